@@ -1,0 +1,82 @@
+//! The library's one error type. Its variants follow the exit codes of the command line.
+
+use std::path::{Path, PathBuf};
+
+/// Everything that can go wrong, grouped by what the user can do about it.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A file or setting holds something it must not (exit code 2).
+    #[error("{file}: {place}: found {found}, expected {expected}")]
+    Input {
+        /// The file, or the name of the bundled resource or flag.
+        file: String,
+        /// The line, field or channel, as in `line 12, field mass_kg`.
+        place: String,
+        /// What stands there.
+        found: String,
+        /// What should stand there.
+        expected: String,
+    },
+    /// A file could not be read or written (exit code 2).
+    #[error("{path}: cannot {action}: {source}")]
+    Io {
+        /// The file or folder.
+        path: PathBuf,
+        /// The verb that failed: `read`, `write`, `create`.
+        action: &'static str,
+        /// The operating system's reason.
+        source: std::io::Error,
+    },
+    /// No device fits what was asked for (exit code 3).
+    #[error("no usable device: {0}")]
+    NoDevice(String),
+    /// A device failed while it worked (exit code 3).
+    #[error("device failure: {0}")]
+    Device(String),
+    /// The study ran and did not reach what it was asked to reach (exit code 1).
+    #[error("{0}")]
+    Study(String),
+    /// The user stopped the run (exit code 130).
+    #[error("interrupted; what was reached is saved in {}", .0.display())]
+    Interrupted(PathBuf),
+}
+
+/// `Result` with this crate's [`Error`].
+pub type Result<T, E = Error> = std::result::Result<T, E>;
+
+impl Error {
+    /// An [`Error::Input`] from anything printable.
+    pub fn input(
+        file: impl AsRef<Path>,
+        place: impl Into<String>,
+        found: impl Into<String>,
+        expected: impl Into<String>,
+    ) -> Self {
+        Self::Input {
+            file: file.as_ref().display().to_string(),
+            place: place.into(),
+            found: found.into(),
+            expected: expected.into(),
+        }
+    }
+
+    /// An [`Error::Io`]; `action` is the verb that failed.
+    pub fn io(path: impl AsRef<Path>, action: &'static str, source: std::io::Error) -> Self {
+        Self::Io {
+            path: path.as_ref().to_owned(),
+            action,
+            source,
+        }
+    }
+
+    /// The exit code the command line ends with (see the README).
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Self::Study(_) => 1,
+            Self::Input { .. } | Self::Io { .. } => 2,
+            Self::NoDevice(_) | Self::Device(_) => 3,
+            Self::Interrupted(_) => 130,
+        }
+    }
+}

@@ -1,0 +1,10 @@
+//! lapswarm evaluates whole swarms of race cars at once.
+
+pub mod error;
+pub mod report;
+pub mod scalar;
+pub mod telemetry;
+pub mod track;
+pub mod vehicle;
+
+pub use error::{Error, Result};
