@@ -1,5 +1,6 @@
 //! lapswarm evaluates whole swarms of race cars at once.
 
+pub mod config;
 pub mod error;
 pub mod report;
 pub mod scalar;

@@ -1,1 +1,78 @@
-//! scalar
+//! The scalars that the physics is written over.
+//!
+//! Every equation of [`crate::vehicle`] is generic over [`Real`], so the same lines run in `f64` (the
+//! reference), in `f32` and `f32` lanes (the SIMD backend, twin of the WGSL kernels) and in dual numbers
+//! (exact derivatives).
+
+mod dual;
+pub mod elementary;
+mod float;
+pub mod lanes;
+
+pub use dual::Dual;
+
+use std::fmt::Debug;
+use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
+
+/// A real number, or a pack of them, that the physics can be evaluated in.
+///
+/// Comparisons yield a [`Real::Mask`] and choices are made by [`Real::select`], never by a branch, because a
+/// pack of lanes takes both sides. Angles are in radians throughout.
+pub trait Real:
+    Copy
+    + Debug
+    + Send
+    + Sync
+    + 'static
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + Neg<Output = Self>
+{
+    /// The truth values of a comparison, one per lane.
+    type Mask: Copy + BitAnd<Output = Self::Mask> + BitOr<Output = Self::Mask> + Not<Output = Self::Mask>;
+    /// The plain float that tables shared by all lanes are stored in.
+    type Storage: Copy + Debug + Send + Sync + 'static;
+
+    /// The constant `x`, rounded to this scalar's precision, in every lane.
+    fn lit(x: f64) -> Self;
+    /// A table value, in every lane.
+    fn load(x: Self::Storage) -> Self;
+    /// `x` rounded to the precision of [`Real::Storage`].
+    fn store(x: f64) -> Self::Storage;
+    /// Square root.
+    fn sqrt(self) -> Self;
+    /// Magnitude.
+    fn abs(self) -> Self;
+    /// The smaller of the two.
+    fn min(self, other: Self) -> Self;
+    /// The larger of the two.
+    fn max(self, other: Self) -> Self;
+    /// Sine of an angle in radians.
+    fn sin(self) -> Self;
+    /// Cosine of an angle in radians.
+    fn cos(self) -> Self;
+    /// Inverse tangent, radians.
+    fn atan(self) -> Self;
+    /// Natural exponential.
+    fn exp(self) -> Self;
+    /// Where `self < other`; false for NaN.
+    fn less_than(self, other: Self) -> Self::Mask;
+    /// The same truth in every lane.
+    fn splat_mask(truth: bool) -> Self::Mask;
+    /// `if_true` where the mask holds, else `if_false`.
+    fn select(mask: Self::Mask, if_true: Self, if_false: Self) -> Self;
+
+    /// Minus one below zero, else plus one: `sgn(0) = +1`, as the Magic Formula wants.
+    #[inline(always)]
+    fn sign(self) -> Self {
+        Self::select(self.less_than(Self::lit(0.0)), Self::lit(-1.0), Self::lit(1.0))
+    }
+
+    /// `cos(atan self)`, by the identity `1 / sqrt(1 + x^2)` instead of two transcendentals.
+    #[inline(always)]
+    fn cos_atan(self) -> Self {
+        Self::lit(1.0) / (Self::lit(1.0) + self * self).sqrt()
+    }
+}

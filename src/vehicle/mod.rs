@@ -1,1 +1,20 @@
-//! vehicle
+//! The car: parameters, tyres, aero, loads, body, and all of it together.
+//!
+//! Axes are ISO 8855: x forward, y left, z up; yaw and steering positive to the left. Wheels are FL, FR, RL,
+//! RR. Units are SI unless a name says otherwise.
+
+pub mod aero;
+pub mod car;
+pub mod chassis;
+pub mod loads;
+pub mod model;
+pub mod parameters;
+pub mod powertrain;
+pub mod tyre;
+
+pub use car::{Car, CarParameter, Tyres};
+pub use chassis::Chassis;
+pub use model::{CarInput, CarModel, CarRate, CarState};
+pub use parameters::ParameterInfo;
+pub use powertrain::Powertrain;
+pub use tyre::{LinearTyre, TyreCoefficients, TyreModel};

@@ -1,0 +1,300 @@
+//! A car as its users write it: TOML with units in the keys, tyres by `.tir`.
+
+use super::chassis::Chassis;
+use super::parameters::ParameterInfo;
+use super::powertrain::Powertrain;
+use super::tyre::{LinearTyre, TyreCoefficients, TyreFile, TyreModel};
+use crate::config::{Document, Table, read_text};
+use crate::error::{Error, Result};
+use std::path::Path;
+
+/// The tyres of both axles.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Tyres {
+    /// Magic Formula 5.2 tyres, front and rear.
+    MagicFormula {
+        /// The front tyre's file.
+        front: Box<TyreFile>,
+        /// The rear tyre's file.
+        rear: Box<TyreFile>,
+    },
+    /// Linear tyres, front and rear.
+    Linear {
+        /// The front tyre.
+        front: LinearTyre<f64>,
+        /// The rear tyre.
+        rear: LinearTyre<f64>,
+    },
+}
+
+/// A car.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Car {
+    /// Its name.
+    pub name: String,
+    /// Body, wheels and air.
+    pub chassis: Chassis<f64>,
+    /// Tyres.
+    pub tyres: Tyres,
+    /// Steering-wheel angle per road-wheel angle.
+    pub steering_ratio: f64,
+    /// The greatest road-wheel angle, rad.
+    pub max_steer_rad: f64,
+    /// Engine and gears, where known.
+    pub powertrain: Option<Powertrain>,
+}
+
+/// A parameter that an identification may free: its name, and where it stands in the car's flat form.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CarParameter {
+    /// The name: a chassis key, a tyre coefficient of both axles (`rBx1`), or of one (`front.rBx1`).
+    pub name: String,
+    /// Unit, bounds and meaning.
+    pub info: ParameterInfo,
+    /// The places in the flat form that it sets.
+    pub slots: Vec<usize>,
+}
+
+/// Names that the literature uses for two chassis parameters.
+const ALIASES: [(&str, &str); 2] = [
+    ("K", "roll_stiffness_nm_per_rad"),
+    ("C", "roll_damping_nms_per_rad"),
+];
+
+const BUNDLED_CAR: &str = include_str!("../../data/cars/gt.toml");
+const BUNDLED_TYRE: &str = include_str!("../../data/cars/gt_slick.tir");
+
+impl Car {
+    /// The bundled GT car (`physics.md` section 8).
+    pub fn bundled() -> Result<Self> {
+        Self::parse(Path::new("the bundled car gt.toml"), BUNDLED_CAR, |name| {
+            TyreFile::parse(Path::new(name), BUNDLED_TYRE)
+        })
+    }
+
+    /// A bundled car by name (`gt`), or a car file; tyre files are looked for beside it.
+    pub fn load(name_or_path: &str) -> Result<Self> {
+        if name_or_path == "gt" {
+            return Self::bundled();
+        }
+        let path = Path::new(name_or_path);
+        let text = read_text(path)?;
+        let folder = path.parent().unwrap_or(Path::new("."));
+        Self::parse(path, &text, |name| TyreFile::read(&folder.join(name)))
+    }
+
+    /// Parses a car's TOML; `tyre` reads a tyre file that it names.
+    ///
+    /// # Errors
+    /// [`Error::Input`] naming line and field for anything missing, unknown or out of its range.
+    pub fn parse(file: &Path, text: &str, tyre: impl Fn(&str) -> Result<TyreFile>) -> Result<Self> {
+        let document = Document::parse(file, text)?;
+        let root = document.root();
+        let chassis_table = root.required_table("chassis")?;
+        let flat = read_parameters(&chassis_table, Chassis::<f64>::PARAMETERS)?;
+        let chassis = Chassis::from_flat(|i| flat[i]);
+        if chassis.drs_lift / 100.0 > 1.0 - chassis.pressure_centre {
+            return Err(chassis_table.refuse(
+                "drs_downforce_percent",
+                "at most the rear axle's share of the downforce, 100 (1 - aero_balance_front)",
+            ));
+        }
+        chassis_table.finish()?;
+
+        let tyre_table = root.required_table("tyres")?;
+        let tyres = read_tyres(&tyre_table, tyre)?;
+        tyre_table.finish()?;
+
+        let steering = root.required_table("steering")?;
+        let powertrain = match root.table("powertrain")? {
+            Some(table) => {
+                let powertrain = Powertrain::from_table(&table)?;
+                table.finish()?;
+                Some(powertrain)
+            }
+            None => None,
+        };
+        let car = Self {
+            name: root.string("name")?.unwrap_or("unnamed car").to_owned(),
+            chassis,
+            tyres,
+            steering_ratio: steering.number("ratio", 0.1, 100.0, "")?.unwrap_or(1.0),
+            max_steer_rad: steering
+                .number("max_road_wheel_angle_rad", 0.01, 1.5, "rad")?
+                .unwrap_or(0.5),
+            powertrain,
+        };
+        steering.finish()?;
+        root.finish()?;
+        Ok(car)
+    }
+
+    /// Writes `<stem>.toml` and the tyre files it names into `folder`.
+    pub fn write(&self, folder: &Path, stem: &str) -> Result<()> {
+        let mut text = format!("name = {}\n\n[chassis]\n", toml_string(&self.name));
+        push_parameters(&mut text, Chassis::<f64>::PARAMETERS, &self.chassis.to_flat());
+        match &self.tyres {
+            Tyres::MagicFormula { front, rear } if front == rear => {
+                let name = format!("{stem}.tir");
+                write_file(&folder.join(&name), &front.to_text())?;
+                text.push_str(&format!("\n[tyres]\nboth = \"{name}\"\n"));
+            }
+            Tyres::MagicFormula { front, rear } => {
+                text.push_str("\n[tyres]\n");
+                for (axle, tyre) in [("front", front), ("rear", rear)] {
+                    let name = format!("{stem}_{axle}.tir");
+                    write_file(&folder.join(&name), &tyre.to_text())?;
+                    text.push_str(&format!("{axle} = \"{name}\"\n"));
+                }
+            }
+            Tyres::Linear { front, rear } => {
+                for (axle, tyre) in [("front", front), ("rear", rear)] {
+                    text.push_str(&format!("\n[tyres.{axle}]\n"));
+                    push_parameters(&mut text, LinearTyre::<f64>::PARAMETERS, &tyre.to_flat());
+                }
+            }
+        }
+        text.push_str(&format!(
+            "\n[steering]\nratio = {:?}\nmax_road_wheel_angle_rad = {:?}\n",
+            self.steering_ratio, self.max_steer_rad
+        ));
+        if let Some(powertrain) = &self.powertrain {
+            text.push('\n');
+            text.push_str(&powertrain.to_toml());
+        }
+        write_file(&folder.join(format!("{stem}.toml")), &text)
+    }
+
+    /// Which tyre model the car has.
+    pub fn tyre_model(&self) -> TyreModel {
+        match self.tyres {
+            Tyres::MagicFormula { .. } => TyreModel::MagicFormula,
+            Tyres::Linear { .. } => TyreModel::Linear,
+        }
+    }
+
+    /// All parameters in a row: chassis, front tyre, rear tyre. Kernels read cars in this form.
+    pub fn to_flat(&self) -> Vec<f64> {
+        let (front, rear) = match &self.tyres {
+            Tyres::MagicFormula { front, rear } => {
+                (front.coefficients.to_flat(), rear.coefficients.to_flat())
+            }
+            Tyres::Linear { front, rear } => (front.to_flat(), rear.to_flat()),
+        };
+        [self.chassis.to_flat(), front, rear].concat()
+    }
+
+    /// This car with the parameters of a flat form; `flat` is as long as [`Car::to_flat`] gives.
+    pub fn with_flat(&self, flat: &[f64]) -> Self {
+        let chassis_count = Chassis::<f64>::PARAMETERS.len();
+        let tyre_count = self.tyre_model().parameters().len();
+        let front_at = |i: usize| flat[chassis_count + i];
+        let rear_at = |i: usize| flat[chassis_count + tyre_count + i];
+        let mut car = self.clone();
+        car.chassis = Chassis::from_flat(|i| flat[i]);
+        match &mut car.tyres {
+            Tyres::MagicFormula { front, rear } => {
+                front.coefficients = TyreCoefficients::from_flat(front_at);
+                rear.coefficients = TyreCoefficients::from_flat(rear_at);
+            }
+            Tyres::Linear { front, rear } => {
+                *front = LinearTyre::from_flat(front_at);
+                *rear = LinearTyre::from_flat(rear_at);
+            }
+        }
+        car
+    }
+
+    /// Looks a parameter up by name, regardless of case.
+    ///
+    /// A tyre parameter without axle (`rBx1`) sets both axles; `front.rBx1` and `rear.rBx1` set one.
+    pub fn parameter(&self, name: &str) -> Option<CarParameter> {
+        let chassis = Chassis::<f64>::PARAMETERS;
+        let tyre = self.tyre_model().parameters();
+        let wanted = ALIASES
+            .iter()
+            .find(|(alias, _)| *alias == name)
+            .map_or(name, |(_, key)| key);
+        let find = |table: &'static [ParameterInfo], key: &str| {
+            table.iter().position(|p| p.name.eq_ignore_ascii_case(key))
+        };
+        if let Some(i) = find(chassis, wanted) {
+            return Some(CarParameter {
+                name: chassis[i].name.to_owned(),
+                info: chassis[i],
+                slots: vec![i],
+            });
+        }
+        let (axle, key) = wanted.split_once('.').unwrap_or(("", wanted));
+        let i = find(tyre, key)?;
+        let front = chassis.len() + i;
+        let rear = front + tyre.len();
+        let (prefix, slots) = match axle {
+            "" => ("", vec![front, rear]),
+            "front" => ("front.", vec![front]),
+            "rear" => ("rear.", vec![rear]),
+            _ => return None,
+        };
+        Some(CarParameter {
+            name: format!("{prefix}{}", tyre[i].name),
+            info: tyre[i],
+            slots,
+        })
+    }
+}
+
+fn read_parameters(table: &Table<'_>, parameters: &[ParameterInfo]) -> Result<Vec<f64>> {
+    parameters
+        .iter()
+        .map(|p| match p.default {
+            Some(default) => Ok(table
+                .number(p.name, p.minimum, p.maximum, p.unit)?
+                .unwrap_or(default)),
+            None => table.required_number(p.name, p.minimum, p.maximum, p.unit),
+        })
+        .collect()
+}
+
+fn push_parameters(text: &mut String, parameters: &[ParameterInfo], values: &[f64]) {
+    for (p, value) in parameters.iter().zip(values) {
+        text.push_str(&format!("{} = {value:?} # {}\n", p.name, p.meaning));
+    }
+}
+
+fn read_tyres(table: &Table<'_>, tyre: impl Fn(&str) -> Result<TyreFile>) -> Result<Tyres> {
+    if let Some(name) = table.string("both")? {
+        let file = Box::new(tyre(name)?);
+        return Ok(Tyres::MagicFormula {
+            front: file.clone(),
+            rear: file,
+        });
+    }
+    let linear = |axle: &str| -> Result<LinearTyre<f64>> {
+        let axle_table = table.required_table(axle)?;
+        let flat = read_parameters(&axle_table, LinearTyre::<f64>::PARAMETERS)?;
+        axle_table.finish()?;
+        Ok(LinearTyre::from_flat(|i| flat[i]))
+    };
+    match (table.string("front"), table.string("rear")) {
+        (Ok(Some(front)), Ok(Some(rear))) => Ok(Tyres::MagicFormula {
+            front: Box::new(tyre(front)?),
+            rear: Box::new(tyre(rear)?),
+        }),
+        (Err(_), Err(_)) => Ok(Tyres::Linear {
+            front: linear("front")?,
+            rear: linear("rear")?,
+        }),
+        _ => Err(table.refuse(
+            "both",
+            "`both = \"x.tir\"`, or `front` and `rear` as .tir files, or tables [tyres.front] and [tyres.rear] of linear tyres",
+        )),
+    }
+}
+
+fn toml_string(text: &str) -> String {
+    toml::Value::String(text.to_owned()).to_string()
+}
+
+fn write_file(path: &Path, text: &str) -> Result<()> {
+    std::fs::write(path, text).map_err(|e| Error::io(path, "write", e))
+}

@@ -1,0 +1,294 @@
+//! The whole car: wheels, tyres, aero, loads and body put together, and one Runge-Kutta step of it
+//! (`physics.md` section 2). Twin of `shaders/car.wgsl`.
+
+use super::aero::aero_forces;
+use super::chassis::{BodyForces, BodyState, Chassis, body_derivative};
+use super::loads::wheel_loads;
+use super::tyre::{Camber, Tyre, TyreForces, TyreInput};
+use crate::scalar::Real;
+
+/// What drives the car: the logged inputs.
+#[derive(Clone, Copy, Debug)]
+pub struct CarInput<R> {
+    /// Angular speeds of the wheels FL FR RL RR, rad/s.
+    pub wheel_speed: [R; 4],
+    /// Angle of the front road wheels, positive to the left, rad.
+    pub steer: R,
+}
+
+/// The state of the car.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CarState<R> {
+    /// The body's state.
+    pub body: BodyState<R>,
+    /// The longitudinal acceleration that load transfer has answered to, m/s^2: it follows the true one with
+    /// the pitch lag, which stands for the pitching body and keeps the loads free of an algebraic loop.
+    pub pitch_acceleration: R,
+}
+
+/// The rate of change of the state, and what an accelerometer on the roll axis reads meanwhile.
+#[derive(Clone, Copy, Debug)]
+pub struct CarRate<R> {
+    /// Time derivative of the state.
+    pub state: CarState<R>,
+    /// Longitudinal acceleration `dVx/dt - Vy r`, m/s^2.
+    pub ax: R,
+    /// Lateral acceleration `dVy/dt + Vx r`, m/s^2.
+    pub ay: R,
+}
+
+/// A car with what is worked out once per candidate.
+#[derive(Clone, Copy, Debug)]
+pub struct CarModel<R, T> {
+    /// Body, wheels and air.
+    pub chassis: Chassis<R>,
+    /// Front tyres.
+    pub front: T,
+    /// Rear tyres.
+    pub rear: T,
+    /// Camber of the wheels FL FR RL RR.
+    camber: [Camber<R>; 4],
+}
+
+/// Slip of one wheel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct WheelSlip<R> {
+    /// Slip ratio, positive when driven.
+    pub ratio: R,
+    /// Tangent of the slip angle, positive when the wheel drifts to its left.
+    pub tangent: R,
+}
+
+/// Slip of a wheel at `(x, y)` (m) from the point under the centre of gravity, turned by the angle whose cosine
+/// and sine are given, with rim speed `rim_speed` (m/s). `floor` is the least speed slip is reckoned with.
+#[inline(always)]
+pub fn wheel_slip<R: Real>(
+    body: &BodyState<R>,
+    (x, y): (R, R),
+    (cos, sin): (R, R),
+    rim_speed: R,
+    floor: R,
+) -> WheelSlip<R> {
+    let hub_x = body.vx - body.yaw_rate * y;
+    let hub_y = body.vy + body.yaw_rate * x;
+    let vx = cos * hub_x + sin * hub_y;
+    let vy = cos * hub_y - sin * hub_x;
+    let speed = vx.abs().max(floor);
+    WheelSlip {
+        ratio: (rim_speed - vx) / speed,
+        tangent: vy / speed,
+    }
+}
+
+/// A tyre's forces turned into body axes: forward and leftward force (N).
+#[inline(always)]
+pub fn to_body_axes<R: Real>(forces: &TyreForces<R>, (cos, sin): (R, R)) -> (R, R) {
+    (forces.x * cos - forces.y * sin, forces.x * sin + forces.y * cos)
+}
+
+impl<R: Real, T: Tyre<R>> CarModel<R, T> {
+    /// Puts a car together.
+    ///
+    /// Negative camber leans the tops inwards: the left wheels then lean to the right, which is a positive
+    /// inclination about the forward axis.
+    #[inline(always)]
+    pub fn new(chassis: Chassis<R>, front: T, rear: T) -> Self {
+        let degree = R::lit(std::f64::consts::PI / 180.0);
+        let front_camber = chassis.camber_front * degree;
+        let rear_camber = chassis.camber_rear * degree;
+        Self {
+            chassis,
+            front,
+            rear,
+            camber: [
+                Camber::new(-front_camber),
+                Camber::new(front_camber),
+                Camber::new(-rear_camber),
+                Camber::new(rear_camber),
+            ],
+        }
+    }
+
+    /// The rate of change of `state` under `input`.
+    #[inline(always)]
+    pub fn rate(&self, state: &CarState<R>, input: &CarInput<R>) -> CarRate<R> {
+        let chassis = &self.chassis;
+        let body = &state.body;
+        let aero = aero_forces(chassis, body.vx);
+        let loads = wheel_loads(chassis, body, state.pitch_acceleration, &aero);
+
+        let steer = input.steer * chassis.steer_scale + chassis.steer_offset;
+        let turned = (steer.cos(), steer.sin());
+        let straight = (R::lit(1.0), R::lit(0.0));
+        let (a, b) = (chassis.cg_to_front, chassis.cg_to_rear);
+        let (wf, wr) = (chassis.half_track_front, chassis.half_track_rear);
+        let places = [(a, wf), (a, -wf), (-b, wr), (-b, -wr)];
+
+        let zero = R::lit(0.0);
+        let mut total = BodyForces {
+            x: -aero.drag,
+            y: zero,
+            yaw_moment: zero,
+        };
+        for wheel in 0..4 {
+            let front = wheel < 2;
+            let direction = if front { turned } else { straight };
+            let radius = if front {
+                chassis.radius_front
+            } else {
+                chassis.radius_rear
+            };
+            let (x, y) = places[wheel];
+            let slip = wheel_slip(
+                body,
+                (x, y),
+                direction,
+                input.wheel_speed[wheel] * radius,
+                chassis.slip_speed_floor,
+            );
+            let tyre_input = TyreInput {
+                load: loads[wheel],
+                slip_ratio: slip.ratio,
+                slip_tangent: slip.tangent,
+                camber: self.camber[wheel],
+            };
+            let forces = if front {
+                self.front.forces(tyre_input)
+            } else {
+                self.rear.forces(tyre_input)
+            };
+            let (force_x, force_y) = to_body_axes(&forces, direction);
+            total.x = total.x + force_x;
+            total.y = total.y + force_y;
+            total.yaw_moment = total.yaw_moment + (x * force_y - y * force_x + forces.aligning_moment);
+        }
+
+        let rate = body_derivative(chassis, body, &total);
+        CarRate {
+            ax: rate.vx - body.vy * body.yaw_rate,
+            ay: rate.vy + body.vx * body.yaw_rate,
+            state: CarState {
+                body: rate,
+                pitch_acceleration: (total.x / chassis.mass - state.pitch_acceleration) / chassis.pitch_lag,
+            },
+        }
+    }
+
+    /// The state after one classical Runge-Kutta step of `step` seconds, the rate at its start being known.
+    ///
+    /// `middle` and `end` are the inputs half a step and a whole step on.
+    #[inline(always)]
+    pub fn runge_kutta_step(
+        &self,
+        state: &CarState<R>,
+        start_rate: &CarState<R>,
+        middle: &CarInput<R>,
+        end: &CarInput<R>,
+        step: R,
+    ) -> CarState<R> {
+        let half = step * R::lit(0.5);
+        let k2 = self.rate(&state.advanced(start_rate, half), middle).state;
+        let k3 = self.rate(&state.advanced(&k2, half), middle).state;
+        let k4 = self.rate(&state.advanced(&k3, step), end).state;
+        let sixth = step * R::lit(1.0 / 6.0);
+        state.combined([start_rate, &k2, &k3, &k4], |y, [k1, k2, k3, k4]| {
+            y + sixth * (k1 + R::lit(2.0) * (k2 + k3) + k4)
+        })
+    }
+}
+
+impl<R: Real> CarState<R> {
+    /// A car rolling straight ahead at `vx` (m/s), nothing else moving.
+    pub fn straight(vx: R) -> Self {
+        let zero = R::lit(0.0);
+        Self {
+            body: BodyState {
+                vx,
+                vy: zero,
+                yaw_rate: zero,
+                roll: zero,
+                roll_rate: zero,
+            },
+            pitch_acceleration: zero,
+        }
+    }
+
+    /// Applies `f` to each component with those of the rates.
+    #[inline(always)]
+    fn combined<const N: usize>(&self, rates: [&Self; N], f: impl Fn(R, [R; N]) -> R) -> Self {
+        Self {
+            body: BodyState {
+                vx: f(self.body.vx, rates.map(|k| k.body.vx)),
+                vy: f(self.body.vy, rates.map(|k| k.body.vy)),
+                yaw_rate: f(self.body.yaw_rate, rates.map(|k| k.body.yaw_rate)),
+                roll: f(self.body.roll, rates.map(|k| k.body.roll)),
+                roll_rate: f(self.body.roll_rate, rates.map(|k| k.body.roll_rate)),
+            },
+            pitch_acceleration: f(self.pitch_acceleration, rates.map(|k| k.pitch_acceleration)),
+        }
+    }
+
+    /// `self + rate * step`.
+    #[inline(always)]
+    fn advanced(&self, rate: &Self, step: R) -> Self {
+        self.combined([rate], |y, [k]| y + step * k)
+    }
+
+    /// The components in the order vx, vy, yaw rate, roll, roll rate, lagged longitudinal acceleration.
+    #[inline(always)]
+    pub fn to_array(self) -> [R; 6] {
+        let b = self.body;
+        [
+            b.vx,
+            b.vy,
+            b.yaw_rate,
+            b.roll,
+            b.roll_rate,
+            self.pitch_acceleration,
+        ]
+    }
+
+    /// From the components in the order of [`CarState::to_array`].
+    #[inline(always)]
+    pub fn from_array([vx, vy, yaw_rate, roll, roll_rate, pitch_acceleration]: [R; 6]) -> Self {
+        Self {
+            body: BodyState {
+                vx,
+                vy,
+                yaw_rate,
+                roll,
+                roll_rate,
+            },
+            pitch_acceleration,
+        }
+    }
+
+    /// Where the car still drives: it neither slides sideways by more than half a right angle (plus 3 m/s), nor
+    /// spins, rolls over or has left the range of numbers. Written so that NaN counts as lost.
+    #[inline(always)]
+    pub fn drives(&self) -> R::Mask {
+        let b = &self.body;
+        b.vy.abs().less_than(b.vx + R::lit(SLIDE_MARGIN))
+            & b.vx.less_than(R::lit(GREATEST_SPEED))
+            & b.yaw_rate.abs().less_than(R::lit(GREATEST_YAW_RATE))
+            & b.roll.abs().less_than(R::lit(GREATEST_ROLL))
+            & b.roll_rate.abs().less_than(R::lit(GREATEST_ROLL_RATE))
+            & self
+                .pitch_acceleration
+                .abs()
+                .less_than(R::lit(GREATEST_ACCELERATION))
+    }
+}
+
+/// Sideways speed that a car may have over its forward speed, m/s.
+pub const SLIDE_MARGIN: f64 = 3.0;
+/// Forward speed at which a candidate counts as lost, m/s.
+pub const GREATEST_SPEED: f64 = 200.0;
+/// Yaw rate at which a candidate counts as spun, rad/s.
+pub const GREATEST_YAW_RATE: f64 = 6.0;
+/// Roll angle at which a candidate counts as rolled over, rad.
+pub const GREATEST_ROLL: f64 = 0.7;
+/// Roll rate at which a candidate counts as lost, rad/s.
+pub const GREATEST_ROLL_RATE: f64 = 50.0;
+/// Longitudinal acceleration at which a candidate counts as lost, m/s^2.
+pub const GREATEST_ACCELERATION: f64 = 500.0;

@@ -1,0 +1,67 @@
+//! Named, bounded parameters: one table per struct, from which readers, writers, optimisers and the shader
+//! loader all take names, units and order.
+
+/// What is known of one parameter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ParameterInfo {
+    /// The key in files and studies.
+    pub name: &'static str,
+    /// The unit, `-` for none.
+    pub unit: &'static str,
+    /// The least value that makes sense.
+    pub minimum: f64,
+    /// The greatest value that makes sense.
+    pub maximum: f64,
+    /// The value where a file is silent; `None` where it must speak.
+    pub default: Option<f64>,
+    /// What it means.
+    pub meaning: &'static str,
+}
+
+impl ParameterInfo {
+    /// Whether `value` is a number within the bounds.
+    pub fn admits(&self, value: f64) -> bool {
+        value >= self.minimum && value <= self.maximum
+    }
+}
+
+/// Declares a struct of parameters over a scalar together with its table.
+macro_rules! parameters {
+    (
+        $(#[$doc:meta])*
+        pub struct $name:ident {
+            $($field:ident: $key:literal [$unit:literal] $min:literal ..= $max:literal, $default:expr, $meaning:literal;)*
+        }
+    ) => {
+        $(#[$doc])*
+        #[derive(Clone, Copy, Debug, PartialEq)]
+        pub struct $name<R> {
+            $(#[doc = concat!($meaning, " (", $unit, ").")] pub $field: R,)*
+        }
+
+        impl<R> $name<R> {
+            /// Name, unit, bounds and meaning of each parameter, in the order of the flat form.
+            pub const PARAMETERS: &'static [$crate::vehicle::parameters::ParameterInfo] = &[
+                $($crate::vehicle::parameters::ParameterInfo {
+                    name: $key, unit: $unit, minimum: $min, maximum: $max, default: $default, meaning: $meaning,
+                },)*
+            ];
+        }
+
+        impl<R: Copy> $name<R> {
+            /// From the flat form, `at(i)` being the `i`-th parameter of the table.
+            #[inline(always)]
+            pub fn from_flat(mut at: impl FnMut(usize) -> R) -> Self {
+                let mut next = 0..;
+                $(let $field = at(next.next().unwrap_or(0));)*
+                Self { $($field),* }
+            }
+
+            /// To the flat form, in the order of the table.
+            pub fn to_flat(&self) -> Vec<R> {
+                vec![$(self.$field),*]
+            }
+        }
+    };
+}
+pub(crate) use parameters;

@@ -1,0 +1,265 @@
+//! `.tir` tyre property files, the field's own format: read, changed in place, and written.
+
+use super::TyreCoefficients;
+use crate::error::{Error, Result};
+use std::fmt::Write as _;
+use std::path::Path;
+
+/// A `.tir` file with the coefficients in it; what lapswarm does not use is kept and written back as it was.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TyreFile {
+    /// The MF 5.2 coefficients.
+    pub coefficients: TyreCoefficients<f64>,
+    lines: Vec<Line>,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+enum Line {
+    /// A comment, header text, a section name, or a key that lapswarm does not use.
+    Other(String),
+    /// The start of a section.
+    Section(String),
+    /// The coefficient at this place of [`TyreCoefficients::PARAMETERS`].
+    Coefficient { index: usize, comment: String },
+}
+
+/// The `FITTYP` values that mean Magic Formula 5.2 (or 2002, its other name).
+const FIT_TYPES: [&str; 3] = ["6", "21", "52"];
+
+/// A parameter's key in a `.tir` file.
+fn tir_key(name: &str) -> String {
+    match name {
+        "R0" => "UNLOADED_RADIUS".to_owned(),
+        // With the letter O, as every tool writes it.
+        "lFz0" => "LFZO".to_owned(),
+        _ => name.to_uppercase(),
+    }
+}
+
+/// The section in which a parameter stands.
+fn tir_section(name: &str) -> &'static str {
+    match name.as_bytes() {
+        b"R0" => "DIMENSION",
+        b"FNOMIN" => "VERTICAL",
+        [b'l', ..] => "SCALING_COEFFICIENTS",
+        [b'q' | b's', ..] => "ALIGNING_COEFFICIENTS",
+        [b'p', _, axis, ..] | [b'r', _, axis, ..] if *axis == b'x' => "LONGITUDINAL_COEFFICIENTS",
+        _ => "LATERAL_COEFFICIENTS",
+    }
+}
+
+/// The value before any comment (`$` or `!`), and the comment with its mark.
+fn split_comment(text: &str) -> (&str, &str) {
+    match text.find(['$', '!']) {
+        Some(at) => (text[..at].trim(), text[at..].trim_end()),
+        None => (text.trim(), ""),
+    }
+}
+
+fn unquote(value: &str) -> &str {
+    value.trim_matches(|c| c == '\'' || c == '"').trim()
+}
+
+impl TyreFile {
+    /// Reads a `.tir` file.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if it cannot be read; [`Error::Input`] naming line and key for a wrong `FITTYP`, units other
+    /// than SI, a coefficient that is no number or out of its range, a repeated or a missing one.
+    pub fn read(path: &Path) -> Result<Self> {
+        let bytes = std::fs::read(path).map_err(|e| Error::io(path, "read", e))?;
+        // Comments in the wild are Latin-1; the keys and figures are ASCII either way.
+        Self::parse(path, &String::from_utf8_lossy(&bytes))
+    }
+
+    /// Parses the text of a `.tir` file; `file` is only named in errors.
+    pub fn parse(file: &Path, text: &str) -> Result<Self> {
+        let table = TyreCoefficients::<f64>::PARAMETERS;
+        let keys: Vec<String> = table.iter().map(|p| tir_key(p.name)).collect();
+        let mut values: Vec<Option<f64>> = vec![None; table.len()];
+        let mut lines = Vec::new();
+        let mut section = String::new();
+        let mut fit_type = None;
+        for (number, line) in text.lines().enumerate() {
+            let place = |key: &str| format!("line {}, key {key}", number + 1);
+            let trimmed = line.trim();
+            if let Some(name) = trimmed.strip_prefix('[') {
+                let Some(end) = name.find(']') else {
+                    return Err(Error::input(
+                        file,
+                        format!("line {}", number + 1),
+                        trimmed,
+                        "a section name in [brackets]",
+                    ));
+                };
+                section = name[..end].trim().to_uppercase();
+                lines.push(Line::Section(line.trim_end().to_owned()));
+                continue;
+            }
+            let entry = trimmed
+                .split_once('=')
+                .filter(|_| !trimmed.starts_with(['$', '!', '{']));
+            let Some((key, rest)) = entry else {
+                lines.push(Line::Other(line.trim_end().to_owned()));
+                continue;
+            };
+            let key = key.trim().to_uppercase();
+            let (value, comment) = split_comment(rest);
+            let value = unquote(value);
+            if section == "UNITS" {
+                check_unit(file, &place(&key), &key, value)?;
+            }
+            if section == "MODEL" && key == "FITTYP" {
+                if !FIT_TYPES.contains(&value) {
+                    return Err(Error::input(
+                        file,
+                        place(&key),
+                        value,
+                        "6, 21 or 52 (Magic Formula 5.2)",
+                    ));
+                }
+                fit_type = Some(());
+            }
+            let Some(index) = keys.iter().position(|k| *k == key) else {
+                lines.push(Line::Other(line.trim_end().to_owned()));
+                continue;
+            };
+            let info = &table[index];
+            let parsed = value
+                .parse::<f64>()
+                .ok()
+                .filter(|x| info.admits(*x))
+                .ok_or_else(|| {
+                    let expected = format!(
+                        "a number from {} to {} ({})",
+                        info.minimum, info.maximum, info.meaning
+                    );
+                    Error::input(file, place(&key), value, expected)
+                })?;
+            if values[index].replace(parsed).is_some() {
+                return Err(Error::input(
+                    file,
+                    place(&key),
+                    "the key a second time",
+                    "each key once",
+                ));
+            }
+            lines.push(Line::Coefficient {
+                index,
+                comment: comment.to_owned(),
+            });
+        }
+        if fit_type.is_none() {
+            return Err(Error::input(
+                file,
+                "section [MODEL], key FITTYP",
+                "nothing",
+                "6, 21 or 52 (Magic Formula 5.2)",
+            ));
+        }
+        let mut flat = Vec::with_capacity(table.len());
+        for (info, value) in table.iter().zip(values) {
+            flat.push(value.or(info.default).ok_or_else(|| {
+                let place = format!("section [{}], key {}", tir_section(info.name), tir_key(info.name));
+                Error::input(file, place, "nothing", format!("a number ({})", info.meaning))
+            })?);
+        }
+        Ok(Self {
+            coefficients: TyreCoefficients::from_flat(|i| flat[i]),
+            lines,
+        })
+    }
+
+    /// A file of its own for coefficients that came from nowhere.
+    pub fn new(coefficients: TyreCoefficients<f64>) -> Self {
+        let header = "[MDI_HEADER]\nFILE_TYPE = 'tir'\nFILE_VERSION = 3.0\nFILE_FORMAT = 'ASCII'\n[UNITS]\nLENGTH = 'meter'\nFORCE = 'newton'\nANGLE = 'radians'\nMASS = 'kg'\nTIME = 'second'\n[MODEL]\nPROPERTY_FILE_FORMAT = 'PAC2002'\nFITTYP = 6";
+        Self {
+            coefficients,
+            lines: header
+                .lines()
+                .map(|line| {
+                    if line.starts_with('[') {
+                        Line::Section(line.to_owned())
+                    } else {
+                        Line::Other(line.to_owned())
+                    }
+                })
+                .collect(),
+        }
+    }
+
+    /// The text of the file with the present coefficients, figures that read back bit for bit.
+    pub fn to_text(&self) -> String {
+        let table = TyreCoefficients::<f64>::PARAMETERS;
+        let flat = self.coefficients.to_flat();
+        let written: Vec<usize> = self
+            .lines
+            .iter()
+            .filter_map(|line| match line {
+                Line::Coefficient { index, .. } => Some(*index),
+                _ => None,
+            })
+            .collect();
+        // A coefficient the file did not have is only worth a line where it differs from its default.
+        let mut missing: Vec<usize> = (0..table.len())
+            .filter(|i| !written.contains(i) && table[*i].default != Some(flat[*i]))
+            .collect();
+        let entry = |index: usize| format!("{:<24} = {}", tir_key(table[index].name), flat[index]);
+        let mut text = String::new();
+        for line in &self.lines {
+            match line {
+                Line::Other(line) => text.push_str(line),
+                Line::Coefficient { index, comment } => {
+                    let _ = write!(text, "{} {comment}", entry(*index));
+                    text.truncate(text.trim_end().len());
+                }
+                Line::Section(line) => {
+                    text.push_str(line);
+                    missing.retain(|&index| {
+                        let here = line
+                            .to_uppercase()
+                            .contains(&format!("[{}]", tir_section(table[index].name)));
+                        if here {
+                            let _ = write!(text, "\n{}", entry(index));
+                        }
+                        !here
+                    });
+                }
+            }
+            text.push('\n');
+        }
+        while let Some(&first) = missing.first() {
+            let section = tir_section(table[first].name);
+            let _ = writeln!(text, "[{section}]");
+            missing.retain(|&index| {
+                let here = tir_section(table[index].name) == section;
+                if here {
+                    let _ = writeln!(text, "{}", entry(index));
+                }
+                !here
+            });
+        }
+        text
+    }
+}
+
+fn check_unit(file: &Path, place: &str, key: &str, value: &str) -> Result<()> {
+    let allowed: &[&str] = match key {
+        "LENGTH" => &["meter", "metre", "m"],
+        "FORCE" => &["newton", "n"],
+        "ANGLE" => &["radians", "radian", "rad"],
+        "MASS" => &["kg", "kilogram"],
+        "TIME" => &["second", "sec", "s"],
+        _ => return Ok(()),
+    };
+    if allowed.contains(&value.to_lowercase().as_str()) {
+        Ok(())
+    } else {
+        Err(Error::input(
+            file,
+            place,
+            value,
+            format!("'{}': lapswarm reads tyre files in SI units", allowed[0]),
+        ))
+    }
+}

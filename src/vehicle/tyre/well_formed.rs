@@ -1,0 +1,92 @@
+//! Which Magic Formula coefficients make no tyre. Judged once per candidate in `f64`, before any integration,
+//! so that every backend refuses the same candidates for the same reasons.
+
+use super::{Camber, LEAST_LOAD, Tyre, TyreCoefficients, TyreInput};
+use std::fmt;
+
+/// Why a set of coefficients makes no tyre.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum IllFormed {
+    /// A coefficient is not a finite number.
+    NotFinite,
+    /// Peak friction is not positive somewhere in the working range of loads.
+    Friction,
+    /// Slip or cornering stiffness has the wrong sign or vanishes somewhere in the working range of loads.
+    Stiffness,
+    /// A combined-slip weight divides by (nearly) nought, or leaves a negative force at slips driven daily.
+    Weighting,
+}
+
+impl fmt::Display for IllFormed {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::NotFinite => "a coefficient that is not a finite number",
+            Self::Friction => "friction that is not positive",
+            Self::Stiffness => {
+                "slip stiffness that is not positive or cornering stiffness that is not negative"
+            }
+            Self::Weighting => "combined-slip weights that vanish or turn negative",
+        })
+    }
+}
+
+/// Loads (in nominal loads) at which a tyre is judged: from nearly lifted to a loaded outer wheel.
+const LOADS: [f64; 4] = [0.1, 0.5, 1.0, 2.0];
+/// The slip within which the weights must stay positive, as slip ratio and as tangent of the slip angle.
+const WORKING_SLIP: f64 = 0.15;
+/// The least denominator of a weight: below it the formula multiplies forces more than tenfold.
+const LEAST_DENOMINATOR: f64 = 0.1;
+
+impl TyreCoefficients<f64> {
+    /// Whether the coefficients make a tyre (`physics.md` section 1, "Numerics").
+    pub fn well_formed(&self) -> Result<(), IllFormed> {
+        if self.to_flat().iter().any(|x| !x.is_finite()) {
+            return Err(IllFormed::NotFinite);
+        }
+        let shape = |c: f64, b: f64, e: f64, x: f64| {
+            let u = b * x - e.min(1.0) * (b * x - (b * x).atan());
+            (c * u.atan()).cos()
+        };
+        for share in LOADS {
+            let nominal = self.fnomin * self.lfz0;
+            let dfz = share - 1.0;
+            if !((self.pdx1 + self.pdx2 * dfz) * self.lmux > 0.0
+                && (self.pdy1 + self.pdy2 * dfz) * self.lmuy > 0.0)
+            {
+                return Err(IllFormed::Friction);
+            }
+            // The cornering stiffness goes as 2z/(1+z^2) with z = share/pKy2, which has the sign of pKy2.
+            if !((self.pkx1 + self.pkx2 * dfz) * self.lkx > 0.0 && self.pky1 * self.pky2 * self.lky < 0.0) {
+                return Err(IllFormed::Stiffness);
+            }
+            let ex = self.rex1 + self.rex2 * dfz;
+            let ey = self.rey1 + self.rey2 * dfz;
+            let shift = self.rhy1 + self.rhy2 * dfz;
+            // The slopes are steepest, and so the denominators least, where the other slip is nought.
+            let bx = self.rbx1 * self.lxal;
+            let by = self.rby1 * self.lyka;
+            if !(shape(self.rcx1, bx, ex, self.rhx1) > LEAST_DENOMINATOR
+                && shape(self.rcy1, by, ey, shift) > LEAST_DENOMINATOR)
+            {
+                return Err(IllFormed::Weighting);
+            }
+            for slip in [-WORKING_SLIP, WORKING_SLIP] {
+                if !(shape(self.rcx1, bx, ex, slip + self.rhx1) > 0.0
+                    && shape(self.rcy1, by, ey, slip + shift) > 0.0)
+                {
+                    return Err(IllFormed::Weighting);
+                }
+            }
+            let forces = self.forces(TyreInput {
+                load: (share * nominal).max(LEAST_LOAD),
+                slip_ratio: WORKING_SLIP,
+                slip_tangent: WORKING_SLIP,
+                camber: Camber::new(0.0),
+            });
+            if !(forces.x.is_finite() && forces.y.is_finite() && forces.aligning_moment.is_finite()) {
+                return Err(IllFormed::NotFinite);
+            }
+        }
+        Ok(())
+    }
+}
