@@ -2,6 +2,7 @@
 
 pub mod config;
 pub mod error;
+pub mod evaluate;
 pub mod report;
 pub mod scalar;
 pub mod telemetry;

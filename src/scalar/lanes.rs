@@ -166,11 +166,12 @@ mod x86 {
     //! come to life only inside `#[target_feature]` functions that `evaluate::simd` calls after detecting the
     //! set. Memory is only touched through arrays of exactly the register's size.
 
+    // Some mask operations of some sets are plain integer arithmetic, in which `unsafe` says nothing.
+    #![allow(unused_unsafe)]
+
     use super::*;
     use std::arch::x86_64::*;
 
-    // Some mask operations of some sets are plain integer arithmetic, in which `unsafe` says nothing.
-    #[allow(unused_unsafe)]
     macro_rules! register_lanes {
         (
             $(#[$doc:meta])* $name:ident($register:ty) x $lanes:literal, $mask_name:ident($mask:ty),

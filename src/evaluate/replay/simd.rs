@@ -1,0 +1,136 @@
+//! The lane backend: `f32`, as many candidates at once as a register holds, threads by rayon.
+
+use super::cpu::{build_car, collect_rows};
+use super::kernel::{CHANNELS, score_window};
+use super::problem::{Plan, ReplayProblem, Window};
+use crate::error::Result;
+use crate::evaluate::simd::{InstructionSet, LaneWork, dispatch};
+use crate::evaluate::{BackendInfo, Evaluation, Evaluator, Problem};
+use crate::scalar::lanes::Lanes;
+use crate::vehicle::tyre::Tyre;
+use crate::vehicle::{LinearTyre, TyreCoefficients, TyreModel};
+use rayon::prelude::*;
+
+/// The most lanes of any pack.
+const MOST_LANES: usize = 16;
+
+/// Scores replays in `f32` lanes.
+pub struct SimdEvaluator<'a> {
+    replay: &'a ReplayProblem,
+    plan: Plan<f32>,
+    base: Vec<f32>,
+    set: InstructionSet,
+}
+
+/// One pack of candidates through one window.
+struct PackThroughWindow<'a> {
+    evaluator: &'a SimdEvaluator<'a>,
+    /// Rows of the candidates, at most as many as lanes.
+    rows: &'a [&'a [f64]],
+    window: &'a Window<f32>,
+}
+
+/// Errors per channel and lane, and a bit per lane that drove to the end.
+type PackScore = ([[f32; MOST_LANES]; CHANNELS], u32);
+
+impl PackThroughWindow<'_> {
+    #[inline(always)]
+    fn score<L: Lanes, T: Tyre<L>>(&self) -> PackScore {
+        let sources = self.evaluator.replay.sources();
+        let car = build_car::<L, T>(|slot| match sources[slot] {
+            // Lanes without a candidate repeat the last one, so that they cost no special case.
+            Some(variable) => L::from_fn(|lane| self.rows[lane.min(self.rows.len() - 1)][variable] as f32),
+            None => L::load(self.evaluator.base[slot]),
+        });
+        let score = score_window(&car, &self.evaluator.plan, self.window);
+        let mut errors = [[0.0; MOST_LANES]; CHANNELS];
+        for (out, lanes) in errors.iter_mut().zip(score.errors) {
+            lanes.write(out);
+        }
+        (errors, L::mask_bits(score.drives))
+    }
+}
+
+impl LaneWork for PackThroughWindow<'_> {
+    type Output = PackScore;
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) -> PackScore {
+        match self.evaluator.replay.tyre_model() {
+            TyreModel::MagicFormula => self.score::<L, TyreCoefficients<L>>(),
+            TyreModel::Linear => self.score::<L, LinearTyre<L>>(),
+        }
+    }
+}
+
+impl<'a> SimdEvaluator<'a> {
+    /// An evaluator of `replay` in the lanes of `set`.
+    pub fn new(replay: &'a ReplayProblem, set: InstructionSet) -> Self {
+        Self {
+            replay,
+            plan: replay.plan.to_f32(),
+            base: replay.base().iter().map(|x| *x as f32).collect(),
+            set,
+        }
+    }
+}
+
+impl Evaluator for SimdEvaluator<'_> {
+    fn problem(&self) -> &Problem {
+        &self.replay.problem
+    }
+
+    fn backend(&self) -> BackendInfo {
+        BackendInfo {
+            backend: "simd",
+            device: self.set.name().to_owned(),
+            driver: String::new(),
+        }
+    }
+
+    fn evaluate(&mut self, population: &[f64]) -> Result<Evaluation> {
+        let candidates: Vec<&[f64]> = population.chunks_exact(self.replay.dimensions().max(1)).collect();
+        let preliminary: Vec<_> = candidates
+            .par_iter()
+            .map(|c| self.replay.preliminary_failure(c))
+            .collect();
+        // Only what can be driven takes a lane.
+        let driven: Vec<usize> = (0..candidates.len())
+            .filter(|&i| preliminary[i].is_none())
+            .collect();
+        let rows: Vec<&[f64]> = driven.iter().map(|&i| candidates[i]).collect();
+
+        let windows = &self.plan.windows;
+        let packs: Vec<&[&[f64]]> = rows.chunks(self.set.lanes()).collect();
+        let evaluator = &*self;
+        let scores: Vec<PackScore> = (0..packs.len() * windows.len())
+            .into_par_iter()
+            .map(|job| {
+                let work = PackThroughWindow {
+                    evaluator,
+                    rows: packs[job / windows.len()],
+                    window: &windows[job % windows.len()],
+                };
+                dispatch(evaluator.set, work)
+            })
+            .collect();
+
+        let mut results: Vec<_> = preliminary
+            .iter()
+            .map(|f| (self.replay.objective_row(None).0, *f))
+            .collect();
+        for (place, &candidate) in driven.iter().enumerate() {
+            let (pack, lane) = (place / self.set.lanes(), place % self.set.lanes());
+            let mut total = Some([0.0; CHANNELS]);
+            for (errors, drives) in &scores[pack * windows.len()..(pack + 1) * windows.len()] {
+                total = total.filter(|_| drives >> lane & 1 == 1);
+                if let Some(total) = &mut total {
+                    let errors: [f64; CHANNELS] = std::array::from_fn(|k| f64::from(errors[k][lane]));
+                    self.replay.accumulate(total, errors);
+                }
+            }
+            results[candidate] = self.replay.objective_row(total);
+        }
+        Ok(collect_rows(results))
+    }
+}
