@@ -229,7 +229,7 @@ impl CurvatureTable {
                 return self.refuse(place("station_m"), s.to_string(), "0 in the first row");
             }
             last = s;
-            if !(row.curvature_1pm.abs() <= 1.0) {
+            if !(-1.0..=1.0).contains(&row.curvature_1pm) {
                 let found = row.curvature_1pm.to_string();
                 return self.refuse(place("curvature_1pm"), found, "-1 to 1 per metre");
             }
@@ -237,7 +237,7 @@ impl CurvatureTable {
                 ("width_left_m", row.width_left_m),
                 ("width_right_m", row.width_right_m),
             ] {
-                if !(width >= 0.0 && width <= 200.0) {
+                if !(0.0..=200.0).contains(&width) {
                     return self.refuse(place(field), width.to_string(), "0 to 200 m");
                 }
             }
@@ -274,7 +274,7 @@ impl CurvatureTable {
         // A figure of eight turns by nought in all, a simple lap by one turn either way.
         let wanted = TAU * (turn / TAU).round().clamp(-1.0, 1.0);
         let turn_error_rad = turn - wanted;
-        if !(turn_error_rad.abs() <= LARGEST_TURN_ERROR) {
+        if turn_error_rad.abs() > LARGEST_TURN_ERROR {
             return self.refuse(
                 "curvature table",
                 format!("a total turn of {:.1} degrees", turn.to_degrees()),
@@ -284,7 +284,7 @@ impl CurvatureTable {
         let spread = turn_error_rad / self.length_m;
         let untwisted: Vec<f64> = curvature.iter().map(|k| k - spread).collect();
         let gap_m = run(&untwisted).end().1.length();
-        if !(gap_m <= LARGEST_GAP * self.length_m) {
+        if gap_m > LARGEST_GAP * self.length_m {
             return self.refuse(
                 "curvature table",
                 format!("an end {gap_m:.1} m away from the start"),
