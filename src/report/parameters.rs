@@ -4,7 +4,9 @@ use std::path::Path;
 
 use super::axis::Axis;
 use super::canvas::{Align, Canvas, Type, draw_to_file};
-use super::style::{BLUE, FAINT_INK, GREYED, GRID, INK, SHADE, TICK_PX, VERMILLION, significant};
+use super::style::{
+    BLUE, FAINT_INK, GREYED, GRID, INK, SHADE, TICK_PX, VERMILLION, significant, trimmed,
+};
 use crate::{Error, Result};
 
 /// One parameter of the table.
@@ -75,16 +77,16 @@ pub fn plot_parameters(
     let bottom = HEAD + ROW * rows.len() as f64;
     draw_to_file(path, (WIDTH, bottom + 48.0), title, |canvas| {
         draw_head(canvas, rows);
+        for i in (0..rows.len()).step_by(2) {
+            let y = HEAD + ROW * i as f64;
+            canvas.rect((16.0, y), (WIDTH - 16.0, y + ROW), SHADE, 0.6);
+        }
         for quarter in 0..=4 {
             let x = TRACK.0 + f64::from(quarter) / 4.0 * (TRACK.1 - TRACK.0);
             canvas.line((x, HEAD), (x, bottom), GRID, 0.8);
         }
         for (i, row) in rows.iter().enumerate() {
             let y = HEAD + ROW * (i as f64 + 0.5);
-            if i % 2 == 0 {
-                let (a, b) = ((16.0, y - 0.5 * ROW), (WIDTH - 16.0, y + 0.5 * ROW));
-                canvas.rect(a, b, SHADE, 0.6);
-            }
             draw_row(canvas, row, y);
         }
         draw_key(canvas, rows, bottom + 24.0);
@@ -126,27 +128,28 @@ fn draw_row(canvas: &mut Canvas<'_>, row: &ParameterRow<'_>, y: f64) {
     };
     canvas.text(&name, (NAME_X, y), cell(ink, Align::Left).bold());
     canvas.text(row.unit, (UNIT_X, y), cell(quiet, Align::Left));
-    let lower = significant(row.lower, 4);
+    let lower = trimmed(row.lower, 4);
     canvas.text(&lower, (LOWER_X, y), cell(quiet, Align::Right));
-    let upper = significant(row.upper, 4);
+    let upper = trimmed(row.upper, 4);
     canvas.text(&upper, (UPPER_X, y), cell(quiet, Align::Left));
     let swarm = significant(row.swarm, 4);
     canvas.text(&swarm, (SWARM_X, y), cell(ink, Align::Right));
     if row.identifiable {
         // The sign in the middle of the column lines up the figures on both sides.
-        let fitted = significant(row.fitted, 5);
-        let error = row
-            .standard_error
-            .map_or("\u{2013}".to_owned(), |e| significant(e, 2));
-        canvas.text("\u{00b1}", (FITTED_X + 14.0, y), cell(quiet, Align::Centre));
+        let error = row.standard_error.filter(|e| e.is_finite() && *e > 0.0);
+        let fitted = error.map_or(significant(row.fitted, 4), |e| to_error(row.fitted, e));
         canvas.text(&fitted, (FITTED_X + 4.0, y), cell(ink, Align::Right));
-        canvas.text(&error, (FITTED_X + 24.0, y), cell(quiet, Align::Left));
+        if let Some(error) = error {
+            let text = significant(error, 2);
+            canvas.text("\u{00b1}", (FITTED_X + 14.0, y), cell(quiet, Align::Centre));
+            canvas.text(&text, (FITTED_X + 24.0, y), cell(quiet, Align::Left));
+        }
     } else {
         let at = (FITTED_X + 14.0, y);
         canvas.text("not identifiable", at, cell(GREYED, Align::Centre));
     }
     if let Some(truth) = row.truth {
-        let text = significant(truth, 5);
+        let text = trimmed(truth, 5);
         canvas.text(&text, (TRUTH_X, y), cell(quiet, Align::Right));
     }
 
@@ -180,6 +183,13 @@ fn draw_row(canvas: &mut Canvas<'_>, row: &ParameterRow<'_>, y: f64) {
     if let Some(x) = place(&track, row.fitted) {
         canvas.dot((x, y), 3.6, BLUE, 1.0);
     }
+}
+
+/// A value to the last figure that its standard error leaves certain.
+fn to_error(value: f64, error: f64) -> String {
+    let spare = (value.abs() / error).log10().floor();
+    let figures = if spare.is_finite() { spare + 2.0 } else { 2.0 };
+    significant(value, figures.clamp(1.0, 8.0) as usize)
 }
 
 /// The pixel of a value, held to just outside the bounds so that an escaped one is seen as such.
