@@ -114,7 +114,7 @@ impl Axis {
         let first = (self.low / step - 1e-6).ceil() as i64;
         let last = (self.high / step + 1e-6).floor() as i64;
         let largest = self.low.abs().max(self.high.abs());
-        (first..=last.min(first + 100))
+        (first..=last.min(first.saturating_add(100)))
             .map(|i| {
                 let value = i as f64 * step;
                 (value, tick_label(value, step, largest))

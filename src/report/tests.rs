@@ -302,7 +302,15 @@ fn row(i: usize, name: &str) -> ParameterRow<'_> {
 
 #[test]
 fn parameters_list_every_row() {
-    let names: Vec<String> = (0..60).map(|i| format!("rBx{i}")).collect();
+    let names: Vec<String> = (0..60)
+        .map(|i| {
+            if i % 7 == 3 {
+                format!("roll_damping_{i}")
+            } else {
+                format!("rBx{i}")
+            }
+        })
+        .collect();
     for n in [1, 22, 60] {
         let rows: Vec<_> = (0..n).map(|i| row(i, &names[i])).collect();
         let name = format!("parameters{n}");

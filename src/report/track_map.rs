@@ -330,12 +330,13 @@ fn best_place(
         .map(|(far, block)| {
             let covered = road.iter().filter(|&&p| block.gap(p) < CLEAR).count();
             let clashes = taken.iter().filter(|t| t.overlaps(&block)).count();
-            // A name nearer to another place would be read as that place's.
-            let own = block.gap(place) + 10.0;
-            let astray = places.iter().filter(|&&p| p != place && block.gap(p) < own);
+            // A name nearer to another part of the lap would be read as that part's.
+            let own = block.gap(place);
+            let nearer = |p: &&DVec2| p.distance(place) > 60.0 && block.gap(**p) < own;
+            let astray = places.iter().chain(road).any(|p| nearer(&p));
             let cost = far
                 + 20.0 * covered as f64
-                + 40.0 * astray.count() as f64
+                + if astray { 25.0 } else { 0.0 }
                 + 1000.0 * clashes as f64;
             (cost, block)
         })
