@@ -61,9 +61,20 @@ impl Type {
         }
     }
 
-    /// About how wide a text comes out (px). Viewers choose the font, so this errs on the wide side.
+    /// About how wide a text comes out (px), by the widths of Helvetica. Viewers may choose another
+    /// font, so this errs on the wide side.
     pub(super) fn width(&self, text: &str) -> f64 {
-        text.chars().count() as f64 * self.size_px * if self.bold { 0.6 } else { 0.55 }
+        let em: f64 = text
+            .chars()
+            .map(|c| match c {
+                'i' | 'j' | 'l' | 'I' | '.' | ',' | ':' | '\'' | '|' => 0.27,
+                ' ' | 'f' | 't' | 'r' | '(' | ')' | '/' | '-' => 0.31,
+                'm' | 'w' | 'M' | 'W' => 0.83,
+                c if c.is_ascii_uppercase() => 0.70,
+                _ => 0.56,
+            })
+            .sum();
+        em * self.size_px * if self.bold { 1.12 } else { 1.05 }
     }
 }
 

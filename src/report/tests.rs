@@ -68,7 +68,7 @@ fn lap(samples: usize, scale: f64, phase: f64) -> (Vec<f64>, Vec<f64>) {
     (measured.collect(), fitted.collect())
 }
 
-fn traces(samples: usize, title: &str, section: &str) -> Result<String> {
+fn traces(name: &str, samples: usize, title: &str, section: &str) -> Result<String> {
     let x: Vec<f64> = (0..samples)
         .map(|i| 5887.0 * i as f64 / samples as f64)
         .collect();
@@ -114,12 +114,18 @@ fn traces(samples: usize, title: &str, section: &str) -> Result<String> {
             .map(|(name, start, end)| ShadedSection { name, start, end })
             .to_vec(),
     };
-    drawn("traces", |path| plot_traces(path, &figure))
+    drawn(name, |path| plot_traces(path, &figure))
 }
 
 #[test]
 fn traces_show_channels_errors_and_sections() {
-    let svg = traces(12_000, "Silverstone: measured and fitted", "Abbey").expect("drawn");
+    let svg = traces(
+        "traces",
+        12_000,
+        "Silverstone: measured and fitted",
+        "Abbey",
+    )
+    .expect("drawn");
     for label in [
         "yaw rate (rad/s)",
         "speed (m/s)",
@@ -135,6 +141,7 @@ fn traces_show_channels_errors_and_sections() {
 #[test]
 fn names_from_files_cannot_inject_markup() {
     let svg = traces(
+        "markup",
         50,
         "<script>alert(1)</script> & \"co\"\u{1b}\u{0}",
         "<b>]]>",
@@ -146,7 +153,7 @@ fn names_from_files_cannot_inject_markup() {
 #[test]
 fn hopeless_traces_are_refused_and_poor_ones_drawn() {
     for samples in [0, 1] {
-        let error = traces(samples, "short", "A").expect_err("no extent");
+        let error = traces("short", samples, "short", "A").expect_err("no extent");
         assert!(error.to_string().contains("horizontal axis"), "{error}");
     }
     let x = [0.0, 1.0, 2.0];
@@ -295,7 +302,15 @@ fn row(i: usize, name: &str) -> ParameterRow<'_> {
 
 #[test]
 fn parameters_list_every_row() {
-    let names: Vec<String> = (0..60).map(|i| format!("rBx{i}")).collect();
+    let names: Vec<String> = (0..60)
+        .map(|i| {
+            if i % 7 == 3 {
+                format!("roll_damping_{i}")
+            } else {
+                format!("rBx{i}")
+            }
+        })
+        .collect();
     for n in [1, 22, 60] {
         let rows: Vec<_> = (0..n).map(|i| row(i, &names[i])).collect();
         let name = format!("parameters{n}");

@@ -201,11 +201,10 @@ fn draw_panel(
     let fitted = over(panel.fitted).into_iter();
     curves.curve(canvas, fitted, BLUE, FITTED_PX);
 
-    let largest = extent(&errors).map_or(1.0, |(low, high)| low.abs().max(high.abs()));
-    let largest = if largest > 0.0 { largest } else { 1.0 };
+    let largest = extent(&errors).map_or(0.0, |(low, high)| low.abs().max(high.abs()));
     let error = Plot {
         x,
-        y: Axis::padded((-largest, largest), 0.08, (error_bottom, error_top)),
+        y: Axis::around_zero(largest, (error_bottom, error_top)),
     };
     error.draw_axes(
         canvas,

@@ -39,8 +39,9 @@ pub struct TrackMap<'a> {
 const ROOM: (f64, f64) = (120.0, 40.0);
 const TOP: f64 = 52.0;
 const BAR_ROOM: f64 = 120.0;
-const LINE_PX: f64 = 4.0;
+const LINE_PX: f64 = 3.4;
 const ROAD: RGBColor = RGBColor(232, 232, 232);
+const EDGE: RGBColor = RGBColor(120, 120, 120);
 /// Steps of colour: finer ones cannot be told apart and only make the file longer.
 const SHADES: f64 = 64.0;
 
@@ -119,7 +120,7 @@ pub fn plot_track_map(path: impl AsRef<Path>, map: &TrackMap<'_>) -> Result<()> 
             start,
             DVec2::new(width - BAR_ROOM, height),
         );
-        draw_scale(canvas, &view, size.x, height);
+        draw_scale(canvas, &view, size.max_element(), height);
         if let Some(range) = range {
             let bar = (width - BAR_ROOM + 24.0, height);
             draw_colour_bar(canvas, map, range, bar);
@@ -157,7 +158,7 @@ fn draw_road(canvas: &mut Canvas<'_>, map: &TrackMap<'_>, view: &View) {
         canvas.polygon(around, ROAD);
     }
     for edge in left.iter().chain(&right) {
-        canvas.path(edge.iter().copied(), FRAME, 0.9);
+        canvas.path(edge.iter().copied(), EDGE, 0.9);
     }
 }
 
@@ -280,18 +281,21 @@ fn draw_names(
         .iter()
         .map(|&(name, place)| (name, view.at(place)));
     let first = start.map(|[at, _]| ("start", at));
-    for (name, place) in first.into_iter().chain(named) {
+    let all: Vec<(&str, DVec2)> = first.into_iter().chain(named).collect();
+    let places: Vec<DVec2> = all.iter().map(|(_, place)| *place).collect();
+    for (name, place) in all {
         if !place.is_finite() || name.is_empty() {
             continue;
         }
         let half = 0.5 * DVec2::new(look.width(name), LABEL_PX + 2.0);
-        let Some(block) = best_place(place, half, &road, &taken, limits) else {
+        let Some(block) = best_place(place, half, &road, &places, &taken, limits) else {
             continue;
         };
         let near = place.clamp(block.centre - block.half, block.centre + block.half);
         if near.distance(place) > 26.0 {
-            let from = place + (near - place).normalize_or_zero() * 8.0;
-            canvas.line((from.x, from.y), (near.x, near.y), FRAME, 0.8);
+            let way = (near - place).normalize_or_zero();
+            let (from, to) = (place + way * 8.0, near - way * 3.0);
+            canvas.line((from.x, from.y), (to.x, to.y), FRAME, 0.8);
         }
         canvas.text(name, (block.centre.x, block.centre.y), look);
         taken.push(block);
@@ -302,6 +306,7 @@ fn best_place(
     place: DVec2,
     half: DVec2,
     road: &[DVec2],
+    places: &[DVec2],
     taken: &[Block],
     limits: DVec2,
 ) -> Option<Block> {
@@ -325,7 +330,15 @@ fn best_place(
         .map(|(far, block)| {
             let covered = road.iter().filter(|&&p| block.gap(p) < CLEAR).count();
             let clashes = taken.iter().filter(|t| t.overlaps(&block)).count();
-            (far + 20.0 * covered as f64 + 1000.0 * clashes as f64, block)
+            // A name nearer to another part of the lap would be read as that part's.
+            let own = block.gap(place);
+            let nearer = |p: &&DVec2| p.distance(place) > 60.0 && block.gap(**p) < own;
+            let astray = places.iter().chain(road).any(|p| nearer(&p));
+            let cost = far
+                + 20.0 * covered as f64
+                + if astray { 25.0 } else { 0.0 }
+                + 1000.0 * clashes as f64;
+            (cost, block)
         })
         .min_by(|a, b| a.0.total_cmp(&b.0))
         .filter(|(cost, _)| *cost < 1000.0)
@@ -333,8 +346,8 @@ fn best_place(
 }
 
 /// A bar of a round length, for judging distances.
-fn draw_scale(canvas: &mut Canvas<'_>, view: &View, width_m: f64, height: f64) {
-    let most = (0.25 * width_m).max(60.0 / view.px_per_m);
+fn draw_scale(canvas: &mut Canvas<'_>, view: &View, extent_m: f64, height: f64) {
+    let most = 0.3 * extent_m;
     let decade = 10f64.powf(most.log10().floor());
     let length = [5.0, 2.0, 1.0]
         .into_iter()
@@ -364,7 +377,7 @@ fn draw_colour_bar(
     let (top, bottom) = (TOP + 40.0, height - 50.0);
     let right = left + 16.0;
     let axis = Axis::linear(range, (bottom, top));
-    let slices = SHADES as u32;
+    let slices = 2 * SHADES as u32;
     for i in 0..slices {
         let edge = |k: u32| bottom + (top - bottom) * f64::from(k) / f64::from(slices);
         let colour = viridis((f64::from(i) + 0.5) / f64::from(slices));

@@ -7,7 +7,7 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use super::circuit::{Circuit, Section};
-use super::from_curvature::{CurvatureRow, CurvatureTable};
+use super::from_curvature::{Closure, CurvatureRow, CurvatureTable};
 use crate::{Error, Result};
 
 /// A circuit embedded in the crate: name, TOML and curvature table.
@@ -96,16 +96,15 @@ impl Circuit {
     /// [`Error::Io`] when a file cannot be read; [`Error::Input`] with the file, line and field when
     /// something in it is unknown, missing or out of range.
     pub fn load(path: impl AsRef<Path>) -> Result<Self> {
-        Ok(CurvatureTable::load(path.as_ref())?.0)
+        Ok(Self::load_with_closure(path)?.0)
     }
-}
 
-impl CurvatureTable {
-    /// Reads what [`Circuit::load`] reads and returns the circuit with what closing it took.
+    /// As [`Circuit::load`], with what closing the lap took.
     ///
     /// # Errors
     /// As [`Circuit::load`].
-    pub fn load(path: &Path) -> Result<(Circuit, super::Closure)> {
+    pub fn load_with_closure(path: impl AsRef<Path>) -> Result<(Self, Closure)> {
+        let path = path.as_ref();
         let read = |p: &Path| std::fs::read_to_string(p).map_err(|e| Error::io(p, "read", e));
         let toml_file = path.display().to_string();
         let text = read(path)?;
@@ -122,7 +121,7 @@ impl CurvatureTable {
 }
 
 /// Builds, naming the table's file where the library names the circuit.
-fn build(table: &CurvatureTable, table_file: &str) -> Result<(Circuit, super::Closure)> {
+fn build(table: &CurvatureTable, table_file: &str) -> Result<(Circuit, Closure)> {
     table.build().map_err(|error| match error {
         Error::Input {
             place,

@@ -37,7 +37,7 @@ fn silverstone_closes_and_stays_consistent() {
 #[test]
 fn closing_silverstone_takes_little() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/circuits/silverstone_gp.toml");
-    let (circuit, closure) = CurvatureTable::load(&path).expect("the bundled file loads");
+    let (circuit, closure) = Circuit::load_with_closure(&path).expect("the bundled file loads");
     println!("{closure:?}");
     assert_eq!(circuit, silverstone());
     assert!(closure.gap_m < 5.0);
