@@ -19,7 +19,7 @@ impl InstructionSet {
         let mut sets = Vec::new();
         #[cfg(target_arch = "x86_64")]
         {
-            if is_x86_feature_detected!("avx512f") {
+            if has_avx512() {
                 sets.push(Self::Avx512);
             }
             if is_x86_feature_detected!("avx2") {
@@ -38,8 +38,9 @@ impl InstructionSet {
     /// Lanes of one pack.
     pub fn lanes(self) -> usize {
         match self {
-            Self::Avx512 => 16,
-            Self::Avx2 | Self::Portable => 8,
+            Self::Avx512 => 32,
+            Self::Avx2 => 16,
+            Self::Portable => 8,
         }
     }
 
@@ -51,6 +52,12 @@ impl InstructionSet {
             Self::Portable => "portable",
         }
     }
+}
+
+/// The parts of AVX-512 that [`crate::scalar::lanes::Avx512`] uses.
+#[cfg(target_arch = "x86_64")]
+fn has_avx512() -> bool {
+    is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512dq")
 }
 
 /// Work that can be done in any lane type.
@@ -70,15 +77,15 @@ pub fn dispatch<W: LaneWork>(set: InstructionSet, work: W) -> W::Output {
     {
         use crate::scalar::lanes::{Avx2, Avx512};
 
-        #[target_feature(enable = "avx512f")]
+        #[target_feature(enable = "avx512f,avx512dq")]
         fn run_avx512<W: LaneWork>(work: W) -> W::Output {
-            work.run::<Avx512>()
+            work.run::<crate::scalar::Pair<Avx512>>()
         }
         #[target_feature(enable = "avx2")]
         fn run_avx2<W: LaneWork>(work: W) -> W::Output {
-            work.run::<Avx2>()
+            work.run::<crate::scalar::Pair<Avx2>>()
         }
-        if set == InstructionSet::Avx512 && is_x86_feature_detected!("avx512f") {
+        if set == InstructionSet::Avx512 && has_avx512() {
             // SAFETY: the processor has the set, as just detected.
             return unsafe { run_avx512(work) };
         }

@@ -3,9 +3,7 @@
 use plotters::style::RGBColor;
 
 use super::canvas::{Align, Canvas, Type};
-use super::style::{
-    FRAME, GRID, INK, LABEL_PX, MINOR_GRID, TICK_PX, power_of_ten, significant_short,
-};
+use super::style::{FRAME, GRID, INK, LABEL_PX, MINOR_GRID, TICK_PX, power_of_ten, significant_short};
 
 /// A range of a quantity, laid out over a range of pixels.
 #[derive(Clone, Copy)]
@@ -326,12 +324,7 @@ fn thin_out(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
 }
 
 /// A row of coloured names at the right of a figure's title line.
-pub(super) fn draw_legend(
-    canvas: &mut Canvas<'_>,
-    entries: &[(&str, RGBColor, f64)],
-    right: f64,
-    y: f64,
-) {
+pub(super) fn draw_legend(canvas: &mut Canvas<'_>, entries: &[(&str, RGBColor, f64)], right: f64, y: f64) {
     let look = Type::new(TICK_PX + 1.0, INK, Align::Left);
     let mut x = right;
     for &(name, colour, width_px) in entries.iter().rev() {

@@ -4,9 +4,7 @@ use std::path::Path;
 
 use super::axis::Axis;
 use super::canvas::{Align, Canvas, Type, draw_to_file};
-use super::style::{
-    BLUE, FAINT_INK, GREYED, GRID, INK, SHADE, TICK_PX, VERMILLION, significant, trimmed,
-};
+use super::style::{BLUE, FAINT_INK, GREYED, GRID, INK, SHADE, TICK_PX, VERMILLION, significant, trimmed};
 use crate::{Error, Result};
 
 /// One parameter of the table.
@@ -53,9 +51,7 @@ impl Layout {
     fn new(rows: &[ParameterRow<'_>]) -> Self {
         let look = Type::new(TICK_PX + 0.5, INK, Align::Left);
         let widest = |look: Type, text: &dyn Fn(&ParameterRow<'_>) -> f64| {
-            rows.iter()
-                .map(text)
-                .fold(look.width("parameter"), f64::max)
+            rows.iter().map(text).fold(look.width("parameter"), f64::max)
         };
         let names = widest(look.bold(), &|r| look.bold().width(r.name) + 20.0);
         let units = widest(look, &|r| look.width(r.unit));
@@ -80,19 +76,10 @@ impl Layout {
 /// # Errors
 /// [`Error::Input`] when there are no rows or more than 200, or when bounds are not a finite range;
 /// [`Error::Io`] when the file cannot be written.
-pub fn plot_parameters(
-    path: impl AsRef<Path>,
-    title: &str,
-    rows: &[ParameterRow<'_>],
-) -> Result<()> {
+pub fn plot_parameters(path: impl AsRef<Path>, title: &str, rows: &[ParameterRow<'_>]) -> Result<()> {
     let path = path.as_ref();
     if !(1..=200).contains(&rows.len()) {
-        return Err(Error::input(
-            path,
-            "rows",
-            rows.len().to_string(),
-            "1 to 200",
-        ));
+        return Err(Error::input(path, "rows", rows.len().to_string(), "1 to 200"));
     }
     for row in rows {
         let sound = row.lower.is_finite() && row.upper.is_finite() && row.lower < row.upper;
@@ -135,11 +122,7 @@ fn draw_head(canvas: &mut Canvas<'_>, rows: &[ParameterRow<'_>], layout: &Layout
     canvas.text("place between the bounds", (middle, y), head(Align::Centre));
     canvas.text("upper", (UPPER_X, y), head(Align::Left));
     canvas.text("swarm", (SWARM_X, y), head(Align::Right));
-    canvas.text(
-        "fitted \u{00b1} std. error",
-        (FITTED_X, y),
-        head(Align::Centre),
-    );
+    canvas.text("fitted \u{00b1} std. error", (FITTED_X, y), head(Align::Centre));
     if rows.iter().any(|r| r.truth.is_some()) {
         canvas.text("truth", (TRUTH_X, y), head(Align::Right));
     }

@@ -32,9 +32,8 @@ pub fn plot_pareto(
 ) -> Result<()> {
     let path = path.as_ref();
     let n = objectives.len();
-    let refuse = |place: String, found: String, expected: &str| {
-        Err(Error::input(path, place, found, expected))
-    };
+    let refuse =
+        |place: String, found: String, expected: &str| Err(Error::input(path, place, found, expected));
     if !(2..=6).contains(&n) {
         return refuse("objectives".into(), n.to_string(), "2 to 6");
     }
@@ -50,15 +49,9 @@ pub fn plot_pareto(
         .iter()
         .filter(|p| p.iter().all(|v| v.is_finite()))
         .collect();
-    let ranges: Option<Vec<(f64, f64)>> = (0..n)
-        .map(|k| extent(finite.iter().map(|p| &p[k])))
-        .collect();
+    let ranges: Option<Vec<(f64, f64)>> = (0..n).map(|k| extent(finite.iter().map(|p| &p[k]))).collect();
     let Some(ranges) = ranges else {
-        return refuse(
-            "points".into(),
-            "none that is finite".into(),
-            "at least one",
-        );
+        return refuse("points".into(), "none that is finite".into(), "at least one");
     };
     let mark = chosen.map(|c| &points[c]).filter(|p| finite.contains(p));
     let archive = Archive {

@@ -130,9 +130,7 @@ pub fn text_table(columns: &[Column<'_>]) -> String {
         .iter()
         .map(|c| {
             let body = (0..rows).map(|row| c.short(row));
-            std::iter::once(printable(&c.header()))
-                .chain(body)
-                .collect()
+            std::iter::once(printable(&c.header())).chain(body).collect()
         })
         .collect();
     let widths: Vec<usize> = cells

@@ -7,9 +7,7 @@ use plotters::style::RGBColor;
 
 use super::axis::{Axis, extent};
 use super::canvas::{Align, Canvas, Type, draw_to_file};
-use super::style::{
-    FAINT_INK, FRAME, GREYED, INK, LABEL_PX, TICK_PX, TITLE_PX, viridis, with_unit,
-};
+use super::style::{FAINT_INK, FRAME, GREYED, INK, LABEL_PX, TICK_PX, TITLE_PX, viridis, with_unit};
 use crate::{Error, Result};
 
 /// A circuit and what to colour it by.
@@ -94,9 +92,7 @@ pub fn plot_track_map(path: impl AsRef<Path>, map: &TrackMap<'_>) -> Result<()> 
     let room = DVec2::new(1200.0 - BAR_ROOM - 2.0 * ROOM.0, 900.0 - TOP - 2.0 * ROOM.1);
     let px_per_m = (room.x / size.x.max(1e-9)).min(room.y / size.y.max(1e-9));
     let drawn = size * px_per_m;
-    let title = Type::new(TITLE_PX, INK, Align::Left)
-        .bold()
-        .width(map.title);
+    let title = Type::new(TITLE_PX, INK, Align::Left).bold().width(map.title);
     let width = (drawn.x + 2.0 * ROOM.0 + BAR_ROOM)
         .max(title + 48.0)
         .max(640.0)
@@ -113,13 +109,7 @@ pub fn plot_track_map(path: impl AsRef<Path>, map: &TrackMap<'_>) -> Result<()> 
         draw_road(canvas, map, &view);
         draw_line(canvas, map, &view, range);
         let start = draw_start(canvas, map, &view);
-        draw_names(
-            canvas,
-            map,
-            &view,
-            start,
-            DVec2::new(width - BAR_ROOM, height),
-        );
+        draw_names(canvas, map, &view, start, DVec2::new(width - BAR_ROOM, height));
         draw_scale(canvas, &view, size.max_element(), height);
         if let Some(range) = range {
             let bar = (width - BAR_ROOM + 24.0, height);
@@ -200,9 +190,7 @@ fn draw_line(canvas: &mut Canvas<'_>, map: &TrackMap<'_>, view: &View, range: Op
         if run.is_empty() {
             run.push((a.x, a.y));
         }
-        let far = run
-            .last()
-            .is_some_and(|l| b.distance(DVec2::from(*l)) >= 0.8);
+        let far = run.last().is_some_and(|l| b.distance(DVec2::from(*l)) >= 0.8);
         if far || i + 1 == steps {
             run.push((b.x, b.y));
         }
@@ -276,10 +264,7 @@ fn draw_names(
     });
     let mut taken: Vec<Block> = arrow.into_iter().collect();
     let look = Type::new(LABEL_PX, INK, Align::Centre);
-    let named = map
-        .names
-        .iter()
-        .map(|&(name, place)| (name, view.at(place)));
+    let named = map.names.iter().map(|&(name, place)| (name, view.at(place)));
     let first = start.map(|[at, _]| ("start", at));
     let all: Vec<(&str, DVec2)> = first.into_iter().chain(named).collect();
     let places: Vec<DVec2> = all.iter().map(|(_, place)| *place).collect();
@@ -311,17 +296,15 @@ fn best_place(
     limits: DVec2,
 ) -> Option<Block> {
     const CLEAR: f64 = 10.0;
-    let candidates = [12.0, 20.0, 30.0, 45.0, 65.0, 90.0]
-        .into_iter()
-        .flat_map(|far| {
-            (0..24).map(move |turn| {
-                let way = DVec2::from_angle(f64::from(turn) * std::f64::consts::TAU / 24.0);
-                // The nearest side of the box, not its centre, keeps the distance.
-                let reach = far + (way.x * half.x).abs().max((way.y * half.y).abs());
-                let centre = place + way * reach;
-                (far, Block { centre, half })
-            })
-        });
+    let candidates = [12.0, 20.0, 30.0, 45.0, 65.0, 90.0].into_iter().flat_map(|far| {
+        (0..24).map(move |turn| {
+            let way = DVec2::from_angle(f64::from(turn) * std::f64::consts::TAU / 24.0);
+            // The nearest side of the box, not its centre, keeps the distance.
+            let reach = far + (way.x * half.x).abs().max((way.y * half.y).abs());
+            let centre = place + way * reach;
+            (far, Block { centre, half })
+        })
+    });
     candidates
         .filter(|(_, block)| {
             let (a, b) = (block.centre - block.half, block.centre + block.half);
@@ -334,10 +317,8 @@ fn best_place(
             let own = block.gap(place);
             let nearer = |p: &&DVec2| p.distance(place) > 60.0 && block.gap(**p) < own;
             let astray = places.iter().chain(road).any(|p| nearer(&p));
-            let cost = far
-                + 20.0 * covered as f64
-                + if astray { 25.0 } else { 0.0 }
-                + 1000.0 * clashes as f64;
+            let cost =
+                far + 20.0 * covered as f64 + if astray { 25.0 } else { 0.0 } + 1000.0 * clashes as f64;
             (cost, block)
         })
         .min_by(|a, b| a.0.total_cmp(&b.0))
@@ -389,11 +370,7 @@ fn draw_colour_bar(
     for (value, label) in axis.ticks(8) {
         let y = axis.at(value);
         canvas.line((right, y), (right + 4.0, y), INK, 0.8);
-        canvas.text(
-            &label,
-            (right + 8.0, y),
-            Type::new(TICK_PX, INK, Align::Left),
-        );
+        canvas.text(&label, (right + 8.0, y), Type::new(TICK_PX, INK, Align::Left));
     }
     let text = with_unit(map.value_label, map.value_unit);
     let look = Type::new(LABEL_PX, INK, Align::Centre);

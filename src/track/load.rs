@@ -175,12 +175,7 @@ impl Checker<'_> {
         if x >= low && x <= high {
             Ok(x)
         } else {
-            Err(self.refuse(
-                value.span(),
-                field,
-                x.to_string(),
-                &format!("{low} to {high}"),
-            ))
+            Err(self.refuse(value.span(), field, x.to_string(), &format!("{low} to {high}")))
         }
     }
 }
@@ -197,9 +192,10 @@ fn assemble(
         text,
     };
     let length_m = check.within(&file.length_m, "length_m", 10.0, 200_000.0)?;
-    let heading = file.start_heading_deg.as_ref().map_or(Ok(0.0), |h| {
-        check.within(h, "start_heading_deg", -360.0, 360.0)
-    })?;
+    let heading = file
+        .start_heading_deg
+        .as_ref()
+        .map_or(Ok(0.0), |h| check.within(h, "start_heading_deg", -360.0, 360.0))?;
     let width_m = file
         .width_m
         .as_ref()
@@ -229,11 +225,7 @@ fn assemble(
                 "a name that no other section has",
             ));
         }
-        sections.push(Section {
-            name,
-            start_m,
-            end_m,
-        });
+        sections.push(Section { name, start_m, end_m });
     }
     Ok(CurvatureTable {
         rows: parse_table(table_file, csv, length_m, file.closed, width_m)?,
@@ -341,10 +333,7 @@ fn parse_table(
             curvature_1pm: number(curvature, (-1.0, 1.0))?,
             width_left_m: width(left)?,
             width_right_m: width(right)?,
-            corner: corner
-                .and_then(|c| record.get(c))
-                .unwrap_or_default()
-                .to_owned(),
+            corner: corner.and_then(|c| record.get(c)).unwrap_or_default().to_owned(),
         };
         let fits = match rows.last() {
             None => row.station_m == 0.0,

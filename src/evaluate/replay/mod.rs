@@ -4,7 +4,9 @@ mod cpu;
 pub mod kernel;
 mod problem;
 mod simd;
+mod table;
 
-pub use cpu::{CpuEvaluator, build_car, norm_name, trace};
+pub use cpu::{CpuEvaluator, norm_name, trace};
 pub use problem::{CHANNEL_NAMES, CHANNEL_UNITS, ChannelWeights, Norm, Plan, ReplayProblem, Sample, Window};
 pub use simd::SimdEvaluator;
+pub use table::ModelTable;
