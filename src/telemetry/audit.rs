@@ -1,0 +1,80 @@
+//! Values that cannot be what they are declared to be: nearly always a wrong unit.
+
+use super::channel_map::{Mapped, Role};
+use super::log::Log;
+use super::statistics::{derivative, fit};
+use crate::{Error, Result};
+
+/// Largest believable magnitude in SI, and what is usually wrong beyond it.
+fn limit(role: Role) -> Option<(f64, &'static str, &'static str)> {
+    Some(match role {
+        Role::WheelSpeedFl | Role::WheelSpeedFr | Role::WheelSpeedRl | Role::WheelSpeedRr => {
+            (1000.0, "rad/s", "is it a linear speed, or rpm?")
+        }
+        Role::Steer => (
+            1.3,
+            "rad at the road wheels",
+            "is it in degrees, or the steering wheel's angle without a steering_ratio?",
+        ),
+        Role::Vx => (150.0, "m/s", "is it in km/h?"),
+        Role::Ax | Role::Ay => (60.0, "m/s^2", "is the unit right?"),
+        Role::YawRate => (10.0, "rad/s", "is it in deg/s?"),
+        Role::Distance | Role::Lap | Role::LapComplete | Role::Throttle | Role::Brake => {
+            return None;
+        }
+    })
+}
+
+/// Refuses a channel (its values in SI) that goes beyond what a car can do.
+pub(super) fn check_magnitude(source: &str, mapped: &Mapped<'_>, values: &[f64]) -> Result<()> {
+    let Some((most, unit, hint)) = limit(mapped.role) else {
+        return Ok(());
+    };
+    let Some(at) = values.iter().position(|v| v.abs() > most) else {
+        return Ok(());
+    };
+    Err(Error::input(
+        source,
+        mapped.channel.place(at),
+        format!(
+            "{} {} = {:.3} {unit}",
+            mapped.channel.values.get(at).copied().unwrap_or(f64::NAN),
+            mapped.channel.unit,
+            values[at]
+        ),
+        format!("at most {most} {unit} for {}; {hint}", mapped.role.key()),
+    ))
+}
+
+/// Refuses a log whose accelerations follow what they should equal closely, but by a factor that only a wrong unit
+/// explains: `ay` against `vx` times yaw rate, `ax` against the change of `vx`.
+pub(super) fn check_gains(log: &Log) -> Result<()> {
+    const CLOSELY: f64 = 0.8;
+    let moving: Vec<bool> = log.vx_mps.iter().map(|v| *v > 8.0).collect();
+    let turning: Vec<f64> = log
+        .vx_mps
+        .iter()
+        .zip(&log.yaw_rate_radps)
+        .map(|(v, r)| v * r)
+        .collect();
+    let half = (0.1 / log.dt_s).round().max(1.0) as usize;
+    let accel = derivative(&log.vx_mps, log.dt_s, half);
+    for (name, values, reference, against) in [
+        ("ay", &log.ay_mps2, &turning, "ground speed times yaw rate"),
+        ("ax", &log.ax_mps2, &accel, "the change of ground speed"),
+    ] {
+        let Some(found) = fit(reference, values, &moving, 0) else {
+            continue;
+        };
+        let gain = found.slope.abs();
+        if found.correlation.abs() > CLOSELY && !(0.4..=2.5).contains(&gain) {
+            return Err(Error::input(
+                &log.source,
+                format!("channel {name}"),
+                format!("values {gain:.3} times {against}"),
+                "about the same size; is one of the units wrong?",
+            ));
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,544 @@
+//! What a log says about its own sensors: signs, delays, zero offsets and rolling radii.
+//!
+//! Yaw rate is what everything else is measured against. Its sign comes from the front wheels, whose speeds differ by
+//! track times yaw rate; `ay` and steering follow yaw, `ax` follows the change of speed. Delays are relative to yaw
+//! rate: a delay common to all channels neither shows nor matters.
+
+use serde::Serialize;
+
+use super::channel_map::Role;
+use super::log::Log;
+use super::recording::Format;
+use super::statistics::{Lag, best_lag, derivative, fit, median, quantile};
+
+/// Slower than this (m/s) a car says little about its sensors.
+const MOVING_MPS: f64 = 8.0;
+/// Slower than this (m/s) wheel speeds are too coarse to tell a rolling radius.
+const STRAIGHT_MPS: f64 = 12.0;
+/// On a straight yaw rate (rad/s) stays within this of its offset.
+const STRAIGHT_YAW: f64 = 0.03;
+/// On a straight lateral acceleration (m/s^2) stays within this of its offset.
+const STRAIGHT_AY: f64 = 1.0;
+/// Wheels roll freely enough when |ax| (m/s^2) is below this.
+const COASTING_AX: f64 = 1.0;
+/// Standing still, m/s.
+const STANDSTILL_MPS: f64 = 0.3;
+/// Evidence from a straight or standstill needs this much of it, s.
+const LEAST_S: f64 = 2.0;
+/// Delays are looked for up to this, s.
+const MOST_DELAY_S: f64 = 0.5;
+/// Speed is differentiated over this long to each side, s: long enough to quieten 0.1 km/h steps.
+const DERIVATIVE_S: f64 = 0.1;
+/// A correlation below this decides no sign.
+const SURE_OF_SIGN: f64 = 0.4;
+/// A correlation below this decides no delay.
+const SURE_OF_DELAY: f64 = 0.6;
+/// Delays shorter than this share of a sample interval are left alone: interpolating would blur more than it moves.
+const LEAST_SHIFT: f64 = 0.1;
+
+/// Whether to do something, or let the file format decide.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Switch {
+    /// On for foreign files, off for native ones, which are calibrated already.
+    #[default]
+    Auto,
+    /// Always.
+    On,
+    /// Never.
+    Off,
+}
+
+impl Switch {
+    pub(super) fn is_on(self, format: Format) -> bool {
+        match self {
+            Self::Auto => format != Format::Native,
+            Self::On => true,
+            Self::Off => false,
+        }
+    }
+}
+
+/// Which corrections are estimated from the log and applied to it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct CalibrationOptions {
+    /// Signs of yaw rate, `ay`, `ax` and steering.
+    pub signs: Switch,
+    /// Delays of the channels relative to yaw rate.
+    pub delays: Switch,
+    /// Zero offsets of yaw rate and `ay`.
+    pub offsets: Switch,
+    /// Rolling radius of each wheel.
+    pub rolling_radius: Switch,
+}
+
+impl CalibrationOptions {
+    /// Everything on, or everything off.
+    pub fn all(switch: Switch) -> Self {
+        Self {
+            signs: switch,
+            delays: switch,
+            offsets: switch,
+            rolling_radius: switch,
+        }
+    }
+}
+
+/// What was estimated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum FindingKind {
+    /// 1 or -1, by which the channel was multiplied.
+    Sign,
+    /// How much later than yaw rate the channel was recorded, s; taken off.
+    Delay,
+    /// What the channel shows where it should show nought, in its SI unit; taken off.
+    Offset,
+    /// Ground speed over angular speed of a freely rolling wheel, m.
+    RollingRadius,
+    /// Slope of the channel on what it should equal; 1 is right. Never applied.
+    Gain,
+}
+
+/// One thing that was estimated from the log.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Finding {
+    /// The channel.
+    pub role: Role,
+    /// What was estimated.
+    pub kind: FindingKind,
+    /// Its value, in the unit that `kind` names.
+    pub value: f64,
+    /// Whether the log was corrected by it.
+    pub applied: bool,
+    /// The correlation it rests on, where it rests on one.
+    pub correlation: Option<f64>,
+    /// Samples it rests on.
+    pub samples: usize,
+    /// What it was measured against, and why it was not applied where it was not.
+    pub evidence: String,
+}
+
+/// Everything that was estimated from a log, and what was done about it.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Calibration {
+    /// What was estimated, in the order it was applied.
+    pub findings: Vec<Finding>,
+    /// What else a reader of the results should know: channels guessed, speeds made up, evidence that is missing.
+    pub notes: Vec<String>,
+}
+
+impl Calibration {
+    /// The finding of a kind for a channel.
+    pub fn finding(&self, role: Role, kind: FindingKind) -> Option<&Finding> {
+        self.findings
+            .iter()
+            .find(|f| f.role == role && f.kind == kind)
+    }
+
+    /// The value of a finding that was applied.
+    pub fn applied(&self, role: Role, kind: FindingKind) -> Option<f64> {
+        self.finding(role, kind)
+            .filter(|f| f.applied)
+            .map(|f| f.value)
+    }
+}
+
+/// What the channel map declares, which is believed over the log.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Declared {
+    pub signs: Vec<Role>,
+    pub delays: Vec<Role>,
+    pub rolling_radius_m: Option<f64>,
+}
+
+fn moving(log: &Log) -> Vec<bool> {
+    log.vx_mps.iter().map(|&v| v > MOVING_MPS).collect()
+}
+
+fn product(a: &[f64], b: &[f64]) -> Vec<f64> {
+    a.iter().zip(b).map(|(x, y)| x * y).collect()
+}
+
+fn acceleration(log: &Log) -> Vec<f64> {
+    let half = (DERIVATIVE_S / log.dt_s).round().max(1.0) as usize;
+    derivative(&log.vx_mps, log.dt_s, half)
+}
+
+/// Front right minus front left wheel speed, m/s, with a rolling radius that is good enough for this.
+fn front_difference(log: &Log) -> Option<Vec<f64>> {
+    let [left, right, ..] = &log.wheel_speed_radps;
+    let radius = |wheel: &[f64]| {
+        let ratios = wheel.iter().zip(&log.vx_mps);
+        median(
+            ratios
+                .filter(|(w, v)| **v > MOVING_MPS && **w > 0.0)
+                .map(|(w, v)| v / w)
+                .collect(),
+        )
+    };
+    let (of_left, of_right) = (radius(left)?, radius(right)?);
+    let pairs = right.iter().zip(left);
+    Some(pairs.map(|(r, l)| r * of_right - l * of_left).collect())
+}
+
+/// Samples on which the front wheels' difference is that of their paths: not where one of them may be locking.
+fn unbraked(log: &Log, accel: &[f64]) -> Vec<bool> {
+    let pairs = log.vx_mps.iter().zip(accel);
+    pairs.map(|(&v, &a)| v > MOVING_MPS && a > -3.0).collect()
+}
+
+/// Delays of all channels relative to yaw rate, from a log that has not been corrected yet.
+pub(super) fn delays(log: &Log, declared: &Declared, calibration: &mut Calibration) {
+    let most = (MOST_DELAY_S / log.dt_s).ceil() as usize;
+    let (moving, accel) = (moving(log), acceleration(log));
+    let sure = |lag: &Lag| lag.correlation.abs() >= SURE_OF_DELAY;
+    let wheels: Vec<Option<Lag>> = log
+        .wheel_speed_radps
+        .iter()
+        .map(|wheel| {
+            let half = (DERIVATIVE_S / log.dt_s).round().max(1.0) as usize;
+            let spin = derivative(wheel, log.dt_s, half);
+            best_lag(&accel, &spin, &moving, most).filter(sure)
+        })
+        .collect();
+    let front = front_difference(log).and_then(|difference| {
+        best_lag(
+            &log.yaw_rate_radps,
+            &difference,
+            &unbraked(log, &accel),
+            most,
+        )
+        .filter(sure)
+    });
+    let speed = match (&front, &wheels[..]) {
+        (Some(front), [Some(left), Some(right), ..]) => {
+            Some(front.samples - (left.samples + right.samples) / 2.0)
+        }
+        _ => None,
+    };
+    if speed.is_none() {
+        calibration.notes.push(
+            "front wheel speeds do not follow yaw rate well enough to tell the delay of the speed channels".to_owned(),
+        );
+    }
+    let mut report = |role: Role, lag: Option<(f64, &Lag)>, against: &str| {
+        let Some((samples, lag)) = lag else {
+            calibration
+                .notes
+                .push(format!("{}: no clear delay against {against}", role.key()));
+            return;
+        };
+        let (applied, why) = if declared.delays.contains(&role) {
+            (false, "; left alone: the channel map declares a delay")
+        } else if samples.abs() < LEAST_SHIFT {
+            (false, "; too short to correct")
+        } else {
+            (true, "")
+        };
+        calibration.findings.push(Finding {
+            role,
+            kind: FindingKind::Delay,
+            value: samples * log.dt_s,
+            applied,
+            correlation: Some(lag.correlation),
+            samples: lag.used,
+            evidence: format!("against {against}{why}"),
+        });
+    };
+    if let (Some(speed), Some(front)) = (speed, &front) {
+        report(
+            Role::Vx,
+            Some((speed, front)),
+            "yaw rate, through the speed difference of the front wheels",
+        );
+    }
+    let speed = speed.unwrap_or(0.0);
+    for (role, lag) in Role::WHEELS.into_iter().zip(&wheels) {
+        let lag = lag.as_ref().map(|l| (l.samples + speed, l));
+        report(role, lag, "the change of ground speed");
+    }
+    let ax = best_lag(&accel, &log.ax_mps2, &moving, most).filter(sure);
+    report(
+        Role::Ax,
+        ax.as_ref().map(|l| (l.samples + speed, l)),
+        "the change of ground speed",
+    );
+    let turning = product(&log.vx_mps, &log.yaw_rate_radps);
+    let ay = best_lag(&turning, &log.ay_mps2, &moving, most).filter(sure);
+    report(
+        Role::Ay,
+        ay.as_ref().map(|l| (l.samples, l)),
+        "ground speed times yaw rate",
+    );
+    let steer = best_lag(&log.yaw_rate_radps, &log.steer_rad, &moving, most).filter(sure);
+    if let Some(steer) = steer {
+        calibration.findings.push(Finding {
+            role: Role::Steer,
+            kind: FindingKind::Delay,
+            value: steer.samples * log.dt_s,
+            applied: false,
+            correlation: Some(steer.correlation),
+            samples: steer.used,
+            evidence: "against yaw rate; left alone: a car answers its steering late, so this is not the sensor's \
+                       delay alone (delay_s in the channel map sets it)"
+                .to_owned(),
+        });
+    }
+}
+
+/// Estimates and applies signs, offsets and rolling radii, in this order; delays have been taken off before.
+pub(super) fn apply(
+    log: &mut Log,
+    options: &CalibrationOptions,
+    format: Format,
+    declared: &Declared,
+) {
+    if options.signs.is_on(format) {
+        signs(log, declared);
+    }
+    if options.offsets.is_on(format) {
+        offsets(log);
+    }
+    if options.rolling_radius.is_on(format) {
+        rolling_radii(log, declared.rolling_radius_m);
+    }
+}
+
+fn signs(log: &mut Log, declared: &Declared) {
+    let (moving, accel) = (moving(log), acceleration(log));
+    if let Some(difference) = front_difference(log) {
+        let yaw = log.yaw_rate_radps.clone();
+        let found = fit(&yaw, &difference, &unbraked(log, &accel), 0);
+        let evidence = match found {
+            Some(f) => format!(
+                "against the speed difference of the front wheels, which makes the front track {:.2} m",
+                f.slope.abs()
+            ),
+            None => String::new(),
+        };
+        sign(log, declared, Role::YawRate, found, &evidence);
+    }
+    let turning = product(&log.vx_mps, &log.yaw_rate_radps);
+    let found = fit(&turning, &log.ay_mps2, &moving, 0);
+    sign(
+        log,
+        declared,
+        Role::Ay,
+        found,
+        "against ground speed times yaw rate",
+    );
+    gain(log, Role::Ay, found, "ground speed times yaw rate");
+    let found = fit(&accel, &log.ax_mps2, &moving, 0);
+    sign(
+        log,
+        declared,
+        Role::Ax,
+        found,
+        "against the change of ground speed",
+    );
+    gain(log, Role::Ax, found, "the change of ground speed");
+    let found = fit(&log.yaw_rate_radps, &log.steer_rad, &moving, 0);
+    sign(log, declared, Role::Steer, found, "against yaw rate");
+}
+
+fn sign(
+    log: &mut Log,
+    declared: &Declared,
+    role: Role,
+    found: Option<super::statistics::Fit>,
+    evidence: &str,
+) {
+    let Some(found) = found.filter(|f| f.correlation.abs() >= SURE_OF_SIGN) else {
+        log.calibration.notes.push(format!(
+            "{}: the log does not tell its sign; taken as logged",
+            role.key()
+        ));
+        return;
+    };
+    let value = found.correlation.signum();
+    let is_declared = declared.signs.contains(&role);
+    let mut evidence = evidence.to_owned();
+    if is_declared && value < 0.0 {
+        evidence.push_str(
+            "; left alone: the channel map declares the sign, and the log contradicts it",
+        );
+    }
+    let applied = !is_declared && value < 0.0;
+    if applied {
+        for v in values_mut(log, role) {
+            *v = -*v;
+        }
+    }
+    log.calibration.findings.push(Finding {
+        role,
+        kind: FindingKind::Sign,
+        value,
+        applied,
+        correlation: Some(found.correlation),
+        samples: found.samples,
+        evidence,
+    });
+}
+
+fn gain(log: &mut Log, role: Role, found: Option<super::statistics::Fit>, against: &str) {
+    if let Some(found) = found {
+        log.calibration.findings.push(Finding {
+            role,
+            kind: FindingKind::Gain,
+            value: found.slope.abs(),
+            applied: false,
+            correlation: Some(found.correlation),
+            samples: found.samples,
+            evidence: format!("slope on {against}"),
+        });
+    }
+}
+
+fn values_mut(log: &mut Log, role: Role) -> &mut [f64] {
+    match role {
+        Role::Ax => &mut log.ax_mps2,
+        Role::Ay => &mut log.ay_mps2,
+        Role::Steer => &mut log.steer_rad,
+        Role::YawRate => &mut log.yaw_rate_radps,
+        _ => &mut [],
+    }
+}
+
+/// Samples on straights, given the offsets of yaw rate and `ay`: stretches, because yaw rate also passes through
+/// nought in the middle of an S.
+fn straights(log: &Log, yaw_offset: f64, ay_offset: f64) -> Vec<bool> {
+    let mut mask: Vec<bool> = (0..log.samples())
+        .map(|i| {
+            log.vx_mps[i] > STRAIGHT_MPS
+                && (log.yaw_rate_radps[i] - yaw_offset).abs() < STRAIGHT_YAW
+                && (log.ay_mps2[i] - ay_offset).abs() < STRAIGHT_AY
+        })
+        .collect();
+    let least = (0.5 / log.dt_s).ceil() as usize;
+    for stretch in mask.chunk_by_mut(|a, b| a == b) {
+        if stretch.len() < least {
+            stretch.fill(false);
+        }
+    }
+    mask
+}
+
+fn chosen(values: &[f64], mask: &[bool]) -> Vec<f64> {
+    let pairs = values.iter().zip(mask);
+    pairs.filter(|(_, m)| **m).map(|(v, _)| *v).collect()
+}
+
+fn enough(mask: &[bool], dt_s: f64) -> bool {
+    mask.iter().filter(|m| **m).count() as f64 * dt_s >= LEAST_S
+}
+
+fn offsets(log: &mut Log) {
+    let (mut yaw, mut ay) = (0.0, 0.0);
+    let mut mask = straights(log, yaw, ay);
+    // Straights are where yaw rate and ay are near their offsets, which are what is sought: a few rounds settle it.
+    for _ in 0..8 {
+        if let (Some(y), Some(a)) = (
+            median(chosen(&log.yaw_rate_radps, &mask)),
+            median(chosen(&log.ay_mps2, &mask)),
+        ) {
+            (yaw, ay) = (y, a);
+        }
+        mask = straights(log, yaw, ay);
+    }
+    let mut place = "on straights";
+    if !enough(&mask, log.dt_s) {
+        place = "at standstill";
+        mask = log
+            .vx_mps
+            .iter()
+            .map(|v| v.abs() < STANDSTILL_MPS)
+            .collect();
+    }
+    for role in [Role::YawRate, Role::Ay] {
+        let samples = chosen(values_mut(log, role), &mask);
+        let varies = samples.windows(2).any(|pair| pair[0] != pair[1]);
+        // A logger that goes on after its sensors are switched off repeats their last value.
+        let usable = enough(&mask, log.dt_s) && (place == "on straights" || varies);
+        let (Some(value), true) = (mean_of_middle(samples.clone()), usable) else {
+            log.calibration.notes.push(format!(
+                "{}: too little straight running or standstill to tell its zero offset",
+                role.key()
+            ));
+            continue;
+        };
+        for v in values_mut(log, role) {
+            *v -= value;
+        }
+        log.calibration.findings.push(Finding {
+            role,
+            kind: FindingKind::Offset,
+            value,
+            applied: true,
+            correlation: None,
+            samples: samples.len(),
+            evidence: place.to_owned(),
+        });
+    }
+}
+
+/// Mean of the middle half: as sturdy as the median for this, and finer than the steps of a coarse sensor.
+fn mean_of_middle(values: Vec<f64>) -> Option<f64> {
+    let low = quantile(values.clone(), 0.25)?;
+    let high = quantile(values.clone(), 0.75)?;
+    let (mut n, mut sum) = (0_usize, 0.0);
+    for v in values.into_iter().filter(|v| (low..=high).contains(v)) {
+        n += 1;
+        sum += v;
+    }
+    (n > 0).then(|| sum / n as f64)
+}
+
+fn rolling_radii(log: &mut Log, reference_m: Option<f64>) {
+    let accel = acceleration(log);
+    let mut mask = straights(log, 0.0, 0.0);
+    for (m, a) in mask.iter_mut().zip(&accel) {
+        *m &= a.abs() < COASTING_AX;
+    }
+    for (index, role) in Role::WHEELS.into_iter().enumerate() {
+        let wheel = &log.wheel_speed_radps[index];
+        let ratios: Vec<f64> = (0..log.samples())
+            .filter(|&i| mask[i] && wheel[i] > 0.0)
+            .map(|i| log.vx_mps[i] / wheel[i])
+            .collect();
+        let samples = ratios.len();
+        let (Some(radius), true) = (
+            mean_of_middle(ratios.clone()),
+            samples as f64 * log.dt_s >= LEAST_S,
+        ) else {
+            log.calibration.notes.push(format!(
+                "{}: too little coasting on straights to tell its rolling radius",
+                role.key()
+            ));
+            continue;
+        };
+        let spread = match (quantile(ratios.clone(), 0.25), quantile(ratios, 0.75)) {
+            (Some(low), Some(high)) => (high - low) / radius * 100.0,
+            _ => 0.0,
+        };
+        let mut evidence =
+            format!("on straights; the middle half of the samples within {spread:.2} %");
+        // Speeds become those of a wheel of the reference radius: slip is computed with one radius for all wheels.
+        if let Some(reference) = reference_m {
+            let scale = radius / reference;
+            for w in &mut log.wheel_speed_radps[index] {
+                *w *= scale;
+            }
+        } else {
+            evidence.push_str("; left alone: no rolling_radius_m to refer wheel speeds to");
+        }
+        log.calibration.findings.push(Finding {
+            role,
+            kind: FindingKind::RollingRadius,
+            value: radius,
+            applied: reference_m.is_some(),
+            correlation: None,
+            samples,
+            evidence,
+        });
+    }
+}

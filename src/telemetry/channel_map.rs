@@ -1,0 +1,543 @@
+//! Which logged channel plays which role: from a small TOML file, and by the usual names where it says nothing.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+use toml::Spanned;
+
+use super::recording::{Channel, Recording};
+use super::text::shown;
+use super::units::{Quantity, Unit};
+use crate::{Error, Result};
+
+/// What a channel is needed for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Role {
+    /// Speed of the front left wheel.
+    WheelSpeedFl,
+    /// Speed of the front right wheel.
+    WheelSpeedFr,
+    /// Speed of the rear left wheel.
+    WheelSpeedRl,
+    /// Speed of the rear right wheel.
+    WheelSpeedRr,
+    /// Steering angle, at the road wheels or at the steering wheel.
+    Steer,
+    /// Speed over ground.
+    Vx,
+    /// Longitudinal acceleration.
+    Ax,
+    /// Lateral acceleration.
+    Ay,
+    /// Yaw rate.
+    YawRate,
+    /// Distance travelled.
+    Distance,
+    /// Lap number.
+    Lap,
+    /// 1 where the lap was driven from line to line, 0 elsewhere (native files).
+    LapComplete,
+    /// Throttle position.
+    Throttle,
+    /// Brake pressure or position.
+    Brake,
+}
+
+impl Role {
+    /// All roles.
+    pub const ALL: [Self; 14] = [
+        Self::WheelSpeedFl,
+        Self::WheelSpeedFr,
+        Self::WheelSpeedRl,
+        Self::WheelSpeedRr,
+        Self::Steer,
+        Self::Vx,
+        Self::Ax,
+        Self::Ay,
+        Self::YawRate,
+        Self::Distance,
+        Self::Lap,
+        Self::LapComplete,
+        Self::Throttle,
+        Self::Brake,
+    ];
+    /// The wheels' roles, FL FR RL RR.
+    pub const WHEELS: [Self; 4] = [
+        Self::WheelSpeedFl,
+        Self::WheelSpeedFr,
+        Self::WheelSpeedRl,
+        Self::WheelSpeedRr,
+    ];
+
+    /// The role's key in a channel map.
+    pub fn key(self) -> &'static str {
+        match self {
+            Self::WheelSpeedFl => "wheel_speed_fl",
+            Self::WheelSpeedFr => "wheel_speed_fr",
+            Self::WheelSpeedRl => "wheel_speed_rl",
+            Self::WheelSpeedRr => "wheel_speed_rr",
+            Self::Steer => "steer",
+            Self::Vx => "vx",
+            Self::Ax => "ax",
+            Self::Ay => "ay",
+            Self::YawRate => "yaw_rate",
+            Self::Distance => "distance",
+            Self::Lap => "lap",
+            Self::LapComplete => "lap_complete",
+            Self::Throttle => "throttle",
+            Self::Brake => "brake",
+        }
+    }
+
+    /// Whether a log cannot do without it. Ground speed can be made from wheel speeds.
+    pub fn required(self) -> bool {
+        matches!(
+            self,
+            Self::WheelSpeedFl
+                | Self::WheelSpeedFr
+                | Self::WheelSpeedRl
+                | Self::WheelSpeedRr
+                | Self::Steer
+                | Self::Ax
+                | Self::Ay
+                | Self::YawRate
+        )
+    }
+
+    /// The quantities its channel may have; none where it is a plain number.
+    pub fn quantities(self) -> &'static [Quantity] {
+        match self {
+            Self::WheelSpeedFl | Self::WheelSpeedFr | Self::WheelSpeedRl | Self::WheelSpeedRr => {
+                &[Quantity::AngularSpeed, Quantity::Speed]
+            }
+            Self::Steer => &[Quantity::Angle],
+            Self::Vx => &[Quantity::Speed],
+            Self::Ax | Self::Ay => &[Quantity::Acceleration],
+            Self::YawRate => &[Quantity::AngularSpeed],
+            Self::Distance => &[Quantity::Distance],
+            Self::Throttle | Self::Brake => &[Quantity::Ratio, Quantity::Pressure],
+            Self::Lap | Self::LapComplete => &[],
+        }
+    }
+
+    /// Usual names, best first, in lower case and without anything but letters and digits: ours, then those of
+    /// MoTeC, AiM, Racelogic and iRacing.
+    fn usual_names(self) -> &'static [&'static str] {
+        match self {
+            Self::WheelSpeedFl => &[
+                "wheelspeedflradps",
+                "wheelspeedfl",
+                "wheelspeedfrontleft",
+                "wheelspdfl",
+                "whlspdfl",
+                "wspeedfl",
+                "speedfl",
+                "flwheelspeed",
+                "flspeed",
+                "lfspeed",
+            ],
+            Self::WheelSpeedFr => &[
+                "wheelspeedfrradps",
+                "wheelspeedfr",
+                "wheelspeedfrontright",
+                "wheelspdfr",
+                "whlspdfr",
+                "wspeedfr",
+                "speedfr",
+                "frwheelspeed",
+                "frspeed",
+                "rfspeed",
+            ],
+            Self::WheelSpeedRl => &[
+                "wheelspeedrlradps",
+                "wheelspeedrl",
+                "wheelspeedrearleft",
+                "wheelspdrl",
+                "whlspdrl",
+                "wspeedrl",
+                "speedrl",
+                "rlwheelspeed",
+                "rlspeed",
+                "lrspeed",
+            ],
+            Self::WheelSpeedRr => &[
+                "wheelspeedrrradps",
+                "wheelspeedrr",
+                "wheelspeedrearright",
+                "wheelspdrr",
+                "whlspdrr",
+                "wspeedrr",
+                "speedrr",
+                "rrwheelspeed",
+                "rrspeed",
+            ],
+            Self::Steer => &[
+                "steerrad",
+                "steeredangle",
+                "steerangle",
+                "steeringangle",
+                "steeringwheelangle",
+                "steering",
+                "steeringpos",
+                "steerpos",
+                "steeringposition",
+                "steer",
+            ],
+            Self::Vx => &[
+                "vxmps",
+                "groundspeed",
+                "corrspeed",
+                "vehiclespeed",
+                "speedoverground",
+                "velocitykmh",
+                "velocity",
+                "gpsspeed",
+                "speed",
+            ],
+            Self::Ax => &[
+                "axmps2",
+                "gforcelong",
+                "gforcelongitudinal",
+                "longacc",
+                "longaccel",
+                "longitudinalacceleration",
+                "accelerationx",
+                "inlineacc",
+                "lonacc",
+                "accelerometerx",
+                "gpslonacc",
+                "glong",
+            ],
+            Self::Ay => &[
+                "aymps2",
+                "gforcelat",
+                "gforcelateral",
+                "latacc",
+                "lataccel",
+                "lateralacceleration",
+                "accelerationy",
+                "lateralacc",
+                "accelerometery",
+                "gpslatacc",
+                "glat",
+            ],
+            Self::YawRate => &[
+                "yawrateradps",
+                "gyroyawvelocity",
+                "yawrate",
+                "gyroyaw",
+                "yawvelocity",
+                "gyrozaxis",
+                "rategyroz",
+                "zrate",
+                "gpsgyro",
+            ],
+            Self::Distance => &[
+                "distancem",
+                "lapdistance",
+                "distance",
+                "correcteddistance",
+                "lapdist",
+                "distanceonvehiclespeed",
+            ],
+            Self::Lap => &["lap", "lapnumber", "lapnum", "lapno"],
+            Self::LapComplete => &["lapcomplete"],
+            Self::Throttle => &[
+                "throttle",
+                "throttlepos",
+                "throttleposition",
+                "throttlepedal",
+                "pps",
+                "tps",
+            ],
+            Self::Brake => &[
+                "brake",
+                "brakepos",
+                "brakepresfront",
+                "brakepressurefront",
+                "brakepress",
+                "brakepressure",
+            ],
+        }
+    }
+}
+
+/// One of the car's axles.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Axle {
+    /// The front one.
+    #[default]
+    Front,
+    /// The rear one.
+    Rear,
+}
+
+/// What a channel map says about one role.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ChannelEntry {
+    /// The channel's name in the log; by the usual names where it is not given.
+    pub name: Option<String>,
+    /// The unit to believe instead of the one the log gives.
+    pub unit: Option<String>,
+    /// 1 or -1, multiplied to the values. Given, it is not estimated from the log.
+    pub sign: Option<f64>,
+    /// How much later than the event the logger recorded it, s; taken off its times. Given, it is not estimated.
+    pub delay_s: Option<f64>,
+}
+
+/// Which channel plays which role, with the few figures of the car that are needed to convert them.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ChannelMap {
+    /// What was said about roles; the others go by the usual names.
+    pub channels: BTreeMap<Role, ChannelEntry>,
+    /// Steering-wheel angle over road-wheel angle, for a log of the steering-wheel angle.
+    pub steering_ratio: Option<f64>,
+    /// Rolling radius (m) by which wheel speeds logged in km/h are divided to give rad/s, and on which wheel speeds
+    /// are calibrated.
+    pub rolling_radius_m: Option<f64>,
+    /// The axle whose wheel speeds stand in for a ground speed that is not logged: the undriven one.
+    pub speed_axle: Axle,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct FileEntry {
+    name: Option<String>,
+    unit: Option<Spanned<String>>,
+    sign: Option<Spanned<f64>>,
+    delay_s: Option<Spanned<f64>>,
+}
+
+#[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct FileVehicle {
+    steering_ratio: Option<Spanned<f64>>,
+    rolling_radius_m: Option<Spanned<f64>>,
+    #[serde(default)]
+    speed_axle: Axle,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct FileMap {
+    #[serde(default)]
+    channels: BTreeMap<Role, FileEntry>,
+    #[serde(default)]
+    vehicle: FileVehicle,
+}
+
+/// A role with the channel found for it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Mapped<'a> {
+    /// The role.
+    pub role: Role,
+    /// The channel that plays it.
+    pub channel: &'a Channel,
+    /// Its unit; none for plain numbers.
+    pub unit: Option<Unit>,
+    /// The sign the map declares.
+    pub sign: Option<f64>,
+    /// The delay the map declares, s.
+    pub delay_s: Option<f64>,
+    /// Whether the map names the channel; else it was found by its usual name.
+    pub declared: bool,
+}
+
+impl ChannelMap {
+    /// Reads a channel map.
+    ///
+    /// # Errors
+    /// [`Error::Io`], or [`Error::Input`] naming the line of an unknown key or a value out of range.
+    pub fn read(path: impl AsRef<Path>) -> Result<Self> {
+        let path = path.as_ref();
+        let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, "read", e))?;
+        Self::parse(&text, path)
+    }
+
+    /// Reads a channel map from its text; `path` is its name in error messages.
+    ///
+    /// # Errors
+    /// As for [`ChannelMap::read`].
+    pub fn parse(text: &str, path: impl AsRef<Path>) -> Result<Self> {
+        let path = path.as_ref();
+        let line_of = |at: usize| 1 + text.bytes().take(at).filter(|&byte| byte == b'\n').count();
+        let file: FileMap = toml::from_str(text).map_err(|e| {
+            let place = match e.span() {
+                Some(span) => format!("line {}", line_of(span.start)),
+                None => "the file".to_owned(),
+            };
+            let message = e.message().replace('\n', " ");
+            let (found, expected) = message
+                .split_once(", expected ")
+                .unwrap_or((&message, "a channel map in TOML"));
+            Error::input(path, place, found, expected)
+        })?;
+        let checked = |value: Option<Spanned<f64>>,
+                       key: &str,
+                       expected: &str,
+                       fits: fn(f64) -> bool| match value {
+            Some(value) if !fits(*value.get_ref()) => Err(Error::input(
+                path,
+                format!("line {}, field {key}", line_of(value.span().start)),
+                value.get_ref().to_string(),
+                expected,
+            )),
+            value => Ok(value.map(Spanned::into_inner)),
+        };
+        let mut channels = BTreeMap::new();
+        for (role, entry) in file.channels {
+            if let Some(unit) = &entry.unit
+                && !role.quantities().is_empty()
+            {
+                check_unit(unit.get_ref(), role).map_err(|expected| {
+                    let line = line_of(unit.span().start);
+                    let place = format!("line {line}, field channels.{}.unit", role.key());
+                    Error::input(path, place, shown(unit.get_ref()), expected)
+                })?;
+            }
+            let field = |name: &str| format!("channels.{}.{name}", role.key());
+            let entry = ChannelEntry {
+                name: entry.name,
+                unit: entry.unit.map(Spanned::into_inner),
+                sign: checked(entry.sign, &field("sign"), "1 or -1", |v| v.abs() == 1.0)?,
+                delay_s: checked(
+                    entry.delay_s,
+                    &field("delay_s"),
+                    "a delay between -5 and 5 s",
+                    |v| v.abs() <= 5.0,
+                )?,
+            };
+            channels.insert(role, entry);
+        }
+        Ok(Self {
+            channels,
+            steering_ratio: checked(
+                file.vehicle.steering_ratio,
+                "vehicle.steering_ratio",
+                "a ratio between 0.1 and 50",
+                |v| (0.1..=50.0).contains(&v),
+            )?,
+            rolling_radius_m: checked(
+                file.vehicle.rolling_radius_m,
+                "vehicle.rolling_radius_m",
+                "a radius between 0.05 and 2 m",
+                |v| (0.05..=2.0).contains(&v),
+            )?,
+            speed_axle: file.vehicle.speed_axle,
+        })
+    }
+
+    /// Finds the channel of each role.
+    ///
+    /// # Errors
+    /// [`Error::Input`] when a channel the map names is not in the recording, a required role finds no channel, or a
+    /// channel's unit is unknown or measures something else.
+    pub fn resolve<'a>(&self, recording: &'a Recording) -> Result<Vec<Mapped<'a>>> {
+        let mut mapped = Vec::new();
+        for role in Role::ALL {
+            let entry = self.channels.get(&role);
+            let name = entry.and_then(|e| e.name.as_deref());
+            let found = match name {
+                Some(name) => Some(recording.channel(name).ok_or_else(|| {
+                    Error::input(
+                        &recording.source,
+                        format!("channel {}", role.key()),
+                        format!("no channel {}; it has {}", shown(name), listed(recording)),
+                        "the name that the channel map gives",
+                    )
+                })?),
+                None => guess(role, recording),
+            };
+            let Some(channel) = found else {
+                if role.required() || entry.is_some() {
+                    return Err(Error::input(
+                        &recording.source,
+                        format!("channel {}", role.key()),
+                        format!("none with a usual name; it has {}", listed(recording)),
+                        format!(
+                            "a [channels.{}] entry with its name in the channel map",
+                            role.key()
+                        ),
+                    ));
+                }
+                continue;
+            };
+            let unit_text = entry
+                .and_then(|e| e.unit.as_deref())
+                .unwrap_or(&channel.unit);
+            let unit = match check_unit(unit_text, role) {
+                Ok(unit) => unit,
+                // A pedal in volts is of no use, and nobody asked for it.
+                Err(_) if name.is_none() && matches!(role, Role::Throttle | Role::Brake) => {
+                    continue;
+                }
+                Err(expected) => {
+                    return Err(Error::input(
+                        &recording.source,
+                        format!("channel {}", channel.name),
+                        format!("the unit {}", shown(unit_text)),
+                        format!(
+                            "{expected}; a unit in [channels.{}] of the channel map overrides it",
+                            role.key()
+                        ),
+                    ));
+                }
+            };
+            mapped.push(Mapped {
+                role,
+                channel,
+                unit,
+                sign: entry.and_then(|e| e.sign),
+                delay_s: entry.and_then(|e| e.delay_s),
+                declared: name.is_some(),
+            });
+        }
+        Ok(mapped)
+    }
+}
+
+fn check_unit(text: &str, role: Role) -> Result<Option<Unit>, String> {
+    let allowed = role.quantities();
+    if allowed.is_empty() {
+        return Ok(None);
+    }
+    match Unit::parse(text).filter(|unit| allowed.contains(&unit.quantity)) {
+        Some(unit) => Ok(Some(unit)),
+        None => Err(allowed
+            .iter()
+            .map(|quantity| quantity.described())
+            .collect::<Vec<_>>()
+            .join(" or ")),
+    }
+}
+
+fn guess(role: Role, recording: &Recording) -> Option<&Channel> {
+    let key = |name: &str| -> String {
+        name.chars()
+            .filter(char::is_ascii_alphanumeric)
+            .map(|c| c.to_ascii_lowercase())
+            .collect()
+    };
+    role.usual_names()
+        .iter()
+        .find_map(|usual| recording.channels.iter().find(|c| key(&c.name) == *usual))
+}
+
+fn listed(recording: &Recording) -> String {
+    const MOST: usize = 40;
+    let names: Vec<_> = recording
+        .channels
+        .iter()
+        .take(MOST)
+        .map(|c| c.name.as_str())
+        .collect();
+    let rest = recording.channels.len() - names.len();
+    if rest == 0 {
+        names.join(", ")
+    } else {
+        format!("{} and {rest} more", names.join(", "))
+    }
+}

@@ -1,0 +1,618 @@
+//! The log that an identification works on.
+
+use std::borrow::Cow;
+use std::ops::Range;
+use std::path::Path;
+use std::sync::Arc;
+
+use super::audit::{check_gains, check_magnitude};
+use super::calibrate::{self, Calibration, CalibrationOptions, Declared, FindingKind};
+use super::channel_map::{Axle, ChannelMap, Mapped, Role};
+use super::laps::{self, Lap};
+use super::recording::{Channel, Clock, Format, Recording};
+use super::resample::{Grid, check_times, onto, uniform_interval};
+use super::text::shown;
+use super::units::Quantity;
+use crate::{Error, Result};
+
+/// How a recording is turned into a [`Log`].
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct LogOptions {
+    /// Sample rate of the log, Hz; the highest rate among the channels needed where it is not given.
+    pub rate_hz: Option<f64>,
+    /// Gaps of up to this (s) are bridged by a straight line; longer ones are errors. Intervals of up to three times
+    /// the nominal one are no gaps.
+    pub bridge_gaps_s: f64,
+    /// The rolling radius (m) to use where the channel map gives none: that of the car being identified.
+    pub rolling_radius_m: Option<f64>,
+    /// What is estimated from the log and corrected.
+    pub calibration: CalibrationOptions,
+}
+
+/// A log on one uniform clock, in SI and ISO 8855: x forward, y left, yaw anticlockwise and steering to the left
+/// positive. All arrays have as many values as `time_s`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Log {
+    /// The file it came from.
+    pub source: String,
+    /// Sample interval, s.
+    pub dt_s: f64,
+    /// Time, s.
+    pub time_s: Vec<f64>,
+    /// Distance from the start of the lap, m; integrated from speed where it is not logged.
+    pub distance_m: Vec<f64>,
+    /// Wheel speeds FL FR RL RR, rad/s.
+    pub wheel_speed_radps: [Vec<f64>; 4],
+    /// Road-wheel angle, rad.
+    pub steer_rad: Vec<f64>,
+    /// Forward speed, m/s.
+    pub vx_mps: Vec<f64>,
+    /// Longitudinal acceleration `dVx/dt - Vy r`, m/s^2.
+    pub ax_mps2: Vec<f64>,
+    /// Lateral acceleration `dVy/dt + Vx r`, m/s^2.
+    pub ay_mps2: Vec<f64>,
+    /// Yaw rate, rad/s.
+    pub yaw_rate_radps: Vec<f64>,
+    /// Its laps, in order and without gaps.
+    pub laps: Vec<Lap>,
+    /// What was estimated from the log and applied to it.
+    pub calibration: Calibration,
+}
+
+/// A mapped channel in SI, with its times.
+struct Signal<'a> {
+    mapped: Mapped<'a>,
+    times: Arc<[f64]>,
+    nominal_s: f64,
+    values: Cow<'a, [f64]>,
+    delay_s: f64,
+}
+
+impl Log {
+    /// Reads a log file. A native file without lap columns is one complete lap, and its values come through bit for
+    /// bit as long as no other rate and no calibration is asked for.
+    ///
+    /// # Errors
+    /// [`Error::Io`] when the file cannot be read; [`Error::Input`], naming line or time and channel, for missing
+    /// channels, unknown units, samples that are no numbers, times that do not rise, gaps, and values that no car
+    /// reaches.
+    pub fn read(path: impl AsRef<Path>, map: &ChannelMap, options: &LogOptions) -> Result<Self> {
+        Self::from_recording(&Recording::read(path)?, map, options)
+    }
+
+    /// Makes a log of a recording.
+    ///
+    /// # Errors
+    /// As for [`Log::read`], save [`Error::Io`].
+    pub fn from_recording(
+        recording: &Recording,
+        map: &ChannelMap,
+        options: &LogOptions,
+    ) -> Result<Self> {
+        check_options(options)?;
+        let source = recording.source.display().to_string();
+        let radius = map.rolling_radius_m.or(options.rolling_radius_m);
+        let mapped = map.resolve(recording)?;
+        let declared = Declared {
+            signs: roles(&mapped, |m| m.sign.is_some()),
+            delays: roles(&mapped, |m| m.delay_s.is_some()),
+            rolling_radius_m: radius,
+        };
+        let mut calibration = Calibration::default();
+        for m in mapped
+            .iter()
+            .filter(|m| !m.declared && recording.format != Format::Native)
+        {
+            calibration.notes.push(format!(
+                "{}: channel {}, by its name",
+                m.role.key(),
+                shown(&m.channel.name)
+            ));
+        }
+        if recording.format != Format::Native && map.steering_ratio.is_none() {
+            calibration.notes.push(
+                "steer: taken as the road-wheel angle: the channel map gives no steering_ratio"
+                    .to_owned(),
+            );
+        }
+        let mut signals = signals(&source, &mapped, map, options, radius)?;
+        let build = Build {
+            source: &source,
+            recording,
+            map,
+            options,
+            radius,
+        };
+        let mut log = build.assemble(&signals, calibration)?;
+        check_gains(&log)?;
+        if options.calibration.delays.is_on(recording.format) {
+            let mut calibration = std::mem::take(&mut log.calibration);
+            calibrate::delays(&log, &declared, &mut calibration);
+            for signal in &mut signals {
+                if let Some(delay) = calibration.applied(signal.mapped.role, FindingKind::Delay) {
+                    signal.delay_s += delay;
+                }
+            }
+            log = build.assemble(&signals, calibration)?;
+        }
+        calibrate::apply(&mut log, &options.calibration, recording.format, &declared);
+        Ok(log)
+    }
+
+    /// Number of samples.
+    pub fn samples(&self) -> usize {
+        self.time_s.len()
+    }
+
+    /// Duration from the first sample to the last, s.
+    pub fn duration_s(&self) -> f64 {
+        self.samples().saturating_sub(1) as f64 * self.dt_s
+    }
+
+    /// Part of the log. Laps that are cut are no longer complete.
+    ///
+    /// # Errors
+    /// [`Error::Input`] when the range is empty or reaches past the end.
+    pub fn slice(&self, range: Range<usize>) -> Result<Self> {
+        if range.start >= range.end || range.end > self.samples() {
+            return Err(Error::input(
+                &self.source,
+                "samples",
+                format!("{} to {}", range.start, range.end),
+                format!("a range within 0 to {}", self.samples()),
+            ));
+        }
+        let cut = |values: &[f64]| values[range.clone()].to_vec();
+        let laps = self.laps.iter().filter_map(|lap| {
+            let (start, end) = (lap.start.max(range.start), lap.end.min(range.end));
+            (start < end).then(|| Lap {
+                number: lap.number,
+                start: start - range.start,
+                end: end - range.start,
+                complete: lap.complete && end - start == lap.end - lap.start,
+            })
+        });
+        Ok(Self {
+            source: self.source.clone(),
+            dt_s: self.dt_s,
+            time_s: cut(&self.time_s),
+            distance_m: cut(&self.distance_m),
+            wheel_speed_radps: [0, 1, 2, 3].map(|w| cut(&self.wheel_speed_radps[w])),
+            steer_rad: cut(&self.steer_rad),
+            vx_mps: cut(&self.vx_mps),
+            ax_mps2: cut(&self.ax_mps2),
+            ay_mps2: cut(&self.ay_mps2),
+            yaw_rate_radps: cut(&self.yaw_rate_radps),
+            laps: laps.collect(),
+            calibration: self.calibration.clone(),
+        })
+    }
+
+    /// The lap with a number, as a log of its own.
+    ///
+    /// # Errors
+    /// [`Error::Input`] when there is none.
+    pub fn lap(&self, number: u32) -> Result<Self> {
+        match self.laps.iter().find(|lap| lap.number == number) {
+            Some(lap) => self.slice(lap.start..lap.end),
+            None => Err(Error::input(
+                &self.source,
+                "lap",
+                number.to_string(),
+                format!(
+                    "one of {}",
+                    self.laps
+                        .iter()
+                        .map(|lap| lap.number.to_string())
+                        .collect::<Vec<_>>()
+                        .join(", ")
+                ),
+            )),
+        }
+    }
+
+    /// Refuses a log that is shorter than a window of `window_s`.
+    ///
+    /// # Errors
+    /// [`Error::Input`] with both lengths.
+    pub fn check_length(&self, window_s: f64) -> Result<()> {
+        // The last sample's time is reached only to rounding.
+        if self.duration_s() + 1e-6 * self.dt_s >= window_s {
+            return Ok(());
+        }
+        Err(Error::input(
+            &self.source,
+            "time",
+            format!("{:.3} s of log", self.duration_s()),
+            format!("at least one window of {window_s} s"),
+        ))
+    }
+}
+
+fn check_options(options: &LogOptions) -> Result<()> {
+    let checks = [
+        ("sample rate", options.rate_hz, 0.1..=100_000.0, "Hz"),
+        ("bridged gap", Some(options.bridge_gaps_s), 0.0..=1e6, "s"),
+        ("rolling radius", options.rolling_radius_m, 0.05..=2.0, "m"),
+    ];
+    for (name, value, range, unit) in checks {
+        if let Some(value) = value.filter(|v| !range.contains(v)) {
+            return Err(Error::input(
+                "log options",
+                name,
+                value.to_string(),
+                format!("{} to {} {unit}", range.start(), range.end()),
+            ));
+        }
+    }
+    Ok(())
+}
+
+fn roles(mapped: &[Mapped<'_>], which: fn(&Mapped<'_>) -> bool) -> Vec<Role> {
+    mapped.iter().filter(|m| which(m)).map(|m| m.role).collect()
+}
+
+/// Converts the channels that a log is made of to SI, and checks their samples and clocks.
+fn signals<'a>(
+    source: &str,
+    mapped: &[Mapped<'a>],
+    map: &ChannelMap,
+    options: &LogOptions,
+    radius: Option<f64>,
+) -> Result<Vec<Signal<'a>>> {
+    let mut signals: Vec<Signal<'a>> = Vec::new();
+    for m in mapped {
+        if matches!(m.role, Role::Throttle | Role::Brake) {
+            continue;
+        }
+        let channel = m.channel;
+        check_samples(source, channel)?;
+        let known = signals
+            .iter()
+            .find(|s| same_clock(s.mapped.channel, channel));
+        let (times, nominal_s) = match known {
+            Some(signal) => (Arc::clone(&signal.times), signal.nominal_s),
+            None => {
+                let times = times(source, channel)?;
+                let nominal = check_times(source, channel, &times, options.bridge_gaps_s)?;
+                (times, nominal)
+            }
+        };
+        let factor = factor(source, m, map, radius)?;
+        let values = if factor == 1.0 {
+            Cow::Borrowed(&channel.values[..])
+        } else {
+            channel.values.iter().map(|v| v * factor).collect()
+        };
+        check_magnitude(source, m, &values)?;
+        signals.push(Signal {
+            mapped: *m,
+            times,
+            nominal_s,
+            values,
+            delay_s: m.delay_s.unwrap_or(0.0),
+        });
+    }
+    Ok(signals)
+}
+
+fn check_samples(source: &str, channel: &Channel) -> Result<()> {
+    let Some(bad) = &channel.unreadable else {
+        return Ok(());
+    };
+    let (place, found) = if channel.values.is_empty() {
+        (format!("channel {}", channel.name), bad.text.clone())
+    } else if bad.text.is_empty() {
+        (channel.place(bad.sample), "an empty cell".to_owned())
+    } else {
+        (channel.place(bad.sample), shown(&bad.text))
+    };
+    Err(Error::input(source, place, found, "a finite number"))
+}
+
+fn same_clock(a: &Channel, b: &Channel) -> bool {
+    match (&a.clock, &b.clock) {
+        (Clock::Times(a), Clock::Times(b)) => Arc::ptr_eq(a, b),
+        (a_clock, b_clock) => a_clock == b_clock && a.values.len() == b.values.len(),
+    }
+}
+
+fn times(source: &str, channel: &Channel) -> Result<Arc<[f64]>> {
+    match &channel.clock {
+        Clock::Times(times) => Ok(Arc::clone(times)),
+        Clock::Rate { rate_hz, .. } if *rate_hz > 0.0 => Ok((0..channel.values.len())
+            .map(|i| channel.time_s(i))
+            .collect()),
+        Clock::Rate { rate_hz, .. } => Err(Error::input(
+            source,
+            format!("channel {}", channel.name),
+            format!("a sample rate of {rate_hz} Hz"),
+            "one above 0",
+        )),
+    }
+}
+
+/// What a channel's values are multiplied by to become SI with the declared sign.
+fn factor(source: &str, m: &Mapped<'_>, map: &ChannelMap, radius: Option<f64>) -> Result<f64> {
+    let mut factor = m.sign.unwrap_or(1.0);
+    let Some(unit) = m.unit else {
+        return Ok(factor);
+    };
+    factor *= unit.factor;
+    if m.role == Role::Steer {
+        factor /= map.steering_ratio.unwrap_or(1.0);
+    }
+    if Role::WHEELS.contains(&m.role) && unit.quantity == Quantity::Speed {
+        factor /= radius.ok_or_else(|| {
+            Error::input(
+                source,
+                format!("channel {}", m.channel.name),
+                "a linear wheel speed and no rolling radius to turn it into rad/s",
+                "rolling_radius_m in [vehicle] of the channel map",
+            )
+        })?;
+    }
+    Ok(factor)
+}
+
+struct Build<'a> {
+    source: &'a str,
+    recording: &'a Recording,
+    map: &'a ChannelMap,
+    options: &'a LogOptions,
+    radius: Option<f64>,
+}
+
+impl Build<'_> {
+    fn assemble(&self, signals: &[Signal<'_>], calibration: Calibration) -> Result<Log> {
+        let grid = self.grid(signals)?;
+        let (grid, through) = match grid {
+            Clocked::AsLogged(grid) => (grid, true),
+            Clocked::Resampled(grid) => (grid, false),
+        };
+        let sampled = |signal: &Signal<'_>| -> Vec<f64> {
+            if through {
+                signal.values.to_vec()
+            } else {
+                onto(
+                    &signal.times,
+                    &signal.values,
+                    signal.nominal_s,
+                    signal.delay_s,
+                    &grid,
+                )
+            }
+        };
+        let find = |role| signals.iter().find(|s| s.mapped.role == role);
+        let needed = |role: Role| match find(role) {
+            Some(signal) => Ok(sampled(signal)),
+            None => Err(Error::input(
+                self.source,
+                format!("channel {}", role.key()),
+                "none",
+                "one",
+            )),
+        };
+        let [fl, fr, rl, rr] = Role::WHEELS;
+        let wheel_speed_radps = [needed(fl)?, needed(fr)?, needed(rl)?, needed(rr)?];
+        let mut log = Log {
+            source: self.source.to_owned(),
+            dt_s: grid.dt_s,
+            time_s: match signals.first() {
+                Some(signal) if through => signal.times.to_vec(),
+                _ => (0..grid.samples).map(|i| grid.time_s(i)).collect(),
+            },
+            distance_m: Vec::new(),
+            vx_mps: Vec::new(),
+            steer_rad: needed(Role::Steer)?,
+            ax_mps2: needed(Role::Ax)?,
+            ay_mps2: needed(Role::Ay)?,
+            yaw_rate_radps: needed(Role::YawRate)?,
+            wheel_speed_radps,
+            laps: Vec::new(),
+            calibration,
+        };
+        log.vx_mps = match find(Role::Vx) {
+            Some(signal) => sampled(signal),
+            None => self.speed_of_wheels(&mut log)?,
+        };
+        log.laps = self.laps(signals, &grid, &mut log.calibration)?;
+        log.distance_m = match find(Role::Distance) {
+            Some(signal) if through && self.recording.format == Format::Native => {
+                signal.values.to_vec()
+            }
+            Some(signal) => {
+                let running = running_distance(&signal.values);
+                let all = onto(
+                    &signal.times,
+                    &running,
+                    signal.nominal_s,
+                    signal.delay_s,
+                    &grid,
+                );
+                from_lap_start(&all, &log.laps)
+            }
+            None => {
+                let mut all = Vec::with_capacity(grid.samples);
+                let mut sum = 0.0;
+                let mut last = log.vx_mps.first().copied().unwrap_or(0.0);
+                for &v in &log.vx_mps {
+                    sum += (last + v) / 2.0 * if all.is_empty() { 0.0 } else { grid.dt_s };
+                    last = v;
+                    all.push(sum);
+                }
+                from_lap_start(&all, &log.laps)
+            }
+        };
+        Ok(log)
+    }
+
+    fn grid(&self, signals: &[Signal<'_>]) -> Result<Clocked> {
+        let Some(first) = signals.first() else {
+            return Err(Error::input(
+                self.source,
+                "channels",
+                "none",
+                "those of a car",
+            ));
+        };
+        let asked = self.options.rate_hz.map(|rate| 1.0 / rate);
+        let fits = |dt: f64| asked.is_none_or(|asked| (asked - dt).abs() <= 1e-9 * dt);
+        let shared = signals
+            .iter()
+            .all(|s| s.delay_s == 0.0 && Arc::ptr_eq(&s.times, &first.times));
+        if shared && let Some(dt_s) = uniform_interval(&first.times).filter(|dt| fits(*dt)) {
+            return Ok(Clocked::AsLogged(Grid {
+                start_s: first.times[0],
+                dt_s,
+                samples: first.times.len(),
+            }));
+        }
+        // Lap numbers and distance may be logged slowly or start late without holding the others back.
+        let driving = || {
+            signals
+                .iter()
+                .filter(|s| s.mapped.role.required() || s.mapped.role == Role::Vx)
+        };
+        let fastest = driving()
+            .min_by(|a, b| a.nominal_s.total_cmp(&b.nominal_s))
+            .unwrap_or(first);
+        let dt_s = asked
+            .or_else(|| uniform_interval(&fastest.times))
+            .unwrap_or(fastest.nominal_s);
+        let (mut start, mut end) = (f64::NEG_INFINITY, f64::INFINITY);
+        for signal in driving() {
+            if let [first, .., last] = &signal.times[..] {
+                start = start.max(first - signal.delay_s);
+                end = end.min(last - signal.delay_s);
+            }
+        }
+        Grid::within(self.source, fastest.times[0], start, end, dt_s).map(Clocked::Resampled)
+    }
+
+    fn speed_of_wheels(&self, log: &mut Log) -> Result<Vec<f64>> {
+        let Some(radius) = self.radius else {
+            return Err(Error::input(
+                self.source,
+                "channel vx",
+                "no ground speed, and no rolling radius to make one of wheel speeds",
+                "a ground speed channel, or rolling_radius_m in [vehicle] of the channel map",
+            ));
+        };
+        let [fl, fr, rl, rr] = &log.wheel_speed_radps;
+        let (left, right, name) = match self.map.speed_axle {
+            Axle::Front => (fl, fr, "front"),
+            Axle::Rear => (rl, rr, "rear"),
+        };
+        let note = format!(
+            "vx: no ground speed is logged; the mean of the {name} wheel speeds stands in for it"
+        );
+        if !log.calibration.notes.contains(&note) {
+            log.calibration.notes.push(note);
+        }
+        Ok(left
+            .iter()
+            .zip(right)
+            .map(|(l, r)| (l + r) / 2.0 * radius)
+            .collect())
+    }
+
+    fn laps(
+        &self,
+        signals: &[Signal<'_>],
+        grid: &Grid,
+        calibration: &mut Calibration,
+    ) -> Result<Vec<Lap>> {
+        let whole = |number, complete| Lap {
+            number,
+            start: 0,
+            end: grid.samples,
+            complete,
+        };
+        let native = self.recording.format == Format::Native;
+        if !self.recording.beacons_s.is_empty() {
+            let cuts = laps::cuts_from_beacons(&self.recording.beacons_s, *grid);
+            return Ok(laps::cut(&cuts, 0, *grid));
+        }
+        let channel = |role| signals.iter().find(|s| s.mapped.role == role);
+        if let Some(lap) = channel(Role::Lap) {
+            let numbers = lap_numbers(self.source, lap)?;
+            let first = numbers.first().copied().unwrap_or(0);
+            let cuts = laps::cuts_from_numbers(&lap.times, &numbers);
+            let mut found = laps::cut(&cuts, first, *grid);
+            if let Some(flags) = channel(Role::LapComplete) {
+                for lap in &mut found {
+                    let at = flags
+                        .times
+                        .partition_point(|t| *t < grid.time_s(lap.start) - grid.dt_s / 2.0);
+                    lap.complete = flags.values.get(at).is_some_and(|v| *v == 1.0);
+                }
+            } else if native && cuts.is_empty() {
+                found = vec![whole(first, true)];
+            }
+            return Ok(found);
+        }
+        let range = self.recording.metadata.range.as_deref().unwrap_or("");
+        let exported_lap = range.to_ascii_lowercase().starts_with("lap");
+        if !native && !exported_lap {
+            let note = "laps: no beacons and no lap number are logged; the whole file is taken as one lap that may not \
+                        be complete";
+            if !calibration.notes.iter().any(|n| n == note) {
+                calibration.notes.push(note.to_owned());
+            }
+        }
+        Ok(vec![whole(1, native || exported_lap)])
+    }
+}
+
+enum Clocked {
+    /// The samples as they were logged.
+    AsLogged(Grid),
+    /// New samples between them.
+    Resampled(Grid),
+}
+
+fn lap_numbers(source: &str, lap: &Signal<'_>) -> Result<Vec<u32>> {
+    let number = |(at, &value): (usize, &f64)| {
+        if value.fract() == 0.0 && (0.0..=f64::from(u32::MAX)).contains(&value) {
+            Ok(value as u32)
+        } else {
+            Err(Error::input(
+                source,
+                lap.mapped.channel.place(at),
+                value.to_string(),
+                "a lap number: whole, 0 or more",
+            ))
+        }
+    };
+    lap.values.iter().enumerate().map(number).collect()
+}
+
+/// Distance that goes on where the logged one starts again at nought.
+fn running_distance(values: &[f64]) -> Vec<f64> {
+    let mut carried = 0.0;
+    let mut last = values.first().copied().unwrap_or(0.0);
+    values
+        .iter()
+        .map(|&value| {
+            // Half of what was reached: a counter that corrects itself by a few metres has not started again.
+            if value < 0.5 * last {
+                carried += last;
+            }
+            last = value;
+            value + carried
+        })
+        .collect()
+}
+
+fn from_lap_start(all: &[f64], laps: &[Lap]) -> Vec<f64> {
+    let mut out = all.to_vec();
+    for lap in laps {
+        if let Some(part) = out.get_mut(lap.start..lap.end)
+            && let Some(&start) = part.first()
+        {
+            part.iter_mut().for_each(|d| *d -= start);
+        }
+    }
+    out
+}
