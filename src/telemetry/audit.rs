@@ -78,3 +78,84 @@ pub(super) fn check_gains(log: &Log) -> Result<()> {
     }
     Ok(())
 }
+
+/// How long (s) the end of the log repeats its last sample, where that is longer than sensors at rest would.
+pub(super) fn frozen_tail_s(log: &Log) -> Option<f64> {
+    const LONGEST_S: f64 = 2.0;
+    let frozen = [&log.vx_mps, &log.ax_mps2, &log.ay_mps2, &log.yaw_rate_radps]
+        .into_iter()
+        .map(|values| {
+            let last = values.last().copied();
+            values
+                .iter()
+                .rev()
+                .take_while(|v| Some(**v) == last)
+                .count()
+        })
+        .min()?;
+    let frozen_s = frozen as f64 * log.dt_s;
+    (frozen_s > LONGEST_S && frozen < log.samples()).then_some(frozen_s)
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::telemetry::synthetic::{Car, native_text};
+    use crate::telemetry::{ChannelMap, Log, LogOptions, Recording};
+
+    fn error(text: &str) -> String {
+        let recording = Recording::parse(text.as_bytes(), "a.csv").unwrap();
+        Log::from_recording(&recording, &ChannelMap::default(), &LogOptions::default())
+            .unwrap_err()
+            .to_string()
+    }
+
+    #[test]
+    fn units_that_cannot_be_are_refused_with_line_channel_and_value() {
+        let text = native_text(&Car::default().drive(20.0, 50.0));
+        let with = |column: usize, factor: f64| {
+            let mut out = String::new();
+            for (i, line) in text.lines().enumerate() {
+                let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+                if i > 0 {
+                    let value: f64 = cells[column].parse().unwrap();
+                    cells[column] = (value * factor).to_string();
+                }
+                out += &(cells.join(",") + "\n");
+            }
+            out
+        };
+        for (column, factor, parts) in [
+            (
+                10,
+                57.3,
+                ["channel yaw_rate_radps", "at most 10 rad/s", "deg/s?"],
+            ),
+            (7, 3.6, ["channel vx_mps", "at most 150 m/s", "km/h?"]),
+            (6, 57.3, ["channel steer_rad", "at most 1.3 rad", "degrees"]),
+            (9, 9.81, ["line ", "channel ay_mps2", "at most 60 m/s^2"]),
+            (
+                9,
+                0.10197,
+                [
+                    "channel ay",
+                    "times ground speed times yaw rate",
+                    "units wrong?",
+                ],
+            ),
+            (
+                8,
+                0.10197,
+                [
+                    "channel ax",
+                    "times the change of ground speed",
+                    "units wrong?",
+                ],
+            ),
+        ] {
+            let error = error(&with(column, factor));
+            for part in parts {
+                assert!(error.contains(part), "{part}: {error}");
+            }
+        }
+    }
+}

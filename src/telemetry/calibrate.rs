@@ -9,7 +9,7 @@ use serde::Serialize;
 use super::channel_map::Role;
 use super::log::Log;
 use super::recording::Format;
-use super::statistics::{Lag, best_lag, derivative, fit, median, quantile};
+use super::statistics::{Fit, Lag, best_lag, derivative, fit, least_error_lag, median, quantile};
 
 /// Slower than this (m/s) a car says little about its sensors.
 const MOVING_MPS: f64 = 8.0;
@@ -33,6 +33,12 @@ const DERIVATIVE_S: f64 = 0.1;
 const SURE_OF_SIGN: f64 = 0.4;
 /// A correlation below this decides no delay.
 const SURE_OF_DELAY: f64 = 0.6;
+/// The front wheels' speed difference counts up to this many times what it stays within for nine tenths of the time.
+const CLIP: f64 = 2.0;
+/// Brakes are hardly on when ax (m/s^2) is above this.
+const UNBRAKED_AX: f64 = -1.0;
+/// Wheels are not braked when the car gains speed faster than this, m/s^2.
+const DRIVING_AX: f64 = 0.3;
 /// Delays shorter than this share of a sample interval are left alone: interpolating would blur more than it moves.
 const LEAST_SHIFT: f64 = 0.1;
 
@@ -149,6 +155,8 @@ pub(super) struct Declared {
     pub signs: Vec<Role>,
     pub delays: Vec<Role>,
     pub rolling_radius_m: Option<f64>,
+    /// Ground speed is made of wheel speeds, and has no delay of its own.
+    pub speed_of_wheels: bool,
 }
 
 fn moving(log: &Log) -> Vec<bool> {
@@ -164,63 +172,88 @@ fn acceleration(log: &Log) -> Vec<f64> {
     derivative(&log.vx_mps, log.dt_s, half)
 }
 
-/// Front right minus front left wheel speed, m/s, with a rolling radius that is good enough for this.
+/// Front right minus front left wheel speed, m/s.
 fn front_difference(log: &Log) -> Option<Vec<f64>> {
     let [left, right, ..] = &log.wheel_speed_radps;
-    let radius = |wheel: &[f64]| {
-        let ratios = wheel.iter().zip(&log.vx_mps);
-        median(
-            ratios
-                .filter(|(w, v)| **v > MOVING_MPS && **w > 0.0)
-                .map(|(w, v)| v / w)
-                .collect(),
-        )
-    };
-    let (of_left, of_right) = (radius(left)?, radius(right)?);
-    let pairs = right.iter().zip(left);
-    Some(pairs.map(|(r, l)| r * of_right - l * of_left).collect())
+    let (left, right) = (linear_speed(log, left)?, linear_speed(log, right)?);
+    let pairs = right.iter().zip(&left);
+    let mut difference: Vec<f64> = pairs.map(|(r, l)| r - l).collect();
+    // A spike or a locked wheel is worth no more than a tight corner.
+    let most = CLIP * quantile(difference.iter().map(|d| d.abs()).collect(), 0.9)?;
+    for d in &mut difference {
+        *d = d.clamp(-most, most);
+    }
+    Some(difference)
 }
 
 /// Samples on which the front wheels' difference is that of their paths: not where one of them may be locking.
 fn unbraked(log: &Log, accel: &[f64]) -> Vec<bool> {
     let pairs = log.vx_mps.iter().zip(accel);
-    pairs.map(|(&v, &a)| v > MOVING_MPS && a > -3.0).collect()
+    pairs
+        .map(|(&v, &a)| v > MOVING_MPS && a > UNBRAKED_AX)
+        .collect()
 }
 
-/// Delays of all channels relative to yaw rate, from a log that has not been corrected yet.
-pub(super) fn delays(log: &Log, declared: &Declared, calibration: &mut Calibration) {
+/// Speed of a wheel in m/s, with a rolling radius that is good enough to compare it with others: that where the car
+/// hardly turns, since a wheel inside of most corners would look too large, or else that of all running.
+fn linear_speed(log: &Log, wheel: &[f64]) -> Option<Vec<f64>> {
+    let radius = |most_yaw: f64| {
+        let ratios: Vec<f64> = (0..log.samples())
+            .filter(|&i| {
+                log.vx_mps[i] > MOVING_MPS
+                    && wheel[i] > 0.0
+                    && log.yaw_rate_radps[i].abs() < most_yaw
+            })
+            .map(|i| log.vx_mps[i] / wheel[i])
+            .collect();
+        (ratios.len() as f64 * log.dt_s >= LEAST_S).then(|| median(ratios))?
+    };
+    let radius = radius(STRAIGHT_YAW).or_else(|| radius(f64::INFINITY))?;
+    Some(wheel.iter().map(|w| w * radius).collect())
+}
+
+/// Delay of the wheel speeds relative to ground speed, samples, from the mean of both undriven wheels, in which
+/// turning cancels.
+///
+/// Slip looks like a delay, since both grow with acceleration. An undriven wheel that is not braked has none, so only
+/// such samples count, and an error above a limit counts no more than the limit.
+fn wheel_lag(log: &Log, undriven: [usize; 2], accel: &[f64], most: usize) -> Option<Lag> {
+    /// Larger errors are slip or spikes, m/s.
+    const LIMIT: f64 = 1.0;
+    let [left, right] = undriven.map(|w| &log.wheel_speed_radps[w]);
+    let pairs = left.iter().zip(right);
+    let mean: Vec<f64> = pairs.map(|(l, r)| (l + r) / 2.0).collect();
+    let mask: Vec<bool> = log
+        .vx_mps
+        .iter()
+        .zip(accel)
+        .map(|(&v, &a)| v > MOVING_MPS && a > DRIVING_AX)
+        .collect();
+    least_error_lag(&log.vx_mps, &mean, &mask, most, LIMIT)
+}
+
+/// Delays of all channels relative to yaw rate, from a log that has not been corrected yet. `undriven` are the wheels
+/// of the axle that is not driven, left and right.
+pub(super) fn delays(
+    log: &Log,
+    declared: &Declared,
+    undriven: [usize; 2],
+    calibration: &mut Calibration,
+) {
     let most = (MOST_DELAY_S / log.dt_s).ceil() as usize;
     let (moving, accel) = (moving(log), acceleration(log));
     let sure = |lag: &Lag| lag.correlation.abs() >= SURE_OF_DELAY;
-    let wheels: Vec<Option<Lag>> = log
-        .wheel_speed_radps
-        .iter()
-        .map(|wheel| {
-            let half = (DERIVATIVE_S / log.dt_s).round().max(1.0) as usize;
-            let spin = derivative(wheel, log.dt_s, half);
-            best_lag(&accel, &spin, &moving, most).filter(sure)
-        })
-        .collect();
     let front = front_difference(log).and_then(|difference| {
-        best_lag(
+        let lag = best_lag(
             &log.yaw_rate_radps,
             &difference,
             &unbraked(log, &accel),
             most,
-        )
-        .filter(sure)
-    });
-    let speed = match (&front, &wheels[..]) {
-        (Some(front), [Some(left), Some(right), ..]) => {
-            Some(front.samples - (left.samples + right.samples) / 2.0)
-        }
-        _ => None,
-    };
-    if speed.is_none() {
-        calibration.notes.push(
-            "front wheel speeds do not follow yaw rate well enough to tell the delay of the speed channels".to_owned(),
         );
-    }
+        lag.filter(|l| l.correlation.abs() >= SURE_OF_SIGN)
+    });
+    // All four wheel speeds come off one input board, and the driven wheels' own delay cannot be told from slip.
+    let wheels = wheel_lag(log, undriven, &accel, most).filter(sure);
     let mut report = |role: Role, lag: Option<(f64, &Lag)>, against: &str| {
         let Some((samples, lag)) = lag else {
             calibration
@@ -245,22 +278,36 @@ pub(super) fn delays(log: &Log, declared: &Declared, calibration: &mut Calibrati
             evidence: format!("against {against}{why}"),
         });
     };
-    if let (Some(speed), Some(front)) = (speed, &front) {
+    // Without the front wheels to tie them to yaw rate, the speed channels are at least tied to each other.
+    let front_samples = front.as_ref().map(|f| f.samples);
+    let (wheel_samples, speed_samples) = match (front_samples, &wheels) {
+        (Some(front), Some(wheels)) => (Some(front), front - wheels.samples),
+        (Some(front), None) => (Some(front), 0.0),
+        (None, wheels) => (wheels.as_ref().map(|w| w.samples), 0.0),
+    };
+    let against_yaw = "yaw rate, through the speed difference of the front wheels";
+    let (wheel_evidence, wheel_against) = match &front {
+        Some(front) => (Some(front), against_yaw),
+        None => (
+            wheels.as_ref(),
+            "ground speed, on undriven wheels that are not braked",
+        ),
+    };
+    for role in Role::WHEELS {
+        report(role, wheel_samples.zip(wheel_evidence), wheel_against);
+    }
+    if !declared.speed_of_wheels {
+        let lag = front_samples.and(wheels.as_ref());
         report(
             Role::Vx,
-            Some((speed, front)),
-            "yaw rate, through the speed difference of the front wheels",
+            lag.map(|l| (speed_samples, l)),
+            "undriven wheels that are not braked, and through them yaw rate",
         );
-    }
-    let speed = speed.unwrap_or(0.0);
-    for (role, lag) in Role::WHEELS.into_iter().zip(&wheels) {
-        let lag = lag.as_ref().map(|l| (l.samples + speed, l));
-        report(role, lag, "the change of ground speed");
     }
     let ax = best_lag(&accel, &log.ax_mps2, &moving, most).filter(sure);
     report(
         Role::Ax,
-        ax.as_ref().map(|l| (l.samples + speed, l)),
+        ax.as_ref().map(|l| (l.samples + speed_samples, l)),
         "the change of ground speed",
     );
     let turning = product(&log.vx_mps, &log.yaw_rate_radps);
@@ -268,7 +315,7 @@ pub(super) fn delays(log: &Log, declared: &Declared, calibration: &mut Calibrati
     report(
         Role::Ay,
         ay.as_ref().map(|l| (l.samples, l)),
-        "ground speed times yaw rate",
+        "ground speed times yaw rate, which includes the few hundredths of a second by which side slip makes ay late",
     );
     let steer = best_lag(&log.yaw_rate_radps, &log.steer_rad, &moving, most).filter(sure);
     if let Some(steer) = steer {
@@ -341,13 +388,7 @@ fn signs(log: &mut Log, declared: &Declared) {
     sign(log, declared, Role::Steer, found, "against yaw rate");
 }
 
-fn sign(
-    log: &mut Log,
-    declared: &Declared,
-    role: Role,
-    found: Option<super::statistics::Fit>,
-    evidence: &str,
-) {
+fn sign(log: &mut Log, declared: &Declared, role: Role, found: Option<Fit>, evidence: &str) {
     let Some(found) = found.filter(|f| f.correlation.abs() >= SURE_OF_SIGN) else {
         log.calibration.notes.push(format!(
             "{}: the log does not tell its sign; taken as logged",
@@ -380,7 +421,7 @@ fn sign(
     });
 }
 
-fn gain(log: &mut Log, role: Role, found: Option<super::statistics::Fit>, against: &str) {
+fn gain(log: &mut Log, role: Role, found: Option<Fit>, against: &str) {
     if let Some(found) = found {
         log.calibration.findings.push(Finding {
             role,
@@ -540,5 +581,121 @@ fn rolling_radii(log: &mut Log, reference_m: Option<f64>) {
             samples,
             evidence,
         });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::telemetry::synthetic::{Car, Faults, motec_text};
+    use crate::telemetry::{ChannelMap, LogOptions, Recording};
+
+    const FAULTS: Faults = Faults {
+        vx_delay_s: 0.07,
+        wheel_delay_s: 0.03,
+        g_delay_s: 0.12,
+        steer_sign: -1.0,
+        ay_sign: -1.0,
+        yaw_offset: 0.004,
+        ay_offset: 0.3,
+    };
+    const RADII: [f64; 4] = [0.321, 0.324, 0.328, 0.331];
+
+    fn read(map: &str) -> Log {
+        let car = Car {
+            radius_m: RADII,
+            track_m: 1.64,
+        };
+        let text = motec_text(&car, &FAULTS, 70.0, 50.0);
+        let recording = Recording::parse(text.as_bytes(), "a.csv").unwrap();
+        let map = ChannelMap::parse(map, "m.toml").unwrap();
+        Log::from_recording(&recording, &map, &LogOptions::default()).unwrap()
+    }
+
+    #[test]
+    fn injected_faults_are_found_and_taken_off() {
+        let log = read("[vehicle]\nrolling_radius_m = 0.325");
+        let c = &log.calibration;
+        let delay = |role| c.applied(role, FindingKind::Delay).unwrap();
+        for (role, injected) in [
+            (Role::Vx, 0.07),
+            (Role::WheelSpeedFl, 0.03),
+            (Role::WheelSpeedRr, 0.03),
+            (Role::Ax, 0.12),
+            (Role::Ay, 0.12),
+        ] {
+            assert!(
+                (delay(role) - injected).abs() < 0.006,
+                "{role:?} {} for {injected}",
+                delay(role)
+            );
+        }
+        assert_eq!(c.applied(Role::Steer, FindingKind::Delay), None);
+        assert_eq!(c.applied(Role::Steer, FindingKind::Sign), Some(-1.0));
+        assert_eq!(c.applied(Role::Ay, FindingKind::Sign), Some(-1.0));
+        assert_eq!(
+            c.finding(Role::YawRate, FindingKind::Sign).unwrap().value,
+            1.0
+        );
+        let yaw_offset = c.applied(Role::YawRate, FindingKind::Offset).unwrap();
+        assert!(
+            (yaw_offset - FAULTS.yaw_offset).abs() < 1e-3,
+            "{yaw_offset}"
+        );
+        let ay_offset = c.applied(Role::Ay, FindingKind::Offset).unwrap();
+        assert!((ay_offset + FAULTS.ay_offset).abs() < 0.03, "{ay_offset}");
+        for (role, radius) in Role::WHEELS.into_iter().zip(RADII) {
+            let found = c.applied(role, FindingKind::RollingRadius).unwrap();
+            assert!((found / radius - 1.0).abs() < 1e-3, "{found} for {radius}");
+        }
+        let worst = (0..log.samples())
+            .map(|i| {
+                let (v, _, r) = Car::motion(log.time_s[i]);
+                let slip = log.wheel_speed_radps[2][i] * 0.325 - (v - 0.82 * r);
+                [
+                    (log.yaw_rate_radps[i] - r).abs() * 10.0,
+                    (log.ay_mps2[i] - v * r).abs(),
+                    (log.vx_mps[i] - v).abs(),
+                    slip.abs(),
+                ]
+                .into_iter()
+                .fold(0.0, f64::max)
+            })
+            .fold(0.0, f64::max);
+        assert!(worst < 0.15, "{worst}");
+    }
+
+    #[test]
+    fn what_the_map_declares_is_left_alone() {
+        let log = read(
+            "[channels.steer]\nsign = -1\n[channels.ay]\nsign = -1\ndelay_s = 0.12\n\
+             [channels.yaw_rate]\nsign = 1\n",
+        );
+        let c = &log.calibration;
+        assert_eq!(c.applied(Role::Steer, FindingKind::Sign), None);
+        assert_eq!(
+            c.finding(Role::Steer, FindingKind::Sign).unwrap().value,
+            1.0
+        );
+        let ay = c.finding(Role::Ay, FindingKind::Delay).unwrap();
+        assert!(!ay.applied && ay.value.abs() < 0.005, "{ay:?}");
+        // Without a reference radius the radii are told and nothing is scaled.
+        let fl = c
+            .finding(Role::WheelSpeedFl, FindingKind::RollingRadius)
+            .unwrap();
+        assert!(!fl.applied && (fl.value / RADII[0] - 1.0).abs() < 1e-3);
+    }
+
+    #[test]
+    fn off_means_off() {
+        let text = motec_text(&Car::default(), &FAULTS, 30.0, 50.0);
+        let recording = Recording::parse(text.as_bytes(), "a.csv").unwrap();
+        let options = LogOptions {
+            calibration: CalibrationOptions::all(Switch::Off),
+            ..LogOptions::default()
+        };
+        let log = Log::from_recording(&recording, &ChannelMap::default(), &options).unwrap();
+        assert!(log.calibration.findings.is_empty());
+        assert!((log.yaw_rate_radps[0] - FAULTS.yaw_offset).abs() < 1e-12);
     }
 }

@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::path::Path;
 use std::sync::Arc;
 
-use super::audit::{check_gains, check_magnitude};
+use super::audit::{check_gains, check_magnitude, frozen_tail_s};
 use super::calibrate::{self, Calibration, CalibrationOptions, Declared, FindingKind};
 use super::channel_map::{Axle, ChannelMap, Mapped, Role};
 use super::laps::{self, Lap};
@@ -97,6 +97,7 @@ impl Log {
             signs: roles(&mapped, |m| m.sign.is_some()),
             delays: roles(&mapped, |m| m.delay_s.is_some()),
             rolling_radius_m: radius,
+            speed_of_wheels: !mapped.iter().any(|m| m.role == Role::Vx),
         };
         let mut calibration = Calibration::default();
         for m in mapped
@@ -127,13 +128,22 @@ impl Log {
         check_gains(&log)?;
         if options.calibration.delays.is_on(recording.format) {
             let mut calibration = std::mem::take(&mut log.calibration);
-            calibrate::delays(&log, &declared, &mut calibration);
+            let undriven = match map.speed_axle {
+                Axle::Front => [0, 1],
+                Axle::Rear => [2, 3],
+            };
+            calibrate::delays(&log, &declared, undriven, &mut calibration);
             for signal in &mut signals {
                 if let Some(delay) = calibration.applied(signal.mapped.role, FindingKind::Delay) {
                     signal.delay_s += delay;
                 }
             }
             log = build.assemble(&signals, calibration)?;
+        }
+        if let Some(frozen_s) = frozen_tail_s(&log) {
+            log.calibration.notes.push(format!(
+                "the last {frozen_s:.1} s repeat one sample: the sensors were off before the logger"
+            ));
         }
         calibrate::apply(&mut log, &options.calibration, recording.format, &declared);
         Ok(log)

@@ -24,6 +24,8 @@ mod motec_ld;
 mod recording;
 mod resample;
 mod statistics;
+#[cfg(test)]
+mod synthetic;
 mod table;
 mod text;
 mod units;

@@ -76,8 +76,15 @@ pub(super) struct Lag {
 /// The lag within `-most..=most` samples at which `late` correlates most strongly, with either sign, with `early`.
 /// None when the strongest is at the end of the range: then there is no peak.
 pub(super) fn best_lag(early: &[f64], late: &[f64], mask: &[bool], most: usize) -> Option<Lag> {
+    // Samples whose partner falls off either end at some lag are left out at all lags, lest a few at the ends decide.
+    let inner = most..early.len().checked_sub(most)?;
+    let mask: Vec<bool> = mask
+        .iter()
+        .enumerate()
+        .map(|(i, allowed)| *allowed && inner.contains(&i))
+        .collect();
     let most = isize::try_from(most).ok()?;
-    let strength = |lag| fit(early, late, mask, lag);
+    let strength = |lag| fit(early, late, &mask, lag);
     let peak = (-most..=most)
         .filter_map(|lag| Some((lag, strength(lag)?)))
         .max_by(|(_, a), (_, b)| a.correlation.abs().total_cmp(&b.correlation.abs()))?;
@@ -93,6 +100,49 @@ pub(super) fn best_lag(early: &[f64], late: &[f64], mask: &[bool], most: usize) 
     } else {
         0.0
     };
+    Some(Lag {
+        samples: lag as f64 + between,
+        correlation: at.correlation,
+        used: at.samples,
+    })
+}
+
+/// The lag within `-most..=most` samples at which `late`, times the best factor for that lag, equals `early` best,
+/// where a squared error counts up to `limit` squared. None when the best is at the end of the range.
+pub(super) fn least_error_lag(
+    early: &[f64],
+    late: &[f64],
+    mask: &[bool],
+    most: usize,
+    limit: f64,
+) -> Option<Lag> {
+    // As in `best_lag`.
+    let inner = most..early.len().checked_sub(most)?;
+    let most = isize::try_from(most).ok()?;
+    let error = |lag: isize| {
+        let mut pairs = Vec::new();
+        for i in inner.clone().filter(|&i| mask[i]) {
+            pairs.push((early[i], *late.get(i.checked_add_signed(lag)?)?));
+        }
+        // A wrong factor would be made up for by a wrong lag wherever the signal mostly grows.
+        let factor = median(pairs.iter().map(|(e, l)| e / l).collect())?;
+        let errors = pairs.iter().map(|(e, l)| (e - factor * l).abs().min(limit));
+        Some(errors.map(|e| e * e).sum::<f64>())
+    };
+    let (lag, here) = (-most..=most)
+        .filter_map(|lag| Some((lag, error(lag)?)))
+        .min_by(|(_, a), (_, b)| a.total_cmp(b))?;
+    if lag.abs() == most {
+        return None;
+    }
+    let (before, after) = (error(lag - 1)?, error(lag + 1)?);
+    let curvature = before - 2.0 * here + after;
+    let between = if curvature > 0.0 {
+        0.5 * (before - after) / curvature
+    } else {
+        0.0
+    };
+    let at = fit(early, late, mask, lag)?;
     Some(Lag {
         samples: lag as f64 + between,
         correlation: at.correlation,
@@ -125,6 +175,21 @@ mod tests {
         assert!((lag.samples - 3.3).abs() < 0.02 && lag.correlation < -0.99);
         assert!(best_lag(&wave(0.0), &late, &[true; 400], 2).is_none());
         assert!(best_lag(&[1.0; 50], &[1.0; 50], &[true; 50], 2).is_none());
+    }
+
+    #[test]
+    fn outliers_do_not_move_the_least_error() {
+        let ramp = |shift: f64| -> Vec<f64> {
+            (0..400)
+                .map(|i| 20.0 + 8.0 * (0.05 * (f64::from(i) - shift)).sin())
+                .collect()
+        };
+        let mut late = ramp(2.4);
+        for v in late.iter_mut().step_by(9) {
+            *v -= 12.0;
+        }
+        let lag = least_error_lag(&ramp(0.0), &late, &[true; 400], 10, 1.0).unwrap();
+        assert!((lag.samples - 2.4).abs() < 0.1, "{lag:?}");
     }
 
     #[test]
