@@ -358,7 +358,7 @@ fn signs(log: &mut Log, declared: &Declared) {
         let found = fit(&yaw, &difference, &unbraked(log, &accel), 0);
         let evidence = match found {
             Some(f) => format!(
-                "against the speed difference of the front wheels, which makes the front track {:.2} m",
+                "against the speed difference of the front wheels, which makes the front track about {:.1} m",
                 f.slope.abs()
             ),
             None => String::new(),

@@ -541,3 +541,148 @@ fn listed(recording: &Recording) -> String {
         format!("{} and {rest} more", names.join(", "))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::telemetry::{Clock, Format, Metadata};
+    use proptest::prelude::*;
+
+    fn recording(channels: &[(&str, &str)]) -> Recording {
+        Recording {
+            source: "a.csv".into(),
+            format: Format::MotecCsv,
+            channels: channels
+                .iter()
+                .map(|(name, unit)| Channel {
+                    name: (*name).to_owned(),
+                    unit: (*unit).to_owned(),
+                    clock: Clock::Rate {
+                        start_s: 0.0,
+                        rate_hz: 10.0,
+                    },
+                    values: vec![0.0; 2],
+                    unreadable: None,
+                    lines: None,
+                })
+                .collect(),
+            beacons_s: Vec::new(),
+            metadata: Metadata::default(),
+        }
+    }
+
+    const IRACING: [(&str, &str); 9] = [
+        ("LFspeed", "m/s"),
+        ("RFspeed", "m/s"),
+        ("LRspeed", "m/s"),
+        ("RRspeed", "m/s"),
+        ("SteeringWheelAngle", "rad"),
+        ("Speed", "m/s"),
+        ("LongAccel", "m/s^2"),
+        ("LatAccel", "m/s^2"),
+        ("YawRate", "rad/s"),
+    ];
+
+    #[test]
+    fn a_map_is_read_in_full() {
+        let map = ChannelMap::parse(
+            "[channels.yaw_rate]\nname = \"Gyro\"\nunit = \"deg/s\"\nsign = -1\ndelay_s = 0.1\n\
+             [vehicle]\nsteering_ratio = 14\nrolling_radius_m = 0.325\nspeed_axle = \"rear\"\n",
+            "m.toml",
+        )
+        .unwrap();
+        let yaw = &map.channels[&Role::YawRate];
+        assert_eq!((yaw.sign, yaw.delay_s), (Some(-1.0), Some(0.1)));
+        assert_eq!(map.steering_ratio, Some(14.0));
+        assert_eq!(map.speed_axle, Axle::Rear);
+        assert_eq!(
+            ChannelMap::parse("", "m.toml").unwrap(),
+            ChannelMap::default()
+        );
+    }
+
+    #[test]
+    fn each_fault_of_a_map_names_its_line() {
+        for (text, parts) in [
+            (
+                "\n[channels.yaw]\nname = \"x\"",
+                ["m.toml: line 2", "`yaw`"],
+            ),
+            (
+                "[channels.ay]\nname = \"x\"\nsing = 1",
+                ["line 3", "`sing`"],
+            ),
+            (
+                "[channels.ay]\nsign = 2",
+                ["line 2, field channels.ay.sign: found 2", "1 or -1"],
+            ),
+            (
+                "[channels.ay]\ndelay_s = nan",
+                ["line 2, field channels.ay.delay_s", "NaN"],
+            ),
+            (
+                "[channels.ay]\nunit = \"deg\"",
+                [
+                    "line 2, field channels.ay.unit: found \"deg\"",
+                    "an acceleration",
+                ],
+            ),
+            (
+                "[vehicle]\nrolling_radius_m = 325",
+                ["line 2, field vehicle.rolling_radius_m", "325"],
+            ),
+            ("[vehicle]\nmass = 1", ["line 2", "`mass`"]),
+            ("a = ", ["line 1", "m.toml"]),
+        ] {
+            let error = ChannelMap::parse(text, "m.toml").unwrap_err().to_string();
+            for part in parts {
+                assert!(error.contains(part), "{part}: {error}");
+            }
+        }
+    }
+
+    #[test]
+    fn usual_names_are_found() {
+        let recording = recording(&IRACING);
+        let mapped = ChannelMap::default().resolve(&recording).unwrap();
+        assert_eq!(mapped.len(), 9);
+        for (m, (name, _)) in mapped.iter().zip(IRACING) {
+            assert_eq!(m.channel.name, name);
+            assert!(!m.declared);
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_resolved_says_what_to_write() {
+        let error = |channels: &[(&str, &str)], map: &str| {
+            let map = ChannelMap::parse(map, "m.toml").unwrap();
+            map.resolve(&recording(channels)).unwrap_err().to_string()
+        };
+        let missing = error(&IRACING[..8], "");
+        assert!(
+            missing.contains("channel yaw_rate: found none")
+                && missing.contains("[channels.yaw_rate]")
+        );
+        let named = error(&IRACING, "[channels.ay]\nname = \"Lat\"");
+        assert!(
+            named.contains("no channel \"Lat\"; it has LFspeed"),
+            "{named}"
+        );
+        let mut units = IRACING;
+        units[8].1 = "furlong";
+        let unit = error(&units, "");
+        assert!(
+            unit.contains("channel YawRate: found the unit \"furlong\"") && unit.contains("deg/s"),
+            "{unit}"
+        );
+        let map = ChannelMap::parse("[channels.yaw_rate]\nunit = \"deg/s\"", "m.toml").unwrap();
+        assert!(map.resolve(&recording(&units)).is_ok());
+    }
+
+    proptest! {
+        #[test]
+        fn a_map_never_panics(text in "[\\[\\]a-z_.=\" \n0-9-]{0,80}") {
+            let _ = ChannelMap::parse(&text, "m.toml");
+        }
+    }
+}

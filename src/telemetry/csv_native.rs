@@ -221,3 +221,169 @@ fn columns_of(log: &Log) -> [&[f64]; 11] {
         &log.yaw_rate_radps,
     ]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::telemetry::synthetic::{Car, native_text};
+    use crate::telemetry::{ChannelMap, LogOptions};
+    use proptest::prelude::*;
+
+    fn log_of(text: &str) -> Result<Log> {
+        let recording = Recording::parse(text.as_bytes(), "a.csv")?;
+        Log::from_recording(&recording, &ChannelMap::default(), &LogOptions::default())
+    }
+
+    #[test]
+    fn a_log_comes_back_bit_for_bit() {
+        let mut log = Car::default().drive(3.0, 37.0);
+        log.source = "a.csv".to_owned();
+        let text = render(
+            &log,
+            Path::new("a.csv"),
+            &NativeFormat::exact().comment("a\nb"),
+        )
+        .unwrap();
+        assert!(
+            text.starts_with("# a\n# b\ntime_s,distance_m,"),
+            "{text:.60}"
+        );
+        assert!(!text.contains("lap"));
+        assert_eq!(log_of(&text).unwrap(), log);
+    }
+
+    #[test]
+    fn laps_come_back_with_their_state() {
+        let mut log = Car::default().drive(3.0, 20.0);
+        let lap = |number, start, end, complete| crate::telemetry::Lap {
+            number,
+            start,
+            end,
+            complete,
+        };
+        log.laps = vec![
+            lap(0, 0, 7, false),
+            lap(1, 7, 40, true),
+            lap(2, 40, 60, false),
+        ];
+        let text = render(&log, Path::new("a.csv"), &NativeFormat::exact()).unwrap();
+        let back = log_of(&text).unwrap();
+        assert_eq!(back.laps, log.laps);
+        assert_eq!(back.distance_m, log.distance_m);
+        log.laps.pop();
+        let error = render(&log, Path::new("a.csv"), &NativeFormat::exact()).unwrap_err();
+        assert!(
+            error
+                .to_string()
+                .contains("a.csv: laps: found laps that cover samples 0 to 40")
+        );
+    }
+
+    #[test]
+    fn decimals_are_per_column() {
+        let log = Car::default().drive(1.0, 10.0);
+        let format = NativeFormat::exact().decimals("vx_mps", 2);
+        let text = render(&log, Path::new("a.csv"), &format).unwrap();
+        let row: Vec<&str> = text.lines().nth(1).unwrap().split(',').collect();
+        assert_eq!(row[7], "44.00");
+        let wrong = NativeFormat::exact().decimals("speed", 2);
+        assert!(render(&log, Path::new("a.csv"), &wrong).is_err());
+        let mut broken = log.clone();
+        broken.ax_mps2[3] = f64::NAN;
+        let error = render(&broken, Path::new("a.csv"), &format).unwrap_err();
+        assert!(
+            error
+                .to_string()
+                .contains("column ax_mps2, sample 3: found NaN")
+        );
+    }
+
+    #[test]
+    fn each_fault_names_line_and_channel() {
+        let text = native_text(&Car::default().drive(0.3, 10.0));
+        let line_3 = text.lines().nth(2).unwrap();
+        let cell = |column: usize, value: &str| {
+            let mut cells: Vec<&str> = line_3.split(',').collect();
+            cells[column] = value;
+            text.replace(line_3, &cells.join(","))
+        };
+        for (bad, part) in [
+            (
+                cell(10, ""),
+                "line 3, channel yaw_rate_radps: found an empty cell",
+            ),
+            (
+                cell(10, "NaN"),
+                "line 3, channel yaw_rate_radps: found \"NaN\"",
+            ),
+            (cell(0, "x"), "line 3, channel time_s: found \"x\""),
+            (
+                cell(0, "0"),
+                "line 3, channel wheel_speed_fl_radps: found time 0 s after 0 s",
+            ),
+            (
+                text.replace(line_3, "1,2"),
+                "line 3: found 2 cells, expected 11",
+            ),
+            (
+                text.replace("vx_mps", "steer_rad"),
+                "line 1, column 8: found a second steer_rad",
+            ),
+            (
+                text.replace("ay_mps2", "ay_furlongs"),
+                "channel ay: found none",
+            ),
+            (
+                text.replace("yaw_rate_radps", "yaw_rate"),
+                "channel yaw_rate: found the unit \"\"",
+            ),
+            (
+                "time_s,vx_mps\n0,1\n".to_owned(),
+                "data rows: found 1 of them",
+            ),
+        ] {
+            let error = log_of(&bad).unwrap_err().to_string();
+            assert!(error.contains(part), "{error}");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn any_numbers_survive(values in prop::collection::vec(-9.0..9.0_f64, 33)) {
+            let mut log = Car::default().drive(0.3, 10.0);
+            log.yaw_rate_radps.copy_from_slice(&values[..3]);
+            log.ax_mps2.copy_from_slice(&values[3..6]);
+            let text = render(&log, Path::new("a.csv"), &NativeFormat::exact()).unwrap();
+            let back = log_of(&text).unwrap();
+            prop_assert_eq!(back.yaw_rate_radps, log.yaw_rate_radps);
+            prop_assert_eq!(back.ax_mps2, log.ax_mps2);
+        }
+
+        #[test]
+        fn never_panics_on_mutated_files(patches in prop::collection::vec((0..600_usize, any::<u8>()), 1..6)) {
+            let mut bytes = native_text(&Car::default().drive(0.4, 10.0)).into_bytes();
+            for (at, value) in patches {
+                if let Some(byte) = bytes.get_mut(at) {
+                    *byte = value;
+                }
+            }
+            for options in [LogOptions::default(), LogOptions {
+                rate_hz: Some(25.0),
+                rolling_radius_m: Some(0.3),
+                bridge_gaps_s: 1e6,
+                calibration: crate::telemetry::CalibrationOptions::all(crate::telemetry::Switch::On),
+            }] {
+                if let Ok(recording) = Recording::parse(&bytes, "a.csv") {
+                    let _ = Log::from_recording(&recording, &ChannelMap::default(), &options);
+                }
+            }
+        }
+
+        #[test]
+        fn never_panics_on_arbitrary_bytes(bytes: Vec<u8>) {
+            let mut all = b"time_s,vx_mps\n".to_vec();
+            all.extend(bytes);
+            let _ = Recording::parse(&all, "a.csv");
+        }
+    }
+}

@@ -626,3 +626,180 @@ fn from_lap_start(all: &[f64], laps: &[Lap]) -> Vec<f64> {
     }
     out
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::telemetry::synthetic::{Car, native_text};
+    use crate::telemetry::{Metadata, Switch};
+
+    fn channel(name: &str, unit: &str, rate_hz: f64, f: impl Fn(f64) -> f64) -> Channel {
+        let samples = (8.0 * rate_hz) as usize;
+        Channel {
+            name: name.to_owned(),
+            unit: unit.to_owned(),
+            clock: Clock::Rate {
+                start_s: 0.0,
+                rate_hz,
+            },
+            values: (0..samples).map(|i| f(i as f64 / rate_hz)).collect(),
+            unreadable: None,
+            lines: None,
+        }
+    }
+
+    /// Channels of different rates, as in a `.ld`.
+    fn mixed() -> Recording {
+        let mut channels: Vec<Channel> = ["FL", "FR", "RL", "RR"]
+            .map(|w| {
+                channel(&format!("Wheel Speed {w}"), "km/h", 100.0, |t| {
+                    72.0 + 3.6 * t
+                })
+            })
+            .into();
+        channels.push(channel("Steered Angle", "deg", 20.0, |t| t));
+        channels.push(channel("G Force Lat", "G", 50.0, |_| 0.5));
+        channels.push(channel("G Force Long", "G", 50.0, |_| 0.1));
+        channels.push(channel("Gyro Yaw Velocity", "deg/s", 50.0, |t| 2.0 * t));
+        channels.push(channel("Lap Number", "", 1.0, |t| {
+            if t < 3.0 { 4.0 } else { 5.0 }
+        }));
+        Recording {
+            source: "a.ld".into(),
+            format: Format::MotecLd,
+            channels,
+            beacons_s: Vec::new(),
+            metadata: Metadata::default(),
+        }
+    }
+
+    fn off() -> LogOptions {
+        LogOptions {
+            calibration: CalibrationOptions::all(Switch::Off),
+            ..LogOptions::default()
+        }
+    }
+
+    fn map(text: &str) -> ChannelMap {
+        ChannelMap::parse(text, "m.toml").unwrap()
+    }
+
+    #[test]
+    fn channels_of_different_rates_meet_on_the_fastest() {
+        let map = map("[vehicle]\nsteering_ratio = 10\nrolling_radius_m = 0.5");
+        let log = Log::from_recording(&mixed(), &map, &off()).unwrap();
+        assert_eq!(log.dt_s, 0.01);
+        // The slowest needed channel ends first.
+        assert_eq!(log.samples(), 796);
+        for i in [0, 3, 500, 795] {
+            let t = log.time_s[i];
+            assert!((log.steer_rad[i] - (t / 10.0).to_radians()).abs() < 1e-12);
+            assert!((log.wheel_speed_radps[1][i] - (20.0 + t) / 0.5).abs() < 1e-9);
+            assert!((log.vx_mps[i] - (20.0 + t)).abs() < 1e-9);
+            assert!((log.yaw_rate_radps[i] - (2.0 * t).to_radians()).abs() < 1e-12);
+        }
+        assert!(
+            log.calibration
+                .notes
+                .iter()
+                .any(|n| n.contains("front wheel speeds stand"))
+        );
+        let numbers: Vec<_> = log
+            .laps
+            .iter()
+            .map(|l| (l.number, l.start, l.end))
+            .collect();
+        assert_eq!(numbers, [(4, 0, 300), (5, 300, 796)]);
+        assert_eq!(log.distance_m[300], 0.0);
+        assert!((log.distance_m[299] - (20.0 * 2.99 + 2.99 * 2.99 / 2.0)).abs() < 1e-6);
+    }
+
+    #[test]
+    fn declared_delays_and_signs_are_taken_off() {
+        let text =
+            "[vehicle]\nrolling_radius_m = 0.5\n[channels.yaw_rate]\nsign = -1\ndelay_s = 0.205";
+        let log = Log::from_recording(&mixed(), &map(text), &off()).unwrap();
+        let expected = -(2.0 * (log.time_s[10] + 0.205)).to_radians();
+        assert!((log.yaw_rate_radps[10] - expected).abs() < 1e-12);
+    }
+
+    #[test]
+    fn linear_wheel_speeds_need_a_radius() {
+        let error = Log::from_recording(&mixed(), &ChannelMap::default(), &off()).unwrap_err();
+        assert!(
+            error.to_string().contains("rolling_radius_m in [vehicle]"),
+            "{error}"
+        );
+    }
+
+    #[test]
+    fn a_broken_lap_number_names_its_place() {
+        let mut recording = mixed();
+        recording.channels[8].values[2] = 4.5;
+        let map = map("[vehicle]\nrolling_radius_m = 0.5");
+        let error = Log::from_recording(&recording, &map, &off()).unwrap_err();
+        assert!(
+            error
+                .to_string()
+                .contains("channel Lap Number, t = 2.000 s: found 4.5"),
+            "{error}"
+        );
+    }
+
+    #[test]
+    fn another_rate_is_made_when_asked_for() {
+        let text = native_text(&Car::default().drive(10.0, 50.0));
+        let recording = Recording::parse(text.as_bytes(), "a.csv").unwrap();
+        let read = |rate_hz| {
+            let options = LogOptions {
+                rate_hz,
+                ..LogOptions::default()
+            };
+            Log::from_recording(&recording, &ChannelMap::default(), &options)
+        };
+        let log = read(Some(10.0)).unwrap();
+        assert_eq!((log.dt_s, log.samples()), (0.1, 100));
+        assert_eq!(read(Some(50.0)).unwrap(), read(None).unwrap());
+        assert!(
+            read(Some(f64::NAN))
+                .unwrap_err()
+                .to_string()
+                .contains("sample rate: found NaN")
+        );
+        assert!(read(Some(1e5)).is_ok() && read(Some(1e9)).is_err());
+    }
+
+    #[test]
+    fn slices_and_laps() {
+        let map = map("[vehicle]\nrolling_radius_m = 0.5");
+        let mut log = Log::from_recording(&mixed(), &map, &off()).unwrap();
+        log.laps[0].complete = true;
+        assert_eq!(log.lap(5).unwrap().samples(), 496);
+        assert!(log.lap(4).unwrap().laps[0].complete);
+        let cut = log.slice(100..400).unwrap();
+        assert_eq!(
+            (cut.laps[0].end, cut.laps[0].complete, cut.laps[1].end),
+            (200, false, 300)
+        );
+        let error = log.lap(9).unwrap_err().to_string();
+        assert!(
+            error.contains("lap: found 9, expected one of 4, 5"),
+            "{error}"
+        );
+        assert!(log.slice(5..5).is_err() && log.slice(0..9999).is_err());
+        assert!(log.check_length(7.95).is_ok());
+        let error = log.check_length(8.0).unwrap_err().to_string();
+        assert!(
+            error.contains("found 7.950 s of log, expected at least one window of 8 s"),
+            "{error}"
+        );
+    }
+
+    #[test]
+    fn logged_distance_starts_again_with_the_counter() {
+        assert_eq!(
+            running_distance(&[0.0, 10.0, 20.0, 1.0, 11.0]),
+            [0.0, 10.0, 20.0, 21.0, 31.0]
+        );
+    }
+}

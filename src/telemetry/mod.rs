@@ -35,5 +35,5 @@ pub use channel_map::{Axle, ChannelEntry, ChannelMap, Mapped, Role};
 pub use csv_native::{COLUMNS, NativeFormat, write_native};
 pub use laps::Lap;
 pub use log::{Log, LogOptions};
-pub use recording::{Channel, Clock, Format, Metadata, Recording};
+pub use recording::{Channel, Clock, Format, Metadata, Recording, Unreadable};
 pub use units::{Quantity, Unit};
