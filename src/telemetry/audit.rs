@@ -1,8 +1,10 @@
 //! Values that cannot be what they are declared to be: nearly always a wrong unit.
 
-use super::channel_map::{Mapped, Role};
+use super::channel_map::Mapped;
+use super::derived::{acceleration, moving, product};
 use super::log::Log;
-use super::statistics::{derivative, fit};
+use super::role::Role;
+use super::statistics::fit;
 use crate::{Error, Result};
 
 /// Largest believable magnitude in SI, and what is usually wrong beyond it.
@@ -50,15 +52,8 @@ pub(super) fn check_magnitude(source: &str, mapped: &Mapped<'_>, values: &[f64])
 /// explains: `ay` against `vx` times yaw rate, `ax` against the change of `vx`.
 pub(super) fn check_gains(log: &Log) -> Result<()> {
     const CLOSELY: f64 = 0.8;
-    let moving: Vec<bool> = log.vx_mps.iter().map(|v| *v > 8.0).collect();
-    let turning: Vec<f64> = log
-        .vx_mps
-        .iter()
-        .zip(&log.yaw_rate_radps)
-        .map(|(v, r)| v * r)
-        .collect();
-    let half = (0.1 / log.dt_s).round().max(1.0) as usize;
-    let accel = derivative(&log.vx_mps, log.dt_s, half);
+    let (moving, accel) = (moving(log), acceleration(log));
+    let turning = product(&log.vx_mps, &log.yaw_rate_radps);
     for (name, values, reference, against) in [
         ("ay", &log.ay_mps2, &turning, "ground speed times yaw rate"),
         ("ax", &log.ax_mps2, &accel, "the change of ground speed"),

@@ -6,41 +6,22 @@
 
 use serde::Serialize;
 
-use super::channel_map::Role;
+use super::derived::{
+    LEAST_S, STRAIGHT_YAW, SURE_OF_SIGN, acceleration, front_difference, moving, product, unbraked,
+};
 use super::log::Log;
 use super::recording::Format;
-use super::statistics::{Fit, Lag, best_lag, derivative, fit, least_error_lag, median, quantile};
+use super::role::Role;
+use super::statistics::{Fit, fit, median, quantile};
 
-/// Slower than this (m/s) a car says little about its sensors.
-const MOVING_MPS: f64 = 8.0;
 /// Slower than this (m/s) wheel speeds are too coarse to tell a rolling radius.
 const STRAIGHT_MPS: f64 = 12.0;
-/// On a straight yaw rate (rad/s) stays within this of its offset.
-const STRAIGHT_YAW: f64 = 0.03;
 /// On a straight lateral acceleration (m/s^2) stays within this of its offset.
 const STRAIGHT_AY: f64 = 1.0;
 /// Wheels roll freely enough when |ax| (m/s^2) is below this.
 const COASTING_AX: f64 = 1.0;
 /// Standing still, m/s.
 const STANDSTILL_MPS: f64 = 0.3;
-/// Evidence from a straight or standstill needs this much of it, s.
-const LEAST_S: f64 = 2.0;
-/// Delays are looked for up to this, s.
-const MOST_DELAY_S: f64 = 0.5;
-/// Speed is differentiated over this long to each side, s: long enough to quieten 0.1 km/h steps.
-const DERIVATIVE_S: f64 = 0.1;
-/// A correlation below this decides no sign.
-const SURE_OF_SIGN: f64 = 0.4;
-/// A correlation below this decides no delay.
-const SURE_OF_DELAY: f64 = 0.6;
-/// The front wheels' speed difference counts up to this many times what it stays within for nine tenths of the time.
-const CLIP: f64 = 2.0;
-/// Brakes are hardly on when ax (m/s^2) is above this.
-const UNBRAKED_AX: f64 = -1.0;
-/// Wheels are not braked when the car gains speed faster than this, m/s^2.
-const DRIVING_AX: f64 = 0.3;
-/// Delays shorter than this share of a sample interval are left alone: interpolating would blur more than it moves.
-const LEAST_SHIFT: f64 = 0.1;
 
 /// Whether to do something, or let the file format decide.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -157,180 +138,6 @@ pub(super) struct Declared {
     pub rolling_radius_m: Option<f64>,
     /// Ground speed is made of wheel speeds, and has no delay of its own.
     pub speed_of_wheels: bool,
-}
-
-fn moving(log: &Log) -> Vec<bool> {
-    log.vx_mps.iter().map(|&v| v > MOVING_MPS).collect()
-}
-
-fn product(a: &[f64], b: &[f64]) -> Vec<f64> {
-    a.iter().zip(b).map(|(x, y)| x * y).collect()
-}
-
-fn acceleration(log: &Log) -> Vec<f64> {
-    let half = (DERIVATIVE_S / log.dt_s).round().max(1.0) as usize;
-    derivative(&log.vx_mps, log.dt_s, half)
-}
-
-/// Front right minus front left wheel speed, m/s.
-fn front_difference(log: &Log) -> Option<Vec<f64>> {
-    let [left, right, ..] = &log.wheel_speed_radps;
-    let (left, right) = (linear_speed(log, left)?, linear_speed(log, right)?);
-    let pairs = right.iter().zip(&left);
-    let mut difference: Vec<f64> = pairs.map(|(r, l)| r - l).collect();
-    // A spike or a locked wheel is worth no more than a tight corner.
-    let most = CLIP * quantile(difference.iter().map(|d| d.abs()).collect(), 0.9)?;
-    for d in &mut difference {
-        *d = d.clamp(-most, most);
-    }
-    Some(difference)
-}
-
-/// Samples on which the front wheels' difference is that of their paths: not where one of them may be locking.
-fn unbraked(log: &Log, accel: &[f64]) -> Vec<bool> {
-    let pairs = log.vx_mps.iter().zip(accel);
-    pairs
-        .map(|(&v, &a)| v > MOVING_MPS && a > UNBRAKED_AX)
-        .collect()
-}
-
-/// Speed of a wheel in m/s, with a rolling radius that is good enough to compare it with others: that where the car
-/// hardly turns, since a wheel inside of most corners would look too large, or else that of all running.
-fn linear_speed(log: &Log, wheel: &[f64]) -> Option<Vec<f64>> {
-    let radius = |most_yaw: f64| {
-        let ratios: Vec<f64> = (0..log.samples())
-            .filter(|&i| {
-                log.vx_mps[i] > MOVING_MPS
-                    && wheel[i] > 0.0
-                    && log.yaw_rate_radps[i].abs() < most_yaw
-            })
-            .map(|i| log.vx_mps[i] / wheel[i])
-            .collect();
-        (ratios.len() as f64 * log.dt_s >= LEAST_S).then(|| median(ratios))?
-    };
-    let radius = radius(STRAIGHT_YAW).or_else(|| radius(f64::INFINITY))?;
-    Some(wheel.iter().map(|w| w * radius).collect())
-}
-
-/// Delay of the wheel speeds relative to ground speed, samples, from the mean of both undriven wheels, in which
-/// turning cancels.
-///
-/// Slip looks like a delay, since both grow with acceleration. An undriven wheel that is not braked has none, so only
-/// such samples count, and an error above a limit counts no more than the limit.
-fn wheel_lag(log: &Log, undriven: [usize; 2], accel: &[f64], most: usize) -> Option<Lag> {
-    /// Larger errors are slip or spikes, m/s.
-    const LIMIT: f64 = 1.0;
-    let [left, right] = undriven.map(|w| &log.wheel_speed_radps[w]);
-    let pairs = left.iter().zip(right);
-    let mean: Vec<f64> = pairs.map(|(l, r)| (l + r) / 2.0).collect();
-    let mask: Vec<bool> = log
-        .vx_mps
-        .iter()
-        .zip(accel)
-        .map(|(&v, &a)| v > MOVING_MPS && a > DRIVING_AX)
-        .collect();
-    least_error_lag(&log.vx_mps, &mean, &mask, most, LIMIT)
-}
-
-/// Delays of all channels relative to yaw rate, from a log that has not been corrected yet. `undriven` are the wheels
-/// of the axle that is not driven, left and right.
-pub(super) fn delays(
-    log: &Log,
-    declared: &Declared,
-    undriven: [usize; 2],
-    calibration: &mut Calibration,
-) {
-    let most = (MOST_DELAY_S / log.dt_s).ceil() as usize;
-    let (moving, accel) = (moving(log), acceleration(log));
-    let sure = |lag: &Lag| lag.correlation.abs() >= SURE_OF_DELAY;
-    let front = front_difference(log).and_then(|difference| {
-        let lag = best_lag(
-            &log.yaw_rate_radps,
-            &difference,
-            &unbraked(log, &accel),
-            most,
-        );
-        lag.filter(|l| l.correlation.abs() >= SURE_OF_SIGN)
-    });
-    // All four wheel speeds come off one input board, and the driven wheels' own delay cannot be told from slip.
-    let wheels = wheel_lag(log, undriven, &accel, most).filter(sure);
-    let mut report = |role: Role, lag: Option<(f64, &Lag)>, against: &str| {
-        let Some((samples, lag)) = lag else {
-            calibration
-                .notes
-                .push(format!("{}: no clear delay against {against}", role.key()));
-            return;
-        };
-        let (applied, why) = if declared.delays.contains(&role) {
-            (false, "; left alone: the channel map declares a delay")
-        } else if samples.abs() < LEAST_SHIFT {
-            (false, "; too short to correct")
-        } else {
-            (true, "")
-        };
-        calibration.findings.push(Finding {
-            role,
-            kind: FindingKind::Delay,
-            value: samples * log.dt_s,
-            applied,
-            correlation: Some(lag.correlation),
-            samples: lag.used,
-            evidence: format!("against {against}{why}"),
-        });
-    };
-    // Without the front wheels to tie them to yaw rate, the speed channels are at least tied to each other.
-    let front_samples = front.as_ref().map(|f| f.samples);
-    let (wheel_samples, speed_samples) = match (front_samples, &wheels) {
-        (Some(front), Some(wheels)) => (Some(front), front - wheels.samples),
-        (Some(front), None) => (Some(front), 0.0),
-        (None, wheels) => (wheels.as_ref().map(|w| w.samples), 0.0),
-    };
-    let against_yaw = "yaw rate, through the speed difference of the front wheels";
-    let (wheel_evidence, wheel_against) = match &front {
-        Some(front) => (Some(front), against_yaw),
-        None => (
-            wheels.as_ref(),
-            "ground speed, on undriven wheels that are not braked",
-        ),
-    };
-    for role in Role::WHEELS {
-        report(role, wheel_samples.zip(wheel_evidence), wheel_against);
-    }
-    if !declared.speed_of_wheels {
-        let lag = front_samples.and(wheels.as_ref());
-        report(
-            Role::Vx,
-            lag.map(|l| (speed_samples, l)),
-            "undriven wheels that are not braked, and through them yaw rate",
-        );
-    }
-    let ax = best_lag(&accel, &log.ax_mps2, &moving, most).filter(sure);
-    report(
-        Role::Ax,
-        ax.as_ref().map(|l| (l.samples + speed_samples, l)),
-        "the change of ground speed",
-    );
-    let turning = product(&log.vx_mps, &log.yaw_rate_radps);
-    let ay = best_lag(&turning, &log.ay_mps2, &moving, most).filter(sure);
-    report(
-        Role::Ay,
-        ay.as_ref().map(|l| (l.samples, l)),
-        "ground speed times yaw rate, which includes the few hundredths of a second by which side slip makes ay late",
-    );
-    let steer = best_lag(&log.yaw_rate_radps, &log.steer_rad, &moving, most).filter(sure);
-    if let Some(steer) = steer {
-        calibration.findings.push(Finding {
-            role: Role::Steer,
-            kind: FindingKind::Delay,
-            value: steer.samples * log.dt_s,
-            applied: false,
-            correlation: Some(steer.correlation),
-            samples: steer.used,
-            evidence: "against yaw rate; left alone: a car answers its steering late, so this is not the sensor's \
-                       delay alone (delay_s in the channel map sets it)"
-                .to_owned(),
-        });
-    }
 }
 
 /// Estimates and applies signs, offsets and rolling radii, in this order; delays have been taken off before.

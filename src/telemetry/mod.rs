@@ -14,15 +14,19 @@
 //! ```
 
 mod audit;
+mod build;
 mod calibrate;
 mod channel_map;
 mod csv_native;
+mod delays;
+mod derived;
 mod laps;
 mod log;
 mod motec_csv;
 mod motec_ld;
 mod recording;
 mod resample;
+mod role;
 mod statistics;
 #[cfg(test)]
 mod synthetic;
@@ -31,9 +35,10 @@ mod text;
 mod units;
 
 pub use calibrate::{Calibration, CalibrationOptions, Finding, FindingKind, Switch};
-pub use channel_map::{Axle, ChannelEntry, ChannelMap, Mapped, Role};
+pub use channel_map::{Axle, ChannelEntry, ChannelMap, Mapped};
 pub use csv_native::{COLUMNS, NativeFormat, write_native};
 pub use laps::Lap;
 pub use log::{Log, LogOptions};
 pub use recording::{Channel, Clock, Format, Metadata, Recording, Unreadable};
+pub use role::Role;
 pub use units::{Quantity, Unit};

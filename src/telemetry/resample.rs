@@ -9,7 +9,7 @@ pub(super) const JITTER: f64 = 0.04;
 /// Longer than this many nominal intervals between two samples is a gap.
 const GAP_INTERVALS: f64 = 3.0;
 /// Most samples of a resampled log; more is a wrong rate or a wrong unit of time, not a log.
-const MOST_SAMPLES: f64 = 2e7;
+const MOST_SAMPLES: f64 = 5e6;
 
 /// A uniform clock.
 #[derive(Clone, Copy, Debug, PartialEq)]

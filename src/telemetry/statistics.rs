@@ -73,6 +73,20 @@ pub(super) struct Lag {
     pub used: usize,
 }
 
+/// The lag within `-most..=most` with the highest score, first in steps and then around the best step: scores change
+/// little over a twentieth of the range, and there are many lags at high sample rates.
+fn search(most: isize, score: impl Fn(isize) -> Option<f64>) -> Option<isize> {
+    let best = |lags: &mut dyn Iterator<Item = isize>| {
+        lags.filter_map(|lag| Some((lag, score(lag)?)))
+            .max_by(|(_, a), (_, b)| a.total_cmp(b))
+            .map(|(lag, _)| lag)
+    };
+    let step = (most / 20).max(1);
+    let reach = most / step;
+    let near = best(&mut (-reach..=reach).map(|k| k * step))?;
+    best(&mut ((near - step).max(-most)..=(near + step).min(most)))
+}
+
 /// The lag within `-most..=most` samples at which `late` correlates most strongly, with either sign, with `early`.
 /// None when the strongest is at the end of the range: then there is no peak.
 pub(super) fn best_lag(early: &[f64], late: &[f64], mask: &[bool], most: usize) -> Option<Lag> {
@@ -85,10 +99,8 @@ pub(super) fn best_lag(early: &[f64], late: &[f64], mask: &[bool], most: usize) 
         .collect();
     let most = isize::try_from(most).ok()?;
     let strength = |lag| fit(early, late, &mask, lag);
-    let peak = (-most..=most)
-        .filter_map(|lag| Some((lag, strength(lag)?)))
-        .max_by(|(_, a), (_, b)| a.correlation.abs().total_cmp(&b.correlation.abs()))?;
-    let (lag, at) = peak;
+    let lag = search(most, |lag| strength(lag).map(|f| f.correlation.abs()))?;
+    let at = strength(lag)?;
     if lag.abs() == most {
         return None;
     }
@@ -129,9 +141,8 @@ pub(super) fn least_error_lag(
         let errors = pairs.iter().map(|(e, l)| (e - factor * l).abs().min(limit));
         Some(errors.map(|e| e * e).sum::<f64>())
     };
-    let (lag, here) = (-most..=most)
-        .filter_map(|lag| Some((lag, error(lag)?)))
-        .min_by(|(_, a), (_, b)| a.total_cmp(b))?;
+    let lag = search(most, |lag| error(lag).map(|e| -e))?;
+    let here = error(lag)?;
     if lag.abs() == most {
         return None;
     }

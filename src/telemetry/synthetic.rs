@@ -48,7 +48,7 @@ impl Car {
         let yaw = |t: f64| Self::motion(t).2;
         let vx = |t: f64| Self::motion(t).0;
         let wheel = |w: usize| {
-            let side = if w % 2 == 0 { -0.5 } else { 0.5 };
+            let side = if [0, 2].contains(&w) { -0.5 } else { 0.5 };
             of(&|t| (vx(t) + side * self.track_m * yaw(t)) / self.radius_m[w])
         };
         let mut distance = 0.0;
@@ -125,7 +125,7 @@ pub(super) fn motec_text(car: &Car, faults: &Faults, duration_s: f64, rate_hz: f
         let motion = |delay: f64| Car::motion(t - delay);
         let (v, _, r) = motion(faults.wheel_delay_s);
         let [fl, fr, rl, rr] = [0, 1, 2, 3].map(|w| {
-            let side = if w % 2 == 0 { -0.5 } else { 0.5 };
+            let side = if [0, 2].contains(&w) { -0.5 } else { 0.5 };
             (v + side * car.track_m * r) / car.radius_m[w] * 30.0 / std::f64::consts::PI
         });
         let (gv, ga, gr) = motion(faults.g_delay_s);
