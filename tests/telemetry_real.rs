@@ -75,14 +75,9 @@ fn calder_export() {
         .map(|lap| (lap.number, (lap.end - lap.start) as f64 * log.dt_s))
         .collect();
     assert_eq!(log.laps.len(), 5);
-    for ((number, time_s), (expected, beacons_s)) in
-        laps.iter().zip([(1, 63.68), (2, 65.19), (3, 63.76)])
-    {
+    for ((number, time_s), (expected, beacons_s)) in laps.iter().zip([(1, 63.68), (2, 65.19), (3, 63.76)]) {
         assert_eq!(*number, expected);
-        assert!(
-            (time_s - beacons_s).abs() <= log.dt_s,
-            "lap {number}: {time_s} s"
-        );
+        assert!((time_s - beacons_s).abs() <= log.dt_s, "lap {number}: {time_s} s");
         let lap = log.lap(*number).unwrap();
         // A clockwise circuit of 2.28 km.
         let turned = lap.yaw_rate_radps.iter().sum::<f64>() * lap.dt_s;
@@ -91,10 +86,7 @@ fn calder_export() {
             "lap {number}: {turned} rad"
         );
         let length = lap.distance_m.last().copied().unwrap();
-        assert!(
-            (2200.0..2320.0).contains(&length),
-            "lap {number}: {length} m"
-        );
+        assert!((2200.0..2320.0).contains(&length), "lap {number}: {length} m");
     }
 }
 
@@ -113,10 +105,7 @@ fn both_formats_hold_the_same_samples() {
     let (Some(export), Some(ld)) = (export(), ld()) else {
         return;
     };
-    let (export, ld) = (
-        Recording::read(export).unwrap(),
-        Recording::read(ld).unwrap(),
-    );
+    let (export, ld) = (Recording::read(export).unwrap(), Recording::read(ld).unwrap());
     for (name, rounding) in [
         ("Ground Speed", 0.051),
         ("Wheel Speed FR", 0.051),

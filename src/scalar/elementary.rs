@@ -27,10 +27,9 @@ const PI_LOW: f64 = 9.676_535_897_932_385e-4;
 #[inline(always)]
 fn sine_polynomial<R: SinglePrecision>(r: R) -> R {
     let t = r * r;
-    let p = R::lit(2.601_749_7e-6);
-    let p = p * t + R::lit(-1.980_735_1e-4);
-    let p = p * t + R::lit(8.333_025e-3);
-    let p = p * t + R::lit(-0.166_666_57);
+    let low = R::lit(-0.166_666_57) + R::lit(8.333_025e-3) * t;
+    let high = R::lit(-1.980_735_1e-4) + R::lit(2.601_749_7e-6) * t;
+    let p = low + high * (t * t);
     r + r * t * p
 }
 
@@ -89,14 +88,14 @@ pub fn atan<R: SinglePrecision>(x: R) -> R {
     let large = one.less_than(size);
     let q = R::select(large, one, size) / R::select(large, size, one);
     let t = q * q;
-    let p = R::lit(2.849_890_6e-3);
-    let p = p * t + R::lit(-1.606_863_4e-2);
-    let p = p * t + R::lit(4.269_152_5e-2);
-    let p = p * t + R::lit(-7.504_295e-2);
-    let p = p * t + R::lit(0.106_409_34);
-    let p = p * t + R::lit(-0.142_036_44);
-    let p = p * t + R::lit(0.199_926_2);
-    let p = p * t + R::lit(-0.333_330_72);
+    // In Estrin's order: half as long a chain of dependent operations as Horner's.
+    let t2 = t * t;
+    let t4 = t2 * t2;
+    let p01 = R::lit(-0.333_330_72) + R::lit(0.199_926_2) * t;
+    let p23 = R::lit(-0.142_036_44) + R::lit(0.106_409_34) * t;
+    let p45 = R::lit(-7.504_295e-2) + R::lit(4.269_152_5e-2) * t;
+    let p67 = R::lit(-1.606_863_4e-2) + R::lit(2.849_890_6e-3) * t;
+    let p = (p01 + p23 * t2) + (p45 + p67 * t2) * t4;
     let angle = q + q * t * p;
     let folded = R::select(large, R::lit(std::f64::consts::FRAC_PI_2) - angle, angle);
     R::select(x.less_than(R::lit(0.0)), -folded, folded)

@@ -81,11 +81,7 @@ pub(super) fn frozen_tail_s(log: &Log) -> Option<f64> {
         .into_iter()
         .map(|values| {
             let last = values.last().copied();
-            values
-                .iter()
-                .rev()
-                .take_while(|v| Some(**v) == last)
-                .count()
+            values.iter().rev().take_while(|v| Some(**v) == last).count()
         })
         .min()?;
     let frozen_s = frozen as f64 * log.dt_s;
@@ -120,31 +116,19 @@ mod tests {
             out
         };
         for (column, factor, parts) in [
-            (
-                10,
-                57.3,
-                ["channel yaw_rate_radps", "at most 10 rad/s", "deg/s?"],
-            ),
+            (10, 57.3, ["channel yaw_rate_radps", "at most 10 rad/s", "deg/s?"]),
             (7, 3.6, ["channel vx_mps", "at most 150 m/s", "km/h?"]),
             (6, 57.3, ["channel steer_rad", "at most 1.3 rad", "degrees"]),
             (9, 9.81, ["line ", "channel ay_mps2", "at most 60 m/s^2"]),
             (
                 9,
                 0.10197,
-                [
-                    "channel ay",
-                    "times ground speed times yaw rate",
-                    "units wrong?",
-                ],
+                ["channel ay", "times ground speed times yaw rate", "units wrong?"],
             ),
             (
                 8,
                 0.10197,
-                [
-                    "channel ax",
-                    "times the change of ground speed",
-                    "units wrong?",
-                ],
+                ["channel ax", "times the change of ground speed", "units wrong?"],
             ),
         ] {
             let error = error(&with(column, factor));

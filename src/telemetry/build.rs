@@ -40,9 +40,7 @@ pub(super) fn signals<'a>(
         }
         let channel = m.channel;
         check_samples(source, channel)?;
-        let known = signals
-            .iter()
-            .find(|s| same_clock(s.mapped.channel, channel));
+        let known = signals.iter().find(|s| same_clock(s.mapped.channel, channel));
         let (times, nominal_s) = match known {
             Some(signal) => (Arc::clone(&signal.times), signal.nominal_s),
             None => {
@@ -101,9 +99,9 @@ fn same_clock(a: &Channel, b: &Channel) -> bool {
 fn times(source: &str, channel: &Channel) -> Result<Arc<[f64]>> {
     match &channel.clock {
         Clock::Times(times) => Ok(Arc::clone(times)),
-        Clock::Rate { rate_hz, .. } if *rate_hz > 0.0 => Ok((0..channel.values.len())
-            .map(|i| channel.time_s(i))
-            .collect()),
+        Clock::Rate { rate_hz, .. } if *rate_hz > 0.0 => {
+            Ok((0..channel.values.len()).map(|i| channel.time_s(i)).collect())
+        }
         Clock::Rate { rate_hz, .. } => Err(Error::input(
             source,
             format!("channel {}", channel.name),
@@ -202,18 +200,10 @@ impl Build<'_> {
         };
         log.laps = self.laps(signals, &grid, &mut log.calibration)?;
         log.distance_m = match find(Role::Distance) {
-            Some(signal) if through && self.recording.format == Format::Native => {
-                signal.values.to_vec()
-            }
+            Some(signal) if through && self.recording.format == Format::Native => signal.values.to_vec(),
             Some(signal) => {
                 let running = running_distance(&signal.values);
-                let all = onto(
-                    &signal.times,
-                    &running,
-                    signal.nominal_s,
-                    signal.delay_s,
-                    &grid,
-                );
+                let all = onto(&signal.times, &running, signal.nominal_s, signal.delay_s, &grid);
                 from_lap_start(&all, &log.laps)
             }
             None => {
@@ -233,12 +223,7 @@ impl Build<'_> {
 
     fn grid(&self, signals: &[Signal<'_>]) -> Result<Clocked> {
         let Some(first) = signals.first() else {
-            return Err(Error::input(
-                self.source,
-                "channels",
-                "none",
-                "those of a car",
-            ));
+            return Err(Error::input(self.source, "channels", "none", "those of a car"));
         };
         let asked = self.options.rate_hz.map(|rate| 1.0 / rate);
         let fits = |dt: f64| asked.is_none_or(|asked| (asked - dt).abs() <= 1e-9 * dt);
@@ -288,9 +273,8 @@ impl Build<'_> {
             Axle::Front => (fl, fr, "front"),
             Axle::Rear => (rl, rr, "rear"),
         };
-        let note = format!(
-            "vx: no ground speed is logged; the mean of the {name} wheel speeds stands in for it"
-        );
+        let note =
+            format!("vx: no ground speed is logged; the mean of the {name} wheel speeds stands in for it");
         if !log.calibration.notes.contains(&note) {
             log.calibration.notes.push(note);
         }
@@ -301,12 +285,7 @@ impl Build<'_> {
             .collect())
     }
 
-    fn laps(
-        &self,
-        signals: &[Signal<'_>],
-        grid: &Grid,
-        calibration: &mut Calibration,
-    ) -> Result<Vec<Lap>> {
+    fn laps(&self, signals: &[Signal<'_>], grid: &Grid, calibration: &mut Calibration) -> Result<Vec<Lap>> {
         let whole = |number, complete| Lap {
             number,
             start: 0,

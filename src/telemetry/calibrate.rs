@@ -117,16 +117,12 @@ pub struct Calibration {
 impl Calibration {
     /// The finding of a kind for a channel.
     pub fn finding(&self, role: Role, kind: FindingKind) -> Option<&Finding> {
-        self.findings
-            .iter()
-            .find(|f| f.role == role && f.kind == kind)
+        self.findings.iter().find(|f| f.role == role && f.kind == kind)
     }
 
     /// The value of a finding that was applied.
     pub fn applied(&self, role: Role, kind: FindingKind) -> Option<f64> {
-        self.finding(role, kind)
-            .filter(|f| f.applied)
-            .map(|f| f.value)
+        self.finding(role, kind).filter(|f| f.applied).map(|f| f.value)
     }
 }
 
@@ -141,12 +137,7 @@ pub(super) struct Declared {
 }
 
 /// Estimates and applies signs, offsets and rolling radii, in this order; delays have been taken off before.
-pub(super) fn apply(
-    log: &mut Log,
-    options: &CalibrationOptions,
-    format: Format,
-    declared: &Declared,
-) {
+pub(super) fn apply(log: &mut Log, options: &CalibrationOptions, format: Format, declared: &Declared) {
     if options.signs.is_on(format) {
         signs(log, declared);
     }
@@ -207,9 +198,7 @@ fn sign(log: &mut Log, declared: &Declared, role: Role, found: Option<Fit>, evid
     let is_declared = declared.signs.contains(&role);
     let mut evidence = evidence.to_owned();
     if is_declared && value < 0.0 {
-        evidence.push_str(
-            "; left alone: the channel map declares the sign, and the log contradicts it",
-        );
+        evidence.push_str("; left alone: the channel map declares the sign, and the log contradicts it");
     }
     let applied = !is_declared && value < 0.0;
     if applied {
@@ -296,11 +285,7 @@ fn offsets(log: &mut Log) {
     let mut place = "on straights";
     if !enough(&mask, log.dt_s) {
         place = "at standstill";
-        mask = log
-            .vx_mps
-            .iter()
-            .map(|v| v.abs() < STANDSTILL_MPS)
-            .collect();
+        mask = log.vx_mps.iter().map(|v| v.abs() < STANDSTILL_MPS).collect();
     }
     for role in [Role::YawRate, Role::Ay] {
         let samples = chosen(values_mut(log, role), &mask);
@@ -368,8 +353,7 @@ fn rolling_radii(log: &mut Log, reference_m: Option<f64>) {
             (Some(low), Some(high)) => (high - low) / radius * 100.0,
             _ => 0.0,
         };
-        let mut evidence =
-            format!("on straights; the middle half of the samples within {spread:.2} %");
+        let mut evidence = format!("on straights; the middle half of the samples within {spread:.2} %");
         // Speeds become those of a wheel of the reference radius: slip is computed with one radius for all wheels.
         if let Some(reference) = reference_m {
             let scale = radius / reference;
@@ -440,15 +424,9 @@ mod tests {
         assert_eq!(c.applied(Role::Steer, FindingKind::Delay), None);
         assert_eq!(c.applied(Role::Steer, FindingKind::Sign), Some(-1.0));
         assert_eq!(c.applied(Role::Ay, FindingKind::Sign), Some(-1.0));
-        assert_eq!(
-            c.finding(Role::YawRate, FindingKind::Sign).unwrap().value,
-            1.0
-        );
+        assert_eq!(c.finding(Role::YawRate, FindingKind::Sign).unwrap().value, 1.0);
         let yaw_offset = c.applied(Role::YawRate, FindingKind::Offset).unwrap();
-        assert!(
-            (yaw_offset - FAULTS.yaw_offset).abs() < 1e-3,
-            "{yaw_offset}"
-        );
+        assert!((yaw_offset - FAULTS.yaw_offset).abs() < 1e-3, "{yaw_offset}");
         let ay_offset = c.applied(Role::Ay, FindingKind::Offset).unwrap();
         assert!((ay_offset + FAULTS.ay_offset).abs() < 0.03, "{ay_offset}");
         for (role, radius) in Role::WHEELS.into_iter().zip(RADII) {
@@ -480,16 +458,11 @@ mod tests {
         );
         let c = &log.calibration;
         assert_eq!(c.applied(Role::Steer, FindingKind::Sign), None);
-        assert_eq!(
-            c.finding(Role::Steer, FindingKind::Sign).unwrap().value,
-            1.0
-        );
+        assert_eq!(c.finding(Role::Steer, FindingKind::Sign).unwrap().value, 1.0);
         let ay = c.finding(Role::Ay, FindingKind::Delay).unwrap();
         assert!(!ay.applied && ay.value.abs() < 0.005, "{ay:?}");
         // Without a reference radius the radii are told and nothing is scaled.
-        let fl = c
-            .finding(Role::WheelSpeedFl, FindingKind::RollingRadius)
-            .unwrap();
+        let fl = c.finding(Role::WheelSpeedFl, FindingKind::RollingRadius).unwrap();
         assert!(!fl.applied && (fl.value / RADII[0] - 1.0).abs() < 1e-3);
     }
 

@@ -123,18 +123,16 @@ impl ChannelMap {
                 .unwrap_or((&message, "a channel map in TOML"));
             Error::input(path, place, found, expected)
         })?;
-        let checked = |value: Option<Spanned<f64>>,
-                       key: &str,
-                       expected: &str,
-                       fits: fn(f64) -> bool| match value {
-            Some(value) if !fits(*value.get_ref()) => Err(Error::input(
-                path,
-                format!("line {}, field {key}", line_of(value.span().start)),
-                value.get_ref().to_string(),
-                expected,
-            )),
-            value => Ok(value.map(Spanned::into_inner)),
-        };
+        let checked =
+            |value: Option<Spanned<f64>>, key: &str, expected: &str, fits: fn(f64) -> bool| match value {
+                Some(value) if !fits(*value.get_ref()) => Err(Error::input(
+                    path,
+                    format!("line {}, field {key}", line_of(value.span().start)),
+                    value.get_ref().to_string(),
+                    expected,
+                )),
+                value => Ok(value.map(Spanned::into_inner)),
+            };
         let mut channels = BTreeMap::new();
         for (role, entry) in file.channels {
             if let Some(unit) = &entry.unit
@@ -213,9 +211,7 @@ impl ChannelMap {
                 }
                 continue;
             };
-            let unit_text = entry
-                .and_then(|e| e.unit.as_deref())
-                .unwrap_or(&channel.unit);
+            let unit_text = entry.and_then(|e| e.unit.as_deref()).unwrap_or(&channel.unit);
             let unit = match check_unit(unit_text, role) {
                 Ok(unit) => unit,
                 // A pedal in volts is of no use, and nobody asked for it.
@@ -343,23 +339,14 @@ mod tests {
         assert_eq!((yaw.sign, yaw.delay_s), (Some(-1.0), Some(0.1)));
         assert_eq!(map.steering_ratio, Some(14.0));
         assert_eq!(map.speed_axle, Axle::Rear);
-        assert_eq!(
-            ChannelMap::parse("", "m.toml").unwrap(),
-            ChannelMap::default()
-        );
+        assert_eq!(ChannelMap::parse("", "m.toml").unwrap(), ChannelMap::default());
     }
 
     #[test]
     fn each_fault_of_a_map_names_its_line() {
         for (text, parts) in [
-            (
-                "\n[channels.yaw]\nname = \"x\"",
-                ["m.toml: line 2", "`yaw`"],
-            ),
-            (
-                "[channels.ay]\nname = \"x\"\nsing = 1",
-                ["line 3", "`sing`"],
-            ),
+            ("\n[channels.yaw]\nname = \"x\"", ["m.toml: line 2", "`yaw`"]),
+            ("[channels.ay]\nname = \"x\"\nsing = 1", ["line 3", "`sing`"]),
             (
                 "[channels.ay]\nsign = 2",
                 ["line 2, field channels.ay.sign: found 2", "1 or -1"],
@@ -370,10 +357,7 @@ mod tests {
             ),
             (
                 "[channels.ay]\nunit = \"deg\"",
-                [
-                    "line 2, field channels.ay.unit: found \"deg\"",
-                    "an acceleration",
-                ],
+                ["line 2, field channels.ay.unit: found \"deg\"", "an acceleration"],
             ),
             (
                 "[vehicle]\nrolling_radius_m = 325",
@@ -407,15 +391,9 @@ mod tests {
             map.resolve(&recording(channels)).unwrap_err().to_string()
         };
         let missing = error(&IRACING[..8], "");
-        assert!(
-            missing.contains("channel yaw_rate: found none")
-                && missing.contains("[channels.yaw_rate]")
-        );
+        assert!(missing.contains("channel yaw_rate: found none") && missing.contains("[channels.yaw_rate]"));
         let named = error(&IRACING, "[channels.ay]\nname = \"Lat\"");
-        assert!(
-            named.contains("no channel \"Lat\"; it has LFspeed"),
-            "{named}"
-        );
+        assert!(named.contains("no channel \"Lat\"; it has LFspeed"), "{named}");
         let mut units = IRACING;
         units[8].1 = "furlong";
         let unit = error(&units, "");

@@ -123,11 +123,7 @@ pub fn write_native(log: &Log, path: impl AsRef<Path>, format: &NativeFormat) ->
 }
 
 fn render(log: &Log, path: &Path, format: &NativeFormat) -> Result<String> {
-    if let Some(name) = format
-        .decimals
-        .keys()
-        .find(|n| !COLUMNS.contains(&n.as_str()))
-    {
+    if let Some(name) = format.decimals.keys().find(|n| !COLUMNS.contains(&n.as_str())) {
         return Err(Error::input(
             path,
             "decimals",
@@ -238,16 +234,8 @@ mod tests {
     fn a_log_comes_back_bit_for_bit() {
         let mut log = Car::default().drive(3.0, 37.0);
         log.source = "a.csv".to_owned();
-        let text = render(
-            &log,
-            Path::new("a.csv"),
-            &NativeFormat::exact().comment("a\nb"),
-        )
-        .unwrap();
-        assert!(
-            text.starts_with("# a\n# b\ntime_s,distance_m,"),
-            "{text:.60}"
-        );
+        let text = render(&log, Path::new("a.csv"), &NativeFormat::exact().comment("a\nb")).unwrap();
+        assert!(text.starts_with("# a\n# b\ntime_s,distance_m,"), "{text:.60}");
         assert!(!text.contains("lap"));
         assert_eq!(log_of(&text).unwrap(), log);
     }
@@ -261,11 +249,7 @@ mod tests {
             end,
             complete,
         };
-        log.laps = vec![
-            lap(0, 0, 7, false),
-            lap(1, 7, 40, true),
-            lap(2, 40, 60, false),
-        ];
+        log.laps = vec![lap(0, 0, 7, false), lap(1, 7, 40, true), lap(2, 40, 60, false)];
         let text = render(&log, Path::new("a.csv"), &NativeFormat::exact()).unwrap();
         let back = log_of(&text).unwrap();
         assert_eq!(back.laps, log.laps);
@@ -291,11 +275,7 @@ mod tests {
         let mut broken = log.clone();
         broken.ax_mps2[3] = f64::NAN;
         let error = render(&broken, Path::new("a.csv"), &format).unwrap_err();
-        assert!(
-            error
-                .to_string()
-                .contains("column ax_mps2, sample 3: found NaN")
-        );
+        assert!(error.to_string().contains("column ax_mps2, sample 3: found NaN"));
     }
 
     #[test]
@@ -312,35 +292,23 @@ mod tests {
                 cell(10, ""),
                 "line 3, channel yaw_rate_radps: found an empty cell",
             ),
-            (
-                cell(10, "NaN"),
-                "line 3, channel yaw_rate_radps: found \"NaN\"",
-            ),
+            (cell(10, "NaN"), "line 3, channel yaw_rate_radps: found \"NaN\""),
             (cell(0, "x"), "line 3, channel time_s: found \"x\""),
             (
                 cell(0, "0"),
                 "line 3, channel wheel_speed_fl_radps: found time 0 s after 0 s",
             ),
-            (
-                text.replace(line_3, "1,2"),
-                "line 3: found 2 cells, expected 11",
-            ),
+            (text.replace(line_3, "1,2"), "line 3: found 2 cells, expected 11"),
             (
                 text.replace("vx_mps", "steer_rad"),
                 "line 1, column 8: found a second steer_rad",
             ),
-            (
-                text.replace("ay_mps2", "ay_furlongs"),
-                "channel ay: found none",
-            ),
+            (text.replace("ay_mps2", "ay_furlongs"), "channel ay: found none"),
             (
                 text.replace("yaw_rate_radps", "yaw_rate"),
                 "channel yaw_rate: found the unit \"\"",
             ),
-            (
-                "time_s,vx_mps\n0,1\n".to_owned(),
-                "data rows: found 1 of them",
-            ),
+            ("time_s,vx_mps\n0,1\n".to_owned(), "data rows: found 1 of them"),
         ] {
             let error = log_of(&bad).unwrap_err().to_string();
             assert!(error.contains(part), "{error}");

@@ -1,9 +1,7 @@
 //! Delays of the channels relative to yaw rate.
 
 use super::calibrate::{Calibration, Declared, Finding, FindingKind};
-use super::derived::{
-    MOVING_MPS, SURE_OF_SIGN, acceleration, front_difference, moving, product, unbraked,
-};
+use super::derived::{MOVING_MPS, SURE_OF_SIGN, acceleration, front_difference, moving, product, unbraked};
 use super::log::Log;
 use super::role::Role;
 use super::statistics::{Lag, best_lag, least_error_lag};
@@ -39,22 +37,12 @@ fn wheel_lag(log: &Log, undriven: [usize; 2], accel: &[f64], most: usize) -> Opt
 
 /// Delays of all channels relative to yaw rate, from a log that has not been corrected yet. `undriven` are the wheels
 /// of the axle that is not driven, left and right.
-pub(super) fn delays(
-    log: &Log,
-    declared: &Declared,
-    undriven: [usize; 2],
-    calibration: &mut Calibration,
-) {
+pub(super) fn delays(log: &Log, declared: &Declared, undriven: [usize; 2], calibration: &mut Calibration) {
     let most = (MOST_DELAY_S / log.dt_s).ceil() as usize;
     let (moving, accel) = (moving(log), acceleration(log));
     let sure = |lag: &Lag| lag.correlation.abs() >= SURE_OF_DELAY;
     let front = front_difference(log).and_then(|difference| {
-        let lag = best_lag(
-            &log.yaw_rate_radps,
-            &difference,
-            &unbraked(log, &accel),
-            most,
-        );
+        let lag = best_lag(&log.yaw_rate_radps, &difference, &unbraked(log, &accel), most);
         lag.filter(|l| l.correlation.abs() >= SURE_OF_SIGN)
     });
     // All four wheel speeds come off one input board, and the driven wheels' own delay cannot be told from slip.
@@ -131,9 +119,10 @@ pub(super) fn delays(
             applied: false,
             correlation: Some(steer.correlation),
             samples: steer.used,
-            evidence: "against yaw rate; left alone: a car answers its steering late, so this is not the sensor's \
+            evidence:
+                "against yaw rate; left alone: a car answers its steering late, so this is not the sensor's \
                        delay alone (delay_s in the channel map sets it)"
-                .to_owned(),
+                    .to_owned(),
         });
     }
 }

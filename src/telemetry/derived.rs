@@ -51,9 +51,7 @@ pub(super) fn front_difference(log: &Log) -> Option<Vec<f64>> {
 /// Samples on which the front wheels' difference is that of their paths: not where one of them may be locking.
 pub(super) fn unbraked(log: &Log, accel: &[f64]) -> Vec<bool> {
     let pairs = log.vx_mps.iter().zip(accel);
-    pairs
-        .map(|(&v, &a)| v > MOVING_MPS && a > UNBRAKED_AX)
-        .collect()
+    pairs.map(|(&v, &a)| v > MOVING_MPS && a > UNBRAKED_AX).collect()
 }
 
 /// Speed of a wheel in m/s, with a rolling radius that is good enough to compare it with others: that where the car
@@ -62,9 +60,7 @@ fn linear_speed(log: &Log, wheel: &[f64]) -> Option<Vec<f64>> {
     let radius = |most_yaw: f64| {
         let ratios: Vec<f64> = (0..log.samples())
             .filter(|&i| {
-                log.vx_mps[i] > MOVING_MPS
-                    && wheel[i] > 0.0
-                    && log.yaw_rate_radps[i].abs() < most_yaw
+                log.vx_mps[i] > MOVING_MPS && wheel[i] > 0.0 && log.yaw_rate_radps[i].abs() < most_yaw
             })
             .map(|i| log.vx_mps[i] / wheel[i])
             .collect();

@@ -74,11 +74,7 @@ impl Log {
     ///
     /// # Errors
     /// As for [`Log::read`], save [`Error::Io`].
-    pub fn from_recording(
-        recording: &Recording,
-        map: &ChannelMap,
-        options: &LogOptions,
-    ) -> Result<Self> {
+    pub fn from_recording(recording: &Recording, map: &ChannelMap, options: &LogOptions) -> Result<Self> {
         check_options(options)?;
         let source = recording.source.display().to_string();
         let radius = map.rolling_radius_m.or(options.rolling_radius_m);
@@ -102,8 +98,7 @@ impl Log {
         }
         if recording.format != Format::Native && map.steering_ratio.is_none() {
             calibration.notes.push(
-                "steer: taken as the road-wheel angle: the channel map gives no steering_ratio"
-                    .to_owned(),
+                "steer: taken as the road-wheel angle: the channel map gives no steering_ratio".to_owned(),
             );
         }
         let mut signals = signals(&source, &mapped, map, options, radius)?;
@@ -276,19 +271,20 @@ mod tests {
     /// Channels of different rates, as in a `.ld`.
     fn mixed() -> Recording {
         let mut channels: Vec<Channel> = ["FL", "FR", "RL", "RR"]
-            .map(|w| {
-                channel(&format!("Wheel Speed {w}"), "km/h", 100.0, |t| {
-                    72.0 + 3.6 * t
-                })
-            })
+            .map(|w| channel(&format!("Wheel Speed {w}"), "km/h", 100.0, |t| 72.0 + 3.6 * t))
             .into();
         channels.push(channel("Steered Angle", "deg", 20.0, |t| t));
         channels.push(channel("G Force Lat", "G", 50.0, |_| 0.5));
         channels.push(channel("G Force Long", "G", 50.0, |_| 0.1));
         channels.push(channel("Gyro Yaw Velocity", "deg/s", 50.0, |t| 2.0 * t));
-        channels.push(channel("Lap Number", "", 1.0, |t| {
-            if t < 3.0 { 4.0 } else { 5.0 }
-        }));
+        channels.push(channel(
+            "Lap Number",
+            "",
+            1.0,
+            |t| {
+                if t < 3.0 { 4.0 } else { 5.0 }
+            },
+        ));
         Recording {
             source: "a.ld".into(),
             format: Format::MotecLd,
@@ -329,11 +325,7 @@ mod tests {
                 .iter()
                 .any(|n| n.contains("front wheel speeds stand"))
         );
-        let numbers: Vec<_> = log
-            .laps
-            .iter()
-            .map(|l| (l.number, l.start, l.end))
-            .collect();
+        let numbers: Vec<_> = log.laps.iter().map(|l| (l.number, l.start, l.end)).collect();
         assert_eq!(numbers, [(4, 0, 300), (5, 300, 796)]);
         assert_eq!(log.distance_m[300], 0.0);
         assert!((log.distance_m[299] - (20.0 * 2.99 + 2.99 * 2.99 / 2.0)).abs() < 1e-6);
@@ -341,8 +333,7 @@ mod tests {
 
     #[test]
     fn declared_delays_and_signs_are_taken_off() {
-        let text =
-            "[vehicle]\nrolling_radius_m = 0.5\n[channels.yaw_rate]\nsign = -1\ndelay_s = 0.205";
+        let text = "[vehicle]\nrolling_radius_m = 0.5\n[channels.yaw_rate]\nsign = -1\ndelay_s = 0.205";
         let log = Log::from_recording(&mixed(), &map(text), &off()).unwrap();
         let expected = -(2.0 * (log.time_s[10] + 0.205)).to_radians();
         assert!((log.yaw_rate_radps[10] - expected).abs() < 1e-12);
@@ -407,10 +398,7 @@ mod tests {
             (200, false, 300)
         );
         let error = log.lap(9).unwrap_err().to_string();
-        assert!(
-            error.contains("lap: found 9, expected one of 4, 5"),
-            "{error}"
-        );
+        assert!(error.contains("lap: found 9, expected one of 4, 5"), "{error}");
         assert!(log.slice(5..5).is_err() && log.slice(0..9999).is_err());
         assert!(log.check_length(7.95).is_ok());
         let error = log.check_length(8.0).unwrap_err().to_string();

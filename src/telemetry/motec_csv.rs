@@ -77,12 +77,7 @@ fn unique_names(row: &Row<'_>, path: &Path) -> Result<Vec<String>> {
     Ok(names)
 }
 
-fn describe(
-    row: &Row<'_>,
-    path: &Path,
-    metadata: &mut Metadata,
-    beacons_s: &mut Vec<f64>,
-) -> Result<()> {
+fn describe(row: &Row<'_>, path: &Path, metadata: &mut Metadata, beacons_s: &mut Vec<f64>) -> Result<()> {
     if row.cell(0).eq_ignore_ascii_case("Beacon Markers") {
         for word in row.cells.iter().skip(1).flat_map(|c| c.split_whitespace()) {
             match word.parse::<f64>() {
@@ -150,8 +145,7 @@ mod tests {
 
     #[test]
     fn unquoted_latin_1_and_an_aim_wall_clock_row() {
-        let mut bytes =
-            b"Format,AiM CSV File\nTime,11:30\nBeacon Markers,1.5,2.5\n\nTime,Yaw\nsec,".to_vec();
+        let mut bytes = b"Format,AiM CSV File\nTime,11:30\nBeacon Markers,1.5,2.5\n\nTime,Yaw\nsec,".to_vec();
         bytes.extend(b"\xB0/s\n\n0,1\n0.1,2\n");
         let r = Recording::parse(&bytes, "a.csv").unwrap();
         assert_eq!(r.metadata.log_time.as_deref(), Some("11:30"));
@@ -162,11 +156,7 @@ mod tests {
     #[test]
     fn each_fault_names_its_line() {
         for (from, to, part) in [
-            (
-                "\"2.5 1.5 \"",
-                "\"2.5 x\"",
-                "line 4, Beacon Markers: found \"x\"",
-            ),
+            ("\"2.5 1.5 \"", "\"2.5 x\"", "line 4, Beacon Markers: found \"x\""),
             ("\"Time\"", "\"Tide\"", "line 12: found the end of the file"),
             ("\"0.1\",", "", "line 12: found 3 cells, expected 4"),
             ("\"0.1\"", "\"0,1\"", "line 12, channel Time: found \"0,1\""),

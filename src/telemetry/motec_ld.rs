@@ -118,10 +118,7 @@ fn check_channels(bytes: &mut [u8], path: &Path) -> Result<Vec<Storage>> {
         let index = storage.len();
         let place = format!("channel list, entry {index}");
         let length = bytes.len();
-        let Some(entry) = at
-            .checked_add(ENTRY_SIZE)
-            .and_then(|end| bytes.get_mut(at..end))
-        else {
+        let Some(entry) = at.checked_add(ENTRY_SIZE).and_then(|end| bytes.get_mut(at..end)) else {
             return Err(Error::input(
                 path,
                 place,
@@ -158,9 +155,7 @@ fn check_channels(bytes: &mut [u8], path: &Path) -> Result<Vec<Storage>> {
                 entry[20..22].copy_from_slice(&2_u16.to_le_bytes());
             }
         }
-        if let (Some(data), Some(count), false) =
-            (data, count, matches!(kept, Storage::Unknown { .. }))
-        {
+        if let (Some(data), Some(count), false) = (data, count, matches!(kept, Storage::Unknown { .. })) {
             let stored = u64::from(count) * u64::from(size);
             total += stored;
             // Data of all channels together cannot be longer than the file that holds them.
@@ -176,12 +171,7 @@ fn check_channels(bytes: &mut [u8], path: &Path) -> Result<Vec<Storage>> {
         storage.push(kept);
     }
     if storage.is_empty() {
-        return Err(Error::input(
-            path,
-            "channel list",
-            "no channels",
-            "at least one",
-        ));
+        return Err(Error::input(path, "channel list", "no channels", "at least one"));
     }
     Ok(storage)
 }
@@ -193,8 +183,7 @@ fn channel(
     names: &mut HashSet<String>,
 ) -> Channel {
     // The crate gives these as unsigned; a logger that reverses a sensor writes a negative multiplier.
-    let [offset, multiplier, scale] =
-        [meta.offset, meta.mul, meta.scale].map(|raw| f64::from(raw as i16));
+    let [offset, multiplier, scale] = [meta.offset, meta.mul, meta.scale].map(|raw| f64::from(raw as i16));
     let power = 10_f64.powi(-i32::from(meta.dec_places));
     let mut unreadable = match storage {
         Storage::Unknown { kind, size } => Some(Unreadable {

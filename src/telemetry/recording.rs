@@ -63,11 +63,7 @@ impl Channel {
     pub fn time_s(&self, sample: usize) -> f64 {
         match &self.clock {
             Clock::Rate { start_s, rate_hz } => start_s + sample as f64 / rate_hz,
-            Clock::Times(times) => times
-                .get(sample)
-                .or_else(|| times.last())
-                .copied()
-                .unwrap_or(0.0),
+            Clock::Times(times) => times.get(sample).or_else(|| times.last()).copied().unwrap_or(0.0),
         }
     }
 
@@ -141,9 +137,7 @@ impl Recording {
     /// As for [`Recording::read`].
     pub fn parse(bytes: &[u8], path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
-        let is_ld = path
-            .extension()
-            .is_some_and(|e| e.eq_ignore_ascii_case("ld"));
+        let is_ld = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("ld"));
         if is_ld || motec_ld::is_ld(bytes) {
             return motec_ld::parse(bytes, path);
         }
@@ -168,11 +162,10 @@ impl Recording {
 
     /// The channel called `name`, exactly or else without regard to case.
     pub fn channel(&self, name: &str) -> Option<&Channel> {
-        self.channels.iter().find(|c| c.name == name).or_else(|| {
-            self.channels
-                .iter()
-                .find(|c| c.name.eq_ignore_ascii_case(name))
-        })
+        self.channels
+            .iter()
+            .find(|c| c.name == name)
+            .or_else(|| self.channels.iter().find(|c| c.name.eq_ignore_ascii_case(name)))
     }
 }
 
@@ -185,10 +178,7 @@ mod tests {
         let native = Recording::parse(b"# x\ntime_s,vx_mps\n0,1\n1,2\n", "a.txt").unwrap();
         assert_eq!(native.format, Format::Native);
         let motec = b"\"Format\",\"MoTeC CSV File\"\n\nTime,V\ns,km/h\n0,1\n1,2\n";
-        assert_eq!(
-            Recording::parse(motec, "a.csv").unwrap().format,
-            Format::MotecCsv
-        );
+        assert_eq!(Recording::parse(motec, "a.csv").unwrap().format, Format::MotecCsv);
     }
 
     #[test]

@@ -26,13 +26,7 @@ impl Grid {
 
     /// The clock with interval `dt_s` that starts at `origin_s` or whole intervals later, and lies within
     /// `start_s..=end_s`.
-    pub fn within(
-        source: &str,
-        origin_s: f64,
-        start_s: f64,
-        end_s: f64,
-        dt_s: f64,
-    ) -> Result<Self> {
+    pub fn within(source: &str, origin_s: f64, start_s: f64, end_s: f64, dt_s: f64) -> Result<Self> {
         let skipped = ((start_s - origin_s) / dt_s - 1e-6).ceil().max(0.0);
         let start_s = origin_s + skipped * dt_s;
         let intervals = ((end_s - start_s) / dt_s + 1e-6).floor();
@@ -40,9 +34,7 @@ impl Grid {
             return Err(Error::input(
                 source,
                 "time",
-                format!(
-                    "{start_s:.3} to {end_s:.3} s common to all channels, sampled every {dt_s} s"
-                ),
+                format!("{start_s:.3} to {end_s:.3} s common to all channels, sampled every {dt_s} s"),
                 format!("at least two and at most {MOST_SAMPLES:.0} samples"),
             ));
         }
@@ -56,12 +48,7 @@ impl Grid {
 
 /// The nominal sample interval (s), after checking that time rises and has no gaps longer than three intervals and
 /// longer than `bridged_s`.
-pub(super) fn check_times(
-    source: &str,
-    channel: &Channel,
-    times: &[f64],
-    bridged_s: f64,
-) -> Result<f64> {
+pub(super) fn check_times(source: &str, channel: &Channel, times: &[f64], bridged_s: f64) -> Result<f64> {
     let mut intervals = Vec::with_capacity(times.len());
     for (at, pair) in times.windows(2).enumerate() {
         let interval = pair[1] - pair[0];
@@ -120,13 +107,7 @@ pub(super) fn uniform_interval(times: &[f64]) -> Option<f64> {
 /// Values of a channel at the times of the grid, each `delay_s` later in the channel's own time: linear between
 /// samples, or, where the grid is more than twice as coarse as the samples, the mean over one grid interval of that
 /// line, which keeps what is too fast for the grid from folding into it.
-pub(super) fn onto(
-    times: &[f64],
-    values: &[f64],
-    nominal_s: f64,
-    delay_s: f64,
-    grid: &Grid,
-) -> Vec<f64> {
+pub(super) fn onto(times: &[f64], values: &[f64], nominal_s: f64, delay_s: f64, grid: &Grid) -> Vec<f64> {
     let average = grid.dt_s > 2.0 * nominal_s;
     if !average {
         let mut cursor = 0;

@@ -4,11 +4,7 @@
 pub(super) fn quantile(mut values: Vec<f64>, share: f64) -> Option<f64> {
     let last = values.len().checked_sub(1)?;
     let index = (share * last as f64).round() as usize;
-    Some(
-        *values
-            .select_nth_unstable_by(index.min(last), f64::total_cmp)
-            .1,
-    )
+    Some(*values.select_nth_unstable_by(index.min(last), f64::total_cmp).1)
 }
 
 /// The middle value; none for no values.
@@ -176,11 +172,8 @@ mod tests {
 
     #[test]
     fn a_shifted_sine_shows_its_lag_and_its_sign() {
-        let wave = |shift: f64| -> Vec<f64> {
-            (0..400)
-                .map(|i| (0.11 * (f64::from(i) - shift)).sin())
-                .collect()
-        };
+        let wave =
+            |shift: f64| -> Vec<f64> { (0..400).map(|i| (0.11 * (f64::from(i) - shift)).sin()).collect() };
         let late: Vec<f64> = wave(3.3).iter().map(|v| -2.0 * v).collect();
         let lag = best_lag(&wave(0.0), &late, &[true; 400], 10).unwrap();
         assert!((lag.samples - 3.3).abs() < 0.02 && lag.correlation < -0.99);

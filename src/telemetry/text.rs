@@ -21,11 +21,7 @@ pub(super) fn decode(bytes: &[u8]) -> Cow<'_, str> {
 /// A string as an error message may show it: short, and on one line.
 pub(super) fn shown(text: &str) -> String {
     const LONGEST: usize = 60;
-    let mut out: String = text
-        .chars()
-        .take(LONGEST)
-        .flat_map(char::escape_debug)
-        .collect();
+    let mut out: String = text.chars().take(LONGEST).flat_map(char::escape_debug).collect();
     if text.chars().count() > LONGEST {
         out.push_str("...");
     }
@@ -142,9 +138,7 @@ fn split(record: &str) -> Vec<Cow<'_, str>> {
 fn unquote(cell: &str) -> Cow<'_, str> {
     let cell = cell.trim();
     match cell.strip_prefix('"').and_then(|c| c.strip_suffix('"')) {
-        Some(inner) if inner.contains("\"\"") => {
-            Cow::Owned(inner.replace("\"\"", "\"").trim().to_owned())
-        }
+        Some(inner) if inner.contains("\"\"") => Cow::Owned(inner.replace("\"\"", "\"").trim().to_owned()),
         Some(inner) => Cow::Borrowed(inner.trim()),
         None => Cow::Borrowed(cell),
     }

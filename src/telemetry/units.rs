@@ -77,9 +77,7 @@ impl Unit {
             "mph" | "mi/h" | "mile/h" | "miles/h" => (Speed, 0.44704),
             "ft/s" | "fps" => (Speed, 0.3048),
             "kn" | "kt" | "kts" | "knot" | "knots" => (Speed, 1852.0 / 3600.0),
-            "m/s^2" | "m/s2" | "m/s²" | "m/s/s" | "mps2" | "m/s**2" | "m/sec^2" => {
-                (Acceleration, 1.0)
-            }
+            "m/s^2" | "m/s2" | "m/s²" | "m/s/s" | "mps2" | "m/s**2" | "m/sec^2" => (Acceleration, 1.0),
             "g" | "gee" => (Acceleration, G),
             "mg" => (Acceleration, G * 1e-3),
             "rad" | "radians" => (Angle, 1.0),

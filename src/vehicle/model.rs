@@ -42,10 +42,8 @@ pub struct CarRate<R> {
 pub struct CarModel<R, T> {
     /// Body, wheels and air.
     pub chassis: Chassis<R>,
-    /// Front tyres.
-    pub front: T,
-    /// Rear tyres.
-    pub rear: T,
+    /// Tyres of the front and the rear axle.
+    pub tyres: [T; 2],
 }
 
 /// Slip of one wheel.
@@ -94,8 +92,10 @@ impl<R: Real, T: Tyre<R>> CarModel<R, T> {
         let (front, rear) = (Chassis::<R>::PARAMETERS.len(), T::MODEL.parameters().len());
         let degree = R::lit(std::f64::consts::PI / 180.0);
         Self {
-            front: T::from_parameters(|i| at(front + i), -(chassis.camber_front * degree)),
-            rear: T::from_parameters(|i| at(front + rear + i), -(chassis.camber_rear * degree)),
+            tyres: [
+                T::from_parameters(|i| at(front + i), -(chassis.camber_front * degree)),
+                T::from_parameters(|i| at(front + rear + i), -(chassis.camber_rear * degree)),
+            ],
             chassis,
         }
     }
@@ -107,14 +107,18 @@ impl<R: Real, T: Tyre<R>> CarModel<R, T> {
         let rear = front + T::FIELDS.len();
         Self {
             chassis: Chassis::from_flat(&mut at),
-            front: T::from_flat(|i| at(front + i)),
-            rear: T::from_flat(|i| at(rear + i)),
+            tyres: [T::from_flat(|i| at(front + i)), T::from_flat(|i| at(rear + i))],
         }
     }
 
     /// All figures in a row, chassis, front tyre, rear tyre: the form in which kernels read a ready car.
     pub fn to_table(&self) -> Vec<R> {
-        [self.chassis.to_flat(), self.front.to_flat(), self.rear.to_flat()].concat()
+        [
+            self.chassis.to_flat(),
+            self.tyres[0].to_flat(),
+            self.tyres[1].to_flat(),
+        ]
+        .concat()
     }
 
     /// The rate of change of `state` under `input`.
@@ -126,11 +130,10 @@ impl<R: Real, T: Tyre<R>> CarModel<R, T> {
         let loads = wheel_loads(chassis, body, state.pitch_acceleration, &aero);
 
         let steer = input.steer * chassis.steer_scale + chassis.steer_offset;
-        let turned = (steer.cos(), steer.sin());
-        let straight = (R::lit(1.0), R::lit(0.0));
-        let (a, b) = (chassis.cg_to_front, chassis.cg_to_rear);
-        let (wf, wr) = (chassis.half_track_front, chassis.half_track_rear);
-        let places = [(a, wf), (a, -wf), (-b, wr), (-b, -wr)];
+        let directions = [(steer.cos(), steer.sin()), (R::lit(1.0), R::lit(0.0))];
+        let axle_x = [chassis.cg_to_front, -chassis.cg_to_rear];
+        let half_track = [chassis.half_track_front, chassis.half_track_rear];
+        let radius = [chassis.radius_front, chassis.radius_rear];
 
         let zero = R::lit(0.0);
         let mut total = BodyForces {
@@ -138,35 +141,28 @@ impl<R: Real, T: Tyre<R>> CarModel<R, T> {
             y: zero,
             yaw_moment: zero,
         };
-        for wheel in 0..4 {
-            let front = wheel < 2;
-            let direction = if front { turned } else { straight };
-            let radius = if front {
-                chassis.radius_front
-            } else {
-                chassis.radius_rear
-            };
-            let (x, y) = places[wheel];
-            let slip = wheel_slip(
-                body,
-                (x, y),
-                direction,
-                input.wheel_speed[wheel] * radius,
-                chassis.slip_speed_floor,
-            );
-            let tyre_input = TyreInput {
-                load: loads[wheel],
-                slip_ratio: slip.ratio,
-                slip_tangent: slip.tangent,
-                side: if wheel % 2 == 0 { R::lit(1.0) } else { R::lit(-1.0) },
-            };
-            // The choice is of the tyre, not of the call: one copy of the tyre's code serves all wheels.
-            let tyre = if front { &self.front } else { &self.rear };
-            let forces = tyre.forces(tyre_input);
-            let (force_x, force_y) = to_body_axes(&forces, direction);
-            total.x = total.x + force_x;
-            total.y = total.y + force_y;
-            total.yaw_moment = total.yaw_moment + (x * force_y - y * force_x + forces.aligning_moment);
+        // One copy of the tyre's code serves all wheels, indexed rather than chosen between: the code then fits
+        // the processor's instruction cache and the coefficients stay in memory.
+        for axle in 0..2 {
+            let direction = directions[axle];
+            let tyre = &self.tyres[axle];
+            for (half, side) in [1.0, -1.0].into_iter().enumerate() {
+                let wheel = 2 * axle + half;
+                let side = R::lit(side);
+                let (x, y) = (axle_x[axle], half_track[axle] * side);
+                let rim_speed = input.wheel_speed[wheel] * radius[axle];
+                let slip = wheel_slip(body, (x, y), direction, rim_speed, chassis.slip_speed_floor);
+                let forces = tyre.forces(TyreInput {
+                    load: loads[wheel],
+                    slip_ratio: slip.ratio,
+                    slip_tangent: slip.tangent,
+                    side,
+                });
+                let (force_x, force_y) = to_body_axes(&forces, direction);
+                total.x = total.x + force_x;
+                total.y = total.y + force_y;
+                total.yaw_moment = total.yaw_moment + (x * force_y - y * force_x + forces.aligning_moment);
+            }
         }
 
         let rate = body_derivative(chassis, body, &total);

@@ -24,6 +24,12 @@ fn cosine_shape<R: Real>(c: R, b: R, e: R, x: R) -> R {
     (c * stretched_slip(b, e, x).atan()).cos()
 }
 
+/// A combined-slip weight: the cosine shape at `x` over that at its shift, where the other slip is nought.
+#[inline(always)]
+fn weight<R: Real>(c: R, b: R, e: R, x: R, shift: R) -> R {
+    cosine_shape(c, b, e, x) / cosine_shape(c, b, e, shift)
+}
+
 /// Curvature factors above one turn the curve back on itself.
 #[inline(always)]
 fn clamp_curvature<R: Real>(e: R) -> R {
@@ -93,7 +99,7 @@ fn pure_lateral<R: Real>(t: &MagicFormula<R>, load: Load<R>, slip_tangent: R, si
 fn longitudinal_weight<R: Real>(t: &MagicFormula<R>, load: Load<R>, slip_ratio: R, slip_tangent: R) -> R {
     let b = t.rbx1 * (t.rbx2 * slip_ratio).cos_atan();
     let e = clamp_curvature(t.rex1 + t.rex2 * load.difference);
-    cosine_shape(t.rcx1, b, e, slip_tangent + t.rhx1) / cosine_shape(t.rcx1, b, e, t.rhx1)
+    weight(t.rcx1, b, e, slip_tangent + t.rhx1, t.rhx1)
 }
 
 /// The weight that slip ratio leaves of the side force.
@@ -102,7 +108,7 @@ fn lateral_weight<R: Real>(t: &MagicFormula<R>, load: Load<R>, slip_ratio: R, sl
     let b = t.rby1 * (t.rby2 * (slip_tangent - t.rby3)).cos_atan();
     let e = clamp_curvature(t.rey1 + t.rey2 * load.difference);
     let shift = t.rhy1 + t.rhy2 * load.difference;
-    cosine_shape(t.rcy1, b, e, slip_ratio + shift) / cosine_shape(t.rcy1, b, e, shift)
+    weight(t.rcy1, b, e, slip_ratio + shift, shift)
 }
 
 /// The side force `SVyk` that slip ratio induces of itself, N; `peak` is `Dy`.
