@@ -1,8 +1,8 @@
 //! What the physics tests share.
 #![allow(dead_code)] // each test binary uses its own part
 
-use lapswarm::vehicle::TyreCoefficients;
 use lapswarm::vehicle::tyre::{Camber, Tyre, TyreFile, TyreForces, TyreInput};
+use lapswarm::vehicle::{Car, Chassis, TyreCoefficients};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -78,4 +78,19 @@ pub fn forces_at<T: Tyre<f64>>(
         slip_tangent,
         camber: Camber::new(camber),
     })
+}
+
+/// A chassis from `key=value` words; what they leave out stands as in the bundled car.
+pub fn chassis_from(words: &str) -> Chassis<f64> {
+    let table = Chassis::<f64>::PARAMETERS;
+    let mut flat = Car::bundled().unwrap().chassis.to_flat();
+    for word in words.split_whitespace() {
+        let (key, value) = word.split_once('=').unwrap();
+        let index = table
+            .iter()
+            .position(|p| p.name == key)
+            .unwrap_or_else(|| panic!("no chassis key {key}"));
+        flat[index] = value.parse().unwrap();
+    }
+    Chassis::from_flat(|i| flat[i])
 }
