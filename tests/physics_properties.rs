@@ -197,7 +197,7 @@ proptest! {
     fn a_well_formed_tyre_has_finite_forces(
         figures in flat(TYRE),
         wild in prop::collection::vec(0..TYRE.len(), 1..25),
-        load in prop_oneof![0.0..20_000.0, Just(0.0), Just(1e-9), -100.0..0.0],
+        share in prop_oneof![0.0..4.0, Just(0.0), Just(1e-9), -1.0..0.0],
         ratio in prop_oneof![-1.0..1.0, -50.0..50.0f64, Just(0.0)],
         tangent in prop_oneof![-0.3..0.3, -50.0..50.0f64, Just(0.0)],
         camber in -0.26..0.26,
@@ -208,7 +208,8 @@ proptest! {
             flat[index] = figures[index];
         }
         let tyre: TyreCoefficients<f64> = TyreCoefficients::from_flat(|i| flat[i]);
-        prop_assume!(tyre.well_formed().is_ok());
+        if tyre.well_formed().is_err() { return Ok(()); }
+        let load = share * tyre.fnomin * tyre.lfz0;
         let forces = forces_at(&tyre, load, ratio, tangent, camber);
         prop_assert!(forces.x.is_finite() && forces.y.is_finite() && forces.aligning_moment.is_finite(), "{forces:?}");
         let single: TyreCoefficients<f32> = TyreCoefficients::from_flat(|i| flat[i] as f32);
@@ -218,7 +219,7 @@ proptest! {
             slip_tangent: tangent as f32,
             camber: Camber::new(camber as f32),
         });
-        prop_assert!(forces.x.is_finite() && forces.y.is_finite() && forces.aligning_moment.is_finite(), "single: {forces:?}");
+        prop_assert!(forces.x.is_finite() && forces.y.is_finite() && forces.aligning_moment.is_finite(), "single: {forces:?} {load} {ratio} {tangent} {camber}  {:?}", wild.iter().map(|i| (TYRE[*i].name, flat[*i])).collect::<Vec<_>>());
     }
 
     /// A curve's `E` is taken as one where it is greater, whatever its parts make of it.
