@@ -3,10 +3,10 @@
 mod physics_common;
 
 use lapswarm::vehicle::model::wheel_slip;
-use lapswarm::vehicle::{Car, CarInput, CarModel, CarState, TyreCoefficients, Tyres};
-use physics_common::forces_at;
+use lapswarm::vehicle::{Car, CarInput, CarModel, CarState, MagicFormula, TyreCoefficients, Tyres};
+use physics_common::{car_model, car_step, forces_at};
 
-type GtModel = CarModel<f64, TyreCoefficients<f64>>;
+type GtModel = CarModel<f64, MagicFormula<f64>>;
 
 fn gt() -> (GtModel, TyreCoefficients<f64>) {
     let car = Car::bundled().unwrap();
@@ -15,7 +15,11 @@ fn gt() -> (GtModel, TyreCoefficients<f64>) {
     };
     assert_eq!(front.coefficients.well_formed(), Ok(()));
     (
-        CarModel::new(car.chassis, front.coefficients, rear.coefficients),
+        car_model(
+            &car.chassis,
+            &front.coefficients.to_flat(),
+            &rear.coefficients.to_flat(),
+        ),
         front.coefficients,
     )
 }
@@ -80,7 +84,7 @@ fn sweep(model: &GtModel, speed: f64) -> Vec<Moment> {
             ],
             state,
         });
-        state = model.runge_kutta_step(&state, &rate.state, &input, &input, STEP);
+        state = car_step(model, &state, |_| input, STEP);
         assert!(state.drives(), "lost at {speed} m/s, steer {steer}: {state:?}");
     }
     moments

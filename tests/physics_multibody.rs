@@ -3,8 +3,8 @@
 
 mod physics_common;
 
-use lapswarm::vehicle::{CarInput, CarModel, CarState, TyreCoefficients};
-use physics_common::{chassis_from, shared_file, tyre_from};
+use lapswarm::vehicle::{CarInput, CarModel, CarState, MagicFormula};
+use physics_common::{car_model, car_step, chassis_from, shared_file, tyre_from};
 
 /// The published figures of that vehicle, turned from pounds and feet into SI.
 ///
@@ -80,12 +80,11 @@ impl Manoeuvre {
     /// Root-mean-square differences in yaw rate (rad/s), roll (rad) and forward speed (m/s) of our car in steps of
     /// `0.01 s / substeps`.
     fn differences(&self, change: &str, camber_gain: f64, substeps: usize) -> [f64; 3] {
-        let tyre =
-            |gain: f64| -> TyreCoefficients<f64> { tyre_from(&format!("{TYRE} PKY1={}", STIFFNESS * gain)) };
-        let model = CarModel::new(
-            chassis_from(&format!("{CHASSIS} {change}")),
-            tyre(camber_gain),
-            tyre(1.0),
+        let tyre = |gain: f64| tyre_from(&format!("{TYRE} PKY1={}", STIFFNESS * gain)).to_flat();
+        let model: CarModel<f64, MagicFormula<f64>> = car_model(
+            &chassis_from(&format!("{CHASSIS} {change}")),
+            &tyre(camber_gain),
+            &tyre(1.0),
         );
         let columns = ["vx_mps", "vy_mps", "r_radps", "phi_rad", "p_radps"].map(|name| self.column(name));
         let [vx, vy, r, phi, p] = columns.map(|column| self.rows[0][column]);
@@ -102,8 +101,7 @@ impl Manoeuvre {
             if i + 1 < self.rows.len() {
                 for substep in 0..substeps {
                     let at = |share: f64| self.input(i, (substep as f64 + share) / substeps as f64);
-                    let rate = model.rate(&state, &at(0.0)).state;
-                    state = model.runge_kutta_step(&state, &rate, &at(0.5), &at(1.0), 0.01 / substeps as f64);
+                    state = car_step(&model, &state, at, 0.01 / substeps as f64);
                 }
             }
         }

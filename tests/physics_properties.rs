@@ -5,8 +5,10 @@ mod physics_common;
 
 use lapswarm::scalar::Dual;
 use lapswarm::vehicle::parameters::ParameterInfo;
-use lapswarm::vehicle::tyre::{Camber, Tyre, TyreFile, TyreInput};
-use lapswarm::vehicle::{Car, CarInput, CarModel, CarState, Chassis, LinearTyre, TyreCoefficients, Tyres};
+use lapswarm::vehicle::tyre::{Tyre, TyreFile, TyreInput};
+use lapswarm::vehicle::{
+    Car, CarInput, CarModel, CarState, Chassis, LinearTyre, MagicFormula, TyreCoefficients, Tyres,
+};
 use lapswarm::{Error, Result};
 use physics_common::{chassis_from, forces_at, set_b};
 use proptest::prelude::*;
@@ -213,11 +215,11 @@ proptest! {
         let forces = forces_at(&tyre, load, ratio, tangent, camber);
         prop_assert!(forces.x.is_finite() && forces.y.is_finite() && forces.aligning_moment.is_finite(), "{forces:?}");
         let single: TyreCoefficients<f32> = TyreCoefficients::from_flat(|i| flat[i] as f32);
-        let forces = single.forces(TyreInput {
+        let forces = single.prepare(camber as f32).forces(TyreInput {
             load: load as f32,
             slip_ratio: ratio as f32,
             slip_tangent: tangent as f32,
-            camber: Camber::new(camber as f32),
+            side: 1.0,
         });
         prop_assert!(forces.x.is_finite() && forces.y.is_finite() && forces.aligning_moment.is_finite(), "single: {forces:?} {load} {ratio} {tangent} {camber}  {:?}", wild.iter().map(|i| (TYRE[*i].name, flat[*i])).collect::<Vec<_>>());
     }
@@ -288,12 +290,7 @@ proptest! {
 /// parameter that `variables` hold in this order.
 fn rates<R: lapswarm::scalar::Real>(variables: &[R; 12], parameters: &[R], freed: usize) -> Vec<R> {
     let at = |i: usize| if i == freed { variables[11] } else { parameters[i] };
-    let (chassis, tyre) = (Chassis::<f64>::PARAMETERS.len(), TYRE.len());
-    let model = CarModel::new(
-        Chassis::from_flat(at),
-        TyreCoefficients::from_flat(|i| at(chassis + i)),
-        TyreCoefficients::from_flat(|i| at(chassis + tyre + i)),
-    );
+    let model: CarModel<R, MagicFormula<R>> = CarModel::from_parameters(at);
     let state = CarState::from_array(std::array::from_fn(|i| variables[i]));
     let input = CarInput {
         wheel_speed: std::array::from_fn(|i| variables[6 + i]),

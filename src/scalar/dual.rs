@@ -146,6 +146,11 @@ impl<const N: usize> Real for Dual<N> {
         self.chain(cos, -sin)
     }
     #[inline(always)]
+    fn tan(self) -> Self {
+        let tan = self.value.tan();
+        self.chain(tan, 1.0 + tan * tan)
+    }
+    #[inline(always)]
     fn atan(self) -> Self {
         self.chain(self.value.atan(), 1.0 / (1.0 + self.value * self.value))
     }

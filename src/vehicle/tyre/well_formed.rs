@@ -1,7 +1,7 @@
 //! Which Magic Formula coefficients make no tyre. Judged once per candidate in `f64`, before any integration,
 //! so that every backend refuses the same candidates for the same reasons.
 
-use super::{Camber, LEAST_LOAD, Tyre, TyreCoefficients, TyreInput};
+use super::{LEAST_LOAD, Tyre, TyreCoefficients, TyreInput};
 use std::fmt;
 
 /// Why a set of coefficients makes no tyre.
@@ -52,6 +52,7 @@ impl TyreCoefficients<f64> {
             let u = b * x - e.min(1.0) * (b * x - (b * x).atan());
             (c * u.atan()).cos()
         };
+        let tyre = self.prepare(0.0);
         for share in LOADS {
             let nominal = self.fnomin * self.lfz0;
             let dfz = share - 1.0;
@@ -84,11 +85,11 @@ impl TyreCoefficients<f64> {
                     return Err(IllFormed::Weighting);
                 }
             }
-            let forces = self.forces(TyreInput {
+            let forces = tyre.forces(TyreInput {
                 load: (share * nominal).max(LEAST_LOAD),
                 slip_ratio: WORKING_SLIP,
                 slip_tangent: WORKING_SLIP,
-                camber: Camber::new(0.0),
+                side: 1.0,
             });
             if !(forces.x.is_finite() && forces.y.is_finite() && forces.aligning_moment.is_finite()) {
                 return Err(IllFormed::NotFinite);

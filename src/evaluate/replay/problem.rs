@@ -1,0 +1,319 @@
+//! What a replay is: the log, how it is cut into windows, which parameters are free, and what is compared.
+
+use super::kernel::CHANNELS;
+use crate::error::{Error, Result};
+use crate::evaluate::{FAILED_COST, Failure, Objective, Problem, Variable};
+use crate::vehicle::car::CarParameter;
+use crate::vehicle::{Car, TyreCoefficients, TyreModel};
+
+/// Names of the compared channels, in the order of all arrays of four.
+pub const CHANNEL_NAMES: [&str; CHANNELS] = ["vx", "ax", "ay", "yaw_rate"];
+/// Their units.
+pub const CHANNEL_UNITS: [&str; CHANNELS] = ["m/s", "m/s^2", "m/s^2", "rad/s"];
+
+/// How the error of a channel becomes a cost.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Norm {
+    /// Integral of the magnitude over time.
+    One,
+    /// Root of the integral of the square over time.
+    Two,
+    /// Greatest magnitude.
+    Infinity,
+    /// Mean of the square.
+    MeanSquare,
+}
+
+/// One sample of the log: inputs, and measured outputs in the order of [`CHANNEL_NAMES`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sample<S> {
+    /// Wheel speeds FL FR RL RR, rad/s.
+    pub wheel_speed: [S; 4],
+    /// Road-wheel angle, rad.
+    pub steer: S,
+    /// Measured outputs.
+    pub measured: [S; CHANNELS],
+}
+
+/// A stretch of the log that is driven open loop from a known start.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Window<S> {
+    /// First sample.
+    pub start: usize,
+    /// One past the last sample; at least two samples long.
+    pub end: usize,
+    /// Samples from the start that are driven but not scored, while unknown states settle.
+    pub scored_from: usize,
+    /// State at the first sample, in the order of [`crate::vehicle::CarState::to_array`].
+    pub initial: [S; 6],
+}
+
+/// Everything shared by all candidates, in the precision of a backend.
+#[derive(Clone, Debug)]
+pub struct Plan<S> {
+    /// The log.
+    pub samples: Vec<Sample<S>>,
+    /// The windows.
+    pub windows: Vec<Window<S>>,
+    /// Integration step, s.
+    pub step: S,
+    /// For each sub-step, where it starts, halves and ends as a share of the sample interval.
+    pub fractions: Vec<[S; 3]>,
+    /// The norm.
+    pub norm: Norm,
+}
+
+/// An objective as a weighted sum of channel costs.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ChannelWeights {
+    /// The objective's name and unit.
+    pub objective: Objective,
+    /// Weight of each channel's cost.
+    pub weights: [f64; CHANNELS],
+}
+
+/// The identification problem: find the free parameters with which the car does what was logged.
+#[derive(Clone, Debug)]
+pub struct ReplayProblem {
+    /// Variables and objectives.
+    pub problem: Problem,
+    /// The car that fixed parameters come from.
+    pub car: Car,
+    /// The free parameters, one per variable.
+    pub parameters: Vec<CarParameter>,
+    /// The log, cut and ready, in double precision.
+    pub plan: Plan<f64>,
+    /// Sample interval, s.
+    pub interval_s: f64,
+    /// How channel costs make objectives.
+    pub objectives: Vec<ChannelWeights>,
+    base: Vec<f64>,
+    sources: Vec<Option<usize>>,
+}
+
+impl ReplayProblem {
+    /// Puts a problem together.
+    ///
+    /// `free` are the parameters with their bounds; `samples` the uniform log at `interval_s`; each interval is
+    /// integrated in `substeps` Runge-Kutta steps.
+    ///
+    /// # Errors
+    /// [`Error::Input`] if a bound is not finite or out of order, two parameters set the same thing, or a window
+    /// does not lie in the log.
+    pub fn new(
+        car: Car,
+        free: Vec<(CarParameter, f64, f64)>,
+        samples: Vec<Sample<f64>>,
+        windows: Vec<Window<f64>>,
+        (interval_s, substeps): (f64, usize),
+        norm: Norm,
+        objectives: Vec<ChannelWeights>,
+    ) -> Result<Self> {
+        let wrong =
+            |place: &str, found: String, expected: &str| Error::input("the study", place, found, expected);
+        let base = car.to_flat();
+        let mut sources = vec![None; base.len()];
+        let mut variables = Vec::new();
+        let mut parameters = Vec::new();
+        for (index, (parameter, lower, upper)) in free.into_iter().enumerate() {
+            let name = parameter.name.clone();
+            if !(lower.is_finite() && upper.is_finite() && lower <= upper) {
+                return Err(wrong(
+                    &format!("bounds of {name}"),
+                    format!("{lower} to {upper}"),
+                    "finite bounds in order",
+                ));
+            }
+            for &slot in &parameter.slots {
+                if sources[slot].replace(index).is_some() {
+                    return Err(wrong(
+                        &format!("free parameter {name}"),
+                        "a parameter freed twice".into(),
+                        "each once",
+                    ));
+                }
+            }
+            variables.push(Variable {
+                name,
+                unit: parameter.info.unit.to_owned(),
+                lower,
+                upper,
+            });
+            parameters.push(parameter);
+        }
+        for window in &windows {
+            if !(window.start + 2 <= window.end
+                && window.end <= samples.len()
+                && window.scored_from < window.end - window.start)
+            {
+                let found = format!(
+                    "samples {} to {}, scored from {}",
+                    window.start, window.end, window.scored_from
+                );
+                return Err(wrong(
+                    "windows",
+                    found,
+                    "at least two samples within the log, at least one scored",
+                ));
+            }
+        }
+        if windows.is_empty() || objectives.is_empty() || substeps == 0 {
+            return Err(wrong(
+                "windows, objectives, substeps",
+                "none".into(),
+                "at least one of each",
+            ));
+        }
+        let n = substeps as f64;
+        Ok(Self {
+            problem: Problem {
+                variables,
+                objectives: objectives.iter().map(|o| o.objective.clone()).collect(),
+            },
+            car,
+            parameters,
+            plan: Plan {
+                samples,
+                windows,
+                step: interval_s / n,
+                fractions: (0..substeps)
+                    .map(|i| [i as f64 / n, (i as f64 + 0.5) / n, (i as f64 + 1.0) / n])
+                    .collect(),
+                norm,
+            },
+            interval_s,
+            objectives,
+            base,
+            sources,
+        })
+    }
+
+    /// Number of free parameters.
+    pub fn dimensions(&self) -> usize {
+        self.parameters.len()
+    }
+
+    /// The tyre model that the kernels must run.
+    pub fn tyre_model(&self) -> TyreModel {
+        self.car.tyre_model()
+    }
+
+    /// The fixed car in flat form.
+    pub fn base(&self) -> &[f64] {
+        &self.base
+    }
+
+    /// For each place of the flat form, the variable that sets it, if any.
+    pub fn sources(&self) -> &[Option<usize>] {
+        &self.sources
+    }
+
+    /// A candidate's car in flat form.
+    pub fn flat(&self, candidate: &[f64]) -> Vec<f64> {
+        self.base
+            .iter()
+            .zip(&self.sources)
+            .map(|(base, source)| source.map_or(*base, |variable| candidate[variable]))
+            .collect()
+    }
+
+    /// A candidate's car.
+    pub fn candidate_car(&self, candidate: &[f64]) -> Car {
+        self.car.with_flat(&self.flat(candidate))
+    }
+
+    /// Why a candidate need not be driven, if so: a variable that is no number, or a tyre that is none.
+    pub fn preliminary_failure(&self, candidate: &[f64]) -> Option<Failure> {
+        if candidate.iter().any(|x| !x.is_finite()) {
+            return Some(Failure::NotFinite);
+        }
+        if self.tyre_model() == TyreModel::Linear {
+            return None;
+        }
+        let flat = self.flat(candidate);
+        let tyre_count = TyreCoefficients::<f64>::PARAMETERS.len();
+        let front = flat.len() - 2 * tyre_count;
+        let at = |offset: usize| TyreCoefficients::from_flat(|i| flat[offset + i]).well_formed();
+        let rear = front + tyre_count;
+        let one_tyre = flat[front..rear] == flat[rear..];
+        at(front)
+            .and_then(|()| if one_tyre { Ok(()) } else { at(rear) })
+            .err()
+            .map(Failure::IllFormedTyre)
+    }
+
+    /// The cost of each channel from the errors of all windows (summed, or their maxima).
+    pub fn channel_costs(&self, errors: &[f64; CHANNELS]) -> [f64; CHANNELS] {
+        let scored: usize = self
+            .plan
+            .windows
+            .iter()
+            .map(|w| w.end - w.start - w.scored_from)
+            .sum();
+        errors.map(|e| match self.plan.norm {
+            Norm::One => e * self.interval_s,
+            Norm::Two => (e * self.interval_s).sqrt(),
+            Norm::Infinity => e,
+            Norm::MeanSquare => e / scored as f64,
+        })
+    }
+
+    /// The objectives' row of a candidate that drove to the end, from its windows' errors; the failed row
+    /// otherwise, or if a figure is not finite.
+    pub fn objective_row(&self, errors: Option<[f64; CHANNELS]>) -> (Vec<f64>, Option<Failure>) {
+        let costs = errors
+            .map(|e| self.channel_costs(&e))
+            .filter(|c| c.iter().all(|x| x.is_finite()));
+        match costs {
+            Some(costs) => {
+                let row = self
+                    .objectives
+                    .iter()
+                    .map(|o| o.weights.iter().zip(costs).map(|(w, c)| w * c).sum::<f64>());
+                (row.map(|x| x.min(FAILED_COST)).collect(), None)
+            }
+            None => (vec![FAILED_COST; self.objectives.len()], Some(Failure::Spun)),
+        }
+    }
+
+    /// Adds one window's errors to those of the windows before.
+    pub fn accumulate(&self, total: &mut [f64; CHANNELS], errors: [f64; CHANNELS]) {
+        for (t, e) in total.iter_mut().zip(errors) {
+            *t = if self.plan.norm == Norm::Infinity {
+                t.max(e)
+            } else {
+                *t + e
+            };
+        }
+    }
+}
+
+impl Plan<f64> {
+    /// The plan in single precision, for the f32 backends.
+    pub fn to_f32(&self) -> Plan<f32> {
+        Plan {
+            samples: self
+                .samples
+                .iter()
+                .map(|s| Sample {
+                    wheel_speed: s.wheel_speed.map(|x| x as f32),
+                    steer: s.steer as f32,
+                    measured: s.measured.map(|x| x as f32),
+                })
+                .collect(),
+            windows: self
+                .windows
+                .iter()
+                .map(|w| Window {
+                    start: w.start,
+                    end: w.end,
+                    scored_from: w.scored_from,
+                    initial: w.initial.map(|x| x as f32),
+                })
+                .collect(),
+            step: self.step as f32,
+            fractions: self.fractions.iter().map(|f| f.map(|x| x as f32)).collect(),
+            norm: self.norm,
+        }
+    }
+}
