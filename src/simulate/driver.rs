@@ -154,3 +154,78 @@ impl Driver<'_> {
         }
     }
 }
+
+/// How long before the start line the flying lap begins, m.
+const RUN_UP: f64 = 500.0;
+
+fn drive_model<T: Tyre<f64>>(
+    model: &CarModel<f64, T>,
+    car: &Car,
+    circuit: &Circuit,
+    settings: &DriverSettings,
+    interval_s: f64,
+) -> Result<Drive> {
+    let plan = SpeedPlan::new(car, circuit, settings.pace, settings.top_speed_mps);
+    let begin = circuit.length_m - RUN_UP.min(0.4 * circuit.length_m);
+    let mut state = CarState::straight(plan.speed_at(begin));
+    let mut driver = Driver {
+        car,
+        circuit,
+        settings,
+        plan,
+        steer: 0.0,
+        front_slip: 0.0,
+        rear_slip: 0.0,
+    };
+    let mut position: DVec2 = circuit.position_at(begin);
+    let mut yaw = circuit.heading_at(begin);
+    let mut station = begin;
+    let mut travelled = begin;
+    let mut log = Drive::default();
+    let mut next_sample: Option<f64> = None;
+    let mut time = 0.0;
+    // A lap slower than this mean speed is no lap.
+    let most_time = (2.0 * circuit.length_m) / 5.0;
+    loop {
+        let projection = circuit.project(position, station);
+        let moved = (projection.station_m - station + 0.5 * circuit.length_m).rem_euclid(circuit.length_m)
+            - 0.5 * circuit.length_m;
+        station = projection.station_m;
+        travelled += moved;
+        let lap_distance = travelled - circuit.length_m;
+        let offset = projection.lateral_offset_m;
+        let (left, right) = circuit.widths_at(station);
+        if !state.drives() || offset > left || -offset > right || time > most_time {
+            let what = if state.drives() { "left the track" } else { "spun" };
+            return Err(Error::Study(format!(
+                "the driver {what} at station {station:.0} m of {} ({:.1} m/s); try a lower pace than {}",
+                circuit.name, state.body.vx, settings.pace
+            )));
+        }
+        driver.act(&state, station, offset, projection.heading_error_rad(yaw));
+        let input = driver.input(&state);
+        if lap_distance >= 0.0 {
+            let due = *next_sample.get_or_insert(time);
+            if time >= due - 0.5 * STEP {
+                log.inputs.push((input.wheel_speed, input.steer));
+                log.states.push(state.to_array());
+                log.station_m.push(lap_distance);
+                log.offset_m.push(offset);
+                next_sample = Some(due + interval_s);
+            }
+        }
+        if lap_distance >= circuit.length_m {
+            return Ok(log);
+        }
+        let next = runge_kutta_step(model, &state, |_| input, STEP, |_| {});
+        let middle_yaw = yaw + 0.25 * STEP * (state.body.yaw_rate + next.body.yaw_rate);
+        let velocity = DVec2::new(
+            0.5 * (state.body.vx + next.body.vx),
+            0.5 * (state.body.vy + next.body.vy),
+        );
+        position += DVec2::from_angle(middle_yaw).rotate(velocity) * STEP;
+        yaw += 0.5 * STEP * (state.body.yaw_rate + next.body.yaw_rate);
+        state = next;
+        time += STEP;
+    }
+}
