@@ -9,6 +9,9 @@ mod table;
 
 pub use cpu::{CpuEvaluator, norm_name, trace};
 pub use jacobian::Residuals;
-pub use problem::{CHANNEL_NAMES, CHANNEL_UNITS, ChannelWeights, Norm, Plan, ReplayProblem, Sample, Window};
+pub use problem::{
+    CHANNEL_NAMES, CHANNEL_UNITS, ChannelWeights, Norm, Plan, ReplayProblem, Sample, Window, initial_state,
+    step_fractions,
+};
 pub use simd::SimdEvaluator;
 pub use table::ModelTable;
