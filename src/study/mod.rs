@@ -1,3 +1,4 @@
 //! The studies that users run.
 
 pub mod identify;
+pub mod run_folder;

@@ -1,5 +1,6 @@
 //! Replaying a logged lap with candidate cars: the identification's evaluator and its backends.
 
+mod backend;
 mod cpu;
 mod jacobian;
 pub mod kernel;
@@ -7,6 +8,7 @@ mod problem;
 mod simd;
 mod table;
 
+pub use backend::{BackendChoice, open_evaluator};
 pub use cpu::{CpuEvaluator, norm_name, trace};
 pub use jacobian::Residuals;
 pub use problem::{

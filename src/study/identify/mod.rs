@@ -1,12 +1,20 @@
 //! Identification: which car drove this lap?
 
+mod identifiability;
 mod polish;
+mod results;
+mod search;
 mod settings;
 mod setup;
 
+pub use identifiability::{Identifiability, judge};
 pub use polish::{Polished, polish};
+pub use results::{Summary, summarise, write_results};
+pub use search::{
+    Front, HistoryRow, Judged, Outcome, Report, Stage, judge_candidate, search, total_parameter_error,
+};
 pub use settings::{
-    Algorithm, BackendChoice, FreeParameter, IdentifySettings, ObjectiveChoice, parse_algorithm,
-    parse_backend, parse_norm, parse_objective,
+    Algorithm, FreeParameter, IdentifySettings, ObjectiveChoice, parse_algorithm, parse_backend, parse_norm,
+    parse_objective,
 };
 pub use setup::{Setup, cost_unit, lap_format, load_circuit, set_up};

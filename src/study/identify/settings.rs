@@ -2,24 +2,10 @@
 
 use crate::config::{Document, Table, read_text};
 use crate::error::{Error, Result};
-use crate::evaluate::replay::{CHANNEL_NAMES, Norm};
+use crate::evaluate::replay::{BackendChoice, CHANNEL_NAMES, Norm};
 use crate::swarm::{Mutation, Schedule};
 use crate::telemetry::{CalibrationOptions, Switch};
 use std::path::{Path, PathBuf};
-
-/// Where evaluations run.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum BackendChoice {
-    /// A real GPU if there is one, else lanes on the processor.
-    #[default]
-    Auto,
-    /// The `f64` reference.
-    Cpu,
-    /// `f32` lanes on the processor.
-    Simd,
-    /// A GPU, or a software driver that poses as one.
-    Gpu,
-}
 
 /// A parameter to find, and where to look for it.
 #[derive(Clone, Debug, PartialEq)]
