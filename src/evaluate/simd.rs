@@ -19,7 +19,7 @@ impl InstructionSet {
         let mut sets = Vec::new();
         #[cfg(target_arch = "x86_64")]
         {
-            if is_x86_feature_detected!("avx512f") {
+            if has_avx512() {
                 sets.push(Self::Avx512);
             }
             if is_x86_feature_detected!("avx2") {
@@ -53,6 +53,12 @@ impl InstructionSet {
     }
 }
 
+/// The parts of AVX-512 that [`crate::scalar::lanes::Avx512`] uses.
+#[cfg(target_arch = "x86_64")]
+fn has_avx512() -> bool {
+    is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512dq")
+}
+
 /// Work that can be done in any lane type.
 pub trait LaneWork {
     /// What it yields.
@@ -70,7 +76,7 @@ pub fn dispatch<W: LaneWork>(set: InstructionSet, work: W) -> W::Output {
     {
         use crate::scalar::lanes::{Avx2, Avx512};
 
-        #[target_feature(enable = "avx512f")]
+        #[target_feature(enable = "avx512f,avx512dq")]
         fn run_avx512<W: LaneWork>(work: W) -> W::Output {
             work.run::<Avx512>()
         }
@@ -78,7 +84,7 @@ pub fn dispatch<W: LaneWork>(set: InstructionSet, work: W) -> W::Output {
         fn run_avx2<W: LaneWork>(work: W) -> W::Output {
             work.run::<Avx2>()
         }
-        if set == InstructionSet::Avx512 && is_x86_feature_detected!("avx512f") {
+        if set == InstructionSet::Avx512 && has_avx512() {
             // SAFETY: the processor has the set, as just detected.
             return unsafe { run_avx512(work) };
         }

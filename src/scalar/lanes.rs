@@ -130,9 +130,15 @@ impl Real for Portable {
 }
 
 impl SinglePrecision for Portable {
+    /// By way of whole numbers, because a baseline without a rounding instruction calls a library per lane.
     #[inline(always)]
     fn floor(self) -> Self {
-        Self(self.0.map(f32::floor))
+        Self(self.0.map(|x| {
+            let truncated = x as i32 as f32;
+            let floor = truncated - if truncated > x { 1.0 } else { 0.0 };
+            // From 2^23 on every float is whole.
+            if x.abs() < 8_388_608.0 { floor } else { x }
+        }))
     }
     #[inline(always)]
     fn two_to_the(self) -> Self {

@@ -4,6 +4,7 @@
 use super::problem::{Norm, Plan, Sample, Window};
 use crate::scalar::Real;
 use crate::vehicle::tyre::Tyre;
+use crate::vehicle::model::runge_kutta_step;
 use crate::vehicle::{CarInput, CarModel, CarState};
 
 /// The compared outputs: forward speed (m/s), longitudinal and lateral acceleration (m/s^2), yaw rate (rad/s).
@@ -37,30 +38,27 @@ pub fn drive_window<R: Real, T: Tyre<R>>(
     let mut drives = R::splat_mask(true);
     let step = R::load(plan.step);
     let samples = &plan.samples[window.start..window.end];
-    for (i, from) in samples.iter().enumerate() {
-        let to = samples.get(i + 1).unwrap_or(from);
-        let mut rate = car.rate(&state, &input_between(from, from, R::lit(0.0)));
-        visit(i, [state.body.vx, rate.ax, rate.ay, state.body.yaw_rate]);
-        if i + 1 == samples.len() {
-            break;
-        }
+    for (i, pair) in samples.windows(2).enumerate() {
         for (substep, fractions) in plan.fractions.iter().enumerate() {
-            let [start, middle, end] = fractions.map(R::load);
-            if substep > 0 {
-                rate = car.rate(&state, &input_between(from, to, start));
-            }
-            let next = car.runge_kutta_step(
+            let next = runge_kutta_step(
+                car,
                 &state,
-                &rate.state,
-                &input_between(from, to, middle),
-                &input_between(from, to, end),
+                |input| input_between(&pair[0], &pair[1], R::load(fractions[input])),
                 step,
+                |rate| {
+                    if substep == 0 {
+                        visit(i, [state.body.vx, rate.ax, rate.ay, state.body.yaw_rate]);
+                    }
+                },
             );
             drives = drives & next.drives();
             let (kept, moved) = (state.to_array(), next.to_array());
             state = CarState::from_array(std::array::from_fn(|k| R::select(drives, moved[k], kept[k])));
         }
     }
+    let last = &samples[samples.len() - 1];
+    let rate = car.rate(&state, &input_between(last, last, R::lit(0.0)));
+    visit(samples.len() - 1, [state.body.vx, rate.ax, rate.ay, state.body.yaw_rate]);
     (drives, state)
 }
 
