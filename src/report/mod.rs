@@ -1,1 +1,28 @@
-//! report
+//! Pictures (SVG) and tables of what a study found.
+//!
+//! Every function here takes plain numbers and writes one file, whole or not at all. Numbers that
+//! are not finite are gaps in a curve; a figure without anything to draw is refused.
+
+mod axis;
+mod canvas;
+mod convergence;
+mod files;
+mod parameters;
+mod pareto;
+mod scaling;
+mod style;
+mod table;
+mod traces;
+mod track_map;
+
+pub use convergence::{ConvergenceRun, plot_convergence};
+pub use files::write_whole;
+pub use parameters::{ParameterRow, plot_parameters};
+pub use pareto::{Objective, plot_pareto};
+pub use scaling::{ScalingSeries, plot_scaling};
+pub use table::{Cells, Column, text_table, write_csv};
+pub use traces::{ShadedSection, TraceFigure, TracePanel, plot_traces};
+pub use track_map::{TrackMap, plot_track_map};
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,194 @@
+//! An archive of compromises between objectives.
+
+use std::path::Path;
+
+use super::axis::{Axis, Labels, Plot, extent};
+use super::canvas::{Align, Canvas, Type, draw_to_file};
+use super::style::{BLUE, FAINT_INK, INK, LABEL_PX, TICK_PX, VERMILLION, significant, with_unit};
+use crate::{Error, Result};
+
+/// One objective, to be made small.
+#[derive(Debug, Clone, Copy)]
+pub struct Objective<'a> {
+    /// Its name, as in `lap time`.
+    pub name: &'a str,
+    /// Its unit, as in `s`; empty for none.
+    pub unit: &'a str,
+}
+
+/// Draws an archive to an SVG file: a scatter of two objectives, or a matrix of scatters of up to
+/// six. Each point holds one value per objective; `chosen` is the index of the point to mark.
+///
+/// # Errors
+/// [`Error::Input`] when there are fewer than two or more than six objectives, when a point has
+/// another number of values, when no point is finite or `chosen` is not a point; [`Error::Io`] when
+/// the file cannot be written.
+pub fn plot_pareto(
+    path: impl AsRef<Path>,
+    title: &str,
+    objectives: &[Objective<'_>],
+    points: &[Vec<f64>],
+    chosen: Option<usize>,
+) -> Result<()> {
+    let path = path.as_ref();
+    let n = objectives.len();
+    let refuse = |place: String, found: String, expected: &str| {
+        Err(Error::input(path, place, found, expected))
+    };
+    if !(2..=6).contains(&n) {
+        return refuse("objectives".into(), n.to_string(), "2 to 6");
+    }
+    if let Some((i, point)) = points.iter().enumerate().find(|(_, p)| p.len() != n) {
+        let found = format!("{} values", point.len());
+        return refuse(format!("point {i}"), found, &format!("{n} values"));
+    }
+    if let Some(index) = chosen.filter(|&c| c >= points.len()) {
+        let expected = format!("one of {} points", points.len());
+        return refuse("chosen point".into(), index.to_string(), &expected);
+    }
+    let finite: Vec<&Vec<f64>> = points
+        .iter()
+        .filter(|p| p.iter().all(|v| v.is_finite()))
+        .collect();
+    let ranges: Option<Vec<(f64, f64)>> = (0..n)
+        .map(|k| extent(finite.iter().map(|p| &p[k])))
+        .collect();
+    let Some(ranges) = ranges else {
+        return refuse(
+            "points".into(),
+            "none that is finite".into(),
+            "at least one",
+        );
+    };
+    let mark = chosen.map(|c| &points[c]).filter(|p| finite.contains(p));
+    let archive = Archive {
+        objectives,
+        finite: &finite,
+        ranges: &ranges,
+        mark,
+    };
+    if n == 2 {
+        draw_to_file(path, (1200.0, 680.0), title, |canvas| {
+            archive.scatter(canvas, (0, 1), (110.0, 1170.0), (610.0, 76.0), Axes::Full);
+            archive.legend(canvas, 1170.0);
+        })
+    } else {
+        let cell = (960.0 / n as f64).clamp(170.0, 320.0);
+        let (left, top) = (100.0, 70.0);
+        let size = (left + cell * n as f64 + 20.0, top + cell * n as f64 + 50.0);
+        draw_to_file(path, size, title, |canvas| {
+            for (row, column) in (0..n).flat_map(|r| (0..=r).map(move |c| (r, c))) {
+                let x = left + cell * column as f64;
+                let y = top + cell * row as f64;
+                if row == column {
+                    archive.name(canvas, row, (x + 0.5 * cell, y + 0.5 * cell));
+                    continue;
+                }
+                let axes = Axes::Edges {
+                    below: row + 1 == n,
+                    beside: column == 0,
+                };
+                let (across, up) = ((x + 6.0, x + cell - 6.0), (y + cell - 6.0, y + 6.0));
+                archive.scatter(canvas, (column, row), across, up, axes);
+            }
+            archive.legend(canvas, size.0 - 20.0);
+        })
+    }
+}
+
+/// Which axes of a scatter are labelled.
+#[derive(Clone, Copy)]
+enum Axes {
+    Full,
+    Edges { below: bool, beside: bool },
+}
+
+struct Archive<'a> {
+    objectives: &'a [Objective<'a>],
+    finite: &'a [&'a Vec<f64>],
+    ranges: &'a [(f64, f64)],
+    mark: Option<&'a Vec<f64>>,
+}
+
+impl Archive<'_> {
+    fn title(&self, k: usize) -> String {
+        with_unit(self.objectives[k].name, self.objectives[k].unit)
+    }
+
+    fn scatter(
+        &self,
+        canvas: &mut Canvas<'_>,
+        (across, up): (usize, usize),
+        x_pixels: (f64, f64),
+        y_pixels: (f64, f64),
+        axes: Axes,
+    ) {
+        let plot = Plot {
+            x: Axis::padded(self.ranges[across], 0.06, x_pixels),
+            y: Axis::padded(self.ranges[up], 0.06, y_pixels),
+        };
+        let (x_title, y_title) = (self.title(across), self.title(up));
+        let (below, beside, ticks) = match axes {
+            Axes::Full => (true, true, 10),
+            Axes::Edges { below, beside } => (below, beside, 4),
+        };
+        let labels = Labels {
+            x: below.then_some(x_title.as_str()),
+            y: beside.then_some(y_title.as_str()),
+            x_ticks: ticks,
+            y_ticks: ticks,
+        };
+        if beside {
+            plot.draw_axes(canvas, labels);
+        } else {
+            plot.draw_inner(canvas, labels);
+        }
+        let radius = if matches!(axes, Axes::Full) { 4.0 } else { 2.5 };
+        for point in self.finite {
+            let at = (plot.x.at(point[across]), plot.y.at(point[up]));
+            canvas.dot(at, radius, BLUE, 0.55);
+        }
+        if let Some(point) = self.mark {
+            let at = (plot.x.at(point[across]), plot.y.at(point[up]));
+            canvas.dot(at, radius + 1.0, VERMILLION, 1.0);
+            canvas.ring(at, radius + 5.0, VERMILLION, 1.6);
+        }
+    }
+
+    fn name(&self, canvas: &mut Canvas<'_>, k: usize, (x, y): (f64, f64)) {
+        let objective = self.objectives[k];
+        let look = Type::new(LABEL_PX, INK, Align::Centre);
+        canvas.text(objective.name, (x, y - 12.0), look.bold());
+        let (low, high) = self.ranges[k];
+        let range = format!(
+            "{} to {} {}",
+            significant(low, 3),
+            significant(high, 3),
+            objective.unit
+        );
+        canvas.text(
+            range.trim_end(),
+            (x, y + 10.0),
+            Type::new(TICK_PX, FAINT_INK, Align::Centre),
+        );
+    }
+
+    fn legend(&self, canvas: &mut Canvas<'_>, right: f64) {
+        let look = Type::new(TICK_PX + 1.0, INK, Align::Right);
+        let archive = format!("{} compromises", self.finite.len());
+        canvas.text(&archive, (right, 28.0), look);
+        canvas.dot((right - look.width(&archive) - 10.0, 28.0), 4.0, BLUE, 0.55);
+        if let Some(point) = self.mark {
+            let values: Vec<String> = point
+                .iter()
+                .zip(self.objectives)
+                .map(|(v, o)| format!("{} {}", significant(*v, 4), o.unit))
+                .collect();
+            let text = format!("chosen: {}", values.join(", "));
+            canvas.text(text.trim_end(), (right, 52.0), look);
+            let x = right - look.width(text.trim_end()) - 12.0;
+            canvas.dot((x, 52.0), 4.0, VERMILLION, 1.0);
+            canvas.ring((x, 52.0), 7.5, VERMILLION, 1.4);
+        }
+    }
+}

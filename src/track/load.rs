@@ -1,0 +1,369 @@
+//! Reads circuits from TOML files with a curvature table beside them, bundled or the user's own.
+
+use std::ops::Range;
+use std::path::Path;
+
+use serde::Deserialize;
+use toml::Spanned;
+
+use super::circuit::{Circuit, Section};
+use super::from_curvature::{CurvatureRow, CurvatureTable};
+use crate::{Error, Result};
+
+/// A circuit embedded in the crate: name, TOML and curvature table.
+struct Bundled {
+    name: &'static str,
+    toml: &'static str,
+    table: &'static str,
+}
+
+const EMBEDDED: [Bundled; 1] = [Bundled {
+    name: BUNDLED[0],
+    toml: include_str!("../../data/circuits/silverstone_gp.toml"),
+    table: include_str!("../../data/circuits/silverstone_gp.csv"),
+}];
+
+/// Names that [`Circuit::bundled`] knows.
+pub const BUNDLED: [&str; 1] = ["silverstone_gp"];
+
+/// The TOML file, with the place of every value that can be out of range.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct CircuitFile {
+    name: String,
+    #[serde(default = "yes")]
+    closed: bool,
+    curvature_table: Spanned<String>,
+    length_m: Spanned<f64>,
+    #[serde(default)]
+    start_heading_deg: Option<Spanned<f64>>,
+    #[serde(default)]
+    width_m: Option<Spanned<f64>>,
+    #[serde(default)]
+    sections: Vec<SectionEntry>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SectionEntry {
+    name: Spanned<String>,
+    start_m: Spanned<f64>,
+    end_m: Spanned<f64>,
+}
+
+fn yes() -> bool {
+    true
+}
+
+impl Circuit {
+    /// The Silverstone Grand Prix circuit, 5887 m clockwise and 15 m wide.
+    ///
+    /// # Errors
+    /// None in practice: the embedded files are checked by a test.
+    pub fn silverstone_gp() -> Result<Self> {
+        Self::bundled(BUNDLED[0])
+    }
+
+    /// A circuit that comes with the crate, by its name in [`BUNDLED`].
+    ///
+    /// # Errors
+    /// [`Error::Input`] listing the names when there is none of this name.
+    pub fn bundled(name: &str) -> Result<Self> {
+        let wanted = name.trim().to_lowercase().replace(['-', ' '], "_");
+        let Some(found) = EMBEDDED.iter().find(|b| b.name == wanted) else {
+            return Err(Error::input(
+                "bundled circuits",
+                "name",
+                format!("`{name}`"),
+                format!("one of {}", BUNDLED.join(", ")),
+            ));
+        };
+        let toml_file = format!("bundled {}.toml", found.name);
+        let table_file = format!("bundled {}.csv", found.name);
+        let file = parse_toml(&toml_file, found.toml)?;
+        let table = assemble(&toml_file, found.toml, file, &table_file, found.table)?;
+        Ok(build(&table, &table_file)?.0)
+    }
+
+    /// A circuit from a TOML file. The curvature table it names lies beside it.
+    ///
+    /// Keys: `name`, `curvature_table` (a CSV file with columns `station_m`, `curvature_1pm` and, if
+    /// wanted, `width_left_m`, `width_right_m`, `corner`), `length_m`; `closed` (true unless said
+    /// otherwise), `start_heading_deg` (0), `width_m` (of the whole road, where the table has no
+    /// widths), and `[[sections]]` with `name`, `start_m`, `end_m`.
+    ///
+    /// # Errors
+    /// [`Error::Io`] when a file cannot be read; [`Error::Input`] with the file, line and field when
+    /// something in it is unknown, missing or out of range.
+    pub fn load(path: impl AsRef<Path>) -> Result<Self> {
+        Ok(CurvatureTable::load(path.as_ref())?.0)
+    }
+}
+
+impl CurvatureTable {
+    /// Reads what [`Circuit::load`] reads and returns the circuit with what closing it took.
+    ///
+    /// # Errors
+    /// As [`Circuit::load`].
+    pub fn load(path: &Path) -> Result<(Circuit, super::Closure)> {
+        let read = |p: &Path| std::fs::read_to_string(p).map_err(|e| Error::io(p, "read", e));
+        let toml_file = path.display().to_string();
+        let text = read(path)?;
+        let file = parse_toml(&toml_file, &text)?;
+        let table_path = path
+            .parent()
+            .unwrap_or(Path::new(""))
+            .join(file.curvature_table.get_ref());
+        let table_file = table_path.display().to_string();
+        let csv = read(&table_path)?;
+        let table = assemble(&toml_file, &text, file, &table_file, &csv)?;
+        build(&table, &table_file)
+    }
+}
+
+/// Builds, naming the table's file where the library names the circuit.
+fn build(table: &CurvatureTable, table_file: &str) -> Result<(Circuit, super::Closure)> {
+    table.build().map_err(|error| match error {
+        Error::Input {
+            place,
+            found,
+            expected,
+            ..
+        } => Error::input(table_file, place, found, expected),
+        other => other,
+    })
+}
+
+/// The line (from 1) where a byte of a text lies.
+fn line_of(text: &str, at: usize) -> usize {
+    1 + text.bytes().take(at).filter(|&b| b == b'\n').count()
+}
+
+fn parse_toml(file: &str, text: &str) -> Result<CircuitFile> {
+    toml::from_str(text).map_err(|error| {
+        let place = match error.span() {
+            Some(span) => format!("line {}", line_of(text, span.start)),
+            None => "document".to_owned(),
+        };
+        let message = error.message().trim().replace('\n', ", ");
+        // serde's messages end with what they wanted, as in "unknown field `x`, expected one of ...".
+        match message.split_once(", expected ") {
+            Some((found, expected)) => Error::input(file, place, found, expected),
+            None => Error::input(
+                file,
+                place,
+                message,
+                "a circuit with name, curvature_table and length_m",
+            ),
+        }
+    })
+}
+
+/// A checked value of the TOML file.
+struct Checker<'a> {
+    file: &'a str,
+    text: &'a str,
+}
+
+impl Checker<'_> {
+    fn refuse(&self, span: Range<usize>, field: &str, found: String, expected: &str) -> Error {
+        let place = format!("line {}, field {field}", line_of(self.text, span.start));
+        Error::input(self.file, place, found, expected)
+    }
+
+    fn within(&self, value: &Spanned<f64>, field: &str, low: f64, high: f64) -> Result<f64> {
+        let x = *value.get_ref();
+        if x >= low && x <= high {
+            Ok(x)
+        } else {
+            Err(self.refuse(
+                value.span(),
+                field,
+                x.to_string(),
+                &format!("{low} to {high}"),
+            ))
+        }
+    }
+}
+
+fn assemble(
+    toml_file: &str,
+    text: &str,
+    file: CircuitFile,
+    table_file: &str,
+    csv: &str,
+) -> Result<CurvatureTable> {
+    let check = Checker {
+        file: toml_file,
+        text,
+    };
+    let length_m = check.within(&file.length_m, "length_m", 10.0, 200_000.0)?;
+    let heading = file.start_heading_deg.as_ref().map_or(Ok(0.0), |h| {
+        check.within(h, "start_heading_deg", -360.0, 360.0)
+    })?;
+    let width_m = file
+        .width_m
+        .as_ref()
+        .map(|w| check.within(w, "width_m", 1.0, 200.0))
+        .transpose()?;
+    let mut sections: Vec<Section> = Vec::with_capacity(file.sections.len());
+    for entry in &file.sections {
+        let name = entry.name.get_ref().trim().to_owned();
+        let start_m = check.within(&entry.start_m, "start_m", 0.0, length_m)?;
+        let end_m = check.within(&entry.end_m, "end_m", 0.0, length_m)?;
+        if end_m <= start_m {
+            return Err(check.refuse(
+                entry.end_m.span(),
+                "end_m",
+                end_m.to_string(),
+                &format!("a station beyond start_m, {start_m}"),
+            ));
+        }
+        let taken = sections
+            .iter()
+            .any(|s| s.name.to_lowercase() == name.to_lowercase());
+        if name.is_empty() || taken {
+            return Err(check.refuse(
+                entry.name.span(),
+                "name",
+                format!("`{name}`"),
+                "a name that no other section has",
+            ));
+        }
+        sections.push(Section {
+            name,
+            start_m,
+            end_m,
+        });
+    }
+    Ok(CurvatureTable {
+        rows: parse_table(table_file, csv, length_m, file.closed, width_m)?,
+        name: file.name,
+        closed: file.closed,
+        length_m,
+        start_heading_rad: heading.to_radians(),
+        sections,
+    })
+}
+
+const COLUMNS: [&str; 5] = [
+    "station_m",
+    "curvature_1pm",
+    "width_left_m",
+    "width_right_m",
+    "corner",
+];
+
+/// The line of the row that the reader started to look for here: the reader's own count is that of
+/// the comments and empty lines before the row.
+fn row_line(text: &str, position: Option<&csv::Position>) -> usize {
+    let start = position.map_or(0, |p| p.byte() as usize).min(text.len());
+    let skipped = text.as_bytes()[start..]
+        .split(|&b| b == b'\n')
+        .take_while(|line| line.trim_ascii().is_empty() || line.starts_with(b"#"))
+        .count();
+    line_of(text, start) + skipped
+}
+
+fn parse_table(
+    file: &str,
+    text: &str,
+    length_m: f64,
+    closed: bool,
+    width_m: Option<f64>,
+) -> Result<Vec<CurvatureRow>> {
+    let text = text.trim_start_matches('\u{feff}');
+    let mut reader = csv::ReaderBuilder::new()
+        .comment(Some(b'#'))
+        .trim(csv::Trim::All)
+        .from_reader(text.as_bytes());
+    let line_at = |position: Option<&csv::Position>| row_line(text, position);
+    let unreadable = |error: csv::Error| {
+        let line = line_at(error.position());
+        let found = match error.kind() {
+            csv::ErrorKind::UnequalLengths {
+                expected_len, len, ..
+            } => format!("{len} fields where the header has {expected_len}"),
+            _ => error.to_string(),
+        };
+        Error::input(file, format!("line {line}"), found, "a row like the header")
+    };
+    let header = reader.headers().map_err(unreadable)?.clone();
+    let header_line = line_at(header.position());
+    let mut column = [None; COLUMNS.len()];
+    for (i, found) in header.iter().enumerate() {
+        match COLUMNS.iter().position(|&c| c == found) {
+            Some(c) if column[c].is_none() => column[c] = Some(i),
+            _ => {
+                return Err(Error::input(
+                    file,
+                    format!("line {header_line}, column {}", i + 1),
+                    format!("`{found}`"),
+                    format!("each of {} once at most", COLUMNS.join(", ")),
+                ));
+            }
+        }
+    }
+    let [station, curvature, left, right, corner] = column;
+    let missing = |name: &str, found: &str| {
+        let place = format!("line {header_line}, column {name}");
+        Error::input(file, place, found, "this column")
+    };
+    let station = station.ok_or_else(|| missing(COLUMNS[0], "nothing"))?;
+    let curvature = curvature.ok_or_else(|| missing(COLUMNS[1], "nothing"))?;
+    for (name, side) in [(COLUMNS[2], left), (COLUMNS[3], right)] {
+        if side.is_none() && width_m.is_none() {
+            return Err(missing(name, "neither it nor width_m in the TOML file"));
+        }
+    }
+
+    let mut rows: Vec<CurvatureRow> = Vec::new();
+    for record in reader.records() {
+        let record = record.map_err(unreadable)?;
+        let line = line_at(record.position());
+        let number = |column: usize, (low, high): (f64, f64)| -> Result<f64> {
+            let found = record.get(column).unwrap_or_default();
+            match found.parse::<f64>() {
+                Ok(x) if x >= low && x <= high => Ok(x),
+                _ => Err(Error::input(
+                    file,
+                    format!("line {line}, field {}", &header[column]),
+                    format!("`{found}`"),
+                    format!("a number from {low} to {high}"),
+                )),
+            }
+        };
+        let width = |column: Option<usize>| match (column, width_m) {
+            (Some(c), _) => number(c, (0.0, 200.0)),
+            (None, whole) => Ok(whole.unwrap_or_default() / 2.0),
+        };
+        let row = CurvatureRow {
+            station_m: number(station, (0.0, length_m))?,
+            curvature_1pm: number(curvature, (-1.0, 1.0))?,
+            width_left_m: width(left)?,
+            width_right_m: width(right)?,
+            corner: corner
+                .and_then(|c| record.get(c))
+                .unwrap_or_default()
+                .to_owned(),
+        };
+        let fits = match rows.last() {
+            None => row.station_m == 0.0,
+            Some(last) => row.station_m > last.station_m && !(closed && row.station_m >= length_m),
+        };
+        if !fits {
+            return Err(Error::input(
+                file,
+                format!("line {line}, field station_m"),
+                row.station_m.to_string(),
+                if rows.is_empty() {
+                    "0 in the first row".to_owned()
+                } else {
+                    format!("a station beyond the row before and short of {length_m}")
+                },
+            ));
+        }
+        rows.push(row);
+    }
+    Ok(rows)
+}

@@ -1,0 +1,340 @@
+use std::f64::consts::{PI, TAU};
+use std::path::{Path, PathBuf};
+
+use glam::DVec2;
+use proptest::prelude::*;
+
+use super::*;
+use crate::Error;
+
+fn silverstone() -> Circuit {
+    Circuit::silverstone_gp().expect("the bundled circuit is sound")
+}
+
+/// The last sample carried one step further by the circuit's own curvature.
+fn end_of_lap(c: &Circuit) -> DVec2 {
+    c.position_at(c.length_m - 1e-9) + 1e-9 * DVec2::from_angle(c.heading_rad[0])
+}
+
+#[test]
+fn silverstone_closes_and_stays_consistent() {
+    let c = silverstone();
+    assert_eq!(c.station_m.len(), 5887);
+    assert!(end_of_lap(&c).distance(c.centreline_m[0]) < 1e-9);
+    assert!((c.total_turn_rad() + TAU).abs() < 1e-9);
+    let integral: f64 = c.curvature_1pm.iter().sum::<f64>() * c.spacing_m();
+    assert!((integral + TAU).abs() < 1e-9, "{integral}");
+    let lap = c.heading_at(10.0 + c.length_m) - c.heading_at(10.0);
+    assert!((lap + TAU).abs() < 1e-9);
+    // Arc length of the positions themselves: chords are short of arcs by k^2 h^3 / 24 each.
+    let n = c.station_m.len();
+    let chords: f64 = (0..n)
+        .map(|i| c.centreline_m[i].distance(c.centreline_m[(i + 1) % n]))
+        .sum();
+    assert!((c.length_m - chords).abs() < 0.05, "{chords}");
+}
+
+#[test]
+fn closing_silverstone_takes_little() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/circuits/silverstone_gp.toml");
+    let (circuit, closure) = CurvatureTable::load(&path).expect("the bundled file loads");
+    println!("{closure:?}");
+    assert_eq!(circuit, silverstone());
+    assert!(closure.gap_m < 5.0);
+    assert!(closure.curvature_change_1pm < 2e-5);
+    assert!(closure.heading_change_rad < 0.01);
+    assert!(closure.position_change_m < 3.0);
+}
+
+#[test]
+fn circles_have_their_radius_either_way_round() {
+    for anticlockwise in [true, false] {
+        let (c, closure) = CurvatureTable::circle(50.0, 12.0, anticlockwise)
+            .build()
+            .expect("a circle is a circuit");
+        let side = if anticlockwise { 50.0 } else { -50.0 };
+        let centre = DVec2::new(0.0, side);
+        for i in 0..500 {
+            let p = c.position_at(f64::from(i) * 0.7);
+            assert!((p.distance(centre) - 50.0).abs() < 1e-9);
+        }
+        assert!(closure.gap_m < 1e-9 && closure.curvature_change_1pm < 1e-12);
+        let inner = if anticlockwise {
+            c.left_edge()
+        } else {
+            c.right_edge()
+        };
+        assert!(
+            inner
+                .iter()
+                .all(|p| (p.distance(centre) - 44.0).abs() < 1e-9)
+        );
+    }
+}
+
+#[test]
+fn an_open_road_ends_where_it_should() {
+    let mut table = CurvatureTable::circle(100.0, 10.0, true);
+    table.closed = false;
+    table.length_m = PI * 100.0;
+    table.rows.truncate(2);
+    let half = table.length_m;
+    let mut last = table.rows[1].clone();
+    last.station_m = half;
+    table.rows.push(last);
+    let (c, closure) = table.build().expect("half a circle is a road");
+    assert_eq!(closure, Closure::default());
+    assert!(c.position_at(half).distance(DVec2::new(0.0, 200.0)) < 1e-9);
+    assert!(c.position_at(half + 50.0).distance(DVec2::new(0.0, 200.0)) < 1e-9);
+    assert!((c.total_turn_rad() - PI).abs() < 1e-9);
+    let beyond = c.project(DVec2::new(-20.0, 201.0), half - 3.0);
+    assert_eq!(beyond.station_m, half);
+}
+
+#[test]
+fn corners_and_sections_are_found_by_name() {
+    let c = silverstone();
+    assert_eq!(c.corners.len(), 15);
+    assert_eq!(c.corners[0].name, "Abbey");
+    for name in [
+        "Luffield", "luff", "LUFFIELD", "becketts", "the loop", "Village",
+    ] {
+        assert!(c.section(name).is_ok(), "{name}");
+    }
+    for name in ["v", "", "Monza"] {
+        let text = c.section(name).expect_err(name).to_string();
+        assert!(text.contains("Abbey, Village/The Loop, Luffield"), "{text}");
+    }
+    let text = Circuit::bundled("monza")
+        .expect_err("not bundled")
+        .to_string();
+    assert!(text.contains("`monza`") && text.contains("silverstone_gp"));
+    assert!(Circuit::bundled("Silverstone-GP").is_ok());
+}
+
+#[test]
+fn a_point_is_found_without_a_hint() {
+    let c = silverstone();
+    for s in [0.0, 905.0, 1050.0, 2100.0, 5519.0, 5886.9] {
+        let point = c.position_at(s) + 3.0 * DVec2::from_angle(c.heading_at(s)).perp();
+        let found = c.project_anywhere(point);
+        assert!((found.station_m - s).abs() < 1e-6, "{s} {found:?}");
+        assert!((found.lateral_offset_m - 3.0).abs() < 1e-6);
+    }
+}
+
+proptest! {
+    #[test]
+    fn projection_round_trips(s in 0.0..5887.0f64, n in -7.5..7.5f64, off in -4.0..4.0f64) {
+        let c = silverstone();
+        let heading = c.heading_at(s);
+        let point = c.position_at(s) + n * DVec2::from_angle(heading).perp();
+        let found = c.project(point, s + off);
+        let along = (found.station_m - s + 0.5 * c.length_m).rem_euclid(c.length_m)
+            - 0.5 * c.length_m;
+        prop_assert!(along.abs() < 1e-6, "{found:?}");
+        prop_assert!((found.lateral_offset_m - n).abs() < 1e-6, "{found:?}");
+        prop_assert!((found.heading_error_rad(heading + 0.1) - 0.1).abs() < 1e-6);
+        prop_assert!((found.curvature_1pm - c.curvature_at(s)).abs() < 1e-6);
+    }
+
+    #[test]
+    fn any_nearly_closed_table_closes(seed in prop::collection::vec(-0.002..0.002f64, 8)) {
+        let mut table = CurvatureTable::circle(150.0, 10.0, false);
+        let rows = seed.len();
+        table.rows = (0..rows)
+            .map(|i| CurvatureRow {
+                station_m: table.length_m * i as f64 / rows as f64,
+                curvature_1pm: -1.0 / 150.0 + 0.1 * seed[i],
+                ..table.rows[0].clone()
+            })
+            .collect();
+        let (c, closure) = table.build().expect("nearly closed");
+        prop_assert!(end_of_lap(&c).distance(DVec2::ZERO) < 1e-9);
+        prop_assert!((c.total_turn_rad() + TAU).abs() < 1e-9);
+        prop_assert!(closure.curvature_change_1pm < 5e-4, "{closure:?}");
+    }
+}
+
+#[test]
+fn wild_questions_get_answers_not_panics() {
+    let c = silverstone();
+    for s in [f64::NAN, f64::INFINITY, -1e-20, -5.0, 1e12, c.length_m] {
+        let _ = (c.curvature_at(s), c.heading_at(s), c.widths_at(s));
+        let _ = c.project(DVec2::new(1e6, -1e6), s);
+        let _ = c.project(DVec2::NAN, s);
+    }
+    assert_eq!(c.curvature_at(-1e-20), c.curvature_at(0.0));
+    let far = c.project(DVec2::new(1e6, -1e6), 1000.0);
+    assert!((far.station_m - 1000.0).abs() < 300.0);
+}
+
+struct Folder(tempfile::TempDir);
+
+impl Folder {
+    fn with(toml: &str, table: &str) -> (Self, PathBuf) {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = folder.path().join("own.toml");
+        std::fs::write(&path, toml).expect("written");
+        std::fs::write(folder.path().join("own.csv"), table).expect("written");
+        (Self(folder), path)
+    }
+}
+
+const TOML: &str =
+    "name = \"Own\"\ncurvature_table = \"own.csv\"\nlength_m = 628.3\nwidth_m = 10\n";
+const TABLE: &str = "# a circle\nstation_m,curvature_1pm\n0,0.01\n# on\n\n200,0.01\n400,0.01\n";
+
+#[test]
+fn a_users_own_circuit_loads() {
+    let (folder, path) = Folder::with(TOML, TABLE);
+    let c = Circuit::load(&path).expect("a circle");
+    assert_eq!((c.name.as_str(), c.length_m), ("Own", 628.3));
+    assert_eq!(c.widths_at(100.0), (5.0, 5.0));
+    let widths =
+        "station_m,curvature_1pm,width_left_m,width_right_m\n0,.01,4,6\n200,.01,4,6\n400,.01,8,6\n";
+    std::fs::write(folder.0.path().join("own.csv"), widths).expect("written");
+    let c = Circuit::load(&path).expect("a circle");
+    let (left, right) = c.widths_at(300.0);
+    assert!((left - 6.0).abs() < 1e-9 && (right - 6.0).abs() < 1e-9);
+}
+
+#[test]
+fn mistakes_are_named_by_file_line_and_field() {
+    let section = "[[sections]]\nname = \"A\"\nstart_m = 10\nend_m = 5\n";
+    let cases: [(String, String, &[&str]); 15] = [
+        (
+            format!("{TOML}colour = 1\n"),
+            TABLE.into(),
+            &["own.toml", "line 5", "`colour`", "length_m"],
+        ),
+        (
+            TOML.replace("628.3", "-3"),
+            TABLE.into(),
+            &["own.toml", "line 3, field length_m", "-3", "10 to"],
+        ),
+        (
+            TOML.replace("628.3", "\"long\""),
+            TABLE.into(),
+            &["own.toml", "line 3", "string"],
+        ),
+        (
+            TOML.replace("width_m = 10", "width_m = nan"),
+            TABLE.into(),
+            &["line 4, field width_m", "NaN"],
+        ),
+        (
+            TOML.replace("name = \"Own\"\n", ""),
+            TABLE.into(),
+            &["own.toml", "missing field `name`"],
+        ),
+        (
+            format!("{TOML}{section}"),
+            TABLE.into(),
+            &["line 8, field end_m", "found 5", "10"],
+        ),
+        (
+            TOML.replace("width_m = 10\n", ""),
+            TABLE.into(),
+            &["own.csv", "width_left_m"],
+        ),
+        (
+            TOML.into(),
+            TABLE.replace("200,0.01", "200,fast"),
+            &["own.csv", "line 6, field curvature_1pm", "`fast`"],
+        ),
+        (
+            TOML.into(),
+            TABLE.replace("200,0.01", "200,NaN"),
+            &["line 6, field curvature_1pm", "`NaN`"],
+        ),
+        (
+            TOML.into(),
+            TABLE.replace("400,", "100,"),
+            &["line 7, field station_m", "100"],
+        ),
+        (
+            TOML.into(),
+            TABLE.replace("200,0.01", "200"),
+            &["own.csv", "line 6", "1 fields"],
+        ),
+        (
+            TOML.into(),
+            TABLE.replace("curvature_1pm", "kappa"),
+            &["own.csv", "line 2", "`kappa`"],
+        ),
+        (
+            TOML.into(),
+            TABLE.replace("0.01", "0.02"),
+            &["own.csv", "720", "360"],
+        ),
+        (
+            TOML.into(),
+            "station_m,curvature_1pm\n0,0\n100,0.062832\n200,0\n".into(),
+            &["own.csv", "away from the start"],
+        ),
+        (TOML.into(), String::new(), &["own.csv", "station_m"]),
+    ];
+    for (toml, table, wanted) in cases {
+        let (_folder, path) = Folder::with(&toml, &table);
+        let error = Circuit::load(&path).expect_err("refused");
+        assert!(matches!(error, Error::Input { .. }), "{error}");
+        let text = error.to_string();
+        for part in wanted {
+            assert!(text.contains(part), "`{part}` is not in: {text}");
+        }
+    }
+    let absent = Circuit::load("no/such/circuit.toml").expect_err("absent");
+    assert!(matches!(absent, Error::Io { .. }));
+}
+
+/// Distance from the surveyed centreline after the best shift: how good the map's figures are.
+#[test]
+fn silverstone_follows_the_survey() {
+    let shared = std::env::var_os("LAPSWARM_SHARED").map_or_else(
+        || Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared"),
+        PathBuf::from,
+    );
+    let path = shared.join("data/tracks/Silverstone.csv");
+    let Ok(text) = std::fs::read_to_string(&path) else {
+        eprintln!("SKIPPED: no surveyed circuit at {}", path.display());
+        return;
+    };
+    let survey: Vec<DVec2> = text
+        .lines()
+        .filter(|line| !line.starts_with('#'))
+        .map(|line| {
+            let mut fields = line
+                .split(',')
+                .map(|f| f.trim().parse::<f64>().expect("a number"));
+            DVec2::new(fields.next().expect("x"), fields.next().expect("y"))
+        })
+        .collect();
+    let c = silverstone();
+    let mut shift = survey[0];
+    let mut rms = f64::INFINITY;
+    let mut worst = 0.0;
+    let mut stations: Vec<f64> = survey
+        .iter()
+        .map(|&p| c.project_anywhere(p - shift).station_m)
+        .collect();
+    for _ in 0..50 {
+        let misses: Vec<DVec2> = survey
+            .iter()
+            .zip(&mut stations)
+            .map(|(&p, station)| {
+                *station = c.project(p - shift, *station).station_m;
+                p - shift - c.position_at(*station)
+            })
+            .collect();
+        let n = misses.len() as f64;
+        rms = (misses.iter().map(|m| m.length_squared()).sum::<f64>() / n).sqrt();
+        worst = misses.iter().map(|m| m.length()).fold(0.0, f64::max);
+        shift += misses.iter().sum::<DVec2>() / n;
+    }
+    println!(
+        "rms {rms:.3} m, worst {worst:.3} m from {} surveyed points",
+        survey.len()
+    );
+    assert!(rms < 1.2 && worst < 4.0, "rms {rms} m, worst {worst} m");
+}
