@@ -185,11 +185,12 @@ fn aligning_moment<R: Real>(
 
     let residual_slip = input.slip_tangent + lateral.residual_shift;
     let residual_slope = t.qbz9 * stiffness_scale + t.qbz10 * lateral.slope;
+    // The cosine of `a* = tan(alpha)` itself, unlike that of the trail: the reference implementation has it so.
     let residual_peak = load.force
         * t.r0
         * ((t.qdz6 + t.qdz7 * dfz) * t.lres + (t.qdz8 + t.qdz9 * dfz) * g)
         * t.lmuy
-        * cos_slip;
+        * input.slip_tangent.cos();
     let residual =
         residual_peak * (residual_slope * equivalent_tangent(residual_slip, slip_share).atan()).cos_atan();
 
