@@ -48,6 +48,11 @@ macro_rules! parameters {
             ];
         }
 
+        impl<R> $name<R> {
+            /// The fields' names in the same order, which the shaders' structs share.
+            pub const FIELDS: &'static [&'static str] = &[$(stringify!($field)),*];
+        }
+
         impl<R: Copy> $name<R> {
             /// From the flat form, `at(i)` being the `i`-th parameter of the table.
             #[inline(always)]

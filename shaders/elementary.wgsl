@@ -1,0 +1,79 @@
+// Twin of `src/scalar/elementary.rs`: our own sine, cosine, inverse tangent and exponential, because WGSL only
+// promises 2^-11 for `sin` and `cos` and 4096 ULP for `atan`. Same functions, same order, same operations.
+// Drivers may regroup literals, so no product has more than one.
+
+// `cos(atan x)`, and -1 below zero, else +1: twins of the provided methods of `Real` in `src/scalar/mod.rs`.
+fn sign_of(x: f32) -> f32 {
+    return select(1.0, -1.0, x < 0.0);
+}
+
+fn cos_atan(x: f32) -> f32 {
+    return 1.0 / sqrt(1.0 + x * x);
+}
+
+// Whether `x` is a number, by its exponent: a driver may assume away comparisons that ask for NaN.
+fn is_finite(x: f32) -> bool {
+    return (bitcast<u32>(x) & 0x7f800000u) != 0x7f800000u;
+}
+
+fn two_to_the(n: f32) -> f32 {
+    return bitcast<f32>(u32(i32(n) + 127i) << 23u);
+}
+
+fn sine_polynomial(r: f32) -> f32 {
+    let t = r * r;
+    var p = 2.6017497e-6;
+    p = p * t + -1.9807351e-4;
+    p = p * t + 8.333025e-3;
+    p = p * t + -0.16666657;
+    return r + r * t * p;
+}
+
+fn reduce(x: f32, half_turns: f32) -> f32 {
+    return ((x - half_turns * 3.140625) - half_turns * 9.670257568359375e-4) - half_turns * 6.278329573e-7;
+}
+
+fn parity_sign(n: f32) -> f32 {
+    let half = n * 0.5;
+    return 1.0 - (half - floor(half)) * 4.0;
+}
+
+fn own_sin(x: f32) -> f32 {
+    let n = floor(x * 0.3183098861837907 + 0.5);
+    return parity_sign(n) * sine_polynomial(reduce(x, n));
+}
+
+fn own_cos(x: f32) -> f32 {
+    let n = floor(x * 0.3183098861837907);
+    return -(parity_sign(n) * sine_polynomial(reduce(x, n + 0.5)));
+}
+
+fn own_atan(x: f32) -> f32 {
+    let size = abs(x);
+    let large = 1.0 < size;
+    let q = select(size, 1.0, large) / select(1.0, size, large);
+    let t = q * q;
+    var p = 2.8498906e-3;
+    p = p * t + -1.6068634e-2;
+    p = p * t + 4.2691525e-2;
+    p = p * t + -7.504295e-2;
+    p = p * t + 0.10640934;
+    p = p * t + -0.14203644;
+    p = p * t + 0.1999262;
+    p = p * t + -0.33333072;
+    let angle = q + q * t * p;
+    let folded = select(angle, 1.5707963267948966 - angle, large);
+    return select(folded, -folded, x < 0.0);
+}
+
+fn own_exp(argument: f32) -> f32 {
+    let x = min(max(argument, -87.0), 88.0);
+    let n = floor(x * 1.4426950408889634 + 0.5);
+    let r = (x - n * 0.693359375) - n * -2.1219444e-4;
+    var p = 1.3836839e-3;
+    p = p * r + 8.374822e-3;
+    p = p * r + 4.1668225e-2;
+    p = p * r + 0.1666642;
+    p = p * r + 0.4999999;
+    return (r * r * p + r + 1.0) * two_to_the(n);
+}

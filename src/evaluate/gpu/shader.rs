@@ -1,0 +1,114 @@
+//! Composition of the kernels from the fragments under `shaders/`, one list per kernel, and the generated parts:
+//! constants, and the loaders that tell a free parameter from a fixed one.
+
+use crate::evaluate::replay::Norm;
+use crate::vehicle::{Chassis, TyreModel};
+use std::fmt::Write as _;
+
+/// Our own `sin`, `cos`, `atan` and `exp`.
+pub const ELEMENTARY: &str = include_str!("../../../shaders/elementary.wgsl");
+const CHASSIS: &str = include_str!("../../../shaders/chassis.wgsl");
+const AERO: &str = include_str!("../../../shaders/aero.wgsl");
+const LOADS: &str = include_str!("../../../shaders/loads.wgsl");
+const TYRE_INTERFACE: &str = include_str!("../../../shaders/tyre_interface.wgsl");
+const TYRE_MAGIC_FORMULA: &str = include_str!("../../../shaders/tyre.wgsl");
+const TYRE_LINEAR: &str = include_str!("../../../shaders/tyre_linear.wgsl");
+const CAR: &str = include_str!("../../../shaders/car.wgsl");
+const REPLAY_COMMON: &str = include_str!("../../../shaders/replay_common.wgsl");
+const REPLAY: &str = include_str!("../../../shaders/replay.wgsl");
+const REPLAY_REDUCE: &str = include_str!("../../../shaders/replay_reduce.wgsl");
+
+/// The car's fragments with the tyre model's.
+pub fn car_fragments(model: TyreModel) -> [&'static str; 7] {
+    let tyre = match model {
+        TyreModel::MagicFormula => TYRE_MAGIC_FORMULA,
+        TyreModel::Linear => TYRE_LINEAR,
+    };
+    [ELEMENTARY, CHASSIS, AERO, LOADS, TYRE_INTERFACE, tyre, CAR]
+}
+
+/// The name of the tyre model's parameter struct in WGSL, and in Rust.
+pub fn tyre_struct(model: TyreModel) -> &'static str {
+    match model {
+        TyreModel::MagicFormula => "TyreCoefficients",
+        TyreModel::Linear => "LinearTyre",
+    }
+}
+
+/// What a replay kernel is specialised to.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ReplayShape<'a> {
+    /// The tyre model.
+    pub model: TyreModel,
+    /// For each place of the flat form, the variable that sets it, if any.
+    pub sources: &'a [Option<usize>],
+    /// The norm.
+    pub norm: Norm,
+    /// Lanes of a workgroup.
+    pub workgroup: u32,
+}
+
+impl ReplayShape<'_> {
+    /// Source of the kernel that drives and scores; entry point `replay`.
+    pub fn replay(&self) -> String {
+        let mut source = car_fragments(self.model).concat();
+        source.push_str(&self.constants());
+        source.push_str(REPLAY_COMMON);
+        source.push_str(REPLAY);
+        source.push_str(&loaders(self.model, self.sources));
+        source
+    }
+
+    /// Source of the kernel that joins the windows; entry point `replay_reduce`.
+    pub fn reduce(&self) -> String {
+        [&self.constants(), REPLAY_COMMON, REPLAY_REDUCE].concat()
+    }
+
+    fn constants(&self) -> String {
+        format!(
+            "\n// Generated.\nconst NORM_ONE: u32 = 0u;\nconst NORM_TWO: u32 = 1u;\nconst NORM_INFINITY: u32 = 2u;\n\
+             const NORM_MEAN_SQUARE: u32 = 3u;\nconst NORM: u32 = {}u;\nconst WORKGROUP: u32 = {}u;\n\
+             const BASE_VECTORS: u32 = {}u;\n\n",
+            match self.norm {
+                Norm::One => 0,
+                Norm::Two => 1,
+                Norm::Infinity => 2,
+                Norm::MeanSquare => 3,
+            },
+            self.workgroup,
+            base_vectors(self.sources.len()),
+        )
+    }
+}
+
+/// How many `vec4` a uniform table of `count` floats takes.
+pub fn base_vectors(count: usize) -> usize {
+    count.div_ceil(4).max(1)
+}
+
+/// The loaders `load_chassis`, `load_front` and `load_rear`: a fixed parameter comes from the uniform table `base`,
+/// where the compiler sees that all lanes share it, a free one from its row of `positions`.
+pub fn loaders(model: TyreModel, sources: &[Option<usize>]) -> String {
+    let chassis = Chassis::<f32>::FIELDS;
+    let tyre = model.fields();
+    let mut text = "\n// Generated.\n".to_owned();
+    let mut slot = 0;
+    for (function, structure, fields) in [
+        ("load_chassis", "Chassis", chassis),
+        ("load_front", tyre_struct(model), tyre),
+        ("load_rear", tyre_struct(model), tyre),
+    ] {
+        // Writing to a String cannot fail.
+        let _ = writeln!(text, "fn {function}(candidate: u32) -> {structure} {{\n    return {structure}(");
+        for field in fields {
+            let place = match sources[slot] {
+                Some(variable) => format!("positions[{variable}u * stretch.stride + candidate]"),
+                None => format!("base[{}].{}", slot / 4, ["x", "y", "z", "w"][slot % 4]),
+            };
+            let _ = writeln!(text, "        {place}, // {field}");
+            slot += 1;
+        }
+        text.push_str("    );\n}\n\n");
+    }
+    text
+}
