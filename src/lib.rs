@@ -3,8 +3,10 @@
 pub mod config;
 pub mod error;
 pub mod evaluate;
+pub mod random;
 pub mod report;
 pub mod scalar;
+pub mod simulate;
 pub mod telemetry;
 pub mod track;
 pub mod vehicle;

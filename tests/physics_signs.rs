@@ -10,8 +10,10 @@ use lapswarm::vehicle::chassis::{BodyForces, BodyState, body_derivative};
 use lapswarm::vehicle::loads::wheel_loads;
 use lapswarm::vehicle::model::{WheelSlip, to_body_axes, wheel_slip};
 use lapswarm::vehicle::tyre::{Tyre, TyreForces};
-use lapswarm::vehicle::{Car, CarInput, CarModel, CarState, Chassis, LinearTyre, TyreCoefficients, Tyres};
-use physics_common::{chassis_from, forces_at, set_b};
+use lapswarm::vehicle::{
+    Car, CarInput, CarModel, CarState, Chassis, LinearTyre, MagicFormula, TyreCoefficients, Tyres,
+};
+use physics_common::{car_model, chassis_from, forces_at, ready_forces, set_b};
 
 const HAND_CAR: &str = "
     mass_kg=1000 cg_to_front_axle_m=1.2 cg_to_rear_axle_m=1.8 front_half_track_m=0.8 rear_half_track_m=0.75
@@ -64,8 +66,12 @@ fn rolling(vx: f64, steer: f64) -> CarInput<f64> {
     }
 }
 
+fn on_linear_tyres(change: &str, tyre: LinearTyre<f64>) -> CarModel<f64, LinearTyre<f64>> {
+    car_model(&hand_car(change), &tyre.to_flat(), &tyre.to_flat())
+}
+
 fn linear(change: &str) -> CarModel<f64, LinearTyre<f64>> {
-    CarModel::new(hand_car(change), TYRE, TYRE)
+    on_linear_tyres(change, TYRE)
 }
 
 // --- Loads -----------------------------------------------------------------------------------------------------
@@ -258,16 +264,16 @@ fn slick() -> TyreCoefficients<f64> {
 #[test]
 fn tyres_oppose_their_slip() {
     fn check(tyre: &impl Tyre<f64>) {
-        assert!(forces_at(tyre, 3000.0, 0.05, 0.0, 0.0).x > 1000.0);
-        assert!(forces_at(tyre, 3000.0, -0.05, 0.0, 0.0).x < -1000.0);
+        assert!(ready_forces(tyre, 3000.0, 0.05, 0.0).x > 1000.0);
+        assert!(ready_forces(tyre, 3000.0, -0.05, 0.0).x < -1000.0);
         for drift in [0.02, 0.05, 0.1] {
-            let left = forces_at(tyre, 3000.0, 0.0, drift, 0.0);
+            let left = ready_forces(tyre, 3000.0, 0.0, drift);
             assert!(left.y < -500.0 && left.aligning_moment > 0.0, "{left:?}");
-            let right = forces_at(tyre, 3000.0, 0.0, -drift, 0.0);
+            let right = ready_forces(tyre, 3000.0, 0.0, -drift);
             assert!(right.y > 500.0 && right.aligning_moment < 0.0, "{right:?}");
         }
     }
-    check(&slick());
+    check(&slick().prepare(0.0));
     check(&LinearTyre { trail: 0.03, ..TYRE });
 }
 
@@ -391,7 +397,7 @@ fn yaw_is_damped() {
 #[test]
 fn aligning_moments_turn_the_car_back() {
     let tyre = LinearTyre { trail: 0.02, ..TYRE };
-    let model = CarModel::new(hand_car(""), tyre, tyre);
+    let model = on_linear_tyres("", tyre);
     let with = model
         .rate(&CarState::straight(20.0), &rolling(20.0, 0.1))
         .state
@@ -440,11 +446,9 @@ fn lifted_wheels_give_nothing() {
 #[test]
 fn negative_camber_adds_cornering_force_on_the_loaded_side() {
     let model = |camber: &str| {
-        CarModel::new(
-            hand_car(&format!("front_camber_deg={camber} rear_camber_deg={camber}")),
-            slick(),
-            slick(),
-        )
+        let chassis = hand_car(&format!("front_camber_deg={camber} rear_camber_deg={camber}"));
+        let tyre = slick().to_flat();
+        car_model::<f64, MagicFormula<f64>>(&chassis, &tyre, &tyre)
     };
     let straight = model("-2.5").rate(&CarState::straight(20.0), &rolling(20.0, 0.0));
     close(straight.ay, 0.0, 100.0);

@@ -4,7 +4,7 @@
 mod physics_common;
 
 use lapswarm::scalar::Real;
-use lapswarm::vehicle::tyre::{Camber, IllFormed, Tyre, TyreFile, TyreForces, TyreInput};
+use lapswarm::vehicle::tyre::{IllFormed, Tyre, TyreFile, TyreForces, TyreInput};
 use lapswarm::vehicle::{LinearTyre, TyreCoefficients};
 use physics_common::{SET_B, forces_at, set_b, shared_file, tyre_from};
 
@@ -40,15 +40,23 @@ const POINTS: [[f64; 7]; 14] = [
 /// The greatest differences in Fx, Fy and Mz over rows of load, slip ratio, slip angle, camber, Fx, Fy, Mz.
 fn worst_differences(tyre: &TyreCoefficients<f64>, rows: impl Iterator<Item = [f64; 7]>) -> [f64; 3] {
     rows.fold([0.0; 3], |worst, [load, ratio, angle, camber, fx, fy, mz]| {
-        let got = forces_at(tyre, load, ratio, angle.tan(), camber);
-        let differences = [got.x - fx, got.y - fy, got.aligning_moment - mz].map(f64::abs);
-        // `max` would drop a NaN; this keeps it.
-        std::array::from_fn(|i| {
-            if differences[i] <= worst[i] {
-                worst[i]
-            } else {
-                differences[i]
-            }
+        // A wheel leans by its axle's inclination on the left and by the opposite on the right; both ways to lean.
+        [1.0, -1.0].into_iter().fold(worst, |worst, side| {
+            let got = tyre.prepare(side * camber).forces(TyreInput {
+                load,
+                slip_ratio: ratio,
+                slip_tangent: angle.tan(),
+                side,
+            });
+            let differences = [got.x - fx, got.y - fy, got.aligning_moment - mz].map(f64::abs);
+            // `max` would drop a NaN; this keeps it.
+            std::array::from_fn(|i| {
+                if differences[i] <= worst[i] {
+                    worst[i]
+                } else {
+                    differences[i]
+                }
+            })
         })
     })
 }
@@ -177,11 +185,11 @@ fn single_precision_agrees_with_double() {
                 (if column == 2 { row[2].tan() } else { row[column] }) as f32
             })
         };
-        let forces = single.forces(TyreInput {
+        let forces = single.prepare(lane(3)).forces(TyreInput {
             load: lane(0),
             slip_ratio: lane(1),
             slip_tangent: lane(2),
-            camber: Camber::new(lane(3)),
+            side: Portable::lit(1.0),
         });
         let mut out = [[0.0f32; 8]; 3];
         forces.x.write(&mut out[0]);
@@ -236,7 +244,7 @@ fn linear_tyre_by_hand() {
             load,
             slip_ratio,
             slip_tangent,
-            camber: Camber::new(0.0),
+            side: 1.0,
         })
     };
     // Each figure is a product of three or four: 4 roundings of 1.1e-16 of it.

@@ -3,7 +3,7 @@
 use plotters::style::RGBColor;
 
 use super::canvas::{Align, Canvas, Type};
-use super::style::{FRAME, GRID, INK, LABEL_PX, TICK_PX, power_of_ten, significant_short};
+use super::style::{FRAME, GRID, INK, LABEL_PX, MINOR_GRID, TICK_PX, power_of_ten, significant_short};
 
 /// A range of a quantity, laid out over a range of pixels.
 #[derive(Clone, Copy)]
@@ -11,6 +11,8 @@ pub(super) struct Axis {
     low: f64,
     high: f64,
     log: bool,
+    /// Distance between ticks, where it is not to follow from the range.
+    step: Option<f64>,
     pixels: (f64, f64),
 }
 
@@ -49,6 +51,7 @@ impl Axis {
             low,
             high,
             log: false,
+            step: None,
             pixels,
         }
     }
@@ -62,6 +65,20 @@ impl Axis {
         axis
     }
 
+    /// An axis for errors as large as this, with ticks at nought and at a round value either way.
+    pub(super) fn around_zero(largest: f64, pixels: (f64, f64)) -> Self {
+        let largest = if largest > 0.0 && largest.is_finite() {
+            largest
+        } else {
+            1.0
+        };
+        let decade = 10f64.powf(largest.log10().floor());
+        let mut axis = Self::padded((-largest, largest), 0.1, pixels);
+        // One leading digit, rounded down, is more than half of the range: three ticks and no more.
+        axis.step = Some((largest / decade).floor().max(1.0) * decade);
+        axis
+    }
+
     /// A logarithmic axis with a margin beyond a positive range.
     pub(super) fn log((low, high): (f64, f64), pixels: (f64, f64)) -> Self {
         let margin = (high / low).powf(0.05).max(1.3);
@@ -69,6 +86,7 @@ impl Axis {
             low: low / margin,
             high: high * margin,
             log: true,
+            step: None,
             pixels,
         }
     }
@@ -88,15 +106,29 @@ impl Axis {
         if self.log {
             return self.log_ticks(most);
         }
-        let step = round_step((self.high - self.low) / most.max(1) as f64);
+        let step = self
+            .step
+            .unwrap_or_else(|| round_step((self.high - self.low) / most.max(1) as f64));
         let first = (self.low / step - 1e-6).ceil() as i64;
         let last = (self.high / step + 1e-6).floor() as i64;
         let largest = self.low.abs().max(self.high.abs());
-        (first..=last.min(first + 100))
+        (first..=last.min(first.saturating_add(100)))
             .map(|i| {
                 let value = i as f64 * step;
                 (value, tick_label(value, step, largest))
             })
+            .collect()
+    }
+
+    /// The multiples of powers of ten on a logarithmic axis that is not too long to show them.
+    fn minor(&self) -> Vec<f64> {
+        let (first, last) = (self.low.log10().floor(), self.high.log10().ceil());
+        if !self.log || last - first > 8.0 {
+            return Vec::new();
+        }
+        (first as i32..last as i32)
+            .flat_map(|d| (2..10).map(move |m| f64::from(m) * 10f64.powi(d)))
+            .filter(|v| (self.low..=self.high).contains(v))
             .collect()
     }
 
@@ -190,9 +222,23 @@ impl Plot {
         self.draw_grid(canvas, labels, false);
     }
 
+    /// Between powers of ten, lines that show how far apart the steps are.
+    fn draw_minor(&self, canvas: &mut Canvas<'_>) {
+        let ((left, top), (right, bottom)) = self.corners();
+        for x in self.x.minor() {
+            let x = self.x.at(x);
+            canvas.line((x, top), (x, bottom), MINOR_GRID, 0.7);
+        }
+        for y in self.y.minor() {
+            let y = self.y.at(y);
+            canvas.line((left, y), (right, y), MINOR_GRID, 0.7);
+        }
+    }
+
     /// Returns the room that the labels of the vertical axis take (px).
     fn draw_grid(&self, canvas: &mut Canvas<'_>, labels: Labels<'_>, beside: bool) -> f64 {
         let ((left, top), (right, bottom)) = self.corners();
+        self.draw_minor(canvas);
         let tick = |align| Type::new(TICK_PX, INK, align);
         for (value, label) in self.x.ticks(labels.x_ticks) {
             let x = self.x.at(value);
@@ -278,12 +324,7 @@ fn thin_out(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
 }
 
 /// A row of coloured names at the right of a figure's title line.
-pub(super) fn draw_legend(
-    canvas: &mut Canvas<'_>,
-    entries: &[(&str, RGBColor, f64)],
-    right: f64,
-    y: f64,
-) {
+pub(super) fn draw_legend(canvas: &mut Canvas<'_>, entries: &[(&str, RGBColor, f64)], right: f64, y: f64) {
     let look = Type::new(TICK_PX + 1.0, INK, Align::Left);
     let mut x = right;
     for &(name, colour, width_px) in entries.iter().rev() {

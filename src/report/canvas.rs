@@ -55,15 +55,23 @@ impl Type {
     }
 
     pub(super) fn turned(self) -> Self {
-        Self {
-            turned: true,
-            ..self
-        }
+        Self { turned: true, ..self }
     }
 
-    /// About how wide a text comes out (px). Viewers choose the font, so this errs on the wide side.
+    /// About how wide a text comes out (px), by the widths of Helvetica. Viewers may choose another
+    /// font, so this errs on the wide side.
     pub(super) fn width(&self, text: &str) -> f64 {
-        text.chars().count() as f64 * self.size_px * if self.bold { 0.6 } else { 0.55 }
+        let em: f64 = text
+            .chars()
+            .map(|c| match c {
+                'i' | 'j' | 'l' | 'I' | '.' | ',' | ':' | '\'' | '|' => 0.27,
+                ' ' | 'f' | 't' | 'r' | '(' | ')' | '/' | '-' => 0.31,
+                'm' | 'w' | 'M' | 'W' => 0.83,
+                c if c.is_ascii_uppercase() => 0.70,
+                _ => 0.56,
+            })
+            .sum();
+        em * self.size_px * if self.bold { 1.12 } else { 1.05 }
     }
 }
 
@@ -98,11 +106,7 @@ pub(super) fn draw_to_file(
         failure: None,
     };
     canvas.rect((0.0, 0.0), (width_px, height_px), WHITE, 1.0);
-    canvas.text(
-        title,
-        (24.0, 28.0),
-        Type::new(TITLE_PX, INK, Align::Left).bold(),
-    );
+    canvas.text(title, (24.0, 28.0), Type::new(TITLE_PX, INK, Align::Left).bold());
     draw(&mut canvas);
     let presented = canvas.backend.present().map_err(|e| e.to_string());
     canvas.keep(presented);
@@ -159,11 +163,7 @@ impl Canvas<'_> {
     }
 
     /// A filled polygon.
-    pub(super) fn polygon(
-        &mut self,
-        points: impl IntoIterator<Item = (f64, f64)>,
-        colour: RGBColor,
-    ) {
+    pub(super) fn polygon(&mut self, points: impl IntoIterator<Item = (f64, f64)>, colour: RGBColor) {
         let points: Vec<(i32, i32)> = points.into_iter().map(fine).collect();
         let style = ShapeStyle::from(&colour).filled();
         let drawn = self.backend.fill_polygon(points, &style);

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::axis::Axis;
 use super::canvas::{Align, Canvas, Type, draw_to_file};
-use super::style::{BLUE, FAINT_INK, GREYED, GRID, INK, SHADE, TICK_PX, VERMILLION, significant};
+use super::style::{BLUE, FAINT_INK, GREYED, GRID, INK, SHADE, TICK_PX, VERMILLION, significant, trimmed};
 use crate::{Error, Result};
 
 /// One parameter of the table.
@@ -34,32 +34,52 @@ const WIDTH: f64 = 1200.0;
 const ROW: f64 = 22.0;
 const HEAD: f64 = 92.0;
 const NAME_X: f64 = 28.0;
-const UNIT_X: f64 = 148.0;
-const LOWER_X: f64 = 285.0;
-const TRACK: (f64, f64) = (300.0, 720.0);
+const TRACK_END: f64 = 720.0;
 const UPPER_X: f64 = 735.0;
 const SWARM_X: f64 = 900.0;
 const FITTED_X: f64 = 985.0;
 const TRUTH_X: f64 = 1172.0;
+
+/// The columns whose places follow from the lengths of the names and units.
+struct Layout {
+    unit_x: f64,
+    lower_x: f64,
+    track: (f64, f64),
+}
+
+impl Layout {
+    fn new(rows: &[ParameterRow<'_>]) -> Self {
+        let look = Type::new(TICK_PX + 0.5, INK, Align::Left);
+        let widest = |look: Type, text: &dyn Fn(&ParameterRow<'_>) -> f64| {
+            rows.iter().map(text).fold(look.width("parameter"), f64::max)
+        };
+        let names = widest(look.bold(), &|r| look.bold().width(r.name) + 20.0);
+        let units = widest(look, &|r| look.width(r.unit));
+        let unit_x = (NAME_X + names + 20.0).min(340.0);
+        let lower_x = (unit_x + units + 80.0).min(500.0);
+        Self {
+            unit_x,
+            lower_x,
+            track: (lower_x + 15.0, TRACK_END),
+        }
+    }
+
+    /// The pixel of a value, held to just outside the bounds so that an escaped one is seen as such.
+    fn place(&self, track: &Axis, value: f64) -> Option<f64> {
+        let x = track.at(value);
+        (!x.is_nan()).then(|| x.clamp(self.track.0 - 8.0, self.track.1 + 8.0))
+    }
+}
 
 /// Draws a table of parameters to an SVG file, each with its place between its bounds.
 ///
 /// # Errors
 /// [`Error::Input`] when there are no rows or more than 200, or when bounds are not a finite range;
 /// [`Error::Io`] when the file cannot be written.
-pub fn plot_parameters(
-    path: impl AsRef<Path>,
-    title: &str,
-    rows: &[ParameterRow<'_>],
-) -> Result<()> {
+pub fn plot_parameters(path: impl AsRef<Path>, title: &str, rows: &[ParameterRow<'_>]) -> Result<()> {
     let path = path.as_ref();
     if !(1..=200).contains(&rows.len()) {
-        return Err(Error::input(
-            path,
-            "rows",
-            rows.len().to_string(),
-            "1 to 200",
-        ));
+        return Err(Error::input(path, "rows", rows.len().to_string(), "1 to 200"));
     }
     for row in rows {
         let sound = row.lower.is_finite() && row.upper.is_finite() && row.lower < row.upper;
@@ -72,47 +92,44 @@ pub fn plot_parameters(
             ));
         }
     }
+    let layout = Layout::new(rows);
     let bottom = HEAD + ROW * rows.len() as f64;
     draw_to_file(path, (WIDTH, bottom + 48.0), title, |canvas| {
-        draw_head(canvas, rows);
+        draw_head(canvas, rows, &layout);
+        for i in (0..rows.len()).step_by(2) {
+            let y = HEAD + ROW * i as f64;
+            canvas.rect((16.0, y), (WIDTH - 16.0, y + ROW), SHADE, 0.6);
+        }
         for quarter in 0..=4 {
-            let x = TRACK.0 + f64::from(quarter) / 4.0 * (TRACK.1 - TRACK.0);
+            let x = layout.track.0 + f64::from(quarter) / 4.0 * (layout.track.1 - layout.track.0);
             canvas.line((x, HEAD), (x, bottom), GRID, 0.8);
         }
         for (i, row) in rows.iter().enumerate() {
             let y = HEAD + ROW * (i as f64 + 0.5);
-            if i % 2 == 0 {
-                let (a, b) = ((16.0, y - 0.5 * ROW), (WIDTH - 16.0, y + 0.5 * ROW));
-                canvas.rect(a, b, SHADE, 0.6);
-            }
-            draw_row(canvas, row, y);
+            draw_row(canvas, row, &layout, y);
         }
-        draw_key(canvas, rows, bottom + 24.0);
+        draw_key(canvas, rows, &layout, bottom + 24.0);
     })
 }
 
-fn draw_head(canvas: &mut Canvas<'_>, rows: &[ParameterRow<'_>]) {
+fn draw_head(canvas: &mut Canvas<'_>, rows: &[ParameterRow<'_>], layout: &Layout) {
     let head = |align| Type::new(TICK_PX + 1.0, INK, align).bold();
     let y = HEAD - 16.0;
     canvas.text("parameter", (NAME_X, y), head(Align::Left));
-    canvas.text("unit", (UNIT_X, y), head(Align::Left));
-    canvas.text("lower", (LOWER_X, y), head(Align::Right));
-    let middle = 0.5 * (TRACK.0 + TRACK.1);
+    canvas.text("unit", (layout.unit_x, y), head(Align::Left));
+    canvas.text("lower", (layout.lower_x, y), head(Align::Right));
+    let middle = 0.5 * (layout.track.0 + layout.track.1);
     canvas.text("place between the bounds", (middle, y), head(Align::Centre));
     canvas.text("upper", (UPPER_X, y), head(Align::Left));
     canvas.text("swarm", (SWARM_X, y), head(Align::Right));
-    canvas.text(
-        "fitted \u{00b1} std. error",
-        (FITTED_X, y),
-        head(Align::Centre),
-    );
+    canvas.text("fitted \u{00b1} std. error", (FITTED_X, y), head(Align::Centre));
     if rows.iter().any(|r| r.truth.is_some()) {
         canvas.text("truth", (TRUTH_X, y), head(Align::Right));
     }
     canvas.line((16.0, HEAD - 2.0), (WIDTH - 16.0, HEAD - 2.0), INK, 1.0);
 }
 
-fn draw_row(canvas: &mut Canvas<'_>, row: &ParameterRow<'_>, y: f64) {
+fn draw_row(canvas: &mut Canvas<'_>, row: &ParameterRow<'_>, layout: &Layout, y: f64) {
     let (ink, quiet) = if row.identifiable {
         (INK, FAINT_INK)
     } else {
@@ -125,40 +142,41 @@ fn draw_row(canvas: &mut Canvas<'_>, row: &ParameterRow<'_>, y: f64) {
         format!("{} \u{2715}", row.name)
     };
     canvas.text(&name, (NAME_X, y), cell(ink, Align::Left).bold());
-    canvas.text(row.unit, (UNIT_X, y), cell(quiet, Align::Left));
-    let lower = significant(row.lower, 4);
-    canvas.text(&lower, (LOWER_X, y), cell(quiet, Align::Right));
-    let upper = significant(row.upper, 4);
+    canvas.text(row.unit, (layout.unit_x, y), cell(quiet, Align::Left));
+    let lower = trimmed(row.lower, 4);
+    canvas.text(&lower, (layout.lower_x, y), cell(quiet, Align::Right));
+    let upper = trimmed(row.upper, 4);
     canvas.text(&upper, (UPPER_X, y), cell(quiet, Align::Left));
     let swarm = significant(row.swarm, 4);
     canvas.text(&swarm, (SWARM_X, y), cell(ink, Align::Right));
     if row.identifiable {
         // The sign in the middle of the column lines up the figures on both sides.
-        let fitted = significant(row.fitted, 5);
-        let error = row
-            .standard_error
-            .map_or("\u{2013}".to_owned(), |e| significant(e, 2));
-        canvas.text("\u{00b1}", (FITTED_X + 14.0, y), cell(quiet, Align::Centre));
+        let error = row.standard_error.filter(|e| e.is_finite() && *e > 0.0);
+        let fitted = error.map_or(significant(row.fitted, 4), |e| to_error(row.fitted, e));
         canvas.text(&fitted, (FITTED_X + 4.0, y), cell(ink, Align::Right));
-        canvas.text(&error, (FITTED_X + 24.0, y), cell(quiet, Align::Left));
+        if let Some(error) = error {
+            let text = significant(error, 2);
+            canvas.text("\u{00b1}", (FITTED_X + 14.0, y), cell(quiet, Align::Centre));
+            canvas.text(&text, (FITTED_X + 24.0, y), cell(quiet, Align::Left));
+        }
     } else {
         let at = (FITTED_X + 14.0, y);
         canvas.text("not identifiable", at, cell(GREYED, Align::Centre));
     }
     if let Some(truth) = row.truth {
-        let text = significant(truth, 5);
+        let text = trimmed(truth, 5);
         canvas.text(&text, (TRUTH_X, y), cell(quiet, Align::Right));
     }
 
-    let track = Axis::linear((row.lower, row.upper), TRACK);
-    canvas.line((TRACK.0, y), (TRACK.1, y), GREYED, 0.8);
-    for end in [TRACK.0, TRACK.1] {
+    let track = Axis::linear((row.lower, row.upper), layout.track);
+    canvas.line((layout.track.0, y), (layout.track.1, y), GREYED, 0.8);
+    for end in [layout.track.0, layout.track.1] {
         canvas.line((end, y - 4.0), (end, y + 4.0), GREYED, 0.8);
     }
-    if let Some(x) = row.truth.and_then(|t| place(&track, t)) {
+    if let Some(x) = row.truth.and_then(|t| layout.place(&track, t)) {
         canvas.line((x, y - 8.0), (x, y + 8.0), VERMILLION, 1.8);
     }
-    if let Some(x) = place(&track, row.swarm) {
+    if let Some(x) = layout.place(&track, row.swarm) {
         canvas.ring((x, y), 4.0, ink, 1.2);
     }
     if !row.identifiable {
@@ -166,8 +184,8 @@ fn draw_row(canvas: &mut Canvas<'_>, row: &ParameterRow<'_>, y: f64) {
     }
     let error = row.standard_error.filter(|e| e.is_finite()).unwrap_or(0.0);
     let whisker = (
-        place(&track, row.fitted - error),
-        place(&track, row.fitted + error),
+        layout.place(&track, row.fitted - error),
+        layout.place(&track, row.fitted + error),
     );
     if let (Some(a), Some(b)) = whisker
         && error > 0.0
@@ -177,26 +195,31 @@ fn draw_row(canvas: &mut Canvas<'_>, row: &ParameterRow<'_>, y: f64) {
             canvas.line((end, y - 4.0), (end, y + 4.0), BLUE, 1.4);
         }
     }
-    if let Some(x) = place(&track, row.fitted) {
+    if let Some(x) = layout.place(&track, row.fitted) {
         canvas.dot((x, y), 3.6, BLUE, 1.0);
     }
 }
 
-/// The pixel of a value, held to just outside the bounds so that an escaped one is seen as such.
-fn place(track: &Axis, value: f64) -> Option<f64> {
-    let x = track.at(value);
-    (!x.is_nan()).then(|| x.clamp(TRACK.0 - 8.0, TRACK.1 + 8.0))
+/// A value with as many decimals as its standard error is shown with.
+fn to_error(value: f64, error: f64) -> String {
+    let shown = significant(error, 2);
+    let tiny_or_huge = |x: f64| x != 0.0 && !(1e-4..1e6).contains(&x.abs());
+    if tiny_or_huge(value) || tiny_or_huge(error) {
+        return significant(value, 5);
+    }
+    let decimals = shown.split_once('.').map_or(0, |(_, d)| d.len());
+    format!("{value:.decimals$}").replace('-', "\u{2212}")
 }
 
-fn draw_key(canvas: &mut Canvas<'_>, rows: &[ParameterRow<'_>], y: f64) {
+fn draw_key(canvas: &mut Canvas<'_>, rows: &[ParameterRow<'_>], layout: &Layout, y: f64) {
     let look = Type::new(TICK_PX, FAINT_INK, Align::Left);
-    canvas.ring((TRACK.0 + 4.0, y), 4.0, INK, 1.2);
-    canvas.text("swarm", (TRACK.0 + 16.0, y), look);
-    let x = TRACK.0 + 84.0;
+    canvas.ring((layout.track.0 + 4.0, y), 4.0, INK, 1.2);
+    canvas.text("swarm", (layout.track.0 + 16.0, y), look);
+    let x = layout.track.0 + 84.0;
     canvas.line((x - 10.0, y), (x + 10.0, y), BLUE, 2.2);
     canvas.dot((x, y), 3.6, BLUE, 1.0);
     canvas.text("fitted \u{00b1} std. error", (x + 18.0, y), look);
-    let x = TRACK.0 + 254.0;
+    let x = layout.track.0 + 254.0;
     if rows.iter().any(|r| r.truth.is_some()) {
         canvas.line((x, y - 8.0), (x, y + 8.0), VERMILLION, 1.8);
         canvas.text("truth", (x + 10.0, y), look);

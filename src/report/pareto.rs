@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::axis::{Axis, Labels, Plot, extent};
 use super::canvas::{Align, Canvas, Type, draw_to_file};
-use super::style::{BLUE, FAINT_INK, INK, LABEL_PX, TICK_PX, VERMILLION, significant, with_unit};
+use super::style::{BLUE, INK, TICK_PX, VERMILLION, significant, with_unit};
 use crate::{Error, Result};
 
 /// One objective, to be made small.
@@ -32,9 +32,8 @@ pub fn plot_pareto(
 ) -> Result<()> {
     let path = path.as_ref();
     let n = objectives.len();
-    let refuse = |place: String, found: String, expected: &str| {
-        Err(Error::input(path, place, found, expected))
-    };
+    let refuse =
+        |place: String, found: String, expected: &str| Err(Error::input(path, place, found, expected));
     if !(2..=6).contains(&n) {
         return refuse("objectives".into(), n.to_string(), "2 to 6");
     }
@@ -50,15 +49,9 @@ pub fn plot_pareto(
         .iter()
         .filter(|p| p.iter().all(|v| v.is_finite()))
         .collect();
-    let ranges: Option<Vec<(f64, f64)>> = (0..n)
-        .map(|k| extent(finite.iter().map(|p| &p[k])))
-        .collect();
+    let ranges: Option<Vec<(f64, f64)>> = (0..n).map(|k| extent(finite.iter().map(|p| &p[k]))).collect();
     let Some(ranges) = ranges else {
-        return refuse(
-            "points".into(),
-            "none that is finite".into(),
-            "at least one",
-        );
+        return refuse("points".into(), "none that is finite".into(), "at least one");
     };
     let mark = chosen.map(|c| &points[c]).filter(|p| finite.contains(p));
     let archive = Archive {
@@ -73,25 +66,24 @@ pub fn plot_pareto(
             archive.legend(canvas, 1170.0);
         })
     } else {
-        let cell = (960.0 / n as f64).clamp(170.0, 320.0);
-        let (left, top) = (100.0, 70.0);
-        let size = (left + cell * n as f64 + 20.0, top + cell * n as f64 + 50.0);
+        // The lower triangle holds every pair once; the legend stands in the empty half.
+        let cells = n - 1;
+        let cell = (1000.0 / cells as f64).clamp(200.0, 420.0);
+        let (left, top) = (100.0, 60.0);
+        let side = cell * cells as f64;
+        let size = (left + side + 20.0, top + side + 50.0);
         draw_to_file(path, size, title, |canvas| {
-            for (row, column) in (0..n).flat_map(|r| (0..=r).map(move |c| (r, c))) {
+            for (row, column) in (0..cells).flat_map(|r| (0..=r).map(move |c| (r, c))) {
                 let x = left + cell * column as f64;
                 let y = top + cell * row as f64;
-                if row == column {
-                    archive.name(canvas, row, (x + 0.5 * cell, y + 0.5 * cell));
-                    continue;
-                }
                 let axes = Axes::Edges {
-                    below: row + 1 == n,
+                    below: row + 1 == cells,
                     beside: column == 0,
                 };
                 let (across, up) = ((x + 6.0, x + cell - 6.0), (y + cell - 6.0, y + 6.0));
-                archive.scatter(canvas, (column, row), across, up, axes);
+                archive.scatter(canvas, (column, row + 1), across, up, axes);
             }
-            archive.legend(canvas, size.0 - 20.0);
+            archive.legend(canvas, size.0 - 26.0);
         })
     }
 }
@@ -153,24 +145,6 @@ impl Archive<'_> {
             canvas.dot(at, radius + 1.0, VERMILLION, 1.0);
             canvas.ring(at, radius + 5.0, VERMILLION, 1.6);
         }
-    }
-
-    fn name(&self, canvas: &mut Canvas<'_>, k: usize, (x, y): (f64, f64)) {
-        let objective = self.objectives[k];
-        let look = Type::new(LABEL_PX, INK, Align::Centre);
-        canvas.text(objective.name, (x, y - 12.0), look.bold());
-        let (low, high) = self.ranges[k];
-        let range = format!(
-            "{} to {} {}",
-            significant(low, 3),
-            significant(high, 3),
-            objective.unit
-        );
-        canvas.text(
-            range.trim_end(),
-            (x, y + 10.0),
-            Type::new(TICK_PX, FAINT_INK, Align::Centre),
-        );
     }
 
     fn legend(&self, canvas: &mut Canvas<'_>, right: f64) {

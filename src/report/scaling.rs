@@ -23,11 +23,7 @@ pub struct ScalingSeries<'a> {
 /// # Errors
 /// [`Error::Input`] when lengths differ or no series has a positive pair; [`Error::Io`] when the
 /// file cannot be written.
-pub fn plot_scaling(
-    path: impl AsRef<Path>,
-    title: &str,
-    series: &[ScalingSeries<'_>],
-) -> Result<()> {
+pub fn plot_scaling(path: impl AsRef<Path>, title: &str, series: &[ScalingSeries<'_>]) -> Result<()> {
     let path = path.as_ref();
     for one in series {
         let (n, found) = (one.population.len(), one.evaluations_per_s.len());

@@ -13,6 +13,7 @@ pub(super) const INK: RGBColor = RGBColor(34, 34, 34);
 pub(super) const FAINT_INK: RGBColor = RGBColor(110, 110, 110);
 pub(super) const GREYED: RGBColor = RGBColor(165, 165, 165);
 pub(super) const GRID: RGBColor = RGBColor(228, 228, 228);
+pub(super) const MINOR_GRID: RGBColor = RGBColor(243, 243, 243);
 pub(super) const FRAME: RGBColor = RGBColor(150, 150, 150);
 pub(super) const SHADE: RGBColor = RGBColor(238, 243, 248);
 pub(super) const WHITE: RGBColor = RGBColor(255, 255, 255);
@@ -37,13 +38,13 @@ pub(super) fn series_colour(n: usize) -> RGBColor {
 pub(super) fn viridis(share: f64) -> RGBColor {
     const STOPS: [[f64; 3]; 9] = [
         [68.0, 1.0, 84.0],
-        [72.0, 40.0, 120.0],
-        [62.0, 74.0, 137.0],
-        [49.0, 104.0, 142.0],
-        [38.0, 130.0, 142.0],
-        [31.0, 158.0, 137.0],
-        [53.0, 183.0, 121.0],
-        [109.0, 205.0, 89.0],
+        [71.0, 44.0, 122.0],
+        [59.0, 81.0, 139.0],
+        [44.0, 113.0, 142.0],
+        [33.0, 144.0, 141.0],
+        [39.0, 173.0, 129.0],
+        [92.0, 200.0, 99.0],
+        [170.0, 220.0, 50.0],
         [253.0, 231.0, 37.0],
     ];
     let place = share.clamp(0.0, 1.0) * (STOPS.len() - 1) as f64;
@@ -75,6 +76,16 @@ pub(super) fn significant(x: f64, figures: usize) -> String {
         format!("{digits}\u{00d7}{}", power_of_ten(exponent))
     };
     text.replace('-', "\u{2212}")
+}
+
+/// As [`significant`], without noughts that only fill up the figures.
+pub(super) fn trimmed(x: f64, figures: usize) -> String {
+    let text = significant(x, figures);
+    if text.contains('.') && !text.contains('\u{00d7}') {
+        text.trim_end_matches('0').trim_end_matches('.').to_owned()
+    } else {
+        text
+    }
 }
 
 /// A power of ten with a raised exponent.

@@ -130,9 +130,7 @@ pub fn text_table(columns: &[Column<'_>]) -> String {
         .iter()
         .map(|c| {
             let body = (0..rows).map(|row| c.short(row));
-            std::iter::once(printable(&c.header()))
-                .chain(body)
-                .collect()
+            std::iter::once(printable(&c.header())).chain(body).collect()
         })
         .collect();
     let widths: Vec<usize> = cells
@@ -140,16 +138,20 @@ pub fn text_table(columns: &[Column<'_>]) -> String {
         .map(|column| column.iter().map(|c| c.chars().count()).max().unwrap_or(0))
         .collect();
     let mut text = String::new();
+    if columns.is_empty() {
+        return text;
+    }
     let mut push_line = |line: String| {
         text.push_str(line.trim_end());
         text.push('\n');
     };
-    for row in 0..if columns.is_empty() { 0 } else { rows + 1 } {
+    // The header is the row before the first.
+    for row in 0..=rows {
         let line: Vec<String> = columns
             .iter()
-            .enumerate()
-            .map(|(i, column)| {
-                let (cell, width) = (&cells[i][row], widths[i]);
+            .zip(cells.iter().zip(&widths))
+            .map(|(column, (cells, &width))| {
+                let cell = &cells[row];
                 match column.cells {
                     Cells::Numbers(_) => format!("{cell:>width$}"),
                     Cells::Texts(_) => format!("{cell:<width$}"),

@@ -86,9 +86,8 @@ pub fn plot_traces(path: impl AsRef<Path>, figure: &TraceFigure<'_>) -> Result<(
 }
 
 fn check(path: &Path, figure: &TraceFigure<'_>) -> Result<(f64, f64)> {
-    let refuse = |place: String, found: String, expected: &str| {
-        Err(Error::input(path, place, found, expected))
-    };
+    let refuse =
+        |place: String, found: String, expected: &str| Err(Error::input(path, place, found, expected));
     let panels = figure.panels.len();
     if !(1..=12).contains(&panels) {
         return refuse("panels".into(), format!("{panels} panels"), "1 to 12");
@@ -165,11 +164,7 @@ fn draw_panel(
         .map(|(f, m)| f - m)
         .collect();
     let name = Type::new(LABEL_PX, INK, Align::Left).bold();
-    canvas.text(
-        &with_unit(panel.label, panel.unit),
-        (LEFT, top - 11.0),
-        name,
-    );
+    canvas.text(&with_unit(panel.label, panel.unit), (LEFT, top - 11.0), name);
     canvas.text(
         &rms_text(&errors, panel.unit),
         (RIGHT, top - 11.0),
@@ -189,23 +184,17 @@ fn draw_panel(
     };
     curves.draw_axes(canvas, labels);
     let over = |values: &'_ [f64]| -> Vec<(f64, f64)> {
-        figure
-            .x
-            .iter()
-            .copied()
-            .zip(values.iter().copied())
-            .collect()
+        figure.x.iter().copied().zip(values.iter().copied()).collect()
     };
     let measured = over(panel.measured).into_iter();
     curves.curve(canvas, measured, GREYED, MEASURED_PX);
     let fitted = over(panel.fitted).into_iter();
     curves.curve(canvas, fitted, BLUE, FITTED_PX);
 
-    let largest = extent(&errors).map_or(1.0, |(low, high)| low.abs().max(high.abs()));
-    let largest = if largest > 0.0 { largest } else { 1.0 };
+    let largest = extent(&errors).map_or(0.0, |(low, high)| low.abs().max(high.abs()));
     let error = Plot {
         x,
-        y: Axis::padded((-largest, largest), 0.08, (error_bottom, error_top)),
+        y: Axis::around_zero(largest, (error_bottom, error_top)),
     };
     error.draw_axes(
         canvas,

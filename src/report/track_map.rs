@@ -7,9 +7,7 @@ use plotters::style::RGBColor;
 
 use super::axis::{Axis, extent};
 use super::canvas::{Align, Canvas, Type, draw_to_file};
-use super::style::{
-    FAINT_INK, FRAME, GREYED, INK, LABEL_PX, TICK_PX, TITLE_PX, viridis, with_unit,
-};
+use super::style::{FAINT_INK, FRAME, GREYED, INK, LABEL_PX, TICK_PX, TITLE_PX, viridis, with_unit};
 use crate::{Error, Result};
 
 /// A circuit and what to colour it by.
@@ -39,8 +37,9 @@ pub struct TrackMap<'a> {
 const ROOM: (f64, f64) = (120.0, 40.0);
 const TOP: f64 = 52.0;
 const BAR_ROOM: f64 = 120.0;
-const LINE_PX: f64 = 4.0;
+const LINE_PX: f64 = 3.4;
 const ROAD: RGBColor = RGBColor(232, 232, 232);
+const EDGE: RGBColor = RGBColor(120, 120, 120);
 /// Steps of colour: finer ones cannot be told apart and only make the file longer.
 const SHADES: f64 = 64.0;
 
@@ -93,9 +92,7 @@ pub fn plot_track_map(path: impl AsRef<Path>, map: &TrackMap<'_>) -> Result<()> 
     let room = DVec2::new(1200.0 - BAR_ROOM - 2.0 * ROOM.0, 900.0 - TOP - 2.0 * ROOM.1);
     let px_per_m = (room.x / size.x.max(1e-9)).min(room.y / size.y.max(1e-9));
     let drawn = size * px_per_m;
-    let title = Type::new(TITLE_PX, INK, Align::Left)
-        .bold()
-        .width(map.title);
+    let title = Type::new(TITLE_PX, INK, Align::Left).bold().width(map.title);
     let width = (drawn.x + 2.0 * ROOM.0 + BAR_ROOM)
         .max(title + 48.0)
         .max(640.0)
@@ -112,14 +109,8 @@ pub fn plot_track_map(path: impl AsRef<Path>, map: &TrackMap<'_>) -> Result<()> 
         draw_road(canvas, map, &view);
         draw_line(canvas, map, &view, range);
         let start = draw_start(canvas, map, &view);
-        draw_names(
-            canvas,
-            map,
-            &view,
-            start,
-            DVec2::new(width - BAR_ROOM, height),
-        );
-        draw_scale(canvas, &view, size.x, height);
+        draw_names(canvas, map, &view, start, DVec2::new(width - BAR_ROOM, height));
+        draw_scale(canvas, &view, size.max_element(), height);
         if let Some(range) = range {
             let bar = (width - BAR_ROOM + 24.0, height);
             draw_colour_bar(canvas, map, range, bar);
@@ -157,7 +148,7 @@ fn draw_road(canvas: &mut Canvas<'_>, map: &TrackMap<'_>, view: &View) {
         canvas.polygon(around, ROAD);
     }
     for edge in left.iter().chain(&right) {
-        canvas.path(edge.iter().copied(), FRAME, 0.9);
+        canvas.path(edge.iter().copied(), EDGE, 0.9);
     }
 }
 
@@ -199,9 +190,7 @@ fn draw_line(canvas: &mut Canvas<'_>, map: &TrackMap<'_>, view: &View, range: Op
         if run.is_empty() {
             run.push((a.x, a.y));
         }
-        let far = run
-            .last()
-            .is_some_and(|l| b.distance(DVec2::from(*l)) >= 0.8);
+        let far = run.last().is_some_and(|l| b.distance(DVec2::from(*l)) >= 0.8);
         if far || i + 1 == steps {
             run.push((b.x, b.y));
         }
@@ -275,23 +264,23 @@ fn draw_names(
     });
     let mut taken: Vec<Block> = arrow.into_iter().collect();
     let look = Type::new(LABEL_PX, INK, Align::Centre);
-    let named = map
-        .names
-        .iter()
-        .map(|&(name, place)| (name, view.at(place)));
+    let named = map.names.iter().map(|&(name, place)| (name, view.at(place)));
     let first = start.map(|[at, _]| ("start", at));
-    for (name, place) in first.into_iter().chain(named) {
+    let all: Vec<(&str, DVec2)> = first.into_iter().chain(named).collect();
+    let places: Vec<DVec2> = all.iter().map(|(_, place)| *place).collect();
+    for (name, place) in all {
         if !place.is_finite() || name.is_empty() {
             continue;
         }
         let half = 0.5 * DVec2::new(look.width(name), LABEL_PX + 2.0);
-        let Some(block) = best_place(place, half, &road, &taken, limits) else {
+        let Some(block) = best_place(place, half, &road, &places, &taken, limits) else {
             continue;
         };
         let near = place.clamp(block.centre - block.half, block.centre + block.half);
         if near.distance(place) > 26.0 {
-            let from = place + (near - place).normalize_or_zero() * 8.0;
-            canvas.line((from.x, from.y), (near.x, near.y), FRAME, 0.8);
+            let way = (near - place).normalize_or_zero();
+            let (from, to) = (place + way * 8.0, near - way * 3.0);
+            canvas.line((from.x, from.y), (to.x, to.y), FRAME, 0.8);
         }
         canvas.text(name, (block.centre.x, block.centre.y), look);
         taken.push(block);
@@ -302,21 +291,20 @@ fn best_place(
     place: DVec2,
     half: DVec2,
     road: &[DVec2],
+    places: &[DVec2],
     taken: &[Block],
     limits: DVec2,
 ) -> Option<Block> {
     const CLEAR: f64 = 10.0;
-    let candidates = [12.0, 20.0, 30.0, 45.0, 65.0, 90.0]
-        .into_iter()
-        .flat_map(|far| {
-            (0..24).map(move |turn| {
-                let way = DVec2::from_angle(f64::from(turn) * std::f64::consts::TAU / 24.0);
-                // The nearest side of the box, not its centre, keeps the distance.
-                let reach = far + (way.x * half.x).abs().max((way.y * half.y).abs());
-                let centre = place + way * reach;
-                (far, Block { centre, half })
-            })
-        });
+    let candidates = [12.0, 20.0, 30.0, 45.0, 65.0, 90.0].into_iter().flat_map(|far| {
+        (0..24).map(move |turn| {
+            let way = DVec2::from_angle(f64::from(turn) * std::f64::consts::TAU / 24.0);
+            // The nearest side of the box, not its centre, keeps the distance.
+            let reach = far + (way.x * half.x).abs().max((way.y * half.y).abs());
+            let centre = place + way * reach;
+            (far, Block { centre, half })
+        })
+    });
     candidates
         .filter(|(_, block)| {
             let (a, b) = (block.centre - block.half, block.centre + block.half);
@@ -325,7 +313,13 @@ fn best_place(
         .map(|(far, block)| {
             let covered = road.iter().filter(|&&p| block.gap(p) < CLEAR).count();
             let clashes = taken.iter().filter(|t| t.overlaps(&block)).count();
-            (far + 20.0 * covered as f64 + 1000.0 * clashes as f64, block)
+            // A name nearer to another part of the lap would be read as that part's.
+            let own = block.gap(place);
+            let nearer = |p: &&DVec2| p.distance(place) > 60.0 && block.gap(**p) < own;
+            let astray = places.iter().chain(road).any(|p| nearer(&p));
+            let cost =
+                far + 20.0 * covered as f64 + if astray { 25.0 } else { 0.0 } + 1000.0 * clashes as f64;
+            (cost, block)
         })
         .min_by(|a, b| a.0.total_cmp(&b.0))
         .filter(|(cost, _)| *cost < 1000.0)
@@ -333,8 +327,8 @@ fn best_place(
 }
 
 /// A bar of a round length, for judging distances.
-fn draw_scale(canvas: &mut Canvas<'_>, view: &View, width_m: f64, height: f64) {
-    let most = (0.25 * width_m).max(60.0 / view.px_per_m);
+fn draw_scale(canvas: &mut Canvas<'_>, view: &View, extent_m: f64, height: f64) {
+    let most = 0.3 * extent_m;
     let decade = 10f64.powf(most.log10().floor());
     let length = [5.0, 2.0, 1.0]
         .into_iter()
@@ -364,7 +358,7 @@ fn draw_colour_bar(
     let (top, bottom) = (TOP + 40.0, height - 50.0);
     let right = left + 16.0;
     let axis = Axis::linear(range, (bottom, top));
-    let slices = SHADES as u32;
+    let slices = 2 * SHADES as u32;
     for i in 0..slices {
         let edge = |k: u32| bottom + (top - bottom) * f64::from(k) / f64::from(slices);
         let colour = viridis((f64::from(i) + 0.5) / f64::from(slices));
@@ -376,11 +370,7 @@ fn draw_colour_bar(
     for (value, label) in axis.ticks(8) {
         let y = axis.at(value);
         canvas.line((right, y), (right + 4.0, y), INK, 0.8);
-        canvas.text(
-            &label,
-            (right + 8.0, y),
-            Type::new(TICK_PX, INK, Align::Left),
-        );
+        canvas.text(&label, (right + 8.0, y), Type::new(TICK_PX, INK, Align::Left));
     }
     let text = with_unit(map.value_label, map.value_unit);
     let look = Type::new(LABEL_PX, INK, Align::Centre);

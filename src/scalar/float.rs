@@ -63,6 +63,10 @@ impl Real for f64 {
         self.cos()
     }
     #[inline(always)]
+    fn tan(self) -> Self {
+        self.tan()
+    }
+    #[inline(always)]
     fn atan(self) -> Self {
         self.atan()
     }

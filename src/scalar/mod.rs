@@ -8,8 +8,10 @@ mod dual;
 pub mod elementary;
 mod float;
 pub mod lanes;
+mod pair;
 
 pub use dual::Dual;
+pub use pair::Pair;
 
 use std::fmt::Debug;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
@@ -53,6 +55,8 @@ pub trait Real:
     fn sin(self) -> Self;
     /// Cosine of an angle in radians.
     fn cos(self) -> Self;
+    /// Tangent of an angle in radians.
+    fn tan(self) -> Self;
     /// Inverse tangent, radians.
     fn atan(self) -> Self;
     /// Natural exponential.

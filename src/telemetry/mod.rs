@@ -1,1 +1,44 @@
-//! telemetry
+//! Logged laps: reading them, bringing them to SI and ISO 8855 signs, and checking that they can be believed.
+//!
+//! [`Recording`] holds a file as it was logged: named channels, each with its own unit and clock. [`ChannelMap`]
+//! says which of them plays which [`Role`]. [`Log`] is what an identification works on: the eleven channels it needs,
+//! on one uniform clock, calibrated, cut into laps.
+//!
+//! ```no_run
+//! use lapswarm::telemetry::{ChannelMap, Log, LogOptions};
+//!
+//! let map = ChannelMap::read("car.toml")?;
+//! let log = Log::read("outing.csv", &map, &LogOptions::default())?;
+//! println!("{} samples, {} laps", log.samples(), log.laps.len());
+//! # Ok::<(), lapswarm::Error>(())
+//! ```
+
+mod audit;
+mod build;
+mod calibrate;
+mod channel_map;
+mod csv_native;
+mod delays;
+mod derived;
+mod laps;
+mod log;
+mod motec_csv;
+mod motec_ld;
+mod recording;
+mod resample;
+mod role;
+mod statistics;
+#[cfg(test)]
+mod synthetic;
+mod table;
+mod text;
+mod units;
+
+pub use calibrate::{Calibration, CalibrationOptions, Finding, FindingKind, Switch};
+pub use channel_map::{Axle, ChannelEntry, ChannelMap, Mapped};
+pub use csv_native::{COLUMNS, NativeFormat, write_native};
+pub use laps::Lap;
+pub use log::{Log, LogOptions};
+pub use recording::{Channel, Clock, Format, Metadata, Recording, Unreadable};
+pub use role::Role;
+pub use units::{Quantity, Unit};

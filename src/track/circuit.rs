@@ -133,11 +133,7 @@ impl Circuit {
         }
         let wrapped = station_m.rem_euclid(self.length_m);
         // rem_euclid rounds to the length itself for stations a hair below nought.
-        if wrapped >= self.length_m {
-            0.0
-        } else {
-            wrapped
-        }
+        if wrapped >= self.length_m { 0.0 } else { wrapped }
     }
 
     fn locate(&self, station_m: f64) -> Place {
@@ -195,8 +191,7 @@ impl Circuit {
         let (heading, curvature) = (self.heading_rad[at.before], self.curvature_1pm[at.before]);
         let slope = self.slope(&at);
         Frame {
-            position_m: self.centreline_m[at.before]
-                + displacement(heading, curvature, slope, at.past_m),
+            position_m: self.centreline_m[at.before] + displacement(heading, curvature, slope, at.past_m),
             heading_rad: heading + at.past_m * (curvature + 0.5 * slope * at.past_m),
             curvature_1pm: curvature + slope * at.past_m,
         }

@@ -296,10 +296,7 @@ impl CurvatureTable {
         let lap = &original.position[..curvature.len()];
         let centre = lap.iter().sum::<DVec2>() / n;
         let size = (lap.iter().map(|p| p.distance_squared(centre)).sum::<f64>() / n).sqrt();
-        let kernels: Vec<DVec3> = lap
-            .iter()
-            .map(|&p| ((p - centre) / size).extend(1.0))
-            .collect();
+        let kernels: Vec<DVec3> = lap.iter().map(|&p| ((p - centre) / size).extend(1.0)).collect();
         let table = curvature.to_vec();
         let mut line = run(curvature);
         let mut change = DVec3::ZERO;
@@ -320,8 +317,7 @@ impl CurvatureTable {
             let mut sensitivity = DMat3::ZERO;
             for (kernel, &p) in kernels.iter().zip(&line.position) {
                 let moves = (end - p).perp().extend(1.0) * spacing;
-                sensitivity +=
-                    DMat3::from_cols(moves * kernel.x, moves * kernel.y, moves * kernel.z);
+                sensitivity += DMat3::from_cols(moves * kernel.x, moves * kernel.y, moves * kernel.z);
             }
             change -= sensitivity.inverse() * miss;
             for ((k, &k0), kernel) in curvature.iter_mut().zip(&table).zip(&kernels) {

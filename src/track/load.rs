@@ -7,7 +7,7 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use super::circuit::{Circuit, Section};
-use super::from_curvature::{CurvatureRow, CurvatureTable};
+use super::from_curvature::{Closure, CurvatureRow, CurvatureTable};
 use crate::{Error, Result};
 
 /// A circuit embedded in the crate: name, TOML and curvature table.
@@ -96,16 +96,15 @@ impl Circuit {
     /// [`Error::Io`] when a file cannot be read; [`Error::Input`] with the file, line and field when
     /// something in it is unknown, missing or out of range.
     pub fn load(path: impl AsRef<Path>) -> Result<Self> {
-        Ok(CurvatureTable::load(path.as_ref())?.0)
+        Ok(Self::load_with_closure(path)?.0)
     }
-}
 
-impl CurvatureTable {
-    /// Reads what [`Circuit::load`] reads and returns the circuit with what closing it took.
+    /// As [`Circuit::load`], with what closing the lap took.
     ///
     /// # Errors
     /// As [`Circuit::load`].
-    pub fn load(path: &Path) -> Result<(Circuit, super::Closure)> {
+    pub fn load_with_closure(path: impl AsRef<Path>) -> Result<(Self, Closure)> {
+        let path = path.as_ref();
         let read = |p: &Path| std::fs::read_to_string(p).map_err(|e| Error::io(p, "read", e));
         let toml_file = path.display().to_string();
         let text = read(path)?;
@@ -122,7 +121,7 @@ impl CurvatureTable {
 }
 
 /// Builds, naming the table's file where the library names the circuit.
-fn build(table: &CurvatureTable, table_file: &str) -> Result<(Circuit, super::Closure)> {
+fn build(table: &CurvatureTable, table_file: &str) -> Result<(Circuit, Closure)> {
     table.build().map_err(|error| match error {
         Error::Input {
             place,
@@ -176,12 +175,7 @@ impl Checker<'_> {
         if x >= low && x <= high {
             Ok(x)
         } else {
-            Err(self.refuse(
-                value.span(),
-                field,
-                x.to_string(),
-                &format!("{low} to {high}"),
-            ))
+            Err(self.refuse(value.span(), field, x.to_string(), &format!("{low} to {high}")))
         }
     }
 }
@@ -198,9 +192,10 @@ fn assemble(
         text,
     };
     let length_m = check.within(&file.length_m, "length_m", 10.0, 200_000.0)?;
-    let heading = file.start_heading_deg.as_ref().map_or(Ok(0.0), |h| {
-        check.within(h, "start_heading_deg", -360.0, 360.0)
-    })?;
+    let heading = file
+        .start_heading_deg
+        .as_ref()
+        .map_or(Ok(0.0), |h| check.within(h, "start_heading_deg", -360.0, 360.0))?;
     let width_m = file
         .width_m
         .as_ref()
@@ -230,11 +225,7 @@ fn assemble(
                 "a name that no other section has",
             ));
         }
-        sections.push(Section {
-            name,
-            start_m,
-            end_m,
-        });
+        sections.push(Section { name, start_m, end_m });
     }
     Ok(CurvatureTable {
         rows: parse_table(table_file, csv, length_m, file.closed, width_m)?,
@@ -342,10 +333,7 @@ fn parse_table(
             curvature_1pm: number(curvature, (-1.0, 1.0))?,
             width_left_m: width(left)?,
             width_right_m: width(right)?,
-            corner: corner
-                .and_then(|c| record.get(c))
-                .unwrap_or_default()
-                .to_owned(),
+            corner: corner.and_then(|c| record.get(c)).unwrap_or_default().to_owned(),
         };
         let fits = match rows.last() {
             None => row.station_m == 0.0,

@@ -37,7 +37,7 @@ fn silverstone_closes_and_stays_consistent() {
 #[test]
 fn closing_silverstone_takes_little() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/circuits/silverstone_gp.toml");
-    let (circuit, closure) = CurvatureTable::load(&path).expect("the bundled file loads");
+    let (circuit, closure) = Circuit::load_with_closure(&path).expect("the bundled file loads");
     println!("{closure:?}");
     assert_eq!(circuit, silverstone());
     assert!(closure.gap_m < 5.0);
@@ -64,11 +64,7 @@ fn circles_have_their_radius_either_way_round() {
         } else {
             c.right_edge()
         };
-        assert!(
-            inner
-                .iter()
-                .all(|p| (p.distance(centre) - 44.0).abs() < 1e-9)
-        );
+        assert!(inner.iter().all(|p| (p.distance(centre) - 44.0).abs() < 1e-9));
     }
 }
 
@@ -96,18 +92,14 @@ fn corners_and_sections_are_found_by_name() {
     let c = silverstone();
     assert_eq!(c.corners.len(), 15);
     assert_eq!(c.corners[0].name, "Abbey");
-    for name in [
-        "Luffield", "luff", "LUFFIELD", "becketts", "the loop", "Village",
-    ] {
+    for name in ["Luffield", "luff", "LUFFIELD", "becketts", "the loop", "Village"] {
         assert!(c.section(name).is_ok(), "{name}");
     }
     for name in ["v", "", "Monza"] {
         let text = c.section(name).expect_err(name).to_string();
         assert!(text.contains("Abbey, Village/The Loop, Luffield"), "{text}");
     }
-    let text = Circuit::bundled("monza")
-        .expect_err("not bundled")
-        .to_string();
+    let text = Circuit::bundled("monza").expect_err("not bundled").to_string();
     assert!(text.contains("`monza`") && text.contains("silverstone_gp"));
     assert!(Circuit::bundled("Silverstone-GP").is_ok());
 }
@@ -181,8 +173,7 @@ impl Folder {
     }
 }
 
-const TOML: &str =
-    "name = \"Own\"\ncurvature_table = \"own.csv\"\nlength_m = 628.3\nwidth_m = 10\n";
+const TOML: &str = "name = \"Own\"\ncurvature_table = \"own.csv\"\nlength_m = 628.3\nwidth_m = 10\n";
 const TABLE: &str = "# a circle\nstation_m,curvature_1pm\n0,0.01\n# on\n\n200,0.01\n400,0.01\n";
 
 #[test]
@@ -191,8 +182,7 @@ fn a_users_own_circuit_loads() {
     let c = Circuit::load(&path).expect("a circle");
     assert_eq!((c.name.as_str(), c.length_m), ("Own", 628.3));
     assert_eq!(c.widths_at(100.0), (5.0, 5.0));
-    let widths =
-        "station_m,curvature_1pm,width_left_m,width_right_m\n0,.01,4,6\n200,.01,4,6\n400,.01,8,6\n";
+    let widths = "station_m,curvature_1pm,width_left_m,width_right_m\n0,.01,4,6\n200,.01,4,6\n400,.01,8,6\n";
     std::fs::write(folder.0.path().join("own.csv"), widths).expect("written");
     let c = Circuit::load(&path).expect("a circle");
     let (left, right) = c.widths_at(300.0);

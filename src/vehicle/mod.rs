@@ -17,4 +17,4 @@ pub use chassis::Chassis;
 pub use model::{CarInput, CarModel, CarRate, CarState};
 pub use parameters::ParameterInfo;
 pub use powertrain::Powertrain;
-pub use tyre::{LinearTyre, TyreCoefficients, TyreModel};
+pub use tyre::{LinearTyre, MagicFormula, TyreCoefficients, TyreModel};

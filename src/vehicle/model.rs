@@ -4,7 +4,7 @@
 use super::aero::aero_forces;
 use super::chassis::{BodyForces, BodyState, Chassis, body_derivative};
 use super::loads::wheel_loads;
-use super::tyre::{Camber, Tyre, TyreForces, TyreInput};
+use super::tyre::{Tyre, TyreForces, TyreInput};
 use crate::scalar::Real;
 
 /// What drives the car: the logged inputs.
@@ -37,17 +37,13 @@ pub struct CarRate<R> {
     pub ay: R,
 }
 
-/// A car with what is worked out once per candidate.
+/// A car whose tyres are ready for its camber.
 #[derive(Clone, Copy, Debug)]
 pub struct CarModel<R, T> {
     /// Body, wheels and air.
     pub chassis: Chassis<R>,
-    /// Front tyres.
-    pub front: T,
-    /// Rear tyres.
-    pub rear: T,
-    /// Camber of the wheels FL FR RL RR.
-    camber: [Camber<R>; 4],
+    /// Tyres of the front and the rear axle.
+    pub tyres: [T; 2],
 }
 
 /// Slip of one wheel.
@@ -87,26 +83,42 @@ pub fn to_body_axes<R: Real>(forces: &TyreForces<R>, (cos, sin): (R, R)) -> (R, 
 }
 
 impl<R: Real, T: Tyre<R>> CarModel<R, T> {
-    /// Puts a car together.
+    /// Makes a car ready from its flat form ([`super::Car::to_flat`]), `at(i)` being the `i`-th parameter.
     ///
     /// Negative camber leans the tops inwards: the left wheels then lean to the right, which is a positive
     /// inclination about the forward axis.
-    #[inline(always)]
-    pub fn new(chassis: Chassis<R>, front: T, rear: T) -> Self {
+    pub fn from_parameters(mut at: impl FnMut(usize) -> R) -> Self {
+        let chassis = Chassis::from_flat(&mut at);
+        let (front, rear) = (Chassis::<R>::PARAMETERS.len(), T::MODEL.parameters().len());
         let degree = R::lit(std::f64::consts::PI / 180.0);
-        let front_camber = chassis.camber_front * degree;
-        let rear_camber = chassis.camber_rear * degree;
         Self {
-            chassis,
-            front,
-            rear,
-            camber: [
-                Camber::new(-front_camber),
-                Camber::new(front_camber),
-                Camber::new(-rear_camber),
-                Camber::new(rear_camber),
+            tyres: [
+                T::from_parameters(|i| at(front + i), -(chassis.camber_front * degree)),
+                T::from_parameters(|i| at(front + rear + i), -(chassis.camber_rear * degree)),
             ],
+            chassis,
         }
+    }
+
+    /// From the table that [`CarModel::to_table`] gives.
+    #[inline(always)]
+    pub fn from_table(mut at: impl FnMut(usize) -> R) -> Self {
+        let front = Chassis::<R>::PARAMETERS.len();
+        let rear = front + T::FIELDS.len();
+        Self {
+            chassis: Chassis::from_flat(&mut at),
+            tyres: [T::from_flat(|i| at(front + i)), T::from_flat(|i| at(rear + i))],
+        }
+    }
+
+    /// All figures in a row, chassis, front tyre, rear tyre: the form in which kernels read a ready car.
+    pub fn to_table(&self) -> Vec<R> {
+        [
+            self.chassis.to_flat(),
+            self.tyres[0].to_flat(),
+            self.tyres[1].to_flat(),
+        ]
+        .concat()
     }
 
     /// The rate of change of `state` under `input`.
@@ -118,11 +130,10 @@ impl<R: Real, T: Tyre<R>> CarModel<R, T> {
         let loads = wheel_loads(chassis, body, state.pitch_acceleration, &aero);
 
         let steer = input.steer * chassis.steer_scale + chassis.steer_offset;
-        let turned = (steer.cos(), steer.sin());
-        let straight = (R::lit(1.0), R::lit(0.0));
-        let (a, b) = (chassis.cg_to_front, chassis.cg_to_rear);
-        let (wf, wr) = (chassis.half_track_front, chassis.half_track_rear);
-        let places = [(a, wf), (a, -wf), (-b, wr), (-b, -wr)];
+        let directions = [(steer.cos(), steer.sin()), (R::lit(1.0), R::lit(0.0))];
+        let axle_x = [chassis.cg_to_front, -chassis.cg_to_rear];
+        let half_track = [chassis.half_track_front, chassis.half_track_rear];
+        let radius = [chassis.radius_front, chassis.radius_rear];
 
         let zero = R::lit(0.0);
         let mut total = BodyForces {
@@ -130,35 +141,28 @@ impl<R: Real, T: Tyre<R>> CarModel<R, T> {
             y: zero,
             yaw_moment: zero,
         };
-        for wheel in 0..4 {
-            let front = wheel < 2;
-            let direction = if front { turned } else { straight };
-            let radius = if front {
-                chassis.radius_front
-            } else {
-                chassis.radius_rear
-            };
-            let (x, y) = places[wheel];
-            let slip = wheel_slip(
-                body,
-                (x, y),
-                direction,
-                input.wheel_speed[wheel] * radius,
-                chassis.slip_speed_floor,
-            );
-            let tyre_input = TyreInput {
-                load: loads[wheel],
-                slip_ratio: slip.ratio,
-                slip_tangent: slip.tangent,
-                camber: self.camber[wheel],
-            };
-            // The choice is of the tyre, not of the call: one copy of the tyre's code serves all wheels.
-            let tyre = if front { &self.front } else { &self.rear };
-            let forces = tyre.forces(tyre_input);
-            let (force_x, force_y) = to_body_axes(&forces, direction);
-            total.x = total.x + force_x;
-            total.y = total.y + force_y;
-            total.yaw_moment = total.yaw_moment + (x * force_y - y * force_x + forces.aligning_moment);
+        // One copy of the tyre's code serves all wheels, indexed rather than chosen between: the code then fits
+        // the processor's instruction cache and the coefficients stay in memory.
+        for axle in 0..2 {
+            let direction = directions[axle];
+            let tyre = &self.tyres[axle];
+            for (half, side) in [1.0, -1.0].into_iter().enumerate() {
+                let wheel = 2 * axle + half;
+                let side = R::lit(side);
+                let (x, y) = (axle_x[axle], half_track[axle] * side);
+                let rim_speed = input.wheel_speed[wheel] * radius[axle];
+                let slip = wheel_slip(body, (x, y), direction, rim_speed, chassis.slip_speed_floor);
+                let forces = tyre.forces(TyreInput {
+                    load: loads[wheel],
+                    slip_ratio: slip.ratio,
+                    slip_tangent: slip.tangent,
+                    side,
+                });
+                let (force_x, force_y) = to_body_axes(&forces, direction);
+                total.x = total.x + force_x;
+                total.y = total.y + force_y;
+                total.yaw_moment = total.yaw_moment + (x * force_y - y * force_x + forces.aligning_moment);
+            }
         }
 
         let rate = body_derivative(chassis, body, &total);

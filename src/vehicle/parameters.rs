@@ -70,3 +70,36 @@ macro_rules! parameters {
     };
 }
 pub(crate) use parameters;
+
+/// Declares a struct of derived figures over a scalar, with its flat form.
+macro_rules! fields {
+    ($(#[$doc:meta])* pub struct $name:ident { $($field:ident),* $(,)? }) => {
+        $(#[$doc])*
+        #[derive(Clone, Copy, Debug, PartialEq)]
+        #[allow(missing_docs, reason = "each is the product that `prepare` writes it as")]
+        pub struct $name<R> {
+            $(pub $field: R,)*
+        }
+
+        impl<R> $name<R> {
+            /// Names of the figures, in the order of the flat form.
+            pub const FIELDS: &'static [&'static str] = &[$(stringify!($field)),*];
+        }
+
+        impl<R: Copy> $name<R> {
+            /// From the flat form, `at(i)` being the `i`-th figure.
+            #[inline(always)]
+            pub fn from_flat(mut at: impl FnMut(usize) -> R) -> Self {
+                let mut next = 0..;
+                $(let $field = at(next.next().unwrap_or(0));)*
+                Self { $($field),* }
+            }
+
+            /// To the flat form.
+            pub fn to_flat(&self) -> Vec<R> {
+                vec![$(self.$field),*]
+            }
+        }
+    };
+}
+pub(crate) use fields;

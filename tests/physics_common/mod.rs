@@ -1,8 +1,10 @@
 //! What the physics tests share.
 #![allow(dead_code)] // each test binary uses its own part
 
-use lapswarm::vehicle::tyre::{Camber, Tyre, TyreFile, TyreForces, TyreInput};
-use lapswarm::vehicle::{Car, Chassis, TyreCoefficients};
+use lapswarm::scalar::Real;
+use lapswarm::vehicle::model::runge_kutta_step;
+use lapswarm::vehicle::tyre::{Tyre, TyreFile, TyreForces, TyreInput};
+use lapswarm::vehicle::{Car, CarInput, CarModel, CarState, Chassis, TyreCoefficients};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -64,20 +66,41 @@ pub fn set_b() -> TyreCoefficients<f64> {
     tyre_from(SET_B)
 }
 
-/// Forces at a load (N), slip ratio, tangent of the slip angle, and camber (rad).
-pub fn forces_at<T: Tyre<f64>>(
-    tyre: &T,
+/// Forces of an upright tyre or one made ready for its camber, at a load (N), slip ratio, and tangent of the slip angle.
+pub fn ready_forces(tyre: &impl Tyre<f64>, load: f64, slip_ratio: f64, slip_tangent: f64) -> TyreForces<f64> {
+    tyre.forces(TyreInput {
+        load,
+        slip_ratio,
+        slip_tangent,
+        side: 1.0,
+    })
+}
+
+/// Forces at a load (N), slip ratio, tangent of the slip angle, and camber (rad, positive with the top to the right).
+pub fn forces_at(
+    tyre: &TyreCoefficients<f64>,
     load: f64,
     slip_ratio: f64,
     slip_tangent: f64,
     camber: f64,
 ) -> TyreForces<f64> {
-    tyre.forces(TyreInput {
-        load,
-        slip_ratio,
-        slip_tangent,
-        camber: Camber::new(camber),
-    })
+    ready_forces(&tyre.prepare(camber), load, slip_ratio, slip_tangent)
+}
+
+/// A car of a chassis and the flat forms of its tyres.
+pub fn car_model<R: Real, T: Tyre<R>>(chassis: &Chassis<R>, front: &[R], rear: &[R]) -> CarModel<R, T> {
+    let flat = [&chassis.to_flat()[..], front, rear].concat();
+    CarModel::from_parameters(|i| flat[i])
+}
+
+/// One Runge-Kutta step of a car, `input` giving the inputs at a share of the step.
+pub fn car_step<T: Tyre<f64>>(
+    model: &CarModel<f64, T>,
+    state: &CarState<f64>,
+    input: impl Fn(f64) -> CarInput<f64>,
+    step: f64,
+) -> CarState<f64> {
+    runge_kutta_step(model, state, |number| input(0.5 * number as f64), step, |_| ())
 }
 
 /// A chassis from `key=value` words; what they leave out stands as in the bundled car.

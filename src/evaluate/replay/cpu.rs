@@ -4,20 +4,9 @@ use super::kernel::{CHANNELS, drive_window, score_window};
 use super::problem::{Norm, Plan, ReplayProblem, Window};
 use crate::error::Result;
 use crate::evaluate::{BackendInfo, Evaluation, Evaluator, Problem};
-use crate::scalar::Real;
 use crate::vehicle::tyre::Tyre;
-use crate::vehicle::{CarModel, Chassis, LinearTyre, TyreCoefficients, TyreModel};
+use crate::vehicle::{CarModel, LinearTyre, MagicFormula, TyreModel};
 use rayon::prelude::*;
-
-/// A candidate's car from its flat form, `at(i)` being the `i`-th parameter.
-#[inline(always)]
-pub fn build_car<R: Real, T: Tyre<R>>(mut at: impl FnMut(usize) -> R) -> CarModel<R, T> {
-    let chassis_count = Chassis::<R>::PARAMETERS.len();
-    let chassis = Chassis::from_flat(&mut at);
-    let front = T::from_flat(|i| at(chassis_count + i));
-    let rear = T::from_flat(|i| at(chassis_count + T::PARAMETERS.len() + i));
-    CarModel::new(chassis, front, rear)
-}
 
 /// Scores replays in `f64`.
 pub struct CpuEvaluator<'a> {
@@ -31,7 +20,7 @@ impl<'a> CpuEvaluator<'a> {
     }
 
     fn errors<T: Tyre<f64>>(&self, flat: &[f64]) -> Option<[f64; CHANNELS]> {
-        let car = build_car::<f64, T>(|i| flat[i]);
+        let car = CarModel::<f64, T>::from_parameters(|i| flat[i]);
         let mut total = [0.0; CHANNELS];
         for window in &self.replay.plan.windows {
             let score = score_window(&car, &self.replay.plan, window);
@@ -66,7 +55,7 @@ impl Evaluator for CpuEvaluator<'_> {
                 }
                 let flat = self.replay.flat(candidate);
                 self.replay.objective_row(match self.replay.tyre_model() {
-                    TyreModel::MagicFormula => self.errors::<TyreCoefficients<f64>>(&flat),
+                    TyreModel::MagicFormula => self.errors::<MagicFormula<f64>>(&flat),
                     TyreModel::Linear => self.errors::<LinearTyre<f64>>(&flat),
                 })
             })
@@ -99,13 +88,13 @@ pub fn trace(
         plan: &Plan<f64>,
         window: &Window<f64>,
     ) -> (Vec<[f64; CHANNELS]>, bool) {
-        let car = build_car::<f64, T>(|i| flat[i]);
+        let car = CarModel::<f64, T>::from_parameters(|i| flat[i]);
         let mut outputs = Vec::with_capacity(window.end - window.start);
         let (drives, _) = drive_window(&car, plan, window, |_, output| outputs.push(output));
         (outputs, drives)
     }
     match model {
-        TyreModel::MagicFormula => go::<TyreCoefficients<f64>>(flat, plan, window),
+        TyreModel::MagicFormula => go::<MagicFormula<f64>>(flat, plan, window),
         TyreModel::Linear => go::<LinearTyre<f64>>(flat, plan, window),
     }
 }

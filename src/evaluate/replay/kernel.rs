@@ -3,8 +3,8 @@
 
 use super::problem::{Norm, Plan, Sample, Window};
 use crate::scalar::Real;
-use crate::vehicle::tyre::Tyre;
 use crate::vehicle::model::runge_kutta_step;
+use crate::vehicle::tyre::Tyre;
 use crate::vehicle::{CarInput, CarModel, CarState};
 
 /// The compared outputs: forward speed (m/s), longitudinal and lateral acceleration (m/s^2), yaw rate (rad/s).
@@ -58,7 +58,10 @@ pub fn drive_window<R: Real, T: Tyre<R>>(
     }
     let last = &samples[samples.len() - 1];
     let rate = car.rate(&state, &input_between(last, last, R::lit(0.0)));
-    visit(samples.len() - 1, [state.body.vx, rate.ax, rate.ay, state.body.yaw_rate]);
+    visit(
+        samples.len() - 1,
+        [state.body.vx, rate.ax, rate.ay, state.body.yaw_rate],
+    );
     (drives, state)
 }
 

@@ -1,32 +1,33 @@
 //! The lane backend: `f32`, as many candidates at once as a register holds, threads by rayon.
 
-use super::cpu::{build_car, collect_rows};
+use super::cpu::collect_rows;
 use super::kernel::{CHANNELS, score_window};
 use super::problem::{Plan, ReplayProblem, Window};
+use super::table::ModelTable;
 use crate::error::Result;
 use crate::evaluate::simd::{InstructionSet, LaneWork, dispatch};
 use crate::evaluate::{BackendInfo, Evaluation, Evaluator, Problem};
 use crate::scalar::lanes::Lanes;
 use crate::vehicle::tyre::Tyre;
-use crate::vehicle::{LinearTyre, TyreCoefficients, TyreModel};
+use crate::vehicle::{CarModel, LinearTyre, MagicFormula, TyreModel};
 use rayon::prelude::*;
 
 /// The most lanes of any pack.
-const MOST_LANES: usize = 16;
+const MOST_LANES: usize = 32;
 
 /// Scores replays in `f32` lanes.
 pub struct SimdEvaluator<'a> {
     replay: &'a ReplayProblem,
     plan: Plan<f32>,
-    base: Vec<f32>,
+    table: ModelTable,
     set: InstructionSet,
 }
 
 /// One pack of candidates through one window.
 struct PackThroughWindow<'a> {
     evaluator: &'a SimdEvaluator<'a>,
-    /// Rows of the candidates, at most as many as lanes.
-    rows: &'a [&'a [f64]],
+    /// Varying figures of the candidates, at most as many rows as lanes.
+    rows: &'a [f32],
     window: &'a Window<f32>,
 }
 
@@ -36,11 +37,13 @@ type PackScore = ([[f32; MOST_LANES]; CHANNELS], u32);
 impl PackThroughWindow<'_> {
     #[inline(always)]
     fn score<L: Lanes, T: Tyre<L>>(&self) -> PackScore {
-        let sources = self.evaluator.replay.sources();
-        let car = build_car::<L, T>(|slot| match sources[slot] {
+        let table = &self.evaluator.table;
+        let width = table.varying.len();
+        let last = (self.rows.len() / width.max(1)).saturating_sub(1);
+        let car = CarModel::<L, T>::from_table(|place| match table.sources[place] {
             // Lanes without a candidate repeat the last one, so that they cost no special case.
-            Some(variable) => L::from_fn(|lane| self.rows[lane.min(self.rows.len() - 1)][variable] as f32),
-            None => L::load(self.evaluator.base[slot]),
+            Some(figure) => L::from_fn(|lane| self.rows[lane.min(last) * width + figure]),
+            None => L::load(table.base[place]),
         });
         let score = score_window(&car, &self.evaluator.plan, self.window);
         let mut errors = [[0.0; MOST_LANES]; CHANNELS];
@@ -57,7 +60,7 @@ impl LaneWork for PackThroughWindow<'_> {
     #[inline(always)]
     fn run<L: Lanes>(self) -> PackScore {
         match self.evaluator.replay.tyre_model() {
-            TyreModel::MagicFormula => self.score::<L, TyreCoefficients<L>>(),
+            TyreModel::MagicFormula => self.score::<L, MagicFormula<L>>(),
             TyreModel::Linear => self.score::<L, LinearTyre<L>>(),
         }
     }
@@ -69,7 +72,7 @@ impl<'a> SimdEvaluator<'a> {
         Self {
             replay,
             plan: replay.plan.to_f32(),
-            base: replay.base().iter().map(|x| *x as f32).collect(),
+            table: ModelTable::new(replay),
             set,
         }
     }
@@ -99,16 +102,19 @@ impl Evaluator for SimdEvaluator<'_> {
             .filter(|&i| preliminary[i].is_none())
             .collect();
         let rows: Vec<&[f64]> = driven.iter().map(|&i| candidates[i]).collect();
+        let figures = self.table.rows(self.replay, &rows);
 
         let windows = &self.plan.windows;
-        let packs: Vec<&[&[f64]]> = rows.chunks(self.set.lanes()).collect();
+        let (lanes, width) = (self.set.lanes(), self.table.varying.len());
+        let packs = driven.len().div_ceil(lanes);
         let evaluator = &*self;
-        let scores: Vec<PackScore> = (0..packs.len() * windows.len())
+        let scores: Vec<PackScore> = (0..packs * windows.len())
             .into_par_iter()
             .map(|job| {
+                let pack = job / windows.len();
                 let work = PackThroughWindow {
                     evaluator,
-                    rows: packs[job / windows.len()],
+                    rows: &figures[pack * lanes * width..((pack + 1) * lanes).min(driven.len()) * width],
                     window: &windows[job % windows.len()],
                 };
                 dispatch(evaluator.set, work)
@@ -120,7 +126,7 @@ impl Evaluator for SimdEvaluator<'_> {
             .map(|f| (self.replay.objective_row(None).0, *f))
             .collect();
         for (place, &candidate) in driven.iter().enumerate() {
-            let (pack, lane) = (place / self.set.lanes(), place % self.set.lanes());
+            let (pack, lane) = (place / lanes, place % lanes);
             let mut total = Some([0.0; CHANNELS]);
             for (errors, drives) in &scores[pack * windows.len()..(pack + 1) * windows.len()] {
                 total = total.filter(|_| drives >> lane & 1 == 1);

@@ -2,7 +2,7 @@
 
 use super::{Tyre, TyreForces, TyreInput, TyreModel};
 use crate::scalar::Real;
-use crate::vehicle::parameters::{ParameterInfo, parameters};
+use crate::vehicle::parameters::parameters;
 
 parameters! {
     /// A tyre without saturation, for small slips and for teaching.
@@ -15,12 +15,21 @@ parameters! {
 }
 
 impl<R: Real> Tyre<R> for LinearTyre<R> {
-    const PARAMETERS: &'static [ParameterInfo] = LinearTyre::<R>::PARAMETERS;
     const MODEL: TyreModel = TyreModel::Linear;
+    const FIELDS: &'static [&'static str] =
+        &["nominal_load", "slip_stiffness", "cornering_stiffness", "trail"];
+
+    fn from_parameters(at: impl FnMut(usize) -> R, _inclination: R) -> Self {
+        LinearTyre::from_flat(at)
+    }
 
     #[inline(always)]
     fn from_flat(at: impl FnMut(usize) -> R) -> Self {
         LinearTyre::from_flat(at)
+    }
+
+    fn to_flat(&self) -> Vec<R> {
+        LinearTyre::to_flat(self)
     }
 
     #[inline(always)]

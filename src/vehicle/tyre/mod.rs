@@ -3,11 +3,13 @@
 mod coefficients;
 mod linear;
 mod magic_formula;
+mod prepared;
 mod tir;
 mod well_formed;
 
 pub use coefficients::TyreCoefficients;
 pub use linear::LinearTyre;
+pub use prepared::MagicFormula;
 pub use tir::TyreFile;
 pub use well_formed::IllFormed;
 
@@ -18,26 +20,6 @@ use crate::scalar::Real;
 /// It only keeps 0/0 out of slopes that are ratios of things proportional to load.
 const LEAST_LOAD: f64 = 1e-3;
 
-/// The static camber of one wheel with its sine, worked out once per car.
-#[derive(Clone, Copy, Debug)]
-pub struct Camber<R> {
-    /// Inclination about the forward axis, positive with the top leaning to the right, rad.
-    pub angle: R,
-    /// Its sine.
-    pub sine: R,
-}
-
-impl<R: Real> Camber<R> {
-    /// From the angle in radians.
-    #[inline(always)]
-    pub fn new(angle: R) -> Self {
-        Self {
-            angle,
-            sine: angle.sin(),
-        }
-    }
-}
-
 /// What a tyre feels.
 #[derive(Clone, Copy, Debug)]
 pub struct TyreInput<R> {
@@ -47,8 +29,8 @@ pub struct TyreInput<R> {
     pub slip_ratio: R,
     /// Tangent of the slip angle, `vy/|vx|`.
     pub slip_tangent: R,
-    /// Static camber.
-    pub camber: Camber<R>,
+    /// `+1` on the left, `-1` on the right, where the axle's camber leans the other way.
+    pub side: R,
 }
 
 /// What a tyre answers, in its own axes.
@@ -62,15 +44,22 @@ pub struct TyreForces<R> {
     pub aligning_moment: R,
 }
 
-/// A tyre model over a scalar. Each model has its twin module under `shaders/`.
+/// A tyre model over a scalar, ready for an axle. Each model has its twin module under `shaders/`.
 pub trait Tyre<R: Real>: Copy + Send + Sync {
-    /// The model's parameters, in the order of the flat form.
-    const PARAMETERS: &'static [ParameterInfo];
     /// Which model it is.
     const MODEL: TyreModel;
+    /// Names of the figures of its ready form, in order.
+    const FIELDS: &'static [&'static str];
 
-    /// From the flat form, `at(i)` being the `i`-th parameter.
+    /// Makes the tyre ready for an axle whose left wheel leans to the right by `inclination` (rad), from the
+    /// model's parameters in the order of [`TyreModel::parameters`].
+    fn from_parameters(at: impl FnMut(usize) -> R, inclination: R) -> Self;
+
+    /// From the ready form's figures.
     fn from_flat(at: impl FnMut(usize) -> R) -> Self;
+
+    /// To the ready form's figures.
+    fn to_flat(&self) -> Vec<R>;
 
     /// Forces and aligning moment.
     fn forces(&self, input: TyreInput<R>) -> TyreForces<R>;
@@ -79,7 +68,7 @@ pub trait Tyre<R: Real>: Copy + Send + Sync {
 /// The tyre models there are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum TyreModel {
-    /// [`TyreCoefficients`].
+    /// [`MagicFormula`].
     MagicFormula,
     /// [`LinearTyre`].
     Linear,

@@ -202,7 +202,9 @@ impl TyreFile {
             .collect();
         // A coefficient the file did not have is only worth a line where it differs from its default.
         let mut missing: Vec<usize> = (0..table.len())
-            .filter(|i| !written.contains(i) && table[*i].default != Some(flat[*i]))
+            .filter(|i| {
+                !written.contains(i) && table[*i].default.map(f64::to_bits) != Some(flat[*i].to_bits())
+            })
             .collect();
         let entry = |index: usize| format!("{:<24} = {}", tir_key(table[index].name), flat[index]);
         let mut text = String::new();

@@ -1,7 +1,7 @@
 //! Which Magic Formula coefficients make no tyre. Judged once per candidate in `f64`, before any integration,
 //! so that every backend refuses the same candidates for the same reasons.
 
-use super::{Camber, LEAST_LOAD, Tyre, TyreCoefficients, TyreInput};
+use super::{LEAST_LOAD, Tyre, TyreCoefficients, TyreInput};
 use std::fmt;
 
 /// Why a set of coefficients makes no tyre.
@@ -9,7 +9,7 @@ use std::fmt;
 pub enum IllFormed {
     /// A coefficient is not a finite number.
     NotFinite,
-    /// Peak friction is not positive somewhere in the working range of loads.
+    /// Peak friction is not positive (or next to nought) somewhere in the working range of loads.
     Friction,
     /// Slip or cornering stiffness has the wrong sign or vanishes somewhere in the working range of loads.
     Stiffness,
@@ -32,6 +32,11 @@ impl fmt::Display for IllFormed {
 
 /// Loads (in nominal loads) at which a tyre is judged: from nearly lifted to a loaded outer wheel.
 const LOADS: [f64; 4] = [0.1, 0.5, 1.0, 2.0];
+/// The least peak friction, a hundredth of that on wet ice; below it slopes divide by (nearly) nought.
+const LEAST_FRICTION: f64 = 1e-3;
+/// The least stiffness per load, a hundredth of a real tyre's. Other terms divide by stiffness, and what is small but
+/// fine in `f64` is nought in the single precision of the backends.
+const LEAST_STIFFNESS: f64 = 0.1;
 /// The slip within which the weights must stay positive, as slip ratio and as tangent of the slip angle.
 const WORKING_SLIP: f64 = 0.15;
 /// The least denominator of a weight: below it the formula multiplies forces more than tenfold.
@@ -47,16 +52,19 @@ impl TyreCoefficients<f64> {
             let u = b * x - e.min(1.0) * (b * x - (b * x).atan());
             (c * u.atan()).cos()
         };
+        let tyre = self.prepare(0.0);
         for share in LOADS {
             let nominal = self.fnomin * self.lfz0;
             let dfz = share - 1.0;
-            if !((self.pdx1 + self.pdx2 * dfz) * self.lmux > 0.0
-                && (self.pdy1 + self.pdy2 * dfz) * self.lmuy > 0.0)
+            if !((self.pdx1 + self.pdx2 * dfz) * self.lmux > LEAST_FRICTION
+                && (self.pdy1 + self.pdy2 * dfz) * self.lmuy > LEAST_FRICTION)
             {
                 return Err(IllFormed::Friction);
             }
-            // The cornering stiffness goes as 2z/(1+z^2) with z = share/pKy2, which has the sign of pKy2.
-            if !((self.pkx1 + self.pkx2 * dfz) * self.lkx > 0.0 && self.pky1 * self.pky2 * self.lky < 0.0) {
+            let z = share / self.pky2;
+            let slip_stiffness = (self.pkx1 + self.pkx2 * dfz) * (self.pkx3 * dfz).exp() * self.lkx;
+            let cornering_stiffness = -self.pky1 * (2.0 * z / (1.0 + z * z)) * self.lky / share;
+            if !(slip_stiffness > LEAST_STIFFNESS && cornering_stiffness > LEAST_STIFFNESS) {
                 return Err(IllFormed::Stiffness);
             }
             let ex = self.rex1 + self.rex2 * dfz;
@@ -77,11 +85,11 @@ impl TyreCoefficients<f64> {
                     return Err(IllFormed::Weighting);
                 }
             }
-            let forces = self.forces(TyreInput {
+            let forces = tyre.forces(TyreInput {
                 load: (share * nominal).max(LEAST_LOAD),
                 slip_ratio: WORKING_SLIP,
                 slip_tangent: WORKING_SLIP,
-                camber: Camber::new(0.0),
+                side: 1.0,
             });
             if !(forces.x.is_finite() && forces.y.is_finite() && forces.aligning_moment.is_finite()) {
                 return Err(IllFormed::NotFinite);

@@ -1,0 +1,83 @@
+//! Cars in the form that the `f32` kernels read: a shared table of ready figures, and for each candidate only
+//! those that the free parameters move.
+
+use super::problem::ReplayProblem;
+use crate::random::Random;
+use crate::vehicle::{CarModel, LinearTyre, MagicFormula, TyreModel};
+use rayon::prelude::*;
+
+/// Ready cars of one problem (see [`CarModel::to_table`]), worked out in `f64` and rounded once.
+#[derive(Clone, Debug)]
+pub struct ModelTable {
+    /// The table of a candidate in the middle of the bounds; figures that do not vary hold for all.
+    pub base: Vec<f32>,
+    /// For each place of the table, which varying figure it is, if it varies.
+    pub sources: Vec<Option<usize>>,
+    /// Places of the table that vary, ascending.
+    pub varying: Vec<usize>,
+}
+
+/// Purpose of the probing draws in the counter.
+const PROBE: u32 = 0x9b0be;
+/// Random candidates that are compared to find which figures vary. Jointly random, because a figure may be a
+/// product that vanishes while only one of its factors moves.
+const PROBES: u32 = 8;
+
+impl ModelTable {
+    /// Finds the figures that the free parameters of `replay` move.
+    pub fn new(replay: &ReplayProblem) -> Self {
+        let at_share = |share: &dyn Fn(u32) -> f64| -> Vec<f64> {
+            let variables = replay.problem.variables.iter().zip(0..);
+            let candidate: Vec<f64> = variables
+                .map(|(v, i)| v.lower + share(i) * (v.upper - v.lower))
+                .collect();
+            ready(replay, &candidate)
+        };
+        let base = at_share(&|_| 0.5);
+        let random = Random::new(0);
+        let mut varies = vec![false; base.len()];
+        for probe in 0..PROBES {
+            let table = at_share(&|i| random.uniform(PROBE, probe, 0, i));
+            for ((varies, a), b) in varies.iter_mut().zip(&table).zip(&base) {
+                *varies |= a.to_bits() != b.to_bits();
+            }
+        }
+        let varying: Vec<usize> = (0..base.len()).filter(|&i| varies[i]).collect();
+        let mut sources = vec![None; base.len()];
+        for (figure, &place) in varying.iter().enumerate() {
+            sources[place] = Some(figure);
+        }
+        Self {
+            base: base.iter().map(|x| *x as f32).collect(),
+            sources,
+            varying,
+        }
+    }
+
+    /// The varying figures of each candidate, row-major, candidates by [`ModelTable::varying`].
+    pub fn rows(&self, replay: &ReplayProblem, candidates: &[&[f64]]) -> Vec<f32> {
+        let mut rows = vec![0.0; candidates.len() * self.varying.len()];
+        if !self.varying.is_empty() {
+            rows.par_chunks_exact_mut(self.varying.len())
+                .zip(candidates)
+                .for_each(|(row, candidate)| {
+                    let table = ready(replay, candidate);
+                    for (out, &place) in row.iter_mut().zip(&self.varying) {
+                        *out = table[place] as f32;
+                    }
+                });
+        }
+        rows
+    }
+}
+
+/// A candidate's ready table in `f64`.
+fn ready(replay: &ReplayProblem, candidate: &[f64]) -> Vec<f64> {
+    let flat = replay.flat(candidate);
+    match replay.tyre_model() {
+        TyreModel::MagicFormula => {
+            CarModel::<f64, MagicFormula<f64>>::from_parameters(|i| flat[i]).to_table()
+        }
+        TyreModel::Linear => CarModel::<f64, LinearTyre<f64>>::from_parameters(|i| flat[i]).to_table(),
+    }
+}

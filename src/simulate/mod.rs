@@ -1,0 +1,9 @@
+//! Simulated driving: a driver takes the 4DOF car round a circuit, and sensors log it.
+
+mod driver;
+mod sensors;
+mod speed_plan;
+
+pub use driver::{Drive, DriverSettings, drive};
+pub use sensors::{SensorSettings, distort};
+pub use speed_plan::SpeedPlan;

@@ -1,0 +1,117 @@
+//! The speed that the driver aims for: a forward and a backward pass under a friction ellipse
+//! (`physics.md` section 5, in its first-order form; a driver needs no better).
+
+use crate::track::Circuit;
+use crate::vehicle::{Car, Tyres};
+
+/// Speed and acceleration to aim for along the centreline.
+#[derive(Clone, Debug)]
+pub struct SpeedPlan {
+    spacing_m: f64,
+    /// Speed at each grid point, m/s.
+    pub speed_mps: Vec<f64>,
+}
+
+/// Friction of a tyre whose model has no limit.
+const LINEAR_TYRE_FRICTION: f64 = 1.0;
+/// Grid spacing along the centreline, m.
+const SPACING: f64 = 2.0;
+
+/// What the car can do at a speed, roughly: lateral and longitudinal grip, drive and drag, all in m/s^2.
+struct Limits<'a> {
+    car: &'a Car,
+    friction: f64,
+}
+
+impl Limits<'_> {
+    fn grip(&self, speed: f64) -> f64 {
+        let c = &self.car.chassis;
+        self.friction * (c.gravity + 0.5 * c.air_density * c.lift_area * speed * speed / c.mass)
+    }
+
+    fn drag(&self, speed: f64) -> f64 {
+        let c = &self.car.chassis;
+        0.5 * c.air_density * c.drag_area * speed * speed / c.mass
+    }
+
+    fn drive(&self, speed: f64) -> f64 {
+        let c = &self.car.chassis;
+        match &self.car.powertrain {
+            Some(powertrain) => powertrain.wheel_force(speed, c.radius_rear) / c.mass,
+            None => 0.4 * self.grip(speed),
+        }
+    }
+
+    /// What the ellipse leaves for the longitudinal direction at a curvature.
+    fn remaining(&self, speed: f64, curvature: f64) -> f64 {
+        let grip = self.grip(speed);
+        let used = (curvature.abs() * speed * speed / grip).min(1.0);
+        grip * (1.0 - used * used).sqrt()
+    }
+}
+
+impl SpeedPlan {
+    /// Plans a lap at `pace`, the share of the car's friction that the driver uses (0 to 1).
+    ///
+    /// `top_speed` (m/s) caps the straights.
+    pub fn new(car: &Car, circuit: &Circuit, pace: f64, top_speed: f64) -> Self {
+        let friction = pace
+            * match &car.tyres {
+                Tyres::MagicFormula { front, rear } => {
+                    let mu =
+                        |t: &crate::vehicle::TyreCoefficients<f64>| (t.pdx1 * t.lmux).min(t.pdy1 * t.lmuy);
+                    mu(&front.coefficients).min(mu(&rear.coefficients))
+                }
+                Tyres::Linear { .. } => LINEAR_TYRE_FRICTION,
+            };
+        let limits = Limits { car, friction };
+        let count = (circuit.length_m / SPACING).round().max(8.0) as usize;
+        let spacing_m = circuit.length_m / count as f64;
+        let curvature: Vec<f64> = (0..count)
+            .map(|i| circuit.curvature_at(i as f64 * spacing_m))
+            .collect();
+        let mut speed_mps: Vec<f64> = curvature
+            .iter()
+            .map(|k| {
+                // Grip grows with speed, so the corner speed is a fixed point; a few rounds settle it.
+                let mut v = top_speed;
+                for _ in 0..60 {
+                    v = (limits.grip(v) / k.abs().max(1e-9)).sqrt().min(top_speed);
+                }
+                v
+            })
+            .collect();
+        // Twice round, so that the start of a closed lap knows what comes before it.
+        for step in 0..2 * count {
+            let (i, next) = (step % count, (step + 1) % count);
+            let v = speed_mps[i];
+            let a = limits.drive(v).min(0.6 * limits.remaining(v, curvature[i])) - limits.drag(v);
+            speed_mps[next] = speed_mps[next].min((v * v + 2.0 * a * spacing_m).max(1.0).sqrt());
+        }
+        for step in (0..2 * count).rev() {
+            let (i, next) = (step % count, (step + 1) % count);
+            let v = speed_mps[next];
+            let a = 0.85 * limits.remaining(v, curvature[next]) + limits.drag(v);
+            speed_mps[i] = speed_mps[i].min((v * v + 2.0 * a * spacing_m).sqrt());
+        }
+        Self { spacing_m, speed_mps }
+    }
+
+    /// The planned speed (m/s) at a station (m), linear between grid points, periodic.
+    pub fn speed_at(&self, station_m: f64) -> f64 {
+        let count = self.speed_mps.len();
+        let place = (station_m / self.spacing_m).rem_euclid(count as f64);
+        let i = place as usize % count;
+        let share = place - place.floor();
+        self.speed_mps[i] + share * (self.speed_mps[(i + 1) % count] - self.speed_mps[i])
+    }
+
+    /// The planned acceleration (m/s^2) at a station (m).
+    pub fn acceleration_at(&self, station_m: f64) -> f64 {
+        let (before, after) = (
+            self.speed_at(station_m - SPACING),
+            self.speed_at(station_m + SPACING),
+        );
+        (after * after - before * before) / (4.0 * SPACING)
+    }
+}

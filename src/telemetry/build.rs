@@ -1,0 +1,394 @@
+//! From mapped channels to the arrays of a log: conversion to SI, one clock, laps and distance.
+
+use std::borrow::Cow;
+use std::sync::Arc;
+
+use super::audit::check_magnitude;
+use super::calibrate::Calibration;
+use super::channel_map::{Axle, ChannelMap, Mapped};
+use super::laps::{self, Lap};
+use super::log::{Log, LogOptions};
+use super::recording::{Channel, Clock, Format, Recording};
+use super::resample::{Grid, check_times, onto, uniform_interval};
+use super::role::Role;
+use super::text::shown;
+use super::units::Quantity;
+use crate::{Error, Result};
+
+/// A mapped channel in SI, with its times.
+pub(super) struct Signal<'a> {
+    pub mapped: Mapped<'a>,
+    times: Arc<[f64]>,
+    nominal_s: f64,
+    values: Cow<'a, [f64]>,
+    /// Taken off its times, s.
+    pub delay_s: f64,
+}
+
+/// Converts the channels that a log is made of to SI, and checks their samples and clocks.
+pub(super) fn signals<'a>(
+    source: &str,
+    mapped: &[Mapped<'a>],
+    map: &ChannelMap,
+    options: &LogOptions,
+    radius: Option<f64>,
+) -> Result<Vec<Signal<'a>>> {
+    let mut signals: Vec<Signal<'a>> = Vec::new();
+    for m in mapped {
+        if matches!(m.role, Role::Throttle | Role::Brake) {
+            continue;
+        }
+        let channel = m.channel;
+        check_samples(source, channel)?;
+        let known = signals.iter().find(|s| same_clock(s.mapped.channel, channel));
+        let (times, nominal_s) = match known {
+            Some(signal) => (Arc::clone(&signal.times), signal.nominal_s),
+            None => {
+                let times = times(source, channel)?;
+                let nominal = check_times(source, channel, &times, options.bridge_gaps_s)?;
+                (times, nominal)
+            }
+        };
+        if times.len() != channel.values.len() {
+            return Err(Error::input(
+                source,
+                format!("channel {}", channel.name),
+                format!("{} samples at {} times", channel.values.len(), times.len()),
+                "as many samples as times",
+            ));
+        }
+        let factor = factor(source, m, map, radius)?;
+        let values = if factor == 1.0 {
+            Cow::Borrowed(&channel.values[..])
+        } else {
+            channel.values.iter().map(|v| v * factor).collect()
+        };
+        check_magnitude(source, m, &values)?;
+        signals.push(Signal {
+            mapped: *m,
+            times,
+            nominal_s,
+            values,
+            delay_s: m.delay_s.unwrap_or(0.0),
+        });
+    }
+    Ok(signals)
+}
+
+fn check_samples(source: &str, channel: &Channel) -> Result<()> {
+    let Some(bad) = &channel.unreadable else {
+        return Ok(());
+    };
+    let (place, found) = if channel.values.is_empty() {
+        (format!("channel {}", channel.name), bad.text.clone())
+    } else if bad.text.is_empty() {
+        (channel.place(bad.sample), "an empty cell".to_owned())
+    } else {
+        (channel.place(bad.sample), shown(&bad.text))
+    };
+    Err(Error::input(source, place, found, "a finite number"))
+}
+
+fn same_clock(a: &Channel, b: &Channel) -> bool {
+    match (&a.clock, &b.clock) {
+        (Clock::Times(a), Clock::Times(b)) => Arc::ptr_eq(a, b),
+        (a_clock, b_clock) => a_clock == b_clock && a.values.len() == b.values.len(),
+    }
+}
+
+fn times(source: &str, channel: &Channel) -> Result<Arc<[f64]>> {
+    match &channel.clock {
+        Clock::Times(times) => Ok(Arc::clone(times)),
+        Clock::Rate { rate_hz, .. } if *rate_hz > 0.0 => {
+            Ok((0..channel.values.len()).map(|i| channel.time_s(i)).collect())
+        }
+        Clock::Rate { rate_hz, .. } => Err(Error::input(
+            source,
+            format!("channel {}", channel.name),
+            format!("a sample rate of {rate_hz} Hz"),
+            "one above 0",
+        )),
+    }
+}
+
+/// What a channel's values are multiplied by to become SI with the declared sign.
+fn factor(source: &str, m: &Mapped<'_>, map: &ChannelMap, radius: Option<f64>) -> Result<f64> {
+    let mut factor = m.sign.unwrap_or(1.0);
+    let Some(unit) = m.unit else {
+        return Ok(factor);
+    };
+    factor *= unit.factor;
+    if m.role == Role::Steer {
+        factor /= map.steering_ratio.unwrap_or(1.0);
+    }
+    if Role::WHEELS.contains(&m.role) && unit.quantity == Quantity::Speed {
+        factor /= radius.ok_or_else(|| {
+            Error::input(
+                source,
+                format!("channel {}", m.channel.name),
+                "a linear wheel speed and no rolling radius to turn it into rad/s",
+                "rolling_radius_m in [vehicle] of the channel map",
+            )
+        })?;
+    }
+    Ok(factor)
+}
+
+/// What the arrays of a log are made with.
+pub(super) struct Build<'a> {
+    pub source: &'a str,
+    pub recording: &'a Recording,
+    pub map: &'a ChannelMap,
+    pub options: &'a LogOptions,
+    /// Reference rolling radius, m.
+    pub radius: Option<f64>,
+}
+
+impl Build<'_> {
+    /// The log at the signals' present delays, not calibrated otherwise.
+    pub fn assemble(&self, signals: &[Signal<'_>], calibration: Calibration) -> Result<Log> {
+        let grid = self.grid(signals)?;
+        let (grid, through) = match grid {
+            Clocked::AsLogged(grid) => (grid, true),
+            Clocked::Resampled(grid) => (grid, false),
+        };
+        let sampled = |signal: &Signal<'_>| -> Vec<f64> {
+            if through {
+                signal.values.to_vec()
+            } else {
+                onto(
+                    &signal.times,
+                    &signal.values,
+                    signal.nominal_s,
+                    signal.delay_s,
+                    &grid,
+                )
+            }
+        };
+        let find = |role| signals.iter().find(|s| s.mapped.role == role);
+        let needed = |role: Role| match find(role) {
+            Some(signal) => Ok(sampled(signal)),
+            None => Err(Error::input(
+                self.source,
+                format!("channel {}", role.key()),
+                "none",
+                "one",
+            )),
+        };
+        let [fl, fr, rl, rr] = Role::WHEELS;
+        let wheel_speed_radps = [needed(fl)?, needed(fr)?, needed(rl)?, needed(rr)?];
+        let mut log = Log {
+            source: self.source.to_owned(),
+            dt_s: grid.dt_s,
+            time_s: match signals.first() {
+                Some(signal) if through => signal.times.to_vec(),
+                _ => (0..grid.samples).map(|i| grid.time_s(i)).collect(),
+            },
+            distance_m: Vec::new(),
+            vx_mps: Vec::new(),
+            steer_rad: needed(Role::Steer)?,
+            ax_mps2: needed(Role::Ax)?,
+            ay_mps2: needed(Role::Ay)?,
+            yaw_rate_radps: needed(Role::YawRate)?,
+            wheel_speed_radps,
+            laps: Vec::new(),
+            calibration,
+        };
+        log.vx_mps = match find(Role::Vx) {
+            Some(signal) => sampled(signal),
+            None => self.speed_of_wheels(&mut log)?,
+        };
+        log.laps = self.laps(signals, &grid, &mut log.calibration)?;
+        log.distance_m = match find(Role::Distance) {
+            Some(signal) if through && self.recording.format == Format::Native => signal.values.to_vec(),
+            Some(signal) => {
+                let running = running_distance(&signal.values);
+                let all = onto(&signal.times, &running, signal.nominal_s, signal.delay_s, &grid);
+                from_lap_start(&all, &log.laps)
+            }
+            None => {
+                let mut all = Vec::with_capacity(grid.samples);
+                let mut sum = 0.0;
+                let mut last = log.vx_mps.first().copied().unwrap_or(0.0);
+                for &v in &log.vx_mps {
+                    sum += (last + v) / 2.0 * if all.is_empty() { 0.0 } else { grid.dt_s };
+                    last = v;
+                    all.push(sum);
+                }
+                from_lap_start(&all, &log.laps)
+            }
+        };
+        Ok(log)
+    }
+
+    fn grid(&self, signals: &[Signal<'_>]) -> Result<Clocked> {
+        let Some(first) = signals.first() else {
+            return Err(Error::input(self.source, "channels", "none", "those of a car"));
+        };
+        let asked = self.options.rate_hz.map(|rate| 1.0 / rate);
+        let fits = |dt: f64| asked.is_none_or(|asked| (asked - dt).abs() <= 1e-9 * dt);
+        let shared = signals
+            .iter()
+            .all(|s| s.delay_s == 0.0 && Arc::ptr_eq(&s.times, &first.times));
+        if shared && let Some(dt_s) = uniform_interval(&first.times).filter(|dt| fits(*dt)) {
+            return Ok(Clocked::AsLogged(Grid {
+                start_s: first.times[0],
+                dt_s,
+                samples: first.times.len(),
+            }));
+        }
+        // Lap numbers and distance may be logged slowly or start late without holding the others back.
+        let driving = || {
+            signals
+                .iter()
+                .filter(|s| s.mapped.role.required() || s.mapped.role == Role::Vx)
+        };
+        let fastest = driving()
+            .min_by(|a, b| a.nominal_s.total_cmp(&b.nominal_s))
+            .unwrap_or(first);
+        let dt_s = asked
+            .or_else(|| uniform_interval(&fastest.times))
+            .unwrap_or(fastest.nominal_s);
+        let (mut start, mut end) = (f64::NEG_INFINITY, f64::INFINITY);
+        for signal in driving() {
+            if let [first, .., last] = &signal.times[..] {
+                start = start.max(first - signal.delay_s);
+                end = end.min(last - signal.delay_s);
+            }
+        }
+        Grid::within(self.source, fastest.times[0], start, end, dt_s).map(Clocked::Resampled)
+    }
+
+    fn speed_of_wheels(&self, log: &mut Log) -> Result<Vec<f64>> {
+        let Some(radius) = self.radius else {
+            return Err(Error::input(
+                self.source,
+                "channel vx",
+                "no ground speed, and no rolling radius to make one of wheel speeds",
+                "a ground speed channel, or rolling_radius_m in [vehicle] of the channel map",
+            ));
+        };
+        let [fl, fr, rl, rr] = &log.wheel_speed_radps;
+        let (left, right, name) = match self.map.speed_axle {
+            Axle::Front => (fl, fr, "front"),
+            Axle::Rear => (rl, rr, "rear"),
+        };
+        let note =
+            format!("vx: no ground speed is logged; the mean of the {name} wheel speeds stands in for it");
+        if !log.calibration.notes.contains(&note) {
+            log.calibration.notes.push(note);
+        }
+        Ok(left
+            .iter()
+            .zip(right)
+            .map(|(l, r)| (l + r) / 2.0 * radius)
+            .collect())
+    }
+
+    fn laps(&self, signals: &[Signal<'_>], grid: &Grid, calibration: &mut Calibration) -> Result<Vec<Lap>> {
+        let whole = |number, complete| Lap {
+            number,
+            start: 0,
+            end: grid.samples,
+            complete,
+        };
+        let native = self.recording.format == Format::Native;
+        if !self.recording.beacons_s.is_empty() {
+            let cuts = laps::cuts_from_beacons(&self.recording.beacons_s, *grid);
+            return Ok(laps::cut(&cuts, 0, *grid));
+        }
+        let channel = |role| signals.iter().find(|s| s.mapped.role == role);
+        if let Some(lap) = channel(Role::Lap) {
+            let numbers = lap_numbers(self.source, lap)?;
+            let first = numbers.first().copied().unwrap_or(0);
+            let cuts = laps::cuts_from_numbers(&lap.times, &numbers);
+            let mut found = laps::cut(&cuts, first, *grid);
+            if let Some(flags) = channel(Role::LapComplete) {
+                for lap in &mut found {
+                    let at = flags
+                        .times
+                        .partition_point(|t| *t < grid.time_s(lap.start) - grid.dt_s / 2.0);
+                    lap.complete = flags.values.get(at).is_some_and(|v| *v == 1.0);
+                }
+            } else if native && cuts.is_empty() {
+                found = vec![whole(first, true)];
+            }
+            return Ok(found);
+        }
+        let range = self.recording.metadata.range.as_deref().unwrap_or("");
+        let exported_lap = range.to_ascii_lowercase().starts_with("lap");
+        if !native && !exported_lap {
+            let note = "laps: no beacons and no lap number are logged; the whole file is taken as one lap that may not \
+                        be complete";
+            if !calibration.notes.iter().any(|n| n == note) {
+                calibration.notes.push(note.to_owned());
+            }
+        }
+        Ok(vec![whole(1, native || exported_lap)])
+    }
+}
+
+enum Clocked {
+    /// The samples as they were logged.
+    AsLogged(Grid),
+    /// New samples between them.
+    Resampled(Grid),
+}
+
+fn lap_numbers(source: &str, lap: &Signal<'_>) -> Result<Vec<u32>> {
+    let number = |(at, &value): (usize, &f64)| {
+        if value.fract() == 0.0 && (0.0..=f64::from(u32::MAX)).contains(&value) {
+            Ok(value as u32)
+        } else {
+            Err(Error::input(
+                source,
+                lap.mapped.channel.place(at),
+                value.to_string(),
+                "a lap number: whole, 0 or more",
+            ))
+        }
+    };
+    lap.values.iter().enumerate().map(number).collect()
+}
+
+/// Distance that goes on where the logged one starts again at nought.
+fn running_distance(values: &[f64]) -> Vec<f64> {
+    let mut carried = 0.0;
+    let mut last = values.first().copied().unwrap_or(0.0);
+    values
+        .iter()
+        .map(|&value| {
+            // Half of what was reached: a counter that corrects itself by a few metres has not started again.
+            if value < 0.5 * last {
+                carried += last;
+            }
+            last = value;
+            value + carried
+        })
+        .collect()
+}
+
+fn from_lap_start(all: &[f64], laps: &[Lap]) -> Vec<f64> {
+    let mut out = all.to_vec();
+    for lap in laps {
+        if let Some(part) = out.get_mut(lap.start..lap.end)
+            && let Some(&start) = part.first()
+        {
+            part.iter_mut().for_each(|d| *d -= start);
+        }
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn logged_distance_starts_again_with_the_counter() {
+        assert_eq!(
+            running_distance(&[0.0, 10.0, 20.0, 1.0, 11.0]),
+            [0.0, 10.0, 20.0, 21.0, 31.0]
+        );
+    }
+}

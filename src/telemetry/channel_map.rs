@@ -1,0 +1,414 @@
+//! Which logged channel plays which role: from a small TOML file, and by the usual names where it says nothing.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+use toml::Spanned;
+
+use super::recording::{Channel, Recording};
+use super::role::Role;
+use super::text::shown;
+use super::units::Unit;
+use crate::{Error, Result};
+
+/// One of the car's axles.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Axle {
+    /// The front one.
+    #[default]
+    Front,
+    /// The rear one.
+    Rear,
+}
+
+/// What a channel map says about one role.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ChannelEntry {
+    /// The channel's name in the log; by the usual names where it is not given.
+    pub name: Option<String>,
+    /// The unit to believe instead of the one the log gives.
+    pub unit: Option<String>,
+    /// 1 or -1, multiplied to the values. Given, it is not estimated from the log.
+    pub sign: Option<f64>,
+    /// How much later than the event the logger recorded it, s; taken off its times. Given, it is not estimated.
+    pub delay_s: Option<f64>,
+}
+
+/// Which channel plays which role, with the few figures of the car that are needed to convert them.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ChannelMap {
+    /// What was said about roles; the others go by the usual names.
+    pub channels: BTreeMap<Role, ChannelEntry>,
+    /// Steering-wheel angle over road-wheel angle, for a log of the steering-wheel angle.
+    pub steering_ratio: Option<f64>,
+    /// Rolling radius (m) by which wheel speeds logged in km/h are divided to give rad/s, and on which wheel speeds
+    /// are calibrated.
+    pub rolling_radius_m: Option<f64>,
+    /// The axle whose wheel speeds stand in for a ground speed that is not logged: the undriven one.
+    pub speed_axle: Axle,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct FileEntry {
+    name: Option<String>,
+    unit: Option<Spanned<String>>,
+    sign: Option<Spanned<f64>>,
+    delay_s: Option<Spanned<f64>>,
+}
+
+#[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct FileVehicle {
+    steering_ratio: Option<Spanned<f64>>,
+    rolling_radius_m: Option<Spanned<f64>>,
+    #[serde(default)]
+    speed_axle: Axle,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct FileMap {
+    #[serde(default)]
+    channels: BTreeMap<Role, FileEntry>,
+    #[serde(default)]
+    vehicle: FileVehicle,
+}
+
+/// A role with the channel found for it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Mapped<'a> {
+    /// The role.
+    pub role: Role,
+    /// The channel that plays it.
+    pub channel: &'a Channel,
+    /// Its unit; none for plain numbers.
+    pub unit: Option<Unit>,
+    /// The sign the map declares.
+    pub sign: Option<f64>,
+    /// The delay the map declares, s.
+    pub delay_s: Option<f64>,
+    /// Whether the map names the channel; else it was found by its usual name.
+    pub declared: bool,
+}
+
+impl ChannelMap {
+    /// Reads a channel map.
+    ///
+    /// # Errors
+    /// [`Error::Io`], or [`Error::Input`] naming the line of an unknown key or a value out of range.
+    pub fn read(path: impl AsRef<Path>) -> Result<Self> {
+        let path = path.as_ref();
+        let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, "read", e))?;
+        Self::parse(&text, path)
+    }
+
+    /// Reads a channel map from its text; `path` is its name in error messages.
+    ///
+    /// # Errors
+    /// As for [`ChannelMap::read`].
+    pub fn parse(text: &str, path: impl AsRef<Path>) -> Result<Self> {
+        let path = path.as_ref();
+        let line_of = |at: usize| 1 + text.bytes().take(at).filter(|&byte| byte == b'\n').count();
+        let file: FileMap = toml::from_str(text).map_err(|e| {
+            let place = match e.span() {
+                Some(span) => format!("line {}", line_of(span.start)),
+                None => "the file".to_owned(),
+            };
+            let message = e.message().replace('\n', " ");
+            let (found, expected) = message
+                .split_once(", expected ")
+                .unwrap_or((&message, "a channel map in TOML"));
+            Error::input(path, place, found, expected)
+        })?;
+        let checked =
+            |value: Option<Spanned<f64>>, key: &str, expected: &str, fits: fn(f64) -> bool| match value {
+                Some(value) if !fits(*value.get_ref()) => Err(Error::input(
+                    path,
+                    format!("line {}, field {key}", line_of(value.span().start)),
+                    value.get_ref().to_string(),
+                    expected,
+                )),
+                value => Ok(value.map(Spanned::into_inner)),
+            };
+        let mut channels = BTreeMap::new();
+        for (role, entry) in file.channels {
+            if let Some(unit) = &entry.unit
+                && !role.quantities().is_empty()
+            {
+                check_unit(unit.get_ref(), role).map_err(|expected| {
+                    let line = line_of(unit.span().start);
+                    let place = format!("line {line}, field channels.{}.unit", role.key());
+                    Error::input(path, place, shown(unit.get_ref()), expected)
+                })?;
+            }
+            let field = |name: &str| format!("channels.{}.{name}", role.key());
+            let entry = ChannelEntry {
+                name: entry.name,
+                unit: entry.unit.map(Spanned::into_inner),
+                sign: checked(entry.sign, &field("sign"), "1 or -1", |v| v.abs() == 1.0)?,
+                delay_s: checked(
+                    entry.delay_s,
+                    &field("delay_s"),
+                    "a delay between -5 and 5 s",
+                    |v| v.abs() <= 5.0,
+                )?,
+            };
+            channels.insert(role, entry);
+        }
+        Ok(Self {
+            channels,
+            steering_ratio: checked(
+                file.vehicle.steering_ratio,
+                "vehicle.steering_ratio",
+                "a ratio between 0.1 and 50",
+                |v| (0.1..=50.0).contains(&v),
+            )?,
+            rolling_radius_m: checked(
+                file.vehicle.rolling_radius_m,
+                "vehicle.rolling_radius_m",
+                "a radius between 0.05 and 2 m",
+                |v| (0.05..=2.0).contains(&v),
+            )?,
+            speed_axle: file.vehicle.speed_axle,
+        })
+    }
+
+    /// Finds the channel of each role.
+    ///
+    /// # Errors
+    /// [`Error::Input`] when a channel the map names is not in the recording, a required role finds no channel, or a
+    /// channel's unit is unknown or measures something else.
+    pub fn resolve<'a>(&self, recording: &'a Recording) -> Result<Vec<Mapped<'a>>> {
+        let mut mapped = Vec::new();
+        for role in Role::ALL {
+            let entry = self.channels.get(&role);
+            let name = entry.and_then(|e| e.name.as_deref());
+            let found = match name {
+                Some(name) => Some(recording.channel(name).ok_or_else(|| {
+                    Error::input(
+                        &recording.source,
+                        format!("channel {}", role.key()),
+                        format!("no channel {}; it has {}", shown(name), listed(recording)),
+                        "the name that the channel map gives",
+                    )
+                })?),
+                None => guess(role, recording),
+            };
+            let Some(channel) = found else {
+                if role.required() || entry.is_some() {
+                    return Err(Error::input(
+                        &recording.source,
+                        format!("channel {}", role.key()),
+                        format!("none with a usual name; it has {}", listed(recording)),
+                        format!(
+                            "a [channels.{}] entry with its name in the channel map",
+                            role.key()
+                        ),
+                    ));
+                }
+                continue;
+            };
+            let unit_text = entry.and_then(|e| e.unit.as_deref()).unwrap_or(&channel.unit);
+            let unit = match check_unit(unit_text, role) {
+                Ok(unit) => unit,
+                // A pedal in volts is of no use, and nobody asked for it.
+                Err(_) if name.is_none() && matches!(role, Role::Throttle | Role::Brake) => {
+                    continue;
+                }
+                Err(expected) => {
+                    return Err(Error::input(
+                        &recording.source,
+                        format!("channel {}", channel.name),
+                        format!("the unit {}", shown(unit_text)),
+                        format!(
+                            "{expected}; a unit in [channels.{}] of the channel map overrides it",
+                            role.key()
+                        ),
+                    ));
+                }
+            };
+            mapped.push(Mapped {
+                role,
+                channel,
+                unit,
+                sign: entry.and_then(|e| e.sign),
+                delay_s: entry.and_then(|e| e.delay_s),
+                declared: name.is_some(),
+            });
+        }
+        Ok(mapped)
+    }
+}
+
+fn check_unit(text: &str, role: Role) -> Result<Option<Unit>, String> {
+    let allowed = role.quantities();
+    if allowed.is_empty() {
+        return Ok(None);
+    }
+    match Unit::parse(text).filter(|unit| allowed.contains(&unit.quantity)) {
+        Some(unit) => Ok(Some(unit)),
+        None => Err(allowed
+            .iter()
+            .map(|quantity| quantity.described())
+            .collect::<Vec<_>>()
+            .join(" or ")),
+    }
+}
+
+fn guess(role: Role, recording: &Recording) -> Option<&Channel> {
+    let key = |name: &str| -> String {
+        name.chars()
+            .filter(char::is_ascii_alphanumeric)
+            .map(|c| c.to_ascii_lowercase())
+            .collect()
+    };
+    role.usual_names()
+        .iter()
+        .find_map(|usual| recording.channels.iter().find(|c| key(&c.name) == *usual))
+}
+
+fn listed(recording: &Recording) -> String {
+    const MOST: usize = 40;
+    let names: Vec<_> = recording
+        .channels
+        .iter()
+        .take(MOST)
+        .map(|c| c.name.as_str())
+        .collect();
+    let rest = recording.channels.len() - names.len();
+    if rest == 0 {
+        names.join(", ")
+    } else {
+        format!("{} and {rest} more", names.join(", "))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::telemetry::{Clock, Format, Metadata};
+    use proptest::prelude::*;
+
+    fn recording(channels: &[(&str, &str)]) -> Recording {
+        Recording {
+            source: "a.csv".into(),
+            format: Format::MotecCsv,
+            channels: channels
+                .iter()
+                .map(|(name, unit)| Channel {
+                    name: (*name).to_owned(),
+                    unit: (*unit).to_owned(),
+                    clock: Clock::Rate {
+                        start_s: 0.0,
+                        rate_hz: 10.0,
+                    },
+                    values: vec![0.0; 2],
+                    unreadable: None,
+                    lines: None,
+                })
+                .collect(),
+            beacons_s: Vec::new(),
+            metadata: Metadata::default(),
+        }
+    }
+
+    const IRACING: [(&str, &str); 9] = [
+        ("LFspeed", "m/s"),
+        ("RFspeed", "m/s"),
+        ("LRspeed", "m/s"),
+        ("RRspeed", "m/s"),
+        ("SteeringWheelAngle", "rad"),
+        ("Speed", "m/s"),
+        ("LongAccel", "m/s^2"),
+        ("LatAccel", "m/s^2"),
+        ("YawRate", "rad/s"),
+    ];
+
+    #[test]
+    fn a_map_is_read_in_full() {
+        let map = ChannelMap::parse(
+            "[channels.yaw_rate]\nname = \"Gyro\"\nunit = \"deg/s\"\nsign = -1\ndelay_s = 0.1\n\
+             [vehicle]\nsteering_ratio = 14\nrolling_radius_m = 0.325\nspeed_axle = \"rear\"\n",
+            "m.toml",
+        )
+        .unwrap();
+        let yaw = &map.channels[&Role::YawRate];
+        assert_eq!((yaw.sign, yaw.delay_s), (Some(-1.0), Some(0.1)));
+        assert_eq!(map.steering_ratio, Some(14.0));
+        assert_eq!(map.speed_axle, Axle::Rear);
+        assert_eq!(ChannelMap::parse("", "m.toml").unwrap(), ChannelMap::default());
+    }
+
+    #[test]
+    fn each_fault_of_a_map_names_its_line() {
+        for (text, parts) in [
+            ("\n[channels.yaw]\nname = \"x\"", ["m.toml: line 2", "`yaw`"]),
+            ("[channels.ay]\nname = \"x\"\nsing = 1", ["line 3", "`sing`"]),
+            (
+                "[channels.ay]\nsign = 2",
+                ["line 2, field channels.ay.sign: found 2", "1 or -1"],
+            ),
+            (
+                "[channels.ay]\ndelay_s = nan",
+                ["line 2, field channels.ay.delay_s", "NaN"],
+            ),
+            (
+                "[channels.ay]\nunit = \"deg\"",
+                ["line 2, field channels.ay.unit: found \"deg\"", "an acceleration"],
+            ),
+            (
+                "[vehicle]\nrolling_radius_m = 325",
+                ["line 2, field vehicle.rolling_radius_m", "325"],
+            ),
+            ("[vehicle]\nmass = 1", ["line 2", "`mass`"]),
+            ("a = ", ["line 1", "m.toml"]),
+        ] {
+            let error = ChannelMap::parse(text, "m.toml").unwrap_err().to_string();
+            for part in parts {
+                assert!(error.contains(part), "{part}: {error}");
+            }
+        }
+    }
+
+    #[test]
+    fn usual_names_are_found() {
+        let recording = recording(&IRACING);
+        let mapped = ChannelMap::default().resolve(&recording).unwrap();
+        assert_eq!(mapped.len(), 9);
+        for (m, (name, _)) in mapped.iter().zip(IRACING) {
+            assert_eq!(m.channel.name, name);
+            assert!(!m.declared);
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_resolved_says_what_to_write() {
+        let error = |channels: &[(&str, &str)], map: &str| {
+            let map = ChannelMap::parse(map, "m.toml").unwrap();
+            map.resolve(&recording(channels)).unwrap_err().to_string()
+        };
+        let missing = error(&IRACING[..8], "");
+        assert!(missing.contains("channel yaw_rate: found none") && missing.contains("[channels.yaw_rate]"));
+        let named = error(&IRACING, "[channels.ay]\nname = \"Lat\"");
+        assert!(named.contains("no channel \"Lat\"; it has LFspeed"), "{named}");
+        let mut units = IRACING;
+        units[8].1 = "furlong";
+        let unit = error(&units, "");
+        assert!(
+            unit.contains("channel YawRate: found the unit \"furlong\"") && unit.contains("deg/s"),
+            "{unit}"
+        );
+        let map = ChannelMap::parse("[channels.yaw_rate]\nunit = \"deg/s\"", "m.toml").unwrap();
+        assert!(map.resolve(&recording(&units)).is_ok());
+    }
+
+    proptest! {
+        #[test]
+        fn a_map_never_panics(text in "[\\[\\]a-z_.=\" \n0-9-]{0,80}") {
+            let _ = ChannelMap::parse(&text, "m.toml");
+        }
+    }
+}

@@ -1,0 +1,410 @@
+//! The log that an identification works on.
+
+use std::ops::Range;
+use std::path::Path;
+
+use super::audit::{check_gains, frozen_tail_s};
+use super::build::{Build, signals};
+use super::calibrate::{self, Calibration, CalibrationOptions, Declared, FindingKind};
+use super::channel_map::{Axle, ChannelMap, Mapped};
+use super::delays;
+use super::laps::Lap;
+use super::recording::{Format, Recording};
+use super::role::Role;
+use super::text::shown;
+use crate::{Error, Result};
+
+/// How a recording is turned into a [`Log`].
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct LogOptions {
+    /// Sample rate of the log, Hz; the highest rate among the channels needed where it is not given.
+    pub rate_hz: Option<f64>,
+    /// Gaps of up to this (s) are bridged by a straight line; longer ones are errors. Intervals of up to three times
+    /// the nominal one are no gaps.
+    pub bridge_gaps_s: f64,
+    /// The rolling radius (m) to use where the channel map gives none: that of the car being identified.
+    pub rolling_radius_m: Option<f64>,
+    /// What is estimated from the log and corrected.
+    pub calibration: CalibrationOptions,
+}
+
+/// A log on one uniform clock, in SI and ISO 8855: x forward, y left, yaw anticlockwise and steering to the left
+/// positive. All arrays have as many values as `time_s`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Log {
+    /// The file it came from.
+    pub source: String,
+    /// Sample interval, s.
+    pub dt_s: f64,
+    /// Time, s.
+    pub time_s: Vec<f64>,
+    /// Distance from the start of the lap, m; integrated from speed where it is not logged.
+    pub distance_m: Vec<f64>,
+    /// Wheel speeds FL FR RL RR, rad/s.
+    pub wheel_speed_radps: [Vec<f64>; 4],
+    /// Road-wheel angle, rad.
+    pub steer_rad: Vec<f64>,
+    /// Forward speed, m/s.
+    pub vx_mps: Vec<f64>,
+    /// Longitudinal acceleration `dVx/dt - Vy r`, m/s^2.
+    pub ax_mps2: Vec<f64>,
+    /// Lateral acceleration `dVy/dt + Vx r`, m/s^2.
+    pub ay_mps2: Vec<f64>,
+    /// Yaw rate, rad/s.
+    pub yaw_rate_radps: Vec<f64>,
+    /// Its laps, in order and without gaps.
+    pub laps: Vec<Lap>,
+    /// What was estimated from the log and applied to it.
+    pub calibration: Calibration,
+}
+
+impl Log {
+    /// Reads a log file. A native file without lap columns is one complete lap, and its values come through bit for
+    /// bit as long as no other rate and no calibration is asked for.
+    ///
+    /// # Errors
+    /// [`Error::Io`] when the file cannot be read; [`Error::Input`], naming line or time and channel, for missing
+    /// channels, unknown units, samples that are no numbers, times that do not rise, gaps, and values that no car
+    /// reaches.
+    pub fn read(path: impl AsRef<Path>, map: &ChannelMap, options: &LogOptions) -> Result<Self> {
+        Self::from_recording(&Recording::read(path)?, map, options)
+    }
+
+    /// Makes a log of a recording.
+    ///
+    /// # Errors
+    /// As for [`Log::read`], save [`Error::Io`].
+    pub fn from_recording(recording: &Recording, map: &ChannelMap, options: &LogOptions) -> Result<Self> {
+        check_options(options)?;
+        let source = recording.source.display().to_string();
+        let radius = map.rolling_radius_m.or(options.rolling_radius_m);
+        let mapped = map.resolve(recording)?;
+        let declared = Declared {
+            signs: roles(&mapped, |m| m.sign.is_some()),
+            delays: roles(&mapped, |m| m.delay_s.is_some()),
+            rolling_radius_m: radius,
+            speed_of_wheels: !mapped.iter().any(|m| m.role == Role::Vx),
+        };
+        let mut calibration = Calibration::default();
+        for m in mapped
+            .iter()
+            .filter(|m| !m.declared && recording.format != Format::Native)
+        {
+            calibration.notes.push(format!(
+                "{}: channel {}, by its name",
+                m.role.key(),
+                shown(&m.channel.name)
+            ));
+        }
+        if recording.format != Format::Native && map.steering_ratio.is_none() {
+            calibration.notes.push(
+                "steer: taken as the road-wheel angle: the channel map gives no steering_ratio".to_owned(),
+            );
+        }
+        let mut signals = signals(&source, &mapped, map, options, radius)?;
+        let build = Build {
+            source: &source,
+            recording,
+            map,
+            options,
+            radius,
+        };
+        let mut log = build.assemble(&signals, calibration)?;
+        check_gains(&log)?;
+        if options.calibration.delays.is_on(recording.format) {
+            let mut calibration = std::mem::take(&mut log.calibration);
+            let undriven = match map.speed_axle {
+                Axle::Front => [0, 1],
+                Axle::Rear => [2, 3],
+            };
+            delays::delays(&log, &declared, undriven, &mut calibration);
+            for signal in &mut signals {
+                if let Some(delay) = calibration.applied(signal.mapped.role, FindingKind::Delay) {
+                    signal.delay_s += delay;
+                }
+            }
+            log = build.assemble(&signals, calibration)?;
+        }
+        if let Some(frozen_s) = frozen_tail_s(&log) {
+            log.calibration.notes.push(format!(
+                "the last {frozen_s:.1} s repeat one sample: the sensors were off before the logger"
+            ));
+        }
+        calibrate::apply(&mut log, &options.calibration, recording.format, &declared);
+        Ok(log)
+    }
+
+    /// Number of samples.
+    pub fn samples(&self) -> usize {
+        self.time_s.len()
+    }
+
+    /// Duration from the first sample to the last, s.
+    pub fn duration_s(&self) -> f64 {
+        self.samples().saturating_sub(1) as f64 * self.dt_s
+    }
+
+    /// Part of the log. Laps that are cut are no longer complete.
+    ///
+    /// # Errors
+    /// [`Error::Input`] when the range is empty or reaches past the end.
+    pub fn slice(&self, range: Range<usize>) -> Result<Self> {
+        if range.start >= range.end || range.end > self.samples() {
+            return Err(Error::input(
+                &self.source,
+                "samples",
+                format!("{} to {}", range.start, range.end),
+                format!("a range within 0 to {}", self.samples()),
+            ));
+        }
+        let cut = |values: &[f64]| values[range.clone()].to_vec();
+        let laps = self.laps.iter().filter_map(|lap| {
+            let (start, end) = (lap.start.max(range.start), lap.end.min(range.end));
+            (start < end).then(|| Lap {
+                number: lap.number,
+                start: start - range.start,
+                end: end - range.start,
+                complete: lap.complete && end - start == lap.end - lap.start,
+            })
+        });
+        Ok(Self {
+            source: self.source.clone(),
+            dt_s: self.dt_s,
+            time_s: cut(&self.time_s),
+            distance_m: cut(&self.distance_m),
+            wheel_speed_radps: [0, 1, 2, 3].map(|w| cut(&self.wheel_speed_radps[w])),
+            steer_rad: cut(&self.steer_rad),
+            vx_mps: cut(&self.vx_mps),
+            ax_mps2: cut(&self.ax_mps2),
+            ay_mps2: cut(&self.ay_mps2),
+            yaw_rate_radps: cut(&self.yaw_rate_radps),
+            laps: laps.collect(),
+            calibration: self.calibration.clone(),
+        })
+    }
+
+    /// The lap with a number, as a log of its own.
+    ///
+    /// # Errors
+    /// [`Error::Input`] when there is none.
+    pub fn lap(&self, number: u32) -> Result<Self> {
+        match self.laps.iter().find(|lap| lap.number == number) {
+            Some(lap) => self.slice(lap.start..lap.end),
+            None => Err(Error::input(
+                &self.source,
+                "lap",
+                number.to_string(),
+                format!(
+                    "one of {}",
+                    self.laps
+                        .iter()
+                        .map(|lap| lap.number.to_string())
+                        .collect::<Vec<_>>()
+                        .join(", ")
+                ),
+            )),
+        }
+    }
+
+    /// Refuses a log that is shorter than a window of `window_s`.
+    ///
+    /// # Errors
+    /// [`Error::Input`] with both lengths.
+    pub fn check_length(&self, window_s: f64) -> Result<()> {
+        // The last sample's time is reached only to rounding.
+        if self.duration_s() + 1e-6 * self.dt_s >= window_s {
+            return Ok(());
+        }
+        Err(Error::input(
+            &self.source,
+            "time",
+            format!("{:.3} s of log", self.duration_s()),
+            format!("at least one window of {window_s} s"),
+        ))
+    }
+}
+
+fn check_options(options: &LogOptions) -> Result<()> {
+    let checks = [
+        ("sample rate", options.rate_hz, 0.1..=100_000.0, "Hz"),
+        ("bridged gap", Some(options.bridge_gaps_s), 0.0..=1e6, "s"),
+        ("rolling radius", options.rolling_radius_m, 0.05..=2.0, "m"),
+    ];
+    for (name, value, range, unit) in checks {
+        if let Some(value) = value.filter(|v| !range.contains(v)) {
+            return Err(Error::input(
+                "log options",
+                name,
+                value.to_string(),
+                format!("{} to {} {unit}", range.start(), range.end()),
+            ));
+        }
+    }
+    Ok(())
+}
+
+fn roles(mapped: &[Mapped<'_>], which: fn(&Mapped<'_>) -> bool) -> Vec<Role> {
+    mapped.iter().filter(|m| which(m)).map(|m| m.role).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::telemetry::synthetic::{Car, native_text};
+    use crate::telemetry::{Channel, Clock, Metadata, Switch};
+
+    fn channel(name: &str, unit: &str, rate_hz: f64, f: impl Fn(f64) -> f64) -> Channel {
+        let samples = (8.0 * rate_hz) as usize;
+        Channel {
+            name: name.to_owned(),
+            unit: unit.to_owned(),
+            clock: Clock::Rate {
+                start_s: 0.0,
+                rate_hz,
+            },
+            values: (0..samples).map(|i| f(i as f64 / rate_hz)).collect(),
+            unreadable: None,
+            lines: None,
+        }
+    }
+
+    /// Channels of different rates, as in a `.ld`.
+    fn mixed() -> Recording {
+        let mut channels: Vec<Channel> = ["FL", "FR", "RL", "RR"]
+            .map(|w| channel(&format!("Wheel Speed {w}"), "km/h", 100.0, |t| 72.0 + 3.6 * t))
+            .into();
+        channels.push(channel("Steered Angle", "deg", 20.0, |t| t));
+        channels.push(channel("G Force Lat", "G", 50.0, |_| 0.5));
+        channels.push(channel("G Force Long", "G", 50.0, |_| 0.1));
+        channels.push(channel("Gyro Yaw Velocity", "deg/s", 50.0, |t| 2.0 * t));
+        channels.push(channel(
+            "Lap Number",
+            "",
+            1.0,
+            |t| {
+                if t < 3.0 { 4.0 } else { 5.0 }
+            },
+        ));
+        Recording {
+            source: "a.ld".into(),
+            format: Format::MotecLd,
+            channels,
+            beacons_s: Vec::new(),
+            metadata: Metadata::default(),
+        }
+    }
+
+    fn off() -> LogOptions {
+        LogOptions {
+            calibration: CalibrationOptions::all(Switch::Off),
+            ..LogOptions::default()
+        }
+    }
+
+    fn map(text: &str) -> ChannelMap {
+        ChannelMap::parse(text, "m.toml").unwrap()
+    }
+
+    #[test]
+    fn channels_of_different_rates_meet_on_the_fastest() {
+        let map = map("[vehicle]\nsteering_ratio = 10\nrolling_radius_m = 0.5");
+        let log = Log::from_recording(&mixed(), &map, &off()).unwrap();
+        assert_eq!(log.dt_s, 0.01);
+        // The slowest needed channel ends first.
+        assert_eq!(log.samples(), 796);
+        for i in [0, 3, 500, 795] {
+            let t = log.time_s[i];
+            assert!((log.steer_rad[i] - (t / 10.0).to_radians()).abs() < 1e-12);
+            assert!((log.wheel_speed_radps[1][i] - (20.0 + t) / 0.5).abs() < 1e-9);
+            assert!((log.vx_mps[i] - (20.0 + t)).abs() < 1e-9);
+            assert!((log.yaw_rate_radps[i] - (2.0 * t).to_radians()).abs() < 1e-12);
+        }
+        assert!(
+            log.calibration
+                .notes
+                .iter()
+                .any(|n| n.contains("front wheel speeds stand"))
+        );
+        let numbers: Vec<_> = log.laps.iter().map(|l| (l.number, l.start, l.end)).collect();
+        assert_eq!(numbers, [(4, 0, 300), (5, 300, 796)]);
+        assert_eq!(log.distance_m[300], 0.0);
+        assert!((log.distance_m[299] - (20.0 * 2.99 + 2.99 * 2.99 / 2.0)).abs() < 1e-6);
+    }
+
+    #[test]
+    fn declared_delays_and_signs_are_taken_off() {
+        let text = "[vehicle]\nrolling_radius_m = 0.5\n[channels.yaw_rate]\nsign = -1\ndelay_s = 0.205";
+        let log = Log::from_recording(&mixed(), &map(text), &off()).unwrap();
+        let expected = -(2.0 * (log.time_s[10] + 0.205)).to_radians();
+        assert!((log.yaw_rate_radps[10] - expected).abs() < 1e-12);
+    }
+
+    #[test]
+    fn linear_wheel_speeds_need_a_radius() {
+        let error = Log::from_recording(&mixed(), &ChannelMap::default(), &off()).unwrap_err();
+        assert!(
+            error.to_string().contains("rolling_radius_m in [vehicle]"),
+            "{error}"
+        );
+    }
+
+    #[test]
+    fn a_broken_lap_number_names_its_place() {
+        let mut recording = mixed();
+        recording.channels[8].values[2] = 4.5;
+        let map = map("[vehicle]\nrolling_radius_m = 0.5");
+        let error = Log::from_recording(&recording, &map, &off()).unwrap_err();
+        assert!(
+            error
+                .to_string()
+                .contains("channel Lap Number, t = 2.000 s: found 4.5"),
+            "{error}"
+        );
+    }
+
+    #[test]
+    fn another_rate_is_made_when_asked_for() {
+        let text = native_text(&Car::default().drive(10.0, 50.0));
+        let recording = Recording::parse(text.as_bytes(), "a.csv").unwrap();
+        let read = |rate_hz| {
+            let options = LogOptions {
+                rate_hz,
+                ..LogOptions::default()
+            };
+            Log::from_recording(&recording, &ChannelMap::default(), &options)
+        };
+        let log = read(Some(10.0)).unwrap();
+        assert_eq!((log.dt_s, log.samples()), (0.1, 100));
+        assert_eq!(read(Some(50.0)).unwrap(), read(None).unwrap());
+        assert!(
+            read(Some(f64::NAN))
+                .unwrap_err()
+                .to_string()
+                .contains("sample rate: found NaN")
+        );
+        assert!(read(Some(1e5)).is_ok() && read(Some(1e9)).is_err());
+    }
+
+    #[test]
+    fn slices_and_laps() {
+        let map = map("[vehicle]\nrolling_radius_m = 0.5");
+        let mut log = Log::from_recording(&mixed(), &map, &off()).unwrap();
+        log.laps[0].complete = true;
+        assert_eq!(log.lap(5).unwrap().samples(), 496);
+        assert!(log.lap(4).unwrap().laps[0].complete);
+        let cut = log.slice(100..400).unwrap();
+        assert_eq!(
+            (cut.laps[0].end, cut.laps[0].complete, cut.laps[1].end),
+            (200, false, 300)
+        );
+        let error = log.lap(9).unwrap_err().to_string();
+        assert!(error.contains("lap: found 9, expected one of 4, 5"), "{error}");
+        assert!(log.slice(5..5).is_err() && log.slice(0..9999).is_err());
+        assert!(log.check_length(7.95).is_ok());
+        let error = log.check_length(8.0).unwrap_err().to_string();
+        assert!(
+            error.contains("found 7.950 s of log, expected at least one window of 8 s"),
+            "{error}"
+        );
+    }
+}

@@ -1,0 +1,258 @@
+//! What the channels of a log are needed for, and what loggers call them.
+
+use serde::{Deserialize, Serialize};
+
+use super::units::Quantity;
+
+/// What a channel is needed for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Role {
+    /// Speed of the front left wheel.
+    WheelSpeedFl,
+    /// Speed of the front right wheel.
+    WheelSpeedFr,
+    /// Speed of the rear left wheel.
+    WheelSpeedRl,
+    /// Speed of the rear right wheel.
+    WheelSpeedRr,
+    /// Steering angle, at the road wheels or at the steering wheel.
+    Steer,
+    /// Speed over ground.
+    Vx,
+    /// Longitudinal acceleration.
+    Ax,
+    /// Lateral acceleration.
+    Ay,
+    /// Yaw rate.
+    YawRate,
+    /// Distance travelled.
+    Distance,
+    /// Lap number.
+    Lap,
+    /// 1 where the lap was driven from line to line, 0 elsewhere (native files).
+    LapComplete,
+    /// Throttle position.
+    Throttle,
+    /// Brake pressure or position.
+    Brake,
+}
+
+impl Role {
+    /// All roles.
+    pub const ALL: [Self; 14] = [
+        Self::WheelSpeedFl,
+        Self::WheelSpeedFr,
+        Self::WheelSpeedRl,
+        Self::WheelSpeedRr,
+        Self::Steer,
+        Self::Vx,
+        Self::Ax,
+        Self::Ay,
+        Self::YawRate,
+        Self::Distance,
+        Self::Lap,
+        Self::LapComplete,
+        Self::Throttle,
+        Self::Brake,
+    ];
+    /// The wheels' roles, FL FR RL RR.
+    pub const WHEELS: [Self; 4] = [
+        Self::WheelSpeedFl,
+        Self::WheelSpeedFr,
+        Self::WheelSpeedRl,
+        Self::WheelSpeedRr,
+    ];
+
+    /// The role's key in a channel map.
+    pub fn key(self) -> &'static str {
+        match self {
+            Self::WheelSpeedFl => "wheel_speed_fl",
+            Self::WheelSpeedFr => "wheel_speed_fr",
+            Self::WheelSpeedRl => "wheel_speed_rl",
+            Self::WheelSpeedRr => "wheel_speed_rr",
+            Self::Steer => "steer",
+            Self::Vx => "vx",
+            Self::Ax => "ax",
+            Self::Ay => "ay",
+            Self::YawRate => "yaw_rate",
+            Self::Distance => "distance",
+            Self::Lap => "lap",
+            Self::LapComplete => "lap_complete",
+            Self::Throttle => "throttle",
+            Self::Brake => "brake",
+        }
+    }
+
+    /// Whether a log cannot do without it. Ground speed can be made from wheel speeds.
+    pub fn required(self) -> bool {
+        matches!(
+            self,
+            Self::WheelSpeedFl
+                | Self::WheelSpeedFr
+                | Self::WheelSpeedRl
+                | Self::WheelSpeedRr
+                | Self::Steer
+                | Self::Ax
+                | Self::Ay
+                | Self::YawRate
+        )
+    }
+
+    /// The quantities its channel may have; none where it is a plain number.
+    pub fn quantities(self) -> &'static [Quantity] {
+        match self {
+            Self::WheelSpeedFl | Self::WheelSpeedFr | Self::WheelSpeedRl | Self::WheelSpeedRr => {
+                &[Quantity::AngularSpeed, Quantity::Speed]
+            }
+            Self::Steer => &[Quantity::Angle],
+            Self::Vx => &[Quantity::Speed],
+            Self::Ax | Self::Ay => &[Quantity::Acceleration],
+            Self::YawRate => &[Quantity::AngularSpeed],
+            Self::Distance => &[Quantity::Distance],
+            Self::Throttle | Self::Brake => &[Quantity::Ratio, Quantity::Pressure],
+            Self::Lap | Self::LapComplete => &[],
+        }
+    }
+
+    /// Usual names, best first, in lower case and without anything but letters and digits: ours, then those of
+    /// MoTeC, AiM, Racelogic and iRacing.
+    pub(super) fn usual_names(self) -> &'static [&'static str] {
+        match self {
+            Self::WheelSpeedFl => &[
+                "wheelspeedflradps",
+                "wheelspeedfl",
+                "wheelspeedfrontleft",
+                "wheelspdfl",
+                "whlspdfl",
+                "wspeedfl",
+                "speedfl",
+                "flwheelspeed",
+                "flspeed",
+                "lfspeed",
+            ],
+            Self::WheelSpeedFr => &[
+                "wheelspeedfrradps",
+                "wheelspeedfr",
+                "wheelspeedfrontright",
+                "wheelspdfr",
+                "whlspdfr",
+                "wspeedfr",
+                "speedfr",
+                "frwheelspeed",
+                "frspeed",
+                "rfspeed",
+            ],
+            Self::WheelSpeedRl => &[
+                "wheelspeedrlradps",
+                "wheelspeedrl",
+                "wheelspeedrearleft",
+                "wheelspdrl",
+                "whlspdrl",
+                "wspeedrl",
+                "speedrl",
+                "rlwheelspeed",
+                "rlspeed",
+                "lrspeed",
+            ],
+            Self::WheelSpeedRr => &[
+                "wheelspeedrrradps",
+                "wheelspeedrr",
+                "wheelspeedrearright",
+                "wheelspdrr",
+                "whlspdrr",
+                "wspeedrr",
+                "speedrr",
+                "rrwheelspeed",
+                "rrspeed",
+            ],
+            Self::Steer => &[
+                "steerrad",
+                "steeredangle",
+                "steerangle",
+                "steeringangle",
+                "steeringwheelangle",
+                "steering",
+                "steeringpos",
+                "steerpos",
+                "steeringposition",
+                "steer",
+            ],
+            Self::Vx => &[
+                "vxmps",
+                "groundspeed",
+                "corrspeed",
+                "vehiclespeed",
+                "speedoverground",
+                "velocitykmh",
+                "velocity",
+                "gpsspeed",
+                "speed",
+            ],
+            Self::Ax => &[
+                "axmps2",
+                "gforcelong",
+                "gforcelongitudinal",
+                "longacc",
+                "longaccel",
+                "longitudinalacceleration",
+                "accelerationx",
+                "inlineacc",
+                "lonacc",
+                "accelerometerx",
+                "gpslonacc",
+                "glong",
+            ],
+            Self::Ay => &[
+                "aymps2",
+                "gforcelat",
+                "gforcelateral",
+                "latacc",
+                "lataccel",
+                "lateralacceleration",
+                "accelerationy",
+                "lateralacc",
+                "accelerometery",
+                "gpslatacc",
+                "glat",
+            ],
+            Self::YawRate => &[
+                "yawrateradps",
+                "gyroyawvelocity",
+                "yawrate",
+                "gyroyaw",
+                "yawvelocity",
+                "gyrozaxis",
+                "rategyroz",
+                "zrate",
+                "gpsgyro",
+            ],
+            Self::Distance => &[
+                "distancem",
+                "lapdistance",
+                "distance",
+                "correcteddistance",
+                "lapdist",
+                "distanceonvehiclespeed",
+            ],
+            Self::Lap => &["lap", "lapnumber", "lapnum", "lapno"],
+            Self::LapComplete => &["lapcomplete"],
+            Self::Throttle => &[
+                "throttle",
+                "throttlepos",
+                "throttleposition",
+                "throttlepedal",
+                "pps",
+                "tps",
+            ],
+            Self::Brake => &[
+                "brake",
+                "brakepos",
+                "brakepresfront",
+                "brakepressurefront",
+                "brakepress",
+                "brakepressure",
+            ],
+        }
+    }
+}
