@@ -1,7 +1,7 @@
 // Twin of `src/vehicle/model.rs`: wheels, tyres, aero, loads and body put together. `Tyre` and `tyre_forces` come
 // from the tyre model's own module.
 //
-// A shader cannot choose a tyre by reference, so the loop over the wheels is one loop per axle; the wheels' order
+// A shader cannot choose a tyre by reference, so the twin's loop over the wheels is written out; the wheels' order
 // and every operation are the twin's.
 
 struct CarInput {
@@ -24,9 +24,6 @@ struct CarModel {
     chassis: Chassis,
     front: Tyre,
     rear: Tyre,
-    // The right wheels'; the left ones lean the other way.
-    camber_front: Camber,
-    camber_rear: Camber,
 }
 
 struct WheelSlip {
@@ -50,17 +47,6 @@ fn to_body_axes(forces: TyreForces, direction: vec2<f32>) -> vec2<f32> {
     );
 }
 
-fn car_model(chassis: Chassis, front: Tyre, rear: Tyre) -> CarModel {
-    let degree = 0.017453292519943295;
-    return CarModel(
-        chassis,
-        front,
-        rear,
-        camber_of(chassis.camber_front * degree),
-        camber_of(chassis.camber_rear * degree),
-    );
-}
-
 // One pass of the twin's loop over the wheels.
 fn with_wheel(
     total: BodyForces,
@@ -71,10 +57,10 @@ fn with_wheel(
     rim_speed: f32,
     least_speed: f32,
     load: f32,
-    camber: Camber,
+    side: f32,
 ) -> BodyForces {
     let slip = wheel_slip(body, place, direction, rim_speed, least_speed);
-    let forces = tyre_forces(tyre, TyreInput(load, slip.ratio, slip.tangent, camber));
+    let forces = tyre_forces(tyre, TyreInput(load, slip.ratio, slip.tangent, side));
     let force = to_body_axes(forces, direction);
     return BodyForces(
         total.x + force.x,
@@ -83,34 +69,22 @@ fn with_wheel(
     );
 }
 
-// The pair of wheels of one axle, left then right; `camber` is the right wheel's.
+// The pair of wheels of one axle, left then right.
 fn with_axle(
     start: BodyForces,
     body: BodyState,
     tyre: Tyre,
-    place: vec2<f32>,
+    axle_x: f32,
+    half_track: f32,
     direction: vec2<f32>,
     rim_speed: vec2<f32>,
     least_speed: f32,
     load: vec2<f32>,
-    camber: Camber,
 ) -> BodyForces {
-    var total = start;
-    for (var wheel = 0u; wheel < 2u; wheel++) {
-        let left = wheel == 0u;
-        total = with_wheel(
-            total,
-            body,
-            tyre,
-            vec2<f32>(place.x, select(-place.y, place.y, left)),
-            direction,
-            select(rim_speed.y, rim_speed.x, left),
-            least_speed,
-            select(load.y, load.x, left),
-            Camber(select(camber.angle, -camber.angle, left), select(camber.sine, -camber.sine, left)),
-        );
-    }
-    return total;
+    let left = vec2<f32>(axle_x, half_track);
+    let right = vec2<f32>(axle_x, -half_track);
+    let total = with_wheel(start, body, tyre, left, direction, rim_speed.x, least_speed, load.x, 1.0);
+    return with_wheel(total, body, tyre, right, direction, rim_speed.y, least_speed, load.y, -1.0);
 }
 
 fn car_rate(car: CarModel, state: CarState, input: CarInput) -> CarRate {
@@ -125,23 +99,23 @@ fn car_rate(car: CarModel, state: CarState, input: CarInput) -> CarRate {
         total,
         body,
         car.front,
-        vec2<f32>(car.chassis.cg_to_front, car.chassis.half_track_front),
+        car.chassis.cg_to_front,
+        car.chassis.half_track_front,
         turned,
         input.wheel_speed.xy * car.chassis.radius_front,
         car.chassis.slip_speed_floor,
         loads.xy,
-        car.camber_front,
     );
     total = with_axle(
         total,
         body,
         car.rear,
-        vec2<f32>(-car.chassis.cg_to_rear, car.chassis.half_track_rear),
+        -car.chassis.cg_to_rear,
+        car.chassis.half_track_rear,
         straight,
         input.wheel_speed.zw * car.chassis.radius_rear,
         car.chassis.slip_speed_floor,
         loads.zw,
-        car.camber_rear,
     );
     let rate = body_derivative(car.chassis, body, total);
     return CarRate(

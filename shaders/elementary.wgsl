@@ -1,5 +1,6 @@
-// Twin of `src/scalar/elementary.rs`: our own sine, cosine, inverse tangent and exponential, because WGSL only
-// promises 2^-11 for `sin` and `cos` and 4096 ULP for `atan`. Same functions, same order, same operations.
+// Twin of `src/scalar/elementary.rs`: our own sine, cosine, tangent, inverse tangent and
+// exponential, because WGSL only promises 2^-11 for `sin` and `cos` and 4096 ULP for `atan`. Same functions,
+// same order, same operations.
 // Drivers may regroup literals, so no product has more than one.
 
 // `cos(atan x)`, and -1 below zero, else +1: twins of the provided methods of `Real` in `src/scalar/mod.rs`.
@@ -22,15 +23,24 @@ fn two_to_the(n: f32) -> f32 {
 
 fn sine_polynomial(r: f32) -> f32 {
     let t = r * r;
-    var p = 2.6017497e-6;
-    p = p * t + -1.9807351e-4;
-    p = p * t + 8.333025e-3;
-    p = p * t + -0.16666657;
+    let low = -0.16666657 + 8.333025e-3 * t;
+    let high = -1.9807351e-4 + 2.6017497e-6 * t;
+    let p = low + high * (t * t);
     return r + r * t * p;
 }
 
+fn cosine_polynomial(r: f32) -> f32 {
+    let t = r * r;
+    var p = -2.6284124e-7;
+    p = p * t + 2.4773923e-5;
+    p = p * t + -1.3888641e-3;
+    p = p * t + 4.166666e-2;
+    p = p * t + -0.5;
+    return 1.0 + t * p;
+}
+
 fn reduce(x: f32, half_turns: f32) -> f32 {
-    return ((x - half_turns * 3.140625) - half_turns * 9.670257568359375e-4) - half_turns * 6.278329573e-7;
+    return (x - half_turns * 3.140625) - half_turns * 9.676535897932385e-4;
 }
 
 fn parity_sign(n: f32) -> f32 {
@@ -48,19 +58,24 @@ fn own_cos(x: f32) -> f32 {
     return -(parity_sign(n) * sine_polynomial(reduce(x, n + 0.5)));
 }
 
+fn own_tan(x: f32) -> f32 {
+    let n = floor(x * 0.3183098861837907 + 0.5);
+    let r = reduce(x, n);
+    return sine_polynomial(r) / cosine_polynomial(r);
+}
+
 fn own_atan(x: f32) -> f32 {
     let size = abs(x);
     let large = 1.0 < size;
     let q = select(size, 1.0, large) / select(1.0, size, large);
     let t = q * q;
-    var p = 2.8498906e-3;
-    p = p * t + -1.6068634e-2;
-    p = p * t + 4.2691525e-2;
-    p = p * t + -7.504295e-2;
-    p = p * t + 0.10640934;
-    p = p * t + -0.14203644;
-    p = p * t + 0.1999262;
-    p = p * t + -0.33333072;
+    let t2 = t * t;
+    let t4 = t2 * t2;
+    let p01 = -0.33333072 + 0.1999262 * t;
+    let p23 = -0.14203644 + 0.10640934 * t;
+    let p45 = -7.504295e-2 + 4.2691525e-2 * t;
+    let p67 = -1.6068634e-2 + 2.8498906e-3 * t;
+    let p = (p01 + p23 * t2) + (p45 + p67 * t2) * t4;
     let angle = q + q * t * p;
     let folded = select(angle, 1.5707963267948966 - angle, large);
     return select(folded, -folded, x < 0.0);

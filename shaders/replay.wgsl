@@ -4,7 +4,8 @@
 // samples, and leaves its state in a buffer for the next, so that no dispatch runs long enough for a watchdog to
 // kill it and the sums group as in the twin however the stretches are cut.
 //
-// The loaders (`load_chassis`, `load_front`, `load_rear`) and the constants NORM and WORKGROUP are generated.
+// A car comes as the ready figures of `CarModel::to_table`: those that all candidates share from `base`, the others
+// from `figures`, variable by variable. The loaders (`load_chassis`, `load_front`, `load_rear`) and the constants NORM and WORKGROUP are generated.
 
 struct Sample {
     wheel_speed: vec4<f32>,
@@ -23,7 +24,7 @@ struct Window {
 @group(0) @binding(2) var<storage, read> samples: array<Sample>;
 @group(0) @binding(3) var<storage, read> windows: array<Window>;
 @group(0) @binding(4) var<storage, read> fractions: array<vec4<f32>>;
-@group(0) @binding(5) var<storage, read> positions: array<f32>;
+@group(0) @binding(5) var<storage, read> figures: array<f32>;
 @group(0) @binding(6) var<storage, read_write> progress: array<f32>;
 
 fn input_between(a: Sample, b: Sample, fraction: f32) -> CarInput {
@@ -80,7 +81,7 @@ fn replay(@builtin(global_invocation_id) id: vec3<u32>) {
         drives = progress[place_of(10u, row, candidate)] != 0.0;
     }
 
-    let car = car_model(load_chassis(candidate), load_front(candidate), load_rear(candidate));
+    let car = CarModel(load_chassis(candidate), load_front(candidate), load_rear(candidate));
     var block = vec4<f32>(0.0);
     let stop = min(stretch.first_sample + stretch.samples, last + 1u);
     for (var i = stretch.first_sample; i < stop; i++) {

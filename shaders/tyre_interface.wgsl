@@ -1,19 +1,10 @@
 // Twin of the types in `src/vehicle/tyre/mod.rs` that every tyre model shares.
 
-struct Camber {
-    angle: f32,
-    sine: f32,
-}
-
-fn camber_of(angle: f32) -> Camber {
-    return Camber(angle, own_sin(angle));
-}
-
 struct TyreInput {
     load: f32,
     slip_ratio: f32,
     slip_tangent: f32,
-    camber: Camber,
+    side: f32,
 }
 
 struct TyreForces {

@@ -1,8 +1,9 @@
 //! Composition of the kernels from the fragments under `shaders/`, one list per kernel, and the generated parts:
-//! constants, and the loaders that tell a free parameter from a fixed one.
+//! constants, and the loaders that tell the figures that candidates share from those in which they differ.
 
 use crate::evaluate::replay::Norm;
-use crate::vehicle::{Chassis, TyreModel};
+use crate::vehicle::tyre::Tyre;
+use crate::vehicle::{Chassis, LinearTyre, MagicFormula, TyreModel};
 use std::fmt::Write as _;
 
 /// Our own `sin`, `cos`, `atan` and `exp`.
@@ -27,11 +28,11 @@ pub fn car_fragments(model: TyreModel) -> [&'static str; 7] {
     [ELEMENTARY, CHASSIS, AERO, LOADS, TYRE_INTERFACE, tyre, CAR]
 }
 
-/// The name of the tyre model's parameter struct in WGSL, and in Rust.
-pub fn tyre_struct(model: TyreModel) -> &'static str {
+/// The tyre model's struct, which has one name in WGSL and in Rust, with its fields in order.
+pub fn tyre_struct(model: TyreModel) -> (&'static str, &'static [&'static str]) {
     match model {
-        TyreModel::MagicFormula => "TyreCoefficients",
-        TyreModel::Linear => "LinearTyre",
+        TyreModel::MagicFormula => ("MagicFormula", <MagicFormula<f32> as Tyre<f32>>::FIELDS),
+        TyreModel::Linear => ("LinearTyre", <LinearTyre<f32> as Tyre<f32>>::FIELDS),
     }
 }
 
@@ -40,7 +41,7 @@ pub fn tyre_struct(model: TyreModel) -> &'static str {
 pub struct ReplayShape<'a> {
     /// The tyre model.
     pub model: TyreModel,
-    /// For each place of the flat form, the variable that sets it, if any.
+    /// For each figure of a ready car, which varying figure it is, if it varies: `ModelTable::sources`.
     pub sources: &'a [Option<usize>],
     /// The norm.
     pub norm: Norm,
@@ -51,11 +52,13 @@ pub struct ReplayShape<'a> {
 impl ReplayShape<'_> {
     /// Source of the kernel that drives and scores; entry point `replay`.
     pub fn replay(&self) -> String {
+        if let Ok(p) = std::env::var("LS_SRC") { return std::fs::read_to_string(p).unwrap(); } // TEMPORARY
         let mut source = car_fragments(self.model).concat();
         source.push_str(&self.constants());
         source.push_str(REPLAY_COMMON);
         source.push_str(REPLAY);
         source.push_str(&loaders(self.model, self.sources));
+        if let Ok(p) = std::env::var("LS_DUMP") { std::fs::write(p, &source).unwrap(); } // TEMPORARY
         source
     }
 
@@ -86,23 +89,23 @@ pub fn base_vectors(count: usize) -> usize {
     count.div_ceil(4).max(1)
 }
 
-/// The loaders `load_chassis`, `load_front` and `load_rear`: a fixed parameter comes from the uniform table `base`,
-/// where the compiler sees that all lanes share it, a free one from its row of `positions`.
+/// The loaders `load_chassis`, `load_front` and `load_rear`: a figure that candidates share comes from the uniform
+/// table `base`, where the compiler sees that all lanes read the same, one that varies from its row of `figures`.
 pub fn loaders(model: TyreModel, sources: &[Option<usize>]) -> String {
     let chassis = Chassis::<f32>::FIELDS;
-    let tyre = model.fields();
+    let (structure, tyre) = tyre_struct(model);
     let mut text = "\n// Generated.\n".to_owned();
     let mut slot = 0;
     for (function, structure, fields) in [
         ("load_chassis", "Chassis", chassis),
-        ("load_front", tyre_struct(model), tyre),
-        ("load_rear", tyre_struct(model), tyre),
+        ("load_front", structure, tyre),
+        ("load_rear", structure, tyre),
     ] {
         // Writing to a String cannot fail.
         let _ = writeln!(text, "fn {function}(candidate: u32) -> {structure} {{\n    return {structure}(");
         for field in fields {
             let place = match sources[slot] {
-                Some(variable) => format!("positions[{variable}u * stretch.stride + candidate]"),
+                Some(figure) => format!("figures[{figure}u * stretch.stride + candidate]"),
                 None => format!("base[{}].{}", slot / 4, ["x", "y", "z", "w"][slot % 4]),
             };
             let _ = writeln!(text, "        {place}, // {field}");

@@ -3,6 +3,7 @@
 use super::cpu::collect_rows;
 use super::kernel::{BLOCK, CHANNELS};
 use super::problem::ReplayProblem;
+use super::table::ModelTable;
 use crate::error::{Error, Result};
 use crate::evaluate::gpu::shader::{ReplayShape, base_vectors};
 use crate::evaluate::gpu::{Binding, DeviceKind, GpuContext, Kernel};
@@ -122,7 +123,7 @@ struct BatchBuffers {
     /// Lanes and candidates that fit.
     lanes: usize,
     stride: usize,
-    positions: wgpu::Buffer,
+    figures: wgpu::Buffer,
     results: wgpu::Buffer,
     readback: wgpu::Buffer,
     replay_group: wgpu::BindGroup,
@@ -139,6 +140,7 @@ struct Stopwatch {
 /// Scores replays on a graphics processor.
 pub struct GpuEvaluator<'a> {
     replay: &'a ReplayProblem,
+    table: ModelTable,
     context: Arc<GpuContext>,
     batching: Batching,
     drive: Arc<Kernel>,
@@ -164,9 +166,10 @@ impl<'a> GpuEvaluator<'a> {
         let workgroup = WORKGROUP
             .min(limits.max_compute_invocations_per_workgroup)
             .min(limits.max_compute_workgroup_size_x);
+        let table = ModelTable::new(replay);
         let shape = ReplayShape {
             model: replay.tyre_model(),
-            sources: replay.sources(),
+            sources: &table.sources,
             norm: replay.plan.norm,
             workgroup,
         };
@@ -179,7 +182,7 @@ impl<'a> GpuEvaluator<'a> {
         let reduce = context.kernel(&shape.reduce(), "replay_reduce", &[Uniform, Read, Write])?;
 
         let plan = replay.plan.to_f32();
-        let mut base: Vec<f32> = replay.base().iter().map(|x| *x as f32).collect();
+        let mut base = table.base.clone();
         base.resize(base_vectors(base.len()) * 4, 0.0);
         let samples: Vec<DeviceSample> = plan
             .samples
@@ -242,6 +245,7 @@ impl<'a> GpuEvaluator<'a> {
         };
         Ok(Self {
             replay,
+            table,
             batching: Batching::for_kind(context.summary().kind),
             context,
             drive,
@@ -300,7 +304,7 @@ impl<'a> GpuEvaluator<'a> {
         } else {
             all.min(whole_blocks.max(BLOCK))
         };
-        let per_candidate = (self.replay.dimensions().max(RESULT_PLANES) * 4) as u64;
+        let per_candidate = (self.table.varying.len().max(RESULT_PLANES) * 4) as u64;
         let candidates = (lanes / windows)
             .min((binding / per_candidate) as usize)
             .min(most_groups * self.workgroup);
@@ -319,9 +323,9 @@ impl<'a> GpuEvaluator<'a> {
         self.batch = None;
         let context = &self.context;
         let floats = |count: usize| (count * 4) as u64;
-        let positions = context.buffer(
-            "positions",
-            floats(stride * self.replay.dimensions()),
+        let figures = context.buffer(
+            "figures",
+            floats(stride * self.table.varying.len()),
             Usage::STORAGE | Usage::COPY_DST,
         )?;
         let progress = context.buffer("progress", floats(lanes * PROGRESS_PLANES), Usage::STORAGE)?;
@@ -331,13 +335,13 @@ impl<'a> GpuEvaluator<'a> {
         let [base, samples, window_table, fractions] = &self.tables;
         let replay_group = context.bind(
             &self.drive,
-            &[&self.stretch, base, samples, window_table, fractions, &positions, &progress],
+            &[&self.stretch, base, samples, window_table, fractions, &figures, &progress],
         )?;
         let reduce_group = context.bind(&self.reduce, &[&self.stretch, &progress, &results])?;
         self.batch = Some(BatchBuffers {
             lanes,
             stride,
-            positions,
+            figures,
             results,
             readback,
             replay_group,
@@ -356,7 +360,7 @@ impl<'a> GpuEvaluator<'a> {
         (samples / BLOCK).max(1) * BLOCK
     }
 
-    /// Drives one batch of candidates, whose positions are on the device, through one batch of windows.
+    /// Drives one batch of candidates, whose figures are on the device, through one batch of windows.
     fn drive_batch(&mut self, mut stretch: Stretch) -> Result<()> {
         let first = stretch.first_window as usize;
         let windows = &self.replay.plan.windows[first..first + stretch.windows as usize];
@@ -424,16 +428,19 @@ impl<'a> GpuEvaluator<'a> {
         self.reserve(most_candidates, most_windows)?;
         for candidates in rows.chunks(most_candidates) {
             let stride = candidates.len().next_multiple_of(self.workgroup);
-            let mut positions = vec![0.0f32; stride * self.replay.dimensions()];
-            for (candidate, row) in candidates.iter().enumerate() {
-                for (variable, value) in row.iter().enumerate() {
-                    positions[variable * stride + candidate] = *value as f32;
+            let varying = self.table.varying.len();
+            let by_candidate = self.table.rows(self.replay, candidates);
+            // Figure by figure, so that neighbouring lanes read neighbouring memory.
+            let mut figures = vec![0.0f32; stride * varying];
+            for (candidate, row) in by_candidate.chunks_exact(varying.max(1)).enumerate() {
+                for (figure, value) in row.iter().enumerate() {
+                    figures[figure * stride + candidate] = *value;
                 }
             }
             let Some(batch) = &self.batch else {
                 return Err(Error::Device("a batch without buffers".to_owned()));
             };
-            self.context.write(&batch.positions, bytemuck::cast_slice(&positions));
+            self.context.write(&batch.figures, bytemuck::cast_slice(&figures));
             for first_window in (0..all_windows).step_by(most_windows) {
                 self.drive_batch(Stretch {
                     candidates: candidates.len() as u32,

@@ -82,12 +82,4 @@ impl TyreModel {
             Self::Linear => LinearTyre::<f64>::PARAMETERS,
         }
     }
-
-    /// The parameters' names in code, in the same order.
-    pub fn fields(self) -> &'static [&'static str] {
-        match self {
-            Self::MagicFormula => TyreCoefficients::<f64>::FIELDS,
-            Self::Linear => LinearTyre::<f64>::FIELDS,
-        }
-    }
 }
