@@ -1,8 +1,8 @@
 // Twin of `src/vehicle/model.rs`: wheels, tyres, aero, loads and body put together. `Tyre` and `tyre_forces` come
 // from the tyre model's own module.
 //
-// A shader cannot choose a tyre by reference, so the twin's loop over the wheels is written out; the wheels' order
-// and every operation are the twin's.
+// A shader cannot choose a tyre by reference, so the twin's loop over the axles is written out; the wheels of one
+// axle are reckoned side by side. The order of every sum and every operation are the twin's.
 
 struct CarInput {
     wheel_speed: vec4<f32>,
@@ -27,64 +27,61 @@ struct CarModel {
 }
 
 struct WheelSlip {
-    ratio: f32,
-    tangent: f32,
+    ratio: Pair,
+    tangent: Pair,
 }
 
-fn wheel_slip(body: BodyState, place: vec2<f32>, direction: vec2<f32>, rim_speed: f32, least_speed: f32) -> WheelSlip {
-    let hub_x = body.vx - body.yaw_rate * place.y;
-    let hub_y = body.vy + body.yaw_rate * place.x;
+fn wheel_slip(
+    body: BodyState,
+    x: f32,
+    y: Pair,
+    direction: vec2<f32>,
+    rim_speed: Pair,
+    least_speed: f32,
+) -> WheelSlip {
+    let hub_x = body.vx - body.yaw_rate * y;
+    let hub_y = body.vy + body.yaw_rate * x;
     let vx = direction.x * hub_x + direction.y * hub_y;
     let vy = direction.x * hub_y - direction.y * hub_x;
-    let speed = max(abs(vx), least_speed);
+    let speed = max(abs(vx), Pair(least_speed));
     return WheelSlip((rim_speed - vx) / speed, vy / speed);
 }
 
-fn to_body_axes(forces: TyreForces, direction: vec2<f32>) -> vec2<f32> {
-    return vec2<f32>(
+struct AxleForces {
+    x: Pair,
+    y: Pair,
+}
+
+fn to_body_axes(forces: TyreForces, direction: vec2<f32>) -> AxleForces {
+    return AxleForces(
         forces.x * direction.x - forces.y * direction.y,
         forces.x * direction.y + forces.y * direction.x,
     );
 }
 
-// One pass of the twin's loop over the wheels.
-fn with_wheel(
-    total: BodyForces,
-    body: BodyState,
-    tyre: Tyre,
-    place: vec2<f32>,
-    direction: vec2<f32>,
-    rim_speed: f32,
-    least_speed: f32,
-    load: f32,
-    side: f32,
-) -> BodyForces {
-    let slip = wheel_slip(body, place, direction, rim_speed, least_speed);
-    let forces = tyre_forces(tyre, TyreInput(load, slip.ratio, slip.tangent, side));
-    let force = to_body_axes(forces, direction);
-    return BodyForces(
-        total.x + force.x,
-        total.y + force.y,
-        total.yaw_moment + (place.x * force.y - place.y * force.x + forces.aligning_moment),
-    );
-}
-
-// The pair of wheels of one axle, left then right.
+// One pass of the twin's loop over the axles: `start` with the forces of the left, then of the right wheel.
 fn with_axle(
     start: BodyForces,
     body: BodyState,
     tyre: Tyre,
-    axle_x: f32,
+    x: f32,
     half_track: f32,
     direction: vec2<f32>,
-    rim_speed: vec2<f32>,
+    rim_speed: Pair,
     least_speed: f32,
-    load: vec2<f32>,
+    load: Pair,
 ) -> BodyForces {
-    let left = vec2<f32>(axle_x, half_track);
-    let right = vec2<f32>(axle_x, -half_track);
-    let total = with_wheel(start, body, tyre, left, direction, rim_speed.x, least_speed, load.x, 1.0);
-    return with_wheel(total, body, tyre, right, direction, rim_speed.y, least_speed, load.y, -1.0);
+    let side = Pair(1.0, -1.0);
+    let y = half_track * side;
+    let slip = wheel_slip(body, x, y, direction, rim_speed, least_speed);
+    let forces = tyre_forces(tyre, TyreInput(load, slip.ratio, slip.tangent, side));
+    let force = to_body_axes(forces, direction);
+    let moment = x * force.y - y * force.x + forces.aligning_moment;
+    return BodyForces(
+        start.x + force.x.x + force.x.y,
+        start.y + force.y.x + force.y.y,
+        start.yaw_moment + moment.x + moment.y,
+    );
 }
 
 fn car_rate(car: CarModel, state: CarState, input: CarInput) -> CarRate {
@@ -92,7 +89,7 @@ fn car_rate(car: CarModel, state: CarState, input: CarInput) -> CarRate {
     let aero = aero_forces(car.chassis, body.vx);
     let loads = wheel_loads(car.chassis, body, state.pitch_acceleration, aero);
     let steer = input.steer * car.chassis.steer_scale + car.chassis.steer_offset;
-    let turned = vec2<f32>(own_cos(steer), own_sin(steer));
+    let turned = vec2<f32>(own_cos(Pair(steer)).x, own_sin(Pair(steer)).x);
     let straight = vec2<f32>(1.0, 0.0);
     var total = BodyForces(-aero.drag, 0.0, 0.0);
     total = with_axle(

@@ -91,38 +91,38 @@ alias Tyre = MagicFormula;
 // `LEAST_LOAD` in `src/vehicle/tyre/mod.rs`.
 const LEAST_LOAD: f32 = 1e-3;
 
-fn stretched_slip(b: f32, e: f32, x: f32) -> f32 {
+fn stretched_slip(b: Pair, e: Pair, x: Pair) -> Pair {
     let bx = b * x;
     return bx - e * (bx - own_atan(bx));
 }
 
-fn sine_shape(c: f32, b: f32, e: f32, x: f32) -> f32 {
+fn sine_shape(c: f32, b: Pair, e: Pair, x: Pair) -> Pair {
     return own_sin(c * own_atan(stretched_slip(b, e, x)));
 }
 
-fn cosine_shape(c: f32, b: f32, e: f32, x: f32) -> f32 {
+fn cosine_shape(c: f32, b: Pair, e: Pair, x: Pair) -> Pair {
     return own_cos(c * own_atan(stretched_slip(b, e, x)));
 }
 
-fn weight(c: f32, b: f32, e: f32, x: f32, shift: f32) -> f32 {
+fn weight(c: f32, b: Pair, e: Pair, x: Pair, shift: Pair) -> Pair {
     return cosine_shape(c, b, e, x) / cosine_shape(c, b, e, shift);
 }
 
-fn clamp_curvature(e: f32) -> f32 {
-    return min(e, 1.0);
+fn clamp_curvature(e: Pair) -> Pair {
+    return min(e, Pair(1.0));
 }
 
 struct Load {
-    force: f32,
-    difference: f32,
+    force: Pair,
+    difference: Pair,
 }
 
 struct PureLongitudinal {
-    force: f32,
-    stiffness: f32,
+    force: Pair,
+    stiffness: Pair,
 }
 
-fn pure_longitudinal(t: MagicFormula, load: Load, slip_ratio: f32) -> PureLongitudinal {
+fn pure_longitudinal(t: MagicFormula, load: Load, slip_ratio: Pair) -> PureLongitudinal {
     let dfz = load.difference;
     let mu = t.dx1 + t.dx2 * dfz;
     let k = (t.kx1 + t.kx2 * dfz) * own_exp(t.kx3 * dfz);
@@ -134,14 +134,14 @@ fn pure_longitudinal(t: MagicFormula, load: Load, slip_ratio: f32) -> PureLongit
 }
 
 struct PureLateral {
-    force: f32,
-    peak: f32,
-    stiffness: f32,
-    slope: f32,
-    residual_shift: f32,
+    force: Pair,
+    peak: Pair,
+    stiffness: Pair,
+    slope: Pair,
+    residual_shift: Pair,
 }
 
-fn pure_lateral(t: MagicFormula, load: Load, slip_tangent: f32, side: f32) -> PureLateral {
+fn pure_lateral(t: MagicFormula, load: Load, slip_tangent: Pair, side: Pair) -> PureLateral {
     let dfz = load.difference;
     let peak = (t.dy1 + t.dy2 * dfz) * load.force;
     let z = load.force * t.ky_load;
@@ -160,13 +160,13 @@ fn pure_lateral(t: MagicFormula, load: Load, slip_tangent: f32, side: f32) -> Pu
     );
 }
 
-fn longitudinal_weight(t: MagicFormula, load: Load, slip_ratio: f32, slip_tangent: f32) -> f32 {
+fn longitudinal_weight(t: MagicFormula, load: Load, slip_ratio: Pair, slip_tangent: Pair) -> Pair {
     let b = t.rbx1 * cos_atan(t.rbx2 * slip_ratio);
     let e = clamp_curvature(t.rex1 + t.rex2 * load.difference);
-    return weight(t.rcx1, b, e, slip_tangent + t.rhx1, t.rhx1);
+    return weight(t.rcx1, b, e, slip_tangent + t.rhx1, Pair(t.rhx1));
 }
 
-fn lateral_weight(t: MagicFormula, load: Load, slip_ratio: f32, slip_tangent: f32) -> f32 {
+fn lateral_weight(t: MagicFormula, load: Load, slip_ratio: Pair, slip_tangent: Pair) -> Pair {
     let b = t.rby1 * cos_atan(t.rby2 * (slip_tangent - t.rby3));
     let e = clamp_curvature(t.rey1 + t.rey2 * load.difference);
     let shift = t.rhy1 + t.rhy2 * load.difference;
@@ -176,16 +176,16 @@ fn lateral_weight(t: MagicFormula, load: Load, slip_ratio: f32, slip_tangent: f3
 fn induced_lateral(
     t: MagicFormula,
     load: Load,
-    peak: f32,
-    slip_ratio: f32,
-    slip_tangent: f32,
-    side: f32,
-) -> f32 {
+    peak: Pair,
+    slip_ratio: Pair,
+    slip_tangent: Pair,
+    side: Pair,
+) -> Pair {
     let amplitude = peak * (t.rvy1 + t.rvy2 * load.difference + t.rvy_camber * side);
     return amplitude * cos_atan(t.rvy4 * slip_tangent) * own_sin(t.rvy5 * own_atan(t.rvy6 * slip_ratio));
 }
 
-fn equivalent_tangent(x: f32, slip_share: f32) -> f32 {
+fn equivalent_tangent(x: Pair, slip_share: Pair) -> Pair {
     let tangent = own_tan(x);
     return sqrt(tangent * tangent + slip_share * slip_share) * sign_of(x);
 }
@@ -195,11 +195,11 @@ fn aligning_moment(
     load: Load,
     input: TyreInput,
     lateral: PureLateral,
-    longitudinal_stiffness: f32,
-    force_x: f32,
-    force_y: f32,
-    induced: f32,
-) -> f32 {
+    longitudinal_stiffness: Pair,
+    force_x: Pair,
+    force_y: Pair,
+    induced: Pair,
+) -> Pair {
     let dfz = load.difference;
     let side = input.side;
     let slip_share = longitudinal_stiffness / lateral.stiffness * input.slip_ratio;
@@ -227,7 +227,7 @@ fn aligning_moment(
 }
 
 fn tyre_forces(t: MagicFormula, input: TyreInput) -> TyreForces {
-    let force = max(input.load, LEAST_LOAD);
+    let force = max(input.load, Pair(LEAST_LOAD));
     let load = Load(force, force * t.inverse_nominal - 1.0);
     let pure_x = pure_longitudinal(t, load, input.slip_ratio);
     let lateral = pure_lateral(t, load, input.slip_tangent, input.side);
@@ -236,6 +236,7 @@ fn tyre_forces(t: MagicFormula, input: TyreInput) -> TyreForces {
     let y = lateral.force * lateral_weight(t, load, input.slip_ratio, input.slip_tangent) + induced;
     let moment = aligning_moment(t, load, input, lateral, pure_x.stiffness, x, y, induced);
 
-    let loaded = 0.0 < input.load;
-    return TyreForces(select(0.0, x, loaded), select(0.0, y, loaded), select(0.0, moment, loaded));
+    let zero = Pair(0.0);
+    let loaded = zero < input.load;
+    return TyreForces(select(zero, x, loaded), select(zero, y, loaded), select(zero, moment, loaded));
 }

@@ -1,14 +1,15 @@
-// Twin of the types in `src/vehicle/tyre/mod.rs` that every tyre model shares.
+// Twin of the types in `src/vehicle/tyre/mod.rs` that every tyre model shares. An axle's two wheels, left and right,
+// are reckoned side by side.
 
 struct TyreInput {
-    load: f32,
-    slip_ratio: f32,
-    slip_tangent: f32,
-    side: f32,
+    load: Pair,
+    slip_ratio: Pair,
+    slip_tangent: Pair,
+    side: Pair,
 }
 
 struct TyreForces {
-    x: f32,
-    y: f32,
-    aligning_moment: f32,
+    x: Pair,
+    y: Pair,
+    aligning_moment: Pair,
 }

@@ -10,7 +10,7 @@ struct LinearTyre {
 alias Tyre = LinearTyre;
 
 fn tyre_forces(t: LinearTyre, input: TyreInput) -> TyreForces {
-    let share = max(input.load, 0.0) / t.nominal_load;
+    let share = max(input.load, Pair(0.0)) / t.nominal_load;
     let y = -(t.cornering_stiffness * own_atan(input.slip_tangent) * share);
     return TyreForces(t.slip_stiffness * input.slip_ratio * share, y, -(t.trail * y));
 }
