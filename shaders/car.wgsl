@@ -1,11 +1,11 @@
 // Twin of `src/vehicle/model.rs`: wheels, tyres, aero, loads and body put together. `Tyre` and `tyre_forces` come
 // from the tyre model's own module.
 //
-// A shader cannot choose a tyre by reference, so the twin's loop over the axles is written out; the wheels of one
-// axle are reckoned side by side. The order of every sum and every operation are the twin's.
+// The twin's loop over the wheels is one pass over all four side by side; the order of every sum and every
+// operation are the twin's.
 
 struct CarInput {
-    wheel_speed: vec4<f32>,
+    wheel_speed: Wheels,
     steer: f32,
 }
 
@@ -22,101 +22,81 @@ struct CarRate {
 
 struct CarModel {
     chassis: Chassis,
-    front: Tyre,
-    rear: Tyre,
+    // The front axle's figures in the first two places, the rear's in the others.
+    tyres: Tyre,
 }
 
 struct WheelSlip {
-    ratio: Pair,
-    tangent: Pair,
+    ratio: Wheels,
+    tangent: Wheels,
 }
 
 fn wheel_slip(
     body: BodyState,
-    x: f32,
-    y: Pair,
-    direction: vec2<f32>,
-    rim_speed: Pair,
+    x: Wheels,
+    y: Wheels,
+    cosine: Wheels,
+    sine: Wheels,
+    rim_speed: Wheels,
     least_speed: f32,
 ) -> WheelSlip {
     let hub_x = body.vx - body.yaw_rate * y;
     let hub_y = body.vy + body.yaw_rate * x;
-    let vx = direction.x * hub_x + direction.y * hub_y;
-    let vy = direction.x * hub_y - direction.y * hub_x;
-    let speed = max(abs(vx), Pair(least_speed));
+    let vx = cosine * hub_x + sine * hub_y;
+    let vy = cosine * hub_y - sine * hub_x;
+    let speed = max(abs(vx), Wheels(least_speed));
     return WheelSlip((rim_speed - vx) / speed, vy / speed);
 }
 
-struct AxleForces {
-    x: Pair,
-    y: Pair,
+struct WheelForces {
+    x: Wheels,
+    y: Wheels,
 }
 
-fn to_body_axes(forces: TyreForces, direction: vec2<f32>) -> AxleForces {
-    return AxleForces(
-        forces.x * direction.x - forces.y * direction.y,
-        forces.x * direction.y + forces.y * direction.x,
-    );
+fn to_body_axes(forces: TyreForces, cosine: Wheels, sine: Wheels) -> WheelForces {
+    return WheelForces(forces.x * cosine - forces.y * sine, forces.x * sine + forces.y * cosine);
 }
 
-// One pass of the twin's loop over the axles: `start` with the forces of the left, then of the right wheel.
-fn with_axle(
-    start: BodyForces,
-    body: BodyState,
-    tyre: Tyre,
-    x: f32,
-    half_track: f32,
-    direction: vec2<f32>,
-    rim_speed: Pair,
-    least_speed: f32,
-    load: Pair,
-) -> BodyForces {
-    let side = Pair(1.0, -1.0);
-    let y = half_track * side;
-    let slip = wheel_slip(body, x, y, direction, rim_speed, least_speed);
-    let forces = tyre_forces(tyre, TyreInput(load, slip.ratio, slip.tangent, side));
-    let force = to_body_axes(forces, direction);
-    let moment = x * force.y - y * force.x + forces.aligning_moment;
-    return BodyForces(
-        start.x + force.x.x + force.x.y,
-        start.y + force.y.x + force.y.y,
-        start.yaw_moment + moment.x + moment.y,
-    );
+// `start` with the four figures, one after the other.
+fn with_all(start: f32, figures: Wheels) -> f32 {
+    return start + figures.x + figures.y + figures.z + figures.w;
 }
 
 fn car_rate(car: CarModel, state: CarState, input: CarInput) -> CarRate {
+    let chassis = car.chassis;
     let body = state.body;
-    let aero = aero_forces(car.chassis, body.vx);
-    let loads = wheel_loads(car.chassis, body, state.pitch_acceleration, aero);
-    let steer = input.steer * car.chassis.steer_scale + car.chassis.steer_offset;
-    let turned = vec2<f32>(own_cos(Pair(steer)).x, own_sin(Pair(steer)).x);
-    let straight = vec2<f32>(1.0, 0.0);
-    var total = BodyForces(-aero.drag, 0.0, 0.0);
-    total = with_axle(
-        total,
-        body,
-        car.front,
-        car.chassis.cg_to_front,
-        car.chassis.half_track_front,
-        turned,
-        input.wheel_speed.xy * car.chassis.radius_front,
-        car.chassis.slip_speed_floor,
-        loads.xy,
+    let aero = aero_forces(chassis, body.vx);
+    let loads = wheel_loads(chassis, body, state.pitch_acceleration, aero);
+
+    let steer = input.steer * chassis.steer_scale + chassis.steer_offset;
+    let steer_cosine = own_cos(Wheels(steer)).x;
+    let steer_sine = own_sin(Wheels(steer)).x;
+    let cosine = Wheels(steer_cosine, steer_cosine, 1.0, 1.0);
+    let sine = Wheels(steer_sine, steer_sine, 0.0, 0.0);
+    let x = Wheels(chassis.cg_to_front, chassis.cg_to_front, -chassis.cg_to_rear, -chassis.cg_to_rear);
+    let half_track = Wheels(
+        chassis.half_track_front,
+        chassis.half_track_front,
+        chassis.half_track_rear,
+        chassis.half_track_rear,
     );
-    total = with_axle(
-        total,
-        body,
-        car.rear,
-        -car.chassis.cg_to_rear,
-        car.chassis.half_track_rear,
-        straight,
-        input.wheel_speed.zw * car.chassis.radius_rear,
-        car.chassis.slip_speed_floor,
-        loads.zw,
+    let radius = Wheels(chassis.radius_front, chassis.radius_front, chassis.radius_rear, chassis.radius_rear);
+    let side = Wheels(1.0, -1.0, 1.0, -1.0);
+    let y = half_track * side;
+
+    let rim_speed = input.wheel_speed * radius;
+    let slip = wheel_slip(body, x, y, cosine, sine, rim_speed, chassis.slip_speed_floor);
+    let forces = tyre_forces(car.tyres, TyreInput(loads, slip.ratio, slip.tangent, side));
+    let force = to_body_axes(forces, cosine, sine);
+    let total = BodyForces(
+        with_all(-aero.drag, force.x),
+        with_all(0.0, force.y),
+        with_all(0.0, x * force.y - y * force.x + forces.aligning_moment),
     );
-    let rate = body_derivative(car.chassis, body, total);
+
+    let rate = body_derivative(chassis, body, total);
     return CarRate(
-        CarState(rate, (total.x / car.chassis.mass - state.pitch_acceleration) / car.chassis.pitch_lag),
+        CarState(rate, (total.x / chassis.mass - state.pitch_acceleration) / chassis.pitch_lag),
         rate.vx - body.vy * body.yaw_rate,
         rate.vy + body.vx * body.yaw_rate,
     );

@@ -57,8 +57,8 @@ fn body_derivative(chassis: Chassis, state: BodyState, forces: BodyForces) -> Bo
     let izz = chassis.inertia_yaw;
     let r = state.yaw_rate;
     let p = state.roll_rate;
-    let s = own_sin(Pair(state.roll)).x;
-    let c = own_cos(Pair(state.roll)).x;
+    let s = own_sin(Wheels(state.roll)).x;
+    let c = own_cos(Wheels(state.roll)).x;
     let hs = h * s;
     let hc = h * c;
     let sc = s * c;

@@ -5,7 +5,7 @@
 // kill it and the sums group as in the twin however the stretches are cut.
 //
 // A car comes as the ready figures of `CarModel::to_table`: those that all candidates share from `base`, the others
-// from `figures`, variable by variable. The loaders (`load_chassis`, `load_front`, `load_rear`) and the constants NORM and WORKGROUP are generated.
+// from `figures`, variable by variable. The loaders (`load_chassis`, `load_tyres`) and the constants NORM and WORKGROUP are generated.
 
 struct Sample {
     wheel_speed: vec4<f32>,
@@ -81,7 +81,7 @@ fn replay(@builtin(global_invocation_id) id: vec3<u32>) {
         drives = progress[place_of(10u, row, candidate)] != 0.0;
     }
 
-    let car = CarModel(load_chassis(candidate), load_front(candidate), load_rear(candidate));
+    let car = CarModel(load_chassis(candidate), load_tyres(candidate));
     var block = vec4<f32>(0.0);
     let stop = min(stretch.first_sample + stretch.samples, last + 1u);
     for (var i = stretch.first_sample; i < stop; i++) {

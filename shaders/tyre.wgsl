@@ -2,88 +2,88 @@
 // order. The struct is that of `src/vehicle/tyre/prepared.rs`: the tyre made ready for its axle on the host.
 
 struct MagicFormula {
-    inverse_nominal: f32,
-    cx: f32,
-    inverse_cx: f32,
-    dx1: f32,
-    dx2: f32,
-    kx1: f32,
-    kx2: f32,
-    kx3: f32,
-    hx1: f32,
-    hx2: f32,
-    vx1: f32,
-    vx2: f32,
-    ex1: f32,
-    ex2: f32,
-    ex3: f32,
-    ex4: f32,
-    cy: f32,
-    inverse_cy: f32,
-    dy1: f32,
-    dy2: f32,
-    ky: f32,
-    ky_load: f32,
-    hy1: f32,
-    hy2: f32,
-    hy_camber: f32,
-    vy1: f32,
-    vy2: f32,
-    vy_camber1: f32,
-    vy_camber2: f32,
-    ey1: f32,
-    ey2: f32,
-    ey3: f32,
-    ey_camber: f32,
-    rbx1: f32,
-    rbx2: f32,
-    rcx1: f32,
-    rex1: f32,
-    rex2: f32,
-    rhx1: f32,
-    rby1: f32,
-    rby2: f32,
-    rby3: f32,
-    rcy1: f32,
-    rey1: f32,
-    rey2: f32,
-    rhy1: f32,
-    rhy2: f32,
-    rvy1: f32,
-    rvy2: f32,
-    rvy_camber: f32,
-    rvy4: f32,
-    rvy5: f32,
-    rvy6: f32,
-    ct: f32,
-    bt1: f32,
-    bt2: f32,
-    bt3: f32,
-    bt_even: f32,
-    bt_odd: f32,
-    dt1: f32,
-    dt2: f32,
-    dt_even: f32,
-    dt_odd: f32,
-    et1: f32,
-    et2: f32,
-    et3: f32,
-    et4: f32,
-    et_camber: f32,
-    ht1: f32,
-    ht2: f32,
-    ht_camber1: f32,
-    ht_camber2: f32,
-    br1: f32,
-    br2: f32,
-    dr1: f32,
-    dr2: f32,
-    dr_camber1: f32,
-    dr_camber2: f32,
-    s1: f32,
-    s2: f32,
-    s_camber1: f32,
-    s_camber2: f32,
+    inverse_nominal: Wheels,
+    cx: Wheels,
+    inverse_cx: Wheels,
+    dx1: Wheels,
+    dx2: Wheels,
+    kx1: Wheels,
+    kx2: Wheels,
+    kx3: Wheels,
+    hx1: Wheels,
+    hx2: Wheels,
+    vx1: Wheels,
+    vx2: Wheels,
+    ex1: Wheels,
+    ex2: Wheels,
+    ex3: Wheels,
+    ex4: Wheels,
+    cy: Wheels,
+    inverse_cy: Wheels,
+    dy1: Wheels,
+    dy2: Wheels,
+    ky: Wheels,
+    ky_load: Wheels,
+    hy1: Wheels,
+    hy2: Wheels,
+    hy_camber: Wheels,
+    vy1: Wheels,
+    vy2: Wheels,
+    vy_camber1: Wheels,
+    vy_camber2: Wheels,
+    ey1: Wheels,
+    ey2: Wheels,
+    ey3: Wheels,
+    ey_camber: Wheels,
+    rbx1: Wheels,
+    rbx2: Wheels,
+    rcx1: Wheels,
+    rex1: Wheels,
+    rex2: Wheels,
+    rhx1: Wheels,
+    rby1: Wheels,
+    rby2: Wheels,
+    rby3: Wheels,
+    rcy1: Wheels,
+    rey1: Wheels,
+    rey2: Wheels,
+    rhy1: Wheels,
+    rhy2: Wheels,
+    rvy1: Wheels,
+    rvy2: Wheels,
+    rvy_camber: Wheels,
+    rvy4: Wheels,
+    rvy5: Wheels,
+    rvy6: Wheels,
+    ct: Wheels,
+    bt1: Wheels,
+    bt2: Wheels,
+    bt3: Wheels,
+    bt_even: Wheels,
+    bt_odd: Wheels,
+    dt1: Wheels,
+    dt2: Wheels,
+    dt_even: Wheels,
+    dt_odd: Wheels,
+    et1: Wheels,
+    et2: Wheels,
+    et3: Wheels,
+    et4: Wheels,
+    et_camber: Wheels,
+    ht1: Wheels,
+    ht2: Wheels,
+    ht_camber1: Wheels,
+    ht_camber2: Wheels,
+    br1: Wheels,
+    br2: Wheels,
+    dr1: Wheels,
+    dr2: Wheels,
+    dr_camber1: Wheels,
+    dr_camber2: Wheels,
+    s1: Wheels,
+    s2: Wheels,
+    s_camber1: Wheels,
+    s_camber2: Wheels,
 }
 
 alias Tyre = MagicFormula;
@@ -91,38 +91,38 @@ alias Tyre = MagicFormula;
 // `LEAST_LOAD` in `src/vehicle/tyre/mod.rs`.
 const LEAST_LOAD: f32 = 1e-3;
 
-fn stretched_slip(b: Pair, e: Pair, x: Pair) -> Pair {
+fn stretched_slip(b: Wheels, e: Wheels, x: Wheels) -> Wheels {
     let bx = b * x;
     return bx - e * (bx - own_atan(bx));
 }
 
-fn sine_shape(c: f32, b: Pair, e: Pair, x: Pair) -> Pair {
+fn sine_shape(c: Wheels, b: Wheels, e: Wheels, x: Wheels) -> Wheels {
     return own_sin(c * own_atan(stretched_slip(b, e, x)));
 }
 
-fn cosine_shape(c: f32, b: Pair, e: Pair, x: Pair) -> Pair {
+fn cosine_shape(c: Wheels, b: Wheels, e: Wheels, x: Wheels) -> Wheels {
     return own_cos(c * own_atan(stretched_slip(b, e, x)));
 }
 
-fn weight(c: f32, b: Pair, e: Pair, x: Pair, shift: Pair) -> Pair {
+fn weight(c: Wheels, b: Wheels, e: Wheels, x: Wheels, shift: Wheels) -> Wheels {
     return cosine_shape(c, b, e, x) / cosine_shape(c, b, e, shift);
 }
 
-fn clamp_curvature(e: Pair) -> Pair {
-    return min(e, Pair(1.0));
+fn clamp_curvature(e: Wheels) -> Wheels {
+    return min(e, Wheels(1.0));
 }
 
 struct Load {
-    force: Pair,
-    difference: Pair,
+    force: Wheels,
+    difference: Wheels,
 }
 
 struct PureLongitudinal {
-    force: Pair,
-    stiffness: Pair,
+    force: Wheels,
+    stiffness: Wheels,
 }
 
-fn pure_longitudinal(t: MagicFormula, load: Load, slip_ratio: Pair) -> PureLongitudinal {
+fn pure_longitudinal(t: MagicFormula, load: Load, slip_ratio: Wheels) -> PureLongitudinal {
     let dfz = load.difference;
     let mu = t.dx1 + t.dx2 * dfz;
     let k = (t.kx1 + t.kx2 * dfz) * own_exp(t.kx3 * dfz);
@@ -134,14 +134,14 @@ fn pure_longitudinal(t: MagicFormula, load: Load, slip_ratio: Pair) -> PureLongi
 }
 
 struct PureLateral {
-    force: Pair,
-    peak: Pair,
-    stiffness: Pair,
-    slope: Pair,
-    residual_shift: Pair,
+    force: Wheels,
+    peak: Wheels,
+    stiffness: Wheels,
+    slope: Wheels,
+    residual_shift: Wheels,
 }
 
-fn pure_lateral(t: MagicFormula, load: Load, slip_tangent: Pair, side: Pair) -> PureLateral {
+fn pure_lateral(t: MagicFormula, load: Load, slip_tangent: Wheels, side: Wheels) -> PureLateral {
     let dfz = load.difference;
     let peak = (t.dy1 + t.dy2 * dfz) * load.force;
     let z = load.force * t.ky_load;
@@ -160,13 +160,13 @@ fn pure_lateral(t: MagicFormula, load: Load, slip_tangent: Pair, side: Pair) -> 
     );
 }
 
-fn longitudinal_weight(t: MagicFormula, load: Load, slip_ratio: Pair, slip_tangent: Pair) -> Pair {
+fn longitudinal_weight(t: MagicFormula, load: Load, slip_ratio: Wheels, slip_tangent: Wheels) -> Wheels {
     let b = t.rbx1 * cos_atan(t.rbx2 * slip_ratio);
     let e = clamp_curvature(t.rex1 + t.rex2 * load.difference);
-    return weight(t.rcx1, b, e, slip_tangent + t.rhx1, Pair(t.rhx1));
+    return weight(t.rcx1, b, e, slip_tangent + t.rhx1, t.rhx1);
 }
 
-fn lateral_weight(t: MagicFormula, load: Load, slip_ratio: Pair, slip_tangent: Pair) -> Pair {
+fn lateral_weight(t: MagicFormula, load: Load, slip_ratio: Wheels, slip_tangent: Wheels) -> Wheels {
     let b = t.rby1 * cos_atan(t.rby2 * (slip_tangent - t.rby3));
     let e = clamp_curvature(t.rey1 + t.rey2 * load.difference);
     let shift = t.rhy1 + t.rhy2 * load.difference;
@@ -176,16 +176,16 @@ fn lateral_weight(t: MagicFormula, load: Load, slip_ratio: Pair, slip_tangent: P
 fn induced_lateral(
     t: MagicFormula,
     load: Load,
-    peak: Pair,
-    slip_ratio: Pair,
-    slip_tangent: Pair,
-    side: Pair,
-) -> Pair {
+    peak: Wheels,
+    slip_ratio: Wheels,
+    slip_tangent: Wheels,
+    side: Wheels,
+) -> Wheels {
     let amplitude = peak * (t.rvy1 + t.rvy2 * load.difference + t.rvy_camber * side);
     return amplitude * cos_atan(t.rvy4 * slip_tangent) * own_sin(t.rvy5 * own_atan(t.rvy6 * slip_ratio));
 }
 
-fn equivalent_tangent(x: Pair, slip_share: Pair) -> Pair {
+fn equivalent_tangent(x: Wheels, slip_share: Wheels) -> Wheels {
     let tangent = own_tan(x);
     return sqrt(tangent * tangent + slip_share * slip_share) * sign_of(x);
 }
@@ -195,11 +195,11 @@ fn aligning_moment(
     load: Load,
     input: TyreInput,
     lateral: PureLateral,
-    longitudinal_stiffness: Pair,
-    force_x: Pair,
-    force_y: Pair,
-    induced: Pair,
-) -> Pair {
+    longitudinal_stiffness: Wheels,
+    force_x: Wheels,
+    force_y: Wheels,
+    induced: Wheels,
+) -> Wheels {
     let dfz = load.difference;
     let side = input.side;
     let slip_share = longitudinal_stiffness / lateral.stiffness * input.slip_ratio;
@@ -227,7 +227,7 @@ fn aligning_moment(
 }
 
 fn tyre_forces(t: MagicFormula, input: TyreInput) -> TyreForces {
-    let force = max(input.load, Pair(LEAST_LOAD));
+    let force = max(input.load, Wheels(LEAST_LOAD));
     let load = Load(force, force * t.inverse_nominal - 1.0);
     let pure_x = pure_longitudinal(t, load, input.slip_ratio);
     let lateral = pure_lateral(t, load, input.slip_tangent, input.side);
@@ -236,7 +236,7 @@ fn tyre_forces(t: MagicFormula, input: TyreInput) -> TyreForces {
     let y = lateral.force * lateral_weight(t, load, input.slip_ratio, input.slip_tangent) + induced;
     let moment = aligning_moment(t, load, input, lateral, pure_x.stiffness, x, y, induced);
 
-    let zero = Pair(0.0);
+    let zero = Wheels(0.0);
     let loaded = zero < input.load;
     return TyreForces(select(zero, x, loaded), select(zero, y, loaded), select(zero, moment, loaded));
 }

@@ -1,15 +1,15 @@
-// Twin of the types in `src/vehicle/tyre/mod.rs` that every tyre model shares. An axle's two wheels, left and right,
-// are reckoned side by side.
+// Twin of the types in `src/vehicle/tyre/mod.rs` that every tyre model shares. The
+// four wheels are reckoned side by side.
 
 struct TyreInput {
-    load: Pair,
-    slip_ratio: Pair,
-    slip_tangent: Pair,
-    side: Pair,
+    load: Wheels,
+    slip_ratio: Wheels,
+    slip_tangent: Wheels,
+    side: Wheels,
 }
 
 struct TyreForces {
-    x: Pair,
-    y: Pair,
-    aligning_moment: Pair,
+    x: Wheels,
+    y: Wheels,
+    aligning_moment: Wheels,
 }

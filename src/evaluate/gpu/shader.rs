@@ -4,7 +4,6 @@
 use crate::evaluate::replay::Norm;
 use crate::vehicle::tyre::Tyre;
 use crate::vehicle::{Chassis, LinearTyre, MagicFormula, TyreModel};
-use std::fmt::Write as _;
 
 /// Our own `sin`, `cos`, `atan` and `exp`.
 pub const ELEMENTARY: &str = include_str!("../../../shaders/elementary.wgsl");
@@ -52,13 +51,11 @@ pub struct ReplayShape<'a> {
 impl ReplayShape<'_> {
     /// Source of the kernel that drives and scores; entry point `replay`.
     pub fn replay(&self) -> String {
-        if let Ok(p) = std::env::var("LS_SRC") { return std::fs::read_to_string(p).unwrap(); } // TEMPORARY
         let mut source = car_fragments(self.model).concat();
         source.push_str(&self.constants());
         source.push_str(REPLAY_COMMON);
         source.push_str(REPLAY);
         source.push_str(&loaders(self.model, self.sources));
-        if let Ok(p) = std::env::var("LS_DUMP") { std::fs::write(p, &source).unwrap(); } // TEMPORARY
         source
     }
 
@@ -89,29 +86,37 @@ pub fn base_vectors(count: usize) -> usize {
     count.div_ceil(4).max(1)
 }
 
-/// The loaders `load_chassis`, `load_front` and `load_rear`: a figure that candidates share comes from the uniform
-/// table `base`, where the compiler sees that all lanes read the same, one that varies from its row of `figures`.
+/// The loaders `load_chassis` and `load_tyres`: a figure that candidates share comes from the uniform table `base`,
+/// where the compiler sees that all lanes read the same, one that varies from its row of `figures`.
 pub fn loaders(model: TyreModel, sources: &[Option<usize>]) -> String {
     let chassis = Chassis::<f32>::FIELDS;
     let (structure, tyre) = tyre_struct(model);
-    let mut text = "\n// Generated.\n".to_owned();
-    let mut slot = 0;
-    for (function, structure, fields) in [
-        ("load_chassis", "Chassis", chassis),
-        ("load_front", structure, tyre),
-        ("load_rear", structure, tyre),
-    ] {
-        // Writing to a String cannot fail.
-        let _ = writeln!(text, "fn {function}(candidate: u32) -> {structure} {{\n    return {structure}(");
-        for field in fields {
-            let place = match sources[slot] {
-                Some(figure) => format!("figures[{figure}u * stretch.stride + candidate]"),
-                None => format!("base[{}].{}", slot / 4, ["x", "y", "z", "w"][slot % 4]),
-            };
-            let _ = writeln!(text, "        {place}, // {field}");
-            slot += 1;
-        }
-        text.push_str("    );\n}\n\n");
-    }
-    text
+    let place = |slot: usize| match sources[slot] {
+        Some(figure) => format!("figures[{figure}u * stretch.stride + candidate]"),
+        None => format!("base[{}].{}", slot / 4, ["x", "y", "z", "w"][slot % 4]),
+    };
+    let function = |name: &str, structure: &str, lines: &[String]| {
+        let body = lines.concat();
+        format!("fn {name}(candidate: u32) -> {structure} {{\n    return {structure}(\n{body}    );\n}}\n\n")
+    };
+    let (front, rear) = (chassis.len(), chassis.len() + tyre.len());
+    let chassis_lines: Vec<String> = chassis
+        .iter()
+        .enumerate()
+        .map(|(i, field)| format!("        {}, // {field}\n", place(i)))
+        .collect();
+    let tyre_lines: Vec<String> = tyre
+        .iter()
+        .enumerate()
+        .map(|(i, field)| {
+            let (front, rear) = (place(front + i), place(rear + i));
+            format!("        Wheels({front}, {front}, {rear}, {rear}), // {field}\n")
+        })
+        .collect();
+    [
+        "\n// Generated.\n".to_owned(),
+        function("load_chassis", "Chassis", &chassis_lines),
+        function("load_tyres", structure, &tyre_lines),
+    ]
+    .concat()
 }
