@@ -96,5 +96,5 @@ fn own_exp(argument: Wheels) -> Wheels {
     p = p * r + 4.1668225e-2;
     p = p * r + 0.1666642;
     p = p * r + 0.4999999;
-    return (r * r * p + r + 1.0) * two_to_the(n);
+    return (r * r * p + (r + 1.0)) * two_to_the(n);
 }
