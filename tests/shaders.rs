@@ -101,15 +101,31 @@ fn the_lint_finds_what_kernels_must_not_contain() {
         )
     };
     for bad in [
-        "sin(x)", "cos(x)", "tan(x)", "atan(x)", "atan2(x, 2.0)", "exp(x)", "exp2(x)", "log(x)", "pow(x, 1.5)",
-        "fma(x, x, x)", "inverseSqrt(x)", "mix(x, 2.0, 0.5)", "f32(f64(x) * 2.0lf)",
+        "sin(x)",
+        "cos(x)",
+        "tan(x)",
+        "atan(x)",
+        "atan2(x, 2.0)",
+        "exp(x)",
+        "exp2(x)",
+        "log(x)",
+        "pow(x, 1.5)",
+        "fma(x, x, x)",
+        "inverseSqrt(x)",
+        "mix(x, 2.0, 0.5)",
+        "f32(f64(x) * 2.0lf)",
     ] {
         let findings = lint::check(&spoilt(bad)).expect_err(bad);
-        assert!(bad.contains("f64") || findings.contains("helper"), "{bad}: {findings}");
+        assert!(
+            bad.contains("f64") || findings.contains("helper"),
+            "{bad}: {findings}"
+        );
     }
     lint::check(&spoilt("sqrt(abs(x)) + floor(x) + max(x, 1.0)")).expect("these round alike everywhere");
     // The kernels' own sources, with a built-in slipped in.
-    let source = car_fragments(TyreModel::Linear).concat().replace("own_atan(input", "atan(input");
+    let source = car_fragments(TyreModel::Linear)
+        .concat()
+        .replace("own_atan(input", "atan(input");
     assert!(lint::check(&source).expect_err("atan").contains("Atan"));
 }
 
@@ -135,7 +151,10 @@ fn structs_shared_with_the_host_have_its_offsets() {
     let (_, source) = &kernels()[0];
     let module = lint::check(source).expect("the kernel parses");
     let named = |pairs: &[(&str, usize)]| -> Vec<(String, usize)> {
-        pairs.iter().map(|(name, offset)| ((*name).to_owned(), *offset)).collect()
+        pairs
+            .iter()
+            .map(|(name, offset)| ((*name).to_owned(), *offset))
+            .collect()
     };
 
     let (members, size) = layout(&module, "Stretch");
@@ -175,7 +194,11 @@ fn parameter_structs_have_the_fields_of_their_rust_twins_in_order() {
         let source = car_fragments(model).concat();
         let module = lint::check(&source).expect("the fragments parse on their own");
         let names = |name: &str| -> Vec<String> {
-            layout(&module, name).0.into_iter().map(|(member, _)| member).collect()
+            layout(&module, name)
+                .0
+                .into_iter()
+                .map(|(member, _)| member)
+                .collect()
         };
         assert_eq!(names("Chassis"), Chassis::<f32>::FIELDS);
         let (structure, fields) = tyre_struct(model);

@@ -17,6 +17,9 @@ pub const UNKNOWNS: [&str; 22] = [
 /// Sample interval of the made-up lap, s.
 pub const INTERVAL_S: f64 = 0.01;
 
+/// Greatest sensor noise in the made-up log, channel by channel (m/s, m/s^2, m/s^2, rad/s): a good logger's.
+pub const NOISE: [f64; 4] = [0.05, 0.3, 0.3, 0.01];
+
 /// A small generator (SplitMix64) whose numbers are the same everywhere.
 pub struct Random(pub u64);
 
@@ -112,7 +115,10 @@ impl Default for Lap {
 pub fn problem(car: Car, free: &[&str], lap: Lap) -> ReplayProblem {
     let parameters: Vec<CarParameter> = free
         .iter()
-        .map(|name| car.parameter(name).unwrap_or_else(|| panic!("a parameter {name}")))
+        .map(|name| {
+            car.parameter(name)
+                .unwrap_or_else(|| panic!("a parameter {name}"))
+        })
         .collect();
     let flat = car.to_flat();
     let bounds = |p: &CarParameter| {
@@ -163,20 +169,32 @@ pub fn problem(car: Car, free: &[&str], lap: Lap) -> ReplayProblem {
     let reference = build(samples.clone(), vec![whole]);
     let (outputs, drives) = trace(&flat, car.tyre_model(), &reference.plan, &whole);
     assert!(drives, "the reference car must drive the made-up lap to its end");
+    let mut random = Random(1);
     for (sample, output) in samples.iter_mut().zip(&outputs) {
-        sample.measured = *output;
+        sample.measured = std::array::from_fn(|k| output[k] + random.within(-NOISE[k], NOISE[k]));
     }
     // Windows start from the logged speed and yaw rate; their first tenth settles what is not logged.
     let length = lap.samples / lap.windows;
     let windows = (0..lap.windows)
         .map(|w| {
             let start = w * length;
-            let end = if w + 1 == lap.windows { lap.samples } else { start + length };
+            let end = if w + 1 == lap.windows {
+                lap.samples
+            } else {
+                start + length
+            };
             Window {
                 start,
                 end,
                 scored_from: if w == 0 { 0 } else { length / 10 },
-                initial: [outputs[start][0], 0.0, outputs[start][3], 0.0, 0.0, outputs[start][1]],
+                initial: [
+                    outputs[start][0],
+                    0.0,
+                    outputs[start][3],
+                    0.0,
+                    0.0,
+                    outputs[start][1],
+                ],
             }
         })
         .collect();

@@ -69,7 +69,11 @@ fn inputs((low, high): (f64, f64), seed: u64) -> Vec<f32> {
     (0..COUNT)
         .map(|i| {
             let x = random.within(low, high);
-            let shrink = if i % 2 == 0 { 1.0 } else { 10f64.powf(random.within(-12.0, 0.0)) };
+            let shrink = if i % 2 == 0 {
+                1.0
+            } else {
+                10f64.powf(random.within(-12.0, 0.0))
+            };
             (x * shrink) as f32
         })
         .collect()
@@ -111,7 +115,10 @@ fn lanes_are_the_scalar_bit_for_bit() {
         for set in InstructionSet::available() {
             let found = dispatch(set, Mapped(f.index, &x));
             if let Some(i) = first_difference(&expected, &found) {
-                panic!("{} of {:e} on {set:?}: {:e} is not {:e}", f.shader, x[i], found[i], expected[i]);
+                panic!(
+                    "{} of {:e} on {set:?}: {:e} is not {:e}",
+                    f.shader, x[i], found[i], expected[i]
+                );
             }
         }
     }
@@ -131,7 +138,10 @@ fn the_device_is_the_scalar_bit_for_bit_or_nearly() {
         let found = map(&context, f.shader, &x);
         if rounds_like_the_processor(&context) {
             if let Some(i) = first_difference(&expected, &found) {
-                panic!("{} of {:e}: {:e} is not {:e}", f.shader, x[i], found[i], expected[i]);
+                panic!(
+                    "{} of {:e}: {:e} is not {:e}",
+                    f.shader, x[i], found[i], expected[i]
+                );
             }
             continue;
         }
@@ -139,7 +149,11 @@ fn the_device_is_the_scalar_bit_for_bit_or_nearly() {
             let exact = (f.reference)(f64::from(*x));
             let spacing = exact.abs().max(f.floor).log2().floor().exp2() * 2f64.powi(-23);
             let off = (f64::from(*y) - exact).abs() / spacing;
-            assert!(off <= OTHER_DEVICES_ULP, "{} of {x:e}: {y:e} is {off} ULP from {exact:e}", f.shader);
+            assert!(
+                off <= OTHER_DEVICES_ULP,
+                "{} of {x:e}: {y:e} is {off} ULP from {exact:e}",
+                f.shader
+            );
         }
     }
 }

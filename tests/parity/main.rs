@@ -5,8 +5,8 @@
 
 #[path = "../common/mod.rs"]
 mod common;
+mod cutting;
 mod device;
 mod elementary;
 mod lap;
 mod step;
-mod cutting;

@@ -33,13 +33,19 @@ fn case(model: TyreModel, random: &mut Random) -> Option<Case> {
         TyreModel::MagicFormula => bundled_car(),
         TyreModel::Linear => linear_car(),
     };
-    let flat: Vec<f64> = car.to_flat().iter().map(|x| x * random.within(0.8, 1.2)).collect();
+    let flat: Vec<f64> = car
+        .to_flat()
+        .iter()
+        .map(|x| x * random.within(0.8, 1.2))
+        .collect();
     let table = match model {
         TyreModel::MagicFormula => {
             let (chassis, tyre) = (Chassis::<f64>::PARAMETERS.len(), model.parameters().len());
             for axle in 0..2 {
                 let at = |i: usize| flat[chassis + axle * tyre + i];
-                lapswarm::vehicle::TyreCoefficients::from_flat(at).well_formed().ok()?;
+                lapswarm::vehicle::TyreCoefficients::from_flat(at)
+                    .well_formed()
+                    .ok()?;
             }
             CarModel::<f64, MagicFormula<f64>>::from_parameters(|i| flat[i]).to_table()
         }
@@ -66,7 +72,10 @@ fn case(model: TyreModel, random: &mut Random) -> Option<Case> {
 
 fn cases(model: TyreModel, count: usize, seed: u64) -> Vec<Case> {
     let mut random = Random(seed);
-    std::iter::repeat_with(|| case(model, &mut random)).flatten().take(count).collect()
+    std::iter::repeat_with(|| case(model, &mut random))
+        .flatten()
+        .take(count)
+        .collect()
 }
 
 impl Case {
@@ -90,7 +99,13 @@ fn outputs<R: Real, T: Tyre<R>>(at: impl Fn(usize) -> R) -> [R; OUTPUTS] {
     let mut rate = None;
     let mut next = state;
     for _ in 0..std::hint::black_box(1) {
-        next = runge_kutta_step(&car, &next, |_| input, R::lit(f64::from(STEP)), |first| rate = Some(*first));
+        next = runge_kutta_step(
+            &car,
+            &next,
+            |_| input,
+            R::lit(f64::from(STEP)),
+            |first| rate = Some(*first),
+        );
     }
     let rate = rate.expect("one step was taken");
     let slopes = rate.state.to_array();
@@ -185,7 +200,11 @@ fn on_device(model: TyreModel, cases: &[Case]) -> Option<Vec<[f32; OUTPUTS]>> {
     let out = context
         .run_array(&source, "one_step", &rows, OUTPUTS * lanes, lanes)
         .expect("the kernel runs");
-    Some((0..lanes).map(|lane| std::array::from_fn(|i| out[i * lanes + lane])).collect())
+    Some(
+        (0..lanes)
+            .map(|lane| std::array::from_fn(|i| out[i * lanes + lane]))
+            .collect(),
+    )
 }
 
 /// What an error of each output is measured against: the sum of the magnitudes of what it is made of.
@@ -265,7 +284,10 @@ fn a_derivative_and_a_step_agree_on_every_backend() {
         if let Some(device) = on_device(model, &cases) {
             let worst = compare(model, "gpu", &cases, &device);
             let alike = device.iter().zip(&scalar).filter(|(a, b)| a == b).count();
-            println!("{model:?}: gpu is at most {worst:.1e} off; {alike} of {} as the scalar's bits", cases.len());
+            println!(
+                "{model:?}: gpu is at most {worst:.1e} off; {alike} of {} as the scalar's bits",
+                cases.len()
+            );
         }
     }
 }

@@ -126,7 +126,9 @@ pub fn devices() -> Vec<DeviceSummary> {
 /// # Errors
 /// [`Error::NoDevice`] if there is none, listing what there is.
 pub(super) fn choose(name: Option<&str>) -> Result<(wgpu::Adapter, DeviceSummary)> {
-    let from_environment = std::env::var(ADAPTER_VARIABLE).ok().filter(|x| !x.trim().is_empty());
+    let from_environment = std::env::var(ADAPTER_VARIABLE)
+        .ok()
+        .filter(|x| !x.trim().is_empty());
     let wanted = name.or(from_environment.as_deref()).map(str::trim);
     let adapters = enumerate();
     let present: Vec<DeviceSummary> = adapters.iter().map(|(_, summary)| summary.clone()).collect();
@@ -153,7 +155,10 @@ fn pick(present: &[DeviceSummary], wanted: Option<&str>) -> Result<usize> {
         .position(|summary| summary.name.to_lowercase().contains(&key))
         .ok_or_else(|| {
             let names: Vec<String> = present.iter().map(DeviceSummary::to_string).collect();
-            Error::NoDevice(format!("no adapter's name contains {wanted:?}; there is {}", names.join(", ")))
+            Error::NoDevice(format!(
+                "no adapter's name contains {wanted:?}; there is {}",
+                names.join(", ")
+            ))
         })
 }
 
@@ -186,7 +191,10 @@ mod tests {
         assert_eq!(pick(&present, Some("LLVMpipe")).ok(), Some(1));
         let message = pick(&present, Some("radeon")).map_err(|e| e.to_string());
         let message = message.expect_err("there is no such adapter");
-        assert!(message.contains("radeon") && message.contains("NVIDIA H200 (Vulkan, discrete)"), "{message}");
+        assert!(
+            message.contains("radeon") && message.contains("NVIDIA H200 (Vulkan, discrete)"),
+            "{message}"
+        );
         assert!(matches!(pick(&[], None), Err(Error::NoDevice(_))));
     }
 

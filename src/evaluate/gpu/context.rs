@@ -61,7 +61,13 @@ impl GpuContext {
     pub fn shared(name: Option<&str>) -> Result<Arc<Self>> {
         let mut shared = locked(&SHARED);
         if let Some(context) = shared.as_ref() {
-            let meant = name.is_none_or(|n| context.summary.name.to_lowercase().contains(&n.trim().to_lowercase()));
+            let meant = name.is_none_or(|n| {
+                context
+                    .summary
+                    .name
+                    .to_lowercase()
+                    .contains(&n.trim().to_lowercase())
+            });
             if meant && context.check().is_ok() {
                 return Ok(Arc::clone(context));
             }
@@ -90,7 +96,9 @@ impl GpuContext {
             locked(failure).get_or_insert(message);
         };
         let uncaptured = Arc::clone(&failure);
-        device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| keep(&uncaptured, error.to_string())));
+        device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
+            keep(&uncaptured, error.to_string())
+        }));
         let lost = Arc::clone(&failure);
         device.set_device_lost_callback(move |reason, message| {
             if reason != wgpu::DeviceLostReason::Destroyed {
@@ -166,7 +174,12 @@ impl GpuContext {
     ///
     /// # Errors
     /// [`Error::Device`] if the device cannot hold it.
-    pub(crate) fn buffer_of(&self, label: &str, data: &[u8], usage: wgpu::BufferUsages) -> Result<wgpu::Buffer> {
+    pub(crate) fn buffer_of(
+        &self,
+        label: &str,
+        data: &[u8],
+        usage: wgpu::BufferUsages,
+    ) -> Result<wgpu::Buffer> {
         let buffer = self.buffer(label, data.len() as u64, usage | wgpu::BufferUsages::COPY_DST)?;
         self.write(&buffer, data);
         Ok(buffer)
@@ -215,23 +228,29 @@ impl GpuContext {
                 label: Some(entry),
                 source: wgpu::ShaderSource::Wgsl(source.into()),
             });
-            let layout = self.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-                label: Some(entry),
-                entries: &entries,
-            });
-            let pipeline_layout = self.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-                label: Some(entry),
-                bind_group_layouts: &[Some(&layout)],
-                immediate_size: 0,
-            });
-            let pipeline = self.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-                label: Some(entry),
-                layout: Some(&pipeline_layout),
-                module: &module,
-                entry_point: Some(entry),
-                compilation_options: Default::default(),
-                cache: None,
-            });
+            let layout = self
+                .device
+                .create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+                    label: Some(entry),
+                    entries: &entries,
+                });
+            let pipeline_layout = self
+                .device
+                .create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+                    label: Some(entry),
+                    bind_group_layouts: &[Some(&layout)],
+                    immediate_size: 0,
+                });
+            let pipeline = self
+                .device
+                .create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+                    label: Some(entry),
+                    layout: Some(&pipeline_layout),
+                    module: &module,
+                    entry_point: Some(entry),
+                    compilation_options: Default::default(),
+                    cache: None,
+                });
             (pipeline, layout)
         })?;
         let kernel = Arc::new(Kernel {
@@ -292,8 +311,14 @@ impl GpuContext {
     ///
     /// # Errors
     /// [`Error::Device`] if they cannot be read.
-    pub(crate) fn read<T>(&self, buffer: &wgpu::Buffer, bytes: u64, read: impl FnOnce(&[u8]) -> T) -> Result<T> {
-        let failed = |reason: String| Error::Device(format!("{}: cannot read results: {reason}", self.summary));
+    pub(crate) fn read<T>(
+        &self,
+        buffer: &wgpu::Buffer,
+        bytes: u64,
+        read: impl FnOnce(&[u8]) -> T,
+    ) -> Result<T> {
+        let failed =
+            |reason: String| Error::Device(format!("{}: cannot read results: {reason}", self.summary));
         let (sender, receiver) = std::sync::mpsc::channel();
         buffer.map_async(wgpu::MapMode::Read, 0..bytes, move |outcome| {
             // Nobody listens any more only if waiting has failed already.
@@ -305,7 +330,9 @@ impl GpuContext {
             Ok(Err(e)) => return Err(failed(e.to_string())),
             Err(e) => return Err(failed(e.to_string())),
         }
-        let view = buffer.get_mapped_range(0..bytes).map_err(|e| failed(e.to_string()))?;
+        let view = buffer
+            .get_mapped_range(0..bytes)
+            .map_err(|e| failed(e.to_string()))?;
         let result = read(&view);
         drop(view);
         buffer.unmap();

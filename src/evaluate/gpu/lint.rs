@@ -41,9 +41,9 @@ pub fn lint(module: &naga::Module) -> Vec<Finding> {
     let mut findings = Vec::new();
     for (_, ty) in module.types.iter() {
         let scalar = match ty.inner {
-            TypeInner::Scalar(scalar) | TypeInner::Vector { scalar, .. } | TypeInner::Matrix { scalar, .. } => {
-                scalar
-            }
+            TypeInner::Scalar(scalar)
+            | TypeInner::Vector { scalar, .. }
+            | TypeInner::Matrix { scalar, .. } => scalar,
             _ => continue,
         };
         if scalar.kind == ScalarKind::Float && scalar.width != 4 {

@@ -316,7 +316,11 @@ impl<'a> GpuEvaluator<'a> {
     fn reserve(&mut self, candidates: usize, windows: usize) -> Result<()> {
         let stride = candidates.next_multiple_of(self.workgroup);
         let lanes = stride * windows;
-        if self.batch.as_ref().is_some_and(|b| b.lanes >= lanes && b.stride >= stride) {
+        if self
+            .batch
+            .as_ref()
+            .is_some_and(|b| b.lanes >= lanes && b.stride >= stride)
+        {
             return Ok(());
         }
         // The old buffers go before the new ones come.
@@ -335,7 +339,15 @@ impl<'a> GpuEvaluator<'a> {
         let [base, samples, window_table, fractions] = &self.tables;
         let replay_group = context.bind(
             &self.drive,
-            &[&self.stretch, base, samples, window_table, fractions, &figures, &progress],
+            &[
+                &self.stretch,
+                base,
+                samples,
+                window_table,
+                fractions,
+                &figures,
+                &progress,
+            ],
         )?;
         let reduce_group = context.bind(&self.reduce, &[&self.stretch, &progress, &results])?;
         self.batch = Some(BatchBuffers {
@@ -369,7 +381,9 @@ impl<'a> GpuEvaluator<'a> {
         let groups = stretch.candidates.div_ceil(self.workgroup as u32);
         let mut done = 0;
         while done < longest {
-            let samples = self.next_samples(lanes).min((longest - done).next_multiple_of(BLOCK));
+            let samples = self
+                .next_samples(lanes)
+                .min((longest - done).next_multiple_of(BLOCK));
             stretch.first_sample = done as u32;
             stretch.samples = samples as u32;
             self.context.write(&self.stretch, bytemuck::bytes_of(&stretch));
@@ -486,7 +500,10 @@ impl<'a> GpuEvaluator<'a> {
         })?;
         let ticks: u64 = self.context.read(&stopwatch.readback, bytes, |data| {
             let ticks: Vec<u64> = bytemuck::pod_collect_to_vec(data);
-            ticks.chunks_exact(2).map(|pair| pair[1].saturating_sub(pair[0])).sum()
+            ticks
+                .chunks_exact(2)
+                .map(|pair| pair[1].saturating_sub(pair[0]))
+                .sum()
         })?;
         Ok(Some(ticks as f64 * self.context.tick_ms()))
     }
@@ -502,7 +519,9 @@ impl Evaluator for GpuEvaluator<'_> {
         BackendInfo {
             backend: "gpu",
             device: summary.name.clone(),
-            driver: format!("{} {}", summary.driver, summary.driver_info).trim().to_owned(),
+            driver: format!("{} {}", summary.driver, summary.driver_info)
+                .trim()
+                .to_owned(),
         }
     }
 
@@ -512,7 +531,10 @@ impl Evaluator for GpuEvaluator<'_> {
         let replay = self.replay;
         let candidates: Vec<&[f64]> = population.chunks_exact(replay.dimensions().max(1)).collect();
         // Only what can be driven takes a lane.
-        let preliminary: Vec<_> = candidates.par_iter().map(|c| replay.preliminary_failure(c)).collect();
+        let preliminary: Vec<_> = candidates
+            .par_iter()
+            .map(|c| replay.preliminary_failure(c))
+            .collect();
         let rows: Vec<&[f64]> = candidates
             .iter()
             .zip(&preliminary)
