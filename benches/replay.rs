@@ -20,7 +20,8 @@ fn backends(replay: &ReplayProblem) -> Vec<(String, usize, Box<dyn Evaluator + '
         vec![("cpu f64".to_owned(), 16, Box::new(CpuEvaluator::new(replay)))];
     for set in InstructionSet::available() {
         let evaluator = Box::new(SimdEvaluator::new(replay, set));
-        backends.push((format!("simd {}", set.name()), 256, evaluator));
+        let count = if set == InstructionSet::Portable { 32 } else { 256 };
+        backends.push((format!("simd {}", set.name()), count, evaluator));
     }
     match GpuContext::shared(None).and_then(|context| GpuEvaluator::new(replay, context)) {
         Ok(mut evaluator) => {
@@ -30,7 +31,7 @@ fn backends(replay: &ReplayProblem) -> Vec<(String, usize, Box<dyn Evaluator + '
                 eprintln!("IGNORED: the GPU failed: {error}");
             } else {
                 let name = format!("gpu {}", evaluator.backend().device);
-                backends.push((name, 4096, Box::new(evaluator)));
+                backends.push((name, 1024, Box::new(evaluator)));
             }
         }
         Err(error) => eprintln!("IGNORED: no GPU adapter ({error})"),

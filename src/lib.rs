@@ -7,6 +7,8 @@ pub mod random;
 pub mod report;
 pub mod scalar;
 pub mod simulate;
+pub mod study;
+pub mod swarm;
 pub mod telemetry;
 pub mod track;
 pub mod vehicle;

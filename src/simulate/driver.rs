@@ -15,6 +15,8 @@ pub struct DriverSettings {
     pub pace: f64,
     /// Greatest slip ratio, driven or braked.
     pub slip_limit: f64,
+    /// Slip stiffness per load that the driver's feet reckon with: the lower, the more slip for a wanted force.
+    pub slip_stiffness: f64,
     /// How far ahead the driver looks, s.
     pub preview_s: f64,
     /// Speed not to exceed, m/s.
@@ -24,8 +26,9 @@ pub struct DriverSettings {
 impl Default for DriverSettings {
     fn default() -> Self {
         Self {
-            pace: 0.88,
-            slip_limit: 0.08,
+            pace: 0.9,
+            slip_limit: 0.14,
+            slip_stiffness: 18.0,
             preview_s: 0.25,
             top_speed_mps: 70.0,
         }
@@ -119,10 +122,10 @@ impl Driver<'_> {
                 .map_or(f64::INFINITY, |p| p.wheel_force(v, c.radius_rear));
             (
                 0.0,
-                (force.min(most) / (0.55 * weight * SLIP_STIFFNESS)).min(limit),
+                (force.min(most) / (0.55 * weight * self.settings.slip_stiffness)).min(limit),
             )
         } else {
-            let slip = (force / (weight * SLIP_STIFFNESS)).max(-limit);
+            let slip = (force / (weight * self.settings.slip_stiffness)).max(-limit);
             (slip, 0.75 * slip)
         };
         self.front_slip += (front - self.front_slip) * STEP / PEDAL_LAG;
@@ -152,8 +155,6 @@ impl Driver<'_> {
     }
 }
 
-/// Slip stiffness per load that the driver's feet reckon with.
-const SLIP_STIFFNESS: f64 = 30.0;
 /// How long before the start line the flying lap begins, m.
 const RUN_UP: f64 = 500.0;
 

@@ -387,6 +387,6 @@ impl GpuContext {
             drop(pass);
             encoder.copy_buffer_to_buffer(&to, 0, &readback, 0, bytes);
         })?;
-        self.read(&readback, bytes, |data| bytemuck::pod_collect_to_vec(data))
+        self.read(&readback, bytes, bytemuck::pod_collect_to_vec)
     }
 }

@@ -2,6 +2,7 @@
 
 mod cpu;
 mod gpu;
+mod jacobian;
 pub mod kernel;
 mod problem;
 mod simd;
@@ -9,6 +10,10 @@ mod table;
 
 pub use cpu::{CpuEvaluator, norm_name, trace};
 pub use gpu::{Batching, DeviceSample, DeviceWindow, DispatchStatistics, GpuEvaluator, Stretch};
-pub use problem::{CHANNEL_NAMES, CHANNEL_UNITS, ChannelWeights, Norm, Plan, ReplayProblem, Sample, Window};
+pub use jacobian::Residuals;
+pub use problem::{
+    CHANNEL_NAMES, CHANNEL_UNITS, ChannelWeights, Norm, Plan, ReplayProblem, Sample, Window, initial_state,
+    step_fractions,
+};
 pub use simd::SimdEvaluator;
 pub use table::ModelTable;

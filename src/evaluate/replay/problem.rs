@@ -48,6 +48,21 @@ pub struct Window<S> {
     pub initial: [S; 6],
 }
 
+/// The state that a window starts from: speed and yaw rate as measured, nothing else moving. Lateral speed, roll
+/// and the lagged acceleration are not logged; they settle in a few tenths of a second.
+pub fn initial_state(sample: &Sample<f64>) -> [f64; 6] {
+    [sample.measured[0], 0.0, sample.measured[3], 0.0, 0.0, 0.0]
+}
+
+/// [`Plan::fractions`] for equal sub-steps.
+pub fn step_fractions(substeps: usize) -> Vec<[f64; 3]> {
+    let n = substeps as f64;
+    (0..substeps)
+        .map(|i| i as f64)
+        .map(|i| [i / n, (i + 0.5) / n, (i + 1.0) / n])
+        .collect()
+}
+
 /// Everything shared by all candidates, in the precision of a backend.
 #[derive(Clone, Debug)]
 pub struct Plan<S> {
@@ -164,7 +179,6 @@ impl ReplayProblem {
                 "at least one of each",
             ));
         }
-        let n = substeps as f64;
         Ok(Self {
             problem: Problem {
                 variables,
@@ -175,10 +189,8 @@ impl ReplayProblem {
             plan: Plan {
                 samples,
                 windows,
-                step: interval_s / n,
-                fractions: (0..substeps)
-                    .map(|i| [i as f64 / n, (i as f64 + 0.5) / n, (i as f64 + 1.0) / n])
-                    .collect(),
+                step: interval_s / substeps as f64,
+                fractions: step_fractions(substeps),
                 norm,
             },
             interval_s,

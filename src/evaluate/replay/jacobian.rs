@@ -1,0 +1,92 @@
+//! Exact derivatives of the replayed outputs to the free parameters, by dual numbers.
+
+use super::kernel::{CHANNELS, drive_window};
+use super::problem::ReplayProblem;
+use crate::scalar::Dual;
+use crate::vehicle::tyre::Tyre;
+use crate::vehicle::{CarModel, LinearTyre, MagicFormula, TyreModel};
+use rayon::prelude::*;
+
+/// Parameters that are differentiated to in one drive: as many doubles as the widest register holds.
+const CHUNK: usize = 8;
+
+/// Errors of the outputs, and their derivatives.
+#[derive(Clone, Debug)]
+pub struct Residuals {
+    /// Output minus measurement, in the channels' units: by window, by scored sample, by channel.
+    pub errors: Vec<f64>,
+    /// For each free parameter, the derivative of every error to it.
+    pub columns: Vec<Vec<f64>>,
+}
+
+/// A drive through all windows with the derivatives to `CHUNK` parameters from `first`; `None` if the car is lost.
+#[inline(always)]
+fn drive_chunk<T: Tyre<Dual<CHUNK>>>(
+    replay: &ReplayProblem,
+    candidate: &[f64],
+    first: usize,
+) -> Option<Vec<Dual<CHUNK>>> {
+    let variable = |i: usize| match i.checked_sub(first) {
+        Some(k) if k < CHUNK => Dual::variable(candidate[i], k),
+        _ => Dual::constant(candidate[i]),
+    };
+    let car = CarModel::<Dual<CHUNK>, T>::from_parameters(|slot| {
+        replay.sources()[slot].map_or(Dual::constant(replay.base()[slot]), variable)
+    });
+    let mut errors = Vec::new();
+    for window in &replay.plan.windows {
+        let (drives, _) = drive_window(&car, &replay.plan, window, |i, outputs| {
+            if i >= window.scored_from {
+                let measured = &replay.plan.samples[window.start + i].measured;
+                errors.extend((0..CHANNELS).map(|k| outputs[k] - Dual::constant(measured[k])));
+            }
+        });
+        if !drives {
+            return None;
+        }
+    }
+    Some(errors)
+}
+
+/// [`drive_chunk`] compiled for what the processor has: the gradients are arrays that fill its registers.
+fn drive_dispatched(replay: &ReplayProblem, candidate: &[f64], first: usize) -> Option<Vec<Dual<CHUNK>>> {
+    #[inline(always)]
+    fn by_model(replay: &ReplayProblem, candidate: &[f64], first: usize) -> Option<Vec<Dual<CHUNK>>> {
+        match replay.tyre_model() {
+            TyreModel::MagicFormula => drive_chunk::<MagicFormula<Dual<CHUNK>>>(replay, candidate, first),
+            TyreModel::Linear => drive_chunk::<LinearTyre<Dual<CHUNK>>>(replay, candidate, first),
+        }
+    }
+    #[cfg(target_arch = "x86_64")]
+    {
+        #[target_feature(enable = "avx2")]
+        fn with_avx2(replay: &ReplayProblem, candidate: &[f64], first: usize) -> Option<Vec<Dual<CHUNK>>> {
+            by_model(replay, candidate, first)
+        }
+        if is_x86_feature_detected!("avx2") {
+            // SAFETY: the processor has the set, as just detected.
+            return unsafe { with_avx2(replay, candidate, first) };
+        }
+    }
+    by_model(replay, candidate, first)
+}
+
+impl ReplayProblem {
+    /// The errors of a candidate with their exact derivatives; `None` if the candidate fails.
+    pub fn residuals(&self, candidate: &[f64]) -> Option<Residuals> {
+        if self.preliminary_failure(candidate).is_some() {
+            return None;
+        }
+        let starts: Vec<usize> = (0..self.dimensions().max(1)).step_by(CHUNK).collect();
+        let chunks: Vec<Vec<Dual<CHUNK>>> = starts
+            .par_iter()
+            .map(|&first| drive_dispatched(self, candidate, first))
+            .collect::<Option<_>>()?;
+        let errors: Vec<f64> = chunks.first()?.iter().map(|e| e.value).collect();
+        let columns: Vec<Vec<f64>> = (0..self.dimensions())
+            .map(|i| chunks[i / CHUNK].iter().map(|e| e.gradient[i % CHUNK]).collect())
+            .collect();
+        let finite = |column: &Vec<f64>| column.iter().all(|x| x.is_finite());
+        (finite(&errors) && columns.iter().all(finite)).then_some(Residuals { errors, columns })
+    }
+}

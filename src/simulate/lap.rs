@@ -1,0 +1,130 @@
+//! A simulated log: the driver's inputs, and what the model makes of them.
+
+use super::driver::{DriverSettings, drive};
+use super::sensors::{SensorSettings, distort};
+use crate::error::{Error, Result};
+use crate::evaluate::replay::{Norm, Plan, Sample, Window, initial_state, step_fractions, trace};
+use crate::telemetry::{Calibration, Lap, Log};
+use crate::track::Circuit;
+use crate::vehicle::Car;
+
+/// How a lap is simulated and logged.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SimulateSettings {
+    /// The driver.
+    pub driver: DriverSettings,
+    /// Sample rate of the log, Hz.
+    pub rate_hz: f64,
+    /// Runge-Kutta steps per sample interval with which the outputs are worked out.
+    pub substeps: usize,
+    /// Noise and delay of the outputs.
+    pub sensors: SensorSettings,
+    /// Seed of the noise.
+    pub seed: u64,
+}
+
+impl Default for SimulateSettings {
+    fn default() -> Self {
+        Self {
+            driver: DriverSettings::default(),
+            rate_hz: 50.0,
+            substeps: 1,
+            sensors: SensorSettings::default(),
+            seed: 1,
+        }
+    }
+}
+
+/// Decimal places to which the logged inputs are rounded, so that the log's figures are the very inputs that its
+/// outputs were worked out from: wheel speeds (rad/s) and steering (rad).
+const INPUT_DECIMALS: [i32; 2] = [6, 8];
+
+fn rounded(x: f64, decimals: i32) -> f64 {
+    let scale = 10f64.powi(decimals);
+    (x * scale).round() / scale
+}
+
+/// Drives one flying lap and logs it.
+///
+/// The driver's closed loop runs at a fine step. The logged outputs are those of the model fed the logged inputs,
+/// linear between samples, from the start that an identification assumes: so the truth fits the log exactly when
+/// the fit takes the same step.
+///
+/// # Errors
+/// [`Error::Input`] for a setting out of range, [`Error::Study`] if the car does not get round.
+pub fn simulate_lap(car: &Car, circuit: &Circuit, settings: &SimulateSettings) -> Result<Log> {
+    if !(settings.rate_hz >= 5.0 && settings.rate_hz <= 1000.0) || settings.substeps == 0 {
+        let found = format!("{} Hz, {} sub-steps", settings.rate_hz, settings.substeps);
+        return Err(Error::input(
+            "simulate",
+            "rate_hz, substeps",
+            found,
+            "5 to 1000 Hz and 1 or more sub-steps",
+        ));
+    }
+    let interval = 1.0 / settings.rate_hz;
+    let lap = drive(car, circuit, &settings.driver, interval)?;
+    let mut samples: Vec<Sample<f64>> = lap
+        .inputs
+        .iter()
+        .zip(&lap.states)
+        .map(|((wheels, steer), state)| Sample {
+            wheel_speed: wheels.map(|w| rounded(w, INPUT_DECIMALS[0])),
+            steer: rounded(*steer, INPUT_DECIMALS[1]),
+            measured: [
+                rounded(state[0], INPUT_DECIMALS[0]),
+                0.0,
+                0.0,
+                rounded(state[2], INPUT_DECIMALS[1]),
+            ],
+        })
+        .collect();
+    let window = Window {
+        start: 0,
+        end: samples.len(),
+        scored_from: 0,
+        initial: initial_state(&samples[0]),
+    };
+    let plan = Plan {
+        samples: samples.clone(),
+        windows: vec![window],
+        step: interval / settings.substeps as f64,
+        fractions: step_fractions(settings.substeps),
+        norm: Norm::Two,
+    };
+    let (outputs, drives) = trace(&car.to_flat(), car.tyre_model(), &plan, &window);
+    if !drives {
+        return Err(Error::Study(format!(
+            "the car, replayed open loop from its logged inputs at {} Hz in {} steps per sample, is lost; try a \
+             higher rate or a lower pace than {}",
+            settings.rate_hz, settings.substeps, settings.driver.pace
+        )));
+    }
+    for (sample, output) in samples.iter_mut().zip(outputs) {
+        sample.measured = output;
+    }
+    distort(&mut samples, interval, &settings.sensors, settings.seed);
+
+    let column = |k: usize| samples.iter().map(|s| s.measured[k]).collect();
+    Ok(Log {
+        source: format!("{} on {}, simulated", car.name, circuit.name),
+        dt_s: interval,
+        time_s: (0..samples.len()).map(|i| i as f64 * interval).collect(),
+        distance_m: lap.station_m,
+        wheel_speed_radps: std::array::from_fn(|wheel| {
+            samples.iter().map(|s| s.wheel_speed[wheel]).collect()
+        }),
+        steer_rad: samples.iter().map(|s| s.steer).collect(),
+        vx_mps: column(0),
+        ax_mps2: column(1),
+        ay_mps2: column(2),
+        yaw_rate_radps: column(3),
+        laps: vec![Lap {
+            number: 1,
+            start: 0,
+            end: samples.len(),
+            complete: true,
+        }],
+        calibration: Calibration::default(),
+    })
+}

@@ -1,0 +1,115 @@
+//! Least-squares polish of a candidate: Levenberg-Marquardt on the exact Jacobian, in `f64`, within the bounds.
+
+use crate::evaluate::Variable;
+use crate::evaluate::replay::{CHANNEL_NAMES, ReplayProblem, Residuals};
+use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
+use nalgebra::{DMatrix, DVector, Dyn, VecStorage};
+
+/// Number of compared channels.
+const CHANNELS: usize = CHANNEL_NAMES.len();
+
+/// The outcome of a polish.
+#[derive(Clone, Debug)]
+pub struct Polished {
+    /// The polished candidate.
+    pub candidate: Vec<f64>,
+    /// Half the sum of the squares of the weighted errors.
+    pub cost: f64,
+    /// Drives of the car that it took.
+    pub evaluations: usize,
+    /// Whether the method met one of its tolerances.
+    pub converged: bool,
+}
+
+/// A candidate is moved this share of the range away from a bound before it is polished, where the
+/// transformation below would otherwise hold it for ever.
+const MARGIN: f64 = 1e-3;
+/// Error that stands for every sample of a car that was lost: far above any real one, so the step is refused.
+const LOST: f64 = 1e4;
+
+/// Bounds by `x = lower + range (1 + sin u)/2` with `u` unbounded, as MINUIT has it (James, Roos, 1975).
+struct Bounded<'a> {
+    replay: &'a ReplayProblem,
+    variables: &'a [Variable],
+    weights: [f64; CHANNELS],
+    u: DVector<f64>,
+    current: Option<Residuals>,
+    length: usize,
+    evaluations: usize,
+}
+
+impl Bounded<'_> {
+    fn candidate(&self, u: &DVector<f64>) -> Vec<f64> {
+        let scaled = |(v, u): (&Variable, &f64)| {
+            (v.lower + 0.5 * (v.upper - v.lower) * (1.0 + u.sin())).clamp(v.lower, v.upper)
+        };
+        self.variables.iter().zip(u.iter()).map(scaled).collect()
+    }
+
+    fn weight(&self, row: usize) -> f64 {
+        self.weights[row % CHANNELS]
+    }
+}
+
+impl LeastSquaresProblem<f64, Dyn, Dyn> for Bounded<'_> {
+    type ResidualStorage = VecStorage<f64, Dyn, nalgebra::U1>;
+    type JacobianStorage = VecStorage<f64, Dyn, Dyn>;
+    type ParameterStorage = VecStorage<f64, Dyn, nalgebra::U1>;
+
+    fn set_params(&mut self, u: &DVector<f64>) {
+        self.u.copy_from(u);
+        self.current = self.replay.residuals(&self.candidate(u));
+        self.evaluations += 1;
+    }
+
+    fn params(&self) -> DVector<f64> {
+        self.u.clone()
+    }
+
+    fn residuals(&self) -> Option<DVector<f64>> {
+        Some(match &self.current {
+            Some(r) => DVector::from_fn(self.length, |i, _| self.weight(i) * r.errors[i]),
+            None => DVector::from_element(self.length, LOST),
+        })
+    }
+
+    fn jacobian(&self) -> Option<DMatrix<f64>> {
+        let r = self.current.as_ref()?;
+        Some(DMatrix::from_fn(self.length, self.variables.len(), |i, k| {
+            let v = &self.variables[k];
+            self.weight(i) * r.columns[k][i] * 0.5 * (v.upper - v.lower) * self.u[k].cos()
+        }))
+    }
+}
+
+/// Polishes `candidate` with the errors of each channel weighted by `weights` (one over their noise, or scale).
+/// `None` if the candidate is lost from the start.
+pub fn polish(replay: &ReplayProblem, candidate: &[f64], weights: [f64; CHANNELS]) -> Option<Polished> {
+    let length = replay.residuals(candidate)?.errors.len();
+    let variables = &replay.problem.variables;
+    let u = DVector::from_iterator(
+        variables.len(),
+        candidate.iter().zip(variables).map(|(x, v)| {
+            let range = v.upper - v.lower;
+            let share = if range > 0.0 { (x - v.lower) / range } else { 0.5 };
+            (2.0 * share.clamp(MARGIN, 1.0 - MARGIN) - 1.0).asin()
+        }),
+    );
+    let mut problem = Bounded {
+        replay,
+        variables,
+        weights,
+        u: u.clone(),
+        current: None,
+        length,
+        evaluations: 0,
+    };
+    problem.set_params(&u);
+    let (problem, report) = LevenbergMarquardt::new().minimize(problem);
+    Some(Polished {
+        candidate: problem.candidate(&problem.u),
+        cost: report.objective_function,
+        evaluations: problem.evaluations,
+        converged: report.termination.was_successful(),
+    })
+}

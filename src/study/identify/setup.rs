@@ -1,0 +1,381 @@
+//! From a log to a problem: samples, windows, step size, scales of the channels.
+
+use super::settings::{IdentifySettings, ObjectiveChoice};
+use crate::error::{Error, Result};
+use crate::evaluate::Objective;
+use crate::evaluate::replay::{
+    CHANNEL_NAMES, CHANNEL_UNITS, ChannelWeights, Norm, ReplayProblem, Sample, Window, initial_state,
+};
+use crate::telemetry::{ChannelMap, Log, LogOptions, NativeFormat, Recording};
+use crate::track::Circuit;
+use crate::vehicle::Car;
+use std::path::Path;
+
+/// Number of compared channels.
+pub(super) const CHANNELS: usize = CHANNEL_NAMES.len();
+
+const BUNDLED_LAP: &str = include_str!("../../../data/laps/gt_silverstone.csv");
+/// The circuit that the bundled lap was driven on.
+const BUNDLED_TRACK: &str = "silverstone_gp";
+
+/// Everything an identification works with.
+pub struct Setup {
+    /// The log, calibrated and on one clock.
+    pub log: Log,
+    /// The problem over the laps to fit.
+    pub replay: ReplayProblem,
+    /// The same problem over the laps held out, if any.
+    pub holdout: Option<ReplayProblem>,
+    /// The true value of each free parameter, where the truth is known.
+    pub truth: Option<Vec<f64>>,
+    /// The circuit, where one is named.
+    pub circuit: Option<Circuit>,
+    /// Standard deviation of each channel over the scored samples, which its errors are set against.
+    pub scales: [f64; CHANNELS],
+}
+
+/// The stability limit of the classical Runge-Kutta method on the negative real axis, with a margin for modes that
+/// are stiffer than the estimate below.
+const STABLE_STEP: f64 = 2.4;
+
+/// The fastest mode (1/s) of a car at a speed (m/s), after the figures of `physics.md` section 2 ("Step size").
+fn fastest_mode(speed: f64) -> f64 {
+    60.0 + 620.0 / speed
+}
+
+/// Reads what the settings name and puts the problem together.
+///
+/// # Errors
+/// [`Error::Input`] naming file and field for anything that does not fit.
+pub fn set_up(settings: &IdentifySettings) -> Result<Setup> {
+    let car = Car::load(&settings.car)?;
+    let bundled = settings.log.is_none();
+    let map = match &settings.channel_map {
+        Some(path) => ChannelMap::read(path)?,
+        None => ChannelMap::default(),
+    };
+    let options = LogOptions {
+        rate_hz: settings.rate_hz,
+        rolling_radius_m: Some(car.chassis.radius_front),
+        calibration: settings.calibration.clone(),
+        ..LogOptions::default()
+    };
+    let log = match &settings.log {
+        Some(path) => Log::read(path, &map, &options)?,
+        None => {
+            let name = Path::new("the bundled lap gt_silverstone.csv");
+            Log::from_recording(&Recording::parse(BUNDLED_LAP.as_bytes(), name)?, &map, &options)?
+        }
+    };
+    let track = settings.track.as_deref().or(bundled.then_some(BUNDLED_TRACK));
+    let circuit = track.map(load_circuit).transpose()?;
+    let truth_car = match settings.truth.as_deref().or(bundled.then_some("gt")) {
+        Some(name) => Some(Car::load(name)?),
+        None => None,
+    };
+
+    let samples = samples_of(&log);
+    let (fitted, held) = choose_laps(settings, &log)?;
+    let fit_windows = windows_over(settings, &log, &samples, &fitted, circuit.as_ref())?;
+    if fit_windows.is_empty() {
+        let found = format!(
+            "no stretch of the laps chosen above {} m/s",
+            settings.least_speed_mps
+        );
+        return Err(Error::input(
+            &log.source,
+            "windows",
+            found,
+            "at least one window of the length asked for",
+        ));
+    }
+    let slowest = fit_windows
+        .iter()
+        .flat_map(|w| &samples[w.start..w.end])
+        .map(|s| s.measured[0])
+        .fold(f64::INFINITY, f64::min);
+    let automatic = (log.dt_s * fastest_mode(slowest.max(1.0)) / STABLE_STEP).ceil() as usize;
+    let substeps = settings.substeps.unwrap_or(automatic.max(1));
+    let scales = channel_scales(&samples, &fit_windows);
+    let problem = |windows: Vec<Window<f64>>| {
+        let free = free_parameters(settings, &car)?;
+        let weights = objective_weights(settings, &scales, &windows, log.dt_s);
+        ReplayProblem::new(
+            car.clone(),
+            free,
+            samples.clone(),
+            windows,
+            (log.dt_s, substeps),
+            settings.norm,
+            weights,
+        )
+    };
+    let replay = problem(fit_windows)?;
+    let holdout = if held.is_empty() {
+        None
+    } else {
+        let windows = windows_over(settings, &log, &samples, &held, circuit.as_ref())?;
+        if windows.is_empty() {
+            None
+        } else {
+            Some(problem(windows)?)
+        }
+    };
+    let truth = truth_car.map(|truth| {
+        let flat = truth.to_flat();
+        replay.parameters.iter().map(|p| flat[p.slots[0]]).collect()
+    });
+    Ok(Setup {
+        truth,
+        circuit,
+        scales,
+        holdout,
+        replay,
+        log,
+    })
+}
+
+/// A bundled circuit by name, or a circuit file.
+pub fn load_circuit(name_or_path: &str) -> Result<Circuit> {
+    if Path::new(name_or_path).extension().is_some() {
+        Circuit::load(name_or_path)
+    } else {
+        Circuit::bundled(name_or_path)
+    }
+}
+
+fn samples_of(log: &Log) -> Vec<Sample<f64>> {
+    (0..log.samples())
+        .map(|i| Sample {
+            wheel_speed: std::array::from_fn(|wheel| log.wheel_speed_radps[wheel][i]),
+            steer: log.steer_rad[i],
+            measured: [
+                log.vx_mps[i],
+                log.ax_mps2[i],
+                log.ay_mps2[i],
+                log.yaw_rate_radps[i],
+            ],
+        })
+        .collect()
+}
+
+/// Sample ranges of the laps to fit and of those held out.
+type LapRanges = Vec<(usize, usize)>;
+
+fn choose_laps(settings: &IdentifySettings, log: &Log) -> Result<(LapRanges, LapRanges)> {
+    let range_of = |number: &u32| -> Result<(usize, usize)> {
+        let lap = log.laps.iter().find(|lap| lap.number == *number).ok_or_else(|| {
+            let there: Vec<String> = log.laps.iter().map(|l| l.number.to_string()).collect();
+            Error::input(
+                &log.source,
+                "laps",
+                format!("lap {number} asked for"),
+                format!("one of {}", there.join(", ")),
+            )
+        })?;
+        Ok((lap.start, lap.end))
+    };
+    let held: LapRanges = settings.holdout.iter().map(range_of).collect::<Result<_>>()?;
+    let fitted: LapRanges = if settings.laps.is_empty() {
+        let wanted = log
+            .laps
+            .iter()
+            .filter(|l| l.complete && !settings.holdout.contains(&l.number));
+        wanted.map(|l| (l.start, l.end)).collect()
+    } else {
+        settings.laps.iter().map(range_of).collect::<Result<_>>()?
+    };
+    if fitted.is_empty() {
+        return Err(Error::input(
+            &log.source,
+            "laps",
+            "no complete lap to fit",
+            "at least one",
+        ));
+    }
+    Ok((fitted, held))
+}
+
+fn windows_over(
+    settings: &IdentifySettings,
+    log: &Log,
+    samples: &[Sample<f64>],
+    laps: &[(usize, usize)],
+    circuit: Option<&Circuit>,
+) -> Result<Vec<Window<f64>>> {
+    let settle = (settings.settle_s / log.dt_s).round() as usize;
+    let section = match (&settings.section, circuit) {
+        (Some(name), Some(circuit)) => Some(circuit.section(name)?.clone()),
+        (Some(name), None) => {
+            return Err(Error::input(
+                "the study",
+                "section",
+                name,
+                "a track on which the section is named",
+            ));
+        }
+        (None, _) => None,
+    };
+    let mut windows = Vec::new();
+    for &(start, end) in laps {
+        let stretches: Vec<(usize, usize)> = match &section {
+            None => vec![(start, end)],
+            Some(section) => {
+                let inside: Vec<usize> = (start..end)
+                    .filter(|&i| section.contains(log.distance_m[i]))
+                    .collect();
+                match (inside.first(), inside.last()) {
+                    (Some(&first), Some(&last)) => vec![(first.saturating_sub(settle).max(start), last + 1)],
+                    _ => Vec::new(),
+                }
+            }
+        };
+        for (from, to) in stretches {
+            let length = match settings.window_s {
+                // The settling time is driven besides.
+                Some(window) => ((window / log.dt_s).round() as usize).max(1) + settle,
+                None => to - from,
+            };
+            if length > to - from || length <= settle + 1 {
+                let found = format!("a stretch of {:.2} s", (to - from) as f64 * log.dt_s);
+                let expected = format!(
+                    "at least one window of {:.2} s with {:.2} s to settle",
+                    settings.window_s.unwrap_or(0.0),
+                    settings.settle_s
+                );
+                return Err(Error::input(&log.source, "windows", found, expected));
+            }
+            let mut at = from;
+            while at + length <= to {
+                let window = Window {
+                    start: at,
+                    end: at + length,
+                    scored_from: settle,
+                    initial: initial_state(&samples[at]),
+                };
+                let whole_lap = settings.window_s.is_none();
+                let fast = samples[at..at + length]
+                    .iter()
+                    .all(|s| s.measured[0] >= settings.least_speed_mps);
+                if fast {
+                    windows.push(window);
+                } else if whole_lap {
+                    let found = format!("samples slower than {} m/s in the lap", settings.least_speed_mps);
+                    return Err(Error::input(
+                        &log.source,
+                        "windows",
+                        found,
+                        "a window_s, so that slow parts are left out",
+                    ));
+                }
+                at += length - settle;
+            }
+        }
+    }
+    Ok(windows)
+}
+
+fn channel_scales(samples: &[Sample<f64>], windows: &[Window<f64>]) -> [f64; CHANNELS] {
+    std::array::from_fn(|k| {
+        let values: Vec<f64> = windows
+            .iter()
+            .flat_map(|w| &samples[w.start + w.scored_from..w.end])
+            .map(|s| s.measured[k])
+            .collect();
+        let mean = values.iter().sum::<f64>() / values.len() as f64;
+        let variance = values.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / values.len() as f64;
+        // A channel that does not move has no scale of its own.
+        if variance > 0.0 { variance.sqrt() } else { 1.0 }
+    })
+}
+
+fn free_parameters(
+    settings: &IdentifySettings,
+    car: &Car,
+) -> Result<Vec<(crate::vehicle::CarParameter, f64, f64)>> {
+    settings
+        .free
+        .iter()
+        .map(|free| {
+            let parameter = car.parameter(&free.name).ok_or_else(|| {
+                let expected = "a chassis key, a tyre coefficient, or one axle's as in front.rBx1";
+                Error::input(
+                    "the study",
+                    "table [free]",
+                    format!("the parameter {}", free.name),
+                    expected,
+                )
+            })?;
+            let info = parameter.info;
+            if !(info.admits(free.lower) && info.admits(free.upper)) {
+                let found = format!("{} to {}", free.lower, free.upper);
+                let expected = format!("bounds within {} to {} {}", info.minimum, info.maximum, info.unit);
+                return Err(Error::input(
+                    "the study",
+                    format!("bounds of {}", free.name),
+                    found,
+                    expected,
+                ));
+            }
+            Ok((parameter, free.lower, free.upper))
+        })
+        .collect()
+}
+
+fn objective_weights(
+    settings: &IdentifySettings,
+    scales: &[f64; CHANNELS],
+    windows: &[Window<f64>],
+    dt_s: f64,
+) -> Vec<ChannelWeights> {
+    let scored: usize = windows.iter().map(|w| w.end - w.start - w.scored_from).sum();
+    let time = scored as f64 * dt_s;
+    // The cost that an error of one standard deviation of the channel would have.
+    let unit_cost = |scale: f64| match settings.norm {
+        Norm::One => scale * time,
+        Norm::Two => scale * time.sqrt(),
+        Norm::Infinity => scale,
+        Norm::MeanSquare => scale * scale,
+    };
+    settings
+        .objectives
+        .iter()
+        .map(|choice| match *choice {
+            ObjectiveChoice::All => ChannelWeights {
+                objective: Objective {
+                    name: "all".to_owned(),
+                    unit: "-".to_owned(),
+                },
+                weights: scales.map(|s| 1.0 / (unit_cost(s) * CHANNELS as f64)),
+            },
+            ObjectiveChoice::Channel(channel) => ChannelWeights {
+                objective: Objective {
+                    name: CHANNEL_NAMES[channel].to_owned(),
+                    unit: cost_unit(settings.norm, CHANNEL_UNITS[channel]),
+                },
+                weights: std::array::from_fn(|k| if k == channel { 1.0 } else { 0.0 }),
+            },
+        })
+        .collect()
+}
+
+/// The unit of a channel's cost.
+pub fn cost_unit(norm: Norm, unit: &str) -> String {
+    match norm {
+        Norm::One => format!("({unit}) s"),
+        Norm::Two => format!("({unit}) s^0.5"),
+        Norm::Infinity => unit.to_owned(),
+        Norm::MeanSquare => format!("({unit})^2"),
+    }
+}
+
+/// How the bundled laps are written: inputs as rounded when driven, outputs to 1e-11.
+pub fn lap_format() -> NativeFormat {
+    ["vx_mps", "ax_mps2", "ay_mps2", "yaw_rate_radps"]
+        .into_iter()
+        .fold(NativeFormat::exact(), |format, column| {
+            format.decimals(column, 11)
+        })
+        .decimals("time_s", 4)
+        .decimals("distance_m", 3)
+}

@@ -1,0 +1,3 @@
+//! The studies that users run.
+
+pub mod identify;

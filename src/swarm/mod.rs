@@ -1,0 +1,102 @@
+//! Particle swarms: single-objective ([`Pso`]) and multi-objective ([`Mopso`]), by ask and tell or in one run.
+//!
+//! Positions live in the unit cube and are scaled to the bounds when asked for, so a swarm does not notice where
+//! its bounds lie. Random numbers are functions of seed, iteration, particle and purpose ([`crate::random`]), so
+//! the same seed gives the same run whatever the threads.
+//!
+//! References, as the settings cite them:
+//! 1. Kennedy, Eberhart, *Particle swarm optimization*, ICNN 1995.
+//! 2. Shi, Eberhart, *A modified particle swarm optimizer*, CEC 1998 (inertia, linear schedules).
+//! 3. Clerc, Kennedy, *The particle swarm: explosion, stability, and convergence*, IEEE TEC 6 (2002).
+//! 4. Coello Coello, Pulido, Lechuga, *Handling multiple objectives with particle swarm optimization*, IEEE TEC 8
+//!    (2004) (archive, mutation that shrinks over the run).
+//! 5. Deb et al., *A fast and elitist multiobjective genetic algorithm: NSGA-II*, IEEE TEC 6 (2002) (crowding).
+//! 6. Nebro et al., *SMPSO*, MCDM 2009 (speed limit, reversed velocity at a bound).
+//! 7. Storn, Price, *Differential evolution*, J. Global Optimization 11 (1997) (difference moves).
+
+mod archive;
+mod covariance;
+mod mopso;
+mod motion;
+mod pso;
+mod settings;
+
+pub use archive::Archive;
+pub use covariance::{CovarianceSettings, CovarianceSwarm};
+pub use mopso::Mopso;
+pub use pso::Pso;
+pub use settings::{BoundHandling, Leaders, MopsoSettings, Mutation, PsoSettings, Randomness, Schedule};
+
+use crate::error::Result;
+use crate::evaluate::{Evaluation, Evaluator};
+use std::ops::ControlFlow;
+
+/// A population-based optimiser that is asked for candidates and told what they are worth.
+pub trait Optimiser {
+    /// The candidates to evaluate next: row-major, values within the bounds.
+    fn ask(&mut self) -> Vec<f64>;
+
+    /// Takes the objectives of the candidates last asked for.
+    fn tell(&mut self, evaluation: &Evaluation);
+
+    /// Iterations told so far.
+    fn iteration(&self) -> usize;
+
+    /// Iterations that the settings plan for.
+    fn planned_iterations(&self) -> usize;
+
+    /// Candidates evaluated so far.
+    fn evaluations(&self) -> u64;
+
+    /// The least value seen of each objective.
+    fn best(&self) -> Vec<f64>;
+}
+
+/// What an observer of a run sees after each iteration.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Progress {
+    /// Iterations done.
+    pub iteration: usize,
+    /// Candidates evaluated.
+    pub evaluations: u64,
+    /// The least value seen of each objective.
+    pub best: Vec<f64>,
+    /// The median of the first objective over this iteration's candidates that did not fail, if any did not.
+    pub median: Option<f64>,
+    /// Candidates of this iteration that failed.
+    pub failed: usize,
+}
+
+/// Asks, evaluates and tells until the planned iterations are done or `observe` breaks off.
+///
+/// # Errors
+/// Those of the evaluator.
+pub fn run(
+    optimiser: &mut dyn Optimiser,
+    evaluator: &mut dyn Evaluator,
+    mut observe: impl FnMut(&Progress) -> ControlFlow<()>,
+) -> Result<()> {
+    let width = evaluator.problem().objectives.len();
+    while optimiser.iteration() < optimiser.planned_iterations() {
+        let population = optimiser.ask();
+        let evaluation = evaluator.evaluate(&population)?;
+        optimiser.tell(&evaluation);
+        let rows = evaluation
+            .objectives
+            .chunks_exact(width)
+            .zip(&evaluation.failures);
+        let mut costs: Vec<f64> = rows.filter(|(_, f)| f.is_none()).map(|(row, _)| row[0]).collect();
+        costs.sort_by(f64::total_cmp);
+        let progress = Progress {
+            iteration: optimiser.iteration(),
+            evaluations: optimiser.evaluations(),
+            best: optimiser.best(),
+            median: costs.get(costs.len() / 2).copied(),
+            failed: evaluation.failures.iter().filter(|f| f.is_some()).count(),
+        };
+        if observe(&progress).is_break() {
+            break;
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,158 @@
+//! Single-objective particle swarm; minimises the first objective.
+
+use super::Optimiser;
+use super::motion::{Particles, Purpose};
+use super::settings::PsoSettings;
+use crate::error::Result;
+use crate::evaluate::{Evaluation, FAILED_COST, Problem};
+use crate::random::Random;
+
+/// A swarm with one leader (references 1, 2 and 7 of [`super`]).
+#[derive(Clone, Debug)]
+pub struct Pso {
+    settings: PsoSettings,
+    random: Random,
+    particles: Particles,
+    objectives: usize,
+    best_position: Vec<f64>,
+    best_cost: Vec<f64>,
+    leader: usize,
+    iteration: usize,
+    evaluations: u64,
+}
+
+/// Share of the swarm, best first, from which difference moves take their leaders.
+const ELITE_SHARE: f64 = 0.1;
+
+impl Pso {
+    /// A swarm over the variables of `problem`.
+    ///
+    /// # Errors
+    /// [`crate::Error::Input`] naming the setting that is out of its range.
+    pub fn new(problem: &Problem, settings: PsoSettings) -> Result<Self> {
+        settings.validate()?;
+        let random = Random::new(settings.seed);
+        let particles = Particles::scattered(&problem.variables, settings.population, random);
+        Ok(Self {
+            best_position: particles.position.clone(),
+            best_cost: vec![f64::INFINITY; settings.population],
+            objectives: problem.objectives.len(),
+            random,
+            particles,
+            settings,
+            leader: 0,
+            iteration: 0,
+            evaluations: 0,
+        })
+    }
+
+    /// The best candidate so far, in the variables' units, and its cost.
+    pub fn best_candidate(&self) -> (Vec<f64>, f64) {
+        let d = self.particles.dimensions();
+        let row = &self.best_position[self.leader * d..(self.leader + 1) * d];
+        (self.particles.scaled(row), self.best_cost[self.leader])
+    }
+
+    fn advance(&mut self) {
+        let share = self.iteration as f64 / (self.settings.iterations.max(2) - 1) as f64;
+        let d = self.particles.dimensions();
+        let mut order: Vec<usize> = (0..self.settings.population).collect();
+        order.sort_by(|&a, &b| self.best_cost[a].total_cmp(&self.best_cost[b]));
+        let elite = ((self.settings.population as f64 * ELITE_SHARE) as usize).max(2);
+        for particle in 0..self.settings.population {
+            let coin = self
+                .random
+                .uniform(Purpose::Coin as u32, self.iteration as u32, particle as u32, 0);
+            if coin < self.settings.difference_share {
+                self.difference_move(particle, &order[..elite.min(order.len())]);
+            } else {
+                let own = self.best_position[particle * d..(particle + 1) * d].to_vec();
+                let leader = self.best_position[self.leader * d..(self.leader + 1) * d].to_vec();
+                self.particles.pull(
+                    particle,
+                    (&own, &leader),
+                    &self.settings,
+                    (share, self.iteration),
+                    self.random,
+                );
+            }
+        }
+    }
+
+    /// From a particle's own best towards one of the elite, plus the difference of two others' bests; only some
+    /// coordinates move, so that what is good already is not all given up at once.
+    fn difference_move(&mut self, particle: usize, elite: &[usize]) {
+        let (when, who) = (self.iteration as u32, particle as u32);
+        let purpose = Purpose::Difference as u32;
+        let d = self.particles.dimensions();
+        let uniform = |index: u32| self.random.uniform(purpose, when, who, index);
+        let pick = |index: u32| {
+            self.random
+                .below(self.settings.population, purpose, when, who, index)
+        };
+        let towards = elite[self.random.below(elite.len(), purpose, when, who, 0)];
+        let (first, second) = (pick(1), pick(2));
+        let scale = 0.4 + 0.5 * uniform(3);
+        let crossover = if uniform(4) < 0.5 { 0.9 } else { 0.3 };
+        let always = self.random.below(d.max(1), purpose, when, who, 5);
+        for k in 0..d {
+            let i = particle * d + k;
+            let at = |p: usize| self.best_position[p * d + k];
+            let own = at(particle);
+            let moved = own + scale * (at(towards) - own) + scale * (at(first) - at(second));
+            let take = k == always || uniform(8 + k as u32) < crossover;
+            // Half-way back to the bound that was overstepped, which keeps the spread of the swarm.
+            let target = if !take {
+                own
+            } else if moved < 0.0 {
+                0.5 * own
+            } else if moved > 1.0 {
+                0.5 * (own + 1.0)
+            } else {
+                moved
+            };
+            self.particles.velocity[i] = target - self.particles.position[i];
+            self.particles.position[i] = target;
+        }
+    }
+}
+
+impl Optimiser for Pso {
+    fn ask(&mut self) -> Vec<f64> {
+        self.particles.scaled(&self.particles.position)
+    }
+
+    fn tell(&mut self, evaluation: &Evaluation) {
+        let d = self.particles.dimensions();
+        for (particle, row) in evaluation.objectives.chunks_exact(self.objectives).enumerate() {
+            let cost = if row[0].is_finite() { row[0] } else { FAILED_COST };
+            if cost < self.best_cost[particle] {
+                self.best_cost[particle] = cost;
+                let range = particle * d..(particle + 1) * d;
+                self.best_position[range.clone()].copy_from_slice(&self.particles.position[range]);
+            }
+            if self.best_cost[particle] < self.best_cost[self.leader] {
+                self.leader = particle;
+            }
+        }
+        self.evaluations += self.settings.population as u64;
+        self.iteration += 1;
+        self.advance();
+    }
+
+    fn iteration(&self) -> usize {
+        self.iteration
+    }
+
+    fn planned_iterations(&self) -> usize {
+        self.settings.iterations
+    }
+
+    fn evaluations(&self) -> u64 {
+        self.evaluations
+    }
+
+    fn best(&self) -> Vec<f64> {
+        vec![self.best_cost[self.leader]]
+    }
+}
