@@ -46,9 +46,7 @@ macro_rules! parameters {
                     name: $key, unit: $unit, minimum: $min, maximum: $max, default: $default, meaning: $meaning,
                 },)*
             ];
-        }
 
-        impl<R> $name<R> {
             /// The fields' names in the same order, which the shaders' structs share.
             pub const FIELDS: &'static [&'static str] = &[$(stringify!($field)),*];
         }
