@@ -3,6 +3,7 @@
 //! A [`Problem`] names its bounded decision variables and its objectives. An [`Evaluator`] scores candidates of
 //! it. Optimisers see nothing else, so they run any problem on any backend.
 
+pub mod gpu;
 pub mod replay;
 pub mod simd;
 

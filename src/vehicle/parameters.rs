@@ -46,6 +46,9 @@ macro_rules! parameters {
                     name: $key, unit: $unit, minimum: $min, maximum: $max, default: $default, meaning: $meaning,
                 },)*
             ];
+
+            /// The fields' names in the same order, which the shaders' structs share.
+            pub const FIELDS: &'static [&'static str] = &[$(stringify!($field)),*];
         }
 
         impl<R: Copy> $name<R> {

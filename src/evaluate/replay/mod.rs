@@ -2,6 +2,7 @@
 
 mod backend;
 mod cpu;
+mod gpu;
 mod jacobian;
 pub mod kernel;
 mod problem;
@@ -10,6 +11,7 @@ mod table;
 
 pub use backend::{BackendChoice, open_evaluator};
 pub use cpu::{CpuEvaluator, norm_name, trace};
+pub use gpu::{Batching, DeviceSample, DeviceWindow, DispatchStatistics, GpuEvaluator, Stretch};
 pub use jacobian::Residuals;
 pub use problem::{
     CHANNEL_NAMES, CHANNEL_UNITS, ChannelWeights, Norm, Plan, ReplayProblem, Sample, Window, initial_state,

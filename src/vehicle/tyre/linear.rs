@@ -16,8 +16,7 @@ parameters! {
 
 impl<R: Real> Tyre<R> for LinearTyre<R> {
     const MODEL: TyreModel = TyreModel::Linear;
-    const FIELDS: &'static [&'static str] =
-        &["nominal_load", "slip_stiffness", "cornering_stiffness", "trail"];
+    const FIELDS: &'static [&'static str] = LinearTyre::<R>::FIELDS;
 
     fn from_parameters(at: impl FnMut(usize) -> R, _inclination: R) -> Self {
         LinearTyre::from_flat(at)

@@ -1,0 +1,150 @@
+// Twin of `src/vehicle/model.rs`: wheels, tyres, aero, loads and body put together. `Tyre` and `tyre_forces` come
+// from the tyre model's own module.
+//
+// The twin's loop over the wheels is one pass over all four side by side; the order of every sum and every
+// operation are the twin's.
+
+struct CarInput {
+    wheel_speed: Wheels,
+    steer: f32,
+}
+
+struct CarState {
+    body: BodyState,
+    pitch_acceleration: f32,
+}
+
+struct CarRate {
+    state: CarState,
+    ax: f32,
+    ay: f32,
+}
+
+struct CarModel {
+    chassis: Chassis,
+    // The front axle's figures in the first two places, the rear's in the others.
+    tyres: Tyre,
+}
+
+struct WheelSlip {
+    ratio: Wheels,
+    tangent: Wheels,
+}
+
+fn wheel_slip(
+    body: BodyState,
+    x: Wheels,
+    y: Wheels,
+    cosine: Wheels,
+    sine: Wheels,
+    rim_speed: Wheels,
+    least_speed: f32,
+) -> WheelSlip {
+    let hub_x = body.vx - body.yaw_rate * y;
+    let hub_y = body.vy + body.yaw_rate * x;
+    let vx = cosine * hub_x + sine * hub_y;
+    let vy = cosine * hub_y - sine * hub_x;
+    let speed = max(abs(vx), Wheels(least_speed));
+    return WheelSlip((rim_speed - vx) / speed, vy / speed);
+}
+
+struct WheelForces {
+    x: Wheels,
+    y: Wheels,
+}
+
+fn to_body_axes(forces: TyreForces, cosine: Wheels, sine: Wheels) -> WheelForces {
+    return WheelForces(forces.x * cosine - forces.y * sine, forces.x * sine + forces.y * cosine);
+}
+
+// `start` with the four figures, one after the other.
+fn with_all(start: f32, figures: Wheels) -> f32 {
+    return start + figures.x + figures.y + figures.z + figures.w;
+}
+
+fn car_rate(car: CarModel, state: CarState, input: CarInput) -> CarRate {
+    let chassis = car.chassis;
+    let body = state.body;
+    let aero = aero_forces(chassis, body.vx);
+    let loads = wheel_loads(chassis, body, state.pitch_acceleration, aero);
+
+    let steer = input.steer * chassis.steer_scale + chassis.steer_offset;
+    let steer_cosine = own_cos(Wheels(steer)).x;
+    let steer_sine = own_sin(Wheels(steer)).x;
+    let cosine = Wheels(steer_cosine, steer_cosine, 1.0, 1.0);
+    let sine = Wheels(steer_sine, steer_sine, 0.0, 0.0);
+    let x = Wheels(chassis.cg_to_front, chassis.cg_to_front, -chassis.cg_to_rear, -chassis.cg_to_rear);
+    let half_track = Wheels(
+        chassis.half_track_front,
+        chassis.half_track_front,
+        chassis.half_track_rear,
+        chassis.half_track_rear,
+    );
+    let radius = Wheels(chassis.radius_front, chassis.radius_front, chassis.radius_rear, chassis.radius_rear);
+    let side = Wheels(1.0, -1.0, 1.0, -1.0);
+    let y = half_track * side;
+
+    let rim_speed = input.wheel_speed * radius;
+    let slip = wheel_slip(body, x, y, cosine, sine, rim_speed, chassis.slip_speed_floor);
+    let forces = tyre_forces(car.tyres, TyreInput(loads, slip.ratio, slip.tangent, side));
+    let force = to_body_axes(forces, cosine, sine);
+    let total = BodyForces(
+        with_all(-aero.drag, force.x),
+        with_all(0.0, force.y),
+        with_all(0.0, x * force.y - y * force.x + forces.aligning_moment),
+    );
+
+    let rate = body_derivative(chassis, body, total);
+    return CarRate(
+        CarState(rate, (total.x / chassis.mass - state.pitch_acceleration) / chassis.pitch_lag),
+        rate.vx - body.vy * body.yaw_rate,
+        rate.vy + body.vx * body.yaw_rate,
+    );
+}
+
+// `origin + share * slope`, component by component: the sums of `runge_kutta_step`.
+fn carried(origin: CarState, share: f32, slope: CarState) -> CarState {
+    return CarState(
+        BodyState(
+            origin.body.vx + share * slope.body.vx,
+            origin.body.vy + share * slope.body.vy,
+            origin.body.yaw_rate + share * slope.body.yaw_rate,
+            origin.body.roll + share * slope.body.roll,
+            origin.body.roll_rate + share * slope.body.roll_rate,
+        ),
+        origin.pitch_acceleration + share * slope.pitch_acceleration,
+    );
+}
+
+// The stages of the classical Runge-Kutta method: `STAGES` in the twin. The number of the input is one of a
+// step's three: start, middle, end.
+const STAGES: u32 = 4u;
+
+fn stage_input(fractions: vec4<f32>, stage: u32) -> f32 {
+    return select(select(fractions.y, fractions.z, stage == 3u), fractions.x, stage == 0u);
+}
+
+fn stage_weight(stage: u32) -> f32 {
+    return select(0.3333333333333333, 0.16666666666666666, stage == 0u || stage == 3u);
+}
+
+fn stage_reach(stage: u32) -> f32 {
+    return select(select(0.5, 1.0, stage == 2u), 0.0, stage == 3u);
+}
+
+// `CarState::drives`. A state that is no number is lost; so says the exponent, whatever a driver thinks of NaN.
+fn still_drives(state: CarState) -> bool {
+    let b = state.body;
+    return abs(b.vy) < b.vx + 3.0
+        && b.vx < 200.0
+        && abs(b.yaw_rate) < 6.0
+        && abs(b.roll) < 0.7
+        && abs(b.roll_rate) < 50.0
+        && abs(state.pitch_acceleration) < 500.0
+        && is_finite(b.vx)
+        && is_finite(b.vy)
+        && is_finite(b.yaw_rate)
+        && is_finite(b.roll)
+        && is_finite(b.roll_rate)
+        && is_finite(state.pitch_acceleration);
+}

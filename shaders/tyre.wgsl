@@ -1,0 +1,242 @@
+// Twin of `src/vehicle/tyre/magic_formula.rs`: Magic Formula 5.2 forces and moment, the same functions in the same
+// order. The struct is that of `src/vehicle/tyre/prepared.rs`: the tyre made ready for its axle on the host.
+
+struct MagicFormula {
+    inverse_nominal: Wheels,
+    cx: Wheels,
+    inverse_cx: Wheels,
+    dx1: Wheels,
+    dx2: Wheels,
+    kx1: Wheels,
+    kx2: Wheels,
+    kx3: Wheels,
+    hx1: Wheels,
+    hx2: Wheels,
+    vx1: Wheels,
+    vx2: Wheels,
+    ex1: Wheels,
+    ex2: Wheels,
+    ex3: Wheels,
+    ex4: Wheels,
+    cy: Wheels,
+    inverse_cy: Wheels,
+    dy1: Wheels,
+    dy2: Wheels,
+    ky: Wheels,
+    ky_load: Wheels,
+    hy1: Wheels,
+    hy2: Wheels,
+    hy_camber: Wheels,
+    vy1: Wheels,
+    vy2: Wheels,
+    vy_camber1: Wheels,
+    vy_camber2: Wheels,
+    ey1: Wheels,
+    ey2: Wheels,
+    ey3: Wheels,
+    ey_camber: Wheels,
+    rbx1: Wheels,
+    rbx2: Wheels,
+    rcx1: Wheels,
+    rex1: Wheels,
+    rex2: Wheels,
+    rhx1: Wheels,
+    rby1: Wheels,
+    rby2: Wheels,
+    rby3: Wheels,
+    rcy1: Wheels,
+    rey1: Wheels,
+    rey2: Wheels,
+    rhy1: Wheels,
+    rhy2: Wheels,
+    rvy1: Wheels,
+    rvy2: Wheels,
+    rvy_camber: Wheels,
+    rvy4: Wheels,
+    rvy5: Wheels,
+    rvy6: Wheels,
+    ct: Wheels,
+    bt1: Wheels,
+    bt2: Wheels,
+    bt3: Wheels,
+    bt_even: Wheels,
+    bt_odd: Wheels,
+    dt1: Wheels,
+    dt2: Wheels,
+    dt_even: Wheels,
+    dt_odd: Wheels,
+    et1: Wheels,
+    et2: Wheels,
+    et3: Wheels,
+    et4: Wheels,
+    et_camber: Wheels,
+    ht1: Wheels,
+    ht2: Wheels,
+    ht_camber1: Wheels,
+    ht_camber2: Wheels,
+    br1: Wheels,
+    br2: Wheels,
+    dr1: Wheels,
+    dr2: Wheels,
+    dr_camber1: Wheels,
+    dr_camber2: Wheels,
+    s1: Wheels,
+    s2: Wheels,
+    s_camber1: Wheels,
+    s_camber2: Wheels,
+}
+
+alias Tyre = MagicFormula;
+
+// `LEAST_LOAD` in `src/vehicle/tyre/mod.rs`.
+const LEAST_LOAD: f32 = 1e-3;
+
+fn stretched_slip(b: Wheels, e: Wheels, x: Wheels) -> Wheels {
+    let bx = b * x;
+    return bx - e * (bx - own_atan(bx));
+}
+
+fn sine_shape(c: Wheels, b: Wheels, e: Wheels, x: Wheels) -> Wheels {
+    return own_sin(c * own_atan(stretched_slip(b, e, x)));
+}
+
+fn cosine_shape(c: Wheels, b: Wheels, e: Wheels, x: Wheels) -> Wheels {
+    return own_cos(c * own_atan(stretched_slip(b, e, x)));
+}
+
+fn weight(c: Wheels, b: Wheels, e: Wheels, x: Wheels, shift: Wheels) -> Wheels {
+    return cosine_shape(c, b, e, x) / cosine_shape(c, b, e, shift);
+}
+
+fn clamp_curvature(e: Wheels) -> Wheels {
+    return min(e, Wheels(1.0));
+}
+
+struct Load {
+    force: Wheels,
+    difference: Wheels,
+}
+
+struct PureLongitudinal {
+    force: Wheels,
+    stiffness: Wheels,
+}
+
+fn pure_longitudinal(t: MagicFormula, load: Load, slip_ratio: Wheels) -> PureLongitudinal {
+    let dfz = load.difference;
+    let mu = t.dx1 + t.dx2 * dfz;
+    let k = (t.kx1 + t.kx2 * dfz) * own_exp(t.kx3 * dfz);
+    let b = k * t.inverse_cx / mu;
+    let x = slip_ratio + (t.hx1 + t.hx2 * dfz);
+    let e = clamp_curvature((t.ex1 + dfz * (t.ex2 + t.ex3 * dfz)) * (1.0 - t.ex4 * sign_of(x)));
+    let force = load.force * (mu * sine_shape(t.cx, b, e, x) + (t.vx1 + t.vx2 * dfz));
+    return PureLongitudinal(force, load.force * k);
+}
+
+struct PureLateral {
+    force: Wheels,
+    peak: Wheels,
+    stiffness: Wheels,
+    slope: Wheels,
+    residual_shift: Wheels,
+}
+
+fn pure_lateral(t: MagicFormula, load: Load, slip_tangent: Wheels, side: Wheels) -> PureLateral {
+    let dfz = load.difference;
+    let peak = (t.dy1 + t.dy2 * dfz) * load.force;
+    let z = load.force * t.ky_load;
+    let stiffness = t.ky * (z / (1.0 + z * z));
+    let slope = stiffness / peak;
+    let horizontal_shift = t.hy1 + t.hy2 * dfz + t.hy_camber * side;
+    let vertical_shift = load.force * ((t.vy1 + t.vy2 * dfz) + (t.vy_camber1 + t.vy_camber2 * dfz) * side);
+    let x = slip_tangent + horizontal_shift;
+    let e = clamp_curvature((t.ey1 + t.ey2 * dfz) * (1.0 - (t.ey3 + t.ey_camber * side) * sign_of(x)));
+    return PureLateral(
+        peak * sine_shape(t.cy, slope * t.inverse_cy, e, x) + vertical_shift,
+        peak,
+        stiffness,
+        slope,
+        horizontal_shift + vertical_shift / stiffness,
+    );
+}
+
+fn longitudinal_weight(t: MagicFormula, load: Load, slip_ratio: Wheels, slip_tangent: Wheels) -> Wheels {
+    let b = t.rbx1 * cos_atan(t.rbx2 * slip_ratio);
+    let e = clamp_curvature(t.rex1 + t.rex2 * load.difference);
+    return weight(t.rcx1, b, e, slip_tangent + t.rhx1, t.rhx1);
+}
+
+fn lateral_weight(t: MagicFormula, load: Load, slip_ratio: Wheels, slip_tangent: Wheels) -> Wheels {
+    let b = t.rby1 * cos_atan(t.rby2 * (slip_tangent - t.rby3));
+    let e = clamp_curvature(t.rey1 + t.rey2 * load.difference);
+    let shift = t.rhy1 + t.rhy2 * load.difference;
+    return weight(t.rcy1, b, e, slip_ratio + shift, shift);
+}
+
+fn induced_lateral(
+    t: MagicFormula,
+    load: Load,
+    peak: Wheels,
+    slip_ratio: Wheels,
+    slip_tangent: Wheels,
+    side: Wheels,
+) -> Wheels {
+    let amplitude = peak * (t.rvy1 + t.rvy2 * load.difference + t.rvy_camber * side);
+    return amplitude * cos_atan(t.rvy4 * slip_tangent) * own_sin(t.rvy5 * own_atan(t.rvy6 * slip_ratio));
+}
+
+fn equivalent_tangent(x: Wheels, slip_share: Wheels) -> Wheels {
+    let tangent = own_tan(x);
+    return sqrt(tangent * tangent + slip_share * slip_share) * sign_of(x);
+}
+
+fn aligning_moment(
+    t: MagicFormula,
+    load: Load,
+    input: TyreInput,
+    lateral: PureLateral,
+    longitudinal_stiffness: Wheels,
+    force_x: Wheels,
+    force_y: Wheels,
+    induced: Wheels,
+) -> Wheels {
+    let dfz = load.difference;
+    let side = input.side;
+    let slip_share = longitudinal_stiffness / lateral.stiffness * input.slip_ratio;
+
+    let x = input.slip_tangent + (t.ht1 + t.ht2 * dfz + (t.ht_camber1 + t.ht_camber2 * dfz) * side);
+    let b = (t.bt1 + dfz * (t.bt2 + t.bt3 * dfz)) * (t.bt_even + t.bt_odd * side);
+    let d = load.force * (t.dt1 + t.dt2 * dfz) * (t.dt_even + t.dt_odd * side);
+    let e = clamp_curvature(
+        (t.et1 + dfz * (t.et2 + t.et3 * dfz)) * (1.0 + (t.et4 + t.et_camber * side) * own_atan(b * t.ct * x)),
+    );
+    let trail = d
+        * cosine_shape(t.ct, b, e, own_atan(equivalent_tangent(x, slip_share)))
+        * cos_atan(input.slip_tangent);
+
+    let residual_slip = input.slip_tangent + lateral.residual_shift;
+    let residual_slope = t.br1 + t.br2 * lateral.slope;
+    let residual_peak = load.force
+        * (t.dr1 + t.dr2 * dfz + (t.dr_camber1 + t.dr_camber2 * dfz) * side)
+        * own_cos(input.slip_tangent);
+    let residual =
+        residual_peak * cos_atan(residual_slope * own_atan(equivalent_tangent(residual_slip, slip_share)));
+
+    let arm = t.s1 + t.s2 * force_y + (t.s_camber1 + t.s_camber2 * dfz) * side;
+    return residual - trail * (force_y - induced) + arm * force_x;
+}
+
+fn tyre_forces(t: MagicFormula, input: TyreInput) -> TyreForces {
+    let force = max(input.load, Wheels(LEAST_LOAD));
+    let load = Load(force, force * t.inverse_nominal - 1.0);
+    let pure_x = pure_longitudinal(t, load, input.slip_ratio);
+    let lateral = pure_lateral(t, load, input.slip_tangent, input.side);
+    let x = pure_x.force * longitudinal_weight(t, load, input.slip_ratio, input.slip_tangent);
+    let induced = induced_lateral(t, load, lateral.peak, input.slip_ratio, input.slip_tangent, input.side);
+    let y = lateral.force * lateral_weight(t, load, input.slip_ratio, input.slip_tangent) + induced;
+    let moment = aligning_moment(t, load, input, lateral, pure_x.stiffness, x, y, induced);
+
+    let zero = Wheels(0.0);
+    let loaded = zero < input.load;
+    return TyreForces(select(zero, x, loaded), select(zero, y, loaded), select(zero, moment, loaded));
+}

@@ -1,0 +1,207 @@
+//! Which graphics processor: what there is, and the choice among it.
+
+use crate::error::{Error, Result};
+use std::fmt;
+
+/// The environment variable that names an adapter where no flag does.
+pub const ADAPTER_VARIABLE: &str = "LAPSWARM_ADAPTER";
+
+/// What sort of device an adapter is, best first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum DeviceKind {
+    /// A card with memory of its own.
+    Discrete,
+    /// Part of the processor's package.
+    Integrated,
+    /// A share of a host's device.
+    Virtual,
+    /// A driver that runs on the processor, such as lavapipe or WARP.
+    Software,
+    /// The driver does not say.
+    Other,
+}
+
+impl fmt::Display for DeviceKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Discrete => "discrete",
+            Self::Integrated => "integrated",
+            Self::Virtual => "virtual",
+            Self::Software => "software",
+            Self::Other => "other",
+        })
+    }
+}
+
+impl From<wgpu::DeviceType> for DeviceKind {
+    fn from(kind: wgpu::DeviceType) -> Self {
+        match kind {
+            wgpu::DeviceType::DiscreteGpu => Self::Discrete,
+            wgpu::DeviceType::IntegratedGpu => Self::Integrated,
+            wgpu::DeviceType::VirtualGpu => Self::Virtual,
+            wgpu::DeviceType::Cpu => Self::Software,
+            wgpu::DeviceType::Other => Self::Other,
+        }
+    }
+}
+
+/// An adapter as users choose it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct DeviceSummary {
+    /// Its name, by which it is chosen.
+    pub name: String,
+    /// `Vulkan`, `Metal` or `Dx12`.
+    pub backend: String,
+    /// The driver's name.
+    pub driver: String,
+    /// The driver's version, as far as it tells.
+    pub driver_info: String,
+    /// What sort of device it is.
+    pub kind: DeviceKind,
+    /// The largest buffer, bytes.
+    pub max_buffer_bytes: u64,
+    /// The largest part of a buffer that a kernel sees at once, bytes.
+    pub max_binding_bytes: u64,
+    /// Workgroups per dimension of one dispatch.
+    pub max_workgroups: u32,
+    /// Lanes per workgroup.
+    pub max_lanes_per_workgroup: u32,
+    /// Whether kernels can be timed on the device.
+    pub timestamps: bool,
+}
+
+impl DeviceSummary {
+    fn of(adapter: &wgpu::Adapter) -> Self {
+        let info = adapter.get_info();
+        let limits = adapter.limits();
+        Self {
+            name: info.name,
+            backend: format!("{:?}", info.backend),
+            driver: info.driver,
+            driver_info: info.driver_info,
+            kind: info.device_type.into(),
+            max_buffer_bytes: limits.max_buffer_size,
+            max_binding_bytes: limits.max_storage_buffer_binding_size,
+            max_workgroups: limits.max_compute_workgroups_per_dimension,
+            max_lanes_per_workgroup: limits.max_compute_invocations_per_workgroup,
+            timestamps: adapter.features().contains(wgpu::Features::TIMESTAMP_QUERY),
+        }
+    }
+}
+
+impl fmt::Display for DeviceSummary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} ({}, {})", self.name, self.backend, self.kind)
+    }
+}
+
+fn enumerate() -> Vec<(wgpu::Adapter, DeviceSummary)> {
+    let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
+    descriptor.backends = wgpu::Backends::VULKAN | wgpu::Backends::METAL | wgpu::Backends::DX12;
+    descriptor.flags = wgpu::InstanceFlags::empty();
+    let instance = wgpu::Instance::new(descriptor);
+    let mut adapters: Vec<_> = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::all()))
+        .into_iter()
+        .filter(|adapter| {
+            let capabilities = adapter.get_downlevel_capabilities();
+            capabilities.flags.contains(wgpu::DownlevelFlags::COMPUTE_SHADERS)
+        })
+        .map(|adapter| {
+            let summary = DeviceSummary::of(&adapter);
+            (adapter, summary)
+        })
+        .collect();
+    adapters.sort_by_key(|(_, summary)| summary.kind);
+    adapters
+}
+
+/// Every adapter that can run kernels, best first.
+pub fn devices() -> Vec<DeviceSummary> {
+    enumerate().into_iter().map(|(_, summary)| summary).collect()
+}
+
+/// The best adapter, or the best whose name contains `name` regardless of case; where `name` is `None`, that of
+/// [`ADAPTER_VARIABLE`] counts.
+///
+/// # Errors
+/// [`Error::NoDevice`] if there is none, listing what there is.
+pub(super) fn choose(name: Option<&str>) -> Result<(wgpu::Adapter, DeviceSummary)> {
+    let from_environment = std::env::var(ADAPTER_VARIABLE)
+        .ok()
+        .filter(|x| !x.trim().is_empty());
+    let wanted = name.or(from_environment.as_deref()).map(str::trim);
+    let adapters = enumerate();
+    let present: Vec<DeviceSummary> = adapters.iter().map(|(_, summary)| summary.clone()).collect();
+    let place = pick(&present, wanted)?;
+    adapters
+        .into_iter()
+        .nth(place)
+        .ok_or_else(|| Error::NoDevice("the adapter is gone".to_owned()))
+}
+
+/// The place in `present` (best first) of the first whose name contains `wanted`.
+fn pick(present: &[DeviceSummary], wanted: Option<&str>) -> Result<usize> {
+    if present.is_empty() {
+        return Err(Error::NoDevice(
+            "no Vulkan, Metal or DX12 adapter was found. Install a driver (a software one such as lavapipe, \
+             Debian package mesa-vulkan-drivers, will do), or use the backend simd"
+                .to_owned(),
+        ));
+    }
+    let Some(wanted) = wanted else { return Ok(0) };
+    let key = wanted.to_lowercase();
+    present
+        .iter()
+        .position(|summary| summary.name.to_lowercase().contains(&key))
+        .ok_or_else(|| {
+            let names: Vec<String> = present.iter().map(DeviceSummary::to_string).collect();
+            Error::NoDevice(format!(
+                "no adapter's name contains {wanted:?}; there is {}",
+                names.join(", ")
+            ))
+        })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn summary(name: &str, kind: DeviceKind) -> DeviceSummary {
+        DeviceSummary {
+            name: name.to_owned(),
+            backend: "Vulkan".to_owned(),
+            driver: String::new(),
+            driver_info: String::new(),
+            kind,
+            max_buffer_bytes: 0,
+            max_binding_bytes: 0,
+            max_workgroups: 0,
+            max_lanes_per_workgroup: 0,
+            timestamps: false,
+        }
+    }
+
+    #[test]
+    fn an_adapter_is_found_by_part_of_its_name_in_any_case() {
+        let present = [
+            summary("NVIDIA H200", DeviceKind::Discrete),
+            summary("llvmpipe (LLVM 15)", DeviceKind::Software),
+        ];
+        assert_eq!(pick(&present, None).ok(), Some(0));
+        assert_eq!(pick(&present, Some("LLVMpipe")).ok(), Some(1));
+        let message = pick(&present, Some("radeon")).map_err(|e| e.to_string());
+        let message = message.expect_err("there is no such adapter");
+        assert!(
+            message.contains("radeon") && message.contains("NVIDIA H200 (Vulkan, discrete)"),
+            "{message}"
+        );
+        assert!(matches!(pick(&[], None), Err(Error::NoDevice(_))));
+    }
+
+    #[test]
+    fn kinds_are_ordered_best_first() {
+        use DeviceKind::*;
+        let kinds = [Discrete, Integrated, Virtual, Software, Other];
+        assert!(kinds.is_sorted());
+    }
+}

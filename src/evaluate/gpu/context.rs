@@ -1,0 +1,392 @@
+//! The process's device: buffers, kernels and their errors.
+//!
+//! Nothing that wgpu reports reaches the user as a panic: allocation and compilation run inside error scopes, and
+//! what happens outside them is kept by the handlers and handed out as [`Error::Device`] at the next check.
+
+use super::adapter::{DeviceSummary, choose};
+use super::lint;
+use crate::error::{Error, Result};
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+/// How long a dispatch may take before the device counts as hung. Dispatches are cut to a tenth of a second; a
+/// loaded machine's software driver may need far longer for its first, which also compiles.
+const PATIENCE: Duration = Duration::from_secs(600);
+
+/// How a kernel sees a buffer, in the order of its bindings.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Binding {
+    /// A small table that all lanes share.
+    Uniform,
+    /// Read by lanes.
+    Read,
+    /// Read and written by lanes.
+    Write,
+}
+
+/// A compiled kernel.
+#[derive(Debug)]
+pub struct Kernel {
+    pub(crate) pipeline: wgpu::ComputePipeline,
+    layout: wgpu::BindGroupLayout,
+    /// How long parsing and compilation took, ms. Drivers may put off a part to the first dispatch.
+    pub compile_ms: f64,
+}
+
+/// A device with its queue, and the kernels compiled for it.
+#[derive(Debug)]
+pub struct GpuContext {
+    device: wgpu::Device,
+    queue: wgpu::Queue,
+    summary: DeviceSummary,
+    failure: Arc<Mutex<Option<String>>>,
+    kernels: Mutex<HashMap<String, Arc<Kernel>>>,
+}
+
+fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    // What is guarded is replaced whole, so that a panic elsewhere leaves it sound.
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// The device that the process has open, if any.
+static SHARED: Mutex<Option<Arc<GpuContext>>> = Mutex::new(None);
+
+impl GpuContext {
+    /// The process's device, opened on the first call; `name` chooses the adapter (see
+    /// [`super::devices`]). A lost device, or one that `name` does not mean, gives way to a new one.
+    ///
+    /// # Errors
+    /// [`Error::NoDevice`] if there is none of that name, [`Error::Device`] if it does not open.
+    pub fn shared(name: Option<&str>) -> Result<Arc<Self>> {
+        let mut shared = locked(&SHARED);
+        if let Some(context) = shared.as_ref() {
+            let meant = name.is_none_or(|n| {
+                context
+                    .summary
+                    .name
+                    .to_lowercase()
+                    .contains(&n.trim().to_lowercase())
+            });
+            if meant && context.check().is_ok() {
+                return Ok(Arc::clone(context));
+            }
+        }
+        // The old device closes first, unless an evaluator still holds it.
+        *shared = None;
+        let context = Arc::new(Self::open(name)?);
+        *shared = Some(Arc::clone(&context));
+        Ok(context)
+    }
+
+    fn open(name: Option<&str>) -> Result<Self> {
+        let (adapter, summary) = choose(name)?;
+        let descriptor = wgpu::DeviceDescriptor {
+            label: Some("lapswarm"),
+            // Whatever the adapter has of what is useful; nothing is demanded.
+            required_features: adapter.features() & wgpu::Features::TIMESTAMP_QUERY,
+            required_limits: adapter.limits(),
+            ..Default::default()
+        };
+        let (device, queue) = pollster::block_on(adapter.request_device(&descriptor))
+            .map_err(|e| Error::Device(format!("{summary} does not open: {e}")))?;
+        let failure = Arc::new(Mutex::new(None));
+        let keep = |failure: &Mutex<Option<String>>, message: String| {
+            // The first failure is the cause of those that follow.
+            locked(failure).get_or_insert(message);
+        };
+        let uncaptured = Arc::clone(&failure);
+        device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
+            keep(&uncaptured, error.to_string())
+        }));
+        let lost = Arc::clone(&failure);
+        device.set_device_lost_callback(move |reason, message| {
+            if reason != wgpu::DeviceLostReason::Destroyed {
+                keep(&lost, format!("the device was lost: {message}"));
+            }
+        });
+        Ok(Self {
+            device,
+            queue,
+            summary,
+            failure,
+            kernels: Mutex::default(),
+        })
+    }
+
+    /// What the device is.
+    pub fn summary(&self) -> &DeviceSummary {
+        &self.summary
+    }
+
+    /// The device's limits.
+    pub fn limits(&self) -> wgpu::Limits {
+        self.device.limits()
+    }
+
+    /// # Errors
+    /// [`Error::Device`] if something failed since the device opened.
+    pub fn check(&self) -> Result<()> {
+        match locked(&self.failure).as_ref() {
+            Some(message) => Err(Error::Device(format!("{}: {message}", self.summary))),
+            None => Ok(()),
+        }
+    }
+
+    /// Runs `work` in error scopes; `what` says in errors what was tried.
+    fn scoped<T>(&self, what: &str, work: impl FnOnce() -> T) -> Result<T> {
+        self.check()?;
+        let scopes = [
+            wgpu::ErrorFilter::Internal,
+            wgpu::ErrorFilter::OutOfMemory,
+            wgpu::ErrorFilter::Validation,
+        ]
+        .map(|filter| self.device.push_error_scope(filter));
+        let result = work();
+        let mut error = None;
+        for scope in scopes.into_iter().rev() {
+            error = error.or(pollster::block_on(scope.pop()));
+        }
+        match error {
+            Some(error) => Err(Error::Device(format!("{}: cannot {what}: {error}", self.summary))),
+            None => self.check().map(|()| result),
+        }
+    }
+
+    /// A buffer of at least `bytes`.
+    ///
+    /// # Errors
+    /// [`Error::Device`] if the device cannot hold it.
+    pub(crate) fn buffer(&self, label: &str, bytes: u64, usage: wgpu::BufferUsages) -> Result<wgpu::Buffer> {
+        // Bindings of no bytes are not allowed, copies go by fours.
+        let size = bytes.max(16).next_multiple_of(4);
+        self.scoped(&format!("allocate {size} bytes for {label}"), || {
+            self.device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some(label),
+                size,
+                usage,
+                mapped_at_creation: false,
+            })
+        })
+    }
+
+    /// A buffer that holds `data`.
+    ///
+    /// # Errors
+    /// [`Error::Device`] if the device cannot hold it.
+    pub(crate) fn buffer_of(
+        &self,
+        label: &str,
+        data: &[u8],
+        usage: wgpu::BufferUsages,
+    ) -> Result<wgpu::Buffer> {
+        let buffer = self.buffer(label, data.len() as u64, usage | wgpu::BufferUsages::COPY_DST)?;
+        self.write(&buffer, data);
+        Ok(buffer)
+    }
+
+    /// Writes to the front of `buffer` before the next submission.
+    pub(crate) fn write(&self, buffer: &wgpu::Buffer, data: &[u8]) {
+        if !data.is_empty() {
+            self.queue.write_buffer(buffer, 0, data);
+        }
+    }
+
+    /// The kernel of `source` at `entry`, compiled on the first call.
+    ///
+    /// # Errors
+    /// [`Error::Device`] if it does not compile.
+    pub fn kernel(&self, source: &str, entry: &str, bindings: &[Binding]) -> Result<Arc<Kernel>> {
+        let key = format!("{entry} {bindings:?}\n{source}");
+        if let Some(kernel) = locked(&self.kernels).get(&key) {
+            return Ok(Arc::clone(kernel));
+        }
+        if cfg!(debug_assertions) {
+            lint::check(source).map_err(|message| Error::Device(format!("kernel {entry}: {message}")))?;
+        }
+        let start = Instant::now();
+        let entries: Vec<_> = bindings
+            .iter()
+            .zip(0..)
+            .map(|(kind, binding)| wgpu::BindGroupLayoutEntry {
+                binding,
+                visibility: wgpu::ShaderStages::COMPUTE,
+                ty: wgpu::BindingType::Buffer {
+                    ty: match kind {
+                        Binding::Uniform => wgpu::BufferBindingType::Uniform,
+                        Binding::Read => wgpu::BufferBindingType::Storage { read_only: true },
+                        Binding::Write => wgpu::BufferBindingType::Storage { read_only: false },
+                    },
+                    has_dynamic_offset: false,
+                    min_binding_size: None,
+                },
+                count: None,
+            })
+            .collect();
+        let (pipeline, layout) = self.scoped(&format!("compile the kernel {entry}"), || {
+            let module = self.device.create_shader_module(wgpu::ShaderModuleDescriptor {
+                label: Some(entry),
+                source: wgpu::ShaderSource::Wgsl(source.into()),
+            });
+            let layout = self
+                .device
+                .create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+                    label: Some(entry),
+                    entries: &entries,
+                });
+            let pipeline_layout = self
+                .device
+                .create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+                    label: Some(entry),
+                    bind_group_layouts: &[Some(&layout)],
+                    immediate_size: 0,
+                });
+            let pipeline = self
+                .device
+                .create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+                    label: Some(entry),
+                    layout: Some(&pipeline_layout),
+                    module: &module,
+                    entry_point: Some(entry),
+                    compilation_options: Default::default(),
+                    cache: None,
+                });
+            (pipeline, layout)
+        })?;
+        let kernel = Arc::new(Kernel {
+            pipeline,
+            layout,
+            compile_ms: start.elapsed().as_secs_f64() * 1e3,
+        });
+        locked(&self.kernels).insert(key, Arc::clone(&kernel));
+        Ok(kernel)
+    }
+
+    /// Binds `buffers` to the kernel's bindings in order.
+    ///
+    /// # Errors
+    /// [`Error::Device`] if a buffer does not fit its binding.
+    pub(crate) fn bind(&self, kernel: &Kernel, buffers: &[&wgpu::Buffer]) -> Result<wgpu::BindGroup> {
+        let entries: Vec<_> = buffers
+            .iter()
+            .zip(0..)
+            .map(|(buffer, binding)| wgpu::BindGroupEntry {
+                binding,
+                resource: buffer.as_entire_binding(),
+            })
+            .collect();
+        self.scoped("bind buffers", || {
+            self.device.create_bind_group(&wgpu::BindGroupDescriptor {
+                label: None,
+                layout: &kernel.layout,
+                entries: &entries,
+            })
+        })
+    }
+
+    /// Records with `record`, submits, and waits for the device to finish.
+    ///
+    /// # Errors
+    /// [`Error::Device`] if that fails or takes too long.
+    pub(crate) fn run(&self, record: impl FnOnce(&mut wgpu::CommandEncoder)) -> Result<()> {
+        let submission = self.scoped("run a kernel", || {
+            let mut encoder = self.device.create_command_encoder(&Default::default());
+            record(&mut encoder);
+            self.queue.submit([encoder.finish()])
+        })?;
+        self.wait(Some(submission))
+    }
+
+    fn wait(&self, submission_index: Option<wgpu::SubmissionIndex>) -> Result<()> {
+        self.device
+            .poll(wgpu::PollType::Wait {
+                submission_index,
+                timeout: Some(PATIENCE),
+            })
+            .map_err(|e| Error::Device(format!("{}: {e}", self.summary)))?;
+        self.check()
+    }
+
+    /// Hands the first `bytes` of `buffer`, which is mappable, to `read`.
+    ///
+    /// # Errors
+    /// [`Error::Device`] if they cannot be read.
+    pub(crate) fn read<T>(
+        &self,
+        buffer: &wgpu::Buffer,
+        bytes: u64,
+        read: impl FnOnce(&[u8]) -> T,
+    ) -> Result<T> {
+        let failed =
+            |reason: String| Error::Device(format!("{}: cannot read results: {reason}", self.summary));
+        let (sender, receiver) = std::sync::mpsc::channel();
+        buffer.map_async(wgpu::MapMode::Read, 0..bytes, move |outcome| {
+            // Nobody listens any more only if waiting has failed already.
+            let _ = sender.send(outcome);
+        });
+        self.wait(None)?;
+        match receiver.try_recv() {
+            Ok(Ok(())) => {}
+            Ok(Err(e)) => return Err(failed(e.to_string())),
+            Err(e) => return Err(failed(e.to_string())),
+        }
+        let view = buffer
+            .get_mapped_range(0..bytes)
+            .map_err(|e| failed(e.to_string()))?;
+        let result = read(&view);
+        drop(view);
+        buffer.unmap();
+        Ok(result)
+    }
+
+    /// A set of `count` timestamps with a buffer to resolve it into, where the device has such.
+    pub(crate) fn timestamps(&self, count: u32) -> Result<Option<wgpu::QuerySet>> {
+        if !self.device.features().contains(wgpu::Features::TIMESTAMP_QUERY) {
+            return Ok(None);
+        }
+        self.scoped("set up timestamps", || {
+            Some(self.device.create_query_set(&wgpu::QuerySetDescriptor {
+                label: Some("timestamps"),
+                ty: wgpu::QueryType::Timestamp,
+                count,
+            }))
+        })
+    }
+
+    /// Milliseconds per tick of a timestamp.
+    pub(crate) fn tick_ms(&self) -> f64 {
+        f64::from(self.queue.get_timestamp_period()) * 1e-6
+    }
+
+    /// Runs a one-off kernel with `lanes` lanes in workgroups of 64 over `input` (binding 0, read) and hands back
+    /// the `outputs` floats that it wrote (binding 1). Made for testing single shader functions.
+    ///
+    /// # Errors
+    /// [`Error::Device`] if the kernel does not compile or run.
+    pub fn run_array(
+        &self,
+        source: &str,
+        entry: &str,
+        input: &[f32],
+        outputs: usize,
+        lanes: usize,
+    ) -> Result<Vec<f32>> {
+        use wgpu::BufferUsages as U;
+        let kernel = self.kernel(source, entry, &[Binding::Read, Binding::Write])?;
+        let bytes = (outputs * 4) as u64;
+        let from = self.buffer_of("inputs", bytemuck::cast_slice(input), U::STORAGE)?;
+        let to = self.buffer("outputs", bytes, U::STORAGE | U::COPY_SRC)?;
+        let readback = self.buffer("readback", bytes, U::MAP_READ | U::COPY_DST)?;
+        let group = self.bind(&kernel, &[&from, &to])?;
+        let groups = u32::try_from(lanes.div_ceil(64)).unwrap_or(u32::MAX);
+        self.run(|encoder| {
+            let mut pass = encoder.begin_compute_pass(&Default::default());
+            pass.set_pipeline(&kernel.pipeline);
+            pass.set_bind_group(0, &group, &[]);
+            pass.dispatch_workgroups(groups, 1, 1);
+            drop(pass);
+            encoder.copy_buffer_to_buffer(&to, 0, &readback, 0, bytes);
+        })?;
+        self.read(&readback, bytes, bytemuck::pod_collect_to_vec)
+    }
+}

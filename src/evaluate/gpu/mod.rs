@@ -1,0 +1,9 @@
+//! The graphics processor: which one, its device, the kernels' sources and the rules they keep.
+
+mod adapter;
+mod context;
+pub mod lint;
+pub mod shader;
+
+pub use adapter::{ADAPTER_VARIABLE, DeviceKind, DeviceSummary, devices};
+pub use context::{Binding, GpuContext, Kernel};

@@ -1,0 +1,122 @@
+//! Composition of the kernels from the fragments under `shaders/`, one list per kernel, and the generated parts:
+//! constants, and the loaders that tell the figures that candidates share from those in which they differ.
+
+use crate::evaluate::replay::Norm;
+use crate::vehicle::tyre::Tyre;
+use crate::vehicle::{Chassis, LinearTyre, MagicFormula, TyreModel};
+
+/// Our own `sin`, `cos`, `atan` and `exp`.
+pub const ELEMENTARY: &str = include_str!("../../../shaders/elementary.wgsl");
+const CHASSIS: &str = include_str!("../../../shaders/chassis.wgsl");
+const AERO: &str = include_str!("../../../shaders/aero.wgsl");
+const LOADS: &str = include_str!("../../../shaders/loads.wgsl");
+const TYRE_INTERFACE: &str = include_str!("../../../shaders/tyre_interface.wgsl");
+const TYRE_MAGIC_FORMULA: &str = include_str!("../../../shaders/tyre.wgsl");
+const TYRE_LINEAR: &str = include_str!("../../../shaders/tyre_linear.wgsl");
+const CAR: &str = include_str!("../../../shaders/car.wgsl");
+const REPLAY_COMMON: &str = include_str!("../../../shaders/replay_common.wgsl");
+const REPLAY: &str = include_str!("../../../shaders/replay.wgsl");
+const REPLAY_REDUCE: &str = include_str!("../../../shaders/replay_reduce.wgsl");
+
+/// The car's fragments with the tyre model's.
+pub fn car_fragments(model: TyreModel) -> [&'static str; 7] {
+    let tyre = match model {
+        TyreModel::MagicFormula => TYRE_MAGIC_FORMULA,
+        TyreModel::Linear => TYRE_LINEAR,
+    };
+    [ELEMENTARY, CHASSIS, AERO, LOADS, TYRE_INTERFACE, tyre, CAR]
+}
+
+/// The tyre model's struct, which has one name in WGSL and in Rust, with its fields in order.
+pub fn tyre_struct(model: TyreModel) -> (&'static str, &'static [&'static str]) {
+    match model {
+        TyreModel::MagicFormula => ("MagicFormula", <MagicFormula<f32> as Tyre<f32>>::FIELDS),
+        TyreModel::Linear => ("LinearTyre", <LinearTyre<f32> as Tyre<f32>>::FIELDS),
+    }
+}
+
+/// What a replay kernel is specialised to.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ReplayShape<'a> {
+    /// The tyre model.
+    pub model: TyreModel,
+    /// For each figure of a ready car, which varying figure it is, if it varies: `ModelTable::sources`.
+    pub sources: &'a [Option<usize>],
+    /// The norm.
+    pub norm: Norm,
+    /// Lanes of a workgroup.
+    pub workgroup: u32,
+}
+
+impl ReplayShape<'_> {
+    /// Source of the kernel that drives and scores; entry point `replay`.
+    pub fn replay(&self) -> String {
+        let mut source = car_fragments(self.model).concat();
+        source.push_str(&self.constants());
+        source.push_str(REPLAY_COMMON);
+        source.push_str(REPLAY);
+        source.push_str(&loaders(self.model, self.sources));
+        source
+    }
+
+    /// Source of the kernel that joins the windows; entry point `replay_reduce`.
+    pub fn reduce(&self) -> String {
+        [&self.constants(), REPLAY_COMMON, REPLAY_REDUCE].concat()
+    }
+
+    fn constants(&self) -> String {
+        format!(
+            "\n// Generated.\nconst NORM_ONE: u32 = 0u;\nconst NORM_TWO: u32 = 1u;\nconst NORM_INFINITY: u32 = 2u;\n\
+             const NORM_MEAN_SQUARE: u32 = 3u;\nconst NORM: u32 = {}u;\nconst WORKGROUP: u32 = {}u;\n\
+             const BASE_VECTORS: u32 = {}u;\n\n",
+            match self.norm {
+                Norm::One => 0,
+                Norm::Two => 1,
+                Norm::Infinity => 2,
+                Norm::MeanSquare => 3,
+            },
+            self.workgroup,
+            base_vectors(self.sources.len()),
+        )
+    }
+}
+
+/// How many `vec4` a uniform table of `count` floats takes.
+pub fn base_vectors(count: usize) -> usize {
+    count.div_ceil(4).max(1)
+}
+
+/// The loaders `load_chassis` and `load_tyres`: a figure that candidates share comes from the uniform table `base`,
+/// where the compiler sees that all lanes read the same, one that varies from its row of `figures`.
+pub fn loaders(model: TyreModel, sources: &[Option<usize>]) -> String {
+    let chassis = Chassis::<f32>::FIELDS;
+    let (structure, tyre) = tyre_struct(model);
+    let place = |slot: usize| match sources[slot] {
+        Some(figure) => format!("figures[{figure}u * stretch.stride + candidate]"),
+        None => format!("base[{}].{}", slot / 4, ["x", "y", "z", "w"][slot % 4]),
+    };
+    let function = |name: &str, structure: &str, lines: &[String]| {
+        let body = lines.concat();
+        format!("fn {name}(candidate: u32) -> {structure} {{\n    return {structure}(\n{body}    );\n}}\n\n")
+    };
+    let (front, rear) = (chassis.len(), chassis.len() + tyre.len());
+    let chassis_lines: Vec<String> = chassis
+        .iter()
+        .enumerate()
+        .map(|(i, field)| format!("        {}, // {field}\n", place(i)))
+        .collect();
+    let tyre_lines: Vec<String> = tyre
+        .iter()
+        .enumerate()
+        .map(|(i, field)| {
+            let (front, rear) = (place(front + i), place(rear + i));
+            format!("        Wheels({front}, {front}, {rear}, {rear}), // {field}\n")
+        })
+        .collect();
+    [
+        "\n// Generated.\n".to_owned(),
+        function("load_chassis", "Chassis", &chassis_lines),
+        function("load_tyres", structure, &tyre_lines),
+    ]
+    .concat()
+}

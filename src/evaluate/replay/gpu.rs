@@ -1,0 +1,555 @@
+//! The graphics backend: `f32`, one lane per candidate and window, the windows joined on the device.
+
+use super::cpu::collect_rows;
+use super::kernel::{BLOCK, CHANNELS};
+use super::problem::ReplayProblem;
+use super::table::ModelTable;
+use crate::error::{Error, Result};
+use crate::evaluate::gpu::shader::{ReplayShape, base_vectors};
+use crate::evaluate::gpu::{Binding, DeviceKind, GpuContext, Kernel};
+use crate::evaluate::{BackendInfo, Evaluation, Evaluator, Problem};
+use bytemuck::{Pod, Zeroable};
+use rayon::prelude::*;
+use std::sync::Arc;
+use std::time::Instant;
+use wgpu::BufferUsages as Usage;
+
+/// One sample of the log on the device. Twin of `Sample` in `shaders/replay.wgsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+pub struct DeviceSample {
+    /// Wheel speeds FL FR RL RR, rad/s.
+    pub wheel_speed: [f32; 4],
+    /// Measured outputs.
+    pub measured: [f32; 4],
+    /// Road-wheel angle, rad.
+    pub steer: f32,
+    /// Nothing: vectors of four are aligned to 16 bytes.
+    pub padding: [f32; 3],
+}
+
+/// One window on the device. Twin of `Window` in `shaders/replay.wgsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+pub struct DeviceWindow {
+    /// First sample.
+    pub start: u32,
+    /// One past the last sample.
+    pub end: u32,
+    /// Samples from the start that are not scored.
+    pub scored_from: u32,
+    /// State at the first sample.
+    pub initial: [f32; 6],
+}
+
+/// What a dispatch is to do. Twin of `Stretch` in `shaders/replay_common.wgsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+pub struct Stretch {
+    /// Candidates in this batch.
+    pub candidates: u32,
+    /// Distance between their rows in the buffers.
+    pub stride: u32,
+    /// Windows in this batch.
+    pub windows: u32,
+    /// The first of them.
+    pub first_window: u32,
+    /// The first sample within every window.
+    pub first_sample: u32,
+    /// How many samples.
+    pub samples: u32,
+    /// Runge-Kutta steps per sample interval.
+    pub substeps: u32,
+    /// Integration step, s.
+    pub step: f32,
+}
+
+/// Floats per lane between dispatches: state, totals and the drives flag.
+const PROGRESS_PLANES: usize = 6 + CHANNELS + 1;
+/// Floats per candidate that come back.
+const RESULT_PLANES: usize = CHANNELS + 1;
+/// Lanes of a workgroup, where the device allows: a multiple of every device's subgroup.
+const WORKGROUP: u32 = 64;
+/// Dispatches that one set of timestamps covers.
+const TIMED_DISPATCHES: u32 = 1024;
+
+/// How work is cut. Results do not depend on it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Batching {
+    /// The most lanes (candidates times windows) of one dispatch.
+    pub lanes: usize,
+    /// The most bytes of progress between dispatches.
+    pub bytes: u64,
+    /// How long a dispatch should take, ms: well under the watchdogs' two seconds, well over its overhead.
+    pub dispatch_ms: f64,
+    /// The most samples of a dispatch, rounded up to whole blocks; `None` leaves it to the time.
+    pub samples: Option<usize>,
+}
+
+impl Batching {
+    /// What suits a kind of device: the first dispatch of a block of samples must end in reasonable time on a
+    /// software driver, and fill a large card.
+    pub fn for_kind(kind: DeviceKind) -> Self {
+        Self {
+            lanes: match kind {
+                DeviceKind::Software => 1 << 14,
+                _ => 1 << 18,
+            },
+            bytes: 128 << 20,
+            dispatch_ms: 70.0,
+            samples: None,
+        }
+    }
+}
+
+/// What the last evaluation asked of the device.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct DispatchStatistics {
+    /// Dispatches of the replay kernel.
+    pub dispatches: usize,
+    /// The longest of them with its submission and the wait, ms.
+    pub longest_ms: f64,
+}
+
+/// How fast the last dispatch went, from which the next is sized.
+#[derive(Clone, Copy)]
+struct Pace {
+    lanes: usize,
+    ms_per_sample: f64,
+}
+
+/// Buffers that grow with the batch, and the kernels' bindings to them.
+struct BatchBuffers {
+    /// Lanes and candidates that fit.
+    lanes: usize,
+    stride: usize,
+    figures: wgpu::Buffer,
+    results: wgpu::Buffer,
+    readback: wgpu::Buffer,
+    replay_group: wgpu::BindGroup,
+    reduce_group: wgpu::BindGroup,
+}
+
+/// Timestamps of the replay dispatches.
+struct Stopwatch {
+    set: wgpu::QuerySet,
+    resolved: wgpu::Buffer,
+    readback: wgpu::Buffer,
+}
+
+/// Scores replays on a graphics processor.
+pub struct GpuEvaluator<'a> {
+    replay: &'a ReplayProblem,
+    table: ModelTable,
+    context: Arc<GpuContext>,
+    batching: Batching,
+    drive: Arc<Kernel>,
+    reduce: Arc<Kernel>,
+    workgroup: usize,
+    stretch: wgpu::Buffer,
+    /// In the order of the replay kernel's bindings 1 to 4.
+    tables: [wgpu::Buffer; 4],
+    batch: Option<BatchBuffers>,
+    stopwatch: Option<Stopwatch>,
+    pace: Option<Pace>,
+    statistics: DispatchStatistics,
+    kernel_ms: Option<f64>,
+}
+
+impl<'a> GpuEvaluator<'a> {
+    /// An evaluator of `replay` on `context`'s device.
+    ///
+    /// # Errors
+    /// [`Error::Device`] if the kernels do not compile or the log does not fit the device.
+    pub fn new(replay: &'a ReplayProblem, context: Arc<GpuContext>) -> Result<Self> {
+        let limits = context.limits();
+        let workgroup = WORKGROUP
+            .min(limits.max_compute_invocations_per_workgroup)
+            .min(limits.max_compute_workgroup_size_x);
+        let table = ModelTable::new(replay);
+        let shape = ReplayShape {
+            model: replay.tyre_model(),
+            sources: &table.sources,
+            norm: replay.plan.norm,
+            workgroup,
+        };
+        use Binding::{Read, Uniform, Write};
+        let drive = context.kernel(
+            &shape.replay(),
+            "replay",
+            &[Uniform, Uniform, Read, Read, Read, Read, Write],
+        )?;
+        let reduce = context.kernel(&shape.reduce(), "replay_reduce", &[Uniform, Read, Write])?;
+
+        let plan = replay.plan.to_f32();
+        let mut base = table.base.clone();
+        base.resize(base_vectors(base.len()) * 4, 0.0);
+        let samples: Vec<DeviceSample> = plan
+            .samples
+            .iter()
+            .map(|s| DeviceSample {
+                wheel_speed: s.wheel_speed,
+                measured: s.measured,
+                steer: s.steer,
+                padding: [0.0; 3],
+            })
+            .collect();
+        let narrow = |x: usize| {
+            u32::try_from(x).map_err(|_| Error::Device(format!("a log of {x} samples does not fit a device")))
+        };
+        let windows = plan
+            .windows
+            .iter()
+            .map(|w| {
+                Ok(DeviceWindow {
+                    start: narrow(w.start)?,
+                    end: narrow(w.end)?,
+                    scored_from: narrow(w.scored_from)?,
+                    initial: w.initial,
+                })
+            })
+            .collect::<Result<Vec<_>>>()?;
+        let fractions: Vec<[f32; 4]> = plan.fractions.iter().map(|f| [f[0], f[1], f[2], 0.0]).collect();
+        let storage = |label: &str, data: &[u8]| {
+            let most = limits.max_storage_buffer_binding_size;
+            if data.len() as u64 > most {
+                return Err(Error::Device(format!(
+                    "{} holds at most {most} bytes of {label}, {} are needed",
+                    context.summary(),
+                    data.len()
+                )));
+            }
+            context.buffer_of(label, data, Usage::STORAGE)
+        };
+        let tables = [
+            context.buffer_of("parameters", bytemuck::cast_slice(&base), Usage::UNIFORM)?,
+            storage("samples", bytemuck::cast_slice(&samples))?,
+            storage("windows", bytemuck::cast_slice(&windows))?,
+            storage("fractions", bytemuck::cast_slice(&fractions))?,
+        ];
+        let stretch = context.buffer(
+            "stretch",
+            size_of::<Stretch>() as u64,
+            Usage::UNIFORM | Usage::COPY_DST,
+        )?;
+        let stopwatch = match context.timestamps(2 * TIMED_DISPATCHES)? {
+            Some(set) => {
+                let bytes = u64::from(2 * TIMED_DISPATCHES) * 8;
+                Some(Stopwatch {
+                    set,
+                    resolved: context.buffer("ticks", bytes, Usage::QUERY_RESOLVE | Usage::COPY_SRC)?,
+                    readback: context.buffer("ticks", bytes, Usage::MAP_READ | Usage::COPY_DST)?,
+                })
+            }
+            None => None,
+        };
+        Ok(Self {
+            replay,
+            table,
+            batching: Batching::for_kind(context.summary().kind),
+            context,
+            drive,
+            reduce,
+            workgroup: workgroup as usize,
+            stretch,
+            tables,
+            batch: None,
+            stopwatch,
+            pace: None,
+            statistics: DispatchStatistics::default(),
+            kernel_ms: None,
+        })
+    }
+
+    /// Cuts the work differently.
+    pub fn with_batching(mut self, batching: Batching) -> Self {
+        self.batching = batching;
+        self.batch = None;
+        self
+    }
+
+    /// How the work is cut.
+    pub fn batching(&self) -> Batching {
+        self.batching
+    }
+
+    /// Time that the device itself spent driving in the last evaluation, ms; `None` where it cannot tell.
+    pub fn last_kernel_ms(&self) -> Option<f64> {
+        self.kernel_ms
+    }
+
+    /// What the last evaluation asked of the device.
+    pub fn statistics(&self) -> DispatchStatistics {
+        self.statistics
+    }
+
+    /// How long the replay kernel took to compile, ms.
+    pub fn compile_ms(&self) -> f64 {
+        self.drive.compile_ms
+    }
+
+    /// The most candidates and windows of one batch, for a population of `count`.
+    fn batch_size(&self, count: usize) -> (usize, usize) {
+        let limits = self.context.limits();
+        let binding = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+        let per_lane = (PROGRESS_PLANES * 4) as u64;
+        let fitting = (self.batching.bytes.min(binding) / per_lane) as usize;
+        let lanes = self.batching.lanes.min(fitting).max(self.workgroup);
+        let most_groups = limits.max_compute_workgroups_per_dimension as usize;
+        // Windows are split only into whole blocks, because they are summed by the block.
+        let all = self.replay.plan.windows.len();
+        let whole_blocks = (lanes / self.workgroup).min(most_groups) / BLOCK * BLOCK;
+        let windows = if all * self.workgroup <= lanes && all <= most_groups {
+            all
+        } else {
+            all.min(whole_blocks.max(BLOCK))
+        };
+        let per_candidate = (self.table.varying.len().max(RESULT_PLANES) * 4) as u64;
+        let candidates = (lanes / windows)
+            .min((binding / per_candidate) as usize)
+            .min(most_groups * self.workgroup);
+        let whole_groups = (candidates / self.workgroup).max(1) * self.workgroup;
+        (whole_groups.min(count), windows)
+    }
+
+    /// Makes room for a batch.
+    fn reserve(&mut self, candidates: usize, windows: usize) -> Result<()> {
+        let stride = candidates.next_multiple_of(self.workgroup);
+        let lanes = stride * windows;
+        if self
+            .batch
+            .as_ref()
+            .is_some_and(|b| b.lanes >= lanes && b.stride >= stride)
+        {
+            return Ok(());
+        }
+        // The old buffers go before the new ones come.
+        self.batch = None;
+        let context = &self.context;
+        let floats = |count: usize| (count * 4) as u64;
+        let figures = context.buffer(
+            "figures",
+            floats(stride * self.table.varying.len()),
+            Usage::STORAGE | Usage::COPY_DST,
+        )?;
+        let progress = context.buffer("progress", floats(lanes * PROGRESS_PLANES), Usage::STORAGE)?;
+        let result_bytes = floats(stride * RESULT_PLANES);
+        let results = context.buffer("results", result_bytes, Usage::STORAGE | Usage::COPY_SRC)?;
+        let readback = context.buffer("readback", result_bytes, Usage::MAP_READ | Usage::COPY_DST)?;
+        let [base, samples, window_table, fractions] = &self.tables;
+        let replay_group = context.bind(
+            &self.drive,
+            &[
+                &self.stretch,
+                base,
+                samples,
+                window_table,
+                fractions,
+                &figures,
+                &progress,
+            ],
+        )?;
+        let reduce_group = context.bind(&self.reduce, &[&self.stretch, &progress, &results])?;
+        self.batch = Some(BatchBuffers {
+            lanes,
+            stride,
+            figures,
+            results,
+            readback,
+            replay_group,
+            reduce_group,
+        });
+        Ok(())
+    }
+
+    /// Samples of the next dispatch, in whole blocks.
+    fn next_samples(&self, lanes: usize) -> usize {
+        let by_time = self.pace.map_or(BLOCK, |pace| {
+            let ms_per_sample = pace.ms_per_sample * (lanes as f64 / pace.lanes as f64).max(1.0);
+            (self.batching.dispatch_ms / ms_per_sample) as usize
+        });
+        let samples = by_time.min(self.batching.samples.unwrap_or(usize::MAX));
+        (samples / BLOCK).max(1) * BLOCK
+    }
+
+    /// Drives one batch of candidates, whose figures are on the device, through one batch of windows.
+    fn drive_batch(&mut self, mut stretch: Stretch) -> Result<()> {
+        let first = stretch.first_window as usize;
+        let windows = &self.replay.plan.windows[first..first + stretch.windows as usize];
+        let longest = windows.iter().map(|w| w.end - w.start).max().unwrap_or(0);
+        let lanes = stretch.candidates as usize * windows.len();
+        let groups = stretch.candidates.div_ceil(self.workgroup as u32);
+        let mut done = 0;
+        while done < longest {
+            let samples = self
+                .next_samples(lanes)
+                .min((longest - done).next_multiple_of(BLOCK));
+            stretch.first_sample = done as u32;
+            stretch.samples = samples as u32;
+            self.context.write(&self.stretch, bytemuck::bytes_of(&stretch));
+            let query = 2 * self.statistics.dispatches as u32;
+            let timestamp_writes = self
+                .stopwatch
+                .as_ref()
+                .filter(|_| query < 2 * TIMED_DISPATCHES)
+                .map(|stopwatch| wgpu::ComputePassTimestampWrites {
+                    query_set: &stopwatch.set,
+                    beginning_of_pass_write_index: Some(query),
+                    end_of_pass_write_index: Some(query + 1),
+                });
+            let Some(batch) = &self.batch else {
+                return Err(Error::Device("a batch without buffers".to_owned()));
+            };
+            let start = Instant::now();
+            self.context.run(|encoder| {
+                let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
+                    label: Some("replay"),
+                    timestamp_writes,
+                });
+                pass.set_pipeline(&self.drive.pipeline);
+                pass.set_bind_group(0, &batch.replay_group, &[]);
+                pass.dispatch_workgroups(groups, stretch.windows, 1);
+            })?;
+            let ms = start.elapsed().as_secs_f64() * 1e3;
+            // The first dispatch of all may have compiled; the next one corrects what it taught.
+            self.pace = Some(Pace {
+                lanes,
+                ms_per_sample: (ms / samples as f64).max(1e-9),
+            });
+            self.statistics.dispatches += 1;
+            self.statistics.longest_ms = self.statistics.longest_ms.max(ms);
+            done += samples;
+        }
+        let Some(batch) = &self.batch else {
+            return Err(Error::Device("a batch without buffers".to_owned()));
+        };
+        self.context.run(|encoder| {
+            let mut pass = encoder.begin_compute_pass(&Default::default());
+            pass.set_pipeline(&self.reduce.pipeline);
+            pass.set_bind_group(0, &batch.reduce_group, &[]);
+            pass.dispatch_workgroups(groups, 1, 1);
+        })
+    }
+
+    /// Errors per channel of candidates that can be driven; `None` of those that do not reach the end.
+    fn drive(&mut self, rows: &[&[f64]]) -> Result<Vec<Option<[f64; CHANNELS]>>> {
+        let mut errors = Vec::with_capacity(rows.len());
+        if rows.is_empty() {
+            return Ok(errors);
+        }
+        let (most_candidates, most_windows) = self.batch_size(rows.len());
+        let all_windows = self.replay.plan.windows.len();
+        self.reserve(most_candidates, most_windows)?;
+        for candidates in rows.chunks(most_candidates) {
+            let stride = candidates.len().next_multiple_of(self.workgroup);
+            let varying = self.table.varying.len();
+            let by_candidate = self.table.rows(self.replay, candidates);
+            // Figure by figure, so that neighbouring lanes read neighbouring memory.
+            let mut figures = vec![0.0f32; stride * varying];
+            for (candidate, row) in by_candidate.chunks_exact(varying.max(1)).enumerate() {
+                for (figure, value) in row.iter().enumerate() {
+                    figures[figure * stride + candidate] = *value;
+                }
+            }
+            let Some(batch) = &self.batch else {
+                return Err(Error::Device("a batch without buffers".to_owned()));
+            };
+            self.context.write(&batch.figures, bytemuck::cast_slice(&figures));
+            for first_window in (0..all_windows).step_by(most_windows) {
+                self.drive_batch(Stretch {
+                    candidates: candidates.len() as u32,
+                    stride: stride as u32,
+                    windows: most_windows.min(all_windows - first_window) as u32,
+                    first_window: first_window as u32,
+                    first_sample: 0,
+                    samples: 0,
+                    substeps: self.replay.plan.fractions.len() as u32,
+                    step: self.replay.plan.step as f32,
+                })?;
+            }
+            let Some(batch) = &self.batch else {
+                return Err(Error::Device("a batch without buffers".to_owned()));
+            };
+            let bytes = (stride * RESULT_PLANES * 4) as u64;
+            self.context
+                .run(|encoder| encoder.copy_buffer_to_buffer(&batch.results, 0, &batch.readback, 0, bytes))?;
+            self.context.read(&batch.readback, bytes, |data| {
+                let planes: &[f32] = bytemuck::cast_slice(data);
+                errors.extend((0..candidates.len()).map(|candidate| {
+                    let at = |plane: usize| f64::from(planes[plane * stride + candidate]);
+                    (at(CHANNELS) != 0.0).then(|| std::array::from_fn(at))
+                }));
+            })?;
+        }
+        Ok(errors)
+    }
+
+    /// Sums up the timestamps of the dispatches so far.
+    fn read_stopwatch(&self) -> Result<Option<f64>> {
+        let dispatches = self.statistics.dispatches as u32;
+        let Some(stopwatch) = self.stopwatch.as_ref().filter(|_| dispatches > 0) else {
+            return Ok(None);
+        };
+        if dispatches > TIMED_DISPATCHES {
+            return Ok(None);
+        }
+        let bytes = u64::from(2 * dispatches) * 8;
+        self.context.run(|encoder| {
+            encoder.resolve_query_set(&stopwatch.set, 0..2 * dispatches, &stopwatch.resolved, 0);
+            encoder.copy_buffer_to_buffer(&stopwatch.resolved, 0, &stopwatch.readback, 0, bytes);
+        })?;
+        let ticks: u64 = self.context.read(&stopwatch.readback, bytes, |data| {
+            let ticks: Vec<u64> = bytemuck::pod_collect_to_vec(data);
+            ticks
+                .chunks_exact(2)
+                .map(|pair| pair[1].saturating_sub(pair[0]))
+                .sum()
+        })?;
+        Ok(Some(ticks as f64 * self.context.tick_ms()))
+    }
+}
+
+impl Evaluator for GpuEvaluator<'_> {
+    fn problem(&self) -> &Problem {
+        &self.replay.problem
+    }
+
+    fn backend(&self) -> BackendInfo {
+        let summary = self.context.summary();
+        BackendInfo {
+            backend: "gpu",
+            device: summary.name.clone(),
+            driver: format!("{} {}", summary.driver, summary.driver_info)
+                .trim()
+                .to_owned(),
+        }
+    }
+
+    fn evaluate(&mut self, population: &[f64]) -> Result<Evaluation> {
+        self.statistics = DispatchStatistics::default();
+        self.kernel_ms = None;
+        let replay = self.replay;
+        let candidates: Vec<&[f64]> = population.chunks_exact(replay.dimensions().max(1)).collect();
+        // Only what can be driven takes a lane.
+        let preliminary: Vec<_> = candidates
+            .par_iter()
+            .map(|c| replay.preliminary_failure(c))
+            .collect();
+        let rows: Vec<&[f64]> = candidates
+            .iter()
+            .zip(&preliminary)
+            .filter(|(_, failure)| failure.is_none())
+            .map(|(candidate, _)| *candidate)
+            .collect();
+        let mut errors = self.drive(&rows)?.into_iter();
+        self.kernel_ms = self.read_stopwatch()?;
+        let results = preliminary
+            .into_iter()
+            .map(|failure| match failure {
+                Some(failure) => (replay.objective_row(None).0, Some(failure)),
+                None => replay.objective_row(errors.next().flatten()),
+            })
+            .collect();
+        Ok(collect_rows(results))
+    }
+}

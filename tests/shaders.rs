@@ -1,0 +1,207 @@
+//! The kernels without a driver: they parse, validate, keep the rules, translate to what every platform's driver
+//! takes, and their structs are the host's.
+
+mod common;
+
+use common::{Lap, UNKNOWNS, bundled_car, linear_car, problem};
+use lapswarm::evaluate::gpu::lint;
+use lapswarm::evaluate::gpu::shader::{ReplayShape, car_fragments, tyre_struct};
+use lapswarm::evaluate::replay::{DeviceSample, DeviceWindow, ModelTable, Norm, Stretch};
+use lapswarm::vehicle::{Chassis, TyreModel};
+use naga::back::{hlsl, msl, spv};
+use naga::valid::{Capabilities, ValidationFlags, Validator};
+use std::mem::offset_of;
+
+const NORMS: [Norm; 4] = [Norm::One, Norm::Two, Norm::Infinity, Norm::MeanSquare];
+
+/// Every kernel for both tyre models, a few sets of free parameters and all norms: entry point and source.
+fn kernels() -> Vec<(&'static str, String)> {
+    let lap = Lap {
+        samples: 200,
+        ..Lap::default()
+    };
+    let chassis_only = ["mass_kg", "roll_stiffness_nm_per_rad", "aero_balance_front"];
+    let mixed = ["front.rBx1", "rear.pKy1", "mass_kg", "front_camber_deg"];
+    let problems = [
+        problem(bundled_car(), &[], lap),
+        problem(bundled_car(), &UNKNOWNS, lap),
+        problem(bundled_car(), &mixed, lap),
+        problem(linear_car(), &[], lap),
+        problem(linear_car(), &chassis_only, lap),
+        problem(linear_car(), &["front.cornering_stiffness_n_per_rad"], lap),
+    ];
+    let mut kernels = Vec::new();
+    for problem in &problems {
+        let table = ModelTable::new(problem);
+        for norm in NORMS {
+            let shape = ReplayShape {
+                model: problem.tyre_model(),
+                sources: &table.sources,
+                norm,
+                workgroup: 64,
+            };
+            kernels.push(("replay", shape.replay()));
+            kernels.push(("replay_reduce", shape.reduce()));
+        }
+    }
+    kernels
+}
+
+#[test]
+fn kernels_validate_pass_the_lint_and_translate_to_every_platform() {
+    for (entry, source) in kernels() {
+        let module = lint::check(&source).unwrap_or_else(|message| panic!("{entry}: {message}"));
+        // No capabilities: what WebGPU has at its barest must do.
+        let info = Validator::new(ValidationFlags::all(), Capabilities::empty())
+            .validate(&module)
+            .unwrap_or_else(|e| panic!("{entry}: {}", e.emit_to_string(&source)));
+
+        let stage = naga::ShaderStage::Compute;
+        let spirv = spv::write_vec(
+            &module,
+            &info,
+            &spv::Options::default(),
+            Some(&spv::PipelineOptions {
+                shader_stage: stage,
+                entry_point: entry.to_owned(),
+            }),
+        );
+        assert!(!spirv.expect("SPIR-V").is_empty());
+
+        let options = msl::Options {
+            lang_version: (2, 0),
+            ..Default::default()
+        };
+        let pipeline = msl::PipelineOptions {
+            entry_point: Some((stage, entry.to_owned())),
+            ..Default::default()
+        };
+        let (metal, _) = msl::write_string(&module, &info, &options, &pipeline).expect("MSL");
+        assert!(metal.contains("kernel void"));
+
+        let options = hlsl::Options::default();
+        let pipeline = hlsl::PipelineOptions {
+            entry_point: Some((stage, entry.to_owned())),
+        };
+        let mut text = String::new();
+        hlsl::Writer::new(&mut text, &options, &pipeline)
+            .write(&module, &info, None)
+            .expect("HLSL");
+        assert!(text.contains("numthreads(64, 1, 1)"));
+    }
+}
+
+#[test]
+fn the_lint_finds_what_kernels_must_not_contain() {
+    let spoilt = |expression: &str| {
+        format!(
+            "@group(0) @binding(0) var<storage, read_write> data: array<f32>;\n\
+             fn helper(x: f32) -> f32 {{ return {expression}; }}\n\
+             @compute @workgroup_size(1) fn main() {{ data[0] = helper(data[1]); }}"
+        )
+    };
+    for bad in [
+        "sin(x)",
+        "cos(x)",
+        "tan(x)",
+        "atan(x)",
+        "atan2(x, 2.0)",
+        "exp(x)",
+        "exp2(x)",
+        "log(x)",
+        "pow(x, 1.5)",
+        "fma(x, x, x)",
+        "inverseSqrt(x)",
+        "mix(x, 2.0, 0.5)",
+        "f32(f64(x) * 2.0lf)",
+    ] {
+        let findings = lint::check(&spoilt(bad)).expect_err(bad);
+        assert!(
+            bad.contains("f64") || findings.contains("helper"),
+            "{bad}: {findings}"
+        );
+    }
+    lint::check(&spoilt("sqrt(abs(x)) + floor(x) + max(x, 1.0)")).expect("these round alike everywhere");
+    // The kernels' own sources, with a built-in slipped in.
+    let source = car_fragments(TyreModel::Linear)
+        .concat()
+        .replace("own_atan(input", "atan(input");
+    assert!(lint::check(&source).expect_err("atan").contains("Atan"));
+}
+
+/// Name and offset of each member of the struct called `name`, and the struct's size.
+fn layout(module: &naga::Module, name: &str) -> (Vec<(String, usize)>, usize) {
+    let (_, ty) = module
+        .types
+        .iter()
+        .find(|(_, ty)| ty.name.as_deref() == Some(name))
+        .unwrap_or_else(|| panic!("no struct {name}"));
+    let naga::TypeInner::Struct { members, span } = &ty.inner else {
+        panic!("{name} is no struct");
+    };
+    let members = members
+        .iter()
+        .map(|m| (m.name.clone().unwrap_or_default(), m.offset as usize))
+        .collect();
+    (members, *span as usize)
+}
+
+#[test]
+fn structs_shared_with_the_host_have_its_offsets() {
+    let (_, source) = &kernels()[0];
+    let module = lint::check(source).expect("the kernel parses");
+    let named = |pairs: &[(&str, usize)]| -> Vec<(String, usize)> {
+        pairs
+            .iter()
+            .map(|(name, offset)| ((*name).to_owned(), *offset))
+            .collect()
+    };
+
+    let (members, size) = layout(&module, "Stretch");
+    let host = [
+        ("candidates", offset_of!(Stretch, candidates)),
+        ("stride", offset_of!(Stretch, stride)),
+        ("windows", offset_of!(Stretch, windows)),
+        ("first_window", offset_of!(Stretch, first_window)),
+        ("first_sample", offset_of!(Stretch, first_sample)),
+        ("samples", offset_of!(Stretch, samples)),
+        ("substeps", offset_of!(Stretch, substeps)),
+        ("step", offset_of!(Stretch, step)),
+    ];
+    assert_eq!((members, size), (named(&host), size_of::<Stretch>()));
+
+    let (members, size) = layout(&module, "Sample");
+    let host = [
+        ("wheel_speed", offset_of!(DeviceSample, wheel_speed)),
+        ("measured", offset_of!(DeviceSample, measured)),
+        ("steer", offset_of!(DeviceSample, steer)),
+    ];
+    assert_eq!((members, size), (named(&host), size_of::<DeviceSample>()));
+
+    let (members, size) = layout(&module, "Window");
+    let host = [
+        ("start", offset_of!(DeviceWindow, start)),
+        ("end", offset_of!(DeviceWindow, end)),
+        ("scored_from", offset_of!(DeviceWindow, scored_from)),
+        ("initial", offset_of!(DeviceWindow, initial)),
+    ];
+    assert_eq!((members, size), (named(&host), size_of::<DeviceWindow>()));
+}
+
+#[test]
+fn parameter_structs_have_the_fields_of_their_rust_twins_in_order() {
+    for model in [TyreModel::MagicFormula, TyreModel::Linear] {
+        let source = car_fragments(model).concat();
+        let module = lint::check(&source).expect("the fragments parse on their own");
+        let names = |name: &str| -> Vec<String> {
+            layout(&module, name)
+                .0
+                .into_iter()
+                .map(|(member, _)| member)
+                .collect()
+        };
+        assert_eq!(names("Chassis"), Chassis::<f32>::FIELDS);
+        let (structure, fields) = tyre_struct(model);
+        assert_eq!(names(structure), fields);
+    }
+}
