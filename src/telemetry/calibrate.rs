@@ -105,6 +105,21 @@ pub struct Finding {
     pub evidence: String,
 }
 
+impl std::fmt::Display for Finding {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let state = if self.applied {
+            "corrected"
+        } else {
+            "left as it is"
+        };
+        write!(
+            f,
+            "{:?} {:?}: {:.4}, {state} ({})",
+            self.role, self.kind, self.value, self.evidence
+        )
+    }
+}
+
 /// Everything that was estimated from a log, and what was done about it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Calibration {

@@ -21,6 +21,13 @@ pub enum DeviceKind {
     Other,
 }
 
+impl DeviceKind {
+    /// Whether it is known to be a graphics processor, and not a driver that poses as one.
+    pub fn is_real(self) -> bool {
+        matches!(self, Self::Discrete | Self::Integrated | Self::Virtual)
+    }
+}
+
 impl fmt::Display for DeviceKind {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(match self {

@@ -1,8 +1,9 @@
 //! Choice of backend for a replay.
 
-use super::{CpuEvaluator, ReplayProblem, SimdEvaluator};
+use super::{CpuEvaluator, GpuEvaluator, ReplayProblem, SimdEvaluator};
 use crate::error::Result;
 use crate::evaluate::Evaluator;
+use crate::evaluate::gpu::{GpuContext, devices};
 use crate::evaluate::simd::InstructionSet;
 
 /// Where evaluations run.
@@ -21,18 +22,27 @@ pub enum BackendChoice {
 
 /// An evaluator of `replay` on the backend chosen; `adapter` is part of the name of the GPU to use.
 ///
+/// `Auto` takes a GPU only where one is real: a software driver does the same work slower than lanes do. Naming an
+/// adapter asks for it, whatever it is.
+///
 /// # Errors
-/// [`crate::Error::NoDevice`] if a GPU was asked for and none fits. `Auto` never fails for want of one.
+/// [`crate::Error::NoDevice`] if a GPU was asked for and none fits. `Auto` without a named adapter never fails for
+/// want of one.
 pub fn open_evaluator<'a>(
     replay: &'a ReplayProblem,
     choice: BackendChoice,
     adapter: Option<&str>,
 ) -> Result<Box<dyn Evaluator + 'a>> {
-    let _ = adapter;
-    Ok(match choice {
-        BackendChoice::Cpu => Box::new(CpuEvaluator::new(replay)),
-        BackendChoice::Simd | BackendChoice::Auto | BackendChoice::Gpu => {
-            Box::new(SimdEvaluator::new(replay, InstructionSet::best()))
-        }
+    let gpu = match choice {
+        BackendChoice::Cpu | BackendChoice::Simd => false,
+        BackendChoice::Gpu => true,
+        BackendChoice::Auto => adapter.is_some() || devices().iter().any(|d| d.kind.is_real()),
+    };
+    Ok(if gpu {
+        Box::new(GpuEvaluator::new(replay, GpuContext::shared(adapter)?)?)
+    } else if choice == BackendChoice::Cpu {
+        Box::new(CpuEvaluator::new(replay))
+    } else {
+        Box::new(SimdEvaluator::new(replay, InstructionSet::best()))
     })
 }

@@ -6,7 +6,7 @@ use super::settings::{Algorithm, IdentifySettings};
 use super::setup::{CHANNELS, Setup};
 use crate::error::{Error, Result};
 use crate::evaluate::replay::{ReplayProblem, open_evaluator, trace};
-use crate::evaluate::{BackendInfo, Evaluator, FAILED_COST};
+use crate::evaluate::{BackendInfo, FAILED_COST};
 use crate::swarm::{
     CovarianceSettings, CovarianceSwarm, Mopso, MopsoSettings, Progress, Pso, PsoSettings, run,
 };

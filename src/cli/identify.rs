@@ -1,0 +1,177 @@
+//! `lapswarm identify`.
+
+use super::progress::SearchBar;
+use super::{Common, backend_flag, print_json, stop_flag};
+use lapswarm::evaluate::replay::{BackendChoice, Norm};
+use lapswarm::study::identify::{
+    Algorithm, IdentifySettings, ObjectiveChoice, parse_algorithm, parse_norm, parse_objective, search,
+    set_up, summarise, write_results,
+};
+use lapswarm::study::run_folder;
+use lapswarm::{Error, Result};
+use std::ops::ControlFlow;
+use std::path::PathBuf;
+use std::sync::atomic::Ordering;
+
+/// Flags of `identify`; a flag wins over the study file.
+#[derive(clap::Args)]
+pub struct Arguments {
+    /// A study file; every flag has its twin in it
+    study: Option<PathBuf>,
+    #[command(flatten)]
+    common: Common,
+    /// The car that fixed parameters come from: a bundled name (gt) or a TOML file
+    #[arg(long, value_name = "NAME|FILE")]
+    car: Option<String>,
+    /// The log: our CSV, a MoTeC i2 CSV export or a MoTeC .ld file [default: the bundled lap]
+    #[arg(long, value_name = "FILE")]
+    log: Option<PathBuf>,
+    /// Channel names, units, signs and delays of the log, as TOML [default: guessed]
+    #[arg(long, value_name = "FILE")]
+    channel_map: Option<PathBuf>,
+    /// The circuit that sections are named on: a bundled name or a TOML file
+    #[arg(long, value_name = "NAME|FILE")]
+    track: Option<String>,
+    /// The car that drove the log, where known, to state the parameter error
+    #[arg(long, value_name = "NAME|FILE")]
+    truth: Option<String>,
+    /// all, or channels to fit at once: vx,ax,ay,yaw_rate (more than one searches a Pareto front)
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = objective_flag)]
+    objectives: Option<Vec<ObjectiveChoice>>,
+    /// Norm of the costs: 1, 2, infinity or mse
+    #[arg(long, value_parser = norm_flag)]
+    norm: Option<Norm>,
+    /// Score windows of this length that restart from the log, s [default: whole laps]
+    #[arg(long, value_name = "SECONDS")]
+    window_s: Option<f64>,
+    /// Score only this section of the track
+    #[arg(long, value_name = "NAME")]
+    section: Option<String>,
+    /// Laps to fit [default: all complete ones]
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    laps: Option<Vec<u32>>,
+    /// Laps to judge on, not to fit
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    holdout: Option<Vec<u32>>,
+    /// The search: adaptive, pso, or thesis
+    #[arg(long, value_parser = algorithm_flag)]
+    algorithm: Option<Algorithm>,
+    /// Particles
+    #[arg(long, value_name = "N")]
+    population: Option<usize>,
+    /// Iterations
+    #[arg(long, value_name = "N")]
+    iterations: Option<usize>,
+    /// Leave the least-squares polish out
+    #[arg(long)]
+    no_polish: bool,
+    /// Where to evaluate: auto, cpu, simd or gpu
+    #[arg(long, value_name = "BACKEND", value_parser = backend_flag)]
+    backend: Option<BackendChoice>,
+    /// Part of the name of the GPU to use
+    #[arg(long, value_name = "NAME")]
+    adapter: Option<String>,
+}
+
+fn objective_flag(name: &str) -> Result<ObjectiveChoice, String> {
+    parse_objective(name).ok_or_else(|| "expected all, vx, ax, ay or yaw_rate".to_owned())
+}
+
+fn norm_flag(name: &str) -> Result<Norm, String> {
+    parse_norm(name).ok_or_else(|| "expected 1, 2, infinity or mse".to_owned())
+}
+
+fn algorithm_flag(name: &str) -> Result<Algorithm, String> {
+    parse_algorithm(name).ok_or_else(|| "expected adaptive, pso or thesis".to_owned())
+}
+
+impl Arguments {
+    fn settings(&self) -> Result<IdentifySettings> {
+        let mut s = match &self.study {
+            Some(path) => IdentifySettings::read(path)?,
+            None => IdentifySettings::default(),
+        };
+        let wrong = |flag: &str, found: f64, expected: &str| {
+            Err(Error::input(
+                "the command line",
+                flag,
+                found.to_string(),
+                expected,
+            ))
+        };
+        if let Some(window) = self.window_s
+            && !(0.2..=1e5).contains(&window)
+        {
+            return wrong("--window-s", window, "a length from 0.2 to 100000 s");
+        }
+        set(&mut s.car, &self.car);
+        set(&mut s.objectives, &self.objectives);
+        set(&mut s.norm, &self.norm);
+        set(&mut s.laps, &self.laps);
+        set(&mut s.holdout, &self.holdout);
+        set(&mut s.algorithm, &self.algorithm);
+        set(&mut s.seed, &self.common.seed);
+        set(&mut s.backend, &self.backend);
+        set_some(&mut s.log, &self.log);
+        set_some(&mut s.channel_map, &self.channel_map);
+        set_some(&mut s.track, &self.track);
+        set_some(&mut s.truth, &self.truth);
+        set_some(&mut s.window_s, &self.window_s);
+        set_some(&mut s.section, &self.section);
+        set_some(&mut s.population, &self.population);
+        set_some(&mut s.iterations, &self.iterations);
+        set_some(&mut s.adapter, &self.adapter);
+        s.polish &= !self.no_polish;
+        Ok(s)
+    }
+}
+
+fn set<T: Clone>(setting: &mut T, flag: &Option<T>) {
+    if let Some(value) = flag {
+        *setting = value.clone();
+    }
+}
+
+fn set_some<T: Clone>(setting: &mut Option<T>, flag: &Option<T>) {
+    if flag.is_some() {
+        setting.clone_from(flag);
+    }
+}
+
+/// Runs the study.
+pub fn run(arguments: &Arguments) -> Result<()> {
+    let settings = arguments.settings()?;
+    let setup = set_up(&settings)?;
+    let folder = run_folder::create("identify", arguments.common.out.as_deref())?;
+    let stop = stop_flag();
+    let mut bar = SearchBar::new(arguments.common.quiet);
+    let outcome = search(&settings, &setup, |report| {
+        bar.show(report);
+        if stop.load(Ordering::Relaxed) {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        }
+    })?;
+    bar.finish();
+    let summary = summarise(&settings, &setup, &outcome);
+    write_results(&folder, &settings, &setup, &outcome, &summary)?;
+    if !arguments.common.quiet {
+        for finding in &summary.calibration.findings {
+            println!("{finding}");
+        }
+        for note in &summary.calibration.notes {
+            println!("{note}");
+        }
+        print!("{}", summary.to_text(&settings));
+        println!("Results: {}", folder.display());
+    }
+    if arguments.common.json {
+        print_json(&summary)?;
+    }
+    if outcome.interrupted {
+        Err(Error::Interrupted(folder))
+    } else {
+        Ok(())
+    }
+}

@@ -1,0 +1,125 @@
+//! Subcommands, their flags and their exit codes.
+
+mod bench;
+mod devices;
+mod identify;
+mod progress;
+mod simulate;
+
+use clap::{Args, Parser, Subcommand};
+use lapswarm::evaluate::replay::BackendChoice;
+use lapswarm::study::identify::{load_circuit, parse_backend};
+use lapswarm::track::Circuit;
+use lapswarm::{Error, Result};
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Evaluate whole swarms of race cars at once.
+#[derive(Parser)]
+#[command(
+    version,
+    after_help = "Exit codes: 0 done, 1 the study failed to reach what it was asked to, 2 bad input, 3 no usable \
+                  device, 130 interrupted (what was reached is saved).\n\nExamples:\n  lapswarm identify\n  lapswarm \
+                  identify study.toml --seed 7 --json\n  lapswarm simulate --rate 100 --out lap\n  lapswarm devices"
+)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Find a car's unknown parameters from a logged lap; with no argument, on the bundled lap.
+    Identify(Box<identify::Arguments>),
+    /// Drive a car round a circuit and log it.
+    Simulate(simulate::Arguments),
+    /// List the GPUs that evaluations can run on, with their limits.
+    Devices(devices::Arguments),
+    /// Measure evaluations per second against population, on every backend present.
+    Bench(bench::Arguments),
+}
+
+/// Flags that all studies share.
+#[derive(Args, Clone, Default)]
+pub struct Common {
+    /// The run folder; refused if it holds another run [default: the next runs/STUDY-NNN]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Seed of all random numbers
+    #[arg(long, value_name = "N")]
+    pub seed: Option<u64>,
+    /// Print one JSON object as the last thing on stdout
+    #[arg(long)]
+    pub json: bool,
+    /// No progress bar and no table
+    #[arg(long)]
+    pub quiet: bool,
+}
+
+/// Parses `--backend`.
+fn backend_flag(name: &str) -> Result<BackendChoice, String> {
+    parse_backend(name).ok_or_else(|| "expected auto, cpu, simd or gpu".to_owned())
+}
+
+/// The circuit of a `--track`, or the bundled one.
+fn circuit(track: Option<&str>) -> Result<Circuit> {
+    load_circuit(track.unwrap_or("silverstone_gp"))
+}
+
+/// A flag that rises when the user or the system asks the program to stop.
+fn stop_flag() -> Arc<AtomicBool> {
+    let flag = Arc::new(AtomicBool::new(false));
+    let raised = Arc::clone(&flag);
+    let set = ctrlc::set_handler(move || raised.store(true, Ordering::Relaxed));
+    if let Err(error) = set {
+        tracing::warn!("an interrupt will end the program at once: {error}");
+    }
+    flag
+}
+
+/// Runs the program.
+pub fn run() -> ExitCode {
+    // Clap ends with code 2 on bad flags and 0 on --help, as documented.
+    let cli = Cli::parse();
+    tracing_subscriber::fmt()
+        .with_writer(std::io::stderr)
+        .with_max_level(tracing::Level::WARN)
+        .init();
+    let outcome = match cli.command {
+        Command::Identify(arguments) => identify::run(&arguments),
+        Command::Simulate(arguments) => simulate::run(&arguments),
+        Command::Devices(arguments) => devices::run(&arguments),
+        Command::Bench(arguments) => bench::run(&arguments),
+    };
+    match outcome {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            let code = error.exit_code();
+            let mut report = miette::MietteDiagnostic::new(error.to_string());
+            report.help = advice(&error);
+            eprintln!("{:?}", miette::Report::new(report));
+            ExitCode::from(code)
+        }
+    }
+}
+
+/// What the user can do about an error, where that is known.
+fn advice(error: &Error) -> Option<String> {
+    Some(match error {
+        Error::NoDevice(_) => {
+            "`lapswarm devices` lists what there is; `--backend simd` needs no GPU".to_owned()
+        }
+        Error::Device(_) => "`--backend simd` runs the same study on the processor".to_owned(),
+        _ => return None,
+    })
+}
+
+/// Prints a serialisable value as one JSON object on stdout.
+fn print_json(value: &impl serde::Serialize) -> Result<()> {
+    let text = serde_json::to_string(value)
+        .map_err(|e| Error::io("standard output", "write", std::io::Error::other(e)))?;
+    println!("{text}");
+    Ok(())
+}
