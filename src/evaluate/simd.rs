@@ -38,8 +38,8 @@ impl InstructionSet {
     /// Lanes of one pack.
     pub fn lanes(self) -> usize {
         match self {
-            Self::Avx512 => 32,
-            Self::Avx2 => 16,
+            Self::Avx512 => 16,
+            Self::Avx2 => 8,
             Self::Portable => 8,
         }
     }
@@ -79,11 +79,11 @@ pub fn dispatch<W: LaneWork>(set: InstructionSet, work: W) -> W::Output {
 
         #[target_feature(enable = "avx512f,avx512dq")]
         fn run_avx512<W: LaneWork>(work: W) -> W::Output {
-            work.run::<crate::scalar::Pair<Avx512>>()
+            work.run::<Avx512>()
         }
         #[target_feature(enable = "avx2")]
         fn run_avx2<W: LaneWork>(work: W) -> W::Output {
-            work.run::<crate::scalar::Pair<Avx2>>()
+            work.run::<Avx2>()
         }
         if set == InstructionSet::Avx512 && has_avx512() {
             // SAFETY: the processor has the set, as just detected.

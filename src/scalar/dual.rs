@@ -160,6 +160,14 @@ impl<const N: usize> Real for Dual<N> {
         self.chain(value, value)
     }
     #[inline(always)]
+    fn sin_pi(self) -> Self {
+        (Self::constant(std::f64::consts::PI) * self).sin()
+    }
+    #[inline(always)]
+    fn cos_pi(self) -> Self {
+        (Self::constant(std::f64::consts::PI) * self).cos()
+    }
+    #[inline(always)]
     fn less_than(self, other: Self) -> bool {
         self.value < other.value
     }

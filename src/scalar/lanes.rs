@@ -113,6 +113,7 @@ impl Real for Portable {
         Self(std::array::from_fn(|i| Real::max(self.0[i], other.0[i])))
     }
     elementary::single_precision_functions!();
+    elementary::lockstep_functions!();
     #[inline(always)]
     fn less_than(self, other: Self) -> PortableMask {
         PortableMask(std::array::from_fn(|i| self.0[i] < other.0[i]))
@@ -130,15 +131,17 @@ impl Real for Portable {
 }
 
 impl SinglePrecision for Portable {
-    /// By way of whole numbers, because a baseline without a rounding instruction calls a library per lane.
     #[inline(always)]
-    fn floor(self) -> Self {
-        Self(self.0.map(|x| {
-            let truncated = x as i32 as f32;
-            let floor = truncated - if truncated > x { 1.0 } else { 0.0 };
-            // From 2^23 on every float is whole.
-            if x.abs() < 8_388_608.0 { floor } else { x }
-        }))
+    fn round(self) -> Self {
+        Self(self.0.map(SinglePrecision::round))
+    }
+    #[inline(always)]
+    fn negate_where_odd(self, n: Self) -> Self {
+        Self(std::array::from_fn(|i| self.0[i].negate_where_odd(n.0[i])))
+    }
+    #[inline(always)]
+    fn with_sign_of(self, other: Self) -> Self {
+        Self(std::array::from_fn(|i| self.0[i].with_sign_of(other.0[i])))
     }
     #[inline(always)]
     fn two_to_the(self) -> Self {
@@ -183,7 +186,7 @@ mod x86 {
             $(#[$doc:meta])* $name:ident($register:ty) x $lanes:literal, $mask_name:ident($mask:ty),
             set1 $set1:ident, add $add:ident, sub $sub:ident, mul $mul:ident, div $div:ident,
             sqrt $sqrt:ident, min $min:ident, max $max:ident,
-            less $less:expr, select $select:expr, abs $abs:expr, neg $neg:expr, floor $floor:expr, pow $pow:expr,
+            less $less:expr, select $select:expr, abs $abs:expr, neg $neg:expr, round $round:expr, odd $odd:expr, sign $sign:expr, pow $pow:expr,
             and $and:expr, or $or:expr, not $not:expr, all $all:expr, bits $bits:expr
         ) => {
             $(#[$doc])*
@@ -286,6 +289,7 @@ mod x86 {
                     unsafe { Self($max(self.0, other.0)) }
                 }
                 elementary::single_precision_functions!();
+                elementary::lockstep_functions!();
                 #[inline(always)]
                 fn less_than(self, other: Self) -> $mask_name {
                     unsafe { $mask_name($less(self.0, other.0)) }
@@ -302,8 +306,16 @@ mod x86 {
 
             impl SinglePrecision for $name {
                 #[inline(always)]
-                fn floor(self) -> Self {
-                    unsafe { Self($floor(self.0)) }
+                fn round(self) -> Self {
+                    unsafe { Self($round(self.0)) }
+                }
+                #[inline(always)]
+                fn negate_where_odd(self, n: Self) -> Self {
+                    unsafe { Self($odd(self.0, n.0)) }
+                }
+                #[inline(always)]
+                fn with_sign_of(self, other: Self) -> Self {
+                    unsafe { Self($sign(self.0, other.0)) }
                 }
                 #[inline(always)]
                 fn two_to_the(self) -> Self {
@@ -341,7 +353,9 @@ mod x86 {
         select |m, a, b| _mm512_mask_blend_ps(m, b, a),
         abs |a| _mm512_abs_ps(a),
         neg |a| _mm512_xor_ps(a, _mm512_set1_ps(-0.0)),
-        floor |a| _mm512_roundscale_ps::<{ _MM_FROUND_TO_NEG_INF | _MM_FROUND_NO_EXC }>(a),
+        round |a| _mm512_roundscale_ps::<{ _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC }>(a),
+        odd |a, n| _mm512_xor_ps(a, _mm512_castsi512_ps(_mm512_slli_epi32::<31>(_mm512_cvttps_epi32(n)))),
+        sign |a, b| _mm512_or_ps(_mm512_abs_ps(a), _mm512_and_ps(b, _mm512_set1_ps(-0.0))),
         pow |a| _mm512_castsi512_ps(_mm512_slli_epi32::<23>(_mm512_add_epi32(
             _mm512_cvttps_epi32(a),
             _mm512_set1_epi32(127)
@@ -360,7 +374,12 @@ mod x86 {
         select |m, a, b| _mm256_blendv_ps(b, a, m),
         abs |a| _mm256_andnot_ps(_mm256_set1_ps(-0.0), a),
         neg |a| _mm256_xor_ps(a, _mm256_set1_ps(-0.0)),
-        floor |a| _mm256_floor_ps(a),
+        round |a| _mm256_round_ps::<{ _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC }>(a),
+        odd |a, n| _mm256_xor_ps(a, _mm256_castsi256_ps(_mm256_slli_epi32::<31>(_mm256_cvttps_epi32(n)))),
+        sign |a, b| {
+            let sign_bit = _mm256_set1_ps(-0.0);
+            _mm256_or_ps(_mm256_andnot_ps(sign_bit, a), _mm256_and_ps(sign_bit, b))
+        },
         pow |a| _mm256_castsi256_ps(_mm256_slli_epi32::<23>(_mm256_add_epi32(
             _mm256_cvttps_epi32(a),
             _mm256_set1_epi32(127)
