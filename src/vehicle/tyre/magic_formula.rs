@@ -4,7 +4,6 @@
 use super::prepared::MagicFormula;
 use super::{LEAST_LOAD, Tyre, TyreCoefficients, TyreForces, TyreInput, TyreModel};
 use crate::scalar::Real;
-use std::array::from_fn;
 
 /// The angle `C atan(B x - E (B x - atan(B x)))` of which a curve is the sine or the cosine.
 #[derive(Clone, Copy)]
@@ -16,14 +15,19 @@ struct Curve<R> {
     x: R,
 }
 
-/// The angles of several curves, in half turns. Side by side, because each is one long chain of operations that
-/// wait for each other.
-#[inline(always)]
-fn angles<R: Real, const N: usize>(curves: [Curve<R>; N]) -> [R; N] {
-    let bx = curves.map(|curve| curve.b * curve.x);
-    let inner = R::atan_each(bx);
-    let outer: [R; N] = R::atan_each(from_fn(|i| bx[i] - curves[i].e * (bx[i] - inner[i])));
-    from_fn(|i| curves[i].c * outer[i])
+impl<R: Real> Curve<R> {
+    /// `B x`.
+    #[inline(always)]
+    fn bx(&self) -> R {
+        self.b * self.x
+    }
+
+    /// `B x - E (B x - atan(B x))`, given `atan(B x)`.
+    #[inline(always)]
+    fn stretched(&self, atan_bx: R) -> R {
+        let bx = self.bx();
+        bx - self.e * (bx - atan_bx)
+    }
 }
 
 /// Curvature factors above one turn the curve back on itself.
@@ -153,11 +157,17 @@ impl<R: Real> Tyre<R> for MagicFormula<R> {
         let pure_x = pure_longitudinal(t, load, slip_ratio);
         let (pure_y, slope, residual_shift) = pure_lateral(t, load, slip_tangent, side);
 
+        let [wx, wx0] = longitudinal_weight(t, load, slip_ratio, slip_tangent);
+        let [wy, wy0] = lateral_weight(t, load, slip_ratio, slip_tangent);
+        let (fx, fy) = (pure_x.curve, pure_y.curve);
+
         // Equivalent slip angles of the trail and the residual moment.
         let slip_share = pure_x.stiffness / pure_y.stiffness * slip_ratio;
         let trail_x = slip_tangent + (t.ht1 + t.ht2 * dfz + (t.ht_camber1 + t.ht_camber2 * dfz) * side);
         let residual_x = slip_tangent + residual_shift;
         let [trail_tangent, residual_tangent] = R::tan_each([trail_x, residual_x]);
+        let [afx, afy, awx, awx0, awy, awy0] =
+            R::atan_each([fx.bx(), fy.bx(), wx.bx(), wx0.bx(), wy.bx(), wy0.bx()]);
         let trail_b = (t.bt1 + dfz * (t.bt2 + t.bt3 * dfz)) * (t.bt_even + t.bt_odd * side);
         let [trail_slip, residual_slip, trail_angle, induced_angle] = R::atan_each([
             equivalent_tangent(trail_x, trail_tangent, slip_share),
@@ -165,7 +175,7 @@ impl<R: Real> Tyre<R> for MagicFormula<R> {
             trail_b * t.bct * trail_x,
             t.rvy6 * slip_ratio,
         ]);
-        let trail_curve = Curve {
+        let ft = Curve {
             c: t.ct,
             b: trail_b,
             e: clamp_curvature(
@@ -173,12 +183,21 @@ impl<R: Real> Tyre<R> for MagicFormula<R> {
             ),
             x: trail_slip,
         };
-        let [xn, xd] = longitudinal_weight(t, load, slip_ratio, slip_tangent);
-        let [yn, yd] = lateral_weight(t, load, slip_ratio, slip_tangent);
-        let [xn, xd, yn, yd] = angles([xn, xd, yn, yd]);
-        let [angle_x, angle_y, trail_angle] = angles([pure_x.curve, pure_y.curve, trail_curve]);
-        let [sin_x, sin_y, sin_induced] = R::sin_pi_each([angle_x, angle_y, t.rvy5 * induced_angle]);
-        let [xn, xd, yn, yd, cos_trail] = R::cos_pi_each([xn, xd, yn, yd, trail_angle]);
+        let [aft, afx, afy, awx] = R::atan_each([
+            ft.bx(),
+            fx.stretched(afx),
+            fy.stretched(afy),
+            wx.stretched(awx),
+        ]);
+        let [aft, awx0, awy, awy0] = R::atan_each([
+            ft.stretched(aft),
+            wx0.stretched(awx0),
+            wy.stretched(awy),
+            wy0.stretched(awy0),
+        ]);
+        let [sin_x, sin_y, sin_induced] = R::sin_pi_each([fx.c * afx, fy.c * afy, t.rvy5 * induced_angle]);
+        let [xn, xd, yn, yd, cos_trail] =
+            R::cos_pi_each([wx.c * awx, wx0.c * awx0, wy.c * awy, wy0.c * awy0, ft.c * aft]);
 
         let x = (pure_x.peak * sin_x + pure_x.vertical_shift) * (xn / xd);
         let amplitude = pure_y.peak * (t.rvy1 + t.rvy2 * dfz + t.rvy_camber * side);
