@@ -114,18 +114,15 @@ pub fn atan<R: SinglePrecision>(x: R) -> R {
     let large = one.less_than(x.abs());
     let q = R::select(large, one / x, x);
     let t = q * q;
-    // Even and odd powers apart: half as long a chain of dependent operations as Horner's.
-    let t2 = t * t;
-    let even = R::lit(2.916_889_3e-3);
-    let odd = R::lit(-1.635_871_6e-2);
-    let even = even * t2 + R::lit(4.320_277e-2);
-    let odd = odd * t2 + R::lit(-7.551_660_4e-2);
-    let even = even * t2 + R::lit(0.106_657_69);
-    let odd = odd * t2 + R::lit(-0.142_110_02);
-    let even = even * t2 + R::lit(0.199_937_67);
-    let odd = odd * t2 + R::lit(-0.333_331_53);
-    let even = even * t2 + one;
-    let angle = q * (even + odd * t);
+    let p = R::lit(2.916_889_3e-3);
+    let p = p * t + R::lit(-1.635_871_6e-2);
+    let p = p * t + R::lit(4.320_277e-2);
+    let p = p * t + R::lit(-7.551_660_4e-2);
+    let p = p * t + R::lit(0.106_657_69);
+    let p = p * t + R::lit(-0.142_110_02);
+    let p = p * t + R::lit(0.199_937_67);
+    let p = p * t + R::lit(-0.333_331_53);
+    let angle = q * (p * t + one);
     let quarter = R::lit(std::f64::consts::FRAC_PI_2).with_sign_of(x);
     R::select(large, quarter - angle, angle)
 }

@@ -166,14 +166,24 @@ impl<R: Real> Tyre<R> for MagicFormula<R> {
         let trail_x = slip_tangent + (t.ht1 + t.ht2 * dfz + (t.ht_camber1 + t.ht_camber2 * dfz) * side);
         let residual_x = slip_tangent + residual_shift;
         let [trail_tangent, residual_tangent] = R::tan_each([trail_x, residual_x]);
-        let [afx, afy, awx, awx0, awy, awy0] =
-            R::atan_each([fx.bx(), fy.bx(), wx.bx(), wx0.bx(), wy.bx(), wy0.bx()]);
         let trail_b = (t.bt1 + dfz * (t.bt2 + t.bt3 * dfz)) * (t.bt_even + t.bt_odd * side);
-        let [trail_slip, residual_slip, trail_angle, induced_angle] = R::atan_each([
-            equivalent_tangent(trail_x, trail_tangent, slip_share),
-            equivalent_tangent(residual_x, residual_tangent, slip_share),
+        let [afx, afy, awx, awx0, awy, awy0, trail_angle, induced_angle] = R::atan_each([
+            fx.bx(),
+            fy.bx(),
+            wx.bx(),
+            wx0.bx(),
+            wy.bx(),
+            wy0.bx(),
             trail_b * t.bct * trail_x,
             t.rvy6 * slip_ratio,
+        ]);
+        let [trail_slip, residual_slip, awx, awx0, awy, awy0] = R::atan_each([
+            equivalent_tangent(trail_x, trail_tangent, slip_share),
+            equivalent_tangent(residual_x, residual_tangent, slip_share),
+            wx.stretched(awx),
+            wx0.stretched(awx0),
+            wy.stretched(awy),
+            wy0.stretched(awy0),
         ]);
         let ft = Curve {
             c: t.ct,
@@ -183,21 +193,11 @@ impl<R: Real> Tyre<R> for MagicFormula<R> {
             ),
             x: trail_slip,
         };
-        let [aft, afx, afy, awx] = R::atan_each([
-            ft.bx(),
-            fx.stretched(afx),
-            fy.stretched(afy),
-            wx.stretched(awx),
-        ]);
-        let [aft, awx0, awy, awy0] = R::atan_each([
-            ft.stretched(aft),
-            wx0.stretched(awx0),
-            wy.stretched(awy),
-            wy0.stretched(awy0),
-        ]);
+        let [aft, afx, afy] = R::atan_each([ft.bx(), fx.stretched(afx), fy.stretched(afy)]);
+        let [xn, xd, yn, yd] = R::cos_pi_each([wx.c * awx, wx0.c * awx0, wy.c * awy, wy0.c * awy0]);
+        let aft = ft.stretched(aft).atan();
         let [sin_x, sin_y, sin_induced] = R::sin_pi_each([fx.c * afx, fy.c * afy, t.rvy5 * induced_angle]);
-        let [xn, xd, yn, yd, cos_trail] =
-            R::cos_pi_each([wx.c * awx, wx0.c * awx0, wy.c * awy, wy0.c * awy0, ft.c * aft]);
+        let cos_trail = (ft.c * aft).cos_pi();
 
         let x = (pure_x.peak * sin_x + pure_x.vertical_shift) * (xn / xd);
         let amplitude = pure_y.peak * (t.rvy1 + t.rvy2 * dfz + t.rvy_camber * side);
