@@ -17,6 +17,17 @@ pub trait SinglePrecision: Real {
     fn negate_where_odd(self, n: Self) -> Self;
     /// The magnitude of `self` with the sign bit of `other`.
     fn with_sign_of(self, other: Self) -> Self;
+    /// The same two, of which the compiler may use neither before it has both.
+    #[inline(always)]
+    fn tie(self, other: Self) -> (Self, Self) {
+        (self, other)
+    }
+    /// The same, but tied together where it is several: left alone, the compiler puts the instructions of one chain
+    /// behind those of another again, to save registers.
+    #[inline(always)]
+    fn abreast(self) -> Self {
+        self
+    }
     /// `2^self` for a whole number from -126 to 127.
     fn two_to_the(self) -> Self;
 }
@@ -32,9 +43,9 @@ const PI_LOW: f64 = 9.676_535_897_932_385e-4;
 fn sine_polynomial<R: SinglePrecision>(r: R) -> R {
     let t = r * r;
     let p = R::lit(2.606_095_7e-6);
-    let p = p * t + R::lit(-1.980_977_7e-4);
-    let p = p * t + R::lit(8.333_069e-3);
-    let p = p * t + R::lit(-0.166_666_6);
+    let p = (p * t + R::lit(-1.980_977_7e-4)).abreast();
+    let p = (p * t + R::lit(8.333_069e-3)).abreast();
+    let p = (p * t + R::lit(-0.166_666_6)).abreast();
     r + r * (p * t)
 }
 
@@ -43,10 +54,10 @@ fn sine_polynomial<R: SinglePrecision>(r: R) -> R {
 fn cosine_polynomial<R: SinglePrecision>(r: R) -> R {
     let t = r * r;
     let p = R::lit(-2.628_412_4e-7);
-    let p = p * t + R::lit(2.477_392_3e-5);
-    let p = p * t + R::lit(-1.388_864_1e-3);
-    let p = p * t + R::lit(4.166_666e-2);
-    let p = p * t + R::lit(-0.5);
+    let p = (p * t + R::lit(2.477_392_3e-5)).abreast();
+    let p = (p * t + R::lit(-1.388_864_1e-3)).abreast();
+    let p = (p * t + R::lit(4.166_666e-2)).abreast();
+    let p = (p * t + R::lit(-0.5)).abreast();
     R::lit(1.0) + t * p
 }
 
@@ -56,10 +67,10 @@ fn cosine_polynomial<R: SinglePrecision>(r: R) -> R {
 fn sine_pi_polynomial<R: SinglePrecision>(r: R) -> R {
     let t = r * r;
     let p = R::lit(7.983_576_5e-2);
-    let p = p * t + R::lit(-0.599_437_36);
-    let p = p * t + R::lit(2.550_269_8);
-    let p = p * t + R::lit(-5.167_721);
-    let p = p * t + R::lit(std::f64::consts::PI);
+    let p = (p * t + R::lit(-0.599_437_36)).abreast();
+    let p = (p * t + R::lit(2.550_269_8)).abreast();
+    let p = (p * t + R::lit(-5.167_721)).abreast();
+    let p = (p * t + R::lit(std::f64::consts::PI)).abreast();
     r * p
 }
 
@@ -115,13 +126,13 @@ pub fn atan<R: SinglePrecision>(x: R) -> R {
     let q = R::select(large, one / x, x);
     let t = q * q;
     let p = R::lit(2.916_889_3e-3);
-    let p = p * t + R::lit(-1.635_871_6e-2);
-    let p = p * t + R::lit(4.320_277e-2);
-    let p = p * t + R::lit(-7.551_660_4e-2);
-    let p = p * t + R::lit(0.106_657_69);
-    let p = p * t + R::lit(-0.142_110_02);
-    let p = p * t + R::lit(0.199_937_67);
-    let p = p * t + R::lit(-0.333_331_53);
+    let p = (p * t + R::lit(-1.635_871_6e-2)).abreast();
+    let p = (p * t + R::lit(4.320_277e-2)).abreast();
+    let p = (p * t + R::lit(-7.551_660_4e-2)).abreast();
+    let p = (p * t + R::lit(0.106_657_69)).abreast();
+    let p = (p * t + R::lit(-0.142_110_02)).abreast();
+    let p = (p * t + R::lit(0.199_937_67)).abreast();
+    let p = (p * t + R::lit(-0.333_331_53)).abreast();
     let angle = q * (p * t + one);
     let quarter = R::lit(std::f64::consts::FRAC_PI_2).with_sign_of(x);
     R::select(large, quarter - angle, angle)
@@ -135,10 +146,10 @@ pub fn exp<R: SinglePrecision>(x: R) -> R {
     // ln 2 in two parts, the first with few enough bits for an exact product.
     let r = (x - n * R::lit(0.693_359_375)) - n * R::lit(-2.121_944_4e-4);
     let p = R::lit(1.383_683_9e-3);
-    let p = p * r + R::lit(8.374_822e-3);
-    let p = p * r + R::lit(4.166_822_5e-2);
-    let p = p * r + R::lit(0.166_664_2);
-    let p = p * r + R::lit(0.499_999_9);
+    let p = (p * r + R::lit(8.374_822e-3)).abreast();
+    let p = (p * r + R::lit(4.166_822_5e-2)).abreast();
+    let p = (p * r + R::lit(0.166_664_2)).abreast();
+    let p = (p * r + R::lit(0.499_999_9)).abreast();
     (r * r * p + r + R::lit(1.0)) * n.two_to_the()
 }
 

@@ -179,14 +179,31 @@ mod x86 {
     #![allow(unused_unsafe)]
 
     use super::*;
+    use std::arch::asm;
     use std::arch::x86_64::*;
+
+    /// An empty instruction that reads and writes both.
+    #[inline]
+    #[target_feature(enable = "avx512f")]
+    fn tie_512(mut a: __m512, mut b: __m512) -> (__m512, __m512) {
+        unsafe { asm!("/* {0} {1} */", inout(zmm_reg) a, inout(zmm_reg) b, options(pure, nomem, nostack, preserves_flags)) };
+        (a, b)
+    }
+
+    /// The like for narrower registers.
+    #[inline]
+    #[target_feature(enable = "avx2")]
+    fn tie_256(mut a: __m256, mut b: __m256) -> (__m256, __m256) {
+        unsafe { asm!("/* {0} {1} */", inout(ymm_reg) a, inout(ymm_reg) b, options(pure, nomem, nostack, preserves_flags)) };
+        (a, b)
+    }
 
     macro_rules! register_lanes {
         (
             $(#[$doc:meta])* $name:ident($register:ty) x $lanes:literal, $mask_name:ident($mask:ty),
             set1 $set1:ident, add $add:ident, sub $sub:ident, mul $mul:ident, div $div:ident,
             sqrt $sqrt:ident, min $min:ident, max $max:ident,
-            less $less:expr, select $select:expr, abs $abs:expr, neg $neg:expr, round $round:expr, odd $odd:expr, sign $sign:expr, pow $pow:expr,
+            less $less:expr, select $select:expr, abs $abs:expr, neg $neg:expr, round $round:expr, odd $odd:expr, sign $sign:expr, pow $pow:expr, tie $tie:ident,
             and $and:expr, or $or:expr, not $not:expr, all $all:expr, bits $bits:expr
         ) => {
             $(#[$doc])*
@@ -318,6 +335,11 @@ mod x86 {
                     unsafe { Self($sign(self.0, other.0)) }
                 }
                 #[inline(always)]
+                fn tie(self, other: Self) -> (Self, Self) {
+                    let (a, b) = unsafe { $tie(self.0, other.0) };
+                    (Self(a), Self(b))
+                }
+                #[inline(always)]
                 fn two_to_the(self) -> Self {
                     unsafe { Self($pow(self.0)) }
                 }
@@ -360,6 +382,7 @@ mod x86 {
             _mm512_cvttps_epi32(a),
             _mm512_set1_epi32(127)
         ))),
+        tie tie_512,
         and |a, b| a & b, or |a, b| a | b, not |a: __mmask16| !a,
         all |t: bool| if t { !0 } else { 0 },
         bits |m: __mmask16| u32::from(m)
@@ -384,6 +407,7 @@ mod x86 {
             _mm256_cvttps_epi32(a),
             _mm256_set1_epi32(127)
         ))),
+        tie tie_256,
         and |a, b| _mm256_and_ps(a, b), or |a, b| _mm256_or_ps(a, b),
         not |a| _mm256_xor_ps(a, _mm256_castsi256_ps(_mm256_set1_epi32(-1))),
         all |t: bool| _mm256_castsi256_ps(_mm256_set1_epi32(if t { -1 } else { 0 })),

@@ -27,7 +27,7 @@ impl<R: Neg<Output = R>, const N: usize> Neg for Lockstep<R, N> {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
-        Self(self.0.map(Neg::neg))
+        Self(self.0.map(|x| -x))
     }
 }
 
@@ -35,7 +35,7 @@ impl<R: Not<Output = R>, const N: usize> Not for Lockstep<R, N> {
     type Output = Self;
     #[inline(always)]
     fn not(self) -> Self {
-        Self(self.0.map(Not::not))
+        Self(self.0.map(|x| !x))
     }
 }
 
@@ -57,11 +57,11 @@ impl<R: SinglePrecision, const N: usize> Real for Lockstep<R, N> {
     }
     #[inline(always)]
     fn sqrt(self) -> Self {
-        Self(self.0.map(R::sqrt))
+        Self(self.0.map(|x| x.sqrt()))
     }
     #[inline(always)]
     fn abs(self) -> Self {
-        Self(self.0.map(R::abs))
+        Self(self.0.map(|x| x.abs()))
     }
     #[inline(always)]
     fn min(self, other: Self) -> Self {
@@ -89,7 +89,7 @@ impl<R: SinglePrecision, const N: usize> Real for Lockstep<R, N> {
 impl<R: SinglePrecision, const N: usize> SinglePrecision for Lockstep<R, N> {
     #[inline(always)]
     fn round(self) -> Self {
-        Self(self.0.map(R::round))
+        Self(self.0.map(|x| x.round()))
     }
     #[inline(always)]
     fn negate_where_odd(self, n: Self) -> Self {
@@ -101,6 +101,17 @@ impl<R: SinglePrecision, const N: usize> SinglePrecision for Lockstep<R, N> {
     }
     #[inline(always)]
     fn two_to_the(self) -> Self {
-        Self(self.0.map(R::two_to_the))
+        Self(self.0.map(|x| x.two_to_the()))
+    }
+    #[inline(always)]
+    fn tie(self, other: Self) -> (Self, Self) {
+        (self, other)
+    }
+    #[inline(always)]
+    fn abreast(mut self) -> Self {
+        for i in 1..N {
+            (self.0[i - 1], self.0[i]) = self.0[i - 1].tie(self.0[i]);
+        }
+        self
     }
 }
