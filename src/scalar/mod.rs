@@ -9,8 +9,10 @@ pub mod elementary;
 mod float;
 pub mod lanes;
 mod lockstep;
+mod pair;
 
 pub use dual::Dual;
+pub use pair::Pair;
 
 use std::fmt::Debug;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};

@@ -46,9 +46,8 @@ pub struct CarModel<R, T> {
     pub tyres: [T; 2],
 }
 
-/// On which side of the car each wheel is, left positive. A table in memory: an array in the function is stored on
-/// the stack anew for each wheel, and waiting for that store keeps one wheel's work from overlapping the last's.
-static SIDES: [f64; 4] = [1.0, -1.0, 1.0, -1.0];
+/// On which side an axle's wheels are, left positive.
+const SIDES: [f64; 2] = [1.0, -1.0];
 
 /// Slip of one wheel.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -139,10 +138,6 @@ impl<R: Real, T: Tyre<R>> CarModel<R, T> {
         let half_track = [chassis.half_track_front, chassis.half_track_rear];
         let radius = [chassis.radius_front, chassis.radius_rear];
 
-        let place = |wheel: usize| {
-            let side = R::lit(SIDES[wheel]);
-            (axle_x[wheel / 2], half_track[wheel / 2] * side, side)
-        };
         let zero = R::lit(0.0);
         let mut total = BodyForces {
             x: -aero.drag,
@@ -151,20 +146,30 @@ impl<R: Real, T: Tyre<R>> CarModel<R, T> {
         };
         // One copy of the tyre's code serves all wheels, indexed rather than chosen between: the code then fits
         // the processor's instruction cache and the coefficients stay in memory.
-        for wheel in 0..4 {
-            let (x, y, side) = place(wheel);
-            let rim_speed = input.wheel_speed[wheel] * radius[wheel / 2];
-            let slip = wheel_slip(body, (x, y), directions[wheel / 2], rim_speed, chassis.slip_speed_floor);
-            let forces = self.tyres[wheel / 2].forces(TyreInput {
-                load: loads[wheel],
-                slip_ratio: slip.ratio,
-                slip_tangent: slip.tangent,
-                side,
-            });
-            let (force_x, force_y) = to_body_axes(&forces, directions[wheel / 2]);
-            total.x = total.x + force_x;
-            total.y = total.y + force_y;
-            total.yaw_moment = total.yaw_moment + (x * force_y - y * force_x + forces.aligning_moment);
+        for axle in 0..2 {
+            let direction = directions[axle];
+            let x = axle_x[axle];
+            let mut inputs = [TyreInput::unloaded(); 2];
+            for half in 0..2 {
+                let side = R::lit(SIDES[half]);
+                let place = (x, half_track[axle] * side);
+                let rim_speed = input.wheel_speed[2 * axle + half] * radius[axle];
+                let slip = wheel_slip(body, place, direction, rim_speed, chassis.slip_speed_floor);
+                inputs[half] = TyreInput {
+                    load: loads[2 * axle + half],
+                    slip_ratio: slip.ratio,
+                    slip_tangent: slip.tangent,
+                    side,
+                };
+            }
+            let forces = self.tyres[axle].axle_forces(inputs);
+            for half in 0..2 {
+                let y = half_track[axle] * R::lit(SIDES[half]);
+                let (force_x, force_y) = to_body_axes(&forces[half], direction);
+                total.x = total.x + force_x;
+                total.y = total.y + force_y;
+                total.yaw_moment = total.yaw_moment + (x * force_y - y * force_x + forces[half].aligning_moment);
+            }
         }
 
         let rate = body_derivative(chassis, body, &total);

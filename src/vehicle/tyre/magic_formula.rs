@@ -3,7 +3,7 @@
 
 use super::prepared::MagicFormula;
 use super::{LEAST_LOAD, Tyre, TyreCoefficients, TyreForces, TyreInput, TyreModel};
-use crate::scalar::Real;
+use crate::scalar::{Pair, Real};
 
 /// The angle `C atan(B x - E (B x - atan(B x)))` of which a curve is the sine or the cosine.
 #[derive(Clone, Copy)]
@@ -108,7 +108,8 @@ fn pure_lateral<R: Real>(t: &MagicFormula<R>, load: Load<R>, slip_tangent: R, si
 fn longitudinal_weight<R: Real>(t: &MagicFormula<R>, load: Load<R>, slip_ratio: R, slip_tangent: R) -> [Curve<R>; 2] {
     let b = t.rbx1 * (t.rbx2 * slip_ratio).cos_atan();
     let e = clamp_curvature(t.rex1 + t.rex2 * load.difference);
-    [slip_tangent + t.rhx1, t.rhx1].map(|x| Curve { c: t.rcx1, b, e, x })
+    let at = Curve { c: t.rcx1, b, e, x: t.rhx1 };
+    [Curve { x: slip_tangent + at.x, ..at }, at]
 }
 
 /// The like for the weight that slip ratio leaves of the side force.
@@ -116,8 +117,8 @@ fn longitudinal_weight<R: Real>(t: &MagicFormula<R>, load: Load<R>, slip_ratio: 
 fn lateral_weight<R: Real>(t: &MagicFormula<R>, load: Load<R>, slip_ratio: R, slip_tangent: R) -> [Curve<R>; 2] {
     let b = t.rby1 * (t.rby2 * (slip_tangent - t.rby3)).cos_atan();
     let e = clamp_curvature(t.rey1 + t.rey2 * load.difference);
-    let shift = t.rhy1 + t.rhy2 * load.difference;
-    [slip_ratio + shift, shift].map(|x| Curve { c: t.rcy1, b, e, x })
+    let at = Curve { c: t.rcy1, b, e, x: t.rhy1 + t.rhy2 * load.difference };
+    [Curve { x: slip_ratio + at.x, ..at }, at]
 }
 
 /// The tangent of the equivalent slip angle: `x`'s, whose tangent is given, with the slip ratio's share added. `x` is
@@ -127,31 +128,14 @@ fn equivalent_tangent<R: Real>(x: R, tangent: R, slip_share: R) -> R {
     (tangent * tangent + slip_share * slip_share).sqrt() * x.sign()
 }
 
-impl<R: Real> Tyre<R> for MagicFormula<R> {
-    const FIELDS: &'static [&'static str] = MagicFormula::<R>::FIELDS;
-    const MODEL: TyreModel = TyreModel::MagicFormula;
-
-    fn from_parameters(at: impl FnMut(usize) -> R, inclination: R) -> Self {
-        TyreCoefficients::from_flat(at).prepare(inclination)
-    }
-
+/// Forces and aligning moment under combined slip.
     #[inline(always)]
-    fn from_flat(at: impl FnMut(usize) -> R) -> Self {
-        MagicFormula::from_flat(at)
-    }
-
-    fn to_flat(&self) -> Vec<R> {
-        MagicFormula::to_flat(self)
-    }
-
-    #[inline(always)]
-    fn forces(&self, input: TyreInput<R>) -> TyreForces<R> {
+    fn combined_slip<R: Real>(t: &MagicFormula<R>, input: TyreInput<R>) -> TyreForces<R> {
         let force = input.load.max(R::lit(LEAST_LOAD));
         let load = Load {
             force,
-            difference: force * self.inverse_nominal - R::lit(1.0),
+            difference: force * t.inverse_nominal - R::lit(1.0),
         };
-        let t = self;
         let (dfz, side, one) = (load.difference, input.side, R::lit(1.0));
         let (slip_ratio, slip_tangent) = (input.slip_ratio, input.slip_tangent);
         let pure_x = pure_longitudinal(t, load, slip_ratio);
@@ -222,5 +206,43 @@ impl<R: Real> Tyre<R> for MagicFormula<R> {
             y: R::select(loaded, y, zero),
             aligning_moment: R::select(loaded, moment, zero),
         }
+    }
+
+impl<R: Real> Tyre<R> for MagicFormula<R> {
+    const FIELDS: &'static [&'static str] = MagicFormula::<R>::FIELDS;
+    const MODEL: TyreModel = TyreModel::MagicFormula;
+
+    fn from_parameters(at: impl FnMut(usize) -> R, inclination: R) -> Self {
+        TyreCoefficients::from_flat(at).prepare(inclination)
+    }
+
+    #[inline(always)]
+    fn from_flat(at: impl FnMut(usize) -> R) -> Self {
+        MagicFormula::from_flat(at)
+    }
+
+    fn to_flat(&self) -> Vec<R> {
+        MagicFormula::to_flat(self)
+    }
+
+    #[inline(always)]
+    fn forces(&self, input: TyreInput<R>) -> TyreForces<R> {
+        combined_slip(self, input)
+    }
+
+    #[inline(always)]
+    fn axle_forces(&self, [left, right]: [TyreInput<R>; 2]) -> [TyreForces<R>; 2] {
+        let input = TyreInput {
+            load: Pair(left.load, right.load),
+            slip_ratio: Pair(left.slip_ratio, right.slip_ratio),
+            slip_tangent: Pair(left.slip_tangent, right.slip_tangent),
+            side: Pair(left.side, right.side),
+        };
+        let forces = combined_slip(&self.map(|figure| Pair(figure, figure)), input);
+        let of = |x, y, aligning_moment| TyreForces { x, y, aligning_moment };
+        [
+            of(forces.x.0, forces.y.0, forces.aligning_moment.0),
+            of(forces.x.1, forces.y.1, forces.aligning_moment.1),
+        ]
     }
 }
