@@ -123,7 +123,7 @@ pub fn cos_pi<R: SinglePrecision>(x: R) -> R {
 pub fn atan<R: SinglePrecision>(x: R) -> R {
     let one = R::lit(1.0);
     let large = one.less_than(x.abs());
-    let q = R::select(large, one / x, x);
+    let q = R::select(large, one / x, x).abreast();
     let t = q * q;
     let p = R::lit(2.916_889_3e-3);
     let p = (p * t + R::lit(-1.635_871_6e-2)).abreast();
@@ -133,7 +133,7 @@ pub fn atan<R: SinglePrecision>(x: R) -> R {
     let p = (p * t + R::lit(-0.142_110_02)).abreast();
     let p = (p * t + R::lit(0.199_937_67)).abreast();
     let p = (p * t + R::lit(-0.333_331_53)).abreast();
-    let angle = q * (p * t + one);
+    let angle = (q * (p * t + one)).abreast();
     let quarter = R::lit(std::f64::consts::FRAC_PI_2).with_sign_of(x);
     R::select(large, quarter - angle, angle)
 }
