@@ -187,7 +187,7 @@ mod tests {
 
     fn composite<R: Real>(x: R, y: R) -> R {
         let ratio = (x * y + x.exp()) / (R::lit(2.0) + y.abs().sqrt());
-        ratio.atan().sin() + (x - y).cos() * x.min(y).cos_atan() - y.max(x)
+        ratio.atan().sin() + (x - y).cos() / x.min(y).sec_atan() - y.max(x)
     }
 
     #[test]

@@ -242,8 +242,17 @@ mod tests {
         assert!(largest_ulp((-40.0, 40.0), 1e-2, sin, f64::sin) < 3.0);
         assert!(largest_ulp((-40.0, 40.0), 1e-2, cos, f64::cos) < 3.0);
         let pi = std::f64::consts::PI;
-        assert!(largest_ulp((-12.0, 12.0), 1e-30, sin_pi, |x| (pi * (x - x.round())).sin() * (1.0 - 2.0 * (x.round().rem_euclid(2.0)))) < 3.0);
-        assert!(largest_ulp((-12.0, 12.0), 1e-30, cos_pi, |x| { let n = x.floor(); (pi * (n + 0.5 - x)).sin() * (1.0 - 2.0 * n.rem_euclid(2.0)) }) < 3.0);
+        assert!(
+            largest_ulp((-12.0, 12.0), 1e-30, sin_pi, |x| (pi * (x - x.round())).sin()
+                * (1.0 - 2.0 * (x.round().rem_euclid(2.0))))
+                < 3.0
+        );
+        assert!(
+            largest_ulp((-12.0, 12.0), 1e-30, cos_pi, |x| {
+                let n = x.floor();
+                (pi * (n + 0.5 - x)).sin() * (1.0 - 2.0 * n.rem_euclid(2.0))
+            }) < 3.0
+        );
         // Two polynomials and a division.
         assert!(largest_ulp((-1.2, 1.2), 1e-4, tan, f64::tan) < 4.0);
         assert!(largest_ulp((-50.0, 50.0), 1e-30, atan, f64::atan) < 3.0);

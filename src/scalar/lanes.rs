@@ -1,10 +1,10 @@
 //! Packs of `f32` lanes: one candidate car per lane.
 //!
-//! [`Avx512`] and [`Avx2`] wrap the vector registers; [`Portable`] is a plain array that the compiler
-//! vectorises for the target's baseline (SSE2, NEON). All round alike: the operations are IEEE and the
-//! elementary functions are the shared ones, so a candidate's cost does not depend on the instruction set.
+//! [`Avx512`], [`Avx2`] and [`Sse2`] wrap the vector registers; [`Portable`] is a plain array for processors that
+//! have none of them. All round alike: the operations are IEEE and the elementary functions are the shared ones, so
+//! a candidate's cost does not depend on the instruction set.
 //!
-//! The register types are only sound to use inside a function that enables their instruction set, after that
+//! The wider register types are only sound to use inside a function that enables their instruction set, after that
 //! set was detected: [`crate::evaluate::simd`] is the one place that does so.
 
 use super::Real;
@@ -167,13 +167,20 @@ impl Lanes for Portable {
 }
 
 #[cfg(target_arch = "x86_64")]
-pub use x86::{Avx2, Avx512};
+pub use x86::{Avx2, Avx512, Sse2};
+
+/// What every processor of the target has.
+#[cfg(target_arch = "x86_64")]
+pub type Baseline = Sse2;
+/// What every processor of the target has.
+#[cfg(not(target_arch = "x86_64"))]
+pub type Baseline = Portable;
 
 #[cfg(target_arch = "x86_64")]
 mod x86 {
     //! Safety of every block here: the intrinsics only need their instruction set to be present. These types
     //! come to life only inside `#[target_feature]` functions that `evaluate::simd` calls after detecting the
-    //! set. Memory is only touched through arrays of exactly the register's size.
+    //! set, but for `Sse2`, which every x86-64 processor has. Memory is only touched through arrays of exactly the register's size.
 
     // Some mask operations of some sets are plain integer arithmetic, in which `unsafe` says nothing.
     #![allow(unused_unsafe)]
@@ -186,7 +193,9 @@ mod x86 {
     #[inline]
     #[target_feature(enable = "avx512f")]
     fn tie_512(mut a: __m512, mut b: __m512) -> (__m512, __m512) {
-        unsafe { asm!("/* {0} {1} */", inout(zmm_reg) a, inout(zmm_reg) b, options(pure, nomem, nostack, preserves_flags)) };
+        unsafe {
+            asm!("/* {0} {1} */", inout(zmm_reg) a, inout(zmm_reg) b, options(pure, nomem, nostack, preserves_flags))
+        };
         (a, b)
     }
 
@@ -194,7 +203,19 @@ mod x86 {
     #[inline]
     #[target_feature(enable = "avx2")]
     fn tie_256(mut a: __m256, mut b: __m256) -> (__m256, __m256) {
-        unsafe { asm!("/* {0} {1} */", inout(ymm_reg) a, inout(ymm_reg) b, options(pure, nomem, nostack, preserves_flags)) };
+        unsafe {
+            asm!("/* {0} {1} */", inout(ymm_reg) a, inout(ymm_reg) b, options(pure, nomem, nostack, preserves_flags))
+        };
+        (a, b)
+    }
+
+    /// The like for the narrowest.
+    #[inline]
+    #[target_feature(enable = "sse2")]
+    fn tie_128(mut a: __m128, mut b: __m128) -> (__m128, __m128) {
+        unsafe {
+            asm!("/* {0} {1} */", inout(xmm_reg) a, inout(xmm_reg) b, options(pure, nomem, nostack, preserves_flags))
+        };
         (a, b)
     }
 
@@ -412,5 +433,29 @@ mod x86 {
         not |a| _mm256_xor_ps(a, _mm256_castsi256_ps(_mm256_set1_epi32(-1))),
         all |t: bool| _mm256_castsi256_ps(_mm256_set1_epi32(if t { -1 } else { 0 })),
         bits |m| _mm256_movemask_ps(m) as u32
+    }
+
+    register_lanes! {
+        /// Four lanes in an SSE2 register.
+        Sse2(__m128) x 4, Sse2Mask(__m128),
+        set1 _mm_set1_ps, add _mm_add_ps, sub _mm_sub_ps, mul _mm_mul_ps, div _mm_div_ps,
+        sqrt _mm_sqrt_ps, min _mm_min_ps, max _mm_max_ps,
+        less |a, b| _mm_cmplt_ps(a, b),
+        select |m, a, b| _mm_or_ps(_mm_and_ps(m, a), _mm_andnot_ps(m, b)),
+        abs |a| _mm_andnot_ps(_mm_set1_ps(-0.0), a),
+        neg |a| _mm_xor_ps(a, _mm_set1_ps(-0.0)),
+        // There is no rounding to a whole number that stays a float.
+        round |a| _mm_cvtepi32_ps(_mm_cvtps_epi32(a)),
+        odd |a, n| _mm_xor_ps(a, _mm_castsi128_ps(_mm_slli_epi32::<31>(_mm_cvttps_epi32(n)))),
+        sign |a, b| {
+            let sign_bit = _mm_set1_ps(-0.0);
+            _mm_or_ps(_mm_andnot_ps(sign_bit, a), _mm_and_ps(sign_bit, b))
+        },
+        pow |a| _mm_castsi128_ps(_mm_slli_epi32::<23>(_mm_add_epi32(_mm_cvttps_epi32(a), _mm_set1_epi32(127)))),
+        tie tie_128,
+        and |a, b| _mm_and_ps(a, b), or |a, b| _mm_or_ps(a, b),
+        not |a| _mm_xor_ps(a, _mm_castsi128_ps(_mm_set1_epi32(-1))),
+        all |t: bool| _mm_castsi128_ps(_mm_set1_epi32(if t { -1 } else { 0 })),
+        bits |m| _mm_movemask_ps(m) as u32
     }
 }

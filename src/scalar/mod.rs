@@ -79,10 +79,10 @@ pub trait Real:
         Self::select(self.less_than(Self::lit(0.0)), Self::lit(-1.0), Self::lit(1.0))
     }
 
-    /// `cos(atan self)`, by the identity `1 / sqrt(1 + x^2)` instead of two transcendentals.
+    /// The secant `1 / cos(atan self)`, by the identity `sqrt(1 + x^2)` instead of two transcendentals.
     #[inline(always)]
-    fn cos_atan(self) -> Self {
-        Self::lit(1.0) / (Self::lit(1.0) + self * self).sqrt()
+    fn sec_atan(self) -> Self {
+        (Self::lit(1.0) + self * self).sqrt()
     }
 
     /// Tangents of several, which lanes work out side by side.

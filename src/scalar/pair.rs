@@ -119,7 +119,10 @@ impl<R: Real> Real for Pair<R> {
     }
     #[inline(always)]
     fn select(mask: Self::Mask, if_true: Self, if_false: Self) -> Self {
-        Self(R::select(mask.0, if_true.0, if_false.0), R::select(mask.1, if_true.1, if_false.1))
+        Self(
+            R::select(mask.0, if_true.0, if_false.0),
+            R::select(mask.1, if_true.1, if_false.1),
+        )
     }
     #[inline(always)]
     fn tan_each<const N: usize>(x: [Self; N]) -> [Self; N] {

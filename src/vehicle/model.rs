@@ -168,7 +168,8 @@ impl<R: Real, T: Tyre<R>> CarModel<R, T> {
                 let (force_x, force_y) = to_body_axes(&forces[half], direction);
                 total.x = total.x + force_x;
                 total.y = total.y + force_y;
-                total.yaw_moment = total.yaw_moment + (x * force_y - y * force_x + forces[half].aligning_moment);
+                total.yaw_moment =
+                    total.yaw_moment + (x * force_y - y * force_x + forces[half].aligning_moment);
             }
         }
 

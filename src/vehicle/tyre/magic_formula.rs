@@ -77,7 +77,12 @@ fn pure_longitudinal<R: Real>(t: &MagicFormula<R>, load: Load<R>, slip_ratio: R)
 
 /// Pure side slip, and what the residual moment needs of it: `By Cy` and `SHy + SVy/Ky`.
 #[inline(always)]
-fn pure_lateral<R: Real>(t: &MagicFormula<R>, load: Load<R>, slip_tangent: R, side: R) -> (PureSlip<R>, R, R) {
+fn pure_lateral<R: Real>(
+    t: &MagicFormula<R>,
+    load: Load<R>,
+    slip_tangent: R,
+    side: R,
+) -> (PureSlip<R>, R, R) {
     let dfz = load.difference;
     let one = R::lit(1.0);
     let peak = (t.dy1 + t.dy2 * dfz) * load.force;
@@ -105,20 +110,52 @@ fn pure_lateral<R: Real>(t: &MagicFormula<R>, load: Load<R>, slip_tangent: R, si
 /// The curve whose cosine at `x`, over that at its shift, is the weight that side slip leaves of the longitudinal
 /// force.
 #[inline(always)]
-fn longitudinal_weight<R: Real>(t: &MagicFormula<R>, load: Load<R>, slip_ratio: R, slip_tangent: R) -> [Curve<R>; 2] {
-    let b = t.rbx1 * (t.rbx2 * slip_ratio).cos_atan();
+fn longitudinal_weight<R: Real>(
+    t: &MagicFormula<R>,
+    load: Load<R>,
+    slip_ratio: R,
+    slip_tangent: R,
+) -> [Curve<R>; 2] {
+    let b = t.rbx1 / (t.rbx2 * slip_ratio).sec_atan();
     let e = clamp_curvature(t.rex1 + t.rex2 * load.difference);
-    let at = Curve { c: t.rcx1, b, e, x: t.rhx1 };
-    [Curve { x: slip_tangent + at.x, ..at }, at]
+    let at = Curve {
+        c: t.rcx1,
+        b,
+        e,
+        x: t.rhx1,
+    };
+    [
+        Curve {
+            x: slip_tangent + at.x,
+            ..at
+        },
+        at,
+    ]
 }
 
 /// The like for the weight that slip ratio leaves of the side force.
 #[inline(always)]
-fn lateral_weight<R: Real>(t: &MagicFormula<R>, load: Load<R>, slip_ratio: R, slip_tangent: R) -> [Curve<R>; 2] {
-    let b = t.rby1 * (t.rby2 * (slip_tangent - t.rby3)).cos_atan();
+fn lateral_weight<R: Real>(
+    t: &MagicFormula<R>,
+    load: Load<R>,
+    slip_ratio: R,
+    slip_tangent: R,
+) -> [Curve<R>; 2] {
+    let b = t.rby1 / (t.rby2 * (slip_tangent - t.rby3)).sec_atan();
     let e = clamp_curvature(t.rey1 + t.rey2 * load.difference);
-    let at = Curve { c: t.rcy1, b, e, x: t.rhy1 + t.rhy2 * load.difference };
-    [Curve { x: slip_ratio + at.x, ..at }, at]
+    let at = Curve {
+        c: t.rcy1,
+        b,
+        e,
+        x: t.rhy1 + t.rhy2 * load.difference,
+    };
+    [
+        Curve {
+            x: slip_ratio + at.x,
+            ..at
+        },
+        at,
+    ]
 }
 
 /// The tangent of the equivalent slip angle: `x`'s, whose tangent is given, with the slip ratio's share added. `x` is
@@ -129,84 +166,83 @@ fn equivalent_tangent<R: Real>(x: R, tangent: R, slip_share: R) -> R {
 }
 
 /// Forces and aligning moment under combined slip.
-    #[inline(always)]
-    fn combined_slip<R: Real>(t: &MagicFormula<R>, input: TyreInput<R>) -> TyreForces<R> {
-        let force = input.load.max(R::lit(LEAST_LOAD));
-        let load = Load {
-            force,
-            difference: force * t.inverse_nominal - R::lit(1.0),
-        };
-        let (dfz, side, one) = (load.difference, input.side, R::lit(1.0));
-        let (slip_ratio, slip_tangent) = (input.slip_ratio, input.slip_tangent);
-        let pure_x = pure_longitudinal(t, load, slip_ratio);
-        let (pure_y, slope, residual_shift) = pure_lateral(t, load, slip_tangent, side);
+#[inline(always)]
+fn combined_slip<R: Real>(t: &MagicFormula<R>, input: TyreInput<R>) -> TyreForces<R> {
+    let force = input.load.max(R::lit(LEAST_LOAD));
+    let load = Load {
+        force,
+        difference: force * t.inverse_nominal - R::lit(1.0),
+    };
+    let (dfz, side, one) = (load.difference, input.side, R::lit(1.0));
+    let (slip_ratio, slip_tangent) = (input.slip_ratio, input.slip_tangent);
+    let pure_x = pure_longitudinal(t, load, slip_ratio);
+    let (pure_y, slope, residual_shift) = pure_lateral(t, load, slip_tangent, side);
 
-        let [wx, wx0] = longitudinal_weight(t, load, slip_ratio, slip_tangent);
-        let [wy, wy0] = lateral_weight(t, load, slip_ratio, slip_tangent);
-        let (fx, fy) = (pure_x.curve, pure_y.curve);
+    let [wx, wx0] = longitudinal_weight(t, load, slip_ratio, slip_tangent);
+    let [wy, wy0] = lateral_weight(t, load, slip_ratio, slip_tangent);
+    let (fx, fy) = (pure_x.curve, pure_y.curve);
 
-        // Equivalent slip angles of the trail and the residual moment.
-        let slip_share = pure_x.stiffness / pure_y.stiffness * slip_ratio;
-        let trail_x = slip_tangent + (t.ht1 + t.ht2 * dfz + (t.ht_camber1 + t.ht_camber2 * dfz) * side);
-        let residual_x = slip_tangent + residual_shift;
-        let [trail_tangent, residual_tangent] = R::tan_each([trail_x, residual_x]);
-        let trail_b = (t.bt1 + dfz * (t.bt2 + t.bt3 * dfz)) * (t.bt_even + t.bt_odd * side);
-        let [afx, afy, awx, awx0, awy, awy0, trail_angle, induced_angle] = R::atan_each([
-            fx.bx(),
-            fy.bx(),
-            wx.bx(),
-            wx0.bx(),
-            wy.bx(),
-            wy0.bx(),
-            trail_b * t.bct * trail_x,
-            t.rvy6 * slip_ratio,
-        ]);
-        let [trail_slip, residual_slip, awx, awx0, awy, awy0] = R::atan_each([
-            equivalent_tangent(trail_x, trail_tangent, slip_share),
-            equivalent_tangent(residual_x, residual_tangent, slip_share),
-            wx.stretched(awx),
-            wx0.stretched(awx0),
-            wy.stretched(awy),
-            wy0.stretched(awy0),
-        ]);
-        let ft = Curve {
-            c: t.ct,
-            b: trail_b,
-            e: clamp_curvature(
-                (t.et1 + dfz * (t.et2 + t.et3 * dfz)) * (one + (t.et4 + t.et_camber * side) * trail_angle),
-            ),
-            x: trail_slip,
-        };
-        let [aft, afx, afy] = R::atan_each([ft.bx(), fx.stretched(afx), fy.stretched(afy)]);
-        let [xn, xd, yn, yd] = R::cos_pi_each([wx.c * awx, wx0.c * awx0, wy.c * awy, wy0.c * awy0]);
-        let aft = ft.stretched(aft).atan();
-        let [sin_x, sin_y, sin_induced] = R::sin_pi_each([fx.c * afx, fy.c * afy, t.rvy5 * induced_angle]);
-        let cos_trail = (ft.c * aft).cos_pi();
+    // Equivalent slip angles of the trail and the residual moment.
+    let slip_share = pure_x.stiffness / pure_y.stiffness * slip_ratio;
+    let trail_x = slip_tangent + (t.ht1 + t.ht2 * dfz + (t.ht_camber1 + t.ht_camber2 * dfz) * side);
+    let residual_x = slip_tangent + residual_shift;
+    let [trail_tangent, residual_tangent] = R::tan_each([trail_x, residual_x]);
+    let trail_b = (t.bt1 + dfz * (t.bt2 + t.bt3 * dfz)) * (t.bt_even + t.bt_odd * side);
+    let [afx, afy, awx, awx0, awy, awy0, trail_angle, induced_angle] = R::atan_each([
+        fx.bx(),
+        fy.bx(),
+        wx.bx(),
+        wx0.bx(),
+        wy.bx(),
+        wy0.bx(),
+        trail_b * t.bct * trail_x,
+        t.rvy6 * slip_ratio,
+    ]);
+    let [trail_slip, residual_slip, awx, awx0, awy, awy0] = R::atan_each([
+        equivalent_tangent(trail_x, trail_tangent, slip_share),
+        equivalent_tangent(residual_x, residual_tangent, slip_share),
+        wx.stretched(awx),
+        wx0.stretched(awx0),
+        wy.stretched(awy),
+        wy0.stretched(awy0),
+    ]);
+    let ft = Curve {
+        c: t.ct,
+        b: trail_b,
+        e: clamp_curvature(
+            (t.et1 + dfz * (t.et2 + t.et3 * dfz)) * (one + (t.et4 + t.et_camber * side) * trail_angle),
+        ),
+        x: trail_slip,
+    };
+    let [aft, afx, afy] = R::atan_each([ft.bx(), fx.stretched(afx), fy.stretched(afy)]);
+    let [xn, xd, yn, yd] = R::cos_pi_each([wx.c * awx, wx0.c * awx0, wy.c * awy, wy0.c * awy0]);
+    let aft = ft.stretched(aft).atan();
+    let [sin_x, sin_y, sin_induced] = R::sin_pi_each([fx.c * afx, fy.c * afy, t.rvy5 * induced_angle]);
+    let cos_trail = (ft.c * aft).cos_pi();
 
-        let x = (pure_x.peak * sin_x + pure_x.vertical_shift) * (xn / xd);
-        let amplitude = pure_y.peak * (t.rvy1 + t.rvy2 * dfz + t.rvy_camber * side);
-        let induced = amplitude * (t.rvy4 * slip_tangent).cos_atan() * sin_induced;
-        let y = (pure_y.peak * sin_y + pure_y.vertical_shift) * (yn / yd) + induced;
+    let x = (pure_x.peak * sin_x + pure_x.vertical_shift) * (xn / xd);
+    let amplitude = pure_y.peak * (t.rvy1 + t.rvy2 * dfz + t.rvy_camber * side);
+    let induced = amplitude / (t.rvy4 * slip_tangent).sec_atan() * sin_induced;
+    let y = (pure_y.peak * sin_y + pure_y.vertical_shift) * (yn / yd) + induced;
 
-        let d = load.force * (t.dt1 + t.dt2 * dfz) * (t.dt_even + t.dt_odd * side);
-        let trail = d * cos_trail * slip_tangent.cos_atan();
-        let residual_slope = t.br1 + t.br2 * slope;
-        // The cosine of `a* = tan(alpha)` itself, unlike that of the trail: the reference implementation has it so.
-        let residual_peak = load.force
-            * (t.dr1 + t.dr2 * dfz + (t.dr_camber1 + t.dr_camber2 * dfz) * side)
-            * slip_tangent.cos();
-        let residual = residual_peak * (residual_slope * residual_slip).cos_atan();
-        let arm = t.s1 + t.s2 * y + (t.s_camber1 + t.s_camber2 * dfz) * side;
-        let moment = residual - trail * (y - induced) + arm * x;
+    let d = load.force * (t.dt1 + t.dt2 * dfz) * (t.dt_even + t.dt_odd * side);
+    let trail = d * cos_trail / slip_tangent.sec_atan();
+    let residual_slope = t.br1 + t.br2 * slope;
+    // The cosine of `a* = tan(alpha)` itself, unlike that of the trail: the reference implementation has it so.
+    let residual_peak =
+        load.force * (t.dr1 + t.dr2 * dfz + (t.dr_camber1 + t.dr_camber2 * dfz) * side) * slip_tangent.cos();
+    let residual = residual_peak / (residual_slope * residual_slip).sec_atan();
+    let arm = t.s1 + t.s2 * y + (t.s_camber1 + t.s_camber2 * dfz) * side;
+    let moment = residual - trail * (y - induced) + arm * x;
 
-        let zero = R::lit(0.0);
-        let loaded = zero.less_than(input.load);
-        TyreForces {
-            x: R::select(loaded, x, zero),
-            y: R::select(loaded, y, zero),
-            aligning_moment: R::select(loaded, moment, zero),
-        }
+    let zero = R::lit(0.0);
+    let loaded = zero.less_than(input.load);
+    TyreForces {
+        x: R::select(loaded, x, zero),
+        y: R::select(loaded, y, zero),
+        aligning_moment: R::select(loaded, moment, zero),
     }
+}
 
 impl<R: Real> Tyre<R> for MagicFormula<R> {
     const FIELDS: &'static [&'static str] = MagicFormula::<R>::FIELDS;
@@ -239,7 +275,11 @@ impl<R: Real> Tyre<R> for MagicFormula<R> {
             side: Pair(left.side, right.side),
         };
         let forces = combined_slip(&self.map(|figure| Pair(figure, figure)), input);
-        let of = |x, y, aligning_moment| TyreForces { x, y, aligning_moment };
+        let of = |x, y, aligning_moment| TyreForces {
+            x,
+            y,
+            aligning_moment,
+        };
         [
             of(forces.x.0, forces.y.0, forces.aligning_moment.0),
             of(forces.x.1, forces.y.1, forces.aligning_moment.1),

@@ -38,7 +38,12 @@ impl<R: Real> TyreInput<R> {
     #[inline(always)]
     pub fn unloaded() -> Self {
         let zero = R::lit(0.0);
-        Self { load: zero, slip_ratio: zero, slip_tangent: zero, side: zero }
+        Self {
+            load: zero,
+            slip_ratio: zero,
+            slip_tangent: zero,
+            side: zero,
+        }
     }
 }
 
