@@ -68,6 +68,7 @@ impl<const N: usize> Sub for Dual<N> {
 
 impl<const N: usize> Mul for Dual<N> {
     type Output = Self;
+    #[allow(clippy::suspicious_arithmetic_impl, reason = "the product rule is a sum")]
     #[inline(always)]
     fn mul(self, other: Self) -> Self {
         Self {

@@ -144,12 +144,13 @@ impl<R: Real, T: Tyre<R>> CarModel<R, T> {
             y: zero,
             yaw_moment: zero,
         };
-        // One copy of the tyre's code serves all wheels, indexed rather than chosen between: the code then fits
-        // the processor's instruction cache and the coefficients stay in memory.
+        // One copy of the tyre's code serves both axles, indexed rather than chosen between: the code then fits
+        // the processor's instruction cache and the coefficients stay in memory. The loops over an axle's wheels
+        // are loops because large closures would not be compiled for the instruction set of their surroundings.
         for axle in 0..2 {
             let direction = directions[axle];
             let x = axle_x[axle];
-            let mut inputs = [TyreInput::unloaded(); 2];
+            let mut inputs = [TyreInput::nought(); 2];
             for half in 0..2 {
                 let side = R::lit(SIDES[half]);
                 let place = (x, half_track[axle] * side);

@@ -5,7 +5,7 @@ use super::prepared::MagicFormula;
 use super::{LEAST_LOAD, Tyre, TyreCoefficients, TyreForces, TyreInput, TyreModel};
 use crate::scalar::{Pair, Real};
 
-/// The angle `C atan(B x - E (B x - atan(B x)))` of which a curve is the sine or the cosine.
+/// The angle `C atan(B x - E (B x - atan(B x)))`, in half turns, of which a curve is the sine or the cosine.
 #[derive(Clone, Copy)]
 struct Curve<R> {
     /// `C / pi`.
@@ -118,19 +118,9 @@ fn longitudinal_weight<R: Real>(
 ) -> [Curve<R>; 2] {
     let b = t.rbx1 / (t.rbx2 * slip_ratio).sec_atan();
     let e = clamp_curvature(t.rex1 + t.rex2 * load.difference);
-    let at = Curve {
-        c: t.rcx1,
-        b,
-        e,
-        x: t.rhx1,
-    };
-    [
-        Curve {
-            x: slip_tangent + at.x,
-            ..at
-        },
-        at,
-    ]
+    let (c, shift) = (t.rcx1, t.rhx1);
+    let x = slip_tangent + shift;
+    [Curve { c, b, e, x }, Curve { c, b, e, x: shift }]
 }
 
 /// The like for the weight that slip ratio leaves of the side force.
@@ -143,19 +133,9 @@ fn lateral_weight<R: Real>(
 ) -> [Curve<R>; 2] {
     let b = t.rby1 / (t.rby2 * (slip_tangent - t.rby3)).sec_atan();
     let e = clamp_curvature(t.rey1 + t.rey2 * load.difference);
-    let at = Curve {
-        c: t.rcy1,
-        b,
-        e,
-        x: t.rhy1 + t.rhy2 * load.difference,
-    };
-    [
-        Curve {
-            x: slip_ratio + at.x,
-            ..at
-        },
-        at,
-    ]
+    let (c, shift) = (t.rcy1, t.rhy1 + t.rhy2 * load.difference);
+    let x = slip_ratio + shift;
+    [Curve { c, b, e, x }, Curve { c, b, e, x: shift }]
 }
 
 /// The tangent of the equivalent slip angle: `x`'s, whose tangent is given, with the slip ratio's share added. `x` is
@@ -178,6 +158,8 @@ fn combined_slip<R: Real>(t: &MagicFormula<R>, input: TyreInput<R>) -> TyreForce
     let pure_x = pure_longitudinal(t, load, slip_ratio);
     let (pure_y, slope, residual_shift) = pure_lateral(t, load, slip_tangent, side);
 
+    // Each curve is a chain of an inner arc tangent, an outer one and a sine or cosine: `f` of a pure force, `w` of
+    // a weight and `w0` of its shift, `m` of the trail. All of a kind that are ready are worked out side by side.
     let [wx, wx0] = longitudinal_weight(t, load, slip_ratio, slip_tangent);
     let [wy, wy0] = lateral_weight(t, load, slip_ratio, slip_tangent);
     let (fx, fy) = (pure_x.curve, pure_y.curve);
@@ -188,7 +170,16 @@ fn combined_slip<R: Real>(t: &MagicFormula<R>, input: TyreInput<R>) -> TyreForce
     let residual_x = slip_tangent + residual_shift;
     let [trail_tangent, residual_tangent] = R::tan_each([trail_x, residual_x]);
     let trail_b = (t.bt1 + dfz * (t.bt2 + t.bt3 * dfz)) * (t.bt_even + t.bt_odd * side);
-    let [afx, afy, awx, awx0, awy, awy0, trail_angle, induced_angle] = R::atan_each([
+    let [
+        fx_atan,
+        fy_atan,
+        wx_atan,
+        wx0_atan,
+        wy_atan,
+        wy0_atan,
+        trail_angle,
+        induced_angle,
+    ] = R::atan_each([
         fx.bx(),
         fy.bx(),
         wx.bx(),
@@ -198,15 +189,15 @@ fn combined_slip<R: Real>(t: &MagicFormula<R>, input: TyreInput<R>) -> TyreForce
         trail_b * t.bct * trail_x,
         t.rvy6 * slip_ratio,
     ]);
-    let [trail_slip, residual_slip, awx, awx0, awy, awy0] = R::atan_each([
+    let [trail_slip, residual_slip, wx_atan, wx0_atan, wy_atan, wy0_atan] = R::atan_each([
         equivalent_tangent(trail_x, trail_tangent, slip_share),
         equivalent_tangent(residual_x, residual_tangent, slip_share),
-        wx.stretched(awx),
-        wx0.stretched(awx0),
-        wy.stretched(awy),
-        wy0.stretched(awy0),
+        wx.stretched(wx_atan),
+        wx0.stretched(wx0_atan),
+        wy.stretched(wy_atan),
+        wy0.stretched(wy0_atan),
     ]);
-    let ft = Curve {
+    let m = Curve {
         c: t.ct,
         b: trail_b,
         e: clamp_curvature(
@@ -214,19 +205,21 @@ fn combined_slip<R: Real>(t: &MagicFormula<R>, input: TyreInput<R>) -> TyreForce
         ),
         x: trail_slip,
     };
-    let [aft, afx, afy] = R::atan_each([ft.bx(), fx.stretched(afx), fy.stretched(afy)]);
-    let [xn, xd, yn, yd] = R::cos_pi_each([wx.c * awx, wx0.c * awx0, wy.c * awy, wy0.c * awy0]);
-    let aft = ft.stretched(aft).atan();
-    let [sin_x, sin_y, sin_induced] = R::sin_pi_each([fx.c * afx, fy.c * afy, t.rvy5 * induced_angle]);
-    let cos_trail = (ft.c * aft).cos_pi();
+    let [m_atan, fx_atan, fy_atan] = R::atan_each([m.bx(), fx.stretched(fx_atan), fy.stretched(fy_atan)]);
+    let [cos_wx, cos_wx0, cos_wy, cos_wy0] =
+        R::cos_pi_each([wx.c * wx_atan, wx0.c * wx0_atan, wy.c * wy_atan, wy0.c * wy0_atan]);
+    let m_atan = m.stretched(m_atan).atan();
+    let [sin_x, sin_y, sin_induced] =
+        R::sin_pi_each([fx.c * fx_atan, fy.c * fy_atan, t.rvy5 * induced_angle]);
+    let cos_m = (m.c * m_atan).cos_pi();
 
-    let x = (pure_x.peak * sin_x + pure_x.vertical_shift) * (xn / xd);
+    let x = (pure_x.peak * sin_x + pure_x.vertical_shift) * (cos_wx / cos_wx0);
     let amplitude = pure_y.peak * (t.rvy1 + t.rvy2 * dfz + t.rvy_camber * side);
     let induced = amplitude / (t.rvy4 * slip_tangent).sec_atan() * sin_induced;
-    let y = (pure_y.peak * sin_y + pure_y.vertical_shift) * (yn / yd) + induced;
+    let y = (pure_y.peak * sin_y + pure_y.vertical_shift) * (cos_wy / cos_wy0) + induced;
 
     let d = load.force * (t.dt1 + t.dt2 * dfz) * (t.dt_even + t.dt_odd * side);
-    let trail = d * cos_trail / slip_tangent.sec_atan();
+    let trail = d * cos_m / slip_tangent.sec_atan();
     let residual_slope = t.br1 + t.br2 * slope;
     // The cosine of `a* = tan(alpha)` itself, unlike that of the trail: the reference implementation has it so.
     let residual_peak =

@@ -34,9 +34,9 @@ pub struct TyreInput<R> {
 }
 
 impl<R: Real> TyreInput<R> {
-    /// A tyre that feels nothing.
+    /// Nought throughout.
     #[inline(always)]
-    pub fn unloaded() -> Self {
+    pub fn nought() -> Self {
         let zero = R::lit(0.0);
         Self {
             load: zero,
