@@ -14,13 +14,22 @@ fn is_finite(x: f32) -> bool {
     return (bitcast<u32>(x) & 0x7f800000u) != 0x7f800000u;
 }
 
-// `cos(atan x)`, and -1 below zero, else +1: twins of the provided methods of `Real` in `src/scalar/mod.rs`.
+// -1 below zero, else +1, and `1 / cos(atan x)`: twins of the provided methods of `Real` in `src/scalar/mod.rs`.
 fn sign_of(x: Wheels) -> Wheels {
     return select(Wheels(1.0), Wheels(-1.0), x < Wheels(0.0));
 }
 
-fn cos_atan(x: Wheels) -> Wheels {
-    return 1.0 / sqrt(1.0 + x * x);
+fn sec_atan(x: Wheels) -> Wheels {
+    return sqrt(1.0 + x * x);
+}
+
+fn negate_where_odd(x: Wheels, n: Wheels) -> Wheels {
+    return bitcast<Wheels>(bitcast<vec4<u32>>(x) ^ (vec4<u32>(vec4<i32>(n)) << vec4<u32>(31u)));
+}
+
+fn with_sign_of(x: Wheels, other: Wheels) -> Wheels {
+    let sign = bitcast<vec4<u32>>(other) & vec4<u32>(0x80000000u);
+    return bitcast<Wheels>((bitcast<vec4<u32>>(x) & vec4<u32>(0x7fffffffu)) | sign);
 }
 
 fn two_to_the(n: Wheels) -> Wheels {
@@ -29,10 +38,11 @@ fn two_to_the(n: Wheels) -> Wheels {
 
 fn sine_polynomial(r: Wheels) -> Wheels {
     let t = r * r;
-    let low = -0.16666657 + 8.333025e-3 * t;
-    let high = -1.9807351e-4 + 2.6017497e-6 * t;
-    let p = low + high * (t * t);
-    return r + r * t * p;
+    var p = Wheels(2.6060957e-6);
+    p = p * t + -1.9809777e-4;
+    p = p * t + 8.333069e-3;
+    p = p * t + -0.1666666;
+    return r + r * (p * t);
 }
 
 fn cosine_polynomial(r: Wheels) -> Wheels {
@@ -45,51 +55,66 @@ fn cosine_polynomial(r: Wheels) -> Wheels {
     return 1.0 + t * p;
 }
 
+fn sine_pi_polynomial(r: Wheels) -> Wheels {
+    let t = r * r;
+    var p = Wheels(7.9835765e-2);
+    p = p * t + -0.59943736;
+    p = p * t + 2.5502698;
+    p = p * t + -5.167721;
+    p = p * t + 3.141592653589793;
+    return r * p;
+}
+
 fn reduce(x: Wheels, half_turns: Wheels) -> Wheels {
     return (x - half_turns * 3.140625) - half_turns * 9.676535897932385e-4;
 }
 
-fn parity_sign(n: Wheels) -> Wheels {
-    let half = n * 0.5;
-    return 1.0 - (half - floor(half)) * 4.0;
-}
-
 fn own_sin(x: Wheels) -> Wheels {
-    let n = floor(x * 0.3183098861837907 + 0.5);
-    return parity_sign(n) * sine_polynomial(reduce(x, n));
+    let n = round(x * 0.3183098861837907);
+    return negate_where_odd(sine_polynomial(reduce(x, n)), n);
 }
 
 fn own_cos(x: Wheels) -> Wheels {
-    let n = floor(x * 0.3183098861837907);
-    return -(parity_sign(n) * sine_polynomial(reduce(x, n + 0.5)));
+    let n = round(x * 0.3183098861837907 - 0.5);
+    return negate_where_odd(sine_polynomial(-reduce(x, n + 0.5)), n);
 }
 
 fn own_tan(x: Wheels) -> Wheels {
-    let n = floor(x * 0.3183098861837907 + 0.5);
+    let n = round(x * 0.3183098861837907);
     let r = reduce(x, n);
     return sine_polynomial(r) / cosine_polynomial(r);
 }
 
+fn own_sin_pi(x: Wheels) -> Wheels {
+    let n = round(x);
+    return negate_where_odd(sine_pi_polynomial(x - n), n);
+}
+
+fn own_cos_pi(x: Wheels) -> Wheels {
+    let n = round(x - 0.5);
+    return negate_where_odd(sine_pi_polynomial((n + 0.5) - x), n);
+}
+
 fn own_atan(x: Wheels) -> Wheels {
-    let size = abs(x);
-    let large = Wheels(1.0) < size;
-    let q = select(size, Wheels(1.0), large) / select(Wheels(1.0), size, large);
+    let large = Wheels(1.0) < abs(x);
+    let q = select(x, 1.0 / x, large);
     let t = q * q;
-    let t2 = t * t;
-    let t4 = t2 * t2;
-    let p01 = -0.33333072 + 0.1999262 * t;
-    let p23 = -0.14203644 + 0.10640934 * t;
-    let p45 = -7.504295e-2 + 4.2691525e-2 * t;
-    let p67 = -1.6068634e-2 + 2.8498906e-3 * t;
-    let p = (p01 + p23 * t2) + (p45 + p67 * t2) * t4;
-    let angle = q + q * t * p;
-    let folded = select(angle, 1.5707963267948966 - angle, large);
-    return select(folded, -folded, x < Wheels(0.0));
+    var p = Wheels(2.9168893e-3);
+    p = p * t + -1.6358716e-2;
+    p = p * t + 4.320277e-2;
+    p = p * t + -7.5516604e-2;
+    p = p * t + 0.10665769;
+    p = p * t + -0.14211002;
+    p = p * t + 0.19993767;
+    p = p * t + -0.33333153;
+    let angle = q * (p * t + 1.0);
+    let quarter = with_sign_of(Wheels(1.5707963267948966), x);
+    return select(angle, quarter - angle, large);
 }
 
 fn own_exp(argument: Wheels) -> Wheels {
     let x = min(max(argument, Wheels(-87.0)), Wheels(88.0));
-    let n = floor(x * 1.4426950408889634 + 0.5);
+    let n = round(x * 1.4426950408889634);
     let r = (x - n * 0.693359375) - n * -2.1219444e-4;
     var p = Wheels(1.3836839e-3);
     p = p * r + 8.374822e-3;

@@ -56,6 +56,7 @@ struct MagicFormula {
     rvy5: Wheels,
     rvy6: Wheels,
     ct: Wheels,
+    bct: Wheels,
     bt1: Wheels,
     bt2: Wheels,
     bt3: Wheels,
@@ -91,21 +92,17 @@ alias Tyre = MagicFormula;
 // `LEAST_LOAD` in `src/vehicle/tyre/mod.rs`.
 const LEAST_LOAD: f32 = 1e-3;
 
-fn stretched_slip(b: Wheels, e: Wheels, x: Wheels) -> Wheels {
-    let bx = b * x;
-    return bx - e * (bx - own_atan(bx));
+// The angle `C atan(B x - E (B x - atan(B x)))`, in half turns, of which a curve is the sine or the cosine.
+struct Curve {
+    c: Wheels,
+    b: Wheels,
+    e: Wheels,
+    x: Wheels,
 }
 
-fn sine_shape(c: Wheels, b: Wheels, e: Wheels, x: Wheels) -> Wheels {
-    return own_sin(c * own_atan(stretched_slip(b, e, x)));
-}
-
-fn cosine_shape(c: Wheels, b: Wheels, e: Wheels, x: Wheels) -> Wheels {
-    return own_cos(c * own_atan(stretched_slip(b, e, x)));
-}
-
-fn weight(c: Wheels, b: Wheels, e: Wheels, x: Wheels, shift: Wheels) -> Wheels {
-    return cosine_shape(c, b, e, x) / cosine_shape(c, b, e, shift);
+fn curve_angle(curve: Curve) -> Wheels {
+    let bx = curve.b * curve.x;
+    return curve.c * own_atan(bx - curve.e * (bx - own_atan(bx)));
 }
 
 fn clamp_curvature(e: Wheels) -> Wheels {
@@ -117,26 +114,29 @@ struct Load {
     difference: Wheels,
 }
 
-struct PureLongitudinal {
-    force: Wheels,
+struct PureSlip {
+    curve: Curve,
+    peak: Wheels,
+    vertical_shift: Wheels,
     stiffness: Wheels,
 }
 
-fn pure_longitudinal(t: MagicFormula, load: Load, slip_ratio: Wheels) -> PureLongitudinal {
+fn pure_longitudinal(t: MagicFormula, load: Load, slip_ratio: Wheels) -> PureSlip {
     let dfz = load.difference;
     let mu = t.dx1 + t.dx2 * dfz;
     let k = (t.kx1 + t.kx2 * dfz) * own_exp(t.kx3 * dfz);
-    let b = k * t.inverse_cx / mu;
     let x = slip_ratio + (t.hx1 + t.hx2 * dfz);
     let e = clamp_curvature((t.ex1 + dfz * (t.ex2 + t.ex3 * dfz)) * (1.0 - t.ex4 * sign_of(x)));
-    let force = load.force * (mu * sine_shape(t.cx, b, e, x) + (t.vx1 + t.vx2 * dfz));
-    return PureLongitudinal(force, load.force * k);
+    return PureSlip(
+        Curve(t.cx, k * t.inverse_cx / mu, e, x),
+        load.force * mu,
+        load.force * (t.vx1 + t.vx2 * dfz),
+        load.force * k,
+    );
 }
 
 struct PureLateral {
-    force: Wheels,
-    peak: Wheels,
-    stiffness: Wheels,
+    pure_slip: PureSlip,
     slope: Wheels,
     residual_shift: Wheels,
 }
@@ -152,89 +152,75 @@ fn pure_lateral(t: MagicFormula, load: Load, slip_tangent: Wheels, side: Wheels)
     let x = slip_tangent + horizontal_shift;
     let e = clamp_curvature((t.ey1 + t.ey2 * dfz) * (1.0 - (t.ey3 + t.ey_camber * side) * sign_of(x)));
     return PureLateral(
-        peak * sine_shape(t.cy, slope * t.inverse_cy, e, x) + vertical_shift,
-        peak,
-        stiffness,
+        PureSlip(Curve(t.cy, slope * t.inverse_cy, e, x), peak, vertical_shift, stiffness),
         slope,
         horizontal_shift + vertical_shift / stiffness,
     );
 }
 
+fn weight(curve: Curve, shift: Wheels) -> Wheels {
+    let at_shift = Curve(curve.c, curve.b, curve.e, shift);
+    return own_cos_pi(curve_angle(curve)) / own_cos_pi(curve_angle(at_shift));
+}
+
 fn longitudinal_weight(t: MagicFormula, load: Load, slip_ratio: Wheels, slip_tangent: Wheels) -> Wheels {
-    let b = t.rbx1 * cos_atan(t.rbx2 * slip_ratio);
+    let b = t.rbx1 / sec_atan(t.rbx2 * slip_ratio);
     let e = clamp_curvature(t.rex1 + t.rex2 * load.difference);
-    return weight(t.rcx1, b, e, slip_tangent + t.rhx1, t.rhx1);
+    return weight(Curve(t.rcx1, b, e, slip_tangent + t.rhx1), t.rhx1);
 }
 
 fn lateral_weight(t: MagicFormula, load: Load, slip_ratio: Wheels, slip_tangent: Wheels) -> Wheels {
-    let b = t.rby1 * cos_atan(t.rby2 * (slip_tangent - t.rby3));
+    let b = t.rby1 / sec_atan(t.rby2 * (slip_tangent - t.rby3));
     let e = clamp_curvature(t.rey1 + t.rey2 * load.difference);
     let shift = t.rhy1 + t.rhy2 * load.difference;
-    return weight(t.rcy1, b, e, slip_ratio + shift, shift);
+    return weight(Curve(t.rcy1, b, e, slip_ratio + shift), shift);
 }
 
-fn induced_lateral(
-    t: MagicFormula,
-    load: Load,
-    peak: Wheels,
-    slip_ratio: Wheels,
-    slip_tangent: Wheels,
-    side: Wheels,
-) -> Wheels {
-    let amplitude = peak * (t.rvy1 + t.rvy2 * load.difference + t.rvy_camber * side);
-    return amplitude * cos_atan(t.rvy4 * slip_tangent) * own_sin(t.rvy5 * own_atan(t.rvy6 * slip_ratio));
-}
-
-fn equivalent_tangent(x: Wheels, slip_share: Wheels) -> Wheels {
-    let tangent = own_tan(x);
+fn equivalent_tangent(x: Wheels, tangent: Wheels, slip_share: Wheels) -> Wheels {
     return sqrt(tangent * tangent + slip_share * slip_share) * sign_of(x);
 }
 
-fn aligning_moment(
-    t: MagicFormula,
-    load: Load,
-    input: TyreInput,
-    lateral: PureLateral,
-    longitudinal_stiffness: Wheels,
-    force_x: Wheels,
-    force_y: Wheels,
-    induced: Wheels,
-) -> Wheels {
-    let dfz = load.difference;
-    let side = input.side;
-    let slip_share = longitudinal_stiffness / lateral.stiffness * input.slip_ratio;
-
-    let x = input.slip_tangent + (t.ht1 + t.ht2 * dfz + (t.ht_camber1 + t.ht_camber2 * dfz) * side);
-    let b = (t.bt1 + dfz * (t.bt2 + t.bt3 * dfz)) * (t.bt_even + t.bt_odd * side);
-    let d = load.force * (t.dt1 + t.dt2 * dfz) * (t.dt_even + t.dt_odd * side);
-    let e = clamp_curvature(
-        (t.et1 + dfz * (t.et2 + t.et3 * dfz)) * (1.0 + (t.et4 + t.et_camber * side) * own_atan(b * t.ct * x)),
-    );
-    let trail = d
-        * cosine_shape(t.ct, b, e, own_atan(equivalent_tangent(x, slip_share)))
-        * cos_atan(input.slip_tangent);
-
-    let residual_slip = input.slip_tangent + lateral.residual_shift;
-    let residual_slope = t.br1 + t.br2 * lateral.slope;
-    let residual_peak = load.force
-        * (t.dr1 + t.dr2 * dfz + (t.dr_camber1 + t.dr_camber2 * dfz) * side)
-        * own_cos(input.slip_tangent);
-    let residual =
-        residual_peak * cos_atan(residual_slope * own_atan(equivalent_tangent(residual_slip, slip_share)));
-
-    let arm = t.s1 + t.s2 * force_y + (t.s_camber1 + t.s_camber2 * dfz) * side;
-    return residual - trail * (force_y - induced) + arm * force_x;
-}
-
+// `combined_slip`. The twin works out the functions of all curves in rounds, several side by side; here the four
+// wheels are side by side already, and each curve is one call.
 fn tyre_forces(t: MagicFormula, input: TyreInput) -> TyreForces {
     let force = max(input.load, Wheels(LEAST_LOAD));
     let load = Load(force, force * t.inverse_nominal - 1.0);
-    let pure_x = pure_longitudinal(t, load, input.slip_ratio);
-    let lateral = pure_lateral(t, load, input.slip_tangent, input.side);
-    let x = pure_x.force * longitudinal_weight(t, load, input.slip_ratio, input.slip_tangent);
-    let induced = induced_lateral(t, load, lateral.peak, input.slip_ratio, input.slip_tangent, input.side);
-    let y = lateral.force * lateral_weight(t, load, input.slip_ratio, input.slip_tangent) + induced;
-    let moment = aligning_moment(t, load, input, lateral, pure_x.stiffness, x, y, induced);
+    let dfz = load.difference;
+    let side = input.side;
+    let slip_ratio = input.slip_ratio;
+    let slip_tangent = input.slip_tangent;
+    let pure_x = pure_longitudinal(t, load, slip_ratio);
+    let lateral = pure_lateral(t, load, slip_tangent, side);
+    let pure_y = lateral.pure_slip;
+
+    let x = (pure_x.peak * own_sin_pi(curve_angle(pure_x.curve)) + pure_x.vertical_shift)
+        * longitudinal_weight(t, load, slip_ratio, slip_tangent);
+    let amplitude = pure_y.peak * (t.rvy1 + t.rvy2 * dfz + t.rvy_camber * side);
+    let induced = amplitude / sec_atan(t.rvy4 * slip_tangent) * own_sin_pi(t.rvy5 * own_atan(t.rvy6 * slip_ratio));
+    let y = (pure_y.peak * own_sin_pi(curve_angle(pure_y.curve)) + pure_y.vertical_shift)
+        * lateral_weight(t, load, slip_ratio, slip_tangent)
+        + induced;
+
+    let slip_share = pure_x.stiffness / pure_y.stiffness * slip_ratio;
+    let trail_x = slip_tangent + (t.ht1 + t.ht2 * dfz + (t.ht_camber1 + t.ht_camber2 * dfz) * side);
+    let residual_x = slip_tangent + lateral.residual_shift;
+    let trail_b = (t.bt1 + dfz * (t.bt2 + t.bt3 * dfz)) * (t.bt_even + t.bt_odd * side);
+    let trail_angle = own_atan(trail_b * t.bct * trail_x);
+    let trail_slip = own_atan(equivalent_tangent(trail_x, own_tan(trail_x), slip_share));
+    let residual_slip = own_atan(equivalent_tangent(residual_x, own_tan(residual_x), slip_share));
+    let trail_e = clamp_curvature(
+        (t.et1 + dfz * (t.et2 + t.et3 * dfz)) * (1.0 + (t.et4 + t.et_camber * side) * trail_angle),
+    );
+    let cos_m = own_cos_pi(curve_angle(Curve(t.ct, trail_b, trail_e, trail_slip)));
+    let d = load.force * (t.dt1 + t.dt2 * dfz) * (t.dt_even + t.dt_odd * side);
+    let trail = d * cos_m / sec_atan(slip_tangent);
+    let residual_slope = t.br1 + t.br2 * lateral.slope;
+    let residual_peak = load.force
+        * (t.dr1 + t.dr2 * dfz + (t.dr_camber1 + t.dr_camber2 * dfz) * side)
+        * own_cos(slip_tangent);
+    let residual = residual_peak / sec_atan(residual_slope * residual_slip);
+    let arm = t.s1 + t.s2 * y + (t.s_camber1 + t.s_camber2 * dfz) * side;
+    let moment = residual - trail * (y - induced) + arm * x;
 
     let zero = Wheels(0.0);
     let loaded = zero < input.load;

@@ -58,7 +58,7 @@ impl Random {
     /// A normal deviate of mean nought and variance one (Box and Muller, 1958).
     pub fn normal(self, purpose: u32, when: u32, who: u32, index: u32) -> f64 {
         let words = self.words(purpose, when, who, index / 2);
-        let (a, b) = if index % 2 == 0 {
+        let (a, b) = if index.is_multiple_of(2) {
             (words[0], words[1])
         } else {
             (words[2], words[3])

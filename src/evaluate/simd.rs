@@ -1,6 +1,6 @@
 //! Choice of instruction set at run time: the one place where lane types meet the processor.
 
-use crate::scalar::lanes::{Lanes, Portable};
+use crate::scalar::lanes::{Baseline, Lanes};
 
 /// Instruction sets that lanes can run on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -9,7 +9,7 @@ pub enum InstructionSet {
     Avx512,
     /// 256-bit registers, 8 lanes.
     Avx2,
-    /// Whatever the target always has, 8 lanes.
+    /// Whatever every processor of the target has.
     Portable,
 }
 
@@ -38,9 +38,9 @@ impl InstructionSet {
     /// Lanes of one pack.
     pub fn lanes(self) -> usize {
         match self {
-            Self::Avx512 => 32,
-            Self::Avx2 => 16,
-            Self::Portable => 8,
+            Self::Avx512 => 16,
+            Self::Avx2 => 8,
+            Self::Portable => Baseline::LANES,
         }
     }
 
@@ -79,11 +79,11 @@ pub fn dispatch<W: LaneWork>(set: InstructionSet, work: W) -> W::Output {
 
         #[target_feature(enable = "avx512f,avx512dq")]
         fn run_avx512<W: LaneWork>(work: W) -> W::Output {
-            work.run::<crate::scalar::Pair<Avx512>>()
+            work.run::<Avx512>()
         }
         #[target_feature(enable = "avx2")]
         fn run_avx2<W: LaneWork>(work: W) -> W::Output {
-            work.run::<crate::scalar::Pair<Avx2>>()
+            work.run::<Avx2>()
         }
         if set == InstructionSet::Avx512 && has_avx512() {
             // SAFETY: the processor has the set, as just detected.
@@ -94,5 +94,82 @@ pub fn dispatch<W: LaneWork>(set: InstructionSet, work: W) -> W::Output {
             return unsafe { run_avx2(work) };
         }
     }
-    work.run::<Portable>()
+    work.run::<Baseline>()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scalar::Real;
+    use crate::scalar::lanes::Portable;
+
+    /// What [`functions`] yields.
+    const FUNCTIONS: usize = 14;
+
+    /// Every elementary function, alone and in lockstep, and every operation that lane types write themselves.
+    #[inline(always)]
+    fn functions<R: Real>(x: R, y: R) -> [R; FUNCTIONS] {
+        let [both, _] = R::atan_each([x * y, y]);
+        let [tan, _, _] = R::tan_each([x, y, x - y]);
+        [
+            x.sin(),
+            x.cos(),
+            tan,
+            x.atan(),
+            x.exp(),
+            x.sin_pi(),
+            x.cos_pi(),
+            both,
+            x.abs().sqrt() / y,
+            x.min(y) - x.max(-y),
+            x.sign(),
+            R::select(x.less_than(y), x, y),
+            R::select(!(x.less_than(y) & y.less_than(x)), x, y),
+            R::select(x.less_than(y) | R::splat_mask(false), x, y),
+        ]
+    }
+
+    /// The figures of each lane, the lanes filled from `argument`.
+    struct Sampled;
+
+    fn argument(lane: usize, which: usize) -> f32 {
+        (lane as f32 - 7.3) * if which == 0 { 1.9 } else { 0.37 }
+    }
+
+    impl LaneWork for Sampled {
+        type Output = Vec<[f32; 16]>;
+
+        #[inline(always)]
+        fn run<L: Lanes>(self) -> Self::Output {
+            let mut out = vec![[0.0; 16]; FUNCTIONS];
+            for start in (0..16).step_by(L::LANES) {
+                let x = L::from_fn(|lane| argument(start + lane, 0));
+                let y = L::from_fn(|lane| argument(start + lane, 1));
+                for (out, lanes) in out.iter_mut().zip(functions(x, y)) {
+                    lanes.write(&mut out[start..]);
+                }
+            }
+            out
+        }
+    }
+
+    #[test]
+    fn every_instruction_set_computes_what_one_float_does() {
+        let packs = InstructionSet::available()
+            .into_iter()
+            .map(|set| dispatch(set, Sampled))
+            .chain([Sampled.run::<Portable>()]);
+        for pack in packs {
+            for lane in 0..16 {
+                let alone = functions(argument(lane, 0), argument(lane, 1));
+                for (number, (lanes, alone)) in pack.iter().zip(alone).enumerate() {
+                    assert_eq!(
+                        lanes[lane].to_bits(),
+                        alone.to_bits(),
+                        "function {number}, lane {lane}"
+                    );
+                }
+            }
+        }
+    }
 }

@@ -161,6 +161,14 @@ impl<const N: usize> Real for Dual<N> {
         self.chain(value, value)
     }
     #[inline(always)]
+    fn sin_pi(self) -> Self {
+        (Self::constant(std::f64::consts::PI) * self).sin()
+    }
+    #[inline(always)]
+    fn cos_pi(self) -> Self {
+        (Self::constant(std::f64::consts::PI) * self).cos()
+    }
+    #[inline(always)]
     fn less_than(self, other: Self) -> bool {
         self.value < other.value
     }
@@ -180,7 +188,7 @@ mod tests {
 
     fn composite<R: Real>(x: R, y: R) -> R {
         let ratio = (x * y + x.exp()) / (R::lit(2.0) + y.abs().sqrt());
-        ratio.atan().sin() + (x - y).cos() * x.min(y).cos_atan() - y.max(x)
+        ratio.atan().sin() + (x - y).cos() / x.min(y).sec_atan() - y.max(x)
     }
 
     #[test]

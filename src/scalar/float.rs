@@ -74,20 +74,43 @@ impl Real for f64 {
     fn exp(self) -> Self {
         self.exp()
     }
+    #[inline(always)]
+    fn sin_pi(self) -> Self {
+        (std::f64::consts::PI * self).sin()
+    }
+    #[inline(always)]
+    fn cos_pi(self) -> Self {
+        (std::f64::consts::PI * self).cos()
+    }
 }
 
 impl Real for f32 {
     plain_arithmetic!(f32);
     elementary::single_precision_functions!();
+    elementary::lockstep_functions!();
 }
+
+/// 1.5 * 2^23: added to a whole number below 2^22 it leaves that number in the low bits of the mantissa, and
+/// added to any number of that size it rounds it to a whole one. Baselines without instructions for that would
+/// call a library instead.
+const WHOLE: f32 = 12_582_912.0;
 
 impl SinglePrecision for f32 {
     #[inline(always)]
-    fn floor(self) -> Self {
-        self.floor()
+    fn round(self) -> Self {
+        (self + WHOLE) - WHOLE
+    }
+    #[inline(always)]
+    fn negate_where_odd(self, n: Self) -> Self {
+        f32::from_bits(self.to_bits() ^ ((n + WHOLE).to_bits() << 31))
+    }
+    #[inline(always)]
+    fn with_sign_of(self, other: Self) -> Self {
+        self.copysign(other)
     }
     #[inline(always)]
     fn two_to_the(self) -> Self {
-        f32::from_bits((((self as i32) + 127) << 23) as u32)
+        // The exponent's bias added; the shift then leaves only exponent bits.
+        f32::from_bits((self + (WHOLE + 127.0)).to_bits() << 23)
     }
 }

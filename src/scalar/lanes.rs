@@ -1,10 +1,10 @@
 //! Packs of `f32` lanes: one candidate car per lane.
 //!
-//! [`Avx512`] and [`Avx2`] wrap the vector registers; [`Portable`] is a plain array that the compiler
-//! vectorises for the target's baseline (SSE2, NEON). All round alike: the operations are IEEE and the
-//! elementary functions are the shared ones, so a candidate's cost does not depend on the instruction set.
+//! [`Avx512`], [`Avx2`] and [`Sse2`] wrap the vector registers; [`Portable`] is a plain array for processors that
+//! have none of them. All round alike: the operations are IEEE and the elementary functions are the shared ones, so
+//! a candidate's cost does not depend on the instruction set.
 //!
-//! The register types are only sound to use inside a function that enables their instruction set, after that
+//! The wider register types are only sound to use inside a function that enables their instruction set, after that
 //! set was detected: [`crate::evaluate::simd`] is the one place that does so.
 
 use super::Real;
@@ -113,6 +113,7 @@ impl Real for Portable {
         Self(std::array::from_fn(|i| Real::max(self.0[i], other.0[i])))
     }
     elementary::single_precision_functions!();
+    elementary::lockstep_functions!();
     #[inline(always)]
     fn less_than(self, other: Self) -> PortableMask {
         PortableMask(std::array::from_fn(|i| self.0[i] < other.0[i]))
@@ -130,15 +131,17 @@ impl Real for Portable {
 }
 
 impl SinglePrecision for Portable {
-    /// By way of whole numbers, because a baseline without a rounding instruction calls a library per lane.
     #[inline(always)]
-    fn floor(self) -> Self {
-        Self(self.0.map(|x| {
-            let truncated = x as i32 as f32;
-            let floor = truncated - if truncated > x { 1.0 } else { 0.0 };
-            // From 2^23 on every float is whole.
-            if x.abs() < 8_388_608.0 { floor } else { x }
-        }))
+    fn round(self) -> Self {
+        Self(self.0.map(SinglePrecision::round))
+    }
+    #[inline(always)]
+    fn negate_where_odd(self, n: Self) -> Self {
+        Self(std::array::from_fn(|i| self.0[i].negate_where_odd(n.0[i])))
+    }
+    #[inline(always)]
+    fn with_sign_of(self, other: Self) -> Self {
+        Self(std::array::from_fn(|i| self.0[i].with_sign_of(other.0[i])))
     }
     #[inline(always)]
     fn two_to_the(self) -> Self {
@@ -164,26 +167,64 @@ impl Lanes for Portable {
 }
 
 #[cfg(target_arch = "x86_64")]
-pub use x86::{Avx2, Avx512};
+pub use x86::{Avx2, Avx512, Sse2};
+
+/// What every processor of the target has.
+#[cfg(target_arch = "x86_64")]
+pub type Baseline = Sse2;
+/// What every processor of the target has.
+#[cfg(not(target_arch = "x86_64"))]
+pub type Baseline = Portable;
 
 #[cfg(target_arch = "x86_64")]
 mod x86 {
     //! Safety of every block here: the intrinsics only need their instruction set to be present. These types
     //! come to life only inside `#[target_feature]` functions that `evaluate::simd` calls after detecting the
-    //! set. Memory is only touched through arrays of exactly the register's size.
+    //! set, but for `Sse2`, which every x86-64 processor has. Memory is only touched through arrays of exactly the register's size.
 
     // Some mask operations of some sets are plain integer arithmetic, in which `unsafe` says nothing.
     #![allow(unused_unsafe)]
 
     use super::*;
+    use std::arch::asm;
     use std::arch::x86_64::*;
+
+    /// An empty instruction that reads and writes both.
+    #[inline]
+    #[target_feature(enable = "avx512f")]
+    fn tie_512(mut a: __m512, mut b: __m512) -> (__m512, __m512) {
+        unsafe {
+            asm!("/* {0} {1} */", inout(zmm_reg) a, inout(zmm_reg) b, options(pure, nomem, nostack, preserves_flags))
+        };
+        (a, b)
+    }
+
+    /// The like for narrower registers.
+    #[inline]
+    #[target_feature(enable = "avx2")]
+    fn tie_256(mut a: __m256, mut b: __m256) -> (__m256, __m256) {
+        unsafe {
+            asm!("/* {0} {1} */", inout(ymm_reg) a, inout(ymm_reg) b, options(pure, nomem, nostack, preserves_flags))
+        };
+        (a, b)
+    }
+
+    /// The like for the narrowest.
+    #[inline]
+    #[target_feature(enable = "sse2")]
+    fn tie_128(mut a: __m128, mut b: __m128) -> (__m128, __m128) {
+        unsafe {
+            asm!("/* {0} {1} */", inout(xmm_reg) a, inout(xmm_reg) b, options(pure, nomem, nostack, preserves_flags))
+        };
+        (a, b)
+    }
 
     macro_rules! register_lanes {
         (
             $(#[$doc:meta])* $name:ident($register:ty) x $lanes:literal, $mask_name:ident($mask:ty),
             set1 $set1:ident, add $add:ident, sub $sub:ident, mul $mul:ident, div $div:ident,
             sqrt $sqrt:ident, min $min:ident, max $max:ident,
-            less $less:expr, select $select:expr, abs $abs:expr, neg $neg:expr, floor $floor:expr, pow $pow:expr,
+            less $less:expr, select $select:expr, abs $abs:expr, neg $neg:expr, round $round:expr, odd $odd:expr, sign $sign:expr, pow $pow:expr, tie $tie:ident,
             and $and:expr, or $or:expr, not $not:expr, all $all:expr, bits $bits:expr
         ) => {
             $(#[$doc])*
@@ -286,6 +327,7 @@ mod x86 {
                     unsafe { Self($max(self.0, other.0)) }
                 }
                 elementary::single_precision_functions!();
+                elementary::lockstep_functions!();
                 #[inline(always)]
                 fn less_than(self, other: Self) -> $mask_name {
                     unsafe { $mask_name($less(self.0, other.0)) }
@@ -302,8 +344,21 @@ mod x86 {
 
             impl SinglePrecision for $name {
                 #[inline(always)]
-                fn floor(self) -> Self {
-                    unsafe { Self($floor(self.0)) }
+                fn round(self) -> Self {
+                    unsafe { Self($round(self.0)) }
+                }
+                #[inline(always)]
+                fn negate_where_odd(self, n: Self) -> Self {
+                    unsafe { Self($odd(self.0, n.0)) }
+                }
+                #[inline(always)]
+                fn with_sign_of(self, other: Self) -> Self {
+                    unsafe { Self($sign(self.0, other.0)) }
+                }
+                #[inline(always)]
+                fn tie(self, other: Self) -> (Self, Self) {
+                    let (a, b) = unsafe { $tie(self.0, other.0) };
+                    (Self(a), Self(b))
                 }
                 #[inline(always)]
                 fn two_to_the(self) -> Self {
@@ -341,11 +396,14 @@ mod x86 {
         select |m, a, b| _mm512_mask_blend_ps(m, b, a),
         abs |a| _mm512_abs_ps(a),
         neg |a| _mm512_xor_ps(a, _mm512_set1_ps(-0.0)),
-        floor |a| _mm512_roundscale_ps::<{ _MM_FROUND_TO_NEG_INF | _MM_FROUND_NO_EXC }>(a),
+        round |a| _mm512_roundscale_ps::<{ _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC }>(a),
+        odd |a, n| _mm512_xor_ps(a, _mm512_castsi512_ps(_mm512_slli_epi32::<31>(_mm512_cvttps_epi32(n)))),
+        sign |a, b| _mm512_or_ps(_mm512_abs_ps(a), _mm512_and_ps(b, _mm512_set1_ps(-0.0))),
         pow |a| _mm512_castsi512_ps(_mm512_slli_epi32::<23>(_mm512_add_epi32(
             _mm512_cvttps_epi32(a),
             _mm512_set1_epi32(127)
         ))),
+        tie tie_512,
         and |a, b| a & b, or |a, b| a | b, not |a: __mmask16| !a,
         all |t: bool| if t { !0 } else { 0 },
         bits |m: __mmask16| u32::from(m)
@@ -360,14 +418,44 @@ mod x86 {
         select |m, a, b| _mm256_blendv_ps(b, a, m),
         abs |a| _mm256_andnot_ps(_mm256_set1_ps(-0.0), a),
         neg |a| _mm256_xor_ps(a, _mm256_set1_ps(-0.0)),
-        floor |a| _mm256_floor_ps(a),
+        round |a| _mm256_round_ps::<{ _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC }>(a),
+        odd |a, n| _mm256_xor_ps(a, _mm256_castsi256_ps(_mm256_slli_epi32::<31>(_mm256_cvttps_epi32(n)))),
+        sign |a, b| {
+            let sign_bit = _mm256_set1_ps(-0.0);
+            _mm256_or_ps(_mm256_andnot_ps(sign_bit, a), _mm256_and_ps(sign_bit, b))
+        },
         pow |a| _mm256_castsi256_ps(_mm256_slli_epi32::<23>(_mm256_add_epi32(
             _mm256_cvttps_epi32(a),
             _mm256_set1_epi32(127)
         ))),
+        tie tie_256,
         and |a, b| _mm256_and_ps(a, b), or |a, b| _mm256_or_ps(a, b),
         not |a| _mm256_xor_ps(a, _mm256_castsi256_ps(_mm256_set1_epi32(-1))),
         all |t: bool| _mm256_castsi256_ps(_mm256_set1_epi32(if t { -1 } else { 0 })),
         bits |m| _mm256_movemask_ps(m) as u32
+    }
+
+    register_lanes! {
+        /// Four lanes in an SSE2 register.
+        Sse2(__m128) x 4, Sse2Mask(__m128),
+        set1 _mm_set1_ps, add _mm_add_ps, sub _mm_sub_ps, mul _mm_mul_ps, div _mm_div_ps,
+        sqrt _mm_sqrt_ps, min _mm_min_ps, max _mm_max_ps,
+        less |a, b| _mm_cmplt_ps(a, b),
+        select |m, a, b| _mm_or_ps(_mm_and_ps(m, a), _mm_andnot_ps(m, b)),
+        abs |a| _mm_andnot_ps(_mm_set1_ps(-0.0), a),
+        neg |a| _mm_xor_ps(a, _mm_set1_ps(-0.0)),
+        // There is no rounding to a whole number that stays a float.
+        round |a| _mm_cvtepi32_ps(_mm_cvtps_epi32(a)),
+        odd |a, n| _mm_xor_ps(a, _mm_castsi128_ps(_mm_slli_epi32::<31>(_mm_cvttps_epi32(n)))),
+        sign |a, b| {
+            let sign_bit = _mm_set1_ps(-0.0);
+            _mm_or_ps(_mm_andnot_ps(sign_bit, a), _mm_and_ps(sign_bit, b))
+        },
+        pow |a| _mm_castsi128_ps(_mm_slli_epi32::<23>(_mm_add_epi32(_mm_cvttps_epi32(a), _mm_set1_epi32(127)))),
+        tie tie_128,
+        and |a, b| _mm_and_ps(a, b), or |a, b| _mm_or_ps(a, b),
+        not |a| _mm_xor_ps(a, _mm_castsi128_ps(_mm_set1_epi32(-1))),
+        all |t: bool| _mm_castsi128_ps(_mm_set1_epi32(if t { -1 } else { 0 })),
+        bits |m| _mm_movemask_ps(m) as u32
     }
 }

@@ -8,6 +8,7 @@ mod dual;
 pub mod elementary;
 mod float;
 pub mod lanes;
+mod lockstep;
 mod pair;
 
 pub use dual::Dual;
@@ -19,7 +20,7 @@ use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
 /// A real number, or a pack of them, that the physics can be evaluated in.
 ///
 /// Comparisons yield a [`Real::Mask`] and choices are made by [`Real::select`], never by a branch, because a
-/// pack of lanes takes both sides. Angles are in radians throughout.
+/// pack of lanes takes both sides. Angles are in radians except where a name ends in `pi`.
 pub trait Real:
     Copy
     + Debug
@@ -61,6 +62,10 @@ pub trait Real:
     fn atan(self) -> Self;
     /// Natural exponential.
     fn exp(self) -> Self;
+    /// Sine of an angle in half turns: `sin(pi self)`.
+    fn sin_pi(self) -> Self;
+    /// Cosine of an angle in half turns: `cos(pi self)`.
+    fn cos_pi(self) -> Self;
     /// Where `self < other`; false for NaN.
     fn less_than(self, other: Self) -> Self::Mask;
     /// The same truth in every lane.
@@ -74,9 +79,33 @@ pub trait Real:
         Self::select(self.less_than(Self::lit(0.0)), Self::lit(-1.0), Self::lit(1.0))
     }
 
-    /// `cos(atan self)`, by the identity `1 / sqrt(1 + x^2)` instead of two transcendentals.
+    /// The secant `1 / cos(atan self)`, by the identity `sqrt(1 + x^2)` instead of two transcendentals.
     #[inline(always)]
-    fn cos_atan(self) -> Self {
-        Self::lit(1.0) / (Self::lit(1.0) + self * self).sqrt()
+    fn sec_atan(self) -> Self {
+        (Self::lit(1.0) + self * self).sqrt()
+    }
+
+    /// Tangents of several, which lanes work out side by side.
+    #[inline(always)]
+    fn tan_each<const N: usize>(x: [Self; N]) -> [Self; N] {
+        x.map(Self::tan)
+    }
+
+    /// Inverse tangents of several, which lanes work out side by side.
+    #[inline(always)]
+    fn atan_each<const N: usize>(x: [Self; N]) -> [Self; N] {
+        x.map(Self::atan)
+    }
+
+    /// Sines, in half turns of several, which lanes work out side by side.
+    #[inline(always)]
+    fn sin_pi_each<const N: usize>(x: [Self; N]) -> [Self; N] {
+        x.map(Self::sin_pi)
+    }
+
+    /// Cosines, in half turns of several, which lanes work out side by side.
+    #[inline(always)]
+    fn cos_pi_each<const N: usize>(x: [Self; N]) -> [Self; N] {
+        x.map(Self::cos_pi)
     }
 }

@@ -1,37 +1,29 @@
-//! Two packs side by side: their instructions alternate, so that one pack's work fills the time in which the
-//! other waits for a result. Polynomials are long chains of dependent operations, and a processor looks only so
-//! far ahead for something else to do.
+//! Two scalars (or packs of lanes) as one: the wheels of an axle, whose instructions then alternate. Each wheel's are
+//! long chains of operations that wait for each other, and a processor looks only so far ahead for something else to
+//! do.
 
 use super::Real;
-use super::elementary::{self, SinglePrecision};
-use super::lanes::Lanes;
+use std::array::from_fn;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
 
-/// Two packs of lanes as one.
+/// Two scalars as one: every operation is done for both. Also the truths of both.
 #[derive(Clone, Copy, Debug)]
-pub struct Pair<L>(L, L);
+pub struct Pair<R>(pub R, pub R);
 
-/// The truths of both packs.
-#[derive(Clone, Copy, Debug)]
-pub struct PairMask<M>(M, M);
-
-macro_rules! pair_operator {
-    ($trait:ident, $method:ident) => {
-        impl<L: Lanes> $trait for Pair<L> {
+macro_rules! operators {
+    ($($trait:ident $method:ident),*) => {$(
+        impl<R: $trait<Output = R>> $trait for Pair<R> {
             type Output = Self;
             #[inline(always)]
             fn $method(self, other: Self) -> Self {
                 Self(self.0.$method(other.0), self.1.$method(other.1))
             }
         }
-    };
+    )*};
 }
-pair_operator!(Add, add);
-pair_operator!(Sub, sub);
-pair_operator!(Mul, mul);
-pair_operator!(Div, div);
+operators!(Add add, Sub sub, Mul mul, Div div, BitAnd bitand, BitOr bitor);
 
-impl<L: Lanes> Neg for Pair<L> {
+impl<R: Neg<Output = R>> Neg for Pair<R> {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
@@ -39,23 +31,7 @@ impl<L: Lanes> Neg for Pair<L> {
     }
 }
 
-impl<M: BitAnd<Output = M>> BitAnd for PairMask<M> {
-    type Output = Self;
-    #[inline(always)]
-    fn bitand(self, other: Self) -> Self {
-        Self(self.0 & other.0, self.1 & other.1)
-    }
-}
-
-impl<M: BitOr<Output = M>> BitOr for PairMask<M> {
-    type Output = Self;
-    #[inline(always)]
-    fn bitor(self, other: Self) -> Self {
-        Self(self.0 | other.0, self.1 | other.1)
-    }
-}
-
-impl<M: Not<Output = M>> Not for PairMask<M> {
+impl<R: Not<Output = R>> Not for Pair<R> {
     type Output = Self;
     #[inline(always)]
     fn not(self) -> Self {
@@ -63,21 +39,27 @@ impl<M: Not<Output = M>> Not for PairMask<M> {
     }
 }
 
-impl<L: Lanes> Real for Pair<L> {
-    type Mask = PairMask<L::Mask>;
-    type Storage = f32;
+/// Pairs of the first and the second scalars.
+#[inline(always)]
+fn join<R: Copy, const N: usize>(first: [R; N], second: [R; N]) -> [Pair<R>; N] {
+    from_fn(|i| Pair(first[i], second[i]))
+}
+
+impl<R: Real> Real for Pair<R> {
+    type Mask = Pair<R::Mask>;
+    type Storage = R::Storage;
 
     #[inline(always)]
     fn lit(x: f64) -> Self {
-        Self(L::lit(x), L::lit(x))
+        Self(R::lit(x), R::lit(x))
     }
     #[inline(always)]
-    fn load(x: f32) -> Self {
-        Self(L::load(x), L::load(x))
+    fn load(x: R::Storage) -> Self {
+        Self(R::load(x), R::load(x))
     }
     #[inline(always)]
-    fn store(x: f64) -> f32 {
-        x as f32
+    fn store(x: f64) -> R::Storage {
+        R::store(x)
     }
     #[inline(always)]
     fn sqrt(self) -> Self {
@@ -88,6 +70,38 @@ impl<L: Lanes> Real for Pair<L> {
         Self(self.0.abs(), self.1.abs())
     }
     #[inline(always)]
+    fn sin(self) -> Self {
+        Self(self.0.sin(), self.1.sin())
+    }
+    #[inline(always)]
+    fn cos(self) -> Self {
+        Self(self.0.cos(), self.1.cos())
+    }
+    #[inline(always)]
+    fn exp(self) -> Self {
+        Self(self.0.exp(), self.1.exp())
+    }
+    #[inline(always)]
+    fn tan(self) -> Self {
+        let [a, b] = R::tan_each([self.0, self.1]);
+        Self(a, b)
+    }
+    #[inline(always)]
+    fn atan(self) -> Self {
+        let [a, b] = R::atan_each([self.0, self.1]);
+        Self(a, b)
+    }
+    #[inline(always)]
+    fn sin_pi(self) -> Self {
+        let [a, b] = R::sin_pi_each([self.0, self.1]);
+        Self(a, b)
+    }
+    #[inline(always)]
+    fn cos_pi(self) -> Self {
+        let [a, b] = R::cos_pi_each([self.0, self.1]);
+        Self(a, b)
+    }
+    #[inline(always)]
     fn min(self, other: Self) -> Self {
         Self(self.0.min(other.0), self.1.min(other.1))
     }
@@ -95,49 +109,35 @@ impl<L: Lanes> Real for Pair<L> {
     fn max(self, other: Self) -> Self {
         Self(self.0.max(other.0), self.1.max(other.1))
     }
-    elementary::single_precision_functions!();
     #[inline(always)]
     fn less_than(self, other: Self) -> Self::Mask {
-        PairMask(self.0.less_than(other.0), self.1.less_than(other.1))
+        Pair(self.0.less_than(other.0), self.1.less_than(other.1))
     }
     #[inline(always)]
     fn splat_mask(truth: bool) -> Self::Mask {
-        PairMask(L::splat_mask(truth), L::splat_mask(truth))
+        Pair(R::splat_mask(truth), R::splat_mask(truth))
     }
     #[inline(always)]
     fn select(mask: Self::Mask, if_true: Self, if_false: Self) -> Self {
         Self(
-            L::select(mask.0, if_true.0, if_false.0),
-            L::select(mask.1, if_true.1, if_false.1),
+            R::select(mask.0, if_true.0, if_false.0),
+            R::select(mask.1, if_true.1, if_false.1),
         )
     }
-}
-
-impl<L: Lanes> SinglePrecision for Pair<L> {
     #[inline(always)]
-    fn floor(self) -> Self {
-        Self(self.0.floor(), self.1.floor())
+    fn tan_each<const N: usize>(x: [Self; N]) -> [Self; N] {
+        join(R::tan_each(x.map(|x| x.0)), R::tan_each(x.map(|x| x.1)))
     }
     #[inline(always)]
-    fn two_to_the(self) -> Self {
-        Self(self.0.two_to_the(), self.1.two_to_the())
-    }
-}
-
-impl<L: Lanes> Lanes for Pair<L> {
-    const LANES: usize = 2 * L::LANES;
-
-    #[inline(always)]
-    fn from_fn(mut f: impl FnMut(usize) -> f32) -> Self {
-        Self(L::from_fn(&mut f), L::from_fn(|i| f(L::LANES + i)))
+    fn atan_each<const N: usize>(x: [Self; N]) -> [Self; N] {
+        join(R::atan_each(x.map(|x| x.0)), R::atan_each(x.map(|x| x.1)))
     }
     #[inline(always)]
-    fn write(self, out: &mut [f32]) {
-        self.0.write(out);
-        self.1.write(&mut out[L::LANES..]);
+    fn sin_pi_each<const N: usize>(x: [Self; N]) -> [Self; N] {
+        join(R::sin_pi_each(x.map(|x| x.0)), R::sin_pi_each(x.map(|x| x.1)))
     }
     #[inline(always)]
-    fn mask_bits(mask: Self::Mask) -> u32 {
-        L::mask_bits(mask.0) | (L::mask_bits(mask.1) << L::LANES)
+    fn cos_pi_each<const N: usize>(x: [Self; N]) -> [Self; N] {
+        join(R::cos_pi_each(x.map(|x| x.0)), R::cos_pi_each(x.map(|x| x.1)))
     }
 }

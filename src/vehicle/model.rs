@@ -46,6 +46,9 @@ pub struct CarModel<R, T> {
     pub tyres: [T; 2],
 }
 
+/// On which side an axle's wheels are, left positive.
+const SIDES: [f64; 2] = [1.0, -1.0];
+
 /// Slip of one wheel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WheelSlip<R> {
@@ -141,27 +144,33 @@ impl<R: Real, T: Tyre<R>> CarModel<R, T> {
             y: zero,
             yaw_moment: zero,
         };
-        // One copy of the tyre's code serves all wheels, indexed rather than chosen between: the code then fits
-        // the processor's instruction cache and the coefficients stay in memory.
+        // One copy of the tyre's code serves both axles, indexed rather than chosen between: the code then fits
+        // the processor's instruction cache and the coefficients stay in memory. The loops over an axle's wheels
+        // are loops because large closures would not be compiled for the instruction set of their surroundings.
         for axle in 0..2 {
             let direction = directions[axle];
-            let tyre = &self.tyres[axle];
-            for (half, side) in [1.0, -1.0].into_iter().enumerate() {
-                let wheel = 2 * axle + half;
-                let side = R::lit(side);
-                let (x, y) = (axle_x[axle], half_track[axle] * side);
-                let rim_speed = input.wheel_speed[wheel] * radius[axle];
-                let slip = wheel_slip(body, (x, y), direction, rim_speed, chassis.slip_speed_floor);
-                let forces = tyre.forces(TyreInput {
-                    load: loads[wheel],
+            let x = axle_x[axle];
+            let mut inputs = [TyreInput::nought(); 2];
+            for half in 0..2 {
+                let side = R::lit(SIDES[half]);
+                let place = (x, half_track[axle] * side);
+                let rim_speed = input.wheel_speed[2 * axle + half] * radius[axle];
+                let slip = wheel_slip(body, place, direction, rim_speed, chassis.slip_speed_floor);
+                inputs[half] = TyreInput {
+                    load: loads[2 * axle + half],
                     slip_ratio: slip.ratio,
                     slip_tangent: slip.tangent,
                     side,
-                });
-                let (force_x, force_y) = to_body_axes(&forces, direction);
+                };
+            }
+            let forces = self.tyres[axle].axle_forces(inputs);
+            for half in 0..2 {
+                let y = half_track[axle] * R::lit(SIDES[half]);
+                let (force_x, force_y) = to_body_axes(&forces[half], direction);
                 total.x = total.x + force_x;
                 total.y = total.y + force_y;
-                total.yaw_moment = total.yaw_moment + (x * force_y - y * force_x + forces.aligning_moment);
+                total.yaw_moment =
+                    total.yaw_moment + (x * force_y - y * force_x + forces[half].aligning_moment);
             }
         }
 

@@ -93,6 +93,12 @@ macro_rules! fields {
                 Self { $($field),* }
             }
 
+            /// Every figure put through `f`.
+            #[inline(always)]
+            pub fn map<S>(&self, f: impl Fn(R) -> S) -> $name<S> {
+                $name { $($field: f(self.$field)),* }
+            }
+
             /// To the flat form.
             pub fn to_flat(&self) -> Vec<R> {
                 vec![$(self.$field),*]

@@ -20,7 +20,7 @@ struct Function {
     index: usize,
 }
 
-const FUNCTIONS: [Function; 5] = [
+const FUNCTIONS: [Function; 7] = [
     Function {
         shader: "own_sin",
         range: (-40.0, 40.0),
@@ -61,6 +61,22 @@ const FUNCTIONS: [Function; 5] = [
         floor: 1e-30,
         index: 4,
     },
+    Function {
+        shader: "own_sin_pi",
+        range: (-12.0, 12.0),
+        scalar: elementary::sin_pi,
+        reference: |x| (std::f64::consts::PI * x).sin(),
+        floor: 1e-2,
+        index: 5,
+    },
+    Function {
+        shader: "own_cos_pi",
+        range: (-12.0, 12.0),
+        scalar: elementary::cos_pi,
+        reference: |x| (std::f64::consts::PI * x).cos(),
+        floor: 1e-2,
+        index: 6,
+    },
 ];
 
 /// Half evenly through the range, half over all magnitudes down to 1e-12.
@@ -94,7 +110,9 @@ impl LaneWork for Mapped<'_> {
                 1 => x.cos(),
                 2 => x.tan(),
                 3 => x.atan(),
-                _ => x.exp(),
+                4 => x.exp(),
+                5 => x.sin_pi(),
+                _ => x.cos_pi(),
             };
             y.write(to);
         }

@@ -4,10 +4,11 @@ use crate::common::{INTERVAL_S, Lap, Random, UNKNOWNS, bundled_car, candidates, 
 use crate::device::{car_source, device};
 use lapswarm::evaluate::replay::kernel::{drive_window, score_window};
 use lapswarm::evaluate::replay::{
-    CHANNEL_NAMES, CpuEvaluator, GpuEvaluator, ModelTable, Norm, ReplayProblem, SimdEvaluator, trace,
+    CHANNEL_NAMES, CpuEvaluator, GpuEvaluator, ModelTable, Norm, Plan, ReplayProblem, SimdEvaluator, trace,
 };
 use lapswarm::evaluate::simd::InstructionSet;
 use lapswarm::evaluate::{Evaluation, Evaluator};
+use lapswarm::scalar::Real;
 use lapswarm::vehicle::tyre::Tyre;
 use lapswarm::vehicle::{CarModel, LinearTyre, MagicFormula, TyreModel};
 use std::fmt::Write as _;
@@ -29,22 +30,30 @@ const TOLERANCE: f64 = 1e-4;
 /// the speed.
 const SINGLE_SAMPLE: [f64; 4] = [4e-5, 2e-4, 2e-4, 1e-5];
 
+/// Errors of `car`, window by window; `None` if it does not drive to the end.
+fn errors<R: Real<Mask = bool, Storage = R> + Into<f64>, T: Tyre<R>>(
+    replay: &ReplayProblem,
+    plan: &Plan<R>,
+    car: &CarModel<R, T>,
+) -> Option<[f64; 4]> {
+    let mut total = [0.0; 4];
+    for window in &plan.windows {
+        let score = score_window(car, plan, window);
+        if !score.drives {
+            return None;
+        }
+        replay.accumulate(&mut total, score.errors.map(Into::into));
+    }
+    Some(total)
+}
+
 /// The `f32` scalar, window by window, as the lanes do it.
 fn scalar(replay: &ReplayProblem, population: &[f64]) -> Evaluation {
-    fn errors<T: Tyre<f32>>(replay: &ReplayProblem, figures: &[f32]) -> Option<[f64; 4]> {
-        let car = CarModel::<f32, T>::from_table(|i| figures[i]);
-        let plan = replay.plan.to_f32();
-        let mut total = [0.0; 4];
-        for window in &plan.windows {
-            let score = score_window(&car, &plan, window);
-            if !score.drives {
-                return None;
-            }
-            replay.accumulate(&mut total, score.errors.map(f64::from));
-        }
-        Some(total)
+    fn single<T: Tyre<f32>>(replay: &ReplayProblem, plan: &Plan<f32>, figures: &[f32]) -> Option<[f64; 4]> {
+        errors(replay, plan, &CarModel::<f32, T>::from_table(|i| figures[i]))
     }
     let table = ModelTable::new(replay);
+    let plan = replay.plan.to_f32();
     let mut evaluation = Evaluation::default();
     for candidate in population.chunks_exact(replay.dimensions()) {
         let failure = replay.preliminary_failure(candidate);
@@ -53,8 +62,8 @@ fn scalar(replay: &ReplayProblem, population: &[f64]) -> Evaluation {
         } else {
             let figures = figures(replay, &table, candidate);
             match replay.tyre_model() {
-                TyreModel::MagicFormula => errors::<MagicFormula<f32>>(replay, &figures),
-                TyreModel::Linear => errors::<LinearTyre<f32>>(replay, &figures),
+                TyreModel::MagicFormula => single::<MagicFormula<f32>>(replay, &plan, &figures),
+                TyreModel::Linear => single::<LinearTyre<f32>>(replay, &plan, &figures),
             }
         };
         let (row, spun) = replay.objective_row(errors);
@@ -177,24 +186,33 @@ fn report(replay: &ReplayProblem, backend: &str, candidate: &[f64]) -> String {
     }
 }
 
-/// What the reference says of cars next to `candidate`, whose parameters are up to a millionth off.
+/// What the reference says of cars next to `candidate`, all of whose parameters, free or not, are up to a millionth
+/// off.
 ///
 /// Single precision moves every figure by a sixteenth of that at the outset and the state by as much in every step.
 /// Where a millionth changes the reference's own verdict, or its cost by more than the tolerance, the car stands at
 /// the edge of a spin, and neither answer is wrong.
 fn neighbours(replay: &ReplayProblem, candidate: &[f64]) -> Evaluation {
+    fn near<T: Tyre<f64>>(replay: &ReplayProblem, flat: &[f64]) -> Option<[f64; 4]> {
+        let car = CarModel::<f64, T>::from_parameters(|i| flat[i]);
+        errors(replay, &replay.plan, &car)
+    }
     let mut random = Random(99);
-    let near: Vec<f64> = (0..32)
-        .flat_map(|_| {
-            candidate
-                .iter()
-                .map(|x| x * (1.0 + random.within(-1e-6, 1e-6)))
-                .collect::<Vec<_>>()
-        })
-        .collect();
-    CpuEvaluator::new(replay)
-        .evaluate(&near)
-        .expect("the reference runs")
+    let mut evaluation = Evaluation::default();
+    for _ in 0..32 {
+        let mut flat = replay.flat(candidate);
+        for x in &mut flat {
+            *x *= 1.0 + random.within(-1e-6, 1e-6);
+        }
+        let errors = match replay.tyre_model() {
+            TyreModel::MagicFormula => near::<MagicFormula<f64>>(replay, &flat),
+            TyreModel::Linear => near::<LinearTyre<f64>>(replay, &flat),
+        };
+        let (row, spun) = replay.objective_row(errors);
+        evaluation.objectives.extend(row);
+        evaluation.failures.push(spun);
+    }
+    evaluation
 }
 
 /// What a comparison found.

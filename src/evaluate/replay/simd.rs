@@ -13,7 +13,7 @@ use crate::vehicle::{CarModel, LinearTyre, MagicFormula, TyreModel};
 use rayon::prelude::*;
 
 /// The most lanes of any pack.
-const MOST_LANES: usize = 32;
+const MOST_LANES: usize = 16;
 
 /// Scores replays in `f32` lanes.
 pub struct SimdEvaluator<'a> {

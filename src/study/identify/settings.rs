@@ -369,7 +369,7 @@ fn lap_numbers(table: &Table<'_>, key: &str) -> Result<Vec<u32>> {
     numbers
         .iter()
         .map(|&x| {
-            if x >= 0.0 && x <= 1e6 && x.fract() == 0.0 {
+            if (0.0..=1e6).contains(&x) && x.fract() == 0.0 {
                 Ok(x as u32)
             } else {
                 Err(table.refuse(key, "a list of lap numbers"))

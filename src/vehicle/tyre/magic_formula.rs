@@ -3,31 +3,31 @@
 
 use super::prepared::MagicFormula;
 use super::{LEAST_LOAD, Tyre, TyreCoefficients, TyreForces, TyreInput, TyreModel};
-use crate::scalar::Real;
+use crate::scalar::{Pair, Real};
 
-/// `B x - E (B x - atan(B x))`, the argument of the outer `atan` of every curve.
-#[inline(always)]
-fn stretched_slip<R: Real>(b: R, e: R, x: R) -> R {
-    let bx = b * x;
-    bx - e * (bx - bx.atan())
+/// The angle `C atan(B x - E (B x - atan(B x)))`, in half turns, of which a curve is the sine or the cosine.
+#[derive(Clone, Copy)]
+struct Curve<R> {
+    /// `C / pi`.
+    c: R,
+    b: R,
+    e: R,
+    x: R,
 }
 
-/// `sin(C atan u)`: the shape of a force curve.
-#[inline(always)]
-fn sine_shape<R: Real>(c: R, b: R, e: R, x: R) -> R {
-    (c * stretched_slip(b, e, x).atan()).sin()
-}
+impl<R: Real> Curve<R> {
+    /// `B x`.
+    #[inline(always)]
+    fn bx(&self) -> R {
+        self.b * self.x
+    }
 
-/// `cos(C atan u)`: the shape of a weighting or trail curve.
-#[inline(always)]
-fn cosine_shape<R: Real>(c: R, b: R, e: R, x: R) -> R {
-    (c * stretched_slip(b, e, x).atan()).cos()
-}
-
-/// A combined-slip weight: the cosine shape at `x` over that at its shift, where the other slip is nought.
-#[inline(always)]
-fn weight<R: Real>(c: R, b: R, e: R, x: R, shift: R) -> R {
-    cosine_shape(c, b, e, x) / cosine_shape(c, b, e, shift)
+    /// `B x - E (B x - atan(B x))`, given `atan(B x)`.
+    #[inline(always)]
+    fn stretched(&self, atan_bx: R) -> R {
+        let bx = self.bx();
+        bx - self.e * (bx - atan_bx)
+    }
 }
 
 /// Curvature factors above one turn the curve back on itself.
@@ -43,37 +43,46 @@ struct Load<R> {
     difference: R,
 }
 
-/// Pure longitudinal slip: force (N) and slip stiffness `Kx` (N).
+/// What pure slip yields and the other formulas need: the force is `peak sin(angle) + shift`.
+#[derive(Clone, Copy)]
+struct PureSlip<R> {
+    curve: Curve<R>,
+    /// Peak force `D`, N.
+    peak: R,
+    /// `SV`, N.
+    vertical_shift: R,
+    /// Slip stiffness `K`, N.
+    stiffness: R,
+}
+
+/// Pure longitudinal slip.
 #[inline(always)]
-fn pure_longitudinal<R: Real>(t: &MagicFormula<R>, load: Load<R>, slip_ratio: R) -> (R, R) {
+fn pure_longitudinal<R: Real>(t: &MagicFormula<R>, load: Load<R>, slip_ratio: R) -> PureSlip<R> {
     let dfz = load.difference;
     let mu = t.dx1 + t.dx2 * dfz;
     let k = (t.kx1 + t.kx2 * dfz) * (t.kx3 * dfz).exp();
-    let b = k * t.inverse_cx / mu;
     let x = slip_ratio + (t.hx1 + t.hx2 * dfz);
-    let e = clamp_curvature((t.ex1 + dfz * (t.ex2 + t.ex3 * dfz)) * (R::lit(1.0) - t.ex4 * x.sign()));
-    let force = load.force * (mu * sine_shape(t.cx, b, e, x) + (t.vx1 + t.vx2 * dfz));
-    (force, load.force * k)
+    PureSlip {
+        curve: Curve {
+            c: t.cx,
+            b: k * t.inverse_cx / mu,
+            e: clamp_curvature((t.ex1 + dfz * (t.ex2 + t.ex3 * dfz)) * (R::lit(1.0) - t.ex4 * x.sign())),
+            x,
+        },
+        peak: load.force * mu,
+        vertical_shift: load.force * (t.vx1 + t.vx2 * dfz),
+        stiffness: load.force * k,
+    }
 }
 
-/// What pure side slip yields and the other formulas need.
-#[derive(Clone, Copy)]
-struct PureLateral<R> {
-    /// Force, N.
-    force: R,
-    /// Peak force `Dy`, N.
-    peak: R,
-    /// Cornering stiffness `Ky`, N.
-    stiffness: R,
-    /// `By Cy`, the initial slope per peak force.
-    slope: R,
-    /// `SHy + SVy/Ky`, the slip at which the residual moment turns.
-    residual_shift: R,
-}
-
-/// Pure side slip.
+/// Pure side slip, and what the residual moment needs of it: `By Cy` and `SHy + SVy/Ky`.
 #[inline(always)]
-fn pure_lateral<R: Real>(t: &MagicFormula<R>, load: Load<R>, slip_tangent: R, side: R) -> PureLateral<R> {
+fn pure_lateral<R: Real>(
+    t: &MagicFormula<R>,
+    load: Load<R>,
+    slip_tangent: R,
+    side: R,
+) -> (PureSlip<R>, R, R) {
     let dfz = load.difference;
     let one = R::lit(1.0);
     let peak = (t.dy1 + t.dy2 * dfz) * load.force;
@@ -84,94 +93,148 @@ fn pure_lateral<R: Real>(t: &MagicFormula<R>, load: Load<R>, slip_tangent: R, si
     let horizontal_shift = t.hy1 + t.hy2 * dfz + t.hy_camber * side;
     let vertical_shift = load.force * ((t.vy1 + t.vy2 * dfz) + (t.vy_camber1 + t.vy_camber2 * dfz) * side);
     let x = slip_tangent + horizontal_shift;
-    let e = clamp_curvature((t.ey1 + t.ey2 * dfz) * (one - (t.ey3 + t.ey_camber * side) * x.sign()));
-    PureLateral {
-        force: peak * sine_shape(t.cy, slope * t.inverse_cy, e, x) + vertical_shift,
+    let pure = PureSlip {
+        curve: Curve {
+            c: t.cy,
+            b: slope * t.inverse_cy,
+            e: clamp_curvature((t.ey1 + t.ey2 * dfz) * (one - (t.ey3 + t.ey_camber * side) * x.sign())),
+            x,
+        },
         peak,
+        vertical_shift,
         stiffness,
-        slope,
-        residual_shift: horizontal_shift + vertical_shift / stiffness,
-    }
+    };
+    (pure, slope, horizontal_shift + vertical_shift / stiffness)
 }
 
-/// The weight that side slip leaves of the longitudinal force.
+/// The curve whose cosine at `x`, over that at its shift, is the weight that side slip leaves of the longitudinal
+/// force.
 #[inline(always)]
-fn longitudinal_weight<R: Real>(t: &MagicFormula<R>, load: Load<R>, slip_ratio: R, slip_tangent: R) -> R {
-    let b = t.rbx1 * (t.rbx2 * slip_ratio).cos_atan();
-    let e = clamp_curvature(t.rex1 + t.rex2 * load.difference);
-    weight(t.rcx1, b, e, slip_tangent + t.rhx1, t.rhx1)
-}
-
-/// The weight that slip ratio leaves of the side force.
-#[inline(always)]
-fn lateral_weight<R: Real>(t: &MagicFormula<R>, load: Load<R>, slip_ratio: R, slip_tangent: R) -> R {
-    let b = t.rby1 * (t.rby2 * (slip_tangent - t.rby3)).cos_atan();
-    let e = clamp_curvature(t.rey1 + t.rey2 * load.difference);
-    let shift = t.rhy1 + t.rhy2 * load.difference;
-    weight(t.rcy1, b, e, slip_ratio + shift, shift)
-}
-
-/// The side force `SVyk` that slip ratio induces of itself, N; `peak` is `Dy`.
-#[inline(always)]
-fn induced_lateral<R: Real>(
+fn longitudinal_weight<R: Real>(
     t: &MagicFormula<R>,
     load: Load<R>,
-    peak: R,
     slip_ratio: R,
     slip_tangent: R,
-    side: R,
-) -> R {
-    let amplitude = peak * (t.rvy1 + t.rvy2 * load.difference + t.rvy_camber * side);
-    amplitude * (t.rvy4 * slip_tangent).cos_atan() * (t.rvy5 * (t.rvy6 * slip_ratio).atan()).sin()
+) -> [Curve<R>; 2] {
+    let b = t.rbx1 / (t.rbx2 * slip_ratio).sec_atan();
+    let e = clamp_curvature(t.rex1 + t.rex2 * load.difference);
+    let (c, shift) = (t.rcx1, t.rhx1);
+    let x = slip_tangent + shift;
+    [Curve { c, b, e, x }, Curve { c, b, e, x: shift }]
 }
 
-/// The tangent of the equivalent slip angle: `x`'s with the slip ratio's share added. `x` is itself the tangent
-/// of a slip angle, and the formula as published takes the tangent once more.
+/// The like for the weight that slip ratio leaves of the side force.
 #[inline(always)]
-fn equivalent_tangent<R: Real>(x: R, slip_share: R) -> R {
-    let tangent = x.tan();
+fn lateral_weight<R: Real>(
+    t: &MagicFormula<R>,
+    load: Load<R>,
+    slip_ratio: R,
+    slip_tangent: R,
+) -> [Curve<R>; 2] {
+    let b = t.rby1 / (t.rby2 * (slip_tangent - t.rby3)).sec_atan();
+    let e = clamp_curvature(t.rey1 + t.rey2 * load.difference);
+    let (c, shift) = (t.rcy1, t.rhy1 + t.rhy2 * load.difference);
+    let x = slip_ratio + shift;
+    [Curve { c, b, e, x }, Curve { c, b, e, x: shift }]
+}
+
+/// The tangent of the equivalent slip angle: `x`'s, whose tangent is given, with the slip ratio's share added. `x` is
+/// itself the tangent of a slip angle, and the formula as published takes the tangent once more.
+#[inline(always)]
+fn equivalent_tangent<R: Real>(x: R, tangent: R, slip_share: R) -> R {
     (tangent * tangent + slip_share * slip_share).sqrt() * x.sign()
 }
 
-/// Aligning moment (N m) of the side force without its induced part, the residual moment and the arm of `Fx`.
-///
-/// `forces` are `Fx`, `Fy` and `SVyk` in N.
+/// Forces and aligning moment under combined slip.
 #[inline(always)]
-fn aligning_moment<R: Real>(
-    t: &MagicFormula<R>,
-    load: Load<R>,
-    input: &TyreInput<R>,
-    lateral: &PureLateral<R>,
-    longitudinal_stiffness: R,
-    forces: (R, R, R),
-) -> R {
-    let (force_x, force_y, induced) = forces;
-    let dfz = load.difference;
-    let one = R::lit(1.0);
-    let side = input.side;
-    let slip_share = longitudinal_stiffness / lateral.stiffness * input.slip_ratio;
+fn combined_slip<R: Real>(t: &MagicFormula<R>, input: TyreInput<R>) -> TyreForces<R> {
+    let force = input.load.max(R::lit(LEAST_LOAD));
+    let load = Load {
+        force,
+        difference: force * t.inverse_nominal - R::lit(1.0),
+    };
+    let (dfz, side, one) = (load.difference, input.side, R::lit(1.0));
+    let (slip_ratio, slip_tangent) = (input.slip_ratio, input.slip_tangent);
+    let pure_x = pure_longitudinal(t, load, slip_ratio);
+    let (pure_y, slope, residual_shift) = pure_lateral(t, load, slip_tangent, side);
 
-    let x = input.slip_tangent + (t.ht1 + t.ht2 * dfz + (t.ht_camber1 + t.ht_camber2 * dfz) * side);
-    let b = (t.bt1 + dfz * (t.bt2 + t.bt3 * dfz)) * (t.bt_even + t.bt_odd * side);
+    // Each curve is a chain of an inner arc tangent, an outer one and a sine or cosine: `f` of a pure force, `w` of
+    // a weight and `w0` of its shift, `m` of the trail. All of a kind that are ready are worked out side by side.
+    let [wx, wx0] = longitudinal_weight(t, load, slip_ratio, slip_tangent);
+    let [wy, wy0] = lateral_weight(t, load, slip_ratio, slip_tangent);
+    let (fx, fy) = (pure_x.curve, pure_y.curve);
+
+    // Equivalent slip angles of the trail and the residual moment.
+    let slip_share = pure_x.stiffness / pure_y.stiffness * slip_ratio;
+    let trail_x = slip_tangent + (t.ht1 + t.ht2 * dfz + (t.ht_camber1 + t.ht_camber2 * dfz) * side);
+    let residual_x = slip_tangent + residual_shift;
+    let [trail_tangent, residual_tangent] = R::tan_each([trail_x, residual_x]);
+    let trail_b = (t.bt1 + dfz * (t.bt2 + t.bt3 * dfz)) * (t.bt_even + t.bt_odd * side);
+    let [
+        fx_atan,
+        fy_atan,
+        wx_atan,
+        wx0_atan,
+        wy_atan,
+        wy0_atan,
+        trail_angle,
+        induced_angle,
+    ] = R::atan_each([
+        fx.bx(),
+        fy.bx(),
+        wx.bx(),
+        wx0.bx(),
+        wy.bx(),
+        wy0.bx(),
+        trail_b * t.bct * trail_x,
+        t.rvy6 * slip_ratio,
+    ]);
+    let [trail_slip, residual_slip, wx_atan, wx0_atan, wy_atan, wy0_atan] = R::atan_each([
+        equivalent_tangent(trail_x, trail_tangent, slip_share),
+        equivalent_tangent(residual_x, residual_tangent, slip_share),
+        wx.stretched(wx_atan),
+        wx0.stretched(wx0_atan),
+        wy.stretched(wy_atan),
+        wy0.stretched(wy0_atan),
+    ]);
+    let m = Curve {
+        c: t.ct,
+        b: trail_b,
+        e: clamp_curvature(
+            (t.et1 + dfz * (t.et2 + t.et3 * dfz)) * (one + (t.et4 + t.et_camber * side) * trail_angle),
+        ),
+        x: trail_slip,
+    };
+    let [m_atan, fx_atan, fy_atan] = R::atan_each([m.bx(), fx.stretched(fx_atan), fy.stretched(fy_atan)]);
+    let [cos_wx, cos_wx0, cos_wy, cos_wy0] =
+        R::cos_pi_each([wx.c * wx_atan, wx0.c * wx0_atan, wy.c * wy_atan, wy0.c * wy0_atan]);
+    let m_atan = m.stretched(m_atan).atan();
+    let [sin_x, sin_y, sin_induced] =
+        R::sin_pi_each([fx.c * fx_atan, fy.c * fy_atan, t.rvy5 * induced_angle]);
+    let cos_m = (m.c * m_atan).cos_pi();
+
+    let x = (pure_x.peak * sin_x + pure_x.vertical_shift) * (cos_wx / cos_wx0);
+    let amplitude = pure_y.peak * (t.rvy1 + t.rvy2 * dfz + t.rvy_camber * side);
+    let induced = amplitude / (t.rvy4 * slip_tangent).sec_atan() * sin_induced;
+    let y = (pure_y.peak * sin_y + pure_y.vertical_shift) * (cos_wy / cos_wy0) + induced;
+
     let d = load.force * (t.dt1 + t.dt2 * dfz) * (t.dt_even + t.dt_odd * side);
-    let e = clamp_curvature(
-        (t.et1 + dfz * (t.et2 + t.et3 * dfz)) * (one + (t.et4 + t.et_camber * side) * (b * t.ct * x).atan()),
-    );
-    let trail = d
-        * cosine_shape(t.ct, b, e, equivalent_tangent(x, slip_share).atan())
-        * input.slip_tangent.cos_atan();
-
-    let residual_slip = input.slip_tangent + lateral.residual_shift;
-    let residual_slope = t.br1 + t.br2 * lateral.slope;
+    let trail = d * cos_m / slip_tangent.sec_atan();
+    let residual_slope = t.br1 + t.br2 * slope;
     // The cosine of `a* = tan(alpha)` itself, unlike that of the trail: the reference implementation has it so.
-    let residual_peak = load.force
-        * (t.dr1 + t.dr2 * dfz + (t.dr_camber1 + t.dr_camber2 * dfz) * side)
-        * input.slip_tangent.cos();
-    let residual =
-        residual_peak * (residual_slope * equivalent_tangent(residual_slip, slip_share).atan()).cos_atan();
+    let residual_peak =
+        load.force * (t.dr1 + t.dr2 * dfz + (t.dr_camber1 + t.dr_camber2 * dfz) * side) * slip_tangent.cos();
+    let residual = residual_peak / (residual_slope * residual_slip).sec_atan();
+    let arm = t.s1 + t.s2 * y + (t.s_camber1 + t.s_camber2 * dfz) * side;
+    let moment = residual - trail * (y - induced) + arm * x;
 
-    let arm = t.s1 + t.s2 * force_y + (t.s_camber1 + t.s_camber2 * dfz) * side;
-    residual - trail * (force_y - induced) + arm * force_x
+    let zero = R::lit(0.0);
+    let loaded = zero.less_than(input.load);
+    TyreForces {
+        x: R::select(loaded, x, zero),
+        y: R::select(loaded, y, zero),
+        aligning_moment: R::select(loaded, moment, zero),
+    }
 }
 
 impl<R: Real> Tyre<R> for MagicFormula<R> {
@@ -193,38 +256,26 @@ impl<R: Real> Tyre<R> for MagicFormula<R> {
 
     #[inline(always)]
     fn forces(&self, input: TyreInput<R>) -> TyreForces<R> {
-        let force = input.load.max(R::lit(LEAST_LOAD));
-        let load = Load {
-            force,
-            difference: force * self.inverse_nominal - R::lit(1.0),
-        };
-        let (pure_x, longitudinal_stiffness) = pure_longitudinal(self, load, input.slip_ratio);
-        let lateral = pure_lateral(self, load, input.slip_tangent, input.side);
-        let x = pure_x * longitudinal_weight(self, load, input.slip_ratio, input.slip_tangent);
-        let induced = induced_lateral(
-            self,
-            load,
-            lateral.peak,
-            input.slip_ratio,
-            input.slip_tangent,
-            input.side,
-        );
-        let y = lateral.force * lateral_weight(self, load, input.slip_ratio, input.slip_tangent) + induced;
-        let moment = aligning_moment(
-            self,
-            load,
-            &input,
-            &lateral,
-            longitudinal_stiffness,
-            (x, y, induced),
-        );
+        combined_slip(self, input)
+    }
 
-        let zero = R::lit(0.0);
-        let loaded = zero.less_than(input.load);
-        TyreForces {
-            x: R::select(loaded, x, zero),
-            y: R::select(loaded, y, zero),
-            aligning_moment: R::select(loaded, moment, zero),
-        }
+    #[inline(always)]
+    fn axle_forces(&self, [left, right]: [TyreInput<R>; 2]) -> [TyreForces<R>; 2] {
+        let input = TyreInput {
+            load: Pair(left.load, right.load),
+            slip_ratio: Pair(left.slip_ratio, right.slip_ratio),
+            slip_tangent: Pair(left.slip_tangent, right.slip_tangent),
+            side: Pair(left.side, right.side),
+        };
+        let forces = combined_slip(&self.map(|figure| Pair(figure, figure)), input);
+        let of = |x, y, aligning_moment| TyreForces {
+            x,
+            y,
+            aligning_moment,
+        };
+        [
+            of(forces.x.0, forces.y.0, forces.aligning_moment.0),
+            of(forces.x.1, forces.y.1, forces.aligning_moment.1),
+        ]
     }
 }

@@ -33,6 +33,20 @@ pub struct TyreInput<R> {
     pub side: R,
 }
 
+impl<R: Real> TyreInput<R> {
+    /// Nought throughout.
+    #[inline(always)]
+    pub fn nought() -> Self {
+        let zero = R::lit(0.0);
+        Self {
+            load: zero,
+            slip_ratio: zero,
+            slip_tangent: zero,
+            side: zero,
+        }
+    }
+}
+
 /// What a tyre answers, in its own axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TyreForces<R> {
@@ -63,6 +77,13 @@ pub trait Tyre<R: Real>: Copy + Send + Sync {
 
     /// Forces and aligning moment.
     fn forces(&self, input: TyreInput<R>) -> TyreForces<R>;
+
+    /// Forces and aligning moments of the left and the right wheel of the axle.
+    #[inline(always)]
+    fn axle_forces(&self, inputs: [TyreInput<R>; 2]) -> [TyreForces<R>; 2] {
+        let [left, right] = inputs;
+        [self.forces(left), self.forces(right)]
+    }
 }
 
 /// The tyre models there are.

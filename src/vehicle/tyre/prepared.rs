@@ -9,7 +9,9 @@ fields! {
     /// Magic Formula 5.2 of one axle, its static camber folded in. Twin of `MagicFormula` in `shaders/tyre.wgsl`.
     ///
     /// Terms odd in camber hold for the left wheel and are multiplied by the side (`+1` left, `-1` right), on
-    /// which the same camber leans the other way; even terms hold for both.
+    /// which the same camber leans the other way; even terms hold for both. The shape factors that multiply an
+    /// angle (`cx`, `cy`, `rcx1`, `rcy1`, `rvy5` and `ct`) are divided by pi, so that the product is in half turns;
+    /// `bct` is that of the trail as it was.
     pub struct MagicFormula {
         inverse_nominal,
         cx, inverse_cx, dx1, dx2, kx1, kx2, kx3, hx1, hx2, vx1, vx2, ex1, ex2, ex3, ex4,
@@ -18,7 +20,7 @@ fields! {
         rbx1, rbx2, rcx1, rex1, rex2, rhx1,
         rby1, rby2, rby3, rcy1, rey1, rey2, rhy1, rhy2,
         rvy1, rvy2, rvy_camber, rvy4, rvy5, rvy6,
-        ct, bt1, bt2, bt3, bt_even, bt_odd, dt1, dt2, dt_even, dt_odd, et1, et2, et3, et4, et_camber,
+        ct, bct, bt1, bt2, bt3, bt_even, bt_odd, dt1, dt2, dt_even, dt_odd, et1, et2, et3, et4, et_camber,
         ht1, ht2, ht_camber1, ht_camber2,
         br1, br2, dr1, dr2, dr_camber1, dr_camber2,
         s1, s2, s_camber1, s_camber2,
@@ -44,10 +46,11 @@ impl<R: Real> TyreCoefficients<R> {
         let trail_scale = self.r0 / nominal * self.ltr;
         let residual_scale = self.r0 * self.lmuy;
         let arm_scale = self.r0 * self.ls;
+        let over_pi = R::lit(std::f64::consts::FRAC_1_PI);
         let two_over_pi = R::lit(std::f64::consts::FRAC_2_PI);
         MagicFormula {
             inverse_nominal: one / nominal,
-            cx,
+            cx: cx * over_pi,
             inverse_cx: one / cx,
             dx1: self.pdx1 * friction_x,
             dx2: self.pdx2 * friction_x,
@@ -62,7 +65,7 @@ impl<R: Real> TyreCoefficients<R> {
             ex2: self.pex2 * self.lex,
             ex3: self.pex3 * self.lex,
             ex4: self.pex4,
-            cy,
+            cy: cy * over_pi,
             inverse_cy: one / cy,
             dy1: self.pdy1 * friction_y,
             dy2: self.pdy2 * friction_y,
@@ -82,14 +85,14 @@ impl<R: Real> TyreCoefficients<R> {
             ey_camber: self.pey4 * g,
             rbx1: self.rbx1 * self.lxal,
             rbx2: self.rbx2,
-            rcx1: self.rcx1,
+            rcx1: self.rcx1 * over_pi,
             rex1: self.rex1,
             rex2: self.rex2,
             rhx1: self.rhx1,
             rby1: self.rby1 * self.lyka,
             rby2: self.rby2,
             rby3: self.rby3,
-            rcy1: self.rcy1,
+            rcy1: self.rcy1 * over_pi,
             rey1: self.rey1,
             rey2: self.rey2,
             rhy1: self.rhy1,
@@ -98,9 +101,10 @@ impl<R: Real> TyreCoefficients<R> {
             rvy2: self.rvy2 * self.lvyka,
             rvy_camber: self.rvy3 * g * self.lvyka,
             rvy4: self.rvy4,
-            rvy5: self.rvy5,
+            rvy5: self.rvy5 * over_pi,
             rvy6: self.rvy6,
-            ct: self.qcz1,
+            ct: self.qcz1 * over_pi,
+            bct: self.qcz1,
             bt1: self.qbz1,
             bt2: self.qbz2,
             bt3: self.qbz3,

@@ -1,0 +1,117 @@
+//! The same function of several arguments at once, their instructions alternating: polynomials are long chains of
+//! dependent operations, and a processor looks only so far ahead for something to do while it waits for a result.
+
+use super::Real;
+use super::elementary::{self, SinglePrecision};
+use std::array::from_fn;
+use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
+
+/// Several scalars (or packs of lanes) as one scalar: every operation is done for each in turn.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Lockstep<R, const N: usize>(pub(super) [R; N]);
+
+macro_rules! operators {
+    ($type:ident, $($trait:ident $method:ident),*) => {$(
+        impl<R: $trait<Output = R> + Copy, const N: usize> $trait for $type<R, N> {
+            type Output = Self;
+            #[inline(always)]
+            fn $method(self, other: Self) -> Self {
+                Self(from_fn(|i| self.0[i].$method(other.0[i])))
+            }
+        }
+    )*};
+}
+operators!(Lockstep, Add add, Sub sub, Mul mul, Div div, BitAnd bitand, BitOr bitor);
+
+impl<R: Neg<Output = R>, const N: usize> Neg for Lockstep<R, N> {
+    type Output = Self;
+    #[inline(always)]
+    fn neg(self) -> Self {
+        Self(self.0.map(|x| -x))
+    }
+}
+
+impl<R: Not<Output = R>, const N: usize> Not for Lockstep<R, N> {
+    type Output = Self;
+    #[inline(always)]
+    fn not(self) -> Self {
+        Self(self.0.map(|x| !x))
+    }
+}
+
+impl<R: SinglePrecision, const N: usize> Real for Lockstep<R, N> {
+    type Mask = Lockstep<R::Mask, N>;
+    type Storage = R::Storage;
+
+    #[inline(always)]
+    fn lit(x: f64) -> Self {
+        Self([R::lit(x); N])
+    }
+    #[inline(always)]
+    fn load(x: R::Storage) -> Self {
+        Self([R::load(x); N])
+    }
+    #[inline(always)]
+    fn store(x: f64) -> R::Storage {
+        R::store(x)
+    }
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        Self(self.0.map(|x| x.sqrt()))
+    }
+    #[inline(always)]
+    fn abs(self) -> Self {
+        Self(self.0.map(|x| x.abs()))
+    }
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        Self(from_fn(|i| self.0[i].min(other.0[i])))
+    }
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        Self(from_fn(|i| self.0[i].max(other.0[i])))
+    }
+    elementary::single_precision_functions!();
+    #[inline(always)]
+    fn less_than(self, other: Self) -> Self::Mask {
+        Lockstep(from_fn(|i| self.0[i].less_than(other.0[i])))
+    }
+    #[inline(always)]
+    fn splat_mask(truth: bool) -> Self::Mask {
+        Lockstep([R::splat_mask(truth); N])
+    }
+    #[inline(always)]
+    fn select(mask: Self::Mask, if_true: Self, if_false: Self) -> Self {
+        Self(from_fn(|i| R::select(mask.0[i], if_true.0[i], if_false.0[i])))
+    }
+}
+
+impl<R: SinglePrecision, const N: usize> SinglePrecision for Lockstep<R, N> {
+    #[inline(always)]
+    fn round(self) -> Self {
+        Self(self.0.map(|x| x.round()))
+    }
+    #[inline(always)]
+    fn negate_where_odd(self, n: Self) -> Self {
+        Self(from_fn(|i| self.0[i].negate_where_odd(n.0[i])))
+    }
+    #[inline(always)]
+    fn with_sign_of(self, other: Self) -> Self {
+        Self(from_fn(|i| self.0[i].with_sign_of(other.0[i])))
+    }
+    #[inline(always)]
+    fn two_to_the(self) -> Self {
+        Self(self.0.map(|x| x.two_to_the()))
+    }
+    #[inline(always)]
+    fn tie(self, other: Self) -> (Self, Self) {
+        (self, other)
+    }
+    #[inline(always)]
+    fn abreast(mut self) -> Self {
+        for i in 1..N {
+            (self.0[i - 1], self.0[i]) = self.0[i - 1].tie(self.0[i]);
+        }
+        self
+    }
+}
