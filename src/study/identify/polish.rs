@@ -24,6 +24,8 @@ pub struct Polished {
 /// A candidate is moved this share of the range away from a bound before it is polished, where the
 /// transformation below would otherwise hold it for ever.
 const MARGIN: f64 = 1e-3;
+/// Drives after which a polish that has not converged is left where it is.
+const MOST_DRIVES: usize = 150;
 /// Error that stands for every sample of a car that was lost: far above any real one, so the step is refused.
 const LOST: f64 = 1e4;
 
@@ -105,7 +107,8 @@ pub fn polish(replay: &ReplayProblem, candidate: &[f64], weights: [f64; CHANNELS
         evaluations: 0,
     };
     problem.set_params(&u);
-    let (problem, report) = LevenbergMarquardt::new().minimize(problem);
+    let patience = (MOST_DRIVES / (variables.len() + 1)).max(1);
+    let (problem, report) = LevenbergMarquardt::new().with_patience(patience).minimize(problem);
     Some(Polished {
         candidate: problem.candidate(&problem.u),
         cost: report.objective_function,
