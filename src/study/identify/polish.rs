@@ -108,7 +108,9 @@ pub fn polish(replay: &ReplayProblem, candidate: &[f64], weights: [f64; CHANNELS
     };
     problem.set_params(&u);
     let patience = (MOST_DRIVES / (variables.len() + 1)).max(1);
-    let (problem, report) = LevenbergMarquardt::new().with_patience(patience).minimize(problem);
+    let (problem, report) = LevenbergMarquardt::new()
+        .with_patience(patience)
+        .minimize(problem);
     Some(Polished {
         candidate: problem.candidate(&problem.u),
         cost: report.objective_function,
