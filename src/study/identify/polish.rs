@@ -24,6 +24,9 @@ pub struct Polished {
 /// A candidate is moved this share of the range away from a bound before it is polished, where the
 /// transformation below would otherwise hold it for ever.
 const MARGIN: f64 = 1e-3;
+/// A polish ends when a step gains less than this share of the cost. An exact fit gains orders of magnitude with each
+/// step until it is down to rounding, so this only ends fits to noise.
+const LEAST_GAIN: f64 = 1e-9;
 /// Drives after which a polish that has not converged is left where it is.
 const MOST_DRIVES: usize = 150;
 /// Error that stands for every sample of a car that was lost: far above any real one, so the step is refused.

@@ -460,9 +460,13 @@ fn write_traces(folder: &Path, setup: &Setup, judged: &Judged, summary: &Summary
             })
             .collect()
     });
+    // The file's name alone: a long path would run into the legend.
+    let source = Path::new(&log.source)
+        .file_name()
+        .map_or_else(|| log.source.clone().into(), |n| n.to_string_lossy());
     let title = format!(
-        "{}: measured and fitted in {:.1} s on {} ({})",
-        log.source, summary.elapsed_s, summary.backend, summary.adapter
+        "{source}, fitted in {:.0} s on {}",
+        summary.elapsed_s, summary.backend
     );
     plot_traces(
         folder.join("traces.svg"),
