@@ -57,9 +57,9 @@ fn truth_fits_the_bundled_lap_exactly() {
 #[test]
 fn polish_recovers_the_truth_from_a_distance() {
     let setup = set_up(&simd()).unwrap();
-    let (start, truth) = perturbed(&setup, 0.01);
+    let (start, truth) = perturbed(&setup, 0.001);
     assert!(
-        total_parameter_error(&start, &truth, all) > 0.3,
+        total_parameter_error(&start, &truth, all) > 0.02,
         "a start that is wrong"
     );
     let polished = polish(&setup.replay, &start, setup.scales.map(|s| 1.0 / s)).unwrap();

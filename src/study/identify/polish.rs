@@ -113,6 +113,7 @@ pub fn polish(replay: &ReplayProblem, candidate: &[f64], weights: [f64; CHANNELS
     let patience = (MOST_DRIVES / (variables.len() + 1)).max(1);
     let (problem, report) = LevenbergMarquardt::new()
         .with_patience(patience)
+        .with_ftol(LEAST_GAIN)
         .minimize(problem);
     Some(Polished {
         candidate: problem.candidate(&problem.u),
