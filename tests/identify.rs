@@ -206,13 +206,9 @@ fn noise_stays_within_three_standard_errors() {
     let polished = polish(&setup.replay, &start, noise.map(|n| 1.0 / n)).unwrap();
     let residuals = setup.replay.residuals(&polished.candidate).unwrap();
     let verdict = judge(&residuals, &setup.replay.problem.variables, &setup.scales);
-    for k in 0..4 {
+    for (told, true_noise) in verdict.noise.iter().zip(noise) {
         // 7000 samples tell a standard deviation to 1/sqrt(14000), 0.8%; five of those.
-        assert!(
-            (verdict.noise[k] / noise[k] - 1.0).abs() < 0.042,
-            "channel {k}: {}",
-            verdict.noise[k]
-        );
+        assert!((told / true_noise - 1.0).abs() < 0.042, "{told} for {true_noise}");
     }
     for (k, v) in setup.replay.problem.variables.iter().enumerate() {
         let off = (polished.candidate[k] - truth[k]).abs() / verdict.standard_errors[k];
