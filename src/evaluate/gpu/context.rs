@@ -7,6 +7,7 @@ use super::adapter::{DeviceSummary, choose};
 use super::lint;
 use crate::error::{Error, Result};
 use std::collections::HashMap;
+use std::sync::mpsc::RecvTimeoutError;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -324,12 +325,17 @@ impl GpuContext {
             // Nobody listens any more only if waiting has failed already.
             let _ = sender.send(outcome);
         });
-        self.wait(None)?;
-        match receiver.try_recv() {
-            Ok(Ok(())) => {}
-            Ok(Err(e)) => return Err(failed(e.to_string())),
-            Err(e) => return Err(failed(e.to_string())),
-        }
+        // Another thread's poll may have taken up the callback and be yet to call it: this thread's poll then
+        // comes back before the answer does.
+        let start = Instant::now();
+        let outcome = loop {
+            self.wait(None)?;
+            match receiver.recv_timeout(Duration::from_millis(1)) {
+                Err(RecvTimeoutError::Timeout) if start.elapsed() < PATIENCE => {}
+                answer => break answer.map_err(|e| failed(e.to_string()))?,
+            }
+        };
+        outcome.map_err(|e| failed(e.to_string()))?;
         let view = buffer
             .get_mapped_range(0..bytes)
             .map_err(|e| failed(e.to_string()))?;
