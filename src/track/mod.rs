@@ -6,10 +6,12 @@
 //! to rounding, so a car that follows the curvature follows the positions.
 
 mod circuit;
+mod cross_sections;
 mod from_curvature;
 mod load;
 
 pub use circuit::{Circuit, Corner, Projection, Section};
+pub use cross_sections::CrossSections;
 pub use from_curvature::{Closure, CurvatureRow, CurvatureTable};
 pub use load::BUNDLED;
 

@@ -1,0 +1,107 @@
+//! A circuit cut across at stations: the straight cuts that a racing line crosses.
+
+use super::circuit::{Corner, Section};
+use crate::{Error, Result};
+use glam::DVec2;
+
+/// Cuts across a circuit, each from its right edge to its left one.
+///
+/// A line crosses cut `i` at `right_m[i] + alpha_i (left_m[i] - right_m[i])`, with `alpha` from 0 (the driver's
+/// right) to 1 (left). On a closed circuit the last cut is followed by the first, which is not repeated.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CrossSections {
+    /// Name for titles and messages.
+    pub name: String,
+    /// Whether the end joins the start.
+    pub closed: bool,
+    /// Length of the reference line (m), the closing stretch of a closed circuit included.
+    pub length_m: f64,
+    /// Station of each cut along the reference line (m), ascending from 0.
+    pub station_m: Vec<f64>,
+    /// Right end of each cut (m).
+    pub right_m: Vec<DVec2>,
+    /// Left end of each cut (m).
+    pub left_m: Vec<DVec2>,
+    /// Named stretches, by station.
+    pub sections: Vec<Section>,
+    /// Named corners, by station.
+    pub corners: Vec<Corner>,
+}
+
+impl CrossSections {
+    /// Number of cuts.
+    pub fn len(&self) -> usize {
+        self.station_m.len()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.station_m.is_empty()
+    }
+
+    /// The same cuts shortened at both ends by half the width of a car (m), so that its middle may use all of them.
+    ///
+    /// # Errors
+    /// [`Error::Input`] naming the station of the first cut that is not wider than the car.
+    pub fn narrowed(&self, car_width_m: f64) -> Result<Self> {
+        let mut narrowed = self.clone();
+        let ends = narrowed.right_m.iter_mut().zip(&mut narrowed.left_m);
+        for ((right, left), station) in ends.zip(&self.station_m) {
+            let width = right.distance(*left);
+            // A negated comparison refuses what is no number, too.
+            if !(width > car_width_m) || !(car_width_m >= 0.0) {
+                return Err(Error::input(
+                    &self.name,
+                    format!("width at station {station:.1} m"),
+                    format!("{width:.2} m"),
+                    format!("more than the car's {car_width_m:.2} m"),
+                ));
+            }
+            let inward = (*left - *right) * (0.5 * car_width_m / width);
+            *right += inward;
+            *left -= inward;
+        }
+        Ok(narrowed)
+    }
+
+    /// The points of a line (m), one per cut, from its `alpha` at every cut.
+    pub fn points(&self, alpha: &[f64]) -> Vec<DVec2> {
+        self.right_m
+            .iter()
+            .zip(&self.left_m)
+            .zip(alpha)
+            .map(|((right, left), alpha)| *right + *alpha * (*left - *right))
+            .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn straight() -> CrossSections {
+        CrossSections {
+            name: "straight".to_owned(),
+            closed: false,
+            length_m: 10.0,
+            station_m: vec![0.0, 10.0],
+            right_m: vec![DVec2::new(0.0, -4.0), DVec2::new(10.0, -4.0)],
+            left_m: vec![DVec2::new(0.0, 6.0), DVec2::new(10.0, 6.0)],
+            sections: Vec::new(),
+            corners: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn a_line_crosses_between_the_drawn_in_edges() {
+        let cuts = straight().narrowed(2.0).unwrap();
+        let points = cuts.points(&[0.0, 1.0]);
+        assert_eq!(points, [DVec2::new(0.0, -3.0), DVec2::new(10.0, 5.0)]);
+    }
+
+    #[test]
+    fn a_car_wider_than_the_road_is_refused_by_place() {
+        let error = straight().narrowed(10.0).unwrap_err().to_string();
+        assert!(error.contains("station 0.0 m"), "{error}");
+    }
+}
