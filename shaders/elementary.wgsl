@@ -23,8 +23,13 @@ fn sec_atan(x: Wheels) -> Wheels {
     return sqrt(1.0 + x * x);
 }
 
+// Added to a whole number below 2^22, leaves that number in the low bits: `WHOLE` in `src/scalar/float.rs`. Cheaper
+// than a conversion to integers, whose range WGSL has to check.
+const WHOLE: f32 = 12582912.0;
+const WHOLE_AND_BIAS: f32 = 12583039.0;
+
 fn negate_where_odd(x: Wheels, n: Wheels) -> Wheels {
-    return bitcast<Wheels>(bitcast<vec4<u32>>(x) ^ (vec4<u32>(vec4<i32>(n)) << vec4<u32>(31u)));
+    return bitcast<Wheels>(bitcast<vec4<u32>>(x) ^ (bitcast<vec4<u32>>(n + WHOLE) << vec4<u32>(31u)));
 }
 
 fn with_sign_of(x: Wheels, other: Wheels) -> Wheels {
@@ -33,7 +38,7 @@ fn with_sign_of(x: Wheels, other: Wheels) -> Wheels {
 }
 
 fn two_to_the(n: Wheels) -> Wheels {
-    return bitcast<Wheels>(vec4<u32>(vec4<i32>(n) + 127i) << vec4<u32>(23u));
+    return bitcast<Wheels>(bitcast<vec4<u32>>(n + WHOLE_AND_BIAS) << vec4<u32>(23u));
 }
 
 fn sine_polynomial(r: Wheels) -> Wheels {
