@@ -132,12 +132,12 @@ impl Survey {
         let n = self.centre_m.len();
         let mut left = Vec::with_capacity(n);
         let mut right = Vec::with_capacity(n);
-        for i in 0..n {
+        for (i, &knot) in knots.iter().enumerate().take(n) {
             // The surveyed edges stand beside the surveyed points; measured from the smooth line beside them they are
             // nearer by as much as the line moved.
-            let here = line.at(knots[i]);
+            let here = line.at(knot);
             let normal = here.first.normalize_or_zero().perp();
-            let moved = (here.value - through.at(knots[i]).value).dot(normal);
+            let moved = (here.value - through.at(knot).value).dot(normal);
             left.push(self.left_m[i] - moved);
             right.push(self.right_m[i] + moved);
         }
