@@ -1,7 +1,6 @@
 //! Every format, read right and refused by place.
 
 use super::*;
-use proptest::prelude::*;
 use std::f64::consts::{PI, TAU};
 use std::fmt::Write as _;
 
@@ -16,7 +15,7 @@ fn refusal(text: &str, name: &str, options: &SurveyOptions) -> String {
     }
 }
 
-fn wide() -> SurveyOptions {
+pub(super) fn wide() -> SurveyOptions {
     SurveyOptions {
         width_m: Some(8.0),
         ..SurveyOptions::default()
@@ -24,14 +23,14 @@ fn wide() -> SurveyOptions {
 }
 
 /// An oval of 60 points, anticlockwise.
-fn oval() -> Vec<DVec2> {
+pub(super) fn oval() -> Vec<DVec2> {
     (0..60)
         .map(|i| TAU * f64::from(i) / 60.0)
         .map(|t| DVec2::new(200.0 * t.cos(), 120.0 * t.sin()))
         .collect()
 }
 
-fn racetrack() -> String {
+pub(super) fn racetrack() -> String {
     let mut text = "# x_m,y_m,w_tr_right_m,w_tr_left_m\n".to_owned();
     for p in oval() {
         let _ = writeln!(text, "{:.6},{:.6},5.5,6.25", p.x, p.y);
@@ -46,7 +45,7 @@ fn places(points: &[DVec2]) -> Vec<(f64, f64)> {
     points.iter().map(place).collect()
 }
 
-fn gpx(points: &[DVec2], version: &str) -> String {
+pub(super) fn gpx(points: &[DVec2], version: &str) -> String {
     let mut text = format!(
         "<?xml version=\"1.0\"?>\n<gpx version=\"{version}\" creator=\"t\" \
          xmlns=\"http://www.topografix.com/GPX/{}\">\n<trk><name>Oval &amp; more</name><trkseg>\n",
@@ -61,7 +60,7 @@ fn gpx(points: &[DVec2], version: &str) -> String {
     text + "</trkseg></trk>\n</gpx>\n"
 }
 
-fn kml(points: &[DVec2]) -> String {
+pub(super) fn kml(points: &[DVec2]) -> String {
     let mut text = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<kml xmlns=\"http://www.opengis.net/kml/2.2\">\n<Document>\
                     <Placemark><name>Oval</name><LineString><coordinates>\n"
         .to_owned();
@@ -71,7 +70,7 @@ fn kml(points: &[DVec2]) -> String {
     text + "</coordinates></LineString></Placemark></Document></kml>\n"
 }
 
-fn latitudes(points: &[DVec2]) -> String {
+pub(super) fn latitudes(points: &[DVec2]) -> String {
     let mut text = "time,Latitude,Longitude\n".to_owned();
     for (i, (lat, lon)) in places(points).into_iter().enumerate() {
         let _ = writeln!(text, "{i},{lat:.9},{lon:.9}");
@@ -79,7 +78,7 @@ fn latitudes(points: &[DVec2]) -> String {
     text
 }
 
-fn edges(left: &[DVec2], right: &[DVec2]) -> String {
+pub(super) fn edges(left: &[DVec2], right: &[DVec2]) -> String {
     let mut text = "left_x_m,left_y_m,right_x_m,right_y_m\n".to_owned();
     let cell = |p: Option<&DVec2>| p.map_or_else(|| ",".to_owned(), |p| format!("{},{}", p.x, p.y));
     for i in 0..left.len().max(right.len()) {
@@ -88,14 +87,14 @@ fn edges(left: &[DVec2], right: &[DVec2]) -> String {
     text
 }
 
-fn ring(radius: f64, points: u32) -> Vec<DVec2> {
+pub(super) fn ring(radius: f64, points: u32) -> Vec<DVec2> {
     (0..points)
         .map(|i| radius * DVec2::from_angle(TAU * f64::from(i) / f64::from(points)))
         .collect()
 }
 
 /// A log with GPS: an out lap, two laps and an in lap, each once round the oval.
-fn log() -> String {
+pub(super) fn log() -> String {
     let mut text = "# made up\ntime_s,lap,lap_complete,gps_lat,gps_long\n".to_owned();
     for i in 0..1200 {
         let t = TAU * f64::from(i) / 300.0;
@@ -556,76 +555,5 @@ fn a_toml_file_says_what_a_survey_cannot() {
         std::fs::write(&path, toml.replace(from, to)).unwrap();
         let text = crate::track::Circuit::load(&path).unwrap_err().to_string();
         assert!(text.contains("oval.toml") && text.contains(part), "{text}");
-    }
-}
-
-/// A refusal names the file and a place in it.
-fn names_its_place(result: Result<Survey>) -> std::result::Result<(), TestCaseError> {
-    if let Err(error) = result {
-        let Error::Input { file, place, .. } = &error else {
-            return Err(TestCaseError::fail(error.to_string()));
-        };
-        prop_assert!(file.starts_with("f.") && !place.is_empty(), "{}", error);
-    }
-    Ok(())
-}
-
-proptest! {
-    #[test]
-    fn random_bytes_are_read_or_refused(bytes in prop::collection::vec(any::<u8>(), 0..400), kind in 0usize..5) {
-        let name = ["f.csv", "f.gpx", "f.kml", "f.txt", "f.ld"][kind];
-        names_its_place(Survey::parse(&bytes, name, &wide()))?;
-        let start = [racetrack(), gpx(&oval(), "1.1"), kml(&oval()), latitudes(&oval()), log()];
-        let mut after = start[kind].as_bytes()[..300].to_vec();
-        after.extend(&bytes);
-        names_its_place(Survey::parse(&after, name, &wide()))?;
-    }
-
-    #[test]
-    fn damaged_files_are_read_or_refused(
-        kind in 0usize..6,
-        changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>(), 0u8..4), 1..6),
-        closed in prop::option::of(any::<bool>()),
-        whole_number in any::<bool>(),
-    ) {
-        let good = [
-            racetrack(),
-            gpx(&oval(), "1.0"),
-            kml(&oval()),
-            latitudes(&oval()),
-            log(),
-            edges(&ring(95.0, 60), &ring(105.0, 70)),
-        ];
-        let name = ["f.csv", "f.gpx", "f.kml", "f.csv", "f.csv", "f.csv"][kind];
-        let mut bytes = good[kind].as_bytes().to_vec();
-        for (at, byte, what) in changes {
-            if bytes.is_empty() {
-                break;
-            }
-            let at = at.index(bytes.len());
-            // Digits keep a file readable and make its figures wild.
-            let byte = if whole_number { b'0' + byte % 10 } else { byte };
-            match what {
-                0 => bytes[at] = byte,
-                1 => bytes.insert(at, byte),
-                2 => drop(bytes.remove(at)),
-                _ => {
-                    let end = (at + 40).min(bytes.len());
-                    let piece: Vec<u8> = bytes[at..end].to_vec();
-                    bytes.splice(at..at, piece);
-                }
-            }
-        }
-        let options = SurveyOptions { closed, ..wide() };
-        let result = Survey::parse(&bytes, name, &options);
-        if let Ok(survey) = &result {
-            // What is taken for a road is a road: its spline and cuts are finite, or refused.
-            if let Ok(line) = survey.smoothed(&crate::track::Smoothing::default())
-                && let Ok(cuts) = line.cross_sections(&crate::track::Spacing::equal(50))
-            {
-                prop_assert!(cuts.right_m.iter().chain(&cuts.left_m).all(|p| p.is_finite()));
-            }
-        }
-        names_its_place(result)?;
     }
 }
