@@ -463,7 +463,11 @@ fn hostile_lines_are_checked_in_seconds() {
             DVec2::new(0.0, 0.1 * f64::from(i)),
             DVec2::new(19.0, 0.1 * f64::from(i)),
         );
-        let ends = if i % 2 == 0 { [near, far] } else { [far, near] };
+        let ends = if i.is_multiple_of(2) {
+            [near, far]
+        } else {
+            [far, near]
+        };
         ends.map(|p| slant.rotate(p))
     };
     let comb = survey((0..5000).flat_map(stroke).collect(), false, 0.2);
