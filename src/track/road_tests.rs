@@ -205,6 +205,8 @@ fn a_hairpin_whose_edges_cross_is_refused_by_station() {
         .unwrap_err()
         .to_string();
     assert!(error.contains("test.csv: station"), "{error}");
+    let error = tight.circuit().unwrap_err().to_string();
+    assert!(error.contains("test.csv: station"), "{error}");
     // Legs that lean towards each other until their roads overlap.
     let mut points: Vec<DVec2> = (0..60).map(|i| DVec2::new(5.0 * f64::from(i), 0.0)).collect();
     for i in 1..30 {
@@ -463,7 +465,11 @@ fn hostile_lines_are_checked_in_seconds() {
             DVec2::new(0.0, 0.1 * f64::from(i)),
             DVec2::new(19.0, 0.1 * f64::from(i)),
         );
-        let ends = if i % 2 == 0 { [near, far] } else { [far, near] };
+        let ends = if i.is_multiple_of(2) {
+            [near, far]
+        } else {
+            [far, near]
+        };
         ends.map(|p| slant.rotate(p))
     };
     let comb = survey((0..5000).flat_map(stroke).collect(), false, 0.2);
