@@ -33,6 +33,8 @@ impl Default for Smoothing {
 const LONGEST_WAVE_M: f64 = 100.0;
 /// The same for the widths (m).
 const LONGEST_WIDTH_WAVE_M: f64 = 200.0;
+/// Distance between the cross-sections by which a road is tried (m).
+const TRIED_EVERY_M: f64 = 5.0;
 /// The most that may be asked for (m).
 const MOST_SMOOTHING_M: f64 = 10.0;
 
@@ -230,11 +232,14 @@ impl ReferenceLine {
         cross_sections(self, spacing)
     }
 
-    /// A circuit along the line, and what closing it took.
+    /// A circuit along the line, and what closing it took. Cross-sections every few metres are tried first, so that
+    /// a road that cannot be is found here and not in a study.
     ///
     /// # Errors
-    /// [`Error::Input`] where the line cannot be a road's.
+    /// [`Error::Input`] naming the station where the line or its widths cannot be a road's.
     pub fn circuit(&self) -> Result<(Circuit, Closure)> {
+        let cuts = (self.length_m() / TRIED_EVERY_M).ceil().max(8.0) as usize;
+        self.cross_sections(&Spacing::equal(cuts))?;
         circuit(self)
     }
 

@@ -205,6 +205,8 @@ fn a_hairpin_whose_edges_cross_is_refused_by_station() {
         .unwrap_err()
         .to_string();
     assert!(error.contains("test.csv: station"), "{error}");
+    let error = tight.circuit().unwrap_err().to_string();
+    assert!(error.contains("test.csv: station"), "{error}");
     // Legs that lean towards each other until their roads overlap.
     let mut points: Vec<DVec2> = (0..60).map(|i| DVec2::new(5.0 * f64::from(i), 0.0)).collect();
     for i in 1..30 {
