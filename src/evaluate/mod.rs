@@ -4,6 +4,7 @@
 //! it. Optimisers see nothing else, so they run any problem on any backend.
 
 pub mod gpu;
+pub mod point;
 pub mod replay;
 pub mod simd;
 
@@ -24,6 +25,18 @@ pub struct Variable {
     pub upper: f64,
 }
 
+impl Variable {
+    /// From its name, unit and bounds.
+    pub fn new(name: impl Into<String>, unit: &str, lower: f64, upper: f64) -> Self {
+        Self {
+            name: name.into(),
+            unit: unit.to_owned(),
+            lower,
+            upper,
+        }
+    }
+}
+
 /// An objective, to be minimised.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Objective {
@@ -31,6 +44,16 @@ pub struct Objective {
     pub name: String,
     /// Its unit, `-` for none.
     pub unit: String,
+}
+
+impl Objective {
+    /// From its name and unit.
+    pub fn new(name: impl Into<String>, unit: &str) -> Self {
+        Self {
+            name: name.into(),
+            unit: unit.to_owned(),
+        }
+    }
 }
 
 /// What is to be optimised.
@@ -54,6 +77,8 @@ pub enum Failure {
     Spun,
     /// A decision variable was not a finite number.
     NotFinite,
+    /// An objective was not a finite number.
+    Undefined,
 }
 
 impl fmt::Display for Failure {
@@ -62,6 +87,7 @@ impl fmt::Display for Failure {
             Self::IllFormedTyre(reason) => write!(f, "an ill-formed tyre: {reason}"),
             Self::Spun => f.write_str("spun"),
             Self::NotFinite => f.write_str("a variable that is not a finite number"),
+            Self::Undefined => f.write_str("an objective that is not a finite number"),
         }
     }
 }

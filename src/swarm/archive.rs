@@ -1,27 +1,49 @@
 //! The archive of solutions that nothing found so far dominates.
 
+use super::metrics::exclusive;
+use super::settings::Truncation;
+
 /// A bounded set of non-dominated solutions; all objectives are minimised.
 #[derive(Clone, Debug)]
 pub struct Archive {
     capacity: usize,
-    /// Positions in the unit cube, one row per member.
+    truncation: Truncation,
+    /// Positions in the swarm's unit cube, one row per member.
     pub positions: Vec<Vec<f64>>,
     /// Objectives, one row per member.
     pub objectives: Vec<Vec<f64>>,
+    /// What each member alone dominates and the far corner of the box that this lies in; kept only for
+    /// truncation by it.
+    shares: Vec<(f64, [f64; 3])>,
+    /// The reference point of the shares.
+    reference: Vec<f64>,
 }
 
 /// Whether `a` is at least as good as `b` in every objective and better in one.
 pub fn dominates(a: &[f64], b: &[f64]) -> bool {
-    a.iter().zip(b).all(|(x, y)| x <= y) && a.iter().zip(b).any(|(x, y)| x < y)
+    let mut better = false;
+    for (x, y) in a.iter().zip(b) {
+        if x > y {
+            return false;
+        }
+        better |= x < y;
+    }
+    better
 }
+
+/// The reference point lies this share of the archive's range beyond its worst values, so that extremes count.
+const BEYOND: f64 = 0.1;
 
 impl Archive {
     /// An empty archive of at most `capacity` members.
-    pub fn new(capacity: usize) -> Self {
+    pub fn new(capacity: usize, truncation: Truncation) -> Self {
         Self {
             capacity,
+            truncation,
             positions: Vec::new(),
             objectives: Vec::new(),
+            shares: Vec::new(),
+            reference: Vec::new(),
         }
     }
 
@@ -35,104 +57,263 @@ impl Archive {
         self.objectives.is_empty()
     }
 
-    /// Takes a solution in unless a member dominates or equals it; members that it dominates leave. Returns
-    /// whether it came in. [`Archive::truncate`] bounds the size afterwards.
+    /// Takes a solution in unless a member dominates or equals it; members that it dominates leave. If there
+    /// is one too many then, the one leaves that would be missed least and is not the best in any objective, which
+    /// may be the new one. Returns whether it came in.
     pub fn insert(&mut self, position: &[f64], objectives: &[f64]) -> bool {
-        if self
-            .objectives
-            .iter()
-            .any(|m| m == objectives || dominates(m, objectives))
-        {
+        let beaten = |m: &Vec<f64>| m.iter().zip(objectives).all(|(x, y)| x <= y);
+        if self.objectives.iter().any(beaten) {
             return false;
         }
-        let mut kept = 0;
-        for i in 0..self.len() {
-            if !dominates(objectives, &self.objectives[i]) {
-                self.objectives.swap(kept, i);
-                self.positions.swap(kept, i);
-                kept += 1;
+        let mut i = 0;
+        while i < self.len() {
+            if dominates(objectives, &self.objectives[i]) {
+                self.drop_member(i);
+            } else {
+                i += 1;
             }
         }
-        self.objectives.truncate(kept);
-        self.positions.truncate(kept);
         self.objectives.push(objectives.to_vec());
         self.positions.push(position.to_vec());
+        if self.by_contribution() {
+            self.shares.push((0.0, [f64::INFINITY; 3]));
+            self.refresh(objectives);
+        }
+        if self.len() > self.capacity {
+            let mut worth = self.worth();
+            // The ends of a front are what its users look for first.
+            for k in 0..objectives.len() {
+                let value = |i: usize| self.objectives[i][k];
+                if let Some(end) = (0..self.len()).min_by(|&a, &b| value(a).total_cmp(&value(b))) {
+                    worth[end] = f64::INFINITY;
+                }
+            }
+            let least = (0..self.len())
+                .min_by(|&a, &b| worth[a].total_cmp(&worth[b]))
+                .unwrap_or(0);
+            let left = self.objectives[least].clone();
+            self.drop_member(least);
+            if self.by_contribution() {
+                self.refresh(&left);
+            }
+            return left != objectives;
+        }
         true
     }
 
-    /// Removes the most crowded member, one at a time, until the archive is within its capacity.
-    pub fn truncate(&mut self) {
-        while self.len() > self.capacity {
-            let crowding = self.crowding();
-            let most = (0..self.len())
-                .min_by(|&a, &b| crowding[a].total_cmp(&crowding[b]))
-                .unwrap_or(0);
-            self.objectives.swap_remove(most);
-            self.positions.swap_remove(most);
+    /// How much the archive would miss each member, by the measure that it is truncated by.
+    pub fn worth(&self) -> Vec<f64> {
+        if self.by_contribution() {
+            return self.shares.iter().map(|s| s.0).collect();
         }
+        match self.truncation {
+            Truncation::Crowding => self.crowding(),
+            Truncation::Contribution | Truncation::MutualNearest => self.remoteness(),
+        }
+    }
+
+    fn by_contribution(&self) -> bool {
+        let width = self.objectives.first().map_or(0, Vec::len);
+        self.truncation == Truncation::Contribution && width <= 3
+    }
+
+    fn drop_member(&mut self, i: usize) {
+        self.objectives.swap_remove(i);
+        self.positions.swap_remove(i);
+        if !self.shares.is_empty() {
+            self.shares.swap_remove(i);
+        }
+    }
+
+    /// Brings the shares up to date after `change` came or went.
+    fn refresh(&mut self, change: &[f64]) {
+        let reference: Vec<f64> = (0..change.len())
+            .map(|k| {
+                let (low, high) = self.range(k);
+                high + if high > low { BEYOND * (high - low) } else { 1.0 }
+            })
+            .collect();
+        let moved = reference != self.reference;
+        self.reference = reference;
+        for i in 0..self.len() {
+            // Only what lies at or below the corner of a member's box touches its share.
+            if moved
+                || change
+                    .iter()
+                    .zip(&self.shares[i].1)
+                    .all(|(x, corner)| x <= corner)
+            {
+                self.shares[i] = exclusive(&self.objectives, i, &self.reference);
+            }
+        }
+    }
+
+    fn range(&self, k: usize) -> (f64, f64) {
+        let values = self.objectives.iter().map(|m| m[k]);
+        values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| {
+            (low.min(x), high.max(x))
+        })
     }
 
     /// Crowding distance of each member (Deb et al. 2002): the sum over objectives of the gap between its
     /// neighbours, as a share of the range; infinite for the extremes.
     pub fn crowding(&self) -> Vec<f64> {
-        let mut distance = vec![0.0; self.len()];
+        let rows: Vec<&[f64]> = self.objectives.iter().map(Vec::as_slice).collect();
+        crowding(&rows)
+    }
+
+    /// Distance of each member to its nearest neighbour, each objective as a share of its range; ties, which
+    /// every nearest pair is, by the next neighbours. As ranks, from nought.
+    fn remoteness(&self) -> Vec<f64> {
+        let n = self.len();
         let width = self.objectives.first().map_or(0, Vec::len);
-        for k in 0..width {
-            let mut order: Vec<usize> = (0..self.len()).collect();
-            order.sort_by(|&a, &b| self.objectives[a][k].total_cmp(&self.objectives[b][k]));
-            let (Some(&first), Some(&last)) = (order.first(), order.last()) else {
-                continue;
-            };
-            let range = self.objectives[last][k] - self.objectives[first][k];
-            distance[first] = f64::INFINITY;
-            distance[last] = f64::INFINITY;
-            if range > 0.0 {
-                for w in order.windows(3) {
-                    distance[w[1]] += (self.objectives[w[2]][k] - self.objectives[w[0]][k]) / range;
+        let ranges: Vec<(f64, f64)> = (0..width).map(|k| self.range(k)).collect();
+        let scale = |k: usize| {
+            let (low, high) = ranges[k];
+            if high > low { 1.0 / (high - low) } else { 0.0 }
+        };
+        let square = |i: usize, j: usize| -> f64 {
+            let gap = |k: usize| (self.objectives[i][k] - self.objectives[j][k]) * scale(k);
+            (0..width).map(|k| gap(k).powi(2)).sum()
+        };
+        let nearest = |i: usize| {
+            let mut two = [f64::INFINITY; 2];
+            for j in (0..n).filter(|&j| j != i) {
+                let d = square(i, j);
+                if d < two[0] {
+                    two = [d, two[0]];
+                } else if d < two[1] {
+                    two[1] = d;
                 }
             }
+            two
+        };
+        let neighbours: Vec<[f64; 2]> = (0..n).map(nearest).collect();
+        let mut order: Vec<usize> = (0..n).collect();
+        order.sort_by(|&a, &b| {
+            let (p, q) = (neighbours[a], neighbours[b]);
+            p[0].total_cmp(&q[0]).then(p[1].total_cmp(&q[1]))
+        });
+        // Ranks, which keep the order with its ties broken.
+        let mut worth = vec![0.0; n];
+        for (rank, &i) in order.iter().enumerate() {
+            worth[i] = rank as f64;
         }
-        distance
+        worth
     }
+}
+
+/// Crowding distance of each row among all, see [`Archive::crowding`].
+pub(super) fn crowding(rows: &[&[f64]]) -> Vec<f64> {
+    let mut distance = vec![0.0; rows.len()];
+    let width = rows.first().map_or(0, |r| r.len());
+    let mut order: Vec<usize> = (0..rows.len()).collect();
+    for k in 0..width {
+        order.sort_by(|&a, &b| rows[a][k].total_cmp(&rows[b][k]).then(a.cmp(&b)));
+        let (Some(&first), Some(&last)) = (order.first(), order.last()) else {
+            continue;
+        };
+        let range = rows[last][k] - rows[first][k];
+        distance[first] = f64::INFINITY;
+        distance[last] = f64::INFINITY;
+        if range > 0.0 {
+            for w in order.windows(3) {
+                distance[w[1]] += (rows[w[2]][k] - rows[w[0]][k]) / range;
+            }
+        }
+    }
+    distance
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::random::Random;
+    use crate::swarm::metrics::{contributions, hypervolume, non_dominated};
+
+    const ALL: [Truncation; 3] = [
+        Truncation::Crowding,
+        Truncation::Contribution,
+        Truncation::MutualNearest,
+    ];
+
+    fn points(width: u32, count: u32) -> Vec<Vec<f64>> {
+        let random = Random::new(3);
+        (0..count)
+            .map(|i| (0..width).map(|k| random.below(64, 1, 0, i, k) as f64).collect())
+            .collect()
+    }
 
     #[test]
     fn keeps_exactly_the_non_dominated_without_truncation() {
-        let random = Random::new(3);
-        let points: Vec<Vec<f64>> = (0..300)
-            .map(|i| (0..3).map(|k| random.uniform(1, 0, i, k)).collect())
-            .collect();
-        let mut archive = Archive::new(1000);
-        for p in &points {
-            archive.insert(p, p);
+        for (truncation, width) in ALL.into_iter().flat_map(|t| [(t, 2), (t, 3), (t, 4)]) {
+            let points = points(width, 300);
+            let mut archive = Archive::new(1000, truncation);
+            for p in &points {
+                archive.insert(p, p);
+            }
+            let mut front: Vec<_> = non_dominated(&points)
+                .into_iter()
+                .map(|i| points[i].clone())
+                .collect();
+            let mut kept = archive.objectives.clone();
+            let key = |a: &Vec<f64>, b: &Vec<f64>| a.partial_cmp(b).unwrap();
+            front.sort_by(key);
+            kept.sort_by(key);
+            assert_eq!(front, kept);
         }
-        let mut front: Vec<_> = points
-            .iter()
-            .filter(|p| !points.iter().any(|q| dominates(q, p)))
-            .cloned()
-            .collect();
-        let mut kept = archive.objectives.clone();
-        let key = |a: &Vec<f64>, b: &Vec<f64>| a[0].total_cmp(&b[0]);
-        front.sort_by(key);
-        kept.sort_by(key);
-        assert_eq!(front, kept);
+    }
+
+    /// Every insertion leaves the non-dominated part of what was there, or that less one member.
+    #[test]
+    fn loses_nothing_but_by_truncation() {
+        for (truncation, width) in ALL.into_iter().flat_map(|t| [(t, 2), (t, 3), (t, 4)]) {
+            let mut archive = Archive::new(12, truncation);
+            for p in points(width, 400) {
+                let mut before = archive.objectives.clone();
+                before.push(p.clone());
+                let front = non_dominated(&before);
+                archive.insert(&p, &p);
+                assert_eq!(archive.len(), front.len().min(12));
+                assert!(
+                    archive
+                        .objectives
+                        .iter()
+                        .all(|m| front.iter().any(|&i| before[i] == *m))
+                );
+                assert_eq!(non_dominated(&archive.objectives).len(), archive.len());
+                assert_eq!(archive.positions, archive.objectives);
+            }
+        }
+    }
+
+    /// The shares that are kept up to date are those of a fresh calculation, and truncation gives up the least
+    /// volume.
+    #[test]
+    fn shares_stay_exact() {
+        for width in [2, 3] {
+            let mut archive = Archive::new(15, Truncation::Contribution);
+            for p in points(width, 600) {
+                archive.insert(&p, &p);
+                let fresh = contributions(&archive.objectives, &archive.reference).unwrap();
+                assert_eq!(archive.worth(), fresh);
+            }
+            assert!(hypervolume(&archive.objectives, &archive.reference).unwrap() > 0.0);
+        }
     }
 
     #[test]
     fn truncation_keeps_extremes_and_bound() {
-        let mut archive = Archive::new(10);
-        for i in 0..100 {
-            let x = f64::from(i) / 99.0;
-            archive.insert(&[x], &[x, 1.0 - x]);
+        for truncation in ALL {
+            let mut archive = Archive::new(10, truncation);
+            for i in 0..100 {
+                let x = f64::from(i * 37 % 100) / 99.0;
+                archive.insert(&[x], &[x, 1.0 - x]);
+            }
+            assert_eq!(archive.len(), 10);
+            let holds = |end: [f64; 2]| archive.objectives.contains(&end.to_vec());
+            assert!(holds([0.0, 1.0]) && holds([1.0, 0.0]));
+            assert!(!archive.insert(&[0.0], &[0.0, 1.0]), "no duplicates");
         }
-        archive.truncate();
-        assert_eq!(archive.len(), 10);
-        assert!(archive.objectives.contains(&vec![0.0, 1.0]) && archive.objectives.contains(&vec![1.0, 0.0]));
-        assert!(!archive.insert(&[0.0], &[0.0, 1.0]), "no duplicates");
     }
 }

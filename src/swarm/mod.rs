@@ -13,19 +13,35 @@
 //! 5. Deb et al., *A fast and elitist multiobjective genetic algorithm: NSGA-II*, IEEE TEC 6 (2002) (crowding).
 //! 6. Nebro et al., *SMPSO*, MCDM 2009 (speed limit, reversed velocity at a bound).
 //! 7. Storn, Price, *Differential evolution*, J. Global Optimization 11 (1997) (difference moves).
+//! 8. Beume, Naujoks, Emmerich, *SMS-EMOA*, European J. Operational Research 181 (2007) (truncation by contribution).
+//! 9. Zitzler, Laumanns, Thiele, *SPEA2*, TIK report 103 (2001) (truncation by the nearest neighbours).
 
 mod archive;
+mod cooperative;
 mod covariance;
+mod difference;
+mod hybrid;
+pub mod metrics;
 mod mopso;
 mod motion;
+mod nsga2;
+pub mod problems;
 mod pso;
 mod settings;
+mod space;
 
 pub use archive::Archive;
-pub use covariance::{CovarianceSettings, CovarianceSwarm};
+pub use cooperative::{CooperativeSettings, CooperativeSwarm};
+pub use covariance::{CovarianceSettings, CovarianceSwarm, Restarts};
+pub use difference::{DifferenceSettings, DifferenceSwarm};
+pub use hybrid::{HybridSettings, HybridSwarm};
 pub use mopso::Mopso;
+pub use nsga2::{Nsga2, Nsga2Settings};
 pub use pso::Pso;
-pub use settings::{BoundHandling, Leaders, MopsoSettings, Mutation, PsoSettings, Randomness, Schedule};
+pub use settings::{
+    BoundHandling, Constriction, DRAWN_PULLS, Leaders, MopsoSettings, Mutation, PsoSettings, Randomness,
+    Schedule, Truncation,
+};
 
 use crate::error::Result;
 use crate::evaluate::{Evaluation, Evaluator};
@@ -45,11 +61,37 @@ pub trait Optimiser {
     /// Iterations that the settings plan for.
     fn planned_iterations(&self) -> usize;
 
+    /// Whether what the settings plan for is done.
+    fn done(&self) -> bool {
+        self.iteration() >= self.planned_iterations()
+    }
+
     /// Candidates evaluated so far.
     fn evaluations(&self) -> u64;
 
     /// The least value seen of each objective.
     fn best(&self) -> Vec<f64>;
+
+    /// What has been found: the archive, or the one best candidate with its cost.
+    fn front(&self) -> Front;
+}
+
+/// Candidates, none of which another dominates, and their objectives.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Front {
+    /// Rows of variables, in their units.
+    pub candidates: Vec<Vec<f64>>,
+    /// Rows of objectives.
+    pub objectives: Vec<Vec<f64>>,
+}
+
+impl Front {
+    fn single(candidate: Vec<f64>, cost: f64) -> Self {
+        Self {
+            candidates: vec![candidate],
+            objectives: vec![vec![cost]],
+        }
+    }
 }
 
 /// What an observer of a run sees after each iteration.
@@ -77,7 +119,7 @@ pub fn run(
     mut observe: impl FnMut(&Progress) -> ControlFlow<()>,
 ) -> Result<()> {
     let width = evaluator.problem().objectives.len();
-    while optimiser.iteration() < optimiser.planned_iterations() {
+    while !optimiser.done() {
         let population = optimiser.ask();
         let evaluation = evaluator.evaluate(&population)?;
         optimiser.tell(&evaluation);

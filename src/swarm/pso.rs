@@ -1,8 +1,8 @@
 //! Single-objective particle swarm; minimises the first objective.
 
-use super::Optimiser;
 use super::motion::{Particles, Purpose};
 use super::settings::PsoSettings;
+use super::{Front, Optimiser};
 use crate::error::Result;
 use crate::evaluate::{Evaluation, FAILED_COST, Problem};
 use crate::random::Random;
@@ -32,7 +32,7 @@ impl Pso {
     pub fn new(problem: &Problem, settings: PsoSettings) -> Result<Self> {
         settings.validate()?;
         let random = Random::new(settings.seed);
-        let particles = Particles::scattered(&problem.variables, settings.population, random);
+        let particles = Particles::scattered(problem, settings.population, random)?;
         Ok(Self {
             best_position: particles.position.clone(),
             best_cost: vec![f64::INFINITY; settings.population],
@@ -48,9 +48,8 @@ impl Pso {
 
     /// The best candidate so far, in the variables' units, and its cost.
     pub fn best_candidate(&self) -> (Vec<f64>, f64) {
-        let d = self.particles.dimensions();
-        let row = &self.best_position[self.leader * d..(self.leader + 1) * d];
-        (self.particles.scaled(row), self.best_cost[self.leader])
+        let row = &self.best_position[self.particles.row(self.leader)];
+        (self.particles.space.scaled(row, 1), self.best_cost[self.leader])
     }
 
     fn advance(&mut self) {
@@ -94,7 +93,10 @@ impl Pso {
         let (first, second) = (pick(1), pick(2));
         let scale = 0.4 + 0.5 * uniform(3);
         let crossover = if uniform(4) < 0.5 { 0.9 } else { 0.3 };
-        let always = self.random.below(d.max(1), purpose, when, who, 5);
+        if d == 0 {
+            return;
+        }
+        let always = self.random.below(d, purpose, when, who, 5);
         for k in 0..d {
             let i = particle * d + k;
             let at = |p: usize| self.best_position[p * d + k];
@@ -119,7 +121,7 @@ impl Pso {
 
 impl Optimiser for Pso {
     fn ask(&mut self) -> Vec<f64> {
-        self.particles.scaled(&self.particles.position)
+        self.particles.candidates()
     }
 
     fn tell(&mut self, evaluation: &Evaluation) {
@@ -150,6 +152,11 @@ impl Optimiser for Pso {
 
     fn evaluations(&self) -> u64 {
         self.evaluations
+    }
+
+    fn front(&self) -> Front {
+        let (candidate, cost) = self.best_candidate();
+        Front::single(candidate, cost)
     }
 
     fn best(&self) -> Vec<f64> {

@@ -46,7 +46,25 @@ pub enum BoundHandling {
     Absorb,
     /// It stops at the bound and its velocity there is reversed and halved.
     Bounce,
+    /// It stops at the bound and its velocity there is reversed.
+    Reverse,
 }
+
+/// Whether the step of a particle is shortened as a whole.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Constriction {
+    /// By the inertia only.
+    None,
+    /// By the coefficient of Clerc and Kennedy \[3\] for the sum of the pulls; the inertia is then one.
+    Clerc,
+    /// As in SMPSO \[6\]: the pulls are drawn anew for each particle and iteration, uniformly between
+    /// [`DRAWN_PULLS`], and the coefficient is used with its sign, which turns the step round where they add up to
+    /// more than four.
+    Signed,
+}
+
+/// Bounds of the pulls that [`Constriction::Signed`] draws.
+pub const DRAWN_PULLS: [f64; 2] = [1.5, 2.5];
 
 /// Settings of [`super::Pso`].
 #[derive(Clone, Debug, PartialEq)]
@@ -63,6 +81,8 @@ pub struct PsoSettings {
     pub cognitive: Schedule,
     /// Pull `c2` towards the swarm's best.
     pub social: Schedule,
+    /// Shortening of the step.
+    pub constriction: Constriction,
     /// Random numbers of the pulls.
     pub randomness: Randomness,
     /// Greatest speed, as a share of the range per iteration.
@@ -84,6 +104,7 @@ impl Default for PsoSettings {
             inertia: Schedule::Linear { from: 0.5, to: 0.1 },
             cognitive: Schedule::Fixed(1.5),
             social: Schedule::Fixed(2.5),
+            constriction: Constriction::None,
             randomness: Randomness::PerDimension,
             speed_limit: 0.5,
             bounds: BoundHandling::Bounce,
@@ -150,31 +171,61 @@ impl PsoSettings {
 /// How a particle of [`super::Mopso`] chooses whom to follow.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Leaders {
-    /// The less crowded of two archive members drawn at random \[5, 6\].
-    CrowdingTournament,
+    /// Of two archive members drawn at random the one that the archive would miss more \[5, 6\].
+    Tournament,
     /// Any archive member.
     Random,
 }
 
-/// The exponent `mu` of the mutation's decline \[4\]: a particle mutates with probability
-/// `(1 - t)^(1/mu)` at the share `t` of the run, in one dimension, within that share of the range.
+/// By what an archive that is too full chooses who leaves; one member at a time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Truncation {
+    /// The least crowding distance \[5\].
+    Crowding,
+    /// The least volume that a member alone dominates \[8\]; for more than three objectives as `MutualNearest`.
+    Contribution,
+    /// The least distance to the nearest neighbour, then to the next \[9\].
+    MutualNearest,
+}
+
+/// What disturbs a particle after its move.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Mutation {
-    /// No mutation.
+    /// Nothing.
     None,
-    /// A fixed `mu`.
+    /// With probability `(1 - t)^(1/mu)` at the share `t` of the run, one dimension is redrawn within that share
+    /// of the range \[4\], with this exponent `mu`.
     Fixed(f64),
-    /// A `mu` drawn anew for each particle and iteration, between nought and one.
+    /// The same with a `mu` drawn anew for each particle and iteration, between nought and one.
     Random,
+    /// Polynomial mutation \[5\] of this share of the particles, each of whose dimensions is disturbed with
+    /// probability one over their number.
+    Polynomial {
+        /// Share of the particles.
+        share: f64,
+        /// Distribution index: the greater, the smaller the disturbance.
+        index: f64,
+    },
+}
+
+impl Mutation {
+    /// Polynomial mutation with the constants of SMPSO \[6\].
+    pub const SMPSO: Self = Self::Polynomial {
+        share: 1.0 / 6.0,
+        index: 20.0,
+    };
 }
 
 /// Settings of [`super::Mopso`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct MopsoSettings {
-    /// The motion's settings; `difference_share` is not used.
+    /// The motion's settings. A difference move goes from an archive member along the difference of two others
+    /// \[7\].
     pub motion: PsoSettings,
     /// Most members of the archive.
     pub archive: usize,
+    /// Who leaves an archive that is too full.
+    pub truncation: Truncation,
     /// Choice of leaders.
     pub leaders: Leaders,
     /// Mutation.
@@ -182,20 +233,57 @@ pub struct MopsoSettings {
 }
 
 impl Default for MopsoSettings {
+    /// The best found for two and three objectives over the test problems: the motion of SMPSO, a quarter of
+    /// difference moves, and an archive by contribution.
     fn default() -> Self {
+        let smpso = Self::smpso();
         Self {
             motion: PsoSettings {
-                difference_share: 0.0,
-                ..PsoSettings::default()
+                bounds: BoundHandling::Absorb,
+                difference_share: 0.25,
+                ..smpso.motion
             },
-            archive: 100,
-            leaders: Leaders::CrowdingTournament,
-            mutation: Mutation::Fixed(0.3),
+            truncation: Truncation::Contribution,
+            ..smpso
         }
     }
 }
 
 impl MopsoSettings {
+    /// SMPSO \[6\], with the constants of its paper.
+    pub fn smpso() -> Self {
+        Self {
+            motion: PsoSettings {
+                population: 100,
+                iterations: 250,
+                seed: 1,
+                inertia: Schedule::Fixed(0.1),
+                cognitive: Schedule::Fixed(2.0),
+                social: Schedule::Fixed(2.0),
+                constriction: Constriction::Signed,
+                randomness: Randomness::PerParticle,
+                speed_limit: 0.5,
+                bounds: BoundHandling::Reverse,
+                difference_share: 0.0,
+            },
+            archive: 100,
+            truncation: Truncation::Crowding,
+            leaders: Leaders::Tournament,
+            mutation: Mutation::SMPSO,
+        }
+    }
+
+    /// The thesis's swarm: its [`PsoSettings::thesis`], mutation with `mu` 0.3.
+    pub fn thesis() -> Self {
+        Self {
+            motion: PsoSettings::thesis(),
+            archive: 100,
+            truncation: Truncation::Crowding,
+            leaders: Leaders::Tournament,
+            mutation: Mutation::Fixed(0.3),
+        }
+    }
+
     /// Checks every setting.
     ///
     /// # Errors
@@ -205,15 +293,19 @@ impl MopsoSettings {
         if self.archive < 2 {
             return Err(setting("archive", self.archive.to_string(), "2 or more"));
         }
-        if let Mutation::Fixed(mu) = self.mutation
-            && !(mu > 0.0 && mu <= 10.0)
-        {
-            return Err(setting("mutation", mu.to_string(), "a number above 0 up to 10"));
+        match self.mutation {
+            Mutation::Fixed(mu) if !(mu > 0.0 && mu <= 10.0) => {
+                Err(setting("mutation", mu.to_string(), "a number above 0 up to 10"))
+            }
+            Mutation::Polynomial { share, index } if !((0.0..=1.0).contains(&share) && index >= 0.0) => {
+                let found = format!("a share of {share}, an index of {index}");
+                Err(setting("mutation", found, "a share from 0 to 1, an index from 0"))
+            }
+            _ => Ok(()),
         }
-        Ok(())
     }
 }
 
-fn setting(name: &str, found: String, expected: &str) -> Error {
+pub(super) fn setting(name: &str, found: String, expected: &str) -> Error {
     Error::input("the swarm's settings", name, found, expected)
 }

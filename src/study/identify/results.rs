@@ -581,10 +581,11 @@ fn study_toml(s: &IdentifySettings) -> String {
     push("archive", Some(s.archive.to_string()));
     push(
         "mutation",
-        Some(match s.mutation {
+        s.mutation.map(|m| match m {
             Mutation::None => "0".to_owned(),
             Mutation::Fixed(mu) => format!("{mu:?}"),
             Mutation::Random => quoted("random"),
+            Mutation::Polynomial { .. } => quoted("polynomial"),
         }),
     );
     lines.push("\n[calibration]".to_owned());

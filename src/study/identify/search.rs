@@ -113,12 +113,7 @@ pub fn search(
     let motion = swarm_settings(settings);
 
     let (swarm_candidate, front) = if settings.objectives.len() > 1 {
-        let mopso_settings = MopsoSettings {
-            motion,
-            archive: settings.archive,
-            mutation: settings.mutation,
-            ..MopsoSettings::default()
-        };
+        let mopso_settings = front_settings(settings, motion);
         let planned = mopso_settings.motion.iterations;
         let mut swarm = Mopso::new(&replay.problem, mopso_settings)?;
         run(&mut swarm, evaluator.as_mut(), |p| {
@@ -241,6 +236,34 @@ fn swarm_settings(settings: &IdentifySettings) -> PsoSettings {
         inertia: settings.inertia.unwrap_or(base.inertia),
         cognitive: settings.cognitive.unwrap_or(base.cognitive),
         social: settings.social.unwrap_or(base.social),
+        ..base
+    }
+}
+
+/// The thesis's swarm, or the best there is; pulls that the study names make it a plain one with these.
+fn front_settings(settings: &IdentifySettings, motion: PsoSettings) -> MopsoSettings {
+    let named = [settings.inertia, settings.cognitive, settings.social];
+    let base = match settings.algorithm {
+        Algorithm::Thesis => MopsoSettings::thesis(),
+        _ => MopsoSettings::default(),
+    };
+    let motion = if settings.algorithm == Algorithm::Thesis || named.iter().any(Option::is_some) {
+        PsoSettings {
+            difference_share: base.motion.difference_share,
+            ..motion
+        }
+    } else {
+        PsoSettings {
+            population: motion.population,
+            iterations: motion.iterations,
+            seed: motion.seed,
+            ..base.motion
+        }
+    };
+    MopsoSettings {
+        motion,
+        archive: settings.archive,
+        mutation: settings.mutation.unwrap_or(base.mutation),
         ..base
     }
 }

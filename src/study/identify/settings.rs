@@ -88,7 +88,7 @@ pub struct IdentifySettings {
     /// Pull towards the leader.
     pub social: Option<Schedule>,
     /// Mutation of the multi-objective swarm.
-    pub mutation: Mutation,
+    pub mutation: Option<Mutation>,
     /// Members of the multi-objective archive.
     pub archive: usize,
     /// Seed of all random numbers.
@@ -158,7 +158,7 @@ impl Default for IdentifySettings {
             inertia: None,
             cognitive: None,
             social: None,
-            mutation: Mutation::Fixed(0.3),
+            mutation: None,
             archive: 100,
             seed: 1,
             polish: true,
@@ -337,15 +337,14 @@ impl IdentifySettings {
         self.social = schedule("social")?;
         self.mutation = match (table.number("mutation", 0.0, 10.0, ""), table.string("mutation")) {
             (Ok(None), _) => self.mutation,
-            (Ok(Some(mu)), _) => {
-                if mu > 0.0 {
-                    Mutation::Fixed(mu)
-                } else {
-                    Mutation::None
-                }
-            }
-            (_, Ok(Some("random"))) => Mutation::Random,
-            _ => return Err(table.refuse("mutation", "a number from 0 to 10, or \"random\"")),
+            (Ok(Some(mu)), _) => Some(if mu > 0.0 {
+                Mutation::Fixed(mu)
+            } else {
+                Mutation::None
+            }),
+            (_, Ok(Some("random"))) => Some(Mutation::Random),
+            (_, Ok(Some("polynomial"))) => Some(Mutation::SMPSO),
+            _ => return Err(table.refuse("mutation", "a number from 0 to 10, \"random\" or \"polynomial\"")),
         };
         Ok(())
     }

@@ -1,0 +1,206 @@
+//! Cooperating swarms, each of which looks after some of the variables: CPSO-S_K.
+//!
+//! Van den Bergh, Engelbrecht, *A cooperative approach to particle swarm optimization*, IEEE TEC 8 (2004). The
+//! variables are split into groups, each with a swarm of its own. A particle is evaluated in the context of the
+//! other groups' best, so a good value of one group is not lost because another group was bad at the same time.
+//! The groups take turns, one in each iteration, each from the context that the one before has left.
+
+use super::motion::{Particles, Purpose};
+use super::settings::{BoundHandling, Constriction, PsoSettings, Randomness, Schedule, setting};
+use super::space::Space;
+use super::{Front, Optimiser};
+use crate::error::Result;
+use crate::evaluate::{Evaluation, FAILED_COST, Problem};
+use crate::random::Random;
+use std::ops::Range;
+
+/// Settings of [`CooperativeSwarm`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct CooperativeSettings {
+    /// Motion within each group; the population is that of one group, the iterations those of all groups together.
+    /// There are no difference moves.
+    pub motion: PsoSettings,
+    /// Number of groups; at most one for each variable that is not fixed.
+    pub groups: usize,
+}
+
+impl Default for CooperativeSettings {
+    /// Six groups of ten particles, the pulls and the inertia of the paper.
+    fn default() -> Self {
+        Self {
+            motion: PsoSettings {
+                population: 10,
+                iterations: 10_000,
+                seed: 1,
+                inertia: Schedule::Linear { from: 1.0, to: 0.0 },
+                cognitive: Schedule::Fixed(1.49),
+                social: Schedule::Fixed(1.49),
+                constriction: Constriction::None,
+                randomness: Randomness::PerDimension,
+                speed_limit: 0.5,
+                bounds: BoundHandling::Bounce,
+                difference_share: 0.0,
+            },
+            groups: 6,
+        }
+    }
+}
+
+impl CooperativeSettings {
+    /// Checks every setting.
+    ///
+    /// # Errors
+    /// [`crate::Error::Input`] naming the setting.
+    pub fn validate(&self) -> Result<()> {
+        if self.groups == 0 {
+            return Err(setting("groups", self.groups.to_string(), "1 or more"));
+        }
+        self.motion.validate()
+    }
+}
+
+/// The swarm of one group.
+#[derive(Clone, Debug)]
+struct Group {
+    /// The coordinates that it looks after.
+    columns: Range<usize>,
+    particles: Particles,
+    best_position: Vec<f64>,
+    best_cost: Vec<f64>,
+    turns: usize,
+    random: Random,
+}
+
+/// Groups of particles about a common context; minimises the first objective.
+#[derive(Clone, Debug)]
+pub struct CooperativeSwarm {
+    settings: CooperativeSettings,
+    space: Space,
+    objectives: usize,
+    groups: Vec<Group>,
+    /// The best position of each group, put together, and its cost.
+    context: Vec<f64>,
+    cost: f64,
+    iteration: usize,
+    evaluations: u64,
+}
+
+impl CooperativeSwarm {
+    /// Swarms over the variables of `problem`.
+    ///
+    /// # Errors
+    /// [`crate::Error::Input`] naming the setting that is out of its range.
+    pub fn new(problem: &Problem, settings: CooperativeSettings) -> Result<Self> {
+        settings.validate()?;
+        let space = Space::new(problem)?;
+        let d = space.dimensions();
+        let count = settings.groups.min(d).max(1);
+        let groups: Vec<Group> = (0..count)
+            .map(|g| {
+                let columns = g * d / count..(g + 1) * d / count;
+                // Each group draws from a seed of its own.
+                let words = Random::new(settings.motion.seed).words(Purpose::Start as u32, 0, g as u32, 0);
+                let random = Random::new(u64::from(words[0]) << 32 | u64::from(words[1]));
+                let particles =
+                    Particles::scattered_in(space.part(columns.clone()), settings.motion.population, random);
+                Group {
+                    best_position: particles.position.clone(),
+                    best_cost: vec![f64::INFINITY; settings.motion.population],
+                    columns,
+                    particles,
+                    turns: 0,
+                    random,
+                }
+            })
+            .collect();
+        let context = groups
+            .iter()
+            .flat_map(|g| g.particles.position[g.particles.row(0)].to_vec())
+            .collect();
+        Ok(Self {
+            settings,
+            space,
+            objectives: problem.objectives.len(),
+            groups,
+            context,
+            cost: f64::INFINITY,
+            iteration: 0,
+            evaluations: 0,
+        })
+    }
+
+    /// The best candidate so far, in the variables' units, and its cost.
+    pub fn best_candidate(&self) -> (Vec<f64>, f64) {
+        (self.space.scaled(&self.context, 1), self.cost)
+    }
+}
+
+impl Optimiser for CooperativeSwarm {
+    fn ask(&mut self) -> Vec<f64> {
+        let group = &self.groups[self.iteration % self.groups.len()];
+        let row = |particle: usize| {
+            let mut position = self.context.clone();
+            position[group.columns.clone()]
+                .copy_from_slice(&group.particles.position[group.particles.row(particle)]);
+            position
+        };
+        let rows: Vec<f64> = (0..group.particles.count).flat_map(row).collect();
+        self.space.scaled(&rows, group.particles.count)
+    }
+
+    fn tell(&mut self, evaluation: &Evaluation) {
+        let turn = self.iteration % self.groups.len();
+        let planned = (self.settings.motion.iterations / self.groups.len()).max(2) - 1;
+        let group = &mut self.groups[turn];
+        for (particle, row) in evaluation.objectives.chunks_exact(self.objectives).enumerate() {
+            let cost = if row[0].is_finite() { row[0] } else { FAILED_COST };
+            let range = group.particles.row(particle);
+            let position = &group.particles.position[range.clone()];
+            if cost < group.best_cost[particle] {
+                group.best_cost[particle] = cost;
+                group.best_position[range].copy_from_slice(position);
+            }
+            if cost < self.cost {
+                self.cost = cost;
+                self.context[group.columns.clone()].copy_from_slice(position);
+            }
+        }
+        let leader = self.context[group.columns.clone()].to_vec();
+        let share = (group.turns as f64 / planned as f64).min(1.0);
+        for particle in 0..group.particles.count {
+            let own = &group.best_position[group.particles.row(particle)];
+            let when = (share, group.turns);
+            group.particles.pull(
+                particle,
+                (own, &leader),
+                &self.settings.motion,
+                when,
+                group.random,
+            );
+        }
+        group.turns += 1;
+        self.evaluations += group.particles.count as u64;
+        self.iteration += 1;
+    }
+
+    fn iteration(&self) -> usize {
+        self.iteration
+    }
+
+    fn planned_iterations(&self) -> usize {
+        self.settings.motion.iterations
+    }
+
+    fn evaluations(&self) -> u64 {
+        self.evaluations
+    }
+
+    fn front(&self) -> Front {
+        let (candidate, cost) = self.best_candidate();
+        Front::single(candidate, cost)
+    }
+
+    fn best(&self) -> Vec<f64> {
+        vec![self.cost]
+    }
+}

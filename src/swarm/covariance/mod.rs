@@ -1,0 +1,276 @@
+//! A swarm that learns the shape of the valley it is in: covariance matrix adaptation.
+//!
+//! A plain swarm stalls where the cost is a long, narrow valley across the axes, as in any fit whose parameters
+//! stand in for one another. Here the particles are drawn about a common centre from a normal distribution whose
+//! covariance follows the steps that paid (Hansen, *The CMA evolution strategy: a tutorial*, arXiv:1604.00772,
+//! 2016, with the default constants of its table 1). It starts from where an exploring swarm got to, as in Müller,
+//! Baumgartner, Sbalzarini, *Particle swarm CMA evolution strategy*, CEC 2009.
+//!
+//! Where the distribution has collapsed it can start again elsewhere: with twice the particles each time (Auger,
+//! Hansen, *A restart CMA evolution strategy with increasing population size*, CEC 2005), or by turns with these
+//! and with few (Hansen, *Benchmarking a BI-population CMA-ES on the BBOB-2009 function testbed*, GECCO 2009).
+
+mod distribution;
+
+use super::space::Space;
+use super::{Front, Optimiser};
+use crate::error::{Error, Result};
+use crate::evaluate::{Evaluation, FAILED_COST, Problem};
+use crate::random::Random;
+use distribution::Distribution;
+use nalgebra::DVector;
+use std::collections::VecDeque;
+
+/// What becomes of a swarm whose distribution has collapsed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Restarts {
+    /// It goes on.
+    None,
+    /// It starts again anywhere, with twice the particles of the start before.
+    Growing,
+    /// It starts again by turns as `Growing` and with few particles and a random spread; whichever has had fewer
+    /// evaluations.
+    Alternating,
+}
+
+/// Settings of [`CovarianceSwarm`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct CovarianceSettings {
+    /// Particles at the start.
+    pub population: usize,
+    /// Iterations; their product with the population is the budget of evaluations.
+    pub iterations: usize,
+    /// Seed of all random numbers.
+    pub seed: u64,
+    /// Standard deviation at the start, as a share of the ranges.
+    pub spread: f64,
+    /// Whether the worst steps are unlearnt, besides the best being learnt.
+    pub active: bool,
+    /// Restarts.
+    pub restarts: Restarts,
+}
+
+impl Default for CovarianceSettings {
+    fn default() -> Self {
+        Self {
+            population: 64,
+            iterations: 800,
+            seed: 1,
+            spread: 0.1,
+            active: false,
+            restarts: Restarts::None,
+        }
+    }
+}
+
+/// A swarm drawn from an adapted normal distribution; minimises the first objective.
+#[derive(Clone, Debug)]
+pub struct CovarianceSwarm {
+    settings: CovarianceSettings,
+    space: Space,
+    objectives: usize,
+    random: Random,
+    distribution: Distribution,
+    /// Positions of the present population in the unit cube.
+    positions: Vec<DVector<f64>>,
+    best: (DVector<f64>, f64),
+    /// Best costs of the last iterations since the last start.
+    history: VecDeque<f64>,
+    /// Starts so far that doubled the particles.
+    doublings: u32,
+    /// Whether the present start is a small one, and the evaluations that small and other starts have had.
+    small: bool,
+    spent: [u64; 2],
+    iteration: usize,
+    evaluations: u64,
+}
+
+/// What the draws are for, in the counter.
+const SAMPLE: u32 = 0xc0a;
+const RESTART: u32 = 0xc0b;
+/// Standard deviation of a restart, as a share of the ranges.
+const RESTART_SPREAD: f64 = 0.3;
+/// A distribution narrower than this share of the ranges has collapsed,
+const COLLAPSED: f64 = 1e-15;
+/// as has one of this ratio of variances,
+const ILL_CONDITIONED: f64 = 1e14;
+/// or one whose best costs agree to this share.
+const SAME_COST: f64 = 1e-12;
+
+impl CovarianceSwarm {
+    /// A swarm over the variables of `problem` about `start` (in the variables' units).
+    ///
+    /// # Errors
+    /// [`Error::Input`] naming the setting that is out of its range.
+    pub fn new(problem: &Problem, start: &[f64], settings: CovarianceSettings) -> Result<Self> {
+        let space = Space::new(problem)?;
+        let d = problem.variables.len();
+        if settings.population < 4 || start.len() != d || start.iter().any(|x| !x.is_finite()) {
+            let found = format!(
+                "{} particles, {d} variables, a start of {}",
+                settings.population,
+                start.len()
+            );
+            let expected = "4 or more particles, and a start with a finite value for each of the variables";
+            return Err(Error::input(
+                "the swarm's settings",
+                "population, start",
+                found,
+                expected,
+            ));
+        }
+        if !(settings.spread > 0.0 && settings.spread <= 1.0) {
+            let found = settings.spread.to_string();
+            return Err(Error::input(
+                "the swarm's settings",
+                "spread",
+                found,
+                "a share above 0 up to 1",
+            ));
+        }
+        let mean = DVector::from_vec(space.position(start));
+        let mut swarm = Self {
+            objectives: problem.objectives.len(),
+            random: Random::new(settings.seed),
+            best: (mean.clone(), f64::INFINITY),
+            distribution: Distribution::new(mean, settings.spread),
+            space,
+            positions: Vec::new(),
+            history: VecDeque::new(),
+            doublings: 0,
+            small: false,
+            spent: [0; 2],
+            iteration: 0,
+            evaluations: 0,
+            settings,
+        };
+        swarm.sample(swarm.settings.population);
+        Ok(swarm)
+    }
+
+    /// The best candidate so far, in the variables' units, and its cost.
+    pub fn best_candidate(&self) -> (Vec<f64>, f64) {
+        (self.space.scaled(self.best.0.as_slice(), 1), self.best.1)
+    }
+
+    fn budget(&self) -> u64 {
+        (self.settings.population as u64).saturating_mul(self.settings.iterations as u64)
+    }
+
+    fn sample(&mut self, count: usize) {
+        let when = self.iteration as u32;
+        let draw = |particle: usize| {
+            self.distribution
+                .sample(|k| self.random.normal(SAMPLE, when, particle as u32, k as u32))
+        };
+        self.positions = (0..count).map(draw).collect();
+    }
+
+    /// Notes the iteration's best cost and says whether there is nothing left to gain from this start.
+    fn collapsed(&mut self, cost: f64) -> bool {
+        let kept = 10 + (30 * self.space.dimensions()).div_ceil(self.positions.len());
+        self.history.push_back(cost);
+        if self.history.len() > kept {
+            self.history.pop_front();
+        }
+        let (least, most) = self
+            .history
+            .iter()
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &c| {
+                (low.min(c), high.max(c))
+            });
+        let level = self.history.len() == kept && most - least <= SAME_COST * least.abs();
+        level || self.distribution.width() < COLLAPSED || self.distribution.condition() > ILL_CONDITIONED
+    }
+
+    /// Starts again anywhere; returns the number of particles.
+    fn restart(&mut self) -> usize {
+        let uniform = |index: usize| {
+            self.random
+                .uniform(RESTART, self.iteration as u32, 0, index as u32)
+        };
+        let d = self.space.dimensions();
+        let mean = DVector::from_fn(d, |k, _| uniform(2 + k));
+        self.history.clear();
+        let usual = self.settings.population;
+        self.small = self.settings.restarts == Restarts::Alternating
+            && self.doublings > 0
+            && self.spent[1] < self.spent[0];
+        let remaining = self.budget().saturating_sub(self.evaluations).max(4) as usize;
+        if self.small {
+            let least = ((4.0 + 3.0 * (d as f64).ln()) as usize).min(usual);
+            let large = (usual << self.doublings.min(20)) as f64;
+            let ratio = 0.5 * large / least as f64;
+            self.distribution = Distribution::new(mean, RESTART_SPREAD * 10f64.powf(-2.0 * uniform(0)));
+            let count = least as f64 * ratio.max(1.0).powf(uniform(1).powi(2));
+            return (count as usize).clamp(4, remaining);
+        }
+        self.doublings += 1;
+        self.distribution = Distribution::new(mean, RESTART_SPREAD);
+        // A population that the budget has no room for to converge is no use.
+        (usual << self.doublings.min(20))
+            .min((remaining / 50).max(usual))
+            .min(remaining)
+    }
+}
+
+impl Optimiser for CovarianceSwarm {
+    fn ask(&mut self) -> Vec<f64> {
+        let rows: Vec<f64> = self.positions.iter().flat_map(|p| p.iter().copied()).collect();
+        self.space.scaled(&rows, self.positions.len())
+    }
+
+    fn tell(&mut self, evaluation: &Evaluation) {
+        let costs: Vec<f64> = evaluation
+            .objectives
+            .chunks_exact(self.objectives)
+            .map(|row| if row[0].is_finite() { row[0] } else { FAILED_COST })
+            .collect();
+        let mut order: Vec<usize> = (0..costs.len()).collect();
+        order.sort_by(|&a, &b| costs[a].total_cmp(&costs[b]));
+        let Some(&first) = order.first() else {
+            return;
+        };
+        if costs[first] < self.best.1 {
+            self.best = (self.positions[first].clone(), costs[first]);
+        }
+        self.evaluations += costs.len() as u64;
+        self.spent[usize::from(self.small)] += costs.len() as u64;
+        let mut count = self.positions.len();
+        // A population that failed as a whole says nothing about where to go.
+        if costs[first] < FAILED_COST && self.space.dimensions() > 0 {
+            let ranked: Vec<&DVector<f64>> = order.iter().map(|&i| &self.positions[i]).collect();
+            self.distribution.adapt(&ranked, self.settings.active);
+            if self.settings.restarts != Restarts::None && self.collapsed(costs[first]) {
+                count = self.restart();
+            }
+        }
+        self.iteration += 1;
+        self.sample(count);
+    }
+
+    fn iteration(&self) -> usize {
+        self.iteration
+    }
+
+    fn planned_iterations(&self) -> usize {
+        self.settings.iterations
+    }
+
+    fn done(&self) -> bool {
+        self.evaluations + self.positions.len() as u64 > self.budget()
+    }
+
+    fn evaluations(&self) -> u64 {
+        self.evaluations
+    }
+
+    fn front(&self) -> Front {
+        let (candidate, cost) = self.best_candidate();
+        Front::single(candidate, cost)
+    }
+
+    fn best(&self) -> Vec<f64> {
+        vec![self.best.1]
+    }
+}

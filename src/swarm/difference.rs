@@ -1,0 +1,222 @@
+//! A swarm of difference moves that finds its own scale: differential evolution.
+//!
+//! Each particle tries the sum of another's position and the scaled difference of two further ones, in some of its
+//! coordinates, and stays where it was unless that is better. Scale and share of coordinates belong to the
+//! particle, are redrawn now and then and kept when the move paid (Storn, Price, *Differential evolution*, J.
+//! Global Optimization 11, 1997; Brest et al., *Self-adapting control parameters in differential evolution*, IEEE
+//! TEC 10, 2006, with its constants). It explores many hollows where a swarm with one leader commits itself to one.
+
+use super::motion::{Particles, Purpose};
+use super::settings::setting;
+use super::{Front, Optimiser};
+use crate::error::Result;
+use crate::evaluate::{Evaluation, FAILED_COST, Problem};
+use crate::random::Random;
+
+/// Settings of [`DifferenceSwarm`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct DifferenceSettings {
+    /// Particles.
+    pub population: usize,
+    /// Iterations, the first random population counted.
+    pub iterations: usize,
+    /// Seed of all random numbers.
+    pub seed: u64,
+    /// Probability that a particle redraws its scale, and that it redraws its share of coordinates.
+    pub redraw: f64,
+}
+
+impl Default for DifferenceSettings {
+    fn default() -> Self {
+        Self {
+            population: 40,
+            iterations: 1000,
+            seed: 1,
+            redraw: 0.1,
+        }
+    }
+}
+
+impl DifferenceSettings {
+    /// Checks every setting.
+    ///
+    /// # Errors
+    /// [`crate::Error::Input`] naming the setting.
+    pub fn validate(&self) -> Result<()> {
+        if self.population < 4 {
+            return Err(setting("population", self.population.to_string(), "4 or more"));
+        }
+        if self.iterations < 1 {
+            return Err(setting("iterations", self.iterations.to_string(), "1 or more"));
+        }
+        if !(0.0..=1.0).contains(&self.redraw) {
+            return Err(setting("redraw", self.redraw.to_string(), "a share from 0 to 1"));
+        }
+        Ok(())
+    }
+}
+
+/// A swarm of self-adapted difference moves; minimises the first objective.
+#[derive(Clone, Debug)]
+pub struct DifferenceSwarm {
+    settings: DifferenceSettings,
+    random: Random,
+    /// Where the particles try next.
+    particles: Particles,
+    objectives: usize,
+    home: Vec<f64>,
+    cost: Vec<f64>,
+    /// Scale and share of coordinates of each particle, and those of its present try.
+    control: Vec<[f64; 2]>,
+    tried: Vec<[f64; 2]>,
+    iteration: usize,
+    evaluations: u64,
+}
+
+impl DifferenceSwarm {
+    /// A swarm over the variables of `problem`.
+    ///
+    /// # Errors
+    /// [`crate::Error::Input`] naming the setting that is out of its range.
+    pub fn new(problem: &Problem, settings: DifferenceSettings) -> Result<Self> {
+        settings.validate()?;
+        let random = Random::new(settings.seed);
+        let particles = Particles::scattered(problem, settings.population, random)?;
+        Ok(Self {
+            home: particles.position.clone(),
+            cost: vec![f64::INFINITY; settings.population],
+            control: vec![[0.5; 2]; settings.population],
+            tried: vec![[0.5; 2]; settings.population],
+            objectives: problem.objectives.len(),
+            random,
+            particles,
+            settings,
+            iteration: 0,
+            evaluations: 0,
+        })
+    }
+
+    fn leader(&self) -> usize {
+        let by = |&a: &usize, &b: &usize| self.cost[a].total_cmp(&self.cost[b]);
+        (0..self.cost.len()).min_by(by).unwrap_or(0)
+    }
+
+    /// The best candidate so far, in the variables' units, and its cost.
+    pub fn best_candidate(&self) -> (Vec<f64>, f64) {
+        let leader = self.leader();
+        let row = &self.home[self.particles.row(leader)];
+        (self.particles.space.scaled(row, 1), self.cost[leader])
+    }
+
+    /// Root mean square distance of the particles from their mean along an axis, as a share of the ranges.
+    pub fn spread(&self) -> f64 {
+        let (d, n) = (self.particles.dimensions(), self.settings.population as f64);
+        let variance = |k: usize| {
+            let column = || self.home.iter().skip(k).step_by(d);
+            let mean = column().sum::<f64>() / n;
+            column().map(|x| (x - mean).powi(2)).sum::<f64>() / n
+        };
+        ((0..d).map(variance).sum::<f64>() / d.max(1) as f64).sqrt()
+    }
+
+    fn advance(&mut self) {
+        let when = self.iteration as u32;
+        for particle in 0..self.settings.population {
+            let who = particle as u32;
+            let uniform = |index: usize| {
+                self.random
+                    .uniform(Purpose::Difference as u32, when, who, index as u32)
+            };
+            let redrawn = |k: usize, value: f64| {
+                if uniform(k) < self.settings.redraw {
+                    value
+                } else {
+                    self.control[particle][k]
+                }
+            };
+            let [scale, share] = [redrawn(0, 0.1 + 0.9 * uniform(2)), redrawn(1, uniform(3))];
+            self.tried[particle] = [scale, share];
+            let [from, first, second] = self.three_others(particle);
+            let row = self.particles.row(particle);
+            let (d, at) = (row.len(), row.start);
+            let always = (uniform(4) * d as f64) as usize;
+            for k in 0..d {
+                let own = self.home[at + k];
+                let of = |p: usize| self.home[p * d + k];
+                let moved = of(from) + scale * (of(first) - of(second));
+                self.particles.position[at + k] = if k != always && uniform(5 + k) >= share {
+                    own
+                } else if moved < 0.0 {
+                    // Half-way to the bound that was overstepped, which keeps the spread of the swarm.
+                    0.5 * own
+                } else if moved > 1.0 {
+                    0.5 * (own + 1.0)
+                } else {
+                    moved
+                };
+            }
+        }
+    }
+
+    /// Three different particles, none of them this one.
+    fn three_others(&self, particle: usize) -> [usize; 3] {
+        let (when, who) = (self.iteration as u32, particle as u32);
+        let mut taken = [particle, 0, 0, 0];
+        for k in 0..3 {
+            let free = self.settings.population - 1 - k;
+            let mut other = self
+                .random
+                .below(free, Purpose::Leader as u32, when, who, k as u32);
+            // The nth of those not taken yet.
+            let mut passed = taken[..=k].to_vec();
+            passed.sort_unstable();
+            for p in passed {
+                other += usize::from(other >= p);
+            }
+            taken[k + 1] = other;
+        }
+        [taken[1], taken[2], taken[3]]
+    }
+}
+
+impl Optimiser for DifferenceSwarm {
+    fn ask(&mut self) -> Vec<f64> {
+        self.particles.candidates()
+    }
+
+    fn tell(&mut self, evaluation: &Evaluation) {
+        for (particle, row) in evaluation.objectives.chunks_exact(self.objectives).enumerate() {
+            let cost = if row[0].is_finite() { row[0] } else { FAILED_COST };
+            if cost <= self.cost[particle] {
+                self.cost[particle] = cost;
+                self.control[particle] = self.tried[particle];
+                let range = self.particles.row(particle);
+                self.home[range.clone()].copy_from_slice(&self.particles.position[range]);
+            }
+        }
+        self.evaluations += self.settings.population as u64;
+        self.iteration += 1;
+        self.advance();
+    }
+
+    fn iteration(&self) -> usize {
+        self.iteration
+    }
+
+    fn planned_iterations(&self) -> usize {
+        self.settings.iterations
+    }
+
+    fn evaluations(&self) -> u64 {
+        self.evaluations
+    }
+
+    fn front(&self) -> Front {
+        let (candidate, cost) = self.best_candidate();
+        Front::single(candidate, cost)
+    }
+
+    fn best(&self) -> Vec<f64> {
+        vec![self.cost[self.leader()]]
+    }
+}

@@ -1,0 +1,306 @@
+//! NSGA-II, the genetic algorithm that swarms are compared with.
+//!
+//! Deb, Pratap, Agarwal, Meyarivan, *A fast and elitist multiobjective genetic algorithm: NSGA-II*, IEEE TEC 6
+//! (2002); simulated binary crossover as in Deb, Agrawal, *Simulated binary crossover for continuous search space*,
+//! Complex Systems 9 (1995), in the form that keeps to the bounds.
+
+use super::archive::{crowding, dominates};
+use super::motion::{Particles, Purpose, polynomial};
+use super::settings::setting;
+use super::{Front, Optimiser};
+use crate::error::Result;
+use crate::evaluate::{Evaluation, FAILED_COST, Problem};
+use crate::random::Random;
+
+/// Settings of [`Nsga2`]; the defaults are those of the paper.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Nsga2Settings {
+    /// Members of the population, an even number.
+    pub population: usize,
+    /// Generations, the first random one counted.
+    pub iterations: usize,
+    /// Seed of all random numbers.
+    pub seed: u64,
+    /// Probability that a pair of parents is crossed.
+    pub crossover: f64,
+    /// Distribution index of the crossover: the greater, the nearer children are to their parents.
+    pub crossover_index: f64,
+    /// Distribution index of the polynomial mutation, which changes a variable with probability one over their
+    /// number.
+    pub mutation_index: f64,
+}
+
+impl Default for Nsga2Settings {
+    fn default() -> Self {
+        Self {
+            population: 100,
+            iterations: 250,
+            seed: 1,
+            crossover: 0.9,
+            crossover_index: 20.0,
+            mutation_index: 20.0,
+        }
+    }
+}
+
+impl Nsga2Settings {
+    /// Checks every setting.
+    ///
+    /// # Errors
+    /// [`crate::Error::Input`] naming the setting.
+    pub fn validate(&self) -> Result<()> {
+        if self.population < 4 || !self.population.is_multiple_of(2) {
+            let found = self.population.to_string();
+            return Err(setting("population", found, "an even number, 4 or more"));
+        }
+        if self.iterations < 1 {
+            return Err(setting("iterations", self.iterations.to_string(), "1 or more"));
+        }
+        if !(0.0..=1.0).contains(&self.crossover) {
+            return Err(setting(
+                "crossover",
+                self.crossover.to_string(),
+                "a share from 0 to 1",
+            ));
+        }
+        for (name, value) in [
+            ("crossover_index", self.crossover_index),
+            ("mutation_index", self.mutation_index),
+        ] {
+            if !(0.0..=1000.0).contains(&value) {
+                return Err(setting(name, value.to_string(), "a number from 0 to 1000"));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// One solution, with the number of the front that it is in and its crowding there.
+#[derive(Clone, Debug)]
+struct Member {
+    position: Vec<f64>,
+    objectives: Vec<f64>,
+    rank: usize,
+    crowding: f64,
+}
+
+/// The population and the children it has been asked for.
+#[derive(Clone, Debug)]
+pub struct Nsga2 {
+    settings: Nsga2Settings,
+    random: Random,
+    children: Particles,
+    objectives: usize,
+    parents: Vec<Member>,
+    iteration: usize,
+    evaluations: u64,
+}
+
+impl Nsga2 {
+    /// A population over the variables of `problem`.
+    ///
+    /// # Errors
+    /// [`crate::Error::Input`] naming the setting that is out of its range.
+    pub fn new(problem: &Problem, settings: Nsga2Settings) -> Result<Self> {
+        settings.validate()?;
+        let random = Random::new(settings.seed);
+        Ok(Self {
+            children: Particles::scattered(problem, settings.population, random)?,
+            objectives: problem.objectives.len(),
+            parents: Vec::new(),
+            random,
+            settings,
+            iteration: 0,
+            evaluations: 0,
+        })
+    }
+
+    /// The better of two parents drawn at random: by front, then by crowding.
+    fn parent(&self, pair: usize, which: u32) -> &Member {
+        let draw = |index| {
+            let (when, who) = (self.iteration as u32, pair as u32);
+            &self.parents[self
+                .random
+                .below(self.parents.len(), Purpose::Leader as u32, when, who, index)]
+        };
+        let (a, b) = (draw(2 * which), draw(2 * which + 1));
+        if b.rank < a.rank || (b.rank == a.rank && b.crowding > a.crowding) {
+            b
+        } else {
+            a
+        }
+    }
+
+    fn breed(&mut self) {
+        let d = self.children.dimensions();
+        let when = self.iteration as u32;
+        for pair in 0..self.settings.population / 2 {
+            let uniform = |index: u32| {
+                self.random
+                    .uniform(Purpose::Recombine as u32, when, pair as u32, index)
+            };
+            let (a, b) = (self.parent(pair, 0), self.parent(pair, 1));
+            let (mut first, mut second) = (a.position.clone(), b.position.clone());
+            if uniform(0) < self.settings.crossover {
+                for k in 0..d {
+                    let index = 1 + 3 * k as u32;
+                    if uniform(index) < 0.5 {
+                        let swap = uniform(index + 2) < 0.5;
+                        let (x, y) = cross(a.position[k], b.position[k], uniform(index + 1), {
+                            self.settings.crossover_index
+                        });
+                        (first[k], second[k]) = if swap { (y, x) } else { (x, y) };
+                    }
+                }
+            }
+            for (child, position) in [(2 * pair, first), (2 * pair + 1, second)] {
+                for (k, (i, x)) in self.children.row(child).zip(position).enumerate() {
+                    let uniform = |index: u32| {
+                        self.random
+                            .uniform(Purpose::Mutation as u32, when, child as u32, index)
+                    };
+                    let mutates = uniform(2 * k as u32) * (d as f64) < 1.0;
+                    self.children.position[i] = if mutates {
+                        polynomial(x, uniform(2 * k as u32 + 1), self.settings.mutation_index)
+                    } else {
+                        x
+                    };
+                }
+            }
+        }
+    }
+}
+
+/// Two children of two coordinates of the unit cube.
+fn cross(a: f64, b: f64, uniform: f64, index: f64) -> (f64, f64) {
+    let (low, high) = (a.min(b), a.max(b));
+    let gap = high - low;
+    if gap < 1e-14 {
+        return (a, b);
+    }
+    let spread = |to_bound: f64| {
+        let beta = 1.0 + 2.0 * to_bound / gap;
+        let alpha = 2.0 - beta.powf(-(index + 1.0));
+        let base = if uniform <= 1.0 / alpha {
+            uniform * alpha
+        } else {
+            1.0 / (2.0 - uniform * alpha)
+        };
+        base.powf(1.0 / (index + 1.0))
+    };
+    let middle = 0.5 * (low + high);
+    let below = middle - 0.5 * spread(low) * gap;
+    let above = middle + 0.5 * spread(1.0 - high) * gap;
+    (below.clamp(0.0, 1.0), above.clamp(0.0, 1.0))
+}
+
+/// The fronts of a set, best first, by the number of others that dominate each.
+fn fronts(members: &[Member]) -> Vec<Vec<usize>> {
+    let n = members.len();
+    let mut beaten_by = vec![0usize; n];
+    let mut beats: Vec<Vec<usize>> = vec![Vec::new(); n];
+    for i in 0..n {
+        for j in 0..n {
+            if dominates(&members[i].objectives, &members[j].objectives) {
+                beats[i].push(j);
+                beaten_by[j] += 1;
+            }
+        }
+    }
+    let mut found = Vec::new();
+    let mut front: Vec<usize> = (0..n).filter(|&i| beaten_by[i] == 0).collect();
+    while !front.is_empty() {
+        let mut next = Vec::new();
+        for &j in front.iter().flat_map(|&i| &beats[i]) {
+            beaten_by[j] -= 1;
+            if beaten_by[j] == 0 {
+                next.push(j);
+            }
+        }
+        next.sort_unstable();
+        found.push(std::mem::replace(&mut front, next));
+    }
+    found
+}
+
+impl Optimiser for Nsga2 {
+    fn ask(&mut self) -> Vec<f64> {
+        self.children.candidates()
+    }
+
+    fn tell(&mut self, evaluation: &Evaluation) {
+        let mut all = std::mem::take(&mut self.parents);
+        let rows = evaluation
+            .objectives
+            .chunks_exact(self.objectives)
+            .zip(&evaluation.failures);
+        for (child, (row, failure)) in rows.enumerate() {
+            let sound = failure.is_none() && row.iter().all(|x| x.is_finite());
+            let objectives = if sound {
+                row.to_vec()
+            } else {
+                vec![FAILED_COST; self.objectives]
+            };
+            let position = self.children.position[self.children.row(child)].to_vec();
+            let known = |m: &Member| m.objectives == objectives && m.position == position;
+            // A copy of a member brings nothing and would crowd it out.
+            if !all.iter().any(known) {
+                all.push(Member {
+                    position,
+                    objectives,
+                    rank: 0,
+                    crowding: 0.0,
+                });
+            }
+        }
+        let mut kept = Vec::new();
+        for (rank, mut front) in fronts(&all).into_iter().enumerate() {
+            let rows: Vec<&[f64]> = front.iter().map(|&i| all[i].objectives.as_slice()).collect();
+            for (&i, distance) in front.iter().zip(crowding(&rows)) {
+                all[i].rank = rank;
+                all[i].crowding = distance;
+            }
+            front.sort_by(|&a, &b| all[b].crowding.total_cmp(&all[a].crowding));
+            kept.extend(front);
+            if kept.len() >= self.settings.population {
+                break;
+            }
+        }
+        kept.truncate(self.settings.population);
+        self.parents = kept.into_iter().map(|i| all[i].clone()).collect();
+        self.evaluations += self.settings.population as u64;
+        self.iteration += 1;
+        self.breed();
+    }
+
+    fn iteration(&self) -> usize {
+        self.iteration
+    }
+
+    fn planned_iterations(&self) -> usize {
+        self.settings.iterations
+    }
+
+    fn evaluations(&self) -> u64 {
+        self.evaluations
+    }
+
+    fn best(&self) -> Vec<f64> {
+        let column = |k: usize| self.parents.iter().map(move |m| m.objectives[k]);
+        (0..self.objectives)
+            .map(|k| column(k).fold(FAILED_COST, f64::min))
+            .collect()
+    }
+
+    fn front(&self) -> Front {
+        let mut front = Front::default();
+        for m in &self.parents {
+            let failed = m.objectives.iter().any(|&x| x >= FAILED_COST);
+            if m.rank == 0 && !failed && !front.objectives.contains(&m.objectives) {
+                front.candidates.push(self.children.space.scaled(&m.position, 1));
+                front.objectives.push(m.objectives.clone());
+            }
+        }
+        front
+    }
+}

@@ -1,0 +1,221 @@
+//! Problems whose answers are known, to test optimisers and backends on.
+//!
+//! References:
+//! 1. Zitzler, Deb, Thiele, *Comparison of multiobjective evolutionary algorithms: empirical results*,
+//!    Evolutionary Computation 8 (2000) (ZDT1 to ZDT4 and ZDT6).
+//! 2. Deb, Thiele, Laumanns, Zitzler, *Scalable test problems for evolutionary multiobjective optimization*, 2005
+//!    (DTLZ1, DTLZ2).
+//! 3. Suganthan et al., *Problem definitions and evaluation criteria for the CEC 2005 special session on
+//!    real-parameter optimization* (the single-objective functions and that their optima are shifted).
+
+mod dtlz;
+mod single;
+mod zdt;
+
+use crate::evaluate::point::{CallCost, PointEvaluator};
+use crate::evaluate::{Objective, Problem, Variable};
+
+/// A problem with a known answer, with variables and objectives without units.
+#[derive(Clone, Debug)]
+pub struct TestProblem {
+    name: &'static str,
+    problem: Problem,
+    function: fn(&[f64], &mut [f64]),
+    /// Taken off a candidate before it is evaluated: where the optimum lies, or nothing.
+    shift: Vec<f64>,
+    front: fn(usize) -> Vec<Vec<f64>>,
+}
+
+/// Names of all test problems, those with several objectives first.
+pub const NAMES: [&str; 12] = [
+    "zdt1",
+    "zdt2",
+    "zdt3",
+    "zdt4",
+    "zdt6",
+    "dtlz1",
+    "dtlz2",
+    "sphere",
+    "rosenbrock",
+    "rastrigin",
+    "ackley",
+    "griewank",
+];
+
+impl TestProblem {
+    /// The problem of that name, one of [`NAMES`], in the size of the references: 30 variables (10 for ZDT4 and
+    /// ZDT6), 7 for DTLZ1 and 12 for DTLZ2 with three objectives; 30 for the single-objective ones.
+    pub fn by_name(name: &str) -> Option<Self> {
+        zdt::by_name(name)
+            .or_else(|| dtlz::by_name(name))
+            .or_else(|| single::by_name(name, 30))
+    }
+
+    /// The single-objective problem of that name in `dimensions` variables.
+    pub fn single(name: &str, dimensions: usize) -> Option<Self> {
+        single::by_name(name, dimensions)
+    }
+
+    fn new(
+        name: &'static str,
+        bounds: impl Iterator<Item = (f64, f64)>,
+        objectives: usize,
+        function: fn(&[f64], &mut [f64]),
+        front: fn(usize) -> Vec<Vec<f64>>,
+    ) -> Self {
+        let variables = bounds
+            .enumerate()
+            .map(|(i, (lower, upper))| Variable::new(format!("x{}", i + 1), "-", lower, upper));
+        Self {
+            name,
+            problem: Problem {
+                variables: variables.collect(),
+                objectives: (1..=objectives)
+                    .map(|k| Objective::new(format!("f{k}"), "-"))
+                    .collect(),
+            },
+            function,
+            shift: Vec::new(),
+            front,
+        }
+    }
+
+    /// The same problem moved by `shift`, one per variable, bounds and all: an optimiser should not notice.
+    pub fn translated(mut self, shift: &[f64]) -> Self {
+        self.shift.resize(self.problem.variables.len(), 0.0);
+        for ((variable, own), by) in self.problem.variables.iter_mut().zip(&mut self.shift).zip(shift) {
+            variable.lower += by;
+            variable.upper += by;
+            *own += by;
+        }
+        self
+    }
+
+    /// Its name.
+    pub fn name(&self) -> &'static str {
+        self.name
+    }
+
+    /// Variables and objectives.
+    pub fn problem(&self) -> &Problem {
+        &self.problem
+    }
+
+    /// About `count` points of the true front, evenly over it; the least value for a single objective.
+    pub fn front(&self, count: usize) -> Vec<Vec<f64>> {
+        (self.front)(count)
+    }
+
+    /// Where the optimum of a single-objective problem lies; nothing for the others.
+    pub fn optimum(&self) -> Option<&[f64]> {
+        (self.problem.objectives.len() == 1).then_some(&self.shift)
+    }
+
+    /// Writes the objectives of `candidate`.
+    pub fn evaluate(&self, candidate: &[f64], objectives: &mut [f64]) {
+        if self.shift.is_empty() {
+            return (self.function)(candidate, objectives);
+        }
+        let moved: Vec<f64> = candidate.iter().zip(&self.shift).map(|(x, s)| x - s).collect();
+        (self.function)(&moved, objectives);
+    }
+
+    /// An evaluator on one thread.
+    pub fn evaluator(&self) -> PointEvaluator<impl Fn(&[f64], &mut [f64]) + Sync> {
+        let problem = self.clone();
+        let function = move |x: &[f64], f: &mut [f64]| problem.evaluate(x, f);
+        PointEvaluator::new(self.problem.clone(), CallCost::Cheap, function)
+    }
+}
+
+/// `count` numbers from nought to one, ends included.
+fn even(count: usize) -> impl Iterator<Item = f64> {
+    let last = count.max(2) - 1;
+    (0..=last).map(move |i| i as f64 / last as f64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::evaluate::Evaluator;
+    use crate::swarm::metrics::{hypervolume, non_dominated};
+
+    #[test]
+    fn fronts_are_reached_and_non_dominated() {
+        for name in NAMES {
+            let problem = TestProblem::by_name(name).unwrap();
+            let front = problem.front(200);
+            assert_eq!(non_dominated(&front).len(), front.len(), "{name}");
+            assert!(
+                front
+                    .iter()
+                    .all(|p| p.len() == problem.problem().objectives.len()),
+                "{name}"
+            );
+        }
+        assert!(TestProblem::by_name("zdt5").is_none());
+    }
+
+    /// On the true front all distance variables stand at their best values: candidates there give points of it.
+    #[test]
+    fn candidates_of_the_front() {
+        let near = |name: &str, candidate: &[f64], expected: &[f64]| {
+            let problem = TestProblem::by_name(name).unwrap();
+            let found = problem.evaluator().evaluate(candidate).unwrap().objectives;
+            for (f, e) in found.iter().zip(expected) {
+                assert!((f - e).abs() < 1e-14, "{name}: {found:?}, not {expected:?}");
+            }
+        };
+        let padded = |first: &[f64], rest: f64, count: usize| {
+            let mut row = first.to_vec();
+            row.resize(count, rest);
+            row
+        };
+        near("zdt1", &padded(&[0.25], 0.0, 30), &[0.25, 0.5]);
+        near("zdt2", &padded(&[0.5], 0.0, 30), &[0.5, 0.75]);
+        near("zdt3", &padded(&[0.25], 0.0, 30), &[0.25, 0.25]);
+        near("zdt4", &padded(&[0.25], 0.0, 10), &[0.25, 0.5]);
+        // Off the front: g = 1 + 9 = 10 (ZDT1), 1 + 10 * 9 + 9 * (1 - 10) = 10 (ZDT4).
+        near("zdt1", &padded(&[0.0], 1.0, 30), &[0.0, 10.0]);
+        near("zdt4", &padded(&[0.0], 1.0, 10), &[0.0, 10.0]);
+        near("zdt6", &padded(&[1.0], 0.0, 10), &[1.0, 0.0]);
+        near("dtlz1", &padded(&[0.5, 0.5], 0.5, 7), &[0.125, 0.125, 0.25]);
+        near(
+            "dtlz2",
+            &padded(&[0.5, 1.0], 0.5, 12),
+            &[0.0, 0.5f64.sqrt(), 0.5f64.sqrt()],
+        );
+    }
+
+    /// Volumes by integration of the fronts' formulas, reference 1.1: 1.21 less the area under the front.
+    #[test]
+    fn volumes_under_fronts() {
+        let of = |name: &str| {
+            let front = TestProblem::by_name(name).unwrap().front(4000);
+            let width = front[0].len();
+            hypervolume(&front, &vec![1.1; width]).unwrap()
+        };
+        assert!((of("zdt1") - (1.21 - 1.0 / 3.0)).abs() < 1e-3);
+        assert!((of("zdt2") - (1.21 - 2.0 / 3.0)).abs() < 1e-3);
+        // The cube less an eighth of a ball, a lattice of some 90 by 90 being coarser.
+        assert!((of("dtlz2") - (1.331 - std::f64::consts::PI / 6.0)).abs() < 1.5e-2);
+    }
+
+    #[test]
+    fn optima_are_optimal_and_inside() {
+        for name in &NAMES[7..] {
+            let problem = TestProblem::by_name(name).unwrap();
+            let optimum = problem.optimum().unwrap();
+            let mut value = [1.0];
+            problem.evaluate(optimum, &mut value);
+            // Ackley's cancels exp(1) only to rounding.
+            assert!(value[0].abs() < 1e-14, "{name}: {}", value[0]);
+            for (x, v) in optimum.iter().zip(&problem.problem().variables) {
+                assert!(*x > v.lower && *x < v.upper);
+            }
+            let aside: Vec<f64> = optimum.iter().map(|x| x + 0.01).collect();
+            problem.evaluate(&aside, &mut value);
+            assert!(value[0] > 1e-5);
+        }
+    }
+}

@@ -1,0 +1,87 @@
+//! The cube that swarms move in.
+
+use crate::error::{Error, Result};
+use crate::evaluate::{Problem, Variable};
+use std::ops::Range;
+
+/// The unit cube, with one dimension for each variable that is not fixed by equal bounds, and the way from it to
+/// the variables' units.
+#[derive(Clone, Debug)]
+pub(super) struct Space {
+    variables: Vec<Variable>,
+    free: Vec<usize>,
+}
+
+impl Space {
+    /// # Errors
+    /// [`Error::Input`] naming a variable whose bounds are not finite or crossed, or if there is no objective.
+    pub fn new(problem: &Problem) -> Result<Self> {
+        for v in &problem.variables {
+            let range = v.upper - v.lower;
+            if !(range.is_finite() && range >= 0.0) {
+                let found = format!("bounds from {} to {}", v.lower, v.upper);
+                return Err(Error::input(
+                    "the problem",
+                    &v.name,
+                    found,
+                    "finite bounds in order",
+                ));
+            }
+        }
+        if problem.objectives.is_empty() || problem.variables.is_empty() {
+            let found = format!(
+                "{} variables, {} objectives",
+                problem.variables.len(),
+                problem.objectives.len()
+            );
+            return Err(Error::input(
+                "the problem",
+                "variables, objectives",
+                found,
+                "one or more of each",
+            ));
+        }
+        let variables = problem.variables.clone();
+        let free = (0..variables.len())
+            .filter(|&k| variables[k].upper > variables[k].lower)
+            .collect();
+        Ok(Self { variables, free })
+    }
+
+    /// The cube of some of the dimensions.
+    pub fn part(&self, columns: Range<usize>) -> Self {
+        Self {
+            variables: self.variables.clone(),
+            free: self.free[columns].to_vec(),
+        }
+    }
+
+    /// Dimensions of the cube.
+    pub fn dimensions(&self) -> usize {
+        self.free.len()
+    }
+
+    /// `count` positions, row-major, as candidates in the variables' units.
+    pub fn scaled(&self, positions: &[f64], count: usize) -> Vec<f64> {
+        let d = self.dimensions();
+        let fixed = self.variables.iter().map(|v| v.lower);
+        let mut candidates: Vec<f64> = (0..count).flat_map(|_| fixed.clone()).collect();
+        for (row, candidate) in candidates.chunks_exact_mut(self.variables.len()).enumerate() {
+            for (j, &k) in self.free.iter().enumerate() {
+                let v = &self.variables[k];
+                let value = v.lower + positions[row * d + j] * (v.upper - v.lower);
+                candidate[k] = value.min(v.upper);
+            }
+        }
+        candidates
+    }
+
+    /// The position of a candidate, brought within the bounds.
+    pub fn position(&self, candidate: &[f64]) -> Vec<f64> {
+        let share = |&k: &usize| {
+            let v = &self.variables[k];
+            ((candidate[k] - v.lower) / (v.upper - v.lower)).clamp(0.0, 1.0)
+        };
+        self.free.iter().map(share).collect()
+    }
+}
