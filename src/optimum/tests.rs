@@ -1,0 +1,221 @@
+use super::*;
+use crate::random::Random;
+use crate::track::CrossSections;
+use glam::DVec2;
+use std::f64::consts::TAU;
+
+/// Cuts across an ellipse with half axes `a` and `b` (m), driven anticlockwise, half a width to each side.
+fn ellipse(a: f64, b: f64, half_width: f64, n: usize) -> CrossSections {
+    let at = |i: usize| {
+        let t = TAU * i as f64 / n as f64;
+        let centre = DVec2::new(a * t.cos(), b * t.sin());
+        let outward = DVec2::new(b * t.cos(), a * t.sin()).normalize();
+        (centre, outward * half_width)
+    };
+    let centre: Vec<DVec2> = (0..n).map(|i| at(i).0).collect();
+    let mut station_m = vec![0.0];
+    let mut sum = 0.0;
+    for i in 0..n {
+        sum += centre[i].distance(centre[(i + 1) % n]);
+        station_m.push(sum);
+    }
+    station_m.pop();
+    CrossSections {
+        name: "ellipse".to_owned(),
+        closed: true,
+        length_m: sum,
+        station_m,
+        right_m: (0..n).map(|i| at(i).0 + at(i).1).collect(),
+        left_m: (0..n).map(|i| at(i).0 - at(i).1).collect(),
+        sections: Vec::new(),
+        corners: Vec::new(),
+    }
+}
+
+/// A car of steady grip: 15 to 18 m/s^2 sideways over 25 to 65 m/s, 14 to 18 lengthways, 330 kW, CdA 0.9 m^2, 1245 kg.
+struct Racer;
+
+impl Limits for Racer {
+    fn at(&self, v: f64) -> Grip {
+        let line = |low: f64, high: f64| {
+            let slope = (high - low) / 40.0;
+            Slope {
+                value: low + slope * (v - 25.0),
+                by_speed: slope,
+            }
+        };
+        let power = 330e3 / 1245.0;
+        let drag = 0.5 * 1.2 * 0.9 / 1245.0;
+        Grip {
+            lateral: line(15.0, 18.0),
+            longitudinal: line(14.0, 18.0),
+            drive: Slope {
+                value: power / v,
+                by_speed: -power / (v * v),
+            },
+            drag: Slope {
+                value: drag * v * v,
+                by_speed: 2.0 * drag * v,
+            },
+        }
+    }
+
+    fn top_speed_mps(&self) -> f64 {
+        70.0
+    }
+}
+
+/// Smooth random lines, away from the edges.
+fn random_line(n: usize, who: u32) -> Vec<f64> {
+    let random = Random::new(11);
+    let draw = |i: u32| random.normal(1, 0, who, i);
+    let waves = |i: usize| {
+        let t = TAU * i as f64 / n as f64;
+        (1..9u32).map(|k| draw(k) * (f64::from(k) * t + 6.0 * draw(20 + k)).sin()).sum::<f64>()
+    };
+    (0..n).map(|i| (0.5 + 0.1 * waves(i)).clamp(0.05, 0.95)).collect()
+}
+
+fn problem<'a>(map: &'a LineMap, limits: Option<&'a dyn Limits>) -> LineProblem<'a> {
+    LineProblem {
+        map,
+        limits,
+        start_mps: 20.0,
+        spacing_m: None,
+    }
+}
+
+/// Surveyed Silverstone, cut at even distances: a stand-in.
+fn surveyed(n: usize, car: f64) -> CrossSections {
+    let text = std::fs::read_to_string("../shared/data/tracks/Silverstone.csv").unwrap();
+    let rows: Vec<Vec<f64>> = text
+        .lines()
+        .filter(|l| !l.starts_with('#'))
+        .map(|l| l.split(',').map(|x| x.trim().parse().unwrap()).collect())
+        .collect();
+    let m = rows.len();
+    let p: Vec<DVec2> = rows.iter().map(|r| DVec2::new(r[0], r[1])).collect();
+    let mut s = vec![0.0];
+    for i in 0..m {
+        s.push(s[i] + p[i].distance(p[(i + 1) % m]));
+    }
+    let normal: Vec<DVec2> =
+        (0..m).map(|i| (p[(i + 1) % m] - p[(i + m - 1) % m]).normalize().perp()).collect();
+    let (mut right, mut left, mut station) = (vec![], vec![], vec![]);
+    for k in 0..n {
+        let at = s[m] * k as f64 / n as f64;
+        let i = s.partition_point(|x| *x <= at) - 1;
+        let t = (at - s[i]) / (s[i + 1] - s[i]);
+        let j = (i + 1) % m;
+        let c = p[i].lerp(p[j], t);
+        let nn = normal[i].lerp(normal[j], t).normalize();
+        let wr = rows[i][2] * (1.0 - t) + rows[j][2] * t;
+        let wl = rows[i][3] * (1.0 - t) + rows[j][3] * t;
+        right.push(c - nn * wr);
+        left.push(c + nn * wl);
+        station.push(at);
+    }
+    let cuts = CrossSections {
+        name: "Silverstone".to_owned(),
+        closed: true,
+        length_m: s[m],
+        station_m: station,
+        right_m: right,
+        left_m: left,
+        sections: vec![],
+        corners: vec![],
+    };
+    cuts.narrowed(car).unwrap()
+}
+
+#[test]
+fn explore() {
+    for car in [0.0, 2.0] {
+        let cuts = surveyed(360, car);
+        let map = LineMap::at_every_cut(&cuts);
+        let bounds = Bounds::road(map.variables());
+        let o = shortest(&map, &bounds).unwrap();
+        println!("shortest {car} {} {:?} {:?} {} {:.3}", o.value, o.lower_bound, o.status, o.iterations, o.seconds);
+        let o = least_squared_length(&map, &bounds).unwrap();
+        println!("squared {car} {} {:?} {:?} {} {:.3}", o.value, o.lower_bound, o.status, o.iterations, o.seconds);
+        let h = spacing_m(&map, &vec![0.5; 360]);
+        let even = vec![cuts.length_m / 360.0; 360];
+        for h in [h, even] {
+            let o = least_gamma(&map, &h, &bounds).unwrap();
+            println!("gamma {car} {} {:?} {:?} {} {:.3}", o.value, o.lower_bound, o.status, o.iterations, o.seconds);
+            let own = problem(&map, None).measures(&o.x);
+            println!("  its own {own:?}");
+        }
+    }
+    for n in [720, 1178] {
+        let cuts = surveyed(n, 2.0);
+        let map = LineMap::at_every_cut(&cuts);
+        let bounds = Bounds::road(map.variables());
+        let even = vec![cuts.length_m / n as f64; n];
+        let o = least_gamma(&map, &even, &bounds).unwrap();
+        println!("gamma {n} {} {:?} {:?} {} {:.3}", o.value, o.lower_bound, o.status, o.iterations, o.seconds);
+        let own = problem(&map, None).measures(&o.x);
+        println!("  its own {own:?}");
+        let c = least_curvature(&map, &bounds, &o.x).unwrap();
+        println!("curvature {n} {} {:?} {} {:.3}", c.value, c.status, c.iterations, c.seconds);
+        let c = least_curvature(&map, &bounds, &vec![0.5; n]).unwrap();
+        println!("curvature from centre {n} {} {:?} {} {:.3}", c.value, c.status, c.iterations, c.seconds);
+    }
+}
+
+#[test]
+fn gradients() {
+    let cuts = ellipse(300.0, 60.0, 6.0, 200);
+    let n = cuts.len();
+    for map in [LineMap::at_every_cut(&cuts), LineMap::b_spline(&cuts, 40)] {
+        let spacing = spacing_m(&map, &vec![0.5; map.variables()]);
+        let mut all = problem(&map, Some(&Racer));
+        for fixed in [false, true] {
+            all.spacing_m = fixed.then_some(&spacing);
+            for (name, weights) in [
+                ("time", Weights { time: 1.0, ..Weights::default() }),
+                ("length", Weights { length: 1.0, ..Weights::default() }),
+                ("squared", Weights { squared_length: 1.0, ..Weights::default() }),
+                ("gamma", Weights { gamma: 1.0, ..Weights::default() }),
+                ("curvature", Weights { curvature: 1.0, ..Weights::default() }),
+            ] {
+                let x = random_line(map.variables(), 3);
+                let (c, g) = all.cost(&weights, &x);
+                let mut worst = 0.0f64;
+                let most = g.iter().fold(0.0f64, |m, g| m.max(g.abs()));
+                for k in 0..map.variables() {
+                    let eps = 1e-6;
+                    let (mut up, mut down) = (x.clone(), x.clone());
+                    up[k] += eps;
+                    down[k] -= eps;
+                    let slope = (all.cost(&weights, &up).0 - all.cost(&weights, &down).0) / (2.0 * eps);
+                    worst = worst.max((slope - g[k]).abs());
+                }
+                println!("{name} {fixed} {n} cost {c} gradient {most:e} worst {worst:e}");
+            }
+        }
+    }
+}
+
+#[test]
+fn time() {
+    let full = surveyed(1964, 2.0);
+    for controls in [150, 300, 600, 1964] {
+        let map = if controls == 1964 { LineMap::at_every_cut(&full) } else { LineMap::b_spline(&full, controls) };
+        let p = problem(&map, Some(&Racer));
+        let bounds = Bounds::road(map.variables());
+        let clock = std::time::Instant::now();
+        let c = if true {
+            let weights = Weights { curvature: 1.0, ..Weights::default() };
+            polish_lines(&p, &bounds, &[Start { x: vec![0.5; controls], weights }], &Budget::default()).unwrap().remove(0)
+        } else { unreachable!() };
+        println!("curvature {controls}: {:?} {:?} {} {:?}", c.measures, c.ending, c.evaluations, clock.elapsed());
+        let weights = Weights { time: 1.0, ..Weights::default() };
+        for (name, x) in [("centre", vec![0.5; controls]), ("curved", c.x)] {
+            let clock = std::time::Instant::now();
+            println!("   start {}", p.measures(&x).time_s);
+            let c = polish_lines(&p, &bounds, &[Start { x, weights }], &Budget { evaluations: 20000, least_gain: 1e-7 }).unwrap().remove(0);
+            println!("{name} {controls}: {:?} {:?} {} {:?}", c.measures, c.ending, c.evaluations, clock.elapsed());
+        }
+    }
+}
