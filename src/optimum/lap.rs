@@ -74,8 +74,8 @@ pub(super) struct Lap {
 
 /// Newton's steps, with halving to fall back on, of a segment. Halving alone needs 52 for every bit of an `f64`.
 const MOST_STEPS: usize = 60;
-/// Relative accuracy of `e` at which Newton's steps end; its errors square, so the last one is far below this.
-const ACCURACY: f64 = 1e-9;
+/// Relative accuracy of `e` at which Newton's steps end.
+const ACCURACY: f64 = 1e-12;
 
 impl Lap {
     /// Drives `shape` as fast as `limits` allow, from `start_mps` on an open line.
@@ -260,6 +260,27 @@ fn push(limits: &dyn Limits, pass: Pass, e: f64, curvature_1pm: f64) -> Push {
     }
 }
 
+/// The middle of a segment if limits did not change over it: where a parabola meets the ellipse.
+fn guess(limits: &dyn Limits, pass: Pass, start: f64, curvature_1pm: f64, h: f64) -> f64 {
+    let grip = limits.at(start.sqrt().max(f64::MIN_POSITIVE));
+    let drag = match pass {
+        Pass::Drive => -h * grip.drag.value,
+        Pass::Brake => h * grip.drag.value,
+    };
+    let coast = start + drag;
+    let (reach, bend) = (h * grip.longitudinal.value, curvature_1pm / grip.lateral.value);
+    let (reach2, bend2) = (reach * reach, bend * bend);
+    let left = 1.0 - bend2 * coast * coast;
+    if left <= 0.0 {
+        return coast;
+    }
+    let tyre = (coast + reach * (left + reach2 * bend2).sqrt()) / (1.0 + reach2 * bend2);
+    match pass {
+        Pass::Drive => tyre.min(coast + h * grip.drive.value),
+        Pass::Brake => tyre,
+    }
+}
+
 /// The `e` that a pass reaches from `start` over one segment, by the implicit midpoint rule: the limit is that at the
 /// middle, `e_m = start + h a(e_m)`, which is of second order and, the limit falling with speed, never unstable.
 fn across(limits: &dyn Limits, pass: Pass, start: f64, curvature_1pm: f64, h: f64) -> (f64, Origin) {
@@ -267,27 +288,21 @@ fn across(limits: &dyn Limits, pass: Pass, start: f64, curvature_1pm: f64, h: f6
     // No limit rises so fast with e that h times its slope passes one half, so the middle lies within twice Euler's step.
     let reach = 2.0 * h * first.value;
     let (mut low, mut high) = ((start + reach.min(0.0)).max(0.0), start + reach.max(0.0));
-    let mut e = start;
-    let mut p = first;
+    let mut e = guess(limits, pass, start, curvature_1pm, h).clamp(low, high);
+    let mut p = push(limits, pass, e, curvature_1pm);
     for _ in 0..MOST_STEPS {
         let excess = e - start - h * p.value;
-        if excess < 0.0 {
+        if excess <= 0.0 {
             low = e;
         } else {
             high = e;
         }
         let newton = e - p.share * excess / (p.share - h * p.by_square);
-        let next = if newton >= low && newton <= high {
-            newton
-        } else {
-            0.5 * (low + high)
-        };
-        let done = (next - e).abs() <= ACCURACY * e;
-        e = next;
-        p = push(limits, pass, e, curvature_1pm);
-        if done {
+        if (newton - e).abs() <= ACCURACY * e {
             break;
         }
+        e = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
+        p = push(limits, pass, e, curvature_1pm);
     }
     let gain = p.share / (p.share - h * p.by_square);
     let by_curvature = h * p.by_curvature / (p.share - h * p.by_square);

@@ -99,6 +99,17 @@ fn surveyed(n: usize, car: f64) -> CrossSections {
     for i in 0..m {
         s.push(s[i] + p[i].distance(p[(i + 1) % m]));
     }
+    let smooth = |v: &dyn Fn(usize) -> f64| -> Vec<f64> {
+        let mut v: Vec<f64> = (0..m).map(v).collect();
+        for _ in 0..16 {
+            v = (0..m).map(|i| 0.25 * (v[(i + m - 1) % m] + v[(i + 1) % m]) + 0.5 * v[i]).collect();
+        }
+        v
+    };
+    let (wrs, wls) = (smooth(&|i| rows[i][2]), smooth(&|i| rows[i][3]));
+    let (px, py) = (smooth(&|i| p[i].x), smooth(&|i| p[i].y));
+    let rows: Vec<Vec<f64>> = (0..m).map(|i| vec![px[i], py[i], wrs[i], wls[i]]).collect();
+    let p: Vec<DVec2> = rows.iter().map(|r| DVec2::new(r[0], r[1])).collect();
     let normal: Vec<DVec2> =
         (0..m).map(|i| (p[(i + 1) % m] - p[(i + m - 1) % m]).normalize().perp()).collect();
     let (mut right, mut left, mut station) = (vec![], vec![], vec![]);
@@ -190,6 +201,9 @@ fn gradients() {
                     down[k] -= eps;
                     let slope = (all.cost(&weights, &up).0 - all.cost(&weights, &down).0) / (2.0 * eps);
                     worst = worst.max((slope - g[k]).abs());
+                    if (slope - g[k]).abs() > 1e-3 {
+                        println!("   {k} {slope} {} {}", g[k], x[k]);
+                    }
                 }
                 println!("{name} {fixed} {n} cost {c} gradient {most:e} worst {worst:e}");
             }
@@ -200,7 +214,7 @@ fn gradients() {
 #[test]
 fn time() {
     let full = surveyed(1964, 2.0);
-    for controls in [150, 300, 600, 1964] {
+    for controls in [300, 1964] {
         let map = if controls == 1964 { LineMap::at_every_cut(&full) } else { LineMap::b_spline(&full, controls) };
         let p = problem(&map, Some(&Racer));
         let bounds = Bounds::road(map.variables());
@@ -214,7 +228,7 @@ fn time() {
         for (name, x) in [("centre", vec![0.5; controls]), ("curved", c.x)] {
             let clock = std::time::Instant::now();
             println!("   start {}", p.measures(&x).time_s);
-            let c = polish_lines(&p, &bounds, &[Start { x, weights }], &Budget { evaluations: 20000, least_gain: 1e-7 }).unwrap().remove(0);
+            let c = polish_lines(&p, &bounds, &[Start { x, weights }], &Budget { evaluations: 6000, least_gain: 1e-7 }).unwrap().remove(0);
             println!("{name} {controls}: {:?} {:?} {} {:?}", c.measures, c.ending, c.evaluations, clock.elapsed());
         }
     }
