@@ -17,7 +17,7 @@ pub struct Arguments {
     /// The car: a bundled name (gt) or a TOML file
     #[arg(long, value_name = "NAME|FILE", default_value = "gt")]
     car: String,
-    /// The circuit: a bundled name or a TOML file [default: silverstone_gp]
+    /// The circuit: a bundled name, a TOML file, a survey (CSV, GPX, KML, log) or a shape [default: silverstone_gp]
     #[arg(long, value_name = "NAME|FILE")]
     track: Option<String>,
     /// Sample rate of the log, Hz
