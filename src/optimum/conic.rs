@@ -22,6 +22,21 @@ pub(super) struct Affine {
     pub terms: Vec<(usize, f64)>,
 }
 
+impl Affine {
+    /// The same with one term for each variable.
+    pub fn merged(mut self) -> Self {
+        self.terms.sort_by_key(|(k, _)| *k);
+        self.terms.dedup_by(|later, kept| {
+            let same = later.0 == kept.0;
+            if same {
+                kept.1 += later.1;
+            }
+            same
+        });
+        self
+    }
+}
+
 /// Minimise `sum of squares + linear terms` over a box, with rows that must lie in second-order cones.
 #[derive(Debug)]
 pub(super) struct ConicProgram {
@@ -29,7 +44,9 @@ pub(super) struct ConicProgram {
     upper: Vec<f64>,
     linear: Vec<f64>,
     squares: Vec<Affine>,
+    nonnegatives: Vec<Affine>,
     cones: Vec<[Affine; 3]>,
+    tolerance: f64,
 }
 
 /// What a solver returned.
@@ -55,7 +72,9 @@ impl ConicProgram {
             lower,
             upper,
             squares: Vec::new(),
+            nonnegatives: Vec::new(),
             cones: Vec::new(),
+            tolerance: TOLERANCE,
         }
     }
 
@@ -69,9 +88,30 @@ impl ConicProgram {
         self.squares.push(square);
     }
 
+    /// Demands `0 <= map`.
+    pub fn add_nonnegative(&mut self, map: Affine) {
+        self.nonnegatives.push(map);
+    }
+
+    /// Solves to a relative `tolerance` only, as for a step of a sequence.
+    pub fn with_tolerance(mut self, tolerance: f64) -> Self {
+        self.tolerance = tolerance;
+        self
+    }
+
     /// Demands `norm(cone[1], cone[2]) <= cone[0]`.
     pub fn add_cone(&mut self, cone: [Affine; 3]) {
         self.cones.push(cone);
+    }
+
+    /// The objective at `x`, less the squares' part that does not change.
+    pub fn value(&self, x: &[f64]) -> f64 {
+        let linear: f64 = self.linear.iter().zip(x).map(|(c, x)| c * x).sum();
+        let square = |map: &Affine| {
+            let change: f64 = map.terms.iter().map(|&(k, a)| a * x[k]).sum();
+            change * (2.0 * map.constant + change)
+        };
+        linear + self.squares.iter().map(square).sum::<f64>()
     }
 
     /// Solves it.
@@ -105,6 +145,9 @@ impl ConicProgram {
                 rows.push(1.0, &[(i, 1.0)], self.upper[i]);
             }
         }
+        for map in &self.nonnegatives {
+            rows.push(-1.0, &map.terms, map.constant);
+        }
         let nonnegatives = rows.right.len() - zeros;
         for map in self.cones.iter().flatten() {
             rows.push(-1.0, &map.terms, map.constant);
@@ -117,9 +160,9 @@ impl ConicProgram {
         let settings = DefaultSettingsBuilder::<f64>::default()
             .verbose(false)
             .max_threads(1)
-            .tol_gap_abs(TOLERANCE)
-            .tol_gap_rel(TOLERANCE)
-            .tol_feas(TOLERANCE)
+            .tol_gap_abs(self.tolerance)
+            .tol_gap_rel(self.tolerance)
+            .tol_feas(self.tolerance)
             .reduced_tol_gap_abs(REDUCED_TOLERANCE)
             .reduced_tol_gap_rel(REDUCED_TOLERANCE)
             .reduced_tol_feas(REDUCED_TOLERANCE)

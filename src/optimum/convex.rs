@@ -123,7 +123,7 @@ pub fn least_gamma(map: &LineMap, spacing_m: &[f64], bounds: &Bounds) -> Result<
             let other = scaled(&steps[before][axis], -1.0 / (h0 * mean));
             square.constant += other.constant;
             square.terms.extend(other.terms);
-            program.add_square(merged(square));
+            program.add_square(square.merged());
         }
     }
     let mut optimum = solve(map, &program, |problem, x| {
@@ -175,10 +175,11 @@ fn steps(map: &LineMap) -> Vec<[Affine; 2]> {
         axes.map(|axis| {
             let there = map.reach(next).iter().map(|&(k, reach)| (k, axis(reach)));
             let here = map.reach(s).iter().map(|&(k, reach)| (k, -axis(reach)));
-            merged(Affine {
+            Affine {
                 constant: axis(origins[next] - origins[s]),
                 terms: there.chain(here).collect(),
-            })
+            }
+            .merged()
         })
     };
     (0..segments).map(step).collect()
@@ -189,19 +190,6 @@ fn scaled(map: &Affine, by: f64) -> Affine {
         constant: by * map.constant,
         terms: map.terms.iter().map(|&(k, a)| (k, by * a)).collect(),
     }
-}
-
-/// The same with one term for each variable.
-fn merged(mut map: Affine) -> Affine {
-    map.terms.sort_by_key(|(k, _)| *k);
-    map.terms.dedup_by(|later, kept| {
-        let same = later.0 == kept.0;
-        if same {
-            kept.1 += later.1;
-        }
-        same
-    });
-    map
 }
 
 fn solve(

@@ -4,7 +4,6 @@ use super::conic::{Affine, ConicProgram, Status};
 use super::convex::{Bounds, Optimum, check};
 use super::geometry::{LineMap, Shape};
 use crate::Result;
-use glam::DVec2;
 use std::time::Instant;
 
 /// A sequence ends when a step gains less than this share of the integral.
@@ -92,30 +91,22 @@ fn residuals<'a>(map: &'a LineMap, shape: &'a Shape) -> impl Iterator<Item = Aff
         let (Some(before), Some(after)) = shape.neighbours(i) else {
             return None;
         };
-        let (h0, h1) = (shape.length_m[before], shape.length_m[after]);
-        let (d0, d1) = (shape.step_m[before], shape.step_m[after]);
-        let root = shape.spacing_m[i].sqrt();
-        // The turn by either step, then half the spacing's share of the root.
-        let stretch = -0.25 * shape.turn_rad[i] / (root * shape.spacing_m[i]);
-        let by_first: DVec2 = -d0.perp() / (h0 * h0 * root) + d0 * (stretch / h0);
-        let by_second: DVec2 = d1.perp() / (h1 * h1 * root) + d1 * (stretch / h1);
-        let mut terms: Vec<(usize, f64)> = Vec::new();
-        let points = [
-            (before, -by_first),
-            (i, by_first - by_second),
-            ((after + 1) % n, by_second),
-        ];
-        for (point, bar) in points {
-            for &(k, reach) in map.reach(point) {
-                match terms.iter_mut().find(|(other, _)| *other == k) {
-                    Some((_, sum)) => *sum += reach.dot(bar),
-                    None => terms.push((k, reach.dot(bar))),
-                }
-            }
+        let spacing = shape.spacing_m[i];
+        let mut terms = Vec::new();
+        shape.add_turn(map, i, 1.0 / spacing.sqrt(), &mut terms);
+        for segment in [before, after] {
+            // The spacing is half the sum of both lengths, and the residual has its root below.
+            shape.add_length(
+                map,
+                segment,
+                -0.25 * shape.turn_rad[i] * spacing.powf(-1.5),
+                &mut terms,
+            );
         }
-        Some(Affine {
-            constant: shape.turn_rad[i] / root,
+        let map = Affine {
+            constant: shape.turn_rad[i] / spacing.sqrt(),
             terms,
-        })
+        };
+        Some(map.merged())
     })
 }

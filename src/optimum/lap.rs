@@ -301,7 +301,11 @@ fn across(limits: &dyn Limits, pass: Pass, start: f64, curvature_1pm: f64, h: f6
         if (newton - e).abs() <= ACCURACY * e {
             break;
         }
-        e = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
+        e = if newton > low && newton < high {
+            newton
+        } else {
+            0.5 * (low + high)
+        };
         p = push(limits, pass, e, curvature_1pm);
     }
     let gain = p.share / (p.share - h * p.by_square);

@@ -71,7 +71,9 @@ fn random_line(n: usize, who: u32) -> Vec<f64> {
     let draw = |i: u32| random.normal(1, 0, who, i);
     let waves = |i: usize| {
         let t = TAU * i as f64 / n as f64;
-        (1..9u32).map(|k| draw(k) * (f64::from(k) * t + 6.0 * draw(20 + k)).sin()).sum::<f64>()
+        (1..9u32)
+            .map(|k| draw(k) * (f64::from(k) * t + 6.0 * draw(20 + k)).sin())
+            .sum::<f64>()
     };
     (0..n).map(|i| (0.5 + 0.1 * waves(i)).clamp(0.05, 0.95)).collect()
 }
@@ -85,92 +87,66 @@ fn problem<'a>(map: &'a LineMap, limits: Option<&'a dyn Limits>) -> LineProblem<
     }
 }
 
-/// Surveyed Silverstone, cut at even distances: a stand-in.
-fn surveyed(n: usize, car: f64) -> CrossSections {
-    let text = std::fs::read_to_string("../shared/data/tracks/Silverstone.csv").unwrap();
-    let rows: Vec<Vec<f64>> = text
-        .lines()
-        .filter(|l| !l.starts_with('#'))
-        .map(|l| l.split(',').map(|x| x.trim().parse().unwrap()).collect())
-        .collect();
-    let m = rows.len();
-    let p: Vec<DVec2> = rows.iter().map(|r| DVec2::new(r[0], r[1])).collect();
-    let mut s = vec![0.0];
-    for i in 0..m {
-        s.push(s[i] + p[i].distance(p[(i + 1) % m]));
-    }
-    let smooth = |v: &dyn Fn(usize) -> f64| -> Vec<f64> {
-        let mut v: Vec<f64> = (0..m).map(v).collect();
-        for _ in 0..16 {
-            v = (0..m).map(|i| 0.25 * (v[(i + m - 1) % m] + v[(i + 1) % m]) + 0.5 * v[i]).collect();
-        }
-        v
-    };
-    let (wrs, wls) = (smooth(&|i| rows[i][2]), smooth(&|i| rows[i][3]));
-    let (px, py) = (smooth(&|i| p[i].x), smooth(&|i| p[i].y));
-    let rows: Vec<Vec<f64>> = (0..m).map(|i| vec![px[i], py[i], wrs[i], wls[i]]).collect();
-    let p: Vec<DVec2> = rows.iter().map(|r| DVec2::new(r[0], r[1])).collect();
-    let normal: Vec<DVec2> =
-        (0..m).map(|i| (p[(i + 1) % m] - p[(i + m - 1) % m]).normalize().perp()).collect();
-    let (mut right, mut left, mut station) = (vec![], vec![], vec![]);
-    for k in 0..n {
-        let at = s[m] * k as f64 / n as f64;
-        let i = s.partition_point(|x| *x <= at) - 1;
-        let t = (at - s[i]) / (s[i + 1] - s[i]);
-        let j = (i + 1) % m;
-        let c = p[i].lerp(p[j], t);
-        let nn = normal[i].lerp(normal[j], t).normalize();
-        let wr = rows[i][2] * (1.0 - t) + rows[j][2] * t;
-        let wl = rows[i][3] * (1.0 - t) + rows[j][3] * t;
-        right.push(c - nn * wr);
-        left.push(c + nn * wl);
-        station.push(at);
-    }
-    let cuts = CrossSections {
-        name: "Silverstone".to_owned(),
-        closed: true,
-        length_m: s[m],
-        station_m: station,
-        right_m: right,
-        left_m: left,
-        sections: vec![],
-        corners: vec![],
-    };
-    cuts.narrowed(car).unwrap()
+/// Surveyed Silverstone, cut at even distances.
+fn surveyed(n: usize, car: f64, raw: bool) -> CrossSections {
+    let track = crate::track::Track::read("../shared/data/tracks/Silverstone.csv").unwrap();
+    track
+        .cross_sections(&crate::track::Spacing::equal(n), raw)
+        .unwrap()
+        .narrowed(car)
+        .unwrap()
 }
 
 #[test]
 fn explore() {
     for car in [0.0, 2.0] {
-        let cuts = surveyed(360, car);
+        let cuts = surveyed(360, car, true);
         let map = LineMap::at_every_cut(&cuts);
         let bounds = Bounds::road(map.variables());
         let o = shortest(&map, &bounds).unwrap();
-        println!("shortest {car} {} {:?} {:?} {} {:.3}", o.value, o.lower_bound, o.status, o.iterations, o.seconds);
+        println!(
+            "shortest {car} {} {:?} {:?} {} {:.3}",
+            o.value, o.lower_bound, o.status, o.iterations, o.seconds
+        );
         let o = least_squared_length(&map, &bounds).unwrap();
-        println!("squared {car} {} {:?} {:?} {} {:.3}", o.value, o.lower_bound, o.status, o.iterations, o.seconds);
+        println!(
+            "squared {car} {} {:?} {:?} {} {:.3}",
+            o.value, o.lower_bound, o.status, o.iterations, o.seconds
+        );
         let h = spacing_m(&map, &vec![0.5; 360]);
         let even = vec![cuts.length_m / 360.0; 360];
         for h in [h, even] {
             let o = least_gamma(&map, &h, &bounds).unwrap();
-            println!("gamma {car} {} {:?} {:?} {} {:.3}", o.value, o.lower_bound, o.status, o.iterations, o.seconds);
+            println!(
+                "gamma {car} {} {:?} {:?} {} {:.3}",
+                o.value, o.lower_bound, o.status, o.iterations, o.seconds
+            );
             let own = problem(&map, None).measures(&o.x);
             println!("  its own {own:?}");
         }
     }
     for n in [720, 1178] {
-        let cuts = surveyed(n, 2.0);
+        let cuts = surveyed(n, 2.0, true);
         let map = LineMap::at_every_cut(&cuts);
         let bounds = Bounds::road(map.variables());
         let even = vec![cuts.length_m / n as f64; n];
         let o = least_gamma(&map, &even, &bounds).unwrap();
-        println!("gamma {n} {} {:?} {:?} {} {:.3}", o.value, o.lower_bound, o.status, o.iterations, o.seconds);
+        println!(
+            "gamma {n} {} {:?} {:?} {} {:.3}",
+            o.value, o.lower_bound, o.status, o.iterations, o.seconds
+        );
         let own = problem(&map, None).measures(&o.x);
         println!("  its own {own:?}");
         let c = least_curvature(&map, &bounds, &o.x).unwrap();
-        println!("curvature {n} {} {:?} {} {:.3}", c.value, c.status, c.iterations, c.seconds);
+        println!(
+            "curvature {n} {} {:?} {} {:.3}",
+            c.value, c.status, c.iterations, c.seconds
+        );
         let c = least_curvature(&map, &bounds, &vec![0.5; n]).unwrap();
-        println!("curvature from centre {n} {} {:?} {} {:.3}", c.value, c.status, c.iterations, c.seconds);
+        println!(
+            "curvature from centre {n} {} {:?} {} {:.3}",
+            c.value, c.status, c.iterations, c.seconds
+        );
     }
 }
 
@@ -184,11 +160,41 @@ fn gradients() {
         for fixed in [false, true] {
             all.spacing_m = fixed.then_some(&spacing);
             for (name, weights) in [
-                ("time", Weights { time: 1.0, ..Weights::default() }),
-                ("length", Weights { length: 1.0, ..Weights::default() }),
-                ("squared", Weights { squared_length: 1.0, ..Weights::default() }),
-                ("gamma", Weights { gamma: 1.0, ..Weights::default() }),
-                ("curvature", Weights { curvature: 1.0, ..Weights::default() }),
+                (
+                    "time",
+                    Weights {
+                        time: 1.0,
+                        ..Weights::default()
+                    },
+                ),
+                (
+                    "length",
+                    Weights {
+                        length: 1.0,
+                        ..Weights::default()
+                    },
+                ),
+                (
+                    "squared",
+                    Weights {
+                        squared_length: 1.0,
+                        ..Weights::default()
+                    },
+                ),
+                (
+                    "gamma",
+                    Weights {
+                        gamma: 1.0,
+                        ..Weights::default()
+                    },
+                ),
+                (
+                    "curvature",
+                    Weights {
+                        curvature: 1.0,
+                        ..Weights::default()
+                    },
+                ),
             ] {
                 let x = random_line(map.variables(), 3);
                 let (c, g) = all.cost(&weights, &x);
@@ -213,23 +219,92 @@ fn gradients() {
 
 #[test]
 fn time() {
-    let full = surveyed(1964, 2.0);
-    for controls in [300, 1964] {
-        let map = if controls == 1964 { LineMap::at_every_cut(&full) } else { LineMap::b_spline(&full, controls) };
-        let p = problem(&map, Some(&Racer));
-        let bounds = Bounds::road(map.variables());
-        let clock = std::time::Instant::now();
-        let c = if true {
-            let weights = Weights { curvature: 1.0, ..Weights::default() };
-            polish_lines(&p, &bounds, &[Start { x: vec![0.5; controls], weights }], &Budget::default()).unwrap().remove(0)
-        } else { unreachable!() };
-        println!("curvature {controls}: {:?} {:?} {} {:?}", c.measures, c.ending, c.evaluations, clock.elapsed());
-        let weights = Weights { time: 1.0, ..Weights::default() };
-        for (name, x) in [("centre", vec![0.5; controls]), ("curved", c.x)] {
+    for raw in [false, true] {
+        let full = surveyed(1964, 2.0, raw);
+        for controls in [300, 1964] {
+            let map = if controls == 1964 {
+                LineMap::at_every_cut(&full)
+            } else {
+                LineMap::b_spline(&full, controls)
+            };
+            let p = problem(&map, Some(&Racer));
+            let bounds = Bounds::road(map.variables());
             let clock = std::time::Instant::now();
-            println!("   start {}", p.measures(&x).time_s);
-            let c = polish_lines(&p, &bounds, &[Start { x, weights }], &Budget { evaluations: 6000, least_gain: 1e-7 }).unwrap().remove(0);
-            println!("{name} {controls}: {:?} {:?} {} {:?}", c.measures, c.ending, c.evaluations, clock.elapsed());
+            let c = if true {
+                let weights = Weights {
+                    curvature: 1.0,
+                    ..Weights::default()
+                };
+                polish_lines(
+                    &p,
+                    &bounds,
+                    &[Start {
+                        x: vec![0.5; controls],
+                        weights,
+                    }],
+                    &Budget::default(),
+                )
+                .unwrap()
+                .remove(0)
+            } else {
+                unreachable!()
+            };
+            println!(
+                "curvature {controls}: {:?} {:?} {} {:?}",
+                c.measures,
+                c.ending,
+                c.evaluations,
+                clock.elapsed()
+            );
+            let weights = Weights {
+                time: 1.0,
+                ..Weights::default()
+            };
+            for (name, x) in [("centre", vec![0.5; controls]), ("curved", c.x)] {
+                let clock = std::time::Instant::now();
+                println!("   start {}", p.measures(&x).time_s);
+                let c = polish_lines(
+                    &p,
+                    &bounds,
+                    &[Start { x, weights }],
+                    &Budget {
+                        evaluations: 6000,
+                        least_gain: 1e-7,
+                    },
+                )
+                .unwrap()
+                .remove(0);
+                println!(
+                    "{name} {controls}: {:?} {:?} {} {:?}",
+                    c.measures,
+                    c.ending,
+                    c.evaluations,
+                    clock.elapsed()
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn transcribed() {
+    for (n, raw) in [(720, false), (1964, false), (1964, true)] {
+        let cuts = surveyed(n, 2.0, raw);
+        let map = LineMap::at_every_cut(&cuts);
+        let p = problem(&map, Some(&Racer));
+        let bounds = Bounds::road(n);
+        let curved = least_curvature(&map, &bounds, &vec![0.5; n]).unwrap();
+        for start in [curved.x, vec![0.5; n]] {
+            println!("start {}", p.measures(&start).time_s);
+            let o = fastest(&p, &bounds, &start, &FastestSettings::default()).unwrap();
+            println!(
+                "fastest {n} {raw} {} {:?} {} {:.3} s {:?}",
+                o.value,
+                o.status,
+                o.iterations,
+                o.seconds,
+                p.measures(&o.x)
+            );
         }
     }
 }

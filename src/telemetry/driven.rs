@@ -124,7 +124,11 @@ impl Recording {
     }
 
     /// The lap's number and the samples of a channel that lie in it.
-    fn range_of_lap(&self, asked: Option<u32>, of: &Channel) -> Result<(Option<u32>, std::ops::Range<usize>)> {
+    fn range_of_lap(
+        &self,
+        asked: Option<u32>,
+        of: &Channel,
+    ) -> Result<(Option<u32>, std::ops::Range<usize>)> {
         let samples = of.values.len();
         // Times at which laps begin, each with its number; the last one is where the last complete lap ends.
         let mut cuts: Vec<(f64, u32)> = Vec::new();

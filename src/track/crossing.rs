@@ -76,11 +76,7 @@ pub(super) fn crossings(stretches: &[Stretch], most: usize) -> Result<Vec<(usize
         }
         if a == b {
             if a < leaves {
-                pending.extend([
-                    (2 * a, 2 * a),
-                    (2 * a + 1, 2 * a + 1),
-                    (2 * a, 2 * a + 1),
-                ]);
+                pending.extend([(2 * a, 2 * a), (2 * a + 1, 2 * a + 1), (2 * a, 2 * a + 1)]);
             }
         } else if tree[a].meets(&tree[b]) {
             if a < leaves {
@@ -146,6 +142,9 @@ mod tests {
             .map(|i| f64::from(i) * std::f64::consts::TAU / 100.0 + 0.01)
             .map(|t| DVec2::new(t.sin(), (2.0 * t).sin()))
             .collect();
-        assert_eq!(crossings(&stretches(&points, true), 10).map(|c| c.len()).ok(), Some(1));
+        assert_eq!(
+            crossings(&stretches(&points, true), 10).map(|c| c.len()).ok(),
+            Some(1)
+        );
     }
 }

@@ -162,7 +162,8 @@ impl<'a> Cutter<'a> {
             let j = (i + 1) % n;
             let (here, there) = (&self.frames[i], &self.frames[j]);
             let step = there.position_m - here.position_m;
-            let forwards = |end: usize| (self.ends[j][end] - self.ends[i][end]).dot(here.tangent + there.tangent);
+            let forwards =
+                |end: usize| (self.ends[j][end] - self.ends[i][end]).dot(here.tangent + there.tangent);
             let least = LEAST_STEP * step.dot(here.tangent + there.tangent).abs();
             if forwards(0) < least || forwards(1) < least {
                 near.push((i, j));
@@ -210,7 +211,11 @@ impl<'a> Cutter<'a> {
 
     fn too_tight(&self, cut: usize) -> Error {
         let frame = &self.frames[cut];
-        let inside = if frame.curvature_1pm > 0.0 { frame.left_m } else { frame.right_m };
+        let inside = if frame.curvature_1pm > 0.0 {
+            frame.left_m
+        } else {
+            frame.right_m
+        };
         Error::input(
             self.road.source(),
             format!("station {:.1} m", self.stations[cut]),
@@ -256,7 +261,11 @@ impl<'a> Cutter<'a> {
             }
             for _ in 0..40 {
                 let middle = 0.5 * (low + high);
-                if short(middle) > 0.0 { low = middle } else { high = middle }
+                if short(middle) > 0.0 {
+                    low = middle
+                } else {
+                    high = middle
+                }
             }
             Some(frame.position_m + way * low * left)
         };
@@ -282,7 +291,10 @@ impl<'a> Cutter<'a> {
             .unwrap_or(middle);
         let sample = &self.fine[index(best)];
         // Distance from the chord through the neighbours, which is finer than that from the sample.
-        let (before, after) = (self.fine[index(best - 1)].position_m, self.fine[index(best + 1)].position_m);
+        let (before, after) = (
+            self.fine[index(best - 1)].position_m,
+            self.fine[index(best + 1)].position_m,
+        );
         let along = (after - before).normalize_or_zero();
         let away = (point - sample.position_m).perp_dot(along).abs();
         (away.max(0.0), sample)

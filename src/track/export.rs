@@ -75,7 +75,12 @@ impl CrossSections {
         let path = path.as_ref();
         if alpha.len() != self.len() {
             let found = format!("{} values", alpha.len());
-            return Err(Error::input(path, "line", found, format!("{}, one per cut", self.len())));
+            return Err(Error::input(
+                path,
+                "line",
+                found,
+                format!("{}, one per cut", self.len()),
+            ));
         }
         write_new(path, &self.line_to_racetrack_csv(alpha))
     }

@@ -138,7 +138,11 @@ impl CircuitSource {
             let (survey, smoothing) = super::load_survey::read(path, &text)?;
             return Ok(Self::Survey(survey, smoothing));
         }
-        let file: CircuitFile = parse_toml(&toml_file, &text, "a circuit with name, curvature_table and length_m")?;
+        let file: CircuitFile = parse_toml(
+            &toml_file,
+            &text,
+            "a circuit with name, curvature_table and length_m",
+        )?;
         let table_path = path
             .parent()
             .unwrap_or(Path::new(""))

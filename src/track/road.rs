@@ -197,7 +197,11 @@ pub(super) fn spread(road: &dyn Road, spacing: &Spacing) -> Result<Vec<f64>> {
     let mut near = averaged(&bends, reach, road.closed());
     let most = near.iter().fold(0.0f64, |a, &b| a.max(b));
     // A straight road has no corners to stand closer in.
-    let scale = if most > 1e-9 { (corner_density - 1.0) / most } else { 0.0 };
+    let scale = if most > 1e-9 {
+        (corner_density - 1.0) / most
+    } else {
+        0.0
+    };
     near.iter_mut().for_each(|k| *k = 1.0 + scale * *k);
     if road.closed() {
         near.push(near[0]);
@@ -227,7 +231,11 @@ fn averaged(values: &[f64], reach: usize, closed: bool) -> Vec<f64> {
         .map(|i| {
             let (mut sum, mut weights) = (0.0, 0.0);
             for k in -reach..=reach {
-                let j = if closed { (i + k).rem_euclid(n) } else { (i + k).clamp(0, n - 1) };
+                let j = if closed {
+                    (i + k).rem_euclid(n)
+                } else {
+                    (i + k).clamp(0, n - 1)
+                };
                 sum += weight(k) * values[j as usize];
                 weights += weight(k);
             }

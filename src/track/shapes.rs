@@ -73,7 +73,11 @@ impl Shape {
             }),
             _ => None,
         };
-        Some(shape.ok_or_else(wrong).and_then(|shape| shape.check().map(|()| shape)))
+        Some(
+            shape
+                .ok_or_else(wrong)
+                .and_then(|shape| shape.check().map(|()| shape)),
+        )
     }
 
     /// A shape as [`Shape::parse`] reads it.
@@ -99,7 +103,10 @@ impl Shape {
         };
         let (sizes, width, tightest) = match *self {
             Self::Circle { right_m, left_m } => {
-                let sizes = [("radius of the right edge", right_m), ("radius of the left edge", left_m)];
+                let sizes = [
+                    ("radius of the right edge", right_m),
+                    ("radius of the left edge", left_m),
+                ];
                 (sizes, (left_m - right_m).abs(), f64::INFINITY)
             }
             Self::Ellipse {
@@ -108,13 +115,21 @@ impl Shape {
                 width_m,
             } => {
                 let (small, great) = (half_x_m.min(half_y_m), half_x_m.max(half_y_m));
-                ([("half_x_m", half_x_m), ("half_y_m", half_y_m)], width_m, small * small / great)
+                (
+                    [("half_x_m", half_x_m), ("half_y_m", half_y_m)],
+                    width_m,
+                    small * small / great,
+                )
             }
             Self::Stadium {
                 straight_m,
                 radius_m,
                 width_m,
-            } => ([("straight_m", straight_m), ("radius_m", radius_m)], width_m, radius_m),
+            } => (
+                [("straight_m", straight_m), ("radius_m", radius_m)],
+                width_m,
+                radius_m,
+            ),
         };
         for (field, size) in sizes {
             if !(SIZE_M.0..=SIZE_M.1).contains(&size) {
@@ -124,7 +139,11 @@ impl Shape {
         // Half the road lies inside the tightest bend.
         let widest = (2.0 * tightest).min(400.0);
         if !(width >= NARROWEST_M && width < widest) {
-            return refuse("width", width, format!("{NARROWEST_M} m to less than {widest:.1} m"));
+            return refuse(
+                "width",
+                width,
+                format!("{NARROWEST_M} m to less than {widest:.1} m"),
+            );
         }
         Ok(())
     }
@@ -168,7 +187,9 @@ impl Shaped {
             Shape::Stadium {
                 straight_m, radius_m, ..
             } => 2.0 * straight_m + TAU * radius_m,
-            Shape::Ellipse { half_x_m, half_y_m, .. } => {
+            Shape::Ellipse {
+                half_x_m, half_y_m, ..
+            } => {
                 let speed = |u: f64| (half_x_m * u.sin()).hypot(half_y_m * u.cos());
                 let step = TAU / ELLIPSE_STEPS as f64;
                 let mut sum = 0.0;

@@ -361,9 +361,7 @@ mod tests {
     use std::f64::consts::TAU;
 
     fn uneven(n: usize) -> Vec<f64> {
-        (0..n)
-            .map(|i| i as f64 + 0.3 * (2.3 * i as f64).sin())
-            .collect()
+        (0..n).map(|i| i as f64 + 0.3 * (2.3 * i as f64).sin()).collect()
     }
 
     #[test]

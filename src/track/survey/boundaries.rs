@@ -79,7 +79,11 @@ pub(super) fn survey(left: &Edge, right: &Edge, path: &Path, options: &SurveyOpt
         return Err(Error::input(
             path,
             "edges",
-            format!("a {} left edge and a {} right one", state(closed[0]), state(closed[1])),
+            format!(
+                "a {} left edge and a {} right one",
+                state(closed[0]),
+                state(closed[1])
+            ),
             "both closed or both open",
         ));
     }
@@ -89,7 +93,10 @@ pub(super) fn survey(left: &Edge, right: &Edge, path: &Path, options: &SurveyOpt
         let nearest = nearest(&right_points, left_points[0]);
         right_points.rotate_left(nearest);
     }
-    let (lefts, rights) = (Polyline::new(left_points, closed), Polyline::new(right_points, closed));
+    let (lefts, rights) = (
+        Polyline::new(left_points, closed),
+        Polyline::new(right_points, closed),
+    );
     let step = STEP_M.max(lefts.total().max(rights.total()) / MOST_STEPS);
     let (l, r) = (lefts.resampled(step), rights.resampled(step));
     check_sides(&l, &r, left, path)?;
@@ -274,7 +281,11 @@ fn hit(edge: &Polyline, from: DVec2, way: DVec2, hint: &mut usize) -> Option<f64
 /// Distance (m) across to the nearer end of an edge.
 fn beside(edge: &Polyline, from: DVec2, way: DVec2) -> Option<f64> {
     let ends = [edge.points[0], edge.points[edge.points.len() - 1]];
-    let near = if ends[0].distance(from) < ends[1].distance(from) { ends[0] } else { ends[1] };
+    let near = if ends[0].distance(from) < ends[1].distance(from) {
+        ends[0]
+    } else {
+        ends[1]
+    };
     let across = (near - from).dot(way);
     (across > 0.0 && across < WIDEST_ROAD_M).then_some(across)
 }

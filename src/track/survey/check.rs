@@ -79,7 +79,8 @@ pub(super) fn check_line(
     source: &str,
     place: &dyn Fn(usize) -> String,
 ) -> Result<()> {
-    let refuse = |place: String, found: String, expected: String| Err(Error::input(source, place, found, expected));
+    let refuse =
+        |place: String, found: String, expected: String| Err(Error::input(source, place, found, expected));
     let n = points.len();
     let fewest = if closed { FEWEST.0 } else { FEWEST.1 };
     if !(fewest..=MOST_POINTS).contains(&n) {
@@ -116,7 +117,10 @@ pub(super) fn check_line(
     }
     let turns = if closed { 0..n } else { 1..n - 1 };
     for i in turns {
-        let (before, after) = (points[i] - points[(i + n - 1) % n], points[(i + 1) % n] - points[i]);
+        let (before, after) = (
+            points[i] - points[(i + n - 1) % n],
+            points[(i + 1) % n] - points[i],
+        );
         let turn = before.angle_to(after).abs().to_degrees();
         if turn > SHARPEST_DEG {
             return refuse(
@@ -147,7 +151,8 @@ pub(super) fn check_crossings(
                 format!("{} and {}", place(i), place(j)),
                 format!("a line that crosses itself, {} time(s) or more", crossed.len()),
                 match bridges {
-                    0 => "a line that does not, or a TOML file with `bridges`, the number of its crossings".to_owned(),
+                    0 => "a line that does not, or a TOML file with `bridges`, the number of its crossings"
+                        .to_owned(),
                     _ => format!("at most {bridges} crossing(s), as `bridges` says"),
                 },
             ))

@@ -67,7 +67,8 @@ fn shown(cell: &str) -> String {
 }
 
 fn cells(line: &str, separator: char) -> impl Iterator<Item = &str> {
-    line.split(separator).map(|cell| cell.trim().trim_matches('"').trim())
+    line.split(separator)
+        .map(|cell| cell.trim().trim_matches('"').trim())
 }
 
 struct Table<'a> {
@@ -90,7 +91,10 @@ impl Table<'_> {
 /// The columns of a header line, or nothing if none is known.
 fn header<'a>(line: &str, number: usize, path: &'a Path) -> Result<Option<Table<'a>>> {
     let text = line.trim_start_matches('#').trim();
-    let separator = [',', ';', '\t'].into_iter().find(|&s| text.contains(s)).unwrap_or(',');
+    let separator = [',', ';', '\t']
+        .into_iter()
+        .find(|&s| text.contains(s))
+        .unwrap_or(',');
     let mut header: Vec<(usize, Column)> = Vec::new();
     let mut width = 0;
     for (i, cell) in cells(text, separator).enumerate() {
@@ -135,7 +139,14 @@ pub(super) fn read(text: &str, path: &Path) -> Result<Content> {
         match header(line, number, path)? {
             Some(table) => break table,
             None if line.starts_with('#') => {}
-            None => return Err(Error::input(path, format!("line {number}"), shown(line), EXPECTED)),
+            None => {
+                return Err(Error::input(
+                    path,
+                    format!("line {number}"),
+                    shown(line),
+                    EXPECTED,
+                ));
+            }
         }
     };
     let rows = lines.filter(|(_, line)| !line.is_empty() && !line.starts_with('#'));
@@ -151,7 +162,12 @@ pub(super) fn read(text: &str, path: &Path) -> Result<Content> {
         (Some(columns), _) => (columns, true),
         (None, Some(columns)) => (columns, false),
         _ => {
-            return Err(Error::input(path, "header", "not all columns of a line", EXPECTED));
+            return Err(Error::input(
+                path,
+                "header",
+                "not all columns of a line",
+                EXPECTED,
+            ));
         }
     };
     read_line(&table, rows, place, is_plane).map(Content::Line)
@@ -220,8 +236,10 @@ fn read_line<'a>(
         bounded(table.path, || format!("line {line}"), raw.lines.len())?;
         if is_plane {
             let range = (-FURTHEST_M, FURTHEST_M);
-            raw.points
-                .push(DVec2::new(cell(place[0], range.0, range.1)?, cell(place[1], range.0, range.1)?));
+            raw.points.push(DVec2::new(
+                cell(place[0], range.0, range.1)?,
+                cell(place[1], range.0, range.1)?,
+            ));
         } else {
             fixes.push(Fix {
                 latitude_deg: cell(place[0], -90.0, 90.0)?,

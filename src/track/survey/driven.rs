@@ -39,7 +39,11 @@ pub(super) fn read(bytes: &[u8], path: &Path, options: &SurveyOptions) -> Result
         ..Raw::default()
     };
     for (i, &point) in all.iter().enumerate() {
-        if raw.points.last().is_none_or(|last| last.distance(point) >= STEP_M) {
+        if raw
+            .points
+            .last()
+            .is_none_or(|last| last.distance(point) >= STEP_M)
+        {
             raw.points.push(point);
             if let Some(&line) = lines.get(i) {
                 raw.lines.push(line);

@@ -42,12 +42,19 @@ pub(super) fn project(fixes: &[Fix], path: &Path, place: &dyn Fn(usize) -> Strin
         return Err(Error::input(
             path,
             place(i),
-            format!("latitude {}, longitude {}", fixes[i].latitude_deg, fixes[i].longitude_deg),
+            format!(
+                "latitude {}, longitude {}",
+                fixes[i].latitude_deg, fixes[i].longitude_deg
+            ),
             "degrees from -90 to 90 and from -180 to 180",
         ));
     }
     // The mean of normals, which needs no care at the date line.
-    let up = fixes.iter().map(|f| f.normal()).sum::<DVec3>().normalize_or(DVec3::Z);
+    let up = fixes
+        .iter()
+        .map(|f| f.normal())
+        .sum::<DVec3>()
+        .normalize_or(DVec3::Z);
     let middle = Fix {
         latitude_deg: up.z.clamp(-1.0, 1.0).asin().to_degrees(),
         longitude_deg: up.y.atan2(up.x).to_degrees(),
@@ -89,11 +96,19 @@ mod tests {
             latitude_deg,
             longitude_deg,
         };
-        let fixes = [fix(51.995, -1.0), fix(52.005, -1.0), fix(52.0, -1.005), fix(52.0, -0.995)];
+        let fixes = [
+            fix(51.995, -1.0),
+            fix(52.005, -1.0),
+            fix(52.0, -1.005),
+            fix(52.0, -0.995),
+        ];
         let points = project(&fixes, Path::new("a"), &|i| i.to_string()).unwrap();
         let north = points[1] - points[0];
         let east = points[3] - points[2];
-        assert!((north.y - 1112.68).abs() < 0.02 && north.x.abs() < 0.01, "{north}");
+        assert!(
+            (north.y - 1112.68).abs() < 0.02 && north.x.abs() < 0.01,
+            "{north}"
+        );
         assert!((east.x - 686.78).abs() < 0.02 && east.y.abs() < 0.01, "{east}");
     }
 
@@ -105,7 +120,9 @@ mod tests {
         };
         let points = project(&[fix(179.999), fix(-179.999)], Path::new("a"), &|i| i.to_string()).unwrap();
         assert!(points[0].distance(points[1]) < 300.0);
-        let far = project(&[fix(0.0), fix(0.0), fix(30.0)], Path::new("a"), &|i| format!("point {i}"));
+        let far = project(&[fix(0.0), fix(0.0), fix(30.0)], Path::new("a"), &|i| {
+            format!("point {i}")
+        });
         assert!(far.unwrap_err().to_string().contains("km from the middle"));
     }
 }

@@ -110,7 +110,8 @@ impl Reader<'_> {
     }
 
     fn gpx(&mut self, root: Node<'_, '_>) -> Result<Option<String>> {
-        let points_of = |track: Node<'_, '_>| children(track, "trkseg").any(|s| children(s, "trkpt").next().is_some());
+        let points_of =
+            |track: Node<'_, '_>| children(track, "trkseg").any(|s| children(s, "trkpt").next().is_some());
         let tracks: Vec<Node<'_, '_>> = children(root, "trk").filter(|t| points_of(*t)).collect();
         let routes = || children(root, "rte").filter(|r| children(*r, "rtept").next().is_some());
         if tracks.is_empty() {
@@ -136,7 +137,10 @@ impl Reader<'_> {
             "Track" => children(*n, "coord").next().is_some(),
             _ => false,
         };
-        let line = self.only(root.descendants().filter(is_line).collect(), "LineString, LinearRing or gx:Track")?;
+        let line = self.only(
+            root.descendants().filter(is_line).collect(),
+            "LineString, LinearRing or gx:Track",
+        )?;
         for node in children(line, "coordinates").chain(children(line, "coord")) {
             let tuples_have_commas = node.tag_name().name() == "coordinates";
             for inner in node.children().filter(|c| c.is_text()) {
@@ -157,7 +161,12 @@ impl Reader<'_> {
         Ok(placemark.and_then(name_of))
     }
 
-    fn tuple<'t>(&mut self, node: Node<'_, '_>, offset: usize, mut parts: impl Iterator<Item = &'t str>) -> Result<()> {
+    fn tuple<'t>(
+        &mut self,
+        node: Node<'_, '_>,
+        offset: usize,
+        mut parts: impl Iterator<Item = &'t str>,
+    ) -> Result<()> {
         let longitude = parts.next().unwrap_or_default();
         let latitude = parts.next().unwrap_or_default();
         self.push(node, offset, latitude, longitude)
