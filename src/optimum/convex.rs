@@ -1,36 +1,12 @@
 //! The convex optima: shortest path, least squared length, least second difference.
 
+use super::bounds::{Bounds, check};
 use super::conic::{Affine, ConicProgram, Status};
 use super::geometry::{LineMap, Shape};
 use super::objective::LineProblem;
 use crate::{Error, Result};
 use glam::DVec2;
 use std::time::Instant;
-
-/// Least and greatest value of each variable of a line.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Bounds {
-    /// Least values.
-    pub lower: Vec<f64>,
-    /// Greatest values.
-    pub upper: Vec<f64>,
-}
-
-impl Bounds {
-    /// From 0, the right edge, to 1, the left one, everywhere.
-    pub fn road(variables: usize) -> Self {
-        Self {
-            lower: vec![0.0; variables],
-            upper: vec![1.0; variables],
-        }
-    }
-
-    /// The same with variable `i` held at `value`, as at the ends of an open line.
-    pub fn holding(mut self, i: usize, value: f64) -> Self {
-        (self.lower[i], self.upper[i]) = (value, value);
-        self
-    }
-}
 
 /// An exact optimum.
 #[derive(Clone, Debug)]
@@ -61,6 +37,7 @@ pub fn shortest(map: &LineMap, bounds: &Bounds) -> Result<Optimum> {
     lower.extend(steps.iter().map(|_| f64::NEG_INFINITY));
     upper.extend(steps.iter().map(|_| f64::INFINITY));
     let mut program = ConicProgram::new(lower, upper);
+    bounds.add_rows(&mut program, &vec![0.0; n]);
     for (s, [x, y]) in steps.into_iter().enumerate() {
         program.add_linear(n + s, 1.0);
         let length = Affine {
@@ -81,6 +58,7 @@ pub fn shortest(map: &LineMap, bounds: &Bounds) -> Result<Optimum> {
 pub fn least_squared_length(map: &LineMap, bounds: &Bounds) -> Result<Optimum> {
     check(map, bounds)?;
     let mut program = ConicProgram::new(bounds.lower.clone(), bounds.upper.clone());
+    bounds.add_rows(&mut program, &vec![0.0; map.variables()]);
     for square in steps(map).into_iter().flatten() {
         program.add_square(square);
     }
@@ -107,6 +85,7 @@ pub fn least_gamma(map: &LineMap, spacing_m: &[f64], bounds: &Bounds) -> Result<
         ));
     }
     let mut program = ConicProgram::new(bounds.lower.clone(), bounds.upper.clone());
+    bounds.add_rows(&mut program, &vec![0.0; map.variables()]);
     let pairs = (0..map.points()).filter_map(|i| {
         let before = if i > 0 {
             Some(i - 1)
@@ -136,32 +115,6 @@ pub fn least_gamma(map: &LineMap, spacing_m: &[f64], bounds: &Bounds) -> Result<
     // The program knows the square.
     optimum.lower_bound = optimum.lower_bound.map(|square| square.max(0.0).sqrt());
     Ok(optimum)
-}
-
-pub(super) fn check(map: &LineMap, bounds: &Bounds) -> Result<()> {
-    let n = map.variables();
-    let place = bounds
-        .lower
-        .iter()
-        .zip(&bounds.upper)
-        .position(|(l, u)| !(l <= u));
-    if bounds.lower.len() != n || bounds.upper.len() != n || map.points() < 3 {
-        return Err(Error::input(
-            "the line",
-            "bounds",
-            format!("{} bounds and {} points", bounds.lower.len(), map.points()),
-            format!("{n} bounds and three points at least"),
-        ));
-    }
-    match place {
-        Some(i) => Err(Error::input(
-            "the line",
-            format!("bounds of variable {i}"),
-            format!("{} to {}", bounds.lower[i], bounds.upper[i]),
-            "a range",
-        )),
-        None => Ok(()),
-    }
 }
 
 /// Both coordinates of each segment (m) as affine functions of the variables.

@@ -1,7 +1,8 @@
 //! The line of least integral of squared curvature, by a sequence of quadratic programs.
 
+use super::bounds::{Bounds, check};
 use super::conic::{Affine, ConicProgram, Status};
-use super::convex::{Bounds, Optimum, check};
+use super::convex::Optimum;
 use super::geometry::{LineMap, Shape};
 use crate::Result;
 use std::time::Instant;
@@ -22,10 +23,7 @@ const MOST_PROGRAMS: usize = 200;
 pub fn least_curvature(map: &LineMap, bounds: &Bounds, start: &[f64]) -> Result<Optimum> {
     check(map, bounds)?;
     let clock = Instant::now();
-    let mut x: Vec<f64> = start.to_vec();
-    for ((x, l), u) in x.iter_mut().zip(&bounds.lower).zip(&bounds.upper) {
-        *x = x.clamp(*l, *u);
-    }
+    let mut x = bounds.inside(start);
     let mut shape = Shape::of(&map.line(&x), map.closed);
     let mut value = integral(&shape);
     let mut iterations = 0;
@@ -35,6 +33,7 @@ pub fn least_curvature(map: &LineMap, bounds: &Bounds, start: &[f64]) -> Result<
         let lower = bounds.lower.iter().zip(&x).map(|(l, x)| l - x).collect();
         let upper = bounds.upper.iter().zip(&x).map(|(u, x)| u - x).collect();
         let mut program = ConicProgram::new(lower, upper);
+        bounds.add_rows(&mut program, &x);
         for residual in residuals(map, &shape) {
             program.add_square(residual);
         }

@@ -1,7 +1,8 @@
 //! The line of least lap time: a direct transcription, solved as a sequence of cone programs.
 
+use super::bounds::{Bounds, check};
 use super::conic::{Affine, ConicProgram, Status};
-use super::convex::{Bounds, Optimum, check};
+use super::convex::Optimum;
 use super::geometry::{LineMap, Shape};
 use super::lap::{Lap, Limits};
 use super::objective::LineProblem;
@@ -15,8 +16,8 @@ pub struct FastestSettings {
     pub programs: usize,
     /// The sequence ends when no step within reach promises more than this share of the time.
     pub least_gain: f64,
-    /// Largest first change of a variable.
-    pub first_reach: f64,
+    /// First weight of the distance from the line that a step starts at.
+    pub caution: f64,
 }
 
 impl Default for FastestSettings {
@@ -24,7 +25,7 @@ impl Default for FastestSettings {
         Self {
             programs: 60,
             least_gain: 1e-6,
-            first_reach: 0.2,
+            caution: 1.0,
         }
     }
 }
@@ -35,8 +36,8 @@ const PROGRAM_TOLERANCE: f64 = 1e-8;
 const LEAST_KEPT: f64 = 0.1;
 /// Share of the promise above which the next step may be twice as long.
 const WELL_KEPT: f64 = 0.7;
-/// Reach below which nothing but rounding is left.
-const LEAST_REACH: f64 = 1e-7;
+/// Caution beyond which nothing but rounding is left.
+const MOST_CAUTION: f64 = 1e7;
 
 /// The fastest line, from `start`: its value is the lap time (s).
 ///
@@ -69,13 +70,12 @@ pub fn fastest(
         let lap = Lap::of(&shape, limits, problem.start_mps);
         (shape, lap)
     };
-    let clamped = start.iter().zip(&bounds.lower).zip(&bounds.upper);
-    let mut x: Vec<f64> = clamped.map(|((x, l), u)| x.clamp(*l, *u)).collect();
+    let mut x = bounds.inside(start);
     let (mut shape, mut lap) = drive(&x);
-    let (mut iterations, mut reach) = (0, settings.first_reach);
+    let (mut iterations, mut caution) = (0, settings.caution);
     let mut status = Status::Failed(format!("{} programs without an end", settings.programs));
     for _ in 0..settings.programs {
-        let program = step_program(map, limits, &shape, &lap, bounds, &x, reach);
+        let program = step_program(map, limits, &shape, &lap, bounds, &x, caution);
         let solution = program.solve()?;
         iterations += solution.iterations;
         let step = &solution.x[..x.len()];
@@ -85,7 +85,7 @@ pub fn fastest(
         let gain = lap.time_s - trial_lap.time_s;
         if std::env::var("OPT_TRACE").is_ok() {
             println!(
-                "{:?} {} {promise:.6} {gain:.6} reach {reach:.4} time {:.6}",
+                "{:?} {} {promise:.6} {gain:.6} caution {caution:.4} time {:.6}",
                 solution.status, solution.iterations, lap.time_s
             );
         }
@@ -93,16 +93,15 @@ pub fn fastest(
             status = solution.status;
             break;
         }
-        let longest = step.iter().fold(0.0f64, |most, d| most.max(d.abs()));
         if gain >= LEAST_KEPT * promise {
             (x, shape, lap) = (trial, trial_shape, trial_lap);
             if gain >= WELL_KEPT * promise {
-                reach = (2.0 * reach).min(1.0);
+                caution *= 0.4;
             }
         } else {
-            reach = 0.5 * longest.min(reach);
+            caution *= 4.0;
         }
-        if reach < LEAST_REACH {
+        if caution > MOST_CAUTION {
             status = Status::Almost("steps too short to tell a gain from rounding".to_owned());
             break;
         }
@@ -126,7 +125,7 @@ fn step_program(
     lap: &Lap,
     bounds: &Bounds,
     x: &[f64],
-    reach: f64,
+    caution: f64,
 ) -> ConicProgram {
     let (variables, n) = (x.len(), map.points());
     let speed: Vec<f64> = lap.square.iter().map(|e| e.sqrt()).collect();
@@ -135,13 +134,13 @@ fn step_program(
         .lower
         .iter()
         .zip(x)
-        .map(|(l, x)| (l - x).max(-reach).min(0.0))
+        .map(|(l, x)| (l - x).min(0.0))
         .collect();
     let mut upper: Vec<f64> = bounds
         .upper
         .iter()
         .zip(x)
-        .map(|(u, x)| (u - x).min(reach).max(0.0))
+        .map(|(u, x)| (u - x).max(0.0))
         .collect();
     for (i, e) in lap.square.iter().enumerate() {
         // The start of an open line is given, and so is a standstill.
@@ -150,6 +149,7 @@ fn step_program(
         upper.push(if held { 0.0 } else { top / e - 1.0 });
     }
     let mut program = ConicProgram::new(lower, upper).with_tolerance(PROGRAM_TOLERANCE);
+    bounds.add_rows(&mut program, x);
     let square = |i: usize| variables + i;
     for (s, h) in shape.length_m.iter().enumerate() {
         let next = (s + 1) % n;
@@ -179,6 +179,16 @@ fn step_program(
         let grip = limits.at(speed[i].max(f64::MIN_POSITIVE)).lateral;
         let used = shape.curvature_1pm[i] * lap.square[i] / grip.value;
         let by_square = used * (1.0 - 0.5 * speed[i] * grip.by_speed / grip.value);
+        // What a linear model of grip leaves out is the product of the relative changes of curvature and speed squared, and it
+        // costs at most half the time spent here times that product; of which the squares are a bound.
+        let time = shape.spacing_m[i] / speed[i].max(1.0);
+        let weight = (0.25 * caution * time).sqrt();
+        let mut bend = Vec::new();
+        shape.add_curvature(map, i, weight * lap.square[i] / grip.value, &mut bend);
+        for terms in [bend, vec![(square(i), weight)]] {
+            let constant = 0.0;
+            program.add_square(Affine { constant, terms }.merged());
+        }
         // To either side: on a straight a step may bend the line both ways.
         for sign in [1.0, -1.0] {
             let mut terms = vec![(square(i), -sign * by_square)];

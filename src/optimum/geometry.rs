@@ -1,5 +1,6 @@
 //! Points of a line, its segments and curvature, and the derivatives of both in reverse.
 
+use super::bounds::{Bounds, RowBound};
 use crate::track::CrossSections;
 use glam::DVec2;
 
@@ -47,33 +48,33 @@ impl LineMap {
     /// `alpha` as a cubic B-spline with `controls` evenly spaced over the cuts' stations; on an open circuit the outer
     /// controls lie at the ends and are doubled, so that a straight row of controls gives a straight line.
     pub fn b_spline(cuts: &CrossSections, controls: usize) -> Self {
-        let last = controls as isize - 1;
-        Self::of_shares(cuts, controls, |i| {
-            let share = cuts.station_m[i] / cuts.length_m;
-            let spans = if cuts.closed { controls as f64 } else { last as f64 };
-            let place = share * spans;
-            let t = place - place.floor();
-            let weights = [
-                (1.0 - t).powi(3) / 6.0,
-                (4.0 - 6.0 * t * t + 3.0 * t.powi(3)) / 6.0,
-                (1.0 + 3.0 * t + 3.0 * t * t - 3.0 * t.powi(3)) / 6.0,
-                t.powi(3) / 6.0,
-            ];
-            let mut row: Vec<(usize, f64)> = Vec::with_capacity(4);
-            for (weight, offset) in weights.into_iter().zip(-1..) {
-                let k = place.floor() as isize + offset;
-                let k = if cuts.closed {
-                    k.rem_euclid(last + 1)
-                } else {
-                    k.clamp(0, last)
-                } as usize;
-                match row.iter_mut().find(|(other, _)| *other == k) {
-                    Some((_, sum)) => *sum += weight,
-                    None => row.push((k, weight)),
-                }
-            }
-            row
-        })
+        Self::of_shares(cuts, controls, |i| spline_shares(cuts, controls, i))
+    }
+
+    /// A line `base` (its `alpha` on every cut) moved along the cuts by a cubic B-spline with `controls` (m, to the left),
+    /// and the bounds that keep it on the road at every cut. Where the base is smooth, all such lines are, however jagged
+    /// the edges; which `alpha` as a spline cannot say.
+    pub fn spline_about(cuts: &CrossSections, base: &[f64], controls: usize) -> (Self, Bounds) {
+        let points = cuts.points(base);
+        let across = |i: usize| (cuts.left_m[i] - cuts.right_m[i]).normalize();
+        let reaches = (0..cuts.len()).map(|i| {
+            let reach = spline_shares(cuts, controls, i).into_iter();
+            (
+                points[i],
+                reach.map(|(k, share)| (k, share * across(i))).collect(),
+            )
+        });
+        let rows = (0..cuts.len()).map(|i| RowBound {
+            terms: spline_shares(cuts, controls, i),
+            lower: -points[i].distance(cuts.right_m[i]),
+            upper: points[i].distance(cuts.left_m[i]),
+        });
+        let bounds = Bounds {
+            lower: vec![f64::NEG_INFINITY; controls],
+            upper: vec![f64::INFINITY; controls],
+            rows: rows.collect(),
+        };
+        (Self::new(cuts.closed, controls, reaches), bounds)
     }
 
     /// `alpha` on every cut a sum of shares of the variables.
@@ -124,6 +125,34 @@ impl LineMap {
         }
         by_x
     }
+}
+
+/// What each of `controls` evenly spaced controls of a cubic B-spline counts at cut `i`.
+fn spline_shares(cuts: &CrossSections, controls: usize, i: usize) -> Vec<(usize, f64)> {
+    let last = controls as isize - 1;
+    let spans = if cuts.closed { controls as f64 } else { last as f64 };
+    let place = cuts.station_m[i] / cuts.length_m * spans;
+    let t = place - place.floor();
+    let weights = [
+        (1.0 - t).powi(3) / 6.0,
+        (4.0 - 6.0 * t * t + 3.0 * t.powi(3)) / 6.0,
+        (1.0 + 3.0 * t + 3.0 * t * t - 3.0 * t.powi(3)) / 6.0,
+        t.powi(3) / 6.0,
+    ];
+    let mut row: Vec<(usize, f64)> = Vec::with_capacity(4);
+    for (weight, offset) in weights.into_iter().zip(-1..) {
+        let k = place.floor() as isize + offset;
+        let k = if cuts.closed {
+            k.rem_euclid(last + 1)
+        } else {
+            k.clamp(0, last)
+        } as usize;
+        match row.iter_mut().find(|(other, _)| *other == k) {
+            Some((_, sum)) => *sum += weight,
+            None => row.push((k, weight)),
+        }
+    }
+    row
 }
 
 /// Segments and curvature of a line.

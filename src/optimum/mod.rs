@@ -4,6 +4,7 @@
 //! time are smooth but for kinks, and are led downhill by gradients in reverse mode.
 
 mod bounded;
+mod bounds;
 mod conic;
 mod convex;
 mod curvature;
@@ -16,8 +17,9 @@ mod polish;
 mod tests;
 
 pub use bounded::{Budget, Ending};
+pub use bounds::{Bounds, RowBound};
 pub use conic::Status;
-pub use convex::{Bounds, Optimum, least_gamma, least_squared_length, shortest, spacing_m};
+pub use convex::{Optimum, least_gamma, least_squared_length, shortest, spacing_m};
 pub use curvature::least_curvature;
 pub use fastest::{FastestSettings, fastest};
 pub use geometry::LineMap;

@@ -1,7 +1,7 @@
 //! Many lines at once, each led downhill by exact gradients.
 
 use super::bounded::{Budget, Ending, minimise};
-use super::convex::{Bounds, check};
+use super::bounds::{Bounds, check};
 use super::objective::{LineProblem, Measures, Weights};
 use crate::Result;
 use rayon::prelude::*;

@@ -288,17 +288,39 @@ fn time() {
 
 #[test]
 fn transcribed() {
-    for (n, raw) in [(720, false), (1964, false), (1964, true)] {
-        let cuts = surveyed(n, 2.0, raw);
+    for (n, share) in [(720, 2), (1964, 3), (1964, 1)] {
+        let cuts = surveyed(n, 2.0, false);
         let map = LineMap::at_every_cut(&cuts);
-        let p = problem(&map, Some(&Racer));
-        let bounds = Bounds::road(n);
-        let curved = least_curvature(&map, &bounds, &vec![0.5; n]).unwrap();
-        for start in [curved.x, vec![0.5; n]] {
+        for who in 0..2u32 {
+            let mut road = Bounds::road(n);
+            let random = Random::new(3);
+            if who > 0 {
+                for i in 0..n {
+                    let t = TAU * i as f64 / n as f64;
+                    let wave: f64 = (1..30u32)
+                        .map(|k| {
+                            random.normal(1, 0, who, k)
+                                * (f64::from(k) * t + 6.0 * random.normal(2, 0, who, k)).sin()
+                        })
+                        .sum();
+                    let middle = (0.5 + 0.1 * wave).clamp(0.2, 0.8);
+                    road.lower[i] = middle - 0.15;
+                    road.upper[i] = middle + 0.15;
+                }
+            }
+            let curved = least_curvature(&map, &road, &vec![0.5; n]).unwrap();
+            let controls = n / share;
+            let (map, bounds) = if share > 1 {
+                LineMap::spline_about(&cuts, &curved.x, controls)
+            } else {
+                (map.clone(), Bounds::road(n))
+            };
+            let p = problem(&map, Some(&Racer));
+            let start = if share > 1 { vec![0.0; controls] } else { curved.x };
             println!("start {}", p.measures(&start).time_s);
             let o = fastest(&p, &bounds, &start, &FastestSettings::default()).unwrap();
             println!(
-                "fastest {n} {raw} {} {:?} {} {:.3} s {:?}",
+                "fastest {n} {share} {} {:?} {} {:.3} s {:?}",
                 o.value,
                 o.status,
                 o.iterations,
