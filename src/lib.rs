@@ -3,6 +3,7 @@
 pub mod config;
 pub mod error;
 pub mod evaluate;
+pub mod line;
 pub mod random;
 pub mod report;
 pub mod scalar;
