@@ -30,10 +30,10 @@ pub struct Arguments {
     #[arg(long, value_name = "SHARE")]
     pace: Option<f64>,
     /// Standard deviations of the sensors' noise: vx (m/s), ax, ay (m/s^2), yaw rate (rad/s)
-    #[arg(long, value_name = "VX,AX,AY,R", value_delimiter = ',', num_args = 4)]
+    #[arg(long, value_name = "VX,AX,AY,R", value_delimiter = ',')]
     noise: Option<Vec<f64>>,
     /// Delays of the sensors: vx, ax, ay, yaw rate (s)
-    #[arg(long, value_name = "VX,AX,AY,R", value_delimiter = ',', num_args = 4)]
+    #[arg(long, value_name = "VX,AX,AY,R", value_delimiter = ',')]
     delay: Option<Vec<f64>>,
 }
 

@@ -2,7 +2,7 @@
 //!
 //! A plain swarm stalls where the cost is a long, narrow valley across the axes, as in any fit whose parameters
 //! stand in for one another. Here the particles are drawn about a common centre from a normal distribution whose
-//! covariance follows the steps that paid (Hansen, *The CMA evolution strategy: a tutorial*, arXiv:1604.00772,
+//! covariance follows the steps that paid and shuns those that did not (Hansen, *The CMA evolution strategy: a tutorial*, arXiv:1604.00772,
 //! 2016, with the default constants of its table 1). It starts from where an exploring swarm got to, as in Müller,
 //! Baumgartner, Sbalzarini, *Particle swarm CMA evolution strategy*, CEC 2009.
 
@@ -152,47 +152,67 @@ impl CovarianceSwarm {
     /// One update of centre, step size and covariance from the ranked population.
     fn adapt(&mut self, order: &[usize]) {
         let n = self.mean.len() as f64;
-        let lambda = self.settings.population as f64;
-        let parents = self.settings.population / 2;
-        let raw: Vec<f64> = (0..parents)
-            .map(|i| (0.5 * (lambda + 1.0)).ln() - (i as f64 + 1.0).ln())
+        let population = self.settings.population;
+        let parents = population / 2;
+        let lambda = population as f64;
+        let raw: Vec<f64> = (1..=population)
+            .map(|rank| (0.5 * (lambda + 1.0)).ln() - (rank as f64).ln())
             .collect();
-        let sum: f64 = raw.iter().sum();
-        let weights: Vec<f64> = raw.iter().map(|w| w / sum).collect();
-        let effective = 1.0 / weights.iter().map(|w| w * w).sum::<f64>();
+        let sum = |weights: &[f64]| weights.iter().sum::<f64>();
+        let effective_of =
+            |weights: &[f64]| sum(weights).powi(2) / weights.iter().map(|w| w * w).sum::<f64>();
+        let effective = effective_of(&raw[..parents]);
         let rate_path = (4.0 + effective / n) / (n + 4.0 + 2.0 * effective / n);
         let rate_step = (effective + 2.0) / (n + effective + 5.0);
         let rate_one = 2.0 / ((n + 1.3).powi(2) + effective);
-        let rate_many =
-            (1.0 - rate_one).min(2.0 * (effective - 2.0 + 1.0 / effective) / ((n + 2.0).powi(2) + effective));
+        let rate_many = (1.0 - rate_one)
+            .min(2.0 * (effective - 1.75 + 1.0 / effective) / ((n + 2.0).powi(2) + effective));
         let damping = 1.0 + 2.0 * (((effective - 1.0) / (n + 1.0)).sqrt() - 1.0).max(0.0) + rate_step;
         let expected = n.sqrt() * (1.0 - 1.0 / (4.0 * n) + 1.0 / (21.0 * n * n));
+        // Steps that did not pay count against their directions, by no more than leaves the covariance positive
+        // (equations 50 to 53).
+        let against = (1.0 + rate_one / rate_many)
+            .min(1.0 + 2.0 * effective_of(&raw[parents..]) / (effective + 2.0))
+            .min((1.0 - rate_one - rate_many) / (n * rate_many));
+        let (gain, loss) = (sum(&raw[..parents]), -sum(&raw[parents..]));
+        let weights: Vec<f64> = raw
+            .iter()
+            .enumerate()
+            .map(|(i, w)| if i < parents { w / gain } else { against * w / loss })
+            .collect();
 
         let old = self.mean.clone();
-        let steps: Vec<DVector<f64>> = order[..parents]
+        let steps: Vec<DVector<f64>> = order
             .iter()
             .map(|&i| (&self.positions[i] - &old) / self.step)
             .collect();
-        let shift = steps
+        let shift = steps[..parents]
             .iter()
             .zip(&weights)
             .fold(DVector::zeros(old.len()), |acc, (y, w)| acc + y * *w);
         self.mean = old + &shift * self.step;
 
-        let whitened = &self.basis * (self.basis.transpose() * &shift).component_div(&self.scales);
+        let whitened = |y: &DVector<f64>| (self.basis.transpose() * y).component_div(&self.scales);
         self.step_path = &self.step_path * (1.0 - rate_step)
-            + whitened * (rate_step * (2.0 - rate_step) * effective).sqrt();
+            + &self.basis * whitened(&shift) * (rate_step * (2.0 - rate_step) * effective).sqrt();
         let age = 1.0 - (1.0 - rate_step).powi(2 * (self.iteration as i32 + 1));
         let steady = self.step_path.norm() / age.sqrt() < (1.4 + 2.0 / (n + 1.0)) * expected;
         let heaviside = if steady { 1.0 } else { 0.0 };
         self.covariance_path = &self.covariance_path * (1.0 - rate_path)
             + shift * (heaviside * (rate_path * (2.0 - rate_path) * effective).sqrt());
-        let kept = 1.0 - rate_one - rate_many + (1.0 - heaviside) * rate_one * rate_path * (2.0 - rate_path);
+        let kept = 1.0 + (1.0 - heaviside) * rate_one * rate_path * (2.0 - rate_path)
+            - rate_one
+            - rate_many * sum(&weights);
         self.covariance *= kept;
         self.covariance
             .ger(rate_one, &self.covariance_path, &self.covariance_path, 1.0);
         for (y, w) in steps.iter().zip(&weights) {
-            self.covariance.ger(rate_many * w, y, y, 1.0);
+            let weight = if *w < 0.0 {
+                w * n / whitened(y).norm_squared().max(f64::MIN_POSITIVE)
+            } else {
+                *w
+            };
+            self.covariance.ger(rate_many * weight, y, y, 1.0);
         }
         let growth = (rate_step / damping) * (self.step_path.norm() / expected - 1.0);
         self.step = (self.step * growth.min(1.0).exp()).min(1.0);

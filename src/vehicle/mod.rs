@@ -6,6 +6,7 @@
 pub mod aero;
 pub mod car;
 pub mod chassis;
+pub mod envelope;
 pub mod loads;
 pub mod model;
 pub mod parameters;
@@ -14,6 +15,7 @@ pub mod tyre;
 
 pub use car::{Car, CarParameter, Tyres};
 pub use chassis::Chassis;
+pub use envelope::{Envelope, EnvelopeRow};
 pub use model::{CarInput, CarModel, CarRate, CarState};
 pub use parameters::ParameterInfo;
 pub use powertrain::Powertrain;
