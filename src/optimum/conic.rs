@@ -23,6 +23,11 @@ pub(super) struct Affine {
 }
 
 impl Affine {
+    /// A map without constant, as of a change.
+    pub fn change(terms: Vec<(usize, f64)>) -> Self {
+        Self { constant: 0.0, terms }.merged()
+    }
+
     /// The same with one term for each variable.
     pub fn merged(mut self) -> Self {
         self.terms.sort_by_key(|(k, _)| *k);
@@ -76,6 +81,17 @@ impl ConicProgram {
             cones: Vec::new(),
             tolerance: TOLERANCE,
         }
+    }
+
+    /// Adds variables between bounds and returns the number of the first.
+    pub fn add_variables(&mut self, bounds: impl Iterator<Item = (f64, f64)>) -> usize {
+        let first = self.lower.len();
+        for (lower, upper) in bounds {
+            self.lower.push(lower);
+            self.upper.push(upper);
+            self.linear.push(0.0);
+        }
+        first
     }
 
     /// Adds `coefficient * variable` to the objective.

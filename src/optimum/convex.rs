@@ -3,7 +3,7 @@
 use super::bounds::{Bounds, check};
 use super::conic::{Affine, ConicProgram, Status};
 use super::geometry::{LineMap, Shape};
-use super::objective::LineProblem;
+use super::objective::{LineProblem, Measures};
 use crate::{Error, Result};
 use glam::DVec2;
 use std::time::Instant;
@@ -19,7 +19,11 @@ pub struct Optimum {
     pub lower_bound: Option<f64>,
     /// How the solver ended.
     pub status: Status,
-    /// Steps of the solver.
+    /// The line's measures.
+    pub measures: Measures,
+    /// Cone programs solved.
+    pub programs: usize,
+    /// Steps of the solver in all of them.
     pub iterations: usize,
     /// Time that it took (s).
     pub seconds: f64,
@@ -51,7 +55,7 @@ pub fn shortest(map: &LineMap, bounds: &Bounds) -> Result<Optimum> {
 
 /// The line of least squared length: a quadratic program. Its value is the sum of squares (m^2).
 ///
-/// Source: [R] of Braghin et al., *Race driver model*, Computers and Structures 86 (2008).
+/// Source: Braghin, Cheli, Melzi, Sabbioni, *Race driver model*, Computers and Structures 86 (2008).
 ///
 /// # Errors
 /// [`Error::Input`] for bounds that do not fit, [`Error::Study`] if the solver refuses.
@@ -153,13 +157,10 @@ fn solve(
     let start = Instant::now();
     let mut solution = program.solve()?;
     solution.x.truncate(map.variables());
-    let problem = LineProblem {
-        map,
-        limits: None,
-        start_mps: 0.0,
-        spacing_m: None,
-    };
+    let problem = LineProblem::of(map);
     Ok(Optimum {
+        measures: problem.measures(&solution.x),
+        programs: 1,
         value: value(&problem, &solution.x),
         x: solution.x,
         lower_bound: Some(solution.lower_bound),

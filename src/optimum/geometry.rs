@@ -214,25 +214,33 @@ impl Shape {
         self.length_m.iter().any(|length| !(*length > 0.0))
     }
 
-    /// Adds `scale` times the change of segment `s`'s length by the variables to `terms`.
-    pub fn add_length(&self, map: &LineMap, s: usize, scale: f64, terms: &mut Vec<(usize, f64)>) {
-        let along = self.step_m[s] * (scale / self.length_m[s]);
-        add_reach(map, (s + 1) % map.points(), along, terms);
-        add_reach(map, s, -along, terms);
-    }
-
-    /// Adds `scale` times the change of the turn at point `i` by the variables to `terms`; nought at the ends of an open line.
-    pub fn add_turn(&self, map: &LineMap, i: usize, scale: f64, terms: &mut Vec<(usize, f64)>) {
-        if let (Some(before), Some(after)) = self.neighbours(i) {
-            for (segment, sign) in [(before, -scale), (after, scale)] {
-                let across = self.step_m[segment].perp() * (sign / self.length_m[segment].powi(2));
-                add_reach(map, (segment + 1) % map.points(), across, terms);
-                add_reach(map, segment, -across, terms);
-            }
+    /// Adds the change of segment `s` in `direction`, times the direction's length, by the variables to `terms`.
+    pub fn add_step(map: &LineMap, s: usize, direction: DVec2, terms: &mut Vec<(usize, f64)>) {
+        for (point, bar) in [((s + 1) % map.points(), direction), (s, -direction)] {
+            terms.extend(map.reach(point).iter().map(|&(k, reach)| (k, reach.dot(bar))));
         }
     }
 
-    /// Adds `scale` times the change of the curvature at point `i` by the variables to `terms`.
+    /// Adds `scale` times the change of segment `s`'s length.
+    pub fn add_length(&self, map: &LineMap, s: usize, scale: f64, terms: &mut Vec<(usize, f64)>) {
+        Self::add_step(map, s, self.step_m[s] * (scale / self.length_m[s]), terms);
+    }
+
+    /// Adds `scale` times the change of segment `s`'s heading.
+    pub fn add_heading(&self, map: &LineMap, s: usize, scale: f64, terms: &mut Vec<(usize, f64)>) {
+        let across = self.step_m[s].perp();
+        Self::add_step(map, s, across * (scale / self.length_m[s].powi(2)), terms);
+    }
+
+    /// Adds `scale` times the change of the turn at point `i`; nought at the ends of an open line.
+    pub fn add_turn(&self, map: &LineMap, i: usize, scale: f64, terms: &mut Vec<(usize, f64)>) {
+        if let (Some(before), Some(after)) = self.neighbours(i) {
+            self.add_heading(map, after, scale, terms);
+            self.add_heading(map, before, -scale, terms);
+        }
+    }
+
+    /// Adds `scale` times the change of the curvature at point `i`.
     pub fn add_curvature(&self, map: &LineMap, i: usize, scale: f64, terms: &mut Vec<(usize, f64)>) {
         let spacing = self.spacing_m[i];
         self.add_turn(map, i, scale / spacing, terms);
@@ -274,9 +282,4 @@ impl Shape {
         }
         by_point
     }
-}
-
-/// Adds what moving point `j` by the variables changes, `by_point` for each metre, to `terms`.
-fn add_reach(map: &LineMap, j: usize, by_point: DVec2, terms: &mut Vec<(usize, f64)>) {
-    terms.extend(map.reach(j).iter().map(|&(k, reach)| (k, reach.dot(by_point))));
 }

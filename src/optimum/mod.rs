@@ -3,26 +3,23 @@
 //! Shortest path, squared length and second difference are convex and go to an interior-point solver; curvature and lap
 //! time are smooth but for kinks, and are led downhill by gradients in reverse mode.
 
-mod bounded;
 mod bounds;
 mod conic;
 mod convex;
-mod curvature;
-mod fastest;
+mod descent;
 mod geometry;
 mod lap;
 mod objective;
-mod polish;
+mod point_mass;
 #[cfg(test)]
 mod tests;
+mod time_model;
 
-pub use bounded::{Budget, Ending};
 pub use bounds::{Bounds, RowBound};
 pub use conic::Status;
 pub use convex::{Optimum, least_gamma, least_squared_length, shortest, spacing_m};
-pub use curvature::least_curvature;
-pub use fastest::{FastestSettings, fastest};
+pub use descent::{DescentSettings, Start, descend, fastest, least_curvature, polish_lines};
 pub use geometry::LineMap;
 pub use lap::{Grip, Limits, Slope};
 pub use objective::{LineProblem, Measures, Weights};
-pub use polish::{Polished, Start, polish_lines};
+pub use point_mass::PointMassLimits;

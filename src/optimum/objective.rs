@@ -22,7 +22,7 @@ pub struct Weights {
 /// The measures of a line.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Measures {
-    /// Lap time (s); nought if it has no weight, since it is the costly one.
+    /// Lap time (s); nought without a car or, where lines are weighed, without a weight.
     pub time_s: f64,
     /// Length (m).
     pub length_m: f64,
@@ -59,13 +59,44 @@ pub struct LineProblem<'a> {
     pub spacing_m: Option<&'a [f64]>,
 }
 
-impl LineProblem<'_> {
+impl<'a> LineProblem<'a> {
+    /// Lines alone, without a car.
+    pub fn of(map: &'a LineMap) -> Self {
+        Self {
+            map,
+            limits: None,
+            start_mps: 0.0,
+            spacing_m: None,
+        }
+    }
+
+    /// Shape, lap (where time counts) and measures of line `x`; all measures infinite where it has two points in one place.
+    pub(super) fn judged(&self, weights: &Weights, x: &[f64]) -> (Shape, Option<Lap>, Measures) {
+        let shape = Shape::of(&self.map.line(x), self.map.closed);
+        if shape.stands_still() {
+            let far = f64::INFINITY;
+            let measures = Measures {
+                time_s: far,
+                length_m: far,
+                squared_length_m2: far,
+                gamma_1pm: far,
+                curvature_1pm: far,
+            };
+            return (shape, None, measures);
+        }
+        let limits = self.limits.filter(|_| weights.time != 0.0);
+        let lap = limits.map(|limits| Lap::of(&shape, limits, self.start_mps));
+        let measures = self.measured(&shape, lap.as_ref());
+        (shape, lap, measures)
+    }
+
     /// The measures of line `x`.
     pub fn measures(&self, x: &[f64]) -> Measures {
-        let points = self.map.line(x);
-        let shape = Shape::of(&points, self.map.closed);
-        let lap = self.limits.map(|limits| Lap::of(&shape, limits, self.start_mps));
-        self.measured(&shape, lap.as_ref())
+        let time = Weights {
+            time: 1.0,
+            ..Weights::default()
+        };
+        self.judged(&time, x).2
     }
 
     /// Speeds (m/s) at the points of line `x`; none without a car.
@@ -94,14 +125,10 @@ impl LineProblem<'_> {
 
     /// The weighted cost of line `x` and its gradient; an infinite cost where a line has two points in one place.
     pub fn cost(&self, weights: &Weights, x: &[f64]) -> (f64, Vec<f64>) {
-        let points = self.map.line(x);
-        let shape = Shape::of(&points, self.map.closed);
-        if shape.stands_still() {
+        let (shape, lap, measures) = self.judged(weights, x);
+        if !measures.length_m.is_finite() {
             return (f64::INFINITY, vec![0.0; x.len()]);
         }
-        let limits = self.limits.filter(|_| weights.time != 0.0);
-        let lap = limits.map(|limits| Lap::of(&shape, limits, self.start_mps));
-        let measures = self.measured(&shape, lap.as_ref());
         let mut by_length: Vec<f64> = shape
             .length_m
             .iter()
