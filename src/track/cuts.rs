@@ -86,8 +86,7 @@ impl<'a> Cutter<'a> {
         let mut widest = 0.0f64;
         for (frame, station) in frames.iter().zip(&stations) {
             let width = frame.left_m + frame.right_m;
-            // A negated comparison refuses what is no number, too.
-            if !(width > 0.0) {
+            if width.is_nan() || width <= 0.0 {
                 return Err(Error::input(
                     road.source(),
                     format!("width at station {station:.1} m"),
@@ -197,7 +196,8 @@ impl<'a> Cutter<'a> {
             for i in (0..n).filter(|&i| zone[i]) {
                 let mean = direction((i + n - 1) % n) + direction((i + 1) % n) + 2.0 * direction(i);
                 next[i] = self.frames[i].tangent.angle_to(mean);
-                if !(next[i].abs() <= FURTHEST_TURN_RAD) || round == ROUNDS {
+                let turnable = next[i].abs() <= FURTHEST_TURN_RAD && round < ROUNDS;
+                if !turnable {
                     return Err(self.too_tight(worst));
                 }
             }

@@ -35,4 +35,6 @@ pub use spline::Deviation;
 pub use survey::{Survey, SurveyOptions};
 
 #[cfg(test)]
+mod road_tests;
+#[cfg(test)]
 mod tests;

@@ -33,6 +33,8 @@ impl Default for Smoothing {
 const LONGEST_WAVE_M: f64 = 100.0;
 /// The same for the widths (m).
 const LONGEST_WIDTH_WAVE_M: f64 = 200.0;
+/// Distance between the cross-sections by which a road is tried (m).
+const TRIED_EVERY_M: f64 = 5.0;
 /// The most that may be asked for (m).
 const MOST_SMOOTHING_M: f64 = 10.0;
 
@@ -132,12 +134,12 @@ impl Survey {
         let n = self.centre_m.len();
         let mut left = Vec::with_capacity(n);
         let mut right = Vec::with_capacity(n);
-        for i in 0..n {
+        for (i, &knot) in knots.iter().enumerate().take(n) {
             // The surveyed edges stand beside the surveyed points; measured from the smooth line beside them they are
             // nearer by as much as the line moved.
-            let here = line.at(knots[i]);
+            let here = line.at(knot);
             let normal = here.first.normalize_or_zero().perp();
-            let moved = (here.value - through.at(knots[i]).value).dot(normal);
+            let moved = (here.value - through.at(knot).value).dot(normal);
             left.push(self.left_m[i] - moved);
             right.push(self.right_m[i] + moved);
         }
@@ -230,11 +232,14 @@ impl ReferenceLine {
         cross_sections(self, spacing)
     }
 
-    /// A circuit along the line, and what closing it took.
+    /// A circuit along the line, and what closing it took. Cross-sections every few metres are tried first, so that
+    /// a road that cannot be is found here and not in a study.
     ///
     /// # Errors
-    /// [`Error::Input`] where the line cannot be a road's.
+    /// [`Error::Input`] naming the station where the line or its widths cannot be a road's.
     pub fn circuit(&self) -> Result<(Circuit, Closure)> {
+        let cuts = (self.length_m() / TRIED_EVERY_M).ceil().max(8.0) as usize;
+        self.cross_sections(&Spacing::equal(cuts))?;
         circuit(self)
     }
 

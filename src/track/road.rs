@@ -112,7 +112,7 @@ pub(super) fn circuit(road: &dyn Road) -> Result<(Circuit, Closure)> {
             }
         })
         .collect();
-    if let Some(row) = rows.iter().find(|r| !(r.curvature_1pm.abs() <= 1.0)) {
+    if let Some(row) = rows.iter().find(|r| !(-1.0..=1.0).contains(&r.curvature_1pm)) {
         return Err(Error::input(
             road.source(),
             format!("station {:.1} m", row.station_m),
@@ -121,11 +121,17 @@ pub(super) fn circuit(road: &dyn Road) -> Result<(Circuit, Closure)> {
         ));
     }
     let start = road.frame(0.0);
+    let mut start_heading_rad = start.tangent.to_angle();
+    if road.closed() {
+        // The integral of mean curvatures is the mean of the headings half a step before and after.
+        let around = [-0.5 * step, 0.5 * step].map(|s| turn(start.tangent, road.frame(s).tangent));
+        start_heading_rad += 0.5 * (around[0] + around[1]);
+    }
     let table = CurvatureTable {
         name: road.name().to_owned(),
         closed: road.closed(),
         length_m: road.length_m(),
-        start_heading_rad: start.tangent.to_angle(),
+        start_heading_rad,
         rows,
         sections: road.sections().to_vec(),
     };

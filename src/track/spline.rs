@@ -55,12 +55,9 @@ pub(super) struct Jet<T> {
     pub second: T,
 }
 
-/// The fewest data of a closed spline; an open one does with three.
-pub(super) const FEWEST_CLOSED: usize = 5;
-
 impl<T: Value> Spline<T> {
     /// The smoothing spline of `data` at the first knots (the last knot of a closed spline is its period's end).
-    /// Knots ascend strictly; there are at least [`FEWEST_CLOSED`] data, or three on an open spline.
+    /// Knots ascend strictly; there are at least five data, or three on an open spline.
     pub fn smoothing(knots: &[f64], data: &[T], closed: bool, lambda: f64) -> Self {
         let system = System::new(knots, data.len(), closed, lambda);
         let second = system.solve(data);
@@ -283,7 +280,9 @@ impl System {
             corner = [diagonal(n - 2), first(n - 2), diagonal(n - 1)];
         }
         let solved = border.clone().map(|mut column| {
-            band.solve(&mut column);
+            if closed {
+                band.solve(&mut column);
+            }
             column
         });
         let dot = |a: &[f64], b: &[f64]| -> f64 { a.iter().zip(b).map(|(x, y)| x * y).sum() };
@@ -425,8 +424,8 @@ mod tests {
         fn value_and_slope_are_continuous(data in prop::collection::vec(-1.0..1.0f64, 5..30), closed: bool) {
             let knots = uneven(data.len() + usize::from(closed));
             let spline = Spline::smoothing(&knots, &data, closed, 0.7);
-            for i in 1..knots.len() - 1 {
-                let (a, b) = (spline.on(i - 1, knots[i]), spline.on(i, knots[i]));
+            for (i, &knot) in knots.iter().enumerate().take(knots.len() - 1).skip(1) {
+                let (a, b) = (spline.on(i - 1, knot), spline.on(i, knot));
                 prop_assert!((a.value - b.value).abs() < 1e-9);
                 prop_assert!((a.first - b.first).abs() < 1e-8);
                 prop_assert!((a.second - b.second).abs() < 1e-8);

@@ -11,6 +11,7 @@ pub mod loads;
 pub mod model;
 pub mod parameters;
 pub mod powertrain;
+pub mod steady;
 pub mod tyre;
 
 pub use car::{Car, CarParameter, Tyres};
@@ -19,4 +20,5 @@ pub use envelope::{Envelope, EnvelopeRow};
 pub use model::{CarInput, CarModel, CarRate, CarState};
 pub use parameters::ParameterInfo;
 pub use powertrain::Powertrain;
+pub use steady::{SteadyCar, Trim, steady_car};
 pub use tyre::{LinearTyre, MagicFormula, TyreCoefficients, TyreModel};

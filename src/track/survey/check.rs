@@ -91,7 +91,8 @@ pub(super) fn check_line(
             format!("{fewest} to {MOST_POINTS} points of {kind} line"),
         );
     }
-    if let Some(i) = points.iter().position(|p| !(p.abs().max_element() <= FURTHEST_M)) {
+    let within = |x: f64| (-FURTHEST_M..=FURTHEST_M).contains(&x);
+    if let Some(i) = points.iter().position(|p| !(within(p.x) && within(p.y))) {
         let expected = format!("coordinates from -{FURTHEST_M} to {FURTHEST_M} m");
         return refuse(place(i), format!("{:?}", points[i].to_array()), expected);
     }

@@ -15,6 +15,8 @@ mod boundaries;
 mod check;
 mod csv_columns;
 mod driven;
+#[cfg(test)]
+mod fuzz;
 mod geographic;
 #[cfg(test)]
 mod tests;
