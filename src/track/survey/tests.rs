@@ -1,6 +1,3 @@
-<<<<<<< HEAD
-fn x() {}
-=======
 //! Every format, read right and refused by place.
 
 use super::*;
@@ -560,4 +557,3 @@ fn a_toml_file_says_what_a_survey_cannot() {
         assert!(text.contains("oval.toml") && text.contains(part), "{text}");
     }
 }
->>>>>>> tracks
