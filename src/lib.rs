@@ -39,6 +39,8 @@
 pub mod config;
 pub mod error;
 pub mod evaluate;
+pub mod line;
+pub mod optimum;
 pub mod random;
 pub mod report;
 pub mod scalar;

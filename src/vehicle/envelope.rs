@@ -64,7 +64,8 @@ const RANGES: [(f64, bool, f64); 5] = [
     (0.0, true, 200.0),
     (0.0, false, 200.0),
     (0.0, false, 200.0),
-    (0.0, true, 200.0),
+    // Constant power is without bounds towards standstill.
+    (0.0, true, 1e5),
     (0.0, true, 200.0),
 ];
 
