@@ -37,7 +37,7 @@ enum Command {
     Simulate(simulate::Arguments),
     /// List the GPUs that evaluations can run on, with their limits.
     Devices(devices::Arguments),
-    /// Measure evaluations per second against population, on every backend present.
+    /// Measure evaluations per second against population on every backend present, or compare optimisers.
     Bench(bench::Arguments),
 }
 
