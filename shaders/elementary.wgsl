@@ -4,10 +4,17 @@
 // Drivers may regroup literals, so no product has more than one.
 //
 // They work on four figures side by side, one per wheel: polynomials are long chains of dependent operations, and
-// one chain fills the other's waits, as `Pair` in `src/scalar/pair.rs` has it on the processor.
+// one chain fills the other's waits, as `Pair` in `src/scalar/pair.rs` has it on the processor. Where two functions of
+// the wheels are wanted at once, `_each` takes them in lockstep, for the same reason; a lone one is half of that, of
+// which every compiler sees that its halves are the same.
 
 // Figures of the wheels FL, FR, RL, RR.
 alias Wheels = vec4<f32>;
+
+struct WheelsPair {
+    first: Wheels,
+    second: Wheels,
+}
 
 // Whether `x` is a number, by its exponent: a driver may assume away comparisons that ask for NaN.
 fn is_finite(x: f32) -> bool {
@@ -60,14 +67,20 @@ fn cosine_polynomial(r: Wheels) -> Wheels {
     return 1.0 + t * p;
 }
 
-fn sine_pi_polynomial(r: Wheels) -> Wheels {
-    let t = r * r;
+fn sine_pi_polynomial_each(x: Wheels, y: Wheels) -> WheelsPair {
+    let t = x * x;
+    let u = y * y;
     var p = Wheels(7.9835765e-2);
+    var q = Wheels(7.9835765e-2);
     p = p * t + -0.59943736;
+    q = q * u + -0.59943736;
     p = p * t + 2.5502698;
+    q = q * u + 2.5502698;
     p = p * t + -5.167721;
+    q = q * u + -5.167721;
     p = p * t + 3.141592653589793;
-    return r * p;
+    q = q * u + 3.141592653589793;
+    return WheelsPair(x * p, y * q);
 }
 
 fn reduce(x: Wheels, half_turns: Wheels) -> Wheels {
@@ -84,37 +97,75 @@ fn own_cos(x: Wheels) -> Wheels {
     return negate_where_odd(sine_polynomial(-reduce(x, n + 0.5)), n);
 }
 
-fn own_tan(x: Wheels) -> Wheels {
+fn own_tan_each(x: Wheels, y: Wheels) -> WheelsPair {
     let n = round(x * 0.3183098861837907);
+    let m = round(y * 0.3183098861837907);
     let r = reduce(x, n);
-    return sine_polynomial(r) / cosine_polynomial(r);
+    let s = reduce(y, m);
+    return WheelsPair(sine_polynomial(r) / cosine_polynomial(r), sine_polynomial(s) / cosine_polynomial(s));
+}
+
+fn own_tan(x: Wheels) -> Wheels {
+    return own_tan_each(x, x).first;
+}
+
+fn own_sin_pi_each(x: Wheels, y: Wheels) -> WheelsPair {
+    let n = round(x);
+    let m = round(y);
+    let sines = sine_pi_polynomial_each(x - n, y - m);
+    return WheelsPair(negate_where_odd(sines.first, n), negate_where_odd(sines.second, m));
 }
 
 fn own_sin_pi(x: Wheels) -> Wheels {
-    let n = round(x);
-    return negate_where_odd(sine_pi_polynomial(x - n), n);
+    return own_sin_pi_each(x, x).first;
+}
+
+fn own_cos_pi_each(x: Wheels, y: Wheels) -> WheelsPair {
+    let n = round(x - 0.5);
+    let m = round(y - 0.5);
+    let sines = sine_pi_polynomial_each((n + 0.5) - x, (m + 0.5) - y);
+    return WheelsPair(negate_where_odd(sines.first, n), negate_where_odd(sines.second, m));
 }
 
 fn own_cos_pi(x: Wheels) -> Wheels {
-    let n = round(x - 0.5);
-    return negate_where_odd(sine_pi_polynomial((n + 0.5) - x), n);
+    return own_cos_pi_each(x, x).first;
+}
+
+fn own_atan_each(x: Wheels, y: Wheels) -> WheelsPair {
+    let large_x = Wheels(1.0) < abs(x);
+    let large_y = Wheels(1.0) < abs(y);
+    let a = select(x, 1.0 / x, large_x);
+    let b = select(y, 1.0 / y, large_y);
+    let t = a * a;
+    let u = b * b;
+    var p = Wheels(2.9168893e-3);
+    var q = Wheels(2.9168893e-3);
+    p = p * t + -1.6358716e-2;
+    q = q * u + -1.6358716e-2;
+    p = p * t + 4.320277e-2;
+    q = q * u + 4.320277e-2;
+    p = p * t + -7.5516604e-2;
+    q = q * u + -7.5516604e-2;
+    p = p * t + 0.10665769;
+    q = q * u + 0.10665769;
+    p = p * t + -0.14211002;
+    q = q * u + -0.14211002;
+    p = p * t + 0.19993767;
+    q = q * u + 0.19993767;
+    p = p * t + -0.33333153;
+    q = q * u + -0.33333153;
+    let angle_x = a * (p * t + 1.0);
+    let angle_y = b * (q * u + 1.0);
+    let quarter_x = with_sign_of(Wheels(1.5707963267948966), x);
+    let quarter_y = with_sign_of(Wheels(1.5707963267948966), y);
+    return WheelsPair(
+        select(angle_x, quarter_x - angle_x, large_x),
+        select(angle_y, quarter_y - angle_y, large_y),
+    );
 }
 
 fn own_atan(x: Wheels) -> Wheels {
-    let large = Wheels(1.0) < abs(x);
-    let q = select(x, 1.0 / x, large);
-    let t = q * q;
-    var p = Wheels(2.9168893e-3);
-    p = p * t + -1.6358716e-2;
-    p = p * t + 4.320277e-2;
-    p = p * t + -7.5516604e-2;
-    p = p * t + 0.10665769;
-    p = p * t + -0.14211002;
-    p = p * t + 0.19993767;
-    p = p * t + -0.33333153;
-    let angle = q * (p * t + 1.0);
-    let quarter = with_sign_of(Wheels(1.5707963267948966), x);
-    return select(angle, quarter - angle, large);
+    return own_atan_each(x, x).first;
 }
 
 fn own_exp(argument: Wheels) -> Wheels {

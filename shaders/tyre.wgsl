@@ -100,9 +100,16 @@ struct Curve {
     x: Wheels,
 }
 
+fn curve_angles(k: Curve, l: Curve) -> WheelsPair {
+    let bk = k.b * k.x;
+    let bl = l.b * l.x;
+    let inner = own_atan_each(bk, bl);
+    let outer = own_atan_each(bk - k.e * (bk - inner.first), bl - l.e * (bl - inner.second));
+    return WheelsPair(k.c * outer.first, l.c * outer.second);
+}
+
 fn curve_angle(curve: Curve) -> Wheels {
-    let bx = curve.b * curve.x;
-    return curve.c * own_atan(bx - curve.e * (bx - own_atan(bx)));
+    return curve_angles(curve, curve).first;
 }
 
 fn clamp_curvature(e: Wheels) -> Wheels {
@@ -160,7 +167,9 @@ fn pure_lateral(t: MagicFormula, load: Load, slip_tangent: Wheels, side: Wheels)
 
 fn weight(curve: Curve, shift: Wheels) -> Wheels {
     let at_shift = Curve(curve.c, curve.b, curve.e, shift);
-    return own_cos_pi(curve_angle(curve)) / own_cos_pi(curve_angle(at_shift));
+    let angles = curve_angles(curve, at_shift);
+    let cosines = own_cos_pi_each(angles.first, angles.second);
+    return cosines.first / cosines.second;
 }
 
 fn longitudinal_weight(t: MagicFormula, load: Load, slip_ratio: Wheels, slip_tangent: Wheels) -> Wheels {
@@ -180,8 +189,8 @@ fn equivalent_tangent(x: Wheels, tangent: Wheels, slip_share: Wheels) -> Wheels 
     return sqrt(tangent * tangent + slip_share * slip_share) * sign_of(x);
 }
 
-// `combined_slip`. The twin works out the functions of all curves in rounds, several side by side; here the four
-// wheels are side by side already, and each curve is one call.
+// `combined_slip`. The twin works out the functions of all curves in rounds; here, where the four wheels are side by
+// side already, two at a time are enough.
 fn tyre_forces(t: MagicFormula, input: TyreInput) -> TyreForces {
     let force = max(input.load, Wheels(LEAST_LOAD));
     let load = Load(force, force * t.inverse_nominal - 1.0);
@@ -193,32 +202,37 @@ fn tyre_forces(t: MagicFormula, input: TyreInput) -> TyreForces {
     let lateral = pure_lateral(t, load, slip_tangent, side);
     let pure_y = lateral.pure_slip;
 
-    let x = (pure_x.peak * own_sin_pi(curve_angle(pure_x.curve)) + pure_x.vertical_shift)
+    let pure = curve_angles(pure_x.curve, pure_y.curve);
+    let sines = own_sin_pi_each(pure.first, pure.second);
+    let x = (pure_x.peak * sines.first + pure_x.vertical_shift)
         * longitudinal_weight(t, load, slip_ratio, slip_tangent);
+    let trail_x = slip_tangent + (t.ht1 + t.ht2 * dfz + (t.ht_camber1 + t.ht_camber2 * dfz) * side);
+    let trail_b = (t.bt1 + dfz * (t.bt2 + t.bt3 * dfz)) * (t.bt_even + t.bt_odd * side);
+    let angles = own_atan_each(t.rvy6 * slip_ratio, trail_b * t.bct * trail_x);
     let amplitude = pure_y.peak * (t.rvy1 + t.rvy2 * dfz + t.rvy_camber * side);
-    let induced = amplitude / sec_atan(t.rvy4 * slip_tangent) * own_sin_pi(t.rvy5 * own_atan(t.rvy6 * slip_ratio));
-    let y = (pure_y.peak * own_sin_pi(curve_angle(pure_y.curve)) + pure_y.vertical_shift)
+    let induced = amplitude / sec_atan(t.rvy4 * slip_tangent) * own_sin_pi(t.rvy5 * angles.first);
+    let y = (pure_y.peak * sines.second + pure_y.vertical_shift)
         * lateral_weight(t, load, slip_ratio, slip_tangent)
         + induced;
 
     let slip_share = pure_x.stiffness / pure_y.stiffness * slip_ratio;
-    let trail_x = slip_tangent + (t.ht1 + t.ht2 * dfz + (t.ht_camber1 + t.ht_camber2 * dfz) * side);
     let residual_x = slip_tangent + lateral.residual_shift;
-    let trail_b = (t.bt1 + dfz * (t.bt2 + t.bt3 * dfz)) * (t.bt_even + t.bt_odd * side);
-    let trail_angle = own_atan(trail_b * t.bct * trail_x);
-    let trail_slip = own_atan(equivalent_tangent(trail_x, own_tan(trail_x), slip_share));
-    let residual_slip = own_atan(equivalent_tangent(residual_x, own_tan(residual_x), slip_share));
-    let trail_e = clamp_curvature(
-        (t.et1 + dfz * (t.et2 + t.et3 * dfz)) * (1.0 + (t.et4 + t.et_camber * side) * trail_angle),
+    let tangents = own_tan_each(trail_x, residual_x);
+    let slips = own_atan_each(
+        equivalent_tangent(trail_x, tangents.first, slip_share),
+        equivalent_tangent(residual_x, tangents.second, slip_share),
     );
-    let cos_m = own_cos_pi(curve_angle(Curve(t.ct, trail_b, trail_e, trail_slip)));
+    let trail_e = clamp_curvature(
+        (t.et1 + dfz * (t.et2 + t.et3 * dfz)) * (1.0 + (t.et4 + t.et_camber * side) * angles.second),
+    );
+    let cos_m = own_cos_pi(curve_angle(Curve(t.ct, trail_b, trail_e, slips.first)));
     let d = load.force * (t.dt1 + t.dt2 * dfz) * (t.dt_even + t.dt_odd * side);
     let trail = d * cos_m / sec_atan(slip_tangent);
     let residual_slope = t.br1 + t.br2 * lateral.slope;
     let residual_peak = load.force
         * (t.dr1 + t.dr2 * dfz + (t.dr_camber1 + t.dr_camber2 * dfz) * side)
         * own_cos(slip_tangent);
-    let residual = residual_peak / sec_atan(residual_slope * residual_slip);
+    let residual = residual_peak / sec_atan(residual_slope * slips.second);
     let arm = t.s1 + t.s2 * y + (t.s_camber1 + t.s_camber2 * dfz) * side;
     let moment = residual - trail * (y - induced) + arm * x;
 

@@ -29,7 +29,7 @@ pub struct Arguments {
     /// Channel names, units, signs and delays of the log, as TOML [default: guessed]
     #[arg(long, value_name = "FILE")]
     channel_map: Option<PathBuf>,
-    /// The circuit that sections are named on: a bundled name or a TOML file
+    /// The circuit that sections are named on: a bundled name, a TOML file, a survey (CSV, GPX, KML, log) or a shape
     #[arg(long, value_name = "NAME|FILE")]
     track: Option<String>,
     /// The car that drove the log, where known, to state the parameter error

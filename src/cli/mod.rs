@@ -2,6 +2,7 @@
 
 mod bench;
 mod devices;
+mod envelope;
 mod identify;
 mod progress;
 mod simulate;
@@ -35,6 +36,8 @@ enum Command {
     Identify(Box<identify::Arguments>),
     /// Drive a car round a circuit and log it.
     Simulate(simulate::Arguments),
+    /// Find a car's limits at each speed: the g-g-v diagram that racing lines are driven within.
+    Envelope(envelope::Arguments),
     /// List the GPUs that evaluations can run on, with their limits.
     Devices(devices::Arguments),
     /// Measure evaluations per second against population on every backend present, or compare optimisers.
@@ -90,6 +93,7 @@ pub fn run() -> ExitCode {
     let outcome = match cli.command {
         Command::Identify(arguments) => identify::run(&arguments),
         Command::Simulate(arguments) => simulate::run(&arguments),
+        Command::Envelope(arguments) => envelope::run(&arguments),
         Command::Devices(arguments) => devices::run(&arguments),
         Command::Bench(arguments) => bench::run(&arguments),
     };

@@ -17,7 +17,7 @@ pub struct Arguments {
     /// The car: a bundled name (gt) or a TOML file
     #[arg(long, value_name = "NAME|FILE", default_value = "gt")]
     car: String,
-    /// The circuit: a bundled name or a TOML file [default: silverstone_gp]
+    /// The circuit: a bundled name, a TOML file, a survey (CSV, GPX, KML, log) or a shape [default: silverstone_gp]
     #[arg(long, value_name = "NAME|FILE")]
     track: Option<String>,
     /// Sample rate of the log, Hz
@@ -30,10 +30,10 @@ pub struct Arguments {
     #[arg(long, value_name = "SHARE")]
     pace: Option<f64>,
     /// Standard deviations of the sensors' noise: vx (m/s), ax, ay (m/s^2), yaw rate (rad/s)
-    #[arg(long, value_name = "VX,AX,AY,R", value_delimiter = ',', num_args = 4)]
+    #[arg(long, value_name = "VX,AX,AY,R", value_delimiter = ',')]
     noise: Option<Vec<f64>>,
     /// Delays of the sensors: vx, ax, ay, yaw rate (s)
-    #[arg(long, value_name = "VX,AX,AY,R", value_delimiter = ',', num_args = 4)]
+    #[arg(long, value_name = "VX,AX,AY,R", value_delimiter = ',')]
     delay: Option<Vec<f64>>,
 }
 

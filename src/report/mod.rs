@@ -6,6 +6,7 @@
 mod axis;
 mod canvas;
 mod convergence;
+mod curves;
 mod files;
 mod parameters;
 mod pareto;
@@ -16,6 +17,7 @@ mod traces;
 mod track_map;
 
 pub use convergence::{ConvergenceRun, plot_convergence};
+pub use curves::{Curve, CurvePanel, plot_curves};
 pub use files::write_whole;
 pub use parameters::{ParameterRow, plot_parameters};
 pub use pareto::{Objective, plot_pareto};

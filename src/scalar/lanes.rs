@@ -7,12 +7,12 @@
 //! The wider register types are only sound to use inside a function that enables their instruction set, after that
 //! set was detected: [`crate::evaluate::simd`] is the one place that does so.
 
-use super::Real;
 use super::elementary::{self, SinglePrecision};
+use super::{Lookup, Real};
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
 
 /// A pack of lanes that can be filled from and read out to memory.
-pub trait Lanes: SinglePrecision<Storage = f32> {
+pub trait Lanes: SinglePrecision<Storage = f32> + Lookup {
     /// Lanes in the pack.
     const LANES: usize;
 
@@ -339,6 +339,20 @@ mod x86 {
                 #[inline(always)]
                 fn select(mask: $mask_name, if_true: Self, if_false: Self) -> Self {
                     unsafe { Self($select(mask.0, if_true.0, if_false.0)) }
+                }
+            }
+
+            #[allow(dead_code, reason = "the narrowest lanes look tables up one by one")]
+            impl $name {
+                /// The register itself.
+                #[inline(always)]
+                pub(in crate::scalar) fn register(self) -> $register {
+                    self.0
+                }
+                /// The lanes of a register.
+                #[inline(always)]
+                pub(in crate::scalar) fn of_register(register: $register) -> Self {
+                    Self(register)
                 }
             }
 

@@ -9,9 +9,11 @@ pub mod elementary;
 mod float;
 pub mod lanes;
 mod lockstep;
+mod lookup;
 mod pair;
 
 pub use dual::Dual;
+pub use lookup::Lookup;
 pub use pair::Pair;
 
 use std::fmt::Debug;

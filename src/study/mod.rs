@@ -1,4 +1,5 @@
 //! The studies that users run.
 
+pub mod envelope;
 pub mod identify;
 pub mod run_folder;

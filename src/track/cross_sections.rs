@@ -48,8 +48,9 @@ impl CrossSections {
         let ends = narrowed.right_m.iter_mut().zip(&mut narrowed.left_m);
         for ((right, left), station) in ends.zip(&self.station_m) {
             let width = right.distance(*left);
-            // A negated comparison refuses what is no number, too.
-            if !(width > car_width_m) || !(car_width_m >= 0.0) {
+            // What is no number fits nowhere.
+            let fits = width > car_width_m && car_width_m >= 0.0;
+            if !fits {
                 return Err(Error::input(
                     &self.name,
                     format!("width at station {station:.1} m"),

@@ -20,8 +20,10 @@ use crate::{Error, Result};
 
 /// Distance between samples of a circuit (m), before rounding to a whole number of steps.
 const SPACING_M: f64 = 1.0;
-/// The end of a closed lap lies this close to its start (m).
+/// The end of a closed lap lies this close to its start (m), on laps up to this length (m); the rounding of longer ones
+/// grows with their size and with their number of steps.
 const CLOSED_TO_M: f64 = 1e-10;
+const CLOSED_TO_UP_TO_M: f64 = 10_000.0;
 /// A gap beyond this share of the length is a mistake in the table, not a measuring error.
 const LARGEST_GAP: f64 = 0.03;
 /// A total turn further than this from a whole number of turns is a mistake in the table (rad).
@@ -297,6 +299,7 @@ impl CurvatureTable {
         let centre = lap.iter().sum::<DVec2>() / n;
         let size = (lap.iter().map(|p| p.distance_squared(centre)).sum::<f64>() / n).sqrt();
         let kernels: Vec<DVec3> = lap.iter().map(|&p| ((p - centre) / size).extend(1.0)).collect();
+        let closed_to = CLOSED_TO_M * (self.length_m / CLOSED_TO_UP_TO_M).max(1.0).powi(2);
         let table = curvature.to_vec();
         let mut line = run(curvature);
         let mut change = DVec3::ZERO;
@@ -304,7 +307,7 @@ impl CurvatureTable {
             let (turn, end) = line.end();
             let miss = DVec3::new(end.x, end.y, turn - wanted);
             // The turn is held to what would move the far side of the circuit by the same amount.
-            if end.length() < CLOSED_TO_M && miss.z.abs() * size < CLOSED_TO_M {
+            if end.length() < closed_to && miss.z.abs() * size < closed_to {
                 let places = line.position.iter().zip(&original.position);
                 return Ok(Closure {
                     turn_error_rad,

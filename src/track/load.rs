@@ -1,13 +1,16 @@
-//! Reads circuits from TOML files with a curvature table beside them, bundled or the user's own.
+//! Reads circuits from TOML files with a curvature table or a survey beside them, bundled or the user's own.
 
 use std::ops::Range;
 use std::path::Path;
 
 use serde::Deserialize;
+use serde::de::DeserializeOwned;
 use toml::Spanned;
 
 use super::circuit::{Circuit, Section};
 use super::from_curvature::{Closure, CurvatureRow, CurvatureTable};
+use super::reference::Smoothing;
+use super::survey::{Survey, SurveyOptions};
 use crate::{Error, Result};
 
 /// A circuit embedded in the crate: name, TOML and curvature table.
@@ -45,7 +48,7 @@ struct CircuitFile {
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct SectionEntry {
+pub(super) struct SectionEntry {
     name: Spanned<String>,
     start_m: Spanned<f64>,
     end_m: Spanned<f64>,
@@ -80,14 +83,18 @@ impl Circuit {
         };
         let toml_file = format!("bundled {}.toml", found.name);
         let table_file = format!("bundled {}.csv", found.name);
-        let file = parse_toml(&toml_file, found.toml)?;
+        let file = parse_toml(&toml_file, found.toml, "a circuit")?;
         let table = assemble(&toml_file, found.toml, file, &table_file, found.table)?;
         Ok(build(&table, &table_file)?.0)
     }
 
-    /// A circuit from a TOML file. The curvature table it names lies beside it.
+    /// A circuit from a TOML file, or from a survey (any file that [`Survey::read`] takes).
     ///
-    /// Keys: `name`, `curvature_table` (a CSV file with columns `station_m`, `curvature_1pm` and, if
+    /// A TOML file names a survey or a curvature table that lies beside it. Keys with a survey: `survey` (the file),
+    /// `name`, `closed`, `width_m`, `lap` and `bridges` as in [`SurveyOptions`], `smoothing_line_m` and
+    /// `smoothing_edges_m` as in [`Smoothing`], `[[sections]]` as below and `[[corners]]` with `name` and `station_m`.
+    ///
+    /// Keys with a curvature table: `name`, `curvature_table` (a CSV file with columns `station_m`, `curvature_1pm` and, if
     /// wanted, `width_left_m`, `width_right_m`, `corner`), `length_m`; `closed` (true unless said
     /// otherwise), `start_heading_deg` (0), `width_m` (of the whole road, where the table has no
     /// widths), and `[[sections]]` with `name`, `start_m`, `end_m`.
@@ -104,11 +111,38 @@ impl Circuit {
     /// # Errors
     /// As [`Circuit::load`].
     pub fn load_with_closure(path: impl AsRef<Path>) -> Result<(Self, Closure)> {
-        let path = path.as_ref();
+        match CircuitSource::read(path.as_ref())? {
+            CircuitSource::Curvature(circuit, closure) => Ok((circuit, closure)),
+            CircuitSource::Survey(survey, smoothing) => survey.smoothed(&smoothing)?.circuit(),
+        }
+    }
+}
+
+/// What a circuit file holds.
+pub(super) enum CircuitSource {
+    Curvature(Circuit, Closure),
+    Survey(Survey, Smoothing),
+}
+
+impl CircuitSource {
+    /// Reads a TOML file with what it names, or a survey.
+    pub fn read(path: &Path) -> Result<Self> {
+        if !path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) {
+            let survey = Survey::read(path, &SurveyOptions::default())?;
+            return Ok(Self::Survey(survey, Smoothing::default()));
+        }
         let read = |p: &Path| std::fs::read_to_string(p).map_err(|e| Error::io(p, "read", e));
         let toml_file = path.display().to_string();
         let text = read(path)?;
-        let file = parse_toml(&toml_file, &text)?;
+        if super::load_survey::is_survey(&text) {
+            let (survey, smoothing) = super::load_survey::read(path, &text)?;
+            return Ok(Self::Survey(survey, smoothing));
+        }
+        let file: CircuitFile = parse_toml(
+            &toml_file,
+            &text,
+            "a circuit with name, curvature_table and length_m",
+        )?;
         let table_path = path
             .parent()
             .unwrap_or(Path::new(""))
@@ -116,7 +150,8 @@ impl Circuit {
         let table_file = table_path.display().to_string();
         let csv = read(&table_path)?;
         let table = assemble(&toml_file, &text, file, &table_file, &csv)?;
-        build(&table, &table_file)
+        let (circuit, closure) = build(&table, &table_file)?;
+        Ok(Self::Curvature(circuit, closure))
     }
 }
 
@@ -138,7 +173,7 @@ fn line_of(text: &str, at: usize) -> usize {
     1 + text.bytes().take(at).filter(|&b| b == b'\n').count()
 }
 
-fn parse_toml(file: &str, text: &str) -> Result<CircuitFile> {
+pub(super) fn parse_toml<T: DeserializeOwned>(file: &str, text: &str, what: &str) -> Result<T> {
     toml::from_str(text).map_err(|error| {
         let place = match error.span() {
             Some(span) => format!("line {}", line_of(text, span.start)),
@@ -148,35 +183,61 @@ fn parse_toml(file: &str, text: &str) -> Result<CircuitFile> {
         // serde's messages end with what they wanted, as in "unknown field `x`, expected one of ...".
         match message.split_once(", expected ") {
             Some((found, expected)) => Error::input(file, place, found, expected),
-            None => Error::input(
-                file,
-                place,
-                message,
-                "a circuit with name, curvature_table and length_m",
-            ),
+            None => Error::input(file, place, message, what),
         }
     })
 }
 
 /// A checked value of the TOML file.
-struct Checker<'a> {
-    file: &'a str,
-    text: &'a str,
+pub(super) struct Checker<'a> {
+    pub file: &'a str,
+    pub text: &'a str,
 }
 
 impl Checker<'_> {
-    fn refuse(&self, span: Range<usize>, field: &str, found: String, expected: &str) -> Error {
+    pub fn refuse(&self, span: Range<usize>, field: &str, found: String, expected: &str) -> Error {
         let place = format!("line {}, field {field}", line_of(self.text, span.start));
         Error::input(self.file, place, found, expected)
     }
 
-    fn within(&self, value: &Spanned<f64>, field: &str, low: f64, high: f64) -> Result<f64> {
+    pub fn within(&self, value: &Spanned<f64>, field: &str, low: f64, high: f64) -> Result<f64> {
         let x = *value.get_ref();
         if x >= low && x <= high {
             Ok(x)
         } else {
             Err(self.refuse(value.span(), field, x.to_string(), &format!("{low} to {high}")))
         }
+    }
+
+    /// Named stretches within a length (m).
+    pub fn sections(&self, entries: &[SectionEntry], length_m: f64) -> Result<Vec<Section>> {
+        let mut sections: Vec<Section> = Vec::with_capacity(entries.len());
+        for entry in entries {
+            let name = entry.name.get_ref().trim().to_owned();
+            let start_m = self.within(&entry.start_m, "start_m", 0.0, length_m)?;
+            let end_m = self.within(&entry.end_m, "end_m", 0.0, length_m)?;
+            if end_m <= start_m {
+                return Err(self.refuse(
+                    entry.end_m.span(),
+                    "end_m",
+                    end_m.to_string(),
+                    &format!("a station beyond start_m, {start_m}"),
+                ));
+            }
+            let taken = sections
+                .iter()
+                .any(|s| s.name.to_lowercase() == name.to_lowercase());
+            if name.is_empty() || taken {
+                return Err(self.refuse(
+                    entry.name.span(),
+                    "name",
+                    format!("`{name}`"),
+                    "a name that no other section has",
+                ));
+            }
+            sections.push(Section { name, start_m, end_m });
+        }
+        Ok(sections)
     }
 }
 
@@ -201,32 +262,7 @@ fn assemble(
         .as_ref()
         .map(|w| check.within(w, "width_m", 1.0, 200.0))
         .transpose()?;
-    let mut sections: Vec<Section> = Vec::with_capacity(file.sections.len());
-    for entry in &file.sections {
-        let name = entry.name.get_ref().trim().to_owned();
-        let start_m = check.within(&entry.start_m, "start_m", 0.0, length_m)?;
-        let end_m = check.within(&entry.end_m, "end_m", 0.0, length_m)?;
-        if end_m <= start_m {
-            return Err(check.refuse(
-                entry.end_m.span(),
-                "end_m",
-                end_m.to_string(),
-                &format!("a station beyond start_m, {start_m}"),
-            ));
-        }
-        let taken = sections
-            .iter()
-            .any(|s| s.name.to_lowercase() == name.to_lowercase());
-        if name.is_empty() || taken {
-            return Err(check.refuse(
-                entry.name.span(),
-                "name",
-                format!("`{name}`"),
-                "a name that no other section has",
-            ));
-        }
-        sections.push(Section { name, start_m, end_m });
-    }
+    let sections = check.sections(&file.sections, length_m)?;
     Ok(CurvatureTable {
         rows: parse_table(table_file, csv, length_m, file.closed, width_m)?,
         name: file.name,

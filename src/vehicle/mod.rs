@@ -6,15 +6,19 @@
 pub mod aero;
 pub mod car;
 pub mod chassis;
+pub mod envelope;
 pub mod loads;
 pub mod model;
 pub mod parameters;
 pub mod powertrain;
+pub mod steady;
 pub mod tyre;
 
 pub use car::{Car, CarParameter, Tyres};
 pub use chassis::Chassis;
+pub use envelope::{Envelope, EnvelopeRow};
 pub use model::{CarInput, CarModel, CarRate, CarState};
 pub use parameters::ParameterInfo;
 pub use powertrain::Powertrain;
+pub use steady::{SteadyCar, Trim, steady_car};
 pub use tyre::{LinearTyre, MagicFormula, TyreCoefficients, TyreModel};

@@ -7,7 +7,7 @@ use crate::evaluate::replay::{
     CHANNEL_NAMES, CHANNEL_UNITS, ChannelWeights, Norm, ReplayProblem, Sample, Window, initial_state,
 };
 use crate::telemetry::{ChannelMap, Log, LogOptions, NativeFormat, Recording};
-use crate::track::Circuit;
+use crate::track::{Circuit, Track};
 use crate::vehicle::Car;
 use std::path::Path;
 
@@ -135,13 +135,9 @@ pub fn set_up(settings: &IdentifySettings) -> Result<Setup> {
     })
 }
 
-/// A bundled circuit by name, or a circuit file.
+/// The circuit of a track's name or file (see [`Track::load`]).
 pub fn load_circuit(name_or_path: &str) -> Result<Circuit> {
-    if Path::new(name_or_path).extension().is_some() {
-        Circuit::load(name_or_path)
-    } else {
-        Circuit::bundled(name_or_path)
-    }
+    Track::load(name_or_path)?.circuit()
 }
 
 fn samples_of(log: &Log) -> Vec<Sample<f64>> {

@@ -1,0 +1,58 @@
+//! `lapswarm envelope`.
+
+use super::print_json;
+use lapswarm::Result;
+use lapswarm::study::envelope::{EnvelopeSettings, car_limits, summarise, write_results};
+use lapswarm::study::run_folder;
+use lapswarm::vehicle::Car;
+use std::path::PathBuf;
+use std::time::Instant;
+
+/// Flags of `envelope`.
+#[derive(clap::Args)]
+pub struct Arguments {
+    /// The car: a bundled name (gt) or a TOML file, such as the one that `identify` writes
+    #[arg(long, value_name = "NAME|FILE", default_value = "gt")]
+    car: String,
+    /// Slowest speed, m/s
+    #[arg(long, value_name = "MPS", default_value_t = EnvelopeSettings::default().from_mps)]
+    from_mps: f64,
+    /// Greatest speed, m/s, if the engine goes that far
+    #[arg(long, value_name = "MPS", default_value_t = EnvelopeSettings::default().to_mps)]
+    to_mps: f64,
+    /// Step between speeds, m/s
+    #[arg(long, value_name = "MPS", default_value_t = EnvelopeSettings::default().step_mps)]
+    step_mps: f64,
+    /// The run folder; refused if it holds another run [default: the next runs/envelope-NNN]
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Print one JSON object as the last thing on stdout
+    #[arg(long)]
+    json: bool,
+    /// No table
+    #[arg(long)]
+    quiet: bool,
+}
+
+/// Runs the study.
+pub fn run(arguments: &Arguments) -> Result<()> {
+    let car = Car::load(&arguments.car)?;
+    let settings = EnvelopeSettings {
+        from_mps: arguments.from_mps,
+        to_mps: arguments.to_mps,
+        step_mps: arguments.step_mps,
+    };
+    let began = Instant::now();
+    let limits = car_limits(&car, &settings)?;
+    let summary = summarise(&car.name, &limits, began.elapsed().as_secs_f64());
+    let folder = run_folder::create("envelope", arguments.out.as_deref())?;
+    write_results(&folder, &limits, &summary)?;
+    if !arguments.quiet {
+        print!("{}", summary.to_text(&limits));
+        println!("Results: {}", folder.display());
+    }
+    if arguments.json {
+        print_json(&summary)?;
+    }
+    Ok(())
+}

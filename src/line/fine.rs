@@ -1,0 +1,136 @@
+//! A line worked out anew on a fine spline through its points, which is what reports give.
+
+use super::point_mass::PointMass;
+use super::profile::{LapProfile, lap_profile};
+use super::spline::Spline;
+use crate::error::{Error, Result};
+use glam::DVec2;
+
+/// A line on a fine grid: no wiggle between coarse points stays hidden, and none gains by it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FineLine {
+    /// Whether the end joins the start.
+    pub closed: bool,
+    /// Points (m), the given ones among them.
+    pub points_m: Vec<DVec2>,
+    /// For each point, the given point at it or before it and how far on to the next it is, as a share.
+    pub section: Vec<(usize, f64)>,
+    /// Distance along the curve from the start at each point (m).
+    pub station_m: Vec<f64>,
+    /// Length of the curve from each point to the next (m), one fewer than points on an open line.
+    pub segment_m: Vec<f64>,
+    /// The curve's own curvature at each point (1/m), positive in left turns.
+    pub curvature_1pm: Vec<f64>,
+    /// Length of the curve (m).
+    pub length_m: f64,
+    /// Root of the sum of the squared curvatures at the given points (1/m).
+    pub gamma_1pm: f64,
+    /// Integral of the curvature squared over the length (1/m).
+    pub integral_kappa2_1pm: f64,
+    /// The lap, if a car was given.
+    pub lap: Option<LapProfile>,
+}
+
+impl FineLine {
+    /// The cubic spline through `points_m`, cut into pieces of at most `spacing_m`, and the lap of `car` on it;
+    /// `entry_mps` is the greatest speed at the start of an open line (m/s).
+    ///
+    /// # Errors
+    /// [`Error::Input`] if there are too few points, if neighbours coincide, or if the car or the spacing cannot be.
+    pub fn new(
+        points_m: &[DVec2],
+        closed: bool,
+        spacing_m: f64,
+        car: Option<&PointMass>,
+        entry_mps: f64,
+    ) -> Result<Self> {
+        let n = points_m.len();
+        let least = if closed { 3 } else { 2 };
+        if n < least {
+            let expected = format!("at least {least}");
+            return Err(Error::input("line", "points", n.to_string(), expected));
+        }
+        let apart = |i: usize| points_m[i].distance(points_m[(i + 1) % n]);
+        let segments = n - usize::from(!closed);
+        if let Some(i) = (0..segments).find(|&i| !(apart(i) > 1e-6 && apart(i).is_finite())) {
+            let found = format!("{} m to the next", apart(i));
+            return Err(Error::input("line", format!("point {i}"), found, "points apart"));
+        }
+        if !(0.01..=1000.0).contains(&spacing_m) {
+            return Err(Error::input(
+                "line",
+                "spacing",
+                format!("{spacing_m} m"),
+                "0.01 to 1000 m",
+            ));
+        }
+        let spline = Spline::through(points_m, closed);
+        let mut line = Self {
+            closed,
+            points_m: Vec::new(),
+            section: Vec::new(),
+            station_m: Vec::new(),
+            segment_m: Vec::new(),
+            curvature_1pm: Vec::new(),
+            length_m: 0.0,
+            gamma_1pm: 0.0,
+            integral_kappa2_1pm: 0.0,
+            lap: None,
+        };
+        let mut gamma_squared = 0.0;
+        for segment in 0..spline.segments() {
+            let chord = spline.chord(segment);
+            // The curve is longer than the chord, and faster at one end than at the other.
+            let fastest = (0..=4)
+                .map(|i| spline.at(segment, chord * f64::from(i) / 4.0).speed)
+                .fold(1.0, f64::max);
+            let pieces = (chord * fastest / spacing_m).ceil().max(1.0) as usize;
+            for piece in 0..pieces {
+                let t = |piece: usize| chord * piece as f64 / pieces as f64;
+                line.push(
+                    &spline,
+                    segment,
+                    t(piece),
+                    Some((piece as f64 / pieces as f64, t(piece + 1))),
+                );
+                if piece == 0 {
+                    gamma_squared += line.curvature_1pm[line.curvature_1pm.len() - 1].powi(2);
+                }
+            }
+        }
+        if !closed {
+            let last = spline.segments() - 1;
+            line.push(&spline, last, spline.chord(last), None);
+            gamma_squared += line.curvature_1pm[line.curvature_1pm.len() - 1].powi(2);
+        }
+        line.gamma_1pm = gamma_squared.sqrt();
+        if let Some(car) = car {
+            let table = car.table()?;
+            let lap = lap_profile(car, &table, &line.segment_m, &line.curvature_1pm, entry_mps)?;
+            line.lap = Some(lap);
+        }
+        Ok(line)
+    }
+
+    /// Adds the place at `t` of a segment, with the piece from there to the parameter `end` if one follows.
+    fn push(&mut self, spline: &Spline, segment: usize, t: f64, piece: Option<(f64, f64)>) {
+        let place = spline.at(segment, t);
+        self.points_m.push(place.point);
+        self.curvature_1pm.push(place.curvature);
+        self.station_m.push(self.length_m);
+        let Some((share, end)) = piece else {
+            self.section.push((segment + 1, 0.0));
+            return;
+        };
+        self.section.push((segment, share));
+        let length = spline.integral(segment, t, end, |p| p.speed);
+        self.segment_m.push(length);
+        self.length_m += length;
+        self.integral_kappa2_1pm += spline.integral(segment, t, end, |p| p.curvature * p.curvature * p.speed);
+    }
+
+    /// Time of the lap (s), if a car was given.
+    pub fn lap_time_s(&self) -> Option<f64> {
+        self.lap.as_ref().map(|lap| lap.time_s)
+    }
+}

@@ -1,0 +1,298 @@
+//! The line kernel: from a candidate's variables to the shape of its line and the time of a lap on it.
+//! Twin of `shaders/line.wgsl`.
+//!
+//! Curvature is the three-point second difference on uneven spacing. The lap is that of a point mass on the limit:
+//! a forward pass of driving and a backward pass of braking on the speed squared, below the corner speeds (after
+//! D. Brayshaw and M. Harrison, *A quasi steady state approach to race car lap simulation*, 2005; N. R. Kapania,
+//! J. Subosits and J. C. Gerdes, *A sequential two-step algorithm for fast generation of vehicle racing trajectories*,
+//! J. Dyn. Sys., Meas., Control 138, 2016).
+
+use super::plan::{LinePlan, SectionRow};
+use super::point_mass::{LIMIT_WIDTH, LimitTable};
+use crate::scalar::{Lookup, Real};
+
+/// Terms that are summed up before they join the running total, which keeps `f32` sums of long laps exact enough.
+pub const BLOCK: usize = 64;
+
+/// What of a line is asked for beyond its length.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Wanted {
+    /// The integral of the curvature squared.
+    pub integral: bool,
+    /// The lap time.
+    pub lap: bool,
+}
+
+/// Figures of one line's segments and sections, filled by [`shape`] and [`lap_time`].
+#[derive(Clone, Debug)]
+pub struct Course<R> {
+    /// Length of each segment (m).
+    pub length: Vec<R>,
+    /// Curvature at each section (1/m), without a sign.
+    pub curvature: Vec<R>,
+    /// Speed squared at each section (m^2/s^2).
+    pub speed_squared: Vec<R>,
+}
+
+impl<R> Default for Course<R> {
+    fn default() -> Self {
+        Self {
+            length: Vec::new(),
+            curvature: Vec::new(),
+            speed_squared: Vec::new(),
+        }
+    }
+}
+
+/// Sums over a line.
+#[derive(Clone, Copy, Debug)]
+pub struct Shape<R> {
+    /// Length (m).
+    pub length: R,
+    /// Sum of the squared lengths of the segments (m^2).
+    pub length_squared: R,
+    /// Sum of the squared second differences (1/m^2).
+    pub second_differences: R,
+    /// Integral of the curvature squared over the length (1/m): turning angle squared over spacing.
+    pub integral: R,
+}
+
+/// A segment of a line.
+#[derive(Clone, Copy)]
+struct Segment<R> {
+    direction: [R; 2],
+    length: R,
+}
+
+impl<R: Real> Segment<R> {
+    #[inline(always)]
+    fn between(row: &SectionRow<R::Storage>, here: [R; 2], next: [R; 2]) -> Self {
+        let x = R::load(row.step[0]) + (next[0] - here[0]);
+        let y = R::load(row.step[1]) + (next[1] - here[1]);
+        // Points that coincide have no direction; a tenth of a millimetre gives them one.
+        let length = (x * x + y * y).max(R::lit(1e-8)).sqrt();
+        Self {
+            direction: [x / length, y / length],
+            length,
+        }
+    }
+}
+
+/// `alpha` at a section: a sum of variables, held within the road.
+#[inline(always)]
+pub fn alpha<R: Real>(row: &SectionRow<R::Storage>, terms: usize, variables: &[R]) -> R {
+    let mut sum = R::load(row.constant);
+    for term in 0..terms {
+        sum = sum + R::load(row.weights[term]) * variables[row.sources[term] as usize];
+    }
+    let (nought, one) = (R::lit(0.0), R::lit(1.0));
+    // Not `min` and `max`: on the very edge the sum is kept, with its derivatives.
+    let sum = R::select(sum.less_than(nought), nought, sum);
+    R::select(one.less_than(sum), one, sum)
+}
+
+/// From the right end of a cut to the line (m).
+#[inline(always)]
+fn offset<R: Real>(row: &SectionRow<R::Storage>, terms: usize, variables: &[R]) -> [R; 2] {
+    let share = alpha(row, terms, variables);
+    row.cut.map(|c| share * R::load(c))
+}
+
+/// The shape of the line that `variables` give; `course` has its lengths and curvatures after.
+#[inline(always)]
+pub fn shape<R: Real>(
+    plan: &LinePlan<R::Storage>,
+    wanted: Wanted,
+    variables: &[R],
+    course: &mut Course<R>,
+) -> Shape<R> {
+    let n = plan.rows.len();
+    let nought = R::lit(0.0);
+    let at = |i: usize| offset(&plan.rows[i], plan.terms, variables);
+    course.length.clear();
+    course.length.resize(n, nought);
+    course.curvature.clear();
+    course.curvature.resize(n, nought);
+
+    let first = at(0);
+    let mut here = first;
+    let mut before = plan
+        .closed
+        .then(|| Segment::between(&plan.rows[n - 1], at(n - 1), first));
+    let mut total = [nought; 4];
+    let mut block = [nought; 4];
+    for i in 0..plan.segments() {
+        let next = if i + 1 < n { at(i + 1) } else { first };
+        let segment = Segment::between(&plan.rows[i], here, next);
+        course.length[i] = segment.length;
+        block[0] = block[0] + segment.length;
+        block[1] = block[1] + segment.length * segment.length;
+        if let Some(before) = before {
+            let turned_x = segment.direction[0] - before.direction[0];
+            let turned_y = segment.direction[1] - before.direction[1];
+            let turned_squared = turned_x * turned_x + turned_y * turned_y;
+            let spacing = R::lit(0.5) * (before.length + segment.length);
+            let turned = turned_squared.sqrt();
+            let curvature = turned / spacing;
+            course.curvature[i] = curvature;
+            block[2] = block[2] + curvature * curvature;
+            if wanted.integral {
+                // The difference of two directions is the chord of the turning angle on the unit circle.
+                let across = (R::lit(4.0) - turned_squared).max(R::lit(1e-6)).sqrt();
+                let half = (turned / across).atan();
+                block[3] = block[3] + R::lit(4.0) * half * (half / spacing);
+            }
+        }
+        if (i + 1) % BLOCK == 0 || i + 1 == plan.segments() {
+            for (total, block) in total.iter_mut().zip(&mut block) {
+                *total = *total + *block;
+                *block = nought;
+            }
+        }
+        before = Some(segment);
+        here = next;
+    }
+    if !plan.closed && n > 2 {
+        course.curvature[0] = course.curvature[1];
+        course.curvature[n - 1] = course.curvature[n - 2];
+    }
+    let [length, length_squared, second_differences, integral] = total;
+    Shape {
+        length,
+        length_squared,
+        second_differences,
+        integral,
+    }
+}
+
+/// The figure of `column` at `argument`, counted in rows of `width` of which half are figures and half rises.
+#[inline(always)]
+fn look_up<R: Lookup>(table: &[R::Storage], width: usize, place: R::Place, beyond: R, column: usize) -> R {
+    R::pick(table, place, column) + beyond * R::pick(table, place, width / 2 + column)
+}
+
+/// Greatest speed squared (m^2/s^2) in a bend.
+#[inline(always)]
+pub fn corner<R: Lookup>(limits: &LimitTable<R::Storage>, curvature: R) -> R {
+    // Straights have no radius; a thousand kilometres will do.
+    let radius = R::lit(1.0) / curvature.max(R::lit(1e-6));
+    let (place, beyond) = (radius * R::load(limits.rows_per_radius)).place(limits.corners.len() / 2, 2);
+    look_up(&limits.corners, 2, place, beyond, 0)
+}
+
+/// Greatest acceleration and greatest deceleration (m/s^2) at a speed squared in a bend.
+#[inline(always)]
+pub fn longitudinal<R: Lookup>(limits: &LimitTable<R::Storage>, speed_squared: R, curvature: R) -> [R; 2] {
+    let rows = limits.limits.len() / LIMIT_WIDTH;
+    let argument = speed_squared * R::load(limits.rows_per_speed_squared);
+    let (place, beyond) = argument.place(rows, LIMIT_WIDTH);
+    let at = |column| look_up(&limits.limits, LIMIT_WIDTH, place, beyond, column);
+    let share = curvature * speed_squared / at(0);
+    let root = (R::lit(1.0) - share * share).max(R::lit(0.0)).sqrt();
+    let left = if limits.ellipse.is_empty() {
+        root
+    } else {
+        let rows = limits.ellipse.len() / 2;
+        let (place, beyond) = (root * R::lit(rows as f64)).place(rows, 2);
+        look_up(&limits.ellipse, 2, place, beyond, 0)
+    };
+    let grip = at(1) * left;
+    let drag = at(3);
+    [grip.min(at(2)) - drag, grip + drag]
+}
+
+/// Speed squared after driving from a section to the next. Second order: the limits are those at the middle.
+#[inline(always)]
+fn driven<R: Lookup>(limits: &LimitTable<R::Storage>, from: R, length: R, here: R, there: R) -> R {
+    let nought = R::lit(0.0);
+    let [start, _] = longitudinal(limits, from, here);
+    let middle = (from + length * start).max(nought);
+    let [drive, _] = longitudinal(limits, middle, R::lit(0.5) * (here + there));
+    (from + R::lit(2.0) * length * drive).max(nought)
+}
+
+/// Speed squared from which the car just brakes to that of the next section.
+#[inline(always)]
+fn braked<R: Lookup>(limits: &LimitTable<R::Storage>, to: R, length: R, there: R, here: R) -> R {
+    let [_, end] = longitudinal(limits, to, there);
+    let middle = to + length * end;
+    let [_, brake] = longitudinal(limits, middle, R::lit(0.5) * (here + there));
+    to + R::lit(2.0) * length * brake
+}
+
+/// Time of a lap (s) on `course`, whose lengths and curvatures are given; it has the speeds after.
+///
+/// A closed lap's passes go on beyond the section where they started until they meet themselves, so that any start
+/// gives the same lap.
+#[inline(always)]
+pub fn lap_time<R: Lookup>(
+    limits: &LimitTable<R::Storage>,
+    closed: bool,
+    start: usize,
+    entry: R,
+    course: &mut Course<R>,
+) -> R {
+    let n = course.curvature.len();
+    let (length, curvature) = (&course.length, &course.curvature);
+    let speeds = &mut course.speed_squared;
+    speeds.clear();
+    speeds.extend(curvature.iter().map(|k| corner(limits, *k)));
+    let start = if closed { start } else { 0 };
+    if !closed {
+        speeds[0] = speeds[0].min(entry);
+    }
+    // Every section has been reached after n - 1 steps; a closed lap may need as many again to meet itself.
+    let steps = if closed { 2 * n } else { n - 1 };
+
+    let mut here = start;
+    for step in 0..steps {
+        let next = if here + 1 < n { here + 1 } else { 0 };
+        let reached = driven(
+            limits,
+            speeds[here],
+            length[here],
+            curvature[here],
+            curvature[next],
+        );
+        let slower = reached.less_than(speeds[next]);
+        speeds[next] = R::select(slower, reached, speeds[next]);
+        if step + 1 >= n && R::all(!slower) {
+            break;
+        }
+        here = next;
+    }
+
+    let mut next = if closed { start } else { n - 1 };
+    for step in 0..steps {
+        let here = if next > 0 { next - 1 } else { n - 1 };
+        let reached = braked(
+            limits,
+            speeds[next],
+            length[here],
+            curvature[next],
+            curvature[here],
+        );
+        let slower = reached.less_than(speeds[here]);
+        speeds[here] = R::select(slower, reached, speeds[here]);
+        if step + 1 >= n && R::all(!slower) {
+            break;
+        }
+        next = here;
+    }
+
+    let segments = if closed { n } else { n - 1 };
+    let nought = R::lit(0.0);
+    let (mut total, mut block) = (nought, nought);
+    let mut from = speeds[0].sqrt();
+    for (here, length) in length[..segments].iter().enumerate() {
+        let next = if here + 1 < n { here + 1 } else { 0 };
+        let to = speeds[next].sqrt();
+        block = block + R::lit(2.0) * *length / (from + to);
+        from = to;
+        if (here + 1) % BLOCK == 0 || here + 1 == segments {
+            total = total + block;
+            block = nought;
+        }
+    }
+    total
+}

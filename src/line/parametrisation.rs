@@ -1,0 +1,271 @@
+//! How few or many numbers give a line.
+
+use super::plan::{LinePlan, TERMS};
+use crate::error::{Error, Result};
+use crate::evaluate::Variable;
+use crate::track::CrossSections;
+use nalgebra::{DMatrix, DVector};
+
+/// What the coefficients of a line are.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Basis {
+    /// `alpha` at every section.
+    Sections,
+    /// Control points of a uniform cubic B-spline over the station: periodic on a closed circuit, clamped at the ends of
+    /// an open one (L. Piegl and W. Tiller, *The NURBS Book*, 2nd ed., 1997, ch. 2).
+    ControlPoints { count: usize, overshoot: f64 },
+}
+
+/// How a line's `alpha` follows from a candidate's variables: the values of all the coefficients, or of some of them
+/// while the others keep those of a context line.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Parametrisation {
+    basis: Basis,
+    /// Free coefficients, and the values of all where they are not free.
+    free: Option<(Vec<usize>, Vec<f64>)>,
+}
+
+/// How far beyond the road control points may reach by default, as a share of its width. A lone control point at 1.25
+/// among neighbours at 0.5 brings the line just to the edge, and what would go beyond is held there.
+pub const OVERSHOOT: f64 = 0.25;
+
+impl Parametrisation {
+    /// `alpha` at every section.
+    pub fn sections() -> Self {
+        Self {
+            basis: Basis::Sections,
+            free: None,
+        }
+    }
+
+    /// `count` control points, at least four, which may reach [`OVERSHOOT`] beyond the road; the line is held within.
+    pub fn control_points(count: usize) -> Self {
+        Self {
+            basis: Basis::ControlPoints {
+                count,
+                overshoot: OVERSHOOT,
+            },
+            free: None,
+        }
+    }
+
+    /// How far beyond the road control points may reach, as a share of its width.
+    pub fn with_overshoot(mut self, share: f64) -> Self {
+        if let Basis::ControlPoints { overshoot, .. } = &mut self.basis {
+            *overshoot = share;
+        }
+        self
+    }
+
+    /// Only the coefficients `free` are variables, in this order; `context` has the values of all, as
+    /// [`Parametrisation::fit`] gives them.
+    pub fn with_free(mut self, free: Vec<usize>, context: Vec<f64>) -> Self {
+        self.free = Some((free, context));
+        self
+    }
+
+    /// Both ends of an open line stay where `context` has them.
+    pub fn with_fixed_ends(self, context: Vec<f64>) -> Self {
+        let inner = (1..context.len().saturating_sub(1)).collect();
+        self.with_free(inner, context)
+    }
+
+    /// Number of coefficients, free or not, of a line over `cuts`.
+    pub fn coefficients(&self, cuts: &CrossSections) -> usize {
+        match self.basis {
+            Basis::Sections => cuts.len(),
+            Basis::ControlPoints { count, .. } => count,
+        }
+    }
+
+    /// # Errors
+    /// [`Error::Input`] naming the setting that does not fit `cuts`.
+    pub fn check(&self, cuts: &CrossSections) -> Result<()> {
+        let wrong = |place: &str, found: String, expected: String| {
+            Err(Error::input(
+                &cuts.name,
+                format!("line, {place}"),
+                found,
+                expected,
+            ))
+        };
+        let all = self.coefficients(cuts);
+        if let Basis::ControlPoints { count, overshoot } = self.basis {
+            if count < TERMS || count > cuts.len() {
+                return wrong(
+                    "control points",
+                    count.to_string(),
+                    format!("{TERMS} to {}, the number of sections", cuts.len()),
+                );
+            }
+            if !(0.0..=10.0).contains(&overshoot) {
+                return wrong("overshoot", overshoot.to_string(), "0 to 10".to_owned());
+            }
+        }
+        if let Some((free, context)) = &self.free {
+            if context.len() != all || context.iter().any(|x| !x.is_finite()) {
+                return wrong(
+                    "context",
+                    format!("{} values", context.len()),
+                    format!("{all} finite ones"),
+                );
+            }
+            let mut taken = vec![false; all];
+            for &index in free {
+                if index >= all || std::mem::replace(&mut taken[index], true) {
+                    return wrong(
+                        "free coefficients",
+                        index.to_string(),
+                        format!("each below {all}, once at most"),
+                    );
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The decision variables over `cuts`.
+    pub fn variables(&self, cuts: &CrossSections) -> Vec<Variable> {
+        let (name, overshoot) = match self.basis {
+            Basis::Sections => ("alpha", 0.0),
+            Basis::ControlPoints { overshoot, .. } => ("control", overshoot),
+        };
+        let variable = |index: usize| Variable {
+            name: format!("{name}_{index}"),
+            unit: "-".to_owned(),
+            lower: -overshoot,
+            upper: 1.0 + overshoot,
+        };
+        match &self.free {
+            None => (0..self.coefficients(cuts)).map(variable).collect(),
+            Some((free, _)) => free.iter().copied().map(variable).collect(),
+        }
+    }
+
+    /// The coefficients that `alpha` at a section is the sum of, and their weights.
+    fn weights_at(&self, cuts: &CrossSections, section: usize) -> [(usize, f64); TERMS] {
+        let Basis::ControlPoints { count, .. } = self.basis else {
+            return [(section, 1.0), (section, 0.0), (section, 0.0), (section, 0.0)];
+        };
+        let station = cuts.station_m[section];
+        if cuts.closed {
+            let place = station / cuts.length_m * count as f64;
+            let t = place.fract();
+            let s = 1.0 - t;
+            let weights = [
+                s * s * s / 6.0,
+                (4.0 - 6.0 * t * t + 3.0 * t * t * t) / 6.0,
+                (4.0 - 6.0 * s * s + 3.0 * s * s * s) / 6.0,
+                t * t * t / 6.0,
+            ];
+            let first = place as usize + count - 1;
+            return std::array::from_fn(|j| ((first + j) % count, weights[j]));
+        }
+        let spans = count - 3;
+        let last = cuts.station_m[cuts.len() - 1];
+        let place = station / last * spans as f64;
+        let span = (place as usize).min(spans - 1);
+        // Knots are whole numbers, held at the ends.
+        let knot = |i: isize| (span as isize + i).clamp(0, spans as isize) as f64;
+        let mut weights = [1.0, 0.0, 0.0, 0.0];
+        for degree in 1..4 {
+            let mut saved = 0.0;
+            for (j, weight) in weights[..degree].iter_mut().enumerate() {
+                let (left, right) = (knot(j as isize + 1 - degree as isize), knot(j as isize + 1));
+                let share = *weight / (right - left);
+                *weight = saved + (right - place) * share;
+                saved = (place - left) * share;
+            }
+            weights[degree] = saved;
+        }
+        std::array::from_fn(|j| (span + j, weights[j]))
+    }
+
+    /// Gives `plan`, which is of `cuts`, its `alpha`.
+    ///
+    /// # Errors
+    /// As [`Parametrisation::check`].
+    pub fn apply(&self, cuts: &CrossSections, plan: &mut LinePlan<f64>) -> Result<()> {
+        self.check(cuts)?;
+        let all = self.coefficients(cuts);
+        let mut sources: Vec<Option<usize>> = (0..all).map(Some).collect();
+        if let Some((free, _)) = &self.free {
+            sources.fill(None);
+            for (variable, &index) in free.iter().enumerate() {
+                sources[index] = Some(variable);
+            }
+        }
+        plan.terms = if self.basis == Basis::Sections { 1 } else { TERMS };
+        for (section, row) in plan.rows.iter_mut().enumerate() {
+            (row.constant, row.weights, row.sources) = (0.0, [0.0; TERMS], [0; TERMS]);
+            for (term, (index, weight)) in self.weights_at(cuts, section).into_iter().enumerate() {
+                match (sources[index], &self.free) {
+                    (Some(variable), _) => {
+                        row.weights[term] = weight;
+                        row.sources[term] = variable as u32;
+                    }
+                    (None, Some((_, context))) => row.constant += weight * context[index],
+                    (None, None) => {}
+                }
+            }
+        }
+        if sources.iter().all(Option::is_none) {
+            plan.terms = 0;
+        }
+        Ok(())
+    }
+
+    /// The coefficients, free or not, whose line comes closest to `alpha` at every section, held within their bounds.
+    ///
+    /// # Errors
+    /// As [`Parametrisation::check`]; [`Error::Input`] if `alpha` has not a value per section.
+    pub fn fit(&self, cuts: &CrossSections, alpha: &[f64]) -> Result<Vec<f64>> {
+        self.check(cuts)?;
+        if alpha.len() != cuts.len() || alpha.iter().any(|a| !a.is_finite()) {
+            return Err(Error::input(
+                &cuts.name,
+                "line, alpha",
+                format!("{} values", alpha.len()),
+                format!("{} finite ones, one per section", cuts.len()),
+            ));
+        }
+        let Basis::ControlPoints { count, overshoot } = self.basis else {
+            return Ok(alpha.iter().map(|a| a.clamp(0.0, 1.0)).collect());
+        };
+        // Normal equations, with a trace of the identity: control points that no section sees stay in the middle.
+        let mut matrix = DMatrix::<f64>::identity(count, count) * 1e-9;
+        let mut right = DVector::from_element(count, 0.5e-9);
+        for (section, alpha) in alpha.iter().enumerate() {
+            let weights = self.weights_at(cuts, section);
+            for (i, weight) in weights {
+                right[i] += weight * alpha;
+                for (j, other) in weights {
+                    matrix[(i, j)] += weight * other;
+                }
+            }
+        }
+        let solution = matrix.cholesky().map(|c| c.solve(&right)).ok_or_else(|| {
+            Error::input(
+                &cuts.name,
+                "line, control points",
+                count.to_string(),
+                "a number that the sections determine",
+            )
+        })?;
+        Ok(solution
+            .iter()
+            .map(|c| c.clamp(-overshoot, 1.0 + overshoot))
+            .collect())
+    }
+
+    /// The variables among the coefficients that [`Parametrisation::fit`] gives.
+    pub fn variables_of(&self, coefficients: &[f64]) -> Vec<f64> {
+        match &self.free {
+            None => coefficients.to_vec(),
+            Some((free, _)) => free
+                .iter()
+                .filter_map(|&i| coefficients.get(i).copied())
+                .collect(),
+        }
+    }
+}

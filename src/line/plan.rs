@@ -1,0 +1,93 @@
+//! What the kernels need to know of a line's sections.
+
+use crate::scalar::Real;
+use glam::DVec2;
+
+/// Terms of the sum that gives `alpha` at a section.
+pub const TERMS: usize = 4;
+
+/// One section, in differences: absolute coordinates would cost single precision its curvatures.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SectionRow<S> {
+    /// From the right end of this cut to that of the next (m).
+    pub step: [S; 2],
+    /// From the right end of the cut to the left end (m).
+    pub cut: [S; 2],
+    /// The part of `alpha` that no variable moves.
+    pub constant: S,
+    /// Weights of the variables that `alpha` is the sum of.
+    pub weights: [S; TERMS],
+    /// Which variables those are.
+    pub sources: [u32; TERMS],
+}
+
+/// All sections, and how the lap goes through them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LinePlan<S> {
+    /// Whether the last section is followed by the first.
+    pub closed: bool,
+    /// The section where a closed lap's passes start. Results do not depend on it; the work is least where the car is
+    /// slowest.
+    pub start: usize,
+    /// Speed squared at the start of an open line (m^2/s^2).
+    pub entry: S,
+    /// Terms in use of [`TERMS`].
+    pub terms: usize,
+    /// The sections.
+    pub rows: Vec<SectionRow<S>>,
+}
+
+impl LinePlan<f64> {
+    /// The plan of the cuts between `right_m` and `left_m`, with `alpha` yet to be given by nothing.
+    pub fn of_cuts(right_m: &[DVec2], left_m: &[DVec2], closed: bool) -> Self {
+        let n = right_m.len();
+        let rows = (0..n).map(|i| SectionRow {
+            step: (right_m[(i + 1) % n] - right_m[i]).to_array(),
+            cut: (left_m[i] - right_m[i]).to_array(),
+            constant: 0.0,
+            weights: [0.0; TERMS],
+            sources: [0; TERMS],
+        });
+        Self {
+            closed,
+            start: 0,
+            entry: 0.0,
+            terms: 0,
+            rows: rows.collect(),
+        }
+    }
+
+    /// The plan of one line that no variable moves.
+    pub fn of_points(points_m: &[DVec2], closed: bool) -> Self {
+        Self::of_cuts(points_m, points_m, closed)
+    }
+
+    /// The plan in the precision that the scalar `R` stores tables in.
+    pub fn stored<R: Real>(&self) -> LinePlan<R::Storage> {
+        let store = R::store;
+        LinePlan {
+            closed: self.closed,
+            start: self.start,
+            entry: store(self.entry),
+            terms: self.terms,
+            rows: self
+                .rows
+                .iter()
+                .map(|row| SectionRow {
+                    step: row.step.map(store),
+                    cut: row.cut.map(store),
+                    constant: store(row.constant),
+                    weights: row.weights.map(store),
+                    sources: row.sources,
+                })
+                .collect(),
+        }
+    }
+}
+
+impl<S> LinePlan<S> {
+    /// Number of segments: one per section, but for the last of an open line.
+    pub fn segments(&self) -> usize {
+        self.rows.len() - usize::from(!self.closed)
+    }
+}

@@ -1,0 +1,182 @@
+//! The point mass that laps are timed with, and its limits as tables that every backend looks up alike.
+
+use crate::error::{Error, Result};
+use crate::scalar::Real;
+use crate::vehicle::Envelope;
+
+/// A point mass with a car's limits.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PointMass {
+    /// The limits over speed.
+    pub envelope: Envelope,
+    /// Exponent of the friction ellipse, 1 to 4: 2 is the ellipse itself.
+    pub ellipse_exponent: f64,
+    /// Wheelbase (m), by which a curvature asks for a steering angle.
+    pub wheelbase_m: f64,
+    /// Greatest steering angle at the wheels (rad), if it is to limit.
+    ///
+    /// A bend tighter than the lock allows cannot be driven. So that a search finds its way back from there, its corner
+    /// speed squared falls with the fourth power of the radius instead of the line failing.
+    pub max_steer_rad: Option<f64>,
+}
+
+/// The limits of a [`PointMass`] over even steps of the speed squared, in which its equation of motion is written.
+///
+/// Tables have for each row the figures at its start and then how much they rise to its end.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LimitTable<S> {
+    /// Greatest speed squared (m^2/s^2).
+    pub top: S,
+    /// Rows of [`LimitTable::limits`] per speed squared (s^2/m^2).
+    pub rows_per_speed_squared: S,
+    /// Lateral, grip, drive, drag (m/s^2), then their rises.
+    pub limits: Vec<S>,
+    /// Rows of [`LimitTable::corners`] per radius (1/m).
+    pub rows_per_radius: S,
+    /// Corner speed squared (m^2/s^2) over the radius, then its rise.
+    pub corners: Vec<S>,
+    /// The share of the longitudinal grip that is left over `sqrt(1 - (lateral share)^2)`, then its rise. Empty where the
+    /// ellipse has exponent 2 and that root is the share itself.
+    pub ellipse: Vec<S>,
+}
+
+/// Figures of a row of [`LimitTable::limits`].
+pub const LIMIT_WIDTH: usize = 8;
+/// Rows over speed squared. At 70 m/s a step is 9.6 m^2/s^2: 0.2 m/s at 25 m/s.
+const LIMIT_ROWS: usize = 512;
+/// Rows over radius. Corner speed squared bends so little over it that a step of the usual 0.3 m costs 1e-6 of it.
+const CORNER_ROWS: usize = 1024;
+/// Rows over the share.
+const ELLIPSE_ROWS: usize = 256;
+
+impl PointMass {
+    /// A point mass within `envelope`, on an ellipse of exponent 2, with a wheelbase (m) and no limit of steering.
+    pub fn new(envelope: Envelope, wheelbase_m: f64) -> Self {
+        Self {
+            envelope,
+            ellipse_exponent: 2.0,
+            wheelbase_m,
+            max_steer_rad: None,
+        }
+    }
+
+    /// # Errors
+    /// [`Error::Input`] naming the first setting that cannot be.
+    pub fn check(&self) -> Result<()> {
+        let within = |name: &str, x: f64, least: f64, most: f64| {
+            if x >= least && x <= most {
+                return Ok(());
+            }
+            Err(Error::input(
+                self.envelope.name(),
+                name,
+                x.to_string(),
+                format!("{least} to {most}"),
+            ))
+        };
+        within("ellipse_exponent", self.ellipse_exponent, 1.0, 4.0)?;
+        within("wheelbase_m", self.wheelbase_m, 0.1, 20.0)?;
+        self.max_steer_rad
+            .map_or(Ok(()), |x| within("max_steer_rad", x, 0.01, 1.5))
+    }
+
+    /// The tables of the limits.
+    ///
+    /// # Errors
+    /// As [`PointMass::check`].
+    pub fn table(&self) -> Result<LimitTable<f64>> {
+        self.check()?;
+        let top = self.envelope.top_speed_mps().powi(2);
+        let at_knot = |knot: usize| {
+            let row = self.envelope.at((top * knot as f64 / LIMIT_ROWS as f64).sqrt());
+            [row.ay_mps2, row.ax_grip_mps2, row.ax_drive_mps2, row.drag_mps2]
+        };
+        let mut knots: Vec<[f64; 4]> = (0..=LIMIT_ROWS).map(at_knot).collect();
+        // Speed is held at the greatest, so that drive need not fall to nought within a row.
+        let last = self.envelope.rows()[self.envelope.rows().len() - 1];
+        knots[LIMIT_ROWS][2] = last.ax_drive_mps2;
+        let (radius_top, corner_knots) = self.corners(top, &knots);
+        Ok(LimitTable {
+            top,
+            rows_per_speed_squared: LIMIT_ROWS as f64 / top,
+            limits: with_rises(&knots),
+            rows_per_radius: CORNER_ROWS as f64 / radius_top,
+            corners: with_rises(&corner_knots),
+            ellipse: if self.ellipse_exponent == 2.0 {
+                Vec::new()
+            } else {
+                with_rises(&self.ellipse_knots())
+            },
+        })
+    }
+
+    /// The radius from which on no speed is too great, and the corner speed squared at even steps up to it: the least
+    /// `w` at which `w / radius` exceeds the lateral limit, which itself rises with downforce.
+    fn corners(&self, top: f64, knots: &[[f64; 4]]) -> (f64, Vec<[f64; 1]>) {
+        let step = top / LIMIT_ROWS as f64;
+        let lateral = |knot: usize| knots[knot][0];
+        let radius_top = (0..=LIMIT_ROWS)
+            .map(|k| k as f64 * step / lateral(k))
+            .fold(0.0, f64::max);
+        let lock_radius = self.max_steer_rad.map_or(0.0, |lock| self.wheelbase_m / lock);
+        let mut row = 0;
+        let corners = (0..=CORNER_ROWS).map(|i| {
+            let radius = radius_top * i as f64 / CORNER_ROWS as f64;
+            // The first row at whose end the limit is passed; with the radius it only moves on.
+            while row < LIMIT_ROWS && (row + 1) as f64 * step <= lateral(row + 1) * radius {
+                row += 1;
+            }
+            let corner = if row == LIMIT_ROWS {
+                top
+            } else {
+                let start = row as f64 * step;
+                let slope = (lateral(row + 1) - lateral(row)) / step;
+                ((lateral(row) - slope * start) * radius / (1.0 - slope * radius)).clamp(start, start + step)
+            };
+            let beyond_lock = if radius < lock_radius {
+                radius / lock_radius
+            } else {
+                1.0
+            };
+            [corner * beyond_lock.powi(4)]
+        });
+        (radius_top, corners.collect())
+    }
+
+    fn ellipse_knots(&self) -> Vec<[f64; 1]> {
+        let p = self.ellipse_exponent;
+        (0..=ELLIPSE_ROWS)
+            .map(|i| {
+                let root = i as f64 / ELLIPSE_ROWS as f64;
+                let lateral_squared = 1.0 - root * root;
+                [(1.0 - lateral_squared.powf(p / 2.0)).powf(1.0 / p)]
+            })
+            .collect()
+    }
+}
+
+/// Rows of the figures at each knot but the last and their rises to the next.
+fn with_rises<const N: usize>(knots: &[[f64; N]]) -> Vec<f64> {
+    knots
+        .windows(2)
+        .flat_map(|pair| {
+            let rises = std::array::from_fn::<f64, N, _>(|i| pair[1][i] - pair[0][i]);
+            pair[0].into_iter().chain(rises)
+        })
+        .collect()
+}
+
+impl LimitTable<f64> {
+    /// The tables in the precision that the scalar `R` stores tables in.
+    pub fn stored<R: Real>(&self) -> LimitTable<R::Storage> {
+        let all = |table: &[f64]| table.iter().map(|x| R::store(*x)).collect();
+        LimitTable {
+            top: R::store(self.top),
+            rows_per_speed_squared: R::store(self.rows_per_speed_squared),
+            limits: all(&self.limits),
+            rows_per_radius: R::store(self.rows_per_radius),
+            corners: all(&self.corners),
+            ellipse: all(&self.ellipse),
+        }
+    }
+}

@@ -1,0 +1,137 @@
+//! Everything about a lap on one line.
+
+use super::kernel::{Course, lap_time};
+use super::point_mass::{LimitTable, PointMass};
+use crate::error::{Error, Result};
+
+/// A lap, section by section.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LapProfile {
+    /// Time (s).
+    pub time_s: f64,
+    /// Distance from the start at each section (m).
+    pub station_m: Vec<f64>,
+    /// Speed at each section (m/s).
+    pub v_mps: Vec<f64>,
+    /// Mean longitudinal acceleration from each section to the next (m/s^2); the last of an open line has that before it.
+    pub ax_mps2: Vec<f64>,
+    /// Lateral acceleration at each section (m/s^2), positive to the left.
+    pub ay_mps2: Vec<f64>,
+    /// Steering angle at the wheels that the curvature asks for (rad), positive to the left: wheelbase times curvature.
+    pub steering_rad: Vec<f64>,
+    /// Time of each segment (s).
+    pub segment_time_s: Vec<f64>,
+    /// Sections where the steering passes the lock, if there is one.
+    pub beyond_lock: usize,
+}
+
+impl LapProfile {
+    /// Time at each section (s), from nought at the first.
+    pub fn elapsed_s(&self) -> Vec<f64> {
+        let mut time = 0.0;
+        let mut elapsed = Vec::with_capacity(self.v_mps.len());
+        for i in 0..self.v_mps.len() {
+            elapsed.push(time);
+            time += self.segment_time_s.get(i).copied().unwrap_or(0.0);
+        }
+        elapsed
+    }
+}
+
+/// Drives `car` along a line of these segments (m) and curvatures (1/m, with sign). A line is closed if it has as many
+/// segments as sections; `entry_mps` is the greatest speed (m/s) at the start of an open one. `table` is the car's.
+///
+/// # Errors
+/// [`Error::Input`] if lengths are not positive, the numbers of figures do not fit each other, or the car comes to a
+/// standstill.
+pub fn lap_profile(
+    car: &PointMass,
+    table: &LimitTable<f64>,
+    segment_m: &[f64],
+    curvature_1pm: &[f64],
+    entry_mps: f64,
+) -> Result<LapProfile> {
+    let n = curvature_1pm.len();
+    let wrong = |place: &str, found: String, expected: &str| {
+        Err(Error::input("line", place.to_owned(), found, expected))
+    };
+    let closed = segment_m.len() == n;
+    if n < 2 || !(closed || segment_m.len() + 1 == n) {
+        let found = format!("{} segments and {n} sections", segment_m.len());
+        return wrong(
+            "sections",
+            found,
+            "two or more, and as many segments or one fewer",
+        );
+    }
+    if let Some(i) = segment_m.iter().position(|h| !(*h > 0.0 && h.is_finite())) {
+        return wrong(
+            &format!("segment {i}"),
+            segment_m[i].to_string(),
+            "a positive length (m)",
+        );
+    }
+    if let Some(i) = curvature_1pm.iter().position(|k| !k.is_finite()) {
+        return wrong(
+            &format!("section {i}"),
+            curvature_1pm[i].to_string(),
+            "a curvature (1/m)",
+        );
+    }
+    let mut course = Course {
+        length: segment_m.to_vec(),
+        curvature: curvature_1pm.iter().map(|k| k.abs()).collect(),
+        speed_squared: Vec::new(),
+    };
+    let start = slowest(&course.curvature);
+    let time_s = lap_time::<f64>(table, closed, start, entry_mps * entry_mps, &mut course);
+    if !time_s.is_finite() {
+        return wrong(
+            "lap",
+            "a standstill".to_owned(),
+            "a car that moves along the whole line",
+        );
+    }
+    let w = &course.speed_squared;
+    let v_mps: Vec<f64> = w.iter().map(|w| w.sqrt()).collect();
+    let next = |i: usize| (i + 1) % n;
+    let mut ax_mps2: Vec<f64> = segment_m
+        .iter()
+        .enumerate()
+        .map(|(i, h)| (w[next(i)] - w[i]) / (2.0 * h))
+        .collect();
+    if !closed {
+        ax_mps2.push(ax_mps2[n - 2]);
+    }
+    let station_m = (0..n)
+        .scan(0.0, |station, i| {
+            let here = *station;
+            *station += segment_m.get(i).copied().unwrap_or(0.0);
+            Some(here)
+        })
+        .collect();
+    let steering_rad: Vec<f64> = curvature_1pm.iter().map(|k| car.wheelbase_m * k).collect();
+    Ok(LapProfile {
+        time_s,
+        station_m,
+        ax_mps2,
+        ay_mps2: curvature_1pm.iter().zip(w).map(|(k, w)| k * w).collect(),
+        beyond_lock: car
+            .max_steer_rad
+            .map_or(0, |lock| steering_rad.iter().filter(|s| s.abs() > lock).count()),
+        steering_rad,
+        segment_time_s: segment_m
+            .iter()
+            .enumerate()
+            .map(|(i, h)| 2.0 * h / (v_mps[i] + v_mps[next(i)]))
+            .collect(),
+        v_mps,
+    })
+}
+
+/// The section of the greatest curvature, where a car is slowest.
+pub(crate) fn slowest(curvature: &[f64]) -> usize {
+    (0..curvature.len())
+        .max_by(|&i, &j| curvature[i].abs().total_cmp(&curvature[j].abs()))
+        .unwrap_or(0)
+}

@@ -1,0 +1,360 @@
+use super::kernel::{Course, Wanted, lap_time, shape};
+use super::*;
+use crate::scalar::Dual;
+use crate::track::CrossSections;
+use crate::vehicle::{Envelope, EnvelopeRow};
+use glam::DVec2;
+use std::f64::consts::{PI, TAU};
+
+/// A ring road driven anticlockwise: the right edge is the outer one.
+fn ring(inner_m: f64, outer_m: f64, sections: usize) -> CrossSections {
+    let at = |radius: f64, i: usize| radius * DVec2::from_angle(TAU * i as f64 / sections as f64);
+    let length_m = PI * (inner_m + outer_m);
+    CrossSections {
+        name: "ring".to_owned(),
+        closed: true,
+        length_m,
+        station_m: (0..sections)
+            .map(|i| length_m * i as f64 / sections as f64)
+            .collect(),
+        right_m: (0..sections).map(|i| at(outer_m, i)).collect(),
+        left_m: (0..sections).map(|i| at(inner_m, i)).collect(),
+        sections: Vec::new(),
+        corners: Vec::new(),
+    }
+}
+
+fn car(limits: impl Fn(f64) -> [f64; 4], top_mps: f64) -> PointMass {
+    let rows = (1..=280).map(|i| {
+        let v_mps = top_mps * f64::from(i) / 280.0;
+        let [ay_mps2, ax_grip_mps2, ax_drive_mps2, drag_mps2] = limits(v_mps);
+        EnvelopeRow {
+            v_mps,
+            ay_mps2,
+            ax_grip_mps2,
+            ax_drive_mps2,
+            drag_mps2,
+        }
+    });
+    PointMass::new(Envelope::new("test car", rows.collect()).unwrap(), 2.6)
+}
+
+/// A GT car: 1245 kg, 330 kW, CdA 0.9 m^2, with downforce.
+fn gt_car() -> PointMass {
+    car(
+        |v| {
+            let share = (v * v - 625.0) / (4225.0 - 625.0);
+            let drive = 330e3 / (1245.0 * v);
+            [
+                15.0 + 3.0 * share,
+                14.0 + 4.0 * share,
+                drive,
+                0.5 * 1.2 * 0.9 / 1245.0 * v * v,
+            ]
+        },
+        70.0,
+    )
+}
+
+#[test]
+fn circles_have_the_length_and_curvature_of_their_polygons() {
+    let cuts = ring(590.0, 600.0, 361);
+    for (alpha, radius) in [(0.0, 600.0), (1.0, 590.0), (0.5, 595.0)] {
+        let found = geometry(&cuts.points(&vec![alpha; 361]), true);
+        let side = 2.0 * radius * (PI / 361.0).sin();
+        assert!((found.length_m - 361.0 * side).abs() < 1e-9, "{}", found.length_m);
+        assert!((found.length_squared_m2 - 361.0 * side * side).abs() < 1e-9 * 361.0 * side);
+        assert!(
+            found
+                .curvature_1pm
+                .iter()
+                .all(|k| (k * radius - 1.0).abs() < 1e-9)
+        );
+        assert!((found.gamma_1pm - 19.0 / radius).abs() < 1e-9);
+        let integral = 361.0 * (TAU / 361.0).powi(2) / side;
+        assert!((found.integral_kappa2_1pm - integral).abs() < 1e-9);
+    }
+}
+
+#[test]
+fn a_lap_at_constant_grip_takes_what_it_must() {
+    let car = car(|_| [12.0, 10.0, 5.0, 0.0], 100.0);
+    let table = car.table().unwrap();
+    let shape = geometry(&ring(590.0, 600.0, 361).points(&[0.5; 361]), true);
+    let lap = lap_profile(&car, &table, &shape.segment_m, &shape.curvature_1pm, 0.0).unwrap();
+    let speed = (12.0f64 * 595.0).sqrt();
+    assert!(
+        lap.v_mps.iter().all(|v| (v - speed).abs() < 1e-8 * speed),
+        "{}",
+        lap.v_mps[0]
+    );
+    assert!((lap.time_s - shape.length_m / speed).abs() < 1e-8 * lap.time_s);
+    assert!((lap.ay_mps2[0] - 12.0).abs() < 1e-7 && lap.ax_mps2[0].abs() < 1e-9);
+    assert!((lap.steering_rad[0] - 2.6 / 595.0).abs() < 1e-12);
+}
+
+#[test]
+fn a_straight_is_left_at_the_speed_of_constant_acceleration() {
+    let car = car(|_| [12.0, 10.0, 5.0, 0.0], 100.0);
+    let table = car.table().unwrap();
+    let points: Vec<DVec2> = (0..50).map(|i| DVec2::new(7.0 * f64::from(i), 3.0)).collect();
+    let shape = geometry(&points, false);
+    let lap = lap_profile(&car, &table, &shape.segment_m, &shape.curvature_1pm, 20.0).unwrap();
+    let distance = 7.0 * 49.0;
+    let speed = (400.0f64 + 2.0 * 5.0 * distance).sqrt();
+    assert!((lap.v_mps[49] - speed).abs() < 1e-9);
+    assert!((lap.time_s - (speed - 20.0) / 5.0).abs() < 1e-9);
+    assert!(lap.ax_mps2.iter().all(|a| (a - 5.0).abs() < 1e-9));
+    assert!((lap.elapsed_s()[49] - lap.time_s).abs() < 1e-12);
+}
+
+#[test]
+fn corner_speed_meets_the_lateral_limit_or_never_binds() {
+    let car = gt_car();
+    let table = car.table().unwrap();
+    for radius in [8.0, 20.0, 77.7, 150.0, 240.0, 260.0] {
+        let w = kernel::corner::<f64>(&table, 1.0 / radius);
+        let limit = car.envelope.at(w.sqrt()).ay_mps2;
+        // Half a table step bends by 1e-6 of the whole; the limits' own steps add as much.
+        assert!((w / radius - limit).abs() < 2e-4 * limit, "{radius}: {w}");
+    }
+    // Lateral grip at 70 m/s is 18.6 m/s^2, so that no bend wider than 264 m slows the car.
+    assert_eq!(kernel::corner::<f64>(&table, 1.0 / 300.0), 4900.0);
+    assert_eq!(kernel::corner::<f64>(&table, 0.0), 4900.0);
+    let locked = PointMass {
+        max_steer_rad: Some(0.1745),
+        ..car
+    };
+    let locked = locked.table().unwrap();
+    let at = |table: &LimitTable<f64>, radius: f64| kernel::corner::<f64>(table, 1.0 / radius);
+    assert_eq!(at(&table, 20.0), at(&locked, 20.0));
+    assert!(at(&locked, 10.0) < 0.3 * at(&table, 10.0));
+}
+
+#[test]
+fn other_exponents_bulge_the_ellipse() {
+    let table = |exponent| {
+        let car = PointMass {
+            ellipse_exponent: exponent,
+            ..gt_car()
+        };
+        car.table().unwrap()
+    };
+    let half = |exponent: f64| {
+        let table = table(exponent);
+        let brake = kernel::longitudinal::<f64>(&table, 900.0, 0.5 * 15.229 / 900.0)[1];
+        (brake - 0.5 * 1.2 * 0.9 / 1245.0 * 900.0) / 14.3056
+    };
+    for exponent in [1.0f64, 1.5, 2.0, 2.5] {
+        let expected = (1.0 - 0.5f64.powf(exponent)).powf(1.0 / exponent);
+        assert!(
+            (half(exponent) - expected).abs() < 1e-4,
+            "{exponent}: {}",
+            half(exponent)
+        );
+    }
+    let bad = PointMass {
+        ellipse_exponent: 0.5,
+        ..gt_car()
+    };
+    assert!(bad.table().unwrap_err().to_string().contains("ellipse_exponent"));
+}
+
+/// A wavy ring: corners of many radii.
+fn wavy(sections: usize) -> Vec<DVec2> {
+    (0..sections)
+        .map(|i| {
+            let angle = TAU * i as f64 / sections as f64;
+            let radius = 300.0 + 60.0 * (3.0 * angle).sin() + 25.0 * (8.0 * angle).cos();
+            radius * DVec2::from_angle(angle)
+        })
+        .collect()
+}
+
+#[test]
+fn a_closed_lap_does_not_depend_on_where_its_passes_start() {
+    let table = gt_car().table().unwrap();
+    let shape = geometry(&wavy(400), true);
+    let time = |start: usize| {
+        let mut course = Course {
+            length: shape.segment_m.clone(),
+            curvature: shape.curvature_1pm.iter().map(|k| k.abs()).collect(),
+            speed_squared: Vec::new(),
+        };
+        let time = lap_time::<f64>(&table, true, start, 0.0, &mut course);
+        (time, course.speed_squared)
+    };
+    let first = time(0);
+    assert!(first.0 > 20.0 && first.0 < 80.0);
+    for start in [1, 57, 200, 399] {
+        assert_eq!(time(start), first);
+    }
+}
+
+#[test]
+fn halving_the_grid_quarters_the_error() {
+    let car = gt_car();
+    let time = |sections| {
+        let line = FineLine::new(&wavy(sections), true, 1000.0, Some(&car), 0.0).unwrap();
+        line.lap_time_s().unwrap()
+    };
+    let reference = time(12_800);
+    let errors = [200, 400, 800].map(|n| (time(n) - reference).abs() / reference);
+    println!("{reference} s, relative errors {errors:?}");
+    // Second order would be a sixteenth; a first-order pass would stay above a quarter.
+    assert!(errors[0] < 1e-2 && errors[2] < errors[0] / 8.0, "{errors:?}");
+}
+
+#[test]
+fn duals_give_the_gradient_of_the_lap_time() {
+    let car = gt_car();
+    let table = car.table().unwrap();
+    let right = wavy(200);
+    let left: Vec<DVec2> = right.iter().map(|p| *p * 0.97).collect();
+    let cuts = CrossSections {
+        right_m: right,
+        left_m: left,
+        ..ring(290.0, 300.0, 200)
+    };
+    let way = Parametrisation::control_points(40);
+    let mut plan = LinePlan::of_cuts(&cuts.right_m, &cuts.left_m, true);
+    way.apply(&cuts, &mut plan).unwrap();
+    let wanted = Wanted {
+        integral: true,
+        lap: true,
+    };
+    let middle = vec![0.5; 40];
+    let at = |shift: f64| {
+        let mut variables = middle.clone();
+        variables[7] += shift;
+        let mut course = Course::default();
+        let sums = shape::<f64>(&plan, wanted, &variables, &mut course);
+        let time = lap_time::<f64>(&table, true, 0, 0.0, &mut course);
+        [sums.length, sums.integral, time]
+    };
+    let mut variables: Vec<Dual<1>> = middle.iter().map(|x| Dual::constant(*x)).collect();
+    variables[7] = Dual::variable(0.5, 0);
+    let mut course = Course::default();
+    let sums = shape(&plan, wanted, &variables, &mut course);
+    let time = lap_time(&table, true, 0, Dual::constant(0.0), &mut course);
+    let step = 1e-5;
+    let (plus, minus) = (at(step), at(-step));
+    for (i, found) in [sums.length, sums.integral, time].into_iter().enumerate() {
+        let expected = (plus[i] - minus[i]) / (2.0 * step);
+        assert!(
+            (found.gradient[0] - expected).abs() < 1e-4 * (1.0 + expected.abs()),
+            "{i}: {} and {expected}",
+            found.gradient[0]
+        );
+    }
+}
+
+#[test]
+fn control_points_give_lines_and_lines_control_points() {
+    let closed = ring(590.0, 600.0, 100);
+    let mut open = closed.clone();
+    open.closed = false;
+    for cuts in [&closed, &open] {
+        let way = Parametrisation::control_points(17);
+        let mut plan = LinePlan::of_cuts(&cuts.right_m, &cuts.left_m, cuts.closed);
+        way.apply(cuts, &mut plan).unwrap();
+        for row in &plan.rows {
+            assert!((row.weights.iter().sum::<f64>() - 1.0).abs() < 1e-12);
+            assert!(row.weights.iter().all(|w| *w >= 0.0));
+        }
+        let coefficients: Vec<f64> = (0..17).map(|i| 0.5 + 0.4 * f64::from(i).sin()).collect();
+        let alpha: Vec<f64> = plan
+            .rows
+            .iter()
+            .map(|row| kernel::alpha(row, plan.terms, &coefficients))
+            .collect();
+        let back = way.fit(cuts, &alpha).unwrap();
+        for (a, b) in back.iter().zip(&coefficients) {
+            assert!((a - b).abs() < 1e-6, "{a} {b}");
+        }
+        // Third differences of a cubic spline are small: it is smooth.
+        let rough = alpha
+            .windows(4)
+            .map(|a| (a[3] - 3.0 * a[2] + 3.0 * a[1] - a[0]).abs());
+        assert!(rough.fold(0.0, f64::max) < 0.02);
+
+        let some = way.with_free(vec![3, 16], coefficients.clone());
+        assert_eq!(some.variables(cuts)[1].name, "control_16");
+        some.apply(cuts, &mut plan).unwrap();
+        let variables = some.variables_of(&coefficients);
+        for (row, alpha) in plan.rows.iter().zip(&alpha) {
+            assert!((kernel::alpha(row, plan.terms, &variables) - alpha).abs() < 1e-12);
+        }
+    }
+    let ends = Parametrisation::control_points(9).with_fixed_ends(vec![0.25; 9]);
+    let mut plan = LinePlan::of_cuts(&open.right_m, &open.left_m, false);
+    ends.apply(&open, &mut plan).unwrap();
+    assert_eq!(kernel::alpha(&plan.rows[0], 4, &[1.0; 7]), 0.25);
+    assert!((kernel::alpha::<f64>(&plan.rows[99], 4, &[1.0; 7]) - 0.25).abs() < 1e-12);
+    for bad in [
+        Parametrisation::control_points(3),
+        Parametrisation::control_points(101),
+        Parametrisation::sections().with_free(vec![1, 1], vec![0.5; 100]),
+        Parametrisation::sections().with_free(vec![1], vec![0.5; 99]),
+    ] {
+        assert!(bad.apply(&open, &mut plan).is_err());
+    }
+}
+
+#[test]
+fn a_fine_line_knows_the_circle_that_its_points_lie_on() {
+    let points = ring(590.0, 600.0, 360).points(&[0.5; 360]);
+    let line = FineLine::new(&points, true, 1.0, None, 0.0).unwrap();
+    assert!((line.length_m - TAU * 595.0).abs() < 1e-4, "{}", line.length_m);
+    assert!(line.curvature_1pm.iter().all(|k| (k * 595.0 - 1.0).abs() < 1e-4));
+    assert!((line.integral_kappa2_1pm - TAU / 595.0).abs() < 1e-6);
+    assert!(line.segment_m.iter().all(|h| *h <= 1.0 + 1e-9));
+    assert_eq!(line.points_m.len(), line.segment_m.len());
+
+    let half: Vec<DVec2> = points[..181].to_vec();
+    let line = FineLine::new(&half, false, 1.0, None, 0.0).unwrap();
+    assert!((line.length_m - PI * 595.0).abs() < 1e-3, "{}", line.length_m);
+    assert_eq!(line.points_m.len(), line.segment_m.len() + 1);
+    assert!(line.curvature_1pm.iter().all(|k| (k * 595.0 - 1.0).abs() < 0.01));
+    assert!(FineLine::new(&points[..2], true, 1.0, None, 0.0).is_err());
+    assert!(FineLine::new(&[points[0], points[0]], false, 1.0, None, 0.0).is_err());
+}
+
+#[test]
+fn clearance_is_the_distance_to_the_edges() {
+    let cuts = ring(590.0, 600.0, 720);
+    for (alpha, expected, left) in [(0.5, 4.0, true), (0.9, 0.0, true), (0.02, -0.8, false)] {
+        let line = FineLine::new(&cuts.points(&[alpha; 720]), true, 1.0, None, 0.0).unwrap();
+        let found = check_line(&line, &cuts.right_m, &cuts.left_m, 2.0);
+        // The edges are polygons: at half a side they are 6 mm nearer the middle than the circle.
+        assert!((found.margin_m - expected).abs() < 0.008, "{found:?}");
+        assert!(found.left == left || alpha == 0.5);
+    }
+}
+
+/// The surveyed centreline, as far as the public database has it.
+#[test]
+fn the_surveyed_centreline_takes_what_others_found() {
+    let shared = std::env::var_os("LAPSWARM_SHARED").map_or_else(
+        || std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared"),
+        std::path::PathBuf::from,
+    );
+    let path = shared.join("data/tracks/Silverstone.csv");
+    let Ok(text) = std::fs::read_to_string(&path) else {
+        eprintln!("SKIPPED: no surveyed circuit at {}", path.display());
+        return;
+    };
+    let points: Vec<DVec2> = text
+        .lines()
+        .filter(|line| !line.starts_with('#'))
+        .map(|line| {
+            let mut fields = line.split(',').map(|f| f.trim().parse::<f64>().unwrap());
+            DVec2::new(fields.next().unwrap(), fields.next().unwrap())
+        })
+        .collect();
+    let line = FineLine::new(&points, true, 1.0, Some(&gt_car()), 0.0).unwrap();
+    let time = line.lap_time_s().unwrap();
+    println!("{time} s, {} m", line.length_m);
+    // A published minimum-time solution for this car has 146 s for the centreline.
+    assert!((time - 146.0).abs() < 1.5, "{time}");
+}

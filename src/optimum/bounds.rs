@@ -1,0 +1,108 @@
+//! Where a line may run.
+
+use super::conic::{Affine, ConicProgram};
+use super::geometry::LineMap;
+use crate::{Error, Result};
+
+/// Least and greatest value of each variable of a line, and of sums of them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Bounds {
+    /// Least values; minus infinity for none.
+    pub lower: Vec<f64>,
+    /// Greatest values; infinity for none.
+    pub upper: Vec<f64>,
+    /// Bounds of sums, as at points that several variables move.
+    pub rows: Vec<RowBound>,
+}
+
+/// Bounds of a weighted sum of variables.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RowBound {
+    /// Variables and weights.
+    pub terms: Vec<(usize, f64)>,
+    /// Least value.
+    pub lower: f64,
+    /// Greatest value.
+    pub upper: f64,
+}
+
+impl RowBound {
+    /// The sum at `x`.
+    pub fn at(&self, x: &[f64]) -> f64 {
+        self.terms.iter().map(|&(k, weight)| weight * x[k]).sum()
+    }
+}
+
+impl Bounds {
+    /// From 0, the right edge, to 1, the left one, everywhere.
+    pub fn road(variables: usize) -> Self {
+        Self {
+            lower: vec![0.0; variables],
+            upper: vec![1.0; variables],
+            rows: Vec::new(),
+        }
+    }
+
+    /// The same with variable `i` held at `value`, as at the ends of an open line.
+    pub fn holding(mut self, i: usize, value: f64) -> Self {
+        (self.lower[i], self.upper[i]) = (value, value);
+        self
+    }
+
+    /// `x` within the bounds of the variables, then drawn towards nought until the sums are within theirs too.
+    /// Nought must be within the sums' bounds, as it is for lines given by their offset from one on the road.
+    pub(super) fn inside(&self, x: &[f64]) -> Vec<f64> {
+        let boxed = x.iter().zip(&self.lower).zip(&self.upper);
+        let boxed: Vec<f64> = boxed.map(|((x, l), u)| x.clamp(*l, *u)).collect();
+        let share = self.rows.iter().fold(1.0f64, |share, row| {
+            let sum = row.at(&boxed);
+            let bound = if sum > 0.0 { row.upper } else { row.lower };
+            if sum.abs() > bound.abs() {
+                share.min(bound / sum)
+            } else {
+                share
+            }
+        });
+        boxed.iter().map(|x| x * share).collect()
+    }
+
+    /// Holds the sums within their bounds in a program for a step from `x`. Where rounding has left `x` outside, it may stay.
+    pub(super) fn add_rows(&self, program: &mut ConicProgram, x: &[f64]) {
+        for row in &self.rows {
+            let sum = row.at(x);
+            for (spare, sign) in [(sum - row.lower, 1.0), (row.upper - sum, -1.0)] {
+                let terms = row.terms.iter().map(|&(k, weight)| (k, sign * weight));
+                program.add_nonnegative(Affine {
+                    constant: spare.max(0.0),
+                    terms: terms.collect(),
+                });
+            }
+        }
+    }
+}
+
+pub(super) fn check(map: &LineMap, bounds: &Bounds) -> Result<()> {
+    let n = map.variables();
+    let place = bounds
+        .lower
+        .iter()
+        .zip(&bounds.upper)
+        .position(|(l, u)| !(l <= u));
+    if bounds.lower.len() != n || bounds.upper.len() != n || map.points() < 3 {
+        return Err(Error::input(
+            "the line",
+            "bounds",
+            format!("{} bounds and {} points", bounds.lower.len(), map.points()),
+            format!("{n} bounds and three points at least"),
+        ));
+    }
+    match place {
+        Some(i) => Err(Error::input(
+            "the line",
+            format!("bounds of variable {i}"),
+            format!("{} to {}", bounds.lower[i], bounds.upper[i]),
+            "a range",
+        )),
+        None => Ok(()),
+    }
+}

@@ -1,0 +1,285 @@
+//! Points of a line, its segments and curvature, and the derivatives of both in reverse.
+
+use super::bounds::{Bounds, RowBound};
+use crate::track::CrossSections;
+use glam::DVec2;
+
+/// The points of a line as a linear function of its variables: `point_j = origin_j + sum of reach_jk x_k`.
+///
+/// Everything that a line is commonly given by is of this form: its place on every cut, the controls of a
+/// B-spline, points that an interpolating spline goes through.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LineMap {
+    /// Whether the last point is followed by the first.
+    pub closed: bool,
+    variables: usize,
+    origin_m: Vec<DVec2>,
+    starts: Vec<usize>,
+    reach: Vec<(usize, DVec2)>,
+}
+
+impl LineMap {
+    /// From the origin of every point (m) and its reach (m) for each variable that moves it.
+    pub fn new(
+        closed: bool,
+        variables: usize,
+        points: impl IntoIterator<Item = (DVec2, Vec<(usize, DVec2)>)>,
+    ) -> Self {
+        let mut map = Self {
+            closed,
+            variables,
+            origin_m: Vec::new(),
+            starts: vec![0],
+            reach: Vec::new(),
+        };
+        for (origin, reach) in points {
+            map.origin_m.push(origin);
+            map.reach.extend(reach);
+            map.starts.push(map.reach.len());
+        }
+        map
+    }
+
+    /// One variable for each cut: the line's `alpha` there.
+    pub fn at_every_cut(cuts: &CrossSections) -> Self {
+        Self::of_shares(cuts, cuts.len(), |i| vec![(i, 1.0)])
+    }
+
+    /// `alpha` as a cubic B-spline with `controls` evenly spaced over the cuts' stations; on an open circuit the outer
+    /// controls lie at the ends and are doubled, so that a straight row of controls gives a straight line.
+    pub fn b_spline(cuts: &CrossSections, controls: usize) -> Self {
+        Self::of_shares(cuts, controls, |i| spline_shares(cuts, controls, i))
+    }
+
+    /// A line `base` (its `alpha` on every cut) moved along the cuts by a cubic B-spline with `controls` (m, to the left),
+    /// and the bounds that keep it on the road at every cut. Where the base is smooth, all such lines are, however jagged
+    /// the edges; which `alpha` as a spline cannot say.
+    pub fn spline_about(cuts: &CrossSections, base: &[f64], controls: usize) -> (Self, Bounds) {
+        let points = cuts.points(base);
+        let across = |i: usize| (cuts.left_m[i] - cuts.right_m[i]).normalize();
+        let reaches = (0..cuts.len()).map(|i| {
+            let reach = spline_shares(cuts, controls, i).into_iter();
+            (
+                points[i],
+                reach.map(|(k, share)| (k, share * across(i))).collect(),
+            )
+        });
+        let rows = (0..cuts.len()).map(|i| RowBound {
+            terms: spline_shares(cuts, controls, i),
+            lower: -points[i].distance(cuts.right_m[i]),
+            upper: points[i].distance(cuts.left_m[i]),
+        });
+        let bounds = Bounds {
+            lower: vec![f64::NEG_INFINITY; controls],
+            upper: vec![f64::INFINITY; controls],
+            rows: rows.collect(),
+        };
+        (Self::new(cuts.closed, controls, reaches), bounds)
+    }
+
+    /// `alpha` on every cut a sum of shares of the variables.
+    fn of_shares(
+        cuts: &CrossSections,
+        variables: usize,
+        shares: impl Fn(usize) -> Vec<(usize, f64)>,
+    ) -> Self {
+        let points = (0..cuts.len()).map(|i| {
+            let across = cuts.left_m[i] - cuts.right_m[i];
+            let reach = shares(i).into_iter().map(|(k, share)| (k, share * across));
+            (cuts.right_m[i], reach.collect())
+        });
+        Self::new(cuts.closed, variables, points)
+    }
+
+    /// Number of variables.
+    pub fn variables(&self) -> usize {
+        self.variables
+    }
+
+    /// Number of points.
+    pub fn points(&self) -> usize {
+        self.origin_m.len()
+    }
+
+    /// What moves point `j`: variables and reaches (m).
+    pub fn reach(&self, j: usize) -> &[(usize, DVec2)] {
+        &self.reach[self.starts[j]..self.starts[j + 1]]
+    }
+
+    /// The points (m) of line `x`.
+    pub fn line(&self, x: &[f64]) -> Vec<DVec2> {
+        let point = |j: usize| {
+            let moved = self.reach(j).iter().map(|&(k, reach)| reach * x[k]);
+            moved.fold(self.origin_m[j], |sum, step| sum + step)
+        };
+        (0..self.points()).map(point).collect()
+    }
+
+    /// Carries derivatives with respect to the points back to the variables.
+    pub(super) fn pull_back(&self, by_point: &[DVec2]) -> Vec<f64> {
+        let mut by_x = vec![0.0; self.variables];
+        for (j, bar) in by_point.iter().enumerate() {
+            for &(k, reach) in self.reach(j) {
+                by_x[k] += reach.dot(*bar);
+            }
+        }
+        by_x
+    }
+}
+
+/// What each of `controls` evenly spaced controls of a cubic B-spline counts at cut `i`.
+fn spline_shares(cuts: &CrossSections, controls: usize, i: usize) -> Vec<(usize, f64)> {
+    let last = controls as isize - 1;
+    let spans = if cuts.closed { controls as f64 } else { last as f64 };
+    let place = cuts.station_m[i] / cuts.length_m * spans;
+    let t = place - place.floor();
+    let weights = [
+        (1.0 - t).powi(3) / 6.0,
+        (4.0 - 6.0 * t * t + 3.0 * t.powi(3)) / 6.0,
+        (1.0 + 3.0 * t + 3.0 * t * t - 3.0 * t.powi(3)) / 6.0,
+        t.powi(3) / 6.0,
+    ];
+    let mut row: Vec<(usize, f64)> = Vec::with_capacity(4);
+    for (weight, offset) in weights.into_iter().zip(-1..) {
+        let k = place.floor() as isize + offset;
+        let k = if cuts.closed {
+            k.rem_euclid(last + 1)
+        } else {
+            k.clamp(0, last)
+        } as usize;
+        match row.iter_mut().find(|(other, _)| *other == k) {
+            Some((_, sum)) => *sum += weight,
+            None => row.push((k, weight)),
+        }
+    }
+    row
+}
+
+/// Segments and curvature of a line.
+#[derive(Clone, Debug)]
+pub(super) struct Shape {
+    pub closed: bool,
+    /// From each point to the next (m); one fewer than points on an open line.
+    pub step_m: Vec<DVec2>,
+    /// Lengths of the segments (m).
+    pub length_m: Vec<f64>,
+    /// Angle turned through at each point (rad), left positive; nought at the ends of an open line.
+    pub turn_rad: Vec<f64>,
+    /// Half the length of the segments on both sides of each point (m).
+    pub spacing_m: Vec<f64>,
+    /// Turn over spacing (1/m).
+    pub curvature_1pm: Vec<f64>,
+}
+
+impl Shape {
+    pub fn of(points: &[DVec2], closed: bool) -> Self {
+        let n = points.len();
+        let segments = if closed { n } else { n.saturating_sub(1) };
+        let step_m: Vec<DVec2> = (0..segments).map(|i| points[(i + 1) % n] - points[i]).collect();
+        let length_m: Vec<f64> = step_m.iter().map(|d| d.length()).collect();
+        let mut shape = Self {
+            closed,
+            length_m,
+            turn_rad: vec![0.0; n],
+            spacing_m: vec![0.0; n],
+            curvature_1pm: vec![0.0; n],
+            step_m,
+        };
+        for i in 0..n {
+            let (before, after) = shape.neighbours(i);
+            let lengths = [before, after].into_iter().flatten().map(|s| shape.length_m[s]);
+            shape.spacing_m[i] = 0.5 * lengths.sum::<f64>();
+            if let (Some(before), Some(after)) = (before, after) {
+                let (d, e) = (shape.step_m[before], shape.step_m[after]);
+                shape.turn_rad[i] = d.perp_dot(e).atan2(d.dot(e));
+                shape.curvature_1pm[i] = shape.turn_rad[i] / shape.spacing_m[i];
+            }
+        }
+        shape
+    }
+
+    /// The segments before and after point `i`.
+    pub fn neighbours(&self, i: usize) -> (Option<usize>, Option<usize>) {
+        let segments = self.step_m.len();
+        let before = if i > 0 {
+            Some(i - 1)
+        } else {
+            self.closed.then(|| segments - 1)
+        };
+        (before, (i < segments).then_some(i))
+    }
+
+    /// Whether the line has two points in one place, where its heading is undefined.
+    pub fn stands_still(&self) -> bool {
+        self.length_m.iter().any(|length| !(*length > 0.0))
+    }
+
+    /// Adds the change of segment `s` in `direction`, times the direction's length, by the variables to `terms`.
+    pub fn add_step(map: &LineMap, s: usize, direction: DVec2, terms: &mut Vec<(usize, f64)>) {
+        for (point, bar) in [((s + 1) % map.points(), direction), (s, -direction)] {
+            terms.extend(map.reach(point).iter().map(|&(k, reach)| (k, reach.dot(bar))));
+        }
+    }
+
+    /// Adds `scale` times the change of segment `s`'s length.
+    pub fn add_length(&self, map: &LineMap, s: usize, scale: f64, terms: &mut Vec<(usize, f64)>) {
+        Self::add_step(map, s, self.step_m[s] * (scale / self.length_m[s]), terms);
+    }
+
+    /// Adds `scale` times the change of segment `s`'s heading.
+    pub fn add_heading(&self, map: &LineMap, s: usize, scale: f64, terms: &mut Vec<(usize, f64)>) {
+        let across = self.step_m[s].perp();
+        Self::add_step(map, s, across * (scale / self.length_m[s].powi(2)), terms);
+    }
+
+    /// Adds `scale` times the change of the turn at point `i`; nought at the ends of an open line.
+    pub fn add_turn(&self, map: &LineMap, i: usize, scale: f64, terms: &mut Vec<(usize, f64)>) {
+        if let (Some(before), Some(after)) = self.neighbours(i) {
+            self.add_heading(map, after, scale, terms);
+            self.add_heading(map, before, -scale, terms);
+        }
+    }
+
+    /// Adds `scale` times the change of the curvature at point `i`.
+    pub fn add_curvature(&self, map: &LineMap, i: usize, scale: f64, terms: &mut Vec<(usize, f64)>) {
+        let spacing = self.spacing_m[i];
+        self.add_turn(map, i, scale / spacing, terms);
+        if let (Some(before), Some(after)) = self.neighbours(i) {
+            for segment in [before, after] {
+                self.add_length(
+                    map,
+                    segment,
+                    -0.5 * scale * self.curvature_1pm[i] / spacing,
+                    terms,
+                );
+            }
+        }
+    }
+
+    /// Derivatives with respect to the points, from those with respect to segment lengths and curvature.
+    pub fn pull_back(&self, by_length: &[f64], by_curvature: &[f64]) -> Vec<DVec2> {
+        let n = self.turn_rad.len();
+        let mut by_length = by_length.to_vec();
+        let mut by_heading = vec![0.0; self.step_m.len()];
+        for i in 0..n {
+            if let (Some(before), Some(after)) = self.neighbours(i) {
+                let by_turn = by_curvature[i] / self.spacing_m[i];
+                by_heading[after] += by_turn;
+                by_heading[before] -= by_turn;
+                let by_spacing = -by_turn * self.curvature_1pm[i];
+                by_length[after] += 0.5 * by_spacing;
+                by_length[before] += 0.5 * by_spacing;
+            }
+        }
+        let mut by_point = vec![DVec2::ZERO; n];
+        for (s, step) in self.step_m.iter().enumerate() {
+            let length = self.length_m[s];
+            // A step grows along itself and turns across itself.
+            let along = *step * (by_length[s] / length);
+            let across = step.perp() * (by_heading[s] / (length * length));
+            by_point[(s + 1) % n] += along + across;
+            by_point[s] -= along + across;
+        }
+        by_point
+    }
+}

@@ -1,0 +1,403 @@
+//! The quasi-steady lap of a point mass on a fixed line, with its derivatives in reverse.
+//!
+//! On a fixed line the state is one number, `e = v^2`, and both the most that it may rise and the most that it may fall
+//! over a segment are functions of `e` at the segment's other end. The continuous problem `de/ds <= 2 a_drive(e, s)`,
+//! `de/ds >= -2 a_brake(e, s)`, `e <= corner(s)` therefore has a greatest solution (solutions of a scalar differential equation
+//! do not cross), greatest at every station at once; since time is a falling function of `e`, it is the fastest, and
+//! one pass each way finds it. What is left to optimise is the line alone.
+//! Sources: Bobrow, Dubowsky, Gibson, *Time-optimal control of robotic manipulators along specified paths*, IJRR 4 (1985);
+//! Kapania, Subosits, Gerdes, *A sequential two-step algorithm for fast generation of vehicle racing trajectories*, J. Dyn.
+//! Sys. Meas. Control 138 (2016).
+
+use super::geometry::Shape;
+
+/// A quantity at one speed, and what it changes by for each m/s.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Slope {
+    /// The quantity.
+    pub value: f64,
+    /// Its derivative by speed (m/s).
+    pub by_speed: f64,
+}
+
+/// What a point mass can do at one speed, all in m/s^2.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Grip {
+    /// Most that the tyres give sideways.
+    pub lateral: Slope,
+    /// Most that the tyres give lengthways.
+    pub longitudinal: Slope,
+    /// Most that the drive train asks of the tyres.
+    pub drive: Slope,
+    /// Deceleration by drag, which is no tyre force.
+    pub drag: Slope,
+}
+
+/// Limits of a point mass, by speed.
+pub trait Limits: Sync {
+    /// The limits at a speed (m/s).
+    fn at(&self, speed_mps: f64) -> Grip;
+    /// The speed that is never exceeded (m/s).
+    fn top_speed_mps(&self) -> f64;
+}
+
+/// Which way a segment is driven: out of a corner, or, backwards, into one.
+#[derive(Clone, Copy, PartialEq)]
+enum Pass {
+    Drive,
+    Brake,
+}
+
+/// Where `e` of a node came from, with the derivatives of a segment's end by its start, curvature and length.
+#[derive(Clone, Copy, Debug)]
+enum Origin {
+    /// The node's own limit (of a corner, or what the drive pass left).
+    Own,
+    /// The neighbour across a segment.
+    Neighbour {
+        by_start: f64,
+        by_curvature: f64,
+        by_length: f64,
+    },
+}
+
+/// Speeds along a line, and time.
+#[derive(Clone, Debug)]
+pub(super) struct Lap {
+    pub time_s: f64,
+    /// Speed squared at the points.
+    pub square: Vec<f64>,
+    corner_by_curvature: Vec<f64>,
+    drive: Vec<(usize, Origin)>,
+    brake: Vec<(usize, Origin)>,
+}
+
+/// Newton's steps, with halving to fall back on, of a segment. Halving alone needs 52 for every bit of an `f64`.
+const MOST_STEPS: usize = 60;
+/// Relative accuracy of `e` at which Newton's steps end.
+const ACCURACY: f64 = 1e-12;
+
+impl Lap {
+    /// Drives `shape` as fast as `limits` allow, from `start_mps` on an open line.
+    pub fn of(shape: &Shape, limits: &dyn Limits, start_mps: f64) -> Self {
+        let n = shape.curvature_1pm.len();
+        let (mut corner, mut corner_by_curvature) = (Vec::with_capacity(n), Vec::with_capacity(n));
+        for curvature in &shape.curvature_1pm {
+            let (square, slope) = corner_square(limits, *curvature);
+            corner.push(square);
+            corner_by_curvature.push(slope);
+        }
+        if !shape.closed {
+            let start = start_mps * start_mps;
+            if start < corner[0] {
+                corner[0] = start;
+                corner_by_curvature[0] = 0.0;
+            }
+        }
+        let (after_drive, drive) = if shape.closed {
+            closed_drive(shape, limits, &corner)
+        } else {
+            drive_pass(shape, limits, &corner, 0, n)
+        };
+        let (square, brake) = brake_pass(shape, limits, &after_drive);
+        let speed: Vec<f64> = square.iter().map(|e| e.sqrt()).collect();
+        let segments = shape.length_m.iter().enumerate();
+        let time_s = segments
+            .map(|(s, h)| 2.0 * h / (speed[s] + speed[(s + 1) % n]))
+            .sum();
+        Self {
+            time_s,
+            square,
+            corner_by_curvature,
+            drive,
+            brake,
+        }
+    }
+
+    /// Derivatives of the time by segment lengths (s/m) and by curvature (s m).
+    pub fn gradient(&self, shape: &Shape) -> (Vec<f64>, Vec<f64>) {
+        let n = self.square.len();
+        let speed: Vec<f64> = self.square.iter().map(|e| e.sqrt()).collect();
+        let mut by_length = vec![0.0; shape.length_m.len()];
+        let mut by_curvature = vec![0.0; n];
+        let mut by_square = vec![0.0; n];
+        for (s, h) in shape.length_m.iter().enumerate() {
+            let next = (s + 1) % n;
+            let sum = speed[s] + speed[next];
+            by_length[s] += 2.0 / sum;
+            for node in [s, next] {
+                if speed[node] > 0.0 {
+                    by_square[node] -= h / (sum * sum * speed[node]);
+                }
+            }
+        }
+        let mut by_drive = vec![0.0; n];
+        for &(node, origin) in self.brake.iter().rev() {
+            let bar = std::mem::take(&mut by_square[node]);
+            match origin {
+                Origin::Own => by_drive[node] += bar,
+                Origin::Neighbour {
+                    by_start,
+                    by_curvature: c,
+                    by_length: l,
+                } => {
+                    let next = (node + 1) % n;
+                    by_square[next] += bar * by_start;
+                    by_curvature[node] += 0.5 * bar * c;
+                    by_curvature[next] += 0.5 * bar * c;
+                    by_length[node] += bar * l;
+                }
+            }
+        }
+        for &(node, origin) in self.drive.iter().rev() {
+            let bar = std::mem::take(&mut by_drive[node]);
+            match origin {
+                Origin::Own => by_curvature[node] += bar * self.corner_by_curvature[node],
+                Origin::Neighbour {
+                    by_start,
+                    by_curvature: c,
+                    by_length: l,
+                } => {
+                    let previous = (node + n - 1) % n;
+                    by_drive[previous] += bar * by_start;
+                    by_curvature[node] += 0.5 * bar * c;
+                    by_curvature[previous] += 0.5 * bar * c;
+                    by_length[previous] += bar * l;
+                }
+            }
+        }
+        (by_length, by_curvature)
+    }
+}
+
+/// The greatest `e` that a curvature (1/m) allows, and its derivative by curvature.
+fn corner_square(limits: &dyn Limits, curvature_1pm: f64) -> (f64, f64) {
+    let k = curvature_1pm.abs();
+    let top = limits.top_speed_mps();
+    let mut high = top * top;
+    // Grip less need, falling through nought at the corner's speed.
+    let spare = |e: f64| {
+        let v = e.sqrt();
+        let lateral = limits.at(v).lateral;
+        (lateral.value - k * e, 0.5 * lateral.by_speed / v - k)
+    };
+    if spare(high).0 >= 0.0 {
+        return (high, 0.0);
+    }
+    let mut low = 0.0;
+    let mut e = (limits.at(0.5 * top).lateral.value / k).min(high);
+    for _ in 0..MOST_STEPS {
+        let (value, slope) = spare(e);
+        if value > 0.0 {
+            low = e;
+        } else {
+            high = e;
+        }
+        let newton = e - value / slope;
+        let next = if newton > low && newton < high {
+            newton
+        } else {
+            0.5 * (low + high)
+        };
+        let done = (next - e).abs() <= ACCURACY * e;
+        e = next;
+        if done {
+            break;
+        }
+    }
+    (e, curvature_1pm.signum() * e / spare(e).1)
+}
+
+/// Acceleration in the direction of a pass, at speed squared `e`, times `s`, where `s` is the share of longitudinal
+/// grip left beside the lateral, and derivatives likewise times `s`, which keeps them finite where no grip is left.
+struct Push {
+    share: f64,
+    value: f64,
+    by_square: f64,
+    by_curvature: f64,
+}
+
+fn push(limits: &dyn Limits, pass: Pass, e: f64, curvature_1pm: f64) -> Push {
+    let v = e.sqrt().max(f64::MIN_POSITIVE);
+    let per_square = 0.5 / v;
+    let grip = limits.at(v);
+    let lateral = grip.lateral.value;
+    let used = curvature_1pm * e / lateral;
+    let left = 1.0 - used * used;
+    let (sign, drag) = match pass {
+        Pass::Drive => (-1.0, grip.drag),
+        Pass::Brake => (1.0, grip.drag),
+    };
+    let (drag_value, drag_slope) = (sign * drag.value, sign * drag.by_speed * per_square);
+    let share = left.max(0.0).sqrt();
+    let tyre = grip.longitudinal.value * share;
+    if pass == Pass::Drive && grip.drive.value < tyre {
+        return Push {
+            share: 1.0,
+            value: grip.drive.value + drag_value,
+            by_square: grip.drive.by_speed * per_square + drag_slope,
+            by_curvature: 0.0,
+        };
+    }
+    if left <= 0.0 {
+        // Beyond the tyres' limit: coasting. Over in O(h) round a corner's slowest point, never on the fastest line's flank.
+        return Push {
+            share: 1.0,
+            value: drag_value,
+            by_square: drag_slope,
+            by_curvature: 0.0,
+        };
+    }
+    let used_by_square = curvature_1pm / lateral - used * grip.lateral.by_speed * per_square / lateral;
+    let used_by_curvature = e / lateral;
+    let pull = grip.longitudinal.value * used;
+    let along = grip.longitudinal.by_speed * per_square * left;
+    Push {
+        share,
+        value: tyre + drag_value,
+        by_square: along + share * drag_slope - pull * used_by_square,
+        by_curvature: -pull * used_by_curvature,
+    }
+}
+
+/// The middle of a segment if limits did not change over it: where a parabola meets the ellipse.
+fn guess(limits: &dyn Limits, pass: Pass, start: f64, curvature_1pm: f64, h: f64) -> f64 {
+    let grip = limits.at(start.sqrt().max(f64::MIN_POSITIVE));
+    let drag = match pass {
+        Pass::Drive => -h * grip.drag.value,
+        Pass::Brake => h * grip.drag.value,
+    };
+    let coast = start + drag;
+    let (reach, bend) = (h * grip.longitudinal.value, curvature_1pm / grip.lateral.value);
+    let (reach2, bend2) = (reach * reach, bend * bend);
+    let left = 1.0 - bend2 * coast * coast;
+    if left <= 0.0 {
+        return coast;
+    }
+    let tyre = (coast + reach * (left + reach2 * bend2).sqrt()) / (1.0 + reach2 * bend2);
+    match pass {
+        Pass::Drive => tyre.min(coast + h * grip.drive.value),
+        Pass::Brake => tyre,
+    }
+}
+
+/// The `e` that a pass reaches from `start` over one segment, by the implicit midpoint rule: the limit is that at the
+/// middle, `e_m = start + h a(e_m)`, which is of second order and, the limit falling with speed, never unstable.
+fn across(limits: &dyn Limits, pass: Pass, start: f64, curvature_1pm: f64, h: f64) -> (f64, Origin) {
+    let first = push(limits, pass, start, curvature_1pm);
+    // No limit rises so fast with e that h times its slope passes one half, so the middle lies within twice Euler's step.
+    let reach = 2.0 * h * first.value;
+    let (mut low, mut high) = ((start + reach.min(0.0)).max(0.0), start + reach.max(0.0));
+    let mut e = guess(limits, pass, start, curvature_1pm, h).clamp(low, high);
+    let mut p = push(limits, pass, e, curvature_1pm);
+    for _ in 0..MOST_STEPS {
+        let excess = e - start - h * p.value;
+        if excess <= 0.0 {
+            low = e;
+        } else {
+            high = e;
+        }
+        let newton = e - p.share * excess / (p.share - h * p.by_square);
+        if (newton - e).abs() <= ACCURACY * e {
+            break;
+        }
+        e = if newton > low && newton < high {
+            newton
+        } else {
+            0.5 * (low + high)
+        };
+        p = push(limits, pass, e, curvature_1pm);
+    }
+    let gain = p.share / (p.share - h * p.by_square);
+    let by_curvature = h * p.by_curvature / (p.share - h * p.by_square);
+    let origin = Origin::Neighbour {
+        by_start: 2.0 * gain - 1.0,
+        by_curvature: 2.0 * by_curvature,
+        by_length: 2.0 * gain * p.value,
+    };
+    ((2.0 * e - start).max(0.0), origin)
+}
+
+fn middle_curvature(shape: &Shape, segment: usize) -> f64 {
+    let k = &shape.curvature_1pm;
+    0.5 * (k[segment] + k[(segment + 1) % k.len()])
+}
+
+type Passed = (Vec<f64>, Vec<(usize, Origin)>);
+
+/// Drives `count` nodes from `first` on, which has its corner's speed.
+fn drive_pass(shape: &Shape, limits: &dyn Limits, corner: &[f64], first: usize, count: usize) -> Passed {
+    let n = corner.len();
+    let mut square = corner.to_vec();
+    let mut origins = vec![(first, Origin::Own)];
+    for step in 1..count {
+        let (previous, node) = ((first + step - 1) % n, (first + step) % n);
+        let curvature = middle_curvature(shape, previous);
+        let (reached, origin) = across(
+            limits,
+            Pass::Drive,
+            square[previous],
+            curvature,
+            shape.length_m[previous],
+        );
+        let own = reached >= corner[node];
+        square[node] = if own { corner[node] } else { reached };
+        origins.push((node, if own { Origin::Own } else { origin }));
+    }
+    (square, origins)
+}
+
+/// The drive pass of a closed lap. It starts at a node whose corner's speed the car reaches again a lap later; drag may keep
+/// it from that at the slowest corner, so another is tried, and where there is none (a circle) two laps are driven.
+fn closed_drive(shape: &Shape, limits: &dyn Limits, corner: &[f64]) -> Passed {
+    let n = corner.len();
+    let mut first = (0..n)
+        .min_by(|a, b| corner[*a].total_cmp(&corner[*b]))
+        .unwrap_or(0);
+    for _ in 0..3 {
+        let passed = drive_pass(shape, limits, corner, first, n);
+        let last = (first + n - 1) % n;
+        let curvature = middle_curvature(shape, last);
+        let (closing, _) = across(
+            limits,
+            Pass::Drive,
+            passed.0[last],
+            curvature,
+            shape.length_m[last],
+        );
+        if closing >= corner[first] {
+            return passed;
+        }
+        let own = passed
+            .1
+            .iter()
+            .skip(1)
+            .rfind(|(_, origin)| matches!(origin, Origin::Own));
+        match own {
+            Some(&(node, _)) => first = node,
+            None => break,
+        }
+    }
+    drive_pass(shape, limits, corner, first, 2 * n)
+}
+
+/// Brakes for what the drive pass left, backwards from its slowest node (whose speed is below all that could demand less)
+/// on a closed line and from the end of an open one.
+fn brake_pass(shape: &Shape, limits: &dyn Limits, after_drive: &[f64]) -> Passed {
+    let n = after_drive.len();
+    let slowest = (0..n)
+        .min_by(|a, b| after_drive[*a].total_cmp(&after_drive[*b]))
+        .unwrap_or(0);
+    let last = if shape.closed { slowest } else { n - 1 };
+    let mut square = after_drive.to_vec();
+    let mut origins = vec![(last, Origin::Own)];
+    for step in 1..n {
+        let (next, node) = ((last + n + 1 - step) % n, (last + n - step) % n);
+        let curvature = middle_curvature(shape, node);
+        let (reached, origin) = across(limits, Pass::Brake, square[next], curvature, shape.length_m[node]);
+        let own = reached >= after_drive[node];
+        square[node] = if own { after_drive[node] } else { reached };
+        origins.push((node, if own { Origin::Own } else { origin }));
+    }
+    (square, origins)
+}

@@ -1,0 +1,68 @@
+//! The limits of a [`PointMass`] as the optima use them.
+
+use super::lap::{Grip, Limits, Slope};
+use crate::line::PointMass;
+use crate::vehicle::EnvelopeRow;
+use crate::{Error, Result};
+
+/// Limits of a point mass, linear in speed between the rows of its envelope.
+///
+/// The steering lock is left out: it would make corners that the car cannot take slow, which no fast line has.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PointMassLimits {
+    rows: Vec<EnvelopeRow>,
+}
+
+impl PointMassLimits {
+    /// Those of `car`.
+    ///
+    /// # Errors
+    /// [`Error::Input`] if its settings cannot be, or for a friction ellipse whose exponent is not 2: the solvers know no
+    /// other.
+    pub fn new(car: &PointMass) -> Result<Self> {
+        car.check()?;
+        if car.ellipse_exponent != 2.0 {
+            return Err(Error::input(
+                car.envelope.name(),
+                "ellipse_exponent",
+                car.ellipse_exponent.to_string(),
+                "2 for an exact optimum",
+            ));
+        }
+        Ok(Self {
+            rows: car.envelope.rows().to_vec(),
+        })
+    }
+}
+
+impl Limits for PointMassLimits {
+    fn at(&self, v_mps: f64) -> Grip {
+        let after = self.rows.partition_point(|row| row.v_mps <= v_mps);
+        let (low, high) = (
+            self.rows[after.saturating_sub(1)],
+            self.rows[after.min(self.rows.len() - 1)],
+        );
+        let span = high.v_mps - low.v_mps;
+        let between = |figure: fn(&EnvelopeRow) -> f64| {
+            let by_speed = if span > 0.0 {
+                (figure(&high) - figure(&low)) / span
+            } else {
+                0.0
+            };
+            Slope {
+                value: figure(&low) + by_speed * (v_mps - low.v_mps).max(0.0),
+                by_speed,
+            }
+        };
+        Grip {
+            lateral: between(|row| row.ay_mps2),
+            longitudinal: between(|row| row.ax_grip_mps2),
+            drive: between(|row| row.ax_drive_mps2),
+            drag: between(|row| row.drag_mps2),
+        }
+    }
+
+    fn top_speed_mps(&self) -> f64 {
+        self.rows.last().map_or(0.0, |row| row.v_mps)
+    }
+}

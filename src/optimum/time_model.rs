@@ -1,0 +1,142 @@
+//! Lap time as a step of line and speeds sees it: the limits about a lap, and the time with its second derivative.
+
+use super::conic::{Affine, ConicProgram};
+use super::geometry::{LineMap, Shape};
+use super::lap::Limits;
+
+/// Least relative change of a squared speed in a step: a car does not stop.
+const LEAST_CHANGE: f64 = -0.9;
+
+/// Adds the time, times `weight`, of the lap with squared speeds `squares` to a program whose variables so far are changes
+/// of the line's; relative changes of the squared speeds follow them. Tyres are held within the ellipse at the middle of each
+/// segment, corner speeds at the points, as the lap has it.
+pub(super) fn add_time(
+    program: &mut ConicProgram,
+    map: &LineMap,
+    limits: &dyn Limits,
+    shape: &Shape,
+    squares: &[f64],
+    weight: f64,
+    caution: f64,
+) {
+    let n = map.points();
+    let speed: Vec<f64> = squares.iter().map(|e| e.sqrt()).collect();
+    let top = limits.top_speed_mps().powi(2);
+    let bounds = squares.iter().enumerate().map(|(i, e)| {
+        // The start of an open line is given, and so is a standstill.
+        let held = *e <= 0.0 || (!map.closed && i == 0);
+        if held {
+            (0.0, 0.0)
+        } else {
+            (LEAST_CHANGE, (top / e - 1.0).max(0.0))
+        }
+    });
+    let first = program.add_variables(bounds);
+    let square = |i: usize| first + i;
+    for (s, h) in shape.length_m.iter().enumerate() {
+        let next = (s + 1) % n;
+        let sum = speed[s] + speed[next];
+        let mut by_length = Vec::new();
+        shape.add_length(map, s, 2.0 * weight / sum, &mut by_length);
+        for (k, slope) in by_length {
+            program.add_linear(k, slope);
+        }
+        // dT/de = -h/(S^2 v); half of d2T/de2 is the squares' sum.
+        let both = (0.5 * weight * h / sum.powi(3)).sqrt();
+        let mut terms = Vec::new();
+        for i in [s, next].into_iter().filter(|i| speed[*i] > 0.0) {
+            program.add_linear(square(i), -weight * h * speed[i] / (sum * sum));
+            terms.push((square(i), both * speed[i]));
+            let own = 0.5 * (weight * h * speed[i]).sqrt() / sum;
+            program.add_square(Affine::change(vec![(square(i), own)]));
+        }
+        program.add_square(Affine::change(terms));
+    }
+    for s in 0..shape.length_m.len() {
+        add_segment(program, map, limits, shape, squares, (first, s));
+    }
+    for i in 0..n {
+        let grip = limits.at(speed[i].max(f64::MIN_POSITIVE)).lateral;
+        let used = shape.curvature_1pm[i] * squares[i] / grip.value;
+        let by_square = used * (1.0 - 0.5 * speed[i] * grip.by_speed / grip.value);
+        // What a linear model of grip leaves out is the product of the relative changes of curvature and speed squared, and
+        // it costs at most half the time spent here times that product; of which the squares are a bound.
+        let time = weight * shape.spacing_m[i] / speed[i].max(1.0);
+        let caution = (0.25 * caution * time).sqrt();
+        let mut bend = Vec::new();
+        shape.add_curvature(map, i, caution * squares[i] / grip.value, &mut bend);
+        program.add_square(Affine::change(bend));
+        program.add_square(Affine::change(vec![(square(i), caution)]));
+        // To either side: on a straight a step may bend the line both ways.
+        for sign in [1.0, -1.0] {
+            let mut terms = vec![(square(i), -sign * by_square)];
+            shape.add_curvature(map, i, -sign * squares[i] / grip.value, &mut terms);
+            let constant = (1.0 - sign * used).max(0.0);
+            program.add_nonnegative(Affine { constant, terms }.merged());
+        }
+    }
+}
+
+/// Keeps the tyres of segment `s` within the ellipse and the drive train within its power; variable `first` is the change of
+/// the first point's squared speed.
+fn add_segment(
+    program: &mut ConicProgram,
+    map: &LineMap,
+    limits: &dyn Limits,
+    shape: &Shape,
+    squares: &[f64],
+    (first, s): (usize, usize),
+) {
+    let next = (s + 1) % map.points();
+    let (e0, e1, h) = (squares[s], squares[next], shape.length_m[s]);
+    let middle = 0.5 * (e0 + e1);
+    let v = middle.sqrt().max(f64::MIN_POSITIVE);
+    let grip = limits.at(v);
+    let per_square = 0.5 / v;
+    let curvature = 0.5 * (shape.curvature_1pm[s] + shape.curvature_1pm[next]);
+    let acceleration = 0.5 * (e1 - e0) / h;
+    let demand = acceleration + grip.drag.value;
+    // Terms of a quantity that changes with the speeds at both ends, the segment's length and the curvature at both ends.
+    let terms = |by_start: f64, by_end: f64, by_length: f64, by_curvature: f64| {
+        let mut terms = vec![(first + s, e0 * by_start), (first + next, e1 * by_end)];
+        shape.add_length(map, s, by_length, &mut terms);
+        if by_curvature != 0.0 {
+            shape.add_curvature(map, s, 0.5 * by_curvature, &mut terms);
+            shape.add_curvature(map, next, 0.5 * by_curvature, &mut terms);
+        }
+        terms
+    };
+    let affine = |constant: f64, terms| Affine { constant, terms }.merged();
+    let along = grip.longitudinal.value;
+    // Half of what a change at the middle does belongs to each end.
+    let slope = 0.5 * per_square * (grip.drag.by_speed - demand * grip.longitudinal.by_speed / along) / along;
+    let by_length = -acceleration / (h * along);
+    let longitudinal = affine(
+        demand / along,
+        terms(
+            slope - 0.5 / (h * along),
+            slope + 0.5 / (h * along),
+            by_length,
+            0.0,
+        ),
+    );
+    let across = grip.lateral.value;
+    let used = curvature * middle / across;
+    let slope = 0.5 * (curvature / across - used * per_square * grip.lateral.by_speed / across);
+    let lateral = affine(used, terms(slope, slope, 0.0, middle / across));
+    // A segment beyond the ellipse by rounding, or by what the midpoint of a coasting one leaves, may stay there.
+    let size = longitudinal.constant.hypot(lateral.constant).max(1.0);
+    let whole = affine(size, Vec::new());
+    program.add_cone([whole, longitudinal, lateral]);
+    let slope = 0.5 * per_square * (grip.drive.by_speed - grip.drag.by_speed) / along;
+    let spare = affine(
+        ((grip.drive.value - demand) / along).max(0.0),
+        terms(
+            slope + 0.5 / (h * along),
+            slope - 0.5 / (h * along),
+            -by_length,
+            0.0,
+        ),
+    );
+    program.add_nonnegative(spare);
+}

@@ -1,0 +1,168 @@
+//! Tables that a scalar looks figures up in.
+
+use super::lanes::Portable;
+use super::{Dual, Real};
+
+/// A scalar, or a pack of them, that can be the argument of a table of rows.
+pub trait Lookup: Real {
+    /// Where a row starts in its table, one place per lane.
+    type Place: Copy;
+
+    /// The row that `self` counted in rows falls into, of `rows` rows of `width` figures, and how far it is beyond
+    /// the row's start, from nought to one. Arguments off either end (and what is no number) go to that end.
+    fn place(self, rows: usize, width: usize) -> (Self::Place, Self);
+
+    /// The figure `column` places behind `place`, from a table that is not empty; never beyond its end.
+    fn pick(table: &[Self::Storage], place: Self::Place, column: usize) -> Self;
+
+    /// Whether the mask holds in every lane.
+    fn all(mask: Self::Mask) -> bool;
+}
+
+macro_rules! lone_lookup {
+    ($float:ty) => {
+        impl Lookup for $float {
+            type Place = usize;
+
+            #[inline(always)]
+            fn place(self, rows: usize, width: usize) -> (usize, Self) {
+                let held = Real::min(Real::max(self, 0.0), rows as $float);
+                let row = (held as usize).min(rows - 1);
+                (row * width, held - row as $float)
+            }
+            #[inline(always)]
+            fn pick(table: &[$float], place: usize, column: usize) -> Self {
+                table[(place + column).min(table.len() - 1)]
+            }
+            #[inline(always)]
+            fn all(mask: bool) -> bool {
+                mask
+            }
+        }
+    };
+}
+lone_lookup!(f64);
+lone_lookup!(f32);
+
+impl<const N: usize> Lookup for Dual<N> {
+    type Place = usize;
+
+    #[inline(always)]
+    fn place(self, rows: usize, width: usize) -> (usize, Self) {
+        let held = Real::min(Real::max(self, Self::lit(0.0)), Self::lit(rows as f64));
+        let row = (held.value as usize).min(rows - 1);
+        (row * width, held - Self::lit(row as f64))
+    }
+    #[inline(always)]
+    fn pick(table: &[f64], place: usize, column: usize) -> Self {
+        Self::constant(f64::pick(table, place, column))
+    }
+    #[inline(always)]
+    fn all(mask: bool) -> bool {
+        mask
+    }
+}
+
+impl Lookup for Portable {
+    type Place = [usize; 8];
+
+    #[inline(always)]
+    fn place(self, rows: usize, width: usize) -> ([usize; 8], Self) {
+        let mut lanes = [0.0; 8];
+        super::lanes::Lanes::write(self, &mut lanes);
+        let found = lanes.map(|x| Lookup::place(x, rows, width));
+        (found.map(|f| f.0), super::lanes::Lanes::from_fn(|i| found[i].1))
+    }
+    #[inline(always)]
+    fn pick(table: &[f32], place: [usize; 8], column: usize) -> Self {
+        super::lanes::Lanes::from_fn(|i| f32::pick(table, place[i], column))
+    }
+    #[inline(always)]
+    fn all(mask: Self::Mask) -> bool {
+        <Self as super::lanes::Lanes>::mask_bits(mask) == 0xff
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+mod x86 {
+    //! Safety of every block here: as in [`crate::scalar::lanes`] the types only come to life where their
+    //! instruction set is, and no index reaches beyond the table, because the smaller of it and the last one is
+    //! taken unsigned.
+
+    #![allow(unused_unsafe)]
+
+    use super::*;
+    use crate::scalar::lanes::{Avx2, Avx512, Lanes, Sse2};
+    use std::arch::x86_64::*;
+
+    /// The last index of a table, as lanes count.
+    #[inline(always)]
+    fn last_index(table: &[f32]) -> i32 {
+        assert!(!table.is_empty() && table.len() <= i32::MAX as usize);
+        (table.len() - 1) as i32
+    }
+
+    macro_rules! wide_lookup {
+        (
+            $name:ident, $index:ty, all $all:literal, truncate $truncate:ident, float $float:ident, set1 $set1:ident,
+            min $min:ident, mul $mul:ident, add $add:ident, gather $gather:expr
+        ) => {
+            impl Lookup for $name {
+                type Place = $index;
+
+                #[inline(always)]
+                fn place(self, rows: usize, width: usize) -> ($index, Self) {
+                    let held = self.max(Self::lit(0.0)).min(Self::lit(rows as f64));
+                    unsafe {
+                        let row = $min($truncate(held.register()), $set1(rows as i32 - 1));
+                        let fraction = held - Self::of_register($float(row));
+                        ($mul(row, $set1(width as i32)), fraction)
+                    }
+                }
+                #[inline(always)]
+                fn pick(table: &[f32], place: $index, column: usize) -> Self {
+                    let last = last_index(table);
+                    unsafe {
+                        let index = $min($add(place, $set1(column as i32)), $set1(last));
+                        Self::of_register($gather(table.as_ptr(), index))
+                    }
+                }
+                #[inline(always)]
+                fn all(mask: Self::Mask) -> bool {
+                    Self::mask_bits(mask) == $all
+                }
+            }
+        };
+    }
+    wide_lookup!(
+        Avx512, __m512i, all 0xffff, truncate _mm512_cvttps_epi32, float _mm512_cvtepi32_ps, set1 _mm512_set1_epi32,
+        min _mm512_min_epu32, mul _mm512_mullo_epi32, add _mm512_add_epi32,
+        gather |at, index| _mm512_i32gather_ps::<4>(index, at)
+    );
+    wide_lookup!(
+        Avx2, __m256i, all 0xff, truncate _mm256_cvttps_epi32, float _mm256_cvtepi32_ps, set1 _mm256_set1_epi32,
+        min _mm256_min_epu32, mul _mm256_mullo_epi32, add _mm256_add_epi32,
+        gather |at, index| _mm256_i32gather_ps::<4>(at, index)
+    );
+
+    /// Without instructions for it, lane by lane.
+    impl Lookup for Sse2 {
+        type Place = [usize; 4];
+
+        #[inline(always)]
+        fn place(self, rows: usize, width: usize) -> ([usize; 4], Self) {
+            let mut lanes = [0.0; 4];
+            self.write(&mut lanes);
+            let found = lanes.map(|x| Lookup::place(x, rows, width));
+            (found.map(|f| f.0), Self::from_fn(|i| found[i].1))
+        }
+        #[inline(always)]
+        fn pick(table: &[f32], place: [usize; 4], column: usize) -> Self {
+            Self::from_fn(|i| f32::pick(table, place[i], column))
+        }
+        #[inline(always)]
+        fn all(mask: Self::Mask) -> bool {
+            Self::mask_bits(mask) == 0xf
+        }
+    }
+}

@@ -1,0 +1,243 @@
+//! What a car can do at each speed, from its 4DOF model: the limits that racing lines are driven within.
+//!
+//! At every speed the steady states of the car ([`crate::vehicle::steady`]) give lateral acceleration over steering and
+//! its ridge, straight-line running the greatest braking and traction, and the powertrain what the engine can give
+//! through the gears. The rows make an [`Envelope`]; the small-angle end of the curves gives the handling figures.
+
+mod results;
+
+pub use results::{EnvelopeSummary, summarise, write_results};
+
+use crate::error::{Error, Result};
+use crate::vehicle::{Car, Envelope, EnvelopeRow, Trim, steady_car};
+use rayon::prelude::*;
+
+/// Settings of the study.
+#[derive(Clone, Debug, PartialEq)]
+pub struct EnvelopeSettings {
+    /// Slowest speed (m/s); below it the limits are taken to be its.
+    pub from_mps: f64,
+    /// Greatest speed (m/s), if the engine goes that far.
+    pub to_mps: f64,
+    /// Step between speeds (m/s).
+    pub step_mps: f64,
+}
+
+impl Default for EnvelopeSettings {
+    /// 20 to 70 m/s, and a tenth beyond either end.
+    fn default() -> Self {
+        Self {
+            from_mps: 18.0,
+            to_mps: 77.0,
+            step_mps: 2.0,
+        }
+    }
+}
+
+impl EnvelopeSettings {
+    /// Checks every setting.
+    ///
+    /// # Errors
+    /// [`Error::Input`] naming the setting.
+    pub fn validate(&self) -> Result<()> {
+        let checks = [
+            ("from", self.from_mps, 3.0, 150.0),
+            ("to", self.to_mps, self.from_mps + 1.0, 160.0),
+            ("step", self.step_mps, 0.05, 50.0),
+        ];
+        for (name, value, least, most) in checks {
+            if !(least..=most).contains(&value) {
+                return Err(Error::input(
+                    "the envelope's settings",
+                    name,
+                    value.to_string(),
+                    format!("{least} to {most} m/s"),
+                ));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// What the car does at one speed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SpeedLimits {
+    /// The row of the envelope.
+    pub row: EnvelopeRow,
+    /// Steady cornering to the left, in order along the curve of steady states.
+    pub cornering: Vec<Trim>,
+    /// Greatest acceleration by the driven tyres (m/s^2).
+    pub traction_mps2: f64,
+    /// Greatest acceleration by the engine in its best gear (m/s^2).
+    pub engine_mps2: f64,
+}
+
+/// How the car steers at small lateral acceleration (R. Gillespie, *Fundamentals of Vehicle Dynamics*, 1992, ch. 6).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Handling {
+    /// Steering at the wheels beyond what geometry asks for, over lateral acceleration (rad s^2/m); positive
+    /// understeers.
+    pub understeer_gradient: f64,
+    /// `K` in `steer = L kappa (1 + K v^2)` (s^2/m^2).
+    pub stability_factor: f64,
+    /// Speed at which an understeering car answers most to the steering wheel (m/s).
+    pub characteristic_speed_mps: Option<f64>,
+    /// Speed at which an oversteering car becomes unstable (m/s).
+    pub critical_speed_mps: Option<f64>,
+}
+
+/// The outcome of the study.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CarLimits {
+    /// Limits by rising speed.
+    pub speeds: Vec<SpeedLimits>,
+    /// Handling in the middle of the range.
+    pub handling: Handling,
+    /// The envelope.
+    pub envelope: Envelope,
+}
+
+/// Steering up to which the tyres' own limit is looked for (rad): a car whose lock is reached first still has it.
+const STEER_TO_GRIP: f64 = 0.6;
+
+/// Sweeps the car over speed and steering.
+///
+/// # Errors
+/// [`Error::Input`] for settings out of range, for a car without a powertrain, and for one that has no steady state or
+/// no drive at a speed that is asked for.
+pub fn car_limits(car: &Car, settings: &EnvelopeSettings) -> Result<CarLimits> {
+    settings.validate()?;
+    let Some(powertrain) = &car.powertrain else {
+        return Err(Error::input(
+            &car.name,
+            "[powertrain]",
+            "none",
+            "an engine and gears, for what the car can accelerate by",
+        ));
+    };
+    let steady = steady_car(car);
+    let force = |speed: f64| powertrain.wheel_force(speed, car.chassis.radius_rear);
+    let mut speeds: Vec<f64> = Vec::new();
+    let count = ((settings.to_mps - settings.from_mps) / settings.step_mps + 1e-9).floor() as usize;
+    for i in 0..=count {
+        let speed = settings.from_mps + settings.step_mps * i as f64;
+        if force(speed) <= 0.0 {
+            break;
+        }
+        speeds.push(speed);
+    }
+    if let Some(&last) = speeds.last()
+        && speeds.len() <= count
+    {
+        // The engine ends between two speeds: that is the car's greatest.
+        let (mut low, mut high) = (last, last + settings.step_mps);
+        while high - low > 1e-6 {
+            let middle = 0.5 * (low + high);
+            if force(middle) > 0.0 {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        if low - last > 1e-3 {
+            speeds.push(low);
+        }
+    }
+    let limits: Vec<SpeedLimits> = speeds
+        .into_par_iter()
+        .map(|speed| {
+            let cornering = steady.cornering(speed, STEER_TO_GRIP);
+            let traction_mps2 = steady.greatest_traction(speed);
+            let engine_mps2 = force(speed) / car.chassis.mass;
+            SpeedLimits {
+                row: EnvelopeRow {
+                    v_mps: speed,
+                    ay_mps2: cornering.iter().map(|t| t.ay_mps2).fold(0.0, f64::max),
+                    ax_grip_mps2: steady.greatest_braking(speed),
+                    ax_drive_mps2: traction_mps2.min(engine_mps2),
+                    drag_mps2: steady.drag(speed),
+                },
+                cornering,
+                traction_mps2,
+                engine_mps2,
+            }
+        })
+        .collect();
+    let envelope = Envelope::new(&car.name, limits.iter().map(|l| l.row).collect())?;
+    let wheelbase = car.chassis.cg_to_front + car.chassis.cg_to_rear;
+    Ok(CarLimits {
+        handling: handling(&limits[limits.len() / 2], wheelbase),
+        speeds: limits,
+        envelope,
+    })
+}
+
+/// The slope of steering over lateral acceleration, between the two steady states nearest to 0 and 2 m/s^2: small
+/// against any tyre's limit, large against rounding.
+fn handling(limits: &SpeedLimits, wheelbase: f64) -> Handling {
+    let first = limits.cornering.first();
+    let second = limits
+        .cornering
+        .iter()
+        .find(|t| t.ay_mps2 >= 2.0)
+        .or(limits.cornering.last());
+    let v = limits.row.v_mps;
+    let slope = match (first, second) {
+        (Some(a), Some(b)) if b.ay_mps2 > a.ay_mps2 => (b.steer_rad - a.steer_rad) / (b.ay_mps2 - a.ay_mps2),
+        _ => f64::NAN,
+    };
+    let understeer_gradient = slope - wheelbase / v.powi(2);
+    let stability_factor = understeer_gradient / wheelbase;
+    Handling {
+        understeer_gradient,
+        stability_factor,
+        characteristic_speed_mps: (stability_factor > 0.0).then(|| stability_factor.recip().sqrt()),
+        critical_speed_mps: (stability_factor < 0.0).then(|| (-stability_factor).recip().sqrt()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_bundled_car_corners_as_it_was_made_to() {
+        let car = Car::bundled().unwrap();
+        let limits = car_limits(&car, &EnvelopeSettings::default()).unwrap();
+        let envelope = &limits.envelope;
+        // What the bundled car was made for: up to 15 m/s^2 at 25 m/s and 18 at 65, within a tenth.
+        assert!((envelope.at(25.0).ay_mps2 / 15.0 - 1.0).abs() < 0.1);
+        assert!((envelope.at(65.0).ay_mps2 / 18.0 - 1.0).abs() < 0.1);
+        // Sixth gear ends at 8500 rpm: 70 m/s.
+        let top = 8500.0 * std::f64::consts::TAU / 60.0 / (1.2915 * 3.2) * 0.325;
+        assert!((envelope.top_speed_mps() - top).abs() < 1e-3);
+        // The engine limits where the tyres could do more, and the other way round.
+        let fast = limits.speeds.last().unwrap();
+        assert_eq!(fast.row.ax_drive_mps2, fast.engine_mps2);
+        assert!(
+            limits
+                .speeds
+                .iter()
+                .all(|s| s.row.ax_drive_mps2 <= s.traction_mps2)
+        );
+        assert!(limits.handling.stability_factor.abs() < 0.01);
+    }
+
+    #[test]
+    fn a_car_without_an_engine_and_absurd_settings_are_refused() {
+        let mut car = Car::bundled().unwrap();
+        let backwards = EnvelopeSettings {
+            to_mps: 10.0,
+            ..EnvelopeSettings::default()
+        };
+        assert!(
+            car_limits(&car, &backwards)
+                .unwrap_err()
+                .to_string()
+                .contains("to")
+        );
+        car.powertrain = None;
+        let error = car_limits(&car, &EnvelopeSettings::default()).unwrap_err();
+        assert!(error.to_string().contains("[powertrain]"));
+    }
+}

@@ -1,0 +1,87 @@
+//! Circuits, cross-sections and lines in the format of the racetrack database (TU Munich): `x_m,y_m,w_tr_right_m,w_tr_left_m`.
+
+use super::circuit::Circuit;
+use super::cross_sections::CrossSections;
+use crate::{Error, Result};
+use glam::DVec2;
+use std::fmt::Write as _;
+use std::fs::OpenOptions;
+use std::io::Write as _;
+use std::path::Path;
+
+/// A table of points with the distances to the right and left edges, to the micrometre.
+fn table(rows: impl Iterator<Item = (DVec2, f64, f64)>) -> String {
+    let mut text = "# x_m,y_m,w_tr_right_m,w_tr_left_m\n".to_owned();
+    for (point, right_m, left_m) in rows {
+        // Writing to a string cannot fail.
+        let _ = writeln!(text, "{:.6},{:.6},{right_m:.6},{left_m:.6}", point.x, point.y);
+    }
+    text
+}
+
+/// Writes a file that is not there yet.
+fn write_new(path: &Path, text: &str) -> Result<()> {
+    let file = OpenOptions::new().write(true).create_new(true).open(path);
+    file.and_then(|mut file| file.write_all(text.as_bytes()))
+        .map_err(|e| Error::io(path, "write", e))
+}
+
+impl Circuit {
+    /// The centreline's samples and widths in the racetrack database's format.
+    pub fn to_racetrack_csv(&self) -> String {
+        let widths = self.width_right_m.iter().zip(&self.width_left_m);
+        let points = self.centreline_m.iter().zip(widths);
+        table(points.map(|(&point, (&right, &left))| (point, right, left)))
+    }
+
+    /// Writes [`Circuit::to_racetrack_csv`] to a new file.
+    ///
+    /// # Errors
+    /// [`Error::Io`] when the file is there already or cannot be written.
+    pub fn write_racetrack(&self, path: impl AsRef<Path>) -> Result<()> {
+        write_new(path.as_ref(), &self.to_racetrack_csv())
+    }
+}
+
+impl CrossSections {
+    /// The middles of the cuts and half their widths in the racetrack database's format.
+    pub fn to_racetrack_csv(&self) -> String {
+        self.line_to_racetrack_csv(&vec![0.5; self.len()])
+    }
+
+    /// A line in the racetrack database's format, with its distances to both edges along the cuts; `alpha` has a value
+    /// for every cut.
+    pub fn line_to_racetrack_csv(&self, alpha: &[f64]) -> String {
+        let points = self.points(alpha);
+        let ends = self.right_m.iter().zip(&self.left_m);
+        let rows = points.iter().zip(ends);
+        table(rows.map(|(&point, (&right, &left))| (point, point.distance(right), point.distance(left))))
+    }
+
+    /// Writes [`CrossSections::to_racetrack_csv`] to a new file.
+    ///
+    /// # Errors
+    /// [`Error::Io`] when the file is there already or cannot be written.
+    pub fn write_racetrack(&self, path: impl AsRef<Path>) -> Result<()> {
+        write_new(path.as_ref(), &self.to_racetrack_csv())
+    }
+
+    /// Writes [`CrossSections::line_to_racetrack_csv`] to a new file.
+    ///
+    /// # Errors
+    /// [`Error::Input`] when there are not as many values as cuts; [`Error::Io`] when the file is there already or
+    /// cannot be written.
+    pub fn write_racetrack_line(&self, alpha: &[f64], path: impl AsRef<Path>) -> Result<()> {
+        let path = path.as_ref();
+        if alpha.len() != self.len() {
+            let found = format!("{} values", alpha.len());
+            return Err(Error::input(
+                path,
+                "line",
+                found,
+                format!("{}, one per cut", self.len()),
+            ));
+        }
+        write_new(path, &self.line_to_racetrack_csv(alpha))
+    }
+}

@@ -1,0 +1,81 @@
+//! TOML files that name a survey and say what the survey's file cannot.
+
+use std::path::Path;
+
+use serde::Deserialize;
+use toml::Spanned;
+
+use super::circuit::Corner;
+use super::load::{Checker, SectionEntry, parse_toml};
+use super::reference::Smoothing;
+use super::survey::{Survey, SurveyOptions};
+use crate::Result;
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SurveyFile {
+    survey: String,
+    name: Option<String>,
+    closed: Option<bool>,
+    width_m: Option<Spanned<f64>>,
+    lap: Option<u32>,
+    #[serde(default)]
+    bridges: u16,
+    smoothing_line_m: Option<Spanned<f64>>,
+    smoothing_edges_m: Option<Spanned<f64>>,
+    #[serde(default)]
+    sections: Vec<SectionEntry>,
+    #[serde(default)]
+    corners: Vec<CornerEntry>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct CornerEntry {
+    name: String,
+    station_m: Spanned<f64>,
+}
+
+/// Whether a TOML file names a survey.
+pub(super) fn is_survey(text: &str) -> bool {
+    text.parse::<toml::Table>()
+        .is_ok_and(|table| table.contains_key("survey"))
+}
+
+/// Reads the survey that a TOML file names; it lies beside it.
+pub(super) fn read(path: &Path, text: &str) -> Result<(Survey, Smoothing)> {
+    let name = path.display().to_string();
+    let file: SurveyFile = parse_toml(&name, text, "a circuit with survey")?;
+    let check = Checker { file: &name, text };
+    let within = |value: &Option<Spanned<f64>>, field: &str, low: f64, high: f64| {
+        let checked = value.as_ref().map(|v| check.within(v, field, low, high));
+        checked.transpose()
+    };
+    let options = SurveyOptions {
+        closed: file.closed,
+        width_m: within(&file.width_m, "width_m", 0.1, 400.0)?,
+        lap: file.lap,
+        bridges: usize::from(file.bridges),
+    };
+    let usual = Smoothing::default();
+    let smoothing = Smoothing {
+        line_m: within(&file.smoothing_line_m, "smoothing_line_m", 0.0, 10.0)?.unwrap_or(usual.line_m),
+        edges_m: within(&file.smoothing_edges_m, "smoothing_edges_m", 0.0, 10.0)?.unwrap_or(usual.edges_m),
+    };
+    let beside = path.parent().unwrap_or(Path::new("")).join(&file.survey);
+    let mut survey = Survey::read(beside, &options)?;
+    if let Some(name) = file.name {
+        survey.name = name;
+    }
+    if !file.sections.is_empty() || !file.corners.is_empty() {
+        let length_m = survey.smoothed(&smoothing)?.length_m();
+        survey.sections = check.sections(&file.sections, length_m)?;
+        for corner in &file.corners {
+            survey.corners.push(Corner {
+                name: corner.name.clone(),
+                station_m: check.within(&corner.station_m, "station_m", 0.0, length_m)?,
+            });
+        }
+    }
+    Ok((survey, smoothing))
+}

@@ -1,0 +1,251 @@
+//! What circuits, smoothed surveys and generated shapes have in common, and what is made from any of them.
+
+use super::circuit::{Circuit, Corner, Section};
+use super::from_curvature::{Closure, CurvatureRow, CurvatureTable};
+use crate::{Error, Result};
+use glam::DVec2;
+use std::f64::consts::PI;
+
+/// Distance between the rows of curvature that a circuit is built from (m), before rounding to whole steps.
+const ROW_M: f64 = 1.0;
+
+/// The road at one station.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct RoadFrame {
+    /// The reference line (m).
+    pub position_m: DVec2,
+    /// Its direction, a unit vector.
+    pub tangent: DVec2,
+    /// Its curvature (1/m), positive in left turns.
+    pub curvature_1pm: f64,
+    /// Distance to the left edge (m).
+    pub left_m: f64,
+    /// Distance to the right edge (m).
+    pub right_m: f64,
+}
+
+/// A road along a smooth reference line.
+pub(super) trait Road {
+    /// Name for titles.
+    fn name(&self) -> &str;
+    /// File or circuit for error messages.
+    fn source(&self) -> &str;
+    /// Whether the end joins the start.
+    fn closed(&self) -> bool;
+    /// Length of the reference line (m).
+    fn length_m(&self) -> f64;
+    /// The road at a station (m), which is wrapped, or held at the ends of an open road.
+    fn frame(&self, station_m: f64) -> RoadFrame;
+    /// Named stretches.
+    fn sections(&self) -> &[Section];
+    /// Named corners.
+    fn corners(&self) -> &[Corner];
+}
+
+impl Road for Circuit {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn source(&self) -> &str {
+        &self.name
+    }
+
+    fn closed(&self) -> bool {
+        self.closed
+    }
+
+    fn length_m(&self) -> f64 {
+        self.length_m
+    }
+
+    fn frame(&self, station_m: f64) -> RoadFrame {
+        let (left_m, right_m) = self.widths_at(station_m);
+        RoadFrame {
+            position_m: self.position_at(station_m),
+            tangent: DVec2::from_angle(self.heading_at(station_m)),
+            curvature_1pm: self.curvature_at(station_m),
+            left_m,
+            right_m,
+        }
+    }
+
+    fn sections(&self) -> &[Section] {
+        &self.sections
+    }
+
+    fn corners(&self) -> &[Corner] {
+        &self.corners
+    }
+}
+
+/// Stations at even steps of about `step_m`, the length itself left out on a closed road.
+pub(super) fn even_stations(road: &dyn Road, step_m: f64) -> Vec<f64> {
+    let steps = (road.length_m() / step_m).round().max(8.0) as usize;
+    let stations = steps + usize::from(!road.closed());
+    (0..stations)
+        .map(|i| road.length_m() * i as f64 / steps as f64)
+        .collect()
+}
+
+/// A circuit along the road's reference line, where the road lies.
+pub(super) fn circuit(road: &dyn Road) -> Result<(Circuit, Closure)> {
+    let stations = even_stations(road, ROW_M);
+    let step = road.length_m() / (stations.len() - usize::from(!road.closed())) as f64;
+    let turn = |from: DVec2, to: DVec2| from.perp_dot(to).atan2(from.dot(to));
+    let rows: Vec<CurvatureRow> = stations
+        .iter()
+        .map(|&station_m| {
+            let frame = road.frame(station_m);
+            // The mean curvature about the row, not the curvature at it: so headings do not drift from row to row.
+            let (mut from, mut to) = (station_m - 0.5 * step, station_m + 0.5 * step);
+            if !road.closed() {
+                (from, to) = (from.max(0.0), to.min(road.length_m()));
+            }
+            let turned = turn(road.frame(from).tangent, road.frame(to).tangent);
+            CurvatureRow {
+                station_m,
+                curvature_1pm: turned / (to - from),
+                width_left_m: frame.left_m,
+                width_right_m: frame.right_m,
+                corner: String::new(),
+            }
+        })
+        .collect();
+    if let Some(row) = rows.iter().find(|r| !(-1.0..=1.0).contains(&r.curvature_1pm)) {
+        return Err(Error::input(
+            road.source(),
+            format!("station {:.1} m", row.station_m),
+            format!("a bend of {:.2} m radius", 1.0 / row.curvature_1pm.abs()),
+            "bends of at least 1 m radius",
+        ));
+    }
+    let start = road.frame(0.0);
+    let mut start_heading_rad = start.tangent.to_angle();
+    if road.closed() {
+        // The integral of mean curvatures is the mean of the headings half a step before and after.
+        let around = [-0.5 * step, 0.5 * step].map(|s| turn(start.tangent, road.frame(s).tangent));
+        start_heading_rad += 0.5 * (around[0] + around[1]);
+    }
+    let table = CurvatureTable {
+        name: road.name().to_owned(),
+        closed: road.closed(),
+        length_m: road.length_m(),
+        start_heading_rad,
+        rows,
+        sections: road.sections().to_vec(),
+    };
+    let (mut circuit, closure) = table.build()?;
+    for position in &mut circuit.centreline_m {
+        *position += start.position_m;
+    }
+    circuit.corners = road.corners().to_vec();
+    Ok((circuit, closure))
+}
+
+/// How cross-sections are spread along a road.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Spacing {
+    /// Number of cross-sections.
+    pub cuts: usize,
+    /// How many times closer they stand in the tightest corners than on straights; 1 for equal steps.
+    pub corner_density: f64,
+}
+
+impl Spacing {
+    /// Equal steps.
+    pub fn equal(cuts: usize) -> Self {
+        Self {
+            cuts,
+            corner_density: 1.0,
+        }
+    }
+}
+
+/// Fewest and most cross-sections.
+const CUTS: (usize, usize) = (8, 1_000_000);
+/// Cross-sections stand closer within this distance of a corner (m), so that steps change gradually.
+const APPROACH_M: f64 = 30.0;
+
+/// The stations of cross-sections, ascending from 0; an open road has its last at its end.
+pub(super) fn spread(road: &dyn Road, spacing: &Spacing) -> Result<Vec<f64>> {
+    let Spacing { cuts, corner_density } = *spacing;
+    if !(CUTS.0..=CUTS.1).contains(&cuts) {
+        return Err(Error::input(
+            road.source(),
+            "number of cross-sections",
+            cuts.to_string(),
+            format!("{} to {}", CUTS.0, CUTS.1),
+        ));
+    }
+    if !(1.0..=20.0).contains(&corner_density) {
+        return Err(Error::input(
+            road.source(),
+            "corner density of cross-sections",
+            corner_density.to_string(),
+            "1 (equal steps) to 20",
+        ));
+    }
+    let steps = cuts - usize::from(!road.closed());
+    let length = road.length_m();
+    let even = |i: usize| length * i as f64 / steps as f64;
+    if corner_density == 1.0 {
+        return Ok((0..cuts).map(even).collect());
+    }
+    // Cuts per metre by station: 1 on straights, corner_density where the curvature is greatest.
+    let samples = even_stations(road, 2.0);
+    let step = length / (samples.len() - usize::from(!road.closed())) as f64;
+    let bends: Vec<f64> = samples
+        .iter()
+        .map(|&s| road.frame(s).curvature_1pm.abs())
+        .collect();
+    let reach = (APPROACH_M / step).ceil() as usize;
+    let mut near = averaged(&bends, reach, road.closed());
+    let most = near.iter().fold(0.0f64, |a, &b| a.max(b));
+    // A straight road has no corners to stand closer in.
+    let scale = if most > 1e-9 {
+        (corner_density - 1.0) / most
+    } else {
+        0.0
+    };
+    near.iter_mut().for_each(|k| *k = 1.0 + scale * *k);
+    if road.closed() {
+        near.push(near[0]);
+    }
+    let mut sum = vec![0.0];
+    for pair in near.windows(2) {
+        sum.push(sum[sum.len() - 1] + 0.5 * (pair[0] + pair[1]));
+    }
+    let total = sum[sum.len() - 1];
+    let station = |i: usize| {
+        let wanted = total * i as f64 / steps as f64;
+        let after = sum.partition_point(|&x| x <= wanted).clamp(1, sum.len() - 1);
+        let share = (wanted - sum[after - 1]) / (sum[after] - sum[after - 1]);
+        ((after - 1) as f64 + share) * step
+    };
+    Ok((0..cuts)
+        .map(|i| if i == steps { length } else { station(i) })
+        .collect())
+}
+
+/// Means weighted by a raised cosine over `reach` neighbours on each side.
+fn averaged(values: &[f64], reach: usize, closed: bool) -> Vec<f64> {
+    let n = values.len() as isize;
+    let reach = (reach as isize).min(n / 2);
+    let weight = |k: isize| 0.5 + 0.5 * (PI * k as f64 / (reach + 1) as f64).cos();
+    (0..n)
+        .map(|i| {
+            let (mut sum, mut weights) = (0.0, 0.0);
+            for k in -reach..=reach {
+                let j = if closed {
+                    (i + k).rem_euclid(n)
+                } else {
+                    (i + k).clamp(0, n - 1)
+                };
+                sum += weight(k) * values[j as usize];
+                weights += weight(k);
+            }
+            sum / weights
+        })
+        .collect()
+}

@@ -1,0 +1,98 @@
+//! What a `--track` may name.
+
+use super::circuit::Circuit;
+use super::cross_sections::CrossSections;
+use super::load::CircuitSource;
+use super::reference::{ReferenceLine, Smoothing};
+use super::road::Spacing;
+use super::shapes::Shape;
+use super::survey::Survey;
+use crate::Result;
+use std::path::Path;
+
+/// A track from wherever it comes.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Track {
+    /// Built from curvature: bundled, or a TOML file with a curvature table.
+    Circuit(Circuit),
+    /// Surveyed: a survey file, or a TOML file that names one and says how much to smooth it.
+    Survey(Survey, Smoothing),
+    /// A stated shape.
+    Shape(Shape),
+}
+
+impl Track {
+    /// The track of this name: a bundled circuit, a shape such as `circle:590:600` (see [`Shape::parse`]), or a file:
+    /// TOML (see [`Circuit::load`]) or a survey (see [`Survey::read`]).
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`] when a file cannot be read; [`crate::Error::Input`] when it holds no track or the name is
+    /// not known.
+    pub fn load(name_or_path: &str) -> Result<Self> {
+        if let Some(shape) = Shape::parse(name_or_path) {
+            return shape.map(Self::Shape);
+        }
+        if Path::new(name_or_path).extension().is_some() {
+            Self::read(name_or_path)
+        } else {
+            Circuit::bundled(name_or_path).map(Self::Circuit)
+        }
+    }
+
+    /// The track of a file.
+    ///
+    /// # Errors
+    /// As [`Track::load`].
+    pub fn read(path: impl AsRef<Path>) -> Result<Self> {
+        Ok(match CircuitSource::read(path.as_ref())? {
+            CircuitSource::Curvature(circuit, _) => Self::Circuit(circuit),
+            CircuitSource::Survey(survey, smoothing) => Self::Survey(survey, smoothing),
+        })
+    }
+
+    /// Name for titles.
+    pub fn name(&self) -> String {
+        match self {
+            Self::Circuit(circuit) => circuit.name.clone(),
+            Self::Survey(survey, _) => survey.name.clone(),
+            Self::Shape(shape) => shape.name(),
+        }
+    }
+
+    /// The circuit, surveys being smoothed.
+    ///
+    /// # Errors
+    /// [`crate::Error::Input`] naming the place where no road can be.
+    pub fn circuit(&self) -> Result<Circuit> {
+        match self {
+            Self::Circuit(circuit) => Ok(circuit.clone()),
+            Self::Survey(survey, smoothing) => Ok(survey.smoothed(smoothing)?.circuit()?.0),
+            Self::Shape(shape) => shape.circuit(),
+        }
+    }
+
+    /// The reference line of a survey with what smoothing it took; nothing for what is no survey.
+    ///
+    /// # Errors
+    /// As [`Track::circuit`].
+    pub fn reference_line(&self) -> Result<Option<ReferenceLine>> {
+        match self {
+            Self::Survey(survey, smoothing) => survey.smoothed(smoothing).map(Some),
+            _ => Ok(None),
+        }
+    }
+
+    /// Cuts across the track. A survey is smoothed first, unless `as_surveyed`.
+    ///
+    /// # Errors
+    /// As [`Track::circuit`], and for a spacing out of range.
+    pub fn cross_sections(&self, spacing: &Spacing, as_surveyed: bool) -> Result<CrossSections> {
+        match self {
+            Self::Circuit(circuit) => circuit.cross_sections_spaced(spacing),
+            Self::Survey(survey, _) if as_surveyed => survey.as_surveyed()?.cross_sections(spacing),
+            Self::Survey(survey, smoothing) => survey.smoothed(smoothing)?.cross_sections(spacing),
+            Self::Shape(shape) => shape.cross_sections(spacing),
+        }
+    }
+}

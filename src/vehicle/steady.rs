@@ -1,0 +1,397 @@
+//! Steady cornering and the greatest push of the tyres, from the car's own equations of motion.
+//!
+//! A trim is a state in which the car goes round a circle: its sideways, yaw, roll and pitch accelerations are
+//! nought. With no push of the tyres along the path (drag then slows the car, as a point-mass lap takes off by
+//! itself) the trims of a speed form a curve through straight running. It is followed by its arc length (Keller,
+//! *Numerical solution of bifurcation and nonlinear eigenvalue problems*, 1977), because neither steering angle nor
+//! lateral acceleration rises along it for ever: an oversteering car needs less steering the faster it corners, and
+//! every car has a greatest lateral acceleration.
+
+use super::aero::aero_forces;
+use super::chassis::BodyState;
+use super::loads::wheel_loads;
+use super::model::{CarInput, CarModel, CarState};
+use super::tyre::Tyre;
+use super::{Car, LinearTyre, MagicFormula, TyreModel};
+use crate::scalar::{Dual, Real};
+use nalgebra::{SMatrix, SVector};
+
+/// Unknowns of a trim.
+const UNKNOWNS: usize = 5;
+type Exact = Dual<UNKNOWNS>;
+type Point = SVector<f64, UNKNOWNS>;
+
+/// The car in steady cornering.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Trim {
+    /// Angle of the front road wheels, positive to the left (rad).
+    pub steer_rad: f64,
+    /// Lateral acceleration `v r`, across the path (m/s^2).
+    pub ay_mps2: f64,
+    /// Yaw rate (rad/s).
+    pub yaw_rate_radps: f64,
+    /// Angle from the car's axis to its velocity, positive when it drifts to its left (rad).
+    pub sideslip_rad: f64,
+    /// Roll angle (rad).
+    pub roll_rad: f64,
+    /// Slip ratio of the driven rear wheels.
+    pub slip_ratio: f64,
+    /// Vertical loads of the wheels FL FR RL RR (N).
+    pub wheel_load_n: [f64; 4],
+}
+
+/// Steady states and limits of one car.
+pub trait SteadyCar: Send + Sync {
+    /// The curve of trims at `speed` (m/s) from straight running to the left, until the road wheels reach
+    /// `greatest_steer` (rad), the car stands across the road, or lateral acceleration has fallen well below its
+    /// peak. In order along the curve; at least straight running unless not even that has a solution.
+    fn cornering(&self, speed: f64, greatest_steer: f64) -> Vec<Trim>;
+
+    /// The greatest deceleration by the tyres (m/s^2) running straight at `speed` (m/s), each axle at the slip at
+    /// which it brakes hardest.
+    fn greatest_braking(&self, speed: f64) -> f64;
+
+    /// The greatest acceleration by the driven rear tyres (m/s^2) running straight at `speed` (m/s), the engine
+    /// left aside.
+    fn greatest_traction(&self, speed: f64) -> f64;
+
+    /// Deceleration by drag (m/s^2) at `speed` (m/s).
+    fn drag(&self, speed: f64) -> f64;
+}
+
+/// The steady states of a car on whichever tyres it has.
+pub fn steady_car(car: &Car) -> Box<dyn SteadyCar> {
+    match car.tyre_model() {
+        TyreModel::MagicFormula => Box::new(Ready::<MagicFormula<f64>, MagicFormula<Exact>>::new(car)),
+        TyreModel::Linear => Box::new(Ready::<LinearTyre<f64>, LinearTyre<Exact>>::new(car)),
+    }
+}
+
+/// A car made ready in plain and in dual numbers.
+struct Ready<T, D> {
+    plain: CarModel<f64, T>,
+    exact: CarModel<Exact, D>,
+}
+
+/// Sizes of the unknowns sideslip, yaw rate (times speed), roll, slip ratio and steering angle that count as one
+/// step along a curve: about a tenth of what they reach at the limit.
+const SCALES: [f64; UNKNOWNS] = [0.01, 2.0, 0.01, 0.01, 0.01];
+/// Steps along the curve, in [`SCALES`]: the longest, and the one below which the curve is taken to end.
+const LONGEST_STEP: f64 = 0.7;
+const SHORTEST_STEP: f64 = 1e-4;
+/// Points of a curve at most.
+const MOST_POINTS: usize = 2000;
+/// Sideslip at which a car counts as standing across the road (rad).
+const GREATEST_SIDESLIP: f64 = 0.5;
+/// The curve is left where lateral acceleration has fallen to this share of its peak.
+const PAST_THE_PEAK: f64 = 0.85;
+
+impl<T: Tyre<f64>, D: Tyre<Exact>> Ready<T, D> {
+    fn new(car: &Car) -> Self {
+        let flat = car.to_flat();
+        Self {
+            plain: CarModel::from_parameters(|slot| flat[slot]),
+            exact: CarModel::from_parameters(|slot| Exact::constant(flat[slot])),
+        }
+    }
+
+    /// What the four equations leave over at a point of the curve, with the derivatives to its unknowns.
+    fn residual(&self, speed: f64, point: &Point) -> [Exact; 4] {
+        let unknown = |i: usize| Exact::variable(point[i] * SCALES[i], i);
+        let [sideslip, across, roll, slip_ratio, steer] = std::array::from_fn(unknown);
+        let v = Exact::constant(speed);
+        let (cos, sin) = (sideslip.cos(), sideslip.sin());
+        let yaw_rate = across / v;
+        let zero = Exact::constant(0.0);
+        let one = Exact::constant(1.0);
+        let body = BodyState {
+            vx: v * cos,
+            vy: v * sin,
+            yaw_rate,
+            roll,
+            roll_rate: zero,
+        };
+        let chassis = &self.exact.chassis;
+        // No push along the path: the tyres' push along the car is what balances their push across it.
+        let drag = aero_forces(chassis, body.vx).drag / chassis.mass;
+        let state = CarState {
+            pitch_acceleration: -(body.vx * yaw_rate * sin / cos) - drag,
+            body,
+        };
+        let direction = (steer.cos(), steer.sin());
+        let wheel_speed = std::array::from_fn(|wheel| {
+            let front = wheel < 2;
+            let (x, half_track, radius) = if front {
+                (
+                    chassis.cg_to_front,
+                    chassis.half_track_front,
+                    chassis.radius_front,
+                )
+            } else {
+                (-chassis.cg_to_rear, chassis.half_track_rear, chassis.radius_rear)
+            };
+            let y = if wheel % 2 == 0 { half_track } else { -half_track };
+            let turned = if front { direction } else { (one, zero) };
+            let rolling = one + if front { zero } else { slip_ratio };
+            let hub_x = body.vx - body.yaw_rate * y;
+            let hub_y = body.vy + body.yaw_rate * x;
+            let along = turned.0 * hub_x + turned.1 * hub_y;
+            along * rolling / radius
+        });
+        // The model takes the angle that a sensor reads.
+        let steer = (steer - chassis.steer_offset) / chassis.steer_scale;
+        let rate = self.exact.rate(&state, &CarInput { wheel_speed, steer });
+        [
+            rate.state.body.vy,
+            rate.state.body.yaw_rate,
+            rate.state.body.roll_rate,
+            rate.state.pitch_acceleration * chassis.pitch_lag,
+        ]
+    }
+
+    /// The trim on the line `direction . (point - guess) = 0` nearest to `guess`, by Newton's method.
+    fn solve(&self, speed: f64, guess: &Point, direction: &Point) -> Option<(Point, Point)> {
+        /// Accelerations this small are rounding (m/s^2, rad/s^2).
+        const BALANCED: f64 = 1e-9;
+        let mut point = *guess;
+        for _ in 0..12 {
+            let residual = self.residual(speed, &point);
+            let mut slopes = SMatrix::<f64, UNKNOWNS, UNKNOWNS>::zeros();
+            let mut value = Point::zeros();
+            for (row, equation) in residual.iter().enumerate() {
+                value[row] = equation.value;
+                for column in 0..UNKNOWNS {
+                    slopes[(row, column)] = equation.gradient[column] * SCALES[column];
+                }
+            }
+            value[4] = direction.dot(&(point - guess));
+            slopes.set_row(4, &direction.transpose());
+            let factors = slopes.lu();
+            if value.amax() < BALANCED {
+                // Along the curve nothing but the fifth equation changes.
+                let tangent = factors.solve(&Point::from_fn(|i, _| f64::from(i == 4)))?;
+                return Some((point, tangent.normalize()));
+            }
+            let step = factors.solve(&value)?;
+            // A long step has left the curve that was followed.
+            if !step.iter().all(|x| x.is_finite()) || step.norm() > 20.0 {
+                return None;
+            }
+            point -= step;
+        }
+        None
+    }
+
+    fn trim(&self, speed: f64, point: &Point) -> Trim {
+        let unknown: [f64; UNKNOWNS] = std::array::from_fn(|i| point[i] * SCALES[i]);
+        let [sideslip_rad, across, roll_rad, slip_ratio, steer_rad] = unknown;
+        let yaw_rate_radps = across / speed;
+        let body = BodyState {
+            vx: speed * sideslip_rad.cos(),
+            vy: speed * sideslip_rad.sin(),
+            yaw_rate: yaw_rate_radps,
+            roll: roll_rad,
+            roll_rate: 0.0,
+        };
+        let chassis = &self.plain.chassis;
+        let aero = aero_forces(chassis, body.vx);
+        let push = -body.vy * yaw_rate_radps - aero.drag / chassis.mass;
+        Trim {
+            steer_rad,
+            ay_mps2: across,
+            yaw_rate_radps,
+            sideslip_rad,
+            roll_rad,
+            slip_ratio,
+            wheel_load_n: wheel_loads(chassis, &body, push, &aero),
+        }
+    }
+
+    /// The tyres' acceleration (m/s^2) running straight at `speed` with these slip ratios of the axles.
+    fn push(&self, speed: f64, slip: [f64; 2]) -> f64 {
+        let chassis = &self.plain.chassis;
+        let drag = self.drag(speed);
+        let mut state = CarState::straight(speed);
+        let wheel_speed = std::array::from_fn(|wheel| {
+            let radius = [chassis.radius_front, chassis.radius_rear][wheel / 2];
+            speed * (1.0 + slip[wheel / 2]) / radius
+        });
+        let input = CarInput {
+            wheel_speed,
+            steer: -chassis.steer_offset / chassis.steer_scale,
+        };
+        // Load transfer and push settle on each other; what one moves the other is a sixth at most.
+        for _ in 0..40 {
+            let rate = self.plain.rate(&state, &input).state.pitch_acceleration;
+            state.pitch_acceleration += rate * chassis.pitch_lag;
+        }
+        state.pitch_acceleration + drag
+    }
+}
+
+/// The argument between `low` and `high` where `f` is greatest, to a ten-thousandth of the range: the best of an
+/// even scan, narrowed by golden sections.
+fn greatest(low: f64, high: f64, f: impl Fn(f64) -> f64) -> f64 {
+    const SCAN: usize = 24;
+    const GOLDEN: f64 = 0.618_033_988_749_894_9;
+    let step = (high - low) / SCAN as f64;
+    let at = |i: usize| low + step * i as f64;
+    let best = (0..=SCAN)
+        .max_by(|&i, &j| f(at(i)).total_cmp(&f(at(j))))
+        .unwrap_or(0);
+    let (mut a, mut b) = ((at(best) - step).max(low), (at(best) + step).min(high));
+    while b - a > 1e-4 * (high - low) {
+        let (c, d) = (b - GOLDEN * (b - a), a + GOLDEN * (b - a));
+        if f(c) > f(d) { b = d } else { a = c }
+    }
+    0.5 * (a + b)
+}
+
+/// Slip ratio up to which limits are looked for.
+const GREATEST_SLIP: f64 = 0.4;
+
+impl<T: Tyre<f64>, D: Tyre<Exact>> SteadyCar for Ready<T, D> {
+    fn cornering(&self, speed: f64, greatest_steer: f64) -> Vec<Trim> {
+        let steering = Point::from_fn(|i, _| f64::from(i == 4));
+        let Some((mut point, mut tangent)) = self.solve(speed, &Point::zeros(), &steering) else {
+            return Vec::new();
+        };
+        // To the left: a yaw rate to the left, whichever way the steering goes.
+        if tangent[1] < 0.0 {
+            tangent = -tangent;
+        }
+        let mut trims = vec![self.trim(speed, &point)];
+        let mut peak = 0.0f64;
+        let mut length = 0.1;
+        while length > SHORTEST_STEP && trims.len() < MOST_POINTS {
+            let guess = point + tangent * length;
+            let Some((next, direction)) = self.solve(speed, &guess, &tangent) else {
+                length *= 0.5;
+                continue;
+            };
+            // Two tangents across one another are two branches, not one step of a curve.
+            let ahead = direction.dot(&tangent);
+            if ahead.abs() < 0.9 {
+                length *= 0.5;
+                continue;
+            }
+            (point, tangent) = (next, direction * ahead.signum());
+            length = (1.4 * length).min(LONGEST_STEP);
+            let trim = self.trim(speed, &point);
+            if trim.steer_rad.abs() > greatest_steer || trim.sideslip_rad.abs() > GREATEST_SIDESLIP {
+                break;
+            }
+            peak = peak.max(trim.ay_mps2);
+            trims.push(trim);
+            if trim.ay_mps2 < PAST_THE_PEAK * peak {
+                break;
+            }
+        }
+        trims
+    }
+
+    fn greatest_braking(&self, speed: f64) -> f64 {
+        let mut slip = [-0.1; 2];
+        // Each axle's best slip depends on the other's through the loads alone, so that a few rounds settle it.
+        for _ in 0..3 {
+            slip[0] = greatest(-GREATEST_SLIP, 0.0, |s| -self.push(speed, [s, slip[1]]));
+            slip[1] = greatest(-GREATEST_SLIP, 0.0, |s| -self.push(speed, [slip[0], s]));
+        }
+        -self.push(speed, slip)
+    }
+
+    fn greatest_traction(&self, speed: f64) -> f64 {
+        let slip = greatest(0.0, GREATEST_SLIP, |s| self.push(speed, [0.0, s]));
+        self.push(speed, [0.0, slip])
+    }
+
+    fn drag(&self, speed: f64) -> f64 {
+        aero_forces(&self.plain.chassis, speed).drag / self.plain.chassis.mass
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::vehicle::{Powertrain, Tyres};
+
+    /// A car on tyres whose side force is proportional to slip angle and load, with even aero and its loads even.
+    fn linear_car() -> Car {
+        let mut car = Car::bundled().unwrap();
+        let tyre = |stiffness: f64| LinearTyre {
+            nominal_load: 3000.0,
+            slip_stiffness: 60_000.0,
+            cornering_stiffness: stiffness,
+            trail: 0.0,
+        };
+        car.tyres = Tyres::Linear {
+            front: tyre(40_000.0),
+            rear: tyre(55_000.0),
+        };
+        car
+    }
+
+    #[test]
+    fn a_linear_car_steers_as_the_bicycle_model_has_it() {
+        let mut car = linear_car();
+        car.chassis.lift_area = 0.0;
+        car.chassis.drag_area = 0.0;
+        let c = car.chassis;
+        let (a, b, speed) = (c.cg_to_front, c.cg_to_rear, 30.0);
+        // Loads are static without aero or push, so an axle's stiffness is two tyres' at their static load.
+        let weight = c.mass * c.gravity;
+        let stiffness = |per_tyre: f64, share: f64| per_tyre * weight * share / 3000.0;
+        let front = stiffness(40_000.0, b / (a + b));
+        let rear = stiffness(55_000.0, a / (a + b));
+        let gradient = c.mass / (a + b) * (b / front - a / rear);
+        let trims = steady_car(&car).cornering(speed, 0.17);
+        let small = trims.iter().find(|t| t.ay_mps2 > 0.01).unwrap();
+        let bicycle = (a + b) * small.ay_mps2 / speed.powi(2) + gradient * small.ay_mps2;
+        // The first point lies at a few hundredths of a m/s^2: angles of 1e-3 rad, whose squares are a millionth,
+        // and load transfer of 1e-3 of the load, which cancels across an axle of tyres linear in load.
+        assert!(
+            (small.steer_rad / bicycle - 1.0).abs() < 1e-4,
+            "{} {bicycle}",
+            small.steer_rad
+        );
+    }
+
+    #[test]
+    fn trims_of_the_bundled_car_stand_still_and_reach_a_peak() {
+        let car = Car::bundled().unwrap();
+        let steady = steady_car(&car);
+        for speed in [16.0, 25.0, 45.0, 65.0] {
+            let trims = steady.cornering(speed, 0.1745);
+            let peak = trims.iter().map(|t| t.ay_mps2).fold(0.0, f64::max);
+            assert!(trims.len() > 10 && peak > 10.0, "{speed}: {} {peak}", trims.len());
+            // What the wheels carry is the car and its downforce.
+            let aero = aero_forces(&car.chassis, speed * trims[5].sideslip_rad.cos());
+            let carried: f64 = trims[5].wheel_load_n.iter().sum();
+            let weight = car.chassis.mass * car.chassis.gravity + aero.downforce_front + aero.downforce_rear;
+            assert!((carried / weight - 1.0).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn braking_finds_both_axles_peaks() {
+        let car = Car::bundled().unwrap();
+        let steady = steady_car(&car);
+        let found = steady.greatest_braking(40.0);
+        let ready = Ready::<MagicFormula<f64>, MagicFormula<Exact>>::new(&car);
+        let scanned = (0..=80)
+            .flat_map(|i| (0..=80).map(move |j| [-0.005 * f64::from(i), -0.005 * f64::from(j)]))
+            .map(|slip| -ready.push(40.0, slip))
+            .fold(0.0, f64::max);
+        // The scan is coarser than the search: it may fall short by the curvature of the peak over 0.005 of slip.
+        assert!(found >= scanned && found < 1.002 * scanned, "{found} {scanned}");
+        assert!(steady.greatest_traction(40.0) < found);
+    }
+
+    #[test]
+    fn the_engine_has_no_part_in_traction() {
+        let mut car = Car::bundled().unwrap();
+        let before = steady_car(&car).greatest_traction(30.0);
+        car.powertrain = None::<Powertrain>;
+        assert_eq!(steady_car(&car).greatest_traction(30.0), before);
+    }
+}
