@@ -5,8 +5,8 @@
 
 mod backend;
 pub mod gpu;
-pub mod point;
 pub mod line;
+pub mod point;
 pub mod replay;
 pub mod simd;
 

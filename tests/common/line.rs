@@ -33,6 +33,7 @@ fn cut(name: &str, right_m: Vec<DVec2>, left_m: Vec<DVec2>, closed: bool) -> Cro
     } else {
         last
     };
+    let count = right_m.len();
     CrossSections {
         name: name.to_owned(),
         closed,
@@ -40,6 +41,7 @@ fn cut(name: &str, right_m: Vec<DVec2>, left_m: Vec<DVec2>, closed: bool) -> Cro
         station_m,
         right_m,
         left_m,
+        reference: vec![0.5; count],
         sections: Vec::new(),
         corners: Vec::new(),
     }
