@@ -1,6 +1,8 @@
 //! Points of a line, its segments and curvature, and the derivatives of both in reverse.
 
 use super::bounds::{Bounds, RowBound};
+use crate::Result;
+use crate::line::{LinePlan, Parametrisation, SectionRow};
 use crate::track::CrossSections;
 use glam::DVec2;
 
@@ -42,13 +44,43 @@ impl LineMap {
 
     /// One variable for each cut: the line's `alpha` there.
     pub fn at_every_cut(cuts: &CrossSections) -> Self {
-        Self::of_shares(cuts, cuts.len(), |i| vec![(i, 1.0)])
+        let points = (0..cuts.len()).map(|i| (cuts.right_m[i], vec![(i, cuts.left_m[i] - cuts.right_m[i])]));
+        Self::new(cuts.closed, cuts.len(), points)
     }
 
-    /// `alpha` as a cubic B-spline with `controls` evenly spaced over the cuts' stations; on an open circuit the outer
-    /// controls lie at the ends and are doubled, so that a straight row of controls gives a straight line.
-    pub fn b_spline(cuts: &CrossSections, controls: usize) -> Self {
-        Self::of_shares(cuts, controls, |i| spline_shares(cuts, controls, i))
+    /// The variables of a parametrisation, and the bounds that keep them and the line within theirs.
+    ///
+    /// # Errors
+    /// [`crate::Error::Input`] if the parametrisation does not fit the cuts.
+    pub fn parametrised(cuts: &CrossSections, parametrisation: &Parametrisation) -> Result<(Self, Bounds)> {
+        let mut plan = LinePlan::of_cuts(&cuts.right_m, &cuts.left_m, cuts.closed);
+        parametrisation.apply(cuts, &mut plan)?;
+        let variables = parametrisation.variables(cuts);
+        let shares = |row: &SectionRow<f64>| {
+            let terms = row.sources.iter().zip(&row.weights).take(plan.terms);
+            let used = terms.filter(|(_, weight)| **weight != 0.0);
+            used.map(|(source, weight)| (*source as usize, *weight))
+                .collect::<Vec<_>>()
+        };
+        let points = plan.rows.iter().enumerate().map(|(i, row)| {
+            let across = cuts.left_m[i] - cuts.right_m[i];
+            let reach = shares(row).into_iter().map(|(k, share)| (k, share * across));
+            (cuts.right_m[i] + row.constant * across, reach.collect())
+        });
+        let map = Self::new(cuts.closed, variables.len(), points);
+        // A single variable at a section is within its own bounds.
+        let sums = plan.rows.iter().filter(|_| plan.terms > 1);
+        let rows = sums.map(|row| RowBound {
+            terms: shares(row),
+            lower: -row.constant,
+            upper: 1.0 - row.constant,
+        });
+        let bounds = Bounds {
+            lower: variables.iter().map(|v| v.lower).collect(),
+            upper: variables.iter().map(|v| v.upper).collect(),
+            rows: rows.collect(),
+        };
+        Ok((map, bounds))
     }
 
     /// A line `base` (its `alpha` on every cut) moved along the cuts by a cubic B-spline with `controls` (m, to the left),
@@ -75,20 +107,6 @@ impl LineMap {
             rows: rows.collect(),
         };
         (Self::new(cuts.closed, controls, reaches), bounds)
-    }
-
-    /// `alpha` on every cut a sum of shares of the variables.
-    fn of_shares(
-        cuts: &CrossSections,
-        variables: usize,
-        shares: impl Fn(usize) -> Vec<(usize, f64)>,
-    ) -> Self {
-        let points = (0..cuts.len()).map(|i| {
-            let across = cuts.left_m[i] - cuts.right_m[i];
-            let reach = shares(i).into_iter().map(|(k, share)| (k, share * across));
-            (cuts.right_m[i], reach.collect())
-        });
-        Self::new(cuts.closed, variables, points)
     }
 
     /// Number of variables.
@@ -127,7 +145,8 @@ impl LineMap {
     }
 }
 
-/// What each of `controls` evenly spaced controls of a cubic B-spline counts at cut `i`.
+/// What each of `controls` evenly spaced controls of a cubic B-spline counts at cut `i`; the outer ones of an open
+/// circuit count for those that would lie beyond its ends.
 fn spline_shares(cuts: &CrossSections, controls: usize, i: usize) -> Vec<(usize, f64)> {
     let last = controls as isize - 1;
     let spans = if cuts.closed { controls as f64 } else { last as f64 };
