@@ -99,7 +99,7 @@ pub(super) fn check(map: &LineMap, bounds: &Bounds) -> Result<()> {
         .lower
         .iter()
         .zip(&bounds.upper)
-        .position(|(l, u)| !(l <= u));
+        .position(|(l, u)| l.is_nan() || u.is_nan() || l > u);
     if bounds.lower.len() != n || bounds.upper.len() != n || map.points() < 3 {
         return Err(Error::input(
             "the line",

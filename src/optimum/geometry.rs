@@ -230,7 +230,7 @@ impl Shape {
 
     /// Whether the line has two points in one place, where its heading is undefined.
     pub fn stands_still(&self) -> bool {
-        self.length_m.iter().any(|length| !(*length > 0.0))
+        !self.length_m.iter().all(|length| *length > 0.0)
     }
 
     /// Adds the change of segment `s` in `direction`, times the direction's length, by the variables to `terms`.
@@ -280,9 +280,9 @@ impl Shape {
         let n = self.turn_rad.len();
         let mut by_length = by_length.to_vec();
         let mut by_heading = vec![0.0; self.step_m.len()];
-        for i in 0..n {
+        for (i, by_curvature) in by_curvature.iter().enumerate() {
             if let (Some(before), Some(after)) = self.neighbours(i) {
-                let by_turn = by_curvature[i] / self.spacing_m[i];
+                let by_turn = by_curvature / self.spacing_m[i];
                 by_heading[after] += by_turn;
                 by_heading[before] -= by_turn;
                 let by_spacing = -by_turn * self.curvature_1pm[i];
