@@ -40,7 +40,7 @@ enum Command {
     Envelope(envelope::Arguments),
     /// List the GPUs that evaluations can run on, with their limits.
     Devices(devices::Arguments),
-    /// Measure evaluations per second against population, on every backend present.
+    /// Measure evaluations per second against population on every backend present, or compare optimisers.
     Bench(bench::Arguments),
 }
 

@@ -209,16 +209,18 @@ pub(super) fn crowding(rows: &[&[f64]]) -> Vec<f64> {
     let width = rows.first().map_or(0, |r| r.len());
     let mut order: Vec<usize> = (0..rows.len()).collect();
     for k in 0..width {
-        order.sort_by(|&a, &b| rows[a][k].total_cmp(&rows[b][k]).then(a.cmp(&b)));
+        let column: Vec<f64> = rows.iter().map(|r| r[k]).collect();
+        let value = |i: usize| column[i];
+        order.sort_by(|&a, &b| value(a).total_cmp(&value(b)).then(a.cmp(&b)));
         let (Some(&first), Some(&last)) = (order.first(), order.last()) else {
             continue;
         };
-        let range = rows[last][k] - rows[first][k];
+        let range = value(last) - value(first);
         distance[first] = f64::INFINITY;
         distance[last] = f64::INFINITY;
         if range > 0.0 {
             for w in order.windows(3) {
-                distance[w[1]] += (rows[w[2]][k] - rows[w[0]][k]) / range;
+                distance[w[1]] += (value(w[2]) - value(w[0])) / range;
             }
         }
     }

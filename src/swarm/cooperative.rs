@@ -3,7 +3,8 @@
 //! Van den Bergh, Engelbrecht, *A cooperative approach to particle swarm optimization*, IEEE TEC 8 (2004). The
 //! variables are split into groups, each with a swarm of its own. A particle is evaluated in the context of the
 //! other groups' best, so a good value of one group is not lost because another group was bad at the same time.
-//! The groups take turns, one in each iteration, each from the context that the one before has left.
+//! The groups take turns, one in each iteration, each from the context that the one before has left. Before that,
+//! all groups together draw whole candidates until one of these can be evaluated: it is the first context.
 
 use super::motion::{Particles, Purpose};
 use super::settings::{BoundHandling, Constriction, PsoSettings, Randomness, Schedule, setting};
@@ -71,6 +72,31 @@ struct Group {
     random: Random,
 }
 
+impl Group {
+    /// Takes the costs of its particles.
+    fn note(&mut self, costs: &[f64]) {
+        for (particle, &cost) in costs.iter().enumerate() {
+            if cost < self.best_cost[particle] {
+                self.best_cost[particle] = cost;
+                let range = self.particles.row(particle);
+                self.best_position[range.clone()].copy_from_slice(&self.particles.position[range]);
+            }
+        }
+    }
+
+    /// Moves its particles; it has as many turns as are `planned`.
+    fn advance(&mut self, leader: &[f64], settings: &PsoSettings, planned: usize) {
+        let share = (self.turns as f64 / planned as f64).min(1.0);
+        for particle in 0..self.particles.count {
+            let own = &self.best_position[self.particles.row(particle)];
+            let when = (share, self.turns);
+            self.particles
+                .pull(particle, (own, leader), settings, when, self.random);
+        }
+        self.turns += 1;
+    }
+}
+
 /// Groups of particles about a common context; minimises the first objective.
 #[derive(Clone, Debug)]
 pub struct CooperativeSwarm {
@@ -81,6 +107,8 @@ pub struct CooperativeSwarm {
     /// The best position of each group, put together, and its cost.
     context: Vec<f64>,
     cost: f64,
+    /// Turns that the groups have had; none before there is a context that can be evaluated.
+    turns: usize,
     iteration: usize,
     evaluations: u64,
 }
@@ -123,10 +151,20 @@ impl CooperativeSwarm {
             objectives: problem.objectives.len(),
             groups,
             context,
-            cost: f64::INFINITY,
+            cost: FAILED_COST,
+            turns: 0,
             iteration: 0,
             evaluations: 0,
         })
+    }
+
+    /// The groups that the next candidates differ in.
+    fn moving(&self) -> Range<usize> {
+        if self.turns == 0 {
+            return 0..self.groups.len();
+        }
+        let turn = self.turns % self.groups.len();
+        turn..turn + 1
     }
 
     /// The best candidate so far, in the variables' units, and its cost.
@@ -137,50 +175,55 @@ impl CooperativeSwarm {
 
 impl Optimiser for CooperativeSwarm {
     fn ask(&mut self) -> Vec<f64> {
-        let group = &self.groups[self.iteration % self.groups.len()];
+        let count = self.settings.motion.population;
+        let moving = self.moving();
         let row = |particle: usize| {
             let mut position = self.context.clone();
-            position[group.columns.clone()]
-                .copy_from_slice(&group.particles.position[group.particles.row(particle)]);
+            for group in &self.groups[moving.clone()] {
+                position[group.columns.clone()]
+                    .copy_from_slice(&group.particles.position[group.particles.row(particle)]);
+            }
             position
         };
-        let rows: Vec<f64> = (0..group.particles.count).flat_map(row).collect();
-        self.space.scaled(&rows, group.particles.count)
+        let rows: Vec<f64> = (0..count).flat_map(row).collect();
+        self.space.scaled(&rows, count)
     }
 
     fn tell(&mut self, evaluation: &Evaluation) {
-        let turn = self.iteration % self.groups.len();
-        let planned = (self.settings.motion.iterations / self.groups.len()).max(2) - 1;
-        let group = &mut self.groups[turn];
-        for (particle, row) in evaluation.objectives.chunks_exact(self.objectives).enumerate() {
-            let cost = if row[0].is_finite() { row[0] } else { FAILED_COST };
-            let range = group.particles.row(particle);
-            let position = &group.particles.position[range.clone()];
-            if cost < group.best_cost[particle] {
-                group.best_cost[particle] = cost;
-                group.best_position[range].copy_from_slice(position);
-            }
+        let costs: Vec<f64> = evaluation
+            .objectives
+            .chunks_exact(self.objectives)
+            .map(|row| if row[0].is_finite() { row[0] } else { FAILED_COST })
+            .collect();
+        let moving = self.moving();
+        for group in &mut self.groups[moving.clone()] {
+            group.note(&costs);
+        }
+        for (particle, &cost) in costs.iter().enumerate() {
             if cost < self.cost {
                 self.cost = cost;
-                self.context[group.columns.clone()].copy_from_slice(position);
+                for group in &self.groups[moving.clone()] {
+                    self.context[group.columns.clone()]
+                        .copy_from_slice(&group.particles.position[group.particles.row(particle)]);
+                }
             }
         }
-        let leader = self.context[group.columns.clone()].to_vec();
-        let share = (group.turns as f64 / planned as f64).min(1.0);
-        for particle in 0..group.particles.count {
-            let own = &group.best_position[group.particles.row(particle)];
-            let when = (share, group.turns);
-            group.particles.pull(
-                particle,
-                (own, &leader),
-                &self.settings.motion,
-                when,
-                group.random,
-            );
-        }
-        group.turns += 1;
-        self.evaluations += group.particles.count as u64;
+        self.evaluations += costs.len() as u64;
         self.iteration += 1;
+        if self.cost >= FAILED_COST {
+            for group in &mut self.groups {
+                for particle in 0..group.particles.count {
+                    group.particles.rescatter(particle, self.iteration, group.random);
+                }
+            }
+            return;
+        }
+        let planned = (self.settings.motion.iterations / self.groups.len()).max(2) - 1;
+        for group in &mut self.groups[moving] {
+            let leader = self.context[group.columns.clone()].to_vec();
+            group.advance(&leader, &self.settings.motion, planned);
+            self.turns += 1;
+        }
     }
 
     fn iteration(&self) -> usize {

@@ -17,6 +17,7 @@
 //! 9. Zitzler, Laumanns, Thiele, *SPEA2*, TIK report 103 (2001) (truncation by the nearest neighbours).
 
 mod archive;
+pub mod comparison;
 mod cooperative;
 mod covariance;
 mod difference;

@@ -34,15 +34,10 @@ impl Distribution {
         }
     }
 
-    /// The point that standard normal deviates stand for, reflected at the bounds, so that the density does not
-    /// pile up on them.
+    /// The point that standard normal deviates stand for, which may lie beyond the bounds.
     pub fn sample(&self, normal: impl Fn(usize) -> f64) -> DVector<f64> {
         let z = DVector::from_fn(self.mean.len(), |k, _| self.scales[k] * normal(k));
-        let position = &self.mean + &self.basis * z * self.step;
-        position.map(|x| {
-            let folded = x.rem_euclid(2.0);
-            if folded > 1.0 { 2.0 - folded } else { folded }
-        })
+        &self.mean + &self.basis * z * self.step
     }
 
     /// The greatest standard deviation in any direction.

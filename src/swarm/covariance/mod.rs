@@ -71,7 +71,7 @@ pub struct CovarianceSwarm {
     objectives: usize,
     random: Random,
     distribution: Distribution,
-    /// Positions of the present population in the unit cube.
+    /// The present population over the plane that the unit cube tiles by reflection, see [`folded`].
     positions: Vec<DVector<f64>>,
     best: (DVector<f64>, f64),
     /// Best costs of the last iterations since the last start.
@@ -150,7 +150,8 @@ impl CovarianceSwarm {
 
     /// The best candidate so far, in the variables' units, and its cost.
     pub fn best_candidate(&self) -> (Vec<f64>, f64) {
-        (self.space.scaled(self.best.0.as_slice(), 1), self.best.1)
+        let position: Vec<f64> = self.best.0.iter().copied().map(folded).collect();
+        (self.space.scaled(&position, 1), self.best.1)
     }
 
     fn budget(&self) -> u64 {
@@ -214,9 +215,21 @@ impl CovarianceSwarm {
     }
 }
 
+/// A coordinate reflected into the unit cube. The distribution itself knows nothing of the bounds: an optimum on a
+/// bound is one in the open to it, with its mirror image beyond. If it were shown the reflected particles, all of
+/// their steps at a bound would seem to lead inwards.
+fn folded(x: f64) -> f64 {
+    let twice = x.rem_euclid(2.0);
+    if twice > 1.0 { 2.0 - twice } else { twice }
+}
+
 impl Optimiser for CovarianceSwarm {
     fn ask(&mut self) -> Vec<f64> {
-        let rows: Vec<f64> = self.positions.iter().flat_map(|p| p.iter().copied()).collect();
+        let rows: Vec<f64> = self
+            .positions
+            .iter()
+            .flat_map(|p| p.iter().copied().map(folded))
+            .collect();
         self.space.scaled(&rows, self.positions.len())
     }
 

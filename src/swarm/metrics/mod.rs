@@ -19,6 +19,7 @@ mod contribution;
 mod hypervolume;
 mod indicators;
 mod non_dominated;
+mod significance;
 mod staircase;
 
 pub use contribution::contributions;
@@ -26,3 +27,4 @@ pub(super) use contribution::exclusive;
 pub use hypervolume::hypervolume;
 pub use indicators::{Scale, epsilon, igd_plus, spread};
 pub use non_dominated::non_dominated;
+pub use significance::signed_rank;

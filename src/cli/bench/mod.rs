@@ -1,4 +1,6 @@
-//! `lapswarm bench`: evaluations per second against population.
+//! `lapswarm bench`: evaluations per second against population, and how good the optimisers are.
+
+mod optimisers;
 
 use super::{backend_flag, print_json};
 use lapswarm::Result;
@@ -15,7 +17,10 @@ use std::time::Instant;
 
 /// Flags of `bench`.
 #[derive(clap::Args)]
+#[command(args_conflicts_with_subcommands = true)]
 pub struct Arguments {
+    #[command(subcommand)]
+    what: Option<What>,
     /// Populations to measure
     #[arg(long, value_delimiter = ',', default_value = "64,256,1024,4096")]
     populations: Vec<usize>,
@@ -31,6 +36,12 @@ pub struct Arguments {
     /// Print one JSON object
     #[arg(long)]
     json: bool,
+}
+
+#[derive(clap::Subcommand)]
+enum What {
+    /// Compare the optimisers on problems whose answers are known.
+    Optimisers(optimisers::Arguments),
 }
 
 #[derive(Serialize)]
@@ -60,6 +71,9 @@ const MOST_FOR_CPU: usize = 64;
 
 /// Measures and prints.
 pub fn run(arguments: &Arguments) -> Result<()> {
+    if let Some(What::Optimisers(arguments)) = &arguments.what {
+        return optimisers::run(arguments);
+    }
     let setup = set_up(&IdentifySettings::default())?;
     let replay = &setup.replay;
     let base = replay.base();

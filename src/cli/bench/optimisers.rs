@@ -1,0 +1,160 @@
+//! `lapswarm bench optimisers`: every algorithm on every test problem.
+
+use crate::cli::print_json;
+use lapswarm::swarm::comparison::{MULTI_OBJECTIVE, SINGLE_OBJECTIVE, compare, quartiles};
+use lapswarm::swarm::metrics::signed_rank;
+use lapswarm::swarm::problems::{NAMES, TestProblem};
+use lapswarm::{Error, Result};
+use serde::Serialize;
+
+/// Flags of `bench optimisers`.
+#[derive(clap::Args)]
+pub struct Arguments {
+    /// Runs of each algorithm, seeds 1 to N
+    #[arg(long, value_name = "N", default_value_t = 11, value_parser = clap::value_parser!(u64).range(1..=60))]
+    seeds: u64,
+    /// Only these problems [default: all]
+    #[arg(long, value_delimiter = ',', value_name = "NAMES")]
+    problems: Vec<String>,
+    /// Only these algorithms [default: all]
+    #[arg(long, value_delimiter = ',', value_name = "NAMES")]
+    algorithms: Vec<String>,
+    /// Print one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+/// One algorithm on one problem; hypervolume for several objectives, error for one.
+#[derive(Serialize)]
+struct Row {
+    problem: &'static str,
+    algorithm: &'static str,
+    seeds: u64,
+    hypervolume_median: Option<f64>,
+    hypervolume_iqr: Option<f64>,
+    igd_plus_median: Option<f64>,
+    error_median: Option<f64>,
+    error_iqr: Option<f64>,
+    best_peer: Option<f64>,
+    better_than_peer_p: Option<f64>,
+}
+
+#[derive(Serialize)]
+struct Table {
+    study: &'static str,
+    rows: Vec<Row>,
+}
+
+/// The best median that another library's optimiser reaches at the same budget, measured with `jmetalpy` (SMPSO),
+/// `pymoo` (NSGA-II, SMS-EMOA, MOPSO-CD, PSO) and `pygmo` (PSO): hypervolume, or the error for one objective.
+const PEERS: [(&str, f64); 11] = [
+    ("zdt1", 0.8719),
+    ("zdt2", 0.5386),
+    ("zdt3", 0.7255),
+    ("zdt4", 0.8714),
+    ("zdt6", 0.6114),
+    ("dtlz2", 0.757),
+    ("sphere", 0.0),
+    ("rosenbrock", 17.0),
+    ("rastrigin", 4.0),
+    ("ackley", 7e-11),
+    ("griewank", 0.0),
+];
+
+/// Measures and prints.
+pub fn run(arguments: &Arguments) -> Result<()> {
+    check("--problems", &arguments.problems, &NAMES)?;
+    let algorithms = [MULTI_OBJECTIVE, SINGLE_OBJECTIVE].concat();
+    check("--algorithms", &arguments.algorithms, &algorithms)?;
+    let wanted = |chosen: &[String], name: &str| chosen.is_empty() || chosen.iter().any(|c| c == name);
+    let mut rows = Vec::new();
+    if !arguments.json {
+        println!("medians and interquartile ranges of {} seeds", arguments.seeds);
+        println!(
+            "{:<12}{:<18}{:>14}{:>10}{:>12}{:>14}{:>10}{:>12}{:>12}",
+            "problem", "algorithm", "hypervolume", "IQR", "IGD+", "error", "IQR", "best peer", "p"
+        );
+    }
+    for problem in NAMES
+        .into_iter()
+        .filter(|n| wanted(&arguments.problems, n))
+        .filter_map(TestProblem::by_name)
+    {
+        let single = problem.problem().objectives.len() == 1;
+        let algorithms = if single { SINGLE_OBJECTIVE } else { MULTI_OBJECTIVE };
+        for algorithm in algorithms
+            .into_iter()
+            .filter(|a| wanted(&arguments.algorithms, a))
+        {
+            let row = measure(&problem, algorithm, arguments.seeds)?;
+            if !arguments.json {
+                print_row(&row);
+            }
+            rows.push(row);
+        }
+    }
+    if arguments.json {
+        print_json(&Table {
+            study: "bench optimisers",
+            rows,
+        })?;
+    }
+    Ok(())
+}
+
+fn check(flag: &str, chosen: &[String], known: &[&str]) -> Result<()> {
+    match chosen.iter().find(|c| !known.contains(&c.as_str())) {
+        Some(name) => Err(Error::input(flag, "name", name, known.join(", "))),
+        None => Ok(()),
+    }
+}
+
+fn measure(problem: &TestProblem, algorithm: &'static str, seeds: u64) -> Result<Row> {
+    let scores = compare(algorithm, problem, seeds)?;
+    let values: Vec<f64> = scores.iter().map(|s| s.quality).collect();
+    let distances: Vec<f64> = scores.iter().filter_map(|s| s.igd_plus).collect();
+    let [low, median, high] = quartiles(&values);
+    let single = distances.is_empty();
+    let best_peer = PEERS.iter().find(|p| p.0 == problem.name()).map(|p| p.1);
+    let better_than_peer_p = best_peer.and_then(|figure| {
+        if single {
+            let negated: Vec<f64> = values.iter().map(|x| -x).collect();
+            signed_rank(&negated, -figure)
+        } else {
+            signed_rank(&values, figure)
+        }
+    });
+    Ok(Row {
+        problem: problem.name(),
+        algorithm,
+        seeds,
+        hypervolume_median: (!single).then_some(median),
+        hypervolume_iqr: (!single).then_some(high - low),
+        igd_plus_median: (!single).then(|| quartiles(&distances)[1]),
+        error_median: single.then_some(median),
+        error_iqr: single.then_some(high - low),
+        best_peer,
+        better_than_peer_p,
+    })
+}
+
+fn print_row(row: &Row) {
+    let fixed = |x: Option<f64>| x.map_or(String::new(), |x| format!("{x:.4}"));
+    let short = |x: Option<f64>| x.map_or(String::new(), |x| format!("{x:.1e}"));
+    let peer = match row.hypervolume_median {
+        Some(_) => fixed(row.best_peer),
+        None => short(row.best_peer),
+    };
+    println!(
+        "{:<12}{:<18}{:>14}{:>10}{:>12}{:>14}{:>10}{:>12}{:>12}",
+        row.problem,
+        row.algorithm,
+        fixed(row.hypervolume_median),
+        short(row.hypervolume_iqr),
+        fixed(row.igd_plus_median),
+        short(row.error_median),
+        short(row.error_iqr),
+        peer,
+        short(row.better_than_peer_p),
+    );
+}

@@ -1,0 +1,247 @@
+//! Every algorithm on every test problem at the same budget.
+//!
+//! Conventions: 25,000 evaluations, swarm and archive of 100, hypervolume with reference 1.1 per objective and IGD+
+//! on the scale of the true front; for one objective 100,000 evaluations, 40 particles, and the distance of the
+//! best cost from the optimum's.
+
+use super::metrics::{Scale, hypervolume, igd_plus};
+use super::problems::TestProblem;
+use super::{
+    CooperativeSettings, CooperativeSwarm, CovarianceSettings, CovarianceSwarm, DifferenceSettings,
+    DifferenceSwarm, HybridSettings, HybridSwarm, Mopso, MopsoSettings, Mutation, Nsga2, Nsga2Settings,
+    Optimiser, Pso, PsoSettings, Restarts, Truncation, run,
+};
+use crate::error::{Error, Result};
+use crate::evaluate::Problem;
+use rayon::prelude::*;
+use std::ops::ControlFlow;
+
+/// Names of the algorithms for several objectives; `default` is [`MopsoSettings::default`].
+pub const MULTI_OBJECTIVE: [&str; 6] = [
+    "default",
+    "default_nearest",
+    "smpso",
+    "nsga2",
+    "thesis",
+    "thesis_random_mu",
+];
+/// Names of the algorithms for one objective; `default` is [`HybridSettings::default`].
+pub const SINGLE_OBJECTIVE: [&str; 6] = [
+    "default",
+    "pso",
+    "covariance",
+    "difference",
+    "cooperative",
+    "thesis",
+];
+
+/// Particles and evaluations of a comparison.
+fn budget(problem: &Problem) -> (usize, usize) {
+    if problem.objectives.len() > 1 {
+        (100, 25_000)
+    } else {
+        (40, 100_000)
+    }
+}
+
+/// Reference point of the hypervolume on the true front's scale, in every objective.
+pub const REFERENCE: f64 = 1.1;
+/// Points of the true front that IGD+ is taken over, about.
+const FRONT_POINTS: usize = 2000;
+
+/// The optimiser of that name for `problem` at the budget of the comparison.
+///
+/// # Errors
+/// [`Error::Input`] if there is none of that name for so many objectives.
+pub fn optimiser(name: &str, problem: &Problem, seed: u64) -> Result<Box<dyn Optimiser + Send>> {
+    let (population, evaluations) = budget(problem);
+    let iterations = evaluations / population;
+    let mopso = |settings: MopsoSettings| -> Result<Box<dyn Optimiser + Send>> {
+        let motion = PsoSettings {
+            population,
+            iterations,
+            seed,
+            ..settings.motion
+        };
+        Ok(Box::new(Mopso::new(
+            problem,
+            MopsoSettings {
+                motion,
+                archive: population,
+                ..settings
+            },
+        )?))
+    };
+    let pso = |settings: PsoSettings| -> Result<Box<dyn Optimiser + Send>> {
+        let settings = PsoSettings {
+            population,
+            iterations,
+            seed,
+            ..settings
+        };
+        Ok(Box::new(Pso::new(problem, settings)?))
+    };
+    if problem.objectives.len() > 1 {
+        return match name {
+            "default" => mopso(MopsoSettings::default()),
+            "default_nearest" => mopso(MopsoSettings {
+                truncation: Truncation::MutualNearest,
+                ..MopsoSettings::default()
+            }),
+            "smpso" => mopso(MopsoSettings::smpso()),
+            "thesis" => mopso(MopsoSettings::thesis()),
+            "thesis_random_mu" => mopso(MopsoSettings {
+                mutation: Mutation::Random,
+                ..MopsoSettings::thesis()
+            }),
+            "nsga2" => {
+                let settings = Nsga2Settings {
+                    population,
+                    iterations,
+                    seed,
+                    ..Nsga2Settings::default()
+                };
+                Ok(Box::new(Nsga2::new(problem, settings)?))
+            }
+            _ => Err(unknown(name, &MULTI_OBJECTIVE)),
+        };
+    }
+    Ok(match name {
+        "default" => {
+            let settings = HybridSettings {
+                population,
+                iterations,
+                seed,
+                ..HybridSettings::default()
+            };
+            Box::new(HybridSwarm::new(problem, settings)?)
+        }
+        "pso" => pso(PsoSettings::default())?,
+        "thesis" => pso(PsoSettings::thesis())?,
+        "covariance" => {
+            let settings = CovarianceSettings {
+                population,
+                iterations,
+                seed,
+                spread: 0.3,
+                active: true,
+                restarts: Restarts::Alternating,
+            };
+            let middle: Vec<f64> = problem
+                .variables
+                .iter()
+                .map(|v| 0.5 * (v.lower + v.upper))
+                .collect();
+            Box::new(CovarianceSwarm::new(problem, &middle, settings)?)
+        }
+        "difference" => {
+            let settings = DifferenceSettings {
+                population,
+                iterations,
+                seed,
+                ..DifferenceSettings::default()
+            };
+            Box::new(DifferenceSwarm::new(problem, settings)?)
+        }
+        "cooperative" => {
+            let base = CooperativeSettings::default();
+            let motion = PsoSettings {
+                iterations: evaluations / base.motion.population,
+                seed,
+                ..base.motion
+            };
+            Box::new(CooperativeSwarm::new(
+                problem,
+                CooperativeSettings { motion, ..base },
+            )?)
+        }
+        _ => return Err(unknown(name, &SINGLE_OBJECTIVE)),
+    })
+}
+
+fn unknown(name: &str, known: &[&str]) -> Error {
+    Error::input("the comparison", "algorithm", name, known.join(", "))
+}
+
+/// What one run reached.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Score {
+    /// Hypervolume of what was found; for one objective how far the best cost is from the optimum's.
+    pub quality: f64,
+    /// IGD+; nothing for one objective.
+    pub igd_plus: Option<f64>,
+}
+
+/// Runs an algorithm on a problem once for each of the seeds from one to `seeds`, a run to a thread.
+///
+/// # Errors
+/// Those of [`optimiser`].
+pub fn compare(name: &str, problem: &TestProblem, seeds: u64) -> Result<Vec<Score>> {
+    let front = problem.front(FRONT_POINTS);
+    let scale = Scale::of(&front);
+    let front = scale.apply(&front);
+    let width = problem.problem().objectives.len();
+    (1..=seeds)
+        .into_par_iter()
+        .map(|seed| {
+            let mut optimiser = optimiser(name, problem.problem(), seed)?;
+            run(optimiser.as_mut(), &mut problem.evaluator(), |_| {
+                ControlFlow::Continue(())
+            })?;
+            let found = scale.apply(&optimiser.front().objectives);
+            Ok(if width == 1 {
+                Score {
+                    quality: found[0][0],
+                    igd_plus: None,
+                }
+            } else {
+                Score {
+                    quality: hypervolume(&found, &vec![REFERENCE; width])?,
+                    igd_plus: Some(igd_plus(&found, &front)?),
+                }
+            })
+        })
+        .collect()
+}
+
+/// First quartile, median and third quartile, by linear interpolation; not a number where there is no value.
+pub fn quartiles(values: &[f64]) -> [f64; 3] {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let last = sorted.len().saturating_sub(1);
+    let at = |share: f64| {
+        let place = share * last as f64;
+        let (below, above) = (
+            sorted.get(place.floor() as usize),
+            sorted.get(place.ceil() as usize),
+        );
+        match (below, above) {
+            (Some(a), Some(b)) => a + (b - a) * place.fract(),
+            _ => f64::NAN,
+        }
+    };
+    [0.25, 0.5, 0.75].map(at)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quartiles_by_hand() {
+        assert_eq!(quartiles(&[4.0, 1.0, 3.0, 2.0, 5.0]), [2.0, 3.0, 4.0]);
+        assert_eq!(quartiles(&[1.0, 2.0]), [1.25, 1.5, 1.75]);
+        assert!(quartiles(&[])[1].is_nan());
+    }
+
+    #[test]
+    fn all_names_are_known() {
+        for (problem, names) in [("zdt1", MULTI_OBJECTIVE), ("sphere", SINGLE_OBJECTIVE)] {
+            let problem = TestProblem::by_name(problem).unwrap();
+            for name in names {
+                optimiser(name, problem.problem(), 1).unwrap();
+            }
+            assert!(optimiser("best", problem.problem(), 1).is_err());
+        }
+    }
+}
