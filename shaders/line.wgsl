@@ -3,7 +3,9 @@
 // One lane per candidate. Segment lengths, curvatures and speeds squared stand in a buffer, section by section, so that
 // neighbouring lanes meet in neighbouring memory. All lanes start a lap's passes at the same section, for the same
 // reason. The constants CLOSED, TERMS, WANTS_INTEGRAL, WANTS_LAP, LIMIT_ROWS, CORNER_ROWS, ELLIPSE_ROWS and WORKGROUP
-// are generated.
+// are generated, and so are the bindings 1 and 2: `sections`, and `limits` in rows of lateral, grip, drive, drag at their
+// start and then of their rises. All lanes read the same section, so that these are uniform where they fit; limits only
+// where the driver does not mind that lanes read different rows.
 
 // What a dispatch is to do; twin of `LineStretch` in `src/evaluate/line/gpu.rs`.
 struct LineStretch {
@@ -29,23 +31,19 @@ struct Section {
 }
 
 @group(0) @binding(0) var<uniform> stretch: LineStretch;
-@group(0) @binding(1) var<storage, read> sections: array<Section>;
-// Rows of lateral, grip, drive, drag at their start and then of their rises.
-@group(0) @binding(2) var<storage, read> limits: array<vec4<f32>>;
 @group(0) @binding(3) var<storage, read> corners: array<vec2<f32>>;
 @group(0) @binding(4) var<storage, read> ellipse: array<vec2<f32>>;
 @group(0) @binding(5) var<storage, read> variables: array<f32>;
-@group(0) @binding(6) var<storage, read_write> course: array<f32>;
+// Length of the segment and curvature, section by section.
+@group(0) @binding(6) var<storage, read_write> course: array<vec2<f32>>;
+@group(0) @binding(7) var<storage, read_write> speeds_squared: array<f32>;
 // Planes of length, squared length, squared second differences, integral and time.
-@group(0) @binding(7) var<storage, read_write> results: array<f32>;
+@group(0) @binding(8) var<storage, read_write> results: array<f32>;
 
 const BLOCK: u32 = 64u;
-const LENGTH: u32 = 0u;
-const CURVATURE: u32 = 1u;
-const SPEED_SQUARED: u32 = 2u;
 
-fn place_of(plane: u32, section: u32, candidate: u32) -> u32 {
-    return (plane * stretch.sections + section) * stretch.stride + candidate;
+fn place_of(section: u32, candidate: u32) -> u32 {
+    return section * stretch.stride + candidate;
 }
 
 struct Segment {
@@ -118,8 +116,7 @@ fn shape(candidate: u32) -> vec4<f32> {
             }
         }
         if WANTS_LAP {
-            course[place_of(LENGTH, i, candidate)] = segment.length;
-            course[place_of(CURVATURE, i, candidate)] = curvature;
+            course[place_of(i, candidate)] = vec2<f32>(segment.length, curvature);
         }
         if (i + 1u) % BLOCK == 0u || i + 1u == segments {
             total = total + block;
@@ -129,8 +126,8 @@ fn shape(candidate: u32) -> vec4<f32> {
         here = next;
     }
     if WANTS_LAP && !CLOSED {
-        course[place_of(CURVATURE, 0u, candidate)] = course[place_of(CURVATURE, 1u, candidate)];
-        course[place_of(CURVATURE, n - 1u, candidate)] = course[place_of(CURVATURE, n - 2u, candidate)];
+        course[place_of(0u, candidate)].y = course[place_of(1u, candidate)].y;
+        course[place_of(n - 1u, candidate)] = vec2<f32>(0.0, course[place_of(n - 2u, candidate)].y);
     }
     return total;
 }
@@ -174,62 +171,65 @@ fn braked(end: f32, length: f32, there: f32, here: f32) -> f32 {
 
 fn lap_time(candidate: u32) -> f32 {
     let n = stretch.sections;
-    for (var i = 0u; i < n; i++) {
-        course[place_of(SPEED_SQUARED, i, candidate)] = corner(course[place_of(CURVATURE, i, candidate)]);
-    }
     let start = select(0u, stretch.start, CLOSED);
-    let first = place_of(SPEED_SQUARED, start, candidate);
-    if !CLOSED {
-        course[first] = min(course[first], stretch.entry);
-    }
     let steps = select(n - 1u, 2u * n, CLOSED);
 
     var here = start;
-    var speed_squared = course[first];
-    var curvature = course[place_of(CURVATURE, start, candidate)];
+    var bend = course[place_of(start, candidate)];
+    var speed_squared = corner(bend.y);
+    if !CLOSED {
+        speed_squared = min(speed_squared, stretch.entry);
+    }
+    speeds_squared[place_of(start, candidate)] = speed_squared;
     for (var i = 0u; i < steps; i++) {
         let next = select(0u, here + 1u, here + 1u < n);
-        let there = course[place_of(CURVATURE, next, candidate)];
-        let reached = driven(speed_squared, course[place_of(LENGTH, here, candidate)], curvature, there);
-        let known = course[place_of(SPEED_SQUARED, next, candidate)];
-        let slower = reached < known;
-        if slower {
-            course[place_of(SPEED_SQUARED, next, candidate)] = reached;
-        } else if i + 1u >= n {
+        let there = course[place_of(next, candidate)];
+        let reached = driven(speed_squared, bend.x, bend.y, there.y);
+        // The first time round a section is only held to its corner speed.
+        let again = i + 1u >= n;
+        var most: f32;
+        if again {
+            most = speeds_squared[place_of(next, candidate)];
+        } else {
+            most = corner(there.y);
+        }
+        let slower = reached < most;
+        if again && !slower {
             break;
         }
-        speed_squared = select(known, reached, slower);
-        curvature = there;
+        speed_squared = select(most, reached, slower);
+        speeds_squared[place_of(next, candidate)] = speed_squared;
+        bend = there;
         here = next;
     }
 
     var next = select(n - 1u, start, CLOSED);
-    speed_squared = course[place_of(SPEED_SQUARED, next, candidate)];
-    curvature = course[place_of(CURVATURE, next, candidate)];
+    speed_squared = speeds_squared[place_of(next, candidate)];
+    var curvature = course[place_of(next, candidate)].y;
     for (var i = 0u; i < steps; i++) {
         let before = select(n - 1u, next - 1u, next > 0u);
-        let there = course[place_of(CURVATURE, before, candidate)];
-        let reached = braked(speed_squared, course[place_of(LENGTH, before, candidate)], curvature, there);
-        let known = course[place_of(SPEED_SQUARED, before, candidate)];
+        let there = course[place_of(before, candidate)];
+        let reached = braked(speed_squared, there.x, curvature, there.y);
+        let known = speeds_squared[place_of(before, candidate)];
         let slower = reached < known;
         if slower {
-            course[place_of(SPEED_SQUARED, before, candidate)] = reached;
+            speeds_squared[place_of(before, candidate)] = reached;
         } else if i + 1u >= n {
             break;
         }
         speed_squared = select(known, reached, slower);
-        curvature = there;
+        curvature = there.y;
         next = before;
     }
 
     let segments = select(n - 1u, n, CLOSED);
     var total = 0.0;
     var block = 0.0;
-    var speed = sqrt(course[place_of(SPEED_SQUARED, 0u, candidate)]);
+    var speed = sqrt(speeds_squared[place_of(0u, candidate)]);
     for (var i = 0u; i < segments; i++) {
         let after = select(0u, i + 1u, i + 1u < n);
-        let to = sqrt(course[place_of(SPEED_SQUARED, after, candidate)]);
-        block = block + 2.0 * course[place_of(LENGTH, i, candidate)] / (speed + to);
+        let to = sqrt(speeds_squared[place_of(after, candidate)]);
+        block = block + 2.0 * course[place_of(i, candidate)].x / (speed + to);
         speed = to;
         if (i + 1u) % BLOCK == 0u || i + 1u == segments {
             total = total + block;

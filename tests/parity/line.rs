@@ -244,7 +244,7 @@ fn batches_and_dispatches_of_lines_do_not_show() {
         // Less than the least there can be, and two workgroups.
         LineBatching { bytes: 1, ..usual },
         LineBatching {
-            bytes: 2 * 64 * 3 * 120 * 4,
+            bytes: 2 * 64 * 2 * 120 * 4,
             ..usual
         },
         LineBatching {

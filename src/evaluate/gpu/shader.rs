@@ -99,6 +99,10 @@ pub struct LineShape {
     pub corner_rows: usize,
     /// Rows of the table of the ellipse, nought where there is none.
     pub ellipse_rows: usize,
+    /// Sections, if their table is to be uniform.
+    pub uniform_sections: Option<usize>,
+    /// Whether the table of limits is to be uniform.
+    pub uniform_limits: bool,
     /// Lanes of a workgroup.
     pub workgroup: u32,
 }
@@ -109,7 +113,8 @@ impl LineShape {
         let constants = format!(
             "\n// Generated.\nconst CLOSED: bool = {};\nconst TERMS: u32 = {}u;\nconst WANTS_INTEGRAL: bool = {};\n\
              const WANTS_LAP: bool = {};\nconst LIMIT_ROWS: u32 = {}u;\nconst CORNER_ROWS: u32 = {}u;\n\
-             const ELLIPSE_ROWS: u32 = {}u;\nconst WORKGROUP: u32 = {}u;\n\n",
+             const ELLIPSE_ROWS: u32 = {}u;\nconst WORKGROUP: u32 = {}u;\n\
+             @group(0) @binding(1) {};\n@group(0) @binding(2) {};\n\n",
             self.closed,
             self.terms,
             self.wanted.integral,
@@ -118,6 +123,15 @@ impl LineShape {
             self.corner_rows,
             self.ellipse_rows,
             self.workgroup,
+            match self.uniform_sections {
+                Some(count) => format!("var<uniform> sections: array<Section, {count}>"),
+                None => "var<storage, read> sections: array<Section>".to_owned(),
+            },
+            if self.uniform_limits {
+                format!("var<uniform> limits: array<vec4<f32>, {}>", 2 * self.limit_rows)
+            } else {
+                "var<storage, read> limits: array<vec4<f32>>".to_owned()
+            },
         );
         [ELEMENTARY, &constants, LINE].concat()
     }

@@ -52,8 +52,8 @@ pub struct LineStretch {
     pub rows_per_radius: f32,
 }
 
-/// Floats per candidate and section between the passes of a lap.
-const COURSE_PLANES: usize = 3;
+/// Floats per candidate and section in the course: length and curvature.
+const COURSE_WIDTH: usize = 2;
 /// Lanes of a workgroup, where the device allows: a multiple of every device's subgroup.
 const WORKGROUP: u32 = 64;
 
@@ -131,6 +131,11 @@ impl<'a> GpuLineEvaluator<'a> {
             },
             |limits| limits.stored::<f32>(),
         );
+        let section_bytes = (plan.rows.len() * size_of::<DeviceSection>()) as u64;
+        let uniform = section_bytes <= device.max_uniform_buffer_binding_size;
+        // A card reads a uniform table row after row where lanes part; a software driver is faster with it.
+        let uniform_limits = context.summary().kind == DeviceKind::Software
+            && size_of_val(limits.limits.as_slice()) as u64 <= device.max_uniform_buffer_binding_size;
         let shape = LineShape {
             closed: plan.closed,
             terms: plan.terms,
@@ -138,10 +143,23 @@ impl<'a> GpuLineEvaluator<'a> {
             limit_rows: limits.limits.len() / 8,
             corner_rows: limits.corners.len() / 2,
             ellipse_rows: limits.ellipse.len() / 2,
+            uniform_sections: uniform.then_some(plan.rows.len()),
+            uniform_limits,
             workgroup,
         };
         use Binding::{Read, Uniform, Write};
-        let bindings = [Uniform, Read, Read, Read, Read, Read, Write, Write];
+        let table_binding = |uniform: bool| if uniform { Uniform } else { Read };
+        let bindings = [
+            Uniform,
+            table_binding(uniform),
+            table_binding(uniform_limits),
+            Read,
+            Read,
+            Read,
+            Write,
+            Write,
+            Write,
+        ];
         let kernel = context.kernel(&shape.source(), "line", &bindings)?;
         let sections: Vec<DeviceSection> = plan
             .rows
@@ -157,17 +175,18 @@ impl<'a> GpuLineEvaluator<'a> {
             .collect();
         let sections: &[u8] = bytemuck::cast_slice(&sections);
         let most = device.max_storage_buffer_binding_size;
-        if sections.len() as u64 > most {
+        if section_bytes > most {
             return Err(Error::Device(format!(
                 "{} holds at most {most} bytes of sections, {} are needed",
                 context.summary(),
-                sections.len()
+                section_bytes
             )));
         }
-        let table =
-            |label: &str, data: &[f32]| context.buffer_of(label, bytemuck::cast_slice(data), Usage::STORAGE);
+        let table = |label: &str, data: &[f32]| {
+            context.buffer_of(label, bytemuck::cast_slice(data), Usage::STORAGE | Usage::UNIFORM)
+        };
         let tables = [
-            context.buffer_of("sections", sections, Usage::STORAGE)?,
+            context.buffer_of("sections", sections, Usage::STORAGE | Usage::UNIFORM)?,
             table("limits", &limits.limits)?,
             table("corners", &limits.corners)?,
             table("ellipse", &limits.ellipse)?,
@@ -212,7 +231,7 @@ impl<'a> GpuLineEvaluator<'a> {
     /// Floats per candidate in the largest of the buffers.
     fn planes(&self) -> usize {
         let course = if self.line.wanted().lap {
-            COURSE_PLANES * self.line.plan().rows.len()
+            COURSE_WIDTH * self.line.plan().rows.len()
         } else {
             0
         };
@@ -242,7 +261,7 @@ impl<'a> GpuLineEvaluator<'a> {
             let context = &self.context;
             let bytes = |planes: usize| (planes * stride * 4) as u64;
             let course = if self.line.wanted().lap {
-                COURSE_PLANES * self.line.plan().rows.len()
+                COURSE_WIDTH * self.line.plan().rows.len()
             } else {
                 0
             };
@@ -251,6 +270,7 @@ impl<'a> GpuLineEvaluator<'a> {
                 bytes(self.line.dimensions()),
                 Usage::STORAGE | Usage::COPY_DST,
             )?;
+            let speeds = context.buffer("speeds", bytes(course / COURSE_WIDTH), Usage::STORAGE)?;
             let course = context.buffer("course", bytes(course), Usage::STORAGE)?;
             let results = context.buffer("results", bytes(MEASURES), Usage::STORAGE | Usage::COPY_SRC)?;
             let readback = context.buffer("readback", bytes(MEASURES), Usage::MAP_READ | Usage::COPY_DST)?;
@@ -265,6 +285,7 @@ impl<'a> GpuLineEvaluator<'a> {
                     ellipse,
                     &variables,
                     &course,
+                    &speeds,
                     &results,
                 ],
             )?;
