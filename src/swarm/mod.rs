@@ -1,4 +1,16 @@
-//! Particle swarms: single-objective ([`Pso`]) and multi-objective ([`Mopso`]), by ask and tell or in one run.
+//! Swarms and their kin for one objective and for several, by ask and tell or in one run.
+//!
+//! | Objectives | Optimiser | |
+//! |---|---|---|
+//! | one | [`HybridSwarm`] | explores, then gathers; the choice where nothing is known |
+//! | one | [`Pso`] | particle swarm, with or without difference moves |
+//! | one | [`CovarianceSwarm`] | CMA: learns the shape of a valley, with or without restarts |
+//! | one | [`DifferenceSwarm`] | differential evolution that adapts itself |
+//! | one | [`CooperativeSwarm`] | CPSO-S_K: a swarm to each group of variables |
+//! | more | [`Mopso`] | particle swarm with an archive: the default, SMPSO and the thesis's are settings of it |
+//! | more | [`Nsga2`] | the genetic algorithm that swarms are compared with |
+//!
+//! [`comparison`] runs them on [`problems`] whose answers are known and judges them by [`metrics`].
 //!
 //! Positions live in the unit cube and are scaled to the bounds when asked for, so a swarm does not notice where
 //! its bounds lie. Random numbers are functions of seed, iteration, particle and purpose ([`crate::random`]), so
