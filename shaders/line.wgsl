@@ -28,6 +28,7 @@ struct Section {
     step: vec2<f32>,
     cut: vec2<f32>,
     constant: f32,
+    inverse_spacing: f32,
 }
 
 @group(0) @binding(0) var<uniform> stretch: LineStretch;
@@ -49,12 +50,22 @@ fn place_of(section: u32, candidate: u32) -> u32 {
 struct Segment {
     direction: vec2<f32>,
     length: f32,
+    slope: vec2<f32>,
+    inverse_spacing: f32,
 }
 
-fn segment_between(step: vec2<f32>, here: vec2<f32>, next: vec2<f32>) -> Segment {
-    let along = step + (next - here);
+fn segment_between(section: u32, here: vec2<f32>, next: vec2<f32>) -> Segment {
+    let along = sections[section].step + (next - here);
     let length = sqrt(max(along.x * along.x + along.y * along.y, 1e-8));
-    return Segment(along / length, length);
+    let inverse_spacing = sections[section].inverse_spacing;
+    return Segment(along / length, length, along * inverse_spacing, inverse_spacing);
+}
+
+fn second_difference_squared(segment: Segment, before: Segment) -> f32 {
+    let change = segment.slope - before.slope;
+    let spacings = segment.inverse_spacing + before.inverse_spacing;
+    let scale = 2.0 * (segment.inverse_spacing * before.inverse_spacing) / spacings;
+    return (change.x * change.x + change.y * change.y) * (scale * scale);
 }
 
 fn variable(source: u32, candidate: u32) -> f32 {
@@ -87,9 +98,9 @@ fn shape(candidate: u32) -> vec4<f32> {
     let segments = select(n - 1u, n, CLOSED);
     let first = offset(0u, candidate);
     var here = first;
-    var before = Segment(vec2<f32>(0.0), 0.0);
+    var before = Segment(vec2<f32>(0.0), 0.0, vec2<f32>(0.0), 0.0);
     if CLOSED {
-        before = segment_between(sections[n - 1u].step, offset(n - 1u, candidate), first);
+        before = segment_between(n - 1u, offset(n - 1u, candidate), first);
     }
     var total = vec4<f32>(0.0);
     var block = vec4<f32>(0.0);
@@ -98,7 +109,7 @@ fn shape(candidate: u32) -> vec4<f32> {
         if i + 1u < n {
             next = offset(i + 1u, candidate);
         }
-        let segment = segment_between(sections[i].step, here, next);
+        let segment = segment_between(i, here, next);
         block.x = block.x + segment.length;
         block.y = block.y + segment.length * segment.length;
         var curvature = 0.0;
@@ -108,7 +119,7 @@ fn shape(candidate: u32) -> vec4<f32> {
             let spacing = 0.5 * (before.length + segment.length);
             let turned = sqrt(turned_squared);
             curvature = turned / spacing;
-            block.z = block.z + curvature * curvature;
+            block.z = block.z + second_difference_squared(segment, before);
             if WANTS_INTEGRAL {
                 let across = sqrt(max(4.0 - turned_squared, 1e-6));
                 let half = own_atan(Wheels(turned / across)).x;

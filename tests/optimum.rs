@@ -57,7 +57,7 @@ fn neighbours(x: &[f64], size: f64) -> Vec<Vec<f64>> {
     let near = |who: u32| {
         let moved = x.iter().enumerate().map(|(i, x)| {
             let t = TAU * i as f64 / 200.0;
-            let change = if who % 2 == 0 {
+            let change = if who.is_multiple_of(2) {
                 random.normal(1, 0, who, i as u32)
             } else {
                 (f64::from(who) * t + 6.0 * random.normal(2, 0, who, 0)).sin()

@@ -247,6 +247,7 @@ fn structs_of_lines_have_the_hosts_offsets() {
         ("step", offset_of!(DeviceSection, step)),
         ("cut", offset_of!(DeviceSection, cut)),
         ("constant", offset_of!(DeviceSection, constant)),
+        ("inverse_spacing", offset_of!(DeviceSection, inverse_spacing)),
     ];
     assert_eq!((members, size), (named(&host), size_of::<DeviceSection>()));
 }

@@ -32,9 +32,9 @@ pub struct Arguments {
     /// Cuts across the track
     #[arg(long, value_name = "N")]
     sections: Option<usize>,
-    /// Take surveyed edges as they are, not smoothed
+    /// Smooth a surveyed track's line and edges, within 0.25 m
     #[arg(long)]
-    as_surveyed: bool,
+    smoothed: bool,
     /// Width of the car, m; 0 lets its middle use the whole road
     #[arg(long, value_name = "W")]
     car_width_m: Option<f64>,
@@ -99,7 +99,7 @@ impl Arguments {
         if self.adapter.is_some() {
             s.adapter.clone_from(&self.adapter);
         }
-        s.as_surveyed |= self.as_surveyed;
+        s.as_surveyed &= !self.smoothed;
         s.warm_start &= !self.no_warm_start;
         s.local_search &= !self.no_local_search;
         s.validate()?;

@@ -1,6 +1,13 @@
 //! Choice of backend.
 
 use super::gpu::devices;
+use std::sync::OnceLock;
+
+/// Whether a real GPU is present. Asked once: it wakes every driver.
+fn real_gpu() -> bool {
+    static PRESENT: OnceLock<bool> = OnceLock::new();
+    *PRESENT.get_or_init(|| devices().iter().any(|d| d.kind.is_real()))
+}
 
 /// Where evaluations run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -23,7 +30,7 @@ impl BackendChoice {
     /// adapter asks for it, whatever it is.
     pub fn decided(self, adapter: Option<&str>) -> Self {
         match self {
-            Self::Auto if adapter.is_some() || devices().iter().any(|d| d.kind.is_real()) => Self::Gpu,
+            Self::Auto if adapter.is_some() || real_gpu() => Self::Gpu,
             Self::Auto => Self::Simd,
             chosen => chosen,
         }

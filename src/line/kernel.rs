@@ -1,7 +1,8 @@
 //! The line kernel: from a candidate's variables to the shape of its line and the time of a lap on it.
 //! Twin of `shaders/line.wgsl`.
 //!
-//! Curvature is the three-point second difference on uneven spacing. The lap is that of a point mass on the limit:
+//! Curvature is the turn over the line's own spacing; the second differences of Gamma are over the cuts' spacing, which
+//! makes Gamma convex. The lap is that of a point mass on the limit:
 //! a forward pass of driving and a backward pass of braking on the speed squared, below the corner speeds (after
 //! D. Brayshaw and M. Harrison, *A quasi steady state approach to race car lap simulation*, 2005; N. R. Kapania,
 //! J. Subosits and J. C. Gerdes, *A sequential two-step algorithm for fast generation of vehicle racing trajectories*,
@@ -62,6 +63,9 @@ pub struct Shape<R> {
 struct Segment<R> {
     direction: [R; 2],
     length: R,
+    /// The step over the spacing by which second differences are reckoned, and one over that spacing (1/m).
+    slope: [R; 2],
+    inverse_spacing: R,
 }
 
 impl<R: Real> Segment<R> {
@@ -71,10 +75,23 @@ impl<R: Real> Segment<R> {
         let y = R::load(row.step[1]) + (next[1] - here[1]);
         // Points that coincide have no direction; a tenth of a millimetre gives them one.
         let length = (x * x + y * y).max(R::lit(1e-8)).sqrt();
+        let inverse_spacing = R::load(row.inverse_spacing);
         Self {
             direction: [x / length, y / length],
             length,
+            slope: [x * inverse_spacing, y * inverse_spacing],
+            inverse_spacing,
         }
+    }
+
+    /// The square of the second difference between the segment before and this one (1/m^2).
+    #[inline(always)]
+    fn second_difference_squared(&self, before: &Self) -> R {
+        let x = self.slope[0] - before.slope[0];
+        let y = self.slope[1] - before.slope[1];
+        let spacings = self.inverse_spacing + before.inverse_spacing;
+        let scale = R::lit(2.0) * (self.inverse_spacing * before.inverse_spacing) / spacings;
+        (x * x + y * y) * (scale * scale)
     }
 }
 
@@ -135,7 +152,7 @@ pub fn shape<R: Real>(
             let turned = turned_squared.sqrt();
             let curvature = turned / spacing;
             course.curvature[i] = curvature;
-            block[2] = block[2] + curvature * curvature;
+            block[2] = block[2] + segment.second_difference_squared(&before);
             if wanted.integral {
                 // The difference of two directions is the chord of the turning angle on the unit circle.
                 let across = (R::lit(4.0) - turned_squared).max(R::lit(1e-6)).sqrt();

@@ -13,6 +13,8 @@ pub struct SectionRow<S> {
     pub step: [S; 2],
     /// From the right end of the cut to the left end (m).
     pub cut: [S; 2],
+    /// One over the spacing from this cut to the next by which second differences are reckoned (1/m).
+    pub inverse_spacing: S,
     /// The part of `alpha` that no variable moves.
     pub constant: S,
     /// Weights of the variables that `alpha` is the sum of.
@@ -38,12 +40,17 @@ pub struct LinePlan<S> {
 }
 
 impl LinePlan<f64> {
-    /// The plan of the cuts between `right_m` and `left_m`, with `alpha` yet to be given by nothing.
+    /// The plan of the cuts between `right_m` and `left_m`, with `alpha` yet to be given by nothing and the spacing of
+    /// their middles.
     pub fn of_cuts(right_m: &[DVec2], left_m: &[DVec2], closed: bool) -> Self {
         let n = right_m.len();
+        let middle = |i: usize| 0.5 * (right_m[i] + left_m[i]);
+        // As kernels have it, points that coincide are a tenth of a millimetre apart.
+        let spacing = |i: usize| middle(i).distance(middle((i + 1) % n)).max(1e-4);
         let rows = (0..n).map(|i| SectionRow {
             step: (right_m[(i + 1) % n] - right_m[i]).to_array(),
             cut: (left_m[i] - right_m[i]).to_array(),
+            inverse_spacing: spacing(i).recip(),
             constant: 0.0,
             weights: [0.0; TERMS],
             sources: [0; TERMS],
@@ -55,6 +62,14 @@ impl LinePlan<f64> {
             terms: 0,
             rows: rows.collect(),
         }
+    }
+
+    /// The plan with the spacing (m) of every segment by which second differences are reckoned.
+    pub fn spaced(mut self, spacing_m: &[f64]) -> Self {
+        for (row, spacing) in self.rows.iter_mut().zip(spacing_m) {
+            row.inverse_spacing = spacing.recip();
+        }
+        self
     }
 
     /// The plan of one line that no variable moves.
@@ -76,6 +91,7 @@ impl LinePlan<f64> {
                 .map(|row| SectionRow {
                     step: row.step.map(store),
                     cut: row.cut.map(store),
+                    inverse_spacing: store(row.inverse_spacing),
                     constant: store(row.constant),
                     weights: row.weights.map(store),
                     sources: row.sources,

@@ -41,6 +41,17 @@ impl CrossSections {
         self.station_m.is_empty()
     }
 
+    /// Distance along the reference line from each cut to the next (m), the closing stretch of a closed circuit included.
+    pub fn spacing_m(&self) -> Vec<f64> {
+        let after = self.station_m.iter().copied().skip(1);
+        let ends = after.chain(self.closed.then_some(self.length_m));
+        self.station_m
+            .iter()
+            .zip(ends)
+            .map(|(from, to)| to - from)
+            .collect()
+    }
+
     /// The same cuts shortened at both ends by half the width of a car (m), so that its middle may use all of them.
     ///
     /// # Errors

@@ -26,8 +26,10 @@ pub struct DeviceSection {
     pub cut: [f32; 2],
     /// The part of `alpha` that no variable moves.
     pub constant: f32,
+    /// One over the spacing of second differences, 1/m.
+    pub inverse_spacing: f32,
     /// Nothing: vectors of four are aligned to 16 bytes.
-    pub padding: [f32; 3],
+    pub padding: [f32; 2],
 }
 
 /// What a dispatch is to do. Twin of `LineStretch` in `shaders/line.wgsl`.
@@ -170,7 +172,8 @@ impl<'a> GpuLineEvaluator<'a> {
                 step: row.step,
                 cut: row.cut,
                 constant: row.constant,
-                padding: [0.0; 3],
+                inverse_spacing: row.inverse_spacing,
+                padding: [0.0; 2],
             })
             .collect();
         let sections: &[u8] = bytemuck::cast_slice(&sections);

@@ -14,7 +14,7 @@ pub enum LineObjective {
     Length,
     /// The sum of its segments' squared lengths, m^2.
     LengthSquared,
-    /// The root of the sum of its squared second differences, 1/m.
+    /// The root of the sum of its squared second differences over the cuts' spacing, 1/m.
     Gamma,
     /// The integral of its curvature squared over the length, 1/m.
     Kappa2,
@@ -143,7 +143,7 @@ impl LineProblem {
                 "a car's envelope",
             );
         }
-        let mut plan = LinePlan::of_cuts(&cuts.right_m, &cuts.left_m, cuts.closed);
+        let mut plan = LinePlan::of_cuts(&cuts.right_m, &cuts.left_m, cuts.closed).spaced(&cuts.spacing_m());
         parametrisation.apply(&cuts, &mut plan)?;
         plan.entry = entry_mps * entry_mps;
         let middle = geometry(&cuts.points(&vec![0.5; n]), cuts.closed);

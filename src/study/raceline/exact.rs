@@ -5,25 +5,44 @@ use super::settings::RacelineSettings;
 use crate::error::Result;
 use crate::evaluate::line::LineObjective;
 use crate::optimum::{
-    Bounds, DescentSettings, LineMap, LineProblem, Optimum, PointMassLimits, Start, Weights, descend,
-    least_gamma, least_squared_length, polish_lines, shortest, spacing_m,
+    Bounds, DescentSettings, LineMap, LineProblem, Optimum, PointMassLimits, Start, Status, Weights, fastest,
+    least_curvature, least_gamma, least_squared_length, polish_lines, shortest,
 };
+use crate::track::CrossSections;
 
 /// The solvers on one track.
+///
+/// Lines without a lap time have a variable at every cut. With one, cuts' worth of zigzag between them would pay, so that
+/// lines are then a spline's distance from the least curved line, with [`CUTS_PER_CONTROL`] cuts for each control point.
 pub struct ExactSolvers {
-    map: LineMap,
-    bounds: Bounds,
+    cuts: CrossSections,
+    spacing_m: Vec<f64>,
+    every: (LineMap, Bounds),
+    smooth: (LineMap, Bounds),
+    /// The least curved line, from which the smooth lines are measured.
+    base: Vec<f64>,
     limits: Option<PointMassLimits>,
-    reference: Vec<f64>,
     entry_mps: f64,
 }
 
-/// Weights of one objective alone.
-fn only(objective: LineObjective) -> Weights {
-    weights([(objective, 1.0)])
+/// A line of the exact solvers.
+#[derive(Clone, Debug)]
+pub struct ExactLine {
+    /// Share of the usable width at every cut.
+    pub alpha: Vec<f64>,
+    /// How the solver ended.
+    pub status: Status,
+    /// Time taken (s).
+    pub seconds: f64,
 }
 
-/// Weights of several.
+/// A line to be led downhill (`alpha` at every cut), and the weight of each objective.
+pub type WeightedLine = (Vec<f64>, Vec<(LineObjective, f64)>);
+
+/// With two, ripples are left between the cuts that their lap time does not feel and a fine spline does.
+const CUTS_PER_CONTROL: usize = 3;
+
+/// Weights of the solvers.
 fn weights(terms: impl IntoIterator<Item = (LineObjective, f64)>) -> Weights {
     let mut weights = Weights::default();
     for (objective, weight) in terms {
@@ -42,27 +61,36 @@ impl ExactSolvers {
     /// The solvers of `setup`. Lap times are theirs only on a friction ellipse of exponent 2.
     ///
     /// # Errors
-    /// [`crate::Error::Input`] for a car that cannot be.
+    /// [`crate::Error::Input`] for a car that cannot be; [`crate::Error::Study`] if the least curved line is refused.
     pub fn new(setup: &Setup, settings: &RacelineSettings) -> Result<Self> {
-        let map = LineMap::at_every_cut(&setup.cuts);
+        let cuts = setup.cuts.clone();
+        let map = LineMap::at_every_cut(&cuts);
+        let bounds = Bounds::road(cuts.len());
+        let spacing_m = cuts.spacing_m();
+        let start = least_gamma(&map, &spacing_m, &bounds)?.x;
+        let base = least_curvature(&map, &bounds, &start)?.x;
+        let controls = (cuts.len() / CUTS_PER_CONTROL).max(4);
         Ok(Self {
-            bounds: Bounds::road(map.variables()),
+            smooth: LineMap::spline_about(&cuts, &base, controls),
+            every: (map, bounds),
+            base,
             limits: if setup.car.ellipse_exponent == 2.0 {
                 Some(PointMassLimits::new(&setup.car)?)
             } else {
                 None
             },
-            reference: setup.cuts.reference.clone(),
             entry_mps: settings.entry_mps,
-            map,
+            spacing_m,
+            cuts,
         })
     }
 
-    fn problem(&self) -> LineProblem<'_> {
+    fn problem<'a>(&'a self, map: &'a LineMap) -> LineProblem<'a> {
         LineProblem {
             limits: self.limits.as_ref().map(|l| l as _),
             start_mps: self.entry_mps,
-            ..LineProblem::of(&self.map)
+            spacing_m: Some(&self.spacing_m),
+            ..LineProblem::of(map)
         }
     }
 
@@ -73,58 +101,83 @@ impl ExactSolvers {
 
     /// The line that is best by one objective; nothing where there is no solver for it.
     ///
-    /// Length and squared length are convex, so that theirs is the optimum. The others are led downhill: Gamma and
-    /// curvature from the optimum of the convex second difference over the reference line's spacing, lap time from the
-    /// least curved line.
+    /// Length, squared length and Gamma are convex, so that theirs is the optimum. Curvature and lap time are led
+    /// downhill, the latter from the least curved line; starts all over the road lead to the same.
     ///
     /// # Errors
     /// [`crate::Error::Study`] if a solver refuses.
-    pub fn best(&self, objective: LineObjective) -> Result<Option<Optimum>> {
-        if !self.solves(objective) {
-            return Ok(None);
-        }
+    pub fn best(&self, objective: LineObjective) -> Result<Option<ExactLine>> {
+        let (map, bounds) = &self.every;
         let solved = match objective {
-            LineObjective::Length => shortest(&self.map, &self.bounds)?,
-            LineObjective::LengthSquared => least_squared_length(&self.map, &self.bounds)?,
-            LineObjective::Gamma | LineObjective::Kappa2 | LineObjective::LapTime => {
-                let spacing = spacing_m(&self.map, &self.reference);
-                let mut start = least_gamma(&self.map, &spacing, &self.bounds)?.x;
-                if objective == LineObjective::LapTime {
-                    start = self.descend(start, only(LineObjective::Kappa2))?.x;
-                }
-                self.descend(start, only(objective))?
+            LineObjective::Length => shortest(map, bounds)?,
+            LineObjective::LengthSquared => least_squared_length(map, bounds)?,
+            LineObjective::Gamma => least_gamma(map, &self.spacing_m, bounds)?,
+            LineObjective::Kappa2 => least_curvature(map, bounds, &self.base)?,
+            LineObjective::LapTime if self.limits.is_none() => return Ok(None),
+            LineObjective::LapTime => {
+                let (map, bounds) = &self.smooth;
+                let settings = DescentSettings::default();
+                let start = vec![0.0; map.variables()];
+                let mut solved = fastest(&self.problem(map), bounds, &start, &settings)?;
+                solved.x = self.shares(map, &solved.x);
+                solved
             }
         };
-        Ok(Some(solved))
+        Ok(Some(ExactLine {
+            alpha: solved.x.iter().map(|a| a.clamp(0.0, 1.0)).collect(),
+            status: solved.status,
+            seconds: solved.seconds,
+        }))
     }
 
-    fn descend(&self, x: Vec<f64>, weights: Weights) -> Result<Optimum> {
-        let settings = DescentSettings::default();
-        descend(&self.problem(), &self.bounds, &Start { x, weights }, &settings)
+    /// `alpha` at every cut of a line of `map`.
+    fn shares(&self, map: &LineMap, x: &[f64]) -> Vec<f64> {
+        let points = map.line(x);
+        let ends = self.cuts.right_m.iter().zip(&self.cuts.left_m);
+        points
+            .iter()
+            .zip(ends)
+            .map(|(point, (right, left))| {
+                let across = *left - *right;
+                (*point - *right).dot(across) / across.length_squared()
+            })
+            .collect()
     }
 
-    /// Leads lines to the nearest optimum, each by its own weights of the objectives. Lines that no solver can improve on
-    /// come back as they are.
+    /// Leads lines to the nearest optimum, each by its own weights of the objectives, in `programs` cone programs at most.
     ///
     /// # Errors
     /// [`crate::Error::Study`] if a solver refuses.
-    pub fn polish(
-        &self,
-        lines: Vec<(Vec<f64>, Vec<(LineObjective, f64)>)>,
-        programs: usize,
-    ) -> Result<Vec<Vec<f64>>> {
-        let starts: Vec<Start> = lines
-            .into_iter()
-            .map(|(x, terms)| Start {
-                x,
-                weights: weights(terms),
-            })
-            .collect();
+    pub fn polish(&self, lines: Vec<WeightedLine>, programs: usize) -> Result<Vec<Vec<f64>>> {
+        let timed = lines
+            .iter()
+            .flat_map(|(_, terms)| terms)
+            .any(|(o, w)| *o == LineObjective::LapTime && *w > 0.0);
+        let (map, bounds) = if timed { &self.smooth } else { &self.every };
         let settings = DescentSettings {
             programs,
             ..DescentSettings::default()
         };
-        let polished = polish_lines(&self.problem(), &self.bounds, &starts, &settings)?;
-        Ok(polished.into_iter().map(|p| p.x).collect())
+        let starts: Vec<Start> = lines
+            .into_iter()
+            .map(|(alpha, terms)| Start {
+                x: if timed { self.offsets(&alpha) } else { alpha },
+                weights: weights(terms),
+            })
+            .collect();
+        let polished = polish_lines(&self.problem(map), bounds, &starts, &settings)?;
+        let alpha = |p: Optimum| self.shares(map, &p.x).iter().map(|a| a.clamp(0.0, 1.0)).collect();
+        Ok(polished.into_iter().map(alpha).collect())
+    }
+
+    /// Control points (m) of a smooth line near `alpha`: its distances from the base where they stand.
+    fn offsets(&self, alpha: &[f64]) -> Vec<f64> {
+        let (n, controls) = (self.cuts.len(), self.smooth.0.variables());
+        (0..controls)
+            .map(|k| {
+                let i = (k * n / controls).min(n - 1);
+                (alpha[i] - self.base[i]) * self.cuts.left_m[i].distance(self.cuts.right_m[i])
+            })
+            .collect()
     }
 }

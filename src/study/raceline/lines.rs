@@ -95,6 +95,15 @@ impl ReportedLine {
         self.fine.lap_time_s().unwrap_or(f64::NAN)
     }
 
+    /// What an objective comes to where lines are compared: lap times on the fine spline, so that no line wins by zigzag
+    /// between the cuts, the others through the cuts.
+    pub fn worth(&self, objective: LineObjective) -> f64 {
+        match objective {
+            LineObjective::LapTime => self.lap_time_fine_s(),
+            _ => self.objective(objective),
+        }
+    }
+
     /// What an objective comes to through the cuts.
     pub fn objective(&self, objective: LineObjective) -> f64 {
         match objective {

@@ -11,7 +11,7 @@ mod results;
 mod search;
 mod settings;
 
-pub use exact::ExactSolvers;
+pub use exact::{ExactLine, ExactSolvers, WeightedLine};
 pub use front::{LineFront, search_front};
 pub use lines::{FINE_M, ReportedLine, Setup, set_up};
 pub use results::{LineFigures, Summary, summarise, write_results};
@@ -114,7 +114,7 @@ pub fn find_lines(
         let start = exact
             .as_ref()
             .filter(|_| settings.warm_start)
-            .map(|o| o.x.as_slice());
+            .map(|o| o.alpha.as_slice());
         let search = LineSearchSettings {
             seed: settings.seed,
             ..LineSearchSettings::default()
@@ -151,14 +151,14 @@ pub fn find_lines(
             let polished = solvers.polish(vec![(found.alpha, vec![(*objective, 1.0)])], 60)?;
             for alpha in polished {
                 let line = setup.report(line_name(*objective), &alpha, settings)?;
-                if line.objective(*objective) < best.objective(*objective) {
+                if line.worth(*objective) < best.worth(*objective) {
                     best = line;
                 }
             }
         }
         let exact_line = exact
             .as_ref()
-            .map(|o| setup.report(line_name(*objective), &o.x, settings))
+            .map(|o| setup.report(line_name(*objective), &o.alpha, settings))
             .transpose()?;
         objectives.push(ObjectiveOutcome {
             objective: *objective,

@@ -89,7 +89,7 @@ pub struct Summary {
     pub swarm: BTreeMap<&'static str, f64>,
     /// The exact solvers' lines; `null` where there is no solver.
     pub exact: BTreeMap<&'static str, Option<LineFigures>>,
-    /// How much more the best line costs than the exact one, of each objective (%).
+    /// How much more the best line costs than the exact one, of each objective (%); lap times on the fine spline.
     pub above_exact_percent: BTreeMap<&'static str, Option<f64>>,
     /// The reference line.
     pub reference: LineFigures,

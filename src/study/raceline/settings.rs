@@ -53,7 +53,7 @@ impl Default for RacelineSettings {
             car: "gt".to_owned(),
             envelope: None,
             sections: 720,
-            as_surveyed: false,
+            as_surveyed: true,
             car_width_m: 2.0,
             ellipse_exponent: 2.0,
             entry_mps: 10.0,
