@@ -160,7 +160,8 @@ impl Archive<'_> {
                 .collect();
             let text = format!("chosen: {}", values.join(", "));
             canvas.text(text.trim_end(), (right, 52.0), look);
-            let x = right - look.width(text.trim_end()) - 12.0;
+            // Viewers choose wider fonts than the one that widths are guessed by.
+            let x = right - 1.1 * look.width(text.trim_end()) - 14.0;
             canvas.dot((x, 52.0), 4.0, VERMILLION, 1.0);
             canvas.ring((x, 52.0), 7.5, VERMILLION, 1.4);
         }

@@ -162,7 +162,7 @@ fn draw_traces(path: &Path, setup: &Setup, lines: &[&ReportedLine], fastest: &Re
             .iter()
             .filter_map(|line| {
                 Some(Curve {
-                    label: &line.name,
+                    label: "",
                     x: along(line),
                     y: of(line)?,
                     shade: None,
@@ -183,9 +183,9 @@ fn draw_traces(path: &Path, setup: &Setup, lines: &[&ReportedLine], fastest: &Re
             Some(l.fine.curvature_1pm.clone())
         }),
     ];
+    // The only panel with names: colours are the same in all.
     let delta = lines
         .iter()
-        .filter(|line| line.name != fastest.name)
         .filter_map(|line| {
             let (x, y) = lap_delta(line, fastest)?;
             Some(Curve {
