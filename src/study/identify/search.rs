@@ -8,7 +8,7 @@ use crate::error::{Error, Result};
 use crate::evaluate::replay::{ReplayProblem, open_evaluator, trace};
 use crate::evaluate::{BackendInfo, FAILED_COST};
 use crate::swarm::{
-    CovarianceSettings, CovarianceSwarm, Mopso, MopsoSettings, Progress, Pso, PsoSettings, run,
+    Beyond, CovarianceSettings, CovarianceSwarm, Mopso, MopsoSettings, Progress, Pso, PsoSettings, run,
 };
 use std::ops::ControlFlow;
 use std::time::Instant;
@@ -137,6 +137,8 @@ pub fn search(
                 population: settings.population.unwrap_or(GATHER.0),
                 iterations: settings.iterations.unwrap_or(GATHER.1),
                 seed: settings.seed,
+                // Neither the drawn places nor unlearning did better on the bundled lap.
+                beyond: Beyond::Reflected,
                 ..CovarianceSettings::default()
             };
             let planned = gathering.iterations;
