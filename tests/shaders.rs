@@ -5,8 +5,10 @@ mod common;
 
 use common::{Lap, UNKNOWNS, bundled_car, linear_car, problem};
 use lapswarm::evaluate::gpu::lint;
-use lapswarm::evaluate::gpu::shader::{ReplayShape, car_fragments, tyre_struct};
+use lapswarm::evaluate::gpu::shader::{LineShape, ReplayShape, car_fragments, tyre_struct};
+use lapswarm::evaluate::line::{DeviceSection, LineStretch};
 use lapswarm::evaluate::replay::{DeviceSample, DeviceWindow, ModelTable, Norm, Stretch};
+use lapswarm::line::kernel::Wanted;
 use lapswarm::vehicle::{Chassis, TyreModel};
 use naga::back::{hlsl, msl, spv};
 use naga::valid::{Capabilities, ValidationFlags, Validator};
@@ -44,7 +46,31 @@ fn kernels() -> Vec<(&'static str, String)> {
             kernels.push(("replay_reduce", shape.reduce()));
         }
     }
+    for closed in [false, true] {
+        for terms in [0, 1, 4] {
+            for lap in [false, true] {
+                kernels.push(("line", line_shape(closed, terms, lap).source()));
+            }
+        }
+    }
     kernels
+}
+
+fn line_shape(closed: bool, terms: usize, lap: bool) -> LineShape {
+    LineShape {
+        closed,
+        terms,
+        wanted: Wanted {
+            integral: terms > 0,
+            lap,
+        },
+        limit_rows: 512,
+        corner_rows: 1024,
+        ellipse_rows: if closed { 256 } else { 0 },
+        uniform_sections: closed.then_some(360),
+        uniform_limits: terms == 4,
+        workgroup: 64,
+    }
 }
 
 #[test]
@@ -186,6 +212,43 @@ fn structs_shared_with_the_host_have_its_offsets() {
         ("initial", offset_of!(DeviceWindow, initial)),
     ];
     assert_eq!((members, size), (named(&host), size_of::<DeviceWindow>()));
+}
+
+#[test]
+fn structs_of_lines_have_the_hosts_offsets() {
+    let source = line_shape(true, 4, true).source();
+    let module = lint::check(&source).expect("the kernel parses");
+    let (members, size) = layout(&module, "LineStretch");
+    let host = [
+        ("candidates", offset_of!(LineStretch, candidates)),
+        ("stride", offset_of!(LineStretch, stride)),
+        ("first", offset_of!(LineStretch, first)),
+        ("sections", offset_of!(LineStretch, sections)),
+        ("start", offset_of!(LineStretch, start)),
+        ("entry", offset_of!(LineStretch, entry)),
+        (
+            "rows_per_speed_squared",
+            offset_of!(LineStretch, rows_per_speed_squared),
+        ),
+        ("rows_per_radius", offset_of!(LineStretch, rows_per_radius)),
+    ];
+    let named = |pairs: &[(&str, usize)]| -> Vec<(String, usize)> {
+        pairs
+            .iter()
+            .map(|(name, offset)| ((*name).to_owned(), *offset))
+            .collect()
+    };
+    assert_eq!((members, size), (named(&host), size_of::<LineStretch>()));
+
+    let (members, size) = layout(&module, "Section");
+    let host = [
+        ("sources", offset_of!(DeviceSection, sources)),
+        ("weights", offset_of!(DeviceSection, weights)),
+        ("step", offset_of!(DeviceSection, step)),
+        ("cut", offset_of!(DeviceSection, cut)),
+        ("constant", offset_of!(DeviceSection, constant)),
+    ];
+    assert_eq!((members, size), (named(&host), size_of::<DeviceSection>()));
 }
 
 #[test]

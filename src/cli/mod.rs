@@ -5,6 +5,7 @@ mod devices;
 mod envelope;
 mod identify;
 mod progress;
+mod raceline;
 mod simulate;
 
 use clap::{Args, Parser, Subcommand};
@@ -36,6 +37,8 @@ enum Command {
     Identify(Box<identify::Arguments>),
     /// Drive a car round a circuit and log it.
     Simulate(simulate::Arguments),
+    /// Find the line round a circuit: shortest, least curved, fastest, and the front between them.
+    Raceline(Box<raceline::Arguments>),
     /// Find a car's limits at each speed: the g-g-v diagram that racing lines are driven within.
     Envelope(envelope::Arguments),
     /// List the GPUs that evaluations can run on, with their limits.
@@ -93,6 +96,7 @@ pub fn run() -> ExitCode {
     let outcome = match cli.command {
         Command::Identify(arguments) => identify::run(&arguments),
         Command::Simulate(arguments) => simulate::run(&arguments),
+        Command::Raceline(arguments) => raceline::run(&arguments),
         Command::Envelope(arguments) => envelope::run(&arguments),
         Command::Devices(arguments) => devices::run(&arguments),
         Command::Bench(arguments) => bench::run(&arguments),

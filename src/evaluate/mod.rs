@@ -3,10 +3,14 @@
 //! A [`Problem`] names its bounded decision variables and its objectives. An [`Evaluator`] scores candidates of
 //! it. Optimisers see nothing else, so they run any problem on any backend.
 
+mod backend;
 pub mod gpu;
+pub mod line;
 pub mod point;
 pub mod replay;
 pub mod simd;
+
+pub use backend::BackendChoice;
 
 use crate::error::Result;
 use crate::vehicle::tyre::IllFormed;
@@ -75,6 +79,8 @@ pub enum Failure {
     IllFormedTyre(IllFormed),
     /// It spun, rolled over or left the range of numbers.
     Spun,
+    /// It came to a standstill.
+    Standstill,
     /// A decision variable was not a finite number.
     NotFinite,
     /// An objective was not a finite number.
@@ -86,6 +92,7 @@ impl fmt::Display for Failure {
         match self {
             Self::IllFormedTyre(reason) => write!(f, "an ill-formed tyre: {reason}"),
             Self::Spun => f.write_str("spun"),
+            Self::Standstill => f.write_str("came to a standstill"),
             Self::NotFinite => f.write_str("a variable that is not a finite number"),
             Self::Undefined => f.write_str("an objective that is not a finite number"),
         }
@@ -99,6 +106,18 @@ pub struct Evaluation {
     pub objectives: Vec<f64>,
     /// Why a candidate failed, one per candidate.
     pub failures: Vec<Option<Failure>>,
+}
+
+impl Evaluation {
+    /// Joins rows of objectives and failures.
+    pub(crate) fn of_rows(rows: Vec<(Vec<f64>, Option<Failure>)>) -> Self {
+        let mut evaluation = Self::default();
+        for (row, failure) in rows {
+            evaluation.objectives.extend(row);
+            evaluation.failures.push(failure);
+        }
+        evaluation
+    }
 }
 
 /// What ran an evaluation, for manifests and logs.

@@ -95,7 +95,7 @@ pub fn alpha<R: Real>(row: &SectionRow<R::Storage>, terms: usize, variables: &[R
 #[inline(always)]
 fn offset<R: Real>(row: &SectionRow<R::Storage>, terms: usize, variables: &[R]) -> [R; 2] {
     let share = alpha(row, terms, variables);
-    row.cut.map(|c| share * R::load(c))
+    [share * R::load(row.cut[0]), share * R::load(row.cut[1])]
 }
 
 /// The shape of the line that `variables` give; `course` has its lengths and curvatures after.
@@ -186,7 +186,8 @@ pub fn longitudinal<R: Lookup>(limits: &LimitTable<R::Storage>, speed_squared: R
     let rows = limits.limits.len() / LIMIT_WIDTH;
     let argument = speed_squared * R::load(limits.rows_per_speed_squared);
     let (place, beyond) = argument.place(rows, LIMIT_WIDTH);
-    let at = |column| look_up(&limits.limits, LIMIT_WIDTH, place, beyond, column);
+    let row = R::pick_row(&limits.limits, place);
+    let at = |column: usize| row[column] + beyond * row[LIMIT_WIDTH / 2 + column];
     let share = curvature * speed_squared / at(0);
     let root = (R::lit(1.0) - share * share).max(R::lit(0.0)).sqrt();
     let left = if limits.ellipse.is_empty() {
@@ -236,8 +237,9 @@ pub fn lap_time<R: Lookup>(
     let (length, curvature) = (&course.length, &course.curvature);
     let speeds = &mut course.speed_squared;
     speeds.clear();
-    speeds.extend(curvature.iter().map(|k| corner(limits, *k)));
+    speeds.resize(n, R::lit(0.0));
     let start = if closed { start } else { 0 };
+    speeds[start] = corner(limits, curvature[start]);
     if !closed {
         speeds[0] = speeds[0].min(entry);
     }
@@ -254,9 +256,16 @@ pub fn lap_time<R: Lookup>(
             curvature[here],
             curvature[next],
         );
-        let slower = reached.less_than(speeds[next]);
-        speeds[next] = R::select(slower, reached, speeds[next]);
-        if step + 1 >= n && R::all(!slower) {
+        // The first time round a section is only held to its corner speed.
+        let again = step + 1 >= n;
+        let most = if again {
+            speeds[next]
+        } else {
+            corner(limits, curvature[next])
+        };
+        let slower = reached.less_than(most);
+        speeds[next] = R::select(slower, reached, most);
+        if again && R::all(!slower) {
             break;
         }
         here = next;

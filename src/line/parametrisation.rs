@@ -12,7 +12,9 @@ enum Basis {
     /// `alpha` at every section.
     Sections,
     /// Control points of a uniform cubic B-spline over the station: periodic on a closed circuit, clamped at the ends of
-    /// an open one (L. Piegl and W. Tiller, *The NURBS Book*, 2nd ed., 1997, ch. 2).
+    /// an open one (L. Piegl and W. Tiller, *The NURBS Book*, 2nd ed., 1997, ch. 2). It is the line's distance from the
+    /// reference line, in mean widths of the road and from one half on: `alpha` where the road is even, and smooth as
+    /// the reference line is where its edges are jagged, which no smooth `alpha` could be.
     ControlPoints { count: usize, overshoot: f64 },
 }
 
@@ -126,19 +128,60 @@ impl Parametrisation {
 
     /// The decision variables over `cuts`.
     pub fn variables(&self, cuts: &CrossSections) -> Vec<Variable> {
-        let (name, overshoot) = match self.basis {
-            Basis::Sections => ("alpha", 0.0),
-            Basis::ControlPoints { overshoot, .. } => ("control", overshoot),
+        let bounds = self.bounds(cuts);
+        let name = match self.basis {
+            Basis::Sections => "alpha",
+            Basis::ControlPoints { .. } => "control",
         };
         let variable = |index: usize| Variable {
             name: format!("{name}_{index}"),
             unit: "-".to_owned(),
-            lower: -overshoot,
-            upper: 1.0 + overshoot,
+            lower: bounds[index].0,
+            upper: bounds[index].1,
         };
         match &self.free {
             None => (0..self.coefficients(cuts)).map(variable).collect(),
             Some((free, _)) => free.iter().copied().map(variable).collect(),
+        }
+    }
+
+    /// Bounds of all coefficients: a control point may reach the furthest edge among the cuts that it moves the line
+    /// on, and the overshoot beyond.
+    fn bounds(&self, cuts: &CrossSections) -> Vec<(f64, f64)> {
+        let Basis::ControlPoints { count, overshoot } = self.basis else {
+            return vec![(0.0, 1.0); cuts.len()];
+        };
+        let mut bounds = vec![(0.5f64, 0.5f64); count];
+        for (section, scale) in self.scales(cuts).into_iter().enumerate() {
+            let reference = cuts.reference[section];
+            let (right, left) = (0.5 - reference / scale, 0.5 + (1.0 - reference) / scale);
+            for (index, weight) in self.weights_at(cuts, section) {
+                if weight > 0.0 {
+                    let (lower, upper) = &mut bounds[index];
+                    *lower = lower.min(right - overshoot);
+                    *upper = upper.max(left + overshoot);
+                }
+            }
+        }
+        bounds
+    }
+
+    /// How much of a cut's width a change by one of what the coefficients add up to is.
+    fn scales(&self, cuts: &CrossSections) -> Vec<f64> {
+        if self.basis == Basis::Sections {
+            return vec![1.0; cuts.len()];
+        }
+        let ends = cuts.right_m.iter().zip(&cuts.left_m);
+        let widths: Vec<f64> = ends.map(|(right, left)| right.distance(*left)).collect();
+        let mean = widths.iter().sum::<f64>() / widths.len() as f64;
+        widths.into_iter().map(|width| mean / width).collect()
+    }
+
+    /// `alpha` at a section where what the coefficients add up to is nought.
+    fn origin(&self, cuts: &CrossSections, section: usize, scale: f64) -> f64 {
+        match self.basis {
+            Basis::Sections => 0.0,
+            Basis::ControlPoints { .. } => cuts.reference[section] - 0.5 * scale,
         }
     }
 
@@ -196,9 +239,13 @@ impl Parametrisation {
             }
         }
         plan.terms = if self.basis == Basis::Sections { 1 } else { TERMS };
+        let scales = self.scales(cuts);
         for (section, row) in plan.rows.iter_mut().enumerate() {
-            (row.constant, row.weights, row.sources) = (0.0, [0.0; TERMS], [0; TERMS]);
+            let scale = scales[section];
+            (row.weights, row.sources) = ([0.0; TERMS], [0; TERMS]);
+            row.constant = self.origin(cuts, section, scale);
             for (term, (index, weight)) in self.weights_at(cuts, section).into_iter().enumerate() {
+                let weight = scale * weight;
                 match (sources[index], &self.free) {
                     (Some(variable), _) => {
                         row.weights[term] = weight;
@@ -229,16 +276,18 @@ impl Parametrisation {
                 format!("{} finite ones, one per section", cuts.len()),
             ));
         }
-        let Basis::ControlPoints { count, overshoot } = self.basis else {
+        let Basis::ControlPoints { count, .. } = self.basis else {
             return Ok(alpha.iter().map(|a| a.clamp(0.0, 1.0)).collect());
         };
+        let scales = self.scales(cuts);
         // Normal equations, with a trace of the identity: control points that no section sees stay in the middle.
         let mut matrix = DMatrix::<f64>::identity(count, count) * 1e-9;
         let mut right = DVector::from_element(count, 0.5e-9);
         for (section, alpha) in alpha.iter().enumerate() {
             let weights = self.weights_at(cuts, section);
+            let sum = (alpha - self.origin(cuts, section, scales[section])) / scales[section];
             for (i, weight) in weights {
-                right[i] += weight * alpha;
+                right[i] += weight * sum;
                 for (j, other) in weights {
                     matrix[(i, j)] += weight * other;
                 }
@@ -252,10 +301,9 @@ impl Parametrisation {
                 "a number that the sections determine",
             )
         })?;
-        Ok(solution
-            .iter()
-            .map(|c| c.clamp(-overshoot, 1.0 + overshoot))
-            .collect())
+        let bounds = self.bounds(cuts);
+        let held = solution.iter().zip(bounds);
+        Ok(held.map(|(c, (lower, upper))| c.clamp(lower, upper)).collect())
     }
 
     /// The variables among the coefficients that [`Parametrisation::fit`] gives.

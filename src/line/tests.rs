@@ -19,6 +19,7 @@ fn ring(inner_m: f64, outer_m: f64, sections: usize) -> CrossSections {
             .collect(),
         right_m: (0..sections).map(|i| at(outer_m, i)).collect(),
         left_m: (0..sections).map(|i| at(inner_m, i)).collect(),
+        reference: vec![0.5; sections],
         sections: Vec::new(),
         corners: Vec::new(),
     }

@@ -1,6 +1,6 @@
 //! Where a line may run.
 
-use super::conic::{Affine, ConicProgram};
+use super::conic::{Affine, ConicProgram, Status};
 use super::geometry::LineMap;
 use crate::{Error, Result};
 
@@ -49,21 +49,33 @@ impl Bounds {
         self
     }
 
-    /// `x` within the bounds of the variables, then drawn towards nought until the sums are within theirs too.
-    /// Nought must be within the sums' bounds, as it is for lines given by their offset from one on the road.
-    pub(super) fn inside(&self, x: &[f64]) -> Vec<f64> {
-        let boxed = x.iter().zip(&self.lower).zip(&self.upper);
-        let boxed: Vec<f64> = boxed.map(|((x, l), u)| x.clamp(*l, *u)).collect();
-        let share = self.rows.iter().fold(1.0f64, |share, row| {
-            let sum = row.at(&boxed);
-            let bound = if sum > 0.0 { row.upper } else { row.lower };
-            if sum.abs() > bound.abs() {
-                share.min(bound / sum)
-            } else {
-                share
+    /// The point within the bounds that is nearest to `x`, but for the solver's rounding.
+    pub(super) fn inside(&self, x: &[f64]) -> Result<Vec<f64>> {
+        let boxed = x.iter().zip(self.lower.iter().zip(&self.upper));
+        let boxed: Vec<f64> = boxed.map(|(x, (l, u))| x.clamp(*l, *u)).collect();
+        let within = |row: &RowBound| (row.lower..=row.upper).contains(&row.at(&boxed));
+        if self.rows.iter().all(within) {
+            return Ok(boxed);
+        }
+        let mut program = ConicProgram::new(self.lower.clone(), self.upper.clone());
+        for (k, x) in x.iter().enumerate() {
+            let terms = vec![(k, 1.0)];
+            program.add_square(Affine { constant: -x, terms });
+        }
+        for row in &self.rows {
+            for (bound, sign) in [(row.lower, 1.0), (row.upper, -1.0)] {
+                let terms = row.terms.iter().map(|&(k, weight)| (k, sign * weight));
+                program.add_nonnegative(Affine {
+                    constant: -sign * bound,
+                    terms: terms.collect(),
+                });
             }
-        });
-        boxed.iter().map(|x| x * share).collect()
+        }
+        let solution = program.solve()?;
+        match solution.status {
+            Status::Failed(words) => Err(Error::Study(format!("no line lies within its bounds: {words}"))),
+            _ => Ok(solution.x),
+        }
     }
 
     /// Holds the sums within their bounds in a program for a step from `x`. Where rounding has left `x` outside, it may stay.
@@ -87,7 +99,7 @@ pub(super) fn check(map: &LineMap, bounds: &Bounds) -> Result<()> {
         .lower
         .iter()
         .zip(&bounds.upper)
-        .position(|(l, u)| !(l <= u));
+        .position(|(l, u)| l.is_nan() || u.is_nan() || l > u);
     if bounds.lower.len() != n || bounds.upper.len() != n || map.points() < 3 {
         return Err(Error::input(
             "the line",

@@ -80,7 +80,7 @@ pub fn least_squared_length(map: &LineMap, bounds: &Bounds) -> Result<Optimum> {
 pub fn least_gamma(map: &LineMap, spacing_m: &[f64], bounds: &Bounds) -> Result<Optimum> {
     check(map, bounds)?;
     let steps = steps(map);
-    if spacing_m.len() != steps.len() || spacing_m.iter().any(|h| !(*h > 0.0)) {
+    if spacing_m.len() != steps.len() || !spacing_m.iter().all(|h| *h > 0.0) {
         return Err(Error::input(
             "the line",
             "spacing_m",
@@ -101,9 +101,9 @@ pub fn least_gamma(map: &LineMap, spacing_m: &[f64], bounds: &Bounds) -> Result<
     for (before, after) in pairs {
         let (h0, h1) = (spacing_m[before], spacing_m[after]);
         let mean = 0.5 * (h0 + h1);
-        for axis in 0..2 {
-            let mut square = scaled(&steps[after][axis], 1.0 / (h1 * mean));
-            let other = scaled(&steps[before][axis], -1.0 / (h0 * mean));
+        for (there, here) in steps[after].iter().zip(&steps[before]) {
+            let mut square = scaled(there, 1.0 / (h1 * mean));
+            let other = scaled(here, -1.0 / (h0 * mean));
             square.constant += other.constant;
             square.terms.extend(other.terms);
             program.add_square(square.merged());

@@ -82,10 +82,19 @@ pub fn descend(
     check_start(problem, start)?;
     let clock = Instant::now();
     let weights = &start.weights;
-    let mut here = Place::of(problem, weights, bounds.inside(&start.x));
+    let mut here = Place::of(problem, weights, bounds.inside(&start.x)?);
     let (mut iterations, mut programs, mut caution) = (0, 0, settings.caution);
     let mut status = Status::Failed(format!("{} programs without an end", settings.programs));
-    while programs < settings.programs && here.cost.is_finite() {
+    if !here.cost.is_finite() {
+        let found = "two points in one place, or a car that stands still";
+        return Err(Error::input(
+            "the line",
+            "start",
+            found,
+            "a line that can be driven",
+        ));
+    }
+    while programs < settings.programs {
         let program = here.program(problem, bounds, weights, caution);
         let solution = program.solve()?;
         programs += 1;

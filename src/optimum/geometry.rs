@@ -1,6 +1,8 @@
 //! Points of a line, its segments and curvature, and the derivatives of both in reverse.
 
 use super::bounds::{Bounds, RowBound};
+use crate::Result;
+use crate::line::{LinePlan, Parametrisation, SectionRow};
 use crate::track::CrossSections;
 use glam::DVec2;
 
@@ -42,13 +44,43 @@ impl LineMap {
 
     /// One variable for each cut: the line's `alpha` there.
     pub fn at_every_cut(cuts: &CrossSections) -> Self {
-        Self::of_shares(cuts, cuts.len(), |i| vec![(i, 1.0)])
+        let points = (0..cuts.len()).map(|i| (cuts.right_m[i], vec![(i, cuts.left_m[i] - cuts.right_m[i])]));
+        Self::new(cuts.closed, cuts.len(), points)
     }
 
-    /// `alpha` as a cubic B-spline with `controls` evenly spaced over the cuts' stations; on an open circuit the outer
-    /// controls lie at the ends and are doubled, so that a straight row of controls gives a straight line.
-    pub fn b_spline(cuts: &CrossSections, controls: usize) -> Self {
-        Self::of_shares(cuts, controls, |i| spline_shares(cuts, controls, i))
+    /// The variables of a parametrisation, and the bounds that keep them and the line within theirs.
+    ///
+    /// # Errors
+    /// [`crate::Error::Input`] if the parametrisation does not fit the cuts.
+    pub fn parametrised(cuts: &CrossSections, parametrisation: &Parametrisation) -> Result<(Self, Bounds)> {
+        let mut plan = LinePlan::of_cuts(&cuts.right_m, &cuts.left_m, cuts.closed);
+        parametrisation.apply(cuts, &mut plan)?;
+        let variables = parametrisation.variables(cuts);
+        let shares = |row: &SectionRow<f64>| {
+            let terms = row.sources.iter().zip(&row.weights).take(plan.terms);
+            let used = terms.filter(|(_, weight)| **weight != 0.0);
+            used.map(|(source, weight)| (*source as usize, *weight))
+                .collect::<Vec<_>>()
+        };
+        let points = plan.rows.iter().enumerate().map(|(i, row)| {
+            let across = cuts.left_m[i] - cuts.right_m[i];
+            let reach = shares(row).into_iter().map(|(k, share)| (k, share * across));
+            (cuts.right_m[i] + row.constant * across, reach.collect())
+        });
+        let map = Self::new(cuts.closed, variables.len(), points);
+        // A single variable at a section is within its own bounds.
+        let sums = plan.rows.iter().filter(|_| plan.terms > 1);
+        let rows = sums.map(|row| RowBound {
+            terms: shares(row),
+            lower: -row.constant,
+            upper: 1.0 - row.constant,
+        });
+        let bounds = Bounds {
+            lower: variables.iter().map(|v| v.lower).collect(),
+            upper: variables.iter().map(|v| v.upper).collect(),
+            rows: rows.collect(),
+        };
+        Ok((map, bounds))
     }
 
     /// A line `base` (its `alpha` on every cut) moved along the cuts by a cubic B-spline with `controls` (m, to the left),
@@ -75,20 +107,6 @@ impl LineMap {
             rows: rows.collect(),
         };
         (Self::new(cuts.closed, controls, reaches), bounds)
-    }
-
-    /// `alpha` on every cut a sum of shares of the variables.
-    fn of_shares(
-        cuts: &CrossSections,
-        variables: usize,
-        shares: impl Fn(usize) -> Vec<(usize, f64)>,
-    ) -> Self {
-        let points = (0..cuts.len()).map(|i| {
-            let across = cuts.left_m[i] - cuts.right_m[i];
-            let reach = shares(i).into_iter().map(|(k, share)| (k, share * across));
-            (cuts.right_m[i], reach.collect())
-        });
-        Self::new(cuts.closed, variables, points)
     }
 
     /// Number of variables.
@@ -127,7 +145,8 @@ impl LineMap {
     }
 }
 
-/// What each of `controls` evenly spaced controls of a cubic B-spline counts at cut `i`.
+/// What each of `controls` evenly spaced controls of a cubic B-spline counts at cut `i`; the outer ones of an open
+/// circuit count for those that would lie beyond its ends.
 fn spline_shares(cuts: &CrossSections, controls: usize, i: usize) -> Vec<(usize, f64)> {
     let last = controls as isize - 1;
     let spans = if cuts.closed { controls as f64 } else { last as f64 };
@@ -211,7 +230,7 @@ impl Shape {
 
     /// Whether the line has two points in one place, where its heading is undefined.
     pub fn stands_still(&self) -> bool {
-        self.length_m.iter().any(|length| !(*length > 0.0))
+        !self.length_m.iter().all(|length| *length > 0.0)
     }
 
     /// Adds the change of segment `s` in `direction`, times the direction's length, by the variables to `terms`.
@@ -261,9 +280,9 @@ impl Shape {
         let n = self.turn_rad.len();
         let mut by_length = by_length.to_vec();
         let mut by_heading = vec![0.0; self.step_m.len()];
-        for i in 0..n {
+        for (i, by_curvature) in by_curvature.iter().enumerate() {
             if let (Some(before), Some(after)) = self.neighbours(i) {
-                let by_turn = by_curvature[i] / self.spacing_m[i];
+                let by_turn = by_curvature / self.spacing_m[i];
                 by_heading[after] += by_turn;
                 by_heading[before] -= by_turn;
                 let by_spacing = -by_turn * self.curvature_1pm[i];

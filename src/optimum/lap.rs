@@ -143,8 +143,7 @@ impl Lap {
                 } => {
                     let next = (node + 1) % n;
                     by_square[next] += bar * by_start;
-                    by_curvature[node] += 0.5 * bar * c;
-                    by_curvature[next] += 0.5 * bar * c;
+                    by_curvature[tighter(shape, node)] += bar * c;
                     by_length[node] += bar * l;
                 }
             }
@@ -160,8 +159,7 @@ impl Lap {
                 } => {
                     let previous = (node + n - 1) % n;
                     by_drive[previous] += bar * by_start;
-                    by_curvature[node] += 0.5 * bar * c;
-                    by_curvature[previous] += 0.5 * bar * c;
+                    by_curvature[tighter(shape, previous)] += bar * c;
                     by_length[previous] += bar * l;
                 }
             }
@@ -318,9 +316,16 @@ fn across(limits: &dyn Limits, pass: Pass, start: f64, curvature_1pm: f64, h: f6
     ((2.0 * e - start).max(0.0), origin)
 }
 
-fn middle_curvature(shape: &Shape, segment: usize) -> f64 {
+/// The end of a segment with the tighter bend, whose limits hold over all of it. The mean of both would be of second order, but
+/// a line whose bends take turns in being tight and wide would go unpunished, and an optimiser finds it.
+pub(super) fn tighter(shape: &Shape, segment: usize) -> usize {
     let k = &shape.curvature_1pm;
-    0.5 * (k[segment] + k[(segment + 1) % k.len()])
+    let next = (segment + 1) % k.len();
+    if k[next].abs() > k[segment].abs() {
+        next
+    } else {
+        segment
+    }
 }
 
 type Passed = (Vec<f64>, Vec<(usize, Origin)>);
@@ -332,7 +337,7 @@ fn drive_pass(shape: &Shape, limits: &dyn Limits, corner: &[f64], first: usize, 
     let mut origins = vec![(first, Origin::Own)];
     for step in 1..count {
         let (previous, node) = ((first + step - 1) % n, (first + step) % n);
-        let curvature = middle_curvature(shape, previous);
+        let curvature = shape.curvature_1pm[tighter(shape, previous)];
         let (reached, origin) = across(
             limits,
             Pass::Drive,
@@ -357,7 +362,7 @@ fn closed_drive(shape: &Shape, limits: &dyn Limits, corner: &[f64]) -> Passed {
     for _ in 0..3 {
         let passed = drive_pass(shape, limits, corner, first, n);
         let last = (first + n - 1) % n;
-        let curvature = middle_curvature(shape, last);
+        let curvature = shape.curvature_1pm[tighter(shape, last)];
         let (closing, _) = across(
             limits,
             Pass::Drive,
@@ -393,7 +398,7 @@ fn brake_pass(shape: &Shape, limits: &dyn Limits, after_drive: &[f64]) -> Passed
     let mut origins = vec![(last, Origin::Own)];
     for step in 1..n {
         let (next, node) = ((last + n + 1 - step) % n, (last + n - step) % n);
-        let curvature = middle_curvature(shape, node);
+        let curvature = shape.curvature_1pm[tighter(shape, node)];
         let (reached, origin) = across(limits, Pass::Brake, square[next], curvature, shape.length_m[node]);
         let own = reached >= after_drive[node];
         square[node] = if own { after_drive[node] } else { reached };

@@ -1,7 +1,13 @@
 //! Exact optima of racing lines, for reference and for warm starts.
 //!
-//! Shortest path, squared length and second difference are convex and go to an interior-point solver; curvature and lap
-//! time are smooth but for kinks, and are led downhill by gradients in reverse mode.
+//! Shortest path, squared length and second differences are convex problems, and one cone program each: their optima are
+//! global, with a bound that proves it. Curvature, lap time and weighted sums are led downhill by sequences of such
+//! programs ([`descend`], [`polish_lines`]) to points of the first order; starts that end in the same place tell that it
+//! is the optimum.
+//!
+//! A line is judged at its points. Where every cut has a variable of its own, curvature may alternate from point to point
+//! and gain what no car could; [`LineMap::spline_about`] a smooth line with two or more points for each control leaves no
+//! room for that, and `alpha` as a spline only serves roads whose edges are smooth.
 
 mod bounds;
 mod conic;

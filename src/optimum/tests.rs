@@ -1,1 +1,157 @@
+//! Gradients and step models, by differences.
 
+use super::*;
+use crate::line::Parametrisation;
+use crate::random::Random;
+use crate::track::{CrossSections, Shape, Spacing};
+
+fn ellipse(cuts: usize) -> CrossSections {
+    let shape = Shape::parse("ellipse:300:60:12").unwrap().unwrap();
+    shape.cross_sections(&Spacing::equal(cuts)).unwrap()
+}
+
+/// Grip that grows with speed, constant power, drag.
+struct Racer;
+
+impl Limits for Racer {
+    fn at(&self, v: f64) -> Grip {
+        let line = |value: f64, by_speed: f64| Slope {
+            value: value + by_speed * v,
+            by_speed,
+        };
+        Grip {
+            lateral: line(13.0, 0.075),
+            longitudinal: line(11.5, 0.1),
+            drive: Slope {
+                value: 265.0 / v,
+                by_speed: -265.0 / (v * v),
+            },
+            drag: Slope {
+                value: 4.3e-4 * v * v,
+                by_speed: 8.6e-4 * v,
+            },
+        }
+    }
+
+    fn top_speed_mps(&self) -> f64 {
+        70.0
+    }
+}
+
+/// A line that wanders over the middle of the road.
+fn wandering(variables: usize) -> Vec<f64> {
+    let random = Random::new(11);
+    let phase: Vec<f64> = (0..9).map(|k| 6.3 * random.uniform(1, 0, 0, k)).collect();
+    let waves = |i: usize| {
+        let t = std::f64::consts::TAU * i as f64 / variables as f64;
+        let wave = |(k, phase): (usize, &f64)| (k as f64 * t + phase).sin();
+        0.5 + 0.05 * phase.iter().enumerate().map(wave).sum::<f64>()
+    };
+    (0..variables).map(waves).collect()
+}
+
+fn weights() -> [(&'static str, Weights); 5] {
+    let none = Weights::default();
+    [
+        ("time", Weights { time: 1.0, ..none }),
+        ("length", Weights { length: 1.0, ..none }),
+        (
+            "squared length",
+            Weights {
+                squared_length: 1.0,
+                ..none
+            },
+        ),
+        ("Gamma", Weights { gamma: 1.0, ..none }),
+        (
+            "curvature",
+            Weights {
+                curvature: 1.0,
+                ..none
+            },
+        ),
+    ]
+}
+
+/// Central differences over 1e-6 of the road's width leave 1e-12 of third derivatives and 1e-5 of the rounding of the
+/// lap's Newton steps; what a wrong term would do is of the size of the gradient itself.
+#[test]
+fn gradients_are_those_of_differences() {
+    let cuts = ellipse(200);
+    let (spline, _) = LineMap::parametrised(&cuts, &Parametrisation::control_points(40)).unwrap();
+    for map in [LineMap::at_every_cut(&cuts), spline] {
+        let spacing = spacing_m(&map, &vec![0.5; map.variables()]);
+        for spacing_m in [None, Some(&spacing[..])] {
+            let problem = LineProblem {
+                limits: Some(&Racer),
+                spacing_m,
+                ..LineProblem::of(&map)
+            };
+            let x = wandering(map.variables());
+            for (name, weights) in weights() {
+                let (_, gradient) = problem.cost(&weights, &x);
+                let most = gradient.iter().fold(0.0f64, |most, g| most.max(g.abs()));
+                for (k, slope) in gradient.iter().enumerate() {
+                    let at = |step: f64| {
+                        let mut x = x.clone();
+                        x[k] += step;
+                        problem.cost(&weights, &x).0
+                    };
+                    let difference = (at(1e-6) - at(-1e-6)) / 2e-6;
+                    assert!(
+                        (difference - slope).abs() < 1e-4 * most,
+                        "{name}, variable {k}: {difference} and {slope}"
+                    );
+                }
+            }
+        }
+    }
+}
+
+/// An open road, too: entry speed given, one fewer segment than points.
+#[test]
+fn gradients_on_an_open_road() {
+    let mut cuts = ellipse(200);
+    cuts.closed = false;
+    let map = LineMap::at_every_cut(&cuts);
+    let problem = LineProblem {
+        limits: Some(&Racer),
+        start_mps: 10.0,
+        ..LineProblem::of(&map)
+    };
+    let x = wandering(200);
+    let (cost, gradient) = problem.cost(&weights()[0].1, &x);
+    assert!((problem.speeds_mps(&x)[0] - 10.0).abs() < 1e-12 && cost == problem.measures(&x).time_s);
+    let most = gradient.iter().fold(0.0f64, |most, g| most.max(g.abs()));
+    for k in [0, 1, 2, 50, 101, 150, 198, 199] {
+        let at = |step: f64| {
+            let mut x = x.clone();
+            x[k] += step;
+            problem.measures(&x).time_s
+        };
+        let difference = (at(1e-6) - at(-1e-6)) / 2e-6;
+        assert!(
+            (difference - gradient[k]).abs() < 1e-4 * most,
+            "{k}: {difference} {}",
+            gradient[k]
+        );
+    }
+}
+
+/// On a circle the fastest steady speed is where the ellipse leaves just the drag: `(a_x/g_x)^2 + (v^2/(r g_y))^2 = 1`.
+#[test]
+fn a_steady_circle_is_driven_at_the_ellipse() {
+    let circle = Shape::parse("circle:95:105").unwrap().unwrap();
+    let map = LineMap::at_every_cut(&circle.cross_sections(&Spacing::equal(360)).unwrap());
+    let problem = LineProblem {
+        limits: Some(&Racer),
+        ..LineProblem::of(&map)
+    };
+    for v in problem.speeds_mps(&[0.5; 360]) {
+        let grip = Racer.at(v);
+        // The polygon's curvature is that of its corners' circle to (pi/360)^2.
+        let used = (grip.drag.value / grip.longitudinal.value).powi(2)
+            + (v * v / 100.0 / grip.lateral.value).powi(2);
+        assert!((used - 1.0).abs() < 1e-4, "{v} {used}");
+    }
+}

@@ -9,7 +9,7 @@ const LEAST_CHANGE: f64 = -0.9;
 
 /// Adds the time, times `weight`, of the lap with squared speeds `squares` to a program whose variables so far are changes
 /// of the line's; relative changes of the squared speeds follow them. Tyres are held within the ellipse at the middle of each
-/// segment, corner speeds at the points, as the lap has it.
+/// segment with the curvature of both its ends, corner speeds at the points, as the lap has it.
 pub(super) fn add_time(
     program: &mut ConicProgram,
     map: &LineMap,
@@ -93,17 +93,12 @@ fn add_segment(
     let v = middle.sqrt().max(f64::MIN_POSITIVE);
     let grip = limits.at(v);
     let per_square = 0.5 / v;
-    let curvature = 0.5 * (shape.curvature_1pm[s] + shape.curvature_1pm[next]);
     let acceleration = 0.5 * (e1 - e0) / h;
     let demand = acceleration + grip.drag.value;
-    // Terms of a quantity that changes with the speeds at both ends, the segment's length and the curvature at both ends.
-    let terms = |by_start: f64, by_end: f64, by_length: f64, by_curvature: f64| {
+    // Terms of a quantity that changes with the speeds at both ends, the segment's length.
+    let terms = |by_start: f64, by_end: f64, by_length: f64| {
         let mut terms = vec![(first + s, e0 * by_start), (first + next, e1 * by_end)];
         shape.add_length(map, s, by_length, &mut terms);
-        if by_curvature != 0.0 {
-            shape.add_curvature(map, s, 0.5 * by_curvature, &mut terms);
-            shape.add_curvature(map, next, 0.5 * by_curvature, &mut terms);
-        }
         terms
     };
     let affine = |constant: f64, terms| Affine { constant, terms }.merged();
@@ -113,30 +108,23 @@ fn add_segment(
     let by_length = -acceleration / (h * along);
     let longitudinal = affine(
         demand / along,
-        terms(
-            slope - 0.5 / (h * along),
-            slope + 0.5 / (h * along),
-            by_length,
-            0.0,
-        ),
+        terms(slope - 0.5 / (h * along), slope + 0.5 / (h * along), by_length),
     );
     let across = grip.lateral.value;
-    let used = curvature * middle / across;
-    let slope = 0.5 * (curvature / across - used * per_square * grip.lateral.by_speed / across);
-    let lateral = affine(used, terms(slope, slope, 0.0, middle / across));
-    // A segment beyond the ellipse by rounding, or by what the midpoint of a coasting one leaves, may stay there.
-    let size = longitudinal.constant.hypot(lateral.constant).max(1.0);
-    let whole = affine(size, Vec::new());
-    program.add_cone([whole, longitudinal, lateral]);
+    for end in [s, next] {
+        let curvature = shape.curvature_1pm[end];
+        let used = curvature * middle / across;
+        let slope = 0.5 * (curvature / across - used * per_square * grip.lateral.by_speed / across);
+        let mut change = terms(slope, slope, 0.0);
+        shape.add_curvature(map, end, middle / across, &mut change);
+        // A segment beyond the ellipse by rounding, or by what the middle of a coasting one leaves, may stay there.
+        let whole = affine(longitudinal.constant.hypot(used).max(1.0), Vec::new());
+        program.add_cone([whole, longitudinal.clone(), affine(used, change)]);
+    }
     let slope = 0.5 * per_square * (grip.drive.by_speed - grip.drag.by_speed) / along;
     let spare = affine(
         ((grip.drive.value - demand) / along).max(0.0),
-        terms(
-            slope + 0.5 / (h * along),
-            slope - 0.5 / (h * along),
-            -by_length,
-            0.0,
-        ),
+        terms(slope + 0.5 / (h * along), slope - 0.5 / (h * along), -by_length),
     );
     program.add_nonnegative(spare);
 }

@@ -15,6 +15,12 @@ pub trait Lookup: Real {
     /// The figure `column` places behind `place`, from a table that is not empty; never beyond its end.
     fn pick(table: &[Self::Storage], place: Self::Place, column: usize) -> Self;
 
+    /// The eight figures from `place` on, from a table of whole rows of eight that is not empty; never beyond its end.
+    #[inline(always)]
+    fn pick_row(table: &[Self::Storage], place: Self::Place) -> [Self; 8] {
+        std::array::from_fn(|column| Self::pick(table, place, column))
+    }
+
     /// Whether the mask holds in every lane.
     fn all(mask: Self::Mask) -> bool;
 }
@@ -102,10 +108,78 @@ mod x86 {
         (table.len() - 1) as i32
     }
 
+    /// Eight rows of eight as eight columns. Loading whole rows and turning them round costs less than gathering.
+    #[inline]
+    #[target_feature(enable = "avx2")]
+    fn transposed(rows: [__m256; 8]) -> [__m256; 8] {
+        let [a, b, c, d, e, f, g, h] = rows;
+        let pairs = |x, y| (_mm256_unpacklo_ps(x, y), _mm256_unpackhi_ps(x, y));
+        let (ab_low, ab_high) = pairs(a, b);
+        let (cd_low, cd_high) = pairs(c, d);
+        let (ef_low, ef_high) = pairs(e, f);
+        let (gh_low, gh_high) = pairs(g, h);
+        let fours = |x, y| (_mm256_shuffle_ps::<0x44>(x, y), _mm256_shuffle_ps::<0xee>(x, y));
+        let (abcd_0, abcd_1) = fours(ab_low, cd_low);
+        let (abcd_2, abcd_3) = fours(ab_high, cd_high);
+        let (efgh_0, efgh_1) = fours(ef_low, gh_low);
+        let (efgh_2, efgh_3) = fours(ef_high, gh_high);
+        let low = |x, y| _mm256_permute2f128_ps::<0x20>(x, y);
+        let high = |x, y| _mm256_permute2f128_ps::<0x31>(x, y);
+        [
+            low(abcd_0, efgh_0),
+            low(abcd_1, efgh_1),
+            low(abcd_2, efgh_2),
+            low(abcd_3, efgh_3),
+            high(abcd_0, efgh_0),
+            high(abcd_1, efgh_1),
+            high(abcd_2, efgh_2),
+            high(abcd_3, efgh_3),
+        ]
+    }
+
+    /// The columns of eight rows that start at `index`, which all lie behind `at`.
+    #[inline]
+    #[target_feature(enable = "avx2")]
+    unsafe fn rows_256(at: *const f32, index: __m256i) -> [__m256; 8] {
+        unsafe {
+            let [a, b, c, d, e, f, g, h] = std::mem::transmute::<__m256i, [u32; 8]>(index);
+            transposed([
+                _mm256_loadu_ps(at.add(a as usize)),
+                _mm256_loadu_ps(at.add(b as usize)),
+                _mm256_loadu_ps(at.add(c as usize)),
+                _mm256_loadu_ps(at.add(d as usize)),
+                _mm256_loadu_ps(at.add(e as usize)),
+                _mm256_loadu_ps(at.add(f as usize)),
+                _mm256_loadu_ps(at.add(g as usize)),
+                _mm256_loadu_ps(at.add(h as usize)),
+            ])
+        }
+    }
+
+    /// The columns of sixteen rows, likewise.
+    #[inline]
+    #[target_feature(enable = "avx512f,avx512dq")]
+    unsafe fn rows_512(at: *const f32, index: __m512i) -> [__m512; 8] {
+        unsafe {
+            let [low, high] = std::mem::transmute::<__m512i, [__m256i; 2]>(index);
+            let (low, high) = (rows_256(at, low), rows_256(at, high));
+            [
+                _mm512_insertf32x8::<1>(_mm512_castps256_ps512(low[0]), high[0]),
+                _mm512_insertf32x8::<1>(_mm512_castps256_ps512(low[1]), high[1]),
+                _mm512_insertf32x8::<1>(_mm512_castps256_ps512(low[2]), high[2]),
+                _mm512_insertf32x8::<1>(_mm512_castps256_ps512(low[3]), high[3]),
+                _mm512_insertf32x8::<1>(_mm512_castps256_ps512(low[4]), high[4]),
+                _mm512_insertf32x8::<1>(_mm512_castps256_ps512(low[5]), high[5]),
+                _mm512_insertf32x8::<1>(_mm512_castps256_ps512(low[6]), high[6]),
+                _mm512_insertf32x8::<1>(_mm512_castps256_ps512(low[7]), high[7]),
+            ]
+        }
+    }
+
     macro_rules! wide_lookup {
         (
             $name:ident, $index:ty, all $all:literal, truncate $truncate:ident, float $float:ident, set1 $set1:ident,
-            min $min:ident, mul $mul:ident, add $add:ident, gather $gather:expr
+            min $min:ident, mul $mul:ident, add $add:ident, gather $gather:expr, rows $rows:ident
         ) => {
             impl Lookup for $name {
                 type Place = $index;
@@ -128,6 +202,26 @@ mod x86 {
                     }
                 }
                 #[inline(always)]
+                fn pick_row(table: &[f32], place: $index) -> [Self; 8] {
+                    let last = last_index(table);
+                    assert!(last >= 7);
+                    unsafe {
+                        let index = $min(place, $set1(last - 7));
+                        // Written out: through a library function's closure the registers would go by memory.
+                        let [a, b, c, d, e, f, g, h] = $rows(table.as_ptr(), index);
+                        [
+                            Self::of_register(a),
+                            Self::of_register(b),
+                            Self::of_register(c),
+                            Self::of_register(d),
+                            Self::of_register(e),
+                            Self::of_register(f),
+                            Self::of_register(g),
+                            Self::of_register(h),
+                        ]
+                    }
+                }
+                #[inline(always)]
                 fn all(mask: Self::Mask) -> bool {
                     Self::mask_bits(mask) == $all
                 }
@@ -137,12 +231,14 @@ mod x86 {
     wide_lookup!(
         Avx512, __m512i, all 0xffff, truncate _mm512_cvttps_epi32, float _mm512_cvtepi32_ps, set1 _mm512_set1_epi32,
         min _mm512_min_epu32, mul _mm512_mullo_epi32, add _mm512_add_epi32,
-        gather |at, index| _mm512_i32gather_ps::<4>(index, at)
+        gather |at, index| _mm512_i32gather_ps::<4>(index, at),
+        rows rows_512
     );
     wide_lookup!(
         Avx2, __m256i, all 0xff, truncate _mm256_cvttps_epi32, float _mm256_cvtepi32_ps, set1 _mm256_set1_epi32,
         min _mm256_min_epu32, mul _mm256_mullo_epi32, add _mm256_add_epi32,
-        gather |at, index| _mm256_i32gather_ps::<4>(at, index)
+        gather |at, index| _mm256_i32gather_ps::<4>(at, index),
+        rows rows_256
     );
 
     /// Without instructions for it, lane by lane.

@@ -51,7 +51,7 @@ fn rounded(x: f64, decimals: i32) -> f64 {
 /// the fit takes the same step.
 ///
 /// # Errors
-/// [`Error::Input`] for a setting out of range, [`Error::Study`] if the car does not get round.
+/// [`Error::Input`] for a setting out of range or an open road, [`Error::Study`] if the car does not get round.
 pub fn simulate_lap(car: &Car, circuit: &Circuit, settings: &SimulateSettings) -> Result<Log> {
     if !(settings.rate_hz >= 5.0 && settings.rate_hz <= 1000.0) || settings.substeps == 0 {
         let found = format!("{} Hz, {} sub-steps", settings.rate_hz, settings.substeps);
@@ -60,6 +60,14 @@ pub fn simulate_lap(car: &Car, circuit: &Circuit, settings: &SimulateSettings) -
             "rate_hz, substeps",
             found,
             "5 to 1000 Hz and 1 or more sub-steps",
+        ));
+    }
+    if !circuit.closed {
+        return Err(Error::input(
+            &circuit.name,
+            "track",
+            "an open road",
+            "a closed circuit: the lap driven is a flying one",
         ));
     }
     let interval = 1.0 / settings.rate_hz;

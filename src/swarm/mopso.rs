@@ -44,6 +44,16 @@ impl Mopso {
         })
     }
 
+    /// Puts the first particles at these candidates (in the variables' units), before the first population is asked for.
+    pub fn start_from(&mut self, candidates: &[Vec<f64>]) {
+        for (particle, candidate) in candidates.iter().enumerate().take(self.particles.count) {
+            let row = self.particles.row(particle);
+            let position = self.particles.space.position(candidate);
+            self.particles.position[row.clone()].copy_from_slice(&position);
+            self.best_position[row].copy_from_slice(&position);
+        }
+    }
+
     /// The archive; its positions are in the unit cube, see [`Mopso::archive_candidates`].
     pub fn archive(&self) -> &Archive {
         &self.archive

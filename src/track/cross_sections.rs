@@ -22,6 +22,8 @@ pub struct CrossSections {
     pub right_m: Vec<DVec2>,
     /// Left end of each cut (m).
     pub left_m: Vec<DVec2>,
+    /// Where the smooth reference line crosses each cut, as a share of its width from the right.
+    pub reference: Vec<f64>,
     /// Named stretches, by station.
     pub sections: Vec<Section>,
     /// Named corners, by station.
@@ -46,7 +48,8 @@ impl CrossSections {
     pub fn narrowed(&self, car_width_m: f64) -> Result<Self> {
         let mut narrowed = self.clone();
         let ends = narrowed.right_m.iter_mut().zip(&mut narrowed.left_m);
-        for ((right, left), station) in ends.zip(&self.station_m) {
+        let cuts = ends.zip(&mut narrowed.reference).zip(&self.station_m);
+        for (((right, left), reference), station) in cuts {
             let width = right.distance(*left);
             // What is no number fits nowhere.
             let fits = width > car_width_m && car_width_m >= 0.0;
@@ -61,6 +64,8 @@ impl CrossSections {
             let inward = (*left - *right) * (0.5 * car_width_m / width);
             *right += inward;
             *left -= inward;
+            let usable = width - car_width_m;
+            *reference = ((*reference * width - 0.5 * car_width_m) / usable).clamp(0.0, 1.0);
         }
         Ok(narrowed)
     }
@@ -88,6 +93,7 @@ mod tests {
             station_m: vec![0.0, 10.0],
             right_m: vec![DVec2::new(0.0, -4.0), DVec2::new(10.0, -4.0)],
             left_m: vec![DVec2::new(0.0, 6.0), DVec2::new(10.0, 6.0)],
+            reference: vec![0.4, 0.4],
             sections: Vec::new(),
             corners: Vec::new(),
         }
@@ -98,6 +104,8 @@ mod tests {
         let cuts = straight().narrowed(2.0).unwrap();
         let points = cuts.points(&[0.0, 1.0]);
         assert_eq!(points, [DVec2::new(0.0, -3.0), DVec2::new(10.0, 5.0)]);
+        // The reference line stays where it is, 4 m from the right edge: 3 of the 8 m that are left.
+        assert!((cuts.reference[0] - 0.375).abs() < 1e-15);
     }
 
     #[test]

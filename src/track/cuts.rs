@@ -44,8 +44,14 @@ pub(super) fn cross_sections(road: &dyn Road, spacing: &Spacing) -> Result<Cross
     let mut cutter = Cutter::new(road, spread(road, spacing)?)?;
     cutter.mend()?;
     cutter.check_edges()?;
+    let share = |(frame, &[right, left]): (&RoadFrame, &Stretch)| {
+        let across: DVec2 = left - right;
+        (frame.position_m - right).dot(across) / across.length_squared()
+    };
+    let reference = cutter.frames.iter().zip(&cutter.ends).map(share).collect();
     let (right_m, left_m) = cutter.ends.iter().map(|&[right, left]| (right, left)).unzip();
     Ok(CrossSections {
+        reference,
         name: road.name().to_owned(),
         closed: road.closed(),
         length_m: road.length_m(),

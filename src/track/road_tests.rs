@@ -295,6 +295,10 @@ fn an_open_road_keeps_its_ends() {
     }
     let (circuit, _) = line.circuit().unwrap();
     assert!(circuit.position_at(1e9).distance(points[99]) < 0.05);
+    let car = crate::vehicle::Car::load("gt").unwrap();
+    let refused =
+        crate::simulate::simulate_lap(&car, &circuit, &crate::simulate::SimulateSettings::default());
+    assert!(refused.unwrap_err().to_string().contains("an open road"));
 }
 
 #[test]

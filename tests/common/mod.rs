@@ -2,6 +2,8 @@
 
 #![allow(dead_code)] // Each of the crates that include this module uses a part of it.
 
+pub mod line;
+
 use lapswarm::evaluate::Objective;
 use lapswarm::evaluate::replay::{
     CHANNEL_NAMES, CHANNEL_UNITS, ChannelWeights, Norm, ReplayProblem, Sample, Window, trace,

@@ -9,4 +9,5 @@ mod cutting;
 mod device;
 mod elementary;
 mod lap;
+mod line;
 mod step;

@@ -6,6 +6,7 @@
 use super::adapter::{DeviceSummary, choose};
 use super::lint;
 use crate::error::{Error, Result};
+use crate::evaluate::BackendInfo;
 use std::collections::HashMap;
 use std::sync::mpsc::RecvTimeoutError;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -118,6 +119,17 @@ impl GpuContext {
     /// What the device is.
     pub fn summary(&self) -> &DeviceSummary {
         &self.summary
+    }
+
+    /// What the device is, as evaluators say it.
+    pub(crate) fn backend_info(&self) -> BackendInfo {
+        BackendInfo {
+            backend: "gpu",
+            device: self.summary.name.clone(),
+            driver: format!("{} {}", self.summary.driver, self.summary.driver_info)
+                .trim()
+                .to_owned(),
+        }
     }
 
     /// The device's limits.

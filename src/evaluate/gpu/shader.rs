@@ -2,6 +2,7 @@
 //! constants, and the loaders that tell the figures that candidates share from those in which they differ.
 
 use crate::evaluate::replay::Norm;
+use crate::line::kernel::Wanted;
 use crate::vehicle::tyre::Tyre;
 use crate::vehicle::{Chassis, LinearTyre, MagicFormula, TyreModel};
 
@@ -17,6 +18,8 @@ const CAR: &str = include_str!("../../../shaders/car.wgsl");
 const REPLAY_COMMON: &str = include_str!("../../../shaders/replay_common.wgsl");
 const REPLAY: &str = include_str!("../../../shaders/replay.wgsl");
 const REPLAY_REDUCE: &str = include_str!("../../../shaders/replay_reduce.wgsl");
+
+const LINE: &str = include_str!("../../../shaders/line.wgsl");
 
 /// The car's fragments with the tyre model's.
 pub fn car_fragments(model: TyreModel) -> [&'static str; 7] {
@@ -78,6 +81,59 @@ impl ReplayShape<'_> {
             self.workgroup,
             base_vectors(self.sources.len()),
         )
+    }
+}
+
+/// What a line kernel is specialised to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct LineShape {
+    /// Whether the line's end joins its start.
+    pub closed: bool,
+    /// Terms of the sum that gives `alpha` at a section: none, one or four.
+    pub terms: usize,
+    /// What is asked for beyond lengths.
+    pub wanted: Wanted,
+    /// Rows of the table of limits.
+    pub limit_rows: usize,
+    /// Rows of the table of corner speeds.
+    pub corner_rows: usize,
+    /// Rows of the table of the ellipse, nought where there is none.
+    pub ellipse_rows: usize,
+    /// Sections, if their table is to be uniform.
+    pub uniform_sections: Option<usize>,
+    /// Whether the table of limits is to be uniform.
+    pub uniform_limits: bool,
+    /// Lanes of a workgroup.
+    pub workgroup: u32,
+}
+
+impl LineShape {
+    /// Source of the kernel; entry point `line`.
+    pub fn source(&self) -> String {
+        let constants = format!(
+            "\n// Generated.\nconst CLOSED: bool = {};\nconst TERMS: u32 = {}u;\nconst WANTS_INTEGRAL: bool = {};\n\
+             const WANTS_LAP: bool = {};\nconst LIMIT_ROWS: u32 = {}u;\nconst CORNER_ROWS: u32 = {}u;\n\
+             const ELLIPSE_ROWS: u32 = {}u;\nconst WORKGROUP: u32 = {}u;\n\
+             @group(0) @binding(1) {};\n@group(0) @binding(2) {};\n\n",
+            self.closed,
+            self.terms,
+            self.wanted.integral,
+            self.wanted.lap,
+            self.limit_rows,
+            self.corner_rows,
+            self.ellipse_rows,
+            self.workgroup,
+            match self.uniform_sections {
+                Some(count) => format!("var<uniform> sections: array<Section, {count}>"),
+                None => "var<storage, read> sections: array<Section>".to_owned(),
+            },
+            if self.uniform_limits {
+                format!("var<uniform> limits: array<vec4<f32>, {}>", 2 * self.limit_rows)
+            } else {
+                "var<storage, read> limits: array<vec4<f32>>".to_owned()
+            },
+        );
+        [ELEMENTARY, &constants, LINE].concat()
     }
 }
 

@@ -60,18 +60,8 @@ impl Evaluator for CpuEvaluator<'_> {
                 })
             })
             .collect();
-        Ok(collect_rows(rows))
+        Ok(Evaluation::of_rows(rows))
     }
-}
-
-/// Joins rows of objectives and failures.
-pub(super) fn collect_rows(rows: Vec<(Vec<f64>, Option<crate::evaluate::Failure>)>) -> Evaluation {
-    let mut evaluation = Evaluation::default();
-    for (row, failure) in rows {
-        evaluation.objectives.extend(row);
-        evaluation.failures.push(failure);
-    }
-    evaluation
 }
 
 /// The four compared outputs at every sample of `window`, and whether the car drove to its end.

@@ -1,6 +1,5 @@
 //! The graphics backend: `f32`, one lane per candidate and window, the windows joined on the device.
 
-use super::cpu::collect_rows;
 use super::kernel::{BLOCK, CHANNELS};
 use super::problem::ReplayProblem;
 use super::table::ModelTable;
@@ -515,14 +514,7 @@ impl Evaluator for GpuEvaluator<'_> {
     }
 
     fn backend(&self) -> BackendInfo {
-        let summary = self.context.summary();
-        BackendInfo {
-            backend: "gpu",
-            device: summary.name.clone(),
-            driver: format!("{} {}", summary.driver, summary.driver_info)
-                .trim()
-                .to_owned(),
-        }
+        self.context.backend_info()
     }
 
     fn evaluate(&mut self, population: &[f64]) -> Result<Evaluation> {
@@ -550,6 +542,6 @@ impl Evaluator for GpuEvaluator<'_> {
                 None => replay.objective_row(errors.next().flatten()),
             })
             .collect();
-        Ok(collect_rows(results))
+        Ok(Evaluation::of_rows(results))
     }
 }

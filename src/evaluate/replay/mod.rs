@@ -9,7 +9,8 @@ mod problem;
 mod simd;
 mod table;
 
-pub use backend::{BackendChoice, open_evaluator};
+pub use super::BackendChoice;
+pub use backend::open_evaluator;
 pub use cpu::{CpuEvaluator, norm_name, trace};
 pub use gpu::{Batching, DeviceSample, DeviceWindow, DispatchStatistics, GpuEvaluator, Stretch};
 pub use jacobian::Residuals;

@@ -1,6 +1,5 @@
 //! The lane backend: `f32`, as many candidates at once as a register holds, threads by rayon.
 
-use super::cpu::collect_rows;
 use super::kernel::{CHANNELS, score_window};
 use super::problem::{Plan, ReplayProblem, Window};
 use super::table::ModelTable;
@@ -137,6 +136,6 @@ impl Evaluator for SimdEvaluator<'_> {
             }
             results[candidate] = self.replay.objective_row(total);
         }
-        Ok(collect_rows(results))
+        Ok(Evaluation::of_rows(results))
     }
 }

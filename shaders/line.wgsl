@@ -1,0 +1,256 @@
+// Twin of `src/line/kernel.rs`: from a candidate's variables to the shape of its line and the time of a lap on it.
+//
+// One lane per candidate. Segment lengths, curvatures and speeds squared stand in a buffer, section by section, so that
+// neighbouring lanes meet in neighbouring memory. All lanes start a lap's passes at the same section, for the same
+// reason. The constants CLOSED, TERMS, WANTS_INTEGRAL, WANTS_LAP, LIMIT_ROWS, CORNER_ROWS, ELLIPSE_ROWS and WORKGROUP
+// are generated, and so are the bindings 1 and 2: `sections`, and `limits` in rows of lateral, grip, drive, drag at their
+// start and then of their rises. All lanes read the same section, so that these are uniform where they fit; limits only
+// where the driver does not mind that lanes read different rows.
+
+// What a dispatch is to do; twin of `LineStretch` in `src/evaluate/line/gpu.rs`.
+struct LineStretch {
+    // One past the last candidate, the distance between rows in the buffers, and the first candidate.
+    candidates: u32,
+    stride: u32,
+    first: u32,
+    // Sections of the line, and where a closed lap's passes start.
+    sections: u32,
+    start: u32,
+    // Speed squared at the start of an open line.
+    entry: f32,
+    rows_per_speed_squared: f32,
+    rows_per_radius: f32,
+}
+
+struct Section {
+    sources: vec4<u32>,
+    weights: vec4<f32>,
+    step: vec2<f32>,
+    cut: vec2<f32>,
+    constant: f32,
+}
+
+@group(0) @binding(0) var<uniform> stretch: LineStretch;
+@group(0) @binding(3) var<storage, read> corners: array<vec2<f32>>;
+@group(0) @binding(4) var<storage, read> ellipse: array<vec2<f32>>;
+@group(0) @binding(5) var<storage, read> variables: array<f32>;
+// Length of the segment and curvature, section by section.
+@group(0) @binding(6) var<storage, read_write> course: array<vec2<f32>>;
+@group(0) @binding(7) var<storage, read_write> speeds_squared: array<f32>;
+// Planes of length, squared length, squared second differences, integral and time.
+@group(0) @binding(8) var<storage, read_write> results: array<f32>;
+
+const BLOCK: u32 = 64u;
+
+fn place_of(section: u32, candidate: u32) -> u32 {
+    return section * stretch.stride + candidate;
+}
+
+struct Segment {
+    direction: vec2<f32>,
+    length: f32,
+}
+
+fn segment_between(step: vec2<f32>, here: vec2<f32>, next: vec2<f32>) -> Segment {
+    let along = step + (next - here);
+    let length = sqrt(max(along.x * along.x + along.y * along.y, 1e-8));
+    return Segment(along / length, length);
+}
+
+fn variable(source: u32, candidate: u32) -> f32 {
+    return variables[source * stretch.stride + candidate];
+}
+
+fn alpha(section: u32, candidate: u32) -> f32 {
+    var sum = sections[section].constant;
+    let weights = sections[section].weights;
+    let sources = sections[section].sources;
+    if TERMS > 0u {
+        sum = sum + weights.x * variable(sources.x, candidate);
+    }
+    if TERMS > 1u {
+        sum = sum + weights.y * variable(sources.y, candidate);
+        sum = sum + weights.z * variable(sources.z, candidate);
+        sum = sum + weights.w * variable(sources.w, candidate);
+    }
+    sum = select(sum, 0.0, sum < 0.0);
+    return select(sum, 1.0, 1.0 < sum);
+}
+
+fn offset(section: u32, candidate: u32) -> vec2<f32> {
+    return alpha(section, candidate) * sections[section].cut;
+}
+
+// Sums of length, squared length, squared second differences and integral.
+fn shape(candidate: u32) -> vec4<f32> {
+    let n = stretch.sections;
+    let segments = select(n - 1u, n, CLOSED);
+    let first = offset(0u, candidate);
+    var here = first;
+    var before = Segment(vec2<f32>(0.0), 0.0);
+    if CLOSED {
+        before = segment_between(sections[n - 1u].step, offset(n - 1u, candidate), first);
+    }
+    var total = vec4<f32>(0.0);
+    var block = vec4<f32>(0.0);
+    for (var i = 0u; i < segments; i++) {
+        var next = first;
+        if i + 1u < n {
+            next = offset(i + 1u, candidate);
+        }
+        let segment = segment_between(sections[i].step, here, next);
+        block.x = block.x + segment.length;
+        block.y = block.y + segment.length * segment.length;
+        var curvature = 0.0;
+        if CLOSED || i > 0u {
+            let turn = segment.direction - before.direction;
+            let turned_squared = turn.x * turn.x + turn.y * turn.y;
+            let spacing = 0.5 * (before.length + segment.length);
+            let turned = sqrt(turned_squared);
+            curvature = turned / spacing;
+            block.z = block.z + curvature * curvature;
+            if WANTS_INTEGRAL {
+                let across = sqrt(max(4.0 - turned_squared, 1e-6));
+                let half = own_atan(Wheels(turned / across)).x;
+                block.w = block.w + 4.0 * half * (half / spacing);
+            }
+        }
+        if WANTS_LAP {
+            course[place_of(i, candidate)] = vec2<f32>(segment.length, curvature);
+        }
+        if (i + 1u) % BLOCK == 0u || i + 1u == segments {
+            total = total + block;
+            block = vec4<f32>(0.0);
+        }
+        before = segment;
+        here = next;
+    }
+    if WANTS_LAP && !CLOSED {
+        course[place_of(0u, candidate)].y = course[place_of(1u, candidate)].y;
+        course[place_of(n - 1u, candidate)] = vec2<f32>(0.0, course[place_of(n - 2u, candidate)].y);
+    }
+    return total;
+}
+
+fn corner(curvature: f32) -> f32 {
+    let radius = 1.0 / max(curvature, 1e-6);
+    let held = min(max(radius * stretch.rows_per_radius, 0.0), f32(CORNER_ROWS));
+    let row = min(u32(held), CORNER_ROWS - 1u);
+    let figures = corners[row];
+    return figures.x + (held - f32(row)) * figures.y;
+}
+
+// Greatest acceleration and greatest deceleration.
+fn longitudinal(speed_squared: f32, curvature: f32) -> vec2<f32> {
+    let held = min(max(speed_squared * stretch.rows_per_speed_squared, 0.0), f32(LIMIT_ROWS));
+    let row = min(u32(held), LIMIT_ROWS - 1u);
+    let at = limits[2u * row] + (held - f32(row)) * limits[2u * row + 1u];
+    let share = curvature * speed_squared / at.x;
+    var left = sqrt(max(1.0 - share * share, 0.0));
+    if ELLIPSE_ROWS > 0u {
+        let held = min(max(left * f32(ELLIPSE_ROWS), 0.0), f32(ELLIPSE_ROWS));
+        let row = min(u32(held), ELLIPSE_ROWS - 1u);
+        let figures = ellipse[row];
+        left = figures.x + (held - f32(row)) * figures.y;
+    }
+    let grip = at.y * left;
+    return vec2<f32>(min(grip, at.z) - at.w, grip + at.w);
+}
+
+fn driven(start: f32, length: f32, here: f32, there: f32) -> f32 {
+    let middle = max(start + length * longitudinal(start, here).x, 0.0);
+    let drive = longitudinal(middle, 0.5 * (here + there)).x;
+    return max(start + 2.0 * length * drive, 0.0);
+}
+
+fn braked(end: f32, length: f32, there: f32, here: f32) -> f32 {
+    let middle = end + length * longitudinal(end, there).y;
+    let brake = longitudinal(middle, 0.5 * (here + there)).y;
+    return end + 2.0 * length * brake;
+}
+
+fn lap_time(candidate: u32) -> f32 {
+    let n = stretch.sections;
+    let start = select(0u, stretch.start, CLOSED);
+    let steps = select(n - 1u, 2u * n, CLOSED);
+
+    var here = start;
+    var bend = course[place_of(start, candidate)];
+    var speed_squared = corner(bend.y);
+    if !CLOSED {
+        speed_squared = min(speed_squared, stretch.entry);
+    }
+    speeds_squared[place_of(start, candidate)] = speed_squared;
+    for (var i = 0u; i < steps; i++) {
+        let next = select(0u, here + 1u, here + 1u < n);
+        let there = course[place_of(next, candidate)];
+        let reached = driven(speed_squared, bend.x, bend.y, there.y);
+        // The first time round a section is only held to its corner speed.
+        let again = i + 1u >= n;
+        var most: f32;
+        if again {
+            most = speeds_squared[place_of(next, candidate)];
+        } else {
+            most = corner(there.y);
+        }
+        let slower = reached < most;
+        if again && !slower {
+            break;
+        }
+        speed_squared = select(most, reached, slower);
+        speeds_squared[place_of(next, candidate)] = speed_squared;
+        bend = there;
+        here = next;
+    }
+
+    var next = select(n - 1u, start, CLOSED);
+    speed_squared = speeds_squared[place_of(next, candidate)];
+    var curvature = course[place_of(next, candidate)].y;
+    for (var i = 0u; i < steps; i++) {
+        let before = select(n - 1u, next - 1u, next > 0u);
+        let there = course[place_of(before, candidate)];
+        let reached = braked(speed_squared, there.x, curvature, there.y);
+        let known = speeds_squared[place_of(before, candidate)];
+        let slower = reached < known;
+        if slower {
+            speeds_squared[place_of(before, candidate)] = reached;
+        } else if i + 1u >= n {
+            break;
+        }
+        speed_squared = select(known, reached, slower);
+        curvature = there.y;
+        next = before;
+    }
+
+    let segments = select(n - 1u, n, CLOSED);
+    var total = 0.0;
+    var block = 0.0;
+    var speed = sqrt(speeds_squared[place_of(0u, candidate)]);
+    for (var i = 0u; i < segments; i++) {
+        let after = select(0u, i + 1u, i + 1u < n);
+        let to = sqrt(speeds_squared[place_of(after, candidate)]);
+        block = block + 2.0 * course[place_of(i, candidate)].x / (speed + to);
+        speed = to;
+        if (i + 1u) % BLOCK == 0u || i + 1u == segments {
+            total = total + block;
+            block = 0.0;
+        }
+    }
+    return total;
+}
+
+@compute @workgroup_size(WORKGROUP)
+fn line(@builtin(global_invocation_id) id: vec3<u32>) {
+    let candidate = stretch.first + id.x;
+    if candidate >= stretch.candidates {
+        return;
+    }
+    let sums = shape(candidate);
+    results[candidate] = sums.x;
+    results[stretch.stride + candidate] = sums.y;
+    results[2u * stretch.stride + candidate] = sums.z;
+    results[3u * stretch.stride + candidate] = sums.w;
+    if WANTS_LAP {
+        results[4u * stretch.stride + candidate] = lap_time(candidate);
+    }
+}

@@ -1,0 +1,150 @@
+//! `lapswarm raceline`.
+
+use super::{Common, backend_flag, print_json, stop_flag};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use lapswarm::evaluate::BackendChoice;
+use lapswarm::evaluate::line::LineObjective;
+use lapswarm::study::raceline::{
+    OBJECTIVE_NAMES, RacelineSettings, find_lines, set_up, summarise, write_results,
+};
+use lapswarm::study::run_folder;
+use lapswarm::{Error, Result};
+use std::ops::ControlFlow;
+use std::path::PathBuf;
+use std::sync::atomic::Ordering;
+
+/// Flags of `raceline`; a flag wins over the study file.
+#[derive(clap::Args)]
+pub struct Arguments {
+    /// A study file; every flag has its twin in it
+    study: Option<PathBuf>,
+    #[command(flatten)]
+    common: Common,
+    /// The circuit: a bundled name, a shape such as circle:590:600, or a file (TOML, CSV, GPX, KML, a log with GPS)
+    #[arg(long, value_name = "NAME|FILE")]
+    track: Option<String>,
+    /// The car whose limits are swept: a bundled name (gt) or a TOML file
+    #[arg(long, value_name = "NAME|FILE")]
+    car: Option<String>,
+    /// Limits from a table (v_mps, ay_mps2, ax_grip_mps2, ax_drive_mps2, drag_mps2) instead of the car's own
+    #[arg(long, value_name = "FILE")]
+    envelope: Option<PathBuf>,
+    /// Cuts across the track
+    #[arg(long, value_name = "N")]
+    sections: Option<usize>,
+    /// Take surveyed edges as they are, not smoothed
+    #[arg(long)]
+    as_surveyed: bool,
+    /// Width of the car, m; 0 lets its middle use the whole road
+    #[arg(long, value_name = "W")]
+    car_width_m: Option<f64>,
+    /// Exponent of the friction ellipse
+    #[arg(long, value_name = "P")]
+    ellipse_exponent: Option<f64>,
+    /// Greatest speed at the start of an open track, m/s
+    #[arg(long, value_name = "MPS")]
+    entry_mps: Option<f64>,
+    /// length, length_squared, gamma, kappa2, lap_time: any of them, more than one for a front
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = objective_flag)]
+    objectives: Option<Vec<LineObjective>>,
+    /// Start the swarms cold, from no known line
+    #[arg(long)]
+    no_warm_start: bool,
+    /// Leave the local search by gradients out
+    #[arg(long)]
+    no_local_search: bool,
+    /// Particles of the swarm that looks for the front
+    #[arg(long, value_name = "N")]
+    population: Option<usize>,
+    /// Its iterations
+    #[arg(long, value_name = "N")]
+    iterations: Option<usize>,
+    /// Where to evaluate: auto, cpu, simd or gpu
+    #[arg(long, value_name = "BACKEND", value_parser = backend_flag)]
+    backend: Option<BackendChoice>,
+    /// Part of the name of the GPU to use
+    #[arg(long, value_name = "NAME")]
+    adapter: Option<String>,
+}
+
+fn objective_flag(name: &str) -> Result<LineObjective, String> {
+    LineObjective::named(name).ok_or_else(|| format!("expected one of {OBJECTIVE_NAMES}"))
+}
+
+impl Arguments {
+    fn settings(&self) -> Result<RacelineSettings> {
+        let mut s = match &self.study {
+            Some(path) => RacelineSettings::read(path)?,
+            None => RacelineSettings::default(),
+        };
+        fn set<T: Clone>(setting: &mut T, flag: &Option<T>) {
+            if let Some(value) = flag {
+                setting.clone_from(value);
+            }
+        }
+        set(&mut s.track, &self.track);
+        set(&mut s.car, &self.car);
+        set(&mut s.sections, &self.sections);
+        set(&mut s.car_width_m, &self.car_width_m);
+        set(&mut s.ellipse_exponent, &self.ellipse_exponent);
+        set(&mut s.entry_mps, &self.entry_mps);
+        set(&mut s.objectives, &self.objectives);
+        set(&mut s.population, &self.population);
+        set(&mut s.iterations, &self.iterations);
+        set(&mut s.backend, &self.backend);
+        set(&mut s.seed, &self.common.seed);
+        if self.envelope.is_some() {
+            s.envelope.clone_from(&self.envelope);
+        }
+        if self.adapter.is_some() {
+            s.adapter.clone_from(&self.adapter);
+        }
+        s.as_surveyed |= self.as_surveyed;
+        s.warm_start &= !self.no_warm_start;
+        s.local_search &= !self.no_local_search;
+        s.validate()?;
+        Ok(s)
+    }
+}
+
+/// Runs the study.
+pub fn run(arguments: &Arguments) -> Result<()> {
+    let settings = arguments.settings()?;
+    let setup = set_up(&settings)?;
+    let folder = run_folder::create("raceline", arguments.common.out.as_deref())?;
+    let stop = stop_flag();
+    let target = if arguments.common.quiet {
+        ProgressDrawTarget::hidden()
+    } else {
+        ProgressDrawTarget::stderr()
+    };
+    let bar = ProgressBar::with_draw_target(None, target);
+    if let Ok(style) = ProgressStyle::with_template("{spinner} {prefix:24} {msg}") {
+        bar.set_style(style);
+    }
+    let outcome = find_lines(&settings, &setup, |progress| {
+        bar.set_prefix(progress.stage.clone());
+        bar.set_message(format!("{} lines, best {}", progress.evaluations, progress.best));
+        bar.tick();
+        if stop.load(Ordering::Relaxed) {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        }
+    })?;
+    bar.finish_and_clear();
+    let summary = summarise(&settings, &setup, &outcome);
+    write_results(&folder, &settings, &setup, &outcome, &summary)?;
+    if !arguments.common.quiet {
+        print!("{}", summary.to_text());
+        println!("Results: {}", folder.display());
+    }
+    if arguments.common.json {
+        print_json(&summary)?;
+    }
+    if outcome.interrupted {
+        Err(Error::Interrupted(folder))
+    } else {
+        Ok(())
+    }
+}

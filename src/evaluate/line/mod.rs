@@ -1,0 +1,13 @@
+//! Scoring racing lines: lengths, curvatures and point-mass lap times of whole swarms of them.
+
+mod backend;
+mod cpu;
+mod gpu;
+mod problem;
+mod simd;
+
+pub use backend::open_line_evaluator;
+pub use cpu::CpuLineEvaluator;
+pub use gpu::{DeviceSection, GpuLineEvaluator, LineBatching, LineStretch};
+pub use problem::{LineObjective, LineProblem};
+pub use simd::SimdLineEvaluator;

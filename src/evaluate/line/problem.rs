@@ -1,0 +1,273 @@
+//! What is asked of racing lines: the sections they cross, how few numbers give them, and what is to be small.
+
+use crate::error::{Error, Result};
+use crate::evaluate::{FAILED_COST, Failure, Objective, Problem};
+use crate::line::kernel::{Shape, Wanted};
+use crate::line::{LimitTable, LinePlan, Parametrisation, PointMass, geometry};
+use crate::track::CrossSections;
+use glam::DVec2;
+
+/// What of a line can be minimised.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LineObjective {
+    /// Its length, m.
+    Length,
+    /// The sum of its segments' squared lengths, m^2.
+    LengthSquared,
+    /// The root of the sum of its squared second differences, 1/m.
+    Gamma,
+    /// The integral of its curvature squared over the length, 1/m.
+    Kappa2,
+    /// The time of a point mass's lap on it, s.
+    LapTime,
+}
+
+impl LineObjective {
+    /// Every objective.
+    pub const ALL: [Self; 5] = [
+        Self::Length,
+        Self::LengthSquared,
+        Self::Gamma,
+        Self::Kappa2,
+        Self::LapTime,
+    ];
+
+    /// The name in studies.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Length => "length",
+            Self::LengthSquared => "length_squared",
+            Self::Gamma => "gamma",
+            Self::Kappa2 => "kappa2",
+            Self::LapTime => "lap_time",
+        }
+    }
+
+    /// The unit.
+    pub fn unit(self) -> &'static str {
+        match self {
+            Self::Length => "m",
+            Self::LengthSquared => "m^2",
+            Self::Gamma | Self::Kappa2 => "1/m",
+            Self::LapTime => "s",
+        }
+    }
+
+    /// The objective of this name.
+    pub fn named(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|o| o.name() == name)
+    }
+}
+
+/// Figures of one line: length, squared length, squared second differences, integral and time.
+pub(super) type Measures = [f64; MEASURES];
+/// How many those are.
+pub(super) const MEASURES: usize = 5;
+
+impl<R: Copy> From<(Shape<R>, R)> for MeasuresOf<R> {
+    fn from((shape, time): (Shape<R>, R)) -> Self {
+        Self([
+            shape.length,
+            shape.length_squared,
+            shape.second_differences,
+            shape.integral,
+            time,
+        ])
+    }
+}
+
+/// [`Measures`] in any scalar.
+pub(super) struct MeasuresOf<R>(pub [R; MEASURES]);
+
+/// Finding lines across sections.
+#[derive(Clone, Debug)]
+pub struct LineProblem {
+    /// Variables and objectives.
+    pub problem: Problem,
+    cuts: CrossSections,
+    parametrisation: Parametrisation,
+    objectives: Vec<LineObjective>,
+    plan: LinePlan<f64>,
+    car: Option<PointMass>,
+    limits: Option<LimitTable<f64>>,
+}
+
+impl LineProblem {
+    /// The problem of finding lines across `cuts`, which the middle of the car may use from end to end (see
+    /// [`CrossSections::narrowed`]). `car` drives the laps; `entry_mps` is its greatest speed at the start of an open
+    /// circuit (m/s).
+    ///
+    /// # Errors
+    /// [`Error::Input`] if there are fewer than three sections, if objectives are missing or come twice, if a lap time is
+    /// asked for without a car, or if the parametrisation or the car cannot be.
+    pub fn new(
+        cuts: CrossSections,
+        parametrisation: Parametrisation,
+        objectives: &[LineObjective],
+        car: Option<PointMass>,
+        entry_mps: f64,
+    ) -> Result<Self> {
+        let wrong = |place: &str, found: String, expected: &str| {
+            Err(Error::input(&cuts.name, place, found, expected))
+        };
+        let n = cuts.len();
+        if n < 3 || cuts.right_m.len() != n || cuts.left_m.len() != n {
+            return wrong("sections", n.to_string(), "at least three, each with both ends");
+        }
+        let finite = |points: &[DVec2]| points.iter().all(|p| p.is_finite());
+        if !(finite(&cuts.right_m) && finite(&cuts.left_m)) {
+            return wrong(
+                "sections",
+                "a position that is no number".to_owned(),
+                "finite positions",
+            );
+        }
+        if !(0.0..=1000.0).contains(&entry_mps) {
+            return wrong("entry speed", format!("{entry_mps} m/s"), "0 to 1000 m/s");
+        }
+        let twice = (1..objectives.len()).find(|&i| objectives[..i].contains(&objectives[i]));
+        if let Some(i) = twice {
+            return wrong(
+                "objectives",
+                format!("{} twice", objectives[i].name()),
+                "each once",
+            );
+        }
+        if objectives.is_empty() {
+            return wrong("objectives", "none".to_owned(), "at least one");
+        }
+        if car.is_none() && objectives.contains(&LineObjective::LapTime) {
+            return wrong(
+                "objectives",
+                "lap_time without a car".to_owned(),
+                "a car's envelope",
+            );
+        }
+        let mut plan = LinePlan::of_cuts(&cuts.right_m, &cuts.left_m, cuts.closed);
+        parametrisation.apply(&cuts, &mut plan)?;
+        plan.entry = entry_mps * entry_mps;
+        let middle = geometry(&cuts.points(&vec![0.5; n]), cuts.closed);
+        let sharpness = |i: &usize| middle.curvature_1pm[*i].abs();
+        plan.start = (0..n)
+            .max_by(|i, j| sharpness(i).total_cmp(&sharpness(j)))
+            .unwrap_or(0);
+        let limits = car.as_ref().map(PointMass::table).transpose()?;
+        Ok(Self {
+            problem: Problem {
+                variables: parametrisation.variables(&cuts),
+                objectives: objectives
+                    .iter()
+                    .map(|o| Objective {
+                        name: o.name().to_owned(),
+                        unit: o.unit().to_owned(),
+                    })
+                    .collect(),
+            },
+            cuts,
+            parametrisation,
+            objectives: objectives.to_vec(),
+            plan,
+            car,
+            limits,
+        })
+    }
+
+    /// The sections.
+    pub fn cuts(&self) -> &CrossSections {
+        &self.cuts
+    }
+
+    /// How variables give a line.
+    pub fn parametrisation(&self) -> &Parametrisation {
+        &self.parametrisation
+    }
+
+    /// The objectives.
+    pub fn objectives(&self) -> &[LineObjective] {
+        &self.objectives
+    }
+
+    /// The car that laps are timed with.
+    pub fn car(&self) -> Option<&PointMass> {
+        self.car.as_ref()
+    }
+
+    /// The car's limits.
+    pub fn limits(&self) -> Option<&LimitTable<f64>> {
+        self.limits.as_ref()
+    }
+
+    /// What the kernels read of the sections.
+    pub fn plan(&self) -> &LinePlan<f64> {
+        &self.plan
+    }
+
+    /// Number of variables.
+    pub fn dimensions(&self) -> usize {
+        self.problem.variables.len()
+    }
+
+    /// `alpha` at every section, of a candidate.
+    pub fn alpha(&self, candidate: &[f64]) -> Vec<f64> {
+        self.plan
+            .rows
+            .iter()
+            .map(|row| crate::line::kernel::alpha(row, self.plan.terms, candidate))
+            .collect()
+    }
+
+    /// The points of a candidate's line (m), one per section.
+    pub fn points(&self, candidate: &[f64]) -> Vec<DVec2> {
+        self.cuts.points(&self.alpha(candidate))
+    }
+
+    /// The candidate whose line comes closest to `alpha` at every section.
+    ///
+    /// # Errors
+    /// As [`Parametrisation::fit`].
+    pub fn candidate(&self, alpha: &[f64]) -> Result<Vec<f64>> {
+        let coefficients = self.parametrisation.fit(&self.cuts, alpha)?;
+        Ok(self.parametrisation.variables_of(&coefficients))
+    }
+
+    /// What the kernels must work out.
+    pub(super) fn wanted(&self) -> Wanted {
+        Wanted {
+            integral: self.objectives.contains(&LineObjective::Kappa2),
+            lap: self.objectives.contains(&LineObjective::LapTime),
+        }
+    }
+
+    /// Why a candidate need not be scored, if so.
+    pub(super) fn preliminary_failure(&self, candidate: &[f64]) -> Option<Failure> {
+        candidate
+            .iter()
+            .any(|x| !x.is_finite())
+            .then_some(Failure::NotFinite)
+    }
+
+    /// The row of a candidate that failed.
+    pub(super) fn failed_row(&self, failure: Failure) -> (Vec<f64>, Option<Failure>) {
+        (vec![FAILED_COST; self.objectives.len()], Some(failure))
+    }
+
+    /// The objectives' row of a line's figures.
+    pub(super) fn objective_row(&self, measures: &Measures) -> (Vec<f64>, Option<Failure>) {
+        let [length, length_squared, second_differences, integral, time] = *measures;
+        let row: Vec<f64> = self
+            .objectives
+            .iter()
+            .map(|objective| match objective {
+                LineObjective::Length => length,
+                LineObjective::LengthSquared => length_squared,
+                LineObjective::Gamma => second_differences.sqrt(),
+                LineObjective::Kappa2 => integral,
+                LineObjective::LapTime => time,
+            })
+            .collect();
+        if row.iter().any(|x| !x.is_finite()) {
+            return self.failed_row(Failure::Standstill);
+        }
+        (row.into_iter().map(|x| x.min(FAILED_COST)).collect(), None)
+    }
+}

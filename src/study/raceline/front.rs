@@ -1,0 +1,262 @@
+//! The front between several objectives: a swarm of whole lines, then the local search along it.
+
+use super::exact::ExactSolvers;
+use super::lines::Setup;
+use super::settings::RacelineSettings;
+use crate::error::Result;
+use crate::evaluate::line::{LineProblem, open_line_evaluator};
+use crate::evaluate::{Evaluator, FAILED_COST};
+use crate::line::Parametrisation;
+use crate::random::Random;
+use crate::swarm::metrics::hypervolume;
+use crate::swarm::{Archive, Mopso, MopsoSettings, Progress, PsoSettings, Truncation, run};
+use std::ops::ControlFlow;
+
+/// Lines none of which another betters in every objective.
+#[derive(Clone, Debug, Default)]
+pub struct LineFront {
+    /// Share of the usable width at every cut, one row per line.
+    pub alpha: Vec<Vec<f64>>,
+    /// Objectives, one row per line.
+    pub objectives: Vec<Vec<f64>>,
+    /// Volume between the front and the reference point, as a share of the box from the ideal to the reference point.
+    pub hypervolume: f64,
+    /// The point from which the volume is measured.
+    pub reference: Vec<f64>,
+    /// The least value of each objective on the front or by the exact solvers.
+    pub ideal: Vec<f64>,
+    /// Lines evaluated.
+    pub evaluations: u64,
+}
+
+/// Metres of the reference line for each control point of the front's lines.
+const CONTROL_SPACING_M: f64 = 20.0;
+/// Purpose of the draws of starting lines in the counter.
+const BLEND: u32 = 0x11e5;
+/// Standard deviation of the control points of starting lines about a blend of known ones, in widths of the road.
+const BLEND_SPREAD: f64 = 0.01;
+/// Steps between the objectives of the local search: `LATTICE` and the number of objectives give its lines.
+const LATTICE: u32 = 5;
+/// Cone programs for each line of the local search: most of the gain is in the first.
+const PROGRAMS: usize = 6;
+
+/// Looks for the front. `known` are lines to start from and to keep (`alpha` at every cut).
+///
+/// # Errors
+/// Those of the evaluator and of the solvers.
+pub fn search_front(
+    setup: &Setup,
+    settings: &RacelineSettings,
+    solvers: &ExactSolvers,
+    known: &[Vec<f64>],
+    observe: impl FnMut(&Progress) -> ControlFlow<()>,
+) -> Result<LineFront> {
+    let cuts = &setup.cuts;
+    let controls = ((cuts.length_m / CONTROL_SPACING_M) as usize).clamp(4, cuts.len());
+    let problem = LineProblem::new(
+        cuts.clone(),
+        Parametrisation::control_points(controls),
+        &settings.objectives,
+        Some(setup.car.clone()),
+        settings.entry_mps,
+    )?;
+    let mopso = MopsoSettings {
+        motion: PsoSettings {
+            population: settings.population,
+            iterations: settings.iterations,
+            seed: settings.seed,
+            ..MopsoSettings::default().motion
+        },
+        archive: settings.archive,
+        ..MopsoSettings::default()
+    };
+    let mut swarm = Mopso::new(&problem.problem, mopso)?;
+    if settings.warm_start {
+        swarm.start_from(&starting_lines(&problem, settings, known)?);
+    }
+    let mut evaluator = open_line_evaluator(&problem, settings.backend, settings.adapter.as_deref())?;
+    run(&mut swarm, evaluator.as_mut(), observe)?;
+
+    let whole = LineProblem::new(
+        cuts.clone(),
+        Parametrisation::sections(),
+        &settings.objectives,
+        Some(setup.car.clone()),
+        settings.entry_mps,
+    )?;
+    let mut judge = open_line_evaluator(&whole, settings.backend, settings.adapter.as_deref())?;
+    let mut lines: Vec<Vec<f64>> = swarm
+        .archive_candidates()
+        .iter()
+        .map(|c| problem.alpha(c))
+        .collect();
+    lines.extend(known.iter().cloned());
+    let mut archive = Archive::new(settings.archive, Truncation::Contribution);
+    let mut evaluations = crate::swarm::Optimiser::evaluations(&swarm);
+    evaluations += insert_all(&mut archive, judge.as_mut(), &lines)?;
+    if settings.local_search && settings.objectives.iter().all(|o| solvers.solves(*o)) {
+        let polished = polish_along(&archive, settings, solvers)?;
+        evaluations += insert_all(&mut archive, judge.as_mut(), &polished)?;
+    }
+
+    // The point that the reference line and the edges of the archive do not exceed.
+    let middle = judge.evaluate(&cuts.reference)?.objectives;
+    let across = |k: usize| archive.objectives.iter().map(move |row| row[k]);
+    let ideal: Vec<f64> = (0..middle.len())
+        .map(|k| across(k).fold(f64::INFINITY, f64::min))
+        .collect();
+    let reference: Vec<f64> = (0..middle.len())
+        .map(|k| across(k).fold(middle[k], f64::max))
+        .collect();
+    let shares: Vec<Vec<f64>> = archive
+        .objectives
+        .iter()
+        .map(|row| {
+            let share = |k: usize| (row[k] - ideal[k]) / (reference[k] - ideal[k]).max(f64::MIN_POSITIVE);
+            (0..row.len()).map(share).collect()
+        })
+        .collect();
+    let volume = if (2..=3).contains(&ideal.len()) {
+        hypervolume(&shares, &vec![1.0; ideal.len()])?
+    } else {
+        f64::NAN
+    };
+    Ok(LineFront {
+        alpha: archive.positions.clone(),
+        objectives: archive.objectives.clone(),
+        hypervolume: volume,
+        reference,
+        ideal,
+        evaluations,
+    })
+}
+
+/// The known lines, the reference line and the edges, then blends of them with a little noise.
+fn starting_lines(
+    problem: &LineProblem,
+    settings: &RacelineSettings,
+    known: &[Vec<f64>],
+) -> Result<Vec<Vec<f64>>> {
+    let n = problem.cuts().len();
+    let mut given = known.to_vec();
+    given.push(problem.cuts().reference.clone());
+    let mut lines = given.clone();
+    lines.push(vec![0.0; n]);
+    lines.push(vec![1.0; n]);
+    let random = Random::new(settings.seed);
+    let mut candidates: Vec<Vec<f64>> = lines
+        .iter()
+        .map(|alpha| problem.candidate(alpha))
+        .collect::<Result<_>>()?;
+    let all: Vec<Vec<f64>> = candidates[..given.len()].to_vec();
+    let variables = &problem.problem.variables;
+    for particle in candidates.len()..settings.population {
+        // Exponential deviates over their sum are even over the simplex.
+        let shares: Vec<f64> = (0..all.len())
+            .map(|k| -(1.0 - random.uniform(BLEND, 0, particle as u32, k as u32)).ln())
+            .collect();
+        let sum: f64 = shares.iter().sum();
+        let blend = |j: usize| {
+            all.iter()
+                .zip(&shares)
+                .map(|(line, s)| s / sum * line[j])
+                .sum::<f64>()
+        };
+        let noise = |j: usize| BLEND_SPREAD * random.normal(BLEND, 1, particle as u32, j as u32);
+        let row = variables.iter().enumerate();
+        candidates.push(
+            row.map(|(j, v)| (blend(j) + noise(j)).clamp(v.lower, v.upper))
+                .collect(),
+        );
+    }
+    candidates.truncate(settings.population);
+    Ok(candidates)
+}
+
+/// Scores lines and offers them to the archive; returns how many.
+fn insert_all(archive: &mut Archive, judge: &mut dyn Evaluator, lines: &[Vec<f64>]) -> Result<u64> {
+    let width = judge.problem().objectives.len();
+    let rows = judge.evaluate(&lines.concat())?.objectives;
+    for (line, row) in lines.iter().zip(rows.chunks_exact(width)) {
+        if row.iter().all(|x| *x < FAILED_COST) {
+            archive.insert(line, row);
+        }
+    }
+    Ok(lines.len() as u64)
+}
+
+/// The local search from the members of the archive that suit an even lattice of weights best.
+fn polish_along(
+    archive: &Archive,
+    settings: &RacelineSettings,
+    solvers: &ExactSolvers,
+) -> Result<Vec<Vec<f64>>> {
+    let m = settings.objectives.len();
+    let rows = &archive.objectives;
+    if rows.is_empty() {
+        return Ok(Vec::new());
+    }
+    let bound = |k: usize, f: fn(f64, f64) -> f64| rows.iter().map(|r| r[k]).reduce(f).unwrap_or(0.0);
+    let ranges: Vec<f64> = (0..m)
+        .map(|k| (bound(k, f64::max) - bound(k, f64::min)).max(1e-9 * bound(k, f64::max).abs()))
+        .collect();
+    let starts = lattice(m, LATTICE)
+        .into_iter()
+        .map(|shares| {
+            // A trace of every objective keeps the corners of the front from being weakly best only.
+            let weight = |k: usize| (shares[k] + 0.002) / ranges[k];
+            let sum = |row: &[f64]| (0..m).map(|k| weight(k) * row[k]).sum::<f64>();
+            let best = (0..rows.len())
+                .min_by(|&i, &j| sum(&rows[i]).total_cmp(&sum(&rows[j])))
+                .unwrap_or(0);
+            let terms = settings
+                .objectives
+                .iter()
+                .enumerate()
+                .map(|(k, o)| (*o, weight(k)));
+            (archive.positions[best].clone(), terms.collect())
+        })
+        .collect();
+    solvers.polish(starts, PROGRAMS)
+}
+
+/// All ways to share `steps` among `m`, as shares of one (Das, Dennis, *Normal-boundary intersection*, SIAM J.
+/// Optimization 8, 1998).
+fn lattice(m: usize, steps: u32) -> Vec<Vec<f64>> {
+    if m == 1 {
+        return vec![vec![1.0]];
+    }
+    let mut rows: Vec<Vec<u32>> = vec![Vec::new()];
+    for _ in 1..m {
+        rows = rows
+            .into_iter()
+            .flat_map(|row| {
+                let left = steps - row.iter().sum::<u32>();
+                (0..=left).map(move |k| {
+                    let mut next = row.clone();
+                    next.push(k);
+                    next
+                })
+            })
+            .collect();
+    }
+    rows.into_iter()
+        .map(|mut row| {
+            row.push(steps - row.iter().sum::<u32>());
+            row.into_iter().map(|k| f64::from(k) / f64::from(steps)).collect()
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_lattice_covers_the_simplex_evenly() {
+        let rows = lattice(3, 4);
+        assert_eq!(rows.len(), 15);
+        assert!(rows.iter().all(|r| (r.iter().sum::<f64>() - 1.0).abs() < 1e-15));
+        assert!(rows.contains(&vec![0.0, 0.25, 0.75]));
+    }
+}

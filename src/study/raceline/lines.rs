@@ -1,0 +1,163 @@
+//! The track, the car and lines as a study reports them.
+
+use super::settings::RacelineSettings;
+use crate::error::{Error, Result};
+use crate::evaluate::line::{LineObjective, LineProblem};
+use crate::line::{Clearance, FineLine, Parametrisation, PointMass, check_line};
+use crate::study::envelope::{EnvelopeSettings, car_limits};
+use crate::track::{CrossSections, Spacing, Track};
+use crate::vehicle::{Car, Envelope};
+use glam::DVec2;
+
+/// Distance between the points of the fine spline that lines are reported on (m).
+pub const FINE_M: f64 = 1.0;
+/// Distance between the points of the edges that lines are checked against (m).
+const EDGE_M: f64 = 2.0;
+
+/// The track and the car, ready for lines.
+#[derive(Clone, Debug)]
+pub struct Setup {
+    /// Title of the track.
+    pub track_name: String,
+    /// The cuts from edge to edge.
+    pub road: CrossSections,
+    /// The cuts that the car's middle may use.
+    pub cuts: CrossSections,
+    /// The edges at close steps (m), right and left, which no cut has a part in.
+    pub edges_m: [Vec<DVec2>; 2],
+    /// The car.
+    pub car: PointMass,
+    /// Its name.
+    pub car_name: String,
+}
+
+/// Reads track and car.
+///
+/// # Errors
+/// [`Error::Input`] and [`Error::Io`] for what cannot be read or used.
+pub fn set_up(settings: &RacelineSettings) -> Result<Setup> {
+    settings.validate()?;
+    let track = Track::load(&settings.track)?;
+    let road = track.cross_sections(&Spacing::equal(settings.sections), settings.as_surveyed)?;
+    let cuts = road.narrowed(settings.car_width_m)?;
+    let close = ((road.length_m / EDGE_M).ceil() as usize).clamp(settings.sections, 1_000_000);
+    let dense = track.cross_sections(&Spacing::equal(close), settings.as_surveyed)?;
+    let car = Car::load(&settings.car)?;
+    let (envelope, car_name) = match &settings.envelope {
+        Some(path) => (Envelope::load(path)?, path.display().to_string()),
+        None => (
+            car_limits(&car, &EnvelopeSettings::default())?.envelope,
+            car.name.clone(),
+        ),
+    };
+    let wheelbase = car.chassis.cg_to_front + car.chassis.cg_to_rear;
+    let car = PointMass {
+        ellipse_exponent: settings.ellipse_exponent,
+        ..PointMass::new(envelope, wheelbase)
+    };
+    car.check()?;
+    Ok(Setup {
+        track_name: track.name(),
+        road,
+        cuts,
+        edges_m: [dense.right_m, dense.left_m],
+        car,
+        car_name,
+    })
+}
+
+/// One line with everything that is reported of it.
+#[derive(Clone, Debug)]
+pub struct ReportedLine {
+    /// What it is, as in `shortest`.
+    pub name: String,
+    /// Share of the usable width from the right at every cut.
+    pub alpha: Vec<f64>,
+    /// Length (m) through the cuts.
+    pub length_m: f64,
+    /// Sum of the squared lengths of the segments (m^2).
+    pub length_squared_m2: f64,
+    /// Root of the sum of squared second differences through the cuts (1/m).
+    pub gamma_1pm: f64,
+    /// Integral of squared curvature through the cuts (1/m).
+    pub integral_kappa2_1pm: f64,
+    /// Lap time through the cuts (s).
+    pub lap_time_s: f64,
+    /// The line on the fine spline, with its lap.
+    pub fine: FineLine,
+    /// How close its sides come to the edges.
+    pub clearance: Clearance,
+}
+
+impl ReportedLine {
+    /// Lap time on the fine spline (s): the one to believe.
+    pub fn lap_time_fine_s(&self) -> f64 {
+        self.fine.lap_time_s().unwrap_or(f64::NAN)
+    }
+
+    /// What an objective comes to through the cuts.
+    pub fn objective(&self, objective: LineObjective) -> f64 {
+        match objective {
+            LineObjective::Length => self.length_m,
+            LineObjective::LengthSquared => self.length_squared_m2,
+            LineObjective::Gamma => self.gamma_1pm,
+            LineObjective::Kappa2 => self.integral_kappa2_1pm,
+            LineObjective::LapTime => self.lap_time_s,
+        }
+    }
+}
+
+impl Setup {
+    /// Works out everything that is reported of a line.
+    ///
+    /// # Errors
+    /// [`Error::Study`] if the line cannot be driven at all.
+    pub fn report(&self, name: &str, alpha: &[f64], settings: &RacelineSettings) -> Result<ReportedLine> {
+        let problem = LineProblem::new(
+            self.cuts.clone(),
+            Parametrisation::sections(),
+            &LineObjective::ALL,
+            Some(self.car.clone()),
+            settings.entry_mps,
+        )?;
+        let mut evaluator = crate::evaluate::line::CpuLineEvaluator::new(&problem);
+        let figures = crate::evaluate::Evaluator::evaluate(&mut evaluator, alpha)?;
+        if let Some(failure) = figures.failures.first().copied().flatten() {
+            return Err(Error::Study(format!(
+                "the line `{name}` cannot be driven: {failure}"
+            )));
+        }
+        let points = self.cuts.points(alpha);
+        let fine = FineLine::new(
+            &points,
+            self.cuts.closed,
+            FINE_M,
+            Some(&self.car),
+            settings.entry_mps,
+        )?;
+        let clearance = check_line(&fine, &self.edges_m[0], &self.edges_m[1], settings.car_width_m);
+        let Ok(
+            [
+                length_m,
+                length_squared_m2,
+                gamma_1pm,
+                integral_kappa2_1pm,
+                lap_time_s,
+            ],
+        ) = <[f64; 5]>::try_from(figures.objectives)
+        else {
+            return Err(Error::Study(format!("the line `{name}` was not evaluated")));
+        };
+        Ok(ReportedLine {
+            name: name.to_owned(),
+            alpha: alpha.to_vec(),
+            length_m,
+            length_squared_m2,
+            gamma_1pm,
+            integral_kappa2_1pm,
+            lap_time_s,
+            fine,
+            clearance,
+        })
+    }
+}

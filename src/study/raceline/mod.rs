@@ -1,0 +1,235 @@
+//! The racing line: shortest, least curved, fastest, and the front between them, beside the exact optima.
+//!
+//! Every objective has a swarm of its own ([`search_line`]), all together have one that looks for their front
+//! ([`search_front`]), and the exact solvers ([`ExactSolvers`]) say how far from the optimum each is. Whatever is reported
+//! is worked out anew on a fine spline and checked against the edges ([`Setup::report`]).
+
+mod exact;
+mod front;
+mod lines;
+mod results;
+mod search;
+mod settings;
+
+pub use exact::ExactSolvers;
+pub use front::{LineFront, search_front};
+pub use lines::{FINE_M, ReportedLine, Setup, set_up};
+pub use results::{LineFigures, Summary, summarise, write_results};
+pub use search::{FoundLine, LineProgress, LineSearchSettings, search_line};
+pub use settings::{OBJECTIVE_NAMES, RacelineSettings};
+
+use crate::error::Result;
+use crate::evaluate::BackendInfo;
+use crate::evaluate::line::{LineObjective, LineProblem, open_line_evaluator};
+use crate::line::Parametrisation;
+use std::ops::ControlFlow;
+use std::time::Instant;
+
+/// What one objective came to.
+#[derive(Clone, Debug)]
+pub struct ObjectiveOutcome {
+    /// The objective.
+    pub objective: LineObjective,
+    /// The best line of the swarm, the local search included if it was asked for.
+    pub best: ReportedLine,
+    /// What the swarm alone reached through the cuts, in the objective's unit.
+    pub swarm_cost: f64,
+    /// The exact solver's line, where there is one.
+    pub exact: Option<ReportedLine>,
+    /// How the exact solver ended, and the time that it took (s).
+    pub exact_status: Option<(String, f64)>,
+}
+
+/// The outcome of a study.
+#[derive(Clone, Debug)]
+pub struct Outcome {
+    /// One for each objective.
+    pub objectives: Vec<ObjectiveOutcome>,
+    /// The front between them, where there are several.
+    pub front: Option<LineFront>,
+    /// The compromise nearest to the ideal, each objective as a share of its range.
+    pub compromise: Option<ReportedLine>,
+    /// The reference line.
+    pub reference: ReportedLine,
+    /// What evaluated.
+    pub backend: BackendInfo,
+    /// Lines evaluated by the swarms.
+    pub evaluations: u64,
+    /// Time of the swarms and the local search (s).
+    pub search_s: f64,
+    /// Time of the exact solvers (s).
+    pub exact_s: f64,
+    /// Best cost against evaluations of each objective's swarm.
+    pub history: Vec<Vec<(u64, f64)>>,
+    /// Whether the observer broke the study off.
+    pub interrupted: bool,
+}
+
+/// What an observer is told.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StudyProgress {
+    /// The objective, or the front.
+    pub stage: String,
+    /// Lines evaluated in this stage.
+    pub evaluations: u64,
+    /// The best so far, as text.
+    pub best: String,
+}
+
+/// Name of the line that is best by an objective.
+fn line_name(objective: LineObjective) -> &'static str {
+    match objective {
+        LineObjective::Length => "shortest",
+        LineObjective::LengthSquared => "least squared length",
+        LineObjective::Gamma => "least second difference",
+        LineObjective::Kappa2 => "least curved",
+        LineObjective::LapTime => "fastest",
+    }
+}
+
+/// Runs a study.
+///
+/// # Errors
+/// Those of the evaluators and the solvers.
+pub fn find_lines(
+    settings: &RacelineSettings,
+    setup: &Setup,
+    mut observe: impl FnMut(&StudyProgress) -> ControlFlow<()>,
+) -> Result<Outcome> {
+    let reference = setup.report("reference", &setup.cuts.reference, settings)?;
+    let solvers = ExactSolvers::new(setup, settings)?;
+    let exact_began = Instant::now();
+    let mut exact = Vec::new();
+    for objective in &settings.objectives {
+        exact.push(solvers.best(*objective)?);
+    }
+    let exact_s = exact_began.elapsed().as_secs_f64();
+
+    let began = Instant::now();
+    let mut interrupted = false;
+    let mut evaluations = 0;
+    let mut history = Vec::new();
+    let mut objectives = Vec::new();
+    for (objective, exact) in settings.objectives.iter().zip(&exact) {
+        let start = exact
+            .as_ref()
+            .filter(|_| settings.warm_start)
+            .map(|o| o.x.as_slice());
+        let search = LineSearchSettings {
+            seed: settings.seed,
+            ..LineSearchSettings::default()
+        };
+        let found = search_line(
+            &setup.cuts,
+            *objective,
+            Some(&setup.car),
+            settings.entry_mps,
+            start,
+            settings.backend,
+            settings.adapter.as_deref(),
+            &search,
+            |progress| {
+                let told = observe(&StudyProgress {
+                    stage: line_name(*objective).to_owned(),
+                    evaluations: progress.evaluations,
+                    best: format!("{:.4} {}", progress.best, objective.unit()),
+                });
+                interrupted |= told.is_break();
+                told
+            },
+        )?;
+        evaluations += found.evaluations;
+        history.push(
+            found
+                .history
+                .iter()
+                .map(|row| (row.evaluations, row.best))
+                .collect(),
+        );
+        let mut best = setup.report(line_name(*objective), &found.alpha, settings)?;
+        if settings.local_search && solvers.solves(*objective) && !interrupted {
+            let polished = solvers.polish(vec![(found.alpha, vec![(*objective, 1.0)])], 60)?;
+            for alpha in polished {
+                let line = setup.report(line_name(*objective), &alpha, settings)?;
+                if line.objective(*objective) < best.objective(*objective) {
+                    best = line;
+                }
+            }
+        }
+        let exact_line = exact
+            .as_ref()
+            .map(|o| setup.report(line_name(*objective), &o.x, settings))
+            .transpose()?;
+        objectives.push(ObjectiveOutcome {
+            objective: *objective,
+            best,
+            swarm_cost: found.cost,
+            exact: exact_line,
+            exact_status: exact.as_ref().map(|o| (format!("{:?}", o.status), o.seconds)),
+        });
+        if interrupted {
+            break;
+        }
+    }
+
+    let mut front = None;
+    let mut compromise = None;
+    if settings.objectives.len() > 1 && !interrupted {
+        let known: Vec<Vec<f64>> = objectives.iter().map(|o| o.best.alpha.clone()).collect();
+        let found = search_front(setup, settings, &solvers, &known, |progress| {
+            let best: Vec<String> = progress.best.iter().map(|b| format!("{b:.4}")).collect();
+            let told = observe(&StudyProgress {
+                stage: "front".to_owned(),
+                evaluations: progress.evaluations,
+                best: best.join(" "),
+            });
+            interrupted |= told.is_break();
+            told
+        })?;
+        evaluations += found.evaluations;
+        if let Some(nearest) = nearest_to_ideal(&found) {
+            compromise = Some(setup.report("compromise", &found.alpha[nearest], settings)?);
+        }
+        front = Some(found);
+    }
+    // A small problem of the same kind says what it is that evaluates.
+    let probe = LineProblem::new(
+        setup.cuts.clone(),
+        Parametrisation::sections(),
+        &settings.objectives,
+        Some(setup.car.clone()),
+        settings.entry_mps,
+    )?;
+    let backend = open_line_evaluator(&probe, settings.backend, settings.adapter.as_deref())?.backend();
+    Ok(Outcome {
+        objectives,
+        front,
+        compromise,
+        reference,
+        backend,
+        evaluations,
+        search_s: began.elapsed().as_secs_f64(),
+        exact_s,
+        history,
+        interrupted,
+    })
+}
+
+/// The member of a front nearest to the ideal, each objective as a share of the front's range.
+fn nearest_to_ideal(front: &LineFront) -> Option<usize> {
+    let rows = &front.objectives;
+    let distance = |row: &[f64]| -> f64 {
+        (0..row.len())
+            .map(|k| {
+                let worst = rows.iter().map(|r| r[k]).fold(front.ideal[k], f64::max);
+                let range = worst - front.ideal[k];
+                if range > 0.0 {
+                    ((row[k] - front.ideal[k]) / range).powi(2)
+                } else {
+                    0.0
+                }
+            })
+            .sum()
+    };
+    (0..rows.len()).min_by(|&i, &j| distance(&rows[i]).total_cmp(&distance(&rows[j])))
+}

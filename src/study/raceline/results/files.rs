@@ -1,0 +1,149 @@
+//! Tables and figures.
+
+use super::{Summary, told_lines};
+use crate::error::Result;
+use crate::report::{Cells, Column, write_csv, write_whole};
+use crate::study::raceline::{Outcome, RacelineSettings, ReportedLine, Setup};
+use serde::Serialize;
+use std::path::Path;
+
+/// The name of a line as a part of a file's name.
+pub fn stem(name: &str) -> String {
+    name.chars()
+        .map(|c| if c.is_alphanumeric() { c } else { '_' })
+        .collect()
+}
+
+#[derive(Serialize)]
+struct Manifest<'a> {
+    program: &'static str,
+    version: &'static str,
+    study: &'static str,
+    seed: u64,
+    backend: &'a str,
+    adapter: &'a str,
+    driver: &'a str,
+    track: &'a str,
+    car: &'a str,
+    settings: &'static str,
+    interrupted: bool,
+}
+
+pub fn write(
+    folder: &Path,
+    settings: &RacelineSettings,
+    setup: &Setup,
+    outcome: &Outcome,
+    summary: &Summary,
+) -> Result<()> {
+    let json = |name: &str, value: serde_json::Result<String>| {
+        let path = folder.join(name);
+        let text = value.map_err(|e| crate::Error::io(&path, "write", std::io::Error::other(e)))?;
+        write_whole(path, text.as_bytes())
+    };
+    json("summary.json", serde_json::to_string_pretty(summary))?;
+    let manifest = Manifest {
+        program: "lapswarm",
+        version: env!("CARGO_PKG_VERSION"),
+        study: "raceline",
+        seed: settings.seed,
+        backend: outcome.backend.backend,
+        adapter: &outcome.backend.device,
+        driver: &outcome.backend.driver,
+        track: &setup.track_name,
+        car: &setup.car_name,
+        settings: "study.toml",
+        interrupted: outcome.interrupted,
+    };
+    json("manifest.json", serde_json::to_string_pretty(&manifest))?;
+    write_whole(folder.join("study.toml"), settings.to_toml().as_bytes())?;
+    write_whole(
+        folder.join("envelope.csv"),
+        setup.car.envelope.to_csv().as_bytes(),
+    )?;
+    for line in told_lines(outcome) {
+        let name = stem(&line.name);
+        write_line(&folder.join(format!("line_{name}.csv")), line)?;
+        setup
+            .cuts
+            .write_racetrack_line(&line.alpha, folder.join(format!("racetrack_{name}.csv")))?;
+    }
+    write_front(folder, outcome)
+}
+
+/// The line on its fine spline: station, place, alpha, curvature, speed, accelerations, steering, time.
+fn write_line(path: &Path, line: &ReportedLine) -> Result<()> {
+    let fine = &line.fine;
+    let n = line.alpha.len();
+    let alpha: Vec<f64> = fine
+        .section
+        .iter()
+        .map(|&(section, share)| {
+            let next = if fine.closed {
+                (section + 1) % n
+            } else {
+                (section + 1).min(n - 1)
+            };
+            let here = section.min(n - 1);
+            line.alpha[here] + share * (line.alpha[next] - line.alpha[here])
+        })
+        .collect();
+    let (x, y): (Vec<f64>, Vec<f64>) = fine.points_m.iter().map(|p| (p.x, p.y)).unzip();
+    let elapsed = fine.lap.as_ref().map(|lap| lap.elapsed_s());
+    let mut table: Vec<(&str, &str, &[f64])> = vec![
+        ("station", "m", &fine.station_m),
+        ("x", "m", &x),
+        ("y", "m", &y),
+        ("alpha", "-", &alpha),
+        ("curvature", "1/m", &fine.curvature_1pm),
+    ];
+    if let (Some(lap), Some(elapsed)) = (&fine.lap, &elapsed) {
+        table.extend([
+            ("v", "m/s", lap.v_mps.as_slice()),
+            ("ax", "m/s^2", &lap.ax_mps2),
+            ("ay", "m/s^2", &lap.ay_mps2),
+            ("steering", "rad", &lap.steering_rad),
+            ("time", "s", elapsed),
+        ]);
+    }
+    let columns: Vec<Column<'_>> = table
+        .into_iter()
+        .map(|(name, unit, values)| Column {
+            name,
+            unit,
+            cells: Cells::Numbers(values),
+        })
+        .collect();
+    write_csv(path, &columns)
+}
+
+/// Objectives of the front's lines, and their `alpha` at every cut.
+fn write_front(folder: &Path, outcome: &Outcome) -> Result<()> {
+    let Some(front) = outcome.front.as_ref().filter(|f| !f.alpha.is_empty()) else {
+        return Ok(());
+    };
+    let column = |rows: &[Vec<f64>], k: usize| rows.iter().map(|row| row[k]).collect::<Vec<f64>>();
+    let write = |path: &Path, names: &[(String, &str)], rows: &[Vec<f64>]| {
+        let values: Vec<Vec<f64>> = (0..names.len()).map(|k| column(rows, k)).collect();
+        let columns: Vec<Column<'_>> = names
+            .iter()
+            .zip(&values)
+            .map(|((name, unit), values)| Column {
+                name,
+                unit,
+                cells: Cells::Numbers(values),
+            })
+            .collect();
+        write_csv(path, &columns)
+    };
+    let objectives: Vec<(String, &str)> = outcome
+        .objectives
+        .iter()
+        .map(|o| (o.objective.name().to_owned(), o.objective.unit()))
+        .collect();
+    write(&folder.join("front.csv"), &objectives, &front.objectives)?;
+    let cuts: Vec<(String, &str)> = (0..front.alpha[0].len())
+        .map(|i| (format!("alpha_{i}"), "-"))
+        .collect();
+    write(&folder.join("front_lines.csv"), &cuts, &front.alpha)
+}

@@ -1,0 +1,279 @@
+//! Racing lines: shape and lap time on every backend, against `f64`, and how the work is cut.
+
+use crate::common::Random;
+use crate::common::line::{circuit, gt_car, line_problem, lines, random_car, ring};
+use crate::device::device;
+use glam::DVec2;
+use lapswarm::evaluate::line::{
+    CpuLineEvaluator, GpuLineEvaluator, LineBatching, LineObjective, LineProblem, SimdLineEvaluator,
+};
+use lapswarm::evaluate::simd::InstructionSet;
+use lapswarm::evaluate::{Evaluation, Evaluator, FAILED_COST, Failure};
+use lapswarm::line::{Parametrisation, geometry};
+
+/// The single-precision backends.
+fn backends(problem: &LineProblem) -> Vec<(String, Box<dyn Evaluator + '_>)> {
+    let mut backends: Vec<(String, Box<dyn Evaluator>)> = Vec::new();
+    for set in InstructionSet::available() {
+        backends.push((
+            format!("simd {}", set.name()),
+            Box::new(SimdLineEvaluator::new(problem, set)),
+        ));
+    }
+    if let Some(context) = device() {
+        let evaluator = GpuLineEvaluator::new(problem, context).expect("the kernel compiles");
+        backends.push(("gpu".to_owned(), Box::new(evaluator)));
+    }
+    backends
+}
+
+/// How far single precision may be off, absolute, for each of [`LineObjective::ALL`].
+///
+/// `alpha` is a sum of four rounded products and a constant: 5 roundings of 6e-8 of up to 1.25, so that a point is off by
+/// 4e-7 of the 14 m road, and rounding of the steps between cuts adds 3e-8 of these: 6e-6 m in all. Across the road it changes a
+/// length by no more than a third of it at either end, beside the 70 roundings of a sum in blocks of 64. A second
+/// difference is off by four times that over the shortest spacing squared, and two roots of sums of squares differ by no
+/// more than the root of the sum of the squared differences. Where corner speed decides, time goes with half the relative
+/// error of the curvature, and no bend wider than 400 m slows any of the cars; 1e-4 is the limit of whole laps.
+fn tolerances(problem: &LineProblem, expected: &[f64]) -> [f64; 5] {
+    let cuts = problem.cuts();
+    let n = cuts.len() as f64;
+    let middle = geometry(&cuts.points(&vec![0.5; cuts.len()]), cuts.closed);
+    // Inside bends, points are closer than in the middle of the road.
+    let shortest = 0.6 * middle.segment_m.iter().fold(f64::INFINITY, |a, b| a.min(*b));
+    let point = 6e-6;
+    let bend = 4.0 * point / (shortest * shortest);
+    let length = 70.0 * 6e-8 * expected[0] + n * 0.7 * point;
+    let gamma = n.sqrt() * bend + 1e-5 * expected[2];
+    let root = expected[3].sqrt();
+    let integral = expected[0].sqrt() * bend + 1e-5 * root;
+    let time = (1e-5 + 0.5 * bend * 400.0).min(1e-4);
+    [
+        length,
+        2.0 * expected[1] * length / expected[0] + 70.0 * 6e-8 * expected[1],
+        gamma,
+        2.0 * root * integral + integral * integral,
+        time * expected[4],
+    ]
+}
+
+/// Compares `found` with `f64` and hands back the largest relative error of each objective.
+fn compare(name: &str, problem: &LineProblem, population: &[f64], found: &Evaluation) -> [f64; 5] {
+    let expected = CpuLineEvaluator::new(problem)
+        .evaluate(population)
+        .expect("it runs");
+    assert_eq!(found.failures, expected.failures, "{name}");
+    let mut worst = [0.0f64; 5];
+    let rows = found
+        .objectives
+        .chunks_exact(5)
+        .zip(expected.objectives.chunks_exact(5));
+    for (line, (found, expected)) in rows.enumerate() {
+        let tolerances = tolerances(problem, expected);
+        for k in 0..5 {
+            let error = (found[k] - expected[k]).abs();
+            assert!(
+                error <= tolerances[k],
+                "{name}, line {line}, {}: {} for {}, tolerance {:e}",
+                LineObjective::ALL[k].name(),
+                found[k],
+                expected[k],
+                tolerances[k]
+            );
+            worst[k] = worst[k].max(error / expected[k].abs());
+        }
+    }
+    worst
+}
+
+/// Problems of every kind: open and closed, by sections and by control points, whole and in part.
+fn problems() -> Vec<(&'static str, LineProblem)> {
+    let mut random = Random(5);
+    let mut made = |sections: usize, spacing: f64, closed: bool| {
+        let centre = DVec2::new(random.within(-2e3, 2e3), random.within(-2e3, 2e3));
+        let cuts = circuit(sections, spacing, closed, centre, &mut random);
+        (cuts, random_car(&mut random))
+    };
+    let mut problems = Vec::new();
+    for (closed, sections, spacing) in [
+        (true, 360, 16.0),
+        (false, 200, 10.0),
+        (true, 1000, 5.0),
+        (true, 75, 12.0),
+    ] {
+        let (cuts, car) = made(sections, spacing, closed);
+        problems.push((
+            "control points",
+            line_problem(cuts, Parametrisation::control_points(sections / 4), car),
+        ));
+        let (cuts, car) = made(sections, spacing, closed);
+        problems.push(("sections", line_problem(cuts, Parametrisation::sections(), car)));
+    }
+    let (cuts, car) = made(360, 16.0, true);
+    let part = Parametrisation::control_points(60).with_free((10..25).collect(), vec![0.4; 60]);
+    problems.push(("a sector", line_problem(cuts, part, car)));
+    let (cuts, car) = made(150, 12.0, false);
+    let ends = Parametrisation::control_points(30).with_fixed_ends(vec![0.3; 30]);
+    problems.push(("fixed ends", line_problem(cuts, ends, car)));
+    problems
+}
+
+#[test]
+fn lines_cost_what_the_reference_says_on_every_backend() {
+    for (kind, problem) in problems() {
+        let population = lines(&problem, 70, &mut Random(6));
+        let mut lanes: Option<Evaluation> = None;
+        for (name, mut backend) in backends(&problem) {
+            let found = backend.evaluate(&population).expect("it runs");
+            let worst = compare(&format!("{kind}, {name}"), &problem, &population, &found);
+            println!(
+                "{kind}, {} sections, {name}: {:?}",
+                problem.cuts().len(),
+                worst.map(|x| format!("{x:.0e}"))
+            );
+            if name.starts_with("simd") {
+                // Every instruction set rounds alike.
+                assert_eq!(*lanes.get_or_insert_with(|| found.clone()), found, "{name}");
+            }
+        }
+    }
+}
+
+#[test]
+fn circles_have_the_shape_of_their_polygons_on_every_backend() {
+    let problem = line_problem(ring(590.0, 600.0, 361), Parametrisation::sections(), gt_car());
+    let population: Vec<f64> = [0.0, 0.5, 1.0].iter().flat_map(|a| vec![*a; 361]).collect();
+    let mut backends = backends(&problem);
+    backends.push(("cpu".to_owned(), Box::new(CpuLineEvaluator::new(&problem))));
+    for (name, mut backend) in backends {
+        let found = backend.evaluate(&population).expect("it runs");
+        for (row, radius) in found.objectives.chunks_exact(5).zip([600.0f64, 595.0, 590.0]) {
+            let side = 2.0 * radius * (std::f64::consts::PI / 361.0).sin();
+            let exact = [361.0 * side, 361.0 * side * side, 19.0 / radius];
+            for (found, exact) in row.iter().zip(exact) {
+                // Curvature is a difference of directions of 0.017, in which a rounding counts sixtyfold.
+                let relative = if name == "cpu" { 1e-12 } else { 60.0 * 3.0 * 6e-8 };
+                assert!(
+                    (found / exact - 1.0).abs() < relative,
+                    "{name}: {found} and {exact}"
+                );
+            }
+        }
+    }
+}
+
+/// A circuit far from the origin: its lines cost the same to the last bit that the differences have, because no backend
+/// subtracts coordinates in single precision.
+#[test]
+fn lines_do_not_know_where_on_earth_they_are() {
+    let near = circuit(360, 16.0, true, DVec2::ZERO, &mut Random(9));
+    let far = circuit(360, 16.0, true, DVec2::new(3e5, -5.2e6), &mut Random(9));
+    let way = || Parametrisation::control_points(90);
+    let (near, far) = (
+        line_problem(near, way(), gt_car()),
+        line_problem(far, way(), gt_car()),
+    );
+    let population = lines(&near, 40, &mut Random(10));
+    for ((name, mut here), (_, mut there)) in backends(&near).into_iter().zip(backends(&far)) {
+        let here = here.evaluate(&population).expect("it runs");
+        let there = there.evaluate(&population).expect("it runs");
+        for (row, (a, b)) in here
+            .objectives
+            .chunks_exact(5)
+            .zip(there.objectives.chunks_exact(5))
+            .enumerate()
+        {
+            for (k, tolerance) in tolerances(&near, a).into_iter().enumerate() {
+                assert!(
+                    (a[k] - b[k]).abs() <= tolerance,
+                    "{name}, line {row}: {} {}",
+                    a[k],
+                    b[k]
+                );
+            }
+        }
+    }
+}
+
+fn bits(evaluation: &Evaluation) -> (Vec<u64>, Vec<Option<Failure>>) {
+    let objectives = evaluation.objectives.iter().map(|x| x.to_bits()).collect();
+    (objectives, evaluation.failures.clone())
+}
+
+#[test]
+fn a_line_costs_the_same_alone_and_among_others() {
+    let cuts = circuit(300, 14.0, true, DVec2::ZERO, &mut Random(11));
+    let problem = line_problem(cuts, Parametrisation::control_points(50), gt_car());
+    let mut population = lines(&problem, 150, &mut Random(12));
+    population[50 * 7 + 3] = f64::NAN;
+    for (name, mut backend) in backends(&problem) {
+        let together = backend.evaluate(&population).expect("it runs");
+        assert_eq!(together.failures[7], Some(Failure::NotFinite));
+        assert_eq!(together.objectives[35..40], [FAILED_COST; 5]);
+        assert_eq!(together.failures.iter().flatten().count(), 1);
+        let again = backend.evaluate(&population).expect("it runs");
+        assert_eq!(bits(&again), bits(&together), "{name}, repeated");
+        for count in [1, 5, 64, 65, 149] {
+            let fewer = backend.evaluate(&population[..count * 50]).expect("it runs");
+            let expected = Evaluation {
+                objectives: together.objectives[..count * 5].to_vec(),
+                failures: together.failures[..count].to_vec(),
+            };
+            assert_eq!(bits(&fewer), bits(&expected), "{name}, {count} lines");
+        }
+        assert_eq!(
+            backend.evaluate(&[]).expect("it runs"),
+            Evaluation::default(),
+            "{name}, no lines"
+        );
+    }
+}
+
+#[test]
+fn batches_and_dispatches_of_lines_do_not_show() {
+    let Some(context) = device() else { return };
+    let cuts = circuit(120, 14.0, true, DVec2::ZERO, &mut Random(13));
+    let problem = line_problem(cuts, Parametrisation::control_points(30), gt_car());
+    let population = lines(&problem, 400, &mut Random(14));
+    let mut evaluator = GpuLineEvaluator::new(&problem, context).expect("the kernel compiles");
+    let usual = evaluator.batching();
+    let expected = evaluator.evaluate(&population).expect("it runs");
+    for batching in [
+        LineBatching { lanes: 1, ..usual },
+        LineBatching { lanes: 128, ..usual },
+        // Less than the least there can be, and two workgroups.
+        LineBatching { bytes: 1, ..usual },
+        LineBatching {
+            bytes: 2 * 64 * 2 * 120 * 4,
+            ..usual
+        },
+        LineBatching {
+            dispatch_ms: 0.1,
+            ..usual
+        },
+    ] {
+        evaluator = evaluator.with_batching(batching);
+        let found = evaluator.evaluate(&population).expect("it runs");
+        assert_eq!(bits(&found), bits(&expected), "{batching:?}");
+    }
+}
+
+/// Each objective alone gives what it gives among all: kernels are specialised to what is asked for.
+#[test]
+fn objectives_do_not_depend_on_each_other() {
+    let cuts = circuit(100, 14.0, true, DVec2::ZERO, &mut Random(15));
+    let all = line_problem(cuts.clone(), Parametrisation::sections(), gt_car());
+    let population = lines(&all, 20, &mut Random(16));
+    for (k, objective) in LineObjective::ALL.into_iter().enumerate() {
+        let car = (objective == LineObjective::LapTime).then(gt_car);
+        let one = LineProblem::new(cuts.clone(), Parametrisation::sections(), &[objective], car, 0.0)
+            .expect("a sound problem");
+        for ((name, mut alone), (_, mut among)) in backends(&one).into_iter().zip(backends(&all)) {
+            let alone = alone.evaluate(&population).expect("it runs");
+            let among = among.evaluate(&population).expect("it runs");
+            for (found, row) in alone.objectives.iter().zip(among.objectives.chunks_exact(5)) {
+                assert_eq!(*found, row[k], "{name}, {}", objective.name());
+            }
+        }
+    }
+}
