@@ -7,7 +7,7 @@
 use super::metrics::{Scale, hypervolume, igd_plus};
 use super::problems::TestProblem;
 use super::{
-    CooperativeSettings, CooperativeSwarm, CovarianceSettings, CovarianceSwarm, DifferenceSettings,
+    Beyond, CooperativeSettings, CooperativeSwarm, CovarianceSettings, CovarianceSwarm, DifferenceSettings,
     DifferenceSwarm, HybridSettings, HybridSwarm, Mopso, MopsoSettings, Mutation, Nsga2, Nsga2Settings,
     Optimiser, Pso, PsoSettings, Restarts, Truncation, run,
 };
@@ -125,6 +125,7 @@ pub fn optimiser(name: &str, problem: &Problem, seed: u64) -> Result<Box<dyn Opt
                 seed,
                 spread: 0.3,
                 active: true,
+                beyond: Beyond::Drawn,
                 restarts: Restarts::Alternating,
             };
             let middle: Vec<f64> = problem

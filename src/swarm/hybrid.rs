@@ -5,7 +5,8 @@
 
 use super::settings::setting;
 use super::{
-    CovarianceSettings, CovarianceSwarm, DifferenceSettings, DifferenceSwarm, Front, Optimiser, Restarts,
+    Beyond, CovarianceSettings, CovarianceSwarm, DifferenceSettings, DifferenceSwarm, Front, Optimiser,
+    Restarts,
 };
 use crate::error::Result;
 use crate::evaluate::{Evaluation, Problem};
@@ -127,6 +128,7 @@ impl Optimiser for HybridSwarm {
                 seed: self.settings.seed,
                 spread: self.explorers.spread().clamp(SPREAD[0], SPREAD[1]),
                 active: true,
+                beyond: Beyond::Drawn,
                 restarts: Restarts::Alternating,
             };
             let (start, _) = self.explorers.best_candidate();

@@ -45,7 +45,7 @@ mod space;
 
 pub use archive::Archive;
 pub use cooperative::{CooperativeSettings, CooperativeSwarm};
-pub use covariance::{CovarianceSettings, CovarianceSwarm, Restarts};
+pub use covariance::{Beyond, CovarianceSettings, CovarianceSwarm, Restarts};
 pub use difference::{DifferenceSettings, DifferenceSwarm};
 pub use hybrid::{HybridSettings, HybridSwarm};
 pub use mopso::Mopso;

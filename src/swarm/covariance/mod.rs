@@ -33,6 +33,18 @@ pub enum Restarts {
     Alternating,
 }
 
+/// What the distribution learns from where particles lie beyond the bounds; they are evaluated where reflection at
+/// the bounds puts them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Beyond {
+    /// From where they lie: an optimum on a bound is one in the open, with its mirror image beyond. It is found to
+    /// full precision.
+    Drawn,
+    /// From where reflection puts them. At a bound all steps then lead inwards, which keeps the distribution off
+    /// it; an optimum in a corner of many bounds is missed.
+    Reflected,
+}
+
 /// Settings of [`CovarianceSwarm`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct CovarianceSettings {
@@ -46,6 +58,8 @@ pub struct CovarianceSettings {
     pub spread: f64,
     /// Whether the worst steps are unlearnt, besides the best being learnt.
     pub active: bool,
+    /// What the distribution learns from of particles beyond the bounds.
+    pub beyond: Beyond,
     /// Restarts.
     pub restarts: Restarts,
 }
@@ -58,6 +72,7 @@ impl Default for CovarianceSettings {
             seed: 1,
             spread: 0.1,
             active: false,
+            beyond: Beyond::Drawn,
             restarts: Restarts::None,
         }
     }
@@ -161,8 +176,12 @@ impl CovarianceSwarm {
     fn sample(&mut self, count: usize) {
         let when = self.iteration as u32;
         let draw = |particle: usize| {
-            self.distribution
-                .sample(|k| self.random.normal(SAMPLE, when, particle as u32, k as u32))
+            let normal = |k: usize| self.random.normal(SAMPLE, when, particle as u32, k as u32);
+            let drawn = self.distribution.sample(normal);
+            match self.settings.beyond {
+                Beyond::Drawn => drawn,
+                Beyond::Reflected => drawn.map(folded),
+            }
         };
         self.positions = (0..count).map(draw).collect();
     }
@@ -215,9 +234,7 @@ impl CovarianceSwarm {
     }
 }
 
-/// A coordinate reflected into the unit cube. The distribution itself knows nothing of the bounds: an optimum on a
-/// bound is one in the open to it, with its mirror image beyond. If it were shown the reflected particles, all of
-/// their steps at a bound would seem to lead inwards.
+/// A coordinate reflected into the unit cube.
 fn folded(x: f64) -> f64 {
     let twice = x.rem_euclid(2.0);
     if twice > 1.0 { 2.0 - twice } else { twice }
