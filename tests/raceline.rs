@@ -1,0 +1,147 @@
+//! Racing lines end to end: on shapes with known answers, on the bundled circuit, on a surveyed one where it is at hand.
+
+use lapswarm::evaluate::BackendChoice;
+use lapswarm::evaluate::line::LineObjective;
+use lapswarm::study::raceline::{
+    Outcome, RacelineSettings, Setup, find_lines, set_up, summarise, write_results,
+};
+use std::io::Write as _;
+use std::ops::ControlFlow;
+use std::path::PathBuf;
+
+fn cold(track: &str, sections: usize, objectives: &[LineObjective]) -> RacelineSettings {
+    RacelineSettings {
+        track: track.to_owned(),
+        sections,
+        objectives: objectives.to_vec(),
+        car_width_m: 0.0,
+        warm_start: false,
+        local_search: false,
+        backend: BackendChoice::Simd,
+        ..RacelineSettings::default()
+    }
+}
+
+fn run(settings: &RacelineSettings) -> (Setup, Outcome) {
+    let setup = set_up(settings).unwrap();
+    let outcome = find_lines(settings, &setup, |_| ControlFlow::Continue(())).unwrap();
+    (setup, outcome)
+}
+
+/// The surveyed circuit, or none after saying so: a test that did not run must be seen not to have run.
+fn surveyed() -> Option<String> {
+    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/data/tracks/Silverstone.csv");
+    if path.is_file() {
+        return Some(path.display().to_string());
+    }
+    let line = format!("SKIPPED: the surveyed Silverstone is not at hand at {}\n", path.display());
+    std::io::stderr().write_all(line.as_bytes()).unwrap();
+    None
+}
+
+#[test]
+fn a_swarm_alone_finds_the_inside_of_a_circle() {
+    // Driven clockwise: the right edge is the inner one.
+    let (_, outcome) = run(&cold("circle:590:600", 361, &[LineObjective::Length]));
+    let inside = 361.0 * 2.0 * 590.0 * (std::f64::consts::PI / 361.0).sin();
+    let found = &outcome.objectives[0];
+    assert!((found.exact.as_ref().unwrap().length_m / inside - 1.0).abs() < 1e-9);
+    // The bound.
+    let error = found.best.length_m / inside - 1.0;
+    assert!((-1e-9..1e-4).contains(&error), "{error}");
+}
+
+#[test]
+fn the_surveyed_circuit_gives_the_published_optima() {
+    let Some(track) = surveyed() else { return };
+    let (_, outcome) = run(&cold(
+        &track,
+        360,
+        &[LineObjective::Length, LineObjective::Gamma],
+    ));
+    let [length, gamma] = &outcome.objectives[..] else {
+        panic!("two objectives")
+    };
+    // The exact solvers to the figures' own digits; the swarm from a cold start, without gradients, to the bounds that it
+    // was set: a twentieth of a percent, and one percent.
+    let exact = |o: &lapswarm::study::raceline::ObjectiveOutcome| o.exact.clone().unwrap();
+    assert!((exact(length).length_m - 5710.944).abs() < 1e-3);
+    assert!((exact(gamma).gamma_1pm - 0.12610).abs() < 1e-5);
+    println!("swarm alone: {} m, Gamma {}", length.swarm_cost, gamma.swarm_cost);
+    assert!(length.best.length_m < 5710.944 * 1.0005, "{}", length.best.length_m);
+    assert!(gamma.best.gamma_1pm < 0.12610 * 1.01, "{}", gamma.best.gamma_1pm);
+}
+
+#[test]
+fn a_study_of_the_bundled_circuit_holds_together() {
+    let settings = RacelineSettings {
+        sections: 240,
+        population: 40,
+        iterations: 20,
+        archive: 40,
+        backend: BackendChoice::Simd,
+        ..RacelineSettings::default()
+    };
+    let (setup, outcome) = run(&settings);
+    let [gamma, length, time] = &outcome.objectives[..] else {
+        panic!("three objectives")
+    };
+    // Each line is the best by its own objective, and no study ends worse than the exact line that it started from.
+    for (own, others) in [(gamma, [length, time]), (length, [gamma, time]), (time, [gamma, length])] {
+        let worth = own.best.worth(own.objective);
+        assert!(others.iter().all(|o| o.best.worth(own.objective) > worth));
+        let exact = own.exact.as_ref().unwrap().objective(own.objective);
+        assert!(own.best.objective(own.objective) <= exact * 1.001, "{:?}", own.objective);
+    }
+    let front = outcome.front.as_ref().unwrap();
+    assert!(front.alpha.len() > 10 && (0.3..1.0).contains(&front.hypervolume));
+    for (i, a) in front.objectives.iter().enumerate() {
+        let beaten = |b: &Vec<f64>| b != a && b.iter().zip(a).all(|(x, y)| x <= y);
+        assert!(!front.objectives.iter().any(beaten), "line {i} of the front is beaten");
+    }
+    assert!(front.alpha.iter().flatten().all(|a| (0.0..=1.0).contains(a)));
+
+    let folder = tempfile::tempdir().unwrap();
+    let summary = summarise(&settings, &setup, &outcome);
+    write_results(folder.path(), &settings, &setup, &outcome, &summary).unwrap();
+    for name in [
+        "manifest.json",
+        "summary.json",
+        "study.toml",
+        "line_fastest.csv",
+        "racetrack_fastest.csv",
+        "front.csv",
+        "map.svg",
+        "section_Abbey.svg",
+        "traces.svg",
+        "front.svg",
+        "parallel.svg",
+        "convergence.svg",
+    ] {
+        assert!(folder.path().join(name).metadata().unwrap().len() > 0, "{name}");
+    }
+    let json = serde_json::to_value(&summary).unwrap();
+    for key in ["length_m", "gamma_1pm", "integral_kappa2_1pm", "lap_time_s", "lap_time_fine_s"] {
+        assert!(json["best"]["lap_time"][key].is_number(), "best {key}");
+        assert!(json["exact"]["length"][key].is_number(), "exact {key}");
+    }
+    let again = RacelineSettings::read(&folder.path().join("study.toml")).unwrap();
+    assert_eq!(again, settings);
+}
+
+#[test]
+fn the_same_seed_gives_the_same_lines() {
+    let settings = RacelineSettings {
+        sections: 60,
+        population: 20,
+        iterations: 5,
+        backend: BackendChoice::Simd,
+        ..RacelineSettings::default()
+    };
+    let (_, one) = run(&settings);
+    let (_, other) = run(&settings);
+    assert_eq!(one.front.unwrap().alpha, other.front.unwrap().alpha);
+    for (a, b) in one.objectives.iter().zip(&other.objectives) {
+        assert_eq!(a.best.alpha, b.best.alpha);
+    }
+}
