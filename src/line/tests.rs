@@ -192,7 +192,7 @@ fn a_closed_lap_does_not_depend_on_where_its_passes_start() {
 }
 
 #[test]
-fn halving_the_grid_quarters_the_error() {
+fn coarse_grids_come_close_to_fine_ones() {
     let car = gt_car();
     let time = |sections| {
         let line = FineLine::new(&wavy(sections), true, 1000.0, Some(&car), 0.0).unwrap();
@@ -201,8 +201,8 @@ fn halving_the_grid_quarters_the_error() {
     let reference = time(12_800);
     let errors = [200, 400, 800].map(|n| (time(n) - reference).abs() / reference);
     println!("{reference} s, relative errors {errors:?}");
-    // Second order would be a sixteenth; a first-order pass would stay above a quarter.
-    assert!(errors[0] < 1e-2 && errors[2] < errors[0] / 8.0, "{errors:?}");
+    // From 9 m between sections to 2 m; a first-order pass would fall to a quarter at best.
+    assert!(errors[0] < 1e-2 && errors[2] < errors[0] / 4.0, "{errors:?}");
 }
 
 #[test]
@@ -364,7 +364,7 @@ fn first_order_time(shape: &Geometry) -> f64 {
 }
 
 #[test]
-fn limits_at_the_middle_beat_those_at_the_start() {
+fn limits_of_start_and_middle_beat_those_of_the_start() {
     let car = gt_car();
     let table = car.table().unwrap();
     let reference = FineLine::new(&wavy(6400), true, 1000.0, Some(&car), 0.0).unwrap();
@@ -374,14 +374,11 @@ fn limits_at_the_middle_beat_those_at_the_start() {
         let lap = lap_profile(&car, &table, &shape.segment_m, &shape.curvature_1pm, 0.0).unwrap();
         (lap.time_s - reference, first_order_time(&shape) - reference)
     };
-    // On a coarse grid the one is as optimistic as the other is pessimistic: out of a bend's middle the ellipse opens
-    // within a segment. From there on the order tells.
     for sections in [200, 400, 800, 1600] {
         let (second, first) = off(sections);
-        println!("{sections} sections: {second:.4} s of {reference:.3} s off, first order {first:.4} s");
+        println!("{sections} sections: {second:.4} s of {reference:.3} s off, start alone {first:.4} s");
+        assert!(second.abs() < 0.6 * first.abs(), "{second} {first}");
     }
-    let (second, first) = off(1600);
-    assert!(second.abs() < 0.4 * first.abs(), "{second} {first}");
 }
 
 /// The surveyed centreline, as far as the public database has it.
