@@ -169,15 +169,17 @@ fn longitudinal(speed_squared: f32, curvature: f32) -> vec2<f32> {
 }
 
 fn driven(start: f32, length: f32, here: f32, there: f32) -> f32 {
-    let middle = max(start + length * longitudinal(start, here).x, 0.0);
+    let first = longitudinal(start, here).x;
+    let middle = max(start + length * first, 0.0);
     let drive = longitudinal(middle, 0.5 * (here + there)).x;
-    return max(start + 2.0 * length * drive, 0.0);
+    return max(start + length * (first + drive), 0.0);
 }
 
 fn braked(end: f32, length: f32, there: f32, here: f32) -> f32 {
-    let middle = end + length * longitudinal(end, there).y;
+    let first = longitudinal(end, there).y;
+    let middle = end + length * first;
     let brake = longitudinal(middle, 0.5 * (here + there)).y;
-    return end + 2.0 * length * brake;
+    return end + length * (first + brake);
 }
 
 fn lap_time(candidate: u32) -> f32 {

@@ -219,14 +219,16 @@ pub fn longitudinal<R: Lookup>(limits: &LimitTable<R::Storage>, speed_squared: R
     [grip.min(at(2)) - drag, grip + drag]
 }
 
-/// Speed squared after driving from a section to the next. Second order: the limits are those at the middle.
+/// Speed squared after driving from a section to the next, on the mean of the limits at the start and at the middle.
+/// Out of a bend's middle the ellipse opens within a segment: the middle alone is then as optimistic as the start alone
+/// is pessimistic (0.4% of a lap at 5 m, 1% at 16 m), their mean ten times nearer.
 #[inline(always)]
 fn driven<R: Lookup>(limits: &LimitTable<R::Storage>, from: R, length: R, here: R, there: R) -> R {
     let nought = R::lit(0.0);
     let [start, _] = longitudinal(limits, from, here);
     let middle = (from + length * start).max(nought);
     let [drive, _] = longitudinal(limits, middle, R::lit(0.5) * (here + there));
-    (from + R::lit(2.0) * length * drive).max(nought)
+    (from + length * (start + drive)).max(nought)
 }
 
 /// Speed squared from which the car just brakes to that of the next section.
@@ -235,7 +237,7 @@ fn braked<R: Lookup>(limits: &LimitTable<R::Storage>, to: R, length: R, there: R
     let [_, end] = longitudinal(limits, to, there);
     let middle = to + length * end;
     let [_, brake] = longitudinal(limits, middle, R::lit(0.5) * (here + there));
-    to + R::lit(2.0) * length * brake
+    to + length * (end + brake)
 }
 
 /// Time of a lap (s) on `course`, whose lengths and curvatures are given; it has the speeds after.

@@ -81,6 +81,39 @@ impl CrossSections {
         Ok(narrowed)
     }
 
+    /// The `count` cuts from `first` on as an open stretch, round the end of a closed circuit if need be. Stations start
+    /// from nought; named sections and corners stay with the whole.
+    ///
+    /// # Errors
+    /// [`Error::Input`] if the stretch has fewer than two cuts, or more than there are.
+    pub fn stretch(&self, first: usize, count: usize) -> Result<Self> {
+        let n = self.len();
+        let most = if self.closed { n } else { n.saturating_sub(first) };
+        if first >= n || count < 2 || count > most {
+            return Err(Error::input(
+                &self.name,
+                "stretch of cuts",
+                format!("{count} from {first} on"),
+                format!("2 to {most} of {n}"),
+            ));
+        }
+        let cuts = (first..first + count).map(|i| i % n);
+        let from = self.station_m[first];
+        let station_m: Vec<f64> = (first..first + count)
+            .map(|i| self.station_m[i % n] - from + if i < n { 0.0 } else { self.length_m })
+            .collect();
+        Ok(Self {
+            name: self.name.clone(),
+            closed: false,
+            length_m: station_m[count - 1],
+            station_m,
+            right_m: cuts.clone().map(|i| self.right_m[i]).collect(),
+            left_m: cuts.map(|i| self.left_m[i]).collect(),
+            sections: Vec::new(),
+            corners: Vec::new(),
+        })
+    }
+
     /// The points of a line (m), one per cut, from its `alpha` at every cut.
     pub fn points(&self, alpha: &[f64]) -> Vec<DVec2> {
         self.right_m
@@ -117,6 +150,19 @@ mod tests {
         assert_eq!(points, [DVec2::new(0.0, -3.0), DVec2::new(10.0, 5.0)]);
         // The reference line stays where it is, 4 m from the right edge: 3 of the 8 m that are left.
         assert!((cuts.reference[0] - 0.375).abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_stretch_goes_round_the_end_of_a_closed_circuit() {
+        let mut cuts = straight();
+        cuts.closed = true;
+        cuts.length_m = 25.0;
+        let stretch = cuts.stretch(1, 2).unwrap();
+        assert!(!stretch.closed);
+        assert_eq!(stretch.station_m, [0.0, 15.0]);
+        assert_eq!(stretch.left_m, [cuts.left_m[1], cuts.left_m[0]]);
+        assert!(cuts.stretch(0, 3).is_err() && cuts.stretch(2, 2).is_err());
+        assert!(straight().stretch(1, 2).is_err());
     }
 
     #[test]

@@ -34,7 +34,10 @@ fn backends(problem: &LineProblem) -> Vec<(String, Box<dyn Evaluator + '_>)> {
 /// length by no more than a third of it at either end, beside the 70 roundings of a sum in blocks of 64. A second
 /// difference is off by four times that over the shortest spacing squared, and two roots of sums of squares differ by no
 /// more than the root of the sum of the squared differences. Where corner speed decides, time goes with half the relative
-/// error of the curvature, and no bend wider than 400 m slows any of the cars; 1e-4 is the limit of whole laps.
+/// error of the curvature, and no bend wider than 400 m slows any of the cars; 1e-4 is the limit of whole laps. Beside it,
+/// on the lateral limit itself, what is left of the ellipse is the root of a difference that three roundings of 6e-8 can
+/// fill: `sqrt(2 * 1.8e-7)` or 6e-4 of the grip `g`. Half of `2 h` times that, over a corner's speed squared `g r`, is off by `h / r`
+/// times 6e-4, its root and so the time by half of that, in corners: 1.6e-4 at 16 m in bends of 30 m.
 fn tolerances(problem: &LineProblem, expected: &[f64]) -> [f64; 5] {
     let cuts = problem.cuts();
     let n = cuts.len() as f64;
@@ -47,7 +50,11 @@ fn tolerances(problem: &LineProblem, expected: &[f64]) -> [f64; 5] {
     let gamma = n.sqrt() * bend + 1e-5 * expected[2];
     let root = expected[3].sqrt();
     let integral = expected[0].sqrt() * bend + 1e-5 * root;
-    let time = (1e-5 + 0.5 * bend * 400.0).min(1e-4);
+    let left = (2.0f64 * 3.0 * 6e-8).sqrt();
+    let sharpest = (0..cuts.len())
+        .map(|i| middle.curvature_1pm[i].abs() * middle.segment_m[i.min(middle.segment_m.len() - 1)])
+        .fold(0.0, f64::max);
+    let time = (1e-5 + 0.5 * bend * 400.0).min(1e-4) + 0.5 * sharpest.min(0.53) * left;
     [
         length,
         2.0 * expected[1] * length / expected[0] + 70.0 * 6e-8 * expected[1],
