@@ -34,7 +34,10 @@ fn surveyed() -> Option<String> {
     if path.is_file() {
         return Some(path.display().to_string());
     }
-    let line = format!("SKIPPED: the surveyed Silverstone is not at hand at {}\n", path.display());
+    let line = format!(
+        "SKIPPED: the surveyed Silverstone is not at hand at {}\n",
+        path.display()
+    );
     std::io::stderr().write_all(line.as_bytes()).unwrap();
     None
 }
@@ -54,11 +57,7 @@ fn a_swarm_alone_finds_the_inside_of_a_circle() {
 #[test]
 fn the_surveyed_circuit_gives_the_published_optima() {
     let Some(track) = surveyed() else { return };
-    let (_, outcome) = run(&cold(
-        &track,
-        360,
-        &[LineObjective::Length, LineObjective::Gamma],
-    ));
+    let (_, outcome) = run(&cold(&track, 360, &[LineObjective::Length, LineObjective::Gamma]));
     let [length, gamma] = &outcome.objectives[..] else {
         panic!("two objectives")
     };
@@ -68,7 +67,11 @@ fn the_surveyed_circuit_gives_the_published_optima() {
     assert!((exact(length).length_m - 5710.944).abs() < 1e-3);
     assert!((exact(gamma).gamma_1pm - 0.12610).abs() < 1e-5);
     println!("swarm alone: {} m, Gamma {}", length.swarm_cost, gamma.swarm_cost);
-    assert!(length.best.length_m < 5710.944 * 1.0005, "{}", length.best.length_m);
+    assert!(
+        length.best.length_m < 5710.944 * 1.0005,
+        "{}",
+        length.best.length_m
+    );
     assert!(gamma.best.gamma_1pm < 0.12610 * 1.01, "{}", gamma.best.gamma_1pm);
 }
 
@@ -87,17 +90,28 @@ fn a_study_of_the_bundled_circuit_holds_together() {
         panic!("three objectives")
     };
     // Each line is the best by its own objective, and no study ends worse than the exact line that it started from.
-    for (own, others) in [(gamma, [length, time]), (length, [gamma, time]), (time, [gamma, length])] {
+    for (own, others) in [
+        (gamma, [length, time]),
+        (length, [gamma, time]),
+        (time, [gamma, length]),
+    ] {
         let worth = own.best.worth(own.objective);
         assert!(others.iter().all(|o| o.best.worth(own.objective) > worth));
         let exact = own.exact.as_ref().unwrap().objective(own.objective);
-        assert!(own.best.objective(own.objective) <= exact * 1.001, "{:?}", own.objective);
+        assert!(
+            own.best.objective(own.objective) <= exact * 1.001,
+            "{:?}",
+            own.objective
+        );
     }
     let front = outcome.front.as_ref().unwrap();
     assert!(front.alpha.len() > 10 && (0.3..1.0).contains(&front.hypervolume));
     for (i, a) in front.objectives.iter().enumerate() {
         let beaten = |b: &Vec<f64>| b != a && b.iter().zip(a).all(|(x, y)| x <= y);
-        assert!(!front.objectives.iter().any(beaten), "line {i} of the front is beaten");
+        assert!(
+            !front.objectives.iter().any(beaten),
+            "line {i} of the front is beaten"
+        );
     }
     assert!(front.alpha.iter().flatten().all(|a| (0.0..=1.0).contains(a)));
 
@@ -121,7 +135,13 @@ fn a_study_of_the_bundled_circuit_holds_together() {
         assert!(folder.path().join(name).metadata().unwrap().len() > 0, "{name}");
     }
     let json = serde_json::to_value(&summary).unwrap();
-    for key in ["length_m", "gamma_1pm", "integral_kappa2_1pm", "lap_time_s", "lap_time_fine_s"] {
+    for key in [
+        "length_m",
+        "gamma_1pm",
+        "integral_kappa2_1pm",
+        "lap_time_s",
+        "lap_time_fine_s",
+    ] {
         assert!(json["best"]["lap_time"][key].is_number(), "best {key}");
         assert!(json["exact"]["length"][key].is_number(), "exact {key}");
     }

@@ -108,7 +108,8 @@ impl CrossSections {
             length_m: station_m[count - 1],
             station_m,
             right_m: cuts.clone().map(|i| self.right_m[i]).collect(),
-            left_m: cuts.map(|i| self.left_m[i]).collect(),
+            left_m: cuts.clone().map(|i| self.left_m[i]).collect(),
+            reference: cuts.map(|i| self.reference[i]).collect(),
             sections: Vec::new(),
             corners: Vec::new(),
         })
