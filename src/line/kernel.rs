@@ -220,8 +220,9 @@ pub fn longitudinal<R: Lookup>(limits: &LimitTable<R::Storage>, speed_squared: R
 }
 
 /// Speed squared after driving from a section to the next, on the mean of the limits at the start and at the middle.
-/// Out of a bend's middle the ellipse opens within a segment: the middle alone is then as optimistic as the start alone
-/// is pessimistic (0.4% of a lap at 5 m, 1% at 16 m), their mean ten times nearer.
+/// Out of a bend's middle the ellipse opens within a segment: the middle alone is then optimistic and the start alone
+/// pessimistic. On smooth lines at 5 to 16 m the middle was 0.4% to 1.2% of a lap off, the start 0.4% to 0.5% the other
+/// way, and the mean 0.1% to 0.2%. On jagged lines no coarse grid is to be trusted.
 #[inline(always)]
 fn driven<R: Lookup>(limits: &LimitTable<R::Storage>, from: R, length: R, here: R, there: R) -> R {
     let nought = R::lit(0.0);
