@@ -10,7 +10,7 @@
 //! | [`vehicle`] | the car: tyres, body, loads, aero; written once over a [`scalar::Real`], with a WGSL twin in `shaders/` |
 //! | [`track`], [`telemetry`] | circuits and logs, as read from files |
 //! | [`simulate`] | a driver who takes a car round a circuit and logs it |
-//! | [`line`], [`optimum`] | racing lines, the point-mass lap on them, and their exact optima |
+//! | [`mod@line`], [`optimum`] | racing lines, the point-mass lap on them, and their exact optima |
 //! | [`evaluate`], [`swarm`] | problems and their evaluators; optimisers |
 //! | [`study`], [`report`] | what users run, and the pictures and tables that it writes |
 //!
