@@ -2,4 +2,5 @@
 
 pub mod envelope;
 pub mod identify;
+pub mod raceline;
 pub mod run_folder;
