@@ -40,7 +40,7 @@ impl Parametrisation {
         }
     }
 
-    /// `count` control points, at least four, which may reach [`OVERSHOOT`] beyond the road; the line is held within.
+    /// `count` control points, at least four, which may reach a quarter of its width beyond the road; the line is held within.
     pub fn control_points(count: usize) -> Self {
         Self {
             basis: Basis::ControlPoints {

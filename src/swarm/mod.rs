@@ -42,6 +42,7 @@ pub mod problems;
 mod pso;
 mod settings;
 mod space;
+mod windows;
 
 pub use archive::Archive;
 pub use cooperative::{CooperativeSettings, CooperativeSwarm};
@@ -55,6 +56,7 @@ pub use settings::{
     BoundHandling, Constriction, DRAWN_PULLS, Leaders, MopsoSettings, Mutation, PsoSettings, Randomness,
     Schedule, Truncation,
 };
+pub use windows::{WindowSettings, WindowSwarm};
 
 use crate::error::Result;
 use crate::evaluate::{Evaluation, Evaluator};

@@ -13,7 +13,7 @@ use crate::track::CrossSections;
 /// The solvers on one track.
 ///
 /// Lines without a lap time have a variable at every cut. With one, cuts' worth of zigzag between them would pay, so that
-/// lines are then a spline's distance from the least curved line, with [`CUTS_PER_CONTROL`] cuts for each control point.
+/// lines are then a spline's distance from the least curved line, with three cuts for each control point.
 pub struct ExactSolvers {
     cuts: CrossSections,
     spacing_m: Vec<f64>,

@@ -15,7 +15,7 @@ pub use exact::{ExactLine, ExactSolvers, WeightedLine};
 pub use front::{LineFront, search_front};
 pub use lines::{FINE_M, ReportedLine, Setup, set_up};
 pub use results::{LineFigures, Summary, summarise, write_results};
-pub use search::{FoundLine, LineProgress, LineSearchSettings, search_line};
+pub use search::{FoundLine, LevelRow, LineProgress, LineSearch, LineSearchSettings, search_line};
 pub use settings::{OBJECTIVE_NAMES, RacelineSettings};
 
 use crate::error::Result;
@@ -120,13 +120,15 @@ pub fn find_lines(
             ..LineSearchSettings::default()
         };
         let found = search_line(
-            &setup.cuts,
-            *objective,
-            Some(&setup.car),
-            settings.entry_mps,
-            start,
-            settings.backend,
-            settings.adapter.as_deref(),
+            &LineSearch {
+                cuts: &setup.cuts,
+                objective: *objective,
+                car: Some(&setup.car),
+                entry_mps: settings.entry_mps,
+                start,
+                backend: settings.backend,
+                adapter: settings.adapter.as_deref(),
+            },
             &search,
             |progress| {
                 let told = observe(&StudyProgress {
@@ -146,14 +148,16 @@ pub fn find_lines(
                 .map(|row| (row.evaluations, row.best))
                 .collect(),
         );
-        let mut best = setup.report(line_name(*objective), &found.alpha, settings)?;
+        // A search that goes from coarse to fine may lose a little of the line that it started from.
+        let mut rivals: Vec<Vec<f64>> = start.map(<[f64]>::to_vec).into_iter().collect();
         if settings.local_search && solvers.solves(*objective) && !interrupted {
-            let polished = solvers.polish(vec![(found.alpha, vec![(*objective, 1.0)])], 60)?;
-            for alpha in polished {
-                let line = setup.report(line_name(*objective), &alpha, settings)?;
-                if line.worth(*objective) < best.worth(*objective) {
-                    best = line;
-                }
+            rivals.extend(solvers.polish(vec![(found.alpha.clone(), vec![(*objective, 1.0)])], 60)?);
+        }
+        let mut best = setup.report(line_name(*objective), &found.alpha, settings)?;
+        for alpha in rivals {
+            let line = setup.report(line_name(*objective), &alpha, settings)?;
+            if line.worth(*objective) < best.worth(*objective) {
+                best = line;
             }
         }
         let exact_line = exact

@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 /// Centre, step size and covariance over the unit cube, with their evolution paths.
 #[derive(Clone, Debug)]
-pub(super) struct Distribution {
+pub(in crate::swarm) struct Distribution {
     pub mean: DVector<f64>,
     pub step: f64,
     covariance: DMatrix<f64>,
@@ -38,6 +38,11 @@ impl Distribution {
     pub fn sample(&self, normal: impl Fn(usize) -> f64) -> DVector<f64> {
         let z = DVector::from_fn(self.mean.len(), |k, _| self.scales[k] * normal(k));
         &self.mean + &self.basis * z * self.step
+    }
+
+    /// Takes its steps so many times as wide.
+    pub fn widen(&mut self, factor: f64) {
+        self.step = (self.step * factor).min(1.0);
     }
 
     /// The greatest standard deviation in any direction.

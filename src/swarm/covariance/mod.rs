@@ -17,7 +17,7 @@ use super::{Front, Optimiser};
 use crate::error::{Error, Result};
 use crate::evaluate::{Evaluation, FAILED_COST, Problem};
 use crate::random::Random;
-use distribution::Distribution;
+pub(super) use distribution::Distribution;
 use nalgebra::DVector;
 use std::collections::VecDeque;
 

@@ -1,0 +1,95 @@
+use super::*;
+use crate::track::{Shape, Spacing, Track};
+use std::f64::consts::PI;
+
+fn found(cuts: &CrossSections, objective: LineObjective, settings: &LineSearchSettings) -> FoundLine {
+    let search = LineSearch {
+        cuts,
+        objective,
+        car: None,
+        entry_mps: 0.0,
+        start: None,
+        backend: BackendChoice::Simd,
+        adapter: None,
+    };
+    search_line(&search, settings, |_| ControlFlow::Continue(())).unwrap()
+}
+
+/// A ring of 590 and 600 m with as many sections as corners: the inner polygon is the shortest line.
+#[test]
+fn the_ring_is_driven_along_the_inside() {
+    let ring = Shape::parse("circle:590:600").unwrap().unwrap();
+    let cuts = ring.cross_sections(&Spacing::equal(361)).unwrap();
+    let exact = 361.0 * 2.0 * 590.0 * (PI / 361.0).sin();
+    for seed in 1..=3 {
+        let settings = LineSearchSettings {
+            seed,
+            ..LineSearchSettings::default()
+        };
+        let line = found(&cuts, LineObjective::Length, &settings);
+        let short = line.cost / exact - 1.0;
+        assert!((-1e-9..1e-4).contains(&short), "seed {seed}: {short:e}");
+    }
+}
+
+/// An open road keeps its ends free: along a straight of constant width every line across is as long as it is oblique.
+#[test]
+fn an_open_road_is_searched_to_its_ends() {
+    let whole = Track::load("silverstone_gp").unwrap();
+    let mut cuts = whole.cross_sections(&Spacing::equal(360), false).unwrap();
+    let part: Vec<usize> = (0..120).collect();
+    cuts = thinned(&cuts, &part);
+    cuts.closed = false;
+    let map = crate::optimum::LineMap::at_every_cut(&cuts);
+    let exact = crate::optimum::shortest(&map, &crate::optimum::Bounds::road(120))
+        .unwrap()
+        .value;
+    let line = found(&cuts, LineObjective::Length, &LineSearchSettings::default());
+    let short = line.cost / exact - 1.0;
+    assert!((-1e-6..5e-4).contains(&short), "{short:e}");
+}
+
+#[test]
+fn the_same_seed_finds_the_same_line() {
+    let track = Track::load("silverstone_gp").unwrap();
+    let cuts = track.cross_sections(&Spacing::equal(120), false).unwrap();
+    let quick = LineSearchSettings {
+        rounds: 1,
+        first_controls: 30,
+        ..LineSearchSettings::default()
+    };
+    let bits = |settings: &LineSearchSettings| -> Vec<u64> {
+        let line = found(&cuts, LineObjective::Gamma, settings);
+        line.alpha.iter().map(|a| a.to_bits()).collect()
+    };
+    assert_eq!(bits(&quick), bits(&quick));
+    let other = LineSearchSettings {
+        seed: 2,
+        ..quick.clone()
+    };
+    assert_ne!(bits(&quick), bits(&other));
+}
+
+/// Within 0.05 % of the exact shortest line of the bundled circuit, from the reference line on.
+#[test]
+fn the_shortest_line_of_the_bundled_circuit() {
+    let track = Track::load("silverstone_gp").unwrap();
+    let cuts = track.cross_sections(&Spacing::equal(360), false).unwrap();
+    let map = crate::optimum::LineMap::at_every_cut(&cuts);
+    let exact = crate::optimum::shortest(&map, &crate::optimum::Bounds::road(360))
+        .unwrap()
+        .value;
+    let line = found(&cuts, LineObjective::Length, &LineSearchSettings::default());
+    let short = line.cost / exact - 1.0;
+    assert!((-1e-6..5e-4).contains(&short), "{short:e}");
+}
+
+#[test]
+fn settings_that_cannot_be_are_named() {
+    let settings = LineSearchSettings {
+        sections_per_control: 0.5,
+        ..LineSearchSettings::default()
+    };
+    let message = settings.validate().unwrap_err().to_string();
+    assert!(message.contains("sections_per_control"), "{message}");
+}

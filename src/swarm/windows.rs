@@ -1,0 +1,366 @@
+//! Cooperating swarms in windows, for variables that follow one another along a curve.
+//!
+//! Where each variable matters only to its neighbours, as along a racing line, a swarm over all of them at once learns
+//! far more than there is to know: its distribution has as many entries as pairs of variables, and it needs evaluations in
+//! proportion. Here the variables are cut into windows of a few neighbours, each with a small swarm that adapts a
+//! distribution of its own ([`super::CovarianceSwarm`]), in the context that the centres of all the others make: the
+//! context vector of van den Bergh and Engelbrecht, *A cooperative approach to particle swarm optimization*, IEEE TEC 8
+//! (2004), with covariance matrix adaptation in the place of velocities (Liu, Tang, *Scaling up covariance matrix
+//! adaptation evolution strategy using cooperative coevolution*, IDEAL 2013). All windows are asked for in one population.
+//!
+//! The windows take turns with others that lie half a window further on, so that no border lasts, and with wider ones,
+//! whose particles move smooth bumps of many variables: they find what is long, as a coarse grid does for a fine one
+//! (Briggs, Henson, McCormick, *A multigrid tutorial*, 2nd ed., 2000).
+
+use super::covariance::Distribution;
+use super::settings::setting;
+use super::space::Space;
+use super::{Front, Optimiser};
+use crate::error::{Error, Result};
+use crate::evaluate::{Evaluation, FAILED_COST, Problem};
+use crate::random::Random;
+use nalgebra::DVector;
+
+/// Settings of [`WindowSwarm`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct WindowSettings {
+    /// Directions in which the swarm of one window moves.
+    pub size: usize,
+    /// Particles of one window.
+    pub population: usize,
+    /// Distances between the middles of the bumps that a window moves, in variables, each a turn of its own; at 1 it
+    /// moves the variables themselves.
+    pub strides: Vec<usize>,
+    /// Iterations of a turn.
+    pub turn: usize,
+    /// Iterations in all.
+    pub iterations: usize,
+    /// Seed of all random numbers.
+    pub seed: u64,
+    /// Standard deviation at the start, as a share of the mean range of the variables.
+    pub spread: f64,
+    /// Whether the first variable follows the last.
+    pub cyclic: bool,
+}
+
+impl Default for WindowSettings {
+    fn default() -> Self {
+        Self {
+            size: 12,
+            population: 16,
+            strides: vec![1],
+            turn: 8,
+            iterations: 400,
+            seed: 1,
+            spread: 0.05,
+            cyclic: true,
+        }
+    }
+}
+
+impl WindowSettings {
+    /// Checks every setting.
+    ///
+    /// # Errors
+    /// [`Error::Input`] naming the setting.
+    pub fn validate(&self) -> Result<()> {
+        let counts = [
+            ("size", self.size, 2),
+            ("population", self.population, 4),
+            ("strides", self.strides.iter().copied().min().unwrap_or(0), 1),
+            ("turn", self.turn, 1),
+            ("iterations", self.iterations, 1),
+        ];
+        for (name, value, least) in counts {
+            if value < least {
+                return Err(setting(name, value.to_string(), &format!("{least} or more")));
+            }
+        }
+        if !(self.spread > 0.0 && self.spread <= 1.0) {
+            return Err(setting(
+                "spread",
+                self.spread.to_string(),
+                "a share above 0 up to 1",
+            ));
+        }
+        Ok(())
+    }
+}
+
+/// The swarm of one window.
+#[derive(Clone, Debug)]
+struct Window {
+    /// What each direction moves: variables and weights.
+    bumps: Vec<Vec<(usize, f64)>>,
+    /// Over the bumps' heights, from the context on.
+    distribution: Distribution,
+    /// The present particles.
+    heights: Vec<DVector<f64>>,
+}
+
+impl Window {
+    /// Adds the bumps at these heights to a row of variables.
+    fn add(&self, heights: &DVector<f64>, row: &mut [f64]) {
+        for (bump, height) in self.bumps.iter().zip(heights.iter()) {
+            for &(variable, weight) in bump {
+                row[variable] += weight * height;
+            }
+        }
+    }
+}
+
+/// Windows of particles about a common context; minimises the first objective.
+#[derive(Clone, Debug)]
+pub struct WindowSwarm {
+    settings: WindowSettings,
+    /// Bounds of the variables; bumps and context are in the variables' own units.
+    bounds: Vec<(f64, f64)>,
+    objectives: usize,
+    random: Random,
+    /// The windows of each turn; together they cover all variables.
+    turns: Vec<Vec<Window>>,
+    context: Vec<f64>,
+    best: (Vec<f64>, f64),
+    iteration: usize,
+    evaluations: u64,
+}
+
+/// What the draws are for, in the counter.
+const SAMPLE: u32 = 0x3d0;
+/// How much wider a window looks at the start of its next turn than it did at the end of the last, since the others have
+/// moved on.
+const REOPENED: f64 = 1.5;
+
+impl WindowSwarm {
+    /// A swarm over the variables of `problem` about `start` (in the variables' units). The variables stand for the same
+    /// thing at one place after another, so one spread fits all.
+    ///
+    /// # Errors
+    /// [`Error::Input`] naming the setting that is out of its range.
+    pub fn new(problem: &Problem, start: &[f64], settings: WindowSettings) -> Result<Self> {
+        settings.validate()?;
+        Space::new(problem)?;
+        let n = problem.variables.len();
+        if start.len() != n || start.iter().any(|x| !x.is_finite()) {
+            return Err(Error::input(
+                "the swarm's settings",
+                "start",
+                format!("{} values", start.len()),
+                format!("{n} finite ones, one per variable"),
+            ));
+        }
+        let bounds: Vec<(f64, f64)> = problem.variables.iter().map(|v| (v.lower, v.upper)).collect();
+        let range = bounds.iter().map(|(lower, upper)| upper - lower).sum::<f64>() / n as f64;
+        let mut turns = Vec::new();
+        for &stride in &settings.strides {
+            for shifted in [false, true] {
+                let windows = windows(n, stride, settings.size, settings.cyclic, shifted);
+                // A single window leaves no border to shift.
+                if shifted && windows.len() == 1 {
+                    continue;
+                }
+                let window = |bumps: Vec<Vec<(usize, f64)>>| Window {
+                    distribution: Distribution::new(DVector::zeros(bumps.len()), settings.spread * range),
+                    heights: Vec::new(),
+                    bumps,
+                };
+                turns.push(windows.into_iter().map(window).collect());
+            }
+        }
+        let held = start.iter().zip(&bounds);
+        let context: Vec<f64> = held.map(|(x, (lower, upper))| x.clamp(*lower, *upper)).collect();
+        let mut swarm = Self {
+            objectives: problem.objectives.len(),
+            random: Random::new(settings.seed),
+            best: (context.clone(), f64::INFINITY),
+            bounds,
+            turns,
+            context,
+            iteration: 0,
+            evaluations: 0,
+            settings,
+        };
+        swarm.sample();
+        Ok(swarm)
+    }
+
+    /// The best candidate so far, in the variables' units, and its cost.
+    pub fn best_candidate(&self) -> (Vec<f64>, f64) {
+        self.best.clone()
+    }
+
+    /// Turns of every kind that have been completed.
+    pub fn rounds(&self) -> usize {
+        self.iteration / (self.settings.turn * self.turns.len())
+    }
+
+    fn turn(&self) -> usize {
+        self.iteration / self.settings.turn % self.turns.len()
+    }
+
+    fn sample(&mut self) {
+        let (turn, when) = (self.turn(), self.iteration as u32);
+        let (random, count) = (self.random, self.settings.population);
+        for (w, window) in self.turns[turn].iter_mut().enumerate() {
+            let draw = |particle: usize| {
+                let who = (w * count + particle) as u32;
+                window
+                    .distribution
+                    .sample(|k| random.normal(SAMPLE, when, who, k as u32))
+            };
+            window.heights = (0..count).map(draw).collect();
+        }
+    }
+
+    /// The row of one particle: the context but for its window.
+    fn row(&self, window: &Window, heights: &DVector<f64>) -> Vec<f64> {
+        let mut row = self.context.clone();
+        window.add(heights, &mut row);
+        self.hold(&mut row);
+        row
+    }
+
+    fn hold(&self, row: &mut [f64]) {
+        for (x, (lower, upper)) in row.iter_mut().zip(&self.bounds) {
+            *x = x.clamp(*lower, *upper);
+        }
+    }
+}
+
+/// The bumps of each window: middles `stride` variables apart, `size` of them in a window or as near to that as divides them
+/// evenly, from half a window on if they are `shifted`.
+fn windows(n: usize, stride: usize, size: usize, cyclic: bool, shifted: bool) -> Vec<Vec<Vec<(usize, f64)>>> {
+    let count = n.div_ceil(stride);
+    let parts = (count as f64 / size as f64).round().max(1.0) as usize;
+    let half = if shifted { count.div_ceil(2 * parts) } else { 0 };
+    let place = |k: usize| k * count / parts;
+    let ranges: Vec<Vec<usize>> = if cyclic || !shifted {
+        let shift = |k: usize| (k + half) % count;
+        (0..parts)
+            .map(|p| (place(p)..place(p + 1)).map(shift).collect())
+            .collect()
+    } else {
+        // The ends of an open row are half windows of their own.
+        let edges = (0..parts).map(|p| place(p) + half).chain([count]);
+        let mut from = 0;
+        edges
+            .map(|to| {
+                let to = to.min(count);
+                (std::mem::replace(&mut from, to)..to).collect()
+            })
+            .collect()
+    };
+    let bumps = |middles: Vec<usize>| -> Vec<Vec<(usize, f64)>> {
+        middles
+            .into_iter()
+            .map(|k| bump(k * stride, stride, n, cyclic))
+            .collect()
+    };
+    ranges
+        .into_iter()
+        .filter(|range| !range.is_empty())
+        .map(bumps)
+        .collect()
+}
+
+/// A cubic B-spline about a variable, of knots `stride` variables apart; the variable alone if that is one.
+fn bump(middle: usize, stride: usize, n: usize, cyclic: bool) -> Vec<(usize, f64)> {
+    if stride == 1 {
+        return vec![(middle, 1.0)];
+    }
+    let reach = (2 * stride as isize - 1).min((n as isize - 1) / 2);
+    (-reach..=reach)
+        .filter_map(|d| {
+            let t = d.unsigned_abs() as f64 / stride as f64;
+            let weight = if t < 1.0 {
+                (4.0 - 6.0 * t * t + 3.0 * t * t * t) / 6.0
+            } else {
+                (2.0 - t).powi(3) / 6.0
+            };
+            let variable = middle as isize + d;
+            let inside = (0..n as isize).contains(&variable);
+            (cyclic || inside).then(|| (variable.rem_euclid(n as isize) as usize, weight))
+        })
+        .collect()
+}
+
+impl Optimiser for WindowSwarm {
+    fn ask(&mut self) -> Vec<f64> {
+        // The context comes first.
+        let mut rows = self.context.clone();
+        for window in &self.turns[self.turn()] {
+            for heights in &window.heights {
+                rows.extend(self.row(window, heights));
+            }
+        }
+        rows
+    }
+
+    fn tell(&mut self, evaluation: &Evaluation) {
+        let costs: Vec<f64> = evaluation
+            .objectives
+            .chunks_exact(self.objectives)
+            .map(|row| if row[0].is_finite() { row[0] } else { FAILED_COST })
+            .collect();
+        let (turn, count) = (self.turn(), self.settings.population);
+        self.evaluations += costs.len() as u64;
+        let Some((&own, costs)) = costs.split_first() else {
+            return;
+        };
+        if own < self.best.1 {
+            self.best = (self.context.clone(), own);
+        }
+        let least = (0..costs.len()).min_by(|&a, &b| costs[a].total_cmp(&costs[b]));
+        if let Some(i) = least.filter(|&i| costs[i] < self.best.1) {
+            let window = &self.turns[turn][i / count];
+            self.best = (self.row(window, &window.heights[i % count]), costs[i]);
+        }
+        let mut context = std::mem::take(&mut self.context);
+        for (window, costs) in self.turns[turn].iter_mut().zip(costs.chunks_exact(count)) {
+            let mut order: Vec<usize> = (0..count).collect();
+            order.sort_by(|&a, &b| costs[a].total_cmp(&costs[b]));
+            // A window that failed as a whole, or to which nothing matters, says nothing about where to go.
+            if costs[order[0]] >= FAILED_COST || costs[order[0]] == costs[order[count - 1]] {
+                continue;
+            }
+            let ranked: Vec<&DVector<f64>> = order.iter().map(|&i| &window.heights[i]).collect();
+            window.distribution.adapt(&ranked, true);
+            let d = window.bumps.len();
+            let moved = std::mem::replace(&mut window.distribution.mean, DVector::zeros(d));
+            window.add(&moved, &mut context);
+        }
+        self.hold(&mut context);
+        self.context = context;
+        self.iteration += 1;
+        if self.iteration.is_multiple_of(self.settings.turn) {
+            // All windows moved at once; what that has spoilt is taken back.
+            self.context.clone_from(&self.best.0);
+            let next = self.turn();
+            for window in &mut self.turns[next] {
+                window.distribution.widen(REOPENED);
+            }
+        }
+        self.sample();
+    }
+
+    fn iteration(&self) -> usize {
+        self.iteration
+    }
+
+    fn planned_iterations(&self) -> usize {
+        self.settings.iterations
+    }
+
+    fn evaluations(&self) -> u64 {
+        self.evaluations
+    }
+
+    fn front(&self) -> Front {
+        let (candidate, cost) = self.best_candidate();
+        Front::single(candidate, cost)
+    }
+
+    fn best(&self) -> Vec<f64> {
+        vec![self.best.1]
+    }
+}
