@@ -364,3 +364,73 @@ impl Optimiser for WindowSwarm {
         vec![self.best.1]
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::evaluate::{Objective, Variable};
+
+    /// Every variable is moved in every turn, and by as much: with bumps, splines add up to one where none is cut off.
+    #[test]
+    fn windows_cover_all_variables() {
+        for (n, stride, size, cyclic) in [
+            (361, 1, 12, true),
+            (96, 8, 12, true),
+            (50, 2, 7, false),
+            (9, 1, 12, false),
+        ] {
+            for shifted in [false, true] {
+                let windows = windows(n, stride, size, cyclic, shifted);
+                let mut sum = vec![0.0; n];
+                for (variable, weight) in windows.iter().flatten().flatten() {
+                    sum[*variable] += weight;
+                }
+                let inner = if cyclic && n % stride == 0 || stride == 1 {
+                    0..n
+                } else {
+                    2 * stride..n - 3 * stride
+                };
+                assert!(sum.iter().all(|s| *s > 0.0));
+                assert!(
+                    sum[inner].iter().all(|s| (s - 1.0).abs() < 1e-12),
+                    "{n} {stride}: {sum:?}"
+                );
+            }
+        }
+    }
+
+    /// A chain held at both ends that wants to be straight (sum of squared second differences, condition number of the
+    /// order of n^4): nought at the optimum. That the waves of the start go, not how fast the longest ones do, is what is
+    /// held here; how close lines come to their optima is tested where they are searched for.
+    #[test]
+    fn a_stiff_chain_straightens() {
+        let n = 64;
+        let problem = Problem {
+            variables: (0..n)
+                .map(|i| Variable::new(format!("x{i}"), "-", -1.0, 1.0))
+                .collect(),
+            objectives: vec![Objective::new("stiffness", "-")],
+        };
+        let cost = |x: &[f64]| {
+            let bends: f64 = x.windows(3).map(|w| (w[0] - 2.0 * w[1] + w[2]).powi(2)).sum();
+            bends + x[0].powi(2) + x[n - 1].powi(2)
+        };
+        let start: Vec<f64> = (0..n).map(|i| 0.5 * (i as f64 * 0.4).sin()).collect();
+        let first = cost(&start);
+        let settings = WindowSettings {
+            strides: vec![8, 4, 2, 1],
+            iterations: 1600,
+            cyclic: false,
+            ..WindowSettings::default()
+        };
+        let mut swarm = WindowSwarm::new(&problem, &start, settings).unwrap();
+        while !swarm.done() {
+            let rows = swarm.ask();
+            let scored = rows.chunks_exact(n).map(|x| (vec![cost(x)], None)).collect();
+            swarm.tell(&Evaluation::of_rows(scored));
+        }
+        let (x, best) = swarm.best_candidate();
+        assert!(best < 0.05 * first, "{first} to {best}");
+        assert_eq!(best, cost(&x));
+    }
+}
