@@ -8,7 +8,7 @@ use crate::error::{Error, Result};
 use crate::evaluate::replay::{ReplayProblem, open_evaluator, trace};
 use crate::evaluate::{BackendInfo, FAILED_COST};
 use crate::swarm::{
-    Beyond, CovarianceSettings, CovarianceSwarm, Mopso, MopsoSettings, Progress, Pso, PsoSettings, run,
+    CovarianceSettings, CovarianceSwarm, Mopso, MopsoSettings, Progress, Pso, PsoSettings, run,
 };
 use std::ops::ControlFlow;
 use std::time::Instant;
@@ -139,8 +139,6 @@ pub fn search(
                 seed: settings.seed,
                 // Along the valley what did not pay tells as much as what did: it halves the error that is left.
                 active: true,
-                // No gain was measured from learning beyond the bounds.
-                beyond: Beyond::Reflected,
                 ..CovarianceSettings::default()
             };
             let planned = gathering.iterations;

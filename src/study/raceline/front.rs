@@ -71,9 +71,7 @@ pub fn search_front(
         ..MopsoSettings::default()
     };
     let mut swarm = Mopso::new(&problem.problem, mopso)?;
-    if settings.warm_start {
-        swarm.start_from(&starting_lines(&problem, settings, known)?);
-    }
+    swarm.start_from(&starting_lines(&problem, settings, known)?);
     let mut evaluator = open_line_evaluator(&problem, settings.backend, settings.adapter.as_deref())?;
     run(&mut swarm, evaluator.as_mut(), observe)?;
 

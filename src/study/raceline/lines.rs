@@ -11,6 +11,8 @@ use glam::DVec2;
 
 /// Distance between the points of the fine spline that lines are reported on (m).
 pub const FINE_M: f64 = 1.0;
+/// Waves of a survey's reference line that are shorter than this are noise (m): the tightest bend of a road is longer.
+const REFERENCE_M: f64 = 60.0;
 /// Distance between the points of the edges that lines are checked against (m).
 const EDGE_M: f64 = 2.0;
 
@@ -38,7 +40,9 @@ pub struct Setup {
 pub fn set_up(settings: &RacelineSettings) -> Result<Setup> {
     settings.validate()?;
     let track = Track::load(&settings.track)?;
-    let road = track.cross_sections(&Spacing::equal(settings.sections), settings.as_surveyed)?;
+    let road = track
+        .cross_sections(&Spacing::equal(settings.sections), settings.as_surveyed)?
+        .with_smooth_reference(REFERENCE_M);
     let cuts = road.narrowed(settings.car_width_m)?;
     let close = ((road.length_m / EDGE_M).ceil() as usize).clamp(settings.sections, 1_000_000);
     let dense = track.cross_sections(&Spacing::equal(close), settings.as_surveyed)?;

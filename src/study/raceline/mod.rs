@@ -115,31 +115,15 @@ pub fn find_lines(
             .as_ref()
             .filter(|_| settings.warm_start)
             .map(|o| o.alpha.as_slice());
-        let search = LineSearchSettings {
-            seed: settings.seed,
-            ..LineSearchSettings::default()
-        };
-        let found = search_line(
-            &LineSearch {
-                cuts: &setup.cuts,
-                objective: *objective,
-                car: Some(&setup.car),
-                entry_mps: settings.entry_mps,
-                start,
-                backend: settings.backend,
-                adapter: settings.adapter.as_deref(),
-            },
-            &search,
-            |progress| {
-                let told = observe(&StudyProgress {
-                    stage: line_name(*objective).to_owned(),
-                    evaluations: progress.evaluations,
-                    best: format!("{:.4} {}", progress.best, objective.unit()),
-                });
-                interrupted |= told.is_break();
-                told
-            },
-        )?;
+        let found = search_objective(settings, setup, *objective, start, |progress| {
+            let told = observe(&StudyProgress {
+                stage: line_name(*objective).to_owned(),
+                evaluations: progress.evaluations,
+                best: format!("{:.4} {}", progress.best, objective.unit()),
+            });
+            interrupted |= told.is_break();
+            told
+        })?;
         evaluations += found.evaluations;
         history.push(
             found
@@ -217,6 +201,69 @@ pub fn find_lines(
         history,
         interrupted,
     })
+}
+
+/// Cuts for each control point where lap time counts: with fewer, ripples between the cuts would pay.
+const CUTS_PER_CONTROL: f64 = 3.0;
+/// Waves of the least curved line that are shorter than this (m) are left out where fast lines are measured from it.
+const BASE_M: f64 = 40.0;
+
+/// The swarm's line for one objective.
+///
+/// Fast lines are looked for about the swarm's own least curved line, smoothed: about the reference line, a few control
+/// points could not say them.
+fn search_objective(
+    settings: &RacelineSettings,
+    setup: &Setup,
+    objective: LineObjective,
+    start: Option<&[f64]>,
+    mut observe: impl FnMut(&LineProgress) -> ControlFlow<()>,
+) -> Result<FoundLine> {
+    let plain = LineSearchSettings {
+        seed: settings.seed,
+        ..LineSearchSettings::default()
+    };
+    let search = LineSearch {
+        cuts: &setup.cuts,
+        objective,
+        car: Some(&setup.car),
+        entry_mps: settings.entry_mps,
+        start,
+        backend: settings.backend,
+        adapter: settings.adapter.as_deref(),
+    };
+    if objective != LineObjective::LapTime {
+        return search_line(&search, &plain, observe);
+    }
+    let curved = LineSearch {
+        objective: LineObjective::Kappa2,
+        ..search
+    };
+    let mut evaluations = 0;
+    let curved = search_line(&curved, &plain, |progress| {
+        evaluations = progress.evaluations;
+        observe(progress)
+    })?;
+    let mut cuts = setup.cuts.clone();
+    cuts.reference.clone_from(&curved.alpha);
+    let smooth = cuts.with_smooth_reference(BASE_M);
+    let fast = LineSearch {
+        cuts: &smooth,
+        start: None,
+        ..search
+    };
+    let settings = LineSearchSettings {
+        sections_per_control: CUTS_PER_CONTROL,
+        ..plain
+    };
+    let mut found = search_line(&fast, &settings, |progress| {
+        observe(&LineProgress {
+            evaluations: evaluations + progress.evaluations,
+            ..progress.clone()
+        })
+    })?;
+    found.evaluations += curved.evaluations;
+    Ok(found)
 }
 
 /// The member of a front nearest to the ideal, each objective as a share of the front's range.

@@ -28,7 +28,7 @@ pub struct RacelineSettings {
     pub entry_mps: f64,
     /// What is to be small.
     pub objectives: Vec<LineObjective>,
-    /// Whether the swarms start from known lines (the reference, the edges, the exact optima).
+    /// Whether the swarms start from the exact optima; else from the reference line, and the front from what they found.
     pub warm_start: bool,
     /// Whether what the swarms find is led to the nearest optimum by exact gradients.
     pub local_search: bool,
