@@ -52,7 +52,7 @@ impl Default for RacelineSettings {
             track: "silverstone_gp".to_owned(),
             car: "gt".to_owned(),
             envelope: None,
-            sections: 720,
+            sections: 960,
             as_surveyed: true,
             car_width_m: 2.0,
             ellipse_exponent: 2.0,
