@@ -268,12 +268,7 @@ fn search_objective(
         })
     })?;
     found.evaluations += curved.evaluations;
-    let time = |alpha: &[f64]| {
-        setup
-            .report("fastest", alpha, settings)
-            .map(|line| line.lap_time_fine_s())
-    };
-    let mut least = time(&found.alpha)?;
+    let mut fastest = setup.report("fastest", &found.alpha, settings)?;
     cuts.reference.clone_from(&found.alpha);
     for wavelength in RIPPLES_M {
         let smooth = cuts.with_smooth_reference(wavelength).reference;
