@@ -206,6 +206,8 @@ pub fn find_lines(
 /// Cuts for each control point where lap time counts: with fewer, ripples between the cuts would pay; with more, a swarm
 /// cannot follow the edges.
 const CUTS_PER_CONTROL: f64 = 2.0;
+/// Rounds of a search that starts from an exact optimum.
+const WARM_ROUNDS: usize = 2;
 /// Waves of the least curved line that are shorter than this (m) are left out where fast lines are measured from it.
 const BASE_M: f64 = 40.0;
 /// Waves (m) left out of a fast line, one after the other, to see whether a fine spline through it is faster without.
@@ -223,9 +225,12 @@ fn search_objective(
     start: Option<&[f64]>,
     mut observe: impl FnMut(&LineProgress) -> ControlFlow<()>,
 ) -> Result<FoundLine> {
+    let cold = LineSearchSettings::default();
     let plain = LineSearchSettings {
         seed: settings.seed,
-        ..LineSearchSettings::default()
+        // A search from an optimum has little left to find.
+        rounds: if start.is_some() { WARM_ROUNDS } else { cold.rounds },
+        ..cold
     };
     let search = LineSearch {
         cuts: &setup.cuts,
