@@ -145,6 +145,11 @@ fn a_study_of_the_bundled_circuit_holds_together() {
         assert!(json["best"]["lap_time"][key].is_number(), "best {key}");
         assert!(json["exact"]["length"][key].is_number(), "exact {key}");
     }
+    // Distances to the exact line are of lap times on the fine spline, where no line gains by zigzag.
+    let fine = |lines: &str| json[lines]["lap_time"]["lap_time_fine_s"].as_f64().unwrap();
+    let gap = json["above_exact_percent"]["lap_time"].as_f64().unwrap();
+    assert!((gap - 100.0 * (fine("best") / fine("exact") - 1.0)).abs() < 1e-9);
+    assert_eq!(json["exact_status"]["length"], "Solved");
     let again = RacelineSettings::read(&folder.path().join("study.toml")).unwrap();
     assert_eq!(again, settings);
 }

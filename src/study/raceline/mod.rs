@@ -30,7 +30,8 @@ use std::time::Instant;
 pub struct ObjectiveOutcome {
     /// The objective.
     pub objective: LineObjective,
-    /// The best line of the swarm, the local search included if it was asked for.
+    /// The best of the swarm's line, what the local search made of it and, with a warm start, the exact line that the
+    /// swarm started from.
     pub best: ReportedLine,
     /// What the swarm alone reached through the cuts, in the objective's unit.
     pub swarm_cost: f64,

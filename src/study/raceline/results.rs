@@ -89,6 +89,8 @@ pub struct Summary {
     pub swarm: BTreeMap<&'static str, f64>,
     /// The exact solvers' lines; `null` where there is no solver.
     pub exact: BTreeMap<&'static str, Option<LineFigures>>,
+    /// How the exact solver ended, in its own words; `null` where there is no solver.
+    pub exact_status: BTreeMap<&'static str, Option<String>>,
     /// How much more the best line costs than the exact one, of each objective (%); lap times on the fine spline.
     pub above_exact_percent: BTreeMap<&'static str, Option<f64>>,
     /// The reference line.
@@ -133,13 +135,13 @@ pub fn summarise(settings: &RacelineSettings, setup: &Setup, outcome: &Outcome) 
         exact: each()
             .map(|(name, o)| (name, o.exact.as_ref().map(LineFigures::of)))
             .collect(),
+        exact_status: each()
+            .map(|(name, o)| (name, o.exact_status.as_ref().map(|(status, _)| status.clone())))
+            .collect(),
         above_exact_percent: each()
             .map(|(name, o)| {
-                let exact = o.exact.as_ref().map(|line| line.objective(o.objective));
-                (
-                    name,
-                    exact.map(|e| 100.0 * (o.best.objective(o.objective) / e - 1.0)),
-                )
+                let exact = o.exact.as_ref().map(|line| line.worth(o.objective));
+                (name, exact.map(|e| 100.0 * (o.best.worth(o.objective) / e - 1.0)))
             })
             .collect(),
         reference: LineFigures::of(&outcome.reference),
