@@ -3,12 +3,13 @@
 
 mod common;
 
-use common::{Lap, UNKNOWNS, bundled_car, linear_car, problem};
+use common::{UNKNOWNS, bundled_car, linear_car, problem};
 use lapswarm::evaluate::gpu::lint;
 use lapswarm::evaluate::gpu::shader::{LineShape, ReplayShape, car_fragments, tyre_struct};
 use lapswarm::evaluate::line::{DeviceSection, LineStretch};
 use lapswarm::evaluate::replay::{DeviceSample, DeviceWindow, ModelTable, Norm, Stretch};
 use lapswarm::line::kernel::Wanted;
+use lapswarm::parity::made_up::Lap;
 use lapswarm::vehicle::{Chassis, TyreModel};
 use naga::back::{hlsl, msl, spv};
 use naga::valid::{Capabilities, ValidationFlags, Validator};

@@ -4,6 +4,7 @@ mod bench;
 mod devices;
 mod envelope;
 mod identify;
+mod parity;
 mod progress;
 mod raceline;
 mod simulate;
@@ -43,6 +44,8 @@ enum Command {
     Envelope(envelope::Arguments),
     /// List the GPUs that evaluations can run on, with their limits.
     Devices(devices::Arguments),
+    /// Hold every kernel on this machine against the f64 reference.
+    Parity(parity::Arguments),
     /// Measure evaluations per second against population on every backend present, or compare optimisers.
     Bench(bench::Arguments),
 }
@@ -99,6 +102,7 @@ pub fn run() -> ExitCode {
         Command::Raceline(arguments) => raceline::run(&arguments),
         Command::Envelope(arguments) => envelope::run(&arguments),
         Command::Devices(arguments) => devices::run(&arguments),
+        Command::Parity(arguments) => parity::run(&arguments),
         Command::Bench(arguments) => bench::run(&arguments),
     };
     match outcome {
