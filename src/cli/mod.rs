@@ -10,6 +10,7 @@ mod raceline;
 mod replay_flags;
 mod sensitivity;
 mod simulate;
+mod surface;
 
 use clap::{Args, Parser, Subcommand};
 use lapswarm::evaluate::replay::BackendChoice;
@@ -46,6 +47,8 @@ enum Command {
     Envelope(envelope::Arguments),
     /// Find how much each parameter of a car matters to each channel of a lap.
     Sensitivity(Box<sensitivity::Arguments>),
+    /// Draw the costs of a lap over two parameters of a car.
+    Surface(Box<surface::Arguments>),
     /// List the GPUs that evaluations can run on, with their limits.
     Devices(devices::Arguments),
     /// Hold every kernel on this machine against the f64 reference.
@@ -121,6 +124,7 @@ pub fn run() -> ExitCode {
         Command::Raceline(arguments) => raceline::run(&arguments),
         Command::Envelope(arguments) => envelope::run(&arguments),
         Command::Sensitivity(arguments) => sensitivity::run(&arguments),
+        Command::Surface(arguments) => surface::run(&arguments),
         Command::Devices(arguments) => devices::run(&arguments),
         Command::Parity(arguments) => parity::run(&arguments),
         Command::Bench(arguments) => bench::run(&arguments),

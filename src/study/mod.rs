@@ -5,3 +5,4 @@ pub mod identify;
 pub mod raceline;
 pub mod run_folder;
 pub mod sensitivity;
+pub mod surface;
