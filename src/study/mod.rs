@@ -3,6 +3,8 @@
 pub mod envelope;
 pub mod identify;
 pub mod raceline;
+pub mod run;
 pub mod run_folder;
 pub mod sensitivity;
 pub mod surface;
+pub mod transient;
