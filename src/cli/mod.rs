@@ -1,9 +1,11 @@
 //! Subcommands, their flags and their exit codes.
 
 mod bench;
+mod check;
 mod devices;
 mod envelope;
 mod identify;
+mod init;
 mod parity;
 mod progress;
 mod raceline;
@@ -14,7 +16,7 @@ mod simulate;
 mod surface;
 mod transient;
 
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, CommandFactory, Parser, Subcommand};
 use lapswarm::evaluate::replay::BackendChoice;
 use lapswarm::study::identify::{FreeParameter, IdentifySettings, load_circuit, parse_backend};
 use lapswarm::track::Circuit;
@@ -55,6 +57,15 @@ enum Command {
     Surface(Box<surface::Arguments>),
     /// Drive a racing line with the 4DOF car and a driver, and set its lap beside the point mass's.
     Transient(transient::Arguments),
+    /// Write a commented study, car or track file to start from.
+    Init(init::Arguments),
+    /// Read files as the studies do, and say what is in them or what is wrong.
+    Check(check::Arguments),
+    /// Print a shell's completions.
+    Completions {
+        /// The shell
+        shell: clap_complete::Shell,
+    },
     /// List the GPUs that evaluations can run on, with their limits.
     Devices(devices::Arguments),
     /// Hold every kernel on this machine against the f64 reference.
@@ -133,6 +144,12 @@ pub fn run() -> ExitCode {
         Command::Sensitivity(arguments) => sensitivity::run(&arguments),
         Command::Surface(arguments) => surface::run(&arguments),
         Command::Transient(arguments) => transient::run(&arguments),
+        Command::Init(arguments) => init::run(&arguments),
+        Command::Check(arguments) => check::run(&arguments),
+        Command::Completions { shell } => {
+            clap_complete::generate(shell, &mut Cli::command(), "lapswarm", &mut std::io::stdout());
+            Ok(())
+        }
         Command::Devices(arguments) => devices::run(&arguments),
         Command::Parity(arguments) => parity::run(&arguments),
         Command::Bench(arguments) => bench::run(&arguments),

@@ -61,14 +61,16 @@ const ALIASES: [(&str, &str); 2] = [
     ("C", "roll_damping_nms_per_rad"),
 ];
 
-const BUNDLED_CAR: &str = include_str!("../../data/cars/gt.toml");
-const BUNDLED_TYRE: &str = include_str!("../../data/cars/gt_slick.tir");
-
 impl Car {
+    /// The bundled GT car's file.
+    pub const BUNDLED_TOML: &str = include_str!("../../data/cars/gt.toml");
+    /// The tyre file that it names.
+    pub const BUNDLED_TYRE: &str = include_str!("../../data/cars/gt_slick.tir");
+
     /// The bundled GT car (`physics.md` section 8).
     pub fn bundled() -> Result<Self> {
-        Self::parse(Path::new("the bundled car gt.toml"), BUNDLED_CAR, |name| {
-            TyreFile::parse(Path::new(name), BUNDLED_TYRE)
+        Self::parse(Path::new("the bundled car gt.toml"), Self::BUNDLED_TOML, |name| {
+            TyreFile::parse(Path::new(name), Self::BUNDLED_TYRE)
         })
     }
 
