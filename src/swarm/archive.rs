@@ -1,7 +1,9 @@
 //! The archive of solutions that nothing found so far dominates.
 
-use super::metrics::exclusive;
+use super::Front;
+use super::metrics::{exclusive, non_dominated};
 use super::settings::Truncation;
+use super::space::Space;
 
 /// A bounded set of non-dominated solutions; all objectives are minimised.
 #[derive(Clone, Debug)]
@@ -80,25 +82,73 @@ impl Archive {
             self.refresh(objectives);
         }
         if self.len() > self.capacity {
-            let mut worth = self.worth();
-            // The ends of a front are what its users look for first.
-            for k in 0..objectives.len() {
-                let value = |i: usize| self.objectives[i][k];
-                if let Some(end) = (0..self.len()).min_by(|&a, &b| value(a).total_cmp(&value(b))) {
-                    worth[end] = f64::INFINITY;
-                }
-            }
-            let least = (0..self.len())
-                .min_by(|&a, &b| worth[a].total_cmp(&worth[b]))
-                .unwrap_or(0);
-            let left = self.objectives[least].clone();
-            self.drop_member(least);
-            if self.by_contribution() {
-                self.refresh(&left);
-            }
-            return left != objectives;
+            return self.drop_least() != objectives;
         }
         true
+    }
+
+    /// Takes in solutions with their objectives all at once: what no other of them and no member dominates or equals
+    /// comes in, and then those leave, one at a time, that would be missed least.
+    pub(super) fn insert_all(&mut self, solutions: Vec<(Vec<f64>, Vec<f64>)>) {
+        if solutions.is_empty() {
+            return;
+        }
+        let positions = std::mem::take(&mut self.positions).into_iter();
+        let members = positions.zip(std::mem::take(&mut self.objectives));
+        let all: Vec<(Vec<f64>, Vec<f64>)> = members.chain(solutions).collect();
+        let rows: Vec<Vec<f64>> = all.iter().map(|(_, row)| row.clone()).collect();
+        let mut stays = vec![false; all.len()];
+        for i in non_dominated(&rows) {
+            stays[i] = true;
+        }
+        let kept = all.into_iter().zip(stays).filter(|(_, stays)| *stays);
+        (self.positions, self.objectives) = kept.map(|(solution, _)| solution).unzip();
+        self.shares.clear();
+        if self.by_contribution() {
+            self.shares = vec![(0.0, [f64::INFINITY; 3]); self.len()];
+            // No point lies at it, so that all shares are worked out.
+            self.reference.clear();
+            let first = self.objectives[0].clone();
+            self.refresh(&first);
+        }
+        while self.len() > self.capacity {
+            self.drop_least();
+        }
+    }
+
+    /// Lets the member go that would be missed least and is not the best in any objective; its objectives.
+    fn drop_least(&mut self) -> Vec<f64> {
+        let mut worth = self.worth();
+        // The ends of a front are what its users look for first.
+        for k in 0..self.objectives[0].len() {
+            let value = |i: usize| self.objectives[i][k];
+            if let Some(end) = (0..self.len()).min_by(|&a, &b| value(a).total_cmp(&value(b))) {
+                worth[end] = f64::INFINITY;
+            }
+        }
+        let least = (0..self.len())
+            .min_by(|&a, &b| worth[a].total_cmp(&worth[b]))
+            .unwrap_or(0);
+        let left = self.objectives[least].clone();
+        self.drop_member(least);
+        if self.by_contribution() {
+            self.refresh(&left);
+        }
+        left
+    }
+
+    /// The least value of an objective; infinite without members.
+    pub fn least(&self, objective: usize) -> f64 {
+        let values = self.objectives.iter().map(|m| m[objective]);
+        values.fold(f64::INFINITY, f64::min)
+    }
+
+    /// The members, their positions scaled to the variables' units.
+    pub(super) fn front(&self, space: &Space) -> Front {
+        Front {
+            candidates: self.positions.iter().map(|p| space.scaled(p, 1)).collect(),
+            objectives: self.objectives.clone(),
+        }
     }
 
     /// How much the archive would miss each member, by the measure that it is truncated by.

@@ -49,7 +49,7 @@ pub use cooperative::{CooperativeSettings, CooperativeSwarm};
 pub use covariance::{Beyond, CovarianceSettings, CovarianceSwarm, Restarts};
 pub use difference::{DifferenceSettings, DifferenceSwarm};
 pub use hybrid::{HybridSettings, HybridSwarm};
-pub use mopso::Mopso;
+pub use mopso::{MANY, Mopso};
 pub use nsga2::{Nsga2, Nsga2Settings};
 pub use pso::Pso;
 pub use settings::{
@@ -143,12 +143,12 @@ pub fn run(
             .chunks_exact(width)
             .zip(&evaluation.failures);
         let mut costs: Vec<f64> = rows.filter(|(_, f)| f.is_none()).map(|(row, _)| row[0]).collect();
-        costs.sort_by(f64::total_cmp);
+        let middle = costs.len() / 2;
         let progress = Progress {
             iteration: optimiser.iteration(),
             evaluations: optimiser.evaluations(),
             best: optimiser.best(),
-            median: costs.get(costs.len() / 2).copied(),
+            median: (!costs.is_empty()).then(|| *costs.select_nth_unstable_by(middle, f64::total_cmp).1),
             failed: evaluation.failures.iter().filter(|f| f.is_some()).count(),
         };
         if observe(&progress).is_break() {

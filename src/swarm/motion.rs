@@ -139,7 +139,7 @@ impl Particles {
 
 /// The coefficient of constriction of pulls that add up to `phi`, with its sign: one up to four, negative beyond
 /// (\[3\], equation 4 of \[6\]).
-fn constriction(phi: f64) -> f64 {
+pub(super) fn constriction(phi: f64) -> f64 {
     if phi > 4.0 {
         2.0 / (2.0 - phi - (phi * phi - 4.0 * phi).sqrt())
     } else {

@@ -61,6 +61,31 @@ impl Space {
         self.free.len()
     }
 
+    /// Variables, fixed ones and all.
+    pub fn variables(&self) -> usize {
+        self.variables.len()
+    }
+
+    /// Writes the candidates of a block of `lanes` positions, whose coordinates lie in rows; as many as `candidates`
+    /// has room for.
+    pub fn scale_block(&self, positions: &[f32], lanes: usize, candidates: &mut [f64]) {
+        let width = self.variables.len();
+        for (k, v) in self.variables.iter().enumerate() {
+            if v.lower == v.upper {
+                for candidate in candidates.chunks_exact_mut(width) {
+                    candidate[k] = v.lower;
+                }
+            }
+        }
+        for (row, &k) in positions.chunks_exact(lanes).zip(&self.free) {
+            let v = &self.variables[k];
+            let range = v.upper - v.lower;
+            for (candidate, x) in candidates.chunks_exact_mut(width).zip(row) {
+                candidate[k] = (v.lower + f64::from(*x) * range).min(v.upper);
+            }
+        }
+    }
+
     /// `count` positions, row-major, as candidates in the variables' units.
     pub fn scaled(&self, positions: &[f64], count: usize) -> Vec<f64> {
         let d = self.dimensions();

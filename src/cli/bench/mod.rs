@@ -1,6 +1,7 @@
 //! `lapswarm bench`: evaluations per second against population, and how good the optimisers are.
 
 mod optimisers;
+mod swarm;
 
 use super::{backend_flag, print_json};
 use lapswarm::Result;
@@ -42,6 +43,8 @@ pub struct Arguments {
 enum What {
     /// Compare the optimisers on problems whose answers are known.
     Optimisers(optimisers::Arguments),
+    /// Measure what the optimiser itself costs, from a thousand particles to a million.
+    Swarm(swarm::Arguments),
 }
 
 #[derive(Serialize)]
@@ -71,8 +74,10 @@ const MOST_FOR_CPU: usize = 64;
 
 /// Measures and prints.
 pub fn run(arguments: &Arguments) -> Result<()> {
-    if let Some(What::Optimisers(arguments)) = &arguments.what {
-        return optimisers::run(arguments);
+    match &arguments.what {
+        Some(What::Optimisers(arguments)) => return optimisers::run(arguments),
+        Some(What::Swarm(arguments)) => return swarm::run(arguments),
+        None => {}
     }
     let setup = set_up(&IdentifySettings::default())?;
     let replay = &setup.replay;

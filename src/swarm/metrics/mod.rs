@@ -28,3 +28,4 @@ pub use hypervolume::hypervolume;
 pub use indicators::{Scale, epsilon, igd_plus, spread};
 pub use non_dominated::non_dominated;
 pub use significance::signed_rank;
+pub(super) use staircase::Staircase;

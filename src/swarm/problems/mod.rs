@@ -51,6 +51,25 @@ impl TestProblem {
             .or_else(|| single::by_name(name, 30))
     }
 
+    /// The problem of that name in so many variables, two or three at least. Where the front or the optimum lies does
+    /// not depend on it.
+    pub fn sized(name: &str, dimensions: usize) -> Option<Self> {
+        let mut problem = Self::by_name(name)?;
+        if problem.problem.objectives.len() == 1 {
+            return Self::single(name, dimensions);
+        }
+        let least = problem.problem.objectives.len();
+        let last = problem.problem.variables.last()?.clone();
+        let named = |i: usize| Variable {
+            name: format!("x{}", i + 1),
+            ..last.clone()
+        };
+        let count = problem.problem.variables.len();
+        problem.problem.variables.truncate(dimensions.max(least));
+        problem.problem.variables.extend((count..dimensions).map(named));
+        Some(problem)
+    }
+
     /// The single-objective problem of that name in `dimensions` variables.
     pub fn single(name: &str, dimensions: usize) -> Option<Self> {
         single::by_name(name, dimensions)
@@ -122,9 +141,18 @@ impl TestProblem {
 
     /// An evaluator on one thread.
     pub fn evaluator(&self) -> PointEvaluator<impl Fn(&[f64], &mut [f64]) + Sync> {
+        self.evaluator_on(CallCost::Cheap)
+    }
+
+    /// An evaluator on all threads, for populations that are worth it.
+    pub fn threaded_evaluator(&self) -> PointEvaluator<impl Fn(&[f64], &mut [f64]) + Sync> {
+        self.evaluator_on(CallCost::Dear)
+    }
+
+    fn evaluator_on(&self, cost: CallCost) -> PointEvaluator<impl Fn(&[f64], &mut [f64]) + Sync> {
         let problem = self.clone();
         let function = move |x: &[f64], f: &mut [f64]| problem.evaluate(x, f);
-        PointEvaluator::new(self.problem.clone(), CallCost::Cheap, function)
+        PointEvaluator::new(self.problem.clone(), cost, function)
     }
 }
 
