@@ -1,7 +1,7 @@
 //! The archive of solutions that nothing found so far dominates.
 
 use super::Front;
-use super::metrics::{exclusive, non_dominated};
+use super::metrics::{Columns, non_dominated};
 use super::settings::Truncation;
 use super::space::Space;
 
@@ -17,6 +17,8 @@ pub struct Archive {
     /// What each member alone dominates and the far corner of the box that this lies in; kept only for
     /// truncation by it.
     shares: Vec<(f64, [f64; 3])>,
+    /// The objectives once more, for the shares.
+    columns: Columns,
     /// The reference point of the shares.
     reference: Vec<f64>,
 }
@@ -45,6 +47,7 @@ impl Archive {
             positions: Vec::new(),
             objectives: Vec::new(),
             shares: Vec::new(),
+            columns: Columns::default(),
             reference: Vec::new(),
         }
     }
@@ -79,6 +82,7 @@ impl Archive {
         self.positions.push(position.to_vec());
         if self.by_contribution() {
             self.shares.push((0.0, [f64::INFINITY; 3]));
+            self.columns.push(objectives);
             self.refresh(objectives);
         }
         if self.len() > self.capacity {
@@ -104,8 +108,10 @@ impl Archive {
         let kept = all.into_iter().zip(stays).filter(|(_, stays)| *stays);
         (self.positions, self.objectives) = kept.map(|(solution, _)| solution).unzip();
         self.shares.clear();
+        self.columns.clear();
         if self.by_contribution() {
             self.shares = vec![(0.0, [f64::INFINITY; 3]); self.len()];
+            self.objectives.iter().for_each(|row| self.columns.push(row));
             // No point lies at it, so that all shares are worked out.
             self.reference.clear();
             let first = self.objectives[0].clone();
@@ -172,6 +178,7 @@ impl Archive {
         self.positions.swap_remove(i);
         if !self.shares.is_empty() {
             self.shares.swap_remove(i);
+            self.columns.swap_remove(i);
         }
     }
 
@@ -193,7 +200,7 @@ impl Archive {
                     .zip(&self.shares[i].1)
                     .all(|(x, corner)| x <= corner)
             {
-                self.shares[i] = exclusive(&self.objectives, i, &self.reference);
+                self.shares[i] = self.columns.exclusive(i, &self.reference);
             }
         }
     }

@@ -22,8 +22,8 @@ mod non_dominated;
 mod significance;
 mod staircase;
 
+pub(super) use contribution::Columns;
 pub use contribution::contributions;
-pub(super) use contribution::exclusive;
 pub use hypervolume::hypervolume;
 pub use indicators::{Scale, epsilon, igd_plus, spread};
 pub use non_dominated::non_dominated;
