@@ -8,6 +8,7 @@
 //! | one | [`DifferenceSwarm`] | differential evolution that adapts itself |
 //! | one | [`CooperativeSwarm`] | CPSO-S_K: a swarm to each group of variables |
 //! | more | [`Mopso`] | particle swarm with an archive: the default, SMPSO and the thesis's are settings of it |
+//! | more | [`device::DeviceMopso`] | the same on a device, where its problem is there too |
 //! | more | [`Nsga2`] | the genetic algorithm that swarms are compared with |
 //!
 //! [`comparison`] runs them on [`problems`] whose answers are known and judges them by [`metrics`].
@@ -32,6 +33,7 @@ mod archive;
 pub mod comparison;
 mod cooperative;
 mod covariance;
+pub mod device;
 mod difference;
 mod hybrid;
 pub mod metrics;
@@ -49,7 +51,7 @@ pub use cooperative::{CooperativeSettings, CooperativeSwarm};
 pub use covariance::{Beyond, CovarianceSettings, CovarianceSwarm, Restarts};
 pub use difference::{DifferenceSettings, DifferenceSwarm};
 pub use hybrid::{HybridSettings, HybridSwarm};
-pub use mopso::{MANY, Mopso};
+pub use mopso::{Generation, MANY, Mopso};
 pub use nsga2::{Nsga2, Nsga2Settings};
 pub use pso::Pso;
 pub use settings::{

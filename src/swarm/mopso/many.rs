@@ -258,7 +258,7 @@ impl Many {
         let d = self.space.dimensions();
         let generation = self.generation();
         let random = self.random;
-        let leaders = self.leaders();
+        let leaders = leaders(&self.archive);
         self.position
             .par_chunks_mut(PART * d)
             .zip(self.velocity.par_chunks_mut(PART * d))
@@ -277,15 +277,20 @@ impl Many {
                 dispatch(InstructionSet::best(), step);
             });
     }
+}
 
-    /// The archive's positions, the one that it would miss most first.
-    fn leaders(&self) -> Vec<f32> {
-        let worth = self.archive.worth();
-        let mut order: Vec<usize> = (0..worth.len()).collect();
-        order.sort_by(|&a, &b| worth[b].total_cmp(&worth[a]));
-        let coordinate = |i: usize| self.archive.positions[i].iter().map(|x| *x as f32);
-        order.into_iter().flat_map(coordinate).collect()
-    }
+/// The archive's positions, the one that it would miss most first.
+pub fn leaders(archive: &Archive) -> Vec<f32> {
+    let worth = archive.worth();
+    let mut order: Vec<usize> = (0..worth.len()).collect();
+    order.sort_by(|&a, &b| worth[b].total_cmp(&worth[a]));
+    let coordinate = |i: usize| archive.positions[i].iter().map(|x| *x as f32);
+    order.into_iter().flat_map(coordinate).collect()
+}
+
+/// The front of a part of a swarm by itself.
+pub fn learn_from(rows: &[f64], width: usize) -> Vec<Point> {
+    part(rows, width, 0, |_| true, &[])
 }
 
 impl Optimiser for Many {

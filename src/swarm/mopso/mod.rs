@@ -1,10 +1,10 @@
 //! Multi-objective particle swarm with an archive of leaders.
 
 mod few;
-mod filter;
-mod flock;
+pub(super) mod filter;
+pub(super) mod flock;
 mod many;
-mod sieve;
+pub(super) mod sieve;
 
 use super::archive::Archive;
 use super::settings::MopsoSettings;
@@ -12,7 +12,9 @@ use super::{Front, Optimiser};
 use crate::error::Result;
 use crate::evaluate::{Evaluation, Problem};
 use few::Few;
+pub use flock::Generation;
 use many::Many;
+pub(super) use many::{leaders, learn_from};
 
 /// From this many particles on, a swarm of two or three objectives is kept in single precision and moved in lanes and
 /// threads.

@@ -8,19 +8,25 @@
 //! 3. Suganthan et al., *Problem definitions and evaluation criteria for the CEC 2005 special session on
 //!    real-parameter optimization* (the single-objective functions and that their optima are shifted).
 
+mod device;
 mod dtlz;
+mod lanes;
 mod single;
 mod zdt;
 
+pub use device::GpuTestEvaluator;
+pub use lanes::SimdTestEvaluator;
+
 use crate::evaluate::point::{CallCost, PointEvaluator};
 use crate::evaluate::{Objective, Problem, Variable};
+use crate::scalar::Real;
 
 /// A problem with a known answer, with variables and objectives without units.
 #[derive(Clone, Debug)]
 pub struct TestProblem {
     name: &'static str,
     problem: Problem,
-    function: fn(&[f64], &mut [f64]),
+    function: Function,
     /// Taken off a candidate before it is evaluated: where the optimum lies, or nothing.
     shift: Vec<f64>,
     front: fn(usize) -> Vec<Vec<f64>>,
@@ -41,6 +47,54 @@ pub const NAMES: [&str; 12] = [
     "ackley",
     "griewank",
 ];
+
+/// The functions, in the order of [`NAMES`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Function {
+    Zdt1,
+    Zdt2,
+    Zdt3,
+    Zdt4,
+    Zdt6,
+    Dtlz1,
+    Dtlz2,
+    Sphere,
+    Rosenbrock,
+    Rastrigin,
+    Ackley,
+    Griewank,
+}
+
+impl Function {
+    /// Writes the objectives of one candidate, or of one in each lane.
+    #[inline(always)]
+    fn evaluate<R: Real>(self, x: &[R], f: &mut [R]) {
+        match self {
+            Self::Zdt1 => zdt::zdt1(x, f),
+            Self::Zdt2 => zdt::zdt2(x, f),
+            Self::Zdt3 => zdt::zdt3(x, f),
+            Self::Zdt4 => zdt::zdt4(x, f),
+            Self::Zdt6 => zdt::zdt6(x, f),
+            Self::Dtlz1 => dtlz::dtlz1(x, f),
+            Self::Dtlz2 => dtlz::dtlz2(x, f),
+            Self::Sphere => single::sphere(x, f),
+            Self::Rosenbrock => single::rosenbrock(x, f),
+            Self::Rastrigin => single::rastrigin(x, f),
+            Self::Ackley => single::ackley(x, f),
+            Self::Griewank => single::griewank(x, f),
+        }
+    }
+}
+
+/// The sum over a row, from the first to the last.
+#[inline(always)]
+fn sum<R: Real>(x: &[R], term: impl Fn(R) -> R) -> R {
+    let mut sum = R::lit(0.0);
+    for x in x {
+        sum = sum + term(*x);
+    }
+    sum
+}
 
 impl TestProblem {
     /// The problem of that name, one of [`NAMES`], in the size of the references: 30 variables (10 for ZDT4 and
@@ -79,7 +133,7 @@ impl TestProblem {
         name: &'static str,
         bounds: impl Iterator<Item = (f64, f64)>,
         objectives: usize,
-        function: fn(&[f64], &mut [f64]),
+        function: Function,
         front: fn(usize) -> Vec<Vec<f64>>,
     ) -> Self {
         let variables = bounds
@@ -133,10 +187,10 @@ impl TestProblem {
     /// Writes the objectives of `candidate`.
     pub fn evaluate(&self, candidate: &[f64], objectives: &mut [f64]) {
         if self.shift.is_empty() {
-            return (self.function)(candidate, objectives);
+            return self.function.evaluate(candidate, objectives);
         }
         let moved: Vec<f64> = candidate.iter().zip(&self.shift).map(|(x, s)| x - s).collect();
-        (self.function)(&moved, objectives);
+        self.function.evaluate(&moved, objectives);
     }
 
     /// An evaluator on one thread.
