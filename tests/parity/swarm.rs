@@ -139,7 +139,17 @@ fn test_problems_are_the_same_everywhere() {
             .unwrap();
         assert_eq!(on_device.failures, lanes.failures);
         if rounds_like_the_processor(context) {
-            assert_eq!(on_device.objectives, lanes.objectives, "{name}");
+            // Llvmpipe regroups Ackley's sum of three terms of up to 23, whose two roundings are each half a spacing of
+            // 32: 2e-6.
+            let most = if name == "ackley" { 4e-6 } else { 0.0 };
+            let off = |i: &usize| (on_device.objectives[*i] - lanes.objectives[*i]).abs() > most;
+            let part = (0..lanes.objectives.len()).find(off);
+            if let Some(i) = part {
+                panic!(
+                    "{name}, figure {i}: {} is not {}",
+                    on_device.objectives[i], lanes.objectives[i]
+                );
+            }
         } else {
             close(&on_device.objectives, "device", 4e-5);
         }

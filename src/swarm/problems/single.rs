@@ -34,19 +34,19 @@ pub(super) fn sphere<R: Real>(x: &[R], f: &mut [R]) {
 /// With its optimum moved from one to nought.
 #[inline(always)]
 pub(super) fn rosenbrock<R: Real>(x: &[R], f: &mut [R]) {
-    let one = R::lit(1.0);
-    f[0] = R::lit(0.0);
+    let (mut bends, mut squares) = (R::lit(0.0), R::lit(0.0));
     for pair in x.windows(2) {
-        let (a, b) = (pair[0] + one, pair[1] + one);
-        let (bend, rest) = (b - a * a, one - a);
-        f[0] = f[0] + (R::lit(100.0) * (bend * bend) + rest * rest);
+        let bend = pair[1] - (pair[0] * pair[0] + (pair[0] + pair[0]));
+        bends = bends + bend * bend;
+        squares = squares + pair[0] * pair[0];
     }
+    f[0] = R::lit(100.0) * bends + squares;
 }
 
 #[inline(always)]
 pub(super) fn rastrigin<R: Real>(x: &[R], f: &mut [R]) {
-    let ten = R::lit(10.0);
-    f[0] = sum(x, |x| x * x + ten - ten * (R::lit(2.0) * x).cos_pi());
+    let cosines = sum(x, |x| (R::lit(2.0) * x).cos_pi());
+    f[0] = sum(x, |x| x * x) + R::lit(10.0) * (R::lit(x.len() as f64) - cosines);
 }
 
 #[inline(always)]
@@ -54,7 +54,7 @@ pub(super) fn ackley<R: Real>(x: &[R], f: &mut [R]) {
     let n = R::lit(x.len() as f64);
     let root = (sum(x, |x| x * x) / n).sqrt();
     let waves = sum(x, |x| (R::lit(2.0) * x).cos_pi()) / n;
-    f[0] = R::lit(-20.0) * (R::lit(-0.2) * root).exp() - waves.exp() + R::lit(20.0) + R::lit(E);
+    f[0] = R::lit(-20.0) * (R::lit(-0.2) * root).exp() - waves.exp() + R::lit(20.0 + E);
 }
 
 #[inline(always)]

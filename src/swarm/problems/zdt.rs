@@ -90,8 +90,10 @@ pub(super) fn zdt3<R: Real>(x: &[R], f: &mut [R]) {
 
 #[inline(always)]
 pub(super) fn zdt4<R: Real>(x: &[R], f: &mut [R]) {
-    let waves = sum(&x[1..], |x| x * x - R::lit(10.0) * (R::lit(4.0) * x).cos_pi());
-    let g = R::lit(1.0) + R::lit(10.0) * R::lit((x.len() - 1) as f64) + waves;
+    let squares = sum(&x[1..], |x| x * x);
+    let cosines = sum(&x[1..], |x| (R::lit(4.0) * x).cos_pi());
+    let count = R::lit((x.len() - 1) as f64);
+    let g = R::lit(1.0) + (squares + R::lit(10.0) * (count - cosines));
     f[0] = x[0];
     f[1] = g * (R::lit(1.0) - (x[0] / g).sqrt());
 }
