@@ -14,10 +14,11 @@ pub use backend::BackendChoice;
 
 use crate::error::Result;
 use crate::vehicle::tyre::IllFormed;
+use serde::{Deserialize, Serialize};
 use std::fmt;
 
 /// A bounded decision variable.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Variable {
     /// Its name.
     pub name: String,
@@ -42,7 +43,7 @@ impl Variable {
 }
 
 /// An objective, to be minimised.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Objective {
     /// Its name.
     pub name: String,
@@ -61,7 +62,7 @@ impl Objective {
 }
 
 /// What is to be optimised.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Problem {
     /// Decision variables, in the order of a candidate's row.
     pub variables: Vec<Variable>,
@@ -109,6 +110,14 @@ pub struct Evaluation {
 }
 
 impl Evaluation {
+    /// The part of some of the candidates, of `width` objectives.
+    pub fn part(&self, candidates: std::ops::Range<usize>, width: usize) -> Self {
+        Self {
+            objectives: self.objectives[candidates.start * width..candidates.end * width].to_vec(),
+            failures: self.failures[candidates].to_vec(),
+        }
+    }
+
     /// Joins rows of objectives and failures.
     pub(crate) fn of_rows(rows: Vec<(Vec<f64>, Option<Failure>)>) -> Self {
         let mut evaluation = Self::default();

@@ -4,9 +4,10 @@ use super::Front;
 use super::metrics::{Columns, non_dominated};
 use super::settings::Truncation;
 use super::space::Space;
+use serde::{Deserialize, Serialize};
 
 /// A bounded set of non-dominated solutions; all objectives are minimised.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Archive {
     capacity: usize,
     truncation: Truncation,

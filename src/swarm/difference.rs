@@ -8,13 +8,14 @@
 
 use super::motion::{Particles, Purpose};
 use super::settings::setting;
-use super::{Front, Optimiser};
+use super::{Front, Optimiser, Welcome};
 use crate::error::Result;
 use crate::evaluate::{Evaluation, FAILED_COST, Problem};
 use crate::random::Random;
+use serde::{Deserialize, Serialize};
 
 /// Settings of [`DifferenceSwarm`].
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DifferenceSettings {
     /// Particles.
     pub population: usize,
@@ -57,7 +58,7 @@ impl DifferenceSettings {
 }
 
 /// A swarm of self-adapted difference moves; minimises the first objective.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct DifferenceSwarm {
     settings: DifferenceSettings,
     random: Random,
@@ -176,6 +177,20 @@ impl DifferenceSwarm {
             taken[k + 1] = other;
         }
         [taken[1], taken[2], taken[3]]
+    }
+}
+
+impl Welcome for DifferenceSwarm {
+    /// Each takes the home of the worst particle, if it is better.
+    fn welcome(&mut self, migrants: &Front) {
+        for (candidate, row) in migrants.candidates.iter().zip(&migrants.objectives) {
+            let worst = (0..self.cost.len()).max_by(|&a, &b| self.cost[a].total_cmp(&self.cost[b]));
+            if let Some(worst) = worst.filter(|&p| row[0] < self.cost[p]) {
+                let place = self.particles.row(worst);
+                self.home[place].copy_from_slice(&self.particles.space.position(candidate));
+                self.cost[worst] = row[0];
+            }
+        }
     }
 }
 

@@ -11,7 +11,8 @@
 //! | more | [`device::DeviceMopso`] | the same on a device, where its problem is there too |
 //! | more | [`Nsga2`] | the genetic algorithm that swarms are compared with |
 //!
-//! [`comparison`] runs them on [`problems`] whose answers are known and judges them by [`metrics`].
+//! [`Islands`] are several swarms in one population, with or without migration. [`checkpoint`] keeps the state of any of
+//! them in a file. [`comparison`] runs them on [`problems`] whose answers are known and judges them by [`metrics`].
 //!
 //! Positions live in the unit cube and are scaled to the bounds when asked for, so a swarm does not notice where
 //! its bounds lie. Random numbers are functions of seed, iteration, particle and purpose ([`crate::random`]), so
@@ -30,12 +31,14 @@
 //! 9. Zitzler, Laumanns, Thiele, *SPEA2*, TIK report 103 (2001) (truncation by the nearest neighbours).
 
 mod archive;
+pub mod checkpoint;
 pub mod comparison;
 mod cooperative;
 mod covariance;
 pub mod device;
 mod difference;
 mod hybrid;
+mod islands;
 pub mod metrics;
 mod mopso;
 mod motion;
@@ -51,6 +54,7 @@ pub use cooperative::{CooperativeSettings, CooperativeSwarm};
 pub use covariance::{Beyond, CovarianceSettings, CovarianceSwarm, Restarts};
 pub use difference::{DifferenceSettings, DifferenceSwarm};
 pub use hybrid::{HybridSettings, HybridSwarm};
+pub use islands::{Islands, Migration, Welcome};
 pub use mopso::{Generation, MANY, Mopso};
 pub use nsga2::{Nsga2, Nsga2Settings};
 pub use pso::Pso;

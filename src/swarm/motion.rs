@@ -5,6 +5,7 @@ use super::space::Space;
 use crate::error::Result;
 use crate::evaluate::Problem;
 use crate::random::Random;
+use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
 /// What random draws are for, the counter's last word.
@@ -23,7 +24,7 @@ pub(super) enum Purpose {
 }
 
 /// Positions and velocities, row-major, in the unit cube.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct Particles {
     pub position: Vec<f64>,
     pub velocity: Vec<f64>,

@@ -11,9 +11,10 @@ use super::{Front, Optimiser};
 use crate::error::Result;
 use crate::evaluate::{Evaluation, FAILED_COST, Problem};
 use crate::random::Random;
+use serde::{Deserialize, Serialize};
 
 /// Settings of [`Nsga2`]; the defaults are those of the paper.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Nsga2Settings {
     /// Members of the population, an even number.
     pub population: usize,
@@ -76,7 +77,7 @@ impl Nsga2Settings {
 }
 
 /// One solution, with the number of the front that it is in and its crowding there.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 struct Member {
     position: Vec<f64>,
     objectives: Vec<f64>,
@@ -85,7 +86,7 @@ struct Member {
 }
 
 /// The population and the children it has been asked for.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Nsga2 {
     settings: Nsga2Settings,
     random: Random,

@@ -2,13 +2,14 @@
 
 use super::motion::{Particles, Purpose};
 use super::settings::PsoSettings;
-use super::{Front, Optimiser};
+use super::{Front, Optimiser, Welcome};
 use crate::error::Result;
 use crate::evaluate::{Evaluation, FAILED_COST, Problem};
 use crate::random::Random;
+use serde::{Deserialize, Serialize};
 
 /// A swarm with one leader (references 1, 2 and 7 of [`super`]).
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Pso {
     settings: PsoSettings,
     random: Random,
@@ -115,6 +116,25 @@ impl Pso {
             };
             self.particles.velocity[i] = target - self.particles.position[i];
             self.particles.position[i] = target;
+        }
+    }
+}
+
+impl Welcome for Pso {
+    /// Each becomes the best of the particle whose best is worst, if it is better.
+    fn welcome(&mut self, migrants: &Front) {
+        for (candidate, row) in migrants.candidates.iter().zip(&migrants.objectives) {
+            let worst =
+                (0..self.best_cost.len()).max_by(|&a, &b| self.best_cost[a].total_cmp(&self.best_cost[b]));
+            let Some(worst) = worst.filter(|&p| row[0] < self.best_cost[p]) else {
+                continue;
+            };
+            let place = self.particles.row(worst);
+            self.best_position[place].copy_from_slice(&self.particles.space.position(candidate));
+            self.best_cost[worst] = row[0];
+            if row[0] < self.best_cost[self.leader] {
+                self.leader = worst;
+            }
         }
     }
 }

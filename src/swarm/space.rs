@@ -2,11 +2,12 @@
 
 use crate::error::{Error, Result};
 use crate::evaluate::{Problem, Variable};
+use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
 /// The unit cube, with one dimension for each variable that is not fixed by equal bounds, and the way from it to
 /// the variables' units.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct Space {
     variables: Vec<Variable>,
     free: Vec<usize>,

@@ -20,9 +20,10 @@ use crate::error::{Error, Result};
 use crate::evaluate::{Evaluation, FAILED_COST, Problem};
 use crate::random::Random;
 use nalgebra::DVector;
+use serde::{Deserialize, Serialize};
 
 /// Settings of [`WindowSwarm`].
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct WindowSettings {
     /// Directions in which the swarm of one window moves.
     pub size: usize,
@@ -88,7 +89,7 @@ impl WindowSettings {
 }
 
 /// The swarm of one window.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 struct Window {
     /// What each direction moves: variables and weights.
     bumps: Vec<Vec<(usize, f64)>>,
@@ -110,7 +111,7 @@ impl Window {
 }
 
 /// Windows of particles about a common context; minimises the first objective.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct WindowSwarm {
     settings: WindowSettings,
     /// Bounds of the variables; bumps and context are in the variables' own units.

@@ -4,6 +4,7 @@ use super::hypervolume::hypervolume;
 use crate::error::Result;
 use crate::evaluate::simd::{InstructionSet, LaneWork, dispatch};
 use crate::scalar::lanes::Lanes;
+use serde::{Deserialize, Serialize};
 
 /// The volume, up to `reference`, that each of `points` dominates and no other does, for one to three
 /// objectives. Nought for a point that another equals or dominates, or that is not better than the reference.
@@ -21,7 +22,7 @@ pub fn contributions(points: &[Vec<f64>], reference: &[f64]) -> Result<Vec<f64>>
 }
 
 /// Points of up to three objectives by objective; missing ones are nought, against a reference of one.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(in crate::swarm) struct Columns {
     x: Vec<f64>,
     y: Vec<f64>,

@@ -7,9 +7,10 @@ use crate::swarm::archive::{Archive, dominates};
 use crate::swarm::motion::{Particles, Purpose, polynomial};
 use crate::swarm::settings::{Leaders, MopsoSettings, Mutation};
 use crate::swarm::{Front, Optimiser};
+use serde::{Deserialize, Serialize};
 
 /// Particles in rows, and their archive.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct Few {
     settings: MopsoSettings,
     random: Random,
@@ -53,6 +54,14 @@ impl Few {
 
     pub fn archive(&self) -> &Archive {
         &self.archive
+    }
+
+    /// They join the archive.
+    pub fn welcome(&mut self, migrants: &Front) {
+        for (candidate, row) in migrants.candidates.iter().zip(&migrants.objectives) {
+            let position = self.particles.space.position(candidate);
+            self.archive.insert(&position, row);
+        }
     }
 
     pub fn bytes_per_particle(&self) -> usize {

@@ -17,12 +17,13 @@ use crate::swarm::settings::MopsoSettings;
 use crate::swarm::space::Space;
 use crate::swarm::{Front, Optimiser};
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 /// Particles that are filtered together and that one thread handles in a row.
 const PART: usize = 64 * BLOCK;
 
 /// State of a large swarm. Rows of a block follow one another; its last block may have lanes without a particle.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct Many {
     settings: MopsoSettings,
     random: Random,
@@ -197,6 +198,14 @@ impl Many {
 
     pub fn archive(&self) -> &Archive {
         &self.archive
+    }
+
+    /// They join the archive.
+    pub fn welcome(&mut self, migrants: &Front) {
+        let rows = migrants.candidates.iter().zip(&migrants.objectives);
+        let solution =
+            |(candidate, row): (&Vec<f64>, &Vec<f64>)| (self.space.position(candidate), row.clone());
+        self.archive.insert_all(rows.map(solution).collect());
     }
 
     pub fn bytes_per_particle(&self) -> usize {

@@ -8,13 +8,14 @@ pub(super) mod sieve;
 
 use super::archive::Archive;
 use super::settings::MopsoSettings;
-use super::{Front, Optimiser};
+use super::{Front, Optimiser, Welcome};
 use crate::error::Result;
 use crate::evaluate::{Evaluation, Problem};
 use few::Few;
 pub use flock::Generation;
 use many::Many;
 pub(super) use many::{leaders, learn_from};
+use serde::{Deserialize, Serialize};
 
 /// From this many particles on, a swarm of two or three objectives is kept in single precision and moved in lanes and
 /// threads.
@@ -26,12 +27,12 @@ pub const MANY: usize = 4096;
 /// kept in `f32` (a coordinate to 6e-8 of its range), `4 (3 d + m)` bytes to a particle of `d` variables and `m`
 /// objectives, and a generation costs time in proportion to the particles: moved in lanes and threads, filtered and
 /// not ranked, the archive told only what may enter it. Results do not depend on the threads or the lanes.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Mopso {
     kind: Kind,
 }
 
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 enum Kind {
     Few(Few),
     Many(Many),
@@ -88,6 +89,15 @@ impl Mopso {
         match &self.kind {
             Kind::Few(few) => few,
             Kind::Many(many) => many,
+        }
+    }
+}
+
+impl Welcome for Mopso {
+    fn welcome(&mut self, migrants: &Front) {
+        match &mut self.kind {
+            Kind::Few(few) => few.welcome(migrants),
+            Kind::Many(many) => many.welcome(migrants),
         }
     }
 }
