@@ -11,6 +11,8 @@ use serde::{Deserialize, Serialize};
 pub struct Archive {
     capacity: usize,
     truncation: Truncation,
+    /// What each of the members violates.
+    violation: f64,
     /// Positions in the swarm's unit cube, one row per member.
     pub positions: Vec<Vec<f64>>,
     /// Objectives, one row per member.
@@ -45,6 +47,7 @@ impl Archive {
         Self {
             capacity,
             truncation,
+            violation: f64::INFINITY,
             positions: Vec::new(),
             objectives: Vec::new(),
             shares: Vec::new(),
@@ -63,10 +66,26 @@ impl Archive {
         self.objectives.is_empty()
     }
 
+    /// By how much all members violate the constraints; nought once something feasible is known, infinite for an empty
+    /// archive.
+    pub fn violation(&self) -> f64 {
+        self.violation
+    }
+
+    /// [`Archive::insert_violating`] of a solution that violates nothing.
+    pub fn insert(&mut self, position: &[f64], objectives: &[f64]) -> bool {
+        self.insert_violating(position, objectives, 0.0)
+    }
+
     /// Takes a solution in unless a member dominates or equals it; members that it dominates leave. If there
     /// is one too many then, the one leaves that would be missed least and is not the best in any objective, which
-    /// may be the new one. Returns whether it came in.
-    pub fn insert(&mut self, position: &[f64], objectives: &[f64]) -> bool {
+    /// may be the new one. What violates the constraints less is better than what violates them more, whatever the
+    /// objectives (Deb's rules), so that all members violate them by as much. Objectives that are not finite do not come
+    /// in. Returns whether it came in.
+    pub fn insert_violating(&mut self, position: &[f64], objectives: &[f64], violation: f64) -> bool {
+        if objectives.iter().any(|x| !x.is_finite()) || !self.reached(violation) {
+            return false;
+        }
         let beaten = |m: &Vec<f64>| m.iter().zip(objectives).all(|(x, y)| x <= y);
         if self.objectives.iter().any(beaten) {
             return false;
@@ -94,8 +113,8 @@ impl Archive {
 
     /// Takes in solutions with their objectives all at once: what no other of them and no member dominates or equals
     /// comes in, and then those leave, one at a time, that would be missed least.
-    pub(super) fn insert_all(&mut self, solutions: Vec<(Vec<f64>, Vec<f64>)>) {
-        if solutions.is_empty() {
+    pub(super) fn insert_all(&mut self, solutions: Vec<(Vec<f64>, Vec<f64>)>, violation: f64) {
+        if solutions.is_empty() || !self.reached(violation) {
             return;
         }
         let positions = std::mem::take(&mut self.positions).into_iter();
@@ -121,6 +140,21 @@ impl Archive {
         while self.len() > self.capacity {
             self.drop_least();
         }
+    }
+
+    /// Whether a violation is as small as the archive's. If it is smaller the members leave, whoever comes.
+    fn reached(&mut self, violation: f64) -> bool {
+        if !(violation <= self.violation && violation.is_finite()) {
+            return false;
+        }
+        if violation < self.violation {
+            self.violation = violation;
+            self.positions.clear();
+            self.objectives.clear();
+            self.shares.clear();
+            self.columns.clear();
+        }
+        true
     }
 
     /// Lets the member go that would be missed least and is not the best in any objective; its objectives.

@@ -191,11 +191,7 @@ impl Optimiser for CooperativeSwarm {
     }
 
     fn tell(&mut self, evaluation: &Evaluation) {
-        let costs: Vec<f64> = evaluation
-            .objectives
-            .chunks_exact(self.objectives)
-            .map(|row| if row[0].is_finite() { row[0] } else { FAILED_COST })
-            .collect();
+        let costs = evaluation.costs(self.objectives);
         let moving = self.moving();
         for group in &mut self.groups[moving.clone()] {
             group.note(&costs);

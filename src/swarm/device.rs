@@ -76,7 +76,7 @@ struct Buffers {
     gather: wgpu::BindGroup,
 }
 
-/// A swarm of two or three objectives on a device, with the settings of [`super::Mopso`].
+/// A swarm of two or three objectives without constraints on a device, with the settings of [`super::Mopso`].
 pub struct DeviceMopso {
     settings: MopsoSettings,
     space: Space,
@@ -109,6 +109,10 @@ impl DeviceMopso {
                 found,
                 expected,
             ));
+        }
+        if let Some(v) = problem.variables.iter().find(|v| v.whole) {
+            let expected = "a swarm on a device moves real numbers only";
+            return Err(Error::input("the problem", &v.name, "whole numbers", expected));
         }
         let bindings = [Uniform, Read, Write, Write, Write, Write, Write, Write];
         let source = swarm();
@@ -330,7 +334,7 @@ impl DeviceMopso {
             (position, p.at[..self.objectives].to_vec())
         };
         let solutions = points.iter().zip(rows.chunks_exact(d)).map(solution);
-        self.archive.insert_all(solutions.collect());
+        self.archive.insert_all(solutions.collect(), 0.0);
         self.evaluations += self.settings.motion.population as u64;
         self.iteration += 1;
         self.context.write(

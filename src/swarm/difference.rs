@@ -10,7 +10,7 @@ use super::motion::{Particles, Purpose};
 use super::settings::setting;
 use super::{Front, Optimiser, Welcome};
 use crate::error::Result;
-use crate::evaluate::{Evaluation, FAILED_COST, Problem};
+use crate::evaluate::{Evaluation, Problem};
 use crate::random::Random;
 use serde::{Deserialize, Serialize};
 
@@ -182,7 +182,7 @@ impl DifferenceSwarm {
 
 impl Welcome for DifferenceSwarm {
     /// Each takes the home of the worst particle, if it is better.
-    fn welcome(&mut self, migrants: &Front) {
+    fn welcome(&mut self, migrants: &Front, _violation: f64) {
         for (candidate, row) in migrants.candidates.iter().zip(&migrants.objectives) {
             let worst = (0..self.cost.len()).max_by(|&a, &b| self.cost[a].total_cmp(&self.cost[b]));
             if let Some(worst) = worst.filter(|&p| row[0] < self.cost[p]) {
@@ -200,8 +200,7 @@ impl Optimiser for DifferenceSwarm {
     }
 
     fn tell(&mut self, evaluation: &Evaluation) {
-        for (particle, row) in evaluation.objectives.chunks_exact(self.objectives).enumerate() {
-            let cost = if row[0].is_finite() { row[0] } else { FAILED_COST };
+        for (particle, cost) in evaluation.costs(self.objectives).into_iter().enumerate() {
             if cost <= self.cost[particle] {
                 self.cost[particle] = cost;
                 self.control[particle] = self.tried[particle];

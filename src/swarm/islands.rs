@@ -14,8 +14,14 @@ use serde::{Deserialize, Serialize};
 
 /// An optimiser that takes in what others have found.
 pub trait Welcome: Optimiser {
-    /// Takes in solutions of the same problem, with objectives that were evaluated.
-    fn welcome(&mut self, migrants: &Front);
+    /// What its front violates, if its objectives do not say so themselves.
+    fn violation(&self) -> f64 {
+        0.0
+    }
+
+    /// Takes in solutions of the same problem, with objectives that were evaluated; `violation` is the
+    /// [`Welcome::violation`] of where they come from.
+    fn welcome(&mut self, migrants: &Front, violation: f64);
 }
 
 /// Who moves between islands, and when.
@@ -77,7 +83,7 @@ impl<O: Welcome> Islands<O> {
 
     /// Each sends a part of its front, evenly over it, to the next.
     fn migrate(&mut self, count: usize) {
-        let parties: Vec<Front> = self
+        let parties: Vec<(Front, f64)> = self
             .islands
             .iter()
             .map(|island| {
@@ -85,15 +91,16 @@ impl<O: Welcome> Islands<O> {
                 let all = front.objectives.len();
                 let sent = count.min(all);
                 let chosen = |rows: &[Vec<f64>]| (0..sent).map(|i| rows[i * all / sent].clone()).collect();
-                Front {
+                let party = Front {
                     candidates: chosen(&front.candidates),
                     objectives: chosen(&front.objectives),
-                }
+                };
+                (party, island.violation())
             })
             .collect();
         let n = self.islands.len();
-        for (i, party) in parties.iter().enumerate() {
-            self.islands[(i + 1) % n].welcome(party);
+        for (i, (party, violation)) in parties.iter().enumerate() {
+            self.islands[(i + 1) % n].welcome(party, *violation);
         }
     }
 }
@@ -156,7 +163,12 @@ impl<O: Welcome> Optimiser for Islands<O> {
     /// What no island has found anything better than.
     fn front(&self) -> Front {
         let mut all = Front::default();
-        for island in &self.islands {
+        let least = self
+            .islands
+            .iter()
+            .map(Welcome::violation)
+            .fold(f64::INFINITY, f64::min);
+        for island in self.islands.iter().filter(|island| island.violation() <= least) {
             let front = island.front();
             all.candidates.extend(front.candidates);
             all.objectives.extend(front.objectives);

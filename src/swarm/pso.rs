@@ -4,7 +4,7 @@ use super::motion::{Particles, Purpose};
 use super::settings::PsoSettings;
 use super::{Front, Optimiser, Welcome};
 use crate::error::Result;
-use crate::evaluate::{Evaluation, FAILED_COST, Problem};
+use crate::evaluate::{Evaluation, Problem};
 use crate::random::Random;
 use serde::{Deserialize, Serialize};
 
@@ -122,7 +122,7 @@ impl Pso {
 
 impl Welcome for Pso {
     /// Each becomes the best of the particle whose best is worst, if it is better.
-    fn welcome(&mut self, migrants: &Front) {
+    fn welcome(&mut self, migrants: &Front, _violation: f64) {
         for (candidate, row) in migrants.candidates.iter().zip(&migrants.objectives) {
             let worst =
                 (0..self.best_cost.len()).max_by(|&a, &b| self.best_cost[a].total_cmp(&self.best_cost[b]));
@@ -146,8 +146,7 @@ impl Optimiser for Pso {
 
     fn tell(&mut self, evaluation: &Evaluation) {
         let d = self.particles.dimensions();
-        for (particle, row) in evaluation.objectives.chunks_exact(self.objectives).enumerate() {
-            let cost = if row[0].is_finite() { row[0] } else { FAILED_COST };
+        for (particle, cost) in evaluation.costs(self.objectives).into_iter().enumerate() {
             if cost < self.best_cost[particle] {
                 self.best_cost[particle] = cost;
                 let range = particle * d..(particle + 1) * d;

@@ -29,6 +29,12 @@ impl Space {
                 ));
             }
         }
+        for v in problem.variables.iter().filter(|v| v.whole) {
+            if v.lower.fract() != 0.0 || v.upper.fract() != 0.0 {
+                let found = format!("bounds from {} to {}", v.lower, v.upper);
+                return Err(Error::input("the problem", &v.name, found, "whole numbers"));
+            }
+        }
         if problem.objectives.is_empty() || problem.variables.is_empty() {
             let found = format!(
                 "{} variables, {} objectives",
@@ -80,9 +86,8 @@ impl Space {
         }
         for (row, &k) in positions.chunks_exact(lanes).zip(&self.free) {
             let v = &self.variables[k];
-            let range = v.upper - v.lower;
             for (candidate, x) in candidates.chunks_exact_mut(width).zip(row) {
-                candidate[k] = (v.lower + f64::from(*x) * range).min(v.upper);
+                candidate[k] = value(v, f64::from(*x));
             }
         }
     }
@@ -94,9 +99,7 @@ impl Space {
         let mut candidates: Vec<f64> = (0..count).flat_map(|_| fixed.clone()).collect();
         for (row, candidate) in candidates.chunks_exact_mut(self.variables.len()).enumerate() {
             for (j, &k) in self.free.iter().enumerate() {
-                let v = &self.variables[k];
-                let value = v.lower + positions[row * d + j] * (v.upper - v.lower);
-                candidate[k] = value.min(v.upper);
+                candidate[k] = value(&self.variables[k], positions[row * d + j]);
             }
         }
         candidates
@@ -106,8 +109,26 @@ impl Space {
     pub fn position(&self, candidate: &[f64]) -> Vec<f64> {
         let share = |&k: &usize| {
             let v = &self.variables[k];
-            ((candidate[k] - v.lower) / (v.upper - v.lower)).clamp(0.0, 1.0)
+            let share = if v.whole {
+                // The middle of what stands for it.
+                (candidate[k].round() - v.lower + 0.5) / (v.upper - v.lower + 1.0)
+            } else {
+                (candidate[k] - v.lower) / (v.upper - v.lower)
+            };
+            share.clamp(0.0, 1.0)
         };
         self.free.iter().map(share).collect()
     }
+}
+
+/// What a coordinate of the cube stands for: each whole number for as much of it as the others, if only those will do.
+#[inline(always)]
+fn value(v: &Variable, position: f64) -> f64 {
+    let range = v.upper - v.lower;
+    let value = if v.whole {
+        v.lower + (position * (range + 1.0)).floor()
+    } else {
+        v.lower + position * range
+    };
+    value.min(v.upper)
 }

@@ -141,6 +141,10 @@ impl WindowSwarm {
     pub fn new(problem: &Problem, start: &[f64], settings: WindowSettings) -> Result<Self> {
         settings.validate()?;
         Space::new(problem)?;
+        if let Some(v) = problem.variables.iter().find(|v| v.whole) {
+            let expected = "a swarm in windows moves real numbers only";
+            return Err(Error::input("the problem", &v.name, "whole numbers", expected));
+        }
         let n = problem.variables.len();
         if start.len() != n || start.iter().any(|x| !x.is_finite()) {
             return Err(Error::input(
@@ -298,11 +302,7 @@ impl Optimiser for WindowSwarm {
     }
 
     fn tell(&mut self, evaluation: &Evaluation) {
-        let costs: Vec<f64> = evaluation
-            .objectives
-            .chunks_exact(self.objectives)
-            .map(|row| if row[0].is_finite() { row[0] } else { FAILED_COST })
-            .collect();
+        let costs = evaluation.costs(self.objectives);
         let (turn, count) = (self.turn(), self.settings.population);
         self.evaluations += costs.len() as u64;
         let Some((&own, costs)) = costs.split_first() else {

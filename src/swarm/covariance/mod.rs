@@ -252,11 +252,7 @@ impl Optimiser for CovarianceSwarm {
     }
 
     fn tell(&mut self, evaluation: &Evaluation) {
-        let costs: Vec<f64> = evaluation
-            .objectives
-            .chunks_exact(self.objectives)
-            .map(|row| if row[0].is_finite() { row[0] } else { FAILED_COST })
-            .collect();
+        let costs = evaluation.costs(self.objectives);
         let mut order: Vec<usize> = (0..costs.len()).collect();
         order.sort_by(|&a, &b| costs[a].total_cmp(&costs[b]));
         let Some(&first) = order.first() else {

@@ -18,6 +18,7 @@ pub(super) struct Few {
     objectives: usize,
     best_position: Vec<f64>,
     best_objectives: Vec<Vec<f64>>,
+    best_violation: Vec<f64>,
     archive: Archive,
     iteration: usize,
     evaluations: u64,
@@ -33,6 +34,7 @@ impl Few {
         Ok(Self {
             best_position: particles.position.clone(),
             best_objectives: vec![vec![f64::INFINITY; problem.objectives.len()]; settings.motion.population],
+            best_violation: vec![f64::INFINITY; settings.motion.population],
             objectives: problem.objectives.len(),
             archive: Archive::new(settings.archive, settings.truncation),
             random,
@@ -57,10 +59,10 @@ impl Few {
     }
 
     /// They join the archive.
-    pub fn welcome(&mut self, migrants: &Front) {
+    pub fn welcome(&mut self, migrants: &Front, violation: f64) {
         for (candidate, row) in migrants.candidates.iter().zip(&migrants.objectives) {
             let position = self.particles.space.position(candidate);
-            self.archive.insert(&position, row);
+            self.archive.insert_violating(&position, row, violation);
         }
     }
 
@@ -198,10 +200,14 @@ impl Optimiser for Few {
             if !sound {
                 continue;
             }
-            self.archive.insert(position, row);
+            let violation = evaluation.violation(particle);
+            self.archive.insert_violating(position, row, violation);
             let heads = self.coin(Purpose::Coin, particle) < 0.5;
             let best = &mut self.best_objectives[particle];
-            if dominates(row, best) || (!dominates(best, row) && heads) {
+            let least = self.best_violation[particle];
+            let open = violation == least && !dominates(best, row) && heads;
+            if violation < least || (violation == least && dominates(row, best)) || open {
+                self.best_violation[particle] = violation;
                 best.copy_from_slice(row);
                 self.best_position[range].copy_from_slice(position);
             }

@@ -33,6 +33,8 @@ pub(super) struct Many {
     velocity: Vec<f32>,
     best_position: Vec<f32>,
     best_objectives: Vec<f32>,
+    /// Nothing before there was a violation to be told of.
+    best_violation: Vec<f64>,
     archive: Archive,
     iteration: usize,
     evaluations: u64,
@@ -66,6 +68,11 @@ struct Learn<'a> {
     first: usize,
     rows: &'a [f64],
     failures: &'a [Option<Failure>],
+    /// Nothing where there are no constraints, as is the best of each particle.
+    violations: &'a [f64],
+    best_violation: &'a mut [f64],
+    /// The violation that the archive takes.
+    level: f64,
     position: &'a [f32],
     best_position: &'a mut [f32],
     best_objectives: &'a mut [f32],
@@ -89,7 +96,20 @@ impl LaneWork for Learn<'_> {
             let rows = self.rows.chunks_exact(width).skip(block * BLOCK).take(BLOCK);
             objectives.fill(UNKNOWN);
             for (lane, row) in rows.enumerate() {
-                if self.failures[block * BLOCK + lane].is_none() {
+                let i = block * BLOCK + lane;
+                let mut sound = self.failures[i].is_none();
+                if let (Some(best), Some(violation)) =
+                    (self.best_violation.get_mut(i), self.violations.get(i))
+                {
+                    // Less is better whatever was known before, and more is never.
+                    let usable = sound && row.iter().all(|x| x.is_finite() && *x < FAILED_COST);
+                    if usable && *violation < *best {
+                        *best = *violation;
+                        (0..width).for_each(|k| best_objectives[k * BLOCK + lane] = UNKNOWN);
+                    }
+                    sound &= *violation == *best;
+                }
+                if sound {
                     for (k, value) in row.iter().enumerate() {
                         objectives[k * BLOCK + lane] = *value as f32;
                     }
@@ -103,7 +123,8 @@ impl LaneWork for Learn<'_> {
                 (best_position, best_objectives),
             );
         }
-        let sound = |i: usize| self.failures[i].is_none();
+        let sound =
+            |i: usize| self.failures[i].is_none() && self.violations.get(i).is_none_or(|v| *v == self.level);
         part(self.rows, width, self.first as u32, sound, self.members)
     }
 }
@@ -171,6 +192,7 @@ impl Many {
             velocity: vec![0.0; lanes * d],
             best_position: position.clone(),
             best_objectives: vec![UNKNOWN; lanes * width],
+            best_violation: Vec::new(),
             archive: Archive::new(settings.archive, settings.truncation),
             objectives: width,
             position,
@@ -201,11 +223,11 @@ impl Many {
     }
 
     /// They join the archive.
-    pub fn welcome(&mut self, migrants: &Front) {
+    pub fn welcome(&mut self, migrants: &Front, violation: f64) {
         let rows = migrants.candidates.iter().zip(&migrants.objectives);
         let solution =
             |(candidate, row): (&Vec<f64>, &Vec<f64>)| (self.space.position(candidate), row.clone());
-        self.archive.insert_all(rows.map(solution).collect());
+        self.archive.insert_all(rows.map(solution).collect(), violation);
     }
 
     pub fn bytes_per_particle(&self) -> usize {
@@ -222,17 +244,27 @@ impl Many {
         Generation::new(&self.settings, sizes, self.iteration)
     }
 
-    /// What of the swarm the archive should see.
-    fn learn(&mut self, evaluation: &Evaluation) -> Vec<Point> {
+    /// What of the swarm the archive should see, and what it violates.
+    fn learn(&mut self, evaluation: &Evaluation) -> (Vec<Point>, f64) {
         let (d, width) = (self.space.dimensions(), self.objectives);
         let generation = self.generation();
         let random = self.random;
-        let members: Vec<[f64; 3]> = self
-            .archive
-            .objectives
-            .iter()
-            .map(|row| point(row, 0).at)
-            .collect();
+        let n = self.settings.motion.population;
+        let violations: Vec<f64> = if evaluation.violations.is_empty() {
+            Vec::new()
+        } else {
+            (0..n).map(|i| evaluation.violation(i)).collect()
+        };
+        if !violations.is_empty() && self.best_violation.is_empty() {
+            // What was told of before violated nothing.
+            let known = if self.iteration > 0 { 0.0 } else { f64::INFINITY };
+            self.best_violation = vec![known; n];
+        }
+        let level = self.level(evaluation, &violations);
+        let better = level < self.archive.violation();
+        let rows = self.archive.objectives.iter().filter(|_| !better);
+        let members: Vec<[f64; 3]> = rows.map(|row| point(row, 0).at).collect();
+        let part_of = |i: usize, all: usize| (i * PART).min(all)..((i + 1) * PART).min(all);
         let parts = evaluation
             .objectives
             .par_chunks(PART * width)
@@ -240,16 +272,23 @@ impl Many {
             .zip(self.position.par_chunks(PART * d))
             .zip(self.best_position.par_chunks_mut(PART * d))
             .zip(self.best_objectives.par_chunks_mut(PART * width))
+            .zip(pieces(&mut self.best_violation, n))
             .enumerate();
         let fronts: Vec<Vec<Point>> = parts
             .map(
-                |(number, ((((rows, failures), position), best_position), best_objectives))| {
+                |(
+                    number,
+                    (((((rows, failures), position), best_position), best_objectives), best_violation),
+                )| {
                     let learn = Learn {
                         generation: &generation,
                         random,
                         first: number * PART,
                         rows,
                         failures,
+                        violations: &violations[part_of(number, violations.len())],
+                        best_violation,
+                        level,
                         position,
                         best_position,
                         best_objectives,
@@ -259,7 +298,20 @@ impl Many {
                 },
             )
             .collect();
-        front(fronts.concat(), width)
+        (front(fronts.concat(), width), level)
+    }
+
+    /// The violation that the archive takes after this evaluation: the least of its own and of those that are told.
+    fn level(&self, evaluation: &Evaluation, violations: &[f64]) -> f64 {
+        if violations.is_empty() {
+            return 0.0;
+        }
+        let rows = evaluation.objectives.chunks_exact(self.objectives);
+        let sound = rows
+            .zip(&evaluation.failures)
+            .map(|(row, failure)| failure.is_none() && row.iter().all(|x| x.is_finite() && *x < FAILED_COST));
+        let told = sound.zip(violations).filter(|(sound, _)| *sound).map(|(_, v)| *v);
+        told.fold(self.archive.violation(), f64::min)
     }
 
     /// Moves the swarm.
@@ -286,6 +338,14 @@ impl Many {
                 dispatch(InstructionSet::best(), step);
             });
     }
+}
+
+/// The pieces of `state` that go with the parts of a swarm of `n`, empty ones if it is.
+fn pieces(state: &mut [f64], n: usize) -> Vec<&mut [f64]> {
+    if state.is_empty() {
+        return (0..n.div_ceil(PART)).map(|_| Default::default()).collect();
+    }
+    state.chunks_mut(PART).collect()
 }
 
 /// The archive's positions, the one that it would miss most first.
@@ -321,18 +381,15 @@ impl Optimiser for Many {
     }
 
     fn tell(&mut self, evaluation: &Evaluation) {
-        let found = sieve(
-            self.learn(evaluation),
-            self.objectives,
-            PER_PLACE * self.settings.archive,
-        );
+        let (found, violation) = self.learn(evaluation);
+        let found = sieve(found, self.objectives, PER_PLACE * self.settings.archive);
         let d = self.space.dimensions();
         let positions = found.iter().map(|p| {
             let at = |k: usize| f64::from(self.position[self.place(p.who as usize, k)]);
             (0..d).map(at).collect()
         });
         let rows = found.iter().map(|p| p.at[..self.objectives].to_vec());
-        self.archive.insert_all(positions.zip(rows).collect());
+        self.archive.insert_all(positions.zip(rows).collect(), violation);
         self.evaluations += self.settings.motion.population as u64;
         self.iteration += 1;
         self.advance();

@@ -94,10 +94,14 @@ impl Mopso {
 }
 
 impl Welcome for Mopso {
-    fn welcome(&mut self, migrants: &Front) {
+    fn violation(&self) -> f64 {
+        self.archive().violation()
+    }
+
+    fn welcome(&mut self, migrants: &Front, violation: f64) {
         match &mut self.kind {
-            Kind::Few(few) => few.welcome(migrants),
-            Kind::Many(many) => many.welcome(migrants),
+            Kind::Few(few) => few.welcome(migrants, violation),
+            Kind::Many(many) => many.welcome(migrants, violation),
         }
     }
 }

@@ -164,6 +164,7 @@ impl Evaluator for GpuTestEvaluator<'_> {
         Ok(Evaluation {
             objectives: evaluation,
             failures,
+            violations: Vec::new(),
         })
     }
 }

@@ -94,7 +94,11 @@ impl Evaluator for SimdTestEvaluator<'_> {
             dispatch(set, part);
         });
         let failures = failures(population, d, &mut objectives, width);
-        Ok(Evaluation { objectives, failures })
+        Ok(Evaluation {
+            objectives,
+            failures,
+            violations: Vec::new(),
+        })
     }
 }
 
