@@ -147,7 +147,7 @@ fn what_is_no_checkpoint_of_it_is_refused() {
     let swarm = pso(1);
     let bytes = to_bytes(&swarm).unwrap();
     let file = Path::new("run/state");
-    let refusal = |bytes: &[u8]| from_bytes::<Pso>(bytes, file).err().expect("refused");
+    let refusal = |bytes: &[u8]| from_bytes::<Pso>(bytes, file).expect_err("refused");
     let says = |bytes: &[u8], word: &str| {
         let error = refusal(bytes);
         assert_eq!(error.exit_code(), 2);

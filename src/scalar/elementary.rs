@@ -172,7 +172,7 @@ pub fn ln(x: f32) -> f32 {
     let twice = s + s;
     let fraction = twice + twice * (p * t);
     // ln 2 in two parts, the first with few enough bits for an exact product.
-    (fraction + exponent * -2.121_944_4e-4) + exponent * 0.693_359_375
+    (fraction + exponent * -2.121_944_4e-4) + exponent * 0.693_359_4
 }
 
 /// `base` to the power of `exponent`; nought for a base that is not positive. The relative error grows with the

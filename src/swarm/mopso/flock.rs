@@ -270,7 +270,7 @@ pub fn advance(
                 + shares[1][lane] * (towards[lane] - x[lane]);
             let speed = speed.max(-g.speed_limit).min(g.speed_limit);
             let moved = x[lane] + speed;
-            let inside = moved.max(0.0).min(1.0);
+            let inside = moved.clamp(0.0, 1.0);
             v[lane] = if moved == inside { speed } else { speed * g.rebound };
             x[lane] = inside;
         }
@@ -314,7 +314,7 @@ fn difference(
         let chosen = k == always || unit_f32(words[k % 4]) < CROSSOVER;
         let step = SCALE * (leaders[one * d + k] - leaders[two * d + k]);
         let moved = leaders[from * d + k] + if chosen { step } else { 0.0 };
-        position[k * BLOCK + lane] = moved.max(0.0).min(1.0);
+        position[k * BLOCK + lane] = moved.clamp(0.0, 1.0);
         velocity[k * BLOCK + lane] = 0.0;
     }
 }
@@ -348,7 +348,7 @@ fn polynomial(g: &Generation, x: f32, uniform: f32) -> f32 {
     let base = part + (1.0 - part) * power(room, g.mutation_power);
     let step = power(base, g.mutation_root) - 1.0;
     let moved = if low { x + step } else { x - step };
-    moved.max(0.0).min(1.0)
+    moved.clamp(0.0, 1.0)
 }
 
 /// With a probability that falls over the run, one coordinate anew within that share of the range.
