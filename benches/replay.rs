@@ -7,12 +7,14 @@
 #[path = "../tests/common/mod.rs"]
 mod common;
 
-use common::{Lap, Random, UNKNOWNS, bundled_car, candidates, problem};
+use common::{UNKNOWNS, bundled_car, problem};
 use criterion::{BenchmarkId, Criterion, SamplingMode, Throughput};
 use lapswarm::evaluate::Evaluator;
 use lapswarm::evaluate::gpu::GpuContext;
 use lapswarm::evaluate::replay::{CpuEvaluator, GpuEvaluator, ReplayProblem, SimdEvaluator};
 use lapswarm::evaluate::simd::InstructionSet;
+use lapswarm::parity::Draws;
+use lapswarm::parity::made_up::{Lap, candidates};
 use std::time::Duration;
 
 fn backends(replay: &ReplayProblem) -> Vec<(String, usize, Box<dyn Evaluator + '_>)> {
@@ -26,7 +28,7 @@ fn backends(replay: &ReplayProblem) -> Vec<(String, usize, Box<dyn Evaluator + '
     match GpuContext::shared(None).and_then(|context| GpuEvaluator::new(replay, context)) {
         Ok(mut evaluator) => {
             // The driver's compilation and the first chunk's timing are no part of the speed.
-            let warm_up = candidates(replay, 64, 0.1, &mut Random(1));
+            let warm_up = candidates(replay, 64, 0.1, &mut Draws::new(1));
             if let Err(error) = evaluator.evaluate(&warm_up) {
                 eprintln!("IGNORED: the GPU failed: {error}");
             } else {
@@ -54,7 +56,7 @@ fn replay(criterion: &mut Criterion) {
         .measurement_time(Duration::from_secs(if quick { 1 } else { 5 }));
     for (name, count, mut backend) in backends(&problem) {
         let count = if quick { count.min(256) } else { count };
-        let population = candidates(&problem, count, 0.1, &mut Random(2));
+        let population = candidates(&problem, count, 0.1, &mut Draws::new(2));
         group.throughput(Throughput::Elements((count * lap.samples) as u64));
         group.bench_function(BenchmarkId::from_parameter(name), |bencher| {
             bencher.iter(|| backend.evaluate(&population));

@@ -42,6 +42,7 @@ pub mod error;
 pub mod evaluate;
 pub mod line;
 pub mod optimum;
+pub mod parity;
 pub mod random;
 pub mod report;
 pub mod scalar;

@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::{Lap, UNKNOWNS, bundled_car, linear_car, problem};
+use common::{UNKNOWNS, bundled_car, linear_car, problem};
 use lapswarm::evaluate::gpu::lint;
 use lapswarm::evaluate::gpu::shader::{
     LineShape, ReplayShape, car_fragments, swarm, swarm_gather, test_problem, tyre_struct,
@@ -11,6 +11,7 @@ use lapswarm::evaluate::gpu::shader::{
 use lapswarm::evaluate::line::{DeviceSection, LineStretch};
 use lapswarm::evaluate::replay::{DeviceSample, DeviceWindow, ModelTable, Norm, Stretch};
 use lapswarm::line::kernel::Wanted;
+use lapswarm::parity::made_up::Lap;
 use lapswarm::swarm::Generation;
 use lapswarm::swarm::problems::NAMES;
 use lapswarm::vehicle::{Chassis, TyreModel};

@@ -4,6 +4,7 @@
 //! are not finite are gaps in a curve; a figure without anything to draw is refused.
 
 mod axis;
+mod bars;
 mod canvas;
 mod convergence;
 mod curves;
@@ -12,16 +13,19 @@ mod parameters;
 mod pareto;
 mod scaling;
 mod style;
+mod surface;
 mod table;
 mod traces;
 mod track_map;
 
+pub use bars::{BarPanel, BarSeries, plot_bars};
 pub use convergence::{ConvergenceRun, plot_convergence};
 pub use curves::{Curve, CurvePanel, plot_curves};
 pub use files::write_whole;
 pub use parameters::{ParameterRow, plot_parameters};
 pub use pareto::{Objective, plot_pareto};
 pub use scaling::{ScalingSeries, plot_scaling};
+pub use surface::{SurfaceFigure, plot_surface};
 pub use table::{Cells, Column, text_table, write_csv};
 pub use traces::{ShadedSection, TraceFigure, TracePanel, plot_traces};
 pub use track_map::{TrackMap, plot_track_map};

@@ -4,6 +4,7 @@
 //! reference), in `f32` and `f32` lanes (the SIMD backend, twin of the WGSL kernels) and in dual numbers
 //! (exact derivatives).
 
+mod counted;
 mod dual;
 pub mod elementary;
 mod float;
@@ -12,6 +13,7 @@ mod lockstep;
 mod lookup;
 mod pair;
 
+pub use counted::{Counted, operations_of};
 pub use dual::Dual;
 pub use lookup::Lookup;
 pub use pair::Pair;

@@ -4,3 +4,5 @@ pub mod envelope;
 pub mod identify;
 pub mod raceline;
 pub mod run_folder;
+pub mod sensitivity;
+pub mod surface;

@@ -1,10 +1,12 @@
 //! Layer five: results do not depend on how the work is cut.
 
-use crate::common::{Lap, Random, UNKNOWNS, bundled_car, candidates, problem};
+use crate::common::{UNKNOWNS, bundled_car, problem};
 use crate::device::device;
 use lapswarm::evaluate::replay::{Batching, GpuEvaluator, Norm, ReplayProblem, SimdEvaluator};
 use lapswarm::evaluate::simd::InstructionSet;
 use lapswarm::evaluate::{Evaluation, Evaluator, Failure};
+use lapswarm::parity::Draws;
+use lapswarm::parity::made_up::{Lap, candidates};
 
 fn bits(evaluation: &Evaluation) -> (Vec<u64>, Vec<Option<Failure>>) {
     let objectives = evaluation.objectives.iter().map(|x| x.to_bits()).collect();
@@ -24,7 +26,7 @@ fn many_windows(norm: Norm) -> ReplayProblem {
 
 /// A population in which some candidates are no cars.
 fn population(replay: &ReplayProblem, count: usize) -> Vec<f64> {
-    let mut population = candidates(replay, count, 0.2, &mut Random(3));
+    let mut population = candidates(replay, count, 0.2, &mut Draws::new(3));
     let width = replay.dimensions();
     for candidate in (0..count).step_by(7) {
         // A combined-slip weight of this shape factor vanishes within the working slips.
@@ -134,7 +136,7 @@ fn long_windows_are_driven_in_chunks_that_do_not_show() {
         ..Lap::default()
     };
     let replay = problem(bundled_car(), &UNKNOWNS, lap);
-    let population = candidates(&replay, 100, 0.2, &mut Random(8));
+    let population = candidates(&replay, 100, 0.2, &mut Draws::new(8));
     let mut evaluator = GpuEvaluator::new(&replay, context).expect("the kernels compile");
     let usual = evaluator.batching();
     let whole = Batching {
@@ -161,7 +163,7 @@ fn long_windows_are_driven_in_chunks_that_do_not_show() {
 fn windows_add_up() {
     let Some(context) = device() else { return };
     let replay = many_windows(Norm::One);
-    let population = candidates(&replay, 8, 0.2, &mut Random(4));
+    let population = candidates(&replay, 8, 0.2, &mut Draws::new(4));
     let all = GpuEvaluator::new(&replay, context.clone())
         .and_then(|mut e| e.evaluate(&population))
         .expect("it runs");

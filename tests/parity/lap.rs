@@ -1,13 +1,15 @@
 //! Layer three and four: whole laps on every `f32` backend against the `f64` reference.
 
-use crate::common::{INTERVAL_S, Lap, Random, UNKNOWNS, bundled_car, candidates, linear_car, problem};
-use crate::device::{car_source, device};
+use crate::common::{Random, UNKNOWNS, bundled_car, linear_car, problem};
+use crate::device::device;
 use lapswarm::evaluate::replay::kernel::{drive_window, score_window};
 use lapswarm::evaluate::replay::{
     CHANNEL_NAMES, CpuEvaluator, GpuEvaluator, ModelTable, Norm, Plan, ReplayProblem, SimdEvaluator, trace,
 };
 use lapswarm::evaluate::simd::InstructionSet;
 use lapswarm::evaluate::{Evaluation, Evaluator};
+use lapswarm::parity::made_up::{INTERVAL_S, Lap, candidates};
+use lapswarm::parity::{Draws, car_source};
 use lapswarm::scalar::Real;
 use lapswarm::vehicle::tyre::Tyre;
 use lapswarm::vehicle::{CarModel, LinearTyre, MagicFormula, TyreModel};
@@ -287,7 +289,7 @@ fn compare(
 
 /// Scores `count` candidates on every backend and compares; hands back how many of them failed.
 fn all_backends(what: &str, replay: &ReplayProblem, count: usize, share: f64) -> usize {
-    let population = candidates(replay, count, share, &mut Random(5));
+    let population = candidates(replay, count, share, &mut Draws::new(5));
     let expected = CpuEvaluator::new(replay)
         .evaluate(&population)
         .expect("the reference runs");

@@ -9,7 +9,8 @@ use lapswarm::evaluate::line::{
 };
 use lapswarm::evaluate::simd::InstructionSet;
 use lapswarm::evaluate::{Evaluation, Evaluator, FAILED_COST, Failure};
-use lapswarm::line::{Parametrisation, geometry};
+use lapswarm::line::Parametrisation;
+use lapswarm::parity::line_tolerances;
 
 /// The single-precision backends.
 fn backends(problem: &LineProblem) -> Vec<(String, Box<dyn Evaluator + '_>)> {
@@ -27,43 +28,6 @@ fn backends(problem: &LineProblem) -> Vec<(String, Box<dyn Evaluator + '_>)> {
     backends
 }
 
-/// How far single precision may be off, absolute, for each of [`LineObjective::ALL`].
-///
-/// `alpha` is a sum of four rounded products and a constant: 5 roundings of 6e-8 of up to 1.25, so that a point is off by
-/// 4e-7 of the 14 m road, and rounding of the steps between cuts adds 3e-8 of these: 6e-6 m in all. Across the road it changes a
-/// length by no more than a third of it at either end, beside the 70 roundings of a sum in blocks of 64. A second
-/// difference is off by four times that over the shortest spacing squared, and two roots of sums of squares differ by no
-/// more than the root of the sum of the squared differences. Where corner speed decides, time goes with half the relative
-/// error of the curvature, and no bend wider than 400 m slows any of the cars; 1e-4 is the limit of whole laps. Beside it,
-/// on the lateral limit itself, what is left of the ellipse is the root of a difference that three roundings of 6e-8 can
-/// fill: `sqrt(2 * 1.8e-7)` or 6e-4 of the grip `g`. Half of `2 h` times that, over a corner's speed squared `g r`, is off by `h / r`
-/// times 6e-4, its root and so the time by half of that, in corners: 1.6e-4 at 16 m in bends of 30 m.
-fn tolerances(problem: &LineProblem, expected: &[f64]) -> [f64; 5] {
-    let cuts = problem.cuts();
-    let n = cuts.len() as f64;
-    let middle = geometry(&cuts.points(&vec![0.5; cuts.len()]), cuts.closed);
-    // Inside bends, points are closer than in the middle of the road.
-    let shortest = 0.6 * middle.segment_m.iter().fold(f64::INFINITY, |a, b| a.min(*b));
-    let point = 6e-6;
-    let bend = 4.0 * point / (shortest * shortest);
-    let length = 70.0 * 6e-8 * expected[0] + n * 0.7 * point;
-    let gamma = n.sqrt() * bend + 1e-5 * expected[2];
-    let root = expected[3].sqrt();
-    let integral = expected[0].sqrt() * bend + 1e-5 * root;
-    let left = (2.0f64 * 3.0 * 6e-8).sqrt();
-    let sharpest = (0..cuts.len())
-        .map(|i| middle.curvature_1pm[i].abs() * middle.segment_m[i.min(middle.segment_m.len() - 1)])
-        .fold(0.0, f64::max);
-    let time = (1e-5 + 0.5 * bend * 400.0).min(1e-4) + 0.5 * sharpest.min(0.53) * left;
-    [
-        length,
-        2.0 * expected[1] * length / expected[0] + 70.0 * 6e-8 * expected[1],
-        gamma,
-        2.0 * root * integral + integral * integral,
-        time * expected[4],
-    ]
-}
-
 /// Compares `found` with `f64` and hands back the largest relative error of each objective.
 fn compare(name: &str, problem: &LineProblem, population: &[f64], found: &Evaluation) -> [f64; 5] {
     let expected = CpuLineEvaluator::new(problem)
@@ -76,7 +40,7 @@ fn compare(name: &str, problem: &LineProblem, population: &[f64], found: &Evalua
         .chunks_exact(5)
         .zip(expected.objectives.chunks_exact(5));
     for (line, (found, expected)) in rows.enumerate() {
-        let tolerances = tolerances(problem, expected);
+        let tolerances = line_tolerances(problem, expected);
         for k in 0..5 {
             let error = (found[k] - expected[k]).abs();
             assert!(
@@ -194,7 +158,7 @@ fn lines_do_not_know_where_on_earth_they_are() {
             .zip(there.objectives.chunks_exact(5))
             .enumerate()
         {
-            for (k, tolerance) in tolerances(&near, a).into_iter().enumerate() {
+            for (k, tolerance) in line_tolerances(&near, a).into_iter().enumerate() {
                 assert!(
                     (a[k] - b[k]).abs() <= tolerance,
                     "{name}, line {row}: {} {}",

@@ -1,17 +1,23 @@
 //! Random numbers, test problems and swarms: processor and device against each other.
 
 use crate::common::Random;
-use crate::device::{device, rounds_like_the_processor};
+use crate::device::device;
 use lapswarm::evaluate::Evaluator;
 use lapswarm::evaluate::gpu::GpuContext;
 use lapswarm::evaluate::gpu::shader::{ELEMENTARY, random};
 use lapswarm::evaluate::simd::InstructionSet;
+use lapswarm::parity::Subject;
 use lapswarm::random::philox;
 use lapswarm::scalar::elementary::{ln, power};
 use lapswarm::swarm::device::DeviceMopso;
 use lapswarm::swarm::problems::{GpuTestEvaluator, NAMES, SimdTestEvaluator, TestProblem};
 use lapswarm::swarm::{Mopso, MopsoSettings, Mutation, Optimiser, PsoSettings};
 use std::sync::Arc;
+
+/// Whether the device is known to round every operation as the processor does.
+fn rounds_like_the_processor(context: &Arc<GpuContext>) -> bool {
+    Subject::Device(Arc::clone(context)).rounds_like_the_processor()
+}
 
 /// `expression` of eight words `c`, four of which it is to yield.
 fn map_words(context: &GpuContext, fragments: &str, expression: &str, inputs: &[u32]) -> Vec<u32> {

@@ -1,0 +1,435 @@
+//! `lapswarm bench`: evaluations per second against population on every backend.
+
+use super::machine::{forget_peak_memory, peak_memory_bytes, peak_operations_per_s};
+use crate::cli::{backend_flag, print_json};
+use lapswarm::evaluate::gpu::{GpuContext, devices};
+use lapswarm::evaluate::line::{
+    CpuLineEvaluator, GpuLineEvaluator, LineObjective, LineProblem, SimdLineEvaluator,
+};
+use lapswarm::evaluate::replay::{BackendChoice, CpuEvaluator, GpuEvaluator, ReplayProblem, SimdEvaluator};
+use lapswarm::evaluate::simd::InstructionSet;
+use lapswarm::evaluate::{Evaluator, Problem};
+use lapswarm::line::{Parametrisation, kernel};
+use lapswarm::random::Random;
+use lapswarm::report::{ScalingSeries, plot_scaling};
+use lapswarm::scalar::{Counted, operations_of};
+use lapswarm::study::identify::{IdentifySettings, set_up};
+use lapswarm::study::raceline::{self, RacelineSettings};
+use lapswarm::vehicle::model::runge_kutta_step;
+use lapswarm::vehicle::{CarInput, CarModel, CarState, MagicFormula};
+use lapswarm::{Error, Result};
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// Flags of `bench` itself.
+#[derive(clap::Args)]
+pub struct Arguments {
+    /// Problems: replay (the bundled lap, 22 unknowns), line (lap time, 360 cuts, 90 control points)
+    #[arg(long, value_delimiter = ',', value_parser = ["replay", "line"], default_value = "replay,line")]
+    problems: Vec<String>,
+    /// Populations to measure
+    #[arg(long, value_delimiter = ',', default_value = "64,256,1024,4096,16384",
+          value_parser = clap::value_parser!(u32).range(1..=4_194_304))]
+    populations: Vec<u32>,
+    /// Leave out what would take longer than this, s, by the rate of the population before
+    #[arg(long, value_name = "S", default_value_t = 20.0)]
+    longest_s: f64,
+    /// Only this backend [default: all there are]
+    #[arg(long, value_parser = backend_flag)]
+    backend: Option<BackendChoice>,
+    /// Part of the name of the GPU to use
+    #[arg(long)]
+    adapter: Option<String>,
+    /// Draw the rates into this SVG
+    #[arg(long, value_name = "FILE")]
+    plot: Option<PathBuf>,
+    /// What `bench --json` printed on another machine, to lay beside this one
+    #[arg(long, value_name = "FILE")]
+    against: Option<PathBuf>,
+    /// Print one JSON object as the last thing on stdout
+    #[arg(long)]
+    json: bool,
+    /// No table
+    #[arg(long)]
+    quiet: bool,
+}
+
+#[derive(Serialize, Deserialize)]
+struct Row {
+    problem: String,
+    backend: String,
+    adapter: String,
+    population: usize,
+    evaluations_per_s: f64,
+    particle_steps_per_s: Option<f64>,
+    kernel_ms: Option<f64>,
+    generation_ms: f64,
+    /// Share of what the cores' lanes can do at best; `None` for devices, whose best is not measured.
+    arithmetic_peak_share: Option<f64>,
+    /// Memory of the whole process at its greatest while it evaluated, MiB.
+    peak_memory_mib: Option<f64>,
+}
+
+#[derive(Serialize, Deserialize)]
+struct Table {
+    study: String,
+    seed: u64,
+    backend: String,
+    adapter: Option<String>,
+    elapsed_s: f64,
+    evaluations: u64,
+    evaluations_per_s: f64,
+    threads: usize,
+    rows: Vec<Row>,
+}
+
+/// Purpose of the draws of candidates in the counter.
+const CANDIDATES: u32 = 0xbe0c;
+/// Cars lie within this share of the truth, so that all of them drive and none ends early.
+const SPREAD: f64 = 0.02;
+/// Cuts of the circuit that lines are driven on.
+const SECTIONS: usize = 360;
+
+/// A problem with what is known of its arithmetic.
+struct Case {
+    name: &'static str,
+    kind: Kind,
+    /// Candidates are drawn this far about these, each variable on its own.
+    about: Vec<(f64, f64)>,
+    /// Runge-Kutta steps of an evaluation, if it has any.
+    steps: Option<usize>,
+    /// Arithmetic operations of an evaluation.
+    operations: u64,
+}
+
+enum Kind {
+    Replay(ReplayProblem),
+    Line(LineProblem),
+}
+
+impl Case {
+    fn replay() -> Result<Self> {
+        let replay = set_up(&IdentifySettings::default())?.replay;
+        let base = replay.base();
+        let truth: Vec<f64> = replay.parameters.iter().map(|p| base[p.slots[0]]).collect();
+        let samples: usize = replay.plan.windows.iter().map(|w| w.end - w.start - 1).sum();
+        let steps = samples * replay.plan.fractions.len();
+        let car = CarModel::<Counted, MagicFormula<Counted>>::from_parameters(|i| Counted(base[i] as f32));
+        let window = &replay.plan.windows[0];
+        let sample = &replay.plan.samples[window.start];
+        let input = CarInput {
+            wheel_speed: sample.wheel_speed.map(|x| Counted(x as f32)),
+            steer: Counted(sample.steer as f32),
+        };
+        let state = CarState::from_array(window.initial.map(|x| Counted(x as f32)));
+        let per_step = operations_of(|| {
+            runge_kutta_step(&car, &state, |_| input, Counted(0.01), |_| {});
+        });
+        Ok(Self {
+            name: "replay",
+            about: truth.iter().map(|x| (*x, SPREAD * x.abs())).collect(),
+            steps: Some(steps),
+            operations: per_step * steps as u64,
+            kind: Kind::Replay(replay),
+        })
+    }
+
+    fn line() -> Result<Self> {
+        let setup = raceline::set_up(&RacelineSettings {
+            sections: SECTIONS,
+            ..RacelineSettings::default()
+        })?;
+        let way = Parametrisation::control_points(SECTIONS / 4);
+        let objectives = [LineObjective::LapTime];
+        let line = LineProblem::new(setup.cuts, way, &objectives, Some(setup.car), 0.0)?;
+        let dimensions = line.dimensions();
+        let plan = line.plan().stored::<Counted>();
+        let middle = vec![Counted(0.5); dimensions];
+        let mut operations = 0;
+        if let Some(limits) = line.limits() {
+            let limits = limits.stored::<Counted>();
+            operations = operations_of(|| {
+                let mut course = kernel::Course::default();
+                let wanted = kernel::Wanted {
+                    integral: false,
+                    lap: true,
+                };
+                kernel::shape(&plan, wanted, &middle, &mut course);
+                kernel::lap_time(&limits, plan.closed, plan.start, Counted(plan.entry), &mut course);
+            });
+        }
+        Ok(Self {
+            name: "line",
+            about: vec![(0.5, 0.3); dimensions],
+            steps: None,
+            operations,
+            kind: Kind::Line(line),
+        })
+    }
+
+    fn problem(&self) -> &Problem {
+        match &self.kind {
+            Kind::Replay(replay) => &replay.problem,
+            Kind::Line(line) => &line.problem,
+        }
+    }
+
+    fn candidates(&self, count: usize) -> Vec<f64> {
+        let random = Random::new(1);
+        let mut all = Vec::with_capacity(count * self.about.len());
+        for i in 0..count as u32 {
+            let draws = self.about.iter().zip(&self.problem().variables).zip(0..);
+            all.extend(draws.map(|(((middle, reach), variable), k)| {
+                let off = 2.0 * random.uniform(CANDIDATES, 0, i, k) - 1.0;
+                (middle + reach * off).clamp(variable.lower, variable.upper)
+            }));
+        }
+        all
+    }
+}
+
+/// A backend, and how long its kernels took where it can tell.
+enum Backend<'a> {
+    Host(Box<dyn Evaluator + 'a>),
+    Replay(Box<GpuEvaluator<'a>>),
+    Line(Box<GpuLineEvaluator<'a>>),
+}
+
+impl Backend<'_> {
+    fn evaluator(&mut self) -> &mut dyn Evaluator {
+        match self {
+            Self::Host(evaluator) => evaluator.as_mut(),
+            Self::Replay(evaluator) => evaluator.as_mut(),
+            Self::Line(evaluator) => evaluator.as_mut(),
+        }
+    }
+
+    fn kernel_ms(&self) -> Option<f64> {
+        match self {
+            Self::Replay(evaluator) => evaluator.last_kernel_ms(),
+            _ => None,
+        }
+    }
+}
+
+fn backends<'a>(case: &'a Case, arguments: &Arguments) -> Result<Vec<Backend<'a>>> {
+    let wanted = |choice| {
+        let asked = arguments.backend.unwrap_or_default();
+        asked == choice || asked == BackendChoice::Auto
+    };
+    let mut found: Vec<Backend<'a>> = Vec::new();
+    if wanted(BackendChoice::Cpu) {
+        found.push(Backend::Host(match &case.kind {
+            Kind::Replay(replay) => Box::new(CpuEvaluator::new(replay)),
+            Kind::Line(line) => Box::new(CpuLineEvaluator::new(line)),
+        }));
+    }
+    if wanted(BackendChoice::Simd) {
+        let set = InstructionSet::best();
+        found.push(Backend::Host(match &case.kind {
+            Kind::Replay(replay) => Box::new(SimdEvaluator::new(replay, set)),
+            Kind::Line(line) => Box::new(SimdLineEvaluator::new(line, set)),
+        }));
+    }
+    let asked = arguments.backend == Some(BackendChoice::Gpu) || arguments.adapter.is_some();
+    if asked || (wanted(BackendChoice::Gpu) && !devices().is_empty()) {
+        let context = GpuContext::shared(arguments.adapter.as_deref())?;
+        found.push(match &case.kind {
+            Kind::Replay(replay) => Backend::Replay(Box::new(GpuEvaluator::new(replay, context)?)),
+            Kind::Line(line) => Backend::Line(Box::new(GpuLineEvaluator::new(line, context)?)),
+        });
+    }
+    Ok(found)
+}
+
+/// Measures and prints.
+pub fn run(arguments: &Arguments) -> Result<()> {
+    let other = arguments.against.as_deref().map(read_table).transpose()?;
+    let began = Instant::now();
+    let threads = rayon::current_num_threads();
+    let peak = threads as f64 * peak_operations_per_s(InstructionSet::best());
+    let mut rows: Vec<Row> = Vec::new();
+    if !arguments.quiet {
+        println!(
+            "{threads} threads, {:.0} billion unfused {} operations per second at best",
+            peak / 1e9,
+            InstructionSet::best().name()
+        );
+        println!(
+            "{:<8}{:<8}{:>10}{:>15}{:>14}{:>12}{:>10}{:>8}{:>10}{}",
+            "problem",
+            "backend",
+            "particles",
+            "evaluations/s",
+            "million steps",
+            "ms",
+            "kernel ms",
+            "peak",
+            "MiB",
+            if other.is_some() { "   times the other" } else { "" }
+        );
+    }
+    for name in &arguments.problems {
+        let case = if name == "replay" {
+            Case::replay()?
+        } else {
+            Case::line()?
+        };
+        for mut backend in backends(&case, arguments)? {
+            let mut rate: Option<f64> = None;
+            for &population in &arguments.populations {
+                let population = population as usize;
+                if rate.is_some_and(|rate| population as f64 / rate > arguments.longest_s) {
+                    continue;
+                }
+                let row = measure(&case, &mut backend, population, peak)?;
+                rate = Some(row.evaluations_per_s);
+                if !arguments.quiet {
+                    print_row(&row, other.as_ref());
+                }
+                rows.push(row);
+            }
+        }
+    }
+    let evaluations = rows.iter().map(|r| r.population as u64).sum();
+    let elapsed_s = began.elapsed().as_secs_f64();
+    let mut names: Vec<&str> = rows.iter().map(|r| r.backend.as_str()).collect();
+    names.sort_unstable();
+    names.dedup();
+    let table = Table {
+        study: "bench".to_owned(),
+        seed: 1,
+        backend: names.join(", "),
+        adapter: rows
+            .iter()
+            .find(|r| r.backend == "gpu")
+            .map(|r| r.adapter.clone()),
+        elapsed_s,
+        evaluations,
+        evaluations_per_s: evaluations as f64 / elapsed_s,
+        threads,
+        rows,
+    };
+    if let Some(path) = &arguments.plot {
+        draw(path, &table)?;
+    }
+    if arguments.json {
+        print_json(&table)?;
+    }
+    Ok(())
+}
+
+fn measure(case: &Case, backend: &mut Backend<'_>, population: usize, peak: f64) -> Result<Row> {
+    let candidates = case.candidates(population);
+    // The first call compiles kernels and fills caches.
+    let few = population.min(64) * case.about.len();
+    backend.evaluator().evaluate(&candidates[..few])?;
+    forget_peak_memory();
+    let began = Instant::now();
+    backend.evaluator().evaluate(&candidates)?;
+    let seconds = began.elapsed().as_secs_f64();
+    let peak_memory_mib = peak_memory_bytes().map(|b| b as f64 / (1 << 20) as f64);
+    let info = backend.evaluator().backend();
+    let rate = population as f64 / seconds;
+    Ok(Row {
+        problem: case.name.to_owned(),
+        backend: info.backend.to_owned(),
+        adapter: info.device,
+        population,
+        evaluations_per_s: rate,
+        particle_steps_per_s: case.steps.map(|s| rate * s as f64),
+        kernel_ms: backend.kernel_ms(),
+        generation_ms: seconds * 1e3,
+        arithmetic_peak_share: (info.backend == "simd").then(|| rate * case.operations as f64 / peak),
+        peak_memory_mib,
+    })
+}
+
+fn print_row(row: &Row, other: Option<&Table>) {
+    let or_dash = |x: Option<String>| x.unwrap_or("-".to_owned());
+    let ratio = other.map_or(String::new(), |table| {
+        let theirs = table.rows.iter().find(|r| {
+            (r.problem.as_str(), r.backend.as_str(), r.population)
+                == (row.problem.as_str(), row.backend.as_str(), row.population)
+        });
+        theirs.map_or("   -".to_owned(), |r| {
+            format!(
+                "   {:.2}  {}",
+                row.evaluations_per_s / r.evaluations_per_s,
+                r.adapter
+            )
+        })
+    });
+    println!(
+        "{:<8}{:<8}{:>10}{:>15.1}{:>14}{:>12.1}{:>10}{:>8}{:>10}{ratio}   {}",
+        row.problem,
+        row.backend,
+        row.population,
+        row.evaluations_per_s,
+        or_dash(row.particle_steps_per_s.map(|s| format!("{:.3}", s / 1e6))),
+        row.generation_ms,
+        or_dash(row.kernel_ms.map(|ms| format!("{ms:.1}"))),
+        or_dash(row.arithmetic_peak_share.map(|s| format!("{:.0}%", 100.0 * s))),
+        or_dash(row.peak_memory_mib.map(|m| format!("{m:.0}"))),
+        row.adapter,
+    );
+}
+
+fn read_table(path: &Path) -> Result<Table> {
+    let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, "read", e))?;
+    // A redirected run may have its table above the JSON, which is the last line.
+    let last = text.lines().rev().find(|l| !l.trim().is_empty()).unwrap_or("");
+    serde_json::from_str(last)
+        .or_else(|_| serde_json::from_str(&text))
+        .map_err(|e| {
+            Error::input(
+                path,
+                "--against",
+                e.to_string(),
+                "what `lapswarm bench --json` printed",
+            )
+        })
+}
+
+fn draw(path: &Path, table: &Table) -> Result<()> {
+    let mut labels: Vec<(String, &str, &str)> = table
+        .rows
+        .iter()
+        .map(|r| {
+            (
+                format!("{}, {}", r.problem, r.backend),
+                r.problem.as_str(),
+                r.backend.as_str(),
+            )
+        })
+        .collect();
+    labels.sort_unstable();
+    labels.dedup();
+    let columns: Vec<(&str, Vec<f64>, Vec<f64>)> = labels
+        .iter()
+        .map(|(label, problem, backend)| {
+            let of = |f: &dyn Fn(&Row) -> f64| {
+                let rows = table
+                    .rows
+                    .iter()
+                    .filter(|r| r.problem == *problem && r.backend == *backend);
+                rows.map(f).collect()
+            };
+            (
+                label.as_str(),
+                of(&|r| r.population as f64),
+                of(&|r| r.evaluations_per_s),
+            )
+        })
+        .collect();
+    let series: Vec<ScalingSeries<'_>> = columns
+        .iter()
+        .map(|(label, population, rate)| ScalingSeries {
+            label,
+            population,
+            evaluations_per_s: rate,
+        })
+        .collect();
+    plot_scaling(path, "Evaluations per second against population", &series)
+}

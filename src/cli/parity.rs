@@ -1,0 +1,150 @@
+//! `lapswarm parity`.
+
+use super::{backend_flag, print_json};
+use lapswarm::evaluate::BackendChoice;
+use lapswarm::evaluate::gpu::{DeviceSummary, devices};
+use lapswarm::parity::{Agreement, Subject, compare, subjects};
+use lapswarm::{Error, Result};
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::time::Instant;
+
+/// Flags of `parity`.
+#[derive(clap::Args)]
+#[command(
+    after_help = "Examples:\n  lapswarm parity\n  lapswarm parity --backend gpu --adapter radeon --file parity.json"
+)]
+pub struct Arguments {
+    /// What to hold against the f64 reference [default: all there is]
+    #[arg(long, value_parser = backend_flag, default_value = "auto")]
+    backend: BackendChoice,
+    /// Part of the name of the GPU to use
+    #[arg(long)]
+    adapter: Option<String>,
+    /// Write the findings into this file, to go with a bug report; refused if it exists
+    #[arg(long, value_name = "FILE")]
+    file: Option<PathBuf>,
+    /// Print one JSON object as the last thing on stdout
+    #[arg(long)]
+    json: bool,
+    /// No table
+    #[arg(long)]
+    quiet: bool,
+}
+
+#[derive(Serialize)]
+struct Report {
+    study: &'static str,
+    version: &'static str,
+    seed: u64,
+    backend: String,
+    adapter: Option<String>,
+    driver: Option<String>,
+    elapsed_s: f64,
+    evaluations: usize,
+    evaluations_per_s: f64,
+    kernels: BTreeMap<String, Agreement>,
+    pass: bool,
+}
+
+/// Compares and prints.
+pub fn run(arguments: &Arguments) -> Result<()> {
+    if let Some(path) = arguments.file.as_ref().filter(|p| p.exists()) {
+        return Err(Error::input(
+            path,
+            "--file",
+            "a file",
+            "one that does not exist: nothing is overwritten",
+        ));
+    }
+    let began = Instant::now();
+    let subjects = subjects(arguments.backend, arguments.adapter.as_deref())?;
+    let device: Option<&DeviceSummary> = subjects.iter().find_map(|s| match s {
+        Subject::Device(context) => Some(context.summary()),
+        Subject::Lanes(_) => None,
+    });
+    if !arguments.quiet {
+        if device.is_none() && arguments.backend == BackendChoice::Auto && devices().is_empty() {
+            println!("no GPU: neither Vulkan, Metal nor DX12 found an adapter");
+        }
+        println!(
+            "{:<40}{:>10}{:>12}{:>10}{:>16}  bits as f32",
+            "kernel", "figures", "relative", "ULP", "of what may be"
+        );
+    }
+    let found = compare(&subjects, |a| {
+        if !arguments.quiet {
+            println!(
+                "{:<40}{:>10}{:>12.1e}{:>10.1}{:>15.1}%  {}{}",
+                a.key(),
+                a.figures,
+                a.max_relative,
+                a.max_ulp,
+                100.0 * a.share_of_tolerance,
+                match a.bits_as_scalar {
+                    Some(true) => "yes",
+                    Some(false) => "no",
+                    None => "-",
+                },
+                if a.pass {
+                    String::new()
+                } else {
+                    format!("  FAILS: {}", a.worst)
+                }
+            );
+        }
+    })?;
+    let pass = found.iter().all(|a| a.pass);
+    let evaluations = found.iter().map(|a| a.figures).sum();
+    let elapsed_s = began.elapsed().as_secs_f64();
+    let mut backends: Vec<String> = subjects.iter().map(Subject::name).collect();
+    backends.dedup();
+    let report = Report {
+        study: "parity",
+        version: env!("CARGO_PKG_VERSION"),
+        seed: 1,
+        backend: backends.join(", "),
+        adapter: device.map(|d| d.name.clone()),
+        driver: device.map(|d| format!("{} {}", d.driver, d.driver_info).trim().to_owned()),
+        elapsed_s,
+        evaluations,
+        evaluations_per_s: evaluations as f64 / elapsed_s,
+        kernels: found.into_iter().map(|a| (a.key(), a)).collect(),
+        pass,
+    };
+    if let Some(path) = &arguments.file {
+        let text = serde_json::to_string_pretty(&report)
+            .map_err(|e| Error::io(path, "write", std::io::Error::other(e)))?;
+        std::fs::write(path, text).map_err(|e| Error::io(path, "write", e))?;
+    }
+    if !arguments.quiet {
+        if let Some(device) = device {
+            println!("{device}");
+        }
+        println!(
+            "{}",
+            if pass {
+                "all agree with the f64 reference"
+            } else {
+                "NOT ALL AGREE"
+            }
+        );
+    }
+    if arguments.json {
+        print_json(&report)?;
+    }
+    if pass {
+        return Ok(());
+    }
+    let failing: Vec<&str> = report
+        .kernels
+        .iter()
+        .filter(|(_, a)| !a.pass)
+        .map(|(k, _)| k.as_str())
+        .collect();
+    Err(Error::Study(format!(
+        "off the reference by more than may be: {}",
+        failing.join("; ")
+    )))
+}

@@ -1,0 +1,129 @@
+//! Layer four: lines round the bundled circuit, their shape and their lap time.
+
+use super::{Agreement, Draws, Subject};
+use crate::error::Result;
+use crate::evaluate::line::{
+    CpuLineEvaluator, GpuLineEvaluator, LineObjective, LineProblem, SimdLineEvaluator,
+};
+use crate::evaluate::{Evaluation, Evaluator};
+use crate::line::{Parametrisation, geometry};
+use crate::study::raceline::{RacelineSettings, set_up};
+use std::f64::consts::TAU;
+use std::sync::Arc;
+
+/// Lines by each parametrisation.
+const COUNT: usize = 64;
+/// Cuts of the circuit.
+const SECTIONS: usize = 360;
+
+/// How far single precision may be off, absolute, for each of [`LineObjective::ALL`], on a line that costs `exact` in
+/// `f64`; roads up to 14 m wide with bends of 30 m radius and more.
+///
+/// `alpha` is a sum of four rounded products and a constant: 5 roundings of 6e-8 of up to 1.25, so that a point is off by
+/// 4e-7 of the 14 m road, and rounding of the steps between cuts adds 3e-8 of these: 6e-6 m in all. Across the road it changes a
+/// length by no more than a third of it at either end, beside the 70 roundings of a sum in blocks of 64. A second
+/// difference is off by four times that over the shortest spacing squared, and two roots of sums of squares differ by no
+/// more than the root of the sum of the squared differences. Where corner speed decides, time goes with half the relative
+/// error of the curvature, and no bend wider than 400 m slows any of the cars; 1e-4 is the limit of whole laps. Beside it,
+/// on the lateral limit itself, what is left of the ellipse is the root of a difference that three roundings of 6e-8 can
+/// fill: `sqrt(2 * 1.8e-7)` or 6e-4 of the grip `g`. Half of `2 h` times that, over a corner's speed squared `g r`, is off by `h / r`
+/// times 6e-4, its root and so the time by half of that, in corners: 1.6e-4 at 16 m in bends of 30 m.
+pub fn line_tolerances(problem: &LineProblem, exact: &[f64]) -> [f64; 5] {
+    let cuts = problem.cuts();
+    let n = cuts.len() as f64;
+    let middle = geometry(&cuts.points(&vec![0.5; cuts.len()]), cuts.closed);
+    // Inside bends, points are closer than in the middle of the road.
+    let shortest = 0.6 * middle.segment_m.iter().fold(f64::INFINITY, |a, b| a.min(*b));
+    let point = 6e-6;
+    let bend = 4.0 * point / (shortest * shortest);
+    let length = 70.0 * 6e-8 * exact[0] + n * 0.7 * point;
+    let gamma = n.sqrt() * bend + 1e-5 * exact[2];
+    let root = exact[3].sqrt();
+    let integral = exact[0].sqrt() * bend + 1e-5 * root;
+    let left = (2.0f64 * 3.0 * 6e-8).sqrt();
+    let sharpest = (0..cuts.len())
+        .map(|i| middle.curvature_1pm[i].abs() * middle.segment_m[i.min(middle.segment_m.len() - 1)])
+        .fold(0.0, f64::max);
+    let time = (1e-5 + 0.5 * bend * 400.0).min(1e-4) + 0.5 * sharpest.min(0.53) * left;
+    [
+        length,
+        2.0 * exact[1] * length / exact[0] + 70.0 * 6e-8 * exact[1],
+        gamma,
+        2.0 * root * integral + integral * integral,
+        time * exact[4],
+    ]
+}
+
+/// Smooth lines: they wander over the road a few times a lap, as lines in a search do after its first moments.
+fn lines(dimensions: usize, draws: &mut Draws) -> Vec<f64> {
+    let mut population = Vec::with_capacity(dimensions * COUNT);
+    for _ in 0..COUNT {
+        let waves: Vec<(f64, f64, f64)> = (1..8)
+            .map(|k| (f64::from(k), draws.within(0.0, 0.2), draws.within(0.0, TAU)))
+            .collect();
+        population.extend((0..dimensions).map(|i| {
+            let angle = TAU * i as f64 / dimensions as f64;
+            let wave: f64 = waves.iter().map(|(k, a, p)| a * (k * angle + p).sin()).sum();
+            (0.5 + wave).clamp(0.0, 1.0)
+        }));
+    }
+    population
+}
+
+/// Problems, lines, and what the reference says of them.
+pub(super) struct Cases(Vec<(&'static str, LineProblem, Vec<f64>, Evaluation)>);
+
+impl Cases {
+    /// # Errors
+    /// Those of reading the bundled circuit and car.
+    pub(super) fn new() -> Result<Self> {
+        let setup = set_up(&RacelineSettings {
+            sections: SECTIONS,
+            ..RacelineSettings::default()
+        })?;
+        let mut draws = Draws::new(4);
+        let ways = [
+            ("control points", Parametrisation::control_points(SECTIONS / 4)),
+            ("sections", Parametrisation::sections()),
+        ];
+        let cases = ways.into_iter().map(|(name, way)| {
+            let car = Some(setup.car.clone());
+            let problem = LineProblem::new(setup.cuts.clone(), way, &LineObjective::ALL, car, 30.0)?;
+            let population = lines(problem.dimensions(), &mut draws);
+            let exact = CpuLineEvaluator::new(&problem).evaluate(&population)?;
+            Ok((name, problem, population, exact))
+        });
+        Ok(Self(cases.collect::<Result<_>>()?))
+    }
+
+    /// # Errors
+    /// [`crate::Error::Device`] if the device fails.
+    pub(super) fn compare(&self, subject: &Subject) -> Result<Vec<Agreement>> {
+        let width = LineObjective::ALL.len();
+        let mut agreements = Vec::new();
+        for (way, problem, population, exact) in &self.0 {
+            let found = match subject {
+                Subject::Lanes(set) => SimdLineEvaluator::new(problem, *set).evaluate(population)?,
+                Subject::Device(context) => {
+                    GpuLineEvaluator::new(problem, Arc::clone(context))?.evaluate(population)?
+                }
+            };
+            for (k, objective) in LineObjective::ALL.into_iter().enumerate() {
+                let mut agreement = Agreement::new(&format!("line, {}, {way}", objective.name()), subject);
+                let rows = found
+                    .objectives
+                    .chunks_exact(width)
+                    .zip(exact.objectives.chunks_exact(width));
+                for (line, (found, exact)) in rows.enumerate() {
+                    let allowed = line_tolerances(problem, exact)[k];
+                    agreement.note(found[k], exact[k], exact[k].abs(), allowed, || {
+                        format!("line {line}")
+                    });
+                }
+                agreement.verdict(found.failures == exact.failures, || "other failures".to_owned());
+                agreements.push(agreement);
+            }
+        }
+        Ok(agreements)
+    }
+}
