@@ -5,11 +5,15 @@ mod common;
 
 use common::{UNKNOWNS, bundled_car, linear_car, problem};
 use lapswarm::evaluate::gpu::lint;
-use lapswarm::evaluate::gpu::shader::{LineShape, ReplayShape, car_fragments, tyre_struct};
+use lapswarm::evaluate::gpu::shader::{
+    LineShape, ReplayShape, car_fragments, swarm, swarm_gather, test_problem, tyre_struct,
+};
 use lapswarm::evaluate::line::{DeviceSection, LineStretch};
 use lapswarm::evaluate::replay::{DeviceSample, DeviceWindow, ModelTable, Norm, Stretch};
 use lapswarm::line::kernel::Wanted;
 use lapswarm::parity::made_up::Lap;
+use lapswarm::swarm::Generation;
+use lapswarm::swarm::problems::NAMES;
 use lapswarm::vehicle::{Chassis, TyreModel};
 use naga::back::{hlsl, msl, spv};
 use naga::valid::{Capabilities, ValidationFlags, Validator};
@@ -54,6 +58,9 @@ fn kernels() -> Vec<(&'static str, String)> {
             }
         }
     }
+    kernels.extend(["scatter", "learn", "advance"].map(|entry| (entry, swarm())));
+    kernels.push(("gather", swarm_gather()));
+    kernels.extend((0..NAMES.len() as u32).map(|number| ("test_problem", test_problem(number))));
     kernels
 }
 
@@ -251,6 +258,42 @@ fn structs_of_lines_have_the_hosts_offsets() {
         ("inverse_spacing", offset_of!(DeviceSection, inverse_spacing)),
     ];
     assert_eq!((members, size), (named(&host), size_of::<DeviceSection>()));
+}
+
+#[test]
+fn a_generation_has_the_hosts_offsets() {
+    let module = lint::check(&swarm()).expect("the kernel parses");
+    let (members, size) = layout(&module, "Generation");
+    macro_rules! offsets {
+        ($($field:ident),*) => {
+            [$((stringify!($field).to_owned(), offset_of!(Generation, $field))),*]
+        };
+    }
+    let host = offsets!(
+        key,
+        when,
+        particles,
+        dimensions,
+        objectives,
+        members,
+        signed,
+        per_dimension,
+        tournament,
+        mutation,
+        inertia,
+        cognitive,
+        social,
+        speed_limit,
+        rebound,
+        difference_share,
+        mutation_share,
+        mutation_power,
+        mutation_root,
+        log_left,
+        mu,
+        pulls
+    );
+    assert_eq!((members, size), (host.to_vec(), size_of::<Generation>()));
 }
 
 #[test]

@@ -11,3 +11,4 @@ mod elementary;
 mod lap;
 mod line;
 mod step;
+mod swarm;

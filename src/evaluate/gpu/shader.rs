@@ -18,8 +18,34 @@ const CAR: &str = include_str!("../../../shaders/car.wgsl");
 const REPLAY_COMMON: &str = include_str!("../../../shaders/replay_common.wgsl");
 const REPLAY: &str = include_str!("../../../shaders/replay.wgsl");
 const REPLAY_REDUCE: &str = include_str!("../../../shaders/replay_reduce.wgsl");
+const RANDOM: &str = include_str!("../../../shaders/random.wgsl");
+const SWARM: &str = include_str!("../../../shaders/swarm.wgsl");
+const SWARM_GATHER: &str = include_str!("../../../shaders/swarm_gather.wgsl");
+const TEST_PROBLEMS: &str = include_str!("../../../shaders/test_problems.wgsl");
 
 const LINE: &str = include_str!("../../../shaders/line.wgsl");
+
+/// Philox, the twin of [`crate::random`].
+pub fn random() -> &'static str {
+    RANDOM
+}
+
+/// Source of the kernels that move a swarm; entry points `scatter`, `learn` and `advance`.
+pub fn swarm() -> String {
+    [ELEMENTARY, RANDOM, SWARM].concat()
+}
+
+/// Source of the kernel that copies a few particles' positions; entry point `gather`.
+pub fn swarm_gather() -> String {
+    SWARM_GATHER.to_owned()
+}
+
+/// Source of the kernel of the test problem of that number among
+/// [`crate::swarm::problems::NAMES`]; entry point `test_problem`.
+pub fn test_problem(number: u32) -> String {
+    let constants = format!("\n// Generated.\nconst PROBLEM: u32 = {number}u;\n\n");
+    [ELEMENTARY, &constants, TEST_PROBLEMS].concat()
+}
 
 /// The car's fragments with the tyre model's.
 pub fn car_fragments(model: TyreModel) -> [&'static str; 7] {
