@@ -14,6 +14,7 @@ mod run;
 mod sensitivity;
 mod simulate;
 mod surface;
+mod sweep;
 mod transient;
 
 use clap::{Args, CommandFactory, Parser, Subcommand};
@@ -55,6 +56,8 @@ enum Command {
     Sensitivity(Box<sensitivity::Arguments>),
     /// Draw the costs of a lap over two parameters of a car.
     Surface(Box<surface::Arguments>),
+    /// The same study over a grid of settings and seeds, with medians.
+    Sweep(sweep::Arguments),
     /// Drive a racing line with the 4DOF car and a driver, and set its lap beside the point mass's.
     Transient(transient::Arguments),
     /// Write a commented study, car or track file to start from.
@@ -143,6 +146,7 @@ pub fn run() -> ExitCode {
         Command::Envelope(arguments) => envelope::run(&arguments),
         Command::Sensitivity(arguments) => sensitivity::run(&arguments),
         Command::Surface(arguments) => surface::run(&arguments),
+        Command::Sweep(arguments) => sweep::run(&arguments),
         Command::Transient(arguments) => transient::run(&arguments),
         Command::Init(arguments) => init::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),

@@ -7,4 +7,5 @@ pub mod run;
 pub mod run_folder;
 pub mod sensitivity;
 pub mod surface;
+pub mod sweep;
 pub mod transient;
