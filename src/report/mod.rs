@@ -1,4 +1,4 @@
-//! Pictures (SVG) and tables of what a study found.
+//! Pictures (SVG), tables and interactive pages of what a study found.
 //!
 //! Every function here takes plain numbers and writes one file, whole or not at all. Numbers that
 //! are not finite are gaps in a curve; a figure without anything to draw is refused.
@@ -8,6 +8,7 @@ mod canvas;
 mod convergence;
 mod curves;
 mod files;
+mod html;
 mod parameters;
 mod pareto;
 mod scaling;
@@ -19,6 +20,9 @@ mod track_map;
 pub use convergence::{ConvergenceRun, plot_convergence};
 pub use curves::{Curve, CurvePanel, plot_curves};
 pub use files::write_whole;
+pub use html::{
+    BarSeries, Bars, Front, HeatMap, HtmlReport, LapLine, LapMap, LapPanel, LapTrace, LapView, Scale,
+};
 pub use parameters::{ParameterRow, plot_parameters};
 pub use pareto::{Objective, plot_pareto};
 pub use scaling::{ScalingSeries, plot_scaling};

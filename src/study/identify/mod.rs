@@ -1,6 +1,7 @@
 //! Identification: which car drove this lap?
 
 mod identifiability;
+mod page;
 mod polish;
 mod results;
 mod search;

@@ -220,7 +220,8 @@ pub fn write_results(
         write_front(folder, setup, front)?;
     }
     let judged = judge_candidate(replay, &outcome.candidate);
-    write_traces(folder, setup, &judged, summary)
+    write_traces(folder, setup, &judged, summary)?;
+    super::page::write(folder, settings, setup, outcome, &judged, summary)
 }
 
 #[derive(Serialize)]
@@ -334,7 +335,17 @@ fn write_parameters(folder: &Path, summary: &Summary) -> Result<()> {
         cells: Cells::Numbers(values),
     }));
     write_csv(folder.join("parameters.csv"), &columns)?;
-    let rows: Vec<ParameterRow<'_>> = p
+    plot_parameters(
+        folder.join("parameters.svg"),
+        "Parameters within their bounds",
+        &parameter_rows(summary),
+    )
+}
+
+/// The parameters as figures show them.
+pub(super) fn parameter_rows(summary: &Summary) -> Vec<ParameterRow<'_>> {
+    summary
+        .parameters
         .iter()
         .map(|p| ParameterRow {
             name: &p.name,
@@ -347,12 +358,7 @@ fn write_parameters(folder: &Path, summary: &Summary) -> Result<()> {
             truth: p.truth,
             identifiable: p.value.is_some(),
         })
-        .collect();
-    plot_parameters(
-        folder.join("parameters.svg"),
-        "Parameters within their bounds",
-        &rows,
-    )
+        .collect()
 }
 
 fn write_front(folder: &Path, setup: &Setup, front: &super::Front) -> Result<()> {
@@ -401,24 +407,24 @@ fn write_front(folder: &Path, setup: &Setup, front: &super::Front) -> Result<()>
 }
 
 /// Labels of the channels in pictures.
-const LABELS: [&str; CHANNELS] = [
+pub(super) const LABELS: [&str; CHANNELS] = [
     "speed",
     "longitudinal acceleration",
     "lateral acceleration",
     "yaw rate",
 ];
 
+/// One lap, the first that has a fitted sample: laps over one another would not be legible.
+pub(super) fn traced_lap(log: &crate::telemetry::Log, judged: &Judged) -> std::ops::Range<usize> {
+    let fitted = |i: usize| judged.outputs[0][i].is_finite();
+    let mut laps = log.laps.iter().map(|l| l.start..l.end);
+    laps.find(|r| r.clone().any(fitted)).unwrap_or(0..log.samples())
+}
+
 fn write_traces(folder: &Path, setup: &Setup, judged: &Judged, summary: &Summary) -> Result<()> {
     let log = &setup.log;
     let measured = [&log.vx_mps, &log.ax_mps2, &log.ay_mps2, &log.yaw_rate_radps];
-    // One lap, the first that has a fitted sample: laps over one another would not be legible.
-    let fitted = |i: usize| judged.outputs[0][i].is_finite();
-    let range = log
-        .laps
-        .iter()
-        .map(|l| l.start..l.end)
-        .find(|r| r.clone().any(fitted))
-        .unwrap_or(0..log.samples());
+    let range = traced_lap(log, judged);
     let distance = &log.distance_m[range.clone()];
     let mut columns = vec![
         Column {
@@ -510,7 +516,7 @@ fn write_traces(folder: &Path, setup: &Setup, judged: &Judged, summary: &Summary
 }
 
 /// The resolved settings as a study file that repeats the run.
-fn study_toml(s: &IdentifySettings) -> String {
+pub(super) fn study_toml(s: &IdentifySettings) -> String {
     let quoted = |text: &str| toml::Value::String(text.to_owned()).to_string();
     let path = |p: &Path| {
         quoted(

@@ -1,0 +1,276 @@
+//! Charts of the page beside the lap view.
+
+use super::escape::Numbers;
+use super::lap::LapData;
+use super::thin::{POINTS, picked, thinned};
+use crate::report::{CurvePanel, Objective, ParameterRow};
+use crate::{Error, Result};
+use serde::Serialize;
+use std::path::Path;
+
+/// Whether an axis goes by equal steps or by equal ratios.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Scale {
+    /// Equal steps.
+    #[default]
+    Linear,
+    /// Equal ratios, for positive values.
+    Log,
+}
+
+/// Candidates by their objectives: a scatter whose axes can be chosen and, from three objectives on, parallel coordinates.
+#[derive(Clone, Debug, Default)]
+pub struct Front<'a> {
+    /// What is shown.
+    pub title: &'a str,
+    /// What a reader should know of it; may be empty.
+    pub note: &'a str,
+    /// The objectives.
+    pub objectives: Vec<Objective<'a>>,
+    /// One row per candidate with one value per objective.
+    pub points: &'a [Vec<f64>],
+    /// Candidates to mark, with their names.
+    pub marked: Vec<(usize, &'a str)>,
+}
+
+/// Values over two quantities.
+#[derive(Clone, Debug, Default)]
+pub struct HeatMap<'a> {
+    /// What is shown.
+    pub title: &'a str,
+    /// What a reader should know of it; may be empty.
+    pub note: &'a str,
+    /// Horizontal quantity and unit.
+    pub x_label: &'a str,
+    /// Its values, rising.
+    pub x: &'a [f64],
+    /// Vertical quantity and unit.
+    pub y_label: &'a str,
+    /// Its values, rising.
+    pub y: &'a [f64],
+    /// The value and its unit.
+    pub value_label: &'a str,
+    /// Rows of constant `y`, one value per `x` each; gaps where not finite.
+    pub values: &'a [Vec<f64>],
+    /// How colours follow values.
+    pub scale: Scale,
+    /// Places (x, y) to mark, with their names.
+    pub marked: Vec<(f64, f64, &'a str)>,
+}
+
+/// One set of bars.
+#[derive(Clone, Debug)]
+pub struct BarSeries<'a> {
+    /// Its name in the legend.
+    pub name: &'a str,
+    /// One value per category.
+    pub values: Vec<f64>,
+    /// Ends of an interval about each value; gaps where not finite.
+    pub interval: Option<[Vec<f64>; 2]>,
+}
+
+/// Horizontal bars.
+#[derive(Clone, Debug, Default)]
+pub struct Bars<'a> {
+    /// What is shown.
+    pub title: &'a str,
+    /// What a reader should know of it; may be empty.
+    pub note: &'a str,
+    /// The value and its unit.
+    pub value_label: &'a str,
+    /// The categories, from the top.
+    pub categories: Vec<&'a str>,
+    /// The bars.
+    pub series: Vec<BarSeries<'a>>,
+}
+
+#[derive(Serialize)]
+pub(super) struct CurveData {
+    label: String,
+    x: Numbers,
+    y: Numbers,
+    shade: Option<f64>,
+}
+
+#[derive(Serialize)]
+pub(super) struct ParameterData {
+    name: String,
+    unit: String,
+    lower: f64,
+    upper: f64,
+    swarm: f64,
+    fitted: f64,
+    error: Option<f64>,
+    truth: Option<f64>,
+    told: bool,
+}
+
+#[derive(Serialize)]
+pub(super) struct BarData {
+    name: String,
+    values: Numbers,
+    interval: Option<[Numbers; 2]>,
+}
+
+/// As the page's script reads it.
+#[derive(Serialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub(super) enum Chart {
+    Lap(LapData),
+    Curves {
+        x_label: String,
+        y_label: String,
+        x_scale: Scale,
+        y_scale: Scale,
+        curves: Vec<CurveData>,
+    },
+    Front {
+        objectives: Vec<(String, String)>,
+        points: Vec<Numbers>,
+        marked: Vec<(usize, String)>,
+    },
+    Parameters {
+        rows: Vec<ParameterData>,
+    },
+    Heat {
+        x_label: String,
+        y_label: String,
+        value_label: String,
+        x: Numbers,
+        y: Numbers,
+        values: Vec<Numbers>,
+        scale: Scale,
+        marked: Vec<(f64, f64, String)>,
+    },
+    Bars {
+        value_label: String,
+        categories: Vec<String>,
+        series: Vec<BarData>,
+    },
+}
+
+fn refused<T>(title: &str, found: &str, expected: &str) -> Result<T> {
+    Err(Error::input(Path::new("report.html"), title, found, expected))
+}
+
+impl Chart {
+    pub fn curves(panel: &CurvePanel<'_>, [x_scale, y_scale]: [Scale; 2]) -> Result<Self> {
+        if panel.curves.iter().any(|c| c.x.len() != c.y.len()) {
+            return refused(panel.title, "lengths that differ", "a y for each x");
+        }
+        let curves = panel.curves.iter().map(|c| {
+            // A curve that turns back, as round a friction ellipse, has no buckets along x.
+            let rising = c.x.windows(2).all(|w| w[0] <= w[1]);
+            let which = if rising {
+                thinned(&c.x, &[&c.y], POINTS)
+            } else {
+                (0..c.x.len()).collect()
+            };
+            CurveData {
+                label: c.label.to_owned(),
+                x: Numbers::new(picked(&c.x, &which)),
+                y: Numbers::new(picked(&c.y, &which)),
+                shade: c.shade,
+            }
+        });
+        Ok(Self::Curves {
+            x_label: panel.x_label.to_owned(),
+            y_label: panel.y_label.to_owned(),
+            x_scale,
+            y_scale,
+            curves: curves.collect(),
+        })
+    }
+
+    pub fn front(front: &Front<'_>) -> Result<Self> {
+        let m = front.objectives.len();
+        let lost = front.marked.iter().any(|(i, _)| *i >= front.points.len());
+        if m < 2 || lost || front.points.iter().any(|p| p.len() != m) {
+            return refused(
+                front.title,
+                "points of another kind",
+                "two or more objectives, a value each",
+            );
+        }
+        let column = |k: usize| Numbers::new(front.points.iter().map(|p| p[k]));
+        let named = |o: &Objective<'_>| (o.name.to_owned(), o.unit.to_owned());
+        Ok(Self::Front {
+            objectives: front.objectives.iter().map(named).collect(),
+            points: (0..m).map(column).collect(),
+            marked: front.marked.iter().map(|(i, n)| (*i, (*n).to_owned())).collect(),
+        })
+    }
+
+    pub fn parameters(rows: &[ParameterRow<'_>]) -> Self {
+        Self::Parameters {
+            rows: rows
+                .iter()
+                .map(|r| ParameterData {
+                    name: r.name.to_owned(),
+                    unit: r.unit.to_owned(),
+                    lower: r.lower,
+                    upper: r.upper,
+                    swarm: r.swarm,
+                    fitted: r.fitted,
+                    error: r.standard_error,
+                    truth: r.truth,
+                    told: r.identifiable,
+                })
+                .collect(),
+        }
+    }
+
+    pub fn heat(map: &HeatMap<'_>) -> Result<Self> {
+        let fits = map.values.len() == map.y.len() && map.values.iter().all(|row| row.len() == map.x.len());
+        if map.x.len() < 2 || map.y.len() < 2 || !fits {
+            return refused(
+                map.title,
+                "another number of values",
+                "a row per y, a value per x",
+            );
+        }
+        Ok(Self::Heat {
+            x_label: map.x_label.to_owned(),
+            y_label: map.y_label.to_owned(),
+            value_label: map.value_label.to_owned(),
+            x: Numbers::new(map.x.iter().copied()),
+            y: Numbers::new(map.y.iter().copied()),
+            values: map
+                .values
+                .iter()
+                .map(|row| Numbers::new(row.iter().copied()))
+                .collect(),
+            scale: map.scale,
+            marked: map
+                .marked
+                .iter()
+                .map(|(x, y, n)| (*x, *y, (*n).to_owned()))
+                .collect(),
+        })
+    }
+
+    pub fn bars(bars: &Bars<'_>) -> Result<Self> {
+        let n = bars.categories.len();
+        let intervals = || bars.series.iter().filter_map(|s| s.interval.as_ref()).flatten();
+        if n == 0 || bars.series.iter().any(|s| s.values.len() != n) || intervals().any(|i| i.len() != n) {
+            return refused(bars.title, "another number of values", "one per category");
+        }
+        Ok(Self::Bars {
+            value_label: bars.value_label.to_owned(),
+            categories: bars.categories.iter().map(|c| (*c).to_owned()).collect(),
+            series: bars
+                .series
+                .iter()
+                .map(|s| BarData {
+                    name: s.name.to_owned(),
+                    values: Numbers::new(s.values.iter().copied()),
+                    interval: s
+                        .interval
+                        .as_ref()
+                        .map(|[low, high]| [low, high].map(|end| Numbers::new(end.iter().copied()))),
+                })
+                .collect(),
+        })
+    }
+}
