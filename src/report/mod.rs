@@ -25,6 +25,7 @@ pub use html::{
 };
 pub use parameters::{ParameterRow, plot_parameters};
 pub use pareto::{Objective, plot_pareto};
+pub use style::significant;
 pub use scaling::{ScalingSeries, plot_scaling};
 pub use table::{Cells, Column, text_table, write_csv};
 pub use traces::{ShadedSection, TraceFigure, TracePanel, plot_traces};

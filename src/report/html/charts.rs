@@ -1,6 +1,6 @@
 //! Charts of the page beside the lap view.
 
-use super::escape::Numbers;
+use super::escape::{Numbers, raised};
 use super::lap::LapData;
 use super::thin::{POINTS, picked, thinned};
 use crate::report::{CurvePanel, Objective, ParameterRow};
@@ -194,7 +194,7 @@ impl Chart {
             );
         }
         let column = |k: usize| Numbers::new(front.points.iter().map(|p| p[k]));
-        let named = |o: &Objective<'_>| (o.name.to_owned(), o.unit.to_owned());
+        let named = |o: &Objective<'_>| (o.name.to_owned(), raised(o.unit));
         Ok(Self::Front {
             objectives: front.objectives.iter().map(named).collect(),
             points: (0..m).map(column).collect(),
@@ -208,7 +208,7 @@ impl Chart {
                 .iter()
                 .map(|r| ParameterData {
                     name: r.name.to_owned(),
-                    unit: r.unit.to_owned(),
+                    unit: raised(r.unit),
                     lower: r.lower,
                     upper: r.upper,
                     swarm: r.swarm,

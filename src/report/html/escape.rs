@@ -20,6 +20,11 @@ pub(super) fn html(text: &str) -> String {
     safe
 }
 
+/// A unit with its exponents raised, as in `m/s\u{b2}` for `m/s^2`; others as they are.
+pub(super) fn raised(unit: &str) -> String {
+    unit.replace("^2", "\u{b2}").replace("^3", "\u{b3}")
+}
+
 /// JSON that may stand inside a `<script>` element: no character in it can end the element, open a comment or break a
 /// line of an old JavaScript engine. All of these stand inside strings only, where JSON lets them be written as numbers.
 pub(super) fn json_in_script(json: &str) -> String {

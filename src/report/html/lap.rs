@@ -1,6 +1,6 @@
 //! Traces over a lap and the map that they are linked with.
 
-use super::escape::Numbers;
+use super::escape::{Numbers, raised};
 use super::thin::{POINTS, picked, thinned};
 use crate::report::ShadedSection;
 use crate::{Error, Result};
@@ -41,6 +41,8 @@ pub struct LapLine<'a> {
     pub traces: Vec<LapTrace<'a>>,
     /// Where it lies (m), one point per `x`; empty if it is not on the map.
     pub place_m: Vec<DVec2>,
+    /// Drawn wide and pale, to stand behind what is compared with it.
+    pub wide: bool,
 }
 
 /// The road under the lines.
@@ -99,6 +101,7 @@ struct Line {
     x: Numbers,
     traces: Vec<Trace>,
     place: Option<[Numbers; 2]>,
+    wide: bool,
 }
 
 #[derive(Serialize)]
@@ -185,18 +188,19 @@ impl LapView<'_> {
                     x: pick(&line.x),
                     traces: traces.collect(),
                     place: (!line.place_m.is_empty()).then(|| places(&picked(&line.place_m, &which))),
+                    wide: line.wide,
                 })
             })
             .collect::<Result<Vec<Line>>>()?;
         let data = LapData {
             x_label: self.x_label.to_owned(),
-            x_unit: self.x_unit.to_owned(),
+            x_unit: raised(self.x_unit),
             panels: self
                 .panels
                 .iter()
                 .map(|p| Panel {
                     label: p.label.to_owned(),
-                    unit: p.unit.to_owned(),
+                    unit: raised(p.unit),
                     height: p.height,
                 })
                 .collect(),

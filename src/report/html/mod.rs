@@ -19,7 +19,7 @@ use super::table::{Cells, Column, plain_digits};
 use super::{CurvePanel, ParameterRow};
 use crate::{Error, Result};
 use charts::Chart;
-use escape::{html, json_in_script};
+use escape::{html, json_in_script, raised};
 use std::path::Path;
 
 /// The page of a run, filled from the top.
@@ -129,7 +129,7 @@ impl HtmlReport {
         for c in columns {
             let unit = match c.unit {
                 "" => String::new(),
-                unit => format!(" <span class=\"unit\">{}</span>", html(unit)),
+                unit => format!(" <span class=\"unit\">{}</span>", html(&raised(unit))),
             };
             text += &format!("<th scope=\"col\"{}>{}{unit}</th>", class(c), html(c.name));
         }

@@ -33,6 +33,7 @@ fn hostile() -> HtmlReport {
             band: None,
         }],
         place_m: vec![DVec2::ZERO, DVec2::X],
+        wide: false,
     };
     page.lap(&LapView {
         title: HOSTILE,
@@ -121,6 +122,7 @@ fn the_page_is_whole_small_and_asks_for_nothing() {
         x: x.clone(),
         traces: (0..8).map(trace).collect(),
         place_m: x.iter().map(|v| DVec2::new(*v, -v)).collect(),
+        wide: false,
     };
     let panel = LapPanel {
         label: "speed",

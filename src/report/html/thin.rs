@@ -1,7 +1,7 @@
 //! Fewer points that look alike.
 
 /// Points of a trace that go into a page at most: more than a screen has columns, so that a zoom still shows more.
-pub(super) const POINTS: usize = 4000;
+pub(super) const POINTS: usize = 3000;
 
 /// Which of the points to draw so that all series over a common axis look as they did: in each of `limit` buckets the one
 /// that spans the largest triangles with its neighbours, taken over all series (Steinarsson, *Downsampling Time Series

@@ -8,7 +8,7 @@ use crate::error::Result;
 use crate::evaluate::replay::{CHANNEL_NAMES, CHANNEL_UNITS};
 use crate::report::{
     Cells, Column, Curve, CurvePanel, Front, HtmlReport, LapLine, LapMap, LapPanel, LapTrace, LapView,
-    Objective, Scale, ShadedSection,
+    Objective, Scale, ShadedSection, significant,
 };
 use std::path::Path;
 
@@ -132,17 +132,18 @@ fn head(page: &mut HtmlReport, car: &str, source: &str, outcome: &Outcome, summa
     });
     if let Some(error) = summary.total_parameter_error {
         page.sentence(format!(
-            "The car that drove the log is known: the told parameters are off by {error:.2e} in all, as a sum of shares \
-             of their values; the swarm alone, before the least-squares polish, ended at {:.2e}.",
-            summary.swarm_total_parameter_error.unwrap_or(f64::NAN)
+            "The car that drove the log is known: the told parameters are off by {} in all, as a sum of shares \
+             of their values; the swarm alone, before the least-squares polish, ended at {}.",
+            significant(error, 3),
+            significant(summary.swarm_total_parameter_error.unwrap_or(f64::NAN), 3)
         ));
-        page.tile("Total parameter error", format!("{error:.2e}"), "");
+        page.tile("Total parameter error", significant(error, 3), "");
     }
     page.tile("Parameters told", format!("{told} of {count}"), "");
     for (k, label) in LABELS.iter().enumerate() {
         page.tile(
             &format!("Error of {label}"),
-            format!("{:.2}", share(CHANNEL_NAMES[k])),
+            significant(share(CHANNEL_NAMES[k]), 2),
             "% of signal, rms",
         );
     }
@@ -153,8 +154,11 @@ fn head(page: &mut HtmlReport, car: &str, source: &str, outcome: &Outcome, summa
             .map(|k| {
                 let name = CHANNEL_NAMES[k];
                 format!(
-                    "{} {:.3} of {:.3} {}",
-                    LABELS[k], held[name], signal[name], CHANNEL_UNITS[k]
+                    "{} {} of {} {}",
+                    LABELS[k],
+                    significant(held[name], 3),
+                    significant(signal[name], 3),
+                    CHANNEL_UNITS[k].replace("^2", "\u{b2}")
                 )
             })
             .collect();
@@ -181,6 +185,7 @@ fn lap<'a>(setup: &'a Setup, judged: &Judged) -> LapView<'a> {
         .collect();
     let line = |name, values: &dyn Fn(usize, usize) -> f64, first: usize, placed: bool| LapLine {
         name,
+        wide: placed,
         x: distance_m.to_vec(),
         traces: (0..CHANNELS)
             .map(|k| LapTrace {

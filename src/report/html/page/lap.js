@@ -4,6 +4,7 @@ const PANEL_PX = 118;
 const BETWEEN_PX = 12;
 // Room above the panels for the buttons.
 const HEAD_PX = 30;
+const LEFT_PX = 76;
 
 draw.lap = (place, lap) => {
   const hidden = new Set();
@@ -63,7 +64,7 @@ draw.lap = (place, lap) => {
       const common = { name: seriesName(i), xAxisIndex: trace.panel, yAxisIndex: trace.panel, silent: true, zlevel: 1 };
       const curve = {
         ...common, type: "line", data: line.x.map((x, k) => [x, trace.values[k]]), showSymbol: false, sampling: "lttb", emphasis: { disabled: true },
-        lineStyle: { color: seriesColour(i), width: 1.4 }, itemStyle: { color: seriesColour(i) }, z: 10 + i,
+        lineStyle: line.wide ? { color: seriesColour(i), width: 4, opacity: 0.45 } : { color: seriesColour(i), width: 1.4 }, itemStyle: { color: seriesColour(i) }, z: 10 + i,
       };
       return trace.band ? [bandSeries(common, line.x, trace.band, seriesColour(i)), curve] : [curve];
     }));
@@ -75,13 +76,13 @@ draw.lap = (place, lap) => {
       },
     }));
     return {
-      grid: panels.map((panel, k) => ({ left: 64, right: 14, top: tops[k], height: PANEL_PX * panel.height, outerBoundsMode: "none" })),
+      grid: panels.map((panel, k) => ({ left: LEFT_PX, right: 14, top: tops[k], height: PANEL_PX * panel.height, outerBoundsMode: "none" })),
       xAxis: panels.map((_, k) => axis(k === last ? withUnit(lap.x_label, lap.x_unit) : "", {
-        gridIndex: k, min: "dataMin", max: "dataMax",
+        gridIndex: k, min: startOf, max: "dataMax",
         axisLabel: { show: k === last, color: t.faint, fontSize: 11, formatter: tick, hideOverlap: true, showMaxLabel: false }, axisTick: { show: k === last },
       })),
-      yAxis: panels.map((panel, k) => axis(panel.unit ? `${panel.label}\n${panel.unit}` : panel.label, {
-        gridIndex: k, nameGap: 40, splitNumber: panel.height < 1 ? 2 : 4, nameTextStyle: { color: t.ink, fontSize: 11, lineHeight: 13 },
+      yAxis: panels.map((panel, k) => axis(panel.unit && panel.height >= 1 ? `${panel.label}\n${panel.unit}` : panel.label, {
+        gridIndex: k, nameGap: 52, nameMoveOverlap: false, splitNumber: panel.height < 1 ? 2 : 4, nameTextStyle: { color: t.ink, fontSize: 11, lineHeight: 13 },
         axisLabel: { color: t.faint, fontSize: 10, formatter: tick, hideOverlap: true },
       })),
       series: [...areas, ...series],
@@ -91,7 +92,7 @@ draw.lap = (place, lap) => {
       toolbox: toolbox({ xAxisIndex: "all", yAxisIndex: false }),
       dataZoom: [
         {
-          type: "slider", xAxisIndex: "all", bottom: 8, height: 20, left: 64, right: 14, borderColor: t.frame, fillerColor: t.shade, textStyle: { color: t.faint },
+          type: "slider", xAxisIndex: "all", bottom: 8, height: 20, left: LEFT_PX, right: 14, borderColor: t.frame, fillerColor: t.shade, textStyle: { color: t.faint },
           labelFormatter: (v) => tick(Math.round(v)), showDataShadow: false, brushSelect: false, filterMode: "none",
         },
         { type: "inside", xAxisIndex: "all", zoomOnMouseWheel: "ctrl", moveOnMouseMove: false, moveOnMouseWheel: false, filterMode: "none" },
@@ -156,6 +157,9 @@ draw.lap = (place, lap) => {
     ? "Drag across the traces to zoom; the map follows, and a double click goes back. Drag the map to move it, turn the wheel with Ctrl held to zoom it."
     : "Drag across the traces to zoom; a double click goes back."));
 };
+
+// Where an axis starts: at nought if the first value is all but there.
+const startOf = ({ min, max }) => (Math.abs(min) < 0.01 * (max - min) ? Math.min(min, 0) : min);
 
 // The room between two curves over `x`.
 function bandSeries(common, x, [low, high], colour) {

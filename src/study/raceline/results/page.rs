@@ -166,6 +166,7 @@ fn lap<'a>(setup: &'a Setup, lines: &[&'a ReportedLine]) -> LapView<'a> {
             x,
             traces,
             place_m: line.fine.points_m.clone(),
+            wide: false,
         }
     };
     LapView {
