@@ -7,11 +7,13 @@ mod identify;
 mod parity;
 mod progress;
 mod raceline;
+mod replay_flags;
+mod sensitivity;
 mod simulate;
 
 use clap::{Args, Parser, Subcommand};
 use lapswarm::evaluate::replay::BackendChoice;
-use lapswarm::study::identify::{load_circuit, parse_backend};
+use lapswarm::study::identify::{FreeParameter, IdentifySettings, load_circuit, parse_backend};
 use lapswarm::track::Circuit;
 use lapswarm::{Error, Result};
 use std::path::PathBuf;
@@ -42,6 +44,8 @@ enum Command {
     Raceline(Box<raceline::Arguments>),
     /// Find a car's limits at each speed: the g-g-v diagram that racing lines are driven within.
     Envelope(envelope::Arguments),
+    /// Find how much each parameter of a car matters to each channel of a lap.
+    Sensitivity(Box<sensitivity::Arguments>),
     /// List the GPUs that evaluations can run on, with their limits.
     Devices(devices::Arguments),
     /// Hold every kernel on this machine against the f64 reference.
@@ -70,6 +74,21 @@ pub struct Common {
 /// Parses `--backend`.
 fn backend_flag(name: &str) -> Result<BackendChoice, String> {
     parse_backend(name).ok_or_else(|| "expected auto, cpu, simd or gpu".to_owned())
+}
+
+/// Parameters by name, as free ones; bounds come from the settings where these have them.
+fn named_parameters(settings: &IdentifySettings, names: &[String]) -> Vec<FreeParameter> {
+    let known = |name: &String| settings.free.iter().find(|f| f.name == *name).cloned();
+    names
+        .iter()
+        .map(|name| {
+            known(name).unwrap_or(FreeParameter {
+                name: name.clone(),
+                lower: 0.0,
+                upper: 1.0,
+            })
+        })
+        .collect()
 }
 
 /// The circuit of a `--track`, or the bundled one.
@@ -101,6 +120,7 @@ pub fn run() -> ExitCode {
         Command::Simulate(arguments) => simulate::run(&arguments),
         Command::Raceline(arguments) => raceline::run(&arguments),
         Command::Envelope(arguments) => envelope::run(&arguments),
+        Command::Sensitivity(arguments) => sensitivity::run(&arguments),
         Command::Devices(arguments) => devices::run(&arguments),
         Command::Parity(arguments) => parity::run(&arguments),
         Command::Bench(arguments) => bench::run(&arguments),

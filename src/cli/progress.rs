@@ -75,3 +75,19 @@ impl SearchBar {
         self.bar.finish_and_clear();
     }
 }
+
+/// A bar that counts evaluations, or a silent one.
+pub fn counting(quiet: bool) -> ProgressBar {
+    let target = if quiet {
+        ProgressDrawTarget::hidden()
+    } else {
+        ProgressDrawTarget::stderr()
+    };
+    let bar = ProgressBar::with_draw_target(Some(1), target);
+    if let Ok(style) =
+        ProgressStyle::with_template("[{bar:32}] {pos}/{len} evaluations, {per_sec}, {eta} left")
+    {
+        bar.set_style(style.progress_chars("=> "));
+    }
+    bar
+}

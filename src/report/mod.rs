@@ -4,6 +4,7 @@
 //! are not finite are gaps in a curve; a figure without anything to draw is refused.
 
 mod axis;
+mod bars;
 mod canvas;
 mod convergence;
 mod curves;
@@ -17,6 +18,7 @@ mod table;
 mod traces;
 mod track_map;
 
+pub use bars::{BarPanel, BarSeries, plot_bars};
 pub use convergence::{ConvergenceRun, plot_convergence};
 pub use curves::{Curve, CurvePanel, plot_curves};
 pub use files::write_whole;

@@ -4,3 +4,4 @@ pub mod envelope;
 pub mod identify;
 pub mod raceline;
 pub mod run_folder;
+pub mod sensitivity;

@@ -1,5 +1,6 @@
 //! Identification: which car drove this lap?
 
+mod coordinates;
 mod identifiability;
 mod page;
 mod polish;

@@ -1,12 +1,13 @@
 //! The search itself: swarm, polish, judgement.
 
+use super::coordinates::Logarithmic;
 use super::identifiability::{Identifiability, judge, noise_of};
 use super::polish::polish;
 use super::settings::{Algorithm, IdentifySettings};
 use super::setup::{CHANNELS, Setup};
 use crate::error::{Error, Result};
 use crate::evaluate::replay::{ReplayProblem, open_evaluator, trace};
-use crate::evaluate::{BackendInfo, FAILED_COST};
+use crate::evaluate::{BackendInfo, Evaluator, FAILED_COST};
 use crate::swarm::{
     CovarianceSettings, CovarianceSwarm, Mopso, MopsoSettings, Progress, Pso, PsoSettings, run,
 };
@@ -142,15 +143,17 @@ pub fn search(
                 ..CovarianceSettings::default()
             };
             let planned = gathering.iterations;
-            let mut swarm = CovarianceSwarm::new(&replay.problem, &best, gathering)?;
-            run(&mut swarm, evaluator.as_mut(), |p| {
+            let mut seen = Logarithmic::new(evaluator.as_mut());
+            let start = seen.of_parameters(&best);
+            let mut swarm = CovarianceSwarm::new(seen.problem(), &start, gathering)?;
+            run(&mut swarm, &mut seen, |p| {
                 let flow = log.watch(Stage::Gather, planned, p, &mut observe);
                 interrupted |= flow.is_break();
                 flow
             })?;
-            let gathered = swarm.best_candidate();
-            if gathered.1 < cost {
-                (best, cost) = gathered;
+            let (gathered, least) = swarm.best_candidate();
+            if least < cost {
+                (best, cost) = (seen.to_parameters(&gathered), least);
             }
         }
         if cost >= FAILED_COST {

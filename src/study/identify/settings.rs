@@ -217,11 +217,25 @@ impl IdentifySettings {
     /// # Errors
     /// [`Error::Input`] naming line and field for anything unknown or out of range.
     pub fn read(path: &Path) -> Result<Self> {
+        Self::read_beside(path, Self::default(), |_| Ok(()))
+    }
+
+    /// As [`IdentifySettings::read`] from other defaults, for studies of a replay that have settings of their own:
+    /// `own` reads these from the same file.
+    ///
+    /// # Errors
+    /// As [`IdentifySettings::read`], and those of `own`.
+    pub(crate) fn read_beside(
+        path: &Path,
+        defaults: Self,
+        own: impl FnOnce(&Table<'_>) -> Result<()>,
+    ) -> Result<Self> {
         let text = read_text(path)?;
         let folder = path.parent().unwrap_or(Path::new("."));
         let document = Document::parse(path, &text)?;
         let root = document.root();
-        let mut s = Self::default();
+        let mut s = defaults;
+        own(&root)?;
         let file = |name: &str| folder.join(name);
         let named_or_file = |name: &str| {
             if Path::new(name).extension().is_some() {
@@ -254,7 +268,7 @@ impl IdentifySettings {
             parse_norm,
             "\"1\", \"2\", \"infinity\" or \"mse\"",
         )?;
-        s.window_s = root.number("window_s", 0.2, 1e5, "s")?;
+        s.window_s = root.number("window_s", 0.2, 1e5, "s")?.or(s.window_s);
         s.settle_s = root.number("settle_s", 0.0, 60.0, "s")?.unwrap_or(s.settle_s);
         s.least_speed_mps = root
             .number("least_speed_mps", 1.0, 60.0, "m/s")?

@@ -1,0 +1,85 @@
+//! `lapswarm sensitivity`.
+
+use super::replay_flags::ReplayFlags;
+use super::{Common, print_json, progress, stop_flag};
+use lapswarm::study::run_folder;
+use lapswarm::study::sensitivity::{
+    SensitivitySettings, measure, set_up_sensitivity, summarise, write_results,
+};
+use lapswarm::{Error, Result};
+use std::ops::ControlFlow;
+use std::path::PathBuf;
+use std::sync::atomic::Ordering;
+
+/// Flags of `sensitivity`; a flag wins over the study file.
+#[derive(clap::Args)]
+#[command(
+    after_help = "Examples:\n  lapswarm sensitivity\n  lapswarm sensitivity --share 0.02 --samples 1024\n  lapswarm \
+                  sensitivity --car runs/identify-001/car.toml --log lap.csv --parameters K,C,cg_height_m"
+)]
+pub struct Arguments {
+    /// A study file, as `identify` reads it, with share, samples and resamples beside
+    study: Option<PathBuf>,
+    #[command(flatten)]
+    common: Common,
+    #[command(flatten)]
+    replay: ReplayFlags,
+    /// Parameters to move [default: the 22 unknowns of `identify`]
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    parameters: Option<Vec<String>>,
+    /// How far each goes either way, as a share of its value [default: 0.05]
+    #[arg(long, value_name = "SHARE")]
+    share: Option<f64>,
+    /// Base samples of the Sobol indices, each as many evaluations as there are parameters and two more [default: 256]
+    #[arg(long, value_name = "N")]
+    samples: Option<usize>,
+}
+
+impl Arguments {
+    fn settings(&self) -> Result<SensitivitySettings> {
+        let mut s = match &self.study {
+            Some(path) => SensitivitySettings::read(path)?,
+            None => SensitivitySettings::default(),
+        };
+        self.replay.apply(&self.common, &mut s.replay);
+        if let Some(names) = &self.parameters {
+            s.replay.free = super::named_parameters(&s.replay, names);
+        }
+        s.share = self.share.unwrap_or(s.share);
+        s.samples = self.samples.unwrap_or(s.samples);
+        s.validate()?;
+        Ok(s)
+    }
+}
+
+/// Runs the study.
+pub fn run(arguments: &Arguments) -> Result<()> {
+    let settings = arguments.settings()?;
+    let setup = set_up_sensitivity(&settings)?;
+    let folder = run_folder::create("sensitivity", arguments.common.out.as_deref())?;
+    let stop = stop_flag();
+    let bar = progress::counting(arguments.common.quiet);
+    let outcome = measure(&settings, &setup, |p| {
+        bar.set_length(p.planned as u64);
+        bar.set_position(p.evaluations as u64);
+        if stop.load(Ordering::Relaxed) {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        }
+    })?;
+    bar.finish_and_clear();
+    let summary = summarise(&settings, &setup, &outcome);
+    write_results(&folder, &settings, &setup, &outcome, &summary)?;
+    if !arguments.common.quiet {
+        print!("{}", summary.to_text());
+        println!("Results: {}", folder.display());
+    }
+    if arguments.common.json {
+        print_json(&summary)?;
+    }
+    if outcome.interrupted {
+        return Err(Error::Interrupted(folder));
+    }
+    Ok(())
+}

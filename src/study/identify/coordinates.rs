@@ -1,0 +1,74 @@
+//! The coordinates that the gathering swarm sees parameters in.
+//!
+//! Factors of the Magic Formula stand in for one another as products: `B C` is a slope, so that its valley is a
+//! hyperbola over `B` and `C` and a straight line over their logarithms, which an adapted normal distribution can follow.
+
+use crate::error::Result;
+use crate::evaluate::{BackendInfo, Evaluation, Evaluator, Problem};
+
+/// Parameters whose bounds are both positive and this far apart, as a ratio, are seen by their logarithm.
+const WIDE: f64 = 1.5;
+
+/// An evaluator whose positive parameters of wide range are given as logarithms.
+pub(super) struct Logarithmic<'a> {
+    inner: &'a mut dyn Evaluator,
+    problem: Problem,
+    logarithmic: Vec<bool>,
+}
+
+impl<'a> Logarithmic<'a> {
+    pub(super) fn new(inner: &'a mut dyn Evaluator) -> Self {
+        let mut problem = inner.problem().clone();
+        let logarithmic: Vec<bool> = problem
+            .variables
+            .iter()
+            .map(|v| v.lower > 0.0 && v.upper > WIDE * v.lower)
+            .collect();
+        for (variable, _) in problem
+            .variables
+            .iter_mut()
+            .zip(&logarithmic)
+            .filter(|(_, l)| **l)
+        {
+            variable.lower = variable.lower.ln();
+            variable.upper = variable.upper.ln();
+        }
+        Self {
+            inner,
+            problem,
+            logarithmic,
+        }
+    }
+
+    /// A candidate in these coordinates.
+    pub(super) fn of_parameters(&self, candidate: &[f64]) -> Vec<f64> {
+        let columns = candidate.iter().zip(&self.logarithmic);
+        columns.map(|(x, l)| if *l { x.ln() } else { *x }).collect()
+    }
+
+    /// Candidates in the parameters' units, within the parameters' own bounds.
+    pub(super) fn to_parameters(&self, candidates: &[f64]) -> Vec<f64> {
+        let own = &self.inner.problem().variables;
+        let columns = self.logarithmic.iter().zip(own).cycle();
+        candidates
+            .iter()
+            .zip(columns)
+            .map(|(x, (l, v))| if *l { x.exp().clamp(v.lower, v.upper) } else { *x })
+            .collect()
+    }
+}
+
+impl Evaluator for Logarithmic<'_> {
+    fn problem(&self) -> &Problem {
+        &self.problem
+    }
+
+    fn backend(&self) -> BackendInfo {
+        self.inner.backend()
+    }
+
+    fn evaluate(&mut self, population: &[f64]) -> Result<Evaluation> {
+        let parameters = self.to_parameters(population);
+        self.inner.evaluate(&parameters)
+    }
+}
