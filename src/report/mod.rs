@@ -22,13 +22,11 @@ pub use bars::{BarPanel, BarSeries, plot_bars};
 pub use convergence::{ConvergenceRun, plot_convergence};
 pub use curves::{Curve, CurvePanel, plot_curves};
 pub use files::write_whole;
-pub use html::{
-    BarSeries, Bars, Front, HeatMap, HtmlReport, LapLine, LapMap, LapPanel, LapTrace, LapView, Scale,
-};
+pub use html::{Front, HeatMap, HtmlReport, LapLine, LapMap, LapPanel, LapTrace, LapView, Scale};
 pub use parameters::{ParameterRow, plot_parameters};
 pub use pareto::{Objective, plot_pareto};
-pub use style::significant;
 pub use scaling::{ScalingSeries, plot_scaling};
+pub use style::significant;
 pub use table::{Cells, Column, text_table, write_csv};
 pub use traces::{ShadedSection, TraceFigure, TracePanel, plot_traces};
 pub use track_map::{TrackMap, plot_track_map};

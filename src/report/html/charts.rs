@@ -3,7 +3,7 @@
 use super::escape::{Numbers, raised};
 use super::lap::LapData;
 use super::thin::{POINTS, picked, thinned};
-use crate::report::{CurvePanel, Objective, ParameterRow};
+use crate::report::{BarPanel, BarSeries, CurvePanel, Objective, ParameterRow};
 use crate::{Error, Result};
 use serde::Serialize;
 use std::path::Path;
@@ -57,32 +57,6 @@ pub struct HeatMap<'a> {
     pub scale: Scale,
     /// Places (x, y) to mark, with their names.
     pub marked: Vec<(f64, f64, &'a str)>,
-}
-
-/// One set of bars.
-#[derive(Clone, Debug)]
-pub struct BarSeries<'a> {
-    /// Its name in the legend.
-    pub name: &'a str,
-    /// One value per category.
-    pub values: Vec<f64>,
-    /// Ends of an interval about each value; gaps where not finite.
-    pub interval: Option<[Vec<f64>; 2]>,
-}
-
-/// Horizontal bars.
-#[derive(Clone, Debug, Default)]
-pub struct Bars<'a> {
-    /// What is shown.
-    pub title: &'a str,
-    /// What a reader should know of it; may be empty.
-    pub note: &'a str,
-    /// The value and its unit.
-    pub value_label: &'a str,
-    /// The categories, from the top.
-    pub categories: Vec<&'a str>,
-    /// The bars.
-    pub series: Vec<BarSeries<'a>>,
 }
 
 #[derive(Serialize)]
@@ -250,25 +224,27 @@ impl Chart {
         })
     }
 
-    pub fn bars(bars: &Bars<'_>) -> Result<Self> {
-        let n = bars.categories.len();
-        let intervals = || bars.series.iter().filter_map(|s| s.interval.as_ref()).flatten();
-        if n == 0 || bars.series.iter().any(|s| s.values.len() != n) || intervals().any(|i| i.len() != n) {
-            return refused(bars.title, "another number of values", "one per category");
+    pub fn bars(panel: &BarPanel<'_>) -> Result<Self> {
+        let n = panel.names.len();
+        let fits =
+            |s: &BarSeries<'_>| s.values.len() == n && matches!(s.intervals.len(), m if m == n || m == 0);
+        if n == 0 || !panel.series.iter().all(fits) {
+            return refused(panel.title, "another number of values", "one per name");
         }
+        let interval = |s: &BarSeries<'_>| {
+            let end = |k: usize| Numbers::new(s.intervals.iter().map(|i| i[k]));
+            (!s.intervals.is_empty()).then(|| [end(0), end(1)])
+        };
         Ok(Self::Bars {
-            value_label: bars.value_label.to_owned(),
-            categories: bars.categories.iter().map(|c| (*c).to_owned()).collect(),
-            series: bars
+            value_label: panel.x_label.to_owned(),
+            categories: panel.names.iter().map(|c| (*c).to_owned()).collect(),
+            series: panel
                 .series
                 .iter()
                 .map(|s| BarData {
-                    name: s.name.to_owned(),
+                    name: s.label.to_owned(),
                     values: Numbers::new(s.values.iter().copied()),
-                    interval: s
-                        .interval
-                        .as_ref()
-                        .map(|[low, high]| [low, high].map(|end| Numbers::new(end.iter().copied()))),
+                    interval: interval(s),
                 })
                 .collect(),
         })

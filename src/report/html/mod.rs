@@ -11,12 +11,12 @@ mod lap;
 mod page;
 mod thin;
 
-pub use charts::{BarSeries, Bars, Front, HeatMap, Scale};
+pub use charts::{Front, HeatMap, Scale};
 pub use lap::{LapLine, LapMap, LapPanel, LapTrace, LapView};
 
 use super::files::write_whole;
 use super::table::{Cells, Column, plain_digits};
-use super::{CurvePanel, ParameterRow};
+use super::{BarPanel, CurvePanel, ParameterRow};
 use crate::{Error, Result};
 use charts::Chart;
 use escape::{html, json_in_script, raised};
@@ -206,16 +206,16 @@ impl HtmlReport {
     /// Horizontal bars, with intervals where they are known.
     ///
     /// # Errors
-    /// [`Error::Input`] when there is not one value per category.
-    pub fn bars(&mut self, bars: &Bars<'_>) -> Result<()> {
-        let chart = Chart::bars(bars)?;
-        self.chart(bars.title, bars.note, chart);
+    /// [`Error::Input`] when there is not one value per name.
+    pub fn bars(&mut self, panel: &BarPanel<'_>, note: &str) -> Result<()> {
+        let chart = Chart::bars(panel)?;
+        self.chart(panel.title, note, chart);
         Ok(())
     }
 
     fn chart(&mut self, title: &str, note: &str, chart: Chart) {
         let number = self.charts.len();
-        let half = matches!(chart, Chart::Curves { .. });
+        let half = matches!(chart, Chart::Curves { .. } | Chart::Bars { .. });
         let html = format!(
             "<figure><figcaption>{}</figcaption><div class=\"chart\" data-chart=\"{number}\"></div>{}</figure>\n",
             html(title),

@@ -1,5 +1,5 @@
 use super::*;
-use crate::report::Curve;
+use crate::report::{BarSeries, Curve};
 use glam::DVec2;
 
 const HOSTILE: &str = "<script>alert(1)</script><!-- & \"'\u{2028}";
@@ -69,18 +69,17 @@ fn hostile() -> HtmlReport {
         }],
     };
     page.curves(&panel, HOSTILE, [Scale::Linear, Scale::Log]).unwrap();
-    page.bars(&Bars {
+    let bars = BarPanel {
         title: HOSTILE,
-        note: HOSTILE,
-        value_label: HOSTILE,
-        categories: vec![HOSTILE],
+        x_label: HOSTILE,
+        names: vec![HOSTILE],
         series: vec![BarSeries {
-            name: HOSTILE,
+            label: HOSTILE,
             values: vec![1.0],
-            interval: Some([vec![0.5], vec![f64::NAN]]),
+            intervals: vec![[0.5, f64::NAN]],
         }],
-    })
-    .unwrap();
+    };
+    page.bars(&bars, HOSTILE).unwrap();
     page.provenance(HOSTILE, HOSTILE);
     page.settings(HOSTILE, HOSTILE);
     page
@@ -176,9 +175,11 @@ fn lengths_that_differ_are_refused_by_name() {
         ..Front::default()
     };
     assert!(page.front(&front).unwrap_err().to_string().contains("Odd front"));
-    let bars = Bars {
+    let bars = BarPanel {
         title: "Odd bars",
-        ..Bars::default()
+        x_label: "share",
+        names: vec![],
+        series: vec![],
     };
-    assert!(page.bars(&bars).unwrap_err().to_string().contains("Odd bars"));
+    assert!(page.bars(&bars, "").unwrap_err().to_string().contains("Odd bars"));
 }

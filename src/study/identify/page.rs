@@ -109,8 +109,10 @@ fn head(page: &mut HtmlReport, car: &str, source: &str, outcome: &Outcome, summa
         .map(|k| {
             let name = CHANNEL_NAMES[k];
             format!(
-                "{} to {:.2e} {}",
-                LABELS[k], summary.rms_error[name], CHANNEL_UNITS[k]
+                "{} to {} {}",
+                LABELS[k],
+                significant(summary.rms_error[name], 3),
+                CHANNEL_UNITS[k].replace("^2", "\u{b2}")
             )
         })
         .collect();

@@ -9,6 +9,7 @@ use crate::report::{
     Cells, Column, ConvergenceRun, Objective, ParameterRow, ShadedSection, TraceFigure, TracePanel, TrackMap,
     plot_convergence, plot_parameters, plot_pareto, plot_traces, plot_track_map, write_csv, write_whole,
 };
+use crate::study::run_folder::{Manifest, write_json};
 use crate::swarm::Mutation;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -198,17 +199,9 @@ pub fn write_results(
     write_json(&folder.join("summary.json"), summary)?;
     write_whole(folder.join("study.toml"), study_toml(settings).as_bytes())?;
     let manifest = Manifest {
-        program: "lapswarm",
-        version: env!("CARGO_PKG_VERSION"),
-        study: "identify",
-        seed: settings.seed,
-        backend: outcome.backend.backend,
-        adapter: &outcome.backend.device,
-        driver: &outcome.backend.driver,
-        log: &setup.log.source,
-        car: &replay.car.name,
-        settings: "study.toml",
+        log: Some(&setup.log.source),
         interrupted: outcome.interrupted,
+        ..Manifest::new("identify", settings.seed, &outcome.backend, &replay.car.name)
     };
     write_json(&folder.join("manifest.json"), &manifest)?;
     replay
@@ -222,27 +215,6 @@ pub fn write_results(
     let judged = judge_candidate(replay, &outcome.candidate);
     write_traces(folder, setup, &judged, summary)?;
     super::page::write(folder, settings, setup, outcome, &judged, summary)
-}
-
-#[derive(Serialize)]
-struct Manifest<'a> {
-    program: &'static str,
-    version: &'static str,
-    study: &'static str,
-    seed: u64,
-    backend: &'a str,
-    adapter: &'a str,
-    driver: &'a str,
-    log: &'a str,
-    car: &'a str,
-    settings: &'static str,
-    interrupted: bool,
-}
-
-fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
-    let text = serde_json::to_string_pretty(value)
-        .map_err(|e| crate::Error::io(path, "write", std::io::Error::other(e)))?;
-    write_whole(path, text.as_bytes())
 }
 
 fn write_history(folder: &Path, outcome: &Outcome) -> Result<()> {

@@ -25,7 +25,7 @@ draw.bars = (place, data) => {
       toolbox: { ...toolbox({}), feature: { saveAsImage: toolbox({}).feature.saveAsImage } },
       tooltip: tooltip({
         trigger: "axis", axisPointer: { type: "shadow" },
-        formatter: (items) => tip(categories[items[0].dataIndex], series.map((s, i) => [seriesColour(i), s.name, value(s, items[0].dataIndex)])),
+        formatter: (items) => tip(categories[items[0].dataIndex], series.map((s, i) => [seriesColour(i), s.name || data.value_label, value(s, items[0].dataIndex)])),
       }),
       series: series.flatMap((s, i) => [
         { name: s.name, type: "bar", data: s.values, itemStyle: { color: seriesColour(i), opacity: 0.85 }, barMaxWidth: 16 },
