@@ -8,6 +8,7 @@ mod parity;
 mod progress;
 mod raceline;
 mod replay_flags;
+mod report;
 mod sensitivity;
 mod simulate;
 
@@ -46,6 +47,8 @@ enum Command {
     Envelope(envelope::Arguments),
     /// Find how much each parameter of a car matters to each channel of a lap.
     Sensitivity(Box<sensitivity::Arguments>),
+    /// Lay runs side by side on one page: figures, laps, limits.
+    Report(report::Arguments),
     /// List the GPUs that evaluations can run on, with their limits.
     Devices(devices::Arguments),
     /// Hold every kernel on this machine against the f64 reference.
@@ -121,6 +124,7 @@ pub fn run() -> ExitCode {
         Command::Raceline(arguments) => raceline::run(&arguments),
         Command::Envelope(arguments) => envelope::run(&arguments),
         Command::Sensitivity(arguments) => sensitivity::run(&arguments),
+        Command::Report(arguments) => report::run(&arguments),
         Command::Devices(arguments) => devices::run(&arguments),
         Command::Parity(arguments) => parity::run(&arguments),
         Command::Bench(arguments) => bench::run(&arguments),

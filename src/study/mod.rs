@@ -1,5 +1,6 @@
 //! The studies that users run.
 
+pub mod compare;
 pub mod envelope;
 pub mod identify;
 pub mod raceline;

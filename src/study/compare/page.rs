@@ -1,0 +1,394 @@
+//! The page that lays runs side by side.
+
+use super::read::{Run, Trace};
+use crate::error::{Error, Result};
+use crate::report::{
+    Cells, Column, Curve, CurvePanel, HtmlReport, LapLine, LapMap, LapPanel, LapTrace, LapView, Scale,
+    significant,
+};
+use glam::DVec2;
+
+/// Runs that a page takes at most: more lines than colours cannot be told apart.
+const MOST_RUNS: usize = 24;
+/// Figures worth a look first, by how their names begin.
+const HEADLINES: [&str; 14] = [
+    "total_parameter_error",
+    "swarm_total_parameter_error",
+    "rms_error",
+    "holdout_rms_error",
+    "best",
+    "above_exact_percent",
+    "hypervolume",
+    "front_size",
+    "lap_time_s",
+    "scenarios",
+    "top_speed_mps",
+    "understeer_gradient_deg_per_g",
+    "stability_factor_s2_per_m2",
+    "elapsed_s",
+];
+/// Traces that runs may share: names of their columns, label and unit.
+const PANELS: [(&[&str], &str, &str); 7] = [
+    (&["v", "vx_fitted"], "speed", "m/s"),
+    (&["ax", "ax_fitted"], "ax", "m/s\u{b2}"),
+    (&["ay", "ay_fitted"], "ay", "m/s\u{b2}"),
+    (&["yaw_rate_fitted", "yaw_rate"], "yaw rate", "rad/s"),
+    (&["curvature"], "curvature", "1/m"),
+    (&["soc"], "state of charge", "MJ"),
+    (&["steering"], "steering", "rad"),
+];
+
+/// Lays runs side by side: what they are, their figures, and their laps, limits and convergence over one another.
+///
+/// # Errors
+/// [`Error::Input`] for no run, or more than can be told apart.
+pub fn compare(runs: &[Run]) -> Result<HtmlReport> {
+    if runs.is_empty() || runs.len() > MOST_RUNS {
+        let expected = format!("1 to {MOST_RUNS}");
+        return Err(Error::input(
+            "the command line",
+            "RUN",
+            runs.len().to_string(),
+            expected,
+        ));
+    }
+    let names = distinct_names(runs);
+    let title = match names.as_slice() {
+        [one] => one.clone(),
+        [first, second] => format!("{first} beside {second}"),
+        [first, .., last] => format!("{} runs, {first} to {last}", runs.len()),
+        [] => String::new(),
+    };
+    let mut page = HtmlReport::new("report", &title);
+    head(&mut page, runs, &names);
+    page.section("Runs", "");
+    about(&mut page, runs, &names)?;
+    figures(&mut page, runs, &names)?;
+    laps(&mut page, runs, &names)?;
+    limits(&mut page, runs, &names)?;
+    convergence(&mut page, runs, &names)?;
+    for (run, name) in runs.iter().zip(&names) {
+        page.provenance(name, run.folder.display().to_string());
+        if let Some(settings) = &run.settings {
+            page.settings(&format!("study.toml of {name}"), settings);
+        }
+    }
+    Ok(page)
+}
+
+/// Folders' names, with their paths where two are the same.
+fn distinct_names(runs: &[Run]) -> Vec<String> {
+    let twice = |name: &str| runs.iter().filter(|r| r.name == name).count() > 1;
+    let named = |r: &Run| {
+        if twice(&r.name) {
+            r.folder.display().to_string()
+        } else {
+            r.name.clone()
+        }
+    };
+    runs.iter().map(named).collect()
+}
+
+/// What a study is judged by, where one number says it: its name, words for it, its unit.
+fn verdict(study: &str) -> Option<(&'static str, &'static str, &'static str)> {
+    match study {
+        "identify" => Some(("total_parameter_error", "total parameter error", "")),
+        "raceline" => Some(("best / lap_time / lap_time_fine_s", "lap time", "s")),
+        "envelope" => Some(("top_speed_mps", "top speed", "m/s")),
+        _ => None,
+    }
+}
+
+fn head(page: &mut HtmlReport, runs: &[Run], names: &[String]) {
+    let mut studies: Vec<&str> = runs.iter().map(|r| r.study.as_str()).collect();
+    studies.sort_unstable();
+    studies.dedup();
+    for study in studies {
+        let of = || runs.iter().zip(names).filter(|(r, _)| r.study == study);
+        let count = of().count();
+        let plural = if count == 1 { "run" } else { "runs" };
+        let mut sentence = format!("{count} {plural} of {study}");
+        if let Some((figure, words, unit)) = verdict(study) {
+            let told: Vec<String> = of()
+                .filter_map(|(r, name)| {
+                    let value = significant(r.figure(figure)?, 6);
+                    Some(format!("{name} {value} {unit}").trim_end().to_owned())
+                })
+                .collect();
+            if !told.is_empty() {
+                sentence += &format!(", by {words}: {}", told.join(", "));
+            }
+            for (r, name) in of() {
+                if let Some(value) = r.figure(figure) {
+                    page.tile(&format!("{name}, {words}"), significant(value, 6), unit);
+                }
+            }
+        }
+        page.sentence(sentence + ".");
+    }
+    for (run, name) in runs.iter().zip(names) {
+        if run.said("interrupted") == Some("true") {
+            page.warning(format!(
+                "{name} was interrupted: its figures are what it had reached."
+            ));
+        }
+    }
+}
+
+fn about(page: &mut HtmlReport, runs: &[Run], names: &[String]) -> Result<()> {
+    let keys = [
+        "study", "track", "car", "log", "seed", "backend", "adapter", "driver", "version",
+    ];
+    let said = |key: &str| -> Vec<String> {
+        runs.iter()
+            .map(|r| r.said(key).unwrap_or_default().to_owned())
+            .collect()
+    };
+    let told: Vec<(&str, Vec<String>)> = keys.iter().map(|key| (*key, said(key))).collect();
+    let mut columns = vec![Column {
+        name: "run",
+        unit: "",
+        cells: Cells::Texts(names),
+    }];
+    let present = told
+        .iter()
+        .filter(|(_, cells)| cells.iter().any(|c| !c.is_empty()));
+    columns.extend(present.map(|(name, cells)| Column {
+        name,
+        unit: "",
+        cells: Cells::Texts(cells),
+    }));
+    page.table("What was run", "", &columns)
+}
+
+fn is_headline(name: &str) -> bool {
+    let first = name.split(" / ").next().unwrap_or(name);
+    HEADLINES.contains(&first)
+}
+
+fn figures(page: &mut HtmlReport, runs: &[Run], names: &[String]) -> Result<()> {
+    let mut rows: Vec<&str> = Vec::new();
+    let mut known = std::collections::HashSet::new();
+    for figure in runs.iter().flat_map(|r| &r.figures) {
+        if known.insert(figure.name.as_str()) {
+            rows.push(&figure.name);
+        }
+    }
+    let (first, rest): (Vec<&str>, Vec<&str>) = rows.into_iter().partition(|name| is_headline(name));
+    let by_name: Vec<std::collections::HashMap<&str, f64>> = runs
+        .iter()
+        .map(|r| r.figures.iter().map(|f| (f.name.as_str(), f.value)).collect())
+        .collect();
+    for (title, rows) in [("Headline figures", first), ("All other figures", rest)] {
+        if rows.is_empty() {
+            continue;
+        }
+        let labels: Vec<String> = rows.iter().map(|r| (*r).to_owned()).collect();
+        let values: Vec<Vec<f64>> = by_name
+            .iter()
+            .map(|of| {
+                rows.iter()
+                    .map(|row| of.get(row).copied().unwrap_or(f64::NAN))
+                    .collect()
+            })
+            .collect();
+        let mut columns = vec![Column {
+            name: "figure",
+            unit: "",
+            cells: Cells::Texts(&labels),
+        }];
+        columns.extend(names.iter().zip(&values).map(|(name, values)| Column {
+            name,
+            unit: "",
+            cells: Cells::Numbers(values),
+        }));
+        // With two runs the difference is what one looks for.
+        let change: Vec<f64> = match values.as_slice() {
+            [a, b] => a.iter().zip(b).map(|(a, b)| 100.0 * (b - a) / a.abs()).collect(),
+            _ => Vec::new(),
+        };
+        if !change.is_empty() {
+            columns.push(Column {
+                name: "second against first",
+                unit: "%",
+                cells: Cells::Numbers(&change),
+            });
+        }
+        page.table(title, "Units are the endings of the names.", &columns)?;
+    }
+    Ok(())
+}
+
+/// Columns over the distance from the start, as a line of a lap view.
+fn lap_line<'a>(name: &'a str, trace: &Trace, panels: &[usize], placed: bool) -> Option<LapLine<'a>> {
+    let station = trace.column(&["station", "distance"])?;
+    // What came from elsewhere may not rise.
+    let which: Vec<usize> = (0..station.len())
+        .scan(f64::NEG_INFINITY, |last, i| {
+            let rises = station[i] > *last;
+            if rises {
+                *last = station[i];
+            }
+            Some(rises.then_some(i))
+        })
+        .flatten()
+        .collect();
+    let pick =
+        |values: &[f64]| -> Option<Vec<f64>> { which.iter().map(|&i| values.get(i).copied()).collect() };
+    let traces: Vec<LapTrace<'a>> = panels
+        .iter()
+        .enumerate()
+        .filter_map(|(row, &panel)| {
+            Some(LapTrace {
+                panel: row,
+                values: pick(trace.column(PANELS[panel].0)?)?,
+                band: None,
+            })
+        })
+        .collect();
+    let place = trace
+        .column(&["x"])
+        .and_then(pick)
+        .zip(trace.column(&["y"]).and_then(pick));
+    let x = pick(station)?;
+    (x.len() > 1 && !traces.is_empty()).then(|| LapLine {
+        name,
+        x,
+        traces,
+        place_m: place.filter(|_| placed).map_or(Vec::new(), |(x, y)| {
+            x.into_iter().zip(y).map(DVec2::from).collect()
+        }),
+        wide: false,
+    })
+}
+
+fn laps(page: &mut HtmlReport, runs: &[Run], names: &[String]) -> Result<()> {
+    let best: Vec<(&String, &Trace)> = runs
+        .iter()
+        .zip(names)
+        .filter_map(|(run, name)| Some((name, run.traces.first()?)))
+        .collect();
+    // What two runs have, or the only run has, can be laid over one another.
+    let enough = best.len().min(2);
+    let has = |panel: &usize| {
+        best.iter()
+            .filter(|(_, t)| t.column(PANELS[*panel].0).is_some())
+            .count()
+            >= enough
+    };
+    let panels: Vec<usize> = (0..PANELS.len()).filter(has).collect();
+    if best.is_empty() || panels.is_empty() {
+        return Ok(());
+    }
+    let track = runs.iter().find_map(|r| r.said("track"));
+    let one_track = runs
+        .iter()
+        .all(|r| r.said("track").is_none_or(|t| Some(t) == track));
+    let labels: Vec<String> = best
+        .iter()
+        .map(|(name, trace)| format!("{name}: {}", said_of(&trace.name)))
+        .collect();
+    let lines: Vec<LapLine<'_>> = best
+        .iter()
+        .zip(&labels)
+        .filter_map(|((_, trace), label)| lap_line(label, trace, &panels, one_track))
+        .collect();
+    if lines.is_empty() {
+        return Ok(());
+    }
+    page.section(
+        "Laps",
+        "The quickest line of each run, or what it fitted to its log.",
+    );
+    let mapped = lines.iter().any(|line| !line.place_m.is_empty());
+    page.lap(&LapView {
+        title: "Laps over one another",
+        x_label: "distance",
+        x_unit: "m",
+        panels: panels
+            .iter()
+            .map(|&panel| LapPanel {
+                label: PANELS[panel].1,
+                unit: PANELS[panel].2,
+                height: 1.0,
+            })
+            .collect(),
+        lines,
+        map: mapped.then(LapMap::default),
+        ..LapView::default()
+    })
+}
+
+/// What a file's name says of its line: `line_least_curved` is `least curved`.
+fn said_of(stem: &str) -> String {
+    match stem.strip_prefix("line_") {
+        Some(line) => line.replace('_', " "),
+        None => "fitted".to_owned(),
+    }
+}
+
+fn curves_of<'a>(
+    runs: &[Run],
+    names: &'a [String],
+    of: fn(&Run) -> Option<&Trace>,
+    [x, y]: [&[&str]; 2],
+) -> Vec<Curve<'a>> {
+    let curve = |(run, name): (&Run, &'a String)| {
+        let table = of(run)?;
+        let (x, y) = (table.column(x)?.to_vec(), table.column(y)?.to_vec());
+        (x.len() == y.len() && y.iter().any(|v| v.is_finite())).then_some(Curve {
+            label: name,
+            x,
+            y,
+            shade: None,
+        })
+    };
+    runs.iter().zip(names).filter_map(curve).collect()
+}
+
+fn limits(page: &mut HtmlReport, runs: &[Run], names: &[String]) -> Result<()> {
+    let panels = [
+        ("Cornering", "ay_mps2"),
+        ("Braking grip", "ax_grip_mps2"),
+        ("Drive", "ax_drive_mps2"),
+        ("Drag", "drag_mps2"),
+    ];
+    let mut begun = false;
+    for (title, column) in panels {
+        let curves = curves_of(runs, names, |r| r.envelope.as_ref(), [&["v_mps"], &[column]]);
+        if curves.is_empty() {
+            continue;
+        }
+        if !std::mem::replace(&mut begun, true) {
+            page.section("Limits over speed", "");
+        }
+        let panel = CurvePanel {
+            title,
+            x_label: "speed (m/s)",
+            y_label: "acceleration (m/s\u{b2})",
+            curves,
+        };
+        page.curves(&panel, "", [Scale::Linear; 2])?;
+    }
+    Ok(())
+}
+
+fn convergence(page: &mut HtmlReport, runs: &[Run], names: &[String]) -> Result<()> {
+    let curves = curves_of(
+        runs,
+        names,
+        |r| r.convergence.as_ref(),
+        [&["evaluations"], &["best"]],
+    );
+    if curves.is_empty() {
+        return Ok(());
+    }
+    page.section("Convergence", "");
+    let panel = CurvePanel {
+        title: "Cost of the swarms' best",
+        x_label: "candidates evaluated",
+        y_label: "cost",
+        curves,
+    };
+    page.curves(&panel, "", [Scale::Linear, Scale::Log])
+}
