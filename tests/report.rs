@@ -22,7 +22,7 @@ fn raceline(folder: &Path, seed: &str) {
     let out = folder.to_str().unwrap();
     let small = [
         "--sections",
-        "160",
+        "60",
         "--population",
         "20",
         "--iterations",

@@ -66,7 +66,7 @@
       }
     }
 
-    const table = document.querySelector(".table table");
+    const table = [...document.querySelectorAll(".table table")].find((t) => t.querySelector("th.number"));
     if (table) {
       const heads = [...table.tHead.rows[0].cells];
       const column = heads.findIndex((head) => head.classList.contains("number"));

@@ -108,48 +108,21 @@ impl HtmlReport {
     /// # Errors
     /// [`Error::Input`] when the columns differ in length.
     pub fn table(&mut self, title: &str, note: &str, columns: &[Column<'_>]) -> Result<()> {
-        let rows = columns.first().map_or(0, Column::len);
-        if columns.iter().any(|c| c.len() != rows) {
-            let expected = "columns of one length";
-            return Err(Error::input(
-                Path::new("report.html"),
-                title,
-                "columns that differ",
-                expected,
-            ));
-        }
-        let class = |c: &Column<'_>| match c.cells {
-            Cells::Numbers(_) => " class=\"number\"",
-            Cells::Texts(_) => "",
-        };
-        let mut text = format!(
-            "<div class=\"table\"><table>\n<caption>{}</caption>\n<thead><tr>",
+        let table = table(title, note, columns)?;
+        self.push(table);
+        Ok(())
+    }
+
+    /// The same, folded away until a reader asks for it.
+    ///
+    /// # Errors
+    /// [`Error::Input`] when the columns differ in length.
+    pub fn folded_table(&mut self, title: &str, note: &str, columns: &[Column<'_>]) -> Result<()> {
+        let table = table(title, note, columns)?;
+        self.push(format!(
+            "<details><summary>{}</summary>{table}</details>\n",
             html(title)
-        );
-        for c in columns {
-            let unit = match c.unit {
-                "" => String::new(),
-                unit => format!(" <span class=\"unit\">{}</span>", html(&raised(unit))),
-            };
-            text += &format!("<th scope=\"col\"{}>{}{unit}</th>", class(c), html(c.name));
-        }
-        text += "</tr></thead>\n<tbody>\n";
-        for row in 0..rows {
-            text += "<tr>";
-            for c in columns {
-                match c.cells {
-                    Cells::Numbers(x) if x[row].is_finite() => {
-                        let shown = plain_digits(x[row]).replace('-', "\u{2212}");
-                        text += &format!("<td class=\"number\" data-value=\"{}\">{shown}</td>", x[row]);
-                    }
-                    Cells::Numbers(_) => text += "<td class=\"number\">\u{2013}</td>",
-                    Cells::Texts(t) => text += &format!("<td>{}</td>", html(&t[row])),
-                }
-            }
-            text += "</tr>\n";
-        }
-        text += &format!("</tbody></table></div>\n{}", noted(note));
-        self.push(text);
+        ));
         Ok(())
     }
 
@@ -255,6 +228,51 @@ impl HtmlReport {
     pub fn write(&self, path: impl AsRef<Path>) -> Result<()> {
         write_whole(path, self.to_html()?.as_bytes())
     }
+}
+
+fn table(title: &str, note: &str, columns: &[Column<'_>]) -> Result<String> {
+    let rows = columns.first().map_or(0, Column::len);
+    if columns.iter().any(|c| c.len() != rows) {
+        let expected = "columns of one length";
+        return Err(Error::input(
+            Path::new("report.html"),
+            title,
+            "columns that differ",
+            expected,
+        ));
+    }
+    let class = |c: &Column<'_>| match c.cells {
+        Cells::Numbers(_) => " class=\"number\"",
+        Cells::Texts(_) => "",
+    };
+    let mut text = format!(
+        "<div class=\"table\"><table>\n<caption>{}</caption>\n<thead><tr>",
+        html(title)
+    );
+    for c in columns {
+        let unit = match c.unit {
+            "" => String::new(),
+            unit => format!(" <span class=\"unit\">{}</span>", html(&raised(unit))),
+        };
+        text += &format!("<th scope=\"col\"{}>{}{unit}</th>", class(c), html(c.name));
+    }
+    text += "</tr></thead>\n<tbody>\n";
+    for row in 0..rows {
+        text += "<tr>";
+        for c in columns {
+            match c.cells {
+                Cells::Numbers(x) if x[row].is_finite() => {
+                    let shown = plain_digits(x[row]).replace('-', "\u{2212}");
+                    text += &format!("<td class=\"number\" data-value=\"{}\">{shown}</td>", x[row]);
+                }
+                Cells::Numbers(_) => text += "<td class=\"number\">\u{2013}</td>",
+                Cells::Texts(t) => text += &format!("<td>{}</td>", html(&t[row])),
+            }
+        }
+        text += "</tr>\n";
+    }
+    text += &format!("</tbody></table></div>\n{}", noted(note));
+    Ok(text)
 }
 
 fn noted(text: &str) -> String {

@@ -6,13 +6,14 @@ use super::escape::html;
 const STYLE: &str = include_str!("page/page.css");
 const LIBRARY: &str = include_str!("vendor/echarts.min.js");
 /// Our own script, in the order that its parts need one another.
-const SCRIPT: [&str; 8] = [
+const SCRIPT: [&str; 9] = [
     include_str!("page/base.js"),
     include_str!("page/map.js"),
     include_str!("page/lap.js"),
     include_str!("page/curves.js"),
     include_str!("page/front.js"),
     include_str!("page/bars.js"),
+    include_str!("page/surface.js"),
     include_str!("page/heat.js"),
     include_str!("page/start.js"),
 ];

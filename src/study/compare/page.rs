@@ -27,6 +27,13 @@ const HEADLINES: [&str; 14] = [
     "stability_factor_s2_per_m2",
     "elapsed_s",
 ];
+/// Figures of a best line that are: those on the fine spline, where there are two.
+const BEST: [&str; 4] = [
+    "lap_time_fine_s",
+    "length_fine_m",
+    "integral_kappa2_fine_1pm",
+    "gamma_1pm",
+];
 /// Traces that runs may share: names of their columns, label and unit.
 const PANELS: [(&[&str], &str, &str); 7] = [
     (&["v", "vx_fitted"], "speed", "m/s"),
@@ -63,10 +70,11 @@ pub fn compare(runs: &[Run]) -> Result<HtmlReport> {
     head(&mut page, runs, &names);
     page.section("Runs", "");
     about(&mut page, runs, &names)?;
-    figures(&mut page, runs, &names)?;
+    figures(&mut page, runs, &names, true)?;
     laps(&mut page, runs, &names)?;
     limits(&mut page, runs, &names)?;
     convergence(&mut page, runs, &names)?;
+    figures(&mut page, runs, &names, false)?;
     for (run, name) in runs.iter().zip(&names) {
         page.provenance(name, run.folder.display().to_string());
         if let Some(settings) = &run.settings {
@@ -163,10 +171,12 @@ fn about(page: &mut HtmlReport, runs: &[Run], names: &[String]) -> Result<()> {
 
 fn is_headline(name: &str) -> bool {
     let first = name.split(" / ").next().unwrap_or(name);
-    HEADLINES.contains(&first)
+    let last = name.rsplit(" / ").next().unwrap_or(name);
+    HEADLINES.contains(&first) && (first != "best" || BEST.contains(&last))
 }
 
-fn figures(page: &mut HtmlReport, runs: &[Run], names: &[String]) -> Result<()> {
+/// The numbers of the summaries: the headlines, or all others.
+fn figures(page: &mut HtmlReport, runs: &[Run], names: &[String], headlines: bool) -> Result<()> {
     let mut rows: Vec<&str> = Vec::new();
     let mut known = std::collections::HashSet::new();
     for figure in runs.iter().flat_map(|r| &r.figures) {
@@ -174,149 +184,225 @@ fn figures(page: &mut HtmlReport, runs: &[Run], names: &[String]) -> Result<()> 
             rows.push(&figure.name);
         }
     }
-    let (first, rest): (Vec<&str>, Vec<&str>) = rows.into_iter().partition(|name| is_headline(name));
+    rows.retain(|name| is_headline(name) == headlines);
+    if rows.is_empty() {
+        return Ok(());
+    }
     let by_name: Vec<std::collections::HashMap<&str, f64>> = runs
         .iter()
         .map(|r| r.figures.iter().map(|f| (f.name.as_str(), f.value)).collect())
         .collect();
-    for (title, rows) in [("Headline figures", first), ("All other figures", rest)] {
-        if rows.is_empty() {
-            continue;
-        }
-        let labels: Vec<String> = rows.iter().map(|r| (*r).to_owned()).collect();
-        let values: Vec<Vec<f64>> = by_name
-            .iter()
-            .map(|of| {
-                rows.iter()
-                    .map(|row| of.get(row).copied().unwrap_or(f64::NAN))
-                    .collect()
-            })
-            .collect();
-        let mut columns = vec![Column {
-            name: "figure",
-            unit: "",
-            cells: Cells::Texts(&labels),
-        }];
-        columns.extend(names.iter().zip(&values).map(|(name, values)| Column {
-            name,
-            unit: "",
-            cells: Cells::Numbers(values),
-        }));
-        // With two runs the difference is what one looks for.
-        let change: Vec<f64> = match values.as_slice() {
-            [a, b] => a.iter().zip(b).map(|(a, b)| 100.0 * (b - a) / a.abs()).collect(),
-            _ => Vec::new(),
-        };
-        if !change.is_empty() {
-            columns.push(Column {
-                name: "second against first",
-                unit: "%",
-                cells: Cells::Numbers(&change),
-            });
-        }
-        page.table(title, "Units are the endings of the names.", &columns)?;
+    let labels: Vec<String> = rows.iter().map(|r| (*r).to_owned()).collect();
+    let values: Vec<Vec<f64>> = by_name
+        .iter()
+        .map(|of| {
+            rows.iter()
+                .map(|row| of.get(row).copied().unwrap_or(f64::NAN))
+                .collect()
+        })
+        .collect();
+    let mut columns = vec![Column {
+        name: "figure",
+        unit: "",
+        cells: Cells::Texts(&labels),
+    }];
+    columns.extend(names.iter().zip(&values).map(|(name, values)| Column {
+        name,
+        unit: "",
+        cells: Cells::Numbers(values),
+    }));
+    // With two runs the difference is what one looks for.
+    let change: Vec<f64> = match values.as_slice() {
+        [a, b] => a.iter().zip(b).map(|(a, b)| 100.0 * (b - a) / a.abs()).collect(),
+        _ => Vec::new(),
+    };
+    if !change.is_empty() {
+        columns.push(Column {
+            name: "second against first",
+            unit: "%",
+            cells: Cells::Numbers(&change),
+        });
     }
-    Ok(())
+    let note = "Units are the endings of the names.";
+    if headlines {
+        page.table("Headline figures", note, &columns)
+    } else {
+        page.folded_table("All other figures", note, &columns)
+    }
 }
 
-/// Columns over the distance from the start, as a line of a lap view.
-fn lap_line<'a>(name: &'a str, trace: &Trace, panels: &[usize], placed: bool) -> Option<LapLine<'a>> {
-    let station = trace.column(&["station", "distance"])?;
-    // What came from elsewhere may not rise.
-    let which: Vec<usize> = (0..station.len())
-        .scan(f64::NEG_INFINITY, |last, i| {
-            let rises = station[i] > *last;
-            if rises {
-                *last = station[i];
-            }
-            Some(rises.then_some(i))
-        })
-        .flatten()
-        .collect();
-    let pick =
-        |values: &[f64]| -> Option<Vec<f64>> { which.iter().map(|&i| values.get(i).copied()).collect() };
-    let traces: Vec<LapTrace<'a>> = panels
-        .iter()
-        .enumerate()
-        .filter_map(|(row, &panel)| {
-            Some(LapTrace {
-                panel: row,
-                values: pick(trace.column(PANELS[panel].0)?)?,
-                band: None,
-            })
-        })
-        .collect();
-    let place = trace
-        .column(&["x"])
-        .and_then(pick)
-        .zip(trace.column(&["y"]).and_then(pick));
-    let x = pick(station)?;
-    (x.len() > 1 && !traces.is_empty()).then(|| LapLine {
-        name,
-        x,
-        traces,
-        place_m: place.filter(|_| placed).map_or(Vec::new(), |(x, y)| {
-            x.into_iter().zip(y).map(DVec2::from).collect()
-        }),
-        wide: false,
-    })
+/// A lap on the way into the page: what it has at places that rise.
+struct Lap<'a> {
+    trace: &'a Trace,
+    /// Rows whose station is beyond all before it: what came from elsewhere may not rise.
+    rows: Vec<usize>,
+    station_m: Vec<f64>,
 }
+
+impl<'a> Lap<'a> {
+    fn new(trace: &'a Trace) -> Option<Self> {
+        let station = trace.column(&["station", "distance"])?;
+        let mut rows = Vec::new();
+        let mut last = f64::NEG_INFINITY;
+        for (i, &s) in station.iter().enumerate() {
+            if s > last {
+                rows.push(i);
+                last = s;
+            }
+        }
+        let station_m: Vec<f64> = rows.iter().map(|&i| station[i]).collect();
+        (rows.len() > 1).then_some(Self {
+            trace,
+            rows,
+            station_m,
+        })
+    }
+
+    fn column(&self, names: &[&str]) -> Option<Vec<f64>> {
+        let values = self.trace.column(names)?;
+        self.rows.iter().map(|&i| values.get(i).copied()).collect()
+    }
+
+    fn length_m(&self) -> f64 {
+        self.station_m.last().copied().unwrap_or(f64::NAN)
+    }
+
+    /// Time since the start (s) where a share of the stations is behind.
+    fn clock(&self) -> Option<impl Fn(f64) -> f64> {
+        let (time, station, length) = (self.column(&["time"])?, self.station_m.clone(), self.length_m());
+        Some(move |share: f64| {
+            let at = share * length;
+            let after = station.partition_point(|s| *s <= at).clamp(1, station.len() - 1);
+            let (s0, s1) = (station[after - 1], station[after]);
+            time[after - 1] + (at - s0) / (s1 - s0) * (time[after] - time[after - 1])
+        })
+    }
+}
+
+/// Lines of one circuit differ by less than this share in length.
+const ONE_CIRCUIT: f64 = 0.06;
 
 fn laps(page: &mut HtmlReport, runs: &[Run], names: &[String]) -> Result<()> {
-    let best: Vec<(&String, &Trace)> = runs
+    let best: Vec<(&Run, &String, Lap<'_>)> = runs
         .iter()
         .zip(names)
-        .filter_map(|(run, name)| Some((name, run.traces.first()?)))
+        .filter_map(|(run, name)| Some((run, name, Lap::new(run.traces.first()?)?)))
         .collect();
     // What two runs have, or the only run has, can be laid over one another.
     let enough = best.len().min(2);
     let has = |panel: &usize| {
-        best.iter()
-            .filter(|(_, t)| t.column(PANELS[*panel].0).is_some())
-            .count()
-            >= enough
+        let with = best
+            .iter()
+            .filter(|(.., lap)| lap.trace.column(PANELS[*panel].0).is_some());
+        with.count() >= enough
     };
     let panels: Vec<usize> = (0..PANELS.len()).filter(has).collect();
-    if best.is_empty() || panels.is_empty() {
+    let Some((first, _, lap)) = best.first().filter(|_| !panels.is_empty()) else {
         return Ok(());
-    }
-    let track = runs.iter().find_map(|r| r.said("track"));
-    let one_track = runs
-        .iter()
-        .all(|r| r.said("track").is_none_or(|t| Some(t) == track));
+    };
+    let length_m = lap.length_m();
+    let track = first.said("track");
+    let alike = |run: &Run, lap: &Lap<'_>| {
+        run.said("track")
+            .is_none_or(|t| track.is_none_or(|first| first == t))
+            && (lap.length_m() / length_m - 1.0).abs() < ONE_CIRCUIT
+    };
+    let one_track = best.iter().all(|(run, _, lap)| alike(run, lap));
+    let clock = if one_track { lap.clock() } else { None };
     let labels: Vec<String> = best
         .iter()
-        .map(|(name, trace)| format!("{name}: {}", said_of(&trace.name)))
+        .map(|(_, name, lap)| format!("{name}: {}", said_of(&lap.trace.name)))
         .collect();
     let lines: Vec<LapLine<'_>> = best
         .iter()
         .zip(&labels)
-        .filter_map(|((_, trace), label)| lap_line(label, trace, &panels, one_track))
+        .map(|((.., lap), name)| {
+            let stretch = if one_track { length_m / lap.length_m() } else { 1.0 };
+            let row = |(row, &panel): (usize, &usize)| {
+                Some(LapTrace {
+                    panel: row,
+                    values: lap.column(PANELS[panel].0)?,
+                    band: None,
+                })
+            };
+            let mut traces: Vec<LapTrace<'_>> = panels.iter().enumerate().filter_map(row).collect();
+            if let (Some(first), Some(mine)) = (&clock, lap.clock()) {
+                let lost = |s: &f64| mine(s / lap.length_m()) - first(s / lap.length_m());
+                traces.push(LapTrace {
+                    panel: panels.len(),
+                    values: lap.station_m.iter().map(lost).collect(),
+                    band: None,
+                });
+            }
+            let place = lap.column(&["x"]).zip(lap.column(&["y"])).filter(|_| one_track);
+            LapLine {
+                name,
+                x: lap.station_m.iter().map(|s| s * stretch).collect(),
+                traces,
+                place_m: place.map_or(Vec::new(), |(x, y)| {
+                    x.into_iter().zip(y).map(DVec2::from).collect()
+                }),
+                wide: false,
+            }
+        })
+        .filter(|line| !line.traces.is_empty())
         .collect();
-    if lines.is_empty() {
-        return Ok(());
-    }
+    let mut rows: Vec<LapPanel<'_>> = panels
+        .iter()
+        .map(|&panel| LapPanel {
+            label: PANELS[panel].1,
+            unit: PANELS[panel].2,
+            height: 1.0,
+        })
+        .collect();
+    rows.extend(clock.as_ref().map(|_| LapPanel {
+        label: "time lost",
+        unit: "s",
+        height: 1.0,
+    }));
     page.section(
         "Laps",
         "The quickest line of each run, or what it fitted to its log.",
     );
     let mapped = lines.iter().any(|line| !line.place_m.is_empty());
+    let edges = best
+        .iter()
+        .find_map(|(run, ..)| edges(run.road.as_ref()?))
+        .unwrap_or_default();
     page.lap(&LapView {
         title: "Laps over one another",
+        note: if one_track {
+            "Distances are stretched to the first lap's length, so that what is beside each other on the road stands above \
+             each other; time lost is against that lap."
+        } else {
+            "The laps are of different tracks: only their distances are shared."
+        },
         x_label: "distance",
         x_unit: "m",
-        panels: panels
-            .iter()
-            .map(|&panel| LapPanel {
-                label: PANELS[panel].1,
-                unit: PANELS[panel].2,
-                height: 1.0,
-            })
-            .collect(),
+        panels: rows,
         lines,
-        map: mapped.then(LapMap::default),
+        map: mapped.then(|| LapMap {
+            left_edge_m: &edges[0],
+            right_edge_m: &edges[1],
+            closed: true,
+            names: Vec::new(),
+        }),
         ..LapView::default()
     })
+}
+
+/// Left and right edge of a road (m), from its line and the widths at right angles to it.
+fn edges(road: &Trace) -> Option<[Vec<DVec2>; 2]> {
+    let [x, y] = [road.column(&["x_m"])?, road.column(&["y_m"])?];
+    let [right, left] = [road.column(&["w_tr_right_m"])?, road.column(&["w_tr_left_m"])?];
+    let n = [x.len(), y.len(), right.len(), left.len()].into_iter().min()?;
+    let at = |i: usize| DVec2::new(x[i % n], y[i % n]);
+    let edge = |widths: &[f64], side: f64| -> Vec<DVec2> {
+        (0..n)
+            .map(|i| at(i) + side * widths[i] * (at(i + 1) - at(i + n - 1)).normalize_or_zero().perp())
+            .collect()
+    };
+    (n > 2).then(|| [edge(left, 1.0), edge(right, -1.0)])
 }
 
 /// What a file's name says of its line: `line_least_curved` is `least curved`.

@@ -55,6 +55,8 @@ pub struct Run {
     pub settings: Option<String>,
     /// Its laps, the best first.
     pub traces: Vec<Trace>,
+    /// The reference line of its road with the widths beside it, where it has one.
+    pub road: Option<Trace>,
     /// Limits over speed, where it has any.
     pub envelope: Option<Trace>,
     /// Best cost over evaluations, where it kept them.
@@ -111,6 +113,7 @@ impl Run {
             figures,
             settings: read_text(&folder.join("study.toml"))?,
             traces: read_traces(folder)?,
+            road: table("racetrack_reference.csv")?,
             envelope: table("envelope.csv")?,
             convergence: table("convergence.csv")?,
         })

@@ -7,9 +7,10 @@ use super::setup::{CHANNELS, Setup};
 use crate::error::Result;
 use crate::evaluate::replay::{CHANNEL_NAMES, CHANNEL_UNITS};
 use crate::report::{
-    Cells, Column, Curve, CurvePanel, Front, HtmlReport, LapLine, LapMap, LapPanel, LapTrace, LapView,
-    Objective, Scale, ShadedSection, significant,
+    Cells, Column, Curve, CurvePanel, Front, HtmlReport, LapLine, LapPanel, LapTrace, LapView, Objective,
+    Scale, significant,
 };
+use crate::study::circuit_view;
 use std::path::Path;
 
 pub(super) fn write(
@@ -27,22 +28,10 @@ pub(super) fn write(
     let mut page = HtmlReport::new("identify", &format!("{car} identified from {source}"));
     head(&mut page, car, &source, outcome, summary);
     page.section("Lap", "What was measured, and what the fitted car does when it is driven by the same steering and wheel speeds.");
-    let edges = setup.circuit.as_ref().map(|c| [c.left_edge(), c.right_edge()]);
+    let edges = setup.circuit.as_ref().map(circuit_view::edges);
     let mut view = lap(setup, judged);
-    view.map = setup
-        .circuit
-        .as_ref()
-        .zip(edges.as_ref())
-        .map(|(circuit, [left, right])| LapMap {
-            left_edge_m: left,
-            right_edge_m: right,
-            closed: circuit.closed,
-            names: circuit
-                .sections
-                .iter()
-                .map(|s| (s.name.as_str(), circuit.position_at(0.5 * (s.start_m + s.end_m))))
-                .collect(),
-        });
+    let circuit = setup.circuit.as_ref().zip(edges.as_ref());
+    view.map = circuit.map(|(c, edges)| circuit_view::map(c, edges));
     page.lap(&view)?;
     channels(&mut page, summary)?;
     parameters(&mut page, summary)?;
@@ -216,14 +205,7 @@ fn lap<'a>(setup: &'a Setup, judged: &Judged) -> LapView<'a> {
             line("fitted", &|k, i| judged.outputs[k][i], 0, false),
             line("error", &|k, i| judged.outputs[k][i] - measured[k][i], 1, false),
         ],
-        sections: setup.circuit.as_ref().map_or(Vec::new(), |circuit| {
-            let shaded = circuit.sections.iter().map(|s| ShadedSection {
-                name: &s.name,
-                start: s.start_m,
-                end: s.end_m,
-            });
-            shaded.collect()
-        }),
+        sections: setup.circuit.as_ref().map_or(Vec::new(), circuit_view::sections),
         map: None,
     }
 }

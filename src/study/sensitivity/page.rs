@@ -4,7 +4,8 @@ use super::results::{LABELS, ParameterSensitivity, Summary, one_at_a_time_panels
 use super::{LEVELS, Outcome, SobolIndex};
 use crate::error::Result;
 use crate::evaluate::replay::CHANNEL_UNITS;
-use crate::report::{Cells, Column, HtmlReport, LapLine, LapMap, LapPanel, LapTrace, LapView, ShadedSection};
+use crate::report::{Cells, Column, HtmlReport, LapLine, LapPanel, LapTrace, LapView};
+use crate::study::circuit_view;
 use crate::study::identify::Setup;
 use std::path::Path;
 
@@ -148,7 +149,7 @@ fn table(page: &mut HtmlReport, summary: &Summary) -> Result<()> {
 fn bands(page: &mut HtmlReport, setup: &Setup, outcome: &Outcome) -> Result<()> {
     let band = &outcome.band;
     let circuit = setup.circuit.as_ref();
-    let edges = circuit.map(|c| [c.left_edge(), c.right_edge()]);
+    let edges = circuit.map(circuit_view::edges);
     let change = |ends: &[Vec<f64>]| -> Vec<Vec<f64>> {
         let of = |(end, base): (&Vec<f64>, &Vec<f64>)| end.iter().zip(base).map(|(e, b)| e - b).collect();
         ends.iter().zip(&band.base).map(of).collect()
@@ -187,25 +188,9 @@ fn bands(page: &mut HtmlReport, setup: &Setup, outcome: &Outcome) -> Result<()> 
             })
             .collect(),
         lines: vec![line("greatest", &high, true), line("least", &low, false)],
-        sections: circuit.map_or(Vec::new(), |c| {
-            let shaded = c.sections.iter().map(|s| ShadedSection {
-                name: &s.name,
-                start: s.start_m,
-                end: s.end_m,
-            });
-            shaded.collect()
-        }),
+        sections: circuit.map_or(Vec::new(), circuit_view::sections),
         map: circuit
             .zip(edges.as_ref())
-            .map(|(circuit, [left, right])| LapMap {
-                left_edge_m: left,
-                right_edge_m: right,
-                closed: circuit.closed,
-                names: circuit
-                    .sections
-                    .iter()
-                    .map(|s| (s.name.as_str(), circuit.position_at(0.5 * (s.start_m + s.end_m))))
-                    .collect(),
-            }),
+            .map(|(c, edges)| circuit_view::map(c, edges)),
     })
 }

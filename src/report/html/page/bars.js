@@ -30,7 +30,8 @@ draw.bars = (place, data) => {
       series: series.flatMap((s, i) => [
         { name: s.name, type: "bar", data: s.values, itemStyle: { color: seriesColour(i), opacity: 0.85 }, barMaxWidth: 16 },
         ...(s.interval ? [{
-          name: s.name, type: "custom", silent: true, z: 5, data: categories.map((_, row) => [s.values[row], row]), encode: { x: 0, y: 1 },
+          // Both ends go into the axis's range.
+          name: s.name, type: "custom", silent: true, z: 5, data: categories.map((_, row) => [s.interval[0][row], s.interval[1][row], row]), encode: { x: [0, 1], y: 2 },
           renderItem: (params, api) => {
             const row = params.dataIndex;
             const layout = api.barLayout({ barMaxWidth: 16, count: series.length })[i];

@@ -34,7 +34,7 @@ function number(value, figures = 4) {
   if (value === null || value === undefined || !Number.isFinite(value)) return "–";
   if (value === 0) return "0";
   const size = Math.abs(value);
-  if (size >= 1e-3 && size < 1e6) {
+  if (size >= 1e-4 && size < 1e6) {
     const decimals = Math.max(0, figures - 1 - Math.floor(Math.log10(size)));
     return value.toFixed(decimals).replace("-", "−");
   }

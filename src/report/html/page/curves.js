@@ -18,7 +18,7 @@ draw.curves = (place, data) => {
     grid: { left: 74, right: 20, top: 26, bottom: labels.length ? 74 : 46 },
     xAxis: axis(data.x_label, { type: data.x_scale === "log" ? "log" : "value" }),
     yAxis: axis(data.y_label, { type: data.y_scale === "log" ? "log" : "value", nameGap: 52 }),
-    legend: legend(labels),
+    legend: legend(labels.map((name) => ({ name, icon: "roundRect", itemStyle: { opacity: 1 } })), { itemHeight: 4 }),
     tooltip: tooltip(overX
       ? { trigger: "axis", formatter: (items) => tip(`${data.x_label}: ${number(items[0].value[0], 5)}`, rows(items)) }
       : { trigger: "item", formatter: (p) => tip(`${data.x_label}: ${number(p.value[0], 5)}`, rows([p])) }),
@@ -27,7 +27,8 @@ draw.curves = (place, data) => {
     series: curves.map((curve, i) => ({
       name: curve.label, type: "line", data: points(curve), showSymbol: curve.x.length === 1, symbol: "circle", symbolSize: overX ? 5 : 4,
       lineStyle: { color: colour(curve, i), width: 1.8 }, itemStyle: { color: colour(curve, i) }, triggerLineEvent: !overX,
-      ...(overX ? {} : { showSymbol: true, showAllSymbol: true, symbolSize: 3 }),
+      // Points that show under the mouse only are what the mouse finds.
+      ...(overX ? {} : { showSymbol: true, showAllSymbol: true, symbolSize: 6, itemStyle: { color: colour(curve, i), opacity: 0 }, emphasis: { itemStyle: { opacity: 1 } } }),
     })),
   });
   const chart = mount(place, 360, option, dragToZoom);

@@ -1,6 +1,7 @@
 // Values over two quantities: cells of colour, lines of constant value, marks.
 
 const LEVELS = 10;
+const HEAT_PX = 440;
 
 // Ends of the cells about rising values.
 function cellEnds(values) {
@@ -87,5 +88,9 @@ draw.heat = (place, data) => {
       ],
     };
   };
-  mount(place, 440, option);
+  const [flat, solid] = [element("div"), element("div")];
+  place.classList.add("pair");
+  place.append(flat, solid);
+  mount(flat, HEAT_PX, option);
+  surface(solid, HEAT_PX, { x, y, values, low, high, xLabel: data.x_label, yLabel: data.y_label, valueLabel: data.value_label, format: shownValue, marked: data.marked });
 };
