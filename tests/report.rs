@@ -2,8 +2,8 @@
 
 use glam::DVec2;
 use lapswarm::report::{
-    BarPanel, BarSeries, Cells, Column, Curve, CurvePanel, Front, HeatMap, HtmlReport, LapLine, LapMap,
-    LapPanel, LapTrace, LapView, Objective, ParameterRow, Scale, ShadedSection,
+    BarPanel, BarSeries, Cells, Column, Curve, CurvePanel, Front, HtmlReport, LapLine, LapMap, LapPanel,
+    LapTrace, LapView, Objective, ParameterRow, Scale, ShadedSection, SurfaceFigure,
 };
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -163,28 +163,22 @@ fn everything(path: &Path) {
     })
     .unwrap();
     let steps: Vec<f64> = (0..30).map(f64::from).collect();
-    let bowl: Vec<Vec<f64>> = steps
+    let bowl = |x: &f64, y: &f64| (x - 9.0).powi(2) + (y - 20.0).powi(2) + 1.0;
+    let z: Vec<f64> = steps
         .iter()
-        .map(|y| {
-            steps
-                .iter()
-                .map(|x| (x - 9.0).powi(2) + (y - 20.0).powi(2) + 1.0)
-                .collect()
-        })
+        .flat_map(|y| steps.iter().map(move |x| bowl(x, y)))
         .collect();
-    page.heat_map(&HeatMap {
+    let surface = SurfaceFigure {
         title: HOSTILE,
-        note: HOSTILE,
         x_label: HOSTILE,
-        x: &steps,
         y_label: HOSTILE,
+        z_label: HOSTILE,
+        x: &steps,
         y: &steps,
-        value_label: HOSTILE,
-        values: &bowl,
-        scale: Scale::Log,
-        marked: vec![(9.0, 20.0, HOSTILE)],
-    })
-    .unwrap();
+        z: &z,
+        marks: vec![(HOSTILE, [9.0, 20.0])],
+    };
+    page.surface(&surface, HOSTILE).unwrap();
     let bars = BarPanel {
         title: HOSTILE,
         x_label: HOSTILE,

@@ -11,6 +11,7 @@ mod replay_flags;
 mod report;
 mod sensitivity;
 mod simulate;
+mod surface;
 
 use clap::{Args, Parser, Subcommand};
 use lapswarm::evaluate::replay::BackendChoice;
@@ -49,6 +50,8 @@ enum Command {
     Sensitivity(Box<sensitivity::Arguments>),
     /// Lay runs side by side on one page: figures, laps, limits.
     Report(report::Arguments),
+    /// Draw the costs of a lap over two parameters of a car.
+    Surface(Box<surface::Arguments>),
     /// List the GPUs that evaluations can run on, with their limits.
     Devices(devices::Arguments),
     /// Hold every kernel on this machine against the f64 reference.
@@ -125,6 +128,7 @@ pub fn run() -> ExitCode {
         Command::Envelope(arguments) => envelope::run(&arguments),
         Command::Sensitivity(arguments) => sensitivity::run(&arguments),
         Command::Report(arguments) => report::run(&arguments),
+        Command::Surface(arguments) => surface::run(&arguments),
         Command::Devices(arguments) => devices::run(&arguments),
         Command::Parity(arguments) => parity::run(&arguments),
         Command::Bench(arguments) => bench::run(&arguments),

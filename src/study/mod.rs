@@ -7,3 +7,4 @@ pub mod identify;
 pub mod raceline;
 pub mod run_folder;
 pub mod sensitivity;
+pub mod surface;

@@ -3,7 +3,7 @@
 use super::escape::{Numbers, raised};
 use super::lap::LapData;
 use super::thin::{POINTS, picked, thinned};
-use crate::report::{BarPanel, BarSeries, CurvePanel, Objective, ParameterRow};
+use crate::report::{BarPanel, BarSeries, CurvePanel, Objective, ParameterRow, SurfaceFigure};
 use crate::{Error, Result};
 use serde::Serialize;
 use std::path::Path;
@@ -34,30 +34,8 @@ pub struct Front<'a> {
     pub marked: Vec<(usize, &'a str)>,
 }
 
-/// Values over two quantities.
-#[derive(Clone, Debug, Default)]
-pub struct HeatMap<'a> {
-    /// What is shown.
-    pub title: &'a str,
-    /// What a reader should know of it; may be empty.
-    pub note: &'a str,
-    /// Horizontal quantity and unit.
-    pub x_label: &'a str,
-    /// Its values, rising.
-    pub x: &'a [f64],
-    /// Vertical quantity and unit.
-    pub y_label: &'a str,
-    /// Its values, rising.
-    pub y: &'a [f64],
-    /// The value and its unit.
-    pub value_label: &'a str,
-    /// Rows of constant `y`, one value per `x` each; gaps where not finite.
-    pub values: &'a [Vec<f64>],
-    /// How colours follow values.
-    pub scale: Scale,
-    /// Places (x, y) to mark, with their names.
-    pub marked: Vec<(f64, f64, &'a str)>,
-}
+/// Values along each side of a surface that go into a page at most.
+const GRID: usize = 100;
 
 #[derive(Serialize)]
 pub(super) struct CurveData {
@@ -107,14 +85,13 @@ pub(super) enum Chart {
     Parameters {
         rows: Vec<ParameterData>,
     },
-    Heat {
+    Surface {
         x_label: String,
         y_label: String,
         value_label: String,
         x: Numbers,
         y: Numbers,
         values: Vec<Numbers>,
-        scale: Scale,
         marked: Vec<(f64, f64, String)>,
     },
     Bars {
@@ -195,33 +172,34 @@ impl Chart {
         }
     }
 
-    pub fn heat(map: &HeatMap<'_>) -> Result<Self> {
-        let fits = map.values.len() == map.y.len() && map.values.iter().all(|row| row.len() == map.x.len());
-        if map.x.len() < 2 || map.y.len() < 2 || !fits {
-            return refused(
-                map.title,
-                "another number of values",
-                "a row per y, a value per x",
-            );
+    /// Also how many of how many values a side keeps, where that is fewer.
+    pub fn surface(figure: &SurfaceFigure<'_>) -> Result<(Self, Option<(usize, usize)>)> {
+        let (nx, ny) = (figure.x.len(), figure.y.len());
+        if nx < 2 || ny < 2 || nx * ny != figure.z.len() || !figure.z.iter().any(|v| v.is_finite()) {
+            return refused(figure.title, "another number of values", "a finite one per pair");
         }
-        Ok(Self::Heat {
-            x_label: map.x_label.to_owned(),
-            y_label: map.y_label.to_owned(),
-            value_label: map.value_label.to_owned(),
-            x: Numbers::new(map.x.iter().copied()),
-            y: Numbers::new(map.y.iter().copied()),
-            values: map
-                .values
+        // The ends stay; what is between them is as even as it can be.
+        let kept = |n: usize| -> Vec<usize> {
+            let count = n.min(GRID);
+            (0..count).map(|i| i * (n - 1) / (count - 1)).collect()
+        };
+        let (columns, rows) = (kept(nx), kept(ny));
+        let thinned = (nx.max(ny) > GRID).then(|| (columns.len().max(rows.len()), nx.max(ny)));
+        let row = |j: &usize| Numbers::new(columns.iter().map(|i| figure.z[j * nx + i]));
+        let chart = Self::Surface {
+            x_label: figure.x_label.to_owned(),
+            y_label: figure.y_label.to_owned(),
+            value_label: figure.z_label.to_owned(),
+            x: Numbers::new(picked(figure.x, &columns)),
+            y: Numbers::new(picked(figure.y, &rows)),
+            values: rows.iter().map(row).collect(),
+            marked: figure
+                .marks
                 .iter()
-                .map(|row| Numbers::new(row.iter().copied()))
+                .map(|(n, [x, y])| (*x, *y, (*n).to_owned()))
                 .collect(),
-            scale: map.scale,
-            marked: map
-                .marked
-                .iter()
-                .map(|(x, y, n)| (*x, *y, (*n).to_owned()))
-                .collect(),
-        })
+        };
+        Ok((chart, thinned))
     }
 
     pub fn bars(panel: &BarPanel<'_>) -> Result<Self> {

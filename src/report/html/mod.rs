@@ -11,12 +11,12 @@ mod lap;
 mod page;
 mod thin;
 
-pub use charts::{Front, HeatMap, Scale};
+pub use charts::{Front, Scale};
 pub use lap::{LapLine, LapMap, LapPanel, LapTrace, LapView};
 
 use super::files::write_whole;
 use super::table::{Cells, Column, plain_digits};
-use super::{BarPanel, CurvePanel, ParameterRow};
+use super::{BarPanel, CurvePanel, ParameterRow, SurfaceFigure};
 use crate::{Error, Result};
 use charts::Chart;
 use escape::{html, json_in_script, raised};
@@ -166,13 +166,18 @@ impl HtmlReport {
         self.chart(title, note, Chart::parameters(rows));
     }
 
-    /// Values over two quantities.
+    /// A cost over two parameters, from above and in space. Colours go with the root of the cost above its least, which
+    /// spreads a basin's bottom.
     ///
     /// # Errors
-    /// [`Error::Input`] when there is not one value per pair.
-    pub fn heat_map(&mut self, map: &HeatMap<'_>) -> Result<()> {
-        let chart = Chart::heat(map)?;
-        self.chart(map.title, map.note, chart);
+    /// [`Error::Input`] when there is not one value per pair, or none that is finite.
+    pub fn surface(&mut self, figure: &SurfaceFigure<'_>, note: &str) -> Result<()> {
+        let (chart, thinned) = Chart::surface(figure)?;
+        let mut note = note.to_owned();
+        if let Some((kept, of)) = thinned {
+            note += &format!(" Drawn are {kept} of up to {of} values along a side.");
+        }
+        self.chart(figure.title, note.trim(), chart);
         Ok(())
     }
 

@@ -11,10 +11,12 @@ pub use results::{Summary, summarise, write_results};
 pub use sobol::{DesignOutputs, MOST_SAMPLES, MOST_VARIABLES, SobolIndex, design, indices};
 
 use crate::error::{Error, Result};
-use crate::evaluate::replay::{CHANNEL_NAMES, ReplayProblem, open_evaluator, trace};
+use crate::evaluate::replay::kernel::drive_window;
+use crate::evaluate::replay::{CHANNEL_NAMES, ReplayProblem, Window, open_evaluator, trace};
 use crate::evaluate::{BackendInfo, Evaluator};
 use crate::study::identify::{FreeParameter, IdentifySettings, ObjectiveChoice, Setup, set_up};
-use crate::vehicle::Car;
+use crate::vehicle::tyre::Tyre;
+use crate::vehicle::{Car, CarModel, LinearTyre, MagicFormula, TyreModel};
 use rayon::prelude::*;
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -201,11 +203,47 @@ pub fn set_up_sensitivity(settings: &SensitivitySettings) -> Result<Setup> {
     let names: Vec<String> = settings.replay.free.iter().map(|f| f.name.clone()).collect();
     settings.validate()?;
     let channels = (0..CHANNEL_NAMES.len()).map(ObjectiveChoice::Channel);
-    set_up(&IdentifySettings {
+    let mut setup = set_up(&IdentifySettings {
         free: ranges_about(&settings.replay, &names, settings.share)?,
         objectives: std::iter::once(ObjectiveChoice::All).chain(channels).collect(),
         ..settings.replay.clone()
-    })
+    })?;
+    start_as_base_drives(&mut setup.replay);
+    Ok(setup)
+}
+
+/// Lets every window start from the state in which the base car comes there, lateral speed and roll with it, which no
+/// log has: the base car's cost is then that of whole laps, and what others add is their own. A window that the base car
+/// does not reach starts as before.
+pub(crate) fn start_as_base_drives(replay: &mut ReplayProblem) {
+    fn chained<T: Tyre<f64>>(replay: &mut ReplayProblem, car: &CarModel<f64, T>) {
+        let mut before: Option<Window<f64>> = None;
+        for k in 0..replay.plan.windows.len() {
+            let window = replay.plan.windows[k];
+            if let Some(before) = before.filter(|b| b.start < window.start) {
+                let between = Window {
+                    end: window.start + 1,
+                    ..before
+                };
+                let (drives, state) = drive_window(car, &replay.plan, &between, |_, _| {});
+                if drives {
+                    replay.plan.windows[k].initial = state.to_array();
+                }
+            }
+            before = Some(replay.plan.windows[k]);
+        }
+    }
+    let base = replay.base().to_vec();
+    match replay.tyre_model() {
+        TyreModel::MagicFormula => {
+            let car = CarModel::<f64, MagicFormula<f64>>::from_parameters(|i| base[i]);
+            chained(replay, &car);
+        }
+        TyreModel::Linear => {
+            let car = CarModel::<f64, LinearTyre<f64>>::from_parameters(|i| base[i]);
+            chained(replay, &car);
+        }
+    }
 }
 
 /// Candidates of one call of the evaluator: enough to fill any device for a moment, few enough to be interrupted.

@@ -31,12 +31,12 @@ function contour(x, y, values, level) {
   return pieces;
 }
 
-draw.heat = (place, data) => {
+draw.surface = (place, data) => {
   const { x, y } = data;
-  const log = data.scale === "log";
-  const of = (v) => (v === null || (log && v <= 0) ? null : log ? Math.log10(v) : v);
-  const values = data.values.map((row) => row.map(of));
-  const shownValue = (v) => number(log ? 10 ** v : v, 3);
+  const [least] = extent(data.values.flat());
+  // The root of the value above its least: it spreads a basin's bottom.
+  const values = data.values.map((row) => row.map((v) => (v === null ? null : Math.sqrt(v - least))));
+  const shownValue = (v) => number(least + v * v, 3);
   const [low, high] = extent(values.flat());
   const [xEnds, yEnds] = [cellEnds(x), cellEnds(y)];
   const cells = values.flatMap((row, j) => row.map((v, i) => [x[i], y[j], v, i, j])).filter((cell) => cell[2] !== null);

@@ -1,0 +1,88 @@
+//! `lapswarm surface`.
+
+use super::replay_flags::ReplayFlags;
+use super::{Common, print_json, progress, stop_flag};
+use lapswarm::study::run_folder;
+use lapswarm::study::surface::{SurfaceSettings, measure, set_up_surface, summarise, write_results};
+use lapswarm::{Error, Result};
+use std::ops::ControlFlow;
+use std::path::PathBuf;
+use std::sync::atomic::Ordering;
+
+/// Flags of `surface`; a flag wins over the study file.
+#[derive(clap::Args)]
+#[command(
+    after_help = "Examples:\n  lapswarm surface\n  lapswarm surface --parameters K,C --share 0.5 --grid 101"
+)]
+pub struct Arguments {
+    /// A study file, as `identify` reads it, with parameters, share and grid beside
+    study: Option<PathBuf>,
+    #[command(flatten)]
+    common: Common,
+    #[command(flatten)]
+    replay: ReplayFlags,
+    /// The horizontal and the vertical parameter [default: rBy1,rCy1]
+    #[arg(long, value_name = "X,Y", value_delimiter = ',', num_args = 1)]
+    parameters: Option<Vec<String>>,
+    /// How far each goes either way, as a share of its value [default: 0.2]
+    #[arg(long, value_name = "SHARE")]
+    share: Option<f64>,
+    /// Values of each [default: 41]
+    #[arg(long, value_name = "N")]
+    grid: Option<usize>,
+}
+
+impl Arguments {
+    fn settings(&self) -> Result<SurfaceSettings> {
+        let mut s = match &self.study {
+            Some(path) => SurfaceSettings::read(path)?,
+            None => SurfaceSettings::default(),
+        };
+        self.replay.apply(&self.common, &mut s.replay);
+        if let Some(names) = &self.parameters {
+            s.parameters = <[String; 2]>::try_from(names.clone()).map_err(|names| {
+                Error::input(
+                    "the flags",
+                    "--parameters",
+                    names.join(","),
+                    "two names with a comma between",
+                )
+            })?;
+        }
+        s.share = self.share.or(s.share);
+        s.grid = self.grid.unwrap_or(s.grid);
+        Ok(s)
+    }
+}
+
+/// Runs the study.
+pub fn run(arguments: &Arguments) -> Result<()> {
+    let settings = arguments.settings()?;
+    let setup = set_up_surface(&settings)?;
+    let folder = run_folder::create("surface", arguments.common.out.as_deref())?;
+    let stop = stop_flag();
+    let bar = progress::counting(arguments.common.quiet);
+    bar.set_length((settings.grid * settings.grid) as u64);
+    let outcome = measure(&settings, &setup, |done| {
+        bar.set_position(done as u64);
+        if stop.load(Ordering::Relaxed) {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        }
+    })?;
+    bar.finish_and_clear();
+    let summary = summarise(&settings, &setup, &outcome);
+    write_results(&folder, &settings, &setup, &outcome, &summary)?;
+    if !arguments.common.quiet {
+        print!("{}", summary.to_text());
+        println!("Results: {}", folder.display());
+    }
+    if arguments.common.json {
+        print_json(&summary)?;
+    }
+    if outcome.interrupted {
+        return Err(Error::Interrupted(folder));
+    }
+    Ok(())
+}

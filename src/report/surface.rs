@@ -1,0 +1,196 @@
+//! A cost over two parameters: levels from above, and the surface in space.
+
+use super::axis::{Axis, Labels, Plot, extent};
+use super::canvas::{Align, Canvas, Type, draw_to_file};
+use super::style::{FAINT_INK, INK, LABEL_PX, TICK_PX, VERMILLION, WHITE, significant, viridis};
+use crate::{Error, Result};
+use contour::ContourBuilder;
+use std::path::Path;
+
+/// A cost over an even grid of two parameters.
+#[derive(Clone, Debug)]
+pub struct SurfaceFigure<'a> {
+    /// Above it.
+    pub title: &'a str,
+    /// Horizontal parameter with its unit.
+    pub x_label: &'a str,
+    /// Vertical parameter with its unit.
+    pub y_label: &'a str,
+    /// The cost with its unit.
+    pub z_label: &'a str,
+    /// Values of the horizontal parameter, evenly spaced and ascending.
+    pub x: &'a [f64],
+    /// Values of the vertical parameter, likewise.
+    pub y: &'a [f64],
+    /// The cost, row by row of `y`; what is not finite is left white.
+    pub z: &'a [f64],
+    /// Places to mark, with their names.
+    pub marks: Vec<(&'a str, [f64; 2])>,
+}
+
+const SIZE: (f64, f64) = (1400.0, 640.0);
+/// Levels between the least and the greatest cost.
+const LEVELS: usize = 12;
+
+/// Draws the levels and the surface beside each other to an SVG file. Colours and levels go with the root of the cost
+/// above its least, which spreads a basin's bottom.
+///
+/// # Errors
+/// [`Error::Input`] when the grid is smaller than 2 by 2, does not fit the costs, or has nothing finite; [`Error::Io`]
+/// when the file cannot be written.
+pub fn plot_surface(path: impl AsRef<Path>, figure: &SurfaceFigure<'_>) -> Result<()> {
+    let path = path.as_ref();
+    let (nx, ny) = (figure.x.len(), figure.y.len());
+    let range = extent(figure.z);
+    let Some((least, most)) = range.filter(|_| nx >= 2 && ny >= 2 && nx * ny == figure.z.len()) else {
+        let found = format!("{nx} by {ny} places and {} costs", figure.z.len());
+        return Err(Error::input(
+            path,
+            "grid",
+            found,
+            "2 by 2 places or more, one cost each, some of them finite",
+        ));
+    };
+    let spread = (most - least).max(1e-300);
+    let share = move |z: f64| ((z - least) / spread).max(0.0).sqrt();
+    draw_to_file(path, SIZE, figure.title, |canvas| {
+        draw_levels(canvas, figure, &share, (least, spread));
+        draw_in_space(canvas, figure, &share);
+        draw_scale(canvas, figure, (least, spread));
+    })
+}
+
+fn draw_levels(
+    canvas: &mut Canvas<'_>,
+    figure: &SurfaceFigure<'_>,
+    share: &dyn Fn(f64) -> f64,
+    (least, spread): (f64, f64),
+) {
+    let (nx, ny) = (figure.x.len(), figure.y.len());
+    let step = |v: &[f64]| (v[v.len() - 1] - v[0]) / (v.len() - 1) as f64;
+    let (dx, dy) = (step(figure.x), step(figure.y));
+    let plot = Plot {
+        x: Axis::linear(
+            (figure.x[0] - 0.5 * dx, figure.x[nx - 1] + 0.5 * dx),
+            (110.0, 610.0),
+        ),
+        y: Axis::linear(
+            (figure.y[0] - 0.5 * dy, figure.y[ny - 1] + 0.5 * dy),
+            (560.0, 70.0),
+        ),
+    };
+    for (row, y) in figure.y.iter().enumerate() {
+        for (column, x) in figure.x.iter().enumerate() {
+            let z = figure.z[row * nx + column];
+            if z.is_finite() {
+                // A little more than the cell, so that no seams show between neighbours.
+                let left = (plot.x.at(x - 0.5 * dx), plot.y.at(y + 0.5 * dy));
+                let right = (plot.x.at(x + 0.5 * dx) + 0.3, plot.y.at(y - 0.5 * dy) + 0.3);
+                canvas.rect(left, right, viridis(share(z)), 1.0);
+            }
+        }
+    }
+    let finite: Vec<f64> = figure
+        .z
+        .iter()
+        .map(|z| if z.is_finite() { *z } else { least + 4.0 * spread })
+        .collect();
+    let thresholds: Vec<f64> = (1..LEVELS)
+        .map(|i| least + spread * (i as f64 / LEVELS as f64).powi(2))
+        .collect();
+    // The builder counts places from the corner of their cell.
+    if let Ok(lines) = ContourBuilder::new(nx, ny, true).lines(&finite, &thresholds) {
+        for line in lines.iter().flat_map(|l| &l.geometry().0) {
+            let points = line.coords().map(|c| {
+                let x = figure.x[0] + (c.x - 0.5) * dx;
+                let y = figure.y[0] + (c.y - 0.5) * dy;
+                (plot.x.at(x), plot.y.at(y))
+            });
+            canvas.path(points, WHITE, 0.8);
+        }
+    }
+    plot.draw_axes(
+        canvas,
+        Labels {
+            x: Some(figure.x_label),
+            y: Some(figure.y_label),
+            x_ticks: 6,
+            y_ticks: 8,
+        },
+    );
+    for (name, at) in &figure.marks {
+        let at = (plot.x.at(at[0]), plot.y.at(at[1]));
+        canvas.dot(at, 5.0, WHITE, 1.0);
+        canvas.dot(at, 3.6, VERMILLION, 1.0);
+        // Names read inwards, away from the frame.
+        let (side, align) = if at.0 > 560.0 {
+            (-9.0, Align::Right)
+        } else {
+            (9.0, Align::Left)
+        };
+        canvas.text(name, (at.0 + side, at.1), Type::new(TICK_PX, WHITE, align).bold());
+    }
+}
+
+/// The surface seen from the front right and above, drawn from the back to the front.
+fn draw_in_space(canvas: &mut Canvas<'_>, figure: &SurfaceFigure<'_>, share: &dyn Fn(f64) -> f64) {
+    let (nx, ny) = (figure.x.len(), figure.y.len());
+    let (turn, tilt) = (0.62f64, 0.52f64);
+    let project = |u: f64, v: f64, w: f64| -> (f64, f64) {
+        let (a, b) = (u - 0.5, v - 0.5);
+        let across = a * turn.cos() - b * turn.sin();
+        let away = a * turn.sin() + b * turn.cos();
+        let up = w * tilt.cos() + away * tilt.sin();
+        (985.0 + 390.0 * across, 450.0 - 330.0 * up)
+    };
+    let floor = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0), (0.0, 0.0)];
+    canvas.path(floor.map(|(u, v)| project(u, v, 0.0)), FAINT_INK, 0.8);
+    let place = |column: usize, row: usize| -> Option<(f64, f64)> {
+        let z = figure.z[row * nx + column];
+        let (u, v) = (column as f64 / (nx - 1) as f64, row as f64 / (ny - 1) as f64);
+        z.is_finite().then(|| project(u, v, 0.75 * share(z)))
+    };
+    for row in (0..ny - 1).rev() {
+        for column in (0..nx - 1).rev() {
+            let corners = [
+                (column, row),
+                (column + 1, row),
+                (column + 1, row + 1),
+                (column, row + 1),
+            ];
+            let points: Vec<(f64, f64)> = corners.iter().filter_map(|(c, r)| place(*c, *r)).collect();
+            if points.len() == 4 {
+                let mean = corners
+                    .iter()
+                    .map(|(c, r)| share(figure.z[r * nx + c]))
+                    .sum::<f64>()
+                    / 4.0;
+                canvas.polygon(points.iter().copied(), viridis(mean));
+                canvas.path(points.iter().copied().chain([points[0]]), WHITE, 0.25);
+            }
+        }
+    }
+    let look = |align| Type::new(LABEL_PX, INK, align);
+    let (near, right) = (project(0.5, -0.1, 0.0), project(1.1, 0.55, 0.0));
+    canvas.text(figure.x_label, (near.0, near.1 + 6.0), look(Align::Right));
+    canvas.text(figure.y_label, (right.0 + 4.0, right.1 + 14.0), look(Align::Left));
+}
+
+fn draw_scale(canvas: &mut Canvas<'_>, figure: &SurfaceFigure<'_>, (least, spread): (f64, f64)) {
+    let (left, right, y) = (760.0, 1220.0, 600.0);
+    for i in 0..92 {
+        let at = left + (right - left) * f64::from(i) / 92.0;
+        canvas.rect((at, y), (at + 5.3, y + 12.0), viridis(f64::from(i) / 91.0), 1.0);
+    }
+    for i in 0..=4 {
+        let part = f64::from(i) / 4.0;
+        let text = significant(least + spread * part * part, 3);
+        canvas.text(
+            &text,
+            (left + part * (right - left), y + 24.0),
+            Type::new(TICK_PX, INK, Align::Centre),
+        );
+    }
+    let look = Type::new(LABEL_PX, INK, Align::Left);
+    canvas.text(figure.z_label, (right + 22.0, y + 6.0), look);
+}
