@@ -61,7 +61,7 @@ draw.lap = (place, lap) => {
     const t = theme();
     const last = panels.length - 1;
     const series = lines.flatMap((line, i) => line.traces.flatMap((trace) => {
-      const common = { name: seriesName(i), xAxisIndex: trace.panel, yAxisIndex: trace.panel, silent: true, zlevel: 1 };
+      const common = { name: seriesName(i), xAxisIndex: trace.panel, yAxisIndex: trace.panel, silent: true };
       const curve = {
         ...common, type: "line", data: line.x.map((x, k) => [x, trace.values[k]]), showSymbol: false, sampling: "lttb", emphasis: { disabled: true },
         lineStyle: line.wide ? { color: seriesColour(i), width: 4, opacity: 0.45 } : { color: seriesColour(i), width: 1.4 }, itemStyle: { color: seriesColour(i) }, z: 10 + i,
@@ -69,7 +69,7 @@ draw.lap = (place, lap) => {
       return trace.band ? [bandSeries(common, line.x, trace.band, seriesColour(i)), curve] : [curve];
     }));
     const areas = panels.map((_, k) => ({
-      type: "line", data: [], xAxisIndex: k, yAxisIndex: k, silent: true, zlevel: 0,
+      type: "line", data: [], xAxisIndex: k, yAxisIndex: k, silent: true,
       markArea: {
         silent: true, itemStyle: { color: t.shade }, label: { show: k === 0, position: "insideTop", color: t.faint, fontSize: 10 },
         data: lap.sections.map((s) => [{ name: s.name, xAxis: s.start }, { xAxis: s.end }]),

@@ -45,7 +45,7 @@ function trackMap(place, lap, shown, onHover) {
     return closed && all.length ? [...all, all[0]] : all;
   };
   const plain = (id, data, colour, width) => ({
-    id, type: "line", data, showSymbol: false, silent: true, lineStyle: { color: colour, width }, emphasis: { disabled: true }, zlevel: 0,
+    id, type: "line", data, showSymbol: false, silent: true, lineStyle: { color: colour, width }, emphasis: { disabled: true },
   });
 
   const values = () => {
@@ -81,7 +81,7 @@ function trackMap(place, lap, shown, onHover) {
       xAxis: { ...bare, ...seen.xAxis }, yAxis: { ...bare, ...seen.yAxis },
       series: [
         {
-          id: "road", type: "custom", silent: true, data: road.length ? [0] : [], zlevel: 0, z: 0,
+          id: "road", type: "custom", silent: true, data: road.length ? [0] : [], z: 0,
           renderItem: (_, api) => ({
             type: "polygon", shape: { points: [...road[0], ...road[1].slice().reverse()].map((p) => api.coord(p)) }, style: { fill: t.road },
           }),
@@ -90,7 +90,7 @@ function trackMap(place, lap, shown, onHover) {
         ...lines.filter((other) => other.index !== coloured.line && shown(other.index))
           .map((other) => plain(`line-${other.index}`, points(other.place, false), seriesColour(other.index), 1.2)),
         {
-          id: "coloured", type: "custom", silent: true, data: strokes.map((_, i) => i), zlevel: 0, z: 5,
+          id: "coloured", type: "custom", silent: true, data: strokes.map((_, i) => i), z: 5,
           renderItem: (params, api) => {
             const { shade, from, to } = strokes[params.dataIndex];
             const run = [];
@@ -100,7 +100,7 @@ function trackMap(place, lap, shown, onHover) {
           },
         },
         {
-          id: "names", type: "scatter", silent: true, symbolSize: 0.1, data: map.names.map(([label, x, y]) => ({ value: [x, y], name: label })), zlevel: 0, z: 8,
+          id: "names", type: "scatter", silent: true, symbolSize: 0.1, data: map.names.map(([label, x, y]) => ({ value: [x, y], name: label })), z: 8,
           label: { show: true, formatter: (p) => p.name, color: t.ink, fontSize: 11, textBorderColor: t.paper, textBorderWidth: 3, distance: 9, position: "top" },
           labelLayout: { hideOverlap: true },
         },

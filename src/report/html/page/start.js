@@ -10,6 +10,8 @@ const redrawAll = () => {
   for (const { chart, draw } of drawn) {
     chart.resize();
     draw();
+    // At once: a printer does not wait for the next frame.
+    chart.getZr?.().flush();
   }
 };
 let pending = 0;
@@ -19,8 +21,21 @@ addEventListener("resize", () => {
 });
 darkColours.addEventListener("change", redrawAll);
 // On paper the light colours, at the width of the paper.
-addEventListener("beforeprint", () => { printing = true; redrawAll(); });
-addEventListener("afterprint", () => { printing = false; redrawAll(); });
+const folded = new Set();
+addEventListener("beforeprint", () => {
+  printing = true;
+  for (const fold of document.querySelectorAll("details:not([open])")) {
+    folded.add(fold);
+    fold.open = true;
+  }
+  redrawAll();
+});
+addEventListener("afterprint", () => {
+  printing = false;
+  for (const fold of folded) fold.open = false;
+  folded.clear();
+  redrawAll();
+});
 
 function sortBy(table, column, descending) {
   const key = (row) => {
