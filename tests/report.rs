@@ -145,7 +145,7 @@ fn everything(path: &Path) {
     };
     page.parameters(HOSTILE, HOSTILE, &[row(1.0, Some(1.1)), row(0.4, None)]);
     let points: Vec<Vec<f64>> = (0..40)
-        .map(|i| f64::from(i))
+        .map(f64::from)
         .map(|i| vec![i, 40.0 - i, (i - 20.0).powi(2)])
         .collect();
     page.front(&Front {
@@ -338,6 +338,13 @@ fn pages_work_in_a_browser() {
     let [first, second] = [first, second].map(|f| f.display().to_string());
     let run = lapswarm(&["report", &first, &second, "--out", page.to_str().unwrap()]);
     assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+    let html = std::fs::read_to_string(&page).unwrap();
+    let (_, data) = html.split_once("id=\"charts\">").unwrap();
+    let data: serde_json::Value = serde_json::from_str(data.split_once("</script>").unwrap().0).unwrap();
+    // The road of the first run lies under the lines, and the first run loses no time on itself.
+    assert_eq!(data[0]["map"]["left"][0].as_array().unwrap().len(), 60);
+    let lost = data[0]["lines"][0]["traces"].as_array().unwrap().last().unwrap();
+    assert!(lost["values"].as_array().unwrap().iter().all(|v| v == 0));
     let findings = used(&browser, &page);
     // Laps and four limits.
     sound(&findings, 5);

@@ -221,12 +221,9 @@ fn read_table(path: &Path) -> Result<Option<Trace>> {
         .headers()
         .map_err(refuse)?
         .iter()
-        .map(|head| {
-            head.split_once(" (")
-                .map_or(head, |(name, _)| name)
-                .trim()
-                .to_owned()
-        })
+        // Without units, and without the mark of a comment that the racetrack format begins with.
+        .map(|head| head.split_once(" (").map_or(head, |(name, _)| name))
+        .map(|name| name.trim_start_matches('#').trim().to_owned())
         .collect();
     let mut columns: Vec<(String, Vec<f64>)> = names.into_iter().map(|n| (n, Vec::new())).collect();
     for record in reader.records() {

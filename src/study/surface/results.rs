@@ -231,14 +231,15 @@ fn begun_page(setup: &Setup, summary: &Summary) -> HtmlReport {
         if let Some(least) = least {
             let [at_x, at_y] = least.at.map(|v| significant(v, 5));
             page.sentence(format!(
-                "The cost of {name} is least, {}, where {x} is {at_x} and {y} is {at_y}.",
+                "The cost of {} is least, {}, where {x} is {at_x} and {y} is {at_y}.",
+                if name == "all" { "all channels" } else { name },
                 significant(least.cost, 4)
             ));
         }
     }
     if summary.failed > 0 {
         page.warning(format!(
-            "{} of {} cars did not drive; they are left white.",
+            "{} of {} cars did not drive; they are left out.",
             summary.failed, summary.evaluations
         ));
     }
