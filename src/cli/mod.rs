@@ -9,9 +9,11 @@ mod progress;
 mod raceline;
 mod replay_flags;
 mod report;
+mod run;
 mod sensitivity;
 mod simulate;
 mod surface;
+mod transient;
 
 use clap::{Args, Parser, Subcommand};
 use lapswarm::evaluate::replay::BackendChoice;
@@ -38,6 +40,8 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
+    /// The whole way from a log to a lap: the car, its limits, its line, and that line driven.
+    Run(Box<run::Arguments>),
     /// Find a car's unknown parameters from a logged lap; with no argument, on the bundled lap.
     Identify(Box<identify::Arguments>),
     /// Drive a car round a circuit and log it.
@@ -52,6 +56,8 @@ enum Command {
     Report(report::Arguments),
     /// Draw the costs of a lap over two parameters of a car.
     Surface(Box<surface::Arguments>),
+    /// Drive a racing line with the 4DOF car and a driver, and set its lap beside the point mass's.
+    Transient(transient::Arguments),
     /// List the GPUs that evaluations can run on, with their limits.
     Devices(devices::Arguments),
     /// Hold every kernel on this machine against the f64 reference.
@@ -122,6 +128,7 @@ pub fn run() -> ExitCode {
         .with_max_level(tracing::Level::WARN)
         .init();
     let outcome = match cli.command {
+        Command::Run(arguments) => run::run(&arguments),
         Command::Identify(arguments) => identify::run(&arguments),
         Command::Simulate(arguments) => simulate::run(&arguments),
         Command::Raceline(arguments) => raceline::run(&arguments),
@@ -129,6 +136,7 @@ pub fn run() -> ExitCode {
         Command::Sensitivity(arguments) => sensitivity::run(&arguments),
         Command::Report(arguments) => report::run(&arguments),
         Command::Surface(arguments) => surface::run(&arguments),
+        Command::Transient(arguments) => transient::run(&arguments),
         Command::Devices(arguments) => devices::run(&arguments),
         Command::Parity(arguments) => parity::run(&arguments),
         Command::Bench(arguments) => bench::run(&arguments),

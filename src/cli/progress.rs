@@ -91,3 +91,17 @@ pub fn counting(quiet: bool) -> ProgressBar {
     }
     bar
 }
+
+/// A line that says what is being done, or a silent one.
+pub fn saying(quiet: bool) -> ProgressBar {
+    let target = if quiet {
+        ProgressDrawTarget::hidden()
+    } else {
+        ProgressDrawTarget::stderr()
+    };
+    let bar = ProgressBar::with_draw_target(None, target);
+    if let Ok(style) = ProgressStyle::with_template("{spinner} {elapsed_precise} {msg}") {
+        bar.set_style(style);
+    }
+    bar
+}

@@ -41,7 +41,7 @@ pub fn check_line(line: &FineLine, right_m: &[DVec2], left_m: &[DVec2], car_widt
 }
 
 /// Distance from a polyline (m), positive to its left.
-fn leftward_distance(point: DVec2, polyline: &[DVec2], closed: bool) -> f64 {
+pub(crate) fn leftward_distance(point: DVec2, polyline: &[DVec2], closed: bool) -> f64 {
     let n = polyline.len();
     let segments = if closed { n } else { n.saturating_sub(1) };
     let mut nearest = f64::INFINITY;

@@ -17,6 +17,7 @@ mod spline;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use check::leftward_distance;
 pub use check::{Clearance, check_line};
 pub use fine::FineLine;
 pub use geometry::{Geometry, geometry};

@@ -5,7 +5,7 @@ use crate::error::{Error, Result};
 use crate::track::Circuit;
 use crate::vehicle::model::runge_kutta_step;
 use crate::vehicle::tyre::Tyre;
-use crate::vehicle::{Car, CarInput, CarModel, CarState, LinearTyre, MagicFormula, TyreModel};
+use crate::vehicle::{Car, CarInput, CarModel, CarState, LinearTyre, MagicFormula, TyreModel, steady_car};
 use glam::DVec2;
 
 /// How the driver drives.
@@ -21,6 +21,71 @@ pub struct DriverSettings {
     pub preview_s: f64,
     /// Speed not to exceed, m/s.
     pub top_speed_mps: f64,
+    /// How much the driver steers against an angle to the path, rad per rad.
+    pub heading_gain: f64,
+    /// Acceleration that the driver adds for every m/s that the plan is ahead, 1/s.
+    pub speed_gain_1ps: f64,
+    /// What the driver knows of the car, if anything.
+    pub knowledge: Option<CarKnowledge>,
+}
+
+/// What a driver who knows the car reckons with: without it the car's own angle to its path looks like an error to steer
+/// against, and a foot that is down in a bend takes grip that the bend needs.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CarKnowledge {
+    /// Slip angle of the rear axle for every m/s^2 of lateral acceleration (rad s^2/m): it turns the car into the bend.
+    pub rear_slip_per_ay: f64,
+    /// Lateral acceleration that the tyres give for every m/s^2 of load over mass: a coefficient of friction.
+    pub friction: f64,
+}
+
+impl CarKnowledge {
+    /// From the car's steady states in bends at 60% to 90% of the greatest lateral acceleration.
+    ///
+    /// # Errors
+    /// [`Error::Study`] if the car has none.
+    pub fn of_car(car: &Car) -> Result<Self> {
+        let c = &car.chassis;
+        let steady = steady_car(car);
+        let mut slips = Vec::new();
+        let mut frictions = Vec::new();
+        for speed in [25.0f64, 40.0, 55.0] {
+            let trims = steady.cornering(speed, car.max_steer_rad.max(0.3));
+            let most = trims.iter().map(|t| t.ay_mps2).fold(0.0, f64::max);
+            let load = c.gravity + 0.5 * c.air_density * c.lift_area * speed * speed / c.mass;
+            frictions.push(most / load);
+            let ridge = trims.iter().position(|t| t.ay_mps2 == most).unwrap_or(0);
+            slips.extend(
+                trims[..=ridge.min(trims.len().saturating_sub(1))]
+                    .iter()
+                    .filter(|t| (0.6..0.9).contains(&(t.ay_mps2 / most)))
+                    // Without slip the rear axle follows the path: its share of the angle is geometry.
+                    .map(|t| c.cg_to_rear / (speed * speed) - t.sideslip_rad / t.ay_mps2),
+            );
+        }
+        if slips.is_empty() {
+            return Err(Error::Study(format!("{} has no steady state in bends", car.name)));
+        }
+        Ok(Self {
+            rear_slip_per_ay: slips.iter().sum::<f64>() / slips.len() as f64,
+            friction: frictions.iter().copied().fold(f64::INFINITY, f64::min),
+        })
+    }
+}
+
+impl DriverSettings {
+    /// A driver who knows the car and follows a line as closely as it can be followed.
+    ///
+    /// # Errors
+    /// As [`CarKnowledge::of_car`].
+    pub fn racing(car: &Car) -> Result<Self> {
+        Ok(Self {
+            heading_gain: 0.8,
+            speed_gain_1ps: 3.0,
+            knowledge: Some(CarKnowledge::of_car(car)?),
+            ..Self::default()
+        })
+    }
 }
 
 impl Default for DriverSettings {
@@ -31,6 +96,9 @@ impl Default for DriverSettings {
             slip_stiffness: 18.0,
             preview_s: 0.25,
             top_speed_mps: 70.0,
+            heading_gain: 0.55,
+            speed_gain_1ps: 1.8,
+            knowledge: None,
         }
     }
 }
@@ -48,6 +116,16 @@ pub struct Drive {
     pub offset_m: Vec<f64>,
 }
 
+impl Drive {
+    /// Time of the lap (s), whose length (m) and sample interval (s) are given: the samples' own, less what the first
+    /// was late and more what the last was short.
+    pub fn lap_time_s(&self, length_m: f64, interval_s: f64) -> Option<f64> {
+        let (first, last) = (self.station_m.first()?, self.station_m.last()?);
+        let (from, to) = (self.states.first()?[0], self.states.last()?[0]);
+        Some((self.states.len() - 1) as f64 * interval_s + (length_m - last) / to + first / from)
+    }
+}
+
 /// Integration step of the closed loop, s.
 const STEP: f64 = 1e-3;
 /// Time constant with which wheel slip follows the pedals, s.
@@ -61,12 +139,28 @@ const STEER_RATE: f64 = 0.9;
 /// # Errors
 /// [`Error::Study`] if the car spins or leaves the track, saying where.
 pub fn drive(car: &Car, circuit: &Circuit, settings: &DriverSettings, interval_s: f64) -> Result<Drive> {
+    let plan = SpeedPlan::new(car, circuit, settings.pace, settings.top_speed_mps);
+    drive_planned(car, circuit, plan, settings, interval_s)
+}
+
+/// As [`drive`], at the speeds of `plan` instead of the driver's own.
+///
+/// # Errors
+/// As [`drive`].
+pub fn drive_planned(
+    car: &Car,
+    circuit: &Circuit,
+    plan: SpeedPlan,
+    settings: &DriverSettings,
+    interval_s: f64,
+) -> Result<Drive> {
     let flat = car.to_flat();
     match car.tyre_model() {
         TyreModel::MagicFormula => drive_model::<MagicFormula<f64>>(
             &CarModel::from_parameters(|i| flat[i]),
             car,
             circuit,
+            plan,
             settings,
             interval_s,
         ),
@@ -74,6 +168,7 @@ pub fn drive(car: &Car, circuit: &Circuit, settings: &DriverSettings, interval_s
             &CarModel::from_parameters(|i| flat[i]),
             car,
             circuit,
+            plan,
             settings,
             interval_s,
         ),
@@ -101,19 +196,33 @@ impl Driver<'_> {
         // Feed-forward: geometry plus the understeer of a car near its limit; feedback: offset, heading and
         // the yaw rate that the present curvature asks for.
         let understeer = 0.0025 * curvature * v * v / c.gravity * wheelbase;
-        let heading = heading_error + offset * 0.9 / (v * 0.45 + 3.0);
+        let bend = self.circuit.curvature_at(station);
+        let sideslip = self
+            .settings
+            .knowledge
+            .map_or(0.0, |k| c.cg_to_rear * bend - k.rear_slip_per_ay * bend * v * v);
+        let heading = heading_error + sideslip + offset * 0.9 / (v * 0.45 + 3.0);
         let yaw_lack = self.circuit.curvature_at(station + 0.08 * v) * v - state.body.yaw_rate;
-        let wanted = wheelbase * curvature + understeer - 0.55 * heading + 0.045 * yaw_lack;
+        let wanted =
+            wheelbase * curvature + understeer - self.settings.heading_gain * heading + 0.045 * yaw_lack;
         let wanted = wanted.clamp(-self.car.max_steer_rad, self.car.max_steer_rad);
         let rate = ((wanted - self.steer) / STEER_LAG).clamp(-STEER_RATE, STEER_RATE);
         self.steer += rate * STEP;
 
         let planned = self.plan.speed_at(station + 0.1 * v);
-        let wanted = self.plan.acceleration_at(station + 0.15 * v) + 1.8 * (planned - state.body.vx);
+        let behind = planned - state.body.vx;
+        let wanted = self.plan.acceleration_at(station + 0.15 * v) + self.settings.speed_gain_1ps * behind;
         let drag = 0.5 * c.air_density * c.drag_area * v * v;
         let force = c.mass * wanted + drag;
         let weight = c.mass * c.gravity + 0.5 * c.air_density * c.lift_area * v * v;
-        let limit = self.settings.slip_limit;
+        // What a bend leaves of the tyres, by the friction circle.
+        let left = self.settings.knowledge.map_or(1.0, |k| {
+            let used = (state.body.yaw_rate * v / (k.friction * weight / c.mass))
+                .abs()
+                .min(1.0);
+            (1.0 - used * used).max(0.01).sqrt()
+        });
+        let limit = self.settings.slip_limit * left;
         let (front, rear) = if force >= 0.0 {
             let most = self
                 .car
@@ -162,10 +271,10 @@ fn drive_model<T: Tyre<f64>>(
     model: &CarModel<f64, T>,
     car: &Car,
     circuit: &Circuit,
+    plan: SpeedPlan,
     settings: &DriverSettings,
     interval_s: f64,
 ) -> Result<Drive> {
-    let plan = SpeedPlan::new(car, circuit, settings.pace, settings.top_speed_mps);
     let begin = circuit.length_m - RUN_UP.min(0.4 * circuit.length_m);
     let mut state = CarState::straight(plan.speed_at(begin));
     let mut driver = Driver {

@@ -5,7 +5,7 @@ mod lap;
 mod sensors;
 mod speed_plan;
 
-pub use driver::{Drive, DriverSettings, drive};
+pub use driver::{CarKnowledge, Drive, DriverSettings, drive, drive_planned};
 pub use lap::{SimulateSettings, simulate_lap};
 pub use sensors::{SensorSettings, distort};
 pub use speed_plan::SpeedPlan;

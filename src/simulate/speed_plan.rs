@@ -97,6 +97,31 @@ impl SpeedPlan {
         Self { spacing_m, speed_mps }
     }
 
+    /// A plan of given speeds (m/s) at rising stations (m) of a closed lap of this length (m), the first at nought.
+    pub fn of_speeds(station_m: &[f64], speed_mps: &[f64], length_m: f64) -> Self {
+        let count = (length_m / SPACING).round().max(8.0) as usize;
+        let spacing_m = length_m / count as f64;
+        let n = station_m.len();
+        let mut before = 0;
+        let speeds = (0..count).map(|i| {
+            let at = i as f64 * spacing_m;
+            while before + 1 < n && station_m[before + 1] <= at {
+                before += 1;
+            }
+            let (next, end) = if before + 1 < n {
+                (before + 1, station_m[before + 1])
+            } else {
+                (0, length_m)
+            };
+            let share = ((at - station_m[before]) / (end - station_m[before])).clamp(0.0, 1.0);
+            speed_mps[before] + share * (speed_mps[next] - speed_mps[before])
+        });
+        Self {
+            spacing_m,
+            speed_mps: speeds.collect(),
+        }
+    }
+
     /// The planned speed (m/s) at a station (m), linear between grid points, periodic.
     pub fn speed_at(&self, station_m: f64) -> f64 {
         let count = self.speed_mps.len();

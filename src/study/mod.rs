@@ -5,6 +5,8 @@ pub mod compare;
 pub mod envelope;
 pub mod identify;
 pub mod raceline;
+pub mod run;
 pub mod run_folder;
 pub mod sensitivity;
 pub mod surface;
+pub mod transient;

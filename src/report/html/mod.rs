@@ -99,6 +99,18 @@ impl HtmlReport {
         }
     }
 
+    /// Links to pages in folders within the page's own, as in `2_envelope` for `2_envelope/report.html`.
+    pub fn reports_within(&mut self, folders: &[String]) {
+        // Names that need no escape in an address: those that studies give.
+        let plain = |f: &&String| f.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
+        let links: Vec<String> = folders
+            .iter()
+            .filter(plain)
+            .map(|f| format!("<a href=\"{f}/report.html\">{}</a>", f.replace('_', " ")))
+            .collect();
+        self.push(format!("<p>{}</p>\n", links.join(" \u{b7} ")));
+    }
+
     fn push(&mut self, html: String) {
         self.body.push(Block { html, half: false });
     }

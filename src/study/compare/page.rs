@@ -11,7 +11,7 @@ use glam::DVec2;
 /// Runs that a page takes at most: more lines than colours cannot be told apart.
 const MOST_RUNS: usize = 24;
 /// Figures worth a look first, by how their names begin.
-const HEADLINES: [&str; 14] = [
+const HEADLINES: [&str; 17] = [
     "total_parameter_error",
     "swarm_total_parameter_error",
     "rms_error",
@@ -21,6 +21,9 @@ const HEADLINES: [&str; 14] = [
     "hypervolume",
     "front_size",
     "lap_time_s",
+    "point_mass_lap_time_s",
+    "grip_share",
+    "disagreement_percent",
     "scenarios",
     "top_speed_mps",
     "understeer_gradient_deg_per_g",
@@ -36,7 +39,7 @@ const BEST: [&str; 4] = [
 ];
 /// Traces that runs may share: names of their columns, label and unit.
 const PANELS: [(&[&str], &str, &str); 7] = [
-    (&["v", "vx_fitted"], "speed", "m/s"),
+    (&["v", "vx_fitted", "vx"], "speed", "m/s"),
     (&["ax", "ax_fitted"], "ax", "m/s\u{b2}"),
     (&["ay", "ay_fitted"], "ay", "m/s\u{b2}"),
     (&["yaw_rate_fitted", "yaw_rate"], "yaw rate", "rad/s"),
@@ -102,6 +105,7 @@ fn verdict(study: &str) -> Option<(&'static str, &'static str, &'static str)> {
     match study {
         "identify" => Some(("total_parameter_error", "total parameter error", "")),
         "raceline" => Some(("best / lap_time / lap_time_fine_s", "lap time", "s")),
+        "transient" => Some(("lap_time_s", "driven lap", "s")),
         "envelope" => Some(("top_speed_mps", "top speed", "m/s")),
         _ => None,
     }
@@ -283,41 +287,67 @@ impl<'a> Lap<'a> {
 const ONE_CIRCUIT: f64 = 0.06;
 
 fn laps(page: &mut HtmlReport, runs: &[Run], names: &[String]) -> Result<()> {
-    let best: Vec<(&Run, &String, Lap<'_>)> = runs
+    let best: Vec<(&Run, String, &Trace)> = runs
         .iter()
         .zip(names)
-        .filter_map(|(run, name)| Some((run, name, Lap::new(run.traces.first()?)?)))
+        .filter_map(|(run, name)| {
+            let trace = run.traces.first()?;
+            Some((run, format!("{name}: {}", said_of(&trace.name)), trace))
+        })
         .collect();
-    // What two runs have, or the only run has, can be laid over one another.
-    let enough = best.len().min(2);
+    let Some((first, _, trace)) = best.first() else {
+        return Ok(());
+    };
+    let length_m = Lap::new(trace).map_or(f64::NAN, |lap| lap.length_m());
+    let track = first.said("track");
+    let alike = |run: &Run, trace: &Trace| {
+        let length = Lap::new(trace).map_or(f64::NAN, |lap| lap.length_m());
+        run.said("track")
+            .is_none_or(|t| track.is_none_or(|first| first == t))
+            && (length / length_m - 1.0).abs() < ONE_CIRCUIT
+    };
+    let one_track = best.iter().all(|(run, _, trace)| alike(run, trace));
+    let road = best.iter().find_map(|(run, ..)| run.road.as_ref());
+    let labelled: Vec<(&str, &Trace)> = best.iter().map(|(_, label, t)| (label.as_str(), *t)).collect();
+    page.section(
+        "Laps",
+        "The quickest line of each run, or what it fitted to its log.",
+    );
+    overlay(page, &labelled, road, one_track)
+}
+
+/// Lays laps over one another: the traces that two of them share, or the only one has, the time that each loses on the
+/// first and, if all are of `one_track`, where they lie on the `road`.
+pub(crate) fn overlay(
+    page: &mut HtmlReport,
+    named: &[(&str, &Trace)],
+    road: Option<&Trace>,
+    one_track: bool,
+) -> Result<()> {
+    let laps: Vec<(&str, Lap<'_>)> = named
+        .iter()
+        .filter_map(|(name, trace)| Some((*name, Lap::new(trace)?)))
+        .collect();
+    let enough = laps.len().min(2);
     let has = |panel: &usize| {
-        let with = best
+        let with = laps
             .iter()
-            .filter(|(.., lap)| lap.trace.column(PANELS[*panel].0).is_some());
+            .filter(|(_, lap)| lap.trace.column(PANELS[*panel].0).is_some());
         with.count() >= enough
     };
     let panels: Vec<usize> = (0..PANELS.len()).filter(has).collect();
-    let Some((first, _, lap)) = best.first().filter(|_| !panels.is_empty()) else {
+    let Some((_, first)) = laps.first().filter(|_| !panels.is_empty()) else {
         return Ok(());
     };
-    let length_m = lap.length_m();
-    let track = first.said("track");
-    let alike = |run: &Run, lap: &Lap<'_>| {
-        run.said("track")
-            .is_none_or(|t| track.is_none_or(|first| first == t))
-            && (lap.length_m() / length_m - 1.0).abs() < ONE_CIRCUIT
-    };
-    let one_track = best.iter().all(|(run, _, lap)| alike(run, lap));
-    let clock = if one_track { lap.clock() } else { None };
-    let labels: Vec<String> = best
+    let clock = if one_track { first.clock() } else { None };
+    let lines: Vec<LapLine<'_>> = laps
         .iter()
-        .map(|(_, name, lap)| format!("{name}: {}", said_of(&lap.trace.name)))
-        .collect();
-    let lines: Vec<LapLine<'_>> = best
-        .iter()
-        .zip(&labels)
-        .map(|((.., lap), name)| {
-            let stretch = if one_track { length_m / lap.length_m() } else { 1.0 };
+        .map(|(name, lap)| {
+            let stretch = if one_track {
+                first.length_m() / lap.length_m()
+            } else {
+                1.0
+            };
             let row = |(row, &panel): (usize, &usize)| {
                 Some(LapTrace {
                     panel: row,
@@ -360,15 +390,8 @@ fn laps(page: &mut HtmlReport, runs: &[Run], names: &[String]) -> Result<()> {
         unit: "s",
         height: 1.0,
     }));
-    page.section(
-        "Laps",
-        "The quickest line of each run, or what it fitted to its log.",
-    );
     let mapped = lines.iter().any(|line| !line.place_m.is_empty());
-    let edges = best
-        .iter()
-        .find_map(|(run, ..)| edges(run.road.as_ref()?))
-        .unwrap_or_default();
+    let edges = road.and_then(edges).unwrap_or_default();
     page.lap(&LapView {
         title: "Laps over one another",
         note: if one_track {
@@ -409,6 +432,7 @@ fn edges(road: &Trace) -> Option<[Vec<DVec2>; 2]> {
 fn said_of(stem: &str) -> String {
     match stem.strip_prefix("line_") {
         Some(line) => line.replace('_', " "),
+        None if stem == "drive" => "driven".to_owned(),
         None => "fitted".to_owned(),
     }
 }

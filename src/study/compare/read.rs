@@ -203,7 +203,7 @@ fn gather(figures: &mut Vec<Figure>, place: &str, value: &Value) {
 }
 
 /// A table of numbers with a header; empty cells are gaps.
-fn read_table(path: &Path) -> Result<Option<Trace>> {
+pub(crate) fn read_table(path: &Path) -> Result<Option<Trace>> {
     let Some(text) = read_text(path)? else {
         return Ok(None);
     };
@@ -246,7 +246,10 @@ fn read_traces(folder: &Path) -> Result<Vec<Trace>> {
     let entries = folder.read_dir().map_err(|e| Error::io(folder, "read", e))?;
     let mut files: Vec<String> = entries
         .filter_map(|entry| entry.ok()?.file_name().into_string().ok())
-        .filter(|name| (name.starts_with("line_") && name.ends_with(".csv")) || name == "traces.csv")
+        .filter(|name| {
+            (name.starts_with("line_") && name.ends_with(".csv"))
+                || matches!(name.as_str(), "traces.csv" | "drive.csv")
+        })
         .collect();
     files.sort();
     let mut traces = Vec::new();

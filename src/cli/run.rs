@@ -1,0 +1,125 @@
+//! `lapswarm run`.
+
+use super::{Common, backend_flag, print_json, progress, stop_flag};
+use lapswarm::evaluate::BackendChoice;
+use lapswarm::study::run::{RunSettings, run as run_all};
+use lapswarm::study::run_folder;
+use lapswarm::{Error, Result};
+use std::ops::ControlFlow;
+use std::path::PathBuf;
+use std::sync::atomic::Ordering;
+
+/// Flags of `run`; a flag wins over the study file.
+#[derive(clap::Args)]
+#[command(
+    after_help = "Examples:\n  lapswarm run\n  lapswarm run --log lap.csv --car start.toml --track circuit.csv\n\nA study \
+                  file names study files of the stages: identify = \"identify.toml\", raceline = \"raceline.toml\"; \
+                  margin_m and rounds are its own."
+)]
+pub struct Arguments {
+    /// A study file
+    study: Option<PathBuf>,
+    #[command(flatten)]
+    common: Common,
+    /// The log [default: the bundled lap]
+    #[arg(long, value_name = "FILE")]
+    log: Option<PathBuf>,
+    /// The car that fixed parameters come from: a bundled name (gt) or a TOML file
+    #[arg(long, value_name = "NAME|FILE")]
+    car: Option<String>,
+    /// The circuit: a bundled name, a shape, or a file
+    #[arg(long, value_name = "NAME|FILE")]
+    track: Option<String>,
+    /// Room that the line leaves on either side of the car for the driver's errors, m [default: 0.5]
+    #[arg(long, value_name = "M")]
+    margin_m: Option<f64>,
+    /// Most lines that are driven, each within the limits that the one before it left [default: 2]
+    #[arg(long, value_name = "N")]
+    rounds: Option<usize>,
+    /// Where to evaluate: auto, cpu, simd or gpu
+    #[arg(long, value_name = "BACKEND", value_parser = backend_flag)]
+    backend: Option<BackendChoice>,
+    /// Part of the name of the GPU to use
+    #[arg(long, value_name = "NAME")]
+    adapter: Option<String>,
+    /// Where results of stages are kept for runs of the same inputs
+    #[arg(long, value_name = "DIR", default_value = "runs/cache")]
+    cache: PathBuf,
+    /// Do every stage anew, and keep none
+    #[arg(long)]
+    no_cache: bool,
+}
+
+impl Arguments {
+    fn settings(&self) -> Result<RunSettings> {
+        let mut s = match &self.study {
+            Some(path) => RunSettings::read(path)?,
+            None => RunSettings::default(),
+        };
+        if self.log.is_some() {
+            s.identify.log.clone_from(&self.log);
+        }
+        if let Some(car) = &self.car {
+            s.identify.car.clone_from(car);
+        }
+        if let Some(track) = &self.track {
+            s.identify.track = Some(track.clone());
+            s.raceline.track.clone_from(track);
+        }
+        if let Some(backend) = self.backend {
+            (s.identify.backend, s.raceline.backend) = (backend, backend);
+        }
+        if self.adapter.is_some() {
+            s.identify.adapter.clone_from(&self.adapter);
+            s.raceline.adapter.clone_from(&self.adapter);
+        }
+        if let Some(seed) = self.common.seed {
+            (s.identify.seed, s.raceline.seed) = (seed, seed);
+        }
+        s.margin_m = self.margin_m.unwrap_or(s.margin_m);
+        s.rounds = self.rounds.unwrap_or(s.rounds);
+        if !(0.0..=5.0).contains(&s.margin_m) || !(1..=20).contains(&s.rounds) {
+            let found = format!("{} m, {} rounds", s.margin_m, s.rounds);
+            return Err(Error::input(
+                "the flags",
+                "--margin-m, --rounds",
+                found,
+                "0 to 5 m, 1 to 20 rounds",
+            ));
+        }
+        Ok(s)
+    }
+}
+
+/// Runs everything.
+pub fn run(arguments: &Arguments) -> Result<()> {
+    let settings = arguments.settings()?;
+    let folder = run_folder::create("run", arguments.common.out.as_deref())?;
+    let stop = stop_flag();
+    let bar = progress::saying(arguments.common.quiet);
+    let cache = (!arguments.no_cache).then_some(arguments.cache.as_path());
+    let summary = run_all(&settings, &folder, cache, |doing| {
+        bar.set_message(doing.to_owned());
+        bar.tick();
+        if stop.load(Ordering::Relaxed) {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        }
+    })?;
+    bar.finish_and_clear();
+    if !arguments.common.quiet {
+        print!("{}", summary.to_text());
+        println!("Results: {}", folder.display());
+    }
+    if arguments.common.json {
+        print_json(&summary)?;
+    }
+    if summary.agrees {
+        return Ok(());
+    }
+    Err(Error::Study(
+        "the driven lap and the point mass's differ by more than half a percent (see the story above)"
+            .to_owned(),
+    ))
+}

@@ -1,0 +1,210 @@
+//! The whole way from a log to a lap: the car that drove it, its limits, the line that suits it, and that line driven by
+//! the car itself, whose grip is fed back into the limits until both laps agree.
+
+mod page;
+mod stage;
+mod story;
+
+pub use stage::{Inputs, Stages};
+pub use story::{RoundSummary, Summary};
+
+use crate::config::{Document, read_text};
+use crate::error::{Error, Result};
+use crate::line::PointMass;
+use crate::study::envelope::{self, EnvelopeSettings, car_limits};
+use crate::study::identify::{self, IdentifySettings};
+use crate::study::raceline::{self, RacelineSettings};
+use crate::study::transient::{self, TransientSettings};
+use crate::vehicle::{Car, Envelope};
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// Settings of a run.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RunSettings {
+    /// How the car is identified.
+    pub identify: IdentifySettings,
+    /// How the line is found; car and envelope are those of the run.
+    pub raceline: RacelineSettings,
+    /// Room that the line leaves on either side of the car for the driver's errors (m).
+    pub margin_m: f64,
+    /// Most lines that are driven, each within the limits that the one before it left.
+    pub rounds: usize,
+}
+
+impl Default for RunSettings {
+    fn default() -> Self {
+        Self {
+            identify: IdentifySettings::default(),
+            raceline: RacelineSettings::default(),
+            margin_m: 0.5,
+            rounds: 2,
+        }
+    }
+}
+
+impl RunSettings {
+    /// Reads a study file: `identify` and `raceline` name study files of these, `margin_m` and `rounds` are its own.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if a file cannot be read, [`Error::Input`] naming file, line and field if it says something wrong.
+    pub fn read(path: &Path) -> Result<Self> {
+        let text = read_text(path)?;
+        let folder = path.parent().unwrap_or(Path::new(""));
+        let document = Document::parse(path, &text)?;
+        let root = document.root();
+        let mut s = Self::default();
+        if let Some(name) = root.string("identify")? {
+            s.identify = IdentifySettings::read(&folder.join(name))?;
+        }
+        if let Some(name) = root.string("raceline")? {
+            s.raceline = RacelineSettings::read(&folder.join(name))?;
+        }
+        s.margin_m = root.number("margin_m", 0.0, 5.0, "m")?.unwrap_or(s.margin_m);
+        s.rounds = root.integer("rounds", 1, 20)?.map_or(s.rounds, |n| n as usize);
+        root.finish()?;
+        Ok(s)
+    }
+}
+
+/// Change of the grip's share from one line to the next below which another line would be the same.
+const SETTLED: f64 = 0.015;
+
+/// Runs everything into `folder`; results of stages are kept in `cache`, if there is one. `observe` is told what is being
+/// done, and may break the run off.
+///
+/// # Errors
+/// Those of the stages; [`Error::Interrupted`] if the run was broken off.
+pub fn run(
+    settings: &RunSettings,
+    folder: &Path,
+    cache: Option<&Path>,
+    mut observe: impl FnMut(&str) -> ControlFlow<()>,
+) -> Result<Summary> {
+    let began = Instant::now();
+    let stages = Stages::new(folder, cache);
+    let mut reused = Vec::new();
+    let mut keep = |name: &str, stage: (PathBuf, bool)| {
+        if stage.1 {
+            reused.push(name.to_owned());
+        }
+        stage.0
+    };
+    let broken_off = || Error::Interrupted(folder.to_owned());
+
+    let setup = identify::set_up(&settings.identify)?;
+    let mut inputs = Inputs::new("identify");
+    inputs.add(&settings.identify);
+    inputs.add(&(&setup.log, &setup.replay.car, &setup.truth));
+    let stage = stages.run("1_identify", &inputs, |to| {
+        let outcome = identify::search(&settings.identify, &setup, |report| {
+            let done = report.progress.map_or(String::new(), |p| {
+                format!(" {} of {}, best {:.2e}", p.iteration, report.planned, p.best[0])
+            });
+            observe(&format!("the car: {:?}{done}", report.stage).to_lowercase())
+        })?;
+        if outcome.interrupted {
+            return Err(broken_off());
+        }
+        let summary = identify::summarise(&settings.identify, &setup, &outcome);
+        identify::write_results(to, &settings.identify, &setup, &outcome, &summary)
+    })?;
+    let identified = keep("identify", stage);
+    let car_path = identified.join("car.toml");
+    let car = Car::load(&car_path.display().to_string())?;
+
+    if observe("the car's limits").is_break() {
+        return Err(broken_off());
+    }
+    let mut inputs = Inputs::new("envelope");
+    inputs.add(&car);
+    let stage = stages.run("2_envelope", &inputs, |to| {
+        let began = Instant::now();
+        let limits = car_limits(&car, &EnvelopeSettings::default())?;
+        let summary = envelope::summarise(&car.name, &limits, began.elapsed().as_secs_f64());
+        envelope::write_results(to, &limits, &summary)
+    })?;
+    let whole = Envelope::load(keep("envelope", stage).join("envelope.csv"))?;
+
+    let mut rounds: Vec<RoundSummary> = Vec::new();
+    let mut driven_within: Option<PathBuf> = None;
+    for round in 1..=settings.rounds {
+        let number = 1 + 2 * round;
+        let line_settings = RacelineSettings {
+            car: car_path.display().to_string(),
+            envelope: driven_within.clone(),
+            car_width_m: settings.raceline.car_width_m + 2.0 * settings.margin_m,
+            ..settings.raceline.clone()
+        };
+        let line_setup = raceline::set_up(&line_settings)?;
+        let mut inputs = Inputs::new("raceline");
+        // The car is in its limits; where its file lies does not matter.
+        inputs.add(&RacelineSettings {
+            car: String::new(),
+            envelope: None,
+            ..line_settings.clone()
+        });
+        inputs.add(&(&line_setup.cuts, line_setup.car.envelope.rows()));
+        let stage = stages.run(&format!("{number}_raceline"), &inputs, |to| {
+            let outcome = raceline::find_lines(&line_settings, &line_setup, |p| {
+                observe(&format!(
+                    "line {round}: {}, {} lines, best {}",
+                    p.stage, p.evaluations, p.best
+                ))
+            })?;
+            if outcome.interrupted {
+                return Err(broken_off());
+            }
+            let summary = raceline::summarise(&line_settings, &line_setup, &outcome);
+            raceline::write_results(to, &line_settings, &line_setup, &outcome, &summary)
+        })?;
+        let line_folder = keep("raceline", stage);
+        let line_path = line_folder.join("line_fastest.csv");
+
+        if observe(&format!("line {round}: driven by the car")).is_break() {
+            return Err(broken_off());
+        }
+        let points = transient::read_line(&line_path)?;
+        let limits = PointMass {
+            envelope: whole.clone(),
+            ..line_setup.car.clone()
+        };
+        let edges = [line_setup.edges_m[0].as_slice(), line_setup.edges_m[1].as_slice()];
+        let drive_settings = TransientSettings {
+            car_width_m: settings.raceline.car_width_m,
+            ..TransientSettings::default()
+        };
+        let mut inputs = Inputs::new("transient");
+        inputs.add(&(&car, &drive_settings, whole.rows(), &line_setup.edges_m));
+        inputs.add_file(&line_path)?;
+        let stage = stages.run(&format!("{}_transient", number + 1), &inputs, |to| {
+            let began = Instant::now();
+            let outcome = transient::drive_line(&car, &limits, &points, edges, &drive_settings)?;
+            let summary = transient::summarise(&car.name, &outcome, began.elapsed().as_secs_f64());
+            transient::write_results(to, &outcome, &summary)
+        })?;
+        let driven = keep("transient", stage);
+        driven_within = Some(driven.join("envelope_driven.csv"));
+        let found = RoundSummary::read(&line_folder, &driven)?;
+        let settled = rounds
+            .last()
+            .is_some_and(|before| (before.grip_share - found.grip_share).abs() <= SETTLED);
+        rounds.push(found);
+        if settled {
+            break;
+        }
+    }
+    let summary = Summary::put_together(
+        settings,
+        &setup,
+        &identified,
+        &car,
+        &whole,
+        rounds,
+        reused,
+        began.elapsed().as_secs_f64(),
+    )?;
+    summary.write(folder)?;
+    Ok(summary)
+}
