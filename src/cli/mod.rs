@@ -10,6 +10,7 @@ mod parity;
 mod progress;
 mod raceline;
 mod replay_flags;
+mod report;
 mod run;
 mod sensitivity;
 mod simulate;
@@ -54,6 +55,8 @@ enum Command {
     Envelope(envelope::Arguments),
     /// Find how much each parameter of a car matters to each channel of a lap.
     Sensitivity(Box<sensitivity::Arguments>),
+    /// Lay runs side by side on one page: figures, laps, limits.
+    Report(report::Arguments),
     /// Draw the costs of a lap over two parameters of a car.
     Surface(Box<surface::Arguments>),
     /// The same study over a grid of settings and seeds, with medians.
@@ -145,6 +148,7 @@ pub fn run() -> ExitCode {
         Command::Raceline(arguments) => raceline::run(&arguments),
         Command::Envelope(arguments) => envelope::run(&arguments),
         Command::Sensitivity(arguments) => sensitivity::run(&arguments),
+        Command::Report(arguments) => report::run(&arguments),
         Command::Surface(arguments) => surface::run(&arguments),
         Command::Sweep(arguments) => sweep::run(&arguments),
         Command::Transient(arguments) => transient::run(&arguments),

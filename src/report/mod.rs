@@ -1,4 +1,4 @@
-//! Pictures (SVG) and tables of what a study found.
+//! Pictures (SVG), tables and interactive pages of what a study found.
 //!
 //! Every function here takes plain numbers and writes one file, whole or not at all. Numbers that
 //! are not finite are gaps in a curve; a figure without anything to draw is refused.
@@ -9,6 +9,7 @@ mod canvas;
 mod convergence;
 mod curves;
 mod files;
+mod html;
 mod parameters;
 mod pareto;
 mod scaling;
@@ -22,9 +23,11 @@ pub use bars::{BarPanel, BarSeries, plot_bars};
 pub use convergence::{ConvergenceRun, plot_convergence};
 pub use curves::{Curve, CurvePanel, plot_curves};
 pub use files::write_whole;
+pub use html::{Front, HtmlReport, LapLine, LapMap, LapPanel, LapTrace, LapView, Scale};
 pub use parameters::{ParameterRow, plot_parameters};
 pub use pareto::{Objective, plot_pareto};
 pub use scaling::{ScalingSeries, plot_scaling};
+pub use style::significant;
 pub use surface::{SurfaceFigure, plot_surface};
 pub use table::{Cells, Column, text_table, write_csv};
 pub use traces::{ShadedSection, TraceFigure, TracePanel, plot_traces};

@@ -56,7 +56,7 @@ pub(super) fn viridis(share: f64) -> RGBColor {
 
 /// A number to so many significant figures, with a true minus sign and powers of ten where plain
 /// digits would be long.
-pub(super) fn significant(x: f64, figures: usize) -> String {
+pub fn significant(x: f64, figures: usize) -> String {
     if x == 0.0 {
         return "0".to_owned();
     }

@@ -27,7 +27,7 @@ pub struct Column<'a> {
 }
 
 impl Column<'_> {
-    fn len(&self) -> usize {
+    pub(super) fn len(&self) -> usize {
         match self.cells {
             Cells::Numbers(x) => x.len(),
             Cells::Texts(t) => t.len(),
@@ -69,7 +69,7 @@ fn printable(text: &str) -> String {
 }
 
 /// Six significant digits without trailing noughts.
-fn plain_digits(v: f64) -> String {
+pub(super) fn plain_digits(v: f64) -> String {
     if v == 0.0 {
         return "0".to_owned();
     }

@@ -1,5 +1,7 @@
 //! The studies that users run.
 
+mod circuit_view;
+pub mod compare;
 pub mod envelope;
 pub mod identify;
 pub mod raceline;

@@ -1,8 +1,12 @@
 //! Tables and pictures of a car's limits.
 
+mod page;
+
 use super::CarLimits;
 use crate::error::Result;
+use crate::evaluate::BackendInfo;
 use crate::report::{Cells, Column, Curve, CurvePanel, plot_curves, write_csv, write_whole};
+use crate::study::run_folder::{Manifest, write_json};
 use serde::Serialize;
 use std::path::Path;
 
@@ -47,6 +51,15 @@ pub fn summarise(car: &str, limits: &CarLimits, elapsed_s: f64) -> EnvelopeSumma
 }
 
 impl EnvelopeSummary {
+    /// Which way the car is balanced, in words.
+    fn balance(&self) -> String {
+        match (self.characteristic_speed_mps, self.critical_speed_mps) {
+            (Some(v), _) => format!("understeers; characteristic speed {v:.1} m/s"),
+            (_, Some(v)) => format!("oversteers; critical speed {v:.1} m/s"),
+            _ => "steers neutrally".to_owned(),
+        }
+    }
+
     /// The figures in words.
     pub fn to_text(&self, limits: &CarLimits) -> String {
         let mut text = format!(
@@ -60,11 +73,7 @@ impl EnvelopeSummary {
                 r.v_mps, r.ay_mps2, r.ax_grip_mps2, r.ax_drive_mps2, r.drag_mps2
             );
         }
-        let balance = match (self.characteristic_speed_mps, self.critical_speed_mps) {
-            (Some(v), _) => format!("understeers; characteristic speed {v:.1} m/s"),
-            (_, Some(v)) => format!("oversteers; critical speed {v:.1} m/s"),
-            _ => "steers neutrally".to_owned(),
-        };
+        let balance = self.balance();
         text + &format!(
             "Understeer gradient {:.3} deg/g, stability factor {:.3e} s^2/m^2: {balance}\n",
             self.understeer_gradient_deg_per_g, self.stability_factor_s2_per_m2
@@ -72,7 +81,8 @@ impl EnvelopeSummary {
     }
 }
 
-/// Writes `envelope.csv` (as `--envelope` reads it), `cornering.csv`, `summary.json` and `envelope.svg`.
+/// Writes `envelope.csv` (as `--envelope` reads it), `cornering.csv`, `summary.json`, `manifest.json`, `envelope.svg` and
+/// `report.html`.
 ///
 /// # Errors
 /// [`crate::Error::Io`] if a file cannot be written.
@@ -81,7 +91,25 @@ pub fn write_results(folder: &Path, limits: &CarLimits, summary: &EnvelopeSummar
     let json = serde_json::to_string_pretty(summary).unwrap_or_default();
     write_whole(folder.join("summary.json"), json.as_bytes())?;
     write_cornering(&folder.join("cornering.csv"), limits)?;
-    plot(&folder.join("envelope.svg"), limits, summary)
+    let backend = BackendInfo {
+        backend: "cpu",
+        device: "f64".to_owned(),
+        driver: String::new(),
+    };
+    // Nothing here is drawn at random, and flags say all there is to say.
+    let manifest = Manifest {
+        settings: "",
+        ..Manifest::new("envelope", 0, &backend, &summary.car)
+    };
+    write_json(&folder.join("manifest.json"), &manifest)?;
+    with_panels(limits, |panels| {
+        plot_curves(
+            folder.join("envelope.svg"),
+            &format!("Limits of the {}", summary.car),
+            panels,
+        )?;
+        page::write(folder, limits, summary, panels)
+    })
 }
 
 fn write_cornering(path: &Path, limits: &CarLimits) -> Result<()> {
@@ -111,7 +139,8 @@ fn write_cornering(path: &Path, limits: &CarLimits) -> Result<()> {
     write_csv(path, &columns)
 }
 
-fn plot(path: &Path, limits: &CarLimits, summary: &EnvelopeSummary) -> Result<()> {
+/// Hands the curves on, which borrow their labels.
+fn with_panels(limits: &CarLimits, show: impl FnOnce(&[CurvePanel<'_>]) -> Result<()>) -> Result<()> {
     let speeds = &limits.speeds;
     let v: Vec<f64> = speeds.iter().map(|s| s.row.v_mps).collect();
     let shade = |i: usize| Some(i as f64 / (speeds.len() - 1).max(1) as f64);
@@ -195,5 +224,5 @@ fn plot(path: &Path, limits: &CarLimits, summary: &EnvelopeSummary) -> Result<()
                 .collect(),
         },
     ];
-    plot_curves(path, &format!("Limits of the {}", summary.car), &panels)
+    show(&panels)
 }

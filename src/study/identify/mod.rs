@@ -2,6 +2,7 @@
 
 mod coordinates;
 mod identifiability;
+mod page;
 mod polish;
 mod results;
 mod search;

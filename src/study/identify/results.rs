@@ -9,6 +9,7 @@ use crate::report::{
     Cells, Column, ConvergenceRun, Objective, ParameterRow, ShadedSection, TraceFigure, TracePanel, TrackMap,
     plot_convergence, plot_parameters, plot_pareto, plot_traces, plot_track_map, write_csv, write_whole,
 };
+use crate::study::run_folder::{Manifest, write_json};
 use crate::swarm::Mutation;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -198,17 +199,9 @@ pub fn write_results(
     write_json(&folder.join("summary.json"), summary)?;
     write_whole(folder.join("study.toml"), study_toml(settings).as_bytes())?;
     let manifest = Manifest {
-        program: "lapswarm",
-        version: env!("CARGO_PKG_VERSION"),
-        study: "identify",
-        seed: settings.seed,
-        backend: outcome.backend.backend,
-        adapter: &outcome.backend.device,
-        driver: &outcome.backend.driver,
-        log: &setup.log.source,
-        car: &replay.car.name,
-        settings: "study.toml",
+        log: Some(&setup.log.source),
         interrupted: outcome.interrupted,
+        ..Manifest::new("identify", settings.seed, &outcome.backend, &replay.car.name)
     };
     write_json(&folder.join("manifest.json"), &manifest)?;
     replay
@@ -220,28 +213,8 @@ pub fn write_results(
         write_front(folder, setup, front)?;
     }
     let judged = judge_candidate(replay, &outcome.candidate);
-    write_traces(folder, setup, &judged, summary)
-}
-
-#[derive(Serialize)]
-struct Manifest<'a> {
-    program: &'static str,
-    version: &'static str,
-    study: &'static str,
-    seed: u64,
-    backend: &'a str,
-    adapter: &'a str,
-    driver: &'a str,
-    log: &'a str,
-    car: &'a str,
-    settings: &'static str,
-    interrupted: bool,
-}
-
-fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
-    let text = serde_json::to_string_pretty(value)
-        .map_err(|e| crate::Error::io(path, "write", std::io::Error::other(e)))?;
-    write_whole(path, text.as_bytes())
+    write_traces(folder, setup, &judged, summary)?;
+    super::page::write(folder, settings, setup, outcome, &judged, summary)
 }
 
 fn write_history(folder: &Path, outcome: &Outcome) -> Result<()> {
@@ -334,7 +307,17 @@ fn write_parameters(folder: &Path, summary: &Summary) -> Result<()> {
         cells: Cells::Numbers(values),
     }));
     write_csv(folder.join("parameters.csv"), &columns)?;
-    let rows: Vec<ParameterRow<'_>> = p
+    plot_parameters(
+        folder.join("parameters.svg"),
+        "Parameters within their bounds",
+        &parameter_rows(summary),
+    )
+}
+
+/// The parameters as figures show them.
+pub(super) fn parameter_rows(summary: &Summary) -> Vec<ParameterRow<'_>> {
+    summary
+        .parameters
         .iter()
         .map(|p| ParameterRow {
             name: &p.name,
@@ -347,12 +330,7 @@ fn write_parameters(folder: &Path, summary: &Summary) -> Result<()> {
             truth: p.truth,
             identifiable: p.value.is_some(),
         })
-        .collect();
-    plot_parameters(
-        folder.join("parameters.svg"),
-        "Parameters within their bounds",
-        &rows,
-    )
+        .collect()
 }
 
 fn write_front(folder: &Path, setup: &Setup, front: &super::Front) -> Result<()> {
@@ -401,24 +379,24 @@ fn write_front(folder: &Path, setup: &Setup, front: &super::Front) -> Result<()>
 }
 
 /// Labels of the channels in pictures.
-const LABELS: [&str; CHANNELS] = [
+pub(super) const LABELS: [&str; CHANNELS] = [
     "speed",
     "longitudinal acceleration",
     "lateral acceleration",
     "yaw rate",
 ];
 
+/// One lap, the first that has a fitted sample: laps over one another would not be legible.
+pub(super) fn traced_lap(log: &crate::telemetry::Log, judged: &Judged) -> std::ops::Range<usize> {
+    let fitted = |i: usize| judged.outputs[0][i].is_finite();
+    let mut laps = log.laps.iter().map(|l| l.start..l.end);
+    laps.find(|r| r.clone().any(fitted)).unwrap_or(0..log.samples())
+}
+
 fn write_traces(folder: &Path, setup: &Setup, judged: &Judged, summary: &Summary) -> Result<()> {
     let log = &setup.log;
     let measured = [&log.vx_mps, &log.ax_mps2, &log.ay_mps2, &log.yaw_rate_radps];
-    // One lap, the first that has a fitted sample: laps over one another would not be legible.
-    let fitted = |i: usize| judged.outputs[0][i].is_finite();
-    let range = log
-        .laps
-        .iter()
-        .map(|l| l.start..l.end)
-        .find(|r| r.clone().any(fitted))
-        .unwrap_or(0..log.samples());
+    let range = traced_lap(log, judged);
     let distance = &log.distance_m[range.clone()];
     let mut columns = vec![
         Column {
@@ -510,7 +488,7 @@ fn write_traces(folder: &Path, setup: &Setup, judged: &Judged, summary: &Summary
 }
 
 /// The resolved settings as a study file that repeats the run.
-fn study_toml(s: &IdentifySettings) -> String {
+pub(super) fn study_toml(s: &IdentifySettings) -> String {
     let quoted = |text: &str| toml::Value::String(text.to_owned()).to_string();
     let path = |p: &Path| {
         quoted(

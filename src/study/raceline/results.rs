@@ -1,6 +1,7 @@
 //! What a racing-line study leaves behind: figures for people and scripts, lines, pictures.
 
 mod files;
+mod page;
 mod pictures;
 
 use super::{Outcome, RacelineSettings, ReportedLine, Setup};
@@ -270,5 +271,6 @@ pub fn write_results(
     summary: &Summary,
 ) -> Result<()> {
     files::write(folder, settings, setup, outcome, summary)?;
-    pictures::draw(folder, setup, outcome)
+    pictures::draw(folder, setup, outcome)?;
+    page::write(folder, settings, setup, outcome, summary)
 }

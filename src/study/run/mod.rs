@@ -1,6 +1,7 @@
 //! The whole way from a log to a lap: the car that drove it, its limits, the line that suits it, and that line driven by
 //! the car itself, whose grip is fed back into the limits until both laps agree.
 
+mod page;
 mod stage;
 mod story;
 

@@ -4,7 +4,7 @@ use super::RunSettings;
 use crate::error::{Error, Result};
 use crate::report::write_whole;
 use crate::study::identify::Setup;
-use crate::study::run_folder::write_json;
+use crate::study::run_folder::{Manifest, write_json};
 use crate::study::transient::AGREEMENT;
 use crate::vehicle::{Car, Envelope};
 use serde::Serialize;
@@ -179,12 +179,28 @@ impl Summary {
         )
     }
 
-    /// Writes `summary.json` and `story.txt`.
+    /// Writes `summary.json`, `manifest.json`, `story.txt` and `report.html`.
     ///
     /// # Errors
     /// [`Error::Io`] if a file cannot be written.
     pub(super) fn write(&self, folder: &Path) -> Result<()> {
         write_json(&folder.join("summary.json"), self)?;
-        write_whole(folder.join("story.txt"), self.to_text().as_bytes())
+        write_whole(folder.join("story.txt"), self.to_text().as_bytes())?;
+        let manifest = Manifest {
+            program: "lapswarm",
+            version: env!("CARGO_PKG_VERSION"),
+            study: self.study,
+            seed: self.seed,
+            backend: &self.backend,
+            adapter: &self.adapter,
+            driver: "",
+            log: Some(&self.log),
+            track: None,
+            car: &self.car,
+            settings: "",
+            interrupted: false,
+        };
+        write_json(&folder.join("manifest.json"), &manifest)?;
+        super::page::write(folder, self)
     }
 }

@@ -3,6 +3,7 @@
 //! The lap is replayed in short windows that restart from the log, so that the figures are of the parameters' own effect
 //! and not of what a spin makes of it many corners later. All candidates are scored as populations.
 
+mod page;
 mod results;
 mod sobol;
 

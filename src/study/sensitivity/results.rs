@@ -193,7 +193,7 @@ impl Summary {
 }
 
 /// Labels of the channels in pictures.
-const LABELS: [&str; 4] = [
+pub(super) const LABELS: [&str; 4] = [
     "speed",
     "longitudinal acceleration",
     "lateral acceleration",
@@ -201,7 +201,7 @@ const LABELS: [&str; 4] = [
 ];
 
 /// Writes `summary.json`, `manifest.json`, `study.toml`, `sobol.csv`, `one_at_a_time.csv`, and the pictures `sobol.svg`,
-/// `one_at_a_time.svg` and `bands.svg`.
+/// `one_at_a_time.svg` and `bands.svg`, and `report.html`.
 ///
 /// # Errors
 /// [`crate::Error::Io`] if a file cannot be written.
@@ -231,7 +231,8 @@ pub fn write_results(
         write_sobol(folder, summary)?;
         plot_sobol(folder, summary)?;
     }
-    plot_bands(folder, outcome)
+    plot_bands(folder, outcome)?;
+    super::page::write(folder, &study_toml(settings), setup, outcome, summary)
 }
 
 /// The settings as a study file.
@@ -346,6 +347,17 @@ fn write_sobol(folder: &Path, summary: &Summary) -> Result<()> {
 const SHOWN: usize = 30;
 
 fn plot_sobol(folder: &Path, summary: &Summary) -> Result<()> {
+    let title = "Shares of variance (Sobol indices) with 95% intervals";
+    sobol_panels(summary, |panels| {
+        plot_bars(folder.join("sobol.svg"), title, panels)
+    })
+}
+
+/// Hands on the panels of the indices, one for each cost.
+pub(super) fn sobol_panels(
+    summary: &Summary,
+    show: impl FnOnce(&[BarPanel<'_>]) -> Result<()>,
+) -> Result<()> {
     let shown = &summary.parameters[..summary.parameters.len().min(SHOWN)];
     let panels: Vec<BarPanel<'_>> = summary
         .base_costs
@@ -368,14 +380,27 @@ fn plot_sobol(folder: &Path, summary: &Summary) -> Result<()> {
             }
         })
         .collect();
-    plot_bars(
-        folder.join("sobol.svg"),
-        "Shares of variance (Sobol indices) with 95% intervals",
-        &panels,
-    )
+    show(&panels)
 }
 
 fn plot_one_at_a_time(folder: &Path, summary: &Summary) -> Result<()> {
+    let title = format!(
+        "One parameter at a time, {:.3}% either way",
+        100.0 * summary.share
+    );
+    one_at_a_time_panels(summary, |panels| {
+        if panels.is_empty() {
+            return Ok(());
+        }
+        plot_bars(folder.join("one_at_a_time.svg"), &title, panels)
+    })
+}
+
+/// Hands on the panels of the changes, one for each cost that has any.
+pub(super) fn one_at_a_time_panels(
+    summary: &Summary,
+    show: impl FnOnce(&[BarPanel<'_>]) -> Result<()>,
+) -> Result<()> {
     let shown = &summary.parameters[..summary.parameters.len().min(SHOWN)];
     let labels: Vec<(String, String)> = summary
         .cost_units
@@ -399,14 +424,7 @@ fn plot_one_at_a_time(folder: &Path, summary: &Summary) -> Result<()> {
         })
         .filter(|panel| panel.series[0].values.iter().any(|v| v.is_finite()))
         .collect();
-    if panels.is_empty() {
-        return Ok(());
-    }
-    let title = format!(
-        "One parameter at a time, {:.3}% either way",
-        100.0 * summary.share
-    );
-    plot_bars(folder.join("one_at_a_time.svg"), &title, &panels)
+    show(&panels)
 }
 
 /// The change that the parameters make at each place, least and greatest: the outputs themselves would hide it.

@@ -2,7 +2,9 @@
 
 use super::{Outcome, SurfaceSettings};
 use crate::error::Result;
-use crate::report::{Cells, Column, SurfaceFigure, plot_surface, write_csv, write_whole};
+use crate::report::{
+    Cells, Column, HtmlReport, SurfaceFigure, plot_surface, significant, write_csv, write_whole,
+};
 use crate::study::identify::Setup;
 use crate::study::run_folder::{Manifest, write_json};
 use serde::Serialize;
@@ -103,7 +105,7 @@ impl Summary {
     }
 }
 
-/// Writes `summary.json`, `manifest.json`, `study.toml`, `surface.csv` and a picture `surface_<cost>.svg` of each cost.
+/// Writes `summary.json`, `manifest.json`, `study.toml`, `surface.csv` a picture `surface_<cost>.svg` of each cost, and `report.html`.
 ///
 /// # Errors
 /// [`crate::Error::Io`] if a file cannot be written.
@@ -179,28 +181,72 @@ pub fn write_results(
     };
     let axis_label = |k: usize| label(&problem.variables[k].name, &problem.variables[k].unit);
     let (x_label, y_label) = (axis_label(0), axis_label(1));
+    let mut page = begun_page(setup, summary);
     for (objective, costs) in problem.objectives.iter().zip(&outcome.costs) {
         let mut marks = vec![("car", outcome.base)];
         if let Some(Some(least)) = summary.least.get(&objective.name) {
             marks.push(("least", least.at));
         }
         let name = &objective.name;
-        plot_surface(
-            folder.join(format!("surface_{name}.svg")),
-            &SurfaceFigure {
-                title: &format!(
-                    "Cost of {name} over {} and {}",
-                    summary.parameters[0], summary.parameters[1]
-                ),
-                x_label: &x_label,
-                y_label: &y_label,
-                z_label: &label(name, &objective.unit),
-                x: &outcome.axes[0],
-                y: &outcome.axes[1],
-                z: costs,
-                marks,
-            },
-        )?;
+        let figure = SurfaceFigure {
+            title: &format!(
+                "Cost of {name} over {} and {}",
+                summary.parameters[0], summary.parameters[1]
+            ),
+            x_label: &x_label,
+            y_label: &y_label,
+            z_label: &label(name, &objective.unit),
+            x: &outcome.axes[0],
+            y: &outcome.axes[1],
+            z: costs,
+            marks,
+        };
+        plot_surface(folder.join(format!("surface_{name}.svg")), &figure)?;
+        page.surface(&figure, "")?;
     }
-    Ok(())
+    page.provenance("log", &setup.log.source);
+    page.provenance("car", &setup.replay.car.name);
+    page.provenance("backend", summary.backend);
+    page.provenance("adapter", &summary.adapter);
+    page.provenance("driver", &outcome.backend.driver);
+    page.provenance("candidates evaluated", summary.evaluations.to_string());
+    page.provenance("time", format!("{:.1} s", summary.elapsed_s));
+    page.settings("study.toml, which repeats this run", toml);
+    page.write(folder.join("report.html"))
+}
+
+/// The interactive report, up to its surfaces.
+fn begun_page(setup: &Setup, summary: &Summary) -> HtmlReport {
+    let [x, y] = &summary.parameters;
+    let car = &setup.replay.car.name;
+    let mut page = HtmlReport::new("surface", &format!("{x} and {y} of the {car}"));
+    page.sentence(format!(
+        "{} cars over a grid of {x} and {y} were driven through the log in {:.1} s; the {car} itself has {} and {}.",
+        summary.evaluations,
+        summary.elapsed_s,
+        significant(summary.base[0], 5),
+        significant(summary.base[1], 5)
+    ));
+    for (name, least) in &summary.least {
+        if let Some(least) = least {
+            let [at_x, at_y] = least.at.map(|v| significant(v, 5));
+            page.sentence(format!(
+                "The cost of {} is least, {}, where {x} is {at_x} and {y} is {at_y}.",
+                if name == "all" { "all channels" } else { name },
+                significant(least.cost, 4)
+            ));
+        }
+    }
+    if summary.failed > 0 {
+        page.warning(format!(
+            "{} of {} cars did not drive; they are left out.",
+            summary.failed, summary.evaluations
+        ));
+    }
+    page.section(
+        "Costs",
+        "From above with lines of equal steps of colour, and in space, to be turned by dragging. Colours go with the root \
+         of the cost above its least, which spreads a basin's bottom.",
+    );
+    page
 }

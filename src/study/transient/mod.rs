@@ -5,6 +5,7 @@
 //! at which the car gets round within the edges and as fast as the point mass, to half a percent; with it the limits are
 //! fed back, and both laps are set side by side.
 
+mod page;
 mod results;
 
 pub use results::{Summary, summarise, write_results};

@@ -2,10 +2,11 @@
 
 use super::{AGREEMENT, INTERVAL_S, Outcome};
 use crate::error::Result;
+use crate::evaluate::BackendInfo;
 use crate::report::{
     Cells, Column, Curve, CurvePanel, TrackMap, plot_curves, plot_track_map, write_csv, write_whole,
 };
-use crate::study::run_folder::write_json;
+use crate::study::run_folder::{Manifest, write_json};
 use glam::DVec2;
 use serde::Serialize;
 use std::path::Path;
@@ -96,7 +97,7 @@ impl Summary {
     }
 }
 
-/// Writes `summary.json`, `drive.csv`, `envelope_driven.csv`, `speeds.svg` and `map.svg`.
+/// Writes `summary.json`, `manifest.json`, `drive.csv`, `envelope_driven.csv`, `speeds.svg`, `map.svg` and `report.html`.
 ///
 /// # Errors
 /// [`crate::Error::Io`] if a file cannot be written.
@@ -111,10 +112,13 @@ pub fn write_results(folder: &Path, outcome: &Outcome, summary: &Summary) -> Res
     let (vx, vy, yaw_rate, roll) = (state(0), state(1), state(2), state(3));
     let time: Vec<f64> = (0..vx.len()).map(|i| i as f64 * INTERVAL_S).collect();
     let steer: Vec<f64> = drive.inputs.iter().map(|(_, steer)| *steer).collect();
-    let table: [(&str, &str, &[f64]); 8] = [
+    let (x, y): (Vec<f64>, Vec<f64>) = driven_m(outcome).iter().map(|p| (p.x, p.y)).unzip();
+    let table: [(&str, &str, &[f64]); 10] = [
         ("time", "s", &time),
         ("station", "m", &drive.station_m),
         ("offset", "m", &drive.offset_m),
+        ("x", "m", &x),
+        ("y", "m", &y),
         ("vx", "m/s", &vx),
         ("vy", "m/s", &vy),
         ("yaw_rate", "rad/s", &yaw_rate),
@@ -163,21 +167,36 @@ pub fn write_results(folder: &Path, outcome: &Outcome, summary: &Summary) -> Res
         ),
     ];
     plot_curves(folder.join("speeds.svg"), "The line, driven", &panels)?;
-    plot_map(folder, outcome, &vx)
+    plot_map(folder, outcome, &vx)?;
+    let backend = BackendInfo {
+        backend: summary.backend,
+        device: summary.adapter.to_owned(),
+        driver: String::new(),
+    };
+    // Flags say all there is to say.
+    let manifest = Manifest {
+        settings: "",
+        ..Manifest::new("transient", summary.seed, &backend, &summary.car)
+    };
+    write_json(&folder.join("manifest.json"), &manifest)?;
+    super::page::write(folder, outcome, summary, &driven_m(outcome))
 }
 
-fn plot_map(folder: &Path, outcome: &Outcome, speed_mps: &[f64]) -> Result<()> {
-    let line = &outcome.line;
-    let driven: Vec<DVec2> = outcome
-        .drive
-        .station_m
-        .iter()
-        .zip(&outcome.drive.offset_m)
+/// Where the car went (m).
+fn driven_m(outcome: &Outcome) -> Vec<DVec2> {
+    let (line, drive) = (&outcome.line, &outcome.drive);
+    let places = drive.station_m.iter().zip(&drive.offset_m);
+    places
         .map(|(station, offset)| {
             let heading = DVec2::from_angle(line.heading_at(*station));
             line.position_at(*station) + *offset * heading.perp()
         })
-        .collect();
+        .collect()
+}
+
+fn plot_map(folder: &Path, outcome: &Outcome, speed_mps: &[f64]) -> Result<()> {
+    let line = &outcome.line;
+    let driven = driven_m(outcome);
     plot_track_map(
         folder.join("map.svg"),
         &TrackMap {

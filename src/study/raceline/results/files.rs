@@ -4,7 +4,7 @@ use super::{Summary, told_lines};
 use crate::error::Result;
 use crate::report::{Cells, Column, write_csv, write_whole};
 use crate::study::raceline::{Outcome, RacelineSettings, ReportedLine, Setup};
-use serde::Serialize;
+use crate::study::run_folder::{Manifest, write_json};
 use std::path::Path;
 
 /// The name of a line as a part of a file's name.
@@ -14,21 +14,6 @@ pub fn stem(name: &str) -> String {
         .collect()
 }
 
-#[derive(Serialize)]
-struct Manifest<'a> {
-    program: &'static str,
-    version: &'static str,
-    study: &'static str,
-    seed: u64,
-    backend: &'a str,
-    adapter: &'a str,
-    driver: &'a str,
-    track: &'a str,
-    car: &'a str,
-    settings: &'static str,
-    interrupted: bool,
-}
-
 pub fn write(
     folder: &Path,
     settings: &RacelineSettings,
@@ -36,26 +21,13 @@ pub fn write(
     outcome: &Outcome,
     summary: &Summary,
 ) -> Result<()> {
-    let json = |name: &str, value: serde_json::Result<String>| {
-        let path = folder.join(name);
-        let text = value.map_err(|e| crate::Error::io(&path, "write", std::io::Error::other(e)))?;
-        write_whole(path, text.as_bytes())
-    };
-    json("summary.json", serde_json::to_string_pretty(summary))?;
+    write_json(&folder.join("summary.json"), summary)?;
     let manifest = Manifest {
-        program: "lapswarm",
-        version: env!("CARGO_PKG_VERSION"),
-        study: "raceline",
-        seed: settings.seed,
-        backend: outcome.backend.backend,
-        adapter: &outcome.backend.device,
-        driver: &outcome.backend.driver,
-        track: &setup.track_name,
-        car: &setup.car_name,
-        settings: "study.toml",
+        track: Some(&setup.track_name),
         interrupted: outcome.interrupted,
+        ..Manifest::new("raceline", settings.seed, &outcome.backend, &setup.car_name)
     };
-    json("manifest.json", serde_json::to_string_pretty(&manifest))?;
+    write_json(&folder.join("manifest.json"), &manifest)?;
     write_whole(folder.join("study.toml"), settings.to_toml().as_bytes())?;
     write_whole(
         folder.join("envelope.csv"),

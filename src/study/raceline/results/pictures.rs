@@ -42,7 +42,8 @@ fn speeds(line: &ReportedLine) -> &[f64] {
     line.fine.lap.as_ref().map_or(&[], |lap| &lap.v_mps)
 }
 
-fn draw_map(path: &Path, setup: &Setup, line: &ReportedLine) -> Result<()> {
+/// Names to write on a map, and their places (m).
+pub fn map_names(setup: &Setup) -> Vec<(&str, DVec2)> {
     let road = &setup.road;
     let at = |station: f64| {
         let i = road
@@ -56,11 +57,14 @@ fn draw_map(path: &Path, setup: &Setup, line: &ReportedLine) -> Result<()> {
         .sections
         .iter()
         .map(|s| (s.name.as_str(), at(0.5 * (s.start_m + s.end_m))));
-    let names: Vec<(&str, DVec2)> = if road.corners.is_empty() {
+    if road.corners.is_empty() {
         sections.collect()
     } else {
         corners.collect()
-    };
+    }
+}
+
+fn draw_map(path: &Path, setup: &Setup, line: &ReportedLine) -> Result<()> {
     plot_track_map(
         path,
         &TrackMap {
@@ -71,8 +75,8 @@ fn draw_map(path: &Path, setup: &Setup, line: &ReportedLine) -> Result<()> {
             values: speeds(line),
             value_label: "speed",
             value_unit: "m/s",
-            closed: road.closed,
-            names,
+            closed: setup.road.closed,
+            names: map_names(setup),
         },
     )
 }
@@ -147,13 +151,15 @@ fn draw_sections(folder: &Path, setup: &Setup, line: &ReportedLine) -> Result<()
     Ok(())
 }
 
+/// Distances (m) along the reference line. Lines differ in length: what is beside each other on the road is drawn above
+/// each other.
+pub fn along(setup: &Setup, line: &ReportedLine) -> Vec<f64> {
+    let stretch = setup.road.length_m / line.fine.length_m;
+    line.fine.station_m.iter().map(|s| s * stretch).collect()
+}
+
 /// Speed, accelerations and steering of every line against distance, and the time that each loses on the fastest.
 fn draw_traces(path: &Path, setup: &Setup, lines: &[&ReportedLine], fastest: &ReportedLine) -> Result<()> {
-    // Lines differ in length: what is beside each other on the road is drawn above each other.
-    let along = |line: &ReportedLine| -> Vec<f64> {
-        let stretch = setup.road.length_m / line.fine.length_m;
-        line.fine.station_m.iter().map(|s| s * stretch).collect()
-    };
     let panel = |title, y_label, of: &dyn Fn(&ReportedLine) -> Option<Vec<f64>>| CurvePanel {
         title,
         x_label: "distance along the reference line (m)",
@@ -163,7 +169,7 @@ fn draw_traces(path: &Path, setup: &Setup, lines: &[&ReportedLine], fastest: &Re
             .filter_map(|line| {
                 Some(Curve {
                     label: "",
-                    x: along(line),
+                    x: along(setup, line),
                     y: of(line)?,
                     shade: None,
                 })
@@ -184,14 +190,16 @@ fn draw_traces(path: &Path, setup: &Setup, lines: &[&ReportedLine], fastest: &Re
         }),
     ];
     // The only panel with names: colours are the same in all.
+    let shares: Vec<f64> = (0..=DELTA_POINTS)
+        .map(|i| i as f64 / DELTA_POINTS as f64)
+        .collect();
     let delta = lines
         .iter()
         .filter_map(|line| {
-            let (x, y) = lap_delta(line, fastest)?;
             Some(Curve {
                 label: &line.name,
-                x: x.iter().map(|share| share * setup.road.length_m).collect(),
-                y,
+                x: shares.iter().map(|share| share * setup.road.length_m).collect(),
+                y: lap_delta(line, fastest, &shares)?,
                 shade: None,
             })
         })
@@ -211,35 +219,28 @@ fn draw_traces(path: &Path, setup: &Setup, lines: &[&ReportedLine], fastest: &Re
     )
 }
 
-/// The time that one line loses on another, over the share of the lap.
-fn lap_delta(line: &ReportedLine, other: &ReportedLine) -> Option<(Vec<f64>, Vec<f64>)> {
-    let time_at = |line: &ReportedLine, share: f64| -> Option<f64> {
-        let lap = line.fine.lap.as_ref()?;
-        let elapsed = lap.elapsed_s();
-        let station = share * line.fine.length_m;
-        let after = line.fine.station_m.partition_point(|s| *s <= station).max(1);
-        let (s0, t0) = (line.fine.station_m[after - 1], elapsed[after - 1]);
-        let s1 = line
-            .fine
-            .station_m
-            .get(after)
-            .copied()
-            .unwrap_or(line.fine.length_m);
-        let t1 = elapsed.get(after).copied().unwrap_or(lap.time_s);
-        Some(if s1 > s0 {
-            t0 + (station - s0) / (s1 - s0) * (t1 - t0)
-        } else {
-            t0
+/// The time that one line loses on another (s), after each share of the lap.
+pub fn lap_delta(line: &ReportedLine, other: &ReportedLine, shares: &[f64]) -> Option<Vec<f64>> {
+    let clock = |line: &ReportedLine| {
+        let fine = &line.fine;
+        let lap = fine.lap.as_ref()?;
+        let (elapsed, end) = (lap.elapsed_s(), (fine.length_m, lap.time_s));
+        let station = fine.station_m.clone();
+        Some(move |share: f64| {
+            let at = share * end.0;
+            let after = station.partition_point(|s| *s <= at).max(1);
+            let (s0, t0) = (station[after - 1], elapsed[after - 1]);
+            let s1 = station.get(after).copied().unwrap_or(end.0);
+            let t1 = elapsed.get(after).copied().unwrap_or(end.1);
+            if s1 > s0 {
+                t0 + (at - s0) / (s1 - s0) * (t1 - t0)
+            } else {
+                t0
+            }
         })
     };
-    let shares: Vec<f64> = (0..=DELTA_POINTS)
-        .map(|i| i as f64 / DELTA_POINTS as f64)
-        .collect();
-    let lost = shares
-        .iter()
-        .map(|&share| Some(time_at(line, share)? - time_at(other, share)?))
-        .collect::<Option<Vec<f64>>>()?;
-    Some((shares, lost))
+    let (mine, its) = (clock(line)?, clock(other)?);
+    Some(shares.iter().map(|&share| mine(share) - its(share)).collect())
 }
 
 fn draw_convergence(path: &Path, outcome: &Outcome) -> Result<()> {

@@ -1,0 +1,9 @@
+//! Runs side by side, from what their folders hold: no study is run again.
+
+mod page;
+mod read;
+
+pub use page::compare;
+pub(crate) use page::overlay;
+pub(crate) use read::read_table;
+pub use read::{Figure, Run, Trace};

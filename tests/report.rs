@@ -1,0 +1,414 @@
+//! Reports as a reader meets them: runs laid side by side by the program, pages opened in a real browser.
+
+use glam::DVec2;
+use lapswarm::report::{
+    BarPanel, BarSeries, Cells, Column, Curve, CurvePanel, Front, HtmlReport, LapLine, LapMap, LapPanel,
+    LapTrace, LapView, Objective, ParameterRow, Scale, ShadedSection, SurfaceFigure,
+};
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+/// As a channel, a car and a track may be called in a file.
+const HOSTILE: &str = "<script>window.alerted=true</script><img src=x onerror=\"window.alerted=true\">";
+
+fn lapswarm(arguments: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_lapswarm"));
+    command.args(arguments).output().unwrap()
+}
+
+fn raceline(folder: &Path, seed: &str) {
+    let out = folder.to_str().unwrap();
+    let small = [
+        "--sections",
+        "60",
+        "--population",
+        "20",
+        "--iterations",
+        "5",
+        "--backend",
+        "simd",
+    ];
+    let mut arguments = vec![
+        "raceline",
+        "--out",
+        out,
+        "--quiet",
+        "--seed",
+        seed,
+        "--objectives",
+        "length,gamma,lap_time",
+    ];
+    arguments.extend(small);
+    let run = lapswarm(&arguments);
+    assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+}
+
+fn envelope(folder: &Path, step: &str) {
+    let run = lapswarm(&[
+        "envelope",
+        "--out",
+        folder.to_str().unwrap(),
+        "--quiet",
+        "--step-mps",
+        step,
+    ]);
+    assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+}
+
+/// A page with every kind of chart on it, a long lap, and a hostile name wherever a name can stand.
+fn everything(path: &Path) {
+    let mut page = HtmlReport::new("identify", HOSTILE);
+    page.sentence(HOSTILE);
+    page.tile(HOSTILE, HOSTILE, HOSTILE);
+    page.warning(HOSTILE);
+    page.section(HOSTILE, HOSTILE);
+    let n = 14_000;
+    let x: Vec<f64> = (0..n).map(|i| 0.4 * f64::from(i)).collect();
+    let angle = |s: f64| s * std::f64::consts::TAU / 5600.0;
+    let wave = |k: f64| -> Vec<f64> { x.iter().map(|s| 40.0 + k * (3.0 * angle(*s)).sin()).collect() };
+    let ring =
+        |radius: f64| -> Vec<DVec2> { x.iter().map(|s| radius * DVec2::from_angle(angle(*s))).collect() };
+    let (low, high) = (wave(8.0), wave(12.0));
+    let (inner, outer) = (ring(880.0), ring(900.0));
+    let line = |name, k: f64, band| LapLine {
+        name,
+        x: x.clone(),
+        traces: vec![
+            LapTrace {
+                panel: 0,
+                values: wave(k),
+                band,
+            },
+            LapTrace {
+                panel: 1,
+                values: wave(0.1 * k),
+                band: None,
+            },
+        ],
+        place_m: ring(890.0 + 0.1 * k),
+        wide: false,
+    };
+    let panel = |height| LapPanel {
+        label: HOSTILE,
+        unit: "m/s^2",
+        height,
+    };
+    page.lap(&LapView {
+        title: HOSTILE,
+        note: HOSTILE,
+        x_label: "distance",
+        x_unit: "m",
+        panels: vec![panel(1.0), panel(0.5)],
+        lines: vec![
+            line(HOSTILE, 10.0, Some([&low, &high])),
+            line(HOSTILE, 20.0, None),
+        ],
+        sections: vec![ShadedSection {
+            name: HOSTILE,
+            start: 500.0,
+            end: 1500.0,
+        }],
+        map: Some(LapMap {
+            left_edge_m: &inner,
+            right_edge_m: &outer,
+            closed: true,
+            names: vec![(HOSTILE, inner[0])],
+        }),
+    })
+    .unwrap();
+    let panel = CurvePanel {
+        title: HOSTILE,
+        x_label: HOSTILE,
+        y_label: HOSTILE,
+        curves: (0..3)
+            .map(|k| Curve {
+                label: HOSTILE,
+                x: (0..50).map(f64::from).collect(),
+                y: (0..50).map(|i| f64::from(i * k + 1)).collect(),
+                shade: (k == 2).then_some(0.5),
+            })
+            .collect(),
+    };
+    page.curves(&panel, HOSTILE, [Scale::Linear, Scale::Log]).unwrap();
+    let row = |fitted, truth| ParameterRow {
+        name: HOSTILE,
+        unit: "N",
+        lower: 0.0,
+        upper: 2.0,
+        swarm: 0.7,
+        fitted,
+        standard_error: Some(0.1),
+        truth,
+        identifiable: truth.is_some(),
+    };
+    page.parameters(HOSTILE, HOSTILE, &[row(1.0, Some(1.1)), row(0.4, None)]);
+    let points: Vec<Vec<f64>> = (0..40)
+        .map(f64::from)
+        .map(|i| vec![i, 40.0 - i, (i - 20.0).powi(2)])
+        .collect();
+    page.front(&Front {
+        title: HOSTILE,
+        note: HOSTILE,
+        objectives: vec![
+            Objective {
+                name: HOSTILE,
+                unit: "s",
+            };
+            3
+        ],
+        points: &points,
+        marked: vec![(7, HOSTILE)],
+    })
+    .unwrap();
+    let steps: Vec<f64> = (0..30).map(f64::from).collect();
+    let bowl = |x: &f64, y: &f64| (x - 9.0).powi(2) + (y - 20.0).powi(2) + 1.0;
+    let z: Vec<f64> = steps
+        .iter()
+        .flat_map(|y| steps.iter().map(move |x| bowl(x, y)))
+        .collect();
+    let surface = SurfaceFigure {
+        title: HOSTILE,
+        x_label: HOSTILE,
+        y_label: HOSTILE,
+        z_label: HOSTILE,
+        x: &steps,
+        y: &steps,
+        z: &z,
+        marks: vec![(HOSTILE, [9.0, 20.0])],
+    };
+    page.surface(&surface, HOSTILE).unwrap();
+    let bars = BarPanel {
+        title: HOSTILE,
+        x_label: HOSTILE,
+        names: vec![HOSTILE, "plain"],
+        series: ["alone", HOSTILE]
+            .map(|label| BarSeries {
+                label,
+                values: vec![0.3, 0.6],
+                intervals: vec![[0.2, 0.4], [0.5, 0.65]],
+            })
+            .into(),
+    };
+    page.bars(&bars, HOSTILE).unwrap();
+    let names = ["b", HOSTILE, "a"].map(str::to_owned);
+    let column = |name, cells| Column {
+        name,
+        unit: "m/s^2",
+        cells,
+    };
+    page.table(
+        HOSTILE,
+        HOSTILE,
+        &[
+            column(HOSTILE, Cells::Texts(&names)),
+            column("n", Cells::Numbers(&[2.0, f64::NAN, 1.0])),
+        ],
+    )
+    .unwrap();
+    page.provenance(HOSTILE, HOSTILE);
+    page.settings(HOSTILE, HOSTILE);
+    page.write(path).unwrap();
+}
+
+/// A browser, or none after saying so: a test that did not run must be seen not to have run.
+fn browser() -> Option<PathBuf> {
+    let asked = std::env::var_os("LAPSWARM_BROWSER").map(PathBuf::from);
+    let names = [
+        "chromium",
+        "chromium-browser",
+        "google-chrome",
+        "google-chrome-stable",
+    ];
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    let mut found = std::env::split_paths(&path).flat_map(|folder| names.map(|name| folder.join(name)));
+    let browser = asked.or_else(|| found.find(|file| file.is_file()));
+    if browser.is_none() {
+        let line = "IGNORED: no Chromium here, so that no report was opened in a browser\n";
+        std::io::stderr().write_all(line.as_bytes()).unwrap();
+    }
+    browser
+}
+
+/// Opens a page, uses it by `tests/browser/checks.js`, and gives back what came of it.
+fn used(browser: &Path, page: &Path) -> serde_json::Value {
+    let html = std::fs::read_to_string(page).unwrap();
+    assert!(html.len() < 6_000_000, "{} bytes", html.len());
+    let (head, body) = html.split_once("<meta name=\"viewport\"").unwrap();
+    let (body, end) = body.rsplit_once("</body>").unwrap();
+    let under_test = page.with_file_name("under_test.html");
+    let (early, checks) = (
+        include_str!("browser/early.js"),
+        include_str!("browser/checks.js"),
+    );
+    let text = format!(
+        "{head}<script>{early}</script><meta name=\"viewport\"{body}<script>{checks}</script></body>{end}"
+    );
+    std::fs::write(&under_test, text).unwrap();
+    let profile = tempfile::tempdir().unwrap();
+    let dom = page.with_file_name("dom.html");
+    let mut child = Command::new(browser)
+        .args([
+            "--headless",
+            "--no-sandbox",
+            "--disable-gpu",
+            "--no-first-run",
+            "--dump-dom",
+        ])
+        .args([
+            "--window-size=1440,1000",
+            "--virtual-time-budget=8000",
+            "--host-resolver-rules=MAP * ~NOTFOUND",
+        ])
+        .arg(format!("--user-data-dir={}", profile.path().display()))
+        .arg(format!("file://{}", under_test.display()))
+        .stdout(std::fs::File::create(&dom).unwrap())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    let began = Instant::now();
+    while child.try_wait().unwrap().is_none() {
+        if began.elapsed() > Duration::from_secs(120) {
+            child.kill().unwrap();
+            panic!("the browser did not come back");
+        }
+        std::thread::sleep(Duration::from_millis(50));
+    }
+    let dom = std::fs::read_to_string(dom).unwrap();
+    let (_, findings) = dom.split_once("<pre id=\"findings\">").expect("the checks ended");
+    let findings = findings.split_once("</pre>").unwrap().0;
+    let plain = findings
+        .replace("&lt;", "<")
+        .replace("&gt;", ">")
+        .replace("&amp;", "&");
+    serde_json::from_str(&plain).unwrap()
+}
+
+/// What holds for every page: no fault, nothing blank, nothing run that came from a name.
+fn sound(findings: &serde_json::Value, charts: u64) {
+    assert_eq!(findings["faults"], serde_json::json!([]), "{findings}");
+    assert_eq!(findings["charts"], charts, "{findings}");
+    assert_eq!(findings["blank"], 0, "{findings}");
+    assert_eq!(findings["alerted"], false, "{findings}");
+    // Data, library, our own, and the two of the test.
+    assert_eq!(findings["scripts"], 5, "{findings}");
+    assert_eq!(findings["sorts"], true, "{findings}");
+}
+
+/// Moving along the traces moves the dot and changes the read-out, and the map leads back to the traces.
+fn linked(findings: &serde_json::Value) {
+    let dots: Vec<Option<&str>> = findings["dot_from_traces"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|d| d.as_str())
+        .collect();
+    assert_eq!(dots.len(), 3);
+    assert_eq!(dots[0], None, "{findings}");
+    assert!(
+        dots[1].is_some() && dots[2].is_some() && dots[1] != dots[2],
+        "{findings}"
+    );
+    assert_eq!(findings["readouts_differ"], true, "{findings}");
+    let told = findings["map_to_traces"].as_array().unwrap();
+    assert_ne!(told[0], told[1], "{findings}");
+    assert_eq!(findings["map_follows_zoom"], true, "{findings}");
+}
+
+#[test]
+fn pages_work_in_a_browser() {
+    let Some(browser) = browser() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let page = folder.path().join("everything.html");
+    everything(&page);
+    let findings = used(&browser, &page);
+    sound(&findings, 6);
+    linked(&findings);
+
+    let [first, second] = ["a", "b"].map(|name| folder.path().join(name));
+    raceline(&first, "1");
+    raceline(&second, "2");
+    let findings = used(&browser, &first.join("report.html"));
+    // Lines, front, three swarms.
+    sound(&findings, 5);
+    linked(&findings);
+
+    let page = folder.path().join("both.html");
+    let [first, second] = [first, second].map(|f| f.display().to_string());
+    let run = lapswarm(&["report", &first, &second, "--out", page.to_str().unwrap()]);
+    assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+    let html = std::fs::read_to_string(&page).unwrap();
+    let (_, data) = html.split_once("id=\"charts\">").unwrap();
+    let data: serde_json::Value = serde_json::from_str(data.split_once("</script>").unwrap().0).unwrap();
+    // The road of the first run lies under the lines, and the first run loses no time on itself.
+    assert_eq!(data[0]["map"]["left"][0].as_array().unwrap().len(), 60);
+    let lost = data[0]["lines"][0]["traces"].as_array().unwrap().last().unwrap();
+    assert!(lost["values"].as_array().unwrap().iter().all(|v| v == 0));
+    let findings = used(&browser, &page);
+    // Laps and four limits.
+    sound(&findings, 5);
+    linked(&findings);
+}
+
+#[test]
+fn runs_are_laid_side_by_side() {
+    let folder = tempfile::tempdir().unwrap();
+    let [coarse, fine] = ["coarse", "fine"].map(|name| folder.path().join(name));
+    envelope(&coarse, "10");
+    envelope(&fine, "5");
+    let out = folder.path().join("both.html");
+    let [a, b, page] = [&coarse, &fine, &out].map(|p| p.to_str().unwrap());
+    let run = lapswarm(&["report", a, b, "--out", page, "--json"]);
+    assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+    let said = String::from_utf8(run.stdout).unwrap();
+    let json: serde_json::Value = serde_json::from_str(said.lines().last().unwrap()).unwrap();
+    assert_eq!(json["file"], page);
+    let html = std::fs::read_to_string(&out).unwrap();
+    for expected in [
+        "2 runs of envelope, by top speed: coarse",
+        "top_speed_mps",
+        "Braking grip",
+        "second against first",
+    ] {
+        assert!(html.contains(expected), "{expected}");
+    }
+    // The same again would overwrite it.
+    let again = lapswarm(&["report", a, b, "--out", page]);
+    assert_eq!(again.status.code(), Some(2));
+}
+
+#[test]
+fn folders_that_are_no_runs_are_refused_by_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("none.html");
+    let refused = |run: &Path, named: &str| {
+        let output = lapswarm(&["report", run.to_str().unwrap(), "--out", out.to_str().unwrap()]);
+        let said = String::from_utf8_lossy(&output.stderr).replace(['\n', '│', ' '], "");
+        assert_eq!(output.status.code(), Some(2), "{said}");
+        assert!(said.contains(&named.replace(' ', "")), "{named}: {said}");
+        assert!(!out.exists());
+    };
+    refused(&folder.path().join("nowhere"), "manifest.json: file: found none");
+    let odd = folder.path().join("odd");
+    std::fs::create_dir(&odd).unwrap();
+    refused(&odd, "manifest.json: file: found none");
+    let write = |name: &str, text: &[u8]| std::fs::write(odd.join(name), text).unwrap();
+    write("manifest.json", b"{\"program\": \"another\"}");
+    refused(&odd, "manifest.json: program: found another");
+    write("manifest.json", b"{\"program\": ");
+    refused(&odd, "manifest.json: line 1");
+    write("manifest.json", b"[1, 2]");
+    refused(&odd, "manifest.json: file: found another value");
+    write("manifest.json", b"\xff\xfe");
+    refused(&odd, "manifest.json: file: found bytes that are no UTF-8");
+    write(
+        "manifest.json",
+        b"{\"program\": \"lapswarm\", \"study\": \"raceline\"}",
+    );
+    refused(&odd, "summary.json: file: found none");
+    write("summary.json", b"{}");
+    write("traces.csv", b"a,b\n1,2\n1,2,3\n");
+    refused(&odd, "traces.csv: line 3");
+    refused(&odd.join("summary.json"), "manifest.json: file: found none");
+}
