@@ -234,7 +234,7 @@ fn driven<R: Lookup>(limits: &LimitTable<R::Storage>, from: R, length: R, here: 
 
 /// Speed squared from which the car just brakes to that of the next section.
 #[inline(always)]
-fn braked<R: Lookup>(limits: &LimitTable<R::Storage>, to: R, length: R, there: R, here: R) -> R {
+pub(super) fn braked<R: Lookup>(limits: &LimitTable<R::Storage>, to: R, length: R, there: R, here: R) -> R {
     let [_, end] = longitudinal(limits, to, there);
     let middle = to + length * end;
     let [_, brake] = longitudinal(limits, middle, R::lit(0.5) * (here + there));
