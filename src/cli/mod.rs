@@ -3,6 +3,7 @@
 mod bench;
 mod devices;
 mod envelope;
+mod hybrid;
 mod identify;
 mod progress;
 mod raceline;
@@ -39,6 +40,8 @@ enum Command {
     Simulate(simulate::Arguments),
     /// Find the line round a circuit: shortest, least curved, fastest, and the front between them.
     Raceline(Box<raceline::Arguments>),
+    /// Find where a hybrid's energy goes on a lap and where it buys most: scenarios, swarm, exact optimum.
+    Hybrid(Box<hybrid::Arguments>),
     /// Find a car's limits at each speed: the g-g-v diagram that racing lines are driven within.
     Envelope(envelope::Arguments),
     /// List the GPUs that evaluations can run on, with their limits.
@@ -97,6 +100,7 @@ pub fn run() -> ExitCode {
         Command::Identify(arguments) => identify::run(&arguments),
         Command::Simulate(arguments) => simulate::run(&arguments),
         Command::Raceline(arguments) => raceline::run(&arguments),
+        Command::Hybrid(arguments) => hybrid::run(&arguments),
         Command::Envelope(arguments) => envelope::run(&arguments),
         Command::Devices(arguments) => devices::run(&arguments),
         Command::Bench(arguments) => bench::run(&arguments),

@@ -174,7 +174,9 @@ impl DeploymentSearch<'_> {
         let (none, all) = (step(square, 0.0), step(square, 1.0));
         Linear {
             reached,
-            by_square: slope(0),
+            // Arriving faster never means leaving slower: where a step on the very limit of grip says so, a program would
+            // slow down for it, and the next lap would not.
+            by_square: slope(0).max(0.0),
             by_share: all[0] - none[0],
             energy: cost * motor,
             energy_by_square: cost * slope(1),
