@@ -5,7 +5,8 @@ mod common;
 
 use common::{Lap, UNKNOWNS, bundled_car, linear_car, problem};
 use lapswarm::evaluate::gpu::lint;
-use lapswarm::evaluate::gpu::shader::{LineShape, ReplayShape, car_fragments, tyre_struct};
+use lapswarm::evaluate::gpu::shader::{EnergyShape, LineShape, ReplayShape, car_fragments, tyre_struct};
+use lapswarm::evaluate::hybrid::EnergyAccount;
 use lapswarm::evaluate::line::{DeviceSection, LineStretch};
 use lapswarm::evaluate::replay::{DeviceSample, DeviceWindow, ModelTable, Norm, Stretch};
 use lapswarm::line::kernel::Wanted;
@@ -51,9 +52,20 @@ fn kernels() -> Vec<(&'static str, String)> {
             for lap in [false, true] {
                 kernels.push(("line", line_shape(closed, terms, lap).source()));
             }
+            for additional in [false, true] {
+                kernels.push(("energy_line", energy_shape(closed, terms, additional).source()));
+            }
         }
     }
     kernels
+}
+
+fn energy_shape(closed: bool, terms: usize, additional: bool) -> EnergyShape {
+    EnergyShape {
+        line: line_shape(closed, terms, true),
+        line_variables: 12,
+        additional,
+    }
 }
 
 fn line_shape(closed: bool, terms: usize, lap: bool) -> LineShape {
@@ -250,6 +262,32 @@ fn structs_of_lines_have_the_hosts_offsets() {
         ("inverse_spacing", offset_of!(DeviceSection, inverse_spacing)),
     ];
     assert_eq!((members, size), (named(&host), size_of::<DeviceSection>()));
+}
+
+#[test]
+fn the_struct_of_energies_has_the_hosts_offsets() {
+    let source = energy_shape(true, 4, true).source();
+    let module = lint::check(&source).expect("the kernel parses");
+    let (members, size) = layout(&module, "EnergyAccount");
+    let host = [
+        ("mass", offset_of!(EnergyAccount, mass)),
+        ("deploy_cost", offset_of!(EnergyAccount, deploy_cost)),
+        ("harvest_gain", offset_of!(EnergyAccount, harvest_gain)),
+        ("harvest_most", offset_of!(EnergyAccount, harvest_most)),
+        ("exhaust_gain", offset_of!(EnergyAccount, exhaust_gain)),
+        ("exhaust_cost", offset_of!(EnergyAccount, exhaust_cost)),
+        ("exhaust_from", offset_of!(EnergyAccount, exhaust_from)),
+        ("exhaust_to_ax", offset_of!(EnergyAccount, exhaust_to_ax)),
+        (
+            "rows_per_speed_squared",
+            offset_of!(EnergyAccount, rows_per_speed_squared),
+        ),
+        ("run_in", offset_of!(EnergyAccount, run_in)),
+        ("padding_a", offset_of!(EnergyAccount, padding_a)),
+        ("padding_b", offset_of!(EnergyAccount, padding_b)),
+    ];
+    let named: Vec<(String, usize)> = host.iter().map(|(name, at)| ((*name).to_owned(), *at)).collect();
+    assert_eq!((members, size), (named, size_of::<EnergyAccount>()));
 }
 
 #[test]

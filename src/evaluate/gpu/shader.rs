@@ -20,6 +20,8 @@ const REPLAY: &str = include_str!("../../../shaders/replay.wgsl");
 const REPLAY_REDUCE: &str = include_str!("../../../shaders/replay_reduce.wgsl");
 
 const LINE: &str = include_str!("../../../shaders/line.wgsl");
+/// Engine, motors, store and fuel on a lap of a line.
+const ENERGY: &str = include_str!("../../../shaders/energy.wgsl");
 
 /// The car's fragments with the tyre model's.
 pub fn car_fragments(model: TyreModel) -> [&'static str; 7] {
@@ -134,6 +136,36 @@ impl LineShape {
             },
         );
         [ELEMENTARY, &constants, LINE].concat()
+    }
+}
+
+/// What an energy kernel is specialised to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct EnergyShape {
+    /// The line kernel that it continues; it wants a lap.
+    pub line: LineShape,
+    /// Variables of the line, after which the strategy's figures come.
+    pub line_variables: usize,
+    /// Whether the motor adds to the engine.
+    pub additional: bool,
+}
+
+impl EnergyShape {
+    /// Where in the table of vectors of four the flows, the boosts and the zones begin.
+    pub fn places(&self) -> [usize; 3] {
+        let rows = self.line.limit_rows;
+        [2 * rows, 4 * rows, 5 * rows]
+    }
+
+    /// Source of the kernel; entry point `energy_line`.
+    pub fn source(&self) -> String {
+        let [flows, boosts, zones] = self.places();
+        let constants = format!(
+            "\n// Generated.\nconst STRATEGY: u32 = {}u;\nconst ADDITIONAL: bool = {};\nconst FLOWS_AT: u32 = {flows}u;\n\
+             const BOOSTS_AT: u32 = {boosts}u;\nconst ZONES_AT: u32 = {zones}u;\n\n",
+            self.line_variables, self.additional,
+        );
+        [&self.line.source(), &constants, ENERGY].concat()
     }
 }
 

@@ -1,7 +1,8 @@
 //! Opens the evaluator of a hybrid problem.
 
-use super::{CpuHybridEvaluator, HybridProblem, SimdHybridEvaluator};
+use super::{CpuHybridEvaluator, GpuHybridEvaluator, HybridProblem, SimdHybridEvaluator};
 use crate::error::Result;
+use crate::evaluate::gpu::GpuContext;
 use crate::evaluate::simd::InstructionSet;
 use crate::evaluate::{BackendChoice, Evaluator};
 
@@ -16,6 +17,7 @@ pub fn open_hybrid_evaluator<'a>(
     adapter: Option<&str>,
 ) -> Result<Box<dyn Evaluator + 'a>> {
     Ok(match choice.decided(adapter) {
+        BackendChoice::Gpu => Box::new(GpuHybridEvaluator::new(hybrid, GpuContext::shared(adapter)?)?),
         BackendChoice::Cpu => Box::new(CpuHybridEvaluator::new(hybrid)),
         _ => Box::new(SimdHybridEvaluator::new(hybrid, InstructionSet::best())),
     })

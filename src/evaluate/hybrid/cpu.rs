@@ -55,6 +55,24 @@ impl<'a> CpuHybridEvaluator<'a> {
     pub fn new(hybrid: &'a HybridProblem) -> Self {
         Self { hybrid }
     }
+
+    /// The laps of candidates.
+    pub fn laps(&self, candidates: &[&[f64]]) -> Vec<EnergyLap<f64>> {
+        let hybrid = self.hybrid;
+        candidates
+            .par_iter()
+            .map_init(Course::default, |course, candidate| {
+                let figures = hybrid.figures(candidate);
+                measure(
+                    &hybrid.tables(),
+                    hybrid.line_variables(),
+                    &figures,
+                    course,
+                    |_, _| {},
+                )
+            })
+            .collect()
+    }
 }
 
 impl HybridProblem {
@@ -99,31 +117,8 @@ impl Evaluator for CpuHybridEvaluator<'_> {
     }
 
     fn evaluate(&mut self, population: &[f64]) -> Result<Evaluation> {
-        let hybrid = self.hybrid;
-        // A problem without variables has one candidate, which is empty.
-        let candidates: Vec<&[f64]> = if hybrid.dimensions() == 0 {
-            vec![&[]]
-        } else {
-            population.chunks_exact(hybrid.dimensions()).collect()
-        };
-        let rows = candidates
-            .par_iter()
-            .map_init(Course::default, |course, candidate| {
-                let failure = hybrid.preliminary_failure(candidate);
-                if failure.is_some() {
-                    return hybrid.row(failure, &EnergyLap::default());
-                }
-                let figures = hybrid.figures(candidate);
-                let lap = measure(
-                    &hybrid.tables(),
-                    hybrid.line_variables(),
-                    &figures,
-                    course,
-                    |_, _| {},
-                );
-                hybrid.row(None, &lap)
-            })
-            .collect();
-        Ok(Evaluation::of_rows(rows))
+        let candidates = self.hybrid.candidates(population);
+        let laps = self.laps(&candidates);
+        Ok(self.hybrid.evaluation(&candidates, &laps))
     }
 }

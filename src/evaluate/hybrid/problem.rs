@@ -1,7 +1,7 @@
 //! What is asked of laps with energy: the line, the strategy, which parts of both are free, and what is to be small.
 
 use crate::error::{Error, Result};
-use crate::evaluate::{FAILED_COST, Failure, Objective, Problem, Variable};
+use crate::evaluate::{Evaluation, FAILED_COST, Failure, Objective, Problem, Variable};
 use crate::line::energy::{EnergyCar, EnergyLap, EnergyPlan, GATES, Gates};
 use crate::line::{LinePlan, Parametrisation};
 use crate::track::CrossSections;
@@ -282,6 +282,24 @@ impl HybridProblem {
         figures.extend(self.car.gate_figures(&gates));
         figures.extend(shares);
         figures
+    }
+
+    /// The candidates of a population; a problem without variables has one, which is empty.
+    pub(super) fn candidates<'p>(&self, population: &'p [f64]) -> Vec<&'p [f64]> {
+        if self.dimensions() == 0 {
+            vec![&[]]
+        } else {
+            population.chunks_exact(self.dimensions()).collect()
+        }
+    }
+
+    /// What the laps of candidates come to.
+    pub(super) fn evaluation(&self, candidates: &[&[f64]], laps: &[EnergyLap<f64>]) -> Evaluation {
+        let rows = candidates
+            .iter()
+            .zip(laps)
+            .map(|(candidate, lap)| self.row(self.preliminary_failure(candidate), lap));
+        Evaluation::of_rows(rows.collect())
     }
 
     /// Why a candidate need not be scored, if so.

@@ -107,13 +107,8 @@ impl Evaluator for SimdHybridEvaluator<'_> {
 
     fn evaluate(&mut self, population: &[f64]) -> Result<Evaluation> {
         let hybrid = self.hybrid;
-        let candidates: Vec<&[f64]> = population.chunks_exact(hybrid.dimensions().max(1)).collect();
+        let candidates = hybrid.candidates(population);
         let laps = self.laps(&candidates);
-        let rows = candidates
-            .iter()
-            .zip(&laps)
-            .map(|(candidate, lap)| hybrid.row(hybrid.preliminary_failure(candidate), lap))
-            .collect();
-        Ok(Evaluation::of_rows(rows))
+        Ok(hybrid.evaluation(&candidates, &laps))
     }
 }

@@ -10,8 +10,8 @@
 //! After R. Lot and S. A. Evangelou, *Lap time optimization of a sports series hybrid electric vehicle*, World Congress on
 //! Engineering 2013, for what is accounted; the passes are those of [`super::super::kernel`].
 
-use super::super::kernel::{BLOCK, Course, braked, corner};
-use super::super::point_mass::{LIMIT_WIDTH, LimitTable};
+use super::super::kernel::{BLOCK, Course, braked, corner, limits_at, look_up};
+use super::super::point_mass::LimitTable;
 use super::plan::{EnergyPlan, GATES, Mode, ZoneRow};
 use super::table::EnergyTable;
 use crate::scalar::{Lookup, Real};
@@ -135,25 +135,6 @@ struct Step<R> {
     motor: R,
 }
 
-/// Lateral, grip, drive and drag at a speed squared, and the share of the grip that is left lengthways.
-#[inline(always)]
-fn limits_at<R: Lookup>(limits: &LimitTable<R::Storage>, speed_squared: R, curvature: R) -> [R; 3] {
-    let rows = limits.limits.len() / LIMIT_WIDTH;
-    let (place, beyond) = (speed_squared * R::load(limits.rows_per_speed_squared)).place(rows, LIMIT_WIDTH);
-    let row = R::pick_row(&limits.limits, place);
-    let at = |column: usize| row[column] + beyond * row[LIMIT_WIDTH / 2 + column];
-    let share = curvature * speed_squared / at(0);
-    let root = (R::lit(1.0) - share * share).max(R::lit(0.0)).sqrt();
-    let left = if limits.ellipse.is_empty() {
-        root
-    } else {
-        let rows = limits.ellipse.len() / 2;
-        let (place, beyond) = (root * R::lit(rows as f64)).place(rows, 2);
-        R::pick(&limits.ellipse, place, 0) + beyond * R::pick(&limits.ellipse, place, 1)
-    };
-    [at(1) * left, at(2), at(3)]
-}
-
 /// The share of a segment in which its zone lets the motor work.
 #[inline(always)]
 fn zone_share<R: Real>(row: &ZoneRow<R::Storage>, strategy: &[R]) -> R {
@@ -192,7 +173,7 @@ impl<R: Lookup> Car<'_, R> {
         let ahead = (from + length * (engine - drag)).max(nought);
         let rows = self.table.boosts.len() / 2;
         let (place, beyond) = (ahead * R::load(self.table.rows_per_speed_squared)).place(rows, 2);
-        let boost = R::pick(&self.table.boosts, place, 0) + beyond * R::pick(&self.table.boosts, place, 1);
+        let boost = look_up(&self.table.boosts, 2, place, beyond, 0);
         let open = self.open(bends[0], from) & self.strategy[2].less_than(engine - drag);
         let wanted = gated(open, boost * zone_share(&self.plan.zones[here], self.strategy));
         let per_force = R::load(self.table.mass) * R::load(self.table.deploy_cost) * length;
