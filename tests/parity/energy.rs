@@ -63,7 +63,7 @@ fn problems() -> Vec<(String, HybridProblem)> {
                 ..Strategy::fixed(Gates::OPEN, plan.count())
             };
             let free = HybridLine::Free {
-                cuts: cuts.clone(),
+                cuts: Box::new(cuts.clone()),
                 parametrisation: Parametrisation::control_points(sections / 6),
             };
             let fixed = HybridLine::Fixed {

@@ -63,7 +63,7 @@ pub enum HybridLine {
     /// A line across cuts, which the first variables give.
     Free {
         /// The cuts.
-        cuts: CrossSections,
+        cuts: Box<CrossSections>,
         /// How variables give a line.
         parametrisation: Parametrisation,
     },

@@ -17,9 +17,7 @@ pub use scenario::{ReportedLap, Scenario, drive, published};
 pub use settings::{FreePart, HYBRID_OBJECTIVES, HybridStudySettings};
 pub use setup::{HybridSetup, set_up};
 pub use stint::{Sizing, StintLap, size, stint};
-pub use strategy::{
-    FoundStrategy, StrategyFront, search_front, search_strategy, speed_gate, zone_gates, zone_starts,
-};
+pub use strategy::{FoundStrategy, StrategyFront, search_front, search_strategy, zone_gates, zone_starts};
 
 use crate::error::Result;
 use crate::evaluate::BackendInfo;
@@ -153,10 +151,11 @@ pub fn run_study(
         let exact = setup.exact(budget_j, None)?;
         outcome.interrupted |= observe(&told("exact", 0, format!("{:.4} s", exact.lap.time))).is_break();
         let unbound = setup.exact(1e9, Some(&exact.shares))?;
-        let mut front = Vec::new();
+        let mut front: Vec<FrontPoint> = Vec::new();
         for &mj in &settings.budgets_mj {
             if !outcome.interrupted {
-                let deployment = setup.exact(1e6 * mj, None)?;
+                let before = front.last().map(|p| p.deployment.shares.as_slice());
+                let deployment = setup.exact(1e6 * mj, before)?;
                 outcome.interrupted |= observe(&told(
                     "front",
                     0,
@@ -171,7 +170,7 @@ pub fn run_study(
         }
         let search = Instant::now();
         let mut interrupted = outcome.interrupted;
-        let swarm = search_strategy(setup, settings, &outcome.engine, budget_j / 1e6, |p| {
+        let swarm = search_strategy(setup, settings, budget_j / 1e6, |p| {
             let told = observe(&told("swarm", p.evaluations, format!("{:.4} s", p.best[0])));
             interrupted |= told.is_break();
             told
@@ -179,7 +178,7 @@ pub fn run_study(
         outcome.evaluations += swarm.evaluations;
         let mut swarm_front = None;
         if settings.objectives.len() > 1 && !interrupted {
-            let found = search_front(setup, settings, &outcome.engine, budget_j / 1e6, |p| {
+            let found = search_front(setup, settings, budget_j / 1e6, |p| {
                 let best: Vec<String> = p.best.iter().map(|b| format!("{b:.3}")).collect();
                 let told = observe(&told("swarm front", p.evaluations, best.join(" ")));
                 interrupted |= told.is_break();

@@ -104,7 +104,7 @@ impl Default for HybridStudySettings {
             free: FreePart::Strategy,
             objectives: vec![HybridObjective::LapTime, HybridObjective::EnergyUsed],
             energy_mj: None,
-            budgets_mj: vec![0.0, 1.0, 2.1, 4.0, 5.3],
+            budgets_mj: vec![0.0, 0.5, 1.0, 1.5, 2.1, 3.0, 4.0, 5.3],
             stint_laps: 0,
             stint_fuel_kg: 60.0,
             match_lap_time_s: None,
@@ -346,7 +346,7 @@ fn read_scenario(name: &str, row: &Table<'_>) -> Result<Scenario> {
             steer_rad: number("steer_rad", 0.0, 2.0, open.steer_rad)?,
             speed_mps: number("speed_mps", 0.0, 200.0, open.speed_mps)?,
             ax_mps2: number("ax_mps2", -100.0, 100.0, open.ax_mps2)?,
-            soc: number("soc", 0.0, 2.0, open.soc)?,
+            soc: number("soc", -100.0, 2.0, open.soc)?,
             energy_mj: number("energy_mj", 0.0, 1000.0, open.energy_mj)?,
         },
     })
@@ -400,7 +400,7 @@ mod tests {
             ("budgets_mj = [-1]", "budgets_mj"),
             ("[scenarios.own]\nsteer = 0.1", "scenarios.own.steer"),
             ("[scenarios.own]\nmode = \"both\"", "scenarios.own.mode"),
-            ("[scenarios.own]\nsoc = -0.5", "scenarios.own.soc"),
+            ("[scenarios.own]\nsoc = 3", "scenarios.own.soc"),
         ] {
             std::fs::write(&path, text).unwrap();
             let error = HybridStudySettings::read(&path).unwrap_err().to_string();

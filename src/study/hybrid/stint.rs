@@ -2,7 +2,7 @@
 
 use super::scenario::{ReportedLap, drive};
 use super::setup::HybridSetup;
-use super::strategy::speed_gate;
+use super::strategy::{MOST_MJ, budget_at, gate_speeds};
 use crate::error::{Error, Result};
 use crate::line::energy::{Gates, Mode};
 use serde::Serialize;
@@ -33,8 +33,8 @@ pub struct StintLap {
 /// The greatest difference of the charge over a lap that counts as sustained, as a share of the energy used.
 const SUSTAINED: f64 = 0.02;
 
-/// Drives `laps` with `fuel_kg` on board at first. Each lap deploys what it harvests, at the lowest speeds; the mass falls
-/// by the fuel burnt.
+/// Drives `laps` with `fuel_kg` on board at first. Each lap deploys no more than it harvests, below the speed that makes it
+/// fastest; the mass falls by the fuel burnt.
 ///
 /// # Errors
 /// [`Error::Input`] if the fuel does not last; those of laps.
@@ -50,18 +50,24 @@ pub fn stint(setup: &HybridSetup, laps: usize, fuel_kg: f64) -> Result<Vec<Stint
             car: setup.car.with_mass(mass_kg)?,
             ..setup.clone()
         };
-        let lap_with = |speed_mps: f64| {
+        let lap_with = |speed_mps: f64, energy_mj: f64| {
             let gates = Gates {
                 speed_mps,
+                energy_mj,
                 soc: -1e6,
                 ..Gates::OPEN
             };
             drive(&heavy, "stint", Mode::Additional, gates)
         };
-        // More is used the higher the gate.
-        let gate_mps = speed_gate(|v| Ok(-lap_with(v)?.lap.change))?;
-        let lap = lap_with(gate_mps)?.lap;
-        let engine = lap_with(0.0)?.lap;
+        let engine = lap_with(0.0, 0.0)?.lap;
+        let (mut gate_mps, mut lap) = (0.0, engine);
+        for speed in gate_speeds() {
+            let energy = budget_at(|mj| Ok(lap_with(speed, mj)?.lap.change))?;
+            let tried = lap_with(speed, energy)?.lap;
+            if tried.time < lap.time {
+                (gate_mps, lap) = (speed, tried);
+            }
+        }
         let harvested = lap.harvested_k + lap.harvested_h;
         soc += lap.change / setup.car.hybrid.store.capacity_j;
         if lap.change < -SUSTAINED * harvested.max(1e4) {
@@ -99,7 +105,7 @@ pub fn stint(setup: &HybridSetup, laps: usize, fuel_kg: f64) -> Result<Vec<Stint
 pub struct Sizing {
     /// Power of the motor (kW).
     pub power_kw: f64,
-    /// Energy that it needs in a lap (MJ), deployed at the lowest speeds; `null` where no energy is enough.
+    /// Energy that it needs in a lap (MJ), deployed below the speed that needs least; `null` where no energy is enough.
     pub energy_mj: Option<f64>,
     /// What of it is harvested in the same lap (MJ).
     pub harvested_mj: f64,
@@ -129,19 +135,36 @@ pub fn size(setup: &HybridSetup, lap_time_s: f64) -> Result<Vec<Sizing>> {
             car: setup.car.with_hybrid(hybrid)?,
             ..setup.clone()
         };
-        let lap_with = |speed_mps: f64| -> Result<ReportedLap> {
+        let lap_with = |speed_mps: f64, energy_mj: f64| -> Result<ReportedLap> {
             let gates = Gates {
                 speed_mps,
+                energy_mj,
                 soc: -1e6,
                 ..Gates::OPEN
             };
             drive(&sized, "sized", Mode::Additional, gates)
         };
-        let gate_mps = speed_gate(|v| Ok(lap_time_s - lap_with(v)?.lap.time))?;
-        let lap = lap_with(gate_mps)?.lap;
+        let mut best: Option<ReportedLap> = None;
+        let mut fastest = lap_with(0.0, 0.0)?;
+        for speed in gate_speeds() {
+            let free = lap_with(speed, MOST_MJ)?;
+            let enough = free.lap.time <= lap_time_s;
+            if free.lap.time < fastest.lap.time {
+                fastest = free;
+            }
+            if enough {
+                let energy = budget_at(|mj| Ok(lap_with(speed, mj)?.lap.time - lap_time_s))?;
+                let tried = lap_with(speed, energy)?;
+                if best.as_ref().is_none_or(|b| tried.lap.deployed < b.lap.deployed) {
+                    best = Some(tried);
+                }
+            }
+        }
+        let met = best.is_some();
+        let lap = best.unwrap_or(fastest).lap;
         rows.push(Sizing {
             power_kw,
-            energy_mj: (lap.time <= lap_time_s + 1e-3).then_some(lap.deployed / 1e6),
+            energy_mj: met.then_some(lap.deployed / 1e6),
             harvested_mj: (lap.harvested_k + lap.harvested_h) / 1e6,
             lap_time_s: lap.time,
             fuel_l: lap.fuel / setup.car.fuel_density_kgpl,

@@ -1,6 +1,6 @@
 //! Where the motor works: by the exact optimum, by a swarm, and along the fronts between objectives.
 
-use super::scenario::ReportedLap;
+use super::scenario::{ReportedLap, drive};
 use super::settings::{FreePart, HybridStudySettings};
 use super::setup::{HybridSetup, late_bend};
 use crate::error::Result;
@@ -17,8 +17,10 @@ use crate::swarm::{
 };
 use std::ops::ControlFlow;
 
-/// Rises of speed smaller than this make no zone of their own (m/s).
-const RISE_MPS: f64 = 2.0;
+/// Gaps shorter than this do not end a stretch (m).
+const GAP_M: f64 = 8.0;
+/// Stretches of less are none (J).
+const LEAST_J: f64 = 5e3;
 /// Metres of the reference line for each control point of free lines.
 const CONTROL_SPACING_M: f64 = 40.0;
 
@@ -32,32 +34,39 @@ pub fn zone_gates(energy_mj: f64) -> Gates {
     }
 }
 
-/// Sections where a lap of these speeds (m/s) begins to gain speed: one for each stretch that the motor may help on.
-pub fn zone_starts(v_mps: &[f64]) -> Vec<usize> {
-    let n = v_mps.len();
-    let Some(slowest) = (0..n).min_by(|&i, &j| v_mps[i].total_cmp(&v_mps[j])) else {
-        return Vec::new();
+/// Sections where stretches begin that the motor is of use on, by what it gives in each segment (J) of a lap on which nothing
+/// holds it back, and by the segments' lengths (m). Where tyres or corners take all that the engine gives, it adds nothing.
+pub fn zone_starts(given_j: &[f64], length_m: &[f64]) -> Vec<usize> {
+    let n = given_j.len();
+    let mut on: Vec<bool> = given_j.iter().map(|j| *j > 0.0).collect();
+    let runs = |on: &[bool]| -> Vec<(usize, usize)> {
+        let Some(first) = (0..n).find(|&i| on[i] != on[(i + n - 1) % n]) else {
+            return Vec::new();
+        };
+        let mut runs = Vec::new();
+        let mut k = 0;
+        while k < n {
+            let start = (first + k) % n;
+            let count = (0..n - k)
+                .take_while(|j| on[(start + j) % n] == on[start])
+                .count();
+            runs.push((start, count));
+            k += count;
+        }
+        runs
     };
-    let mut starts = vec![slowest];
-    // From the slowest on, a start is the least speed since a fall that is followed by a rise.
-    let (mut least, mut greatest, mut falling) = (slowest, v_mps[slowest], false);
-    for i in (1..n).map(|k| (slowest + k) % n) {
-        let v = v_mps[i];
-        if falling {
-            if v < v_mps[least] {
-                least = i;
-            } else if v > v_mps[least] + RISE_MPS {
-                starts.push(least);
-                (falling, greatest) = (false, v);
-            }
-        } else if v < greatest - RISE_MPS {
-            (falling, least) = (true, i);
-        } else {
-            greatest = greatest.max(v);
+    let sum = |values: &[f64], (start, count): (usize, usize)| {
+        (0..count).map(|j| values[(start + j) % n]).sum::<f64>()
+    };
+    for run in runs(&on) {
+        if !on[run.0] && sum(length_m, run) < GAP_M {
+            (0..run.1).for_each(|j| on[(run.0 + j) % n] = true);
         }
     }
+    let worth_it = |run: &(usize, usize)| on[run.0] && sum(given_j, *run) > LEAST_J;
+    let mut starts: Vec<usize> = runs(&on).iter().filter(|r| worth_it(r)).map(|r| r.0).collect();
     starts.sort_unstable();
-    starts
+    if starts.is_empty() { vec![0] } else { starts }
 }
 
 /// What the swarm found for one budget.
@@ -111,23 +120,16 @@ impl HybridSetup {
         Ok(ReportedLap::of(name, &problem, &[]))
     }
 
-    /// The problem of sharing an energy (MJ) out over the zones of `engine_lap`, the lap without the motor.
+    /// The problem of sharing an energy (MJ) out over the stretches that the motor is of use on.
     ///
     /// # Errors
     /// Those of [`HybridProblem::new`].
-    pub fn zone_problem(
-        &self,
-        engine_lap: &ReportedLap,
-        energy_mj: f64,
-        objectives: &[HybridObjective],
-    ) -> Result<HybridProblem> {
-        let mut speeds: Vec<f64> = engine_lap.segments.iter().map(|s| s.start.sqrt()).collect();
-        let mut length = engine_lap.length_m.clone();
-        if !self.closed {
-            speeds.extend(engine_lap.segments.last().map(|s| s.end.sqrt()));
-            length.push(0.0);
-        }
-        let starts = zone_starts(&speeds);
+    pub fn zone_problem(&self, energy_mj: f64, objectives: &[HybridObjective]) -> Result<HybridProblem> {
+        let open = drive(self, "open", Mode::Additional, zone_gates(1e6))?;
+        let given: Vec<f64> = open.segments.iter().map(|s| s.deployed).collect();
+        let starts = zone_starts(&given, &open.length_m);
+        let mut length = open.length_m;
+        length.resize(self.points_m.len(), 0.0);
         let plan = EnergyPlan::zoned(&length, &starts, self.closed, self.run_in, Mode::Additional);
         let zones = plan.count();
         HybridProblem::new(
@@ -151,11 +153,10 @@ impl HybridSetup {
 pub fn search_strategy(
     setup: &HybridSetup,
     settings: &HybridStudySettings,
-    engine_lap: &ReportedLap,
     energy_mj: f64,
     mut observe: impl FnMut(&Progress) -> ControlFlow<()>,
 ) -> Result<FoundStrategy> {
-    let problem = setup.zone_problem(engine_lap, energy_mj, &[HybridObjective::LapTime])?;
+    let problem = setup.zone_problem(energy_mj, &[HybridObjective::LapTime])?;
     let mut swarm = HybridSwarm::new(
         &problem.problem,
         HybridSettings {
@@ -202,11 +203,10 @@ pub struct StrategyFront {
 pub fn search_front(
     setup: &HybridSetup,
     settings: &HybridStudySettings,
-    engine_lap: &ReportedLap,
     energy_mj: f64,
     observe: impl FnMut(&Progress) -> ControlFlow<()>,
 ) -> Result<StrategyFront> {
-    let fixed = setup.zone_problem(engine_lap, energy_mj, &settings.objectives)?;
+    let fixed = setup.zone_problem(energy_mj, &settings.objectives)?;
     let mut starts: Vec<Vec<f64>> = Vec::new();
     let problem = match (settings.free, &setup.alpha) {
         (FreePart::Strategy, _) | (_, None) => fixed,
@@ -228,7 +228,7 @@ pub fn search_front(
             let free_zones = if free == FreePart::Line { 0 } else { zones };
             let problem = HybridProblem::new(
                 HybridLine::Free {
-                    cuts,
+                    cuts: Box::new(cuts),
                     parametrisation,
                 },
                 setup.car.clone(),
@@ -320,24 +320,35 @@ fn starting_candidates(
         .collect()
 }
 
-/// The greatest speed (m/s) of the motor's gate at which `wanted` of a lap's figures is still nought or less, by halving;
-/// `wanted` is to rise with the gate.
+/// Gates of speed (m/s) that a lap with a budget is tried with: the lowest spends it where it is worth most.
+pub fn gate_speeds() -> impl Iterator<Item = f64> {
+    (8..=36).map(|i| 2.0 * f64::from(i))
+}
+
+/// Budgets are looked for up to this (MJ).
+pub const MOST_MJ: f64 = 30.0;
+
+/// The budget (MJ) at which `excess`, which falls with it, comes to nought; the greatest if it never does, nought if it
+/// always has.
 ///
 /// # Errors
-/// Those of `wanted`.
-pub fn speed_gate(mut wanted: impl FnMut(f64) -> Result<f64>) -> Result<f64> {
-    let (mut low, mut high) = (0.0, 100.0);
-    if wanted(high)? <= 0.0 {
+/// Those of `excess`.
+pub fn budget_at(mut excess: impl FnMut(f64) -> Result<f64>) -> Result<f64> {
+    let (mut low, mut high) = (0.0, MOST_MJ);
+    if excess(low)? <= 0.0 {
+        return Ok(low);
+    }
+    if excess(high)? > 0.0 {
         return Ok(high);
     }
-    // To a hundredth of a millimetre per second.
-    while high - low > 1e-5 {
+    // To a tenth of a joule.
+    while high - low > 1e-7 {
         let middle = 0.5 * (low + high);
-        if wanted(middle)? > 0.0 {
-            high = middle;
-        } else {
+        if excess(middle)? > 0.0 {
             low = middle;
+        } else {
+            high = middle;
         }
     }
-    Ok(low)
+    Ok(high)
 }

@@ -350,7 +350,7 @@ pub fn write_results(
     summary: &HybridSummary,
 ) -> Result<()> {
     files::write(folder, settings, setup, outcome, summary)?;
-    pictures::draw(folder, setup, outcome)
+    pictures::draw(folder, settings, setup, outcome)
 }
 
 /// The laps that a study tells of.
