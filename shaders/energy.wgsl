@@ -1,7 +1,7 @@
 // Twin of `src/line/energy/kernel.rs`: a lap on a line's lengths and curvatures with engine, motor-generators and store.
 //
 // Follows `line.wgsl`, whose course, limits and variables it reads; the strategy's figures are the variables from row
-// STRATEGY on. The constants STRATEGY, ADDITIONAL, FLOWS_AT, BOOSTS_AT and ZONES_AT are generated: where in `energy` the
+// STRATEGY on. The constants STRATEGY, ADDITIONAL, COUNTS_CHARGE, FLOWS_AT, BOOSTS_AT and ZONES_AT are generated: where in `energy` the
 // flows, the boosts and the zones begin, after the forces.
 
 // Twin of `EnergyAccount` in `src/evaluate/hybrid/gpu.rs`.
@@ -9,6 +9,8 @@ struct EnergyAccount {
     mass: f32,
     deploy_cost: f32,
     harvest_gain: f32,
+    force_per_deployed: f32,
+    force_per_harvested: f32,
     harvest_most: f32,
     exhaust_gain: f32,
     exhaust_cost: f32,
@@ -17,8 +19,6 @@ struct EnergyAccount {
     rows_per_speed_squared: f32,
     // The section that a lap is run in from.
     run_in: u32,
-    padding_a: u32,
-    padding_b: u32,
 }
 
 @group(0) @binding(9) var<uniform> account: EnergyAccount;
@@ -76,8 +76,8 @@ fn additional(section: u32, start: f32, length: f32, here: f32, there: f32, most
     let greatest = figures.x + (held - f32(row)) * figures.y;
     let may = gates_open(here, start, candidate) && strategy(2u, candidate) < engine - first.z;
     let wanted = select(0.0, greatest * zone_share(section, candidate), may);
-    let per_force = account.mass * account.deploy_cost * length;
-    let boost = min(wanted, left / per_force);
+    let inverse = 1.0 / length;
+    let boost = min(wanted, left * account.force_per_deployed * inverse);
 
     let both = min(first.x, first.y + boost);
     let middle = max(start + length * (both - first.z), 0.0);
@@ -87,7 +87,7 @@ fn additional(section: u32, start: f32, length: f32, here: f32, there: f32, most
     let reached = max(start + length * ((both - first.z) + (later_both - later.z)), 0.0);
     let end = min(reached, most);
     // Where less is needed than both could give, the motor gives way first.
-    let spare = 0.5 * (reached - end) / length;
+    let spare = 0.5 * (reached - end) * inverse;
     return Step(end, max(motor - spare, 0.0));
 }
 
@@ -98,6 +98,38 @@ fn engine_only(start: f32, length: f32, here: f32, there: f32, most: f32) -> f32
     let later = limits_at(middle, 0.5 * (here + there));
     let second = min(later.x, later.y) - later.z;
     return min(max(start + length * (first + second), 0.0), most);
+}
+
+// One segment of the lap that only finds the speed at the start line.
+fn provisional(
+    state: ptr<function, EnergyState>,
+    section: u32,
+    length: f32,
+    here: f32,
+    there: f32,
+    most: f32,
+    candidate: u32,
+) {
+    let start = (*state).speed_squared;
+    let step = additional(section, start, length, here, there, most, store_left(*state, candidate), candidate);
+    let joules = account.mass * length;
+    let deployed = joules * step.motor * account.deploy_cost;
+    (*state).speed_squared = step.end;
+    (*state).deployed = (*state).deployed + deployed;
+    if COUNTS_CHARGE {
+        let mean = 0.5 * (start + step.end);
+        let held = min(max(mean * account.rows_per_speed_squared, 0.0), f32(LIMIT_ROWS));
+        let row = min(u32(held), LIMIT_ROWS - 1u);
+        let forces = energy[2u * row] + (held - f32(row)) * energy[2u * row + 1u];
+        let inverse = 1.0 / length;
+        let force = 0.5 * (step.end - start) * inverse + forces.w;
+        let unharvested = account.harvest_most - (*state).harvested_k;
+        let room = max(unharvested * account.force_per_harvested * inverse, 0.0);
+        let generator = min(min(max(-force, 0.0), forces.z), room);
+        let harvested_k = joules * generator * account.harvest_gain;
+        (*state).change = (*state).change + (harvested_k - deployed);
+        (*state).harvested_k = (*state).harvested_k + harvested_k;
+    }
 }
 
 fn segment_energy(
@@ -123,7 +155,8 @@ fn segment_energy(
     let row = min(u32(held), LIMIT_ROWS - 1u);
     let beyond = held - f32(row);
     let forces = energy[2u * row] + beyond * energy[2u * row + 1u];
-    let ax = 0.5 * (end - start) / length;
+    let inverse = 1.0 / length;
+    let ax = 0.5 * (end - start) * inverse;
     // What the tyres do, forwards or backwards.
     let force = ax + forces.w;
     let demand = max(force, 0.0);
@@ -135,11 +168,12 @@ fn segment_energy(
     } else {
         let may = gates_open(here, start, candidate) && strategy(2u, candidate) < ax;
         let share = zone_share(section, candidate);
-        let reach = left / (joules * account.deploy_cost);
+        let reach = left * account.force_per_deployed * inverse;
         motor = min(min(select(0.0, forces.y * share, may), demand), reach);
     }
     let engine = demand - motor;
-    let room = (account.harvest_most - (*state).harvested_k) / (joules * account.harvest_gain);
+    let unharvested = account.harvest_most - (*state).harvested_k;
+    let room = unharvested * account.force_per_harvested * inverse;
     let generator = min(min(shed, forces.z), max(room, 0.0));
     let deployed = joules * motor * account.deploy_cost;
     let harvested_k = joules * generator * account.harvest_gain;
@@ -226,7 +260,7 @@ fn energy_lap(candidate: u32) {
                 let after = select(0u, here + 1u, here + 1u < n);
                 let there = course[place_of(after, candidate)];
                 let most = speeds_squared[place_of(after, candidate)];
-                _ = segment_energy(&state, here, bend.x, bend.y, there.y, most, candidate);
+                provisional(&state, here, bend.x, bend.y, there.y, most, candidate);
                 bend = there;
             }
             speed_squared = state.speed_squared;

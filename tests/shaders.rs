@@ -65,6 +65,7 @@ fn energy_shape(closed: bool, terms: usize, additional: bool) -> EnergyShape {
         line: line_shape(closed, terms, true),
         line_variables: 12,
         additional,
+        counts_charge: closed,
     }
 }
 
@@ -273,6 +274,14 @@ fn the_struct_of_energies_has_the_hosts_offsets() {
         ("mass", offset_of!(EnergyAccount, mass)),
         ("deploy_cost", offset_of!(EnergyAccount, deploy_cost)),
         ("harvest_gain", offset_of!(EnergyAccount, harvest_gain)),
+        (
+            "force_per_deployed",
+            offset_of!(EnergyAccount, force_per_deployed),
+        ),
+        (
+            "force_per_harvested",
+            offset_of!(EnergyAccount, force_per_harvested),
+        ),
         ("harvest_most", offset_of!(EnergyAccount, harvest_most)),
         ("exhaust_gain", offset_of!(EnergyAccount, exhaust_gain)),
         ("exhaust_cost", offset_of!(EnergyAccount, exhaust_cost)),
@@ -283,8 +292,6 @@ fn the_struct_of_energies_has_the_hosts_offsets() {
             offset_of!(EnergyAccount, rows_per_speed_squared),
         ),
         ("run_in", offset_of!(EnergyAccount, run_in)),
-        ("padding_a", offset_of!(EnergyAccount, padding_a)),
-        ("padding_b", offset_of!(EnergyAccount, padding_b)),
     ];
     let named: Vec<(String, usize)> = host.iter().map(|(name, at)| ((*name).to_owned(), *at)).collect();
     assert_eq!((members, size), (named, size_of::<EnergyAccount>()));

@@ -148,6 +148,8 @@ pub struct EnergyShape {
     pub line_variables: usize,
     /// Whether the motor adds to the engine.
     pub additional: bool,
+    /// Whether the charge has a say in where the motor works.
+    pub counts_charge: bool,
 }
 
 impl EnergyShape {
@@ -161,9 +163,9 @@ impl EnergyShape {
     pub fn source(&self) -> String {
         let [flows, boosts, zones] = self.places();
         let constants = format!(
-            "\n// Generated.\nconst STRATEGY: u32 = {}u;\nconst ADDITIONAL: bool = {};\nconst FLOWS_AT: u32 = {flows}u;\n\
+            "\n// Generated.\nconst STRATEGY: u32 = {}u;\nconst ADDITIONAL: bool = {};\nconst COUNTS_CHARGE: bool = {};\nconst FLOWS_AT: u32 = {flows}u;\n\
              const BOOSTS_AT: u32 = {boosts}u;\nconst ZONES_AT: u32 = {zones}u;\n\n",
-            self.line_variables, self.additional,
+            self.line_variables, self.additional, self.counts_charge,
         );
         [&self.line.source(), &constants, ENERGY].concat()
     }

@@ -24,6 +24,10 @@ pub struct EnergyAccount {
     pub deploy_cost: f32,
     /// Energy into the store for each joule at the wheels.
     pub harvest_gain: f32,
+    /// Force over mass for each joule out of the store, times the length, m^2/s^2/J.
+    pub force_per_deployed: f32,
+    /// Force over mass for each joule of the MGU-K, times the length, m^2/s^2/J.
+    pub force_per_harvested: f32,
     /// What the MGU-K may put into the store in a lap, J.
     pub harvest_most: f32,
     /// Energy of the MGU-H for each kilogram of fuel, J/kg.
@@ -38,10 +42,6 @@ pub struct EnergyAccount {
     pub rows_per_speed_squared: f32,
     /// The section that a lap is run in from.
     pub run_in: u32,
-    /// Nothing: uniform structs are padded to 16 bytes.
-    pub padding_a: u32,
-    /// Nothing.
-    pub padding_b: u32,
 }
 
 /// Lanes of a workgroup, where the device allows: a multiple of every device's subgroup.
@@ -132,6 +132,7 @@ impl<'a> GpuHybridEvaluator<'a> {
             },
             line_variables: hybrid.line_variables(),
             additional: hybrid.energy().mode == Mode::Additional,
+            counts_charge: hybrid.energy().counts_charge,
         };
         use Binding::{Read, Uniform, Write};
         let table_binding = |uniform: bool| if uniform { Uniform } else { Read };
@@ -171,6 +172,8 @@ impl<'a> GpuHybridEvaluator<'a> {
             mass: table.mass,
             deploy_cost: table.deploy_cost,
             harvest_gain: table.harvest_gain,
+            force_per_deployed: table.force_per_deployed,
+            force_per_harvested: table.force_per_harvested,
             harvest_most: table.harvest_most,
             exhaust_gain: table.exhaust_gain,
             exhaust_cost: table.exhaust_cost,
@@ -178,8 +181,6 @@ impl<'a> GpuHybridEvaluator<'a> {
             exhaust_to_ax: table.exhaust_to_ax,
             rows_per_speed_squared: table.rows_per_speed_squared,
             run_in: hybrid.energy().run_in as u32,
-            padding_a: 0,
-            padding_b: 0,
         };
         let vectors = energy_vectors(&table, &hybrid.energy().stored::<f32>());
         let tables = [

@@ -210,6 +210,9 @@ impl HybridProblem {
             HybridLine::Fixed { points_m, closed } => slowest(points_m, *closed),
             HybridLine::Free { cuts, .. } => slowest(&cuts.points(&vec![0.5; n]), cuts.closed),
         };
+        // A floor so far down is none.
+        let mut energy = energy;
+        energy.counts_charge = strategy.free.contains(&Free::Soc) || strategy.gates.soc > -1e3;
         let line_variables = variables.len();
         variables.extend(strategy.free.iter().map(|f| f.variable()));
         Ok(Self {

@@ -167,6 +167,7 @@ impl<R: Lookup> Car<'_, R> {
     /// greatest speed squared at its end.
     #[inline(always)]
     fn additional(&self, here: usize, from: R, length: R, bends: [R; 2], most: R, left: R) -> Step<R> {
+        let inverse = R::lit(1.0) / length;
         let nought = R::lit(0.0);
         let [grip, drive, drag] = limits_at(self.limits, from, bends[0]);
         let engine = grip.min(drive);
@@ -176,8 +177,7 @@ impl<R: Lookup> Car<'_, R> {
         let boost = look_up(&self.table.boosts, 2, place, beyond, 0);
         let open = self.open(bends[0], from) & self.strategy[2].less_than(engine - drag);
         let wanted = gated(open, boost * zone_share(&self.plan.zones[here], self.strategy));
-        let per_force = R::load(self.table.mass) * R::load(self.table.deploy_cost) * length;
-        let boost = wanted.min(left / per_force);
+        let boost = wanted.min(left * R::load(self.table.force_per_deployed) * inverse);
 
         let both = grip.min(drive + boost);
         let middle = (from + length * (both - drag)).max(nought);
@@ -187,7 +187,7 @@ impl<R: Lookup> Car<'_, R> {
         let reached = (from + length * ((both - drag) + (later_both - later_drag))).max(nought);
         let end = reached.min(most);
         // Where less is needed than both could give, the motor gives way first.
-        let spare = R::lit(0.5) * (reached - end) / length;
+        let spare = R::lit(0.5) * (reached - end) * inverse;
         Step {
             end,
             motor: (motor - spare).max(nought),
@@ -204,6 +204,34 @@ impl<R: Lookup> Car<'_, R> {
         let [grip, drive, drag] = limits_at(self.limits, middle, R::lit(0.5) * (bends[0] + bends[1]));
         let second = grip.min(drive) - drag;
         (from + length * (first + second)).max(nought).min(most)
+    }
+
+    /// One segment of the lap that only finds the speed at the start line, with the motor beside the engine: what is deployed,
+    /// and what is harvested by the MGU-K where the charge has a say. The little that the MGU-H adds is left out here.
+    #[inline(always)]
+    fn provisional(&self, state: &mut State<R>, here: usize, length: R, bends: [R; 2], most: R) {
+        let nought = R::lit(0.0);
+        let table = self.table;
+        let from = state.speed_squared;
+        let step = self.additional(here, from, length, bends, most, self.left(state));
+        let joules = R::load(table.mass) * length;
+        let deployed = joules * step.motor * R::load(table.deploy_cost);
+        state.speed_squared = step.end;
+        state.deployed = state.deployed + deployed;
+        if self.plan.counts_charge {
+            let mean = R::lit(0.5) * (from + step.end);
+            let rows = table.forces.len() / 8;
+            let (place, beyond) = (mean * R::load(table.rows_per_speed_squared)).place(rows, 8);
+            let row = R::pick_row(&table.forces, place);
+            let inverse = R::lit(1.0) / length;
+            let force = R::lit(0.5) * (step.end - from) * inverse + (row[3] + beyond * row[7]);
+            let unharvested = R::load(table.harvest_most) - state.harvested_k;
+            let room = (unharvested * R::load(table.force_per_harvested) * inverse).max(nought);
+            let generator = (-force).max(nought).min(row[2] + beyond * row[6]).min(room);
+            let harvested_k = joules * generator * R::load(table.harvest_gain);
+            state.change = state.change + (harvested_k - deployed);
+            state.harvested_k = state.harvested_k + harvested_k;
+        }
     }
 
     /// One segment with its accounts, up to the greatest speed squared at its end.
@@ -234,7 +262,8 @@ impl<R: Lookup> Car<'_, R> {
         let row = R::pick_row(&table.forces, place);
         let [greatest, motor_most, generator_most, drag]: [R; 4] =
             std::array::from_fn(|column| row[column] + beyond * row[4 + column]);
-        let ax = R::lit(0.5) * (end - from) / length;
+        let inverse = R::lit(1.0) / length;
+        let ax = R::lit(0.5) * (end - from) * inverse;
         // What the tyres do, forwards or backwards.
         let force = ax + drag;
         let demand = force.max(nought);
@@ -245,12 +274,13 @@ impl<R: Lookup> Car<'_, R> {
             Mode::Offset => {
                 let open = self.open(bends[0], from) & self.strategy[2].less_than(ax);
                 let share = zone_share(&self.plan.zones[here], self.strategy);
-                let reach = left / (joules * R::load(table.deploy_cost));
+                let reach = left * R::load(table.force_per_deployed) * inverse;
                 gated(open, motor_most * share).min(demand).min(reach)
             }
         };
         let engine = demand - motor;
-        let room = (R::load(table.harvest_most) - state.harvested_k) / (joules * R::load(table.harvest_gain));
+        let unharvested = R::load(table.harvest_most) - state.harvested_k;
+        let room = unharvested * R::load(table.force_per_harvested) * inverse;
         let generator = shed.min(generator_most).min(room.max(nought));
         let deployed = joules * motor * R::load(table.deploy_cost);
         let harvested_k = joules * generator * R::load(table.harvest_gain);
@@ -407,7 +437,7 @@ pub fn energy_lap<R: Lookup>(
         if plan.mode == Mode::Additional {
             let mut state = fresh(speed_squared);
             for here in 0..n {
-                car.segment(&mut state, here, length[here], bends(here), most[after(here)]);
+                car.provisional(&mut state, here, length[here], bends(here), most[after(here)]);
             }
             speed_squared = state.speed_squared;
         }

@@ -89,6 +89,8 @@ pub struct EnergyPlan<S> {
     pub run_in: usize,
     /// What the motor does.
     pub mode: Mode,
+    /// Whether the charge has a say in where the motor works.
+    pub counts_charge: bool,
 }
 
 impl EnergyPlan<f64> {
@@ -103,6 +105,7 @@ impl EnergyPlan<f64> {
             zones: vec![row; sections],
             run_in,
             mode,
+            counts_charge: true,
         }
     }
 
@@ -167,6 +170,7 @@ impl EnergyPlan<f64> {
                 .collect(),
             run_in: self.run_in,
             mode: self.mode,
+            counts_charge: self.counts_charge,
         }
     }
 }

@@ -44,6 +44,10 @@ pub struct EnergyTable<S> {
     pub deploy_cost: S,
     /// Energy into the store for each joule at the wheels.
     pub harvest_gain: S,
+    /// Force over mass for each joule out of the store, times the length (m^2/s^2/J).
+    pub force_per_deployed: S,
+    /// Force over mass for each joule of the MGU-K into the store, times the length (m^2/s^2/J).
+    pub force_per_harvested: S,
     /// What the MGU-K may put into the store in a lap (J).
     pub harvest_most: S,
     /// Energy of the MGU-H into the store for each kilogram of fuel (J/kg).
@@ -130,11 +134,15 @@ impl EnergyTable<f64> {
         }
         let greatest_flow = flows.iter().flatten().fold(0.0, |a: f64, b| a.max(*b));
         let h = hybrid.mgu_h;
+        let deploy_cost = 1.0 / (k.motor_efficiency * powertrain.efficiency);
+        let harvest_gain = k.generator_efficiency * powertrain.efficiency;
         Ok(Self {
             mass,
             rows_per_speed_squared: limits.rows_per_speed_squared,
-            deploy_cost: 1.0 / (k.motor_efficiency * powertrain.efficiency),
-            harvest_gain: k.generator_efficiency * powertrain.efficiency,
+            deploy_cost,
+            harvest_gain,
+            force_per_deployed: 1.0 / (mass * deploy_cost),
+            force_per_harvested: 1.0 / (mass * harvest_gain),
             harvest_most: hybrid.rules.harvested_k_j.unwrap_or(1e12),
             exhaust_gain: h.map_or(0.0, |h| -h.power_w(0.0, 1.0) / greatest_flow),
             exhaust_cost: h.map_or(0.0, |h| CONSUMPTION_KGPJ * h.generator_cost_w / h.generator_w),
@@ -167,6 +175,8 @@ impl EnergyTable<f64> {
             rows_per_speed_squared: R::store(self.rows_per_speed_squared),
             deploy_cost: R::store(self.deploy_cost),
             harvest_gain: R::store(self.harvest_gain),
+            force_per_deployed: R::store(self.force_per_deployed),
+            force_per_harvested: R::store(self.force_per_harvested),
             harvest_most: R::store(self.harvest_most),
             exhaust_gain: R::store(self.exhaust_gain),
             exhaust_cost: R::store(self.exhaust_cost),
