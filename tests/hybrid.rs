@@ -207,7 +207,7 @@ fn the_swarm_comes_within_a_twentieth_of_a_second_of_the_exact_deployment() {
         let swarm = search_strategy(setup, &settings, mj, |_| ControlFlow::Continue(())).unwrap();
         let time = swarm.lap.lap.time;
         println!(
-            "{mj} MJ: swarm {time:.4} s, exact {:.4} s, bound {:.4} s",
+            "{mj} MJ: swarm {time:.4} s, exact {:.4} s, bound {:?} s",
             exact.lap.time, exact.bound_s
         );
         assert!(

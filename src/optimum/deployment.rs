@@ -25,8 +25,9 @@ pub struct Deployment {
     pub status: Status,
     /// Programs solved.
     pub programs: usize,
-    /// The last program's bound on the time (s) about the last lap: what further steps could at most gain to first order.
-    pub bound_s: f64,
+    /// The last program's bound on the time (s): no lap is faster to first order about the one before. Nothing where none was
+    /// solved, or not well enough to say.
+    pub bound_s: Option<f64>,
     /// Time that it took (s).
     pub seconds: f64,
 }
@@ -113,7 +114,7 @@ impl DeploymentSearch<'_> {
         let mut shares = start.map_or_else(|| vec![0.0; n], <[f64]>::to_vec);
         let (mut lap, mut segments, mut course) = problem.lap(&shares);
         let mut status = Status::Solved;
-        let mut bound_s = lap.time;
+        let mut bound_s = None;
         let (mut programs, mut reach) = (0, FIRST_MOVE);
         while energy_j > 0.0 && programs < PROGRAMS {
             let squares: Vec<f64> = segments.iter().map(|s| s.start).collect();
@@ -138,7 +139,7 @@ impl DeploymentSearch<'_> {
             if gain > 0.0 {
                 shares = found;
                 (lap, segments, course) = tried;
-                (status, bound_s) = (ended, bound);
+                (status, bound_s) = (ended, Some(bound).filter(|b| b.is_finite()));
                 if gain < GAIN_S {
                     break;
                 }

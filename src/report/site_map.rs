@@ -38,6 +38,8 @@ const TOP: f64 = 76.0;
 const BOTTOM: f64 = 550.0;
 const DOT_PX: f64 = 2.0;
 const SEAM_PX: f64 = 0.4;
+/// Steps of colour: finer ones cannot be told apart and only make the file longer.
+const SHADES: f64 = 48.0;
 /// Families of dots beyond these share the last colour.
 const COLOURS: [RGBColor; 3] = [WHITE, VERMILLION, INK];
 
@@ -73,22 +75,29 @@ pub fn plot_site_map(path: impl AsRef<Path>, map: &SiteMap<'_>) -> Result<()> {
             },
         );
         // Little is the better: dark for much would read the other way round.
-        let shade = |value: f64| {
-            viridis(if high > low {
+        let share = |value: f64| {
+            if high > low {
                 (high - value) / (high - low)
             } else {
                 0.5
-            })
+            }
         };
+        let shade = |value: f64| viridis((share(value) * SHADES).round() / SHADES);
         let rows = map.cells.len() as f64;
         for (j, row) in map.cells.iter().enumerate() {
-            for (i, value) in row.iter().enumerate().filter(|(_, v)| v.is_finite()) {
-                let x = |i: f64| LEFT + (RIGHT - LEFT) * i / row.len() as f64;
-                let y = |j: f64| BOTTOM - (BOTTOM - TOP) * j / rows;
-                let (i, j) = (i as f64, j as f64);
-                // Cells that only touch would let the ground shine through between them.
-                let corners = ((x(i), y(j + 1.0)), (x(i + 1.0) + SEAM_PX, y(j) + SEAM_PX));
-                canvas.rect(corners.0, corners.1, shade(*value), 1.0);
+            let x = |i: usize| LEFT + (RIGHT - LEFT) * i as f64 / row.len() as f64;
+            let y = |j: usize| BOTTOM - (BOTTOM - TOP) * j as f64 / rows;
+            // Neighbours that look alike are drawn as one.
+            let mut start = 0;
+            let look = |value: f64| value.is_finite().then(|| (share(value) * SHADES).round() as i64);
+            for alike in row.chunk_by(|a, b| look(*a) == look(*b)) {
+                let end = start + alike.len();
+                if alike[0].is_finite() {
+                    // Cells that only touch would let the ground shine through between them.
+                    let corners = ((x(start), y(j + 1)), (x(end) + SEAM_PX, y(j) + SEAM_PX));
+                    canvas.rect(corners.0, corners.1, shade(alike[0]), 1.0);
+                }
+                start = end;
             }
         }
         let mut legend = Vec::new();

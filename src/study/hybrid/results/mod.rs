@@ -89,8 +89,8 @@ pub struct DeploymentFigures {
     pub exact_status: String,
     /// Cone programs solved.
     pub exact_programs: usize,
-    /// The last program's bound on the time, to first order (s).
-    pub exact_bound_s: f64,
+    /// The last program's bound on the time, to first order (s); `null` where it has none.
+    pub exact_bound_s: Option<f64>,
     /// Time that the solver took (s).
     pub exact_elapsed_s: f64,
     /// Time of the swarm's lap (s).

@@ -163,14 +163,16 @@ fn draw_charges(path: &Path, setup: &HybridSetup, outcome: &Outcome) -> Result<(
         return Ok(());
     }
     let names: Vec<String> = laps.iter().map(|l| l.name.replace('_', " ")).collect();
+    // Colours are the same in both panels, and one legend would be too long for either.
+    let label = |i: usize, panel: usize| if i % 2 == panel { names[i].as_str() } else { "" };
     let panel = CurvePanel {
         title: "State of charge",
         x_label: DISTANCE,
         y_label: "share of the store",
         curves: laps
             .iter()
-            .zip(&names)
-            .map(|(lap, name)| curve(name, lap, soc(setup, lap)))
+            .enumerate()
+            .map(|(i, lap)| curve(label(i, 0), lap, soc(setup, lap)))
             .collect(),
     };
     let out = CurvePanel {
@@ -179,7 +181,8 @@ fn draw_charges(path: &Path, setup: &HybridSetup, outcome: &Outcome) -> Result<(
         y_label: "energy (MJ)",
         curves: laps
             .iter()
-            .map(|lap| curve("", lap, summed(lap.segments.iter().map(|s| s.deployed))))
+            .enumerate()
+            .map(|(i, lap)| curve(label(i, 1), lap, summed(lap.segments.iter().map(|s| s.deployed))))
             .collect(),
     };
     plot_curves(
