@@ -4,6 +4,7 @@ mod bench;
 mod check;
 mod devices;
 mod envelope;
+mod hybrid;
 mod identify;
 mod init;
 mod parity;
@@ -51,6 +52,8 @@ enum Command {
     Simulate(simulate::Arguments),
     /// Find the line round a circuit: shortest, least curved, fastest, and the front between them.
     Raceline(Box<raceline::Arguments>),
+    /// Find where a hybrid's energy goes on a lap and where it buys most: scenarios, swarm, exact optimum.
+    Hybrid(Box<hybrid::Arguments>),
     /// Find a car's limits at each speed: the g-g-v diagram that racing lines are driven within.
     Envelope(envelope::Arguments),
     /// Find how much each parameter of a car matters to each channel of a lap.
@@ -146,6 +149,7 @@ pub fn run() -> ExitCode {
         Command::Identify(arguments) => identify::run(&arguments),
         Command::Simulate(arguments) => simulate::run(&arguments),
         Command::Raceline(arguments) => raceline::run(&arguments),
+        Command::Hybrid(arguments) => hybrid::run(&arguments),
         Command::Envelope(arguments) => envelope::run(&arguments),
         Command::Sensitivity(arguments) => sensitivity::run(&arguments),
         Command::Report(arguments) => report::run(&arguments),

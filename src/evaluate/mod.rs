@@ -5,6 +5,7 @@
 
 mod backend;
 pub mod gpu;
+pub mod hybrid;
 pub mod line;
 pub mod point;
 pub mod replay;

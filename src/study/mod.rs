@@ -3,6 +3,7 @@
 mod circuit_view;
 pub mod compare;
 pub mod envelope;
+pub mod hybrid;
 pub mod identify;
 pub mod raceline;
 pub mod run;

@@ -24,6 +24,8 @@ const SWARM_GATHER: &str = include_str!("../../../shaders/swarm_gather.wgsl");
 const TEST_PROBLEMS: &str = include_str!("../../../shaders/test_problems.wgsl");
 
 const LINE: &str = include_str!("../../../shaders/line.wgsl");
+/// Engine, motors, store and fuel on a lap of a line.
+const ENERGY: &str = include_str!("../../../shaders/energy.wgsl");
 
 /// Philox, the twin of [`crate::random`].
 pub fn random() -> &'static str {
@@ -160,6 +162,38 @@ impl LineShape {
             },
         );
         [ELEMENTARY, &constants, LINE].concat()
+    }
+}
+
+/// What an energy kernel is specialised to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct EnergyShape {
+    /// The line kernel that it continues; it wants a lap.
+    pub line: LineShape,
+    /// Variables of the line, after which the strategy's figures come.
+    pub line_variables: usize,
+    /// Whether the motor adds to the engine.
+    pub additional: bool,
+    /// Whether the charge has a say in where the motor works.
+    pub counts_charge: bool,
+}
+
+impl EnergyShape {
+    /// Where in the table of vectors of four the flows, the boosts and the zones begin.
+    pub fn places(&self) -> [usize; 3] {
+        let rows = self.line.limit_rows;
+        [2 * rows, 4 * rows, 5 * rows]
+    }
+
+    /// Source of the kernel; entry point `energy_line`.
+    pub fn source(&self) -> String {
+        let [flows, boosts, zones] = self.places();
+        let constants = format!(
+            "\n// Generated.\nconst STRATEGY: u32 = {}u;\nconst ADDITIONAL: bool = {};\nconst COUNTS_CHARGE: bool = {};\nconst FLOWS_AT: u32 = {flows}u;\n\
+             const BOOSTS_AT: u32 = {boosts}u;\nconst ZONES_AT: u32 = {zones}u;\n\n",
+            self.line_variables, self.additional, self.counts_charge,
+        );
+        [&self.line.source(), &constants, ENERGY].concat()
     }
 }
 
