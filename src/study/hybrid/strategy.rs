@@ -211,7 +211,9 @@ pub fn search_front(
     let problem = match (settings.free, &setup.alpha) {
         (FreePart::Strategy, _) | (_, None) => fixed,
         (free, Some(alpha)) => {
-            let cuts = setup.raceline.cuts.clone();
+            // Control points move the line about the fastest one, which a few of them alone could not say.
+            let mut cuts = setup.raceline.cuts.clone();
+            cuts.reference.clone_from(alpha);
             let n = cuts.len();
             let controls = ((cuts.length_m / CONTROL_SPACING_M) as usize).clamp(4, n);
             let parametrisation = Parametrisation::control_points(controls);
@@ -311,7 +313,7 @@ fn starting_candidates(
             if i >= lines.len() {
                 for (k, x) in candidate.iter_mut().enumerate() {
                     let v = &problem.problem.variables[k];
-                    *x = (*x + 0.02 * noise(shares + k) * (v.upper - v.lower)).clamp(v.lower, v.upper);
+                    *x = (*x + 0.002 * noise(shares + k) * (v.upper - v.lower)).clamp(v.lower, v.upper);
                 }
             }
             candidate.extend((0..shares).map(|k| (level + 0.2 * noise(k)).clamp(0.0, 1.0)));
