@@ -13,11 +13,18 @@ use criterion::{BenchmarkId, Criterion, SamplingMode, Throughput};
 use glam::DVec2;
 use lapswarm::evaluate::Evaluator;
 use lapswarm::evaluate::gpu::GpuContext;
+use lapswarm::evaluate::hybrid::{
+    CpuHybridEvaluator, GpuHybridEvaluator, HybridLine, HybridObjective, HybridProblem, SimdHybridEvaluator,
+    Strategy,
+};
 use lapswarm::evaluate::line::{
     CpuLineEvaluator, GpuLineEvaluator, LineObjective, LineProblem, SimdLineEvaluator,
 };
 use lapswarm::evaluate::simd::InstructionSet;
 use lapswarm::line::Parametrisation;
+use lapswarm::line::energy::{EnergyCar, EnergyPlan, Gates, Mode, Traction};
+use lapswarm::study::envelope::{EnvelopeSettings, car_limits};
+use lapswarm::vehicle::Car;
 use std::time::Duration;
 
 /// Lap times on a circuit of `sections`, lines by a control point for every four of them.
@@ -105,6 +112,81 @@ fn laps(criterion: &mut Criterion) {
     );
 }
 
+/// A lap time alone, and with the accounts of a hybrid in either mode, on the same lines.
+fn energy(criterion: &mut Criterion) {
+    let sections = 720;
+    let plain = problem(sections);
+    let car = hybrid_car();
+    let with_energy = [Mode::Offset, Mode::Additional].map(|mode| {
+        let line = HybridLine::Free {
+            cuts: Box::new(plain.cuts().clone()),
+            parametrisation: plain.parametrisation().clone(),
+        };
+        let plan = EnergyPlan::whole(sections, sections - 60, mode);
+        let gates = Gates {
+            energy_mj: 1.5,
+            ..Gates::OPEN
+        };
+        let objectives = [HybridObjective::LapTime, HybridObjective::Fuel];
+        let strategy = Strategy::fixed(gates, 1);
+        HybridProblem::new(line, car.clone(), plan, strategy, &objectives, 0.0).expect("a sound problem")
+    });
+    // The same car's lap without energy.
+    let plain = LineProblem::new(
+        plain.cuts().clone(),
+        plain.parametrisation().clone(),
+        &[LineObjective::LapTime],
+        Some(car.point_mass.clone()),
+        0.0,
+    )
+    .expect("a sound problem");
+    let count = 512;
+    let population = lines(&plain, count, &mut Random(2));
+    let mut group = criterion.benchmark_group("energy");
+    group
+        .sample_size(10)
+        .warm_up_time(Duration::from_millis(100))
+        .measurement_time(Duration::from_secs(2))
+        .throughput(Throughput::Elements(count as u64));
+    let set = InstructionSet::best();
+    let mut run = |name: String, evaluator: &mut dyn Evaluator| {
+        group.bench_function(name, |bencher| bencher.iter(|| evaluator.evaluate(&population)));
+    };
+    run("cpu lap time".to_owned(), &mut CpuLineEvaluator::new(&plain));
+    run(
+        "simd lap time".to_owned(),
+        &mut SimdLineEvaluator::new(&plain, set),
+    );
+    if let Some((name, mut evaluator)) = gpu(&plain) {
+        run(format!("{name} lap time"), evaluator.as_mut());
+    }
+    for problem in &with_energy {
+        let mode = problem.energy().mode.name();
+        run(format!("cpu {mode}"), &mut CpuHybridEvaluator::new(problem));
+        run(
+            format!("simd {mode}"),
+            &mut SimdHybridEvaluator::new(problem, set),
+        );
+        if let Ok(mut evaluator) =
+            GpuContext::shared(None).and_then(|context| GpuHybridEvaluator::new(problem, context))
+        {
+            run(format!("gpu {mode}"), &mut evaluator);
+        }
+    }
+    group.finish();
+}
+
+fn hybrid_car() -> EnergyCar {
+    let car = Car::load("gt_hybrid").expect("bundled");
+    let limits = car_limits(&car, &EnvelopeSettings::default()).expect("limits");
+    let rows = limits
+        .speeds
+        .iter()
+        .map(|s| (s.row.v_mps, s.traction_mps2))
+        .collect();
+    EnergyCar::new(car, limits.envelope, Traction { rows }, 2.0).expect("a hybrid")
+}
+
 fn main() {
     // The pool is global and this is its first use, so that nothing can have built it before.
     if let Err(error) = rayon::ThreadPoolBuilder::new().num_threads(1).build_global() {
@@ -112,5 +194,6 @@ fn main() {
     }
     let mut criterion = Criterion::default().configure_from_args();
     laps(&mut criterion);
+    energy(&mut criterion);
     criterion.final_summary();
 }

@@ -179,3 +179,24 @@ fn own_exp(argument: Wheels) -> Wheels {
     p = p * r + 0.4999999;
     return (r * r * p + (r + 1.0)) * two_to_the(n);
 }
+
+// Of one figure; the others are of the wheels.
+fn own_ln(x: f32) -> f32 {
+    let offset = bitcast<u32>(x) - 0x3f3504f3u;
+    let exponent = f32(bitcast<i32>(offset) >> 23u);
+    let mantissa = bitcast<f32>((offset & 0x007fffffu) + 0x3f3504f3u);
+    let s = (mantissa - 1.0) / (mantissa + 1.0);
+    let t = s * s;
+    var p = 0.11111111;
+    p = p * t + 0.14285715;
+    p = p * t + 0.2;
+    p = p * t + 0.33333334;
+    let twice = s + s;
+    let fraction = twice + twice * (p * t);
+    return (fraction + exponent * -2.1219444e-4) + exponent * 0.693359375;
+}
+
+fn own_power(base: f32, exponent: f32) -> f32 {
+    if base < 1e-37 { return 0.0; }
+    return own_exp(Wheels(exponent * own_ln(base))).x;
+}

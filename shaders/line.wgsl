@@ -151,8 +151,8 @@ fn corner(curvature: f32) -> f32 {
     return figures.x + (held - f32(row)) * figures.y;
 }
 
-// Greatest acceleration and greatest deceleration.
-fn longitudinal(speed_squared: f32, curvature: f32) -> vec2<f32> {
+// What is left of the grip lengthways, drive and drag.
+fn limits_at(speed_squared: f32, curvature: f32) -> vec3<f32> {
     let held = min(max(speed_squared * stretch.rows_per_speed_squared, 0.0), f32(LIMIT_ROWS));
     let row = min(u32(held), LIMIT_ROWS - 1u);
     let at = limits[2u * row] + (held - f32(row)) * limits[2u * row + 1u];
@@ -164,8 +164,13 @@ fn longitudinal(speed_squared: f32, curvature: f32) -> vec2<f32> {
         let figures = ellipse[row];
         left = figures.x + (held - f32(row)) * figures.y;
     }
-    let grip = at.y * left;
-    return vec2<f32>(min(grip, at.z) - at.w, grip + at.w);
+    return vec3<f32>(at.y * left, at.z, at.w);
+}
+
+// Greatest acceleration and greatest deceleration.
+fn longitudinal(speed_squared: f32, curvature: f32) -> vec2<f32> {
+    let at = limits_at(speed_squared, curvature);
+    return vec2<f32>(min(at.x, at.y) - at.z, at.x + at.z);
 }
 
 fn driven(start: f32, length: f32, here: f32, there: f32) -> f32 {

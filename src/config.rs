@@ -223,6 +223,26 @@ impl<'a> Table<'a> {
             .ok_or_else(|| self.wrong(key, value, "a list of numbers"))
     }
 
+    /// A list of lists of finite numbers, if the key is there.
+    pub fn number_rows(&self, key: &str) -> Result<Option<Vec<Vec<f64>>>> {
+        let Some(value) = self.value(key) else {
+            return Ok(None);
+        };
+        let row = |row: &Spanned<DeValue<'_>>| -> Option<Vec<f64>> {
+            let items = row.get_ref().as_array()?;
+            items
+                .iter()
+                .map(|item| Self::as_number(item.get_ref()).filter(|x| x.is_finite()))
+                .collect()
+        };
+        value
+            .get_ref()
+            .as_array()
+            .and_then(|rows| rows.iter().map(row).collect())
+            .map(Some)
+            .ok_or_else(|| self.wrong(key, value, "a list of lists of numbers"))
+    }
+
     /// A sub-table, if the key is there.
     pub fn table(&self, key: &str) -> Result<Option<Table<'a>>> {
         let Some(value) = self.value(key) else {

@@ -5,10 +5,13 @@
 //!
 //! Source: Salmon, Moraes, Dror and Shaw, *Parallel random numbers: as easy as 1, 2, 3*, SC11 (2011).
 
+use serde::{Deserialize, Serialize};
+
 const MULTIPLIERS: [u32; 2] = [0xD251_1F53, 0xCD9E_8D57];
 const WEYL: [u32; 2] = [0x9E37_79B9, 0xBB67_AE85];
 
 /// Ten rounds of Philox: four random words from a counter and a key.
+#[inline(always)]
 pub fn philox(mut counter: [u32; 4], mut key: [u32; 2]) -> [u32; 4] {
     for _ in 0..10 {
         let product = |i: usize, word: u32| u64::from(MULTIPLIERS[i]) * u64::from(word);
@@ -25,7 +28,7 @@ pub fn philox(mut counter: [u32; 4], mut key: [u32; 2]) -> [u32; 4] {
 }
 
 /// A seeded family of draws.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Random {
     key: [u32; 2],
 }
@@ -41,6 +44,25 @@ impl Random {
     /// The four words of draw `index` by `who` at time `when` for purpose `purpose`.
     pub fn words(self, purpose: u32, when: u32, who: u32, index: u32) -> [u32; 4] {
         philox([index, who, when, purpose], self.key)
+    }
+
+    /// The words of draw `index` by each of `N` who follow one another from `first` on. The same as one by one, in a
+    /// loop that compilers turn into lanes.
+    #[inline(always)]
+    pub fn words_of<const N: usize>(self, purpose: u32, when: u32, first: u32, index: u32) -> [[u32; N]; 4] {
+        let mut words = [[0; N]; 4];
+        for lane in 0..N {
+            let four = philox([index, first.wrapping_add(lane as u32), when, purpose], self.key);
+            for (plane, word) in words.iter_mut().zip(four) {
+                plane[lane] = word;
+            }
+        }
+        words
+    }
+
+    /// The two words of the key.
+    pub fn key(self) -> [u32; 2] {
+        self.key
     }
 
     /// A number in `[0, 1)` with 24 random bits, exact in `f32`.
@@ -69,6 +91,19 @@ impl Random {
     }
 }
 
+/// The upper 24 bits of a word as a number in `[0, 1)`, exact.
+#[inline(always)]
+pub fn unit_f32(word: u32) -> f32 {
+    // As a signed number, which every lane converts.
+    (word >> 8) as i32 as f32 * 5.960_464_5e-8
+}
+
+/// A whole number below `bound` from a word.
+#[inline(always)]
+pub fn below_u32(word: u32, bound: u32) -> u32 {
+    ((u64::from(word) * u64::from(bound)) >> 32) as u32
+}
+
 /// The upper 24 bits of a word as a number in `[0, 1)`.
 fn unit(word: u32) -> f64 {
     f64::from(word >> 8) * 2f64.powi(-24)
@@ -89,6 +124,22 @@ mod tests {
             philox([u32::MAX; 4], [u32::MAX; 2]),
             [0x408f_276d, 0x41c8_3b0e, 0xa20b_c7c6, 0x6d54_51fd]
         );
+    }
+
+    #[test]
+    fn lanes_draw_what_each_draws() {
+        let random = Random::new(0x1234_5678_9abc_def0);
+        let lanes = random.words_of::<64>(3, 7, u32::MAX - 10, 5);
+        for lane in 0..64u32 {
+            let one = random.words(3, 7, (u32::MAX - 10).wrapping_add(lane), 5);
+            assert_eq!(lanes.map(|plane| plane[lane as usize]), one);
+            assert_eq!(f64::from(unit_f32(one[0])), unit(one[0]));
+            let (who, bound) = ((u32::MAX - 10).wrapping_add(lane), 1000);
+            assert_eq!(
+                below_u32(one[1], 1000) as usize,
+                random.below(bound, 3, 7, who, 21)
+            );
+        }
     }
 
     /// Mean and variance within five standard errors (1/sqrt(12 n), and about 1/sqrt(180 n) for the variance;

@@ -5,11 +5,16 @@ mod common;
 
 use common::{UNKNOWNS, bundled_car, linear_car, problem};
 use lapswarm::evaluate::gpu::lint;
-use lapswarm::evaluate::gpu::shader::{LineShape, ReplayShape, car_fragments, tyre_struct};
+use lapswarm::evaluate::gpu::shader::{
+    EnergyShape, LineShape, ReplayShape, car_fragments, swarm, swarm_gather, test_problem, tyre_struct,
+};
+use lapswarm::evaluate::hybrid::EnergyAccount;
 use lapswarm::evaluate::line::{DeviceSection, LineStretch};
 use lapswarm::evaluate::replay::{DeviceSample, DeviceWindow, ModelTable, Norm, Stretch};
 use lapswarm::line::kernel::Wanted;
 use lapswarm::parity::made_up::Lap;
+use lapswarm::swarm::Generation;
+use lapswarm::swarm::problems::NAMES;
 use lapswarm::vehicle::{Chassis, TyreModel};
 use naga::back::{hlsl, msl, spv};
 use naga::valid::{Capabilities, ValidationFlags, Validator};
@@ -52,9 +57,24 @@ fn kernels() -> Vec<(&'static str, String)> {
             for lap in [false, true] {
                 kernels.push(("line", line_shape(closed, terms, lap).source()));
             }
+            for additional in [false, true] {
+                kernels.push(("energy_line", energy_shape(closed, terms, additional).source()));
+            }
         }
     }
+    kernels.extend(["scatter", "learn", "advance"].map(|entry| (entry, swarm())));
+    kernels.push(("gather", swarm_gather()));
+    kernels.extend((0..NAMES.len() as u32).map(|number| ("test_problem", test_problem(number))));
     kernels
+}
+
+fn energy_shape(closed: bool, terms: usize, additional: bool) -> EnergyShape {
+    EnergyShape {
+        line: line_shape(closed, terms, true),
+        line_variables: 12,
+        additional,
+        counts_charge: closed,
+    }
 }
 
 fn line_shape(closed: bool, terms: usize, lap: bool) -> LineShape {
@@ -251,6 +271,74 @@ fn structs_of_lines_have_the_hosts_offsets() {
         ("inverse_spacing", offset_of!(DeviceSection, inverse_spacing)),
     ];
     assert_eq!((members, size), (named(&host), size_of::<DeviceSection>()));
+}
+
+#[test]
+fn a_generation_has_the_hosts_offsets() {
+    let module = lint::check(&swarm()).expect("the kernel parses");
+    let (members, size) = layout(&module, "Generation");
+    macro_rules! offsets {
+        ($($field:ident),*) => {
+            [$((stringify!($field).to_owned(), offset_of!(Generation, $field))),*]
+        };
+    }
+    let host = offsets!(
+        key,
+        when,
+        particles,
+        dimensions,
+        objectives,
+        members,
+        signed,
+        per_dimension,
+        tournament,
+        mutation,
+        inertia,
+        cognitive,
+        social,
+        speed_limit,
+        rebound,
+        difference_share,
+        mutation_share,
+        mutation_power,
+        mutation_root,
+        log_left,
+        mu,
+        pulls
+    );
+    assert_eq!((members, size), (host.to_vec(), size_of::<Generation>()));
+}
+
+#[test]
+fn the_struct_of_energies_has_the_hosts_offsets() {
+    let source = energy_shape(true, 4, true).source();
+    let module = lint::check(&source).expect("the kernel parses");
+    let (members, size) = layout(&module, "EnergyAccount");
+    let host = [
+        ("mass", offset_of!(EnergyAccount, mass)),
+        ("deploy_cost", offset_of!(EnergyAccount, deploy_cost)),
+        ("harvest_gain", offset_of!(EnergyAccount, harvest_gain)),
+        (
+            "force_per_deployed",
+            offset_of!(EnergyAccount, force_per_deployed),
+        ),
+        (
+            "force_per_harvested",
+            offset_of!(EnergyAccount, force_per_harvested),
+        ),
+        ("harvest_most", offset_of!(EnergyAccount, harvest_most)),
+        ("exhaust_gain", offset_of!(EnergyAccount, exhaust_gain)),
+        ("exhaust_cost", offset_of!(EnergyAccount, exhaust_cost)),
+        ("exhaust_from", offset_of!(EnergyAccount, exhaust_from)),
+        ("exhaust_to_ax", offset_of!(EnergyAccount, exhaust_to_ax)),
+        (
+            "rows_per_speed_squared",
+            offset_of!(EnergyAccount, rows_per_speed_squared),
+        ),
+        ("run_in", offset_of!(EnergyAccount, run_in)),
+    ];
+    let named: Vec<(String, usize)> = host.iter().map(|(name, at)| ((*name).to_owned(), *at)).collect();
+    assert_eq!((members, size), (named, size_of::<EnergyAccount>()));
 }
 
 #[test]

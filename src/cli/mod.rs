@@ -1,9 +1,12 @@
 //! Subcommands, their flags and their exit codes.
 
 mod bench;
+mod check;
 mod devices;
 mod envelope;
+mod hybrid;
 mod identify;
+mod init;
 mod parity;
 mod progress;
 mod raceline;
@@ -13,9 +16,10 @@ mod run;
 mod sensitivity;
 mod simulate;
 mod surface;
+mod sweep;
 mod transient;
 
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, CommandFactory, Parser, Subcommand};
 use lapswarm::evaluate::replay::BackendChoice;
 use lapswarm::study::identify::{FreeParameter, IdentifySettings, load_circuit, parse_backend};
 use lapswarm::track::Circuit;
@@ -48,6 +52,8 @@ enum Command {
     Simulate(simulate::Arguments),
     /// Find the line round a circuit: shortest, least curved, fastest, and the front between them.
     Raceline(Box<raceline::Arguments>),
+    /// Find where a hybrid's energy goes on a lap and where it buys most: scenarios, swarm, exact optimum.
+    Hybrid(Box<hybrid::Arguments>),
     /// Find a car's limits at each speed: the g-g-v diagram that racing lines are driven within.
     Envelope(envelope::Arguments),
     /// Find how much each parameter of a car matters to each channel of a lap.
@@ -56,8 +62,19 @@ enum Command {
     Report(report::Arguments),
     /// Draw the costs of a lap over two parameters of a car.
     Surface(Box<surface::Arguments>),
+    /// The same study over a grid of settings and seeds, with medians.
+    Sweep(sweep::Arguments),
     /// Drive a racing line with the 4DOF car and a driver, and set its lap beside the point mass's.
     Transient(transient::Arguments),
+    /// Write a commented study, car or track file to start from.
+    Init(init::Arguments),
+    /// Read files as the studies do, and say what is in them or what is wrong.
+    Check(check::Arguments),
+    /// Print a shell's completions.
+    Completions {
+        /// The shell
+        shell: clap_complete::Shell,
+    },
     /// List the GPUs that evaluations can run on, with their limits.
     Devices(devices::Arguments),
     /// Hold every kernel on this machine against the f64 reference.
@@ -132,11 +149,19 @@ pub fn run() -> ExitCode {
         Command::Identify(arguments) => identify::run(&arguments),
         Command::Simulate(arguments) => simulate::run(&arguments),
         Command::Raceline(arguments) => raceline::run(&arguments),
+        Command::Hybrid(arguments) => hybrid::run(&arguments),
         Command::Envelope(arguments) => envelope::run(&arguments),
         Command::Sensitivity(arguments) => sensitivity::run(&arguments),
         Command::Report(arguments) => report::run(&arguments),
         Command::Surface(arguments) => surface::run(&arguments),
+        Command::Sweep(arguments) => sweep::run(&arguments),
         Command::Transient(arguments) => transient::run(&arguments),
+        Command::Init(arguments) => init::run(&arguments),
+        Command::Check(arguments) => check::run(&arguments),
+        Command::Completions { shell } => {
+            clap_complete::generate(shell, &mut Cli::command(), "lapswarm", &mut std::io::stdout());
+            Ok(())
+        }
         Command::Devices(arguments) => devices::run(&arguments),
         Command::Parity(arguments) => parity::run(&arguments),
         Command::Bench(arguments) => bench::run(&arguments),

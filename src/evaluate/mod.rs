@@ -5,6 +5,7 @@
 
 mod backend;
 pub mod gpu;
+pub mod hybrid;
 pub mod line;
 pub mod point;
 pub mod replay;
@@ -14,10 +15,11 @@ pub use backend::BackendChoice;
 
 use crate::error::Result;
 use crate::vehicle::tyre::IllFormed;
+use serde::{Deserialize, Serialize};
 use std::fmt;
 
 /// A bounded decision variable.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Variable {
     /// Its name.
     pub name: String,
@@ -27,6 +29,8 @@ pub struct Variable {
     pub lower: f64,
     /// Greatest value.
     pub upper: f64,
+    /// Whether only whole numbers will do; bounds are whole numbers then.
+    pub whole: bool,
 }
 
 impl Variable {
@@ -37,12 +41,21 @@ impl Variable {
             unit: unit.to_owned(),
             lower,
             upper,
+            whole: false,
+        }
+    }
+
+    /// One of whole numbers, bounds included.
+    pub fn whole(name: impl Into<String>, unit: &str, lower: i32, upper: i32) -> Self {
+        Self {
+            whole: true,
+            ..Self::new(name, unit, f64::from(lower), f64::from(upper))
         }
     }
 }
 
 /// An objective, to be minimised.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Objective {
     /// Its name.
     pub name: String,
@@ -61,7 +74,7 @@ impl Objective {
 }
 
 /// What is to be optimised.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Problem {
     /// Decision variables, in the order of a candidate's row.
     pub variables: Vec<Variable>,
@@ -106,9 +119,75 @@ pub struct Evaluation {
     pub objectives: Vec<f64>,
     /// Why a candidate failed, one per candidate.
     pub failures: Vec<Option<Failure>>,
+    /// By how much each candidate violates its constraints: the sum of those `G` that are above nought, where `G <= 0` is
+    /// wanted. Empty for a problem without constraints. Optimisers go by Deb's rules (*An efficient constraint handling
+    /// method for genetic algorithms*, 2000): a candidate that violates less is better, whatever its objectives.
+    pub violations: Vec<f64>,
+}
+
+/// From here on up to [`FAILED_COST`] a cost stands for a violation, see [`violation_of`]. Costs of what violates nothing are
+/// below.
+pub const INFEASIBLE_COST: f64 = 536_870_912.0;
+
+/// A cost above all feasible ones and below that of a failure, in the order of violations: their leading 52 bits on top of
+/// those of [`INFEASIBLE_COST`].
+fn infeasible(violation: f64) -> f64 {
+    f64::from_bits(INFEASIBLE_COST.to_bits() + (violation.to_bits() >> 12))
+}
+
+/// The violation that a cost stands for (to 40 bits), if the candidate violates its constraints.
+pub fn violation_of(cost: f64) -> Option<f64> {
+    let infeasible = (INFEASIBLE_COST..FAILED_COST).contains(&cost);
+    infeasible.then(|| f64::from_bits((cost.to_bits() - INFEASIBLE_COST.to_bits()) << 12))
 }
 
 impl Evaluation {
+    /// By how much a candidate violates its constraints: nought for none, infinite for what is no number.
+    pub fn violation(&self, candidate: usize) -> f64 {
+        match self.violations.get(candidate) {
+            None => 0.0,
+            Some(v) if v.is_nan() => f64::INFINITY,
+            Some(v) => v.max(0.0),
+        }
+    }
+
+    /// The first of `width` objectives of every candidate as one figure to compare by: [`FAILED_COST`] for one that failed,
+    /// and between that and what is feasible those that violate constraints, see [`violation_of`].
+    pub fn costs(&self, width: usize) -> Vec<f64> {
+        let rows = self.objectives.chunks_exact(width).enumerate();
+        rows.map(|(i, row)| {
+            let violation = self.violation(i);
+            if !row[0].is_finite() || row[0] >= FAILED_COST || violation == f64::INFINITY {
+                // A cost beyond that of a failure is one all the same.
+                if row[0].is_finite() && self.violations.is_empty() {
+                    row[0]
+                } else {
+                    FAILED_COST
+                }
+            } else if violation > 0.0 {
+                infeasible(violation)
+            } else if self.violations.is_empty() {
+                row[0]
+            } else {
+                row[0].min(INFEASIBLE_COST.next_down())
+            }
+        })
+        .collect()
+    }
+
+    /// The part of some of the candidates, of `width` objectives.
+    pub fn part(&self, candidates: std::ops::Range<usize>, width: usize) -> Self {
+        Self {
+            objectives: self.objectives[candidates.start * width..candidates.end * width].to_vec(),
+            violations: if self.violations.is_empty() {
+                Vec::new()
+            } else {
+                self.violations[candidates.clone()].to_vec()
+            },
+            failures: self.failures[candidates].to_vec(),
+        }
+    }
+
     /// Joins rows of objectives and failures.
     pub(crate) fn of_rows(rows: Vec<(Vec<f64>, Option<Failure>)>) -> Self {
         let mut evaluation = Self::default();

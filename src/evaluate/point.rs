@@ -16,6 +16,7 @@ pub enum CallCost {
 /// Scores candidates by a function that reads a candidate, in the variables' units, and writes its objectives.
 pub struct PointEvaluator<F> {
     problem: Problem,
+    constraints: usize,
     cost: CallCost,
     function: F,
 }
@@ -25,8 +26,18 @@ impl<F: Fn(&[f64], &mut [f64]) + Sync> PointEvaluator<F> {
     pub fn new(problem: Problem, cost: CallCost, function: F) -> Self {
         Self {
             problem,
+            constraints: 0,
             cost,
             function,
+        }
+    }
+
+    /// An evaluator of `problem` under `constraints` constraints, whose figures `G <= 0` the function writes behind the
+    /// objectives.
+    pub fn constrained(problem: Problem, constraints: usize, cost: CallCost, function: F) -> Self {
+        Self {
+            constraints,
+            ..Self::new(problem, cost, function)
         }
     }
 
@@ -61,7 +72,8 @@ impl<F: Fn(&[f64], &mut [f64]) + Sync> Evaluator for PointEvaluator<F> {
     }
 
     fn evaluate(&mut self, population: &[f64]) -> Result<Evaluation> {
-        let width = self.problem.objectives.len().max(1);
+        let wanted = self.problem.objectives.len().max(1);
+        let width = wanted + self.constraints;
         let candidates = population.chunks_exact(self.problem.variables.len().max(1));
         let mut objectives = vec![0.0; candidates.len() * width];
         let rows = objectives.chunks_exact_mut(width);
@@ -72,7 +84,20 @@ impl<F: Fn(&[f64], &mut [f64]) + Sync> Evaluator for PointEvaluator<F> {
                 pairs.into_par_iter().map(|(c, row)| self.score(c, row)).collect()
             }
         };
-        Ok(Evaluation { objectives, failures })
+        if self.constraints == 0 {
+            return Ok(Evaluation {
+                objectives,
+                failures,
+                violations: Vec::new(),
+            });
+        }
+        let rows = || objectives.chunks_exact(width);
+        let above = |row: &[f64]| row[wanted..].iter().map(|g| g.max(0.0)).sum();
+        Ok(Evaluation {
+            violations: rows().map(above).collect(),
+            objectives: rows().flat_map(|row| &row[..wanted]).copied().collect(),
+            failures,
+        })
     }
 }
 

@@ -32,7 +32,16 @@ impl InstructionSet {
 
     /// The widest set that this processor has.
     pub fn best() -> Self {
-        Self::available()[0]
+        #[cfg(target_arch = "x86_64")]
+        {
+            if has_avx512() {
+                return Self::Avx512;
+            }
+            if is_x86_feature_detected!("avx2") {
+                return Self::Avx2;
+            }
+        }
+        Self::Portable
     }
 
     /// Lanes of one pack.

@@ -184,7 +184,13 @@ pub fn shape<R: Real>(
 
 /// The figure of `column` at `argument`, counted in rows of `width` of which half are figures and half rises.
 #[inline(always)]
-fn look_up<R: Lookup>(table: &[R::Storage], width: usize, place: R::Place, beyond: R, column: usize) -> R {
+pub(super) fn look_up<R: Lookup>(
+    table: &[R::Storage],
+    width: usize,
+    place: R::Place,
+    beyond: R,
+    column: usize,
+) -> R {
     R::pick(table, place, column) + beyond * R::pick(table, place, width / 2 + column)
 }
 
@@ -197,9 +203,13 @@ pub fn corner<R: Lookup>(limits: &LimitTable<R::Storage>, curvature: R) -> R {
     look_up(&limits.corners, 2, place, beyond, 0)
 }
 
-/// Greatest acceleration and greatest deceleration (m/s^2) at a speed squared in a bend.
+/// What is left of the grip lengthways, drive and drag (m/s^2) at a speed squared in a bend.
 #[inline(always)]
-pub fn longitudinal<R: Lookup>(limits: &LimitTable<R::Storage>, speed_squared: R, curvature: R) -> [R; 2] {
+pub(super) fn limits_at<R: Lookup>(
+    limits: &LimitTable<R::Storage>,
+    speed_squared: R,
+    curvature: R,
+) -> [R; 3] {
     let rows = limits.limits.len() / LIMIT_WIDTH;
     let argument = speed_squared * R::load(limits.rows_per_speed_squared);
     let (place, beyond) = argument.place(rows, LIMIT_WIDTH);
@@ -214,9 +224,14 @@ pub fn longitudinal<R: Lookup>(limits: &LimitTable<R::Storage>, speed_squared: R
         let (place, beyond) = (root * R::lit(rows as f64)).place(rows, 2);
         look_up(&limits.ellipse, 2, place, beyond, 0)
     };
-    let grip = at(1) * left;
-    let drag = at(3);
-    [grip.min(at(2)) - drag, grip + drag]
+    [at(1) * left, at(2), at(3)]
+}
+
+/// Greatest acceleration and greatest deceleration (m/s^2) at a speed squared in a bend.
+#[inline(always)]
+pub fn longitudinal<R: Lookup>(limits: &LimitTable<R::Storage>, speed_squared: R, curvature: R) -> [R; 2] {
+    let [grip, drive, drag] = limits_at(limits, speed_squared, curvature);
+    [grip.min(drive) - drag, grip + drag]
 }
 
 /// Speed squared after driving from a section to the next, on the mean of the limits at the start and at the middle.
@@ -234,7 +249,7 @@ fn driven<R: Lookup>(limits: &LimitTable<R::Storage>, from: R, length: R, here: 
 
 /// Speed squared from which the car just brakes to that of the next section.
 #[inline(always)]
-fn braked<R: Lookup>(limits: &LimitTable<R::Storage>, to: R, length: R, there: R, here: R) -> R {
+pub(super) fn braked<R: Lookup>(limits: &LimitTable<R::Storage>, to: R, length: R, there: R, here: R) -> R {
     let [_, end] = longitudinal(limits, to, there);
     let middle = to + length * end;
     let [_, brake] = longitudinal(limits, middle, R::lit(0.5) * (here + there));

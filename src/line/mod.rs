@@ -6,6 +6,7 @@
 //! fine spline through its points ([`FineLine`]) and checked against the edges of the road ([`check_line`]).
 
 mod check;
+pub mod energy;
 mod fine;
 mod geometry;
 pub mod kernel;

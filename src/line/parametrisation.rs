@@ -138,6 +138,7 @@ impl Parametrisation {
             unit: "-".to_owned(),
             lower: bounds[index].0,
             upper: bounds[index].1,
+            whole: false,
         };
         match &self.free {
             None => (0..self.coefficients(cuts)).map(variable).collect(),

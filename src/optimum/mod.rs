@@ -12,6 +12,7 @@
 mod bounds;
 mod conic;
 mod convex;
+mod deployment;
 mod descent;
 mod geometry;
 mod lap;
@@ -24,6 +25,7 @@ mod time_model;
 pub use bounds::{Bounds, RowBound};
 pub use conic::Status;
 pub use convex::{Optimum, least_gamma, least_squared_length, shortest, spacing_m};
+pub use deployment::{Deployment, DeploymentSearch};
 pub use descent::{DescentSettings, Start, descend, fastest, least_curvature, polish_lines};
 pub use geometry::LineMap;
 pub use lap::{Grip, Limits, Slope};

@@ -276,7 +276,7 @@ impl Plot {
         let mut flush = |run: &mut Vec<(f64, f64)>| {
             match run.as_slice() {
                 [] => {}
-                &[alone] => canvas.dot(alone, width_px.max(1.5), colour, 1.0),
+                &[alone] => canvas.dot(alone, (1.6 * width_px).max(1.5), colour, 1.0),
                 several => canvas.path(thin_out(several), colour, width_px),
             }
             run.clear();

@@ -13,6 +13,7 @@ mod html;
 mod parameters;
 mod pareto;
 mod scaling;
+mod site_map;
 mod style;
 mod surface;
 mod table;
@@ -27,6 +28,7 @@ pub use html::{Front, HtmlReport, LapLine, LapMap, LapPanel, LapTrace, LapView, 
 pub use parameters::{ParameterRow, plot_parameters};
 pub use pareto::{Objective, plot_pareto};
 pub use scaling::{ScalingSeries, plot_scaling};
+pub use site_map::{SiteMap, plot_site_map};
 pub use style::significant;
 pub use surface::{SurfaceFigure, plot_surface};
 pub use table::{Cells, Column, text_table, write_csv};

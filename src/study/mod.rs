@@ -3,10 +3,12 @@
 mod circuit_view;
 pub mod compare;
 pub mod envelope;
+pub mod hybrid;
 pub mod identify;
 pub mod raceline;
 pub mod run;
 pub mod run_folder;
 pub mod sensitivity;
 pub mod surface;
+pub mod sweep;
 pub mod transient;

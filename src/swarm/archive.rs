@@ -1,13 +1,18 @@
 //! The archive of solutions that nothing found so far dominates.
 
-use super::metrics::exclusive;
+use super::Front;
+use super::metrics::{Columns, non_dominated};
 use super::settings::Truncation;
+use super::space::Space;
+use serde::{Deserialize, Serialize};
 
 /// A bounded set of non-dominated solutions; all objectives are minimised.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Archive {
     capacity: usize,
     truncation: Truncation,
+    /// What each of the members violates.
+    violation: f64,
     /// Positions in the swarm's unit cube, one row per member.
     pub positions: Vec<Vec<f64>>,
     /// Objectives, one row per member.
@@ -15,6 +20,8 @@ pub struct Archive {
     /// What each member alone dominates and the far corner of the box that this lies in; kept only for
     /// truncation by it.
     shares: Vec<(f64, [f64; 3])>,
+    /// The objectives once more, for the shares.
+    columns: Columns,
     /// The reference point of the shares.
     reference: Vec<f64>,
 }
@@ -40,9 +47,11 @@ impl Archive {
         Self {
             capacity,
             truncation,
+            violation: f64::INFINITY,
             positions: Vec::new(),
             objectives: Vec::new(),
             shares: Vec::new(),
+            columns: Columns::default(),
             reference: Vec::new(),
         }
     }
@@ -57,10 +66,26 @@ impl Archive {
         self.objectives.is_empty()
     }
 
+    /// By how much all members violate the constraints; nought once something feasible is known, infinite for an empty
+    /// archive.
+    pub fn violation(&self) -> f64 {
+        self.violation
+    }
+
+    /// [`Archive::insert_violating`] of a solution that violates nothing.
+    pub fn insert(&mut self, position: &[f64], objectives: &[f64]) -> bool {
+        self.insert_violating(position, objectives, 0.0)
+    }
+
     /// Takes a solution in unless a member dominates or equals it; members that it dominates leave. If there
     /// is one too many then, the one leaves that would be missed least and is not the best in any objective, which
-    /// may be the new one. Returns whether it came in.
-    pub fn insert(&mut self, position: &[f64], objectives: &[f64]) -> bool {
+    /// may be the new one. What violates the constraints less is better than what violates them more, whatever the
+    /// objectives (Deb's rules), so that all members violate them by as much. Objectives that are not finite do not come
+    /// in. Returns whether it came in.
+    pub fn insert_violating(&mut self, position: &[f64], objectives: &[f64], violation: f64) -> bool {
+        if objectives.iter().any(|x| !x.is_finite()) || !self.reached(violation) {
+            return false;
+        }
         let beaten = |m: &Vec<f64>| m.iter().zip(objectives).all(|(x, y)| x <= y);
         if self.objectives.iter().any(beaten) {
             return false;
@@ -77,28 +102,94 @@ impl Archive {
         self.positions.push(position.to_vec());
         if self.by_contribution() {
             self.shares.push((0.0, [f64::INFINITY; 3]));
+            self.columns.push(objectives);
             self.refresh(objectives);
         }
         if self.len() > self.capacity {
-            let mut worth = self.worth();
-            // The ends of a front are what its users look for first.
-            for k in 0..objectives.len() {
-                let value = |i: usize| self.objectives[i][k];
-                if let Some(end) = (0..self.len()).min_by(|&a, &b| value(a).total_cmp(&value(b))) {
-                    worth[end] = f64::INFINITY;
-                }
-            }
-            let least = (0..self.len())
-                .min_by(|&a, &b| worth[a].total_cmp(&worth[b]))
-                .unwrap_or(0);
-            let left = self.objectives[least].clone();
-            self.drop_member(least);
-            if self.by_contribution() {
-                self.refresh(&left);
-            }
-            return left != objectives;
+            return self.drop_least() != objectives;
         }
         true
+    }
+
+    /// Takes in solutions with their objectives all at once: what no other of them and no member dominates or equals
+    /// comes in, and then those leave, one at a time, that would be missed least.
+    pub(super) fn insert_all(&mut self, solutions: Vec<(Vec<f64>, Vec<f64>)>, violation: f64) {
+        if solutions.is_empty() || !self.reached(violation) {
+            return;
+        }
+        let positions = std::mem::take(&mut self.positions).into_iter();
+        let members = positions.zip(std::mem::take(&mut self.objectives));
+        let all: Vec<(Vec<f64>, Vec<f64>)> = members.chain(solutions).collect();
+        let rows: Vec<Vec<f64>> = all.iter().map(|(_, row)| row.clone()).collect();
+        let mut stays = vec![false; all.len()];
+        for i in non_dominated(&rows) {
+            stays[i] = true;
+        }
+        let kept = all.into_iter().zip(stays).filter(|(_, stays)| *stays);
+        (self.positions, self.objectives) = kept.map(|(solution, _)| solution).unzip();
+        self.shares.clear();
+        self.columns.clear();
+        if self.by_contribution() {
+            self.shares = vec![(0.0, [f64::INFINITY; 3]); self.len()];
+            self.objectives.iter().for_each(|row| self.columns.push(row));
+            // No point lies at it, so that all shares are worked out.
+            self.reference.clear();
+            let first = self.objectives[0].clone();
+            self.refresh(&first);
+        }
+        while self.len() > self.capacity {
+            self.drop_least();
+        }
+    }
+
+    /// Whether a violation is as small as the archive's. If it is smaller the members leave, whoever comes.
+    fn reached(&mut self, violation: f64) -> bool {
+        if !(violation <= self.violation && violation.is_finite()) {
+            return false;
+        }
+        if violation < self.violation {
+            self.violation = violation;
+            self.positions.clear();
+            self.objectives.clear();
+            self.shares.clear();
+            self.columns.clear();
+        }
+        true
+    }
+
+    /// Lets the member go that would be missed least and is not the best in any objective; its objectives.
+    fn drop_least(&mut self) -> Vec<f64> {
+        let mut worth = self.worth();
+        // The ends of a front are what its users look for first.
+        for k in 0..self.objectives[0].len() {
+            let value = |i: usize| self.objectives[i][k];
+            if let Some(end) = (0..self.len()).min_by(|&a, &b| value(a).total_cmp(&value(b))) {
+                worth[end] = f64::INFINITY;
+            }
+        }
+        let least = (0..self.len())
+            .min_by(|&a, &b| worth[a].total_cmp(&worth[b]))
+            .unwrap_or(0);
+        let left = self.objectives[least].clone();
+        self.drop_member(least);
+        if self.by_contribution() {
+            self.refresh(&left);
+        }
+        left
+    }
+
+    /// The least value of an objective; infinite without members.
+    pub fn least(&self, objective: usize) -> f64 {
+        let values = self.objectives.iter().map(|m| m[objective]);
+        values.fold(f64::INFINITY, f64::min)
+    }
+
+    /// The members, their positions scaled to the variables' units.
+    pub(super) fn front(&self, space: &Space) -> Front {
+        Front {
+            candidates: self.positions.iter().map(|p| space.scaled(p, 1)).collect(),
+            objectives: self.objectives.clone(),
+        }
     }
 
     /// How much the archive would miss each member, by the measure that it is truncated by.
@@ -122,6 +213,7 @@ impl Archive {
         self.positions.swap_remove(i);
         if !self.shares.is_empty() {
             self.shares.swap_remove(i);
+            self.columns.swap_remove(i);
         }
     }
 
@@ -143,7 +235,7 @@ impl Archive {
                     .zip(&self.shares[i].1)
                     .all(|(x, corner)| x <= corner)
             {
-                self.shares[i] = exclusive(&self.objectives, i, &self.reference);
+                self.shares[i] = self.columns.exclusive(i, &self.reference);
             }
         }
     }

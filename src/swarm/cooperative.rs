@@ -13,10 +13,11 @@ use super::{Front, Optimiser};
 use crate::error::Result;
 use crate::evaluate::{Evaluation, FAILED_COST, Problem};
 use crate::random::Random;
+use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
 /// Settings of [`CooperativeSwarm`].
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CooperativeSettings {
     /// Motion within each group; the population is that of one group, the iterations those of all groups together.
     /// There are no difference moves.
@@ -61,7 +62,7 @@ impl CooperativeSettings {
 }
 
 /// The swarm of one group.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 struct Group {
     /// The coordinates that it looks after.
     columns: Range<usize>,
@@ -98,7 +99,7 @@ impl Group {
 }
 
 /// Groups of particles about a common context; minimises the first objective.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct CooperativeSwarm {
     settings: CooperativeSettings,
     space: Space,
@@ -190,11 +191,7 @@ impl Optimiser for CooperativeSwarm {
     }
 
     fn tell(&mut self, evaluation: &Evaluation) {
-        let costs: Vec<f64> = evaluation
-            .objectives
-            .chunks_exact(self.objectives)
-            .map(|row| if row[0].is_finite() { row[0] } else { FAILED_COST })
-            .collect();
+        let costs = evaluation.costs(self.objectives);
         let moving = self.moving();
         for group in &mut self.groups[moving.clone()] {
             group.note(&costs);

@@ -8,13 +8,14 @@
 
 use super::motion::{Particles, Purpose};
 use super::settings::setting;
-use super::{Front, Optimiser};
+use super::{Front, Optimiser, Welcome};
 use crate::error::Result;
-use crate::evaluate::{Evaluation, FAILED_COST, Problem};
+use crate::evaluate::{Evaluation, Problem};
 use crate::random::Random;
+use serde::{Deserialize, Serialize};
 
 /// Settings of [`DifferenceSwarm`].
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DifferenceSettings {
     /// Particles.
     pub population: usize,
@@ -57,7 +58,7 @@ impl DifferenceSettings {
 }
 
 /// A swarm of self-adapted difference moves; minimises the first objective.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct DifferenceSwarm {
     settings: DifferenceSettings,
     random: Random,
@@ -179,14 +180,27 @@ impl DifferenceSwarm {
     }
 }
 
+impl Welcome for DifferenceSwarm {
+    /// Each takes the home of the worst particle, if it is better.
+    fn welcome(&mut self, migrants: &Front, _violation: f64) {
+        for (candidate, row) in migrants.candidates.iter().zip(&migrants.objectives) {
+            let worst = (0..self.cost.len()).max_by(|&a, &b| self.cost[a].total_cmp(&self.cost[b]));
+            if let Some(worst) = worst.filter(|&p| row[0] < self.cost[p]) {
+                let place = self.particles.row(worst);
+                self.home[place].copy_from_slice(&self.particles.space.position(candidate));
+                self.cost[worst] = row[0];
+            }
+        }
+    }
+}
+
 impl Optimiser for DifferenceSwarm {
     fn ask(&mut self) -> Vec<f64> {
         self.particles.candidates()
     }
 
     fn tell(&mut self, evaluation: &Evaluation) {
-        for (particle, row) in evaluation.objectives.chunks_exact(self.objectives).enumerate() {
-            let cost = if row[0].is_finite() { row[0] } else { FAILED_COST };
+        for (particle, cost) in evaluation.costs(self.objectives).into_iter().enumerate() {
             if cost <= self.cost[particle] {
                 self.cost[particle] = cost;
                 self.control[particle] = self.tried[particle];

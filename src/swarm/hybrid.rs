@@ -10,9 +10,10 @@ use super::{
 };
 use crate::error::Result;
 use crate::evaluate::{Evaluation, Problem};
+use serde::{Deserialize, Serialize};
 
 /// Settings of [`HybridSwarm`].
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct HybridSettings {
     /// Particles.
     pub population: usize,
@@ -64,7 +65,7 @@ impl HybridSettings {
 }
 
 /// An exploring swarm followed by a gathering one; minimises the first objective.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct HybridSwarm {
     settings: HybridSettings,
     problem: Problem,

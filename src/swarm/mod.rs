@@ -8,9 +8,11 @@
 //! | one | [`DifferenceSwarm`] | differential evolution that adapts itself |
 //! | one | [`CooperativeSwarm`] | CPSO-S_K: a swarm to each group of variables |
 //! | more | [`Mopso`] | particle swarm with an archive: the default, SMPSO and the thesis's are settings of it |
+//! | more | [`device::DeviceMopso`] | the same on a device, where its problem is there too |
 //! | more | [`Nsga2`] | the genetic algorithm that swarms are compared with |
 //!
-//! [`comparison`] runs them on [`problems`] whose answers are known and judges them by [`metrics`].
+//! [`Islands`] are several swarms in one population, with or without migration. [`checkpoint`] keeps the state of any of
+//! them in a file. [`comparison`] runs them on [`problems`] whose answers are known and judges them by [`metrics`].
 //!
 //! Positions live in the unit cube and are scaled to the bounds when asked for, so a swarm does not notice where
 //! its bounds lie. Random numbers are functions of seed, iteration, particle and purpose ([`crate::random`]), so
@@ -29,11 +31,14 @@
 //! 9. Zitzler, Laumanns, Thiele, *SPEA2*, TIK report 103 (2001) (truncation by the nearest neighbours).
 
 mod archive;
+pub mod checkpoint;
 pub mod comparison;
 mod cooperative;
 mod covariance;
+pub mod device;
 mod difference;
 mod hybrid;
+mod islands;
 pub mod metrics;
 mod mopso;
 mod motion;
@@ -49,7 +54,8 @@ pub use cooperative::{CooperativeSettings, CooperativeSwarm};
 pub use covariance::{Beyond, CovarianceSettings, CovarianceSwarm, Restarts};
 pub use difference::{DifferenceSettings, DifferenceSwarm};
 pub use hybrid::{HybridSettings, HybridSwarm};
-pub use mopso::Mopso;
+pub use islands::{Islands, Migration, Welcome};
+pub use mopso::{Generation, MANY, Mopso};
 pub use nsga2::{Nsga2, Nsga2Settings};
 pub use pso::Pso;
 pub use settings::{
@@ -143,12 +149,12 @@ pub fn run(
             .chunks_exact(width)
             .zip(&evaluation.failures);
         let mut costs: Vec<f64> = rows.filter(|(_, f)| f.is_none()).map(|(row, _)| row[0]).collect();
-        costs.sort_by(f64::total_cmp);
+        let middle = costs.len() / 2;
         let progress = Progress {
             iteration: optimiser.iteration(),
             evaluations: optimiser.evaluations(),
             best: optimiser.best(),
-            median: costs.get(costs.len() / 2).copied(),
+            median: (!costs.is_empty()).then(|| *costs.select_nth_unstable_by(middle, f64::total_cmp).1),
             failed: evaluation.failures.iter().filter(|f| f.is_some()).count(),
         };
         if observe(&progress).is_break() {

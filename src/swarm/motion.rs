@@ -5,6 +5,7 @@ use super::space::Space;
 use crate::error::Result;
 use crate::evaluate::Problem;
 use crate::random::Random;
+use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
 /// What random draws are for, the counter's last word.
@@ -23,7 +24,7 @@ pub(super) enum Purpose {
 }
 
 /// Positions and velocities, row-major, in the unit cube.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct Particles {
     pub position: Vec<f64>,
     pub velocity: Vec<f64>,
@@ -139,7 +140,7 @@ impl Particles {
 
 /// The coefficient of constriction of pulls that add up to `phi`, with its sign: one up to four, negative beyond
 /// (\[3\], equation 4 of \[6\]).
-fn constriction(phi: f64) -> f64 {
+pub(super) fn constriction(phi: f64) -> f64 {
     if phi > 4.0 {
         2.0 / (2.0 - phi - (phi * phi - 4.0 * phi).sqrt())
     } else {

@@ -11,9 +11,10 @@ use super::{Front, Optimiser};
 use crate::error::Result;
 use crate::evaluate::{Evaluation, FAILED_COST, Problem};
 use crate::random::Random;
+use serde::{Deserialize, Serialize};
 
 /// Settings of [`Nsga2`]; the defaults are those of the paper.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Nsga2Settings {
     /// Members of the population, an even number.
     pub population: usize,
@@ -76,16 +77,17 @@ impl Nsga2Settings {
 }
 
 /// One solution, with the number of the front that it is in and its crowding there.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 struct Member {
     position: Vec<f64>,
     objectives: Vec<f64>,
+    violation: f64,
     rank: usize,
     crowding: f64,
 }
 
 /// The population and the children it has been asked for.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Nsga2 {
     settings: Nsga2Settings,
     random: Random,
@@ -194,15 +196,23 @@ fn cross(a: f64, b: f64, uniform: f64, index: f64) -> (f64, f64) {
     (below.clamp(0.0, 1.0), above.clamp(0.0, 1.0))
 }
 
+/// Whether one solution is better than another: by what it violates, then by dominance (Deb's rules).
+fn beats(a: &Member, b: &Member) -> bool {
+    if a.violation != b.violation {
+        return a.violation < b.violation;
+    }
+    dominates(&a.objectives, &b.objectives)
+}
+
 /// The fronts of a set, best first, by the number of others that dominate each.
 fn fronts(members: &[Member]) -> Vec<Vec<usize>> {
     let n = members.len();
     let mut beaten_by = vec![0usize; n];
-    let mut beats: Vec<Vec<usize>> = vec![Vec::new(); n];
+    let mut beaten: Vec<Vec<usize>> = vec![Vec::new(); n];
     for i in 0..n {
         for j in 0..n {
-            if dominates(&members[i].objectives, &members[j].objectives) {
-                beats[i].push(j);
+            if beats(&members[i], &members[j]) {
+                beaten[i].push(j);
                 beaten_by[j] += 1;
             }
         }
@@ -211,7 +221,7 @@ fn fronts(members: &[Member]) -> Vec<Vec<usize>> {
     let mut front: Vec<usize> = (0..n).filter(|&i| beaten_by[i] == 0).collect();
     while !front.is_empty() {
         let mut next = Vec::new();
-        for &j in front.iter().flat_map(|&i| &beats[i]) {
+        for &j in front.iter().flat_map(|&i| &beaten[i]) {
             beaten_by[j] -= 1;
             if beaten_by[j] == 0 {
                 next.push(j);
@@ -241,6 +251,10 @@ impl Optimiser for Nsga2 {
             } else {
                 vec![FAILED_COST; self.objectives]
             };
+            let violation = match evaluation.violation(child) {
+                _ if sound || evaluation.violations.is_empty() => evaluation.violation(child),
+                _ => f64::INFINITY,
+            };
             let position = self.children.position[self.children.row(child)].to_vec();
             let known = |m: &Member| m.objectives == objectives && m.position == position;
             // A copy of a member brings nothing and would crowd it out.
@@ -248,6 +262,7 @@ impl Optimiser for Nsga2 {
                 all.push(Member {
                     position,
                     objectives,
+                    violation,
                     rank: 0,
                     crowding: 0.0,
                 });

@@ -2,13 +2,14 @@
 
 use super::motion::{Particles, Purpose};
 use super::settings::PsoSettings;
-use super::{Front, Optimiser};
+use super::{Front, Optimiser, Welcome};
 use crate::error::Result;
-use crate::evaluate::{Evaluation, FAILED_COST, Problem};
+use crate::evaluate::{Evaluation, Problem};
 use crate::random::Random;
+use serde::{Deserialize, Serialize};
 
 /// A swarm with one leader (references 1, 2 and 7 of [`super`]).
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Pso {
     settings: PsoSettings,
     random: Random,
@@ -119,6 +120,25 @@ impl Pso {
     }
 }
 
+impl Welcome for Pso {
+    /// Each becomes the best of the particle whose best is worst, if it is better.
+    fn welcome(&mut self, migrants: &Front, _violation: f64) {
+        for (candidate, row) in migrants.candidates.iter().zip(&migrants.objectives) {
+            let worst =
+                (0..self.best_cost.len()).max_by(|&a, &b| self.best_cost[a].total_cmp(&self.best_cost[b]));
+            let Some(worst) = worst.filter(|&p| row[0] < self.best_cost[p]) else {
+                continue;
+            };
+            let place = self.particles.row(worst);
+            self.best_position[place].copy_from_slice(&self.particles.space.position(candidate));
+            self.best_cost[worst] = row[0];
+            if row[0] < self.best_cost[self.leader] {
+                self.leader = worst;
+            }
+        }
+    }
+}
+
 impl Optimiser for Pso {
     fn ask(&mut self) -> Vec<f64> {
         self.particles.candidates()
@@ -126,8 +146,7 @@ impl Optimiser for Pso {
 
     fn tell(&mut self, evaluation: &Evaluation) {
         let d = self.particles.dimensions();
-        for (particle, row) in evaluation.objectives.chunks_exact(self.objectives).enumerate() {
-            let cost = if row[0].is_finite() { row[0] } else { FAILED_COST };
+        for (particle, cost) in evaluation.costs(self.objectives).into_iter().enumerate() {
             if cost < self.best_cost[particle] {
                 self.best_cost[particle] = cost;
                 let range = particle * d..(particle + 1) * d;

@@ -1,9 +1,10 @@
 //! Settings of the swarms, validated in one place.
 
 use crate::error::{Error, Result};
+use serde::{Deserialize, Serialize};
 
 /// A coefficient that may change over the run.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Schedule {
     /// The same throughout.
     Fixed(f64),
@@ -31,7 +32,7 @@ impl Schedule {
 }
 
 /// How many random numbers a particle draws for each pull.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Randomness {
     /// One for each dimension, as in the first papers and the thesis.
     PerDimension,
@@ -40,7 +41,7 @@ pub enum Randomness {
 }
 
 /// What becomes of a particle that would leave its bounds.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum BoundHandling {
     /// It stops at the bound and its velocity there becomes nought.
     Absorb,
@@ -51,7 +52,7 @@ pub enum BoundHandling {
 }
 
 /// Whether the step of a particle is shortened as a whole.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Constriction {
     /// By the inertia only.
     None,
@@ -67,7 +68,7 @@ pub enum Constriction {
 pub const DRAWN_PULLS: [f64; 2] = [1.5, 2.5];
 
 /// Settings of [`super::Pso`].
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PsoSettings {
     /// Particles.
     pub population: usize,
@@ -169,7 +170,7 @@ impl PsoSettings {
 }
 
 /// How a particle of [`super::Mopso`] chooses whom to follow.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Leaders {
     /// Of two archive members drawn at random the one that the archive would miss more \[5, 6\].
     Tournament,
@@ -178,7 +179,7 @@ pub enum Leaders {
 }
 
 /// By what an archive that is too full chooses who leaves; one member at a time.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Truncation {
     /// The least crowding distance \[5\].
     Crowding,
@@ -189,7 +190,7 @@ pub enum Truncation {
 }
 
 /// What disturbs a particle after its move.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Mutation {
     /// Nothing.
     None,
@@ -217,7 +218,7 @@ impl Mutation {
 }
 
 /// Settings of [`super::Mopso`].
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MopsoSettings {
     /// The motion's settings. A difference move goes from an archive member along the difference of two others
     /// \[7\].

@@ -2,11 +2,12 @@
 
 use crate::error::{Error, Result};
 use crate::evaluate::{Problem, Variable};
+use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
 /// The unit cube, with one dimension for each variable that is not fixed by equal bounds, and the way from it to
 /// the variables' units.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct Space {
     variables: Vec<Variable>,
     free: Vec<usize>,
@@ -26,6 +27,12 @@ impl Space {
                     found,
                     "finite bounds in order",
                 ));
+            }
+        }
+        for v in problem.variables.iter().filter(|v| v.whole) {
+            if v.lower.fract() != 0.0 || v.upper.fract() != 0.0 {
+                let found = format!("bounds from {} to {}", v.lower, v.upper);
+                return Err(Error::input("the problem", &v.name, found, "whole numbers"));
             }
         }
         if problem.objectives.is_empty() || problem.variables.is_empty() {
@@ -61,6 +68,30 @@ impl Space {
         self.free.len()
     }
 
+    /// Variables, fixed ones and all.
+    pub fn variables(&self) -> usize {
+        self.variables.len()
+    }
+
+    /// Writes the candidates of a block of `lanes` positions, whose coordinates lie in rows; as many as `candidates`
+    /// has room for.
+    pub fn scale_block(&self, positions: &[f32], lanes: usize, candidates: &mut [f64]) {
+        let width = self.variables.len();
+        for (k, v) in self.variables.iter().enumerate() {
+            if v.lower == v.upper {
+                for candidate in candidates.chunks_exact_mut(width) {
+                    candidate[k] = v.lower;
+                }
+            }
+        }
+        for (row, &k) in positions.chunks_exact(lanes).zip(&self.free) {
+            let v = &self.variables[k];
+            for (candidate, x) in candidates.chunks_exact_mut(width).zip(row) {
+                candidate[k] = value(v, f64::from(*x));
+            }
+        }
+    }
+
     /// `count` positions, row-major, as candidates in the variables' units.
     pub fn scaled(&self, positions: &[f64], count: usize) -> Vec<f64> {
         let d = self.dimensions();
@@ -68,9 +99,7 @@ impl Space {
         let mut candidates: Vec<f64> = (0..count).flat_map(|_| fixed.clone()).collect();
         for (row, candidate) in candidates.chunks_exact_mut(self.variables.len()).enumerate() {
             for (j, &k) in self.free.iter().enumerate() {
-                let v = &self.variables[k];
-                let value = v.lower + positions[row * d + j] * (v.upper - v.lower);
-                candidate[k] = value.min(v.upper);
+                candidate[k] = value(&self.variables[k], positions[row * d + j]);
             }
         }
         candidates
@@ -80,8 +109,26 @@ impl Space {
     pub fn position(&self, candidate: &[f64]) -> Vec<f64> {
         let share = |&k: &usize| {
             let v = &self.variables[k];
-            ((candidate[k] - v.lower) / (v.upper - v.lower)).clamp(0.0, 1.0)
+            let share = if v.whole {
+                // The middle of what stands for it.
+                (candidate[k].round() - v.lower + 0.5) / (v.upper - v.lower + 1.0)
+            } else {
+                (candidate[k] - v.lower) / (v.upper - v.lower)
+            };
+            share.clamp(0.0, 1.0)
         };
         self.free.iter().map(share).collect()
     }
+}
+
+/// What a coordinate of the cube stands for: each whole number for as much of it as the others, if only those will do.
+#[inline(always)]
+fn value(v: &Variable, position: f64) -> f64 {
+    let range = v.upper - v.lower;
+    let value = if v.whole {
+        v.lower + (position * (range + 1.0)).floor()
+    } else {
+        v.lower + position * range
+    };
+    value.min(v.upper)
 }

@@ -20,9 +20,10 @@ use crate::error::{Error, Result};
 use crate::evaluate::{Evaluation, FAILED_COST, Problem};
 use crate::random::Random;
 use nalgebra::DVector;
+use serde::{Deserialize, Serialize};
 
 /// Settings of [`WindowSwarm`].
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct WindowSettings {
     /// Directions in which the swarm of one window moves.
     pub size: usize,
@@ -88,7 +89,7 @@ impl WindowSettings {
 }
 
 /// The swarm of one window.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 struct Window {
     /// What each direction moves: variables and weights.
     bumps: Vec<Vec<(usize, f64)>>,
@@ -110,7 +111,7 @@ impl Window {
 }
 
 /// Windows of particles about a common context; minimises the first objective.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct WindowSwarm {
     settings: WindowSettings,
     /// Bounds of the variables; bumps and context are in the variables' own units.
@@ -140,6 +141,10 @@ impl WindowSwarm {
     pub fn new(problem: &Problem, start: &[f64], settings: WindowSettings) -> Result<Self> {
         settings.validate()?;
         Space::new(problem)?;
+        if let Some(v) = problem.variables.iter().find(|v| v.whole) {
+            let expected = "a swarm in windows moves real numbers only";
+            return Err(Error::input("the problem", &v.name, "whole numbers", expected));
+        }
         let n = problem.variables.len();
         if start.len() != n || start.iter().any(|x| !x.is_finite()) {
             return Err(Error::input(
@@ -297,11 +302,7 @@ impl Optimiser for WindowSwarm {
     }
 
     fn tell(&mut self, evaluation: &Evaluation) {
-        let costs: Vec<f64> = evaluation
-            .objectives
-            .chunks_exact(self.objectives)
-            .map(|row| if row[0].is_finite() { row[0] } else { FAILED_COST })
-            .collect();
+        let costs = evaluation.costs(self.objectives);
         let (turn, count) = (self.turn(), self.settings.population);
         self.evaluations += costs.len() as u64;
         let Some((&own, costs)) = costs.split_first() else {

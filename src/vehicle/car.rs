@@ -1,6 +1,7 @@
 //! A car as its users write it: TOML with units in the keys, tyres by `.tir`.
 
 use super::chassis::Chassis;
+use super::hybrid::Hybrid;
 use super::parameters::ParameterInfo;
 use super::powertrain::Powertrain;
 use super::tyre::{LinearTyre, TyreCoefficients, TyreFile, TyreModel};
@@ -42,6 +43,8 @@ pub struct Car {
     pub max_steer_rad: f64,
     /// Engine and gears, where known.
     pub powertrain: Option<Powertrain>,
+    /// Motor-generators and store, where there are any.
+    pub hybrid: Option<Hybrid>,
 }
 
 /// A parameter that an identification may free: its name, and where it stands in the car's flat form.
@@ -61,21 +64,36 @@ const ALIASES: [(&str, &str); 2] = [
     ("C", "roll_damping_nms_per_rad"),
 ];
 
-const BUNDLED_CAR: &str = include_str!("../../data/cars/gt.toml");
-const BUNDLED_TYRE: &str = include_str!("../../data/cars/gt_slick.tir");
+const BUNDLED_HYBRID: &str = include_str!("../../data/cars/gt_hybrid.toml");
 
 impl Car {
+    /// The bundled GT car's file.
+    pub const BUNDLED_TOML: &str = include_str!("../../data/cars/gt.toml");
+    /// The tyre file that it names.
+    pub const BUNDLED_TYRE: &str = include_str!("../../data/cars/gt_slick.tir");
+
     /// The bundled GT car (`physics.md` section 8).
     pub fn bundled() -> Result<Self> {
-        Self::parse(Path::new("the bundled car gt.toml"), BUNDLED_CAR, |name| {
-            TyreFile::parse(Path::new(name), BUNDLED_TYRE)
+        Self::parse(Path::new("the bundled car gt.toml"), Self::BUNDLED_TOML, |name| {
+            TyreFile::parse(Path::new(name), Self::BUNDLED_TYRE)
         })
     }
 
-    /// A bundled car by name (`gt`), or a car file; tyre files are looked for beside it.
+    /// The bundled GT car with its engine map and a hybrid drive.
+    pub fn bundled_hybrid() -> Result<Self> {
+        Self::parse(
+            Path::new("the bundled car gt_hybrid.toml"),
+            BUNDLED_HYBRID,
+            |name| TyreFile::parse(Path::new(name), Self::BUNDLED_TYRE),
+        )
+    }
+
+    /// A bundled car by name (`gt`, `gt_hybrid`), or a car file; tyre files are looked for beside it.
     pub fn load(name_or_path: &str) -> Result<Self> {
-        if name_or_path == "gt" {
-            return Self::bundled();
+        match name_or_path {
+            "gt" => return Self::bundled(),
+            "gt_hybrid" => return Self::bundled_hybrid(),
+            _ => {}
         }
         let path = Path::new(name_or_path);
         let text = read_text(path)?;
@@ -114,6 +132,14 @@ impl Car {
             }
             None => None,
         };
+        let hybrid = match root.table("hybrid")? {
+            Some(table) => {
+                let hybrid = Hybrid::from_table(&table)?;
+                table.finish()?;
+                Some(hybrid)
+            }
+            None => None,
+        };
         let car = Self {
             name: root.string("name")?.unwrap_or("unnamed car").to_owned(),
             chassis,
@@ -123,6 +149,7 @@ impl Car {
                 .number("max_road_wheel_angle_rad", 0.01, 1.5, "rad")?
                 .unwrap_or(0.5),
             powertrain,
+            hybrid,
         };
         steering.finish()?;
         root.finish()?;
@@ -161,6 +188,10 @@ impl Car {
         if let Some(powertrain) = &self.powertrain {
             text.push('\n');
             text.push_str(&powertrain.to_toml());
+        }
+        if let Some(hybrid) = &self.hybrid {
+            text.push('\n');
+            text.push_str(&hybrid.to_toml());
         }
         write_file(&folder.join(format!("{stem}.toml")), &text)
     }

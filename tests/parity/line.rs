@@ -193,6 +193,7 @@ fn a_line_costs_the_same_alone_and_among_others() {
             let expected = Evaluation {
                 objectives: together.objectives[..count * 5].to_vec(),
                 failures: together.failures[..count].to_vec(),
+                violations: Vec::new(),
             };
             assert_eq!(bits(&fewer), bits(&expected), "{name}, {count} lines");
         }

@@ -8,6 +8,8 @@ mod common;
 mod cutting;
 mod device;
 mod elementary;
+mod energy;
 mod lap;
 mod line;
 mod step;
+mod swarm;

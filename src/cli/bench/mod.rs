@@ -3,6 +3,7 @@
 mod machine;
 mod optimisers;
 mod scaling;
+mod swarm;
 
 use lapswarm::Result;
 
@@ -24,12 +25,15 @@ pub struct Arguments {
 enum What {
     /// Compare the optimisers on problems whose answers are known.
     Optimisers(optimisers::Arguments),
+    /// Measure what the optimiser itself costs, from a thousand particles to a million.
+    Swarm(swarm::Arguments),
 }
 
 /// Measures and prints.
 pub fn run(arguments: &Arguments) -> Result<()> {
     match &arguments.what {
         Some(What::Optimisers(arguments)) => optimisers::run(arguments),
+        Some(What::Swarm(arguments)) => swarm::run(arguments),
         None => scaling::run(&arguments.scaling),
     }
 }

@@ -18,8 +18,36 @@ const CAR: &str = include_str!("../../../shaders/car.wgsl");
 const REPLAY_COMMON: &str = include_str!("../../../shaders/replay_common.wgsl");
 const REPLAY: &str = include_str!("../../../shaders/replay.wgsl");
 const REPLAY_REDUCE: &str = include_str!("../../../shaders/replay_reduce.wgsl");
+const RANDOM: &str = include_str!("../../../shaders/random.wgsl");
+const SWARM: &str = include_str!("../../../shaders/swarm.wgsl");
+const SWARM_GATHER: &str = include_str!("../../../shaders/swarm_gather.wgsl");
+const TEST_PROBLEMS: &str = include_str!("../../../shaders/test_problems.wgsl");
 
 const LINE: &str = include_str!("../../../shaders/line.wgsl");
+/// Engine, motors, store and fuel on a lap of a line.
+const ENERGY: &str = include_str!("../../../shaders/energy.wgsl");
+
+/// Philox, the twin of [`crate::random`].
+pub fn random() -> &'static str {
+    RANDOM
+}
+
+/// Source of the kernels that move a swarm; entry points `scatter`, `learn` and `advance`.
+pub fn swarm() -> String {
+    [ELEMENTARY, RANDOM, SWARM].concat()
+}
+
+/// Source of the kernel that copies a few particles' positions; entry point `gather`.
+pub fn swarm_gather() -> String {
+    SWARM_GATHER.to_owned()
+}
+
+/// Source of the kernel of the test problem of that number among
+/// [`crate::swarm::problems::NAMES`]; entry point `test_problem`.
+pub fn test_problem(number: u32) -> String {
+    let constants = format!("\n// Generated.\nconst PROBLEM: u32 = {number}u;\n\n");
+    [ELEMENTARY, &constants, TEST_PROBLEMS].concat()
+}
 
 /// The car's fragments with the tyre model's.
 pub fn car_fragments(model: TyreModel) -> [&'static str; 7] {
@@ -134,6 +162,38 @@ impl LineShape {
             },
         );
         [ELEMENTARY, &constants, LINE].concat()
+    }
+}
+
+/// What an energy kernel is specialised to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct EnergyShape {
+    /// The line kernel that it continues; it wants a lap.
+    pub line: LineShape,
+    /// Variables of the line, after which the strategy's figures come.
+    pub line_variables: usize,
+    /// Whether the motor adds to the engine.
+    pub additional: bool,
+    /// Whether the charge has a say in where the motor works.
+    pub counts_charge: bool,
+}
+
+impl EnergyShape {
+    /// Where in the table of vectors of four the flows, the boosts and the zones begin.
+    pub fn places(&self) -> [usize; 3] {
+        let rows = self.line.limit_rows;
+        [2 * rows, 4 * rows, 5 * rows]
+    }
+
+    /// Source of the kernel; entry point `energy_line`.
+    pub fn source(&self) -> String {
+        let [flows, boosts, zones] = self.places();
+        let constants = format!(
+            "\n// Generated.\nconst STRATEGY: u32 = {}u;\nconst ADDITIONAL: bool = {};\nconst COUNTS_CHARGE: bool = {};\nconst FLOWS_AT: u32 = {flows}u;\n\
+             const BOOSTS_AT: u32 = {boosts}u;\nconst ZONES_AT: u32 = {zones}u;\n\n",
+            self.line_variables, self.additional, self.counts_charge,
+        );
+        [&self.line.source(), &constants, ENERGY].concat()
     }
 }
 

@@ -5,7 +5,7 @@ use crate::error::{Error, Result};
 use crate::evaluate::gpu::shader::LineShape;
 use crate::evaluate::gpu::{Binding, DeviceKind, GpuContext, Kernel};
 use crate::evaluate::{BackendInfo, Evaluation, Evaluator, Problem};
-use crate::line::{LimitTable, TERMS};
+use crate::line::{LimitTable, SectionRow, TERMS};
 use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -30,6 +30,21 @@ pub struct DeviceSection {
     pub inverse_spacing: f32,
     /// Nothing: vectors of four are aligned to 16 bytes.
     pub padding: [f32; 2],
+}
+
+impl DeviceSection {
+    /// A section of a plan.
+    pub(in crate::evaluate) fn of(row: &SectionRow<f32>) -> Self {
+        Self {
+            sources: row.sources,
+            weights: row.weights,
+            step: row.step,
+            cut: row.cut,
+            constant: row.constant,
+            inverse_spacing: row.inverse_spacing,
+            padding: [0.0; 2],
+        }
+    }
 }
 
 /// What a dispatch is to do. Twin of `LineStretch` in `shaders/line.wgsl`.
@@ -163,19 +178,7 @@ impl<'a> GpuLineEvaluator<'a> {
             Write,
         ];
         let kernel = context.kernel(&shape.source(), "line", &bindings)?;
-        let sections: Vec<DeviceSection> = plan
-            .rows
-            .iter()
-            .map(|row| DeviceSection {
-                sources: row.sources,
-                weights: row.weights,
-                step: row.step,
-                cut: row.cut,
-                constant: row.constant,
-                inverse_spacing: row.inverse_spacing,
-                padding: [0.0; 2],
-            })
-            .collect();
+        let sections: Vec<DeviceSection> = plan.rows.iter().map(DeviceSection::of).collect();
         let sections: &[u8] = bytemuck::cast_slice(&sections);
         let most = device.max_storage_buffer_binding_size;
         if section_bytes > most {

@@ -153,6 +153,7 @@ impl ReplayProblem {
                 unit: parameter.info.unit.to_owned(),
                 lower,
                 upper,
+                whole: false,
             });
             parameters.push(parameter);
         }

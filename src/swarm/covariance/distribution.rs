@@ -1,9 +1,10 @@
 //! The normal distribution that the particles are drawn from, and how it adapts.
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use serde::{Deserialize, Serialize};
 
 /// Centre, step size and covariance over the unit cube, with their evolution paths.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub(in crate::swarm) struct Distribution {
     pub mean: DVector<f64>,
     pub step: f64,

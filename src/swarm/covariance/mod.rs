@@ -19,10 +19,11 @@ use crate::evaluate::{Evaluation, FAILED_COST, Problem};
 use crate::random::Random;
 pub(super) use distribution::Distribution;
 use nalgebra::DVector;
+use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 
 /// What becomes of a swarm whose distribution has collapsed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Restarts {
     /// It goes on.
     None,
@@ -35,7 +36,7 @@ pub enum Restarts {
 
 /// What the distribution learns from where particles lie beyond the bounds; they are evaluated where reflection at
 /// the bounds puts them.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Beyond {
     /// From where they lie: an optimum on a bound is one in the open, with its mirror image beyond. It is found to
     /// full precision.
@@ -46,7 +47,7 @@ pub enum Beyond {
 }
 
 /// Settings of [`CovarianceSwarm`].
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CovarianceSettings {
     /// Particles at the start.
     pub population: usize,
@@ -79,7 +80,7 @@ impl Default for CovarianceSettings {
 }
 
 /// A swarm drawn from an adapted normal distribution; minimises the first objective.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct CovarianceSwarm {
     settings: CovarianceSettings,
     space: Space,
@@ -251,11 +252,7 @@ impl Optimiser for CovarianceSwarm {
     }
 
     fn tell(&mut self, evaluation: &Evaluation) {
-        let costs: Vec<f64> = evaluation
-            .objectives
-            .chunks_exact(self.objectives)
-            .map(|row| if row[0].is_finite() { row[0] } else { FAILED_COST })
-            .collect();
+        let costs = evaluation.costs(self.objectives);
         let mut order: Vec<usize> = (0..costs.len()).collect();
         order.sort_by(|&a, &b| costs[a].total_cmp(&costs[b]));
         let Some(&first) = order.first() else {

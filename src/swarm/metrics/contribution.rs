@@ -2,6 +2,9 @@
 
 use super::hypervolume::hypervolume;
 use crate::error::Result;
+use crate::evaluate::simd::{InstructionSet, LaneWork, dispatch};
+use crate::scalar::lanes::Lanes;
+use serde::{Deserialize, Serialize};
 
 /// The volume, up to `reference`, that each of `points` dominates and no other does, for one to three
 /// objectives. Nought for a point that another equals or dominates, or that is not better than the reference.
@@ -11,81 +14,176 @@ use crate::error::Result;
 pub fn contributions(points: &[Vec<f64>], reference: &[f64]) -> Result<Vec<f64>> {
     // It checks the widths.
     hypervolume(points, reference)?;
+    let mut columns = Columns::default();
+    points.iter().for_each(|row| columns.push(row));
     Ok((0..points.len())
-        .map(|i| exclusive(points, i, reference).0)
+        .map(|i| columns.exclusive(i, reference).0)
         .collect())
 }
 
-/// The exclusive volume of point `i` among `points` of up to three objectives, and the far corner of the least
-/// box from the point that holds it. Another point changes the volume only if it is at or below that corner in
-/// every objective.
-///
-/// A sweep along the third objective over a window that the others leave in the first two. The window is small
-/// in a set of non-dominated points, so that nearly all of the others are dismissed by two comparisons: some
-/// `n` steps for a point instead of the `n log n` of a whole hypervolume.
-pub(in crate::swarm) fn exclusive(points: &[Vec<f64>], i: usize, reference: &[f64]) -> (f64, [f64; 3]) {
-    let at = |row: &[f64], k: usize| row.get(k).copied().unwrap_or(0.0);
-    let point = &points[i];
-    let (x, y, z) = (at(point, 0), at(point, 1), at(point, 2));
-    // Missing objectives are nought against a reference of one.
-    let end = |k: usize| reference.get(k).copied().unwrap_or(1.0);
-    let (mut right, mut top, ceiling) = (end(0), end(1), end(2));
-    let nothing = (0.0, [x, y, z]);
-    if !(x < right && y < top && z < ceiling) {
-        return nothing;
-    }
-    // The window at the point's own level.
-    for (j, other) in points.iter().enumerate() {
-        if j == i || at(other, 2) > z {
-            continue;
-        }
-        let (u, v) = (at(other, 0), at(other, 1));
-        match (u <= x, v <= y) {
-            (true, true) => return nothing,
-            (true, false) => top = top.min(v),
-            (false, true) => right = right.min(u),
-            (false, false) => {}
-        }
-    }
-    // Points inside the window bite its far corner off, now or from their level on.
-    let mut inside: Vec<(f64, f64, f64)> = Vec::new();
-    let mut above: Vec<(f64, f64, f64)> = Vec::new();
-    for (j, other) in points.iter().enumerate() {
-        let (u, v, w) = (at(other, 0), at(other, 1), at(other, 2));
-        if j == i || u >= right || v >= top || w >= ceiling {
-            continue;
-        }
-        if w > z {
-            above.push((w, u, v));
-        } else {
-            inside.push((u, v, w));
-        }
-    }
-    above.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let far = (right, top);
-    let mut area = window(&mut inside, (x, y), (right, top));
-    let (mut level, mut volume) = (z, 0.0);
-    for (w, u, v) in above {
-        if u >= right || v >= top {
-            continue;
-        }
-        volume += area * (w - level);
-        level = w;
-        match (u <= x, v <= y) {
-            (true, true) => return (volume, [far.0, far.1, w]),
-            (true, false) => top = v,
-            (false, true) => right = u,
-            (false, false) => inside.push((u, v, w)),
-        }
-        area = window(&mut inside, (x, y), (right, top));
-    }
-    (volume + area * (ceiling - level), [far.0, far.1, ceiling])
+/// Points of up to three objectives by objective; missing ones are nought, against a reference of one.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub(in crate::swarm) struct Columns {
+    x: Vec<f64>,
+    y: Vec<f64>,
+    z: Vec<f64>,
 }
 
-/// The area of the window from `(x, y)` to `(right, top)` less what the points inside dominate; drops points
-/// that are no longer inside or dominate nothing of their own.
+impl Columns {
+    pub fn push(&mut self, row: &[f64]) {
+        let at = |k: usize| row.get(k).copied().unwrap_or(0.0);
+        self.x.push(at(0));
+        self.y.push(at(1));
+        self.z.push(at(2));
+    }
+
+    pub fn swap_remove(&mut self, i: usize) {
+        for column in [&mut self.x, &mut self.y, &mut self.z] {
+            column.swap_remove(i);
+        }
+    }
+
+    pub fn clear(&mut self) {
+        for column in [&mut self.x, &mut self.y, &mut self.z] {
+            column.clear();
+        }
+    }
+
+    /// The exclusive volume of point `i`, and the far corner of the least box from the point that holds it. Another
+    /// point changes the volume only if it is at or below that corner in every objective.
+    ///
+    /// A sweep along the third objective over a window that the others leave in the first two. The window is small
+    /// in a set of non-dominated points, so that nearly all of the others are dismissed by two comparisons: some
+    /// `n` steps for a point instead of the `n log n` of a whole hypervolume.
+    pub fn exclusive(&self, i: usize, reference: &[f64]) -> (f64, [f64; 3]) {
+        let work = Exclusive {
+            columns: self,
+            i,
+            reference,
+        };
+        dispatch(InstructionSet::best(), work)
+    }
+
+    /// The block of points that number `from` is the first of; infinite ones fill up the last.
+    #[inline(always)]
+    fn block(&self, from: usize) -> [[f64; WIDE]; 3] {
+        let mut lanes = [[f64::INFINITY; WIDE]; 3];
+        for (lanes, column) in lanes.iter_mut().zip([&self.x, &self.y, &self.z]) {
+            match column[from..].first_chunk::<WIDE>() {
+                Some(whole) => *lanes = *whole,
+                None => lanes[..column.len() - from].copy_from_slice(&column[from..]),
+            }
+        }
+        lanes
+    }
+
+    #[inline(always)]
+    fn exclusive_in_lanes(&self, i: usize, reference: &[f64]) -> (f64, [f64; 3]) {
+        let (x, y, z) = (self.x[i], self.y[i], self.z[i]);
+        let end = |k: usize| reference.get(k).copied().unwrap_or(1.0);
+        let (mut right, mut top, mut ceiling) = (end(0), end(1), end(2));
+        let nothing = (0.0, [x, y, z]);
+        if !(x < right && y < top && z < ceiling) {
+            return nothing;
+        }
+        // The window at the point's own level, and the level where it closes.
+        let mut least = [[f64::INFINITY; WIDE]; 3];
+        for from in (0..self.x.len()).step_by(WIDE) {
+            let [us, vs, ws] = self.block(from);
+            for lane in 0..WIDE {
+                let (u, v, w) = (us[lane], vs[lane], ws[lane]);
+                let (here, other) = (w <= z, from + lane != i);
+                let (left, low) = ((u <= x) & other, (v <= y) & other);
+                let found = [
+                    if here & left { v } else { f64::INFINITY },
+                    if here & low { u } else { f64::INFINITY },
+                    if !here & left & low { w } else { f64::INFINITY },
+                ];
+                for (least, found) in least.iter_mut().zip(found) {
+                    least[lane] = if found < least[lane] { found } else { least[lane] };
+                }
+            }
+        }
+        let [above, beside, over] = least.map(|lanes| lanes.into_iter().fold(f64::INFINITY, f64::min));
+        (top, right, ceiling) = (top.min(above), right.min(beside), ceiling.min(over));
+        if top <= y || right <= x {
+            return nothing;
+        }
+        // Points inside the window bite its far corner off, now or from their level on.
+        let mut inside: Vec<(f64, f64, f64)> = Vec::new();
+        let mut above: Vec<(f64, f64, f64)> = Vec::new();
+        for from in (0..self.x.len()).step_by(WIDE) {
+            let [us, vs, ws] = self.block(from);
+            let mut counts = [false; WIDE];
+            for lane in 0..WIDE {
+                let below = (us[lane] < right) & (vs[lane] < top) & (ws[lane] < ceiling);
+                counts[lane] = below & (from + lane != i);
+            }
+            if !counts.contains(&true) {
+                continue;
+            }
+            for lane in (0..WIDE).filter(|&lane| counts[lane]) {
+                let (u, v, w) = (us[lane], vs[lane], ws[lane]);
+                if w > z {
+                    above.push((w, u, v));
+                } else {
+                    inside.push((u, v, w));
+                }
+            }
+        }
+        above.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let far = (right, top);
+        inside.sort_by(place);
+        let mut area = window(&mut inside, (x, y), (right, top));
+        let (mut level, mut volume) = (z, 0.0);
+        for (w, u, v) in above {
+            if u >= right || v >= top {
+                continue;
+            }
+            volume += area * (w - level);
+            level = w;
+            match (u <= x, v <= y) {
+                // Both is not met: the window would have closed there.
+                (true, _) => top = v,
+                (false, true) => right = u,
+                (false, false) => {
+                    let point = (u, v, w);
+                    inside.insert(inside.partition_point(|p| place(p, &point).is_le()), point);
+                }
+            }
+            area = window(&mut inside, (x, y), (right, top));
+        }
+        (volume + area * (ceiling - level), [far.0, far.1, ceiling])
+    }
+}
+
+/// Points that are looked at side by side.
+const WIDE: usize = 8;
+
+/// [`Columns::exclusive`], compiled for each instruction set.
+struct Exclusive<'a> {
+    columns: &'a Columns,
+    i: usize,
+    reference: &'a [f64],
+}
+
+impl LaneWork for Exclusive<'_> {
+    type Output = (f64, [f64; 3]);
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) -> Self::Output {
+        self.columns.exclusive_in_lanes(self.i, self.reference)
+    }
+}
+
+/// The order of points inside a window.
+fn place(a: &(f64, f64, f64), b: &(f64, f64, f64)) -> std::cmp::Ordering {
+    a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1))
+}
+
+/// The area of the window from `(x, y)` to `(right, top)` less what the points inside, in order, dominate; drops
+/// points that are no longer inside or dominate nothing of their own.
 fn window(inside: &mut Vec<(f64, f64, f64)>, (x, y): (f64, f64), (right, top): (f64, f64)) -> f64 {
-    inside.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
     let mut ceiling = top;
     inside.retain(|&(u, v, _)| {
         let counts = u < right && v < ceiling;
@@ -145,11 +243,16 @@ mod tests {
                 rest.remove(i);
                 let difference = whole - hypervolume(&rest, &reference).unwrap();
                 assert_eq!(found[i], difference, "{i} of {points:?}");
-                let (volume, corner) = exclusive(&points, i, &reference);
+                let columns = |points: &[Vec<f64>]| {
+                    let mut columns = Columns::default();
+                    points.iter().for_each(|row| columns.push(row));
+                    columns
+                };
+                let (volume, corner) = columns(&points).exclusive(i, &reference);
                 let mut near = vec![points[i].clone()];
                 let touches = |p: &&Vec<f64>| p.iter().zip(&corner).all(|(x, c)| x <= c);
                 near.extend(rest.iter().filter(touches).cloned());
-                assert_eq!(exclusive(&near, 0, &reference).0, volume);
+                assert_eq!(columns(&near).exclusive(0, &reference).0, volume);
             }
         }
     }

@@ -22,9 +22,10 @@ mod non_dominated;
 mod significance;
 mod staircase;
 
+pub(super) use contribution::Columns;
 pub use contribution::contributions;
-pub(super) use contribution::exclusive;
 pub use hypervolume::hypervolume;
 pub use indicators::{Scale, epsilon, igd_plus, spread};
 pub use non_dominated::non_dominated;
 pub use significance::signed_rank;
+pub(super) use staircase::Staircase;

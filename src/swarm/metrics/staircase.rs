@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 /// Non-dominated points of a plane, in order of the first coordinate.
 #[derive(Default)]
-pub(super) struct Staircase {
+pub(in crate::swarm) struct Staircase {
     /// The second coordinate by the first, which is kept as a word of the same order.
     steps: BTreeMap<u64, f64>,
 }

@@ -8,19 +8,25 @@
 //! 3. Suganthan et al., *Problem definitions and evaluation criteria for the CEC 2005 special session on
 //!    real-parameter optimization* (the single-objective functions and that their optima are shifted).
 
+mod device;
 mod dtlz;
+mod lanes;
 mod single;
 mod zdt;
 
+pub use device::GpuTestEvaluator;
+pub use lanes::SimdTestEvaluator;
+
 use crate::evaluate::point::{CallCost, PointEvaluator};
 use crate::evaluate::{Objective, Problem, Variable};
+use crate::scalar::Real;
 
 /// A problem with a known answer, with variables and objectives without units.
 #[derive(Clone, Debug)]
 pub struct TestProblem {
     name: &'static str,
     problem: Problem,
-    function: fn(&[f64], &mut [f64]),
+    function: Function,
     /// Taken off a candidate before it is evaluated: where the optimum lies, or nothing.
     shift: Vec<f64>,
     front: fn(usize) -> Vec<Vec<f64>>,
@@ -42,6 +48,54 @@ pub const NAMES: [&str; 12] = [
     "griewank",
 ];
 
+/// The functions, in the order of [`NAMES`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Function {
+    Zdt1,
+    Zdt2,
+    Zdt3,
+    Zdt4,
+    Zdt6,
+    Dtlz1,
+    Dtlz2,
+    Sphere,
+    Rosenbrock,
+    Rastrigin,
+    Ackley,
+    Griewank,
+}
+
+impl Function {
+    /// Writes the objectives of one candidate, or of one in each lane.
+    #[inline(always)]
+    fn evaluate<R: Real>(self, x: &[R], f: &mut [R]) {
+        match self {
+            Self::Zdt1 => zdt::zdt1(x, f),
+            Self::Zdt2 => zdt::zdt2(x, f),
+            Self::Zdt3 => zdt::zdt3(x, f),
+            Self::Zdt4 => zdt::zdt4(x, f),
+            Self::Zdt6 => zdt::zdt6(x, f),
+            Self::Dtlz1 => dtlz::dtlz1(x, f),
+            Self::Dtlz2 => dtlz::dtlz2(x, f),
+            Self::Sphere => single::sphere(x, f),
+            Self::Rosenbrock => single::rosenbrock(x, f),
+            Self::Rastrigin => single::rastrigin(x, f),
+            Self::Ackley => single::ackley(x, f),
+            Self::Griewank => single::griewank(x, f),
+        }
+    }
+}
+
+/// The sum over a row, from the first to the last.
+#[inline(always)]
+fn sum<R: Real>(x: &[R], term: impl Fn(R) -> R) -> R {
+    let mut sum = R::lit(0.0);
+    for x in x {
+        sum = sum + term(*x);
+    }
+    sum
+}
+
 impl TestProblem {
     /// The problem of that name, one of [`NAMES`], in the size of the references: 30 variables (10 for ZDT4 and
     /// ZDT6), 7 for DTLZ1 and 12 for DTLZ2 with three objectives; 30 for the single-objective ones.
@@ -49,6 +103,25 @@ impl TestProblem {
         zdt::by_name(name)
             .or_else(|| dtlz::by_name(name))
             .or_else(|| single::by_name(name, 30))
+    }
+
+    /// The problem of that name in so many variables, two or three at least. Where the front or the optimum lies does
+    /// not depend on it.
+    pub fn sized(name: &str, dimensions: usize) -> Option<Self> {
+        let mut problem = Self::by_name(name)?;
+        if problem.problem.objectives.len() == 1 {
+            return Self::single(name, dimensions);
+        }
+        let least = problem.problem.objectives.len();
+        let last = problem.problem.variables.last()?.clone();
+        let named = |i: usize| Variable {
+            name: format!("x{}", i + 1),
+            ..last.clone()
+        };
+        let count = problem.problem.variables.len();
+        problem.problem.variables.truncate(dimensions.max(least));
+        problem.problem.variables.extend((count..dimensions).map(named));
+        Some(problem)
     }
 
     /// The single-objective problem of that name in `dimensions` variables.
@@ -60,7 +133,7 @@ impl TestProblem {
         name: &'static str,
         bounds: impl Iterator<Item = (f64, f64)>,
         objectives: usize,
-        function: fn(&[f64], &mut [f64]),
+        function: Function,
         front: fn(usize) -> Vec<Vec<f64>>,
     ) -> Self {
         let variables = bounds
@@ -114,17 +187,26 @@ impl TestProblem {
     /// Writes the objectives of `candidate`.
     pub fn evaluate(&self, candidate: &[f64], objectives: &mut [f64]) {
         if self.shift.is_empty() {
-            return (self.function)(candidate, objectives);
+            return self.function.evaluate(candidate, objectives);
         }
         let moved: Vec<f64> = candidate.iter().zip(&self.shift).map(|(x, s)| x - s).collect();
-        (self.function)(&moved, objectives);
+        self.function.evaluate(&moved, objectives);
     }
 
     /// An evaluator on one thread.
     pub fn evaluator(&self) -> PointEvaluator<impl Fn(&[f64], &mut [f64]) + Sync> {
+        self.evaluator_on(CallCost::Cheap)
+    }
+
+    /// An evaluator on all threads, for populations that are worth it.
+    pub fn threaded_evaluator(&self) -> PointEvaluator<impl Fn(&[f64], &mut [f64]) + Sync> {
+        self.evaluator_on(CallCost::Dear)
+    }
+
+    fn evaluator_on(&self, cost: CallCost) -> PointEvaluator<impl Fn(&[f64], &mut [f64]) + Sync> {
         let problem = self.clone();
         let function = move |x: &[f64], f: &mut [f64]| problem.evaluate(x, f);
-        PointEvaluator::new(self.problem.clone(), CallCost::Cheap, function)
+        PointEvaluator::new(self.problem.clone(), cost, function)
     }
 }
 

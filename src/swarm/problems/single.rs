@@ -1,17 +1,17 @@
 //! Single-objective classics with shifted optima \[3\].
 
-use super::TestProblem;
+use super::{Function, TestProblem, sum};
 use crate::random::Random;
-use std::f64::consts::{E, PI};
+use crate::scalar::Real;
+use std::f64::consts::E;
 
 pub(super) fn by_name(name: &str, dimensions: usize) -> Option<TestProblem> {
-    type Function = fn(&[f64], &mut [f64]);
     let (name, bound, function): (_, f64, Function) = match name {
-        "sphere" => ("sphere", 100.0, sphere),
-        "rosenbrock" => ("rosenbrock", 30.0, rosenbrock),
-        "rastrigin" => ("rastrigin", 5.12, rastrigin),
-        "ackley" => ("ackley", 32.0, ackley),
-        "griewank" => ("griewank", 600.0, griewank),
+        "sphere" => ("sphere", 100.0, Function::Sphere),
+        "rosenbrock" => ("rosenbrock", 30.0, Function::Rosenbrock),
+        "rastrigin" => ("rastrigin", 5.12, Function::Rastrigin),
+        "ackley" => ("ackley", 32.0, Function::Ackley),
+        "griewank" => ("griewank", 600.0, Function::Griewank),
         _ => return None,
     };
     let bounds = std::iter::repeat_n((-bound, bound), dimensions);
@@ -26,35 +26,43 @@ pub(super) fn by_name(name: &str, dimensions: usize) -> Option<TestProblem> {
 
 const SHIFT_SEED: u64 = 2005;
 
-fn sphere(x: &[f64], f: &mut [f64]) {
-    f[0] = x.iter().map(|x| x * x).sum();
+#[inline(always)]
+pub(super) fn sphere<R: Real>(x: &[R], f: &mut [R]) {
+    f[0] = sum(x, |x| x * x);
 }
 
 /// With its optimum moved from one to nought.
-fn rosenbrock(x: &[f64], f: &mut [f64]) {
-    let step = |w: &[f64]| {
-        let (a, b) = (w[0] + 1.0, w[1] + 1.0);
-        100.0 * (b - a * a).powi(2) + (1.0 - a).powi(2)
-    };
-    f[0] = x.windows(2).map(step).sum();
+#[inline(always)]
+pub(super) fn rosenbrock<R: Real>(x: &[R], f: &mut [R]) {
+    let (mut bends, mut squares) = (R::lit(0.0), R::lit(0.0));
+    for pair in x.windows(2) {
+        let bend = pair[1] - (pair[0] * pair[0] + (pair[0] + pair[0]));
+        bends = bends + bend * bend;
+        squares = squares + pair[0] * pair[0];
+    }
+    f[0] = R::lit(100.0) * bends + squares;
 }
 
-fn rastrigin(x: &[f64], f: &mut [f64]) {
-    f[0] = x.iter().map(|x| x * x + 10.0 - 10.0 * (2.0 * PI * x).cos()).sum();
+#[inline(always)]
+pub(super) fn rastrigin<R: Real>(x: &[R], f: &mut [R]) {
+    let cosines = sum(x, |x| (R::lit(2.0) * x).cos_pi());
+    f[0] = sum(x, |x| x * x) + R::lit(10.0) * (R::lit(x.len() as f64) - cosines);
 }
 
-fn ackley(x: &[f64], f: &mut [f64]) {
-    let n = x.len() as f64;
-    let root = (x.iter().map(|x| x * x).sum::<f64>() / n).sqrt();
-    let waves = x.iter().map(|x| (2.0 * PI * x).cos()).sum::<f64>() / n;
-    f[0] = -20.0 * (-0.2 * root).exp() - waves.exp() + 20.0 + E;
+#[inline(always)]
+pub(super) fn ackley<R: Real>(x: &[R], f: &mut [R]) {
+    let n = R::lit(x.len() as f64);
+    let root = (sum(x, |x| x * x) / n).sqrt();
+    let waves = sum(x, |x| (R::lit(2.0) * x).cos_pi()) / n;
+    f[0] = R::lit(-20.0) * (R::lit(-0.2) * root).exp() - waves.exp() + R::lit(20.0 + E);
 }
 
-fn griewank(x: &[f64], f: &mut [f64]) {
-    let square = x.iter().map(|x| x * x).sum::<f64>() / 4000.0;
-    let waves: f64 = (1u32..)
-        .zip(x)
-        .map(|(i, x)| (x / f64::from(i).sqrt()).cos())
-        .product();
-    f[0] = square - waves + 1.0;
+#[inline(always)]
+pub(super) fn griewank<R: Real>(x: &[R], f: &mut [R]) {
+    let square = sum(x, |x| x * x) / R::lit(4000.0);
+    let mut waves = R::lit(1.0);
+    for (i, x) in x.iter().enumerate() {
+        waves = waves * (*x / R::lit((i + 1) as f64).sqrt()).cos();
+    }
+    f[0] = square - waves + R::lit(1.0);
 }

@@ -1,21 +1,22 @@
 //! The two-objective family ZDT \[1\] without its fifth, which is of bits.
 
-use super::{TestProblem, even};
+use super::{Function, TestProblem, even, sum};
+use crate::scalar::Real;
 use std::f64::consts::PI;
 
 pub(super) fn by_name(name: &str) -> Option<TestProblem> {
     let unit = |count: usize| std::iter::repeat_n((0.0, 1.0), count);
     Some(match name {
-        "zdt1" => TestProblem::new("zdt1", unit(30), 2, zdt1, convex),
-        "zdt2" => TestProblem::new("zdt2", unit(30), 2, zdt2, |n| {
+        "zdt1" => TestProblem::new("zdt1", unit(30), 2, Function::Zdt1, convex),
+        "zdt2" => TestProblem::new("zdt2", unit(30), 2, Function::Zdt2, |n| {
             even(n).map(|x| vec![x, 1.0 - x * x]).collect()
         }),
-        "zdt3" => TestProblem::new("zdt3", unit(30), 2, zdt3, pieces),
+        "zdt3" => TestProblem::new("zdt3", unit(30), 2, Function::Zdt3, pieces),
         "zdt4" => {
             let bounds = unit(1).chain(std::iter::repeat_n((-5.0, 5.0), 9));
-            TestProblem::new("zdt4", bounds, 2, zdt4, convex)
+            TestProblem::new("zdt4", bounds, 2, Function::Zdt4, convex)
         }
-        "zdt6" => TestProblem::new("zdt6", unit(10), 2, zdt6, |n| {
+        "zdt6" => TestProblem::new("zdt6", unit(10), 2, Function::Zdt6, |n| {
             even(n)
                 .map(|s| ZDT6_LEAST + (1.0 - ZDT6_LEAST) * s)
                 .map(|x| vec![x, 1.0 - x * x])
@@ -53,37 +54,56 @@ fn pieces(count: usize) -> Vec<Vec<f64>> {
     front.into_iter().map(|i| points[i].clone()).collect()
 }
 
-fn mean(x: &[f64]) -> f64 {
-    x.iter().sum::<f64>() / x.len() as f64
+#[inline(always)]
+fn mean<R: Real>(x: &[R]) -> R {
+    sum(x, |x| x) / R::lit(x.len() as f64)
 }
 
-fn zdt1(x: &[f64], f: &mut [f64]) {
-    let g = 1.0 + 9.0 * mean(&x[1..]);
+/// What the distance variables of most of the family add up to.
+#[inline(always)]
+fn distance<R: Real>(x: &[R]) -> R {
+    R::lit(1.0) + R::lit(9.0) * mean(&x[1..])
+}
+
+#[inline(always)]
+pub(super) fn zdt1<R: Real>(x: &[R], f: &mut [R]) {
+    let g = distance(x);
     f[0] = x[0];
-    f[1] = g * (1.0 - (x[0] / g).sqrt());
+    f[1] = g * (R::lit(1.0) - (x[0] / g).sqrt());
 }
 
-fn zdt2(x: &[f64], f: &mut [f64]) {
-    let g = 1.0 + 9.0 * mean(&x[1..]);
+#[inline(always)]
+pub(super) fn zdt2<R: Real>(x: &[R], f: &mut [R]) {
+    let g = distance(x);
+    let share = x[0] / g;
     f[0] = x[0];
-    f[1] = g * (1.0 - (x[0] / g).powi(2));
+    f[1] = g * (R::lit(1.0) - share * share);
 }
 
-fn zdt3(x: &[f64], f: &mut [f64]) {
-    let g = 1.0 + 9.0 * mean(&x[1..]);
+#[inline(always)]
+pub(super) fn zdt3<R: Real>(x: &[R], f: &mut [R]) {
+    let g = distance(x);
+    let share = x[0] / g;
     f[0] = x[0];
-    f[1] = g * (1.0 - (x[0] / g).sqrt() - x[0] / g * (10.0 * PI * x[0]).sin());
+    f[1] = g * (R::lit(1.0) - share.sqrt() - share * (R::lit(10.0) * x[0]).sin_pi());
 }
 
-fn zdt4(x: &[f64], f: &mut [f64]) {
-    let waves = |x: &f64| x * x - 10.0 * (4.0 * PI * x).cos();
-    let g = 1.0 + 10.0 * (x.len() - 1) as f64 + x[1..].iter().map(waves).sum::<f64>();
+#[inline(always)]
+pub(super) fn zdt4<R: Real>(x: &[R], f: &mut [R]) {
+    let squares = sum(&x[1..], |x| x * x);
+    let cosines = sum(&x[1..], |x| (R::lit(4.0) * x).cos_pi());
+    let count = R::lit((x.len() - 1) as f64);
+    let g = R::lit(1.0) + (squares + R::lit(10.0) * (count - cosines));
     f[0] = x[0];
-    f[1] = g * (1.0 - (x[0] / g).sqrt());
+    f[1] = g * (R::lit(1.0) - (x[0] / g).sqrt());
 }
 
-fn zdt6(x: &[f64], f: &mut [f64]) {
-    let g = 1.0 + 9.0 * mean(&x[1..]).powf(0.25);
-    f[0] = 1.0 - (-4.0 * x[0]).exp() * (6.0 * PI * x[0]).sin().powi(6);
-    f[1] = g * (1.0 - (f[0] / g).powi(2));
+#[inline(always)]
+pub(super) fn zdt6<R: Real>(x: &[R], f: &mut [R]) {
+    let g = R::lit(1.0) + R::lit(9.0) * mean(&x[1..]).sqrt().sqrt();
+    let s = (R::lit(6.0) * x[0]).sin_pi();
+    let s2 = s * s;
+    f[0] = R::lit(1.0) - (R::lit(-4.0) * x[0]).exp() * (s2 * s2 * s2);
+    let share = f[0] / g;
+    f[1] = g * (R::lit(1.0) - share * share);
 }

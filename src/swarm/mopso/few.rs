@@ -1,30 +1,30 @@
-//! Multi-objective particle swarm with an archive of leaders.
+//! The small swarm: double precision, one particle after the other.
 
-use super::archive::{Archive, dominates};
-use super::motion::{Particles, Purpose, polynomial};
-use super::settings::{Leaders, MopsoSettings, Mutation};
-use super::{Front, Optimiser};
 use crate::error::Result;
 use crate::evaluate::{Evaluation, FAILED_COST, Problem};
 use crate::random::Random;
+use crate::swarm::archive::{Archive, dominates};
+use crate::swarm::motion::{Particles, Purpose, polynomial};
+use crate::swarm::settings::{Leaders, MopsoSettings, Mutation};
+use crate::swarm::{Front, Optimiser};
+use serde::{Deserialize, Serialize};
 
-/// A swarm that follows an archive of non-dominated solutions (references 4 and 5 of [`super`]).
-#[derive(Clone, Debug)]
-pub struct Mopso {
+/// Particles in rows, and their archive.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub(super) struct Few {
     settings: MopsoSettings,
     random: Random,
     particles: Particles,
     objectives: usize,
     best_position: Vec<f64>,
     best_objectives: Vec<Vec<f64>>,
+    best_violation: Vec<f64>,
     archive: Archive,
     iteration: usize,
     evaluations: u64,
 }
 
-impl Mopso {
-    /// A swarm over the variables of `problem`.
-    ///
+impl Few {
     /// # Errors
     /// [`crate::Error::Input`] naming the setting that is out of its range.
     pub fn new(problem: &Problem, settings: MopsoSettings) -> Result<Self> {
@@ -34,6 +34,7 @@ impl Mopso {
         Ok(Self {
             best_position: particles.position.clone(),
             best_objectives: vec![vec![f64::INFINITY; problem.objectives.len()]; settings.motion.population],
+            best_violation: vec![f64::INFINITY; settings.motion.population],
             objectives: problem.objectives.len(),
             archive: Archive::new(settings.archive, settings.truncation),
             random,
@@ -44,7 +45,6 @@ impl Mopso {
         })
     }
 
-    /// Puts the first particles at these candidates (in the variables' units), before the first population is asked for.
     pub fn start_from(&mut self, candidates: &[Vec<f64>]) {
         for (particle, candidate) in candidates.iter().enumerate().take(self.particles.count) {
             let row = self.particles.row(particle);
@@ -54,18 +54,21 @@ impl Mopso {
         }
     }
 
-    /// The archive; its positions are in the unit cube, see [`Mopso::archive_candidates`].
     pub fn archive(&self) -> &Archive {
         &self.archive
     }
 
-    /// The archive's positions in the variables' units, one row per member.
-    pub fn archive_candidates(&self) -> Vec<Vec<f64>> {
-        self.archive
-            .positions
-            .iter()
-            .map(|p| self.particles.space.scaled(p, 1))
-            .collect()
+    /// They join the archive.
+    pub fn welcome(&mut self, migrants: &Front, violation: f64) {
+        for (candidate, row) in migrants.candidates.iter().zip(&migrants.objectives) {
+            let position = self.particles.space.position(candidate);
+            self.archive.insert_violating(&position, row, violation);
+        }
+    }
+
+    pub fn bytes_per_particle(&self) -> usize {
+        let row = size_of::<Vec<f64>>() + self.objectives * size_of::<f64>();
+        3 * self.particles.dimensions() * size_of::<f64>() + row
     }
 
     fn leader(&self, worth: &[f64], particle: usize) -> usize {
@@ -180,7 +183,7 @@ const SCALE: f64 = 0.5;
 /// not, and spreads DTLZ2's front better.
 const CROSSOVER: f64 = 0.3;
 
-impl Optimiser for Mopso {
+impl Optimiser for Few {
     fn ask(&mut self) -> Vec<f64> {
         self.particles.candidates()
     }
@@ -197,10 +200,14 @@ impl Optimiser for Mopso {
             if !sound {
                 continue;
             }
-            self.archive.insert(position, row);
+            let violation = evaluation.violation(particle);
+            self.archive.insert_violating(position, row, violation);
             let heads = self.coin(Purpose::Coin, particle) < 0.5;
             let best = &mut self.best_objectives[particle];
-            if dominates(row, best) || (!dominates(best, row) && heads) {
+            let least = self.best_violation[particle];
+            let open = violation == least && !dominates(best, row) && heads;
+            if violation < least || (violation == least && dominates(row, best)) || open {
+                self.best_violation[particle] = violation;
                 best.copy_from_slice(row);
                 self.best_position[range].copy_from_slice(position);
             }
@@ -223,20 +230,12 @@ impl Optimiser for Mopso {
     }
 
     fn front(&self) -> Front {
-        Front {
-            candidates: self.archive_candidates(),
-            objectives: self.archive.objectives.clone(),
-        }
+        self.archive.front(&self.particles.space)
     }
 
     fn best(&self) -> Vec<f64> {
-        let least = |k: usize| {
-            self.archive
-                .objectives
-                .iter()
-                .map(|m| m[k])
-                .fold(FAILED_COST, f64::min)
-        };
-        (0..self.objectives).map(least).collect()
+        (0..self.objectives)
+            .map(|k| self.archive.least(k).min(FAILED_COST))
+            .collect()
     }
 }

@@ -1,0 +1,322 @@
+// Twin of `src/line/energy/kernel.rs`: a lap on a line's lengths and curvatures with engine, motor-generators and store.
+//
+// Follows `line.wgsl`, whose course, limits and variables it reads; the strategy's figures are the variables from row
+// STRATEGY on. The constants STRATEGY, ADDITIONAL, COUNTS_CHARGE, FLOWS_AT, BOOSTS_AT and ZONES_AT are generated: where in `energy` the
+// flows, the boosts and the zones begin, after the forces.
+
+// Twin of `EnergyAccount` in `src/evaluate/hybrid/gpu.rs`.
+struct EnergyAccount {
+    mass: f32,
+    deploy_cost: f32,
+    harvest_gain: f32,
+    force_per_deployed: f32,
+    force_per_harvested: f32,
+    harvest_most: f32,
+    exhaust_gain: f32,
+    exhaust_cost: f32,
+    exhaust_from: f32,
+    exhaust_to_ax: f32,
+    rows_per_speed_squared: f32,
+    // The section that a lap is run in from.
+    run_in: u32,
+}
+
+@group(0) @binding(9) var<uniform> account: EnergyAccount;
+// Rows of engine, motor, generator, drag and of their rises; of flows at four loads and of their rises; of the boost and its
+// rise; of each section's zone, position and one over its share.
+@group(0) @binding(10) var<storage, read> energy: array<vec4<f32>>;
+
+struct EnergyState {
+    speed_squared: f32,
+    change: f32,
+    deployed: f32,
+    harvested_k: f32,
+}
+
+struct Step {
+    end: f32,
+    motor: f32,
+}
+
+struct SegmentEnergy {
+    time: f32,
+    fuel: f32,
+    deployed: f32,
+    harvested_k: f32,
+    harvested_h: f32,
+}
+
+fn strategy(figure: u32, candidate: u32) -> f32 {
+    return variable(STRATEGY + figure, candidate);
+}
+
+fn zone_share(section: u32, candidate: u32) -> f32 {
+    let zone = energy[ZONES_AT + section];
+    let into = (strategy(5u + u32(zone.x), candidate) - zone.y) * zone.z;
+    return min(max(into, 0.0), 1.0);
+}
+
+fn gates_open(curvature: f32, speed_squared: f32, candidate: u32) -> bool {
+    return !(strategy(0u, candidate) < curvature) && !(strategy(1u, candidate) < speed_squared);
+}
+
+fn store_left(state: EnergyState, candidate: u32) -> f32 {
+    let of_charge = state.change - strategy(3u, candidate);
+    let of_budget = strategy(4u, candidate) - state.deployed;
+    return max(min(of_charge, of_budget), 0.0);
+}
+
+fn additional(section: u32, start: f32, length: f32, here: f32, there: f32, most: f32, left: f32, candidate: u32) -> Step {
+    let first = limits_at(start, here);
+    let engine = min(first.x, first.y);
+    let ahead = max(start + length * (engine - first.z), 0.0);
+    let held = min(max(ahead * account.rows_per_speed_squared, 0.0), f32(LIMIT_ROWS));
+    let row = min(u32(held), LIMIT_ROWS - 1u);
+    let figures = energy[BOOSTS_AT + row];
+    let greatest = figures.x + (held - f32(row)) * figures.y;
+    let may = gates_open(here, start, candidate) && strategy(2u, candidate) < engine - first.z;
+    let wanted = select(0.0, greatest * zone_share(section, candidate), may);
+    let inverse = 1.0 / length;
+    let boost = min(wanted, left * account.force_per_deployed * inverse);
+
+    let both = min(first.x, first.y + boost);
+    let middle = max(start + length * (both - first.z), 0.0);
+    let later = limits_at(middle, 0.5 * (here + there));
+    let later_both = min(later.x, later.y + boost);
+    let motor = 0.5 * ((both - engine) + (later_both - min(later.x, later.y)));
+    let reached = max(start + length * ((both - first.z) + (later_both - later.z)), 0.0);
+    let end = min(reached, most);
+    // Where less is needed than both could give, the motor gives way first.
+    let spare = 0.5 * (reached - end) * inverse;
+    return Step(end, max(motor - spare, 0.0));
+}
+
+fn engine_only(start: f32, length: f32, here: f32, there: f32, most: f32) -> f32 {
+    let at_start = limits_at(start, here);
+    let first = min(at_start.x, at_start.y) - at_start.z;
+    let middle = max(start + length * first, 0.0);
+    let later = limits_at(middle, 0.5 * (here + there));
+    let second = min(later.x, later.y) - later.z;
+    return min(max(start + length * (first + second), 0.0), most);
+}
+
+// One segment of the lap that only finds the speed at the start line.
+fn provisional(
+    state: ptr<function, EnergyState>,
+    section: u32,
+    length: f32,
+    here: f32,
+    there: f32,
+    most: f32,
+    candidate: u32,
+) {
+    let start = (*state).speed_squared;
+    let step = additional(section, start, length, here, there, most, store_left(*state, candidate), candidate);
+    let joules = account.mass * length;
+    let deployed = joules * step.motor * account.deploy_cost;
+    (*state).speed_squared = step.end;
+    (*state).deployed = (*state).deployed + deployed;
+    if COUNTS_CHARGE {
+        let mean = 0.5 * (start + step.end);
+        let held = min(max(mean * account.rows_per_speed_squared, 0.0), f32(LIMIT_ROWS));
+        let row = min(u32(held), LIMIT_ROWS - 1u);
+        let forces = energy[2u * row] + (held - f32(row)) * energy[2u * row + 1u];
+        let inverse = 1.0 / length;
+        let force = 0.5 * (step.end - start) * inverse + forces.w;
+        let unharvested = account.harvest_most - (*state).harvested_k;
+        let room = max(unharvested * account.force_per_harvested * inverse, 0.0);
+        let generator = min(min(max(-force, 0.0), forces.z), room);
+        let harvested_k = joules * generator * account.harvest_gain;
+        (*state).change = (*state).change + (harvested_k - deployed);
+        (*state).harvested_k = (*state).harvested_k + harvested_k;
+    }
+}
+
+fn segment_energy(
+    state: ptr<function, EnergyState>,
+    section: u32,
+    length: f32,
+    here: f32,
+    there: f32,
+    most: f32,
+    candidate: u32,
+) -> SegmentEnergy {
+    let start = (*state).speed_squared;
+    let left = store_left(*state, candidate);
+    var step: Step;
+    if ADDITIONAL {
+        step = additional(section, start, length, here, there, most, left, candidate);
+    } else {
+        step = Step(engine_only(start, length, here, there, most), 0.0);
+    }
+    let end = step.end;
+    let mean = 0.5 * (start + end);
+    let held = min(max(mean * account.rows_per_speed_squared, 0.0), f32(LIMIT_ROWS));
+    let row = min(u32(held), LIMIT_ROWS - 1u);
+    let beyond = held - f32(row);
+    let forces = energy[2u * row] + beyond * energy[2u * row + 1u];
+    let inverse = 1.0 / length;
+    let ax = 0.5 * (end - start) * inverse;
+    // What the tyres do, forwards or backwards.
+    let force = ax + forces.w;
+    let demand = max(force, 0.0);
+    let shed = max(-force, 0.0);
+    let joules = account.mass * length;
+    var motor: f32;
+    if ADDITIONAL {
+        motor = min(step.motor, demand);
+    } else {
+        let may = gates_open(here, start, candidate) && strategy(2u, candidate) < ax;
+        let share = zone_share(section, candidate);
+        let reach = left * account.force_per_deployed * inverse;
+        motor = min(min(select(0.0, forces.y * share, may), demand), reach);
+    }
+    let engine = demand - motor;
+    let unharvested = account.harvest_most - (*state).harvested_k;
+    let room = unharvested * account.force_per_harvested * inverse;
+    let generator = min(min(shed, forces.z), max(room, 0.0));
+    let deployed = joules * motor * account.deploy_cost;
+    let harvested_k = joules * generator * account.harvest_gain;
+
+    let load = min(engine / max(forces.x, 1e-3), 1.0);
+    let flows = energy[FLOWS_AT + 2u * row] + beyond * energy[FLOWS_AT + 2u * row + 1u];
+    let thirds = 3.0 * load;
+    let flow = flows.x
+        + (flows.y - flows.x) * min(thirds, 1.0)
+        + (flows.z - flows.y) * min(max(thirds - 1.0, 0.0), 1.0)
+        + (flows.w - flows.z) * max(thirds - 2.0, 0.0);
+    let time = 2.0 * length / (sqrt(start) + sqrt(end));
+    let burnt = flow * time;
+    let spins = !(mean < account.exhaust_from) && 0.0 < ax && !(account.exhaust_to_ax < ax);
+    let harvested_h = select(0.0, account.exhaust_gain * burnt, spins);
+
+    (*state).speed_squared = end;
+    (*state).change = (*state).change + ((harvested_k + harvested_h) - deployed);
+    (*state).deployed = (*state).deployed + deployed;
+    (*state).harvested_k = (*state).harvested_k + harvested_k;
+    return SegmentEnergy(time, burnt + account.exhaust_cost * harvested_h, deployed, harvested_k, harvested_h);
+}
+
+// Leaves in `speeds_squared` the greatest from which all that follows can be braked for.
+fn ceilings(candidate: u32) {
+    let n = stretch.sections;
+    var next = select(n - 1u, stretch.start, CLOSED);
+    var curvature = course[place_of(next, candidate)].y;
+    var speed_squared = corner(curvature);
+    speeds_squared[place_of(next, candidate)] = speed_squared;
+    // The first time round a section is only held to its corner speed; a closed lap goes on until it meets itself.
+    let steps = select(n - 1u, 2u * n, CLOSED);
+    for (var i = 0u; i < steps; i++) {
+        let before = select(n - 1u, next - 1u, next > 0u);
+        let there = course[place_of(before, candidate)];
+        let reached = braked(speed_squared, there.x, curvature, there.y);
+        let again = i + 1u >= n;
+        var most: f32;
+        if again {
+            most = speeds_squared[place_of(before, candidate)];
+        } else {
+            most = corner(there.y);
+        }
+        let slower = reached < most;
+        if again && !slower {
+            break;
+        }
+        speed_squared = select(most, reached, slower);
+        speeds_squared[place_of(before, candidate)] = speed_squared;
+        curvature = there.y;
+        next = before;
+    }
+    if !CLOSED {
+        let first = place_of(0u, candidate);
+        speeds_squared[first] = min(speeds_squared[first], stretch.entry);
+    }
+}
+
+fn energy_lap(candidate: u32) {
+    ceilings(candidate);
+    let n = stretch.sections;
+    var speed_squared = speeds_squared[place_of(0u, candidate)];
+    if CLOSED {
+        // From a slow section late in the lap to the start line, as if the store held enough.
+        var from_late = speeds_squared[place_of(account.run_in, candidate)];
+        var bend = course[place_of(account.run_in, candidate)];
+        let enough = strategy(4u, candidate);
+        for (var here = account.run_in; here < n; here++) {
+            let after = select(0u, here + 1u, here + 1u < n);
+            let there = course[place_of(after, candidate)];
+            let most = speeds_squared[place_of(after, candidate)];
+            if ADDITIONAL {
+                from_late = additional(here, from_late, bend.x, bend.y, there.y, most, enough, candidate).end;
+            } else {
+                from_late = engine_only(from_late, bend.x, bend.y, there.y, most);
+            }
+            bend = there;
+        }
+        speed_squared = from_late;
+        if ADDITIONAL {
+            var state = EnergyState(speed_squared, 0.0, 0.0, 0.0);
+            var bend = course[place_of(0u, candidate)];
+            for (var here = 0u; here < n; here++) {
+                let after = select(0u, here + 1u, here + 1u < n);
+                let there = course[place_of(after, candidate)];
+                let most = speeds_squared[place_of(after, candidate)];
+                provisional(&state, here, bend.x, bend.y, there.y, most, candidate);
+                bend = there;
+            }
+            speed_squared = state.speed_squared;
+        }
+    }
+
+    var state = EnergyState(speed_squared, 0.0, 0.0, 0.0);
+    var greatest = 0.0;
+    var least = 0.0;
+    var total = SegmentEnergy(0.0, 0.0, 0.0, 0.0, 0.0);
+    var total_motor = 0.0;
+    var block = SegmentEnergy(0.0, 0.0, 0.0, 0.0, 0.0);
+    var block_motor = 0.0;
+    let segments = select(n - 1u, n, CLOSED);
+    var bend = course[place_of(0u, candidate)];
+    for (var here = 0u; here < segments; here++) {
+        let after = select(0u, here + 1u, here + 1u < n);
+        let there = course[place_of(after, candidate)];
+        let most = speeds_squared[place_of(after, candidate)];
+        let segment = segment_energy(&state, here, bend.x, bend.y, there.y, most, candidate);
+        bend = there;
+        block.time = block.time + segment.time;
+        block.fuel = block.fuel + segment.fuel;
+        block.deployed = block.deployed + segment.deployed;
+        block.harvested_k = block.harvested_k + segment.harvested_k;
+        block.harvested_h = block.harvested_h + segment.harvested_h;
+        block_motor = block_motor + select(0.0, segment.time, 0.0 < segment.deployed);
+        greatest = max(greatest, state.change);
+        least = min(least, state.change);
+        if (here + 1u) % BLOCK == 0u || here + 1u == segments {
+            total.time = total.time + block.time;
+            total.fuel = total.fuel + block.fuel;
+            total.deployed = total.deployed + block.deployed;
+            total.harvested_k = total.harvested_k + block.harvested_k;
+            total.harvested_h = total.harvested_h + block.harvested_h;
+            total_motor = total_motor + block_motor;
+            block = SegmentEnergy(0.0, 0.0, 0.0, 0.0, 0.0);
+            block_motor = 0.0;
+        }
+    }
+    results[candidate] = total.time;
+    results[stretch.stride + candidate] = total.fuel;
+    results[2u * stretch.stride + candidate] = total.deployed;
+    results[3u * stretch.stride + candidate] = total.harvested_k;
+    results[4u * stretch.stride + candidate] = total.harvested_h;
+    results[5u * stretch.stride + candidate] = state.change;
+    results[6u * stretch.stride + candidate] = greatest - least;
+    results[7u * stretch.stride + candidate] = total_motor;
+}
+
+@compute @workgroup_size(WORKGROUP)
+fn energy_line(@builtin(global_invocation_id) id: vec3<u32>) {
+    let candidate = stretch.first + id.x;
+    if candidate >= stretch.candidates {
+        return;
+    }
+    _ = shape(candidate);
+    energy_lap(candidate);
+}

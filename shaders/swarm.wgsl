@@ -1,0 +1,261 @@
+// Twin of `src/swarm/mopso/flock.rs`: how the particles of a large swarm learn and move. One lane to a particle, state
+// in blocks: a coordinate of all particles of a block lies in a row, and the coordinates of a block follow one another.
+// With `elementary.wgsl` and `random.wgsl`.
+
+// What is the same for all particles of a generation.
+struct Generation {
+    key: vec2<u32>,
+    when: u32,
+    particles: u32,
+    dimensions: u32,
+    objectives: u32,
+    members: u32,
+    signed: u32,
+    per_dimension: u32,
+    tournament: u32,
+    mutation: u32,
+    inertia: f32,
+    cognitive: f32,
+    social: f32,
+    speed_limit: f32,
+    rebound: f32,
+    difference_share: f32,
+    mutation_share: f32,
+    mutation_power: f32,
+    mutation_root: f32,
+    log_left: f32,
+    mu: f32,
+    pulls: vec2<f32>,
+}
+
+const BLOCK: u32 = 64u;
+const UNKNOWN: f32 = 3.4028234e38;
+const FAILED_COST: f32 = 1e9;
+const SCALE: f32 = 0.5;
+const CROSSOVER: f32 = 0.3;
+
+// What random draws are for, the counter's last word.
+const START: u32 = 1u;
+const COGNITIVE: u32 = 2u;
+const SOCIAL: u32 = 3u;
+const MUTATION: u32 = 5u;
+const DIFFERENCE: u32 = 6u;
+const COIN: u32 = 7u;
+const PULLS: u32 = 8u;
+const RECOMBINE: u32 = 9u;
+
+@group(0) @binding(0) var<uniform> generation: Generation;
+// Positions of the archive's members, the one that it would miss most first; then their objectives, three to each.
+@group(0) @binding(1) var<storage, read> archive: array<f32>;
+@group(0) @binding(2) var<storage, read_write> position: array<f32>;
+@group(0) @binding(3) var<storage, read_write> velocity: array<f32>;
+@group(0) @binding(4) var<storage, read_write> best_position: array<f32>;
+@group(0) @binding(5) var<storage, read_write> best_objectives: array<f32>;
+@group(0) @binding(6) var<storage, read_write> objectives: array<f32>;
+// How many points no member dominates or equals, then those: the particle and its objectives, three to each.
+struct Found {
+    count: atomic<u32>,
+    points: array<vec4<u32>>,
+}
+@group(0) @binding(7) var<storage, read_write> found: Found;
+
+fn words(purpose: u32, who: u32, index: u32) -> vec4<u32> {
+    return philox(vec4<u32>(index, who, generation.when, purpose), generation.key);
+}
+
+// Where coordinate `k` of `width` of a particle stands.
+fn place(who: u32, width: u32, k: u32) -> u32 {
+    return (who / BLOCK * width + k) * BLOCK + who % BLOCK;
+}
+
+fn held(x: f32) -> f32 {
+    return min(max(x, 0.0), 1.0);
+}
+
+@compute @workgroup_size(BLOCK)
+fn scatter(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
+    let who = id.y * groups.x * BLOCK + id.x;
+    if who >= generation.particles { return; }
+    scatter_one(who);
+    for (var k = 0u; k < generation.dimensions; k++) {
+        let i = place(who, generation.dimensions, k);
+        best_position[i] = position[i];
+    }
+    for (var k = 0u; k < generation.objectives; k++) {
+        best_objectives[place(who, generation.objectives, k)] = UNKNOWN;
+    }
+}
+
+fn scatter_one(who: u32) {
+    var four = vec4<u32>(0u);
+    for (var k = 0u; k < generation.dimensions; k++) {
+        if k % 4u == 0u { four = words(START, who, k / 4u); }
+        let i = place(who, generation.dimensions, k);
+        position[i] = unit(four[k % 4u]);
+        velocity[i] = 0.0;
+    }
+}
+
+// Takes positions for personal bests where their objectives are better; where neither is, by a coin. Then notes the
+// particle if no member of the archive dominates or equals it.
+@compute @workgroup_size(BLOCK)
+fn learn(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
+    let who = id.y * groups.x * BLOCK + id.x;
+    if who >= generation.particles { return; }
+    let width = generation.objectives;
+    var no_worse = true;
+    var no_better = true;
+    var sound = true;
+    var at = vec3<f32>(0.0);
+    for (var k = 0u; k < width; k++) {
+        let i = place(who, width, k);
+        let value = objectives[i];
+        let best = best_objectives[i];
+        no_worse = no_worse && value <= best;
+        no_better = no_better && best <= value;
+        sound = sound && is_finite(value) && value < FAILED_COST;
+        at[k] = value;
+    }
+    let heads = words(COIN, who, 0u).x < 0x80000000u;
+    let better = no_worse && !no_better;
+    let open = no_worse == no_better;
+    if sound && (better || (open && heads)) {
+        for (var k = 0u; k < generation.dimensions; k++) {
+            let i = place(who, generation.dimensions, k);
+            best_position[i] = position[i];
+        }
+        for (var k = 0u; k < width; k++) {
+            let i = place(who, width, k);
+            best_objectives[i] = objectives[i];
+        }
+    }
+    let rows = generation.members * generation.dimensions;
+    for (var member = 0u; member < generation.members; member++) {
+        let i = rows + 3u * member;
+        sound = sound && !(archive[i] <= at.x && archive[i + 1u] <= at.y && archive[i + 2u] <= at.z);
+        if !sound { break; }
+    }
+    if sound {
+        let slot = atomicAdd(&found.count, 1u);
+        found.points[slot] = vec4<u32>(who, bitcast<vec3<u32>>(at));
+    }
+}
+
+@compute @workgroup_size(BLOCK)
+fn advance(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
+    let who = id.y * groups.x * BLOCK + id.x;
+    if who >= generation.particles { return; }
+    if generation.members == 0u {
+        // Nobody knows anything yet.
+        scatter_one(who);
+        return;
+    }
+    let d = generation.dimensions;
+    let choice = words(RECOMBINE, who, 0u);
+    var leader = below(choice.y, generation.members);
+    if generation.tournament == 1u { leader = min(leader, below(choice.z, generation.members)); }
+    if unit(choice.x) < generation.difference_share {
+        difference(who, leader);
+    } else {
+        pull(who, leader);
+    }
+    if generation.mutation == 1u {
+        if unit(choice.w) < generation.mutation_share { disturb(who); }
+    } else if generation.mutation > 1u {
+        redraw(who);
+    }
+}
+
+fn pull(who: u32, leader: u32) {
+    let d = generation.dimensions;
+    let draws = words(PULLS, who, 0u);
+    var inertia = generation.inertia;
+    var own = generation.cognitive;
+    var social = generation.social;
+    if generation.signed == 1u {
+        let c1 = generation.pulls.x + generation.pulls.y * unit(draws.x);
+        let c2 = generation.pulls.x + generation.pulls.y * unit(draws.y);
+        let sum = c1 + c2;
+        let beyond = sum - 4.0;
+        let root = sqrt(sum * max(beyond, 0.0));
+        let chi = select(1.0, 2.0 / (-2.0 - beyond - root), beyond > 0.0);
+        inertia = chi * generation.inertia;
+        own = chi * c1;
+        social = chi * c2;
+    }
+    var to_own = own * unit(draws.z);
+    var to_leader = social * unit(draws.w);
+    var first = vec4<u32>(0u);
+    var second = vec4<u32>(0u);
+    for (var k = 0u; k < d; k++) {
+        if generation.per_dimension == 1u {
+            if k % 4u == 0u {
+                first = words(COGNITIVE, who, k / 4u);
+                second = words(SOCIAL, who, k / 4u);
+            }
+            to_own = own * unit(first[k % 4u]);
+            to_leader = social * unit(second[k % 4u]);
+        }
+        let i = place(who, d, k);
+        let x = position[i];
+        let wanted = inertia * velocity[i] + to_own * (best_position[i] - x) + to_leader * (archive[leader * d + k] - x);
+        let speed = min(max(wanted, -generation.speed_limit), generation.speed_limit);
+        let moved = x + speed;
+        let inside = held(moved);
+        velocity[i] = select(speed * generation.rebound, speed, moved == inside);
+        position[i] = inside;
+    }
+}
+
+// From an archive member along the difference of two others, in some of the coordinates.
+fn difference(who: u32, leader: u32) {
+    let d = generation.dimensions;
+    let picks = words(DIFFERENCE, who, 0u);
+    let one = below(picks.x, generation.members);
+    let two = below(picks.y, generation.members);
+    let always = below(picks.z, d);
+    var four = vec4<u32>(0u);
+    for (var k = 0u; k < d; k++) {
+        if k % 4u == 0u { four = words(DIFFERENCE, who, 1u + k / 4u); }
+        let chosen = k == always || unit(four[k % 4u]) < CROSSOVER;
+        let step = SCALE * (archive[one * d + k] - archive[two * d + k]);
+        let i = place(who, d, k);
+        position[i] = held(archive[leader * d + k] + select(0.0, step, chosen));
+        velocity[i] = 0.0;
+    }
+}
+
+// Polynomial mutation of each coordinate with probability one over their number.
+fn disturb(who: u32) {
+    var four = vec4<u32>(0u);
+    for (var k = 0u; k < generation.dimensions; k++) {
+        if k % 2u == 0u { four = words(MUTATION, who, k / 2u); }
+        let pair = 2u * (k % 2u);
+        if unit(four[pair]) * f32(generation.dimensions) < 1.0 {
+            let i = place(who, generation.dimensions, k);
+            position[i] = polynomial(position[i], unit(four[pair + 1u]));
+        }
+    }
+}
+
+fn polynomial(x: f32, uniform_draw: f32) -> f32 {
+    let low = uniform_draw < 0.5;
+    let part = select(2.0 - (uniform_draw + uniform_draw), uniform_draw + uniform_draw, low);
+    let room = select(x, 1.0 - x, low);
+    let base = part + (1.0 - part) * own_power(room, generation.mutation_power);
+    let step = own_power(base, generation.mutation_root) - 1.0;
+    return held(select(x - step, x + step, low));
+}
+
+// With a probability that falls over the run, one coordinate anew within that share of the range.
+fn redraw(who: u32) {
+    let draws = words(MUTATION, who, 0u);
+    let mu = select(generation.mu, max(unit(draws.x), 1e-3), generation.mutation == 3u);
+    let probability = own_exp(Wheels(generation.log_left / mu)).x;
+    if unit(draws.y) >= probability { return; }
+    let i = place(who, generation.dimensions, below(draws.z, generation.dimensions));
+    let x = position[i];
+    let low = max(x - probability, 0.0);
+    let high = min(x + probability, 1.0);
+    position[i] = low + unit(draws.w) * (high - low);
+}

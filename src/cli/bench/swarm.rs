@@ -1,0 +1,315 @@
+//! `lapswarm bench swarm`: what a generation costs besides its evaluations, against the number of particles.
+
+use crate::cli::{backend_flag, print_json};
+use lapswarm::Result;
+use lapswarm::evaluate::gpu::{GpuContext, devices};
+use lapswarm::evaluate::simd::InstructionSet;
+use lapswarm::evaluate::{BackendChoice, Evaluator};
+use lapswarm::swarm::device::DeviceMopso;
+use lapswarm::swarm::metrics::{Scale, hypervolume};
+use lapswarm::swarm::problems::{GpuTestEvaluator, SimdTestEvaluator, TestProblem};
+use lapswarm::swarm::{MANY, Mopso, MopsoSettings, Optimiser, PsoSettings};
+use serde::Serialize;
+use std::time::Instant;
+
+/// Flags of `bench swarm`.
+#[derive(clap::Args)]
+pub struct Arguments {
+    /// Particles to measure
+    #[arg(long, value_delimiter = ',', default_value = "1000,10000,100000,1000000")]
+    populations: Vec<usize>,
+    /// Test problems; one with two and one with three objectives
+    #[arg(long, value_delimiter = ',', default_value = "zdt1,dtlz2")]
+    problems: Vec<String>,
+    /// Variables of the problems; their own number if 0
+    #[arg(long, default_value_t = 12)]
+    variables: usize,
+    /// Generations of a run
+    #[arg(long, default_value_t = 25, value_parser = clap::value_parser!(u32).range(2..=1000))]
+    generations: u32,
+    /// Runs, of which the fastest counts
+    #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=100))]
+    repeats: u32,
+    /// Only the swarm on this backend, cpu and simd being one [default: all there are]
+    #[arg(long, value_parser = backend_flag)]
+    backend: Option<BackendChoice>,
+    /// Part of the name of the GPU to use
+    #[arg(long)]
+    adapter: Option<String>,
+    /// Print one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+/// One population on one problem.
+#[derive(Serialize)]
+struct Row {
+    backend: &'static str,
+    device: String,
+    problem: &'static str,
+    objectives: usize,
+    variables: usize,
+    population: usize,
+    generation_ms: f64,
+    slowest_generation_ms: f64,
+    evaluation_ms: f64,
+    bytes_per_particle: usize,
+    hypervolume: f64,
+}
+
+/// How the time of a generation grows with the particles.
+#[derive(Serialize)]
+struct Growth {
+    backend: &'static str,
+    problem: &'static str,
+    exponent: f64,
+}
+
+#[derive(Serialize)]
+struct Table {
+    study: &'static str,
+    threads: usize,
+    rows: Vec<Row>,
+    growth: Vec<Growth>,
+}
+
+/// Reference point of the hypervolume on the true front's scale.
+const REFERENCE: f64 = 1.1;
+
+/// Measures and prints.
+pub fn run(arguments: &Arguments) -> Result<()> {
+    let mut table = Table {
+        study: "bench swarm",
+        threads: rayon::current_num_threads(),
+        rows: Vec::new(),
+        growth: Vec::new(),
+    };
+    if !arguments.json {
+        println!(
+            "milliseconds per generation of the optimiser alone, {} threads",
+            table.threads
+        );
+        println!(
+            "{:<8}{:<8}{:>11}{:>11}{:>12}{:>12}{:>12}{:>12}{:>13}",
+            "backend",
+            "problem",
+            "objectives",
+            "particles",
+            "generation",
+            "slowest",
+            "evaluation",
+            "bytes each",
+            "hypervolume"
+        );
+    }
+    for name in &arguments.problems {
+        let problem = TestProblem::by_name(name)
+            .filter(|p| p.problem().objectives.len() > 1)
+            .ok_or_else(|| {
+                lapswarm::Error::input(
+                    "--problems",
+                    "name",
+                    name,
+                    "a test problem of two or three objectives",
+                )
+            })?;
+        let problem = if arguments.variables > 0 {
+            TestProblem::sized(name, arguments.variables).unwrap_or(problem)
+        } else {
+            problem
+        };
+        for here in [true, false] {
+            let mut times = Vec::new();
+            let wanted = match arguments.backend {
+                None | Some(BackendChoice::Auto) => here || !devices().is_empty(),
+                Some(choice) => (choice != BackendChoice::Gpu) == here,
+            };
+            for &population in arguments.populations.iter().filter(|_| wanted) {
+                let row = measure(&problem, population, here, arguments)?;
+                times.push((population as f64, row.generation_ms));
+                if !arguments.json {
+                    print_row(&row);
+                }
+                table.rows.push(row);
+            }
+            if times.len() > 1 {
+                let growth = Growth {
+                    backend: if here { "host" } else { "gpu" },
+                    problem: problem.name(),
+                    exponent: slope(&times),
+                };
+                if !arguments.json {
+                    println!(
+                        "{:<8}{:<8} time grows as particles^{:.2}",
+                        growth.backend, growth.problem, growth.exponent
+                    );
+                }
+                table.growth.push(growth);
+            }
+        }
+    }
+    if arguments.json {
+        print_json(&table)?;
+    }
+    Ok(())
+}
+
+fn print_row(row: &Row) {
+    println!(
+        "{:<8}{:<8}{:>11}{:>11}{:>12.3}{:>12.3}{:>12.3}{:>12}{:>13.4}   {}",
+        row.backend,
+        row.problem,
+        row.objectives,
+        row.population,
+        row.generation_ms,
+        row.slowest_generation_ms,
+        row.evaluation_ms,
+        row.bytes_per_particle,
+        row.hypervolume,
+        row.device
+    );
+}
+
+/// Seconds of one run: the optimiser's own, its slowest generation's, and the evaluations'.
+#[derive(Default)]
+struct Times {
+    own: f64,
+    slowest: f64,
+    others: f64,
+}
+
+impl Times {
+    fn note(&mut self, own: f64, others: f64) {
+        self.own += own;
+        self.slowest = self.slowest.max(own);
+        self.others += others;
+    }
+}
+
+/// Seconds that `work` takes, and what it yields.
+fn timed<T>(work: impl FnOnce() -> T) -> (f64, T) {
+    let began = Instant::now();
+    let result = work();
+    (began.elapsed().as_secs_f64(), result)
+}
+
+/// The best of the repeats.
+fn measure(problem: &TestProblem, population: usize, here: bool, arguments: &Arguments) -> Result<Row> {
+    let mut best: Option<Row> = None;
+    for _ in 0..arguments.repeats {
+        let settings = MopsoSettings {
+            motion: PsoSettings {
+                population,
+                iterations: arguments.generations as usize,
+                ..MopsoSettings::default().motion
+            },
+            ..MopsoSettings::default()
+        };
+        let row = if here {
+            on_the_host(problem, settings)?
+        } else {
+            on_a_device(problem, settings, arguments)?
+        };
+        if best.as_ref().is_none_or(|b| row.generation_ms < b.generation_ms) {
+            best = Some(row);
+        }
+    }
+    best.ok_or_else(|| lapswarm::Error::Study("nothing was measured".to_owned()))
+}
+
+fn on_the_host(problem: &TestProblem, settings: MopsoSettings) -> Result<Row> {
+    let generations = settings.motion.iterations;
+    let population = settings.motion.population;
+    let mut swarm = Mopso::new(problem.problem(), settings)?;
+    let mut evaluator = SimdTestEvaluator::new(problem, InstructionSet::best());
+    let mut times = Times::default();
+    while !swarm.done() {
+        let (asking, candidates) = timed(|| swarm.ask());
+        let (others, evaluation) = timed(|| evaluator.evaluate(&candidates));
+        let evaluation = evaluation?;
+        let (telling, ()) = timed(|| swarm.tell(&evaluation));
+        times.note(asking + telling, others);
+    }
+    let (backend, device) = if population < MANY {
+        ("cpu", "f64".to_owned())
+    } else {
+        ("simd", InstructionSet::best().name().to_owned())
+    };
+    let found = swarm.front().objectives;
+    let bytes = swarm.bytes_per_particle();
+    row(
+        problem,
+        (backend, device),
+        (population, generations),
+        &times,
+        bytes,
+        &found,
+    )
+}
+
+fn on_a_device(problem: &TestProblem, settings: MopsoSettings, arguments: &Arguments) -> Result<Row> {
+    let generations = settings.motion.iterations;
+    let population = settings.motion.population;
+    let context = GpuContext::shared(arguments.adapter.as_deref())?;
+    let mut evaluator = GpuTestEvaluator::new(problem, context.clone())?;
+    // The first generation of a swarm compiles its kernels.
+    let mut first = DeviceMopso::new(problem.problem(), settings.clone(), context.clone())?;
+    first.step(&mut evaluator)?;
+    drop(first);
+    let mut swarm = DeviceMopso::new(problem.problem(), settings, context)?;
+    let mut times = Times::default();
+    for _ in 0..generations {
+        let (others, evaluated) = timed(|| swarm.evaluate(&mut evaluator));
+        evaluated?;
+        let (own, moved) = timed(|| swarm.learn_and_move());
+        moved?;
+        times.note(own, others);
+    }
+    let info = swarm.backend();
+    let found = swarm.front().objectives;
+    let bytes = swarm.bytes_per_particle();
+    row(
+        problem,
+        (info.backend, info.device),
+        (population, generations),
+        &times,
+        bytes,
+        &found,
+    )
+}
+
+fn row(
+    problem: &TestProblem,
+    (backend, device): (&'static str, String),
+    (population, generations): (usize, usize),
+    times: &Times,
+    bytes_per_particle: usize,
+    found: &[Vec<f64>],
+) -> Result<Row> {
+    let front = problem.front(2000);
+    let width = problem.problem().objectives.len();
+    let each = 1e3 / generations as f64;
+    Ok(Row {
+        backend,
+        device,
+        problem: problem.name(),
+        objectives: width,
+        variables: problem.problem().variables.len(),
+        population,
+        generation_ms: times.own * each,
+        slowest_generation_ms: times.slowest * 1e3,
+        evaluation_ms: times.others * each,
+        bytes_per_particle,
+        hypervolume: hypervolume(&Scale::of(&front).apply(found), &vec![REFERENCE; width])?,
+    })
+}
+
+/// Slope of the line through the logarithms of time against particles.
+fn slope(times: &[(f64, f64)]) -> f64 {
+    let n = times.len() as f64;
+    let logs: Vec<(f64, f64)> = times.iter().map(|(x, y)| (x.ln(), y.ln())).collect();
+    let mean = |f: fn(&(f64, f64)) -> f64| logs.iter().map(f).sum::<f64>() / n;
+    let (x, y) = (mean(|l| l.0), mean(|l| l.1));
+    let covariance: f64 = logs.iter().map(|l| (l.0 - x) * (l.1 - y)).sum();
+    covariance / logs.iter().map(|l| (l.0 - x).powi(2)).sum::<f64>()
+}

@@ -1,0 +1,172 @@
+//! `lapswarm hybrid`.
+
+use super::{Common, backend_flag, print_json, stop_flag};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use lapswarm::evaluate::BackendChoice;
+use lapswarm::evaluate::hybrid::HybridObjective;
+use lapswarm::study::hybrid::{
+    FreePart, HYBRID_OBJECTIVES, HybridStudySettings, run_study, set_up, summarise, write_results,
+};
+use lapswarm::study::run_folder;
+use lapswarm::{Error, Result};
+use std::ops::ControlFlow;
+use std::path::PathBuf;
+use std::sync::atomic::Ordering;
+
+/// Flags of `hybrid`; a flag wins over the study file.
+#[derive(clap::Args)]
+#[command(
+    after_help = "Examples:\n  lapswarm hybrid\n  lapswarm hybrid --scenarios-only --json\n  lapswarm hybrid --energy-mj 2.1 \
+                  --objectives lap_time_s,fuel_l --free both\n  lapswarm hybrid --line runs/raceline-001/line_fastest.csv\n  \
+                  lapswarm hybrid --stint-laps 10\n  lapswarm hybrid --match-lap-time-s 113.5\n\nA study file has the same \
+                  names, and scenarios of its own:\n  [scenarios.own]\n  mode = \"additional\"     # or offset: the motor takes \
+                  the engine's place\n  steer_rad = 0.03        # greatest steering at the wheels\n  speed_mps = 60          # \
+                  greatest speed\n  soc = 0.5               # the store is not led below\n  energy_mj = 3           # energy \
+                  out of the store in a lap"
+)]
+pub struct Arguments {
+    /// A study file; every flag has its twin in it
+    study: Option<PathBuf>,
+    #[command(flatten)]
+    common: Common,
+    /// The circuit: a bundled name, a shape such as stadium:500:100:12, or a file
+    #[arg(long, value_name = "NAME|FILE")]
+    track: Option<String>,
+    /// The car, with an engine map and a hybrid drive: a bundled name (gt_hybrid) or a TOML file
+    #[arg(long, value_name = "NAME|FILE")]
+    car: Option<String>,
+    /// Limits from a table (v_mps, ay_mps2, ax_grip_mps2, ax_drive_mps2, drag_mps2) instead of the car's own
+    #[arg(long, value_name = "FILE")]
+    envelope: Option<PathBuf>,
+    /// A line (CSV with columns x and y in m) instead of the fastest one
+    #[arg(long, value_name = "FILE")]
+    line: Option<PathBuf>,
+    /// Cuts across the track that the fastest line is found through
+    #[arg(long, value_name = "N")]
+    sections: Option<usize>,
+    /// Width of the car, m
+    #[arg(long, value_name = "W")]
+    car_width_m: Option<f64>,
+    /// Drive the scenarios only
+    #[arg(long)]
+    scenarios_only: bool,
+    /// Energy that may be deployed in a lap, MJ [default: what rules and store allow]
+    #[arg(long, value_name = "MJ")]
+    energy_mj: Option<f64>,
+    /// lap_time_s, fuel_l, energy_used_mj, soc_swing: more than one for a front
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = objective_flag)]
+    objectives: Option<Vec<HybridObjective>>,
+    /// What the front's swarm may change: strategy, line or both
+    #[arg(long, value_name = "PART", value_parser = free_flag)]
+    free: Option<FreePart>,
+    /// Laps of a stint that sustains its charge
+    #[arg(long, value_name = "N")]
+    stint_laps: Option<usize>,
+    /// Fuel on board at the start of the stint, kg
+    #[arg(long, value_name = "KG")]
+    stint_fuel_kg: Option<f64>,
+    /// Size motor and store so that the car laps in this time, s
+    #[arg(long, value_name = "S")]
+    match_lap_time_s: Option<f64>,
+    /// Particles of the swarms
+    #[arg(long, value_name = "N")]
+    population: Option<usize>,
+    /// Their iterations
+    #[arg(long, value_name = "N")]
+    iterations: Option<usize>,
+    /// Where to evaluate: auto, cpu, simd or gpu
+    #[arg(long, value_name = "BACKEND", value_parser = backend_flag)]
+    backend: Option<BackendChoice>,
+    /// Part of the name of the GPU to use
+    #[arg(long, value_name = "NAME")]
+    adapter: Option<String>,
+}
+
+fn objective_flag(name: &str) -> Result<HybridObjective, String> {
+    HybridObjective::named(name).ok_or_else(|| format!("expected one of {HYBRID_OBJECTIVES}"))
+}
+
+fn free_flag(name: &str) -> Result<FreePart, String> {
+    FreePart::named(name).ok_or_else(|| "expected strategy, line or both".to_owned())
+}
+
+impl Arguments {
+    fn settings(&self) -> Result<HybridStudySettings> {
+        let mut s = match &self.study {
+            Some(path) => HybridStudySettings::read(path)?,
+            None => HybridStudySettings::default(),
+        };
+        fn set<T: Clone>(setting: &mut T, flag: &Option<T>) {
+            if let Some(value) = flag {
+                setting.clone_from(value);
+            }
+        }
+        fn set_some<T: Clone>(setting: &mut Option<T>, flag: &Option<T>) {
+            if flag.is_some() {
+                setting.clone_from(flag);
+            }
+        }
+        set(&mut s.track, &self.track);
+        set(&mut s.car, &self.car);
+        set(&mut s.sections, &self.sections);
+        set(&mut s.car_width_m, &self.car_width_m);
+        set(&mut s.objectives, &self.objectives);
+        set(&mut s.free, &self.free);
+        set(&mut s.stint_laps, &self.stint_laps);
+        set(&mut s.stint_fuel_kg, &self.stint_fuel_kg);
+        set(&mut s.population, &self.population);
+        set(&mut s.iterations, &self.iterations);
+        set(&mut s.backend, &self.backend);
+        set(&mut s.seed, &self.common.seed);
+        set_some(&mut s.envelope, &self.envelope);
+        set_some(&mut s.line, &self.line);
+        set_some(&mut s.energy_mj, &self.energy_mj);
+        set_some(&mut s.match_lap_time_s, &self.match_lap_time_s);
+        set_some(&mut s.adapter, &self.adapter);
+        s.optimise &= !self.scenarios_only;
+        s.validate()?;
+        Ok(s)
+    }
+}
+
+/// Runs the study.
+pub fn run(arguments: &Arguments) -> Result<()> {
+    let settings = arguments.settings()?;
+    let setup = set_up(&settings)?;
+    let folder = run_folder::create("hybrid", arguments.common.out.as_deref())?;
+    let stop = stop_flag();
+    let target = if arguments.common.quiet {
+        ProgressDrawTarget::hidden()
+    } else {
+        ProgressDrawTarget::stderr()
+    };
+    let bar = ProgressBar::with_draw_target(None, target);
+    if let Ok(style) = ProgressStyle::with_template("{spinner} {prefix:12} {msg}") {
+        bar.set_style(style);
+    }
+    let outcome = run_study(&settings, &setup, |progress| {
+        bar.set_prefix(progress.stage);
+        bar.set_message(format!("{} laps, {}", progress.evaluations, progress.best));
+        bar.tick();
+        if stop.load(Ordering::Relaxed) {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        }
+    })?;
+    bar.finish_and_clear();
+    let summary = summarise(&settings, &setup, &outcome);
+    write_results(&folder, &settings, &setup, &outcome, &summary)?;
+    if !arguments.common.quiet {
+        print!("{}", summary.to_text());
+        println!("Results: {}", folder.display());
+    }
+    if arguments.common.json {
+        print_json(&summary)?;
+    }
+    if outcome.interrupted {
+        Err(Error::Interrupted(folder))
+    } else {
+        Ok(())
+    }
+}

@@ -1,0 +1,75 @@
+//! `lapswarm sweep`.
+
+use super::{Common, print_json, progress, stop_flag};
+use lapswarm::study::run_folder;
+use lapswarm::study::sweep::{SweepSettings, sweep};
+use lapswarm::{Error, Result};
+use std::ops::ControlFlow;
+use std::sync::atomic::Ordering;
+
+/// Flags of `sweep`.
+#[derive(clap::Args)]
+#[command(
+    after_help = "Examples:\n  lapswarm sweep thesis_inertia --out tuning\n  lapswarm sweep my_sweep.toml --out s1\n  lapswarm \
+                  sweep my_sweep.toml --out s1 --resume\n\nA sweep file:\n  study = \"identify\"\n  [base]\n  polish = \
+                  false\n  [grid]\n  \"swarm.population\" = [25, 50, 100]\n  seed = [1, 2, 3]"
+)]
+pub struct Arguments {
+    /// A sweep file, or a bundled sweep: thesis_inertia, thesis_population, norms, sections
+    sweep: String,
+    #[command(flatten)]
+    common: Common,
+    /// Go on with the sweep that --out holds a part of
+    #[arg(long, requires = "out")]
+    resume: bool,
+}
+
+/// Runs the sweep.
+pub fn run(arguments: &Arguments) -> Result<()> {
+    let settings = SweepSettings::load(&arguments.sweep)?;
+    let folder = match (&arguments.common.out, arguments.resume) {
+        (Some(folder), true) => {
+            if !folder.is_dir() {
+                return Err(Error::input(
+                    folder,
+                    "--resume",
+                    "no such folder",
+                    "a folder that holds a part of the sweep",
+                ));
+            }
+            folder.clone()
+        }
+        (out, _) => run_folder::create("sweep", out.as_deref())?,
+    };
+    let stop = stop_flag();
+    let bar = progress::saying(arguments.common.quiet);
+    let summary = sweep(&settings, &folder, arguments.resume, |p| {
+        let point: Vec<String> = p
+            .point
+            .settings
+            .iter()
+            .map(|(key, value)| format!("{key} {value}"))
+            .collect();
+        bar.set_message(format!(
+            "run {} of {}: {}",
+            p.done + 1,
+            p.planned,
+            point.join(", ")
+        ));
+        bar.tick();
+        if stop.load(Ordering::Relaxed) {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        }
+    })?;
+    bar.finish_and_clear();
+    if !arguments.common.quiet {
+        print!("{}", summary.to_text());
+        println!("Results: {}", folder.display());
+    }
+    if arguments.common.json {
+        print_json(&summary)?;
+    }
+    Ok(())
+}

@@ -1,0 +1,345 @@
+//! What is asked of laps with energy: the line, the strategy, which parts of both are free, and what is to be small.
+
+use crate::error::{Error, Result};
+use crate::evaluate::{Evaluation, FAILED_COST, Failure, Objective, Problem, Variable};
+use crate::line::energy::{EnergyCar, EnergyLap, EnergyPlan, GATES, Gates};
+use crate::line::{LinePlan, Parametrisation};
+use crate::track::CrossSections;
+use glam::DVec2;
+
+/// What of a lap can be minimised.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum HybridObjective {
+    /// Its time, s.
+    LapTime,
+    /// Its fuel, l.
+    Fuel,
+    /// Energy out of the store, MJ.
+    EnergyUsed,
+    /// Greatest less least state of charge.
+    SocSwing,
+}
+
+impl HybridObjective {
+    /// Every objective.
+    pub const ALL: [Self; 4] = [Self::LapTime, Self::Fuel, Self::EnergyUsed, Self::SocSwing];
+
+    /// The name in studies.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::LapTime => "lap_time_s",
+            Self::Fuel => "fuel_l",
+            Self::EnergyUsed => "energy_used_mj",
+            Self::SocSwing => "soc_swing",
+        }
+    }
+
+    /// The unit.
+    pub fn unit(self) -> &'static str {
+        match self {
+            Self::LapTime => "s",
+            Self::Fuel => "l",
+            Self::EnergyUsed => "MJ",
+            Self::SocSwing => "-",
+        }
+    }
+
+    /// The objective of this name.
+    pub fn named(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|o| o.name() == name)
+    }
+}
+
+/// The line that laps are driven on.
+#[derive(Clone, Debug)]
+pub enum HybridLine {
+    /// One line through these points (m); whether its end joins its start.
+    Fixed {
+        /// The points.
+        points_m: Vec<DVec2>,
+        /// Whether the last is followed by the first.
+        closed: bool,
+    },
+    /// A line across cuts, which the first variables give.
+    Free {
+        /// The cuts.
+        cuts: Box<CrossSections>,
+        /// How variables give a line.
+        parametrisation: Parametrisation,
+    },
+}
+
+/// A part of the strategy that may be free.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Free {
+    /// Greatest steering angle, rad.
+    Steer,
+    /// Greatest speed, m/s.
+    Speed,
+    /// Least acceleration, m/s^2.
+    Acceleration,
+    /// Least state of charge.
+    Soc,
+    /// Energy that may leave the store, MJ.
+    Energy,
+    /// The share of a zone in which the motor works.
+    Zone(usize),
+}
+
+impl Free {
+    fn variable(self) -> Variable {
+        match self {
+            Self::Steer => Variable::new("steer", "rad", 0.0, 0.2),
+            Self::Speed => Variable::new("speed", "m/s", 10.0, 100.0),
+            Self::Acceleration => Variable::new("ax", "m/s^2", 0.0, 10.0),
+            Self::Soc => Variable::new("soc", "-", 0.0, 1.1),
+            Self::Energy => Variable::new("energy", "MJ", 0.0, 20.0),
+            Self::Zone(zone) => Variable::new(format!("zone {zone}"), "-", 0.0, 1.0),
+        }
+    }
+}
+
+/// A strategy, and what of it is free.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Strategy {
+    /// The gates.
+    pub gates: Gates,
+    /// The share of each zone in which the motor works.
+    pub shares: Vec<f64>,
+    /// What variables set instead, in their order.
+    pub free: Vec<Free>,
+}
+
+impl Strategy {
+    /// Gates that nothing moves, all zones open.
+    pub fn fixed(gates: Gates, zones: usize) -> Self {
+        Self {
+            gates,
+            shares: vec![1.0; zones],
+            free: Vec::new(),
+        }
+    }
+
+    /// The gates and shares with the free ones set.
+    fn with(&self, values: &[f64]) -> (Gates, Vec<f64>) {
+        let (mut gates, mut shares) = (self.gates, self.shares.clone());
+        for (free, &value) in self.free.iter().zip(values) {
+            match free {
+                Free::Steer => gates.steer_rad = value,
+                Free::Speed => gates.speed_mps = value,
+                Free::Acceleration => gates.ax_mps2 = value,
+                Free::Soc => gates.soc = value,
+                Free::Energy => gates.energy_mj = value,
+                Free::Zone(zone) => shares[*zone] = value,
+            }
+        }
+        (gates, shares)
+    }
+}
+
+/// Finding strategies, lines or both.
+#[derive(Clone, Debug)]
+pub struct HybridProblem {
+    /// Variables and objectives: those of the line, then those of the strategy.
+    pub problem: Problem,
+    line: HybridLine,
+    plan: LinePlan<f64>,
+    energy: EnergyPlan<f64>,
+    car: EnergyCar,
+    strategy: Strategy,
+    objectives: Vec<HybridObjective>,
+    line_variables: usize,
+}
+
+impl HybridProblem {
+    /// The problem of `car` on `line` by `strategy` in the zones of `energy`; `entry_mps` is the greatest speed at the start
+    /// of an open line (m/s).
+    ///
+    /// # Errors
+    /// [`Error::Input`] if there are too few sections, if zones do not fit, if objectives are missing or come twice.
+    pub fn new(
+        line: HybridLine,
+        car: EnergyCar,
+        energy: EnergyPlan<f64>,
+        strategy: Strategy,
+        objectives: &[HybridObjective],
+        entry_mps: f64,
+    ) -> Result<Self> {
+        let wrong =
+            |place: &str, found: String, expected: &str| Err(Error::input("hybrid", place, found, expected));
+        let (mut plan, mut variables) = match &line {
+            HybridLine::Fixed { points_m, closed } => (LinePlan::of_points(points_m, *closed), Vec::new()),
+            HybridLine::Free {
+                cuts,
+                parametrisation,
+            } => {
+                let mut plan =
+                    LinePlan::of_cuts(&cuts.right_m, &cuts.left_m, cuts.closed).spaced(&cuts.spacing_m());
+                parametrisation.apply(cuts, &mut plan)?;
+                (plan, parametrisation.variables(cuts))
+            }
+        };
+        let n = plan.rows.len();
+        if n < 3 {
+            return wrong("sections", n.to_string(), "at least three");
+        }
+        if energy.zones.len() != n || energy.run_in >= n {
+            let found = format!("{} rows, run-in from {}", energy.zones.len(), energy.run_in);
+            return wrong("zones", found, "one for each section");
+        }
+        if strategy.shares.len() < energy.count() {
+            let found = format!("{} for {} zones", strategy.shares.len(), energy.count());
+            return wrong("shares", found, "one for each zone");
+        }
+        let beyond = strategy
+            .free
+            .iter()
+            .find(|f| matches!(f, Free::Zone(zone) if *zone >= strategy.shares.len()));
+        if let Some(free) = beyond {
+            return wrong("free", format!("{free:?}"), "a zone that there is");
+        }
+        let twice = (1..objectives.len()).find(|&i| objectives[..i].contains(&objectives[i]));
+        if objectives.is_empty() || twice.is_some() {
+            return wrong("objectives", format!("{objectives:?}"), "at least one, each once");
+        }
+        if !(0.0..=1000.0).contains(&entry_mps) {
+            return wrong("entry speed", format!("{entry_mps} m/s"), "0 to 1000 m/s");
+        }
+        plan.entry = entry_mps * entry_mps;
+        plan.start = match &line {
+            HybridLine::Fixed { points_m, closed } => slowest(points_m, *closed),
+            HybridLine::Free { cuts, .. } => slowest(&cuts.points(&vec![0.5; n]), cuts.closed),
+        };
+        // A floor so far down is none.
+        let mut energy = energy;
+        energy.counts_charge = strategy.free.contains(&Free::Soc) || strategy.gates.soc > -1e3;
+        let line_variables = variables.len();
+        variables.extend(strategy.free.iter().map(|f| f.variable()));
+        Ok(Self {
+            problem: Problem {
+                variables,
+                objectives: objectives
+                    .iter()
+                    .map(|o| Objective::new(o.name(), o.unit()))
+                    .collect(),
+            },
+            line,
+            plan,
+            energy,
+            car,
+            strategy,
+            objectives: objectives.to_vec(),
+            line_variables,
+        })
+    }
+
+    /// The line.
+    pub fn line(&self) -> &HybridLine {
+        &self.line
+    }
+
+    /// The car.
+    pub fn car(&self) -> &EnergyCar {
+        &self.car
+    }
+
+    /// What the kernels read of the sections.
+    pub fn plan(&self) -> &LinePlan<f64> {
+        &self.plan
+    }
+
+    /// What the kernels read of the zones.
+    pub fn energy(&self) -> &EnergyPlan<f64> {
+        &self.energy
+    }
+
+    /// The objectives.
+    pub fn objectives(&self) -> &[HybridObjective] {
+        &self.objectives
+    }
+
+    /// Number of variables.
+    pub fn dimensions(&self) -> usize {
+        self.problem.variables.len()
+    }
+
+    /// Variables of the line, which come first.
+    pub fn line_variables(&self) -> usize {
+        self.line_variables
+    }
+
+    /// Figures of the kernels' strategy.
+    pub fn strategy_figures(&self) -> usize {
+        GATES + self.strategy.shares.len()
+    }
+
+    /// The gates and the shares of zones of a candidate.
+    pub fn strategy_of(&self, candidate: &[f64]) -> (Gates, Vec<f64>) {
+        self.strategy.with(&candidate[self.line_variables..])
+    }
+
+    /// The kernels' figures of a candidate: variables of the line, gates, shares of zones.
+    pub fn figures(&self, candidate: &[f64]) -> Vec<f64> {
+        let (gates, shares) = self.strategy_of(candidate);
+        let mut figures = candidate[..self.line_variables].to_vec();
+        figures.extend(self.car.gate_figures(&gates));
+        figures.extend(shares);
+        figures
+    }
+
+    /// The candidates of a population; a problem without variables has one, which is empty.
+    pub(super) fn candidates<'p>(&self, population: &'p [f64]) -> Vec<&'p [f64]> {
+        if self.dimensions() == 0 {
+            vec![&[]]
+        } else {
+            population.chunks_exact(self.dimensions()).collect()
+        }
+    }
+
+    /// What the laps of candidates come to.
+    pub(super) fn evaluation(&self, candidates: &[&[f64]], laps: &[EnergyLap<f64>]) -> Evaluation {
+        let rows = candidates
+            .iter()
+            .zip(laps)
+            .map(|(candidate, lap)| self.row(self.preliminary_failure(candidate), lap));
+        Evaluation::of_rows(rows.collect())
+    }
+
+    /// Why a candidate need not be scored, if so.
+    pub(super) fn preliminary_failure(&self, candidate: &[f64]) -> Option<Failure> {
+        candidate
+            .iter()
+            .any(|x| !x.is_finite())
+            .then_some(Failure::NotFinite)
+    }
+
+    /// The objectives' row of a lap, or of a candidate that failed.
+    pub(super) fn row(&self, failure: Option<Failure>, lap: &EnergyLap<f64>) -> (Vec<f64>, Option<Failure>) {
+        let failed = |failure| (vec![FAILED_COST; self.objectives.len()], Some(failure));
+        if let Some(failure) = failure {
+            return failed(failure);
+        }
+        let row: Vec<f64> = self
+            .objectives
+            .iter()
+            .map(|objective| match objective {
+                HybridObjective::LapTime => lap.time,
+                HybridObjective::Fuel => lap.fuel / self.car.fuel_density_kgpl,
+                HybridObjective::EnergyUsed => lap.deployed / 1e6,
+                HybridObjective::SocSwing => lap.swing / self.car.hybrid.store.capacity_j,
+            })
+            .collect();
+        if row.iter().any(|x| !x.is_finite()) {
+            return failed(Failure::Standstill);
+        }
+        (row.into_iter().map(|x| x.min(FAILED_COST)).collect(), None)
+    }
+}
+
+/// The section where a car is slowest, by the sharpest bend.
+fn slowest(points_m: &[DVec2], closed: bool) -> usize {
+    let curvature = crate::line::geometry(points_m, closed).curvature_1pm;
+    (0..curvature.len())
+        .max_by(|&i, &j| curvature[i].abs().total_cmp(&curvature[j].abs()))
+        .unwrap_or(0)
+}

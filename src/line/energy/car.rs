@@ -1,0 +1,111 @@
+//! A point mass with engine, motors and store.
+
+use super::super::point_mass::{LimitTable, PointMass};
+use super::table::{EnergyTable, Traction};
+use crate::error::Result;
+use crate::vehicle::{Car, Envelope, Hybrid};
+
+/// A car as energy laps need it.
+#[derive(Clone, Debug)]
+pub struct EnergyCar {
+    /// Its name.
+    pub name: String,
+    /// The point mass, with the rolling resistance in its drag.
+    pub point_mass: PointMass,
+    /// Its limits.
+    pub limits: LimitTable<f64>,
+    /// Its energy.
+    pub table: EnergyTable<f64>,
+    /// Its electric half.
+    pub hybrid: Hybrid,
+    /// Density of its fuel (kg/l).
+    pub fuel_density_kgpl: f64,
+    /// What it was made from.
+    pub car: Car,
+    envelope: Envelope,
+    traction: Traction,
+    ellipse_exponent: f64,
+}
+
+impl EnergyCar {
+    /// `car` within `envelope` (its limits without rolling resistance) and `traction`.
+    ///
+    /// # Errors
+    /// [`crate::Error::Input`] for a car without engine map or hybrid drive, or limits that cannot be.
+    pub fn new(car: Car, envelope: Envelope, traction: Traction, ellipse_exponent: f64) -> Result<Self> {
+        let wheelbase = car.chassis.cg_to_front + car.chassis.cg_to_rear;
+        let point_mass = PointMass {
+            ellipse_exponent,
+            ..PointMass::new(EnergyTable::rolling(&car, &envelope)?, wheelbase)
+        };
+        let limits = point_mass.table()?;
+        let table = EnergyTable::new(&car, &point_mass.envelope, &traction, &limits)?;
+        let parts = (
+            car.hybrid.clone(),
+            car.powertrain.as_ref().and_then(|p| p.engine.as_ref()),
+        );
+        let (Some(hybrid), Some(engine)) = parts else {
+            return Err(crate::Error::input(
+                &car.name,
+                "[hybrid]",
+                "none",
+                "a hybrid drive",
+            ));
+        };
+        Ok(Self {
+            name: car.name.clone(),
+            fuel_density_kgpl: engine.fuel_density_kgpl,
+            point_mass,
+            limits,
+            table,
+            hybrid,
+            envelope,
+            traction,
+            ellipse_exponent,
+            car,
+        })
+    }
+
+    /// The same with other motors or another store.
+    ///
+    /// # Errors
+    /// As [`EnergyCar::new`].
+    pub fn with_hybrid(&self, hybrid: Hybrid) -> Result<Self> {
+        let mut car = self.car.clone();
+        car.hybrid = Some(hybrid);
+        Self::new(
+            car,
+            self.envelope.clone(),
+            self.traction.clone(),
+            self.ellipse_exponent,
+        )
+    }
+
+    /// The same with another mass (kg): engine, motors and drag move it, and its tyres' limits are taken to grow with it.
+    ///
+    /// # Errors
+    /// As [`EnergyCar::new`].
+    pub fn with_mass(&self, mass_kg: f64) -> Result<Self> {
+        let ratio = self.car.chassis.mass / mass_kg;
+        let rows = self
+            .envelope
+            .rows()
+            .iter()
+            .map(|row| crate::vehicle::EnvelopeRow {
+                ax_drive_mps2: (row.ax_drive_mps2 * ratio).min(self.traction.at(row.v_mps)),
+                drag_mps2: row.drag_mps2 * ratio,
+                ..*row
+            })
+            .collect();
+        let mut car = self.car.clone();
+        car.chassis.mass = mass_kg;
+        let envelope = Envelope::new(self.envelope.name(), rows)?;
+        Self::new(car, envelope, self.traction.clone(), self.ellipse_exponent)
+    }
+
+    /// The kernels' figures of gates.
+    pub fn gate_figures(&self, gates: &super::Gates) -> [f64; super::GATES] {
+        let store = &self.hybrid.store;
+        gates.figures(self.point_mass.wheelbase_m, store.capacity_j, store.start_soc)
+    }
+}

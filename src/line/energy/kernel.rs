@@ -1,0 +1,486 @@
+//! The energy kernel: a lap on a line's lengths and curvatures with engine, motor-generators and store.
+//! Twin of `shaders/energy.wgsl`.
+//!
+//! Braking first: a backward pass from the corner speeds gives at every section the greatest speed from which all that
+//! follows can still be braked for. A forward pass below it is then the lap itself, section after section, so that it can
+//! carry the store along and open and shut the motor's gates by what has really been used. Energies are counted from the
+//! start line, which the car crosses as fast as it ends the lap: a closed lap is driven once to find that speed and once
+//! more for the accounts.
+//!
+//! After R. Lot and S. A. Evangelou, *Lap time optimization of a sports series hybrid electric vehicle*, World Congress on
+//! Engineering 2013, for what is accounted; the passes are those of [`super::super::kernel`].
+
+use super::super::kernel::{BLOCK, Course, braked, corner, limits_at, look_up};
+use super::super::point_mass::LimitTable;
+use super::plan::{EnergyPlan, GATES, Mode, ZoneRow};
+use super::table::EnergyTable;
+use crate::scalar::{Lookup, Real};
+
+/// What a lap came to.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct EnergyLap<R> {
+    /// Time (s).
+    pub time: R,
+    /// Fuel (kg).
+    pub fuel: R,
+    /// Energy out of the store (J).
+    pub deployed: R,
+    /// Energy of the MGU-K into the store (J).
+    pub harvested_k: R,
+    /// Energy of the MGU-H into the store (J).
+    pub harvested_h: R,
+    /// Change of the charge over the lap (J), which adds up beside the three before.
+    pub change: R,
+    /// Greatest less least charge along the lap (J).
+    pub swing: R,
+    /// Time with the motor on (s).
+    pub motor_time: R,
+}
+
+/// Figures of [`EnergyLap`].
+pub const FIGURES: usize = 8;
+
+impl<R: Copy> EnergyLap<R> {
+    /// The figures in their order.
+    pub fn to_array(self) -> [R; FIGURES] {
+        [
+            self.time,
+            self.fuel,
+            self.deployed,
+            self.harvested_k,
+            self.harvested_h,
+            self.change,
+            self.swing,
+            self.motor_time,
+        ]
+    }
+
+    /// From the figures in their order.
+    pub fn from_array(
+        [
+            time,
+            fuel,
+            deployed,
+            harvested_k,
+            harvested_h,
+            change,
+            swing,
+            motor_time,
+        ]: [R; FIGURES],
+    ) -> Self {
+        Self {
+            time,
+            fuel,
+            deployed,
+            harvested_k,
+            harvested_h,
+            change,
+            swing,
+            motor_time,
+        }
+    }
+}
+
+/// One segment of a lap.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SegmentEnergy<R> {
+    /// Speed squared at its start (m^2/s^2).
+    pub start: R,
+    /// Speed squared at its end (m^2/s^2).
+    pub end: R,
+    /// Time (s).
+    pub time: R,
+    /// Force over mass at the wheels of the engine (m/s^2),
+    pub engine: R,
+    /// of the motor,
+    pub motor: R,
+    /// of the generator,
+    pub generator: R,
+    /// and of the hydraulic brakes.
+    pub hydraulic: R,
+    /// Share of the engine's greatest power.
+    pub load: R,
+    /// Fuel (kg).
+    pub fuel: R,
+    /// Energy out of the store (J).
+    pub deployed: R,
+    /// Energy of the MGU-K into the store (J).
+    pub harvested_k: R,
+    /// Energy of the MGU-H into the store (J).
+    pub harvested_h: R,
+}
+
+/// The part of a lap that later segments depend on.
+#[derive(Clone, Copy)]
+struct State<R> {
+    speed_squared: R,
+    change: R,
+    deployed: R,
+    harvested_k: R,
+}
+
+/// All that does not change along a lap.
+struct Car<'a, R: Real> {
+    limits: &'a LimitTable<R::Storage>,
+    table: &'a EnergyTable<R::Storage>,
+    plan: &'a EnergyPlan<R::Storage>,
+    strategy: &'a [R],
+}
+
+/// A step along a segment.
+struct Step<R> {
+    /// Speed squared at the end.
+    end: R,
+    /// Force of the motor over the mass (m/s^2).
+    motor: R,
+}
+
+/// The share of a segment in which its zone lets the motor work.
+#[inline(always)]
+fn zone_share<R: Real>(row: &ZoneRow<R::Storage>, strategy: &[R]) -> R {
+    let into = (strategy[GATES + row.zone as usize] - R::load(row.position)) * R::load(row.per_share);
+    into.max(R::lit(0.0)).min(R::lit(1.0))
+}
+
+/// Where both hold, `x`, else nought.
+#[inline(always)]
+fn gated<R: Real>(mask: R::Mask, x: R) -> R {
+    R::select(mask, x, R::lit(0.0))
+}
+
+impl<R: Lookup> Car<'_, R> {
+    /// Whether the gates of steering and speed are open at a section.
+    #[inline(always)]
+    fn open(&self, curvature: R, speed_squared: R) -> R::Mask {
+        !self.strategy[0].less_than(curvature) & !self.strategy[1].less_than(speed_squared)
+    }
+
+    /// What may still leave the store (J).
+    #[inline(always)]
+    fn left(&self, state: &State<R>) -> R {
+        let of_charge = state.change - self.strategy[3];
+        let of_budget = self.strategy[4] - state.deployed;
+        of_charge.min(of_budget).max(R::lit(0.0))
+    }
+
+    /// Drives along a segment, with the motor beside the engine in as much of it as `left` (J) suffices for, up to the
+    /// greatest speed squared at its end.
+    #[inline(always)]
+    fn additional(&self, here: usize, from: R, length: R, bends: [R; 2], most: R, left: R) -> Step<R> {
+        let inverse = R::lit(1.0) / length;
+        let nought = R::lit(0.0);
+        let [grip, drive, drag] = limits_at(self.limits, from, bends[0]);
+        let engine = grip.min(drive);
+        let ahead = (from + length * (engine - drag)).max(nought);
+        let rows = self.table.boosts.len() / 2;
+        let (place, beyond) = (ahead * R::load(self.table.rows_per_speed_squared)).place(rows, 2);
+        let boost = look_up(&self.table.boosts, 2, place, beyond, 0);
+        let open = self.open(bends[0], from) & self.strategy[2].less_than(engine - drag);
+        let wanted = gated(open, boost * zone_share(&self.plan.zones[here], self.strategy));
+        let boost = wanted.min(left * R::load(self.table.force_per_deployed) * inverse);
+
+        let both = grip.min(drive + boost);
+        let middle = (from + length * (both - drag)).max(nought);
+        let [grip, drive, later_drag] = limits_at(self.limits, middle, R::lit(0.5) * (bends[0] + bends[1]));
+        let later_both = grip.min(drive + boost);
+        let motor = R::lit(0.5) * ((both - engine) + (later_both - grip.min(drive)));
+        let reached = (from + length * ((both - drag) + (later_both - later_drag))).max(nought);
+        let end = reached.min(most);
+        // Where less is needed than both could give, the motor gives way first.
+        let spare = R::lit(0.5) * (reached - end) * inverse;
+        Step {
+            end,
+            motor: (motor - spare).max(nought),
+        }
+    }
+
+    /// Drives along a segment by the engine alone.
+    #[inline(always)]
+    fn engine_only(&self, from: R, length: R, bends: [R; 2], most: R) -> R {
+        let nought = R::lit(0.0);
+        let [grip, drive, drag] = limits_at(self.limits, from, bends[0]);
+        let first = grip.min(drive) - drag;
+        let middle = (from + length * first).max(nought);
+        let [grip, drive, drag] = limits_at(self.limits, middle, R::lit(0.5) * (bends[0] + bends[1]));
+        let second = grip.min(drive) - drag;
+        (from + length * (first + second)).max(nought).min(most)
+    }
+
+    /// One segment of the lap that only finds the speed at the start line, with the motor beside the engine: what is deployed,
+    /// and what is harvested by the MGU-K where the charge has a say. The little that the MGU-H adds is left out here.
+    #[inline(always)]
+    fn provisional(&self, state: &mut State<R>, here: usize, length: R, bends: [R; 2], most: R) {
+        let nought = R::lit(0.0);
+        let table = self.table;
+        let from = state.speed_squared;
+        let step = self.additional(here, from, length, bends, most, self.left(state));
+        let joules = R::load(table.mass) * length;
+        let deployed = joules * step.motor * R::load(table.deploy_cost);
+        state.speed_squared = step.end;
+        state.deployed = state.deployed + deployed;
+        if self.plan.counts_charge {
+            let mean = R::lit(0.5) * (from + step.end);
+            let rows = table.forces.len() / 8;
+            let (place, beyond) = (mean * R::load(table.rows_per_speed_squared)).place(rows, 8);
+            let row = R::pick_row(&table.forces, place);
+            let inverse = R::lit(1.0) / length;
+            let force = R::lit(0.5) * (step.end - from) * inverse + (row[3] + beyond * row[7]);
+            let unharvested = R::load(table.harvest_most) - state.harvested_k;
+            let room = (unharvested * R::load(table.force_per_harvested) * inverse).max(nought);
+            let generator = (-force).max(nought).min(row[2] + beyond * row[6]).min(room);
+            let harvested_k = joules * generator * R::load(table.harvest_gain);
+            state.change = state.change + (harvested_k - deployed);
+            state.harvested_k = state.harvested_k + harvested_k;
+        }
+    }
+
+    /// One segment with its accounts, up to the greatest speed squared at its end.
+    #[inline(always)]
+    fn segment(
+        &self,
+        state: &mut State<R>,
+        here: usize,
+        length: R,
+        bends: [R; 2],
+        most: R,
+    ) -> SegmentEnergy<R> {
+        let (nought, one) = (R::lit(0.0), R::lit(1.0));
+        let table = self.table;
+        let from = state.speed_squared;
+        let left = self.left(state);
+        let step = match self.plan.mode {
+            Mode::Additional => self.additional(here, from, length, bends, most, left),
+            Mode::Offset => Step {
+                end: self.engine_only(from, length, bends, most),
+                motor: nought,
+            },
+        };
+        let end = step.end;
+        let mean = R::lit(0.5) * (from + end);
+        let rows = table.forces.len() / 8;
+        let (place, beyond) = (mean * R::load(table.rows_per_speed_squared)).place(rows, 8);
+        let row = R::pick_row(&table.forces, place);
+        let [greatest, motor_most, generator_most, drag]: [R; 4] =
+            std::array::from_fn(|column| row[column] + beyond * row[4 + column]);
+        let inverse = R::lit(1.0) / length;
+        let ax = R::lit(0.5) * (end - from) * inverse;
+        // What the tyres do, forwards or backwards.
+        let force = ax + drag;
+        let demand = force.max(nought);
+        let shed = (-force).max(nought);
+        let joules = R::load(table.mass) * length;
+        let motor = match self.plan.mode {
+            Mode::Additional => step.motor.min(demand),
+            Mode::Offset => {
+                let open = self.open(bends[0], from) & self.strategy[2].less_than(ax);
+                let share = zone_share(&self.plan.zones[here], self.strategy);
+                let reach = left * R::load(table.force_per_deployed) * inverse;
+                gated(open, motor_most * share).min(demand).min(reach)
+            }
+        };
+        let engine = demand - motor;
+        let unharvested = R::load(table.harvest_most) - state.harvested_k;
+        let room = unharvested * R::load(table.force_per_harvested) * inverse;
+        let generator = shed.min(generator_most).min(room.max(nought));
+        let deployed = joules * motor * R::load(table.deploy_cost);
+        let harvested_k = joules * generator * R::load(table.harvest_gain);
+
+        let load = (engine / greatest.max(R::lit(1e-3))).min(one);
+        let row = R::pick_row(&table.flows, place);
+        let flows: [R; 4] = std::array::from_fn(|column| row[column] + beyond * row[4 + column]);
+        let thirds = R::lit(3.0) * load;
+        let flow = flows[0]
+            + (flows[1] - flows[0]) * thirds.min(one)
+            + (flows[2] - flows[1]) * (thirds - one).max(nought).min(one)
+            + (flows[3] - flows[2]) * (thirds - R::lit(2.0)).max(nought);
+        let time = R::lit(2.0) * length / (from.sqrt() + end.sqrt());
+        let burnt = flow * time;
+        let spins = !mean.less_than(R::load(table.exhaust_from))
+            & nought.less_than(ax)
+            & !R::load(table.exhaust_to_ax).less_than(ax);
+        let harvested_h = gated(spins, R::load(table.exhaust_gain) * burnt);
+
+        state.speed_squared = end;
+        state.change = state.change + ((harvested_k + harvested_h) - deployed);
+        state.deployed = state.deployed + deployed;
+        state.harvested_k = state.harvested_k + harvested_k;
+        SegmentEnergy {
+            start: from,
+            end,
+            time,
+            engine,
+            motor,
+            generator,
+            hydraulic: shed - generator,
+            load,
+            fuel: burnt + R::load(table.exhaust_cost) * harvested_h,
+            deployed,
+            harvested_k,
+            harvested_h,
+        }
+    }
+}
+
+/// A segment of one lap by itself: the speed squared reached with the motor at a share of its force beside the engine,
+/// without a limit at the end, and the force of the motor over the mass (m/s^2).
+pub fn motor_step(
+    limits: &LimitTable<f64>,
+    table: &EnergyTable<f64>,
+    from: f64,
+    length: f64,
+    bends: [f64; 2],
+    share: f64,
+) -> [f64; 2] {
+    let car = Car {
+        limits,
+        table,
+        plan: &EnergyPlan::whole(1, 0, Mode::Additional),
+        strategy: &[f64::INFINITY, f64::INFINITY, f64::NEG_INFINITY, 0.0, 0.0, share],
+    };
+    let step = car.additional(0, from, length, bends, f64::INFINITY, f64::INFINITY);
+    [step.end, step.motor]
+}
+
+/// Fills `course.speed_squared` with the greatest speeds squared from which all that follows can be braked for.
+#[inline(always)]
+fn ceilings<R: Lookup>(
+    limits: &LimitTable<R::Storage>,
+    closed: bool,
+    start: usize,
+    entry: R,
+    course: &mut Course<R>,
+) {
+    let n = course.curvature.len();
+    let (length, curvature) = (&course.length, &course.curvature);
+    let speeds = &mut course.speed_squared;
+    speeds.clear();
+    speeds.resize(n, R::lit(0.0));
+    let mut next = if closed { start } else { n - 1 };
+    speeds[next] = corner(limits, curvature[next]);
+    // The first time round a section is only held to its corner speed; a closed lap goes on until it meets itself.
+    let steps = if closed { 2 * n } else { n - 1 };
+    for step in 0..steps {
+        let here = if next > 0 { next - 1 } else { n - 1 };
+        let reached = braked(
+            limits,
+            speeds[next],
+            length[here],
+            curvature[next],
+            curvature[here],
+        );
+        let again = step + 1 >= n;
+        let most = if again {
+            speeds[here]
+        } else {
+            corner(limits, curvature[here])
+        };
+        let slower = reached.less_than(most);
+        speeds[here] = R::select(slower, reached, most);
+        if again && R::all(!slower) {
+            break;
+        }
+        next = here;
+    }
+    if !closed {
+        speeds[0] = speeds[0].min(entry);
+    }
+}
+
+/// A lap with energy on `course`, whose lengths and curvatures are given; its speeds squared are those that can be braked
+/// for after. `start` is where braking begins to be worked out, as in [`super::super::kernel::lap_time`]; `entry` is the
+/// greatest speed squared at the start of an open line. `strategy` has the figures of the gates, then the share of each
+/// zone. `record` sees every segment of the lap that counts.
+#[inline(always)]
+#[allow(clippy::too_many_arguments)]
+pub fn energy_lap<R: Lookup>(
+    limits: &LimitTable<R::Storage>,
+    table: &EnergyTable<R::Storage>,
+    plan: &EnergyPlan<R::Storage>,
+    (closed, start, entry): (bool, usize, R),
+    strategy: &[R],
+    course: &mut Course<R>,
+    mut record: impl FnMut(usize, &SegmentEnergy<R>),
+) -> EnergyLap<R> {
+    ceilings(limits, closed, start, entry, course);
+    let n = course.curvature.len();
+    let nought = R::lit(0.0);
+    let (length, curvature, most) = (&course.length, &course.curvature, &course.speed_squared);
+    let after = |here: usize| if here + 1 < n { here + 1 } else { 0 };
+    let bends = |here: usize| [curvature[here], curvature[after(here)]];
+    let car = Car {
+        limits,
+        table,
+        plan,
+        strategy,
+    };
+    let fresh = |speed_squared: R| State {
+        speed_squared,
+        change: nought,
+        deployed: nought,
+        harvested_k: nought,
+    };
+    let mut speed_squared = most[0];
+    if closed {
+        // From a slow section late in the lap to the start line, as if the store held enough.
+        let mut state = most[plan.run_in];
+        for here in plan.run_in..n {
+            let (h, bend, held) = (length[here], bends(here), most[after(here)]);
+            state = match plan.mode {
+                Mode::Additional => {
+                    let enough = car.strategy[4];
+                    car.additional(here, state, h, bend, held, enough).end
+                }
+                Mode::Offset => car.engine_only(state, h, bend, held),
+            };
+        }
+        speed_squared = state;
+        if plan.mode == Mode::Additional {
+            let mut state = fresh(speed_squared);
+            for here in 0..n {
+                car.provisional(&mut state, here, length[here], bends(here), most[after(here)]);
+            }
+            speed_squared = state.speed_squared;
+        }
+    }
+
+    let mut state = fresh(speed_squared);
+    let (mut greatest, mut least) = (nought, nought);
+    let mut total = [nought; 6];
+    let mut block = [nought; 6];
+    let segments = if closed { n } else { n - 1 };
+    for here in 0..segments {
+        let s = car.segment(&mut state, here, length[here], bends(here), most[after(here)]);
+        record(here, &s);
+        let motor_time = gated(nought.less_than(s.deployed), s.time);
+        let terms = [
+            s.time,
+            s.fuel,
+            s.deployed,
+            s.harvested_k,
+            s.harvested_h,
+            motor_time,
+        ];
+        for (block, term) in block.iter_mut().zip(terms) {
+            *block = *block + term;
+        }
+        greatest = greatest.max(state.change);
+        least = least.min(state.change);
+        if (here + 1) % BLOCK == 0 || here + 1 == segments {
+            for (total, block) in total.iter_mut().zip(&mut block) {
+                *total = *total + *block;
+                *block = nought;
+            }
+        }
+    }
+    let [time, fuel, deployed, harvested_k, harvested_h, motor_time] = total;
+    EnergyLap {
+        time,
+        fuel,
+        deployed,
+        harvested_k,
+        harvested_h,
+        change: state.change,
+        swing: greatest - least,
+        motor_time,
+    }
+}

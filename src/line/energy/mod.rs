@@ -1,0 +1,13 @@
+//! Energy on a lap: engine, motor-generators, store and fuel, segment by segment, in every scalar.
+
+mod car;
+pub mod kernel;
+mod plan;
+mod table;
+#[cfg(test)]
+mod tests;
+
+pub use car::EnergyCar;
+pub use kernel::{EnergyLap, SegmentEnergy, energy_lap};
+pub use plan::{EnergyPlan, GATES, Gates, Mode, ZoneRow};
+pub use table::{EnergyTable, Traction};

@@ -1,0 +1,176 @@
+//! What a lap's energy strategy is made of.
+
+use crate::scalar::Real;
+
+/// What the motor does with its power.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Mode {
+    /// It takes the engine's place on the engine's own lap: the same time for less fuel.
+    Offset,
+    /// It adds to the engine where that gives all it has: less time.
+    Additional,
+}
+
+impl Mode {
+    /// The name in studies.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Offset => "offset",
+            Self::Additional => "additional",
+        }
+    }
+
+    /// The mode of this name.
+    pub fn named(name: &str) -> Option<Self> {
+        [Self::Offset, Self::Additional]
+            .into_iter()
+            .find(|m| m.name() == name)
+    }
+}
+
+/// Where the motor may work.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Gates {
+    /// Greatest steering angle at the wheels (rad).
+    pub steer_rad: f64,
+    /// Greatest speed (m/s).
+    pub speed_mps: f64,
+    /// Acceleration that must be exceeded (m/s^2).
+    pub ax_mps2: f64,
+    /// State of charge below which the store is not led.
+    pub soc: f64,
+    /// Energy that may leave the store in a lap (MJ).
+    pub energy_mj: f64,
+}
+
+impl Gates {
+    /// Gates that are open wherever the car accelerates and the store holds anything.
+    pub const OPEN: Self = Self {
+        steer_rad: 2.0,
+        speed_mps: 200.0,
+        ax_mps2: 0.0,
+        soc: 0.0,
+        energy_mj: 1000.0,
+    };
+
+    /// The kernels' figures: curvature (1/m), speed squared (m^2/s^2), acceleration (m/s^2), least change of the charge (J)
+    /// and energy (J), for a wheelbase (m), a capacity (J) and a state of charge at the start.
+    pub fn figures(&self, wheelbase_m: f64, capacity_j: f64, start_soc: f64) -> [f64; GATES] {
+        [
+            self.steer_rad / wheelbase_m,
+            self.speed_mps * self.speed_mps,
+            self.ax_mps2,
+            (self.soc - start_soc) * capacity_j,
+            1e6 * self.energy_mj,
+        ]
+    }
+}
+
+/// Figures of [`Gates`] at the head of a strategy; shares of zones follow.
+pub const GATES: usize = 5;
+
+/// The zone that a segment belongs to: the motor works in the first part of it, a share that the strategy gives.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ZoneRow<S> {
+    /// Which zone.
+    pub zone: u32,
+    /// Share of the zone before the segment.
+    pub position: S,
+    /// One over the segment's share of the zone.
+    pub per_share: S,
+}
+
+/// How the segments belong to zones, and how the lap is begun.
+#[derive(Clone, Debug, PartialEq)]
+pub struct EnergyPlan<S> {
+    /// One for each section.
+    pub zones: Vec<ZoneRow<S>>,
+    /// A slow section late in the lap, from which the speed at the start line is found.
+    pub run_in: usize,
+    /// What the motor does.
+    pub mode: Mode,
+    /// Whether the charge has a say in where the motor works.
+    pub counts_charge: bool,
+}
+
+impl EnergyPlan<f64> {
+    /// The whole lap as one zone of which a share of one is open, or all of it.
+    pub fn whole(sections: usize, run_in: usize, mode: Mode) -> Self {
+        let row = ZoneRow {
+            zone: 0,
+            position: 0.0,
+            per_share: 1.0,
+        };
+        Self {
+            zones: vec![row; sections],
+            run_in,
+            mode,
+            counts_charge: true,
+        }
+    }
+
+    /// Every segment a zone of its own.
+    pub fn single(sections: usize, run_in: usize, mode: Mode) -> Self {
+        let mut plan = Self::whole(sections, run_in, mode);
+        for (zone, row) in plan.zones.iter_mut().enumerate() {
+            row.zone = zone as u32;
+        }
+        plan
+    }
+
+    /// Zones from each of `starts` (ascending sections) to the next, on segments of these lengths (m). Segments before the
+    /// first start belong to the last zone, as its beginning or, on an open line, to the first.
+    pub fn zoned(length_m: &[f64], starts: &[usize], closed: bool, run_in: usize, mode: Mode) -> Self {
+        let n = length_m.len();
+        let mut plan = Self::whole(n, run_in, mode);
+        for (zone, &start) in starts.iter().enumerate() {
+            let first = if zone == 0 && !closed { 0 } else { start };
+            let count = match starts.get(zone + 1) {
+                Some(next) => next - first,
+                None if closed => n - start + starts[0],
+                None => n - first,
+            };
+            let segments: Vec<usize> = (0..count).map(|i| (first + i) % n).collect();
+            let total: f64 = segments.iter().map(|&i| length_m[i]).sum();
+            let mut before = 0.0;
+            for i in segments {
+                // The last section of an open line has no segment.
+                let share = (length_m[i] / total).max(1e-9);
+                plan.zones[i] = ZoneRow {
+                    zone: zone as u32,
+                    position: before,
+                    per_share: share.recip(),
+                };
+                before += share;
+            }
+        }
+        plan
+    }
+
+    /// Number of zones.
+    pub fn count(&self) -> usize {
+        self.zones
+            .iter()
+            .map(|row| row.zone as usize + 1)
+            .max()
+            .unwrap_or(1)
+    }
+
+    /// The plan in the precision that the scalar `R` stores tables in.
+    pub fn stored<R: Real>(&self) -> EnergyPlan<R::Storage> {
+        EnergyPlan {
+            zones: self
+                .zones
+                .iter()
+                .map(|row| ZoneRow {
+                    zone: row.zone,
+                    position: R::store(row.position),
+                    per_share: R::store(row.per_share),
+                })
+                .collect(),
+            run_in: self.run_in,
+            mode: self.mode,
+            counts_charge: self.counts_charge,
+        }
+    }
+}

@@ -1,0 +1,200 @@
+//! What engine, motors and fuel come to at each speed, as tables that every backend looks up alike.
+
+use super::super::point_mass::{LIMIT_WIDTH, LimitTable};
+use crate::error::{Error, Result};
+use crate::scalar::Real;
+use crate::vehicle::powertrain::GRAVITY_MPS2;
+use crate::vehicle::{Car, Envelope, EnvelopeRow};
+
+/// Greatest acceleration by the driven tyres (m/s^2) over speed (m/s), by rising speed; without rows there is no limit but
+/// the friction ellipse.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Traction {
+    /// Speeds and accelerations.
+    pub rows: Vec<(f64, f64)>,
+}
+
+impl Traction {
+    pub(super) fn at(&self, v_mps: f64) -> f64 {
+        let Some(last) = self.rows.last() else {
+            return f64::INFINITY;
+        };
+        match self.rows.iter().position(|row| row.0 >= v_mps) {
+            Some(0) => self.rows[0].1,
+            Some(i) => {
+                let (low, high) = (self.rows[i - 1], self.rows[i]);
+                low.1 + (v_mps - low.0) / (high.0 - low.0) * (high.1 - low.1)
+            }
+            None => last.1,
+        }
+    }
+}
+
+/// Figures of a car's energy over even steps of the speed squared, those of its [`LimitTable`].
+///
+/// Tables have for each row the figures at its start and then how much they rise to its end. Forces are over the car's
+/// mass, in m/s^2 at the wheels.
+#[derive(Clone, Debug, PartialEq)]
+pub struct EnergyTable<S> {
+    /// Mass (kg).
+    pub mass: S,
+    /// Rows per speed squared (s^2/m^2).
+    pub rows_per_speed_squared: S,
+    /// Energy out of the store for each joule at the wheels.
+    pub deploy_cost: S,
+    /// Energy into the store for each joule at the wheels.
+    pub harvest_gain: S,
+    /// Force over mass for each joule out of the store, times the length (m^2/s^2/J).
+    pub force_per_deployed: S,
+    /// Force over mass for each joule of the MGU-K into the store, times the length (m^2/s^2/J).
+    pub force_per_harvested: S,
+    /// What the MGU-K may put into the store in a lap (J).
+    pub harvest_most: S,
+    /// Energy of the MGU-H into the store for each kilogram of fuel (J/kg).
+    pub exhaust_gain: S,
+    /// Fuel for each joule of the MGU-H (kg/J).
+    pub exhaust_cost: S,
+    /// Speed squared from which the MGU-H generates (m^2/s^2).
+    pub exhaust_from: S,
+    /// Acceleration up to which it does (m/s^2).
+    pub exhaust_to_ax: S,
+    /// Engine, motor, generator, drag, then their rises.
+    pub forces: Vec<S>,
+    /// Fuel flow (kg/s) at a load of 0, 1/3, 2/3 and 1, then the rises.
+    pub flows: Vec<S>,
+    /// What the motor adds where engine and tyres leave it room, then its rise.
+    pub boosts: Vec<S>,
+}
+
+/// Best specific consumption that the cost of the MGU-H at the crank is made up at, if the map has none (kg/J): 270 g/kWh.
+const CONSUMPTION_KGPJ: f64 = 0.270 / 3.6e6;
+/// Motors have a torque at standstill, and a power over nought would be none.
+const SLOWEST_MPS: f64 = 1.0;
+
+impl EnergyTable<f64> {
+    /// The tables of `car` on the rows of `limits`, which are those of `envelope`; `traction` limits what motor and engine
+    /// give together.
+    ///
+    /// # Errors
+    /// [`Error::Input`] for a car without an engine map or without a hybrid drive.
+    pub fn new(
+        car: &Car,
+        envelope: &Envelope,
+        traction: &Traction,
+        limits: &LimitTable<f64>,
+    ) -> Result<Self> {
+        let missing = |place: &str, expected: &str| Error::input(&car.name, place, "none", expected);
+        let Some(powertrain) = &car.powertrain else {
+            return Err(missing("[powertrain]", "an engine and gears"));
+        };
+        let Some(engine) = &powertrain.engine else {
+            return Err(missing(
+                "powertrain.throttle_deg",
+                "maps of torque and fuel flow over engine speed and throttle",
+            ));
+        };
+        let Some(hybrid) = &car.hybrid else {
+            return Err(missing(
+                "[hybrid]",
+                "a motor-generator and a store, as in the bundled gt_hybrid",
+            ));
+        };
+        let mass = car.chassis.mass;
+        let radius = car.chassis.radius_rear;
+        let k = &hybrid.mgu_k;
+        let rows = limits.limits.len() / LIMIT_WIDTH;
+        let top_ratio = powertrain.gear_ratios[powertrain.gear_ratios.len() - 1] * powertrain.final_drive;
+        let last: EnvelopeRow = envelope.rows()[envelope.rows().len() - 1];
+        let (mut forces, mut flows, mut boosts) = (Vec::new(), Vec::new(), Vec::new());
+        for knot in 0..=rows {
+            let v = (limits.top * knot as f64 / rows as f64).sqrt();
+            let gear = powertrain.gear(v, radius);
+            let rpm = gear.map_or(v / radius * 60.0 / std::f64::consts::TAU * top_ratio, |g| {
+                g.engine_speed_rpm
+            });
+            let drive = gear.map_or(0.0, |g| g.force_n / mass);
+            // At its last speed an envelope has no drive, and its tables that of just below.
+            let driven = if knot == rows {
+                last.ax_drive_mps2
+            } else {
+                envelope.at(v).ax_drive_mps2
+            };
+            let drag = envelope.at(v).drag_mps2;
+            let slow = v.max(SLOWEST_MPS);
+            let shaft = k.power_at(rpm * slow / v.max(1e-9));
+            let motor = shaft * powertrain.efficiency / (mass * slow);
+            let generator = shaft / powertrain.efficiency / (mass * slow);
+            forces.push([drive, motor, generator, drag]);
+            let most_nm = powertrain.torque_at(rpm);
+            flows.push(std::array::from_fn::<f64, 4, _>(|i| {
+                let throttle = engine.throttle_for(rpm, most_nm * i as f64 / 3.0);
+                engine.fuel_flow_at(rpm, throttle) / 3600.0
+            }));
+            boosts.push([motor.min((traction.at(v) - driven).max(0.0))]);
+        }
+        let greatest_flow = flows.iter().flatten().fold(0.0, |a: f64, b| a.max(*b));
+        let h = hybrid.mgu_h;
+        let deploy_cost = 1.0 / (k.motor_efficiency * powertrain.efficiency);
+        let harvest_gain = k.generator_efficiency * powertrain.efficiency;
+        Ok(Self {
+            mass,
+            rows_per_speed_squared: limits.rows_per_speed_squared,
+            deploy_cost,
+            harvest_gain,
+            force_per_deployed: 1.0 / (mass * deploy_cost),
+            force_per_harvested: 1.0 / (mass * harvest_gain),
+            harvest_most: hybrid.rules.harvested_k_j.unwrap_or(1e12),
+            exhaust_gain: h.map_or(0.0, |h| -h.power_w(0.0, 1.0) / greatest_flow),
+            exhaust_cost: h.map_or(0.0, |h| CONSUMPTION_KGPJ * h.generator_cost_w / h.generator_w),
+            exhaust_from: h.map_or(1e9, |h| h.from_speed_mps.powi(2)),
+            exhaust_to_ax: h.map_or(0.0, |h| h.to_ax_mps2),
+            forces: with_rises(&forces),
+            flows: with_rises(&flows),
+            boosts: with_rises(&boosts),
+        })
+    }
+
+    /// `envelope` with the rolling resistance of `car`, if it has one.
+    ///
+    /// # Errors
+    /// Those of [`Envelope::new`].
+    pub fn rolling(car: &Car, envelope: &Envelope) -> Result<Envelope> {
+        let rolling = GRAVITY_MPS2 * car.hybrid.as_ref().map_or(0.0, |h| h.rolling_resistance);
+        let slowed = |row: &EnvelopeRow| EnvelopeRow {
+            drag_mps2: row.drag_mps2 + rolling,
+            ..*row
+        };
+        Envelope::new(envelope.name(), envelope.rows().iter().map(slowed).collect())
+    }
+
+    /// The tables in the precision that the scalar `R` stores tables in.
+    pub fn stored<R: Real>(&self) -> EnergyTable<R::Storage> {
+        let all = |table: &[f64]| table.iter().map(|x| R::store(*x)).collect();
+        EnergyTable {
+            mass: R::store(self.mass),
+            rows_per_speed_squared: R::store(self.rows_per_speed_squared),
+            deploy_cost: R::store(self.deploy_cost),
+            harvest_gain: R::store(self.harvest_gain),
+            force_per_deployed: R::store(self.force_per_deployed),
+            force_per_harvested: R::store(self.force_per_harvested),
+            harvest_most: R::store(self.harvest_most),
+            exhaust_gain: R::store(self.exhaust_gain),
+            exhaust_cost: R::store(self.exhaust_cost),
+            exhaust_from: R::store(self.exhaust_from),
+            exhaust_to_ax: R::store(self.exhaust_to_ax),
+            forces: all(&self.forces),
+            flows: all(&self.flows),
+            boosts: all(&self.boosts),
+        }
+    }
+}
+
+/// Rows of the figures at each knot but the last and their rises to the next.
+fn with_rises<const N: usize>(knots: &[[f64; N]]) -> Vec<f64> {
+    let mut table = Vec::with_capacity(2 * N * knots.len());
+    for pair in knots.windows(2) {
+        table.extend(pair[0]);
+        table.extend((0..N).map(|i| pair[1][i] - pair[0][i]));
+    }
+    table
+}

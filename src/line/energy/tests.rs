@@ -1,0 +1,175 @@
+use super::*;
+use crate::evaluate::hybrid::{Free, HybridLine, HybridObjective, HybridProblem, Strategy};
+use crate::study::envelope::{EnvelopeSettings, car_limits};
+use crate::vehicle::Car;
+use glam::DVec2;
+use proptest::prelude::*;
+use std::f64::consts::TAU;
+use std::sync::OnceLock;
+
+fn car() -> &'static EnergyCar {
+    static CAR: OnceLock<EnergyCar> = OnceLock::new();
+    CAR.get_or_init(|| {
+        let car = Car::load("gt_hybrid").unwrap();
+        let coarse = EnvelopeSettings {
+            step_mps: 10.0,
+            ..EnvelopeSettings::default()
+        };
+        let limits = car_limits(&car, &coarse).unwrap();
+        let rows = limits
+            .speeds
+            .iter()
+            .map(|s| (s.row.v_mps, s.traction_mps2))
+            .collect();
+        EnergyCar::new(car, limits.envelope, Traction { rows }, 2.0).unwrap()
+    })
+}
+
+/// A bean of some 2 km with bends of all kinds.
+fn bean() -> Vec<DVec2> {
+    (0..250)
+        .map(|i| {
+            let angle = TAU * f64::from(i) / 250.0;
+            let radius = 320.0 + 90.0 * (2.0 * angle).sin() + 25.0 * (5.0 * angle).cos();
+            radius * DVec2::from_angle(angle)
+        })
+        .collect()
+}
+
+fn problem(mode: Mode) -> HybridProblem {
+    let points_m = bean();
+    let n = points_m.len();
+    let lengths: Vec<f64> = (0..n)
+        .map(|i| points_m[i].distance(points_m[(i + 1) % n]))
+        .collect();
+    let plan = EnergyPlan::zoned(&lengths, &[10, 80, 140, 200], true, 220, mode);
+    let free = [
+        Free::Steer,
+        Free::Speed,
+        Free::Acceleration,
+        Free::Soc,
+        Free::Energy,
+    ];
+    let strategy = Strategy {
+        free: free.into_iter().chain((0..4).map(Free::Zone)).collect(),
+        ..Strategy::fixed(Gates::OPEN, 4)
+    };
+    let line = HybridLine::Fixed {
+        points_m,
+        closed: true,
+    };
+    HybridProblem::new(line, car().clone(), plan, strategy, &HybridObjective::ALL, 10.0).unwrap()
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(200))]
+    /// Whatever the strategy: what is in the store at the end is what was there, was harvested and was not deployed; gates
+    /// and limits hold on every segment; and a lap with the motor is none slower.
+    #[test]
+    fn books_balance_and_gates_hold(
+        additional in any::<bool>(),
+        steer in 0.0..0.15f64,
+        speed in 15.0..80.0f64,
+        ax in 0.0..4.0f64,
+        soc in 0.6..1.05f64,
+        energy in 0.0..3.0f64,
+        shares in prop::array::uniform4(0.0..1.0f64),
+    ) {
+        static PROBLEMS: OnceLock<[HybridProblem; 2]> = OnceLock::new();
+        let problems = PROBLEMS.get_or_init(|| [problem(Mode::Offset), problem(Mode::Additional)]);
+        let problem = &problems[usize::from(additional)];
+        let mut candidate = vec![steer, speed, ax, soc, energy];
+        candidate.extend(shares);
+        let (lap, segments, course) = problem.lap(&candidate);
+        let passed = lap.deployed + lap.harvested_k + lap.harvested_h;
+        // A rounding of what has passed for every segment and sum.
+        let bound = 4.0 * 250.0 * f64::EPSILON * passed.max(1.0);
+        prop_assert!((lap.change - (lap.harvested_k + lap.harvested_h - lap.deployed)).abs() <= bound);
+        prop_assert!(lap.deployed <= 1e6 * energy + 1e-6);
+        let (mut change, mut least) = (0.0f64, 0.0f64);
+        for (i, s) in segments.iter().enumerate() {
+            if s.deployed > 0.0 {
+                prop_assert!(s.start <= speed * speed * (1.0 + 1e-12));
+                prop_assert!(course.curvature[i] * 2.6 <= steer * (1.0 + 1e-12));
+                // The floor is only ever approached by deploying.
+                let floor = (soc - 1.0) * 5.3e6;
+                prop_assert!(change - s.deployed >= floor - 1e-6);
+            }
+            change += s.harvested_k + s.harvested_h - s.deployed;
+            least = least.min(change);
+            prop_assert!(s.load <= 1.0 && s.time > 0.0 && s.fuel > 0.0);
+            // The wheels' force is what moves the car: engine, motor and brakes against drag.
+            prop_assert!(s.engine.min(s.generator + s.hydraulic) < 1e-9);
+        }
+        let closed = (segments[0].start / segments[249].end - 1.0).abs();
+        prop_assert!(closed < 2e-3, "the lap ends {closed} off the speed that it began with");
+        candidate[4] = 0.0;
+        let engine = problem.lap(&candidate).0;
+        prop_assert!(lap.time <= engine.time * (1.0 + 1e-9) && engine.deployed == 0.0);
+    }
+}
+
+#[test]
+fn tables_say_what_the_powertrain_says() {
+    let car = car();
+    let powertrain = car.car.powertrain.as_ref().unwrap();
+    let engine = powertrain.engine.as_ref().unwrap();
+    let (mass, radius) = (1245.0, 0.325);
+    let rows = car.table.forces.len() / 8;
+    let at = |table: &[f64], v: f64, column: usize| {
+        let place = v * v * car.table.rows_per_speed_squared;
+        let row = (place as usize).min(rows - 1);
+        table[8 * row + column] + (place - row as f64) * table[8 * row + 4 + column]
+    };
+    for v in [22.0, 35.0, 48.0, 55.0, 63.0] {
+        let gear = powertrain.gear(v, radius).unwrap();
+        // Within what a step of 0.2 m/s rounds off a kink of the torque.
+        assert!(
+            (at(&car.table.forces, v, 0) / (gear.force_n / mass) - 1.0).abs() < 5e-3,
+            "{v}"
+        );
+        // 120 kW less the gearbox's losses, over the speed.
+        let motor = car.hybrid.mgu_k.power_at(gear.engine_speed_rpm) * 0.95 / (mass * v);
+        assert!((at(&car.table.forces, v, 1) / motor - 1.0).abs() < 5e-3, "{v}");
+        for (column, load) in [(0, 0.0), (1, 1.0 / 3.0), (2, 2.0 / 3.0), (3, 1.0)] {
+            let power = load * gear.force_n * v;
+            let flow = powertrain
+                .operating_point(v, power, radius)
+                .unwrap()
+                .fuel_flow_kgph
+                / 3600.0;
+            assert!(
+                (at(&car.table.flows, v, column) / flow - 1.0).abs() < 2e-2,
+                "{v} {load}"
+            );
+        }
+        // Between its four loads the flow is close to the map's.
+        let power = 0.5 * gear.force_n * v;
+        let flow = powertrain
+            .operating_point(v, power, radius)
+            .unwrap()
+            .fuel_flow_kgph
+            / 3600.0;
+        let between = 0.5 * (at(&car.table.flows, v, 1) + at(&car.table.flows, v, 2));
+        assert!((between / flow - 1.0).abs() < 2e-2, "{v}: {between} and {flow}");
+    }
+    assert_eq!(engine.fuel_density_kgpl, 0.748);
+}
+
+#[test]
+fn zones_are_cut_by_distance() {
+    // Two zones of four and two segments; the first reaches over the start line.
+    let plan = EnergyPlan::zoned(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0], &[2, 4], true, 0, Mode::Offset);
+    let row = |i: usize| {
+        (
+            plan.zones[i].zone,
+            plan.zones[i].position,
+            1.0 / plan.zones[i].per_share,
+        )
+    };
+    let near =
+        |a: (u32, f64, f64), b: (u32, f64, f64)| a.0 == b.0 && (a.1 - b.1).abs() + (a.2 - b.2).abs() < 1e-12;
+    assert!(near(row(2), (0, 0.0, 3.0 / 7.0)) && near(row(3), (0, 3.0 / 7.0, 4.0 / 7.0)));
+    assert!(near(row(4), (1, 0.0, 5.0 / 14.0)) && near(row(1), (1, 12.0 / 14.0, 2.0 / 14.0)));
+    assert_eq!(plan.count(), 2);
+}

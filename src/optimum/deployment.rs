@@ -1,0 +1,283 @@
+//! Where a motor's energy buys most time on a fixed line.
+//!
+//! Speeds squared and the motor's share of its force in each segment are the unknowns. A lap's time is a convex function of
+//! the speeds squared, and what must be braked for bounds these from above whatever the motor does; only how far engine,
+//! tyres and motor take the car along a segment bends. A sequence of cone programs with that linearised about the last lap
+//! leads to the optimum, each lap being driven anew in full. After S. Ebbesen, M. Salazar, P. Elbert, C. Bussi and C. H.
+//! Onder, *Time-optimal control strategies for a hybrid electric race car*, IEEE Trans. Control Syst. Technol. 26, 2018.
+
+use super::conic::{Affine, ConicProgram, Status};
+use crate::error::{Error, Result};
+use crate::evaluate::hybrid::{HybridObjective, HybridProblem, Strategy};
+use crate::line::energy::kernel::motor_step;
+use crate::line::energy::{EnergyCar, EnergyLap, EnergyPlan, Gates, Mode};
+use glam::DVec2;
+use std::time::Instant;
+
+/// The best deployment of an energy.
+#[derive(Clone, Debug)]
+pub struct Deployment {
+    /// The motor's share of its force in each segment.
+    pub shares: Vec<f64>,
+    /// The lap.
+    pub lap: EnergyLap<f64>,
+    /// How the last program ended.
+    pub status: Status,
+    /// Programs solved.
+    pub programs: usize,
+    /// The last program's bound on the time (s): no lap is faster to first order about the one before. Nothing where none was
+    /// solved, or not well enough to say.
+    pub bound_s: Option<f64>,
+    /// Time that it took (s).
+    pub seconds: f64,
+}
+
+/// Where deployments are looked for.
+pub struct DeploymentSearch<'a> {
+    /// The car.
+    pub car: &'a EnergyCar,
+    /// Points of the line (m).
+    pub points_m: &'a [DVec2],
+    /// Whether the line is closed.
+    pub closed: bool,
+    /// A slow section late in the lap.
+    pub run_in: usize,
+    /// Greatest speed at the start of an open line (m/s).
+    pub entry_mps: f64,
+}
+
+/// Programs at most.
+const PROGRAMS: usize = 30;
+/// A gain of time below which the search ends (s), well under what a lap is measured to.
+const GAIN_S: f64 = 2e-5;
+/// Shares move no further than this in the first program.
+const FIRST_MOVE: f64 = 1.0;
+/// Speeds squared are reckoned in these (m^2/s^2), so that all unknowns are about one.
+const SQUARE: f64 = 1000.0;
+/// Step of the derivatives by the speed squared, as a share of it.
+const DERIVATIVE: f64 = 1e-4;
+
+/// A segment about the last lap.
+struct Linear {
+    /// Speed squared at the end at the last speed and share, and its derivatives by both.
+    reached: f64,
+    by_square: f64,
+    by_share: f64,
+    /// Energy (J), likewise.
+    energy: f64,
+    energy_by_square: f64,
+    energy_by_share: f64,
+}
+
+impl DeploymentSearch<'_> {
+    /// The lap with these shares of the motor's force, segment by segment, within a budget (J); no harvest is counted on.
+    fn problem(&self, energy_j: f64) -> Result<HybridProblem> {
+        let n = self.points_m.len();
+        let gates = Gates {
+            ax_mps2: -1e3,
+            soc: -1e6,
+            energy_mj: energy_j / 1e6,
+            ..Gates::OPEN
+        };
+        HybridProblem::new(
+            crate::evaluate::hybrid::HybridLine::Fixed {
+                points_m: self.points_m.to_vec(),
+                closed: self.closed,
+            },
+            self.car.clone(),
+            EnergyPlan::single(n, self.run_in, Mode::Additional),
+            Strategy {
+                free: (0..n).map(crate::evaluate::hybrid::Free::Zone).collect(),
+                ..Strategy::fixed(gates, n)
+            },
+            &[HybridObjective::LapTime],
+            self.entry_mps,
+        )
+    }
+
+    /// The fastest lap with no more than `energy_j` out of the store, started from `shares`.
+    ///
+    /// # Errors
+    /// [`Error::Input`] for a line or energy that cannot be; [`Error::Study`] if the solver refuses.
+    pub fn best(&self, energy_j: f64, start: Option<&[f64]>) -> Result<Deployment> {
+        let began = Instant::now();
+        if !(0.0..=1e12).contains(&energy_j) {
+            return Err(Error::input(
+                "deployment",
+                "energy",
+                format!("{energy_j} J"),
+                "0 or more",
+            ));
+        }
+        let problem = self.problem(energy_j)?;
+        let n = self.points_m.len();
+        let mut shares = start.map_or_else(|| vec![0.0; n], <[f64]>::to_vec);
+        let (mut lap, mut segments, mut course) = problem.lap(&shares);
+        let mut status = Status::Solved;
+        let mut bound_s = None;
+        let (mut programs, mut reach) = (0, FIRST_MOVE);
+        while energy_j > 0.0 && programs < PROGRAMS {
+            let squares: Vec<f64> = segments.iter().map(|s| s.start).collect();
+            let linear: Vec<Linear> = (0..segments.len())
+                .map(|i| self.linear(&course.length, &course.curvature, i, squares[i], shares[i]))
+                .collect();
+            let program = Program {
+                closed: self.closed,
+                length: &course.length,
+                most: &course.speed_squared,
+                squares: &squares,
+                end: segments.last().map_or(0.0, |s| s.end),
+                shares: &shares,
+                linear: &linear,
+                energy_j,
+                reach,
+            };
+            let (found, bound, ended) = program.solve()?;
+            programs += 1;
+            let tried = problem.lap(&found);
+            let gain = lap.time - tried.0.time;
+            if gain > 0.0 {
+                shares = found;
+                (lap, segments, course) = tried;
+                (status, bound_s) = (ended, Some(bound).filter(|b| b.is_finite()));
+                if gain < GAIN_S {
+                    break;
+                }
+            } else {
+                // The model is only good nearby.
+                reach *= 0.4;
+                if reach < 1e-3 {
+                    break;
+                }
+            }
+        }
+        Ok(Deployment {
+            shares,
+            lap,
+            status,
+            programs,
+            bound_s,
+            seconds: began.elapsed().as_secs_f64(),
+        })
+    }
+
+    fn linear(&self, length: &[f64], curvature: &[f64], i: usize, square: f64, share: f64) -> Linear {
+        let (h, n) = (length[i], curvature.len());
+        let bends = [curvature[i], curvature[(i + 1) % n]];
+        let step =
+            |square: f64, share: f64| motor_step(&self.car.limits, &self.car.table, square, h, bends, share);
+        let cost = self.car.table.mass * self.car.table.deploy_cost * h;
+        let [reached, motor] = step(square, share);
+        let around = DERIVATIVE * square;
+        let (low, high) = (step(square - around, share), step(square + around, share));
+        let slope = |k: usize| (high[k] - low[k]) / (2.0 * around);
+        // Between no motor and all of it: beyond what the tyres take, a share changes neither speed nor energy.
+        let (none, all) = (step(square, 0.0), step(square, 1.0));
+        Linear {
+            reached,
+            // Arriving faster never means leaving slower: where a step on the very limit of grip says so, a program would
+            // slow down for it, and the next lap would not.
+            by_square: slope(0).max(0.0),
+            by_share: all[0] - none[0],
+            energy: cost * motor,
+            energy_by_square: cost * slope(1),
+            energy_by_share: cost * (all[1] - none[1]),
+        }
+    }
+}
+
+/// The cone program about a lap.
+struct Program<'a> {
+    closed: bool,
+    length: &'a [f64],
+    most: &'a [f64],
+    squares: &'a [f64],
+    /// Speed squared at the end of the last segment.
+    end: f64,
+    shares: &'a [f64],
+    linear: &'a [Linear],
+    energy_j: f64,
+    reach: f64,
+}
+
+impl Program<'_> {
+    /// The shares, the bound on the time (s) and how the solver ended.
+    fn solve(&self) -> Result<(Vec<f64>, f64, Status)> {
+        let segments = self.linear.len();
+        let n = self.shares.len();
+        let points = if self.closed { segments } else { segments + 1 };
+        let old = |i: usize| self.squares.get(i).copied().unwrap_or(self.end);
+        // Speeds squared, roots, inverse means, shares.
+        let mut lower: Vec<f64> = (0..points).map(|i| 0.5 * old(i) / SQUARE).collect();
+        let mut upper: Vec<f64> = (0..points)
+            .map(|i| self.most[i % n].max(old(i)) / SQUARE)
+            .collect();
+        if !self.closed {
+            upper[0] = old(0) / SQUARE;
+        }
+        lower.extend(vec![f64::NEG_INFINITY; points + segments]);
+        upper.extend(vec![f64::INFINITY; points + segments]);
+        for share in &self.shares[..segments] {
+            lower.push((share - self.reach).max(0.0));
+            upper.push((share + self.reach).min(1.0));
+        }
+        let (root, inverse, share) = (points, 2 * points, 2 * points + segments);
+        let mut program = ConicProgram::new(lower, upper).with_tolerance(1e-8);
+        let affine = |constant: f64, terms: Vec<(usize, f64)>| Affine { constant, terms }.merged();
+        for i in 0..points {
+            // root^2 <= square
+            program.add_cone([
+                affine(1.0, vec![(i, 1.0)]),
+                affine(0.0, vec![(root + i, 2.0)]),
+                affine(-1.0, vec![(i, 1.0)]),
+            ]);
+        }
+        let mut budget = affine(self.energy_j, Vec::new());
+        let per_second = SQUARE.sqrt();
+        for (i, linear) in self.linear.iter().enumerate() {
+            let next = (i + 1) % points;
+            // 1 <= inverse * (root + next root); time is twice the length times the inverse.
+            let sum = [(root + i, 1.0), (root + next, 1.0)];
+            let with = |sign: f64| {
+                sum.iter()
+                    .map(|&(k, a)| (k, sign * a))
+                    .chain([(inverse + i, 1.0)])
+                    .collect()
+            };
+            program.add_cone([
+                affine(0.0, with(1.0)),
+                affine(2.0, Vec::new()),
+                affine(0.0, with(-1.0)),
+            ]);
+            program.add_linear(inverse + i, 2.0 * self.length[i] / per_second);
+            // The speed at the end is no greater than what the segment leads to.
+            let constant =
+                linear.reached - linear.by_square * self.squares[i] - linear.by_share * self.shares[i];
+            program.add_nonnegative(affine(
+                constant / SQUARE,
+                vec![
+                    (i, linear.by_square),
+                    (share + i, linear.by_share / SQUARE),
+                    (next, -1.0),
+                ],
+            ));
+            budget.constant -= linear.energy
+                - linear.energy_by_square * self.squares[i]
+                - linear.energy_by_share * self.shares[i];
+            budget.terms.push((i, -linear.energy_by_square * SQUARE));
+            budget.terms.push((share + i, -linear.energy_by_share));
+        }
+        let scale = self.energy_j.max(1e3).recip();
+        budget.constant *= scale;
+        for term in &mut budget.terms {
+            term.1 *= scale;
+        }
+        program.add_nonnegative(budget.merged());
+        let solution = program.solve()?;
+        let mut shares = self.shares.to_vec();
+        for (s, found) in shares.iter_mut().zip(&solution.x[share..]) {
+            *s = found.clamp(0.0, 1.0);
+        }
+        Ok((shares, solution.lower_bound, solution.status))
+    }
+}

@@ -1,0 +1,135 @@
+//! Tables and figures.
+
+use super::{HybridSummary, told_laps};
+use crate::error::Result;
+use crate::report::{Cells, Column, write_csv, write_whole};
+use crate::study::hybrid::{HybridSetup, HybridStudySettings, Outcome, ReportedLap};
+use serde::Serialize;
+use std::path::Path;
+
+/// A name as a part of a file's name.
+pub fn stem(name: &str) -> String {
+    name.chars()
+        .map(|c| if c.is_alphanumeric() { c } else { '_' })
+        .collect()
+}
+
+#[derive(Serialize)]
+struct Manifest<'a> {
+    program: &'static str,
+    version: &'static str,
+    study: &'static str,
+    seed: u64,
+    backend: &'a str,
+    adapter: &'a str,
+    driver: &'a str,
+    track: &'a str,
+    car: &'a str,
+    settings: &'static str,
+    interrupted: bool,
+}
+
+pub fn write(
+    folder: &Path,
+    settings: &HybridStudySettings,
+    setup: &HybridSetup,
+    outcome: &Outcome,
+    summary: &HybridSummary,
+) -> Result<()> {
+    let json = |name: &str, value: serde_json::Result<String>| {
+        let path = folder.join(name);
+        let text = value.map_err(|e| crate::Error::io(&path, "write", std::io::Error::other(e)))?;
+        write_whole(path, text.as_bytes())
+    };
+    json("summary.json", serde_json::to_string_pretty(summary))?;
+    let manifest = Manifest {
+        program: "lapswarm",
+        version: env!("CARGO_PKG_VERSION"),
+        study: "hybrid",
+        seed: settings.seed,
+        backend: outcome.backend.backend,
+        adapter: &outcome.backend.device,
+        driver: &outcome.backend.driver,
+        track: &setup.raceline.track_name,
+        car: &setup.car.name,
+        settings: "study.toml",
+        interrupted: outcome.interrupted,
+    };
+    json("manifest.json", serde_json::to_string_pretty(&manifest))?;
+    write_whole(folder.join("study.toml"), settings.to_toml().as_bytes())?;
+    setup.car.car.write(folder, "car")?;
+    let (x, y): (Vec<f64>, Vec<f64>) = setup.points_m.iter().map(|p| (p.x, p.y)).unzip();
+    write_table(&folder.join("line.csv"), &[("x", "m", x), ("y", "m", y)])?;
+    for lap in told_laps(outcome) {
+        write_lap(&folder.join(format!("lap_{}.csv", stem(&lap.name))), setup, lap)?;
+    }
+    if let Some(front) = outcome.optimised.as_ref().and_then(|o| o.swarm_front.as_ref()) {
+        let column = |rows: &[Vec<f64>], k: usize| rows.iter().map(|row| row[k]).collect::<Vec<f64>>();
+        let mut table: Vec<(&str, &str, Vec<f64>)> = settings
+            .objectives
+            .iter()
+            .enumerate()
+            .map(|(k, o)| (o.name(), o.unit(), column(&front.objectives, k)))
+            .collect();
+        table.extend(
+            front
+                .names
+                .iter()
+                .enumerate()
+                .map(|(k, name)| (name.as_str(), "-", column(&front.candidates, k))),
+        );
+        write_table(&folder.join("front.csv"), &table)?;
+    }
+    Ok(())
+}
+
+fn write_table(path: &Path, table: &[(&str, &str, Vec<f64>)]) -> Result<()> {
+    let columns: Vec<Column<'_>> = table
+        .iter()
+        .map(|(name, unit, values)| Column {
+            name,
+            unit,
+            cells: Cells::Numbers(values),
+        })
+        .collect();
+    write_csv(path, &columns)
+}
+
+/// A lap, segment by segment: place, speed, powers at the wheels, energies, charge, fuel.
+fn write_lap(path: &Path, setup: &HybridSetup, lap: &ReportedLap) -> Result<()> {
+    let mass = setup.car.table.mass;
+    let each = |f: &dyn Fn(&crate::line::energy::SegmentEnergy<f64>) -> f64| {
+        lap.segments.iter().map(f).collect::<Vec<f64>>()
+    };
+    // A force over the mass, over a segment's length, in its time.
+    let power = |f: &dyn Fn(&crate::line::energy::SegmentEnergy<f64>) -> f64| -> Vec<f64> {
+        lap.segments
+            .iter()
+            .zip(&lap.length_m)
+            .map(|(s, h)| mass * f(s) * h / s.time / 1e3)
+            .collect()
+    };
+    let store = &setup.car.hybrid.store;
+    let soc = lap.change_j()[..lap.segments.len()]
+        .iter()
+        .map(|c| store.start_soc + c / store.capacity_j)
+        .collect();
+    write_table(
+        path,
+        &[
+            ("station", "m", lap.station_m.clone()),
+            ("v", "m/s", each(&|s| s.start.sqrt())),
+            ("time", "s", each(&|s| s.time)),
+            ("engine_power", "kW", power(&|s| s.engine)),
+            ("motor_power", "kW", power(&|s| s.motor)),
+            ("generator_power", "kW", power(&|s| s.generator)),
+            ("brake_power", "kW", power(&|s| s.hydraulic)),
+            ("load", "-", each(&|s| s.load)),
+            ("deployed", "J", each(&|s| s.deployed)),
+            ("harvested_k", "J", each(&|s| s.harvested_k)),
+            ("harvested_h", "J", each(&|s| s.harvested_h)),
+            ("soc", "-", soc),
+            ("fuel", "kg", each(&|s| s.fuel)),
+        ],
+    )
+}

@@ -1,0 +1,364 @@
+//! What a hybrid study leaves behind: figures for people and scripts, laps, pictures.
+
+mod files;
+mod pictures;
+
+use super::{HybridSetup, HybridStudySettings, Outcome, ReportedLap, Sizing, StintLap};
+use crate::error::Result;
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// The figures of a scenario.
+#[derive(Clone, Debug, Serialize)]
+pub struct ScenarioFigures {
+    /// `offset` or `additional`.
+    pub mode: &'static str,
+    /// Energy out of the store (MJ).
+    pub deployed_mj: f64,
+    /// Energy of the MGU-K into the store (MJ).
+    pub harvested_k_mj: f64,
+    /// Energy of the MGU-H into the store (MJ).
+    pub harvested_h_mj: f64,
+    /// State of charge at the end.
+    pub soc_end: f64,
+    /// Greatest state of charge along the lap.
+    pub soc_greatest: f64,
+    /// Fuel (l).
+    pub fuel_l: f64,
+    /// Share of the lap's time with the motor on.
+    pub motor_time_share: f64,
+    /// Share of the lap's time with the generator on.
+    pub generator_time_share: f64,
+    /// Time (s).
+    pub lap_time_s: f64,
+    /// Time by the same gates with the motor adding to the engine (s).
+    pub additional_lap_time_s: f64,
+    /// Energy out of the store then (MJ).
+    pub additional_deployed_mj: f64,
+    /// What charge at the end, harvest and deployment do not balance by (J).
+    pub balance_error_j: f64,
+}
+
+impl ScenarioFigures {
+    fn of(setup: &HybridSetup, own: &ReportedLap, additional: &ReportedLap) -> Self {
+        let store = &setup.car.hybrid.store;
+        let soc = |change: f64| store.start_soc + change / store.capacity_j;
+        let lap = &own.lap;
+        let greatest = own.change_j().into_iter().fold(0.0, f64::max);
+        let generating = own.segments.iter().filter(|s| s.generator > 0.0).map(|s| s.time);
+        Self {
+            mode: own.mode.name(),
+            deployed_mj: lap.deployed / 1e6,
+            harvested_k_mj: lap.harvested_k / 1e6,
+            harvested_h_mj: lap.harvested_h / 1e6,
+            soc_end: soc(lap.change),
+            soc_greatest: soc(greatest),
+            fuel_l: lap.fuel / setup.car.fuel_density_kgpl,
+            motor_time_share: lap.motor_time / lap.time,
+            generator_time_share: generating.sum::<f64>() / lap.time,
+            lap_time_s: lap.time,
+            additional_lap_time_s: additional.lap.time,
+            additional_deployed_mj: additional.lap.deployed / 1e6,
+            balance_error_j: own.balance_error_j(),
+        }
+    }
+}
+
+/// A point of the front of time against energy.
+#[derive(Clone, Debug, Serialize)]
+pub struct FrontFigures {
+    /// Energy that may leave the store (MJ).
+    pub energy_mj: f64,
+    /// Energy that did (MJ).
+    pub deployed_mj: f64,
+    /// Time of the exact optimum (s).
+    pub lap_time_s: f64,
+}
+
+/// The deployment of the study's energy.
+#[derive(Clone, Debug, Serialize)]
+pub struct DeploymentFigures {
+    /// Energy that may leave the store (MJ).
+    pub energy_mj: f64,
+    /// Time of the exact optimum (s).
+    pub exact_lap_time_s: f64,
+    /// Energy that it uses (MJ).
+    pub exact_deployed_mj: f64,
+    /// How its solver ended.
+    pub exact_status: String,
+    /// Cone programs solved.
+    pub exact_programs: usize,
+    /// The last program's bound on the time, to first order (s); `null` where it has none.
+    pub exact_bound_s: Option<f64>,
+    /// Time that the solver took (s).
+    pub exact_elapsed_s: f64,
+    /// Time of the swarm's lap (s).
+    pub swarm_lap_time_s: f64,
+    /// Energy that it uses (MJ).
+    pub swarm_deployed_mj: f64,
+    /// How much slower than the exact optimum it is (s).
+    pub swarm_above_exact_s: f64,
+    /// What the swarm's deployment gains on the engine alone (s).
+    pub gain_s: f64,
+    /// Zones that the swarm shares the energy out over.
+    pub zones: usize,
+    /// The energy that an endless store is used for (MJ): no greater budget binds.
+    pub binds_up_to_mj: f64,
+    /// Time against energy, by the exact optimum.
+    pub front: Vec<FrontFigures>,
+    /// Laps on the swarm's front between the study's objectives.
+    pub swarm_front_size: Option<usize>,
+}
+
+/// The figures of a study; `--json` prints this.
+#[derive(Clone, Debug, Serialize)]
+pub struct HybridSummary {
+    /// `hybrid`.
+    pub study: &'static str,
+    /// The track.
+    pub track: String,
+    /// The car.
+    pub car: String,
+    /// The line.
+    pub line: String,
+    /// Its length (m).
+    pub length_m: f64,
+    /// Seed of all random numbers.
+    pub seed: u64,
+    /// `cpu`, `simd` or `gpu`.
+    pub backend: &'static str,
+    /// Instruction set, or name of the adapter.
+    pub adapter: String,
+    /// Driver of the adapter.
+    pub driver: String,
+    /// Scenarios, solvers and swarms (s).
+    pub elapsed_s: f64,
+    /// Laps evaluated.
+    pub evaluations: u64,
+    /// Laps per second of the swarms; `null` where none ran.
+    pub evaluations_per_s: Option<f64>,
+    /// What the rules allow to be deployed on this lap (MJ); `null` without a limit.
+    pub rules_deployed_mj: Option<f64>,
+    /// Time of the engine alone (s).
+    pub engine_lap_time_s: f64,
+    /// Fuel of the engine alone (l).
+    pub engine_fuel_l: f64,
+    /// The scenarios.
+    pub scenarios: BTreeMap<String, ScenarioFigures>,
+    /// The deployment of the study's energy.
+    pub deployment: Option<DeploymentFigures>,
+    /// The laps of a stint.
+    pub stint: Vec<StintLap>,
+    /// Motors with which the car laps in the time asked for.
+    pub sizing: Vec<Sizing>,
+    /// What a reader must know before believing the figures.
+    pub warnings: Vec<String>,
+    /// Whether the study was broken off.
+    pub interrupted: bool,
+}
+
+/// Puts the figures together.
+pub fn summarise(settings: &HybridStudySettings, setup: &HybridSetup, outcome: &Outcome) -> HybridSummary {
+    let scenarios: BTreeMap<String, ScenarioFigures> = outcome
+        .scenarios
+        .iter()
+        .map(|s| {
+            (
+                s.own.name.clone(),
+                ScenarioFigures::of(setup, &s.own, &s.additional),
+            )
+        })
+        .collect();
+    let mut warnings = Vec::new();
+    let rules = setup
+        .car
+        .hybrid
+        .rules
+        .deployed_on(setup.length_m)
+        .map(|j| j / 1e6);
+    for (name, s) in &scenarios {
+        if let Some(most) = rules.filter(|most| s.deployed_mj > most + 1e-9) {
+            warnings.push(format!(
+                "{name}: {:.2} MJ deployed, which the rules hold to {most:.2} MJ",
+                s.deployed_mj
+            ));
+        }
+        if s.soc_end < 0.0 {
+            warnings.push(format!(
+                "{name}: the store is led to {:.3} of its charge: it is too small",
+                s.soc_end
+            ));
+        }
+        if s.soc_greatest > 1.0 + 1e-9 {
+            warnings.push(format!(
+                "{name}: the charge reaches {:.3} of the store, which would have to be so much larger",
+                s.soc_greatest
+            ));
+        }
+    }
+    HybridSummary {
+        study: "hybrid",
+        track: setup.raceline.track_name.clone(),
+        car: setup.car.name.clone(),
+        line: setup.line_name.clone(),
+        length_m: setup.length_m,
+        seed: settings.seed,
+        backend: outcome.backend.backend,
+        adapter: outcome.backend.device.clone(),
+        driver: outcome.backend.driver.clone(),
+        elapsed_s: outcome.elapsed_s,
+        evaluations: outcome.evaluations,
+        evaluations_per_s: (outcome.search_s > 0.0).then(|| outcome.evaluations as f64 / outcome.search_s),
+        rules_deployed_mj: rules,
+        engine_lap_time_s: outcome.engine.lap.time,
+        engine_fuel_l: outcome.engine.lap.fuel / setup.car.fuel_density_kgpl,
+        scenarios,
+        deployment: outcome.optimised.as_ref().map(|o| DeploymentFigures {
+            energy_mj: o.budget_j / 1e6,
+            exact_lap_time_s: o.exact.lap.time,
+            exact_deployed_mj: o.exact.lap.deployed / 1e6,
+            exact_status: format!("{:?}", o.exact.status),
+            exact_programs: o.exact.programs,
+            exact_bound_s: o.exact.bound_s,
+            exact_elapsed_s: o.exact.seconds,
+            swarm_lap_time_s: o.swarm.lap.lap.time,
+            swarm_deployed_mj: o.swarm.lap.lap.deployed / 1e6,
+            swarm_above_exact_s: o.swarm.lap.lap.time - o.exact.lap.time,
+            gain_s: outcome.engine.lap.time - o.swarm.lap.lap.time,
+            zones: o.swarm.shares.len(),
+            binds_up_to_mj: o.unbound_j / 1e6,
+            front: o
+                .front
+                .iter()
+                .map(|p| FrontFigures {
+                    energy_mj: p.budget_j / 1e6,
+                    deployed_mj: p.deployment.lap.deployed / 1e6,
+                    lap_time_s: p.deployment.lap.time,
+                })
+                .collect(),
+            swarm_front_size: o.swarm_front.as_ref().map(|f| f.objectives.len()),
+        }),
+        stint: outcome.stint.clone(),
+        sizing: outcome.sizing.clone(),
+        warnings,
+        interrupted: outcome.interrupted,
+    }
+}
+
+impl HybridSummary {
+    /// The figures in words.
+    pub fn to_text(&self) -> String {
+        let mut text = format!(
+            "{} with the {}, {} line of {:.0} m: {:.3} s and {:.3} l by the engine alone\n",
+            self.track, self.car, self.line, self.length_m, self.engine_lap_time_s, self.engine_fuel_l
+        );
+        if !self.scenarios.is_empty() {
+            text += &format!(
+                "{:22}{:>11}{:>9}{:>9}{:>9}{:>8}{:>9}{:>8}{:>10}{:>12}\n",
+                "scenario",
+                "mode",
+                "out MJ",
+                "K MJ",
+                "H MJ",
+                "SOC",
+                "motor %",
+                "fuel l",
+                "lap s",
+                "added lap s"
+            );
+        }
+        for (name, s) in &self.scenarios {
+            text += &format!(
+                "{name:22}{:>11}{:>9.3}{:>9.3}{:>9.3}{:>8.3}{:>9.1}{:>8.3}{:>10.3}{:>12.3}\n",
+                s.mode,
+                s.deployed_mj,
+                s.harvested_k_mj,
+                s.harvested_h_mj,
+                s.soc_end,
+                100.0 * s.motor_time_share,
+                s.fuel_l,
+                s.lap_time_s,
+                s.additional_lap_time_s
+            );
+        }
+        if let Some(d) = &self.deployment {
+            text += &format!(
+                "{:.2} MJ beside the engine: swarm {:.3} s with {:.3} MJ over {} zones, exact optimum {:.3} s with {:.3} MJ; \
+                 {:.3} s gained\nNo more than {:.2} MJ are of use. Time against energy:\n",
+                d.energy_mj,
+                d.swarm_lap_time_s,
+                d.swarm_deployed_mj,
+                d.zones,
+                d.exact_lap_time_s,
+                d.exact_deployed_mj,
+                d.gain_s,
+                d.binds_up_to_mj
+            );
+            for p in &d.front {
+                text += &format!("{:>8.2} MJ{:>10.3} s\n", p.energy_mj, p.lap_time_s);
+            }
+        }
+        for (i, lap) in self.stint.iter().enumerate() {
+            text += &format!(
+                "lap {:>3}: {:.1} kg, {:.3} s and {:.3} l (engine alone {:.3} s, {:.3} l), {:.3} MJ out and {:.3} in, SOC {:.3}\n",
+                i + 1,
+                lap.mass_kg,
+                lap.lap_time_s,
+                lap.fuel_l,
+                lap.engine_lap_time_s,
+                lap.engine_fuel_l,
+                lap.deployed_mj,
+                lap.harvested_mj,
+                lap.soc_end
+            );
+        }
+        for s in &self.sizing {
+            text += &match s.energy_mj {
+                Some(mj) => format!(
+                    "{:>6.0} kW and {mj:.2} MJ a lap ({:.2} harvested) lap in {:.3} s with {:.3} l\n",
+                    s.power_kw, s.harvested_mj, s.lap_time_s, s.fuel_l
+                ),
+                None => format!(
+                    "{:>6.0} kW do not suffice: {:.3} s at best\n",
+                    s.power_kw, s.lap_time_s
+                ),
+            };
+        }
+        if let Some(rate) = self.evaluations_per_s {
+            text += &format!(
+                "{} laps evaluated ({rate:.0} per second) on {} {}\n",
+                self.evaluations, self.backend, self.adapter
+            );
+        }
+        for warning in &self.warnings {
+            text += &format!("Note: {warning}\n");
+        }
+        text
+    }
+}
+
+/// Writes all files of a run into `folder`.
+///
+/// # Errors
+/// [`crate::Error::Io`] if one cannot be written.
+pub fn write_results(
+    folder: &Path,
+    settings: &HybridStudySettings,
+    setup: &HybridSetup,
+    outcome: &Outcome,
+    summary: &HybridSummary,
+) -> Result<()> {
+    files::write(folder, settings, setup, outcome, summary)?;
+    pictures::draw(folder, settings, setup, outcome)
+}
+
+/// The laps that a study tells of.
+fn told_laps(outcome: &Outcome) -> Vec<&ReportedLap> {
+    let mut laps = vec![&outcome.engine];
+    laps.extend(outcome.scenarios.iter().map(|s| &s.own));
+    if let Some(o) = &outcome.optimised {
+        laps.extend([&o.exact_lap, &o.swarm.lap]);
+    }
+    laps
+}

@@ -1,0 +1,113 @@
+//! Strategies set by hand.
+
+use super::setup::HybridSetup;
+use crate::error::Result;
+use crate::evaluate::hybrid::{HybridObjective, HybridProblem, Strategy};
+use crate::line::energy::{EnergyLap, EnergyPlan, Gates, Mode, SegmentEnergy};
+
+/// A strategy by its gates.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scenario {
+    /// Its name.
+    pub name: String,
+    /// Whether the motor takes the engine's place or adds to it.
+    pub mode: Mode,
+    /// Its gates.
+    pub gates: Gates,
+}
+
+/// The four scenarios of the thesis, with the motor in the engine's place: gates of steering (rad at the wheels) and speed
+/// (m/s), then of charge or of energy.
+pub fn published() -> Vec<Scenario> {
+    let scenario = |name: &str, steer_rad: f64, speed_mps: f64, soc: f64, energy_mj: f64| Scenario {
+        name: name.to_owned(),
+        mode: Mode::Offset,
+        gates: Gates {
+            steer_rad,
+            speed_mps,
+            soc,
+            energy_mj,
+            ..Gates::OPEN
+        },
+    };
+    vec![
+        scenario("charge_depleting", 0.02, 70.0, -10.0, 1000.0),
+        scenario("charge_sustaining", 0.02, 70.0, 1.0, 1000.0),
+        scenario("maximum_deployment", 0.15, 70.0, 0.0, 1000.0),
+        scenario("maximum_permissible", 0.05, 60.0, 0.0, 5.3),
+    ]
+}
+
+/// A lap with everything that is told of it.
+#[derive(Clone, Debug)]
+pub struct ReportedLap {
+    /// What it is.
+    pub name: String,
+    /// Whether the motor takes the engine's place or adds to it.
+    pub mode: Mode,
+    /// The sums.
+    pub lap: EnergyLap<f64>,
+    /// Every segment.
+    pub segments: Vec<SegmentEnergy<f64>>,
+    /// Distance from the start of each segment (m).
+    pub station_m: Vec<f64>,
+    /// Length of each segment (m).
+    pub length_m: Vec<f64>,
+}
+
+impl ReportedLap {
+    /// The lap of a candidate.
+    pub fn of(name: &str, problem: &HybridProblem, candidate: &[f64]) -> Self {
+        let (lap, segments, course) = problem.lap(candidate);
+        let length_m = course.length[..segments.len()].to_vec();
+        let station_m = length_m
+            .iter()
+            .scan(0.0, |station, h| {
+                let here = *station;
+                *station += h;
+                Some(here)
+            })
+            .collect();
+        Self {
+            name: name.to_owned(),
+            mode: problem.energy().mode,
+            lap,
+            segments,
+            station_m,
+            length_m,
+        }
+    }
+
+    /// What the books do not balance by (J).
+    pub fn balance_error_j(&self) -> f64 {
+        self.lap.change - ((self.lap.harvested_k + self.lap.harvested_h) - self.lap.deployed)
+    }
+
+    /// Charge at the start of each segment above that at the start of the lap, and at the end (J).
+    pub fn change_j(&self) -> Vec<f64> {
+        let mut sum = 0.0;
+        let mut changes = vec![0.0];
+        for s in &self.segments {
+            sum += s.harvested_k + s.harvested_h - s.deployed;
+            changes.push(sum);
+        }
+        changes
+    }
+}
+
+/// Drives a scenario on the study's line.
+///
+/// # Errors
+/// Those of [`HybridProblem::new`].
+pub fn drive(setup: &HybridSetup, name: &str, mode: Mode, gates: Gates) -> Result<ReportedLap> {
+    let n = setup.points_m.len();
+    let problem = HybridProblem::new(
+        setup.fixed_line(),
+        setup.car.clone(),
+        EnergyPlan::whole(n, setup.run_in, mode),
+        Strategy::fixed(gates, 1),
+        &[HybridObjective::LapTime],
+        setup.entry_mps,
+    )?;
+    Ok(ReportedLap::of(name, &problem, &[]))
+}

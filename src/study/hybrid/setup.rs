@@ -1,0 +1,180 @@
+//! Track, car and line.
+
+use super::settings::HybridStudySettings;
+use crate::error::{Error, Result};
+use crate::evaluate::hybrid::HybridLine;
+use crate::evaluate::line::LineObjective;
+use crate::line::FineLine;
+use crate::line::energy::{EnergyCar, Traction};
+use crate::study::envelope::{EnvelopeSettings, car_limits};
+use crate::study::raceline::{self, ExactSolvers, RacelineSettings};
+use crate::vehicle::{Car, Envelope};
+use glam::DVec2;
+use std::path::Path;
+
+/// Everything that laps are driven with.
+#[derive(Clone, Debug)]
+pub struct HybridSetup {
+    /// Track and limits as racing lines know them.
+    pub raceline: raceline::Setup,
+    /// Their settings.
+    pub raceline_settings: RacelineSettings,
+    /// The car with its energy.
+    pub car: EnergyCar,
+    /// What the line is, in words.
+    pub line_name: String,
+    /// Share of the usable width at every cut, where the line was found here.
+    pub alpha: Option<Vec<f64>>,
+    /// Points of the line (m).
+    pub points_m: Vec<DVec2>,
+    /// Length of the line (m).
+    pub length_m: f64,
+    /// Whether it is closed.
+    pub closed: bool,
+    /// The sharpest bend late in the lap.
+    pub run_in: usize,
+    /// Greatest speed at the start of an open line (m/s).
+    pub entry_mps: f64,
+}
+
+/// Bends from this share of the lap on are late.
+const LATE: f64 = 0.6;
+
+/// The sharpest bend late in a lap of these curvatures (1/m).
+pub(super) fn late_bend(curvature_1pm: &[f64]) -> usize {
+    let n = curvature_1pm.len();
+    ((LATE * n as f64) as usize..n)
+        .max_by(|&i, &j| curvature_1pm[i].abs().total_cmp(&curvature_1pm[j].abs()))
+        .unwrap_or(0)
+}
+
+/// Reads track and car and finds the line.
+///
+/// # Errors
+/// [`Error::Input`] and [`Error::Io`] for what cannot be read or used; [`Error::Study`] if the solver of the fastest line
+/// refuses.
+pub fn set_up(settings: &HybridStudySettings) -> Result<HybridSetup> {
+    settings.validate()?;
+    let raceline_settings = settings.raceline();
+    let mut setup = raceline::set_up(&raceline_settings)?;
+    let car = Car::load(&settings.car)?;
+    let (envelope, traction) = match &settings.envelope {
+        Some(path) => (Envelope::load(path)?, Traction::default()),
+        None => {
+            let limits = car_limits(&car, &EnvelopeSettings::default())?;
+            let rows = limits.speeds.iter().map(|s| (s.row.v_mps, s.traction_mps2));
+            (limits.envelope.clone(), Traction { rows: rows.collect() })
+        }
+    };
+    let car = EnergyCar::new(car, envelope, traction, raceline_settings.ellipse_exponent)?;
+    setup.car = car.point_mass.clone();
+    let closed = setup.cuts.closed;
+    let (line_name, alpha, through) = match &settings.line {
+        Some(path) => (
+            path.display().to_string(),
+            None,
+            read_line(path, settings.spacing_m)?,
+        ),
+        None => {
+            let found = ExactSolvers::new(&setup, &raceline_settings)?.best(LineObjective::LapTime)?;
+            let Some(found) = found else {
+                return Err(Error::Study("there is no solver for the fastest line".to_owned()));
+            };
+            let points = setup.cuts.points(&found.alpha);
+            ("fastest".to_owned(), Some(found.alpha), points)
+        }
+    };
+    let fine = FineLine::new(&through, closed, settings.spacing_m, None, settings.entry_mps)?;
+    Ok(HybridSetup {
+        run_in: late_bend(&fine.curvature_1pm),
+        length_m: fine.length_m,
+        points_m: fine.points_m,
+        closed,
+        car,
+        line_name,
+        alpha,
+        entry_mps: settings.entry_mps,
+        raceline: setup,
+        raceline_settings,
+    })
+}
+
+impl HybridSetup {
+    /// The line, fixed.
+    pub fn fixed_line(&self) -> HybridLine {
+        HybridLine::Fixed {
+            points_m: self.points_m.clone(),
+            closed: self.closed,
+        }
+    }
+
+    /// What may be deployed in a lap (J): of what is asked for, the rules and a full store the least.
+    pub fn budget_j(&self, asked_mj: Option<f64>) -> f64 {
+        let hybrid = &self.car.hybrid;
+        let rules = hybrid.rules.deployed_on(self.length_m).unwrap_or(f64::INFINITY);
+        let store = hybrid.store.capacity_j * hybrid.store.start_soc;
+        asked_mj.map_or(rules.min(store), |mj| 1e6 * mj)
+    }
+}
+
+/// Points of a line from the columns `x` and `y`, whatever their units are written like, at least `spacing_m` apart.
+fn read_line(path: &Path, spacing_m: f64) -> Result<Vec<DVec2>> {
+    let file = path.display().to_string();
+    let text = crate::config::read_text(path)?;
+    let mut reader = csv::ReaderBuilder::new()
+        .comment(Some(b'#'))
+        .trim(csv::Trim::All)
+        .from_reader(text.as_bytes());
+    let unreadable = |e: csv::Error| {
+        let line = e.position().map_or(0, csv::Position::line);
+        Error::input(
+            &file,
+            format!("line {line}"),
+            e.to_string(),
+            "a row like the header",
+        )
+    };
+    let header = reader.headers().map_err(unreadable)?.clone();
+    let column = |name: &str| {
+        let matches =
+            |h: &str| h == name || h.starts_with(&format!("{name}_")) || h.starts_with(&format!("{name} "));
+        header
+            .iter()
+            .position(|h| matches(h) || h.starts_with(&format!("{name}[")))
+            .ok_or_else(|| {
+                let found = header.iter().collect::<Vec<_>>().join(",");
+                Error::input(
+                    &file,
+                    format!("line 1, column {name}"),
+                    found,
+                    "columns x and y in m",
+                )
+            })
+    };
+    let (x, y) = (column("x")?, column("y")?);
+    let mut points: Vec<DVec2> = Vec::new();
+    for record in reader.records() {
+        let record = record.map_err(unreadable)?;
+        let line = record.position().map_or(0, csv::Position::line);
+        let number = |column: usize, name: &str| {
+            let field = record.get(column).unwrap_or_default();
+            field
+                .parse::<f64>()
+                .ok()
+                .filter(|x| x.is_finite())
+                .ok_or_else(|| {
+                    let place = format!("line {line}, field {name}");
+                    Error::input(&file, place, format!("`{field}`"), "a number")
+                })
+        };
+        let point = DVec2::new(number(x, "x")?, number(y, "y")?);
+        if points.last().is_none_or(|last| last.distance(point) >= spacing_m) {
+            points.push(point);
+        }
+    }
+    // The end of a closed line may repeat its start.
+    while points.len() > 3 && points[0].distance(points[points.len() - 1]) < 0.5 * spacing_m {
+        points.pop();
+    }
+    Ok(points)
+}

@@ -1,0 +1,354 @@
+//! Where the motor works: by the exact optimum, by a swarm, and along the fronts between objectives.
+
+use super::scenario::{ReportedLap, drive};
+use super::settings::{FreePart, HybridStudySettings};
+use super::setup::{HybridSetup, late_bend};
+use crate::error::Result;
+use crate::evaluate::BackendInfo;
+use crate::evaluate::hybrid::{
+    Free, HybridLine, HybridObjective, HybridProblem, Strategy, open_hybrid_evaluator,
+};
+use crate::line::energy::{EnergyPlan, Gates, Mode};
+use crate::line::{Parametrisation, geometry};
+use crate::optimum::{Deployment, DeploymentSearch};
+use crate::random::Random;
+use crate::swarm::{
+    HybridSettings, HybridSwarm, Mopso, MopsoSettings, Optimiser, Progress, PsoSettings, run,
+};
+use std::ops::ControlFlow;
+
+/// Gaps shorter than this do not end a stretch (m).
+const GAP_M: f64 = 8.0;
+/// Stretches of less are none (J).
+const LEAST_J: f64 = 5e3;
+/// Metres of the reference line for each control point of free lines.
+const CONTROL_SPACING_M: f64 = 40.0;
+
+/// Gates that leave all to the zones, but for the energy (MJ).
+pub fn zone_gates(energy_mj: f64) -> Gates {
+    Gates {
+        ax_mps2: -1e3,
+        soc: -1e6,
+        energy_mj,
+        ..Gates::OPEN
+    }
+}
+
+/// Sections where stretches begin that the motor is of use on, by what it gives in each segment (J) of a lap on which nothing
+/// holds it back, and by the segments' lengths (m). Where tyres or corners take all that the engine gives, it adds nothing.
+pub fn zone_starts(given_j: &[f64], length_m: &[f64]) -> Vec<usize> {
+    let n = given_j.len();
+    let mut on: Vec<bool> = given_j.iter().map(|j| *j > 0.0).collect();
+    let runs = |on: &[bool]| -> Vec<(usize, usize)> {
+        let Some(first) = (0..n).find(|&i| on[i] != on[(i + n - 1) % n]) else {
+            return Vec::new();
+        };
+        let mut runs = Vec::new();
+        let mut k = 0;
+        while k < n {
+            let start = (first + k) % n;
+            let count = (0..n - k)
+                .take_while(|j| on[(start + j) % n] == on[start])
+                .count();
+            runs.push((start, count));
+            k += count;
+        }
+        runs
+    };
+    let sum = |values: &[f64], (start, count): (usize, usize)| {
+        (0..count).map(|j| values[(start + j) % n]).sum::<f64>()
+    };
+    for run in runs(&on) {
+        if !on[run.0] && sum(length_m, run) < GAP_M {
+            (0..run.1).for_each(|j| on[(run.0 + j) % n] = true);
+        }
+    }
+    let worth_it = |run: &(usize, usize)| on[run.0] && sum(given_j, *run) > LEAST_J;
+    let mut starts: Vec<usize> = runs(&on).iter().filter(|r| worth_it(r)).map(|r| r.0).collect();
+    starts.sort_unstable();
+    if starts.is_empty() { vec![0] } else { starts }
+}
+
+/// What the swarm found for one budget.
+#[derive(Clone, Debug)]
+pub struct FoundStrategy {
+    /// The share of each zone in which the motor works.
+    pub shares: Vec<f64>,
+    /// The lap, in `f64`.
+    pub lap: ReportedLap,
+    /// Laps evaluated.
+    pub evaluations: u64,
+    /// Best time (s) against evaluations.
+    pub history: Vec<(u64, f64)>,
+    /// What evaluated.
+    pub backend: BackendInfo,
+}
+
+impl HybridSetup {
+    /// The exact deployment of an energy (J) on the study's line, started from known shares of segments.
+    ///
+    /// # Errors
+    /// Those of [`DeploymentSearch::best`].
+    pub fn exact(&self, energy_j: f64, start: Option<&[f64]>) -> Result<Deployment> {
+        let search = DeploymentSearch {
+            car: &self.car,
+            points_m: &self.points_m,
+            closed: self.closed,
+            run_in: self.run_in,
+            entry_mps: self.entry_mps,
+        };
+        search.best(energy_j, start)
+    }
+
+    /// The lap of an exact deployment with everything that is told of it.
+    ///
+    /// # Errors
+    /// Those of [`HybridProblem::new`].
+    pub fn exact_lap(&self, name: &str, shares: &[f64], energy_j: f64) -> Result<ReportedLap> {
+        let n = self.points_m.len();
+        let problem = HybridProblem::new(
+            self.fixed_line(),
+            self.car.clone(),
+            EnergyPlan::single(n, self.run_in, Mode::Additional),
+            Strategy {
+                shares: shares.to_vec(),
+                ..Strategy::fixed(zone_gates(energy_j / 1e6), n)
+            },
+            &[HybridObjective::LapTime],
+            self.entry_mps,
+        )?;
+        Ok(ReportedLap::of(name, &problem, &[]))
+    }
+
+    /// The problem of sharing an energy (MJ) out over the stretches that the motor is of use on.
+    ///
+    /// # Errors
+    /// Those of [`HybridProblem::new`].
+    pub fn zone_problem(&self, energy_mj: f64, objectives: &[HybridObjective]) -> Result<HybridProblem> {
+        let open = drive(self, "open", Mode::Additional, zone_gates(1e6))?;
+        let given: Vec<f64> = open.segments.iter().map(|s| s.deployed).collect();
+        let starts = zone_starts(&given, &open.length_m);
+        let mut length = open.length_m;
+        length.resize(self.points_m.len(), 0.0);
+        let plan = EnergyPlan::zoned(&length, &starts, self.closed, self.run_in, Mode::Additional);
+        let zones = plan.count();
+        HybridProblem::new(
+            self.fixed_line(),
+            self.car.clone(),
+            plan,
+            Strategy {
+                free: (0..zones).map(Free::Zone).collect(),
+                ..Strategy::fixed(zone_gates(energy_mj), zones)
+            },
+            objectives,
+            self.entry_mps,
+        )
+    }
+}
+
+/// The swarm's strategy for an energy (MJ).
+///
+/// # Errors
+/// Those of the problem and the evaluator.
+pub fn search_strategy(
+    setup: &HybridSetup,
+    settings: &HybridStudySettings,
+    energy_mj: f64,
+    mut observe: impl FnMut(&Progress) -> ControlFlow<()>,
+) -> Result<FoundStrategy> {
+    let problem = setup.zone_problem(energy_mj, &[HybridObjective::LapTime])?;
+    let mut swarm = HybridSwarm::new(
+        &problem.problem,
+        HybridSettings {
+            population: settings.population,
+            iterations: settings.iterations,
+            seed: settings.seed,
+            ..HybridSettings::default()
+        },
+    )?;
+    let mut evaluator = open_hybrid_evaluator(&problem, settings.backend, settings.adapter.as_deref())?;
+    let mut history = Vec::new();
+    run(&mut swarm, evaluator.as_mut(), |progress| {
+        history.push((progress.evaluations, progress.best[0]));
+        observe(progress)
+    })?;
+    let front = swarm.front();
+    let shares = front.candidates[0].clone();
+    Ok(FoundStrategy {
+        lap: ReportedLap::of("swarm", &problem, &shares),
+        shares,
+        evaluations: swarm.evaluations(),
+        history,
+        backend: evaluator.backend(),
+    })
+}
+
+/// Laps none of which another betters in every objective.
+#[derive(Clone, Debug, Default)]
+pub struct StrategyFront {
+    /// Variables, in their order.
+    pub names: Vec<String>,
+    /// Candidates.
+    pub candidates: Vec<Vec<f64>>,
+    /// Their objectives.
+    pub objectives: Vec<Vec<f64>>,
+    /// Laps evaluated.
+    pub evaluations: u64,
+}
+
+/// Looks for the front between the study's objectives, with strategy, line or both free.
+///
+/// # Errors
+/// Those of the problem and the evaluator.
+pub fn search_front(
+    setup: &HybridSetup,
+    settings: &HybridStudySettings,
+    energy_mj: f64,
+    observe: impl FnMut(&Progress) -> ControlFlow<()>,
+) -> Result<StrategyFront> {
+    let fixed = setup.zone_problem(energy_mj, &settings.objectives)?;
+    let mut starts: Vec<Vec<f64>> = Vec::new();
+    let problem = match (settings.free, &setup.alpha) {
+        (FreePart::Strategy, _) | (_, None) => fixed,
+        (free, Some(alpha)) => {
+            let cuts = setup.raceline.cuts.clone();
+            let n = cuts.len();
+            let controls = ((cuts.length_m / CONTROL_SPACING_M) as usize).clamp(4, n);
+            let parametrisation = Parametrisation::control_points(controls);
+            let coefficients = parametrisation.fit(&cuts, alpha)?;
+            let line = parametrisation.variables_of(&coefficients);
+            // Zones lie where they do on the fixed line, by distance.
+            let shape = geometry(&cuts.points(alpha), cuts.closed);
+            let mut length = shape.segment_m.clone();
+            length.resize(n, 0.0);
+            let zone_sections = sections_of(&fixed, &length);
+            let run_in = late_bend(&shape.curvature_1pm);
+            let plan = EnergyPlan::zoned(&length, &zone_sections, cuts.closed, run_in, Mode::Additional);
+            let zones = plan.count();
+            let free_zones = if free == FreePart::Line { 0 } else { zones };
+            let problem = HybridProblem::new(
+                HybridLine::Free {
+                    cuts: Box::new(cuts),
+                    parametrisation,
+                },
+                setup.car.clone(),
+                plan,
+                Strategy {
+                    free: (0..free_zones).map(Free::Zone).collect(),
+                    ..Strategy::fixed(zone_gates(energy_mj), zones)
+                },
+                &settings.objectives,
+                settings.entry_mps,
+            )?;
+            starts = vec![line];
+            problem
+        }
+    };
+    let mopso = MopsoSettings {
+        motion: PsoSettings {
+            population: settings.population,
+            iterations: settings.iterations,
+            seed: settings.seed,
+            ..MopsoSettings::default().motion
+        },
+        ..MopsoSettings::default()
+    };
+    let mut swarm = Mopso::new(&problem.problem, mopso)?;
+    swarm.start_from(&starting_candidates(&problem, settings, &starts));
+    let mut evaluator = open_hybrid_evaluator(&problem, settings.backend, settings.adapter.as_deref())?;
+    run(&mut swarm, evaluator.as_mut(), observe)?;
+    Ok(StrategyFront {
+        names: problem.problem.variables.iter().map(|v| v.name.clone()).collect(),
+        candidates: swarm.archive_candidates(),
+        objectives: swarm.archive().objectives.clone(),
+        evaluations: swarm.evaluations(),
+    })
+}
+
+/// Sections of these lengths (m) where the zones of `fixed`, whose sections are evenly spaced, begin.
+fn sections_of(fixed: &HybridProblem, length_m: &[f64]) -> Vec<usize> {
+    let zones = &fixed.energy().zones;
+    let n = zones.len();
+    let total: f64 = length_m.iter().sum();
+    let mut starts: Vec<usize> = (0..n)
+        .filter(|&i| zones[i].zone != zones[(i + n - 1) % n].zone)
+        .map(|i| {
+            let station = i as f64 / n as f64 * total;
+            let mut along = 0.0;
+            length_m
+                .iter()
+                .position(|h| {
+                    along += h;
+                    along > station
+                })
+                .unwrap_or(0)
+        })
+        .collect();
+    starts.sort_unstable();
+    starts.dedup();
+    if starts.is_empty() { vec![0] } else { starts }
+}
+
+/// Known lines, or none, with shares of all zones from none to all.
+fn starting_candidates(
+    problem: &HybridProblem,
+    settings: &HybridStudySettings,
+    lines: &[Vec<f64>],
+) -> Vec<Vec<f64>> {
+    /// Purpose of the draws in the counter.
+    const SPREAD: u32 = 0x11e9;
+    let random = Random::new(settings.seed);
+    let shares = problem.dimensions() - problem.line_variables();
+    let line_of = |i: usize| match lines {
+        [] => Vec::new(),
+        lines => lines[i % lines.len()].clone(),
+    };
+    (0..settings.population)
+        .map(|i| {
+            let level = i as f64 / (settings.population - 1) as f64;
+            let noise = |k: usize| random.uniform(SPREAD, 0, i as u32, k as u32) - 0.5;
+            let mut candidate = line_of(i);
+            if i >= lines.len() {
+                for (k, x) in candidate.iter_mut().enumerate() {
+                    let v = &problem.problem.variables[k];
+                    *x = (*x + 0.02 * noise(shares + k) * (v.upper - v.lower)).clamp(v.lower, v.upper);
+                }
+            }
+            candidate.extend((0..shares).map(|k| (level + 0.2 * noise(k)).clamp(0.0, 1.0)));
+            candidate
+        })
+        .collect()
+}
+
+/// Gates of speed (m/s) that a lap with a budget is tried with: the lowest spends it where it is worth most.
+pub fn gate_speeds() -> impl Iterator<Item = f64> {
+    (8..=36).map(|i| 2.0 * f64::from(i))
+}
+
+/// Budgets are looked for up to this (MJ).
+pub const MOST_MJ: f64 = 30.0;
+
+/// The budget (MJ) at which `excess`, which falls with it, comes to nought; the greatest if it never does, nought if it
+/// always has.
+///
+/// # Errors
+/// Those of `excess`.
+pub fn budget_at(mut excess: impl FnMut(f64) -> Result<f64>) -> Result<f64> {
+    let (mut low, mut high) = (0.0, MOST_MJ);
+    if excess(low)? <= 0.0 {
+        return Ok(low);
+    }
+    if excess(high)? > 0.0 {
+        return Ok(high);
+    }
+    // To a tenth of a joule.
+    while high - low > 1e-7 {
+        let middle = 0.5 * (low + high);
+        if excess(middle)? > 0.0 {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    Ok(high)
+}

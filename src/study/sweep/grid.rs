@@ -1,0 +1,288 @@
+//! The grid of settings of a sweep.
+
+use super::SweptStudy;
+use crate::config::read_text;
+use crate::error::{Error, Result};
+use std::collections::BTreeMap;
+use std::path::Path;
+use toml::{Table, Value};
+
+/// A sweep: which study, what all of its runs share, and what they differ in.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SweepSettings {
+    /// The study.
+    pub study: SweptStudy,
+    /// Keys that all runs share.
+    base: Table,
+    /// Values of each key of the grid, in the order of the file's keys; the last key changes fastest.
+    axes: Vec<(String, Vec<Value>)>,
+    /// The sweep file, as it was read.
+    pub(super) text: String,
+    file: String,
+}
+
+/// One run of a sweep.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Point {
+    /// What it differs in, key by key, as text.
+    pub settings: BTreeMap<String, String>,
+    /// Its study file.
+    pub study: String,
+}
+
+/// Sweep files that come with the crate, by name.
+const BUNDLED: [(&str, &str); 4] = [
+    (
+        "thesis_inertia",
+        include_str!("../../../data/sweeps/thesis_inertia.toml"),
+    ),
+    (
+        "thesis_population",
+        include_str!("../../../data/sweeps/thesis_population.toml"),
+    ),
+    ("norms", include_str!("../../../data/sweeps/norms.toml")),
+    ("sections", include_str!("../../../data/sweeps/sections.toml")),
+];
+
+/// Most runs of a sweep.
+const MOST_RUNS: usize = 100_000;
+/// Keys that name files, which are relative to the sweep file.
+const FILES: [&str; 6] = ["car", "log", "channel_map", "track", "truth", "envelope"];
+
+impl SweepSettings {
+    /// A bundled sweep by name, or a sweep file.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if it cannot be read, [`Error::Input`] naming what is wrong in it.
+    pub fn load(name_or_path: &str) -> Result<Self> {
+        if let Some((name, text)) = BUNDLED.iter().find(|(name, _)| *name == name_or_path) {
+            return Self::parse(Path::new(name), text);
+        }
+        let path = Path::new(name_or_path);
+        if path.extension().is_none() {
+            let known: Vec<&str> = BUNDLED.iter().map(|(name, _)| *name).collect();
+            let expected = format!("a TOML file, or one of {}", known.join(", "));
+            return Err(Error::input(path, "the sweep", name_or_path, expected));
+        }
+        Self::parse(path, &read_text(path)?)
+    }
+
+    /// Reads a sweep file's text.
+    ///
+    /// # Errors
+    /// [`Error::Input`] naming what is wrong in it.
+    pub fn parse(path: &Path, text: &str) -> Result<Self> {
+        let refuse =
+            |place: &str, found: String, expected: &str| Err(Error::input(path, place, found, expected));
+        let mut root: Table = match text.parse() {
+            Ok(root) => root,
+            Err(e) => {
+                let e: toml::de::Error = e;
+                let line = e
+                    .span()
+                    .map_or(0, |s| text[..s.start.min(text.len())].matches('\n').count() + 1);
+                return refuse(&format!("line {line}"), e.message().to_owned(), "a TOML file");
+            }
+        };
+        let study = match root.remove("study") {
+            Some(Value::String(name)) if name == "identify" => SweptStudy::Identify,
+            Some(Value::String(name)) if name == "raceline" => SweptStudy::Raceline,
+            other => {
+                let found = other.map_or("nothing".to_owned(), |v| v.to_string());
+                return refuse("study", found, "\"identify\" or \"raceline\"");
+            }
+        };
+        let mut base = match root.remove("base") {
+            None => Table::new(),
+            Some(Value::Table(base)) => base,
+            Some(other) => return refuse("base", other.to_string(), "a table of the study's keys"),
+        };
+        let folder = std::path::absolute(path.parent().unwrap_or(Path::new(""))).unwrap_or_default();
+        make_absolute(&mut base, &folder);
+        let Some(Value::Table(grid)) = root.remove("grid") else {
+            return refuse(
+                "grid",
+                "no such table".to_owned(),
+                "a table of the study's keys, each with a list of values",
+            );
+        };
+        if let Some((key, value)) = root.iter().next() {
+            return refuse(key, value.to_string(), "no other keys than study, base and grid");
+        }
+        let mut axes = Vec::new();
+        for (key, value) in grid {
+            match value {
+                Value::Array(values) if !values.is_empty() => {
+                    let values: Vec<Value> = values
+                        .into_iter()
+                        .map(|v| absolute_value(&key, v, &folder))
+                        .collect();
+                    axes.push((key, values));
+                }
+                other => {
+                    return refuse(
+                        &format!("grid, {key}"),
+                        other.to_string(),
+                        "a list of values, at least one",
+                    );
+                }
+            }
+        }
+        // Seeds change fastest, so that the runs that a median is taken over lie beside each other.
+        axes.sort_by_key(|(key, _)| key == "seed");
+        let runs = axes.iter().try_fold(1usize, |n, (_, v)| n.checked_mul(v.len()));
+        if runs.is_none_or(|n| n > MOST_RUNS) {
+            return refuse("grid", format!("{runs:?} runs"), "at most 100000 runs");
+        }
+        Ok(Self {
+            study,
+            base,
+            axes,
+            text: text.to_owned(),
+            file: path.display().to_string(),
+        })
+    }
+
+    /// The keys of the grid, the seed last.
+    pub fn keys(&self) -> Vec<&str> {
+        self.axes.iter().map(|(key, _)| key.as_str()).collect()
+    }
+
+    /// Every point of the grid.
+    ///
+    /// # Errors
+    /// [`Error::Input`] if a dotted key goes through something that is no table.
+    pub fn points(&self) -> Result<Vec<Point>> {
+        let count: usize = self.axes.iter().map(|(_, v)| v.len()).product();
+        (0..count)
+            .map(|number| {
+                let mut left = number;
+                let mut chosen: Vec<(&str, &Value)> = Vec::with_capacity(self.axes.len());
+                for (key, values) in self.axes.iter().rev() {
+                    chosen.push((key, &values[left % values.len()]));
+                    left /= values.len();
+                }
+                let mut study = self.base.clone();
+                for (key, value) in chosen.iter().rev() {
+                    self.set(&mut study, key, value)?;
+                }
+                Ok(Point {
+                    settings: chosen
+                        .iter()
+                        .map(|(key, value)| ((*key).to_owned(), plain(value)))
+                        .collect(),
+                    study: study.to_string(),
+                })
+            })
+            .collect()
+    }
+
+    /// Sets `a.b` of nested tables; a table's keys are added to what is there.
+    fn set(&self, table: &mut Table, key: &str, value: &Value) -> Result<()> {
+        let refuse = || {
+            Err(Error::input(
+                &self.file,
+                format!("grid, {key}"),
+                "a key through no table",
+                "a key of the study",
+            ))
+        };
+        if let Some((first, rest)) = key.split_once('.') {
+            let inner = table.entry(first).or_insert_with(|| Value::Table(Table::new()));
+            return match inner {
+                Value::Table(inner) => self.set(inner, rest, value),
+                _ => refuse(),
+            };
+        }
+        if let (Some(Value::Table(there)), Value::Table(more)) = (table.get_mut(key), value) {
+            there.extend(more.clone());
+        } else {
+            table.insert(key.to_owned(), value.clone());
+        }
+        Ok(())
+    }
+}
+
+/// A value as a cell of a table.
+fn plain(value: &Value) -> String {
+    match value {
+        Value::String(text) => text.clone(),
+        Value::Table(table) => {
+            let cells: Vec<String> = table
+                .iter()
+                .map(|(key, value)| format!("{key} {}", plain(value)))
+                .collect();
+            cells.join(", ")
+        }
+        other => other.to_string(),
+    }
+}
+
+fn absolute_value(key: &str, value: Value, folder: &Path) -> Value {
+    match value {
+        Value::String(name) if FILES.contains(&key) && Path::new(&name).extension().is_some() => {
+            Value::String(folder.join(name).display().to_string())
+        }
+        other => other,
+    }
+}
+
+fn make_absolute(base: &mut Table, folder: &Path) {
+    for (key, value) in base.iter_mut() {
+        let taken = std::mem::replace(value, Value::Boolean(false));
+        *value = absolute_value(key, taken, folder);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bundled_sweeps_are_grids_of_sound_studies() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        for (name, _) in BUNDLED {
+            let sweep = SweepSettings::load(name).expect(name);
+            let points = sweep.points().expect(name);
+            assert!(points.len() >= 9, "{name}");
+            for point in points {
+                let path = folder.path().join("study.toml");
+                std::fs::write(&path, &point.study).expect("a study");
+                match sweep.study {
+                    SweptStudy::Identify => {
+                        crate::study::identify::IdentifySettings::read(&path).expect(name);
+                    }
+                    SweptStudy::Raceline => {
+                        crate::study::raceline::RacelineSettings::read(&path).expect(name);
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn seeds_change_fastest_and_tables_are_joined() {
+        let text = "study = \"identify\"\n[base.swarm]\npopulation = 9\n[grid]\nseed = [1, 2]\n\"swarm.iterations\" = [3, 4]\n";
+        let sweep = SweepSettings::parse(Path::new("s.toml"), text).expect("a sweep");
+        let points = sweep.points().expect("points");
+        let seeds: Vec<&str> = points.iter().map(|p| p.settings["seed"].as_str()).collect();
+        assert_eq!(seeds, ["1", "2", "1", "2"]);
+        assert!(points[3].study.contains("population = 9") && points[3].study.contains("iterations = 4"));
+    }
+
+    #[test]
+    fn what_is_no_sweep_is_refused_by_place() {
+        for (text, place) in [
+            ("study = \"cook\"\n", "study"),
+            ("study = \"identify\"\n", "grid"),
+            ("study = \"identify\"\n[grid]\nseed = 1\n", "grid, seed"),
+            ("study = \"identify\"\nmore = 1\n[grid]\nseed = [1]\n", "more"),
+            ("study = \n", "line 1"),
+        ] {
+            let error = SweepSettings::parse(Path::new("s.toml"), text)
+                .expect_err(text)
+                .to_string();
+            assert!(error.contains(place), "{error}");
+        }
+    }
+}

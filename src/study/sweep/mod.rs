@@ -1,0 +1,158 @@
+//! The same study over a grid of settings and seeds: one row for each run, medians over the seeds.
+//!
+//! A run is a study file of its own, made of the base's keys and those of one point of the grid. Rows are kept as they
+//! come, so that a sweep that was broken off goes on where it stopped; they hold nothing that depends on the clock.
+
+mod grid;
+mod results;
+
+pub use grid::{Point, SweepSettings};
+pub use results::{Row, Summary, medians};
+
+use crate::error::{Error, Result};
+use crate::report::write_whole;
+use crate::study::identify::{self, IdentifySettings};
+use crate::study::raceline::{self, RacelineSettings};
+use std::collections::BTreeMap;
+use std::ops::ControlFlow;
+use std::path::Path;
+
+/// The studies that can be swept.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SweptStudy {
+    /// Identification.
+    Identify,
+    /// Racing lines.
+    Raceline,
+}
+
+/// Rows of a sweep as they are kept, one JSON object per line.
+const ROWS: &str = "rows.jsonl";
+/// The sweep that a folder holds.
+const SWEEP: &str = "sweep.toml";
+
+/// What an observer is told before each run.
+pub struct SweepProgress<'a> {
+    /// Runs done.
+    pub done: usize,
+    /// Runs in all.
+    pub planned: usize,
+    /// The point of the grid.
+    pub point: &'a Point,
+}
+
+/// Runs what is left of a sweep in `folder`, which holds nothing yet or, to `resume`, a part of the same sweep.
+///
+/// # Errors
+/// [`Error::Input`] if the folder holds another sweep, or a point of the grid is no study; [`Error::Interrupted`] if the
+/// observer broke the sweep off; those of the studies.
+pub fn sweep(
+    settings: &SweepSettings,
+    folder: &Path,
+    resume: bool,
+    mut observe: impl FnMut(&SweepProgress<'_>) -> ControlFlow<()>,
+) -> Result<Summary> {
+    let points = settings.points()?;
+    // Every point is read before the first is run: a mistake in the last shows at once.
+    let studies = folder.join("studies");
+    std::fs::create_dir_all(&studies).map_err(|e| Error::io(&studies, "create", e))?;
+    let mut rows = if resume {
+        results::read_rows(&folder.join(ROWS), &folder.join(SWEEP), settings, &points)?
+    } else {
+        write_whole(folder.join(SWEEP), settings.text.as_bytes())?;
+        Vec::new()
+    };
+    let path_of = |number: usize| studies.join(format!("{number:05}.toml"));
+    for (number, point) in points.iter().enumerate() {
+        let path = path_of(number);
+        write_whole(&path, point.study.as_bytes())?;
+        match settings.study {
+            SweptStudy::Identify => drop(IdentifySettings::read(&path)?),
+            SweptStudy::Raceline => drop(RacelineSettings::read(&path)?),
+        }
+    }
+    for (number, point) in points.iter().enumerate().skip(rows.len()) {
+        let progress = SweepProgress {
+            done: number,
+            planned: points.len(),
+            point,
+        };
+        if observe(&progress).is_break() {
+            return Err(Error::Interrupted(folder.to_owned()));
+        }
+        let path = path_of(number);
+        let found = match settings.study {
+            SweptStudy::Identify => identified(&path, || observe(&progress))?,
+            SweptStudy::Raceline => lined(&path, || observe(&progress))?,
+        };
+        // A run that was broken off is no row: it is done anew.
+        let Some(figures) = found else {
+            return Err(Error::Interrupted(folder.to_owned()));
+        };
+        rows.push(Row {
+            run: number,
+            settings: point.settings.clone(),
+            figures,
+        });
+        results::write_rows(&folder.join(ROWS), &rows)?;
+    }
+    let summary = Summary::new(settings, rows);
+    summary.write(folder)?;
+    Ok(summary)
+}
+
+type Figures = BTreeMap<String, Option<f64>>;
+
+fn identified(path: &Path, mut observe: impl FnMut() -> ControlFlow<()>) -> Result<Option<Figures>> {
+    let settings = IdentifySettings::read(path)?;
+    let setup = identify::set_up(&settings)?;
+    let outcome = identify::search(&settings, &setup, |_| observe())?;
+    if outcome.interrupted {
+        return Ok(None);
+    }
+    let summary = identify::summarise(&settings, &setup, &outcome);
+    let mut figures = Figures::from([
+        ("evaluations".to_owned(), Some(outcome.evaluations as f64)),
+        (
+            "best_cost".to_owned(),
+            outcome.history.last().and_then(|row| row.best.first().copied()),
+        ),
+        (
+            "swarm_total_parameter_error".to_owned(),
+            summary.swarm_total_parameter_error,
+        ),
+        ("total_parameter_error".to_owned(), summary.total_parameter_error),
+    ]);
+    figures.extend(
+        summary
+            .costs
+            .iter()
+            .map(|(channel, cost)| (format!("cost_{channel}"), Some(*cost))),
+    );
+    Ok(Some(figures))
+}
+
+fn lined(path: &Path, mut observe: impl FnMut() -> ControlFlow<()>) -> Result<Option<Figures>> {
+    let settings = RacelineSettings::read(path)?;
+    let setup = raceline::set_up(&settings)?;
+    let outcome = raceline::find_lines(&settings, &setup, |_| observe())?;
+    if outcome.interrupted {
+        return Ok(None);
+    }
+    let mut figures = Figures::from([("evaluations".to_owned(), Some(outcome.evaluations as f64))]);
+    for o in &outcome.objectives {
+        let name = o.objective.name();
+        let unit = o.objective.unit().replace('/', "p").replace('^', "");
+        figures.insert(format!("swarm_{name}_{unit}"), Some(o.swarm_cost));
+        figures.insert(format!("best_{name}_{unit}"), Some(o.best.worth(o.objective)));
+        figures.insert(
+            format!("exact_{name}_{unit}"),
+            o.exact.as_ref().map(|line| line.worth(o.objective)),
+        );
+    }
+    if let Some(front) = &outcome.front {
+        figures.insert("hypervolume".to_owned(), Some(front.hypervolume));
+        figures.insert("front_size".to_owned(), Some(front.alpha.len() as f64));
+    }
+    Ok(Some(figures))
+}

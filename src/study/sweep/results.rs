@@ -1,0 +1,305 @@
+//! Rows of a sweep, and medians over its seeds.
+
+use super::{Point, SweepSettings};
+use crate::error::{Error, Result};
+use crate::report::{Cells, Column, text_table, write_csv, write_whole};
+use crate::study::run_folder::write_json;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// One run.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Row {
+    /// Its number, from nought.
+    pub run: usize,
+    /// What it differed in.
+    pub settings: BTreeMap<String, String>,
+    /// What came of it.
+    pub figures: BTreeMap<String, Option<f64>>,
+}
+
+/// Median and quartiles of a figure over the seeds of one setting.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Spread {
+    /// A quarter is below.
+    pub lower_quartile: f64,
+    /// Half is below.
+    pub median: f64,
+    /// A quarter is above.
+    pub upper_quartile: f64,
+}
+
+/// Runs of the same settings but for the seed.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Group {
+    /// The settings.
+    pub settings: BTreeMap<String, String>,
+    /// Runs.
+    pub runs: usize,
+    /// Each figure over the runs that have it.
+    pub figures: BTreeMap<String, Spread>,
+}
+
+/// The figures of a sweep; `--json` prints this.
+#[derive(Clone, Debug, Serialize)]
+pub struct Summary {
+    /// `sweep`.
+    pub study: &'static str,
+    /// Every run.
+    pub rows: Vec<Row>,
+    /// Medians over the seeds.
+    pub groups: Vec<Group>,
+}
+
+/// Linear interpolation between order statistics (type 7 of R. Hyndman and Y. Fan, *Sample quantiles in statistical
+/// packages*, Am. Stat. 50, 1996).
+fn quantile(sorted: &[f64], share: f64) -> f64 {
+    let place = share * (sorted.len() - 1) as f64;
+    let below = place.floor() as usize;
+    let above = (below + 1).min(sorted.len() - 1);
+    sorted[below] + (place - below as f64) * (sorted[above] - sorted[below])
+}
+
+/// Medians over runs that differ in nothing but the seed, in the order in which they were run.
+pub fn medians(rows: &[Row]) -> Vec<Group> {
+    let mut groups: Vec<(BTreeMap<String, String>, Vec<&Row>)> = Vec::new();
+    for row in rows {
+        let mut settings = row.settings.clone();
+        settings.remove("seed");
+        match groups.iter_mut().find(|(s, _)| *s == settings) {
+            Some((_, members)) => members.push(row),
+            None => groups.push((settings, vec![row])),
+        }
+    }
+    groups
+        .into_iter()
+        .map(|(settings, members)| {
+            let mut figures = BTreeMap::new();
+            for name in members.iter().flat_map(|r| r.figures.keys()) {
+                let mut values: Vec<f64> = members
+                    .iter()
+                    .filter_map(|r| r.figures.get(name).copied().flatten())
+                    .collect();
+                values.sort_unstable_by(f64::total_cmp);
+                if !values.is_empty() {
+                    let spread = Spread {
+                        lower_quartile: quantile(&values, 0.25),
+                        median: quantile(&values, 0.5),
+                        upper_quartile: quantile(&values, 0.75),
+                    };
+                    figures.insert(name.clone(), spread);
+                }
+            }
+            Group {
+                settings,
+                runs: members.len(),
+                figures,
+            }
+        })
+        .collect()
+}
+
+pub(super) fn write_rows(path: &Path, rows: &[Row]) -> Result<()> {
+    let mut text = String::new();
+    for row in rows {
+        let line =
+            serde_json::to_string(row).map_err(|e| Error::io(path, "write", std::io::Error::other(e)))?;
+        text += &line;
+        text.push('\n');
+    }
+    write_whole(path, text.as_bytes())
+}
+
+/// The rows that a folder holds of this very sweep.
+pub(super) fn read_rows(
+    path: &Path,
+    sweep: &Path,
+    settings: &SweepSettings,
+    points: &[Point],
+) -> Result<Vec<Row>> {
+    let held = std::fs::read_to_string(sweep).map_err(|e| Error::io(sweep, "read", e))?;
+    if held != settings.text {
+        return Err(Error::input(
+            sweep,
+            "--resume",
+            "another sweep",
+            "the sweep that the folder holds",
+        ));
+    }
+    let text = match std::fs::read_to_string(path) {
+        Ok(text) => text,
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(Vec::new()),
+        Err(e) => return Err(Error::io(path, "read", e)),
+    };
+    text.lines()
+        .enumerate()
+        .map(|(number, line)| {
+            let row: Option<Row> = serde_json::from_str(line).ok();
+            let own = |row: &Row| {
+                row.run == number && points.get(number).is_some_and(|p| p.settings == row.settings)
+            };
+            row.filter(own).ok_or_else(|| {
+                Error::input(
+                    path,
+                    format!("line {}", number + 1),
+                    line.chars().take(60).collect::<String>(),
+                    "a row of this sweep",
+                )
+            })
+        })
+        .collect()
+}
+
+impl Summary {
+    pub(super) fn new(_settings: &SweepSettings, rows: Vec<Row>) -> Self {
+        Self {
+            study: "sweep",
+            groups: medians(&rows),
+            rows,
+        }
+    }
+
+    /// The medians as a table.
+    pub fn to_text(&self) -> String {
+        let Some(first) = self.groups.first() else {
+            return String::new();
+        };
+        let keys: Vec<&String> = first.settings.keys().collect();
+        let names: Vec<&String> = first.figures.keys().collect();
+        let settings: Vec<Vec<String>> = keys
+            .iter()
+            .map(|key| self.groups.iter().map(|g| g.settings[*key].clone()).collect())
+            .collect();
+        let figures: Vec<Vec<f64>> = names
+            .iter()
+            .map(|name| {
+                self.groups
+                    .iter()
+                    .map(|g| g.figures.get(*name).map_or(f64::NAN, |s| s.median))
+                    .collect()
+            })
+            .collect();
+        let column = |name, cells| Column {
+            name,
+            unit: "",
+            cells,
+        };
+        let mut columns: Vec<Column<'_>> = keys
+            .iter()
+            .zip(&settings)
+            .map(|(key, cells)| column(key.as_str(), Cells::Texts(cells)))
+            .collect();
+        columns.extend(
+            names
+                .iter()
+                .zip(&figures)
+                .map(|(name, cells)| column(name.as_str(), Cells::Numbers(cells))),
+        );
+        format!("Medians over the seeds\n{}", text_table(&columns))
+    }
+
+    /// Writes `sweep.csv`, `medians.csv` and `summary.json`.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if a file cannot be written.
+    pub(super) fn write(&self, folder: &Path) -> Result<()> {
+        write_json(&folder.join("summary.json"), self)?;
+        let Some(first) = self.rows.first() else {
+            return Ok(());
+        };
+        let texts =
+            |key: &String| -> Vec<String> { self.rows.iter().map(|r| r.settings[key].clone()).collect() };
+        let settings: Vec<(&String, Vec<String>)> =
+            first.settings.keys().map(|key| (key, texts(key))).collect();
+        let numbers = |name: &String| -> Vec<f64> {
+            self.rows
+                .iter()
+                .map(|r| r.figures.get(name).copied().flatten().unwrap_or(f64::NAN))
+                .collect()
+        };
+        let figures: Vec<(&String, Vec<f64>)> =
+            first.figures.keys().map(|name| (name, numbers(name))).collect();
+        let mut columns: Vec<Column<'_>> = settings
+            .iter()
+            .map(|(name, cells)| Column {
+                name,
+                unit: "",
+                cells: Cells::Texts(cells),
+            })
+            .collect();
+        columns.extend(figures.iter().map(|(name, cells)| Column {
+            name,
+            unit: "",
+            cells: Cells::Numbers(cells),
+        }));
+        write_csv(folder.join("sweep.csv"), &columns)?;
+
+        let keys: Vec<(&String, Vec<String>)> = self.groups[0]
+            .settings
+            .keys()
+            .map(|key| (key, self.groups.iter().map(|g| g.settings[key].clone()).collect()))
+            .collect();
+        let mut spreads: Vec<(String, Vec<f64>)> = Vec::new();
+        for name in self.groups[0].figures.keys() {
+            for (ending, of) in [
+                (
+                    "lower_quartile",
+                    (|s: &Spread| s.lower_quartile) as fn(&Spread) -> f64,
+                ),
+                ("median", |s| s.median),
+                ("upper_quartile", |s| s.upper_quartile),
+            ] {
+                let values = self
+                    .groups
+                    .iter()
+                    .map(|g| g.figures.get(name).map_or(f64::NAN, of))
+                    .collect();
+                spreads.push((format!("{name}_{ending}"), values));
+            }
+        }
+        let mut columns: Vec<Column<'_>> = keys
+            .iter()
+            .map(|(name, cells)| Column {
+                name,
+                unit: "",
+                cells: Cells::Texts(cells),
+            })
+            .collect();
+        columns.extend(spreads.iter().map(|(name, cells)| Column {
+            name,
+            unit: "",
+            cells: Cells::Numbers(cells),
+        }));
+        write_csv(folder.join("medians.csv"), &columns)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn medians_are_over_the_seeds_of_one_setting() {
+        let row = |run: usize, k: &str, seed: &str, x: f64| Row {
+            run,
+            settings: BTreeMap::from([
+                ("k".to_owned(), k.to_owned()),
+                ("seed".to_owned(), seed.to_owned()),
+            ]),
+            figures: BTreeMap::from([("x".to_owned(), Some(x)), ("none".to_owned(), None)]),
+        };
+        let rows = [
+            row(0, "a", "1", 3.0),
+            row(1, "a", "2", 1.0),
+            row(2, "a", "3", 2.0),
+            row(3, "b", "1", 9.0),
+        ];
+        let groups = medians(&rows);
+        assert_eq!(groups.len(), 2);
+        let x = groups[0].figures["x"];
+        assert_eq!((x.lower_quartile, x.median, x.upper_quartile), (1.5, 2.0, 2.5));
+        assert_eq!((groups[0].runs, groups[1].runs), (3, 1));
+        assert!(!groups[0].figures.contains_key("none"));
+    }
+}

@@ -1,0 +1,155 @@
+//! States on disk, so that a run goes on where it was broken off, bit for bit.
+//!
+//! A checkpoint is a file of its own kind: `LAPSWARM`, the format's version (`u32`, little endian like all numbers in
+//! it), the length (`u32`) and the name of the kind of state, the length (`u64`) of the state, the state as `postcard`
+//! writes it, and a CRC-32 of all of that. Floats keep every bit, infinities and all. A file that is foreign, newer,
+//! torn or of another state is refused. It is written beside its place and then moved there, so that a run that is
+//! broken off while it writes leaves the last one whole.
+
+use super::{
+    CooperativeSwarm, CovarianceSwarm, DifferenceSwarm, HybridSwarm, Islands, Mopso, Nsga2, Pso, WindowSwarm,
+};
+use crate::error::{Error, Result};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use std::fs::{self, File};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+/// The format that this version writes, and the only one that it reads. It changes with the fields of any state.
+pub const VERSION: u32 = 1;
+
+const MAGIC: &[u8; 8] = b"LAPSWARM";
+
+/// A state that can be kept in a file.
+pub trait Checkpoint: Serialize + DeserializeOwned {
+    /// What the file says that it is.
+    const KIND: &'static str;
+}
+
+macro_rules! checkpoints {
+    ($($state:ty: $kind:literal),* $(,)?) => {
+        $(impl Checkpoint for $state { const KIND: &'static str = $kind; })*
+    };
+}
+
+checkpoints! {
+    CooperativeSwarm: "cooperative swarm",
+    CovarianceSwarm: "covariance swarm",
+    DifferenceSwarm: "difference swarm",
+    HybridSwarm: "hybrid swarm",
+    Mopso: "multi-objective swarm",
+    Nsga2: "NSGA-II",
+    Pso: "swarm",
+    WindowSwarm: "window swarm",
+    Islands<Mopso>: "islands of multi-objective swarms",
+    Islands<Pso>: "islands of swarms",
+    Islands<DifferenceSwarm>: "islands of difference swarms",
+}
+
+/// The bytes of a checkpoint of `state`.
+///
+/// # Errors
+/// [`Error::Study`] if the state cannot be written down at all.
+pub fn to_bytes<T: Checkpoint>(state: &T) -> Result<Vec<u8>> {
+    let payload = postcard::to_allocvec(state)
+        .map_err(|e| Error::Study(format!("the state of the {} cannot be kept: {e}", T::KIND)))?;
+    let mut bytes = Vec::with_capacity(payload.len() + 64);
+    bytes.extend(MAGIC);
+    bytes.extend(VERSION.to_le_bytes());
+    bytes.extend((T::KIND.len() as u32).to_le_bytes());
+    bytes.extend(T::KIND.as_bytes());
+    bytes.extend((payload.len() as u64).to_le_bytes());
+    bytes.extend(payload);
+    bytes.extend(crc32fast::hash(&bytes).to_le_bytes());
+    Ok(bytes)
+}
+
+/// The state in the bytes of a checkpoint; `file` is what errors call them.
+///
+/// # Errors
+/// [`Error::Input`] if they are no checkpoint, of a newer version, damaged, or of another kind of state.
+pub fn from_bytes<T: Checkpoint>(bytes: &[u8], file: &Path) -> Result<T> {
+    let wrong = |place: &str, found: String, expected: String| Error::input(file, place, found, expected);
+    let damaged = || {
+        wrong(
+            "checkpoint",
+            "a damaged one".to_owned(),
+            "a whole one, as it was written".to_owned(),
+        )
+    };
+    let mut rest = bytes;
+    let mut take = |count: usize| -> Option<&[u8]> {
+        let (head, tail) = rest.split_at_checked(count)?;
+        rest = tail;
+        Some(head)
+    };
+    if take(MAGIC.len()) != Some(MAGIC) {
+        return Err(wrong(
+            "start of the file",
+            "something else".to_owned(),
+            "a checkpoint of lapswarm".to_owned(),
+        ));
+    }
+    let word = |bytes: Option<&[u8]>| Some(u32::from_le_bytes(bytes?.try_into().ok()?));
+    let version = word(take(4)).ok_or_else(damaged)?;
+    if version != VERSION {
+        let expected = format!("version {VERSION}, which this program reads");
+        return Err(wrong("version of the checkpoint", version.to_string(), expected));
+    }
+    // Before anything that is written in it is believed.
+    let body = bytes.len().checked_sub(4).ok_or_else(damaged)?;
+    if word(Some(&bytes[body..])) != Some(crc32fast::hash(&bytes[..body])) {
+        return Err(damaged());
+    }
+    let length = word(take(4)).ok_or_else(damaged)? as usize;
+    let kind = take(length).ok_or_else(damaged)?;
+    if kind != T::KIND.as_bytes() {
+        let found = format!("a {}", String::from_utf8_lossy(kind));
+        return Err(wrong("state in the checkpoint", found, format!("a {}", T::KIND)));
+    }
+    let length = take(8).and_then(|b| b.try_into().ok()).map(u64::from_le_bytes);
+    let payload = length
+        .and_then(|length| usize::try_from(length).ok())
+        .and_then(&mut take)
+        .ok_or_else(damaged)?;
+    postcard::from_bytes(payload).map_err(|_| damaged())
+}
+
+/// Keeps `state` in the file `path`, in the place of what may be there from before.
+///
+/// # Errors
+/// [`Error::Io`] if the file cannot be written.
+pub fn save<T: Checkpoint>(path: &Path, state: &T) -> Result<()> {
+    let bytes = to_bytes(state)?;
+    let mut name = path.as_os_str().to_owned();
+    name.push(".part");
+    let part = PathBuf::from(name);
+    let write = || -> std::io::Result<()> {
+        let mut file = File::create(&part)?;
+        file.write_all(&bytes)?;
+        // On the disk before it takes the place of the last one.
+        file.sync_all()?;
+        fs::rename(&part, path)?;
+        // Not every system lets a folder be opened; there the move is as safe as it gets.
+        let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
+        if let Ok(folder) = File::open(folder.unwrap_or(Path::new("."))) {
+            let _ = folder.sync_all();
+        }
+        Ok(())
+    };
+    write().map_err(|e| {
+        // What is left of it is of no use; that it was not written is said already.
+        let _ = fs::remove_file(&part);
+        Error::io(path, "write", e)
+    })
+}
+
+/// The state in the file `path`.
+///
+/// # Errors
+/// [`Error::Io`] if the file cannot be read, [`Error::Input`] as [`from_bytes`].
+pub fn load<T: Checkpoint>(path: &Path) -> Result<T> {
+    let bytes = fs::read(path).map_err(|e| Error::io(path, "read", e))?;
+    from_bytes(&bytes, path)
+}

@@ -1,0 +1,410 @@
+//! A swarm that lives on a device: only archive candidates and leaders cross the bus.
+//!
+//! The kernels of `shaders/swarm.wgsl` hold positions, velocities and personal bests, move the particles and note those
+//! that no member of the archive dominates or equals; the host keeps the archive. On a device that rounds as the
+//! processor does, the swarm is the one that [`super::Mopso`] keeps in lanes, bit for bit.
+
+use super::archive::Archive;
+use super::mopso::filter::{Point, front};
+use super::mopso::flock::Generation;
+use super::mopso::sieve::{PER_PLACE, sieve};
+use super::mopso::{leaders, learn_from};
+use super::settings::MopsoSettings;
+use super::space::Space;
+use super::{Front, Progress};
+use crate::error::{Error, Result};
+use crate::evaluate::gpu::shader::{swarm, swarm_gather};
+use crate::evaluate::gpu::{Binding, GpuContext, Kernel};
+use crate::evaluate::{BackendInfo, FAILED_COST, Problem};
+use std::ops::ControlFlow;
+use std::sync::Arc;
+use wgpu::BufferUsages as Usage;
+
+pub use super::mopso::flock::BLOCK;
+
+/// Objectives of particles whose positions are on a device.
+pub trait DeviceObjectives {
+    /// The problem that they are of.
+    fn problem(&self) -> &Problem;
+
+    /// Writes the objectives of `particles` particles. Both buffers are in blocks of [`BLOCK`] particles: a coordinate of
+    /// all particles of a block in a row of `f32`, the coordinates of a block one after the other. Positions are
+    /// in the unit cube of those variables whose bounds differ.
+    ///
+    /// # Errors
+    /// [`Error::Device`] if the device fails.
+    fn evaluate(
+        &mut self,
+        particles: usize,
+        position: &wgpu::Buffer,
+        objectives: &wgpu::Buffer,
+    ) -> Result<()>;
+}
+
+/// Workgroups along two dimensions, for a particle to a lane.
+pub(super) fn groups(particles: usize) -> (u32, u32) {
+    let all = particles.div_ceil(BLOCK);
+    let wide = all.clamp(1, 1 << 15);
+    (wide as u32, all.div_ceil(wide) as u32)
+}
+
+/// Particles whose own front stands in for the archive in the first generation.
+const SAMPLE: usize = 64 * BLOCK;
+/// The most points of it.
+const SAMPLE_FRONT: usize = 512;
+/// Bytes before the points of the list of those found.
+const HEADER: u64 = 16;
+
+struct Kernels {
+    learn: Arc<Kernel>,
+    advance: Arc<Kernel>,
+    gather: Arc<Kernel>,
+}
+
+struct Buffers {
+    generation: wgpu::Buffer,
+    archive: wgpu::Buffer,
+    position: wgpu::Buffer,
+    objectives: wgpu::Buffer,
+    found: wgpu::Buffer,
+    /// As large as the largest of what is read back.
+    readback: wgpu::Buffer,
+    gathering: wgpu::Buffer,
+    chosen: wgpu::Buffer,
+    rows: wgpu::Buffer,
+    swarm: wgpu::BindGroup,
+    gather: wgpu::BindGroup,
+}
+
+/// A swarm of two or three objectives without constraints on a device, with the settings of [`super::Mopso`].
+pub struct DeviceMopso {
+    settings: MopsoSettings,
+    space: Space,
+    objectives: usize,
+    context: Arc<GpuContext>,
+    kernels: Kernels,
+    buffers: Buffers,
+    archive: Archive,
+    iteration: usize,
+    evaluations: u64,
+}
+
+impl DeviceMopso {
+    /// A swarm over the variables of `problem` on `context`'s device.
+    ///
+    /// # Errors
+    /// [`Error::Input`] naming the setting that is out of its range, [`Error::Device`] if the device cannot hold the
+    /// swarm.
+    pub fn new(problem: &Problem, settings: MopsoSettings, context: Arc<GpuContext>) -> Result<Self> {
+        use Binding::{Read, Uniform, Write};
+        settings.validate()?;
+        let space = Space::new(problem)?;
+        let (d, width) = (space.dimensions(), problem.objectives.len());
+        if d == 0 || !(2..=3).contains(&width) {
+            let found = format!("{d} free variables, {width} objectives");
+            let expected = "a free variable and two or three objectives";
+            return Err(Error::input(
+                "the problem",
+                "variables, objectives",
+                found,
+                expected,
+            ));
+        }
+        if let Some(v) = problem.variables.iter().find(|v| v.whole) {
+            let expected = "a swarm on a device moves real numbers only";
+            return Err(Error::input("the problem", &v.name, "whole numbers", expected));
+        }
+        let bindings = [Uniform, Read, Write, Write, Write, Write, Write, Write];
+        let source = swarm();
+        let kernel = |entry: &str| context.kernel(&source, entry, &bindings);
+        let scatter = kernel("scatter")?;
+        let kernels = Kernels {
+            learn: kernel("learn")?,
+            advance: kernel("advance")?,
+            gather: context.kernel(&swarm_gather(), "gather", &[Uniform, Read, Read, Write])?,
+        };
+        let n = settings.motion.population;
+        let lanes = n.next_multiple_of(BLOCK) as u64;
+        let (state, worth) = (lanes * d as u64 * 4, lanes * width as u64 * 4);
+        let members = settings.archive.max(SAMPLE_FRONT) as u64;
+        let most = PER_PLACE * settings.archive;
+        let listed = HEADER + lanes * 16;
+        let device = context.limits();
+        let largest = state.max(listed);
+        if largest > device.max_storage_buffer_binding_size {
+            return Err(Error::Device(format!(
+                "{} holds at most {} bytes in a buffer; {n} particles of {d} variables need {largest}",
+                context.summary(),
+                device.max_storage_buffer_binding_size
+            )));
+        }
+        let on = Usage::STORAGE | Usage::COPY_SRC | Usage::COPY_DST;
+        let size = size_of::<Generation>() as u64;
+        let generation = context.buffer("generation", size, Usage::UNIFORM | Usage::COPY_DST)?;
+        let archive = context.buffer("archive", members * (d as u64 + 3) * 4, on)?;
+        let position = context.buffer("positions", state, on)?;
+        let velocity = context.buffer("velocities", state, on)?;
+        let best_position = context.buffer("best positions", state, on)?;
+        let best_objectives = context.buffer("best objectives", worth, on)?;
+        let objectives = context.buffer("objectives", worth, on)?;
+        let found = context.buffer("candidates", listed, on)?;
+        let readback = context.buffer("readback", largest, Usage::MAP_READ | Usage::COPY_DST)?;
+        let gathering = context.buffer("gathering", 16, Usage::UNIFORM | Usage::COPY_DST)?;
+        let chosen = context.buffer("chosen", most as u64 * 4, on)?;
+        let rows = context.buffer("chosen positions", (most * d) as u64 * 4, on)?;
+        let state = [
+            &generation,
+            &archive,
+            &position,
+            &velocity,
+            &best_position,
+            &best_objectives,
+            &objectives,
+            &found,
+        ];
+        let swarm = context.bind(&scatter, &state)?;
+        let gather = context.bind(&kernels.gather, &[&gathering, &chosen, &position, &rows])?;
+        let buffers = Buffers {
+            generation,
+            archive,
+            position,
+            objectives,
+            found,
+            readback,
+            gathering,
+            chosen,
+            rows,
+            swarm,
+            gather,
+        };
+        let swarm = Self {
+            archive: Archive::new(settings.archive, settings.truncation),
+            objectives: width,
+            settings,
+            space,
+            context,
+            kernels,
+            buffers,
+            iteration: 0,
+            evaluations: 0,
+        };
+        swarm.dispatch(&scatter, 0)?;
+        Ok(swarm)
+    }
+
+    /// What does the work.
+    pub fn backend(&self) -> BackendInfo {
+        self.context.backend_info()
+    }
+
+    /// Memory of the swarm on the device, bytes to a particle.
+    pub fn bytes_per_particle(&self) -> usize {
+        // Objectives stand there twice, and each particle has a place in the list of candidates and in its copy.
+        (3 * self.space.dimensions() + 2 * self.objectives) * size_of::<f32>() + 16
+    }
+
+    /// Runs a kernel of the swarm for the present iteration against so many members.
+    fn dispatch(&self, kernel: &Kernel, members: usize) -> Result<()> {
+        let sizes = (self.space.dimensions(), self.objectives, members);
+        let generation = Generation::new(&self.settings, sizes, self.iteration);
+        self.context
+            .write(&self.buffers.generation, bytemuck::bytes_of(&generation));
+        let (x, y) = groups(self.settings.motion.population);
+        self.context.run(|encoder| {
+            let mut pass = encoder.begin_compute_pass(&Default::default());
+            pass.set_pipeline(&kernel.pipeline);
+            pass.set_bind_group(0, &self.buffers.swarm, &[]);
+            pass.dispatch_workgroups(x, y, 1);
+        })
+    }
+
+    /// The first `bytes` of a buffer.
+    fn read<T: bytemuck::Pod>(&self, from: &wgpu::Buffer, bytes: u64) -> Result<Vec<T>> {
+        let readback = &self.buffers.readback;
+        self.context
+            .run(|encoder| encoder.copy_buffer_to_buffer(from, 0, readback, 0, bytes))?;
+        self.context.read(readback, bytes, bytemuck::pod_collect_to_vec)
+    }
+
+    /// The front of the first particles, for want of an archive.
+    fn sample(&self) -> Result<Vec<Point>> {
+        let width = self.objectives;
+        let n = self.settings.motion.population.min(SAMPLE);
+        let lanes = n.next_multiple_of(BLOCK);
+        let rows: Vec<f32> = self.read(&self.buffers.objectives, (lanes * width * 4) as u64)?;
+        let mut plain = vec![0.0; n * width];
+        for (i, row) in plain.chunks_exact_mut(width).enumerate() {
+            for (k, value) in row.iter_mut().enumerate() {
+                *value = f64::from(rows[(i / BLOCK * width + k) * BLOCK + i % BLOCK]);
+            }
+        }
+        Ok(sieve(learn_from(&plain, width), width, SAMPLE_FRONT))
+    }
+
+    /// The particles that the archive should see.
+    fn found(&self) -> Result<Vec<Point>> {
+        let count = self.read::<u32>(&self.buffers.found, 4)?[0];
+        let count = u64::from(count).min(self.settings.motion.population as u64);
+        if count == 0 {
+            return Ok(Vec::new());
+        }
+        let words: Vec<u32> = self.read(&self.buffers.found, HEADER + 16 * count)?;
+        let of = |word: u32| f64::from(f32::from_bits(word));
+        let points = words[HEADER as usize / 4..].chunks_exact(4).map(|p| Point {
+            at: [of(p[1]), of(p[2]), of(p[3])],
+            who: p[0],
+        });
+        Ok(points.collect())
+    }
+
+    /// Positions of these particles.
+    fn gather(&self, points: &[Point]) -> Result<Vec<f32>> {
+        if points.is_empty() {
+            return Ok(Vec::new());
+        }
+        let d = self.space.dimensions();
+        let who: Vec<u32> = points.iter().map(|p| p.who).collect();
+        self.context.write(
+            &self.buffers.gathering,
+            bytemuck::cast_slice(&[points.len() as u32, d as u32, 0, 0]),
+        );
+        self.context
+            .write(&self.buffers.chosen, bytemuck::cast_slice(&who));
+        self.context.run(|encoder| {
+            let mut pass = encoder.begin_compute_pass(&Default::default());
+            pass.set_pipeline(&self.kernels.gather.pipeline);
+            pass.set_bind_group(0, &self.buffers.gather, &[]);
+            pass.dispatch_workgroups((points.len() as u32).div_ceil(64), 1, 1);
+        })?;
+        self.read(&self.buffers.rows, (points.len() * d * 4) as u64)
+    }
+
+    /// One generation: evaluates the particles by `objectives`, lets archive and personal bests learn, moves.
+    ///
+    /// # Errors
+    /// [`Error::Device`] if the device fails.
+    pub fn step(&mut self, objectives: &mut dyn DeviceObjectives) -> Result<()> {
+        self.evaluate(objectives)?;
+        self.learn_and_move()
+    }
+
+    /// The first half of [`DeviceMopso::step`].
+    ///
+    /// # Errors
+    /// [`Error::Device`] if the device fails.
+    pub fn evaluate(&mut self, objectives: &mut dyn DeviceObjectives) -> Result<()> {
+        let n = self.settings.motion.population;
+        objectives.evaluate(n, &self.buffers.position, &self.buffers.objectives)
+    }
+
+    /// The second half of [`DeviceMopso::step`].
+    ///
+    /// # Errors
+    /// [`Error::Device`] if the device fails.
+    pub fn learn_and_move(&mut self) -> Result<()> {
+        let d = self.space.dimensions();
+        let sample = if self.archive.is_empty() {
+            self.sample()?
+        } else {
+            Vec::new()
+        };
+        let members: Vec<[f64; 3]> = if self.archive.is_empty() {
+            sample.iter().map(|p| p.at).collect()
+        } else {
+            let at = |row: &Vec<f64>| std::array::from_fn(|k| row.get(k).copied().unwrap_or(0.0));
+            self.archive.objectives.iter().map(at).collect()
+        };
+        let mut table = vec![0.0f32; members.len() * d];
+        table.extend(members.iter().flatten().map(|x| *x as f32));
+        self.context
+            .write(&self.buffers.archive, bytemuck::cast_slice(&table));
+        self.context.write(&self.buffers.found, &[0; HEADER as usize]);
+        self.dispatch(&self.kernels.learn, members.len())?;
+        let mut points = self.found()?;
+        // They were among the members, so that the list leaves them out.
+        points.extend(sample);
+        let points = sieve(
+            front(points, self.objectives),
+            self.objectives,
+            PER_PLACE * self.settings.archive,
+        );
+        let rows = self.gather(&points)?;
+        let solution = |(p, row): (&Point, &[f32])| {
+            let position = row.iter().map(|x| f64::from(*x)).collect();
+            (position, p.at[..self.objectives].to_vec())
+        };
+        let solutions = points.iter().zip(rows.chunks_exact(d)).map(solution);
+        self.archive.insert_all(solutions.collect(), 0.0);
+        self.evaluations += self.settings.motion.population as u64;
+        self.iteration += 1;
+        self.context.write(
+            &self.buffers.archive,
+            bytemuck::cast_slice(&leaders(&self.archive)),
+        );
+        self.dispatch(&self.kernels.advance, self.archive.len())
+    }
+
+    /// Steps until the planned iterations are done or `observe` breaks off.
+    ///
+    /// # Errors
+    /// Those of [`DeviceMopso::step`].
+    pub fn run(
+        &mut self,
+        objectives: &mut dyn DeviceObjectives,
+        mut observe: impl FnMut(&Progress) -> ControlFlow<()>,
+    ) -> Result<()> {
+        while self.iteration < self.settings.motion.iterations {
+            self.step(objectives)?;
+            let progress = Progress {
+                iteration: self.iteration,
+                evaluations: self.evaluations,
+                best: self.best(),
+                median: None,
+                failed: 0,
+            };
+            if observe(&progress).is_break() {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// The particles' present candidates, row-major in the variables' units, read back from the device.
+    ///
+    /// # Errors
+    /// [`Error::Device`] if the device fails.
+    pub fn candidates(&self) -> Result<Vec<f64>> {
+        let (n, d) = (self.settings.motion.population, self.space.dimensions());
+        let bytes = n.next_multiple_of(BLOCK) * d * 4;
+        let position: Vec<f32> = self.read(&self.buffers.position, bytes as u64)?;
+        let width = self.space.variables();
+        let mut candidates = vec![0.0; n * width];
+        let blocks = position.chunks_exact(BLOCK * d);
+        for (block, rows) in blocks.zip(candidates.chunks_mut(BLOCK * width)) {
+            self.space.scale_block(block, BLOCK, rows);
+        }
+        Ok(candidates)
+    }
+
+    /// Iterations done.
+    pub fn iteration(&self) -> usize {
+        self.iteration
+    }
+
+    /// Candidates evaluated.
+    pub fn evaluations(&self) -> u64 {
+        self.evaluations
+    }
+
+    /// The least value seen of each objective.
+    pub fn best(&self) -> Vec<f64> {
+        (0..self.objectives)
+            .map(|k| self.archive.least(k).min(FAILED_COST))
+            .collect()
+    }
+
+    /// The archive.
+    pub fn front(&self) -> Front {
+        self.archive.front(&self.space)
+    }
+}

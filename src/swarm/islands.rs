@@ -1,0 +1,182 @@
+//! Several swarms on one problem, evaluated together: seeds side by side, with or without migration.
+//!
+//! All islands are asked at once, so that a device is given one large population and not many small ones. Every few
+//! iterations some of what each has found may move to the next, in a ring (Cohoon, Hegde, Martin, Richards, *Punctuated
+//! equilibria: a parallel genetic algorithm*, ICGA 1987). It is the same run whatever the threads, and without
+//! migration each island is what it would be alone.
+
+use super::settings::setting;
+use super::{Front, Optimiser};
+use crate::error::Result;
+use crate::evaluate::Evaluation;
+use crate::swarm::metrics::non_dominated;
+use serde::{Deserialize, Serialize};
+
+/// An optimiser that takes in what others have found.
+pub trait Welcome: Optimiser {
+    /// What its front violates, if its objectives do not say so themselves.
+    fn violation(&self) -> f64 {
+        0.0
+    }
+
+    /// Takes in solutions of the same problem, with objectives that were evaluated; `violation` is the
+    /// [`Welcome::violation`] of where they come from.
+    fn welcome(&mut self, migrants: &Front, violation: f64);
+}
+
+/// Who moves between islands, and when.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Migration {
+    /// Iterations between two moves.
+    pub every: usize,
+    /// The most solutions that leave an island for the next.
+    pub count: usize,
+}
+
+/// Swarms on one problem.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Islands<O> {
+    islands: Vec<O>,
+    migration: Option<Migration>,
+    variables: usize,
+    objectives: usize,
+    /// Candidates of each island in the population that was asked for last.
+    asked: Vec<usize>,
+    iteration: usize,
+}
+
+impl<O: Welcome> Islands<O> {
+    /// Of these swarms, all on `problem`; one after the other in each population.
+    ///
+    /// # Errors
+    /// [`crate::Error::Input`] if there is none, or if migration is never or of nobody.
+    pub fn new(
+        problem: &crate::evaluate::Problem,
+        islands: Vec<O>,
+        migration: Option<Migration>,
+    ) -> Result<Self> {
+        if islands.is_empty() {
+            return Err(setting("islands", "0".to_owned(), "1 or more"));
+        }
+        if let Some(m) = migration.filter(|m| m.every == 0 || m.count == 0) {
+            let found = format!("{} every {} iterations", m.count, m.every);
+            return Err(setting(
+                "migration",
+                found,
+                "1 or more every 1 or more iterations",
+            ));
+        }
+        Ok(Self {
+            asked: vec![0; islands.len()],
+            islands,
+            migration,
+            variables: problem.variables.len(),
+            objectives: problem.objectives.len(),
+            iteration: 0,
+        })
+    }
+
+    /// The swarms.
+    pub fn islands(&self) -> &[O] {
+        &self.islands
+    }
+
+    /// Each sends a part of its front, evenly over it, to the next.
+    fn migrate(&mut self, count: usize) {
+        let parties: Vec<(Front, f64)> = self
+            .islands
+            .iter()
+            .map(|island| {
+                let front = island.front();
+                let all = front.objectives.len();
+                let sent = count.min(all);
+                let chosen = |rows: &[Vec<f64>]| (0..sent).map(|i| rows[i * all / sent].clone()).collect();
+                let party = Front {
+                    candidates: chosen(&front.candidates),
+                    objectives: chosen(&front.objectives),
+                };
+                (party, island.violation())
+            })
+            .collect();
+        let n = self.islands.len();
+        for (i, (party, violation)) in parties.iter().enumerate() {
+            self.islands[(i + 1) % n].welcome(party, *violation);
+        }
+    }
+}
+
+impl<O: Welcome> Optimiser for Islands<O> {
+    fn ask(&mut self) -> Vec<f64> {
+        let mut population = Vec::new();
+        for (island, asked) in self.islands.iter_mut().zip(&mut self.asked) {
+            *asked = 0;
+            // One that is done waits for the others.
+            if !island.done() {
+                let rows = island.ask();
+                *asked = rows.len() / self.variables;
+                population.extend(rows);
+            }
+        }
+        population
+    }
+
+    fn tell(&mut self, evaluation: &Evaluation) {
+        let mut from = 0;
+        for (island, &count) in self.islands.iter_mut().zip(&self.asked) {
+            if count > 0 {
+                island.tell(&evaluation.part(from..from + count, self.objectives));
+                from += count;
+            }
+        }
+        self.iteration += 1;
+        if let Some(m) = self.migration
+            && self.islands.len() > 1
+            && self.iteration.is_multiple_of(m.every)
+        {
+            self.migrate(m.count);
+        }
+    }
+
+    fn iteration(&self) -> usize {
+        self.iteration
+    }
+
+    fn planned_iterations(&self) -> usize {
+        let planned = self.islands.iter().map(Optimiser::planned_iterations);
+        planned.max().unwrap_or(0)
+    }
+
+    fn done(&self) -> bool {
+        self.islands.iter().all(Optimiser::done)
+    }
+
+    fn evaluations(&self) -> u64 {
+        self.islands.iter().map(Optimiser::evaluations).sum()
+    }
+
+    fn best(&self) -> Vec<f64> {
+        let all: Vec<Vec<f64>> = self.islands.iter().map(Optimiser::best).collect();
+        let least = |k: usize| all.iter().map(|best| best[k]).fold(f64::INFINITY, f64::min);
+        (0..all[0].len()).map(least).collect()
+    }
+
+    /// What no island has found anything better than.
+    fn front(&self) -> Front {
+        let mut all = Front::default();
+        let least = self
+            .islands
+            .iter()
+            .map(Welcome::violation)
+            .fold(f64::INFINITY, f64::min);
+        for island in self.islands.iter().filter(|island| island.violation() <= least) {
+            let front = island.front();
+            all.candidates.extend(front.candidates);
+            all.objectives.extend(front.objectives);
+        }
+        let kept = non_dominated(&all.objectives);
+        Front {
+            candidates: kept.iter().map(|&i| all.candidates[i].clone()).collect(),
+            objectives: kept.iter().map(|&i| all.objectives[i].clone()).collect(),
+        }
+    }
+}

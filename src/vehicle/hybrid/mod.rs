@@ -1,0 +1,171 @@
+//! The electric half of a hybrid: motor-generators on the crank (MGU-K) and on the turbocharger (MGU-H), the store, and
+//! what the rules let flow between them.
+
+mod read;
+#[cfg(test)]
+mod tests;
+
+use std::f64::consts::TAU;
+
+/// The motor-generator on the crank.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MguK {
+    /// Its turns per turn of the crank.
+    pub ratio: f64,
+    /// Its speeds, ascending (rpm).
+    pub speed_rpm: Vec<f64>,
+    /// Torque that it gives or takes at those speeds (N m), linear between; none beyond the last.
+    pub torque_nm: Vec<f64>,
+    /// The power that it never exceeds, either way (W).
+    pub power_w: f64,
+    /// Share of the store's power that reaches the shaft.
+    pub motor_efficiency: f64,
+    /// Share of the shaft's power that reaches the store.
+    pub generator_efficiency: f64,
+}
+
+impl MguK {
+    /// The greatest power at its shaft (W), either way, at a speed of the crank (rpm).
+    pub fn power_at(&self, crank_rpm: f64) -> f64 {
+        let rpm = self.ratio * crank_rpm;
+        let after = self.speed_rpm.partition_point(|s| *s <= rpm);
+        let torque = if after == 0 {
+            self.torque_nm[0]
+        } else if after == self.speed_rpm.len() {
+            // At the last speed itself it still gives its torque.
+            if rpm > self.speed_rpm[after - 1] {
+                0.0
+            } else {
+                self.torque_nm[after - 1]
+            }
+        } else {
+            let share =
+                (rpm - self.speed_rpm[after - 1]) / (self.speed_rpm[after] - self.speed_rpm[after - 1]);
+            self.torque_nm[after - 1] + share * (self.torque_nm[after] - self.torque_nm[after - 1])
+        };
+        (torque * rpm * TAU / 60.0).min(self.power_w)
+    }
+}
+
+/// The motor-generator on the turbocharger.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MguH {
+    /// Greatest power in as a motor (W).
+    pub motor_w: f64,
+    /// What that is worth at the crank (W).
+    pub motor_gain_w: f64,
+    /// Greatest power out as a generator (W).
+    pub generator_w: f64,
+    /// What that costs at the crank (W).
+    pub generator_cost_w: f64,
+    /// It generates from this speed on (m/s),
+    pub from_speed_mps: f64,
+    /// while the car accelerates by no more than this (m/s^2).
+    pub to_ax_mps2: f64,
+}
+
+impl MguH {
+    /// Its power (W), positive as a motor: `((Pmax - Pmin) Wg + Pmin) F` with the waste-gate `Wg` from 0 (the turbine
+    /// drives the generator) to 1 (the motor drives the compressor) and the fuel flow `F` as a share of its greatest; the
+    /// thesis's (4.9).
+    pub fn power_w(&self, waste_gate: f64, flow_share: f64) -> f64 {
+        ((self.motor_w + self.generator_w) * waste_gate - self.generator_w) * flow_share
+    }
+
+    /// Power at the crank (W) with the MGU-H at `power_w`, of an engine that gives `ice_w` at full generation:
+    /// `P_add (P_H - Pmin) / (Pmax - Pmin) + P_ice`, the thesis's (4.8), where `P_add` is what lies between full generation
+    /// and full boost.
+    pub fn boosted_w(&self, ice_w: f64, power_w: f64) -> f64 {
+        let added = self.motor_gain_w + self.generator_cost_w;
+        added * (power_w + self.generator_w) / (self.motor_w + self.generator_w) + ice_w
+    }
+}
+
+/// The store.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Store {
+    /// What a state of charge of one is (J). Paper laps may go beyond, which then sizes the store.
+    pub capacity_j: f64,
+    /// State of charge at the start of a lap.
+    pub start_soc: f64,
+}
+
+/// Energies that the rules let flow in a lap.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct EnergyRules {
+    /// From the store to the MGU-K (J).
+    pub deployed_j: Option<f64>,
+    /// From the MGU-K to the store (J).
+    pub harvested_k_j: Option<f64>,
+    /// Whether the deployment is that of a lap of Le Mans, to be scaled by the circuit's length.
+    pub scaled: bool,
+}
+
+/// Length of a lap of Le Mans (m).
+const LE_MANS_M: f64 = 13_626.0;
+/// Other circuits get so much more for each metre.
+const ELSEWHERE: f64 = 1.55;
+
+impl EnergyRules {
+    /// Formula One's of 2014: 4 MJ from the store to the MGU-K and 2 MJ back.
+    pub const FORMULA_ONE: Self = Self {
+        deployed_j: Some(4.0e6),
+        harvested_k_j: Some(2.0e6),
+        scaled: false,
+    };
+
+    /// The class of so many joules a lap of Le Mans.
+    pub fn le_mans(deployed_j: f64) -> Self {
+        Self {
+            deployed_j: Some(deployed_j),
+            harvested_k_j: None,
+            scaled: true,
+        }
+    }
+
+    /// What may be deployed in a lap of `length_m` (J): a class of Le Mans scales by `length x 1.55 / 13.626 km`.
+    pub fn deployed_on(&self, length_m: f64) -> Option<f64> {
+        let share = if self.scaled {
+            length_m * ELSEWHERE / LE_MANS_M
+        } else {
+            1.0
+        };
+        self.deployed_j.map(|j| j * share)
+    }
+}
+
+/// The electric half.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Hybrid {
+    /// On the crank.
+    pub mgu_k: MguK,
+    /// On the turbocharger, if there is one.
+    pub mgu_h: Option<MguH>,
+    /// The store.
+    pub store: Store,
+    /// The rules.
+    pub rules: EnergyRules,
+    /// Coefficient of rolling resistance, which laps with energy count.
+    pub rolling_resistance: f64,
+}
+
+/// What braking splits into.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Blend {
+    /// Power into the generator's shaft (W).
+    pub generator_w: f64,
+    /// Power into the hydraulic brakes (W).
+    pub hydraulic_w: f64,
+}
+
+impl MguK {
+    /// Brakes by the generator as far as it goes, by the hydraulics beyond; `shed_w` is what the wheels are to lose and
+    /// `efficiency` what of it reaches the crank.
+    pub fn blend(&self, shed_w: f64, crank_rpm: f64, efficiency: f64) -> Blend {
+        let generator_w = (shed_w * efficiency).clamp(0.0, self.power_at(crank_rpm));
+        Blend {
+            generator_w,
+            hydraulic_w: shed_w.max(0.0) - generator_w / efficiency,
+        }
+    }
+}

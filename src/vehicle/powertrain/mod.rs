@@ -1,0 +1,217 @@
+//! Engine, gears and driven axles: what the wheels can be given at a speed, and what it takes to give them less.
+
+mod differential;
+mod engine;
+#[cfg(test)]
+mod tests;
+
+pub use differential::Differential;
+pub use engine::{EngineMap, FlowLimit};
+
+use crate::config::Table;
+use crate::error::Result;
+use std::f64::consts::TAU;
+
+/// Full-throttle torque over engine speed, gears and final drive.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Powertrain {
+    /// Engine speeds of the torque curve, ascending, rpm.
+    pub engine_speed_rpm: Vec<f64>,
+    /// Full-throttle torque at those speeds, N m.
+    pub torque_nm: Vec<f64>,
+    /// Gear ratios from first to top, engine turns per gearbox-output turn.
+    pub gear_ratios: Vec<f64>,
+    /// Final drive ratio.
+    pub final_drive: f64,
+    /// Share of engine torque that reaches the wheels.
+    pub efficiency: f64,
+    /// Torque and fuel over engine speed and throttle, where known.
+    pub engine: Option<EngineMap>,
+    /// How the driven wheels share the torque.
+    pub differential: Differential,
+}
+
+/// A gear at a road speed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Gear {
+    /// Its place in [`Powertrain::gear_ratios`].
+    pub index: usize,
+    /// Engine speed (rpm).
+    pub engine_speed_rpm: f64,
+    /// Force at the wheels at full throttle (N).
+    pub force_n: f64,
+}
+
+/// What the engine does for a power at the wheels.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OperatingPoint {
+    /// The gear.
+    pub gear: Gear,
+    /// Throttle (degrees).
+    pub throttle_deg: f64,
+    /// Torque at the crank (N m).
+    pub torque_nm: f64,
+    /// Power at the crank (W).
+    pub power_w: f64,
+    /// Share of the greatest power in this gear.
+    pub load: f64,
+    /// Fuel flow (kg/h).
+    pub fuel_flow_kgph: f64,
+    /// What was asked for at the crank beyond the greatest power (W).
+    pub missing_w: f64,
+}
+
+/// The power (W) that takes a car along: `v (m g f_r + D + m I a)` with the coefficient of rolling resistance `f_r`, the
+/// drag `D` (N) and the factor of rotating masses `I` (R. Rajamani, *Vehicle Dynamics and Control*, 2012, ch. 4).
+pub fn demand_w(v_mps: f64, ax_mps2: f64, mass_kg: f64, drag_n: f64, rolling: f64, rotating: f64) -> f64 {
+    v_mps * (mass_kg * GRAVITY_MPS2 * rolling + drag_n + mass_kg * rotating * ax_mps2)
+}
+
+/// Acceleration of gravity (m/s^2).
+pub const GRAVITY_MPS2: f64 = 9.80665;
+
+impl Powertrain {
+    /// Reads `[powertrain]`.
+    pub fn from_table(table: &Table<'_>) -> Result<Self> {
+        let list = |key: &str, least: usize, minimum: f64, meaning: &str| -> Result<Vec<f64>> {
+            let values = table.numbers(key)?.unwrap_or_default();
+            if values.len() < least || values.iter().any(|x| *x < minimum) {
+                return Err(table.refuse(
+                    key,
+                    format!("at least {least} numbers of {minimum} or more ({meaning})"),
+                ));
+            }
+            Ok(values)
+        };
+        let engine_speed_rpm = list("engine_speed_rpm", 2, 1.0, "engine speeds in rpm")?;
+        if engine_speed_rpm.windows(2).any(|w| w[1] <= w[0]) {
+            return Err(table.refuse("engine_speed_rpm", "speeds that rise from one to the next"));
+        }
+        let engine = EngineMap::from_table(table, &engine_speed_rpm)?;
+        let (engine_speed_rpm, torque_nm) = match &engine {
+            Some(engine) => engine.full_throttle_curve(),
+            None => {
+                let torque_nm = list("torque_nm", 2, 0.0, "torques in N m")?;
+                if torque_nm.len() != engine_speed_rpm.len() {
+                    return Err(table.refuse(
+                        "torque_nm",
+                        format!("{} torques, one per engine speed", engine_speed_rpm.len()),
+                    ));
+                }
+                (engine_speed_rpm, torque_nm)
+            }
+        };
+        Ok(Self {
+            engine,
+            differential: Differential::from_table(table)?,
+            gear_ratios: list("gear_ratios", 1, 0.1, "ratios from first to top gear")?,
+            final_drive: table.required_number("final_drive", 0.1, 50.0, "")?,
+            efficiency: table.number("gearbox_efficiency", 0.1, 1.0, "")?.unwrap_or(1.0),
+            engine_speed_rpm,
+            torque_nm,
+        })
+    }
+
+    /// Writes `[powertrain]`.
+    pub fn to_toml(&self) -> String {
+        let engine = match &self.engine {
+            Some(engine) => engine.to_toml(),
+            None => format!(
+                "engine_speed_rpm = {:?}\ntorque_nm = {:?}\n",
+                self.engine_speed_rpm, self.torque_nm
+            ),
+        };
+        format!(
+            "[powertrain]\n{engine}gear_ratios = {:?}\nfinal_drive = {:?}\ngearbox_efficiency = {:?}\n{}",
+            self.gear_ratios,
+            self.final_drive,
+            self.efficiency,
+            self.differential.to_toml()
+        )
+    }
+
+    /// Full-throttle engine torque (N m), linear between points; nought beyond the last one.
+    pub fn torque_at(&self, engine_speed_rpm: f64) -> f64 {
+        let speeds = &self.engine_speed_rpm;
+        match speeds.iter().position(|s| *s >= engine_speed_rpm) {
+            Some(0) => self.torque_nm[0],
+            Some(i) => {
+                let share = (engine_speed_rpm - speeds[i - 1]) / (speeds[i] - speeds[i - 1]);
+                self.torque_nm[i - 1] + share * (self.torque_nm[i] - self.torque_nm[i - 1])
+            }
+            None => 0.0,
+        }
+    }
+
+    /// The gear that gives most at road speed `speed` (m/s), the lowest of those that give the same; none above the
+    /// speed that the engine reaches in top gear.
+    pub fn gear(&self, speed: f64, wheel_radius: f64) -> Option<Gear> {
+        let wheel_rpm = speed / wheel_radius * 60.0 / TAU;
+        let mut best: Option<Gear> = None;
+        for (index, gear) in self.gear_ratios.iter().enumerate() {
+            let ratio = gear * self.final_drive;
+            let engine_speed_rpm = wheel_rpm * ratio;
+            let force_n = self.torque_at(engine_speed_rpm) * ratio * self.efficiency / wheel_radius;
+            if force_n > best.map_or(0.0, |b| b.force_n) {
+                best = Some(Gear {
+                    index,
+                    engine_speed_rpm,
+                    force_n,
+                });
+            }
+        }
+        best
+    }
+
+    /// The greatest force at the wheels (N) at road speed `speed` (m/s), in the gear that gives most.
+    pub fn wheel_force(&self, speed: f64, wheel_radius: f64) -> f64 {
+        self.gear(speed, wheel_radius).map_or(0.0, |gear| gear.force_n)
+    }
+
+    /// Road speeds (m/s) from which the next gear gives more, one fewer than gears; nothing where it never does.
+    pub fn shift_points_mps(&self, wheel_radius: f64) -> Vec<Option<f64>> {
+        let top_rpm = self.engine_speed_rpm[self.engine_speed_rpm.len() - 1];
+        let force = |gear: usize, speed: f64| {
+            let ratio = self.gear_ratios[gear] * self.final_drive;
+            self.torque_at(speed / wheel_radius * 60.0 / TAU * ratio) * ratio
+        };
+        (1..self.gear_ratios.len())
+            .map(|next| {
+                let end =
+                    top_rpm * TAU / 60.0 * wheel_radius / (self.gear_ratios[next - 1] * self.final_drive);
+                // Above its last speed a gear gives nothing, so that the next one wins there if nowhere before.
+                const STEPS: usize = 2000;
+                (1..=STEPS + 1)
+                    .map(|i| end * i as f64 / STEPS as f64)
+                    .find(|&v| force(next, v) > force(next - 1, v))
+            })
+            .collect()
+    }
+
+    /// What the engine does for a power (W) at the wheels at a road speed (m/s): gear, engine speed, throttle and fuel.
+    /// Nothing without an engine map, or beyond the speed of the top gear.
+    pub fn operating_point(
+        &self,
+        speed: f64,
+        wheel_power_w: f64,
+        wheel_radius: f64,
+    ) -> Option<OperatingPoint> {
+        let engine = self.engine.as_ref()?;
+        let gear = self.gear(speed, wheel_radius)?;
+        let rpm = gear.engine_speed_rpm;
+        let omega = rpm * TAU / 60.0;
+        let most_nm = self.torque_at(rpm);
+        let asked_w = (wheel_power_w / self.efficiency).max(0.0);
+        let torque_nm = (asked_w / omega).min(most_nm);
+        let throttle_deg = engine.throttle_for(rpm, torque_nm);
+        Some(OperatingPoint {
+            gear,
+            throttle_deg,
+            torque_nm,
+            power_w: torque_nm * omega,
+            load: if most_nm > 0.0 { torque_nm / most_nm } else { 0.0 },
+            fuel_flow_kgph: engine.fuel_flow_at(rpm, throttle_deg),
+            missing_w: asked_w - torque_nm * omega,
+        })
+    }
+}

@@ -1,0 +1,94 @@
+use super::*;
+use crate::vehicle::Car;
+
+fn powertrain() -> (Powertrain, f64) {
+    let car = Car::load("gt_hybrid").unwrap();
+    (car.powertrain.unwrap(), car.chassis.radius_rear)
+}
+
+#[test]
+fn formula_ones_fuel_flow() {
+    // 0.009 x 8000 + 5.5 by hand, and 100 from 10500 rpm on, where both agree.
+    assert!((FlowLimit::FORMULA_ONE.at(8000.0) - 77.5).abs() < 1e-12);
+    assert!((FlowLimit::FORMULA_ONE.at(10_499.99) - 100.0).abs() < 1e-3);
+    assert_eq!(FlowLimit::FORMULA_ONE.at(10_500.0), 100.0);
+    assert_eq!(FlowLimit::FORMULA_ONE.at(15_000.0), 100.0);
+}
+
+#[test]
+fn maps_are_bilinear_and_held_at_their_edges() {
+    let engine = powertrain().0.engine.unwrap();
+    assert_eq!(engine.fuel_flow_at(6000.0, 90.0), 70.7);
+    // The mean of 54.6, 57.7, 64.1 and 69.8.
+    assert!((engine.fuel_flow_at(6250.0, 15.0) - 61.55).abs() < 1e-9);
+    assert_eq!(engine.torque_at(9000.0, 95.0), 382.0);
+    assert_eq!(engine.torque_at(3000.0, 90.0), 227.0);
+    // 408 Nm at 8000 rpm is 341.8 kW, which 92.4 kg/h give at 270.3 g/kWh.
+    assert!((engine.bsfc_gpkwh(8000.0, 90.0).unwrap() - 270.3).abs() < 0.1);
+    assert_eq!(engine.bsfc_gpkwh(8000.0, 0.0), None);
+}
+
+#[test]
+fn a_limit_of_the_flow_closes_the_throttle() {
+    let mut engine = powertrain().0.engine.unwrap();
+    assert_eq!(engine.greatest_torque(8000.0), (408.0, 90.0));
+    engine.flow_limit = Some(FlowLimit::FORMULA_ONE);
+    let (torque, throttle) = engine.greatest_torque(8000.0);
+    // 77.5 kg/h lie a quarter of the way from 76.4 (20 degrees) to 80.8 (30 degrees).
+    assert!((throttle - 22.5).abs() < 1e-6, "{throttle}");
+    assert!(engine.fuel_flow_at(8000.0, throttle) <= 77.5);
+    let share = (77.5 - 9.2) / (92.4 - 9.2);
+    assert!((torque - 408.0 * share).abs() < 0.1, "{torque}");
+}
+
+#[test]
+fn gears_give_most_force_and_shift_where_the_next_does() {
+    let (powertrain, radius) = powertrain();
+    let shifts = powertrain.shift_points_mps(radius);
+    assert_eq!(shifts.len(), 5);
+    for (i, shift) in shifts.iter().enumerate() {
+        let v = shift.unwrap();
+        assert_eq!(powertrain.gear(v - 0.1, radius).unwrap().index, i, "{v}");
+        assert_eq!(powertrain.gear(v + 0.1, radius).unwrap().index, i + 1, "{v}");
+    }
+    // Sixth ends at 8500 rpm: 70 m/s.
+    assert!(powertrain.gear(69.9, radius).unwrap().engine_speed_rpm < 8500.0);
+    assert!(powertrain.gear(70.1, radius).is_none());
+}
+
+#[test]
+fn an_operating_point_is_the_maps_inverse() {
+    let (powertrain, radius) = powertrain();
+    let engine = powertrain.engine.as_ref().unwrap();
+    for (speed, wheel_power) in [(30.0, 50e3), (45.0, 150e3), (60.0, 280e3), (65.0, 10e3)] {
+        let point = powertrain.operating_point(speed, wheel_power, radius).unwrap();
+        let rpm = point.gear.engine_speed_rpm;
+        assert!((point.power_w * powertrain.efficiency - wheel_power).abs() < 1e-6);
+        assert!((engine.torque_at(rpm, point.throttle_deg) - point.torque_nm).abs() < 1e-9);
+        assert!((0.0..=1.0).contains(&point.load) && point.missing_w.abs() < 1e-6);
+    }
+    // At 50 m/s: 1245 x (9.80665 x 0.013 + 1.1 x 2) N and 1425 N of drag, all by 50 m/s.
+    let demand = demand_w(50.0, 2.0, 1245.0, 1425.0, 0.013, 1.1);
+    assert!(
+        (demand - 50.0 * (158.72 + 1425.0 + 2739.0)).abs() < 1.0,
+        "{demand}"
+    );
+    let beyond = powertrain.operating_point(60.0, 1e6, radius).unwrap();
+    assert_eq!(beyond.load, 1.0);
+    assert!(beyond.missing_w > 6e5);
+}
+
+#[test]
+fn the_outer_wheel_may_get_more() {
+    let differential = Differential {
+        front_share: 0.2,
+        share_per_steer: 1.0,
+        share_per_yaw_rate: 0.1,
+    };
+    // 0.5 + 0.1 + 0.05 of the rear axle's 800 Nm to the right in a left turn.
+    let torques = differential.torques_nm(1000.0, 0.1, 0.5);
+    for (found, wanted) in torques.iter().zip([100.0, 100.0, 280.0, 520.0]) {
+        assert!((found - wanted).abs() < 1e-9);
+    }
+    assert_eq!(differential.torques_nm(1000.0, 0.0, 9.0)[2], 0.0);
+}

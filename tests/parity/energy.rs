@@ -1,0 +1,221 @@
+//! Laps with energy on every backend: against `f64`, and their books.
+
+use crate::common::Random;
+use crate::common::line::circuit;
+use crate::device::device;
+use glam::DVec2;
+use lapswarm::evaluate::Evaluator;
+use lapswarm::evaluate::hybrid::{
+    CpuHybridEvaluator, Free, GpuHybridEvaluator, HybridLine, HybridObjective, HybridProblem,
+    SimdHybridEvaluator, Strategy,
+};
+use lapswarm::evaluate::simd::InstructionSet;
+use lapswarm::line::energy::{EnergyCar, EnergyLap, EnergyPlan, Gates, Mode, Traction};
+use lapswarm::line::{Parametrisation, geometry};
+use lapswarm::study::envelope::{EnvelopeSettings, car_limits};
+use lapswarm::vehicle::Car;
+
+fn hybrid_car(exponent: f64) -> EnergyCar {
+    let car = Car::load("gt_hybrid").expect("bundled");
+    let coarse = EnvelopeSettings {
+        step_mps: 8.0,
+        ..EnvelopeSettings::default()
+    };
+    let limits = car_limits(&car, &coarse).expect("limits");
+    let rows = limits
+        .speeds
+        .iter()
+        .map(|s| (s.row.v_mps, s.traction_mps2))
+        .collect();
+    EnergyCar::new(car, limits.envelope, Traction { rows }, exponent).expect("a hybrid")
+}
+
+const GATES: [Free; 5] = [
+    Free::Steer,
+    Free::Speed,
+    Free::Acceleration,
+    Free::Soc,
+    Free::Energy,
+];
+
+/// Problems of every kind, with all gates and all zones free.
+fn problems() -> Vec<(String, HybridProblem)> {
+    let mut random = Random(9);
+    let mut problems = Vec::new();
+    for (closed, sections, spacing, exponent) in [
+        (true, 360, 16.0, 2.0),
+        (true, 600, 5.0, 1.7),
+        (false, 300, 8.0, 2.0),
+    ] {
+        let centre = DVec2::new(random.within(-2e3, 2e3), random.within(-2e3, 2e3));
+        let cuts = circuit(sections, spacing, closed, centre, &mut random);
+        let middle = cuts.points(&vec![0.5; sections]);
+        let shape = geometry(&middle, closed);
+        let mut length = shape.segment_m.clone();
+        length.resize(sections, 0.0);
+        for mode in [Mode::Offset, Mode::Additional] {
+            let plan = EnergyPlan::zoned(&length, &[20, 90, 150, 260], closed, sections - 40, mode);
+            let strategy = Strategy {
+                free: GATES
+                    .into_iter()
+                    .chain((0..plan.count()).map(Free::Zone))
+                    .collect(),
+                ..Strategy::fixed(Gates::OPEN, plan.count())
+            };
+            let free = HybridLine::Free {
+                cuts: Box::new(cuts.clone()),
+                parametrisation: Parametrisation::control_points(sections / 6),
+            };
+            let fixed = HybridLine::Fixed {
+                points_m: middle.clone(),
+                closed,
+            };
+            for (name, line) in [("free", free), ("fixed", fixed)] {
+                let problem = HybridProblem::new(
+                    line,
+                    hybrid_car(exponent),
+                    plan.clone(),
+                    strategy.clone(),
+                    &HybridObjective::ALL,
+                    30.0,
+                );
+                let name = format!("{name} line, {} mode, closed {closed}", mode.name());
+                problems.push((name, problem.expect("a sound problem")));
+            }
+        }
+    }
+    problems
+}
+
+/// Smooth lines with strategies from all over their ranges.
+fn candidates(problem: &HybridProblem, count: usize, random: &mut Random) -> Vec<Vec<f64>> {
+    let line = problem.line_variables();
+    (0..count)
+        .map(|_| {
+            let phase = random.within(0.0, 6.0);
+            let mut candidate: Vec<f64> = (0..line)
+                .map(|i| 0.5 + 0.3 * (0.3 * i as f64 + phase).sin())
+                .collect();
+            candidate.extend([
+                random.within(0.005, 0.15),
+                random.within(30.0, 75.0),
+                random.within(0.0, 3.0),
+                random.within(0.7, 1.0),
+                random.within(0.0, 4.0),
+            ]);
+            candidate.extend((line + 5..problem.dimensions()).map(|_| random.within(0.0, 1.0)));
+            candidate
+        })
+        .collect()
+}
+
+fn check_books(name: &str, problem: &HybridProblem, laps: &[EnergyLap<f64>], epsilon: f64) {
+    for (i, lap) in laps.iter().enumerate() {
+        // Each of the sums takes one rounding for every segment, of no more than what has passed so far.
+        let passed = lap.deployed + lap.harvested_k + lap.harvested_h;
+        let bound = 4.0 * problem.plan().rows.len() as f64 * epsilon * passed.max(1.0);
+        let error = lap.change - (lap.harvested_k + lap.harvested_h - lap.deployed);
+        assert!(
+            error.abs() <= bound,
+            "{name}, lap {i}: {error} J of {passed} J, at most {bound} J"
+        );
+    }
+}
+
+/// Books balance to rounding on every lap of every particle, and single precision gives the laps of `f64`.
+///
+/// Times: as of racing lines, whose rounding is at most 1e-4 of a lap away from the lateral limit and 1.6e-4 on it. Energies
+/// are forces over lengths, and forces are differences of speeds squared: 2500 m^2/s^2 is off by 3e-4 after the roundings of a
+/// step, over 2 h of 10 m that is 3e-5 m/s^2 or 4 kJ on a lap of 5 km whose signs all agree; a root of what the ellipse leaves
+/// is off by 6e-4 of 15 m/s^2 where a corner is on the limit, an eighth of the lap at most: 7 kJ more. A gate flips on a
+/// rounding where a figure is on its threshold: no more than a segment at either end of each of the four zones, and one at
+/// the budget's end, of 120 kW over 0.95 and h / v.
+#[test]
+fn laps_with_energy_agree_and_balance() {
+    let mut random = Random(77);
+    for (name, problem) in problems() {
+        let rows = candidates(&problem, 70, &mut random);
+        let slices: Vec<&[f64]> = rows.iter().map(Vec::as_slice).collect();
+        let expected = CpuHybridEvaluator::new(&problem).laps(&slices);
+        check_books(&name, &problem, &expected, f64::EPSILON);
+        let mut found: Vec<(String, Vec<EnergyLap<f64>>)> = Vec::new();
+        for set in InstructionSet::available() {
+            let laps = SimdHybridEvaluator::new(&problem, set).laps(&slices);
+            found.push((format!("simd {}", set.name()), laps));
+        }
+        if let Some(context) = device() {
+            let mut evaluator = GpuHybridEvaluator::new(&problem, context).expect("the kernel compiles");
+            found.push(("gpu".to_owned(), evaluator.laps(&slices).expect("it runs")));
+        }
+        let points = match problem.line() {
+            HybridLine::Fixed { points_m, .. } => points_m.clone(),
+            HybridLine::Free { cuts, .. } => cuts.points(&vec![0.5; cuts.len()]),
+        };
+        let spacing = geometry(&points, true)
+            .segment_m
+            .iter()
+            .fold(0.0, |a: f64, b| a.max(*b));
+        for (backend, laps) in found {
+            check_books(
+                &format!("{backend}, {name}"),
+                &problem,
+                &laps,
+                f64::from(f32::EPSILON),
+            );
+            let mut worst = [0.0f64; 3];
+            for (i, (lap, expected)) in laps.iter().zip(&expected).enumerate() {
+                let mean_speed = points.len() as f64 * spacing / expected.time;
+                let segment_j = 130e3 * 2.0 * spacing / mean_speed;
+                let energy = 11e3 + 9.0 * segment_j;
+                let fuel = 3e-4 * expected.fuel + energy * 2.0 * 0.27 / 3.6e6;
+                for (what, found, expected, tolerance) in [
+                    ("time", lap.time, expected.time, 2.6e-4 * expected.time),
+                    ("fuel", lap.fuel, expected.fuel, fuel),
+                    ("deployed", lap.deployed, expected.deployed, energy),
+                    ("harvested by K", lap.harvested_k, expected.harvested_k, energy),
+                    ("harvested by H", lap.harvested_h, expected.harvested_h, energy),
+                    ("change", lap.change, expected.change, 2.0 * energy),
+                    ("swing", lap.swing, expected.swing, 2.0 * energy),
+                ] {
+                    let error = (found - expected).abs();
+                    assert!(
+                        error <= tolerance,
+                        "{backend}, {name}, lap {i}, {what}: {found} for {expected}"
+                    );
+                }
+                worst[0] = worst[0].max((lap.time / expected.time - 1.0).abs());
+                worst[1] = worst[1].max((lap.fuel / expected.fuel - 1.0).abs());
+                worst[2] = worst[2].max((lap.deployed - expected.deployed).abs());
+            }
+            println!(
+                "{backend:12} {name}: time {:.1e}, fuel {:.1e}, deployed {:.0} J",
+                worst[0], worst[1], worst[2]
+            );
+        }
+    }
+}
+
+#[test]
+fn evaluations_are_rows_of_laps_and_candidates_that_are_no_numbers_fail() {
+    let (_, problem) = problems().swap_remove(2);
+    let mut random = Random(3);
+    let mut rows = candidates(&problem, 3, &mut random);
+    rows[1][0] = f64::NAN;
+    let mut backends: Vec<Box<dyn Evaluator + '_>> = vec![
+        Box::new(CpuHybridEvaluator::new(&problem)),
+        Box::new(SimdHybridEvaluator::new(&problem, InstructionSet::best())),
+    ];
+    if let Some(context) = device() {
+        backends.push(Box::new(
+            GpuHybridEvaluator::new(&problem, context).expect("the kernel compiles"),
+        ));
+    }
+    for evaluator in &mut backends {
+        let evaluation = evaluator.evaluate(&rows.concat()).expect("it runs");
+        assert_eq!(evaluation.failures.iter().filter(|f| f.is_some()).count(), 1);
+        assert_eq!(evaluation.objectives[4..8], [lapswarm::evaluate::FAILED_COST; 4]);
+        let lap = problem.lap(&rows[0]).0;
+        assert!((evaluation.objectives[0] / lap.time - 1.0).abs() < 2.6e-4);
+        assert!((evaluation.objectives[1] / (lap.fuel / 0.748) - 1.0).abs() < 1e-2);
+    }
+}

@@ -1,0 +1,234 @@
+//! Random numbers, test problems and swarms: processor and device against each other.
+
+use crate::common::Random;
+use crate::device::device;
+use lapswarm::evaluate::Evaluator;
+use lapswarm::evaluate::gpu::GpuContext;
+use lapswarm::evaluate::gpu::shader::{ELEMENTARY, random};
+use lapswarm::evaluate::simd::InstructionSet;
+use lapswarm::parity::Subject;
+use lapswarm::random::philox;
+use lapswarm::scalar::elementary::{ln, power};
+use lapswarm::swarm::device::DeviceMopso;
+use lapswarm::swarm::problems::{GpuTestEvaluator, NAMES, SimdTestEvaluator, TestProblem};
+use lapswarm::swarm::{Mopso, MopsoSettings, Mutation, Optimiser, PsoSettings};
+use std::sync::Arc;
+
+/// Whether the device is known to round every operation as the processor does.
+fn rounds_like_the_processor(context: &Arc<GpuContext>) -> bool {
+    Subject::Device(Arc::clone(context)).rounds_like_the_processor()
+}
+
+/// `expression` of eight words `c`, four of which it is to yield.
+fn map_words(context: &GpuContext, fragments: &str, expression: &str, inputs: &[u32]) -> Vec<u32> {
+    let lanes = inputs.len() / 8;
+    let source = format!(
+        "{fragments}
+        @group(0) @binding(0) var<storage, read> from_host: array<vec4<u32>>;
+        @group(0) @binding(1) var<storage, read_write> to_host: array<vec4<u32>>;
+        @compute @workgroup_size(64) fn apply(@builtin(global_invocation_id) id: vec3<u32>) {{
+            if id.x < {lanes}u {{
+                let a = from_host[2u * id.x];
+                let b = from_host[2u * id.x + 1u];
+                to_host[id.x] = {expression};
+            }}
+        }}"
+    );
+    // Bits travel as floats, unread.
+    let floats: &[f32] = bytemuck::cast_slice(inputs);
+    let found = context
+        .run_array(&source, "apply", floats, lanes * 4, lanes)
+        .expect("the kernel runs");
+    bytemuck::cast_slice(&found).to_vec()
+}
+
+#[test]
+fn the_device_draws_the_same_random_numbers() {
+    let Some(context) = device() else { return };
+    let mut source = Random(3);
+    let mut inputs: Vec<u32> = (0..8 * 100_000).map(|_| source.bits() as u32).collect();
+    // All ones carry furthest.
+    inputs[..8].fill(u32::MAX);
+    let found = map_words(&context, random(), "philox(a, b.xy)", &inputs);
+    for (given, words) in inputs.chunks_exact(8).zip(found.chunks_exact(4)) {
+        let expected = philox([given[0], given[1], given[2], given[3]], [given[4], given[5]]);
+        assert_eq!(words, expected, "{given:?}");
+    }
+}
+
+/// Integer work and one division: exact where divisions are, else as far as the logarithm carries their 2.5 ULP.
+#[test]
+fn the_device_takes_the_same_powers() {
+    let Some(context) = device() else { return };
+    let mut source = Random(4);
+    let inputs: Vec<f32> = (0..100_000)
+        .flat_map(|_| {
+            let x = source.within(0.0, 1.0) as f32;
+            [x, x * 1e-6, x * 1e6, 1.0 / 21.0, 0.0, 0.0, 0.0, 0.0]
+        })
+        .collect();
+    let expression = "bitcast<vec4<u32>>(vec4<f32>(own_ln(bitcast<f32>(a.y) + 1e-9), own_ln(bitcast<f32>(a.z) + 1e-9), \
+                      own_power(bitcast<f32>(a.x), 21.0), own_power(bitcast<f32>(a.x), bitcast<f32>(a.w))))";
+    let found = map_words(&context, ELEMENTARY, expression, bytemuck::cast_slice(&inputs));
+    for (given, words) in inputs.chunks_exact(8).zip(found.chunks_exact(4)) {
+        let expected = [
+            ln(given[1] + 1e-9),
+            ln(given[2] + 1e-9),
+            power(given[0], 21.0),
+            power(given[0], given[3]),
+        ];
+        for (word, expected) in words.iter().zip(expected) {
+            let found = f32::from_bits(*word);
+            if rounds_like_the_processor(&context) {
+                assert_eq!(
+                    found.to_bits(),
+                    expected.to_bits(),
+                    "{given:?}: {found} is not {expected}"
+                );
+            } else {
+                let share = (found - expected).abs() / expected.abs().max(1e-3);
+                assert!(share < 1e-5, "{given:?}: {found} is not {expected}");
+            }
+        }
+    }
+}
+
+fn candidates(test: &TestProblem, count: usize) -> Vec<f64> {
+    let mut source = Random(5);
+    let variables = &test.problem().variables;
+    (0..count)
+        // As floats, so that all backends are asked for the same candidates.
+        .flat_map(|_| {
+            variables
+                .iter()
+                .map(|v| f64::from(source.within(v.lower, v.upper) as f32))
+                .collect::<Vec<_>>()
+        })
+        .map(|x| x.clamp(-1e6, 1e6))
+        .collect()
+}
+
+/// Lanes on every instruction set, the device, and `f64`.
+///
+/// Against `f64`: a float's spacing of 6e-8 of the largest term, times the number of operations of a sum (30 variables,
+/// some four each), times what the steepest function makes of an argument's rounding: cosines of 20 half turns
+/// times 100 in DTLZ1.
+#[test]
+fn test_problems_are_the_same_everywhere() {
+    let context = device();
+    for name in NAMES {
+        let test = TestProblem::by_name(name).unwrap();
+        let population = candidates(&test, 1003);
+        let exact = test.evaluator().evaluate(&population).unwrap();
+        let lanes = SimdTestEvaluator::new(&test, InstructionSet::best())
+            .evaluate(&population)
+            .unwrap();
+        for set in InstructionSet::available() {
+            assert_eq!(
+                SimdTestEvaluator::new(&test, set).evaluate(&population).unwrap(),
+                lanes,
+                "{name} {set:?}"
+            );
+        }
+        let largest = exact.objectives.iter().fold(0.0f64, |m, x| m.max(x.abs()));
+        let close = |found: &[f64], what: &str, share: f64| {
+            for (i, (found, expected)) in found.iter().zip(&exact.objectives).enumerate() {
+                let off = (found - expected).abs() / largest;
+                assert!(off <= share, "{name} {what} {i}: {found} is not {expected}");
+            }
+        };
+        close(&lanes.objectives, "lanes", 2e-5);
+        let Some(context) = &context else { continue };
+        let on_device = GpuTestEvaluator::new(&test, Arc::clone(context))
+            .unwrap()
+            .evaluate(&population)
+            .unwrap();
+        assert_eq!(on_device.failures, lanes.failures);
+        if rounds_like_the_processor(context) {
+            // Llvmpipe regroups Ackley's sum of three terms of up to 23, whose two roundings are each half a spacing of
+            // 32: 2e-6.
+            let most = if name == "ackley" { 4e-6 } else { 0.0 };
+            let off = |i: &usize| (on_device.objectives[*i] - lanes.objectives[*i]).abs() > most;
+            let part = (0..lanes.objectives.len()).find(off);
+            if let Some(i) = part {
+                panic!(
+                    "{name}, figure {i}: {} is not {}",
+                    on_device.objectives[i], lanes.objectives[i]
+                );
+            }
+        } else {
+            close(&on_device.objectives, "device", 4e-5);
+        }
+    }
+}
+
+/// Generations that the two swarms go in lockstep.
+const GENERATIONS: usize = 100;
+
+/// One hundred generations on smooth fronts: bit for bit where the device rounds as the processor does. Elsewhere the
+/// first rounding that turns a comparison makes another swarm, so that there the first generation is held to the
+/// rounding of its few operations (ten spacings of one), and the end to how good the front is.
+#[test]
+fn swarms_in_lanes_and_on_the_device_in_lockstep() {
+    let Some(context) = device() else { return };
+    let default = MopsoSettings::default();
+    let thesis = MopsoSettings {
+        mutation: Mutation::Random,
+        ..MopsoSettings::thesis()
+    };
+    // A block that is not full, and more than one part.
+    for (name, settings, population) in [
+        ("zdt1", default.clone(), 4100),
+        ("dtlz2", default, 5000),
+        ("zdt2", thesis, 4096),
+    ] {
+        let test = TestProblem::sized(name, 12).unwrap();
+        let settings = MopsoSettings {
+            motion: PsoSettings {
+                population,
+                iterations: GENERATIONS,
+                seed: 9,
+                ..settings.motion
+            },
+            ..settings
+        };
+        let mut lanes = Mopso::new(test.problem(), settings.clone()).unwrap();
+        let mut judge = SimdTestEvaluator::new(&test, InstructionSet::best());
+        let mut there = DeviceMopso::new(test.problem(), settings, Arc::clone(&context)).unwrap();
+        let mut judge_there = GpuTestEvaluator::new(&test, Arc::clone(&context)).unwrap();
+        let exact = rounds_like_the_processor(&context);
+        for generation in 0..GENERATIONS {
+            let candidates = lanes.ask();
+            if exact || generation < 2 {
+                let others = there.candidates().unwrap();
+                let furthest = candidates
+                    .iter()
+                    .zip(&others)
+                    .map(|(a, b)| (a - b).abs())
+                    .fold(0.0, f64::max);
+                let most = if exact {
+                    0.0
+                } else {
+                    10.0 * f64::from(f32::EPSILON)
+                };
+                assert!(
+                    furthest <= most,
+                    "{name}, generation {generation}: {furthest} apart"
+                );
+            }
+            lanes.tell(&judge.evaluate(&candidates).unwrap());
+            there.step(&mut judge_there).unwrap();
+        }
+        if exact {
+            assert_eq!(lanes.front(), there.front(), "{name}");
+        }
+        assert_eq!(lanes.evaluations(), there.evaluations());
+        let reference = vec![1.1; test.problem().objectives.len()];
+        let volume = |rows: &[Vec<f64>]| lapswarm::swarm::metrics::hypervolume(rows, &reference).unwrap();
+        let (here, there) = (
+            volume(&lanes.front().objectives),
+            volume(&there.front().objectives),
+        );
+        assert!((here - there).abs() < 2e-3, "{name}: {here} and {there}");
+    }
+}

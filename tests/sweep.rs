@@ -1,0 +1,79 @@
+//! Sweeps: a grid of small studies, broken off and gone on with.
+
+use lapswarm::study::sweep::{SweepSettings, sweep};
+use std::ops::ControlFlow;
+use std::path::Path;
+
+const SWEEP: &str = "study = \"identify\"
+[base]
+polish = false
+[base.free]
+K = [3e4, 3e5]
+[base.swarm]
+algorithm = \"thesis\"
+iterations = 2
+[grid]
+\"swarm.population\" = [4, 6]
+seed = [1, 2]
+";
+
+fn files(folder: &Path) -> Vec<(String, Vec<u8>)> {
+    [
+        "sweep.csv",
+        "medians.csv",
+        "rows.jsonl",
+        "summary.json",
+        "sweep.toml",
+    ]
+    .map(|name| (name.to_owned(), std::fs::read(folder.join(name)).expect(name)))
+    .to_vec()
+}
+
+#[test]
+fn a_sweep_broken_off_and_gone_on_with_is_the_same_to_the_byte() {
+    let root = tempfile::tempdir().expect("a temporary folder");
+    let settings = SweepSettings::parse(Path::new("sweep.toml"), SWEEP).expect("a sweep");
+    let whole = root.path().join("whole");
+    let summary = sweep(&settings, &whole, false, |_| ControlFlow::Continue(())).expect("it runs");
+    assert_eq!((summary.rows.len(), summary.groups.len()), (4, 2));
+    assert!(
+        summary
+            .rows
+            .iter()
+            .all(|r| r.figures["best_cost"].is_some_and(f64::is_finite))
+    );
+    // Broken off at the n-th word from it, be it before or within a run.
+    for stop in [1usize, 3, 6, 9] {
+        let part = root.path().join(format!("part{stop}"));
+        let mut told = 0;
+        let broken = sweep(&settings, &part, false, |_| {
+            told += 1;
+            if told > stop {
+                ControlFlow::Break(())
+            } else {
+                ControlFlow::Continue(())
+            }
+        });
+        assert_eq!(broken.expect_err("broken off").exit_code(), 130, "after {stop}");
+        sweep(&settings, &part, true, |_| ControlFlow::Continue(())).expect("it goes on");
+        assert_eq!(files(&part), files(&whole), "after {stop}");
+    }
+    let other =
+        SweepSettings::parse(Path::new("sweep.toml"), &SWEEP.replace("[4, 6]", "[4]")).expect("a sweep");
+    let refused = sweep(&other, &whole, true, |_| ControlFlow::Continue(()));
+    assert_eq!(refused.expect_err("another sweep").exit_code(), 2);
+}
+
+#[test]
+fn a_mistake_in_the_last_point_shows_before_the_first_is_run() {
+    let root = tempfile::tempdir().expect("a temporary folder");
+    let text = SWEEP.replace("[4, 6]", "[4, -6]");
+    let settings = SweepSettings::parse(Path::new("sweep.toml"), &text).expect("a sweep");
+    let mut told = 0;
+    let refused = sweep(&settings, &root.path().join("s"), false, |_| {
+        told += 1;
+        ControlFlow::Continue(())
+    });
+    assert_eq!(refused.expect_err("a negative population").exit_code(), 2);
+    assert_eq!(told, 0);
+}

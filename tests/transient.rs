@@ -1,0 +1,137 @@
+//! A line driven by the 4DOF car, and the whole way from a log to a lap.
+
+use lapswarm::evaluate::line::LineObjective;
+use lapswarm::study::identify::{Algorithm, IdentifySettings};
+use lapswarm::study::raceline::{RacelineSettings, set_up};
+use lapswarm::study::run::{RunSettings, run};
+use lapswarm::study::transient::{
+    AGREEMENT, TransientSettings, drive_line, read_line, summarise, write_results,
+};
+use lapswarm::vehicle::Car;
+use std::ops::ControlFlow;
+
+fn stadium() -> lapswarm::study::raceline::Setup {
+    set_up(&RacelineSettings {
+        track: "stadium:400:120:14".to_owned(),
+        sections: 200,
+        ..RacelineSettings::default()
+    })
+    .expect("a stadium")
+}
+
+#[test]
+fn the_car_drives_a_line_as_fast_as_the_point_mass() {
+    let setup = stadium();
+    let car = Car::bundled().expect("the bundled car");
+    let points = setup.cuts.points(&setup.cuts.reference);
+    let edges = [setup.edges_m[0].as_slice(), setup.edges_m[1].as_slice()];
+    let outcome =
+        drive_line(&car, &setup.car, &points, edges, &TransientSettings::default()).expect("it drives");
+    assert!(
+        outcome.disagreement().abs() <= AGREEMENT,
+        "{}",
+        outcome.disagreement()
+    );
+    assert!(outcome.margin_m > 0.0, "{}", outcome.margin_m);
+    assert!(outcome.grip_share > 0.7, "{}", outcome.grip_share);
+    // The time is that of the samples: speeds integrated over the lap give its length.
+    let driven: f64 = outcome.drive.states.iter().map(|s| s[0].hypot(s[1]) * 0.01).sum();
+    let length = outcome.line.length_m;
+    assert!((driven / length - 1.0).abs() < 0.005, "{driven} and {length}");
+
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let summary = summarise("gt", &outcome, 1.0);
+    write_results(folder.path(), &outcome, &summary).expect("files are written");
+    for name in [
+        "drive.csv",
+        "speeds.svg",
+        "map.svg",
+        "envelope_driven.csv",
+        "summary.json",
+    ] {
+        assert!(folder.path().join(name).is_file(), "{name}");
+    }
+}
+
+#[test]
+fn a_road_too_narrow_for_the_car_and_a_table_of_something_else_are_refused() {
+    let setup = stadium();
+    let car = Car::bundled().expect("the bundled car");
+    let points = setup.cuts.points(&setup.cuts.reference);
+    let edges = [setup.edges_m[0].as_slice(), setup.edges_m[1].as_slice()];
+    let wide = TransientSettings {
+        car_width_m: 16.0,
+        ..TransientSettings::default()
+    };
+    let error = drive_line(&car, &setup.car, &points, edges, &wide).expect_err("no room");
+    assert_eq!(error.exit_code(), 2, "{error}");
+
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = folder.path().join("line.csv");
+    for (text, place) in [
+        ("a,b\n1,2\n", "line 1"),
+        ("x_m,y_m\n1,2\n3,oops\n", "line 3"),
+        ("x_m,y_m\n1,2\n", "rows"),
+    ] {
+        std::fs::write(&path, text).expect("a file");
+        let error = read_line(&path).expect_err("no line").to_string();
+        assert!(error.contains(place), "{error}");
+    }
+}
+
+#[test]
+fn a_run_goes_from_the_log_to_a_driven_lap_and_remembers_its_stages() {
+    let base = RunSettings::default();
+    let free = base
+        .identify
+        .free
+        .iter()
+        .filter(|f| f.name == "K")
+        .cloned()
+        .collect();
+    let settings = RunSettings {
+        identify: IdentifySettings {
+            free,
+            algorithm: Algorithm::Pso,
+            population: Some(8),
+            iterations: Some(3),
+            ..base.identify.clone()
+        },
+        raceline: RacelineSettings {
+            sections: 360,
+            objectives: vec![LineObjective::LapTime],
+            ..base.raceline.clone()
+        },
+        rounds: 1,
+        ..base
+    };
+    let root = tempfile::tempdir().expect("a temporary folder");
+    let cache = root.path().join("cache");
+    let go = |name: &str| {
+        run(&settings, &root.path().join(name), Some(&cache), |_| {
+            ControlFlow::Continue(())
+        })
+        .expect("it runs")
+    };
+    let first = go("first");
+    assert!(first.reused.is_empty(), "{:?}", first.reused);
+    assert!(first.agrees, "{:?}", first.rounds);
+    assert!(first.rounds[0].margin_m > 0.0, "the car stays on the road");
+    assert!(
+        first.total_parameter_error.is_some_and(|e| e < 1e-3),
+        "{:?}",
+        first.total_parameter_error
+    );
+    let again = go("again");
+    assert_eq!(again.reused, ["identify", "envelope", "raceline", "transient"]);
+    assert_eq!(format!("{:?}", again.rounds), format!("{:?}", first.rounds));
+    for name in [
+        "story.txt",
+        "summary.json",
+        "1_identify/car.toml",
+        "3_raceline/line_fastest.csv",
+        "4_transient/drive.csv",
+    ] {
+        assert!(root.path().join("again").join(name).is_file(), "{name}");
+    }
+}
