@@ -69,11 +69,15 @@ pub(super) fn write(folder: &Path, summary: &Summary) -> Result<()> {
 
 /// A line of the story without the label before it, where what follows says the same.
 fn sentence(line: &str) -> String {
-    let words = line.split_whitespace().collect::<Vec<_>>().join(" ");
+    let words = line
+        .split_whitespace()
+        .collect::<Vec<_>>()
+        .join(" ")
+        .replace("^2", "\u{b2}");
     let told = words.strip_prefix("The car ").unwrap_or(&words);
     match told.strip_prefix("Its limits ") {
         Some(limits) => format!("Its limits: {limits}"),
-        None => told.replace("^2", "\u{b2}"),
+        None => told.to_owned(),
     }
 }
 
