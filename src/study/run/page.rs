@@ -8,8 +8,8 @@ use std::path::Path;
 
 pub(super) fn write(folder: &Path, summary: &Summary) -> Result<()> {
     let mut page = HtmlReport::new("run", &format!("{}: from the log to a lap", summary.car));
-    for sentence in summary.to_text().lines() {
-        page.sentence(sentence.split_whitespace().collect::<Vec<_>>().join(" "));
+    for line in summary.to_text().lines() {
+        page.sentence(sentence(line));
     }
     if let Some(last) = summary.rounds.last() {
         page.tile("Driven lap", format!("{:.3}", last.driven_lap_time_s), "s");
@@ -46,8 +46,8 @@ pub(super) fn write(folder: &Path, summary: &Summary) -> Result<()> {
             "The last line as it was planned, and as the car itself drives it.",
         );
         let laps = [
-            ("driven by the 4DOF car", driven),
             ("planned by the point mass", planned),
+            ("driven by the 4DOF car", driven),
         ];
         overlay(&mut page, &laps, road.as_ref(), true)?;
     }
@@ -65,6 +65,20 @@ pub(super) fn write(folder: &Path, summary: &Summary) -> Result<()> {
     page.provenance("time", format!("{:.1} s", summary.elapsed_s));
     page.provenance("stages taken from earlier runs", summary.reused.join(", "));
     page.write(folder.join("report.html"))
+}
+
+/// A line of the story without the label before it, where what follows says the same.
+fn sentence(line: &str) -> String {
+    let words = line
+        .split_whitespace()
+        .collect::<Vec<_>>()
+        .join(" ")
+        .replace("^2", "\u{b2}");
+    let told = words.strip_prefix("The car ").unwrap_or(&words);
+    match told.strip_prefix("Its limits ") {
+        Some(limits) => format!("Its limits: {limits}"),
+        None => told.to_owned(),
+    }
 }
 
 fn table(page: &mut HtmlReport, rounds: &[RoundSummary]) -> Result<()> {

@@ -26,11 +26,13 @@ function trackMap(place, lap, shown, onHover) {
     const [across, up] = [(view.scale * width) / 2, (view.scale * height) / 2];
     return { xAxis: { min: view.x - across, max: view.x + across }, yAxis: { min: view.y - up, max: view.y + up } };
   };
-  const look = (to) => {
-    view = to;
+  let all = true;
+  const look = (to, isAll = false) => {
+    [view, all] = [to, isAll];
     chart.setOption(axes());
     dots();
   };
+  const lookAtAll = () => look(fitted(whole, 26), true);
   const toPixel = (x, y) => {
     const [width, height] = size();
     return [width / 2 + (x - view.x) / view.scale, height / 2 - (y - view.y) / view.scale];
@@ -151,7 +153,7 @@ function trackMap(place, lap, shown, onHover) {
   zr.on("mousedown", (e) => { grip = { px: e.offsetX, py: e.offsetY, x: view.x, y: view.y }; });
   zr.on("mouseup", () => { grip = null; });
   zr.on("globalout", () => { grip = null; });
-  zr.on("dblclick", () => look(fitted(whole, 26)));
+  zr.on("dblclick", () => lookAtAll());
   zr.on("mousemove", (e) => {
     if (grip) {
       look({ x: grip.x - (e.offsetX - grip.px) * view.scale, y: grip.y + (e.offsetY - grip.py) * view.scale, scale: view.scale });
@@ -173,9 +175,9 @@ function trackMap(place, lap, shown, onHover) {
     move(x) { cursor = x; dots(); },
     redraw() { chart.setOption(option(), { replaceMerge: ["series", "visualMap"] }); dots(); },
     colour(line, panel) { coloured = { line, panel }; this.redraw(); },
-    resized() { look(fitted(whole, 26)); },
+    resized() { if (all) lookAtAll(); else look(view); },
     zoom(factor) { const [w, h] = size(); zoom(factor, w / 2, h / 2); },
-    reset() { look(fitted(whole, 26)); },
+    reset() { lookAtAll(); },
     // Shows the stretch between two distances.
     follow(from, to) {
       const box = [[Infinity, -Infinity], [Infinity, -Infinity]];

@@ -1,6 +1,7 @@
 //! What a hybrid study leaves behind: figures for people and scripts, laps, pictures.
 
 mod files;
+mod page;
 mod pictures;
 
 use super::{HybridSetup, HybridStudySettings, Outcome, ReportedLap, Sizing, StintLap};
@@ -350,7 +351,8 @@ pub fn write_results(
     summary: &HybridSummary,
 ) -> Result<()> {
     files::write(folder, settings, setup, outcome, summary)?;
-    pictures::draw(folder, settings, setup, outcome)
+    pictures::draw(folder, settings, setup, outcome)?;
+    page::write(folder, settings, setup, outcome, summary)
 }
 
 /// The laps that a study tells of.

@@ -47,7 +47,7 @@ pub fn draw(
 }
 
 /// Power at the wheels (kW) of a force over the mass (m/s^2), segment by segment.
-fn power_kw(
+pub fn power_kw(
     setup: &HybridSetup,
     lap: &ReportedLap,
     force: impl Fn(&crate::line::energy::SegmentEnergy<f64>) -> f64,
@@ -57,7 +57,7 @@ fn power_kw(
     rows.map(|(s, h)| mass * force(s) * h / s.time / 1e3).collect()
 }
 
-fn soc(setup: &HybridSetup, lap: &ReportedLap) -> Vec<f64> {
+pub fn soc(setup: &HybridSetup, lap: &ReportedLap) -> Vec<f64> {
     let store = &setup.car.hybrid.store;
     lap.change_j()[1..]
         .iter()
@@ -66,7 +66,7 @@ fn soc(setup: &HybridSetup, lap: &ReportedLap) -> Vec<f64> {
 }
 
 /// Running sum, MJ.
-fn summed(values: impl Iterator<Item = f64>) -> Vec<f64> {
+pub fn summed(values: impl Iterator<Item = f64>) -> Vec<f64> {
     values
         .scan(0.0, |sum, x| {
             *sum += x / 1e6;
@@ -152,7 +152,7 @@ fn draw_lap(path: &Path, setup: &HybridSetup, outcome: &Outcome, lap: &ReportedL
     plot_curves(path, &title, &panels)
 }
 
-fn speeds(lap: &ReportedLap) -> Vec<f64> {
+pub fn speeds(lap: &ReportedLap) -> Vec<f64> {
     lap.segments.iter().map(|s| s.start.sqrt()).collect()
 }
 
@@ -192,8 +192,8 @@ fn draw_charges(path: &Path, setup: &HybridSetup, outcome: &Outcome) -> Result<(
     )
 }
 
-/// Deployment and harvest on the circuit.
-fn draw_map(path: &Path, setup: &HybridSetup, lap: &ReportedLap) -> Result<()> {
+/// Names to write on a map, and their places (m).
+pub fn map_names(setup: &HybridSetup) -> Vec<(&str, DVec2)> {
     let road = &setup.raceline.road;
     let at = |station: f64| {
         let i = road
@@ -207,11 +207,15 @@ fn draw_map(path: &Path, setup: &HybridSetup, lap: &ReportedLap) -> Result<()> {
         .sections
         .iter()
         .map(|s| (s.name.as_str(), at(0.5 * (s.start_m + s.end_m))));
-    let names: Vec<(&str, DVec2)> = if road.corners.is_empty() {
+    if road.corners.is_empty() {
         sections.collect()
     } else {
         corners.collect()
-    };
+    }
+}
+
+/// Deployment and harvest on the circuit.
+fn draw_map(path: &Path, setup: &HybridSetup, lap: &ReportedLap) -> Result<()> {
     let mut values = power_kw(setup, lap, |s| s.motor - s.generator);
     values.resize(setup.points_m.len(), f64::NAN);
     plot_track_map(
@@ -231,7 +235,7 @@ fn draw_map(path: &Path, setup: &HybridSetup, lap: &ReportedLap) -> Result<()> {
             value_label: "power",
             value_unit: "kW",
             closed: setup.closed,
-            names,
+            names: map_names(setup),
         },
     )
 }
@@ -366,8 +370,13 @@ fn draw_sites(path: &Path, setup: &HybridSetup, engine_lap: &ReportedLap, lap: &
 
 /// Time against energy: the exact optima, the swarm's front, the scenarios with the motor beside the engine.
 fn draw_time_energy(path: &Path, outcome: &Outcome) -> Result<()> {
+    plot_curves(path, "Time against energy", &time_energy(outcome))
+}
+
+/// Its panels; none without a deployment.
+pub fn time_energy(outcome: &Outcome) -> Vec<CurvePanel<'static>> {
     let Some(o) = &outcome.optimised else {
-        return Ok(());
+        return Vec::new();
     };
     let mut exact: Vec<(f64, f64)> = o
         .front
@@ -419,7 +428,7 @@ fn draw_time_energy(path: &Path, outcome: &Outcome) -> Result<()> {
             curves: vec![line("", marginal)],
         });
     }
-    plot_curves(path, "Time against energy", &panels)
+    panels
 }
 
 /// The swarm's front as scatters of every two objectives and in parallel coordinates with its variables.
