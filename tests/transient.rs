@@ -92,6 +92,8 @@ fn a_run_goes_from_the_log_to_a_driven_lap_and_remembers_its_stages() {
     let settings = RunSettings {
         identify: IdentifySettings {
             free,
+            // Without a hybrid drive, whose study would take longer than all the others here.
+            car: "gt".to_owned(),
             algorithm: Algorithm::Pso,
             population: Some(8),
             iterations: Some(3),

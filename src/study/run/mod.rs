@@ -1,17 +1,18 @@
-//! The whole way from a log to a lap: the car that drove it, its limits, the line that suits it, and that line driven by
-//! the car itself, whose grip is fed back into the limits until both laps agree.
+//! The whole way from a log to a lap: the car that drove it, its limits, the line that suits it, that line driven by the
+//! car itself, whose grip is fed back into the limits until both laps agree, and a hybrid's energy on it.
 
 mod page;
 mod stage;
 mod story;
 
 pub use stage::{Inputs, Stages};
-pub use story::{RoundSummary, Summary};
+pub use story::{EnergySummary, RoundSummary, Summary};
 
 use crate::config::{Document, read_text};
 use crate::error::{Error, Result};
 use crate::line::PointMass;
 use crate::study::envelope::{self, EnvelopeSettings, car_limits};
+use crate::study::hybrid::{self, HybridStudySettings};
 use crate::study::identify::{self, IdentifySettings};
 use crate::study::raceline::{self, RacelineSettings};
 use crate::study::transient::{self, TransientSettings};
@@ -36,7 +37,11 @@ pub struct RunSettings {
 impl Default for RunSettings {
     fn default() -> Self {
         Self {
-            identify: IdentifySettings::default(),
+            identify: IdentifySettings {
+                // The bundled car with all that the story tells of: an engine map and a hybrid drive.
+                car: "gt_hybrid".to_owned(),
+                ..IdentifySettings::default()
+            },
             raceline: RacelineSettings::default(),
             margin_m: 0.5,
             rounds: 2,
@@ -129,6 +134,7 @@ pub fn run(
 
     let mut rounds: Vec<RoundSummary> = Vec::new();
     let mut driven_within: Option<PathBuf> = None;
+    let mut last_line: Option<PathBuf> = None;
     for round in 1..=settings.rounds {
         let number = 1 + 2 * round;
         let line_settings = RacelineSettings {
@@ -186,6 +192,7 @@ pub fn run(
         })?;
         let driven = keep("transient", stage);
         driven_within = Some(driven.join("envelope_driven.csv"));
+        last_line = Some(line_path);
         let found = RoundSummary::read(&line_folder, &driven)?;
         let settled = rounds
             .last()
@@ -195,7 +202,48 @@ pub fn run(
             break;
         }
     }
-    let summary = Summary::put_together(
+    let mut energy = None;
+    if car.hybrid.is_some() {
+        let energy_settings = HybridStudySettings {
+            track: settings.raceline.track.clone(),
+            car: car_path.display().to_string(),
+            envelope: driven_within,
+            line: last_line,
+            car_width_m: settings.raceline.car_width_m,
+            seed: settings.raceline.seed,
+            backend: settings.raceline.backend,
+            adapter: settings.raceline.adapter.clone(),
+            ..HybridStudySettings::default()
+        };
+        let energy_setup = hybrid::set_up(&energy_settings)?;
+        let mut inputs = Inputs::new("hybrid");
+        for path in energy_settings.line.iter().chain(&energy_settings.envelope) {
+            inputs.add_file(path)?;
+        }
+        inputs.add(&(
+            &car,
+            &energy_settings.backend,
+            &energy_settings.adapter,
+            energy_settings.seed,
+        ));
+        inputs.add(&(&energy_settings.track, energy_settings.car_width_m));
+        let number = 3 + 2 * rounds.len();
+        let stage = stages.run(&format!("{number}_hybrid"), &inputs, |to| {
+            let outcome = hybrid::run_study(&energy_settings, &energy_setup, |p| {
+                observe(&format!(
+                    "energy: {}, {} laps, {}",
+                    p.stage, p.evaluations, p.best
+                ))
+            })?;
+            if outcome.interrupted {
+                return Err(broken_off());
+            }
+            let summary = hybrid::summarise(&energy_settings, &energy_setup, &outcome);
+            hybrid::write_results(to, &energy_settings, &energy_setup, &outcome, &summary)
+        })?;
+        energy = Some(EnergySummary::read(&keep("hybrid", stage))?);
+    }
+    let mut summary = Summary::put_together(
         settings,
         &setup,
         &identified,
@@ -205,6 +253,7 @@ pub fn run(
         reused,
         began.elapsed().as_secs_f64(),
     )?;
+    summary.energy = energy;
     summary.write(folder)?;
     Ok(summary)
 }

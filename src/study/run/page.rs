@@ -30,6 +30,11 @@ pub(super) fn write(folder: &Path, summary: &Summary) -> Result<()> {
     let stage = |number: usize, name: &str| format!("{number}_{name}");
     let mut stages = vec![stage(1, "identify"), stage(2, "envelope")];
     stages.extend((1..=rounds).flat_map(|r| [stage(1 + 2 * r, "raceline"), stage(2 + 2 * r, "transient")]));
+    if let Some(energy) = &summary.energy {
+        let gain = energy.engine_lap_time_s - energy.deployed_lap_time_s;
+        page.tile("Gained by deployed energy", format!("{gain:.2}"), "s");
+        stages.push(stage(3 + 2 * rounds, "hybrid"));
+    }
     page.section("Stages", "Each has a report of its own.");
     page.reports_within(&stages);
     table(&mut page, &summary.rounds)?;

@@ -61,6 +61,41 @@ impl RoundSummary {
     }
 }
 
+/// What a hybrid's energy does on the line that was driven, within the limits that were held.
+#[derive(Clone, Debug, Serialize)]
+pub struct EnergySummary {
+    /// The lap by the engine alone (s).
+    pub engine_lap_time_s: f64,
+    /// Its fuel (l).
+    pub engine_fuel_l: f64,
+    /// Fuel of the same lap with the charge sustained (l).
+    pub sustaining_fuel_l: f64,
+    /// The lap with the motor beside the engine, as the swarm deploys it (s).
+    pub deployed_lap_time_s: f64,
+    /// Energy that this takes (MJ).
+    pub deployed_mj: f64,
+    /// The same lap deployed exactly (s).
+    pub exact_lap_time_s: f64,
+}
+
+impl EnergySummary {
+    /// From the summary of a hybrid study.
+    ///
+    /// # Errors
+    /// [`Error::Io`] or [`Error::Input`] if it cannot be read.
+    pub(super) fn read(folder: &Path) -> Result<Self> {
+        let found = summary_of(folder)?;
+        Ok(Self {
+            engine_lap_time_s: number(&found, &["engine_lap_time_s"]),
+            engine_fuel_l: number(&found, &["engine_fuel_l"]),
+            sustaining_fuel_l: number(&found, &["scenarios", "charge_sustaining", "fuel_l"]),
+            deployed_lap_time_s: number(&found, &["deployment", "swarm_lap_time_s"]),
+            deployed_mj: number(&found, &["deployment", "swarm_deployed_mj"]),
+            exact_lap_time_s: number(&found, &["deployment", "exact_lap_time_s"]),
+        })
+    }
+}
+
 /// The figures of a run; `--json` prints this.
 #[derive(Clone, Debug, Serialize)]
 pub struct Summary {
@@ -92,6 +127,8 @@ pub struct Summary {
     pub top_speed_mps: f64,
     /// The lines, one after the other.
     pub rounds: Vec<RoundSummary>,
+    /// What a hybrid's energy does; nothing for a car without.
+    pub energy: Option<EnergySummary>,
     /// Whether the last driven lap agrees with the point mass's to half a percent.
     pub agrees: bool,
     /// Stages that were taken from earlier runs.
@@ -136,6 +173,7 @@ impl Summary {
                 .last()
                 .is_some_and(|r| r.disagreement_percent.abs() <= 100.0 * AGREEMENT),
             rounds,
+            energy: None,
             reused,
         })
     }
@@ -168,6 +206,18 @@ impl Summary {
                 r.driven_lap_time_s,
                 r.disagreement_percent,
                 r.margin_m
+            );
+        }
+        if let Some(e) = &self.energy {
+            text += &format!(
+                "Energy     By the engine alone the line takes {:.2} s and {:.2} l; the same lap with the charge sustained {:.2} l. \
+                 Deployed where it pays, {:.2} MJ buy {:.2} s (the exact optimum {:.2} s).\n",
+                e.engine_lap_time_s,
+                e.engine_fuel_l,
+                e.sustaining_fuel_l,
+                e.deployed_mj,
+                e.engine_lap_time_s - e.deployed_lap_time_s,
+                e.engine_lap_time_s - e.exact_lap_time_s
             );
         }
         if !self.reused.is_empty() {
