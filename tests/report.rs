@@ -269,7 +269,7 @@ fn used(browser: &Path, page: &Path) -> serde_json::Value {
         .unwrap();
     let began = Instant::now();
     while child.try_wait().unwrap().is_none() {
-        if began.elapsed() > Duration::from_secs(120) {
+        if began.elapsed() > Duration::from_secs(300) {
             child.kill().unwrap();
             panic!("the browser did not come back");
         }

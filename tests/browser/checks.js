@@ -7,14 +7,21 @@
   const painted = (canvas) => {
     const pixels = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data;
     const colours = new Set();
-    for (let i = 0; i < pixels.length && colours.size < 4; i += 4) colours.add(`${pixels[i]},${pixels[i + 1]},${pixels[i + 2]},${pixels[i + 3]}`);
+    for (let i = 0; i < pixels.length && colours.size < 4; i += 4)
+      colours.add(`${pixels[i]},${pixels[i + 1]},${pixels[i + 2]},${pixels[i + 3]}`);
     return colours.size >= 4;
   };
   const move = (box, x, y, kinds = ["mousemove"]) => {
     const canvas = box.querySelector("canvas");
     const corner = box.getBoundingClientRect();
     for (const kind of kinds) {
-      const about = { bubbles: true, cancelable: true, clientX: corner.left + x, clientY: corner.top + y, view: window };
+      const about = {
+        bubbles: true,
+        cancelable: true,
+        clientX: corner.left + x,
+        clientY: corner.top + y,
+        view: window,
+      };
       canvas.dispatchEvent(new PointerEvent(kind.replace("mouse", "pointer"), about));
       canvas.dispatchEvent(new MouseEvent(kind, about));
     }
@@ -51,7 +58,11 @@
         // From the dot's place on the map back to the traces: another place on the map, another distance.
         const canvas = map.querySelector("canvas");
         const before = lap.querySelector(".readout caption").textContent;
-        for (let y = 20; y < canvas.clientHeight && lap.querySelector(".readout caption").textContent === before; y += 6) {
+        for (
+          let y = 20;
+          y < canvas.clientHeight && lap.querySelector(".readout caption").textContent === before;
+          y += 6
+        ) {
           for (let x = 20; x < canvas.clientWidth; x += 6) move(map, x, y);
         }
         await pause(120);
@@ -70,12 +81,18 @@
     if (table) {
       const heads = [...table.tHead.rows[0].cells];
       const column = heads.findIndex((head) => head.classList.contains("number"));
-      const order = () => [...table.tBodies[0].rows].map((row) => Number(row.cells[column].dataset.value)).filter((v) => !Number.isNaN(v));
+      const order = () =>
+        [...table.tBodies[0].rows]
+          .map((row) => Number(row.cells[column].dataset.value))
+          .filter((v) => !Number.isNaN(v));
       heads[column].click();
       const up = order();
       heads[column].click();
       const down = order();
-      findings.sorts = up.every((v, i) => i === 0 || v >= up[i - 1]) && down.every((v, i) => i === 0 || v <= down[i - 1]) && up.length > 0;
+      findings.sorts =
+        up.every((v, i) => i === 0 || v >= up[i - 1]) &&
+        down.every((v, i) => i === 0 || v <= down[i - 1]) &&
+        up.length > 0;
     }
     findings.scripts = document.scripts.length;
     findings.alerted = window.alerted === true;

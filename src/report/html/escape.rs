@@ -107,6 +107,6 @@ mod tests {
         );
         // Eastings: a metre of range far from nought still has its micrometres.
         assert_eq!(json(&[500_000.123_456, 500_001.0]), "[500000.123456,500001]");
-        assert_eq!(json(&[f64::INFINITY, 1e300]), "[null,1e300]");
+        assert_eq!(json(&[f64::INFINITY, 1e300]), "[null,1e+300]");
     }
 }

@@ -5,8 +5,24 @@ let printing = false;
 
 function theme() {
   return darkColours.matches && !printing
-    ? { ink: "#e6e6e6", faint: "#9aa3ad", grid: "#343a42", frame: "#59616b", paper: "#1b1f24", shade: "#ffffff0d", road: "#2b3138" }
-    : { ink: "#222222", faint: "#66707a", grid: "#e6e8eb", frame: "#9aa0a6", paper: "#ffffff", shade: "#3b6ea512", road: "#eceef0" };
+    ? {
+        ink: "#e6e6e6",
+        faint: "#9aa3ad",
+        grid: "#343a42",
+        frame: "#59616b",
+        paper: "#1b1f24",
+        shade: "#ffffff0d",
+        road: "#2b3138",
+      }
+    : {
+        ink: "#222222",
+        faint: "#66707a",
+        grid: "#e6e8eb",
+        frame: "#9aa0a6",
+        paper: "#ffffff",
+        shade: "#3b6ea512",
+        road: "#eceef0",
+      };
 }
 
 // Okabe and Ito's palette, readable with any colour vision; the last one follows the paper.
@@ -16,7 +32,17 @@ function seriesColour(n) {
   return i < PALETTE.length ? PALETTE[i] : theme().ink;
 }
 
-const VIRIDIS = ["#440154", "#472c7a", "#3b518b", "#2c718e", "#21908d", "#27ad81", "#5cc863", "#aadc32", "#fde725"];
+const VIRIDIS = [
+  "#440154",
+  "#472c7a",
+  "#3b518b",
+  "#2c718e",
+  "#21908d",
+  "#27ad81",
+  "#5cc863",
+  "#aadc32",
+  "#fde725",
+];
 // The darkest and the brightest ends are hard to see on a page of their own shade.
 function scaleColours() {
   return darkColours.matches && !printing ? VIRIDIS.slice(2) : VIRIDIS.slice(0, 8);
@@ -28,7 +54,19 @@ function scaleColour(share) {
   return echarts.color.lerp(place - low, [colours[low], colours[low + 1]]);
 }
 
-const SUPERSCRIPT = { "-": "⁻", 0: "⁰", 1: "¹", 2: "²", 3: "³", 4: "⁴", 5: "⁵", 6: "⁶", 7: "⁷", 8: "⁸", 9: "⁹" };
+const SUPERSCRIPT = {
+  "-": "⁻",
+  0: "⁰",
+  1: "¹",
+  2: "²",
+  3: "³",
+  4: "⁴",
+  5: "⁵",
+  6: "⁶",
+  7: "⁷",
+  8: "⁸",
+  9: "⁹",
+};
 // A number to so many figures, with a true minus sign and powers of ten where plain digits would be long.
 function number(value, figures = 4) {
   if (value === null || value === undefined || !Number.isFinite(value)) return "–";
@@ -45,7 +83,9 @@ function number(value, figures = 4) {
 // As above, without noughts that only fill up: for axes.
 function tick(value) {
   const text = number(value, 5);
-  return text.includes("×") ? text.replace(/\.?0+×/, "×").replace(/^1×/, "") : text.replace(/(\.\d*?)0+$/, "$1").replace(/\.$/, "");
+  return text.includes("×")
+    ? text.replace(/\.?0+×/, "×").replace(/^1×/, "")
+    : text.replace(/(\.\d*?)0+$/, "$1").replace(/\.$/, "");
 }
 const withUnit = (label, unit) => (unit ? `${label} (${unit})` : label);
 
@@ -93,29 +133,56 @@ function tip(heading, rows) {
 
 function tooltip(extra) {
   const t = theme();
-  return { confine: true, backgroundColor: t.paper, borderColor: t.frame, textStyle: { color: t.ink, fontSize: 12 }, ...extra };
+  return {
+    confine: true,
+    backgroundColor: t.paper,
+    borderColor: t.frame,
+    textStyle: { color: t.ink, fontSize: 12 },
+    ...extra,
+  };
 }
 
 function axis(name, extra = {}) {
   const t = theme();
   return {
-    type: "value", name, nameLocation: "middle", nameGap: 28, nameTextStyle: { color: t.ink, fontSize: 12 }, scale: true,
-    axisLine: { show: true, lineStyle: { color: t.frame } }, axisTick: { show: true, lineStyle: { color: t.frame } },
-    axisLabel: { color: t.faint, fontSize: 11, formatter: tick, hideOverlap: true }, splitLine: { lineStyle: { color: t.grid } },
+    type: "value",
+    name,
+    nameLocation: "middle",
+    nameGap: 28,
+    nameTextStyle: { color: t.ink, fontSize: 12 },
+    scale: true,
+    axisLine: { show: true, lineStyle: { color: t.frame } },
+    axisTick: { show: true, lineStyle: { color: t.frame } },
+    axisLabel: { color: t.faint, fontSize: 11, formatter: tick, hideOverlap: true },
+    splitLine: { lineStyle: { color: t.grid } },
     ...extra,
   };
 }
 
 function legend(data, extra = {}) {
   const t = theme();
-  return { type: "scroll", bottom: 2, data, textStyle: { color: t.ink }, inactiveColor: t.grid, pageTextStyle: { color: t.faint }, pageIconColor: t.faint, itemWidth: 18, ...extra };
+  return {
+    type: "scroll",
+    bottom: 2,
+    data,
+    textStyle: { color: t.ink },
+    inactiveColor: t.grid,
+    pageTextStyle: { color: t.faint },
+    pageIconColor: t.faint,
+    itemWidth: 18,
+    ...extra,
+  };
 }
 
 // Buttons to drag a zoom, go back, and save a picture.
 function toolbox(zoomed) {
   const t = theme();
   return {
-    right: 8, top: 0, itemSize: 13, iconStyle: { borderColor: t.faint }, emphasis: { iconStyle: { borderColor: t.ink } },
+    right: 8,
+    top: 0,
+    itemSize: 13,
+    iconStyle: { borderColor: t.faint },
+    emphasis: { iconStyle: { borderColor: t.ink } },
     feature: {
       dataZoom: { title: { zoom: "Drag to zoom", back: "Undo the zoom" }, ...zoomed },
       saveAsImage: { title: "Save as PNG", pixelRatio: 2, backgroundColor: t.paper },
@@ -129,7 +196,10 @@ function mount(place, height, option, after = () => {}) {
   place.style.height = `${height}px`;
   const chart = echarts.init(place, null, { renderer: "canvas" });
   const draw = () => {
-    chart.setOption({ animation: false, aria: { enabled: true }, textStyle: { fontFamily: "inherit" }, ...option() }, { notMerge: true });
+    chart.setOption(
+      { animation: false, aria: { enabled: true }, textStyle: { fontFamily: "inherit" }, ...option() },
+      { notMerge: true },
+    );
     after(chart);
   };
   draw();
@@ -144,7 +214,10 @@ function dragToZoom(chart) {
 function doubleClickResets(chart) {
   chart.getZr().on("dblclick", () => {
     const zooms = chart.getOption().dataZoom ?? [];
-    chart.dispatchAction({ type: "dataZoom", batch: zooms.map((_, i) => ({ dataZoomIndex: i, start: 0, end: 100 })) });
+    chart.dispatchAction({
+      type: "dataZoom",
+      batch: zooms.map((_, i) => ({ dataZoomIndex: i, start: 0, end: 100 })),
+    });
   });
 }
 

@@ -6,29 +6,66 @@ draw.curves = (place, data) => {
   const { curves } = data;
   // Curves of one label are one family: one entry in the legend.
   const labels = [...new Set(curves.map((c) => c.label).filter(Boolean))];
-  const colour = (curve, i) => (curve.shade === null ? seriesColour(curve.label ? labels.indexOf(curve.label) : i) : scaleColour(curve.shade));
+  const colour = (curve, i) =>
+    curve.shade === null
+      ? seriesColour(curve.label ? labels.indexOf(curve.label) : i)
+      : scaleColour(curve.shade);
   const positive = (v) => (v !== null && v > 0 ? v : null);
-  const points = (curve) => curve.x.map((x, k) => [
-    data.x_scale === "log" ? positive(x) : x, data.y_scale === "log" ? positive(curve.y[k]) : curve.y[k],
-  ]);
+  const points = (curve) =>
+    curve.x.map((x, k) => [
+      data.x_scale === "log" ? positive(x) : x,
+      data.y_scale === "log" ? positive(curve.y[k]) : curve.y[k],
+    ]);
   // Only curves over rising values have one height at each of them.
-  const overX = curves.length <= MOST_IN_TIP && curves.every((c) => c.x.every((x, k) => k === 0 || x >= c.x[k - 1]));
-  const rows = (items) => items.map((p) => [p.color, curves[p.seriesIndex].label || data.y_label, number(p.value[1], 5)]);
+  const overX =
+    curves.length <= MOST_IN_TIP && curves.every((c) => c.x.every((x, k) => k === 0 || x >= c.x[k - 1]));
+  const rows = (items) =>
+    items.map((p) => [p.color, curves[p.seriesIndex].label || data.y_label, number(p.value[1], 5)]);
   const option = () => ({
     grid: { left: 74, right: 20, top: 26, bottom: labels.length ? 74 : 46 },
     xAxis: axis(data.x_label, { type: data.x_scale === "log" ? "log" : "value" }),
     yAxis: axis(data.y_label, { type: data.y_scale === "log" ? "log" : "value", nameGap: 52 }),
-    legend: legend(labels.map((name) => ({ name, icon: "roundRect", itemStyle: { opacity: 1 } })), { itemHeight: 4 }),
-    tooltip: tooltip(overX
-      ? { trigger: "axis", formatter: (items) => tip(`${data.x_label}: ${number(items[0].value[0], 5)}`, rows(items)) }
-      : { trigger: "item", formatter: (p) => tip(`${data.x_label}: ${number(p.value[0], 5)}`, rows([p])) }),
+    legend: legend(
+      labels.map((name) => ({ name, icon: "roundRect", itemStyle: { opacity: 1 } })),
+      { itemHeight: 4 },
+    ),
+    tooltip: tooltip(
+      overX
+        ? {
+            trigger: "axis",
+            formatter: (items) => tip(`${data.x_label}: ${number(items[0].value[0], 5)}`, rows(items)),
+          }
+        : { trigger: "item", formatter: (p) => tip(`${data.x_label}: ${number(p.value[0], 5)}`, rows([p])) },
+    ),
     toolbox: toolbox({ filterMode: "none" }),
-    dataZoom: ["xAxisIndex", "yAxisIndex"].map((which) => ({ type: "inside", [which]: 0, zoomOnMouseWheel: "ctrl", moveOnMouseMove: false, moveOnMouseWheel: false, filterMode: "none" })),
+    dataZoom: ["xAxisIndex", "yAxisIndex"].map((which) => ({
+      type: "inside",
+      [which]: 0,
+      zoomOnMouseWheel: "ctrl",
+      moveOnMouseMove: false,
+      moveOnMouseWheel: false,
+      filterMode: "none",
+    })),
     series: curves.map((curve, i) => ({
-      name: curve.label, type: "line", data: points(curve), showSymbol: curve.x.length === 1, symbol: "circle", symbolSize: overX ? 5 : 4,
-      lineStyle: { color: colour(curve, i), width: 1.8 }, itemStyle: { color: colour(curve, i) }, triggerLineEvent: !overX,
+      name: curve.label,
+      type: "line",
+      data: points(curve),
+      showSymbol: curve.x.length === 1,
+      symbol: "circle",
+      symbolSize: overX ? 5 : 4,
+      lineStyle: { color: colour(curve, i), width: 1.8 },
+      itemStyle: { color: colour(curve, i) },
+      triggerLineEvent: !overX,
       // Points that show under the mouse only are what the mouse finds.
-      ...(overX ? {} : { showSymbol: true, showAllSymbol: true, symbolSize: 6, itemStyle: { color: colour(curve, i), opacity: 0 }, emphasis: { itemStyle: { opacity: 1 } } }),
+      ...(overX
+        ? {}
+        : {
+            showSymbol: true,
+            showAllSymbol: true,
+            symbolSize: 6,
+            itemStyle: { color: colour(curve, i), opacity: 0 },
+            emphasis: { itemStyle: { opacity: 1 } },
+          }),
     })),
   });
   const chart = mount(place, 360, option, dragToZoom);

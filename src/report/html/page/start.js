@@ -65,6 +65,8 @@ for (const table of document.querySelectorAll(".table table")) {
     head.tabIndex = 0;
     head.title = "Sort";
     head.addEventListener("click", sort);
-    head.addEventListener("keydown", (event) => { if (event.key === "Enter") sort(); });
+    head.addEventListener("keydown", (event) => {
+      if (event.key === "Enter") sort();
+    });
   });
 }

@@ -32,7 +32,11 @@ function surface(place, height, { x, y, values, low, high, xLabel, yLabel, value
     const seen = ([a, b, h]) => {
       const across = a * Math.cos(turn) - b * Math.sin(turn);
       const deep = a * Math.sin(turn) + b * Math.cos(turn);
-      return [width / 2 + across * scale, height * 0.47 - (h * Math.cos(tilt) + deep * Math.sin(tilt)) * scale, deep * Math.cos(tilt) - h * Math.sin(tilt)];
+      return [
+        width / 2 + across * scale,
+        height * 0.47 - (h * Math.cos(tilt) + deep * Math.sin(tilt)) * scale,
+        deep * Math.cos(tilt) - h * Math.sin(tilt),
+      ];
     };
     const text = (words, at, align = "center") => {
       c.font = "11px system-ui, sans-serif";
@@ -47,7 +51,11 @@ function surface(place, height, { x, y, values, low, high, xLabel, yLabel, value
     const path = (points, stroke, fill) => {
       c.beginPath();
       points.forEach(([px, py], i) => (i ? c.lineTo(px, py) : c.moveTo(px, py)));
-      if (fill) { c.closePath(); c.fillStyle = fill; c.fill(); }
+      if (fill) {
+        c.closePath();
+        c.fillStyle = fill;
+        c.fill();
+      }
       c.strokeStyle = stroke;
       c.lineWidth = fill ? 0.5 : 1;
       c.stroke();
@@ -57,12 +65,23 @@ function surface(place, height, { x, y, values, low, high, xLabel, yLabel, value
     const quads = [];
     for (let j = 0; j + 1 < rows.length; j++) {
       for (let i = 0; i + 1 < columns.length; i++) {
-        const corners = [[i, j], [i + 1, j], [i + 1, j + 1], [i, j + 1]];
+        const corners = [
+          [i, j],
+          [i + 1, j],
+          [i + 1, j + 1],
+          [i, j + 1],
+        ];
         const heights = corners.map(([a, b]) => values[rows[b]][columns[a]]);
         if (heights.includes(null)) continue;
-        const points = corners.map(([a, b], k) => seen([unit(x[columns[a]], xs), unit(y[rows[b]], ys), up(heights[k])]));
+        const points = corners.map(([a, b], k) =>
+          seen([unit(x[columns[a]], xs), unit(y[rows[b]], ys), up(heights[k])]),
+        );
         const middle = heights.reduce((sum, h) => sum + h, 0) / 4;
-        quads.push({ points, deep: points.reduce((sum, p) => sum + p[2], 0), share: (middle - low) / (high - low || 1) });
+        quads.push({
+          points,
+          deep: points.reduce((sum, p) => sum + p[2], 0),
+          share: (middle - low) / (high - low || 1),
+        });
       }
     }
     quads.sort((a, b) => b.deep - a.deep);
@@ -82,20 +101,33 @@ function surface(place, height, { x, y, values, low, high, xLabel, yLabel, value
     }
     text(xLabel, floor(0, -1.22));
     text(yLabel, floor(-1.22, 0));
-    for (const [a, v] of [[-1, xs[0]], [1, xs[1]]]) text(number(v, 3), floor(a, -1.1));
-    for (const [b, v] of [[-1, ys[0]], [1, ys[1]]]) text(number(v, 3), floor(-1.1, b));
+    for (const [a, v] of [
+      [-1, xs[0]],
+      [1, xs[1]],
+    ])
+      text(number(v, 3), floor(a, -1.1));
+    for (const [b, v] of [
+      [-1, ys[0]],
+      [1, ys[1]],
+    ])
+      text(number(v, 3), floor(-1.1, b));
     text(`${valueLabel}: ${format(low)} to ${format(high)}`, [8, 16], "left");
   };
 
   let grip = null;
-  canvas.addEventListener("pointerdown", (e) => { grip = { x: e.clientX, y: e.clientY, turn, tilt }; canvas.setPointerCapture(e.pointerId); });
+  canvas.addEventListener("pointerdown", (e) => {
+    grip = { x: e.clientX, y: e.clientY, turn, tilt };
+    canvas.setPointerCapture(e.pointerId);
+  });
   canvas.addEventListener("pointermove", (e) => {
     if (!grip) return;
     turn = grip.turn + (e.clientX - grip.x) * 0.01;
     tilt = Math.min(Math.max(grip.tilt + (e.clientY - grip.y) * 0.008, 0.05), 1.5);
     paint();
   });
-  canvas.addEventListener("pointerup", () => { grip = null; });
+  canvas.addEventListener("pointerup", () => {
+    grip = null;
+  });
   paint();
   drawn.push({ chart: { resize: paint }, draw: paint });
 }

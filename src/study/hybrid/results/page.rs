@@ -16,7 +16,7 @@ const PANELS: [(&str, &str); 6] = [
     ("motor", "kW"),
     ("regeneration", "kW"),
     ("energy out", "MJ"),
-    ("state of charge", "-"),
+    ("charge", ""),
 ];
 
 pub fn write(
