@@ -104,7 +104,7 @@ struct Case {
 }
 
 enum Kind {
-    Replay(ReplayProblem),
+    Replay(Box<ReplayProblem>),
     Line(LineProblem),
 }
 
@@ -131,7 +131,7 @@ impl Case {
             about: truth.iter().map(|x| (*x, SPREAD * x.abs())).collect(),
             steps: Some(steps),
             operations: per_step * steps as u64,
-            kind: Kind::Replay(replay),
+            kind: Kind::Replay(Box::new(replay)),
         })
     }
 
