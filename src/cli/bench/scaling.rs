@@ -105,7 +105,7 @@ struct Case {
 
 enum Kind {
     Replay(Box<ReplayProblem>),
-    Line(LineProblem),
+    Line(Box<LineProblem>),
 }
 
 impl Case {
@@ -164,7 +164,7 @@ impl Case {
             about: vec![(0.5, 0.3); dimensions],
             steps: None,
             operations,
-            kind: Kind::Line(line),
+            kind: Kind::Line(Box::new(line)),
         })
     }
 
