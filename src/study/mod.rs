@@ -2,6 +2,7 @@
 
 pub mod envelope;
 pub mod identify;
+pub mod keeper;
 pub mod raceline;
 pub mod run;
 pub mod run_folder;

@@ -27,6 +27,8 @@ struct Manifest<'a> {
     car: &'a str,
     settings: &'static str,
     interrupted: bool,
+    #[serde(skip_serializing_if = "<[String]>::is_empty")]
+    device_faults: &'a [String],
 }
 
 pub fn write(
@@ -54,9 +56,10 @@ pub fn write(
         car: &setup.car_name,
         settings: "study.toml",
         interrupted: outcome.interrupted,
+        device_faults: &outcome.device_faults,
     };
     json("manifest.json", serde_json::to_string_pretty(&manifest))?;
-    write_whole(folder.join("study.toml"), settings.to_toml().as_bytes())?;
+    super::write_settings(folder, settings)?;
     write_whole(
         folder.join("envelope.csv"),
         setup.car.envelope.to_csv().as_bytes(),
