@@ -165,7 +165,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         print_json(&summary)?;
     }
     if outcome.interrupted {
-        Err(Error::Interrupted(folder))
+        Err(Error::Interrupted(folder.to_path_buf()))
     } else {
         Ok(())
     }

@@ -1,11 +1,11 @@
 //! `lapswarm identify`.
 
 use super::progress::SearchBar;
-use super::{Common, backend_flag, print_json, stop_flag};
+use super::{Common, Resume, backend_flag, print_json, same_settings, stop_flag};
 use lapswarm::evaluate::replay::{BackendChoice, Norm};
 use lapswarm::study::identify::{
-    Algorithm, IdentifySettings, ObjectiveChoice, parse_algorithm, parse_norm, parse_objective, search,
-    set_up, summarise, write_results,
+    Algorithm, IdentifySettings, ObjectiveChoice, SearchState, parse_algorithm, parse_norm, parse_objective,
+    search_from, set_up, summarise, write_results, write_settings,
 };
 use lapswarm::study::run_folder;
 use lapswarm::{Error, Result};
@@ -20,6 +20,8 @@ pub struct Arguments {
     study: Option<PathBuf>,
     #[command(flatten)]
     common: Common,
+    #[command(flatten)]
+    resume: Resume,
     /// The car that fixed parameters come from: a bundled name (gt) or a TOML file
     #[arg(long, value_name = "NAME|FILE")]
     car: Option<String>,
@@ -86,10 +88,11 @@ fn algorithm_flag(name: &str) -> Result<Algorithm, String> {
 }
 
 impl Arguments {
-    fn settings(&self) -> Result<IdentifySettings> {
+    /// The settings of the study file, or of `base` where there is none, under the flags.
+    fn settings(&self, base: IdentifySettings) -> Result<IdentifySettings> {
         let mut s = match &self.study {
             Some(path) => IdentifySettings::read(path)?,
-            None => IdentifySettings::default(),
+            None => base,
         };
         let wrong = |flag: &str, found: f64, expected: &str| {
             Err(Error::input(
@@ -122,7 +125,14 @@ impl Arguments {
         set_some(&mut s.iterations, &self.iterations);
         set_some(&mut s.adapter, &self.adapter);
         s.polish &= !self.no_polish;
-        Ok(s)
+        s.absolute()
+    }
+}
+
+impl Arguments {
+    /// Whether the flags name a backend or an adapter.
+    fn moves(&self) -> bool {
+        self.backend.is_some() || self.adapter.is_some()
     }
 }
 
@@ -140,12 +150,31 @@ fn set_some<T: Clone>(setting: &mut Option<T>, flag: &Option<T>) {
 
 /// Runs the study.
 pub fn run(arguments: &Arguments) -> Result<()> {
-    let settings = arguments.settings()?;
+    let out = arguments.common.out.as_deref();
+    let (folder, state, settings) = if arguments.resume.resume {
+        let (folder, mut state) = arguments.resume.open::<SearchState>("identify", out)?;
+        let settings = arguments.settings(state.settings.clone())?;
+        // Where it is evaluated may change, if that is said; what is evaluated may not.
+        if arguments.moves() {
+            state.settings.backend = settings.backend;
+            state.settings.adapter.clone_from(&settings.adapter);
+        }
+        same_settings(&folder, &state.settings, &settings)?;
+        (Some(folder), Some(state), settings)
+    } else {
+        (None, None, arguments.settings(IdentifySettings::default())?)
+    };
     let setup = set_up(&settings)?;
-    let folder = run_folder::create("identify", arguments.common.out.as_deref())?;
+    // What cannot be set up leaves no folder.
+    let folder = match folder {
+        Some(folder) => folder,
+        None => run_folder::create("identify", out)?,
+    };
+    write_settings(&folder, &settings)?;
     let stop = stop_flag();
+    let mut keeper = arguments.resume.keeper(&folder, arguments.moves())?;
     let mut bar = SearchBar::new(arguments.common.quiet);
-    let outcome = search(&settings, &setup, |report| {
+    let outcome = search_from(&settings, &setup, state, &mut keeper, |report| {
         bar.show(report);
         if stop.load(Ordering::Relaxed) {
             ControlFlow::Break(())
@@ -156,6 +185,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     bar.finish();
     let summary = summarise(&settings, &setup, &outcome);
     write_results(&folder, &settings, &setup, &outcome, &summary)?;
+    if !outcome.interrupted {
+        keeper.done()?;
+    }
     if !arguments.common.quiet {
         for finding in &summary.calibration.findings {
             println!("{finding}");
@@ -170,7 +202,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         print_json(&summary)?;
     }
     if outcome.interrupted {
-        Err(Error::Interrupted(folder))
+        Err(Error::Interrupted(folder.to_path_buf()))
     } else {
         Ok(())
     }

@@ -22,12 +22,16 @@ mod transient;
 use clap::{Args, CommandFactory, Parser, Subcommand};
 use lapswarm::evaluate::replay::BackendChoice;
 use lapswarm::study::identify::{FreeParameter, IdentifySettings, load_circuit, parse_backend};
+use lapswarm::study::keeper::Keeper;
+use lapswarm::study::run_folder::{self, RunFolder};
+use lapswarm::swarm::checkpoint::{self, Checkpoint};
 use lapswarm::track::Circuit;
 use lapswarm::{Error, Result};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 
 /// Evaluate whole swarms of race cars at once.
 #[derive(Parser)]
@@ -98,6 +102,60 @@ pub struct Common {
     /// No progress bar and no table
     #[arg(long)]
     pub quiet: bool,
+}
+
+/// The flag of studies that can be gone on with.
+#[derive(Args, Clone)]
+pub struct Resume {
+    /// Go on with the run in --out that was broken off, with its own settings
+    #[arg(long, requires = "out")]
+    pub resume: bool,
+    /// Time between saves of the run's state, s
+    #[arg(long, value_name = "SECONDS", default_value_t = 5.0)]
+    pub save_every_s: f64,
+}
+
+impl Resume {
+    /// What saves the run's state; `moves` if another backend may go on with it.
+    fn keeper(&self, folder: &Path, moves: bool) -> Result<Keeper> {
+        let interval = Duration::try_from_secs_f64(self.save_every_s).map_err(|_| {
+            let found = self.save_every_s.to_string();
+            Error::input(
+                "the command line",
+                "--save-every-s",
+                found,
+                "a time in seconds, 0 or more",
+            )
+        })?;
+        let keeper = Keeper::new(folder).every(interval);
+        Ok(if moves { keeper.may_move() } else { keeper })
+    }
+
+    /// The run folder, and the state in it that is to be gone on with.
+    fn open<T: Checkpoint>(&self, study: &str, out: Option<&Path>) -> Result<(RunFolder, T)> {
+        let Some(out) = out else {
+            let expected = format!("--out, the folder of a run of {study}");
+            return Err(Error::input("the command line", "--resume", "no --out", expected));
+        };
+        let folder = run_folder::reopen(out)?;
+        let state = checkpoint::load(&folder.join(run_folder::STATE))?;
+        Ok((folder, state))
+    }
+}
+
+/// Flags and study files beside `--resume` may only say what the run was begun with.
+fn same_settings<T: PartialEq>(folder: &Path, kept: &T, asked: &T) -> Result<()> {
+    if kept == asked {
+        return Ok(());
+    }
+    let file = folder.join(run_folder::STATE);
+    let expected = "those that the run was begun with (study.toml beside it), or none";
+    Err(Error::input(
+        file,
+        "settings",
+        "other settings on the command line",
+        expected,
+    ))
 }
 
 /// Parses `--backend`.

@@ -1,11 +1,12 @@
 //! `lapswarm raceline`.
 
-use super::{Common, backend_flag, print_json, stop_flag};
+use super::{Common, Resume, backend_flag, print_json, same_settings, stop_flag};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use lapswarm::evaluate::BackendChoice;
 use lapswarm::evaluate::line::LineObjective;
 use lapswarm::study::raceline::{
-    OBJECTIVE_NAMES, RacelineSettings, find_lines, set_up, summarise, write_results,
+    LinesState, OBJECTIVE_NAMES, RacelineSettings, find_lines_from, set_up, summarise, write_results,
+    write_settings,
 };
 use lapswarm::study::run_folder;
 use lapswarm::{Error, Result};
@@ -20,6 +21,8 @@ pub struct Arguments {
     study: Option<PathBuf>,
     #[command(flatten)]
     common: Common,
+    #[command(flatten)]
+    resume: Resume,
     /// The circuit: a bundled name, a shape such as circle:590:600, or a file (TOML, CSV, GPX, KML, a log with GPS)
     #[arg(long, value_name = "NAME|FILE")]
     track: Option<String>,
@@ -72,10 +75,16 @@ fn objective_flag(name: &str) -> Result<LineObjective, String> {
 }
 
 impl Arguments {
-    fn settings(&self) -> Result<RacelineSettings> {
+    /// Whether the flags name a backend or an adapter.
+    fn moves(&self) -> bool {
+        self.backend.is_some() || self.adapter.is_some()
+    }
+
+    /// The settings of the study file, or of `base` where there is none, under the flags.
+    fn settings(&self, base: RacelineSettings) -> Result<RacelineSettings> {
         let mut s = match &self.study {
             Some(path) => RacelineSettings::read(path)?,
-            None => RacelineSettings::default(),
+            None => base,
         };
         fn set<T: Clone>(setting: &mut T, flag: &Option<T>) {
             if let Some(value) = flag {
@@ -103,15 +112,34 @@ impl Arguments {
         s.warm_start &= !self.no_warm_start;
         s.local_search &= !self.no_local_search;
         s.validate()?;
-        Ok(s)
+        Ok(s.absolute())
     }
 }
 
 /// Runs the study.
 pub fn run(arguments: &Arguments) -> Result<()> {
-    let settings = arguments.settings()?;
+    let out = arguments.common.out.as_deref();
+    let (folder, state, settings) = if arguments.resume.resume {
+        let (folder, mut state) = arguments.resume.open::<LinesState>("raceline", out)?;
+        let settings = arguments.settings(state.settings.clone())?;
+        // Where lines are evaluated may change, if that is said; what is evaluated may not.
+        if arguments.moves() {
+            state.settings.backend = settings.backend;
+            state.settings.adapter.clone_from(&settings.adapter);
+        }
+        same_settings(&folder, &state.settings, &settings)?;
+        (Some(folder), Some(state), settings)
+    } else {
+        (None, None, arguments.settings(RacelineSettings::default())?)
+    };
     let setup = set_up(&settings)?;
-    let folder = run_folder::create("raceline", arguments.common.out.as_deref())?;
+    // What cannot be set up leaves no folder.
+    let folder = match folder {
+        Some(folder) => folder,
+        None => run_folder::create("raceline", out)?,
+    };
+    write_settings(&folder, &settings)?;
+    let mut keeper = arguments.resume.keeper(&folder, arguments.moves())?;
     let stop = stop_flag();
     let target = if arguments.common.quiet {
         ProgressDrawTarget::hidden()
@@ -122,7 +150,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     if let Ok(style) = ProgressStyle::with_template("{spinner} {prefix:24} {msg}") {
         bar.set_style(style);
     }
-    let outcome = find_lines(&settings, &setup, |progress| {
+    let outcome = find_lines_from(&settings, &setup, state, &mut keeper, |progress| {
         bar.set_prefix(progress.stage.clone());
         bar.set_message(format!("{} lines, best {}", progress.evaluations, progress.best));
         bar.tick();
@@ -135,6 +163,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     bar.finish_and_clear();
     let summary = summarise(&settings, &setup, &outcome);
     write_results(&folder, &settings, &setup, &outcome, &summary)?;
+    if !outcome.interrupted {
+        keeper.done()?;
+    }
     if !arguments.common.quiet {
         print!("{}", summary.to_text());
         println!("Results: {}", folder.display());
@@ -143,7 +174,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         print_json(&summary)?;
     }
     if outcome.interrupted {
-        Err(Error::Interrupted(folder))
+        Err(Error::Interrupted(folder.to_path_buf()))
     } else {
         Ok(())
     }

@@ -79,7 +79,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         print_json(&summary)?;
     }
     if outcome.interrupted {
-        return Err(Error::Interrupted(folder));
+        return Err(Error::Interrupted(folder.to_path_buf()));
     }
     Ok(())
 }

@@ -82,7 +82,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         print_json(&summary)?;
     }
     if outcome.interrupted {
-        return Err(Error::Interrupted(folder));
+        return Err(Error::Interrupted(folder.to_path_buf()));
     }
     Ok(())
 }

@@ -1,9 +1,9 @@
 //! `lapswarm sweep`.
 
 use super::{Common, print_json, progress, stop_flag};
+use lapswarm::Result;
 use lapswarm::study::run_folder;
-use lapswarm::study::sweep::{SweepSettings, sweep};
-use lapswarm::{Error, Result};
+use lapswarm::study::sweep::{SWEEP_FILE, SweepSettings, sweep};
 use std::ops::ControlFlow;
 use std::sync::atomic::Ordering;
 
@@ -28,17 +28,7 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<()> {
     let settings = SweepSettings::load(&arguments.sweep)?;
     let folder = match (&arguments.common.out, arguments.resume) {
-        (Some(folder), true) => {
-            if !folder.is_dir() {
-                return Err(Error::input(
-                    folder,
-                    "--resume",
-                    "no such folder",
-                    "a folder that holds a part of the sweep",
-                ));
-            }
-            folder.clone()
-        }
+        (Some(folder), true) => run_folder::reopen_by(folder, SWEEP_FILE)?,
         (out, _) => run_folder::create("sweep", out.as_deref())?,
     };
     let stop = stop_flag();

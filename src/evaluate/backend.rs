@@ -1,6 +1,7 @@
 //! Choice of backend.
 
 use super::gpu::devices;
+use serde::{Deserialize, Serialize};
 use std::sync::OnceLock;
 
 /// Whether a real GPU is present. Asked once: it wakes every driver.
@@ -10,7 +11,7 @@ fn real_gpu() -> bool {
 }
 
 /// Where evaluations run.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum BackendChoice {
     /// A real GPU if there is one, else lanes on the processor.
     #[default]

@@ -4,6 +4,7 @@
 //! it. Optimisers see nothing else, so they run any problem on any backend.
 
 mod backend;
+mod fallback;
 pub mod gpu;
 pub mod hybrid;
 pub mod line;
@@ -12,10 +13,12 @@ pub mod replay;
 pub mod simd;
 
 pub use backend::BackendChoice;
+pub use fallback::FallbackEvaluator;
 
 use crate::error::Result;
 use crate::vehicle::tyre::IllFormed;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use std::fmt;
 
 /// A bounded decision variable.
@@ -98,6 +101,29 @@ pub enum Failure {
     NotFinite,
     /// An objective was not a finite number.
     Undefined,
+}
+
+impl Failure {
+    /// A word for counts and scripts.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::IllFormedTyre(_) => "ill_formed_tyre",
+            Self::Spun => "spun",
+            Self::Standstill => "standstill",
+            Self::NotFinite => "variable_not_finite",
+            Self::Undefined => "objective_not_finite",
+        }
+    }
+}
+
+/// Candidates that failed, by [`Failure::word`].
+pub type FailureCounts = BTreeMap<String, u64>;
+
+/// Adds counts to others.
+pub fn add_failures(total: &mut FailureCounts, counts: &FailureCounts) {
+    for (reason, count) in counts {
+        *total.entry(reason.clone()).or_default() += count;
+    }
 }
 
 impl fmt::Display for Failure {
@@ -188,6 +214,15 @@ impl Evaluation {
         }
     }
 
+    /// How many candidates failed, by reason.
+    pub fn failure_counts(&self) -> FailureCounts {
+        let mut counts = FailureCounts::new();
+        for failure in self.failures.iter().flatten() {
+            *counts.entry(failure.word().to_owned()).or_default() += 1;
+        }
+        counts
+    }
+
     /// Joins rows of objectives and failures.
     pub(crate) fn of_rows(rows: Vec<(Vec<f64>, Option<Failure>)>) -> Self {
         let mut evaluation = Self::default();
@@ -217,6 +252,11 @@ pub trait Evaluator {
 
     /// What does the work.
     fn backend(&self) -> BackendInfo;
+
+    /// What has gone wrong with devices so far and was got over, in words.
+    fn device_faults(&self) -> &[String] {
+        &[]
+    }
 
     /// Scores `population`: row-major, `n` by number of variables, values within their bounds.
     ///

@@ -5,6 +5,7 @@ pub mod compare;
 pub mod envelope;
 pub mod hybrid;
 pub mod identify;
+pub mod keeper;
 pub mod raceline;
 pub mod run;
 pub mod run_folder;

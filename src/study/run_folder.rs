@@ -1,43 +1,184 @@
-//! The folder that a run writes into: one run each, nothing overwritten.
+//! The folder that a run writes into: one run each, nothing overwritten, one process at a time.
 
 use crate::error::{Error, Result};
+use std::fs::{File, TryLockError};
+use std::io::{Read, Write};
+use std::ops::Deref;
 use std::path::{Path, PathBuf};
 
 /// Where runs go that were given no folder.
 const RUNS: &str = "runs";
+/// The file that the process that writes into a folder holds locked; it says which process that is. The system gives the
+/// lock back when the process ends, however it ends.
+const LOCK: &str = ".lock";
+/// The state of a run that can be gone on with.
+pub const STATE: &str = "state.lapswarm";
+/// What a finished or interrupted run leaves last.
+const MANIFEST: &str = "manifest.json";
+
+/// The folder of a run, which no other process writes into while this lives.
+#[derive(Debug)]
+pub struct RunFolder {
+    path: PathBuf,
+    _lock: File,
+}
+
+impl Deref for RunFolder {
+    type Target = Path;
+
+    fn deref(&self) -> &Path {
+        &self.path
+    }
+}
+
+impl AsRef<Path> for RunFolder {
+    fn as_ref(&self) -> &Path {
+        &self.path
+    }
+}
+
+impl Drop for RunFolder {
+    fn drop(&mut self) {
+        // A lock file that stays behind is nobody's, and the next run takes it.
+        let _ = std::fs::remove_file(self.path.join(LOCK));
+    }
+}
+
+impl RunFolder {
+    /// Takes the folder for this process.
+    fn lock(path: &Path) -> Result<Self> {
+        let file = path.join(LOCK);
+        let failed = |e| Error::io(&file, "write", e);
+        let mut lock = File::options()
+            .read(true)
+            .write(true)
+            .create(true)
+            .truncate(false)
+            .open(&file)
+            .map_err(failed)?;
+        match lock.try_lock() {
+            Ok(()) => {}
+            Err(TryLockError::WouldBlock) => {
+                let mut owner = String::new();
+                // Not every system lets a locked file be read.
+                let _ = lock.read_to_string(&mut owner);
+                let found = format!("a folder that process {} writes into", owner.trim());
+                return Err(Error::input(
+                    path,
+                    "--out",
+                    found,
+                    "one that no run is at work in",
+                ));
+            }
+            // A file system without locks: what a run leaves behind still keeps others out.
+            Err(TryLockError::Error(e)) if e.kind() == std::io::ErrorKind::Unsupported => {}
+            Err(TryLockError::Error(e)) => return Err(failed(e)),
+        }
+        lock.set_len(0)
+            .and_then(|()| write!(lock, "{}", std::process::id()))
+            .map_err(failed)?;
+        Ok(Self {
+            path: path.to_owned(),
+            _lock: lock,
+        })
+    }
+}
+
+/// Whether a folder has anything in it but the lock of a run that has come to nothing.
+fn holds_something(folder: &Path) -> bool {
+    folder
+        .read_dir()
+        .is_ok_and(|entries| entries.flatten().any(|entry| entry.file_name() != LOCK))
+}
 
 /// Creates the folder of a run: `asked`, or the next free `runs/<study>-NNN`.
 ///
 /// # Errors
-/// [`Error::Input`] if the folder asked for holds anything already; [`Error::Io`] if it cannot be created.
-pub fn create(study: &str, asked: Option<&Path>) -> Result<PathBuf> {
+/// [`Error::Input`] if the folder asked for holds anything already or another process writes into it; [`Error::Io`] if it
+/// cannot be created.
+pub fn create(study: &str, asked: Option<&Path>) -> Result<RunFolder> {
     if let Some(folder) = asked {
-        let holds_something = folder
-            .read_dir()
-            .is_ok_and(|mut entries| entries.next().is_some());
-        if holds_something || folder.is_file() {
+        let taken = || {
             let expected = "a new or empty folder: nothing is overwritten";
-            return Err(Error::input(
+            Err(Error::input(
                 folder,
                 "--out",
                 "a folder that holds another run, or a file",
                 expected,
-            ));
+            ))
+        };
+        if holds_something(folder) || folder.is_file() {
+            return taken();
         }
         std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, "create", e))?;
-        return Ok(folder.to_owned());
+        let locked = RunFolder::lock(folder)?;
+        // Another run may have come and gone between the look and the lock.
+        if holds_something(folder) {
+            return taken();
+        }
+        return Ok(locked);
     }
     std::fs::create_dir_all(RUNS).map_err(|e| Error::io(RUNS, "create", e))?;
     let mut number = 1u32;
     loop {
         let folder = Path::new(RUNS).join(format!("{study}-{number:03}"));
         match std::fs::create_dir(&folder) {
-            Ok(()) => return Ok(folder),
+            Ok(()) => return RunFolder::lock(&folder),
             // Taken, perhaps just now by another process.
             Err(e) if e.kind() == std::io::ErrorKind::AlreadyExists => number += 1,
             Err(e) => return Err(Error::io(folder, "create", e)),
         }
     }
+}
+
+/// Takes the folder of a run that was broken off, to go on with it.
+///
+/// # Errors
+/// [`Error::Input`] if there is nothing in it to go on with, or another process writes into it.
+pub fn reopen(folder: &Path) -> Result<RunFolder> {
+    reopen_by(folder, STATE)
+}
+
+/// As [`reopen`], for a study whose state is in the file `state`.
+///
+/// # Errors
+/// As [`reopen`].
+pub fn reopen_by(folder: &Path, state: &str) -> Result<RunFolder> {
+    let refused = |found: &str, expected: &str| Err(Error::input(folder, "--resume", found, expected));
+    if !folder.is_dir() {
+        return refused("no such folder", "the folder of a run that was broken off");
+    }
+    let part = format!("{state}.part");
+    let state = folder.join(state);
+    let nothing = || {
+        if folder.join(MANIFEST).is_file() {
+            refused("a run that is finished", "one that was broken off")
+        } else {
+            refused(
+                "no saved state",
+                "a run that was broken off; one that had not begun is started anew, without --resume",
+            )
+        }
+    };
+    if !state.is_file() {
+        return nothing();
+    }
+    let locked = RunFolder::lock(folder)?;
+    if !state.is_file() {
+        return nothing();
+    }
+    // What a killed process had half written, under names of their own.
+    for entry in folder
+        .read_dir()
+        .map_err(|e| Error::io(folder, "read", e))?
+        .flatten()
+    {
+        let name = entry.file_name().to_string_lossy().into_owned();
+        if name.starts_with('.') && name.ends_with(".tmp") || name == part {
+            std::fs::remove_file(entry.path()).map_err(|e| Error::io(entry.path(), "remove", e))?;
+        }
+    }
+    Ok(locked)
 }
 
 /// Who made a run and of what, as `manifest.json` says it.
@@ -69,6 +210,9 @@ pub struct Manifest<'a> {
     pub settings: &'static str,
     /// Whether the run was broken off.
     pub interrupted: bool,
+    /// What devices failed of and what was done about it; left out where nothing failed.
+    #[serde(skip_serializing_if = "<[String]>::is_empty")]
+    pub device_faults: &'a [String],
 }
 
 impl<'a> Manifest<'a> {
@@ -92,6 +236,7 @@ impl<'a> Manifest<'a> {
             car,
             settings: "study.toml",
             interrupted: false,
+            device_faults: &[],
         }
     }
 }
@@ -104,4 +249,67 @@ pub fn write_json(path: &Path, value: &impl serde::Serialize) -> Result<()> {
     let text = serde_json::to_string_pretty(value)
         .map_err(|e| Error::io(path, "write", std::io::Error::other(e)))?;
     crate::report::write_whole(path, text.as_bytes())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_process_at_a_time_and_a_dead_one_holds_nothing() {
+        let root = tempfile::tempdir().expect("a temporary folder");
+        let folder = root.path().join("run");
+        let held = create("study", Some(&folder)).expect("a new folder");
+        let second = create("study", Some(&folder)).expect_err("it is taken");
+        assert_eq!(second.exit_code(), 2);
+        let said = second.to_string();
+        assert!(
+            said.contains(&format!("process {}", std::process::id())),
+            "{said}"
+        );
+        std::fs::write(folder.join(STATE), "a state").expect("a file");
+        let resumed = reopen(&folder).expect_err("its owner lives").to_string();
+        assert!(resumed.contains("process"), "{resumed}");
+        drop(held);
+        drop(reopen(&folder).expect("nobody holds it"));
+        std::fs::remove_file(folder.join(STATE)).expect("the file goes");
+        // As a killed process leaves it.
+        std::fs::write(folder.join(LOCK), "1").expect("a file");
+        drop(create("study", Some(&folder)).expect("a lock that nobody holds"));
+        assert!(!folder.join(LOCK).exists());
+    }
+
+    #[test]
+    fn of_many_that_want_one_folder_one_gets_it() {
+        let root = tempfile::tempdir().expect("a temporary folder");
+        let folder = root.path().join("run");
+        let together = std::sync::Barrier::new(8);
+        let got: Vec<bool> = std::thread::scope(|scope| {
+            let contend = || {
+                together.wait();
+                let folder = create("study", Some(&folder));
+                let got = folder.is_ok();
+                // Held until all have tried.
+                together.wait();
+                got
+            };
+            let all: Vec<_> = (0..8).map(|_| scope.spawn(contend)).collect();
+            all.into_iter().map(|t| t.join().expect("no panic")).collect()
+        });
+        assert_eq!(got.iter().filter(|g| **g).count(), 1);
+    }
+
+    #[test]
+    fn only_what_was_broken_off_is_gone_on_with() {
+        let root = tempfile::tempdir().expect("a temporary folder");
+        let refused = |folder: &Path| {
+            let error = reopen(folder).expect_err("nothing to go on with");
+            assert_eq!(error.exit_code(), 2);
+            error.to_string()
+        };
+        assert!(refused(&root.path().join("nowhere")).contains("no such folder"));
+        assert!(refused(root.path()).contains("no saved state"));
+        std::fs::write(root.path().join(MANIFEST), "{}").expect("a file");
+        assert!(refused(root.path()).contains("finished"));
+    }
 }

@@ -15,7 +15,7 @@ use super::{Front, Progress};
 use crate::error::{Error, Result};
 use crate::evaluate::gpu::shader::{swarm, swarm_gather};
 use crate::evaluate::gpu::{Binding, GpuContext, Kernel};
-use crate::evaluate::{BackendInfo, FAILED_COST, Problem};
+use crate::evaluate::{BackendInfo, FAILED_COST, FailureCounts, Problem};
 use std::ops::ControlFlow;
 use std::sync::Arc;
 use wgpu::BufferUsages as Usage;
@@ -361,6 +361,7 @@ impl DeviceMopso {
                 best: self.best(),
                 median: None,
                 failed: 0,
+                failures: FailureCounts::new(),
             };
             if observe(&progress).is_break() {
                 break;

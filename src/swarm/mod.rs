@@ -65,7 +65,7 @@ pub use settings::{
 pub use windows::{WindowSettings, WindowSwarm};
 
 use crate::error::Result;
-use crate::evaluate::{Evaluation, Evaluator};
+use crate::evaluate::{Evaluation, Evaluator, FailureCounts};
 use std::ops::ControlFlow;
 
 /// A population-based optimiser that is asked for candidates and told what they are worth.
@@ -128,6 +128,33 @@ pub struct Progress {
     pub median: Option<f64>,
     /// Candidates of this iteration that failed.
     pub failed: usize,
+    /// The same by reason.
+    pub failures: FailureCounts,
+}
+
+/// Asks, evaluates and tells once.
+///
+/// # Errors
+/// Those of the evaluator; the optimiser is as it was then, but for having been asked.
+pub fn step(optimiser: &mut dyn Optimiser, evaluator: &mut dyn Evaluator) -> Result<Progress> {
+    let width = evaluator.problem().objectives.len();
+    let population = optimiser.ask();
+    let evaluation = evaluator.evaluate(&population)?;
+    optimiser.tell(&evaluation);
+    let rows = evaluation
+        .objectives
+        .chunks_exact(width)
+        .zip(&evaluation.failures);
+    let mut costs: Vec<f64> = rows.filter(|(_, f)| f.is_none()).map(|(row, _)| row[0]).collect();
+    let middle = costs.len() / 2;
+    Ok(Progress {
+        iteration: optimiser.iteration(),
+        evaluations: optimiser.evaluations(),
+        best: optimiser.best(),
+        median: (!costs.is_empty()).then(|| *costs.select_nth_unstable_by(middle, f64::total_cmp).1),
+        failed: evaluation.failures.iter().filter(|f| f.is_some()).count(),
+        failures: evaluation.failure_counts(),
+    })
 }
 
 /// Asks, evaluates and tells until the planned iterations are done or `observe` breaks off.
@@ -139,24 +166,8 @@ pub fn run(
     evaluator: &mut dyn Evaluator,
     mut observe: impl FnMut(&Progress) -> ControlFlow<()>,
 ) -> Result<()> {
-    let width = evaluator.problem().objectives.len();
     while !optimiser.done() {
-        let population = optimiser.ask();
-        let evaluation = evaluator.evaluate(&population)?;
-        optimiser.tell(&evaluation);
-        let rows = evaluation
-            .objectives
-            .chunks_exact(width)
-            .zip(&evaluation.failures);
-        let mut costs: Vec<f64> = rows.filter(|(_, f)| f.is_none()).map(|(row, _)| row[0]).collect();
-        let middle = costs.len() / 2;
-        let progress = Progress {
-            iteration: optimiser.iteration(),
-            evaluations: optimiser.evaluations(),
-            best: optimiser.best(),
-            median: (!costs.is_empty()).then(|| *costs.select_nth_unstable_by(middle, f64::total_cmp).1),
-            failed: evaluation.failures.iter().filter(|f| f.is_some()).count(),
-        };
+        let progress = step(optimiser, evaluator)?;
         if observe(&progress).is_break() {
             break;
         }

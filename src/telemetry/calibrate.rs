@@ -4,7 +4,7 @@
 //! track times yaw rate; `ay` and steering follow yaw, `ax` follows the change of speed. Delays are relative to yaw
 //! rate: a delay common to all channels neither shows nor matters.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::derived::{
     LEAST_S, STRAIGHT_YAW, SURE_OF_SIGN, acceleration, front_difference, moving, product, unbraked,
@@ -24,7 +24,7 @@ const COASTING_AX: f64 = 1.0;
 const STANDSTILL_MPS: f64 = 0.3;
 
 /// Whether to do something, or let the file format decide.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Switch {
     /// On for foreign files, off for native ones, which are calibrated already.
     #[default]
@@ -46,7 +46,7 @@ impl Switch {
 }
 
 /// Which corrections are estimated from the log and applied to it.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct CalibrationOptions {
     /// Signs of yaw rate, `ay`, `ax` and steering.
     pub signs: Switch,

@@ -4,6 +4,7 @@
 //! what happens outside them is kept by the handlers and handed out as [`Error::Device`] at the next check.
 
 use super::adapter::{DeviceSummary, choose};
+use super::faults::{self, Fault};
 use super::lint;
 use crate::error::{Error, Result};
 use crate::evaluate::BackendInfo;
@@ -81,13 +82,31 @@ impl GpuContext {
         Ok(context)
     }
 
+    /// Lets go of the process's device, so that the next call of [`GpuContext::shared`] opens one anew.
+    pub fn forget() {
+        *locked(&SHARED) = None;
+    }
+
+    /// A device of its own that is held to the least that every WebGPU device has: storage bindings of 128 MiB, 65535
+    /// workgroups in a dispatch.
+    ///
+    /// # Errors
+    /// As [`GpuContext::shared`].
+    pub fn with_least_limits(name: Option<&str>) -> Result<Arc<Self>> {
+        Ok(Arc::new(Self::open_within(name, |_| wgpu::Limits::default())?))
+    }
+
     fn open(name: Option<&str>) -> Result<Self> {
+        Self::open_within(name, wgpu::Adapter::limits)
+    }
+
+    fn open_within(name: Option<&str>, limits: impl Fn(&wgpu::Adapter) -> wgpu::Limits) -> Result<Self> {
         let (adapter, summary) = choose(name)?;
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("lapswarm"),
             // Whatever the adapter has of what is useful; nothing is demanded.
             required_features: adapter.features() & wgpu::Features::TIMESTAMP_QUERY,
-            required_limits: adapter.limits(),
+            required_limits: limits(&adapter),
             ..Default::default()
         };
         let (device, queue) = pollster::block_on(adapter.request_device(&descriptor))
@@ -302,12 +321,36 @@ impl GpuContext {
     /// # Errors
     /// [`Error::Device`] if that fails or takes too long.
     pub(crate) fn run(&self, record: impl FnOnce(&mut wgpu::CommandEncoder)) -> Result<()> {
+        if let Some(fault) = faults::next() {
+            self.suffer(fault)?;
+        }
         let submission = self.scoped("run a kernel", || {
             let mut encoder = self.device.create_command_encoder(&Default::default());
             record(&mut encoder);
             self.queue.submit([encoder.finish()])
         })?;
         self.wait(Some(submission))
+    }
+
+    /// What an injected fault does.
+    fn suffer(&self, fault: Fault) -> Result<()> {
+        match fault {
+            // What is submitted next finds it gone.
+            Fault::Lost => {
+                self.device.destroy();
+                Ok(())
+            }
+            Fault::OutOfMemory => Err(Error::Device(format!("{}: out of memory", self.summary))),
+            Fault::Validation => self.scoped("run a kernel", || {
+                // No buffer may be mapped for reading and writing at once.
+                drop(self.device.create_buffer(&wgpu::BufferDescriptor {
+                    label: Some("fault"),
+                    size: 16,
+                    usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::MAP_WRITE,
+                    mapped_at_creation: false,
+                }));
+            }),
+        }
     }
 
     fn wait(&self, submission_index: Option<wgpu::SubmissionIndex>) -> Result<()> {

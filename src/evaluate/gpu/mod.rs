@@ -2,6 +2,7 @@
 
 mod adapter;
 mod context;
+pub mod faults;
 pub mod lint;
 pub mod shader;
 

@@ -6,9 +6,10 @@ use crate::line::kernel::{Shape, Wanted};
 use crate::line::{LimitTable, LinePlan, Parametrisation, PointMass, geometry};
 use crate::track::CrossSections;
 use glam::DVec2;
+use serde::{Deserialize, Serialize};
 
 /// What of a line can be minimised.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum LineObjective {
     /// Its length, m.
     Length,

@@ -4,10 +4,11 @@ use super::{CpuEvaluator, GpuEvaluator, ReplayProblem, SimdEvaluator};
 use crate::error::Result;
 use crate::evaluate::gpu::GpuContext;
 use crate::evaluate::simd::InstructionSet;
-use crate::evaluate::{BackendChoice, Evaluator};
+use crate::evaluate::{BackendChoice, Evaluator, FallbackEvaluator};
 
 /// An evaluator of `replay` on the backend chosen; `adapter` is part of the name of the GPU to use (see
-/// [`BackendChoice::decided`]).
+/// [`BackendChoice::decided`]). A GPU that fails at work is opened anew, and lanes on the processor take over from one that
+/// keeps failing (see [`FallbackEvaluator`]).
 ///
 /// # Errors
 /// [`crate::Error::NoDevice`] if a GPU was asked for and none fits. `Auto` without a named adapter never fails for
@@ -18,7 +19,20 @@ pub fn open_evaluator<'a>(
     adapter: Option<&str>,
 ) -> Result<Box<dyn Evaluator + 'a>> {
     Ok(match choice.decided(adapter) {
-        BackendChoice::Gpu => Box::new(GpuEvaluator::new(replay, GpuContext::shared(adapter)?)?),
+        BackendChoice::Gpu => {
+            let name = adapter.map(str::to_owned);
+            Box::new(FallbackEvaluator::new(
+                &replay.problem,
+                (choice, adapter),
+                move || {
+                    Ok(Box::new(GpuEvaluator::new(
+                        replay,
+                        GpuContext::shared(name.as_deref())?,
+                    )?))
+                },
+                || Box::new(SimdEvaluator::new(replay, InstructionSet::best())),
+            )?)
+        }
         BackendChoice::Cpu => Box::new(CpuEvaluator::new(replay)),
         _ => Box::new(SimdEvaluator::new(replay, InstructionSet::best())),
     })

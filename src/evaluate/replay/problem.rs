@@ -5,6 +5,7 @@ use crate::error::{Error, Result};
 use crate::evaluate::{FAILED_COST, Failure, Objective, Problem, Variable};
 use crate::vehicle::car::CarParameter;
 use crate::vehicle::{Car, TyreCoefficients, TyreModel};
+use serde::{Deserialize, Serialize};
 
 /// Names of the compared channels, in the order of all arrays of four.
 pub const CHANNEL_NAMES: [&str; CHANNELS] = ["vx", "ax", "ay", "yaw_rate"];
@@ -12,7 +13,7 @@ pub const CHANNEL_NAMES: [&str; CHANNELS] = ["vx", "ax", "ay", "yaw_rate"];
 pub const CHANNEL_UNITS: [&str; CHANNELS] = ["m/s", "m/s^2", "m/s^2", "rad/s"];
 
 /// How the error of a channel becomes a cost.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Norm {
     /// Integral of the magnitude over time.
     One,

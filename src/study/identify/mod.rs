@@ -8,15 +8,18 @@ mod results;
 mod search;
 mod settings;
 mod setup;
+mod state;
 
 pub use identifiability::{Identifiability, judge};
 pub use polish::{Polished, polish};
-pub use results::{Summary, summarise, write_results};
+pub use results::{Summary, summarise, write_results, write_settings};
 pub use search::{
-    Front, HistoryRow, Judged, Outcome, Report, Stage, judge_candidate, search, total_parameter_error,
+    Front, HistoryRow, Judged, Outcome, Report, Stage, judge_candidate, search, search_from,
+    total_parameter_error,
 };
 pub use settings::{
     Algorithm, FreeParameter, IdentifySettings, ObjectiveChoice, parse_algorithm, parse_backend, parse_norm,
     parse_objective,
 };
 pub use setup::{Setup, cost_unit, lap_format, load_circuit, set_up};
+pub use state::SearchState;

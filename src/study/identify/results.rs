@@ -4,6 +4,7 @@ use super::search::{Judged, Outcome, judge_candidate, total_parameter_error};
 use super::settings::{Algorithm, IdentifySettings, ObjectiveChoice};
 use super::setup::{CHANNELS, Setup, cost_unit};
 use crate::error::Result;
+use crate::evaluate::FailureCounts;
 use crate::evaluate::replay::{CHANNEL_NAMES, CHANNEL_UNITS, norm_name};
 use crate::report::{
     Cells, Column, ConvergenceRun, Objective, ParameterRow, ShadedSection, TraceFigure, TracePanel, TrackMap,
@@ -53,6 +54,10 @@ pub struct Summary {
     pub swarm_elapsed_s: f64,
     /// Candidates that the swarm evaluated.
     pub evaluations: u64,
+    /// Candidates that failed, by reason.
+    pub failures: FailureCounts,
+    /// What went wrong with devices and was got over; the study's figures hold all the same.
+    pub device_faults: Vec<String>,
     /// Candidates per second of the swarm.
     pub evaluations_per_s: f64,
     /// Runge-Kutta steps of one candidate per second, over all candidates.
@@ -159,6 +164,8 @@ pub fn summarise(settings: &IdentifySettings, setup: &Setup, outcome: &Outcome) 
         elapsed_s: outcome.swarm_s + outcome.polish_s,
         swarm_elapsed_s: outcome.swarm_s,
         evaluations: outcome.evaluations,
+        failures: outcome.failures.clone(),
+        device_faults: outcome.device_faults.clone(),
         evaluations_per_s: rate,
         particle_steps_per_s: rate * steps as f64,
         total_parameter_error: error_of(&outcome.candidate),
@@ -184,6 +191,14 @@ pub fn summarise(settings: &IdentifySettings, setup: &Setup, outcome: &Outcome) 
     }
 }
 
+/// Writes the resolved settings into `folder`, as a study file that repeats the run.
+///
+/// # Errors
+/// [`crate::Error::Io`] if it cannot be written.
+pub fn write_settings(folder: &Path, settings: &IdentifySettings) -> Result<()> {
+    write_whole(folder.join("study.toml"), study_toml(settings).as_bytes())
+}
+
 /// Writes all files of a run into `folder`.
 ///
 /// # Errors
@@ -197,10 +212,11 @@ pub fn write_results(
 ) -> Result<()> {
     let replay = &setup.replay;
     write_json(&folder.join("summary.json"), summary)?;
-    write_whole(folder.join("study.toml"), study_toml(settings).as_bytes())?;
+    write_settings(folder, settings)?;
     let manifest = Manifest {
         log: Some(&setup.log.source),
         interrupted: outcome.interrupted,
+        device_faults: &outcome.device_faults,
         ..Manifest::new("identify", settings.seed, &outcome.backend, &replay.car.name)
     };
     write_json(&folder.join("manifest.json"), &manifest)?;
@@ -652,6 +668,17 @@ impl Summary {
             self.particle_steps_per_s / 1e6,
             self.elapsed_s
         ));
+        if !self.failures.is_empty() {
+            let told: Vec<String> = self
+                .failures
+                .iter()
+                .map(|(reason, count)| format!("{count} {}", reason.replace('_', " ")))
+                .collect();
+            text.push_str(&format!("Candidates that failed: {}.\n", told.join(", ")));
+        }
+        for fault in &self.device_faults {
+            text.push_str(&format!("Note: {fault}\n"));
+        }
         text
     }
 }

@@ -5,12 +5,13 @@ use super::identifiability::{Identifiability, judge, noise_of};
 use super::polish::polish;
 use super::settings::{Algorithm, IdentifySettings};
 use super::setup::{CHANNELS, Setup};
+use super::state::{Place, SearchState, inputs_of};
 use crate::error::{Error, Result};
 use crate::evaluate::replay::{ReplayProblem, open_evaluator, trace};
-use crate::evaluate::{BackendInfo, Evaluator, FAILED_COST};
-use crate::swarm::{
-    CovarianceSettings, CovarianceSwarm, Mopso, MopsoSettings, Progress, Pso, PsoSettings, run,
-};
+use crate::evaluate::{BackendInfo, Evaluator, FAILED_COST, FailureCounts, add_failures};
+use crate::study::keeper::{Keeper, Origin};
+use crate::swarm::{CovarianceSettings, CovarianceSwarm, Mopso, MopsoSettings, Progress, Pso, PsoSettings};
+use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
 use std::time::Instant;
 
@@ -36,7 +37,7 @@ pub struct Report<'a> {
 }
 
 /// One line of the convergence history.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct HistoryRow {
     /// Iterations over both stages.
     pub iteration: usize,
@@ -53,7 +54,7 @@ pub struct HistoryRow {
 }
 
 /// Non-dominated candidates and their objectives.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Front {
     /// One row per member.
     pub candidates: Vec<Vec<f64>>,
@@ -77,6 +78,10 @@ pub struct Outcome {
     pub identifiability: Identifiability,
     /// What evaluated.
     pub backend: BackendInfo,
+    /// Candidates that failed, by reason.
+    pub failures: FailureCounts,
+    /// What went wrong with devices and was got over.
+    pub device_faults: Vec<String>,
     /// Candidates evaluated by the swarm.
     pub evaluations: u64,
     /// Time that the swarm took, s.
@@ -101,69 +106,74 @@ const GATHER: (usize, usize) = (64, 1500);
 pub fn search(
     settings: &IdentifySettings,
     setup: &Setup,
+    observe: impl FnMut(&Report<'_>) -> ControlFlow<()>,
+) -> Result<Outcome> {
+    search_from(settings, setup, None, &mut Keeper::idle(), observe)
+}
+
+/// As [`search`], from the state of a search of the same settings that was broken off, if one is given, and with the state
+/// handed to `keeper` while it works.
+///
+/// # Errors
+/// As [`search`]; [`Error::Input`] if the state belongs to other inputs or another backend; [`Error::Io`] if the state
+/// cannot be saved when the search is broken off.
+pub fn search_from(
+    settings: &IdentifySettings,
+    setup: &Setup,
+    state: Option<SearchState>,
+    keeper: &mut Keeper,
     mut observe: impl FnMut(&Report<'_>) -> ControlFlow<()>,
 ) -> Result<Outcome> {
     let replay = &setup.replay;
     let mut evaluator = open_evaluator(replay, settings.backend, settings.adapter.as_deref())?;
+    let origin = Origin::new(inputs_of(setup), &evaluator.backend());
+    let mut state = match state {
+        Some(state) => {
+            keeper.check(&state.origin, &origin)?;
+            state
+        }
+        None => SearchState {
+            settings: settings.clone(),
+            origin,
+            history: Vec::new(),
+            elapsed_s: 0.0,
+            failures: FailureCounts::new(),
+            device_faults: Vec::new(),
+            place: first_place(settings, setup)?,
+        },
+    };
+    keeper.keep(&state)?;
+    let before_s = state.elapsed_s;
+    let earlier_faults = state.device_faults.clone();
     let began = Instant::now();
-    let mut log = HistoryLog {
-        rows: Vec::new(),
-        began,
-    };
     let mut interrupted = false;
-    let motion = swarm_settings(settings);
-
-    let (swarm_candidate, front) = if settings.objectives.len() > 1 {
-        let mopso_settings = front_settings(settings, motion);
-        let planned = mopso_settings.motion.iterations;
-        let mut swarm = Mopso::new(&replay.problem, mopso_settings)?;
-        run(&mut swarm, evaluator.as_mut(), |p| {
-            let flow = log.watch(Stage::Explore, planned, p, &mut observe);
-            interrupted |= flow.is_break();
-            flow
-        })?;
-        let front = front_of(&swarm).ok_or_else(nothing_drives)?;
-        (front.candidates[front.chosen].clone(), Some(front))
-    } else {
-        let planned = motion.iterations;
-        let mut swarm = Pso::new(&replay.problem, motion.clone())?;
-        run(&mut swarm, evaluator.as_mut(), |p| {
-            let flow = log.watch(Stage::Explore, planned, p, &mut observe);
-            interrupted |= flow.is_break();
-            flow
-        })?;
-        let (mut best, mut cost) = swarm.best_candidate();
-        if settings.algorithm == Algorithm::Adaptive && !interrupted {
-            let gathering = CovarianceSettings {
-                population: settings.population.unwrap_or(GATHER.0),
-                iterations: settings.iterations.unwrap_or(GATHER.1),
-                seed: settings.seed,
-                // Along the valley what did not pay tells as much as what did: it halves the error that is left.
-                active: true,
-                ..CovarianceSettings::default()
-            };
-            let planned = gathering.iterations;
-            let mut seen = Logarithmic::new(evaluator.as_mut());
-            let start = seen.of_parameters(&best);
-            let mut swarm = CovarianceSwarm::new(seen.problem(), &start, gathering)?;
-            run(&mut swarm, &mut seen, |p| {
-                let flow = log.watch(Stage::Gather, planned, p, &mut observe);
-                interrupted |= flow.is_break();
-                flow
-            })?;
-            let (gathered, least) = swarm.best_candidate();
-            if least < cost {
-                (best, cost) = (seen.to_parameters(&gathered), least);
-            }
+    while !matches!(state.place, Place::Searched { .. }) {
+        let Some((stage, planned, progress)) = state.place.advance(evaluator.as_mut())? else {
+            state.place = next_place(state.place, settings, evaluator.as_mut())?;
+            keeper.keep_or_warn(&state);
+            continue;
+        };
+        state.elapsed_s = before_s + began.elapsed().as_secs_f64();
+        state.note(&progress);
+        state.device_faults = [&earlier_faults[..], evaluator.device_faults()].concat();
+        let flow = observe(&Report {
+            stage,
+            planned,
+            progress: Some(&progress),
+        });
+        if flow.is_break() {
+            keeper.keep(&state)?;
+            interrupted = true;
+            break;
         }
-        if cost >= FAILED_COST {
-            return Err(nothing_drives());
+        if keeper.due() {
+            keeper.keep_or_warn(&state);
         }
-        (best, None)
-    };
-    let swarm_s = began.elapsed().as_secs_f64();
-    let evaluations = log.rows.last().map_or(0, |row| row.evaluations);
+    }
+    let swarm_s = before_s + began.elapsed().as_secs_f64();
+    let evaluations = state.history.last().map_or(0, |row| row.evaluations);
     let backend = evaluator.backend();
+    let (swarm_candidate, front) = best_so_far(&state.place, evaluator.as_mut())?;
 
     let polish_began = Instant::now();
     let mut candidate = swarm_candidate.clone();
@@ -200,13 +210,76 @@ pub fn search(
         swarm_candidate,
         candidate,
         front,
-        history: log.rows,
+        history: state.history,
         backend,
+        failures: state.failures,
+        device_faults: state.device_faults,
         evaluations,
         swarm_s,
         polish_evaluations,
         interrupted,
     })
+}
+
+/// The first swarm.
+fn first_place(settings: &IdentifySettings, setup: &Setup) -> Result<Place> {
+    let problem = &setup.replay.problem;
+    let motion = swarm_settings(settings);
+    Ok(if settings.objectives.len() > 1 {
+        Place::Front(Box::new(Mopso::new(problem, front_settings(settings, motion))?))
+    } else {
+        Place::Explore(Box::new(Pso::new(problem, motion)?))
+    })
+}
+
+/// What comes after a stage that is done.
+fn next_place(place: Place, settings: &IdentifySettings, evaluator: &mut dyn Evaluator) -> Result<Place> {
+    if let Place::Explore(swarm) = &place
+        && settings.algorithm == Algorithm::Adaptive
+    {
+        let (best, cost) = swarm.best_candidate();
+        let gathering = CovarianceSettings {
+            population: settings.population.unwrap_or(GATHER.0),
+            iterations: settings.iterations.unwrap_or(GATHER.1),
+            seed: settings.seed,
+            // Along the valley what did not pay tells as much as what did: it halves the error that is left.
+            active: true,
+            ..CovarianceSettings::default()
+        };
+        let seen = Logarithmic::new(evaluator);
+        let swarm = CovarianceSwarm::new(seen.problem(), &seen.of_parameters(&best), gathering)?;
+        return Ok(Place::Gather {
+            best,
+            cost,
+            swarm: Box::new(swarm),
+        });
+    }
+    let (best, front) = best_so_far(&place, evaluator)?;
+    Ok(Place::Searched { best, front })
+}
+
+/// The best candidate that a search has come to, and the front of a search that has one.
+fn best_so_far(place: &Place, evaluator: &mut dyn Evaluator) -> Result<(Vec<f64>, Option<Front>)> {
+    let (best, cost) = match place {
+        Place::Searched { best, front } => return Ok((best.clone(), front.clone())),
+        Place::Front(swarm) => {
+            let front = front_of(swarm).ok_or_else(nothing_drives)?;
+            return Ok((front.candidates[front.chosen].clone(), Some(front)));
+        }
+        Place::Explore(swarm) => swarm.best_candidate(),
+        Place::Gather { best, cost, swarm } => {
+            let (gathered, least) = swarm.best_candidate();
+            if least < *cost {
+                (Logarithmic::new(evaluator).to_parameters(&gathered), least)
+            } else {
+                (best.clone(), *cost)
+            }
+        }
+    };
+    if cost >= FAILED_COST {
+        return Err(nothing_drives());
+    }
+    Ok((best, None))
 }
 
 /// Errors of every channel under this share of its spread are rounding, and there is no noise to weight by.
@@ -273,27 +346,17 @@ fn front_settings(settings: &IdentifySettings, motion: PsoSettings) -> MopsoSett
     }
 }
 
-struct HistoryLog {
-    rows: Vec<HistoryRow>,
-    began: Instant,
-}
-
-impl HistoryLog {
+impl SearchState {
     /// Notes an iteration down; counts go on from the stage before.
-    fn watch(
-        &mut self,
-        stage: Stage,
-        planned: usize,
-        progress: &Progress,
-        observe: &mut impl FnMut(&Report<'_>) -> ControlFlow<()>,
-    ) -> ControlFlow<()> {
-        let (iteration, evaluations) = self.rows.last().map_or((0, 0), |r| (r.iteration, r.evaluations));
+    fn note(&mut self, progress: &Progress) {
+        let last = self.history.last();
+        let (iteration, evaluations) = last.map_or((0, 0), |r| (r.iteration, r.evaluations));
         let done = if progress.iteration <= 1 {
             progress.evaluations
         } else {
             progress.evaluations / progress.iteration as u64
         };
-        let best = match self.rows.last() {
+        let best = match last {
             // A stage starts from the best of the one before.
             Some(row) => row
                 .best
@@ -303,19 +366,15 @@ impl HistoryLog {
                 .collect(),
             None => progress.best.clone(),
         };
-        self.rows.push(HistoryRow {
+        self.history.push(HistoryRow {
             iteration: iteration + 1,
             evaluations: evaluations + done,
             best,
             median: progress.median,
             failed: progress.failed,
-            elapsed_s: self.began.elapsed().as_secs_f64(),
+            elapsed_s: self.elapsed_s,
         });
-        observe(&Report {
-            stage,
-            planned,
-            progress: Some(progress),
-        })
+        add_failures(&mut self.failures, &progress.failures);
     }
 }
 

@@ -5,10 +5,11 @@ use crate::error::{Error, Result};
 use crate::evaluate::replay::{BackendChoice, CHANNEL_NAMES, Norm};
 use crate::swarm::{Mutation, Schedule};
 use crate::telemetry::{CalibrationOptions, Switch};
+use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
 /// A parameter to find, and where to look for it.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FreeParameter {
     /// Its name, as [`crate::vehicle::Car::parameter`] knows it.
     pub name: String,
@@ -19,7 +20,7 @@ pub struct FreeParameter {
 }
 
 /// What the swarm minimises.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum ObjectiveChoice {
     /// The mean over the channels of the cost relative to the channel's own spread.
     All,
@@ -28,7 +29,7 @@ pub enum ObjectiveChoice {
 }
 
 /// Which swarm searches.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Algorithm {
     /// An exploring swarm, then one that learns the shape of the valley.
     Adaptive,
@@ -39,7 +40,7 @@ pub enum Algorithm {
 }
 
 /// Settings of an identification.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct IdentifySettings {
     /// The car that fixed parameters come from: a bundled name or a file.
     pub car: String,
@@ -322,6 +323,30 @@ impl IdentifySettings {
             ));
         }
         Ok(s)
+    }
+
+    /// The same with the paths of files absolute, so that they mean the same from every folder.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if the present folder cannot be told.
+    pub fn absolute(mut self) -> Result<Self> {
+        let whole = |path: &mut PathBuf| -> Result<()> {
+            *path = std::path::absolute(&path).map_err(|e| Error::io(&path, "find", e))?;
+            Ok(())
+        };
+        for path in [&mut self.log, &mut self.channel_map].into_iter().flatten() {
+            whole(path)?;
+        }
+        for name in [Some(&mut self.car), self.track.as_mut(), self.truth.as_mut()]
+            .into_iter()
+            .flatten()
+            .filter(|name| Path::new(name).is_file())
+        {
+            let mut path = PathBuf::from(&name);
+            whole(&mut path)?;
+            *name = path.display().to_string();
+        }
+        Ok(self)
     }
 
     fn read_swarm(&mut self, table: &Table<'_>) -> Result<()> {

@@ -5,11 +5,12 @@ use super::lines::Setup;
 use super::settings::RacelineSettings;
 use crate::error::Result;
 use crate::evaluate::line::{LineProblem, open_line_evaluator};
-use crate::evaluate::{Evaluator, FAILED_COST};
+use crate::evaluate::{Evaluator, FAILED_COST, FailureCounts, add_failures};
 use crate::line::Parametrisation;
 use crate::random::Random;
 use crate::swarm::metrics::hypervolume;
-use crate::swarm::{Archive, Mopso, MopsoSettings, Progress, PsoSettings, Truncation, run};
+use crate::swarm::{Archive, Mopso, MopsoSettings, Optimiser, Progress, PsoSettings, Truncation, step};
+use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
 
 /// Lines none of which another betters in every objective.
@@ -27,6 +28,17 @@ pub struct LineFront {
     pub ideal: Vec<f64>,
     /// Lines evaluated.
     pub evaluations: u64,
+    /// Lines that failed, by reason.
+    pub failures: FailureCounts,
+    /// What went wrong with devices and was got over.
+    pub device_faults: Vec<String>,
+}
+
+/// Where the search for a front is.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub(super) struct FrontState {
+    pub swarm: Mopso,
+    pub failures: FailureCounts,
 }
 
 /// Metres of the reference line for each control point of the front's lines.
@@ -49,7 +61,25 @@ pub fn search_front(
     settings: &RacelineSettings,
     solvers: &ExactSolvers,
     known: &[Vec<f64>],
-    observe: impl FnMut(&Progress) -> ControlFlow<()>,
+    mut observe: impl FnMut(&Progress) -> ControlFlow<()>,
+) -> Result<LineFront> {
+    search_front_from(setup, settings, solvers, known, None, |progress, _| {
+        Ok(observe(progress))
+    })
+}
+
+/// As [`search_front`], from the swarm of the same search that was broken off, if one is given; `observe` is told the swarm
+/// after each iteration.
+///
+/// # Errors
+/// As [`search_front`], and those of `observe`.
+pub(super) fn search_front_from(
+    setup: &Setup,
+    settings: &RacelineSettings,
+    solvers: &ExactSolvers,
+    known: &[Vec<f64>],
+    state: Option<FrontState>,
+    mut observe: impl FnMut(&Progress, &FrontState) -> Result<ControlFlow<()>>,
 ) -> Result<LineFront> {
     let cuts = &setup.cuts;
     let controls = ((cuts.length_m / CONTROL_SPACING_M) as usize).clamp(4, cuts.len());
@@ -70,10 +100,26 @@ pub fn search_front(
         archive: settings.archive,
         ..MopsoSettings::default()
     };
-    let mut swarm = Mopso::new(&problem.problem, mopso)?;
-    swarm.start_from(&starting_lines(&problem, settings, known)?);
+    let mut state = match state {
+        Some(state) => state,
+        None => {
+            let mut swarm = Mopso::new(&problem.problem, mopso)?;
+            swarm.start_from(&starting_lines(&problem, settings, known)?);
+            FrontState {
+                swarm,
+                failures: FailureCounts::new(),
+            }
+        }
+    };
     let mut evaluator = open_line_evaluator(&problem, settings.backend, settings.adapter.as_deref())?;
-    run(&mut swarm, evaluator.as_mut(), observe)?;
+    while !state.swarm.done() {
+        let progress = step(&mut state.swarm, evaluator.as_mut())?;
+        add_failures(&mut state.failures, &progress.failures);
+        if observe(&progress, &state)?.is_break() {
+            break;
+        }
+    }
+    let FrontState { swarm, failures } = state;
 
     let whole = LineProblem::new(
         cuts.clone(),
@@ -90,7 +136,7 @@ pub fn search_front(
         .collect();
     lines.extend(known.iter().cloned());
     let mut archive = Archive::new(settings.archive, Truncation::Contribution);
-    let mut evaluations = crate::swarm::Optimiser::evaluations(&swarm);
+    let mut evaluations = swarm.evaluations();
     evaluations += insert_all(&mut archive, judge.as_mut(), &lines)?;
     if settings.local_search && settings.objectives.iter().all(|o| solvers.solves(*o)) {
         let polished = polish_along(&archive, settings, solvers)?;
@@ -119,7 +165,10 @@ pub fn search_front(
     } else {
         f64::NAN
     };
+    let device_faults = [evaluator.device_faults(), judge.device_faults()].concat();
     Ok(LineFront {
+        device_faults,
+        failures,
         alpha: archive.positions.clone(),
         objectives: archive.objectives.clone(),
         hypervolume: volume,

@@ -10,18 +10,26 @@ mod lines;
 mod results;
 mod search;
 mod settings;
+mod state;
 
 pub use exact::{ExactLine, ExactSolvers, WeightedLine};
 pub use front::{LineFront, search_front};
 pub use lines::{FINE_M, ReportedLine, Setup, set_up};
-pub use results::{LineFigures, Summary, summarise, write_results};
-pub use search::{FoundLine, LevelRow, LineProgress, LineSearch, LineSearchSettings, search_line};
+pub use results::{LineFigures, Summary, summarise, write_results, write_settings};
+pub use search::{
+    FoundLine, LevelRow, LineProgress, LineSearch, LineSearchSettings, LineState, search_line,
+    search_line_from,
+};
 pub use settings::{OBJECTIVE_NAMES, RacelineSettings};
+pub use state::LinesState;
 
 use crate::error::Result;
-use crate::evaluate::BackendInfo;
 use crate::evaluate::line::{LineObjective, LineProblem, open_line_evaluator};
+use crate::evaluate::{BackendInfo, FailureCounts, add_failures};
 use crate::line::Parametrisation;
+use crate::study::keeper::{Keeper, Origin};
+use front::search_front_from;
+use state::{FinishedObjective, Work, inputs_of};
 use std::ops::ControlFlow;
 use std::time::Instant;
 
@@ -54,6 +62,10 @@ pub struct Outcome {
     pub reference: ReportedLine,
     /// What evaluated.
     pub backend: BackendInfo,
+    /// Lines that failed, by reason.
+    pub failures: FailureCounts,
+    /// What went wrong with devices and was got over.
+    pub device_faults: Vec<String>,
     /// Lines evaluated by the swarms.
     pub evaluations: u64,
     /// Time of the swarms and the local search (s).
@@ -95,8 +107,58 @@ fn line_name(objective: LineObjective) -> &'static str {
 pub fn find_lines(
     settings: &RacelineSettings,
     setup: &Setup,
+    observe: impl FnMut(&StudyProgress) -> ControlFlow<()>,
+) -> Result<Outcome> {
+    find_lines_from(settings, setup, None, &mut Keeper::idle(), observe)
+}
+
+/// As [`find_lines`], from the state of a study of the same settings that was broken off, if one is given, and with the
+/// state handed to `keeper` while it works.
+///
+/// # Errors
+/// As [`find_lines`]; [`crate::Error::Input`] if the state belongs to other inputs or another backend;
+/// [`crate::Error::Io`] if the state cannot be saved when the study is broken off.
+pub fn find_lines_from(
+    settings: &RacelineSettings,
+    setup: &Setup,
+    state: Option<LinesState>,
+    keeper: &mut Keeper,
     mut observe: impl FnMut(&StudyProgress) -> ControlFlow<()>,
 ) -> Result<Outcome> {
+    // A small problem of the same kind says what it is that evaluates.
+    let probe = LineProblem::new(
+        setup.cuts.clone(),
+        Parametrisation::sections(),
+        &settings.objectives,
+        Some(setup.car.clone()),
+        settings.entry_mps,
+    )?;
+    let backend = open_line_evaluator(&probe, settings.backend, settings.adapter.as_deref())?.backend();
+    let origin = Origin::new(inputs_of(setup), &backend);
+    let state = match state {
+        Some(state) => {
+            keeper.check(&state.origin, &origin)?;
+            state
+        }
+        None => LinesState {
+            settings: settings.clone(),
+            origin,
+            elapsed_s: 0.0,
+            finished: Vec::new(),
+            steps: Vec::new(),
+            search: None,
+            front: None,
+        },
+    };
+    keeper.keep(&state)?;
+    let before_s = state.elapsed_s;
+    let mut work = Work {
+        state,
+        keeper,
+        observe: &mut observe,
+        interrupted: false,
+    };
+
     let reference = setup.report("reference", &setup.cuts.reference, settings)?;
     let solvers = ExactSolvers::new(setup, settings)?;
     let exact_began = Instant::now();
@@ -107,25 +169,48 @@ pub fn find_lines(
     let exact_s = exact_began.elapsed().as_secs_f64();
 
     let began = Instant::now();
-    let mut interrupted = false;
+    let mut device_faults = Vec::new();
+    let mut failures = FailureCounts::new();
     let mut evaluations = 0;
     let mut history = Vec::new();
     let mut objectives = Vec::new();
-    for (objective, exact) in settings.objectives.iter().zip(&exact) {
+    for (k, (objective, exact)) in settings.objectives.iter().zip(&exact).enumerate() {
         let start = exact
             .as_ref()
             .filter(|_| settings.warm_start)
             .map(|o| o.alpha.as_slice());
-        let found = search_objective(settings, setup, *objective, start, |progress| {
-            let told = observe(&StudyProgress {
-                stage: line_name(*objective).to_owned(),
-                evaluations: progress.evaluations,
-                best: format!("{:.4} {}", progress.best, objective.unit()),
-            });
-            interrupted |= told.is_break();
-            told
-        })?;
+        let (found, best) = match work.state.finished.get(k) {
+            Some(finished) => (
+                finished.found.clone(),
+                setup.report(line_name(*objective), &finished.best, settings)?,
+            ),
+            None => {
+                let found = search_objective(settings, setup, *objective, start, &mut work)?;
+                let best = best_line(
+                    settings,
+                    setup,
+                    *objective,
+                    start,
+                    &found,
+                    &solvers,
+                    work.interrupted,
+                )?;
+                let elapsed_s = before_s + began.elapsed().as_secs_f64();
+                work.finished(|state| {
+                    state.finished.push(FinishedObjective {
+                        found: found.clone(),
+                        best: best.alpha.clone(),
+                    });
+                    state.steps.clear();
+                    state.search = None;
+                    state.elapsed_s = elapsed_s;
+                });
+                (found, best)
+            }
+        };
         evaluations += found.evaluations;
+        device_faults.extend_from_slice(&found.device_faults);
+        add_failures(&mut failures, &found.failures);
         history.push(
             found
                 .history
@@ -133,18 +218,6 @@ pub fn find_lines(
                 .map(|row| (row.evaluations, row.best))
                 .collect(),
         );
-        // A search that goes from coarse to fine may lose a little of the line that it started from.
-        let mut rivals: Vec<Vec<f64>> = start.map(<[f64]>::to_vec).into_iter().collect();
-        if settings.local_search && solvers.solves(*objective) && !interrupted {
-            rivals.extend(solvers.polish(vec![(found.alpha.clone(), vec![(*objective, 1.0)])], 60)?);
-        }
-        let mut best = setup.report(line_name(*objective), &found.alpha, settings)?;
-        for alpha in rivals {
-            let line = setup.report(line_name(*objective), &alpha, settings)?;
-            if line.worth(*objective) < best.worth(*objective) {
-                best = line;
-            }
-        }
         let exact_line = exact
             .as_ref()
             .map(|o| setup.report(line_name(*objective), &o.alpha, settings))
@@ -156,52 +229,75 @@ pub fn find_lines(
             exact: exact_line,
             exact_status: exact.as_ref().map(|o| (format!("{:?}", o.status), o.seconds)),
         });
-        if interrupted {
+        if work.interrupted {
             break;
         }
     }
 
     let mut front = None;
     let mut compromise = None;
-    if settings.objectives.len() > 1 && !interrupted {
+    if settings.objectives.len() > 1 && !work.interrupted {
         let known: Vec<Vec<f64>> = objectives.iter().map(|o| o.best.alpha.clone()).collect();
-        let found = search_front(setup, settings, &solvers, &known, |progress| {
+        let front_state = work.state.front.take().map(|state| *state);
+        let found = search_front_from(setup, settings, &solvers, &known, front_state, |progress, at| {
             let best: Vec<String> = progress.best.iter().map(|b| format!("{b:.4}")).collect();
-            let told = observe(&StudyProgress {
+            let told = StudyProgress {
                 stage: "front".to_owned(),
                 evaluations: progress.evaluations,
                 best: best.join(" "),
-            });
-            interrupted |= told.is_break();
-            told
+            };
+            work.told(&told, |state| {
+                state.front = Some(Box::new(at.clone()));
+                state.elapsed_s = before_s + began.elapsed().as_secs_f64();
+            })
         })?;
         evaluations += found.evaluations;
+        device_faults.extend_from_slice(&found.device_faults);
+        add_failures(&mut failures, &found.failures);
         if let Some(nearest) = nearest_to_ideal(&found) {
             compromise = Some(setup.report("compromise", &found.alpha[nearest], settings)?);
         }
         front = Some(found);
     }
-    // A small problem of the same kind says what it is that evaluates.
-    let probe = LineProblem::new(
-        setup.cuts.clone(),
-        Parametrisation::sections(),
-        &settings.objectives,
-        Some(setup.car.clone()),
-        settings.entry_mps,
-    )?;
-    let backend = open_line_evaluator(&probe, settings.backend, settings.adapter.as_deref())?.backend();
     Ok(Outcome {
         objectives,
         front,
         compromise,
         reference,
         backend,
+        device_faults,
+        failures,
         evaluations,
-        search_s: began.elapsed().as_secs_f64(),
+        search_s: before_s + began.elapsed().as_secs_f64(),
         exact_s,
         history,
-        interrupted,
+        interrupted: work.interrupted,
     })
+}
+
+/// The best of what was found, what the local search makes of it, and the line that the search started from: one that goes
+/// from coarse to fine may lose a little of that.
+fn best_line(
+    settings: &RacelineSettings,
+    setup: &Setup,
+    objective: LineObjective,
+    start: Option<&[f64]>,
+    found: &FoundLine,
+    solvers: &ExactSolvers,
+    interrupted: bool,
+) -> Result<ReportedLine> {
+    let mut rivals: Vec<Vec<f64>> = start.map(<[f64]>::to_vec).into_iter().collect();
+    if settings.local_search && solvers.solves(objective) && !interrupted {
+        rivals.extend(solvers.polish(vec![(found.alpha.clone(), vec![(objective, 1.0)])], 60)?);
+    }
+    let mut best = setup.report(line_name(objective), &found.alpha, settings)?;
+    for alpha in rivals {
+        let line = setup.report(line_name(objective), &alpha, settings)?;
+        if line.worth(objective) < best.worth(objective) {
+            best = line;
+        }
+    }
+    Ok(best)
 }
 
 /// Cuts for each control point where lap time counts: with fewer, ripples between the cuts would pay; with more, a swarm
@@ -224,7 +320,7 @@ fn search_objective(
     setup: &Setup,
     objective: LineObjective,
     start: Option<&[f64]>,
-    mut observe: impl FnMut(&LineProgress) -> ControlFlow<()>,
+    work: &mut Work<'_>,
 ) -> Result<FoundLine> {
     let cold = LineSearchSettings::default();
     let plain = LineSearchSettings {
@@ -243,17 +339,13 @@ fn search_objective(
         adapter: settings.adapter.as_deref(),
     };
     if objective != LineObjective::LapTime {
-        return search_line(&search, &plain, observe);
+        return search_step(&search, &plain, objective, 0, work);
     }
     let curved = LineSearch {
         objective: LineObjective::Kappa2,
         ..search
     };
-    let mut evaluations = 0;
-    let curved = search_line(&curved, &plain, |progress| {
-        evaluations = progress.evaluations;
-        observe(progress)
-    })?;
+    let curved = search_step(&curved, &plain, objective, 0, work)?;
     let mut cuts = setup.cuts.clone();
     cuts.reference.clone_from(&curved.alpha);
     let smooth = cuts.with_smooth_reference(BASE_M);
@@ -267,13 +359,10 @@ fn search_objective(
         overshoot: 0.0,
         ..plain
     };
-    let mut found = search_line(&fast, &fast_settings, |progress| {
-        observe(&LineProgress {
-            evaluations: evaluations + progress.evaluations,
-            ..progress.clone()
-        })
-    })?;
+    let mut found = search_step(&fast, &fast_settings, objective, curved.evaluations, work)?;
     found.evaluations += curved.evaluations;
+    found.device_faults.splice(0..0, curved.device_faults);
+    add_failures(&mut found.failures, &curved.failures);
     let mut fastest = setup.report("fastest", &found.alpha, settings)?;
     cuts.reference.clone_from(&found.alpha);
     for wavelength in RIPPLES_M {
@@ -284,6 +373,41 @@ fn search_objective(
         }
     }
     (found.alpha, found.cost) = (fastest.alpha, fastest.lap_time_s);
+    Ok(found)
+}
+
+/// One search of an objective's, or what it came to in an earlier run. `before` are the lines of the searches before it.
+fn search_step(
+    search: &LineSearch<'_>,
+    settings: &LineSearchSettings,
+    objective: LineObjective,
+    before: u64,
+    work: &mut Work<'_>,
+) -> Result<FoundLine> {
+    // The searches of an objective come one after the other: the first is the one that has no lines before it.
+    let place = usize::from(before > 0);
+    if let Some(found) = work.state.steps.get(place) {
+        return Ok(found.clone());
+    }
+    let before_s = work.state.elapsed_s;
+    let began = Instant::now();
+    let state = work.state.search.take().map(|state| *state);
+    let found = search_line_from(search, settings, state, |progress, state| {
+        let told = StudyProgress {
+            stage: line_name(objective).to_owned(),
+            evaluations: before + progress.evaluations,
+            best: format!("{:.4} {}", progress.best, search.objective.unit()),
+        };
+        work.told(&told, |kept| {
+            kept.search = Some(Box::new(state.clone()));
+            kept.elapsed_s = before_s + began.elapsed().as_secs_f64();
+        })
+    })?;
+    work.finished(|state| {
+        state.steps.push(found.clone());
+        state.search = None;
+        state.elapsed_s = before_s + began.elapsed().as_secs_f64();
+    });
     Ok(found)
 }
 

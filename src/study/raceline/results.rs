@@ -6,6 +6,7 @@ mod pictures;
 
 use super::{Outcome, RacelineSettings, ReportedLine, Setup};
 use crate::error::Result;
+use crate::evaluate::FailureCounts;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -74,6 +75,10 @@ pub struct Summary {
     pub exact_elapsed_s: f64,
     /// Lines evaluated by the swarms.
     pub evaluations: u64,
+    /// Lines that failed, by reason.
+    pub failures: FailureCounts,
+    /// What went wrong with devices and was got over; the study's figures hold all the same.
+    pub device_faults: Vec<String>,
     /// Lines per second of the search.
     pub evaluations_per_s: f64,
     /// Cuts across the track.
@@ -126,6 +131,8 @@ pub fn summarise(settings: &RacelineSettings, setup: &Setup, outcome: &Outcome) 
         search_elapsed_s: outcome.search_s,
         exact_elapsed_s: outcome.exact_s,
         evaluations: outcome.evaluations,
+        failures: outcome.failures.clone(),
+        device_faults: outcome.device_faults.clone(),
         evaluations_per_s: outcome.evaluations as f64 / outcome.search_s.max(1e-9),
         sections: setup.cuts.len(),
         car_width_m: settings.car_width_m,
@@ -252,11 +259,22 @@ impl Summary {
             self.adapter,
             self.exact_elapsed_s
         );
+        for fault in &self.device_faults {
+            text += &format!("Note: {fault}\n");
+        }
         for warning in &self.warnings {
             text += &format!("Note: {warning}\n");
         }
         text
     }
+}
+
+/// Writes the resolved settings into `folder`, as a study file that repeats the run.
+///
+/// # Errors
+/// [`crate::Error::Io`] if it cannot be written.
+pub fn write_settings(folder: &Path, settings: &RacelineSettings) -> Result<()> {
+    crate::report::write_whole(folder.join("study.toml"), settings.to_toml().as_bytes())
 }
 
 /// Writes all files of a run into `folder`.

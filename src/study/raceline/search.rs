@@ -5,10 +5,11 @@
 
 use crate::error::{Error, Result};
 use crate::evaluate::line::{CpuLineEvaluator, LineObjective, LineProblem, open_line_evaluator};
-use crate::evaluate::{BackendChoice, Evaluator};
+use crate::evaluate::{BackendChoice, Evaluator, FailureCounts, add_failures};
 use crate::line::{Parametrisation, PointMass, TERMS};
 use crate::swarm::{Optimiser, WindowSettings, WindowSwarm};
 use crate::track::CrossSections;
+use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
 use std::time::Instant;
 
@@ -138,7 +139,7 @@ pub struct LineProgress {
 }
 
 /// What was reached by the end of a level.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LevelRow {
     /// Control points.
     pub controls: usize,
@@ -153,7 +154,7 @@ pub struct LevelRow {
 }
 
 /// The line that a search has found.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FoundLine {
     /// `alpha` at every section.
     pub alpha: Vec<f64>,
@@ -163,6 +164,25 @@ pub struct FoundLine {
     pub evaluations: u64,
     /// The levels.
     pub history: Vec<LevelRow>,
+    /// Lines that failed, by reason.
+    pub failures: FailureCounts,
+    /// What went wrong with devices and was got over.
+    pub device_faults: Vec<String>,
+}
+
+/// Where a search is: all that it takes to go on.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct LineState {
+    level: usize,
+    /// `alpha` that the level started from, as the control points have it.
+    sums: Vec<f64>,
+    found: FoundLine,
+    /// The level's swarm, once it has begun.
+    swarm: Option<Box<WindowSwarm>>,
+    /// The cost when the last round ended.
+    before: f64,
+    rounds: usize,
+    elapsed_s: f64,
 }
 
 /// Looks for the line of the least objective until all levels are done or `observe` breaks off. Without a break the result
@@ -176,52 +196,96 @@ pub fn search_line(
     settings: &LineSearchSettings,
     mut observe: impl FnMut(&LineProgress) -> ControlFlow<()>,
 ) -> Result<FoundLine> {
+    search_line_from(search, settings, None, |progress, _| Ok(observe(progress)))
+}
+
+/// As [`search_line`], from the state of the same search that was broken off, if one is given; `observe` is told the state
+/// after each iteration.
+///
+/// # Errors
+/// As [`search_line`], and those of `observe`.
+pub fn search_line_from(
+    search: &LineSearch,
+    settings: &LineSearchSettings,
+    state: Option<LineState>,
+    mut observe: impl FnMut(&LineProgress, &LineState) -> Result<ControlFlow<()>>,
+) -> Result<FoundLine> {
     settings.validate()?;
     let clock = Instant::now();
     let cuts = search.cuts;
     let n = cuts.len();
     let judge = problem(search, cuts.clone(), Parametrisation::sections())?;
-    // A line is handed on by its `alpha` as the control points have it, which may lie beyond the edges.
-    let mut sums = judge.candidate(search.start.unwrap_or(&cuts.reference))?;
-    let mut found = FoundLine {
-        cost: cost(&judge, &sums)?,
-        alpha: sums.clone(),
-        evaluations: 0,
-        history: Vec::new(),
+    let mut state = match state {
+        Some(state) => state,
+        None => {
+            // A line is handed on by its `alpha` as the control points have it, which may lie beyond the edges.
+            let sums = judge.candidate(search.start.unwrap_or(&cuts.reference))?;
+            LineState {
+                level: 0,
+                found: FoundLine {
+                    cost: cost(&judge, &sums)?,
+                    alpha: sums.clone(),
+                    evaluations: 0,
+                    history: Vec::new(),
+                    failures: FailureCounts::new(),
+                    device_faults: Vec::new(),
+                },
+                sums,
+                swarm: None,
+                before: f64::INFINITY,
+                rounds: 0,
+                elapsed_s: 0.0,
+            }
+        }
     };
+    let before_s = state.elapsed_s;
     let levels = levels(n, settings);
-    for (level, &(controls, sections)) in levels.iter().enumerate() {
+    while let Some(&(controls, sections)) = levels.get(state.level) {
+        let level = state.level;
         let places = thinned_places(n, sections, cuts.closed);
         let way = Parametrisation::control_points(controls).with_overshoot(settings.overshoot);
         let line = problem(search, thinned(cuts, &places), way.clone())?;
-        let start: Vec<f64> = places.iter().map(|&i| sums[i]).collect();
-        let strides = strides(&settings.strides, controls);
-        let windows = settings.windows(cuts.closed, level, strides);
-        let mut swarm = WindowSwarm::new(&line.problem, &line.candidate(&start)?, windows)?;
+        if state.swarm.is_none() {
+            let start: Vec<f64> = places.iter().map(|&i| state.sums[i]).collect();
+            let strides = strides(&settings.strides, controls);
+            let windows = settings.windows(cuts.closed, level, strides);
+            let swarm = WindowSwarm::new(&line.problem, &line.candidate(&start)?, windows)?;
+            state.swarm = Some(Box::new(swarm));
+            (state.before, state.rounds) = (f64::INFINITY, 0);
+        }
         let mut evaluator = open_line_evaluator(&line, search.backend, search.adapter)?;
         let last = level + 1 == levels.len();
         let least_gain = settings.least_gain * if last { 0.2 } else { 1.0 };
-        let (mut before, mut rounds) = (f64::INFINITY, 0);
         let mut stopped = false;
-        while !swarm.done() && !stopped {
+        let mut settled = false;
+        while let Some(swarm) = state.swarm.as_mut().filter(|s| !s.done())
+            && !stopped
+            && !settled
+        {
             let evaluation = evaluator.evaluate(&swarm.ask())?;
             swarm.tell(&evaluation);
+            add_failures(&mut state.found.failures, &evaluation.failure_counts());
             let best = swarm.best_candidate().1;
             let progress = LineProgress {
                 level,
                 levels: levels.len(),
-                evaluations: found.evaluations + swarm.evaluations(),
+                evaluations: state.found.evaluations + swarm.evaluations(),
                 best,
             };
-            stopped = observe(&progress).is_break();
-            if swarm.rounds() > rounds {
-                rounds = swarm.rounds();
-                if before - best < least_gain * best.abs() {
-                    break;
-                }
-                before = best;
+            if swarm.rounds() > state.rounds {
+                state.rounds = swarm.rounds();
+                settled = state.before - best < least_gain * best.abs();
+                state.before = best;
+            }
+            state.elapsed_s = before_s + clock.elapsed().as_secs_f64();
+            // A settled level is left before anyone can break off: its swarm would go on if it were taken up again.
+            if !settled {
+                stopped = observe(&progress, &state)?.is_break();
             }
         }
+        let Some(swarm) = state.swarm.take() else { break };
+        let found = &mut state.found;
+        found.device_faults.extend_from_slice(evaluator.device_faults());
         found.evaluations += swarm.evaluations();
         let whole = problem(search, cuts.clone(), way)?;
         let candidate = swarm.best_candidate().0;
@@ -235,7 +299,7 @@ pub fn search_line(
                     .map(|(weight, source)| weight * candidate[source as usize])
                     .sum::<f64>()
         };
-        sums = whole.plan().rows.iter().map(row).collect();
+        state.sums = whole.plan().rows.iter().map(row).collect();
         found.alpha = whole.alpha(&candidate);
         found.cost = cost(&judge, &found.alpha)?;
         found.history.push(LevelRow {
@@ -243,13 +307,14 @@ pub fn search_line(
             sections,
             evaluations: found.evaluations,
             best: found.cost,
-            elapsed_s: clock.elapsed().as_secs_f64(),
+            elapsed_s: before_s + clock.elapsed().as_secs_f64(),
         });
         if stopped {
             break;
         }
+        state.level += 1;
     }
-    Ok(found)
+    Ok(state.found)
 }
 
 fn problem(search: &LineSearch, cuts: CrossSections, way: Parametrisation) -> Result<LineProblem> {

@@ -5,10 +5,11 @@ use crate::error::{Error, Result};
 use crate::evaluate::BackendChoice;
 use crate::evaluate::line::LineObjective;
 use crate::study::identify::parse_backend;
+use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
 /// Settings of a racing-line study.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RacelineSettings {
     /// A bundled circuit, a shape or a file: see [`crate::track::Track::load`].
     pub track: String,
@@ -175,6 +176,16 @@ impl RacelineSettings {
             ),
             _ => Ok(()),
         }
+    }
+
+    /// The same with the paths of files absolute, so that they mean the same from every folder.
+    pub fn absolute(mut self) -> Self {
+        self.track = absolute(&self.track);
+        self.car = absolute(&self.car);
+        self.envelope = self
+            .envelope
+            .map(|path| std::path::absolute(&path).unwrap_or(path));
+        self
     }
 
     /// The study file that repeats this study.

@@ -39,7 +39,8 @@ impl Inputs {
         Ok(())
     }
 
-    fn key(&self) -> String {
+    /// The number, as text.
+    pub fn key(&self) -> String {
         format!("{:016x}", self.0.finish())
     }
 }

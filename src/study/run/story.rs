@@ -249,6 +249,7 @@ impl Summary {
             car: &self.car,
             settings: "",
             interrupted: false,
+            device_faults: &[],
         };
         write_json(&folder.join("manifest.json"), &manifest)?;
         super::page::write(folder, self)

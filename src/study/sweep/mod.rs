@@ -29,7 +29,7 @@ pub enum SweptStudy {
 /// Rows of a sweep as they are kept, one JSON object per line.
 const ROWS: &str = "rows.jsonl";
 /// The sweep that a folder holds.
-const SWEEP: &str = "sweep.toml";
+pub const SWEEP_FILE: &str = "sweep.toml";
 
 /// What an observer is told before each run.
 pub struct SweepProgress<'a> {
@@ -57,9 +57,9 @@ pub fn sweep(
     let studies = folder.join("studies");
     std::fs::create_dir_all(&studies).map_err(|e| Error::io(&studies, "create", e))?;
     let mut rows = if resume {
-        results::read_rows(&folder.join(ROWS), &folder.join(SWEEP), settings, &points)?
+        results::read_rows(&folder.join(ROWS), &folder.join(SWEEP_FILE), settings, &points)?
     } else {
-        write_whole(folder.join(SWEEP), settings.text.as_bytes())?;
+        write_whole(folder.join(SWEEP_FILE), settings.text.as_bytes())?;
         Vec::new()
     };
     let path_of = |number: usize| studies.join(format!("{number:05}.toml"));

@@ -25,10 +25,11 @@ pub fn write(
     let manifest = Manifest {
         track: Some(&setup.track_name),
         interrupted: outcome.interrupted,
+        device_faults: &outcome.device_faults,
         ..Manifest::new("raceline", settings.seed, &outcome.backend, &setup.car_name)
     };
     write_json(&folder.join("manifest.json"), &manifest)?;
-    write_whole(folder.join("study.toml"), settings.to_toml().as_bytes())?;
+    super::write_settings(folder, settings)?;
     write_whole(
         folder.join("envelope.csv"),
         setup.car.envelope.to_csv().as_bytes(),

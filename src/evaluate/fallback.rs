@@ -1,0 +1,125 @@
+//! Evaluation on a device that may fail: it is opened anew once, and then lanes on the processor go on in its place.
+
+use super::gpu::GpuContext;
+use super::{BackendChoice, BackendInfo, Evaluation, Evaluator, Problem};
+use crate::error::{Error, Result};
+
+/// An evaluator on whatever works.
+type Boxed<'a> = Box<dyn Evaluator + 'a>;
+
+/// Scores populations on a device as long as it works. One that fails is opened anew and given the same population; if that
+/// fails too, lanes on the processor take over for good. Candidates are scored within the backends' parity either way.
+pub struct FallbackEvaluator<'a> {
+    problem: &'a Problem,
+    /// Nothing only while one takes the place of another.
+    current: Option<Boxed<'a>>,
+    on_device: bool,
+    open: Box<dyn Fn() -> Result<Boxed<'a>> + 'a>,
+    lanes: Box<dyn Fn() -> Boxed<'a> + 'a>,
+    faults: Vec<String>,
+}
+
+impl<'a> FallbackEvaluator<'a> {
+    /// An evaluator that `open` opens on a device, with that of `lanes` to take over.
+    ///
+    /// # Errors
+    /// [`Error::NoDevice`] if there is no device, unless `choice` leaves it to the program and names no `adapter`; a device
+    /// that is there and fails is none.
+    pub fn new(
+        problem: &'a Problem,
+        (choice, adapter): (BackendChoice, Option<&str>),
+        open: impl Fn() -> Result<Boxed<'a>> + 'a,
+        lanes: impl Fn() -> Boxed<'a> + 'a,
+    ) -> Result<Self> {
+        let mut evaluator = Self {
+            problem,
+            current: None,
+            on_device: false,
+            open: Box::new(open),
+            lanes: Box::new(lanes),
+            faults: Vec::new(),
+        };
+        match (evaluator.open)() {
+            Ok(device) => {
+                evaluator.current = Some(device);
+                evaluator.on_device = true;
+            }
+            Err(error @ Error::NoDevice(_)) if choice == BackendChoice::Auto && adapter.is_none() => {
+                evaluator.take_over(error.to_string());
+            }
+            Err(Error::Device(message)) => evaluator.open_anew(message),
+            Err(error) => return Err(error),
+        }
+        Ok(evaluator)
+    }
+
+    fn note(&mut self, fault: String) {
+        tracing::warn!("{fault}");
+        self.faults.push(fault);
+    }
+
+    /// Opens the device anew, or takes over.
+    fn open_anew(&mut self, message: String) {
+        // The failed one closes first.
+        self.current = None;
+        GpuContext::forget();
+        match (self.open)() {
+            Ok(device) => {
+                self.note(format!("the device failed ({message}) and was opened anew"));
+                self.current = Some(device);
+                self.on_device = true;
+            }
+            Err(error) => self.take_over(format!(
+                "the device failed ({message}) and does not open again ({error})"
+            )),
+        }
+    }
+
+    fn take_over(&mut self, reason: String) {
+        self.note(format!("{reason}; the backend simd takes over"));
+        self.current = Some((self.lanes)());
+        self.on_device = false;
+    }
+
+    fn try_once(&mut self, population: &[f64]) -> Result<Evaluation> {
+        match &mut self.current {
+            Some(current) => current.evaluate(population),
+            None => Err(Error::Device("there is no device".to_owned())),
+        }
+    }
+}
+
+impl Evaluator for FallbackEvaluator<'_> {
+    fn problem(&self) -> &Problem {
+        self.problem
+    }
+
+    fn backend(&self) -> BackendInfo {
+        match &self.current {
+            Some(current) => current.backend(),
+            None => (self.lanes)().backend(),
+        }
+    }
+
+    fn device_faults(&self) -> &[String] {
+        &self.faults
+    }
+
+    fn evaluate(&mut self, population: &[f64]) -> Result<Evaluation> {
+        let first = match self.try_once(population) {
+            Err(Error::Device(message)) if self.on_device => message,
+            outcome => return outcome,
+        };
+        self.open_anew(first);
+        match self.try_once(population) {
+            Err(Error::Device(message)) if self.on_device => {
+                // Of the two, the failed device goes before its successor works.
+                self.current = None;
+                GpuContext::forget();
+                self.take_over(format!("the device failed again ({message})"));
+                self.try_once(population)
+            }
+            outcome => outcome,
+        }
+    }
+}

@@ -1,0 +1,146 @@
+//! Keeps a study's state in its run folder while it works, so that a run that is broken off loses seconds at most.
+
+use super::run_folder::STATE;
+use crate::error::{Error, Result};
+use crate::evaluate::BackendInfo;
+use crate::swarm::checkpoint::{self, Checkpoint};
+use serde::{Deserialize, Serialize};
+use std::fmt;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+/// How long a study works between two saves of its state.
+const INTERVAL: Duration = Duration::from_secs(5);
+
+/// Saves states at an interval.
+#[derive(Debug)]
+pub struct Keeper {
+    path: Option<PathBuf>,
+    interval: Duration,
+    last: Instant,
+    may_move: bool,
+}
+
+impl Keeper {
+    /// Saves into a run folder, every five seconds.
+    pub fn new(folder: &Path) -> Self {
+        Self {
+            path: Some(folder.join(STATE)),
+            interval: INTERVAL,
+            last: Instant::now(),
+            may_move: false,
+        }
+    }
+
+    /// Saves nothing.
+    pub fn idle() -> Self {
+        Self {
+            path: None,
+            interval: INTERVAL,
+            last: Instant::now(),
+            may_move: false,
+        }
+    }
+
+    /// Saves this often.
+    pub fn every(self, interval: Duration) -> Self {
+        Self { interval, ..self }
+    }
+
+    /// Whether it is time to save.
+    pub fn due(&self) -> bool {
+        self.path.is_some() && self.last.elapsed() >= self.interval
+    }
+
+    /// Saves a state.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if it cannot be written; the state that was saved before is still there then.
+    pub fn keep<T: Checkpoint>(&mut self, state: &T) -> Result<()> {
+        self.last = Instant::now();
+        match &self.path {
+            Some(path) => checkpoint::save(path, state),
+            None => Ok(()),
+        }
+    }
+
+    /// As [`Keeper::keep`] for saves between: one that fails is told, and the study goes on.
+    pub fn keep_or_warn<T: Checkpoint>(&mut self, state: &T) {
+        if let Err(error) = self.keep(state) {
+            tracing::warn!("the state of the study was not saved: {error}");
+        }
+    }
+
+    /// A state may go on with another backend than it began on: its end is another then, which is said.
+    pub fn may_move(self) -> Self {
+        Self {
+            may_move: true,
+            ..self
+        }
+    }
+
+    /// Whether a state of origin `began` can be gone on with by `now`.
+    ///
+    /// # Errors
+    /// [`Error::Input`] naming what is not the same.
+    pub fn check(&self, began: &Origin, now: &Origin) -> Result<()> {
+        let file = self.path.clone().unwrap_or_else(|| STATE.into());
+        if began.inputs != now.inputs {
+            let expected = "the files that the study reads as they were when the run began";
+            return Err(Error::input(file, "inputs of the study", "others", expected));
+        }
+        if began != now && self.may_move {
+            tracing::warn!(
+                "the run began on {began} and goes on on {now}: its end will differ in the last digits"
+            );
+        } else if began != now {
+            let expected = format!("{began}, where the run began; --backend NAME moves it");
+            return Err(Error::input(file, "backend", now.to_string(), expected));
+        }
+        Ok(())
+    }
+
+    /// Takes the saved state away, when nothing is left to go on with.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if it stays.
+    pub fn done(self) -> Result<()> {
+        match &self.path {
+            Some(path) if path.exists() => {
+                std::fs::remove_file(path).map_err(|e| Error::io(path, "remove", e))
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+/// What a state was reached with. It can be gone on with by the same only, or the end would be another.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Origin {
+    /// A sum over what the study has read.
+    pub inputs: String,
+    /// `cpu`, `simd` or `gpu`.
+    pub backend: String,
+    /// The instruction set, or the adapter's name.
+    pub device: String,
+    /// The adapter's driver.
+    pub driver: String,
+}
+
+impl Origin {
+    /// From what was read and what evaluates.
+    pub fn new(inputs: String, backend: &BackendInfo) -> Self {
+        Self {
+            inputs,
+            backend: backend.backend.to_owned(),
+            device: backend.device.clone(),
+            driver: backend.driver.clone(),
+        }
+    }
+}
+
+impl fmt::Display for Origin {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} ({})", self.backend, self.device)
+    }
+}

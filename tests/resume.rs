@@ -1,0 +1,397 @@
+//! Runs that are broken off and gone on with end as if nothing had happened, to the last bit.
+
+use lapswarm::Error;
+use lapswarm::evaluate::BackendChoice;
+use lapswarm::evaluate::line::LineObjective;
+use lapswarm::study::identify::{
+    self, IdentifySettings, ObjectiveChoice, SearchState, Setup, search, search_from,
+};
+use lapswarm::study::keeper::Keeper;
+use lapswarm::study::raceline::{self, LinesState, RacelineSettings, find_lines, find_lines_from};
+use lapswarm::study::run_folder::STATE;
+use lapswarm::swarm::checkpoint;
+use serde_json::Value;
+use std::ops::ControlFlow;
+use std::path::Path;
+use std::process::{Child, Command, Output, Stdio};
+use std::time::Duration;
+
+/// A short piece of the bundled lap, and short searches.
+fn small(objectives: &[ObjectiveChoice]) -> IdentifySettings {
+    IdentifySettings {
+        section: Some("Abbey".to_owned()),
+        objectives: objectives.to_vec(),
+        population: Some(16),
+        iterations: Some(30),
+        backend: BackendChoice::Simd,
+        ..IdentifySettings::default()
+    }
+}
+
+/// All of an outcome but its times.
+fn told(settings: &IdentifySettings, setup: &Setup, outcome: &identify::Outcome) -> String {
+    let history: Vec<_> = outcome
+        .history
+        .iter()
+        .map(|r| (r.iteration, r.evaluations, r.best.clone(), r.median, r.failed))
+        .collect();
+    let summary = identify::summarise(settings, setup, outcome);
+    let summary = timeless(serde_json::to_value(&summary).unwrap());
+    format!(
+        "{:?} {:?} {:?} {history:?} {summary}",
+        outcome.candidate, outcome.swarm_candidate, outcome.front
+    )
+}
+
+/// A summary without its times and rates.
+fn timeless(mut summary: Value) -> Value {
+    let times = [
+        "elapsed_s",
+        "swarm_elapsed_s",
+        "search_elapsed_s",
+        "exact_elapsed_s",
+        "evaluations_per_s",
+        "particle_steps_per_s",
+    ];
+    for key in times {
+        summary.as_object_mut().unwrap().remove(key);
+    }
+    summary
+}
+
+/// Breaks off at these observations, one after the other, and goes on each time.
+fn identify_in_pieces(settings: &IdentifySettings, setup: &Setup, breaks: &[usize]) -> identify::Outcome {
+    let folder = tempfile::tempdir().unwrap();
+    let mut seen = 0;
+    let mut state: Option<SearchState> = None;
+    for at in breaks.iter().copied().chain([usize::MAX]) {
+        let mut keeper = Keeper::new(folder.path()).every(Duration::ZERO);
+        let outcome = search_from(settings, setup, state.take(), &mut keeper, |_| {
+            seen += 1;
+            if seen == at {
+                ControlFlow::Break(())
+            } else {
+                ControlFlow::Continue(())
+            }
+        })
+        .unwrap();
+        assert_eq!(outcome.interrupted, at != usize::MAX);
+        if !outcome.interrupted {
+            return outcome;
+        }
+        state = Some(checkpoint::load(&folder.path().join(STATE)).unwrap());
+    }
+    unreachable!("the last piece is not broken off")
+}
+
+#[test]
+fn an_identification_goes_on_bit_for_bit() {
+    let settings = small(&[ObjectiveChoice::All]);
+    let setup = identify::set_up(&settings).unwrap();
+    let mut observations = 0;
+    let whole = search(&settings, &setup, |_| {
+        observations += 1;
+        ControlFlow::Continue(())
+    })
+    .unwrap();
+    let wanted = told(&settings, &setup, &whole);
+    // 50 iterations explore, 30 gather, one observation is of the polish.
+    assert_eq!(observations, 81);
+    for breaks in [
+        &[1][..],
+        &[17],
+        &[49],
+        &[50],
+        &[51],
+        &[66],
+        &[80],
+        &[3, 4, 50, 51, 79],
+    ] {
+        let outcome = identify_in_pieces(&settings, &setup, breaks);
+        assert_eq!(
+            told(&settings, &setup, &outcome),
+            wanted,
+            "broken off at {breaks:?}"
+        );
+    }
+}
+
+#[test]
+fn a_front_goes_on_bit_for_bit() {
+    let settings = small(&[ObjectiveChoice::Channel(0), ObjectiveChoice::Channel(3)]);
+    let setup = identify::set_up(&settings).unwrap();
+    let whole = search(&settings, &setup, |_| ControlFlow::Continue(())).unwrap();
+    assert!(!whole.failures.is_empty(), "some of these particles spin");
+    let wanted = told(&settings, &setup, &whole);
+    for breaks in [&[1][..], &[13], &[29], &[30], &[2, 7, 11]] {
+        let outcome = identify_in_pieces(&settings, &setup, breaks);
+        assert_eq!(
+            told(&settings, &setup, &outcome),
+            wanted,
+            "broken off at {breaks:?}"
+        );
+    }
+}
+
+fn lines() -> RacelineSettings {
+    RacelineSettings {
+        sections: 60,
+        population: 16,
+        iterations: 12,
+        archive: 12,
+        objectives: vec![LineObjective::Length, LineObjective::LapTime],
+        backend: BackendChoice::Simd,
+        ..RacelineSettings::default()
+    }
+}
+
+fn lines_told(settings: &RacelineSettings, setup: &raceline::Setup, outcome: &raceline::Outcome) -> String {
+    let summary = raceline::summarise(settings, setup, outcome);
+    let best: Vec<_> = outcome.objectives.iter().map(|o| &o.best.alpha).collect();
+    format!(
+        "{best:?} {:?} {:?} {}",
+        outcome
+            .front
+            .as_ref()
+            .map(|f| (&f.alpha, &f.objectives, f.evaluations)),
+        outcome.history,
+        timeless(serde_json::to_value(&summary).unwrap())
+    )
+}
+
+#[test]
+fn lines_go_on_bit_for_bit_from_every_stage() {
+    let settings = lines();
+    let setup = raceline::set_up(&settings).unwrap();
+    let mut stages: Vec<String> = Vec::new();
+    let whole = find_lines(&settings, &setup, |p| {
+        stages.push(p.stage.clone());
+        ControlFlow::Continue(())
+    })
+    .unwrap();
+    let wanted = lines_told(&settings, &setup, &whole);
+    let all = stages.len();
+    let first = |stage: &str| 1 + stages.iter().position(|s| s == stage).unwrap();
+    let last = first("front") - 1;
+    for breaks in [
+        vec![1],
+        vec![first("fastest") - 1],
+        vec![first("fastest")],
+        vec![(first("fastest") + last) / 2],
+        vec![last],
+        vec![first("front") + 4],
+        vec![all],
+        vec![7, first("fastest") + 9, last - 3, all - 2],
+    ] {
+        let folder = tempfile::tempdir().unwrap();
+        let (mut seen, mut state): (usize, Option<LinesState>) = (0, None);
+        for at in breaks.iter().copied().chain([usize::MAX]) {
+            let mut keeper = Keeper::new(folder.path());
+            let outcome = find_lines_from(&settings, &setup, state.take(), &mut keeper, |_| {
+                seen += 1;
+                if seen == at {
+                    ControlFlow::Break(())
+                } else {
+                    ControlFlow::Continue(())
+                }
+            })
+            .unwrap();
+            assert_eq!(outcome.interrupted, at != usize::MAX, "at {at} of {all}");
+            if outcome.interrupted {
+                state = Some(checkpoint::load(&folder.path().join(STATE)).unwrap());
+            } else {
+                assert_eq!(seen, all, "nothing is done twice");
+                assert_eq!(
+                    lines_told(&settings, &setup, &outcome),
+                    wanted,
+                    "broken off at {breaks:?}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn a_state_of_other_inputs_is_refused() {
+    let settings = small(&[ObjectiveChoice::All]);
+    let setup = identify::set_up(&settings).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let stop = |_: &identify::Report<'_>| ControlFlow::Break(());
+    search_from(&settings, &setup, None, &mut Keeper::new(folder.path()), stop).unwrap();
+    let path = folder.path().join(STATE);
+    let state = || checkpoint::load::<SearchState>(&path).unwrap();
+    let other = IdentifySettings {
+        section: Some("Copse".to_owned()),
+        ..settings.clone()
+    };
+    let other = identify::set_up(&other).unwrap();
+    let mut keeper = Keeper::new(folder.path());
+    let refused = search_from(&settings, &other, Some(state()), &mut keeper, stop)
+        .err()
+        .unwrap();
+    assert!(refused.to_string().contains("inputs of the study"), "{refused}");
+    let on_cpu = IdentifySettings {
+        backend: BackendChoice::Cpu,
+        ..settings
+    };
+    let refused = search_from(&on_cpu, &setup, Some(state()), &mut keeper, stop)
+        .err()
+        .unwrap();
+    assert_eq!(refused.exit_code(), 2);
+    assert!(refused.to_string().contains("where the run began"), "{refused}");
+    // A study of another kind.
+    let wrong = checkpoint::load::<LinesState>(&path).err().unwrap();
+    assert!(matches!(wrong, Error::Input { .. }), "{wrong}");
+}
+
+const STUDY: &str = "section = \"Abbey\"\nbackend = \"simd\"\n[swarm]\npopulation = 24\niterations = 120\n";
+
+fn start(folder: &Path, arguments: &[&str]) -> Child {
+    Command::new(env!("CARGO_BIN_EXE_lapswarm"))
+        .args(arguments)
+        .args(["--json", "--quiet", "--save-every-s", "0"])
+        .current_dir(folder)
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the program starts")
+}
+
+fn finish(child: Child) -> Output {
+    child.wait_with_output().expect("the program ends")
+}
+
+fn summary(output: &Output) -> Value {
+    let text = String::from_utf8_lossy(&output.stdout);
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    timeless(serde_json::from_str(&text).expect("a summary"))
+}
+
+/// Waits until a run has saved a state, and a number of milliseconds more.
+fn let_work(folder: &Path, ms: u64) {
+    for _ in 0..6000 {
+        if folder.join(STATE).is_file() {
+            break;
+        }
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    std::thread::sleep(Duration::from_millis(ms));
+}
+
+/// No file of a folder is part of one: JSON parses, tables end with a line, the state loads.
+fn nothing_half_written(folder: &Path) {
+    for entry in folder.read_dir().expect("a folder").flatten() {
+        let path = entry.path();
+        let bytes = std::fs::read(&path).expect("a file");
+        match path.extension().and_then(|e| e.to_str()) {
+            Some("json") => drop(serde_json::from_slice::<Value>(&bytes).expect("whole JSON")),
+            Some("csv") => assert_eq!(bytes.last(), Some(&b'\n'), "{}", path.display()),
+            Some("svg") => assert!(String::from_utf8_lossy(&bytes).trim_end().ends_with("</svg>")),
+            Some("lapswarm") => drop(checkpoint::load::<SearchState>(&path).expect("a whole state")),
+            _ => {}
+        }
+    }
+}
+
+#[test]
+fn a_killed_run_ends_as_one_that_was_left_alone() {
+    let root = tempfile::tempdir().expect("a temporary folder");
+    std::fs::write(root.path().join("study.toml"), STUDY).expect("a study");
+    let whole = finish(start(root.path(), &["identify", "study.toml", "--out", "whole"]));
+    let wanted = summary(&whole);
+    // Wherever these fall: in a swarm, in the polish, between the files that a run leaves, or after it.
+    for (k, ms) in [0u64, 23, 61, 140, 310, 620].into_iter().enumerate() {
+        let out = format!("killed-{k}");
+        let folder = root.path().join(&out);
+        let mut child = start(root.path(), &["identify", "study.toml", "--out", &out]);
+        let_work(&folder, ms);
+        child.kill().expect("a signal");
+        finish(child);
+        nothing_half_written(&folder);
+        let resumed = finish(start(root.path(), &["identify", "--resume", "--out", &out]));
+        if folder.join("manifest.json").is_file() && resumed.status.code() == Some(2) {
+            // It had finished before it was killed.
+            let said = String::from_utf8_lossy(&resumed.stderr).into_owned();
+            assert!(said.contains("finished"), "{said}");
+            continue;
+        }
+        assert_eq!(summary(&resumed), wanted, "killed after {ms} ms");
+        for file in ["car.toml", "parameters.csv", "traces.csv"] {
+            let read = |run: &str| std::fs::read(root.path().join(run).join(file)).expect("a file");
+            assert!(read(&out) == read("whole"), "{file} after {ms} ms");
+        }
+        assert!(!folder.join(STATE).exists());
+        let left = folder.read_dir().expect("a folder").flatten();
+        let hidden: Vec<_> = left
+            .map(|e| e.file_name())
+            .filter(|n| n.to_string_lossy().starts_with('.'))
+            .collect();
+        assert!(hidden.is_empty(), "{hidden:?}");
+    }
+}
+
+#[test]
+fn an_interrupted_run_says_so_and_what_is_not_its_state_is_refused() {
+    let root = tempfile::tempdir().expect("a temporary folder");
+    std::fs::write(root.path().join("study.toml"), STUDY.replace("120", "100000")).expect("a study");
+    let folder = root.path().join("run");
+    let child = start(root.path(), &["identify", "study.toml", "--out", "run"]);
+    let_work(&folder, 200);
+    // While it works, nobody else gets its folder.
+    for arguments in [
+        &["identify", "study.toml", "--out", "run"][..],
+        &["identify", "--resume", "--out", "run"],
+    ] {
+        let second = finish(start(root.path(), arguments));
+        assert_eq!(second.status.code(), Some(2), "{arguments:?}");
+    }
+    let told = Command::new("kill")
+        .args(["-TERM", &child.id().to_string()])
+        .status();
+    assert!(told.expect("kill").success());
+    let ended = finish(child);
+    assert_eq!(
+        ended.status.code(),
+        Some(130),
+        "{}",
+        String::from_utf8_lossy(&ended.stderr)
+    );
+    let state = folder.join(STATE);
+    let kept = std::fs::read(&state).expect("a state");
+    let refused = |arguments: &[&str], wanted: &str| {
+        let output = finish(start(
+            root.path(),
+            &[&["identify", "--resume", "--out", "run"], arguments].concat(),
+        ));
+        let said: String = String::from_utf8_lossy(&output.stderr).replace(['\n', '│', ' '], "");
+        assert_eq!(output.status.code(), Some(2), "{said}");
+        assert!(
+            said.contains(&wanted.replace(' ', "")),
+            "{said} should say {wanted}"
+        );
+    };
+    refused(&["--seed", "2"], "other settings");
+    refused(&["--population", "25"], "other settings");
+    let mut bytes = kept.clone();
+    bytes.truncate(kept.len() / 2);
+    std::fs::write(&state, &bytes).expect("a file");
+    refused(&[], "a damaged one");
+    let mut bytes = kept.clone();
+    bytes[kept.len() / 2] ^= 4;
+    std::fs::write(&state, &bytes).expect("a file");
+    refused(&[], "a damaged one");
+    let mut bytes = kept.clone();
+    bytes[8] = 77;
+    std::fs::write(&state, &bytes).expect("a file");
+    refused(&[], "version of the checkpoint");
+    std::fs::write(&state, "something else").expect("a file");
+    refused(&[], "a checkpoint of lapswarm");
+    let output = finish(start(root.path(), &["raceline", "--resume", "--out", "run"]));
+    assert_eq!(output.status.code(), Some(2));
+    let output = finish(start(root.path(), &["identify", "--resume", "--out", "nowhere"]));
+    assert_eq!(output.status.code(), Some(2));
+}
