@@ -6,6 +6,7 @@
 //! whether that is within a tolerance derived from the roundings of the kernel.
 
 pub mod elementary;
+mod energy;
 mod laps;
 mod lines;
 pub mod made_up;
@@ -167,11 +168,13 @@ pub fn compare(subjects: &[Subject], mut observe: impl FnMut(&Agreement)) -> Res
     };
     let lines = lines::Cases::new()?;
     let laps = laps::Cases::new()?;
+    let energies = energy::Cases::new()?;
     for subject in subjects {
         take(elementary::compare(subject)?);
         take(step::compare(subject)?);
         take(laps.compare(subject)?);
         take(lines.compare(subject)?);
+        take(energies.compare(subject)?);
     }
     Ok(all)
 }
