@@ -14,6 +14,94 @@
 //! | [`evaluate`], [`swarm`] | problems and their evaluators; optimisers |
 //! | [`study`], [`report`] | what users run, and the pictures and tables that it writes |
 //!
+//! A problem of your own, asked and told by hand: the front between being near nought and being near one.
+//!
+//! ```
+//! use lapswarm::evaluate::point::{CallCost, PointEvaluator};
+//! use lapswarm::evaluate::{Evaluator, Objective, Problem, Variable};
+//! use lapswarm::swarm::{Mopso, MopsoSettings, Optimiser, PsoSettings};
+//!
+//! let problem = Problem {
+//!     variables: vec![Variable::new("x", "m", -2.0, 3.0), Variable::new("y", "m", -2.0, 3.0)],
+//!     objectives: vec![Objective::new("to nought", "m^2"), Objective::new("to one", "m^2")],
+//! };
+//! let mut evaluator = PointEvaluator::new(problem.clone(), CallCost::Cheap, |x, f| {
+//!     f[0] = x.iter().map(|x| x * x).sum();
+//!     f[1] = x.iter().map(|x| (x - 1.0) * (x - 1.0)).sum();
+//! });
+//! let settings = MopsoSettings {
+//!     motion: PsoSettings { population: 40, iterations: 60, ..MopsoSettings::default().motion },
+//!     archive: 20,
+//!     ..MopsoSettings::default()
+//! };
+//! let mut swarm = Mopso::new(&problem, settings)?;
+//! while !swarm.done() {
+//!     let candidates = swarm.ask();
+//!     swarm.tell(&evaluator.evaluate(&candidates)?);
+//! }
+//! // On the front, the roots of the two objectives add up to the distance between their optima.
+//! for f in &swarm.front().objectives {
+//!     assert!((f[0].sqrt() + f[1].sqrt() - 2f64.sqrt()).abs() < 0.01);
+//! }
+//! # Ok::<(), lapswarm::Error>(())
+//! ```
+//!
+//! The same lines round a circle on the reference and in lanes:
+//!
+//! ```
+//! use lapswarm::evaluate::Evaluator;
+//! use lapswarm::evaluate::line::{CpuLineEvaluator, LineObjective, LineProblem, SimdLineEvaluator};
+//! use lapswarm::evaluate::simd::InstructionSet;
+//! use lapswarm::line::Parametrisation;
+//! use lapswarm::track::{Spacing, Track};
+//!
+//! let cuts = Track::load("circle:590:600")?.cross_sections(&Spacing::equal(361), true)?;
+//! let problem = LineProblem::new(cuts, Parametrisation::sections(), &[LineObjective::Length], None, 0.0)?;
+//! let lines = [vec![0.0; 361], vec![1.0; 361]].concat();
+//! let reference = CpuLineEvaluator::new(&problem).evaluate(&lines)?;
+//! let lanes = SimdLineEvaluator::new(&problem, InstructionSet::best()).evaluate(&lines)?;
+//! for (lane, exact) in lanes.objectives.iter().zip(&reference.objectives) {
+//!     assert!((lane / exact - 1.0).abs() < 1e-5);
+//! }
+//! # Ok::<(), lapswarm::Error>(())
+//! ```
+//!
+//! An objective of your own on an evaluator that exists, here length plus a charge for what a line strays from the middle:
+//!
+//! ```
+//! use lapswarm::evaluate::line::{CpuLineEvaluator, LineObjective, LineProblem};
+//! use lapswarm::evaluate::{BackendInfo, Evaluation, Evaluator, Problem};
+//! use lapswarm::line::Parametrisation;
+//! use lapswarm::track::{Spacing, Track};
+//!
+//! struct Charged<E>(E);
+//!
+//! impl<E: Evaluator> Evaluator for Charged<E> {
+//!     fn problem(&self) -> &Problem {
+//!         self.0.problem()
+//!     }
+//!     fn backend(&self) -> BackendInfo {
+//!         self.0.backend()
+//!     }
+//!     fn evaluate(&mut self, population: &[f64]) -> lapswarm::Result<Evaluation> {
+//!         let mut found = self.0.evaluate(population)?;
+//!         let width = self.problem().variables.len();
+//!         for (cost, line) in found.objectives.iter_mut().zip(population.chunks_exact(width)) {
+//!             *cost += line.iter().map(|alpha| (alpha - 0.5).abs()).sum::<f64>();
+//!         }
+//!         Ok(found)
+//!     }
+//! }
+//!
+//! let cuts = Track::load("circle:590:600")?.cross_sections(&Spacing::equal(100), true)?;
+//! let problem = LineProblem::new(cuts, Parametrisation::sections(), &[LineObjective::Length], None, 0.0)?;
+//! let mut charged = Charged(CpuLineEvaluator::new(&problem));
+//! let plain = CpuLineEvaluator::new(&problem).evaluate(&[1.0; 100])?;
+//! let more = charged.evaluate(&[1.0; 100])?;
+//! assert!((more.objectives[0] - plain.objectives[0] - 50.0).abs() < 1e-9);
+//! # Ok::<(), lapswarm::Error>(())
+//! ```
+//!
 //! Which car drove the bundled lap? A short search and no polish:
 //!
 //! ```no_run

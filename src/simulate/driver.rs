@@ -140,7 +140,10 @@ const STEER_RATE: f64 = 0.9;
 /// [`Error::Study`] if the car spins or leaves the track, saying where.
 pub fn drive(car: &Car, circuit: &Circuit, settings: &DriverSettings, interval_s: f64) -> Result<Drive> {
     let plan = SpeedPlan::new(car, circuit, settings.pace, settings.top_speed_mps);
-    drive_planned(car, circuit, plan, settings, interval_s)
+    drive_planned(car, circuit, plan, settings, interval_s).map_err(|error| match error {
+        Error::Study(what) => Error::Study(format!("{what}; try a lower pace than {}", settings.pace)),
+        other => other,
+    })
 }
 
 /// As [`drive`], at the speeds of `plan` instead of the driver's own.
@@ -307,8 +310,8 @@ fn drive_model<T: Tyre<f64>>(
         if !state.drives() || offset > left || -offset > right || time > most_time {
             let what = if state.drives() { "left the track" } else { "spun" };
             return Err(Error::Study(format!(
-                "the driver {what} at station {station:.0} m of {} ({:.1} m/s); try a lower pace than {}",
-                circuit.name, state.body.vx, settings.pace
+                "the driver {what} at station {station:.0} m of {} ({:.1} m/s)",
+                circuit.name, state.body.vx
             )));
         }
         driver.act(&state, station, offset, projection.heading_error_rad(yaw));

@@ -246,7 +246,8 @@ pub fn drive_line(
         .last()
         .map_or(String::new(), |(share, why)| format!(" (at {share:.2}: {why})"));
     Err(Error::Study(format!(
-        "the car does not get round the line with any share of the envelope's grip that was tried{last}"
+        "the car does not get round the line with any share of the envelope's grip that was tried{last}; a line with more room \
+         to the edges (found for a wider car), or through more sections, is easier to drive"
     )))
 }
 
