@@ -3,6 +3,7 @@
 pub mod envelope;
 pub mod identify;
 pub mod keeper;
+pub mod memory;
 pub mod raceline;
 pub mod run;
 pub mod run_folder;
