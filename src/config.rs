@@ -3,6 +3,8 @@
 use crate::error::{Error, Result};
 use std::cell::RefCell;
 use std::collections::BTreeSet;
+use std::fs::File;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -14,9 +16,41 @@ pub struct Document<'a> {
     root: Spanned<DeTable<'a>>,
 }
 
-/// Reads a text file; a missing or unreadable one is an [`Error::Io`].
+/// The largest file of settings, a car, a tyre or a map (bytes): far above any that a person or a logger makes.
+pub const LARGEST_TEXT: u64 = 64 << 20;
+/// The largest log (bytes): hours of all channels at a kilohertz.
+pub const LARGEST_LOG: u64 = 1 << 30;
+
+/// Reads a file of at most `most` bytes, so that none takes all memory, not even one without an end.
+///
+/// # Errors
+/// [`Error::Io`] if it is missing or cannot be read, [`Error::Input`] if it is larger.
+pub fn read_bytes(path: &Path, most: u64) -> Result<Vec<u8>> {
+    let failed = |e| Error::io(path, "read", e);
+    let too_large = |found: String| Error::input(path, "file size", found, format!("at most {most} bytes"));
+    let file = File::open(path).map_err(failed)?;
+    let told = file.metadata().map_err(failed)?.len();
+    if told > most {
+        return Err(too_large(format!("{told} bytes")));
+    }
+    let mut bytes = Vec::new();
+    // Pipes and devices do not tell their size.
+    file.take(most + 1).read_to_end(&mut bytes).map_err(failed)?;
+    if bytes.len() as u64 > most {
+        return Err(too_large("more".to_owned()));
+    }
+    Ok(bytes)
+}
+
+/// Reads a text file; a missing or unreadable one is an [`Error::Io`], one beyond [`LARGEST_TEXT`] an [`Error::Input`].
 pub fn read_text(path: &Path) -> Result<String> {
-    std::fs::read_to_string(path).map_err(|e| Error::io(path, "read", e))
+    String::from_utf8(read_bytes(path, LARGEST_TEXT)?).map_err(|e| {
+        Error::io(
+            path,
+            "read",
+            std::io::Error::new(std::io::ErrorKind::InvalidData, e),
+        )
+    })
 }
 
 fn line_of(text: &str, offset: usize) -> usize {

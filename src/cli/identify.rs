@@ -1,7 +1,7 @@
 //! `lapswarm identify`.
 
 use super::progress::SearchBar;
-use super::{Common, Resume, backend_flag, print_json, same_settings, stop_flag};
+use super::{Common, Memory, Resume, backend_flag, print_json, same_settings, stop_flag};
 use lapswarm::evaluate::replay::{BackendChoice, Norm};
 use lapswarm::study::identify::{
     Algorithm, IdentifySettings, ObjectiveChoice, SearchState, parse_algorithm, parse_norm, parse_objective,
@@ -22,6 +22,8 @@ pub struct Arguments {
     common: Common,
     #[command(flatten)]
     resume: Resume,
+    #[command(flatten)]
+    memory: Memory,
     /// The car that fixed parameters come from: a bundled name (gt) or a TOML file
     #[arg(long, value_name = "NAME|FILE")]
     car: Option<String>,
@@ -164,6 +166,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     } else {
         (None, None, arguments.settings(IdentifySettings::default())?)
     };
+    settings.size().check(arguments.memory.memory_limit_mib)?;
     let setup = set_up(&settings)?;
     // What cannot be set up leaves no folder.
     let folder = match folder {

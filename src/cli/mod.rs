@@ -23,6 +23,7 @@ use clap::{Args, CommandFactory, Parser, Subcommand};
 use lapswarm::evaluate::replay::BackendChoice;
 use lapswarm::study::identify::{FreeParameter, IdentifySettings, load_circuit, parse_backend};
 use lapswarm::study::keeper::Keeper;
+use lapswarm::study::memory::USUAL_MIB;
 use lapswarm::study::run_folder::{self, RunFolder};
 use lapswarm::swarm::checkpoint::{self, Checkpoint};
 use lapswarm::track::Circuit;
@@ -113,6 +114,14 @@ pub struct Resume {
     /// Time between saves of the run's state, s
     #[arg(long, value_name = "SECONDS", default_value_t = 5.0)]
     pub save_every_s: f64,
+}
+
+/// The flag of studies whose size is checked.
+#[derive(Args, Clone)]
+pub struct Memory {
+    /// Memory that the study may take, MiB; one that would need more is refused
+    #[arg(long, value_name = "MIB", default_value_t = USUAL_MIB, value_parser = clap::value_parser!(u64).range(1..))]
+    pub memory_limit_mib: u64,
 }
 
 impl Resume {

@@ -1,6 +1,6 @@
 //! `lapswarm raceline`.
 
-use super::{Common, Resume, backend_flag, print_json, same_settings, stop_flag};
+use super::{Common, Memory, Resume, backend_flag, print_json, same_settings, stop_flag};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use lapswarm::evaluate::BackendChoice;
 use lapswarm::evaluate::line::LineObjective;
@@ -23,6 +23,8 @@ pub struct Arguments {
     common: Common,
     #[command(flatten)]
     resume: Resume,
+    #[command(flatten)]
+    memory: Memory,
     /// The circuit: a bundled name, a shape such as circle:590:600, or a file (TOML, CSV, GPX, KML, a log with GPS)
     #[arg(long, value_name = "NAME|FILE")]
     track: Option<String>,
@@ -132,6 +134,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     } else {
         (None, None, arguments.settings(RacelineSettings::default())?)
     };
+    settings.size().check(arguments.memory.memory_limit_mib)?;
     let setup = set_up(&settings)?;
     // What cannot be set up leaves no folder.
     let folder = match folder {

@@ -6,6 +6,7 @@ pub mod envelope;
 pub mod hybrid;
 pub mod identify;
 pub mod keeper;
+pub mod memory;
 pub mod raceline;
 pub mod run;
 pub mod run_folder;

@@ -10,6 +10,7 @@ use super::recording::{Channel, Recording};
 use super::role::Role;
 use super::text::shown;
 use super::units::Unit;
+use crate::config::read_text;
 use crate::{Error, Result};
 
 /// One of the car's axles.
@@ -101,7 +102,7 @@ impl ChannelMap {
     /// [`Error::Io`], or [`Error::Input`] naming the line of an unknown key or a value out of range.
     pub fn read(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
-        let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, "read", e))?;
+        let text = read_text(path)?;
         Self::parse(&text, path)
     }
 

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::{csv_native, motec_csv, motec_ld, text};
+use crate::config::{LARGEST_LOG, read_bytes};
 use crate::{Error, Result};
 
 /// The file formats that can be read.
@@ -122,7 +123,7 @@ impl Recording {
     /// something it must not.
     pub fn read(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
-        let bytes = std::fs::read(path).map_err(|e| Error::io(path, "read", e))?;
+        let bytes = read_bytes(path, LARGEST_LOG)?;
         let mut recording = Self::parse(&bytes, path)?;
         if recording.format == Format::MotecLd {
             recording.beacons_s = motec_ld::beacons_beside(path)?;

@@ -11,6 +11,7 @@ use super::circuit::{Circuit, Section};
 use super::from_curvature::{Closure, CurvatureRow, CurvatureTable};
 use super::reference::Smoothing;
 use super::survey::{Survey, SurveyOptions};
+use crate::config::read_text;
 use crate::{Error, Result};
 
 /// A circuit embedded in the crate: name, TOML and curvature table.
@@ -131,7 +132,7 @@ impl CircuitSource {
             let survey = Survey::read(path, &SurveyOptions::default())?;
             return Ok(Self::Survey(survey, Smoothing::default()));
         }
-        let read = |p: &Path| std::fs::read_to_string(p).map_err(|e| Error::io(p, "read", e));
+        let read = read_text;
         let toml_file = path.display().to_string();
         let text = read(path)?;
         if super::load_survey::is_survey(&text) {

@@ -5,6 +5,7 @@
 //! outside the ellipse. (D. L. Brayshaw and M. F. Harrison, *A quasi steady state approach to race car lap simulation*,
 //! Proc. IMechE D 219, 2005, for the g-g-speed surface.)
 
+use crate::config::read_text;
 use crate::error::{Error, Result};
 use std::fmt::Write as _;
 use std::path::Path;
@@ -90,7 +91,7 @@ impl Envelope {
     /// [`Error::Io`] if the file cannot be read, [`Error::Input`] with line and field if it is no envelope.
     pub fn load(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
-        let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, "read", e))?;
+        let text = read_text(path)?;
         Self::from_csv(&path.display().to_string(), &text)
     }
 

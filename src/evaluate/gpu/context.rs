@@ -122,9 +122,7 @@ impl GpuContext {
         }));
         let lost = Arc::clone(&failure);
         device.set_device_lost_callback(move |reason, message| {
-            if reason != wgpu::DeviceLostReason::Destroyed {
-                keep(&lost, format!("the device was lost: {message}"));
-            }
+            keep(&lost, format!("the device was lost ({reason:?}): {message}"));
         });
         Ok(Self {
             device,

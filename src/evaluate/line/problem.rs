@@ -266,9 +266,10 @@ impl LineProblem {
                 LineObjective::LapTime => time,
             })
             .collect();
-        if row.iter().any(|x| !x.is_finite()) {
-            return self.failed_row(Failure::Standstill);
+        if row.iter().all(|x| x.is_finite() && *x < FAILED_COST) {
+            (row, None)
+        } else {
+            self.failed_row(Failure::Standstill)
         }
-        (row.into_iter().map(|x| x.min(FAILED_COST)).collect(), None)
     }
 }

@@ -273,19 +273,16 @@ impl ReplayProblem {
     }
 
     /// The objectives' row of a candidate that drove to the end, from its windows' errors; the failed row
-    /// otherwise, or if a figure is not finite.
+    /// otherwise, or if a figure is not finite or that of a failure.
     pub fn objective_row(&self, errors: Option<[f64; CHANNELS]>) -> (Vec<f64>, Option<Failure>) {
-        let costs = errors
-            .map(|e| self.channel_costs(&e))
-            .filter(|c| c.iter().all(|x| x.is_finite()));
-        match costs {
-            Some(costs) => {
-                let row = self
-                    .objectives
-                    .iter()
-                    .map(|o| o.weights.iter().zip(costs).map(|(w, c)| w * c).sum::<f64>());
-                (row.map(|x| x.min(FAILED_COST)).collect(), None)
-            }
+        let row = errors.map(|e| {
+            let costs = self.channel_costs(&e);
+            let weighted = |o: &ChannelWeights| o.weights.iter().zip(costs).map(|(w, c)| w * c).sum();
+            self.objectives.iter().map(weighted).collect::<Vec<f64>>()
+        });
+        // A car that is so far off has left the range of what cars do, whatever it was that it did.
+        match row.filter(|row| row.iter().all(|x| x.is_finite() && *x < FAILED_COST)) {
+            Some(row) => (row, None),
             None => (vec![FAILED_COST; self.objectives.len()], Some(Failure::Spun)),
         }
     }

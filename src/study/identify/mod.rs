@@ -9,10 +9,11 @@ mod search;
 mod settings;
 mod setup;
 mod state;
+mod study_file;
 
 pub use identifiability::{Identifiability, judge};
 pub use polish::{Polished, polish};
-pub use results::{Summary, summarise, write_results, write_settings};
+pub use results::{Summary, summarise, write_results};
 pub use search::{
     Front, HistoryRow, Judged, Outcome, Report, Stage, judge_candidate, search, search_from,
     total_parameter_error,
@@ -23,3 +24,4 @@ pub use settings::{
 };
 pub use setup::{Setup, cost_unit, lap_format, load_circuit, set_up};
 pub use state::SearchState;
+pub use study_file::write_settings;

@@ -1,9 +1,10 @@
 //! The interactive report of an identification.
 
-use super::results::{LABELS, Summary, parameter_rows, study_toml, traced_lap};
+use super::results::{LABELS, Summary, parameter_rows, traced_lap};
 use super::search::{Judged, Outcome};
 use super::settings::IdentifySettings;
 use super::setup::{CHANNELS, Setup};
+use super::study_file::study_toml;
 use crate::error::Result;
 use crate::evaluate::replay::{CHANNEL_NAMES, CHANNEL_UNITS};
 use crate::report::{

@@ -95,9 +95,9 @@ pub struct Outcome {
 }
 
 /// Exploring swarm of the adaptive search: many particles for a short while.
-const EXPLORE: (usize, usize) = (128, 50);
+pub(super) const EXPLORE: (usize, usize) = (128, 50);
 /// Gathering swarm of the adaptive search.
-const GATHER: (usize, usize) = (64, 1500);
+pub(super) const GATHER: (usize, usize) = (64, 1500);
 
 /// Runs the search.
 ///

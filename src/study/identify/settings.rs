@@ -1,8 +1,10 @@
 //! Settings of an identification, from a study file.
 
+use super::search::{EXPLORE, GATHER};
 use crate::config::{Document, Table, read_text};
 use crate::error::{Error, Result};
 use crate::evaluate::replay::{BackendChoice, CHANNEL_NAMES, Norm};
+use crate::study::memory::Size;
 use crate::swarm::{Mutation, Schedule};
 use crate::telemetry::{CalibrationOptions, Switch};
 use serde::{Deserialize, Serialize};
@@ -323,6 +325,21 @@ impl IdentifySettings {
             ));
         }
         Ok(s)
+    }
+
+    /// What the study's memory goes with.
+    pub fn size(&self) -> Size {
+        Size {
+            population: self.population.unwrap_or(0).max(EXPLORE.0),
+            variables: self.free.len(),
+            iterations: self.iterations.unwrap_or(GATHER.1),
+            sections: 0,
+            archive: if self.objectives.len() > 1 {
+                self.archive
+            } else {
+                0
+            },
+        }
     }
 
     /// The same with the paths of files absolute, so that they mean the same from every folder.

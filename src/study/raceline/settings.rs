@@ -5,6 +5,7 @@ use crate::error::{Error, Result};
 use crate::evaluate::BackendChoice;
 use crate::evaluate::line::LineObjective;
 use crate::study::identify::parse_backend;
+use crate::study::memory::Size;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -175,6 +176,18 @@ impl RacelineSettings {
                 "each once",
             ),
             _ => Ok(()),
+        }
+    }
+
+    /// What the study's memory goes with.
+    pub fn size(&self) -> Size {
+        Size {
+            population: self.population,
+            // The swarm's control points are fewer than the cuts; the lines of the front are whole.
+            variables: self.sections,
+            iterations: self.iterations,
+            sections: self.sections,
+            archive: self.archive,
         }
     }
 

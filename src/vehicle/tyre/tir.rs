@@ -1,6 +1,7 @@
 //! `.tir` tyre property files, the field's own format: read, changed in place, and written.
 
 use super::TyreCoefficients;
+use crate::config::{LARGEST_TEXT, read_bytes};
 use crate::error::{Error, Result};
 use std::fmt::Write as _;
 use std::path::Path;
@@ -67,7 +68,7 @@ impl TyreFile {
     /// [`Error::Io`] if it cannot be read; [`Error::Input`] naming line and key for a wrong `FITTYP`, units other
     /// than SI, a coefficient that is no number or out of its range, a repeated or a missing one.
     pub fn read(path: &Path) -> Result<Self> {
-        let bytes = std::fs::read(path).map_err(|e| Error::io(path, "read", e))?;
+        let bytes = read_bytes(path, LARGEST_TEXT)?;
         // Comments in the wild are Latin-1; the keys and figures are ASCII either way.
         Self::parse(path, &String::from_utf8_lossy(&bytes))
     }
