@@ -82,7 +82,7 @@ enum Command {
     },
     /// List the GPUs that evaluations can run on, with their limits.
     Devices(devices::Arguments),
-    /// Hold every kernel on this machine against the f64 reference.
+    /// Hold the kernels that evaluate cars, lines and energies on this machine against the f64 reference.
     Parity(parity::Arguments),
     /// Measure evaluations per second against population on every backend present, or compare optimisers.
     Bench(bench::Arguments),

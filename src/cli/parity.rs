@@ -69,14 +69,14 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             println!("no GPU: neither Vulkan, Metal nor DX12 found an adapter");
         }
         println!(
-            "{:<40}{:>10}{:>12}{:>10}{:>16}  bits as f32",
+            "{:<46}{:>10}{:>12}{:>10}{:>16}  bits as f32",
             "kernel", "figures", "relative", "ULP", "of what may be"
         );
     }
     let found = compare(&subjects, |a| {
         if !arguments.quiet {
             println!(
-                "{:<40}{:>10}{:>12.1e}{:>10.1}{:>15.1}%  {}{}",
+                "{:<46}{:>10}{:>12.1e}{:>10.1}{:>15.1}%  {}{}",
                 a.key(),
                 a.figures,
                 a.max_relative,
