@@ -137,7 +137,7 @@ fn a_front_goes_on_bit_for_bit() {
 
 fn lines() -> RacelineSettings {
     RacelineSettings {
-        sections: 40,
+        sections: 60,
         population: 16,
         iterations: 12,
         archive: 12,
