@@ -197,7 +197,7 @@ pub(crate) fn ranges_about(
 /// Reads the car and the lap; objectives are all channels together, then each alone.
 ///
 /// # Errors
-/// As [`set_up`](crate::study::identify::set_up) and [`SensitivitySettings::validate`].
+/// As [`set_up`] and [`SensitivitySettings::validate`].
 pub fn set_up_sensitivity(settings: &SensitivitySettings) -> Result<Setup> {
     let names: Vec<String> = settings.replay.free.iter().map(|f| f.name.clone()).collect();
     settings.validate()?;

@@ -104,7 +104,7 @@ pub struct Outcome {
 /// Reads the car and the lap; objectives are all channels together, then each alone.
 ///
 /// # Errors
-/// As [`set_up`](crate::study::identify::set_up) and [`SurfaceSettings::validate`].
+/// As [`set_up`] and [`SurfaceSettings::validate`].
 pub fn set_up_surface(settings: &SurfaceSettings) -> Result<Setup> {
     settings.validate()?;
     let about = ranges_about(
