@@ -27,7 +27,14 @@ const GATES: [Free; 5] = [
 ];
 
 /// Problems of both modes, strategies, and what the reference says of them.
-pub(super) struct Cases(Vec<(&'static str, HybridProblem, Vec<Vec<f64>>, Vec<EnergyLap<f64>>)>);
+pub(super) struct Cases(Vec<Case>);
+
+struct Case {
+    mode: &'static str,
+    problem: HybridProblem,
+    strategies: Vec<Vec<f64>>,
+    exact: Vec<EnergyLap<f64>>,
+}
 
 impl Cases {
     /// # Errors
@@ -84,7 +91,12 @@ impl Cases {
                 .collect();
             let slices: Vec<&[f64]> = candidates.iter().map(Vec::as_slice).collect();
             let exact = CpuHybridEvaluator::new(&problem).laps(&slices);
-            Ok((name, problem, candidates, exact))
+            Ok(Case {
+                mode: name,
+                problem,
+                strategies: candidates,
+                exact,
+            })
         });
         Ok(Self(cases.collect::<Result<_>>()?))
     }
@@ -99,8 +111,14 @@ impl Cases {
     /// [`crate::Error::Device`] if the device fails.
     pub(super) fn compare(&self, subject: &Subject) -> Result<Vec<Agreement>> {
         let mut agreements = Vec::new();
-        for (mode, problem, candidates, exact) in &self.0 {
-            let slices: Vec<&[f64]> = candidates.iter().map(Vec::as_slice).collect();
+        for Case {
+            mode,
+            problem,
+            strategies,
+            exact,
+        } in &self.0
+        {
+            let slices: Vec<&[f64]> = strategies.iter().map(Vec::as_slice).collect();
             let found = match subject {
                 Subject::Lanes(set) => SimdHybridEvaluator::new(problem, *set).laps(&slices),
                 Subject::Device(context) => {
