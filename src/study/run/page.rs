@@ -80,10 +80,12 @@ fn sentence(line: &str) -> String {
         .join(" ")
         .replace("^2", "\u{b2}");
     let told = words.strip_prefix("The car ").unwrap_or(&words);
-    match told.strip_prefix("Its limits ") {
-        Some(limits) => format!("Its limits: {limits}"),
-        None => told.to_owned(),
+    for label in ["Its limits ", "Energy "] {
+        if let Some(rest) = told.strip_prefix(label) {
+            return format!("{}: {rest}", label.trim_end());
+        }
     }
+    told.to_owned()
 }
 
 fn table(page: &mut HtmlReport, rounds: &[RoundSummary]) -> Result<()> {
