@@ -96,7 +96,7 @@ pub fn sweep(
         });
         results::write_rows(&folder.join(ROWS), &rows)?;
     }
-    let summary = Summary::new(settings, rows);
+    let summary = Summary::new(rows);
     summary.write(folder)?;
     Ok(summary)
 }

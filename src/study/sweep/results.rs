@@ -152,7 +152,7 @@ pub(super) fn read_rows(
 }
 
 impl Summary {
-    pub(super) fn new(_settings: &SweepSettings, rows: Vec<Row>) -> Self {
+    pub(super) fn new(rows: Vec<Row>) -> Self {
         Self {
             study: "sweep",
             groups: medians(&rows),
