@@ -7,6 +7,8 @@ use lapswarm::study::hybrid::{
     HybridSetup, HybridStudySettings, ReportedLap, drive, published, run_study, search_strategy, set_up,
     size, stint, summarise, write_results,
 };
+use lapswarm::study::journal::Recorder;
+use lapswarm::study::keeper::Keeper;
 use std::f64::consts::PI;
 use std::ops::ControlFlow;
 use std::sync::OnceLock;
@@ -99,7 +101,14 @@ fn on_two_straights_a_joule_is_worth_most_behind_the_slow_bend() {
         iterations: 60,
         ..settings()
     };
-    let found = search_strategy(&setup, &quick, energy_j / 1e6, |_| ControlFlow::Continue(())).unwrap();
+    let found = search_strategy(
+        &setup,
+        &quick,
+        energy_j / 1e6,
+        &mut Recorder::idle(&mut Keeper::idle()),
+        |_| ControlFlow::Continue(()),
+    )
+    .unwrap();
     let behind_slow = deployed_between(&found.lap, slow_end - 10.0, slow_end + 0.5 * straight);
     assert!(behind_slow > 0.9 * found.lap.lap.deployed, "{behind_slow} J");
     assert!(found.lap.lap.time < exact.lap.time + 0.05);
@@ -204,7 +213,14 @@ fn the_swarm_comes_within_a_twentieth_of_a_second_of_the_exact_deployment() {
     let mut before = engine.lap.time;
     for mj in [1.0, 2.1, 5.3] {
         let exact = setup.exact(1e6 * mj, None).unwrap();
-        let swarm = search_strategy(setup, &settings, mj, |_| ControlFlow::Continue(())).unwrap();
+        let swarm = search_strategy(
+            setup,
+            &settings,
+            mj,
+            &mut Recorder::idle(&mut Keeper::idle()),
+            |_| ControlFlow::Continue(()),
+        )
+        .unwrap();
         let time = swarm.lap.lap.time;
         println!(
             "{mj} MJ: swarm {time:.4} s, exact {:.4} s, bound {:?} s",

@@ -12,6 +12,7 @@ mod files;
 mod html;
 mod parameters;
 mod pareto;
+mod parquet;
 mod scaling;
 mod site_map;
 mod style;
@@ -20,6 +21,7 @@ mod table;
 mod traces;
 mod track_map;
 
+pub use self::parquet::write_parquet;
 pub use bars::{BarPanel, BarSeries, plot_bars};
 pub use convergence::{ConvergenceRun, plot_convergence};
 pub use curves::{Curve, CurvePanel, plot_curves};

@@ -6,9 +6,10 @@ use crate::line::energy::{EnergyCar, EnergyLap, EnergyPlan, GATES, Gates};
 use crate::line::{LinePlan, Parametrisation};
 use crate::track::CrossSections;
 use glam::DVec2;
+use serde::{Deserialize, Serialize};
 
 /// What of a lap can be minimised.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum HybridObjective {
     /// Its time, s.
     LapTime,

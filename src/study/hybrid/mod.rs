@@ -23,6 +23,9 @@ use crate::error::Result;
 use crate::evaluate::BackendInfo;
 use crate::line::energy::{Gates, Mode};
 use crate::optimum::Deployment;
+use crate::study::journal::Recorder;
+use crate::study::keeper::Keeper;
+use crate::study::run::Inputs;
 use std::ops::ControlFlow;
 use std::time::Instant;
 
@@ -106,9 +109,26 @@ pub struct HybridProgress {
 pub fn run_study(
     settings: &HybridStudySettings,
     setup: &HybridSetup,
+    observe: impl FnMut(&HybridProgress) -> ControlFlow<()>,
+) -> Result<Outcome> {
+    run_recorded(settings, setup, &mut Recorder::idle(&mut Keeper::idle()), observe)
+}
+
+/// As [`run_study`], with the answers to the swarms noted by `recorder`, or known to it.
+///
+/// # Errors
+/// As [`run_study`], and those of the recorder.
+pub fn run_recorded(
+    settings: &HybridStudySettings,
+    setup: &HybridSetup,
+    recorder: &mut Recorder<'_>,
     mut observe: impl FnMut(&HybridProgress) -> ControlFlow<()>,
 ) -> Result<Outcome> {
     let began = Instant::now();
+    let backend = probe(setup, settings)?;
+    let mut inputs = Inputs::new("hybrid");
+    inputs.add(setup);
+    recorder.begin(inputs.key(), &backend)?;
     let none = Gates {
         energy_mj: 0.0,
         ..Gates::OPEN
@@ -136,7 +156,7 @@ pub fn run_study(
         optimised: None,
         stint: stint_laps,
         sizing,
-        backend: probe(setup, settings)?,
+        backend,
         search_s: 0.0,
         elapsed_s: 0.0,
         interrupted: false,
@@ -170,7 +190,7 @@ pub fn run_study(
         }
         let search = Instant::now();
         let mut interrupted = outcome.interrupted;
-        let swarm = search_strategy(setup, settings, budget_j / 1e6, |p| {
+        let swarm = search_strategy(setup, settings, budget_j / 1e6, recorder, |p| {
             let told = observe(&told("swarm", p.evaluations, format!("{:.4} s", p.best[0])));
             interrupted |= told.is_break();
             told
@@ -178,7 +198,7 @@ pub fn run_study(
         outcome.evaluations += swarm.evaluations;
         let mut swarm_front = None;
         if settings.objectives.len() > 1 && !interrupted {
-            let found = search_front(setup, settings, budget_j / 1e6, |p| {
+            let found = search_front(setup, settings, budget_j / 1e6, recorder, |p| {
                 let best: Vec<String> = p.best.iter().map(|b| format!("{b:.3}")).collect();
                 let told = observe(&told("swarm front", p.evaluations, best.join(" ")));
                 interrupted |= told.is_break();
@@ -189,6 +209,9 @@ pub fn run_study(
         }
         outcome.search_s = search.elapsed().as_secs_f64();
         outcome.interrupted = interrupted;
+        if interrupted {
+            recorder.keep()?;
+        }
         outcome.optimised = Some(Optimised {
             budget_j,
             exact_lap: setup.exact_lap("exact", &exact.shares, budget_j)?,
