@@ -60,10 +60,14 @@ fn gates_open(curvature: f32, speed_squared: f32, candidate: u32) -> bool {
     return !(strategy(0u, candidate) < curvature) && !(strategy(1u, candidate) < speed_squared);
 }
 
+// Less than this stays in the store: rounding would hand it out in ever smaller shares.
+const LEAST_J: f32 = 5.0;
+
 fn store_left(state: EnergyState, candidate: u32) -> f32 {
     let of_charge = state.change - strategy(3u, candidate);
     let of_budget = strategy(4u, candidate) - state.deployed;
-    return max(min(of_charge, of_budget), 0.0);
+    let left = min(of_charge, of_budget);
+    return select(left, 0.0, left < LEAST_J);
 }
 
 fn additional(section: u32, start: f32, length: f32, here: f32, there: f32, most: f32, left: f32, candidate: u32) -> Step {

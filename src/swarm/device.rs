@@ -178,7 +178,7 @@ impl DeviceMopso {
             gather,
         };
         let swarm = Self {
-            archive: Archive::new(settings.archive, settings.truncation),
+            archive: settings.empty_archive(width)?,
             objectives: width,
             settings,
             space,
