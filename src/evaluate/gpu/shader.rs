@@ -23,6 +23,7 @@ const SWARM: &str = include_str!("../../../shaders/swarm.wgsl");
 const SWARM_GATHER: &str = include_str!("../../../shaders/swarm_gather.wgsl");
 const TEST_PROBLEMS: &str = include_str!("../../../shaders/test_problems.wgsl");
 
+const LINE_SWARM: &str = include_str!("../../../shaders/line_swarm.wgsl");
 const LINE: &str = include_str!("../../../shaders/line.wgsl");
 /// Engine, motors, store and fuel on a lap of a line.
 const ENERGY: &str = include_str!("../../../shaders/energy.wgsl");
@@ -40,6 +41,12 @@ pub fn swarm() -> String {
 /// Source of the kernel that copies a few particles' positions; entry point `gather`.
 pub fn swarm_gather() -> String {
     SWARM_GATHER.to_owned()
+}
+
+/// Source of the kernels between a swarm on the device and the line kernel; entry points `variables_of_positions` and
+/// `objectives_of_figures`.
+pub fn line_swarm() -> String {
+    LINE_SWARM.to_owned()
 }
 
 /// Source of the kernel of the test problem of that number among
