@@ -78,6 +78,7 @@ fn energy_shape(closed: bool, terms: usize, additional: bool) -> EnergyShape {
         line_variables: 12,
         additional,
         counts_charge: closed,
+        uniform_energy: (terms == 4).then_some(5 * 512 + 360),
     }
 }
 

@@ -183,6 +183,8 @@ pub struct EnergyShape {
     pub additional: bool,
     /// Whether the charge has a say in where the motor works.
     pub counts_charge: bool,
+    /// Vectors of four in the energy tables, if they are to be uniform.
+    pub uniform_energy: Option<usize>,
 }
 
 impl EnergyShape {
@@ -197,8 +199,14 @@ impl EnergyShape {
         let [flows, boosts, zones] = self.places();
         let constants = format!(
             "\n// Generated.\nconst STRATEGY: u32 = {}u;\nconst ADDITIONAL: bool = {};\nconst COUNTS_CHARGE: bool = {};\nconst FLOWS_AT: u32 = {flows}u;\n\
-             const BOOSTS_AT: u32 = {boosts}u;\nconst ZONES_AT: u32 = {zones}u;\n\n",
-            self.line_variables, self.additional, self.counts_charge,
+             const BOOSTS_AT: u32 = {boosts}u;\nconst ZONES_AT: u32 = {zones}u;\n@group(0) @binding(10) {};\n\n",
+            self.line_variables,
+            self.additional,
+            self.counts_charge,
+            match self.uniform_energy {
+                Some(vectors) => format!("var<uniform> energy: array<vec4<f32>, {vectors}>"),
+                None => "var<storage, read> energy: array<vec4<f32>>".to_owned(),
+            },
         );
         [&self.line.source(), &constants, ENERGY].concat()
     }
