@@ -50,7 +50,7 @@ pub fn worth(setup: &HybridSetup, engine: &ReportedLap, deployed: &ReportedLap) 
     let mut rows = Vec::new();
     let mut first = 0;
     while first < segments {
-        let end = first + engine.length_m[first..].partition_point_along(STRETCH_M);
+        let end = first + reaching(&engine.length_m[first..], STRETCH_M);
         shares[first..end].fill(1.0);
         let lap = problem.lap(&shares).0;
         shares[first..end].fill(0.0);
@@ -71,21 +71,14 @@ pub fn worth(setup: &HybridSetup, engine: &ReportedLap, deployed: &ReportedLap) 
     Ok(rows)
 }
 
-/// Segments one after the other.
-trait Along {
-    /// How many of them, one at least, reach this far (m).
-    fn partition_point_along(&self, reach_m: f64) -> usize;
-}
-
-impl Along for [f64] {
-    fn partition_point_along(&self, reach_m: f64) -> usize {
-        let mut along = 0.0;
-        let beyond = self.iter().position(|h| {
-            along += h;
-            along >= reach_m
-        });
-        beyond.map_or(self.len(), |i| i + 1)
-    }
+/// How many of the first segments of these lengths (m) reach that far (m); all of them if they do not.
+fn reaching(length_m: &[f64], far_m: f64) -> usize {
+    let mut along = 0.0;
+    let last = length_m.iter().position(|h| {
+        along += h;
+        along >= far_m
+    });
+    last.map_or(length_m.len(), |i| i + 1)
 }
 
 /// The correlation (Pearson's) of worth and speed, each stretch counting by its energy; nothing for fewer than three, or if
@@ -143,8 +136,8 @@ mod tests {
         assert_eq!(mean_worths(&falling), [Some(4.0 / 1.5), Some(2.0 / 1.5)]);
         assert_eq!(correlation(&falling[..2]), None);
         assert_eq!(mean_worths(&falling[..1]), [Some(3.0), None]);
-        assert_eq!([10.0, 10.0, 10.0, 1.0].partition_point_along(25.0), 3);
-        assert_eq!([30.0, 10.0].partition_point_along(25.0), 1);
-        assert_eq!([3.0, 10.0].partition_point_along(25.0), 2);
+        assert_eq!(reaching(&[10.0, 10.0, 10.0, 1.0], 25.0), 3);
+        assert_eq!(reaching(&[30.0, 10.0], 25.0), 1);
+        assert_eq!(reaching(&[3.0, 10.0], 25.0), 2);
     }
 }

@@ -308,6 +308,9 @@ impl HybridSummary {
                 d.gain_s,
                 d.binds_up_to_mj
             );
+            for p in &d.front {
+                text += &format!("{:>8.2} MJ{:>10.3} s\n", p.energy_mj, p.lap_time_s);
+            }
             if let (Some(taken), Some(left), Some(with)) = (
                 d.worth_taken_s_per_mj,
                 d.worth_left_s_per_mj,
@@ -317,9 +320,6 @@ impl HybridSummary {
                     "A megajoule by itself buys {taken:.2} s where the swarm deploys and {left:.2} s where it does not \
                      (correlation with speed {with:.2})\n"
                 );
-            }
-            for p in &d.front {
-                text += &format!("{:>8.2} MJ{:>10.3} s\n", p.energy_mj, p.lap_time_s);
             }
         }
         for (i, lap) in self.stint.iter().enumerate() {
