@@ -287,6 +287,7 @@ fn energy_lap(candidate: u32) {
         }
     }
 
+    // The twin takes over what the first drive found wherever this one comes to the same, which changes nothing but the time.
     var state = EnergyState(speed_squared, 0.0, 0.0, 0.0);
     var greatest = 0.0;
     var least = 0.0;
