@@ -11,13 +11,15 @@ mod settings;
 mod setup;
 mod stint;
 mod strategy;
+mod worth;
 
 pub use results::{HybridSummary, ScenarioFigures, summarise, write_results};
 pub use scenario::{ReportedLap, Scenario, drive, published};
 pub use settings::{FreePart, HYBRID_OBJECTIVES, HybridStudySettings};
 pub use setup::{HybridSetup, set_up};
-pub use stint::{Sizing, StintLap, size, stint};
+pub use stint::{ENGINES, Sizing, StintLap, engine_only, size, stint};
 pub use strategy::{FoundStrategy, StrategyFront, search_front, search_strategy, zone_gates, zone_starts};
+pub use worth::{Worth, correlation, mean_worths, worth};
 
 use crate::error::Result;
 use crate::evaluate::BackendInfo;
@@ -62,6 +64,8 @@ pub struct Optimised {
     pub front: Vec<FrontPoint>,
     /// What an endless store is used for (J): no greater budget binds.
     pub unbound_j: f64,
+    /// What the motor is worth along the lap of the engine alone, and how much of it the swarm uses.
+    pub worth: Vec<Worth>,
     /// The swarm's front between the study's objectives.
     pub swarm_front: Option<StrategyFront>,
 }
@@ -216,6 +220,7 @@ pub fn run_recorded(
             budget_j,
             exact_lap: setup.exact_lap("exact", &exact.shares, budget_j)?,
             exact,
+            worth: worth(setup, &outcome.engine, &swarm.lap)?,
             swarm,
             front,
             unbound_j: unbound.lap.deployed,
