@@ -290,5 +290,6 @@ pub fn write_results(
 ) -> Result<()> {
     files::write(folder, settings, setup, outcome, summary)?;
     pictures::draw(folder, setup, outcome)?;
-    page::write(folder, settings, setup, outcome, summary)
+    page::write(folder, settings, setup, outcome, summary)?;
+    files::write_manifest(folder, settings, setup, outcome)
 }

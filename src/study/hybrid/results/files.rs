@@ -4,7 +4,7 @@ use super::{HybridSummary, told_laps};
 use crate::error::Result;
 use crate::report::{Cells, Column, write_csv, write_whole};
 use crate::study::hybrid::{HybridSetup, HybridStudySettings, Outcome, ReportedLap};
-use serde::Serialize;
+use crate::study::run_folder::{Manifest, write_json};
 use std::path::Path;
 
 /// A name as a part of a file's name.
@@ -14,19 +14,19 @@ pub fn stem(name: &str) -> String {
         .collect()
 }
 
-#[derive(Serialize)]
-struct Manifest<'a> {
-    program: &'static str,
-    version: &'static str,
-    study: &'static str,
-    seed: u64,
-    backend: &'a str,
-    adapter: &'a str,
-    driver: &'a str,
-    track: &'a str,
-    car: &'a str,
-    settings: &'static str,
-    interrupted: bool,
+/// Written last: it says that the run is whole.
+pub fn write_manifest(
+    folder: &Path,
+    settings: &HybridStudySettings,
+    setup: &HybridSetup,
+    outcome: &Outcome,
+) -> Result<()> {
+    let manifest = Manifest {
+        track: Some(&setup.raceline.track_name),
+        interrupted: outcome.interrupted,
+        ..Manifest::new("hybrid", settings.seed, &outcome.backend, &setup.car.name)
+    };
+    write_json(&folder.join("manifest.json"), &manifest)
 }
 
 pub fn write(
@@ -36,26 +36,7 @@ pub fn write(
     outcome: &Outcome,
     summary: &HybridSummary,
 ) -> Result<()> {
-    let json = |name: &str, value: serde_json::Result<String>| {
-        let path = folder.join(name);
-        let text = value.map_err(|e| crate::Error::io(&path, "write", std::io::Error::other(e)))?;
-        write_whole(path, text.as_bytes())
-    };
-    json("summary.json", serde_json::to_string_pretty(summary))?;
-    let manifest = Manifest {
-        program: "lapswarm",
-        version: env!("CARGO_PKG_VERSION"),
-        study: "hybrid",
-        seed: settings.seed,
-        backend: outcome.backend.backend,
-        adapter: &outcome.backend.device,
-        driver: &outcome.backend.driver,
-        track: &setup.raceline.track_name,
-        car: &setup.car.name,
-        settings: "study.toml",
-        interrupted: outcome.interrupted,
-    };
-    json("manifest.json", serde_json::to_string_pretty(&manifest))?;
+    write_json(&folder.join("summary.json"), summary)?;
     write_whole(folder.join("study.toml"), settings.to_toml().as_bytes())?;
     setup.car.car.write(folder, "car")?;
     let (x, y): (Vec<f64>, Vec<f64>) = setup.points_m.iter().map(|p| (p.x, p.y)).unzip();

@@ -383,7 +383,8 @@ pub fn write_results(
 ) -> Result<()> {
     files::write(folder, settings, setup, outcome, summary)?;
     pictures::draw(folder, settings, setup, outcome)?;
-    page::write(folder, settings, setup, outcome, summary)
+    page::write(folder, settings, setup, outcome, summary)?;
+    files::write_manifest(folder, settings, setup, outcome)
 }
 
 /// The laps that a study tells of.

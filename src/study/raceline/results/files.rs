@@ -14,6 +14,22 @@ pub fn stem(name: &str) -> String {
         .collect()
 }
 
+/// Written last: it says that the run is whole.
+pub fn write_manifest(
+    folder: &Path,
+    settings: &RacelineSettings,
+    setup: &Setup,
+    outcome: &Outcome,
+) -> Result<()> {
+    let manifest = Manifest {
+        track: Some(&setup.track_name),
+        interrupted: outcome.interrupted,
+        device_faults: &outcome.device_faults,
+        ..Manifest::new("raceline", settings.seed, &outcome.backend, &setup.car_name)
+    };
+    write_json(&folder.join("manifest.json"), &manifest)
+}
+
 pub fn write(
     folder: &Path,
     settings: &RacelineSettings,
@@ -22,13 +38,6 @@ pub fn write(
     summary: &Summary,
 ) -> Result<()> {
     write_json(&folder.join("summary.json"), summary)?;
-    let manifest = Manifest {
-        track: Some(&setup.track_name),
-        interrupted: outcome.interrupted,
-        device_faults: &outcome.device_faults,
-        ..Manifest::new("raceline", settings.seed, &outcome.backend, &setup.car_name)
-    };
-    write_json(&folder.join("manifest.json"), &manifest)?;
     super::write_settings(folder, settings)?;
     write_whole(
         folder.join("envelope.csv"),
