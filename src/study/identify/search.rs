@@ -99,7 +99,7 @@ pub(super) const EXPLORE: (usize, usize) = (128, 50);
 /// Gathering swarm of the adaptive search.
 pub(super) const GATHER: (usize, usize) = (64, 1500);
 
-/// Swarm of a search for several costs: of 128 to 1024 particles with as many cars in all, those that came furthest
+/// Swarm of a search for several costs: of 64 to 1024 particles with as many cars in all, those that came furthest
 /// (`lapswarm bench studies`).
 pub(super) const FRONT: (usize, usize) = (512, 75);
 
