@@ -99,6 +99,10 @@ pub(super) const EXPLORE: (usize, usize) = (128, 50);
 /// Gathering swarm of the adaptive search.
 pub(super) const GATHER: (usize, usize) = (64, 1500);
 
+/// Swarm of a search for several costs: of 64 to 1024 particles with as many cars in all, those that came furthest
+/// (`lapswarm bench studies`).
+pub(super) const FRONT: (usize, usize) = (512, 75);
+
 /// Runs the search.
 ///
 /// # Errors
@@ -305,12 +309,17 @@ fn swarm_settings(settings: &IdentifySettings) -> PsoSettings {
         _ => PsoSettings::default(),
     };
     let adaptive = settings.algorithm == Algorithm::Adaptive && settings.objectives.len() == 1;
+    let usual = match settings.algorithm {
+        Algorithm::Thesis => (base.population, base.iterations),
+        _ if settings.objectives.len() > 1 => FRONT,
+        _ => (base.population, base.iterations),
+    };
     let (population, iterations) = if adaptive {
         EXPLORE
     } else {
         (
-            settings.population.unwrap_or(base.population),
-            settings.iterations.unwrap_or(base.iterations),
+            settings.population.unwrap_or(usual.0),
+            settings.iterations.unwrap_or(usual.1),
         )
     };
     PsoSettings {

@@ -1,6 +1,6 @@
 //! Settings of an identification, from a study file.
 
-use super::search::{EXPLORE, GATHER};
+use super::search::{EXPLORE, FRONT, GATHER};
 use crate::config::{Document, Table, read_text};
 use crate::error::{Error, Result};
 use crate::evaluate::replay::{BackendChoice, CHANNEL_NAMES, Norm};
@@ -330,16 +330,14 @@ impl IdentifySettings {
 
     /// What the study's memory goes with.
     pub fn size(&self) -> Size {
+        let several = self.objectives.len() > 1;
+        let population = self.population.unwrap_or(if several { FRONT.0 } else { 0 });
         Size {
-            population: self.population.unwrap_or(0).max(EXPLORE.0),
+            population: population.max(EXPLORE.0),
             variables: self.free.len(),
             iterations: self.iterations.unwrap_or(GATHER.1),
             sections: 0,
-            archive: if self.objectives.len() > 1 {
-                self.archive
-            } else {
-                0
-            },
+            archive: if several { self.archive } else { 0 },
         }
     }
 
