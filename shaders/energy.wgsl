@@ -2,7 +2,9 @@
 //
 // Follows `line.wgsl`, whose course, limits and variables it reads; the strategy's figures are the variables from row
 // STRATEGY on. The constants STRATEGY, ADDITIONAL, COUNTS_CHARGE, FLOWS_AT, BOOSTS_AT and ZONES_AT are generated: where in `energy` the
-// flows, the boosts and the zones begin, after the forces.
+// flows, the boosts and the zones begin, after the forces. So is binding 10, `energy`, an array of vectors of four: rows of engine,
+// motor, generator, drag and of their rises; of flows at four loads and of their rises; of the boost and its rise; of each section's
+// zone, position and one over its share.
 
 // Twin of `EnergyAccount` in `src/evaluate/hybrid/gpu.rs`.
 struct EnergyAccount {
@@ -22,9 +24,6 @@ struct EnergyAccount {
 }
 
 @group(0) @binding(9) var<uniform> account: EnergyAccount;
-// Rows of engine, motor, generator, drag and of their rises; of flows at four loads and of their rises; of the boost and its
-// rise; of each section's zone, position and one over its share.
-@group(0) @binding(10) var<storage, read> energy: array<vec4<f32>>;
 
 struct EnergyState {
     speed_squared: f32,
@@ -46,6 +45,17 @@ struct SegmentEnergy {
     harvested_h: f32,
 }
 
+// The gates of steering, speed squared and acceleration, the floor of the charge and the budget, read once.
+struct Gates {
+    curvature: f32,
+    speed_squared: f32,
+    ax: f32,
+    floor: f32,
+    budget: f32,
+}
+
+var<private> gates: Gates;
+
 fn strategy(figure: u32, candidate: u32) -> f32 {
     return variable(STRATEGY + figure, candidate);
 }
@@ -56,14 +66,18 @@ fn zone_share(section: u32, candidate: u32) -> f32 {
     return min(max(into, 0.0), 1.0);
 }
 
-fn gates_open(curvature: f32, speed_squared: f32, candidate: u32) -> bool {
-    return !(strategy(0u, candidate) < curvature) && !(strategy(1u, candidate) < speed_squared);
+fn gates_open(curvature: f32, speed_squared: f32) -> bool {
+    return !(gates.curvature < curvature) && !(gates.speed_squared < speed_squared);
 }
 
-fn store_left(state: EnergyState, candidate: u32) -> f32 {
-    let of_charge = state.change - strategy(3u, candidate);
-    let of_budget = strategy(4u, candidate) - state.deployed;
-    return max(min(of_charge, of_budget), 0.0);
+// Less than this stays in the store: rounding would hand it out in ever smaller shares.
+const LEAST_J: f32 = 5.0;
+
+fn store_left(state: EnergyState) -> f32 {
+    let of_charge = state.change - gates.floor;
+    let of_budget = gates.budget - state.deployed;
+    let left = min(of_charge, of_budget);
+    return select(left, 0.0, left < LEAST_J);
 }
 
 fn additional(section: u32, start: f32, length: f32, here: f32, there: f32, most: f32, left: f32, candidate: u32) -> Step {
@@ -74,7 +88,7 @@ fn additional(section: u32, start: f32, length: f32, here: f32, there: f32, most
     let row = min(u32(held), LIMIT_ROWS - 1u);
     let figures = energy[BOOSTS_AT + row];
     let greatest = figures.x + (held - f32(row)) * figures.y;
-    let may = gates_open(here, start, candidate) && strategy(2u, candidate) < engine - first.z;
+    let may = gates_open(here, start) && gates.ax < engine - first.z;
     let wanted = select(0.0, greatest * zone_share(section, candidate), may);
     let inverse = 1.0 / length;
     let boost = min(wanted, left * account.force_per_deployed * inverse);
@@ -111,7 +125,7 @@ fn provisional(
     candidate: u32,
 ) {
     let start = (*state).speed_squared;
-    let step = additional(section, start, length, here, there, most, store_left(*state, candidate), candidate);
+    let step = additional(section, start, length, here, there, most, store_left(*state), candidate);
     let joules = account.mass * length;
     let deployed = joules * step.motor * account.deploy_cost;
     (*state).speed_squared = step.end;
@@ -142,7 +156,7 @@ fn segment_energy(
     candidate: u32,
 ) -> SegmentEnergy {
     let start = (*state).speed_squared;
-    let left = store_left(*state, candidate);
+    let left = store_left(*state);
     var step: Step;
     if ADDITIONAL {
         step = additional(section, start, length, here, there, most, left, candidate);
@@ -166,7 +180,7 @@ fn segment_energy(
     if ADDITIONAL {
         motor = min(step.motor, demand);
     } else {
-        let may = gates_open(here, start, candidate) && strategy(2u, candidate) < ax;
+        let may = gates_open(here, start) && gates.ax < ax;
         let share = zone_share(section, candidate);
         let reach = left * account.force_per_deployed * inverse;
         motor = min(min(select(0.0, forces.y * share, may), demand), reach);
@@ -233,6 +247,13 @@ fn ceilings(candidate: u32) {
 }
 
 fn energy_lap(candidate: u32) {
+    gates = Gates(
+        strategy(0u, candidate),
+        strategy(1u, candidate),
+        strategy(2u, candidate),
+        strategy(3u, candidate),
+        strategy(4u, candidate),
+    );
     ceilings(candidate);
     let n = stretch.sections;
     var speed_squared = speeds_squared[place_of(0u, candidate)];
@@ -240,13 +261,12 @@ fn energy_lap(candidate: u32) {
         // From a slow section late in the lap to the start line, as if the store held enough.
         var from_late = speeds_squared[place_of(account.run_in, candidate)];
         var bend = course[place_of(account.run_in, candidate)];
-        let enough = strategy(4u, candidate);
         for (var here = account.run_in; here < n; here++) {
             let after = select(0u, here + 1u, here + 1u < n);
             let there = course[place_of(after, candidate)];
             let most = speeds_squared[place_of(after, candidate)];
             if ADDITIONAL {
-                from_late = additional(here, from_late, bend.x, bend.y, there.y, most, enough, candidate).end;
+                from_late = additional(here, from_late, bend.x, bend.y, there.y, most, gates.budget, candidate).end;
             } else {
                 from_late = engine_only(from_late, bend.x, bend.y, there.y, most);
             }
@@ -267,6 +287,7 @@ fn energy_lap(candidate: u32) {
         }
     }
 
+    // The twin takes over what the first drive found wherever this one comes to the same, which changes nothing but the time.
     var state = EnergyState(speed_squared, 0.0, 0.0, 0.0);
     var greatest = 0.0;
     var least = 0.0;

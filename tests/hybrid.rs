@@ -4,9 +4,11 @@ use glam::DVec2;
 use lapswarm::evaluate::BackendChoice;
 use lapswarm::line::energy::{Gates, Mode};
 use lapswarm::study::hybrid::{
-    HybridSetup, HybridStudySettings, ReportedLap, drive, published, run_study, search_strategy, set_up,
-    size, stint, summarise, write_results,
+    HybridSetup, HybridStudySettings, ReportedLap, correlation, drive, engine_only, mean_worths, published,
+    run_study, search_strategy, set_up, size, stint, summarise, worth, write_results,
 };
+use lapswarm::study::journal::Recorder;
+use lapswarm::study::keeper::Keeper;
 use std::f64::consts::PI;
 use std::ops::ControlFlow;
 use std::sync::OnceLock;
@@ -99,7 +101,14 @@ fn on_two_straights_a_joule_is_worth_most_behind_the_slow_bend() {
         iterations: 60,
         ..settings()
     };
-    let found = search_strategy(&setup, &quick, energy_j / 1e6, |_| ControlFlow::Continue(())).unwrap();
+    let found = search_strategy(
+        &setup,
+        &quick,
+        energy_j / 1e6,
+        &mut Recorder::idle(&mut Keeper::idle()),
+        |_| ControlFlow::Continue(()),
+    )
+    .unwrap();
     let behind_slow = deployed_between(&found.lap, slow_end - 10.0, slow_end + 0.5 * straight);
     assert!(behind_slow > 0.9 * found.lap.lap.deployed, "{behind_slow} J");
     assert!(found.lap.lap.time < exact.lap.time + 0.05);
@@ -204,7 +213,14 @@ fn the_swarm_comes_within_a_twentieth_of_a_second_of_the_exact_deployment() {
     let mut before = engine.lap.time;
     for mj in [1.0, 2.1, 5.3] {
         let exact = setup.exact(1e6 * mj, None).unwrap();
-        let swarm = search_strategy(setup, &settings, mj, |_| ControlFlow::Continue(())).unwrap();
+        let swarm = search_strategy(
+            setup,
+            &settings,
+            mj,
+            &mut Recorder::idle(&mut Keeper::idle()),
+            |_| ControlFlow::Continue(()),
+        )
+        .unwrap();
         let time = swarm.lap.lap.time;
         println!(
             "{mj} MJ: swarm {time:.4} s, exact {:.4} s, bound {:?} s",
@@ -223,6 +239,19 @@ fn the_swarm_comes_within_a_twentieth_of_a_second_of_the_exact_deployment() {
         assert!(exact.lap.deployed <= 1e6 * mj + 1.0 && swarm.lap.lap.deployed <= 1e6 * mj + 1.0);
         assert!(exact.lap.time < before);
         before = exact.lap.time;
+        // Where a joule buys more by itself it is taken first.
+        let rows = worth(setup, &engine, &swarm.lap).unwrap();
+        let [taken, left] = mean_worths(&rows);
+        println!(
+            "{} stretches, correlation {:?}, {taken:?} taken, {left:?} left",
+            rows.len(),
+            correlation(&rows)
+        );
+        if mj < 3.0 {
+            assert!(taken.unwrap() > left.unwrap(), "{mj} MJ: {taken:?} and {left:?}");
+        }
+        assert!(rows.iter().all(|r| r.s_per_mj > 0.0));
+        assert!(correlation(&rows).unwrap() < 0.0);
         // Better than every strategy that was set by hand, of the same energy.
         for scenario in published() {
             let gates = Gates {
@@ -264,6 +293,18 @@ fn stints_sustain_their_charge_and_sizes_meet_their_lap() {
     assert!(sized.len() >= 4, "{rows:?}");
     for row in &sized {
         assert!((row.lap_time_s - goal).abs() < 2e-3, "{row:?}");
+    }
+    // The car itself is the one that laps like itself.
+    let (share, fuel_l) = engine_only(setup, engine.lap.time).unwrap().unwrap();
+    assert!((share - 1.0).abs() < 1e-4, "{share}");
+    assert!((fuel_l / (engine.lap.fuel / 0.748) - 1.0).abs() < 1e-3);
+    assert!(engine_only(setup, 60.0).unwrap().is_none());
+    // A faster one has a greater engine, which burns more than the hybrid.
+    for row in &sized {
+        assert!(
+            row.engine_share.unwrap() > 1.0 && row.fuel_saving_l.unwrap() > 0.0,
+            "{row:?}"
+        );
     }
     // A strong motor needs less energy: it spends it where the car is slowest.
     assert!(sized[sized.len() - 1].energy_mj < sized[0].energy_mj);
@@ -307,6 +348,7 @@ fn a_study_writes_what_scripts_read_and_repeats() {
         "traces.svg",
         "engine_sites.svg",
         "time_energy.svg",
+        "worth.svg",
         "energy_maximum_permissible.svg",
         "parallel.svg",
     ] {

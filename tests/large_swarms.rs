@@ -135,6 +135,7 @@ fn threads_change_nothing() {
             truncation: Truncation::MutualNearest,
             mutation: Mutation::None,
             archive: 30,
+            reference: None,
         },
     ];
     for variant in variants {

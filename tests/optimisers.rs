@@ -3,9 +3,12 @@
 use lapswarm::evaluate::point::{CallCost, PointEvaluator};
 use lapswarm::evaluate::{Evaluator, FAILED_COST, Objective, Problem, Variable};
 use lapswarm::swarm::comparison::{MULTI_OBJECTIVE, SINGLE_OBJECTIVE, compare, optimiser, quartiles};
-use lapswarm::swarm::metrics::non_dominated;
+use lapswarm::swarm::metrics::{hypervolume, non_dominated};
 use lapswarm::swarm::problems::TestProblem;
-use lapswarm::swarm::{CovarianceSettings, CovarianceSwarm, Front, Optimiser, Restarts, run};
+use lapswarm::swarm::{
+    CovarianceSettings, CovarianceSwarm, Front, MANY, Mopso, MopsoSettings, Optimiser, PsoSettings, Restarts,
+    run,
+};
 use std::ops::ControlFlow;
 
 fn problem(bounds: &[(f64, f64)], objectives: usize) -> Problem {
@@ -41,14 +44,25 @@ fn distances(x: &[f64], f: &mut [f64]) {
 
 /// The first `iterations` of an algorithm on a function, and what it has found then.
 fn first(
+    algorithm: (&str, usize),
+    bounds: &[(f64, f64)],
+    iterations: usize,
+    function: impl Fn(&[f64], &mut [f64]) + Sync,
+) -> Front {
+    first_of(algorithm, CallCost::Cheap, bounds, iterations, function)
+}
+
+/// The same with evaluations shared among threads or not.
+fn first_of(
     (name, objectives): (&str, usize),
+    cost: CallCost,
     bounds: &[(f64, f64)],
     iterations: usize,
     function: impl Fn(&[f64], &mut [f64]) + Sync,
 ) -> Front {
     let problem = problem(bounds, objectives);
     let mut optimiser = optimiser(name, &problem, 7).unwrap();
-    let mut evaluator = PointEvaluator::new(problem, CallCost::Cheap, function);
+    let mut evaluator = PointEvaluator::new(problem, cost, function);
     run(optimiser.as_mut(), &mut evaluator, |p| {
         if p.iteration >= iterations {
             ControlFlow::Break(())
@@ -150,27 +164,54 @@ fn evaluations_are_counted_and_within_the_budget() {
 
 #[test]
 fn threads_change_nothing() {
-    let problem = problem(&ASYMMETRIC, 3);
-    let with = |threads: usize| {
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build()
-            .unwrap();
-        pool.install(|| {
-            let mut evaluator = PointEvaluator::new(problem.clone(), CallCost::Dear, distances);
-            let mut optimiser = optimiser("default", &problem, 3).unwrap();
-            run(optimiser.as_mut(), &mut evaluator, |p| {
-                if p.iteration >= 30 {
-                    ControlFlow::Break(())
-                } else {
-                    ControlFlow::Continue(())
-                }
-            })
-            .unwrap();
-            optimiser.front()
-        })
-    };
-    assert_eq!(with(1), with(3));
+    for algorithm in everyone() {
+        let with = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new()
+                .num_threads(threads)
+                .build()
+                .unwrap();
+            pool.install(|| first_of(algorithm, CallCost::Dear, &ASYMMETRIC, 30, distances))
+        };
+        assert_eq!(with(1), with(3), "{algorithm:?}");
+    }
+}
+
+/// The archive that is measured from a fixed point: generation after generation of a swarm of few and of one of many.
+#[test]
+fn hypervolume_never_falls() {
+    for (name, population) in [("zdt4", 60), ("dtlz2", 60), ("zdt1", MANY), ("dtlz2", MANY)] {
+        let test = TestProblem::by_name(name).unwrap();
+        let reference = vec![1.1; test.problem().objectives.len()];
+        let default = MopsoSettings::default();
+        let settings = MopsoSettings {
+            motion: PsoSettings {
+                population,
+                iterations: 25,
+                ..default.motion
+            },
+            archive: 30,
+            reference: Some(reference.clone()),
+            ..default
+        };
+        let mut swarm = Mopso::new(test.problem(), settings.clone()).unwrap();
+        let mut evaluator = test.evaluator();
+        let mut last = 0.0;
+        while !swarm.done() {
+            let candidates = swarm.ask();
+            swarm.tell(&evaluator.evaluate(&candidates).unwrap());
+            let volume = hypervolume(&swarm.archive().objectives, &reference).unwrap();
+            assert!(volume >= last * (1.0 - 1e-12), "{name}: {volume} after {last}");
+            last = volume;
+        }
+        // Something was found: the fronts of ZDT4 take longer.
+        assert!(last > 0.5 || name == "zdt4", "{name}: {last}");
+        let short = MopsoSettings {
+            reference: Some(vec![1.1]),
+            ..settings
+        };
+        let refused = Mopso::new(test.problem(), short).err().map(|e| e.to_string());
+        assert!(refused.is_some_and(|m| m.contains("reference")));
+    }
 }
 
 #[test]

@@ -6,7 +6,8 @@ mod common;
 use common::{UNKNOWNS, bundled_car, linear_car, problem};
 use lapswarm::evaluate::gpu::lint;
 use lapswarm::evaluate::gpu::shader::{
-    EnergyShape, LineShape, ReplayShape, car_fragments, swarm, swarm_gather, test_problem, tyre_struct,
+    EnergyShape, LineShape, ReplayShape, car_fragments, line_swarm, swarm, swarm_gather, test_problem,
+    tyre_struct,
 };
 use lapswarm::evaluate::hybrid::EnergyAccount;
 use lapswarm::evaluate::line::{DeviceSection, LineStretch};
@@ -64,6 +65,9 @@ fn kernels() -> Vec<(&'static str, String)> {
     }
     kernels.extend(["scatter", "learn", "advance"].map(|entry| (entry, swarm())));
     kernels.push(("gather", swarm_gather()));
+    for entry in ["variables_of_positions", "objectives_of_figures"] {
+        kernels.push((entry, line_swarm()));
+    }
     kernels.extend((0..NAMES.len() as u32).map(|number| ("test_problem", test_problem(number))));
     kernels
 }
@@ -74,6 +78,7 @@ fn energy_shape(closed: bool, terms: usize, additional: bool) -> EnergyShape {
         line_variables: 12,
         additional,
         counts_charge: closed,
+        uniform_energy: (terms == 4).then_some(5 * 512 + 360),
     }
 }
 

@@ -21,6 +21,8 @@ fn files(folder: &Path) -> Vec<(String, Vec<u8>)> {
     [
         "sweep.csv",
         "medians.csv",
+        "sweep.parquet",
+        "medians.parquet",
         "rows.jsonl",
         "summary.json",
         "sweep.toml",

@@ -9,6 +9,7 @@ use lapswarm::study::transient::{
 };
 use lapswarm::vehicle::Car;
 use std::ops::ControlFlow;
+use std::time::Duration;
 
 fn stadium() -> lapswarm::study::raceline::Setup {
     set_up(&RacelineSettings {
@@ -110,9 +111,13 @@ fn a_run_goes_from_the_log_to_a_driven_lap_and_remembers_its_stages() {
     let root = tempfile::tempdir().expect("a temporary folder");
     let cache = root.path().join("cache");
     let go = |name: &str| {
-        run(&settings, &root.path().join(name), Some(&cache), |_| {
-            ControlFlow::Continue(())
-        })
+        run(
+            &settings,
+            &root.path().join(name),
+            Some(&cache),
+            Duration::from_secs(5),
+            |_| ControlFlow::Continue(()),
+        )
         .expect("it runs")
     };
     let first = go("first");

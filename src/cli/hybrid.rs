@@ -1,12 +1,13 @@
 //! `lapswarm hybrid`.
 
-use super::{Common, backend_flag, print_json, stop_flag};
+use super::{Common, Resume, backend_flag, print_json, stop_flag};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use lapswarm::evaluate::BackendChoice;
 use lapswarm::evaluate::hybrid::HybridObjective;
 use lapswarm::study::hybrid::{
-    FreePart, HYBRID_OBJECTIVES, HybridStudySettings, run_study, set_up, summarise, write_results,
+    FreePart, HYBRID_OBJECTIVES, HybridStudySettings, run_recorded, set_up, summarise, write_results,
 };
+use lapswarm::study::journal::Recorder;
 use lapswarm::study::run_folder;
 use lapswarm::{Error, Result};
 use std::ops::ControlFlow;
@@ -29,6 +30,8 @@ pub struct Arguments {
     study: Option<PathBuf>,
     #[command(flatten)]
     common: Common,
+    #[command(flatten)]
+    resume: Resume,
     /// The circuit: a bundled name, a shape such as stadium:500:100:12, or a file
     #[arg(long, value_name = "NAME|FILE")]
     track: Option<String>,
@@ -91,10 +94,11 @@ fn free_flag(name: &str) -> Result<FreePart, String> {
 }
 
 impl Arguments {
-    fn settings(&self) -> Result<HybridStudySettings> {
+    /// The settings of the study file, or of `base` where there is none, under the flags.
+    fn settings(&self, base: Option<HybridStudySettings>) -> Result<HybridStudySettings> {
         let mut s = match &self.study {
             Some(path) => HybridStudySettings::read(path)?,
-            None => HybridStudySettings::default(),
+            None => base.unwrap_or_default(),
         };
         fn set<T: Clone>(setting: &mut T, flag: &Option<T>) {
             if let Some(value) = flag {
@@ -125,15 +129,32 @@ impl Arguments {
         set_some(&mut s.adapter, &self.adapter);
         s.optimise &= !self.scenarios_only;
         s.validate()?;
-        Ok(s)
+        Ok(s.absolute())
     }
 }
 
 /// Runs the study.
 pub fn run(arguments: &Arguments) -> Result<()> {
-    let settings = arguments.settings()?;
+    let out = arguments.common.out.as_deref();
+    let moves = arguments.backend.is_some() || arguments.adapter.is_some();
+    let moved: fn(&mut HybridStudySettings, &HybridStudySettings) = |kept, asked| {
+        kept.backend = asked.backend;
+        kept.adapter.clone_from(&asked.adapter);
+    };
+    let begun = arguments.resume.begin(
+        "hybrid",
+        out,
+        |base| arguments.settings(base),
+        moves.then_some(moved),
+    )?;
+    let settings = begun.settings;
     let setup = set_up(&settings)?;
-    let folder = run_folder::create("hybrid", arguments.common.out.as_deref())?;
+    let folder = match begun.folder {
+        Some(folder) => folder,
+        None => run_folder::create("hybrid", out)?,
+    };
+    let mut keeper = arguments.resume.keeper(&folder, moves)?;
+    let mut recorder = Recorder::new(begun.journal, &mut keeper);
     let stop = stop_flag();
     let target = if arguments.common.quiet {
         ProgressDrawTarget::hidden()
@@ -144,7 +165,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     if let Ok(style) = ProgressStyle::with_template("{spinner} {prefix:12} {msg}") {
         bar.set_style(style);
     }
-    let outcome = run_study(&settings, &setup, |progress| {
+    let outcome = run_recorded(&settings, &setup, &mut recorder, |progress| {
         bar.set_prefix(progress.stage);
         bar.set_message(format!("{} laps, {}", progress.evaluations, progress.best));
         bar.tick();
@@ -157,6 +178,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     bar.finish_and_clear();
     let summary = summarise(&settings, &setup, &outcome);
     write_results(&folder, &settings, &setup, &outcome, &summary)?;
+    if !outcome.interrupted {
+        keeper.done()?;
+    }
     if !arguments.common.quiet {
         print!("{}", summary.to_text());
         println!("Results: {}", folder.display());

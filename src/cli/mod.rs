@@ -22,12 +22,15 @@ mod transient;
 use clap::{Args, CommandFactory, Parser, Subcommand};
 use lapswarm::evaluate::replay::BackendChoice;
 use lapswarm::study::identify::{FreeParameter, IdentifySettings, load_circuit, parse_backend};
+use lapswarm::study::journal::Journal;
 use lapswarm::study::keeper::Keeper;
 use lapswarm::study::memory::USUAL_MIB;
 use lapswarm::study::run_folder::{self, RunFolder};
 use lapswarm::swarm::checkpoint::{self, Checkpoint};
 use lapswarm::track::Circuit;
 use lapswarm::{Error, Result};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -149,6 +152,50 @@ impl Resume {
         let folder = run_folder::reopen(out)?;
         let state = checkpoint::load(&folder.join(run_folder::STATE))?;
         Ok((folder, state))
+    }
+}
+
+/// A study that is begun, or gone on with by its journal.
+struct Begun<S> {
+    settings: S,
+    journal: Journal,
+    /// The folder of the run that is gone on with.
+    folder: Option<RunFolder>,
+}
+
+impl Resume {
+    /// Settings from study file and flags, over those that the run in `--out` was begun with if it is gone on with. `moved`
+    /// puts the second settings' backend and adapter into the first.
+    fn begin<S: Serialize + DeserializeOwned + PartialEq>(
+        &self,
+        study: &str,
+        out: Option<&Path>,
+        settings: impl FnOnce(Option<S>) -> Result<S>,
+        moved: Option<fn(&mut S, &S)>,
+    ) -> Result<Begun<S>> {
+        if !self.resume {
+            let settings = settings(None)?;
+            let journal = Journal::new(study, &settings)?;
+            return Ok(Begun {
+                settings,
+                journal,
+                folder: None,
+            });
+        }
+        let (folder, mut journal) = self.open::<Journal>(study, out)?;
+        let mut kept: S = journal.settings(study)?;
+        let asked = settings(Some(journal.settings(study)?))?;
+        // Where candidates are evaluated may change, if that is said; what is evaluated may not.
+        if let Some(moved) = moved {
+            moved(&mut kept, &asked);
+            journal.set_settings(&kept)?;
+        }
+        same_settings(&folder, &kept, &asked)?;
+        Ok(Begun {
+            settings: asked,
+            journal,
+            folder: Some(folder),
+        })
     }
 }
 

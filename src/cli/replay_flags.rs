@@ -45,6 +45,11 @@ fn norm_flag(name: &str) -> Result<Norm, String> {
 }
 
 impl ReplayFlags {
+    /// Whether a backend or an adapter is named.
+    pub fn moves(&self) -> bool {
+        self.backend.is_some() || self.adapter.is_some()
+    }
+
     /// Overrides what a study file says.
     pub fn apply(&self, common: &Common, s: &mut IdentifySettings) {
         fn set<T: Clone>(setting: &mut T, flag: &Option<T>) {

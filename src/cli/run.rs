@@ -1,6 +1,6 @@
 //! `lapswarm run`.
 
-use super::{Common, backend_flag, print_json, progress, stop_flag};
+use super::{Common, Resume, backend_flag, print_json, progress, stop_flag};
 use lapswarm::evaluate::BackendChoice;
 use lapswarm::study::run::{RunSettings, run as run_all};
 use lapswarm::study::run_folder;
@@ -21,6 +21,8 @@ pub struct Arguments {
     study: Option<PathBuf>,
     #[command(flatten)]
     common: Common,
+    #[command(flatten)]
+    resume: Resume,
     /// The log [default: the bundled lap]
     #[arg(long, value_name = "FILE")]
     log: Option<PathBuf>,
@@ -51,10 +53,16 @@ pub struct Arguments {
 }
 
 impl Arguments {
-    fn settings(&self) -> Result<RunSettings> {
+    /// Whether the flags name a backend or an adapter.
+    fn moves(&self) -> bool {
+        self.backend.is_some() || self.adapter.is_some()
+    }
+
+    /// The settings of the study file, or of `base` where there is none, under the flags.
+    fn settings(&self, base: Option<RunSettings>) -> Result<RunSettings> {
         let mut s = match &self.study {
             Some(path) => RunSettings::read(path)?,
-            None => RunSettings::default(),
+            None => base.unwrap_or_default(),
         };
         if self.log.is_some() {
             s.identify.log.clone_from(&self.log);
@@ -87,18 +95,44 @@ impl Arguments {
                 "0 to 5 m, 1 to 20 rounds",
             ));
         }
+        s.identify = s.identify.absolute()?;
+        s.raceline = s.raceline.absolute();
         Ok(s)
     }
 }
 
 /// Runs everything.
 pub fn run(arguments: &Arguments) -> Result<()> {
-    let settings = arguments.settings()?;
-    let folder = run_folder::create("run", arguments.common.out.as_deref())?;
+    let out = arguments.common.out.as_deref();
+    let moved: fn(&mut RunSettings, &RunSettings) = |kept, asked| {
+        kept.identify.backend = asked.identify.backend;
+        kept.raceline.backend = asked.raceline.backend;
+        kept.identify.adapter.clone_from(&asked.identify.adapter);
+        kept.raceline.adapter.clone_from(&asked.raceline.adapter);
+    };
+    let begun = arguments.resume.begin(
+        "run",
+        out,
+        |base| arguments.settings(base),
+        arguments.moves().then_some(moved),
+    )?;
+    let settings = begun.settings;
+    let folder = match begun.folder {
+        Some(folder) => folder,
+        None => run_folder::create("run", out)?,
+    };
+    let mut keeper = arguments.resume.keeper(&folder, arguments.moves())?;
+    keeper.keep(&begun.journal)?;
     let stop = stop_flag();
     let bar = progress::saying(arguments.common.quiet);
-    let cache = (!arguments.no_cache).then_some(arguments.cache.as_path());
-    let summary = run_all(&settings, &folder, cache, |doing| {
+    // Without a cache to share, a run that is broken off still finds its own stages again.
+    let own = folder.join(".stages");
+    let cache = if arguments.no_cache {
+        &own
+    } else {
+        &arguments.cache
+    };
+    let summary = run_all(&settings, &folder, Some(cache), keeper.interval(), |doing| {
         bar.set_message(doing.to_owned());
         bar.tick();
         if stop.load(Ordering::Relaxed) {
@@ -108,6 +142,10 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         }
     })?;
     bar.finish_and_clear();
+    if own.exists() {
+        std::fs::remove_dir_all(&own).map_err(|e| Error::io(&own, "remove", e))?;
+    }
+    keeper.done()?;
     if !arguments.common.quiet {
         print!("{}", summary.to_text());
         println!("Results: {}", folder.display());

@@ -1,10 +1,11 @@
 //! `lapswarm sensitivity`.
 
 use super::replay_flags::ReplayFlags;
-use super::{Common, print_json, progress, stop_flag};
+use super::{Common, Resume, print_json, progress, stop_flag};
+use lapswarm::study::journal::Recorder;
 use lapswarm::study::run_folder;
 use lapswarm::study::sensitivity::{
-    SensitivitySettings, measure, set_up_sensitivity, summarise, write_results,
+    SensitivitySettings, measure_recorded, set_up_sensitivity, summarise, write_results,
 };
 use lapswarm::{Error, Result};
 use std::ops::ControlFlow;
@@ -23,6 +24,8 @@ pub struct Arguments {
     #[command(flatten)]
     common: Common,
     #[command(flatten)]
+    resume: Resume,
+    #[command(flatten)]
     replay: ReplayFlags,
     /// Parameters to move [default: the 22 unknowns of `identify`]
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
@@ -36,10 +39,11 @@ pub struct Arguments {
 }
 
 impl Arguments {
-    fn settings(&self) -> Result<SensitivitySettings> {
+    /// The settings of the study file, or of `base` where there is none, under the flags.
+    fn settings(&self, base: Option<SensitivitySettings>) -> Result<SensitivitySettings> {
         let mut s = match &self.study {
             Some(path) => SensitivitySettings::read(path)?,
-            None => SensitivitySettings::default(),
+            None => base.unwrap_or_default(),
         };
         self.replay.apply(&self.common, &mut s.replay);
         if let Some(names) = &self.parameters {
@@ -48,18 +52,36 @@ impl Arguments {
         s.share = self.share.unwrap_or(s.share);
         s.samples = self.samples.unwrap_or(s.samples);
         s.validate()?;
+        s.replay = s.replay.absolute()?;
         Ok(s)
     }
 }
 
 /// Runs the study.
 pub fn run(arguments: &Arguments) -> Result<()> {
-    let settings = arguments.settings()?;
+    let out = arguments.common.out.as_deref();
+    let moves = arguments.replay.moves();
+    let moved: fn(&mut SensitivitySettings, &SensitivitySettings) = |kept, asked| {
+        kept.replay.backend = asked.replay.backend;
+        kept.replay.adapter.clone_from(&asked.replay.adapter);
+    };
+    let begun = arguments.resume.begin(
+        "sensitivity",
+        out,
+        |base| arguments.settings(base),
+        moves.then_some(moved),
+    )?;
+    let settings = begun.settings;
     let setup = set_up_sensitivity(&settings)?;
-    let folder = run_folder::create("sensitivity", arguments.common.out.as_deref())?;
+    let folder = match begun.folder {
+        Some(folder) => folder,
+        None => run_folder::create("sensitivity", out)?,
+    };
+    let mut keeper = arguments.resume.keeper(&folder, moves)?;
+    let mut recorder = Recorder::new(begun.journal, &mut keeper);
     let stop = stop_flag();
     let bar = progress::counting(arguments.common.quiet);
-    let outcome = measure(&settings, &setup, |p| {
+    let outcome = measure_recorded(&settings, &setup, &mut recorder, |p| {
         bar.set_length(p.planned as u64);
         bar.set_position(p.evaluations as u64);
         if stop.load(Ordering::Relaxed) {
@@ -71,6 +93,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     bar.finish_and_clear();
     let summary = summarise(&settings, &setup, &outcome);
     write_results(&folder, &settings, &setup, &outcome, &summary)?;
+    if !outcome.interrupted {
+        keeper.done()?;
+    }
     if !arguments.common.quiet {
         print!("{}", summary.to_text());
         println!("Results: {}", folder.display());

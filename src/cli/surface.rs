@@ -1,9 +1,10 @@
 //! `lapswarm surface`.
 
 use super::replay_flags::ReplayFlags;
-use super::{Common, print_json, progress, stop_flag};
+use super::{Common, Resume, print_json, progress, stop_flag};
+use lapswarm::study::journal::Recorder;
 use lapswarm::study::run_folder;
-use lapswarm::study::surface::{SurfaceSettings, measure, set_up_surface, summarise, write_results};
+use lapswarm::study::surface::{SurfaceSettings, measure_recorded, set_up_surface, summarise, write_results};
 use lapswarm::{Error, Result};
 use std::ops::ControlFlow;
 use std::path::PathBuf;
@@ -20,6 +21,8 @@ pub struct Arguments {
     #[command(flatten)]
     common: Common,
     #[command(flatten)]
+    resume: Resume,
+    #[command(flatten)]
     replay: ReplayFlags,
     /// The horizontal and the vertical parameter [default: rBy1,rCy1]
     #[arg(long, value_name = "X,Y", value_delimiter = ',', num_args = 1)]
@@ -33,10 +36,11 @@ pub struct Arguments {
 }
 
 impl Arguments {
-    fn settings(&self) -> Result<SurfaceSettings> {
+    /// The settings of the study file, or of `base` where there is none, under the flags.
+    fn settings(&self, base: Option<SurfaceSettings>) -> Result<SurfaceSettings> {
         let mut s = match &self.study {
             Some(path) => SurfaceSettings::read(path)?,
-            None => SurfaceSettings::default(),
+            None => base.unwrap_or_default(),
         };
         self.replay.apply(&self.common, &mut s.replay);
         if let Some(names) = &self.parameters {
@@ -51,19 +55,37 @@ impl Arguments {
         }
         s.share = self.share.or(s.share);
         s.grid = self.grid.unwrap_or(s.grid);
+        s.replay = s.replay.absolute()?;
         Ok(s)
     }
 }
 
 /// Runs the study.
 pub fn run(arguments: &Arguments) -> Result<()> {
-    let settings = arguments.settings()?;
+    let out = arguments.common.out.as_deref();
+    let moves = arguments.replay.moves();
+    let moved: fn(&mut SurfaceSettings, &SurfaceSettings) = |kept, asked| {
+        kept.replay.backend = asked.replay.backend;
+        kept.replay.adapter.clone_from(&asked.replay.adapter);
+    };
+    let begun = arguments.resume.begin(
+        "surface",
+        out,
+        |base| arguments.settings(base),
+        moves.then_some(moved),
+    )?;
+    let settings = begun.settings;
     let setup = set_up_surface(&settings)?;
-    let folder = run_folder::create("surface", arguments.common.out.as_deref())?;
+    let folder = match begun.folder {
+        Some(folder) => folder,
+        None => run_folder::create("surface", out)?,
+    };
+    let mut keeper = arguments.resume.keeper(&folder, moves)?;
+    let mut recorder = Recorder::new(begun.journal, &mut keeper);
     let stop = stop_flag();
     let bar = progress::counting(arguments.common.quiet);
     bar.set_length((settings.grid * settings.grid) as u64);
-    let outcome = measure(&settings, &setup, |done| {
+    let outcome = measure_recorded(&settings, &setup, &mut recorder, |done| {
         bar.set_position(done as u64);
         if stop.load(Ordering::Relaxed) {
             ControlFlow::Break(())
@@ -74,6 +96,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     bar.finish_and_clear();
     let summary = summarise(&settings, &setup, &outcome);
     write_results(&folder, &settings, &setup, &outcome, &summary)?;
+    if !outcome.interrupted {
+        keeper.done()?;
+    }
     if !arguments.common.quiet {
         print!("{}", summary.to_text());
         println!("Results: {}", folder.display());

@@ -89,7 +89,7 @@ pub struct Problem {
 pub const FAILED_COST: f64 = 1e9;
 
 /// Why a candidate has no cost of its own.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Failure {
     /// Its tyre is none.
     IllFormedTyre(IllFormed),
@@ -139,7 +139,7 @@ impl fmt::Display for Failure {
 }
 
 /// The objectives of a population.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Evaluation {
     /// Row-major `n` by number of objectives; [`FAILED_COST`] where a candidate failed.
     pub objectives: Vec<f64>,

@@ -33,6 +33,9 @@ pub struct Course<R> {
     pub curvature: Vec<R>,
     /// Speed squared at each section (m^2/s^2).
     pub speed_squared: Vec<R>,
+    /// What the first of the two drives of a lap with a motor beside the engine found of each segment: speed squared at its
+    /// end (m^2/s^2), and the motor's force over the mass (m/s^2), what was wanted of it, and what the store had energy for.
+    pub first_drive: Vec<[R; 4]>,
 }
 
 impl<R> Default for Course<R> {
@@ -41,6 +44,7 @@ impl<R> Default for Course<R> {
             length: Vec::new(),
             curvature: Vec::new(),
             speed_squared: Vec::new(),
+            first_drive: Vec::new(),
         }
     }
 }

@@ -81,7 +81,7 @@ pub fn lap_profile(
     let mut course = Course {
         length: segment_m.to_vec(),
         curvature: curvature_1pm.iter().map(|k| k.abs()).collect(),
-        speed_squared: Vec::new(),
+        ..Course::default()
     };
     let start = slowest(&course.curvature);
     let time_s = lap_time::<f64>(table, closed, start, entry_mps * entry_mps, &mut course);

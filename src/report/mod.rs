@@ -13,6 +13,8 @@ mod html;
 mod parallel;
 mod parameters;
 mod pareto;
+mod parquet;
+mod quality;
 mod scaling;
 mod site_map;
 mod style;
@@ -21,6 +23,7 @@ mod table;
 mod traces;
 mod track_map;
 
+pub use self::parquet::write_parquet;
 pub use bars::{BarPanel, BarSeries, plot_bars};
 pub use convergence::{ConvergenceRun, plot_convergence};
 pub use curves::{Curve, CurvePanel, plot_curves};
@@ -29,6 +32,7 @@ pub use html::{Front, HtmlReport, LapLine, LapMap, LapPanel, LapTrace, LapView, 
 pub use parallel::plot_parallel;
 pub use parameters::{ParameterRow, plot_parameters};
 pub use pareto::{Objective, plot_pareto};
+pub use quality::{QualityPanel, QualityRun, plot_quality};
 pub use scaling::{ScalingSeries, plot_scaling};
 pub use site_map::{SiteMap, plot_site_map};
 pub use style::significant;

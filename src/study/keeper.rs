@@ -47,9 +47,22 @@ impl Keeper {
         Self { interval, ..self }
     }
 
+    /// The time between saves.
+    pub fn interval(&self) -> Duration {
+        self.interval
+    }
+
     /// Whether it is time to save.
     pub fn due(&self) -> bool {
         self.path.is_some() && self.last.elapsed() >= self.interval
+    }
+
+    /// The state that an earlier run has left, if it can be read.
+    pub fn saved<T: Checkpoint>(&self) -> Option<T> {
+        let path = self.path.as_ref().filter(|p| p.is_file())?;
+        checkpoint::load(path)
+            .inspect_err(|error| tracing::warn!("a state is not gone on with: {error}"))
+            .ok()
     }
 
     /// Saves a state.
@@ -104,7 +117,7 @@ impl Keeper {
     ///
     /// # Errors
     /// [`Error::Io`] if it stays.
-    pub fn done(self) -> Result<()> {
+    pub fn done(&self) -> Result<()> {
         match &self.path {
             Some(path) if path.exists() => {
                 std::fs::remove_file(path).map_err(|e| Error::io(path, "remove", e))

@@ -5,6 +5,7 @@ pub mod compare;
 pub mod envelope;
 pub mod hybrid;
 pub mod identify;
+pub mod journal;
 pub mod keeper;
 pub mod memory;
 pub mod raceline;

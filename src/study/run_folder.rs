@@ -1,6 +1,7 @@
 //! The folder that a run writes into: one run each, nothing overwritten, one process at a time.
 
 use crate::error::{Error, Result};
+use crate::evaluate::gpu::longest_dispatch_ms;
 use std::fs::{File, TryLockError};
 use std::io::{Read, Write};
 use std::ops::Deref;
@@ -131,6 +132,15 @@ pub fn create(study: &str, asked: Option<&Path>) -> Result<RunFolder> {
     }
 }
 
+/// Takes a folder for this process, whatever is in it.
+///
+/// # Errors
+/// [`Error::Input`] if another process writes into it; [`Error::Io`] if it cannot be created.
+pub fn take(folder: &Path) -> Result<RunFolder> {
+    std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, "create", e))?;
+    RunFolder::lock(folder)
+}
+
 /// Takes the folder of a run that was broken off, to go on with it.
 ///
 /// # Errors
@@ -210,6 +220,9 @@ pub struct Manifest<'a> {
     pub settings: &'static str,
     /// Whether the run was broken off.
     pub interrupted: bool,
+    /// The longest that a dispatch has kept the device (ms); left out where none was at work.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub longest_dispatch_ms: Option<f64>,
     /// What devices failed of and what was done about it; left out where nothing failed.
     #[serde(skip_serializing_if = "<[String]>::is_empty")]
     pub device_faults: &'a [String],
@@ -236,6 +249,7 @@ impl<'a> Manifest<'a> {
             car,
             settings: "study.toml",
             interrupted: false,
+            longest_dispatch_ms: longest_dispatch_ms().filter(|_| backend.backend == "gpu"),
             device_faults: &[],
         }
     }

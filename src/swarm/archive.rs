@@ -24,6 +24,8 @@ pub struct Archive {
     columns: Columns,
     /// The reference point of the shares.
     reference: Vec<f64>,
+    /// Whether that stays where it is.
+    fixed: bool,
 }
 
 /// Whether `a` is at least as good as `b` in every objective and better in one.
@@ -53,6 +55,20 @@ impl Archive {
             shares: Vec::new(),
             columns: Columns::default(),
             reference: Vec::new(),
+            fixed: false,
+        }
+    }
+
+    /// The same with contributions measured up to `reference`, for one to three objectives. The hypervolume up to there then
+    /// never falls while solutions violate nothing: whoever leaves contributes no more than the newcomer. The ends of the
+    /// front have no privilege, and what does not better the reference leaves first. Without it the reference moves with the
+    /// members and the ends stay.
+    pub fn measured_from(self, reference: Vec<f64>) -> Self {
+        Self {
+            truncation: Truncation::Contribution,
+            reference,
+            fixed: true,
+            ..self
         }
     }
 
@@ -117,6 +133,13 @@ impl Archive {
         if solutions.is_empty() || !self.reached(violation) {
             return;
         }
+        if self.fixed {
+            // Many at once could take more away than each brings.
+            for (position, row) in &solutions {
+                self.insert_violating(position, row, violation);
+            }
+            return;
+        }
         let positions = std::mem::take(&mut self.positions).into_iter();
         let members = positions.zip(std::mem::take(&mut self.objectives));
         let all: Vec<(Vec<f64>, Vec<f64>)> = members.chain(solutions).collect();
@@ -161,7 +184,8 @@ impl Archive {
     fn drop_least(&mut self) -> Vec<f64> {
         let mut worth = self.worth();
         // The ends of a front are what its users look for first.
-        for k in 0..self.objectives[0].len() {
+        let privileged = if self.fixed { 0 } else { self.objectives[0].len() };
+        for k in 0..privileged {
             let value = |i: usize| self.objectives[i][k];
             if let Some(end) = (0..self.len()).min_by(|&a, &b| value(a).total_cmp(&value(b))) {
                 worth[end] = f64::INFINITY;
@@ -219,12 +243,15 @@ impl Archive {
 
     /// Brings the shares up to date after `change` came or went.
     fn refresh(&mut self, change: &[f64]) {
-        let reference: Vec<f64> = (0..change.len())
-            .map(|k| {
-                let (low, high) = self.range(k);
-                high + if high > low { BEYOND * (high - low) } else { 1.0 }
-            })
-            .collect();
+        let beyond = |k: usize| {
+            let (low, high) = self.range(k);
+            high + if high > low { BEYOND * (high - low) } else { 1.0 }
+        };
+        let reference = if self.fixed {
+            self.reference.clone()
+        } else {
+            (0..change.len()).map(beyond).collect()
+        };
         let moved = reference != self.reference;
         self.reference = reference;
         for i in 0..self.len() {
@@ -324,6 +351,7 @@ mod tests {
     use super::*;
     use crate::random::Random;
     use crate::swarm::metrics::{contributions, hypervolume, non_dominated};
+    use proptest::prelude::*;
 
     const ALL: [Truncation; 3] = [
         Truncation::Crowding,
@@ -393,6 +421,41 @@ mod tests {
                 assert_eq!(archive.worth(), fresh);
             }
             assert!(hypervolume(&archive.objectives, &archive.reference).unwrap() > 0.0);
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(60))]
+        /// Whatever comes, one at a time or many at once, and wherever the reference lies.
+        #[test]
+        fn hypervolume_never_falls(
+            seed in any::<u64>(), width in 1usize..4, capacity in 1usize..20, at in 0.2..1.5f64, batch in 1usize..30,
+        ) {
+            let random = Random::new(seed);
+            let reference = vec![at; width];
+            let mut archive = Archive::new(capacity, Truncation::Crowding).measured_from(reference.clone());
+            let mut last = 0.0;
+            for round in 0..40 {
+                // Ever closer to a sphere about the origin, so that there is something to truncate.
+                let nearness = 1.0 - f64::from(round) / 60.0;
+                let point = |i: usize| -> Vec<f64> {
+                    let draw = |k: usize| random.uniform(1, round, i as u32, k as u32);
+                    let row: Vec<f64> = (0..width).map(draw).collect();
+                    let length = row.iter().map(|x| x * x).sum::<f64>().sqrt().max(1e-9);
+                    row.iter().map(|x| (1.0 - nearness) * x / length + nearness * x).collect()
+                };
+                let points: Vec<Vec<f64>> = (0..batch).map(point).collect();
+                if round % 2 == 0 {
+                    archive.insert_all(points.iter().map(|p| (p.clone(), p.clone())).collect(), 0.0);
+                } else {
+                    points.iter().for_each(|p| { archive.insert(p, p); });
+                }
+                let volume = hypervolume(&archive.objectives, &reference).unwrap();
+                prop_assert!(volume >= last * (1.0 - 1e-12), "{volume} after {last}");
+                prop_assert!(archive.len() <= capacity);
+                prop_assert_eq!(non_dominated(&archive.objectives).len(), archive.len());
+                last = volume;
+            }
         }
     }
 

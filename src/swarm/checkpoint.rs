@@ -6,6 +6,7 @@
 //! torn or of another state is refused. It is written beside its place and then moved there, so that a run that is
 //! broken off while it writes leaves the last one whole.
 
+use super::device::DeviceState;
 use super::{
     CooperativeSwarm, CovarianceSwarm, DifferenceSwarm, HybridSwarm, Islands, Mopso, Nsga2, Pso, WindowSwarm,
 };
@@ -17,7 +18,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// The format that this version writes, and the only one that it reads. It changes with the fields of any state.
-pub const VERSION: u32 = 1;
+pub const VERSION: u32 = 2;
 
 const MAGIC: &[u8; 8] = b"LAPSWARM";
 
@@ -36,6 +37,7 @@ macro_rules! checkpoints {
 checkpoints! {
     CooperativeSwarm: "cooperative swarm",
     CovarianceSwarm: "covariance swarm",
+    DeviceState: "swarm of a device",
     DifferenceSwarm: "difference swarm",
     HybridSwarm: "hybrid swarm",
     Mopso: "multi-objective swarm",

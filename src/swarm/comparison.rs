@@ -56,22 +56,6 @@ const FRONT_POINTS: usize = 2000;
 pub fn optimiser(name: &str, problem: &Problem, seed: u64) -> Result<Box<dyn Optimiser + Send>> {
     let (population, evaluations) = budget(problem);
     let iterations = evaluations / population;
-    let mopso = |settings: MopsoSettings| -> Result<Box<dyn Optimiser + Send>> {
-        let motion = PsoSettings {
-            population,
-            iterations,
-            seed,
-            ..settings.motion
-        };
-        Ok(Box::new(Mopso::new(
-            problem,
-            MopsoSettings {
-                motion,
-                archive: population,
-                ..settings
-            },
-        )?))
-    };
     let pso = |settings: PsoSettings| -> Result<Box<dyn Optimiser + Send>> {
         let settings = PsoSettings {
             population,
@@ -82,29 +66,13 @@ pub fn optimiser(name: &str, problem: &Problem, seed: u64) -> Result<Box<dyn Opt
         Ok(Box::new(Pso::new(problem, settings)?))
     };
     if problem.objectives.len() > 1 {
-        return match name {
-            "default" => mopso(MopsoSettings::default()),
-            "default_nearest" => mopso(MopsoSettings {
-                truncation: Truncation::MutualNearest,
-                ..MopsoSettings::default()
-            }),
-            "smpso" => mopso(MopsoSettings::smpso()),
-            "thesis" => mopso(MopsoSettings::thesis()),
-            "thesis_random_mu" => mopso(MopsoSettings {
-                mutation: Mutation::Random,
-                ..MopsoSettings::thesis()
-            }),
-            "nsga2" => {
-                let settings = Nsga2Settings {
-                    population,
-                    iterations,
-                    seed,
-                    ..Nsga2Settings::default()
-                };
-                Ok(Box::new(Nsga2::new(problem, settings)?))
-            }
-            _ => Err(unknown(name, &MULTI_OBJECTIVE)),
+        let sizes = Sizes {
+            population,
+            iterations,
+            archive: population,
+            seed,
         };
+        return several(name, problem, sizes, &[]);
     }
     Ok(match name {
         "default" => {
@@ -162,6 +130,72 @@ pub fn optimiser(name: &str, problem: &Problem, seed: u64) -> Result<Box<dyn Opt
 
 fn unknown(name: &str, known: &[&str]) -> Error {
     Error::input("the comparison", "algorithm", name, known.join(", "))
+}
+
+/// How large a run of an optimiser of several objectives is.
+#[derive(Clone, Copy, Debug)]
+pub struct Sizes {
+    /// Candidates of a generation.
+    pub population: usize,
+    /// Generations.
+    pub iterations: usize,
+    /// Most members of the archive; the genetic algorithm's is its population.
+    pub archive: usize,
+    /// Seed of all random numbers.
+    pub seed: u64,
+}
+
+/// The optimiser of that name for several objectives. Its first candidates are those of `start`, as far as they go.
+///
+/// # Errors
+/// [`Error::Input`] if there is none of that name, and those of its settings.
+pub fn several(
+    name: &str,
+    problem: &Problem,
+    sizes: Sizes,
+    start: &[Vec<f64>],
+) -> Result<Box<dyn Optimiser + Send>> {
+    let mopso = |settings: MopsoSettings| -> Result<Box<dyn Optimiser + Send>> {
+        let motion = PsoSettings {
+            population: sizes.population,
+            iterations: sizes.iterations,
+            seed: sizes.seed,
+            ..settings.motion
+        };
+        let settings = MopsoSettings {
+            motion,
+            archive: sizes.archive,
+            ..settings
+        };
+        let mut swarm = Mopso::new(problem, settings)?;
+        swarm.start_from(start);
+        Ok(Box::new(swarm))
+    };
+    match name {
+        "default" => mopso(MopsoSettings::default()),
+        "default_nearest" => mopso(MopsoSettings {
+            truncation: Truncation::MutualNearest,
+            ..MopsoSettings::default()
+        }),
+        "smpso" => mopso(MopsoSettings::smpso()),
+        "thesis" => mopso(MopsoSettings::thesis()),
+        "thesis_random_mu" => mopso(MopsoSettings {
+            mutation: Mutation::Random,
+            ..MopsoSettings::thesis()
+        }),
+        "nsga2" => {
+            let settings = Nsga2Settings {
+                population: sizes.population,
+                iterations: sizes.iterations,
+                seed: sizes.seed,
+                ..Nsga2Settings::default()
+            };
+            let mut genetic = Nsga2::new(problem, settings)?;
+            genetic.start_from(start);
+            Ok(Box::new(genetic))
+        }
+        _ => Err(unknown(name, &MULTI_OBJECTIVE)),
+    }
 }
 
 /// What one run reached.

@@ -16,6 +16,7 @@ use crate::error::{Error, Result};
 use crate::evaluate::gpu::shader::{swarm, swarm_gather};
 use crate::evaluate::gpu::{Binding, GpuContext, Kernel};
 use crate::evaluate::{BackendInfo, FAILED_COST, FailureCounts, Problem};
+use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
 use std::sync::Arc;
 use wgpu::BufferUsages as Usage;
@@ -42,7 +43,7 @@ pub trait DeviceObjectives {
 }
 
 /// Workgroups along two dimensions, for a particle to a lane.
-pub(super) fn groups(particles: usize) -> (u32, u32) {
+pub(crate) fn groups(particles: usize) -> (u32, u32) {
     let all = particles.div_ceil(BLOCK);
     let wide = all.clamp(1, 1 << 15);
     (wide as u32, all.div_ceil(wide) as u32)
@@ -55,6 +56,27 @@ const SAMPLE_FRONT: usize = 512;
 /// Bytes before the points of the list of those found.
 const HEADER: u64 = 16;
 
+/// `n` rows of `width` out of blocks.
+fn row_major(blocks: &[f32], n: usize, width: usize) -> Vec<f64> {
+    let at = |i: usize, k: usize| f64::from(blocks[(i / BLOCK * width + k) * BLOCK + i % BLOCK]);
+    (0..n * width).map(|j| at(j / width, j % width)).collect()
+}
+
+/// A swarm off its device, for [`super::checkpoint`].
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct DeviceState {
+    settings: MopsoSettings,
+    space: Space,
+    objectives: usize,
+    position: Vec<f32>,
+    velocity: Vec<f32>,
+    best_position: Vec<f32>,
+    best_objectives: Vec<f32>,
+    archive: Archive,
+    iteration: usize,
+    evaluations: u64,
+}
+
 struct Kernels {
     learn: Arc<Kernel>,
     advance: Arc<Kernel>,
@@ -65,6 +87,9 @@ struct Buffers {
     generation: wgpu::Buffer,
     archive: wgpu::Buffer,
     position: wgpu::Buffer,
+    velocity: wgpu::Buffer,
+    best_position: wgpu::Buffer,
+    best_objectives: wgpu::Buffer,
     objectives: wgpu::Buffer,
     found: wgpu::Buffer,
     /// As large as the largest of what is read back.
@@ -96,8 +121,6 @@ impl DeviceMopso {
     /// [`Error::Input`] naming the setting that is out of its range, [`Error::Device`] if the device cannot hold the
     /// swarm.
     pub fn new(problem: &Problem, settings: MopsoSettings, context: Arc<GpuContext>) -> Result<Self> {
-        use Binding::{Read, Uniform, Write};
-        settings.validate()?;
         let space = Space::new(problem)?;
         let (d, width) = (space.dimensions(), problem.objectives.len());
         if d == 0 || !(2..=3).contains(&width) {
@@ -114,6 +137,22 @@ impl DeviceMopso {
             let expected = "a swarm on a device moves real numbers only";
             return Err(Error::input("the problem", &v.name, "whole numbers", expected));
         }
+        let archive = settings.empty_archive(width)?;
+        let (swarm, scatter) = Self::unborn(settings, space, archive, width, context)?;
+        swarm.dispatch(&scatter, 0)?;
+        Ok(swarm)
+    }
+
+    /// A swarm with buffers that hold nothing yet, and the kernel that scatters its particles.
+    fn unborn(
+        settings: MopsoSettings,
+        space: Space,
+        archive: Archive,
+        width: usize,
+        context: Arc<GpuContext>,
+    ) -> Result<(Self, Arc<Kernel>)> {
+        use Binding::{Read, Uniform, Write};
+        let d = space.dimensions();
         let bindings = [Uniform, Read, Write, Write, Write, Write, Write, Write];
         let source = swarm();
         let kernel = |entry: &str| context.kernel(&source, entry, &bindings);
@@ -141,7 +180,7 @@ impl DeviceMopso {
         let on = Usage::STORAGE | Usage::COPY_SRC | Usage::COPY_DST;
         let size = size_of::<Generation>() as u64;
         let generation = context.buffer("generation", size, Usage::UNIFORM | Usage::COPY_DST)?;
-        let archive = context.buffer("archive", members * (d as u64 + 3) * 4, on)?;
+        let leaders = context.buffer("archive", members * (d as u64 + 3) * 4, on)?;
         let position = context.buffer("positions", state, on)?;
         let velocity = context.buffer("velocities", state, on)?;
         let best_position = context.buffer("best positions", state, on)?;
@@ -154,7 +193,7 @@ impl DeviceMopso {
         let rows = context.buffer("chosen positions", (most * d) as u64 * 4, on)?;
         let state = [
             &generation,
-            &archive,
+            &leaders,
             &position,
             &velocity,
             &best_position,
@@ -166,8 +205,11 @@ impl DeviceMopso {
         let gather = context.bind(&kernels.gather, &[&gathering, &chosen, &position, &rows])?;
         let buffers = Buffers {
             generation,
-            archive,
+            archive: leaders,
             position,
+            velocity,
+            best_position,
+            best_objectives,
             objectives,
             found,
             readback,
@@ -178,7 +220,7 @@ impl DeviceMopso {
             gather,
         };
         let swarm = Self {
-            archive: Archive::new(settings.archive, settings.truncation),
+            archive,
             objectives: width,
             settings,
             space,
@@ -188,8 +230,80 @@ impl DeviceMopso {
             iteration: 0,
             evaluations: 0,
         };
-        swarm.dispatch(&scatter, 0)?;
-        Ok(swarm)
+        Ok((swarm, scatter))
+    }
+
+    /// Puts the first particles at these candidates (in the variables' units), before the first generation.
+    ///
+    /// # Errors
+    /// [`Error::Device`] if the device fails.
+    pub fn start_from(&mut self, candidates: &[Vec<f64>]) -> Result<()> {
+        let d = self.space.dimensions();
+        let count = candidates.len().min(self.settings.motion.population);
+        if count == 0 {
+            return Ok(());
+        }
+        let bytes = (count.next_multiple_of(BLOCK) * d * 4) as u64;
+        let mut rows: Vec<f32> = self.read(&self.buffers.position, bytes)?;
+        for (i, candidate) in candidates.iter().take(count).enumerate() {
+            for (k, x) in self.space.position(candidate).into_iter().enumerate() {
+                rows[(i / BLOCK * d + k) * BLOCK + i % BLOCK] = x as f32;
+            }
+        }
+        for buffer in [&self.buffers.position, &self.buffers.best_position] {
+            self.context.write(buffer, bytemuck::cast_slice(&rows));
+        }
+        Ok(())
+    }
+
+    /// The whole swarm, read back from the device: what [`DeviceMopso::from_state`] goes on with.
+    ///
+    /// # Errors
+    /// [`Error::Device`] if the device fails.
+    pub fn state(&self) -> Result<DeviceState> {
+        let lanes = self.settings.motion.population.next_multiple_of(BLOCK);
+        let rows = |buffer, width: usize| self.read(buffer, (lanes * width * 4) as u64);
+        let d = self.space.dimensions();
+        Ok(DeviceState {
+            position: rows(&self.buffers.position, d)?,
+            velocity: rows(&self.buffers.velocity, d)?,
+            best_position: rows(&self.buffers.best_position, d)?,
+            best_objectives: rows(&self.buffers.best_objectives, self.objectives)?,
+            settings: self.settings.clone(),
+            space: self.space.clone(),
+            objectives: self.objectives,
+            archive: self.archive.clone(),
+            iteration: self.iteration,
+            evaluations: self.evaluations,
+        })
+    }
+
+    /// A swarm that goes on from `state` on `context`'s device.
+    ///
+    /// # Errors
+    /// [`Error::Device`] if the device cannot hold it.
+    pub fn from_state(state: DeviceState, context: Arc<GpuContext>) -> Result<Self> {
+        let (swarm, _) = Self::unborn(
+            state.settings,
+            state.space,
+            state.archive,
+            state.objectives,
+            context,
+        )?;
+        let buffers = &swarm.buffers;
+        for (buffer, rows) in [
+            (&buffers.position, &state.position),
+            (&buffers.velocity, &state.velocity),
+            (&buffers.best_position, &state.best_position),
+            (&buffers.best_objectives, &state.best_objectives),
+        ] {
+            swarm.context.write(buffer, bytemuck::cast_slice(rows));
+        }
+        Ok(Self {
+            iteration: state.iteration,
+            evaluations: state.evaluations,
+            ..swarm
+        })
     }
 
     /// What does the work.
@@ -232,12 +346,7 @@ impl DeviceMopso {
         let n = self.settings.motion.population.min(SAMPLE);
         let lanes = n.next_multiple_of(BLOCK);
         let rows: Vec<f32> = self.read(&self.buffers.objectives, (lanes * width * 4) as u64)?;
-        let mut plain = vec![0.0; n * width];
-        for (i, row) in plain.chunks_exact_mut(width).enumerate() {
-            for (k, value) in row.iter_mut().enumerate() {
-                *value = f64::from(rows[(i / BLOCK * width + k) * BLOCK + i % BLOCK]);
-            }
-        }
+        let plain = row_major(&rows, n, width);
         Ok(sieve(learn_from(&plain, width), width, SAMPLE_FRONT))
     }
 
@@ -385,6 +494,17 @@ impl DeviceMopso {
             self.space.scale_block(block, BLOCK, rows);
         }
         Ok(candidates)
+    }
+
+    /// Their objectives as last evaluated, row-major, read back from the device.
+    ///
+    /// # Errors
+    /// [`Error::Device`] if the device fails.
+    pub fn objectives(&self) -> Result<Vec<f64>> {
+        let (n, width) = (self.settings.motion.population, self.objectives);
+        let bytes = n.next_multiple_of(BLOCK) * width * 4;
+        let rows: Vec<f32> = self.read(&self.buffers.objectives, bytes as u64)?;
+        Ok(row_major(&rows, n, width))
     }
 
     /// Iterations done.

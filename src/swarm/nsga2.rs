@@ -4,7 +4,8 @@
 //! (2002); simulated binary crossover as in Deb, Agrawal, *Simulated binary crossover for continuous search space*,
 //! Complex Systems 9 (1995), in the form that keeps to the bounds.
 
-use super::archive::{crowding, dominates};
+use super::archive::crowding;
+use super::metrics::{non_dominated, ranks};
 use super::motion::{Particles, Purpose, polynomial};
 use super::settings::setting;
 use super::{Front, Optimiser};
@@ -12,6 +13,8 @@ use crate::error::Result;
 use crate::evaluate::{Evaluation, FAILED_COST, Problem};
 use crate::random::Random;
 use serde::{Deserialize, Serialize};
+use std::collections::HashMap;
+use std::hash::{DefaultHasher, Hash, Hasher};
 
 /// Settings of [`Nsga2`]; the defaults are those of the paper.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -117,6 +120,15 @@ impl Nsga2 {
         })
     }
 
+    /// Puts the first members at these candidates (in the variables' units), before the first population is asked for.
+    pub fn start_from(&mut self, candidates: &[Vec<f64>]) {
+        for (member, candidate) in candidates.iter().enumerate().take(self.settings.population) {
+            let row = self.children.row(member);
+            let position = self.children.space.position(candidate);
+            self.children.position[row].copy_from_slice(&position);
+        }
+    }
+
     /// The better of two parents drawn at random: by front, then by crowding.
     fn parent(&self, pair: usize, which: u32) -> &Member {
         let draw = |index| {
@@ -196,41 +208,47 @@ fn cross(a: f64, b: f64, uniform: f64, index: f64) -> (f64, f64) {
     (below.clamp(0.0, 1.0), above.clamp(0.0, 1.0))
 }
 
-/// Whether one solution is better than another: by what it violates, then by dominance (Deb's rules).
-fn beats(a: &Member, b: &Member) -> bool {
-    if a.violation != b.violation {
-        return a.violation < b.violation;
-    }
-    dominates(&a.objectives, &b.objectives)
-}
-
-/// The fronts of a set, best first, by the number of others that dominate each.
+/// The fronts of a set, best first: by what solutions violate, then by dominance (Deb's rules).
 fn fronts(members: &[Member]) -> Vec<Vec<usize>> {
-    let n = members.len();
-    let mut beaten_by = vec![0usize; n];
-    let mut beaten: Vec<Vec<usize>> = vec![Vec::new(); n];
-    for i in 0..n {
-        for j in 0..n {
-            if beats(&members[i], &members[j]) {
-                beaten[i].push(j);
-                beaten_by[j] += 1;
+    let mut order: Vec<usize> = (0..members.len()).collect();
+    order.sort_by(|&a, &b| members[a].violation.total_cmp(&members[b].violation));
+    let mut found: Vec<Vec<usize>> = Vec::new();
+    for alike in order.chunk_by(|&a, &b| members[a].violation == members[b].violation) {
+        let rows: Vec<Vec<f64>> = alike.iter().map(|&i| members[i].objectives.clone()).collect();
+        let before = found.len();
+        for (&i, rank) in alike.iter().zip(ranks(&rows)) {
+            if found.len() <= before + rank {
+                found.resize(before + rank + 1, Vec::new());
             }
+            found[before + rank].push(i);
         }
-    }
-    let mut found = Vec::new();
-    let mut front: Vec<usize> = (0..n).filter(|&i| beaten_by[i] == 0).collect();
-    while !front.is_empty() {
-        let mut next = Vec::new();
-        for &j in front.iter().flat_map(|&i| &beaten[i]) {
-            beaten_by[j] -= 1;
-            if beaten_by[j] == 0 {
-                next.push(j);
-            }
-        }
-        next.sort_unstable();
-        found.push(std::mem::replace(&mut front, next));
     }
     found
+}
+
+/// Solutions that are known, to find copies of them by.
+#[derive(Default)]
+struct Known {
+    /// Places of solutions by a digest of their numbers.
+    places: HashMap<u64, Vec<usize>>,
+}
+
+impl Known {
+    /// Notes down where a solution will stand, unless it is a copy of one of `all`.
+    fn is_new(&mut self, position: &[f64], objectives: &[f64], all: &[Member]) -> bool {
+        let mut digest = DefaultHasher::new();
+        for x in position.iter().chain(objectives) {
+            // Nought has two signs and one place.
+            (x + 0.0).to_bits().hash(&mut digest);
+        }
+        let places = self.places.entry(digest.finish()).or_default();
+        let copy = |&i: &usize| all[i].objectives == objectives && all[i].position == position;
+        let new = !places.iter().any(copy);
+        if new {
+            places.push(all.len());
+        }
+        new
+    }
 }
 
 impl Optimiser for Nsga2 {
@@ -239,7 +257,12 @@ impl Optimiser for Nsga2 {
     }
 
     fn tell(&mut self, evaluation: &Evaluation) {
-        let mut all = std::mem::take(&mut self.parents);
+        let mut known = Known::default();
+        let mut all = Vec::with_capacity(2 * self.settings.population);
+        for parent in std::mem::take(&mut self.parents) {
+            known.is_new(&parent.position, &parent.objectives, &all);
+            all.push(parent);
+        }
         let rows = evaluation
             .objectives
             .chunks_exact(self.objectives)
@@ -256,9 +279,8 @@ impl Optimiser for Nsga2 {
                 _ => f64::INFINITY,
             };
             let position = self.children.position[self.children.row(child)].to_vec();
-            let known = |m: &Member| m.objectives == objectives && m.position == position;
             // A copy of a member brings nothing and would crowd it out.
-            if !all.iter().any(known) {
+            if known.is_new(&position, &objectives, &all) {
                 all.push(Member {
                     position,
                     objectives,
@@ -282,7 +304,8 @@ impl Optimiser for Nsga2 {
             }
         }
         kept.truncate(self.settings.population);
-        self.parents = kept.into_iter().map(|i| all[i].clone()).collect();
+        let mut all: Vec<Option<Member>> = all.into_iter().map(Some).collect();
+        self.parents = kept.into_iter().filter_map(|i| all[i].take()).collect();
         self.evaluations += self.settings.population as u64;
         self.iteration += 1;
         self.breed();
@@ -308,13 +331,15 @@ impl Optimiser for Nsga2 {
     }
 
     fn front(&self) -> Front {
+        let first = |m: &&Member| m.rank == 0 && m.objectives.iter().all(|&x| x < FAILED_COST);
+        let members: Vec<&Member> = self.parents.iter().filter(first).collect();
+        let rows: Vec<Vec<f64>> = members.iter().map(|m| m.objectives.clone()).collect();
         let mut front = Front::default();
-        for m in &self.parents {
-            let failed = m.objectives.iter().any(|&x| x >= FAILED_COST);
-            if m.rank == 0 && !failed && !front.objectives.contains(&m.objectives) {
-                front.candidates.push(self.children.space.scaled(&m.position, 1));
-                front.objectives.push(m.objectives.clone());
-            }
+        // One of those that are worth the same.
+        for i in non_dominated(&rows) {
+            let position = &members[i].position;
+            front.candidates.push(self.children.space.scaled(position, 1));
+            front.objectives.push(rows[i].clone());
         }
         front
     }

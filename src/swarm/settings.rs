@@ -1,5 +1,6 @@
 //! Settings of the swarms, validated in one place.
 
+use super::archive::Archive;
 use crate::error::{Error, Result};
 use serde::{Deserialize, Serialize};
 
@@ -227,6 +228,9 @@ pub struct MopsoSettings {
     pub archive: usize,
     /// Who leaves an archive that is too full.
     pub truncation: Truncation,
+    /// Where contributions are measured from, a value for each of up to three objectives: the archive's hypervolume up to
+    /// there then never falls. None lets the archive choose, who keeps the ends of its front for it.
+    pub reference: Option<Vec<f64>>,
     /// Choice of leaders.
     pub leaders: Leaders,
     /// Mutation.
@@ -269,6 +273,7 @@ impl MopsoSettings {
             },
             archive: 100,
             truncation: Truncation::Crowding,
+            reference: None,
             leaders: Leaders::Tournament,
             mutation: Mutation::SMPSO,
         }
@@ -280,8 +285,26 @@ impl MopsoSettings {
             motion: PsoSettings::thesis(),
             archive: 100,
             truncation: Truncation::Crowding,
+            reference: None,
             leaders: Leaders::Tournament,
             mutation: Mutation::Fixed(0.3),
+        }
+    }
+
+    /// The empty archive of a swarm of so many objectives.
+    ///
+    /// # Errors
+    /// As [`MopsoSettings::validate`], and for a reference of another length.
+    pub(super) fn empty_archive(&self, objectives: usize) -> Result<Archive> {
+        self.validate()?;
+        let archive = Archive::new(self.archive, self.truncation);
+        match &self.reference {
+            None => Ok(archive),
+            Some(reference) if reference.len() == objectives => Ok(archive.measured_from(reference.clone())),
+            Some(reference) => {
+                let expected = format!("a number for each of {objectives} objectives");
+                Err(setting("reference", format!("{reference:?}"), &expected))
+            }
         }
     }
 
@@ -293,6 +316,14 @@ impl MopsoSettings {
         self.motion.validate()?;
         if self.archive < 2 {
             return Err(setting("archive", self.archive.to_string(), "2 or more"));
+        }
+        if let Some(reference) = &self.reference {
+            let found = format!("{reference:?} with truncation by {:?}", self.truncation);
+            let expected = "one to three numbers, with truncation by contribution";
+            let numbers = (1..=3).contains(&reference.len()) && reference.iter().all(|x| x.is_finite());
+            if !numbers || self.truncation != Truncation::Contribution {
+                return Err(setting("reference", found, expected));
+            }
         }
         match self.mutation {
             Mutation::Fixed(mu) if !(mu > 0.0 && mu <= 10.0) => {

@@ -13,3 +13,4 @@ mod lap;
 mod line;
 mod step;
 mod swarm;
+mod swarm_lines;

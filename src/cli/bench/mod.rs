@@ -3,6 +3,7 @@
 mod machine;
 mod optimisers;
 mod scaling;
+mod studies;
 mod swarm;
 
 use lapswarm::Result;
@@ -25,6 +26,8 @@ pub struct Arguments {
 enum What {
     /// Compare the optimisers on problems whose answers are known.
     Optimisers(optimisers::Arguments),
+    /// Compare the optimisers of several objectives on the studies' own problems, by hypervolume against time.
+    Studies(studies::Arguments),
     /// Measure what the optimiser itself costs, from a thousand particles to a million.
     Swarm(swarm::Arguments),
 }
@@ -33,6 +36,7 @@ enum What {
 pub fn run(arguments: &Arguments) -> Result<()> {
     match &arguments.what {
         Some(What::Optimisers(arguments)) => optimisers::run(arguments),
+        Some(What::Studies(arguments)) => studies::run(arguments),
         Some(What::Swarm(arguments)) => swarm::run(arguments),
         None => scaling::run(&arguments.scaling),
     }

@@ -4,6 +4,7 @@
 //! what happens outside them is kept by the handlers and handed out as [`Error::Device`] at the next check.
 
 use super::adapter::{DeviceSummary, choose};
+use super::dispatches;
 use super::faults::{self, Fault};
 use super::lint;
 use crate::error::{Error, Result};
@@ -322,12 +323,15 @@ impl GpuContext {
         if let Some(fault) = faults::next() {
             self.suffer(fault)?;
         }
+        let begin = Instant::now();
         let submission = self.scoped("run a kernel", || {
             let mut encoder = self.device.create_command_encoder(&Default::default());
             record(&mut encoder);
             self.queue.submit([encoder.finish()])
         })?;
-        self.wait(Some(submission))
+        self.wait(Some(submission))?;
+        dispatches::note(begin.elapsed());
+        Ok(())
     }
 
     /// What an injected fault does.

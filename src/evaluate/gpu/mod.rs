@@ -2,9 +2,11 @@
 
 mod adapter;
 mod context;
+mod dispatches;
 pub mod faults;
 pub mod lint;
 pub mod shader;
 
 pub use adapter::{ADAPTER_VARIABLE, DeviceKind, DeviceSummary, devices};
 pub use context::{Binding, GpuContext, Kernel};
+pub use dispatches::longest_dispatch_ms;

@@ -23,6 +23,7 @@ const SWARM: &str = include_str!("../../../shaders/swarm.wgsl");
 const SWARM_GATHER: &str = include_str!("../../../shaders/swarm_gather.wgsl");
 const TEST_PROBLEMS: &str = include_str!("../../../shaders/test_problems.wgsl");
 
+const LINE_SWARM: &str = include_str!("../../../shaders/line_swarm.wgsl");
 const LINE: &str = include_str!("../../../shaders/line.wgsl");
 /// Engine, motors, store and fuel on a lap of a line.
 const ENERGY: &str = include_str!("../../../shaders/energy.wgsl");
@@ -40,6 +41,12 @@ pub fn swarm() -> String {
 /// Source of the kernel that copies a few particles' positions; entry point `gather`.
 pub fn swarm_gather() -> String {
     SWARM_GATHER.to_owned()
+}
+
+/// Source of the kernels between a swarm on the device and the line kernel; entry points `variables_of_positions` and
+/// `objectives_of_figures`.
+pub fn line_swarm() -> String {
+    LINE_SWARM.to_owned()
 }
 
 /// Source of the kernel of the test problem of that number among
@@ -176,6 +183,8 @@ pub struct EnergyShape {
     pub additional: bool,
     /// Whether the charge has a say in where the motor works.
     pub counts_charge: bool,
+    /// Vectors of four in the energy tables, if they are to be uniform.
+    pub uniform_energy: Option<usize>,
 }
 
 impl EnergyShape {
@@ -190,8 +199,14 @@ impl EnergyShape {
         let [flows, boosts, zones] = self.places();
         let constants = format!(
             "\n// Generated.\nconst STRATEGY: u32 = {}u;\nconst ADDITIONAL: bool = {};\nconst COUNTS_CHARGE: bool = {};\nconst FLOWS_AT: u32 = {flows}u;\n\
-             const BOOSTS_AT: u32 = {boosts}u;\nconst ZONES_AT: u32 = {zones}u;\n\n",
-            self.line_variables, self.additional, self.counts_charge,
+             const BOOSTS_AT: u32 = {boosts}u;\nconst ZONES_AT: u32 = {zones}u;\n@group(0) @binding(10) {};\n\n",
+            self.line_variables,
+            self.additional,
+            self.counts_charge,
+            match self.uniform_energy {
+                Some(vectors) => format!("var<uniform> energy: array<vec4<f32>, {vectors}>"),
+                None => "var<storage, read> energy: array<vec4<f32>>".to_owned(),
+            },
         );
         [&self.line.source(), &constants, ENERGY].concat()
     }

@@ -115,6 +115,10 @@ impl<'a> GpuHybridEvaluator<'a> {
         let uniform = section_bytes <= device.max_uniform_buffer_binding_size;
         let uniform_limits = context.summary().kind == DeviceKind::Software
             && size_of_val(limits.limits.as_slice()) as u64 <= device.max_uniform_buffer_binding_size;
+        let vectors = energy_vectors(&table, &hybrid.energy().stored::<f32>());
+        // A software driver is faster with uniform tables, see the line kernel.
+        let uniform_energy = context.summary().kind == DeviceKind::Software
+            && size_of_val(vectors.as_slice()) as u64 <= device.max_uniform_buffer_binding_size;
         let shape = EnergyShape {
             line: LineShape {
                 closed: plan.closed,
@@ -133,6 +137,7 @@ impl<'a> GpuHybridEvaluator<'a> {
             line_variables: hybrid.line_variables(),
             additional: hybrid.energy().mode == Mode::Additional,
             counts_charge: hybrid.energy().counts_charge,
+            uniform_energy: uniform_energy.then_some(vectors.len()),
         };
         use Binding::{Read, Uniform, Write};
         let table_binding = |uniform: bool| if uniform { Uniform } else { Read };
@@ -147,7 +152,7 @@ impl<'a> GpuHybridEvaluator<'a> {
             Write,
             Write,
             Uniform,
-            Read,
+            table_binding(uniform_energy),
         ];
         let stored = bindings.iter().filter(|b| !matches!(b, Uniform)).count() as u32;
         if stored > device.max_storage_buffers_per_shader_stage {
@@ -182,7 +187,6 @@ impl<'a> GpuHybridEvaluator<'a> {
             rows_per_speed_squared: table.rows_per_speed_squared,
             run_in: hybrid.energy().run_in as u32,
         };
-        let vectors = energy_vectors(&table, &hybrid.energy().stored::<f32>());
         let tables = [
             context.buffer_of("sections", bytemuck::cast_slice(&sections), both)?,
             floats("limits", &limits.limits)?,
@@ -195,7 +199,7 @@ impl<'a> GpuHybridEvaluator<'a> {
             Usage::UNIFORM | Usage::COPY_DST,
         )?;
         let account = context.buffer_of("account", bytemuck::bytes_of(&account), Usage::UNIFORM)?;
-        let energy = context.buffer_of("energy", bytemuck::cast_slice(&vectors), Usage::STORAGE)?;
+        let energy = context.buffer_of("energy", bytemuck::cast_slice(&vectors), both)?;
         Ok(Self {
             hybrid,
             batching: LineBatching::for_kind(context.summary().kind),

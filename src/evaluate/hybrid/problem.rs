@@ -6,9 +6,10 @@ use crate::line::energy::{EnergyCar, EnergyLap, EnergyPlan, GATES, Gates};
 use crate::line::{LinePlan, Parametrisation};
 use crate::track::CrossSections;
 use glam::DVec2;
+use serde::{Deserialize, Serialize};
 
 /// What of a lap can be minimised.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum HybridObjective {
     /// Its time, s.
     LapTime,
@@ -210,9 +211,15 @@ impl HybridProblem {
             HybridLine::Fixed { points_m, closed } => slowest(points_m, *closed),
             HybridLine::Free { cuts, .. } => slowest(&cuts.points(&vec![0.5; n]), cuts.closed),
         };
-        // A floor so far down is none.
+        // A floor that no lap's energy leads down to is none.
         let mut energy = energy;
-        energy.counts_charge = strategy.free.contains(&Free::Soc) || strategy.gates.soc > -1e3;
+        let [.., floor_j, budget_j] = car.gate_figures(&strategy.gates);
+        let most_j = if strategy.free.contains(&Free::Energy) {
+            1e6 * Free::Energy.variable().upper
+        } else {
+            budget_j
+        };
+        energy.counts_charge = strategy.free.contains(&Free::Soc) || floor_j > -most_j;
         let line_variables = variables.len();
         variables.extend(strategy.free.iter().map(|f| f.variable()));
         Ok(Self {

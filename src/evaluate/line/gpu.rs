@@ -1,6 +1,7 @@
 //! The graphics backend: `f32`, one lane per line.
 
 use super::problem::{LineProblem, MEASURES, Measures};
+use super::swarm::Exchange;
 use crate::error::{Error, Result};
 use crate::evaluate::gpu::shader::LineShape;
 use crate::evaluate::gpu::{Binding, DeviceKind, GpuContext, Kernel};
@@ -100,18 +101,18 @@ impl LineBatching {
 }
 
 /// Buffers that grow with the batch, and the kernel's bindings to them.
-struct BatchBuffers {
-    stride: usize,
-    variables: wgpu::Buffer,
-    results: wgpu::Buffer,
+pub(super) struct BatchBuffers {
+    pub(super) stride: usize,
+    pub(super) variables: wgpu::Buffer,
+    pub(super) results: wgpu::Buffer,
     readback: wgpu::Buffer,
     group: wgpu::BindGroup,
 }
 
 /// Scores lines on a graphics processor.
 pub struct GpuLineEvaluator<'a> {
-    line: &'a LineProblem,
-    context: Arc<GpuContext>,
+    pub(super) line: &'a LineProblem,
+    pub(super) context: Arc<GpuContext>,
     batching: LineBatching,
     kernel: Arc<Kernel>,
     workgroup: usize,
@@ -120,6 +121,8 @@ pub struct GpuLineEvaluator<'a> {
     /// In the order of the kernel's bindings 1 to 4.
     tables: [wgpu::Buffer; 4],
     batch: Option<BatchBuffers>,
+    /// For swarms that live on the device.
+    pub(super) exchange: Option<Exchange>,
     /// Lanes and time of the last dispatch, by which the next is sized.
     pace: Option<(usize, f64)>,
     longest_ms: f64,
@@ -212,6 +215,7 @@ impl<'a> GpuLineEvaluator<'a> {
             stretch,
             tables,
             batch: None,
+            exchange: None,
             pace: None,
             longest_ms: 0.0,
         })
@@ -245,7 +249,7 @@ impl<'a> GpuLineEvaluator<'a> {
     }
 
     /// The most candidates of one batch.
-    fn batch_size(&self) -> usize {
+    pub(super) fn batch_size(&self) -> usize {
         let device = self.context.limits();
         let bytes = self
             .batching
@@ -259,7 +263,7 @@ impl<'a> GpuLineEvaluator<'a> {
     }
 
     /// Makes room for a batch of `candidates`.
-    fn reserve(&mut self, candidates: usize) -> Result<()> {
+    pub(super) fn reserve(&mut self, candidates: usize) -> Result<()> {
         let stride = candidates.next_multiple_of(self.workgroup);
         if self.batch.as_ref().is_none_or(|b| b.stride < stride) {
             // The old buffers go before the new ones come.
@@ -306,7 +310,7 @@ impl<'a> GpuLineEvaluator<'a> {
         Ok(())
     }
 
-    fn buffers(&self) -> Result<&BatchBuffers> {
+    pub(super) fn buffers(&self) -> Result<&BatchBuffers> {
         self.batch
             .as_ref()
             .ok_or_else(|| Error::Device("a batch without buffers".to_owned()))
@@ -327,7 +331,7 @@ impl<'a> GpuLineEvaluator<'a> {
     }
 
     /// Scores one batch, whose variables are on the device in rows of `stride`.
-    fn score_batch(&mut self, candidates: usize, stride: usize) -> Result<()> {
+    pub(super) fn score_batch(&mut self, candidates: usize, stride: usize) -> Result<()> {
         let mut first = 0;
         while first < candidates {
             let lanes = self

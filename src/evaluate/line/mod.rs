@@ -5,6 +5,7 @@ mod cpu;
 mod gpu;
 mod problem;
 mod simd;
+mod swarm;
 
 pub use backend::open_line_evaluator;
 pub use cpu::CpuLineEvaluator;

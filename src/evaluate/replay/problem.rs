@@ -79,7 +79,7 @@ pub struct Plan<S> {
     pub norm: Norm,
 }
 
-/// An objective as a weighted sum of channel costs.
+/// An objective as a norm of weighted channel costs, the same norm that their samples are put together in.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ChannelWeights {
     /// The objective's name and unit.
@@ -277,7 +277,19 @@ impl ReplayProblem {
     pub fn objective_row(&self, errors: Option<[f64; CHANNELS]>) -> (Vec<f64>, Option<Failure>) {
         let row = errors.map(|e| {
             let costs = self.channel_costs(&e);
-            let weighted = |o: &ChannelWeights| o.weights.iter().zip(costs).map(|(w, c)| w * c).sum();
+            let weighted = |o: &ChannelWeights| {
+                let each = o.weights.iter().zip(costs).map(|(w, c)| w * c);
+                match self.plan.norm {
+                    Norm::One | Norm::MeanSquare => each.sum(),
+                    // A sum of roots has a crease along which each of them is nought, which swarms get caught in.
+                    Norm::Two => each.fold(0.0, f64::hypot),
+                    // Not f64::max, which would lose what is not a number.
+                    Norm::Infinity => each.fold(
+                        0.0,
+                        |most: f64, c| if most > c || most.is_nan() { most } else { c },
+                    ),
+                }
+            };
             self.objectives.iter().map(weighted).collect::<Vec<f64>>()
         });
         // A car that is so far off has left the range of what cars do, whatever it was that it did.

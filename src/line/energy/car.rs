@@ -103,6 +103,29 @@ impl EnergyCar {
         Self::new(car, envelope, self.traction.clone(), self.ellipse_exponent)
     }
 
+    /// The same with torque and fuel flow of the engine multiplied by `share` at every engine speed, as far as the traction
+    /// goes.
+    ///
+    /// # Errors
+    /// As [`EnergyCar::new`].
+    pub fn with_engine(&self, share: f64) -> Result<Self> {
+        let mut car = self.car.clone();
+        if let Some(powertrain) = &mut car.powertrain {
+            *powertrain = powertrain.scaled(share);
+        }
+        let rows = self
+            .envelope
+            .rows()
+            .iter()
+            .map(|row| crate::vehicle::EnvelopeRow {
+                ax_drive_mps2: (row.ax_drive_mps2 * share).min(self.traction.at(row.v_mps)),
+                ..*row
+            })
+            .collect();
+        let envelope = Envelope::new(self.envelope.name(), rows)?;
+        Self::new(car, envelope, self.traction.clone(), self.ellipse_exponent)
+    }
+
     /// The kernels' figures of gates.
     pub fn gate_figures(&self, gates: &super::Gates) -> [f64; super::GATES] {
         let store = &self.hybrid.store;

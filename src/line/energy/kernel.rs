@@ -119,6 +119,9 @@ struct State<R> {
     harvested_k: R,
 }
 
+/// Less than this (J) stays in the store: in single precision rounding would hand it out in ever smaller shares.
+const LEAST_J: f64 = 5.0;
+
 /// All that does not change along a lap.
 struct Car<'a, R: Real> {
     limits: &'a LimitTable<R::Storage>,
@@ -133,6 +136,10 @@ struct Step<R> {
     end: R,
     /// Force of the motor over the mass (m/s^2).
     motor: R,
+    /// What of the motor the gates and the zone would let work (m/s^2),
+    wanted: R,
+    /// and what of that the store has energy for.
+    boost: R,
 }
 
 /// The share of a segment in which its zone lets the motor work.
@@ -160,7 +167,15 @@ impl<R: Lookup> Car<'_, R> {
     fn left(&self, state: &State<R>) -> R {
         let of_charge = state.change - self.strategy[3];
         let of_budget = self.strategy[4] - state.deployed;
-        of_charge.min(of_budget).max(R::lit(0.0))
+        let left = of_charge.min(of_budget);
+        R::select(left.less_than(R::lit(LEAST_J)), R::lit(0.0), left)
+    }
+
+    /// What the force of the motor over the mass (m/s^2) is at most with so much left (J) for a segment of one over this
+    /// length (m).
+    #[inline(always)]
+    fn reach(&self, left: R, inverse: R) -> R {
+        left * R::load(self.table.force_per_deployed) * inverse
     }
 
     /// Drives along a segment, with the motor beside the engine in as much of it as `left` (J) suffices for, up to the
@@ -177,7 +192,7 @@ impl<R: Lookup> Car<'_, R> {
         let boost = look_up(&self.table.boosts, 2, place, beyond, 0);
         let open = self.open(bends[0], from) & self.strategy[2].less_than(engine - drag);
         let wanted = gated(open, boost * zone_share(&self.plan.zones[here], self.strategy));
-        let boost = wanted.min(left * R::load(self.table.force_per_deployed) * inverse);
+        let boost = wanted.min(self.reach(left, inverse));
 
         let both = grip.min(drive + boost);
         let middle = (from + length * (both - drag)).max(nought);
@@ -191,7 +206,40 @@ impl<R: Lookup> Car<'_, R> {
         Step {
             end,
             motor: (motor - spare).max(nought),
+            wanted,
+            boost,
         }
+    }
+
+    /// The same, from what the first drive of the lap found of this segment if that began it as fast and had as much for it in
+    /// every lane: beyond the first slow bend the two drives differ only where the store runs out.
+    #[inline(always)]
+    #[allow(clippy::too_many_arguments)]
+    fn additional_again(
+        &self,
+        first: Option<[R; 4]>,
+        before: R,
+        here: usize,
+        from: R,
+        length: R,
+        bends: [R; 2],
+        most: R,
+        left: R,
+    ) -> Step<R> {
+        if let Some([end, motor, wanted, boost]) = first {
+            let now = wanted.min(self.reach(left, R::lit(1.0) / length));
+            let differs =
+                from.less_than(before) | before.less_than(from) | now.less_than(boost) | boost.less_than(now);
+            if R::all(!differs) {
+                return Step {
+                    end,
+                    motor,
+                    wanted,
+                    boost,
+                };
+            }
+        }
+        self.additional(here, from, length, bends, most, left)
     }
 
     /// Drives along a segment by the engine alone.
@@ -209,7 +257,7 @@ impl<R: Lookup> Car<'_, R> {
     /// One segment of the lap that only finds the speed at the start line, with the motor beside the engine: what is deployed,
     /// and what is harvested by the MGU-K where the charge has a say. The little that the MGU-H adds is left out here.
     #[inline(always)]
-    fn provisional(&self, state: &mut State<R>, here: usize, length: R, bends: [R; 2], most: R) {
+    fn provisional(&self, state: &mut State<R>, here: usize, length: R, bends: [R; 2], most: R) -> Step<R> {
         let nought = R::lit(0.0);
         let table = self.table;
         let from = state.speed_squared;
@@ -232,27 +280,33 @@ impl<R: Lookup> Car<'_, R> {
             state.change = state.change + (harvested_k - deployed);
             state.harvested_k = state.harvested_k + harvested_k;
         }
+        step
     }
 
-    /// One segment with its accounts, up to the greatest speed squared at its end.
+    /// One segment with its accounts, up to the greatest speed squared at its end. `first` is what the first drive found of
+    /// it and the speed squared that it began it with.
     #[inline(always)]
     fn segment(
         &self,
         state: &mut State<R>,
+        root: &mut R,
         here: usize,
-        length: R,
-        bends: [R; 2],
-        most: R,
+        (length, bends, most): (R, [R; 2], R),
+        first: (Option<[R; 4]>, R),
     ) -> SegmentEnergy<R> {
         let (nought, one) = (R::lit(0.0), R::lit(1.0));
         let table = self.table;
         let from = state.speed_squared;
         let left = self.left(state);
         let step = match self.plan.mode {
-            Mode::Additional => self.additional(here, from, length, bends, most, left),
+            Mode::Additional => {
+                self.additional_again(first.0, first.1, here, from, length, bends, most, left)
+            }
             Mode::Offset => Step {
                 end: self.engine_only(from, length, bends, most),
                 motor: nought,
+                wanted: nought,
+                boost: nought,
             },
         };
         let end = step.end;
@@ -274,8 +328,9 @@ impl<R: Lookup> Car<'_, R> {
             Mode::Offset => {
                 let open = self.open(bends[0], from) & self.strategy[2].less_than(ax);
                 let share = zone_share(&self.plan.zones[here], self.strategy);
-                let reach = left * R::load(table.force_per_deployed) * inverse;
-                gated(open, motor_most * share).min(demand).min(reach)
+                gated(open, motor_most * share)
+                    .min(demand)
+                    .min(self.reach(left, inverse))
             }
         };
         let engine = demand - motor;
@@ -293,7 +348,9 @@ impl<R: Lookup> Car<'_, R> {
             + (flows[1] - flows[0]) * thirds.min(one)
             + (flows[2] - flows[1]) * (thirds - one).max(nought).min(one)
             + (flows[3] - flows[2]) * (thirds - R::lit(2.0)).max(nought);
-        let time = R::lit(2.0) * length / (from.sqrt() + end.sqrt());
+        let end_root = end.sqrt();
+        let time = R::lit(2.0) * length / (*root + end_root);
+        *root = end_root;
         let burnt = flow * time;
         let spins = !mean.less_than(R::load(table.exhaust_from))
             & nought.less_than(ax)
@@ -405,6 +462,9 @@ pub fn energy_lap<R: Lookup>(
     let n = course.curvature.len();
     let nought = R::lit(0.0);
     let (length, curvature, most) = (&course.length, &course.curvature, &course.speed_squared);
+    let first_drive = &mut course.first_drive;
+    first_drive.clear();
+    let mut first_speed_squared = nought;
     let after = |here: usize| if here + 1 < n { here + 1 } else { 0 };
     let bends = |here: usize| [curvature[here], curvature[after(here)]];
     let car = Car {
@@ -435,21 +495,27 @@ pub fn energy_lap<R: Lookup>(
         }
         speed_squared = state;
         if plan.mode == Mode::Additional {
+            first_speed_squared = speed_squared;
             let mut state = fresh(speed_squared);
             for here in 0..n {
-                car.provisional(&mut state, here, length[here], bends(here), most[after(here)]);
+                let step = car.provisional(&mut state, here, length[here], bends(here), most[after(here)]);
+                first_drive.push([step.end, step.motor, step.wanted, step.boost]);
             }
             speed_squared = state.speed_squared;
         }
     }
 
     let mut state = fresh(speed_squared);
+    let mut root = speed_squared.sqrt();
     let (mut greatest, mut least) = (nought, nought);
     let mut total = [nought; 6];
     let mut block = [nought; 6];
     let segments = if closed { n } else { n - 1 };
     for here in 0..segments {
-        let s = car.segment(&mut state, here, length[here], bends(here), most[after(here)]);
+        let first = first_drive.get(here).copied();
+        let along = (length[here], bends(here), most[after(here)]);
+        let s = car.segment(&mut state, &mut root, here, along, (first, first_speed_squared));
+        first_speed_squared = first.map_or(nought, |[end, ..]| end);
         record(here, &s);
         let motor_time = gated(nought.less_than(s.deployed), s.time);
         let terms = [

@@ -1,9 +1,10 @@
 //! What a lap's energy strategy is made of.
 
 use crate::scalar::Real;
+use serde::{Deserialize, Serialize};
 
 /// What the motor does with its power.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Mode {
     /// It takes the engine's place on the engine's own lap: the same time for less fuel.
     Offset,
@@ -29,7 +30,7 @@ impl Mode {
 }
 
 /// Where the motor may work.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Gates {
     /// Greatest steering angle at the wheels (rad).
     pub steer_rad: f64,

@@ -101,7 +101,6 @@ pub fn write_results(folder: &Path, limits: &CarLimits, summary: &EnvelopeSummar
         settings: "",
         ..Manifest::new("envelope", 0, &backend, &summary.car)
     };
-    write_json(&folder.join("manifest.json"), &manifest)?;
     with_panels(limits, |panels| {
         plot_curves(
             folder.join("envelope.svg"),
@@ -109,7 +108,9 @@ pub fn write_results(folder: &Path, limits: &CarLimits, summary: &EnvelopeSummar
             panels,
         )?;
         page::write(folder, limits, summary, panels)
-    })
+    })?;
+    // Last: it says that the run is whole.
+    write_json(&folder.join("manifest.json"), &manifest)
 }
 
 fn write_cornering(path: &Path, limits: &CarLimits) -> Result<()> {

@@ -11,18 +11,23 @@ mod settings;
 mod setup;
 mod stint;
 mod strategy;
+mod worth;
 
 pub use results::{HybridSummary, ScenarioFigures, summarise, write_results};
 pub use scenario::{ReportedLap, Scenario, drive, published};
 pub use settings::{FreePart, HYBRID_OBJECTIVES, HybridStudySettings};
 pub use setup::{HybridSetup, set_up};
-pub use stint::{Sizing, StintLap, size, stint};
+pub use stint::{ENGINES, Sizing, StintLap, engine_only, size, stint};
 pub use strategy::{FoundStrategy, StrategyFront, search_front, search_strategy, zone_gates, zone_starts};
+pub use worth::{Worth, correlation, mean_worths, worth};
 
 use crate::error::Result;
 use crate::evaluate::BackendInfo;
 use crate::line::energy::{Gates, Mode};
 use crate::optimum::Deployment;
+use crate::study::journal::Recorder;
+use crate::study::keeper::Keeper;
+use crate::study::run::Inputs;
 use std::ops::ControlFlow;
 use std::time::Instant;
 
@@ -59,6 +64,8 @@ pub struct Optimised {
     pub front: Vec<FrontPoint>,
     /// What an endless store is used for (J): no greater budget binds.
     pub unbound_j: f64,
+    /// What the motor is worth along the lap of the engine alone, and how much of it the swarm uses.
+    pub worth: Vec<Worth>,
     /// The swarm's front between the study's objectives.
     pub swarm_front: Option<StrategyFront>,
 }
@@ -106,9 +113,26 @@ pub struct HybridProgress {
 pub fn run_study(
     settings: &HybridStudySettings,
     setup: &HybridSetup,
+    observe: impl FnMut(&HybridProgress) -> ControlFlow<()>,
+) -> Result<Outcome> {
+    run_recorded(settings, setup, &mut Recorder::idle(&mut Keeper::idle()), observe)
+}
+
+/// As [`run_study`], with the answers to the swarms noted by `recorder`, or known to it.
+///
+/// # Errors
+/// As [`run_study`], and those of the recorder.
+pub fn run_recorded(
+    settings: &HybridStudySettings,
+    setup: &HybridSetup,
+    recorder: &mut Recorder<'_>,
     mut observe: impl FnMut(&HybridProgress) -> ControlFlow<()>,
 ) -> Result<Outcome> {
     let began = Instant::now();
+    let backend = probe(setup, settings)?;
+    let mut inputs = Inputs::new("hybrid");
+    inputs.add(setup);
+    recorder.begin(inputs.key(), &backend)?;
     let none = Gates {
         energy_mj: 0.0,
         ..Gates::OPEN
@@ -136,7 +160,7 @@ pub fn run_study(
         optimised: None,
         stint: stint_laps,
         sizing,
-        backend: probe(setup, settings)?,
+        backend,
         search_s: 0.0,
         elapsed_s: 0.0,
         interrupted: false,
@@ -170,7 +194,7 @@ pub fn run_study(
         }
         let search = Instant::now();
         let mut interrupted = outcome.interrupted;
-        let swarm = search_strategy(setup, settings, budget_j / 1e6, |p| {
+        let swarm = search_strategy(setup, settings, budget_j / 1e6, recorder, |p| {
             let told = observe(&told("swarm", p.evaluations, format!("{:.4} s", p.best[0])));
             interrupted |= told.is_break();
             told
@@ -178,7 +202,7 @@ pub fn run_study(
         outcome.evaluations += swarm.evaluations;
         let mut swarm_front = None;
         if settings.objectives.len() > 1 && !interrupted {
-            let found = search_front(setup, settings, budget_j / 1e6, |p| {
+            let found = search_front(setup, settings, budget_j / 1e6, recorder, |p| {
                 let best: Vec<String> = p.best.iter().map(|b| format!("{b:.3}")).collect();
                 let told = observe(&told("swarm front", p.evaluations, best.join(" ")));
                 interrupted |= told.is_break();
@@ -189,10 +213,14 @@ pub fn run_study(
         }
         outcome.search_s = search.elapsed().as_secs_f64();
         outcome.interrupted = interrupted;
+        if interrupted {
+            recorder.keep()?;
+        }
         outcome.optimised = Some(Optimised {
             budget_j,
             exact_lap: setup.exact_lap("exact", &exact.shares, budget_j)?,
             exact,
+            worth: worth(setup, &outcome.engine, &swarm.lap)?,
             swarm,
             front,
             unbound_j: unbound.lap.deployed,

@@ -4,9 +4,10 @@ use super::setup::HybridSetup;
 use crate::error::Result;
 use crate::evaluate::hybrid::{HybridObjective, HybridProblem, Strategy};
 use crate::line::energy::{EnergyLap, EnergyPlan, Gates, Mode, SegmentEnergy};
+use serde::{Deserialize, Serialize};
 
 /// A strategy by its gates.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Scenario {
     /// Its name.
     pub name: String,

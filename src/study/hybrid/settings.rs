@@ -8,10 +8,11 @@ use crate::evaluate::hybrid::HybridObjective;
 use crate::line::energy::{Gates, Mode};
 use crate::study::identify::parse_backend;
 use crate::study::raceline::RacelineSettings;
+use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
 /// What the swarm may change.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum FreePart {
     /// Where the motor works.
     Strategy,
@@ -40,7 +41,7 @@ impl FreePart {
 }
 
 /// Settings of a hybrid study.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct HybridStudySettings {
     /// A bundled circuit, a shape or a file.
     pub track: String,
@@ -121,6 +122,20 @@ impl Default for HybridStudySettings {
 pub const HYBRID_OBJECTIVES: &str = "lap_time_s, fuel_l, energy_used_mj, soc_swing";
 
 impl HybridStudySettings {
+    /// The same with the paths of files absolute, so that they mean the same from every folder.
+    pub fn absolute(mut self) -> Self {
+        let placed = RacelineSettings {
+            track: self.track,
+            car: self.car,
+            envelope: self.envelope,
+            ..RacelineSettings::default()
+        }
+        .absolute();
+        (self.track, self.car, self.envelope) = (placed.track, placed.car, placed.envelope);
+        self.line = self.line.map(|path| std::path::absolute(&path).unwrap_or(path));
+        self
+    }
+
     /// Reads a study file; files that it names are relative to it.
     ///
     /// # Errors

@@ -113,17 +113,63 @@ pub struct Sizing {
     pub lap_time_s: f64,
     /// Fuel (l).
     pub fuel_l: f64,
+    /// Power of the engine, as a share of this car's, that a car without a motor laps as fast with; `null` where none within
+    /// [`ENGINES`] does.
+    pub engine_share: Option<f64>,
+    /// Fuel that such a car burns more in a lap (l).
+    pub fuel_saving_l: Option<f64>,
+}
+
+/// Engines that another car may have, as shares of this car's power.
+pub const ENGINES: [f64; 2] = [0.5, 2.0];
+
+/// The share of this car's engine with which it laps in `lap_time_s` without a motor, and the fuel (l) that it burns then.
+/// Torque and fuel flow are taken to grow alike at every engine speed; the mass stays.
+///
+/// # Errors
+/// Those of laps.
+pub fn engine_only(setup: &HybridSetup, lap_time_s: f64) -> Result<Option<(f64, f64)>> {
+    let lap_with = |share: f64| -> Result<ReportedLap> {
+        let other = HybridSetup {
+            car: setup.car.with_engine(share)?,
+            ..setup.clone()
+        };
+        let none = Gates {
+            energy_mj: 0.0,
+            ..Gates::OPEN
+        };
+        drive(&other, "engine alone", Mode::Offset, none)
+    };
+    let [mut low, mut high] = ENGINES;
+    if lap_with(low)?.lap.time < lap_time_s || lap_with(high)?.lap.time > lap_time_s {
+        return Ok(None);
+    }
+    // To a thousandth of a horsepower.
+    while high - low > 1e-6 {
+        let middle = 0.5 * (low + high);
+        if lap_with(middle)?.lap.time > lap_time_s {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    Ok(Some((
+        high,
+        lap_with(high)?.lap.fuel / setup.car.fuel_density_kgpl,
+    )))
 }
 
 /// Motor powers of a sizing, as shares of the car's own.
 const POWERS: [f64; 8] = [0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 1.75, 2.0];
 
-/// The energy in a lap with which motors of several powers make this car lap in `lap_time_s`.
+/// The energy in a lap with which motors of several powers make this car lap in `lap_time_s`, and what fuel they save beside a
+/// car that laps as fast by its engine alone.
 ///
 /// # Errors
 /// Those of laps.
 pub fn size(setup: &HybridSetup, lap_time_s: f64) -> Result<Vec<Sizing>> {
     let mut rows = Vec::new();
+    let other = engine_only(setup, lap_time_s)?;
     for share in POWERS {
         let mut hybrid = setup.car.hybrid.clone();
         hybrid.mgu_k.power_w *= share;
@@ -162,12 +208,16 @@ pub fn size(setup: &HybridSetup, lap_time_s: f64) -> Result<Vec<Sizing>> {
         }
         let met = best.is_some();
         let lap = best.unwrap_or(fastest).lap;
+        let fuel_l = lap.fuel / setup.car.fuel_density_kgpl;
+        let rival = other.filter(|_| met);
         rows.push(Sizing {
             power_kw,
             energy_mj: met.then_some(lap.deployed / 1e6),
             harvested_mj: (lap.harvested_k + lap.harvested_h) / 1e6,
             lap_time_s: lap.time,
-            fuel_l: lap.fuel / setup.car.fuel_density_kgpl,
+            fuel_l,
+            engine_share: rival.map(|(share, _)| share),
+            fuel_saving_l: rival.map(|(_, burnt_l)| burnt_l - fuel_l),
         });
     }
     Ok(rows)

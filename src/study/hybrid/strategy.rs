@@ -12,6 +12,7 @@ use crate::line::energy::{EnergyPlan, Gates, Mode};
 use crate::line::{Parametrisation, geometry};
 use crate::optimum::{Deployment, DeploymentSearch};
 use crate::random::Random;
+use crate::study::journal::Recorder;
 use crate::swarm::{
     HybridSettings, HybridSwarm, Mopso, MopsoSettings, Optimiser, Progress, PsoSettings, run,
 };
@@ -154,6 +155,7 @@ pub fn search_strategy(
     setup: &HybridSetup,
     settings: &HybridStudySettings,
     energy_mj: f64,
+    recorder: &mut Recorder<'_>,
     mut observe: impl FnMut(&Progress) -> ControlFlow<()>,
 ) -> Result<FoundStrategy> {
     let problem = setup.zone_problem(energy_mj, &[HybridObjective::LapTime])?;
@@ -168,7 +170,7 @@ pub fn search_strategy(
     )?;
     let mut evaluator = open_hybrid_evaluator(&problem, settings.backend, settings.adapter.as_deref())?;
     let mut history = Vec::new();
-    run(&mut swarm, evaluator.as_mut(), |progress| {
+    run(&mut swarm, &mut recorder.over(evaluator.as_mut()), |progress| {
         history.push((progress.evaluations, progress.best[0]));
         observe(progress)
     })?;
@@ -204,6 +206,7 @@ pub fn search_front(
     setup: &HybridSetup,
     settings: &HybridStudySettings,
     energy_mj: f64,
+    recorder: &mut Recorder<'_>,
     observe: impl FnMut(&Progress) -> ControlFlow<()>,
 ) -> Result<StrategyFront> {
     let fixed = setup.zone_problem(energy_mj, &settings.objectives)?;
@@ -258,7 +261,7 @@ pub fn search_front(
     let mut swarm = Mopso::new(&problem.problem, mopso)?;
     swarm.start_from(&starting_candidates(&problem, settings, &starts));
     let mut evaluator = open_hybrid_evaluator(&problem, settings.backend, settings.adapter.as_deref())?;
-    run(&mut swarm, evaluator.as_mut(), observe)?;
+    run(&mut swarm, &mut recorder.over(evaluator.as_mut()), observe)?;
     Ok(StrategyFront {
         names: problem.problem.variables.iter().map(|v| v.name.clone()).collect(),
         candidates: swarm.archive_candidates(),

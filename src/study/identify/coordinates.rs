@@ -53,7 +53,7 @@ impl<'a> Logarithmic<'a> {
         candidates
             .iter()
             .zip(columns)
-            .map(|(x, (l, v))| if *l { x.exp().clamp(v.lower, v.upper) } else { *x })
+            .map(|(x, (l, v))| if *l { x.exp() } else { *x }.clamp(v.lower, v.upper))
             .collect()
     }
 }

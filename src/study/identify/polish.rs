@@ -4,6 +4,7 @@ use crate::evaluate::Variable;
 use crate::evaluate::replay::{CHANNEL_NAMES, ReplayProblem, Residuals};
 use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
 use nalgebra::{DMatrix, DVector, Dyn, VecStorage};
+use std::ops::ControlFlow;
 
 /// Number of compared channels.
 const CHANNELS: usize = CHANNEL_NAMES.len();
@@ -19,6 +20,8 @@ pub struct Polished {
     pub evaluations: usize,
     /// Whether the method met one of its tolerances.
     pub converged: bool,
+    /// Whether it was broken off.
+    pub interrupted: bool,
 }
 
 /// A candidate is moved this share of the range away from a bound before it is polished, where the
@@ -41,6 +44,11 @@ struct Bounded<'a> {
     current: Option<Residuals>,
     length: usize,
     evaluations: usize,
+    /// Asked before every drive.
+    watch: &'a mut dyn FnMut() -> ControlFlow<()>,
+    interrupted: bool,
+    /// The best point so far and its cost: where the method is broken off it stands at one that was not driven.
+    best: (DVector<f64>, f64),
 }
 
 impl Bounded<'_> {
@@ -63,8 +71,18 @@ impl LeastSquaresProblem<f64, Dyn, Dyn> for Bounded<'_> {
 
     fn set_params(&mut self, u: &DVector<f64>) {
         self.u.copy_from(u);
-        self.current = self.replay.residuals(&self.candidate(u));
-        self.evaluations += 1;
+        self.interrupted |= (self.watch)().is_break();
+        if !self.interrupted {
+            self.current = self.replay.residuals(&self.candidate(u));
+            self.evaluations += 1;
+            if let Some(r) = &self.current {
+                let weighted = r.errors.iter().enumerate().map(|(i, e)| self.weight(i) * e);
+                let cost = 0.5 * weighted.map(|e| e * e).sum::<f64>();
+                if cost < self.best.1 {
+                    self.best = (u.clone(), cost);
+                }
+            }
+        }
     }
 
     fn params(&self) -> DVector<f64> {
@@ -72,6 +90,10 @@ impl LeastSquaresProblem<f64, Dyn, Dyn> for Bounded<'_> {
     }
 
     fn residuals(&self) -> Option<DVector<f64>> {
+        // Nothing ends the method.
+        if self.interrupted {
+            return None;
+        }
         Some(match &self.current {
             Some(r) => DVector::from_fn(self.length, |i, _| self.weight(i) * r.errors[i]),
             None => DVector::from_element(self.length, LOST),
@@ -90,6 +112,16 @@ impl LeastSquaresProblem<f64, Dyn, Dyn> for Bounded<'_> {
 /// Polishes `candidate` with the errors of each channel weighted by `weights` (one over their noise, or scale).
 /// `None` if the candidate is lost from the start.
 pub fn polish(replay: &ReplayProblem, candidate: &[f64], weights: [f64; CHANNELS]) -> Option<Polished> {
+    polish_watched(replay, candidate, weights, &mut || ControlFlow::Continue(()))
+}
+
+/// As [`polish`]; `watch` is asked before each drive and may break the polish off.
+pub(super) fn polish_watched(
+    replay: &ReplayProblem,
+    candidate: &[f64],
+    weights: [f64; CHANNELS],
+    watch: &mut dyn FnMut() -> ControlFlow<()>,
+) -> Option<Polished> {
     let length = replay.residuals(candidate)?.errors.len();
     let variables = &replay.problem.variables;
     let u = DVector::from_iterator(
@@ -108,6 +140,9 @@ pub fn polish(replay: &ReplayProblem, candidate: &[f64], weights: [f64; CHANNELS
         current: None,
         length,
         evaluations: 0,
+        watch,
+        interrupted: false,
+        best: (u.clone(), f64::INFINITY),
     };
     problem.set_params(&u);
     let patience = (MOST_DRIVES / (variables.len() + 1)).max(1);
@@ -116,9 +151,10 @@ pub fn polish(replay: &ReplayProblem, candidate: &[f64], weights: [f64; CHANNELS
         .with_ftol(LEAST_GAIN)
         .minimize(problem);
     Some(Polished {
-        candidate: problem.candidate(&problem.u),
-        cost: report.objective_function,
+        candidate: problem.candidate(&problem.best.0),
+        cost: problem.best.1,
         evaluations: problem.evaluations,
         converged: report.termination.was_successful(),
+        interrupted: problem.interrupted,
     })
 }

@@ -211,7 +211,6 @@ pub fn write_results(
         device_faults: &outcome.device_faults,
         ..Manifest::new("identify", settings.seed, &outcome.backend, &replay.car.name)
     };
-    write_json(&folder.join("manifest.json"), &manifest)?;
     replay
         .candidate_car(&told_candidate(setup, outcome))
         .write(folder, "car")?;
@@ -222,7 +221,9 @@ pub fn write_results(
     }
     let judged = judge_candidate(replay, &outcome.candidate);
     write_traces(folder, setup, &judged, summary)?;
-    super::page::write(folder, settings, setup, outcome, &judged, summary)
+    super::page::write(folder, settings, setup, outcome, &judged, summary)?;
+    // Last: it says that the run is whole.
+    write_json(&folder.join("manifest.json"), &manifest)
 }
 
 fn write_history(folder: &Path, outcome: &Outcome) -> Result<()> {

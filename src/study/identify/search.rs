@@ -2,7 +2,7 @@
 
 use super::coordinates::Logarithmic;
 use super::identifiability::{Identifiability, judge, noise_of};
-use super::polish::polish;
+use super::polish::polish_watched;
 use super::settings::{Algorithm, IdentifySettings};
 use super::setup::{CHANNELS, Setup};
 use super::state::{Place, SearchState, inputs_of};
@@ -179,20 +179,26 @@ pub fn search_from(
     let mut candidate = swarm_candidate.clone();
     let mut polish_evaluations = 0;
     if settings.polish && !interrupted {
-        let _ = observe(&Report {
-            stage: Stage::Polish,
-            planned: 0,
-            progress: None,
-        });
+        let mut watch = || {
+            observe(&Report {
+                stage: Stage::Polish,
+                planned: 0,
+                progress: None,
+            })
+        };
         // First with the channels' spreads for weights, then with the noise that this leaves: maximum likelihood
         // for white noise.
         let mut weights = setup.scales.map(|s| 1.0 / s);
         for _ in 0..2 {
-            let Some(polished) = polish(replay, &candidate, weights) else {
+            let Some(polished) = polish_watched(replay, &candidate, weights, &mut watch) else {
                 break;
             };
             polish_evaluations += polished.evaluations;
+            interrupted |= polished.interrupted;
             candidate = polished.candidate;
+            if interrupted {
+                break;
+            }
             let Some(residuals) = replay.residuals(&candidate) else {
                 break;
             };

@@ -24,7 +24,8 @@ pub struct FreeParameter {
 /// What the swarm minimises.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum ObjectiveChoice {
-    /// The mean over the channels of the cost relative to the channel's own spread.
+    /// The norm over all channels together, each relative to its own spread: the root of the mean square of the channels' costs
+    /// in the 2-norm, their mean in the 1-norm and of mean squares, the greatest in the infinity norm.
     All,
     /// The cost of one channel, by its place in [`CHANNEL_NAMES`].
     Channel(usize),

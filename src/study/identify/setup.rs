@@ -333,6 +333,13 @@ fn objective_weights(
         Norm::Infinity => scale,
         Norm::MeanSquare => scale * scale,
     };
+    // So that errors of one standard deviation in all channels are one.
+    let channels = CHANNELS as f64;
+    let share = match settings.norm {
+        Norm::One | Norm::MeanSquare => channels,
+        Norm::Two => channels.sqrt(),
+        Norm::Infinity => 1.0,
+    };
     settings
         .objectives
         .iter()
@@ -342,7 +349,7 @@ fn objective_weights(
                     name: "all".to_owned(),
                     unit: "-".to_owned(),
                 },
-                weights: scales.map(|s| 1.0 / (unit_cost(s) * CHANNELS as f64)),
+                weights: scales.map(|s| 1.0 / (unit_cost(s) * share)),
             },
             ObjectiveChoice::Channel(channel) => ChannelWeights {
                 objective: Objective {

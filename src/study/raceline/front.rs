@@ -84,14 +84,7 @@ pub(super) fn search_front_from(
     mut observe: impl FnMut(&Progress, &FrontState) -> Result<ControlFlow<()>>,
 ) -> Result<LineFront> {
     let cuts = &setup.cuts;
-    let controls = ((cuts.length_m / CONTROL_SPACING_M) as usize).clamp(4, cuts.len());
-    let problem = LineProblem::new(
-        cuts.clone(),
-        Parametrisation::control_points(controls),
-        &settings.objectives,
-        Some(setup.car.clone()),
-        settings.entry_mps,
-    )?;
+    let problem = front_problem(setup, settings)?;
     let mopso = MopsoSettings {
         motion: PsoSettings {
             population: settings.population,
@@ -189,8 +182,28 @@ pub(super) fn search_front_from(
     })
 }
 
-/// The known lines, the reference line and the edges, then blends of them with a little noise.
-fn starting_lines(
+/// The problem that the swarm of the front is given: lines through control points.
+///
+/// # Errors
+/// Those of [`LineProblem::new`].
+pub fn front_problem(setup: &Setup, settings: &RacelineSettings) -> Result<LineProblem> {
+    let cuts = &setup.cuts;
+    let controls = ((cuts.length_m / CONTROL_SPACING_M) as usize).clamp(4, cuts.len());
+    LineProblem::new(
+        cuts.clone(),
+        Parametrisation::control_points(controls),
+        &settings.objectives,
+        Some(setup.car.clone()),
+        settings.entry_mps,
+    )
+}
+
+/// What that swarm starts from, a candidate to each of the settings' particles: the known lines (`alpha` at every cut), the
+/// reference line and the edges, then blends of them with a little noise.
+///
+/// # Errors
+/// Those of [`LineProblem::candidate`].
+pub fn starting_lines(
     problem: &LineProblem,
     settings: &RacelineSettings,
     known: &[Vec<f64>],

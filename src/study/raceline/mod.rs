@@ -15,7 +15,7 @@ mod settings;
 mod state;
 
 pub use exact::{ExactLine, ExactSolvers, WeightedLine};
-pub use front::{LineFront, search_front};
+pub use front::{LineFront, front_problem, search_front, starting_lines};
 pub use lines::{FINE_M, ReportedLine, Setup, set_up};
 pub use results::{LineFigures, Summary, summarise, write_results, write_settings};
 pub use search::{

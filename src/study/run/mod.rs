@@ -14,15 +14,18 @@ use crate::line::PointMass;
 use crate::study::envelope::{self, EnvelopeSettings, car_limits};
 use crate::study::hybrid::{self, HybridStudySettings};
 use crate::study::identify::{self, IdentifySettings};
+use crate::study::journal::{Journal, Recorder};
 use crate::study::raceline::{self, RacelineSettings};
 use crate::study::transient::{self, TransientSettings};
 use crate::vehicle::{Car, Envelope};
+use serde::{Deserialize, Serialize};
+use stage::go_on;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// Settings of a run.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RunSettings {
     /// How the car is identified.
     pub identify: IdentifySettings,
@@ -76,8 +79,8 @@ impl RunSettings {
 /// Change of the grip's share from one line to the next below which another line would be the same.
 const SETTLED: f64 = 0.015;
 
-/// Runs everything into `folder`; results of stages are kept in `cache`, if there is one. `observe` is told what is being
-/// done, and may break the run off.
+/// Runs everything into `folder`; results of stages are kept in `cache`, if there is one, and `every` so often the state of
+/// the stage at work. `observe` is told what is being done, and may break the run off.
 ///
 /// # Errors
 /// Those of the stages; [`Error::Interrupted`] if the run was broken off.
@@ -85,10 +88,11 @@ pub fn run(
     settings: &RunSettings,
     folder: &Path,
     cache: Option<&Path>,
+    every: Duration,
     mut observe: impl FnMut(&str) -> ControlFlow<()>,
 ) -> Result<Summary> {
     let began = Instant::now();
-    let stages = Stages::new(folder, cache);
+    let stages = Stages::new(folder, cache, every);
     let mut reused = Vec::new();
     let mut keep = |name: &str, stage: (PathBuf, bool)| {
         if stage.1 {
@@ -102,12 +106,14 @@ pub fn run(
     let mut inputs = Inputs::new("identify");
     inputs.add(&settings.identify);
     inputs.add(&(&setup.log, &setup.replay.car, &setup.truth));
-    let stage = stages.run("1_identify", &inputs, |to| {
-        let outcome = identify::search(&settings.identify, &setup, |report| {
-            let done = report.progress.map_or(String::new(), |p| {
-                format!(" {} of {}, best {:.2e}", p.iteration, report.planned, p.best[0])
-            });
-            observe(&format!("the car: {:?}{done}", report.stage).to_lowercase())
+    let stage = stages.run("1_identify", &inputs, |to, keeper| {
+        let outcome = go_on(keeper, |state, keeper| {
+            identify::search_from(&settings.identify, &setup, state, keeper, |report| {
+                let done = report.progress.map_or(String::new(), |p| {
+                    format!(" {} of {}, best {:.2e}", p.iteration, report.planned, p.best[0])
+                });
+                observe(&format!("the car: {:?}{done}", report.stage).to_lowercase())
+            })
         })?;
         if outcome.interrupted {
             return Err(broken_off());
@@ -124,7 +130,7 @@ pub fn run(
     }
     let mut inputs = Inputs::new("envelope");
     inputs.add(&car);
-    let stage = stages.run("2_envelope", &inputs, |to| {
+    let stage = stages.run("2_envelope", &inputs, |to, _| {
         let began = Instant::now();
         let limits = car_limits(&car, &EnvelopeSettings::default())?;
         let summary = envelope::summarise(&car.name, &limits, began.elapsed().as_secs_f64());
@@ -152,12 +158,14 @@ pub fn run(
             ..line_settings.clone()
         });
         inputs.add(&(&line_setup.cuts, line_setup.car.envelope.rows()));
-        let stage = stages.run(&format!("{number}_raceline"), &inputs, |to| {
-            let outcome = raceline::find_lines(&line_settings, &line_setup, |p| {
-                observe(&format!(
-                    "line {round}: {}, {} lines, best {}",
-                    p.stage, p.evaluations, p.best
-                ))
+        let stage = stages.run(&format!("{number}_raceline"), &inputs, |to, keeper| {
+            let outcome = go_on(keeper, |state, keeper| {
+                raceline::find_lines_from(&line_settings, &line_setup, state, keeper, |p| {
+                    observe(&format!(
+                        "line {round}: {}, {} lines, best {}",
+                        p.stage, p.evaluations, p.best
+                    ))
+                })
             })?;
             if outcome.interrupted {
                 return Err(broken_off());
@@ -184,7 +192,7 @@ pub fn run(
         let mut inputs = Inputs::new("transient");
         inputs.add(&(&car, &drive_settings, whole.rows(), &line_setup.edges_m));
         inputs.add_file(&line_path)?;
-        let stage = stages.run(&format!("{}_transient", number + 1), &inputs, |to| {
+        let stage = stages.run(&format!("{}_transient", number + 1), &inputs, |to, _| {
             let began = Instant::now();
             let outcome = transient::drive_line(&car, &limits, &points, edges, &drive_settings)?;
             let summary = transient::summarise(&car.name, &outcome, began.elapsed().as_secs_f64());
@@ -228,12 +236,19 @@ pub fn run(
         ));
         inputs.add(&(&energy_settings.track, energy_settings.car_width_m));
         let number = 3 + 2 * rounds.len();
-        let stage = stages.run(&format!("{number}_hybrid"), &inputs, |to| {
-            let outcome = hybrid::run_study(&energy_settings, &energy_setup, |p| {
-                observe(&format!(
-                    "energy: {}, {} laps, {}",
-                    p.stage, p.evaluations, p.best
-                ))
+        let stage = stages.run(&format!("{number}_hybrid"), &inputs, |to, keeper| {
+            let outcome = go_on(keeper, |journal, keeper| {
+                let journal = match journal {
+                    Some(journal) => journal,
+                    None => Journal::new("hybrid", &energy_settings)?,
+                };
+                let mut recorder = Recorder::new(journal, keeper);
+                hybrid::run_recorded(&energy_settings, &energy_setup, &mut recorder, |p| {
+                    observe(&format!(
+                        "energy: {}, {} laps, {}",
+                        p.stage, p.evaluations, p.best
+                    ))
+                })
             })?;
             if outcome.interrupted {
                 return Err(broken_off());

@@ -1,9 +1,13 @@
 //! Stages whose results are kept by what went into them.
 
 use crate::error::{Error, Result};
+use crate::study::keeper::Keeper;
+use crate::study::run_folder;
+use crate::swarm::checkpoint::Checkpoint;
 use std::fmt::{Debug, Write as _};
 use std::hash::{DefaultHasher, Hasher};
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 /// What went into a stage, as one number: the program's version, and whatever is [added](Inputs::add).
 pub struct Inputs(DefaultHasher);
@@ -52,19 +56,21 @@ const DONE: &str = "done";
 pub struct Stages {
     cache: Option<PathBuf>,
     folder: PathBuf,
+    every: Duration,
 }
 
 impl Stages {
-    /// Stages of a run in `folder`, kept in `cache` if that is given.
-    pub fn new(folder: &Path, cache: Option<&Path>) -> Self {
+    /// Stages of a run in `folder`, kept in `cache` if that is given; the state of one at work is saved `every` so often.
+    pub fn new(folder: &Path, cache: Option<&Path>, every: Duration) -> Self {
         Self {
+            every,
             cache: cache.map(Path::to_owned),
             folder: folder.to_owned(),
         }
     }
 
     /// The folder of a stage in the run, and whether it was taken from an earlier run of the same inputs. `work` fills
-    /// it otherwise.
+    /// it otherwise, and has the keeper of its state, which may have that of a run that was broken off.
     ///
     /// # Errors
     /// Those of `work`; [`Error::Io`] if folders or files cannot be made.
@@ -72,7 +78,7 @@ impl Stages {
         &self,
         name: &str,
         inputs: &Inputs,
-        work: impl FnOnce(&Path) -> Result<()>,
+        work: impl FnOnce(&Path, &mut Keeper) -> Result<()>,
     ) -> Result<(PathBuf, bool)> {
         let target = self.folder.join(name);
         create(&target)?;
@@ -85,7 +91,22 @@ impl Stages {
             copy(kept, &target)?;
             return Ok((target, true));
         }
-        work(&target)?;
+        // Where another run is at work on the same stage, that one keeps its state.
+        let unfinished = kept
+            .as_ref()
+            .and_then(|kept| run_folder::take(&kept.with_extension("unfinished")).ok());
+        let mut keeper = match &unfinished {
+            Some(folder) => Keeper::new(folder).every(self.every),
+            None => Keeper::idle(),
+        };
+        work(&target, &mut keeper)?;
+        keeper.done()?;
+        if let Some(folder) = unfinished {
+            let path = folder.to_path_buf();
+            drop(folder);
+            // What is in it now is another run's.
+            let _ = std::fs::remove_dir(path);
+        }
         if let Some(kept) = kept {
             // Filled beside and renamed: another run sees all of it or nothing.
             let beside = kept.with_extension(format!("partial-{}", std::process::id()));
@@ -99,6 +120,24 @@ impl Stages {
         }
         Ok((target, false))
     }
+}
+
+/// Does what `work` does from the state that an earlier run has left, and from the start where there is none or it belongs to
+/// something else.
+///
+/// # Errors
+/// Those of `work`.
+pub(super) fn go_on<S: Checkpoint, T>(
+    keeper: &mut Keeper,
+    mut work: impl FnMut(Option<S>, &mut Keeper) -> Result<T>,
+) -> Result<T> {
+    if let Some(state) = keeper.saved() {
+        match work(Some(state), keeper) {
+            Err(Error::Input { .. }) => {}
+            outcome => return outcome,
+        }
+    }
+    work(None, keeper)
 }
 
 fn create(folder: &Path) -> Result<()> {
@@ -121,6 +160,37 @@ fn copy(from: &Path, to: &Path) -> Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::study::journal::Journal;
+
+    const EVERY: Duration = Duration::ZERO;
+
+    #[test]
+    fn a_stage_that_is_broken_off_finds_its_state_again_and_leaves_none_when_it_is_done() {
+        let root = tempfile::tempdir().expect("a temporary folder");
+        let cache = root.path().join("cache");
+        let stages = Stages::new(&root.path().join("run"), Some(&cache), EVERY);
+        let inputs = Inputs::new("stage");
+        let mut known = Vec::new();
+        for round in 0..3u32 {
+            let outcome = stages.run("1_stage", &inputs, |_, keeper| {
+                go_on(keeper, |state: Option<Journal>, keeper| {
+                    let before = state.map(|s| s.settings::<u32>("stage")).transpose()?;
+                    known.push(before);
+                    keeper.keep(&Journal::new("stage", &round)?)
+                })?;
+                if round == 2 {
+                    Ok(())
+                } else {
+                    Err(Error::Interrupted(root.path().to_owned()))
+                }
+            });
+            assert_eq!(outcome.is_ok(), round == 2);
+        }
+        assert_eq!(known, [None, Some(0), Some(1)]);
+        let left: Vec<_> = cache.read_dir().expect("the cache").flatten().collect();
+        assert_eq!(left.len(), 1, "{left:?}");
+        assert!(left[0].path().join(DONE).exists());
+    }
 
     #[test]
     fn a_stage_runs_once_for_the_same_inputs_and_again_for_others() {
@@ -128,11 +198,11 @@ mod tests {
         let cache = root.path().join("cache");
         let mut runs = 0;
         let mut go = |run: &str, input: f64| {
-            let stages = Stages::new(&root.path().join(run), Some(&cache));
+            let stages = Stages::new(&root.path().join(run), Some(&cache), EVERY);
             let mut inputs = Inputs::new("stage");
             inputs.add(&input);
             let (folder, reused) = stages
-                .run("1_stage", &inputs, |folder| {
+                .run("1_stage", &inputs, |folder, _| {
                     runs += 1;
                     std::fs::write(folder.join("result"), format!("{input}"))
                         .map_err(|e| Error::io(folder, "write", e))
@@ -152,11 +222,11 @@ mod tests {
     fn a_stage_that_fails_is_not_kept() {
         let root = tempfile::tempdir().expect("a temporary folder");
         let cache = root.path().join("cache");
-        let stages = Stages::new(&root.path().join("run"), Some(&cache));
+        let stages = Stages::new(&root.path().join("run"), Some(&cache), EVERY);
         let inputs = Inputs::new("stage");
-        let fail = |_: &Path| Err(Error::Study("no".to_owned()));
+        let fail = |_: &Path, _: &mut Keeper| Err(Error::Study("no".to_owned()));
         assert!(stages.run("1_stage", &inputs, fail).is_err());
-        let (_, reused) = stages.run("1_stage", &inputs, |_| Ok(())).expect("it runs");
+        let (_, reused) = stages.run("1_stage", &inputs, |_, _| Ok(())).expect("it runs");
         assert!(!reused);
     }
 }

@@ -2,6 +2,7 @@
 
 use super::RunSettings;
 use crate::error::{Error, Result};
+use crate::evaluate::gpu::longest_dispatch_ms;
 use crate::report::write_whole;
 use crate::study::identify::Setup;
 use crate::study::run_folder::{Manifest, write_json};
@@ -249,9 +250,11 @@ impl Summary {
             car: &self.car,
             settings: "",
             interrupted: false,
+            longest_dispatch_ms: longest_dispatch_ms().filter(|_| self.backend == "gpu"),
             device_faults: &[],
         };
-        write_json(&folder.join("manifest.json"), &manifest)?;
-        super::page::write(folder, self)
+        super::page::write(folder, self)?;
+        // Last: it says that the run is whole.
+        write_json(&folder.join("manifest.json"), &manifest)
     }
 }

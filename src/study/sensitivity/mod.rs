@@ -15,15 +15,19 @@ use crate::evaluate::replay::kernel::drive_window;
 use crate::evaluate::replay::{CHANNEL_NAMES, ReplayProblem, Window, open_evaluator, trace};
 use crate::evaluate::{BackendInfo, Evaluator};
 use crate::study::identify::{FreeParameter, IdentifySettings, ObjectiveChoice, Setup, set_up};
+use crate::study::journal::Recorder;
+use crate::study::keeper::Keeper;
+use crate::study::run::Inputs;
 use crate::vehicle::tyre::Tyre;
 use crate::vehicle::{Car, CarModel, LinearTyre, MagicFormula, TyreModel};
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::time::Instant;
 
 /// Settings of a sensitivity study.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SensitivitySettings {
     /// Car, log, windows, norm and backend, as an identification has them; of the free parameters only the names count.
     pub replay: IdentifySettings,
@@ -276,6 +280,27 @@ pub(crate) fn costs_of(
 pub fn measure(
     settings: &SensitivitySettings,
     setup: &Setup,
+    observe: impl FnMut(&SensitivityProgress) -> ControlFlow<()>,
+) -> Result<Outcome> {
+    measure_recorded(settings, setup, &mut Recorder::idle(&mut Keeper::idle()), observe)
+}
+
+/// What the costs of this setup depend on.
+pub(crate) fn inputs_of(study: &str, setup: &Setup) -> String {
+    let replay = &setup.replay;
+    let mut inputs = Inputs::new(study);
+    inputs.add(&(&replay.plan, &replay.problem, &replay.car));
+    inputs.key()
+}
+
+/// As [`measure`], with the answers noted by `recorder`, or known to it.
+///
+/// # Errors
+/// As [`measure`], and those of the recorder.
+pub fn measure_recorded(
+    settings: &SensitivitySettings,
+    setup: &Setup,
+    recorder: &mut Recorder<'_>,
     mut observe: impl FnMut(&SensitivityProgress) -> ControlFlow<()>,
 ) -> Result<Outcome> {
     let replay = &setup.replay;
@@ -332,7 +357,10 @@ pub fn measure(
     };
     let (first, rest) = population.split_at(singles * dimensions);
     let mut interrupted = false;
-    let single = costs_of(evaluator.as_mut(), first, |done| {
+    recorder.begin(inputs_of("sensitivity", setup), &evaluator.backend())?;
+    let backend = evaluator.backend();
+    let mut evaluator = recorder.over(evaluator.as_mut());
+    let single = costs_of(&mut evaluator, first, |done| {
         interrupted |= watch(done, 0).is_break();
         ControlFlow::Continue(())
     })?
@@ -340,9 +368,12 @@ pub fn measure(
     let global = if interrupted {
         None
     } else {
-        costs_of(evaluator.as_mut(), rest, |done| watch(done, singles))?
+        costs_of(&mut evaluator, rest, |done| watch(done, singles))?
     };
     interrupted |= global.is_none();
+    if interrupted {
+        recorder.keep()?;
+    }
 
     let base_costs = single.first().cloned().flatten().ok_or_else(|| {
         Error::Study("the base car does not drive the lap: nothing to set changes against".to_owned())
@@ -367,7 +398,7 @@ pub fn measure(
         left_out,
         band: band(setup, first, dimensions),
         base,
-        backend: evaluator.backend(),
+        backend,
         evaluations: if interrupted { singles } else { planned },
         elapsed_s: began.elapsed().as_secs_f64(),
         interrupted,

@@ -223,7 +223,6 @@ pub fn write_results(
             &setup.replay.car.name,
         )
     };
-    write_json(&folder.join("manifest.json"), &manifest)?;
     write_whole(folder.join("study.toml"), study_toml(settings).as_bytes())?;
     write_one_at_a_time(folder, setup, outcome)?;
     plot_one_at_a_time(folder, summary)?;
@@ -232,7 +231,9 @@ pub fn write_results(
         plot_sobol(folder, summary)?;
     }
     plot_bands(folder, outcome)?;
-    super::page::write(folder, &study_toml(settings), setup, outcome, summary)
+    super::page::write(folder, &study_toml(settings), setup, outcome, summary)?;
+    // Last: it says that the run is whole.
+    write_json(&folder.join("manifest.json"), &manifest)
 }
 
 /// The settings as a study file.

@@ -8,13 +8,16 @@ use crate::error::{Error, Result};
 use crate::evaluate::BackendInfo;
 use crate::evaluate::replay::{CHANNEL_NAMES, open_evaluator};
 use crate::study::identify::{FreeParameter, IdentifySettings, ObjectiveChoice, Setup, set_up};
-use crate::study::sensitivity::{costs_of, ranges_about, start_as_base_drives};
+use crate::study::journal::Recorder;
+use crate::study::keeper::Keeper;
+use crate::study::sensitivity::{costs_of, inputs_of, ranges_about, start_as_base_drives};
+use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::time::Instant;
 
 /// Settings of a surface study.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SurfaceSettings {
     /// Car, log, windows, norm and backend, as an identification has them. Of the free parameters the bounds of the two
     /// that are moved are taken, where they are among them and no share is given.
@@ -139,6 +142,19 @@ pub fn set_up_surface(settings: &SurfaceSettings) -> Result<Setup> {
 pub fn measure(
     settings: &SurfaceSettings,
     setup: &Setup,
+    observe: impl FnMut(usize) -> ControlFlow<()>,
+) -> Result<Outcome> {
+    measure_recorded(settings, setup, &mut Recorder::idle(&mut Keeper::idle()), observe)
+}
+
+/// As [`measure`], with the answers noted by `recorder`, or known to it.
+///
+/// # Errors
+/// As [`measure`], and those of the recorder.
+pub fn measure_recorded(
+    settings: &SurfaceSettings,
+    setup: &Setup,
+    recorder: &mut Recorder<'_>,
     mut observe: impl FnMut(usize) -> ControlFlow<()>,
 ) -> Result<Outcome> {
     let replay = &setup.replay;
@@ -160,8 +176,12 @@ pub fn measure(
         settings.replay.backend,
         settings.replay.adapter.as_deref(),
     )?;
-    let found = costs_of(evaluator.as_mut(), &population, &mut observe)?;
+    recorder.begin(inputs_of("surface", setup), &evaluator.backend())?;
+    let found = costs_of(&mut recorder.over(evaluator.as_mut()), &population, &mut observe)?;
     let interrupted = found.is_none();
+    if interrupted {
+        recorder.keep()?;
+    }
     let rows = found.unwrap_or_else(|| vec![None; n * n]);
     if !interrupted && rows.iter().all(Option::is_none) {
         let text = "no car of the grid drives the lap to its end: a smaller share, or shorter windows, keep more of them on the road";

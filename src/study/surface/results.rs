@@ -127,7 +127,6 @@ pub fn write_results(
             &setup.replay.car.name,
         )
     };
-    write_json(&folder.join("manifest.json"), &manifest)?;
     let problem = &setup.replay.problem;
     let mut toml = format!(
         "parameters = {:?}\ngrid = {}\ncar = {:?}\n",
@@ -212,7 +211,9 @@ pub fn write_results(
     page.provenance("candidates evaluated", summary.evaluations.to_string());
     page.provenance("time", format!("{:.1} s", summary.elapsed_s));
     page.settings("study.toml, which repeats this run", toml);
-    page.write(folder.join("report.html"))
+    page.write(folder.join("report.html"))?;
+    // Last: it says that the run is whole.
+    write_json(&folder.join("manifest.json"), &manifest)
 }
 
 /// The interactive report, up to its surfaces.

@@ -2,7 +2,7 @@
 
 use super::{Point, SweepSettings};
 use crate::error::{Error, Result};
-use crate::report::{Cells, Column, text_table, write_csv, write_whole};
+use crate::report::{Cells, Column, text_table, write_csv, write_parquet, write_whole};
 use crate::study::run_folder::write_json;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -206,7 +206,7 @@ impl Summary {
         format!("Medians over the seeds\n{}", text_table(&columns))
     }
 
-    /// Writes `sweep.csv`, `medians.csv` and `summary.json`.
+    /// Writes `sweep` and `medians` as CSV and as Parquet, and `summary.json`.
     ///
     /// # Errors
     /// [`Error::Io`] if a file cannot be written.
@@ -241,6 +241,7 @@ impl Summary {
             cells: Cells::Numbers(cells),
         }));
         write_csv(folder.join("sweep.csv"), &columns)?;
+        write_parquet(folder.join("sweep.parquet"), &columns)?;
 
         let keys: Vec<(&String, Vec<String>)> = self.groups[0]
             .settings
@@ -278,7 +279,8 @@ impl Summary {
             unit: "",
             cells: Cells::Numbers(cells),
         }));
-        write_csv(folder.join("medians.csv"), &columns)
+        write_csv(folder.join("medians.csv"), &columns)?;
+        write_parquet(folder.join("medians.parquet"), &columns)
     }
 }
 

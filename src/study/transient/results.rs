@@ -178,8 +178,9 @@ pub fn write_results(folder: &Path, outcome: &Outcome, summary: &Summary) -> Res
         settings: "",
         ..Manifest::new("transient", summary.seed, &backend, &summary.car)
     };
-    write_json(&folder.join("manifest.json"), &manifest)?;
-    super::page::write(folder, outcome, summary, &driven_m(outcome))
+    super::page::write(folder, outcome, summary, &driven_m(outcome))?;
+    // Last: it says that the run is whole.
+    write_json(&folder.join("manifest.json"), &manifest)
 }
 
 /// Where the car went (m).

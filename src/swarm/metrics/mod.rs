@@ -14,11 +14,14 @@
 //! 4. Zitzler, Thiele, Laumanns, Fonseca, Grunert da Fonseca, *Performance assessment of multiobjective
 //!    optimizers*, IEEE TEC 7 (2003) (epsilon).
 //! 5. Kung, Luccio, Preparata, *On finding the maxima of a set of vectors*, J. ACM 22 (1975).
+//! 6. Zhang, Tian, Cheng, Jin, *An efficient approach to nondominated sorting for evolutionary multiobjective
+//!    optimization*, IEEE TEC 19 (2015) (fronts by bisection).
 
 mod contribution;
 mod hypervolume;
 mod indicators;
 mod non_dominated;
+mod ranks;
 mod significance;
 mod staircase;
 
@@ -27,5 +30,6 @@ pub use contribution::contributions;
 pub use hypervolume::hypervolume;
 pub use indicators::{Scale, epsilon, igd_plus, spread};
 pub use non_dominated::non_dominated;
+pub use ranks::ranks;
 pub use significance::signed_rank;
 pub(super) use staircase::Staircase;

@@ -2,6 +2,7 @@
 
 use super::staircase::Staircase;
 use crate::swarm::archive::dominates;
+use std::cmp::Ordering;
 
 /// Indices of the points that no other dominates, ascending; of equal points the first. `O(n log n)` for up to
 /// three objectives \[5\], `O(n m)` for a front of `m` beyond. Rows with a number that is not finite are left
@@ -10,18 +11,7 @@ pub fn non_dominated(points: &[Vec<f64>]) -> Vec<usize> {
     let finite = |i: &usize| points[*i].iter().all(|x| x.is_finite());
     let mut order: Vec<usize> = (0..points.len()).filter(finite).collect();
     let width = order.first().map_or(0, |&i| points[i].len());
-    // By the last objective, then by the others: whatever dominates a point, or equals it and came first, comes
-    // before it.
-    let by = |&a: &usize, &b: &usize| {
-        let (p, q) = (&points[a], &points[b]);
-        let unequal = (0..width)
-            .rev()
-            .map(|k| p[k].partial_cmp(&q[k]).unwrap_or(std::cmp::Ordering::Equal));
-        unequal
-            .fold(std::cmp::Ordering::Equal, std::cmp::Ordering::then)
-            .then(a.cmp(&b))
-    };
-    order.sort_by(by);
+    order.sort_by(by_last(points));
     let mut front = Vec::new();
     match width {
         0 => front.extend(order.first()),
@@ -47,6 +37,20 @@ pub fn non_dominated(points: &[Vec<f64>]) -> Vec<usize> {
     }
     front.sort_unstable();
     front
+}
+
+/// The order by the last objective, then by the one before and so on, then by place: whatever dominates a point, or equals
+/// it and came first, comes before it.
+pub(super) fn by_last(points: &[Vec<f64>]) -> impl Fn(&usize, &usize) -> Ordering {
+    |&a, &b| {
+        let (p, q) = (&points[a], &points[b]);
+        let unequal = p
+            .iter()
+            .zip(q)
+            .rev()
+            .map(|(x, y)| x.partial_cmp(y).unwrap_or(Ordering::Equal));
+        unequal.fold(Ordering::Equal, Ordering::then).then(a.cmp(&b))
+    }
 }
 
 #[cfg(test)]

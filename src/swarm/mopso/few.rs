@@ -36,7 +36,7 @@ impl Few {
             best_objectives: vec![vec![f64::INFINITY; problem.objectives.len()]; settings.motion.population],
             best_violation: vec![f64::INFINITY; settings.motion.population],
             objectives: problem.objectives.len(),
-            archive: Archive::new(settings.archive, settings.truncation),
+            archive: settings.empty_archive(problem.objectives.len())?,
             random,
             particles,
             settings,

@@ -193,7 +193,7 @@ impl Many {
             best_position: position.clone(),
             best_objectives: vec![UNKNOWN; lanes * width],
             best_violation: Vec::new(),
-            archive: Archive::new(settings.archive, settings.truncation),
+            archive: settings.empty_archive(problem.objectives.len())?,
             objectives: width,
             position,
             random,

@@ -71,6 +71,26 @@ pub fn demand_w(v_mps: f64, ax_mps2: f64, mass_kg: f64, drag_n: f64, rolling: f6
 pub const GRAVITY_MPS2: f64 = 9.80665;
 
 impl Powertrain {
+    /// The same with torque and fuel flow, and what the rules let flow, multiplied by `share` at every engine speed.
+    pub fn scaled(&self, share: f64) -> Self {
+        let all = |values: &[f64]| -> Vec<f64> { values.iter().map(|x| share * x).collect() };
+        Self {
+            torque_nm: all(&self.torque_nm),
+            engine: self.engine.as_ref().map(|engine| EngineMap {
+                torque_nm: engine.torque_nm.iter().map(|row| all(row)).collect(),
+                fuel_flow_kgph: engine.fuel_flow_kgph.iter().map(|row| all(row)).collect(),
+                flow_limit: engine.flow_limit.map(|limit| FlowLimit {
+                    most_kgph: share * limit.most_kgph,
+                    slope_kgph_per_rpm: share * limit.slope_kgph_per_rpm,
+                    offset_kgph: share * limit.offset_kgph,
+                    ..limit
+                }),
+                ..engine.clone()
+            }),
+            ..self.clone()
+        }
+    }
+
     /// Reads `[powertrain]`.
     pub fn from_table(table: &Table<'_>) -> Result<Self> {
         let list = |key: &str, least: usize, minimum: f64, meaning: &str| -> Result<Vec<f64>> {

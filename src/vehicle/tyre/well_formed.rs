@@ -2,10 +2,11 @@
 //! so that every backend refuses the same candidates for the same reasons.
 
 use super::{LEAST_LOAD, Tyre, TyreCoefficients, TyreInput};
+use serde::{Deserialize, Serialize};
 use std::fmt;
 
 /// Why a set of coefficients makes no tyre.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum IllFormed {
     /// A coefficient is not a finite number.
     NotFinite,

@@ -4,7 +4,9 @@ mod files;
 mod page;
 mod pictures;
 
-use super::{HybridSetup, HybridStudySettings, Outcome, ReportedLap, Sizing, StintLap};
+use super::{
+    HybridSetup, HybridStudySettings, Outcome, ReportedLap, Sizing, StintLap, correlation, mean_worths,
+};
 use crate::error::Result;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -110,6 +112,13 @@ pub struct DeploymentFigures {
     pub front: Vec<FrontFigures>,
     /// Laps on the swarm's front between the study's objectives.
     pub swarm_front_size: Option<usize>,
+    /// Correlation of what a joule buys with the speed at which it is deployed, over the stretches of the lap on which the
+    /// motor is of use; `null` for too few.
+    pub worth_speed_correlation: Option<f64>,
+    /// What a megajoule buys by itself on the mean (s), where the swarm deploys,
+    pub worth_taken_s_per_mj: Option<f64>,
+    /// and where it does not.
+    pub worth_left_s_per_mj: Option<f64>,
 }
 
 /// The figures of a study; `--json` prints this.
@@ -239,6 +248,9 @@ pub fn summarise(settings: &HybridStudySettings, setup: &HybridSetup, outcome: &
                 })
                 .collect(),
             swarm_front_size: o.swarm_front.as_ref().map(|f| f.objectives.len()),
+            worth_speed_correlation: correlation(&o.worth),
+            worth_taken_s_per_mj: mean_worths(&o.worth)[0],
+            worth_left_s_per_mj: mean_worths(&o.worth)[1],
         }),
         stint: outcome.stint.clone(),
         sizing: outcome.sizing.clone(),
@@ -299,6 +311,16 @@ impl HybridSummary {
             for p in &d.front {
                 text += &format!("{:>8.2} MJ{:>10.3} s\n", p.energy_mj, p.lap_time_s);
             }
+            if let (Some(taken), Some(left), Some(with)) = (
+                d.worth_taken_s_per_mj,
+                d.worth_left_s_per_mj,
+                d.worth_speed_correlation,
+            ) {
+                text += &format!(
+                    "A megajoule by itself buys {taken:.2} s where the swarm deploys and {left:.2} s where it does not \
+                     (correlation with speed {with:.2})\n"
+                );
+            }
         }
         for (i, lap) in self.stint.iter().enumerate() {
             text += &format!(
@@ -317,8 +339,17 @@ impl HybridSummary {
         for s in &self.sizing {
             text += &match s.energy_mj {
                 Some(mj) => format!(
-                    "{:>6.0} kW and {mj:.2} MJ a lap ({:.2} harvested) lap in {:.3} s with {:.3} l\n",
-                    s.power_kw, s.harvested_mj, s.lap_time_s, s.fuel_l
+                    "{:>6.0} kW and {mj:.2} MJ a lap ({:.2} harvested) lap in {:.3} s with {:.3} l{}\n",
+                    s.power_kw,
+                    s.harvested_mj,
+                    s.lap_time_s,
+                    s.fuel_l,
+                    match (s.engine_share, s.fuel_saving_l) {
+                        (Some(share), Some(saving)) => format!(
+                            ", {saving:.3} l less than an engine of {share:.3} times the power that laps as fast"
+                        ),
+                        _ => String::new(),
+                    }
                 ),
                 None => format!(
                     "{:>6.0} kW do not suffice: {:.3} s at best\n",

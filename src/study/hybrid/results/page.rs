@@ -98,8 +98,16 @@ fn head(page: &mut HtmlReport, summary: &HybridSummary) {
     for sizing in &summary.sizing {
         page.sentence(match sizing.energy_mj {
             Some(mj) => format!(
-                "A motor of {:.0} kW with {mj:.2} MJ a lap laps in {:.2} s with {:.2} l.",
-                sizing.power_kw, sizing.lap_time_s, sizing.fuel_l
+                "A motor of {:.0} kW with {mj:.2} MJ a lap laps in {:.2} s with {:.2} l{}.",
+                sizing.power_kw,
+                sizing.lap_time_s,
+                sizing.fuel_l,
+                match (sizing.engine_share, sizing.fuel_saving_l) {
+                    (Some(share), Some(saving)) => format!(
+                        ", {saving:.2} l less than a car without a motor whose engine has {share:.2} times the power"
+                    ),
+                    _ => String::new(),
+                }
             ),
             None => format!(
                 "A motor of {:.0} kW does not suffice: {:.2} s at best.",

@@ -6,7 +6,7 @@ use crate::error::Result;
 use crate::report::{
     Curve, CurvePanel, Objective, SiteMap, TrackMap, plot_curves, plot_pareto, plot_site_map, plot_track_map,
 };
-use crate::study::hybrid::{HybridSetup, HybridStudySettings, Outcome, ReportedLap, StrategyFront};
+use crate::study::hybrid::{HybridSetup, HybridStudySettings, Outcome, ReportedLap, StrategyFront, Worth};
 use glam::DVec2;
 use std::path::Path;
 
@@ -39,6 +39,9 @@ pub fn draw(
     }
     if let Some(o) = &outcome.optimised {
         draw_time_energy(&folder.join("time_energy.svg"), outcome)?;
+        if !o.worth.is_empty() {
+            draw_worth(&folder.join("worth.svg"), outcome, &o.worth)?;
+        }
         if let Some(front) = o.swarm_front.as_ref().filter(|f| f.objectives.len() > 1) {
             draw_front(folder, settings, front)?;
         }
@@ -429,6 +432,45 @@ pub fn time_energy(outcome: &Outcome) -> Vec<CurvePanel<'static>> {
         });
     }
     panels
+}
+
+/// What a megajoule buys by the speed at which it is deployed, and along the lap.
+fn draw_worth(path: &Path, outcome: &Outcome, worth: &[Worth]) -> Result<()> {
+    let dots = |label, along: fn(&Worth) -> f64, chosen: &dyn Fn(&Worth) -> bool| {
+        let rows = worth.iter().filter(|w| chosen(w));
+        // A curve of gaps is dots.
+        let points: Vec<(f64, f64)> = rows
+            .flat_map(|w| [(along(w), w.s_per_mj), (along(w), f64::NAN)])
+            .collect();
+        Curve {
+            label,
+            x: points.iter().map(|p| p.0).collect(),
+            y: points.iter().map(|p| p.1).collect(),
+            shade: None,
+        }
+    };
+    let panel = |title, x_label, along: fn(&Worth) -> f64| CurvePanel {
+        title,
+        x_label,
+        y_label: "time gained (s/MJ)",
+        curves: vec![
+            dots("the swarm deploys", along, &|w| w.taken >= 0.5),
+            dots("the swarm does not", along, &|w| w.taken < 0.5),
+        ],
+    };
+    let panels = [
+        panel(
+            "What a megajoule buys by speed",
+            "speed of the engine alone (m/s)",
+            |w| w.speed_mps,
+        ),
+        panel("Along the lap", DISTANCE, |w| w.station_m),
+    ];
+    let title = format!(
+        "The motor on one stretch at a time, {:.3} s without it",
+        outcome.engine.lap.time
+    );
+    plot_curves(path, &title, &panels)
 }
 
 /// The swarm's front as scatters of every two objectives and in parallel coordinates with its variables.

@@ -1,0 +1,146 @@
+//! What the optimiser itself costs: a generation of the large swarm without its evaluations, and what it is made of, each
+//! against the number of particles. Evaluations are made once, before the clock runs.
+//!
+//! `LAPSWARM_BENCH_QUICK=1` leaves out the largest for continuous integration.
+
+use criterion::{BatchSize, BenchmarkId, Criterion, SamplingMode, Throughput};
+use lapswarm::evaluate::simd::InstructionSet;
+use lapswarm::evaluate::{Evaluation, Evaluator};
+use lapswarm::random::Random;
+use lapswarm::swarm::metrics::{contributions, hypervolume, non_dominated, ranks};
+use lapswarm::swarm::problems::{SimdTestEvaluator, TestProblem};
+use lapswarm::swarm::{Mopso, MopsoSettings, Nsga2, Nsga2Settings, Optimiser, PsoSettings};
+use std::time::Duration;
+
+/// Variables of the problems.
+const VARIABLES: usize = 12;
+/// Generations before the one that is measured: the archive is full then.
+const BEFORE: usize = 5;
+
+fn populations() -> Vec<usize> {
+    let all = [1000, 10_000, 100_000];
+    let quick = std::env::var("LAPSWARM_BENCH_QUICK").is_ok_and(|x| x == "1");
+    all[..if quick { 2 } else { 3 }].to_vec()
+}
+
+/// Problems of two and three objectives.
+fn problems() -> [TestProblem; 2] {
+    ["zdt1", "dtlz2"].map(|name| TestProblem::sized(name, VARIABLES).expect("known"))
+}
+
+/// An optimiser in its stride, and what it is told next.
+fn in_stride<T: Optimiser>(mut optimiser: T, problem: &TestProblem) -> (T, Evaluation) {
+    let mut evaluator = SimdTestEvaluator::new(problem, InstructionSet::best());
+    for _ in 0..BEFORE {
+        let candidates = optimiser.ask();
+        let evaluation = evaluator.evaluate(&candidates).expect("no device");
+        optimiser.tell(&evaluation);
+    }
+    let candidates = optimiser.ask();
+    let evaluation = evaluator.evaluate(&candidates).expect("no device");
+    (optimiser, evaluation)
+}
+
+fn generations(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("generation");
+    group
+        .sampling_mode(SamplingMode::Flat)
+        .sample_size(10)
+        .warm_up_time(Duration::from_millis(100))
+        .measurement_time(Duration::from_secs(2));
+    for problem in problems() {
+        let objectives = problem.problem().objectives.len();
+        for population in populations() {
+            group.throughput(Throughput::Elements(population as u64));
+            let default = MopsoSettings::default();
+            let motion = PsoSettings {
+                population,
+                ..default.motion
+            };
+            let swarm = Mopso::new(problem.problem(), MopsoSettings { motion, ..default }).expect("sound");
+            let (swarm, told) = in_stride(swarm, &problem);
+            let id = BenchmarkId::new(format!("mopso, {objectives} objectives"), population);
+            group.bench_function(id, |bencher| {
+                let generation = |mut swarm: Mopso| {
+                    swarm.tell(&told);
+                    (swarm.ask(), swarm)
+                };
+                bencher.iter_batched(|| swarm.clone(), generation, BatchSize::LargeInput);
+            });
+            let settings = Nsga2Settings {
+                population,
+                ..Nsga2Settings::default()
+            };
+            let genetic = Nsga2::new(problem.problem(), settings).expect("sound");
+            let (genetic, told) = in_stride(genetic, &problem);
+            let id = BenchmarkId::new(format!("nsga2, {objectives} objectives"), population);
+            group.bench_function(id, |bencher| {
+                let generation = |mut genetic: Nsga2| {
+                    genetic.tell(&told);
+                    (genetic.ask(), genetic)
+                };
+                bencher.iter_batched(|| genetic.clone(), generation, BatchSize::LargeInput);
+            });
+        }
+    }
+    group.finish();
+}
+
+/// Points of the unit cube.
+fn cloud(count: usize, width: usize) -> Vec<Vec<f64>> {
+    let random = Random::new(4);
+    (0..count as u32)
+        .map(|i| (0..width as u32).map(|k| random.uniform(1, 0, i, k)).collect())
+        .collect()
+}
+
+/// Points of the unit sphere, none of which dominates another.
+fn sphere(count: usize, width: usize) -> Vec<Vec<f64>> {
+    let mut points = cloud(count, width);
+    for point in &mut points {
+        let radius = point.iter().map(|x| x * x).sum::<f64>().sqrt();
+        point.iter_mut().for_each(|x| *x /= radius);
+    }
+    points
+}
+
+fn metrics(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("metrics");
+    group
+        .sampling_mode(SamplingMode::Flat)
+        .sample_size(10)
+        .warm_up_time(Duration::from_millis(100))
+        .measurement_time(Duration::from_secs(2));
+    for width in [2, 3] {
+        for count in populations() {
+            group.throughput(Throughput::Elements(count as u64));
+            let (cloud, front) = (cloud(count, width), sphere(count, width));
+            let reference = vec![1.1; width];
+            let id = |what: &str| BenchmarkId::new(format!("{what}, {width} objectives"), count);
+            group.bench_function(id("non-dominated of a cloud"), |bencher| {
+                bencher.iter(|| non_dominated(&cloud));
+            });
+            group.bench_function(id("non-dominated of a front"), |bencher| {
+                bencher.iter(|| non_dominated(&front));
+            });
+            group.bench_function(id("ranks of a cloud"), |bencher| bencher.iter(|| ranks(&cloud)));
+            group.bench_function(id("hypervolume of a front"), |bencher| {
+                bencher.iter(|| hypervolume(&front, &reference));
+            });
+        }
+        let front = sphere(100, width);
+        group.throughput(Throughput::Elements(100));
+        let id = BenchmarkId::new(format!("contributions to a front, {width} objectives"), 100);
+        group.bench_function(id, |bencher| {
+            bencher.iter(|| contributions(&front, &vec![1.1; width]));
+        });
+    }
+    group.finish();
+}
+
+fn main() {
+    let mut criterion = Criterion::default().configure_from_args();
+    generations(&mut criterion);
+    metrics(&mut criterion);
+    criterion.final_summary();
+}

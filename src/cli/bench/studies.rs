@@ -1,0 +1,455 @@
+//! `lapswarm bench studies`: every optimiser of several objectives on the studies' own problems, hypervolume against time.
+
+use crate::cli::{backend_flag, print_json};
+use lapswarm::evaluate::line::{LineObjective, LineProblem, open_line_evaluator};
+use lapswarm::evaluate::replay::{CHANNEL_NAMES, ReplayProblem, open_evaluator};
+use lapswarm::evaluate::{BackendChoice, Evaluator, FAILED_COST, Problem};
+use lapswarm::random::Random;
+use lapswarm::report::{QualityPanel, QualityRun, plot_quality};
+use lapswarm::study::identify::{self, IdentifySettings, ObjectiveChoice};
+use lapswarm::study::raceline::{self, ExactSolvers, RacelineSettings};
+use lapswarm::swarm::comparison::{MULTI_OBJECTIVE, Sizes, quartiles, several};
+use lapswarm::swarm::metrics::hypervolume;
+use lapswarm::{Error, Result};
+use serde::Serialize;
+use std::path::PathBuf;
+use std::time::Instant;
+
+/// Flags of `bench studies`.
+#[derive(clap::Args)]
+pub struct Arguments {
+    /// Problems: identify (speed, lateral acceleration and yaw rate through Maggotts and Becketts, 22 unknowns), raceline
+    /// (Gamma, length and lap time at Silverstone, from the exact lines)
+    #[arg(long, value_delimiter = ',', value_parser = PROBLEMS, default_value = "identify,raceline")]
+    problems: Vec<String>,
+    /// Only these algorithms [default: all for several objectives]
+    #[arg(long, value_delimiter = ',', value_parser = MULTI_OBJECTIVE)]
+    algorithms: Vec<String>,
+    /// Populations to compare
+    #[arg(long, value_delimiter = ',', default_value = "100,1000,10000,100000",
+          value_parser = clap::value_parser!(u32).range(4..=10_000_000))]
+    populations: Vec<u32>,
+    /// Evaluations of every run: so many generations as come nearest, one at least
+    #[arg(long, value_name = "N", default_value_t = 200_000, value_parser = clap::value_parser!(u64).range(100..))]
+    evaluations: u64,
+    /// Members of the archive
+    #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u32).range(8..=10_000))]
+    archive: u32,
+    /// Runs of each, seeds 1 to N
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u64).range(1..=60))]
+    seeds: u64,
+    /// Cuts of the circuit that lines are driven on
+    #[arg(long, value_name = "N", default_value_t = 480, value_parser = clap::value_parser!(u32).range(60..=100_000))]
+    sections: u32,
+    /// What evaluates
+    #[arg(long, value_parser = backend_flag, default_value = "auto")]
+    backend: BackendChoice,
+    /// Part of the name of the GPU to use
+    #[arg(long)]
+    adapter: Option<String>,
+    /// Draw hypervolume against time into this SVG
+    #[arg(long, value_name = "FILE")]
+    plot: Option<PathBuf>,
+    /// Print one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+const PROBLEMS: [&str; 2] = ["identify", "raceline"];
+/// The part of the bundled lap that cars are identified on.
+const SECTION: &str = "Maggotts/Becketts";
+/// Random cars whose median costs are the reference point.
+const RANDOM_CARS: usize = 1000;
+/// Purpose of their draws in the counter.
+const CARS: u32 = 0x57d1;
+/// A hypervolume is noted down when so many times the evaluations are done as when the last was.
+const SPACING: f64 = 1.03;
+
+enum Kind {
+    Replay(Box<ReplayProblem>),
+    Line(Box<LineProblem>),
+}
+
+/// A problem with the box that hypervolumes are shares of.
+struct Case {
+    name: &'static str,
+    kind: Kind,
+    /// The lines that runs start from, and the settings that say how.
+    lines: Option<(RacelineSettings, Vec<Vec<f64>>)>,
+    ideal: Vec<f64>,
+    reference: Vec<f64>,
+}
+
+/// One algorithm with one population on one problem.
+#[derive(Serialize)]
+struct Row {
+    problem: &'static str,
+    algorithm: String,
+    population: usize,
+    generations: usize,
+    evaluations: u64,
+    seeds: u64,
+    hypervolume_median: f64,
+    hypervolume_iqr: f64,
+    seconds_median: f64,
+    /// Of these, those of the evaluations.
+    evaluation_s_median: f64,
+    /// The run that comes nearest to the median.
+    history: History,
+}
+
+#[derive(Clone, Default, Serialize)]
+struct History {
+    evaluations: Vec<u64>,
+    seconds: Vec<f64>,
+    hypervolume: Vec<f64>,
+}
+
+/// The box of a problem.
+#[derive(Serialize)]
+struct Scored {
+    problem: &'static str,
+    variables: usize,
+    objectives: Vec<String>,
+    ideal: Vec<f64>,
+    reference: Vec<f64>,
+    backend: &'static str,
+    device: String,
+}
+
+#[derive(Serialize)]
+struct Table {
+    study: &'static str,
+    threads: usize,
+    archive: u32,
+    problems: Vec<Scored>,
+    rows: Vec<Row>,
+}
+
+impl Case {
+    fn new(name: &str, arguments: &Arguments) -> Result<Self> {
+        if name == "identify" {
+            Self::identify(arguments)
+        } else {
+            Self::raceline(arguments)
+        }
+    }
+
+    /// The box reaches from no error at all to the median costs of random cars that drive.
+    fn identify(arguments: &Arguments) -> Result<Self> {
+        let channels = ["vx", "ay", "yaw_rate"];
+        let place = |name: &&str| CHANNEL_NAMES.iter().position(|c| c == name);
+        let settings = IdentifySettings {
+            section: Some(SECTION.to_owned()),
+            objectives: channels
+                .iter()
+                .filter_map(place)
+                .map(ObjectiveChoice::Channel)
+                .collect(),
+            ..IdentifySettings::default()
+        };
+        let replay = identify::set_up(&settings)?.replay;
+        let random = Random::new(1);
+        let cars: Vec<f64> = (0..RANDOM_CARS as u32)
+            .flat_map(|car| {
+                let variables = replay.problem.variables.iter().enumerate();
+                variables
+                    .map(move |(k, v)| v.lower + random.uniform(CARS, 0, car, k as u32) * (v.upper - v.lower))
+            })
+            .collect();
+        let costs = open_evaluator(&replay, arguments.backend, arguments.adapter.as_deref())?
+            .evaluate(&cars)?
+            .objectives;
+        let width = channels.len();
+        let reference: Vec<f64> = (0..width)
+            .map(|k| {
+                let column = costs.iter().skip(k).step_by(width);
+                quartiles(&column.copied().filter(|c| *c < FAILED_COST).collect::<Vec<_>>())[1]
+            })
+            .collect();
+        if reference.iter().any(|r| !r.is_finite()) {
+            return Err(Error::Study("none of the random cars drives".to_owned()));
+        }
+        Ok(Self {
+            name: "identify",
+            ideal: vec![0.0; width],
+            reference,
+            lines: None,
+            kind: Kind::Replay(Box::new(replay)),
+        })
+    }
+
+    /// The box reaches from the best to the worst of each objective among the exact lines and the reference line.
+    fn raceline(arguments: &Arguments) -> Result<Self> {
+        let settings = RacelineSettings {
+            sections: arguments.sections as usize,
+            objectives: vec![
+                LineObjective::Gamma,
+                LineObjective::Length,
+                LineObjective::LapTime,
+            ],
+            ..RacelineSettings::default()
+        };
+        let setup = raceline::set_up(&settings)?;
+        let solvers = ExactSolvers::new(&setup, &settings)?;
+        let mut known = Vec::new();
+        for objective in &settings.objectives {
+            known.extend(solvers.best(*objective)?.map(|line| line.alpha));
+        }
+        let problem = raceline::front_problem(&setup, &settings)?;
+        let mut lines: Vec<f64> = problem.candidate(&setup.cuts.reference)?;
+        for alpha in &known {
+            lines.extend(problem.candidate(alpha)?);
+        }
+        let rows = open_line_evaluator(&problem, arguments.backend, arguments.adapter.as_deref())?
+            .evaluate(&lines)?
+            .objectives;
+        let width = settings.objectives.len();
+        let extreme = |from: f64, f: fn(f64, f64) -> f64| -> Vec<f64> {
+            let column = |k: usize| rows.iter().skip(k).step_by(width).copied();
+            (0..width).map(|k| column(k).fold(from, f)).collect()
+        };
+        Ok(Self {
+            name: "raceline",
+            ideal: extreme(f64::INFINITY, f64::min),
+            reference: extreme(f64::NEG_INFINITY, f64::max),
+            lines: Some((settings, known)),
+            kind: Kind::Line(Box::new(problem)),
+        })
+    }
+
+    fn problem(&self) -> &Problem {
+        match &self.kind {
+            Kind::Replay(replay) => &replay.problem,
+            Kind::Line(line) => &line.problem,
+        }
+    }
+
+    fn evaluator(&self, arguments: &Arguments) -> Result<Box<dyn Evaluator + '_>> {
+        let adapter = arguments.adapter.as_deref();
+        match &self.kind {
+            Kind::Replay(replay) => open_evaluator(replay, arguments.backend, adapter),
+            Kind::Line(line) => open_line_evaluator(line, arguments.backend, adapter),
+        }
+    }
+
+    /// The first candidates, as the study would choose them.
+    fn start(&self, population: usize, seed: u64) -> Result<Vec<Vec<f64>>> {
+        match (&self.kind, &self.lines) {
+            (Kind::Line(problem), Some((settings, known))) => {
+                let settings = RacelineSettings {
+                    population,
+                    seed,
+                    ..settings.clone()
+                };
+                raceline::starting_lines(problem, &settings, known)
+            }
+            _ => Ok(Vec::new()),
+        }
+    }
+
+    /// Share of the box that a front dominates.
+    fn quality(&self, front: &[Vec<f64>]) -> Result<f64> {
+        let share = |row: &Vec<f64>| {
+            let bounds = self.ideal.iter().zip(&self.reference);
+            row.iter()
+                .zip(bounds)
+                .map(|(x, (ideal, reference))| (x - ideal) / (reference - ideal))
+                .collect()
+        };
+        let shares: Vec<Vec<f64>> = front.iter().map(share).collect();
+        hypervolume(&shares, &vec![1.0; self.ideal.len()])
+    }
+}
+
+/// Measures and prints.
+pub fn run(arguments: &Arguments) -> Result<()> {
+    let algorithms: Vec<&str> = if arguments.algorithms.is_empty() {
+        MULTI_OBJECTIVE.to_vec()
+    } else {
+        arguments.algorithms.iter().map(String::as_str).collect()
+    };
+    let mut table = Table {
+        study: "bench studies",
+        threads: rayon::current_num_threads(),
+        archive: arguments.archive,
+        problems: Vec::new(),
+        rows: Vec::new(),
+    };
+    if !arguments.json {
+        println!(
+            "{} evaluations, archive of {}, {} threads, medians of {} seeds; hypervolume as a share of the problem's box",
+            arguments.evaluations, arguments.archive, table.threads, arguments.seeds
+        );
+        println!(
+            "{:<10}{:<18}{:>11}{:>12}{:>13}{:>10}{:>10}{:>14}",
+            "problem",
+            "algorithm",
+            "population",
+            "generations",
+            "hypervolume",
+            "IQR",
+            "seconds",
+            "evaluation s"
+        );
+    }
+    for name in &arguments.problems {
+        let case = Case::new(name, arguments)?;
+        let backend = case.evaluator(arguments)?.backend();
+        let problem = case.problem();
+        table.problems.push(Scored {
+            problem: case.name,
+            variables: problem.variables.len(),
+            objectives: problem
+                .objectives
+                .iter()
+                .map(|o| format!("{} ({})", o.name, o.unit))
+                .collect(),
+            ideal: case.ideal.clone(),
+            reference: case.reference.clone(),
+            backend: backend.backend,
+            device: backend.device,
+        });
+        for &population in &arguments.populations {
+            for algorithm in &algorithms {
+                let row = measure(&case, algorithm, population as usize, arguments)?;
+                if !arguments.json {
+                    print_row(&row);
+                }
+                table.rows.push(row);
+            }
+        }
+    }
+    if let Some(path) = &arguments.plot {
+        plot(path, &table)?;
+    }
+    if arguments.json {
+        print_json(&table)?;
+    }
+    Ok(())
+}
+
+fn print_row(row: &Row) {
+    println!(
+        "{:<10}{:<18}{:>11}{:>12}{:>13.4}{:>10.1e}{:>10.2}{:>14.2}",
+        row.problem,
+        row.algorithm,
+        row.population,
+        row.generations,
+        row.hypervolume_median,
+        row.hypervolume_iqr,
+        row.seconds_median,
+        row.evaluation_s_median
+    );
+}
+
+fn measure(case: &Case, algorithm: &str, population: usize, arguments: &Arguments) -> Result<Row> {
+    // The genetic algorithm breeds pairs.
+    let population = population.next_multiple_of(2);
+    let generations = ((arguments.evaluations as f64 / population as f64).round() as usize).max(1);
+    let mut runs = Vec::new();
+    for seed in 1..=arguments.seeds {
+        let sizes = Sizes {
+            population,
+            iterations: generations,
+            archive: arguments.archive as usize,
+            seed,
+        };
+        runs.push(follow(case, algorithm, sizes, arguments)?);
+    }
+    let last = |values: &[f64]| values.last().copied().unwrap_or(f64::NAN);
+    let reached: Vec<f64> = runs.iter().map(|r| last(&r.0.hypervolume)).collect();
+    let seconds: Vec<f64> = runs.iter().map(|r| last(&r.0.seconds)).collect();
+    let evaluating: Vec<f64> = runs.iter().map(|r| r.1).collect();
+    let [low, median, high] = quartiles(&reached);
+    let nearest = (0..runs.len())
+        .min_by(|&a, &b| f64::total_cmp(&(reached[a] - median).abs(), &(reached[b] - median).abs()));
+    Ok(Row {
+        problem: case.name,
+        algorithm: algorithm.to_owned(),
+        population,
+        generations,
+        evaluations: (population * generations) as u64,
+        seeds: arguments.seeds,
+        hypervolume_median: median,
+        hypervolume_iqr: high - low,
+        seconds_median: quartiles(&seconds)[1],
+        evaluation_s_median: quartiles(&evaluating)[1],
+        history: nearest.map(|i| runs[i].0.clone()).unwrap_or_default(),
+    })
+}
+
+/// One run, and the seconds that its evaluations took.
+fn follow(case: &Case, algorithm: &str, sizes: Sizes, arguments: &Arguments) -> Result<(History, f64)> {
+    let mut evaluator = case.evaluator(arguments)?;
+    let start = case.start(sizes.population, sizes.seed)?;
+    let mut optimiser = several(algorithm, case.problem(), sizes, &start)?;
+    drop(start);
+    let mut history = History::default();
+    let (mut seconds, mut evaluating, mut noted) = (0.0, 0.0, 0.0);
+    while !optimiser.done() {
+        let began = Instant::now();
+        let population = optimiser.ask();
+        let asked = began.elapsed().as_secs_f64();
+        let evaluation = evaluator.evaluate(&population)?;
+        evaluating += began.elapsed().as_secs_f64() - asked;
+        optimiser.tell(&evaluation);
+        seconds += began.elapsed().as_secs_f64();
+        let done = optimiser.evaluations();
+        if done as f64 >= SPACING * noted || optimiser.done() {
+            noted = done as f64;
+            history.evaluations.push(done);
+            history.seconds.push(seconds);
+            history
+                .hypervolume
+                .push(case.quality(&optimiser.front().objectives)?);
+        }
+    }
+    Ok((history, evaluating))
+}
+
+/// A panel for each population and problem, all of a problem over the same range: what the lower half of the runs end at
+/// is in it, how they began need not be.
+fn plot(path: &std::path::Path, table: &Table) -> Result<()> {
+    let mut panels = Vec::new();
+    let mut populations: Vec<usize> = table.rows.iter().map(|r| r.population).collect();
+    populations.sort_unstable();
+    populations.dedup();
+    for population in populations {
+        for problem in table.problems.iter().map(|p| p.problem) {
+            let ends: Vec<f64> = table
+                .rows
+                .iter()
+                .filter(|r| r.problem == problem)
+                .map(|r| r.hypervolume_median)
+                .collect();
+            let [low, _, _] = quartiles(&ends);
+            let most = ends.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            let range = (most - low).max(1e-3);
+            let runs: Vec<QualityRun<'_>> = table
+                .rows
+                .iter()
+                .filter(|r| r.problem == problem && r.population == population)
+                .map(|r| QualityRun {
+                    label: &r.algorithm,
+                    seconds: r.history.seconds.clone(),
+                    hypervolume: r.history.hypervolume.clone(),
+                })
+                .collect();
+            panels.push((
+                format!("{problem}, population {population}"),
+                runs,
+                ((low - range).max(0.0), (most + 0.1 * range).min(1.0)),
+            ));
+        }
+    }
+    let panels: Vec<QualityPanel<'_>> = panels
+        .iter()
+        .map(|(title, runs, shown)| QualityPanel {
+            title,
+            runs: runs.clone(),
+            shown: *shown,
+        })
+        .collect();
+    plot_quality(path, "Hypervolume against time at equal evaluations", &panels)
+}

@@ -1,0 +1,280 @@
+//! What a study has had evaluated, so that a run goes on where it was broken off.
+//!
+//! A study whose work is a sequence of populations is a function of its settings, of what it reads and of the answers to
+//! these populations. Run again and given the answers it has had, it arrives at the place where it was broken off with every
+//! bit of its state, whatever that state is.
+
+use super::keeper::{Keeper, Origin};
+use super::run_folder::STATE;
+use crate::error::{Error, Result};
+use crate::evaluate::{BackendInfo, Evaluation, Evaluator, Problem};
+use crate::swarm::checkpoint::Checkpoint;
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+
+/// An answered population.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+struct Answer {
+    /// Of the population's bits.
+    crc: u32,
+    evaluation: Evaluation,
+}
+
+/// The answers that a study has had, and what they belong to.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Journal {
+    study: String,
+    /// The study's settings, as `postcard` writes them.
+    settings: Vec<u8>,
+    origin: Option<Origin>,
+    answers: Vec<Answer>,
+}
+
+impl Checkpoint for Journal {
+    const KIND: &'static str = concat!("journal of a study, lapswarm ", env!("CARGO_PKG_VERSION"));
+}
+
+impl Journal {
+    /// An empty one.
+    ///
+    /// # Errors
+    /// [`Error::Study`] if the settings cannot be written down at all.
+    pub fn new(study: &str, settings: &impl Serialize) -> Result<Self> {
+        let mut journal = Self {
+            study: study.to_owned(),
+            settings: Vec::new(),
+            origin: None,
+            answers: Vec::new(),
+        };
+        journal.set_settings(settings)?;
+        Ok(journal)
+    }
+
+    /// The settings that the study was begun with.
+    ///
+    /// # Errors
+    /// [`Error::Input`] if they are those of another study.
+    pub fn settings<S: DeserializeOwned>(&self, study: &str) -> Result<S> {
+        let refused = |found: String| Err(Error::input(STATE, "study", found, study));
+        if self.study != study {
+            return refused(self.study.clone());
+        }
+        match postcard::from_bytes(&self.settings) {
+            Ok(settings) => Ok(settings),
+            Err(error) => refused(format!("settings of {study} that cannot be read ({error})")),
+        }
+    }
+
+    /// Puts others in the place of the settings.
+    ///
+    /// # Errors
+    /// As [`Journal::new`].
+    pub fn set_settings(&mut self, settings: &impl Serialize) -> Result<()> {
+        self.settings = postcard::to_allocvec(settings)
+            .map_err(|e| Error::Study(format!("the settings of {} cannot be kept: {e}", self.study)))?;
+        Ok(())
+    }
+}
+
+/// Answers a study's populations from its journal as far as that goes, then has them evaluated and notes the answers.
+pub struct Recorder<'k> {
+    /// Nothing where nothing is kept.
+    journal: Option<Journal>,
+    next: usize,
+    keeper: &'k mut Keeper,
+}
+
+impl<'k> Recorder<'k> {
+    /// Goes by a journal, and has `keeper` keep it.
+    pub fn new(journal: Journal, keeper: &'k mut Keeper) -> Self {
+        Self {
+            journal: Some(journal),
+            next: 0,
+            keeper,
+        }
+    }
+
+    /// Has everything evaluated and notes nothing.
+    pub fn idle(keeper: &'k mut Keeper) -> Self {
+        Self {
+            journal: None,
+            next: 0,
+            keeper,
+        }
+    }
+
+    /// What the answers depend on, to be said before the first of them: a sum over what the study has read, and what
+    /// evaluates.
+    ///
+    /// # Errors
+    /// [`Error::Input`] if the journal is of other inputs or another backend; [`Error::Io`] if it cannot be kept.
+    pub fn begin(&mut self, inputs: String, backend: &BackendInfo) -> Result<()> {
+        let now = Origin::new(inputs, backend);
+        let Some(journal) = &mut self.journal else {
+            return Ok(());
+        };
+        if let Some(began) = &journal.origin {
+            self.keeper.check(began, &now)?;
+        }
+        journal.origin = Some(now);
+        self.keep()
+    }
+
+    /// Saves the journal.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if it cannot be written; the one saved before is still there then.
+    pub fn keep(&mut self) -> Result<()> {
+        match &self.journal {
+            Some(journal) => self.keeper.keep(journal),
+            None => Ok(()),
+        }
+    }
+
+    /// An evaluator whose answers are noted.
+    pub fn over<'a>(&'a mut self, evaluator: &'a mut dyn Evaluator) -> Recorded<'a, 'k> {
+        Recorded {
+            recorder: self,
+            evaluator,
+        }
+    }
+}
+
+/// An [`Evaluator`] whose answers are noted, or known already.
+pub struct Recorded<'a, 'k> {
+    recorder: &'a mut Recorder<'k>,
+    evaluator: &'a mut dyn Evaluator,
+}
+
+fn crc_of(population: &[f64]) -> u32 {
+    crc32fast::hash(bytemuck::cast_slice(population))
+}
+
+impl Evaluator for Recorded<'_, '_> {
+    fn problem(&self) -> &Problem {
+        self.evaluator.problem()
+    }
+
+    fn backend(&self) -> BackendInfo {
+        self.evaluator.backend()
+    }
+
+    fn device_faults(&self) -> &[String] {
+        self.evaluator.device_faults()
+    }
+
+    fn evaluate(&mut self, population: &[f64]) -> Result<Evaluation> {
+        let recorder = &mut *self.recorder;
+        let Some(journal) = &mut recorder.journal else {
+            return self.evaluator.evaluate(population);
+        };
+        let crc = crc_of(population);
+        if let Some(answer) = journal.answers.get(recorder.next) {
+            if answer.crc != crc {
+                let expected = "the populations that the study asks for; it was begun with another build";
+                return Err(Error::input(
+                    STATE,
+                    "answers",
+                    "those to other populations",
+                    expected,
+                ));
+            }
+            recorder.next += 1;
+            return Ok(answer.evaluation.clone());
+        }
+        let evaluation = self.evaluator.evaluate(population)?;
+        journal.answers.push(Answer {
+            crc,
+            evaluation: evaluation.clone(),
+        });
+        recorder.next += 1;
+        if recorder.keeper.due() {
+            recorder.keeper.keep_or_warn(journal);
+        }
+        Ok(evaluation)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::evaluate::{Objective, Variable};
+    use crate::swarm::checkpoint;
+
+    /// The squares of one variable, counted.
+    struct Squares(Problem, usize);
+
+    impl Squares {
+        fn new() -> Self {
+            let problem = Problem {
+                variables: vec![Variable::new("x", "-", 0.0, 1.0)],
+                objectives: vec![Objective::new("square", "-")],
+            };
+            Self(problem, 0)
+        }
+    }
+
+    impl Evaluator for Squares {
+        fn problem(&self) -> &Problem {
+            &self.0
+        }
+
+        fn backend(&self) -> BackendInfo {
+            BackendInfo {
+                backend: "cpu",
+                device: "none".to_owned(),
+                driver: String::new(),
+            }
+        }
+
+        fn evaluate(&mut self, population: &[f64]) -> Result<Evaluation> {
+            self.1 += 1;
+            Ok(Evaluation {
+                objectives: population.iter().map(|x| x * x).collect(),
+                failures: vec![None; population.len()],
+                violations: Vec::new(),
+            })
+        }
+    }
+
+    #[test]
+    fn what_is_known_is_not_evaluated_again_and_other_questions_are_refused() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let file = folder.path().join(STATE);
+        let mut squares = Squares::new();
+        let mut keeper = Keeper::new(folder.path());
+        let mut recorder = Recorder::new(
+            Journal::new("squares", &(3u32, 0.5)).expect("settings"),
+            &mut keeper,
+        );
+        recorder
+            .begin("a".to_owned(), &squares.backend())
+            .expect("it begins");
+        for x in [0.25, 0.5] {
+            recorder.over(&mut squares).evaluate(&[x]).expect("a square");
+        }
+        recorder.keep().expect("it is kept");
+        assert_eq!(squares.1, 2);
+
+        let journal: Journal = checkpoint::load(&file).expect("a journal");
+        assert_eq!(
+            journal.settings::<(u32, f64)>("squares").expect("settings"),
+            (3, 0.5)
+        );
+        assert!(journal.settings::<(u32, f64)>("cubes").is_err());
+        let mut keeper = Keeper::new(folder.path());
+        let mut again = Recorder::new(journal.clone(), &mut keeper);
+        again.begin("a".to_owned(), &squares.backend()).expect("the same");
+        for (x, square) in [(0.25, 0.0625), (0.5, 0.25), (1.0, 1.0)] {
+            let found = again.over(&mut squares).evaluate(&[x]).expect("a square");
+            assert_eq!(found.objectives, [square]);
+        }
+        assert_eq!(squares.1, 3, "only the third was not known");
+
+        let mut keeper = Keeper::new(folder.path());
+        let mut other = Recorder::new(journal.clone(), &mut keeper);
+        assert!(other.over(&mut squares).evaluate(&[0.75]).is_err());
+        let mut elsewhere = Recorder::new(journal, &mut keeper);
+        assert!(elsewhere.begin("b".to_owned(), &squares.backend()).is_err());
+    }
+}

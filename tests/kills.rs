@@ -1,0 +1,316 @@
+//! Runs that are killed or interrupted at any moment lose nothing, and end as if they had been left alone.
+
+use lapswarm::study::identify::SearchState;
+use lapswarm::study::journal::Journal;
+use lapswarm::study::raceline::LinesState;
+use lapswarm::study::run_folder::STATE;
+use lapswarm::swarm::checkpoint;
+use serde_json::Value;
+use std::path::Path;
+use std::process::{Child, Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+const STUDY: &str = "section = \"Abbey\"\nbackend = \"simd\"\n[swarm]\npopulation = 24\niterations = 120\n";
+
+fn start(folder: &Path, arguments: &[&str]) -> Child {
+    Command::new(env!("CARGO_BIN_EXE_lapswarm"))
+        .args(arguments)
+        .args(["--json", "--quiet", "--save-every-s", "0"])
+        .current_dir(folder)
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the program starts")
+}
+
+fn finish(child: Child) -> Output {
+    child.wait_with_output().expect("the program ends")
+}
+
+fn summary(output: &Output) -> Value {
+    let text = String::from_utf8_lossy(&output.stdout);
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    timeless(serde_json::from_str(&text).expect("a summary"))
+}
+
+/// A summary without its times and rates.
+fn timeless(summary: Value) -> Value {
+    match summary {
+        Value::Object(fields) => fields
+            .into_iter()
+            .filter(|(key, _)| {
+                !["elapsed_s", "per_s", "search_s"]
+                    .iter()
+                    .any(|e| key.ends_with(e))
+            })
+            .map(|(key, value)| (key, timeless(value)))
+            .collect(),
+        Value::Array(values) => values.into_iter().map(timeless).collect(),
+        value => value,
+    }
+}
+
+/// Waits until a run has saved a state, and a number of milliseconds more.
+fn let_work(folder: &Path, ms: u64) {
+    for _ in 0..6000 {
+        if folder.join(STATE).is_file() {
+            break;
+        }
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    std::thread::sleep(Duration::from_millis(ms));
+}
+
+/// No file of a folder is part of one: JSON parses, tables end with a line, the state loads.
+fn nothing_half_written(folder: &Path) {
+    for entry in folder.read_dir().expect("a folder").flatten() {
+        let path = entry.path();
+        let bytes = std::fs::read(&path).expect("a file");
+        match path.extension().and_then(|e| e.to_str()) {
+            Some("json") => drop(serde_json::from_slice::<Value>(&bytes).expect("whole JSON")),
+            Some("csv") => assert_eq!(bytes.last(), Some(&b'\n'), "{}", path.display()),
+            Some("svg") => assert!(String::from_utf8_lossy(&bytes).trim_end().ends_with("</svg>")),
+            Some("lapswarm") => {
+                let loads = checkpoint::load::<SearchState>(&path).is_ok()
+                    || checkpoint::load::<LinesState>(&path).is_ok()
+                    || checkpoint::load::<Journal>(&path).is_ok();
+                assert!(loads, "{} is no whole state", path.display());
+            }
+            _ => {}
+        }
+    }
+}
+
+/// Kills a study at moments that are spread at random (by the golden ratio) over the time that it takes when it is left alone,
+/// goes on with it, and holds what it ends with against that of the run that was left alone.
+fn kill_and_go_on(study: &[&str], files: &[&str], kills: u32) {
+    let root = tempfile::tempdir().expect("a temporary folder");
+    std::fs::write(root.path().join("study.toml"), STUDY).expect("a study");
+    let go = |arguments: &[&str]| finish(start(root.path(), arguments));
+    let began = Instant::now();
+    let wanted = summary(&go(&[study, &["--out", "whole"]].concat()));
+    let took = began.elapsed();
+    let mut resumed_runs = 0;
+    for k in 0..kills {
+        let out = format!("killed-{k}");
+        let folder = root.path().join(&out);
+        let mut child = start(root.path(), &[study, &["--out", &out]].concat());
+        let share = (0.5 + f64::from(k) * 0.618_033_988_75).fract();
+        let_work(&folder, (took.as_secs_f64() * share * 1e3) as u64);
+        child.kill().expect("a signal");
+        finish(child);
+        nothing_half_written(&folder);
+        let resumed = go(&[study[0], "--resume", "--out", &out]);
+        if folder.join("manifest.json").is_file() && resumed.status.code() == Some(2) {
+            // It had finished before it was killed.
+            let said = String::from_utf8_lossy(&resumed.stderr).into_owned();
+            assert!(said.contains("finished"), "{said}");
+            continue;
+        }
+        assert_eq!(
+            summary(&resumed),
+            wanted,
+            "{study:?} killed at {share} of its time"
+        );
+        resumed_runs += 1;
+        for file in files {
+            let read = |run: &str| std::fs::read(root.path().join(run).join(file)).expect("a file");
+            assert!(
+                read(&out) == read("whole"),
+                "{file} of {study:?} killed at {share}"
+            );
+        }
+        assert!(!folder.join(STATE).exists());
+        let left = folder.read_dir().expect("a folder").flatten();
+        let hidden: Vec<_> = left
+            .map(|e| e.file_name())
+            .filter(|n| n.to_string_lossy().starts_with('.'))
+            .collect();
+        assert!(hidden.is_empty(), "{hidden:?}");
+    }
+    assert!(resumed_runs > 0, "{study:?} was never caught at work");
+}
+
+#[test]
+fn a_killed_identification_ends_as_one_that_was_left_alone() {
+    let files = ["car.toml", "parameters.csv", "traces.csv"];
+    kill_and_go_on(&["identify", "study.toml"], &files, 10);
+}
+
+#[test]
+fn a_killed_search_for_lines_ends_as_one_that_was_left_alone() {
+    let study = [
+        "raceline",
+        "--track",
+        "stadium:300:80:12",
+        "--sections",
+        "120",
+        "--objectives",
+        "length,lap_time",
+        "--population",
+        "24",
+        "--iterations",
+        "40",
+        "--backend",
+        "simd",
+    ];
+    kill_and_go_on(&study, &["line_fastest.csv"], 10);
+}
+
+#[test]
+fn a_killed_hybrid_study_ends_as_one_that_was_left_alone() {
+    let study = [
+        "hybrid",
+        "--track",
+        "stadium:300:80:12",
+        "--sections",
+        "120",
+        "--population",
+        "16",
+        "--iterations",
+        "40",
+        "--backend",
+        "simd",
+    ];
+    kill_and_go_on(&study, &[], 10);
+}
+
+#[test]
+fn a_killed_sensitivity_study_ends_as_one_that_was_left_alone() {
+    let study = [
+        "sensitivity",
+        "--section",
+        "Abbey",
+        "--parameters",
+        "rBy1,rCy1,K",
+        "--samples",
+        "64",
+        "--backend",
+        "simd",
+    ];
+    kill_and_go_on(&study, &[], 10);
+}
+
+#[test]
+fn a_killed_surface_ends_as_one_that_was_left_alone() {
+    let study = [
+        "surface",
+        "--section",
+        "Abbey",
+        "--grid",
+        "60",
+        "--backend",
+        "simd",
+    ];
+    kill_and_go_on(&study, &[], 10);
+}
+
+#[test]
+fn an_interrupted_run_says_so_and_what_is_not_its_state_is_refused() {
+    let root = tempfile::tempdir().expect("a temporary folder");
+    std::fs::write(root.path().join("study.toml"), STUDY.replace("120", "100000")).expect("a study");
+    let folder = root.path().join("run");
+    let child = start(root.path(), &["identify", "study.toml", "--out", "run"]);
+    let_work(&folder, 200);
+    // While it works, nobody else gets its folder.
+    for arguments in [
+        &["identify", "study.toml", "--out", "run"][..],
+        &["identify", "--resume", "--out", "run"],
+    ] {
+        let second = finish(start(root.path(), arguments));
+        assert_eq!(second.status.code(), Some(2), "{arguments:?}");
+    }
+    let told = Command::new("kill")
+        .args(["-TERM", &child.id().to_string()])
+        .status();
+    assert!(told.expect("kill").success());
+    let ended = finish(child);
+    assert_eq!(
+        ended.status.code(),
+        Some(130),
+        "{}",
+        String::from_utf8_lossy(&ended.stderr)
+    );
+    let state = folder.join(STATE);
+    let kept = std::fs::read(&state).expect("a state");
+    let refused = |arguments: &[&str], wanted: &str| {
+        let output = finish(start(
+            root.path(),
+            &[&["identify", "--resume", "--out", "run"], arguments].concat(),
+        ));
+        let said: String = String::from_utf8_lossy(&output.stderr).replace(['\n', '│', ' '], "");
+        assert_eq!(output.status.code(), Some(2), "{said}");
+        assert!(
+            said.contains(&wanted.replace(' ', "")),
+            "{said} should say {wanted}"
+        );
+    };
+    refused(&["--seed", "2"], "other settings");
+    refused(&["--population", "25"], "other settings");
+    let mut bytes = kept.clone();
+    bytes.truncate(kept.len() / 2);
+    std::fs::write(&state, &bytes).expect("a file");
+    refused(&[], "a damaged one");
+    let mut bytes = kept.clone();
+    bytes[kept.len() / 2] ^= 4;
+    std::fs::write(&state, &bytes).expect("a file");
+    refused(&[], "a damaged one");
+    let mut bytes = kept.clone();
+    bytes[8] = 77;
+    std::fs::write(&state, &bytes).expect("a file");
+    refused(&[], "version of the checkpoint");
+    std::fs::write(&state, "something else").expect("a file");
+    refused(&[], "a checkpoint of lapswarm");
+    let output = finish(start(root.path(), &["raceline", "--resume", "--out", "run"]));
+    assert_eq!(output.status.code(), Some(2));
+    let output = finish(start(root.path(), &["identify", "--resume", "--out", "nowhere"]));
+    assert_eq!(output.status.code(), Some(2));
+}
+
+/// As on a full disk: no file grows beyond a limit, and the write that would make it fails.
+#[cfg(unix)]
+#[test]
+fn a_full_disk_leaves_whole_files_or_none() {
+    let root = tempfile::tempdir().expect("a temporary folder");
+    let study =
+        "section = \"Abbey\"\nbackend = \"simd\"\npolish = false\n[swarm]\npopulation = 8\niterations = 4\n";
+    std::fs::write(root.path().join("study.toml"), study).expect("a study");
+    let mut files = Vec::new();
+    // In blocks of 512 bytes, from nothing at all to what the report alone does not fit into.
+    for blocks in [0, 1, 8, 64, 512] {
+        let out = format!("full-{blocks}");
+        // A limit that is met raises a signal, which would end the program before it can say anything.
+        let limited = format!("trap '' XFSZ; ulimit -f {blocks}; exec \"$0\" \"$@\"");
+        let ended = Command::new("sh")
+            .args(["-c", &limited, env!("CARGO_BIN_EXE_lapswarm")])
+            .args([
+                "identify",
+                "study.toml",
+                "--out",
+                &out,
+                "--quiet",
+                "--save-every-s",
+                "0",
+            ])
+            .current_dir(root.path())
+            .output()
+            .expect("a shell");
+        let said = String::from_utf8_lossy(&ended.stderr).into_owned();
+        assert!(
+            matches!(ended.status.code(), Some(1 | 2)),
+            "{blocks}: {:?} {said}",
+            ended.status
+        );
+        assert!(said.contains(&out) && !said.contains("panicked"), "{said}");
+        let folder = root.path().join(&out);
+        nothing_half_written(&folder);
+        files.push(folder.read_dir().expect("a folder").flatten().count());
+        // No summary or manifest says that a run is whole which is not.
+        assert!(!folder.join("manifest.json").exists(), "{blocks}");
+    }
+    assert!(files.last() > files.first(), "{files:?}");
+}
