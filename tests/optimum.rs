@@ -1,6 +1,6 @@
 //! Exact optima of racing lines, against closed forms, against chance, and on a surveyed circuit.
 
-use lapswarm::line::{FineLine, Parametrisation, PointMass};
+use lapswarm::line::{FineLine, Parametrisation, PointMass, cuts_about};
 use lapswarm::optimum::{
     Bounds, DescentSettings, LineMap, LineProblem, Optimum, PointMassLimits, Start, Status, Weights, descend,
     fastest, least_curvature, least_gamma, least_squared_length, polish_lines, shortest, spacing_m,
@@ -366,4 +366,146 @@ fn control_points_are_polished() {
     );
     let again = polish_lines(&problem, &bounds, &starts, &settings).unwrap();
     assert!(ends.iter().zip(&again).all(|(a, b)| a.x == b.x));
+}
+
+/// The fastest line from the middle, from both edges, from the shortest and the least curved line and from three waves at
+/// random: where each ends, as splines about the least curved line.
+fn from_many_starts(cuts: &CrossSections, car: &PointMass) -> (LineMap, Vec<Optimum>) {
+    let n = cuts.len();
+    let limits = PointMassLimits::new(car).unwrap();
+    let every = LineMap::at_every_cut(cuts);
+    let road = Bounds::road(n);
+    let curved = least_curvature(&every, &road, &vec![0.5; n]).unwrap().x;
+    let path = shortest(&every, &road).unwrap().x;
+    let random = Random::new(11);
+    let wave = |who: u32| -> Vec<f64> {
+        let part = |i: usize, k: u32| {
+            let phase = TAU * random.uniform(1, who, k, 0);
+            (TAU * f64::from(3 * k + 2) * i as f64 / n as f64 + phase).sin()
+        };
+        let at = |i: usize| 0.5 + 0.12 * (1..=4).map(|k| part(i, k)).sum::<f64>();
+        (0..n).map(|i| at(i).clamp(0.0, 1.0)).collect()
+    };
+    let lines = [
+        vec![0.5; n],
+        vec![0.0; n],
+        vec![1.0; n],
+        path,
+        curved.clone(),
+        wave(1),
+        wave(2),
+        wave(3),
+    ];
+    // Three cuts to a control: with two, ripples are left that a fine spline feels and the cuts do not.
+    let controls = n / 3;
+    let (map, bounds) = LineMap::spline_about(cuts, &curved, controls);
+    let problem = LineProblem {
+        limits: Some(&limits),
+        ..LineProblem::of(&map)
+    };
+    let time = Weights {
+        time: 1.0,
+        ..Weights::default()
+    };
+    let starts = lines.map(|line| {
+        let at = |k: usize| {
+            let i = k * n / controls;
+            (line[i] - curved[i]) * cuts.left_m[i].distance(cuts.right_m[i])
+        };
+        start(&(0..controls).map(at).collect::<Vec<f64>>(), time)
+    });
+    let ends = polish_lines(&problem, &bounds, &starts, &DescentSettings::default()).unwrap();
+    for (start, end) in starts.iter().zip(&ends) {
+        println!(
+            "{:.3} s to {:.5} s, {} programs, {:.2} s",
+            problem.measures(&start.x).time_s,
+            end.value,
+            end.programs,
+            end.seconds
+        );
+        assert_eq!(end.status, Status::Solved);
+    }
+    (map, ends)
+}
+
+/// Eight starts, one end: to the share that a descent gives up at, 1e-6 of the lap for each step, and some of them.
+#[test]
+fn every_start_ends_at_the_same_lap_of_the_bundled_circuit() {
+    let track = Track::load("silverstone_gp").unwrap();
+    let cuts = track.cross_sections(&Spacing::equal(480), true).unwrap();
+    let (_, ends) = from_many_starts(&cuts.narrowed(2.0).unwrap(), &racer());
+    let best = ends.iter().map(|e| e.value).fold(f64::INFINITY, f64::min);
+    assert!(ends.iter().all(|e| e.value / best - 1.0 < 5e-5));
+}
+
+/// The same on the surveyed circuit, and then, which is the reference that swarms are held against, splines about the best of
+/// these lines, across cuts square to it. Elsewhere a minimum-time optimal control solution laps in 116.37 s at 3 m, in
+/// 116.41 s at 5 m and in 116.49 s at 8 m, from eight starts out of eight.
+#[test]
+fn every_start_ends_at_the_same_lap_of_the_surveyed_silverstone() {
+    let car = racer();
+    let Some(cuts) = silverstone(981, 2.0) else { return };
+    let (map, ends) = from_many_starts(&cuts, &car);
+    let best = ends.iter().min_by(|a, b| a.value.total_cmp(&b.value)).unwrap();
+    assert!(ends.iter().all(|e| e.value / best.value - 1.0 < 5e-5));
+    let limits = PointMassLimits::new(&car).unwrap();
+    let mut points = map.line(&best.x);
+    let lap = |points: &[glam::DVec2]| {
+        let fine = FineLine::new(points, true, 0.25, Some(&car), 0.0).unwrap();
+        fine.lap_time_s().unwrap()
+    };
+    println!("on a fine spline {:.3} s", lap(&points));
+    for _ in 0..2 {
+        let about = cuts_about(&cuts, &points, 1962).unwrap();
+        let (map, bounds) = LineMap::spline_about(&about, &about.reference, 490);
+        let problem = LineProblem {
+            limits: Some(&limits),
+            ..LineProblem::of(&map)
+        };
+        let solved = fastest(&problem, &bounds, &vec![0.0; 490], &DescentSettings::default()).unwrap();
+        points = map.line(&solved.x);
+        println!(
+            "about it {:.3} s, on a fine spline {:.3} s",
+            solved.value,
+            lap(&points)
+        );
+    }
+    // Of the 0.36 % that are left, most go with the grid: 117.23 s at 981 cuts, 116.72 s at 1962, whose segments have the limit
+    // of their tighter end, an error of the first order that also weighs on the choice of the line.
+    assert!((lap(&points) / 116.37 - 1.0).abs() < 4e-3, "{}", lap(&points));
+}
+
+/// Sectors that are solved each for itself and summed, as once published (5513.87 m of the surveyed circuit, twelve sectors
+/// of thirty cuts): each sum lacks the twelve links from one sector to the next, and each sector ends where the next one
+/// need not begin. With the links it is longer than the lap.
+#[test]
+fn sectors_summed_leave_the_links_out() {
+    let bundled = Track::load("silverstone_gp").unwrap();
+    let bundled = bundled.cross_sections(&Spacing::equal(360), true).unwrap();
+    for (cuts, published) in [(Some(bundled), None), (silverstone(360, 0.0), Some(5513.87))] {
+        let Some(cuts) = cuts else { continue };
+        let lap = shortest(&LineMap::at_every_cut(&cuts), &Bounds::road(360))
+            .unwrap()
+            .value;
+        let mut sum = 0.0;
+        let mut ends: Vec<[glam::DVec2; 2]> = Vec::new();
+        for sector in 0..12 {
+            let part = cuts.stretch(30 * sector, 30).unwrap();
+            let map = LineMap::at_every_cut(&part);
+            let solved = shortest(&map, &Bounds::road(30)).unwrap();
+            let points = map.line(&solved.x);
+            sum += solved.value;
+            ends.push([points[0], points[29]]);
+        }
+        let links: f64 = (0..12).map(|s| ends[s][1].distance(ends[(s + 1) % 12][0])).sum();
+        println!(
+            "{}: lap {lap:.2} m, sectors {sum:.2} m, links {links:.2} m",
+            cuts.name
+        );
+        assert!(sum < lap && sum + links > lap);
+        if let Some(published) = published {
+            // Within 0.1 %: a swarm's, not an optimum.
+            assert!((sum / published - 1.0f64).abs() < 1e-3, "{sum}");
+        }
+    }
 }

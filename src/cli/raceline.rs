@@ -5,8 +5,8 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use lapswarm::evaluate::BackendChoice;
 use lapswarm::evaluate::line::LineObjective;
 use lapswarm::study::raceline::{
-    LinesState, OBJECTIVE_NAMES, RacelineSettings, find_lines_from, set_up, summarise, write_results,
-    write_settings,
+    LineAlgorithm, LinesState, OBJECTIVE_NAMES, RacelineSettings, find_lines_from, set_up, summarise,
+    write_results, write_settings,
 };
 use lapswarm::study::run_folder;
 use lapswarm::{Error, Result};
@@ -34,6 +34,9 @@ pub struct Arguments {
     /// Limits from a table (v_mps, ay_mps2, ax_grip_mps2, ax_drive_mps2, drag_mps2) instead of the car's own
     #[arg(long, value_name = "FILE")]
     envelope: Option<PathBuf>,
+    /// Only a named stretch of the track, such as Abbey, as an open road
+    #[arg(long, value_name = "NAME")]
+    section: Option<String>,
     /// Cuts across the track
     #[arg(long, value_name = "N")]
     sections: Option<usize>,
@@ -58,7 +61,13 @@ pub struct Arguments {
     /// Leave the local search by gradients out
     #[arg(long)]
     no_local_search: bool,
-    /// Particles of the swarm that looks for the front
+    /// What looks for the best line by one objective: windows, cooperative (CPSO-S_K) or thesis; the last two start at random
+    #[arg(long, value_name = "NAME", value_parser = algorithm_flag)]
+    algorithm: Option<LineAlgorithm>,
+    /// Groups of neighbouring cuts of the cooperative algorithm
+    #[arg(long, value_name = "K")]
+    groups: Option<usize>,
+    /// Particles of the swarm that looks for the front, and of each that an algorithm other than windows has
     #[arg(long, value_name = "N")]
     population: Option<usize>,
     /// Its iterations
@@ -74,6 +83,10 @@ pub struct Arguments {
 
 fn objective_flag(name: &str) -> Result<LineObjective, String> {
     LineObjective::named(name).ok_or_else(|| format!("expected one of {OBJECTIVE_NAMES}"))
+}
+
+fn algorithm_flag(name: &str) -> Result<LineAlgorithm, String> {
+    LineAlgorithm::named(name).ok_or_else(|| "expected windows, cooperative or thesis".to_owned())
 }
 
 impl Arguments {
@@ -100,10 +113,15 @@ impl Arguments {
         set(&mut s.ellipse_exponent, &self.ellipse_exponent);
         set(&mut s.entry_mps, &self.entry_mps);
         set(&mut s.objectives, &self.objectives);
+        set(&mut s.algorithm, &self.algorithm);
+        set(&mut s.groups, &self.groups);
         set(&mut s.population, &self.population);
         set(&mut s.iterations, &self.iterations);
         set(&mut s.backend, &self.backend);
         set(&mut s.seed, &self.common.seed);
+        if self.section.is_some() {
+            s.section.clone_from(&self.section);
+        }
         if self.envelope.is_some() {
             s.envelope.clone_from(&self.envelope);
         }

@@ -15,6 +15,7 @@ mod plan;
 mod point_mass;
 mod profile;
 mod spline;
+mod square;
 #[cfg(test)]
 mod tests;
 
@@ -26,3 +27,4 @@ pub use parametrisation::Parametrisation;
 pub use plan::{LinePlan, SectionRow, TERMS};
 pub use point_mass::{LimitTable, PointMass};
 pub use profile::{LapProfile, lap_profile};
+pub use square::{cuts_about, shares_across};

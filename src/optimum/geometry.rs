@@ -85,7 +85,7 @@ impl LineMap {
 
     /// A line `base` (its `alpha` on every cut) moved along the cuts by a cubic B-spline with `controls` (m, to the left),
     /// and the bounds that keep it on the road at every cut. Where the base is smooth, all such lines are, however jagged
-    /// the edges; which `alpha` as a spline cannot say.
+    /// the edges; which `alpha` as a spline cannot say. The base itself may lie off the road.
     pub fn spline_about(cuts: &CrossSections, base: &[f64], controls: usize) -> (Self, Bounds) {
         let points = cuts.points(base);
         let across = |i: usize| (cuts.left_m[i] - cuts.right_m[i]).normalize();
@@ -98,8 +98,8 @@ impl LineMap {
         });
         let rows = (0..cuts.len()).map(|i| RowBound {
             terms: spline_shares(cuts, controls, i),
-            lower: -points[i].distance(cuts.right_m[i]),
-            upper: points[i].distance(cuts.left_m[i]),
+            lower: (cuts.right_m[i] - points[i]).dot(across(i)),
+            upper: (cuts.left_m[i] - points[i]).dot(across(i)),
         });
         let bounds = Bounds {
             lower: vec![f64::NEG_INFINITY; controls],

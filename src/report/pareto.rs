@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::axis::{Axis, Labels, Plot, extent};
 use super::canvas::{Align, Canvas, Type, draw_to_file};
-use super::style::{BLUE, INK, TICK_PX, VERMILLION, significant, with_unit};
+use super::style::{BLUE, FRAME, GRID, INK, TICK_PX, VERMILLION, significant, viridis, with_unit};
 use crate::{Error, Result};
 
 /// One objective, to be made small.
@@ -84,6 +84,9 @@ pub fn plot_pareto(
                 archive.scatter(canvas, (column, row + 1), across, up, axes);
             }
             archive.legend(canvas, size.0 - 26.0);
+            if n == 3 {
+                archive.in_space(canvas, (left + cell, top + 20.0), cell);
+            }
         })
     }
 }
@@ -145,6 +148,61 @@ impl Archive<'_> {
             canvas.dot(at, radius + 1.0, VERMILLION, 1.0);
             canvas.ring(at, radius + 5.0, VERMILLION, 1.6);
         }
+    }
+
+    /// The three objectives in space, in a square cell, coloured by the last; each point stands on the floor's plane.
+    fn in_space(&self, canvas: &mut Canvas<'_>, (left, top): (f64, f64), side: f64) {
+        let (turn, tilt) = (0.62f64, 0.42f64);
+        let project = |[u, v, w]: [f64; 3]| -> (f64, f64) {
+            let (a, b) = (u - 0.5, v - 0.5);
+            let across = a * turn.cos() - b * turn.sin();
+            let away = a * turn.sin() + b * turn.cos();
+            let up = (w - 0.5) * tilt.cos() + away * tilt.sin();
+            (
+                left + side * (0.5 + 0.52 * across),
+                top + side * (0.46 - 0.52 * up),
+            )
+        };
+        let share = |point: &[f64]| -> [f64; 3] {
+            std::array::from_fn(|k| {
+                let (least, most) = self.ranges[k];
+                (point[k] - least) / (most - least).max(f64::MIN_POSITIVE)
+            })
+        };
+        // The floor and the two walls at the back.
+        for (fixed, at) in [(2, 0.0), (0, 0.0), (1, 1.0)] {
+            let corner = |u: f64, v: f64| {
+                let mut place = [u, v, v];
+                if fixed == 0 {
+                    place = [at, u, v];
+                } else if fixed == 1 {
+                    place = [u, at, v];
+                } else {
+                    place[2] = at;
+                }
+                project(place)
+            };
+            let corners = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0), (0.0, 0.0)];
+            canvas.path(corners.map(|(u, v)| corner(u, v)), FRAME, 0.8);
+        }
+        let mut order: Vec<[f64; 3]> = self.finite.iter().map(|p| share(p)).collect();
+        // From the back to the front.
+        let depth = |p: &[f64; 3]| p[0] * turn.sin() + p[1] * turn.cos();
+        order.sort_by(|a, b| depth(b).total_cmp(&depth(a)));
+        for place in order {
+            let (foot, head) = (project([place[0], place[1], 0.0]), project(place));
+            canvas.line(foot, head, GRID, 0.6);
+            canvas.dot(head, 3.0, viridis(place[2]), 0.95);
+        }
+        if let Some(point) = self.mark {
+            canvas.ring(project(share(point)), 7.5, VERMILLION, 1.6);
+        }
+        let name = |canvas: &mut Canvas<'_>, k: usize, at: [f64; 3], align: Align| {
+            canvas.text(&self.title(k), project(at), Type::new(TICK_PX, INK, align));
+        };
+        name(canvas, 0, [0.45, -0.12, 0.0], Align::Right);
+        name(canvas, 1, [1.1, 0.45, 0.0], Align::Left);
+        name(canvas, 2, [0.0, 1.0, 1.06], Align::Centre);
     }
 
     fn legend(&self, canvas: &mut Canvas<'_>, right: f64) {

@@ -178,13 +178,16 @@ fn draw_in_space(canvas: &mut Canvas<'_>, figure: &SurfaceFigure<'_>, share: &dy
 
 fn draw_scale(canvas: &mut Canvas<'_>, figure: &SurfaceFigure<'_>, (least, spread): (f64, f64)) {
     let (left, right, y) = (760.0, 1220.0, 600.0);
+    // As many figures as tell the labels apart, where a cost is far from nought.
+    let far = (least.abs().max((least + spread).abs()) / spread).log10();
+    let figures = 3 + far.clamp(0.0, 9.0) as usize;
     for i in 0..92 {
         let at = left + (right - left) * f64::from(i) / 92.0;
         canvas.rect((at, y), (at + 5.3, y + 12.0), viridis(f64::from(i) / 91.0), 1.0);
     }
     for i in 0..=4 {
         let part = f64::from(i) / 4.0;
-        let text = significant(least + spread * part * part, 3);
+        let text = significant(least + spread * part * part, figures);
         canvas.text(
             &text,
             (left + part * (right - left), y + 24.0),

@@ -53,15 +53,25 @@ impl CrossSections {
     }
 
     /// The same cuts with a reference line that leaves out what is shorter than `wavelength_m`, such as the noise of a
-    /// survey: of all lines across the cuts the one that is least far from the present reference and least bent, weighed
-    /// so that a wave of that length keeps half its height (E. T. Whittaker, *On a new method of graduation*, Proc.
-    /// Edinburgh Math. Soc. 41, 1923), held on the road.
+    /// survey, held on the road: see [`CrossSections::smoothed`].
     pub fn with_smooth_reference(&self, wavelength_m: f64) -> Self {
+        let smooth = self.smoothed(&self.reference, wavelength_m);
+        Self {
+            reference: smooth.into_iter().map(|a| a.clamp(0.0, 1.0)).collect(),
+            ..self.clone()
+        }
+    }
+
+    /// A line (`alpha` at every cut) without what is shorter than `wavelength_m`: of all lines across the cuts the one
+    /// that is least far from the given one and least bent, weighed so that a wave of that length keeps half its height
+    /// (E. T. Whittaker, *On a new method of graduation*, Proc. Edinburgh Math. Soc. 41, 1923). It may leave the road,
+    /// where a line held at its edge would have a kink.
+    pub fn smoothed(&self, alpha: &[f64], wavelength_m: f64) -> Vec<f64> {
         let n = self.len();
         if n < 5 {
-            return self.clone();
+            return alpha.to_vec();
         }
-        let line = self.points(&self.reference);
+        let line = self.points(alpha);
         let ends = self.right_m.iter().zip(&self.left_m);
         let across: Vec<DVec2> = ends
             .map(|(right, left)| (*left - *right).normalize_or_zero())
@@ -98,12 +108,9 @@ impl CrossSections {
         };
         let right: Vec<f64> = spread(&bend(&line)).iter().map(|b| -b).collect();
         let offset = conjugate_gradients(apply, &right);
-        let mut smooth = self.clone();
-        for (i, reference) in smooth.reference.iter_mut().enumerate() {
-            let width = self.right_m[i].distance(self.left_m[i]);
-            *reference = (*reference + offset[i] / width).clamp(0.0, 1.0);
-        }
-        smooth
+        let widths = (0..n).map(|i| self.right_m[i].distance(self.left_m[i]));
+        let moved = alpha.iter().zip(offset).zip(widths);
+        moved.map(|((a, offset), width)| a + offset / width).collect()
     }
 
     /// The same cuts shortened at both ends by half the width of a car (m), so that its middle may use all of them.

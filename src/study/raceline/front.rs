@@ -47,6 +47,8 @@ const CONTROL_SPACING_M: f64 = 20.0;
 const BLEND: u32 = 0x11e5;
 /// Standard deviation of the control points of starting lines about a blend of known ones, in widths of the road.
 const BLEND_SPREAD: f64 = 0.01;
+/// Steps from one known line to another among the lines between them that are offered to the front.
+const BLENDS: u32 = 10;
 /// Steps between the objectives of the local search: `LATTICE` and the number of objectives give its lines.
 const LATTICE: u32 = 5;
 /// Cone programs for each line of the local search: most of the gain is in the first.
@@ -127,7 +129,16 @@ pub(super) fn search_front_from(
         .iter()
         .map(|c| problem.alpha(c))
         .collect();
-    lines.extend(known.iter().cloned());
+    // The known lines, and what lies evenly between them.
+    let blend = |shares: &[f64], i: usize| shares.iter().zip(known).map(|(s, line)| s * line[i]).sum::<f64>();
+    if !known.is_empty() {
+        let blends = lattice(known.len(), BLENDS).into_iter();
+        lines.extend(blends.map(|shares| {
+            (0..cuts.len())
+                .map(|i| blend(&shares, i).clamp(0.0, 1.0))
+                .collect()
+        }));
+    }
     let mut archive = Archive::new(settings.archive, Truncation::Contribution);
     let mut evaluations = swarm.evaluations();
     evaluations += insert_all(&mut archive, judge.as_mut(), &lines)?;

@@ -6,6 +6,7 @@ use crate::evaluate::line::{LineObjective, LineProblem};
 use crate::line::{Clearance, FineLine, Parametrisation, PointMass, check_line};
 use crate::study::envelope::{EnvelopeSettings, car_limits};
 use crate::track::{CrossSections, Spacing, Track};
+use crate::vehicle::powertrain::Powertrain;
 use crate::vehicle::{Car, Envelope};
 use glam::DVec2;
 
@@ -31,6 +32,8 @@ pub struct Setup {
     pub car: PointMass,
     /// Its name.
     pub car_name: String,
+    /// Its gearbox and the rolling radius of the driven wheels (m), where the limits are its own.
+    pub gearbox: Option<(Powertrain, f64)>,
 }
 
 /// Reads track and car.
@@ -43,9 +46,13 @@ pub fn set_up(settings: &RacelineSettings) -> Result<Setup> {
     let road = track
         .cross_sections(&Spacing::equal(settings.sections), settings.as_surveyed)?
         .with_smooth_reference(REFERENCE_M);
-    let cuts = road.narrowed(settings.car_width_m)?;
     let close = ((road.length_m / EDGE_M).ceil() as usize).clamp(settings.sections, 1_000_000);
     let dense = track.cross_sections(&Spacing::equal(close), settings.as_surveyed)?;
+    let (road, dense) = match &settings.section {
+        Some(name) => (stretch_named(&road, name)?, stretch_named(&dense, name)?),
+        None => (road, dense),
+    };
+    let cuts = road.narrowed(settings.car_width_m)?;
     let car = Car::load(&settings.car)?;
     let (envelope, car_name) = match &settings.envelope {
         Some(path) => (Envelope::load(path)?, path.display().to_string()),
@@ -54,6 +61,8 @@ pub fn set_up(settings: &RacelineSettings) -> Result<Setup> {
             car.name.clone(),
         ),
     };
+    let gearbox = car.powertrain.clone().filter(|_| settings.envelope.is_none());
+    let gearbox = gearbox.map(|powertrain| (powertrain, car.chassis.radius_rear));
     let wheelbase = car.chassis.cg_to_front + car.chassis.cg_to_rear;
     let car = PointMass {
         ellipse_exponent: settings.ellipse_exponent,
@@ -67,7 +76,26 @@ pub fn set_up(settings: &RacelineSettings) -> Result<Setup> {
         edges_m: [dense.right_m, dense.left_m],
         car,
         car_name,
+        gearbox,
     })
+}
+
+/// The stretch of the section of this name, or of one of its names, as an open road.
+fn stretch_named(road: &CrossSections, name: &str) -> Result<CrossSections> {
+    let called = |all: &str| all == name || all.split('/').any(|one| one.trim() == name);
+    let Some(section) = road.sections.iter().find(|s| called(&s.name)) else {
+        let known: Vec<&str> = road.sections.iter().map(|s| s.name.as_str()).collect();
+        let expected = if known.is_empty() {
+            "none: the circuit names no sections".to_owned()
+        } else {
+            format!("one of {}", known.join(", "))
+        };
+        return Err(Error::input(&road.name, "section", name, expected));
+    };
+    let first = road.station_m.partition_point(|s| *s < section.start_m);
+    let spacing_m = road.length_m / road.len() as f64;
+    let count = (section.length_m() / spacing_m).round() as usize + 1;
+    road.stretch(first.min(road.len() - 1), count.clamp(2, road.len()))
 }
 
 /// One line with everything that is reported of it.

@@ -5,8 +5,10 @@
 //! is worked out anew on a fine spline and checked against the edges ([`Setup::report`]).
 
 mod exact;
+mod fast;
 mod front;
 mod lines;
+mod plain;
 mod results;
 mod search;
 mod settings;
@@ -20,7 +22,7 @@ pub use search::{
     FoundLine, LevelRow, LineProgress, LineSearch, LineSearchSettings, LineState, search_line,
     search_line_from,
 };
-pub use settings::{OBJECTIVE_NAMES, RacelineSettings};
+pub use settings::{LineAlgorithm, OBJECTIVE_NAMES, RacelineSettings};
 pub use state::LinesState;
 
 use crate::error::Result;
@@ -28,6 +30,7 @@ use crate::evaluate::line::{LineObjective, LineProblem, open_line_evaluator};
 use crate::evaluate::{BackendInfo, FailureCounts, add_failures};
 use crate::line::Parametrisation;
 use crate::study::keeper::{Keeper, Origin};
+use fast::search_objective;
 use front::search_front_from;
 use state::{FinishedObjective, Work, inputs_of};
 use std::ops::ControlFlow;
@@ -164,7 +167,7 @@ pub fn find_lines_from(
     let exact_began = Instant::now();
     let mut exact = Vec::new();
     for objective in &settings.objectives {
-        exact.push(solvers.best(*objective)?);
+        exact.push(solvers.reference(*objective)?);
     }
     let exact_s = exact_began.elapsed().as_secs_f64();
 
@@ -288,7 +291,14 @@ fn best_line(
 ) -> Result<ReportedLine> {
     let mut rivals: Vec<Vec<f64>> = start.map(<[f64]>::to_vec).into_iter().collect();
     if settings.local_search && solvers.solves(objective) && !interrupted {
-        rivals.extend(solvers.polish(vec![(found.alpha.clone(), vec![(objective, 1.0)])], 60)?);
+        let led = match objective {
+            LineObjective::LapTime => solvers.fastest_about(&found.alpha)?.map(|led| led.x),
+            _ => None,
+        };
+        match led {
+            Some(led) => rivals.push(led),
+            None => rivals.extend(solvers.polish(vec![(found.alpha.clone(), vec![(objective, 1.0)])], 60)?),
+        }
     }
     let mut best = setup.report(line_name(objective), &found.alpha, settings)?;
     for alpha in rivals {
@@ -298,117 +308,6 @@ fn best_line(
         }
     }
     Ok(best)
-}
-
-/// Cuts for each control point where lap time counts: with fewer, ripples between the cuts would pay; with more, a swarm
-/// cannot follow the edges.
-const CUTS_PER_CONTROL: f64 = 2.0;
-/// Rounds of a search that starts from an exact optimum.
-const WARM_ROUNDS: usize = 2;
-/// Waves of the least curved line that are shorter than this (m) are left out where fast lines are measured from it.
-const BASE_M: f64 = 40.0;
-/// Waves (m) left out of a fast line, one after the other, to see whether a fine spline through it is faster without.
-const RIPPLES_M: [f64; 4] = [15.0, 20.0, 25.0, 30.0];
-
-/// The swarm's line for one objective.
-///
-/// Fast lines are looked for about the swarm's own least curved line, smoothed: about the reference line, a few control
-/// points could not say them. What is found has ripples between the cuts that its lap time through them does not feel; of
-/// the line and smoother ones like it, the one is kept that is fastest on a fine spline.
-fn search_objective(
-    settings: &RacelineSettings,
-    setup: &Setup,
-    objective: LineObjective,
-    start: Option<&[f64]>,
-    work: &mut Work<'_>,
-) -> Result<FoundLine> {
-    let cold = LineSearchSettings::default();
-    let plain = LineSearchSettings {
-        seed: settings.seed,
-        // A search from an optimum has little left to find.
-        rounds: if start.is_some() { WARM_ROUNDS } else { cold.rounds },
-        ..cold
-    };
-    let search = LineSearch {
-        cuts: &setup.cuts,
-        objective,
-        car: Some(&setup.car),
-        entry_mps: settings.entry_mps,
-        start,
-        backend: settings.backend,
-        adapter: settings.adapter.as_deref(),
-    };
-    if objective != LineObjective::LapTime {
-        return search_step(&search, &plain, objective, 0, work);
-    }
-    let curved = LineSearch {
-        objective: LineObjective::Kappa2,
-        ..search
-    };
-    let curved = search_step(&curved, &plain, objective, 0, work)?;
-    let mut cuts = setup.cuts.clone();
-    cuts.reference.clone_from(&curved.alpha);
-    let smooth = cuts.with_smooth_reference(BASE_M);
-    let fast = LineSearch {
-        cuts: &smooth,
-        start: None,
-        ..search
-    };
-    let fast_settings = LineSearchSettings {
-        sections_per_control: CUTS_PER_CONTROL,
-        overshoot: 0.0,
-        ..plain
-    };
-    let mut found = search_step(&fast, &fast_settings, objective, curved.evaluations, work)?;
-    found.evaluations += curved.evaluations;
-    found.device_faults.splice(0..0, curved.device_faults);
-    add_failures(&mut found.failures, &curved.failures);
-    let mut fastest = setup.report("fastest", &found.alpha, settings)?;
-    cuts.reference.clone_from(&found.alpha);
-    for wavelength in RIPPLES_M {
-        let smooth = cuts.with_smooth_reference(wavelength).reference;
-        let line = setup.report("fastest", &smooth, settings)?;
-        if line.lap_time_fine_s() < fastest.lap_time_fine_s() {
-            fastest = line;
-        }
-    }
-    (found.alpha, found.cost) = (fastest.alpha, fastest.lap_time_s);
-    Ok(found)
-}
-
-/// One search of an objective's, or what it came to in an earlier run. `before` are the lines of the searches before it.
-fn search_step(
-    search: &LineSearch<'_>,
-    settings: &LineSearchSettings,
-    objective: LineObjective,
-    before: u64,
-    work: &mut Work<'_>,
-) -> Result<FoundLine> {
-    // The searches of an objective come one after the other: the first is the one that has no lines before it.
-    let place = usize::from(before > 0);
-    if let Some(found) = work.state.steps.get(place) {
-        return Ok(found.clone());
-    }
-    let before_s = work.state.elapsed_s;
-    let began = Instant::now();
-    let state = work.state.search.take().map(|state| *state);
-    let found = search_line_from(search, settings, state, |progress, state| {
-        let told = StudyProgress {
-            stage: line_name(objective).to_owned(),
-            evaluations: before + progress.evaluations,
-            best: format!("{:.4} {}", progress.best, search.objective.unit()),
-        };
-        work.told(&told, |kept| {
-            kept.search = Some(Box::new(state.clone()));
-            kept.elapsed_s = before_s + began.elapsed().as_secs_f64();
-        })
-    })?;
-    work.finished(|state| {
-        state.steps.push(found.clone());
-        state.search = None;
-        state.elapsed_s = before_s + began.elapsed().as_secs_f64();
-    });
-    Ok(found)
 }
 
 /// The member of a front nearest to the ideal, each objective as a share of the front's range.

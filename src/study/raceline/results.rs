@@ -3,6 +3,7 @@
 mod files;
 mod page;
 mod pictures;
+mod surfaces;
 
 use super::{Outcome, RacelineSettings, ReportedLine, Setup};
 use crate::error::Result;
@@ -290,6 +291,7 @@ pub fn write_results(
 ) -> Result<()> {
     files::write(folder, settings, setup, outcome, summary)?;
     pictures::draw(folder, setup, outcome)?;
+    surfaces::draw(folder, settings, setup, outcome)?;
     page::write(folder, settings, setup, outcome, summary)?;
     files::write_manifest(folder, settings, setup, outcome)
 }

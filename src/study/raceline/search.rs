@@ -9,6 +9,7 @@ use crate::evaluate::{BackendChoice, Evaluator, FailureCounts, add_failures};
 use crate::line::{Parametrisation, PointMass, TERMS};
 use crate::swarm::{Optimiser, WindowSettings, WindowSwarm};
 use crate::track::CrossSections;
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
 use std::time::Instant;
@@ -57,7 +58,14 @@ pub struct LineSearchSettings {
     pub spread: f64,
     /// How far beyond the road control points may reach, as a share of its width.
     pub overshoot: f64,
+    /// Whether lines that leave the road are brought back by moving their control points, which keeps them smooth; else
+    /// they are held at its edges.
+    pub inside: bool,
 }
+
+/// What a line costs more, as a share, for each mean width squared that its control points had to be moved by to bring it
+/// inside: enough that swarms do not wander off where nothing is to be told.
+const MOVED_COST: f64 = 0.1;
 
 impl Default for LineSearchSettings {
     fn default() -> Self {
@@ -73,6 +81,7 @@ impl Default for LineSearchSettings {
             sections_per_control: 1.0,
             spread: 0.1,
             overshoot: 0.25,
+            inside: false,
         }
     }
 }
@@ -262,7 +271,20 @@ pub fn search_line_from(
             && !stopped
             && !settled
         {
-            let evaluation = evaluator.evaluate(&swarm.ask())?;
+            let mut candidates = swarm.ask();
+            let evaluation = if settings.inside {
+                let moves: Vec<f64> = candidates
+                    .par_chunks_mut(line.dimensions())
+                    .map(|row| line.bring_inside(row))
+                    .collect();
+                let mut evaluation = evaluator.evaluate(&candidates)?;
+                for (cost, moved) in evaluation.objectives.iter_mut().zip(moves) {
+                    *cost *= 1.0 + MOVED_COST * moved;
+                }
+                evaluation
+            } else {
+                evaluator.evaluate(&candidates)?
+            };
             swarm.tell(&evaluation);
             add_failures(&mut state.found.failures, &evaluation.failure_counts());
             let best = swarm.best_candidate().1;
@@ -288,7 +310,10 @@ pub fn search_line_from(
         found.device_faults.extend_from_slice(evaluator.device_faults());
         found.evaluations += swarm.evaluations();
         let whole = problem(search, cuts.clone(), way)?;
-        let candidate = swarm.best_candidate().0;
+        let mut candidate = swarm.best_candidate().0;
+        if settings.inside {
+            line.bring_inside(&mut candidate);
+        }
         // Control points count in mean widths of the road, and the mean is over other cuts here.
         let scale = mean_width_m(line.cuts()) / mean_width_m(cuts);
         let candidate: Vec<f64> = candidate.iter().map(|c| 0.5 + scale * (c - 0.5)).collect();

@@ -9,6 +9,37 @@ use crate::study::memory::Size;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
+/// What looks for the best line by one objective.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum LineAlgorithm {
+    /// Swarms in windows over a spline's control points, from coarse to fine.
+    #[default]
+    Windows,
+    /// CPSO-S_K over `alpha` at every cut: a swarm to each of the groups, by turns, in the others' context.
+    Cooperative,
+    /// One plain particle swarm over `alpha` at every cut, with the settings of the thesis.
+    Thesis,
+}
+
+impl LineAlgorithm {
+    /// Every algorithm.
+    pub const ALL: [Self; 3] = [Self::Windows, Self::Cooperative, Self::Thesis];
+
+    /// The name in studies.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Windows => "windows",
+            Self::Cooperative => "cooperative",
+            Self::Thesis => "thesis",
+        }
+    }
+
+    /// The algorithm of this name.
+    pub fn named(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|a| a.name() == name)
+    }
+}
+
 /// Settings of a racing-line study.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RacelineSettings {
@@ -18,6 +49,8 @@ pub struct RacelineSettings {
     pub car: String,
     /// A table of limits that takes the place of the car's own.
     pub envelope: Option<PathBuf>,
+    /// The name of a stretch of the track, if not all of it is to be driven.
+    pub section: Option<String>,
     /// Cuts across the track.
     pub sections: usize,
     /// Whether surveyed edges are taken as they are, not smoothed.
@@ -34,9 +67,13 @@ pub struct RacelineSettings {
     pub warm_start: bool,
     /// Whether what the swarms find is led to the nearest optimum by exact gradients.
     pub local_search: bool,
-    /// Particles of the swarm that looks for the front.
+    /// What looks for the best line by one objective.
+    pub algorithm: LineAlgorithm,
+    /// Groups of neighbouring cuts of the cooperative algorithm.
+    pub groups: usize,
+    /// Particles of the swarm that looks for the front, and of each that an algorithm other than windows has.
     pub population: usize,
-    /// Its iterations.
+    /// Its iterations, and theirs.
     pub iterations: usize,
     /// Lines that the front keeps.
     pub archive: usize,
@@ -54,6 +91,7 @@ impl Default for RacelineSettings {
             track: "silverstone_gp".to_owned(),
             car: "gt".to_owned(),
             envelope: None,
+            section: None,
             sections: 960,
             as_surveyed: true,
             car_width_m: 2.0,
@@ -66,6 +104,8 @@ impl Default for RacelineSettings {
             ],
             warm_start: true,
             local_search: true,
+            algorithm: LineAlgorithm::Windows,
+            groups: 12,
             population: 200,
             iterations: 200,
             archive: 100,
@@ -104,12 +144,18 @@ impl RacelineSettings {
             s.car = named_or_file(name);
         }
         s.envelope = root.string("envelope")?.map(|name| folder.join(name));
+        s.section = root.string("section")?.map(str::to_owned);
+        if let Some(name) = root.string("algorithm")? {
+            s.algorithm = LineAlgorithm::named(name)
+                .ok_or_else(|| root.refuse("algorithm", "\"windows\", \"cooperative\" or \"thesis\""))?;
+        }
         let count = |key: &str, least: u64, most: u64, value: usize| -> Result<usize> {
             Ok(root.integer(key, least, most)?.map_or(value, |n| n as usize))
         };
         s.sections = count("sections", 8, 1_000_000, s.sections)?;
         s.population = count("population", 8, 10_000_000, s.population)?;
         s.iterations = count("iterations", 1, 1_000_000, s.iterations)?;
+        s.groups = count("groups", 1, 1_000_000, s.groups)?;
         s.archive = count("archive", 8, 10_000, s.archive)?;
         let number = |key: &str, least: f64, most: f64, unit: &str, value: f64| -> Result<f64> {
             Ok(root.number(key, least, most, unit)?.unwrap_or(value))
@@ -160,6 +206,7 @@ impl RacelineSettings {
             ("sections", self.sections, 8, 1_000_000),
             ("population", self.population, 8, 10_000_000),
             ("iterations", self.iterations, 1, 1_000_000),
+            ("groups", self.groups, 1, 1_000_000),
             ("archive", self.archive, 8, 10_000),
         ];
         for (name, value, least, most) in counts {
@@ -230,6 +277,16 @@ impl RacelineSettings {
                 BackendChoice::Gpu => "gpu",
             }),
         );
+        if self.algorithm != LineAlgorithm::Windows {
+            text += &format!(
+                "algorithm = {}\ngroups = {}\n",
+                quoted(self.algorithm.name()),
+                self.groups
+            );
+        }
+        if let Some(name) = &self.section {
+            text += &format!("section = {}\n", quoted(name));
+        }
         if let Some(path) = &self.envelope {
             text += &format!("envelope = {}\n", quoted(&absolute(&path.display().to_string())));
         }
@@ -260,6 +317,9 @@ mod tests {
         let settings = RacelineSettings {
             objectives: vec![LineObjective::Kappa2, LineObjective::LapTime],
             warm_start: false,
+            algorithm: LineAlgorithm::Cooperative,
+            groups: 5,
+            section: Some("Abbey".to_owned()),
             seed: 7,
             ..RacelineSettings::default()
         };
@@ -276,6 +336,7 @@ mod tests {
             ("objectives = [\"speed\"]", "objectives"),
             ("objectives = [\"gamma\", \"gamma\"]", "gamma twice"),
             ("width = 2.0", "width"),
+            ("algorithm = \"ants\"", "algorithm"),
             ("car_width_m = \"wide\"", "car_width_m"),
         ] {
             std::fs::write(&path, text).unwrap();

@@ -31,7 +31,7 @@ pub struct Point {
 }
 
 /// Sweep files that come with the crate, by name.
-const BUNDLED: [(&str, &str); 4] = [
+const BUNDLED: [(&str, &str); 5] = [
     (
         "thesis_inertia",
         include_str!("../../../data/sweeps/thesis_inertia.toml"),
@@ -40,6 +40,7 @@ const BUNDLED: [(&str, &str); 4] = [
         "thesis_population",
         include_str!("../../../data/sweeps/thesis_population.toml"),
     ),
+    ("front", include_str!("../../../data/sweeps/front.toml")),
     ("norms", include_str!("../../../data/sweeps/norms.toml")),
     ("sections", include_str!("../../../data/sweeps/sections.toml")),
 ];

@@ -4,6 +4,7 @@
 //! come, so that a sweep that was broken off goes on where it stopped; they hold nothing that depends on the clock.
 
 mod grid;
+mod joint;
 mod results;
 
 pub use grid::{Point, SweepSettings};
@@ -86,24 +87,27 @@ pub fn sweep(
             SweptStudy::Raceline => lined(&path, || observe(&progress))?,
         };
         // A run that was broken off is no row: it is done anew.
-        let Some(figures) = found else {
+        let Some((figures, front)) = found else {
             return Err(Error::Interrupted(folder.to_owned()));
         };
         rows.push(Row {
             run: number,
             settings: point.settings.clone(),
             figures,
+            front,
         });
         results::write_rows(&folder.join(ROWS), &rows)?;
     }
-    let summary = Summary::new(rows);
+    let summary = Summary::new(rows)?;
     summary.write(folder)?;
     Ok(summary)
 }
 
 type Figures = BTreeMap<String, Option<f64>>;
+/// Figures, and the objectives of a front where there is one.
+type Found = (Figures, Vec<Vec<f64>>);
 
-fn identified(path: &Path, mut observe: impl FnMut() -> ControlFlow<()>) -> Result<Option<Figures>> {
+fn identified(path: &Path, mut observe: impl FnMut() -> ControlFlow<()>) -> Result<Option<Found>> {
     let settings = IdentifySettings::read(path)?;
     let setup = identify::set_up(&settings)?;
     let outcome = identify::search(&settings, &setup, |_| observe())?;
@@ -129,10 +133,10 @@ fn identified(path: &Path, mut observe: impl FnMut() -> ControlFlow<()>) -> Resu
             .iter()
             .map(|(channel, cost)| (format!("cost_{channel}"), Some(*cost))),
     );
-    Ok(Some(figures))
+    Ok(Some((figures, Vec::new())))
 }
 
-fn lined(path: &Path, mut observe: impl FnMut() -> ControlFlow<()>) -> Result<Option<Figures>> {
+fn lined(path: &Path, mut observe: impl FnMut() -> ControlFlow<()>) -> Result<Option<Found>> {
     let settings = RacelineSettings::read(path)?;
     let setup = raceline::set_up(&settings)?;
     let outcome = raceline::find_lines(&settings, &setup, |_| observe())?;
@@ -150,9 +154,11 @@ fn lined(path: &Path, mut observe: impl FnMut() -> ControlFlow<()>) -> Result<Op
             o.exact.as_ref().map(|line| line.worth(o.objective)),
         );
     }
-    if let Some(front) = &outcome.front {
-        figures.insert("hypervolume".to_owned(), Some(front.hypervolume));
-        figures.insert("front_size".to_owned(), Some(front.alpha.len() as f64));
+    let mut front = Vec::new();
+    if let Some(found) = outcome.front {
+        figures.insert("hypervolume".to_owned(), Some(found.hypervolume));
+        figures.insert("front_size".to_owned(), Some(found.alpha.len() as f64));
+        front = found.objectives;
     }
-    Ok(Some(figures))
+    Ok(Some((figures, front)))
 }

@@ -17,6 +17,9 @@ pub struct Row {
     pub settings: BTreeMap<String, String>,
     /// What came of it.
     pub figures: BTreeMap<String, Option<f64>>,
+    /// Its front's objectives, row by row; kept until all fronts are compared.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub front: Vec<Vec<f64>>,
 }
 
 /// Median and quartiles of a figure over the seeds of one setting.
@@ -152,12 +155,16 @@ pub(super) fn read_rows(
 }
 
 impl Summary {
-    pub(super) fn new(rows: Vec<Row>) -> Self {
-        Self {
+    pub(super) fn new(mut rows: Vec<Row>) -> Result<Self> {
+        super::joint::compare(&mut rows)?;
+        for row in &mut rows {
+            row.front.clear();
+        }
+        Ok(Self {
             study: "sweep",
             groups: medians(&rows),
             rows,
-        }
+        })
     }
 
     /// The medians as a table.
@@ -290,6 +297,7 @@ mod tests {
                 ("seed".to_owned(), seed.to_owned()),
             ]),
             figures: BTreeMap::from([("x".to_owned(), Some(x)), ("none".to_owned(), None)]),
+            front: Vec::new(),
         };
         let rows = [
             row(0, "a", "1", 3.0),

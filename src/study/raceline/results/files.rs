@@ -45,7 +45,7 @@ pub fn write(
     )?;
     for line in told_lines(outcome) {
         let name = stem(&line.name);
-        write_line(&folder.join(format!("line_{name}.csv")), line)?;
+        write_line(&folder.join(format!("line_{name}.csv")), setup, line)?;
         setup
             .cuts
             .write_racetrack_line(&line.alpha, folder.join(format!("racetrack_{name}.csv")))?;
@@ -53,8 +53,9 @@ pub fn write(
     write_front(folder, outcome)
 }
 
-/// The line on its fine spline: station, place, alpha, curvature, speed, accelerations, steering, time.
-fn write_line(path: &Path, line: &ReportedLine) -> Result<()> {
+/// The line on its fine spline: station, place, alpha, curvature, speed, accelerations, steering, time, and the gear that
+/// gives most (from 1) where there is a gearbox.
+fn write_line(path: &Path, setup: &Setup, line: &ReportedLine) -> Result<()> {
     let fine = &line.fine;
     let n = line.alpha.len();
     let alpha: Vec<f64> = fine
@@ -87,6 +88,21 @@ fn write_line(path: &Path, line: &ReportedLine) -> Result<()> {
             ("steering", "rad", &lap.steering_rad),
             ("time", "s", elapsed),
         ]);
+    }
+    let gears: Option<Vec<f64>> = fine
+        .lap
+        .as_ref()
+        .zip(setup.gearbox.as_ref())
+        .map(|(lap, gearbox)| {
+            let (powertrain, radius_m) = gearbox;
+            let gear = |v: &f64| powertrain.gear(*v, *radius_m);
+            lap.v_mps
+                .iter()
+                .map(|v| gear(v).map_or(powertrain.gear_ratios.len(), |g| g.index + 1) as f64)
+                .collect()
+        });
+    if let Some(gears) = &gears {
+        table.push(("gear", "-", gears));
     }
     let columns: Vec<Column<'_>> = table
         .into_iter()

@@ -3,7 +3,9 @@
 use super::files::stem;
 use super::told_lines;
 use crate::error::Result;
-use crate::report::{Curve, CurvePanel, Objective, TrackMap, plot_curves, plot_pareto, plot_track_map};
+use crate::report::{
+    Curve, CurvePanel, Objective, TrackMap, plot_curves, plot_parallel, plot_pareto, plot_track_map,
+};
 use crate::study::raceline::{Outcome, ReportedLine, Setup};
 use glam::DVec2;
 use std::path::Path;
@@ -299,45 +301,14 @@ fn draw_front(folder: &Path, outcome: &Outcome) -> Result<()> {
             chosen,
         )?;
     }
-    let m = objectives.len();
-    let range = |k: usize| {
-        let values = front.objectives.iter().map(|row| row[k]);
-        let least = values.clone().fold(f64::INFINITY, f64::min);
-        (least, values.fold(f64::NEG_INFINITY, f64::max))
-    };
-    let ranges: Vec<(f64, f64)> = (0..m).map(range).collect();
-    let share = |row: &[f64], k: usize| {
-        let (least, most) = ranges[k];
-        if most > least {
-            (row[k] - least) / (most - least)
-        } else {
-            0.5
-        }
-    };
-    let axis: Vec<String> = objectives
-        .iter()
-        .zip(&ranges)
-        .enumerate()
-        .map(|(k, (o, (least, most)))| format!("{k}: {} {least:.4} to {most:.4} {}", o.name, o.unit))
-        .collect();
-    let panel = CurvePanel {
-        title: "One curve a line, coloured by the last objective",
-        x_label: &axis.join("; "),
-        y_label: "share of the front's range",
-        curves: front
-            .objectives
-            .iter()
-            .map(|row| Curve {
-                label: "",
-                x: (0..m).map(|k| k as f64).collect(),
-                y: (0..m).map(|k| share(row, k)).collect(),
-                shade: Some(share(row, m - 1)),
-            })
-            .collect(),
-    };
-    plot_curves(
-        folder.join("parallel.svg"),
-        "The front in parallel coordinates",
-        &[panel],
-    )
+    if objectives.len() >= 2 {
+        plot_parallel(
+            folder.join("parallel.svg"),
+            "The front in parallel coordinates",
+            &objectives,
+            &front.objectives,
+            chosen,
+        )?;
+    }
+    Ok(())
 }

@@ -1,0 +1,98 @@
+//! An archive in parallel coordinates: an axis for each objective, a line for each compromise.
+
+use super::canvas::{Align, Canvas, Type, draw_to_file};
+use super::pareto::Objective;
+use super::style::{FRAME, INK, LABEL_PX, TICK_PX, VERMILLION, WHITE, significant, viridis, with_unit};
+use crate::{Error, Result};
+use std::path::Path;
+
+const SIZE: (f64, f64) = (900.0, 520.0);
+const TOP: f64 = 100.0;
+const BOTTOM: f64 = 460.0;
+
+/// Draws an archive to an SVG file (A. Inselberg, *The plane with parallel coordinates*, The Visual Computer 1, 1985). Every
+/// axis goes from the least value, below, to the greatest; lines are coloured by the last objective; `chosen` is the index
+/// of the one to mark. Points that are not finite are left out.
+///
+/// # Errors
+/// [`Error::Input`] when there are fewer than two objectives, when a point has another number of values, when no point is
+/// finite or `chosen` is not a point; [`Error::Io`] when the file cannot be written.
+pub fn plot_parallel(
+    path: impl AsRef<Path>,
+    title: &str,
+    objectives: &[Objective<'_>],
+    points: &[Vec<f64>],
+    chosen: Option<usize>,
+) -> Result<()> {
+    let path = path.as_ref();
+    let n = objectives.len();
+    let refuse = |place: &str, found: String, expected: &str| Err(Error::input(path, place, found, expected));
+    if n < 2 {
+        return refuse("objectives", n.to_string(), "2 or more");
+    }
+    if let Some(point) = points.iter().find(|p| p.len() != n) {
+        return refuse(
+            "points",
+            format!("{} values", point.len()),
+            "one value per objective",
+        );
+    }
+    if let Some(index) = chosen.filter(|&c| c >= points.len()) {
+        return refuse("chosen point", index.to_string(), "one of the points");
+    }
+    let finite: Vec<&Vec<f64>> = points
+        .iter()
+        .filter(|p| p.iter().all(|v| v.is_finite()))
+        .collect();
+    if finite.is_empty() {
+        return refuse("points", "none that is finite".to_owned(), "at least one");
+    }
+    let ranges: Vec<(f64, f64)> = (0..n)
+        .map(|k| {
+            let values = finite.iter().map(|p| p[k]);
+            (
+                values.clone().fold(f64::INFINITY, f64::min),
+                values.fold(f64::NEG_INFINITY, f64::max),
+            )
+        })
+        .collect();
+    let share = |point: &[f64], k: usize| {
+        let (least, most) = ranges[k];
+        if most > least {
+            (point[k] - least) / (most - least)
+        } else {
+            0.5
+        }
+    };
+    let across = |k: usize| 110.0 + (SIZE.0 - 220.0) * k as f64 / (n - 1) as f64;
+    let course = |point: &[f64]| -> Vec<(f64, f64)> {
+        (0..n)
+            .map(|k| (across(k), BOTTOM - (BOTTOM - TOP) * share(point, k)))
+            .collect()
+    };
+    // The smallest values of the last objective lie on top.
+    let mut order: Vec<&&Vec<f64>> = finite.iter().collect();
+    order.sort_by(|a, b| b[n - 1].total_cmp(&a[n - 1]));
+    draw_to_file(path, SIZE, title, |canvas: &mut Canvas<'_>| {
+        for point in order {
+            canvas.path(course(point), viridis(share(point, n - 1)), 1.2);
+        }
+        if let Some(point) = chosen.map(|c| &points[c]).filter(|p| finite.contains(p)) {
+            canvas.path(course(point), WHITE, 5.0);
+            canvas.path(course(point), VERMILLION, 2.6);
+        }
+        for (k, objective) in objectives.iter().enumerate() {
+            let (x, (least, most)) = (across(k), ranges[k]);
+            canvas.line((x, TOP), (x, BOTTOM), FRAME, 1.2);
+            let name = with_unit(objective.name, objective.unit);
+            canvas.text(
+                &name,
+                (x, TOP - 36.0),
+                Type::new(LABEL_PX, INK, Align::Centre).bold(),
+            );
+            let look = Type::new(TICK_PX, INK, Align::Centre);
+            canvas.text(&significant(most, 5), (x, TOP - 14.0), look);
+            canvas.text(&significant(least, 5), (x, BOTTOM + 16.0), look);
+        }
+    })
+}
