@@ -32,6 +32,7 @@ use crate::line::Parametrisation;
 use crate::study::keeper::{Keeper, Origin};
 use fast::search_objective;
 use front::search_front_from;
+use rayon::prelude::*;
 use state::{FinishedObjective, Work, inputs_of};
 use std::ops::ControlFlow;
 use std::time::Instant;
@@ -165,10 +166,11 @@ pub fn find_lines_from(
     let reference = setup.report("reference", &setup.cuts.reference, settings)?;
     let solvers = ExactSolvers::new(setup, settings)?;
     let exact_began = Instant::now();
-    let mut exact = Vec::new();
-    for objective in &settings.objectives {
-        exact.push(solvers.reference(*objective)?);
-    }
+    let exact = settings
+        .objectives
+        .par_iter()
+        .map(|objective| solvers.reference(*objective))
+        .collect::<Result<Vec<_>>>()?;
     let exact_s = exact_began.elapsed().as_secs_f64();
 
     let began = Instant::now();
