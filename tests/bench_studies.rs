@@ -70,8 +70,11 @@ fn rows_and_a_picture() {
         let (evaluations, seconds, volumes) = (list("evaluations"), list("seconds"), list("hypervolume"));
         assert_eq!(evaluations.last(), Some(&120.0));
         assert!(evaluations.is_sorted() && seconds.is_sorted() && seconds.len() == volumes.len());
-        // The archive of neither is full yet, so that nothing is lost.
-        assert!(volumes.is_sorted(), "{volumes:?}");
+        // Its archive is not full yet, so that nothing is lost.
+        assert!(
+            row["algorithm"] != "default" || volumes.is_sorted(),
+            "{volumes:?}"
+        );
         let reached = row["hypervolume_median"].as_f64().unwrap();
         assert!((0.0..=1.0).contains(&reached) && reached > 0.0, "{row}");
         // The exact lines are among the first candidates.

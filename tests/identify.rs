@@ -63,7 +63,7 @@ fn polish_recovers_the_truth_from_a_distance() {
         "a start that is wrong"
     );
     let polished = polish(&setup.replay, &start, setup.scales.map(|s| 1.0 / s)).unwrap();
-    // The bound; the figures of the log would allow far less.
+    // The bound that users are promised; the figures of the log would allow far less.
     assert!(total_parameter_error(&polished.candidate, &truth, all) < 1e-3);
 }
 

@@ -50,7 +50,7 @@ fn a_swarm_alone_finds_the_inside_of_a_circle() {
     let inside = 361.0 * 2.0 * 590.0 * (std::f64::consts::PI / 361.0).sin();
     let found = &outcome.objectives[0];
     assert!((found.exact.as_ref().unwrap().length_m / inside - 1.0).abs() < 1e-9);
-    // The bound.
+    // An inner polygon to a ten-thousandth, 0.37 m of 3707 m.
     let error = found.best.length_m / inside - 1.0;
     assert!((-1e-9..1e-4).contains(&error), "{error}");
 }
@@ -88,8 +88,8 @@ fn racer() -> String {
     text
 }
 
-/// The swarm alone, from a cold start and without gradients, on the fine spline: within 0.3 % of the exact solver's line, which
-/// is the bound.
+/// The swarm alone, from a cold start and without gradients, on the fine spline: within 0.3 % of the exact solver's line. The
+/// swarm's spline and the solver's are different ones, and either may be ahead.
 #[test]
 fn a_swarm_alone_finds_the_fastest_line() {
     let mut cases = vec![("silverstone_gp".to_owned(), None, 480)];
@@ -182,6 +182,13 @@ fn a_study_of_the_bundled_circuit_holds_together() {
         assert!(others.iter().all(|o| o.best.worth(own.objective) > worth));
         let exact = own.exact.as_ref().unwrap().worth(own.objective);
         assert!(worth <= exact * (1.0 + 1e-9), "{:?}", own.objective);
+        // The swarm by itself, from the exact line's spline on: no more than a hundredth is lost to its control points.
+        assert!(
+            own.swarm_cost <= exact * 1.01,
+            "{:?}: {}",
+            own.objective,
+            own.swarm_cost
+        );
     }
     let front = outcome.front.as_ref().unwrap();
     assert!(front.alpha.len() > 10 && (0.3..1.0).contains(&front.hypervolume));

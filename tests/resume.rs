@@ -135,7 +135,8 @@ fn a_front_goes_on_bit_for_bit() {
 
 fn lines() -> RacelineSettings {
     RacelineSettings {
-        sections: 60,
+        track: "stadium:300:80:12".to_owned(),
+        sections: 120,
         population: 16,
         iterations: 12,
         archive: 12,
@@ -157,6 +158,39 @@ fn lines_told(settings: &RacelineSettings, setup: &raceline::Setup, outcome: &ra
         outcome.history,
         timeless(serde_json::to_value(&summary).unwrap())
     )
+}
+
+/// Breaks a search for lines off at each of these observations in turn, goes on each time, and holds the end against `wanted`.
+fn lines_in_pieces(
+    (settings, setup): (&RacelineSettings, &raceline::Setup),
+    breaks: &[usize],
+    (wanted, all): (&str, usize),
+) {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut seen, mut state): (usize, Option<LinesState>) = (0, None);
+    for at in breaks.iter().copied().chain([usize::MAX]) {
+        let mut keeper = Keeper::new(folder.path());
+        let outcome = find_lines_from(settings, setup, state.take(), &mut keeper, |_| {
+            seen += 1;
+            if seen == at {
+                ControlFlow::Break(())
+            } else {
+                ControlFlow::Continue(())
+            }
+        })
+        .unwrap();
+        assert_eq!(outcome.interrupted, at != usize::MAX, "at {at} of {all}");
+        if outcome.interrupted {
+            state = Some(checkpoint::load(&folder.path().join(STATE)).unwrap());
+        } else {
+            assert_eq!(seen, all, "nothing is done twice");
+            let told = lines_told(settings, setup, &outcome);
+            assert!(
+                told == wanted,
+                "broken off at {breaks:?} of {all}:\n{told}\nnot\n{wanted}"
+            );
+        }
+    }
 }
 
 #[test]
@@ -182,31 +216,37 @@ fn lines_go_on_bit_for_bit_from_every_stage() {
         ],
         vec![7, first("fastest") + 9, last - 3, all],
     ] {
-        let folder = tempfile::tempdir().unwrap();
-        let (mut seen, mut state): (usize, Option<LinesState>) = (0, None);
-        for at in breaks.iter().copied().chain([usize::MAX]) {
-            let mut keeper = Keeper::new(folder.path());
-            let outcome = find_lines_from(&settings, &setup, state.take(), &mut keeper, |_| {
-                seen += 1;
-                if seen == at {
-                    ControlFlow::Break(())
-                } else {
-                    ControlFlow::Continue(())
-                }
-            })
-            .unwrap();
-            assert_eq!(outcome.interrupted, at != usize::MAX, "at {at} of {all}");
-            if outcome.interrupted {
-                state = Some(checkpoint::load(&folder.path().join(STATE)).unwrap());
-            } else {
-                assert_eq!(seen, all, "nothing is done twice");
-                assert_eq!(
-                    lines_told(&settings, &setup, &outcome),
-                    wanted,
-                    "broken off at {breaks:?}"
-                );
-            }
-        }
+        lines_in_pieces((&settings, &setup), &breaks, (&wanted, all));
+    }
+}
+
+/// Searches with no line to start from, whose stages have control points of different numbers, round a circuit and along a
+/// section of it.
+#[test]
+fn cold_searches_go_on_bit_for_bit_from_every_stage() {
+    let abbey = RacelineSettings {
+        track: "silverstone_gp".to_owned(),
+        section: Some("Abbey".to_owned()),
+        sections: 480,
+        ..lines()
+    };
+    for base in [lines(), abbey] {
+        let settings = RacelineSettings {
+            objectives: vec![LineObjective::LapTime],
+            warm_start: false,
+            local_search: false,
+            ..base
+        };
+        let setup = raceline::set_up(&settings).unwrap();
+        let mut all = 0;
+        let whole = find_lines(&settings, &setup, |_| {
+            all += 1;
+            ControlFlow::Continue(())
+        })
+        .unwrap();
+        let wanted = lines_told(&settings, &setup, &whole);
+        let breaks: Vec<usize> = (1..8).map(|k| 1 + k * (all - 1) / 8).collect();
+        lines_in_pieces((&settings, &setup), &breaks, (&wanted, all));
     }
 }
 

@@ -44,9 +44,9 @@ pub struct Arguments {
     /// Part of the name of the GPU to use
     #[arg(long, value_name = "NAME")]
     adapter: Option<String>,
-    /// Where results of stages are kept for runs of the same inputs
-    #[arg(long, value_name = "DIR", default_value = "runs/cache")]
-    cache: PathBuf,
+    /// Where results of stages are kept for runs of the same inputs [default: runs/cache]
+    #[arg(long, value_name = "DIR", conflicts_with = "no_cache")]
+    cache: Option<PathBuf>,
     /// Do every stage anew, and keep none
     #[arg(long)]
     no_cache: bool,
@@ -62,7 +62,7 @@ impl Arguments {
     fn settings(&self, base: Option<RunSettings>) -> Result<RunSettings> {
         let mut s = match &self.study {
             Some(path) => RunSettings::read(path)?,
-            None => base.unwrap_or_default(),
+            None => base.clone().unwrap_or_default(),
         };
         if self.log.is_some() {
             s.identify.log.clone_from(&self.log);
@@ -94,6 +94,15 @@ impl Arguments {
                 found,
                 "0 to 5 m, 1 to 20 rounds",
             ));
+        }
+        // A run that is gone on with finds its stages where it left them.
+        s.cache = match (&self.cache, base) {
+            (Some(cache), _) => Some(cache.clone()),
+            (None, Some(base)) => base.cache,
+            (None, None) => (!self.no_cache).then(|| PathBuf::from("runs/cache")),
+        };
+        if let Some(cache) = &mut s.cache {
+            *cache = std::path::absolute(&cache).map_err(|e| Error::io(&cache, "find", e))?;
         }
         s.identify = s.identify.absolute()?;
         s.raceline = s.raceline.absolute();
@@ -127,11 +136,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let bar = progress::saying(arguments.common.quiet);
     // Without a cache to share, a run that is broken off still finds its own stages again.
     let own = folder.join(".stages");
-    let cache = if arguments.no_cache {
-        &own
-    } else {
-        &arguments.cache
-    };
+    let cache = settings.cache.as_ref().unwrap_or(&own);
     let summary = run_all(&settings, &folder, Some(cache), keeper.interval(), |doing| {
         bar.set_message(doing.to_owned());
         bar.tick();

@@ -86,7 +86,8 @@ pub fn shares_across(road: &CrossSections, points_m: &[DVec2]) -> Result<Vec<f64
 }
 
 /// `count` cuts square to the closed line through `points_m`, evenly spaced along it, between the edges of `road`; the line
-/// is their reference, and may lie off the road. A line within these cuts is within those of `road`.
+/// is their reference, and may lie off the road. At the cuts a line within these is within `road`; between two of them an edge
+/// bulges in by no more than the square of their spacing over eight times its radius.
 ///
 /// # Errors
 /// As [`shares_across`]; [`Error::Study`] where an edge does not lie abreast of the line.
@@ -138,7 +139,7 @@ pub fn cuts_about(road: &CrossSections, points_m: &[DVec2], count: usize) -> Res
     for (station_m, cut) in by_station {
         for (side, end) in [road.right_m[cut], road.left_m[cut]].into_iter().enumerate() {
             let about = curve.station_m.partition_point(|s| *s <= station_m) + k;
-            let steps = (REACH_M / STEP_M) as usize;
+            let steps = ((REACH_M / STEP_M) as usize).min(k / 2);
             let nearest = (about - steps..about + steps)
                 .map(|p| p % k)
                 .min_by(|a, b| {

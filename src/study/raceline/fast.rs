@@ -159,6 +159,10 @@ fn search_about(
     let mut line = found.alpha.clone();
     found.history.clear();
     for (number, stage) in stages.iter().enumerate() {
+        // The state is that of the search that was broken off, and no other may go on from it.
+        if work.interrupted {
+            break;
+        }
         let count = (controls / stage.coarseness).max(8);
         let wave_m = stage.wave * road.length_m / controls as f64;
         let smooth = cuts.points(&cuts.smoothed(&line, wave_m));
@@ -230,6 +234,9 @@ fn search_across(
         ..*search
     };
     let curved = search_step(&curved, plain, objective, (0, 0), work)?;
+    if work.interrupted {
+        return Ok(curved);
+    }
     let mut cuts = setup.cuts.clone();
     cuts.reference.clone_from(&curved.alpha);
     let smooth = cuts.with_smooth_reference(BASE_M);

@@ -49,7 +49,14 @@ pub fn set_up(settings: &RacelineSettings) -> Result<Setup> {
     let close = ((road.length_m / EDGE_M).ceil() as usize).clamp(settings.sections, 1_000_000);
     let dense = track.cross_sections(&Spacing::equal(close), settings.as_surveyed)?;
     let (road, dense) = match &settings.section {
-        Some(name) => (stretch_named(&road, name)?, stretch_named(&dense, name)?),
+        Some(name) => {
+            let (first_m, length_m) = section_named(&road, name)?;
+            let stretch = stretch_of(&road, first_m, length_m, 0)?;
+            // The edges reach past the stretch's own ends, wherever its cuts have put these.
+            let from_m = road.station_m[first_cut(&road, first_m)];
+            let edges = stretch_of(&dense, from_m - road.length_m / close as f64, stretch.length_m, 3)?;
+            (stretch, edges)
+        }
         None => (road, dense),
     };
     let cuts = road.narrowed(settings.car_width_m)?;
@@ -80,8 +87,8 @@ pub fn set_up(settings: &RacelineSettings) -> Result<Setup> {
     })
 }
 
-/// The stretch of the section of this name, or of one of its names, as an open road.
-fn stretch_named(road: &CrossSections, name: &str) -> Result<CrossSections> {
+/// Where the section of this name, or of one of its names, begins (m), and its length (m).
+fn section_named(road: &CrossSections, name: &str) -> Result<(f64, f64)> {
     let called = |all: &str| all == name || all.split('/').any(|one| one.trim() == name);
     let Some(section) = road.sections.iter().find(|s| called(&s.name)) else {
         let known: Vec<&str> = road.sections.iter().map(|s| s.name.as_str()).collect();
@@ -92,10 +99,35 @@ fn stretch_named(road: &CrossSections, name: &str) -> Result<CrossSections> {
         };
         return Err(Error::input(&road.name, "section", name, expected));
     };
-    let first = road.station_m.partition_point(|s| *s < section.start_m);
+    Ok((section.start_m, section.length_m()))
+}
+
+/// The first cut at or after a station (m).
+fn first_cut(road: &CrossSections, from_m: f64) -> usize {
+    let from_m = if road.closed {
+        from_m.rem_euclid(road.length_m)
+    } else {
+        from_m
+    };
+    let first = road.station_m.partition_point(|s| *s < from_m);
+    if road.closed {
+        first % road.len()
+    } else {
+        first.min(road.len() - 2)
+    }
+}
+
+/// The cuts from a station (m) on over a length (m), and some `more`, as an open road.
+fn stretch_of(road: &CrossSections, from_m: f64, length_m: f64, more: usize) -> Result<CrossSections> {
+    let first = first_cut(road, from_m);
     let spacing_m = road.length_m / road.len() as f64;
-    let count = (section.length_m() / spacing_m).round() as usize + 1;
-    road.stretch(first.min(road.len() - 1), count.clamp(2, road.len()))
+    let most = if road.closed {
+        road.len()
+    } else {
+        road.len() - first
+    };
+    let count = (length_m / spacing_m).round() as usize + 1 + more;
+    road.stretch(first, count.clamp(2, most))
 }
 
 /// One line with everything that is reported of it.

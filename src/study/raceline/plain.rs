@@ -72,7 +72,7 @@ pub(super) fn search_plainly(
             evaluations: progress.evaluations,
             best: format!("{:.4} {}", progress.best[0], objective.unit()),
         };
-        // Such a search is short: one that was broken off is done anew.
+        // Nothing of such a search is kept: one that is broken off is done anew.
         if work.told(&told, |_| {})?.is_break() {
             break;
         }

@@ -35,6 +35,8 @@ pub struct RunSettings {
     pub margin_m: f64,
     /// Most lines that are driven, each within the limits that the one before it left.
     pub rounds: usize,
+    /// Where stages are kept for runs of the same inputs; nothing to keep them in the run's own folder until it is done.
+    pub cache: Option<PathBuf>,
 }
 
 impl Default for RunSettings {
@@ -48,6 +50,7 @@ impl Default for RunSettings {
             raceline: RacelineSettings::default(),
             margin_m: 0.5,
             rounds: 2,
+            cache: None,
         }
     }
 }

@@ -92,21 +92,16 @@ impl Stages {
             return Ok((target, true));
         }
         // Where another run is at work on the same stage, that one keeps its state.
-        let unfinished = kept
-            .as_ref()
-            .and_then(|kept| run_folder::take(&kept.with_extension("unfinished")).ok());
+        let unfinished = kept.as_ref().and_then(|kept| {
+            run_folder::take(&kept.with_extension("unfinished"))
+                .inspect_err(|error| tracing::warn!("the state of this stage is not saved: {error}"))
+                .ok()
+        });
         let mut keeper = match &unfinished {
             Some(folder) => Keeper::new(folder).every(self.every),
             None => Keeper::idle(),
         };
         work(&target, &mut keeper)?;
-        keeper.done()?;
-        if let Some(folder) = unfinished {
-            let path = folder.to_path_buf();
-            drop(folder);
-            // What is in it now is another run's.
-            let _ = std::fs::remove_dir(path);
-        }
         if let Some(kept) = kept {
             // Filled beside and renamed: another run sees all of it or nothing.
             let beside = kept.with_extension(format!("partial-{}", std::process::id()));
@@ -117,6 +112,14 @@ impl Stages {
                 // Another run was first; its results are the same.
                 std::fs::remove_dir_all(&beside).map_err(|e| Error::io(&beside, "remove", e))?;
             }
+        }
+        // Only now: until the stage is kept, its state is all there is of it.
+        keeper.done()?;
+        if let Some(folder) = unfinished {
+            let path = folder.to_path_buf();
+            drop(folder);
+            // What is in it now is another run's.
+            let _ = std::fs::remove_dir(path);
         }
         Ok((target, false))
     }
@@ -133,7 +136,7 @@ pub(super) fn go_on<S: Checkpoint, T>(
 ) -> Result<T> {
     if let Some(state) = keeper.saved() {
         match work(Some(state), keeper) {
-            Err(Error::Input { .. }) => {}
+            Err(error @ Error::Input { .. }) => tracing::warn!("the stage is done anew: {error}"),
             outcome => return outcome,
         }
     }
@@ -144,12 +147,13 @@ fn create(folder: &Path) -> Result<()> {
     std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, "create", e))
 }
 
-/// Copies the files of a folder, which has no folders, all but the mark that it is complete.
+/// Copies the files of a folder, which has no folders, all but the mark that it is complete and what a killed process had half
+/// written.
 fn copy(from: &Path, to: &Path) -> Result<()> {
     let failed = |e| Error::io(from, "read", e);
     for entry in from.read_dir().map_err(failed)? {
         let entry = entry.map_err(failed)?;
-        if entry.file_name() != DONE {
+        if entry.file_name() != DONE && !entry.file_name().to_string_lossy().starts_with('.') {
             let target = to.join(entry.file_name());
             std::fs::copy(entry.path(), &target).map_err(|e| Error::io(&target, "write", e))?;
         }
