@@ -82,10 +82,11 @@ fn a_fault_at_any_submission_costs_nothing_but_time() {
         for at in 0..submissions {
             faults::inject(fault, at, 1);
             let (runs, told, backend) = generations(&replay, BackendChoice::Gpu);
-            faults::end();
+            let seen = faults::end();
             assert_eq!(backend, "gpu", "{fault:?} at {at}: {told:?}");
-            // The last submission reads a clock: a device that goes then is missed by nobody.
-            if at + 1 < submissions || !told.is_empty() {
+            // The last submission reads a clock: a device that goes then is missed by nobody. How many there are goes with the
+            // time that they take.
+            if at + 1 < seen || !told.is_empty() {
                 assert_eq!(told.len(), 1, "{fault:?} at {at} of {submissions}: {told:?}");
                 assert!(told[0].contains("opened anew"), "{told:?}");
             }
@@ -97,7 +98,10 @@ fn a_fault_at_any_submission_costs_nothing_but_time() {
         for at in [0, submissions / 2, submissions - 1] {
             faults::inject(fault, at, u64::MAX);
             let (runs, told, backend) = generations(&replay, BackendChoice::Gpu);
-            faults::end();
+            let seen = faults::end();
+            if at > 0 && at + 1 >= seen && told.is_empty() {
+                continue;
+            }
             assert_eq!(backend, "simd", "{fault:?} from {at}: {told:?}");
             assert!(told.last().unwrap().contains("simd takes over"), "{told:?}");
             let mut taken_over = 0;

@@ -20,7 +20,7 @@ fn small(objectives: &[ObjectiveChoice]) -> IdentifySettings {
         section: Some("Abbey".to_owned()),
         objectives: objectives.to_vec(),
         population: Some(16),
-        iterations: Some(30),
+        iterations: Some(50),
         // A function of the candidate alone; killed runs polish.
         polish: false,
         backend: BackendChoice::Simd,
@@ -95,8 +95,8 @@ fn an_identification_goes_on_bit_for_bit() {
     })
     .unwrap();
     let wanted = told(&settings, &setup, &whole);
-    // 50 iterations explore, 30 gather.
-    assert_eq!(observations, 80);
+    // 50 iterations explore, 50 gather.
+    assert_eq!(observations, 100);
     for breaks in [
         &[1][..],
         &[17],

@@ -113,7 +113,12 @@ fn read(path: &Path, kind: Kind) -> Result<String> {
             format!("a {shape} track, {}: {:.1} m", circuit.name, circuit.length_m)
         }
         Kind::Log => {
-            let log = Log::read(path, &ChannelMap::default(), &LogOptions::default())?;
+            // As for an identification of the bundled car.
+            let options = LogOptions {
+                rolling_radius_m: Some(Car::bundled()?.chassis.radius_front),
+                ..LogOptions::default()
+            };
+            let log = Log::read(path, &ChannelMap::default(), &options)?;
             format!(
                 "a log of {} laps: {} samples at {:.0} Hz",
                 log.laps.len(),

@@ -188,8 +188,14 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     if arguments.common.json {
         print_json(&summary)?;
     }
+    let matched = outcome.sizing.is_empty() || summary.sizing.iter().any(|s| s.energy_mj.is_some());
     if outcome.interrupted {
         Err(Error::Interrupted(folder.to_path_buf()))
+    } else if !matched {
+        let time_s = settings.match_lap_time_s.unwrap_or_default();
+        Err(Error::Study(format!(
+            "no motor that was tried makes the car lap in {time_s} s, whatever the energy (see the sizes above)"
+        )))
     } else {
         Ok(())
     }

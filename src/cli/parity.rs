@@ -60,6 +60,10 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     }
     let began = Instant::now();
     let subjects = subjects(arguments.backend, arguments.adapter.as_deref())?;
+    if subjects.is_empty() {
+        let expected = "auto, simd or gpu: cpu is the reference that these are held against";
+        return Err(Error::input("the command line", "--backend", "cpu", expected));
+    }
     let device: Option<&DeviceSummary> = subjects.iter().find_map(|s| match s {
         Subject::Device(context) => Some(context.summary()),
         Subject::Lanes(_) => None,

@@ -13,7 +13,7 @@ use std::time::Instant;
 /// Flags of `transient`.
 #[derive(clap::Args)]
 #[command(
-    after_help = "Example:\n  lapswarm raceline --out fast\n  lapswarm transient --line fast/line_fastest.csv"
+    after_help = "A driver needs room: half a metre on either side of the car, which a line found for a car one metre wider leaves.\n\nExample:\n  lapswarm raceline --car-width-m 3 --out fast\n  lapswarm transient --line fast/line_fastest.csv"
 )]
 pub struct Arguments {
     #[command(flatten)]

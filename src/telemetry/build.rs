@@ -268,6 +268,15 @@ impl Build<'_> {
                 "a ground speed channel, or rolling_radius_m in [vehicle] of the channel map",
             ));
         };
+        // In the place of a speed that is there after all, the wheels' would be scored without a word.
+        if let Some(channel) = self.recording.channels.iter().find(|c| c.name.starts_with("vx_")) {
+            return Err(Error::input(
+                self.source,
+                format!("channel {}", channel.name),
+                "a forward speed in a unit that is not known",
+                "vx_mps, or the channel with its unit in the channel map",
+            ));
+        }
         let [fl, fr, rl, rr] = &log.wheel_speed_radps;
         let (left, right, name) = match self.map.speed_axle {
             Axle::Front => (fl, fr, "front"),

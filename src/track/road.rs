@@ -106,8 +106,9 @@ pub(super) fn circuit(road: &dyn Road) -> Result<(Circuit, Closure)> {
             CurvatureRow {
                 station_m,
                 curvature_1pm: turned / (to - from),
-                width_left_m: frame.left_m,
-                width_right_m: frame.right_m,
+                // A spline through widths of nought dips below it.
+                width_left_m: frame.left_m.max(0.0),
+                width_right_m: frame.right_m.max(0.0),
                 corner: String::new(),
             }
         })

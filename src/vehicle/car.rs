@@ -96,6 +96,10 @@ impl Car {
             _ => {}
         }
         let path = Path::new(name_or_path);
+        if path.extension().is_none() && !path.exists() {
+            let expected = "a bundled car (gt, gt_hybrid) or a file";
+            return Err(Error::input(name_or_path, "car", "no such file", expected));
+        }
         let text = read_text(path)?;
         let folder = path.parent().unwrap_or(Path::new("."));
         Self::parse(path, &text, |name| TyreFile::read(&folder.join(name)))

@@ -120,8 +120,9 @@ pub struct Sizing {
     pub fuel_saving_l: Option<f64>,
 }
 
-/// Engines that another car may have, as shares of this car's power.
-pub const ENGINES: [f64; 2] = [0.5, 2.0];
+/// Engines that another car may have, as shares of this car's power. Of weaker ones the limits do not tell what they would
+/// give where the tyres hold this one back.
+pub const ENGINES: [f64; 2] = [1.0, 2.0];
 
 /// The share of this car's engine with which it laps in `lap_time_s` without a motor, and the fuel (l) that it burns then.
 /// Torque and fuel flow are taken to grow alike at every engine speed; the mass stays.

@@ -52,6 +52,8 @@ pub struct Summary {
     pub elapsed_s: f64,
     /// Swarm alone, s.
     pub swarm_elapsed_s: f64,
+    /// Whether the search or the polish was broken off.
+    pub interrupted: bool,
     /// Candidates that the swarm evaluated.
     pub evaluations: u64,
     /// Candidates that failed, by reason.
@@ -163,6 +165,7 @@ pub fn summarise(settings: &IdentifySettings, setup: &Setup, outcome: &Outcome) 
         driver: outcome.backend.driver.clone(),
         elapsed_s: outcome.swarm_s + outcome.polish_s,
         swarm_elapsed_s: outcome.swarm_s,
+        interrupted: outcome.interrupted,
         evaluations: outcome.evaluations,
         failures: outcome.failures.clone(),
         device_faults: outcome.device_faults.clone(),

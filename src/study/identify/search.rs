@@ -94,7 +94,8 @@ pub struct Outcome {
     pub interrupted: bool,
 }
 
-/// Exploring swarm of the adaptive search: many particles for a short while.
+/// Exploring swarm of the adaptive search: many particles for a short while. Twice as many as a study's own number at most,
+/// and for no more iterations than that has.
 pub(super) const EXPLORE: (usize, usize) = (128, 50);
 /// Gathering swarm of the adaptive search.
 pub(super) const GATHER: (usize, usize) = (64, 1500);
@@ -315,7 +316,11 @@ fn swarm_settings(settings: &IdentifySettings) -> PsoSettings {
         _ => (base.population, base.iterations),
     };
     let (population, iterations) = if adaptive {
-        EXPLORE
+        let most = |given: Option<usize>, times: usize| given.map_or(usize::MAX, |n| n.saturating_mul(times));
+        (
+            EXPLORE.0.min(most(settings.population, 2)),
+            EXPLORE.1.min(most(settings.iterations, 1)),
+        )
     } else {
         (
             settings.population.unwrap_or(usual.0),

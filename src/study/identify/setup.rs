@@ -207,7 +207,7 @@ fn windows_over(
                 "the study",
                 "section",
                 name,
-                "a track on which the section is named",
+                "a track (--track, or track in the study) on which the section is named",
             ));
         }
         (None, _) => None,

@@ -79,7 +79,8 @@ impl SurfaceSettings {
             return refuse("grid", self.grid.to_string(), "2 to 2000");
         }
         if !self.share.is_none_or(|s| s > 0.0 && s <= 1.0) {
-            return refuse("share", format!("{:?}", self.share), "a share above 0 up to 1");
+            let found = self.share.map_or(String::new(), |s| s.to_string());
+            return refuse("share", found, "a share above 0 up to 1");
         }
         Ok(())
     }
