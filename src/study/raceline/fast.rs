@@ -100,7 +100,7 @@ pub(super) fn search_objective(
     )
     .is_ok()
     {
-        search_about(settings, setup, &search, work)
+        search_about(settings, setup, &search, &plain, work)
     } else {
         search_across(settings, setup, &search, &plain, work)
     }
@@ -116,6 +116,7 @@ fn search_about(
     settings: &RacelineSettings,
     setup: &Setup,
     search: &LineSearch<'_>,
+    across: &LineSearchSettings,
     work: &mut Work<'_>,
 ) -> Result<FoundLine> {
     let (road, objective) = (&setup.cuts, search.objective);
@@ -158,6 +159,7 @@ fn search_about(
     let mut cuts = road.clone();
     let mut line = found.alpha.clone();
     found.history.clear();
+    let mut searched = false;
     for (number, stage) in stages.iter().enumerate() {
         // The state is that of the search that was broken off, and no other may go on from it.
         if work.interrupted {
@@ -194,6 +196,7 @@ fn search_about(
             evaluations: before.1 + row.evaluations,
             ..row
         }));
+        searched = true;
         line = step.alpha;
         let Ok(shares) = shares_across(road, &cuts.points(&line)) else {
             break;
@@ -203,6 +206,10 @@ fn search_about(
         if told.lap_time_fine_s() < best.lap_time_fine_s() {
             best = told;
         }
+    }
+    if !searched && !work.interrupted {
+        // Cuts so far apart that lines on them cannot be cut square to.
+        return search_across(settings, setup, search, across, work);
     }
     (found.alpha, found.cost) = (best.alpha, best.lap_time_s);
     Ok(found)
