@@ -3,8 +3,8 @@
 // Follows `line.wgsl`, whose course, limits and variables it reads; the strategy's figures are the variables from row
 // STRATEGY on. The constants STRATEGY, ADDITIONAL, COUNTS_CHARGE, FLOWS_AT, BOOSTS_AT and ZONES_AT are generated: where in `energy` the
 // flows, the boosts and the zones begin, after the forces. So is binding 10, `energy`, an array of vectors of four: rows of engine,
-// motor, generator, drag and of their rises; of flows at four loads and of their rises; of the boost and its rise; of each section's
-// zone, position and one over its share.
+// motor, generator, drag and of their rises; of flows at four loads and of their rises; of the motor, the room for it and of their
+// rises; of each section's zone, position and one over its share.
 
 // Twin of `EnergyAccount` in `src/evaluate/hybrid/gpu.rs`.
 struct EnergyAccount {
@@ -45,13 +45,14 @@ struct SegmentEnergy {
     harvested_h: f32,
 }
 
-// The gates of steering, speed squared and acceleration, the floor of the charge and the budget, read once.
+// The gates of steering, speed squared and acceleration, the floor of the charge, the budget and the share of the motor, read once.
 struct Gates {
     curvature: f32,
     speed_squared: f32,
     ax: f32,
     floor: f32,
     budget: f32,
+    motor: f32,
 }
 
 var<private> gates: Gates;
@@ -62,7 +63,7 @@ fn strategy(figure: u32, candidate: u32) -> f32 {
 
 fn zone_share(section: u32, candidate: u32) -> f32 {
     let zone = energy[ZONES_AT + section];
-    let into = (strategy(5u + u32(zone.x), candidate) - zone.y) * zone.z;
+    let into = (strategy(6u + u32(zone.x), candidate) - zone.y) * zone.z;
     return min(max(into, 0.0), 1.0);
 }
 
@@ -87,7 +88,8 @@ fn additional(section: u32, start: f32, length: f32, here: f32, there: f32, most
     let held = min(max(ahead * account.rows_per_speed_squared, 0.0), f32(LIMIT_ROWS));
     let row = min(u32(held), LIMIT_ROWS - 1u);
     let figures = energy[BOOSTS_AT + row];
-    let greatest = figures.x + (held - f32(row)) * figures.y;
+    let force_and_room = figures.xy + (held - f32(row)) * figures.zw;
+    let greatest = min(force_and_room.x * gates.motor, force_and_room.y);
     let may = gates_open(here, start) && gates.ax < engine - first.z;
     let wanted = select(0.0, greatest * zone_share(section, candidate), may);
     let inverse = 1.0 / length;
@@ -139,7 +141,7 @@ fn provisional(
         let force = 0.5 * (step.end - start) * inverse + forces.w;
         let unharvested = account.harvest_most - (*state).harvested_k;
         let room = max(unharvested * account.force_per_harvested * inverse, 0.0);
-        let generator = min(min(max(-force, 0.0), forces.z), room);
+        let generator = min(min(max(-force, 0.0), forces.z * gates.motor), room);
         let harvested_k = joules * generator * account.harvest_gain;
         (*state).change = (*state).change + (harvested_k - deployed);
         (*state).harvested_k = (*state).harvested_k + harvested_k;
@@ -183,12 +185,12 @@ fn segment_energy(
         let may = gates_open(here, start) && gates.ax < ax;
         let share = zone_share(section, candidate);
         let reach = left * account.force_per_deployed * inverse;
-        motor = min(min(select(0.0, forces.y * share, may), demand), reach);
+        motor = min(min(select(0.0, forces.y * gates.motor * share, may), demand), reach);
     }
     let engine = demand - motor;
     let unharvested = account.harvest_most - (*state).harvested_k;
     let room = unharvested * account.force_per_harvested * inverse;
-    let generator = min(min(shed, forces.z), max(room, 0.0));
+    let generator = min(min(shed, forces.z * gates.motor), max(room, 0.0));
     let deployed = joules * motor * account.deploy_cost;
     let harvested_k = joules * generator * account.harvest_gain;
 
@@ -253,6 +255,7 @@ fn energy_lap(candidate: u32) {
         strategy(2u, candidate),
         strategy(3u, candidate),
         strategy(4u, candidate),
+        strategy(5u, candidate),
     );
     ceilings(candidate);
     let n = stretch.sections;

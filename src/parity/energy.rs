@@ -18,12 +18,13 @@ const COUNT: usize = 64;
 /// Cuts of the circuit.
 const SECTIONS: usize = 480;
 /// Gates that every strategy sets, in this order.
-const GATES: [Free; 5] = [
+const GATES: [Free; 6] = [
     Free::Steer,
     Free::Speed,
     Free::Acceleration,
     Free::Soc,
     Free::Energy,
+    Free::Motor,
 ];
 
 /// Problems of both modes, strategies, and what the reference says of them.
@@ -84,8 +85,9 @@ impl Cases {
                         draws.within(0.0, 3.0),
                         draws.within(0.7, 1.0),
                         draws.within(0.0, 4.0),
+                        draws.within(0.0, 240.0),
                     ];
-                    candidate.extend((5..problem.dimensions()).map(|_| draws.within(0.0, 1.0)));
+                    candidate.extend((6..problem.dimensions()).map(|_| draws.within(0.0, 1.0)));
                     candidate
                 })
                 .collect();
@@ -105,7 +107,7 @@ impl Cases {
     /// squared: 2500 m^2/s^2 is off by 3e-4 after the roundings of a step, over 2 h of 10 m that is 3e-5 m/s^2 or 4 kJ on
     /// a lap of 5 km whose signs all agree; a root of what the ellipse leaves is off by 6e-4 of 15 m/s^2 where a corner is
     /// on the limit, an eighth of the lap at most: 7 kJ more. A gate flips on a rounding where a figure is on its threshold:
-    /// no more than a segment at either end of each of the four zones, and one at the budget's end, of 130 kW over h / v.
+    /// no more than a segment at either end of each of the four zones, and one at the budget's end, of 260 kW (the strongest motor with what it loses) over h / v.
     ///
     /// # Errors
     /// [`crate::Error::Device`] if the device fails.
@@ -140,7 +142,7 @@ impl Cases {
                 named("harvested"),
             ];
             for (number, (lap, exact)) in found.iter().zip(exact).enumerate() {
-                let segment_j = 130e3 * 2.0 * spacing / (SECTIONS as f64 * spacing / exact.time);
+                let segment_j = 260e3 * 2.0 * spacing / (SECTIONS as f64 * spacing / exact.time);
                 let energy = 11e3 + 9.0 * segment_j;
                 let fuel = 3e-4 * exact.fuel + energy * 2.0 * 0.27 / 3.6e6;
                 // What passes through the store in a lap: an energy of nought is exact to a share of that.

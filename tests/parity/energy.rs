@@ -30,12 +30,13 @@ fn hybrid_car(exponent: f64) -> EnergyCar {
     EnergyCar::new(car, limits.envelope, Traction { rows }, exponent).expect("a hybrid")
 }
 
-const GATES: [Free; 5] = [
+const GATES: [Free; 6] = [
     Free::Steer,
     Free::Speed,
     Free::Acceleration,
     Free::Soc,
     Free::Energy,
+    Free::Motor,
 ];
 
 /// Problems of every kind, with all gates and all zones free.
@@ -102,8 +103,9 @@ fn candidates(problem: &HybridProblem, count: usize, random: &mut Random) -> Vec
                 random.within(0.0, 3.0),
                 random.within(0.7, 1.0),
                 random.within(0.0, 4.0),
+                random.within(0.0, 240.0),
             ]);
-            candidate.extend((line + 5..problem.dimensions()).map(|_| random.within(0.0, 1.0)));
+            candidate.extend((line + 6..problem.dimensions()).map(|_| random.within(0.0, 1.0)));
             candidate
         })
         .collect()
@@ -165,7 +167,7 @@ fn laps_with_energy_agree_and_balance() {
             let mut worst = [0.0f64; 3];
             for (i, (lap, expected)) in laps.iter().zip(&expected).enumerate() {
                 let mean_speed = points.len() as f64 * spacing / expected.time;
-                let segment_j = 130e3 * 2.0 * spacing / mean_speed;
+                let segment_j = 260e3 * 2.0 * spacing / mean_speed;
                 let energy = 11e3 + 9.0 * segment_j;
                 let fuel = 3e-4 * expected.fuel + energy * 2.0 * 0.27 / 3.6e6;
                 for (what, found, expected, tolerance) in [

@@ -83,12 +83,7 @@ fn energy_vectors(table: &EnergyTable<f32>, plan: &EnergyPlan<f32>) -> Vec<[f32;
     };
     let mut vectors = fours(&table.forces);
     vectors.extend(fours(&table.flows));
-    vectors.extend(
-        table
-            .boosts
-            .chunks_exact(2)
-            .map(|pair| [pair[0], pair[1], 0.0, 0.0]),
-    );
+    vectors.extend(fours(&table.boosts));
     // Whole numbers below 2^24 keep their value as floats.
     vectors.extend(
         plan.zones

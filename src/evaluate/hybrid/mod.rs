@@ -9,5 +9,5 @@ mod simd;
 pub use backend::open_hybrid_evaluator;
 pub use cpu::CpuHybridEvaluator;
 pub use gpu::{EnergyAccount, GpuHybridEvaluator};
-pub use problem::{Free, HybridLine, HybridObjective, HybridProblem, Strategy};
+pub use problem::{Free, HybridLine, HybridObjective, HybridProblem, MOST_MOTOR, Strategy};
 pub use simd::SimdHybridEvaluator;

@@ -83,18 +83,24 @@ pub enum Free {
     Soc,
     /// Energy that may leave the store, MJ.
     Energy,
+    /// Greatest power of the MGU-K, kW; its torque goes with it.
+    Motor,
     /// The share of a zone in which the motor works.
     Zone(usize),
 }
 
+/// The strongest motor that may be asked for, as a share of the car's own.
+pub const MOST_MOTOR: f64 = 2.0;
+
 impl Free {
-    fn variable(self) -> Variable {
+    fn variable(self, power_w: f64) -> Variable {
         match self {
             Self::Steer => Variable::new("steer", "rad", 0.0, 0.2),
             Self::Speed => Variable::new("speed", "m/s", 10.0, 100.0),
             Self::Acceleration => Variable::new("ax", "m/s^2", 0.0, 10.0),
             Self::Soc => Variable::new("soc", "-", 0.0, 1.1),
             Self::Energy => Variable::new("energy", "MJ", 0.0, 20.0),
+            Self::Motor => Variable::new("motor power", "kW", 0.0, MOST_MOTOR * power_w / 1e3),
             Self::Zone(zone) => Variable::new(format!("zone {zone}"), "-", 0.0, 1.0),
         }
     }
@@ -122,7 +128,7 @@ impl Strategy {
     }
 
     /// The gates and shares with the free ones set.
-    fn with(&self, values: &[f64]) -> (Gates, Vec<f64>) {
+    fn with(&self, power_w: f64, values: &[f64]) -> (Gates, Vec<f64>) {
         let (mut gates, mut shares) = (self.gates, self.shares.clone());
         for (free, &value) in self.free.iter().zip(values) {
             match free {
@@ -131,6 +137,7 @@ impl Strategy {
                 Free::Acceleration => gates.ax_mps2 = value,
                 Free::Soc => gates.soc = value,
                 Free::Energy => gates.energy_mj = value,
+                Free::Motor => gates.motor_share = 1e3 * value / power_w,
                 Free::Zone(zone) => shares[*zone] = value,
             }
         }
@@ -213,15 +220,16 @@ impl HybridProblem {
         };
         // A floor that no lap's energy leads down to is none.
         let mut energy = energy;
-        let [.., floor_j, budget_j] = car.gate_figures(&strategy.gates);
+        let [_, _, _, floor_j, budget_j, _] = car.gate_figures(&strategy.gates);
         let most_j = if strategy.free.contains(&Free::Energy) {
-            1e6 * Free::Energy.variable().upper
+            1e6 * Free::Energy.variable(0.0).upper
         } else {
             budget_j
         };
         energy.counts_charge = strategy.free.contains(&Free::Soc) || floor_j > -most_j;
         let line_variables = variables.len();
-        variables.extend(strategy.free.iter().map(|f| f.variable()));
+        let power_w = car.hybrid.mgu_k.power_w;
+        variables.extend(strategy.free.iter().map(|f| f.variable(power_w)));
         Ok(Self {
             problem: Problem {
                 variables,
@@ -282,7 +290,8 @@ impl HybridProblem {
 
     /// The gates and the shares of zones of a candidate.
     pub fn strategy_of(&self, candidate: &[f64]) -> (Gates, Vec<f64>) {
-        self.strategy.with(&candidate[self.line_variables..])
+        self.strategy
+            .with(self.car.hybrid.mgu_k.power_w, &candidate[self.line_variables..])
     }
 
     /// The kernels' figures of a candidate: variables of the line, gates, shares of zones.

@@ -187,9 +187,10 @@ impl<R: Lookup> Car<'_, R> {
         let [grip, drive, drag] = limits_at(self.limits, from, bends[0]);
         let engine = grip.min(drive);
         let ahead = (from + length * (engine - drag)).max(nought);
-        let rows = self.table.boosts.len() / 2;
-        let (place, beyond) = (ahead * R::load(self.table.rows_per_speed_squared)).place(rows, 2);
-        let boost = look_up(&self.table.boosts, 2, place, beyond, 0);
+        let rows = self.table.boosts.len() / 4;
+        let (place, beyond) = (ahead * R::load(self.table.rows_per_speed_squared)).place(rows, 4);
+        let [motor, room] = [0, 1].map(|column| look_up(&self.table.boosts, 4, place, beyond, column));
+        let boost = (motor * self.strategy[5]).min(room);
         let open = self.open(bends[0], from) & self.strategy[2].less_than(engine - drag);
         let wanted = gated(open, boost * zone_share(&self.plan.zones[here], self.strategy));
         let boost = wanted.min(self.reach(left, inverse));
@@ -275,7 +276,8 @@ impl<R: Lookup> Car<'_, R> {
             let force = R::lit(0.5) * (step.end - from) * inverse + (row[3] + beyond * row[7]);
             let unharvested = R::load(table.harvest_most) - state.harvested_k;
             let room = (unharvested * R::load(table.force_per_harvested) * inverse).max(nought);
-            let generator = (-force).max(nought).min(row[2] + beyond * row[6]).min(room);
+            let most = (row[2] + beyond * row[6]) * self.strategy[5];
+            let generator = (-force).max(nought).min(most).min(room);
             let harvested_k = joules * generator * R::load(table.harvest_gain);
             state.change = state.change + (harvested_k - deployed);
             state.harvested_k = state.harvested_k + harvested_k;
@@ -328,7 +330,7 @@ impl<R: Lookup> Car<'_, R> {
             Mode::Offset => {
                 let open = self.open(bends[0], from) & self.strategy[2].less_than(ax);
                 let share = zone_share(&self.plan.zones[here], self.strategy);
-                gated(open, motor_most * share)
+                gated(open, motor_most * self.strategy[5] * share)
                     .min(demand)
                     .min(self.reach(left, inverse))
             }
@@ -336,7 +338,7 @@ impl<R: Lookup> Car<'_, R> {
         let engine = demand - motor;
         let unharvested = R::load(table.harvest_most) - state.harvested_k;
         let room = unharvested * R::load(table.force_per_harvested) * inverse;
-        let generator = shed.min(generator_most).min(room.max(nought));
+        let generator = shed.min(generator_most * self.strategy[5]).min(room.max(nought));
         let deployed = joules * motor * R::load(table.deploy_cost);
         let harvested_k = joules * generator * R::load(table.harvest_gain);
 
@@ -392,7 +394,15 @@ pub fn motor_step(
         limits,
         table,
         plan: &EnergyPlan::whole(1, 0, Mode::Additional),
-        strategy: &[f64::INFINITY, f64::INFINITY, f64::NEG_INFINITY, 0.0, 0.0, share],
+        strategy: &[
+            f64::INFINITY,
+            f64::INFINITY,
+            f64::NEG_INFINITY,
+            0.0,
+            0.0,
+            1.0,
+            share,
+        ],
     };
     let step = car.additional(0, from, length, bends, f64::INFINITY, f64::INFINITY);
     [step.end, step.motor]

@@ -42,6 +42,8 @@ pub struct Gates {
     pub soc: f64,
     /// Energy that may leave the store in a lap (MJ).
     pub energy_mj: f64,
+    /// Torque and power of the MGU-K, as shares of the car's own.
+    pub motor_share: f64,
 }
 
 impl Gates {
@@ -52,10 +54,11 @@ impl Gates {
         ax_mps2: 0.0,
         soc: 0.0,
         energy_mj: 1000.0,
+        motor_share: 1.0,
     };
 
-    /// The kernels' figures: curvature (1/m), speed squared (m^2/s^2), acceleration (m/s^2), least change of the charge (J)
-    /// and energy (J), for a wheelbase (m), a capacity (J) and a state of charge at the start.
+    /// The kernels' figures: curvature (1/m), speed squared (m^2/s^2), acceleration (m/s^2), least change of the charge (J),
+    /// energy (J) and share of the motor, for a wheelbase (m), a capacity (J) and a state of charge at the start.
     pub fn figures(&self, wheelbase_m: f64, capacity_j: f64, start_soc: f64) -> [f64; GATES] {
         [
             self.steer_rad / wheelbase_m,
@@ -63,12 +66,13 @@ impl Gates {
             self.ax_mps2,
             (self.soc - start_soc) * capacity_j,
             1e6 * self.energy_mj,
+            self.motor_share,
         ]
     }
 }
 
 /// Figures of [`Gates`] at the head of a strategy; shares of zones follow.
-pub const GATES: usize = 5;
+pub const GATES: usize = 6;
 
 /// The zone that a segment belongs to: the motor works in the first part of it, a share that the strategy gives.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -62,12 +62,14 @@ pub struct EnergyTable<S> {
     pub forces: Vec<S>,
     /// Fuel flow (kg/s) at a load of 0, 1/3, 2/3 and 1, then the rises.
     pub flows: Vec<S>,
-    /// What the motor adds where engine and tyres leave it room, then its rise.
+    /// Force of the motor and what engine and tyres leave it room for, then their rises.
     pub boosts: Vec<S>,
 }
 
 /// Best specific consumption that the cost of the MGU-H at the crank is made up at, if the map has none (kg/J): 270 g/kWh.
 const CONSUMPTION_KGPJ: f64 = 0.270 / 3.6e6;
+/// Room without end (m/s^2), whose rises are numbers all the same.
+const ENDLESS_MPS2: f64 = 1e4;
 /// Motors have a torque at standstill, and a power over nought would be none.
 const SLOWEST_MPS: f64 = 1.0;
 
@@ -130,7 +132,7 @@ impl EnergyTable<f64> {
                 let throttle = engine.throttle_for(rpm, most_nm * i as f64 / 3.0);
                 engine.fuel_flow_at(rpm, throttle) / 3600.0
             }));
-            boosts.push([motor.min((traction.at(v) - driven).max(0.0))]);
+            boosts.push([motor, (traction.at(v) - driven).clamp(0.0, ENDLESS_MPS2)]);
         }
         let greatest_flow = flows.iter().flatten().fold(0.0, |a: f64, b| a.max(*b));
         let h = hybrid.mgu_h;

@@ -49,6 +49,7 @@ fn problem(mode: Mode) -> HybridProblem {
         Free::Acceleration,
         Free::Soc,
         Free::Energy,
+        Free::Motor,
     ];
     let strategy = Strategy {
         free: free.into_iter().chain((0..4).map(Free::Zone)).collect(),
@@ -73,12 +74,13 @@ proptest! {
         ax in 0.0..4.0f64,
         soc in 0.6..1.05f64,
         energy in 0.0..3.0f64,
+        motor_kw in 0.0..240.0f64,
         shares in prop::array::uniform4(0.0..1.0f64),
     ) {
         static PROBLEMS: OnceLock<[HybridProblem; 2]> = OnceLock::new();
         let problems = PROBLEMS.get_or_init(|| [problem(Mode::Offset), problem(Mode::Additional)]);
         let problem = &problems[usize::from(additional)];
-        let mut candidate = vec![steer, speed, ax, soc, energy];
+        let mut candidate = vec![steer, speed, ax, soc, energy, motor_kw];
         candidate.extend(shares);
         let (lap, segments, course) = problem.lap(&candidate);
         let passed = lap.deployed + lap.harvested_k + lap.harvested_h;
@@ -97,6 +99,9 @@ proptest! {
             }
             change += s.harvested_k + s.harvested_h - s.deployed;
             least = least.min(change);
+            // No more than the motor's power at the mean speed, one way or the other.
+            let (joules, shaft) = (1245.0 * course.length[i], 1e3 * motor_kw * s.time * (1.0 + 1e-2));
+            prop_assert!(joules * s.motor <= shaft && joules * s.generator * 0.95 <= shaft);
             prop_assert!(s.load <= 1.0 && s.time > 0.0 && s.fuel > 0.0);
             // The wheels' force is what moves the car: engine, motor and brakes against drag.
             prop_assert!(s.engine.min(s.generator + s.hydraulic) < 1e-9);
@@ -106,6 +111,33 @@ proptest! {
         candidate[4] = 0.0;
         let engine = problem.lap(&candidate).0;
         prop_assert!(lap.time <= engine.time * (1.0 + 1e-9) && engine.deployed == 0.0);
+    }
+}
+
+/// A share of the motor in a strategy is a car with that motor.
+#[test]
+fn a_share_of_the_motor_is_a_smaller_motor() {
+    let lap = |mode: Mode, car: EnergyCar, motor_share: f64| {
+        let whole = problem(mode);
+        let gates = Gates {
+            motor_share,
+            ..Gates::OPEN
+        };
+        let (line, energy) = (whole.line().clone(), whole.energy().clone());
+        let strategy = Strategy::fixed(gates, 4);
+        let problem = HybridProblem::new(line, car, energy, strategy, &[HybridObjective::LapTime], 10.0);
+        problem.unwrap().lap(&[]).0.to_array()
+    };
+    for mode in [Mode::Offset, Mode::Additional] {
+        let mut hybrid = car().hybrid.clone();
+        hybrid.mgu_k = hybrid.mgu_k.scaled(0.4);
+        let smaller = lap(mode, car().with_hybrid(hybrid).unwrap(), 1.0);
+        let share = lap(mode, car().clone(), 0.4);
+        // Products in another order, a rounding or two for each of 250 segments.
+        for (x, y) in smaller.iter().zip(share) {
+            assert!((x - y).abs() <= 1e-9 * x.abs().max(1.0), "{smaller:?} {share:?}");
+        }
+        assert!(share[2] > 0.0);
     }
 }
 

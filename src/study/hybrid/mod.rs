@@ -9,6 +9,7 @@ mod results;
 mod scenario;
 mod settings;
 mod setup;
+mod sizing;
 mod stint;
 mod strategy;
 mod worth;
@@ -17,7 +18,8 @@ pub use results::{HybridSummary, ScenarioFigures, summarise, write_results};
 pub use scenario::{ReportedLap, Scenario, drive, published};
 pub use settings::{FreePart, HYBRID_OBJECTIVES, HybridStudySettings};
 pub use setup::{HybridSetup, set_up};
-pub use stint::{ENGINES, Sizing, StintLap, engine_only, size, stint};
+pub use sizing::{ENGINES, Sizing, engine_only, size};
+pub use stint::{StintLap, stint};
 pub use strategy::{FoundStrategy, StrategyFront, search_front, search_strategy, zone_gates, zone_starts};
 pub use worth::{Worth, correlation, mean_worths, worth};
 
@@ -149,12 +151,24 @@ pub fn run_recorded(
         })
         .collect::<Result<Vec<_>>>()?;
     let stint_laps = stint(setup, settings.stint_laps, settings.stint_fuel_kg)?;
-    let sizing = match settings.match_lap_time_s {
-        Some(time) => size(setup, time)?,
-        None => Vec::new(),
+    let mut interrupted = false;
+    let (sizing, sized) = match settings.match_lap_time_s {
+        Some(time) => size(setup, settings, time, recorder, |p| {
+            let told = observe(&HybridProgress {
+                stage: "sizes",
+                evaluations: p.evaluations,
+                best: format!("{:.4} s", p.best[0]),
+            });
+            interrupted |= told.is_break();
+            told
+        })?,
+        None => (Vec::new(), 0),
     };
+    if interrupted {
+        recorder.keep()?;
+    }
     let mut outcome = Outcome {
-        evaluations: 1 + 2 * scenarios.len() as u64,
+        evaluations: 1 + 2 * scenarios.len() as u64 + sized,
         engine,
         scenarios,
         optimised: None,
@@ -163,9 +177,9 @@ pub fn run_recorded(
         backend,
         search_s: 0.0,
         elapsed_s: 0.0,
-        interrupted: false,
+        interrupted,
     };
-    if settings.optimise {
+    if settings.optimise && !interrupted {
         let told = |stage: &'static str, evaluations: u64, best: String| HybridProgress {
             stage,
             evaluations,

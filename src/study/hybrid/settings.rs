@@ -4,7 +4,7 @@ use super::scenario::{Scenario, published};
 use crate::config::{Document, Table, read_text};
 use crate::error::{Error, Result};
 use crate::evaluate::BackendChoice;
-use crate::evaluate::hybrid::HybridObjective;
+use crate::evaluate::hybrid::{HybridObjective, MOST_MOTOR};
 use crate::line::energy::{Gates, Mode};
 use crate::study::identify::parse_backend;
 use crate::study::raceline::RacelineSettings;
@@ -328,14 +328,16 @@ impl HybridStudySettings {
         for scenario in &self.scenarios {
             let g = &scenario.gates;
             text += &format!(
-                "\n[scenarios.{}]\nmode = {}\nsteer_rad = {:?}\nspeed_mps = {:?}\nax_mps2 = {:?}\nsoc = {:?}\nenergy_mj = {:?}\n",
+                "\n[scenarios.{}]\nmode = {}\nsteer_rad = {:?}\nspeed_mps = {:?}\nax_mps2 = {:?}\nsoc = {:?}\nenergy_mj = {:?}\n\
+                 motor_share = {:?}\n",
                 quoted(&scenario.name),
                 quoted(scenario.mode.name()),
                 g.steer_rad,
                 g.speed_mps,
                 g.ax_mps2,
                 g.soc,
-                g.energy_mj
+                g.energy_mj,
+                g.motor_share
             );
         }
         if self.scenarios.is_empty() {
@@ -363,6 +365,7 @@ fn read_scenario(name: &str, row: &Table<'_>) -> Result<Scenario> {
             ax_mps2: number("ax_mps2", -100.0, 100.0, open.ax_mps2)?,
             soc: number("soc", -100.0, 2.0, open.soc)?,
             energy_mj: number("energy_mj", 0.0, 1000.0, open.energy_mj)?,
+            motor_share: number("motor_share", 0.0, MOST_MOTOR, open.motor_share)?,
         },
     })
 }

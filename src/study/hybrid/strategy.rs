@@ -126,6 +126,19 @@ impl HybridSetup {
     /// # Errors
     /// Those of [`HybridProblem::new`].
     pub fn zone_problem(&self, energy_mj: f64, objectives: &[HybridObjective]) -> Result<HybridProblem> {
+        self.zone_problem_with(&[], energy_mj, objectives)
+    }
+
+    /// The same with other parts of the strategy free, whose variables come before those of the zones.
+    ///
+    /// # Errors
+    /// As [`HybridSetup::zone_problem`].
+    pub(super) fn zone_problem_with(
+        &self,
+        free: &[Free],
+        energy_mj: f64,
+        objectives: &[HybridObjective],
+    ) -> Result<HybridProblem> {
         let open = drive(self, "open", Mode::Additional, zone_gates(1e6))?;
         let given: Vec<f64> = open.segments.iter().map(|s| s.deployed).collect();
         let starts = zone_starts(&given, &open.length_m);
@@ -138,7 +151,7 @@ impl HybridSetup {
             self.car.clone(),
             plan,
             Strategy {
-                free: (0..zones).map(Free::Zone).collect(),
+                free: free.iter().copied().chain((0..zones).map(Free::Zone)).collect(),
                 ..Strategy::fixed(zone_gates(energy_mj), zones)
             },
             objectives,

@@ -25,6 +25,15 @@ pub struct MguK {
 }
 
 impl MguK {
+    /// The same with its torque at every speed and its power multiplied by `share`.
+    pub fn scaled(&self, share: f64) -> Self {
+        Self {
+            torque_nm: self.torque_nm.iter().map(|torque| share * torque).collect(),
+            power_w: share * self.power_w,
+            ..self.clone()
+        }
+    }
+
     /// The greatest power at its shaft (W), either way, at a speed of the crank (rpm).
     pub fn power_at(&self, crank_rpm: f64) -> f64 {
         let rpm = self.ratio * crank_rpm;

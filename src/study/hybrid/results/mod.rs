@@ -339,10 +339,13 @@ impl HybridSummary {
         for s in &self.sizing {
             text += &match s.energy_mj {
                 Some(mj) => format!(
-                    "{:>6.0} kW and {mj:.2} MJ a lap ({:.2} harvested) lap in {:.3} s with {:.3} l{}\n",
+                    "{:>6.0} kW and {mj:.2} MJ a lap ({:.2} harvested, a store of {:.2}) lap in {:.3} s (exact deployment {:.3} s) \
+                     with {:.3} l{}\n",
                     s.power_kw,
                     s.harvested_mj,
+                    s.store_mj,
                     s.lap_time_s,
+                    s.exact_lap_time_s.unwrap_or(s.lap_time_s),
                     s.fuel_l,
                     match (s.engine_share, s.fuel_saving_l) {
                         (Some(share), Some(saving)) => format!(

@@ -98,8 +98,9 @@ fn head(page: &mut HtmlReport, summary: &HybridSummary) {
     for sizing in &summary.sizing {
         page.sentence(match sizing.energy_mj {
             Some(mj) => format!(
-                "A motor of {:.0} kW with {mj:.2} MJ a lap laps in {:.2} s with {:.2} l{}.",
+                "A motor of {:.0} kW with {mj:.2} MJ a lap and a store of {:.2} MJ laps in {:.2} s with {:.2} l{}.",
                 sizing.power_kw,
+                sizing.store_mj,
                 sizing.lap_time_s,
                 sizing.fuel_l,
                 match (sizing.engine_share, sizing.fuel_saving_l) {
