@@ -320,15 +320,7 @@ impl Place {
             }
         }
         if let (Some(lap), Some(limits)) = (&self.lap, problem.limits) {
-            add_time(
-                &mut program,
-                map,
-                limits,
-                shape,
-                &lap.square,
-                weights.time,
-                caution,
-            );
+            add_time(&mut program, map, limits, shape, lap, weights.time, caution);
         }
         program
     }

@@ -61,12 +61,56 @@ enum Origin {
     },
 }
 
+/// Which curvature a segment is driven with.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum SegmentBend {
+    /// That of its tighter end: an error of the first order in the spacing, and the only choice where every cut has a variable
+    /// of its own. A line whose bends take turns in being tight and wide would go unpunished by the mean, and an optimiser finds
+    /// it.
+    #[default]
+    Tighter,
+    /// The mean of both ends: of the second order, for lines with several cuts to a control.
+    Mean,
+}
+
+/// The curvature of every segment (1/m), and what each of its ends counts for in it.
+#[derive(Clone, Debug)]
+pub(super) struct Bends {
+    pub curvature_1pm: Vec<f64>,
+    pub ends: Vec<[f64; 2]>,
+}
+
+impl Bends {
+    pub fn of(shape: &Shape, bend: SegmentBend) -> Self {
+        let k = &shape.curvature_1pm;
+        let ends = (0..k.len()).map(|s| match bend {
+            SegmentBend::Mean => [0.5, 0.5],
+            SegmentBend::Tighter if k[(s + 1) % k.len()].abs() > k[s].abs() => [0.0, 1.0],
+            SegmentBend::Tighter => [1.0, 0.0],
+        });
+        let ends: Vec<[f64; 2]> = ends.collect();
+        let of = |(s, [here, there]): (usize, &[f64; 2])| here * k[s] + there * k[(s + 1) % k.len()];
+        Self {
+            curvature_1pm: ends.iter().enumerate().map(of).collect(),
+            ends,
+        }
+    }
+
+    /// Carries a derivative with respect to a segment's curvature on to those of its ends.
+    fn pull_back(&self, segment: usize, bar: f64, by_curvature: &mut [f64]) {
+        let [here, there] = self.ends[segment];
+        by_curvature[segment] += bar * here;
+        by_curvature[(segment + 1) % self.ends.len()] += bar * there;
+    }
+}
+
 /// Speeds along a line, and time.
 #[derive(Clone, Debug)]
 pub(super) struct Lap {
     pub time_s: f64,
     /// Speed squared at the points.
     pub square: Vec<f64>,
+    pub bends: Bends,
     corner_by_curvature: Vec<f64>,
     drive: Vec<(usize, Origin)>,
     brake: Vec<(usize, Origin)>,
@@ -79,8 +123,9 @@ const ACCURACY: f64 = 1e-12;
 
 impl Lap {
     /// Drives `shape` as fast as `limits` allow, from `start_mps` on an open line.
-    pub fn of(shape: &Shape, limits: &dyn Limits, start_mps: f64) -> Self {
+    pub fn of(shape: &Shape, limits: &dyn Limits, start_mps: f64, bend: SegmentBend) -> Self {
         let n = shape.curvature_1pm.len();
+        let bends = Bends::of(shape, bend);
         let (mut corner, mut corner_by_curvature) = (Vec::with_capacity(n), Vec::with_capacity(n));
         for curvature in &shape.curvature_1pm {
             let (square, slope) = corner_square(limits, *curvature);
@@ -95,11 +140,11 @@ impl Lap {
             }
         }
         let (after_drive, drive) = if shape.closed {
-            closed_drive(shape, limits, &corner)
+            closed_drive(shape, &bends, limits, &corner)
         } else {
-            drive_pass(shape, limits, &corner, 0, n)
+            drive_pass(shape, &bends, limits, &corner, 0, n)
         };
-        let (square, brake) = brake_pass(shape, limits, &after_drive);
+        let (square, brake) = brake_pass(shape, &bends, limits, &after_drive);
         let speed: Vec<f64> = square.iter().map(|e| e.sqrt()).collect();
         let segments = shape.length_m.iter().enumerate();
         let time_s = segments
@@ -108,6 +153,7 @@ impl Lap {
         Self {
             time_s,
             square,
+            bends,
             corner_by_curvature,
             drive,
             brake,
@@ -143,7 +189,7 @@ impl Lap {
                 } => {
                     let next = (node + 1) % n;
                     by_square[next] += bar * by_start;
-                    by_curvature[tighter(shape, node)] += bar * c;
+                    self.bends.pull_back(node, bar * c, &mut by_curvature);
                     by_length[node] += bar * l;
                 }
             }
@@ -159,7 +205,7 @@ impl Lap {
                 } => {
                     let previous = (node + n - 1) % n;
                     by_drive[previous] += bar * by_start;
-                    by_curvature[tighter(shape, previous)] += bar * c;
+                    self.bends.pull_back(previous, bar * c, &mut by_curvature);
                     by_length[previous] += bar * l;
                 }
             }
@@ -316,28 +362,23 @@ fn across(limits: &dyn Limits, pass: Pass, start: f64, curvature_1pm: f64, h: f6
     ((2.0 * e - start).max(0.0), origin)
 }
 
-/// The end of a segment with the tighter bend, whose limits hold over all of it. The mean of both would be of second order, but
-/// a line whose bends take turns in being tight and wide would go unpunished, and an optimiser finds it.
-pub(super) fn tighter(shape: &Shape, segment: usize) -> usize {
-    let k = &shape.curvature_1pm;
-    let next = (segment + 1) % k.len();
-    if k[next].abs() > k[segment].abs() {
-        next
-    } else {
-        segment
-    }
-}
-
 type Passed = (Vec<f64>, Vec<(usize, Origin)>);
 
 /// Drives `count` nodes from `first` on, which has its corner's speed.
-fn drive_pass(shape: &Shape, limits: &dyn Limits, corner: &[f64], first: usize, count: usize) -> Passed {
+fn drive_pass(
+    shape: &Shape,
+    bends: &Bends,
+    limits: &dyn Limits,
+    corner: &[f64],
+    first: usize,
+    count: usize,
+) -> Passed {
     let n = corner.len();
     let mut square = corner.to_vec();
     let mut origins = vec![(first, Origin::Own)];
     for step in 1..count {
         let (previous, node) = ((first + step - 1) % n, (first + step) % n);
-        let curvature = shape.curvature_1pm[tighter(shape, previous)];
+        let curvature = bends.curvature_1pm[previous];
         let (reached, origin) = across(
             limits,
             Pass::Drive,
@@ -354,15 +395,15 @@ fn drive_pass(shape: &Shape, limits: &dyn Limits, corner: &[f64], first: usize, 
 
 /// The drive pass of a closed lap. It starts at a node whose corner's speed the car reaches again a lap later; drag may keep
 /// it from that at the slowest corner, so another is tried, and where there is none (a circle) two laps are driven.
-fn closed_drive(shape: &Shape, limits: &dyn Limits, corner: &[f64]) -> Passed {
+fn closed_drive(shape: &Shape, bends: &Bends, limits: &dyn Limits, corner: &[f64]) -> Passed {
     let n = corner.len();
     let mut first = (0..n)
         .min_by(|a, b| corner[*a].total_cmp(&corner[*b]))
         .unwrap_or(0);
     for _ in 0..3 {
-        let passed = drive_pass(shape, limits, corner, first, n);
+        let passed = drive_pass(shape, bends, limits, corner, first, n);
         let last = (first + n - 1) % n;
-        let curvature = shape.curvature_1pm[tighter(shape, last)];
+        let curvature = bends.curvature_1pm[last];
         let (closing, _) = across(
             limits,
             Pass::Drive,
@@ -383,12 +424,12 @@ fn closed_drive(shape: &Shape, limits: &dyn Limits, corner: &[f64]) -> Passed {
             None => break,
         }
     }
-    drive_pass(shape, limits, corner, first, 2 * n)
+    drive_pass(shape, bends, limits, corner, first, 2 * n)
 }
 
 /// Brakes for what the drive pass left, backwards from its slowest node (whose speed is below all that could demand less)
 /// on a closed line and from the end of an open one.
-fn brake_pass(shape: &Shape, limits: &dyn Limits, after_drive: &[f64]) -> Passed {
+fn brake_pass(shape: &Shape, bends: &Bends, limits: &dyn Limits, after_drive: &[f64]) -> Passed {
     let n = after_drive.len();
     let slowest = (0..n)
         .min_by(|a, b| after_drive[*a].total_cmp(&after_drive[*b]))
@@ -398,7 +439,7 @@ fn brake_pass(shape: &Shape, limits: &dyn Limits, after_drive: &[f64]) -> Passed
     let mut origins = vec![(last, Origin::Own)];
     for step in 1..n {
         let (next, node) = ((last + n + 1 - step) % n, (last + n - step) % n);
-        let curvature = shape.curvature_1pm[tighter(shape, node)];
+        let curvature = bends.curvature_1pm[node];
         let (reached, origin) = across(limits, Pass::Brake, square[next], curvature, shape.length_m[node]);
         let own = reached >= after_drive[node];
         square[node] = if own { after_drive[node] } else { reached };

@@ -28,6 +28,6 @@ pub use convex::{Optimum, least_gamma, least_squared_length, shortest, spacing_m
 pub use deployment::{Deployment, DeploymentSearch};
 pub use descent::{DescentSettings, Start, descend, fastest, least_curvature, polish_lines};
 pub use geometry::LineMap;
-pub use lap::{Grip, Limits, Slope};
+pub use lap::{Grip, Limits, SegmentBend, Slope};
 pub use objective::{LineProblem, Measures, Weights};
 pub use point_mass::PointMassLimits;

@@ -1,7 +1,7 @@
 //! What a line costs, with its gradient.
 
 use super::geometry::{LineMap, Shape};
-use super::lap::{Lap, Limits};
+use super::lap::{Lap, Limits, SegmentBend};
 use glam::DVec2;
 
 /// How much each measure of a line counts; nought leaves one out.
@@ -57,6 +57,8 @@ pub struct LineProblem<'a> {
     /// Spacing (m) for the second differences of Gamma, one for each segment: that of the reference line.
     /// `None` takes the line's own, which changes with it.
     pub spacing_m: Option<&'a [f64]>,
+    /// Which curvature a lap drives segments with.
+    pub bend: SegmentBend,
 }
 
 impl<'a> LineProblem<'a> {
@@ -67,6 +69,7 @@ impl<'a> LineProblem<'a> {
             limits: None,
             start_mps: 0.0,
             spacing_m: None,
+            bend: SegmentBend::default(),
         }
     }
 
@@ -85,7 +88,7 @@ impl<'a> LineProblem<'a> {
             return (shape, None, measures);
         }
         let limits = self.limits.filter(|_| weights.time != 0.0);
-        let lap = limits.map(|limits| Lap::of(&shape, limits, self.start_mps));
+        let lap = limits.map(|limits| Lap::of(&shape, limits, self.start_mps, self.bend));
         let measures = self.measured(&shape, lap.as_ref());
         (shape, lap, measures)
     }
@@ -102,7 +105,9 @@ impl<'a> LineProblem<'a> {
     /// Speeds (m/s) at the points of line `x`; none without a car.
     pub fn speeds_mps(&self, x: &[f64]) -> Vec<f64> {
         let shape = Shape::of(&self.map.line(x), self.map.closed);
-        let lap = self.limits.map(|limits| Lap::of(&shape, limits, self.start_mps));
+        let lap = self
+            .limits
+            .map(|limits| Lap::of(&shape, limits, self.start_mps, self.bend));
         lap.map_or_else(Vec::new, |lap| lap.square.iter().map(|e| e.sqrt()).collect())
     }
 

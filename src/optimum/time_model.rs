@@ -2,24 +2,25 @@
 
 use super::conic::{Affine, ConicProgram};
 use super::geometry::{LineMap, Shape};
-use super::lap::Limits;
+use super::lap::{Lap, Limits};
 
 /// Least relative change of a squared speed in a step: a car does not stop.
 const LEAST_CHANGE: f64 = -0.9;
 
-/// Adds the time, times `weight`, of the lap with squared speeds `squares` to a program whose variables so far are changes
+/// Adds the time, times `weight`, of `lap` to a program whose variables so far are changes
 /// of the line's; relative changes of the squared speeds follow them. Tyres are held within the ellipse at the middle of each
-/// segment with the curvature of both its ends, corner speeds at the points, as the lap has it.
+/// segment with the curvature that it is driven with (both ends', where that is the tighter one's), corner speeds at the points, as the lap has it.
 pub(super) fn add_time(
     program: &mut ConicProgram,
     map: &LineMap,
     limits: &dyn Limits,
     shape: &Shape,
-    squares: &[f64],
+    lap: &Lap,
     weight: f64,
     caution: f64,
 ) {
     let n = map.points();
+    let squares = &lap.square;
     let speed: Vec<f64> = squares.iter().map(|e| e.sqrt()).collect();
     let top = limits.top_speed_mps().powi(2);
     let bounds = squares.iter().enumerate().map(|(i, e)| {
@@ -53,7 +54,7 @@ pub(super) fn add_time(
         program.add_square(Affine::change(terms));
     }
     for s in 0..shape.length_m.len() {
-        add_segment(program, map, limits, shape, squares, (first, s));
+        add_segment(program, map, limits, shape, lap, (first, s));
     }
     for i in 0..n {
         let grip = limits.at(speed[i].max(f64::MIN_POSITIVE)).lateral;
@@ -84,11 +85,11 @@ fn add_segment(
     map: &LineMap,
     limits: &dyn Limits,
     shape: &Shape,
-    squares: &[f64],
+    lap: &Lap,
     (first, s): (usize, usize),
 ) {
     let next = (s + 1) % map.points();
-    let (e0, e1, h) = (squares[s], squares[next], shape.length_m[s]);
+    let (e0, e1, h) = (lap.square[s], lap.square[next], shape.length_m[s]);
     let middle = 0.5 * (e0 + e1);
     let v = middle.sqrt().max(f64::MIN_POSITIVE);
     let grip = limits.at(v);
@@ -111,12 +112,23 @@ fn add_segment(
         terms(slope - 0.5 / (h * along), slope + 0.5 / (h * along), by_length),
     );
     let across = grip.lateral.value;
-    for end in [s, next] {
-        let curvature = shape.curvature_1pm[end];
+    // The tighter end may be the other one after a step: both are held.
+    let mixtures = match lap.bends.ends[s] {
+        mean @ [0.5, 0.5] => vec![mean],
+        _ => vec![[1.0, 0.0], [0.0, 1.0]],
+    };
+    for mixture in mixtures {
+        let ends = [(s, mixture[0]), (next, mixture[1])];
+        let curvature: f64 = ends
+            .iter()
+            .map(|(end, share)| share * shape.curvature_1pm[*end])
+            .sum();
         let used = curvature * middle / across;
         let slope = 0.5 * (curvature / across - used * per_square * grip.lateral.by_speed / across);
         let mut change = terms(slope, slope, 0.0);
-        shape.add_curvature(map, end, middle / across, &mut change);
+        for (end, share) in ends {
+            shape.add_curvature(map, end, share * middle / across, &mut change);
+        }
         // A segment beyond the ellipse by rounding, or by what the middle of a coasting one leaves, may stay there.
         let whole = affine(longitudinal.constant.hypot(used).max(1.0), Vec::new());
         program.add_cone([whole, longitudinal.clone(), affine(used, change)]);

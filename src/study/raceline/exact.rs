@@ -42,10 +42,31 @@ pub struct ExactLine {
 /// A line to be led downhill (`alpha` at every cut), and the weight of each objective.
 pub type WeightedLine = (Vec<f64>, Vec<(LineObjective, f64)>);
 
-/// Distance between the cuts square to a line (m), and how many of them there are for each control point: at 4 m a lap's time
-/// is that on a fine spline to a few parts in ten thousand.
-const ABOUT_M: f64 = 4.0;
-const ABOUT_CUTS_PER_CONTROL: usize = 4;
+/// A line taken anew about itself: the distance between the cuts square to it (m), and how many of them there are for each
+/// control point.
+struct About {
+    spacing_m: f64,
+    cuts_per_control: usize,
+}
+
+/// At 4 m a lap's time is that on a fine spline to a few parts in ten thousand.
+const ABOUT: About = About {
+    spacing_m: 4.0,
+    cuts_per_control: 4,
+};
+/// A thousandth of a lap better, at several times the cost; for studies whose cuts are close enough together to say what is
+/// found: a control at most for every [`CUTS_TO_SAY_CONTROL`] of them.
+const CLOSELY_ABOUT: [About; 2] = [
+    About {
+        spacing_m: 2.0,
+        cuts_per_control: 3,
+    },
+    About {
+        spacing_m: 1.0,
+        cuts_per_control: 3,
+    },
+];
+const CUTS_TO_SAY_CONTROL: f64 = 1.4;
 /// Times that the fastest line is taken anew about itself.
 const ABOUTS: usize = 2;
 
@@ -151,10 +172,7 @@ impl ExactSolvers {
         if objective == LineObjective::LapTime
             && let Some(line) = &mut best
         {
-            for _ in 0..ABOUTS {
-                let Some(about) = self.fastest_about(&line.alpha)? else {
-                    break;
-                };
+            if let Some(about) = self.about_itself(&line.alpha, ABOUTS)? {
                 line.seconds += about.seconds;
                 (line.alpha, line.status) = (about.x, about.status);
             }
@@ -168,15 +186,40 @@ impl ExactSolvers {
     /// # Errors
     /// [`crate::Error::Study`] if a solver refuses.
     pub fn fastest_about(&self, alpha: &[f64]) -> Result<Option<Optimum>> {
+        self.about_itself(alpha, 1)
+    }
+
+    /// The same, at first `abouts` times.
+    fn about_itself(&self, alpha: &[f64], abouts: usize) -> Result<Option<Optimum>> {
         let Some(limits) = &self.limits else {
             return Ok(None);
         };
+        let own_m = self.cuts.length_m / self.cuts.len() as f64;
+        let closely = CLOSELY_ABOUT.iter().filter(|how| {
+            let control_m = how.spacing_m * how.cuts_per_control as f64;
+            control_m >= CUTS_TO_SAY_CONTROL * own_m
+        });
+        let mut found: Option<Optimum> = None;
+        for how in std::iter::repeat_n(&ABOUT, abouts).chain(closely) {
+            let alpha = found.as_ref().map_or(alpha, |f| &f.x);
+            if let Some(closer) = self.taken_about(limits, alpha, how)? {
+                let before_s = found.as_ref().map_or(0.0, |f| f.seconds);
+                found = Some(Optimum {
+                    seconds: before_s + closer.seconds,
+                    ..closer
+                });
+            }
+        }
+        Ok(found)
+    }
+
+    fn taken_about(&self, limits: &PointMassLimits, alpha: &[f64], how: &About) -> Result<Option<Optimum>> {
         let own = self.cuts.points(alpha);
-        let count = ((self.cuts.length_m / ABOUT_M).ceil() as usize).max(self.cuts.len());
+        let count = ((self.cuts.length_m / how.spacing_m).ceil() as usize).max(self.cuts.len());
         let Ok(about) = cuts_about(&self.cuts, &own, count) else {
             return Ok(None);
         };
-        let controls = (about.len() / ABOUT_CUTS_PER_CONTROL).max(4);
+        let controls = (about.len() / how.cuts_per_control).max(4);
         let (map, bounds) = LineMap::spline_about(&about, &about.reference, controls);
         let problem = LineProblem {
             limits: Some(limits),
