@@ -69,6 +69,9 @@ pub struct Arguments {
     /// Leave the least-squares polish out
     #[arg(long)]
     no_polish: bool,
+    /// Hops to other minima that are tried after the polish where what is left over does not look like noise
+    #[arg(long, value_name = "N")]
+    hops: Option<usize>,
     /// Where to evaluate: auto, cpu, simd or gpu
     #[arg(long, value_name = "BACKEND", value_parser = backend_flag)]
     backend: Option<BackendChoice>,
@@ -127,6 +130,7 @@ impl Arguments {
         set_some(&mut s.iterations, &self.iterations);
         set_some(&mut s.adapter, &self.adapter);
         s.polish &= !self.no_polish;
+        s.hops = self.hops.unwrap_or(s.hops);
         s.absolute()
     }
 }

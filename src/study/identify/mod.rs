@@ -1,9 +1,11 @@
 //! Identification: which car drove this lap?
 
 mod coordinates;
+mod hops;
 mod identifiability;
 mod page;
 mod polish;
+mod refine;
 mod results;
 mod search;
 mod settings;
@@ -15,7 +17,7 @@ pub use identifiability::{Identifiability, judge};
 pub use polish::{Polished, polish};
 pub use results::{Summary, summarise, write_results};
 pub use search::{
-    Front, HistoryRow, Judged, Outcome, Report, Stage, judge_candidate, search, search_from,
+    Front, HistoryRow, Judged, Outcome, Report, Stage, judge_candidate, search, search_from, search_with,
     total_parameter_error,
 };
 pub use settings::{

@@ -122,6 +122,24 @@ fn head(page: &mut HtmlReport, car: &str, source: &str, outcome: &Outcome, summa
             summary.unidentifiable.join(", ")
         )
     });
+    let bounds: Vec<&str> = summary
+        .parameters
+        .iter()
+        .filter(|p| p.at_bound)
+        .map(|p| p.name.as_str())
+        .collect();
+    if !bounds.is_empty() {
+        page.sentence(format!(
+            "At their bounds: {}. The log would have them elsewhere, or they stand in for something that the model lacks.",
+            bounds.join(", ")
+        ));
+    }
+    if let [tried @ (1..), gained] = summary.hops {
+        page.sentence(format!(
+            "What the polish left over did not look like noise, so that it was tried from {tried} places more: {gained} led \
+             further down."
+        ));
+    }
     if let Some(error) = summary.total_parameter_error {
         page.sentence(format!(
             "The car that drove the log is known: the told parameters are off by {} in all, as a sum of shares \

@@ -31,7 +31,7 @@ const MARGIN: f64 = 1e-3;
 /// step until it is down to rounding, so this only ends fits to noise.
 const LEAST_GAIN: f64 = 1e-9;
 /// Drives after which a polish that has not converged is left where it is.
-const MOST_DRIVES: usize = 150;
+pub(super) const MOST_DRIVES: usize = 150;
 /// Error that stands for every sample of a car that was lost: far above any real one, so the step is refused.
 const LOST: f64 = 1e4;
 
@@ -112,14 +112,17 @@ impl LeastSquaresProblem<f64, Dyn, Dyn> for Bounded<'_> {
 /// Polishes `candidate` with the errors of each channel weighted by `weights` (one over their noise, or scale).
 /// `None` if the candidate is lost from the start.
 pub fn polish(replay: &ReplayProblem, candidate: &[f64], weights: [f64; CHANNELS]) -> Option<Polished> {
-    polish_watched(replay, candidate, weights, &mut || ControlFlow::Continue(()))
+    polish_watched(replay, candidate, weights, MOST_DRIVES, &mut || {
+        ControlFlow::Continue(())
+    })
 }
 
-/// As [`polish`]; `watch` is asked before each drive and may break the polish off.
+/// As [`polish`], with no more than `most_drives`; `watch` is asked before each drive and may break the polish off.
 pub(super) fn polish_watched(
     replay: &ReplayProblem,
     candidate: &[f64],
     weights: [f64; CHANNELS],
+    most_drives: usize,
     watch: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Option<Polished> {
     let length = replay.residuals(candidate)?.errors.len();
@@ -145,7 +148,7 @@ pub(super) fn polish_watched(
         best: (u.clone(), f64::INFINITY),
     };
     problem.set_params(&u);
-    let patience = (MOST_DRIVES / (variables.len() + 1)).max(1);
+    let patience = (most_drives / (variables.len() + 1)).max(1);
     let (problem, report) = LevenbergMarquardt::new()
         .with_patience(patience)
         .with_ftol(LEAST_GAIN)

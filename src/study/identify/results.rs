@@ -33,7 +33,12 @@ pub struct ParameterSummary {
     pub standard_error: Option<f64>,
     /// The truth, where known.
     pub truth: Option<f64>,
+    /// Whether the fitted value is at one of the bounds: the log would have it elsewhere.
+    pub at_bound: bool,
 }
+
+/// A value this share of the range from a bound is at it: the polish begins no nearer.
+const AT_BOUND: f64 = 1e-3;
 
 /// The figures of an identification; `--json` prints this.
 #[derive(Clone, Debug, Serialize)]
@@ -82,6 +87,8 @@ pub struct Summary {
     pub holdout_lost_windows: Option<[usize; 2]>,
     /// Parameters that the log cannot tell.
     pub unidentifiable: Vec<String>,
+    /// Hops from the polished minimum that were tried, and that led further down.
+    pub hops: [usize; 2],
     /// Singular values of the scaled Jacobian, greatest first.
     pub singular_values: Vec<f64>,
     /// Standard deviation of the errors that remain, in the channel's unit.
@@ -155,6 +162,9 @@ pub fn summarise(settings: &IdentifySettings, setup: &Setup, outcome: &Outcome) 
             value: told(k).then_some(outcome.candidate[k]),
             standard_error: Some(identifiability.standard_errors[k]).filter(|e| e.is_finite()),
             truth: setup.truth.as_ref().map(|t| t[k]),
+            at_bound: told(k)
+                && (outcome.candidate[k] - v.lower).min(v.upper - outcome.candidate[k])
+                    <= AT_BOUND * (v.upper - v.lower),
         })
         .collect();
     Summary {
@@ -184,6 +194,7 @@ pub fn summarise(settings: &IdentifySettings, setup: &Setup, outcome: &Outcome) 
             .filter(|p| p.value.is_none())
             .map(|p| p.name.clone())
             .collect(),
+        hops: outcome.hops,
         singular_values: identifiability.singular_values.clone(),
         noise_estimate: by_channel(identifiability.noise),
         parameters,
@@ -290,7 +301,7 @@ fn write_parameters(folder: &Path, summary: &Summary) -> Result<()> {
     let texts = |f: &dyn Fn(&ParameterSummary) -> String| p.iter().map(f).collect::<Vec<String>>();
     let numbers = |f: &dyn Fn(&ParameterSummary) -> f64| p.iter().map(f).collect::<Vec<f64>>();
     let (names, units) = (texts(&|p| p.name.clone()), texts(&|p| p.unit.clone()));
-    let figures: [(&str, Vec<f64>); 6] = [
+    let figures: [(&str, Vec<f64>); 7] = [
         ("lower", numbers(&|p| p.bounds[0])),
         ("upper", numbers(&|p| p.bounds[1])),
         ("swarm_value", numbers(&|p| p.swarm_value)),
@@ -300,6 +311,7 @@ fn write_parameters(folder: &Path, summary: &Summary) -> Result<()> {
             numbers(&|p| p.standard_error.unwrap_or(f64::NAN)),
         ),
         ("truth", numbers(&|p| p.truth.unwrap_or(f64::NAN))),
+        ("at_bound", numbers(&|p| f64::from(u8::from(p.at_bound)))),
     ];
     let mut columns = vec![
         Column {
@@ -509,11 +521,12 @@ impl Summary {
         let shown = |x: Option<f64>, none: &str| x.map_or(none.to_owned(), |x| format!("{x:.6}"));
         for p in &self.parameters {
             text.push_str(&format!(
-                "{:<28}{:>14}{:>14}{:>14}\n",
+                "{:<28}{:>14}{:>14}{:>14}{}\n",
                 format!("{} ({})", p.name, p.unit),
                 shown(p.value, "not told"),
                 p.standard_error.map_or("-".to_owned(), |e| format!("{e:.2e}")),
                 shown(p.truth, "-"),
+                if p.at_bound { "   at its bound" } else { "" },
             ));
         }
         text.push_str(&format!(
@@ -539,6 +552,11 @@ impl Summary {
             text.push_str(&format!(
                 "\nThe log cannot tell: {}. The starting car's values stand in their place.\n",
                 self.unidentifiable.join(", ")
+            ));
+        }
+        if let [tried @ (1..), gained] = self.hops {
+            text.push_str(&format!(
+                "What was left over did not look like noise: {tried} hops to other minima, {gained} of which led further down.\n"
             ));
         }
         if let Some(error) = self.total_parameter_error {

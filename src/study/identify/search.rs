@@ -1,8 +1,8 @@
 //! The search itself: swarm, polish, judgement.
 
 use super::coordinates::Logarithmic;
-use super::identifiability::{Identifiability, judge, noise_of};
-use super::polish::polish_watched;
+use super::identifiability::{Identifiability, judge};
+use super::refine::refine;
 use super::settings::{Algorithm, IdentifySettings};
 use super::setup::{CHANNELS, Setup};
 use super::state::{Place, SearchState, inputs_of};
@@ -90,6 +90,8 @@ pub struct Outcome {
     pub polish_s: f64,
     /// Drives that the polish took.
     pub polish_evaluations: usize,
+    /// Hops to other minima that were tried, and that led further down.
+    pub hops: [usize; 2],
     /// Whether the search was broken off by the observer.
     pub interrupted: bool,
 }
@@ -127,10 +129,24 @@ pub fn search_from(
     setup: &Setup,
     state: Option<SearchState>,
     keeper: &mut Keeper,
+    observe: impl FnMut(&Report<'_>) -> ControlFlow<()>,
+) -> Result<Outcome> {
+    let mut evaluator = open_evaluator(&setup.replay, settings.backend, settings.adapter.as_deref())?;
+    search_with(settings, setup, evaluator.as_mut(), (state, keeper), observe)
+}
+
+/// As [`search_from`], on an evaluator that is open: one of `setup`'s replay.
+///
+/// # Errors
+/// As [`search_from`].
+pub fn search_with(
+    settings: &IdentifySettings,
+    setup: &Setup,
+    evaluator: &mut dyn Evaluator,
+    (state, keeper): (Option<SearchState>, &mut Keeper),
     mut observe: impl FnMut(&Report<'_>) -> ControlFlow<()>,
 ) -> Result<Outcome> {
     let replay = &setup.replay;
-    let mut evaluator = open_evaluator(replay, settings.backend, settings.adapter.as_deref())?;
     let origin = Origin::new(inputs_of(setup), &evaluator.backend());
     let mut state = match state {
         Some(state) => {
@@ -153,8 +169,8 @@ pub fn search_from(
     let began = Instant::now();
     let mut interrupted = false;
     while !matches!(state.place, Place::Searched { .. }) {
-        let Some((stage, planned, progress)) = state.place.advance(evaluator.as_mut())? else {
-            state.place = next_place(state.place, settings, evaluator.as_mut())?;
+        let Some((stage, planned, progress)) = state.place.advance(evaluator)? else {
+            state.place = next_place(state.place, settings, evaluator)?;
             keeper.keep_or_warn(&state);
             continue;
         };
@@ -178,11 +194,10 @@ pub fn search_from(
     let swarm_s = before_s + began.elapsed().as_secs_f64();
     let evaluations = state.history.last().map_or(0, |row| row.evaluations);
     let backend = evaluator.backend();
-    let (swarm_candidate, front) = best_so_far(&state.place, evaluator.as_mut())?;
+    let (swarm_candidate, front) = best_so_far(&state.place, evaluator)?;
 
     let polish_began = Instant::now();
-    let mut candidate = swarm_candidate.clone();
-    let mut polish_evaluations = 0;
+    let mut refined = None;
     if settings.polish && !interrupted {
         let mut watch = || {
             observe(&Report {
@@ -191,29 +206,14 @@ pub fn search_from(
                 progress: None,
             })
         };
-        // First with the channels' spreads for weights, then with the noise that this leaves: maximum likelihood
-        // for white noise.
-        let mut weights = setup.scales.map(|s| 1.0 / s);
-        for _ in 0..2 {
-            let Some(polished) = polish_watched(replay, &candidate, weights, &mut watch) else {
-                break;
-            };
-            polish_evaluations += polished.evaluations;
-            interrupted |= polished.interrupted;
-            candidate = polished.candidate;
-            if interrupted {
-                break;
-            }
-            let Some(residuals) = replay.residuals(&candidate) else {
-                break;
-            };
-            let noise = noise_of(&residuals.errors, &setup.scales);
-            if (0..CHANNELS).all(|k| noise[k] < EXACT * setup.scales[k]) {
-                break;
-            }
-            weights = noise.map(|n| 1.0 / n);
-        }
+        let found = refine(settings, setup, evaluator, &swarm_candidate, &mut watch)?;
+        interrupted |= found.interrupted;
+        refined = Some(found);
     }
+    let (candidate, polish_evaluations, hops) = match refined {
+        Some(r) => (r.candidate, r.drives, [r.hops, r.hops_gained]),
+        None => (swarm_candidate.clone(), 0, [0, 0]),
+    };
     let residuals = replay.residuals(&candidate).ok_or_else(nothing_drives)?;
     Ok(Outcome {
         identifiability: judge(&residuals, &replay.problem.variables, &setup.scales),
@@ -228,6 +228,7 @@ pub fn search_from(
         evaluations,
         swarm_s,
         polish_evaluations,
+        hops,
         interrupted,
     })
 }
@@ -292,9 +293,6 @@ fn best_so_far(place: &Place, evaluator: &mut dyn Evaluator) -> Result<(Vec<f64>
     }
     Ok((best, None))
 }
-
-/// Errors of every channel under this share of its spread are rounding, and there is no noise to weight by.
-const EXACT: f64 = 1e-7;
 
 fn nothing_drives() -> Error {
     Error::Study(

@@ -99,6 +99,8 @@ pub struct IdentifySettings {
     pub seed: u64,
     /// Whether the swarm's best is polished by least squares.
     pub polish: bool,
+    /// Hops from the polished minimum to others that are tried, where what is left over does not look like noise.
+    pub hops: usize,
     /// Backend.
     pub backend: BackendChoice,
     /// Part of the name of the adapter to use.
@@ -166,6 +168,7 @@ impl Default for IdentifySettings {
             archive: 100,
             seed: 1,
             polish: true,
+            hops: 2,
             backend: BackendChoice::Auto,
             adapter: None,
         }
@@ -283,6 +286,7 @@ impl IdentifySettings {
         s.holdout = lap_numbers(&root, "holdout")?;
         s.seed = root.integer("seed", 0, u64::MAX)?.unwrap_or(s.seed);
         s.polish = root.boolean("polish")?.unwrap_or(s.polish);
+        s.hops = root.integer("hops", 0, 1000)?.map_or(s.hops, |n| n as usize);
         s.backend = choice(
             &root,
             "backend",

@@ -63,6 +63,7 @@ pub(super) fn study_toml(s: &IdentifySettings) -> String {
         Some(format!("{:?}", s.holdout)).filter(|_| !s.holdout.is_empty()),
     );
     push("polish", Some(s.polish.to_string()));
+    push("hops", Some(s.hops.to_string()));
     let backend = format!("{:?}", s.backend).to_lowercase();
     push("backend", Some(quoted(&backend)));
     push("adapter", s.adapter.as_deref().map(quoted));

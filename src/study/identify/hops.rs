@@ -1,0 +1,101 @@
+//! Basin hopping after the polish (Wales and Doye, *J. Phys. Chem. A* 101, 1997): a lap can have minima that least squares
+//! does not leave, and beside them starts from which it comes further down.
+
+use super::coordinates::Logarithmic;
+use super::polish::{Polished, polish_watched};
+use super::setup::CHANNELS;
+use crate::error::Result;
+use crate::evaluate::replay::ReplayProblem;
+use crate::evaluate::{Evaluator, FAILED_COST};
+use crate::random::Random;
+use std::ops::ControlFlow;
+
+/// Starts that are drawn for a hop; the best of them is polished.
+const STARTS: usize = 64;
+/// Their standard deviation about the minimum in turn, as shares of the parameters' ranges (of their logarithms where these
+/// are wide).
+const REACH: [f64; 2] = [0.05, 0.1];
+/// Drives that a hop may take: twice what led from a second minimum of the bundled lap into the first.
+const MOST_DRIVES: usize = 120;
+/// A hop counts that gains this share of the cost.
+const LEAST_GAIN: f64 = 1e-3;
+/// Purpose of the draws in the counter.
+const DRAWS: u32 = 0x40b5;
+
+/// Whether errors (row-major, one column for each channel) look like noise: none of the channels has neighbours more alike
+/// than chance makes them once in ten thousand fits. What a wrong minimum leaves over is smooth along the lap.
+pub(super) fn looks_like_noise(errors: &[f64]) -> bool {
+    let count = errors.len() / CHANNELS;
+    // The correlation of white noise with itself one sample later is normal, of variance 1/n.
+    let most = 4.0 / (count.max(1) as f64).sqrt();
+    (0..CHANNELS).all(|k| {
+        let channel = || errors.iter().skip(k).step_by(CHANNELS);
+        let squares: f64 = channel().map(|e| e * e).sum();
+        let products: f64 = channel().zip(channel().skip(1)).map(|(a, b)| a * b).sum();
+        products.abs() <= most * squares
+    })
+}
+
+/// Polishes the best of the starts about `minimum` by hop number `hop`; `None` if none of them drives.
+///
+/// # Errors
+/// Those of the evaluator.
+pub(super) fn hop(
+    replay: &ReplayProblem,
+    evaluator: &mut dyn Evaluator,
+    (minimum, weights): (&[f64], [f64; CHANNELS]),
+    (seed, hop): (u64, usize),
+    watch: &mut dyn FnMut() -> ControlFlow<()>,
+) -> Result<Option<Polished>> {
+    let mut seen = Logarithmic::new(evaluator);
+    let centre = seen.of_parameters(minimum);
+    let random = Random::new(seed);
+    let reach = REACH[hop % REACH.len()];
+    let variables = &seen.problem().variables;
+    let starts: Vec<f64> = (0..STARTS)
+        .flat_map(|start| {
+            centre.iter().zip(variables).enumerate().map(move |(k, (x, v))| {
+                let step = random.normal(DRAWS, hop as u32, start as u32, k as u32);
+                (x + reach * (v.upper - v.lower) * step).clamp(v.lower, v.upper)
+            })
+        })
+        .collect();
+    let width = seen.problem().objectives.len();
+    let costs = seen.evaluate(&starts)?.costs(width);
+    let best = (0..STARTS)
+        .min_by(|&a, &b| costs[a].total_cmp(&costs[b]))
+        .unwrap_or(0);
+    if costs[best] >= FAILED_COST {
+        return Ok(None);
+    }
+    let dimensions = centre.len();
+    let start = seen.to_parameters(&starts[best * dimensions..(best + 1) * dimensions]);
+    Ok(polish_watched(replay, &start, weights, MOST_DRIVES, watch))
+}
+
+/// Whether a polished hop is further down than the minimum that it began from.
+pub(super) fn gains(hopped: &Polished, cost: f64) -> bool {
+    hopped.cost < (1.0 - LEAST_GAIN) * cost
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn noise_looks_like_noise_and_a_ripple_under_it_does_not() {
+        let random = Random::new(3);
+        let rows = 7000;
+        let errors = |ripple: f64| -> Vec<f64> {
+            (0..rows * CHANNELS)
+                .map(|i| {
+                    let smooth = ripple * (i as f64 / 400.0).sin();
+                    random.normal(1, 0, i as u32, 0) + if i % CHANNELS == 2 { smooth } else { 0.0 }
+                })
+                .collect()
+        };
+        assert!(looks_like_noise(&errors(0.0)));
+        // A tenth of the noise's variance in one channel.
+        assert!(!looks_like_noise(&errors(0.45)));
+    }
+}
