@@ -106,7 +106,7 @@ pub fn run(
     let broken_off = || Error::Interrupted(folder.to_owned());
 
     let setup = identify::set_up(&settings.identify)?;
-    let mut inputs = Inputs::new("identify");
+    let mut inputs = Inputs::of_program("identify");
     inputs.add(&settings.identify);
     inputs.add(&(&setup.log, &setup.replay.car, &setup.truth));
     let stage = stages.run("1_identify", &inputs, |to, keeper| {
@@ -131,7 +131,7 @@ pub fn run(
     if observe("the car's limits").is_break() {
         return Err(broken_off());
     }
-    let mut inputs = Inputs::new("envelope");
+    let mut inputs = Inputs::of_program("envelope");
     inputs.add(&car);
     let stage = stages.run("2_envelope", &inputs, |to, _| {
         let began = Instant::now();
@@ -153,7 +153,7 @@ pub fn run(
             ..settings.raceline.clone()
         };
         let line_setup = raceline::set_up(&line_settings)?;
-        let mut inputs = Inputs::new("raceline");
+        let mut inputs = Inputs::of_program("raceline");
         // The car is in its limits; where its file lies does not matter.
         inputs.add(&RacelineSettings {
             car: String::new(),
@@ -192,7 +192,7 @@ pub fn run(
             car_width_m: settings.raceline.car_width_m,
             ..TransientSettings::default()
         };
-        let mut inputs = Inputs::new("transient");
+        let mut inputs = Inputs::of_program("transient");
         inputs.add(&(&car, &drive_settings, whole.rows(), &line_setup.edges_m));
         inputs.add_file(&line_path)?;
         let stage = stages.run(&format!("{}_transient", number + 1), &inputs, |to, _| {
@@ -227,7 +227,7 @@ pub fn run(
             ..HybridStudySettings::default()
         };
         let energy_setup = hybrid::set_up(&energy_settings)?;
-        let mut inputs = Inputs::new("hybrid");
+        let mut inputs = Inputs::of_program("hybrid");
         for path in energy_settings.line.iter().chain(&energy_settings.envelope) {
             inputs.add_file(path)?;
         }

@@ -7,6 +7,7 @@ use crate::swarm::checkpoint::Checkpoint;
 use std::fmt::{Debug, Write as _};
 use std::hash::{DefaultHasher, Hasher};
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 use std::time::Duration;
 
 /// What went into a stage, as one number: the program's version, and whatever is [added](Inputs::add).
@@ -17,6 +18,19 @@ impl Inputs {
     pub fn new(stage: &str) -> Self {
         let mut inputs = Self(DefaultHasher::new());
         inputs.add(&(stage, env!("CARGO_PKG_VERSION")));
+        inputs
+    }
+
+    /// As [`Inputs::new`], and of the very program that runs: what it finds may differ from build to build of one version.
+    pub fn of_program(stage: &str) -> Self {
+        static PROGRAM: OnceLock<Option<u64>> = OnceLock::new();
+        let mut inputs = Self::new(stage);
+        // Where the program cannot be read its version has to do.
+        inputs.add(PROGRAM.get_or_init(|| {
+            let mut hasher = DefaultHasher::new();
+            hasher.write(&std::fs::read(std::env::current_exe().ok()?).ok()?);
+            Some(hasher.finish())
+        }));
         inputs
     }
 
