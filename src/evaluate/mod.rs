@@ -8,12 +8,14 @@ mod fallback;
 pub mod gpu;
 pub mod hybrid;
 pub mod line;
+mod packed;
 pub mod point;
 pub mod replay;
 pub mod simd;
 
 pub use backend::BackendChoice;
 pub use fallback::FallbackEvaluator;
+pub use packed::{PackedClient, run_packed};
 
 use crate::error::Result;
 use crate::vehicle::tyre::IllFormed;
