@@ -91,3 +91,44 @@ pub(super) fn refine(
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::{set_up, total_parameter_error};
+    use super::*;
+    use crate::evaluate::replay::open_evaluator;
+
+    /// Where the swarm ended with seed 7: a minimum of the bundled lap that least squares does not leave.
+    const SECOND_MINIMUM: [f64; 22] = [
+        10.0291, 10.078, 1.35272, 0.881518, -0.295207, 0.0118127, 10.344, 9.05526, -0.0295591, 0.971715,
+        -1.25888, 0.388244, 0.0109837, 0.0212609, 0.0580326, 0.0483849, -0.702109, 12.117, 2.3486, 9.19599,
+        101461.0, 20281.1,
+    ];
+
+    #[test]
+    fn a_second_minimum_is_left() {
+        let settings = IdentifySettings::default();
+        let setup = set_up(&settings).unwrap();
+        let truth = setup.truth.clone().unwrap();
+        let error = |candidate: &[f64]| total_parameter_error(candidate, &truth, |_| true);
+        assert!(error(&SECOND_MINIMUM) > 3.0);
+        let mut evaluator = open_evaluator(&setup.replay, settings.backend, None).unwrap();
+        let mut refined = |hops: usize| {
+            let settings = IdentifySettings {
+                hops,
+                seed: 7,
+                ..settings.clone()
+            };
+            let mut watch = || ControlFlow::Continue(());
+            refine(&settings, &setup, evaluator.as_mut(), &SECOND_MINIMUM, &mut watch).unwrap()
+        };
+        let stuck = refined(0);
+        assert!(stuck.hops == 0 && error(&stuck.candidate) > 1.0);
+        let free = refined(2);
+        assert!(
+            free.hops_gained > 0 && error(&free.candidate) < 1e-3,
+            "{}",
+            error(&free.candidate)
+        );
+    }
+}
