@@ -1,6 +1,6 @@
 //! Packs of `f32` lanes: one candidate car per lane.
 //!
-//! [`Avx512`], [`Avx2`] and [`Sse2`] wrap the vector registers; [`Portable`] is a plain array for processors that
+//! `Avx512`, `Avx2` and [`Sse2`] wrap the vector registers; [`Portable`] is a plain array for processors that
 //! have none of them. All round alike: the operations are IEEE and the elementary functions are the shared ones, so
 //! a candidate's cost does not depend on the instruction set.
 //!
