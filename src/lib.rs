@@ -123,7 +123,7 @@
 //! # Ok::<(), lapswarm::Error>(())
 //! ```
 
-#![warn(missing_docs)]
+#![warn(missing_docs, clippy::undocumented_unsafe_blocks)]
 
 pub mod config;
 pub mod error;

@@ -5,12 +5,20 @@ mod common;
 use common::{Random, linear_car, problem};
 use lapswarm::evaluate::gpu::GpuContext;
 use lapswarm::evaluate::gpu::faults::{self, Fault};
+use lapswarm::evaluate::hybrid::{HybridObjective, open_hybrid_evaluator};
 use lapswarm::evaluate::line::{GpuLineEvaluator, LineObjective, LineProblem, open_line_evaluator};
+use lapswarm::evaluate::portions::{self, Portions};
 use lapswarm::evaluate::replay::{GpuEvaluator, ReplayProblem, open_evaluator};
 use lapswarm::evaluate::{BackendChoice, Evaluation, Evaluator, FAILED_COST, Failure};
 use lapswarm::line::Parametrisation;
 use lapswarm::parity::Draws;
 use lapswarm::parity::made_up::{Lap, candidates};
+use lapswarm::study::hybrid::{self, HybridStudySettings};
+use lapswarm::study::keeper::Keeper;
+use lapswarm::study::raceline::{self, LineAlgorithm, LinesState, RacelineSettings, find_lines_from};
+use lapswarm::study::run_folder::STATE;
+use lapswarm::swarm::checkpoint;
+use std::ops::ControlFlow;
 use std::path::Path;
 use std::process::{Command, Output};
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -196,6 +204,131 @@ fn the_least_limits_change_no_bit() {
     assert_eq!(on(small), on(whole));
 }
 
+/// A population in one go and in portions of every size, on every backend.
+#[test]
+fn portions_change_no_bit() {
+    let _turn = alone();
+    let choices = [BackendChoice::Cpu, BackendChoice::Simd, BackendChoice::Gpu];
+    let choices = &choices[..if has_device() { 3 } else { 2 }];
+    // More than the least portion, so that the least memory cuts it.
+    let count = portions::LEAST + 500;
+    let replay = replay();
+    let line = lines(&[LineObjective::Length, LineObjective::LapTime], 24);
+    let settings = HybridStudySettings {
+        track: "stadium:300:80:12".to_owned(),
+        sections: 120,
+        ..HybridStudySettings::default()
+    };
+    let setup = hybrid::set_up(&settings).unwrap();
+    let energy = setup
+        .zone_problem(1.0, &[HybridObjective::LapTime, HybridObjective::Fuel])
+        .unwrap();
+    type Open<'a> = Box<dyn Fn(BackendChoice) -> Box<dyn Evaluator + 'a> + 'a>;
+    let opened: [(&str, Open<'_>); 3] = [
+        (
+            "replay",
+            Box::new(|choice| open_evaluator(&replay, choice, None).unwrap()),
+        ),
+        (
+            "line",
+            Box::new(|choice| open_line_evaluator(&line, choice, None).unwrap()),
+        ),
+        (
+            "hybrid",
+            Box::new(|choice| open_hybrid_evaluator(&energy, choice, None).unwrap()),
+        ),
+    ];
+    for (name, open) in &opened {
+        for &choice in choices {
+            let mut whole = open(choice);
+            let mut random = Random(3);
+            let variables = whole.problem().variables.clone();
+            let population: Vec<f64> = (0..count)
+                .flat_map(|_| {
+                    variables
+                        .iter()
+                        .map(|v| random.within(v.lower, v.upper))
+                        .collect::<Vec<_>>()
+                })
+                .collect();
+            let wanted = bits(&whole.evaluate(&population).unwrap());
+            assert_eq!(wanted.1.len(), count);
+            for size in [37, 256, 1000] {
+                let found = Portions::of(open(choice), size).evaluate(&population).unwrap();
+                assert!(
+                    bits(&found) == wanted,
+                    "{name} on {choice:?} in portions of {size}"
+                );
+            }
+            portions::allow(0);
+            let mut least = open(choice);
+            portions::allow(1 << 30);
+            let found = bits(&least.evaluate(&population).unwrap());
+            assert!(found == wanted, "{name} on {choice:?} in the least memory");
+        }
+    }
+}
+
+/// What went wrong with devices before a run was broken off is told at its end, and what ended it is what it names.
+#[test]
+fn faults_survive_a_resume_and_the_summary_names_what_ended_the_run() {
+    let _turn = alone();
+    if !has_device() {
+        return;
+    }
+    for algorithm in [LineAlgorithm::Windows, LineAlgorithm::Thesis] {
+        let settings = RacelineSettings {
+            track: "stadium:300:80:12".to_owned(),
+            sections: 60,
+            population: 16,
+            iterations: 12,
+            objectives: vec![LineObjective::Length],
+            warm_start: false,
+            local_search: false,
+            backend: BackendChoice::Gpu,
+            algorithm,
+            ..RacelineSettings::default()
+        };
+        let setup = raceline::set_up(&settings).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let mut seen = 0;
+        // One submission fails, and the device is opened anew.
+        let found = find_lines_from(&settings, &setup, None, &mut Keeper::new(folder.path()), |_| {
+            seen += 1;
+            if seen == 2 {
+                faults::inject(Fault::Lost, 0, 1);
+            }
+            if seen == 4 {
+                ControlFlow::Break(())
+            } else {
+                ControlFlow::Continue(())
+            }
+        })
+        .unwrap();
+        faults::end();
+        assert!(found.interrupted);
+        assert_eq!(found.device_faults.len(), 1, "{:?}", found.device_faults);
+        let state: LinesState = checkpoint::load(&folder.path().join(STATE)).unwrap();
+        let mut keeper = Keeper::new(folder.path());
+        let mut seen = 0;
+        // The same again, and then it stays away.
+        let ended = find_lines_from(&settings, &setup, Some(state), &mut keeper, |_| {
+            seen += 1;
+            if seen == 2 {
+                faults::inject(Fault::Lost, 0, u64::MAX);
+            }
+            ControlFlow::Continue(())
+        })
+        .unwrap();
+        faults::end();
+        assert!(!ended.interrupted);
+        assert_eq!(ended.device_faults[0], found.device_faults[0]);
+        let last = ended.device_faults.last().unwrap();
+        assert!(last.contains("simd takes over"), "{:?}", ended.device_faults);
+        assert_eq!(ended.backend.backend, "simd", "{algorithm:?}");
+    }
+}
+
 #[test]
 fn no_number_that_is_none_gets_through() {
     let _turn = alone();
@@ -337,6 +470,10 @@ fn what_would_take_all_memory_is_refused_with_what_would_not() {
         &["raceline", "--sections", "1000000"],
         &["raceline", "--sections", "1000000000"],
         &["identify", "--population", "100000", "--memory-limit-mib", "16"],
+        &["hybrid", "--population", "9999999"],
+        &["hybrid", "--iterations", "1000000", "--population", "100000"],
+        &["sensitivity", "--samples", "65536", "--memory-limit-mib", "64"],
+        &["surface", "--grid", "2000", "--memory-limit-mib", "64"],
         &["identify", "--log", "huge.csv"],
         &["raceline", "--track", "huge.csv"],
         &["raceline", "--envelope", "huge.csv"],

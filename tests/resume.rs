@@ -7,7 +7,9 @@ use lapswarm::study::identify::{
     self, IdentifySettings, ObjectiveChoice, SearchState, Setup, search, search_from,
 };
 use lapswarm::study::keeper::Keeper;
-use lapswarm::study::raceline::{self, LinesState, RacelineSettings, find_lines, find_lines_from};
+use lapswarm::study::raceline::{
+    self, LineAlgorithm, LinesState, RacelineSettings, find_lines, find_lines_from,
+};
 use lapswarm::study::run_folder::STATE;
 use lapswarm::swarm::checkpoint;
 use serde_json::Value;
@@ -247,6 +249,31 @@ fn cold_searches_go_on_bit_for_bit_from_every_stage() {
         let wanted = lines_told(&settings, &setup, &whole);
         let breaks: Vec<usize> = (1..8).map(|k| 1 + k * (all - 1) / 8).collect();
         lines_in_pieces((&settings, &setup), &breaks, (&wanted, all));
+    }
+}
+
+#[test]
+fn plain_swarms_go_on_bit_for_bit() {
+    for algorithm in [LineAlgorithm::Cooperative, LineAlgorithm::Thesis] {
+        let settings = RacelineSettings {
+            algorithm,
+            groups: 4,
+            local_search: false,
+            ..lines()
+        };
+        let setup = raceline::set_up(&settings).unwrap();
+        let mut stages: Vec<String> = Vec::new();
+        let whole = find_lines(&settings, &setup, |p| {
+            stages.push(p.stage.clone());
+            ControlFlow::Continue(())
+        })
+        .unwrap();
+        let wanted = lines_told(&settings, &setup, &whole);
+        let all = stages.len();
+        let fastest = 1 + stages.iter().position(|s| s == "fastest").unwrap();
+        for breaks in [vec![1, fastest - 1, fastest], vec![5, fastest + 6, all]] {
+            lines_in_pieces((&settings, &setup), &breaks, (&wanted, all));
+        }
     }
 }
 

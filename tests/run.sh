@@ -23,3 +23,7 @@ cargo fmt --check
 cargo clippy --all-targets -- -D warnings
 RUSTDOCFLAGS="-D warnings" cargo doc --no-deps --quiet
 cargo test --release
+# Licences, duplicates and sources of dependencies, where the tool is there; advisories need the network and are left out.
+if command -v cargo-deny >/dev/null 2>&1; then
+    cargo deny --offline check licenses bans sources
+fi

@@ -72,10 +72,60 @@ fn a_mistake_in_the_last_point_shows_before_the_first_is_run() {
     let text = SWEEP.replace("[4, 6]", "[4, -6]");
     let settings = SweepSettings::parse(Path::new("sweep.toml"), &text).expect("a sweep");
     let mut told = 0;
-    let refused = sweep(&settings, &root.path().join("s"), false, |_| {
+    let folder = root.path().join("s");
+    let refused = sweep(&settings, &folder, false, |_| {
         told += 1;
         ControlFlow::Continue(())
     });
-    assert_eq!(refused.expect_err("a negative population").exit_code(), 2);
+    let refused = refused.expect_err("a negative population");
+    assert_eq!(refused.exit_code(), 2);
     assert_eq!(told, 0);
+    // Of the file that the user wrote, and the point in it.
+    let said = refused.to_string();
+    assert!(
+        said.starts_with("sweep.toml: run 3 (seed 1, swarm.population -6), field"),
+        "{said}"
+    );
+    assert!(!folder.exists(), "nothing was begun");
+}
+
+#[test]
+fn a_sweep_that_fails_leaves_nothing_that_stops_the_next() {
+    let root = tempfile::tempdir().expect("a temporary folder");
+    let folder = root.path().join("s");
+    // A log that is not there shows when the first point is set up.
+    let text = SWEEP.replace("polish = false", "polish = false\nlog = \"nowhere.csv\"");
+    let settings = SweepSettings::parse(Path::new("sweep.toml"), &text).expect("a sweep");
+    let failed = sweep(&settings, &folder, false, |_| ControlFlow::Continue(()));
+    assert_eq!(failed.expect_err("no log").exit_code(), 2);
+    let left: Vec<_> = folder.read_dir().expect("a folder").flatten().collect();
+    assert!(left.is_empty(), "{left:?}");
+    let settings = SweepSettings::parse(Path::new("sweep.toml"), SWEEP).expect("a sweep");
+    sweep(&settings, &folder, false, |_| ControlFlow::Continue(())).expect("the mended one runs");
+}
+
+#[test]
+fn sweeps_beyond_all_measure_are_refused() {
+    let runs = "[1,2,3,4,5,6,7,8,9,10]";
+    let many: String = ["a", "b", "c", "d", "e", "f"]
+        .iter()
+        .map(|k| format!("{k} = {runs}\n"))
+        .collect();
+    let deep = format!("\"{}\" = [1]\n", ["a"; 100_000].join("."));
+    // Each a small file; the studies of the second would fill 400 MB.
+    let long = format!("# {}\n", "long ".repeat(8000));
+    let four: String = ["a", "b", "c", "d"]
+        .iter()
+        .map(|k| format!("{k} = {runs}\n"))
+        .collect();
+    for (grid, word) in [
+        (many, "1000000 runs"),
+        (four + &long, "10000 runs of"),
+        (deep, "a.a.a"),
+    ] {
+        let text = format!("study = \"identify\"\n[grid]\n{grid}");
+        let refused = SweepSettings::parse(Path::new("s.toml"), &text).expect_err(word);
+        assert!(refused.to_string().contains(word), "{refused}");
+        assert!(refused.to_string().len() < 500);
+    }
 }

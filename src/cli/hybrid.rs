@@ -1,6 +1,6 @@
 //! `lapswarm hybrid`.
 
-use super::{Common, Resume, backend_flag, print_json, stop_flag};
+use super::{Common, Memory, Resume, backend_flag, print_json, stop_flag};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use lapswarm::evaluate::BackendChoice;
 use lapswarm::evaluate::hybrid::HybridObjective;
@@ -32,6 +32,8 @@ pub struct Arguments {
     common: Common,
     #[command(flatten)]
     resume: Resume,
+    #[command(flatten)]
+    memory: Memory,
     /// The circuit: a bundled name, a shape such as stadium:500:100:12, or a file
     #[arg(long, value_name = "NAME|FILE")]
     track: Option<String>,
@@ -148,6 +150,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         moves.then_some(moved),
     )?;
     let settings = begun.settings;
+    settings.size().check(arguments.memory.memory_limit_mib)?;
     let setup = set_up(&settings)?;
     let folder = match begun.folder {
         Some(folder) => folder,

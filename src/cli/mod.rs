@@ -123,7 +123,8 @@ pub struct Resume {
 /// The flag of studies whose size is checked.
 #[derive(Args, Clone)]
 pub struct Memory {
-    /// Memory that the study may take, MiB; one that would need more is refused
+    /// Memory that the study may take, MiB; populations are evaluated in portions to stay below, and what cannot be split
+    /// and needs more is refused
     #[arg(long, value_name = "MIB", default_value_t = USUAL_MIB, value_parser = clap::value_parser!(u64).range(1..))]
     pub memory_limit_mib: u64,
 }

@@ -1,6 +1,6 @@
 //! `lapswarm run`.
 
-use super::{Common, Resume, backend_flag, print_json, progress, stop_flag};
+use super::{Common, Memory, Resume, backend_flag, print_json, progress, stop_flag};
 use lapswarm::evaluate::BackendChoice;
 use lapswarm::study::run::{RunSettings, run as run_all};
 use lapswarm::study::run_folder;
@@ -23,6 +23,8 @@ pub struct Arguments {
     common: Common,
     #[command(flatten)]
     resume: Resume,
+    #[command(flatten)]
+    memory: Memory,
     /// The log [default: the bundled lap]
     #[arg(long, value_name = "FILE")]
     log: Option<PathBuf>,
@@ -126,6 +128,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         arguments.moves().then_some(moved),
     )?;
     let settings = begun.settings;
+    for size in [settings.identify.size(), settings.raceline.size()] {
+        size.check(arguments.memory.memory_limit_mib)?;
+    }
     let folder = match begun.folder {
         Some(folder) => folder,
         None => run_folder::create("run", out)?,

@@ -1,8 +1,9 @@
 //! `lapswarm sensitivity`.
 
 use super::replay_flags::ReplayFlags;
-use super::{Common, Resume, print_json, progress, stop_flag};
+use super::{Common, Memory, Resume, print_json, progress, stop_flag};
 use lapswarm::study::journal::Recorder;
+use lapswarm::study::memory;
 use lapswarm::study::run_folder;
 use lapswarm::study::sensitivity::{
     SensitivitySettings, measure_recorded, set_up_sensitivity, summarise, write_results,
@@ -25,6 +26,8 @@ pub struct Arguments {
     common: Common,
     #[command(flatten)]
     resume: Resume,
+    #[command(flatten)]
+    memory: Memory,
     #[command(flatten)]
     replay: ReplayFlags,
     /// Parameters to move [default: the 22 unknowns of `identify`]
@@ -72,6 +75,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         moves.then_some(moved),
     )?;
     let settings = begun.settings;
+    memory::check(&settings.kept(), arguments.memory.memory_limit_mib)?;
     let setup = set_up_sensitivity(&settings)?;
     let folder = match begun.folder {
         Some(folder) => folder,

@@ -1,8 +1,9 @@
 //! `lapswarm surface`.
 
 use super::replay_flags::ReplayFlags;
-use super::{Common, Resume, print_json, progress, stop_flag};
+use super::{Common, Memory, Resume, print_json, progress, stop_flag};
 use lapswarm::study::journal::Recorder;
+use lapswarm::study::memory;
 use lapswarm::study::run_folder;
 use lapswarm::study::surface::{SurfaceSettings, measure_recorded, set_up_surface, summarise, write_results};
 use lapswarm::{Error, Result};
@@ -22,6 +23,8 @@ pub struct Arguments {
     common: Common,
     #[command(flatten)]
     resume: Resume,
+    #[command(flatten)]
+    memory: Memory,
     #[command(flatten)]
     replay: ReplayFlags,
     /// The horizontal and the vertical parameter [default: rBy1,rCy1]
@@ -75,6 +78,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         moves.then_some(moved),
     )?;
     let settings = begun.settings;
+    memory::check(&settings.kept(), arguments.memory.memory_limit_mib)?;
     let setup = set_up_surface(&settings)?;
     let folder = match begun.folder {
         Some(folder) => folder,

@@ -10,6 +10,7 @@ pub mod hybrid;
 pub mod line;
 mod packed;
 pub mod point;
+pub mod portions;
 pub mod replay;
 pub mod simd;
 
@@ -19,7 +20,7 @@ pub use packed::{PackedClient, run_packed};
 
 use crate::error::Result;
 use crate::vehicle::tyre::IllFormed;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::collections::BTreeMap;
 use std::fmt;
 
@@ -245,6 +246,28 @@ pub struct BackendInfo {
     pub device: String,
     /// The driver's name and version, empty for a processor.
     pub driver: String,
+}
+
+/// The names that [`BackendInfo::backend`] may have.
+const BACKENDS: [&str; 3] = ["cpu", "simd", "gpu"];
+
+impl Serialize for BackendInfo {
+    fn serialize<S: Serializer>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error> {
+        (self.backend, &self.device, &self.driver).serialize(serializer)
+    }
+}
+
+impl<'de> Deserialize<'de> for BackendInfo {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> std::result::Result<Self, D::Error> {
+        let (name, device, driver) = <(String, String, String)>::deserialize(deserializer)?;
+        let backend = BACKENDS.into_iter().find(|known| *known == name);
+        let backend = backend.ok_or_else(|| serde::de::Error::custom("an unknown backend"))?;
+        Ok(Self {
+            backend,
+            device,
+            driver,
+        })
+    }
 }
 
 /// Scores whole populations of candidates.

@@ -1,6 +1,6 @@
 //! Packs of `f32` lanes: one candidate car per lane.
 //!
-//! [`Avx512`], [`Avx2`] and [`Sse2`] wrap the vector registers; [`Portable`] is a plain array for processors that
+//! `Avx512`, `Avx2` and [`Sse2`] wrap the vector registers; [`Portable`] is a plain array for processors that
 //! have none of them. All round alike: the operations are IEEE and the elementary functions are the shared ones, so
 //! a candidate's cost does not depend on the instruction set.
 //!
@@ -167,7 +167,10 @@ impl Lanes for Portable {
 }
 
 #[cfg(target_arch = "x86_64")]
-pub use x86::{Avx2, Avx512, Sse2};
+pub use x86::Sse2;
+// Not for others: outside functions for their sets their operations would be undefined.
+#[cfg(target_arch = "x86_64")]
+pub(crate) use x86::{Avx2, Avx512};
 
 /// What every processor of the target has.
 #[cfg(target_arch = "x86_64")]
@@ -193,6 +196,7 @@ mod x86 {
     #[inline]
     #[target_feature(enable = "avx512f")]
     fn tie_512(mut a: __m512, mut b: __m512) -> (__m512, __m512) {
+        // SAFETY: the instruction is none: it names two registers and touches nothing.
         unsafe {
             asm!("/* {0} {1} */", inout(zmm_reg) a, inout(zmm_reg) b, options(pure, nomem, nostack, preserves_flags))
         };
@@ -203,6 +207,7 @@ mod x86 {
     #[inline]
     #[target_feature(enable = "avx2")]
     fn tie_256(mut a: __m256, mut b: __m256) -> (__m256, __m256) {
+        // SAFETY: the instruction is none: it names two registers and touches nothing.
         unsafe {
             asm!("/* {0} {1} */", inout(ymm_reg) a, inout(ymm_reg) b, options(pure, nomem, nostack, preserves_flags))
         };
@@ -213,6 +218,7 @@ mod x86 {
     #[inline]
     #[target_feature(enable = "sse2")]
     fn tie_128(mut a: __m128, mut b: __m128) -> (__m128, __m128) {
+        // SAFETY: the instruction is none: it names two registers and touches nothing.
         unsafe {
             asm!("/* {0} {1} */", inout(xmm_reg) a, inout(xmm_reg) b, options(pure, nomem, nostack, preserves_flags))
         };
@@ -241,6 +247,7 @@ mod x86 {
                 type Output = Self;
                 #[inline(always)]
                 fn add(self, other: Self) -> Self {
+                    // SAFETY: the set is there, as the module says.
                     unsafe { Self($add(self.0, other.0)) }
                 }
             }
@@ -248,6 +255,7 @@ mod x86 {
                 type Output = Self;
                 #[inline(always)]
                 fn sub(self, other: Self) -> Self {
+                    // SAFETY: the set is there, as the module says.
                     unsafe { Self($sub(self.0, other.0)) }
                 }
             }
@@ -255,6 +263,7 @@ mod x86 {
                 type Output = Self;
                 #[inline(always)]
                 fn mul(self, other: Self) -> Self {
+                    // SAFETY: the set is there, as the module says.
                     unsafe { Self($mul(self.0, other.0)) }
                 }
             }
@@ -262,6 +271,7 @@ mod x86 {
                 type Output = Self;
                 #[inline(always)]
                 fn div(self, other: Self) -> Self {
+                    // SAFETY: the set is there, as the module says.
                     unsafe { Self($div(self.0, other.0)) }
                 }
             }
@@ -269,6 +279,7 @@ mod x86 {
                 type Output = Self;
                 #[inline(always)]
                 fn neg(self) -> Self {
+                    // SAFETY: the set is there, as the module says.
                     unsafe { Self($neg(self.0)) }
                 }
             }
@@ -276,6 +287,7 @@ mod x86 {
                 type Output = Self;
                 #[inline(always)]
                 fn bitand(self, other: Self) -> Self {
+                    // SAFETY: the set is there, as the module says.
                     unsafe { Self($and(self.0, other.0)) }
                 }
             }
@@ -283,6 +295,7 @@ mod x86 {
                 type Output = Self;
                 #[inline(always)]
                 fn bitor(self, other: Self) -> Self {
+                    // SAFETY: the set is there, as the module says.
                     unsafe { Self($or(self.0, other.0)) }
                 }
             }
@@ -290,6 +303,7 @@ mod x86 {
                 type Output = Self;
                 #[inline(always)]
                 fn not(self) -> Self {
+                    // SAFETY: the set is there, as the module says.
                     unsafe { Self($not(self.0)) }
                 }
             }
@@ -300,10 +314,12 @@ mod x86 {
 
                 #[inline(always)]
                 fn lit(x: f64) -> Self {
+                    // SAFETY: the set is there, as the module says.
                     unsafe { Self($set1(x as f32)) }
                 }
                 #[inline(always)]
                 fn load(x: f32) -> Self {
+                    // SAFETY: the set is there, as the module says.
                     unsafe { Self($set1(x)) }
                 }
                 #[inline(always)]
@@ -312,32 +328,39 @@ mod x86 {
                 }
                 #[inline(always)]
                 fn sqrt(self) -> Self {
+                    // SAFETY: the set is there, as the module says.
                     unsafe { Self($sqrt(self.0)) }
                 }
                 #[inline(always)]
                 fn abs(self) -> Self {
+                    // SAFETY: the set is there, as the module says.
                     unsafe { Self($abs(self.0)) }
                 }
                 #[inline(always)]
                 fn min(self, other: Self) -> Self {
+                    // SAFETY: the set is there, as the module says.
                     unsafe { Self($min(self.0, other.0)) }
                 }
                 #[inline(always)]
                 fn max(self, other: Self) -> Self {
+                    // SAFETY: the set is there, as the module says.
                     unsafe { Self($max(self.0, other.0)) }
                 }
                 elementary::single_precision_functions!();
                 elementary::lockstep_functions!();
                 #[inline(always)]
                 fn less_than(self, other: Self) -> $mask_name {
+                    // SAFETY: the set is there, as the module says.
                     unsafe { $mask_name($less(self.0, other.0)) }
                 }
                 #[inline(always)]
                 fn splat_mask(truth: bool) -> $mask_name {
+                    // SAFETY: the set is there, as the module says.
                     unsafe { $mask_name($all(truth)) }
                 }
                 #[inline(always)]
                 fn select(mask: $mask_name, if_true: Self, if_false: Self) -> Self {
+                    // SAFETY: the set is there, as the module says.
                     unsafe { Self($select(mask.0, if_true.0, if_false.0)) }
                 }
             }
@@ -359,23 +382,28 @@ mod x86 {
             impl SinglePrecision for $name {
                 #[inline(always)]
                 fn round(self) -> Self {
+                    // SAFETY: the set is there, as the module says.
                     unsafe { Self($round(self.0)) }
                 }
                 #[inline(always)]
                 fn negate_where_odd(self, n: Self) -> Self {
+                    // SAFETY: the set is there, as the module says.
                     unsafe { Self($odd(self.0, n.0)) }
                 }
                 #[inline(always)]
                 fn with_sign_of(self, other: Self) -> Self {
+                    // SAFETY: the set is there, as the module says.
                     unsafe { Self($sign(self.0, other.0)) }
                 }
                 #[inline(always)]
                 fn tie(self, other: Self) -> (Self, Self) {
+                    // SAFETY: the set is there, as the module says.
                     let (a, b) = unsafe { $tie(self.0, other.0) };
                     (Self(a), Self(b))
                 }
                 #[inline(always)]
                 fn two_to_the(self) -> Self {
+                    // SAFETY: the set is there, as the module says.
                     unsafe { Self($pow(self.0)) }
                 }
             }
@@ -386,15 +414,18 @@ mod x86 {
                 #[inline(always)]
                 fn from_fn(f: impl FnMut(usize) -> f32) -> Self {
                     let lanes: [f32; $lanes] = std::array::from_fn(f);
+                    // SAFETY: an array of exactly the register's size, of which every bit pattern is a number.
                     unsafe { Self(std::mem::transmute::<[f32; $lanes], $register>(lanes)) }
                 }
                 #[inline(always)]
                 fn write(self, out: &mut [f32]) {
+                    // SAFETY: an array of exactly the register's size, of which every bit pattern is a number.
                     let lanes = unsafe { std::mem::transmute::<$register, [f32; $lanes]>(self.0) };
                     out[..$lanes].copy_from_slice(&lanes);
                 }
                 #[inline(always)]
                 fn mask_bits(mask: $mask_name) -> u32 {
+                    // SAFETY: the set is there, as the module says.
                     unsafe { $bits(mask.0) }
                 }
             }

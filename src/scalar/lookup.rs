@@ -138,9 +138,13 @@ mod x86 {
     }
 
     /// The columns of eight rows that start at `index`, which all lie behind `at`.
+    ///
+    /// # Safety
+    /// Every index has eight figures behind it in the table that starts at `at`.
     #[inline]
     #[target_feature(enable = "avx2")]
     unsafe fn rows_256(at: *const f32, index: __m256i) -> [__m256; 8] {
+        // SAFETY: the sets are there, and rows of eight at these indices lie behind `at`, as the caller has seen to.
         unsafe {
             let [a, b, c, d, e, f, g, h] = std::mem::transmute::<__m256i, [u32; 8]>(index);
             transposed([
@@ -157,9 +161,13 @@ mod x86 {
     }
 
     /// The columns of sixteen rows, likewise.
+    ///
+    /// # Safety
+    /// As for [`rows_256`].
     #[inline]
     #[target_feature(enable = "avx512f,avx512dq")]
     unsafe fn rows_512(at: *const f32, index: __m512i) -> [__m512; 8] {
+        // SAFETY: as for half of them.
         unsafe {
             let [low, high] = std::mem::transmute::<__m512i, [__m256i; 2]>(index);
             let (low, high) = (rows_256(at, low), rows_256(at, high));
@@ -187,6 +195,7 @@ mod x86 {
                 #[inline(always)]
                 fn place(self, rows: usize, width: usize) -> ($index, Self) {
                     let held = self.max(Self::lit(0.0)).min(Self::lit(rows as f64));
+                    // SAFETY: the set is there; no memory is touched.
                     unsafe {
                         let row = $min($truncate(held.register()), $set1(rows as i32 - 1));
                         let fraction = held - Self::of_register($float(row));
@@ -196,6 +205,7 @@ mod x86 {
                 #[inline(always)]
                 fn pick(table: &[f32], place: $index, column: usize) -> Self {
                     let last = last_index(table);
+                    // SAFETY: the set is there, and no index is beyond the last: the lesser is taken, unsigned.
                     unsafe {
                         let index = $min($add(place, $set1(column as i32)), $set1(last));
                         Self::of_register($gather(table.as_ptr(), index))
@@ -205,6 +215,7 @@ mod x86 {
                 fn pick_row(table: &[f32], place: $index) -> [Self; 8] {
                     let last = last_index(table);
                     assert!(last >= 7);
+                    // SAFETY: the set is there, and eight figures follow every index: the lesser is taken, unsigned.
                     unsafe {
                         let index = $min(place, $set1(last - 7));
                         // Written out: through a library function's closure the registers would go by memory.

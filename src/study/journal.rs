@@ -18,6 +18,10 @@ struct Answer {
     /// Of the population's bits.
     crc: u32,
     evaluation: Evaluation,
+    /// What gave it.
+    backend: BackendInfo,
+    /// What has gone wrong with devices since the answer before.
+    device_faults: Vec<String>,
 }
 
 /// The answers that a study has had, and what they belong to.
@@ -81,6 +85,9 @@ pub struct Recorder<'k> {
     /// Nothing where nothing is kept.
     journal: Option<Journal>,
     next: usize,
+    device_faults: Vec<String>,
+    /// What gave the last answer.
+    backend: Option<BackendInfo>,
     keeper: &'k mut Keeper,
 }
 
@@ -90,6 +97,8 @@ impl<'k> Recorder<'k> {
         Self {
             journal: Some(journal),
             next: 0,
+            device_faults: Vec::new(),
+            backend: None,
             keeper,
         }
     }
@@ -99,6 +108,8 @@ impl<'k> Recorder<'k> {
         Self {
             journal: None,
             next: 0,
+            device_faults: Vec::new(),
+            backend: None,
             keeper,
         }
     }
@@ -120,6 +131,16 @@ impl<'k> Recorder<'k> {
         self.keep()
     }
 
+    /// What has gone wrong with devices in all answers so far, known ones with them.
+    pub fn device_faults(&self) -> &[String] {
+        &self.device_faults
+    }
+
+    /// What gave the last answer, if there has been one.
+    pub fn backend(&self) -> Option<&BackendInfo> {
+        self.backend.as_ref()
+    }
+
     /// Saves the journal.
     ///
     /// # Errors
@@ -135,6 +156,8 @@ impl<'k> Recorder<'k> {
     pub fn over<'a>(&'a mut self, evaluator: &'a mut dyn Evaluator) -> Recorded<'a, 'k> {
         Recorded {
             recorder: self,
+            opening: evaluator.device_faults().len(),
+            seen: evaluator.device_faults().len(),
             evaluator,
         }
     }
@@ -144,6 +167,10 @@ impl<'k> Recorder<'k> {
 pub struct Recorded<'a, 'k> {
     recorder: &'a mut Recorder<'k>,
     evaluator: &'a mut dyn Evaluator,
+    /// How many of the evaluator's faults were met when it was opened.
+    opening: usize,
+    /// How many of them are among those above, or need not be.
+    seen: usize,
 }
 
 fn crc_of(population: &[f64]) -> u32 {
@@ -160,16 +187,17 @@ impl Evaluator for Recorded<'_, '_> {
     }
 
     fn device_faults(&self) -> &[String] {
-        self.evaluator.device_faults()
+        &self.recorder.device_faults
     }
 
     fn evaluate(&mut self, population: &[f64]) -> Result<Evaluation> {
         let recorder = &mut *self.recorder;
-        let Some(journal) = &mut recorder.journal else {
-            return self.evaluator.evaluate(population);
-        };
         let crc = crc_of(population);
-        if let Some(answer) = journal.answers.get(recorder.next) {
+        let known = recorder
+            .journal
+            .as_ref()
+            .and_then(|j| j.answers.get(recorder.next));
+        if let Some(answer) = known {
             if answer.crc != crc {
                 let expected = "the populations that the study asks for; it was begun with another build";
                 return Err(Error::input(
@@ -180,16 +208,32 @@ impl Evaluator for Recorded<'_, '_> {
                 ));
             }
             recorder.next += 1;
+            recorder.device_faults.extend_from_slice(&answer.device_faults);
+            recorder.backend = Some(answer.backend.clone());
             return Ok(answer.evaluation.clone());
         }
         let evaluation = self.evaluator.evaluate(population)?;
-        journal.answers.push(Answer {
-            crc,
-            evaluation: evaluation.clone(),
-        });
-        recorder.next += 1;
-        if recorder.keeper.due() {
-            recorder.keeper.keep_or_warn(journal);
+        let met = self.evaluator.device_faults();
+        let opening = std::mem::take(&mut self.opening);
+        // An evaluator that was opened anew to go on meets again what it met at first.
+        let again = |fault: &&String| !recorder.device_faults.contains(fault);
+        let mut device_faults: Vec<String> = met[..opening].iter().filter(again).cloned().collect();
+        device_faults.extend_from_slice(&met[self.seen..]);
+        self.seen = met.len();
+        recorder.device_faults.extend_from_slice(&device_faults);
+        let backend = self.evaluator.backend();
+        recorder.backend = Some(backend.clone());
+        if let Some(journal) = &mut recorder.journal {
+            journal.answers.push(Answer {
+                crc,
+                evaluation: evaluation.clone(),
+                backend,
+                device_faults,
+            });
+            recorder.next += 1;
+            if recorder.keeper.due() {
+                recorder.keeper.keep_or_warn(journal);
+            }
         }
         Ok(evaluation)
     }
@@ -276,5 +320,74 @@ mod tests {
         assert!(other.over(&mut squares).evaluate(&[0.75]).is_err());
         let mut elsewhere = Recorder::new(journal, &mut keeper);
         assert!(elsewhere.begin("b".to_owned(), &squares.backend()).is_err());
+    }
+
+    /// Squares on a device that fails at every evaluation from the second on, and opens with a fault.
+    struct Failing(Squares, Vec<String>);
+
+    impl Failing {
+        fn new() -> Self {
+            Self(Squares::new(), vec!["opened late".to_owned()])
+        }
+    }
+
+    impl Evaluator for Failing {
+        fn problem(&self) -> &Problem {
+            self.0.problem()
+        }
+
+        fn backend(&self) -> BackendInfo {
+            let backend = if self.1.len() > 1 { "simd" } else { "gpu" };
+            BackendInfo {
+                backend,
+                ..self.0.backend()
+            }
+        }
+
+        fn device_faults(&self) -> &[String] {
+            &self.1
+        }
+
+        fn evaluate(&mut self, population: &[f64]) -> Result<Evaluation> {
+            let found = self.0.evaluate(population)?;
+            if self.0.1 > 1 {
+                self.1.push("lost".to_owned());
+            }
+            Ok(found)
+        }
+    }
+
+    #[test]
+    fn faults_are_told_once_whether_or_not_the_run_was_broken_off() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let mut keeper = Keeper::new(folder.path());
+        let journal = Journal::new("squares", &1u32).expect("settings");
+        let mut recorder = Recorder::new(journal, &mut keeper);
+        let mut device = Failing::new();
+        for x in [0.25, 0.5, 0.75] {
+            recorder.over(&mut device).evaluate(&[x]).expect("a square");
+        }
+        let told = ["opened late", "lost", "lost"];
+        assert_eq!(recorder.device_faults(), told);
+        assert_eq!(recorder.backend().map(|b| b.backend), Some("simd"));
+        recorder.keep().expect("it is kept");
+
+        let journal: Journal = checkpoint::load(&folder.path().join(STATE)).expect("a journal");
+        let mut keeper = Keeper::new(folder.path());
+        let mut again = Recorder::new(journal, &mut keeper);
+        let mut device = Failing::new();
+        let mut recorded = again.over(&mut device);
+        for x in [0.25, 0.5, 0.75] {
+            recorded.evaluate(&[x]).expect("a square");
+        }
+        assert_eq!(recorded.device_faults(), told);
+        recorded.evaluate(&[1.0]).expect("a square");
+        assert_eq!(
+            recorded.device_faults(),
+            told,
+            "it opens as late as before, and works"
+        );
+        recorded.evaluate(&[0.125]).expect("a square");
+        assert_eq!(recorded.device_faults()[3..], ["lost"]);
     }
 }

@@ -1,23 +1,76 @@
 //! How large a study may be: what it would need is reckoned before any of it is taken, so that none is ended by the system.
+//!
+//! What a study keeps (its swarm, archive, history, journal, cuts) cannot be split and has to fit; what evaluators take
+//! beside that is cut to what is left, by [`portions`].
 
 use crate::error::{Error, Result};
+use crate::evaluate::portions;
 
 /// Memory that a study may take where nothing else is said (MiB).
 pub const USUAL_MIB: u64 = 4096;
-/// Numbers that swarm, evaluator and checkpoint keep for each variable of a particle, at the most: positions, velocities and
-/// best positions, the candidates asked for in the optimiser's and the parameters' coordinates, the same in single precision,
-/// and a state written down.
-const COPIES: u64 = 12;
-/// Bytes of a particle besides its variables: objectives, failures, order, figures on the device.
-const PARTICLE: u64 = 512;
+/// Numbers that a swarm and its checkpoint keep for each variable of a particle, at the most: positions, velocities and best
+/// positions, the candidates asked for in the optimiser's and the parameters' coordinates, those of a portion, and the state
+/// as it is copied and written down, twice.
+const COPIES: u64 = 11;
+/// Bytes of a particle besides its variables: objectives, failures, order, rows of an evaluation.
+const PARTICLE: u64 = 320;
 /// Bytes of an iteration in the history and in the tables and pictures that it comes to.
 const ITERATION: u64 = 512;
 /// Bytes of a cut across the track: in every level of the search, in the cone programs of the exact solvers, whose
 /// factors are what is largest, in the edges that lines are checked against and the lines that are reported.
 const CUT: u64 = 16 << 10;
+/// Bytes of a candidate's answer in a journal: five objectives and a failure, as they are and twice while they are written.
+pub const ANSWER: u64 = 3 * (5 * 8 + 8);
+/// What evaluators are left at the least (bytes): as much as the smallest of [`portions`] takes.
+const LEAST: u64 = 4 << 20;
 
-/// What a study's memory goes with.
+/// Something of which a study keeps many.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Kept {
+    /// The setting that says how many.
+    pub name: &'static str,
+    /// How many.
+    pub count: u64,
+    /// Bytes of each.
+    pub each: u64,
+}
+
+impl Kept {
+    fn bytes(&self) -> u64 {
+        self.count.saturating_mul(self.each)
+    }
+}
+
+/// What a study keeps must fit into so much memory; the rest is left to its evaluators.
+///
+/// # Errors
+/// [`Error::Input`] naming what takes most of it, and how much of that would fit beside the rest.
+pub fn check(kept: &[Kept], limit_mib: u64) -> Result<()> {
+    let limit = limit_mib.saturating_mul(1 << 20);
+    let needed = kept.iter().map(Kept::bytes).fold(LEAST, u64::saturating_add);
+    let Some(largest) = kept
+        .iter()
+        .max_by_key(|kept| kept.bytes())
+        .filter(|_| needed > limit)
+    else {
+        portions::allow(limit.saturating_sub(needed).saturating_add(LEAST));
+        return Ok(());
+    };
+    let rest = needed.saturating_sub(largest.bytes());
+    let expected = match limit.saturating_sub(rest) / largest.each.max(1) {
+        0 => "a smaller study, or a higher --memory-limit-mib".to_owned(),
+        fitting => format!("at most {fitting}, which fits into {limit_mib} MiB (--memory-limit-mib)"),
+    };
+    let found = format!(
+        "{}, for which some {} MiB are needed",
+        largest.count,
+        needed >> 20
+    );
+    Err(Error::input("the study", largest.name, found, expected))
+}
+
+/// What a study of swarms keeps goes with.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Size {
     /// Particles of the largest swarm.
     pub population: usize,
@@ -29,58 +82,39 @@ pub struct Size {
     pub sections: usize,
     /// Members of the archive.
     pub archive: usize,
+    /// Whether every answer is kept, in a journal.
+    pub journal: bool,
 }
 
 impl Size {
-    /// Bytes that a study of this size takes at the most, as a rule.
-    pub fn bytes(&self) -> u64 {
-        let particle = self.particle();
-        let parts = [
-            particle.saturating_mul(self.population as u64),
-            particle.saturating_mul(self.archive as u64),
-            ITERATION.saturating_mul(self.iterations as u64),
-            CUT.saturating_mul(self.sections as u64),
-        ];
-        parts.into_iter().fold(0, u64::saturating_add)
-    }
-
-    fn particle(&self) -> u64 {
-        (self.variables as u64)
-            .saturating_mul(8 * COPIES)
-            .saturating_add(PARTICLE)
-    }
-
-    /// Whether the study fits into so much memory.
+    /// As [`check`] of all that the study keeps.
     ///
     /// # Errors
-    /// [`Error::Input`] naming what takes most of it, and how much of that would fit beside the rest.
+    /// As [`check`].
     pub fn check(&self, limit_mib: u64) -> Result<()> {
-        let limit = limit_mib.saturating_mul(1 << 20);
-        let needed = self.bytes();
-        if needed <= limit {
-            return Ok(());
-        }
-        let terms = [
-            ("population", self.population, self.particle()),
-            ("archive", self.archive, self.particle()),
-            ("iterations", self.iterations, ITERATION),
-            ("sections", self.sections, CUT),
-        ];
-        let share = |(_, count, each): &(&str, usize, u64)| each.saturating_mul(*count as u64);
-        let Some(largest) = terms.iter().max_by_key(|term| share(term)) else {
-            return Ok(());
+        check(&self.kept(), limit_mib)
+    }
+
+    fn kept(&self) -> [Kept; 4] {
+        let particle = (self.variables as u64)
+            .saturating_mul(8 * COPIES)
+            .saturating_add(PARTICLE);
+        let answers = if self.journal {
+            ANSWER.saturating_mul(self.population as u64)
+        } else {
+            0
         };
-        let rest: u64 = terms
-            .iter()
-            .filter(|term| term.0 != largest.0)
-            .map(share)
-            .fold(0, u64::saturating_add);
-        let expected = match limit.saturating_sub(rest) / largest.2 {
-            0 => "a smaller study, or a higher --memory-limit-mib".to_owned(),
-            fitting => format!("at most {fitting}, which fits into {limit_mib} MiB (--memory-limit-mib)"),
+        let kept = |name, count: usize, each| Kept {
+            name,
+            count: count as u64,
+            each,
         };
-        let found = format!("{}, for which some {} MiB are needed", largest.1, needed >> 20);
-        Err(Error::input("the study", largest.0, found, expected))
+        [
+            kept("population", self.population, particle),
+            kept("archive", self.archive, particle),
+            kept("iterations", self.iterations, ITERATION.saturating_add(answers)),
+            kept("sections", self.sections, CUT),
+        ]
     }
 }
 
@@ -88,33 +122,54 @@ impl Size {
 mod tests {
     use super::*;
 
+    /// The figure that a refusal says would fit.
+    fn said_to_fit(refused: Result<()>) -> usize {
+        let said = refused.expect_err("it does not fit").to_string();
+        said.split("at most ")
+            .nth(1)
+            .and_then(|rest| rest.split(',').next())
+            .and_then(|figure| figure.parse().ok())
+            .expect("a figure")
+    }
+
     #[test]
     fn what_is_said_to_fit_does() {
         let size = |population| Size {
             population,
             variables: 22,
             iterations: 1500,
-            sections: 0,
             archive: 100,
+            ..Size::default()
         };
         size(100_000).check(USUAL_MIB).expect("it fits");
-        let said = size(1_000_000_000)
-            .check(USUAL_MIB)
-            .expect_err("it does not")
-            .to_string();
-        let fitting: usize = said
-            .split("at most ")
-            .nth(1)
-            .and_then(|rest| rest.split(',').next())
-            .and_then(|figure| figure.parse().ok())
-            .expect("a figure");
+        let fitting = said_to_fit(size(1_000_000_000).check(USUAL_MIB));
         size(fitting).check(USUAL_MIB).expect("as was said");
         assert!(size(fitting + 1).check(USUAL_MIB).is_err());
         let absurd = Size {
             population: usize::MAX,
             sections: usize::MAX,
+            journal: true,
             ..size(usize::MAX)
         };
         assert_eq!(absurd.check(1).expect_err("no overflow").exit_code(), 2);
+    }
+
+    #[test]
+    fn a_journal_counts() {
+        let size = |iterations, journal| Size {
+            population: 1000,
+            variables: 10,
+            iterations,
+            journal,
+            ..Size::default()
+        };
+        size(10_000, false)
+            .check(1024)
+            .expect("without a journal it fits");
+        let fitting = said_to_fit(size(10_000, true).check(1024));
+        // 144 bytes to each of a thousand answers.
+        assert!((7000..7500).contains(&fitting), "{fitting}");
+        size(fitting, true).check(1024).expect("as was said");
+        assert!(size(fitting + 1, true).check(1024).is_err());
     }
 }

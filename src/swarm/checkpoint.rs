@@ -10,17 +10,22 @@ use super::device::DeviceState;
 use super::{
     CooperativeSwarm, CovarianceSwarm, DifferenceSwarm, HybridSwarm, Islands, Mopso, Nsga2, Pso, WindowSwarm,
 };
+use crate::config::read_bytes;
 use crate::error::{Error, Result};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::fs::{self, File};
-use std::io::Write;
+use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 
 /// The format that this version writes, and the only one that it reads. It changes with the fields of any state.
-pub const VERSION: u32 = 2;
+pub const VERSION: u32 = 3;
 
 const MAGIC: &[u8; 8] = b"LAPSWARM";
+/// Bytes of that and the version.
+const HEAD: u64 = 12;
+/// The largest state that is read (bytes): that of more particles than a study may have.
+const LARGEST: u64 = 64 << 30;
 
 /// A state that can be kept in a file.
 pub trait Checkpoint: Serialize + DeserializeOwned {
@@ -152,6 +157,15 @@ pub fn save<T: Checkpoint>(path: &Path, state: &T) -> Result<()> {
 /// # Errors
 /// [`Error::Io`] if the file cannot be read, [`Error::Input`] as [`from_bytes`].
 pub fn load<T: Checkpoint>(path: &Path) -> Result<T> {
-    let bytes = fs::read(path).map_err(|e| Error::io(path, "read", e))?;
-    from_bytes(&bytes, path)
+    let mut head = Vec::new();
+    let file = File::open(path).map_err(|e| Error::io(path, "read", e))?;
+    file.take(HEAD)
+        .read_to_end(&mut head)
+        .map_err(|e| Error::io(path, "read", e))?;
+    // What is none, or of another version, need not be read to be refused.
+    if head.len() < HEAD as usize || !head.starts_with(MAGIC) || head[MAGIC.len()..] != VERSION.to_le_bytes()
+    {
+        return from_bytes(&head, path);
+    }
+    from_bytes(&read_bytes(path, LARGEST)?, path)
 }

@@ -13,6 +13,7 @@ use motec_i2::{ChannelMetadata, Header, I2Error, LDReader, Sample};
 
 use super::recording::{Channel, Clock, Format, Metadata, Recording, Unreadable};
 use super::text::{decode, shown};
+use crate::config::{LARGEST_TEXT, read_bytes};
 use crate::{Error, Result};
 
 /// First four bytes of a `.ld`, little-endian.
@@ -292,10 +293,10 @@ fn to_utf8(field: &mut [u8]) {
 pub(super) fn beacons_beside(path: &Path) -> Result<Vec<f64>> {
     let candidates: [PathBuf; 2] = ["ldx", "LDX"].map(|e| path.with_extension(e));
     for ldx in candidates {
-        match std::fs::read(&ldx) {
+        match read_bytes(&ldx, LARGEST_TEXT) {
             Ok(bytes) => return beacons(&decode(&bytes), &ldx),
-            Err(e) if e.kind() == std::io::ErrorKind::NotFound => {}
-            Err(e) => return Err(Error::io(ldx, "read", e)),
+            Err(Error::Io { source, .. }) if source.kind() == std::io::ErrorKind::NotFound => {}
+            Err(e) => return Err(e),
         }
     }
     Ok(Vec::new())

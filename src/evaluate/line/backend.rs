@@ -3,6 +3,7 @@
 use super::{CpuLineEvaluator, GpuLineEvaluator, LineProblem, SimdLineEvaluator};
 use crate::error::Result;
 use crate::evaluate::gpu::GpuContext;
+use crate::evaluate::portions::Portions;
 use crate::evaluate::simd::InstructionSet;
 use crate::evaluate::{BackendChoice, Evaluator, FallbackEvaluator};
 
@@ -18,7 +19,7 @@ pub fn open_line_evaluator<'a>(
     choice: BackendChoice,
     adapter: Option<&str>,
 ) -> Result<Box<dyn Evaluator + 'a>> {
-    Ok(match choice.decided(adapter) {
+    let evaluator: Box<dyn Evaluator + 'a> = match choice.decided(adapter) {
         BackendChoice::Gpu => {
             let name = adapter.map(str::to_owned);
             Box::new(FallbackEvaluator::new(
@@ -35,5 +36,12 @@ pub fn open_line_evaluator<'a>(
         }
         BackendChoice::Cpu => Box::new(CpuLineEvaluator::new(line)),
         _ => Box::new(SimdLineEvaluator::new(line, InstructionSet::best())),
-    })
+    };
+    Ok(Box::new(Portions::new(evaluator, bytes_each(line))))
+}
+
+/// Bytes that a candidate takes at the most while it is evaluated: its variables in single precision, once here and once on
+/// a device, three figures of each section there, its place, its measures and its row.
+fn bytes_each(line: &LineProblem) -> u64 {
+    8 * line.dimensions() as u64 + 12 * line.plan().rows.len() as u64 + 320
 }

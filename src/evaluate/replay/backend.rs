@@ -3,6 +3,7 @@
 use super::{CpuEvaluator, GpuEvaluator, ReplayProblem, SimdEvaluator};
 use crate::error::Result;
 use crate::evaluate::gpu::GpuContext;
+use crate::evaluate::portions::Portions;
 use crate::evaluate::simd::InstructionSet;
 use crate::evaluate::{BackendChoice, Evaluator, FallbackEvaluator};
 
@@ -18,7 +19,7 @@ pub fn open_evaluator<'a>(
     choice: BackendChoice,
     adapter: Option<&str>,
 ) -> Result<Box<dyn Evaluator + 'a>> {
-    Ok(match choice.decided(adapter) {
+    let evaluator: Box<dyn Evaluator + 'a> = match choice.decided(adapter) {
         BackendChoice::Gpu => {
             let name = adapter.map(str::to_owned);
             Box::new(FallbackEvaluator::new(
@@ -35,5 +36,12 @@ pub fn open_evaluator<'a>(
         }
         BackendChoice::Cpu => Box::new(CpuEvaluator::new(replay)),
         _ => Box::new(SimdEvaluator::new(replay, InstructionSet::best())),
-    })
+    };
+    Ok(Box::new(Portions::new(evaluator, bytes_each(replay))))
+}
+
+/// Bytes that a candidate takes at the most while it is evaluated: the figures of its car, once here and once on a device,
+/// its errors in every window here or how far each is there, its place and its row.
+fn bytes_each(replay: &ReplayProblem) -> u64 {
+    8 * replay.base().len() as u64 + 48 * replay.plan.windows.len() as u64 + 320
 }

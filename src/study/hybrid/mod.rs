@@ -85,8 +85,10 @@ pub struct Outcome {
     pub stint: Vec<StintLap>,
     /// Hybrids that lap like another car.
     pub sizing: Vec<Sizing>,
-    /// What evaluated.
+    /// What evaluated in the end.
     pub backend: BackendInfo,
+    /// What went wrong with devices and was got over.
+    pub device_faults: Vec<String>,
     /// Laps evaluated.
     pub evaluations: u64,
     /// Time of the swarms (s).
@@ -175,6 +177,7 @@ pub fn run_recorded(
         stint: stint_laps,
         sizing,
         backend,
+        device_faults: Vec::new(),
         search_s: 0.0,
         elapsed_s: 0.0,
         interrupted,
@@ -240,6 +243,10 @@ pub fn run_recorded(
             unbound_j: unbound.lap.deployed,
             swarm_front,
         });
+    }
+    outcome.device_faults = recorder.device_faults().to_vec();
+    if let Some(backend) = recorder.backend() {
+        outcome.backend.clone_from(backend);
     }
     outcome.elapsed_s = began.elapsed().as_secs_f64();
     Ok(outcome)

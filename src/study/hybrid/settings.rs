@@ -7,6 +7,7 @@ use crate::evaluate::BackendChoice;
 use crate::evaluate::hybrid::{HybridObjective, MOST_MOTOR};
 use crate::line::energy::{Gates, Mode};
 use crate::study::identify::parse_backend;
+use crate::study::memory::Size;
 use crate::study::raceline::RacelineSettings;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -215,6 +216,19 @@ impl HybridStudySettings {
         root.finish()?;
         s.validate()?;
         Ok(s)
+    }
+
+    /// What the study's memory goes with.
+    pub fn size(&self) -> Size {
+        Size {
+            population: self.population,
+            // Zones and control points are fewer than the sections of the line.
+            variables: self.sections,
+            iterations: self.iterations,
+            sections: self.sections,
+            archive: 0,
+            journal: true,
+        }
     }
 
     /// Checks what ranges alone do not tell.

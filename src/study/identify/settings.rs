@@ -227,6 +227,14 @@ impl IdentifySettings {
         Self::read_beside(path, Self::default(), |_| Ok(()))
     }
 
+    /// As [`IdentifySettings::read`], of a file's text; `path` is its name in messages, and paths are relative to it.
+    ///
+    /// # Errors
+    /// As [`IdentifySettings::read`].
+    pub fn parse(path: &Path, text: &str) -> Result<Self> {
+        Self::parse_beside(path, text, Self::default(), |_| Ok(()))
+    }
+
     /// As [`IdentifySettings::read`] from other defaults, for studies of a replay that have settings of their own:
     /// `own` reads these from the same file.
     ///
@@ -237,9 +245,17 @@ impl IdentifySettings {
         defaults: Self,
         own: impl FnOnce(&Table<'_>) -> Result<()>,
     ) -> Result<Self> {
-        let text = read_text(path)?;
+        Self::parse_beside(path, &read_text(path)?, defaults, own)
+    }
+
+    fn parse_beside(
+        path: &Path,
+        text: &str,
+        defaults: Self,
+        own: impl FnOnce(&Table<'_>) -> Result<()>,
+    ) -> Result<Self> {
         let folder = path.parent().unwrap_or(Path::new("."));
-        let document = Document::parse(path, &text)?;
+        let document = Document::parse(path, text)?;
         let root = document.root();
         let mut s = defaults;
         own(&root)?;
@@ -340,8 +356,8 @@ impl IdentifySettings {
             population: population.max(EXPLORE.0),
             variables: self.free.len(),
             iterations: self.iterations.unwrap_or(GATHER.1),
-            sections: 0,
             archive: if several { self.archive } else { 0 },
+            ..Size::default()
         }
     }
 

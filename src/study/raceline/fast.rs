@@ -135,14 +135,7 @@ fn search_about(
     };
     let mut found = match search.start {
         // Nothing has been evaluated yet.
-        Some(start) => FoundLine {
-            alpha: start.to_vec(),
-            cost: f64::INFINITY,
-            evaluations: 0,
-            history: Vec::new(),
-            failures: Default::default(),
-            device_faults: Vec::new(),
-        },
+        Some(start) => FoundLine::given(start.to_vec(), f64::INFINITY),
         None => {
             let curved = LineSearch {
                 objective: LineObjective::Kappa2,
@@ -191,6 +184,7 @@ fn search_about(
         let step = search_step(&level, &few, objective, before, work)?;
         found.evaluations += step.evaluations;
         found.device_faults.extend(step.device_faults);
+        found.backend = step.backend;
         add_failures(&mut found.failures, &step.failures);
         found.history.extend(step.history.into_iter().map(|row| LevelRow {
             evaluations: before.1 + row.evaluations,

@@ -5,7 +5,7 @@ use super::lines::Setup;
 use super::settings::RacelineSettings;
 use crate::error::Result;
 use crate::evaluate::line::{LineProblem, open_line_evaluator};
-use crate::evaluate::{Evaluator, FAILED_COST, FailureCounts, add_failures};
+use crate::evaluate::{BackendInfo, Evaluator, FAILED_COST, FailureCounts, add_failures};
 use crate::line::Parametrisation;
 use crate::random::Random;
 use crate::swarm::metrics::hypervolume;
@@ -32,6 +32,8 @@ pub struct LineFront {
     pub failures: FailureCounts,
     /// What went wrong with devices and was got over.
     pub device_faults: Vec<String>,
+    /// What evaluated in the end.
+    pub backend: Option<BackendInfo>,
 }
 
 /// Where the search for a front is.
@@ -39,6 +41,7 @@ pub struct LineFront {
 pub(super) struct FrontState {
     pub swarm: Mopso,
     pub failures: FailureCounts,
+    pub device_faults: Vec<String>,
 }
 
 /// Metres of the reference line for each control point of the front's lines.
@@ -103,18 +106,25 @@ pub(super) fn search_front_from(
             FrontState {
                 swarm,
                 failures: FailureCounts::new(),
+                device_faults: Vec::new(),
             }
         }
     };
     let mut evaluator = open_line_evaluator(&problem, settings.backend, settings.adapter.as_deref())?;
+    let earlier_faults = state.device_faults.clone();
     while !state.swarm.done() {
         let progress = step(&mut state.swarm, evaluator.as_mut())?;
         add_failures(&mut state.failures, &progress.failures);
+        state.device_faults = [&earlier_faults[..], evaluator.device_faults()].concat();
         if observe(&progress, &state)?.is_break() {
             break;
         }
     }
-    let FrontState { swarm, failures } = state;
+    let FrontState {
+        swarm,
+        failures,
+        mut device_faults,
+    } = state;
 
     let whole = LineProblem::new(
         cuts.clone(),
@@ -169,9 +179,10 @@ pub(super) fn search_front_from(
     } else {
         f64::NAN
     };
-    let device_faults = [evaluator.device_faults(), judge.device_faults()].concat();
+    device_faults.extend_from_slice(judge.device_faults());
     Ok(LineFront {
         device_faults,
+        backend: Some(judge.backend()),
         failures,
         alpha: archive.positions.clone(),
         objectives: archive.objectives.clone(),

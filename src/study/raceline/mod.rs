@@ -64,7 +64,7 @@ pub struct Outcome {
     pub compromise: Option<ReportedLine>,
     /// The reference line.
     pub reference: ReportedLine,
-    /// What evaluated.
+    /// What evaluated in the end.
     pub backend: BackendInfo,
     /// Lines that failed, by reason.
     pub failures: FailureCounts,
@@ -137,7 +137,7 @@ pub fn find_lines_from(
         Some(setup.car.clone()),
         settings.entry_mps,
     )?;
-    let backend = open_line_evaluator(&probe, settings.backend, settings.adapter.as_deref())?.backend();
+    let mut backend = open_line_evaluator(&probe, settings.backend, settings.adapter.as_deref())?.backend();
     let origin = Origin::new(inputs_of(setup), &backend);
     let state = match state {
         Some(state) => {
@@ -151,6 +151,7 @@ pub fn find_lines_from(
             finished: Vec::new(),
             steps: Vec::new(),
             search: None,
+            plain: None,
             front: None,
         },
     };
@@ -208,6 +209,7 @@ pub fn find_lines_from(
                     });
                     state.steps.clear();
                     state.search = None;
+                    state.plain = None;
                     state.elapsed_s = elapsed_s;
                 });
                 (found, best)
@@ -216,6 +218,7 @@ pub fn find_lines_from(
         evaluations += found.evaluations;
         device_faults.extend_from_slice(&found.device_faults);
         add_failures(&mut failures, &found.failures);
+        backend = found.backend.unwrap_or(backend);
         history.push(
             found
                 .history
@@ -259,6 +262,7 @@ pub fn find_lines_from(
         evaluations += found.evaluations;
         device_faults.extend_from_slice(&found.device_faults);
         add_failures(&mut failures, &found.failures);
+        backend = found.backend.clone().unwrap_or(backend);
         if let Some(nearest) = nearest_to_ideal(&found) {
             compromise = Some(setup.report("compromise", &found.alpha[nearest], settings)?);
         }

@@ -10,7 +10,75 @@ use crate::evaluate::line::{CpuLineEvaluator, LineObjective, LineProblem, open_l
 use crate::evaluate::{Evaluator, FailureCounts, add_failures};
 use crate::line::Parametrisation;
 use crate::swarm::{CooperativeSettings, CooperativeSwarm, Optimiser, Pso, PsoSettings, step};
+use serde::{Deserialize, Serialize};
 use std::time::Instant;
+
+/// A swarm of whole lines.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub(super) enum PlainSwarm {
+    Cooperative(Box<CooperativeSwarm>),
+    Thesis(Box<Pso>),
+}
+
+/// Where such a search is: all that it takes to go on.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub(super) struct PlainState {
+    swarm: PlainSwarm,
+    history: Vec<LevelRow>,
+    failures: FailureCounts,
+    device_faults: Vec<String>,
+}
+
+impl PlainState {
+    fn new(settings: &RacelineSettings, problem: &LineProblem) -> Result<Self> {
+        let swarm = match settings.algorithm {
+            LineAlgorithm::Cooperative => {
+                let usual = CooperativeSettings::default();
+                let groups = settings.groups.min(problem.dimensions());
+                // The groups take turns, and each has the iterations that are asked for.
+                let motion = PsoSettings {
+                    population: settings.population,
+                    iterations: settings.iterations.saturating_mul(groups),
+                    seed: settings.seed,
+                    ..usual.motion
+                };
+                let settings = CooperativeSettings { motion, groups };
+                PlainSwarm::Cooperative(Box::new(CooperativeSwarm::new(&problem.problem, settings)?))
+            }
+            LineAlgorithm::Windows | LineAlgorithm::Thesis => {
+                let motion = PsoSettings {
+                    population: settings.population,
+                    iterations: settings.iterations,
+                    seed: settings.seed,
+                    ..PsoSettings::thesis()
+                };
+                PlainSwarm::Thesis(Box::new(Pso::new(&problem.problem, motion)?))
+            }
+        };
+        Ok(Self {
+            swarm,
+            history: Vec::new(),
+            failures: FailureCounts::new(),
+            device_faults: Vec::new(),
+        })
+    }
+}
+
+impl PlainSwarm {
+    fn swarm(&self) -> &dyn Optimiser {
+        match self {
+            Self::Cooperative(swarm) => swarm.as_ref(),
+            Self::Thesis(swarm) => swarm.as_ref(),
+        }
+    }
+
+    fn swarm_mut(&mut self) -> &mut dyn Optimiser {
+        match self {
+            Self::Cooperative(swarm) => swarm.as_mut(),
+            Self::Thesis(swarm) => swarm.as_mut(),
+        }
+    }
+}
 
 /// The line that the settings' algorithm finds from a start at random.
 pub(super) fn search_plainly(
@@ -28,55 +96,44 @@ pub(super) fn search_plainly(
         Some(setup.car.clone()),
         settings.entry_mps,
     )?;
-    let mut swarm: Box<dyn Optimiser> = match settings.algorithm {
-        LineAlgorithm::Cooperative => {
-            let usual = CooperativeSettings::default();
-            let groups = settings.groups.min(setup.cuts.len());
-            // The groups take turns, and each has the iterations that are asked for.
-            let motion = PsoSettings {
-                population: settings.population,
-                iterations: settings.iterations.saturating_mul(groups),
-                seed: settings.seed,
-                ..usual.motion
-            };
-            Box::new(CooperativeSwarm::new(
-                &problem.problem,
-                CooperativeSettings { motion, groups },
-            )?)
-        }
-        LineAlgorithm::Windows | LineAlgorithm::Thesis => {
-            let motion = PsoSettings {
-                population: settings.population,
-                iterations: settings.iterations,
-                seed: settings.seed,
-                ..PsoSettings::thesis()
-            };
-            Box::new(Pso::new(&problem.problem, motion)?)
-        }
-    };
     let mut evaluator = open_line_evaluator(&problem, settings.backend, settings.adapter.as_deref())?;
-    let mut failures = FailureCounts::new();
-    let mut history = Vec::new();
-    while !swarm.done() {
-        let progress = step(swarm.as_mut(), evaluator.as_mut())?;
-        add_failures(&mut failures, &progress.failures);
-        history.push(LevelRow {
+    let mut state = match work.state.plain.take() {
+        Some(state) => *state,
+        None => PlainState::new(settings, &problem)?,
+    };
+    let earlier_faults = state.device_faults.clone();
+    while !state.swarm.swarm().done() {
+        let progress = step(state.swarm.swarm_mut(), evaluator.as_mut())?;
+        add_failures(&mut state.failures, &progress.failures);
+        state.device_faults = [&earlier_faults[..], evaluator.device_faults()].concat();
+        let elapsed_s = before_s + began.elapsed().as_secs_f64();
+        state.history.push(LevelRow {
             controls: problem.dimensions(),
             sections: setup.cuts.len(),
             evaluations: progress.evaluations,
             best: progress.best[0],
-            elapsed_s: before_s + began.elapsed().as_secs_f64(),
+            elapsed_s,
         });
         let told = StudyProgress {
             stage: line_name(objective).to_owned(),
             evaluations: progress.evaluations,
             best: format!("{:.4} {}", progress.best[0], objective.unit()),
         };
-        // Nothing of such a search is kept: one that is broken off is done anew.
-        if work.told(&told, |_| {})?.is_break() {
+        let flow = work.told(&told, |kept| {
+            kept.plain = Some(Box::new(state.clone()));
+            kept.elapsed_s = elapsed_s;
+        })?;
+        if flow.is_break() {
             break;
         }
     }
+    let PlainState {
+        swarm,
+        history,
+        failures,
+        device_faults,
+    } = state;
+    let swarm = swarm.swarm();
     let front = swarm.front();
     let alpha = problem.alpha(&front.candidates[0]);
     let cost = CpuLineEvaluator::new(&problem)
@@ -88,6 +145,7 @@ pub(super) fn search_plainly(
         evaluations: swarm.evaluations(),
         history,
         failures,
-        device_faults: evaluator.device_faults().to_vec(),
+        device_faults,
+        backend: Some(evaluator.backend()),
     })
 }

@@ -5,7 +5,7 @@
 
 use crate::error::{Error, Result};
 use crate::evaluate::line::{CpuLineEvaluator, LineObjective, LineProblem, open_line_evaluator};
-use crate::evaluate::{BackendChoice, Evaluator, FailureCounts, add_failures};
+use crate::evaluate::{BackendChoice, BackendInfo, Evaluator, FailureCounts, add_failures};
 use crate::line::{Parametrisation, PointMass, TERMS};
 use crate::swarm::{Optimiser, WindowSettings, WindowSwarm};
 use crate::track::CrossSections;
@@ -177,6 +177,23 @@ pub struct FoundLine {
     pub failures: FailureCounts,
     /// What went wrong with devices and was got over.
     pub device_faults: Vec<String>,
+    /// What evaluated in the end; nothing before anything was evaluated.
+    pub backend: Option<BackendInfo>,
+}
+
+impl FoundLine {
+    /// A line that is known, before anything is evaluated.
+    pub(super) fn given(alpha: Vec<f64>, cost: f64) -> Self {
+        Self {
+            alpha,
+            cost,
+            evaluations: 0,
+            history: Vec::new(),
+            failures: FailureCounts::new(),
+            device_faults: Vec::new(),
+            backend: None,
+        }
+    }
 }
 
 /// Where a search is: all that it takes to go on.
@@ -231,14 +248,7 @@ pub fn search_line_from(
             let sums = judge.candidate(search.start.unwrap_or(&cuts.reference))?;
             LineState {
                 level: 0,
-                found: FoundLine {
-                    cost: cost(&judge, &sums)?,
-                    alpha: sums.clone(),
-                    evaluations: 0,
-                    history: Vec::new(),
-                    failures: FailureCounts::new(),
-                    device_faults: Vec::new(),
-                },
+                found: FoundLine::given(sums.clone(), cost(&judge, &sums)?),
                 sums,
                 swarm: None,
                 before: f64::INFINITY,
@@ -263,6 +273,7 @@ pub fn search_line_from(
             (state.before, state.rounds) = (f64::INFINITY, 0);
         }
         let mut evaluator = open_line_evaluator(&line, search.backend, search.adapter)?;
+        let earlier_faults = state.found.device_faults.len();
         let last = level + 1 == levels.len();
         let least_gain = settings.least_gain * if last { 0.2 } else { 1.0 };
         let mut stopped = false;
@@ -300,6 +311,13 @@ pub fn search_line_from(
                 state.before = best;
             }
             state.elapsed_s = before_s + clock.elapsed().as_secs_f64();
+            // Those of this evaluator so far, in the place of those that it had before.
+            state.found.device_faults.truncate(earlier_faults);
+            state
+                .found
+                .device_faults
+                .extend_from_slice(evaluator.device_faults());
+            state.found.backend = Some(evaluator.backend());
             // A settled level is left before anyone can break off: its swarm would go on if it were taken up again.
             if !settled {
                 stopped = observe(&progress, &state)?.is_break();
@@ -307,7 +325,6 @@ pub fn search_line_from(
         }
         let Some(swarm) = state.swarm.take() else { break };
         let found = &mut state.found;
-        found.device_faults.extend_from_slice(evaluator.device_faults());
         found.evaluations += swarm.evaluations();
         let whole = problem(search, cuts.clone(), way)?;
         let mut candidate = swarm.best_candidate().0;

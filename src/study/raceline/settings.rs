@@ -125,8 +125,15 @@ impl RacelineSettings {
     /// # Errors
     /// [`Error::Io`] if it cannot be read, [`Error::Input`] naming line and field if it says something wrong.
     pub fn read(path: &Path) -> Result<Self> {
-        let text = read_text(path)?;
-        let document = Document::parse(path, &text)?;
+        Self::parse(path, &read_text(path)?)
+    }
+
+    /// As [`RacelineSettings::read`], of a file's text; `path` is its name in messages, and paths are relative to it.
+    ///
+    /// # Errors
+    /// As [`RacelineSettings::read`].
+    pub fn parse(path: &Path, text: &str) -> Result<Self> {
+        let document = Document::parse(path, text)?;
         let root = document.root();
         let mut s = Self::default();
         let folder = path.parent().unwrap_or(Path::new(""));
@@ -235,6 +242,7 @@ impl RacelineSettings {
             iterations: self.iterations,
             sections: self.sections,
             archive: self.archive,
+            ..Size::default()
         }
     }
 

@@ -1,6 +1,7 @@
 //! The state of a racing-line study: all that it takes to go on.
 
 use super::front::FrontState;
+use super::plain::PlainState;
 use super::search::{FoundLine, LineState};
 use super::settings::RacelineSettings;
 use super::{Setup, StudyProgress};
@@ -33,6 +34,8 @@ pub struct LinesState {
     pub(super) steps: Vec<FoundLine>,
     /// The search in hand.
     pub(super) search: Option<Box<LineState>>,
+    /// The plain swarm in hand.
+    pub(super) plain: Option<Box<PlainState>>,
     /// The swarm that looks for the front.
     pub(super) front: Option<Box<FrontState>>,
 }

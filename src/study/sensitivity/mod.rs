@@ -17,6 +17,7 @@ use crate::evaluate::{BackendInfo, Evaluator};
 use crate::study::identify::{FreeParameter, IdentifySettings, ObjectiveChoice, Setup, set_up};
 use crate::study::journal::Recorder;
 use crate::study::keeper::Keeper;
+use crate::study::memory::{ANSWER, Kept};
 use crate::study::run::Inputs;
 use crate::vehicle::tyre::Tyre;
 use crate::vehicle::{Car, CarModel, LinearTyre, MagicFormula, TyreModel};
@@ -71,6 +72,17 @@ impl SensitivitySettings {
             Ok(())
         })?;
         Ok(s)
+    }
+
+    /// What the study keeps: of every sample two rows of each car in the design and its costs, and the answer in a journal.
+    pub fn kept(&self) -> [Kept; 1] {
+        let variables = self.replay.free.len() as u64;
+        let car = variables.saturating_mul(16).saturating_add(80 + ANSWER);
+        [Kept {
+            name: "samples",
+            count: self.samples as u64,
+            each: car.saturating_mul(variables + 2),
+        }]
     }
 
     /// # Errors
@@ -144,8 +156,10 @@ pub struct Outcome {
     pub left_out: usize,
     /// Outputs along the lap.
     pub band: Band,
-    /// What evaluated.
+    /// What evaluated in the end.
     pub backend: BackendInfo,
+    /// What went wrong with devices and was got over.
+    pub device_faults: Vec<String>,
     /// Candidates evaluated.
     pub evaluations: usize,
     /// Time that they took (s).
@@ -398,7 +412,8 @@ pub fn measure_recorded(
         left_out,
         band: band(setup, first, dimensions),
         base,
-        backend,
+        backend: recorder.backend().cloned().unwrap_or(backend),
+        device_faults: recorder.device_faults().to_vec(),
         evaluations: if interrupted { singles } else { planned },
         elapsed_s: began.elapsed().as_secs_f64(),
         interrupted,

@@ -42,6 +42,8 @@ pub struct Summary {
     pub backend: &'static str,
     /// Instruction set, or name of the adapter.
     pub adapter: String,
+    /// What went wrong with devices and was got over; the study's figures hold all the same.
+    pub device_faults: Vec<String>,
     /// Time taken (s).
     pub elapsed_s: f64,
     /// Candidates evaluated.
@@ -100,6 +102,7 @@ pub fn summarise(settings: &SensitivitySettings, setup: &Setup, outcome: &Outcom
         seed: settings.replay.seed,
         backend: outcome.backend.backend,
         adapter: outcome.backend.device.clone(),
+        device_faults: outcome.device_faults.clone(),
         elapsed_s: outcome.elapsed_s,
         evaluations: outcome.evaluations,
         evaluations_per_s: outcome.evaluations as f64 / outcome.elapsed_s.max(1e-9),
@@ -180,8 +183,13 @@ impl Summary {
         } else {
             String::new()
         };
+        let faults: String = self
+            .device_faults
+            .iter()
+            .map(|f| format!("Note: {f}\n"))
+            .collect();
         format!(
-            "All channels together, each parameter {:.3}% either way:\n{table}{} evaluations in {:.1} s, {:.0}/s, {} {}{left}\n",
+            "All channels together, each parameter {:.3}% either way:\n{table}{} evaluations in {:.1} s, {:.0}/s, {} {}{left}\n{faults}",
             100.0 * self.share,
             self.evaluations,
             self.elapsed_s,
@@ -216,6 +224,7 @@ pub fn write_results(
     let manifest = Manifest {
         log: Some(&setup.log.source),
         interrupted: outcome.interrupted,
+        device_faults: &outcome.device_faults,
         ..Manifest::new(
             "sensitivity",
             settings.replay.seed,

@@ -10,6 +10,7 @@ use crate::evaluate::replay::{CHANNEL_NAMES, open_evaluator};
 use crate::study::identify::{FreeParameter, IdentifySettings, ObjectiveChoice, Setup, set_up};
 use crate::study::journal::Recorder;
 use crate::study::keeper::Keeper;
+use crate::study::memory::{ANSWER, Kept};
 use crate::study::sensitivity::{costs_of, inputs_of, ranges_about, start_as_base_drives};
 use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
@@ -66,6 +67,15 @@ impl SurfaceSettings {
         Ok(s)
     }
 
+    /// What the study keeps: of every candidate its two parameters, its costs, and the answer in a journal.
+    pub fn kept(&self) -> [Kept; 1] {
+        [Kept {
+            name: "grid, squared",
+            count: (self.grid as u64).saturating_mul(self.grid as u64),
+            each: 2 * 8 + 2 * 80 + ANSWER,
+        }]
+    }
+
     /// # Errors
     /// [`Error::Input`] naming the first setting that is out of its range.
     pub fn validate(&self) -> Result<()> {
@@ -95,8 +105,10 @@ pub struct Outcome {
     /// Costs over the grid, objective by objective, row by row of the vertical parameter; not a number where the car
     /// does not drive.
     pub costs: Vec<Vec<f64>>,
-    /// What evaluated.
+    /// What evaluated in the end.
     pub backend: BackendInfo,
+    /// What went wrong with devices and was got over.
+    pub device_faults: Vec<String>,
     /// Candidates evaluated.
     pub evaluations: usize,
     /// Time that they took (s).
@@ -200,7 +212,8 @@ pub fn measure_recorded(
         axes,
         base: [0, 1].map(|k| base[replay.parameters[k].slots[0]]),
         costs,
-        backend: evaluator.backend(),
+        backend: recorder.backend().cloned().unwrap_or_else(|| evaluator.backend()),
+        device_faults: recorder.device_faults().to_vec(),
         evaluations: n * n,
         elapsed_s: began.elapsed().as_secs_f64(),
         interrupted,

@@ -31,6 +31,8 @@ pub struct Summary {
     pub backend: &'static str,
     /// Instruction set, or name of the adapter.
     pub adapter: String,
+    /// What went wrong with devices and was got over; the study's figures hold all the same.
+    pub device_faults: Vec<String>,
     /// Time taken (s).
     pub elapsed_s: f64,
     /// Candidates evaluated.
@@ -67,6 +69,7 @@ pub fn summarise(settings: &SurfaceSettings, setup: &Setup, outcome: &Outcome) -
         seed: settings.replay.seed,
         backend: outcome.backend.backend,
         adapter: outcome.backend.device.clone(),
+        device_faults: outcome.device_faults.clone(),
         elapsed_s: outcome.elapsed_s,
         evaluations: outcome.evaluations,
         evaluations_per_s: outcome.evaluations as f64 / outcome.elapsed_s.max(1e-9),
@@ -98,8 +101,13 @@ impl Summary {
                 );
             }
         }
+        let faults: String = self
+            .device_faults
+            .iter()
+            .map(|f| format!("Note: {f}\n"))
+            .collect();
         text + &format!(
-            "{} evaluations in {:.1} s, {:.0}/s, {} did not drive, {} {}\n",
+            "{} evaluations in {:.1} s, {:.0}/s, {} did not drive, {} {}\n{faults}",
             self.evaluations, self.elapsed_s, self.evaluations_per_s, self.failed, self.backend, self.adapter
         )
     }
@@ -120,6 +128,7 @@ pub fn write_results(
     let manifest = Manifest {
         log: Some(&setup.log.source),
         interrupted: outcome.interrupted,
+        device_faults: &outcome.device_faults,
         ..Manifest::new(
             "surface",
             settings.replay.seed,

@@ -47,6 +47,10 @@ const BUNDLED: [(&str, &str); 5] = [
 
 /// Most runs of a sweep.
 const MOST_RUNS: usize = 100_000;
+/// Most bytes of all studies together.
+const MOST_TEXT: usize = 256 << 20;
+/// Most tables within tables that a key of the grid goes through.
+const MOST_DOTS: usize = 8;
 /// Keys that name files, which are relative to the sweep file.
 const FILES: [&str; 6] = ["car", "log", "channel_map", "track", "truth", "envelope"];
 
@@ -112,6 +116,10 @@ impl SweepSettings {
         }
         let mut axes = Vec::new();
         for (key, value) in grid {
+            if key.matches('.').count() > MOST_DOTS {
+                let key: String = key.chars().take(60).collect();
+                return refuse("grid", key, "keys that go through a few tables at most");
+            }
             match value {
                 Value::Array(values) if !values.is_empty() => {
                     let values: Vec<Value> = values
@@ -133,7 +141,19 @@ impl SweepSettings {
         axes.sort_by_key(|(key, _)| key == "seed");
         let runs = axes.iter().try_fold(1usize, |n, (_, v)| n.checked_mul(v.len()));
         if runs.is_none_or(|n| n > MOST_RUNS) {
-            return refuse("grid", format!("{runs:?} runs"), "at most 100000 runs");
+            let found = runs.map_or("more runs than can be counted".to_owned(), |n| {
+                format!("{n} runs")
+            });
+            return refuse("grid", found, "at most 100000 runs");
+        }
+        // Every run has a study of its own, with all of the base in it.
+        if runs.is_some_and(|n| n.saturating_mul(text.len()) > MOST_TEXT) {
+            let found = format!("{} runs of {} bytes", runs.unwrap_or_default(), text.len());
+            return refuse(
+                "grid",
+                found,
+                &format!("studies of {MOST_TEXT} bytes together at most"),
+            );
         }
         Ok(Self {
             study,
@@ -176,6 +196,28 @@ impl SweepSettings {
                 })
             })
             .collect()
+    }
+
+    /// An error in the study of a point, said of the sweep: that study's file is made by the program.
+    pub(super) fn of_point(&self, error: Error, number: usize, point: &Point, study: &Path) -> Error {
+        match error {
+            Error::Input {
+                file,
+                place,
+                found,
+                expected,
+            } if Path::new(&file) == study || file == "the study" => {
+                // Lines are those of the made file.
+                let place = match place.split_once(", ") {
+                    Some((line, rest)) if line.starts_with("line ") => rest,
+                    _ => &place,
+                };
+                let at: Vec<String> = point.settings.iter().map(|(k, v)| format!("{k} {v}")).collect();
+                let place = format!("run {} ({}), {place}", number + 1, at.join(", "));
+                Error::input(&self.file, place, found, expected)
+            }
+            other => other,
+        }
     }
 
     /// Sets `a.b` of nested tables; a table's keys are added to what is there.

@@ -13,10 +13,11 @@ pub use results::{Row, Summary, medians};
 use crate::error::{Error, Result};
 use crate::report::write_whole;
 use crate::study::identify::{self, IdentifySettings};
+use crate::study::memory::USUAL_MIB;
 use crate::study::raceline::{self, RacelineSettings};
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// The studies that can be swept.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -54,24 +55,66 @@ pub fn sweep(
     mut observe: impl FnMut(&SweepProgress<'_>) -> ControlFlow<()>,
 ) -> Result<Summary> {
     let points = settings.points()?;
-    // Every point is read before the first is run: a mistake in the last shows at once.
     let studies = folder.join("studies");
-    std::fs::create_dir_all(&studies).map_err(|e| Error::io(&studies, "create", e))?;
+    let path_of = |number: usize| studies.join(format!("{number:05}.toml"));
+    // Every point is read before anything is written: a mistake in the last shows at once, and leaves nothing behind.
+    for (number, point) in points.iter().enumerate() {
+        let read = match settings.study {
+            SweptStudy::Identify => IdentifySettings::parse(&path_of(number), &point.study).map(|s| s.size()),
+            SweptStudy::Raceline => RacelineSettings::parse(&path_of(number), &point.study).map(|s| s.size()),
+        };
+        read.and_then(|size| size.check(USUAL_MIB))
+            .map_err(|e| settings.of_point(e, number, point, &path_of(number)))?;
+    }
     let mut rows = if resume {
         results::read_rows(&folder.join(ROWS), &folder.join(SWEEP_FILE), settings, &points)?
     } else {
-        write_whole(folder.join(SWEEP_FILE), settings.text.as_bytes())?;
         Vec::new()
     };
-    let path_of = |number: usize| studies.join(format!("{number:05}.toml"));
-    for (number, point) in points.iter().enumerate() {
-        let path = path_of(number);
-        write_whole(&path, point.study.as_bytes())?;
-        match settings.study {
-            SweptStudy::Identify => drop(IdentifySettings::read(&path)?),
-            SweptStudy::Raceline => drop(RacelineSettings::read(&path)?),
+    let began_with = rows.len();
+    let ran = write_studies(settings, folder, &points, path_of, resume)
+        .and_then(|()| run_points(settings, folder, &points, path_of, &mut rows, &mut observe));
+    if let Err(error) = ran {
+        // What has come to nothing does not stand in the way of the next; what was broken off may be gone on with.
+        if !resume && rows.len() == began_with && !matches!(error, Error::Interrupted(_)) {
+            let _ = std::fs::remove_dir_all(&studies);
+            let _ = std::fs::remove_file(folder.join(SWEEP_FILE));
         }
+        return Err(error);
     }
+    let summary = Summary::new(rows)?;
+    summary.write(folder)?;
+    Ok(summary)
+}
+
+/// Writes the sweep and the study of every point.
+fn write_studies(
+    settings: &SweepSettings,
+    folder: &Path,
+    points: &[Point],
+    path_of: impl Fn(usize) -> PathBuf,
+    resume: bool,
+) -> Result<()> {
+    let studies = folder.join("studies");
+    std::fs::create_dir_all(&studies).map_err(|e| Error::io(&studies, "create", e))?;
+    if !resume {
+        write_whole(folder.join(SWEEP_FILE), settings.text.as_bytes())?;
+    }
+    for (number, point) in points.iter().enumerate() {
+        write_whole(path_of(number), point.study.as_bytes())?;
+    }
+    Ok(())
+}
+
+/// Runs the points that have no row yet, and keeps the rows as they come.
+fn run_points(
+    settings: &SweepSettings,
+    folder: &Path,
+    points: &[Point],
+    path_of: impl Fn(usize) -> PathBuf,
+    rows: &mut Vec<Row>,
+    observe: &mut dyn FnMut(&SweepProgress<'_>) -> ControlFlow<()>,
+) -> Result<()> {
     for (number, point) in points.iter().enumerate().skip(rows.len()) {
         let progress = SweepProgress {
             done: number,
@@ -83,9 +126,10 @@ pub fn sweep(
         }
         let path = path_of(number);
         let found = match settings.study {
-            SweptStudy::Identify => identified(&path, || observe(&progress))?,
-            SweptStudy::Raceline => lined(&path, || observe(&progress))?,
+            SweptStudy::Identify => identified(&path, || observe(&progress)),
+            SweptStudy::Raceline => lined(&path, || observe(&progress)),
         };
+        let found = found.map_err(|e| settings.of_point(e, number, point, &path))?;
         // A run that was broken off is no row: it is done anew.
         let Some((figures, front)) = found else {
             return Err(Error::Interrupted(folder.to_owned()));
@@ -96,11 +140,9 @@ pub fn sweep(
             figures,
             front,
         });
-        results::write_rows(&folder.join(ROWS), &rows)?;
+        results::write_rows(&folder.join(ROWS), rows)?;
     }
-    let summary = Summary::new(rows)?;
-    summary.write(folder)?;
-    Ok(summary)
+    Ok(())
 }
 
 type Figures = BTreeMap<String, Option<f64>>;

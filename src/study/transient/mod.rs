@@ -10,6 +10,7 @@ mod results;
 
 pub use results::{Summary, summarise, write_results};
 
+use crate::config::read_text;
 use crate::error::{Error, Result};
 use crate::line::{FineLine, PointMass, leftward_distance};
 use crate::simulate::{Drive, DriverSettings, SpeedPlan, drive_planned};
@@ -269,8 +270,8 @@ fn least_room(circuit: &Circuit, drive: &Drive) -> f64 {
 /// # Errors
 /// [`Error::Io`] if it cannot be read, [`Error::Input`] naming the line of the file where it is no table of points.
 pub fn read_line(path: &Path) -> Result<Vec<DVec2>> {
-    let mut reader =
-        csv::Reader::from_path(path).map_err(|e| Error::io(path, "read", std::io::Error::other(e)))?;
+    let text = read_text(path)?;
+    let mut reader = csv::Reader::from_reader(text.as_bytes());
     let refuse = |place: String, found: String| {
         Err(Error::input(
             path,

@@ -23,6 +23,7 @@ mod tests;
 mod xml;
 
 use super::circuit::{Corner, Section};
+use crate::config::read_bytes;
 use crate::{Error, Result};
 use glam::DVec2;
 use std::path::Path;
@@ -89,17 +90,7 @@ impl Survey {
     /// [`Error::Io`] when the file cannot be read; [`Error::Input`], naming the line or point, when it holds no road.
     pub fn read(path: impl AsRef<Path>, options: &SurveyOptions) -> Result<Self> {
         let path = path.as_ref();
-        let about = std::fs::metadata(path).map_err(|e| Error::io(path, "read", e))?;
-        if about.len() > LARGEST_FILE {
-            return Err(Error::input(
-                path,
-                "file size",
-                format!("{} bytes", about.len()),
-                format!("at most {LARGEST_FILE}"),
-            ));
-        }
-        let bytes = std::fs::read(path).map_err(|e| Error::io(path, "read", e))?;
-        Self::parse(&bytes, path, options)
+        Self::parse(&read_bytes(path, LARGEST_FILE)?, path, options)
     }
 
     /// Reads a survey from memory; `path` is its name in error messages.

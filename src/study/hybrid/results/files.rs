@@ -24,6 +24,7 @@ pub fn write_manifest(
     let manifest = Manifest {
         track: Some(&setup.raceline.track_name),
         interrupted: outcome.interrupted,
+        device_faults: &outcome.device_faults,
         ..Manifest::new("hybrid", settings.seed, &outcome.backend, &setup.car.name)
     };
     write_json(&folder.join("manifest.json"), &manifest)

@@ -142,6 +142,8 @@ pub struct HybridSummary {
     pub adapter: String,
     /// Driver of the adapter.
     pub driver: String,
+    /// What went wrong with devices and was got over; the study's figures hold all the same.
+    pub device_faults: Vec<String>,
     /// Scenarios, solvers and swarms (s).
     pub elapsed_s: f64,
     /// Laps evaluated.
@@ -216,6 +218,7 @@ pub fn summarise(settings: &HybridStudySettings, setup: &HybridSetup, outcome: &
         seed: settings.seed,
         backend: outcome.backend.backend,
         adapter: outcome.backend.device.clone(),
+        device_faults: outcome.device_faults.clone(),
         driver: outcome.backend.driver.clone(),
         elapsed_s: outcome.elapsed_s,
         evaluations: outcome.evaluations,
@@ -365,6 +368,9 @@ impl HybridSummary {
                 "{} laps evaluated ({rate:.0} per second) on {} {}\n",
                 self.evaluations, self.backend, self.adapter
             );
+        }
+        for fault in &self.device_faults {
+            text += &format!("Note: {fault}\n");
         }
         for warning in &self.warnings {
             text += &format!("Note: {warning}\n");

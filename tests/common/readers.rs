@@ -1,0 +1,335 @@
+//! Every reader given bytes from anywhere: what it takes is sound, what it refuses it refuses by file and place, and it never
+//! panics. The fuzz targets of `fuzz/` and the tests of what they found share this file.
+
+use lapswarm::study::compare::{self, Run};
+use lapswarm::study::hybrid::HybridStudySettings;
+use lapswarm::study::identify::{IdentifySettings, SearchState};
+use lapswarm::study::journal::Journal;
+use lapswarm::study::raceline::{LinesState, RacelineSettings};
+use lapswarm::study::run::RunSettings;
+use lapswarm::study::sensitivity::SensitivitySettings;
+use lapswarm::study::surface::SurfaceSettings;
+use lapswarm::study::sweep::SweepSettings;
+use lapswarm::study::transient::read_line;
+use lapswarm::swarm::checkpoint::{self, Checkpoint};
+use lapswarm::swarm::device::DeviceState;
+use lapswarm::swarm::{
+    CooperativeSwarm, CovarianceSwarm, DifferenceSwarm, HybridSwarm, Islands, Mopso, Nsga2, Pso, WindowSwarm,
+};
+use lapswarm::telemetry::{ChannelMap, Log, LogOptions, Recording};
+use lapswarm::track::{Circuit, Smoothing, Spacing, Survey, SurveyOptions};
+use lapswarm::vehicle::tyre::TyreFile;
+use lapswarm::vehicle::{Car, Envelope};
+use lapswarm::{Error, Result};
+use std::path::{Path, PathBuf};
+
+/// A reader by the name of its fuzz target.
+pub type Reader = (&'static str, fn(&[u8]));
+
+/// All of them.
+pub const READERS: &[Reader] = &[
+    ("car", car),
+    ("maps", maps),
+    ("tyre", tyre),
+    ("study", study),
+    ("sweep", sweep),
+    ("curvature", curvature),
+    ("track_csv", track_csv),
+    ("boundaries", boundaries),
+    ("latlon", latlon),
+    ("gpx_kml", gpx_kml),
+    ("log_csv", log_csv),
+    ("motec_csv", motec_csv),
+    ("motec_ld", motec_ld),
+    ("limits", limits),
+    ("checkpoint", checkpoint),
+    ("state", state),
+    ("run_folder", run_folder),
+];
+
+/// What was read, if anything was; a refusal must name the file and a place in it.
+fn taken<T>(result: Result<T>) -> Option<T> {
+    match result {
+        Ok(value) => Some(value),
+        Err(Error::Input {
+            file, place, found, ..
+        }) => {
+            assert!(!file.is_empty() && !place.is_empty());
+            assert!(found.len() < 4096, "{place}: a message of {} bytes", found.len());
+            None
+        }
+        Err(error) => panic!("refused without a place: {error}"),
+    }
+}
+
+/// As [`taken`], for readers that open what a file names or that ask for text: these may also say that they cannot read it.
+fn taken_from_disk<T>(result: Result<T>) -> Option<T> {
+    match result {
+        Err(Error::Io { .. }) => None,
+        other => taken(other),
+    }
+}
+
+thread_local! {
+    /// In memory where the system offers that.
+    static FOLDER: tempfile::TempDir = {
+        let memory = Path::new("/dev/shm");
+        let made = if memory.is_dir() { tempfile::tempdir_in(memory) } else { tempfile::tempdir() };
+        made.expect("a temporary folder")
+    };
+}
+
+/// A file that holds these bytes, for readers that go by a path.
+fn on_disk(name: &str, bytes: &[u8]) -> PathBuf {
+    let path = FOLDER.with(|folder| folder.path().join(name));
+    std::fs::write(&path, bytes).expect("a temporary file");
+    path
+}
+
+/// What stands before and after the first nought.
+fn split(data: &[u8]) -> (&[u8], &[u8]) {
+    let mut parts = data.splitn(2, |&byte| byte == 0);
+    (parts.next().unwrap_or_default(), parts.next().unwrap_or_default())
+}
+
+fn bundled_tyre(_: &str) -> Result<TyreFile> {
+    TyreFile::parse(Path::new("f.tir"), Car::BUNDLED_TYRE)
+}
+
+/// A car's figures wherever it may be asked for them.
+fn finite_car(car: &Car) {
+    assert!(car.to_flat().iter().all(|x| x.is_finite()));
+    let radius = car.chassis.radius_rear;
+    if let Some(powertrain) = &car.powertrain {
+        for rpm in [0.0, 1.0, 999.5, 6000.0, 1e6] {
+            assert!(powertrain.torque_at(rpm).is_finite());
+        }
+        for v in [0.0, 1e-3, 20.0, 70.0, 300.0] {
+            assert!(powertrain.wheel_force(v, radius).is_finite());
+        }
+        assert!(
+            powertrain
+                .shift_points_mps(radius)
+                .iter()
+                .flatten()
+                .all(|v| v.is_finite())
+        );
+        if let Some(map) = &powertrain.engine {
+            let (speeds, torques) = map.full_throttle_curve();
+            assert!(speeds.iter().chain(&torques).all(|x| x.is_finite()));
+            for (rpm, throttle) in [(0.0, 0.0), (3000.0, 45.0), (1e5, 90.0)] {
+                assert!(map.fuel_flow_at(rpm, throttle).is_finite());
+                assert!(map.throttle_for(rpm, 100.0).is_finite());
+            }
+        }
+    }
+    if let Some(hybrid) = &car.hybrid {
+        for rpm in [0.0, 3000.0, 1e6] {
+            assert!(hybrid.mgu_k.power_at(rpm).is_finite());
+            assert!(hybrid.mgu_k.blend(1e5, rpm, 0.9).hydraulic_w.is_finite());
+        }
+        if let Some(h) = &hybrid.mgu_h {
+            assert!(h.boosted_w(1e5, h.power_w(0.5, 0.5)).is_finite());
+        }
+    }
+}
+
+/// A car's file.
+pub fn car(data: &[u8]) {
+    let text = String::from_utf8_lossy(data);
+    if let Some(car) = taken(Car::parse(Path::new("f.toml"), &text, bundled_tyre)) {
+        finite_car(&car);
+    }
+}
+
+/// The tables of a car's engine, motors and store behind a sound chassis.
+pub fn maps(data: &[u8]) {
+    let whole = include_str!("../../data/cars/gt_hybrid.toml");
+    let head = whole.split("[powertrain]").next().unwrap_or_default();
+    let text = format!("{head}{}", String::from_utf8_lossy(data));
+    if let Some(car) = taken(Car::parse(Path::new("f.toml"), &text, bundled_tyre)) {
+        finite_car(&car);
+    }
+}
+
+/// A tyre's property file, and the bundled car on it.
+pub fn tyre(data: &[u8]) {
+    let text = String::from_utf8_lossy(data);
+    let read = |_: &str| TyreFile::parse(Path::new("f.tir"), &text);
+    taken(read(""));
+    if let Some(car) = taken(Car::parse(Path::new("f.toml"), Car::BUNDLED_TOML, read)) {
+        finite_car(&car);
+    }
+}
+
+/// A study's settings, read as those of every study, and a channel map.
+pub fn study(data: &[u8]) {
+    let path = on_disk("study.toml", data);
+    taken_from_disk(IdentifySettings::read(&path));
+    taken_from_disk(RacelineSettings::read(&path));
+    taken_from_disk(HybridStudySettings::read(&path));
+    taken_from_disk(RunSettings::read(&path));
+    taken_from_disk(SensitivitySettings::read(&path));
+    taken_from_disk(SurfaceSettings::read(&path));
+    taken(ChannelMap::parse(&String::from_utf8_lossy(data), "f.toml"));
+}
+
+/// A sweep and the points of its grid.
+pub fn sweep(data: &[u8]) {
+    let text = String::from_utf8_lossy(data);
+    if let Some(sweep) = taken(SweepSettings::parse(Path::new("f.toml"), &text)) {
+        taken(sweep.points());
+    }
+}
+
+/// A circuit's file and, behind a nought, its table of curvature.
+pub fn curvature(data: &[u8]) {
+    let (toml, table) = split(data);
+    let path = on_disk("circuit.toml", toml);
+    on_disk("circuit.csv", table);
+    if let Some(circuit) = taken_from_disk(Circuit::load(path))
+        && let Some(cuts) = taken(circuit.cross_sections_spaced(&Spacing::equal(50)))
+    {
+        assert!(cuts.right_m.iter().chain(&cuts.left_m).all(|p| p.is_finite()));
+    }
+}
+
+/// What is taken for a road is a road: its spline and cuts are finite, or refused.
+fn survey(data: &[u8], name: &str) {
+    for width_m in [None, Some(8.0)] {
+        let options = SurveyOptions {
+            width_m,
+            ..SurveyOptions::default()
+        };
+        if let Some(survey) = taken(Survey::parse(data, name, &options))
+            && let Some(line) = taken(survey.smoothed(&Smoothing::default()))
+            && let Some(cuts) = taken(line.cross_sections(&Spacing::equal(50)))
+        {
+            assert!(cuts.right_m.iter().chain(&cuts.left_m).all(|p| p.is_finite()));
+        }
+    }
+}
+
+/// A reference line with its widths.
+pub fn track_csv(data: &[u8]) {
+    survey(data, "f.csv");
+}
+
+/// Both edges of a road.
+pub fn boundaries(data: &[u8]) {
+    survey(data, "f.csv");
+}
+
+/// Latitudes and longitudes.
+pub fn latlon(data: &[u8]) {
+    survey(data, "f.csv");
+}
+
+/// A track of GPX, or a line of KML.
+pub fn gpx_kml(data: &[u8]) {
+    survey(data, "f.gpx");
+}
+
+fn log(recording: Result<Recording>) {
+    if let Some(recording) = taken_from_disk(recording) {
+        let log = Log::from_recording(&recording, &ChannelMap::default(), &LogOptions::default());
+        if let Some(log) = taken(log) {
+            assert!(log.vx_mps.iter().chain(&log.steer_rad).all(|x| x.is_finite()));
+        }
+    }
+}
+
+/// A log as the program writes it.
+pub fn log_csv(data: &[u8]) {
+    log(Recording::parse(data, "f.csv"));
+}
+
+/// A log as i2 exports it.
+pub fn motec_csv(data: &[u8]) {
+    log(Recording::parse(data, "f.csv"));
+}
+
+/// A log as the logger writes it, and the same bytes as the beacons beside a sound one.
+pub fn motec_ld(data: &[u8]) {
+    log(Recording::parse(data, "f.ld"));
+    let path = on_disk("f.ld", include_bytes!("../data/small.ld"));
+    on_disk("f.ldx", data);
+    log(Recording::read(path));
+}
+
+/// Limits over speed, and a line that another study wrote.
+pub fn limits(data: &[u8]) {
+    if let Some(limits) = taken(Envelope::from_csv("f.csv", &String::from_utf8_lossy(data))) {
+        let v = limits.top_speed_mps();
+        for row in [0.0, 0.5 * v, v, 2.0 * v].map(|v| limits.at(v)) {
+            let figures = [row.ay_mps2, row.ax_grip_mps2, row.ax_drive_mps2, row.drag_mps2];
+            assert!(figures.iter().all(|x| x.is_finite()));
+        }
+    }
+    if let Some(points) = taken(read_line(&on_disk("line.csv", data))) {
+        assert!(points.iter().all(|p| p.is_finite()));
+    }
+}
+
+/// A checkpoint with a head and a sum that are right, so that what is inside is looked at. What is taken can be kept again.
+fn forged<T: Checkpoint>(payload: &[u8]) {
+    let mut bytes = b"LAPSWARM".to_vec();
+    bytes.extend(checkpoint::VERSION.to_le_bytes());
+    bytes.extend((T::KIND.len() as u32).to_le_bytes());
+    bytes.extend(T::KIND.as_bytes());
+    bytes.extend((payload.len() as u64).to_le_bytes());
+    bytes.extend(payload);
+    bytes.extend(crc32fast::hash(&bytes).to_le_bytes());
+    if let Some(state) = taken(checkpoint::from_bytes::<T>(&bytes, Path::new("f"))) {
+        taken(checkpoint::to_bytes(&state));
+    }
+}
+
+/// A swarm's checkpoint: as it is and, by its first byte, as the state of one of the swarms.
+pub fn checkpoint(data: &[u8]) {
+    taken(checkpoint::from_bytes::<Pso>(data, Path::new("f")));
+    let Some((&kind, payload)) = data.split_first() else {
+        return;
+    };
+    match kind % 12 {
+        0 => forged::<Pso>(payload),
+        1 => forged::<Mopso>(payload),
+        2 => forged::<CooperativeSwarm>(payload),
+        3 => forged::<CovarianceSwarm>(payload),
+        4 => forged::<DeviceState>(payload),
+        5 => forged::<DifferenceSwarm>(payload),
+        6 => forged::<HybridSwarm>(payload),
+        7 => forged::<Nsga2>(payload),
+        8 => forged::<WindowSwarm>(payload),
+        9 => forged::<Islands<Mopso>>(payload),
+        10 => forged::<Islands<Pso>>(payload),
+        _ => forged::<Islands<DifferenceSwarm>>(payload),
+    }
+}
+
+/// A study's state, by its first byte.
+pub fn state(data: &[u8]) {
+    let Some((&kind, payload)) = data.split_first() else {
+        return;
+    };
+    match kind % 3 {
+        0 => forged::<SearchState>(payload),
+        1 => forged::<LinesState>(payload),
+        _ => forged::<Journal>(payload),
+    }
+}
+
+/// The manifest of a run and, behind noughts, its figures and a lap.
+pub fn run_folder(data: &[u8]) {
+    let (manifest, rest) = split(data);
+    let (summary, lap) = split(rest);
+    let path = on_disk("manifest.json", manifest);
+    on_disk("summary.json", summary);
+    on_disk("line_fastest.csv", lap);
+    let Some(folder) = path.parent() else {
+        return;
+    };
+    if let Some(run) = taken(Run::read(folder)) {
+        taken(compare::compare(&[run]));
+    }
+}
