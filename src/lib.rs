@@ -126,6 +126,7 @@
 #![warn(missing_docs, clippy::undocumented_unsafe_blocks)]
 
 pub mod config;
+pub mod drive;
 pub mod error;
 pub mod evaluate;
 pub mod line;

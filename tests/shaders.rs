@@ -4,10 +4,13 @@
 mod common;
 
 use common::{UNKNOWNS, bundled_car, linear_car, problem};
+use lapswarm::drive::driver::DriverTable;
+use lapswarm::drive::{Course, PATH_WIDTH};
+use lapswarm::evaluate::drive::DriveStretch;
 use lapswarm::evaluate::gpu::lint;
 use lapswarm::evaluate::gpu::shader::{
-    EnergyShape, LineShape, ReplayShape, car_fragments, line_swarm, swarm, swarm_gather, test_problem,
-    tyre_struct,
+    DriveShape, EnergyShape, LineShape, ReplayShape, car_fragments, line_swarm, swarm, swarm_gather,
+    test_problem, tyre_struct,
 };
 use lapswarm::evaluate::hybrid::EnergyAccount;
 use lapswarm::evaluate::line::{DeviceSection, LineStretch};
@@ -41,7 +44,7 @@ fn kernels() -> Vec<(&'static str, String)> {
     ];
     let mut kernels = Vec::new();
     for problem in &problems {
-        let table = ModelTable::new(problem);
+        let table = ModelTable::new(&problem.free, &problem.problem.variables);
         for norm in NORMS {
             let shape = ReplayShape {
                 model: problem.tyre_model(),
@@ -51,6 +54,12 @@ fn kernels() -> Vec<(&'static str, String)> {
             };
             kernels.push(("replay", shape.replay()));
             kernels.push(("replay_reduce", shape.reduce()));
+        }
+        for blends in [false, true] {
+            kernels.push((
+                "drive",
+                drive_shape(problem.tyre_model(), &table, blends).source(),
+            ));
         }
     }
     for closed in [false, true] {
@@ -70,6 +79,19 @@ fn kernels() -> Vec<(&'static str, String)> {
     }
     kernels.extend((0..NAMES.len() as u32).map(|number| ("test_problem", test_problem(number))));
     kernels
+}
+
+fn drive_shape(model: TyreModel, table: &ModelTable, blends: bool) -> DriveShape<'_> {
+    DriveShape {
+        model,
+        sources: &table.sources,
+        varying: table.varying.len(),
+        stretches: 31,
+        rows_ahead: 52,
+        cells_ahead: 20,
+        blends,
+        workgroup: 64,
+    }
 }
 
 fn energy_shape(closed: bool, terms: usize, additional: bool) -> EnergyShape {
@@ -276,6 +298,36 @@ fn structs_of_lines_have_the_hosts_offsets() {
         ("inverse_spacing", offset_of!(DeviceSection, inverse_spacing)),
     ];
     assert_eq!((members, size), (named(&host), size_of::<DeviceSection>()));
+}
+
+#[test]
+fn the_structs_of_drives_have_the_hosts_fields() {
+    let problem = problem(bundled_car(), &UNKNOWNS, Lap::default());
+    let table = ModelTable::new(&problem.free, &problem.problem.variables);
+    let source = drive_shape(problem.tyre_model(), &table, true).source();
+    let module = lint::check(&source).expect("the kernel parses");
+    let (members, size) = layout(&module, "DriveStretch");
+    let host = [
+        ("candidates", offset_of!(DriveStretch, candidates)),
+        ("stride", offset_of!(DriveStretch, stride)),
+        ("first_step", offset_of!(DriveStretch, first_step)),
+        ("steps", offset_of!(DriveStretch, steps)),
+    ];
+    let named: Vec<(String, usize)> = host.iter().map(|(name, at)| ((*name).to_owned(), *at)).collect();
+    assert_eq!((members, size), (named, size_of::<DriveStretch>()));
+    // These go to the device as rows of floats in the order of their fields.
+    for (name, fields) in [("Course", Course::FIELDS), ("Driver", DriverTable::<f32>::FIELDS)] {
+        let (members, size) = layout(&module, name);
+        let expected: Vec<(String, usize)> = fields
+            .iter()
+            .enumerate()
+            .map(|(i, field)| ((*field).to_owned(), 4 * i))
+            .collect();
+        assert_eq!((members, size), (expected, 4 * fields.len()), "{name}");
+    }
+    let (members, _) = layout(&module, "PathRow");
+    // One place of three vectors says nothing.
+    assert_eq!(members.len() + 1, PATH_WIDTH);
 }
 
 #[test]

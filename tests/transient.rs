@@ -1,11 +1,13 @@
 //! A line driven by the 4DOF car, and the whole way from a log to a lap.
 
+use lapswarm::evaluate::BackendChoice;
 use lapswarm::evaluate::line::LineObjective;
 use lapswarm::study::identify::{Algorithm, IdentifySettings};
 use lapswarm::study::raceline::{RacelineSettings, set_up};
 use lapswarm::study::run::{RunSettings, run};
 use lapswarm::study::transient::{
-    AGREEMENT, TransientSettings, drive_line, read_line, summarise, write_results,
+    AGREEMENT, NamedLine, PopulationSettings, TransientSettings, drive_line, drive_population, read_line,
+    summarise, summarise_population, table_of, write_population, write_results,
 };
 use lapswarm::vehicle::Car;
 use std::ops::ControlFlow;
@@ -52,6 +54,106 @@ fn the_car_drives_a_line_as_fast_as_the_point_mass() {
     ] {
         assert!(folder.path().join(name).is_file(), "{name}");
     }
+}
+
+/// Set-ups on two lines: the fastest within the edges comes first, the car as it is on a line laps as that line driven alone
+/// with the same share of the grip, and a search can be broken off.
+#[test]
+fn set_ups_and_lines_are_driven_all_at_once() {
+    let setup = stadium();
+    let car = Car::bundled().expect("the bundled car");
+    let edges = [setup.edges_m[0].as_slice(), setup.edges_m[1].as_slice()];
+    let middle = setup.cuts.points(&setup.cuts.reference);
+    let inner: Vec<f64> = setup.cuts.reference.iter().map(|a| a - 0.1).collect();
+    let lines = [
+        NamedLine {
+            name: "middle".to_owned(),
+            points_m: middle.clone(),
+        },
+        NamedLine {
+            name: "beside it".to_owned(),
+            points_m: setup.cuts.points(&inner),
+        },
+    ];
+    let settings = PopulationSettings {
+        setups: 5,
+        grip_shares: vec![0.7, 0.8, 0.9],
+        backend: BackendChoice::Simd,
+        ..PopulationSettings::default()
+    };
+    let outcome = drive_population(&car, &setup.car, &lines, edges, &settings, |_, _| {
+        ControlFlow::Continue(())
+    })
+    .expect("they are driven");
+    assert_eq!(outcome.evaluations, 6 * 2 * 3);
+    assert_eq!(outcome.driven.len(), 6 * 2);
+    let times: Vec<f64> = outcome
+        .driven
+        .iter()
+        .map(|d| d.best.map_or(f64::INFINITY, |b| b.lap_time_s))
+        .collect();
+    assert!(times.is_sorted() && times[0].is_finite(), "{times:?}");
+    assert!(
+        outcome
+            .driven
+            .iter()
+            .flat_map(|d| d.best)
+            .all(|b| b.room_m >= 0.0)
+    );
+
+    let own = outcome
+        .driven
+        .iter()
+        .find(|d| d.setup == 0 && d.line == 0)
+        .and_then(|d| d.best)
+        .expect("the bundled car drives");
+    let alone = TransientSettings {
+        shares: vec![own.grip_share],
+        ..TransientSettings::default()
+    };
+    let alone = drive_line(&car, &setup.car, &middle, edges, &alone).expect("it drives");
+    // Single precision, and a recording every 10 ms: see the parity of drives.
+    assert!(
+        (own.lap_time_s / alone.lap_time_s - 1.0).abs() < 5e-5,
+        "{own:?} and {}",
+        alone.lap_time_s
+    );
+    assert!(
+        (own.room_m - alone.margin_m).abs() < 0.01,
+        "{own:?} and {}",
+        alone.margin_m
+    );
+
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let summary = summarise_population("gt", &lines, &settings, &outcome, 1.0);
+    write_population(folder.path(), &car, &lines, &outcome, &summary).expect("files are written");
+    let fastest = Car::load(&folder.path().join("car.toml").display().to_string()).expect("a car");
+    let value = |name: &str, car: &Car| car.to_flat()[car.parameter(name).expect(name).slots[0]];
+    for (parameter, expected) in outcome.parameters.iter().zip(&outcome.driven[0].values) {
+        assert!(
+            (value(&parameter.name, &fastest) - expected).abs() < 1e-12,
+            "{}",
+            parameter.name
+        );
+    }
+    let table = std::fs::read_to_string(folder.path().join("setups.csv")).expect("a table");
+    assert_eq!(table.lines().count(), 1 + outcome.driven.len(), "{table}");
+    assert!(table_of(&lines, &outcome).contains("beside it"));
+
+    let many = PopulationSettings {
+        setups: 700,
+        grip_shares: vec![0.3],
+        ..settings
+    };
+    let broken = drive_population(&car, &setup.car, &lines, edges, &many, |_, _| {
+        ControlFlow::Break(())
+    })
+    .expect("it is broken off");
+    assert!(
+        broken.interrupted && broken.evaluations < 2 * 701,
+        "{}",
+        broken.evaluations
+    );
 }
 
 #[test]

@@ -4,10 +4,13 @@
 //! it. Optimisers see nothing else, so they run any problem on any backend.
 
 mod backend;
+pub mod drive;
 mod fallback;
+mod free_car;
 pub mod gpu;
 pub mod hybrid;
 pub mod line;
+mod model_table;
 mod packed;
 pub mod point;
 pub mod portions;
@@ -16,6 +19,8 @@ pub mod simd;
 
 pub use backend::BackendChoice;
 pub use fallback::FallbackEvaluator;
+pub use free_car::FreeCar;
+pub use model_table::ModelTable;
 pub use packed::{PackedClient, run_packed};
 
 use crate::error::Result;
@@ -98,6 +103,10 @@ pub enum Failure {
     IllFormedTyre(IllFormed),
     /// It spun, rolled over or left the range of numbers.
     Spun,
+    /// It left the road.
+    LeftRoad,
+    /// It did not get to the end in time.
+    Unfinished,
     /// It came to a standstill.
     Standstill,
     /// A decision variable was not a finite number.
@@ -112,6 +121,8 @@ impl Failure {
         match self {
             Self::IllFormedTyre(_) => "ill_formed_tyre",
             Self::Spun => "spun",
+            Self::LeftRoad => "left_the_road",
+            Self::Unfinished => "did_not_finish",
             Self::Standstill => "standstill",
             Self::NotFinite => "variable_not_finite",
             Self::Undefined => "objective_not_finite",
@@ -134,6 +145,8 @@ impl fmt::Display for Failure {
         match self {
             Self::IllFormedTyre(reason) => write!(f, "an ill-formed tyre: {reason}"),
             Self::Spun => f.write_str("spun"),
+            Self::LeftRoad => f.write_str("left the road"),
+            Self::Unfinished => f.write_str("did not finish in time"),
             Self::Standstill => f.write_str("came to a standstill"),
             Self::NotFinite => f.write_str("a variable that is not a finite number"),
             Self::Undefined => f.write_str("an objective that is not a finite number"),

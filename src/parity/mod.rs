@@ -5,6 +5,7 @@
 //! [`Agreement`] says how far it was off, in relative terms and in spacings of `f32` at the exact value (ULP), and
 //! whether that is within a tolerance derived from the roundings of the kernel.
 
+pub mod drive;
 pub mod elementary;
 mod energy;
 mod laps;
@@ -169,12 +170,14 @@ pub fn compare(subjects: &[Subject], mut observe: impl FnMut(&Agreement)) -> Res
     let lines = lines::Cases::new()?;
     let laps = laps::Cases::new()?;
     let energies = energy::Cases::new()?;
+    let drives = drive::Cases::new()?;
     for subject in subjects {
         take(elementary::compare(subject)?);
         take(step::compare(subject)?);
         take(laps.compare(subject)?);
         take(lines.compare(subject)?);
         take(energies.compare(subject)?);
+        take(drives.compare(subject)?);
     }
     Ok(all)
 }

@@ -119,6 +119,10 @@ impl Lookup for Counted {
         OPERATIONS.set(OPERATIONS.get() + 3);
         (place, Self(beyond))
     }
+    #[inline(always)]
+    fn whole(self, most: usize) -> Self {
+        Self(self.0.whole(most))
+    }
     fn pick(table: &[f32], place: usize, column: usize) -> Self {
         Self(f32::pick(table, place, column))
     }

@@ -12,6 +12,10 @@ pub trait Lookup: Real {
     /// the row's start, from nought to one. Arguments off either end (and what is no number) go to that end.
     fn place(self, rows: usize, width: usize) -> (Self::Place, Self);
 
+    /// The greatest whole number that is not above `self`, held between nought and `most`, which is below 2^24; nought for
+    /// what is no number.
+    fn whole(self, most: usize) -> Self;
+
     /// The figure `column` places behind `place`, from a table that is not empty; never beyond its end.
     fn pick(table: &[Self::Storage], place: Self::Place, column: usize) -> Self;
 
@@ -37,6 +41,11 @@ macro_rules! lone_lookup {
                 (row * width, held - row as $float)
             }
             #[inline(always)]
+            fn whole(self, most: usize) -> Self {
+                let held = Real::min(Real::max(self, 0.0), most as $float);
+                held as usize as $float
+            }
+            #[inline(always)]
             fn pick(table: &[$float], place: usize, column: usize) -> Self {
                 table[(place + column).min(table.len() - 1)]
             }
@@ -60,6 +69,10 @@ impl<const N: usize> Lookup for Dual<N> {
         (row * width, held - Self::lit(row as f64))
     }
     #[inline(always)]
+    fn whole(self, most: usize) -> Self {
+        Self::constant(self.value.whole(most))
+    }
+    #[inline(always)]
     fn pick(table: &[f64], place: usize, column: usize) -> Self {
         Self::constant(f64::pick(table, place, column))
     }
@@ -78,6 +91,12 @@ impl Lookup for Portable {
         super::lanes::Lanes::write(self, &mut lanes);
         let found = lanes.map(|x| Lookup::place(x, rows, width));
         (found.map(|f| f.0), super::lanes::Lanes::from_fn(|i| found[i].1))
+    }
+    #[inline(always)]
+    fn whole(self, most: usize) -> Self {
+        let mut lanes = [0.0; 8];
+        super::lanes::Lanes::write(self, &mut lanes);
+        super::lanes::Lanes::from_fn(|i| lanes[i].whole(most))
     }
     #[inline(always)]
     fn pick(table: &[f32], place: [usize; 8], column: usize) -> Self {
@@ -203,6 +222,11 @@ mod x86 {
                     }
                 }
                 #[inline(always)]
+                fn whole(self, most: usize) -> Self {
+                    let held = self.max(Self::lit(0.0)).min(Self::lit(most as f64));
+                    unsafe { Self::of_register($float($truncate(held.register()))) }
+                }
+                #[inline(always)]
                 fn pick(table: &[f32], place: $index, column: usize) -> Self {
                     let last = last_index(table);
                     // SAFETY: the set is there, and no index is beyond the last: the lesser is taken, unsigned.
@@ -262,6 +286,12 @@ mod x86 {
             self.write(&mut lanes);
             let found = lanes.map(|x| Lookup::place(x, rows, width));
             (found.map(|f| f.0), Self::from_fn(|i| found[i].1))
+        }
+        #[inline(always)]
+        fn whole(self, most: usize) -> Self {
+            let mut lanes = [0.0; 4];
+            self.write(&mut lanes);
+            Self::from_fn(|i| lanes[i].whole(most))
         }
         #[inline(always)]
         fn pick(table: &[f32], place: [usize; 4], column: usize) -> Self {

@@ -1,7 +1,7 @@
 //! A simulated log: the driver's inputs, and what the model makes of them.
 
-use super::driver::{DriverSettings, drive};
 use super::sensors::{SensorSettings, distort};
+use crate::drive::{DriverSettings, drive};
 use crate::error::{Error, Result};
 use crate::evaluate::replay::{Norm, Plan, Sample, Window, initial_state, step_fractions, trace};
 use crate::telemetry::{Calibration, Lap, Log};

@@ -54,11 +54,11 @@ fn scalar(replay: &ReplayProblem, population: &[f64]) -> Evaluation {
     fn single<T: Tyre<f32>>(replay: &ReplayProblem, plan: &Plan<f32>, figures: &[f32]) -> Option<[f64; 4]> {
         errors(replay, plan, &CarModel::<f32, T>::from_table(|i| figures[i]))
     }
-    let table = ModelTable::new(replay);
+    let table = ModelTable::new(&replay.free, &replay.problem.variables);
     let plan = replay.plan.to_f32();
     let mut evaluation = Evaluation::default();
     for candidate in population.chunks_exact(replay.dimensions()) {
-        let failure = replay.preliminary_failure(candidate);
+        let failure = replay.free.preliminary_failure(candidate);
         let errors = if failure.is_some() {
             None
         } else {
@@ -77,7 +77,7 @@ fn scalar(replay: &ReplayProblem, population: &[f64]) -> Evaluation {
 
 /// A candidate's ready figures as the `f32` backends see them.
 fn figures(replay: &ReplayProblem, table: &ModelTable, candidate: &[f64]) -> Vec<f32> {
-    let row = table.rows(replay, &[candidate]);
+    let row = table.rows(&replay.free, &[candidate]);
     let place = |(base, source): (&f32, &Option<usize>)| source.map_or(*base, |figure| row[figure]);
     table.base.iter().zip(&table.sources).map(place).collect()
 }
@@ -91,7 +91,11 @@ fn scalar_trace(replay: &ReplayProblem, candidate: &[f64]) -> Vec<[f32; 4]> {
         drive_window(&car, &plan, &plan.windows[0], |_, output| outputs.push(output));
         outputs
     }
-    let figures = figures(replay, &ModelTable::new(replay), candidate);
+    let figures = figures(
+        replay,
+        &ModelTable::new(&replay.free, &replay.problem.variables),
+        candidate,
+    );
     match replay.tyre_model() {
         TyreModel::MagicFormula => go::<MagicFormula<f32>>(replay, &figures),
         TyreModel::Linear => go::<LinearTyre<f32>>(replay, &figures),
@@ -103,7 +107,11 @@ fn device_trace(replay: &ReplayProblem, candidate: &[f64]) -> Vec<[f32; 4]> {
     let Some(context) = device() else {
         return Vec::new();
     };
-    let figures = figures(replay, &ModelTable::new(replay), candidate);
+    let figures = figures(
+        replay,
+        &ModelTable::new(&replay.free, &replay.problem.variables),
+        candidate,
+    );
     let entry = "
         fn given(i: u32) -> f32 { return figures[AFTER_FIGURES + i]; }
         @compute @workgroup_size(64) fn trace(@builtin(global_invocation_id) id: vec3<u32>) {

@@ -7,6 +7,7 @@
 mod common;
 mod cutting;
 mod device;
+mod drive;
 mod elementary;
 mod energy;
 mod lap;

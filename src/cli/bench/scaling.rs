@@ -2,6 +2,7 @@
 
 use super::machine::{forget_peak_memory, peak_memory_bytes, peak_operations_per_s};
 use crate::cli::{backend_flag, print_json};
+use lapswarm::evaluate::drive::{CpuDriveEvaluator, DriveProblem, GpuDriveEvaluator, SimdDriveEvaluator};
 use lapswarm::evaluate::gpu::{GpuContext, devices};
 use lapswarm::evaluate::line::{
     CpuLineEvaluator, GpuLineEvaluator, LineObjective, LineProblem, SimdLineEvaluator,
@@ -10,13 +11,14 @@ use lapswarm::evaluate::replay::{BackendChoice, CpuEvaluator, GpuEvaluator, Repl
 use lapswarm::evaluate::simd::InstructionSet;
 use lapswarm::evaluate::{Evaluator, Problem};
 use lapswarm::line::{Parametrisation, kernel};
+use lapswarm::parity;
 use lapswarm::random::Random;
 use lapswarm::report::{ScalingSeries, plot_scaling};
 use lapswarm::scalar::{Counted, operations_of};
 use lapswarm::study::identify::{IdentifySettings, set_up};
 use lapswarm::study::raceline::{self, RacelineSettings};
 use lapswarm::vehicle::model::runge_kutta_step;
-use lapswarm::vehicle::{CarInput, CarModel, CarState, MagicFormula};
+use lapswarm::vehicle::{Car, CarInput, CarModel, CarState, MagicFormula};
 use lapswarm::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -25,8 +27,9 @@ use std::time::Instant;
 /// Flags of `bench` itself.
 #[derive(clap::Args)]
 pub struct Arguments {
-    /// Problems: replay (the bundled lap, 22 unknowns), line (lap time, 360 cuts, 90 control points)
-    #[arg(long, value_delimiter = ',', value_parser = ["replay", "line"], default_value = "replay,line")]
+    /// Problems: replay (the bundled lap, 22 unknowns), line (lap time, 360 cuts, 90 control points), drive (set-ups driven
+    /// round a stadium of 840 m by the driver)
+    #[arg(long, value_delimiter = ',', value_parser = ["replay", "line", "drive"], default_value = "replay,line")]
     problems: Vec<String>,
     /// Populations to measure
     #[arg(long, value_delimiter = ',', default_value = "64,256,1024,4096,16384",
@@ -106,13 +109,17 @@ struct Case {
 enum Kind {
     Replay(Box<ReplayProblem>),
     Line(Box<LineProblem>),
+    Drive(Box<DriveProblem>),
 }
+
+/// The circuit that set-ups are driven round, with this share of the car's friction in steps of so many seconds.
+const DRIVEN: (&str, f64, f64) = ("stadium:200:70:14", 0.6, 2e-3);
 
 impl Case {
     fn replay() -> Result<Self> {
         let replay = set_up(&IdentifySettings::default())?.replay;
-        let base = replay.base();
-        let truth: Vec<f64> = replay.parameters.iter().map(|p| base[p.slots[0]]).collect();
+        let base = replay.free.base();
+        let truth: Vec<f64> = replay.free.parameters.iter().map(|p| base[p.slots[0]]).collect();
         let samples: usize = replay.plan.windows.iter().map(|w| w.end - w.start - 1).sum();
         let steps = samples * replay.plan.fractions.len();
         let car = CarModel::<Counted, MagicFormula<Counted>>::from_parameters(|i| Counted(base[i] as f32));
@@ -168,8 +175,28 @@ impl Case {
         })
     }
 
+    fn drive() -> Result<Self> {
+        let (circuit, pace, step) = DRIVEN;
+        let drive = parity::drive::problem(Car::bundled()?, &[circuit], &[pace], step)?;
+        let middle: Vec<f64> = drive
+            .problem
+            .variables
+            .iter()
+            .map(|v| 0.5 * (v.lower + v.upper))
+            .collect();
+        let (steps, operations) = parity::drive::work_of_a_lap(&drive, &middle);
+        Ok(Self {
+            name: "drive",
+            about: middle.iter().map(|x| (*x, SPREAD * x.abs())).collect(),
+            steps: Some(steps),
+            operations,
+            kind: Kind::Drive(Box::new(drive)),
+        })
+    }
+
     fn problem(&self) -> &Problem {
         match &self.kind {
+            Kind::Drive(drive) => &drive.problem,
             Kind::Replay(replay) => &replay.problem,
             Kind::Line(line) => &line.problem,
         }
@@ -191,7 +218,7 @@ impl Case {
 
 /// A backend, and how long its kernels took where it can tell.
 enum Backend<'a> {
-    Host(Box<dyn Evaluator + 'a>),
+    Any(Box<dyn Evaluator + 'a>),
     Replay(Box<GpuEvaluator<'a>>),
     Line(Box<GpuLineEvaluator<'a>>),
 }
@@ -199,7 +226,7 @@ enum Backend<'a> {
 impl Backend<'_> {
     fn evaluator(&mut self) -> &mut dyn Evaluator {
         match self {
-            Self::Host(evaluator) => evaluator.as_mut(),
+            Self::Any(evaluator) => evaluator.as_mut(),
             Self::Replay(evaluator) => evaluator.as_mut(),
             Self::Line(evaluator) => evaluator.as_mut(),
         }
@@ -220,16 +247,18 @@ fn backends<'a>(case: &'a Case, arguments: &Arguments) -> Result<Vec<Backend<'a>
     };
     let mut found: Vec<Backend<'a>> = Vec::new();
     if wanted(BackendChoice::Cpu) {
-        found.push(Backend::Host(match &case.kind {
+        found.push(Backend::Any(match &case.kind {
             Kind::Replay(replay) => Box::new(CpuEvaluator::new(replay)),
             Kind::Line(line) => Box::new(CpuLineEvaluator::new(line)),
+            Kind::Drive(drive) => Box::new(CpuDriveEvaluator::new(drive)),
         }));
     }
     if wanted(BackendChoice::Simd) {
         let set = InstructionSet::best();
-        found.push(Backend::Host(match &case.kind {
+        found.push(Backend::Any(match &case.kind {
             Kind::Replay(replay) => Box::new(SimdEvaluator::new(replay, set)),
             Kind::Line(line) => Box::new(SimdLineEvaluator::new(line, set)),
+            Kind::Drive(drive) => Box::new(SimdDriveEvaluator::new(drive, set)),
         }));
     }
     let asked = arguments.backend == Some(BackendChoice::Gpu) || arguments.adapter.is_some();
@@ -238,6 +267,7 @@ fn backends<'a>(case: &'a Case, arguments: &Arguments) -> Result<Vec<Backend<'a>
         found.push(match &case.kind {
             Kind::Replay(replay) => Backend::Replay(Box::new(GpuEvaluator::new(replay, context)?)),
             Kind::Line(line) => Backend::Line(Box::new(GpuLineEvaluator::new(line, context)?)),
+            Kind::Drive(drive) => Backend::Any(Box::new(GpuDriveEvaluator::new(drive, context)?)),
         });
     }
     Ok(found)
@@ -271,10 +301,10 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         );
     }
     for name in &arguments.problems {
-        let case = if name == "replay" {
-            Case::replay()?
-        } else {
-            Case::line()?
+        let case = match name.as_str() {
+            "replay" => Case::replay()?,
+            "drive" => Case::drive()?,
+            _ => Case::line()?,
         };
         for mut backend in backends(&case, arguments)? {
             let mut rate: Option<f64> = None;

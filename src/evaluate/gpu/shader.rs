@@ -18,6 +18,9 @@ const CAR: &str = include_str!("../../../shaders/car.wgsl");
 const REPLAY_COMMON: &str = include_str!("../../../shaders/replay_common.wgsl");
 const REPLAY: &str = include_str!("../../../shaders/replay.wgsl");
 const REPLAY_REDUCE: &str = include_str!("../../../shaders/replay_reduce.wgsl");
+const PATH: &str = include_str!("../../../shaders/path.wgsl");
+const DRIVER: &str = include_str!("../../../shaders/driver.wgsl");
+const DRIVE: &str = include_str!("../../../shaders/drive.wgsl");
 const RANDOM: &str = include_str!("../../../shaders/random.wgsl");
 const SWARM: &str = include_str!("../../../shaders/swarm.wgsl");
 const SWARM_GATHER: &str = include_str!("../../../shaders/swarm_gather.wgsl");
@@ -116,6 +119,50 @@ impl ReplayShape<'_> {
             self.workgroup,
             base_vectors(self.sources.len()),
         )
+    }
+}
+
+/// What a drive kernel is specialised to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct DriveShape<'a> {
+    /// The tyre model.
+    pub model: TyreModel,
+    /// For each figure of a ready car, which varying figure it is, if it varies: `ModelTable::sources`.
+    pub sources: &'a [Option<usize>],
+    /// How many figures vary; behind them stand the line, the plan and the share of the next plan.
+    pub varying: usize,
+    /// Stretches of the powertrain's torque.
+    pub stretches: usize,
+    /// The most rows that a driver looks ahead.
+    pub rows_ahead: usize,
+    /// The most cells of a plan that a driver looks ahead.
+    pub cells_ahead: usize,
+    /// Whether there are plans to blend.
+    pub blends: bool,
+    /// Lanes of a workgroup.
+    pub workgroup: u32,
+}
+
+impl DriveShape<'_> {
+    /// Source of the kernel; entry point `drive`.
+    pub fn source(&self) -> String {
+        let constants = format!(
+            "\n// Generated.\nconst WORKGROUP: u32 = {}u;\nconst BASE_VECTORS: u32 = {}u;\nconst VARYING: u32 = {}u;\n\
+             const STRETCHES: u32 = {}u;\nconst ROWS_AHEAD: f32 = {}.0;\nconst CELLS_AHEAD: f32 = {}.0;\n\
+             const BLENDS: bool = {};\n\n",
+            self.workgroup,
+            base_vectors(self.sources.len()),
+            self.varying,
+            self.stretches,
+            self.rows_ahead,
+            self.cells_ahead,
+            self.blends,
+        );
+        let [car, loaders] = [
+            car_fragments(self.model).concat(),
+            loaders(self.model, self.sources),
+        ];
+        [&car, &constants, PATH, DRIVER, DRIVE, &loaders].concat()
     }
 }
 

@@ -50,7 +50,7 @@ impl Evaluator for CpuEvaluator<'_> {
         let rows: Vec<_> = population
             .par_chunks_exact(self.replay.dimensions().max(1))
             .map(|candidate| {
-                if let Some(failure) = self.replay.preliminary_failure(candidate) {
+                if let Some(failure) = self.replay.free.preliminary_failure(candidate) {
                     return (self.replay.objective_row(None).0, Some(failure));
                 }
                 let flat = self.replay.flat(candidate);

@@ -2,11 +2,10 @@
 
 use super::kernel::{BLOCK, CHANNELS};
 use super::problem::ReplayProblem;
-use super::table::ModelTable;
 use crate::error::{Error, Result};
 use crate::evaluate::gpu::shader::{ReplayShape, base_vectors};
 use crate::evaluate::gpu::{Binding, DeviceKind, GpuContext, Kernel};
-use crate::evaluate::{BackendInfo, Evaluation, Evaluator, Problem};
+use crate::evaluate::{BackendInfo, Evaluation, Evaluator, ModelTable, Problem};
 use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -165,7 +164,7 @@ impl<'a> GpuEvaluator<'a> {
         let workgroup = WORKGROUP
             .min(limits.max_compute_invocations_per_workgroup)
             .min(limits.max_compute_workgroup_size_x);
-        let table = ModelTable::new(replay);
+        let table = ModelTable::new(&replay.free, &replay.problem.variables);
         let shape = ReplayShape {
             model: replay.tyre_model(),
             sources: &table.sources,
@@ -442,7 +441,7 @@ impl<'a> GpuEvaluator<'a> {
         for candidates in rows.chunks(most_candidates) {
             let stride = candidates.len().next_multiple_of(self.workgroup);
             let varying = self.table.varying.len();
-            let by_candidate = self.table.rows(self.replay, candidates);
+            let by_candidate = self.table.rows(&self.replay.free, candidates);
             // Figure by figure, so that neighbouring lanes read neighbouring memory.
             let mut figures = vec![0.0f32; stride * varying];
             for (candidate, row) in by_candidate.chunks_exact(varying.max(1)).enumerate() {
@@ -525,7 +524,7 @@ impl Evaluator for GpuEvaluator<'_> {
         // Only what can be driven takes a lane.
         let preliminary: Vec<_> = candidates
             .par_iter()
-            .map(|c| replay.preliminary_failure(c))
+            .map(|c| replay.free.preliminary_failure(c))
             .collect();
         let rows: Vec<&[f64]> = candidates
             .iter()

@@ -31,7 +31,7 @@ fn drive_chunk<T: Tyre<Dual<CHUNK>>>(
         _ => Dual::constant(candidate[i]),
     };
     let car = CarModel::<Dual<CHUNK>, T>::from_parameters(|slot| {
-        replay.sources()[slot].map_or(Dual::constant(replay.base()[slot]), variable)
+        replay.free.sources()[slot].map_or(Dual::constant(replay.free.base()[slot]), variable)
     });
     let mut errors = Vec::new();
     for window in &replay.plan.windows {
@@ -74,7 +74,7 @@ fn drive_dispatched(replay: &ReplayProblem, candidate: &[f64], first: usize) -> 
 impl ReplayProblem {
     /// The errors of a candidate with their exact derivatives; `None` if the candidate fails.
     pub fn residuals(&self, candidate: &[f64]) -> Option<Residuals> {
-        if self.preliminary_failure(candidate).is_some() {
+        if self.free.preliminary_failure(candidate).is_some() {
             return None;
         }
         let starts: Vec<usize> = (0..self.dimensions().max(1)).step_by(CHUNK).collect();

@@ -7,9 +7,8 @@ mod jacobian;
 pub mod kernel;
 mod problem;
 mod simd;
-mod table;
 
-pub use super::BackendChoice;
+pub use super::{BackendChoice, ModelTable};
 pub use backend::open_evaluator;
 pub use cpu::{CpuEvaluator, norm_name, trace};
 pub use gpu::{Batching, DeviceSample, DeviceWindow, DispatchStatistics, GpuEvaluator, Stretch};
@@ -19,4 +18,3 @@ pub use problem::{
     step_fractions,
 };
 pub use simd::SimdEvaluator;
-pub use table::ModelTable;

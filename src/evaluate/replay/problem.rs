@@ -2,9 +2,9 @@
 
 use super::kernel::CHANNELS;
 use crate::error::{Error, Result};
-use crate::evaluate::{FAILED_COST, Failure, Objective, Problem, Variable};
+use crate::evaluate::{FAILED_COST, Failure, FreeCar, Objective, Problem};
 use crate::vehicle::car::CarParameter;
-use crate::vehicle::{Car, TyreCoefficients, TyreModel};
+use crate::vehicle::{Car, TyreModel};
 use serde::{Deserialize, Serialize};
 
 /// Names of the compared channels, in the order of all arrays of four.
@@ -93,18 +93,14 @@ pub struct ChannelWeights {
 pub struct ReplayProblem {
     /// Variables and objectives.
     pub problem: Problem,
-    /// The car that fixed parameters come from.
-    pub car: Car,
-    /// The free parameters, one per variable.
-    pub parameters: Vec<CarParameter>,
+    /// The car and which of its parameters are free, one per variable.
+    pub free: FreeCar,
     /// The log, cut and ready, in double precision.
     pub plan: Plan<f64>,
     /// Sample interval, s.
     pub interval_s: f64,
     /// How channel costs make objectives.
     pub objectives: Vec<ChannelWeights>,
-    base: Vec<f64>,
-    sources: Vec<Option<usize>>,
 }
 
 impl ReplayProblem {
@@ -127,37 +123,7 @@ impl ReplayProblem {
     ) -> Result<Self> {
         let wrong =
             |place: &str, found: String, expected: &str| Error::input("the study", place, found, expected);
-        let base = car.to_flat();
-        let mut sources = vec![None; base.len()];
-        let mut variables = Vec::new();
-        let mut parameters = Vec::new();
-        for (index, (parameter, lower, upper)) in free.into_iter().enumerate() {
-            let name = parameter.name.clone();
-            if !(lower.is_finite() && upper.is_finite() && lower <= upper) {
-                return Err(wrong(
-                    &format!("bounds of {name}"),
-                    format!("{lower} to {upper}"),
-                    "finite bounds in order",
-                ));
-            }
-            for &slot in &parameter.slots {
-                if sources[slot].replace(index).is_some() {
-                    return Err(wrong(
-                        &format!("free parameter {name}"),
-                        "a parameter freed twice".into(),
-                        "each once",
-                    ));
-                }
-            }
-            variables.push(Variable {
-                name,
-                unit: parameter.info.unit.to_owned(),
-                lower,
-                upper,
-                whole: false,
-            });
-            parameters.push(parameter);
-        }
+        let (free, variables) = FreeCar::new(car, free)?;
         for window in &windows {
             if !(window.start + 2 <= window.end
                 && window.end <= samples.len()
@@ -186,8 +152,7 @@ impl ReplayProblem {
                 variables,
                 objectives: objectives.iter().map(|o| o.objective.clone()).collect(),
             },
-            car,
-            parameters,
+            free,
             plan: Plan {
                 samples,
                 windows,
@@ -197,63 +162,22 @@ impl ReplayProblem {
             },
             interval_s,
             objectives,
-            base,
-            sources,
         })
     }
 
     /// Number of free parameters.
     pub fn dimensions(&self) -> usize {
-        self.parameters.len()
+        self.free.parameters.len()
     }
 
     /// The tyre model that the kernels must run.
     pub fn tyre_model(&self) -> TyreModel {
-        self.car.tyre_model()
-    }
-
-    /// The fixed car in flat form.
-    pub fn base(&self) -> &[f64] {
-        &self.base
-    }
-
-    /// For each place of the flat form, the variable that sets it, if any.
-    pub fn sources(&self) -> &[Option<usize>] {
-        &self.sources
+        self.free.tyre_model()
     }
 
     /// A candidate's car in flat form.
     pub fn flat(&self, candidate: &[f64]) -> Vec<f64> {
-        self.base
-            .iter()
-            .zip(&self.sources)
-            .map(|(base, source)| source.map_or(*base, |variable| candidate[variable]))
-            .collect()
-    }
-
-    /// A candidate's car.
-    pub fn candidate_car(&self, candidate: &[f64]) -> Car {
-        self.car.with_flat(&self.flat(candidate))
-    }
-
-    /// Why a candidate need not be driven, if so: a variable that is no number, or a tyre that is none.
-    pub fn preliminary_failure(&self, candidate: &[f64]) -> Option<Failure> {
-        if candidate.iter().any(|x| !x.is_finite()) {
-            return Some(Failure::NotFinite);
-        }
-        if self.tyre_model() == TyreModel::Linear {
-            return None;
-        }
-        let flat = self.flat(candidate);
-        let tyre_count = TyreCoefficients::<f64>::PARAMETERS.len();
-        let front = flat.len() - 2 * tyre_count;
-        let at = |offset: usize| TyreCoefficients::from_flat(|i| flat[offset + i]).well_formed();
-        let rear = front + tyre_count;
-        let one_tyre = flat[front..rear] == flat[rear..];
-        at(front)
-            .and_then(|()| if one_tyre { Ok(()) } else { at(rear) })
-            .err()
-            .map(Failure::IllFormedTyre)
+        self.free.flat(candidate)
     }
 
     /// The cost of each channel from the errors of all windows (summed, or their maxima).

@@ -2,10 +2,9 @@
 
 use super::kernel::{CHANNELS, score_window};
 use super::problem::{Plan, ReplayProblem, Window};
-use super::table::ModelTable;
 use crate::error::Result;
 use crate::evaluate::simd::{InstructionSet, LaneWork, dispatch};
-use crate::evaluate::{BackendInfo, Evaluation, Evaluator, Problem};
+use crate::evaluate::{BackendInfo, Evaluation, Evaluator, ModelTable, Problem};
 use crate::scalar::lanes::Lanes;
 use crate::vehicle::tyre::Tyre;
 use crate::vehicle::{CarModel, LinearTyre, MagicFormula, TyreModel};
@@ -71,7 +70,7 @@ impl<'a> SimdEvaluator<'a> {
         Self {
             replay,
             plan: replay.plan.to_f32(),
-            table: ModelTable::new(replay),
+            table: ModelTable::new(&replay.free, &replay.problem.variables),
             set,
         }
     }
@@ -94,14 +93,14 @@ impl Evaluator for SimdEvaluator<'_> {
         let candidates: Vec<&[f64]> = population.chunks_exact(self.replay.dimensions().max(1)).collect();
         let preliminary: Vec<_> = candidates
             .par_iter()
-            .map(|c| self.replay.preliminary_failure(c))
+            .map(|c| self.replay.free.preliminary_failure(c))
             .collect();
         // Only what can be driven takes a lane.
         let driven: Vec<usize> = (0..candidates.len())
             .filter(|&i| preliminary[i].is_none())
             .collect();
         let rows: Vec<&[f64]> = driven.iter().map(|&i| candidates[i]).collect();
-        let figures = self.table.rows(self.replay, &rows);
+        let figures = self.table.rows(&self.replay.free, &rows);
 
         let windows = &self.plan.windows;
         let (lanes, width) = (self.set.lanes(), self.table.varying.len());

@@ -25,7 +25,7 @@ pub(super) fn write(
     let source = Path::new(&setup.log.source)
         .file_name()
         .map_or_else(|| setup.log.source.clone(), |n| n.to_string_lossy().into_owned());
-    let car = &setup.replay.car.name;
+    let car = &setup.replay.free.car.name;
     let mut page = HtmlReport::new("identify", &format!("{car} identified from {source}"));
     head(&mut page, car, &source, outcome, summary);
     page.section("Lap", "What was measured, and what the fitted car does when it is driven by the same steering and wheel speeds.");

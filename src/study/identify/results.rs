@@ -111,7 +111,7 @@ fn by_channel(values: [f64; CHANNELS]) -> BTreeMap<&'static str, f64> {
 
 /// The candidate to hand out: fitted values, but the starting car's where the log cannot tell.
 fn told_candidate(setup: &Setup, outcome: &Outcome) -> Vec<f64> {
-    let base = setup.replay.base();
+    let base = setup.replay.free.base();
     outcome
         .candidate
         .iter()
@@ -120,7 +120,7 @@ fn told_candidate(setup: &Setup, outcome: &Outcome) -> Vec<f64> {
             if outcome.identifiability.identifiable[k] {
                 *x
             } else {
-                base[setup.replay.parameters[k].slots[0]]
+                base[setup.replay.free.parameters[k].slots[0]]
             }
         })
         .collect()
@@ -223,9 +223,10 @@ pub fn write_results(
         log: Some(&setup.log.source),
         interrupted: outcome.interrupted,
         device_faults: &outcome.device_faults,
-        ..Manifest::new("identify", settings.seed, &outcome.backend, &replay.car.name)
+        ..Manifest::new("identify", settings.seed, &outcome.backend, &replay.free.car.name)
     };
     replay
+        .free
         .candidate_car(&told_candidate(setup, outcome))
         .write(folder, "car")?;
     write_history(folder, outcome)?;

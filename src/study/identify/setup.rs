@@ -123,7 +123,7 @@ pub fn set_up(settings: &IdentifySettings) -> Result<Setup> {
     };
     let truth = truth_car.map(|truth| {
         let flat = truth.to_flat();
-        replay.parameters.iter().map(|p| flat[p.slots[0]]).collect()
+        replay.free.parameters.iter().map(|p| flat[p.slots[0]]).collect()
     });
     Ok(Setup {
         truth,

@@ -50,7 +50,7 @@ impl Checkpoint for SearchState {
 pub(super) fn inputs_of(setup: &Setup) -> String {
     let replay = &setup.replay;
     let mut inputs = Inputs::new("identify");
-    inputs.add(&(&replay.plan, &replay.problem, &replay.car, &setup.truth));
+    inputs.add(&(&replay.plan, &replay.problem, &replay.free.car, &setup.truth));
     inputs.add(&setup.holdout.as_ref().map(|h| &h.plan.windows));
     inputs.key()
 }

@@ -108,7 +108,7 @@ pub fn run(
     let setup = identify::set_up(&settings.identify)?;
     let mut inputs = Inputs::of_program("identify");
     inputs.add(&settings.identify);
-    inputs.add(&(&setup.log, &setup.replay.car, &setup.truth));
+    inputs.add(&(&setup.log, &setup.replay.free.car, &setup.truth));
     let stage = stages.run("1_identify", &inputs, |to, keeper| {
         let outcome = go_on(keeper, |state, keeper| {
             identify::search_from(&settings.identify, &setup, state, keeper, |report| {

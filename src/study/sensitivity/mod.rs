@@ -251,7 +251,7 @@ pub(crate) fn start_as_base_drives(replay: &mut ReplayProblem) {
             before = Some(replay.plan.windows[k]);
         }
     }
-    let base = replay.base().to_vec();
+    let base = replay.free.base().to_vec();
     match replay.tyre_model() {
         TyreModel::MagicFormula => {
             let car = CarModel::<f64, MagicFormula<f64>>::from_parameters(|i| base[i]);
@@ -303,7 +303,7 @@ pub fn measure(
 pub(crate) fn inputs_of(study: &str, setup: &Setup) -> String {
     let replay = &setup.replay;
     let mut inputs = Inputs::new(study);
-    inputs.add(&(&replay.plan, &replay.problem, &replay.car));
+    inputs.add(&(&replay.plan, &replay.problem, &replay.free.car));
     inputs.key()
 }
 
@@ -321,9 +321,10 @@ pub fn measure_recorded(
     let began = Instant::now();
     let dimensions = replay.dimensions();
     let base: Vec<f64> = replay
+        .free
         .parameters
         .iter()
-        .map(|p| replay.base()[p.slots[0]])
+        .map(|p| replay.free.base()[p.slots[0]])
         .collect();
     let variables = &replay.problem.variables;
     let ranges: Vec<FreeParameter> = variables

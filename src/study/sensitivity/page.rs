@@ -16,7 +16,7 @@ pub(super) fn write(
     outcome: &Outcome,
     summary: &Summary,
 ) -> Result<()> {
-    let car = &setup.replay.car.name;
+    let car = &setup.replay.free.car.name;
     let mut page = HtmlReport::new("sensitivity", &format!("What matters of the {car}"));
     head(&mut page, car, summary);
     if !outcome.indices.is_empty() {

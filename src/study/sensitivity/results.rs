@@ -229,7 +229,7 @@ pub fn write_results(
             "sensitivity",
             settings.replay.seed,
             &outcome.backend,
-            &setup.replay.car.name,
+            &setup.replay.free.car.name,
         )
     };
     write_whole(folder.join("study.toml"), study_toml(settings).as_bytes())?;

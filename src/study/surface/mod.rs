@@ -207,10 +207,10 @@ pub fn measure_recorded(
                 .collect()
         })
         .collect();
-    let base = replay.base();
+    let base = replay.free.base();
     Ok(Outcome {
         axes,
-        base: [0, 1].map(|k| base[replay.parameters[k].slots[0]]),
+        base: [0, 1].map(|k| base[replay.free.parameters[k].slots[0]]),
         costs,
         backend: recorder.backend().cloned().unwrap_or_else(|| evaluator.backend()),
         device_faults: recorder.device_faults().to_vec(),

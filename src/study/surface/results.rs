@@ -133,7 +133,7 @@ pub fn write_results(
             "surface",
             settings.replay.seed,
             &outcome.backend,
-            &setup.replay.car.name,
+            &setup.replay.free.car.name,
         )
     };
     let problem = &setup.replay.problem;
@@ -213,7 +213,7 @@ pub fn write_results(
         page.surface(&figure, "")?;
     }
     page.provenance("log", &setup.log.source);
-    page.provenance("car", &setup.replay.car.name);
+    page.provenance("car", &setup.replay.free.car.name);
     page.provenance("backend", summary.backend);
     page.provenance("adapter", &summary.adapter);
     page.provenance("driver", &outcome.backend.driver);
@@ -228,7 +228,7 @@ pub fn write_results(
 /// The interactive report, up to its surfaces.
 fn begun_page(setup: &Setup, summary: &Summary) -> HtmlReport {
     let [x, y] = &summary.parameters;
-    let car = &setup.replay.car.name;
+    let car = &setup.replay.free.car.name;
     let mut page = HtmlReport::new("surface", &format!("{x} and {y} of the {car}"));
     page.sentence(format!(
         "{} cars over a grid of {x} and {y} were driven through the log in {:.1} s; the {car} itself has {} and {}.",

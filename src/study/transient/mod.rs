@@ -6,8 +6,14 @@
 //! fed back, and both laps are set side by side.
 
 mod page;
+mod population;
+mod population_results;
 mod results;
 
+pub use population::{
+    Driven, DrivenBest, MOST_SETUPS, NamedLine, PopulationOutcome, PopulationSettings, drive_population,
+};
+pub use population_results::{PopulationSummary, summarise_population, table_of, write_population};
 pub use results::{Summary, summarise, write_results};
 
 use crate::config::read_text;
@@ -169,6 +175,22 @@ pub fn circuit_of_line(
     Ok(circuit)
 }
 
+/// What a point mass with a share of the envelope's grip does on a line of points (m): its limits, its lap, and its speeds
+/// as a plan.
+fn planned(limits: &PointMass, points_m: &[DVec2], share: f64) -> Result<(Envelope, FineLine, SpeedPlan)> {
+    let envelope = with_grip_share(&limits.envelope, share)?;
+    let point_mass = PointMass {
+        envelope: envelope.clone(),
+        ..limits.clone()
+    };
+    let fine = FineLine::new(points_m, true, 1.0, Some(&point_mass), 0.0)?;
+    let Some(lap) = &fine.lap else {
+        return Err(Error::Study("the point mass has no lap on this line".to_owned()));
+    };
+    let plan = SpeedPlan::of_speeds(&lap.station_m, &lap.v_mps, fine.length_m);
+    Ok((envelope, fine, plan))
+}
+
 /// Drives `car` along a line of points (m) between the edges (m, right and left), within the limits of `limits`.
 ///
 /// # Errors
@@ -187,16 +209,7 @@ pub fn drive_line(
         None => DriverSettings::racing(car)?,
     };
     let attempt = |share: f64| -> Result<(Envelope, FineLine, Drive)> {
-        let envelope = with_grip_share(&limits.envelope, share)?;
-        let point_mass = PointMass {
-            envelope: envelope.clone(),
-            ..limits.clone()
-        };
-        let fine = FineLine::new(points_m, true, 1.0, Some(&point_mass), 0.0)?;
-        let Some(lap) = &fine.lap else {
-            return Err(Error::Study("the point mass has no lap on this line".to_owned()));
-        };
-        let plan = SpeedPlan::of_speeds(&lap.station_m, &lap.v_mps, fine.length_m);
+        let (envelope, fine, plan) = planned(limits, points_m, share)?;
         let drive = drive_planned(car, &circuit, plan, &driver, INTERVAL_S)?;
         Ok((envelope, fine, drive))
     };

@@ -4,10 +4,11 @@
 use crate::track::Circuit;
 use crate::vehicle::{Car, Tyres};
 
-/// Speed and acceleration to aim for along the centreline.
+/// Speeds to aim for along the centreline, at even steps from the start line, linear between them and periodic.
 #[derive(Clone, Debug)]
 pub struct SpeedPlan {
-    spacing_m: f64,
+    /// Distance between grid points, m.
+    pub spacing_m: f64,
     /// Speed at each grid point, m/s.
     pub speed_mps: Vec<f64>,
 }
@@ -120,23 +121,5 @@ impl SpeedPlan {
             spacing_m,
             speed_mps: speeds.collect(),
         }
-    }
-
-    /// The planned speed (m/s) at a station (m), linear between grid points, periodic.
-    pub fn speed_at(&self, station_m: f64) -> f64 {
-        let count = self.speed_mps.len();
-        let place = (station_m / self.spacing_m).rem_euclid(count as f64);
-        let i = place as usize % count;
-        let share = place - place.floor();
-        self.speed_mps[i] + share * (self.speed_mps[(i + 1) % count] - self.speed_mps[i])
-    }
-
-    /// The planned acceleration (m/s^2) at a station (m).
-    pub fn acceleration_at(&self, station_m: f64) -> f64 {
-        let (before, after) = (
-            self.speed_at(station_m - SPACING),
-            self.speed_at(station_m + SPACING),
-        );
-        (after * after - before * before) / (4.0 * SPACING)
     }
 }

@@ -1,7 +1,7 @@
 //! Cars in the form that the `f32` kernels read: a shared table of ready figures, and for each candidate only
 //! those that the free parameters move.
 
-use super::problem::ReplayProblem;
+use super::{FreeCar, Variable};
 use crate::random::Random;
 use crate::vehicle::{CarModel, LinearTyre, MagicFormula, TyreModel};
 use rayon::prelude::*;
@@ -24,14 +24,14 @@ const PROBE: u32 = 0x9b0be;
 const PROBES: u32 = 8;
 
 impl ModelTable {
-    /// Finds the figures that the free parameters of `replay` move.
-    pub fn new(replay: &ReplayProblem) -> Self {
+    /// Finds the figures that the free parameters of `car` move between the bounds of `variables`, whose first they are.
+    pub fn new(car: &FreeCar, variables: &[Variable]) -> Self {
         let at_share = |share: &dyn Fn(u32) -> f64| -> Vec<f64> {
-            let variables = replay.problem.variables.iter().zip(0..);
+            let variables = variables.iter().zip(0..);
             let candidate: Vec<f64> = variables
                 .map(|(v, i)| v.lower + share(i) * (v.upper - v.lower))
                 .collect();
-            ready(replay, &candidate)
+            ready(car, &candidate)
         };
         let base = at_share(&|_| 0.5);
         let random = Random::new(0);
@@ -55,13 +55,13 @@ impl ModelTable {
     }
 
     /// The varying figures of each candidate, row-major, candidates by [`ModelTable::varying`].
-    pub fn rows(&self, replay: &ReplayProblem, candidates: &[&[f64]]) -> Vec<f32> {
+    pub fn rows(&self, car: &FreeCar, candidates: &[&[f64]]) -> Vec<f32> {
         let mut rows = vec![0.0; candidates.len() * self.varying.len()];
         if !self.varying.is_empty() {
             rows.par_chunks_exact_mut(self.varying.len())
                 .zip(candidates)
                 .for_each(|(row, candidate)| {
-                    let table = ready(replay, candidate);
+                    let table = ready(car, candidate);
                     for (out, &place) in row.iter_mut().zip(&self.varying) {
                         *out = table[place] as f32;
                     }
@@ -72,9 +72,9 @@ impl ModelTable {
 }
 
 /// A candidate's ready table in `f64`.
-fn ready(replay: &ReplayProblem, candidate: &[f64]) -> Vec<f64> {
-    let flat = replay.flat(candidate);
-    match replay.tyre_model() {
+fn ready(car: &FreeCar, candidate: &[f64]) -> Vec<f64> {
+    let flat = car.flat(candidate);
+    match car.tyre_model() {
         TyreModel::MagicFormula => {
             CarModel::<f64, MagicFormula<f64>>::from_parameters(|i| flat[i]).to_table()
         }

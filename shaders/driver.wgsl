@@ -1,0 +1,129 @@
+// Twin of `src/drive/driver.rs`: steering by preview and feedback, drive and brake by limited wheel slip.
+// The constant STRETCHES is generated.
+
+// A driver's figures; twin of `DriverTable`.
+struct Driver {
+    step: f32,
+    preview: f32,
+    heading_gain: f32,
+    speed_gain: f32,
+    slip_limit: f32,
+    slip_stiffness: f32,
+    max_steer: f32,
+    knows: f32,
+    rear_slip_per_ay: f32,
+    friction: f32,
+    run_off: f32,
+    understeer: f32,
+    driven_share: f32,
+    steer_lag: f32,
+    pedal_lag: f32,
+    reach: f32,
+}
+
+@group(0) @binding(7) var<uniform> driver: Driver;
+// From a speed, the torque there, its rise.
+@group(0) @binding(8) var<uniform> torque: array<vec4<f32>, STRETCHES>;
+
+fn torque_at(speed: f32) -> f32 {
+    var found = 0.0;
+    for (var i = 0u; i < STRETCHES; i++) {
+        let stretch = torque[i];
+        let past = speed - stretch.x;
+        let here = stretch.y + past * stretch.z;
+        found = select(here, found, past < 0.0);
+    }
+    return found;
+}
+
+struct Controls {
+    steer: f32,
+    front_slip: f32,
+    rear_slip: f32,
+}
+
+struct Pace {
+    plan: f32,
+    share: f32,
+}
+
+fn speed_in_cell(cell: f32, share: f32) -> f32 {
+    let at = place_of_number(cell);
+    let speed = plans[at];
+    return speed + share * (plans[at + 1u] - speed);
+}
+
+fn planned_speed(course: Course, pace: Pace, view: View, ahead: f32) -> f32 {
+    let distance = view.pose.along + ahead;
+    let place = view.row.cell_share + distance * course.cells_per_metre + 2.0;
+    let cells = whole(place, CELLS_AHEAD);
+    let share = place - cells;
+    let number = course.plan_at + pace.plan * course.plan_stride + view.row.cell + cells;
+    let speed = speed_in_cell(number, share);
+    if !BLENDS {
+        return speed;
+    }
+    let faster = speed_in_cell(number + course.plan_stride, share);
+    return speed + pace.share * (faster - speed);
+}
+
+fn act(course: Course, pace: Pace, c: Chassis, state: CarState, view: View, controls: Controls) -> Controls {
+    let body = state.body;
+    let v = max(body.vx, 3.0);
+    let wheelbase = c.cg_to_front + c.cg_to_rear;
+    let curvature = curvature_ahead(course, view.pose, driver.preview * v);
+    let understeer = driver.understeer * curvature * v * v / c.gravity * wheelbase;
+    let bend = view.bend;
+    let sideslip = driver.knows * (c.cg_to_rear * bend - driver.rear_slip_per_ay * bend * v * v);
+    let heading = view.heading_error + sideslip + view.offset * 0.9 / (v * 0.45 + 3.0);
+    let yaw_lack = curvature_ahead(course, view.pose, 0.08 * v) * v - body.yaw_rate;
+    let asked = wheelbase * curvature + understeer - driver.heading_gain * heading + 0.045 * yaw_lack;
+    let steer = min(max(asked, -driver.max_steer), driver.max_steer);
+    let rate = min(max((steer - controls.steer) / driver.steer_lag, -0.9), 0.9);
+
+    let behind = planned_speed(course, pace, view, 0.1 * v) - body.vx;
+    let ahead = 0.15 * v;
+    let before = planned_speed(course, pace, view, ahead - driver.reach);
+    let after = planned_speed(course, pace, view, ahead + driver.reach);
+    let planned = (after * after - before * before) / 8.0;
+    let wanted = planned + driver.speed_gain * behind;
+    let drag = 0.5 * c.air_density * c.drag_area * v * v;
+    let force = c.mass * wanted + drag;
+    let weight = c.mass * c.gravity + 0.5 * c.air_density * c.lift_area * v * v;
+    let used = min(driver.knows * abs(body.yaw_rate * v / (driver.friction * weight / c.mass)), 1.0);
+    let left = sqrt(max(1.0 - used * used, 0.01));
+    let limit = driver.slip_limit * left;
+    let most = torque_at(v / c.radius_rear) / c.radius_rear;
+    let driven = min(min(force, most) / (driver.driven_share * weight * driver.slip_stiffness), limit);
+    let braked = max(force / (weight * driver.slip_stiffness), -limit);
+    let brakes = force < 0.0;
+    let front = select(0.0, braked, brakes);
+    let rear = select(driven, 0.75 * braked, brakes);
+    return Controls(
+        controls.steer + rate * driver.step,
+        controls.front_slip + (front - controls.front_slip) * driver.step / driver.pedal_lag,
+        controls.rear_slip + (rear - controls.rear_slip) * driver.step / driver.pedal_lag,
+    );
+}
+
+fn wheel_speed(c: Chassis, body: BodyState, x: f32, y: f32, cosine: f32, sine: f32, slip: f32, radius: f32) -> f32 {
+    let hub = cosine * (body.vx - body.yaw_rate * y) + sine * (body.vy + body.yaw_rate * x);
+    return (hub + slip * max(abs(hub), c.slip_speed_floor)) / radius;
+}
+
+fn car_input(c: Chassis, state: CarState, controls: Controls) -> CarInput {
+    let body = state.body;
+    let cosine = own_cos(Wheels(controls.steer)).x;
+    let sine = own_sin(Wheels(controls.steer)).x;
+    let a = c.cg_to_front;
+    let b = -c.cg_to_rear;
+    return CarInput(
+        Wheels(
+            wheel_speed(c, body, a, c.half_track_front, cosine, sine, controls.front_slip, c.radius_front),
+            wheel_speed(c, body, a, -c.half_track_front, cosine, sine, controls.front_slip, c.radius_front),
+            wheel_speed(c, body, b, c.half_track_rear, 1.0, 0.0, controls.rear_slip, c.radius_rear),
+            wheel_speed(c, body, b, -c.half_track_rear, 1.0, 0.0, controls.rear_slip, c.radius_rear),
+        ),
+        controls.steer,
+    );
+}

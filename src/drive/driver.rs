@@ -1,0 +1,394 @@
+//! The driver: steering by preview and feedback, drive and brake by limited wheel slip. Twin of `shaders/driver.wgsl`.
+
+use super::path::{View, curvature_ahead};
+use super::road::{Course, FRONT_CELLS, PLAN_AHEAD_S, PLAN_REACH_M, Road};
+use super::settings::DriverSettings;
+use crate::error::{Error, Result};
+use crate::scalar::{Lookup, Real};
+use crate::vehicle::powertrain::Powertrain;
+use crate::vehicle::{Car, CarInput, CarState, Chassis};
+use std::f64::consts::TAU;
+
+/// Time constant with which wheel slip follows the pedals, s.
+const PEDAL_LAG: f64 = 0.06;
+/// Time constant of the driver's arms, s.
+const STEER_LAG: f64 = 0.04;
+/// Greatest rate of the driver's arms, rad/s.
+const STEER_RATE: f64 = 0.9;
+/// Steering added for understeer, rad per g and metre of wheelbase.
+const UNDERSTEER: f64 = 0.0025;
+/// Share of the load that the driven wheels are reckoned to carry.
+const DRIVEN_SHARE: f64 = 0.55;
+/// Speed below which the driver reckons as at this one, m/s.
+const LEAST_SPEED: f64 = 3.0;
+
+macro_rules! driver_table {
+    ($($(#[$doc:meta])* $field:ident),* $(,)?) => {
+        /// A driver's figures. Twin of `Driver` in `shaders/driver.wgsl`.
+        #[derive(Clone, Copy, Debug, PartialEq)]
+        pub struct DriverTable<S> {
+            $($(#[$doc])* pub $field: S,)*
+        }
+
+        impl<S> DriverTable<S> {
+            /// The fields' names, in the order of [`DriverTable::to_row`].
+            pub const FIELDS: &'static [&'static str] = &[$(stringify!($field)),*];
+
+            /// The figures in the order of the fields.
+            pub fn to_row(self) -> Vec<S> {
+                vec![$(self.$field),*]
+            }
+        }
+
+        impl DriverTable<f64> {
+            /// The figures in the precision that the scalar `R` stores tables in.
+            pub fn stored<R: Real>(&self) -> DriverTable<R::Storage> {
+                DriverTable { $($field: R::store(self.$field)),* }
+            }
+        }
+    };
+}
+
+driver_table! {
+    /// Integration step of the closed loop, s.
+    step,
+    /// How far ahead the driver looks, s.
+    preview,
+    /// How much the driver steers against an angle to the path, rad per rad.
+    heading_gain,
+    /// Acceleration for every m/s that the plan is ahead, 1/s.
+    speed_gain,
+    /// Greatest slip ratio, driven or braked.
+    slip_limit,
+    /// Slip stiffness per load that the feet reckon with.
+    slip_stiffness,
+    /// Greatest road-wheel angle, rad.
+    max_steer,
+    /// One for a driver who knows the car, nought for one who does not.
+    knows,
+    /// Slip angle of the rear axle for every m/s^2 of lateral acceleration, rad s^2/m.
+    rear_slip_per_ay,
+    /// Lateral acceleration that the tyres give for every m/s^2 of load over mass.
+    friction,
+    /// How far beyond an edge the car is lost, m.
+    run_off,
+    /// Steering added for understeer, rad per g of lateral acceleration and metre of wheelbase. It and those below are constants
+    /// that compilers for devices would regroup if they knew.
+    understeer,
+    /// Share of the load that the driven wheels are reckoned to carry.
+    driven_share,
+    /// Time constant of the arms, s.
+    steer_lag,
+    /// Time constant of the feet, s.
+    pedal_lag,
+    /// Over how far on either side the plan's acceleration is taken, m.
+    reach,
+}
+
+impl DriverTable<f64> {
+    /// The figures of `settings` in `car`, driven in steps of `step_s`; a car is lost `run_off_m` beyond an edge.
+    pub fn new(settings: &DriverSettings, car: &Car, step_s: f64, run_off_m: f64) -> Self {
+        let knowledge = settings.knowledge;
+        Self {
+            step: step_s,
+            preview: settings.preview_s,
+            heading_gain: settings.heading_gain,
+            speed_gain: settings.speed_gain_1ps,
+            slip_limit: settings.slip_limit,
+            slip_stiffness: settings.slip_stiffness,
+            max_steer: car.max_steer_rad,
+            knows: knowledge.map_or(0.0, |_| 1.0),
+            rear_slip_per_ay: knowledge.map_or(0.0, |k| k.rear_slip_per_ay),
+            friction: knowledge.map_or(1.0, |k| k.friction),
+            run_off: run_off_m,
+            understeer: UNDERSTEER,
+            driven_share: DRIVEN_SHARE,
+            steer_lag: STEER_LAG,
+            pedal_lag: PEDAL_LAG,
+            reach: PLAN_REACH_M,
+        }
+    }
+}
+
+/// The torque that a powertrain gives the driven wheels over their speed, in the gear that gives most: in stretches, each
+/// from a speed (rad/s) with the torque there (N m) and its rise (N m s/rad).
+#[derive(Clone, Debug, PartialEq)]
+pub struct WheelTorque<S> {
+    /// The stretches, by rising speed; the first begins at standstill.
+    pub stretches: Vec<[S; 3]>,
+}
+
+/// Torque of a car without a powertrain, which is held back by its tyres alone, N m.
+const BOUNDLESS: f64 = 1e9;
+/// Two torques that differ by less than this share are the same.
+const SAME_TORQUE: f64 = 1e-12;
+/// The most stretches of a torque curve that a kernel takes.
+const MOST_STRETCHES: usize = 1024;
+
+impl WheelTorque<f64> {
+    /// The torque of a car's powertrain.
+    ///
+    /// # Errors
+    /// [`Error::Input`] if it has more points than a kernel takes.
+    pub fn of_car(car: &Car) -> Result<Self> {
+        let Some(powertrain) = &car.powertrain else {
+            return Ok(Self {
+                stretches: vec![[0.0, BOUNDLESS, 0.0]],
+            });
+        };
+        let torque = Self::of_powertrain(powertrain);
+        if torque.stretches.len() > MOST_STRETCHES {
+            return Err(Error::input(
+                &car.name,
+                "powertrain",
+                format!("{} points of all gears together", torque.stretches.len()),
+                format!("at most {MOST_STRETCHES}"),
+            ));
+        }
+        Ok(torque)
+    }
+
+    fn of_powertrain(powertrain: &Powertrain) -> Self {
+        let speeds = &powertrain.engine_speed_rpm;
+        let torques = &powertrain.torque_nm;
+        // Every gear's lines: from where, the torque there, its rise.
+        let mut lines: Vec<Vec<[f64; 3]>> = Vec::new();
+        let mut ends = vec![0.0];
+        for gear in &powertrain.gear_ratios {
+            let ratio = gear * powertrain.final_drive;
+            let rpm = ratio * 60.0 / TAU;
+            let share = ratio * powertrain.efficiency;
+            let mut of_gear = vec![[0.0, torques[0] * share, 0.0]];
+            for i in 1..speeds.len() {
+                let rise = (torques[i] - torques[i - 1]) / (speeds[i] - speeds[i - 1]);
+                of_gear.push([speeds[i - 1] / rpm, torques[i - 1] * share, rise * rpm * share]);
+            }
+            of_gear.push([speeds[speeds.len() - 1] / rpm, 0.0, 0.0]);
+            ends.extend(of_gear.iter().map(|line| line[0]));
+            lines.push(of_gear);
+        }
+        let line_at = |gear: &[[f64; 3]], speed: f64| {
+            let after = gear.partition_point(|line| line[0] <= speed);
+            gear[after.max(1) - 1]
+        };
+        let value = |line: [f64; 3], speed: f64| line[1] + (speed - line[0]) * line[2];
+        ends.sort_unstable_by(f64::total_cmp);
+        ends.dedup();
+        // Between two ends every gear is one line; where two of them cross, another one may take over.
+        let mut crossings = Vec::new();
+        for pair in ends.windows(2) {
+            let middle = 0.5 * (pair[0] + pair[1]);
+            let here: Vec<[f64; 3]> = lines.iter().map(|gear| line_at(gear, middle)).collect();
+            for (i, a) in here.iter().enumerate() {
+                for b in &here[..i] {
+                    let at = middle - (value(*a, middle) - value(*b, middle)) / (a[2] - b[2]);
+                    if at > pair[0] && at < pair[1] {
+                        crossings.push(at);
+                    }
+                }
+            }
+        }
+        ends.extend(crossings);
+        ends.sort_unstable_by(f64::total_cmp);
+        ends.dedup();
+        let mut stretches: Vec<[f64; 3]> = Vec::new();
+        for (i, from) in ends.iter().enumerate() {
+            let middle = ends.get(i + 1).map_or(from + 1.0, |to| 0.5 * (from + to));
+            let best = lines
+                .iter()
+                .map(|gear| line_at(gear, middle))
+                .reduce(|best, line| {
+                    if value(line, middle) > value(best, middle) {
+                        line
+                    } else {
+                        best
+                    }
+                })
+                .unwrap_or([0.0; 3]);
+            // Points on one line are one stretch.
+            let to = ends.get(i + 1).copied().unwrap_or(from + 1.0);
+            let goes_on = stretches.last().is_some_and(|before| {
+                [*from, to].iter().all(|at| {
+                    let (here, there) = (value(best, *at), value(*before, *at));
+                    (here - there).abs() <= SAME_TORQUE * here.abs()
+                })
+            });
+            if !goes_on {
+                stretches.push([*from, value(best, *from), best[2]]);
+            }
+        }
+        Self { stretches }
+    }
+
+    /// The figures in the precision that the scalar `R` stores tables in.
+    pub fn stored<R: Real>(&self) -> WheelTorque<R::Storage> {
+        WheelTorque {
+            stretches: self.stretches.iter().map(|s| s.map(R::store)).collect(),
+        }
+    }
+}
+
+/// The torque (N m) at a speed of the driven wheels (rad/s).
+#[inline(always)]
+pub fn torque_at<R: Real>(torque: &WheelTorque<R::Storage>, speed: R) -> R {
+    let mut found = R::lit(0.0);
+    for [from, value, rise] in &torque.stretches {
+        let past = speed - R::load(*from);
+        let here = R::load(*value) + past * R::load(*rise);
+        found = R::select(past.less_than(R::lit(0.0)), found, here);
+    }
+    found
+}
+
+/// What the driver's arms and feet are doing.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Controls<R> {
+    /// Road-wheel angle (rad).
+    pub steer: R,
+    /// Slip ratio of the front wheels.
+    pub front_slip: R,
+    /// Slip ratio of the rear wheels.
+    pub rear_slip: R,
+}
+
+/// The plan of a candidate: two neighbouring ones of its line, and how much of the second.
+#[derive(Clone, Copy, Debug)]
+pub struct Pace<R> {
+    /// The first plan's number, a whole one.
+    pub plan: R,
+    /// The second's share, 0 to 1.
+    pub share: R,
+}
+
+/// Speed (m/s) a share of the way from one cell of a plan, a whole number, to the next.
+#[inline(always)]
+fn speed_in_cell<R: Lookup>(plans: &[R::Storage], cell: R, share: R) -> R {
+    let (place, _) = cell.place(plans.len(), 1);
+    let speed = R::pick(plans, place, 0);
+    speed + share * (R::pick(plans, place, 1) - speed)
+}
+
+/// Planned speed (m/s) `ahead` metres ahead of the foot.
+#[inline(always)]
+pub fn planned_speed<R: Lookup>(
+    road: &Road<R::Storage>,
+    course: &Course<R>,
+    pace: &Pace<R>,
+    view: &View<R>,
+    ahead: R,
+) -> R {
+    let distance = view.pose.along + ahead;
+    let place = view.row.cell_share + distance * course.cells_per_metre + R::lit(FRONT_CELLS as f64);
+    let cells = place.whole(course.cells_ahead);
+    let share = place - cells;
+    let number = course.plan_at + pace.plan * course.plan_stride + view.row.cell + cells;
+    let speed = speed_in_cell(&road.plans, number, share);
+    if road.plans_per_line == 1 {
+        return speed;
+    }
+    let faster = speed_in_cell(&road.plans, number + course.plan_stride, share);
+    speed + pace.share * (faster - speed)
+}
+
+/// Moves arms and feet for one step.
+#[inline(always)]
+pub fn act<R: Lookup>(
+    driver: &DriverTable<R::Storage>,
+    torque: &WheelTorque<R::Storage>,
+    road: &Road<R::Storage>,
+    (course, pace): (&Course<R>, &Pace<R>),
+    c: &Chassis<R>,
+    (state, view): (&CarState<R>, &View<R>),
+    controls: &Controls<R>,
+) -> Controls<R> {
+    let zero = R::lit(0.0);
+    let one = R::lit(1.0);
+    let half = R::lit(0.5);
+    let step = R::load(driver.step);
+    let knows = R::load(driver.knows);
+    let body = &state.body;
+    let v = body.vx.max(R::lit(LEAST_SPEED));
+    let wheelbase = c.cg_to_front + c.cg_to_rear;
+    let path = &road.path;
+    let pose = &view.pose;
+    // Feed-forward: geometry plus the understeer of a car near its limit; feedback: offset, heading and
+    // the yaw rate that the present curvature asks for.
+    let curvature = curvature_ahead(path, course, pose, R::load(driver.preview) * v);
+    let understeer = R::load(driver.understeer) * curvature * v * v / c.gravity * wheelbase;
+    let bend = view.bend;
+    let sideslip = knows * (c.cg_to_rear * bend - R::load(driver.rear_slip_per_ay) * bend * v * v);
+    let heading =
+        view.heading_error + sideslip + view.offset * R::lit(0.9) / (v * R::lit(0.45) + R::lit(3.0));
+    let yaw_lack = curvature_ahead(path, course, pose, R::lit(0.08) * v) * v - body.yaw_rate;
+    let wanted = wheelbase * curvature + understeer - R::load(driver.heading_gain) * heading
+        + R::lit(0.045) * yaw_lack;
+    let most = R::load(driver.max_steer);
+    let wanted = wanted.max(-most).min(most);
+    let rate = ((wanted - controls.steer) / R::load(driver.steer_lag))
+        .max(R::lit(-STEER_RATE))
+        .min(R::lit(STEER_RATE));
+
+    let behind = planned_speed(road, course, pace, view, R::lit(0.1) * v) - body.vx;
+    let look = R::lit(PLAN_AHEAD_S) * v;
+    let reach = R::load(driver.reach);
+    let before = planned_speed(road, course, pace, view, look - reach);
+    let after = planned_speed(road, course, pace, view, look + reach);
+    let planned = (after * after - before * before) / R::lit(4.0 * PLAN_REACH_M);
+    let wanted = planned + R::load(driver.speed_gain) * behind;
+    let drag = half * c.air_density * c.drag_area * v * v;
+    let force = c.mass * wanted + drag;
+    let weight = c.mass * c.gravity + half * c.air_density * c.lift_area * v * v;
+    // What a bend leaves of the tyres, by the friction circle.
+    let used = knows * (body.yaw_rate * v / (R::load(driver.friction) * weight / c.mass)).abs();
+    let used = used.min(one);
+    let left = (one - used * used).max(R::lit(0.01)).sqrt();
+    let limit = R::load(driver.slip_limit) * left;
+    let stiffness = R::load(driver.slip_stiffness);
+    let most = torque_at(torque, v / c.radius_rear) / c.radius_rear;
+    let driven = (force.min(most) / (R::load(driver.driven_share) * weight * stiffness)).min(limit);
+    let braked = (force / (weight * stiffness)).max(-limit);
+    let brakes = force.less_than(zero);
+    let front = R::select(brakes, braked, zero);
+    let rear = R::select(brakes, R::lit(0.75) * braked, driven);
+    let lag = R::load(driver.pedal_lag);
+    Controls {
+        steer: controls.steer + rate * step,
+        front_slip: controls.front_slip + (front - controls.front_slip) * step / lag,
+        rear_slip: controls.rear_slip + (rear - controls.rear_slip) * step / lag,
+    }
+}
+
+/// The speed (rad/s) that gives a wheel of this radius (m) at `(x, y)` (m) from the point under the centre of gravity, turned
+/// by the angle whose cosine and sine are given, the slip ratio `slip`.
+#[inline(always)]
+fn wheel_speed<R: Real>(
+    c: &Chassis<R>,
+    state: &CarState<R>,
+    (x, y): (R, R),
+    (cos, sin): (R, R),
+    slip: R,
+    radius: R,
+) -> R {
+    let body = &state.body;
+    let hub = cos * (body.vx - body.yaw_rate * y) + sin * (body.vy + body.yaw_rate * x);
+    (hub + slip * hub.abs().max(c.slip_speed_floor)) / radius
+}
+
+/// The wheel speeds and the steering that the controls ask for.
+#[inline(always)]
+pub fn car_input<R: Real>(c: &Chassis<R>, state: &CarState<R>, controls: &Controls<R>) -> CarInput<R> {
+    let turned = (controls.steer.cos(), controls.steer.sin());
+    let straight = (R::lit(1.0), R::lit(0.0));
+    let (a, b) = (c.cg_to_front, -c.cg_to_rear);
+    let (wf, wr) = (c.half_track_front, c.half_track_rear);
+    let (front, rear) = (controls.front_slip, controls.rear_slip);
+    CarInput {
+        wheel_speed: [
+            wheel_speed(c, state, (a, wf), turned, front, c.radius_front),
+            wheel_speed(c, state, (a, -wf), turned, front, c.radius_front),
+            wheel_speed(c, state, (b, wr), straight, rear, c.radius_rear),
+            wheel_speed(c, state, (b, -wr), straight, rear, c.radius_rear),
+        ],
+        steer: controls.steer,
+    }
+}

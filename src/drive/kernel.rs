@@ -1,0 +1,309 @@
+//! One step of the closed loop, and a lap of them: look, judge, act, move. Twin of `shaders/drive.wgsl`.
+
+use super::driver::{Controls, DriverTable, Pace, WheelTorque, act, car_input, planned_speed};
+use super::path::{Pose, View, look};
+use super::road::{Course, Road};
+use crate::scalar::Lookup;
+use crate::vehicle::model::runge_kutta_step;
+use crate::vehicle::tyre::Tyre;
+use crate::vehicle::{CarInput, CarModel, CarState};
+
+/// How a lap ended: whole numbers, which every backend counts alike.
+pub mod ending {
+    /// It has not.
+    pub const UNDER_WAY: f64 = 0.0;
+    /// At the line.
+    pub const FINISHED: f64 = 1.0;
+    /// The car spun, rolled over or turned its back to the path.
+    pub const SPUN: f64 = 2.0;
+    /// The car left the road.
+    pub const LEFT_ROAD: f64 = 3.0;
+    /// It took too long.
+    pub const TOO_LATE: f64 = 4.0;
+}
+
+/// Angle to the path at which a car is on its way back, rad.
+const TURNED_ROUND: f64 = std::f64::consts::FRAC_PI_2;
+/// What stands for the distance beyond an edge before any was seen, m.
+const FAR_INSIDE: f64 = -1e6;
+
+/// What all laps of a population share.
+#[derive(Clone, Copy, Debug)]
+pub struct World<'a, S> {
+    /// The lines and their plans.
+    pub road: &'a Road<S>,
+    /// The driver.
+    pub driver: &'a DriverTable<S>,
+    /// What the powertrain gives.
+    pub torque: &'a WheelTorque<S>,
+}
+
+/// A lap under way.
+#[derive(Clone, Copy, Debug)]
+pub struct DriveState<R> {
+    /// The car.
+    pub car: CarState<R>,
+    /// Arms and feet.
+    pub controls: Controls<R>,
+    /// Where the car is.
+    pub pose: Pose<R>,
+    /// Steps since the start line.
+    pub steps: R,
+    /// What the lap's time is beyond its steps (s): the start line was crossed before a step, the finish line too.
+    pub rest: R,
+    /// Greatest distance beyond an edge so far (m), negative within the road.
+    pub beyond: R,
+    /// How far the road wheels have been turned to and fro in the rows behind (rad).
+    pub turned: R,
+    /// And in this row (rad): sums of few terms lose no tails in `f32`.
+    pub turned_here: R,
+    /// How it ended, see [`ending`].
+    pub ending: R,
+}
+
+/// Figures of [`DriveState::to_array`].
+pub const STATE: usize = 21;
+
+/// What the driver saw and did in a step, before the car moved.
+#[derive(Clone, Copy, Debug)]
+pub struct Moment<'a, R> {
+    /// The car.
+    pub car: &'a CarState<R>,
+    /// Where it is.
+    pub view: &'a View<R>,
+    /// What the wheels and the steering are told.
+    pub input: &'a CarInput<R>,
+}
+
+impl<R: Lookup> DriveState<R> {
+    /// A car at the beginning of the run-up, at the planned speed.
+    #[inline(always)]
+    pub fn begin(world: &World<'_, R::Storage>, course: &Course<R>, pace: &Pace<R>) -> Self {
+        let zero = R::lit(0.0);
+        let pose = Pose {
+            row: course.begin_row,
+            lap: R::lit(-1.0),
+            along: course.begin_along,
+            x: course.begin_x,
+            y: course.begin_y,
+            yaw: course.begin_yaw,
+        };
+        let view = look(&world.road.path, course, &pose);
+        Self {
+            car: CarState::straight(planned_speed(world.road, course, pace, &view, zero)),
+            controls: Controls {
+                steer: zero,
+                front_slip: zero,
+                rear_slip: zero,
+            },
+            pose,
+            steps: zero,
+            rest: zero,
+            beyond: R::lit(FAR_INSIDE),
+            turned: zero,
+            turned_here: zero,
+            ending: R::lit(ending::UNDER_WAY),
+        }
+    }
+
+    /// The components in the order of the fields.
+    #[inline(always)]
+    pub fn to_array(self) -> [R; STATE] {
+        let [vx, vy, yaw_rate, roll, roll_rate, pitch] = self.car.to_array();
+        let (c, p) = (self.controls, self.pose);
+        [
+            vx,
+            vy,
+            yaw_rate,
+            roll,
+            roll_rate,
+            pitch,
+            c.steer,
+            c.front_slip,
+            c.rear_slip,
+            p.row,
+            p.lap,
+            p.along,
+            p.x,
+            p.y,
+            p.yaw,
+            self.steps,
+            self.rest,
+            self.beyond,
+            self.turned,
+            self.turned_here,
+            self.ending,
+        ]
+    }
+
+    /// From the components in the order of [`DriveState::to_array`].
+    #[inline(always)]
+    pub fn from_array(figures: [R; STATE]) -> Self {
+        let f = figures;
+        Self {
+            car: CarState::from_array([f[0], f[1], f[2], f[3], f[4], f[5]]),
+            controls: Controls {
+                steer: f[6],
+                front_slip: f[7],
+                rear_slip: f[8],
+            },
+            pose: Pose {
+                row: f[9],
+                lap: f[10],
+                along: f[11],
+                x: f[12],
+                y: f[13],
+                yaw: f[14],
+            },
+            steps: f[15],
+            rest: f[16],
+            beyond: f[17],
+            turned: f[18],
+            turned_here: f[19],
+            ending: f[20],
+        }
+    }
+
+    /// Where the lap has not ended.
+    #[inline(always)]
+    pub fn under_way(&self) -> R::Mask {
+        self.ending.less_than(R::lit(0.5))
+    }
+}
+
+/// One step, the `number`-th since the run-up began, of a lap that is under way; others stay as they are. `watch` is shown
+/// what the driver saw and did.
+#[inline(always)]
+pub fn drive_step<R: Lookup, T: Tyre<R>>(
+    car: &CarModel<R, T>,
+    world: &World<'_, R::Storage>,
+    (course, pace): (&Course<R>, &Pace<R>),
+    number: R,
+    before: &DriveState<R>,
+    watch: impl FnOnce(&Moment<'_, R>),
+) -> DriveState<R> {
+    let zero = R::lit(0.0);
+    let one = R::lit(1.0);
+    let half = R::lit(0.5);
+    let (road, driver) = (world.road, world.driver);
+    let under_way = before.under_way();
+
+    let view = look(&road.path, course, &before.pose);
+    let pose = view.pose;
+    let turned_round = !view.heading_error.abs().less_than(R::lit(TURNED_ROUND));
+    let off = R::load(driver.run_off).less_than(view.beyond);
+    let late = course.most_steps.less_than(number);
+    let verdict = R::select(off, R::lit(ending::LEFT_ROAD), R::lit(ending::UNDER_WAY));
+    let verdict = R::select(late, R::lit(ending::TOO_LATE), verdict);
+    let verdict = R::select(turned_round, R::lit(ending::SPUN), verdict);
+    let lost = turned_round | off | late;
+
+    // Time since the line was crossed, and what that adds to the steps: at the start, and taken away at the finish.
+    let since = (pose.row * course.spacing + pose.along) / before.car.body.vx;
+    let has_started = before.pose.lap.less_than(-half) & !pose.lap.less_than(-half);
+    let finished = !pose.lap.less_than(half);
+    let rest = before.rest + R::select(has_started, since, zero);
+    let rest = rest - R::select(finished, since, zero);
+    let timed = !pose.lap.less_than(-half) & !finished;
+
+    let controls = act(
+        driver,
+        world.torque,
+        road,
+        (course, pace),
+        &car.chassis,
+        (&before.car, &view),
+        &before.controls,
+    );
+    let input = car_input(&car.chassis, &before.car, &controls);
+    watch(&Moment {
+        car: &before.car,
+        view: &view,
+        input: &input,
+    });
+
+    let step = R::load(driver.step);
+    let next = runge_kutta_step(car, &before.car, |_| input, step, |_| {});
+    let verdict = R::select(!lost & finished, R::lit(ending::FINISHED), verdict);
+    let spun = !lost & !finished & !next.drives();
+    let verdict = R::select(spun, R::lit(ending::SPUN), verdict);
+
+    let (body, then) = (&before.car.body, &next.body);
+    let middle_yaw = pose.yaw + R::lit(0.25) * step * (body.yaw_rate + then.yaw_rate);
+    let (cos, sin) = (middle_yaw.cos(), middle_yaw.sin());
+    let (ahead, left) = (half * (body.vx + then.vx), half * (body.vy + then.vy));
+    let steered = (controls.steer - before.controls.steer).abs();
+    let here = before.turned_here + R::select(timed, steered, zero);
+    let passed = half.less_than(view.passed);
+    let after = DriveState {
+        car: next,
+        controls,
+        pose: Pose {
+            x: pose.x + (cos * ahead - sin * left) * step,
+            y: pose.y + (sin * ahead + cos * left) * step,
+            yaw: pose.yaw + half * step * (body.yaw_rate + then.yaw_rate),
+            ..pose
+        },
+        steps: before.steps + R::select(timed, one, zero),
+        rest,
+        beyond: R::select(timed, before.beyond.max(view.beyond), before.beyond),
+        turned: before.turned + R::select(passed, here, zero),
+        turned_here: R::select(passed, zero, here),
+        ending: verdict,
+    };
+    // A car that is lost stays as it was last; of one that has finished, its time counts.
+    let stays = !under_way | lost | spun | finished;
+    let (kept, moved) = (before.to_array(), after.to_array());
+    let mut figures = kept;
+    for i in 0..STATE {
+        figures[i] = R::select(stays, kept[i], moved[i]);
+    }
+    let mut state = DriveState::from_array(figures);
+    state.ending = R::select(under_way, verdict, before.ending);
+    state.rest = R::select(under_way, rest, before.rest);
+    state
+}
+
+/// What is asked of a lap.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DrivenLap {
+    /// Its time (s).
+    pub time_s: f64,
+    /// Greatest distance of the car beyond an edge (m); negative for the least room that was left.
+    pub beyond_m: f64,
+    /// How fast the road wheels were turned, on the mean (rad/s).
+    pub steering_radps: f64,
+    /// How it ended, see [`ending`]. The other figures are those of a whole lap where it finished.
+    pub ending: f64,
+}
+
+impl DrivenLap {
+    /// The lap whose state at its end is given, driven in steps of `step_s`.
+    pub fn of_state(state: &DriveState<f64>, step_s: f64) -> Self {
+        let time_s = state.steps * step_s + state.rest;
+        Self {
+            time_s,
+            beyond_m: state.beyond,
+            steering_radps: (state.turned + state.turned_here) / time_s,
+            ending: state.ending,
+        }
+    }
+}
+
+/// Drives `car` on from `state`, before the step of this `number`, up to the `most`-th step or until its lap has ended in every
+/// lane.
+#[inline(always)]
+pub fn drive_on<R: Lookup, T: Tyre<R>>(
+    car: &CarModel<R, T>,
+    world: &World<'_, R::Storage>,
+    (course, pace): (&Course<R>, &Pace<R>),
+    state: &mut DriveState<R>,
+    number: &mut u32,
+    most: u32,
+) {
+    while *number < most && !R::all(!state.under_way()) {
+        let count = R::lit(f64::from(*number));
+        *state = drive_step(car, world, (course, pace), count, state, |_| {});
+        *number += 1;
+    }
+}

@@ -1,0 +1,19 @@
+//! A driver takes the 4DOF car round a line: path, plan of speeds, driver and car as one kernel over the scalar, for one lap
+//! in `f64` that is recorded ([`drive`]) or for whole populations of set-ups ([`crate::evaluate::drive`]).
+//!
+//! A car's place is kept relative to the path it follows, in the frame of the path's last sample: figures of metres, whose
+//! rounding in `f32` is a ten-millionth of one, however long the lap.
+
+pub mod driver;
+pub mod kernel;
+mod path;
+mod plan;
+mod record;
+mod road;
+mod settings;
+
+pub use path::{PATH_WIDTH, Pose, Row, View, frame_at, look};
+pub use plan::SpeedPlan;
+pub use record::{Drive, drive, drive_planned};
+pub use road::{Course, FRONT_CELLS, Line, PLAN_REACH_M, Road};
+pub use settings::{CarKnowledge, DriverSettings};

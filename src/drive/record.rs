@@ -1,0 +1,139 @@
+//! One lap, driven in `f64` and recorded.
+
+use super::driver::{DriverTable, Pace, WheelTorque};
+use super::kernel::{DriveState, World, drive_step, ending};
+use super::plan::SpeedPlan;
+use super::road::{Course, Line, Road};
+use super::settings::DriverSettings;
+use crate::error::{Error, Result};
+use crate::track::Circuit;
+use crate::vehicle::tyre::Tyre;
+use crate::vehicle::{Car, CarModel, LinearTyre, MagicFormula, TyreModel};
+
+/// One driven lap: what the wheels and the steering did, at a uniform rate.
+#[derive(Clone, Debug, Default)]
+pub struct Drive {
+    /// Wheel speeds FL FR RL RR and road-wheel angle at each sample, rad/s and rad.
+    pub inputs: Vec<([f64; 4], f64)>,
+    /// State at each sample, in the order of [`crate::vehicle::CarState::to_array`].
+    pub states: Vec<[f64; 6]>,
+    /// Distance driven along the centreline from the start line, m.
+    pub station_m: Vec<f64>,
+    /// Distance from the centreline, left positive, m.
+    pub offset_m: Vec<f64>,
+}
+
+impl Drive {
+    /// Time of the lap (s), whose length (m) and sample interval (s) are given: the samples' own, less what the first
+    /// was late and more what the last was short.
+    pub fn lap_time_s(&self, length_m: f64, interval_s: f64) -> Option<f64> {
+        let (first, last) = (self.station_m.first()?, self.station_m.last()?);
+        let (from, to) = (self.states.first()?[0], self.states.last()?[0]);
+        Some((self.states.len() - 1) as f64 * interval_s + (length_m - last) / to + first / from)
+    }
+}
+
+/// Integration step of the closed loop, s.
+pub(super) const STEP: f64 = 1e-3;
+
+/// Drives one flying lap and samples it every `interval_s` seconds.
+///
+/// # Errors
+/// [`Error::Study`] if the car spins or leaves the track, saying where.
+pub fn drive(car: &Car, circuit: &Circuit, settings: &DriverSettings, interval_s: f64) -> Result<Drive> {
+    let plan = SpeedPlan::new(car, circuit, settings.pace, settings.top_speed_mps);
+    drive_planned(car, circuit, plan, settings, interval_s).map_err(|error| match error {
+        Error::Study(what) => Error::Study(format!("{what}; try a lower pace than {}", settings.pace)),
+        other => other,
+    })
+}
+
+/// As [`drive`], at the speeds of `plan` instead of the driver's own.
+///
+/// # Errors
+/// As [`drive`]; [`Error::Input`] for a circuit that [`Road::new`] refuses.
+pub fn drive_planned(
+    car: &Car,
+    circuit: &Circuit,
+    plan: SpeedPlan,
+    settings: &DriverSettings,
+    interval_s: f64,
+) -> Result<Drive> {
+    let line = Line {
+        circuit,
+        plans: &[plan],
+    };
+    let road = Road::new(&[line], settings, STEP)?;
+    let world = World {
+        road: &road,
+        driver: &DriverTable::new(settings, car, STEP, 0.0),
+        torque: &WheelTorque::of_car(car)?,
+    };
+    let flat = car.to_flat();
+    match car.tyre_model() {
+        TyreModel::MagicFormula => record::<MagicFormula<f64>>(
+            &CarModel::from_parameters(|i| flat[i]),
+            &world,
+            circuit,
+            interval_s,
+        ),
+        TyreModel::Linear => record::<LinearTyre<f64>>(
+            &CarModel::from_parameters(|i| flat[i]),
+            &world,
+            circuit,
+            interval_s,
+        ),
+    }
+}
+
+fn record<T: Tyre<f64>>(
+    car: &CarModel<f64, T>,
+    world: &World<'_, f64>,
+    circuit: &Circuit,
+    interval_s: f64,
+) -> Result<Drive> {
+    let course = Course::at(world.road, 0.0);
+    let pace = Pace {
+        plan: 0.0,
+        share: 0.0,
+    };
+    let mut state = DriveState::begin(world, &course, &pace);
+    let mut log = Drive::default();
+    let mut next_sample: Option<f64> = None;
+    let mut time = 0.0;
+    let mut number = 0.0;
+    while state.under_way() {
+        state = drive_step(car, world, (&course, &pace), number, &state, |moment| {
+            let pose = &moment.view.pose;
+            if pose.lap < 0.0 {
+                return;
+            }
+            let due = *next_sample.get_or_insert(time);
+            if time >= due - 0.5 * STEP {
+                log.inputs.push((moment.input.wheel_speed, moment.input.steer));
+                log.states.push(moment.car.to_array());
+                log.station_m
+                    .push((pose.lap * course.rows + pose.row) * course.spacing + pose.along);
+                log.offset_m.push(moment.view.offset);
+                next_sample = Some(due + interval_s);
+            }
+        });
+        time += STEP;
+        number += 1.0;
+    }
+    if state.ending == ending::FINISHED {
+        return Ok(log);
+    }
+    let what = if state.ending == ending::LEFT_ROAD {
+        "left the track"
+    } else if state.ending == ending::TOO_LATE {
+        "did not get round in time"
+    } else {
+        "spun"
+    };
+    let station = state.pose.row * course.spacing + state.pose.along;
+    Err(Error::Study(format!(
+        "the driver {what} at station {station:.0} m of {} ({:.1} m/s)",
+        circuit.name, state.car.body.vx
+    )))
+}

@@ -1,0 +1,279 @@
+//! Lines and their plans of speed as tables that every backend reads alike.
+
+use super::path::PATH_WIDTH;
+use super::plan::SpeedPlan;
+use super::settings::DriverSettings;
+use crate::error::{Error, Result};
+use crate::scalar::{Lookup, Real};
+use crate::track::Circuit;
+use crate::vehicle::model::GREATEST_SPEED;
+use std::f64::consts::{PI, TAU};
+
+/// How long before the start line the flying lap begins, m.
+const RUN_UP_M: f64 = 500.0;
+/// A lap slower than this mean speed is no lap, half of it counting the run-up, m/s.
+const SLOWEST_MPS: f64 = 5.0;
+/// Cells of a plan before its first, for what lies just behind the start line.
+pub const FRONT_CELLS: usize = 2;
+/// Over how far on either side a plan's acceleration is taken, m.
+pub const PLAN_REACH_M: f64 = 2.0;
+/// How far ahead a driver looks into the plan, s.
+pub(super) const PLAN_AHEAD_S: f64 = 0.15;
+/// Whole numbers beyond this are not exact in `f32`.
+const MOST_COUNTED: f64 = 16_777_216.0;
+/// Samples of a path are at least this far apart (m): no car leaves two of them behind in one step.
+const LEAST_SPACING_M: f64 = 0.25;
+
+/// Lines to drive, each with plans of speed of the same shares of grip.
+///
+/// Rows and cells behind the end of a line repeat its beginning, as far as a driver looks ahead, so that nothing wraps.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Road<S> {
+    /// Rows of [`super::Row`] of all lines, one line after the other.
+    pub path: Vec<S>,
+    /// Planned speeds (m/s), line by line, share by share.
+    pub plans: Vec<S>,
+    /// A row of [`Course`] for each line.
+    pub courses: Vec<S>,
+    /// Plans of each line.
+    pub plans_per_line: usize,
+    /// The most rows that a driver looks ahead.
+    pub rows_ahead: usize,
+    /// The most cells that a driver looks ahead.
+    pub cells_ahead: usize,
+}
+
+macro_rules! course {
+    ($($(#[$doc:meta])* $field:ident),* $(,)?) => {
+        /// What is known of a line as a whole. Twin of `Course` in `shaders/path.wgsl`.
+        #[derive(Clone, Copy, Debug)]
+        pub struct Course<R> {
+            $($(#[$doc])* pub $field: R,)*
+            /// The most rows that a driver looks ahead.
+            pub rows_ahead: usize,
+            /// The most cells that a driver looks ahead.
+            pub cells_ahead: usize,
+        }
+
+        impl Course<f64> {
+            /// Figures of a row, in order.
+            pub const FIELDS: &'static [&'static str] = &[$(stringify!($field)),*];
+
+            fn to_row(self) -> Vec<f64> {
+                vec![$(self.$field),*]
+            }
+        }
+
+        impl<R: Lookup> Course<R> {
+            /// The course of this number, a whole one.
+            #[inline(always)]
+            pub fn at(road: &Road<R::Storage>, number: R) -> Self {
+                let width = Course::FIELDS.len();
+                let (place, _) = number.place(road.courses.len() / width, width);
+                let mut column = 0;
+                let mut next = || {
+                    column += 1;
+                    R::pick(&road.courses, place, column - 1)
+                };
+                Self {
+                    $($field: next(),)*
+                    rows_ahead: road.rows_ahead,
+                    cells_ahead: road.cells_ahead,
+                }
+            }
+        }
+    };
+}
+
+course! {
+    /// The line's first row in the table of paths, a whole number like all that count.
+    path_at,
+    /// Rows of the lap.
+    rows,
+    /// Distance between samples (m).
+    spacing,
+    /// One over that (1/m).
+    per_metre,
+    /// The row in which the run-up begins.
+    begin_row,
+    /// How far into it (m).
+    begin_along,
+    /// Where that is, ahead of the row's sample (m).
+    begin_x,
+    /// And to its left (m).
+    begin_y,
+    /// The path's direction there (rad).
+    begin_yaw,
+    /// The first cell of the line's first plan.
+    plan_at,
+    /// Cells from one of its plans to the next.
+    plan_stride,
+    /// Cells per metre (1/m).
+    cells_per_metre,
+    /// Steps after which no lap is waited for.
+    most_steps,
+}
+
+/// A line to drive: its path and edges, and plans of speed, one for each share of grip.
+#[derive(Clone, Debug)]
+pub struct Line<'a> {
+    /// The path with its edges.
+    pub circuit: &'a Circuit,
+    /// The plans.
+    pub plans: &'a [SpeedPlan],
+}
+
+impl Road<f64> {
+    /// The tables of `lines` for steps of `step_s` by a driver with these settings.
+    ///
+    /// # Errors
+    /// [`Error::Input`] for an open line, one whose samples are too close or that is too long to be counted, and for lines with
+    /// different numbers of plans.
+    pub fn new(lines: &[Line<'_>], driver: &DriverSettings, step_s: f64) -> Result<Self> {
+        let refuse =
+            |name: &str, found: String, expected: &str| Err(Error::input(name, "line", found, expected));
+        let plans_per_line = lines.first().map_or(0, |l| l.plans.len());
+        if plans_per_line == 0 {
+            return refuse("the drive", "no line with a plan".to_owned(), "at least one");
+        }
+        let ahead_m = |seconds: f64| GREATEST_SPEED * seconds;
+        let mut road = Self {
+            path: Vec::new(),
+            plans: Vec::new(),
+            courses: Vec::new(),
+            plans_per_line,
+            rows_ahead: 0,
+            cells_ahead: 0,
+        };
+        for line in lines {
+            let circuit = line.circuit;
+            let name = &circuit.name;
+            if !circuit.closed {
+                return refuse(
+                    name,
+                    "an open one".to_owned(),
+                    "a closed one: the lap is a flying one",
+                );
+            }
+            let spacing = circuit.spacing_m();
+            if spacing < LEAST_SPACING_M {
+                let found = format!("samples {spacing:.3} m apart");
+                return refuse(name, found, "samples a quarter of a metre apart or more");
+            }
+            let shape = |plan: &SpeedPlan| (plan.speed_mps.len(), plan.spacing_m);
+            let (cells, cell_m) = line.plans.first().map_or((0, 1.0), shape);
+            let alike = line.plans.iter().all(|plan| shape(plan) == (cells, cell_m));
+            if line.plans.len() != plans_per_line || !alike || cells == 0 || cell_m < LEAST_SPACING_M {
+                let found = format!("{} plans, the first of {cells} cells", line.plans.len());
+                return refuse(
+                    name,
+                    found,
+                    "as many plans for each line, alike in length and spacing",
+                );
+            }
+            let most_steps = 2.0 * circuit.length_m / SLOWEST_MPS / step_s;
+            if most_steps > MOST_COUNTED {
+                let found = format!("{:.0} m", circuit.length_m);
+                let most_m = MOST_COUNTED * step_s * SLOWEST_MPS / 2.0;
+                return refuse(
+                    name,
+                    found,
+                    &format!("at most {most_m:.0} m in steps of {step_s} s"),
+                );
+            }
+            road.rows_ahead = road
+                .rows_ahead
+                .max((ahead_m(driver.preview_s.max(0.08)) / spacing) as usize + 2);
+            road.cells_ahead = road
+                .cells_ahead
+                .max(((ahead_m(PLAN_AHEAD_S) + PLAN_REACH_M) / cell_m) as usize + FRONT_CELLS + 2);
+        }
+        for line in lines {
+            road.push(line, step_s);
+        }
+        let most = (road.path.len() / PATH_WIDTH).max(road.plans.len());
+        if most as f64 > MOST_COUNTED {
+            return refuse(
+                "the drive",
+                format!("{most} rows of plans"),
+                "fewer lines and shares",
+            );
+        }
+        Ok(road)
+    }
+
+    fn push(&mut self, line: &Line<'_>, step_s: f64) {
+        let circuit = line.circuit;
+        let (count, spacing) = (circuit.station_m.len(), circuit.spacing_m());
+        let cell_m = line.plans[0].spacing_m;
+        let cells = line.plans[0].speed_mps.len();
+        let path_at = self.path.len() / PATH_WIDTH;
+        for i in 0..count + self.rows_ahead + 1 {
+            let (here, next) = (i % count, (i + 1) % count);
+            let away = circuit.centreline_m[next] - circuit.centreline_m[here];
+            let (sin, cos) = circuit.heading_rad[here].sin_cos();
+            let turn = (circuit.heading_rad[next] - circuit.heading_rad[here] + PI).rem_euclid(TAU) - PI;
+            let curvature = &circuit.curvature_1pm;
+            let (left, right) = (&circuit.width_left_m, &circuit.width_right_m);
+            let cell = (here as f64 * spacing / cell_m).min(cells as f64);
+            let row: [f64; PATH_WIDTH] = [
+                curvature[here],
+                (curvature[next] - curvature[here]) / spacing,
+                away.x * cos + away.y * sin,
+                away.y * cos - away.x * sin,
+                turn,
+                left[here],
+                left[next] - left[here],
+                right[here],
+                right[next] - right[here],
+                cell.floor(),
+                cell - cell.floor(),
+                0.0,
+            ];
+            self.path.extend(row);
+        }
+        let plan_at = self.plans.len();
+        for plan in line.plans {
+            let padded = FRONT_CELLS + cells + self.cells_ahead + 1;
+            self.plans
+                .extend((0..padded).map(|i| plan.speed_mps[(i + cells - FRONT_CELLS) % cells]));
+        }
+        let plan_stride = (self.plans.len() - plan_at) / line.plans.len();
+        let begin = circuit.length_m - RUN_UP_M.min(0.4 * circuit.length_m);
+        let begin_row = ((begin / spacing) as usize).min(count - 1);
+        let origin = circuit.centreline_m[begin_row];
+        let (sin, cos) = circuit.heading_rad[begin_row].sin_cos();
+        let away = circuit.position_at(begin) - origin;
+        let course = Course {
+            path_at: path_at as f64,
+            rows: count as f64,
+            spacing,
+            per_metre: 1.0 / spacing,
+            begin_row: begin_row as f64,
+            begin_along: begin - begin_row as f64 * spacing,
+            begin_x: away.x * cos + away.y * sin,
+            begin_y: away.y * cos - away.x * sin,
+            begin_yaw: circuit.heading_at(begin) - circuit.heading_rad[begin_row],
+            plan_at: plan_at as f64,
+            plan_stride: plan_stride as f64,
+            cells_per_metre: 1.0 / cell_m,
+            most_steps: (2.0 * circuit.length_m / SLOWEST_MPS / step_s).floor(),
+            rows_ahead: 0,
+            cells_ahead: 0,
+        };
+        self.courses.extend(course.to_row());
+    }
+
+    /// The tables in the precision that the scalar `R` stores tables in.
+    pub fn stored<R: Real>(&self) -> Road<R::Storage> {
+        let all = |table: &[f64]| table.iter().map(|x| R::store(*x)).collect();
+        Road {
+            path: all(&self.path),
+            plans: all(&self.plans),
+            courses: all(&self.courses),
+            plans_per_line: self.plans_per_line,
+            rows_ahead: self.rows_ahead,
+            cells_ahead: self.cells_ahead,
+        }
+    }
+}

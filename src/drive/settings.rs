@@ -1,0 +1,99 @@
+//! How the driver drives, and what the driver knows of the car.
+
+use crate::error::{Error, Result};
+use crate::vehicle::{Car, steady_car};
+
+/// How the driver drives.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DriverSettings {
+    /// Share of the tyres' friction that is used, 0 to 1.
+    pub pace: f64,
+    /// Greatest slip ratio, driven or braked.
+    pub slip_limit: f64,
+    /// Slip stiffness per load that the driver's feet reckon with: the lower, the more slip for a wanted force.
+    pub slip_stiffness: f64,
+    /// How far ahead the driver looks, s.
+    pub preview_s: f64,
+    /// Speed not to exceed, m/s.
+    pub top_speed_mps: f64,
+    /// How much the driver steers against an angle to the path, rad per rad.
+    pub heading_gain: f64,
+    /// Acceleration that the driver adds for every m/s that the plan is ahead, 1/s.
+    pub speed_gain_1ps: f64,
+    /// What the driver knows of the car, if anything.
+    pub knowledge: Option<CarKnowledge>,
+}
+
+/// What a driver who knows the car reckons with: without it the car's own angle to its path looks like an error to steer
+/// against, and a foot that is down in a bend takes grip that the bend needs.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CarKnowledge {
+    /// Slip angle of the rear axle for every m/s^2 of lateral acceleration (rad s^2/m): it turns the car into the bend.
+    pub rear_slip_per_ay: f64,
+    /// Lateral acceleration that the tyres give for every m/s^2 of load over mass: a coefficient of friction.
+    pub friction: f64,
+}
+
+impl CarKnowledge {
+    /// From the car's steady states in bends at 60% to 90% of the greatest lateral acceleration.
+    ///
+    /// # Errors
+    /// [`Error::Study`] if the car has none.
+    pub fn of_car(car: &Car) -> Result<Self> {
+        let c = &car.chassis;
+        let steady = steady_car(car);
+        let mut slips = Vec::new();
+        let mut frictions = Vec::new();
+        for speed in [25.0f64, 40.0, 55.0] {
+            let trims = steady.cornering(speed, car.max_steer_rad.max(0.3));
+            let most = trims.iter().map(|t| t.ay_mps2).fold(0.0, f64::max);
+            let load = c.gravity + 0.5 * c.air_density * c.lift_area * speed * speed / c.mass;
+            frictions.push(most / load);
+            let ridge = trims.iter().position(|t| t.ay_mps2 == most).unwrap_or(0);
+            slips.extend(
+                trims[..=ridge.min(trims.len().saturating_sub(1))]
+                    .iter()
+                    .filter(|t| (0.6..0.9).contains(&(t.ay_mps2 / most)))
+                    // Without slip the rear axle follows the path: its share of the angle is geometry.
+                    .map(|t| c.cg_to_rear / (speed * speed) - t.sideslip_rad / t.ay_mps2),
+            );
+        }
+        if slips.is_empty() {
+            return Err(Error::Study(format!("{} has no steady state in bends", car.name)));
+        }
+        Ok(Self {
+            rear_slip_per_ay: slips.iter().sum::<f64>() / slips.len() as f64,
+            friction: frictions.iter().copied().fold(f64::INFINITY, f64::min),
+        })
+    }
+}
+
+impl DriverSettings {
+    /// A driver who knows the car and follows a line as closely as it can be followed.
+    ///
+    /// # Errors
+    /// As [`CarKnowledge::of_car`].
+    pub fn racing(car: &Car) -> Result<Self> {
+        Ok(Self {
+            heading_gain: 0.8,
+            speed_gain_1ps: 3.0,
+            knowledge: Some(CarKnowledge::of_car(car)?),
+            ..Self::default()
+        })
+    }
+}
+
+impl Default for DriverSettings {
+    fn default() -> Self {
+        Self {
+            pace: 0.9,
+            slip_limit: 0.14,
+            slip_stiffness: 18.0,
+            preview_s: 0.25,
+            top_speed_mps: 70.0,
+            heading_gain: 0.55,
+            speed_gain_1ps: 1.8,
+            knowledge: None,
+        }
+    }
+}
