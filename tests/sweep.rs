@@ -14,6 +14,7 @@ algorithm = \"thesis\"
 iterations = 2
 [grid]
 \"swarm.population\" = [4, 6]
+norm = [\"1\", \"2\"]
 seed = [1, 2]
 ";
 
@@ -37,28 +38,33 @@ fn a_sweep_broken_off_and_gone_on_with_is_the_same_to_the_byte() {
     let settings = SweepSettings::parse(Path::new("sweep.toml"), SWEEP).expect("a sweep");
     let whole = root.path().join("whole");
     let summary = sweep(&settings, &whole, false, |_| ControlFlow::Continue(())).expect("it runs");
-    assert_eq!((summary.rows.len(), summary.groups.len()), (4, 2));
+    assert_eq!((summary.rows.len(), summary.groups.len()), (8, 4));
     assert!(
         summary
             .rows
             .iter()
             .all(|r| r.figures["best_cost"].is_some_and(f64::is_finite))
     );
-    // Broken off at the n-th word from it, be it before or within a run.
-    for stop in [1usize, 3, 6, 9] {
-        let part = root.path().join(format!("part{stop}"));
+    // Broken off at the n-th word from it about a run, be it before the run or within it. Runs of one problem go together, here
+    // two by two.
+    for (run, stop) in [(0usize, 1usize), (0, 2), (2, 1), (4, 2), (6, 3)] {
+        let part = root.path().join(format!("part{run}_{stop}"));
         let mut told = 0;
-        let broken = sweep(&settings, &part, false, |_| {
-            told += 1;
-            if told > stop {
+        let broken = sweep(&settings, &part, false, |p| {
+            told += usize::from(p.done == run);
+            if told >= stop {
                 ControlFlow::Break(())
             } else {
                 ControlFlow::Continue(())
             }
         });
-        assert_eq!(broken.expect_err("broken off").exit_code(), 130, "after {stop}");
+        assert_eq!(
+            broken.expect_err("broken off").exit_code(),
+            130,
+            "after {run} and {stop}"
+        );
         sweep(&settings, &part, true, |_| ControlFlow::Continue(())).expect("it goes on");
-        assert_eq!(files(&part), files(&whole), "after {stop}");
+        assert_eq!(files(&part), files(&whole), "after {run} and {stop}");
     }
     let other =
         SweepSettings::parse(Path::new("sweep.toml"), &SWEEP.replace("[4, 6]", "[4]")).expect("a sweep");

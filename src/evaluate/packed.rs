@@ -52,7 +52,7 @@ impl Drop for PackedClient {
 }
 
 /// Runs `searches` at the same time, each in a thread of its own and with an evaluator that goes through `evaluator`; what they
-/// come to, in their order. `pause` is called before every call of `evaluator`, in this thread.
+/// come to, in their order. `pause` is called now and then in this thread, before every call of `evaluator` at least.
 ///
 /// Candidates are scored each for itself, so that who else is asking changes no result.
 ///
@@ -88,22 +88,19 @@ pub fn run_packed<T: Send>(
         let mut working = threads.len();
         let mut waiting: Vec<(usize, Vec<f64>)> = Vec::new();
         while working > 0 {
-            let message = if waiting.is_empty() {
-                asked.recv().map_err(|_| RecvTimeoutError::Disconnected)
-            } else {
-                asked.recv_timeout(PATIENCE)
-            };
-            match message {
+            match asked.recv_timeout(PATIENCE) {
                 Ok(Message::Asks { client, population }) => waiting.push((client, population)),
                 Ok(Message::Leaves) => working -= 1,
                 Err(RecvTimeoutError::Timeout) => {
-                    answer(evaluator, &mut waiting, &answers, &mut pause);
+                    pause();
+                    answer(evaluator, &mut waiting, &answers);
                     continue;
                 }
                 Err(RecvTimeoutError::Disconnected) => break,
             }
             if !waiting.is_empty() && waiting.len() == working {
-                answer(evaluator, &mut waiting, &answers, &mut pause);
+                pause();
+                answer(evaluator, &mut waiting, &answers);
             }
         }
         threads
@@ -121,9 +118,10 @@ fn answer(
     evaluator: &mut dyn Evaluator,
     waiting: &mut Vec<(usize, Vec<f64>)>,
     answers: &[Sender<Result<Evaluation>>],
-    pause: &mut impl FnMut(),
 ) {
-    pause();
+    if waiting.is_empty() {
+        return;
+    }
     // The order of arrival depends on threads; that of the call does not where all have asked.
     waiting.sort_by_key(|(client, _)| *client);
     let width = evaluator.problem().objectives.len();

@@ -224,6 +224,7 @@ mod x86 {
                 #[inline(always)]
                 fn whole(self, most: usize) -> Self {
                     let held = self.max(Self::lit(0.0)).min(Self::lit(most as f64));
+                    // SAFETY: the set is there; no memory is touched.
                     unsafe { Self::of_register($float($truncate(held.register()))) }
                 }
                 #[inline(always)]

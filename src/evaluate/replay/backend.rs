@@ -43,5 +43,5 @@ pub fn open_evaluator<'a>(
 /// Bytes that a candidate takes at the most while it is evaluated: the figures of its car, once here and once on a device,
 /// its errors in every window here or how far each is there, its place and its row.
 fn bytes_each(replay: &ReplayProblem) -> u64 {
-    8 * replay.base().len() as u64 + 48 * replay.plan.windows.len() as u64 + 320
+    8 * replay.free.base().len() as u64 + 48 * replay.plan.windows.len() as u64 + 320
 }

@@ -171,11 +171,10 @@ impl ExactSolvers {
         let mut best = self.best(objective)?;
         if objective == LineObjective::LapTime
             && let Some(line) = &mut best
+            && let Some(about) = self.about_itself(&line.alpha, ABOUTS)?
         {
-            if let Some(about) = self.about_itself(&line.alpha, ABOUTS)? {
-                line.seconds += about.seconds;
-                (line.alpha, line.status) = (about.x, about.status);
-            }
+            line.seconds += about.seconds;
+            (line.alpha, line.status) = (about.x, about.status);
         }
         Ok(best)
     }

@@ -4,15 +4,17 @@
 //! come, so that a sweep that was broken off goes on where it stopped; they hold nothing that depends on the clock.
 
 mod grid;
+mod identified;
 mod joint;
 mod results;
 
 pub use grid::{Point, SweepSettings};
 pub use results::{Row, Summary, medians};
 
+use self::identified::{alike, identified};
 use crate::error::{Error, Result};
 use crate::report::write_whole;
-use crate::study::identify::{self, IdentifySettings};
+use crate::study::identify::IdentifySettings;
 use crate::study::memory::USUAL_MIB;
 use crate::study::raceline::{self, RacelineSettings};
 use std::collections::BTreeMap;
@@ -115,32 +117,41 @@ fn run_points(
     rows: &mut Vec<Row>,
     observe: &mut dyn FnMut(&SweepProgress<'_>) -> ControlFlow<()>,
 ) -> Result<()> {
-    for (number, point) in points.iter().enumerate().skip(rows.len()) {
+    let paths: Vec<PathBuf> = (0..points.len()).map(path_of).collect();
+    while rows.len() < points.len() {
+        let number = rows.len();
         let progress = SweepProgress {
             done: number,
             planned: points.len(),
-            point,
+            point: &points[number],
         };
         if observe(&progress).is_break() {
             return Err(Error::Interrupted(folder.to_owned()));
         }
-        let path = path_of(number);
+        let told = || observe(&progress);
         let found = match settings.study {
-            SweptStudy::Identify => identified(&path, || observe(&progress)),
-            SweptStudy::Raceline => lined(&path, || observe(&progress)),
+            SweptStudy::Identify => {
+                let together = alike(&paths[number..]);
+                identified(&paths[number..number + together], told)
+            }
+            SweptStudy::Raceline => lined(&paths[number], told).map(|found| vec![found]),
         };
-        let found = found.map_err(|e| settings.of_point(e, number, point, &path))?;
-        // A run that was broken off is no row: it is done anew.
-        let Some((figures, front)) = found else {
-            return Err(Error::Interrupted(folder.to_owned()));
-        };
-        rows.push(Row {
-            run: number,
-            settings: point.settings.clone(),
-            figures,
-            front,
-        });
+        let found = found.map_err(|e| settings.of_point(e, number, &points[number], &paths[number]))?;
+        // A run that was broken off is no row: it is done anew, as is what comes after it.
+        let whole = found.iter().take_while(|found| found.is_some()).count();
+        let broken_off = whole < found.len();
+        for (figures, front) in found.into_iter().take(whole).flatten() {
+            rows.push(Row {
+                run: rows.len(),
+                settings: points[rows.len()].settings.clone(),
+                figures,
+                front,
+            });
+        }
         results::write_rows(&folder.join(ROWS), rows)?;
+        if broken_off {
+            return Err(Error::Interrupted(folder.to_owned()));
+        }
     }
     Ok(())
 }
@@ -148,35 +159,6 @@ fn run_points(
 type Figures = BTreeMap<String, Option<f64>>;
 /// Figures, and the objectives of a front where there is one.
 type Found = (Figures, Vec<Vec<f64>>);
-
-fn identified(path: &Path, mut observe: impl FnMut() -> ControlFlow<()>) -> Result<Option<Found>> {
-    let settings = IdentifySettings::read(path)?;
-    let setup = identify::set_up(&settings)?;
-    let outcome = identify::search(&settings, &setup, |_| observe())?;
-    if outcome.interrupted {
-        return Ok(None);
-    }
-    let summary = identify::summarise(&settings, &setup, &outcome);
-    let mut figures = Figures::from([
-        ("evaluations".to_owned(), Some(outcome.evaluations as f64)),
-        (
-            "best_cost".to_owned(),
-            outcome.history.last().and_then(|row| row.best.first().copied()),
-        ),
-        (
-            "swarm_total_parameter_error".to_owned(),
-            summary.swarm_total_parameter_error,
-        ),
-        ("total_parameter_error".to_owned(), summary.total_parameter_error),
-    ]);
-    figures.extend(
-        summary
-            .costs
-            .iter()
-            .map(|(channel, cost)| (format!("cost_{channel}"), Some(*cost))),
-    );
-    Ok(Some((figures, Vec::new())))
-}
 
 fn lined(path: &Path, mut observe: impl FnMut() -> ControlFlow<()>) -> Result<Option<Found>> {
     let settings = RacelineSettings::read(path)?;
