@@ -15,7 +15,7 @@ use std::sync::atomic::Ordering;
                   false\n  [grid]\n  \"swarm.population\" = [25, 50, 100]\n  seed = [1, 2, 3]"
 )]
 pub struct Arguments {
-    /// A sweep file, or a bundled sweep: thesis_inertia, thesis_population, front, norms, sections
+    /// A sweep file, or a bundled sweep: thesis_inertia, thesis_population, thesis_lines, front, norms, sections
     sweep: String,
     #[command(flatten)]
     common: Common,

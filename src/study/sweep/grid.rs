@@ -31,7 +31,7 @@ pub struct Point {
 }
 
 /// Sweep files that come with the crate, by name.
-const BUNDLED: [(&str, &str); 5] = [
+const BUNDLED: [(&str, &str); 6] = [
     (
         "thesis_inertia",
         include_str!("../../../data/sweeps/thesis_inertia.toml"),
@@ -39,6 +39,10 @@ const BUNDLED: [(&str, &str); 5] = [
     (
         "thesis_population",
         include_str!("../../../data/sweeps/thesis_population.toml"),
+    ),
+    (
+        "thesis_lines",
+        include_str!("../../../data/sweeps/thesis_lines.toml"),
     ),
     ("front", include_str!("../../../data/sweeps/front.toml")),
     ("norms", include_str!("../../../data/sweeps/norms.toml")),
