@@ -163,7 +163,8 @@ impl Road<f64> {
             let shape = |plan: &SpeedPlan| (plan.speed_mps.len(), plan.spacing_m);
             let (cells, cell_m) = line.plans.first().map_or((0, 1.0), shape);
             let alike = line.plans.iter().all(|plan| shape(plan) == (cells, cell_m));
-            if line.plans.len() != plans_per_line || !alike || cells == 0 || cell_m < LEAST_SPACING_M {
+            if line.plans.len() != plans_per_line || !alike || cells < FRONT_CELLS || cell_m < LEAST_SPACING_M
+            {
                 let found = format!("{} plans, the first of {cells} cells", line.plans.len());
                 return refuse(
                     name,

@@ -79,7 +79,9 @@ pub fn run_packed<T: Send>(
             }
         })
         .collect();
-    thread::scope(|scope| {
+    thread::scope(move |scope| {
+        // Gone with this thread, should it panic: searches that wait for an answer see it.
+        let (answers, asked) = (answers, asked);
         let threads: Vec<_> = searches
             .into_iter()
             .zip(clients)

@@ -137,7 +137,8 @@ impl Strategy {
                 Free::Acceleration => gates.ax_mps2 = value,
                 Free::Soc => gates.soc = value,
                 Free::Energy => gates.energy_mj = value,
-                Free::Motor => gates.motor_share = 1e3 * value / power_w,
+                // A car without a motor has none at any share.
+                Free::Motor => gates.motor_share = 1e3 * value / power_w.max(1.0),
                 Free::Zone(zone) => shares[*zone] = value,
             }
         }

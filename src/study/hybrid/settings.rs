@@ -119,6 +119,9 @@ impl Default for HybridStudySettings {
     }
 }
 
+/// Searches that a sizing comes to at most: the strategy's own, and in each of eight ranges a whole one and seven of a quarter.
+const SIZING: usize = 24;
+
 /// Objectives that a study may name.
 pub const HYBRID_OBJECTIVES: &str = "lap_time_s, fuel_l, energy_used_mj, soc_swing";
 
@@ -224,7 +227,13 @@ impl HybridStudySettings {
             population: self.population,
             // Zones and control points are fewer than the sections of the line.
             variables: self.sections,
-            iterations: self.iterations,
+            // Sizes are searched for each range and energy, all of which the journal holds.
+            iterations: self.iterations
+                * if self.match_lap_time_s.is_some() {
+                    SIZING
+                } else {
+                    1
+                },
             sections: self.sections,
             archive: 0,
             journal: true,

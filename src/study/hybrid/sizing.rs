@@ -4,7 +4,7 @@ use super::scenario::{ReportedLap, drive};
 use super::settings::HybridStudySettings;
 use super::setup::HybridSetup;
 use super::strategy::{MOST_MJ, zone_gates};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::evaluate::hybrid::{Free, HybridObjective, HybridProblem, open_hybrid_evaluator};
 use crate::line::energy::{Gates, Mode};
 use crate::study::journal::Recorder;
@@ -27,7 +27,7 @@ pub struct Sizing {
     pub harvested_mj: f64,
     /// Greatest fall of the charge along the lap (MJ): the least that a store has to hold.
     pub store_mj: f64,
-    /// Time (s).
+    /// Time (s), within some thousandths of the one asked for where the motor suffices; else the best there is.
     pub lap_time_s: f64,
     /// Time of the exact deployment of as much energy by the same motor (s); `null` where no energy was enough.
     pub exact_lap_time_s: Option<f64>,
@@ -84,7 +84,7 @@ pub fn engine_only(setup: &HybridSetup, lap_time_s: f64) -> Result<Option<(f64, 
 const MOTOR: usize = 0;
 /// Ranges of the motor's power that are looked through, alike in width.
 const RANGES: usize = 8;
-/// Laps this close to the one asked for are as fast (s).
+/// Laps this close to the one asked for are as fast (s), and no more energies are tried.
 const CLOSE_S: f64 = 3e-3;
 /// Energies that are tried in a range, at most.
 const ENERGIES: usize = 8;
@@ -113,8 +113,16 @@ pub fn size(
     let engine_s = drive(setup, "engine alone", Mode::Additional, zone_gates(0.0))?
         .lap
         .time;
+    if engine_s <= lap_time_s {
+        return Err(Error::input(
+            "the study",
+            "match_lap_time_s",
+            format!("{lap_time_s} s"),
+            format!("less than the {engine_s:.3} s of the engine alone"),
+        ));
+    }
     let mut evaluations = 0;
-    let mut found: Vec<(Vec<f64>, ReportedLap)> = Vec::new();
+    let mut found: Vec<Found> = Vec::new();
     let mut interrupted = false;
     for range in 0..RANGES {
         let bounds_kw = [range, range + 1].map(|step| step_kw * step as f64);
@@ -125,8 +133,9 @@ pub fn size(
         // Energies (MJ) that are too small and more than enough, and by how much (s).
         let mut few = (0.0, engine_s - lap_time_s);
         let mut many = (lap.lap.deployed / 1e6, lap.lap.time - lap_time_s);
+        let suffices = many.1 <= CLOSE_S;
         for round in 0..ENERGIES {
-            if interrupted || few.1 <= 0.0 || many.1 >= -CLOSE_S {
+            if interrupted || many.1 >= -CLOSE_S {
                 break;
             }
             let energy_mj = few.0 + (many.0 - few.0) * few.1 / (few.1 - many.1);
@@ -184,32 +193,44 @@ pub fn size(
                 few.1 *= 0.5;
             }
         }
-        found.push((best, lap));
+        // What a range had come to when it was broken off is no answer.
         if interrupted {
             break;
         }
+        found.push(Found {
+            candidate: best,
+            lap,
+            suffices,
+        });
     }
     let rival = engine_only(setup, lap_time_s)?;
     let rows = found
         .par_iter()
-        .map(|(candidate, lap)| row_of(setup, &whole, (candidate, lap), (lap_time_s, rival)))
+        .map(|found| row_of(setup, &whole, found, rival))
         .collect::<Result<_>>()?;
     Ok((rows, evaluations))
+}
+
+/// The strategy of a range, and whether its strongest motor suffices at all.
+struct Found {
+    candidate: Vec<f64>,
+    lap: ReportedLap,
+    suffices: bool,
 }
 
 fn row_of(
     setup: &HybridSetup,
     problem: &HybridProblem,
-    (candidate, lap): (&[f64], &ReportedLap),
-    (lap_time_s, rival): (f64, Option<(f64, f64)>),
+    found: &Found,
+    rival: Option<(f64, f64)>,
 ) -> Result<Sizing> {
+    let (candidate, met) = (&found.candidate, found.suffices);
     let (mut most_j, mut store_j) = (0.0f64, 0.0f64);
-    for charge_j in lap.change_j() {
+    for charge_j in found.lap.change_j() {
         most_j = most_j.max(charge_j);
         store_j = store_j.max(most_j - charge_j);
     }
-    let lap = &lap.lap;
-    let met = lap.time <= lap_time_s + CLOSE_S;
+    let lap = &found.lap.lap;
     let rival = rival.filter(|_| met);
     let share = problem.strategy_of(candidate).0.motor_share;
     let hybrid = Hybrid {

@@ -37,8 +37,13 @@ pub struct ParameterSummary {
     pub at_bound: bool,
 }
 
-/// A value this share of the range from a bound is at it: the polish begins no nearer.
+/// A value this share of the range from a bound is at it, of the logarithms' range where both bounds are positive.
 const AT_BOUND: f64 = 1e-3;
+
+fn at_bound(value: f64, bounds: [f64; 2]) -> bool {
+    let [x, low, high] = [value, bounds[0], bounds[1]].map(|x| if bounds[0] > 0.0 { x.ln() } else { x });
+    (x - low).min(high - x) <= AT_BOUND * (high - low)
+}
 
 /// The figures of an identification; `--json` prints this.
 #[derive(Clone, Debug, Serialize)]
@@ -162,9 +167,7 @@ pub fn summarise(settings: &IdentifySettings, setup: &Setup, outcome: &Outcome) 
             value: told(k).then_some(outcome.candidate[k]),
             standard_error: Some(identifiability.standard_errors[k]).filter(|e| e.is_finite()),
             truth: setup.truth.as_ref().map(|t| t[k]),
-            at_bound: told(k)
-                && (outcome.candidate[k] - v.lower).min(v.upper - outcome.candidate[k])
-                    <= AT_BOUND * (v.upper - v.lower),
+            at_bound: told(k) && at_bound(outcome.candidate[k], [v.lower, v.upper]),
         })
         .collect();
     Summary {

@@ -13,10 +13,16 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// Swarms that run at a time: eight of fifty particles fill the lanes of a small device.
 const TOGETHER: usize = 8;
 
+/// Swarms of more particles than this fill a device by themselves, and count by themselves against the memory.
+const SMALL: usize = 4096;
+
 /// How many of the studies, from the first on, are of the same problem and fit together. A study that cannot be read is one by
 /// itself, whose run says what is wrong with it.
 pub(super) fn alike(paths: &[PathBuf]) -> usize {
-    let problem = |path: &Path| IdentifySettings::read(path).ok().map(problem_of);
+    let problem = |path: &Path| {
+        let settings = IdentifySettings::read(path).ok()?;
+        (settings.size().population <= SMALL).then(|| problem_of(settings))
+    };
     let Some(first) = paths.first().and_then(|path| problem(path)) else {
         return 1;
     };
@@ -46,10 +52,13 @@ fn problem_of(settings: IdentifySettings) -> IdentifySettings {
 }
 
 /// Runs studies of one problem at the same time; nothing for each that was broken off.
+///
+/// # Errors
+/// Those of the problem; those of a search are in its place.
 pub(super) fn identified(
     paths: &[PathBuf],
     mut observe: impl FnMut() -> ControlFlow<()>,
-) -> Result<Vec<Option<Found>>> {
+) -> Result<Vec<Result<Option<Found>>>> {
     let studies = paths
         .iter()
         .map(|path| IdentifySettings::read(path))
@@ -78,12 +87,11 @@ pub(super) fn identified(
             }
         })
         .collect();
-    let found = run_packed(evaluator.as_mut(), searches, || {
+    Ok(run_packed(evaluator.as_mut(), searches, || {
         if observe().is_break() {
             stop.store(true, Ordering::Relaxed);
         }
-    });
-    found.into_iter().collect()
+    }))
 }
 
 fn figures_of(settings: &IdentifySettings, setup: &identify::Setup, outcome: &identify::Outcome) -> Found {

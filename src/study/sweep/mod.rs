@@ -134,23 +134,22 @@ fn run_points(
                 let together = alike(&paths[number..]);
                 identified(&paths[number..number + together], told)
             }
-            SweptStudy::Raceline => lined(&paths[number], told).map(|found| vec![found]),
+            SweptStudy::Raceline => Ok(vec![lined(&paths[number], told)]),
         };
         let found = found.map_err(|e| settings.of_point(e, number, &points[number], &paths[number]))?;
-        // A run that was broken off is no row: it is done anew, as is what comes after it.
-        let whole = found.iter().take_while(|found| found.is_some()).count();
-        let broken_off = whole < found.len();
-        for (figures, front) in found.into_iter().take(whole).flatten() {
+        for (run, found) in (number..).zip(found) {
+            let found = found.map_err(|e| settings.of_point(e, run, &points[run], &paths[run]))?;
+            // A run that was broken off is no row: it is done anew, as is what comes after it.
+            let Some((figures, front)) = found else {
+                return Err(Error::Interrupted(folder.to_owned()));
+            };
             rows.push(Row {
-                run: rows.len(),
-                settings: points[rows.len()].settings.clone(),
+                run,
+                settings: points[run].settings.clone(),
                 figures,
                 front,
             });
-        }
-        results::write_rows(&folder.join(ROWS), rows)?;
-        if broken_off {
-            return Err(Error::Interrupted(folder.to_owned()));
+            results::write_rows(&folder.join(ROWS), rows)?;
         }
     }
     Ok(())

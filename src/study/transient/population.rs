@@ -153,6 +153,15 @@ impl PopulationSettings {
                     ));
                 };
                 let value = flat[parameter.slots[0]];
+                if parameter.slots.iter().any(|slot| flat[*slot] != value) {
+                    let expected = format!("front.{name} or rear.{name}, whose values differ");
+                    return Err(Error::input(
+                        &car.name,
+                        "parameters",
+                        format!("`{name}`"),
+                        expected,
+                    ));
+                }
                 if value == 0.0 {
                     let expected = "one that is not nought, which no share of itself moves";
                     return Err(Error::input(&car.name, name, "0", expected));
