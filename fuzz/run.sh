@@ -28,7 +28,7 @@ for target in "$@"; do
     while left=$((end - $(date +%s))) && [ "$left" -gt 2 ] && [ "$runs" -lt 20 ]; do
         runs=$((runs + 1))
         "$FUZZ_BIN/$target" "corpus/$target" -max_total_time="$left" -rss_limit_mb=2048 -malloc_limit_mb=1024 \
-            -timeout=20 -max_len="$most" -print_funcs=0 -print_final_stats=1 -artifact_prefix="artifacts/$target/" >"$log.last" 2>&1 || true
+            -timeout=120 -max_len="$most" -print_funcs=0 -print_final_stats=1 -artifact_prefix="artifacts/$target/" >"$log.last" 2>&1 || true
         done=$(sed -n 's/^stat::number_of_executed_units: *//p' "$log.last")
         executions=$((executions + ${done:-0}))
         cat "$log.last" >>"$log"

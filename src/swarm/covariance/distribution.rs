@@ -1,19 +1,30 @@
 //! The normal distribution that the particles are drawn from, and how it adapts.
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 
 /// Centre, step size and covariance over the unit cube, with their evolution paths.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(in crate::swarm) struct Distribution {
     pub mean: DVector<f64>,
     pub step: f64,
+    #[serde(deserialize_with = "square")]
     covariance: DMatrix<f64>,
+    #[serde(deserialize_with = "square")]
     basis: DMatrix<f64>,
     scales: DVector<f64>,
     covariance_path: DVector<f64>,
     step_path: DVector<f64>,
     age: i32,
+}
+
+/// A square matrix as it is kept. `nalgebra` takes rows times columns without a look at how large they are.
+fn square<'de, D: Deserializer<'de>>(deserializer: D) -> Result<DMatrix<f64>, D::Error> {
+    let (figures, rows, columns) = <(Vec<f64>, usize, usize)>::deserialize(deserializer)?;
+    if rows != columns || rows.checked_mul(columns) != Some(figures.len()) {
+        return Err(serde::de::Error::custom("a matrix that is not square"));
+    }
+    Ok(DMatrix::from_vec(rows, columns, figures))
 }
 
 /// Eigenvalues of the covariance are kept above this.
@@ -146,4 +157,26 @@ fn negative_weights(raw: &[f64], (n, effective): (f64, f64), (rate_one, rate_man
     let positive = (1.0 - rate_one - rate_many) / (n * rate_many);
     let total = balanced.min(mass).min(positive);
     raw.iter().map(|w| w.min(0.0) * total / -sum).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_matrix_of_more_figures_than_it_has_is_refused() {
+        let none = || DVector::<f64>::zeros(0);
+        let written = |rows: usize, columns: usize| {
+            let covariance = (Vec::<f64>::new(), rows, columns);
+            let basis = DMatrix::<f64>::zeros(0, 0);
+            let parts = (none(), 0.1, covariance, basis, none(), none(), none(), 0i32);
+            postcard::to_allocvec(&parts).expect("bytes")
+        };
+        let read = |bytes: &[u8]| postcard::from_bytes::<Distribution>(bytes).map(drop);
+        read(&written(0, 0)).expect("an empty one");
+        // Rows times columns are nought where they are counted in 64 bits.
+        assert!(read(&written(1 << 63, 2)).is_err());
+        assert!(read(&written(1 << 32, 1 << 32)).is_err());
+        assert!(read(&written(2, 2)).is_err());
+    }
 }
