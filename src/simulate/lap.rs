@@ -103,8 +103,8 @@ pub fn simulate_lap(car: &Car, circuit: &Circuit, settings: &SimulateSettings) -
     let (outputs, drives) = trace(&car.to_flat(), car.tyre_model(), &plan, &window);
     if !drives {
         return Err(Error::Study(format!(
-            "the car, replayed open loop from its logged inputs at {} Hz in {} steps per sample, is lost; try a \
-             higher rate or a lower pace than {}",
+            "the car, replayed open loop from its logged inputs at {} Hz in {} steps per sample, is lost; try more \
+             steps (--substeps), a higher rate or a lower pace than {}",
             settings.rate_hz, settings.substeps, settings.driver.pace
         )));
     }

@@ -159,7 +159,7 @@ pub fn run_recorded(
             let told = observe(&HybridProgress {
                 stage: "sizes",
                 evaluations: p.evaluations,
-                best: format!("{:.4} s", p.best[0]),
+                best: p.best.first().map_or(String::new(), |s| format!("{s:.4} s")),
             });
             interrupted |= told.is_break();
             told

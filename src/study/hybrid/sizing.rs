@@ -204,10 +204,26 @@ pub fn size(
         });
     }
     let rival = engine_only(setup, lap_time_s)?;
-    let rows = found
-        .par_iter()
-        .map(|found| row_of(setup, &whole, found, rival))
-        .collect::<Result<_>>()?;
+    let mut rows: Vec<Sizing> = Vec::new();
+    // The exact solver takes seconds for each, in which it may be broken off too.
+    for some in found.chunks(2) {
+        let told = Progress {
+            iteration: 0,
+            evaluations,
+            best: rows.iter().map(|row| row.lap_time_s).take(1).collect(),
+            median: None,
+            failed: 0,
+            failures: Default::default(),
+        };
+        if observe(&told).is_break() {
+            break;
+        }
+        let solved: Vec<Sizing> = some
+            .par_iter()
+            .map(|found| row_of(setup, &whole, found, rival))
+            .collect::<Result<_>>()?;
+        rows.extend(solved);
+    }
     Ok((rows, evaluations))
 }
 

@@ -171,6 +171,14 @@ fn choose_laps(settings: &IdentifySettings, log: &Log) -> Result<(LapRanges, Lap
         })?;
         Ok((lap.start, lap.end))
     };
+    if let Some(both) = settings.holdout.iter().find(|lap| settings.laps.contains(lap)) {
+        return Err(Error::input(
+            &log.source,
+            "holdout",
+            format!("lap {both}, which is fitted too"),
+            "laps that are not fitted",
+        ));
+    }
     let held: LapRanges = settings.holdout.iter().map(range_of).collect::<Result<_>>()?;
     let fitted: LapRanges = if settings.laps.is_empty() {
         let wanted = log

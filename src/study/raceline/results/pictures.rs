@@ -208,7 +208,7 @@ fn draw_traces(path: &Path, setup: &Setup, lines: &[&ReportedLine], fastest: &Re
         .collect::<Vec<_>>();
     if !delta.is_empty() {
         panels.push(CurvePanel {
-            title: "Time lost on the fastest line",
+            title: "Time lost to the fastest line",
             x_label: "distance along the reference line (m)",
             y_label: "time (s)",
             curves: delta,
