@@ -246,7 +246,7 @@ fn a_killed_plain_swarm_ends_as_one_that_was_left_alone() {
         "--population",
         "16",
         "--iterations",
-        "60",
+        "240",
         "--backend",
         "simd",
     ];

@@ -283,6 +283,26 @@ impl<'de> Deserialize<'de> for BackendInfo {
     }
 }
 
+impl BackendInfo {
+    /// The reference: `f64` on the processor.
+    pub(crate) fn reference() -> Self {
+        Self {
+            backend: "cpu",
+            device: "f64 reference".to_owned(),
+            driver: String::new(),
+        }
+    }
+
+    /// Lanes of an instruction set.
+    pub(crate) fn of_lanes(set: simd::InstructionSet) -> Self {
+        Self {
+            backend: "simd",
+            device: set.name().to_owned(),
+            driver: String::new(),
+        }
+    }
+}
+
 /// Scores whole populations of candidates.
 pub trait Evaluator {
     /// The problem that candidates belong to.

@@ -44,11 +44,7 @@ impl Evaluator for CpuLineEvaluator<'_> {
     }
 
     fn backend(&self) -> BackendInfo {
-        BackendInfo {
-            backend: "cpu",
-            device: "f64 reference".to_owned(),
-            driver: String::new(),
-        }
+        BackendInfo::reference()
     }
 
     fn evaluate(&mut self, population: &[f64]) -> Result<Evaluation> {

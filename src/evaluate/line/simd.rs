@@ -80,11 +80,7 @@ impl Evaluator for SimdLineEvaluator<'_> {
     }
 
     fn backend(&self) -> BackendInfo {
-        BackendInfo {
-            backend: "simd",
-            device: self.set.name().to_owned(),
-            driver: String::new(),
-        }
+        BackendInfo::of_lanes(self.set)
     }
 
     fn evaluate(&mut self, population: &[f64]) -> Result<Evaluation> {

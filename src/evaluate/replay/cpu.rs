@@ -39,11 +39,7 @@ impl Evaluator for CpuEvaluator<'_> {
     }
 
     fn backend(&self) -> BackendInfo {
-        BackendInfo {
-            backend: "cpu",
-            device: "f64 reference".to_owned(),
-            driver: String::new(),
-        }
+        BackendInfo::reference()
     }
 
     fn evaluate(&mut self, population: &[f64]) -> Result<Evaluation> {

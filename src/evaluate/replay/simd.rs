@@ -82,11 +82,7 @@ impl Evaluator for SimdEvaluator<'_> {
     }
 
     fn backend(&self) -> BackendInfo {
-        BackendInfo {
-            backend: "simd",
-            device: self.set.name().to_owned(),
-            driver: String::new(),
-        }
+        BackendInfo::of_lanes(self.set)
     }
 
     fn evaluate(&mut self, population: &[f64]) -> Result<Evaluation> {
