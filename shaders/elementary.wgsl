@@ -6,7 +6,8 @@
 // They work on four figures side by side, one per wheel: polynomials are long chains of dependent operations, and
 // one chain fills the other's waits, as `Pair` in `src/scalar/pair.rs` has it on the processor. Where two functions of
 // the wheels are wanted at once, `_each` takes them in lockstep, for the same reason; a lone one is half of that, of
-// which every compiler sees that its halves are the same.
+// which every compiler sees that its halves are the same. Compilers put one chain behind the other again to save
+// registers, so the longest polynomials are split by powers of the square as well: their halves wait for nothing.
 
 // Figures of the wheels FL, FR, RL, RR.
 alias Wheels = vec4<f32>;
@@ -70,17 +71,11 @@ fn cosine_polynomial(r: Wheels) -> Wheels {
 fn sine_pi_polynomial_each(x: Wheels, y: Wheels) -> WheelsPair {
     let t = x * x;
     let u = y * y;
-    var p = Wheels(7.9835765e-2);
-    var q = Wheels(7.9835765e-2);
-    p = p * t + -0.59943736;
-    q = q * u + -0.59943736;
-    p = p * t + 2.5502698;
-    q = q * u + 2.5502698;
-    p = p * t + -5.167721;
-    q = q * u + -5.167721;
-    p = p * t + 3.141592653589793;
-    q = q * u + 3.141592653589793;
-    return WheelsPair(x * p, y * q);
+    let tt = t * t;
+    let uu = u * u;
+    let p = (t * 2.5502698 + -5.167721) + tt * (t * 7.9835765e-2 + -0.59943736);
+    let q = (u * 2.5502698 + -5.167721) + uu * (u * 7.9835765e-2 + -0.59943736);
+    return WheelsPair(x * (p * t + 3.141592653589793), y * (q * u + 3.141592653589793));
 }
 
 fn reduce(x: Wheels, half_turns: Wheels) -> Wheels {
@@ -138,24 +133,14 @@ fn own_atan_each(x: Wheels, y: Wheels) -> WheelsPair {
     let b = select(y, 1.0 / y, large_y);
     let t = a * a;
     let u = b * b;
-    var p = Wheels(2.9168893e-3);
-    var q = Wheels(2.9168893e-3);
-    p = p * t + -1.6358716e-2;
-    q = q * u + -1.6358716e-2;
-    p = p * t + 4.320277e-2;
-    q = q * u + 4.320277e-2;
-    p = p * t + -7.5516604e-2;
-    q = q * u + -7.5516604e-2;
-    p = p * t + 0.10665769;
-    q = q * u + 0.10665769;
-    p = p * t + -0.14211002;
-    q = q * u + -0.14211002;
-    p = p * t + 0.19993767;
-    q = q * u + 0.19993767;
-    p = p * t + -0.33333153;
-    q = q * u + -0.33333153;
-    let angle_x = a * (p * t + 1.0);
-    let angle_y = b * (q * u + 1.0);
+    let tt = t * t;
+    let uu = u * u;
+    let high_x = (t * 4.320277e-2 + -7.5516604e-2) + tt * (t * 2.9168893e-3 + -1.6358716e-2);
+    let high_y = (u * 4.320277e-2 + -7.5516604e-2) + uu * (u * 2.9168893e-3 + -1.6358716e-2);
+    let low_x = (t * 0.19993767 + -0.33333153) + tt * (t * 0.10665769 + -0.14211002);
+    let low_y = (u * 0.19993767 + -0.33333153) + uu * (u * 0.10665769 + -0.14211002);
+    let angle_x = a * ((low_x + (tt * tt) * high_x) * t + 1.0);
+    let angle_y = b * ((low_y + (uu * uu) * high_y) * u + 1.0);
     let quarter_x = with_sign_of(Wheels(1.5707963267948966), x);
     let quarter_y = with_sign_of(Wheels(1.5707963267948966), y);
     return WheelsPair(

@@ -1,11 +1,12 @@
 // Twin of `src/line/kernel.rs`: from a candidate's variables to the shape of its line and the time of a lap on it.
 //
-// One lane per candidate. Segment lengths, curvatures and speeds squared stand in a buffer, section by section, so that
-// neighbouring lanes meet in neighbouring memory. All lanes start a lap's passes at the same section, for the same
-// reason. The constants CLOSED, TERMS, WANTS_INTEGRAL, WANTS_LAP, LIMIT_ROWS, CORNER_ROWS, ELLIPSE_ROWS and WORKGROUP
-// are generated, and so are the bindings 1 and 2: `sections`, and `limits` in rows of lateral, grip, drive, drag at their
-// start and then of their rises. All lanes read the same section, so that these are uniform where they fit; limits only
-// where the driver does not mind that lanes read different rows.
+// One lane per candidate. Segment lengths, curvatures and speeds squared stand in a buffer, in tiles of TILE lanes: section
+// by section within a tile, so that neighbouring lanes meet in neighbouring memory and so do neighbouring sections. All
+// lanes start a lap's passes at the same section, for the same reason. The constants CLOSED, TERMS, WANTS_INTEGRAL,
+// WANTS_LAP, LIMIT_ROWS, CORNER_ROWS, ELLIPSE_ROWS, WORKGROUP and TILE are generated, and so are the bindings 1 to 4:
+// `sections`; `limits` in rows of lateral, grip, drive, drag at their start and then of their rises; `corners` and
+// `ellipse` in rows of a figure and its rise. All lanes read the same section, so that these are uniform where they fit;
+// limits only where the driver does not mind that lanes read different rows.
 
 // What a dispatch is to do; twin of `LineStretch` in `src/evaluate/line/gpu.rs`.
 struct LineStretch {
@@ -29,11 +30,11 @@ struct Section {
     cut: vec2<f32>,
     constant: f32,
     inverse_spacing: f32,
+    // The next section that takes other variables, or one past the last.
+    until: u32,
 }
 
 @group(0) @binding(0) var<uniform> stretch: LineStretch;
-@group(0) @binding(3) var<storage, read> corners: array<vec2<f32>>;
-@group(0) @binding(4) var<storage, read> ellipse: array<vec2<f32>>;
 @group(0) @binding(5) var<storage, read> variables: array<f32>;
 // Length of the segment and curvature, section by section.
 @group(0) @binding(6) var<storage, read_write> course: array<vec2<f32>>;
@@ -44,7 +45,7 @@ struct Section {
 const BLOCK: u32 = 64u;
 
 fn place_of(section: u32, candidate: u32) -> u32 {
-    return section * stretch.stride + candidate;
+    return (candidate / TILE * stretch.sections + section) * TILE + candidate % TILE;
 }
 
 struct Segment {
@@ -72,69 +73,86 @@ fn variable(source: u32, candidate: u32) -> f32 {
     return variables[source * stretch.stride + candidate];
 }
 
-fn alpha(section: u32, candidate: u32) -> f32 {
-    var sum = sections[section].constant;
-    let weights = sections[section].weights;
+// The variables that `alpha` is the sum of at a section.
+fn variables_of(section: u32, candidate: u32) -> vec4<f32> {
+    var own = vec4<f32>(0.0);
     let sources = sections[section].sources;
     if TERMS > 0u {
-        sum = sum + weights.x * variable(sources.x, candidate);
+        own.x = variable(sources.x, candidate);
     }
     if TERMS > 1u {
-        sum = sum + weights.y * variable(sources.y, candidate);
-        sum = sum + weights.z * variable(sources.z, candidate);
-        sum = sum + weights.w * variable(sources.w, candidate);
+        own.y = variable(sources.y, candidate);
+        own.z = variable(sources.z, candidate);
+        own.w = variable(sources.w, candidate);
+    }
+    return own;
+}
+
+fn alpha(section: u32, own: vec4<f32>) -> f32 {
+    var sum = sections[section].constant;
+    let weights = sections[section].weights;
+    if TERMS > 0u {
+        sum = sum + weights.x * own.x;
+    }
+    if TERMS > 1u {
+        sum = sum + weights.y * own.y;
+        sum = sum + weights.z * own.z;
+        sum = sum + weights.w * own.w;
     }
     sum = select(sum, 0.0, sum < 0.0);
     return select(sum, 1.0, 1.0 < sum);
 }
 
-fn offset(section: u32, candidate: u32) -> vec2<f32> {
-    return alpha(section, candidate) * sections[section].cut;
+fn offset(section: u32, own: vec4<f32>) -> vec2<f32> {
+    return alpha(section, own) * sections[section].cut;
 }
 
 // Sums of length, squared length, squared second differences and integral.
 fn shape(candidate: u32) -> vec4<f32> {
     let n = stretch.sections;
     let segments = select(n - 1u, n, CLOSED);
-    let first = offset(0u, candidate);
+    let first = offset(0u, variables_of(0u, candidate));
     var here = first;
     var before = Segment(vec2<f32>(0.0), 0.0, vec2<f32>(0.0), 0.0);
     if CLOSED {
-        before = segment_between(n - 1u, offset(n - 1u, candidate), first);
+        before = segment_between(n - 1u, offset(n - 1u, variables_of(n - 1u, candidate)), first);
     }
     var total = vec4<f32>(0.0);
     var block = vec4<f32>(0.0);
-    for (var i = 0u; i < segments; i++) {
-        var next = first;
-        if i + 1u < n {
-            next = offset(i + 1u, candidate);
-        }
-        let segment = segment_between(i, here, next);
-        block.x = block.x + segment.length;
-        block.y = block.y + segment.length * segment.length;
-        var curvature = 0.0;
-        if CLOSED || i > 0u {
-            let turn = segment.direction - before.direction;
-            let turned_squared = turn.x * turn.x + turn.y * turn.y;
-            let spacing = 0.5 * (before.length + segment.length);
-            let turned = sqrt(turned_squared);
-            curvature = turned / spacing;
-            block.z = block.z + second_difference_squared(segment, before);
-            if WANTS_INTEGRAL {
-                let across = sqrt(max(4.0 - turned_squared, 1e-6));
-                let half = own_atan(Wheels(turned / across)).x;
-                block.w = block.w + 4.0 * half * (half / spacing);
+    // The segment before section `i`. Variables are read once for all neighbouring sections that take the same.
+    var i = 1u;
+    while i <= segments {
+        let own = variables_of(min(i, n - 1u), candidate);
+        let until = select(n + 1u, sections[min(i, n - 1u)].until, i < n);
+        for (; i < until && i <= segments; i++) {
+            let next = select(first, offset(min(i, n - 1u), own), i < n);
+            let segment = segment_between(i - 1u, here, next);
+            block.x = block.x + segment.length;
+            block.y = block.y + segment.length * segment.length;
+            var curvature = 0.0;
+            if CLOSED || i > 1u {
+                let turn = segment.direction - before.direction;
+                let turned_squared = turn.x * turn.x + turn.y * turn.y;
+                let spacing = 0.5 * (before.length + segment.length);
+                let turned = sqrt(turned_squared);
+                curvature = turned / spacing;
+                block.z = block.z + second_difference_squared(segment, before);
+                if WANTS_INTEGRAL {
+                    let across = sqrt(max(4.0 - turned_squared, 1e-6));
+                    let half = own_atan(Wheels(turned / across)).x;
+                    block.w = block.w + 4.0 * half * (half / spacing);
+                }
             }
+            if WANTS_LAP {
+                course[place_of(i - 1u, candidate)] = vec2<f32>(segment.length, curvature);
+            }
+            if i % BLOCK == 0u || i == segments {
+                total = total + block;
+                block = vec4<f32>(0.0);
+            }
+            before = segment;
+            here = next;
         }
-        if WANTS_LAP {
-            course[place_of(i, candidate)] = vec2<f32>(segment.length, curvature);
-        }
-        if (i + 1u) % BLOCK == 0u || i + 1u == segments {
-            total = total + block;
-            block = vec4<f32>(0.0);
-        }
-        before = segment;
-        here = next;
     }
     if WANTS_LAP && !CLOSED {
         course[place_of(0u, candidate)].y = course[place_of(1u, candidate)].y;

@@ -118,6 +118,7 @@ fn line_shape(closed: bool, terms: usize, lap: bool) -> LineShape {
         uniform_sections: closed.then_some(360),
         uniform_limits: terms == 4,
         workgroup: 64,
+        tile: if terms == 4 { 8 } else { 64 },
     }
 }
 
@@ -296,6 +297,7 @@ fn structs_of_lines_have_the_hosts_offsets() {
         ("cut", offset_of!(DeviceSection, cut)),
         ("constant", offset_of!(DeviceSection, constant)),
         ("inverse_spacing", offset_of!(DeviceSection, inverse_spacing)),
+        ("until", offset_of!(DeviceSection, until)),
     ];
     assert_eq!((members, size), (named(&host), size_of::<DeviceSection>()));
 }

@@ -183,20 +183,30 @@ pub struct LineShape {
     pub ellipse_rows: usize,
     /// Sections, if their table is to be uniform.
     pub uniform_sections: Option<usize>,
-    /// Whether the table of limits is to be uniform.
+    /// Whether the tables of limits, of corner speeds and of the ellipse are to be uniform.
     pub uniform_limits: bool,
     /// Lanes of a workgroup.
     pub workgroup: u32,
+    /// Lanes whose figures of a section stand together in memory; divides the workgroup.
+    pub tile: u32,
 }
 
 impl LineShape {
     /// Source of the kernel; entry point `line`.
     pub fn source(&self) -> String {
+        let table = |name: &str, rows: usize| {
+            if self.uniform_limits {
+                format!("var<uniform> {name}: array<vec4<f32>, {rows}>")
+            } else {
+                format!("var<storage, read> {name}: array<vec4<f32>>")
+            }
+        };
         let constants = format!(
             "\n// Generated.\nconst CLOSED: bool = {};\nconst TERMS: u32 = {}u;\nconst WANTS_INTEGRAL: bool = {};\n\
              const WANTS_LAP: bool = {};\nconst LIMIT_ROWS: u32 = {}u;\nconst CORNER_ROWS: u32 = {}u;\n\
-             const ELLIPSE_ROWS: u32 = {}u;\nconst WORKGROUP: u32 = {}u;\n\
-             @group(0) @binding(1) {};\n@group(0) @binding(2) {};\n\n",
+             const ELLIPSE_ROWS: u32 = {}u;\nconst WORKGROUP: u32 = {}u;\nconst TILE: u32 = {}u;\n\
+             @group(0) @binding(1) {};\n@group(0) @binding(2) {};\n@group(0) @binding(3) {};\n\
+             @group(0) @binding(4) {};\n\n",
             self.closed,
             self.terms,
             self.wanted.integral,
@@ -205,15 +215,14 @@ impl LineShape {
             self.corner_rows,
             self.ellipse_rows,
             self.workgroup,
+            self.tile,
             match self.uniform_sections {
                 Some(count) => format!("var<uniform> sections: array<Section, {count}>"),
                 None => "var<storage, read> sections: array<Section>".to_owned(),
             },
-            if self.uniform_limits {
-                format!("var<uniform> limits: array<vec4<f32>, {}>", 2 * self.limit_rows)
-            } else {
-                "var<storage, read> limits: array<vec4<f32>>".to_owned()
-            },
+            table("limits", 2 * self.limit_rows),
+            table("corners", self.corner_rows),
+            table("ellipse", self.ellipse_rows.max(1)),
         );
         [ELEMENTARY, &constants, LINE].concat()
     }

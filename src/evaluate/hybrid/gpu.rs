@@ -2,9 +2,9 @@
 
 use super::problem::HybridProblem;
 use crate::error::{Error, Result};
-use crate::evaluate::gpu::shader::{EnergyShape, LineShape};
+use crate::evaluate::gpu::shader::EnergyShape;
 use crate::evaluate::gpu::{Binding, DeviceKind, GpuContext, Kernel};
-use crate::evaluate::line::{DeviceSection, LineBatching, LineStretch};
+use crate::evaluate::line::{LineBatching, LineStretch, LineTables};
 use crate::evaluate::{BackendInfo, Evaluation, Evaluator, Problem};
 use crate::line::energy::kernel::FIGURES;
 use crate::line::energy::{EnergyLap, EnergyPlan, EnergyTable, Mode};
@@ -44,8 +44,6 @@ pub struct EnergyAccount {
     pub run_in: u32,
 }
 
-/// Lanes of a workgroup, where the device allows: a multiple of every device's subgroup.
-const WORKGROUP: u32 = 64;
 /// Floats per candidate and section in the course: length and curvature.
 const COURSE_WIDTH: usize = 2;
 
@@ -100,54 +98,30 @@ impl<'a> GpuHybridEvaluator<'a> {
     /// [`Error::Device`] if the kernel does not compile or the device has too few bindings or too little memory for it.
     pub fn new(hybrid: &'a HybridProblem, context: Arc<GpuContext>) -> Result<Self> {
         let device = context.limits();
-        let workgroup = WORKGROUP
-            .min(device.max_compute_invocations_per_workgroup)
-            .min(device.max_compute_workgroup_size_x);
         let plan = hybrid.plan().stored::<f32>();
         let limits = hybrid.car().limits.stored::<f32>();
         let table = hybrid.car().table.stored::<f32>();
-        let section_bytes = (plan.rows.len() * size_of::<DeviceSection>()) as u64;
-        let uniform = section_bytes <= device.max_uniform_buffer_binding_size;
-        let uniform_limits = context.summary().kind == DeviceKind::Software
-            && size_of_val(limits.limits.as_slice()) as u64 <= device.max_uniform_buffer_binding_size;
+        let wanted = Wanted {
+            integral: false,
+            lap: true,
+        };
+        let tables = LineTables::new(&context, &plan, &limits, wanted)?;
         let vectors = energy_vectors(&table, &hybrid.energy().stored::<f32>());
         // A software driver is faster with uniform tables, see the line kernel.
         let uniform_energy = context.summary().kind == DeviceKind::Software
             && size_of_val(vectors.as_slice()) as u64 <= device.max_uniform_buffer_binding_size;
         let shape = EnergyShape {
-            line: LineShape {
-                closed: plan.closed,
-                terms: plan.terms,
-                wanted: Wanted {
-                    integral: false,
-                    lap: true,
-                },
-                limit_rows: limits.limits.len() / 8,
-                corner_rows: limits.corners.len() / 2,
-                ellipse_rows: limits.ellipse.len() / 2,
-                uniform_sections: uniform.then_some(plan.rows.len()),
-                uniform_limits,
-                workgroup,
-            },
+            line: tables.shape,
             line_variables: hybrid.line_variables(),
             additional: hybrid.energy().mode == Mode::Additional,
             counts_charge: hybrid.energy().counts_charge,
             uniform_energy: uniform_energy.then_some(vectors.len()),
         };
         use Binding::{Read, Uniform, Write};
-        let table_binding = |uniform: bool| if uniform { Uniform } else { Read };
+        let [sections, speeds, corners, ellipse] = tables.bindings;
+        let energy = if uniform_energy { Uniform } else { Read };
         let bindings = [
-            Uniform,
-            table_binding(uniform),
-            table_binding(uniform_limits),
-            Read,
-            Read,
-            Read,
-            Write,
-            Write,
-            Write,
-            Uniform,
-            table_binding(uniform_energy),
+            Uniform, sections, speeds, corners, ellipse, Read, Write, Write, Write, Uniform, energy,
         ];
         let stored = bindings.iter().filter(|b| !matches!(b, Uniform)).count() as u32;
         if stored > device.max_storage_buffers_per_shader_stage {
@@ -158,16 +132,7 @@ impl<'a> GpuHybridEvaluator<'a> {
             )));
         }
         let kernel = context.kernel(&shape.source(), "energy_line", &bindings)?;
-        let sections: Vec<DeviceSection> = plan.rows.iter().map(DeviceSection::of).collect();
-        if section_bytes > device.max_storage_buffer_binding_size {
-            return Err(Error::Device(format!(
-                "{} holds at most {} bytes of sections, {section_bytes} are needed",
-                context.summary(),
-                device.max_storage_buffer_binding_size
-            )));
-        }
         let both = Usage::STORAGE | Usage::UNIFORM;
-        let floats = |label: &str, data: &[f32]| context.buffer_of(label, bytemuck::cast_slice(data), both);
         let account = EnergyAccount {
             mass: table.mass,
             deploy_cost: table.deploy_cost,
@@ -182,12 +147,6 @@ impl<'a> GpuHybridEvaluator<'a> {
             rows_per_speed_squared: table.rows_per_speed_squared,
             run_in: hybrid.energy().run_in as u32,
         };
-        let tables = [
-            context.buffer_of("sections", bytemuck::cast_slice(&sections), both)?,
-            floats("limits", &limits.limits)?,
-            floats("corners", &limits.corners)?,
-            floats("ellipse", &limits.ellipse)?,
-        ];
         let stretch = context.buffer(
             "stretch",
             size_of::<LineStretch>() as u64,
@@ -200,9 +159,9 @@ impl<'a> GpuHybridEvaluator<'a> {
             batching: LineBatching::for_kind(context.summary().kind),
             context,
             kernel,
-            workgroup: workgroup as usize,
+            workgroup: tables.shape.workgroup as usize,
             stretch,
-            tables,
+            tables: tables.buffers,
             account,
             energy,
             batch: None,

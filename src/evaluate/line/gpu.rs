@@ -2,51 +2,16 @@
 
 use super::problem::{LineProblem, MEASURES, Measures};
 use super::swarm::Exchange;
+use super::tables::LineTables;
 use crate::error::{Error, Result};
-use crate::evaluate::gpu::shader::LineShape;
 use crate::evaluate::gpu::{Binding, DeviceKind, GpuContext, Kernel};
 use crate::evaluate::{BackendInfo, Evaluation, Evaluator, Problem};
-use crate::line::{LimitTable, SectionRow, TERMS};
+use crate::line::LimitTable;
 use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;
 use std::sync::Arc;
 use std::time::Instant;
 use wgpu::BufferUsages as Usage;
-
-/// One section on the device. Twin of `Section` in `shaders/line.wgsl`.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Pod, Zeroable)]
-pub struct DeviceSection {
-    /// Which variables `alpha` is the sum of.
-    pub sources: [u32; TERMS],
-    /// Their weights.
-    pub weights: [f32; TERMS],
-    /// From the right end of this cut to that of the next, m.
-    pub step: [f32; 2],
-    /// From the right end of the cut to the left end, m.
-    pub cut: [f32; 2],
-    /// The part of `alpha` that no variable moves.
-    pub constant: f32,
-    /// One over the spacing of second differences, 1/m.
-    pub inverse_spacing: f32,
-    /// Nothing: vectors of four are aligned to 16 bytes.
-    pub padding: [f32; 2],
-}
-
-impl DeviceSection {
-    /// A section of a plan.
-    pub(in crate::evaluate) fn of(row: &SectionRow<f32>) -> Self {
-        Self {
-            sources: row.sources,
-            weights: row.weights,
-            step: row.step,
-            cut: row.cut,
-            constant: row.constant,
-            inverse_spacing: row.inverse_spacing,
-            padding: [0.0; 2],
-        }
-    }
-}
 
 /// What a dispatch is to do. Twin of `LineStretch` in `shaders/line.wgsl`.
 #[repr(C)]
@@ -72,9 +37,6 @@ pub struct LineStretch {
 
 /// Floats per candidate and section in the course: length and curvature.
 const COURSE_WIDTH: usize = 2;
-/// Lanes of a workgroup, where the device allows: a multiple of every device's subgroup.
-const WORKGROUP: u32 = 64;
-
 /// How work is cut. Results do not depend on it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LineBatching {
@@ -134,10 +96,6 @@ impl<'a> GpuLineEvaluator<'a> {
     /// # Errors
     /// [`Error::Device`] if the kernel does not compile or the sections do not fit the device.
     pub fn new(line: &'a LineProblem, context: Arc<GpuContext>) -> Result<Self> {
-        let device = context.limits();
-        let workgroup = WORKGROUP
-            .min(device.max_compute_invocations_per_workgroup)
-            .min(device.max_compute_workgroup_size_x);
         let plan = line.plan().stored::<f32>();
         // Without laps the tables are there but not read.
         let limits = line.limits().map_or(
@@ -151,55 +109,13 @@ impl<'a> GpuLineEvaluator<'a> {
             },
             |limits| limits.stored::<f32>(),
         );
-        let section_bytes = (plan.rows.len() * size_of::<DeviceSection>()) as u64;
-        let uniform = section_bytes <= device.max_uniform_buffer_binding_size;
-        // A card reads a uniform table row after row where lanes part; a software driver is faster with it.
-        let uniform_limits = context.summary().kind == DeviceKind::Software
-            && size_of_val(limits.limits.as_slice()) as u64 <= device.max_uniform_buffer_binding_size;
-        let shape = LineShape {
-            closed: plan.closed,
-            terms: plan.terms,
-            wanted: line.wanted(),
-            limit_rows: limits.limits.len() / 8,
-            corner_rows: limits.corners.len() / 2,
-            ellipse_rows: limits.ellipse.len() / 2,
-            uniform_sections: uniform.then_some(plan.rows.len()),
-            uniform_limits,
-            workgroup,
-        };
+        let tables = LineTables::new(&context, &plan, &limits, line.wanted())?;
         use Binding::{Read, Uniform, Write};
-        let table_binding = |uniform: bool| if uniform { Uniform } else { Read };
+        let [sections, speeds, corners, ellipse] = tables.bindings;
         let bindings = [
-            Uniform,
-            table_binding(uniform),
-            table_binding(uniform_limits),
-            Read,
-            Read,
-            Read,
-            Write,
-            Write,
-            Write,
+            Uniform, sections, speeds, corners, ellipse, Read, Write, Write, Write,
         ];
-        let kernel = context.kernel(&shape.source(), "line", &bindings)?;
-        let sections: Vec<DeviceSection> = plan.rows.iter().map(DeviceSection::of).collect();
-        let sections: &[u8] = bytemuck::cast_slice(&sections);
-        let most = device.max_storage_buffer_binding_size;
-        if section_bytes > most {
-            return Err(Error::Device(format!(
-                "{} holds at most {most} bytes of sections, {} are needed",
-                context.summary(),
-                section_bytes
-            )));
-        }
-        let table = |label: &str, data: &[f32]| {
-            context.buffer_of(label, bytemuck::cast_slice(data), Usage::STORAGE | Usage::UNIFORM)
-        };
-        let tables = [
-            context.buffer_of("sections", sections, Usage::STORAGE | Usage::UNIFORM)?,
-            table("limits", &limits.limits)?,
-            table("corners", &limits.corners)?,
-            table("ellipse", &limits.ellipse)?,
-        ];
+        let kernel = context.kernel(&tables.shape.source(), "line", &bindings)?;
         let stretch = context.buffer(
             "stretch",
             size_of::<LineStretch>() as u64,
@@ -210,10 +126,10 @@ impl<'a> GpuLineEvaluator<'a> {
             batching: LineBatching::for_kind(context.summary().kind),
             context,
             kernel,
-            workgroup: workgroup as usize,
+            workgroup: tables.shape.workgroup as usize,
             limits,
             stretch,
-            tables,
+            tables: tables.buffers,
             batch: None,
             exchange: None,
             pace: None,

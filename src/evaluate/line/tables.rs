@@ -1,0 +1,155 @@
+//! The tables of a line's sections and of a car's limits on a device, and what a line kernel is specialised to by them.
+
+use crate::error::{Error, Result};
+use crate::evaluate::gpu::shader::LineShape;
+use crate::evaluate::gpu::{Binding, DeviceKind, GpuContext};
+use crate::line::kernel::Wanted;
+use crate::line::{LimitTable, LinePlan, SectionRow, TERMS};
+use bytemuck::{Pod, Zeroable};
+use wgpu::BufferUsages as Usage;
+
+/// Lanes of a workgroup, where the device allows: a multiple of every device's subgroup.
+const WORKGROUP: u32 = 64;
+/// Lanes that a software driver works on at once: their figures fill one line of the processor's cache.
+const SOFTWARE_TILE: u32 = 8;
+
+/// One section on the device. Twin of `Section` in `shaders/line.wgsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+pub struct DeviceSection {
+    /// Which variables `alpha` is the sum of.
+    pub sources: [u32; TERMS],
+    /// Their weights.
+    pub weights: [f32; TERMS],
+    /// From the right end of this cut to that of the next, m.
+    pub step: [f32; 2],
+    /// From the right end of the cut to the left end, m.
+    pub cut: [f32; 2],
+    /// The part of `alpha` that no variable moves.
+    pub constant: f32,
+    /// One over the spacing of second differences, 1/m.
+    pub inverse_spacing: f32,
+    /// The next section whose `alpha` is the sum of other variables, or one past the last.
+    pub until: u32,
+    /// Nothing: vectors of four are aligned to 16 bytes.
+    pub padding: u32,
+}
+
+impl DeviceSection {
+    /// The sections of a plan.
+    fn all_of(rows: &[SectionRow<f32>]) -> Vec<Self> {
+        let mut sections: Vec<Self> = rows
+            .iter()
+            .map(|row| Self {
+                sources: row.sources,
+                weights: row.weights,
+                step: row.step,
+                cut: row.cut,
+                constant: row.constant,
+                inverse_spacing: row.inverse_spacing,
+                until: rows.len() as u32,
+                padding: 0,
+            })
+            .collect();
+        for i in (1..sections.len()).rev() {
+            sections[i - 1].until = if sections[i - 1].sources == sections[i].sources {
+                sections[i].until
+            } else {
+                i as u32
+            };
+        }
+        sections
+    }
+}
+
+/// The tables of the kernel's bindings 1 to 4.
+pub(in crate::evaluate) struct LineTables {
+    pub(in crate::evaluate) shape: LineShape,
+    pub(in crate::evaluate) bindings: [Binding; 4],
+    pub(in crate::evaluate) buffers: [wgpu::Buffer; 4],
+}
+
+impl LineTables {
+    /// The tables of `plan` and `limits` on `context`'s device.
+    ///
+    /// # Errors
+    /// [`Error::Device`] if the sections do not fit the device.
+    pub(in crate::evaluate) fn new(
+        context: &GpuContext,
+        plan: &LinePlan<f32>,
+        limits: &LimitTable<f32>,
+        wanted: Wanted,
+    ) -> Result<Self> {
+        let device = context.limits();
+        let software = context.summary().kind == DeviceKind::Software;
+        let workgroup = WORKGROUP
+            .min(device.max_compute_invocations_per_workgroup)
+            .min(device.max_compute_workgroup_size_x);
+        let sections = DeviceSection::all_of(&plan.rows);
+        // Two figures to a row; uniform rows are of four.
+        let rows_of_four = |table: &[f32]| -> Vec<f32> {
+            table
+                .chunks_exact(2)
+                .flat_map(|row| [row[0], row[1], 0.0, 0.0])
+                .collect()
+        };
+        let (corners, mut ellipse) = (rows_of_four(&limits.corners), rows_of_four(&limits.ellipse));
+        let ellipse_rows = ellipse.len() / 4;
+        if ellipse.is_empty() {
+            // A binding holds at least what its type takes.
+            ellipse = vec![0.0; 4];
+        }
+        let sections: &[u8] = bytemuck::cast_slice(&sections);
+        let most = device.max_storage_buffer_binding_size;
+        if sections.len() as u64 > most {
+            return Err(Error::Device(format!(
+                "{} holds at most {most} bytes of sections, {} are needed",
+                context.summary(),
+                sections.len()
+            )));
+        }
+        let fits = |bytes: usize| bytes as u64 <= device.max_uniform_buffer_binding_size;
+        let uniform_sections = fits(sections.len());
+        // A card reads a uniform table row after row where lanes part; a software driver is faster with it.
+        let uniform_limits = software
+            && [&limits.limits, &corners, &ellipse]
+                .iter()
+                .all(|table| fits(size_of_val(table.as_slice())));
+        let shape = LineShape {
+            closed: plan.closed,
+            terms: plan.terms,
+            wanted,
+            limit_rows: limits.limits.len() / 8,
+            corner_rows: corners.len() / 4,
+            ellipse_rows,
+            uniform_sections: uniform_sections.then_some(plan.rows.len()),
+            uniform_limits,
+            workgroup,
+            // A card's neighbouring lanes, however many, read together.
+            tile: if software && workgroup.is_multiple_of(SOFTWARE_TILE) {
+                SOFTWARE_TILE
+            } else {
+                workgroup
+            },
+        };
+        let table_binding = |uniform: bool| if uniform { Binding::Uniform } else { Binding::Read };
+        let limits_binding = table_binding(uniform_limits);
+        let both = Usage::STORAGE | Usage::UNIFORM;
+        let table = |label: &str, data: &[f32]| context.buffer_of(label, bytemuck::cast_slice(data), both);
+        Ok(Self {
+            shape,
+            bindings: [
+                table_binding(uniform_sections),
+                limits_binding,
+                limits_binding,
+                limits_binding,
+            ],
+            buffers: [
+                context.buffer_of("sections", sections, both)?,
+                table("limits", &limits.limits)?,
+                table("corners", &corners)?,
+                table("ellipse", &ellipse)?,
+            ],
+        })
+    }
+}
