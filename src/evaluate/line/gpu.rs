@@ -53,7 +53,8 @@ impl LineBatching {
     pub fn for_kind(kind: DeviceKind) -> Self {
         Self {
             bytes: match kind {
-                DeviceKind::Software => 128 << 20,
+                // So few that a batch goes through the processor's caches.
+                DeviceKind::Software => 24 << 20,
                 _ => 1 << 30,
             },
             lanes: usize::MAX,
@@ -338,7 +339,7 @@ impl Evaluator for GpuLineEvaluator<'_> {
         let candidates: Vec<&[f64]> = population.chunks_exact(line.dimensions().max(1)).collect();
         let measures = self.score(&candidates)?;
         let rows = candidates
-            .iter()
+            .par_iter()
             .zip(&measures)
             .map(
                 |(candidate, measures)| match line.preliminary_failure(candidate) {
