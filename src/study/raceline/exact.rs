@@ -199,15 +199,26 @@ impl ExactSolvers {
             control_m >= CUTS_TO_SAY_CONTROL * own_m
         });
         let mut found: Option<Optimum> = None;
-        for how in std::iter::repeat_n(&ABOUT, abouts).chain(closely) {
+        let mut closer = |how: &About| -> Result<bool> {
             let alpha = found.as_ref().map_or(alpha, |f| &f.x);
-            if let Some(closer) = self.taken_about(limits, alpha, how)? {
-                let before_s = found.as_ref().map_or(0.0, |f| f.seconds);
-                found = Some(Optimum {
-                    seconds: before_s + closer.seconds,
-                    ..closer
-                });
+            let Some(closer) = self.taken_about(limits, alpha, how)? else {
+                return Ok(false);
+            };
+            let before_s = found.as_ref().map_or(0.0, |f| f.seconds);
+            found = Some(Optimum {
+                seconds: before_s + closer.seconds,
+                ..closer
+            });
+            Ok(true)
+        };
+        // The same again, from the same line, would come to the same.
+        for _ in 0..abouts {
+            if !closer(&ABOUT)? {
+                break;
             }
+        }
+        for how in closely {
+            closer(how)?;
         }
         Ok(found)
     }

@@ -32,7 +32,6 @@ use crate::line::Parametrisation;
 use crate::study::keeper::{Keeper, Origin};
 use fast::search_objective;
 use front::search_front_from;
-use rayon::prelude::*;
 use state::{FinishedObjective, Work, inputs_of};
 use std::ops::ControlFlow;
 use std::time::Instant;
@@ -74,7 +73,9 @@ pub struct Outcome {
     pub evaluations: u64,
     /// Time of the swarms and the local search (s).
     pub search_s: f64,
-    /// Time of the exact solvers (s).
+    /// Time in which the swarms waited for the exact solvers (s).
+    pub waited_s: f64,
+    /// Time of the longest of the exact solvers (s), which work beside each other and beside the swarms.
     pub exact_s: f64,
     /// Best cost against evaluations of each objective's swarm.
     pub history: Vec<Vec<(u64, f64)>>,
@@ -166,81 +167,99 @@ pub fn find_lines_from(
 
     let reference = setup.report("reference", &setup.cuts.reference, settings)?;
     let solvers = ExactSolvers::new(setup, settings)?;
-    let exact_began = Instant::now();
-    let exact = settings
-        .objectives
-        .par_iter()
-        .map(|objective| solvers.reference(*objective))
-        .collect::<Result<Vec<_>>>()?;
-    let exact_s = exact_began.elapsed().as_secs_f64();
-
     let began = Instant::now();
     let mut device_faults = Vec::new();
     let mut failures = FailureCounts::new();
     let mut evaluations = 0;
     let mut history = Vec::new();
     let mut objectives = Vec::new();
-    for (k, (objective, exact)) in settings.objectives.iter().zip(&exact).enumerate() {
-        let start = exact
-            .as_ref()
-            .filter(|_| settings.warm_start)
-            .map(|o| o.alpha.as_slice());
-        let (found, best) = match work.state.finished.get(k) {
-            Some(finished) => (
-                finished.found.clone(),
-                setup.report(line_name(*objective), &finished.best, settings)?,
-            ),
-            None => {
-                let found = search_objective(settings, setup, *objective, start, &mut work)?;
-                let best = best_line(
-                    settings,
-                    setup,
-                    *objective,
-                    start,
-                    &found,
-                    &solvers,
-                    work.interrupted,
-                )?;
-                let elapsed_s = before_s + began.elapsed().as_secs_f64();
-                work.finished(|state| {
-                    state.finished.push(FinishedObjective {
-                        found: found.clone(),
-                        best: best.alpha.clone(),
+    let (mut waited_s, mut exact_s) = (0.0, 0.0f64);
+    // The fastest line takes its solver seconds on one core: the swarms of the objectives before it need not wait.
+    std::thread::scope(|scope| -> Result<()> {
+        let exact: Vec<_> = settings
+            .objectives
+            .iter()
+            .map(|objective| {
+                let solvers = &solvers;
+                scope.spawn(move || {
+                    let began = Instant::now();
+                    let solved = solvers.reference(*objective)?;
+                    Ok((solved, began.elapsed().as_secs_f64()))
+                })
+            })
+            .collect();
+        for (k, (objective, exact)) in settings.objectives.iter().zip(exact).enumerate() {
+            let waiting = Instant::now();
+            let (exact, own_s) = match exact.join() {
+                Ok(solved) => solved?,
+                Err(panic) => std::panic::resume_unwind(panic),
+            };
+            waited_s += waiting.elapsed().as_secs_f64();
+            exact_s = own_s.max(exact_s);
+            let start = exact
+                .as_ref()
+                .filter(|_| settings.warm_start)
+                .map(|o| o.alpha.as_slice());
+            let (found, best) = match work.state.finished.get(k) {
+                Some(finished) => (
+                    finished.found.clone(),
+                    setup.report(line_name(*objective), &finished.best, settings)?,
+                ),
+                None => {
+                    let found = search_objective(settings, setup, *objective, start, &mut work)?;
+                    let best = best_line(
+                        settings,
+                        setup,
+                        *objective,
+                        start,
+                        &found,
+                        &solvers,
+                        work.interrupted,
+                    )?;
+                    let elapsed_s = before_s + began.elapsed().as_secs_f64();
+                    work.finished(|state| {
+                        state.finished.push(FinishedObjective {
+                            found: found.clone(),
+                            best: best.alpha.clone(),
+                        });
+                        state.steps.clear();
+                        state.search = None;
+                        state.plain = None;
+                        state.elapsed_s = elapsed_s;
                     });
-                    state.steps.clear();
-                    state.search = None;
-                    state.plain = None;
-                    state.elapsed_s = elapsed_s;
-                });
-                (found, best)
+                    (found, best)
+                }
+            };
+            evaluations += found.evaluations;
+            device_faults.extend_from_slice(&found.device_faults);
+            add_failures(&mut failures, &found.failures);
+            if let Some(latest) = found.backend {
+                backend = latest;
             }
-        };
-        evaluations += found.evaluations;
-        device_faults.extend_from_slice(&found.device_faults);
-        add_failures(&mut failures, &found.failures);
-        backend = found.backend.unwrap_or(backend);
-        history.push(
-            found
-                .history
-                .iter()
-                .map(|row| (row.evaluations, row.best))
-                .collect(),
-        );
-        let exact_line = exact
-            .as_ref()
-            .map(|o| setup.report(line_name(*objective), &o.alpha, settings))
-            .transpose()?;
-        objectives.push(ObjectiveOutcome {
-            objective: *objective,
-            best,
-            swarm_cost: found.cost,
-            exact: exact_line,
-            exact_status: exact.as_ref().map(|o| (format!("{:?}", o.status), o.seconds)),
-        });
-        if work.interrupted {
-            break;
+            history.push(
+                found
+                    .history
+                    .iter()
+                    .map(|row| (row.evaluations, row.best))
+                    .collect(),
+            );
+            let exact_line = exact
+                .as_ref()
+                .map(|o| setup.report(line_name(*objective), &o.alpha, settings))
+                .transpose()?;
+            objectives.push(ObjectiveOutcome {
+                objective: *objective,
+                best,
+                swarm_cost: found.cost,
+                exact: exact_line,
+                exact_status: exact.as_ref().map(|o| (format!("{:?}", o.status), o.seconds)),
+            });
+            if work.interrupted {
+                break;
+            }
         }
-    }
+        Ok(())
+    })?;
 
     let mut front = None;
     let mut compromise = None;
@@ -277,7 +296,8 @@ pub fn find_lines_from(
         device_faults,
         failures,
         evaluations,
-        search_s: before_s + began.elapsed().as_secs_f64(),
+        search_s: before_s + began.elapsed().as_secs_f64() - waited_s,
+        waited_s,
         exact_s,
         history,
         interrupted: work.interrupted,

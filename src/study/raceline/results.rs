@@ -119,7 +119,7 @@ pub struct Summary {
 /// Puts the figures together.
 pub fn summarise(settings: &RacelineSettings, setup: &Setup, outcome: &Outcome) -> Summary {
     let each = || outcome.objectives.iter().map(|o| (o.objective.name(), o));
-    let elapsed_s = outcome.search_s + outcome.exact_s;
+    let elapsed_s = outcome.search_s + outcome.waited_s;
     Summary {
         study: "raceline",
         track: setup.track_name.clone(),
