@@ -167,8 +167,9 @@ fn a_car_without_camber_cannot_reveal_rvy3() {
         ..simd()
     };
     let setup = set_up(&settings).unwrap();
-    let residuals = setup.replay.residuals(setup.truth.as_ref().unwrap()).unwrap();
-    let verdict = judge(&residuals, &setup.replay.problem.variables, &setup.scales);
+    let truth = setup.truth.as_ref().unwrap();
+    let residuals = setup.replay.residuals(truth).unwrap();
+    let verdict = judge(&residuals, &setup.replay.problem.variables, truth, &setup.scales);
     let blind: Vec<&str> = settings
         .free
         .iter()
@@ -205,7 +206,17 @@ fn noise_stays_within_three_standard_errors() {
     let noise = settings.sensors.noise;
     let polished = polish(&setup.replay, &start, noise.map(|n| 1.0 / n)).unwrap();
     let residuals = setup.replay.residuals(&polished.candidate).unwrap();
-    let verdict = judge(&residuals, &setup.replay.problem.variables, &setup.scales);
+    let variables = &setup.replay.problem.variables;
+    let verdict = judge(&residuals, variables, &polished.candidate, &setup.scales);
+    // At a minimum, with white noise left over.
+    assert!(verdict.step_in_errors < 0.1 && verdict.looks_like_noise);
+    // Beside it, a step of least squares leads back by as much, to within the curvature of the lap over one standard error.
+    let mut beside = polished.candidate.clone();
+    let last = beside.len() - 1;
+    beside[last] += verdict.standard_errors[last];
+    let errors = setup.replay.residuals(&beside).unwrap();
+    let step = judge(&errors, variables, &beside, &setup.scales).step_in_errors;
+    assert!((0.8..1.2).contains(&step), "{step}");
     for (told, true_noise) in verdict.noise.iter().zip(noise) {
         // 7000 samples tell a standard deviation to 1/sqrt(14000), 0.8%; five of those.
         assert!((told / true_noise - 1.0).abs() < 0.042, "{told} for {true_noise}");

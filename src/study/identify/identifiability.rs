@@ -1,5 +1,6 @@
 //! What the log can and cannot tell about each parameter, from the Jacobian at the solution.
 
+use super::hops::looks_like_noise;
 use super::setup::CHANNELS;
 use crate::evaluate::Variable;
 use crate::evaluate::replay::Residuals;
@@ -18,6 +19,11 @@ pub struct Identifiability {
     pub identifiable: Vec<bool>,
     /// Standard deviation of the errors that remain, per channel.
     pub noise: [f64; CHANNELS],
+    /// How far a step of least squares would move a parameter that can be told and stands free of its bounds, in its
+    /// standard errors, at most: nought at a minimum. Standard errors are of the neighbourhood of a minimum.
+    pub step_in_errors: f64,
+    /// Whether the errors that remain look like noise, for which standard errors take them, or are mere rounding.
+    pub looks_like_noise: bool,
 }
 
 /// Singular values under this share of the greatest count as nought: the Jacobian's own rounding, about the square
@@ -37,19 +43,35 @@ pub fn noise_of(errors: &[f64], scales: &[f64; CHANNELS]) -> [f64; CHANNELS] {
     })
 }
 
-/// Judges the parameters at a solution with these residuals.
+/// A value this share of the range from a bound is at it, of the logarithms' range where both bounds are positive.
+const AT_BOUND: f64 = 1e-3;
+
+pub(super) fn at_bound(value: f64, bounds: [f64; 2]) -> bool {
+    let [x, low, high] = [value, bounds[0], bounds[1]].map(|x| if bounds[0] > 0.0 { x.ln() } else { x });
+    (x - low).min(high - x) <= AT_BOUND * (high - low)
+}
+
+/// Judges the parameters at a candidate with these residuals.
 ///
 /// A parameter counts as not identifiable where the Jacobian is blind to it (a singular value of nought), or where
 /// its standard error exceeds the standard deviation of a guess anywhere between its bounds (range / sqrt 12).
-pub fn judge(residuals: &Residuals, variables: &[Variable], scales: &[f64; CHANNELS]) -> Identifiability {
+pub fn judge(
+    residuals: &Residuals,
+    variables: &[Variable],
+    candidate: &[f64],
+    scales: &[f64; CHANNELS],
+) -> Identifiability {
     let noise = noise_of(&residuals.errors, scales);
     let d = variables.len();
     let ranges: Vec<f64> = variables.iter().map(|v| v.upper - v.lower).collect();
     let matrix = DMatrix::from_fn(residuals.errors.len(), d, |i, k| {
         residuals.columns[k][i] / noise[i % CHANNELS] * ranges[k]
     });
+    let errors = DVector::from_fn(residuals.errors.len(), |i, _| {
+        residuals.errors[i] / noise[i % CHANNELS]
+    });
     // The triangular factor has the singular values and right vectors of the whole, and is small.
-    let svd = matrix.qr().r().svd(false, true);
+    let svd = matrix.clone().qr().r().svd(false, true);
     let values = svd.singular_values;
     let vectors = svd.v_t.unwrap_or_else(|| DMatrix::identity(d, d));
     let greatest = values.iter().copied().fold(0.0, f64::max);
@@ -77,12 +99,31 @@ pub fn judge(residuals: &Residuals, variables: &[Variable], scales: &[f64; CHANN
         .collect();
     let mut singular_values: Vec<f64> = values.iter().copied().collect();
     singular_values.sort_by(|a, b| b.total_cmp(a));
+    let identifiable: Vec<bool> = (0..d)
+        .map(|k| standard_errors[k] < ranges[k] / 12f64.sqrt())
+        .collect();
+    let free: Vec<usize> = (0..d)
+        .filter(|&k| identifiable[k] && !at_bound(candidate[k], [variables[k].lower, variables[k].upper]))
+        .collect();
+    let factors = matrix.select_columns(&free).qr();
+    let mut wanted = errors;
+    factors.q_tr_mul(&mut wanted);
+    let step = factors
+        .r()
+        .solve_upper_triangular(&wanted.rows(0, free.len()).into_owned());
+    let step_in_errors = step.map_or(f64::INFINITY, |step| {
+        free.iter()
+            .zip(step.iter())
+            .map(|(&k, s)| (s * ranges[k] / standard_errors[k]).abs())
+            .fold(0.0, f64::max)
+    });
+    let at_rounding = (0..CHANNELS).all(|k| noise[k] <= LEAST_NOISE * scales[k]);
     Identifiability {
-        identifiable: (0..d)
-            .map(|k| standard_errors[k] < ranges[k] / 12f64.sqrt())
-            .collect(),
+        identifiable,
         standard_errors,
         singular_values,
         noise,
+        step_in_errors,
+        looks_like_noise: at_rounding || looks_like_noise(&residuals.errors),
     }
 }

@@ -122,6 +122,9 @@ fn head(page: &mut HtmlReport, car: &str, source: &str, outcome: &Outcome, summa
             summary.unidentifiable.join(", ")
         )
     });
+    if let Some(caution) = summary.caution() {
+        page.sentence(caution);
+    }
     let bounds: Vec<&str> = summary
         .parameters
         .iter()

@@ -1,5 +1,6 @@
 //! What an identification leaves behind: figures for people and scripts, files, pictures.
 
+use super::identifiability::at_bound;
 use super::search::{Judged, Outcome, judge_candidate, total_parameter_error};
 use super::settings::IdentifySettings;
 use super::setup::{CHANNELS, Setup, cost_unit};
@@ -35,14 +36,6 @@ pub struct ParameterSummary {
     pub truth: Option<f64>,
     /// Whether the fitted value is at one of the bounds: the log would have it elsewhere.
     pub at_bound: bool,
-}
-
-/// A value this share of the range from a bound is at it, of the logarithms' range where both bounds are positive.
-const AT_BOUND: f64 = 1e-3;
-
-fn at_bound(value: f64, bounds: [f64; 2]) -> bool {
-    let [x, low, high] = [value, bounds[0], bounds[1]].map(|x| if bounds[0] > 0.0 { x.ln() } else { x });
-    (x - low).min(high - x) <= AT_BOUND * (high - low)
 }
 
 /// The figures of an identification; `--json` prints this.
@@ -92,6 +85,10 @@ pub struct Summary {
     pub holdout_lost_windows: Option<[usize; 2]>,
     /// Parameters that the log cannot tell.
     pub unidentifiable: Vec<String>,
+    /// How far least squares would still move a told parameter, in its standard errors, at most; nought at a minimum.
+    pub step_in_standard_errors: Option<f64>,
+    /// Whether the errors that remain look like noise, for which standard errors take them.
+    pub errors_look_like_noise: bool,
     /// Hops from the polished minimum that were tried, and that led further down.
     pub hops: [usize; 2],
     /// Singular values of the scaled Jacobian, greatest first.
@@ -197,6 +194,8 @@ pub fn summarise(settings: &IdentifySettings, setup: &Setup, outcome: &Outcome) 
             .filter(|p| p.value.is_none())
             .map(|p| p.name.clone())
             .collect(),
+        step_in_standard_errors: Some(identifiability.step_in_errors).filter(|s| s.is_finite()),
+        errors_look_like_noise: identifiability.looks_like_noise,
         hops: outcome.hops,
         singular_values: identifiability.singular_values.clone(),
         noise_estimate: by_channel(identifiability.noise),
@@ -515,7 +514,27 @@ fn write_traces(folder: &Path, setup: &Setup, judged: &Judged, summary: &Summary
     Ok(())
 }
 
+/// Least squares may still move a parameter by this many of its standard errors at what counts as a minimum.
+const AT_MINIMUM: f64 = 1.0;
+
 impl Summary {
+    /// Why the standard errors, and the verdict on what the log tells, are not to be taken at their word; nothing where they are.
+    pub fn caution(&self) -> Option<String> {
+        match self.step_in_standard_errors {
+            Some(step) if step <= AT_MINIMUM => (!self.errors_look_like_noise).then(|| {
+                "The errors that remain do not look like noise: the model lacks something that this car did, and the standard \
+                 errors, which take them for noise, are too small."
+                    .to_owned()
+            }),
+            step => Some(format!(
+                "This car is at no minimum of the errors{}: standard errors, and what the log tells, hold near one only.",
+                step.map_or(String::new(), |s| format!(
+                    " (least squares would move a parameter by {s:.0} of its standard errors)"
+                ))
+            )),
+        }
+    }
+
     /// The parameter table and the errors, for a terminal.
     pub fn to_text(&self, settings: &IdentifySettings) -> String {
         let mut text = format!(
@@ -557,6 +576,10 @@ impl Summary {
                 "\nThe log cannot tell: {}. The starting car's values stand in their place.\n",
                 self.unidentifiable.join(", ")
             ));
+        }
+        if let Some(caution) = self.caution() {
+            text.push_str(&caution);
+            text.push('\n');
         }
         if let [tried @ (1..), gained] = self.hops {
             text.push_str(&format!(

@@ -216,7 +216,7 @@ pub fn search_with(
     };
     let residuals = replay.residuals(&candidate).ok_or_else(nothing_drives)?;
     Ok(Outcome {
-        identifiability: judge(&residuals, &replay.problem.variables, &setup.scales),
+        identifiability: judge(&residuals, &replay.problem.variables, &candidate, &setup.scales),
         polish_s: polish_began.elapsed().as_secs_f64(),
         swarm_candidate,
         candidate,
