@@ -49,24 +49,25 @@ struct About {
     cuts_per_control: usize,
 }
 
+impl About {
+    /// Distance between control points (m).
+    const fn control_m(&self) -> f64 {
+        self.spacing_m * self.cuts_per_control as f64
+    }
+}
+
 /// At 4 m a lap's time is that on a fine spline to a few parts in ten thousand.
 const ABOUT: About = About {
     spacing_m: 4.0,
     cuts_per_control: 4,
 };
-/// A thousandth of a lap better, at several times the cost; for studies whose cuts are close enough together to say what is
-/// found: a control at most for every [`CUTS_TO_SAY_CONTROL`] of them.
-const CLOSELY_ABOUT: [About; 2] = [
-    About {
-        spacing_m: 2.0,
-        cuts_per_control: 3,
-    },
-    About {
-        spacing_m: 1.0,
-        cuts_per_control: 3,
-    },
-];
+/// A thousandth of a lap better, at several times the cost: cuts ever closer together (m), with a control for as many of them
+/// as the study's own cuts can say, [`CUTS_TO_SAY_CONTROL`] each; where controls come closer by a quarter at least.
+const CLOSELY_M: [f64; 2] = [2.0, 1.0];
+const CLOSER: f64 = 0.75;
 const CUTS_TO_SAY_CONTROL: f64 = 1.4;
+/// Share of a lap below which no cone program is worth its second: a hundredth of what lies between two cuts.
+const LEAST_GAIN_ABOUT: f64 = 1e-5;
 /// Times that the fastest line is taken anew about itself.
 const ABOUTS: usize = 2;
 
@@ -194,9 +195,18 @@ impl ExactSolvers {
             return Ok(None);
         };
         let own_m = self.cuts.length_m / self.cuts.len() as f64;
-        let closely = CLOSELY_ABOUT.iter().filter(|how| {
-            let control_m = how.spacing_m * how.cuts_per_control as f64;
-            control_m >= CUTS_TO_SAY_CONTROL * own_m
+        let mut control_m = CLOSER * ABOUT.control_m();
+        let closely = CLOSELY_M.into_iter().filter_map(|spacing_m| {
+            let needed = (CUTS_TO_SAY_CONTROL * own_m / spacing_m).ceil() as usize;
+            let how = About {
+                spacing_m,
+                cuts_per_control: needed.max(CUTS_PER_CONTROL),
+            };
+            let closer = how.control_m() <= control_m;
+            if closer {
+                control_m = CLOSER * how.control_m();
+            }
+            closer.then_some(how)
         });
         let mut found: Option<Optimum> = None;
         let mut closer = |how: &About| -> Result<bool> {
@@ -218,7 +228,7 @@ impl ExactSolvers {
             }
         }
         for how in closely {
-            closer(how)?;
+            closer(&how)?;
         }
         Ok(found)
     }
@@ -238,7 +248,11 @@ impl ExactSolvers {
         };
         let start = vec![0.0; map.variables()];
         // Where the cuts are so far apart that no such spline is on the road, the line stays as it is.
-        let Ok(solved) = fastest(&problem, &bounds, &start, &DescentSettings::default()) else {
+        let settings = DescentSettings {
+            least_gain: LEAST_GAIN_ABOUT,
+            ..DescentSettings::default()
+        };
+        let Ok(solved) = fastest(&problem, &bounds, &start, &settings) else {
             return Ok(None);
         };
         let Ok(shares) = shares_across(&self.cuts, &map.line(&solved.x)) else {
