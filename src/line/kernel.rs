@@ -129,21 +129,29 @@ pub fn shape<R: Real>(
 ) -> Shape<R> {
     let n = plan.rows.len();
     let nought = R::lit(0.0);
-    let at = |i: usize| offset(&plan.rows[i], plan.terms, variables);
     course.length.clear();
     course.length.resize(n, nought);
     course.curvature.clear();
     course.curvature.resize(n, nought);
 
-    let first = at(0);
+    // No closure: what an instruction set compiles anew has to be inlined, and closures cannot be told to.
+    let first = offset(&plan.rows[0], plan.terms, variables);
     let mut here = first;
-    let mut before = plan
-        .closed
-        .then(|| Segment::between(&plan.rows[n - 1], at(n - 1), first));
+    let mut before = plan.closed.then(|| {
+        Segment::between(
+            &plan.rows[n - 1],
+            offset(&plan.rows[n - 1], plan.terms, variables),
+            first,
+        )
+    });
     let mut total = [nought; 4];
     let mut block = [nought; 4];
     for i in 0..plan.segments() {
-        let next = if i + 1 < n { at(i + 1) } else { first };
+        let next = if i + 1 < n {
+            offset(&plan.rows[i + 1], plan.terms, variables)
+        } else {
+            first
+        };
         let segment = Segment::between(&plan.rows[i], here, next);
         course.length[i] = segment.length;
         block[0] = block[0] + segment.length;

@@ -19,7 +19,7 @@ mod square;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use check::leftward_distance;
+pub(crate) use check::Polyline;
 pub use check::{Clearance, check_line};
 pub use fine::FineLine;
 pub use geometry::{Geometry, geometry};

@@ -18,7 +18,7 @@ pub use results::{Summary, summarise, write_results};
 
 use crate::config::read_text;
 use crate::error::{Error, Result};
-use crate::line::{FineLine, PointMass, leftward_distance};
+use crate::line::{FineLine, PointMass, Polyline};
 use crate::simulate::{Drive, DriverSettings, SpeedPlan, drive_planned};
 use crate::track::Circuit;
 use crate::vehicle::{Car, Envelope, EnvelopeRow};
@@ -158,10 +158,11 @@ pub fn circuit_of_line(
             .push(mix(line.curvature_1pm[at], line.curvature_1pm[next]));
     }
     let room = |edge: &[DVec2], side: f64| -> Vec<f64> {
+        let edge = Polyline::new(edge, true);
         circuit
             .centreline_m
             .par_iter()
-            .map(|p| side * leftward_distance(*p, edge, true) - 0.5 * car_width_m)
+            .map(|p| side * edge.leftward_distance(*p) - 0.5 * car_width_m)
             .collect()
     };
     let (right, left) = (room(edges_m[0], 1.0), room(edges_m[1], -1.0));
