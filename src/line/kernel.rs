@@ -137,13 +137,11 @@ pub fn shape<R: Real>(
     // No closure: what an instruction set compiles anew has to be inlined, and closures cannot be told to.
     let first = offset(&plan.rows[0], plan.terms, variables);
     let mut here = first;
-    let mut before = plan.closed.then(|| {
-        Segment::between(
-            &plan.rows[n - 1],
-            offset(&plan.rows[n - 1], plan.terms, variables),
-            first,
-        )
-    });
+    let mut before = None;
+    if plan.closed {
+        let row = &plan.rows[n - 1];
+        before = Some(Segment::between(row, offset(row, plan.terms, variables), first));
+    }
     let mut total = [nought; 4];
     let mut block = [nought; 4];
     for i in 0..plan.segments() {

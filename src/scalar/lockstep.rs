@@ -23,19 +23,19 @@ macro_rules! operators {
 }
 operators!(Lockstep, Add add, Sub sub, Mul mul, Div div, BitAnd bitand, BitOr bitor);
 
-impl<R: Neg<Output = R>, const N: usize> Neg for Lockstep<R, N> {
+impl<R: Neg<Output = R> + Copy, const N: usize> Neg for Lockstep<R, N> {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
-        Self(self.0.map(|x| -x))
+        Self(from_fn(|i| -self.0[i]))
     }
 }
 
-impl<R: Not<Output = R>, const N: usize> Not for Lockstep<R, N> {
+impl<R: Not<Output = R> + Copy, const N: usize> Not for Lockstep<R, N> {
     type Output = Self;
     #[inline(always)]
     fn not(self) -> Self {
-        Self(self.0.map(|x| !x))
+        Self(from_fn(|i| !self.0[i]))
     }
 }
 
@@ -57,11 +57,11 @@ impl<R: SinglePrecision, const N: usize> Real for Lockstep<R, N> {
     }
     #[inline(always)]
     fn sqrt(self) -> Self {
-        Self(self.0.map(|x| x.sqrt()))
+        Self(from_fn(|i| self.0[i].sqrt()))
     }
     #[inline(always)]
     fn abs(self) -> Self {
-        Self(self.0.map(|x| x.abs()))
+        Self(from_fn(|i| self.0[i].abs()))
     }
     #[inline(always)]
     fn min(self, other: Self) -> Self {
@@ -89,7 +89,7 @@ impl<R: SinglePrecision, const N: usize> Real for Lockstep<R, N> {
 impl<R: SinglePrecision, const N: usize> SinglePrecision for Lockstep<R, N> {
     #[inline(always)]
     fn round(self) -> Self {
-        Self(self.0.map(|x| x.round()))
+        Self(from_fn(|i| self.0[i].round()))
     }
     #[inline(always)]
     fn negate_where_odd(self, n: Self) -> Self {
@@ -101,7 +101,7 @@ impl<R: SinglePrecision, const N: usize> SinglePrecision for Lockstep<R, N> {
     }
     #[inline(always)]
     fn two_to_the(self) -> Self {
-        Self(self.0.map(|x| x.two_to_the()))
+        Self(from_fn(|i| self.0[i].two_to_the()))
     }
     #[inline(always)]
     fn tie(self, other: Self) -> (Self, Self) {

@@ -76,7 +76,9 @@ pub fn trace(
     ) -> (Vec<[f64; CHANNELS]>, bool) {
         let car = CarModel::<f64, T>::from_parameters(|i| flat[i]);
         let mut outputs = Vec::with_capacity(window.end - window.start);
-        let (drives, _) = drive_window(&car, plan, window, |_, output| outputs.push(output));
+        let (drives, _) = drive_window(&car, plan, window, |_: usize, output: [f64; CHANNELS]| {
+            outputs.push(output)
+        });
         (outputs, drives)
     }
     match model {

@@ -35,12 +35,17 @@ fn drive_chunk<T: Tyre<Dual<CHUNK>>>(
     });
     let mut errors = Vec::new();
     for window in &replay.plan.windows {
-        let (drives, _) = drive_window(&car, &replay.plan, window, |i, outputs| {
-            if i >= window.scored_from {
-                let measured = &replay.plan.samples[window.start + i].measured;
-                errors.extend((0..CHANNELS).map(|k| outputs[k] - Dual::constant(measured[k])));
-            }
-        });
+        let (drives, _) = drive_window(
+            &car,
+            &replay.plan,
+            window,
+            |i: usize, outputs: [Dual<CHUNK>; CHANNELS]| {
+                if i >= window.scored_from {
+                    let measured = &replay.plan.samples[window.start + i].measured;
+                    errors.extend((0..CHANNELS).map(|k| outputs[k] - Dual::constant(measured[k])));
+                }
+            },
+        );
         if !drives {
             return None;
         }

@@ -24,7 +24,21 @@ fn input_between<R: Real>(from: &Sample<R::Storage>, to: &Sample<R::Storage>, fr
     }
 }
 
-/// Drives `car` through `window`, showing `visit` the four compared outputs at every sample of it.
+/// Who is shown the compared outputs at every sample. A trait, because lanes are only fast where all is inlined into what is
+/// compiled for their instruction set, and a closure that is called from two places is not.
+pub trait Visit<R> {
+    /// The outputs at a sample of the window.
+    fn visit(&mut self, sample: usize, outputs: [R; CHANNELS]);
+}
+
+impl<R, F: FnMut(usize, [R; CHANNELS])> Visit<R> for F {
+    #[inline(always)]
+    fn visit(&mut self, sample: usize, outputs: [R; CHANNELS]) {
+        self(sample, outputs);
+    }
+}
+
+/// Drives `car` through `window`, showing `visitor` the four compared outputs at every sample of it.
 ///
 /// Returns where the car drove to the end, and its last state; a car that is lost stays as it was last.
 #[inline(always)]
@@ -32,7 +46,7 @@ pub fn drive_window<R: Real, T: Tyre<R>>(
     car: &CarModel<R, T>,
     plan: &Plan<R::Storage>,
     window: &Window<R::Storage>,
-    mut visit: impl FnMut(usize, [R; CHANNELS]),
+    mut visitor: impl Visit<R>,
 ) -> (R::Mask, CarState<R>) {
     let mut state = CarState::from_array(window.initial.map(R::load));
     let mut drives = R::splat_mask(true);
@@ -47,7 +61,7 @@ pub fn drive_window<R: Real, T: Tyre<R>>(
                 step,
                 |rate| {
                     if substep == 0 {
-                        visit(i, [state.body.vx, rate.ax, rate.ay, state.body.yaw_rate]);
+                        visitor.visit(i, [state.body.vx, rate.ax, rate.ay, state.body.yaw_rate]);
                     }
                 },
             );
@@ -58,7 +72,7 @@ pub fn drive_window<R: Real, T: Tyre<R>>(
     }
     let last = &samples[samples.len() - 1];
     let rate = car.rate(&state, &input_between(last, last, R::lit(0.0)));
-    visit(
+    visitor.visit(
         samples.len() - 1,
         [state.body.vx, rate.ax, rate.ay, state.body.yaw_rate],
     );
@@ -74,6 +88,41 @@ pub struct WindowScore<R: Real> {
     pub drives: R::Mask,
 }
 
+/// Errors so far: those of the block in hand, and the total of the blocks before.
+struct Scoring<'a, R: Real> {
+    plan: &'a Plan<R::Storage>,
+    window: &'a Window<R::Storage>,
+    total: [R; CHANNELS],
+    block: [R; CHANNELS],
+}
+
+impl<R: Real> Visit<R> for &mut Scoring<'_, R> {
+    #[inline(always)]
+    fn visit(&mut self, sample: usize, outputs: [R; CHANNELS]) {
+        let (norm, window) = (self.plan.norm, self.window);
+        if sample >= window.scored_from {
+            let measured = &self.plan.samples[window.start + sample].measured;
+            for k in 0..CHANNELS {
+                let error = (outputs[k] - R::load(measured[k])).abs();
+                self.block[k] = match norm {
+                    Norm::One => self.block[k] + error,
+                    Norm::Two | Norm::MeanSquare => self.block[k] + error * error,
+                    Norm::Infinity => self.block[k].max(error),
+                };
+            }
+        }
+        if (sample + 1).is_multiple_of(BLOCK) || sample + 1 == window.end - window.start {
+            for k in 0..CHANNELS {
+                self.total[k] = match norm {
+                    Norm::Infinity => self.total[k].max(self.block[k]),
+                    _ => self.total[k] + self.block[k],
+                };
+            }
+            self.block = [R::lit(0.0); CHANNELS];
+        }
+    }
+}
+
 /// Scores `car` over one window.
 #[inline(always)]
 pub fn score_window<R: Real, T: Tyre<R>>(
@@ -82,33 +131,15 @@ pub fn score_window<R: Real, T: Tyre<R>>(
     window: &Window<R::Storage>,
 ) -> WindowScore<R> {
     let zero = [R::lit(0.0); CHANNELS];
-    let mut total = zero;
-    let mut block = zero;
-    let last = window.end - window.start - 1;
-    let (drives, _) = drive_window(car, plan, window, |i, outputs| {
-        if i >= window.scored_from {
-            let measured = &plan.samples[window.start + i].measured;
-            for k in 0..CHANNELS {
-                let error = (outputs[k] - R::load(measured[k])).abs();
-                block[k] = match plan.norm {
-                    Norm::One => block[k] + error,
-                    Norm::Two | Norm::MeanSquare => block[k] + error * error,
-                    Norm::Infinity => block[k].max(error),
-                };
-            }
-        }
-        if (i + 1) % BLOCK == 0 || i == last {
-            for k in 0..CHANNELS {
-                total[k] = match plan.norm {
-                    Norm::Infinity => total[k].max(block[k]),
-                    _ => total[k] + block[k],
-                };
-            }
-            block = zero;
-        }
-    });
+    let mut scoring = Scoring {
+        plan,
+        window,
+        total: zero,
+        block: zero,
+    };
+    let (drives, _) = drive_window(car, plan, window, &mut scoring);
     WindowScore {
-        errors: total,
+        errors: scoring.total,
         drives,
     }
 }

@@ -11,7 +11,7 @@ pub use results::{Summary, summarise, write_results};
 pub use sobol::{DesignOutputs, MOST_SAMPLES, MOST_VARIABLES, SobolIndex, design, indices};
 
 use crate::error::{Error, Result};
-use crate::evaluate::replay::kernel::drive_window;
+use crate::evaluate::replay::kernel::{CHANNELS, drive_window};
 use crate::evaluate::replay::{CHANNEL_NAMES, ReplayProblem, Window, open_evaluator, trace};
 use crate::evaluate::{BackendInfo, Evaluator};
 use crate::study::identify::{FreeParameter, IdentifySettings, ObjectiveChoice, Setup, set_up};
@@ -243,7 +243,8 @@ pub(crate) fn start_as_base_drives(replay: &mut ReplayProblem) {
                     end: window.start + 1,
                     ..before
                 };
-                let (drives, state) = drive_window(car, &replay.plan, &between, |_, _| {});
+                let (drives, state) =
+                    drive_window(car, &replay.plan, &between, |_: usize, _: [f64; CHANNELS]| {});
                 if drives {
                     replay.plan.windows[k].initial = state.to_array();
                 }
