@@ -45,7 +45,7 @@ const PANELS: [(&[&str], &str, &str); 7] = [
     (&["yaw_rate_fitted", "yaw_rate"], "yaw rate", "rad/s"),
     (&["curvature"], "curvature", "1/m"),
     (&["soc"], "state of charge", "MJ"),
-    (&["steering"], "steering", "rad"),
+    (&["steering", "steer"], "steering", "rad"),
 ];
 
 /// Lays runs side by side: what they are, their figures, and their laps, limits and convergence over one another.
@@ -106,6 +106,7 @@ fn verdict(study: &str) -> Option<(&'static str, &'static str, &'static str)> {
         "identify" => Some(("total_parameter_error", "total parameter error", "")),
         "raceline" => Some(("best / lap_time / lap_time_fine_s", "lap time", "s")),
         "transient" => Some(("lap_time_s", "driven lap", "s")),
+        "simulate" => Some(("lap_time_s", "logged lap", "s")),
         "envelope" => Some(("top_speed_mps", "top speed", "m/s")),
         _ => None,
     }
@@ -433,6 +434,7 @@ fn said_of(stem: &str) -> String {
     match stem.strip_prefix("line_") {
         Some(line) => line.replace('_', " "),
         None if stem == "drive" => "driven".to_owned(),
+        None if stem == "lap" => "logged".to_owned(),
         None => "fitted".to_owned(),
     }
 }

@@ -74,6 +74,23 @@ impl SensitivitySettings {
         Ok(s)
     }
 
+    /// The study file that repeats this study.
+    pub fn to_toml(&self) -> String {
+        format!(
+            "share = {:?}\nsamples = {}\nresamples = {}\n{}",
+            self.share,
+            self.samples,
+            self.resamples,
+            self.replay.to_toml()
+        )
+    }
+
+    /// Cars that are driven: the base car, each parameter at each level, and the design of the indices.
+    pub fn evaluations(&self) -> usize {
+        let count = self.replay.free.len();
+        1 + count * LEVELS.len() + self.samples * (count + 2)
+    }
+
     /// What the study keeps: of every sample two rows of each car in the design and its costs, and the answer in a journal.
     pub fn kept(&self) -> [Kept; 1] {
         let variables = self.replay.free.len() as u64;
@@ -188,14 +205,7 @@ pub(crate) fn ranges_about(
     names
         .iter()
         .map(|name| {
-            let parameter = car.parameter(name).ok_or_else(|| {
-                Error::input(
-                    "the study",
-                    "table [free]",
-                    format!("the parameter {name}"),
-                    format!("a parameter of {}", car.name),
-                )
-            })?;
+            let parameter = car.known_parameter("the study", "parameters", name)?;
             let value = flat[parameter.slots[0]];
             let bounds = settings.free.iter().find(|f| f.name == *name);
             let reach = if value == 0.0 {

@@ -67,6 +67,15 @@ impl SurfaceSettings {
         Ok(s)
     }
 
+    /// The study file that repeats this study.
+    pub fn to_toml(&self) -> String {
+        let mut text = format!("parameters = {:?}\ngrid = {}\n", self.parameters, self.grid);
+        if let Some(share) = self.share {
+            text += &format!("share = {share:?}\n");
+        }
+        text + &self.replay.to_toml()
+    }
+
     /// What the study keeps: of every candidate its two parameters, its costs, and the answer in a journal.
     pub fn kept(&self) -> [Kept; 1] {
         [Kept {
