@@ -257,7 +257,7 @@ fn mistakes_come_with_what_was_meant() {
             "roll_stiffness_nm_per_rad",
         ),
         (&["simulate", "--delay", "5,0,0,0"], "0to1"),
-        (&["simulate", "--noise", "-1,0,0,0"], "0to100"),
+        (&["simulate", "--noise=-1,0,0,0"], "0to100"),
         // What it was taken for is said before what is wrong with it.
         (&["check", "alone.toml"], "readasasweep"),
     ] {

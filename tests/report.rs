@@ -402,7 +402,7 @@ fn what_is_measured_has_a_page() {
             "sweep",
             vec!["sweep", &sweep],
             "4 runs of identify with 2 settings, 2 seeds each.",
-            5,
+            7,
             "medians.svg",
         ),
         (
@@ -528,7 +528,7 @@ fn what_is_measured_has_a_page() {
     let data: serde_json::Value = serde_json::from_str(data.split_once("</script>").unwrap().0).unwrap();
     // Speed, both accelerations, yaw rate and steering; alone, no time lost on another.
     let lines = data[0]["lines"][0]["traces"].as_array().unwrap();
-    assert!(lines.len() >= 5, "{}", lines.len());
+    assert_eq!(lines.len(), 5);
 }
 
 #[test]

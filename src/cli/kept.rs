@@ -60,7 +60,6 @@ pub fn write(
     machine: &Machine,
 ) -> Result<()> {
     write_json(&folder.join("summary.json"), summary)?;
-    page.provenance("program", concat!("lapswarm ", env!("CARGO_PKG_VERSION")));
     page.provenance("backends", &machine.backends);
     page.provenance("adapter", &machine.adapter);
     page.provenance("driver", &machine.driver);

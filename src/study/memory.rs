@@ -159,6 +159,8 @@ mod tests {
         let fitting = said_to_fit(size(1_000_000_000).check(USUAL_MIB));
         size(fitting).check(USUAL_MIB).expect("as was said");
         assert!(size(fitting + 1).check(USUAL_MIB).is_err());
+        assert_eq!(size(fitting).needed_mib(), USUAL_MIB);
+        assert!(size(fitting + 1).needed_mib() > USUAL_MIB);
         let absurd = Size {
             population: usize::MAX,
             sections: usize::MAX,

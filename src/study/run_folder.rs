@@ -312,6 +312,22 @@ mod tests {
     }
 
     #[test]
+    fn the_folder_that_would_be_is_the_one_that_is() {
+        let root = tempfile::tempdir().expect("a temporary folder");
+        let folder = root.path().join("run");
+        assert_eq!(would_be("study", Some(&folder)).expect("a new one"), folder);
+        assert!(!folder.exists(), "it is looked at only");
+        drop(create("study", Some(&folder)).expect("a new folder"));
+        assert_eq!(would_be("study", Some(&folder)).expect("an empty one"), folder);
+        std::fs::write(folder.join("a"), "something").expect("a file");
+        for taken in [&folder, &folder.join("a")] {
+            let said = would_be("study", Some(taken)).expect_err("taken").to_string();
+            let refused = create("study", Some(taken)).expect_err("taken").to_string();
+            assert_eq!(said, refused);
+        }
+    }
+
+    #[test]
     fn of_many_that_want_one_folder_one_gets_it() {
         let root = tempfile::tempdir().expect("a temporary folder");
         let folder = root.path().join("run");

@@ -340,7 +340,9 @@ pub(crate) fn overlay(
     let Some((_, first)) = laps.first().filter(|_| !panels.is_empty()) else {
         return Ok(());
     };
-    let clock = if one_track { first.clock() } else { None };
+    let alone = laps.len() == 1;
+    // A lap alone loses no time on another.
+    let clock = if one_track && !alone { first.clock() } else { None };
     let lines: Vec<LapLine<'_>> = laps
         .iter()
         .map(|(name, lap)| {
@@ -394,8 +396,10 @@ pub(crate) fn overlay(
     let mapped = lines.iter().any(|line| !line.place_m.is_empty());
     let edges = road.and_then(edges).unwrap_or_default();
     page.lap(&LapView {
-        title: "Laps over one another",
-        note: if one_track {
+        title: if alone { "The lap" } else { "Laps over one another" },
+        note: if alone {
+            ""
+        } else if one_track {
             "Distances are stretched to the first lap's length, so that what is beside each other on the road stands above \
              each other; time lost is against that lap."
         } else {

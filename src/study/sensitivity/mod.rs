@@ -503,3 +503,40 @@ fn outputs_of(replay: &ReplayProblem, candidate: &[f64], samples: usize) -> Vec<
     }
     outputs
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::evaluate::BackendChoice;
+    use crate::evaluate::replay::Norm;
+
+    #[test]
+    fn a_study_file_repeats_its_study() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = folder.path().join("study.toml");
+        let settings = SensitivitySettings {
+            replay: IdentifySettings {
+                log: Some(folder.path().join("a \"log\".csv")),
+                section: Some("Abbey".to_owned()),
+                laps: vec![2],
+                norm: Norm::One,
+                backend: BackendChoice::Simd,
+                seed: 7,
+                free: vec![FreeParameter {
+                    name: "front.rBy1".to_owned(),
+                    lower: 1.0,
+                    upper: 2.0,
+                }],
+                ..SensitivitySettings::default().replay
+            },
+            share: 0.03,
+            samples: 64,
+            resamples: 17,
+        };
+        std::fs::write(&path, settings.to_toml()).expect("a file");
+        assert_eq!(
+            SensitivitySettings::read(&path).expect("what was written"),
+            settings
+        );
+    }
+}

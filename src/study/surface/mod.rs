@@ -228,3 +228,37 @@ pub fn measure_recorded(
         interrupted,
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::evaluate::BackendChoice;
+    use crate::evaluate::replay::Norm;
+
+    #[test]
+    fn a_study_file_repeats_its_study() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = folder.path().join("study.toml");
+        let settings = SurfaceSettings {
+            replay: IdentifySettings {
+                log: Some(folder.path().join("a \"log\".csv")),
+                section: Some("Abbey".to_owned()),
+                laps: vec![2],
+                norm: Norm::One,
+                backend: BackendChoice::Simd,
+                seed: 7,
+                free: vec![FreeParameter {
+                    name: "front.rBy1".to_owned(),
+                    lower: 1.0,
+                    upper: 2.0,
+                }],
+                ..SurfaceSettings::default().replay
+            },
+            parameters: ["K".to_owned(), "front.rBy1".to_owned()],
+            share: Some(0.1),
+            grid: 7,
+        };
+        std::fs::write(&path, settings.to_toml()).expect("a file");
+        assert_eq!(SurfaceSettings::read(&path).expect("what was written"), settings);
+    }
+}

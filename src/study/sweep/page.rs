@@ -47,7 +47,8 @@ fn ranked<'a>(summary: &'a Summary, figure: &str) -> Vec<(&'a Group, Spread)> {
     all
 }
 
-/// The figures of any group, what the study is judged by first, counts last.
+/// The figures of any group, what the study is judged by first, counts last. One that is another under a second name, as the
+/// swarm's error is where nothing is polished, is left out.
 fn figures(summary: &Summary) -> Vec<&str> {
     let mut names: Vec<&str> = summary
         .groups
@@ -63,7 +64,19 @@ fn figures(summary: &Summary) -> Vec<&str> {
         VERDICTS.iter().position(|v| *v == name).unwrap_or(VERDICTS.len())
     };
     names.sort_by_key(|name| place(name));
-    names
+    let same = |a: &str, b: &str| {
+        summary
+            .groups
+            .iter()
+            .all(|g| g.figures.get(a) == g.figures.get(b))
+    };
+    let mut told: Vec<&str> = Vec::new();
+    for name in names {
+        if !told.iter().any(|before| same(before, name)) {
+            told.push(name);
+        }
+    }
+    told
 }
 
 /// Values of a group's settings, without their names, which the section tells.
@@ -97,7 +110,7 @@ impl<'a> Drawn<'a> {
         };
         let least = ends().fold(f64::INFINITY, f64::min);
         let most = ends().fold(f64::NEG_INFINITY, f64::max);
-        if !(most > least) {
+        if most <= least {
             return None;
         }
         // Bars begin at nought; where all are nearly as long, it is what they are above the least that tells.
@@ -223,7 +236,6 @@ pub(super) fn write(folder: &Path, summary: &Summary, settings: &SweepSettings) 
     page.folded_table("Every run", "", &columns(&summary.row_table()))?;
     page.provenance("study", study);
     page.provenance("runs", runs.to_string());
-    page.provenance("program", concat!("lapswarm ", env!("CARGO_PKG_VERSION")));
     page.settings("sweep.toml, which repeats this sweep", settings.text());
     page.write(folder.join("report.html"))
 }

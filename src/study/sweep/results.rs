@@ -194,7 +194,7 @@ impl Summary {
     }
 
     /// Settings of every group and these of each of its figures, with endings of their names.
-    pub(super) fn median_table(&self, of: &[(&str, fn(&Spread) -> f64)]) -> Vec<OwnColumn> {
+    pub(super) fn median_table(&self, of: &[NamedPart]) -> Vec<OwnColumn> {
         let Some(first) = self.groups.first() else {
             return Vec::new();
         };
@@ -244,6 +244,9 @@ impl Summary {
         super::page::write(folder, self, settings)
     }
 }
+
+/// A part of a spread, and how the names of its columns end.
+pub(super) type NamedPart = (&'static str, fn(&Spread) -> f64);
 
 /// A column of a table with its cells.
 pub(super) struct OwnColumn {
