@@ -413,13 +413,13 @@ pub fn time_energy(outcome: &Outcome) -> Vec<CurvePanel<'static>> {
         .collect();
     let mut panels = vec![CurvePanel {
         title: "Lap time against energy out of the store in a lap",
-        x_label: "energy allowed (optimum) or used (dots) (MJ)",
+        x_label: "energy (MJ)",
         y_label: "lap time (s)",
         curves: vec![
-            line("exact optimum, of what is allowed", exact),
-            dots("scenarios, of what they used", scenarios.collect()),
+            line("exact optimum (energy allowed)", exact),
+            dots("scenarios (energy used)", scenarios.collect()),
             dots(
-                "swarm, of what it used",
+                "swarm (energy used)",
                 vec![(o.swarm.lap.lap.deployed, o.swarm.lap.lap.time)],
             ),
         ],
