@@ -480,7 +480,7 @@ fn draw_front(folder: &Path, settings: &HybridStudySettings, front: &StrategyFro
         .objectives
         .iter()
         .map(|o| Objective {
-            name: o.name(),
+            name: o.words(),
             unit: o.unit(),
         })
         .collect();
