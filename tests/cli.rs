@@ -21,6 +21,10 @@ fn files_to_start_from_are_sound_and_never_overwrite() {
     for (what, said) in [
         ("identify", "a study of identify"),
         ("raceline", "a study of raceline"),
+        ("hybrid", "a study of hybrid"),
+        ("sensitivity", "a study of sensitivity"),
+        ("surface", "a study of surface"),
+        ("sweep", "a sweep"),
         ("run", "a study of run"),
         ("car", "a car"),
     ] {
@@ -37,6 +41,10 @@ fn files_to_start_from_are_sound_and_never_overwrite() {
             std::fs::read(folder.path().join(&file)).expect("the file"),
             before
         );
+        if what != "car" {
+            let planned = lapswarm(folder.path(), &[what, &file, "--dry-run"]);
+            assert!(planned.status.success(), "{what}: {}", text(&planned.stderr));
+        }
     }
     std::fs::write(
         folder.path().join("survey.csv"),
@@ -109,4 +117,181 @@ fn completions_name_every_command() {
     ] {
         assert!(script.contains(command), "{command}");
     }
+}
+
+/// Every file and folder below `folder`.
+fn files_in(folder: &Path) -> Vec<std::path::PathBuf> {
+    let mut found = Vec::new();
+    for entry in folder.read_dir().expect("a folder").flatten() {
+        if entry.path().is_dir() {
+            found.extend(files_in(&entry.path()));
+        }
+        found.push(entry.path());
+    }
+    found.sort();
+    found
+}
+
+#[test]
+fn a_dry_run_of_any_study_says_what_it_would_do_and_writes_nothing() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    // A ring of 100 m about the origin, for what is driven along a line.
+    let rows: String = (0..200)
+        .map(|i| f64::from(i) * std::f64::consts::TAU / 200.0)
+        .map(|a| format!("{},{}\n", 100.0 * a.cos(), 100.0 * a.sin()))
+        .collect();
+    std::fs::write(folder.path().join("ring.csv"), format!("x_m,y_m\n{rows}")).expect("a line");
+    std::fs::create_dir(folder.path().join("empty")).expect("a folder");
+    std::fs::create_dir(folder.path().join("full")).expect("a folder");
+    std::fs::write(folder.path().join("full/a"), "something").expect("a file");
+    let before = files_in(folder.path());
+    let ring = ["--track", "circle:95:105"];
+    let line = [&["--line", "ring.csv"], ring.as_slice()].concat();
+    let setups = [line.as_slice(), &["--setups", "3", "--backend", "simd"]].concat();
+    // Each with an evaluation's number where one is known beforehand: of the adaptive swarms 128 * 50 + 64 * 1500; of three
+    // parameters a base car, four levels of each and eight samples of five; 5 * 5; four set-ups with 21 shares of the grip;
+    // 41 of these alone; four runs of inertia and two each of the pulls with three seeds, 50 * 100 cars each; speeds of 18, 38 and 58 m/s.
+    let studies: [(&str, &[&str], Option<u64>); 12] = [
+        ("run", &[], None),
+        ("identify", &[], Some(128 * 50 + 64 * 1500)),
+        ("raceline", &ring, None),
+        ("hybrid", &["--scenarios-only", "--sections", "60"], None),
+        ("envelope", &["--step-mps", "20"], Some(3)),
+        (
+            "sensitivity",
+            &["--parameters", "K,C,rBy1", "--samples", "8"],
+            Some(1 + 3 * 4 + 8 * 5),
+        ),
+        ("surface", &["--grid", "5"], Some(25)),
+        ("transient", &line, Some(41)),
+        ("transient", &setups, Some(4 * 21)),
+        ("simulate", &["--noise", "0.1,0,0,0"], Some(1)),
+        ("sweep", &["thesis_inertia"], Some(48 * 5000)),
+        ("sweep", &["sections"], None),
+    ];
+    for (study, flags, evaluations) in studies {
+        let said = |more: &[&str]| {
+            let all = [&[study], flags, &["--dry-run"], more].concat();
+            let output = lapswarm(folder.path(), &all);
+            assert_eq!(files_in(folder.path()), before, "{all:?} has written");
+            output
+        };
+        let plain = said(&["--out", "empty"]);
+        assert!(plain.status.success(), "{study}: {}", text(&plain.stderr));
+        let words = text(&plain.stdout);
+        assert!(words.contains("nothing is written"), "{study}: {words}");
+        assert!(words.contains("is there, and empty"), "{study}: {words}");
+
+        let json = said(&["--json", "--quiet", "--out", "new"]);
+        let told: serde_json::Value = serde_json::from_slice(&json.stdout).expect("one JSON object");
+        assert_eq!(told["study"], study);
+        assert_eq!(told["dry_run"], true);
+        assert_eq!(told["evaluations"].as_u64(), evaluations, "{study}");
+        assert_eq!(told["folder"], "new");
+        assert_eq!(told["folder_exists"], false);
+        assert!(told["settings"].is_object(), "{study}: {told}");
+        assert!(told["backend"].is_string(), "{study}: {told}");
+
+        for wrong in [&["--out", "full"][..], &["--out", "full/a"]] {
+            assert_eq!(said(wrong).status.code(), Some(2), "{study} {wrong:?}");
+        }
+    }
+    for wrong in [
+        &["identify", "--log", "nowhere.csv"][..],
+        &["identify", "--laps", "9"],
+        &["identify", "--section", "Nowhere"],
+        &["raceline", "--car", "nowhere.toml"],
+        &["raceline", "--sections", "3"],
+        &["hybrid", "--car", "gt"],
+        &["hybrid", "--line", "nowhere.csv"],
+        &["envelope", "--step-mps", "0"],
+        &["sensitivity", "--parameters", "nothing"],
+        &["surface", "--parameters", "K,nothing"],
+        &["transient", "--line", "nowhere.csv"],
+        // The ring is not on the bundled circuit.
+        &["transient", "--line", "ring.csv"],
+        &[
+            "transient",
+            "--line",
+            "ring.csv",
+            "--track",
+            "circle:95:105",
+            "--setups",
+            "2",
+            "--parameters",
+            "nothing",
+        ],
+        &["simulate", "--rate", "1"],
+        &["simulate", "--track", "nowhere.csv"],
+        &["sweep", "nothing"],
+        &["run", "--log", "nowhere.csv"],
+    ] {
+        let output = lapswarm(folder.path(), &[wrong, &["--dry-run"]].concat());
+        assert_eq!(
+            output.status.code(),
+            Some(2),
+            "{wrong:?}: {}",
+            text(&output.stdout)
+        );
+        assert_eq!(files_in(folder.path()), before, "{wrong:?} has written");
+    }
+}
+
+/// What the program says, on both channels, without the frames and line breaks of its reports.
+fn said(output: &Output) -> String {
+    let all = text(&output.stdout) + &text(&output.stderr);
+    all.replace(['\n', '│', ' '], "")
+}
+
+#[test]
+fn mistakes_come_with_what_was_meant() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    std::fs::write(folder.path().join("alone.toml"), "[grid]\nseed = [1]\n").expect("a file");
+    for (arguments, meant) in [
+        (&["hybrid", "--car", "gt"][..], "gt_hybrid"),
+        (&["sensitivity", "--parameters", "mass"], "mass_kg"),
+        (&["sensitivity", "--parameters", "front.rBy"], "front.rBy1"),
+        (&["surface", "--parameters", "k,C"], "perhapsK"),
+        (
+            &["surface", "--parameters", "roll_stifness,C"],
+            "roll_stiffness_nm_per_rad",
+        ),
+        (&["simulate", "--delay", "5,0,0,0"], "0to1"),
+        (&["simulate", "--noise=-1,0,0,0"], "0to100"),
+        // What it was taken for is said before what is wrong with it.
+        (&["check", "alone.toml"], "readasasweep"),
+    ] {
+        let output = lapswarm(folder.path(), arguments);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {}", said(&output));
+        assert!(said(&output).contains(meant), "{arguments:?}: {}", said(&output));
+    }
+    // Nothing like it: what there is is said instead.
+    let output = lapswarm(folder.path(), &["surface", "--parameters", "zzz,C"]);
+    assert!(said(&output).contains("achassiskey") && !said(&output).contains("perhaps"));
+}
+
+#[test]
+fn what_to_doubt_is_said() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let few = ["sensitivity", "--parameters", "rBy1,rCy1,K", "--samples"];
+    let unsure = lapswarm(folder.path(), &[&few[..], &["8"]].concat());
+    assert!(unsure.status.success(), "{}", said(&unsure));
+    assert!(said(&unsure).contains("8samplesaretoofew"), "{}", said(&unsure));
+    let sure = lapswarm(folder.path(), &[&few[..], &["1024"]].concat());
+    assert!(!said(&sure).contains("toofew"), "{}", said(&sure));
+    // Sixty cuts of a circuit of 5.9 km leave a hundred metres between them, in which no line keeps to the road.
+    let small = [
+        "raceline",
+        "--sections",
+        "60",
+        "--objectives",
+        "length",
+        "--quiet",
+        "--json",
+    ];
+    let off = lapswarm(folder.path(), &small);
+    assert!(off.status.success(), "{}", said(&off));
+    assert!(text(&off.stderr).contains("leaves the road"), "{}", said(&off));
+    let json: serde_json::Value = serde_json::from_slice(&off.stdout).expect("one JSON object");
+    assert_eq!(json["off_road"], serde_json::json!(["length"]));
 }

@@ -378,6 +378,159 @@ fn runs_are_laid_side_by_side() {
     assert_eq!(again.status.code(), Some(2));
 }
 
+/// Sweeps, measurements and simulated laps have pages: what they say in words, and their charts in a browser.
+#[test]
+fn what_is_measured_has_a_page() {
+    let folder = tempfile::tempdir().unwrap();
+    let sweep = folder.path().join("sweep.toml");
+    let text = "study = \"identify\"\n[base]\npolish = false\n[base.swarm]\nalgorithm = \"thesis\"\niterations = 2\n\
+                [base.free]\nrBy1 = [5.0, 25.0]\n[grid]\n\"swarm.population\" = [8, 16]\nseed = [1, 2]\n";
+    std::fs::write(&sweep, text).unwrap();
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    let sweep = sweep.display().to_string();
+    let small = [
+        "--populations",
+        "16,64",
+        "--backend",
+        "simd",
+        "--problems",
+        "line",
+    ];
+    // Words of the page, its charts, and a file beside it.
+    let runs: [(&str, Vec<&str>, &str, u64, &str); 7] = [
+        (
+            "sweep",
+            vec!["sweep", &sweep],
+            "4 runs of identify with 2 settings, 2 seeds each.",
+            7,
+            "medians.svg",
+        ),
+        (
+            "bench",
+            [&["bench"], small.as_slice()].concat(),
+            "line: at most",
+            3,
+            "scaling.svg",
+        ),
+        (
+            "swarm",
+            vec![
+                "bench",
+                "swarm",
+                "--populations",
+                "100,200",
+                "--problems",
+                "zdt1",
+                "--generations",
+                "2",
+                "--repeats",
+                "1",
+                "--backend",
+                "simd",
+            ],
+            "for a generation of 200 particles",
+            2,
+            "rows.csv",
+        ),
+        (
+            "optimisers",
+            vec![
+                "bench",
+                "optimisers",
+                "--seeds",
+                "1",
+                "--problems",
+                "zdt1",
+                "--algorithms",
+                "default,nsga2",
+            ],
+            "zdt1: default is best",
+            1,
+            "rows.csv",
+        ),
+        (
+            "studies",
+            vec![
+                "bench",
+                "studies",
+                "--problems",
+                "raceline",
+                "--algorithms",
+                "default,nsga2",
+                "--populations",
+                "20",
+                "--evaluations",
+                "100",
+                "--seeds",
+                "1",
+                "--sections",
+                "90",
+                "--backend",
+                "simd",
+            ],
+            "raceline:",
+            1,
+            "quality.svg",
+        ),
+        (
+            "parity",
+            vec!["parity", "--backend", "simd"],
+            "comparisons agree with the reference",
+            1,
+            "kernels.csv",
+        ),
+        (
+            "simulate",
+            vec!["simulate", "--track", "stadium:300:80:12"],
+            "1 run of simulate, by logged lap",
+            1,
+            "lap.csv",
+        ),
+    ];
+    let browser = browser();
+    for (name, mut arguments, words, charts, beside) in runs {
+        let out = path(name);
+        arguments.extend(["--out", &out]);
+        let run = lapswarm(&arguments);
+        assert!(
+            run.status.success(),
+            "{name}: {}",
+            String::from_utf8_lossy(&run.stderr)
+        );
+        let page = folder.path().join(name).join("report.html");
+        let html = std::fs::read_to_string(&page).unwrap();
+        assert!(html.contains(words), "{name} does not say: {words}");
+        assert!(
+            folder.path().join(name).join(beside).is_file(),
+            "{name}: {beside}"
+        );
+        if let Some(browser) = &browser {
+            sound(&used(browser, &page), charts);
+        }
+        // Nothing is overwritten.
+        assert_eq!(lapswarm(&arguments).status.code(), Some(2), "{name} again");
+    }
+    // The rates are those of the JSON: two rows of the line.
+    let rows = std::fs::read_to_string(folder.path().join("bench/rows.csv")).unwrap();
+    let summary = std::fs::read_to_string(folder.path().join("bench/summary.json")).unwrap();
+    let summary: serde_json::Value = serde_json::from_str(&summary).unwrap();
+    let rate = summary["rows"][1]["evaluations_per_s"].as_f64().unwrap();
+    assert!(
+        rows.lines().nth(2).unwrap().contains(&format!(",{rate},")),
+        "{rows}"
+    );
+
+    let out = path("lap.html");
+    let run = lapswarm(&["report", &path("simulate"), "--out", &out]);
+    assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+    let html = std::fs::read_to_string(&out).unwrap();
+    let (_, data) = html.split_once("id=\"charts\">").unwrap();
+    let data: serde_json::Value = serde_json::from_str(data.split_once("</script>").unwrap().0).unwrap();
+    // Speed, both accelerations, yaw rate and steering; alone, no time lost on another.
+    let lines = data[0]["lines"][0]["traces"].as_array().unwrap();
+    assert_eq!(lines.len(), 5);
+}
+
 #[test]
 fn folders_that_are_no_runs_are_refused_by_name() {
     let folder = tempfile::tempdir().unwrap();

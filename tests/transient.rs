@@ -44,6 +44,11 @@ fn the_car_drives_a_line_as_fast_as_the_point_mass() {
 
     let folder = tempfile::tempdir().expect("a temporary folder");
     let summary = summarise("gt", &outcome, 1.0);
+    let words = summary.to_text();
+    assert!(
+        summary.agrees && words.contains("Chosen: the greatest share of the grip"),
+        "{words}"
+    );
     write_results(folder.path(), &outcome, &summary).expect("files are written");
     for name in [
         "drive.csv",
@@ -126,6 +131,11 @@ fn set_ups_and_lines_are_driven_all_at_once() {
 
     let folder = tempfile::tempdir().expect("a temporary folder");
     let summary = summarise_population("gt", &lines, &settings, &outcome, 1.0);
+    let words = summary.to_text();
+    assert!(
+        words.contains("Chosen of each set-up on each line: the fastest lap within the edges"),
+        "{words}"
+    );
     write_population(folder.path(), &car, &lines, &outcome, &summary).expect("files are written");
     let fastest = Car::load(&folder.path().join("car.toml").display().to_string()).expect("a car");
     let value = |name: &str, car: &Car| car.to_flat()[car.parameter(name).expect(name).slots[0]];

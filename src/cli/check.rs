@@ -1,11 +1,13 @@
 //! `lapswarm check`: is this file what it should be?
 
 use lapswarm::config::{Document, read_text};
-use lapswarm::study::identify::IdentifySettings;
-use lapswarm::study::raceline::RacelineSettings;
+use lapswarm::study::hybrid::{self, HybridStudySettings};
+use lapswarm::study::identify::{self, IdentifySettings};
+use lapswarm::study::raceline::{self, RacelineSettings};
 use lapswarm::study::run::RunSettings;
-use lapswarm::study::sensitivity::SensitivitySettings;
-use lapswarm::study::surface::SurfaceSettings;
+use lapswarm::study::sensitivity::{SensitivitySettings, set_up_sensitivity};
+use lapswarm::study::surface::{SurfaceSettings, set_up_surface};
+use lapswarm::study::sweep::{self, SweepSettings};
 use lapswarm::study::transient::read_line;
 use lapswarm::telemetry::{ChannelMap, Log, LogOptions};
 use lapswarm::track::Track;
@@ -38,9 +40,32 @@ enum Kind {
     Line,
     Identify,
     Raceline,
+    Hybrid,
     Run,
     Sensitivity,
     Surface,
+    Sweep,
+}
+
+impl Kind {
+    /// What messages call it.
+    fn name(self) -> &'static str {
+        match self {
+            Self::Car => "a car",
+            Self::Tyre => "a tyre",
+            Self::Track => "a track",
+            Self::Log => "a log",
+            Self::Envelope => "limits",
+            Self::Line => "a line",
+            Self::Identify => "a study of identify",
+            Self::Raceline => "a study of raceline",
+            Self::Hybrid => "a study of hybrid",
+            Self::Run => "a study of run",
+            Self::Sensitivity => "a study of sensitivity",
+            Self::Surface => "a study of surface",
+            Self::Sweep => "a sweep",
+        }
+    }
 }
 
 /// What a file seems to be.
@@ -61,21 +86,53 @@ fn guess(path: &Path) -> Result<Kind> {
         let document = Document::parse(path, &text)?;
         let keys: Vec<String> = document.root().keys().map(str::to_owned).collect();
         let has = |names: &[&str]| names.iter().any(|n| keys.iter().any(|k| k == n));
-        return Ok(if has(&["chassis"]) {
-            Kind::Car
-        } else if has(&["survey", "curvature"]) {
-            Kind::Track
-        } else if has(&["samples", "resamples"]) {
-            Kind::Sensitivity
-        } else if has(&["grid"]) {
-            Kind::Surface
-        } else if has(&["identify", "raceline", "margin_m", "rounds"]) {
-            Kind::Run
-        } else if has(&["sections", "envelope", "car_width_m", "local_search"]) {
-            Kind::Raceline
-        } else {
-            Kind::Identify
-        });
+        // A surface's grid is a number.
+        if matches!(document.root().table("grid"), Ok(Some(_))) {
+            return Ok(Kind::Sweep);
+        }
+        // A kind's own keys, those of the kinds that share keys with later ones first.
+        let own: [(Kind, &[&str]); 8] = [
+            (Kind::Car, &["chassis"]),
+            (Kind::Track, &["survey", "curvature"]),
+            (Kind::Sweep, &["study", "base"]),
+            (Kind::Sensitivity, &["samples", "resamples"]),
+            (Kind::Surface, &["grid", "parameters"]),
+            (Kind::Run, &["identify", "raceline", "margin_m", "rounds"]),
+            (
+                Kind::Hybrid,
+                &[
+                    "scenarios",
+                    "optimise",
+                    "energy_mj",
+                    "budgets_mj",
+                    "spacing_m",
+                    "line",
+                    "stint_laps",
+                    "stint_fuel_kg",
+                    "match_lap_time_s",
+                ],
+            ),
+            (
+                Kind::Raceline,
+                &[
+                    "sections",
+                    "envelope",
+                    "car_width_m",
+                    "as_surveyed",
+                    "ellipse_exponent",
+                    "entry_mps",
+                    "warm_start",
+                    "local_search",
+                    "algorithm",
+                    "groups",
+                    "population",
+                    "iterations",
+                    "archive",
+                ],
+            ),
+        ];
+        let of = own.iter().find(|(_, names)| has(names));
+        return Ok(of.map_or(Kind::Identify, |(kind, _)| *kind));
     }
     let head = text.lines().next().unwrap_or_default().to_lowercase();
     let has = |names: &[&str]| names.iter().all(|n| head.contains(n));
@@ -137,43 +194,74 @@ fn read(path: &Path, kind: Kind) -> Result<String> {
         Kind::Line => format!("a line of {} points", read_line(path)?.len()),
         Kind::Identify => {
             let settings = IdentifySettings::read(path)?;
-            format!("a study of identify: {} free parameters", settings.free.len())
+            identify::set_up(&without_log(&settings))?;
+            format!("{}: {} free parameters", kind.name(), settings.free.len())
         }
         Kind::Raceline => {
             let settings = RacelineSettings::read(path)?;
+            raceline::set_up(&settings)?;
             format!(
-                "a study of raceline: {}, {} sections",
-                settings.track, settings.sections
+                "{}: {}, {} sections",
+                kind.name(),
+                settings.track,
+                settings.sections
             )
+        }
+        Kind::Hybrid => {
+            let settings = HybridStudySettings::read(path)?;
+            hybrid::read_inputs(&settings)?;
+            let count = settings.scenarios.len();
+            format!("{}: {}, {count} scenarios", kind.name(), settings.track)
         }
         Kind::Run => {
             let settings = RunSettings::read(path)?;
-            format!("a study of run: at most {} rounds", settings.rounds)
+            identify::set_up(&without_log(&settings.identify))?;
+            raceline::set_up(&settings.line_of(&settings.identify.car, None))?;
+            format!("{}: at most {} rounds", kind.name(), settings.rounds)
         }
         Kind::Sensitivity => {
-            let settings = SensitivitySettings::read(path)?;
-            settings.validate()?;
-            format!("a study of sensitivity: {} samples", settings.samples)
-        }
-        Kind::Surface => {
-            let settings = SurfaceSettings::read(path)?;
-            settings.validate()?;
+            let mut settings = SensitivitySettings::read(path)?;
+            settings.replay = without_log(&settings.replay);
+            set_up_sensitivity(&settings)?;
+            let count = settings.replay.free.len();
             format!(
-                "a study of surface: {} over {}",
-                settings.parameters[1], settings.parameters[0]
+                "{}: {count} parameters, {} samples",
+                kind.name(),
+                settings.samples
             )
         }
+        Kind::Surface => {
+            let mut settings = SurfaceSettings::read(path)?;
+            settings.replay = without_log(&settings.replay);
+            set_up_surface(&settings)?;
+            let [x, y] = &settings.parameters;
+            format!("{}: {y} over {x}", kind.name())
+        }
+        Kind::Sweep => {
+            let planned = sweep::plan(&SweepSettings::load(&name)?)?;
+            format!("{}: {planned}", kind.name())
+        }
     })
+}
+
+/// A study whose log is given with `--log` names laps that the bundled lap has not: these are not looked for.
+fn without_log(settings: &IdentifySettings) -> IdentifySettings {
+    let mut settings = settings.clone();
+    if settings.log.is_none() {
+        settings.laps.clear();
+        settings.holdout.clear();
+    }
+    settings
 }
 
 /// Checks them all; the first that is wrong ends the program, once all have been told of.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let mut wrong: Option<Error> = None;
     for path in &arguments.files {
-        let found = arguments
-            .kind
-            .map_or_else(|| guess(path), Ok)
-            .and_then(|kind| read(path, kind));
+        let found = arguments.kind.map_or_else(|| guess(path), Ok).and_then(|kind| {
+            // Whoever meant another kind sees why it is found wrong.
+            read(path, kind).inspect_err(|_| eprintln!("{}: read as {}", path.display(), kind.name()))
+        });
         match found {
             Ok(text) => println!("{}: {text}", path.display()),
             Err(error) if wrong.is_none() => wrong = Some(error),

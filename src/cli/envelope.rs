@@ -1,8 +1,10 @@
 //! `lapswarm envelope`.
 
-use super::print_json;
+use super::dry_run::Plan;
+use super::{Common, print_json};
 use lapswarm::Result;
-use lapswarm::study::envelope::{EnvelopeSettings, car_limits, summarise, write_results};
+use lapswarm::evaluate::BackendChoice;
+use lapswarm::study::envelope::{EnvelopeSettings, car_limits, speeds_of, summarise, write_results};
 use lapswarm::study::run_folder;
 use lapswarm::vehicle::Car;
 use std::path::PathBuf;
@@ -32,6 +34,9 @@ pub struct Arguments {
     /// No table
     #[arg(long)]
     quiet: bool,
+    /// Read the car, say what would be done, and write nothing
+    #[arg(long)]
+    dry_run: bool,
 }
 
 /// Runs the study.
@@ -42,6 +47,25 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         to_mps: arguments.to_mps,
         step_mps: arguments.step_mps,
     };
+    if arguments.dry_run {
+        let speeds = speeds_of(&car, &settings)?;
+        let resolved = serde_json::json!({
+            "car": arguments.car,
+            "from_mps": settings.from_mps,
+            "to_mps": settings.to_mps,
+            "step_mps": settings.step_mps,
+        });
+        return Plan::with("envelope", resolved)
+            .reads(format!("car {}, {} speeds", car.name, speeds.len()))
+            .evaluations(speeds.len() as u64)
+            .evaluated_by(BackendChoice::Cpu.would_be(None)?)
+            .tell(&Common {
+                out: arguments.out.clone(),
+                json: arguments.json,
+                quiet: arguments.quiet,
+                ..Common::default()
+            });
+    }
     let began = Instant::now();
     let limits = car_limits(&car, &settings)?;
     let summary = summarise(&car.name, &limits, began.elapsed().as_secs_f64());

@@ -1,11 +1,13 @@
 //! `lapswarm hybrid`.
 
+use super::dry_run::Plan;
 use super::{Common, Memory, Resume, backend_flag, print_json, stop_flag};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use lapswarm::evaluate::BackendChoice;
 use lapswarm::evaluate::hybrid::HybridObjective;
 use lapswarm::study::hybrid::{
-    FreePart, HYBRID_OBJECTIVES, HybridStudySettings, run_recorded, set_up, summarise, write_results,
+    FreePart, HYBRID_OBJECTIVES, HybridStudySettings, read_inputs, run_recorded, set_up, summarise,
+    write_results,
 };
 use lapswarm::study::journal::Recorder;
 use lapswarm::study::run_folder;
@@ -151,6 +153,21 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     )?;
     let settings = begun.settings;
     settings.size().check(arguments.memory.memory_limit_mib)?;
+    if arguments.common.dry_run {
+        let (road, car, line) = read_inputs(&settings)?;
+        let line = line.map_or_else(
+            || "the fastest one, found first".to_owned(),
+            |(name, points)| format!("{name}, {} points", points.len()),
+        );
+        return Plan::new("hybrid", &settings.to_toml())
+            .of_road(&road)
+            .reads(format!("hybrid drive of {}", car.name))
+            .reads(format!("line: {line}"))
+            .seed(settings.seed)
+            .memory_mib(settings.size().needed_mib())
+            .backend(settings.backend, settings.adapter.as_deref())?
+            .tell(&arguments.common);
+    }
     let setup = set_up(&settings)?;
     let folder = match begun.folder {
         Some(folder) => folder,

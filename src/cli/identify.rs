@@ -1,5 +1,6 @@
 //! `lapswarm identify`.
 
+use super::dry_run::Plan;
 use super::progress::SearchBar;
 use super::{Common, Memory, Resume, backend_flag, print_json, same_settings, stop_flag};
 use lapswarm::evaluate::replay::{BackendChoice, Norm};
@@ -172,6 +173,15 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     };
     settings.size().check(arguments.memory.memory_limit_mib)?;
     let setup = set_up(&settings)?;
+    if arguments.common.dry_run {
+        return Plan::new("identify", &settings.to_toml())
+            .of_replay(&setup)
+            .seed(settings.seed)
+            .evaluations(settings.evaluations())
+            .memory_mib(settings.size().needed_mib())
+            .backend(settings.backend, settings.adapter.as_deref())?
+            .tell(&arguments.common);
+    }
     // What cannot be set up leaves no folder.
     let folder = match folder {
         Some(folder) => folder,

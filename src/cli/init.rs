@@ -21,6 +21,14 @@ enum Template {
     Identify,
     /// A study of `raceline`
     Raceline,
+    /// A study of `hybrid`
+    Hybrid,
+    /// A study of `sensitivity`
+    Sensitivity,
+    /// A study of `surface`
+    Surface,
+    /// A sweep of a study over a grid
+    Sweep,
     /// A study of `run`
     Run,
     /// A car, with its tyre beside it
@@ -52,6 +60,13 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let (name, text) = match arguments.what {
         Template::Identify => ("identify", include_str!("../../data/templates/identify.toml")),
         Template::Raceline => ("raceline", include_str!("../../data/templates/raceline.toml")),
+        Template::Hybrid => ("hybrid", include_str!("../../data/templates/hybrid.toml")),
+        Template::Sensitivity => (
+            "sensitivity",
+            include_str!("../../data/templates/sensitivity.toml"),
+        ),
+        Template::Surface => ("surface", include_str!("../../data/templates/surface.toml")),
+        Template::Sweep => ("sweep", include_str!("../../data/templates/sweep.toml")),
         Template::Run => ("run", include_str!("../../data/templates/run.toml")),
         Template::Track => ("track", include_str!("../../data/templates/track.toml")),
         Template::Car => ("car", Car::BUNDLED_TOML),

@@ -3,10 +3,12 @@
 mod bench;
 mod check;
 mod devices;
+mod dry_run;
 mod envelope;
 mod hybrid;
 mod identify;
 mod init;
+mod kept;
 mod parity;
 mod progress;
 mod raceline;
@@ -107,13 +109,16 @@ pub struct Common {
     /// No progress bar and no table
     #[arg(long)]
     pub quiet: bool,
+    /// Read and check all that the study needs, say what it would do, and write nothing
+    #[arg(long)]
+    pub dry_run: bool,
 }
 
 /// The flag of studies that can be gone on with.
 #[derive(Args, Clone)]
 pub struct Resume {
     /// Go on with the run in --out that was broken off, with its own settings
-    #[arg(long, requires = "out")]
+    #[arg(long, requires = "out", conflicts_with = "dry_run")]
     pub resume: bool,
     /// Time between saves of the run's state, s
     #[arg(long, value_name = "SECONDS", default_value_t = 5.0)]
@@ -236,9 +241,12 @@ fn named_parameters(settings: &IdentifySettings, names: &[String]) -> Vec<FreePa
         .collect()
 }
 
+/// The circuit that comes with the program.
+const BUNDLED_TRACK: &str = "silverstone_gp";
+
 /// The circuit of a `--track`, or the bundled one.
 fn circuit(track: Option<&str>) -> Result<Circuit> {
-    load_circuit(track.unwrap_or("silverstone_gp"))
+    load_circuit(track.unwrap_or(BUNDLED_TRACK))
 }
 
 /// A flag that rises when the user or the system asks the program to stop.

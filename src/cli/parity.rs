@@ -1,13 +1,15 @@
 //! `lapswarm parity`.
 
+use super::kept::{self, Kept, Machine};
 use super::{backend_flag, print_json};
 use lapswarm::evaluate::BackendChoice;
 use lapswarm::evaluate::gpu::{DeviceSummary, devices};
 use lapswarm::parity::{Agreement, Subject, compare, subjects};
+use lapswarm::report::{BarPanel, BarSeries, Cells, Column, HtmlReport, significant, write_csv};
 use lapswarm::{Error, Result};
 use serde::Serialize;
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 /// Flags of `parity`.
@@ -25,6 +27,8 @@ pub struct Arguments {
     /// Write the findings into this file, to go with a bug report; refused if it exists
     #[arg(long, value_name = "FILE")]
     file: Option<PathBuf>,
+    #[command(flatten)]
+    kept: Kept,
     /// Print one JSON object as the last thing on stdout
     #[arg(long)]
     json: bool,
@@ -64,6 +68,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         let expected = "auto, simd or gpu: cpu is the reference that these are held against";
         return Err(Error::input("the command line", "--backend", "cpu", expected));
     }
+    let folder = arguments.kept.folder("parity")?;
     let device: Option<&DeviceSummary> = subjects.iter().find_map(|s| match s {
         Subject::Device(context) => Some(context.summary()),
         Subject::Lanes(_) => None,
@@ -122,7 +127,18 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             .map_err(|e| Error::io(path, "write", std::io::Error::other(e)))?;
         std::fs::write(path, text).map_err(|e| Error::io(path, "write", e))?;
     }
+    if let Some(folder) = &folder {
+        let names = subjects.iter().map(|s| match s {
+            Subject::Device(_) => "gpu",
+            Subject::Lanes(_) => "simd",
+        });
+        let machine = Machine::of(names, arguments.adapter.as_deref())?;
+        kept::write(folder, "parity", &report, page_of(folder, &report)?, &machine)?;
+    }
     if !arguments.quiet {
+        if let Some(folder) = &folder {
+            println!("Results: {}", folder.display());
+        }
         if let Some(device) = device {
             println!("{device}");
         }
@@ -151,4 +167,86 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         "off the reference by more than may be: {}",
         failing.join("; ")
     )))
+}
+
+/// Comparisons that bars are drawn of; the table has all.
+const DRAWN: usize = 30;
+
+/// The page, and `kernels.csv` beside it.
+fn page_of(folder: &Path, report: &Report) -> Result<HtmlReport> {
+    let mut page = HtmlReport::new("parity", "Kernels held against the f64 reference");
+    let mut found: Vec<(&String, &Agreement)> = report.kernels.iter().collect();
+    found.sort_by(|a, b| b.1.share_of_tolerance.total_cmp(&a.1.share_of_tolerance));
+    let failing: Vec<&str> = found
+        .iter()
+        .filter(|(_, a)| !a.pass)
+        .map(|(k, _)| k.as_str())
+        .collect();
+    page.sentence(if failing.is_empty() {
+        format!("All {} comparisons agree with the reference.", found.len())
+    } else {
+        format!(
+            "{} of {} comparisons do not agree with the reference.",
+            failing.len(),
+            found.len()
+        )
+    });
+    page.tile("Comparisons", found.len().to_string(), "");
+    page.tile("Failing", failing.len().to_string(), "");
+    if let Some((key, worst)) = found.first() {
+        let share = significant(100.0 * worst.share_of_tolerance, 3);
+        page.sentence(format!(
+            "Closest to its tolerance is {key}, which takes {share} % of it."
+        ));
+        page.tile("Most of a tolerance", share, "%");
+    }
+    for key in failing {
+        page.warning(format!("{key}: {}", report.kernels[key].worst));
+    }
+    page.section(
+        "How much of what may be",
+        "Greatest difference of each kernel as a share of its tolerance: 100 % would fail.",
+    );
+    let drawn = &found[..found.len().min(DRAWN)];
+    let panel = BarPanel {
+        title: "Share of the tolerance",
+        x_label: "greatest difference (% of what may be)",
+        names: drawn.iter().map(|(key, _)| key.as_str()).collect(),
+        series: vec![BarSeries {
+            label: "",
+            values: drawn.iter().map(|(_, a)| 100.0 * a.share_of_tolerance).collect(),
+            intervals: Vec::new(),
+        }],
+    };
+    page.bars(&panel, "")?;
+    let texts = |of: &dyn Fn(&Agreement) -> String| found.iter().map(|(_, a)| of(a)).collect::<Vec<_>>();
+    let numbers = |of: &dyn Fn(&Agreement) -> f64| found.iter().map(|(_, a)| of(a)).collect::<Vec<_>>();
+    let (subjects, kernels) = (texts(&|a| a.subject.clone()), texts(&|a| a.kernel.clone()));
+    let figures = numbers(&|a| a.figures as f64);
+    let (relative, ulp) = (numbers(&|a| a.max_relative), numbers(&|a| a.max_ulp));
+    let shares = numbers(&|a| 100.0 * a.share_of_tolerance);
+    let bits = texts(&|a| {
+        a.bits_as_scalar
+            .map_or("-", |same| if same { "yes" } else { "no" })
+            .to_owned()
+    });
+    let verdicts = texts(&|a| if a.pass { "agrees" } else { "FAILS" }.to_owned());
+    let worst = texts(&|a| a.worst.clone());
+    let column = |name, unit, cells| Column { name, unit, cells };
+    let columns = [
+        column("on", "", Cells::Texts(&subjects)),
+        column("kernel", "", Cells::Texts(&kernels)),
+        column("verdict", "", Cells::Texts(&verdicts)),
+        column("figures", "", Cells::Numbers(&figures)),
+        column("greatest relative difference", "", Cells::Numbers(&relative)),
+        column("greatest difference", "ULP", Cells::Numbers(&ulp)),
+        column("of what may be", "%", Cells::Numbers(&shares)),
+        column("bits as f32", "", Cells::Texts(&bits)),
+        column("furthest off", "", Cells::Texts(&worst)),
+    ];
+    write_csv(folder.join("kernels.csv"), &columns)?;
+    page.table("Every comparison", "", &columns)?;
+    page.provenance("figures compared", report.evaluations.to_string());
+    page.provenance("time", format!("{:.1} s", report.elapsed_s));
+    Ok(page)
 }

@@ -1,5 +1,6 @@
 //! `lapswarm raceline`.
 
+use super::dry_run::Plan;
 use super::{Common, Memory, Resume, backend_flag, print_json, same_settings, stop_flag};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use lapswarm::evaluate::BackendChoice;
@@ -16,6 +17,12 @@ use std::sync::atomic::Ordering;
 
 /// Flags of `raceline`; a flag wins over the study file.
 #[derive(clap::Args)]
+#[command(
+    after_help = "Examples:\n  lapswarm raceline\n  lapswarm raceline --track my_circuit.csv --car runs/identify-001/car.toml\n  \
+                  lapswarm raceline --section Abbey --objectives lap_time\n\nLines are looked for through the cuts. Through too \
+                  few of them the best one may leave the road in between: that is warned of on stderr, the JSON names the \
+                  objectives in off_road, and the exit code stays 0, for it is the best line through these cuts."
+)]
 pub struct Arguments {
     /// A study file; every flag has its twin in it
     study: Option<PathBuf>,
@@ -67,10 +74,11 @@ pub struct Arguments {
     /// Groups of neighbouring cuts of the cooperative algorithm
     #[arg(long, value_name = "K")]
     groups: Option<usize>,
-    /// Particles of the swarm that looks for the front, and of each that an algorithm other than windows has
+    /// Particles of the swarm that looks for the front between several objectives; with --algorithm cooperative or thesis
+    /// also of the swarm of each objective. The windows' swarms have sizes of their own
     #[arg(long, value_name = "N")]
     population: Option<usize>,
-    /// Its iterations
+    /// Iterations of these swarms; with one objective and the windows neither flag changes anything
     #[arg(long, value_name = "N")]
     iterations: Option<usize>,
     /// Where to evaluate: auto, cpu, simd or gpu
@@ -154,6 +162,14 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     };
     settings.size().check(arguments.memory.memory_limit_mib)?;
     let setup = set_up(&settings)?;
+    if arguments.common.dry_run {
+        return Plan::new("raceline", &settings.to_toml())
+            .of_road(&setup)
+            .seed(settings.seed)
+            .memory_mib(settings.size().needed_mib())
+            .backend(settings.backend, settings.adapter.as_deref())?
+            .tell(&arguments.common);
+    }
     // What cannot be set up leaves no folder.
     let folder = match folder {
         Some(folder) => folder,
@@ -193,6 +209,10 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     }
     if arguments.common.json {
         print_json(&summary)?;
+    }
+    if !summary.off_road.is_empty() {
+        // Said whatever is printed, and no failure: the line is the best through the cuts that were asked for.
+        tracing::warn!("{}", summary.off_road_text());
     }
     if outcome.interrupted {
         Err(Error::Interrupted(folder.to_path_buf()))

@@ -1,9 +1,12 @@
 //! `lapswarm run`.
 
+use super::dry_run::Plan;
 use super::{Common, Memory, Resume, backend_flag, print_json, progress, stop_flag};
 use lapswarm::evaluate::BackendChoice;
+use lapswarm::study::memory::Size;
 use lapswarm::study::run::{RunSettings, run as run_all};
 use lapswarm::study::run_folder;
+use lapswarm::study::{identify, raceline};
 use lapswarm::{Error, Result};
 use std::ops::ControlFlow;
 use std::path::PathBuf;
@@ -130,6 +133,18 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let settings = begun.settings;
     for size in [settings.identify.size(), settings.raceline.size()] {
         size.check(arguments.memory.memory_limit_mib)?;
+    }
+    if arguments.common.dry_run {
+        let setup = identify::set_up(&settings.identify)?;
+        let road = raceline::set_up(&settings.line_of(&settings.identify.car, None))?;
+        let sizes = [settings.identify.size(), settings.raceline.size()];
+        return Plan::new("run", &settings.to_toml())
+            .of_replay(&setup)
+            .of_road(&road)
+            .seed(settings.identify.seed)
+            .memory_mib(sizes.iter().map(Size::needed_mib).max().unwrap_or(0))
+            .backend(settings.identify.backend, settings.identify.adapter.as_deref())?
+            .tell(&arguments.common);
     }
     let folder = match begun.folder {
         Some(folder) => folder,

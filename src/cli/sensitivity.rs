@@ -1,5 +1,6 @@
 //! `lapswarm sensitivity`.
 
+use super::dry_run::Plan;
 use super::replay_flags::ReplayFlags;
 use super::{Common, Memory, Resume, print_json, progress, stop_flag};
 use lapswarm::study::journal::Recorder;
@@ -77,6 +78,15 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let settings = begun.settings;
     memory::check(&settings.kept(), arguments.memory.memory_limit_mib)?;
     let setup = set_up_sensitivity(&settings)?;
+    if arguments.common.dry_run {
+        return Plan::new("sensitivity", &settings.to_toml())
+            .of_replay(&setup)
+            .seed(settings.replay.seed)
+            .evaluations(settings.evaluations() as u64)
+            .memory_mib(memory::needed_mib(&settings.kept()))
+            .backend(settings.replay.backend, settings.replay.adapter.as_deref())?
+            .tell(&arguments.common);
+    }
     let folder = match begun.folder {
         Some(folder) => folder,
         None => run_folder::create("sensitivity", out)?,

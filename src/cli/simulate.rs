@@ -1,10 +1,13 @@
 //! `lapswarm simulate`.
 
-use super::{Common, circuit, print_json};
+use super::dry_run::Plan;
+use super::{BUNDLED_TRACK, Common, circuit, print_json};
 use lapswarm::Result;
+use lapswarm::evaluate::BackendChoice;
 use lapswarm::simulate::{SensorSettings, SimulateSettings, simulate_lap};
+use lapswarm::study::compare::{Run, compare};
 use lapswarm::study::identify::lap_format;
-use lapswarm::study::run_folder;
+use lapswarm::study::run_folder::{self, Manifest, write_json};
 use lapswarm::telemetry::write_native;
 use lapswarm::vehicle::Car;
 use serde::Serialize;
@@ -32,7 +35,7 @@ pub struct Arguments {
     /// Standard deviations of the sensors' noise: vx (m/s), ax, ay (m/s^2), yaw rate (rad/s)
     #[arg(long, value_name = "VX,AX,AY,R", value_delimiter = ',')]
     noise: Option<Vec<f64>>,
-    /// Delays of the sensors: vx, ax, ay, yaw rate (s)
+    /// Delays of the sensors, 1 s at the most: vx, ax, ay, yaw rate (s)
     #[arg(long, value_name = "VX,AX,AY,R", value_delimiter = ',')]
     delay: Option<Vec<f64>>,
 }
@@ -49,16 +52,21 @@ struct Summary {
     log: String,
 }
 
-/// Four figures of a flag, each at least nought.
-fn four(flag: &str, values: Option<&Vec<f64>>) -> Result<[f64; 4]> {
+/// Greatest standard deviation of a sensor's noise, in the channel's unit: more than the channels themselves have.
+const GREATEST_NOISE: f64 = 100.0;
+/// Greatest delay of a sensor (s): twice as long as `identify` looks for, and far beyond what filters and buses come to.
+const LONGEST_DELAY_S: f64 = 1.0;
+
+/// Four figures of a flag, each from nought to `most`.
+fn four(flag: &str, values: Option<&Vec<f64>>, most: f64) -> Result<[f64; 4]> {
     let values = values.map_or(&[0.0; 4][..], Vec::as_slice);
     match <[f64; 4]>::try_from(values) {
-        Ok(four) if four.iter().all(|x| *x >= 0.0 && x.is_finite()) => Ok(four),
+        Ok(four) if four.iter().all(|x| (0.0..=most).contains(x)) => Ok(four),
         _ => Err(lapswarm::Error::input(
             "the command line",
             flag,
             format!("{values:?}"),
-            "four numbers of nought or more: vx, ax, ay, yaw rate",
+            format!("four numbers from 0 to {most}: vx, ax, ay, yaw rate"),
         )),
     }
 }
@@ -71,8 +79,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         rate_hz: arguments.rate,
         substeps: arguments.substeps,
         sensors: SensorSettings {
-            noise: four("--noise", arguments.noise.as_ref())?,
-            delay_s: four("--delay", arguments.delay.as_ref())?,
+            noise: four("--noise", arguments.noise.as_ref(), GREATEST_NOISE)?,
+            delay_s: four("--delay", arguments.delay.as_ref(), LONGEST_DELAY_S)?,
         },
         seed: arguments.common.seed.unwrap_or(1),
         ..SimulateSettings::default()
@@ -88,6 +96,25 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             ));
         }
         settings.driver.pace = pace;
+    }
+    if arguments.common.dry_run {
+        settings.check(&circuit)?;
+        let resolved = serde_json::json!({
+            "car": arguments.car,
+            "track": arguments.track.as_deref().unwrap_or(BUNDLED_TRACK),
+            "rate_hz": settings.rate_hz,
+            "substeps": settings.substeps,
+            "pace": settings.driver.pace,
+            "noise": settings.sensors.noise,
+            "delay_s": settings.sensors.delay_s,
+        });
+        return Plan::with("simulate", resolved)
+            .reads(format!("car {}", car.name))
+            .reads(format!("track {}, {:.1} m", circuit.name, circuit.length_m))
+            .seed(settings.seed)
+            .evaluations(1)
+            .evaluated_by(BackendChoice::Cpu.would_be(None)?)
+            .tell(&arguments.common);
     }
     let log = simulate_lap(&car, &circuit, &settings)?;
     let folder = run_folder::create("simulate", arguments.common.out.as_deref())?;
@@ -107,6 +134,16 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         greatest_ay_mps2: greatest(&log.ay_mps2),
         log: path.display().to_string(),
     };
+    write_json(&folder.join("summary.json"), &summary)?;
+    let backend = BackendChoice::Cpu.would_be(None)?;
+    let manifest = Manifest {
+        track: Some(&circuit.name),
+        settings: "",
+        ..Manifest::new("simulate", settings.seed, &backend, &car.name)
+    };
+    write_json(&folder.join("manifest.json"), &manifest)?;
+    // The page of runs beside each other, of this one alone.
+    compare(&[Run::read(&folder)?])?.write(folder.join("report.html"))?;
     if !arguments.common.quiet {
         println!(
             "{}: {:.2} s, {:.1} to {:.1} m/s, up to {:.1} m/s^2 sideways\nLog: {}",

@@ -1,9 +1,10 @@
 //! `lapswarm sweep`.
 
+use super::dry_run::Plan;
 use super::{Common, print_json, progress, stop_flag};
 use lapswarm::Result;
 use lapswarm::study::run_folder;
-use lapswarm::study::sweep::{SWEEP_FILE, SweepSettings, sweep};
+use lapswarm::study::sweep::{SWEEP_FILE, SweepSettings, plan, sweep};
 use std::ops::ControlFlow;
 use std::sync::atomic::Ordering;
 
@@ -20,13 +21,24 @@ pub struct Arguments {
     #[command(flatten)]
     common: Common,
     /// Go on with the sweep that --out holds a part of
-    #[arg(long, requires = "out")]
+    #[arg(long, requires = "out", conflicts_with = "dry_run")]
     resume: bool,
 }
 
 /// Runs the sweep.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let settings = SweepSettings::load(&arguments.sweep)?;
+    if arguments.common.dry_run {
+        let planned = plan(&settings)?;
+        let mut told = Plan::new("sweep", settings.text())
+            .reads(planned.to_string())
+            .memory_mib(planned.memory_mib)
+            .evaluated_by(planned.backend);
+        if let Some(evaluations) = planned.evaluations {
+            told = told.evaluations(evaluations);
+        }
+        return told.tell(&arguments.common);
+    }
     let folder = match (&arguments.common.out, arguments.resume) {
         (Some(folder), true) => run_folder::reopen_by(folder, SWEEP_FILE)?,
         (out, _) => run_folder::create("sweep", out.as_deref())?,

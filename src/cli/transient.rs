@@ -1,10 +1,12 @@
 //! `lapswarm transient`.
 
+use super::dry_run::Plan;
 use super::{Common, backend_flag, print_json, progress, stop_flag};
+use glam::DVec2;
 use lapswarm::Error;
 use lapswarm::Result;
 use lapswarm::evaluate::BackendChoice;
-use lapswarm::study::raceline::{RacelineSettings, set_up};
+use lapswarm::study::raceline::{self, RacelineSettings, set_up};
 use lapswarm::study::run_folder;
 use lapswarm::study::transient::{
     MOST_SETUPS, NamedLine, PopulationSettings, TransientSettings, drive_line, drive_population, read_line,
@@ -67,6 +69,26 @@ impl Arguments {
             ..RacelineSettings::default()
         }
     }
+
+    /// What would be driven: lines that leave room between the edges (m, right and left).
+    fn plan(&self, road: &raceline::Setup, lines: &[NamedLine], edges_m: [&[DVec2]; 2]) -> Result<Plan> {
+        let resolved = serde_json::json!({
+            "line": self.line,
+            "track": self.track,
+            "car": self.car,
+            "envelope": self.envelope,
+            "car_width_m": self.car_width_m,
+            "setups": self.setups,
+            "parameters": self.parameters,
+            "share": self.share,
+        });
+        lines
+            .iter()
+            .try_fold(Plan::with("transient", resolved).of_road(road), |plan, line| {
+                let circuit = line.circuit(edges_m, self.car_width_m)?;
+                Ok(plan.reads(format!("line {}, {:.1} m", line.name, circuit.length_m)))
+            })
+    }
 }
 
 /// What reports call the lines: their files' names, with the folders where these are not enough.
@@ -116,8 +138,17 @@ fn run_population(arguments: &Arguments) -> Result<()> {
         adapter: arguments.adapter.clone(),
         ..base
     };
-    let folder = run_folder::create("transient", arguments.common.out.as_deref())?;
     let edges = [setup.edges_m[0].as_slice(), setup.edges_m[1].as_slice()];
+    if arguments.common.dry_run {
+        settings.check(&car)?;
+        return arguments
+            .plan(&setup, &lines, edges)?
+            .seed(settings.seed)
+            .evaluations(settings.laps(lines.len()) as u64)
+            .backend(settings.backend, settings.adapter.as_deref())?
+            .tell(&arguments.common);
+    }
+    let folder = run_folder::create("transient", arguments.common.out.as_deref())?;
     let stop = stop_flag();
     let bar = progress::counting(arguments.common.quiet);
     let outcome = drive_population(&car, &setup.car, &lines, edges, &settings, |done, planned| {
@@ -173,12 +204,23 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let points = read_line(line)?;
     let setup = set_up(&arguments.raceline())?;
     let car = Car::load(&arguments.car)?;
-    let folder = run_folder::create("transient", arguments.common.out.as_deref())?;
     let settings = TransientSettings {
         car_width_m: arguments.car_width_m,
         ..TransientSettings::default()
     };
     let edges = [setup.edges_m[0].as_slice(), setup.edges_m[1].as_slice()];
+    if arguments.common.dry_run {
+        let line = NamedLine {
+            name: "the line".to_owned(),
+            points_m: points,
+        };
+        return arguments
+            .plan(&setup, &[line], edges)?
+            .evaluations(settings.shares.len() as u64)
+            .evaluated_by(BackendChoice::Cpu.would_be(None)?)
+            .tell(&arguments.common);
+    }
+    let folder = run_folder::create("transient", arguments.common.out.as_deref())?;
     let outcome = drive_line(&car, &setup.car, &points, edges, &settings)?;
     let summary = summarise(&car.name, &outcome, began.elapsed().as_secs_f64());
     write_results(&folder, &outcome, &summary)?;

@@ -1,6 +1,9 @@
 //! Choice of backend.
 
-use super::gpu::devices;
+use super::BackendInfo;
+use super::gpu::{GpuContext, devices};
+use super::simd::InstructionSet;
+use crate::error::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::sync::OnceLock;
 
@@ -34,6 +37,24 @@ impl BackendChoice {
             Self::Auto if adapter.is_some() || real_gpu() => Self::Gpu,
             Self::Auto => Self::Simd,
             chosen => chosen,
+        }
+    }
+
+    /// What would evaluate, as evaluators name themselves: the GPU is opened, nothing is compiled.
+    ///
+    /// # Errors
+    /// [`Error::NoDevice`] if a GPU was asked for and none fits, [`Error::Device`] if it does not open.
+    pub fn would_be(self, adapter: Option<&str>) -> Result<BackendInfo> {
+        let lanes = || BackendInfo::of_lanes(InstructionSet::best());
+        match self.decided(adapter) {
+            Self::Gpu => match GpuContext::shared(adapter) {
+                Ok(context) => Ok(context.backend_info()),
+                // As evaluators do: lanes take over where no GPU was asked for.
+                Err(Error::NoDevice(_)) if self == Self::Auto && adapter.is_none() => Ok(lanes()),
+                Err(error) => Err(error),
+            },
+            Self::Cpu => Ok(BackendInfo::reference()),
+            _ => Ok(lanes()),
         }
     }
 }

@@ -323,6 +323,28 @@ fn thin_out(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
     kept
 }
 
+/// Pixels before a legend's name for its line and the gap to the name before.
+const LEGEND_LINE_PX: f64 = 48.0;
+
+/// Entries of a legend in rows that are no wider than this, one to a row at the least.
+pub(super) fn legend_rows<'a, 'b>(
+    entries: &'a [(&'b str, RGBColor, f64)],
+    width: f64,
+) -> Vec<&'a [(&'b str, RGBColor, f64)]> {
+    let look = Type::new(TICK_PX + 1.0, INK, Align::Left);
+    let (mut rows, mut from, mut filled) = (Vec::new(), 0, 0.0);
+    for (i, (name, ..)) in entries.iter().enumerate() {
+        let wide = look.width(name) + LEGEND_LINE_PX;
+        if i > from && filled + wide > width {
+            rows.push(&entries[from..i]);
+            (from, filled) = (i, 0.0);
+        }
+        filled += wide;
+    }
+    rows.extend((from < entries.len()).then(|| &entries[from..]));
+    rows
+}
+
 /// A row of coloured names at the right of a figure's title line.
 pub(super) fn draw_legend(canvas: &mut Canvas<'_>, entries: &[(&str, RGBColor, f64)], right: f64, y: f64) {
     let look = Type::new(TICK_PX + 1.0, INK, Align::Left);
@@ -331,6 +353,6 @@ pub(super) fn draw_legend(canvas: &mut Canvas<'_>, entries: &[(&str, RGBColor, f
         x -= look.width(name);
         canvas.text(name, (x, y), look);
         canvas.line((x - 30.0, y), (x - 8.0, y), colour, width_px);
-        x -= 48.0;
+        x -= LEGEND_LINE_PX;
     }
 }

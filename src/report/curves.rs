@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::axis::{Axis, Labels, Plot, draw_legend, extent};
+use super::axis::{Axis, Labels, Plot, draw_legend, extent, legend_rows};
 use super::canvas::{Align, Type, draw_to_file};
 use super::style::{INK, LABEL_PX, series_colour, viridis};
 use crate::{Error, Result};
@@ -99,9 +99,9 @@ pub fn plot_curves(path: impl AsRef<Path>, title: &str, panels: &[CurvePanel<'_>
                 .filter(|(_, c)| !c.label.is_empty())
                 .map(|(i, c)| (c.label, colour(i, c), 2.0))
                 .collect();
-            if !legend.is_empty() {
-                // Below the axis: the head of a panel is its title's.
-                draw_legend(canvas, &legend, right, bottom + 56.0);
+            // Below the axis: the head of a panel is its title's.
+            for (row, entries) in legend_rows(&legend, right - left + 60.0).into_iter().enumerate() {
+                draw_legend(canvas, entries, right, bottom + 54.0 + 17.0 * row as f64);
             }
         }
     })

@@ -29,6 +29,8 @@ pub struct SurfaceFigure<'a> {
 }
 
 const SIZE: (f64, f64) = (1400.0, 640.0);
+/// Radius of a mark.
+const MARK_PX: f64 = 5.0;
 /// Levels between the least and the greatest cost.
 const LEVELS: usize = 12;
 
@@ -118,17 +120,45 @@ fn draw_levels(
             y_ticks: 8,
         },
     );
-    for (name, at) in &figure.marks {
-        let at = (plot.x.at(at[0]), plot.y.at(at[1]));
-        canvas.dot(at, 5.0, WHITE, 1.0);
-        canvas.dot(at, 3.6, VERMILLION, 1.0);
-        // Names read inwards, away from the frame.
-        let (side, align) = if at.0 > 560.0 {
-            (-9.0, Align::Right)
-        } else {
-            (9.0, Align::Left)
-        };
-        canvas.text(name, (at.0 + side, at.1), Type::new(TICK_PX, WHITE, align).bold());
+    if figure.z.iter().any(|z| !z.is_finite()) {
+        let look = Type::new(TICK_PX, FAINT_INK, Align::Right);
+        canvas.text("white: the car does not drive", (610.0, 58.0), look);
+    }
+    let places = figure
+        .marks
+        .iter()
+        .map(|(_, at)| (plot.x.at(at[0]), plot.y.at(at[1])));
+    // Names read inwards, away from the frame.
+    draw_marks(canvas, figure, places.collect(), 520.0);
+}
+
+/// Dots with names, those that fall together under one; names right of `inwards_px` stand on the left.
+fn draw_marks(canvas: &mut Canvas<'_>, figure: &SurfaceFigure<'_>, places: Vec<(f64, f64)>, inwards_px: f64) {
+    let mut told: Vec<((f64, f64), String)> = Vec::new();
+    for ((name, _), at) in figure.marks.iter().zip(places) {
+        let together = told
+            .iter_mut()
+            .find(|(there, _)| (there.0 - at.0).hypot(there.1 - at.1) < 2.0 * MARK_PX);
+        match together {
+            Some((_, names)) => *names = format!("{names}, {name}"),
+            None => told.push((at, (*name).to_owned())),
+        }
+    }
+    for (at, names) in told {
+        canvas.dot(at, MARK_PX, WHITE, 1.0);
+        canvas.dot(at, MARK_PX - 1.4, VERMILLION, 1.0);
+        let left = at.0 > inwards_px;
+        let look = Type::new(TICK_PX, WHITE, Align::Left).bold();
+        let wide = look.width(&names);
+        let from = if left { at.0 - 9.0 - wide } else { at.0 + 9.0 };
+        // White on a dark ground reads on every colour below.
+        canvas.rect(
+            (from - 3.0, at.1 - 8.0),
+            (from + wide + 3.0, at.1 + 8.0),
+            INK,
+            0.6,
+        );
+        canvas.text(&names, (from, at.1), look);
     }
 }
 
@@ -170,10 +200,31 @@ fn draw_in_space(canvas: &mut Canvas<'_>, figure: &SurfaceFigure<'_>, share: &dy
             }
         }
     }
-    let look = |align| Type::new(LABEL_PX, INK, align);
-    let (near, right) = (project(0.5, -0.1, 0.0), project(1.1, 0.55, 0.0));
-    canvas.text(figure.x_label, (near.0, near.1 + 6.0), look(Align::Right));
-    canvas.text(figure.y_label, (right.0 + 4.0, right.1 + 14.0), look(Align::Left));
+    // Names and ends of the axes stand before the two near edges, where the surface never is.
+    let name = |align| Type::new(LABEL_PX, INK, align);
+    let end = |align| Type::new(TICK_PX, INK, align);
+    let along_x = |u: f64| project(u, -0.08, 0.0);
+    let along_y = |v: f64| project(-0.08, v, 0.0);
+    let down = |at: (f64, f64)| (at.0, at.1 + 8.0);
+    canvas.text(figure.x_label, down(along_x(0.5)), name(Align::Left));
+    canvas.text(figure.y_label, down(along_y(0.5)), name(Align::Right));
+    for (share, at) in [(0.04, 0), (1.0, nx - 1)] {
+        canvas.text(&significant(figure.x[at], 3), along_x(share), end(Align::Left));
+    }
+    for (share, at) in [(0.04, 0), (1.0, ny - 1)] {
+        canvas.text(&significant(figure.y[at], 3), along_y(share), end(Align::Right));
+    }
+    // The value of a mark is that of the cell it lies in.
+    let nearest = |values: &[f64], x: f64| {
+        let step = (values[values.len() - 1] - values[0]) / (values.len() - 1) as f64;
+        (((x - values[0]) / step).round().max(0.0) as usize).min(values.len() - 1)
+    };
+    let places = figure.marks.iter().map(|(_, at)| {
+        let (column, row) = (nearest(figure.x, at[0]), nearest(figure.y, at[1]));
+        let (u, v) = (column as f64 / (nx - 1) as f64, row as f64 / (ny - 1) as f64);
+        place(column, row).unwrap_or_else(|| project(u, v, 0.0))
+    });
+    draw_marks(canvas, figure, places.collect(), SIZE.0 - 160.0);
 }
 
 fn draw_scale(canvas: &mut Canvas<'_>, figure: &SurfaceFigure<'_>, (least, spread): (f64, f64)) {
@@ -195,5 +246,5 @@ fn draw_scale(canvas: &mut Canvas<'_>, figure: &SurfaceFigure<'_>, (least, sprea
         );
     }
     let look = Type::new(LABEL_PX, INK, Align::Left);
-    canvas.text(figure.z_label, (right + 22.0, y + 6.0), look);
+    canvas.text(figure.z_label, (left, y - 12.0), look);
 }

@@ -35,6 +35,33 @@ impl Default for SimulateSettings {
     }
 }
 
+impl SimulateSettings {
+    /// Whether a lap of the circuit can be driven and logged so.
+    ///
+    /// # Errors
+    /// [`Error::Input`] for a setting out of range or an open road.
+    pub fn check(&self, circuit: &Circuit) -> Result<()> {
+        if !(self.rate_hz >= 5.0 && self.rate_hz <= 1000.0) || self.substeps == 0 {
+            let found = format!("{} Hz, {} sub-steps", self.rate_hz, self.substeps);
+            return Err(Error::input(
+                "simulate",
+                "rate_hz, substeps",
+                found,
+                "5 to 1000 Hz and 1 or more sub-steps",
+            ));
+        }
+        if !circuit.closed {
+            return Err(Error::input(
+                &circuit.name,
+                "track",
+                "an open road",
+                "a closed circuit: the lap driven is a flying one",
+            ));
+        }
+        Ok(())
+    }
+}
+
 /// Decimal places to which the logged inputs are rounded, so that the log's figures are the very inputs that its
 /// outputs were worked out from: wheel speeds (rad/s) and steering (rad).
 const INPUT_DECIMALS: [i32; 2] = [6, 8];
@@ -53,23 +80,7 @@ fn rounded(x: f64, decimals: i32) -> f64 {
 /// # Errors
 /// [`Error::Input`] for a setting out of range or an open road, [`Error::Study`] if the car does not get round.
 pub fn simulate_lap(car: &Car, circuit: &Circuit, settings: &SimulateSettings) -> Result<Log> {
-    if !(settings.rate_hz >= 5.0 && settings.rate_hz <= 1000.0) || settings.substeps == 0 {
-        let found = format!("{} Hz, {} sub-steps", settings.rate_hz, settings.substeps);
-        return Err(Error::input(
-            "simulate",
-            "rate_hz, substeps",
-            found,
-            "5 to 1000 Hz and 1 or more sub-steps",
-        ));
-    }
-    if !circuit.closed {
-        return Err(Error::input(
-            &circuit.name,
-            "track",
-            "an open road",
-            "a closed circuit: the lap driven is a flying one",
-        ));
-    }
+    settings.check(circuit)?;
     let interval = 1.0 / settings.rate_hz;
     let lap = drive(car, circuit, &settings.driver, interval)?;
     let mut samples: Vec<Sample<f64>> = lap

@@ -41,13 +41,22 @@ impl Kept {
     }
 }
 
+/// Memory that so much takes, that of the evaluators at the least with it (MiB, rounded up).
+pub fn needed_mib(kept: &[Kept]) -> u64 {
+    needed(kept).div_ceil(1 << 20)
+}
+
+fn needed(kept: &[Kept]) -> u64 {
+    kept.iter().map(Kept::bytes).fold(LEAST, u64::saturating_add)
+}
+
 /// What a study keeps must fit into so much memory; the rest is left to its evaluators.
 ///
 /// # Errors
 /// [`Error::Input`] naming what takes most of it, and how much of that would fit beside the rest.
 pub fn check(kept: &[Kept], limit_mib: u64) -> Result<()> {
     let limit = limit_mib.saturating_mul(1 << 20);
-    let needed = kept.iter().map(Kept::bytes).fold(LEAST, u64::saturating_add);
+    let needed = needed(kept);
     let Some(largest) = kept
         .iter()
         .max_by_key(|kept| kept.bytes())
@@ -93,6 +102,11 @@ impl Size {
     /// As [`check`].
     pub fn check(&self, limit_mib: u64) -> Result<()> {
         check(&self.kept(), limit_mib)
+    }
+
+    /// As [`needed_mib`] of all that the study keeps.
+    pub fn needed_mib(&self) -> u64 {
+        needed_mib(&self.kept())
     }
 
     fn kept(&self) -> [Kept; 4] {
@@ -145,6 +159,8 @@ mod tests {
         let fitting = said_to_fit(size(1_000_000_000).check(USUAL_MIB));
         size(fitting).check(USUAL_MIB).expect("as was said");
         assert!(size(fitting + 1).check(USUAL_MIB).is_err());
+        assert_eq!(size(fitting).needed_mib(), USUAL_MIB);
+        assert!(size(fitting + 1).needed_mib() > USUAL_MIB);
         let absurd = Size {
             population: usize::MAX,
             sections: usize::MAX,

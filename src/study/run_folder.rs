@@ -92,6 +92,33 @@ fn holds_something(folder: &Path) -> bool {
         .is_ok_and(|entries| entries.flatten().any(|entry| entry.file_name() != LOCK))
 }
 
+/// The folder that [`create`] would create, which is not touched.
+///
+/// # Errors
+/// [`Error::Input`] if the folder asked for holds anything already.
+pub fn would_be(study: &str, asked: Option<&Path>) -> Result<PathBuf> {
+    match asked {
+        Some(folder) if holds_something(folder) || folder.is_file() => Err(taken(folder)),
+        Some(folder) => Ok(folder.to_owned()),
+        None => {
+            let numbered = |number: u32| Path::new(RUNS).join(format!("{study}-{number:03}"));
+            Ok((1..u32::MAX)
+                .map(numbered)
+                .find(|folder| !folder.exists())
+                .unwrap_or_else(|| numbered(u32::MAX)))
+        }
+    }
+}
+
+fn taken(folder: &Path) -> Error {
+    Error::input(
+        folder,
+        "--out",
+        "a folder that holds another run, or a file",
+        "a new or empty folder: nothing is overwritten",
+    )
+}
+
 /// Creates the folder of a run: `asked`, or the next free `runs/<study>-NNN`.
 ///
 /// # Errors
@@ -99,23 +126,14 @@ fn holds_something(folder: &Path) -> bool {
 /// cannot be created.
 pub fn create(study: &str, asked: Option<&Path>) -> Result<RunFolder> {
     if let Some(folder) = asked {
-        let taken = || {
-            let expected = "a new or empty folder: nothing is overwritten";
-            Err(Error::input(
-                folder,
-                "--out",
-                "a folder that holds another run, or a file",
-                expected,
-            ))
-        };
         if holds_something(folder) || folder.is_file() {
-            return taken();
+            return Err(taken(folder));
         }
         std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, "create", e))?;
         let locked = RunFolder::lock(folder)?;
         // Another run may have come and gone between the look and the lock.
         if holds_something(folder) {
-            return taken();
+            return Err(taken(folder));
         }
         return Ok(locked);
     }
@@ -291,6 +309,22 @@ mod tests {
         std::fs::write(folder.join(LOCK), "1").expect("a file");
         drop(create("study", Some(&folder)).expect("a lock that nobody holds"));
         assert!(!folder.join(LOCK).exists());
+    }
+
+    #[test]
+    fn the_folder_that_would_be_is_the_one_that_is() {
+        let root = tempfile::tempdir().expect("a temporary folder");
+        let folder = root.path().join("run");
+        assert_eq!(would_be("study", Some(&folder)).expect("a new one"), folder);
+        assert!(!folder.exists(), "it is looked at only");
+        drop(create("study", Some(&folder)).expect("a new folder"));
+        assert_eq!(would_be("study", Some(&folder)).expect("an empty one"), folder);
+        std::fs::write(folder.join("a"), "something").expect("a file");
+        for taken in [&folder, &folder.join("a")] {
+            let said = would_be("study", Some(taken)).expect_err("taken").to_string();
+            let refused = create("study", Some(taken)).expect_err("taken").to_string();
+            assert_eq!(said, refused);
+        }
     }
 
     #[test]

@@ -64,6 +64,12 @@ const ALIASES: [(&str, &str); 2] = [
     ("C", "roll_damping_nms_per_rad"),
 ];
 
+/// Likeness (Jaro-Winkler, 1 for the same) above which a name may be what was meant: one letter wrong in four has 0.85,
+/// two names of the same few letters in another order less than 0.8.
+const LIKE: f64 = 0.8;
+/// Names that are suggested at most.
+const SUGGESTED: usize = 3;
+
 const BUNDLED_HYBRID: &str = include_str!("../../data/cars/gt_hybrid.toml");
 
 impl Car {
@@ -238,6 +244,51 @@ impl Car {
             }
         }
         car
+    }
+
+    /// As [`Car::parameter`], for a name that stands at `place` of `file`.
+    ///
+    /// # Errors
+    /// [`Error::Input`] for an unknown name, with those that are most like it.
+    pub fn known_parameter(&self, file: &str, place: &str, name: &str) -> Result<CarParameter> {
+        self.parameter(name).ok_or_else(|| {
+            let like = self.parameters_like(name);
+            let expected = if like.is_empty() {
+                "a chassis key, a tyre coefficient, or one axle's as in front.rBx1".to_owned()
+            } else {
+                format!(
+                    "a chassis key or a tyre coefficient; perhaps {}",
+                    like.join(" or ")
+                )
+            };
+            Error::input(file, place, format!("the parameter `{name}`"), expected)
+        })
+    }
+
+    /// Names of parameters that one may have meant who wrote `name`, the likest first.
+    fn parameters_like(&self, name: &str) -> Vec<String> {
+        let (axle, key) = match name.split_once('.') {
+            Some((axle @ ("front" | "rear"), key)) => (format!("{axle}."), key),
+            _ => (String::new(), name),
+        };
+        let key = key.to_lowercase();
+        let likeness = |known: &str| {
+            let known = known.to_lowercase();
+            let part = key.len() > 2 && (known.contains(&key) || known.len() > 2 && key.contains(&known));
+            strsim::jaro_winkler(&key, &known) + if part { 1.0 } else { 0.0 }
+        };
+        let tyre = self.tyre_model().parameters().iter();
+        let tyre = tyre.map(|p| (likeness(p.name), format!("{axle}{}", p.name)));
+        let chassis = Chassis::<f64>::PARAMETERS.iter().map(|p| p.name);
+        let whole = chassis.chain(ALIASES.iter().map(|(alias, _)| *alias));
+        let mut like: Vec<(f64, String)> = whole
+            .map(|name| (likeness(name), name.to_owned()))
+            .chain(tyre)
+            .filter(|(likeness, _)| *likeness > LIKE)
+            .collect();
+        like.sort_by(|a, b| b.0.total_cmp(&a.0));
+        like.truncate(SUGGESTED);
+        like.into_iter().map(|(_, name)| name).collect()
     }
 
     /// Looks a parameter up by name, regardless of case.

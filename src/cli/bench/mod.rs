@@ -2,6 +2,7 @@
 
 mod machine;
 mod optimisers;
+mod pages;
 mod scaling;
 mod studies;
 mod swarm;

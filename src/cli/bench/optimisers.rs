@@ -1,5 +1,7 @@
 //! `lapswarm bench optimisers`: every algorithm on every test problem.
 
+use super::pages::of_optimisers;
+use crate::cli::kept::{self, Kept, Machine};
 use crate::cli::print_json;
 use lapswarm::swarm::comparison::{MULTI_OBJECTIVE, SINGLE_OBJECTIVE, compare, quartiles};
 use lapswarm::swarm::metrics::signed_rank;
@@ -19,6 +21,8 @@ pub struct Arguments {
     /// Only these algorithms [default: all]
     #[arg(long, value_delimiter = ',', value_name = "NAMES")]
     algorithms: Vec<String>,
+    #[command(flatten)]
+    kept: Kept,
     /// Print one JSON object
     #[arg(long)]
     json: bool,
@@ -26,17 +30,17 @@ pub struct Arguments {
 
 /// One algorithm on one problem; hypervolume for several objectives, error for one.
 #[derive(Serialize)]
-struct Row {
-    problem: &'static str,
-    algorithm: &'static str,
-    seeds: u64,
-    hypervolume_median: Option<f64>,
-    hypervolume_iqr: Option<f64>,
-    igd_plus_median: Option<f64>,
-    error_median: Option<f64>,
-    error_iqr: Option<f64>,
-    best_peer: Option<f64>,
-    better_than_peer_p: Option<f64>,
+pub(super) struct Row {
+    pub(super) problem: &'static str,
+    pub(super) algorithm: &'static str,
+    pub(super) seeds: u64,
+    pub(super) hypervolume_median: Option<f64>,
+    pub(super) hypervolume_iqr: Option<f64>,
+    pub(super) igd_plus_median: Option<f64>,
+    pub(super) error_median: Option<f64>,
+    pub(super) error_iqr: Option<f64>,
+    pub(super) best_peer: Option<f64>,
+    pub(super) better_than_peer_p: Option<f64>,
 }
 
 #[derive(Serialize)]
@@ -67,6 +71,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let algorithms = [MULTI_OBJECTIVE, SINGLE_OBJECTIVE].concat();
     check("--algorithms", &arguments.algorithms, &algorithms)?;
     let wanted = |chosen: &[String], name: &str| chosen.is_empty() || chosen.iter().any(|c| c == name);
+    let folder = arguments.kept.folder("bench")?;
     let mut rows = Vec::new();
     if !arguments.json {
         println!("medians and interquartile ranges of {} seeds", arguments.seeds);
@@ -93,11 +98,20 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             rows.push(row);
         }
     }
+    let table = Table {
+        study: "bench optimisers",
+        rows,
+    };
+    if let Some(folder) = &folder {
+        let page = of_optimisers(folder, &table.rows)?;
+        let machine = Machine::of(["cpu"], None)?;
+        kept::write(folder, "bench optimisers", &table, page, &machine)?;
+        if !arguments.json {
+            println!("Results: {}", folder.display());
+        }
+    }
     if arguments.json {
-        print_json(&Table {
-            study: "bench optimisers",
-            rows,
-        })?;
+        print_json(&table)?;
     }
     Ok(())
 }

@@ -1,6 +1,8 @@
 //! `lapswarm bench`: evaluations per second against population on every backend.
 
 use super::machine::{forget_peak_memory, peak_memory_bytes, peak_operations_per_s};
+use super::pages::of_scaling;
+use crate::cli::kept::{self, Kept, Machine};
 use crate::cli::{backend_flag, print_json};
 use lapswarm::evaluate::drive::{CpuDriveEvaluator, DriveProblem, GpuDriveEvaluator, SimdDriveEvaluator};
 use lapswarm::evaluate::gpu::{GpuContext, devices};
@@ -26,6 +28,8 @@ use std::time::Instant;
 
 /// Flags of `bench` itself.
 #[derive(clap::Args)]
+// They stand beside those of the subcommands, whose struct has the same name.
+#[group(skip)]
 pub struct Arguments {
     /// Problems: replay (the bundled lap, 22 unknowns), line (lap time, 360 cuts, 90 control points), drive (set-ups driven
     /// round a stadium of 840 m by the driver)
@@ -50,6 +54,8 @@ pub struct Arguments {
     /// What `bench --json` printed on another machine, to lay beside this one
     #[arg(long, value_name = "FILE")]
     against: Option<PathBuf>,
+    #[command(flatten)]
+    kept: Kept,
     /// Print one JSON object as the last thing on stdout
     #[arg(long)]
     json: bool,
@@ -59,32 +65,40 @@ pub struct Arguments {
 }
 
 #[derive(Serialize, Deserialize)]
-struct Row {
-    problem: String,
-    backend: String,
-    adapter: String,
-    population: usize,
-    evaluations_per_s: f64,
-    particle_steps_per_s: Option<f64>,
-    kernel_ms: Option<f64>,
-    generation_ms: f64,
+pub(super) struct Row {
+    pub(super) problem: String,
+    pub(super) backend: String,
+    pub(super) adapter: String,
+    pub(super) population: usize,
+    pub(super) evaluations_per_s: f64,
+    pub(super) particle_steps_per_s: Option<f64>,
+    pub(super) kernel_ms: Option<f64>,
+    pub(super) generation_ms: f64,
     /// Share of what the cores' lanes can do at best; `None` for devices, whose best is not measured.
-    arithmetic_peak_share: Option<f64>,
+    pub(super) arithmetic_peak_share: Option<f64>,
     /// Memory of the whole process at its greatest while it evaluated, MiB.
-    peak_memory_mib: Option<f64>,
+    pub(super) peak_memory_mib: Option<f64>,
 }
 
 #[derive(Serialize, Deserialize)]
-struct Table {
-    study: String,
-    seed: u64,
-    backend: String,
-    adapter: Option<String>,
-    elapsed_s: f64,
-    evaluations: u64,
-    evaluations_per_s: f64,
-    threads: usize,
-    rows: Vec<Row>,
+pub(super) struct Table {
+    pub(super) study: String,
+    pub(super) seed: u64,
+    pub(super) backend: String,
+    pub(super) adapter: Option<String>,
+    pub(super) elapsed_s: f64,
+    pub(super) evaluations: u64,
+    pub(super) evaluations_per_s: f64,
+    pub(super) threads: usize,
+    pub(super) rows: Vec<Row>,
+}
+
+impl Table {
+    /// The row of the same problem, backend and population.
+    pub(super) fn like(&self, row: &Row) -> Option<&Row> {
+        let key = |r: &Row| (r.problem.clone(), r.backend.clone(), r.population);
+        self.rows.iter().find(|r| key(r) == key(row))
+    }
 }
 
 /// Purpose of the draws of candidates in the counter.
@@ -276,6 +290,7 @@ fn backends<'a>(case: &'a Case, arguments: &Arguments) -> Result<Vec<Backend<'a>
 /// Measures and prints.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let other = arguments.against.as_deref().map(read_table).transpose()?;
+    let folder = arguments.kept.folder("bench")?;
     let began = Instant::now();
     let threads = rayon::current_num_threads();
     let peak = threads as f64 * peak_operations_per_s(InstructionSet::best());
@@ -344,6 +359,16 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     if let Some(path) = &arguments.plot {
         draw(path, &table)?;
     }
+    if let Some(folder) = &folder {
+        draw(&folder.join("scaling.svg"), &table)?;
+        let page = of_scaling(folder, &table, other.as_ref())?;
+        let names = table.rows.iter().map(|r| r.backend.as_str());
+        let machine = Machine::of(names, arguments.adapter.as_deref())?;
+        kept::write(folder, "bench", &table, page, &machine)?;
+        if !arguments.quiet {
+            println!("Results: {}", folder.display());
+        }
+    }
     if arguments.json {
         print_json(&table)?;
     }
@@ -379,11 +404,7 @@ fn measure(case: &Case, backend: &mut Backend<'_>, population: usize, peak: f64)
 fn print_row(row: &Row, other: Option<&Table>) {
     let or_dash = |x: Option<String>| x.unwrap_or("-".to_owned());
     let ratio = other.map_or(String::new(), |table| {
-        let theirs = table.rows.iter().find(|r| {
-            (r.problem.as_str(), r.backend.as_str(), r.population)
-                == (row.problem.as_str(), row.backend.as_str(), row.population)
-        });
-        theirs.map_or("   -".to_owned(), |r| {
+        table.like(row).map_or("   -".to_owned(), |r| {
             format!(
                 "   {:.2}  {}",
                 row.evaluations_per_s / r.evaluations_per_s,

@@ -1,5 +1,7 @@
 //! `lapswarm bench studies`: every optimiser of several objectives on the studies' own problems, hypervolume against time.
 
+use super::pages::of_studies;
+use crate::cli::kept::{self, Kept, Machine};
 use crate::cli::{backend_flag, print_json};
 use lapswarm::evaluate::line::{LineObjective, LineProblem, open_line_evaluator};
 use lapswarm::evaluate::replay::{CHANNEL_NAMES, ReplayProblem, open_evaluator};
@@ -50,6 +52,8 @@ pub struct Arguments {
     /// Draw hypervolume against time into this SVG
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
+    #[command(flatten)]
+    kept: Kept,
     /// Print one JSON object
     #[arg(long)]
     json: bool,
@@ -82,27 +86,27 @@ struct Case {
 
 /// One algorithm with one population on one problem.
 #[derive(Serialize)]
-struct Row {
-    problem: &'static str,
-    algorithm: String,
-    population: usize,
-    generations: usize,
-    evaluations: u64,
-    seeds: u64,
-    hypervolume_median: f64,
-    hypervolume_iqr: f64,
-    seconds_median: f64,
+pub(super) struct Row {
+    pub(super) problem: &'static str,
+    pub(super) algorithm: String,
+    pub(super) population: usize,
+    pub(super) generations: usize,
+    pub(super) evaluations: u64,
+    pub(super) seeds: u64,
+    pub(super) hypervolume_median: f64,
+    pub(super) hypervolume_iqr: f64,
+    pub(super) seconds_median: f64,
     /// Of these, those of the evaluations.
-    evaluation_s_median: f64,
+    pub(super) evaluation_s_median: f64,
     /// The run that comes nearest to the median.
-    history: History,
+    pub(super) history: History,
 }
 
 #[derive(Clone, Default, Serialize)]
-struct History {
-    evaluations: Vec<u64>,
-    seconds: Vec<f64>,
-    hypervolume: Vec<f64>,
+pub(super) struct History {
+    pub(super) evaluations: Vec<u64>,
+    pub(super) seconds: Vec<f64>,
+    pub(super) hypervolume: Vec<f64>,
 }
 
 /// The box of a problem.
@@ -269,6 +273,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     } else {
         arguments.algorithms.iter().map(String::as_str).collect()
     };
+    let folder = arguments.kept.folder("bench")?;
     let mut table = Table {
         study: "bench studies",
         threads: rayon::current_num_threads(),
@@ -322,6 +327,18 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     }
     if let Some(path) = &arguments.plot {
         plot(path, &table)?;
+    }
+    if let Some(folder) = &folder {
+        plot(&folder.join("quality.svg"), &table)?;
+        let page = of_studies(folder, &table.rows)?;
+        let machine = Machine::of(
+            table.problems.iter().map(|p| p.backend),
+            arguments.adapter.as_deref(),
+        )?;
+        kept::write(folder, "bench studies", &table, page, &machine)?;
+        if !arguments.json {
+            println!("Results: {}", folder.display());
+        }
     }
     if arguments.json {
         print_json(&table)?;

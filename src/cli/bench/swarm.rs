@@ -1,5 +1,7 @@
 //! `lapswarm bench swarm`: what a generation costs besides its evaluations, against the number of particles.
 
+use super::pages::of_swarm;
+use crate::cli::kept::{self, Kept, Machine};
 use crate::cli::{backend_flag, print_json};
 use lapswarm::Result;
 use lapswarm::evaluate::gpu::{GpuContext, devices};
@@ -36,6 +38,8 @@ pub struct Arguments {
     /// Part of the name of the GPU to use
     #[arg(long)]
     adapter: Option<String>,
+    #[command(flatten)]
+    kept: Kept,
     /// Print one JSON object
     #[arg(long)]
     json: bool,
@@ -43,18 +47,18 @@ pub struct Arguments {
 
 /// One population on one problem.
 #[derive(Serialize)]
-struct Row {
-    backend: &'static str,
-    device: String,
-    problem: &'static str,
-    objectives: usize,
-    variables: usize,
-    population: usize,
-    generation_ms: f64,
-    slowest_generation_ms: f64,
-    evaluation_ms: f64,
-    bytes_per_particle: usize,
-    hypervolume: f64,
+pub(super) struct Row {
+    pub(super) backend: &'static str,
+    pub(super) device: String,
+    pub(super) problem: &'static str,
+    pub(super) objectives: usize,
+    pub(super) variables: usize,
+    pub(super) population: usize,
+    pub(super) generation_ms: f64,
+    pub(super) slowest_generation_ms: f64,
+    pub(super) evaluation_ms: f64,
+    pub(super) bytes_per_particle: usize,
+    pub(super) hypervolume: f64,
 }
 
 /// How the time of a generation grows with the particles.
@@ -78,6 +82,7 @@ const REFERENCE: f64 = 1.1;
 
 /// Measures and prints.
 pub fn run(arguments: &Arguments) -> Result<()> {
+    let folder = arguments.kept.folder("bench")?;
     let mut table = Table {
         study: "bench swarm",
         threads: rayon::current_num_threads(),
@@ -146,6 +151,14 @@ pub fn run(arguments: &Arguments) -> Result<()> {
                 }
                 table.growth.push(growth);
             }
+        }
+    }
+    if let Some(folder) = &folder {
+        let page = of_swarm(folder, &table.rows)?;
+        let machine = Machine::of(table.rows.iter().map(|r| r.backend), arguments.adapter.as_deref())?;
+        kept::write(folder, "bench swarm", &table, page, &machine)?;
+        if !arguments.json {
+            println!("Results: {}", folder.display());
         }
     }
     if arguments.json {

@@ -35,6 +35,16 @@ impl HybridObjective {
         }
     }
 
+    /// What pictures call it, beside its unit.
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::LapTime => "lap time",
+            Self::Fuel => "fuel",
+            Self::EnergyUsed => "energy used",
+            Self::SocSwing => "swing of charge",
+        }
+    }
+
     /// The unit.
     pub fn unit(self) -> &'static str {
         match self {

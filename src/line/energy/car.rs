@@ -1,7 +1,7 @@
 //! A point mass with engine, motors and store.
 
 use super::super::point_mass::{LimitTable, PointMass};
-use super::table::{EnergyTable, Traction};
+use super::table::{EnergyTable, Traction, hybrid_parts};
 use crate::error::Result;
 use crate::vehicle::{Car, Envelope, Hybrid};
 
@@ -33,6 +33,8 @@ impl EnergyCar {
     /// # Errors
     /// [`crate::Error::Input`] for a car without engine map or hybrid drive, or limits that cannot be.
     pub fn new(car: Car, envelope: Envelope, traction: Traction, ellipse_exponent: f64) -> Result<Self> {
+        let (_, engine, hybrid) = hybrid_parts(&car)?;
+        let (fuel_density_kgpl, hybrid) = (engine.fuel_density_kgpl, hybrid.clone());
         let wheelbase = car.chassis.cg_to_front + car.chassis.cg_to_rear;
         let point_mass = PointMass {
             ellipse_exponent,
@@ -40,21 +42,9 @@ impl EnergyCar {
         };
         let limits = point_mass.table()?;
         let table = EnergyTable::new(&car, &point_mass.envelope, &traction, &limits)?;
-        let parts = (
-            car.hybrid.clone(),
-            car.powertrain.as_ref().and_then(|p| p.engine.as_ref()),
-        );
-        let (Some(hybrid), Some(engine)) = parts else {
-            return Err(crate::Error::input(
-                &car.name,
-                "[hybrid]",
-                "none",
-                "a hybrid drive",
-            ));
-        };
         Ok(Self {
             name: car.name.clone(),
-            fuel_density_kgpl: engine.fuel_density_kgpl,
+            fuel_density_kgpl,
             point_mass,
             limits,
             table,

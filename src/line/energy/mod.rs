@@ -10,4 +10,4 @@ mod tests;
 pub use car::EnergyCar;
 pub use kernel::{EnergyLap, SegmentEnergy, energy_lap};
 pub use plan::{EnergyPlan, GATES, Gates, Mode, ZoneRow};
-pub use table::{EnergyTable, Traction};
+pub use table::{EnergyTable, Traction, hybrid_parts};

@@ -3,8 +3,8 @@
 use super::super::point_mass::{LIMIT_WIDTH, LimitTable};
 use crate::error::{Error, Result};
 use crate::scalar::Real;
-use crate::vehicle::powertrain::GRAVITY_MPS2;
-use crate::vehicle::{Car, Envelope, EnvelopeRow};
+use crate::vehicle::powertrain::{EngineMap, GRAVITY_MPS2};
+use crate::vehicle::{Car, Envelope, EnvelopeRow, Hybrid, Powertrain};
 
 /// Greatest acceleration by the driven tyres (m/s^2) over speed (m/s), by rising speed; without rows there is no limit but
 /// the friction ellipse.
@@ -73,6 +73,28 @@ const ENDLESS_MPS2: f64 = 1e4;
 /// Motors have a torque at standstill, and a power over nought would be none.
 const SLOWEST_MPS: f64 = 1.0;
 
+/// What a car's energy is accounted with: gears, engine map and hybrid drive.
+///
+/// # Errors
+/// [`Error::Input`] for a car that lacks one of them.
+pub fn hybrid_parts(car: &Car) -> Result<(&Powertrain, &EngineMap, &Hybrid)> {
+    let missing = |place: &str, expected: &str| Error::input(&car.name, place, "none", expected);
+    let Some(hybrid) = &car.hybrid else {
+        let expected = "a motor-generator and a store, as the bundled gt_hybrid has (--car gt_hybrid)";
+        return Err(missing("[hybrid]", expected));
+    };
+    let Some(powertrain) = &car.powertrain else {
+        return Err(missing("[powertrain]", "an engine and gears"));
+    };
+    let Some(engine) = &powertrain.engine else {
+        return Err(missing(
+            "powertrain.throttle_deg",
+            "maps of torque and fuel flow over engine speed and throttle, as the bundled gt_hybrid has",
+        ));
+    };
+    Ok((powertrain, engine, hybrid))
+}
+
 impl EnergyTable<f64> {
     /// The tables of `car` on the rows of `limits`, which are those of `envelope`; `traction` limits what motor and engine
     /// give together.
@@ -85,22 +107,7 @@ impl EnergyTable<f64> {
         traction: &Traction,
         limits: &LimitTable<f64>,
     ) -> Result<Self> {
-        let missing = |place: &str, expected: &str| Error::input(&car.name, place, "none", expected);
-        let Some(powertrain) = &car.powertrain else {
-            return Err(missing("[powertrain]", "an engine and gears"));
-        };
-        let Some(engine) = &powertrain.engine else {
-            return Err(missing(
-                "powertrain.throttle_deg",
-                "maps of torque and fuel flow over engine speed and throttle",
-            ));
-        };
-        let Some(hybrid) = &car.hybrid else {
-            return Err(missing(
-                "[hybrid]",
-                "a motor-generator and a store, as in the bundled gt_hybrid",
-            ));
-        };
+        let (powertrain, engine, hybrid) = hybrid_parts(car)?;
         let mass = car.chassis.mass;
         let radius = car.chassis.radius_rear;
         let k = &hybrid.mgu_k;

@@ -45,7 +45,7 @@ const PANELS: [(&[&str], &str, &str); 7] = [
     (&["yaw_rate_fitted", "yaw_rate"], "yaw rate", "rad/s"),
     (&["curvature"], "curvature", "1/m"),
     (&["soc"], "state of charge", "MJ"),
-    (&["steering"], "steering", "rad"),
+    (&["steering", "steer"], "steering", "rad"),
 ];
 
 /// Lays runs side by side: what they are, their figures, and their laps, limits and convergence over one another.
@@ -106,6 +106,7 @@ fn verdict(study: &str) -> Option<(&'static str, &'static str, &'static str)> {
         "identify" => Some(("total_parameter_error", "total parameter error", "")),
         "raceline" => Some(("best / lap_time / lap_time_fine_s", "lap time", "s")),
         "transient" => Some(("lap_time_s", "driven lap", "s")),
+        "simulate" => Some(("lap_time_s", "logged lap", "s")),
         "envelope" => Some(("top_speed_mps", "top speed", "m/s")),
         _ => None,
     }
@@ -339,7 +340,9 @@ pub(crate) fn overlay(
     let Some((_, first)) = laps.first().filter(|_| !panels.is_empty()) else {
         return Ok(());
     };
-    let clock = if one_track { first.clock() } else { None };
+    let alone = laps.len() == 1;
+    // A lap alone loses no time on another.
+    let clock = if one_track && !alone { first.clock() } else { None };
     let lines: Vec<LapLine<'_>> = laps
         .iter()
         .map(|(name, lap)| {
@@ -393,8 +396,10 @@ pub(crate) fn overlay(
     let mapped = lines.iter().any(|line| !line.place_m.is_empty());
     let edges = road.and_then(edges).unwrap_or_default();
     page.lap(&LapView {
-        title: "Laps over one another",
-        note: if one_track {
+        title: if alone { "The lap" } else { "Laps over one another" },
+        note: if alone {
+            ""
+        } else if one_track {
             "Distances are stretched to the first lap's length, so that what is beside each other on the road stands above \
              each other; time lost is against that lap."
         } else {
@@ -433,6 +438,7 @@ fn said_of(stem: &str) -> String {
     match stem.strip_prefix("line_") {
         Some(line) => line.replace('_', " "),
         None if stem == "drive" => "driven".to_owned(),
+        None if stem == "lap" => "logged".to_owned(),
         None => "fitted".to_owned(),
     }
 }

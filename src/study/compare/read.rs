@@ -12,6 +12,11 @@ const MOST_BYTES: u64 = 256 << 20;
 /// Figures of one run that are taken in.
 const MOST_FIGURES: usize = 20_000;
 
+/// The log of a simulated lap.
+const LOGGED: &str = "lap.csv";
+/// How the names of a log's columns end.
+const LOG_UNITS: [&str; 6] = ["_mps2", "_mps", "_radps", "_rad", "_m", "_s"];
+
 /// One number of a run's summary.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Figure {
@@ -207,7 +212,11 @@ pub(crate) fn read_table(path: &Path) -> Result<Option<Trace>> {
     let Some(text) = read_text(path)? else {
         return Ok(None);
     };
-    let mut reader = csv::Reader::from_reader(text.as_bytes());
+    // A racetrack's header begins with the mark of a comment, a log's comments come before its header.
+    let log = path.file_name().is_some_and(|name| name == LOGGED);
+    let mut reader = csv::ReaderBuilder::new()
+        .comment(log.then_some(b'#'))
+        .from_reader(text.as_bytes());
     let refuse = |e: csv::Error| {
         let line = e.position().map_or(1, csv::Position::line);
         Error::input(
@@ -223,7 +232,11 @@ pub(crate) fn read_table(path: &Path) -> Result<Option<Trace>> {
         .iter()
         // Without units, and without the mark of a comment that the racetrack format begins with.
         .map(|head| head.split_once(" (").map_or(head, |(name, _)| name))
-        .map(|name| name.trim_start_matches('#').trim().to_owned())
+        .map(|name| name.trim_start_matches('#').trim())
+        .map(|name| {
+            let unit = LOG_UNITS.iter().find_map(|unit| name.strip_suffix(unit));
+            unit.filter(|_| log).unwrap_or(name).to_owned()
+        })
         .collect();
     let mut columns: Vec<(String, Vec<f64>)> = names.into_iter().map(|n| (n, Vec::new())).collect();
     for record in reader.records() {
@@ -248,7 +261,7 @@ fn read_traces(folder: &Path) -> Result<Vec<Trace>> {
         .filter_map(|entry| entry.ok()?.file_name().into_string().ok())
         .filter(|name| {
             (name.starts_with("line_") && name.ends_with(".csv"))
-                || matches!(name.as_str(), "traces.csv" | "drive.csv")
+                || matches!(name.as_str(), "traces.csv" | "drive.csv" | LOGGED)
         })
         .collect();
     files.sort();

@@ -106,43 +106,9 @@ const STEER_TO_GRIP: f64 = 0.6;
 /// [`Error::Input`] for settings out of range, for a car without a powertrain, and for one that has no steady state or
 /// no drive at a speed that is asked for.
 pub fn car_limits(car: &Car, settings: &EnvelopeSettings) -> Result<CarLimits> {
-    settings.validate()?;
-    let Some(powertrain) = &car.powertrain else {
-        return Err(Error::input(
-            &car.name,
-            "[powertrain]",
-            "none",
-            "an engine and gears, for what the car can accelerate by",
-        ));
-    };
+    let speeds = speeds_of(car, settings)?;
+    let force = engine_of(car)?;
     let steady = steady_car(car);
-    let force = |speed: f64| powertrain.wheel_force(speed, car.chassis.radius_rear);
-    let mut speeds: Vec<f64> = Vec::new();
-    let count = ((settings.to_mps - settings.from_mps) / settings.step_mps + 1e-9).floor() as usize;
-    for i in 0..=count {
-        let speed = settings.from_mps + settings.step_mps * i as f64;
-        if force(speed) <= 0.0 {
-            break;
-        }
-        speeds.push(speed);
-    }
-    if let Some(&last) = speeds.last()
-        && speeds.len() <= count
-    {
-        // The engine ends between two speeds: that is the car's greatest.
-        let (mut low, mut high) = (last, last + settings.step_mps);
-        while high - low > 1e-6 {
-            let middle = 0.5 * (low + high);
-            if force(middle) > 0.0 {
-                low = middle;
-            } else {
-                high = middle;
-            }
-        }
-        if low - last > 1e-3 {
-            speeds.push(low);
-        }
-    }
     let limits: Vec<SpeedLimits> = speeds
         .into_par_iter()
         .map(|speed| {
@@ -170,6 +136,55 @@ pub fn car_limits(car: &Car, settings: &EnvelopeSettings) -> Result<CarLimits> {
         speeds: limits,
         envelope,
     })
+}
+
+/// The speeds that a car's limits are looked for at (m/s), the last of them where its engine ends.
+///
+/// # Errors
+/// [`Error::Input`] for settings out of range and for a car without a powertrain.
+pub fn speeds_of(car: &Car, settings: &EnvelopeSettings) -> Result<Vec<f64>> {
+    settings.validate()?;
+    let force = engine_of(car)?;
+    let mut speeds: Vec<f64> = Vec::new();
+    let count = ((settings.to_mps - settings.from_mps) / settings.step_mps + 1e-9).floor() as usize;
+    for i in 0..=count {
+        let speed = settings.from_mps + settings.step_mps * i as f64;
+        if force(speed) <= 0.0 {
+            break;
+        }
+        speeds.push(speed);
+    }
+    if let Some(&last) = speeds.last()
+        && speeds.len() <= count
+    {
+        // The engine ends between two speeds: that is the car's greatest.
+        let (mut low, mut high) = (last, last + settings.step_mps);
+        while high - low > 1e-6 {
+            let middle = 0.5 * (low + high);
+            if force(middle) > 0.0 {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        if low - last > 1e-3 {
+            speeds.push(low);
+        }
+    }
+    Ok(speeds)
+}
+
+/// The engine's force at the wheels (N) by speed (m/s), in the best gear.
+fn engine_of(car: &Car) -> Result<impl Fn(f64) -> f64 + Sync> {
+    let Some(powertrain) = &car.powertrain else {
+        return Err(Error::input(
+            &car.name,
+            "[powertrain]",
+            "none",
+            "an engine and gears, for what the car can accelerate by",
+        ));
+    };
+    Ok(move |speed: f64| powertrain.wheel_force(speed, car.chassis.radius_rear))
 }
 
 /// The slope of steering over lateral acceleration, between the two steady states nearest to 0 and 2 m/s^2: small

@@ -17,7 +17,7 @@ mod worth;
 pub use results::{HybridSummary, ScenarioFigures, summarise, write_results};
 pub use scenario::{ReportedLap, Scenario, drive, published};
 pub use settings::{FreePart, HYBRID_OBJECTIVES, HybridStudySettings};
-pub use setup::{HybridSetup, set_up};
+pub use setup::{HybridSetup, read_inputs, set_up};
 pub use sizing::{ENGINES, Sizing, engine_only, size};
 pub use stint::{StintLap, stint};
 pub use strategy::{FoundStrategy, StrategyFront, search_front, search_strategy, zone_gates, zone_starts};

@@ -5,12 +5,12 @@ use crate::error::{Error, Result};
 use crate::evaluate::hybrid::HybridLine;
 use crate::evaluate::line::LineObjective;
 use crate::line::FineLine;
-use crate::line::energy::{EnergyCar, Traction};
+use crate::line::energy::{EnergyCar, Traction, hybrid_parts};
 use crate::study::envelope::{EnvelopeSettings, car_limits};
 use crate::study::raceline::{self, ExactSolvers, RacelineSettings};
 use crate::vehicle::{Car, Envelope};
 use glam::DVec2;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Everything that laps are driven with.
 #[derive(Clone, Debug)]
@@ -48,16 +48,31 @@ pub(super) fn late_bend(curvature_1pm: &[f64]) -> usize {
         .unwrap_or(0)
 }
 
+/// A line's name and its points (m).
+type ReadLine = (String, Vec<DVec2>);
+
+/// Reads all that the settings name: track and limits, the car, and the line where one is given. What is least work comes
+/// first, so that a mistake shows at once.
+///
+/// # Errors
+/// [`Error::Input`] and [`Error::Io`] for what cannot be read or used, such as a car without a hybrid drive.
+pub fn read_inputs(settings: &HybridStudySettings) -> Result<(raceline::Setup, Car, Option<ReadLine>)> {
+    settings.validate()?;
+    let car = Car::load(&settings.car)?;
+    hybrid_parts(&car)?;
+    let read = |path: &PathBuf| Ok((path.display().to_string(), read_line(path, settings.spacing_m)?));
+    let line = settings.line.as_ref().map(read).transpose()?;
+    Ok((raceline::set_up(&settings.raceline())?, car, line))
+}
+
 /// Reads track and car and finds the line.
 ///
 /// # Errors
 /// [`Error::Input`] and [`Error::Io`] for what cannot be read or used; [`Error::Study`] if the solver of the fastest line
 /// refuses.
 pub fn set_up(settings: &HybridStudySettings) -> Result<HybridSetup> {
-    settings.validate()?;
+    let (mut setup, car, line) = read_inputs(settings)?;
     let raceline_settings = settings.raceline();
-    let mut setup = raceline::set_up(&raceline_settings)?;
-    let car = Car::load(&settings.car)?;
     let (envelope, traction) = match &settings.envelope {
         Some(path) => (Envelope::load(path)?, Traction::default()),
         None => {
@@ -69,12 +84,8 @@ pub fn set_up(settings: &HybridStudySettings) -> Result<HybridSetup> {
     let car = EnergyCar::new(car, envelope, traction, raceline_settings.ellipse_exponent)?;
     setup.car = car.point_mass.clone();
     let closed = setup.cuts.closed;
-    let (line_name, alpha, through) = match &settings.line {
-        Some(path) => (
-            path.display().to_string(),
-            None,
-            read_line(path, settings.spacing_m)?,
-        ),
+    let (line_name, alpha, through) = match line {
+        Some((name, points)) => (name, None, points),
         None => {
             let found = ExactSolvers::new(&setup, &raceline_settings)?.best(LineObjective::LapTime)?;
             let Some(found) = found else {

@@ -4,7 +4,6 @@ use super::results::{LABELS, Summary, parameter_rows, traced_lap};
 use super::search::{Judged, Outcome};
 use super::settings::IdentifySettings;
 use super::setup::{CHANNELS, Setup};
-use super::study_file::study_toml;
 use crate::error::Result;
 use crate::evaluate::replay::{CHANNEL_NAMES, CHANNEL_UNITS};
 use crate::report::{
@@ -87,7 +86,7 @@ pub(super) fn write(
     );
     page.provenance("swarm", format!("{:.1} s", summary.swarm_elapsed_s));
     page.provenance("swarm and polish", format!("{:.1} s", summary.elapsed_s));
-    page.settings("study.toml, which repeats this run", study_toml(settings));
+    page.settings("study.toml, which repeats this run", settings.to_toml());
     page.write(folder.join("report.html"))
 }
 

@@ -302,6 +302,22 @@ fn nothing_drives() -> Error {
     )
 }
 
+impl IdentifySettings {
+    /// Cars that the swarms drive at the most.
+    pub fn evaluations(&self) -> u64 {
+        let cars =
+            |population: usize, iterations: usize| (population as u64).saturating_mul(iterations as u64);
+        let first = swarm_settings(self);
+        let gathered = if self.algorithm == Algorithm::Adaptive && self.objectives.len() == 1 {
+            let population = self.population.unwrap_or(GATHER.0);
+            cars(population, self.iterations.unwrap_or(GATHER.1))
+        } else {
+            0
+        };
+        cars(first.population, first.iterations).saturating_add(gathered)
+    }
+}
+
 fn swarm_settings(settings: &IdentifySettings) -> PsoSettings {
     let base = match settings.algorithm {
         Algorithm::Thesis => PsoSettings::thesis(),

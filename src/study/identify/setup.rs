@@ -301,15 +301,7 @@ fn free_parameters(
         .free
         .iter()
         .map(|free| {
-            let parameter = car.parameter(&free.name).ok_or_else(|| {
-                let expected = "a chassis key, a tyre coefficient, or one axle's as in front.rBx1";
-                Error::input(
-                    "the study",
-                    "table [free]",
-                    format!("the parameter {}", free.name),
-                    expected,
-                )
-            })?;
+            let parameter = car.known_parameter("the study", "table [free]", &free.name)?;
             let info = parameter.info;
             if !(info.admits(free.lower) && info.admits(free.upper)) {
                 let found = format!("{} to {}", free.lower, free.upper);

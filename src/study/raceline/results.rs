@@ -110,6 +110,8 @@ pub struct Summary {
     pub hypervolume_reference: Option<Vec<f64>>,
     /// Lines on the front.
     pub front_size: usize,
+    /// Best lines on which the car's side is more than 0.1 m beyond an edge, by the names of their objectives.
+    pub off_road: Vec<&'static str>,
     /// What a reader must know before believing the figures.
     pub warnings: Vec<String>,
     /// Whether the study was broken off.
@@ -158,6 +160,12 @@ pub fn summarise(settings: &RacelineSettings, setup: &Setup, outcome: &Outcome) 
         hypervolume: outcome.front.as_ref().map(|f| f.hypervolume),
         hypervolume_reference: outcome.front.as_ref().map(|f| f.reference.clone()),
         front_size: outcome.front.as_ref().map_or(0, |f| f.alpha.len()),
+        off_road: outcome
+            .objectives
+            .iter()
+            .filter(|o| o.best.clearance.margin_m < -CLOSE_M)
+            .map(|o| o.objective.name())
+            .collect(),
         warnings: warnings(outcome),
         interrupted: outcome.interrupted,
     }
@@ -205,6 +213,15 @@ fn warnings(outcome: &Outcome) -> Vec<String> {
 const CLOSE_M: f64 = 0.1;
 
 impl Summary {
+    /// What there is to say of best lines that leave the road, and what to do about it.
+    pub fn off_road_text(&self) -> String {
+        format!(
+            "the best line by {} leaves the road between the cuts: {} of them are too few, ask for more --sections",
+            self.off_road.join(", "),
+            self.sections
+        )
+    }
+
     /// The figures in words.
     pub fn to_text(&self) -> String {
         let mut text = format!(

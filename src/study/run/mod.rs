@@ -79,6 +79,34 @@ impl RunSettings {
     }
 }
 
+impl RunSettings {
+    /// How a line of `car` is found, within limits from a file where there are any: with room for the driver's errors.
+    pub fn line_of(&self, car: &str, envelope: Option<PathBuf>) -> RacelineSettings {
+        RacelineSettings {
+            car: car.to_owned(),
+            envelope,
+            car_width_m: self.raceline.car_width_m + 2.0 * self.margin_m,
+            ..self.raceline.clone()
+        }
+    }
+
+    /// The settings as TOML, with those of the stages in tables: to be read by people, the stages of a study file are files.
+    pub fn to_toml(&self) -> String {
+        let within = |stage: &str, toml: &str| toml.replace("\n[", &format!("\n[{stage}."));
+        let cache = self.cache.as_ref().map_or(String::new(), |cache| {
+            let path = toml::Value::String(cache.display().to_string());
+            format!("cache = {path}\n")
+        });
+        format!(
+            "margin_m = {:?}\nrounds = {}\n{cache}\n[identify]\n{}\n[raceline]\n{}",
+            self.margin_m,
+            self.rounds,
+            within("identify", &self.identify.to_toml()),
+            within("raceline", &self.raceline.to_toml())
+        )
+    }
+}
+
 /// Change of the grip's share from one line to the next below which another line would be the same.
 const SETTLED: f64 = 0.015;
 
@@ -146,12 +174,7 @@ pub fn run(
     let mut last_line: Option<PathBuf> = None;
     for round in 1..=settings.rounds {
         let number = 1 + 2 * round;
-        let line_settings = RacelineSettings {
-            car: car_path.display().to_string(),
-            envelope: driven_within.clone(),
-            car_width_m: settings.raceline.car_width_m + 2.0 * settings.margin_m,
-            ..settings.raceline.clone()
-        };
+        let line_settings = settings.line_of(&car_path.display().to_string(), driven_within.clone());
         let line_setup = raceline::set_up(&line_settings)?;
         let mut inputs = Inputs::of_program("raceline");
         // The car is in its limits; where its file lies does not matter.

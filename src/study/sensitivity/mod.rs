@@ -74,6 +74,23 @@ impl SensitivitySettings {
         Ok(s)
     }
 
+    /// The study file that repeats this study.
+    pub fn to_toml(&self) -> String {
+        format!(
+            "share = {:?}\nsamples = {}\nresamples = {}\n{}",
+            self.share,
+            self.samples,
+            self.resamples,
+            self.replay.to_toml()
+        )
+    }
+
+    /// Cars that are driven: the base car, each parameter at each level, and the design of the indices.
+    pub fn evaluations(&self) -> usize {
+        let count = self.replay.free.len();
+        1 + count * LEVELS.len() + self.samples * (count + 2)
+    }
+
     /// What the study keeps: of every sample two rows of each car in the design and its costs, and the answer in a journal.
     pub fn kept(&self) -> [Kept; 1] {
         let variables = self.replay.free.len() as u64;
@@ -188,14 +205,7 @@ pub(crate) fn ranges_about(
     names
         .iter()
         .map(|name| {
-            let parameter = car.parameter(name).ok_or_else(|| {
-                Error::input(
-                    "the study",
-                    "table [free]",
-                    format!("the parameter {name}"),
-                    format!("a parameter of {}", car.name),
-                )
-            })?;
+            let parameter = car.known_parameter("the study", "parameters", name)?;
             let value = flat[parameter.slots[0]];
             let bounds = settings.free.iter().find(|f| f.name == *name);
             let reach = if value == 0.0 {
@@ -493,4 +503,41 @@ fn outputs_of(replay: &ReplayProblem, candidate: &[f64], samples: usize) -> Vec<
         }
     }
     outputs
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::evaluate::BackendChoice;
+    use crate::evaluate::replay::Norm;
+
+    #[test]
+    fn a_study_file_repeats_its_study() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = folder.path().join("study.toml");
+        let settings = SensitivitySettings {
+            replay: IdentifySettings {
+                log: Some(folder.path().join("a \"log\".csv")),
+                section: Some("Abbey".to_owned()),
+                laps: vec![2],
+                norm: Norm::One,
+                backend: BackendChoice::Simd,
+                seed: 7,
+                free: vec![FreeParameter {
+                    name: "front.rBy1".to_owned(),
+                    lower: 1.0,
+                    upper: 2.0,
+                }],
+                ..SensitivitySettings::default().replay
+            },
+            share: 0.03,
+            samples: 64,
+            resamples: 17,
+        };
+        std::fs::write(&path, settings.to_toml()).expect("a file");
+        assert_eq!(
+            SensitivitySettings::read(&path).expect("what was written"),
+            settings
+        );
+    }
 }

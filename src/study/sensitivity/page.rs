@@ -102,6 +102,9 @@ fn head(page: &mut HtmlReport, car: &str, summary: &Summary) {
             summary.left_out, summary.samples
         ));
     }
+    for warning in &summary.warnings {
+        page.warning(warning);
+    }
     if summary.interrupted {
         page.warning("The run was interrupted; this is what it had reached.");
     }

@@ -1,8 +1,8 @@
 //! What a sensitivity study leaves behind.
 
-use super::{LEVELS, Outcome, SensitivitySettings, SobolIndex};
+use super::{LEVELS, MOST_SAMPLES, Outcome, SensitivitySettings, SobolIndex};
 use crate::error::Result;
-use crate::evaluate::replay::{CHANNEL_UNITS, norm_name};
+use crate::evaluate::replay::CHANNEL_UNITS;
 use crate::report::{
     BarPanel, BarSeries, Cells, Column, Curve, CurvePanel, plot_bars, plot_curves, text_table, write_csv,
     write_whole,
@@ -62,8 +62,42 @@ pub struct Summary {
     pub cost_units: BTreeMap<String, String>,
     /// The parameters, the one with the greatest share of the first cost's variance first.
     pub parameters: Vec<ParameterSensitivity>,
+    /// What a reader must know before believing the figures.
+    pub warnings: Vec<String>,
     /// Whether the study was broken off.
     pub interrupted: bool,
+}
+
+/// Width of an interval that is sure enough to tell what matters from what does not.
+const SURE: f64 = 0.25;
+/// Width beyond which the shares of a study are said to be unsure.
+const UNSURE: f64 = 0.5;
+
+/// What is wrong with shares from so many samples, where they say little: intervals wider than half of all there is, or a
+/// share above the whole that is more than rounding.
+fn doubts(parameters: &[ParameterSensitivity], samples: usize) -> Option<String> {
+    let shares = parameters.iter().flat_map(|p| {
+        p.sobol.iter().flat_map(|(cost, index)| {
+            [
+                (&p.name, cost, index.first, index.first_interval),
+                (&p.name, cost, index.total, index.total_interval),
+            ]
+        })
+    });
+    let width = |interval: [f64; 2]| interval[1] - interval[0];
+    let (name, cost, share, interval) =
+        shares.max_by(|(_, _, _, a), (_, _, _, b)| width(*a).total_cmp(&width(*b)))?;
+    if width(interval) <= UNSURE {
+        return None;
+    }
+    // Intervals narrow with the root of the number of samples.
+    let needed = samples as f64 * (width(interval) / SURE).powi(2);
+    let needed = (needed as usize).next_power_of_two().min(MOST_SAMPLES);
+    Some(format!(
+        "{samples} samples are too few to believe the shares of variance, which may even come out above 1 or below 0: that of \
+         {name} in the cost of {cost} is {share:.2}, and 95% sure only to lie between {:.2} and {:.2}; try --samples {needed}",
+        interval[0], interval[1]
+    ))
 }
 
 /// Puts the figures together.
@@ -119,6 +153,7 @@ pub fn summarise(settings: &SensitivitySettings, setup: &Setup, outcome: &Outcom
             .iter()
             .map(|o| (o.name.clone(), o.unit.clone()))
             .collect(),
+        warnings: doubts(&parameters, settings.samples).into_iter().collect(),
         parameters,
         interrupted: outcome.interrupted,
     }
@@ -188,8 +223,9 @@ impl Summary {
             .iter()
             .map(|f| format!("Note: {f}\n"))
             .collect();
+        let doubts: String = self.warnings.iter().map(|w| format!("Note: {w}\n")).collect();
         format!(
-            "All channels together, each parameter {:.3}% either way:\n{table}{} evaluations in {:.1} s, {:.0}/s, {} {}{left}\n{faults}",
+            "All channels together, each parameter {:.3}% either way:\n{table}{} evaluations in {:.1} s, {:.0}/s, {} {}{left}\n{faults}{doubts}",
             100.0 * self.share,
             self.evaluations,
             self.elapsed_s,
@@ -232,7 +268,8 @@ pub fn write_results(
             &setup.replay.free.car.name,
         )
     };
-    write_whole(folder.join("study.toml"), study_toml(settings).as_bytes())?;
+    let study = settings.to_toml();
+    write_whole(folder.join("study.toml"), study.as_bytes())?;
     write_one_at_a_time(folder, setup, outcome)?;
     plot_one_at_a_time(folder, summary)?;
     if !outcome.indices.is_empty() {
@@ -240,35 +277,9 @@ pub fn write_results(
         plot_sobol(folder, summary)?;
     }
     plot_bands(folder, outcome)?;
-    super::page::write(folder, &study_toml(settings), setup, outcome, summary)?;
+    super::page::write(folder, &study, setup, outcome, summary)?;
     // Last: it says that the run is whole.
     write_json(&folder.join("manifest.json"), &manifest)
-}
-
-/// The settings as a study file.
-fn study_toml(s: &SensitivitySettings) -> String {
-    let mut text = format!(
-        "share = {:?}\nsamples = {}\nresamples = {}\n",
-        s.share, s.samples, s.resamples
-    );
-    let r = &s.replay;
-    text += &format!(
-        "car = {:?}\nseed = {}\nnorm = {:?}\n",
-        r.car,
-        r.seed,
-        norm_name(r.norm)
-    );
-    if let Some(log) = &r.log {
-        text += &format!("log = {:?}\n", log.display().to_string());
-    }
-    if let Some(window) = r.window_s {
-        text += &format!("window_s = {window:?}\n");
-    }
-    text += "[free]\n";
-    for f in &r.free {
-        text += &format!("{} = [{:?}, {:?}]\n", f.name, f.lower, f.upper);
-    }
-    text
 }
 
 fn write_one_at_a_time(folder: &Path, setup: &Setup, outcome: &Outcome) -> Result<()> {

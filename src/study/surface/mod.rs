@@ -67,6 +67,15 @@ impl SurfaceSettings {
         Ok(s)
     }
 
+    /// The study file that repeats this study.
+    pub fn to_toml(&self) -> String {
+        let mut text = format!("parameters = {:?}\ngrid = {}\n", self.parameters, self.grid);
+        if let Some(share) = self.share {
+            text += &format!("share = {share:?}\n");
+        }
+        text + &self.replay.to_toml()
+    }
+
     /// What the study keeps: of every candidate its two parameters, its costs, and the answer in a journal.
     pub fn kept(&self) -> [Kept; 1] {
         [Kept {
@@ -218,4 +227,38 @@ pub fn measure_recorded(
         elapsed_s: began.elapsed().as_secs_f64(),
         interrupted,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::evaluate::BackendChoice;
+    use crate::evaluate::replay::Norm;
+
+    #[test]
+    fn a_study_file_repeats_its_study() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = folder.path().join("study.toml");
+        let settings = SurfaceSettings {
+            replay: IdentifySettings {
+                log: Some(folder.path().join("a \"log\".csv")),
+                section: Some("Abbey".to_owned()),
+                laps: vec![2],
+                norm: Norm::One,
+                backend: BackendChoice::Simd,
+                seed: 7,
+                free: vec![FreeParameter {
+                    name: "front.rBy1".to_owned(),
+                    lower: 1.0,
+                    upper: 2.0,
+                }],
+                ..SurfaceSettings::default().replay
+            },
+            parameters: ["K".to_owned(), "front.rBy1".to_owned()],
+            share: Some(0.1),
+            grid: 7,
+        };
+        std::fs::write(&path, settings.to_toml()).expect("a file");
+        assert_eq!(SurfaceSettings::read(&path).expect("what was written"), settings);
+    }
 }

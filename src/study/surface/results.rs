@@ -137,19 +137,7 @@ pub fn write_results(
         )
     };
     let problem = &setup.replay.problem;
-    let mut toml = format!(
-        "parameters = {:?}\ngrid = {}\ncar = {:?}\n",
-        settings.parameters, settings.grid, settings.replay.car
-    );
-    if let Some(share) = settings.share {
-        toml += &format!("share = {share:?}\n");
-    }
-    if let Some(log) = &settings.replay.log {
-        toml += &format!("log = {:?}\n", log.display().to_string());
-    }
-    if let Some(window) = settings.replay.window_s {
-        toml += &format!("window_s = {window:?}\n");
-    }
+    let toml = settings.to_toml();
     write_whole(folder.join("study.toml"), toml.as_bytes())?;
     if outcome.interrupted {
         return Ok(());
@@ -180,13 +168,7 @@ pub fn write_results(
     );
     write_csv(folder.join("surface.csv"), &columns)?;
 
-    let label = |name: &str, unit: &str| {
-        if unit == "-" {
-            name.to_owned()
-        } else {
-            format!("{name} ({unit})")
-        }
-    };
+    let label = |name: &str, unit: &str| format!("{name} ({unit})");
     let axis_label = |k: usize| label(&problem.variables[k].name, &problem.variables[k].unit);
     let (x_label, y_label) = (axis_label(0), axis_label(1));
     let mut page = begun_page(setup, summary);
@@ -196,14 +178,15 @@ pub fn write_results(
             marks.push(("least", least.at));
         }
         let name = &objective.name;
+        let told = told_of(name);
         let figure = SurfaceFigure {
             title: &format!(
-                "Cost of {name} over {} and {}",
+                "Cost of {told} over {} and {}",
                 summary.parameters[0], summary.parameters[1]
             ),
             x_label: &x_label,
             y_label: &y_label,
-            z_label: &label(name, &objective.unit),
+            z_label: &label(&format!("cost of {told}"), &objective.unit),
             x: &outcome.axes[0],
             y: &outcome.axes[1],
             z: costs,
@@ -225,6 +208,15 @@ pub fn write_results(
     write_json(&folder.join("manifest.json"), &manifest)
 }
 
+/// What a cost is of.
+fn told_of(objective: &str) -> &str {
+    if objective == "all" {
+        "all channels"
+    } else {
+        objective
+    }
+}
+
 /// The interactive report, up to its surfaces.
 fn begun_page(setup: &Setup, summary: &Summary) -> HtmlReport {
     let [x, y] = &summary.parameters;
@@ -242,7 +234,7 @@ fn begun_page(setup: &Setup, summary: &Summary) -> HtmlReport {
             let [at_x, at_y] = least.at.map(|v| significant(v, 5));
             page.sentence(format!(
                 "The cost of {} is least, {}, where {x} is {at_x} and {y} is {at_y}.",
-                if name == "all" { "all channels" } else { name },
+                told_of(name),
                 significant(least.cost, 4)
             ));
         }

@@ -17,7 +17,7 @@ pub struct SweepSettings {
     /// Values of each key of the grid, in the order of the file's keys; the last key changes fastest.
     axes: Vec<(String, Vec<Value>)>,
     /// The sweep file, as it was read.
-    pub(super) text: String,
+    text: String,
     file: String,
 }
 
@@ -166,6 +166,11 @@ impl SweepSettings {
             text: text.to_owned(),
             file: path.display().to_string(),
         })
+    }
+
+    /// The sweep file, as it was read.
+    pub fn text(&self) -> &str {
+        &self.text
     }
 
     /// The keys of the grid, the seed last.

@@ -33,7 +33,7 @@ pub(super) fn alike(paths: &[PathBuf]) -> usize {
 }
 
 /// The settings without what only swarm and polish go by.
-fn problem_of(settings: IdentifySettings) -> IdentifySettings {
+pub(super) fn problem_of(settings: IdentifySettings) -> IdentifySettings {
     let usual = IdentifySettings::default();
     IdentifySettings {
         algorithm: usual.algorithm,

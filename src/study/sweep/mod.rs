@@ -6,16 +6,18 @@
 mod grid;
 mod identified;
 mod joint;
+mod page;
 mod results;
 
 pub use grid::{Point, SweepSettings};
 pub use results::{Row, Summary, medians};
 
-use self::identified::{alike, identified};
+use self::identified::{alike, identified, problem_of};
 use crate::error::{Error, Result};
+use crate::evaluate::BackendInfo;
 use crate::report::write_whole;
-use crate::study::identify::IdentifySettings;
-use crate::study::memory::USUAL_MIB;
+use crate::study::identify::{self, IdentifySettings};
+use crate::study::memory::{Size, USUAL_MIB};
 use crate::study::raceline::{self, RacelineSettings};
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
@@ -60,14 +62,7 @@ pub fn sweep(
     let studies = folder.join("studies");
     let path_of = |number: usize| studies.join(format!("{number:05}.toml"));
     // Every point is read before anything is written: a mistake in the last shows at once, and leaves nothing behind.
-    for (number, point) in points.iter().enumerate() {
-        let read = match settings.study {
-            SweptStudy::Identify => IdentifySettings::parse(&path_of(number), &point.study).map(|s| s.size()),
-            SweptStudy::Raceline => RacelineSettings::parse(&path_of(number), &point.study).map(|s| s.size()),
-        };
-        read.and_then(|size| size.check(USUAL_MIB))
-            .map_err(|e| settings.of_point(e, number, point, &path_of(number)))?;
-    }
+    read_points(settings, &points, path_of)?;
     let mut rows = if resume {
         results::read_rows(&folder.join(ROWS), &folder.join(SWEEP_FILE), settings, &points)?
     } else {
@@ -85,8 +80,133 @@ pub fn sweep(
         return Err(error);
     }
     let summary = Summary::new(rows)?;
-    summary.write(folder)?;
+    summary.write(folder, settings)?;
     Ok(summary)
+}
+
+/// The study of a point, read.
+enum PointStudy {
+    Identify(Box<IdentifySettings>),
+    Raceline(Box<RacelineSettings>),
+}
+
+impl PointStudy {
+    fn size(&self) -> Size {
+        match self {
+            Self::Identify(s) => s.size(),
+            Self::Raceline(s) => s.size(),
+        }
+    }
+}
+
+/// Reads the study of every point, and refuses what is wrong or too large.
+fn read_points(
+    settings: &SweepSettings,
+    points: &[Point],
+    path_of: impl Fn(usize) -> PathBuf,
+) -> Result<Vec<PointStudy>> {
+    let read = |(number, point): (usize, &Point)| {
+        let path = path_of(number);
+        let study = match settings.study {
+            SweptStudy::Identify => {
+                IdentifySettings::parse(&path, &point.study).map(|s| PointStudy::Identify(Box::new(s)))
+            }
+            SweptStudy::Raceline => {
+                RacelineSettings::parse(&path, &point.study).map(|s| PointStudy::Raceline(Box::new(s)))
+            }
+        };
+        study
+            .and_then(|study| study.size().check(USUAL_MIB).map(|()| study))
+            .map_err(|e| settings.of_point(e, number, point, &path))
+    };
+    points.iter().enumerate().map(read).collect()
+}
+
+/// What a sweep would do.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SweepPlan {
+    /// Runs.
+    pub runs: usize,
+    /// Different problems among them, each of which has been set up.
+    pub problems: usize,
+    /// Cars driven by all swarms at the most; none where the studies find out how many.
+    pub evaluations: Option<u64>,
+    /// What the largest study keeps (MiB).
+    pub memory_mib: u64,
+    /// What evaluates.
+    pub backend: BackendInfo,
+}
+
+impl std::fmt::Display for SweepPlan {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let of = if self.problems == 1 {
+            "one problem".to_owned()
+        } else {
+            format!("{} problems", self.problems)
+        };
+        write!(f, "{} runs of {of}", self.runs)
+    }
+}
+
+/// Reads every point, sets up every problem among them, and runs none.
+///
+/// # Errors
+/// Those that [`sweep`] would have before its runs begin, and those of the problems.
+pub fn plan(settings: &SweepSettings) -> Result<SweepPlan> {
+    let points = settings.points()?;
+    let path_of = |number: usize| PathBuf::from(format!("{number:05}.toml"));
+    let studies = read_points(settings, &points, path_of)?;
+    let mut identified: Vec<IdentifySettings> = Vec::new();
+    let mut lined: Vec<RacelineSettings> = Vec::new();
+    let mut chosen = Vec::new();
+    for (number, study) in studies.iter().enumerate() {
+        let set_up = match study {
+            PointStudy::Identify(s) => {
+                chosen.push((s.backend, s.adapter.clone()));
+                let problem = problem_of((**s).clone());
+                if identified.contains(&problem) {
+                    continue;
+                }
+                identified.push(problem);
+                identify::set_up(s).map(drop)
+            }
+            PointStudy::Raceline(s) => {
+                chosen.push((s.backend, s.adapter.clone()));
+                let problem = RacelineSettings {
+                    track: s.track.clone(),
+                    car: s.car.clone(),
+                    envelope: s.envelope.clone(),
+                    section: s.section.clone(),
+                    sections: s.sections,
+                    as_surveyed: s.as_surveyed,
+                    car_width_m: s.car_width_m,
+                    ..RacelineSettings::default()
+                };
+                if lined.contains(&problem) {
+                    continue;
+                }
+                lined.push(problem);
+                raceline::set_up(s).map(drop)
+            }
+        };
+        set_up.map_err(|e| settings.of_point(e, number, &points[number], &path_of(number)))?;
+    }
+    chosen.dedup();
+    let mut backends = chosen
+        .iter()
+        .map(|(backend, adapter)| backend.would_be(adapter.as_deref()))
+        .collect::<Result<Vec<_>>>()?;
+    let evaluations = studies.iter().map(|study| match study {
+        PointStudy::Identify(s) => Some(s.evaluations()),
+        PointStudy::Raceline(_) => None,
+    });
+    Ok(SweepPlan {
+        runs: points.len(),
+        problems: identified.len() + lined.len(),
+        evaluations: evaluations.sum(),
+        memory_mib: studies.iter().map(|s| s.size().needed_mib()).max().unwrap_or(0),
+        backend: backends.swap_remove(0),
+    })
 }
 
 /// Writes the sweep and the study of every point.
@@ -100,7 +220,7 @@ fn write_studies(
     let studies = folder.join("studies");
     std::fs::create_dir_all(&studies).map_err(|e| Error::io(&studies, "create", e))?;
     if !resume {
-        write_whole(folder.join(SWEEP_FILE), settings.text.as_bytes())?;
+        write_whole(folder.join(SWEEP_FILE), settings.text().as_bytes())?;
     }
     for (number, point) in points.iter().enumerate() {
         write_whole(path_of(number), point.study.as_bytes())?;

@@ -122,7 +122,7 @@ pub(super) fn read_rows(
     points: &[Point],
 ) -> Result<Vec<Row>> {
     let held = std::fs::read_to_string(sweep).map_err(|e| Error::io(sweep, "read", e))?;
-    if held != settings.text {
+    if held != settings.text() {
         return Err(Error::input(
             sweep,
             "--resume",
@@ -169,119 +169,108 @@ impl Summary {
 
     /// The medians as a table.
     pub fn to_text(&self) -> String {
-        let Some(first) = self.groups.first() else {
+        if self.groups.is_empty() {
             return String::new();
-        };
-        let keys: Vec<&String> = first.settings.keys().collect();
-        let names: Vec<&String> = first.figures.keys().collect();
-        let settings: Vec<Vec<String>> = keys
-            .iter()
-            .map(|key| self.groups.iter().map(|g| g.settings[*key].clone()).collect())
-            .collect();
-        let figures: Vec<Vec<f64>> = names
-            .iter()
-            .map(|name| {
-                self.groups
-                    .iter()
-                    .map(|g| g.figures.get(*name).map_or(f64::NAN, |s| s.median))
-                    .collect()
-            })
-            .collect();
-        let column = |name, cells| Column {
-            name,
-            unit: "",
-            cells,
-        };
-        let mut columns: Vec<Column<'_>> = keys
-            .iter()
-            .zip(&settings)
-            .map(|(key, cells)| column(key.as_str(), Cells::Texts(cells)))
-            .collect();
-        columns.extend(
-            names
-                .iter()
-                .zip(&figures)
-                .map(|(name, cells)| column(name.as_str(), Cells::Numbers(cells))),
-        );
-        format!("Medians over the seeds\n{}", text_table(&columns))
+        }
+        let medians = self.median_table(&[("", |s| s.median)]);
+        format!("Medians over the seeds\n{}", text_table(&columns(&medians)))
     }
 
-    /// Writes `sweep` and `medians` as CSV and as Parquet, and `summary.json`.
+    /// Settings and figures of every run.
+    pub(super) fn row_table(&self) -> Vec<OwnColumn> {
+        let Some(first) = self.rows.first() else {
+            return Vec::new();
+        };
+        let settings = first.settings.keys().map(|key| OwnColumn {
+            name: key.clone(),
+            cells: OwnCells::Texts(self.rows.iter().map(|r| r.settings[key].clone()).collect()),
+        });
+        let value = |r: &Row, name: &String| r.figures.get(name).copied().flatten().unwrap_or(f64::NAN);
+        let figures = first.figures.keys().map(|name| OwnColumn {
+            name: name.clone(),
+            cells: OwnCells::Numbers(self.rows.iter().map(|r| value(r, name)).collect()),
+        });
+        settings.chain(figures).collect()
+    }
+
+    /// Settings of every group and these of each of its figures, with endings of their names.
+    pub(super) fn median_table(&self, of: &[NamedPart]) -> Vec<OwnColumn> {
+        let Some(first) = self.groups.first() else {
+            return Vec::new();
+        };
+        let mut table: Vec<OwnColumn> = first
+            .settings
+            .keys()
+            .map(|key| OwnColumn {
+                name: key.clone(),
+                cells: OwnCells::Texts(self.groups.iter().map(|g| g.settings[key].clone()).collect()),
+            })
+            .collect();
+        for name in first.figures.keys() {
+            table.extend(of.iter().map(|(ending, of)| {
+                OwnColumn {
+                    name: format!("{name}{ending}"),
+                    cells: OwnCells::Numbers(
+                        self.groups
+                            .iter()
+                            .map(|g| g.figures.get(name).map_or(f64::NAN, of))
+                            .collect(),
+                    ),
+                }
+            }));
+        }
+        table
+    }
+
+    /// Writes `sweep` and `medians` as CSV and as Parquet, `summary.json`, the picture `medians.svg` and `report.html`.
     ///
     /// # Errors
     /// [`Error::Io`] if a file cannot be written.
-    pub(super) fn write(&self, folder: &Path) -> Result<()> {
+    pub(super) fn write(&self, folder: &Path, settings: &SweepSettings) -> Result<()> {
         write_json(&folder.join("summary.json"), self)?;
-        let Some(first) = self.rows.first() else {
+        if self.rows.is_empty() {
             return Ok(());
-        };
-        let texts =
-            |key: &String| -> Vec<String> { self.rows.iter().map(|r| r.settings[key].clone()).collect() };
-        let settings: Vec<(&String, Vec<String>)> =
-            first.settings.keys().map(|key| (key, texts(key))).collect();
-        let numbers = |name: &String| -> Vec<f64> {
-            self.rows
-                .iter()
-                .map(|r| r.figures.get(name).copied().flatten().unwrap_or(f64::NAN))
-                .collect()
-        };
-        let figures: Vec<(&String, Vec<f64>)> =
-            first.figures.keys().map(|name| (name, numbers(name))).collect();
-        let mut columns: Vec<Column<'_>> = settings
-            .iter()
-            .map(|(name, cells)| Column {
-                name,
-                unit: "",
-                cells: Cells::Texts(cells),
-            })
-            .collect();
-        columns.extend(figures.iter().map(|(name, cells)| Column {
-            name,
-            unit: "",
-            cells: Cells::Numbers(cells),
-        }));
-        write_csv(folder.join("sweep.csv"), &columns)?;
-        write_parquet(folder.join("sweep.parquet"), &columns)?;
-
-        let keys: Vec<(&String, Vec<String>)> = self.groups[0]
-            .settings
-            .keys()
-            .map(|key| (key, self.groups.iter().map(|g| g.settings[key].clone()).collect()))
-            .collect();
-        let mut spreads: Vec<(String, Vec<f64>)> = Vec::new();
-        for name in self.groups[0].figures.keys() {
-            for (ending, of) in [
-                (
-                    "lower_quartile",
-                    (|s: &Spread| s.lower_quartile) as fn(&Spread) -> f64,
-                ),
-                ("median", |s| s.median),
-                ("upper_quartile", |s| s.upper_quartile),
-            ] {
-                let values = self
-                    .groups
-                    .iter()
-                    .map(|g| g.figures.get(name).map_or(f64::NAN, of))
-                    .collect();
-                spreads.push((format!("{name}_{ending}"), values));
-            }
         }
-        let mut columns: Vec<Column<'_>> = keys
-            .iter()
-            .map(|(name, cells)| Column {
-                name,
-                unit: "",
-                cells: Cells::Texts(cells),
-            })
-            .collect();
-        columns.extend(spreads.iter().map(|(name, cells)| Column {
-            name,
-            unit: "",
-            cells: Cells::Numbers(cells),
-        }));
-        write_csv(folder.join("medians.csv"), &columns)?;
-        write_parquet(folder.join("medians.parquet"), &columns)
+        let rows = self.row_table();
+        write_csv(folder.join("sweep.csv"), &columns(&rows))?;
+        write_parquet(folder.join("sweep.parquet"), &columns(&rows))?;
+        let medians = self.median_table(&[
+            ("_lower_quartile", |s| s.lower_quartile),
+            ("_median", |s| s.median),
+            ("_upper_quartile", |s| s.upper_quartile),
+        ]);
+        write_csv(folder.join("medians.csv"), &columns(&medians))?;
+        write_parquet(folder.join("medians.parquet"), &columns(&medians))?;
+        super::page::write(folder, self, settings)
     }
+}
+
+/// A part of a spread, and how the names of its columns end.
+pub(super) type NamedPart = (&'static str, fn(&Spread) -> f64);
+
+/// A column of a table with its cells.
+pub(super) struct OwnColumn {
+    name: String,
+    cells: OwnCells,
+}
+
+enum OwnCells {
+    Texts(Vec<String>),
+    Numbers(Vec<f64>),
+}
+
+/// The columns, to be written.
+pub(super) fn columns(own: &[OwnColumn]) -> Vec<Column<'_>> {
+    own.iter()
+        .map(|column| Column {
+            name: &column.name,
+            unit: "",
+            cells: match &column.cells {
+                OwnCells::Texts(cells) => Cells::Texts(cells),
+                OwnCells::Numbers(cells) => Cells::Numbers(cells),
+            },
+        })
+        .collect()
 }
 
 #[cfg(test)]

@@ -9,6 +9,7 @@ use crate::error::{Error, Result};
 use crate::evaluate::drive::{DriveObjective, DriveProblem, DriveSettings, open_drive_evaluator};
 use crate::evaluate::{BackendChoice, BackendInfo, FailureCounts, add_failures};
 use crate::line::{FineLine, PointMass};
+use crate::track::Circuit;
 use crate::vehicle::{Car, CarParameter};
 use glam::DVec2;
 use rayon::prelude::*;
@@ -22,6 +23,17 @@ pub struct NamedLine {
     pub name: String,
     /// Its points (m).
     pub points_m: Vec<DVec2>,
+}
+
+impl NamedLine {
+    /// The line between edges (m, right and left) as a circuit of its own (see [`circuit_of_line`]).
+    ///
+    /// # Errors
+    /// [`Error::Input`] for a line that is no lap, or leaves no room for the car.
+    pub fn circuit(&self, edges_m: [&[DVec2]; 2], car_width_m: f64) -> Result<Circuit> {
+        let fine = FineLine::new(&self.points_m, true, 1.0, None, 0.0)?;
+        circuit_of_line(&self.name, &fine, edges_m, car_width_m)
+    }
 }
 
 /// Settings of a population.
@@ -117,7 +129,16 @@ pub struct PopulationOutcome {
 }
 
 impl PopulationSettings {
-    fn check(&self) -> Result<()> {
+    /// Laps of so many lines.
+    pub fn laps(&self, lines: usize) -> usize {
+        (self.setups + 1) * lines * self.grip_shares.len()
+    }
+
+    /// Checks every setting, and whether `car` has the parameters.
+    ///
+    /// # Errors
+    /// [`Error::Input`] naming the setting.
+    pub fn check(&self, car: &Car) -> Result<()> {
         let refuse = |place: &str, found: String, expected: &str| {
             Err(Error::input("the drive", place, found, expected))
         };
@@ -131,7 +152,7 @@ impl PopulationSettings {
             let found = format!("{} of them", self.parameters.len());
             return refuse("parameters", found, "1 to 256");
         }
-        Ok(())
+        self.free(car).map(|_| ())
     }
 
     /// Free parameters of `car` with their bounds, those of a value of nought left where no share of it moves them.
@@ -143,15 +164,7 @@ impl PopulationSettings {
         self.parameters
             .iter()
             .map(|name| {
-                let Some(parameter) = car.parameter(name) else {
-                    let expected = "a parameter of the car: a chassis key or a tyre coefficient";
-                    return Err(Error::input(
-                        &car.name,
-                        "parameters",
-                        format!("`{name}`"),
-                        expected,
-                    ));
-                };
+                let parameter = car.known_parameter(&car.name, "parameters", name)?;
                 let value = flat[parameter.slots[0]];
                 if parameter.slots.iter().any(|slot| flat[*slot] != value) {
                     let expected = format!("front.{name} or rear.{name}, whose values differ");
@@ -188,14 +201,11 @@ pub fn drive_population(
     settings: &PopulationSettings,
     mut observe: impl FnMut(usize, usize) -> ControlFlow<()>,
 ) -> Result<PopulationOutcome> {
-    settings.check()?;
+    settings.check(car)?;
     let shares = &settings.grip_shares;
     let circuits = lines
         .iter()
-        .map(|line| {
-            let fine = FineLine::new(&line.points_m, true, 1.0, None, 0.0)?;
-            circuit_of_line(&line.name, &fine, edges_m, settings.car_width_m)
-        })
+        .map(|line| line.circuit(edges_m, settings.car_width_m))
         .collect::<Result<Vec<_>>>()?;
     let plans = lines
         .iter()

@@ -62,6 +62,8 @@ pub struct PopulationSummary {
     pub best: Option<Entry>,
     /// The car as it is on the line where it is fastest.
     pub as_it_is: Option<Entry>,
+    /// By what the lap of each set-up was chosen among those with other shares of the grip.
+    pub rule: &'static str,
     /// Laps that failed, by reason.
     pub failures: FailureCounts,
     /// What devices failed of and what was done about it.
@@ -117,6 +119,8 @@ pub fn summarise_population(
             .iter()
             .find(|d| d.setup == 0 && d.best.is_some())
             .map(|d| entry(outcome, lines, d)),
+        rule: "the fastest lap within the edges, whether or not it agrees with the point mass's; one line alone is held to that \
+               agreement",
         failures: outcome.failures.clone(),
         device_faults: outcome.device_faults.clone(),
         interrupted: outcome.interrupted,
@@ -140,6 +144,9 @@ impl PopulationSummary {
                 "The fastest laps in {fastest:.3} s, {:.3} s less than the car as it is on its best line ({time:.3} s).\n",
                 time - fastest
             ));
+        }
+        if self.best.is_some() {
+            text.push_str(&format!("Chosen of each set-up on each line: {}.\n", self.rule));
         }
         if self.best.is_none() {
             let counts: Vec<String> = self

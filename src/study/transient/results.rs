@@ -40,6 +40,8 @@ pub struct Summary {
     pub disagreement_percent: f64,
     /// Whether that is within what is asked for.
     pub agrees: bool,
+    /// By what the lap was chosen among those with other shares of the grip.
+    pub rule: &'static str,
     /// Least room between the car's side and an edge (m).
     pub margin_m: f64,
     /// Greatest distance of the car from the line (m).
@@ -65,6 +67,11 @@ pub fn summarise(car: &str, outcome: &Outcome, elapsed_s: f64) -> Summary {
         point_mass_lap_time_s: outcome.point_mass.lap_time_s().unwrap_or(f64::NAN),
         disagreement_percent: 100.0 * outcome.disagreement(),
         agrees: outcome.disagreement().abs() <= AGREEMENT,
+        rule: if outcome.disagreement().abs() <= AGREEMENT {
+            "the greatest share of the grip at which the driven lap and the point mass's agree to half a percent"
+        } else {
+            "the share of the grip at which the driven lap and the point mass's agree best, for they do to half a percent at none"
+        },
         margin_m: outcome.margin_m,
         greatest_offset_m: outcome.drive.offset_m.iter().fold(0.0, |a, b| a.max(b.abs())),
         beyond: outcome.failures.last().map(|(_, why)| why.clone()),
@@ -80,7 +87,7 @@ impl Summary {
             .map_or(String::new(), |why| format!("Beyond it {why}.\n"));
         format!(
             "{} drives the line in {:.3} s, with {:.0}% of the envelope's grip; the point mass with as much laps in {:.3} s \
-             ({:+.2}%{}).\n{beyond}At most {:.2} m off the line; {:.2} m left between the car's side and the edge.\n",
+             ({:+.2}%{}).\n{beyond}Chosen: {}.\nAt most {:.2} m off the line; {:.2} m left between the car's side and the edge.\n",
             self.car,
             self.lap_time_s,
             100.0 * self.grip_share,
@@ -91,6 +98,7 @@ impl Summary {
             } else {
                 ", more than the half percent asked for"
             },
+            self.rule,
             self.greatest_offset_m,
             self.margin_m
         )

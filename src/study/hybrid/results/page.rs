@@ -56,7 +56,7 @@ pub fn write(
                 .objectives
                 .iter()
                 .map(|o| Objective {
-                    name: o.name(),
+                    name: o.words(),
                     unit: o.unit(),
                 })
                 .collect(),

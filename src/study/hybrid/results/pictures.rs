@@ -166,8 +166,6 @@ fn draw_charges(path: &Path, setup: &HybridSetup, outcome: &Outcome) -> Result<(
         return Ok(());
     }
     let names: Vec<String> = laps.iter().map(|l| l.name.replace('_', " ")).collect();
-    // Colours are the same in both panels, and one legend would be too long for either.
-    let label = |i: usize, panel: usize| if i % 2 == panel { names[i].as_str() } else { "" };
     let panel = CurvePanel {
         title: "State of charge",
         x_label: DISTANCE,
@@ -175,7 +173,7 @@ fn draw_charges(path: &Path, setup: &HybridSetup, outcome: &Outcome) -> Result<(
         curves: laps
             .iter()
             .enumerate()
-            .map(|(i, lap)| curve(label(i, 0), lap, soc(setup, lap)))
+            .map(|(i, lap)| curve(&names[i], lap, soc(setup, lap)))
             .collect(),
     };
     let out = CurvePanel {
@@ -185,7 +183,7 @@ fn draw_charges(path: &Path, setup: &HybridSetup, outcome: &Outcome) -> Result<(
         curves: laps
             .iter()
             .enumerate()
-            .map(|(i, lap)| curve(label(i, 1), lap, summed(lap.segments.iter().map(|s| s.deployed))))
+            .map(|(i, lap)| curve(&names[i], lap, summed(lap.segments.iter().map(|s| s.deployed))))
             .collect(),
     };
     plot_curves(
@@ -414,19 +412,22 @@ pub fn time_energy(outcome: &Outcome) -> Vec<CurvePanel<'static>> {
         })
         .collect();
     let mut panels = vec![CurvePanel {
-        title: "Lap time against energy that may leave the store",
+        title: "Lap time against energy out of the store in a lap",
         x_label: "energy (MJ)",
         y_label: "lap time (s)",
         curves: vec![
-            line("exact optimum", exact),
-            dots("scenarios", scenarios.collect()),
-            dots("swarm", vec![(o.swarm.lap.lap.deployed, o.swarm.lap.lap.time)]),
+            line("exact optimum (energy allowed)", exact),
+            dots("scenarios (energy used)", scenarios.collect()),
+            dots(
+                "swarm (energy used)",
+                vec![(o.swarm.lap.lap.deployed, o.swarm.lap.lap.time)],
+            ),
         ],
     }];
     if !marginal.is_empty() {
         panels.push(CurvePanel {
-            title: "What a megajoule buys",
-            x_label: "energy (MJ)",
+            title: "What a further megajoule buys",
+            x_label: "energy allowed (MJ)",
             y_label: "time (s/MJ)",
             curves: vec![line("", marginal)],
         });
@@ -479,7 +480,7 @@ fn draw_front(folder: &Path, settings: &HybridStudySettings, front: &StrategyFro
         .objectives
         .iter()
         .map(|o| Objective {
-            name: o.name(),
+            name: o.words(),
             unit: o.unit(),
         })
         .collect();

@@ -1,0 +1,241 @@
+//! The report of a sweep: what the medians say, figure by figure.
+
+use super::results::{Group, Spread, Summary, columns};
+use super::{SweepSettings, SweptStudy};
+use crate::error::Result;
+use crate::report::{BarPanel, BarSeries, HtmlReport, plot_bars, significant};
+use std::path::Path;
+
+/// Settings that bars are drawn of: more are a wall, and stand in the table.
+const DRAWN: usize = 40;
+/// Least of the figures as a share of the greatest, above which they are alike.
+const ALIKE: f64 = 0.7;
+/// Figures of which more is better; of all others but counts less is.
+const MORE_IS_BETTER: [&str; 3] = ["hypervolume", "hypervolume_share", "front_size"];
+/// Figures that say what a run took, and not how good it is.
+const COUNTS: [&str; 1] = ["evaluations"];
+/// What studies are judged by, the first of these that is there.
+const VERDICTS: [&str; 5] = [
+    "total_parameter_error",
+    "swarm_total_parameter_error",
+    "best_cost",
+    "best_lap_time_s",
+    "hypervolume",
+];
+
+/// What a group differs in, in words.
+fn name_of(group: &Group) -> String {
+    let told: Vec<String> = group.settings.iter().map(|(k, v)| format!("{k} {v}")).collect();
+    if told.is_empty() {
+        "all runs".to_owned()
+    } else {
+        told.join(", ")
+    }
+}
+
+/// The groups that have a figure, the best first.
+fn ranked<'a>(summary: &'a Summary, figure: &str) -> Vec<(&'a Group, Spread)> {
+    let mut all: Vec<(&Group, Spread)> = summary
+        .groups
+        .iter()
+        .filter_map(|g| Some((g, *g.figures.get(figure)?)))
+        .collect();
+    all.sort_by(|a, b| a.1.median.total_cmp(&b.1.median));
+    if MORE_IS_BETTER.contains(&figure) {
+        all.reverse();
+    }
+    all
+}
+
+/// The figures of any group, what the study is judged by first, counts last. One that is another under a second name, as the
+/// swarm's error is where nothing is polished, is left out.
+fn figures(summary: &Summary) -> Vec<&str> {
+    let mut names: Vec<&str> = summary
+        .groups
+        .iter()
+        .flat_map(|g| g.figures.keys().map(String::as_str))
+        .collect();
+    names.sort_unstable();
+    names.dedup();
+    let place = |name: &str| {
+        if COUNTS.contains(&name) {
+            return VERDICTS.len() + 1;
+        }
+        VERDICTS.iter().position(|v| *v == name).unwrap_or(VERDICTS.len())
+    };
+    names.sort_by_key(|name| place(name));
+    let same = |a: &str, b: &str| {
+        summary
+            .groups
+            .iter()
+            .all(|g| g.figures.get(a) == g.figures.get(b))
+    };
+    let mut told: Vec<&str> = Vec::new();
+    for name in names {
+        if !told.iter().any(|before| same(before, name)) {
+            told.push(name);
+        }
+    }
+    told
+}
+
+/// Values of a group's settings, without their names, which the section tells.
+fn short_name(group: &Group) -> String {
+    let values: Vec<&str> = group.settings.values().map(String::as_str).collect();
+    if values.is_empty() {
+        "all runs".to_owned()
+    } else {
+        values.join(" / ")
+    }
+}
+
+/// A figure as it is drawn.
+struct Drawn<'a> {
+    title: &'a str,
+    x_label: String,
+    names: Vec<String>,
+    medians: Vec<f64>,
+    quartiles: Vec<[f64; 2]>,
+}
+
+impl<'a> Drawn<'a> {
+    /// Nothing for a figure that is the same in all runs.
+    fn new(summary: &Summary, figure: &'a str) -> Option<Self> {
+        let groups = ranked(summary, figure);
+        let shown = &groups[..groups.len().min(DRAWN)];
+        let ends = || {
+            shown
+                .iter()
+                .flat_map(|(_, s)| [s.lower_quartile, s.upper_quartile])
+        };
+        let least = ends().fold(f64::INFINITY, f64::min);
+        let most = ends().fold(f64::NEG_INFINITY, f64::max);
+        if most <= least {
+            return None;
+        }
+        // Bars begin at nought; where all are nearly as long, it is what they are above the least that tells.
+        let (from, x_label) = if least > ALIKE * most {
+            (least, format!("{figure} above {}", significant(least, 6)))
+        } else {
+            (0.0, figure.to_owned())
+        };
+        Some(Self {
+            title: figure,
+            x_label,
+            names: shown.iter().map(|(g, _)| short_name(g)).collect(),
+            medians: shown.iter().map(|(_, s)| s.median - from).collect(),
+            quartiles: shown
+                .iter()
+                .map(|(_, s)| [s.lower_quartile - from, s.upper_quartile - from])
+                .collect(),
+        })
+    }
+
+    fn panel(&self) -> BarPanel<'_> {
+        BarPanel {
+            title: self.title,
+            x_label: &self.x_label,
+            names: self.names.iter().map(String::as_str).collect(),
+            series: vec![BarSeries {
+                label: "",
+                values: self.medians.clone(),
+                intervals: self.quartiles.clone(),
+            }],
+        }
+    }
+}
+
+pub(super) fn write(folder: &Path, summary: &Summary, settings: &SweepSettings) -> Result<()> {
+    let study = match settings.study {
+        SweptStudy::Identify => "identify",
+        SweptStudy::Raceline => "raceline",
+    };
+    let (runs, groups) = (summary.rows.len(), summary.groups.len());
+    let axes = settings.keys();
+    let mut page = HtmlReport::new("sweep", &format!("{study} over {}", axes.join(", ")));
+    let seeds = summary.groups.iter().map(|g| g.runs).max().unwrap_or(1);
+    page.sentence(format!(
+        "{runs} runs of {study} with {groups} settings, {} each.",
+        if seeds == 1 {
+            "one run".to_owned()
+        } else {
+            format!("{seeds} seeds")
+        }
+    ));
+    page.tile("Runs", runs.to_string(), "");
+    for figure in figures(summary)
+        .into_iter()
+        .filter(|f| !COUNTS.contains(f))
+        .take(3)
+    {
+        let all = ranked(summary, figure);
+        let (Some((best, spread)), Some((worst, last))) = (all.first(), all.last()) else {
+            continue;
+        };
+        let best_words = if MORE_IS_BETTER.contains(&figure) {
+            "greatest"
+        } else {
+            "least"
+        };
+        page.tile(
+            &format!("{figure}, {best_words} median"),
+            significant(spread.median, 4),
+            "",
+        );
+        let quartiles = [spread.lower_quartile, spread.upper_quartile].map(|v| significant(v, 4));
+        let mut sentence = format!(
+            "The {best_words} median of {figure} is {} (half of the runs between {} and {}), with {}",
+            significant(spread.median, 4),
+            quartiles[0],
+            quartiles[1],
+            name_of(best)
+        );
+        if all.len() > 1 {
+            sentence += &format!(
+                "; at the other end is {} with {}",
+                significant(last.median, 4),
+                name_of(worst)
+            );
+        }
+        page.sentence(sentence + ".");
+    }
+    let keys = summary
+        .groups
+        .first()
+        .map(|g| g.settings.keys().cloned().collect::<Vec<_>>());
+    let order = keys.unwrap_or_default().join(" / ");
+    page.section(
+        "Medians",
+        &format!(
+            "Over the seeds of each setting ({order}), with quartiles as whiskers. The best stands on top."
+        ),
+    );
+    if groups > DRAWN {
+        page.paragraph(&format!(
+            "Drawn are the best {DRAWN} of {groups} settings; the table has all."
+        ));
+    }
+    let drawn: Vec<Drawn<'_>> = figures(summary)
+        .into_iter()
+        .filter_map(|figure| Drawn::new(summary, figure))
+        .collect();
+    let panels: Vec<BarPanel<'_>> = drawn.iter().map(Drawn::panel).collect();
+    if !panels.is_empty() {
+        let title = format!("Medians over the seeds, with quartiles, by {order}");
+        plot_bars(folder.join("medians.svg"), &title, &panels)?;
+    }
+    for panel in &panels {
+        page.bars(panel, "")?;
+    }
+    let medians = summary.median_table(&[
+        ("", |s| s.median),
+        (", quartile below", |s| s.lower_quartile),
+        (", quartile above", |s| s.upper_quartile),
+    ]);
+    page.table("Every setting", "", &columns(&medians))?;
+    page.folded_table("Every run", "", &columns(&summary.row_table()))?;
+    page.provenance("study", study);
+    page.provenance("runs", runs.to_string());
+    page.settings("sweep.toml, which repeats this sweep", settings.text());
+    page.write(folder.join("report.html"))
+}
