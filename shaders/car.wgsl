@@ -48,6 +48,22 @@ fn wheel_slip(
     return WheelSlip((rim_speed - vx) / speed, vy / speed);
 }
 
+fn wheel_speed(c: Chassis, body: BodyState, x: f32, y: f32, cosine: f32, sine: f32, slip: f32, radius: f32) -> f32 {
+    let hub = cosine * (body.vx - body.yaw_rate * y) + sine * (body.vy + body.yaw_rate * x);
+    return (hub + slip * max(abs(hub), c.slip_speed_floor)) / radius;
+}
+
+fn wheel_speeds(c: Chassis, body: BodyState, cosine: f32, sine: f32, front_slip: f32, rear_slip: f32) -> Wheels {
+    let a = c.cg_to_front;
+    let b = -c.cg_to_rear;
+    return Wheels(
+        wheel_speed(c, body, a, c.half_track_front, cosine, sine, front_slip, c.radius_front),
+        wheel_speed(c, body, a, -c.half_track_front, cosine, sine, front_slip, c.radius_front),
+        wheel_speed(c, body, b, c.half_track_rear, 1.0, 0.0, rear_slip, c.radius_rear),
+        wheel_speed(c, body, b, -c.half_track_rear, 1.0, 0.0, rear_slip, c.radius_rear),
+    );
+}
+
 struct WheelForces {
     x: Wheels,
     y: Wheels,

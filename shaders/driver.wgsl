@@ -106,24 +106,11 @@ fn act(course: Course, pace: Pace, c: Chassis, state: CarState, view: View, cont
     );
 }
 
-fn wheel_speed(c: Chassis, body: BodyState, x: f32, y: f32, cosine: f32, sine: f32, slip: f32, radius: f32) -> f32 {
-    let hub = cosine * (body.vx - body.yaw_rate * y) + sine * (body.vy + body.yaw_rate * x);
-    return (hub + slip * max(abs(hub), c.slip_speed_floor)) / radius;
-}
-
 fn car_input(c: Chassis, state: CarState, controls: Controls) -> CarInput {
-    let body = state.body;
     let cosine = own_cos(Wheels(controls.steer)).x;
     let sine = own_sin(Wheels(controls.steer)).x;
-    let a = c.cg_to_front;
-    let b = -c.cg_to_rear;
     return CarInput(
-        Wheels(
-            wheel_speed(c, body, a, c.half_track_front, cosine, sine, controls.front_slip, c.radius_front),
-            wheel_speed(c, body, a, -c.half_track_front, cosine, sine, controls.front_slip, c.radius_front),
-            wheel_speed(c, body, b, c.half_track_rear, 1.0, 0.0, controls.rear_slip, c.radius_rear),
-            wheel_speed(c, body, b, -c.half_track_rear, 1.0, 0.0, controls.rear_slip, c.radius_rear),
-        ),
+        wheel_speeds(c, state.body, cosine, sine, controls.front_slip, controls.rear_slip),
         controls.steer,
     );
 }

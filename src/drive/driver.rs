@@ -5,6 +5,7 @@ use super::road::{Course, FRONT_CELLS, PLAN_AHEAD_S, PLAN_REACH_M, Road};
 use super::settings::DriverSettings;
 use crate::error::{Error, Result};
 use crate::scalar::{Lookup, Real};
+use crate::vehicle::model::wheel_speeds;
 use crate::vehicle::powertrain::Powertrain;
 use crate::vehicle::{Car, CarInput, CarState, Chassis};
 use std::f64::consts::TAU;
@@ -358,37 +359,12 @@ pub fn act<R: Lookup>(
     }
 }
 
-/// The speed (rad/s) that gives a wheel of this radius (m) at `(x, y)` (m) from the point under the centre of gravity, turned
-/// by the angle whose cosine and sine are given, the slip ratio `slip`.
-#[inline(always)]
-fn wheel_speed<R: Real>(
-    c: &Chassis<R>,
-    state: &CarState<R>,
-    (x, y): (R, R),
-    (cos, sin): (R, R),
-    slip: R,
-    radius: R,
-) -> R {
-    let body = &state.body;
-    let hub = cos * (body.vx - body.yaw_rate * y) + sin * (body.vy + body.yaw_rate * x);
-    (hub + slip * hub.abs().max(c.slip_speed_floor)) / radius
-}
-
 /// The wheel speeds and the steering that the controls ask for.
 #[inline(always)]
 pub fn car_input<R: Real>(c: &Chassis<R>, state: &CarState<R>, controls: &Controls<R>) -> CarInput<R> {
     let turned = (controls.steer.cos(), controls.steer.sin());
-    let straight = (R::lit(1.0), R::lit(0.0));
-    let (a, b) = (c.cg_to_front, -c.cg_to_rear);
-    let (wf, wr) = (c.half_track_front, c.half_track_rear);
-    let (front, rear) = (controls.front_slip, controls.rear_slip);
     CarInput {
-        wheel_speed: [
-            wheel_speed(c, state, (a, wf), turned, front, c.radius_front),
-            wheel_speed(c, state, (a, -wf), turned, front, c.radius_front),
-            wheel_speed(c, state, (b, wr), straight, rear, c.radius_rear),
-            wheel_speed(c, state, (b, -wr), straight, rear, c.radius_rear),
-        ],
+        wheel_speed: wheel_speeds(c, &state.body, turned, [controls.front_slip, controls.rear_slip]),
         steer: controls.steer,
     }
 }

@@ -79,6 +79,42 @@ pub fn wheel_slip<R: Real>(
     }
 }
 
+/// The speed (rad/s) that gives a wheel of this radius (m) at `(x, y)` (m) from the point under the centre of gravity, turned
+/// by the angle whose cosine and sine are given, the slip ratio `slip`.
+#[inline(always)]
+fn wheel_speed<R: Real>(
+    chassis: &Chassis<R>,
+    body: &BodyState<R>,
+    (x, y): (R, R),
+    (cos, sin): (R, R),
+    slip: R,
+    radius: R,
+) -> R {
+    let hub = cos * (body.vx - body.yaw_rate * y) + sin * (body.vy + body.yaw_rate * x);
+    (hub + slip * hub.abs().max(chassis.slip_speed_floor)) / radius
+}
+
+/// The speeds of the wheels FL FR RL RR (rad/s) that give the front and the rear axle these slip ratios, the front wheels
+/// turned by the angle whose cosine and sine are given.
+#[inline(always)]
+pub fn wheel_speeds<R: Real>(
+    chassis: &Chassis<R>,
+    body: &BodyState<R>,
+    turned: (R, R),
+    [front, rear]: [R; 2],
+) -> [R; 4] {
+    let c = chassis;
+    let straight = (R::lit(1.0), R::lit(0.0));
+    let (a, b) = (c.cg_to_front, -c.cg_to_rear);
+    let (wf, wr) = (c.half_track_front, c.half_track_rear);
+    [
+        wheel_speed(c, body, (a, wf), turned, front, c.radius_front),
+        wheel_speed(c, body, (a, -wf), turned, front, c.radius_front),
+        wheel_speed(c, body, (b, wr), straight, rear, c.radius_rear),
+        wheel_speed(c, body, (b, -wr), straight, rear, c.radius_rear),
+    ]
+}
+
 /// A tyre's forces turned into body axes: forward and leftward force (N).
 #[inline(always)]
 pub fn to_body_axes<R: Real>(forces: &TyreForces<R>, (cos, sin): (R, R)) -> (R, R) {

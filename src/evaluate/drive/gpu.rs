@@ -4,7 +4,7 @@ use super::problem::{DriveProblem, LAP_FIGURES};
 use crate::drive::kernel::{DrivenLap, STATE, ending};
 use crate::error::{Error, Result};
 use crate::evaluate::gpu::shader::{DriveShape, base_vectors};
-use crate::evaluate::gpu::{Binding, DeviceKind, GpuContext, Kernel};
+use crate::evaluate::gpu::{Binding, GpuContext, Kernel, Pacing, StepBatching};
 use crate::evaluate::{BackendInfo, Evaluation, Evaluator, Failure, ModelTable, Problem};
 use crate::vehicle::model::STAGES;
 use bytemuck::{Pod, Zeroable};
@@ -31,40 +31,6 @@ pub struct DriveStretch {
 const ENDING: usize = STATE - 1;
 /// Lanes of a workgroup, where the device allows: a multiple of every device's subgroup.
 const WORKGROUP: u32 = 64;
-/// Steps of all laps of the first dispatch: tens of milliseconds on a software driver.
-const FIRST: usize = 1 << 16;
-/// How much longer than the last one a dispatch may be.
-const GROWTH: f64 = 4.0;
-
-/// Rounds of all loops of a kernel together, from which on llvmpipe leaves every loop after one round without a word: its own
-/// limit, 65535, less what the other loops of a dispatch take.
-const LOOP_ROUNDS: usize = 65_000;
-
-/// How work is cut. Results do not depend on it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct DriveBatching {
-    /// The most laps of one batch.
-    pub lanes: usize,
-    /// How long a dispatch should take, ms: well under the watchdogs' two seconds, well over its overhead.
-    pub dispatch_ms: f64,
-    /// The most steps of a dispatch; `None` leaves it to the time.
-    pub steps: Option<usize>,
-}
-
-impl DriveBatching {
-    /// What suits a kind of device: a step of all lanes takes milliseconds on a software driver, and fills a large card.
-    pub fn for_kind(kind: DeviceKind) -> Self {
-        Self {
-            lanes: match kind {
-                DeviceKind::Software => 1 << 12,
-                _ => 1 << 17,
-            },
-            dispatch_ms: 70.0,
-            steps: None,
-        }
-    }
-}
-
 /// Buffers that grow with the batch, and the kernel's bindings to them.
 struct BatchBuffers {
     stride: usize,
@@ -79,7 +45,7 @@ pub struct GpuDriveEvaluator<'a> {
     drive: &'a DriveProblem,
     table: ModelTable,
     context: Arc<GpuContext>,
-    batching: DriveBatching,
+    batching: StepBatching,
     kernel: Arc<Kernel>,
     workgroup: usize,
     stretch: wgpu::Buffer,
@@ -87,8 +53,7 @@ pub struct GpuDriveEvaluator<'a> {
     /// In the order of the kernel's bindings 4 to 8.
     tables: [wgpu::Buffer; 5],
     batch: Option<BatchBuffers>,
-    /// Steps of the last dispatch, its lanes, and how long it took, ms.
-    pace: Option<(usize, usize, f64)>,
+    pacing: Pacing,
     dispatches: usize,
 }
 
@@ -149,7 +114,7 @@ impl<'a> GpuDriveEvaluator<'a> {
         Ok(Self {
             drive,
             table,
-            batching: DriveBatching::for_kind(context.summary().kind),
+            batching: StepBatching::for_kind(context.summary().kind),
             context,
             kernel,
             workgroup: workgroup as usize,
@@ -157,20 +122,20 @@ impl<'a> GpuDriveEvaluator<'a> {
             base,
             tables,
             batch: None,
-            pace: None,
+            pacing: Pacing::new(1 + STAGES.len() + drive.torque().stretches.len()),
             dispatches: 0,
         })
     }
 
     /// Cuts the work differently.
-    pub fn with_batching(mut self, batching: DriveBatching) -> Self {
+    pub fn with_batching(mut self, batching: StepBatching) -> Self {
         self.batching = batching;
         self.batch = None;
         self
     }
 
     /// How the work is cut.
-    pub fn batching(&self) -> DriveBatching {
+    pub fn batching(&self) -> StepBatching {
         self.batching
     }
 
@@ -242,24 +207,6 @@ impl<'a> GpuDriveEvaluator<'a> {
             .ok_or_else(|| Error::Device("a batch without buffers".to_owned()))
     }
 
-    /// Steps of the next dispatch of `lanes` laps.
-    fn next_steps(&self, lanes: usize) -> usize {
-        let by_time = match self.pace {
-            // A device that was not full takes no longer for more laps, so that a rise is taken in full and a fall not at all.
-            Some((steps, before, ms)) => {
-                let more = (lanes as f64 / before as f64).max(1.0);
-                let growth = (self.batching.dispatch_ms / (ms * more)).min(GROWTH);
-                (steps as f64 * growth) as usize
-            }
-            None => FIRST / lanes,
-        };
-        let rounds_per_step = 1 + STAGES.len() + self.drive.torque().stretches.len();
-        by_time
-            .min(self.batching.steps.unwrap_or(usize::MAX))
-            .min(LOOP_ROUNDS / rounds_per_step)
-            .max(1)
-    }
-
     /// Hands the planes from `first` on of the state of all candidates to `read`.
     fn read_planes<T>(&self, first: usize, read: impl FnOnce(&[f32]) -> T) -> Result<T> {
         let buffers = self.buffers()?;
@@ -301,10 +248,9 @@ impl<'a> GpuDriveEvaluator<'a> {
         let mut first_step = 0;
         loop {
             let lanes = candidates.next_multiple_of(self.workgroup);
-            let steps = self.next_steps(lanes);
+            let steps = self.pacing.steps(lanes, &self.batching);
             let ms = self.dispatch(candidates, first_step, steps)?;
-            // The first dispatch of all may have compiled; the next one corrects what it taught.
-            self.pace = Some((steps, lanes, ms));
+            self.pacing.took(steps, lanes, ms);
             self.dispatches += 1;
             first_step += steps;
             let under_way = self.read_planes(ENDING, |plane| {

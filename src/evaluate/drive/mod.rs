@@ -6,8 +6,9 @@ mod gpu;
 mod problem;
 mod simd;
 
+pub use crate::evaluate::gpu::StepBatching as DriveBatching;
 pub use backend::open_drive_evaluator;
 pub use cpu::CpuDriveEvaluator;
-pub use gpu::{DriveBatching, DriveStretch, GpuDriveEvaluator};
+pub use gpu::{DriveStretch, GpuDriveEvaluator};
 pub use problem::{DriveObjective, DriveProblem, DriveSettings, LAP_FIGURES};
 pub use simd::SimdDriveEvaluator;

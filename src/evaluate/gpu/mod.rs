@@ -5,8 +5,11 @@ mod context;
 mod dispatches;
 pub mod faults;
 pub mod lint;
+mod pacing;
 pub mod shader;
 
 pub use adapter::{ADAPTER_VARIABLE, DeviceKind, DeviceSummary, devices};
 pub use context::{Binding, GpuContext, Kernel};
 pub use dispatches::longest_dispatch_ms;
+pub(crate) use pacing::Pacing;
+pub use pacing::StepBatching;
