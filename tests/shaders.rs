@@ -9,12 +9,13 @@ use lapswarm::drive::{Course, PATH_WIDTH};
 use lapswarm::evaluate::drive::DriveStretch;
 use lapswarm::evaluate::gpu::lint;
 use lapswarm::evaluate::gpu::shader::{
-    DriveShape, EnergyShape, LineShape, ReplayShape, car_fragments, line_swarm, swarm, swarm_gather,
-    test_problem, tyre_struct,
+    DriveShape, EnergyShape, LineShape, ReplayShape, SteadyShape, car_fragments, line_swarm, swarm,
+    swarm_gather, test_problem, tyre_struct,
 };
 use lapswarm::evaluate::hybrid::EnergyAccount;
 use lapswarm::evaluate::line::{DeviceSection, LineStretch};
 use lapswarm::evaluate::replay::{DeviceSample, DeviceWindow, ModelTable, Norm, Stretch};
+use lapswarm::evaluate::steady::SteadyStretch;
 use lapswarm::line::kernel::Wanted;
 use lapswarm::parity::made_up::Lap;
 use lapswarm::swarm::Generation;
@@ -55,6 +56,13 @@ fn kernels() -> Vec<(&'static str, String)> {
             kernels.push(("replay", shape.replay()));
             kernels.push(("replay_reduce", shape.reduce()));
         }
+        let shape = SteadyShape {
+            model: problem.tyre_model(),
+            sources: &table.sources,
+            varying: table.varying.len(),
+            workgroup: 64,
+        };
+        kernels.push(("settle", shape.source()));
         for blends in [false, true] {
             kernels.push((
                 "drive",
@@ -330,6 +338,24 @@ fn the_structs_of_drives_have_the_hosts_fields() {
     let (members, _) = layout(&module, "PathRow");
     // One place of three vectors says nothing.
     assert_eq!(members.len() + 1, PATH_WIDTH);
+}
+
+#[test]
+fn the_struct_of_circles_has_the_hosts_offsets() {
+    let kernels = kernels();
+    let (_, source) = kernels
+        .iter()
+        .find(|(entry, _)| *entry == "settle")
+        .expect("a kernel");
+    let module = lint::check(source).expect("the kernel parses");
+    macro_rules! offsets {
+        ($($field:ident),*) => {
+            [$((stringify!($field).to_owned(), offset_of!(SteadyStretch, $field))),*]
+        };
+    }
+    let host = offsets!(candidates, stride, first_step, steps, step, steer_per_step, gain);
+    let (members, size) = layout(&module, "SteadyStretch");
+    assert_eq!((members, size), (host.to_vec(), size_of::<SteadyStretch>()));
 }
 
 #[test]

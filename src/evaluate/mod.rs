@@ -16,6 +16,7 @@ pub mod point;
 pub mod portions;
 pub mod replay;
 pub mod simd;
+pub mod steady;
 
 pub use backend::BackendChoice;
 pub use fallback::FallbackEvaluator;
@@ -109,6 +110,10 @@ pub enum Failure {
     Unfinished,
     /// It came to a standstill.
     Standstill,
+    /// It was still on the move when it should have settled.
+    Unsettled,
+    /// No slip of its driven wheels held it at the speed asked for.
+    OffTheEnvelope,
     /// A decision variable was not a finite number.
     NotFinite,
     /// An objective was not a finite number.
@@ -124,6 +129,8 @@ impl Failure {
             Self::LeftRoad => "left_the_road",
             Self::Unfinished => "did_not_finish",
             Self::Standstill => "standstill",
+            Self::Unsettled => "did_not_settle",
+            Self::OffTheEnvelope => "off_the_envelope",
             Self::NotFinite => "variable_not_finite",
             Self::Undefined => "objective_not_finite",
         }
@@ -148,6 +155,8 @@ impl fmt::Display for Failure {
             Self::LeftRoad => f.write_str("left the road"),
             Self::Unfinished => f.write_str("did not finish in time"),
             Self::Standstill => f.write_str("came to a standstill"),
+            Self::Unsettled => f.write_str("did not settle"),
+            Self::OffTheEnvelope => f.write_str("has no grip to hold the speed"),
             Self::NotFinite => f.write_str("a variable that is not a finite number"),
             Self::Undefined => f.write_str("an objective that is not a finite number"),
         }

@@ -11,6 +11,7 @@ mod energy;
 mod laps;
 mod lines;
 pub mod made_up;
+pub mod steady;
 pub mod step;
 
 pub use lines::line_tolerances;
@@ -171,6 +172,7 @@ pub fn compare(subjects: &[Subject], mut observe: impl FnMut(&Agreement)) -> Res
     let laps = laps::Cases::new()?;
     let energies = energy::Cases::new()?;
     let drives = drive::Cases::new()?;
+    let circles = steady::Cases::new()?;
     for subject in subjects {
         take(elementary::compare(subject)?);
         take(step::compare(subject)?);
@@ -178,6 +180,7 @@ pub fn compare(subjects: &[Subject], mut observe: impl FnMut(&Agreement)) -> Res
         take(lines.compare(subject)?);
         take(energies.compare(subject)?);
         take(drives.compare(subject)?);
+        take(circles.compare(subject)?);
     }
     Ok(all)
 }

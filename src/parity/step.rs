@@ -73,7 +73,7 @@ fn case(model: TyreModel, base: &Car, random: &mut Draws) -> Option<Case> {
 }
 
 /// `base` on linear tyres.
-fn on_linear_tyres(base: &Car) -> Car {
+pub(super) fn on_linear_tyres(base: &Car) -> Car {
     let tyre = |cornering_stiffness| LinearTyre {
         nominal_load: 3000.0,
         slip_stiffness: 60_000.0,

@@ -47,6 +47,10 @@ pub trait SteadyCar: Send + Sync {
     /// peak. In order along the curve; at least straight running unless not even that has a solution.
     fn cornering(&self, speed: f64, greatest_steer: f64) -> Vec<Trim>;
 
+    /// The trim under `steer` (rad) between two trims of `curve`, which is [`SteadyCar::cornering`] at `speed` (m/s), on the part
+    /// of it where the steering angle has not yet turned back; nothing beyond.
+    fn trim_at(&self, speed: f64, steer: f64, curve: &[Trim]) -> Option<Trim>;
+
     /// The greatest deceleration by the tyres (m/s^2) running straight at `speed` (m/s), each axle at the slip at
     /// which it brakes hardest.
     fn greatest_braking(&self, speed: f64) -> f64;
@@ -288,6 +292,22 @@ impl<T: Tyre<f64>, D: Tyre<Exact>> SteadyCar for Ready<T, D> {
             }
         }
         trims
+    }
+
+    fn trim_at(&self, speed: f64, steer: f64, curve: &[Trim]) -> Option<Trim> {
+        let rising = curve.windows(2).take_while(|w| w[1].steer_rad > w[0].steer_rad);
+        let pair = rising
+            .into_iter()
+            .find(|w| (w[0].steer_rad..=w[1].steer_rad).contains(&steer))?;
+        let place = |t: &Trim| {
+            let unknown = [t.sideslip_rad, t.ay_mps2, t.roll_rad, t.slip_ratio, t.steer_rad];
+            Point::from_fn(|i, _| unknown[i] / SCALES[i])
+        };
+        let share = (steer - pair[0].steer_rad) / (pair[1].steer_rad - pair[0].steer_rad);
+        let (from, to) = (place(&pair[0]), place(&pair[1]));
+        let steering = Point::from_fn(|i, _| f64::from(i == 4));
+        let (point, _) = self.solve(speed, &(from + (to - from) * share), &steering)?;
+        Some(self.trim(speed, &point))
     }
 
     fn greatest_braking(&self, speed: f64) -> f64 {

@@ -12,6 +12,7 @@ mod elementary;
 mod energy;
 mod lap;
 mod line;
+mod steady;
 mod step;
 mod swarm;
 mod swarm_lines;

@@ -21,6 +21,7 @@ const REPLAY_REDUCE: &str = include_str!("../../../shaders/replay_reduce.wgsl");
 const PATH: &str = include_str!("../../../shaders/path.wgsl");
 const DRIVER: &str = include_str!("../../../shaders/driver.wgsl");
 const DRIVE: &str = include_str!("../../../shaders/drive.wgsl");
+const STEADY: &str = include_str!("../../../shaders/steady.wgsl");
 const RANDOM: &str = include_str!("../../../shaders/random.wgsl");
 const SWARM: &str = include_str!("../../../shaders/swarm.wgsl");
 const SWARM_GATHER: &str = include_str!("../../../shaders/swarm_gather.wgsl");
@@ -163,6 +164,36 @@ impl DriveShape<'_> {
             loaders(self.model, self.sources),
         ];
         [&car, &constants, PATH, DRIVER, DRIVE, &loaders].concat()
+    }
+}
+
+/// What a kernel of steady states is specialised to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SteadyShape<'a> {
+    /// The tyre model.
+    pub model: TyreModel,
+    /// For each figure of a ready car, which varying figure it is, if it varies: `ModelTable::sources`.
+    pub sources: &'a [Option<usize>],
+    /// Varying figures of a candidate's car.
+    pub varying: usize,
+    /// Lanes of a workgroup.
+    pub workgroup: u32,
+}
+
+impl SteadyShape<'_> {
+    /// Source of the kernel; entry point `settle`.
+    pub fn source(&self) -> String {
+        let constants = format!(
+            "\n// Generated.\nconst WORKGROUP: u32 = {}u;\nconst BASE_VECTORS: u32 = {}u;\nconst VARYING: u32 = {}u;\n\n",
+            self.workgroup,
+            base_vectors(self.sources.len()),
+            self.varying,
+        );
+        let [car, loaders] = [
+            car_fragments(self.model).concat(),
+            loaders(self.model, self.sources),
+        ];
+        [&car, &constants, STEADY, &loaders].concat()
     }
 }
 
