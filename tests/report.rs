@@ -3,7 +3,7 @@
 use glam::DVec2;
 use lapswarm::report::{
     BarPanel, BarSeries, Cells, Column, Curve, CurvePanel, Front, HtmlReport, LapLine, LapMap, LapPanel,
-    LapTrace, LapView, Objective, ParameterRow, Scale, ShadedSection, SurfaceFigure,
+    LapTrace, LapView, Levels, Objective, ParameterRow, Scale, ShadedSection, SurfaceFigure,
 };
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -176,6 +176,7 @@ fn everything(path: &Path) {
         x: &steps,
         y: &steps,
         z: &z,
+        levels: Levels::Basin,
         marks: vec![(HOSTILE, [9.0, 20.0])],
     };
     page.surface(&surface, HOSTILE).unwrap();

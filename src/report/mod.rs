@@ -36,7 +36,7 @@ pub use quality::{QualityPanel, QualityRun, plot_quality};
 pub use scaling::{ScalingSeries, plot_scaling};
 pub use site_map::{SiteMap, plot_site_map};
 pub use style::significant;
-pub use surface::{SurfaceFigure, plot_surface};
+pub use surface::{Levels, SurfaceFigure, plot_surface};
 pub use table::{Cells, Column, text_table, write_csv};
 pub use traces::{ShadedSection, TraceFigure, TracePanel, plot_traces};
 pub use track_map::{TrackMap, plot_track_map};

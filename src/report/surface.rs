@@ -7,6 +7,15 @@ use crate::{Error, Result};
 use contour::ContourBuilder;
 use std::path::Path;
 
+/// How colours and levels are spread.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Levels {
+    /// With the root of the cost above its least, which spreads a basin's bottom.
+    Basin,
+    /// Evenly.
+    Even,
+}
+
 /// A cost over an even grid of two parameters.
 #[derive(Clone, Debug)]
 pub struct SurfaceFigure<'a> {
@@ -24,8 +33,28 @@ pub struct SurfaceFigure<'a> {
     pub y: &'a [f64],
     /// The cost, row by row of `y`; what is not finite is left white.
     pub z: &'a [f64],
+    /// How colours and levels are spread over it.
+    pub levels: Levels,
     /// Places to mark, with their names.
     pub marks: Vec<(&'a str, [f64; 2])>,
+}
+
+impl Levels {
+    /// The place on the scale of colours of a share of the spread of costs.
+    fn colour(self, share: f64) -> f64 {
+        match self {
+            Self::Basin => share.sqrt(),
+            Self::Even => share,
+        }
+    }
+
+    /// The share of the spread of costs at a place on the scale.
+    fn share(self, place: f64) -> f64 {
+        match self {
+            Self::Basin => place.powi(2),
+            Self::Even => place,
+        }
+    }
 }
 
 const SIZE: (f64, f64) = (1400.0, 640.0);
@@ -34,8 +63,7 @@ const MARK_PX: f64 = 5.0;
 /// Levels between the least and the greatest cost.
 const LEVELS: usize = 12;
 
-/// Draws the levels and the surface beside each other to an SVG file. Colours and levels go with the root of the cost
-/// above its least, which spreads a basin's bottom.
+/// Draws the levels and the surface beside each other to an SVG file.
 ///
 /// # Errors
 /// [`Error::Input`] when the grid is smaller than 2 by 2, does not fit the costs, or has nothing finite; [`Error::Io`]
@@ -54,7 +82,8 @@ pub fn plot_surface(path: impl AsRef<Path>, figure: &SurfaceFigure<'_>) -> Resul
         ));
     };
     let spread = (most - least).max(1e-300);
-    let share = move |z: f64| ((z - least) / spread).max(0.0).sqrt();
+    let levels = figure.levels;
+    let share = move |z: f64| levels.colour(((z - least) / spread).max(0.0));
     draw_to_file(path, SIZE, figure.title, |canvas| {
         draw_levels(canvas, figure, &share, (least, spread));
         draw_in_space(canvas, figure, &share);
@@ -98,7 +127,7 @@ fn draw_levels(
         .map(|z| if z.is_finite() { *z } else { least + 4.0 * spread })
         .collect();
     let thresholds: Vec<f64> = (1..LEVELS)
-        .map(|i| least + spread * (i as f64 / LEVELS as f64).powi(2))
+        .map(|i| least + spread * figure.levels.share(i as f64 / LEVELS as f64))
         .collect();
     // The builder counts places from the corner of their cell.
     if let Ok(lines) = ContourBuilder::new(nx, ny, true).lines(&finite, &thresholds) {
@@ -238,7 +267,7 @@ fn draw_scale(canvas: &mut Canvas<'_>, figure: &SurfaceFigure<'_>, (least, sprea
     }
     for i in 0..=4 {
         let part = f64::from(i) / 4.0;
-        let text = significant(least + spread * part * part, figures);
+        let text = significant(least + spread * figure.levels.share(part), figures);
         canvas.text(
             &text,
             (left + part * (right - left), y + 24.0),

@@ -11,6 +11,9 @@ use lapswarm::evaluate::line::{
 };
 use lapswarm::evaluate::replay::{BackendChoice, CpuEvaluator, GpuEvaluator, ReplayProblem, SimdEvaluator};
 use lapswarm::evaluate::simd::InstructionSet;
+use lapswarm::evaluate::steady::{
+    CpuSteadyEvaluator, GpuSteadyEvaluator, SimdSteadyEvaluator, SteadyProblem,
+};
 use lapswarm::evaluate::{Evaluator, Problem};
 use lapswarm::line::{Parametrisation, kernel};
 use lapswarm::parity;
@@ -32,8 +35,8 @@ use std::time::Instant;
 #[group(skip)]
 pub struct Arguments {
     /// Problems: replay (the bundled lap, 22 unknowns), line (lap time, 360 cuts, 90 control points), drive (set-ups driven
-    /// round a stadium of 840 m by the driver)
-    #[arg(long, value_delimiter = ',', value_parser = ["replay", "line", "drive"], default_value = "replay,line")]
+    /// round a stadium of 840 m by the driver), steady (set-ups that settle on circles)
+    #[arg(long, value_delimiter = ',', value_parser = ["replay", "line", "drive", "steady"], default_value = "replay,line")]
     problems: Vec<String>,
     /// Populations to measure
     #[arg(long, value_delimiter = ',', default_value = "64,256,1024,4096,16384",
@@ -124,6 +127,7 @@ enum Kind {
     Replay(Box<ReplayProblem>),
     Line(Box<LineProblem>),
     Drive(Box<DriveProblem>),
+    Steady(Box<SteadyProblem>),
 }
 
 /// The circuit that set-ups are driven round, with this share of the car's friction in steps of so many seconds.
@@ -208,8 +212,26 @@ impl Case {
         })
     }
 
+    fn steady() -> Result<Self> {
+        let steady = parity::steady::problem(Car::bundled()?)?;
+        let middle: Vec<f64> = steady
+            .problem
+            .variables
+            .iter()
+            .map(|v| 0.5 * (v.lower + v.upper))
+            .collect();
+        Ok(Self {
+            name: "steady",
+            about: middle.iter().map(|x| (*x, SPREAD * x.abs())).collect(),
+            steps: Some(steady.plan().steps as usize),
+            operations: parity::steady::work_of(&steady, &middle),
+            kind: Kind::Steady(Box::new(steady)),
+        })
+    }
+
     fn problem(&self) -> &Problem {
         match &self.kind {
+            Kind::Steady(steady) => &steady.problem,
             Kind::Drive(drive) => &drive.problem,
             Kind::Replay(replay) => &replay.problem,
             Kind::Line(line) => &line.problem,
@@ -265,6 +287,7 @@ fn backends<'a>(case: &'a Case, arguments: &Arguments) -> Result<Vec<Backend<'a>
             Kind::Replay(replay) => Box::new(CpuEvaluator::new(replay)),
             Kind::Line(line) => Box::new(CpuLineEvaluator::new(line)),
             Kind::Drive(drive) => Box::new(CpuDriveEvaluator::new(drive)),
+            Kind::Steady(steady) => Box::new(CpuSteadyEvaluator::new(steady)),
         }));
     }
     if wanted(BackendChoice::Simd) {
@@ -273,6 +296,7 @@ fn backends<'a>(case: &'a Case, arguments: &Arguments) -> Result<Vec<Backend<'a>
             Kind::Replay(replay) => Box::new(SimdEvaluator::new(replay, set)),
             Kind::Line(line) => Box::new(SimdLineEvaluator::new(line, set)),
             Kind::Drive(drive) => Box::new(SimdDriveEvaluator::new(drive, set)),
+            Kind::Steady(steady) => Box::new(SimdSteadyEvaluator::new(steady, set)),
         }));
     }
     let asked = arguments.backend == Some(BackendChoice::Gpu) || arguments.adapter.is_some();
@@ -282,6 +306,7 @@ fn backends<'a>(case: &'a Case, arguments: &Arguments) -> Result<Vec<Backend<'a>
             Kind::Replay(replay) => Backend::Replay(Box::new(GpuEvaluator::new(replay, context)?)),
             Kind::Line(line) => Backend::Line(Box::new(GpuLineEvaluator::new(line, context)?)),
             Kind::Drive(drive) => Backend::Any(Box::new(GpuDriveEvaluator::new(drive, context)?)),
+            Kind::Steady(steady) => Backend::Any(Box::new(GpuSteadyEvaluator::new(steady, context)?)),
         });
     }
     Ok(found)
@@ -319,6 +344,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         let case = match name.as_str() {
             "replay" => Case::replay()?,
             "drive" => Case::drive()?,
+            "steady" => Case::steady()?,
             _ => Case::line()?,
         };
         for mut backend in backends(&case, arguments)? {

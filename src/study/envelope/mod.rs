@@ -3,9 +3,16 @@
 //! At every speed the steady states of the car ([`crate::vehicle::steady`]) give lateral acceleration over steering and
 //! its ridge, straight-line running the greatest braking and traction, and the powertrain what the engine can give
 //! through the gears. The rows make an [`Envelope`]; the small-angle end of the curves gives the handling figures.
+//!
+//! The surface of lateral acceleration over speed and steering also comes from a population of cars that settle on circles
+//! ([`crate::evaluate::steady`]), on any backend; the limits stay those of the curves, which are exact.
 
+mod population;
 mod results;
 
+pub use population::{
+    MOST_STEERS, PopulationSettings, PopulationSummary, RidgePoint, SteadySurface, steady_surface,
+};
 pub use results::{EnvelopeSummary, summarise, write_results};
 
 use crate::error::{Error, Result};

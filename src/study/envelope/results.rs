@@ -1,8 +1,9 @@
 //! Tables and pictures of a car's limits.
 
 mod page;
+mod surface;
 
-use super::CarLimits;
+use super::{CarLimits, PopulationSummary, SteadySurface};
 use crate::error::Result;
 use crate::evaluate::BackendInfo;
 use crate::report::{Cells, Column, Curve, CurvePanel, plot_curves, write_csv, write_whole};
@@ -15,6 +16,8 @@ use std::path::Path;
 pub struct EnvelopeSummary {
     /// `envelope`.
     pub study: &'static str,
+    /// Nought: nothing is drawn at random.
+    pub seed: u64,
     /// The car.
     pub car: String,
     /// Time taken (s).
@@ -31,14 +34,23 @@ pub struct EnvelopeSummary {
     pub characteristic_speed_mps: Option<f64>,
     /// Critical speed (m/s) of a car that oversteers.
     pub critical_speed_mps: Option<f64>,
+    /// The population's figures, if one was evaluated.
+    #[serde(flatten, skip_serializing_if = "Option::is_none")]
+    pub population: Option<PopulationSummary>,
 }
 
 /// Puts the figures together.
-pub fn summarise(car: &str, limits: &CarLimits, elapsed_s: f64) -> EnvelopeSummary {
+pub fn summarise(
+    car: &str,
+    limits: &CarLimits,
+    surface: Option<&SteadySurface>,
+    elapsed_s: f64,
+) -> EnvelopeSummary {
     /// Standard gravity (m/s^2).
     const G: f64 = 9.806_65;
     EnvelopeSummary {
         study: "envelope",
+        seed: 0,
         car: car.to_owned(),
         elapsed_s,
         steady_states: limits.speeds.iter().map(|s| s.cornering.len()).sum(),
@@ -47,6 +59,7 @@ pub fn summarise(car: &str, limits: &CarLimits, elapsed_s: f64) -> EnvelopeSumma
         stability_factor_s2_per_m2: limits.handling.stability_factor,
         characteristic_speed_mps: limits.handling.characteristic_speed_mps,
         critical_speed_mps: limits.handling.critical_speed_mps,
+        population: surface.map(|s| s.summary.clone()),
     }
 }
 
@@ -74,40 +87,54 @@ impl EnvelopeSummary {
             );
         }
         let balance = self.balance();
-        text + &format!(
+        text += &format!(
             "Understeer gradient {:.3} deg/g, stability factor {:.3e} s^2/m^2: {balance}\n",
             self.understeer_gradient_deg_per_g, self.stability_factor_s2_per_m2
-        )
+        );
+        if let Some(population) = &self.population {
+            text += &surface::in_words(population);
+        }
+        text
     }
 }
 
 /// Writes `envelope.csv` (as `--envelope` reads it), `cornering.csv`, `summary.json`, `manifest.json`, `envelope.svg` and
-/// `report.html`.
+/// `report.html`; with a `surface` also `surface.csv`, `ridge.csv` and `surface.svg`.
 ///
 /// # Errors
 /// [`crate::Error::Io`] if a file cannot be written.
-pub fn write_results(folder: &Path, limits: &CarLimits, summary: &EnvelopeSummary) -> Result<()> {
+pub fn write_results(
+    folder: &Path,
+    limits: &CarLimits,
+    surface: Option<&SteadySurface>,
+    summary: &EnvelopeSummary,
+) -> Result<()> {
     write_whole(folder.join("envelope.csv"), limits.envelope.to_csv().as_bytes())?;
     let json = serde_json::to_string_pretty(summary).unwrap_or_default();
     write_whole(folder.join("summary.json"), json.as_bytes())?;
     write_cornering(&folder.join("cornering.csv"), limits)?;
-    let backend = BackendInfo {
+    let alone = BackendInfo {
         backend: "cpu",
         device: "f64".to_owned(),
         driver: String::new(),
     };
+    let backend = surface.map_or(&alone, |s| &s.backend);
     // Nothing here is drawn at random, and flags say all there is to say.
     let manifest = Manifest {
         settings: "",
-        ..Manifest::new("envelope", 0, &backend, &summary.car)
+        device_faults: surface.map_or(&[], |s| &s.summary.device_faults),
+        ..Manifest::new("envelope", 0, backend, &summary.car)
     };
+    if let Some(surface) = surface {
+        surface::write(folder, surface, &summary.car)?;
+    }
     with_panels(limits, |panels| {
         plot_curves(
             folder.join("envelope.svg"),
             &format!("Limits of the {}", summary.car),
             panels,
         )?;
-        page::write(folder, limits, summary, panels)
+        page::write(folder, (limits, surface), summary, panels)
     })?;
     // Last: it says that the run is whole.
     write_json(&folder.join("manifest.json"), &manifest)

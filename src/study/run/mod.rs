@@ -164,8 +164,8 @@ pub fn run(
     let stage = stages.run("2_envelope", &inputs, |to, _| {
         let began = Instant::now();
         let limits = car_limits(&car, &EnvelopeSettings::default())?;
-        let summary = envelope::summarise(&car.name, &limits, began.elapsed().as_secs_f64());
-        envelope::write_results(to, &limits, &summary)
+        let summary = envelope::summarise(&car.name, &limits, None, began.elapsed().as_secs_f64());
+        envelope::write_results(to, &limits, None, &summary)
     })?;
     let whole = Envelope::load(keep("envelope", stage).join("envelope.csv"))?;
 

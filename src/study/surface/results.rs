@@ -3,7 +3,7 @@
 use super::{Outcome, SurfaceSettings};
 use crate::error::Result;
 use crate::report::{
-    Cells, Column, HtmlReport, SurfaceFigure, plot_surface, significant, write_csv, write_whole,
+    Cells, Column, HtmlReport, Levels, SurfaceFigure, plot_surface, significant, write_csv, write_whole,
 };
 use crate::study::identify::Setup;
 use crate::study::run_folder::{Manifest, write_json};
@@ -190,6 +190,7 @@ pub fn write_results(
             x: &outcome.axes[0],
             y: &outcome.axes[1],
             z: costs,
+            levels: Levels::Basin,
             marks,
         };
         plot_surface(folder.join(format!("surface_{name}.svg")), &figure)?;

@@ -1,14 +1,14 @@
 //! The interactive report of a car's limits.
 
-use super::EnvelopeSummary;
+use super::{EnvelopeSummary, surface};
 use crate::error::Result;
 use crate::report::{Cells, Column, CurvePanel, HtmlReport, Scale};
-use crate::study::envelope::{CarLimits, SpeedLimits};
+use crate::study::envelope::{CarLimits, SpeedLimits, SteadySurface};
 use std::path::Path;
 
 pub fn write(
     folder: &Path,
-    limits: &CarLimits,
+    (limits, surface): (&CarLimits, Option<&SteadySurface>),
     summary: &EnvelopeSummary,
     panels: &[CurvePanel<'_>],
 ) -> Result<()> {
@@ -43,6 +43,11 @@ pub fn write(
     for panel in panels {
         page.curves(panel, "", [Scale::Linear; 2])?;
     }
+    if let Some(found) = surface {
+        page.section("The surface", surface::ABOUT);
+        page.paragraph(&surface::in_words(&found.summary));
+        surface::with_figure(found, &summary.car, |figure| page.surface(figure, ""))?;
+    }
     let of = |f: &dyn Fn(&SpeedLimits) -> f64| limits.speeds.iter().map(f).collect::<Vec<f64>>();
     let figures = [
         ("speed", "m/s", of(&|s| s.row.v_mps)),
@@ -67,7 +72,12 @@ pub fn write(
         &columns,
     )?;
     page.provenance("car", &summary.car);
-    page.provenance("backend", "cpu, f64");
+    page.provenance("limits", "cpu, f64");
+    if let Some(found) = surface {
+        page.provenance("backend", found.backend.backend);
+        page.provenance("adapter", &found.backend.device);
+        page.provenance("driver", &found.backend.driver);
+    }
     page.provenance("steady states", summary.steady_states.to_string());
     page.provenance("time", format!("{:.2} s", summary.elapsed_s));
     page.write(folder.join("report.html"))

@@ -5,7 +5,7 @@ use crate::error::Result;
 use crate::evaluate::line::{LineProblem, open_line_evaluator};
 use crate::evaluate::{BackendChoice, FAILED_COST};
 use crate::line::Parametrisation;
-use crate::report::{SurfaceFigure, plot_surface};
+use crate::report::{Levels, SurfaceFigure, plot_surface};
 use crate::study::raceline::{Outcome, RacelineSettings, Setup};
 use std::path::Path;
 
@@ -62,6 +62,7 @@ pub fn draw(folder: &Path, settings: &RacelineSettings, setup: &Setup, outcome: 
             x: &axis,
             y: &axis,
             z: &costs,
+            levels: Levels::Basin,
             marks: vec![(line.name.as_str(), [line.alpha[cut], line.alpha[cut + 1]])],
         };
         plot_surface(folder.join(format!("surface_{}.svg", stem(&line.name))), &figure)?;
