@@ -1,9 +1,9 @@
 //! An archive in parallel coordinates: an axis for each objective, a line for each compromise.
 
 use super::canvas::{Align, Canvas, Type, draw_to_file};
-use super::pareto::Objective;
+use super::pareto::{Drawable, Objective, drawable};
 use super::style::{FRAME, INK, LABEL_PX, TICK_PX, VERMILLION, WHITE, significant, viridis, with_unit};
-use crate::{Error, Result};
+use crate::Result;
 use std::path::Path;
 
 const SIZE: (f64, f64) = (900.0, 520.0);
@@ -15,8 +15,8 @@ const BOTTOM: f64 = 460.0;
 /// of the one to mark. Points that are not finite are left out.
 ///
 /// # Errors
-/// [`Error::Input`] when there are fewer than two objectives, when a point has another number of values, when no point is
-/// finite or `chosen` is not a point; [`Error::Io`] when the file cannot be written.
+/// [`crate::Error::Input`] when there are fewer than two objectives, when a point has another number of values, when no point is
+/// finite or `chosen` is not a point; [`crate::Error::Io`] when the file cannot be written.
 pub fn plot_parallel(
     path: impl AsRef<Path>,
     title: &str,
@@ -26,36 +26,7 @@ pub fn plot_parallel(
 ) -> Result<()> {
     let path = path.as_ref();
     let n = objectives.len();
-    let refuse = |place: &str, found: String, expected: &str| Err(Error::input(path, place, found, expected));
-    if n < 2 {
-        return refuse("objectives", n.to_string(), "2 or more");
-    }
-    if let Some(point) = points.iter().find(|p| p.len() != n) {
-        return refuse(
-            "points",
-            format!("{} values", point.len()),
-            "one value per objective",
-        );
-    }
-    if let Some(index) = chosen.filter(|&c| c >= points.len()) {
-        return refuse("chosen point", index.to_string(), "one of the points");
-    }
-    let finite: Vec<&Vec<f64>> = points
-        .iter()
-        .filter(|p| p.iter().all(|v| v.is_finite()))
-        .collect();
-    if finite.is_empty() {
-        return refuse("points", "none that is finite".to_owned(), "at least one");
-    }
-    let ranges: Vec<(f64, f64)> = (0..n)
-        .map(|k| {
-            let values = finite.iter().map(|p| p[k]);
-            (
-                values.clone().fold(f64::INFINITY, f64::min),
-                values.fold(f64::NEG_INFINITY, f64::max),
-            )
-        })
-        .collect();
+    let Drawable { finite, ranges, mark } = drawable(path, (n, usize::MAX), points, chosen)?;
     let share = |point: &[f64], k: usize| {
         let (least, most) = ranges[k];
         if most > least {
@@ -77,7 +48,7 @@ pub fn plot_parallel(
         for point in order {
             canvas.path(course(point), viridis(share(point, n - 1)), 1.2);
         }
-        if let Some(point) = chosen.map(|c| &points[c]).filter(|p| finite.contains(p)) {
+        if let Some(point) = mark {
             canvas.path(course(point), WHITE, 5.0);
             canvas.path(course(point), VERMILLION, 2.6);
         }

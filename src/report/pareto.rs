@@ -32,28 +32,7 @@ pub fn plot_pareto(
 ) -> Result<()> {
     let path = path.as_ref();
     let n = objectives.len();
-    let refuse =
-        |place: String, found: String, expected: &str| Err(Error::input(path, place, found, expected));
-    if !(2..=6).contains(&n) {
-        return refuse("objectives".into(), n.to_string(), "2 to 6");
-    }
-    if let Some((i, point)) = points.iter().enumerate().find(|(_, p)| p.len() != n) {
-        let found = format!("{} values", point.len());
-        return refuse(format!("point {i}"), found, &format!("{n} values"));
-    }
-    if let Some(index) = chosen.filter(|&c| c >= points.len()) {
-        let expected = format!("one of {} points", points.len());
-        return refuse("chosen point".into(), index.to_string(), &expected);
-    }
-    let finite: Vec<&Vec<f64>> = points
-        .iter()
-        .filter(|p| p.iter().all(|v| v.is_finite()))
-        .collect();
-    let ranges: Option<Vec<(f64, f64)>> = (0..n).map(|k| extent(finite.iter().map(|p| &p[k]))).collect();
-    let Some(ranges) = ranges else {
-        return refuse("points".into(), "none that is finite".into(), "at least one");
-    };
-    let mark = chosen.map(|c| &points[c]).filter(|p| finite.contains(p));
+    let Drawable { finite, ranges, mark } = drawable(path, (n, 6), points, chosen)?;
     let archive = Archive {
         objectives,
         finite: &finite,
@@ -89,6 +68,57 @@ pub fn plot_pareto(
             }
         })
     }
+}
+
+/// What of an archive can be drawn.
+pub(super) struct Drawable<'a> {
+    /// Points that are finite.
+    pub finite: Vec<&'a Vec<f64>>,
+    /// Least and greatest value of each objective over these.
+    pub ranges: Vec<(f64, f64)>,
+    /// The chosen point, if it is one of them.
+    pub mark: Option<&'a Vec<f64>>,
+}
+
+/// Checks an archive of `n` objectives, of which a picture can hold `most`.
+///
+/// # Errors
+/// [`Error::Input`] when there are fewer than two or more than `most`, when a point has another number of values, when no
+/// point is finite or `chosen` is not a point.
+pub(super) fn drawable<'a>(
+    path: &Path,
+    (n, most): (usize, usize),
+    points: &'a [Vec<f64>],
+    chosen: Option<usize>,
+) -> Result<Drawable<'a>> {
+    let refuse =
+        |place: String, found: String, expected: &str| Err(Error::input(path, place, found, expected));
+    if !(2..=most).contains(&n) {
+        let expected = if most == usize::MAX {
+            "2 or more".to_owned()
+        } else {
+            format!("2 to {most}")
+        };
+        return refuse("objectives".into(), n.to_string(), &expected);
+    }
+    if let Some((i, point)) = points.iter().enumerate().find(|(_, p)| p.len() != n) {
+        let found = format!("{} values", point.len());
+        return refuse(format!("point {i}"), found, &format!("{n} values"));
+    }
+    if let Some(index) = chosen.filter(|&c| c >= points.len()) {
+        let expected = format!("one of {} points", points.len());
+        return refuse("chosen point".into(), index.to_string(), &expected);
+    }
+    let finite: Vec<&Vec<f64>> = points
+        .iter()
+        .filter(|p| p.iter().all(|v| v.is_finite()))
+        .collect();
+    let ranges: Option<Vec<(f64, f64)>> = (0..n).map(|k| extent(finite.iter().map(|p| &p[k]))).collect();
+    let Some(ranges) = ranges else {
+        return refuse("points".into(), "none that is finite".into(), "at least one");
+    };
+    let mark = chosen.map(|c| &points[c]).filter(|p| finite.contains(p));
+    Ok(Drawable { finite, ranges, mark })
 }
 
 /// Which axes of a scatter are labelled.

@@ -334,63 +334,29 @@ fn attribute<'a>(tag: &'a str, name: &str) -> Option<&'a str> {
 }
 
 #[cfg(test)]
+#[path = "../../tests/common/ld.rs"]
+mod made_up;
+
+#[cfg(test)]
 mod tests {
+    use super::made_up::ENTRY;
     use super::*;
-    use motec_i2::{Datatype, LDWriter};
+    use motec_i2::Datatype;
     use proptest::prelude::*;
 
-    fn meta(name: &str, datatype: Datatype, sample_rate: u16) -> ChannelMetadata {
-        ChannelMetadata {
-            prev_addr: 0,
-            next_addr: 0,
-            data_addr: 0,
-            data_count: 0,
-            datatype,
-            sample_rate,
-            offset: 0,
-            mul: 1,
-            scale: 1,
-            dec_places: 1,
-            name: name.to_owned(),
-            short_name: String::new(),
-            unit: "deg".to_owned(),
-        }
-    }
-
     fn small() -> Vec<u8> {
-        let header = Header {
-            channel_meta_ptr: 0x3448,
-            channel_data_ptr: 0,
-            event_ptr: 0,
-            device_serial: 1,
-            device_type: "ADL".to_owned(),
-            device_version: 420,
-            num_channels: 2,
-            date_string: "01/02/2020".to_owned(),
-            time_string: "10:00:00".to_owned(),
-            driver: String::new(),
-            vehicleid: "GT".to_owned(),
-            venue: "Test".to_owned(),
-            session: String::new(),
-            short_comment: String::new(),
+        let channel = |name, datatype, rate| made_up::channel(name, "deg", datatype, rate);
+        let tenths = ChannelMetadata {
+            dec_places: 1,
+            ..channel("Steer", Datatype::I16, 20)
         };
-        let mut cursor = Cursor::new(Vec::new());
         let integers = vec![Sample::I16(10), Sample::I16(-25), Sample::I16(7)];
-        LDWriter::new(&mut cursor, header)
-            .with_channel(meta("Steer", Datatype::I16, 20), integers)
-            .with_channel(
-                ChannelMetadata {
-                    dec_places: 0,
-                    ..meta("Yaw", Datatype::F32, 50)
-                },
-                vec![Sample::F32(0.5), Sample::F32(-0.25)],
-            )
-            .write()
-            .unwrap();
-        cursor.into_inner()
+        let floats = vec![Sample::F32(0.5), Sample::F32(-0.25)];
+        made_up::file(vec![
+            (tenths, integers),
+            (channel("Yaw", Datatype::F32, 50), floats),
+        ])
     }
-
-    const ENTRY: usize = 0x3448;
 
     #[test]
     fn channels_keep_their_own_rates() {
