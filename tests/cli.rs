@@ -99,6 +99,130 @@ fn what_is_wrong_is_named_with_its_place_and_code_two() {
     assert_eq!(unknown.status.code(), Some(2), "{}", text(&unknown.stderr));
 }
 
+/// What is refused, wherever it is found, leaves no folder that stands in the way of the same run with better input, nor takes
+/// one away that was there.
+#[test]
+fn refused_input_leaves_nothing_in_the_way() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let write = |name: &str, contents: &str| {
+        std::fs::write(folder.path().join(name), contents).expect("a file");
+    };
+    write(
+        "line.csv",
+        "x_m,y_m\n0,0\n500,0\n900,90\n900,300\n500,400\n0,400\n-90,300\n-90,90\n",
+    );
+    write("short.csv", "x_m,y_m\n0,0\n1,0\n");
+    write(
+        "sweep.toml",
+        "study = \"identify\"\n[grid]\nlog = [\"nowhere.csv\"]\n",
+    );
+    write(
+        "few.toml",
+        "study = \"identify\"\n[base]\npolish = false\n[grid]\n\"swarm.population\" = [1]\n",
+    );
+    write("raceline.toml", "sections = 60\ntrack = \"stadium:300:80:12\"\n");
+    write("own.toml", "raceline = \"no_track.toml\"\n");
+    write("no_track.toml", "track = \"nowhere.csv\"\n");
+    let stadium = ["--track", "stadium:300:80:12", "--sections", "60"];
+    let raceline = |more: &[&'static str]| [&["raceline"], &stadium[..], more].concat();
+    let hybrid = |more: &[&'static str]| [&["hybrid"], &stadium[..], more].concat();
+    let refused: Vec<Vec<&str>> = vec![
+        vec!["identify", "--population", "1"],
+        vec!["identify", "--population", "0"],
+        vec!["identify", "--iterations", "0"],
+        vec!["identify", "--algorithm", "thesis", "--population", "1"],
+        vec!["identify", "--objectives", "vx,yaw_rate", "--population", "1"],
+        vec!["identify", "--section", "Nowhere"],
+        vec!["identify", "--laps", "77"],
+        vec!["identify", "--backend", "gpu", "--adapter", "no such adapter"],
+        raceline(&["--population", "1"]),
+        raceline(&["--iterations", "0"]),
+        raceline(&["--algorithm", "thesis", "--population", "1"]),
+        raceline(&["--algorithm", "cooperative", "--groups", "0"]),
+        raceline(&["--entry-mps", "-1"]),
+        raceline(&["--ellipse-exponent", "0"]),
+        raceline(&["--car-width-m", "50"]),
+        raceline(&["--backend", "gpu", "--adapter", "no such adapter"]),
+        hybrid(&["--population", "1"]),
+        hybrid(&["--match-lap-time-s", "1000"]),
+        hybrid(&["--stint-laps", "9", "--stint-fuel-kg", "1"]),
+        hybrid(&["--line", "short.csv"]),
+        hybrid(&["--car", "gt"]),
+        hybrid(&["--energy-mj", "-1"]),
+        vec!["transient", "--line", "line.csv"],
+        vec!["transient", "--line", "short.csv"],
+        vec!["transient", "--line", "line.csv", "--setups", "3"],
+        vec![
+            "transient",
+            "--line",
+            "line.csv",
+            "--setups",
+            "3",
+            "--parameters",
+            "no_such",
+        ],
+        vec!["transient", "--line", "line.csv", "--setups", "3", "--share", "2"],
+        vec!["sensitivity", "--section", "Abbey", "--samples", "0"],
+        vec!["sensitivity", "--section", "Abbey", "--share", "7"],
+        vec!["sensitivity", "--section", "Abbey", "--parameters", "no_such"],
+        vec!["surface", "--section", "Abbey", "--grid", "1"],
+        vec!["surface", "--section", "Abbey", "--parameters", "K,K"],
+        vec!["sweep", "sweep.toml"],
+        vec!["sweep", "few.toml"],
+        vec!["envelope", "--step-mps", "0"],
+        vec!["envelope", "--from-mps", "90", "--to-mps", "20"],
+        vec!["simulate", "--rate", "0"],
+        vec!["simulate", "--pace", "9"],
+        vec!["run", "--log", "nowhere.csv", "--no-cache"],
+        vec!["run", "--track", "nowhere.csv", "--no-cache"],
+        vec!["run", "own.toml", "--no-cache"],
+    ];
+    let mut wrong = Vec::new();
+    for arguments in &refused {
+        for there in [false, true] {
+            let out = folder.path().join("out");
+            if there {
+                std::fs::create_dir(&out).expect("a folder");
+            }
+            let ended = lapswarm(
+                folder.path(),
+                &[&arguments[..], &["--quiet", "--out", "out"]].concat(),
+            );
+            let said = text(&ended.stderr);
+            if !matches!(ended.status.code(), Some(2 | 3)) {
+                wrong.push(format!(
+                    "{arguments:?} ends with {:?}: {said}",
+                    ended.status.code()
+                ));
+            }
+            let left: Vec<_> = out.read_dir().into_iter().flatten().flatten().collect();
+            if out.is_dir() != there || !left.is_empty() {
+                wrong.push(format!("{arguments:?} leaves {left:?}: {said}"));
+            }
+            if out.is_dir() {
+                std::fs::remove_dir_all(&out).expect("the folder goes");
+            }
+            // Once is enough for what takes its time.
+            if ["hybrid", "run"].contains(&arguments[0]) {
+                break;
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+    let works = lapswarm(
+        folder.path(),
+        &[
+            "raceline",
+            "raceline.toml",
+            "--objectives",
+            "length",
+            "--out",
+            "out",
+        ],
+    );
+    assert!(works.status.success(), "{}", text(&works.stderr));
+}
+
 #[test]
 fn completions_name_every_command() {
     let folder = tempfile::tempdir().expect("a temporary folder");

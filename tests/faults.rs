@@ -17,6 +17,7 @@ use lapswarm::study::hybrid::{self, HybridStudySettings};
 use lapswarm::study::keeper::Keeper;
 use lapswarm::study::raceline::{self, LineAlgorithm, LinesState, RacelineSettings, find_lines_from};
 use lapswarm::study::run_folder::STATE;
+use lapswarm::study::sweep::{SweepSettings, sweep};
 use lapswarm::swarm::checkpoint;
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -260,10 +261,10 @@ fn portions_change_no_bit() {
                     "{name} on {choice:?} in portions of {size}"
                 );
             }
-            portions::allow(0);
-            let mut least = open(choice);
-            portions::allow(1 << 30);
-            let found = bits(&least.evaluate(&population).unwrap());
+            let least = portions::allow(0);
+            let mut evaluator = open(choice);
+            drop(least);
+            let found = bits(&evaluator.evaluate(&population).unwrap());
             assert!(found == wanted, "{name} on {choice:?} in the least memory");
         }
     }
@@ -457,10 +458,56 @@ fn without_a_driver_auto_works_and_gpu_says_why_not() {
     assert!(matches!(listed.status.code(), Some(0 | 3)), "{listed:?}");
 }
 
+/// Identifications that go together in a sweep share their device, and what goes wrong with it; each says so, and how long its
+/// dispatches took.
+#[test]
+fn a_sweep_tells_of_faults_and_dispatches_run_by_run() {
+    let _turn = alone();
+    if !has_device() {
+        return;
+    }
+    let text = "study = \"identify\"\n[base]\nsection = \"Abbey\"\npolish = false\nbackend = \"gpu\"\n[base.swarm]\n\
+                algorithm = \"thesis\"\npopulation = 6\niterations = 3\n[grid]\nseed = [1, 2, 3]\n";
+    let settings = SweepSettings::parse(Path::new("s.toml"), text).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let mut begun = 0;
+    let summary = sweep(&settings, folder.path(), false, |_| {
+        begun += 1;
+        // Not before the device is open: told first before the runs, then before each call.
+        if begun == 2 {
+            faults::inject(Fault::Lost, 0, 1);
+        }
+        ControlFlow::Continue(())
+    });
+    faults::end();
+    let summary = summary.unwrap();
+    assert_eq!(summary.device_faults.len(), 1, "{:?}", summary.device_faults);
+    let told = &summary.device_faults[0];
+    assert!(
+        told.starts_with("runs 00000, 00001, 00002: ") && told.contains("opened anew"),
+        "{told}"
+    );
+    for (run, row) in summary.rows.iter().enumerate() {
+        let path = folder.path().join(format!("studies/{run:05}.json"));
+        let manifest: serde_json::Value = serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap();
+        assert_eq!(manifest["backend"], "gpu");
+        assert_eq!(manifest["seed"], run + 1);
+        assert_eq!(manifest["device_faults"], serde_json::json!(row.device_faults));
+        assert!(
+            manifest["longest_dispatch_ms"]
+                .as_f64()
+                .is_some_and(|ms| ms > 0.0),
+            "{manifest}"
+        );
+    }
+}
+
 #[test]
 fn what_would_take_all_memory_is_refused_with_what_would_not() {
     let folder = tempfile::tempdir().unwrap();
     let huge = std::fs::File::create(folder.path().join("huge.csv")).unwrap();
+    let sweep = "study = \"identify\"\n[grid]\nseed = [1, 2]\n\"swarm.population\" = [10, 100000]\n";
+    std::fs::write(folder.path().join("sweep.toml"), sweep).unwrap();
     // Ten gigabytes that take no space: a file with a hole.
     huge.set_len(10 << 30).unwrap();
     for arguments in [
@@ -474,6 +521,7 @@ fn what_would_take_all_memory_is_refused_with_what_would_not() {
         &["hybrid", "--iterations", "1000000", "--population", "100000"],
         &["sensitivity", "--samples", "65536", "--memory-limit-mib", "64"],
         &["surface", "--grid", "2000", "--memory-limit-mib", "64"],
+        &["sweep", "sweep.toml", "--memory-limit-mib", "16"],
         &["identify", "--log", "huge.csv"],
         &["raceline", "--track", "huge.csv"],
         &["raceline", "--envelope", "huge.csv"],

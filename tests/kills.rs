@@ -2,8 +2,9 @@
 
 use lapswarm::study::identify::SearchState;
 use lapswarm::study::journal::Journal;
-use lapswarm::study::raceline::LinesState;
+use lapswarm::study::raceline::{LinesState, RacelineSettings, set_up};
 use lapswarm::study::run_folder::STATE;
+use lapswarm::study::transient::DriveState;
 use lapswarm::swarm::checkpoint;
 use serde_json::Value;
 use std::path::Path;
@@ -64,15 +65,19 @@ fn timeless(summary: Value) -> Value {
     }
 }
 
-/// Waits until a run has saved a state, and a number of milliseconds more.
-fn let_work(folder: &Path, ms: u64) {
-    for _ in 0..6000 {
-        if folder.join(STATE).is_file() {
-            break;
+/// Waits until a run has saved a state, and a number of milliseconds more; no longer than it works.
+fn let_work(child: &mut Child, folder: &Path, ms: u64) {
+    let limit = Instant::now() + Duration::from_secs(60);
+    let mut saved = None;
+    while Instant::now() < limit && child.try_wait().expect("its state").is_none() {
+        if saved.is_none() && folder.join(STATE).is_file() {
+            saved = Some(Instant::now());
         }
-        std::thread::sleep(Duration::from_millis(5));
+        if saved.is_some_and(|at| at.elapsed() >= Duration::from_millis(ms)) {
+            return;
+        }
+        std::thread::sleep(Duration::from_millis(2));
     }
-    std::thread::sleep(Duration::from_millis(ms));
 }
 
 /// No file of a folder is part of one: JSON parses, tables end with a line, the state loads.
@@ -92,11 +97,140 @@ fn nothing_half_written(folder: &Path) {
             Some("lapswarm") => {
                 let loads = checkpoint::load::<SearchState>(&path).is_ok()
                     || checkpoint::load::<LinesState>(&path).is_ok()
-                    || checkpoint::load::<Journal>(&path).is_ok();
+                    || checkpoint::load::<Journal>(&path).is_ok()
+                    || checkpoint::load::<DriveState>(&path).is_ok();
                 assert!(loads, "{} is no whole state", path.display());
             }
             _ => {}
         }
+    }
+}
+
+/// A line at a share of a road's width from the right, as `transient` reads one. At its edge many shares of the grip are tried
+/// until one is held.
+fn along(track: &str, alpha: f64) -> String {
+    let setup = set_up(&RacelineSettings {
+        track: track.to_owned(),
+        sections: 200,
+        ..RacelineSettings::default()
+    })
+    .expect("a track");
+    let points = setup.cuts.points(&vec![alpha; setup.cuts.len()]);
+    let rows = points.iter().map(|p| format!("{},{}\n", p.x, p.y));
+    format!("x_m,y_m\n{}", rows.collect::<String>())
+}
+
+/// Tells a study to stop, so many milliseconds after it has saved its first state; goes on with it, and holds what it ends with
+/// against `wanted`. Returns the time that it took to stop.
+fn stop_and_go_on(
+    root: &Path,
+    study: &[&str],
+    (signal, ms): (&str, u64),
+    wanted: &Value,
+    files: &[&str],
+) -> Duration {
+    let out = format!("stopped-{}{signal}-{ms}", study[0]);
+    let folder = root.join(&out);
+    let mut child = start(root, &[study, &["--out", &out]].concat());
+    let_work(&mut child, &folder, ms);
+    let told = Command::new("kill")
+        .args([signal, &child.id().to_string()])
+        .status();
+    assert!(told.expect("kill").success());
+    let signalled = Instant::now();
+    let ended = finish(child);
+    let took = signalled.elapsed();
+    let said = String::from_utf8_lossy(&ended.stderr).into_owned();
+    assert_eq!(
+        ended.status.code(),
+        Some(130),
+        "{study:?} {signal} at {ms}: {said}"
+    );
+    assert!(folder.join(STATE).is_file(), "{said}");
+    nothing_half_written(&folder);
+    let resumed = finish(start(root, &[study[0], "--resume", "--out", &out]));
+    assert_eq!(summary(&resumed), *wanted, "{study:?} {signal} at {ms}");
+    for file in files {
+        let read = |run: &str| std::fs::read(root.join(run).join(file)).expect("a file");
+        assert!(
+            read(&out) == read("whole"),
+            "{file} of {study:?} {signal} at {ms}"
+        );
+    }
+    assert!(!folder.join(STATE).exists());
+    took
+}
+
+#[test]
+fn a_hybrid_that_is_told_to_stop_while_it_looks_for_its_line_goes_on() {
+    let root = tempfile::tempdir().expect("a temporary folder");
+    // The search for the line is nearly all there is to do.
+    let study = [
+        "hybrid",
+        "--scenarios-only",
+        "--sections",
+        "600",
+        "--backend",
+        "simd",
+    ];
+    let began = Instant::now();
+    let wanted = summary(&finish(start(
+        root.path(),
+        &[&study[..], &["--out", "whole"]].concat(),
+    )));
+    let whole = began.elapsed();
+    for (signal, ms) in [("-INT", 0), ("-TERM", 300)] {
+        let took = stop_and_go_on(root.path(), &study, (signal, ms), &wanted, &["study.toml"]);
+        // It ends with the program at work, and not with the search.
+        assert!(took < whole / 2, "{took:?} of {whole:?}");
+    }
+}
+
+#[test]
+fn a_drive_that_is_told_to_stop_goes_on() {
+    let root = tempfile::tempdir().expect("a temporary folder");
+    std::fs::write(root.path().join("line.csv"), along("stadium:400:120:14", 0.01)).expect("a line");
+    let alone = ["transient", "--line", "line.csv", "--track", "stadium:400:120:14"];
+    let wanted = summary(&finish(start(
+        root.path(),
+        &[&alone[..], &["--out", "whole"]].concat(),
+    )));
+    for (signal, ms) in [("-TERM", 0), ("-INT", 100)] {
+        stop_and_go_on(
+            root.path(),
+            &alone,
+            (signal, ms),
+            &wanted,
+            &["drive.csv", "speeds.svg"],
+        );
+    }
+    std::fs::rename(root.path().join("whole"), root.path().join("alone")).expect("it moves");
+    // The plans of the lines come first, then laps in two batches.
+    let small = "stadium:100:40:14";
+    std::fs::write(root.path().join("small.csv"), along(small, 0.5)).expect("a line");
+    let many = [
+        "transient",
+        "--line",
+        "small.csv",
+        "--track",
+        small,
+        "--setups",
+        "60",
+        "--backend",
+        "simd",
+    ];
+    let wanted = summary(&finish(start(
+        root.path(),
+        &[&many[..], &["--out", "whole"]].concat(),
+    )));
+    for (signal, ms) in [("-INT", 0), ("-TERM", 500)] {
+        stop_and_go_on(
+            root.path(),
+            &many,
+            (signal, ms),
+            &wanted,
+            &["setups.csv", "car.toml"],
+        );
     }
 }
 
@@ -109,6 +243,7 @@ fn kill_and_go_on(study: &[&str], files: &[&str], kills: u32) {
         ("run.toml", RUN),
         ("car.toml", RUN_CAR),
         ("line.toml", RUN_LINE),
+        ("line.csv", &along("stadium:400:120:14", 0.01)),
     ] {
         std::fs::write(root.path().join(name), text).expect("a study");
     }
@@ -122,7 +257,7 @@ fn kill_and_go_on(study: &[&str], files: &[&str], kills: u32) {
         let folder = root.path().join(&out);
         let mut child = start(root.path(), &[study, &["--out", &out]].concat());
         let share = (0.5 + f64::from(k) * 0.618_033_988_75).fract();
-        let_work(&folder, (took.as_secs_f64() * share * 1e3) as u64);
+        let_work(&mut child, &folder, (took.as_secs_f64() * share * 1e3) as u64);
         child.kill().expect("a signal");
         finish(child);
         nothing_half_written(&folder);
@@ -254,6 +389,12 @@ fn a_killed_plain_swarm_ends_as_one_that_was_left_alone() {
 }
 
 #[test]
+fn a_killed_drive_ends_as_one_that_was_left_alone() {
+    let study = ["transient", "--line", "line.csv", "--track", "stadium:400:120:14"];
+    kill_and_go_on(&study, &["drive.csv", "envelope_driven.csv"], 4);
+}
+
+#[test]
 fn a_killed_run_ends_as_one_that_was_left_alone() {
     let study = ["run", "run.toml", "--no-cache"];
     kill_and_go_on(
@@ -268,8 +409,8 @@ fn an_interrupted_run_says_so_and_what_is_not_its_state_is_refused() {
     let root = tempfile::tempdir().expect("a temporary folder");
     std::fs::write(root.path().join("study.toml"), STUDY.replace("120", "100000")).expect("a study");
     let folder = root.path().join("run");
-    let child = start(root.path(), &["identify", "study.toml", "--out", "run"]);
-    let_work(&folder, 200);
+    let mut child = start(root.path(), &["identify", "study.toml", "--out", "run"]);
+    let_work(&mut child, &folder, 200);
     // While it works, nobody else gets its folder.
     for arguments in [
         &["identify", "study.toml", "--out", "run"][..],
@@ -361,8 +502,11 @@ fn a_full_disk_leaves_whole_files_or_none() {
         );
         assert!(said.contains(&out) && !said.contains("panicked"), "{said}");
         let folder = root.path().join(&out);
-        nothing_half_written(&folder);
-        files.push(folder.read_dir().expect("a folder").flatten().count());
+        // Where not even a state could be written, the folder has gone again.
+        if folder.exists() {
+            nothing_half_written(&folder);
+        }
+        files.push(folder.read_dir().map_or(0, |entries| entries.flatten().count()));
         // No summary or manifest says that a run is whole which is not.
         assert!(!folder.join("manifest.json").exists(), "{blocks}");
     }

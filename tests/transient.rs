@@ -3,8 +3,9 @@
 use lapswarm::evaluate::BackendChoice;
 use lapswarm::evaluate::line::LineObjective;
 use lapswarm::study::identify::{Algorithm, IdentifySettings};
+use lapswarm::study::memory::USUAL_MIB;
 use lapswarm::study::raceline::{RacelineSettings, set_up};
-use lapswarm::study::run::{RunSettings, run};
+use lapswarm::study::run::{Means, RunSettings, prepare, run};
 use lapswarm::study::transient::{
     AGREEMENT, NamedLine, PopulationSettings, TransientSettings, drive_line, drive_population, read_line,
     summarise, summarise_population, table_of, write_population, write_results,
@@ -224,10 +225,13 @@ fn a_run_goes_from_the_log_to_a_driven_lap_and_remembers_its_stages() {
     let cache = root.path().join("cache");
     let go = |name: &str| {
         run(
-            &settings,
+            &prepare(&settings).expect("it is sound"),
             &root.path().join(name),
-            Some(&cache),
-            Duration::from_secs(5),
+            &Means {
+                cache: Some(&cache),
+                every: Duration::from_secs(5),
+                memory_limit_mib: USUAL_MIB,
+            },
             |_| ControlFlow::Continue(()),
         )
         .expect("it runs")

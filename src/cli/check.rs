@@ -3,6 +3,7 @@
 use lapswarm::config::{Document, read_text};
 use lapswarm::study::hybrid::{self, HybridStudySettings};
 use lapswarm::study::identify::{self, IdentifySettings};
+use lapswarm::study::memory::USUAL_MIB;
 use lapswarm::study::raceline::{self, RacelineSettings};
 use lapswarm::study::run::RunSettings;
 use lapswarm::study::sensitivity::{SensitivitySettings, set_up_sensitivity};
@@ -238,7 +239,7 @@ fn read(path: &Path, kind: Kind) -> Result<String> {
             format!("{}: {y} over {x}", kind.name())
         }
         Kind::Sweep => {
-            let planned = sweep::plan(&SweepSettings::load(&name)?)?;
+            let planned = sweep::plan(&SweepSettings::load(&name)?, USUAL_MIB)?;
             format!("{}: {planned}", kind.name())
         }
     })

@@ -1,20 +1,17 @@
 //! `lapswarm hybrid`.
 
 use super::dry_run::Plan;
-use super::{Common, Memory, Resume, backend_flag, print_json, stop_flag};
+use super::{Common, Memory, Resume, backend_flag, going_on, print_json, stop_flag};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use lapswarm::evaluate::BackendChoice;
 use lapswarm::evaluate::hybrid::HybridObjective;
 use lapswarm::study::hybrid::{
-    FreePart, HYBRID_OBJECTIVES, HybridStudySettings, read_inputs, run_recorded, set_up, summarise,
-    write_results,
+    FreePart, HYBRID_OBJECTIVES, HybridStudySettings, read_inputs, run_recorded, summarise, write_results,
 };
-use lapswarm::study::journal::Recorder;
+use lapswarm::study::journal::{Journal, Recorder};
 use lapswarm::study::run_folder;
 use lapswarm::{Error, Result};
-use std::ops::ControlFlow;
 use std::path::PathBuf;
-use std::sync::atomic::Ordering;
 
 /// Flags of `hybrid`; a flag wins over the study file.
 #[derive(clap::Args)]
@@ -139,6 +136,7 @@ impl Arguments {
 
 /// Runs the study.
 pub fn run(arguments: &Arguments) -> Result<()> {
+    let stop = stop_flag();
     let out = arguments.common.out.as_deref();
     let moves = arguments.backend.is_some() || arguments.adapter.is_some();
     let moved: fn(&mut HybridStudySettings, &HybridStudySettings) = |kept, asked| {
@@ -152,30 +150,41 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         moves.then_some(moved),
     )?;
     let settings = begun.settings;
-    settings.size().check(arguments.memory.memory_limit_mib)?;
+    let limit_mib = arguments.memory.memory_limit_mib;
+    // What no track has room for is refused before one is read.
+    drop(settings.size().check(limit_mib)?);
+    let inputs = read_inputs(&settings)?;
+    let size = inputs.size(&settings);
+    let _allowed = size.check(limit_mib)?;
     if arguments.common.dry_run {
-        let (road, car, line) = read_inputs(&settings)?;
-        let line = line.map_or_else(
-            || "the fastest one, found first".to_owned(),
-            |(name, points)| format!("{name}, {} points", points.len()),
-        );
+        let line = match (&settings.line, inputs.given_points()) {
+            (Some(path), Some(points)) => format!("{}, {points} points", path.display()),
+            _ => "the fastest one, found first".to_owned(),
+        };
         return Plan::new("hybrid", &settings.to_toml())
-            .of_road(&road)
-            .reads(format!("hybrid drive of {}", car.name))
+            .of_road(inputs.road())
+            .reads(format!("hybrid drive of {}", inputs.car().name))
             .reads(format!("line: {line}"))
             .seed(settings.seed)
-            .memory_mib(settings.size().needed_mib())
+            .memory_mib(size.needed_mib())
             .backend(settings.backend, settings.adapter.as_deref())?
             .tell(&arguments.common);
     }
-    let setup = set_up(&settings)?;
     let folder = match begun.folder {
         Some(folder) => folder,
         None => run_folder::create("hybrid", out)?,
     };
     let mut keeper = arguments.resume.keeper(&folder, moves)?;
+    keeper.keep(&begun.journal)?;
+    // Broken off, the search for the line is begun anew: it is a matter of seconds, and ends where it would have ended.
+    let setup = inputs.with_line(&settings, &stop);
+    let Some(setup) = arguments
+        .resume
+        .or_nothing(setup, &keeper, Journal::is_untouched)?
+    else {
+        return Err(Error::Interrupted(folder.to_path_buf()));
+    };
     let mut recorder = Recorder::new(begun.journal, &mut keeper);
-    let stop = stop_flag();
     let target = if arguments.common.quiet {
         ProgressDrawTarget::hidden()
     } else {
@@ -189,12 +198,11 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         bar.set_prefix(progress.stage);
         bar.set_message(format!("{} laps, {}", progress.evaluations, progress.best));
         bar.tick();
-        if stop.load(Ordering::Relaxed) {
-            ControlFlow::Break(())
-        } else {
-            ControlFlow::Continue(())
-        }
-    })?;
+        going_on(&stop)
+    });
+    let outcome = arguments
+        .resume
+        .or_nothing(outcome, &keeper, Journal::is_untouched)?;
     bar.finish_and_clear();
     let summary = summarise(&settings, &setup, &outcome);
     write_results(&folder, &settings, &setup, &outcome, &summary)?;

@@ -2,17 +2,15 @@
 
 use super::dry_run::Plan;
 use super::progress::SearchBar;
-use super::{Common, Memory, Resume, backend_flag, print_json, same_settings, stop_flag};
+use super::{Common, Memory, Resume, backend_flag, going_on, print_json, same_settings, stop_flag};
 use lapswarm::evaluate::replay::{BackendChoice, Norm};
 use lapswarm::study::identify::{
-    Algorithm, IdentifySettings, ObjectiveChoice, SearchState, parse_algorithm, parse_norm, parse_objective,
-    search_from, set_up, summarise, write_results, write_settings,
+    Algorithm, IdentifySettings, ObjectiveChoice, SearchState, check_swarms, parse_algorithm, parse_norm,
+    parse_objective, search_from, set_up, summarise, write_results, write_settings,
 };
 use lapswarm::study::run_folder;
 use lapswarm::{Error, Result};
-use std::ops::ControlFlow;
 use std::path::PathBuf;
-use std::sync::atomic::Ordering;
 
 /// Flags of `identify`; a flag wins over the study file.
 #[derive(clap::Args)]
@@ -171,8 +169,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     } else {
         (None, None, arguments.settings(IdentifySettings::default())?)
     };
-    settings.size().check(arguments.memory.memory_limit_mib)?;
+    let _allowed = settings.size().check(arguments.memory.memory_limit_mib)?;
     let setup = set_up(&settings)?;
+    check_swarms(&settings, &setup)?;
     if arguments.common.dry_run {
         return Plan::new("identify", &settings.to_toml())
             .of_replay(&setup)
@@ -193,12 +192,11 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let mut bar = SearchBar::new(arguments.common.quiet);
     let outcome = search_from(&settings, &setup, state, &mut keeper, |report| {
         bar.show(report);
-        if stop.load(Ordering::Relaxed) {
-            ControlFlow::Break(())
-        } else {
-            ControlFlow::Continue(())
-        }
-    })?;
+        going_on(&stop)
+    });
+    let outcome = arguments
+        .resume
+        .or_nothing(outcome, &keeper, SearchState::is_untouched)?;
     bar.finish();
     let summary = summarise(&settings, &setup, &outcome);
     write_results(&folder, &settings, &setup, &outcome, &summary)?;

@@ -34,6 +34,7 @@ use lapswarm::{Error, Result};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::io::Write;
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -150,6 +151,24 @@ impl Resume {
         Ok(if moves { keeper.may_move() } else { keeper })
     }
 
+    /// What a study came to. Input that is refused only once the run has begun leaves nothing that stands in the way of the
+    /// next: a new run's state in which nothing has been reached goes.
+    fn or_nothing<T, S: Checkpoint>(
+        &self,
+        outcome: Result<T>,
+        keeper: &Keeper,
+        untouched: fn(&S) -> bool,
+    ) -> Result<T> {
+        let refused = matches!(
+            outcome,
+            Err(Error::Input { .. } | Error::Io { .. } | Error::NoDevice(_))
+        );
+        if refused && !self.resume && keeper.saved::<S>().is_some_and(|state| untouched(&state)) {
+            keeper.done()?;
+        }
+        outcome
+    }
+
     /// The run folder, and the state in it that is to be gone on with.
     fn open<T: Checkpoint>(&self, study: &str, out: Option<&Path>) -> Result<(RunFolder, T)> {
         let Some(out) = out else {
@@ -258,6 +277,15 @@ fn stop_flag() -> Arc<AtomicBool> {
         tracing::warn!("an interrupt will end the program at once: {error}");
     }
     flag
+}
+
+/// What an observer answers while the flag of [`stop_flag`] is down, and once it is up.
+fn going_on(stop: &AtomicBool) -> ControlFlow<()> {
+    if stop.load(Ordering::Relaxed) {
+        ControlFlow::Break(())
+    } else {
+        ControlFlow::Continue(())
+    }
 }
 
 /// Runs the program.

@@ -1,7 +1,7 @@
 //! `lapswarm raceline`.
 
 use super::dry_run::Plan;
-use super::{Common, Memory, Resume, backend_flag, print_json, same_settings, stop_flag};
+use super::{Common, Memory, Resume, backend_flag, going_on, print_json, same_settings, stop_flag};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use lapswarm::evaluate::BackendChoice;
 use lapswarm::evaluate::line::LineObjective;
@@ -11,9 +11,7 @@ use lapswarm::study::raceline::{
 };
 use lapswarm::study::run_folder;
 use lapswarm::{Error, Result};
-use std::ops::ControlFlow;
 use std::path::PathBuf;
-use std::sync::atomic::Ordering;
 
 /// Flags of `raceline`; a flag wins over the study file.
 #[derive(clap::Args)]
@@ -160,7 +158,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     } else {
         (None, None, arguments.settings(RacelineSettings::default())?)
     };
-    settings.size().check(arguments.memory.memory_limit_mib)?;
+    let _allowed = settings.size().check(arguments.memory.memory_limit_mib)?;
     let setup = set_up(&settings)?;
     if arguments.common.dry_run {
         return Plan::new("raceline", &settings.to_toml())
@@ -191,12 +189,11 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         bar.set_prefix(progress.stage.clone());
         bar.set_message(format!("{} lines, best {}", progress.evaluations, progress.best));
         bar.tick();
-        if stop.load(Ordering::Relaxed) {
-            ControlFlow::Break(())
-        } else {
-            ControlFlow::Continue(())
-        }
-    })?;
+        going_on(&stop)
+    });
+    let outcome = arguments
+        .resume
+        .or_nothing(outcome, &keeper, LinesState::is_untouched)?;
     bar.finish_and_clear();
     let summary = summarise(&settings, &setup, &outcome);
     write_results(&folder, &settings, &setup, &outcome, &summary)?;

@@ -1,16 +1,13 @@
 //! `lapswarm run`.
 
 use super::dry_run::Plan;
-use super::{Common, Memory, Resume, backend_flag, print_json, progress, stop_flag};
+use super::{Common, Memory, Resume, backend_flag, going_on, print_json, progress, stop_flag};
 use lapswarm::evaluate::BackendChoice;
 use lapswarm::study::memory::Size;
-use lapswarm::study::run::{RunSettings, run as run_all};
+use lapswarm::study::run::{Means, RunSettings, prepare, run as run_all};
 use lapswarm::study::run_folder;
-use lapswarm::study::{identify, raceline};
 use lapswarm::{Error, Result};
-use std::ops::ControlFlow;
 use std::path::PathBuf;
-use std::sync::atomic::Ordering;
 
 /// Flags of `run`; a flag wins over the study file.
 #[derive(clap::Args)]
@@ -117,6 +114,7 @@ impl Arguments {
 
 /// Runs everything.
 pub fn run(arguments: &Arguments) -> Result<()> {
+    let stop = stop_flag();
     let out = arguments.common.out.as_deref();
     let moved: fn(&mut RunSettings, &RunSettings) = |kept, asked| {
         kept.identify.backend = asked.identify.backend;
@@ -131,16 +129,17 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         arguments.moves().then_some(moved),
     )?;
     let settings = begun.settings;
+    // Each stage has the limit for itself; what none of them has room for is refused before the first.
+    let limit_mib = arguments.memory.memory_limit_mib;
     for size in [settings.identify.size(), settings.raceline.size()] {
-        size.check(arguments.memory.memory_limit_mib)?;
+        drop(size.check(limit_mib)?);
     }
+    let prepared = prepare(&settings)?;
     if arguments.common.dry_run {
-        let setup = identify::set_up(&settings.identify)?;
-        let road = raceline::set_up(&settings.line_of(&settings.identify.car, None))?;
         let sizes = [settings.identify.size(), settings.raceline.size()];
         return Plan::new("run", &settings.to_toml())
-            .of_replay(&setup)
-            .of_road(&road)
+            .of_replay(&prepared.setup)
+            .of_road(&prepared.road)
             .seed(settings.identify.seed)
             .memory_mib(sizes.iter().map(Size::needed_mib).max().unwrap_or(0))
             .backend(settings.identify.backend, settings.identify.adapter.as_deref())?
@@ -152,19 +151,19 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     };
     let mut keeper = arguments.resume.keeper(&folder, arguments.moves())?;
     keeper.keep(&begun.journal)?;
-    let stop = stop_flag();
     let bar = progress::saying(arguments.common.quiet);
     // Without a cache to share, a run that is broken off still finds its own stages again.
     let own = folder.join(".stages");
     let cache = settings.cache.as_ref().unwrap_or(&own);
-    let summary = run_all(&settings, &folder, Some(cache), keeper.interval(), |doing| {
+    let means = Means {
+        cache: Some(cache),
+        every: keeper.interval(),
+        memory_limit_mib: limit_mib,
+    };
+    let summary = run_all(&prepared, &folder, &means, |doing| {
         bar.set_message(doing.to_owned());
         bar.tick();
-        if stop.load(Ordering::Relaxed) {
-            ControlFlow::Break(())
-        } else {
-            ControlFlow::Continue(())
-        }
+        going_on(&stop)
     })?;
     bar.finish_and_clear();
     if own.exists() {

@@ -2,17 +2,15 @@
 
 use super::dry_run::Plan;
 use super::replay_flags::ReplayFlags;
-use super::{Common, Memory, Resume, print_json, progress, stop_flag};
-use lapswarm::study::journal::Recorder;
+use super::{Common, Memory, Resume, going_on, print_json, progress, stop_flag};
+use lapswarm::study::journal::{Journal, Recorder};
 use lapswarm::study::memory;
 use lapswarm::study::run_folder;
 use lapswarm::study::sensitivity::{
     SensitivitySettings, measure_recorded, set_up_sensitivity, summarise, write_results,
 };
 use lapswarm::{Error, Result};
-use std::ops::ControlFlow;
 use std::path::PathBuf;
-use std::sync::atomic::Ordering;
 
 /// Flags of `sensitivity`; a flag wins over the study file.
 #[derive(clap::Args)]
@@ -76,7 +74,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         moves.then_some(moved),
     )?;
     let settings = begun.settings;
-    memory::check(&settings.kept(), arguments.memory.memory_limit_mib)?;
+    let _allowed = memory::check(&settings.kept(), arguments.memory.memory_limit_mib)?;
     let setup = set_up_sensitivity(&settings)?;
     if arguments.common.dry_run {
         return Plan::new("sensitivity", &settings.to_toml())
@@ -98,12 +96,11 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let outcome = measure_recorded(&settings, &setup, &mut recorder, |p| {
         bar.set_length(p.planned as u64);
         bar.set_position(p.evaluations as u64);
-        if stop.load(Ordering::Relaxed) {
-            ControlFlow::Break(())
-        } else {
-            ControlFlow::Continue(())
-        }
-    })?;
+        going_on(&stop)
+    });
+    let outcome = arguments
+        .resume
+        .or_nothing(outcome, &keeper, Journal::is_untouched)?;
     bar.finish_and_clear();
     let summary = summarise(&settings, &setup, &outcome);
     write_results(&folder, &settings, &setup, &outcome, &summary)?;

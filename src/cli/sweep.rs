@@ -1,12 +1,10 @@
 //! `lapswarm sweep`.
 
 use super::dry_run::Plan;
-use super::{Common, print_json, progress, stop_flag};
+use super::{Common, Memory, going_on, print_json, progress, stop_flag};
 use lapswarm::Result;
 use lapswarm::study::run_folder;
-use lapswarm::study::sweep::{SWEEP_FILE, SweepSettings, plan, sweep};
-use std::ops::ControlFlow;
-use std::sync::atomic::Ordering;
+use lapswarm::study::sweep::{SWEEP_FILE, SweepSettings, plan, sweep_within};
 
 /// Flags of `sweep`.
 #[derive(clap::Args)]
@@ -20,6 +18,8 @@ pub struct Arguments {
     sweep: String,
     #[command(flatten)]
     common: Common,
+    #[command(flatten)]
+    memory: Memory,
     /// Go on with the sweep that --out holds a part of
     #[arg(long, requires = "out", conflicts_with = "dry_run")]
     resume: bool,
@@ -28,8 +28,9 @@ pub struct Arguments {
 /// Runs the sweep.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let settings = SweepSettings::load(&arguments.sweep)?;
+    let limit_mib = arguments.memory.memory_limit_mib;
     if arguments.common.dry_run {
-        let planned = plan(&settings)?;
+        let planned = plan(&settings, limit_mib)?;
         let mut told = Plan::new("sweep", settings.text())
             .reads(planned.to_string())
             .memory_mib(planned.memory_mib)
@@ -45,7 +46,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     };
     let stop = stop_flag();
     let bar = progress::saying(arguments.common.quiet);
-    let summary = sweep(&settings, &folder, arguments.resume, |p| {
+    let summary = sweep_within(&settings, &folder, arguments.resume, limit_mib, |p| {
         let point: Vec<String> = p
             .point
             .settings
@@ -59,11 +60,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             point.join(", ")
         ));
         bar.tick();
-        if stop.load(Ordering::Relaxed) {
-            ControlFlow::Break(())
-        } else {
-            ControlFlow::Continue(())
-        }
+        going_on(&stop)
     })?;
     bar.finish_and_clear();
     if !arguments.common.quiet {

@@ -1,21 +1,24 @@
 //! `lapswarm transient`.
 
 use super::dry_run::Plan;
-use super::{Common, backend_flag, print_json, progress, stop_flag};
+use super::{
+    Begun, Common, Memory, Resume, backend_flag, going_on, print_json, progress, same_settings, stop_flag,
+};
 use glam::DVec2;
-use lapswarm::Error;
-use lapswarm::Result;
 use lapswarm::evaluate::BackendChoice;
-use lapswarm::study::raceline::{self, RacelineSettings, set_up};
-use lapswarm::study::run_folder;
+use lapswarm::study::journal::{Journal, Recorder};
+use lapswarm::study::memory;
+use lapswarm::study::raceline::{self, set_up};
+use lapswarm::study::run_folder::{self, RunFolder};
 use lapswarm::study::transient::{
-    MOST_SETUPS, NamedLine, PopulationSettings, TransientSettings, drive_line, drive_population, read_line,
-    summarise, summarise_population, table_of, write_population, write_results,
+    DriveRequest, DriveState, MOST_SETUPS, NamedLine, TransientSettings, drive_line_from,
+    drive_population_recorded, read_line, summarise, summarise_population, table_of, write_population,
+    write_results,
 };
 use lapswarm::vehicle::Car;
-use std::ops::ControlFlow;
+use lapswarm::{Error, Result};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::Ordering;
+use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 /// Flags of `transient`.
@@ -26,21 +29,25 @@ use std::time::Instant;
 pub struct Arguments {
     #[command(flatten)]
     common: Common,
+    #[command(flatten)]
+    resume: Resume,
+    #[command(flatten)]
+    memory: Memory,
     /// The line to drive: a table that `raceline` wrote, or any with columns x_m and y_m; several times for several lines
-    #[arg(long, value_name = "FILE", required = true)]
+    #[arg(long, value_name = "FILE", required_unless_present = "resume")]
     line: Vec<PathBuf>,
-    /// The circuit, for its edges: a bundled name, a shape, or a file
-    #[arg(long, value_name = "NAME|FILE", default_value = "silverstone_gp")]
-    track: String,
-    /// The car: a bundled name (gt) or a TOML file
-    #[arg(long, value_name = "NAME|FILE", default_value = "gt")]
-    car: String,
+    /// The circuit, for its edges: a bundled name, a shape, or a file [default: silverstone_gp]
+    #[arg(long, value_name = "NAME|FILE")]
+    track: Option<String>,
+    /// The car: a bundled name (gt) or a TOML file [default: gt]
+    #[arg(long, value_name = "NAME|FILE")]
+    car: Option<String>,
     /// The point mass's limits from a table instead of the car's own
     #[arg(long, value_name = "FILE")]
     envelope: Option<PathBuf>,
-    /// Width of the car, m
-    #[arg(long, value_name = "W", default_value_t = 2.0)]
-    car_width_m: f64,
+    /// Width of the car, m [default: 2]
+    #[arg(long, value_name = "W")]
+    car_width_m: Option<f64>,
     /// Drive this many set-ups of the car beside the car as it is
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=MOST_SETUPS as i64))]
     setups: Option<u32>,
@@ -59,36 +66,80 @@ pub struct Arguments {
 }
 
 impl Arguments {
-    /// What the circuit and the limits are set up from.
-    fn raceline(&self) -> RacelineSettings {
-        RacelineSettings {
-            track: self.track.clone(),
-            car: self.car.clone(),
-            envelope: self.envelope.clone(),
-            car_width_m: self.car_width_m,
-            ..RacelineSettings::default()
-        }
+    /// Whether the flags name a backend or an adapter.
+    fn moves(&self) -> bool {
+        self.backend.is_some() || self.adapter.is_some()
     }
 
-    /// What would be driven: lines that leave room between the edges (m, right and left).
-    fn plan(&self, road: &raceline::Setup, lines: &[NamedLine], edges_m: [&[DVec2]; 2]) -> Result<Plan> {
-        let resolved = serde_json::json!({
-            "line": self.line,
-            "track": self.track,
-            "car": self.car,
-            "envelope": self.envelope,
-            "car_width_m": self.car_width_m,
-            "setups": self.setups,
-            "parameters": self.parameters,
-            "share": self.share,
-        });
-        lines
-            .iter()
-            .try_fold(Plan::with("transient", resolved).of_road(road), |plan, line| {
-                let circuit = line.circuit(edges_m, self.car_width_m)?;
-                Ok(plan.reads(format!("line {}, {:.1} m", line.name, circuit.length_m)))
-            })
+    /// What the flags ask for, over what the run that is gone on with was begun with.
+    fn request(&self, base: Option<DriveRequest>) -> Result<DriveRequest> {
+        fn set<T: Clone>(setting: &mut T, flag: &Option<T>) {
+            if let Some(value) = flag {
+                setting.clone_from(value);
+            }
+        }
+        let mut r = base.unwrap_or_default();
+        if !self.line.is_empty() {
+            r.lines.clone_from(&self.line);
+        }
+        set(&mut r.track, &self.track);
+        set(&mut r.car, &self.car);
+        set(&mut r.car_width_m, &self.car_width_m);
+        if self.envelope.is_some() {
+            r.envelope.clone_from(&self.envelope);
+        }
+        let several = self.setups.is_some() || r.lines.len() > 1 || r.population.is_some();
+        if several {
+            let p = r.population.get_or_insert_default();
+            p.setups = self.setups.map_or(p.setups, |n| n as usize);
+            set(&mut p.parameters, &self.parameters);
+            set(&mut p.share, &self.share);
+            set(&mut p.seed, &self.common.seed);
+            set(&mut p.backend, &self.backend);
+            if self.adapter.is_some() {
+                p.adapter.clone_from(&self.adapter);
+            }
+            p.car_width_m = r.car_width_m;
+        } else {
+            let elsewhere = matches!(self.backend, Some(BackendChoice::Simd | BackendChoice::Gpu));
+            if elsewhere || self.adapter.is_some() {
+                let expected = "--backend cpu, --setups N, or several lines: one line is driven in f64 alone";
+                return Err(Error::input(
+                    "the command line",
+                    "--backend",
+                    "one line and no set-ups",
+                    expected,
+                ));
+            }
+        }
+        Ok(r.absolute())
     }
+}
+
+/// What would be driven: lines that leave room between the edges (m, right and left).
+fn plan_of(
+    request: &DriveRequest,
+    road: &raceline::Setup,
+    lines: &[NamedLine],
+    edges_m: [&[DVec2]; 2],
+) -> Result<Plan> {
+    let several = request.population.as_ref();
+    let resolved = serde_json::json!({
+        "line": request.lines,
+        "track": request.track,
+        "car": request.car,
+        "envelope": request.envelope,
+        "car_width_m": request.car_width_m,
+        "setups": several.map(|p| p.setups),
+        "parameters": several.map(|p| &p.parameters),
+        "share": several.map(|p| p.share),
+    });
+    lines
+        .iter()
+        .try_fold(Plan::with("transient", resolved).of_road(road), |plan, line| {
+            let circuit = line.circuit(edges_m, request.car_width_m)?;
+            Ok(plan.reads(format!("line {}, {:.1} m", line.name, circuit.length_m)))
+        })
 }
 
 /// What reports call the lines: their files' names, with the folders where these are not enough.
@@ -113,11 +164,17 @@ fn names_of(files: &[PathBuf]) -> Vec<String> {
 }
 
 /// Drives several lines or set-ups and prints.
-fn run_population(arguments: &Arguments) -> Result<()> {
+fn run_population(arguments: &Arguments, stop: &AtomicBool, begun: Begun<DriveRequest>) -> Result<()> {
     let began = Instant::now();
-    let names = names_of(&arguments.line).into_iter();
+    let request = begun.settings;
+    let settings = request.population.clone().unwrap_or_default();
+    let _allowed = memory::check(
+        &settings.kept(request.lines.len()),
+        arguments.memory.memory_limit_mib,
+    )?;
+    let names = names_of(&request.lines).into_iter();
     let lines = names
-        .zip(&arguments.line)
+        .zip(&request.lines)
         .map(|(name, file)| {
             Ok(NamedLine {
                 name,
@@ -125,45 +182,46 @@ fn run_population(arguments: &Arguments) -> Result<()> {
             })
         })
         .collect::<Result<Vec<_>>>()?;
-    let setup = set_up(&arguments.raceline())?;
-    let car = Car::load(&arguments.car)?;
-    let base = PopulationSettings::default();
-    let settings = PopulationSettings {
-        setups: arguments.setups.unwrap_or(0) as usize,
-        parameters: arguments.parameters.clone().unwrap_or(base.parameters),
-        share: arguments.share.unwrap_or(base.share),
-        car_width_m: arguments.car_width_m,
-        seed: arguments.common.seed.unwrap_or(base.seed),
-        backend: arguments.backend.unwrap_or(base.backend),
-        adapter: arguments.adapter.clone(),
-        ..base
-    };
+    let setup = set_up(&request.raceline())?;
+    let car = Car::load(&request.car)?;
+    settings.check(&car)?;
     let edges = [setup.edges_m[0].as_slice(), setup.edges_m[1].as_slice()];
     if arguments.common.dry_run {
-        settings.check(&car)?;
-        return arguments
-            .plan(&setup, &lines, edges)?
+        return plan_of(&request, &setup, &lines, edges)?
             .seed(settings.seed)
             .evaluations(settings.laps(lines.len()) as u64)
+            .memory_mib(memory::needed_mib(&settings.kept(lines.len())))
             .backend(settings.backend, settings.adapter.as_deref())?
             .tell(&arguments.common);
     }
-    let folder = run_folder::create("transient", arguments.common.out.as_deref())?;
-    let stop = stop_flag();
+    let folder = match begun.folder {
+        Some(folder) => folder,
+        None => run_folder::create("transient", arguments.common.out.as_deref())?,
+    };
+    let mut keeper = arguments.resume.keeper(&folder, arguments.moves())?;
+    keeper.keep(&begun.journal)?;
+    let mut recorder = Recorder::new(begun.journal, &mut keeper);
     let bar = progress::counting(arguments.common.quiet);
-    let outcome = drive_population(&car, &setup.car, &lines, edges, &settings, |done, planned| {
+    let observe = |done: usize, planned: usize| {
         bar.set_length(planned as u64);
         bar.set_position(done as u64);
-        if stop.load(Ordering::Relaxed) {
-            ControlFlow::Break(())
-        } else {
-            ControlFlow::Continue(())
-        }
-    })?;
+        going_on(stop)
+    };
+    let driven =
+        drive_population_recorded(&car, &setup.car, &lines, edges, &settings, &mut recorder, observe);
     bar.finish_and_clear();
+    let driven = arguments
+        .resume
+        .or_nothing(driven, &keeper, Journal::is_untouched)?;
+    let Some(outcome) = driven else {
+        return Err(Error::Interrupted(folder.to_path_buf()));
+    };
     let elapsed_s = began.elapsed().as_secs_f64();
     let summary = summarise_population(&car.name, &lines, &settings, &outcome, elapsed_s);
     write_population(&folder, &car, &lines, &outcome, &summary)?;
+    if !outcome.interrupted {
+        keeper.done()?;
+    }
     if !arguments.common.quiet {
         print!("{}{}", table_of(&lines, &outcome), summary.to_text());
         println!("Results: {}", folder.display());
@@ -184,28 +242,58 @@ fn run_population(arguments: &Arguments) -> Result<()> {
 
 /// Drives and prints.
 pub fn run(arguments: &Arguments) -> Result<()> {
-    let [line] = arguments.line.as_slice() else {
-        return run_population(arguments);
-    };
-    if arguments.setups.is_some() {
-        return run_population(arguments);
+    let stop = stop_flag();
+    let out = arguments.common.out.as_deref();
+    if arguments.resume.resume {
+        // Of a population there is a journal, of one line a state of its own.
+        if let Ok((folder, state)) = arguments.resume.open::<DriveState>("transient", out) {
+            let request = arguments.request(state.request.clone())?;
+            same_settings(&folder, &state.request.as_ref(), &Some(&request))?;
+            return run_line(arguments, &stop, request, (Some(folder), state));
+        }
+    } else {
+        let request = arguments.request(None)?;
+        if request.population.is_none() {
+            let state = DriveState::of(request.clone());
+            return run_line(arguments, &stop, request, (None, state));
+        }
     }
-    let elsewhere = matches!(arguments.backend, Some(BackendChoice::Simd | BackendChoice::Gpu));
-    if elsewhere || arguments.adapter.is_some() {
-        let expected = "--backend cpu, --setups N, or several lines: one line is driven in f64 alone";
+    let moved: fn(&mut DriveRequest, &DriveRequest) = |kept, asked| {
+        if let (Some(kept), Some(asked)) = (&mut kept.population, &asked.population) {
+            kept.backend = asked.backend;
+            kept.adapter.clone_from(&asked.adapter);
+        }
+    };
+    let begun = arguments.resume.begin(
+        "transient",
+        out,
+        |base| arguments.request(base),
+        arguments.moves().then_some(moved),
+    )?;
+    run_population(arguments, &stop, begun)
+}
+
+/// Drives one line alone and prints.
+fn run_line(
+    arguments: &Arguments,
+    stop: &AtomicBool,
+    request: DriveRequest,
+    (folder, state): (Option<RunFolder>, DriveState),
+) -> Result<()> {
+    let began = Instant::now();
+    let Some(line) = request.lines.first() else {
         return Err(Error::input(
             "the command line",
-            "--backend",
-            "one line and no set-ups",
-            expected,
+            "--line",
+            "none",
+            "a line to drive",
         ));
-    }
-    let began = Instant::now();
+    };
     let points = read_line(line)?;
-    let setup = set_up(&arguments.raceline())?;
-    let car = Car::load(&arguments.car)?;
+    let setup = set_up(&request.raceline())?;
+    let car = Car::load(&request.car)?;
     let settings = TransientSettings {
-        car_width_m: arguments.car_width_m,
+        car_width_m: request.car_width_m,
         ..TransientSettings::default()
     };
     let edges = [setup.edges_m[0].as_slice(), setup.edges_m[1].as_slice()];
@@ -214,16 +302,29 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             name: "the line".to_owned(),
             points_m: points,
         };
-        return arguments
-            .plan(&setup, &[line], edges)?
+        return plan_of(&request, &setup, &[line], edges)?
             .evaluations(settings.shares.len() as u64)
             .evaluated_by(BackendChoice::Cpu.would_be(None)?)
             .tell(&arguments.common);
     }
-    let folder = run_folder::create("transient", arguments.common.out.as_deref())?;
-    let outcome = drive_line(&car, &setup.car, &points, edges, &settings)?;
+    let folder = match folder {
+        Some(folder) => folder,
+        None => run_folder::create("transient", arguments.common.out.as_deref())?,
+    };
+    let mut keeper = arguments.resume.keeper(&folder, false)?;
+    let begun = (state, &mut keeper);
+    let driven = drive_line_from(&car, &setup.car, &points, edges, &settings, begun, |_, _| {
+        going_on(stop)
+    });
+    let driven = arguments
+        .resume
+        .or_nothing(driven, &keeper, DriveState::is_untouched)?;
+    let Some(outcome) = driven else {
+        return Err(Error::Interrupted(folder.to_path_buf()));
+    };
     let summary = summarise(&car.name, &outcome, began.elapsed().as_secs_f64());
     write_results(&folder, &outcome, &summary)?;
+    keeper.done()?;
     if !arguments.common.quiet {
         print!("{}", summary.to_text());
         println!("Results: {}", folder.display());

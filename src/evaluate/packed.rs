@@ -15,13 +15,23 @@ enum Message {
     Leaves,
 }
 
+/// What a search is answered.
+struct Answer {
+    evaluation: Result<Evaluation>,
+    /// What gave it.
+    backend: BackendInfo,
+    /// What has gone wrong with devices since the search was answered before.
+    device_faults: Vec<String>,
+}
+
 /// The evaluator as one of the searches sees it.
 pub struct PackedClient {
     client: usize,
     problem: Problem,
     backend: BackendInfo,
+    device_faults: Vec<String>,
     ask: Sender<Message>,
-    answer: Receiver<Result<Evaluation>>,
+    answer: Receiver<Answer>,
 }
 
 impl Evaluator for PackedClient {
@@ -33,6 +43,10 @@ impl Evaluator for PackedClient {
         self.backend.clone()
     }
 
+    fn device_faults(&self) -> &[String] {
+        &self.device_faults
+    }
+
     fn evaluate(&mut self, population: &[f64]) -> Result<Evaluation> {
         let gone = || Error::Device("the evaluator that several searches share is gone".to_owned());
         let message = Message::Asks {
@@ -40,7 +54,10 @@ impl Evaluator for PackedClient {
             population: population.to_vec(),
         };
         self.ask.send(message).map_err(|_| gone())?;
-        self.answer.recv().map_err(|_| gone())?
+        let answer = self.answer.recv().map_err(|_| gone())?;
+        self.backend = answer.backend;
+        self.device_faults.extend(answer.device_faults);
+        answer.evaluation
     }
 }
 
@@ -65,15 +82,20 @@ pub fn run_packed<T: Send>(
 ) -> Vec<T> {
     let (ask, asked) = channel();
     let (problem, backend) = (evaluator.problem().clone(), evaluator.backend());
+    let device_faults = evaluator.device_faults().to_vec();
     let mut answers = Vec::new();
     let clients: Vec<PackedClient> = (0..searches.len())
         .map(|client| {
             let (answer, answered) = channel();
-            answers.push(answer);
+            answers.push(Answers {
+                to: answer,
+                faults_told: device_faults.len(),
+            });
             PackedClient {
                 client,
                 problem: problem.clone(),
                 backend: backend.clone(),
+                device_faults: device_faults.clone(),
                 ask: ask.clone(),
                 answer: answered,
             }
@@ -81,7 +103,7 @@ pub fn run_packed<T: Send>(
         .collect();
     thread::scope(move |scope| {
         // Gone with this thread, should it panic: searches that wait for an answer see it.
-        let (answers, asked) = (answers, asked);
+        let (mut answers, asked) = (answers, asked);
         let threads: Vec<_> = searches
             .into_iter()
             .zip(clients)
@@ -95,14 +117,14 @@ pub fn run_packed<T: Send>(
                 Ok(Message::Leaves) => working -= 1,
                 Err(RecvTimeoutError::Timeout) => {
                     pause();
-                    answer(evaluator, &mut waiting, &answers);
+                    answer(evaluator, &mut waiting, &mut answers);
                     continue;
                 }
                 Err(RecvTimeoutError::Disconnected) => break,
             }
             if !waiting.is_empty() && waiting.len() == working {
                 pause();
-                answer(evaluator, &mut waiting, &answers);
+                answer(evaluator, &mut waiting, &mut answers);
             }
         }
         threads
@@ -115,12 +137,14 @@ pub fn run_packed<T: Send>(
     })
 }
 
+/// Where a search is answered, and how many of the evaluator's faults it knows.
+struct Answers {
+    to: Sender<Answer>,
+    faults_told: usize,
+}
+
 /// Scores all that wait in one call.
-fn answer(
-    evaluator: &mut dyn Evaluator,
-    waiting: &mut Vec<(usize, Vec<f64>)>,
-    answers: &[Sender<Result<Evaluation>>],
-) {
+fn answer(evaluator: &mut dyn Evaluator, waiting: &mut Vec<(usize, Vec<f64>)>, answers: &mut [Answers]) {
     if waiting.is_empty() {
         return;
     }
@@ -138,8 +162,16 @@ fn answer(
             Err(e) => Err(Error::Device(e.to_string())),
         };
         first += count;
+        let answers = &mut answers[client];
+        let met = evaluator.device_faults();
+        let answer = Answer {
+            evaluation: part,
+            backend: evaluator.backend(),
+            device_faults: met[answers.faults_told..].to_vec(),
+        };
+        answers.faults_told = met.len();
         // A search that has gone meanwhile needs no answer.
-        let _ = answers[client].send(part);
+        let _ = answers.to.send(answer);
     }
 }
 
@@ -148,10 +180,11 @@ mod tests {
     use super::*;
     use crate::evaluate::{Objective, Variable};
 
-    /// The sum of squares; fails on a nought.
+    /// The sum of squares; fails on a nought, and meets a fault of the device on each seven.
     struct Squares {
         problem: Problem,
         calls: Vec<usize>,
+        faults: Vec<String>,
     }
 
     impl Evaluator for Squares {
@@ -160,14 +193,20 @@ mod tests {
         }
         fn backend(&self) -> BackendInfo {
             BackendInfo {
-                backend: "cpu",
+                backend: if self.faults.len() > 1 { "simd" } else { "cpu" },
                 device: String::new(),
                 driver: String::new(),
             }
         }
+        fn device_faults(&self) -> &[String] {
+            &self.faults
+        }
         fn evaluate(&mut self, population: &[f64]) -> Result<Evaluation> {
             if population.contains(&0.0) {
                 return Err(Error::Device("a nought".to_owned()));
+            }
+            if population.contains(&7.0) {
+                self.faults.push("lost".to_owned());
             }
             self.calls.push(population.len() / 2);
             let rows = population
@@ -187,6 +226,33 @@ mod tests {
                 objectives: vec![Objective::new("sum", "-")],
             },
             calls: Vec::new(),
+            faults: vec!["opened late".to_owned()],
+        }
+    }
+
+    #[test]
+    fn every_search_hears_of_faults_and_of_what_gave_its_answer() {
+        let mut evaluator = squares();
+        let searches: Vec<_> = [7.0, 2.0]
+            .into_iter()
+            .map(|x| {
+                move |mut client: PackedClient| {
+                    assert_eq!(client.device_faults(), ["opened late"]);
+                    client.evaluate(&[x, 1.0]).unwrap();
+                    // By now one has met the fault, alone or together with the other.
+                    client.evaluate(&[1.0, 1.0]).unwrap();
+                    (client.device_faults().to_vec(), client.backend().backend)
+                }
+            })
+            .collect();
+        let results = run_packed(&mut evaluator, searches, || {});
+        assert_eq!(
+            results[0],
+            (vec!["opened late".to_owned(), "lost".to_owned()], "simd")
+        );
+        // The other may have been done before, if its thread was much faster; it hears of it otherwise.
+        if evaluator.calls.len() == 2 {
+            assert_eq!(results[1], results[0]);
         }
     }
 

@@ -2,19 +2,52 @@
 
 use super::{BackendInfo, Evaluation, Evaluator, Problem};
 use crate::error::Result;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Mutex, PoisonError};
 
 /// What evaluators take where nothing else is said (bytes).
 const USUAL: u64 = 1 << 30;
 /// Candidates of the smallest portion: enough to keep threads and devices at work.
 pub const LEAST: usize = 1024;
 
-static ALLOWED: AtomicU64 = AtomicU64::new(USUAL);
+/// What is allowed at present, and numbers to tell allowances apart.
+struct Allowed {
+    next: u64,
+    in_force: Vec<(u64, u64)>,
+}
 
-/// Lets each evaluator that is opened from now on take so much memory beside its population (bytes). Like the device, the
-/// memory is the process's. What comes of a study does not depend on it.
-pub fn allow(bytes: u64) {
-    ALLOWED.store(bytes, Ordering::Relaxed);
+static ALLOWED: Mutex<Allowed> = Mutex::new(Allowed {
+    next: 0,
+    in_force: Vec::new(),
+});
+
+fn allowed<T>(of: impl FnOnce(&mut Allowed) -> T) -> T {
+    of(&mut ALLOWED.lock().unwrap_or_else(PoisonError::into_inner))
+}
+
+/// Memory that evaluators may take, as long as this lives.
+#[derive(Debug)]
+#[must_use = "what is allowed ends with it"]
+pub struct Allowance(u64);
+
+impl Drop for Allowance {
+    fn drop(&mut self) {
+        allowed(|a| a.in_force.retain(|(number, _)| *number != self.0));
+    }
+}
+
+/// Lets each evaluator that is opened while the allowance lives take so much memory beside its population (bytes); of several
+/// the latest holds. Like the device, the memory is the process's. What comes of a study does not depend on it.
+pub fn allow(bytes: u64) -> Allowance {
+    allowed(|a| {
+        a.next += 1;
+        a.in_force.push((a.next, bytes));
+        Allowance(a.next)
+    })
+}
+
+/// What an evaluator that is opened now may take (bytes).
+pub fn present() -> u64 {
+    allowed(|a| a.in_force.last().map_or(USUAL, |(_, bytes)| *bytes))
 }
 
 /// Scores populations in portions, one after the other. A candidate's figures do not depend on its neighbours, so that they
@@ -27,7 +60,7 @@ pub struct Portions<E> {
 impl<E: Evaluator> Portions<E> {
     /// As many candidates at a time as may be, of which each takes `bytes_each` while it is evaluated.
     pub fn new(evaluator: E, bytes_each: u64) -> Self {
-        let fitting = ALLOWED.load(Ordering::Relaxed) / bytes_each.max(1);
+        let fitting = present() / bytes_each.max(1);
         let candidates = usize::try_from(fitting).unwrap_or(usize::MAX).max(LEAST);
         Self {
             evaluator,

@@ -95,6 +95,10 @@ pub fn descend(
         ));
     }
     while programs < settings.programs {
+        if problem.stopped() {
+            status = Status::Failed("broken off".to_owned());
+            break;
+        }
         let program = here.program(problem, bounds, weights, caution);
         let solution = program.solve()?;
         programs += 1;
@@ -182,6 +186,14 @@ pub fn fastest(
 /// # Errors
 /// Those of [`descend`].
 pub fn least_curvature(map: &LineMap, bounds: &Bounds, x: &[f64]) -> Result<Optimum> {
+    least_curvature_of(&LineProblem::of(map), bounds, x)
+}
+
+/// The same of a problem that may be [stopped](LineProblem::stop).
+///
+/// # Errors
+/// Those of [`descend`].
+pub fn least_curvature_of(problem: &LineProblem, bounds: &Bounds, x: &[f64]) -> Result<Optimum> {
     let weights = Weights {
         curvature: 1.0,
         ..Weights::default()
@@ -192,7 +204,7 @@ pub fn least_curvature(map: &LineMap, bounds: &Bounds, x: &[f64]) -> Result<Opti
         caution: 1.0,
     };
     descend(
-        &LineProblem::of(map),
+        problem,
         bounds,
         &Start {
             x: x.to_vec(),

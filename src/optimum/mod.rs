@@ -26,7 +26,9 @@ pub use bounds::{Bounds, RowBound};
 pub use conic::Status;
 pub use convex::{Optimum, least_gamma, least_squared_length, shortest, spacing_m};
 pub use deployment::{Deployment, DeploymentSearch};
-pub use descent::{DescentSettings, Start, descend, fastest, least_curvature, polish_lines};
+pub use descent::{
+    DescentSettings, Start, descend, fastest, least_curvature, least_curvature_of, polish_lines,
+};
 pub use geometry::LineMap;
 pub use lap::{Grip, Limits, SegmentBend, Slope};
 pub use objective::{LineProblem, Measures, Weights};

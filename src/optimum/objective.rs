@@ -3,6 +3,7 @@
 use super::geometry::{LineMap, Shape};
 use super::lap::{Lap, Limits, SegmentBend};
 use glam::DVec2;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// How much each measure of a line counts; nought leaves one out.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -59,6 +60,8 @@ pub struct LineProblem<'a> {
     pub spacing_m: Option<&'a [f64]>,
     /// Which curvature a lap drives segments with.
     pub bend: SegmentBend,
+    /// Raised, it ends a sequence of programs after the one at work.
+    pub stop: Option<&'a AtomicBool>,
 }
 
 impl<'a> LineProblem<'a> {
@@ -70,7 +73,13 @@ impl<'a> LineProblem<'a> {
             start_mps: 0.0,
             spacing_m: None,
             bend: SegmentBend::default(),
+            stop: None,
         }
+    }
+
+    /// Whether what is at work is to end.
+    pub(super) fn stopped(&self) -> bool {
+        self.stop.is_some_and(|stop| stop.load(Ordering::Relaxed))
     }
 
     /// Shape, lap (where time counts) and measures of line `x`; all measures infinite where it has two points in one place.

@@ -4,6 +4,7 @@
 //! these populations. Run again and given the answers it has had, it arrives at the place where it was broken off with every
 //! bit of its state, whatever that state is.
 
+use super::device_faults::DeviceFaults;
 use super::keeper::{Keeper, Origin};
 use super::run_folder::STATE;
 use crate::error::{Error, Result};
@@ -52,6 +53,11 @@ impl Journal {
         };
         journal.set_settings(settings)?;
         Ok(journal)
+    }
+
+    /// Whether nothing has been answered yet.
+    pub fn is_untouched(&self) -> bool {
+        self.answers.is_empty()
     }
 
     /// The settings that the study was begun with.
@@ -156,8 +162,7 @@ impl<'k> Recorder<'k> {
     pub fn over<'a>(&'a mut self, evaluator: &'a mut dyn Evaluator) -> Recorded<'a, 'k> {
         Recorded {
             recorder: self,
-            opening: evaluator.device_faults().len(),
-            seen: evaluator.device_faults().len(),
+            faults: DeviceFaults::of(evaluator),
             evaluator,
         }
     }
@@ -167,10 +172,7 @@ impl<'k> Recorder<'k> {
 pub struct Recorded<'a, 'k> {
     recorder: &'a mut Recorder<'k>,
     evaluator: &'a mut dyn Evaluator,
-    /// How many of the evaluator's faults were met when it was opened.
-    opening: usize,
-    /// How many of them are among those above, or need not be.
-    seen: usize,
+    faults: DeviceFaults,
 }
 
 fn crc_of(population: &[f64]) -> u32 {
@@ -213,13 +215,7 @@ impl Evaluator for Recorded<'_, '_> {
             return Ok(answer.evaluation.clone());
         }
         let evaluation = self.evaluator.evaluate(population)?;
-        let met = self.evaluator.device_faults();
-        let opening = std::mem::take(&mut self.opening);
-        // An evaluator that was opened anew to go on meets again what it met at first.
-        let again = |fault: &&String| !recorder.device_faults.contains(fault);
-        let mut device_faults: Vec<String> = met[..opening].iter().filter(again).cloned().collect();
-        device_faults.extend_from_slice(&met[self.seen..]);
-        self.seen = met.len();
+        let device_faults = self.faults.since(self.evaluator, &recorder.device_faults);
         recorder.device_faults.extend_from_slice(&device_faults);
         let backend = self.evaluator.backend();
         recorder.backend = Some(backend.clone());

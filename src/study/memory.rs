@@ -4,7 +4,7 @@
 //! beside that is cut to what is left, by [`portions`].
 
 use crate::error::{Error, Result};
-use crate::evaluate::portions;
+use crate::evaluate::portions::{self, Allowance};
 
 /// Memory that a study may take where nothing else is said (MiB).
 pub const USUAL_MIB: u64 = 4096;
@@ -46,24 +46,30 @@ pub fn needed_mib(kept: &[Kept]) -> u64 {
     needed(kept).div_ceil(1 << 20)
 }
 
+/// What is needed to keep all of this and to evaluate (bytes).
 fn needed(kept: &[Kept]) -> u64 {
     kept.iter().map(Kept::bytes).fold(LEAST, u64::saturating_add)
 }
 
-/// What a study keeps must fit into so much memory; the rest is left to its evaluators.
+fn bytes_of(limit_mib: u64) -> u64 {
+    limit_mib.saturating_mul(1 << 20)
+}
+
+/// What a study keeps must fit into so much memory; the rest is left to its evaluators as long as the allowance lives.
 ///
 /// # Errors
 /// [`Error::Input`] naming what takes most of it, and how much of that would fit beside the rest.
-pub fn check(kept: &[Kept], limit_mib: u64) -> Result<()> {
-    let limit = limit_mib.saturating_mul(1 << 20);
+pub fn check(kept: &[Kept], limit_mib: u64) -> Result<Allowance> {
+    let limit = bytes_of(limit_mib);
     let needed = needed(kept);
     let Some(largest) = kept
         .iter()
         .max_by_key(|kept| kept.bytes())
         .filter(|_| needed > limit)
     else {
-        portions::allow(limit.saturating_sub(needed).saturating_add(LEAST));
-        return Ok(());
+        return Ok(portions::allow(
+            limit.saturating_sub(needed).saturating_add(LEAST),
+        ));
     };
     let rest = needed.saturating_sub(largest.bytes());
     let expected = match limit.saturating_sub(rest) / largest.each.max(1) {
@@ -100,13 +106,31 @@ impl Size {
     ///
     /// # Errors
     /// As [`check`].
-    pub fn check(&self, limit_mib: u64) -> Result<()> {
+    pub fn check(&self, limit_mib: u64) -> Result<Allowance> {
         check(&self.kept(), limit_mib)
     }
 
     /// As [`needed_mib`] of all that the study keeps.
     pub fn needed_mib(&self) -> u64 {
         needed_mib(&self.kept())
+    }
+
+    /// As [`check`] of all that studies keep which run at the same time.
+    ///
+    /// # Errors
+    /// As [`check`].
+    pub fn check_together(sizes: &[Self], limit_mib: u64) -> Result<Allowance> {
+        check(&Self::kept_together(sizes), limit_mib)
+    }
+
+    /// How many of the studies, from the first on, may run at the same time; the first in any case.
+    pub fn together(sizes: &[Self], limit_mib: u64) -> usize {
+        let fit = |count: &usize| needed(&Self::kept_together(&sizes[..*count])) <= bytes_of(limit_mib);
+        (2..=sizes.len()).take_while(fit).last().unwrap_or(1)
+    }
+
+    fn kept_together(sizes: &[Self]) -> Vec<Kept> {
+        sizes.iter().flat_map(Self::kept).collect()
     }
 
     fn kept(&self) -> [Kept; 4] {
@@ -137,7 +161,7 @@ mod tests {
     use super::*;
 
     /// The figure that a refusal says would fit.
-    fn said_to_fit(refused: Result<()>) -> usize {
+    fn said_to_fit(refused: Result<Allowance>) -> usize {
         let said = refused.expect_err("it does not fit").to_string();
         said.split("at most ")
             .nth(1)
@@ -155,9 +179,9 @@ mod tests {
             archive: 100,
             ..Size::default()
         };
-        size(100_000).check(USUAL_MIB).expect("it fits");
+        drop(size(100_000).check(USUAL_MIB).expect("it fits"));
         let fitting = said_to_fit(size(1_000_000_000).check(USUAL_MIB));
-        size(fitting).check(USUAL_MIB).expect("as was said");
+        drop(size(fitting).check(USUAL_MIB).expect("as was said"));
         assert!(size(fitting + 1).check(USUAL_MIB).is_err());
         assert_eq!(size(fitting).needed_mib(), USUAL_MIB);
         assert!(size(fitting + 1).needed_mib() > USUAL_MIB);
@@ -171,6 +195,29 @@ mod tests {
     }
 
     #[test]
+    fn what_runs_together_shares_the_limit() {
+        let size = Size {
+            population: 1000,
+            variables: 22,
+            iterations: 1500,
+            ..Size::default()
+        };
+        let sizes = [size; 8];
+        let alone: u64 = size.kept().iter().map(Kept::bytes).sum();
+        for count in 1..=8u64 {
+            let limit_mib = (count * alone + LEAST).div_ceil(1 << 20);
+            // Rounded up to whole MiB there is not room for another.
+            assert!(alone > 1 << 20);
+            assert_eq!(Size::together(&sizes, limit_mib) as u64, count);
+            drop(Size::check_together(&sizes[..count as usize], limit_mib).expect("they fit"));
+            if count < 8 {
+                assert!(Size::check_together(&sizes[..=count as usize], limit_mib).is_err());
+            }
+        }
+        assert_eq!(Size::together(&sizes, 1), 1, "the first is refused by itself");
+    }
+
+    #[test]
     fn a_journal_counts() {
         let size = |iterations, journal| Size {
             population: 1000,
@@ -179,13 +226,15 @@ mod tests {
             journal,
             ..Size::default()
         };
-        size(10_000, false)
-            .check(1024)
-            .expect("without a journal it fits");
+        drop(
+            size(10_000, false)
+                .check(1024)
+                .expect("without a journal it fits"),
+        );
         let fitting = said_to_fit(size(10_000, true).check(1024));
         // 144 bytes to each of a thousand answers.
         assert!((7000..7500).contains(&fitting), "{fitting}");
-        size(fitting, true).check(1024).expect("as was said");
+        drop(size(fitting, true).check(1024).expect("as was said"));
         assert!(size(fitting + 1, true).check(1024).is_err());
     }
 }

@@ -2,6 +2,7 @@
 
 mod circuit_view;
 pub mod compare;
+mod device_faults;
 pub mod envelope;
 pub mod hybrid;
 pub mod identify;

@@ -1,7 +1,6 @@
 //! The folder that a run writes into: one run each, nothing overwritten, one process at a time.
 
 use crate::error::{Error, Result};
-use crate::evaluate::gpu::longest_dispatch_ms;
 use std::fs::{File, TryLockError};
 use std::io::{Read, Write};
 use std::ops::Deref;
@@ -14,6 +13,8 @@ const RUNS: &str = "runs";
 const LOCK: &str = ".lock";
 /// The state of a run that can be gone on with.
 pub const STATE: &str = "state.lapswarm";
+/// What a run writes before it begins.
+const SETTINGS: &str = "study.toml";
 /// What a finished or interrupted run leaves last.
 const MANIFEST: &str = "manifest.json";
 
@@ -21,6 +22,10 @@ const MANIFEST: &str = "manifest.json";
 #[derive(Debug)]
 pub struct RunFolder {
     path: PathBuf,
+    /// Whether this run is the first in it.
+    first: bool,
+    /// The folders that it made for that, the innermost first.
+    made: Vec<PathBuf>,
     _lock: File,
 }
 
@@ -40,8 +45,16 @@ impl AsRef<Path> for RunFolder {
 
 impl Drop for RunFolder {
     fn drop(&mut self) {
-        // A lock file that stays behind is nobody's, and the next run takes it.
+        // What cannot be removed stands in nobody's way: a lock file that stays behind is nobody's.
+        if self.first && !holds_more_than(&self.path, &[LOCK, SETTINGS]) {
+            // A run that has come to nothing, not even to a state.
+            let _ = std::fs::remove_file(self.path.join(SETTINGS));
+        }
         let _ = std::fs::remove_file(self.path.join(LOCK));
+        for folder in &self.made {
+            // Only what is empty goes.
+            let _ = std::fs::remove_dir(folder);
+        }
     }
 }
 
@@ -80,6 +93,8 @@ impl RunFolder {
             .map_err(failed)?;
         Ok(Self {
             path: path.to_owned(),
+            first: false,
+            made: Vec::new(),
             _lock: lock,
         })
     }
@@ -87,9 +102,7 @@ impl RunFolder {
 
 /// Whether a folder has anything in it but the lock of a run that has come to nothing.
 fn holds_something(folder: &Path) -> bool {
-    folder
-        .read_dir()
-        .is_ok_and(|entries| entries.flatten().any(|entry| entry.file_name() != LOCK))
+    holds_more_than(folder, &[LOCK])
 }
 
 /// The folder that [`create`] would create, which is not touched.
@@ -119,7 +132,23 @@ fn taken(folder: &Path) -> Error {
     )
 }
 
-/// Creates the folder of a run: `asked`, or the next free `runs/<study>-NNN`.
+fn holds_more_than(folder: &Path, names: &[&str]) -> bool {
+    folder.read_dir().is_ok_and(|mut entries| {
+        entries.any(|entry| entry.is_ok_and(|e| !names.iter().any(|name| e.file_name() == *name)))
+    })
+}
+
+/// The folder and those around it that are not there, the innermost first.
+fn missing(folder: &Path) -> Vec<PathBuf> {
+    let around = folder.ancestors().filter(|path| !path.as_os_str().is_empty());
+    around
+        .take_while(|path| !path.exists())
+        .map(Path::to_owned)
+        .collect()
+}
+
+/// Creates the folder of a run: `asked`, or the next free `runs/<study>-NNN`. It goes again with a run that leaves nothing in it
+/// but its settings.
 ///
 /// # Errors
 /// [`Error::Input`] if the folder asked for holds anything already or another process writes into it; [`Error::Io`] if it
@@ -129,20 +158,28 @@ pub fn create(study: &str, asked: Option<&Path>) -> Result<RunFolder> {
         if holds_something(folder) || folder.is_file() {
             return Err(taken(folder));
         }
+        let made = missing(folder);
         std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, "create", e))?;
-        let locked = RunFolder::lock(folder)?;
+        let mut locked = RunFolder::lock(folder)?;
         // Another run may have come and gone between the look and the lock.
         if holds_something(folder) {
             return Err(taken(folder));
         }
+        (locked.first, locked.made) = (true, made);
         return Ok(locked);
     }
+    let mut made = missing(Path::new(RUNS));
     std::fs::create_dir_all(RUNS).map_err(|e| Error::io(RUNS, "create", e))?;
     let mut number = 1u32;
     loop {
         let folder = Path::new(RUNS).join(format!("{study}-{number:03}"));
         match std::fs::create_dir(&folder) {
-            Ok(()) => return RunFolder::lock(&folder),
+            Ok(()) => {
+                let mut locked = RunFolder::lock(&folder)?;
+                made.insert(0, folder);
+                (locked.first, locked.made) = (true, made);
+                return Ok(locked);
+            }
             // Taken, perhaps just now by another process.
             Err(e) if e.kind() == std::io::ErrorKind::AlreadyExists => number += 1,
             Err(e) => return Err(Error::io(folder, "create", e)),
@@ -238,7 +275,7 @@ pub struct Manifest<'a> {
     pub settings: &'static str,
     /// Whether the run was broken off.
     pub interrupted: bool,
-    /// The longest that a dispatch has kept the device (ms); left out where none was at work.
+    /// The longest that a dispatch of the study kept the device (ms); left out where none was at work.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub longest_dispatch_ms: Option<f64>,
     /// What devices failed of and what was done about it; left out where nothing failed.
@@ -247,7 +284,8 @@ pub struct Manifest<'a> {
 }
 
 impl<'a> Manifest<'a> {
-    /// The manifest of a study on a backend; the log, the track and whether it was interrupted are filled in after.
+    /// The manifest of a study on a backend; the log, the track, what devices did and whether it was interrupted are filled in
+    /// after.
     pub fn new(
         study: &'static str,
         seed: u64,
@@ -267,7 +305,7 @@ impl<'a> Manifest<'a> {
             car,
             settings: "study.toml",
             interrupted: false,
-            longest_dispatch_ms: longest_dispatch_ms().filter(|_| backend.backend == "gpu"),
+            longest_dispatch_ms: None,
             device_faults: &[],
         }
     }
@@ -345,6 +383,33 @@ mod tests {
             all.into_iter().map(|t| t.join().expect("no panic")).collect()
         });
         assert_eq!(got.iter().filter(|g| **g).count(), 1);
+    }
+
+    #[test]
+    fn a_run_that_comes_to_nothing_takes_its_folder_with_it() {
+        let root = tempfile::tempdir().expect("a temporary folder");
+        let folder = root.path().join("run");
+        let begin = |leaves: &[&str]| {
+            let held = create("study", Some(&folder)).expect("a new folder");
+            for name in leaves {
+                std::fs::write(held.join(name), "something").expect("a file");
+            }
+        };
+        begin(&[]);
+        assert!(!folder.exists());
+        let deep = root.path().join("a/b/run");
+        drop(create("study", Some(&deep)).expect("a new folder"));
+        assert!(!root.path().join("a").exists() && root.path().is_dir());
+        begin(&[SETTINGS]);
+        assert!(!folder.exists());
+        // Of a folder that was there before, only what the run wrote goes.
+        std::fs::create_dir(&folder).expect("a folder");
+        begin(&[SETTINGS]);
+        assert!(folder.is_dir() && !holds_something(&folder));
+        begin(&[SETTINGS, STATE]);
+        assert!(folder.join(SETTINGS).is_file() && folder.join(STATE).is_file());
+        drop(reopen(&folder).expect("a state"));
+        assert!(folder.join(SETTINGS).is_file() && folder.join(STATE).is_file());
     }
 
     #[test]

@@ -10,6 +10,6 @@ pub mod shader;
 
 pub use adapter::{ADAPTER_VARIABLE, DeviceKind, DeviceSummary, devices};
 pub use context::{Binding, GpuContext, Kernel};
-pub use dispatches::longest_dispatch_ms;
+pub use dispatches::DispatchWatch;
 pub(crate) use pacing::Pacing;
 pub use pacing::StepBatching;

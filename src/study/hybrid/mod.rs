@@ -17,7 +17,7 @@ mod worth;
 pub use results::{HybridSummary, ScenarioFigures, summarise, write_results};
 pub use scenario::{ReportedLap, Scenario, drive, published};
 pub use settings::{FreePart, HYBRID_OBJECTIVES, HybridStudySettings};
-pub use setup::{HybridSetup, read_inputs, set_up};
+pub use setup::{HybridInputs, HybridSetup, read_inputs, read_line, set_up};
 pub use sizing::{ENGINES, Sizing, engine_only, size};
 pub use stint::{StintLap, stint};
 pub use strategy::{FoundStrategy, StrategyFront, search_front, search_strategy, zone_gates, zone_starts};
@@ -25,6 +25,7 @@ pub use worth::{Worth, correlation, mean_worths, worth};
 
 use crate::error::Result;
 use crate::evaluate::BackendInfo;
+use crate::evaluate::gpu::DispatchWatch;
 use crate::line::energy::{Gates, Mode};
 use crate::optimum::Deployment;
 use crate::study::journal::Recorder;
@@ -89,6 +90,8 @@ pub struct Outcome {
     pub backend: BackendInfo,
     /// What went wrong with devices and was got over.
     pub device_faults: Vec<String>,
+    /// The longest that a dispatch kept the device (ms); nothing where none was at work.
+    pub longest_dispatch_ms: Option<f64>,
     /// Laps evaluated.
     pub evaluations: u64,
     /// Time of the swarms (s).
@@ -132,6 +135,7 @@ pub fn run_recorded(
     recorder: &mut Recorder<'_>,
     mut observe: impl FnMut(&HybridProgress) -> ControlFlow<()>,
 ) -> Result<Outcome> {
+    let dispatches = DispatchWatch::begin();
     let began = Instant::now();
     let backend = probe(setup, settings)?;
     let mut inputs = Inputs::new("hybrid");
@@ -178,6 +182,7 @@ pub fn run_recorded(
         sizing,
         backend,
         device_faults: Vec::new(),
+        longest_dispatch_ms: None,
         search_s: 0.0,
         elapsed_s: 0.0,
         interrupted,
@@ -245,6 +250,7 @@ pub fn run_recorded(
         });
     }
     outcome.device_faults = recorder.device_faults().to_vec();
+    outcome.longest_dispatch_ms = dispatches.longest_ms();
     if let Some(backend) = recorder.backend() {
         outcome.backend.clone_from(backend);
     }

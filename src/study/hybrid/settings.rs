@@ -119,8 +119,8 @@ impl Default for HybridStudySettings {
     }
 }
 
-/// Searches that a sizing comes to at most: the strategy's own, and in each of eight ranges a whole one and seven of a quarter.
-const SIZING: usize = 24;
+/// Searches that a sizing comes to at most: in each of eight ranges a whole one and seven of a quarter.
+const SIZING: usize = 22;
 
 /// Objectives that a study may name.
 pub const HYBRID_OBJECTIVES: &str = "lap_time_s, fuel_l, energy_used_mj, soc_swing";
@@ -221,19 +221,26 @@ impl HybridStudySettings {
         Ok(s)
     }
 
-    /// What the study's memory goes with.
+    /// What the study's memory goes with at the least, whatever the track; see
+    /// [`HybridInputs::size`](super::HybridInputs::size).
     pub fn size(&self) -> Size {
+        self.size_of(1)
+    }
+
+    /// What the study's memory goes with, with so many variables of a strategy and a line.
+    pub(super) fn size_of(&self, variables: usize) -> Size {
+        let front = usize::from(self.objectives.len() > 1);
+        let sizing = if self.match_lap_time_s.is_some() {
+            SIZING
+        } else {
+            0
+        };
+        let searches = if self.optimise { 1 + front } else { 0 } + sizing;
         Size {
             population: self.population,
-            // Zones and control points are fewer than the sections of the line.
-            variables: self.sections,
-            // Sizes are searched for each range and energy, all of which the journal holds.
-            iterations: self.iterations
-                * if self.match_lap_time_s.is_some() {
-                    SIZING
-                } else {
-                    1
-                },
+            variables,
+            // The journal holds those of all searches.
+            iterations: self.iterations.saturating_mul(searches),
             sections: self.sections,
             archive: 0,
             journal: true,

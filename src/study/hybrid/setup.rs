@@ -1,16 +1,20 @@
 //! Track, car and line.
 
 use super::settings::HybridStudySettings;
+use super::strategy::{GAP_M, control_points};
 use crate::error::{Error, Result};
 use crate::evaluate::hybrid::HybridLine;
 use crate::evaluate::line::LineObjective;
 use crate::line::FineLine;
 use crate::line::energy::{EnergyCar, Traction, hybrid_parts};
 use crate::study::envelope::{EnvelopeSettings, car_limits};
+use crate::study::memory::Size;
 use crate::study::raceline::{self, ExactSolvers, RacelineSettings};
 use crate::vehicle::{Car, Envelope};
 use glam::DVec2;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Everything that laps are driven with.
 #[derive(Clone, Debug)]
@@ -48,31 +52,29 @@ pub(super) fn late_bend(curvature_1pm: &[f64]) -> usize {
         .unwrap_or(0)
 }
 
-/// A line's name and its points (m).
-type ReadLine = (String, Vec<DVec2>);
+/// Track, car and limits as they are read; the line may be still to be found.
+#[derive(Clone, Debug)]
+pub struct HybridInputs {
+    raceline: raceline::Setup,
+    raceline_settings: RacelineSettings,
+    car: EnergyCar,
+    /// The points of a line that is given (m).
+    given: Option<Vec<DVec2>>,
+}
 
-/// Reads all that the settings name: track and limits, the car, and the line where one is given. What is least work comes
-/// first, so that a mistake shows at once.
+/// Reads all that the settings name: the car, the line where one is given, track and limits. What is least work comes first, so
+/// that a mistake shows at once.
 ///
 /// # Errors
 /// [`Error::Input`] and [`Error::Io`] for what cannot be read or used, such as a car without a hybrid drive.
-pub fn read_inputs(settings: &HybridStudySettings) -> Result<(raceline::Setup, Car, Option<ReadLine>)> {
+pub fn read_inputs(settings: &HybridStudySettings) -> Result<HybridInputs> {
     settings.validate()?;
     let car = Car::load(&settings.car)?;
     hybrid_parts(&car)?;
-    let read = |path: &PathBuf| Ok((path.display().to_string(), read_line(path, settings.spacing_m)?));
-    let line = settings.line.as_ref().map(read).transpose()?;
-    Ok((raceline::set_up(&settings.raceline())?, car, line))
-}
-
-/// Reads track and car and finds the line.
-///
-/// # Errors
-/// [`Error::Input`] and [`Error::Io`] for what cannot be read or used; [`Error::Study`] if the solver of the fastest line
-/// refuses.
-pub fn set_up(settings: &HybridStudySettings) -> Result<HybridSetup> {
-    let (mut setup, car, line) = read_inputs(settings)?;
+    let read = |path: &PathBuf| read_line(path, settings.spacing_m);
+    let given = settings.line.as_ref().map(read).transpose()?;
     let raceline_settings = settings.raceline();
+    let mut raceline = raceline::set_up(&raceline_settings)?;
     let (envelope, traction) = match &settings.envelope {
         Some(path) => (Envelope::load(path)?, Traction::default()),
         None => {
@@ -82,32 +84,99 @@ pub fn set_up(settings: &HybridStudySettings) -> Result<HybridSetup> {
         }
     };
     let car = EnergyCar::new(car, envelope, traction, raceline_settings.ellipse_exponent)?;
-    setup.car = car.point_mass.clone();
-    let closed = setup.cuts.closed;
-    let (line_name, alpha, through) = match line {
-        Some((name, points)) => (name, None, points),
-        None => {
-            let found = ExactSolvers::new(&setup, &raceline_settings)?.best(LineObjective::LapTime)?;
-            let Some(found) = found else {
-                return Err(Error::Study("there is no solver for the fastest line".to_owned()));
-            };
-            let points = setup.cuts.points(&found.alpha);
-            ("fastest".to_owned(), Some(found.alpha), points)
-        }
-    };
-    let fine = FineLine::new(&through, closed, settings.spacing_m, None, settings.entry_mps)?;
-    Ok(HybridSetup {
-        run_in: late_bend(&fine.curvature_1pm),
-        length_m: fine.length_m,
-        points_m: fine.points_m,
-        closed,
-        car,
-        line_name,
-        alpha,
-        entry_mps: settings.entry_mps,
-        raceline: setup,
+    raceline.car = car.point_mass.clone();
+    if let Some(points) = &given {
+        // As it will be driven, so that what is no line is refused before anything is begun.
+        let closed = raceline.cuts.closed;
+        FineLine::new(points, closed, settings.spacing_m, None, settings.entry_mps)?;
+    }
+    Ok(HybridInputs {
+        raceline,
         raceline_settings,
+        car,
+        given,
     })
+}
+
+impl HybridInputs {
+    /// Track and limits as racing lines know them.
+    pub fn road(&self) -> &raceline::Setup {
+        &self.raceline
+    }
+
+    /// The car.
+    pub fn car(&self) -> &EnergyCar {
+        &self.car
+    }
+
+    /// How many points a line has that is given.
+    pub fn given_points(&self) -> Option<usize> {
+        self.given.as_ref().map(Vec::len)
+    }
+
+    /// What the study's memory goes with on this track.
+    pub fn size(&self, settings: &HybridStudySettings) -> Size {
+        let zones = (self.raceline.cuts.length_m / GAP_M).ceil() as usize;
+        let controls = control_points(&self.raceline.cuts);
+        // The motor's power is one more.
+        settings.size_of(zones + controls + 1)
+    }
+
+    /// Finds the line, if none is given; nothing if `stop` was raised before it was found.
+    ///
+    /// # Errors
+    /// [`Error::Study`] if the solver of the fastest line refuses.
+    pub fn with_line(
+        self,
+        settings: &HybridStudySettings,
+        stop: &Arc<AtomicBool>,
+    ) -> Result<Option<HybridSetup>> {
+        let Self {
+            raceline,
+            raceline_settings,
+            car,
+            given,
+        } = self;
+        let closed = raceline.cuts.closed;
+        let (line_name, alpha, through) = match (&settings.line, given) {
+            (Some(path), Some(points)) => (path.display().to_string(), None, points),
+            _ => {
+                let solvers =
+                    ExactSolvers::stopped_by(&raceline, &raceline_settings, Some(Arc::clone(stop)))?;
+                let found = solvers.best(LineObjective::LapTime)?;
+                if stop.load(Ordering::Relaxed) {
+                    return Ok(None);
+                }
+                let Some(found) = found else {
+                    return Err(Error::Study("there is no solver for the fastest line".to_owned()));
+                };
+                let points = raceline.cuts.points(&found.alpha);
+                ("fastest".to_owned(), Some(found.alpha), points)
+            }
+        };
+        let fine = FineLine::new(&through, closed, settings.spacing_m, None, settings.entry_mps)?;
+        Ok(Some(HybridSetup {
+            run_in: late_bend(&fine.curvature_1pm),
+            length_m: fine.length_m,
+            points_m: fine.points_m,
+            closed,
+            car,
+            line_name,
+            alpha,
+            entry_mps: settings.entry_mps,
+            raceline,
+            raceline_settings,
+        }))
+    }
+}
+
+/// Reads track and car and finds the line.
+///
+/// # Errors
+/// Those of [`read_inputs`] and [`HybridInputs::with_line`].
+pub fn set_up(settings: &HybridStudySettings) -> Result<HybridSetup> {
+    let found = read_inputs(settings)?.with_line(settings, &Arc::default())?;
+    found.ok_or_else(|| Error::Study("the search for the line was broken off".to_owned()))
 }
 
 impl HybridSetup {
@@ -128,8 +197,11 @@ impl HybridSetup {
     }
 }
 
-/// Points of a line from the columns `x` and `y`, whatever their units are written like, at least `spacing_m` apart.
-fn read_line(path: &Path, spacing_m: f64) -> Result<Vec<DVec2>> {
+/// Points of a line from the columns `x` and `y` in m, whatever that is written like, at least `spacing_m` apart.
+///
+/// # Errors
+/// [`Error::Io`] if it cannot be read, [`Error::Input`] naming line and field where it is no table of points.
+pub fn read_line(path: &Path, spacing_m: f64) -> Result<Vec<DVec2>> {
     let file = path.display().to_string();
     let text = crate::config::read_text(path)?;
     let mut reader = csv::ReaderBuilder::new()

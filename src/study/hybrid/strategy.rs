@@ -16,14 +16,20 @@ use crate::study::journal::Recorder;
 use crate::swarm::{
     HybridSettings, HybridSwarm, Mopso, MopsoSettings, Optimiser, Progress, PsoSettings, run,
 };
+use crate::track::CrossSections;
 use std::ops::ControlFlow;
 
 /// Gaps shorter than this do not end a stretch (m).
-const GAP_M: f64 = 8.0;
+pub(super) const GAP_M: f64 = 8.0;
 /// Stretches of less are none (J).
 const LEAST_J: f64 = 5e3;
 /// Metres of the reference line for each control point of free lines.
 const CONTROL_SPACING_M: f64 = 40.0;
+
+/// Control points of lines across these cuts.
+pub(super) fn control_points(cuts: &CrossSections) -> usize {
+    ((cuts.length_m / CONTROL_SPACING_M) as usize).clamp(4, cuts.len().max(4))
+}
 
 /// Gates that leave all to the zones, but for the energy (MJ).
 pub fn zone_gates(energy_mj: f64) -> Gates {
@@ -231,8 +237,7 @@ pub fn search_front(
             let mut cuts = setup.raceline.cuts.clone();
             cuts.reference.clone_from(alpha);
             let n = cuts.len();
-            let controls = ((cuts.length_m / CONTROL_SPACING_M) as usize).clamp(4, n);
-            let parametrisation = Parametrisation::control_points(controls);
+            let parametrisation = Parametrisation::control_points(control_points(&cuts));
             let coefficients = parametrisation.fit(&cuts, alpha)?;
             let line = parametrisation.variables_of(&coefficients);
             // Zones lie where they do on the fixed line, by distance.

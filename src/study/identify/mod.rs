@@ -17,8 +17,8 @@ pub use identifiability::{Identifiability, judge};
 pub use polish::{Polished, polish};
 pub use results::{Summary, summarise, write_results};
 pub use search::{
-    Front, HistoryRow, Judged, Outcome, Report, Stage, judge_candidate, search, search_from, search_with,
-    total_parameter_error,
+    Front, HistoryRow, Judged, Outcome, Report, Stage, check_swarms, judge_candidate, search, search_from,
+    search_with, total_parameter_error,
 };
 pub use settings::{
     Algorithm, FreeParameter, IdentifySettings, ObjectiveChoice, parse_algorithm, parse_backend, parse_norm,

@@ -7,8 +7,10 @@ use super::settings::{Algorithm, IdentifySettings};
 use super::setup::{CHANNELS, Setup};
 use super::state::{Place, SearchState, inputs_of};
 use crate::error::{Error, Result};
+use crate::evaluate::gpu::DispatchWatch;
 use crate::evaluate::replay::{ReplayProblem, open_evaluator, trace};
 use crate::evaluate::{BackendInfo, Evaluator, FAILED_COST, FailureCounts, add_failures};
+use crate::study::device_faults::DeviceFaults;
 use crate::study::keeper::{Keeper, Origin};
 use crate::swarm::{CovarianceSettings, CovarianceSwarm, Mopso, MopsoSettings, Progress, Pso, PsoSettings};
 use serde::{Deserialize, Serialize};
@@ -82,6 +84,8 @@ pub struct Outcome {
     pub failures: FailureCounts,
     /// What went wrong with devices and was got over.
     pub device_faults: Vec<String>,
+    /// The longest that a dispatch kept the device (ms); nothing where none was at work.
+    pub longest_dispatch_ms: Option<f64>,
     /// Candidates evaluated by the swarm.
     pub evaluations: u64,
     /// Time that the swarm took, s.
@@ -146,6 +150,7 @@ pub fn search_with(
     (state, keeper): (Option<SearchState>, &mut Keeper),
     mut observe: impl FnMut(&Report<'_>) -> ControlFlow<()>,
 ) -> Result<Outcome> {
+    let dispatches = DispatchWatch::begin();
     let replay = &setup.replay;
     let origin = Origin::new(inputs_of(setup), &evaluator.backend());
     let mut state = match state {
@@ -165,7 +170,7 @@ pub fn search_with(
     };
     keeper.keep(&state)?;
     let before_s = state.elapsed_s;
-    let earlier_faults = state.device_faults.clone();
+    let mut faults = DeviceFaults::of(evaluator);
     let began = Instant::now();
     let mut interrupted = false;
     while !matches!(state.place, Place::Searched { .. }) {
@@ -176,7 +181,8 @@ pub fn search_with(
         };
         state.elapsed_s = before_s + began.elapsed().as_secs_f64();
         state.note(&progress);
-        state.device_faults = [&earlier_faults[..], evaluator.device_faults()].concat();
+        let met = faults.since(evaluator, &state.device_faults);
+        state.device_faults.extend(met);
         let flow = observe(&Report {
             stage,
             planned,
@@ -225,6 +231,7 @@ pub fn search_with(
         backend,
         failures: state.failures,
         device_faults: state.device_faults,
+        longest_dispatch_ms: dispatches.longest_ms(),
         evaluations,
         swarm_s,
         polish_evaluations,
@@ -244,22 +251,45 @@ fn first_place(settings: &IdentifySettings, setup: &Setup) -> Result<Place> {
     })
 }
 
+/// Checks that the swarms which the search is to have can be.
+///
+/// # Errors
+/// [`Error::Input`] naming the setting.
+pub fn check_swarms(settings: &IdentifySettings, setup: &Setup) -> Result<()> {
+    if let Place::Explore(_) = first_place(settings, setup)?
+        && settings.algorithm == Algorithm::Adaptive
+    {
+        let problem = &setup.replay.problem;
+        let middle: Vec<f64> = problem
+            .variables
+            .iter()
+            .map(|v| 0.5 * (v.lower + v.upper))
+            .collect();
+        CovarianceSwarm::new(problem, &middle, gathering(settings))?;
+    }
+    Ok(())
+}
+
+/// The swarm that gathers.
+fn gathering(settings: &IdentifySettings) -> CovarianceSettings {
+    CovarianceSettings {
+        population: settings.population.unwrap_or(GATHER.0),
+        iterations: settings.iterations.unwrap_or(GATHER.1),
+        seed: settings.seed,
+        // Along the valley what did not pay tells as much as what did: it halves the error that is left.
+        active: true,
+        ..CovarianceSettings::default()
+    }
+}
+
 /// What comes after a stage that is done.
 fn next_place(place: Place, settings: &IdentifySettings, evaluator: &mut dyn Evaluator) -> Result<Place> {
     if let Place::Explore(swarm) = &place
         && settings.algorithm == Algorithm::Adaptive
     {
         let (best, cost) = swarm.best_candidate();
-        let gathering = CovarianceSettings {
-            population: settings.population.unwrap_or(GATHER.0),
-            iterations: settings.iterations.unwrap_or(GATHER.1),
-            seed: settings.seed,
-            // Along the valley what did not pay tells as much as what did: it halves the error that is left.
-            active: true,
-            ..CovarianceSettings::default()
-        };
         let seen = Logarithmic::new(evaluator);
-        let swarm = CovarianceSwarm::new(seen.problem(), &seen.of_parameters(&best), gathering)?;
+        let swarm = CovarianceSwarm::new(seen.problem(), &seen.of_parameters(&best), gathering(settings))?;
         return Ok(Place::Gather {
             best,
             cost,

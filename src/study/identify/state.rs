@@ -42,6 +42,13 @@ pub struct SearchState {
     pub(super) place: Place,
 }
 
+impl SearchState {
+    /// Whether nothing has been evaluated yet.
+    pub fn is_untouched(&self) -> bool {
+        self.history.is_empty()
+    }
+}
+
 impl Checkpoint for SearchState {
     const KIND: &'static str = concat!("search of identify, lapswarm ", env!("CARGO_PKG_VERSION"));
 }

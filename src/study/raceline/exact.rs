@@ -7,10 +7,12 @@ use crate::evaluate::line::LineObjective;
 use crate::line::{FineLine, PointMass, cuts_about, shares_across};
 use crate::optimum::{
     Bounds, DescentSettings, LineMap, LineProblem, Optimum, PointMassLimits, Start, Status, Weights, fastest,
-    least_curvature, least_gamma, least_squared_length, polish_lines, shortest,
+    least_curvature, least_curvature_of, least_gamma, least_squared_length, polish_lines, shortest,
 };
 use crate::track::CrossSections;
 use glam::DVec2;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 /// The solvers on one track.
 ///
@@ -26,6 +28,7 @@ pub struct ExactSolvers {
     limits: Option<PointMassLimits>,
     car: PointMass,
     entry_mps: f64,
+    stop: Option<Arc<AtomicBool>>,
 }
 
 /// A line of the exact solvers.
@@ -95,12 +98,28 @@ impl ExactSolvers {
     /// # Errors
     /// [`crate::Error::Input`] for a car that cannot be; [`crate::Error::Study`] if the least curved line is refused.
     pub fn new(setup: &Setup, settings: &RacelineSettings) -> Result<Self> {
+        Self::stopped_by(setup, settings, None)
+    }
+
+    /// As [`ExactSolvers::new`], ended by the flag: what they say once it is raised is no optimum.
+    ///
+    /// # Errors
+    /// As [`ExactSolvers::new`].
+    pub fn stopped_by(
+        setup: &Setup,
+        settings: &RacelineSettings,
+        stop: Option<Arc<AtomicBool>>,
+    ) -> Result<Self> {
         let cuts = setup.cuts.clone();
         let map = LineMap::at_every_cut(&cuts);
         let bounds = Bounds::road(cuts.len());
         let spacing_m = cuts.spacing_m();
         let start = least_gamma(&map, &spacing_m, &bounds)?.x;
-        let base = least_curvature(&map, &bounds, &start)?.x;
+        let curvature = LineProblem {
+            stop: stop.as_deref(),
+            ..LineProblem::of(&map)
+        };
+        let base = least_curvature_of(&curvature, &bounds, &start)?.x;
         let controls = (cuts.len() / CUTS_PER_CONTROL).max(4);
         Ok(Self {
             smooth: LineMap::spline_about(&cuts, &base, controls),
@@ -115,6 +134,7 @@ impl ExactSolvers {
             entry_mps: settings.entry_mps,
             spacing_m,
             cuts,
+            stop,
         })
     }
 
@@ -123,6 +143,7 @@ impl ExactSolvers {
             limits: self.limits.as_ref().map(|l| l as _),
             start_mps: self.entry_mps,
             spacing_m: Some(&self.spacing_m),
+            stop: self.stop.as_deref(),
             ..LineProblem::of(map)
         }
     }

@@ -88,6 +88,7 @@ pub(super) fn search_objective(
         start,
         backend: settings.backend,
         adapter: settings.adapter.as_deref(),
+        known_faults: &[],
     };
     if objective != LineObjective::LapTime {
         return search_step(&search, &plain, objective, (0, 0), work);
@@ -284,7 +285,12 @@ fn search_step(
     let before_s = work.state.elapsed_s;
     let began = Instant::now();
     let state = work.state.search.take().map(|state| *state);
-    let found = search_line_from(search, settings, state, |progress, state| {
+    let known_faults = work.state.device_faults();
+    let search = LineSearch {
+        known_faults: &known_faults,
+        ..*search
+    };
+    let found = search_line_from(&search, settings, state, |progress, state| {
         let told = StudyProgress {
             stage: line_name(objective).to_owned(),
             evaluations: before + progress.evaluations,

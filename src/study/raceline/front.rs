@@ -8,6 +8,7 @@ use crate::evaluate::line::{LineProblem, open_line_evaluator};
 use crate::evaluate::{BackendInfo, Evaluator, FAILED_COST, FailureCounts, add_failures};
 use crate::line::Parametrisation;
 use crate::random::Random;
+use crate::study::device_faults::DeviceFaults;
 use crate::swarm::metrics::hypervolume;
 use crate::swarm::{Archive, Mopso, MopsoSettings, Optimiser, Progress, PsoSettings, Truncation, step};
 use serde::{Deserialize, Serialize};
@@ -68,7 +69,7 @@ pub fn search_front(
     known: &[Vec<f64>],
     mut observe: impl FnMut(&Progress) -> ControlFlow<()>,
 ) -> Result<LineFront> {
-    search_front_from(setup, settings, solvers, known, None, |progress, _| {
+    search_front_from(setup, settings, solvers, known, None, &[], |progress, _| {
         Ok(observe(progress))
     })
 }
@@ -84,6 +85,7 @@ pub(super) fn search_front_from(
     solvers: &ExactSolvers,
     known: &[Vec<f64>],
     state: Option<FrontState>,
+    known_faults: &[String],
     mut observe: impl FnMut(&Progress, &FrontState) -> Result<ControlFlow<()>>,
 ) -> Result<LineFront> {
     let cuts = &setup.cuts;
@@ -111,11 +113,14 @@ pub(super) fn search_front_from(
         }
     };
     let mut evaluator = open_line_evaluator(&problem, settings.backend, settings.adapter.as_deref())?;
-    let earlier_faults = state.device_faults.clone();
+    let mut faults = DeviceFaults::of(evaluator.as_ref());
+    // Opened anew, a device may meet what it has met before.
+    let told = |own: &[String]| [known_faults, own].concat();
     while !state.swarm.done() {
         let progress = step(&mut state.swarm, evaluator.as_mut())?;
         add_failures(&mut state.failures, &progress.failures);
-        state.device_faults = [&earlier_faults[..], evaluator.device_faults()].concat();
+        let met = faults.since(evaluator.as_ref(), &told(&state.device_faults));
+        state.device_faults.extend(met);
         if observe(&progress, &state)?.is_break() {
             break;
         }
@@ -134,6 +139,7 @@ pub(super) fn search_front_from(
         settings.entry_mps,
     )?;
     let mut judge = open_line_evaluator(&whole, settings.backend, settings.adapter.as_deref())?;
+    let mut judging = DeviceFaults::of(judge.as_ref());
     let mut lines: Vec<Vec<f64>> = swarm
         .archive_candidates()
         .iter()
@@ -179,7 +185,8 @@ pub(super) fn search_front_from(
     } else {
         f64::NAN
     };
-    device_faults.extend_from_slice(judge.device_faults());
+    let met = judging.since(judge.as_ref(), &told(&device_faults));
+    device_faults.extend(met);
     Ok(LineFront {
         device_faults,
         backend: Some(judge.backend()),

@@ -26,14 +26,18 @@ pub use settings::{LineAlgorithm, OBJECTIVE_NAMES, RacelineSettings};
 pub use state::LinesState;
 
 use crate::error::Result;
+use crate::evaluate::gpu::DispatchWatch;
 use crate::evaluate::line::{LineObjective, LineProblem, open_line_evaluator};
 use crate::evaluate::{BackendInfo, FailureCounts, add_failures};
 use crate::line::Parametrisation;
 use crate::study::keeper::{Keeper, Origin};
+use crate::swarm::Progress;
 use fast::search_objective;
-use front::search_front_from;
+use front::{FrontState, search_front_from};
 use state::{FinishedObjective, Work, inputs_of};
 use std::ops::ControlFlow;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 /// What one objective came to.
@@ -69,6 +73,8 @@ pub struct Outcome {
     pub failures: FailureCounts,
     /// What went wrong with devices and was got over.
     pub device_faults: Vec<String>,
+    /// The longest that a dispatch kept the device (ms); nothing where none was at work.
+    pub longest_dispatch_ms: Option<f64>,
     /// Lines evaluated by the swarms.
     pub evaluations: u64,
     /// Time of the swarms and the local search (s).
@@ -130,6 +136,7 @@ pub fn find_lines_from(
     keeper: &mut Keeper,
     mut observe: impl FnMut(&StudyProgress) -> ControlFlow<()>,
 ) -> Result<Outcome> {
+    let dispatches = DispatchWatch::begin();
     // A small problem of the same kind says what it is that evaluates.
     let probe = LineProblem::new(
         setup.cuts.clone(),
@@ -166,7 +173,8 @@ pub fn find_lines_from(
     };
 
     let reference = setup.report("reference", &setup.cuts.reference, settings)?;
-    let solvers = ExactSolvers::new(setup, settings)?;
+    let stop = Arc::new(AtomicBool::new(false));
+    let solvers = ExactSolvers::stopped_by(setup, settings, Some(Arc::clone(&stop)))?;
     let began = Instant::now();
     let mut device_faults = Vec::new();
     let mut failures = FailureCounts::new();
@@ -255,6 +263,8 @@ pub fn find_lines_from(
                 exact_status: exact.as_ref().map(|o| (format!("{:?}", o.status), o.seconds)),
             });
             if work.interrupted {
+                // Nor are the solvers still at work waited for.
+                stop.store(true, Ordering::Relaxed);
                 break;
             }
         }
@@ -266,7 +276,7 @@ pub fn find_lines_from(
     if settings.objectives.len() > 1 && !work.interrupted {
         let known: Vec<Vec<f64>> = objectives.iter().map(|o| o.best.alpha.clone()).collect();
         let front_state = work.state.front.take().map(|state| *state);
-        let found = search_front_from(setup, settings, &solvers, &known, front_state, |progress, at| {
+        let watch = |progress: &Progress, at: &FrontState| {
             let best: Vec<String> = progress.best.iter().map(|b| format!("{b:.4}")).collect();
             let told = StudyProgress {
                 stage: "front".to_owned(),
@@ -277,7 +287,16 @@ pub fn find_lines_from(
                 state.front = Some(Box::new(at.clone()));
                 state.elapsed_s = before_s + began.elapsed().as_secs_f64();
             })
-        })?;
+        };
+        let found = search_front_from(
+            setup,
+            settings,
+            &solvers,
+            &known,
+            front_state,
+            &device_faults,
+            watch,
+        )?;
         evaluations += found.evaluations;
         device_faults.extend_from_slice(&found.device_faults);
         add_failures(&mut failures, &found.failures);
@@ -294,6 +313,7 @@ pub fn find_lines_from(
         reference,
         backend,
         device_faults,
+        longest_dispatch_ms: dispatches.longest_ms(),
         failures,
         evaluations,
         search_s: before_s + began.elapsed().as_secs_f64() - waited_s,

@@ -9,6 +9,7 @@ use crate::error::Result;
 use crate::evaluate::line::{CpuLineEvaluator, LineObjective, LineProblem, open_line_evaluator};
 use crate::evaluate::{Evaluator, FailureCounts, add_failures};
 use crate::line::Parametrisation;
+use crate::study::device_faults::DeviceFaults;
 use crate::swarm::{CooperativeSettings, CooperativeSwarm, Optimiser, Pso, PsoSettings, step};
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
@@ -101,11 +102,15 @@ pub(super) fn search_plainly(
         Some(state) => *state,
         None => PlainState::new(settings, &problem)?,
     };
-    let earlier_faults = state.device_faults.clone();
+    let known = work.state.device_faults();
+    let mut faults = DeviceFaults::of(evaluator.as_ref());
     while !state.swarm.swarm().done() {
         let progress = step(state.swarm.swarm_mut(), evaluator.as_mut())?;
         add_failures(&mut state.failures, &progress.failures);
-        state.device_faults = [&earlier_faults[..], evaluator.device_faults()].concat();
+        let told = [&known[..], &state.device_faults].concat();
+        state
+            .device_faults
+            .extend(faults.since(evaluator.as_ref(), &told));
         let elapsed_s = before_s + began.elapsed().as_secs_f64();
         state.history.push(LevelRow {
             controls: problem.dimensions(),

@@ -7,6 +7,7 @@ use crate::error::{Error, Result};
 use crate::evaluate::line::{CpuLineEvaluator, LineObjective, LineProblem, open_line_evaluator};
 use crate::evaluate::{BackendChoice, BackendInfo, Evaluator, FailureCounts, add_failures};
 use crate::line::{Parametrisation, PointMass, TERMS};
+use crate::study::device_faults::DeviceFaults;
 use crate::swarm::{Optimiser, WindowSettings, WindowSwarm};
 use crate::track::CrossSections;
 use rayon::prelude::*;
@@ -31,6 +32,8 @@ pub struct LineSearch<'a> {
     pub backend: BackendChoice,
     /// Part of the name of the GPU to use.
     pub adapter: Option<&'a str>,
+    /// What is known to go wrong with devices, and is not told again where another is opened.
+    pub known_faults: &'a [String],
 }
 
 /// Settings of [`search_line`].
@@ -273,7 +276,7 @@ pub fn search_line_from(
             (state.before, state.rounds) = (f64::INFINITY, 0);
         }
         let mut evaluator = open_line_evaluator(&line, search.backend, search.adapter)?;
-        let earlier_faults = state.found.device_faults.len();
+        let mut faults = DeviceFaults::of(evaluator.as_ref());
         let last = level + 1 == levels.len();
         let least_gain = settings.least_gain * if last { 0.2 } else { 1.0 };
         let mut stopped = false;
@@ -311,12 +314,9 @@ pub fn search_line_from(
                 state.before = best;
             }
             state.elapsed_s = before_s + clock.elapsed().as_secs_f64();
-            // Those of this evaluator so far, in the place of those that it had before.
-            state.found.device_faults.truncate(earlier_faults);
-            state
-                .found
-                .device_faults
-                .extend_from_slice(evaluator.device_faults());
+            let told = [search.known_faults, &state.found.device_faults].concat();
+            let met = faults.since(evaluator.as_ref(), &told);
+            state.found.device_faults.extend(met);
             state.found.backend = Some(evaluator.backend());
             // A settled level is left before anyone can break off: its swarm would go on if it were taken up again.
             if !settled {

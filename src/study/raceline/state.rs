@@ -40,6 +40,23 @@ pub struct LinesState {
     pub(super) front: Option<Box<FrontState>>,
 }
 
+impl LinesState {
+    /// Whether nothing has been evaluated yet.
+    pub fn is_untouched(&self) -> bool {
+        let at_work = self.search.is_some() || self.plain.is_some() || self.front.is_some();
+        self.finished.is_empty() && self.steps.is_empty() && !at_work
+    }
+
+    /// What has gone wrong with devices in all that is done with.
+    pub(super) fn device_faults(&self) -> Vec<String> {
+        let done = self.finished.iter().map(|objective| &objective.found);
+        done.chain(&self.steps)
+            .flat_map(|found| &found.device_faults)
+            .cloned()
+            .collect()
+    }
+}
+
 impl Checkpoint for LinesState {
     const KIND: &'static str = concat!("study of raceline, lapswarm ", env!("CARGO_PKG_VERSION"));
 }

@@ -10,18 +10,20 @@ pub use story::{EnergySummary, RoundSummary, Summary};
 
 use crate::config::{Document, read_text};
 use crate::error::{Error, Result};
+use crate::evaluate::gpu::DispatchWatch;
 use crate::line::PointMass;
 use crate::study::envelope::{self, EnvelopeSettings, car_limits};
 use crate::study::hybrid::{self, HybridStudySettings};
 use crate::study::identify::{self, IdentifySettings};
 use crate::study::journal::{Journal, Recorder};
 use crate::study::raceline::{self, RacelineSettings};
-use crate::study::transient::{self, TransientSettings};
+use crate::study::transient::{self, DriveState, TransientSettings};
 use crate::vehicle::{Car, Envelope};
 use serde::{Deserialize, Serialize};
 use stage::go_on;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// Settings of a run.
@@ -110,20 +112,55 @@ impl RunSettings {
 /// Change of the grip's share from one line to the next below which another line would be the same.
 const SETTLED: f64 = 0.015;
 
-/// Runs everything into `folder`; results of stages are kept in `cache`, if there is one, and `every` so often the state of
-/// the stage at work. `observe` is told what is being done, and may break the run off.
+/// What a run begins with: all that it reads, and could refuse.
+pub struct Prepared<'a> {
+    settings: &'a RunSettings,
+    /// Log and car.
+    pub setup: identify::Setup,
+    /// Track and limits, those of the car that the identification begins with.
+    pub road: raceline::Setup,
+}
+
+/// Reads what the run's stages are to read.
+///
+/// # Errors
+/// [`Error::Io`] and [`Error::Input`] for what cannot be read or used.
+pub fn prepare(settings: &RunSettings) -> Result<Prepared<'_>> {
+    let setup = identify::set_up(&settings.identify)?;
+    identify::check_swarms(&settings.identify, &setup)?;
+    let road = raceline::set_up(&settings.line_of(&settings.identify.car, None))?;
+    Ok(Prepared {
+        settings,
+        setup,
+        road,
+    })
+}
+
+/// What a run works with; nothing of it changes a result.
+#[derive(Clone, Copy, Debug)]
+pub struct Means<'a> {
+    /// Where results of stages are kept, if anywhere.
+    pub cache: Option<&'a Path>,
+    /// Time between two saves of the state of the stage at work.
+    pub every: Duration,
+    /// Memory that each stage may take (MiB).
+    pub memory_limit_mib: u64,
+}
+
+/// Runs everything into `folder`. `observe` is told what is being done, and may break the run off.
 ///
 /// # Errors
 /// Those of the stages; [`Error::Interrupted`] if the run was broken off.
 pub fn run(
-    settings: &RunSettings,
+    prepared: &Prepared<'_>,
     folder: &Path,
-    cache: Option<&Path>,
-    every: Duration,
+    means: &Means<'_>,
     mut observe: impl FnMut(&str) -> ControlFlow<()>,
 ) -> Result<Summary> {
+    let Prepared { settings, setup, .. } = prepared;
+    let dispatches = DispatchWatch::begin();
     let began = Instant::now();
-    let stages = Stages::new(folder, cache, every);
+    let stages = Stages::new(folder, means.cache, means.every);
     let mut reused = Vec::new();
     let mut keep = |name: &str, stage: (PathBuf, bool)| {
         if stage.1 {
@@ -133,13 +170,13 @@ pub fn run(
     };
     let broken_off = || Error::Interrupted(folder.to_owned());
 
-    let setup = identify::set_up(&settings.identify)?;
     let mut inputs = Inputs::of_program("identify");
     inputs.add(&settings.identify);
     inputs.add(&(&setup.log, &setup.replay.free.car, &setup.truth));
     let stage = stages.run("1_identify", &inputs, |to, keeper| {
+        let _allowed = settings.identify.size().check(means.memory_limit_mib)?;
         let outcome = go_on(keeper, |state, keeper| {
-            identify::search_from(&settings.identify, &setup, state, keeper, |report| {
+            identify::search_from(&settings.identify, setup, state, keeper, |report| {
                 let done = report.progress.map_or(String::new(), |p| {
                     format!(" {} of {}, best {:.2e}", p.iteration, report.planned, p.best[0])
                 });
@@ -149,8 +186,8 @@ pub fn run(
         if outcome.interrupted {
             return Err(broken_off());
         }
-        let summary = identify::summarise(&settings.identify, &setup, &outcome);
-        identify::write_results(to, &settings.identify, &setup, &outcome, &summary)
+        let summary = identify::summarise(&settings.identify, setup, &outcome);
+        identify::write_results(to, &settings.identify, setup, &outcome, &summary)
     })?;
     let identified = keep("identify", stage);
     let car_path = identified.join("car.toml");
@@ -185,6 +222,7 @@ pub fn run(
         });
         inputs.add(&(&line_setup.cuts, line_setup.car.envelope.rows()));
         let stage = stages.run(&format!("{number}_raceline"), &inputs, |to, keeper| {
+            let _allowed = line_settings.size().check(means.memory_limit_mib)?;
             let outcome = go_on(keeper, |state, keeper| {
                 raceline::find_lines_from(&line_settings, &line_setup, state, keeper, |p| {
                     observe(&format!(
@@ -218,9 +256,15 @@ pub fn run(
         let mut inputs = Inputs::of_program("transient");
         inputs.add(&(&car, &drive_settings, whole.rows(), &line_setup.edges_m));
         inputs.add_file(&line_path)?;
-        let stage = stages.run(&format!("{}_transient", number + 1), &inputs, |to, _| {
+        let stage = stages.run(&format!("{}_transient", number + 1), &inputs, |to, keeper| {
             let began = Instant::now();
-            let outcome = transient::drive_line(&car, &limits, &points, edges, &drive_settings)?;
+            let outcome = go_on(keeper, |state: Option<DriveState>, keeper| {
+                let begun = (state.unwrap_or_default(), keeper);
+                transient::drive_line_from(&car, &limits, &points, edges, &drive_settings, begun, |_, _| {
+                    observe(&format!("line {round}: driven by the car"))
+                })
+            })?;
+            let outcome = outcome.ok_or_else(broken_off)?;
             let summary = transient::summarise(&car.name, &outcome, began.elapsed().as_secs_f64());
             transient::write_results(to, &outcome, &summary)
         })?;
@@ -249,7 +293,12 @@ pub fn run(
             adapter: settings.raceline.adapter.clone(),
             ..HybridStudySettings::default()
         };
-        let energy_setup = hybrid::set_up(&energy_settings)?;
+        let energy_inputs = hybrid::read_inputs(&energy_settings)?;
+        let energy_size = energy_inputs.size(&energy_settings);
+        // The line is given, and found at once.
+        let Some(energy_setup) = energy_inputs.with_line(&energy_settings, &Arc::default())? else {
+            return Err(broken_off());
+        };
         let mut inputs = Inputs::of_program("hybrid");
         for path in energy_settings.line.iter().chain(&energy_settings.envelope) {
             inputs.add_file(path)?;
@@ -263,6 +312,7 @@ pub fn run(
         inputs.add(&(&energy_settings.track, energy_settings.car_width_m));
         let number = 3 + 2 * rounds.len();
         let stage = stages.run(&format!("{number}_hybrid"), &inputs, |to, keeper| {
+            let _allowed = energy_size.check(means.memory_limit_mib)?;
             let outcome = go_on(keeper, |journal, keeper| {
                 let journal = match journal {
                     Some(journal) => journal,
@@ -286,7 +336,7 @@ pub fn run(
     }
     let mut summary = Summary::put_together(
         settings,
-        &setup,
+        setup,
         &identified,
         &car,
         &whole,
@@ -295,6 +345,6 @@ pub fn run(
         began.elapsed().as_secs_f64(),
     )?;
     summary.energy = energy;
-    summary.write(folder)?;
+    summary.write(folder, dispatches.longest_ms())?;
     Ok(summary)
 }

@@ -2,7 +2,6 @@
 
 use super::RunSettings;
 use crate::error::{Error, Result};
-use crate::evaluate::gpu::longest_dispatch_ms;
 use crate::report::write_whole;
 use crate::study::identify::Setup;
 use crate::study::run_folder::{Manifest, write_json};
@@ -230,11 +229,12 @@ impl Summary {
         )
     }
 
-    /// Writes `summary.json`, `manifest.json`, `story.txt` and `report.html`.
+    /// Writes `summary.json`, `manifest.json`, `story.txt` and `report.html`; the longest dispatch (ms) is that of all stages
+    /// that were not taken from earlier runs.
     ///
     /// # Errors
     /// [`Error::Io`] if a file cannot be written.
-    pub(super) fn write(&self, folder: &Path) -> Result<()> {
+    pub(super) fn write(&self, folder: &Path, longest_dispatch_ms: Option<f64>) -> Result<()> {
         write_json(&folder.join("summary.json"), self)?;
         write_whole(folder.join("story.txt"), self.to_text().as_bytes())?;
         let manifest = Manifest {
@@ -250,7 +250,7 @@ impl Summary {
             car: &self.car,
             settings: "",
             interrupted: false,
-            longest_dispatch_ms: longest_dispatch_ms().filter(|_| self.backend == "gpu"),
+            longest_dispatch_ms,
             device_faults: &[],
         };
         super::page::write(folder, self)?;

@@ -11,6 +11,7 @@ pub use results::{Summary, summarise, write_results};
 pub use sobol::{DesignOutputs, MOST_SAMPLES, MOST_VARIABLES, SobolIndex, design, indices};
 
 use crate::error::{Error, Result};
+use crate::evaluate::gpu::DispatchWatch;
 use crate::evaluate::replay::kernel::{CHANNELS, drive_window};
 use crate::evaluate::replay::{CHANNEL_NAMES, ReplayProblem, Window, open_evaluator, trace};
 use crate::evaluate::{BackendInfo, Evaluator};
@@ -177,6 +178,8 @@ pub struct Outcome {
     pub backend: BackendInfo,
     /// What went wrong with devices and was got over.
     pub device_faults: Vec<String>,
+    /// The longest that a dispatch kept the device (ms); nothing where none was at work.
+    pub longest_dispatch_ms: Option<f64>,
     /// Candidates evaluated.
     pub evaluations: usize,
     /// Time that they took (s).
@@ -370,6 +373,7 @@ pub fn measure_recorded(
         );
     }
     let planned = population.len() / dimensions;
+    let dispatches = DispatchWatch::begin();
     let mut evaluator = open_evaluator(
         replay,
         settings.replay.backend,
@@ -426,6 +430,7 @@ pub fn measure_recorded(
         base,
         backend: recorder.backend().cloned().unwrap_or(backend),
         device_faults: recorder.device_faults().to_vec(),
+        longest_dispatch_ms: dispatches.longest_ms(),
         evaluations: if interrupted { singles } else { planned },
         elapsed_s: began.elapsed().as_secs_f64(),
         interrupted,

@@ -6,6 +6,7 @@ pub use results::{Summary, summarise, write_results};
 
 use crate::error::{Error, Result};
 use crate::evaluate::BackendInfo;
+use crate::evaluate::gpu::DispatchWatch;
 use crate::evaluate::replay::{CHANNEL_NAMES, open_evaluator};
 use crate::study::identify::{FreeParameter, IdentifySettings, ObjectiveChoice, Setup, set_up};
 use crate::study::journal::Recorder;
@@ -118,6 +119,8 @@ pub struct Outcome {
     pub backend: BackendInfo,
     /// What went wrong with devices and was got over.
     pub device_faults: Vec<String>,
+    /// The longest that a dispatch kept the device (ms); nothing where none was at work.
+    pub longest_dispatch_ms: Option<f64>,
     /// Candidates evaluated.
     pub evaluations: usize,
     /// Time that they took (s).
@@ -193,6 +196,7 @@ pub fn measure_recorded(
         .iter()
         .flat_map(|y| axes[0].iter().flat_map(|x| [*x, *y]))
         .collect();
+    let dispatches = DispatchWatch::begin();
     let mut evaluator = open_evaluator(
         replay,
         settings.replay.backend,
@@ -223,6 +227,7 @@ pub fn measure_recorded(
         costs,
         backend: recorder.backend().cloned().unwrap_or_else(|| evaluator.backend()),
         device_faults: recorder.device_faults().to_vec(),
+        longest_dispatch_ms: dispatches.longest_ms(),
         evaluations: n * n,
         elapsed_s: began.elapsed().as_secs_f64(),
         interrupted,

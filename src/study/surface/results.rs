@@ -129,6 +129,7 @@ pub fn write_results(
         log: Some(&setup.log.source),
         interrupted: outcome.interrupted,
         device_faults: &outcome.device_faults,
+        longest_dispatch_ms: outcome.longest_dispatch_ms,
         ..Manifest::new(
             "surface",
             settings.replay.seed,

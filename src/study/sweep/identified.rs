@@ -6,30 +6,29 @@ use crate::evaluate::replay::open_evaluator;
 use crate::evaluate::{PackedClient, run_packed};
 use crate::study::identify::{self, IdentifySettings};
 use crate::study::keeper::Keeper;
+use crate::study::memory::Size;
 use std::ops::ControlFlow;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Swarms that run at a time: eight of fifty particles fill the lanes of a small device.
 const TOGETHER: usize = 8;
 
-/// Swarms of more particles than this fill a device by themselves, and count by themselves against the memory.
+/// Swarms of more particles than this fill a device by themselves.
 const SMALL: usize = 4096;
 
-/// How many of the studies, from the first on, are of the same problem and fit together. A study that cannot be read is one by
-/// itself, whose run says what is wrong with it.
-pub(super) fn alike(paths: &[PathBuf]) -> usize {
-    let problem = |path: &Path| {
+/// How many of the studies, from the first on, are of the same problem and fit into the memory (MiB) together. A study that
+/// cannot be read is one by itself, whose run says what is wrong with it.
+pub(super) fn alike(paths: &[PathBuf], memory_limit_mib: u64) -> usize {
+    let read = |path: &PathBuf| {
         let settings = IdentifySettings::read(path).ok()?;
-        (settings.size().population <= SMALL).then(|| problem_of(settings))
+        let size = settings.size();
+        (size.population <= SMALL).then(|| (problem_of(settings), size))
     };
-    let Some(first) = paths.first().and_then(|path| problem(path)) else {
-        return 1;
-    };
-    let rest = paths.iter().take(TOGETHER).skip(1);
-    1 + rest
-        .take_while(|path| problem(path).as_ref() == Some(&first))
-        .count()
+    let small: Vec<(IdentifySettings, Size)> = paths.iter().take(TOGETHER).map_while(read).collect();
+    let alike = small.iter().take_while(|(problem, _)| *problem == small[0].0);
+    let sizes: Vec<Size> = alike.map(|(_, size)| *size).collect();
+    Size::together(&sizes, memory_limit_mib)
 }
 
 /// The settings without what only swarm and polish go by.
@@ -57,6 +56,7 @@ pub(super) fn problem_of(settings: IdentifySettings) -> IdentifySettings {
 /// Those of the problem; those of a search are in its place.
 pub(super) fn identified(
     paths: &[PathBuf],
+    memory_limit_mib: u64,
     mut observe: impl FnMut() -> ControlFlow<()>,
 ) -> Result<Vec<Result<Option<Found>>>> {
     let studies = paths
@@ -66,6 +66,8 @@ pub(super) fn identified(
     let Some(first) = studies.first() else {
         return Ok(Vec::new());
     };
+    let sizes: Vec<Size> = studies.iter().map(IdentifySettings::size).collect();
+    let _allowed = Size::check_together(&sizes, memory_limit_mib)?;
     let setup = identify::set_up(first)?;
     let mut evaluator = open_evaluator(&setup.replay, first.backend, first.adapter.as_deref())?;
     let stop = AtomicBool::new(false);
@@ -114,5 +116,14 @@ fn figures_of(settings: &IdentifySettings, setup: &identify::Setup, outcome: &id
             .iter()
             .map(|(channel, cost)| (format!("cost_{channel}"), Some(*cost))),
     );
-    (figures, Vec::new())
+    Found {
+        figures,
+        front: Vec::new(),
+        study: "identify",
+        seed: settings.seed,
+        car: setup.replay.free.car.name.clone(),
+        backend: outcome.backend.clone(),
+        device_faults: outcome.device_faults.clone(),
+        longest_dispatch_ms: outcome.longest_dispatch_ms,
+    }
 }

@@ -30,6 +30,7 @@ pub(super) fn compare(rows: &mut [Row]) -> Result<()> {
         let own = settings(&rows[first]);
         let members: Vec<usize> = (first..rows.len())
             .filter(|&i| comparable(&rows[i]) && settings(&rows[i]) == own)
+            .filter(|&i| rows[i].front[0].len() == rows[first].front[0].len())
             .collect();
         let all: Vec<Vec<f64>> = members
             .iter()
@@ -72,6 +73,7 @@ mod tests {
                 ("seed".to_owned(), run.to_string()),
             ]),
             figures: BTreeMap::new(),
+            device_faults: Vec::new(),
             front,
         }
     }

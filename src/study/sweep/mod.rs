@@ -19,6 +19,7 @@ use crate::report::write_whole;
 use crate::study::identify::{self, IdentifySettings};
 use crate::study::memory::{Size, USUAL_MIB};
 use crate::study::raceline::{self, RacelineSettings};
+use crate::study::run_folder::{Manifest, write_json};
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -47,30 +48,53 @@ pub struct SweepProgress<'a> {
     pub point: &'a Point,
 }
 
-/// Runs what is left of a sweep in `folder`, which holds nothing yet or, to `resume`, a part of the same sweep.
+/// As [`sweep_within`], in the usual memory.
 ///
 /// # Errors
-/// [`Error::Input`] if the folder holds another sweep, or a point of the grid is no study; [`Error::Interrupted`] if the
-/// observer broke the sweep off; those of the studies.
+/// As [`sweep_within`].
 pub fn sweep(
     settings: &SweepSettings,
     folder: &Path,
     resume: bool,
+    observe: impl FnMut(&SweepProgress<'_>) -> ControlFlow<()>,
+) -> Result<Summary> {
+    sweep_within(settings, folder, resume, USUAL_MIB, observe)
+}
+
+/// Runs what is left of a sweep in `folder`, which holds nothing yet or, to `resume`, a part of the same sweep. Runs that are
+/// at work at the same time share `memory_limit_mib` (MiB), which changes no row.
+///
+/// # Errors
+/// [`Error::Input`] if the folder holds another sweep, or a point of the grid is no study; [`Error::Interrupted`] if the
+/// observer broke the sweep off; those of the studies.
+pub fn sweep_within(
+    settings: &SweepSettings,
+    folder: &Path,
+    resume: bool,
+    memory_limit_mib: u64,
     mut observe: impl FnMut(&SweepProgress<'_>) -> ControlFlow<()>,
 ) -> Result<Summary> {
     let points = settings.points()?;
     let studies = folder.join("studies");
     let path_of = |number: usize| studies.join(format!("{number:05}.toml"));
     // Every point is read before anything is written: a mistake in the last shows at once, and leaves nothing behind.
-    read_points(settings, &points, path_of)?;
+    read_points(settings, &points, path_of, memory_limit_mib)?;
     let mut rows = if resume {
         results::read_rows(&folder.join(ROWS), &folder.join(SWEEP_FILE), settings, &points)?
     } else {
         Vec::new()
     };
     let began_with = rows.len();
-    let ran = write_studies(settings, folder, &points, path_of, resume)
-        .and_then(|()| run_points(settings, folder, &points, path_of, &mut rows, &mut observe));
+    let ran = write_studies(settings, folder, &points, path_of, resume).and_then(|()| {
+        let work = Work {
+            settings,
+            folder,
+            points: &points,
+            paths: (0..points.len()).map(path_of).collect(),
+            memory_limit_mib,
+        };
+        work.run_points(&mut rows, &mut observe)
+    });
     if let Err(error) = ran {
         // What has come to nothing does not stand in the way of the next; what was broken off may be gone on with.
         if !resume && rows.len() == began_with && !matches!(error, Error::Interrupted(_)) {
@@ -104,6 +128,7 @@ fn read_points(
     settings: &SweepSettings,
     points: &[Point],
     path_of: impl Fn(usize) -> PathBuf,
+    memory_limit_mib: u64,
 ) -> Result<Vec<PointStudy>> {
     let read = |(number, point): (usize, &Point)| {
         let path = path_of(number);
@@ -116,7 +141,7 @@ fn read_points(
             }
         };
         study
-            .and_then(|study| study.size().check(USUAL_MIB).map(|()| study))
+            .and_then(|study| study.size().check(memory_limit_mib).map(|_| study))
             .map_err(|e| settings.of_point(e, number, point, &path))
     };
     points.iter().enumerate().map(read).collect()
@@ -148,14 +173,14 @@ impl std::fmt::Display for SweepPlan {
     }
 }
 
-/// Reads every point, sets up every problem among them, and runs none.
+/// Reads every point, sets up every problem among them, and runs none, none of which may take more than so much memory (MiB).
 ///
 /// # Errors
 /// Those that [`sweep`] would have before its runs begin, and those of the problems.
-pub fn plan(settings: &SweepSettings) -> Result<SweepPlan> {
+pub fn plan(settings: &SweepSettings, memory_limit_mib: u64) -> Result<SweepPlan> {
     let points = settings.points()?;
     let path_of = |number: usize| PathBuf::from(format!("{number:05}.toml"));
-    let studies = read_points(settings, &points, path_of)?;
+    let studies = read_points(settings, &points, path_of, memory_limit_mib)?;
     let mut identified: Vec<IdentifySettings> = Vec::new();
     let mut lined: Vec<RacelineSettings> = Vec::new();
     let mut chosen = Vec::new();
@@ -228,59 +253,102 @@ fn write_studies(
     Ok(())
 }
 
-/// Runs the points that have no row yet, and keeps the rows as they come.
-fn run_points(
-    settings: &SweepSettings,
-    folder: &Path,
-    points: &[Point],
-    path_of: impl Fn(usize) -> PathBuf,
-    rows: &mut Vec<Row>,
-    observe: &mut dyn FnMut(&SweepProgress<'_>) -> ControlFlow<()>,
-) -> Result<()> {
-    let paths: Vec<PathBuf> = (0..points.len()).map(path_of).collect();
-    while rows.len() < points.len() {
-        let number = rows.len();
-        let progress = SweepProgress {
-            done: number,
-            planned: points.len(),
-            point: &points[number],
+/// What runs of a sweep work with.
+struct Work<'a> {
+    settings: &'a SweepSettings,
+    folder: &'a Path,
+    points: &'a [Point],
+    /// Their studies.
+    paths: Vec<PathBuf>,
+    memory_limit_mib: u64,
+}
+
+impl Work<'_> {
+    /// Runs the points that have no row yet, and keeps the rows as they come.
+    fn run_points(
+        &self,
+        rows: &mut Vec<Row>,
+        observe: &mut dyn FnMut(&SweepProgress<'_>) -> ControlFlow<()>,
+    ) -> Result<()> {
+        let (points, paths) = (self.points, &self.paths);
+        let of_point = |error, number: usize| {
+            self.settings
+                .of_point(error, number, &points[number], &paths[number])
         };
-        if observe(&progress).is_break() {
-            return Err(Error::Interrupted(folder.to_owned()));
-        }
-        let told = || observe(&progress);
-        let found = match settings.study {
-            SweptStudy::Identify => {
-                let together = alike(&paths[number..]);
-                identified(&paths[number..number + together], told)
-            }
-            SweptStudy::Raceline => Ok(vec![lined(&paths[number], told)]),
-        };
-        let found = found.map_err(|e| settings.of_point(e, number, &points[number], &paths[number]))?;
-        for (run, found) in (number..).zip(found) {
-            let found = found.map_err(|e| settings.of_point(e, run, &points[run], &paths[run]))?;
-            // A run that was broken off is no row: it is done anew, as is what comes after it.
-            let Some((figures, front)) = found else {
-                return Err(Error::Interrupted(folder.to_owned()));
+        while rows.len() < points.len() {
+            let number = rows.len();
+            let progress = SweepProgress {
+                done: number,
+                planned: points.len(),
+                point: &points[number],
             };
-            rows.push(Row {
-                run,
-                settings: points[run].settings.clone(),
-                figures,
-                front,
-            });
-            results::write_rows(&folder.join(ROWS), rows)?;
+            if observe(&progress).is_break() {
+                return Err(Error::Interrupted(self.folder.to_owned()));
+            }
+            let told = || observe(&progress);
+            let found = match self.settings.study {
+                SweptStudy::Identify => {
+                    let together = alike(&paths[number..], self.memory_limit_mib);
+                    identified(&paths[number..number + together], self.memory_limit_mib, told)
+                }
+                SweptStudy::Raceline => Ok(vec![lined(&paths[number], self.memory_limit_mib, told)]),
+            };
+            let found = found.map_err(|e| of_point(e, number))?;
+            for (run, found) in (number..).zip(found) {
+                // A run that was broken off is no row: it is done anew, as is what comes after it.
+                let Some(found) = found.map_err(|e| of_point(e, run))? else {
+                    return Err(Error::Interrupted(self.folder.to_owned()));
+                };
+                // What depends on the clock stands beside the study, and not in the row.
+                write_json(&paths[run].with_extension("json"), &found.manifest())?;
+                rows.push(Row {
+                    run,
+                    settings: points[run].settings.clone(),
+                    figures: found.figures,
+                    device_faults: found.device_faults,
+                    front: found.front,
+                });
+                results::write_rows(&self.folder.join(ROWS), rows)?;
+            }
         }
+        Ok(())
     }
-    Ok(())
 }
 
 type Figures = BTreeMap<String, Option<f64>>;
-/// Figures, and the objectives of a front where there is one.
-type Found = (Figures, Vec<Vec<f64>>);
 
-fn lined(path: &Path, mut observe: impl FnMut() -> ControlFlow<()>) -> Result<Option<Found>> {
+/// What a run came to.
+struct Found {
+    figures: Figures,
+    /// The objectives of a front, where there is one.
+    front: Vec<Vec<f64>>,
+    study: &'static str,
+    seed: u64,
+    car: String,
+    backend: BackendInfo,
+    device_faults: Vec<String>,
+    longest_dispatch_ms: Option<f64>,
+}
+
+impl Found {
+    fn manifest(&self) -> Manifest<'_> {
+        Manifest {
+            device_faults: &self.device_faults,
+            longest_dispatch_ms: self.longest_dispatch_ms,
+            // Its name is that of the manifest.
+            settings: "",
+            ..Manifest::new(self.study, self.seed, &self.backend, &self.car)
+        }
+    }
+}
+
+fn lined(
+    path: &Path,
+    memory_limit_mib: u64,
+    mut observe: impl FnMut() -> ControlFlow<()>,
+) -> Result<Option<Found>> {
     let settings = RacelineSettings::read(path)?;
+    let _allowed = settings.size().check(memory_limit_mib)?;
     let setup = raceline::set_up(&settings)?;
     let outcome = raceline::find_lines(&settings, &setup, |_| observe())?;
     if outcome.interrupted {
@@ -303,5 +371,14 @@ fn lined(path: &Path, mut observe: impl FnMut() -> ControlFlow<()>) -> Result<Op
         figures.insert("front_size".to_owned(), Some(found.alpha.len() as f64));
         front = found.objectives;
     }
-    Ok(Some((figures, front)))
+    Ok(Some(Found {
+        figures,
+        front,
+        study: "raceline",
+        seed: settings.seed,
+        car: setup.car_name,
+        backend: outcome.backend,
+        device_faults: outcome.device_faults,
+        longest_dispatch_ms: outcome.longest_dispatch_ms,
+    }))
 }

@@ -1,6 +1,7 @@
 //! Rows of a sweep, and medians over its seeds.
 
 use super::{Point, SweepSettings};
+use crate::config::{LARGEST_LOG, read_bytes, read_text};
 use crate::error::{Error, Result};
 use crate::report::{Cells, Column, text_table, write_csv, write_parquet, write_whole};
 use crate::study::run_folder::write_json;
@@ -17,6 +18,9 @@ pub struct Row {
     pub settings: BTreeMap<String, String>,
     /// What came of it.
     pub figures: BTreeMap<String, Option<f64>>,
+    /// What went wrong with devices and was got over; runs that go together share their evaluator's.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub device_faults: Vec<String>,
     /// Its front's objectives, row by row; kept until all fronts are compared.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub front: Vec<Vec<f64>>,
@@ -53,6 +57,29 @@ pub struct Summary {
     pub rows: Vec<Row>,
     /// Medians over the seeds.
     pub groups: Vec<Group>,
+    /// What went wrong with devices and was got over, each with the runs that it befell.
+    pub device_faults: Vec<String>,
+}
+
+/// Faults with the numbers of the runs that met them, as in the file names of their studies.
+fn told_faults(rows: &[Row]) -> Vec<String> {
+    let mut faults: Vec<(&String, Vec<String>)> = Vec::new();
+    for row in rows {
+        for fault in &row.device_faults {
+            let number = format!("{:05}", row.run);
+            match faults.iter_mut().find(|(known, _)| *known == fault) {
+                // More than once in a run is told once.
+                Some((_, runs)) if runs.last() != Some(&number) => runs.push(number),
+                Some(_) => {}
+                None => faults.push((fault, vec![number])),
+            }
+        }
+    }
+    let told = faults.into_iter().map(|(fault, runs)| {
+        let noun = if runs.len() == 1 { "run" } else { "runs" };
+        format!("{noun} {}: {fault}", runs.join(", "))
+    });
+    told.collect()
 }
 
 /// Linear interpolation between order statistics (type 7 of R. Hyndman and Y. Fan, *Sample quantiles in statistical
@@ -121,7 +148,7 @@ pub(super) fn read_rows(
     settings: &SweepSettings,
     points: &[Point],
 ) -> Result<Vec<Row>> {
-    let held = std::fs::read_to_string(sweep).map_err(|e| Error::io(sweep, "read", e))?;
+    let held = read_text(sweep)?;
     if held != settings.text() {
         return Err(Error::input(
             sweep,
@@ -130,17 +157,18 @@ pub(super) fn read_rows(
             "the sweep that the folder holds",
         ));
     }
-    let text = match std::fs::read_to_string(path) {
-        Ok(text) => text,
-        Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(Vec::new()),
-        Err(e) => return Err(Error::io(path, "read", e)),
-    };
-    text.lines()
+    if !path.exists() {
+        return Ok(Vec::new());
+    }
+    String::from_utf8_lossy(&read_bytes(path, LARGEST_LOG)?)
+        .lines()
         .enumerate()
         .map(|(number, line)| {
             let row: Option<Row> = serde_json::from_str(line).ok();
             let own = |row: &Row| {
-                row.run == number && points.get(number).is_some_and(|p| p.settings == row.settings)
+                row.run == number
+                    && points.get(number).is_some_and(|p| p.settings == row.settings)
+                    && row.front.iter().all(|point| point.len() == row.front[0].len())
             };
             row.filter(own).ok_or_else(|| {
                 Error::input(
@@ -163,6 +191,7 @@ impl Summary {
         Ok(Self {
             study: "sweep",
             groups: medians(&rows),
+            device_faults: told_faults(&rows),
             rows,
         })
     }
@@ -173,7 +202,11 @@ impl Summary {
             return String::new();
         }
         let medians = self.median_table(&[("", |s| s.median)]);
-        format!("Medians over the seeds\n{}", text_table(&columns(&medians)))
+        let mut text = format!("Medians over the seeds\n{}", text_table(&columns(&medians)));
+        for fault in &self.device_faults {
+            text += &format!("{fault}\n");
+        }
+        text
     }
 
     /// Settings and figures of every run.
@@ -286,6 +319,7 @@ mod tests {
                 ("seed".to_owned(), seed.to_owned()),
             ]),
             figures: BTreeMap::from([("x".to_owned(), Some(x)), ("none".to_owned(), None)]),
+            device_faults: Vec::new(),
             front: Vec::new(),
         };
         let rows = [

@@ -9,21 +9,28 @@ mod page;
 mod population;
 mod population_results;
 mod results;
+mod state;
 
 pub use population::{
     Driven, DrivenBest, MOST_SETUPS, NamedLine, PopulationOutcome, PopulationSettings, drive_population,
+    drive_population_recorded,
 };
 pub use population_results::{PopulationSummary, summarise_population, table_of, write_population};
 pub use results::{Summary, summarise, write_results};
+pub use state::{DriveRequest, DriveState};
 
 use crate::config::read_text;
 use crate::error::{Error, Result};
 use crate::line::{FineLine, PointMass, Polyline};
 use crate::simulate::{Drive, DriverSettings, SpeedPlan, drive_planned};
+use crate::study::keeper::Keeper;
+use crate::study::run::Inputs;
+use crate::study::run_folder::STATE;
 use crate::track::Circuit;
 use crate::vehicle::{Car, Envelope, EnvelopeRow};
 use glam::DVec2;
 use rayon::prelude::*;
+use std::ops::ControlFlow;
 use std::path::Path;
 
 /// Settings of a drive.
@@ -203,61 +210,114 @@ pub fn drive_line(
     edges_m: [&[DVec2]; 2],
     settings: &TransientSettings,
 ) -> Result<Outcome> {
+    let begun = (DriveState::default(), &mut Keeper::idle());
+    let found = drive_line_from(car, limits, points_m, edges_m, settings, begun, |_, _| {
+        ControlFlow::Continue(())
+    })?;
+    found.ok_or_else(|| Error::Study("the drive was broken off".to_owned()))
+}
+
+/// As [`drive_line`], from the state of the same drive that was broken off, with the state handed to `keeper`. `observe` is told
+/// how many shares of how many were tried, and may end it; there is no outcome then.
+///
+/// # Errors
+/// As [`drive_line`]; [`Error::Input`] if the state belongs to other inputs; [`Error::Io`] if it cannot be saved when the drive
+/// is broken off.
+pub fn drive_line_from(
+    car: &Car,
+    limits: &PointMass,
+    points_m: &[DVec2],
+    edges_m: [&[DVec2]; 2],
+    settings: &TransientSettings,
+    (mut state, keeper): (DriveState, &mut Keeper),
+    mut observe: impl FnMut(usize, usize) -> ControlFlow<()>,
+) -> Result<Option<Outcome>> {
     let line = FineLine::new(points_m, true, 1.0, None, 0.0)?;
     let circuit = circuit_of_line("the line", &line, edges_m, settings.car_width_m)?;
     let driver = match &settings.driver {
         Some(driver) => driver.clone(),
         None => DriverSettings::racing(car)?,
     };
+    let mut inputs = Inputs::new("transient");
+    inputs.add(&(car, limits, points_m, edges_m, settings));
+    let inputs = inputs.key();
+    if state.inputs.as_ref().is_some_and(|began| *began != inputs) {
+        let expected = "the files that the drive reads as they were when it began";
+        return Err(Error::input(STATE, "inputs of the study", "others", expected));
+    }
+    state.inputs = Some(inputs);
+    keeper.keep(&state)?;
     let attempt = |share: f64| -> Result<(Envelope, FineLine, Drive)> {
         let (envelope, fine, plan) = planned(limits, points_m, share)?;
         let drive = drive_planned(car, &circuit, plan, &driver, INTERVAL_S)?;
         Ok((envelope, fine, drive))
     };
-    let mut failures = Vec::new();
-    let mut best = None;
+    let outcome_of = |share: f64, (envelope, point_mass, drive): (Envelope, FineLine, Drive), failures| {
+        let lap_time_s = drive.lap_time_s(circuit.length_m, INTERVAL_S)?;
+        Some(Outcome {
+            grip_share: share,
+            envelope,
+            point_mass,
+            lap_time_s,
+            margin_m: least_room(&circuit, &drive),
+            drive,
+            line: circuit.clone(),
+            failures,
+        })
+    };
+    let mut best = match state.best {
+        Some(share) => {
+            let before = state.failures.iter().take_while(|(failed, _)| *failed != share);
+            outcome_of(share, attempt(share)?, before.cloned().collect())
+        }
+        None => None,
+    };
+    let planned = settings.shares.len();
     // A few at once: the greatest that works ends the search.
-    for batch in settings.shares.chunks(rayon::current_num_threads().max(2)) {
+    let together = rayon::current_num_threads().max(2);
+    while state.tried < planned {
+        if observe(state.tried, planned).is_break() {
+            keeper.keep(&state)?;
+            return Ok(None);
+        }
+        let end = planned.min(state.tried + together);
+        let batch = &settings.shares[state.tried..end];
         let found: Vec<_> = batch.par_iter().map(|share| (*share, attempt(*share))).collect();
-        for (share, outcome) in found {
-            match outcome {
-                Ok((envelope, point_mass, drive)) => {
-                    let Some(lap_time_s) = drive.lap_time_s(circuit.length_m, INTERVAL_S) else {
+        for (share, driven) in found {
+            match driven {
+                Ok(driven) => {
+                    let Some(outcome) = outcome_of(share, driven, state.failures.clone()) else {
                         continue;
-                    };
-                    let outcome = Outcome {
-                        grip_share: share,
-                        envelope,
-                        point_mass,
-                        lap_time_s,
-                        margin_m: least_room(&circuit, &drive),
-                        drive,
-                        line: circuit.clone(),
-                        failures: failures.clone(),
                     };
                     let off = outcome.disagreement();
                     if off.abs() <= AGREEMENT {
-                        return Ok(outcome);
+                        return Ok(Some(outcome));
                     }
                     // It gets round, but more slowly than its plan: the limits are not held yet.
                     let why = format!("the driven lap is {:+.2}% off the point mass's", 100.0 * off);
-                    failures.push((share, why));
+                    state.failures.push((share, why));
                     let nearer = best
                         .as_ref()
                         .is_none_or(|b: &Outcome| off.abs() < b.disagreement().abs());
                     if nearer {
+                        state.best = Some(share);
                         best = Some(outcome);
                     }
                 }
                 Err(error @ Error::Input { .. }) => return Err(error),
-                Err(error) => failures.push((share, error.to_string())),
+                Err(error) => state.failures.push((share, error.to_string())),
             }
+        }
+        state.tried = end;
+        if keeper.due() {
+            keeper.keep_or_warn(&state);
         }
     }
     if let Some(best) = best {
-        return Ok(best);
+        return Ok(Some(best));
     }
-    let last = failures
+    let last = state
+        .failures
         .last()
         .map_or(String::new(), |(share, why)| format!(" (at {share:.2}: {why})"));
     Err(Error::Study(format!(

@@ -7,12 +7,18 @@ use super::{circuit_of_line, planned};
 use crate::drive::{DriverSettings, Line};
 use crate::error::{Error, Result};
 use crate::evaluate::drive::{DriveObjective, DriveProblem, DriveSettings, open_drive_evaluator};
-use crate::evaluate::{BackendChoice, BackendInfo, FailureCounts, add_failures};
+use crate::evaluate::gpu::DispatchWatch;
+use crate::evaluate::{BackendChoice, BackendInfo, Evaluator, FailureCounts, add_failures};
 use crate::line::{FineLine, PointMass};
+use crate::study::journal::Recorder;
+use crate::study::keeper::Keeper;
+use crate::study::memory::{ANSWER, Kept};
+use crate::study::run::Inputs;
 use crate::track::Circuit;
 use crate::vehicle::{Car, CarParameter};
 use glam::DVec2;
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
 use std::time::Instant;
 
@@ -37,7 +43,7 @@ impl NamedLine {
 }
 
 /// Settings of a population.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PopulationSettings {
     /// Set-ups to drive beside the car as it is.
     pub setups: usize,
@@ -124,6 +130,8 @@ pub struct PopulationOutcome {
     pub backend: BackendInfo,
     /// What devices failed of and what was done about it.
     pub device_faults: Vec<String>,
+    /// The longest that a dispatch kept the device (ms); nothing where none was at work.
+    pub longest_dispatch_ms: Option<f64>,
     /// Whether it was broken off.
     pub interrupted: bool,
 }
@@ -132,6 +140,17 @@ impl PopulationSettings {
     /// Laps of so many lines.
     pub fn laps(&self, lines: usize) -> usize {
         (self.setups + 1) * lines * self.grip_shares.len()
+    }
+
+    /// What the study's memory goes with, driven on so many lines.
+    pub fn kept(&self, lines: usize) -> [Kept; 1] {
+        let laps = [lines, self.grip_shares.len()].map(|n| n as u64);
+        let variables = self.parameters.len() as u64 + 2;
+        [Kept {
+            name: "setups",
+            count: self.setups as u64 + 1,
+            each: (laps[0] * laps[1]).saturating_mul(ANSWER) + laps[0] * 3 * 8 * variables,
+        }]
     }
 
     /// Checks every setting, and whether `car` has the parameters.
@@ -199,23 +218,47 @@ pub fn drive_population(
     lines: &[NamedLine],
     edges_m: [&[DVec2]; 2],
     settings: &PopulationSettings,
-    mut observe: impl FnMut(usize, usize) -> ControlFlow<()>,
+    observe: impl FnMut(usize, usize) -> ControlFlow<()>,
 ) -> Result<PopulationOutcome> {
+    let mut keeper = Keeper::idle();
+    let recorder = &mut Recorder::idle(&mut keeper);
+    drive_population_recorded(car, limits, lines, edges_m, settings, recorder, observe)?
+        .ok_or_else(|| Error::Study("broken off before the first lap".to_owned()))
+}
+
+/// As [`drive_population`], with the laps noted by `recorder`, or known to it; nothing if it was broken off while the lines were
+/// planned.
+///
+/// # Errors
+/// As [`drive_population`], and those of the recorder.
+pub fn drive_population_recorded(
+    car: &Car,
+    limits: &PointMass,
+    lines: &[NamedLine],
+    edges_m: [&[DVec2]; 2],
+    settings: &PopulationSettings,
+    recorder: &mut Recorder<'_>,
+    mut observe: impl FnMut(usize, usize) -> ControlFlow<()>,
+) -> Result<Option<PopulationOutcome>> {
     settings.check(car)?;
     let shares = &settings.grip_shares;
+    let planned_laps = settings.laps(lines.len());
     let circuits = lines
         .iter()
         .map(|line| line.circuit(edges_m, settings.car_width_m))
         .collect::<Result<Vec<_>>>()?;
-    let plans = lines
-        .iter()
-        .map(|line| {
-            shares
-                .par_iter()
-                .map(|share| planned(limits, &line.points_m, *share).map(|(_, _, plan)| plan))
-                .collect::<Result<Vec<_>>>()
-        })
-        .collect::<Result<Vec<_>>>()?;
+    let mut plans = Vec::with_capacity(lines.len());
+    for line in lines {
+        if observe(0, planned_laps).is_break() {
+            recorder.keep()?;
+            return Ok(None);
+        }
+        let of_line = shares
+            .par_iter()
+            .map(|share| planned(limits, &line.points_m, *share).map(|(_, _, plan)| plan))
+            .collect::<Result<Vec<_>>>()?;
+        plans.push(of_line);
+    }
     let roads: Vec<Line<'_>> = circuits
         .iter()
         .zip(&plans)
@@ -252,9 +295,13 @@ pub fn drive_population(
     let cases: Vec<(usize, usize)> = (0..setups.len())
         .flat_map(|setup| (0..lines.len()).map(move |line| (setup, line)))
         .collect();
+    let dispatches = DispatchWatch::begin();
     let mut evaluator = open_drive_evaluator(&problem, settings.backend, settings.adapter.as_deref())?;
+    let mut inputs = Inputs::new("transient");
+    inputs.add(&(car, limits, lines, edges_m));
+    let opened = evaluator.backend();
+    recorder.begin(inputs.key(), &opened)?;
     let began = Instant::now();
-    let planned_laps = cases.len() * shares.len();
     let mut driven: Vec<Driven> = Vec::with_capacity(cases.len());
     let mut failures = FailureCounts::new();
     let mut evaluations = 0;
@@ -272,7 +319,7 @@ pub fn drive_population(
                 }
             }
         }
-        let evaluation = evaluator.evaluate(&population)?;
+        let evaluation = recorder.over(evaluator.as_mut()).evaluate(&population)?;
         add_failures(&mut failures, &evaluation.failure_counts());
         evaluations += evaluation.failures.len();
         let laps = evaluation
@@ -300,20 +347,22 @@ pub fn drive_population(
             });
         }
         if observe(evaluations, planned_laps).is_break() && evaluations < planned_laps {
+            recorder.keep()?;
             interrupted = true;
             break;
         }
     }
     let time = |d: &Driven| d.best.map_or(f64::INFINITY, |b| b.lap_time_s);
     driven.sort_by(|a, b| time(a).total_cmp(&time(b)));
-    Ok(PopulationOutcome {
+    Ok(Some(PopulationOutcome {
         parameters,
         driven,
         evaluations,
         driving_s: began.elapsed().as_secs_f64(),
         failures,
-        backend: evaluator.backend(),
-        device_faults: evaluator.device_faults().to_vec(),
+        backend: recorder.backend().cloned().unwrap_or(opened),
+        device_faults: recorder.device_faults().to_vec(),
+        longest_dispatch_ms: dispatches.longest_ms(),
         interrupted,
-    })
+    }))
 }

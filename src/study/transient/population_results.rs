@@ -279,6 +279,7 @@ pub fn write_population(
         settings: "",
         interrupted: outcome.interrupted,
         device_faults: &outcome.device_faults,
+        longest_dispatch_ms: outcome.longest_dispatch_ms,
         ..Manifest::new("transient", summary.seed, &outcome.backend, &summary.car)
     };
     write_json(&folder.join("manifest.json"), &manifest)

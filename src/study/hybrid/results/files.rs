@@ -25,6 +25,7 @@ pub fn write_manifest(
         track: Some(&setup.raceline.track_name),
         interrupted: outcome.interrupted,
         device_faults: &outcome.device_faults,
+        longest_dispatch_ms: outcome.longest_dispatch_ms,
         ..Manifest::new("hybrid", settings.seed, &outcome.backend, &setup.car.name)
     };
     write_json(&folder.join("manifest.json"), &manifest)

@@ -11,6 +11,7 @@ fn found(cuts: &CrossSections, objective: LineObjective, settings: &LineSearchSe
         start: None,
         backend: BackendChoice::Simd,
         adapter: None,
+        known_faults: &[],
     };
     search_line(&search, settings, |_| ControlFlow::Continue(())).unwrap()
 }
