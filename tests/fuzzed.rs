@@ -1,5 +1,8 @@
 //! What fuzzing found, and the seeds that it starts from: see `fuzz/README.md`.
 
+#[path = "common/ld.rs"]
+#[allow(dead_code)] // Others look into the file that it makes.
+mod ld;
 #[path = "common/readers.rs"]
 mod readers;
 
@@ -9,6 +12,7 @@ use lapswarm::study::journal::{Journal, Recorder};
 use lapswarm::study::keeper::Keeper;
 use lapswarm::study::raceline::{self, RacelineSettings};
 use lapswarm::study::run_folder::STATE;
+use lapswarm::study::sweep::{Row, SweepSettings};
 use lapswarm::swarm::checkpoint::{self, Checkpoint};
 use lapswarm::swarm::{
     CooperativeSettings, CooperativeSwarm, CovarianceSettings, CovarianceSwarm, DifferenceSettings,
@@ -85,6 +89,8 @@ fn seeds() -> Vec<(&'static str, Vec<u8>)> {
         ("sweep", include_str!("../data/sweeps/sections.toml")),
         ("sweep", include_str!("../data/sweeps/thesis_inertia.toml")),
         ("curvature", &circuit),
+        ("line", "# a line\nstation (m),x (m),y (m)\n0,0,0\n5,5,0\n10,9,3\n15,9,8\n"),
+        ("line", "x_m,y_m\n0,0\n4,0\n8,1e1\n"),
         ("limits", "v_mps,ay_mps2,ax_grip_mps2,ax_drive_mps2,drag_mps2\n10,12,12,8,0.1\n30,14,13,6,0.8\n60,18,16,2,3\n"),
         ("run_folder", "{\"program\":\"lapswarm\",\"version\":\"0.1.0\",\"study\":\"raceline\",\"seed\":1,\"track\":\"a\"}\0\
             {\"study\":\"raceline\",\"elapsed_s\":1.5,\"best\":{\"lap_time\":{\"lap_time_fine_s\":114.2}},\
@@ -92,6 +98,7 @@ fn seeds() -> Vec<(&'static str, Vec<u8>)> {
     ]
     .map(|(name, text)| (name, text.as_bytes().to_vec()))
     .into();
+    seeds.push(("sweep_rows", sweep_rows()));
     seeds.extend(tracks().into_iter().map(|(name, text)| (name, text.into_bytes())));
     let lap: String = include_str!("../data/laps/gt_silverstone.csv")
         .lines()
@@ -143,12 +150,17 @@ fn tracks() -> Vec<(&'static str, String)> {
     for (left, right) in around(30, 194.0, 114.0).zip(around(30, 206.0, 126.0)) {
         let _ = writeln!(edges, "{:.3},{:.3},{:.3},{:.3}", left.0, left.1, right.0, right.1);
     }
+    let named = format!(
+        "survey = \"survey.csv\"\nname = \"Oval\"\nclosed = true\nsmoothing_line_m = 0.2\n\
+         [[sections]]\nname = \"A\"\nstart_m = 10\nend_m = 90\n[[corners]]\nname = \"B\"\nstation_m = 50\n\0{line}"
+    );
     let mut driven = "time_s,lap,lap_complete,gps_lat,gps_long\n".to_owned();
     for (i, at) in around(120, 200.0, 120.0).enumerate() {
         let (lat, lon) = place(at);
         let _ = writeln!(driven, "{:.1},1,1,{lat:.7},{lon:.7}", i as f64 * 0.3);
     }
     vec![
+        ("survey", named),
         ("track_csv", line),
         ("track_csv", width),
         ("boundaries", edges),
@@ -160,6 +172,25 @@ fn tracks() -> Vec<(&'static str, String)> {
             kml + "</coordinates></LineString></Placemark></Document></kml>\n",
         ),
     ]
+}
+
+/// The rows of a sweep that is done but for its figures' files, and of one that is not.
+fn sweep_rows() -> Vec<u8> {
+    let settings = SweepSettings::parse(Path::new("s.toml"), readers::SWEPT).unwrap();
+    let rows = settings
+        .points()
+        .unwrap()
+        .into_iter()
+        .enumerate()
+        .map(|(run, point)| Row {
+            run,
+            settings: point.settings,
+            figures: [("hypervolume".to_owned(), Some(0.5)), ("none".to_owned(), None)].into(),
+            device_faults: Vec::new(),
+            front: vec![vec![1.0, 3.0 + run as f64], vec![2.0, 1.5]],
+        });
+    rows.flat_map(|row| (serde_json::to_string(&row).unwrap() + "\n").into_bytes())
+        .collect()
 }
 
 fn motec_csv() -> String {
@@ -184,23 +215,7 @@ fn motec_csv() -> String {
 
 /// A log of the channels that the program looks for.
 fn motec_ld() -> Vec<u8> {
-    use motec_i2::{ChannelMetadata, Datatype, Header, LDWriter, Sample};
-    let header = Header {
-        channel_meta_ptr: 0x3448,
-        channel_data_ptr: 0,
-        event_ptr: 0,
-        device_serial: 1,
-        device_type: "ADL".to_owned(),
-        device_version: 420,
-        num_channels: 9,
-        date_string: "01/02/2020".to_owned(),
-        time_string: "10:00:00".to_owned(),
-        driver: String::new(),
-        vehicleid: "GT".to_owned(),
-        venue: "Test".to_owned(),
-        session: String::new(),
-        short_comment: String::new(),
-    };
+    use motec_i2::{Datatype, Sample};
     let channels = [
         ("Ground Speed", "km/h", 150.0),
         ("Wheel Speed FL", "rpm", 1200.0),
@@ -212,29 +227,11 @@ fn motec_ld() -> Vec<u8> {
         ("G Force Long", "G", 0.1),
         ("Gyro Yaw Velocity", "deg/s", 4.0),
     ];
-    let mut cursor = std::io::Cursor::new(Vec::new());
-    let mut writer = LDWriter::new(&mut cursor, header);
-    for (name, unit, value) in channels {
-        let metadata = ChannelMetadata {
-            prev_addr: 0,
-            next_addr: 0,
-            data_addr: 0,
-            data_count: 0,
-            datatype: Datatype::F32,
-            sample_rate: 20,
-            offset: 0,
-            mul: 1,
-            scale: 1,
-            dec_places: 0,
-            name: name.to_owned(),
-            short_name: String::new(),
-            unit: unit.to_owned(),
-        };
+    let channels = channels.map(|(name, unit, value)| {
         let samples = (0..40).map(|i| Sample::F32(value + 0.01 * i as f32)).collect();
-        writer = writer.with_channel(metadata, samples);
-    }
-    writer.write().unwrap();
-    cursor.into_inner()
+        (ld::channel(name, unit, Datatype::F32, 20), samples)
+    });
+    ld::file(channels.into())
 }
 
 /// What is inside a checkpoint, behind the number by which the target knows its kind.

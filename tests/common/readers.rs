@@ -2,14 +2,14 @@
 //! panics. The fuzz targets of `fuzz/` and the tests of what they found share this file.
 
 use lapswarm::study::compare::{self, Run};
-use lapswarm::study::hybrid::HybridStudySettings;
+use lapswarm::study::hybrid::{self, HybridStudySettings};
 use lapswarm::study::identify::{IdentifySettings, SearchState};
 use lapswarm::study::journal::Journal;
 use lapswarm::study::raceline::{LinesState, RacelineSettings};
 use lapswarm::study::run::RunSettings;
 use lapswarm::study::sensitivity::SensitivitySettings;
 use lapswarm::study::surface::SurfaceSettings;
-use lapswarm::study::sweep::SweepSettings;
+use lapswarm::study::sweep::{self, SWEEP_FILE, SweepSettings};
 use lapswarm::study::transient::read_line;
 use lapswarm::swarm::checkpoint::{self, Checkpoint};
 use lapswarm::swarm::device::DeviceState;
@@ -17,10 +17,11 @@ use lapswarm::swarm::{
     CooperativeSwarm, CovarianceSwarm, DifferenceSwarm, HybridSwarm, Islands, Mopso, Nsga2, Pso, WindowSwarm,
 };
 use lapswarm::telemetry::{ChannelMap, Log, LogOptions, Recording};
-use lapswarm::track::{Circuit, Smoothing, Spacing, Survey, SurveyOptions};
+use lapswarm::track::{Circuit, Smoothing, Spacing, Survey, SurveyOptions, Track};
 use lapswarm::vehicle::tyre::TyreFile;
 use lapswarm::vehicle::{Car, Envelope};
 use lapswarm::{Error, Result};
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 /// A reader by the name of its fuzz target.
@@ -45,6 +46,9 @@ pub const READERS: &[Reader] = &[
     ("checkpoint", checkpoint),
     ("state", state),
     ("run_folder", run_folder),
+    ("line", line),
+    ("survey", survey_file),
+    ("sweep_rows", sweep_rows),
 ];
 
 /// What was read, if anything was; a refusal must name the file and a place in it.
@@ -331,5 +335,42 @@ pub fn run_folder(data: &[u8]) {
     };
     if let Some(run) = taken(Run::read(folder)) {
         taken(compare::compare(&[run]));
+    }
+}
+
+/// A line that a hybrid is driven on.
+pub fn line(data: &[u8]) {
+    if let Some(points) = taken(hybrid::read_line(&on_disk("driven.csv", data), 4.0)) {
+        assert!(points.iter().all(|p| p.is_finite()));
+    }
+}
+
+/// A file that names a survey and, behind a nought, the survey.
+pub fn survey_file(data: &[u8]) {
+    let (toml, table) = split(data);
+    let path = on_disk("surveyed.toml", toml);
+    on_disk("survey.csv", table);
+    if let Some(track) = taken_from_disk(Track::read(path))
+        && let Some(cuts) = taken(track.cross_sections(&Spacing::equal(50), false))
+    {
+        assert!(cuts.right_m.iter().chain(&cuts.left_m).all(|p| p.is_finite()));
+    }
+}
+
+/// The sweep whose rows [`sweep_rows`] reads.
+pub const SWEPT: &str =
+    "study = \"raceline\"\n[base]\ntrack = \"circle:590:600\"\n[grid]\nsections = [40, 60]\nseed = [1, 2]\n";
+
+/// The rows that a sweep goes on from, and what it makes of them.
+pub fn sweep_rows(data: &[u8]) {
+    let folder = FOLDER.with(|folder| folder.path().join("sweep"));
+    std::fs::create_dir_all(&folder).expect("a temporary folder");
+    std::fs::write(folder.join(SWEEP_FILE), SWEPT).expect("a temporary file");
+    std::fs::write(folder.join("rows.jsonl"), data).expect("a temporary file");
+    let settings = SweepSettings::parse(Path::new("s.toml"), SWEPT).expect("a sweep");
+    match sweep::sweep(&settings, &folder, true, |_| ControlFlow::Break(())) {
+        // Rows are left to do.
+        Err(Error::Interrupted(_)) => {}
+        other => drop(taken_from_disk(other)),
     }
 }
