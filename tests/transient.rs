@@ -156,10 +156,19 @@ fn set_ups_and_lines_are_driven_all_at_once() {
         grip_shares: vec![0.3],
         ..settings
     };
-    let broken = drive_population(&car, &setup.car, &lines, edges, &many, |_, _| {
-        ControlFlow::Break(())
-    })
-    .expect("it is broken off");
+    let after = |laps: usize| {
+        let (car, setup, many, lines) = (&car, &setup, &many, &lines);
+        drive_population(car, &setup.car, lines, edges, many, |driven, _| {
+            if driven >= laps {
+                ControlFlow::Break(())
+            } else {
+                ControlFlow::Continue(())
+            }
+        })
+    };
+    // While the lines are planned there is nothing yet to tell of.
+    assert_eq!(after(0).expect_err("no lap").exit_code(), 1);
+    let broken = after(1).expect("it is broken off");
     assert!(
         broken.interrupted && broken.evaluations < 2 * 701,
         "{}",
