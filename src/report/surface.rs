@@ -176,6 +176,9 @@ fn draw_marks(canvas: &mut Canvas<'_>, figure: &SurfaceFigure<'_>, places: Vec<(
     for (at, names) in told {
         canvas.dot(at, MARK_PX, WHITE, 1.0);
         canvas.dot(at, MARK_PX - 1.4, VERMILLION, 1.0);
+        if names.is_empty() {
+            continue;
+        }
         let left = at.0 > inwards_px;
         let look = Type::new(TICK_PX, WHITE, Align::Left).bold();
         let wide = look.width(&names);

@@ -356,6 +356,8 @@ mod tests {
         assert_eq!(would_be("study", Some(&folder)).expect("a new one"), folder);
         assert!(!folder.exists(), "it is looked at only");
         drop(create("study", Some(&folder)).expect("a new folder"));
+        assert!(!folder.exists(), "a run that leaves nothing leaves no folder");
+        std::fs::create_dir(&folder).expect("an empty folder");
         assert_eq!(would_be("study", Some(&folder)).expect("an empty one"), folder);
         std::fs::write(folder.join("a"), "something").expect("a file");
         for taken in [&folder, &folder.join("a")] {
