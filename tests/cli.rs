@@ -274,13 +274,14 @@ fn a_dry_run_of_any_study_says_what_it_would_do_and_writes_nothing() {
     let setups = [line.as_slice(), &["--setups", "3", "--backend", "simd"]].concat();
     // Each with an evaluation's number where one is known beforehand: of the adaptive swarms 128 * 50 + 64 * 1500; of three
     // parameters a base car, four levels of each and eight samples of five; 5 * 5; four set-ups with 21 shares of the grip;
-    // 41 of these alone; four runs of inertia and two each of the pulls with three seeds, 50 * 100 cars each; speeds of 18, 38 and 58 m/s.
+    // 41 of these alone; four runs of inertia and two each of the pulls with three seeds, 50 * 100 cars each; speeds of 18,
+    // 38 and 58 m/s by 128 steering angles.
     let studies: [(&str, &[&str], Option<u64>); 12] = [
         ("run", &[], None),
         ("identify", &[], Some(128 * 50 + 64 * 1500)),
         ("raceline", &ring, None),
         ("hybrid", &["--scenarios-only", "--sections", "60"], None),
-        ("envelope", &["--step-mps", "20"], Some(3)),
+        ("envelope", &["--step-mps", "20"], Some(3 * 128)),
         (
             "sensitivity",
             &["--parameters", "K,C,rBy1", "--samples", "8"],

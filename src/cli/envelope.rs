@@ -68,7 +68,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             "to_mps": settings.to_mps,
             "step_mps": settings.step_mps,
             "steers": arguments.steers,
-            "backend": arguments.backend,
+            "backend": format!("{:?}", arguments.backend).to_lowercase(),
             "adapter": arguments.adapter,
         });
         return Plan::with("envelope", resolved)

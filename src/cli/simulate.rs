@@ -141,9 +141,17 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         settings: "",
         ..Manifest::new("simulate", settings.seed, &backend, &car.name)
     };
-    write_json(&folder.join("manifest.json"), &manifest)?;
-    // The page of runs beside each other, of this one alone.
-    compare(&[Run::read(&folder)?])?.write(folder.join("report.html"))?;
+    // The page of runs beside each other, of this one alone, which reads the manifest; without the page the run is not whole.
+    let file = folder.join("manifest.json");
+    write_json(&file, &manifest)?;
+    let written = Run::read(&folder)
+        .and_then(|run| compare(&[run]))
+        .and_then(|page| page.write(folder.join("report.html")));
+    if let Err(error) = written {
+        // Best effort: the error is what counts.
+        let _ = std::fs::remove_file(&file);
+        return Err(error);
+    }
     if !arguments.common.quiet {
         println!(
             "{}: {:.2} s, {:.1} to {:.1} m/s, up to {:.1} m/s^2 sideways\nLog: {}",

@@ -43,14 +43,15 @@ impl BackendChoice {
     /// What would evaluate, as evaluators name themselves: the GPU is opened, nothing is compiled.
     ///
     /// # Errors
-    /// [`Error::NoDevice`] if a GPU was asked for and none fits, [`Error::Device`] if it does not open.
+    /// [`Error::NoDevice`] if a GPU was asked for and none fits.
     pub fn would_be(self, adapter: Option<&str>) -> Result<BackendInfo> {
         let lanes = || BackendInfo::of_lanes(InstructionSet::best());
         match self.decided(adapter) {
             Self::Gpu => match GpuContext::shared(adapter) {
                 Ok(context) => Ok(context.backend_info()),
-                // As evaluators do: lanes take over where no GPU was asked for.
+                // As evaluators do: lanes take over where no GPU was asked for, and from one that fails.
                 Err(Error::NoDevice(_)) if self == Self::Auto && adapter.is_none() => Ok(lanes()),
+                Err(Error::Device(_)) => Ok(lanes()),
                 Err(error) => Err(error),
             },
             Self::Cpu => Ok(BackendInfo::reference()),

@@ -133,9 +133,13 @@ fn taken(folder: &Path) -> Error {
 }
 
 fn holds_more_than(folder: &Path, names: &[&str]) -> bool {
-    folder.read_dir().is_ok_and(|mut entries| {
-        entries.any(|entry| entry.is_ok_and(|e| !names.iter().any(|name| e.file_name() == *name)))
-    })
+    match folder.read_dir() {
+        // What cannot be read may hold anything.
+        Ok(mut entries) => {
+            entries.any(|entry| entry.map_or(true, |e| !names.iter().any(|name| e.file_name() == *name)))
+        }
+        Err(error) => error.kind() != std::io::ErrorKind::NotFound,
+    }
 }
 
 /// The folder and those around it that are not there, the innermost first.

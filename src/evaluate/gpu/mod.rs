@@ -11,5 +11,5 @@ pub mod shader;
 pub use adapter::{ADAPTER_VARIABLE, DeviceKind, DeviceSummary, devices};
 pub use context::{Binding, GpuContext, Kernel};
 pub use dispatches::DispatchWatch;
-pub(crate) use pacing::Pacing;
 pub use pacing::StepBatching;
+pub(crate) use pacing::{LOOP_ROUNDS, Pacing};

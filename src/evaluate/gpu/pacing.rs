@@ -8,7 +8,7 @@ const FIRST: usize = 1 << 16;
 const GROWTH: f64 = 4.0;
 /// Rounds of all loops of a kernel together, from which on llvmpipe leaves every loop after one round without a word: its own
 /// limit, 65535, less what the other loops of a dispatch take.
-const LOOP_ROUNDS: usize = 65_000;
+pub(crate) const LOOP_ROUNDS: usize = 65_000;
 
 /// How work is cut. Results do not depend on it.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::evaluate::gpu::shader::LineShape;
-use crate::evaluate::gpu::{Binding, DeviceKind, GpuContext};
+use crate::evaluate::gpu::{Binding, DeviceKind, GpuContext, LOOP_ROUNDS};
 use crate::line::kernel::Wanted;
 use crate::line::{LimitTable, LinePlan, SectionRow, TERMS};
 use bytemuck::{Pod, Zeroable};
@@ -12,6 +12,10 @@ use wgpu::BufferUsages as Usage;
 const WORKGROUP: u32 = 64;
 /// Lanes that a software driver works on at once: their figures fill one line of the processor's cache.
 const SOFTWARE_TILE: u32 = 8;
+
+/// Rounds of all loops of a kernel for each section, at the most: two of the shape's, two laps of either pass and one of the
+/// times; with energy, the run-in and its two laps besides.
+const ROUNDS_PER_SECTION: usize = 10;
 
 /// One section on the device. Twin of `Section` in `shaders/line.wgsl`.
 #[repr(C)]
@@ -106,6 +110,14 @@ impl LineTables {
                 "{} holds at most {most} bytes of sections, {} are needed",
                 context.summary(),
                 sections.len()
+            )));
+        }
+        let most = LOOP_ROUNDS / ROUNDS_PER_SECTION;
+        if software && plan.rows.len() > most {
+            return Err(Error::Device(format!(
+                "{} leaves loops that are longer than it thinks good: at most {most} sections can be evaluated on it, {} are needed",
+                context.summary(),
+                plan.rows.len()
             )));
         }
         let fits = |bytes: usize| bytes as u64 <= device.max_uniform_buffer_binding_size;

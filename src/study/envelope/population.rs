@@ -36,6 +36,8 @@ impl Default for PopulationSettings {
 
 /// Most steering angles.
 pub const MOST_STEERS: usize = 10_000;
+/// Cars of the surface at the most: with their tables, cells of a picture and places on a page some four kilobytes each.
+const MOST_CARS: usize = 1 << 18;
 /// What is asked of each trim, in the order of [`SteadySurface::figures`].
 pub(super) const OBJECTIVES: [SteadyObjective; 5] = SteadyObjective::ALL;
 
@@ -162,10 +164,15 @@ pub fn steady_surface(car: &Car, limits: &CarLimits, settings: &PopulationSettin
             expected,
         ));
     }
+    let speeds: Vec<f64> = limits.speeds.iter().map(|s| s.row.v_mps).collect();
+    if speeds.len() * settings.steers > MOST_CARS {
+        let found = format!("{} angles at each of {} speeds", settings.steers, speeds.len());
+        let expected = format!("at most {MOST_CARS} cars in all");
+        return Err(Error::input("the envelope's settings", "steers", found, expected));
+    }
     let lock = car.max_steer_rad.min(STEER_TO_GRIP);
     let last = settings.steers - 1;
     let steers: Vec<f64> = (0..=last).map(|i| lock * i as f64 / last as f64).collect();
-    let speeds: Vec<f64> = limits.speeds.iter().map(|s| s.row.v_mps).collect();
     let bounds = [speeds[0], speeds[speeds.len() - 1]];
     let problem = SteadyProblem::new(car.clone(), Vec::new(), bounds, [0.0, lock], &OBJECTIVES)?;
     let population: Vec<f64> = speeds

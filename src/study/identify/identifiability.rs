@@ -63,6 +63,17 @@ pub fn judge(
 ) -> Identifiability {
     let noise = noise_of(&residuals.errors, scales);
     let d = variables.len();
+    if residuals.errors.len() < d {
+        // Fewer figures than unknowns: any of them may be anything.
+        return Identifiability {
+            singular_values: Vec::new(),
+            standard_errors: vec![f64::INFINITY; d],
+            identifiable: vec![false; d],
+            noise,
+            step_in_errors: f64::INFINITY,
+            looks_like_noise: false,
+        };
+    }
     let ranges: Vec<f64> = variables.iter().map(|v| v.upper - v.lower).collect();
     let matrix = DMatrix::from_fn(residuals.errors.len(), d, |i, k| {
         residuals.columns[k][i] / noise[i % CHANNELS] * ranges[k]

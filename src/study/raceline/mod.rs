@@ -111,6 +111,18 @@ fn line_name(objective: LineObjective) -> &'static str {
     }
 }
 
+/// Raises a flag when it goes before the work is done.
+struct Stopping<'a> {
+    flag: &'a AtomicBool,
+    done: bool,
+}
+
+impl Drop for Stopping<'_> {
+    fn drop(&mut self) {
+        self.flag.fetch_or(!self.done, Ordering::Relaxed);
+    }
+}
+
 /// Runs a study.
 ///
 /// # Errors
@@ -184,6 +196,11 @@ pub fn find_lines_from(
     let (mut waited_s, mut exact_s) = (0.0, 0.0f64);
     // The fastest line takes its solver seconds on one core: the swarms of the objectives before it need not wait.
     std::thread::scope(|scope| -> Result<()> {
+        // An error ends the solvers as well, which the scope waits for.
+        let mut stopping = Stopping {
+            flag: &stop,
+            done: false,
+        };
         let exact: Vec<_> = settings
             .objectives
             .iter()
@@ -224,7 +241,7 @@ pub fn find_lines_from(
                         &solvers,
                         work.interrupted,
                     )?;
-                    let elapsed_s = before_s + began.elapsed().as_secs_f64();
+                    let elapsed_s = before_s + began.elapsed().as_secs_f64() - waited_s;
                     work.finished(|state| {
                         state.finished.push(FinishedObjective {
                             found: found.clone(),
@@ -268,6 +285,7 @@ pub fn find_lines_from(
                 break;
             }
         }
+        stopping.done = true;
         Ok(())
     })?;
 
@@ -285,7 +303,7 @@ pub fn find_lines_from(
             };
             work.told(&told, |state| {
                 state.front = Some(Box::new(at.clone()));
-                state.elapsed_s = before_s + began.elapsed().as_secs_f64();
+                state.elapsed_s = before_s + began.elapsed().as_secs_f64() - waited_s;
             })
         };
         let found = search_front_from(

@@ -12,6 +12,7 @@ use crate::config::{Document, read_text};
 use crate::error::{Error, Result};
 use crate::evaluate::gpu::DispatchWatch;
 use crate::line::PointMass;
+use crate::line::energy::hybrid_parts;
 use crate::study::envelope::{self, EnvelopeSettings, car_limits};
 use crate::study::hybrid::{self, HybridStudySettings};
 use crate::study::identify::{self, IdentifySettings};
@@ -129,6 +130,11 @@ pub fn prepare(settings: &RunSettings) -> Result<Prepared<'_>> {
     let setup = identify::set_up(&settings.identify)?;
     identify::check_swarms(&settings.identify, &setup)?;
     let road = raceline::set_up(&settings.line_of(&settings.identify.car, None))?;
+    let car = Car::load(&settings.identify.car)?;
+    if car.hybrid.is_some() {
+        // What the last stage is to need shows before the first.
+        hybrid_parts(&car)?;
+    }
     Ok(Prepared {
         settings,
         setup,

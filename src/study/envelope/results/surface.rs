@@ -101,7 +101,8 @@ pub fn with_figure(
     let step = |i: usize| speeds[i + 1] - speeds[i];
     let uneven = speeds.len() > 2 && (step(speeds.len() - 2) - step(0)).abs() > 0.1 * step(0);
     let rows = speeds.len() - usize::from(uneven);
-    if rows < 2 {
+    let settled = surface.figures[0].iter().any(|ay| ay.is_finite());
+    if rows < 2 || !settled {
         return Ok(());
     }
     let degrees: Vec<f64> = surface.steers.iter().map(|d| d.to_degrees()).collect();
