@@ -135,3 +135,32 @@ fn sweeps_beyond_all_measure_are_refused() {
         assert!(refused.to_string().len() < 500);
     }
 }
+
+#[test]
+fn figures_of_all_objectives_have_their_columns() {
+    let root = tempfile::tempdir().expect("a temporary folder");
+    let text = "study = \"raceline\"
+[base]
+track = \"stadium:200:60:12\"
+sections = 40
+warm_start = false
+local_search = false
+algorithm = \"thesis\"
+population = 8
+iterations = 2
+[grid]
+objectives = [[\"length\"], [\"gamma\"]]
+seed = [1, 2]
+";
+    let settings = SweepSettings::parse(Path::new("sweep.toml"), text).expect("a sweep");
+    let folder = root.path().join("lines");
+    sweep(&settings, &folder, false, |_| ControlFlow::Continue(())).expect("it runs");
+    for (file, ending) in [("sweep.csv", ""), ("medians.csv", "_median")] {
+        let table = std::fs::read_to_string(folder.join(file)).expect(file);
+        let head = table.lines().next().expect("a head");
+        for name in ["best_length_m", "best_gamma_1pm"] {
+            let name = format!("{name}{ending}");
+            assert!(head.split(',').any(|column| column == name), "{file}: {head}");
+        }
+    }
+}

@@ -167,7 +167,7 @@ fn draw_marks(canvas: &mut Canvas<'_>, figure: &SurfaceFigure<'_>, places: Vec<(
     for ((name, _), at) in figure.marks.iter().zip(places) {
         let together = told
             .iter_mut()
-            .find(|(there, _)| (there.0 - at.0).hypot(there.1 - at.1) < 2.0 * MARK_PX);
+            .find(|(there, _)| !name.is_empty() && (there.0 - at.0).hypot(there.1 - at.1) < 2.0 * MARK_PX);
         match together {
             Some((_, names)) => *names = format!("{names}, {name}"),
             None => told.push((at, (*name).to_owned())),

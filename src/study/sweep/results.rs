@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 use crate::report::{Cells, Column, text_table, write_csv, write_parquet, write_whole};
 use crate::study::run_folder::write_json;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 /// One run.
@@ -219,7 +219,9 @@ impl Summary {
             cells: OwnCells::Texts(self.rows.iter().map(|r| r.settings[key].clone()).collect()),
         });
         let value = |r: &Row, name: &String| r.figures.get(name).copied().flatten().unwrap_or(f64::NAN);
-        let figures = first.figures.keys().map(|name| OwnColumn {
+        // Rows of other objectives have other figures.
+        let names: BTreeSet<&String> = self.rows.iter().flat_map(|r| r.figures.keys()).collect();
+        let figures = names.into_iter().map(|name| OwnColumn {
             name: name.clone(),
             cells: OwnCells::Numbers(self.rows.iter().map(|r| value(r, name)).collect()),
         });
@@ -239,7 +241,8 @@ impl Summary {
                 cells: OwnCells::Texts(self.groups.iter().map(|g| g.settings[key].clone()).collect()),
             })
             .collect();
-        for name in first.figures.keys() {
+        let names: BTreeSet<&String> = self.groups.iter().flat_map(|g| g.figures.keys()).collect();
+        for name in names {
             table.extend(of.iter().map(|(ending, of)| {
                 OwnColumn {
                     name: format!("{name}{ending}"),
