@@ -3,6 +3,7 @@
 
 use super::{CarLimits, STEER_TO_GRIP};
 use crate::error::{Error, Result};
+use crate::evaluate::gpu::DispatchWatch;
 use crate::evaluate::steady::kernel::INTEGRATED;
 use crate::evaluate::steady::{SteadyObjective, SteadyProblem, open_steady_evaluator};
 use crate::evaluate::{BackendChoice, BackendInfo, Failure, FailureCounts};
@@ -75,6 +76,8 @@ pub struct SteadySurface {
     pub summary: PopulationSummary,
     /// What evaluated.
     pub backend: BackendInfo,
+    /// The longest that a dispatch kept the device (ms); nothing where none was at work.
+    pub longest_dispatch_ms: Option<f64>,
 }
 
 /// The figures of the population.
@@ -180,6 +183,7 @@ pub fn steady_surface(car: &Car, limits: &CarLimits, settings: &PopulationSettin
         .flat_map(|v| steers.iter().flat_map(|d| [*v, *d]))
         .collect();
     let began = Instant::now();
+    let dispatches = DispatchWatch::begin();
     let mut evaluator = open_steady_evaluator(&problem, settings.backend, settings.adapter.as_deref())?;
     let found = evaluator.evaluate(&population)?;
     let took = began.elapsed().as_secs_f64();
@@ -254,6 +258,7 @@ pub fn steady_surface(car: &Car, limits: &CarLimits, settings: &PopulationSettin
         speeds,
         steers,
         figures,
+        longest_dispatch_ms: dispatches.longest_ms(),
         failures: found.failures,
         ridge,
         summary,

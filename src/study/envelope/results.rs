@@ -123,6 +123,7 @@ pub fn write_results(
     let manifest = Manifest {
         settings: "",
         device_faults: surface.map_or(&[], |s| &s.summary.device_faults),
+        longest_dispatch_ms: surface.and_then(|s| s.longest_dispatch_ms),
         ..Manifest::new("envelope", 0, backend, &summary.car)
     };
     if let Some(surface) = surface {
