@@ -1,25 +1,5 @@
-// Twin of `src/drive/kernel.rs`: a driver takes a candidate car round a line, step by step.
-//
-// One lane per candidate. A dispatch drives some steps and leaves its state in a buffer for the next, so that no dispatch
-// runs long enough for a watchdog to kill it; how the steps are cut does not show. A car comes as in `replay.wgsl`; behind
-// its figures stand the candidate's line, plan and share of the next plan. The loaders and the constants WORKGROUP and
-// VARYING are generated.
-
-// What a dispatch is to do; twin of `DriveStretch` in `src/evaluate/drive/gpu.rs`.
-struct DriveStretch {
-    // Candidates in this batch, and the distance between their rows in the buffers.
-    candidates: u32,
-    stride: u32,
-    // The first step since the run-up began, and how many.
-    first_step: u32,
-    steps: u32,
-}
-
-@group(0) @binding(0) var<uniform> stretch: DriveStretch;
-@group(0) @binding(1) var<uniform> base: array<vec4<f32>, BASE_VECTORS>;
-@group(0) @binding(2) var<storage, read> figures: array<f32>;
-// The figures of `DriveState::to_array`, one plane of candidates each.
-@group(0) @binding(3) var<storage, read_write> progress: array<f32>;
+// Twin of `src/drive/kernel.rs`: a driver takes a candidate car round a line, step by step. Its other figures are its line, its
+// plan and its share of the next plan; its state is that of `DriveState::to_array`.
 
 const UNDER_WAY: f32 = 0.0;
 const FINISHED: f32 = 1.0;
@@ -120,21 +100,14 @@ fn drive_step(car: CarModel, course: Course, pace: Pace, number: f32, before: Dr
     return state;
 }
 
-fn progress_of(figure: u32, candidate: u32) -> f32 {
-    return progress[figure * stretch.stride + candidate];
-}
-
 @compute @workgroup_size(WORKGROUP)
 fn drive(@builtin(global_invocation_id) id: vec3<u32>) {
     let candidate = id.x;
     if candidate >= stretch.candidates {
         return;
     }
-    let course = courses[place_of_number(figures[VARYING * stretch.stride + candidate])];
-    let pace = Pace(
-        figures[(VARYING + 1u) * stretch.stride + candidate],
-        figures[(VARYING + 2u) * stretch.stride + candidate],
-    );
+    let course = courses[place_of_number(other_figure(0u, candidate))];
+    let pace = Pace(other_figure(1u, candidate), other_figure(2u, candidate));
     var state: DriveState;
     if stretch.first_step == 0u {
         state = begin(course, pace);

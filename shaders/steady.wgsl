@@ -1,28 +1,17 @@
-// Twin of `src/evaluate/steady/kernel.rs`: a car that settles on a circle at a held path speed.
-//
-// One lane per candidate. A dispatch takes some steps and leaves its state in a buffer for the next, so that no dispatch runs
-// long enough for a watchdog to kill it; how the steps are cut does not show. A car comes as in `replay.wgsl`; behind its
-// figures stand the candidate's speed and steering. The loaders and the constants WORKGROUP and VARYING are generated.
+// Twin of `src/evaluate/steady/kernel.rs`: a car that settles on a circle at a held path speed. Its other figures are its speed
+// and its steering; its state is that of `Settling::to_array`.
 
-// What a dispatch is to do; twin of `SteadyStretch` in `src/evaluate/steady/gpu.rs`.
-struct SteadyStretch {
-    // Candidates in this batch, and the distance between their rows in the buffers.
-    candidates: u32,
-    stride: u32,
-    // The first step, and how many.
-    first_step: u32,
-    steps: u32,
-    // `SettlePlan`: length of a step, share of the steering that each adds, how fast slip follows the push.
+// Twin of `DevicePlan` in `src/evaluate/steady/gpu.rs`.
+struct SettlePlan {
+    // Length of a step, s.
     step: f32,
+    // Share of the steering angle that each of the first steps adds.
     steer_per_step: f32,
+    // How fast slip follows the push, s/m.
     gain: f32,
 }
 
-@group(0) @binding(0) var<uniform> stretch: SteadyStretch;
-@group(0) @binding(1) var<uniform> base: array<vec4<f32>, BASE_VECTORS>;
-@group(0) @binding(2) var<storage, read> figures: array<f32>;
-// The figures of `Settling::to_array`, one plane of candidates each.
-@group(0) @binding(3) var<storage, read_write> progress: array<f32>;
+@group(0) @binding(4) var<uniform> plan: SettlePlan;
 
 const SETTLING: f32 = 0.0;
 const SPUN: f32 = 1.0;
@@ -94,7 +83,7 @@ fn settle_rate(car: CarModel, speed: f32, steer: f32, now: Figures) -> SettleRat
             rate.body.roll,
             rate.body.roll_rate,
             rate.pitch_acceleration,
-            -(stretch.gain * push),
+            -(plan.gain * push),
         ),
         residual,
     );
@@ -113,7 +102,7 @@ fn shifted(origin: Figures, share: f32, slope: Figures) -> Figures {
 }
 
 fn settle_step(car: CarModel, aim: Aim, number: f32, before: Settling) -> Settling {
-    let steer = aim.steer * min(number * stretch.steer_per_step, 1.0);
+    let steer = aim.steer * min(number * plan.steer_per_step, 1.0);
     let origin = before.figures;
     var reached = origin;
     var sum = origin;
@@ -123,8 +112,8 @@ fn settle_step(car: CarModel, aim: Aim, number: f32, before: Settling) -> Settli
         if stage == 0u {
             state.residual = rate.residual;
         }
-        sum = shifted(sum, stretch.step * stage_weight(stage), rate.slopes);
-        reached = shifted(origin, stretch.step * stage_reach(stage), rate.slopes);
+        sum = shifted(sum, plan.step * stage_weight(stage), rate.slopes);
+        reached = shifted(origin, plan.step * stage_reach(stage), rate.slopes);
     }
     let stands = abs(sum.vy) < GREATEST_SIDESLIP_SINE * aim.speed;
     if !(stands && still_drives(car_state(aim.speed, sum))) || !is_finite(sum.vy) {
@@ -140,20 +129,13 @@ fn settle_step(car: CarModel, aim: Aim, number: f32, before: Settling) -> Settli
     return state;
 }
 
-fn progress_of(figure: u32, candidate: u32) -> f32 {
-    return progress[figure * stretch.stride + candidate];
-}
-
 @compute @workgroup_size(WORKGROUP)
 fn settle(@builtin(global_invocation_id) id: vec3<u32>) {
     let candidate = id.x;
     if candidate >= stretch.candidates {
         return;
     }
-    let aim = Aim(
-        figures[VARYING * stretch.stride + candidate],
-        figures[(VARYING + 1u) * stretch.stride + candidate],
-    );
+    let aim = Aim(other_figure(0u, candidate), other_figure(1u, candidate));
     var state = begin();
     if stretch.first_step > 0u {
         state = Settling(

@@ -6,7 +6,7 @@ mod common;
 use common::{UNKNOWNS, bundled_car, linear_car, problem};
 use lapswarm::drive::driver::DriverTable;
 use lapswarm::drive::{Course, PATH_WIDTH};
-use lapswarm::evaluate::drive::DriveStretch;
+use lapswarm::evaluate::gpu::TrajectoryStretch;
 use lapswarm::evaluate::gpu::lint;
 use lapswarm::evaluate::gpu::shader::{
     DriveShape, EnergyShape, LineShape, ReplayShape, SteadyShape, car_fragments, line_swarm, swarm,
@@ -15,7 +15,7 @@ use lapswarm::evaluate::gpu::shader::{
 use lapswarm::evaluate::hybrid::EnergyAccount;
 use lapswarm::evaluate::line::{DeviceSection, LineStretch};
 use lapswarm::evaluate::replay::{DeviceSample, DeviceWindow, ModelTable, Norm, Stretch};
-use lapswarm::evaluate::steady::SteadyStretch;
+use lapswarm::evaluate::steady::DevicePlan;
 use lapswarm::line::kernel::Wanted;
 use lapswarm::parity::made_up::Lap;
 use lapswarm::swarm::Generation;
@@ -316,15 +316,15 @@ fn the_structs_of_drives_have_the_hosts_fields() {
     let table = ModelTable::new(&problem.free, &problem.problem.variables);
     let source = drive_shape(problem.tyre_model(), &table, true).source();
     let module = lint::check(&source).expect("the kernel parses");
-    let (members, size) = layout(&module, "DriveStretch");
+    let (members, size) = layout(&module, "TrajectoryStretch");
     let host = [
-        ("candidates", offset_of!(DriveStretch, candidates)),
-        ("stride", offset_of!(DriveStretch, stride)),
-        ("first_step", offset_of!(DriveStretch, first_step)),
-        ("steps", offset_of!(DriveStretch, steps)),
+        ("candidates", offset_of!(TrajectoryStretch, candidates)),
+        ("stride", offset_of!(TrajectoryStretch, stride)),
+        ("first_step", offset_of!(TrajectoryStretch, first_step)),
+        ("steps", offset_of!(TrajectoryStretch, steps)),
     ];
     let named: Vec<(String, usize)> = host.iter().map(|(name, at)| ((*name).to_owned(), *at)).collect();
-    assert_eq!((members, size), (named, size_of::<DriveStretch>()));
+    assert_eq!((members, size), (named, size_of::<TrajectoryStretch>()));
     // These go to the device as rows of floats in the order of their fields.
     for (name, fields) in [("Course", Course::FIELDS), ("Driver", DriverTable::<f32>::FIELDS)] {
         let (members, size) = layout(&module, name);
@@ -350,12 +350,12 @@ fn the_struct_of_circles_has_the_hosts_offsets() {
     let module = lint::check(source).expect("the kernel parses");
     macro_rules! offsets {
         ($($field:ident),*) => {
-            [$((stringify!($field).to_owned(), offset_of!(SteadyStretch, $field))),*]
+            [$((stringify!($field).to_owned(), offset_of!(DevicePlan, $field))),*]
         };
     }
-    let host = offsets!(candidates, stride, first_step, steps, step, steer_per_step, gain);
-    let (members, size) = layout(&module, "SteadyStretch");
-    assert_eq!((members, size), (host.to_vec(), size_of::<SteadyStretch>()));
+    let host = offsets!(step, steer_per_step, gain);
+    let (members, size) = layout(&module, "SettlePlan");
+    assert_eq!((members, size), (host.to_vec(), size_of::<DevicePlan>()));
 }
 
 #[test]

@@ -1,11 +1,12 @@
 //! Choice of backend.
 
-use super::BackendInfo;
 use super::gpu::{GpuContext, devices};
+use super::portions::Portions;
 use super::simd::InstructionSet;
+use super::{BackendInfo, Evaluator, FallbackEvaluator, Problem};
 use crate::error::{Error, Result};
 use serde::{Deserialize, Serialize};
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 /// Whether a real GPU is present. Asked once: it wakes every driver.
 fn real_gpu() -> bool {
@@ -57,5 +58,56 @@ impl BackendChoice {
             Self::Cpu => Ok(BackendInfo::reference()),
             _ => Ok(lanes()),
         }
+    }
+}
+
+/// How one kind of problem is evaluated on each backend.
+pub(super) struct Backends<G, L, R> {
+    /// On a device.
+    pub gpu: G,
+    /// In lanes.
+    pub lanes: L,
+    /// By the reference.
+    pub reference: R,
+    /// Bytes that a candidate takes at the most while it is evaluated.
+    pub bytes_each: u64,
+}
+
+impl<G, L, R> Backends<G, L, R> {
+    /// An evaluator of `problem` on the backend chosen; `adapter` is part of the name of the GPU to use (see
+    /// [`BackendChoice::decided`]). A GPU that fails at work is opened anew, and lanes take over from one that keeps failing
+    /// (see [`FallbackEvaluator`]); populations are cut to what memory is allowed (see [`Portions`]).
+    ///
+    /// # Errors
+    /// [`Error::NoDevice`] if a GPU was asked for and none fits. `Auto` without a named adapter never fails for want of one.
+    pub fn open<'a, OnDevice, InLanes, Reference>(
+        self,
+        problem: &'a Problem,
+        choice: BackendChoice,
+        adapter: Option<&str>,
+    ) -> Result<Box<dyn Evaluator + 'a>>
+    where
+        OnDevice: Evaluator + 'a,
+        InLanes: Evaluator + 'a,
+        Reference: Evaluator + 'a,
+        G: Fn(Arc<GpuContext>) -> Result<OnDevice> + 'a,
+        L: Fn(InstructionSet) -> InLanes + 'a,
+        R: FnOnce() -> Reference,
+    {
+        let Self { gpu, lanes, .. } = self;
+        let evaluator: Box<dyn Evaluator + 'a> = match choice.decided(adapter) {
+            BackendChoice::Gpu => {
+                let name = adapter.map(str::to_owned);
+                Box::new(FallbackEvaluator::new(
+                    problem,
+                    (choice, adapter),
+                    move || Ok(Box::new(gpu(GpuContext::shared(name.as_deref())?)?)),
+                    move || Box::new(lanes(InstructionSet::best())),
+                )?)
+            }
+            BackendChoice::Cpu => Box::new((self.reference)()),
+            _ => Box::new(lanes(InstructionSet::best())),
+        };
+        Ok(Box::new(Portions::new(evaluator, self.bytes_each)))
     }
 }

@@ -16,9 +16,11 @@ pub mod point;
 pub mod portions;
 pub mod replay;
 pub mod simd;
+mod sound;
 pub mod steady;
 
 pub use backend::BackendChoice;
+use backend::Backends;
 pub use fallback::FallbackEvaluator;
 pub use free_car::FreeCar;
 pub use model_table::ModelTable;

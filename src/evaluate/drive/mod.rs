@@ -9,6 +9,6 @@ mod simd;
 pub use crate::evaluate::gpu::StepBatching as DriveBatching;
 pub use backend::open_drive_evaluator;
 pub use cpu::CpuDriveEvaluator;
-pub use gpu::{DriveStretch, GpuDriveEvaluator};
+pub use gpu::GpuDriveEvaluator;
 pub use problem::{DriveObjective, DriveProblem, DriveSettings, LAP_FIGURES};
 pub use simd::SimdDriveEvaluator;

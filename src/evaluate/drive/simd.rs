@@ -6,6 +6,7 @@ use crate::drive::kernel::{DriveState, DrivenLap, STATE, World, drive_on};
 use crate::drive::{Course, Road};
 use crate::error::Result;
 use crate::evaluate::simd::{InstructionSet, LaneWork, dispatch};
+use crate::evaluate::sound::{joined, sound};
 use crate::evaluate::{BackendInfo, Evaluation, Evaluator, Failure, ModelTable, Problem};
 use crate::scalar::lanes::Lanes;
 use crate::vehicle::tyre::Tyre;
@@ -142,24 +143,9 @@ impl<'a> SimdDriveEvaluator<'a> {
     /// The laps of candidates.
     pub fn laps(&self, candidates: &[&[f64]]) -> Vec<std::result::Result<DrivenLap, Failure>> {
         let drive = self.drive;
-        let preliminary: Vec<_> = candidates
-            .par_iter()
-            .map(|c| drive.preliminary_failure(c))
-            .collect();
-        // Only what can be driven takes a lane.
-        let driven: Vec<usize> = (0..candidates.len())
-            .filter(|&i| preliminary[i].is_none())
-            .collect();
-        let rows: Vec<&[f64]> = driven.iter().map(|&i| candidates[i]).collect();
-        let states = self.states(&rows, None);
-        let mut driven = states.into_iter().map(|s| drive.lap(s.map(f64::from)));
-        preliminary
-            .into_iter()
-            .map(|failure| match failure {
-                Some(failure) => Err(failure),
-                None => driven.next().ok_or(Failure::Undefined),
-            })
-            .collect()
+        let (preliminary, rows) = sound(candidates, |c| drive.preliminary_failure(c));
+        let states = self.states(&rows, None).into_iter();
+        joined(preliminary, states.map(|s| drive.lap(s.map(f64::from))))
     }
 }
 

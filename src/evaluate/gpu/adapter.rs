@@ -26,6 +26,15 @@ impl DeviceKind {
     pub fn is_real(self) -> bool {
         matches!(self, Self::Discrete | Self::Integrated | Self::Virtual)
     }
+
+    /// How long a dispatch should take (ms): well under the watchdogs' two seconds and a desktop's patience, well over its
+    /// overhead. A software driver shares the processor: what comes in between may double it.
+    pub(crate) fn dispatch_ms(self) -> f64 {
+        match self {
+            Self::Software => 40.0,
+            _ => 70.0,
+        }
+    }
 }
 
 impl fmt::Display for DeviceKind {

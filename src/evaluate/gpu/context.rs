@@ -32,6 +32,7 @@ pub enum Binding {
 /// A compiled kernel.
 #[derive(Debug)]
 pub struct Kernel {
+    entry: String,
     pub(crate) pipeline: wgpu::ComputePipeline,
     layout: wgpu::BindGroupLayout,
     /// How long parsing and compilation took, ms. Drivers may put off a part to the first dispatch.
@@ -285,6 +286,7 @@ impl GpuContext {
             (pipeline, layout)
         })?;
         let kernel = Arc::new(Kernel {
+            entry: entry.to_owned(),
             pipeline,
             layout,
             compile_ms: start.elapsed().as_secs_f64() * 1e3,
@@ -332,6 +334,30 @@ impl GpuContext {
         self.wait(Some(submission))?;
         dispatches::note(begin.elapsed());
         Ok(())
+    }
+
+    /// Runs `kernel` over so many workgroups; hands back how long that took with its submission and the wait (ms, above nought).
+    ///
+    /// # Errors
+    /// As [`GpuContext::run`].
+    pub(crate) fn dispatch(
+        &self,
+        kernel: &Kernel,
+        group: &wgpu::BindGroup,
+        [wide, high]: [u32; 2],
+        timestamp_writes: Option<wgpu::ComputePassTimestampWrites<'_>>,
+    ) -> Result<f64> {
+        let begin = Instant::now();
+        self.run(|encoder| {
+            let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
+                label: Some(&kernel.entry),
+                timestamp_writes,
+            });
+            pass.set_pipeline(&kernel.pipeline);
+            pass.set_bind_group(0, group, &[]);
+            pass.dispatch_workgroups(wide, high, 1);
+        })?;
+        Ok((begin.elapsed().as_secs_f64() * 1e3).max(1e-3))
     }
 
     /// What an injected fault does.

@@ -7,9 +7,12 @@ pub mod faults;
 pub mod lint;
 mod pacing;
 pub mod shader;
+mod trajectories;
 
 pub use adapter::{ADAPTER_VARIABLE, DeviceKind, DeviceSummary, devices};
 pub use context::{Binding, GpuContext, Kernel};
 pub use dispatches::DispatchWatch;
 pub use pacing::StepBatching;
-pub(crate) use pacing::{LOOP_ROUNDS, Pacing};
+pub(crate) use pacing::{LOOP_ROUNDS, LanePacing};
+pub use trajectories::TrajectoryStretch;
+pub(crate) use trajectories::{Trajectories, TrajectoryKernel, workgroup};

@@ -29,7 +29,7 @@ impl StepBatching {
                 DeviceKind::Software => 1 << 12,
                 _ => 1 << 17,
             },
-            dispatch_ms: 70.0,
+            dispatch_ms: kind.dispatch_ms(),
             steps: None,
         }
     }
@@ -72,5 +72,34 @@ impl Pacing {
     /// Notes how long a dispatch took, ms. The first one of all may have compiled; the next one corrects what it taught.
     pub fn took(&mut self, steps: usize, lanes: usize, ms: f64) {
         self.last = Some((steps, lanes, ms));
+    }
+}
+
+/// How many lanes a dispatch takes, where each lane does all of its work in one.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LanePacing {
+    first: usize,
+    /// Lanes of the last dispatch, and how long it took, ms.
+    last: Option<(usize, f64)>,
+}
+
+impl LanePacing {
+    /// With so many lanes in the first dispatch.
+    pub fn new(first: usize) -> Self {
+        Self { first, last: None }
+    }
+
+    /// Lanes of the next dispatch, which should take so long.
+    pub fn lanes(&self, dispatch_ms: f64) -> usize {
+        match self.last {
+            // A device that was not full takes no longer for more: it is approached in steps.
+            Some((lanes, ms)) => (lanes as f64 * (dispatch_ms / ms).min(GROWTH)) as usize,
+            None => self.first,
+        }
+    }
+
+    /// Notes how long a dispatch took, ms. The first one of all may have compiled; the next one corrects what it taught.
+    pub fn took(&mut self, lanes: usize, ms: f64) {
+        self.last = Some((lanes, ms));
     }
 }

@@ -18,6 +18,7 @@ const CAR: &str = include_str!("../../../shaders/car.wgsl");
 const REPLAY_COMMON: &str = include_str!("../../../shaders/replay_common.wgsl");
 const REPLAY: &str = include_str!("../../../shaders/replay.wgsl");
 const REPLAY_REDUCE: &str = include_str!("../../../shaders/replay_reduce.wgsl");
+const TRAJECTORIES: &str = include_str!("../../../shaders/trajectories.wgsl");
 const PATH: &str = include_str!("../../../shaders/path.wgsl");
 const DRIVER: &str = include_str!("../../../shaders/driver.wgsl");
 const DRIVE: &str = include_str!("../../../shaders/drive.wgsl");
@@ -163,7 +164,7 @@ impl DriveShape<'_> {
             car_fragments(self.model).concat(),
             loaders(self.model, self.sources),
         ];
-        [&car, &constants, PATH, DRIVER, DRIVE, &loaders].concat()
+        [&car, &constants, TRAJECTORIES, PATH, DRIVER, DRIVE, &loaders].concat()
     }
 }
 
@@ -193,7 +194,7 @@ impl SteadyShape<'_> {
             car_fragments(self.model).concat(),
             loaders(self.model, self.sources),
         ];
-        [&car, &constants, STEADY, &loaders].concat()
+        [&car, &constants, TRAJECTORIES, STEADY, &loaders].concat()
     }
 }
 

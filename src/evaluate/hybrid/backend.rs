@@ -2,41 +2,27 @@
 
 use super::{CpuHybridEvaluator, GpuHybridEvaluator, HybridProblem, SimdHybridEvaluator};
 use crate::error::Result;
-use crate::evaluate::gpu::GpuContext;
-use crate::evaluate::portions::Portions;
-use crate::evaluate::simd::InstructionSet;
-use crate::evaluate::{BackendChoice, Evaluator, FallbackEvaluator};
+use crate::evaluate::{BackendChoice, Backends, Evaluator};
 
 /// An evaluator of `hybrid` on the backend chosen; `adapter` is part of the name of the GPU to use (see
 /// [`BackendChoice::decided`]). A GPU that fails at work is opened anew, and lanes on the processor take over from one that
-/// keeps failing (see [`FallbackEvaluator`]).
+/// keeps failing (see [`crate::evaluate::FallbackEvaluator`]).
 ///
 /// # Errors
-/// [`crate::Error::NoDevice`] if a GPU was asked for and none fits.
+/// [`crate::Error::NoDevice`] if a GPU was asked for and none fits. `Auto` without a named adapter never fails for
+/// want of one.
 pub fn open_hybrid_evaluator<'a>(
     hybrid: &'a HybridProblem,
     choice: BackendChoice,
     adapter: Option<&str>,
 ) -> Result<Box<dyn Evaluator + 'a>> {
-    let evaluator: Box<dyn Evaluator + 'a> = match choice.decided(adapter) {
-        BackendChoice::Gpu => {
-            let name = adapter.map(str::to_owned);
-            Box::new(FallbackEvaluator::new(
-                &hybrid.problem,
-                (choice, adapter),
-                move || {
-                    Ok(Box::new(GpuHybridEvaluator::new(
-                        hybrid,
-                        GpuContext::shared(name.as_deref())?,
-                    )?))
-                },
-                || Box::new(SimdHybridEvaluator::new(hybrid, InstructionSet::best())),
-            )?)
-        }
-        BackendChoice::Cpu => Box::new(CpuHybridEvaluator::new(hybrid)),
-        _ => Box::new(SimdHybridEvaluator::new(hybrid, InstructionSet::best())),
+    let backends = Backends {
+        gpu: |context| GpuHybridEvaluator::new(hybrid, context),
+        lanes: |set| SimdHybridEvaluator::new(hybrid, set),
+        reference: || CpuHybridEvaluator::new(hybrid),
+        bytes_each: bytes_each(hybrid),
     };
-    Ok(Box::new(Portions::new(evaluator, bytes_each(hybrid))))
+    backends.open(&hybrid.problem, choice, adapter)
 }
 
 /// Bytes that a candidate takes at the most while it is evaluated: its figures in both precisions and on a device, three

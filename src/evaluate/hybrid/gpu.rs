@@ -1,17 +1,17 @@
 //! The graphics backend: `f32`, one lane per lap.
 
 use super::problem::HybridProblem;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::evaluate::gpu::shader::EnergyShape;
-use crate::evaluate::gpu::{Binding, DeviceKind, GpuContext, Kernel};
-use crate::evaluate::line::{LineBatching, LineStretch, LineTables};
+use crate::evaluate::gpu::{Binding, DeviceKind, GpuContext};
+use crate::evaluate::line::{LineBatches, LineBatching, LineKernel, LineTables};
 use crate::evaluate::{BackendInfo, Evaluation, Evaluator, Problem};
 use crate::line::energy::kernel::FIGURES;
 use crate::line::energy::{EnergyLap, EnergyPlan, EnergyTable, Mode};
 use crate::line::kernel::Wanted;
 use bytemuck::{Pod, Zeroable};
+use rayon::prelude::*;
 use std::sync::Arc;
-use std::time::Instant;
 use wgpu::BufferUsages as Usage;
 
 /// Figures of the car that a dispatch needs. Twin of `EnergyAccount` in `shaders/energy.wgsl`.
@@ -44,33 +44,10 @@ pub struct EnergyAccount {
     pub run_in: u32,
 }
 
-/// Floats per candidate and section in the course: length and curvature.
-const COURSE_WIDTH: usize = 2;
-
-/// Buffers that grow with the batch, and the kernel's bindings to them.
-struct BatchBuffers {
-    stride: usize,
-    variables: wgpu::Buffer,
-    results: wgpu::Buffer,
-    readback: wgpu::Buffer,
-    group: wgpu::BindGroup,
-}
-
 /// Scores laps with energy on a graphics processor.
 pub struct GpuHybridEvaluator<'a> {
     hybrid: &'a HybridProblem,
-    context: Arc<GpuContext>,
-    batching: LineBatching,
-    kernel: Arc<Kernel>,
-    workgroup: usize,
-    stretch: wgpu::Buffer,
-    /// In the order of the kernel's bindings 1 to 4.
-    tables: [wgpu::Buffer; 4],
-    account: wgpu::Buffer,
-    energy: wgpu::Buffer,
-    batch: Option<BatchBuffers>,
-    /// Lanes and time of the last dispatch, by which the next is sized.
-    pace: Option<(usize, f64)>,
+    batches: LineBatches<FIGURES>,
 }
 
 /// The energy tables one after the other, in vectors of four.
@@ -95,7 +72,7 @@ impl<'a> GpuHybridEvaluator<'a> {
     /// An evaluator of `hybrid` on `context`'s device.
     ///
     /// # Errors
-    /// [`Error::Device`] if the kernel does not compile or the device has too few bindings or too little memory for it.
+    /// [`crate::Error::Device`] if the kernel does not compile or the device has too few bindings or too little memory for it.
     pub fn new(hybrid: &'a HybridProblem, context: Arc<GpuContext>) -> Result<Self> {
         let device = context.limits();
         let plan = hybrid.plan().stored::<f32>();
@@ -117,21 +94,6 @@ impl<'a> GpuHybridEvaluator<'a> {
             counts_charge: hybrid.energy().counts_charge,
             uniform_energy: uniform_energy.then_some(vectors.len()),
         };
-        use Binding::{Read, Uniform, Write};
-        let [sections, speeds, corners, ellipse] = tables.bindings;
-        let energy = if uniform_energy { Uniform } else { Read };
-        let bindings = [
-            Uniform, sections, speeds, corners, ellipse, Read, Write, Write, Write, Uniform, energy,
-        ];
-        let stored = bindings.iter().filter(|b| !matches!(b, Uniform)).count() as u32;
-        if stored > device.max_storage_buffers_per_shader_stage {
-            return Err(Error::Device(format!(
-                "{} binds at most {} storage buffers, {stored} are needed",
-                context.summary(),
-                device.max_storage_buffers_per_shader_stage
-            )));
-        }
-        let kernel = context.kernel(&shape.source(), "energy_line", &bindings)?;
         let both = Usage::STORAGE | Usage::UNIFORM;
         let account = EnergyAccount {
             mass: table.mass,
@@ -147,196 +109,46 @@ impl<'a> GpuHybridEvaluator<'a> {
             rows_per_speed_squared: table.rows_per_speed_squared,
             run_in: hybrid.energy().run_in as u32,
         };
-        let stretch = context.buffer(
-            "stretch",
-            size_of::<LineStretch>() as u64,
-            Usage::UNIFORM | Usage::COPY_DST,
-        )?;
         let account = context.buffer_of("account", bytemuck::bytes_of(&account), Usage::UNIFORM)?;
         let energy = context.buffer_of("energy", bytemuck::cast_slice(&vectors), both)?;
+        let energy_binding = if uniform_energy {
+            Binding::Uniform
+        } else {
+            Binding::Read
+        };
+        let kernel = LineKernel {
+            source: &shape.source(),
+            entry: "energy_line",
+            tables,
+            plan: &plan,
+            limits: &limits,
+            others: vec![(Binding::Uniform, account), (energy_binding, energy)],
+            variables: hybrid.line_variables() + hybrid.strategy_figures(),
+            lap: true,
+        };
         Ok(Self {
             hybrid,
-            batching: LineBatching::for_kind(context.summary().kind),
-            context,
-            kernel,
-            workgroup: tables.shape.workgroup as usize,
-            stretch,
-            tables: tables.buffers,
-            account,
-            energy,
-            batch: None,
-            pace: None,
+            batches: LineBatches::new(context, kernel)?,
         })
     }
 
     /// Cuts the work differently.
     pub fn with_batching(mut self, batching: LineBatching) -> Self {
-        self.batching = batching;
-        self.batch = None;
+        self.batches.cut(batching);
         self
-    }
-
-    /// Figures of a candidate on the device.
-    fn figures(&self) -> usize {
-        self.hybrid.line_variables() + self.hybrid.strategy_figures()
-    }
-
-    /// The most candidates of one batch.
-    fn batch_size(&self) -> usize {
-        let device = self.context.limits();
-        let planes = (COURSE_WIDTH * self.hybrid.plan().rows.len())
-            .max(self.figures())
-            .max(FIGURES);
-        let bytes = self
-            .batching
-            .bytes
-            .min(device.max_storage_buffer_binding_size)
-            .min(device.max_buffer_size)
-            // Places in the buffers are counted in 32 bits.
-            .min(1 << 33);
-        let fitting = (bytes / (4 * planes as u64)) as usize;
-        (fitting / self.workgroup).max(1) * self.workgroup
-    }
-
-    /// Makes room for a batch of `candidates`.
-    fn reserve(&mut self, candidates: usize) -> Result<()> {
-        let stride = candidates.next_multiple_of(self.workgroup);
-        if self.batch.as_ref().is_some_and(|b| b.stride >= stride) {
-            return Ok(());
-        }
-        // The old buffers go before the new ones come.
-        self.batch = None;
-        let context = &self.context;
-        let bytes = |planes: usize| (planes * stride * 4) as u64;
-        let sections = self.hybrid.plan().rows.len();
-        let variables = context.buffer(
-            "variables",
-            bytes(self.figures()),
-            Usage::STORAGE | Usage::COPY_DST,
-        )?;
-        let speeds = context.buffer("speeds", bytes(sections), Usage::STORAGE)?;
-        let course = context.buffer("course", bytes(COURSE_WIDTH * sections), Usage::STORAGE)?;
-        let results = context.buffer("results", bytes(FIGURES), Usage::STORAGE | Usage::COPY_SRC)?;
-        let readback = context.buffer("readback", bytes(FIGURES), Usage::MAP_READ | Usage::COPY_DST)?;
-        let [sections, limits, corners, ellipse] = &self.tables;
-        let group = context.bind(
-            &self.kernel,
-            &[
-                &self.stretch,
-                sections,
-                limits,
-                corners,
-                ellipse,
-                &variables,
-                &course,
-                &speeds,
-                &results,
-                &self.account,
-                &self.energy,
-            ],
-        )?;
-        self.batch = Some(BatchBuffers {
-            stride,
-            variables,
-            results,
-            readback,
-            group,
-        });
-        Ok(())
-    }
-
-    fn buffers(&self) -> Result<&BatchBuffers> {
-        self.batch
-            .as_ref()
-            .ok_or_else(|| Error::Device("a batch without buffers".to_owned()))
-    }
-
-    /// Lanes of the next dispatch, in whole workgroups.
-    fn next_lanes(&self) -> usize {
-        /// Sections of all laps of the first dispatch: tens of milliseconds on a software driver.
-        const FIRST: usize = 1 << 17;
-        let by_time = match self.pace {
-            // A device that was not full takes no longer for more: it is approached in steps.
-            Some((lanes, ms)) => (lanes as f64 * (self.batching.dispatch_ms / ms).min(4.0)) as usize,
-            None => FIRST / self.hybrid.plan().rows.len(),
-        };
-        let most_groups = self.context.limits().max_compute_workgroups_per_dimension as usize;
-        let lanes = by_time.min(self.batching.lanes) / self.workgroup;
-        lanes.clamp(1, most_groups) * self.workgroup
-    }
-
-    /// Scores one batch, whose figures are on the device in rows of `stride`.
-    fn score_batch(&mut self, candidates: usize, stride: usize) -> Result<()> {
-        let limits = &self.hybrid.car().limits;
-        let plan = self.hybrid.plan();
-        let mut first = 0;
-        while first < candidates {
-            let lanes = self
-                .next_lanes()
-                .min((candidates - first).next_multiple_of(self.workgroup));
-            let stretch = LineStretch {
-                candidates: candidates.min(first + lanes) as u32,
-                stride: stride as u32,
-                first: first as u32,
-                sections: plan.rows.len() as u32,
-                start: plan.start as u32,
-                entry: plan.entry as f32,
-                rows_per_speed_squared: limits.rows_per_speed_squared as f32,
-                rows_per_radius: limits.rows_per_radius as f32,
-            };
-            self.context.write(&self.stretch, bytemuck::bytes_of(&stretch));
-            let batch = self.buffers()?;
-            let begin = Instant::now();
-            self.context.run(|encoder| {
-                let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
-                    label: Some("energy_line"),
-                    timestamp_writes: None,
-                });
-                pass.set_pipeline(&self.kernel.pipeline);
-                pass.set_bind_group(0, &batch.group, &[]);
-                pass.dispatch_workgroups((lanes / self.workgroup) as u32, 1, 1);
-            })?;
-            self.pace = Some((lanes, (begin.elapsed().as_secs_f64() * 1e3).max(1e-3)));
-            first += lanes;
-        }
-        Ok(())
     }
 
     /// The laps of candidates.
     ///
     /// # Errors
-    /// [`Error::Device`] if the device fails.
+    /// [`crate::Error::Device`] if the device fails.
     pub fn laps(&mut self, candidates: &[&[f64]]) -> Result<Vec<EnergyLap<f64>>> {
-        let mut laps = Vec::with_capacity(candidates.len());
-        let count = self.figures();
-        for batch in candidates.chunks(self.batch_size()) {
-            self.reserve(batch.len())?;
-            let stride = self.buffers()?.stride;
-            // Figure by figure, so that neighbouring lanes read neighbouring memory. What is no number never reaches the
-            // device, where it may count as anything.
-            let mut figures = vec![0.0f32; stride * count];
-            for (lane, candidate) in batch.iter().enumerate() {
-                for (k, value) in self.hybrid.figures(candidate).into_iter().enumerate() {
-                    let value = value as f32;
-                    figures[k * stride + lane] = if value.is_finite() { value } else { 0.0 };
-                }
-            }
-            self.context
-                .write(&self.buffers()?.variables, bytemuck::cast_slice(&figures));
-            self.score_batch(batch.len(), stride)?;
-            let buffers = self.buffers()?;
-            let bytes = (stride * FIGURES * 4) as u64;
-            self.context.run(|encoder| {
-                encoder.copy_buffer_to_buffer(&buffers.results, 0, &buffers.readback, 0, bytes)
-            })?;
-            self.context.read(&buffers.readback, bytes, |data| {
-                let planes: &[f32] = bytemuck::cast_slice(data);
-                laps.extend((0..batch.len()).map(|candidate| {
-                    EnergyLap::from_array(std::array::from_fn(|k| f64::from(planes[k * stride + candidate])))
-                }));
-            })?;
-        }
-        Ok(laps)
+        let hybrid = self.hybrid;
+        let figures: Vec<Vec<f64>> = candidates.par_iter().map(|c| hybrid.figures(c)).collect();
+        let laps = self
+            .batches
+            .score(candidates.len(), |candidate, figure| figures[candidate][figure])?;
+        Ok(laps.into_iter().map(EnergyLap::from_array).collect())
     }
 }
 
@@ -346,7 +158,7 @@ impl Evaluator for GpuHybridEvaluator<'_> {
     }
 
     fn backend(&self) -> BackendInfo {
-        self.context.backend_info()
+        self.batches.context().backend_info()
     }
 
     fn evaluate(&mut self, population: &[f64]) -> Result<Evaluation> {

@@ -2,14 +2,11 @@
 
 use super::{CpuLineEvaluator, GpuLineEvaluator, LineProblem, SimdLineEvaluator};
 use crate::error::Result;
-use crate::evaluate::gpu::GpuContext;
-use crate::evaluate::portions::Portions;
-use crate::evaluate::simd::InstructionSet;
-use crate::evaluate::{BackendChoice, Evaluator, FallbackEvaluator};
+use crate::evaluate::{BackendChoice, Backends, Evaluator};
 
 /// An evaluator of `line` on the backend chosen; `adapter` is part of the name of the GPU to use (see
 /// [`BackendChoice::decided`]). A GPU that fails at work is opened anew, and lanes on the processor take over from one that
-/// keeps failing (see [`FallbackEvaluator`]).
+/// keeps failing (see [`crate::evaluate::FallbackEvaluator`]).
 ///
 /// # Errors
 /// [`crate::Error::NoDevice`] if a GPU was asked for and none fits. `Auto` without a named adapter never fails for
@@ -19,25 +16,13 @@ pub fn open_line_evaluator<'a>(
     choice: BackendChoice,
     adapter: Option<&str>,
 ) -> Result<Box<dyn Evaluator + 'a>> {
-    let evaluator: Box<dyn Evaluator + 'a> = match choice.decided(adapter) {
-        BackendChoice::Gpu => {
-            let name = adapter.map(str::to_owned);
-            Box::new(FallbackEvaluator::new(
-                &line.problem,
-                (choice, adapter),
-                move || {
-                    Ok(Box::new(GpuLineEvaluator::new(
-                        line,
-                        GpuContext::shared(name.as_deref())?,
-                    )?))
-                },
-                || Box::new(SimdLineEvaluator::new(line, InstructionSet::best())),
-            )?)
-        }
-        BackendChoice::Cpu => Box::new(CpuLineEvaluator::new(line)),
-        _ => Box::new(SimdLineEvaluator::new(line, InstructionSet::best())),
+    let backends = Backends {
+        gpu: |context| GpuLineEvaluator::new(line, context),
+        lanes: |set| SimdLineEvaluator::new(line, set),
+        reference: || CpuLineEvaluator::new(line),
+        bytes_each: bytes_each(line),
     };
-    Ok(Box::new(Portions::new(evaluator, bytes_each(line))))
+    backends.open(&line.problem, choice, adapter)
 }
 
 /// Bytes that a candidate takes at the most while it is evaluated: its variables in single precision, once here and once on

@@ -104,12 +104,7 @@ impl Exchange {
         context.write(&self.task, bytemuck::bytes_of(&task));
         let group = context.bind(kernel, &[&self.task, table, from, to])?;
         let (x, y) = groups(task.candidates as usize);
-        context.run(|encoder| {
-            let mut pass = encoder.begin_compute_pass(&Default::default());
-            pass.set_pipeline(&kernel.pipeline);
-            pass.set_bind_group(0, &group, &[]);
-            pass.dispatch_workgroups(x, y, 1);
-        })
+        context.dispatch(kernel, &group, [x, y], None).map(drop)
     }
 }
 
@@ -135,16 +130,17 @@ impl DeviceObjectives for GpuLineEvaluator<'_> {
         position: &wgpu::Buffer,
         objectives: &wgpu::Buffer,
     ) -> Result<()> {
+        let context = Arc::clone(self.batches.context());
         let exchange = match self.exchange.take() {
             Some(exchange) => exchange,
-            None => Exchange::new(self.line, &self.context)?,
+            None => Exchange::new(self.line, &context)?,
         };
-        let most = self.batch_size();
+        let most = self.batches.batch_size();
         let mut first = 0;
         while first < particles {
             let candidates = (particles - first).min(most);
-            self.reserve(candidates)?;
-            let stride = self.buffers()?.stride;
+            self.batches.reserve(candidates)?;
+            let (stride, variables, _) = self.batches.rows()?;
             let task = DeviceExchange {
                 first: first as u32,
                 candidates: candidates as u32,
@@ -154,11 +150,12 @@ impl DeviceObjectives for GpuLineEvaluator<'_> {
                 objectives: self.line.objectives().len() as u32,
                 padding: [0; 2],
             };
-            let buffers = [&exchange.variables, position, &self.buffers()?.variables];
-            exchange.dispatch(&self.context, &exchange.take, task, buffers)?;
-            self.score_batch(candidates, stride)?;
-            let buffers = [&exchange.objectives, &self.buffers()?.results, objectives];
-            exchange.dispatch(&self.context, &exchange.give, task, buffers)?;
+            let buffers = [&exchange.variables, position, variables];
+            exchange.dispatch(&context, &exchange.take, task, buffers)?;
+            self.batches.score_batch(candidates)?;
+            let (_, _, results) = self.batches.rows()?;
+            let buffers = [&exchange.objectives, results, objectives];
+            exchange.dispatch(&context, &exchange.give, task, buffers)?;
             first += candidates;
         }
         self.exchange = Some(exchange);

@@ -2,14 +2,12 @@
 
 use crate::error::{Error, Result};
 use crate::evaluate::gpu::shader::LineShape;
-use crate::evaluate::gpu::{Binding, DeviceKind, GpuContext, LOOP_ROUNDS};
+use crate::evaluate::gpu::{Binding, DeviceKind, GpuContext, LOOP_ROUNDS, workgroup};
 use crate::line::kernel::Wanted;
 use crate::line::{LimitTable, LinePlan, SectionRow, TERMS};
 use bytemuck::{Pod, Zeroable};
 use wgpu::BufferUsages as Usage;
 
-/// Lanes of a workgroup, where the device allows: a multiple of every device's subgroup.
-const WORKGROUP: u32 = 64;
 /// Lanes that a software driver works on at once: their figures fill one line of the processor's cache.
 const SOFTWARE_TILE: u32 = 8;
 
@@ -86,9 +84,7 @@ impl LineTables {
     ) -> Result<Self> {
         let device = context.limits();
         let software = context.summary().kind == DeviceKind::Software;
-        let workgroup = WORKGROUP
-            .min(device.max_compute_invocations_per_workgroup)
-            .min(device.max_compute_workgroup_size_x);
+        let workgroup = workgroup(context);
         let sections = DeviceSection::all_of(&plan.rows);
         // Two figures to a row; uniform rows are of four.
         let rows_of_four = |table: &[f32]| -> Vec<f32> {

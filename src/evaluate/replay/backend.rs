@@ -2,14 +2,11 @@
 
 use super::{CpuEvaluator, GpuEvaluator, ReplayProblem, SimdEvaluator};
 use crate::error::Result;
-use crate::evaluate::gpu::GpuContext;
-use crate::evaluate::portions::Portions;
-use crate::evaluate::simd::InstructionSet;
-use crate::evaluate::{BackendChoice, Evaluator, FallbackEvaluator};
+use crate::evaluate::{BackendChoice, Backends, Evaluator};
 
 /// An evaluator of `replay` on the backend chosen; `adapter` is part of the name of the GPU to use (see
 /// [`BackendChoice::decided`]). A GPU that fails at work is opened anew, and lanes on the processor take over from one that
-/// keeps failing (see [`FallbackEvaluator`]).
+/// keeps failing (see [`crate::evaluate::FallbackEvaluator`]).
 ///
 /// # Errors
 /// [`crate::Error::NoDevice`] if a GPU was asked for and none fits. `Auto` without a named adapter never fails for
@@ -19,25 +16,13 @@ pub fn open_evaluator<'a>(
     choice: BackendChoice,
     adapter: Option<&str>,
 ) -> Result<Box<dyn Evaluator + 'a>> {
-    let evaluator: Box<dyn Evaluator + 'a> = match choice.decided(adapter) {
-        BackendChoice::Gpu => {
-            let name = adapter.map(str::to_owned);
-            Box::new(FallbackEvaluator::new(
-                &replay.problem,
-                (choice, adapter),
-                move || {
-                    Ok(Box::new(GpuEvaluator::new(
-                        replay,
-                        GpuContext::shared(name.as_deref())?,
-                    )?))
-                },
-                || Box::new(SimdEvaluator::new(replay, InstructionSet::best())),
-            )?)
-        }
-        BackendChoice::Cpu => Box::new(CpuEvaluator::new(replay)),
-        _ => Box::new(SimdEvaluator::new(replay, InstructionSet::best())),
+    let backends = Backends {
+        gpu: |context| GpuEvaluator::new(replay, context),
+        lanes: |set| SimdEvaluator::new(replay, set),
+        reference: || CpuEvaluator::new(replay),
+        bytes_each: bytes_each(replay),
     };
-    Ok(Box::new(Portions::new(evaluator, bytes_each(replay))))
+    backends.open(&replay.problem, choice, adapter)
 }
 
 /// Bytes that a candidate takes at the most while it is evaluated: the figures of its car, once here and once on a device,

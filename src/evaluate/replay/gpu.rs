@@ -4,12 +4,11 @@ use super::kernel::{BLOCK, CHANNELS};
 use super::problem::ReplayProblem;
 use crate::error::{Error, Result};
 use crate::evaluate::gpu::shader::{ReplayShape, base_vectors};
-use crate::evaluate::gpu::{Binding, DeviceKind, GpuContext, Kernel};
+use crate::evaluate::gpu::{Binding, DeviceKind, GpuContext, Kernel, workgroup};
+use crate::evaluate::sound::{joined, sound};
 use crate::evaluate::{BackendInfo, Evaluation, Evaluator, ModelTable, Problem};
 use bytemuck::{Pod, Zeroable};
-use rayon::prelude::*;
 use std::sync::Arc;
-use std::time::Instant;
 use wgpu::BufferUsages as Usage;
 
 /// One sample of the log on the device. Twin of `Sample` in `shaders/replay.wgsl`.
@@ -66,8 +65,6 @@ pub struct Stretch {
 const PROGRESS_PLANES: usize = 6 + CHANNELS + 1;
 /// Floats per candidate that come back.
 const RESULT_PLANES: usize = CHANNELS + 1;
-/// Lanes of a workgroup, where the device allows: a multiple of every device's subgroup.
-const WORKGROUP: u32 = 64;
 /// Dispatches that one set of timestamps covers.
 const TIMED_DISPATCHES: u32 = 1024;
 
@@ -94,7 +91,7 @@ impl Batching {
                 _ => 1 << 18,
             },
             bytes: 128 << 20,
-            dispatch_ms: 70.0,
+            dispatch_ms: kind.dispatch_ms(),
             samples: None,
         }
     }
@@ -161,9 +158,7 @@ impl<'a> GpuEvaluator<'a> {
     /// [`Error::Device`] if the kernels do not compile or the log does not fit the device.
     pub fn new(replay: &'a ReplayProblem, context: Arc<GpuContext>) -> Result<Self> {
         let limits = context.limits();
-        let workgroup = WORKGROUP
-            .min(limits.max_compute_invocations_per_workgroup)
-            .min(limits.max_compute_workgroup_size_x);
+        let workgroup = workgroup(&context);
         let table = ModelTable::new(&replay.free, &replay.problem.variables);
         let shape = ReplayShape {
             model: replay.tyre_model(),
@@ -398,17 +393,12 @@ impl<'a> GpuEvaluator<'a> {
             let Some(batch) = &self.batch else {
                 return Err(Error::Device("a batch without buffers".to_owned()));
             };
-            let start = Instant::now();
-            self.context.run(|encoder| {
-                let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
-                    label: Some("replay"),
-                    timestamp_writes,
-                });
-                pass.set_pipeline(&self.drive.pipeline);
-                pass.set_bind_group(0, &batch.replay_group, &[]);
-                pass.dispatch_workgroups(groups, stretch.windows, 1);
-            })?;
-            let ms = start.elapsed().as_secs_f64() * 1e3;
+            let ms = self.context.dispatch(
+                &self.drive,
+                &batch.replay_group,
+                [groups, stretch.windows],
+                timestamp_writes,
+            )?;
             // The first dispatch of all may have compiled; the next one corrects what it taught.
             self.pace = Some(Pace {
                 lanes,
@@ -421,12 +411,9 @@ impl<'a> GpuEvaluator<'a> {
         let Some(batch) = &self.batch else {
             return Err(Error::Device("a batch without buffers".to_owned()));
         };
-        self.context.run(|encoder| {
-            let mut pass = encoder.begin_compute_pass(&Default::default());
-            pass.set_pipeline(&self.reduce.pipeline);
-            pass.set_bind_group(0, &batch.reduce_group, &[]);
-            pass.dispatch_workgroups(groups, 1, 1);
-        })
+        self.context
+            .dispatch(&self.reduce, &batch.reduce_group, [groups, 1], None)
+            .map(drop)
     }
 
     /// Errors per channel of candidates that can be driven; `None` of those that do not reach the end.
@@ -521,26 +508,9 @@ impl Evaluator for GpuEvaluator<'_> {
         self.kernel_ms = None;
         let replay = self.replay;
         let candidates: Vec<&[f64]> = population.chunks_exact(replay.dimensions().max(1)).collect();
-        // Only what can be driven takes a lane.
-        let preliminary: Vec<_> = candidates
-            .par_iter()
-            .map(|c| replay.free.preliminary_failure(c))
-            .collect();
-        let rows: Vec<&[f64]> = candidates
-            .iter()
-            .zip(&preliminary)
-            .filter(|(_, failure)| failure.is_none())
-            .map(|(candidate, _)| *candidate)
-            .collect();
-        let mut errors = self.drive(&rows)?.into_iter();
+        let (preliminary, rows) = sound(&candidates, |c| replay.free.preliminary_failure(c));
+        let errors = self.drive(&rows)?.into_iter();
         self.kernel_ms = self.read_stopwatch()?;
-        let results = preliminary
-            .into_iter()
-            .map(|failure| match failure {
-                Some(failure) => (replay.objective_row(None).0, Some(failure)),
-                None => replay.objective_row(errors.next().flatten()),
-            })
-            .collect();
-        Ok(Evaluation::of_rows(results))
+        Ok(replay.evaluation_of(joined(preliminary, errors)))
     }
 }

@@ -2,7 +2,7 @@
 
 use super::kernel::CHANNELS;
 use crate::error::{Error, Result};
-use crate::evaluate::{FAILED_COST, Failure, FreeCar, Objective, Problem};
+use crate::evaluate::{Evaluation, FAILED_COST, Failure, FreeCar, Objective, Problem};
 use crate::vehicle::car::CarParameter;
 use crate::vehicle::{Car, TyreModel};
 use serde::{Deserialize, Serialize};
@@ -221,6 +221,18 @@ impl ReplayProblem {
             Some(row) => (row, None),
             None => (vec![FAILED_COST; self.objectives.len()], Some(Failure::Spun)),
         }
+    }
+
+    /// The objectives of candidates from their errors, see [`ReplayProblem::objective_row`], or from why they have none.
+    pub(super) fn evaluation_of(
+        &self,
+        errors: Vec<std::result::Result<Option<[f64; CHANNELS]>, Failure>>,
+    ) -> Evaluation {
+        let rows = errors.into_iter().map(|errors| match errors {
+            Ok(errors) => self.objective_row(errors),
+            Err(failure) => (self.objective_row(None).0, Some(failure)),
+        });
+        Evaluation::of_rows(rows.collect())
     }
 
     /// Adds one window's errors to those of the windows before.

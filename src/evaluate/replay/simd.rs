@@ -4,6 +4,7 @@ use super::kernel::{CHANNELS, score_window};
 use super::problem::{Plan, ReplayProblem, Window};
 use crate::error::Result;
 use crate::evaluate::simd::{InstructionSet, LaneWork, dispatch};
+use crate::evaluate::sound::{joined, sound};
 use crate::evaluate::{BackendInfo, Evaluation, Evaluator, ModelTable, Problem};
 use crate::scalar::lanes::Lanes;
 use crate::vehicle::tyre::Tyre;
@@ -87,20 +88,13 @@ impl Evaluator for SimdEvaluator<'_> {
 
     fn evaluate(&mut self, population: &[f64]) -> Result<Evaluation> {
         let candidates: Vec<&[f64]> = population.chunks_exact(self.replay.dimensions().max(1)).collect();
-        let preliminary: Vec<_> = candidates
-            .par_iter()
-            .map(|c| self.replay.free.preliminary_failure(c))
-            .collect();
-        // Only what can be driven takes a lane.
-        let driven: Vec<usize> = (0..candidates.len())
-            .filter(|&i| preliminary[i].is_none())
-            .collect();
-        let rows: Vec<&[f64]> = driven.iter().map(|&i| candidates[i]).collect();
+        let replay = self.replay;
+        let (preliminary, rows) = sound(&candidates, |c| replay.free.preliminary_failure(c));
         let figures = self.table.rows(&self.replay.free, &rows);
 
         let windows = &self.plan.windows;
         let (lanes, width) = (self.set.lanes(), self.table.varying.len());
-        let packs = driven.len().div_ceil(lanes);
+        let packs = rows.len().div_ceil(lanes);
         let evaluator = &*self;
         let scores: Vec<PackScore> = (0..packs * windows.len())
             .into_par_iter()
@@ -108,29 +102,25 @@ impl Evaluator for SimdEvaluator<'_> {
                 let pack = job / windows.len();
                 let work = PackThroughWindow {
                     evaluator,
-                    rows: &figures[pack * lanes * width..((pack + 1) * lanes).min(driven.len()) * width],
+                    rows: &figures[pack * lanes * width..((pack + 1) * lanes).min(rows.len()) * width],
                     window: &windows[job % windows.len()],
                 };
                 dispatch(evaluator.set, work)
             })
             .collect();
 
-        let mut results: Vec<_> = preliminary
-            .iter()
-            .map(|f| (self.replay.objective_row(None).0, *f))
-            .collect();
-        for (place, &candidate) in driven.iter().enumerate() {
+        let totals = (0..rows.len()).map(|place| {
             let (pack, lane) = (place / lanes, place % lanes);
             let mut total = Some([0.0; CHANNELS]);
             for (errors, drives) in &scores[pack * windows.len()..(pack + 1) * windows.len()] {
                 total = total.filter(|_| drives >> lane & 1 == 1);
                 if let Some(total) = &mut total {
                     let errors: [f64; CHANNELS] = std::array::from_fn(|k| f64::from(errors[k][lane]));
-                    self.replay.accumulate(total, errors);
+                    replay.accumulate(total, errors);
                 }
             }
-            results[candidate] = self.replay.objective_row(total);
-        }
-        Ok(Evaluation::of_rows(results))
+            total
+        });
+        Ok(replay.evaluation_of(joined(preliminary, totals)))
     }
 }

@@ -13,6 +13,6 @@ mod simd;
 
 pub use backend::open_steady_evaluator;
 pub use cpu::CpuSteadyEvaluator;
-pub use gpu::{GpuSteadyEvaluator, SteadyStretch};
+pub use gpu::{DevicePlan, GpuSteadyEvaluator};
 pub use problem::{AIM_FIGURES, SETTLED, Settled, SteadyObjective, SteadyProblem};
 pub use simd::SimdSteadyEvaluator;

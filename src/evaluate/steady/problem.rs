@@ -6,7 +6,6 @@ use super::modes::{SettlePlan, displaced, slopes};
 use crate::error::{Error, Result};
 use crate::evaluate::{Evaluation, FAILED_COST, Failure, FreeCar, Objective, Problem, Variable};
 use crate::vehicle::{Car, CarParameter, Chassis, TyreModel};
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 /// What of a trim can be minimised.
@@ -242,19 +241,6 @@ impl SteadyProblem {
         }
     }
 
-    /// Why candidates need not be driven, if so, and those that must.
-    pub(super) fn sound<'c>(&self, candidates: &[&'c [f64]]) -> (Vec<Option<Failure>>, Vec<&'c [f64]>) {
-        let preliminary: Vec<_> = candidates
-            .par_iter()
-            .map(|c| self.free.preliminary_failure(c))
-            .collect();
-        // Only what can be driven takes a lane.
-        let rows = candidates.iter().zip(&preliminary);
-        let rows = rows.filter(|(_, failure)| failure.is_none()).map(|(c, _)| *c);
-        let rows = rows.collect();
-        (preliminary, rows)
-    }
-
     /// The trims of candidates from their last states.
     pub(super) fn trims_of<S: Copy + Into<f64>>(
         &self,
@@ -272,18 +258,4 @@ impl SteadyProblem {
         let rows = trims.into_iter().map(|trim| self.objective_row(trim));
         Evaluation::of_rows(rows.collect())
     }
-}
-
-/// The last states of those that could be driven, in their places among those that could not.
-pub(super) fn joined<S>(
-    preliminary: Vec<Option<Failure>>,
-    mut states: impl Iterator<Item = Settling<S>>,
-) -> Vec<std::result::Result<Settling<S>, Failure>> {
-    preliminary
-        .into_iter()
-        .map(|failure| match failure {
-            Some(failure) => Err(failure),
-            None => states.next().ok_or(Failure::Undefined),
-        })
-        .collect()
 }

@@ -2,9 +2,10 @@
 
 use super::kernel::{Aim, STATE, Settling, settle};
 use super::modes::SettlePlan;
-use super::problem::{AIM_FIGURES, Settled, SteadyProblem, joined};
+use super::problem::{AIM_FIGURES, Settled, SteadyProblem};
 use crate::error::Result;
 use crate::evaluate::simd::{InstructionSet, LaneWork, dispatch};
+use crate::evaluate::sound::{joined, sound};
 use crate::evaluate::{BackendInfo, Evaluation, Evaluator, Failure, ModelTable, Problem};
 use crate::scalar::lanes::Lanes;
 use crate::vehicle::tyre::Tyre;
@@ -82,7 +83,7 @@ impl<'a> SimdSteadyEvaluator<'a> {
     /// The last states of candidates, or why there are none.
     pub fn states(&self, candidates: &[&[f64]]) -> Vec<std::result::Result<Settling<f32>, Failure>> {
         let steady = self.steady;
-        let (preliminary, rows) = steady.sound(candidates);
+        let (preliminary, rows) = sound(candidates, |c| steady.preliminary_failure(c));
         let figures = self.table.rows(&steady.free, &rows);
         let aims: Vec<_> = rows.iter().map(|c| steady.aim_figures(c)).collect();
         let (lanes, width) = (self.set.lanes(), self.table.varying.len());

@@ -1,0 +1,267 @@
+//! Candidates that a kernel takes on step by step: the figures of their cars and their states on the device, a batch at a time.
+
+use super::context::{Binding, GpuContext, Kernel};
+use super::pacing::{Pacing, StepBatching};
+use super::shader::base_vectors;
+use crate::error::{Error, Result};
+use crate::evaluate::ModelTable;
+use bytemuck::{Pod, Zeroable};
+use std::sync::Arc;
+use wgpu::BufferUsages as Usage;
+
+/// What a dispatch is to do. Twin of `TrajectoryStretch` in `shaders/trajectories.wgsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+pub struct TrajectoryStretch {
+    /// Candidates in this batch.
+    pub candidates: u32,
+    /// Distance between their rows in the buffers.
+    pub stride: u32,
+    /// The first step since the beginning.
+    pub first_step: u32,
+    /// How many steps.
+    pub steps: u32,
+}
+
+/// Lanes of a workgroup, where the device allows: a multiple of every device's subgroup.
+const WORKGROUP: u32 = 64;
+
+/// Lanes of a workgroup on `context`'s device.
+pub(crate) fn workgroup(context: &GpuContext) -> u32 {
+    let limits = context.limits();
+    WORKGROUP
+        .min(limits.max_compute_invocations_per_workgroup)
+        .min(limits.max_compute_workgroup_size_x)
+}
+
+/// A kernel that takes candidates on, and what it reads.
+pub(crate) struct TrajectoryKernel<'k> {
+    pub source: &'k str,
+    pub entry: &'k str,
+    /// The candidates' cars.
+    pub table: &'k ModelTable,
+    /// Figures of a candidate behind those of its car.
+    pub others: usize,
+    /// From binding 4 on.
+    pub tables: Vec<(Binding, wgpu::Buffer)>,
+    /// Rounds of its loops in a step.
+    pub rounds_per_step: usize,
+}
+
+/// Buffers that grow with the batch, and the kernel's bindings to them.
+struct BatchBuffers {
+    stride: usize,
+    figures: wgpu::Buffer,
+    progress: wgpu::Buffer,
+    readback: wgpu::Buffer,
+    group: wgpu::BindGroup,
+}
+
+/// Batches of candidates on a device, whose states have `STATE` figures.
+pub(crate) struct Trajectories<const STATE: usize> {
+    context: Arc<GpuContext>,
+    kernel: Arc<Kernel>,
+    batching: StepBatching,
+    workgroup: usize,
+    /// Figures of a candidate: those of its car that vary and the others.
+    varying: usize,
+    figures: usize,
+    stretch: wgpu::Buffer,
+    base: wgpu::Buffer,
+    tables: Vec<wgpu::Buffer>,
+    batch: Option<BatchBuffers>,
+    pacing: Pacing,
+    dispatches: usize,
+}
+
+impl<const STATE: usize> Trajectories<STATE> {
+    /// # Errors
+    /// [`Error::Device`] if the kernel does not compile.
+    pub fn new(context: Arc<GpuContext>, parts: TrajectoryKernel<'_>) -> Result<Self> {
+        use Binding::{Read, Uniform, Write};
+        let (kinds, tables): (Vec<_>, Vec<_>) = parts.tables.into_iter().unzip();
+        let bindings = [vec![Uniform, Uniform, Read, Write], kinds].concat();
+        let kernel = context.kernel(parts.source, parts.entry, &bindings)?;
+        let mut base = parts.table.base.clone();
+        base.resize(base_vectors(base.len()) * 4, 0.0);
+        let base = context.buffer_of("parameters", bytemuck::cast_slice(&base), Usage::UNIFORM)?;
+        let stretch = context.buffer(
+            "stretch",
+            size_of::<TrajectoryStretch>() as u64,
+            Usage::UNIFORM | Usage::COPY_DST,
+        )?;
+        let varying = parts.table.varying.len();
+        Ok(Self {
+            batching: StepBatching::for_kind(context.summary().kind),
+            workgroup: workgroup(&context) as usize,
+            context,
+            kernel,
+            varying,
+            figures: varying + parts.others,
+            stretch,
+            base,
+            tables,
+            batch: None,
+            pacing: Pacing::new(parts.rounds_per_step),
+            dispatches: 0,
+        })
+    }
+
+    pub fn context(&self) -> &GpuContext {
+        &self.context
+    }
+
+    /// Cuts the work differently.
+    pub fn cut(&mut self, batching: StepBatching) {
+        self.batching = batching;
+        self.batch = None;
+    }
+
+    pub fn batching(&self) -> StepBatching {
+        self.batching
+    }
+
+    /// Dispatches since the last call of [`Trajectories::count_anew`].
+    pub fn dispatches(&self) -> usize {
+        self.dispatches
+    }
+
+    pub fn count_anew(&mut self) {
+        self.dispatches = 0;
+    }
+
+    /// The most candidates of one batch.
+    pub fn batch_size(&self) -> usize {
+        let limits = self.context.limits();
+        let binding = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+        let planes = self.figures.max(STATE) as u64;
+        let most_groups = limits.max_compute_workgroups_per_dimension as usize;
+        let lanes = self.batching.lanes.min((binding / (4 * planes)) as usize) / self.workgroup;
+        lanes.clamp(1, most_groups) * self.workgroup
+    }
+
+    /// Makes room for a batch of `candidates`.
+    fn reserve(&mut self, candidates: usize) -> Result<()> {
+        let stride = candidates.next_multiple_of(self.workgroup);
+        if self.batch.as_ref().is_some_and(|b| b.stride >= stride) {
+            return Ok(());
+        }
+        // The old buffers go before the new ones come.
+        self.batch = None;
+        let context = &self.context;
+        let bytes = |planes: usize| (planes * stride * 4) as u64;
+        let figures = context.buffer("figures", bytes(self.figures), Usage::STORAGE | Usage::COPY_DST)?;
+        let both_ways = Usage::STORAGE | Usage::COPY_SRC | Usage::COPY_DST;
+        let progress = context.buffer("progress", bytes(STATE), both_ways)?;
+        let readback = context.buffer("readback", bytes(STATE), Usage::MAP_READ | Usage::COPY_DST)?;
+        let mut bound = vec![&self.stretch, &self.base, &figures, &progress];
+        bound.extend(&self.tables);
+        let group = context.bind(&self.kernel, &bound)?;
+        self.batch = Some(BatchBuffers {
+            stride,
+            figures,
+            progress,
+            readback,
+            group,
+        });
+        Ok(())
+    }
+
+    fn buffers(&self) -> Result<&BatchBuffers> {
+        self.batch
+            .as_ref()
+            .ok_or_else(|| Error::Device("a batch without buffers".to_owned()))
+    }
+
+    /// Makes room for a batch of `candidates` and puts its figures on the device: the rows of their cars (see
+    /// [`ModelTable::rows`]) and what `others` says of each.
+    pub fn load<const OTHERS: usize>(
+        &mut self,
+        candidates: usize,
+        rows: &[f32],
+        others: impl Fn(usize) -> [f64; OTHERS],
+    ) -> Result<()> {
+        self.reserve(candidates)?;
+        let batch = self.buffers()?;
+        // Figure by figure, so that neighbouring lanes read neighbouring memory.
+        let mut figures = vec![0.0f32; batch.stride * self.figures];
+        for lane in 0..candidates {
+            let car = rows[lane * self.varying..(lane + 1) * self.varying]
+                .iter()
+                .copied();
+            let others = others(lane).map(|x| x as f32);
+            for (figure, value) in car.chain(others).enumerate() {
+                figures[figure * batch.stride + lane] = value;
+            }
+        }
+        self.context.write(&batch.figures, bytemuck::cast_slice(&figures));
+        Ok(())
+    }
+
+    /// Takes a batch, whose figures are on the device, some steps further, as many as the last dispatch taught but `most`;
+    /// hands back how many.
+    pub fn go_on(&mut self, candidates: usize, first_step: usize, most: usize) -> Result<usize> {
+        let lanes = candidates.next_multiple_of(self.workgroup);
+        let steps = self.pacing.steps(lanes, &self.batching).min(most);
+        let ms = self.dispatch(candidates, first_step, steps)?;
+        self.pacing.took(steps, lanes, ms);
+        self.dispatches += 1;
+        Ok(steps)
+    }
+
+    /// Takes a batch so many steps further; hands back how long that took, ms.
+    pub fn dispatch(&self, candidates: usize, first_step: usize, steps: usize) -> Result<f64> {
+        let batch = self.buffers()?;
+        let stretch = TrajectoryStretch {
+            candidates: candidates as u32,
+            stride: batch.stride as u32,
+            first_step: first_step as u32,
+            steps: steps as u32,
+        };
+        self.context.write(&self.stretch, bytemuck::bytes_of(&stretch));
+        let groups = candidates.div_ceil(self.workgroup) as u32;
+        self.context
+            .dispatch(&self.kernel, &batch.group, [groups, 1], None)
+    }
+
+    /// Hands the planes from `first` on of the states of a batch, and the distance between them, to `read`.
+    fn read_planes<T>(&self, first: usize, read: impl FnOnce(&[f32], usize) -> T) -> Result<T> {
+        let buffers = self.buffers()?;
+        let plane = (buffers.stride * 4) as u64;
+        let bytes = plane * (STATE - first) as u64;
+        self.context.run(|encoder| {
+            let from = plane * first as u64;
+            encoder.copy_buffer_to_buffer(&buffers.progress, from, &buffers.readback, 0, bytes);
+        })?;
+        self.context.read(&buffers.readback, bytes, |data| {
+            read(bytemuck::cast_slice(data), buffers.stride)
+        })
+    }
+
+    /// The last figure of the states of a batch.
+    pub fn last_figures<T>(&self, candidates: usize, read: impl FnOnce(&[f32]) -> T) -> Result<T> {
+        self.read_planes(STATE - 1, |plane, _| read(&plane[..candidates]))
+    }
+
+    /// The states of a batch.
+    pub fn states(&self, candidates: usize) -> Result<Vec<[f32; STATE]>> {
+        self.read_planes(0, |planes, stride| {
+            (0..candidates)
+                .map(|lane| std::array::from_fn(|k| planes[k * stride + lane]))
+                .collect()
+        })
+    }
+
+    /// Puts states of a batch, whose figures are on the device, in the place of those that it has there.
+    pub fn put(&self, states: &[[f32; STATE]]) -> Result<()> {
+        let batch = self.buffers()?;
+        let mut planes = vec![0.0f32; STATE * batch.stride];
+        for (lane, state) in states.iter().enumerate() {
+            for (plane, figure) in state.iter().enumerate() {
+                planes[plane * batch.stride + lane] = *figure;
+            }
+        }
+        self.context.write(&batch.progress, bytemuck::cast_slice(&planes));
+        Ok(())
+    }
+}
