@@ -42,14 +42,17 @@ pub fn read_bytes(path: &Path, most: u64) -> Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// Reads a text file; a missing or unreadable one is an [`Error::Io`], one beyond [`LARGEST_TEXT`] an [`Error::Input`].
+/// Reads a text file of at most [`LARGEST_TEXT`] bytes.
+///
+/// # Errors
+/// As [`read_bytes`], and [`Error::Input`] naming the line that is no UTF-8.
 pub fn read_text(path: &Path) -> Result<String> {
     String::from_utf8(read_bytes(path, LARGEST_TEXT)?).map_err(|e| {
-        Error::io(
-            path,
-            "read",
-            std::io::Error::new(std::io::ErrorKind::InvalidData, e),
-        )
+        let sound = e.utf8_error().valid_up_to();
+        let bytes = e.as_bytes();
+        let line = bytes[..sound].iter().filter(|&&b| b == b'\n').count() + 1;
+        let found = format!("the byte 0x{:02x}", bytes[sound]);
+        Error::input(path, format!("line {line}"), found, "text in UTF-8")
     })
 }
 

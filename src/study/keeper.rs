@@ -32,6 +32,14 @@ impl Keeper {
         }
     }
 
+    /// Saves into a file, every five seconds.
+    pub fn at(file: PathBuf) -> Self {
+        Self {
+            path: Some(file),
+            ..Self::idle()
+        }
+    }
+
     /// Saves nothing.
     pub fn idle() -> Self {
         Self {
@@ -40,6 +48,11 @@ impl Keeper {
             last: Instant::now(),
             may_move: false,
         }
+    }
+
+    /// The state's file, or its usual name where nothing is saved.
+    pub fn file(&self) -> PathBuf {
+        self.path.clone().unwrap_or_else(|| STATE.into())
     }
 
     /// Saves this often.
@@ -97,7 +110,7 @@ impl Keeper {
     /// # Errors
     /// [`Error::Input`] naming what is not the same.
     pub fn check(&self, began: &Origin, now: &Origin) -> Result<()> {
-        let file = self.path.clone().unwrap_or_else(|| STATE.into());
+        let file = self.file();
         if began.inputs != now.inputs {
             let expected = "the files that the study reads as they were when the run began";
             return Err(Error::input(file, "inputs of the study", "others", expected));

@@ -4,6 +4,7 @@ use super::machine::{forget_peak_memory, peak_memory_bytes, peak_operations_per_
 use super::pages::of_scaling;
 use crate::cli::kept::{self, Kept, Machine};
 use crate::cli::{backend_flag, print_json};
+use lapswarm::config::read_text;
 use lapswarm::evaluate::drive::{CpuDriveEvaluator, DriveProblem, GpuDriveEvaluator, SimdDriveEvaluator};
 use lapswarm::evaluate::gpu::{GpuContext, devices};
 use lapswarm::evaluate::line::{
@@ -454,7 +455,7 @@ fn print_row(row: &Row, other: Option<&Table>) {
 }
 
 fn read_table(path: &Path) -> Result<Table> {
-    let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, "read", e))?;
+    let text = read_text(path)?;
     // A redirected run may have its table above the JSON, which is the last line.
     let last = text.lines().rev().find(|l| !l.trim().is_empty()).unwrap_or("");
     serde_json::from_str(last)

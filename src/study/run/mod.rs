@@ -21,7 +21,7 @@ use crate::study::raceline::{self, RacelineSettings};
 use crate::study::transient::{self, DriveState, TransientSettings};
 use crate::vehicle::{Car, Envelope};
 use serde::{Deserialize, Serialize};
-use stage::go_on;
+pub(in crate::study) use stage::go_on;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;

@@ -144,7 +144,7 @@ impl Stages {
 ///
 /// # Errors
 /// Those of `work`.
-pub(super) fn go_on<S: Checkpoint, T>(
+pub(in crate::study) fn go_on<S: Checkpoint, T>(
     keeper: &mut Keeper,
     mut work: impl FnMut(Option<S>, &mut Keeper) -> Result<T>,
 ) -> Result<T> {
