@@ -1,5 +1,6 @@
 //! `lapswarm check`: is this file what it should be?
 
+use crate::cli::said::{errln, outln};
 use lapswarm::config::{Document, read_text};
 use lapswarm::study::hybrid::{self, HybridStudySettings};
 use lapswarm::study::identify::{self, IdentifySettings};
@@ -261,12 +262,12 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     for path in &arguments.files {
         let found = arguments.kind.map_or_else(|| guess(path), Ok).and_then(|kind| {
             // Whoever meant another kind sees why it is found wrong.
-            read(path, kind).inspect_err(|_| eprintln!("{}: read as {}", path.display(), kind.name()))
+            read(path, kind).inspect_err(|_| errln!("{}: read as {}", path.display(), kind.name()))
         });
         match found {
-            Ok(text) => println!("{}: {text}", path.display()),
+            Ok(text) => outln!("{}: {text}", path.display()),
             Err(error) if wrong.is_none() => wrong = Some(error),
-            Err(error) => eprintln!("{error}"),
+            Err(error) => errln!("{error}"),
         }
     }
     wrong.map_or(Ok(()), Err)

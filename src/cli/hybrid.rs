@@ -2,6 +2,7 @@
 
 use super::dry_run::Plan;
 use super::{Common, Memory, Resume, backend_flag, going_on, print_json, stop_flag};
+use crate::cli::said::{out, outln};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use lapswarm::evaluate::BackendChoice;
 use lapswarm::evaluate::hybrid::HybridObjective;
@@ -174,7 +175,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         Some(folder) => folder,
         None => run_folder::create("hybrid", out)?,
     };
-    let mut keeper = arguments.resume.keeper(&folder, moves)?;
+    let mut keeper = arguments.resume.keeper(&folder, moves);
     keeper.keep(&begun.journal)?;
     // Broken off, the search for the line is begun anew: it is a matter of seconds, and ends where it would have ended.
     let setup = inputs.with_line(&settings, &stop);
@@ -210,8 +211,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         keeper.done()?;
     }
     if !arguments.common.quiet {
-        print!("{}", summary.to_text());
-        println!("Results: {}", folder.display());
+        out!("{}", summary.to_text());
+        outln!("Results: {}", folder.display());
     }
     if arguments.common.json {
         print_json(&summary)?;

@@ -3,6 +3,7 @@
 use super::dry_run::Plan;
 use super::progress::SearchBar;
 use super::{Common, Memory, Resume, backend_flag, going_on, print_json, same_settings, stop_flag};
+use crate::cli::said::{out, outln};
 use lapswarm::evaluate::replay::{BackendChoice, Norm};
 use lapswarm::study::identify::{
     Algorithm, IdentifySettings, ObjectiveChoice, SearchState, check_swarms, parse_algorithm, parse_norm,
@@ -188,7 +189,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     };
     write_settings(&folder, &settings)?;
     let stop = stop_flag();
-    let mut keeper = arguments.resume.keeper(&folder, arguments.moves())?;
+    let mut keeper = arguments.resume.keeper(&folder, arguments.moves());
     let mut bar = SearchBar::new(arguments.common.quiet);
     let outcome = search_from(&settings, &setup, state, &mut keeper, |report| {
         bar.show(report);
@@ -205,13 +206,13 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     }
     if !arguments.common.quiet {
         for finding in &summary.calibration.findings {
-            println!("{finding}");
+            outln!("{finding}");
         }
         for note in &summary.calibration.notes {
-            println!("{note}");
+            outln!("{note}");
         }
-        print!("{}", summary.to_text(&settings));
-        println!("Results: {}", folder.display());
+        out!("{}", summary.to_text(&settings));
+        outln!("Results: {}", folder.display());
     }
     if arguments.common.json {
         print_json(&summary)?;

@@ -1,5 +1,6 @@
 //! `lapswarm init`: commented files to start from.
 
+use crate::cli::said::outln;
 use lapswarm::vehicle::Car;
 use lapswarm::{Error, Result};
 use std::io::Write;
@@ -78,9 +79,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     if matches!(arguments.what, Template::Car) {
         let tyre = path.with_file_name("gt_slick.tir");
         write_new(&tyre, Car::BUNDLED_TYRE)?;
-        println!("{}", tyre.display());
+        outln!("{}", tyre.display());
     }
     write_new(&path, text)?;
-    println!("{}", path.display());
+    outln!("{}", path.display());
     Ok(())
 }

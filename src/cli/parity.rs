@@ -2,6 +2,7 @@
 
 use super::kept::{self, Kept, Machine};
 use super::{backend_flag, print_json};
+use crate::cli::said::outln;
 use lapswarm::evaluate::BackendChoice;
 use lapswarm::evaluate::gpu::{DeviceSummary, devices};
 use lapswarm::parity::{Agreement, Subject, compare, subjects};
@@ -75,16 +76,20 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     });
     if !arguments.quiet {
         if device.is_none() && arguments.backend == BackendChoice::Auto && devices().is_empty() {
-            println!("no GPU: neither Vulkan, Metal nor DX12 found an adapter");
+            outln!("no GPU: neither Vulkan, Metal nor DX12 found an adapter");
         }
-        println!(
+        outln!(
             "{:<46}{:>10}{:>12}{:>10}{:>16}  bits as f32",
-            "kernel", "figures", "relative", "ULP", "of what may be"
+            "kernel",
+            "figures",
+            "relative",
+            "ULP",
+            "of what may be"
         );
     }
     let found = compare(&subjects, |a| {
         if !arguments.quiet {
-            println!(
+            outln!(
                 "{:<46}{:>10}{:>12.1e}{:>10.1}{:>15.1}%  {}{}",
                 a.key(),
                 a.figures,
@@ -137,12 +142,12 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     }
     if !arguments.quiet {
         if let Some(folder) = &folder {
-            println!("Results: {}", folder.display());
+            outln!("Results: {}", folder.display());
         }
         if let Some(device) = device {
-            println!("{device}");
+            outln!("{device}");
         }
-        println!(
+        outln!(
             "{}",
             if pass {
                 "all agree with the f64 reference"

@@ -2,6 +2,7 @@
 
 use super::dry_run::Plan;
 use super::{Common, Memory, Resume, backend_flag, going_on, print_json, same_settings, stop_flag};
+use crate::cli::said::{out, outln};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use lapswarm::evaluate::BackendChoice;
 use lapswarm::evaluate::line::LineObjective;
@@ -174,7 +175,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         None => run_folder::create("raceline", out)?,
     };
     write_settings(&folder, &settings)?;
-    let mut keeper = arguments.resume.keeper(&folder, arguments.moves())?;
+    let mut keeper = arguments.resume.keeper(&folder, arguments.moves());
     let stop = stop_flag();
     let target = if arguments.common.quiet {
         ProgressDrawTarget::hidden()
@@ -201,8 +202,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         keeper.done()?;
     }
     if !arguments.common.quiet {
-        print!("{}", summary.to_text());
-        println!("Results: {}", folder.display());
+        out!("{}", summary.to_text());
+        outln!("Results: {}", folder.display());
     }
     if arguments.common.json {
         print_json(&summary)?;

@@ -2,6 +2,7 @@
 
 use super::dry_run::Plan;
 use super::{Common, Memory, Resume, backend_flag, going_on, print_json, progress, stop_flag};
+use crate::cli::said::{out, outln};
 use lapswarm::evaluate::BackendChoice;
 use lapswarm::study::memory::Size;
 use lapswarm::study::run::{Means, RunSettings, prepare, run as run_all};
@@ -149,7 +150,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         Some(folder) => folder,
         None => run_folder::create("run", out)?,
     };
-    let mut keeper = arguments.resume.keeper(&folder, arguments.moves())?;
+    let mut keeper = arguments.resume.keeper(&folder, arguments.moves());
     keeper.keep(&begun.journal)?;
     let bar = progress::saying(arguments.common.quiet);
     // Without a cache to share, a run that is broken off still finds its own stages again.
@@ -171,8 +172,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     }
     keeper.done()?;
     if !arguments.common.quiet {
-        print!("{}", summary.to_text());
-        println!("Results: {}", folder.display());
+        out!("{}", summary.to_text());
+        outln!("Results: {}", folder.display());
     }
     if arguments.common.json {
         print_json(&summary)?;

@@ -3,6 +3,7 @@
 use super::dry_run::Plan;
 use super::replay_flags::ReplayFlags;
 use super::{Common, Memory, Resume, going_on, print_json, progress, stop_flag};
+use crate::cli::said::{out, outln};
 use lapswarm::study::journal::{Journal, Recorder};
 use lapswarm::study::memory;
 use lapswarm::study::run_folder;
@@ -92,7 +93,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         Some(folder) => folder,
         None => run_folder::create("surface", out)?,
     };
-    let mut keeper = arguments.resume.keeper(&folder, moves)?;
+    let mut keeper = arguments.resume.keeper(&folder, moves);
     let mut recorder = Recorder::new(begun.journal, &mut keeper);
     let stop = stop_flag();
     let bar = progress::counting(arguments.common.quiet);
@@ -111,8 +112,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         keeper.done()?;
     }
     if !arguments.common.quiet {
-        print!("{}", summary.to_text());
-        println!("Results: {}", folder.display());
+        out!("{}", summary.to_text());
+        outln!("Results: {}", folder.display());
     }
     if arguments.common.json {
         print_json(&summary)?;

@@ -4,7 +4,7 @@ use std::ops::Range;
 use std::path::Path;
 
 use super::audit::{check_gains, frozen_tail_s};
-use super::build::{Build, signals};
+use super::build::{Build, RATES_HZ, signals};
 use super::calibrate::{self, Calibration, CalibrationOptions, Declared, FindingKind};
 use super::channel_map::{Axle, ChannelMap, Mapped};
 use super::delays;
@@ -226,7 +226,7 @@ impl Log {
 
 fn check_options(options: &LogOptions) -> Result<()> {
     let checks = [
-        ("sample rate", options.rate_hz, 0.1..=100_000.0, "Hz"),
+        ("sample rate", options.rate_hz, RATES_HZ, "Hz"),
         ("bridged gap", Some(options.bridge_gaps_s), 0.0..=1e6, "s"),
         ("rolling radius", options.rolling_radius_m, 0.05..=2.0, "m"),
     ];

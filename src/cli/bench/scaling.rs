@@ -3,6 +3,7 @@
 use super::machine::{forget_peak_memory, peak_memory_bytes, peak_operations_per_s};
 use super::pages::of_scaling;
 use crate::cli::kept::{self, Kept, Machine};
+use crate::cli::said::outln;
 use crate::cli::{backend_flag, print_json};
 use lapswarm::config::read_text;
 use lapswarm::evaluate::drive::{CpuDriveEvaluator, DriveProblem, GpuDriveEvaluator, SimdDriveEvaluator};
@@ -322,12 +323,12 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let peak = threads as f64 * peak_operations_per_s(InstructionSet::best());
     let mut rows: Vec<Row> = Vec::new();
     if !arguments.quiet {
-        println!(
+        outln!(
             "{threads} threads, {:.0} billion unfused {} operations per second at best",
             peak / 1e9,
             InstructionSet::best().name()
         );
-        println!(
+        outln!(
             "{:<8}{:<8}{:>10}{:>15}{:>14}{:>12}{:>10}{:>8}{:>10}{}",
             "problem",
             "backend",
@@ -393,7 +394,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         let machine = Machine::of(names, arguments.adapter.as_deref())?;
         kept::write(folder, "bench", &table, page, &machine)?;
         if !arguments.quiet {
-            println!("Results: {}", folder.display());
+            outln!("Results: {}", folder.display());
         }
     }
     if arguments.json {
@@ -439,7 +440,7 @@ fn print_row(row: &Row, other: Option<&Table>) {
             )
         })
     });
-    println!(
+    outln!(
         "{:<8}{:<8}{:>10}{:>15.1}{:>14}{:>12.1}{:>10}{:>8}{:>10}{ratio}   {}",
         row.problem,
         row.backend,

@@ -266,6 +266,7 @@ impl HybridStudySettings {
             ("sections", self.sections, 8, 1_000_000),
             ("population", self.population, 8, 10_000_000),
             ("iterations", self.iterations, 1, 1_000_000),
+            ("stint_laps", self.stint_laps, 0, 1000),
         ];
         for (name, value, least, most) in counts {
             if !(least..=most).contains(&value) {
@@ -277,6 +278,8 @@ impl HybridStudySettings {
             ("car_width_m", self.car_width_m, 0.0, 10.0),
             ("entry_mps", self.entry_mps, 0.5, 150.0),
             ("energy_mj", self.energy_mj.unwrap_or(0.0), 0.0, 1000.0),
+            ("stint_fuel_kg", self.stint_fuel_kg, 0.0, 500.0),
+            ("match_lap_time_s", self.match_lap_time_s.unwrap_or(1.0), 1.0, 1e5),
         ];
         for (name, value, least, most) in ranges {
             if !(least..=most).contains(&value) {

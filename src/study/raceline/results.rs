@@ -7,7 +7,7 @@ mod surfaces;
 
 use super::{Outcome, RacelineSettings, ReportedLine, Setup};
 use crate::error::Result;
-use crate::evaluate::FailureCounts;
+use crate::evaluate::{FailureCounts, failures_in_words};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -277,6 +277,9 @@ impl Summary {
             self.adapter,
             self.exact_elapsed_s
         );
+        if !self.failures.is_empty() {
+            text += &format!("Lines that failed: {}\n", failures_in_words(&self.failures));
+        }
         for fault in &self.device_faults {
             text += &format!("Note: {fault}\n");
         }

@@ -2,6 +2,7 @@
 
 use super::{LEVELS, MOST_SAMPLES, Outcome, SensitivitySettings, SobolIndex};
 use crate::error::Result;
+use crate::evaluate::FailureCounts;
 use crate::evaluate::replay::CHANNEL_UNITS;
 use crate::report::{
     BarPanel, BarSeries, Cells, Column, Curve, CurvePanel, plot_bars, plot_curves, text_table, write_csv,
@@ -48,6 +49,8 @@ pub struct Summary {
     pub elapsed_s: f64,
     /// Candidates evaluated.
     pub evaluations: usize,
+    /// Candidates that failed, by reason.
+    pub failures: FailureCounts,
     /// Candidates per second.
     pub evaluations_per_s: f64,
     /// How far every parameter went, as a share of its value.
@@ -155,6 +158,7 @@ pub fn summarise(settings: &SensitivitySettings, setup: &Setup, outcome: &Outcom
             .collect(),
         warnings: doubts(&parameters, settings.samples).into_iter().collect(),
         parameters,
+        failures: outcome.failures.clone(),
         interrupted: outcome.interrupted,
     }
 }
