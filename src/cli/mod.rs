@@ -22,6 +22,7 @@ mod sweep;
 mod transient;
 
 use clap::{Args, CommandFactory, Parser, Subcommand};
+use lapswarm::config::limit_memory;
 use lapswarm::evaluate::replay::BackendChoice;
 use lapswarm::study::identify::{FreeParameter, IdentifySettings, load_circuit, parse_backend};
 use lapswarm::study::journal::Journal;
@@ -133,6 +134,14 @@ pub struct Memory {
     /// and needs more is refused
     #[arg(long, value_name = "MIB", default_value_t = USUAL_MIB, value_parser = clap::value_parser!(u64).range(1..))]
     pub memory_limit_mib: u64,
+}
+
+impl Memory {
+    /// Puts the limit in force, before anything large is read, and says it (MiB).
+    fn in_force(&self) -> u64 {
+        limit_memory(self.memory_limit_mib);
+        self.memory_limit_mib
+    }
 }
 
 impl Resume {

@@ -9,10 +9,17 @@ use super::calibrate::{self, Calibration, CalibrationOptions, Declared, FindingK
 use super::channel_map::{Axle, ChannelMap, Mapped};
 use super::delays;
 use super::laps::Lap;
-use super::recording::{Format, Recording};
+use super::recording::{Format, Reading, Recording};
 use super::role::Role;
 use super::text::shown;
+use crate::config::{check_memory, memory_limit};
 use crate::{Error, Result};
+
+/// Bytes of a recorded sample while a log is made: as it was recorded, in SI, its time, the interval to the next, and a sum.
+const SIGNAL_SAMPLE: u64 = 5 * 8;
+/// Bytes of a sample of the log while it is made: its eleven numbers, those of the log before delays were found, and as many
+/// again for what is estimated from them.
+const SAMPLE: u64 = 3 * 11 * 8;
 
 /// How a recording is turned into a [`Log`].
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -67,7 +74,30 @@ impl Log {
     /// channels, unknown units, samples that are no numbers, times that do not rise, gaps, and values that no car
     /// reaches.
     pub fn read(path: impl AsRef<Path>, map: &ChannelMap, options: &LogOptions) -> Result<Self> {
-        Self::from_recording(&Recording::read(path)?, map, options)
+        Self::read_within(path, map, options, memory_limit())
+    }
+
+    /// As [`Log::read`], within so much memory (bytes) instead of what is allowed at present.
+    ///
+    /// # Errors
+    /// As for [`Log::read`].
+    pub fn read_within(
+        path: impl AsRef<Path>,
+        map: &ChannelMap,
+        options: &LogOptions,
+        limit: u64,
+    ) -> Result<Self> {
+        let choose = |recording: &Recording| map.choose(recording);
+        let reading = Reading {
+            choose: &choose,
+            limit,
+        };
+        Self::made_within(
+            &Recording::read_some(path.as_ref(), &reading)?,
+            map,
+            options,
+            limit,
+        )
     }
 
     /// Makes a log of a recording.
@@ -75,6 +105,15 @@ impl Log {
     /// # Errors
     /// As for [`Log::read`], save [`Error::Io`].
     pub fn from_recording(recording: &Recording, map: &ChannelMap, options: &LogOptions) -> Result<Self> {
+        Self::made_within(recording, map, options, memory_limit())
+    }
+
+    fn made_within(
+        recording: &Recording,
+        map: &ChannelMap,
+        options: &LogOptions,
+        limit: u64,
+    ) -> Result<Self> {
         check_options(options)?;
         let source = recording.source.display().to_string();
         let radius = map.rolling_radius_m.or(options.rolling_radius_m);
@@ -101,6 +140,13 @@ impl Log {
                 "steer: taken as the road-wheel angle: the channel map gives no steering_ratio".to_owned(),
             );
         }
+        let recorded: u64 = recording.channels.iter().map(|c| c.values.len() as u64).sum();
+        let fits = |samples: usize| {
+            let needed = (samples as u64).saturating_mul(SAMPLE);
+            let needed = needed.saturating_add(recorded.saturating_mul(SIGNAL_SAMPLE));
+            let size = format!("{recorded} samples, {samples} on one clock");
+            check_memory(&recording.source, &size, needed, limit)
+        };
         let mut signals = signals(&source, &mapped, map, options, radius)?;
         let build = Build {
             source: &source,
@@ -108,6 +154,7 @@ impl Log {
             map,
             options,
             radius,
+            fits: &fits,
         };
         let mut log = build.assemble(&signals, calibration)?;
         check_gains(&log)?;

@@ -69,6 +69,12 @@ pub(super) fn identified(
     let sizes: Vec<Size> = studies.iter().map(IdentifySettings::size).collect();
     let _allowed = Size::check_together(&sizes, memory_limit_mib)?;
     let setup = identify::set_up(first)?;
+    // The log is one for all of them.
+    let alone = Size {
+        samples: setup.log.samples(),
+        ..sizes[0]
+    };
+    drop(alone.check(memory_limit_mib)?);
     let mut evaluator = open_evaluator(&setup.replay, first.backend, first.adapter.as_deref())?;
     let stop = AtomicBool::new(false);
     let (setup, stopped) = (&setup, &stop);
