@@ -81,6 +81,18 @@ pub fn read_bytes(path: &Path, most: u64) -> Result<Vec<u8>> {
     Ok(bytes)
 }
 
+/// The first bytes of a file, `most` of them at the most.
+///
+/// # Errors
+/// [`Error::Io`] if it is missing or cannot be read.
+pub fn read_start(path: &Path, most: u64) -> Result<Vec<u8>> {
+    let failed = |e| Error::io(path, "read", e);
+    let mut bytes = Vec::new();
+    let file = File::open(path).map_err(failed)?;
+    file.take(most).read_to_end(&mut bytes).map_err(failed)?;
+    Ok(bytes)
+}
+
 /// Reads a text file; a missing or unreadable one is an [`Error::Io`], one beyond [`LARGEST_TEXT`] an [`Error::Input`].
 pub fn read_text(path: &Path) -> Result<String> {
     String::from_utf8(read_bytes(path, LARGEST_TEXT)?).map_err(|e| {

@@ -32,16 +32,6 @@ pub fn write_new(path: impl AsRef<Path>, contents: &[u8]) -> Result<()> {
     })
 }
 
-/// Copies a file as [`write_whole`] writes one.
-///
-/// # Errors
-/// [`Error::Io`] when one cannot be read or the other not be written.
-pub fn copy_whole(from: impl AsRef<Path>, to: impl AsRef<Path>) -> Result<()> {
-    let from = from.as_ref();
-    let contents = fs::read(from).map_err(|e| Error::io(from, "read", e))?;
-    write_whole(to, &contents)
-}
-
 /// Makes sure that the names in a folder are on the disk.
 pub fn sync_folder(folder: &Path) {
     let folder = Some(folder).filter(|f| !f.as_os_str().is_empty());
@@ -120,8 +110,7 @@ mod tests {
             write_whole(&path, contents.as_bytes()).expect("written");
             assert_eq!(fs::read_to_string(&path).expect("a file"), contents);
         }
-        copy_whole(&path, folder.path().join("copy")).expect("copied");
-        assert_eq!(names(folder.path()), ["copy", longest.as_str()]);
+        assert_eq!(names(folder.path()), [longest]);
     }
 
     #[test]
@@ -147,5 +136,83 @@ mod tests {
         assert_eq!(source.kind(), io::ErrorKind::AlreadyExists);
         assert_eq!(fs::read_to_string(&path).expect("a file"), "first");
         assert_eq!(names(folder.path()), ["file"]);
+    }
+
+    #[test]
+    fn names_that_lead_elsewhere_become_names_of_files() {
+        for (name, expected) in [
+            ("../../evil", "______evil"),
+            ("/evil", "_evil"),
+            ("C:\\evil", "C__evil"),
+            ("..", "__"),
+            ("nul\0", "nul_"),
+            ("Kurve Größe 1", "Kurve_Größe_1"),
+        ] {
+            assert_eq!(stem(name), expected);
+        }
+        let longest = "中\u{2028}".repeat(30);
+        assert!(stem(&longest).len() <= longest.len());
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn cars_and_laps_take_the_place_of_the_last_ones() {
+        use crate::telemetry::{ChannelMap, Log, LogOptions, NativeFormat, write_native};
+        let folder = tempfile::tempdir().expect("a folder");
+        let of = |name: &str| folder.path().join(name);
+        for name in ["car.toml", "car.tir", "lap.csv"] {
+            fs::write(of(name), "the last one").expect("a file");
+            // What is written in place shows through every name of a file.
+            fs::hard_link(of(name), of("other ").with_extension(name)).expect("a link");
+        }
+        crate::vehicle::Car::bundled()
+            .and_then(|car| car.write(folder.path(), "car"))
+            .expect("a car");
+        let lap = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/laps/gt_silverstone.csv");
+        let log = Log::read(lap, &ChannelMap::default(), &LogOptions::default()).expect("a log");
+        write_native(&log, of("lap.csv"), &NativeFormat::exact()).expect("written");
+        for name in ["car.toml", "car.tir", "lap.csv"] {
+            let other = fs::read_to_string(of("other ").with_extension(name)).expect("a file");
+            assert_eq!(other, "the last one", "{name}");
+            assert_ne!(fs::read_to_string(of(name)).expect("a file"), other);
+        }
+    }
+
+    /// What a program writes and a loss of power may cut in two goes through this module.
+    #[test]
+    fn nothing_else_writes_files() {
+        fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
+            for entry in folder.read_dir().expect("a folder").flatten() {
+                let path = entry.path();
+                if path.is_dir() {
+                    sources(&path, found);
+                } else if path.extension().is_some_and(|e| e == "rs") {
+                    found.push(path);
+                }
+            }
+        }
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+        let mut found = Vec::new();
+        sources(&root, &mut found);
+        assert!(found.len() > 100);
+        for path in found {
+            let name = path.file_name().unwrap_or_default().to_string_lossy();
+            if path == root.join("files.rs") || name.ends_with("tests.rs") {
+                continue;
+            }
+            let text = fs::read_to_string(&path).expect("a source");
+            let program = text.split("#[cfg(test)]\nmod tests {").next().unwrap_or_default();
+            for line in program.lines() {
+                let writes = ["fs::write(", "File::create", "fs::copy(", "create_new("]
+                    .iter()
+                    .any(|call| line.contains(call));
+                // A switch of the system's, which is no file.
+                assert!(
+                    !writes || line.contains("/proc/self/"),
+                    "{}: {line}",
+                    path.display()
+                );
+            }
+        }
     }
 }

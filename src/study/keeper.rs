@@ -53,6 +53,12 @@ impl Keeper {
         Self { interval, ..self }
     }
 
+    /// The folder that it saves into; no name where it saves nothing.
+    pub fn folder(&self) -> &Path {
+        let folder = self.path.as_deref().and_then(Path::parent);
+        folder.unwrap_or(Path::new(""))
+    }
+
     /// The time between saves.
     pub fn interval(&self) -> Duration {
         self.interval

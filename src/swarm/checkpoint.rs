@@ -10,13 +10,11 @@ use super::device::DeviceState;
 use super::{
     CooperativeSwarm, CovarianceSwarm, DifferenceSwarm, HybridSwarm, Islands, Mopso, Nsga2, Pso, WindowSwarm,
 };
-use crate::config::{check_memory, memory_limit, read_bytes};
+use crate::config::{check_memory, memory_limit, read_bytes, read_start};
 use crate::error::{Error, Result};
 use crate::files::write_whole;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
-use std::fs::{self, File};
-use std::io::Read;
 use std::path::Path;
 
 /// The format that this version writes, and the only one that it reads. It changes with the fields of any state.
@@ -140,18 +138,38 @@ pub fn load<T: Checkpoint>(path: &Path) -> Result<T> {
 
 /// As [`load`], within so much memory (bytes).
 fn load_within<T: Checkpoint>(path: &Path, limit: u64) -> Result<T> {
-    let mut head = Vec::new();
-    let file = File::open(path).map_err(|e| Error::io(path, "read", e))?;
-    file.take(HEAD)
-        .read_to_end(&mut head)
-        .map_err(|e| Error::io(path, "read", e))?;
+    let head = read_start(path, HEAD)?;
     // What is none, or of another version, need not be read to be refused.
     if head.len() < HEAD as usize || !head.starts_with(MAGIC) || head[MAGIC.len()..] != VERSION.to_le_bytes()
     {
         return from_bytes(&head, path);
     }
-    let size = fs::metadata(path).map_err(|e| Error::io(path, "read", e))?.len();
+    let size = std::fs::metadata(path)
+        .map_err(|e| Error::io(path, "read", e))?
+        .len();
     // As it is read and as it is; a study counts a state that is written down thrice at the least.
     check_memory(path, &format!("{size} bytes"), size.saturating_mul(2), limit)?;
     from_bytes(&read_bytes(path, limit)?, path)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::study::journal::Journal;
+
+    #[test]
+    fn a_state_that_does_not_fit_is_not_read() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("state");
+        let text = "x".repeat(1 << 20);
+        save(&path, &Journal::new("study", &text).expect("a journal")).expect("saved");
+        let said = load_within::<Journal>(&path, 2 << 20)
+            .expect_err("a little more than twice 1 MiB")
+            .to_string();
+        for part in ["state: file size", "some 3 MiB", "2 MiB (--memory-limit-mib)"] {
+            assert!(said.contains(part), "{said}");
+        }
+        let journal = load_within::<Journal>(&path, 3 << 20).expect("it fits");
+        assert_eq!(journal.settings::<String>("study").expect("its settings"), text);
+    }
 }

@@ -454,4 +454,63 @@ mod tests {
             "{error}"
         );
     }
+
+    fn refused(path: &Path, limit: u64) -> String {
+        let error = Log::read_within(path, &ChannelMap::default(), &off(), limit).unwrap_err();
+        assert_eq!(error.exit_code(), 2);
+        error.to_string()
+    }
+
+    #[test]
+    fn a_log_that_does_not_fit_is_refused_before_it_is_read() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("lap.csv");
+        let head = "time_s,wheel_speed_fl_radps,wheel_speed_fr_radps,wheel_speed_rl_radps,wheel_speed_rr_radps,\
+                    steer_rad,vx_mps,ax_mps2,ay_mps2,yaw_rate_radps,spare\n";
+        let rows = 10_000;
+        let text: String = (0..rows)
+            .map(|i| format!("{},60,60,60,60,0.01,20,0,0.5,0.025,1\n", f64::from(i) / 100.0))
+            .collect();
+        std::fs::write(&path, head.to_owned() + &text).unwrap();
+        let size = std::fs::metadata(&path).unwrap().len();
+        // As it is; with its ten columns that are read, lines and times; and as a log on one clock.
+        let read = size + 8 * (rows as u64 + 2) * 13;
+        let made = rows as u64 * (10 * SIGNAL_SAMPLE + SAMPLE);
+        for (limit, part) in [
+            (size - 1, format!("{size} bytes")),
+            (read - 1, format!("{size} bytes")),
+            (made - 1, format!("{} samples", 10 * rows)),
+        ] {
+            let said = refused(&path, limit);
+            assert!(said.contains("lap.csv") && said.contains(&part), "{said}");
+            assert!(said.contains("MiB (--memory-limit-mib)"), "{said}");
+        }
+        assert!(read < made);
+        let log = Log::read_within(&path, &ChannelMap::default(), &off(), made).unwrap();
+        assert_eq!(log.samples(), rows as usize);
+    }
+
+    #[test]
+    fn of_channels_that_no_log_is_made_of_no_samples_are_kept() {
+        let text = "time_s,wheel_speed_fl_radps,wheel_speed_fr_radps,wheel_speed_rl_radps,wheel_speed_rr_radps,\
+                    steer_rad,vx_mps,ax_mps2,ay_mps2,yaw_rate_radps,spare\n0,1,1,1,1,0,9,0,0,0,7\n1,1,1,1,1,0,9,0,0,0,7\n";
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("lap.csv");
+        std::fs::write(&path, text).unwrap();
+        let map = ChannelMap::default();
+        let reading = Reading {
+            choose: &|recording| map.choose(recording),
+            limit: u64::MAX,
+        };
+        let some = Recording::read_some(&path, &reading).unwrap();
+        let whole = Recording::read(&path).unwrap();
+        assert_eq!(some.channels.len(), whole.channels.len());
+        for (some, whole) in some.channels.iter().zip(&whole.channels) {
+            if some.name == "spare" {
+                assert!(some.values.is_empty() && whole.values == [7.0, 7.0]);
+            } else {
+                assert_eq!(some, whole);
+            }
+        }
+    }
 }

@@ -204,6 +204,15 @@ mod tests {
     }
 
     #[test]
+    fn a_row_of_more_cells_than_any_log_has_is_refused() {
+        let row = ",".repeat(MOST_CHANNELS);
+        let refused = |text: &str| Rows::new(text, Path::new("t.csv"), false).find_map(Result::err);
+        let said = refused(&format!("a\n{row}\n")).unwrap().to_string();
+        assert!(said.contains("t.csv: line 2: found 65536 commas"), "{said}");
+        assert!(refused(&row[1..]).is_none());
+    }
+
+    #[test]
     fn latin_1_is_read_where_utf_8_fails() {
         assert_eq!(decode(b"\xB0/s"), "°/s");
         assert_eq!(decode("\u{feff}°".as_bytes()), "°");

@@ -466,6 +466,15 @@ mod tests {
             ("[scenarios.own]\nsteer = 0.1", "scenarios.own.steer"),
             ("[scenarios.own]\nmode = \"both\"", "scenarios.own.mode"),
             ("[scenarios.own]\nsoc = 3", "scenarios.own.soc"),
+            // Their laps would be of one file.
+            (
+                "[scenarios.\"a b\"]\n[scenarios.\"a/b\"]\n",
+                "line 2, field scenarios.a/b",
+            ),
+            ("[scenarios.\"A b\"]\n[scenarios.a_b]\n", "differs from `A b`"),
+            ("[scenarios.swarm]\n", "differs from `swarm`"),
+            ("[scenarios.\"engine-alone\"]\n", "differs from `engine alone`"),
+            (&format!("[scenarios.{}]\n", "n".repeat(300)), "at most 120 bytes"),
         ] {
             std::fs::write(&path, text).unwrap();
             let error = HybridStudySettings::read(&path).unwrap_err().to_string();

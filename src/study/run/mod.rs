@@ -199,7 +199,12 @@ pub fn run(
                 });
                 observe(&format!("the car: {:?}{done}", report.stage).to_lowercase())
             })
-        })?;
+        });
+        // The run's folder is what is gone on with, wherever the stage's state is.
+        let outcome = match outcome {
+            Err(Error::Interrupted(_)) => return Err(broken_off()),
+            outcome => outcome?,
+        };
         if outcome.interrupted {
             return Err(broken_off());
         }

@@ -1,7 +1,7 @@
 //! Identifications of a sweep, those of one problem together: their swarms share an evaluator, and its calls.
 
 use super::{Figures, Found};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::evaluate::replay::open_evaluator;
 use crate::evaluate::{PackedClient, run_packed};
 use crate::study::identify::{self, IdentifySettings};
@@ -90,7 +90,10 @@ pub(super) fn identified(
                     }
                 };
                 let state = (None, &mut Keeper::idle());
-                let outcome = identify::search_with(settings, setup, &mut evaluator, state, observe)?;
+                let outcome = match identify::search_with(settings, setup, &mut evaluator, state, observe) {
+                    Err(Error::Interrupted(_)) => return Ok(None),
+                    outcome => outcome?,
+                };
                 Ok((!outcome.interrupted).then(|| figures_of(settings, setup, &outcome)))
             }
         })
