@@ -137,6 +137,7 @@ impl Arguments {
 
 /// Runs the study.
 pub fn run(arguments: &Arguments) -> Result<()> {
+    let limit_mib = arguments.memory.in_force();
     let stop = stop_flag();
     let out = arguments.common.out.as_deref();
     let moves = arguments.backend.is_some() || arguments.adapter.is_some();
@@ -151,7 +152,6 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         moves.then_some(moved),
     )?;
     let settings = begun.settings;
-    let limit_mib = arguments.memory.memory_limit_mib;
     // What no track has room for is refused before one is read.
     drop(settings.size().check(limit_mib)?);
     let inputs = read_inputs(&settings)?;

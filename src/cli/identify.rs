@@ -9,6 +9,7 @@ use lapswarm::study::identify::{
     Algorithm, IdentifySettings, ObjectiveChoice, SearchState, check_swarms, parse_algorithm, parse_norm,
     parse_objective, search_from, set_up, summarise, write_results, write_settings,
 };
+use lapswarm::study::memory::Size;
 use lapswarm::study::run_folder;
 use lapswarm::{Error, Result};
 use std::path::PathBuf;
@@ -156,6 +157,7 @@ fn set_some<T: Clone>(setting: &mut Option<T>, flag: &Option<T>) {
 
 /// Runs the study.
 pub fn run(arguments: &Arguments) -> Result<()> {
+    let limit_mib = arguments.memory.in_force();
     let out = arguments.common.out.as_deref();
     let (folder, state, settings) = if arguments.resume.resume {
         let (folder, mut state) = arguments.resume.open::<SearchState>("identify", out)?;
@@ -170,15 +172,20 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     } else {
         (None, None, arguments.settings(IdentifySettings::default())?)
     };
-    let _allowed = settings.size().check(arguments.memory.memory_limit_mib)?;
+    drop(settings.size().check(limit_mib)?);
     let setup = set_up(&settings)?;
+    let size = Size {
+        samples: setup.log.samples(),
+        ..settings.size()
+    };
+    let _allowed = size.check(limit_mib)?;
     check_swarms(&settings, &setup)?;
     if arguments.common.dry_run {
         return Plan::new("identify", &settings.to_toml())
             .of_replay(&setup)
             .seed(settings.seed)
             .evaluations(settings.evaluations())
-            .memory_mib(settings.size().needed_mib())
+            .memory_mib(size.needed_mib())
             .backend(settings.backend, settings.adapter.as_deref())?
             .tell(&arguments.common);
     }

@@ -23,6 +23,7 @@ mod sweep;
 mod transient;
 
 use clap::{Args, CommandFactory, Parser, Subcommand};
+use lapswarm::config::limit_memory;
 use lapswarm::evaluate::replay::BackendChoice;
 use lapswarm::study::identify::{FreeParameter, IdentifySettings, load_circuit, parse_backend};
 use lapswarm::study::journal::Journal;
@@ -142,6 +143,14 @@ fn pause_flag(text: &str) -> Result<f64, String> {
         .ok()
         .filter(|s| Duration::try_from_secs_f64(*s).is_ok());
     seconds.ok_or_else(|| "expected a time in seconds, 0 or more".to_owned())
+}
+
+impl Memory {
+    /// Puts the limit in force, before anything large is read, and says it (MiB).
+    fn in_force(&self) -> u64 {
+        limit_memory(self.memory_limit_mib);
+        self.memory_limit_mib
+    }
 }
 
 impl Resume {

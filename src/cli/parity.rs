@@ -5,6 +5,7 @@ use super::{backend_flag, print_json};
 use crate::cli::said::outln;
 use lapswarm::evaluate::BackendChoice;
 use lapswarm::evaluate::gpu::{DeviceSummary, devices};
+use lapswarm::files::write_whole;
 use lapswarm::parity::{Agreement, Subject, compare, subjects};
 use lapswarm::report::{BarPanel, BarSeries, Cells, Column, HtmlReport, significant, write_csv};
 use lapswarm::{Error, Result};
@@ -130,7 +131,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     if let Some(path) = &arguments.file {
         let text = serde_json::to_string_pretty(&report)
             .map_err(|e| Error::io(path, "write", std::io::Error::other(e)))?;
-        std::fs::write(path, text).map_err(|e| Error::io(path, "write", e))?;
+        write_whole(path, text.as_bytes())?;
     }
     if let Some(folder) = &folder {
         let names = subjects.iter().map(|s| match s {

@@ -145,6 +145,7 @@ impl Arguments {
 
 /// Runs the study.
 pub fn run(arguments: &Arguments) -> Result<()> {
+    let limit_mib = arguments.memory.in_force();
     let out = arguments.common.out.as_deref();
     let (folder, state, settings) = if arguments.resume.resume {
         let (folder, mut state) = arguments.resume.open::<LinesState>("raceline", out)?;
@@ -159,7 +160,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     } else {
         (None, None, arguments.settings(RacelineSettings::default())?)
     };
-    let _allowed = settings.size().check(arguments.memory.memory_limit_mib)?;
+    let _allowed = settings.size().check(limit_mib)?;
     let setup = set_up(&settings)?;
     if arguments.common.dry_run {
         return Plan::new("raceline", &settings.to_toml())

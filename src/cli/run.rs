@@ -115,6 +115,7 @@ impl Arguments {
 
 /// Runs everything.
 pub fn run(arguments: &Arguments) -> Result<()> {
+    let limit_mib = arguments.memory.in_force();
     let stop = stop_flag();
     let out = arguments.common.out.as_deref();
     let moved: fn(&mut RunSettings, &RunSettings) = |kept, asked| {
@@ -131,13 +132,13 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     )?;
     let settings = begun.settings;
     // Each stage has the limit for itself; what none of them has room for is refused before the first.
-    let limit_mib = arguments.memory.memory_limit_mib;
     for size in [settings.identify.size(), settings.raceline.size()] {
         drop(size.check(limit_mib)?);
     }
     let prepared = prepare(&settings)?;
+    let sizes = [prepared.identify_size(), settings.raceline.size()];
+    drop(sizes[0].check(limit_mib)?);
     if arguments.common.dry_run {
-        let sizes = [settings.identify.size(), settings.raceline.size()];
         return Plan::new("run", &settings.to_toml())
             .of_replay(&prepared.setup)
             .of_road(&prepared.road)

@@ -62,6 +62,7 @@ impl Arguments {
 
 /// Runs the study.
 pub fn run(arguments: &Arguments) -> Result<()> {
+    let limit_mib = arguments.memory.in_force();
     let out = arguments.common.out.as_deref();
     let moves = arguments.replay.moves();
     let moved: fn(&mut SensitivitySettings, &SensitivitySettings) = |kept, asked| {
@@ -75,14 +76,17 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         moves.then_some(moved),
     )?;
     let settings = begun.settings;
-    let _allowed = memory::check(&settings.kept(), arguments.memory.memory_limit_mib)?;
+    drop(memory::check(&settings.kept(), limit_mib)?);
     let setup = set_up_sensitivity(&settings)?;
+    let [all] = settings.kept();
+    let kept = [all, memory::log_kept(setup.log.samples())];
+    let _allowed = memory::check(&kept, limit_mib)?;
     if arguments.common.dry_run {
         return Plan::new("sensitivity", &settings.to_toml())
             .of_replay(&setup)
             .seed(settings.replay.seed)
             .evaluations(settings.evaluations() as u64)
-            .memory_mib(memory::needed_mib(&settings.kept()))
+            .memory_mib(memory::needed_mib(&kept))
             .backend(settings.replay.backend, settings.replay.adapter.as_deref())?
             .tell(&arguments.common);
     }

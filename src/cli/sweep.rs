@@ -28,8 +28,8 @@ pub struct Arguments {
 
 /// Runs the sweep.
 pub fn run(arguments: &Arguments) -> Result<()> {
+    let limit_mib = arguments.memory.in_force();
     let settings = SweepSettings::load(&arguments.sweep)?;
-    let limit_mib = arguments.memory.memory_limit_mib;
     if arguments.common.dry_run {
         let planned = plan(&settings, limit_mib)?;
         let mut told = Plan::new("sweep", settings.text())

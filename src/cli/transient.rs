@@ -243,6 +243,7 @@ fn run_population(arguments: &Arguments, stop: &AtomicBool, begun: Begun<DriveRe
 
 /// Drives and prints.
 pub fn run(arguments: &Arguments) -> Result<()> {
+    arguments.memory.in_force();
     let stop = stop_flag();
     let out = arguments.common.out.as_deref();
     if arguments.resume.resume {

@@ -1,6 +1,7 @@
 //! The folder that a run writes into: one run each, nothing overwritten, one process at a time.
 
 use crate::error::{Error, Result};
+use crate::files::is_temporary;
 use std::fs::{File, TryLockError};
 use std::io::{Read, Write};
 use std::ops::Deref;
@@ -61,6 +62,16 @@ impl Drop for RunFolder {
 impl RunFolder {
     /// Takes the folder for this process.
     fn lock(path: &Path) -> Result<Self> {
+        // A run that ends takes the lock file with it, and may take it from under one that waits for it.
+        loop {
+            if let Some(locked) = Self::try_lock(path)? {
+                return Ok(locked);
+            }
+        }
+    }
+
+    /// As [`RunFolder::lock`]; nothing if the file that is locked is not the one in the folder any more.
+    fn try_lock(path: &Path) -> Result<Option<Self>> {
         let file = path.join(LOCK);
         let failed = |e| Error::io(&file, "write", e);
         let mut lock = File::options()
@@ -70,6 +81,8 @@ impl RunFolder {
             .truncate(false)
             .open(&file)
             .map_err(failed)?;
+        #[cfg(test)]
+        tests::between_open_and_lock(path);
         match lock.try_lock() {
             Ok(()) => {}
             Err(TryLockError::WouldBlock) => {
@@ -88,16 +101,35 @@ impl RunFolder {
             Err(TryLockError::Error(e)) if e.kind() == std::io::ErrorKind::Unsupported => {}
             Err(TryLockError::Error(e)) => return Err(failed(e)),
         }
+        if !is_at(&lock, &file) {
+            return Ok(None);
+        }
         lock.set_len(0)
             .and_then(|()| write!(lock, "{}", std::process::id()))
             .map_err(failed)?;
-        Ok(Self {
+        Ok(Some(Self {
             path: path.to_owned(),
             first: false,
             made: Vec::new(),
             _lock: lock,
-        })
+        }))
     }
+}
+
+/// Whether an open file is the one that a path names.
+#[cfg(unix)]
+fn is_at(file: &File, path: &Path) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    match (file.metadata(), path.symlink_metadata()) {
+        (Ok(open), Ok(there)) => (open.dev(), open.ino()) == (there.dev(), there.ino()),
+        _ => false,
+    }
+}
+
+/// Whether an open file is the one that a path names: here a name is not free again before the file is closed.
+#[cfg(not(unix))]
+fn is_at(_: &File, path: &Path) -> bool {
+    path.exists()
 }
 
 /// Whether a folder has anything in it but the lock of a run that has come to nothing.
@@ -217,7 +249,6 @@ pub fn reopen_by(folder: &Path, state: &str) -> Result<RunFolder> {
     if !folder.is_dir() {
         return refused("no such folder", "the folder of a run that was broken off");
     }
-    let part = format!("{state}.part");
     let state = folder.join(state);
     let nothing = || {
         if folder.join(MANIFEST).is_file() {
@@ -236,18 +267,26 @@ pub fn reopen_by(folder: &Path, state: &str) -> Result<RunFolder> {
     if !state.is_file() {
         return nothing();
     }
-    // What a killed process had half written, under names of their own.
-    for entry in folder
-        .read_dir()
-        .map_err(|e| Error::io(folder, "read", e))?
-        .flatten()
-    {
-        let name = entry.file_name().to_string_lossy().into_owned();
-        if name.starts_with('.') && name.ends_with(".tmp") || name == part {
-            std::fs::remove_file(entry.path()).map_err(|e| Error::io(entry.path(), "remove", e))?;
+    clean(folder, DEEPEST)?;
+    Ok(locked)
+}
+
+/// Folders within folders of a run: its stages, what they keep, and no more.
+const DEEPEST: usize = 4;
+
+/// Removes what a killed process had half written, under names of its own, in a folder and those in it.
+fn clean(folder: &Path, deepest: usize) -> Result<()> {
+    let entries = folder.read_dir().map_err(|e| Error::io(folder, "read", e))?;
+    for entry in entries.flatten() {
+        let path = entry.path();
+        let kind = entry.file_type().map_err(|e| Error::io(&path, "read", e))?;
+        if kind.is_dir() && deepest > 0 {
+            clean(&path, deepest - 1)?;
+        } else if kind.is_file() && is_temporary(&entry.file_name().to_string_lossy()) {
+            std::fs::remove_file(&path).map_err(|e| Error::io(&path, "remove", e))?;
         }
     }
-    Ok(locked)
+    Ok(())
 }
 
 /// Who made a run and of what, as `manifest.json` says it.
@@ -328,6 +367,49 @@ pub fn write_json(path: &Path, value: &impl serde::Serialize) -> Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::cell::RefCell;
+
+    thread_local! {
+        static BETWEEN: RefCell<Option<RunFolder>> = const { RefCell::new(None) };
+    }
+
+    /// Lets go of a folder that is to be let go of when another is about to lock it.
+    pub(super) fn between_open_and_lock(path: &Path) {
+        BETWEEN.with_borrow_mut(|held| drop(held.take_if(|held| held.path == path)));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_lock_file_that_is_taken_away_while_another_waits_for_it_is_held_by_nobody() {
+        let root = tempfile::tempdir().expect("a temporary folder");
+        let first = take(root.path()).expect("nobody holds it");
+        BETWEEN.set(Some(first));
+        let second = take(root.path()).expect("the first has let go of it");
+        assert!(BETWEEN.take().is_none(), "it was let go of just then");
+        assert!(second.join(LOCK).is_file());
+        let refused = take(root.path()).expect_err("the second holds it");
+        assert!(refused.to_string().contains("process"), "{refused}");
+        drop(second);
+        drop(take(root.path()).expect("nobody holds it"));
+    }
+
+    #[test]
+    fn what_was_half_written_goes_wherever_it_is() {
+        let root = tempfile::tempdir().expect("a temporary folder");
+        for folder in ["", "1_identify", ".stages/raceline-1"] {
+            let folder = root.path().join(folder);
+            std::fs::create_dir_all(&folder).expect("a folder");
+            std::fs::write(folder.join(".lapswarm-7-0.tmp"), "hal").expect("a file");
+            std::fs::write(folder.join("kept.tmp"), "whole").expect("a file");
+        }
+        std::fs::write(root.path().join(STATE), "a state").expect("a file");
+        drop(reopen(root.path()).expect("a state"));
+        for folder in ["", "1_identify", ".stages/raceline-1"] {
+            let folder = root.path().join(folder);
+            assert!(!folder.join(".lapswarm-7-0.tmp").exists(), "{folder:?}");
+            assert!(folder.join("kept.tmp").exists(), "{folder:?}");
+        }
+    }
 
     #[test]
     fn one_process_at_a_time_and_a_dead_one_holds_nothing() {

@@ -143,6 +143,8 @@ pub(super) struct Build<'a> {
     pub options: &'a LogOptions,
     /// Reference rolling radius, m.
     pub radius: Option<f64>,
+    /// Whether a log of so many samples may be made.
+    pub fits: &'a dyn Fn(usize) -> Result<()>,
 }
 
 impl Build<'_> {
@@ -163,6 +165,7 @@ impl Build<'_> {
                 expected,
             ));
         }
+        (self.fits)(grid.samples)?;
         let sampled = |signal: &Signal<'_>| -> Vec<f64> {
             if through {
                 signal.values.to_vec()

@@ -387,8 +387,20 @@ impl GpuContext {
                 submission_index,
                 timeout: Some(PATIENCE),
             })
-            .map_err(|e| Error::Device(format!("{}: {e}", self.summary)))?;
+            .map_err(|e| match e {
+                wgpu::PollError::Timeout => self.hung("a dispatch did not come to its end"),
+                e => Error::Device(format!("{}: {e}", self.summary)),
+            })?;
         self.check()
+    }
+
+    /// What did not happen in all the time that a device is given.
+    fn hung(&self, what: &str) -> Error {
+        Error::Device(format!(
+            "{}: {what} within {} s, so that the device counts as hung",
+            self.summary,
+            PATIENCE.as_secs()
+        ))
     }
 
     /// Hands the first `bytes` of `buffer`, which is mappable, to `read`.
@@ -415,6 +427,7 @@ impl GpuContext {
             self.wait(None)?;
             match receiver.recv_timeout(Duration::from_millis(1)) {
                 Err(RecvTimeoutError::Timeout) if start.elapsed() < PATIENCE => {}
+                Err(RecvTimeoutError::Timeout) => return Err(self.hung("results were not handed over")),
                 answer => break answer.map_err(|e| failed(e.to_string()))?,
             }
         };

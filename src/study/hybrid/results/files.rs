@@ -2,17 +2,11 @@
 
 use super::{HybridSummary, told_laps};
 use crate::error::Result;
+use crate::files::stem;
 use crate::report::{Cells, Column, write_csv, write_whole};
 use crate::study::hybrid::{HybridSetup, HybridStudySettings, Outcome, ReportedLap};
 use crate::study::run_folder::{Manifest, write_json};
 use std::path::Path;
-
-/// A name as a part of a file's name.
-pub fn stem(name: &str) -> String {
-    name.chars()
-        .map(|c| if c.is_alphanumeric() { c } else { '_' })
-        .collect()
-}
 
 /// Written last: it says that the run is whole.
 pub fn write_manifest(
