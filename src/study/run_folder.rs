@@ -1,7 +1,7 @@
 //! The folder that a run writes into: one run each, nothing overwritten, one process at a time.
 
 use crate::error::{Error, Result};
-use crate::files::is_temporary;
+use crate::files::{is_temporary, write_whole};
 use std::fs::{File, TryLockError};
 use std::io::{Read, Write};
 use std::ops::Deref;
@@ -132,9 +132,11 @@ fn is_at(_: &File, path: &Path) -> bool {
     path.exists()
 }
 
-/// Whether a folder has anything in it but the lock of a run that has come to nothing.
+/// Whether a folder has anything in it but what a run leaves that has come to nothing: its lock, its settings, and what it had
+/// half written. Settings without a lock are a user's own.
 fn holds_something(folder: &Path) -> bool {
-    holds_more_than(folder, &[LOCK])
+    let began = folder.join(LOCK).is_file();
+    holds_more_than(folder, if began { &[LOCK, SETTINGS] } else { &[] })
 }
 
 /// The folder that [`create`] would create, which is not touched.
@@ -143,8 +145,7 @@ fn holds_something(folder: &Path) -> bool {
 /// [`Error::Input`] if the folder asked for holds anything already.
 pub fn would_be(study: &str, asked: Option<&Path>) -> Result<PathBuf> {
     match asked {
-        Some(folder) if holds_something(folder) || folder.is_file() => Err(taken(folder)),
-        Some(folder) => Ok(folder.to_owned()),
+        Some(folder) => check_free(folder).map(|()| folder.to_owned()),
         None => {
             let numbered = |number: u32| Path::new(RUNS).join(format!("{study}-{number:03}"));
             Ok((1..u32::MAX)
@@ -152,6 +153,23 @@ pub fn would_be(study: &str, asked: Option<&Path>) -> Result<PathBuf> {
                 .find(|folder| !folder.exists())
                 .unwrap_or_else(|| numbered(u32::MAX)))
         }
+    }
+}
+
+/// Refuses a folder that holds anything, and what is no folder.
+fn check_free(folder: &Path) -> Result<()> {
+    match folder.read_dir() {
+        Err(e) if e.kind() != std::io::ErrorKind::NotFound && !folder.is_file() => {
+            Err(Error::io(folder, "read", e))
+        }
+        _ if folder.is_file() || holds_something(folder) => Err(taken(folder)),
+        _ if folder.is_symlink() && !folder.exists() => Err(Error::input(
+            folder,
+            "--out",
+            "a link to nowhere",
+            "a new or empty folder",
+        )),
+        _ => Ok(()),
     }
 }
 
@@ -167,9 +185,12 @@ fn taken(folder: &Path) -> Error {
 fn holds_more_than(folder: &Path, names: &[&str]) -> bool {
     match folder.read_dir() {
         // What cannot be read may hold anything.
-        Ok(mut entries) => {
-            entries.any(|entry| entry.map_or(true, |e| !names.iter().any(|name| e.file_name() == *name)))
-        }
+        Ok(mut entries) => entries.any(|entry| {
+            entry.map_or(true, |e| {
+                let name = e.file_name();
+                !names.iter().any(|n| name == *n) && !is_temporary(&name.to_string_lossy())
+            })
+        }),
         Err(error) => error.kind() != std::io::ErrorKind::NotFound,
     }
 }
@@ -191,9 +212,7 @@ fn missing(folder: &Path) -> Vec<PathBuf> {
 /// cannot be created.
 pub fn create(study: &str, asked: Option<&Path>) -> Result<RunFolder> {
     if let Some(folder) = asked {
-        if holds_something(folder) || folder.is_file() {
-            return Err(taken(folder));
-        }
+        check_free(folder)?;
         let made = missing(folder);
         std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, "create", e))?;
         let mut locked = RunFolder::lock(folder)?;
@@ -201,6 +220,7 @@ pub fn create(study: &str, asked: Option<&Path>) -> Result<RunFolder> {
         if holds_something(folder) {
             return Err(taken(folder));
         }
+        clean(folder, 0)?;
         (locked.first, locked.made) = (true, made);
         return Ok(locked);
     }
@@ -289,6 +309,30 @@ fn clean(folder: &Path, deepest: usize) -> Result<()> {
     Ok(())
 }
 
+/// What becomes of settings in a run's folder that are not the run's.
+const EDITED: &str = "study.edited.toml";
+
+/// Writes `study.toml`. One that says something else, as after an edit of a run that is gone on with, is kept beside it: a run
+/// goes by the settings that it was begun with.
+///
+/// # Errors
+/// [`Error::Io`] if it cannot be written.
+pub fn write_study(folder: &Path, toml: &str) -> Result<()> {
+    let path = folder.join(SETTINGS);
+    match std::fs::read(&path) {
+        Ok(before) if before == toml.as_bytes() => return Ok(()),
+        Ok(_) => {
+            std::fs::rename(&path, folder.join(EDITED)).map_err(|e| Error::io(&path, "move", e))?;
+            tracing::warn!(
+                "{} does not say what the run goes by; it is {EDITED} now",
+                path.display()
+            );
+        }
+        Err(_) => {}
+    }
+    write_whole(&path, toml.as_bytes())
+}
+
 /// Who made a run and of what, as `manifest.json` says it.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Manifest<'a> {
@@ -361,7 +405,7 @@ impl<'a> Manifest<'a> {
 pub fn write_json(path: &Path, value: &impl serde::Serialize) -> Result<()> {
     let text = serde_json::to_string_pretty(value)
         .map_err(|e| Error::io(path, "write", std::io::Error::other(e)))?;
-    crate::report::write_whole(path, text.as_bytes())
+    write_whole(path, text.as_bytes())
 }
 
 #[cfg(test)]
@@ -498,6 +542,58 @@ mod tests {
         assert!(folder.join(SETTINGS).is_file() && folder.join(STATE).is_file());
         drop(reopen(&folder).expect("a state"));
         assert!(folder.join(SETTINGS).is_file() && folder.join(STATE).is_file());
+    }
+
+    /// What a run leaves that was killed before its first state: neither it nor the next may be in the way, and a user's own
+    /// settings are no such thing.
+    #[test]
+    fn what_a_run_killed_at_its_beginning_leaves_is_in_nobodys_way() {
+        let root = tempfile::tempdir().expect("a temporary folder");
+        let folder = root.path().join("run");
+        std::fs::create_dir(&folder).expect("a folder");
+        for leaves in [
+            &[LOCK][..],
+            &[LOCK, ".lapswarm-7-0.tmp"],
+            &[LOCK, SETTINGS, ".lapswarm-7-0.tmp"],
+        ] {
+            for name in leaves {
+                std::fs::write(folder.join(name), "").expect("a file");
+            }
+            assert_eq!(
+                would_be("study", Some(&folder)).expect("as good as empty"),
+                folder
+            );
+            let held = create("study", Some(&folder)).expect("as good as empty");
+            assert!(!held.join(".lapswarm-7-0.tmp").exists());
+            drop(held);
+            std::fs::create_dir_all(&folder).expect("a folder");
+        }
+        std::fs::write(folder.join(SETTINGS), "a user's own").expect("a file");
+        create("study", Some(&folder)).expect_err("not ours to overwrite");
+        std::fs::write(folder.join(LOCK), "7").expect("a file");
+        std::fs::write(folder.join("notes.txt"), "a user's own").expect("a file");
+        create("study", Some(&folder)).expect_err("not ours to overwrite");
+    }
+
+    #[test]
+    fn edited_settings_are_kept() {
+        let root = tempfile::tempdir().expect("a temporary folder");
+        let text = |name: &str| std::fs::read_to_string(root.path().join(name)).ok();
+        write_study(root.path(), "a = 1").expect("written");
+        write_study(root.path(), "a = 1").expect("written");
+        assert_eq!(text(EDITED), None);
+        std::fs::write(root.path().join(SETTINGS), "a = 2").expect("a file");
+        write_study(root.path(), "a = 1").expect("written");
+        assert_eq!(text(SETTINGS).as_deref(), Some("a = 1"));
+        assert_eq!(text(EDITED).as_deref(), Some("a = 2"));
+    }
+
+    #[test]
+    fn names_that_cannot_be_are_refused_for_that() {
+        let root = tempfile::tempdir().expect("a temporary folder");
+        let long = root.path().join("n".repeat(300));
+        let refused = create("study", Some(&long)).expect_err("too long").to_string();
+        assert!(!refused.contains("another run"), "{refused}");
     }
 
     #[test]

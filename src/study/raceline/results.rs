@@ -8,6 +8,7 @@ mod surfaces;
 use super::{Outcome, RacelineSettings, ReportedLine, Setup};
 use crate::error::Result;
 use crate::evaluate::{FailureCounts, failures_in_words};
+use crate::study::run_folder::write_study;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -295,7 +296,7 @@ impl Summary {
 /// # Errors
 /// [`crate::Error::Io`] if it cannot be written.
 pub fn write_settings(folder: &Path, settings: &RacelineSettings) -> Result<()> {
-    crate::report::write_whole(folder.join("study.toml"), settings.to_toml().as_bytes())
+    write_study(folder, &settings.to_toml())
 }
 
 /// Writes all files of a run into `folder`.

@@ -6,10 +6,9 @@ use crate::evaluate::FailureCounts;
 use crate::evaluate::replay::CHANNEL_UNITS;
 use crate::report::{
     BarPanel, BarSeries, Cells, Column, Curve, CurvePanel, plot_bars, plot_curves, text_table, write_csv,
-    write_whole,
 };
 use crate::study::identify::Setup;
-use crate::study::run_folder::{Manifest, write_json};
+use crate::study::run_folder::{Manifest, write_json, write_study};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -274,7 +273,7 @@ pub fn write_results(
         )
     };
     let study = settings.to_toml();
-    write_whole(folder.join("study.toml"), study.as_bytes())?;
+    write_study(folder, &study)?;
     write_one_at_a_time(folder, setup, outcome)?;
     plot_one_at_a_time(folder, summary)?;
     if !outcome.indices.is_empty() {

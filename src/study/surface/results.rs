@@ -3,11 +3,9 @@
 use super::{Outcome, SurfaceSettings};
 use crate::error::Result;
 use crate::evaluate::{FailureCounts, failures_in_words};
-use crate::report::{
-    Cells, Column, HtmlReport, Levels, SurfaceFigure, plot_surface, significant, write_csv, write_whole,
-};
+use crate::report::{Cells, Column, HtmlReport, Levels, SurfaceFigure, plot_surface, significant, write_csv};
 use crate::study::identify::Setup;
-use crate::study::run_folder::{Manifest, write_json};
+use crate::study::run_folder::{Manifest, write_json, write_study};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -143,7 +141,7 @@ pub fn write_results(
     };
     let problem = &setup.replay.problem;
     let toml = settings.to_toml();
-    write_whole(folder.join("study.toml"), toml.as_bytes())?;
+    write_study(folder, &toml)?;
     if outcome.interrupted {
         return Ok(());
     }

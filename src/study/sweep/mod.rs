@@ -253,10 +253,11 @@ fn write_studies(
     resume: bool,
 ) -> Result<()> {
     let studies = folder.join("studies");
-    std::fs::create_dir_all(&studies).map_err(|e| Error::io(&studies, "create", e))?;
     if !resume {
+        // First: with it, what was broken off can be gone on with.
         write_whole(folder.join(SWEEP_FILE), settings.text().as_bytes())?;
     }
+    std::fs::create_dir_all(&studies).map_err(|e| Error::io(&studies, "create", e))?;
     for (number, point) in points.iter().enumerate() {
         write_whole(path_of(number), point.study.as_bytes())?;
     }
