@@ -264,6 +264,12 @@ fn lines_go_on_bit_for_bit_from_every_stage() {
     })
     .unwrap();
     let wanted = lines_told(&settings, &setup, &whole);
+    // A run that is gone on with writes over what it had written when it was broken off.
+    let folder = tempfile::tempdir().unwrap();
+    let summary = raceline::summarise(&settings, &setup, &whole);
+    for _ in 0..2 {
+        raceline::write_results(folder.path(), &settings, &setup, &whole, &summary).unwrap();
+    }
     let all = stages.len();
     let first = |stage: &str| 1 + stages.iter().position(|s| s == stage).unwrap();
     let last = first("front") - 1;

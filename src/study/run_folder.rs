@@ -12,6 +12,8 @@ const RUNS: &str = "runs";
 /// The file that the process that writes into a folder holds locked; it says which process that is. The system gives the
 /// lock back when the process ends, however it ends.
 const LOCK: &str = ".lock";
+/// How often a lock file may be taken away just when it is locked, before something else is the matter.
+const LOCK_TRIES: usize = 1000;
 /// The state of a run that can be gone on with.
 pub const STATE: &str = "state.lapswarm";
 /// What a run writes before it begins.
@@ -63,11 +65,13 @@ impl RunFolder {
     /// Takes the folder for this process.
     fn lock(path: &Path) -> Result<Self> {
         // A run that ends takes the lock file with it, and may take it from under one that waits for it.
-        loop {
+        for _ in 0..LOCK_TRIES {
             if let Some(locked) = Self::try_lock(path)? {
                 return Ok(locked);
             }
         }
+        let changing = std::io::Error::other("the file there is another one each time");
+        Err(Error::io(path.join(LOCK), "lock", changing))
     }
 
     /// As [`RunFolder::lock`]; nothing if the file that is locked is not the one in the folder any more.
@@ -120,7 +124,7 @@ impl RunFolder {
 #[cfg(unix)]
 fn is_at(file: &File, path: &Path) -> bool {
     use std::os::unix::fs::MetadataExt;
-    match (file.metadata(), path.symlink_metadata()) {
+    match (file.metadata(), path.metadata()) {
         (Ok(open), Ok(there)) => (open.dev(), open.ino()) == (there.dev(), there.ino()),
         _ => false,
     }
@@ -243,13 +247,15 @@ pub fn create(study: &str, asked: Option<&Path>) -> Result<RunFolder> {
     }
 }
 
-/// Takes a folder for this process, whatever is in it.
+/// Takes a folder for this process, whatever is in it; what a killed one had half written goes.
 ///
 /// # Errors
 /// [`Error::Input`] if another process writes into it; [`Error::Io`] if it cannot be created.
 pub fn take(folder: &Path) -> Result<RunFolder> {
     std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, "create", e))?;
-    RunFolder::lock(folder)
+    let locked = RunFolder::lock(folder)?;
+    clean(folder, 0)?;
+    Ok(locked)
 }
 
 /// Takes the folder of a run that was broken off, to go on with it.
@@ -453,6 +459,9 @@ mod tests {
             assert!(!folder.join(".lapswarm-7-0.tmp").exists(), "{folder:?}");
             assert!(folder.join("kept.tmp").exists(), "{folder:?}");
         }
+        std::fs::write(root.path().join(".lapswarm-7-0.tmp"), "hal").expect("a file");
+        drop(take(root.path()).expect("nobody holds it"));
+        assert!(!root.path().join(".lapswarm-7-0.tmp").exists());
     }
 
     #[test]

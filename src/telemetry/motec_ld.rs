@@ -79,6 +79,8 @@ pub(super) fn parse(bytes: Cow<'_, [u8]>, path: &Path, reading: &Reading<'_>) ->
         ));
     }
     let size = bytes.len() as u64;
+    // What is somebody else's is copied.
+    let copies = if matches!(bytes, Cow::Borrowed(_)) { 2 } else { 1 };
     let mut bytes = bytes.into_owned();
     for (at, size) in HEADER_STRINGS {
         to_utf8(&mut bytes[at..at + size]);
@@ -106,7 +108,11 @@ pub(super) fn parse(bytes: Cow<'_, [u8]>, path: &Path, reading: &Reading<'_>) ->
     let wanted = (reading.choose)(&recording)?;
     let samples = stored.iter().zip(&wanted).filter(|(_, wanted)| **wanted);
     let samples: u64 = samples.map(|(stored, _)| stored.count as u64).sum();
-    reading.fits(path, size, samples.saturating_mul(8).saturating_add(size))?;
+    reading.fits(
+        path,
+        size,
+        samples.saturating_mul(8).saturating_add(copies * size),
+    )?;
     let channels = recording.channels.iter_mut().zip(&metas).zip(&stored);
     for (((channel, meta), stored), _) in channels.zip(wanted).filter(|(_, wanted)| *wanted) {
         fill(channel, meta, stored.storage, &bytes[stored.range.clone()]);
