@@ -4,7 +4,7 @@
 use super::kernel::{INTEGRATED, Settling, ending};
 use super::modes::{SettlePlan, displaced, slopes};
 use crate::error::{Error, Result};
-use crate::evaluate::{Evaluation, FAILED_COST, Failure, FreeCar, Objective, Problem, Variable};
+use crate::evaluate::{Evaluation, FAILED_COST, Failure, FreeCar, Objective, Problem, Variable, are_costs};
 use crate::vehicle::{Car, CarParameter, Chassis, TyreModel};
 use serde::{Deserialize, Serialize};
 
@@ -229,7 +229,7 @@ impl SteadyProblem {
     pub fn objective_row(&self, trim: std::result::Result<Settled, Failure>) -> (Vec<f64>, Option<Failure>) {
         let row = trim.and_then(|trim| {
             let row: Vec<f64> = self.objectives.iter().map(|o| o.of(&trim)).collect();
-            if row.iter().all(|x| x.is_finite()) {
+            if are_costs(&row) {
                 Ok(row)
             } else {
                 Err(Failure::Undefined)
