@@ -37,7 +37,7 @@ pub(super) struct Cases {
     determined: Vec<bool>,
 }
 
-/// What a channel's mean error may be off, of a car for which it is `exact` in `f64`.
+/// What a channel's cost may be off that is `exact` in `f64`.
 pub fn allowed(channel: usize, exact: f64) -> f64 {
     TOLERANCE * exact + FLOOR[channel]
 }

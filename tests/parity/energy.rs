@@ -12,8 +12,8 @@ use lapswarm::evaluate::hybrid::{
 use lapswarm::evaluate::simd::InstructionSet;
 use lapswarm::line::energy::{EnergyCar, EnergyLap, EnergyPlan, Gates, Mode, Traction};
 use lapswarm::line::{Parametrisation, geometry};
-use lapswarm::study::envelope::{EnvelopeSettings, car_limits};
 use lapswarm::parity::energy::{Allowed, allowed};
+use lapswarm::study::envelope::{EnvelopeSettings, car_limits};
 use lapswarm::vehicle::Car;
 
 fn hybrid_car(exponent: f64) -> EnergyCar {

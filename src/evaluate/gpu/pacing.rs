@@ -180,7 +180,10 @@ mod tests {
                 }
                 // Nor is it cut to pieces.
                 let filled = longest_steps * rounds_per_step > LOOP_ROUNDS - rounds_per_step;
-                assert!(filled || total_ms / 2000.0 > TARGET_MS / 4.0, "{total_ms} ms in all");
+                assert!(
+                    filled || total_ms / 2000.0 > TARGET_MS / 4.0,
+                    "{total_ms} ms in all"
+                );
             }
         }
     }

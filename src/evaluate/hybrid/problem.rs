@@ -1,7 +1,9 @@
 //! What is asked of laps with energy: the line, the strategy, which parts of both are free, and what is to be small.
 
 use crate::error::{Error, Result};
-use crate::evaluate::{Evaluation, FAILED_COST, Failure, Objective, Problem, Variable, are_costs, are_numbers};
+use crate::evaluate::{
+    Evaluation, FAILED_COST, Failure, Objective, Problem, Variable, are_costs, are_numbers,
+};
 use crate::line::energy::{EnergyCar, EnergyLap, EnergyPlan, GATES, Gates};
 use crate::line::{LinePlan, Parametrisation};
 use crate::track::CrossSections;
