@@ -111,7 +111,7 @@ impl Wanted {
         assert_eq!(faults.len(), 1, "{}, {what}: {faults:?}", kind.name);
         let words = match fault {
             Fault::Lost => "was opened anew",
-            Fault::Gone => "does not open again (the adapter is gone",
+            Fault::Gone => "does not open again (no usable device: the adapter is gone)",
             Fault::OutOfMemory => "emory",
             Fault::Validation => "MAP_READ",
             Fault::Hung => "does not finish its work",

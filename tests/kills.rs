@@ -83,7 +83,7 @@ impl<'a> Study<'a> {
             );
             if !let_work(&mut child, &marker, (at_s * 1e3) as u64) {
                 // The machine has more time than it had.
-                working_s = 0.8 * working_s;
+                working_s *= 0.8;
             }
             let told = Command::new("kill")
                 .args([self.signal, &child.id().to_string()])

@@ -6,6 +6,7 @@ use lapswarm::study::journal::Journal;
 use lapswarm::study::raceline::{LinesState, RacelineSettings, set_up};
 use lapswarm::study::transient::DriveState;
 use lapswarm::swarm::checkpoint;
+use lapswarm::vehicle::Car;
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -102,7 +103,13 @@ pub fn works_for(child: &mut Child, marker: &Path) -> Duration {
     began.elapsed()
 }
 
-/// No file of a folder is part of one. Hidden ones are on their way.
+/// Whether a file waits to be put in the place of another.
+fn on_its_way(path: &Path) -> bool {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    name.starts_with('.') || name.ends_with(".part")
+}
+
+/// No file of a folder is part of one, but for those on their way.
 pub fn nothing_half_written(folder: &Path) {
     for entry in folder.read_dir().expect("a folder").flatten() {
         let path = entry.path();
@@ -112,7 +119,7 @@ pub fn nothing_half_written(folder: &Path) {
             nothing_half_written(&path);
             continue;
         }
-        if entry.file_name().to_string_lossy().starts_with('.') {
+        if on_its_way(&path) {
             continue;
         }
         let bytes = std::fs::read(&path).expect("a file");
@@ -142,6 +149,15 @@ pub fn nothing_half_written(folder: &Path) {
                     || checkpoint::load::<DriveState>(&path).is_ok();
                 assert!(loads, "{name} is no whole state");
             }
+            // Every car's tyres here are the bundled ones with other figures.
+            Some("tir") => {
+                let key = |text: &str| {
+                    let last = text.lines().next_back().unwrap_or_default();
+                    last.split_once('=').map(|(key, _)| key.trim().to_owned())
+                };
+                let whole = text().ends_with('\n') && key(text()) == key(Car::BUNDLED_TYRE);
+                assert!(whole, "{name}");
+            }
             other => panic!("{name}: nobody knows what a whole one is ({other:?})"),
         }
     }
@@ -165,7 +181,7 @@ fn without_times(table: &str) -> String {
 }
 
 /// All results in a folder and those below it that do not depend on the clock, by their names: tables, cars and settings, and
-/// pictures but for those of how the search went on.
+/// pictures but for those of how the search went on and those that say how long it took.
 pub fn results(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     fn gather(folder: &Path, below: &str, results: &mut BTreeMap<String, Vec<u8>>) {
         for entry in folder.read_dir().expect("a folder").flatten() {
@@ -176,14 +192,14 @@ pub fn results(folder: &Path) -> BTreeMap<String, Vec<u8>> {
                 continue;
             }
             let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
-            if !["csv", "toml", "svg", "parquet", "jsonl"].contains(&extension) {
+            if !["csv", "toml", "tir", "svg", "parquet", "jsonl"].contains(&extension) {
                 continue;
             }
             let mut bytes = std::fs::read(&path).expect("a file");
+            if name == "traces.svg" || name.contains("convergence") && extension != "csv" {
+                continue;
+            }
             if name.contains("convergence") {
-                if extension != "csv" {
-                    continue;
-                }
                 bytes = without_times(&String::from_utf8_lossy(&bytes)).into_bytes();
             }
             results.insert(place, bytes);
@@ -208,11 +224,8 @@ pub fn same_results(what: &str, found: &Path, wanted: &Path) {
 /// Nothing that a run has on its way is left in its folder.
 pub fn nothing_on_its_way(folder: &Path) {
     let left = folder.read_dir().expect("a folder").flatten();
-    let hidden: Vec<_> = left
-        .map(|e| e.file_name())
-        .filter(|n| n.to_string_lossy().starts_with('.'))
-        .collect();
-    assert!(hidden.is_empty(), "{hidden:?}");
+    let left: Vec<_> = left.map(|e| e.path()).filter(|p| on_its_way(p)).collect();
+    assert!(left.is_empty(), "{left:?}");
 }
 
 /// A line at a share of a road's width from the right, as `transient` reads one. At its edge many shares of the grip are tried

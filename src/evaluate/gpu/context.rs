@@ -428,13 +428,22 @@ impl GpuContext {
 
     /// What a wait has come to.
     fn waited(&self, outcome: std::result::Result<wgpu::PollStatus, wgpu::PollError>) -> Result<()> {
-        if let Err(error) = outcome {
-            let message = format!("the device does not finish its work: {error}");
-            locked(&self.failure).get_or_insert(message);
-            // Closing it would wait for that work without end: it stays open for as long as the process lives.
-            std::mem::forget((self.device.clone(), self.queue.clone()));
+        match outcome {
+            Ok(_) => self.check(),
+            Err(error @ wgpu::PollError::Timeout) => {
+                let message = format!("the device does not finish its work: {error}");
+                locked(&self.failure).get_or_insert(message);
+                // Closing it would wait for that work without end: it stays open for as long as the process lives.
+                std::mem::forget((self.device.clone(), self.queue.clone()));
+                self.check()
+            }
+            // A device that has gone takes nothing that it could be waited for, and may yet say so itself.
+            Err(error) => {
+                let _ = self.device.poll(wgpu::PollType::Poll);
+                self.check()?;
+                Err(Error::Device(format!("{}: {error}", self.summary)))
+            }
         }
-        self.check()
     }
 
     /// Hands the first `bytes` of `buffer`, which is mappable, to `read`.

@@ -220,9 +220,13 @@ impl SteadyProblem {
         Some(speed * displaced(&slopes, &off)?[1])
     }
 
-    /// Why a candidate need not be driven, if so.
+    /// Why a candidate need not be driven, if so. Circles at no speed, or at one that no problem may ask for, are off the
+    /// envelope.
     pub fn preliminary_failure(&self, candidate: &[f64]) -> Option<Failure> {
-        self.free.preliminary_failure(candidate)
+        let [speed, _] = self.aim_figures(candidate);
+        let driven = (SPEEDS[0]..=SPEEDS[1]).contains(&speed);
+        let failure = self.free.preliminary_failure(candidate);
+        failure.or_else(|| (!driven).then_some(Failure::OffTheEnvelope))
     }
 
     /// The objectives' row of a candidate from its trim, or from the reason why there is none.
