@@ -1,6 +1,6 @@
 //! A car some of whose parameters are decision variables.
 
-use super::{Failure, Variable};
+use super::{Failure, Variable, are_numbers};
 use crate::error::{Error, Result};
 use crate::vehicle::car::CarParameter;
 use crate::vehicle::{Car, TyreCoefficients, TyreModel};
@@ -95,7 +95,7 @@ impl FreeCar {
 
     /// Why a candidate need not be driven, if so: a variable that is no number, or a tyre that is none.
     pub fn preliminary_failure(&self, candidate: &[f64]) -> Option<Failure> {
-        if candidate.iter().any(|x| !x.is_finite()) {
+        if !are_numbers(candidate) {
             return Some(Failure::NotFinite);
         }
         if self.tyre_model() == TyreModel::Linear {

@@ -99,6 +99,17 @@ pub struct Problem {
 /// The cost of a candidate that failed: the worst finite one, on every backend.
 pub const FAILED_COST: f64 = 1e9;
 
+/// Whether these are objectives of a candidate that did not fail.
+pub(crate) fn are_costs(row: &[f64]) -> bool {
+    row.iter().all(|x| x.is_finite() && *x < FAILED_COST)
+}
+
+/// Whether all figures of a candidate are finite numbers in single precision, in which most backends reckon: what is none in
+/// there is none anywhere, so that all backends say the same.
+pub(crate) fn are_numbers(figures: &[f64]) -> bool {
+    figures.iter().all(|x| (*x as f32).is_finite())
+}
+
 /// Why a candidate has no cost of its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Failure {
@@ -116,7 +127,7 @@ pub enum Failure {
     Unsettled,
     /// No slip of its driven wheels held it at the speed asked for.
     OffTheEnvelope,
-    /// A decision variable was not a finite number.
+    /// A decision variable was not a finite number in single precision.
     NotFinite,
     /// An objective was not a finite number.
     Undefined,

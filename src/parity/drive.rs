@@ -127,7 +127,7 @@ pub fn candidates(problem: &DriveProblem, count: usize, draws: &mut Draws) -> Ve
 /// *Steering*: where the arms are still, they jitter by a spacing of 0.05 rad (3.7e-9) in each step; where they move, by the
 /// share that the lap time is off and by the noise of what is looked up ahead: stations of up to 20 m in rows (1e-6 m) on
 /// curvature that changes by less than 1e-3 1/m^2, through a wheelbase of 2.6 m and the arms' 0.04 s: 2.6e-9 in a step.
-fn allowed(problem: &DriveProblem, lap: &DrivenLap) -> [f64; 3] {
+pub fn allowed(problem: &DriveProblem, lap: &DrivenLap) -> [f64; 3] {
     let driver = problem.driver();
     let (step, gain) = (driver.step, driver.speed_gain);
     let slower = 1.9e-6 / (step * gain) + 1e-4 / gain;

@@ -27,6 +27,41 @@ const GATES: [Free; 6] = [
     Free::Motor,
 ];
 
+/// What single precision may move of a lap.
+#[derive(Clone, Copy, Debug)]
+pub struct Allowed {
+    /// Of its time, s.
+    pub time: f64,
+    /// Of its fuel, kg.
+    pub fuel: f64,
+    /// Of what goes into the store or out of it, J.
+    pub energy: f64,
+}
+
+/// What single precision may move of a lap with up to four zones that is `exact` in `f64`.
+///
+/// Times may be off as those of racing lines. Energies are forces over lengths, and forces are differences of speeds
+/// squared: 2500 m^2/s^2 is off by 3e-4 after the roundings of a step, over 2 h of 10 m that is 3e-5 m/s^2 or 4 kJ on
+/// a lap of 5 km whose signs all agree; a root of what the ellipse leaves is off by 6e-4 of 15 m/s^2 where a corner is
+/// on the limit, an eighth of the lap at most: 7 kJ more. A gate flips on a rounding where a figure is on its threshold:
+/// no more than a segment at either end of each of the four zones, and one at the budget's end, of 260 kW (the strongest motor
+/// with what it loses) over h / v.
+pub fn allowed(problem: &HybridProblem, exact: &EnergyLap<f64>) -> Allowed {
+    let points = match problem.line() {
+        HybridLine::Fixed { points_m, .. } => points_m.clone(),
+        HybridLine::Free { cuts, .. } => cuts.points(&vec![0.5; cuts.len()]),
+    };
+    let segments = geometry(&points, true).segment_m;
+    let spacing = segments.iter().fold(0.0, |a: f64, b| a.max(*b));
+    let mean_speed = points.len() as f64 * spacing / exact.time;
+    let energy = 11e3 + 9.0 * 260e3 * 2.0 * spacing / mean_speed;
+    Allowed {
+        time: 2.6e-4 * exact.time,
+        fuel: 3e-4 * exact.fuel + energy * 2.0 * 0.27 / 3.6e6,
+        energy,
+    }
+}
+
 /// Problems of both modes, strategies, and what the reference says of them.
 pub(super) struct Cases(Vec<Case>);
 
@@ -103,12 +138,6 @@ impl Cases {
         Ok(Self(cases.collect::<Result<_>>()?))
     }
 
-    /// Times may be off as those of racing lines. Energies are forces over lengths, and forces are differences of speeds
-    /// squared: 2500 m^2/s^2 is off by 3e-4 after the roundings of a step, over 2 h of 10 m that is 3e-5 m/s^2 or 4 kJ on
-    /// a lap of 5 km whose signs all agree; a root of what the ellipse leaves is off by 6e-4 of 15 m/s^2 where a corner is
-    /// on the limit, an eighth of the lap at most: 7 kJ more. A gate flips on a rounding where a figure is on its threshold:
-    /// no more than a segment at either end of each of the four zones, and one at the budget's end, of 260 kW (the strongest motor with what it loses) over h / v.
-    ///
     /// # Errors
     /// [`crate::Error::Device`] if the device fails.
     pub(super) fn compare(&self, subject: &Subject) -> Result<Vec<Agreement>> {
@@ -127,13 +156,6 @@ impl Cases {
                     GpuHybridEvaluator::new(problem, Arc::clone(context))?.laps(&slices)?
                 }
             };
-            let spacing = match problem.line() {
-                HybridLine::Fixed { points_m, .. } => {
-                    let shape = geometry(points_m, true);
-                    shape.segment_m.iter().fold(0.0, |a: f64, b| a.max(*b))
-                }
-                HybridLine::Free { .. } => 0.0,
-            };
             let named = |what: &str| Agreement::new(&format!("energy, {mode}, {what}"), subject);
             let mut all = [
                 named("time"),
@@ -142,13 +164,11 @@ impl Cases {
                 named("harvested"),
             ];
             for (number, (lap, exact)) in found.iter().zip(exact).enumerate() {
-                let segment_j = 260e3 * 2.0 * spacing / (SECTIONS as f64 * spacing / exact.time);
-                let energy = 11e3 + 9.0 * segment_j;
-                let fuel = 3e-4 * exact.fuel + energy * 2.0 * 0.27 / 3.6e6;
+                let Allowed { time, fuel, energy } = allowed(problem, exact);
                 // What passes through the store in a lap: an energy of nought is exact to a share of that.
                 let passed = exact.deployed + exact.harvested_k + exact.harvested_h;
                 let figures = [
-                    (lap.time, exact.time, exact.time, 2.6e-4 * exact.time),
+                    (lap.time, exact.time, exact.time, time),
                     (lap.fuel, exact.fuel, exact.fuel, fuel),
                     (lap.deployed, exact.deployed, passed, energy),
                     (

@@ -37,8 +37,8 @@ pub(super) struct Cases {
     determined: Vec<bool>,
 }
 
-/// What a channel's cost may be off.
-fn allowed(channel: usize, exact: f64) -> f64 {
+/// What a channel's cost may be off that is `exact` in `f64`.
+pub fn allowed(channel: usize, exact: f64) -> f64 {
     TOLERANCE * exact + FLOOR[channel]
 }
 

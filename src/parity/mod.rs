@@ -7,8 +7,8 @@
 
 pub mod drive;
 pub mod elementary;
-mod energy;
-mod laps;
+pub mod energy;
+pub mod laps;
 mod lines;
 pub mod made_up;
 pub mod steady;

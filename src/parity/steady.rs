@@ -125,8 +125,8 @@ pub fn work_of(problem: &SteadyProblem, candidate: &[f64]) -> u64 {
 ///
 /// The rates of change are off by what the layer of steps allows, 1e-5 of what they are made of, and every step loses up to half
 /// a spacing of each figure. The trim then moves by the inverse of the slopes there times that; what comes and goes may shake
-/// it by as much again.
-fn allowed(problem: &SteadyProblem, candidate: &[f64], state: &Settling<f64>) -> Option<[f64; 4]> {
+/// it by as much again. Nothing of a trim that nothing holds the car in.
+pub fn allowed(problem: &SteadyProblem, candidate: &[f64], state: &Settling<f64>) -> Option<[f64; 4]> {
     let [speed, steer] = problem.aim_figures(candidate);
     let [vy, yaw_rate, roll, roll_rate, pitch, slip] = state.figures;
     let vx = (speed * speed - vy * vy).max(0.0).sqrt();

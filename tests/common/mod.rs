@@ -2,7 +2,9 @@
 
 #![allow(dead_code)] // Each of the crates that include this module uses a part of it.
 
+pub mod kinds;
 pub mod line;
+pub mod runs;
 
 use lapswarm::evaluate::replay::ReplayProblem;
 use lapswarm::parity::made_up;

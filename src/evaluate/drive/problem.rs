@@ -5,7 +5,7 @@ use crate::drive::driver::{DriverTable, WheelTorque};
 use crate::drive::kernel::{DriveState, DrivenLap, World, ending};
 use crate::drive::{DriverSettings, Line, Road};
 use crate::error::{Error, Result};
-use crate::evaluate::{FAILED_COST, Failure, FreeCar, Objective, Problem, Variable};
+use crate::evaluate::{FAILED_COST, Failure, FreeCar, Objective, Problem, Variable, are_costs};
 use crate::vehicle::{Car, CarParameter, TyreModel};
 use serde::{Deserialize, Serialize};
 
@@ -234,7 +234,7 @@ impl DriveProblem {
                 return Err(Failure::Spun);
             }
             let row: Vec<f64> = self.objectives.iter().map(|o| o.of(&lap)).collect();
-            if row.iter().all(|x| x.is_finite()) {
+            if are_costs(&row) {
                 Ok(row)
             } else {
                 Err(Failure::Undefined)

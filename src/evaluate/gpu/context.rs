@@ -5,7 +5,7 @@
 
 use super::adapter::{DeviceSummary, choose};
 use super::dispatches;
-use super::faults::{self, Fault};
+use super::faults::{self, Fault, Place};
 use super::lint;
 use crate::error::{Error, Result};
 use crate::evaluate::BackendInfo;
@@ -47,6 +47,14 @@ pub struct GpuContext {
     summary: DeviceSummary,
     failure: Arc<Mutex<Option<String>>>,
     kernels: Mutex<HashMap<String, Arc<Kernel>>>,
+}
+
+/// What did not happen in all the time that a device is given.
+fn hung(what: &str) -> String {
+    format!(
+        "{what} within {} s, so that the device counts as hung",
+        PATIENCE.as_secs()
+    )
 }
 
 fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
@@ -103,6 +111,9 @@ impl GpuContext {
     }
 
     fn open_within(name: Option<&str>, limits: impl Fn(&wgpu::Adapter) -> wgpu::Limits) -> Result<Self> {
+        if faults::adapter_is_gone() {
+            return Err(Error::NoDevice("the adapter is gone".to_owned()));
+        }
         let (adapter, summary) = choose(name)?;
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("lapswarm"),
@@ -192,7 +203,11 @@ impl GpuContext {
     pub(crate) fn buffer(&self, label: &str, bytes: u64, usage: wgpu::BufferUsages) -> Result<wgpu::Buffer> {
         // Bindings of no bytes are not allowed, copies go by fours.
         let size = bytes.max(16).next_multiple_of(4);
-        self.scoped(&format!("allocate {size} bytes for {label}"), || {
+        let what = format!("allocate {size} bytes for {label}");
+        if let Some(fault) = faults::next(Place::Allocation) {
+            self.suffer(fault, &what)?;
+        }
+        self.scoped(&what, || {
             self.device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some(label),
                 size,
@@ -322,15 +337,20 @@ impl GpuContext {
     /// # Errors
     /// [`Error::Device`] if that fails or takes too long.
     pub(crate) fn run(&self, record: impl FnOnce(&mut wgpu::CommandEncoder)) -> Result<()> {
-        if let Some(fault) = faults::next() {
-            self.suffer(fault)?;
+        let what = "run a kernel";
+        let fault = faults::next(Place::Submission);
+        if let Some(fault) = fault {
+            self.suffer(fault, what)?;
         }
         let begin = Instant::now();
-        let submission = self.scoped("run a kernel", || {
+        let submission = self.scoped(what, || {
             let mut encoder = self.device.create_command_encoder(&Default::default());
             record(&mut encoder);
             self.queue.submit([encoder.finish()])
         })?;
+        if fault == Some(Fault::Hung) {
+            return self.waited(Err(wgpu::PollError::Timeout));
+        }
         self.wait(Some(submission))?;
         dispatches::note(begin.elapsed());
         Ok(())
@@ -360,16 +380,40 @@ impl GpuContext {
         Ok((begin.elapsed().as_secs_f64() * 1e3).max(1e-3))
     }
 
-    /// What an injected fault does.
-    fn suffer(&self, fault: Fault) -> Result<()> {
+    /// What an injected fault does to the device that is about to do `what`.
+    fn suffer(&self, fault: Fault, what: &str) -> Result<()> {
         match fault {
             // What is submitted next finds it gone.
-            Fault::Lost => {
+            Fault::Lost | Fault::Gone => {
                 self.device.destroy();
                 Ok(())
             }
-            Fault::OutOfMemory => Err(Error::Device(format!("{}: out of memory", self.summary))),
-            Fault::Validation => self.scoped("run a kernel", || {
+            Fault::OutOfMemory => {
+                let limits = self.device.limits();
+                // Hundreds of gigabytes on any device, terabytes on most.
+                self.scoped(what, || {
+                    drop(self.device.create_texture(&wgpu::TextureDescriptor {
+                        label: Some("fault"),
+                        size: wgpu::Extent3d {
+                            width: limits.max_texture_dimension_2d,
+                            height: limits.max_texture_dimension_2d,
+                            depth_or_array_layers: limits.max_texture_array_layers,
+                        },
+                        mip_level_count: 1,
+                        sample_count: 1,
+                        dimension: wgpu::TextureDimension::D2,
+                        format: wgpu::TextureFormat::Rgba32Float,
+                        usage: wgpu::TextureUsages::COPY_DST,
+                        view_formats: &[],
+                    }));
+                })?;
+                // A driver that promises memory before it has it.
+                Err(Error::Device(format!(
+                    "{}: cannot {what}: out of memory",
+                    self.summary
+                )))
+            }
+            Fault::Validation => self.scoped(what, || {
                 // No buffer may be mapped for reading and writing at once.
                 drop(self.device.create_buffer(&wgpu::BufferDescriptor {
                     label: Some("fault"),
@@ -378,29 +422,35 @@ impl GpuContext {
                     mapped_at_creation: false,
                 }));
             }),
+            // Shows when the work is waited for.
+            Fault::Hung => Ok(()),
         }
     }
 
     fn wait(&self, submission_index: Option<wgpu::SubmissionIndex>) -> Result<()> {
-        self.device
-            .poll(wgpu::PollType::Wait {
-                submission_index,
-                timeout: Some(PATIENCE),
-            })
-            .map_err(|e| match e {
-                wgpu::PollError::Timeout => self.hung("a dispatch did not come to its end"),
-                e => Error::Device(format!("{}: {e}", self.summary)),
-            })?;
-        self.check()
+        self.waited(self.device.poll(wgpu::PollType::Wait {
+            submission_index,
+            timeout: Some(PATIENCE),
+        }))
     }
 
-    /// What did not happen in all the time that a device is given.
-    fn hung(&self, what: &str) -> Error {
-        Error::Device(format!(
-            "{}: {what} within {} s, so that the device counts as hung",
-            self.summary,
-            PATIENCE.as_secs()
-        ))
+    /// What a wait has come to.
+    fn waited(&self, outcome: std::result::Result<wgpu::PollStatus, wgpu::PollError>) -> Result<()> {
+        match outcome {
+            Ok(_) => self.check(),
+            Err(wgpu::PollError::Timeout) => {
+                locked(&self.failure).get_or_insert_with(|| hung("a dispatch did not come to its end"));
+                // Closing it would wait for that work without end: it stays open for as long as the process lives.
+                std::mem::forget((self.device.clone(), self.queue.clone()));
+                self.check()
+            }
+            // A device that has gone takes nothing that it could be waited for, and may yet say so itself.
+            Err(error) => {
+                let _ = self.device.poll(wgpu::PollType::Poll);
+                self.check()?;
+                Err(Error::Device(format!("{}: {error}", self.summary)))
+            }
+        }
     }
 
     /// Hands the first `bytes` of `buffer`, which is mappable, to `read`.
@@ -427,7 +477,7 @@ impl GpuContext {
             self.wait(None)?;
             match receiver.recv_timeout(Duration::from_millis(1)) {
                 Err(RecvTimeoutError::Timeout) if start.elapsed() < PATIENCE => {}
-                Err(RecvTimeoutError::Timeout) => return Err(self.hung("results were not handed over")),
+                Err(RecvTimeoutError::Timeout) => return Err(failed(hung("they were not handed over"))),
                 answer => break answer.map_err(|e| failed(e.to_string()))?,
             }
         };

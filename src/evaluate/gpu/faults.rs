@@ -1,56 +1,100 @@
 //! Faults on purpose, so that tests see what a run makes of devices that fail.
 
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// What happens to a device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fault {
     /// It goes, as when a driver resets or a card is pulled.
     Lost,
+    /// It goes with its adapter: until the drill ends, no device opens.
+    Gone,
     /// It has no memory left.
     OutOfMemory,
     /// It is asked for what it does not do.
     Validation,
+    /// It is at work for longer than anybody waits.
+    Hung,
+}
+
+impl Fault {
+    /// Every fault.
+    pub const ALL: [Self; 5] = [
+        Self::Lost,
+        Self::Gone,
+        Self::OutOfMemory,
+        Self::Validation,
+        Self::Hung,
+    ];
+}
+
+/// What a drill counts, and where its fault strikes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Place {
+    /// Submissions of work.
+    Submission,
+    /// Allocations of buffers.
+    Allocation,
 }
 
 struct Drill {
     fault: Fault,
+    place: Place,
     from: u64,
     count: u64,
     seen: u64,
+    /// Whether an adapter has gone.
+    gone: bool,
 }
 
 static ARMED: AtomicBool = AtomicBool::new(false);
 static DRILL: Mutex<Option<Drill>> = Mutex::new(None);
 
+fn drill() -> MutexGuard<'static, Option<Drill>> {
+    DRILL.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
 /// From now on the process's submissions to devices are counted, and those from number `from` on (the first is 0) fail,
 /// `count` of them, whatever device they go to. A drill takes the place of the one before.
 pub fn inject(fault: Fault, from: u64, count: u64) {
-    *DRILL.lock().unwrap_or_else(PoisonError::into_inner) = Some(Drill {
+    inject_at(Place::Submission, fault, from, count);
+}
+
+/// As [`inject`], at the places named.
+pub fn inject_at(place: Place, fault: Fault, from: u64, count: u64) {
+    *drill() = Some(Drill {
         fault,
+        place,
         from,
         count,
         seen: 0,
+        gone: false,
     });
     ARMED.store(true, Ordering::Release);
 }
 
-/// Ends the drill; returns the submissions since it began.
+/// Ends the drill; returns what it counted since it began.
 pub fn end() -> u64 {
     ARMED.store(false, Ordering::Release);
-    let drill = DRILL.lock().unwrap_or_else(PoisonError::into_inner).take();
-    drill.map_or(0, |d| d.seen)
+    drill().take().map_or(0, |d| d.seen)
 }
 
-/// Counts a submission; the fault that it meets, if any.
-pub(super) fn next() -> Option<Fault> {
+/// Counts a submission or an allocation; the fault that it meets, if any.
+pub(super) fn next(place: Place) -> Option<Fault> {
     if !ARMED.load(Ordering::Acquire) {
         return None;
     }
-    let mut drill = DRILL.lock().unwrap_or_else(PoisonError::into_inner);
-    let drill = drill.as_mut()?;
+    let mut drill = drill();
+    let drill = drill.as_mut().filter(|d| d.place == place)?;
     let number = drill.seen;
     drill.seen += 1;
-    (number >= drill.from && number - drill.from < drill.count).then_some(drill.fault)
+    let struck = number >= drill.from && number - drill.from < drill.count;
+    drill.gone |= struck && drill.fault == Fault::Gone;
+    struck.then_some(drill.fault)
+}
+
+/// Whether the adapter has gone.
+pub(super) fn adapter_is_gone() -> bool {
+    ARMED.load(Ordering::Acquire) && drill().as_ref().is_some_and(|d| d.gone)
 }

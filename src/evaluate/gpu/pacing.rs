@@ -103,3 +103,128 @@ impl LanePacing {
         self.last = Some((lanes, ms));
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TARGET_MS: f64 = 40.0;
+    /// Watchdogs and desktops are patient for longer.
+    const LONGEST_MS: f64 = 100.0;
+
+    /// A device that does nothing, in its own time: so many lanes at once in so long, twice as slow and twice as fast by turns
+    /// as somebody else comes and goes, beside what a submission takes.
+    struct MadeUp {
+        at_once: usize,
+        lane_step_ms: f64,
+        submission_ms: f64,
+        draws: u32,
+    }
+
+    impl MadeUp {
+        fn next(&mut self, below: u32) -> u32 {
+            self.draws = self.draws.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (self.draws >> 16) % below
+        }
+
+        /// Half the speed or the whole of it.
+        fn took(&mut self, lanes: usize, steps: usize) -> f64 {
+            let slower = f64::from(1 + self.next(2));
+            let rounds = lanes.div_ceil(self.at_once) as f64;
+            self.submission_ms + slower * rounds * steps as f64 * self.lane_step_ms
+        }
+    }
+
+    /// From a processor that takes 64 lanes in turns to a card that takes all at once.
+    fn devices() -> [MadeUp; 4] {
+        [
+            (1, 2e-4, 0.2),
+            (64, 2e-2, 0.05),
+            (1 << 14, 1.5, 1.0),
+            (1 << 20, 1e-5, 0.01),
+        ]
+        .map(|(at_once, lane_step_ms, submission_ms)| MadeUp {
+            at_once,
+            lane_step_ms,
+            submission_ms,
+            draws: 7,
+        })
+    }
+
+    #[test]
+    fn no_dispatch_of_steps_but_the_first_is_long_on_a_device_whose_speed_changes() {
+        let batching = StepBatching {
+            lanes: usize::MAX,
+            dispatch_ms: TARGET_MS,
+            steps: None,
+        };
+        for mut device in devices() {
+            for rounds_per_step in [1, 5, 37] {
+                let mut pacing = Pacing::new(rounds_per_step);
+                let (mut lanes, mut total_ms, mut longest_steps) = (4096, 0.0, 0);
+                for dispatch in 0..2000 {
+                    // Batches of other sizes, and the last steps of one.
+                    if device.next(5) == 0 {
+                        lanes = 64 << device.next(7);
+                    }
+                    let most = if device.next(9) == 0 { 3 } else { usize::MAX };
+                    let steps = pacing.steps(lanes, &batching).min(most);
+                    assert!(steps >= 1 && steps * rounds_per_step <= LOOP_ROUNDS, "{steps}");
+                    let ms = device.took(lanes, steps);
+                    pacing.took(steps, lanes, ms);
+                    if dispatch > 0 {
+                        assert!(ms <= LONGEST_MS, "{ms} ms of {steps} steps of {lanes} lanes");
+                        total_ms += ms;
+                        longest_steps = longest_steps.max(steps);
+                    }
+                }
+                // Nor is it cut to pieces.
+                let filled = longest_steps * rounds_per_step > LOOP_ROUNDS - rounds_per_step;
+                assert!(
+                    filled || total_ms / 2000.0 > TARGET_MS / 4.0,
+                    "{total_ms} ms in all"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn a_first_dispatch_that_takes_seconds_to_compile_and_one_that_takes_no_time_teach_no_harm() {
+        let batching = StepBatching {
+            lanes: usize::MAX,
+            dispatch_ms: TARGET_MS,
+            steps: None,
+        };
+        let mut pacing = Pacing::new(5);
+        pacing.took(100, 64, 9000.0);
+        assert_eq!(pacing.steps(64, &batching), 1);
+        pacing.took(1, 64, 1e-3);
+        assert_eq!(pacing.steps(64, &batching), GROWTH as usize);
+        // More steps than wanted, or fewer.
+        let few = StepBatching {
+            steps: Some(3),
+            ..batching
+        };
+        assert_eq!(pacing.steps(64, &few), 3);
+        pacing.took(usize::MAX / 8, 64, 1e-3);
+        assert_eq!(pacing.steps(64, &batching), LOOP_ROUNDS / 5);
+    }
+
+    #[test]
+    fn no_dispatch_of_lanes_but_the_first_is_long_on_a_device_whose_speed_changes() {
+        for mut device in devices() {
+            // A workgroup is the least there is: those take no more than a fraction of a dispatch.
+            let (group, steps) = (64, if device.at_once == 1 << 14 { 5 } else { 300 });
+            let mut pacing = LanePacing::new(group);
+            for dispatch in 0..2000 {
+                let most = if device.next(9) == 0 { group } else { 1 << 22 };
+                let lanes = (pacing.lanes(TARGET_MS) / group).max(1).min(most / group) * group;
+                let ms = device.took(lanes, steps);
+                pacing.took(lanes, ms);
+                if dispatch > 0 {
+                    assert!(ms <= LONGEST_MS, "{ms} ms of {lanes} lanes");
+                }
+            }
+        }
+    }
+}

@@ -1,7 +1,9 @@
 //! What is asked of laps with energy: the line, the strategy, which parts of both are free, and what is to be small.
 
 use crate::error::{Error, Result};
-use crate::evaluate::{Evaluation, FAILED_COST, Failure, Objective, Problem, Variable};
+use crate::evaluate::{
+    Evaluation, FAILED_COST, Failure, Objective, Problem, Variable, are_costs, are_numbers,
+};
 use crate::line::energy::{EnergyCar, EnergyLap, EnergyPlan, GATES, Gates};
 use crate::line::{LinePlan, Parametrisation};
 use crate::track::CrossSections;
@@ -332,12 +334,12 @@ impl HybridProblem {
         Evaluation::of_rows(rows.collect())
     }
 
-    /// Why a candidate need not be scored, if so.
+    /// Why a candidate need not be scored, if so. A figure of the kernels may be too large where the variable behind it is not:
+    /// it is in joules, say, and the variable in megajoules.
     pub(super) fn preliminary_failure(&self, candidate: &[f64]) -> Option<Failure> {
-        candidate
-            .iter()
-            .any(|x| !x.is_finite())
-            .then_some(Failure::NotFinite)
+        let numbers =
+            are_numbers(candidate) && are_numbers(&self.car.gate_figures(&self.strategy_of(candidate).0));
+        (!numbers).then_some(Failure::NotFinite)
     }
 
     /// The objectives' row of a lap, or of a candidate that failed.
@@ -356,10 +358,11 @@ impl HybridProblem {
                 HybridObjective::SocSwing => lap.swing / self.car.hybrid.store.capacity_j,
             })
             .collect();
-        if row.iter().any(|x| !x.is_finite()) {
-            return failed(Failure::Standstill);
+        if are_costs(&row) {
+            (row, None)
+        } else {
+            failed(Failure::Standstill)
         }
-        (row.into_iter().map(|x| x.min(FAILED_COST)).collect(), None)
     }
 }
 

@@ -1,7 +1,7 @@
 //! What is asked of racing lines: the sections they cross, how few numbers give them, and what is to be small.
 
 use crate::error::{Error, Result};
-use crate::evaluate::{FAILED_COST, Failure, Objective, Problem};
+use crate::evaluate::{FAILED_COST, Failure, Objective, Problem, are_costs, are_numbers};
 use crate::line::kernel::{Shape, Wanted};
 use crate::line::{LimitTable, LinePlan, Parametrisation, PointMass, geometry};
 use crate::track::CrossSections;
@@ -308,10 +308,7 @@ impl LineProblem {
 
     /// Why a candidate need not be scored, if so.
     pub(super) fn preliminary_failure(&self, candidate: &[f64]) -> Option<Failure> {
-        candidate
-            .iter()
-            .any(|x| !x.is_finite())
-            .then_some(Failure::NotFinite)
+        (!are_numbers(candidate)).then_some(Failure::NotFinite)
     }
 
     /// The row of a candidate that failed.
@@ -333,7 +330,7 @@ impl LineProblem {
                 LineObjective::LapTime => time,
             })
             .collect();
-        if row.iter().all(|x| x.is_finite() && *x < FAILED_COST) {
+        if are_costs(&row) {
             (row, None)
         } else {
             self.failed_row(Failure::Standstill)

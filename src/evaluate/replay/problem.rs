@@ -2,7 +2,7 @@
 
 use super::kernel::CHANNELS;
 use crate::error::{Error, Result};
-use crate::evaluate::{Evaluation, FAILED_COST, Failure, FreeCar, Objective, Problem};
+use crate::evaluate::{Evaluation, FAILED_COST, Failure, FreeCar, Objective, Problem, are_costs};
 use crate::vehicle::car::CarParameter;
 use crate::vehicle::{Car, TyreModel};
 use serde::{Deserialize, Serialize};
@@ -217,7 +217,7 @@ impl ReplayProblem {
             self.objectives.iter().map(weighted).collect::<Vec<f64>>()
         });
         // A car that is so far off has left the range of what cars do, whatever it was that it did.
-        match row.filter(|row| row.iter().all(|x| x.is_finite() && *x < FAILED_COST)) {
+        match row.filter(|row| are_costs(row)) {
             Some(row) => (row, None),
             None => (vec![FAILED_COST; self.objectives.len()], Some(Failure::Spun)),
         }

@@ -4,7 +4,7 @@
 use super::kernel::{INTEGRATED, Settling, ending};
 use super::modes::{SettlePlan, displaced, slopes};
 use crate::error::{Error, Result};
-use crate::evaluate::{Evaluation, FAILED_COST, Failure, FreeCar, Objective, Problem, Variable};
+use crate::evaluate::{Evaluation, FAILED_COST, Failure, FreeCar, Objective, Problem, Variable, are_costs};
 use crate::vehicle::{Car, CarParameter, Chassis, TyreModel};
 use serde::{Deserialize, Serialize};
 
@@ -220,16 +220,20 @@ impl SteadyProblem {
         Some(speed * displaced(&slopes, &off)?[1])
     }
 
-    /// Why a candidate need not be driven, if so.
+    /// Why a candidate need not be driven, if so. Circles at no speed, or at one that no problem may ask for, are off the
+    /// envelope.
     pub fn preliminary_failure(&self, candidate: &[f64]) -> Option<Failure> {
-        self.free.preliminary_failure(candidate)
+        let [speed, _] = self.aim_figures(candidate);
+        let driven = (SPEEDS[0]..=SPEEDS[1]).contains(&speed);
+        let failure = self.free.preliminary_failure(candidate);
+        failure.or_else(|| (!driven).then_some(Failure::OffTheEnvelope))
     }
 
     /// The objectives' row of a candidate from its trim, or from the reason why there is none.
     pub fn objective_row(&self, trim: std::result::Result<Settled, Failure>) -> (Vec<f64>, Option<Failure>) {
         let row = trim.and_then(|trim| {
             let row: Vec<f64> = self.objectives.iter().map(|o| o.of(&trim)).collect();
-            if row.iter().all(|x| x.is_finite()) {
+            if are_costs(&row) {
                 Ok(row)
             } else {
                 Err(Failure::Undefined)

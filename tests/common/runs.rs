@@ -1,0 +1,243 @@
+//! Running the program, breaking it off, and holding what it leaves against what it should have left.
+
+use super::Random;
+use lapswarm::study::identify::SearchState;
+use lapswarm::study::journal::Journal;
+use lapswarm::study::raceline::{LinesState, RacelineSettings, set_up};
+use lapswarm::study::transient::DriveState;
+use lapswarm::swarm::checkpoint;
+use lapswarm::vehicle::Car;
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::process::{Child, Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+/// The environment variable that gives the seed of the moments at which runs are killed.
+const SEED_VARIABLE: &str = "KILL_SEED";
+
+/// Moments drawn at random, each time others unless the seed is given; it is printed.
+pub fn moments(study: &str) -> Random {
+    let given = std::env::var(SEED_VARIABLE).ok().and_then(|s| s.parse().ok());
+    let seed: u64 = given.unwrap_or_else(|| {
+        let since = std::time::SystemTime::UNIX_EPOCH.elapsed().expect("a clock");
+        since.as_nanos() as u64
+    });
+    println!("{study}: {SEED_VARIABLE}={seed}");
+    Random(seed)
+}
+
+pub fn start(folder: &Path, arguments: &[&str]) -> Child {
+    let saves: &[&str] = match arguments[0] {
+        // Keeps every row as it comes.
+        "sweep" => &[],
+        _ => &["--save-every-s", "0"],
+    };
+    Command::new(env!("CARGO_BIN_EXE_lapswarm"))
+        .args(arguments)
+        .args(["--json", "--quiet"])
+        .args(saves)
+        .current_dir(folder)
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the program starts")
+}
+
+pub fn finish(child: Child) -> Output {
+    child.wait_with_output().expect("the program ends")
+}
+
+pub fn summary(output: &Output) -> Value {
+    let text = String::from_utf8_lossy(&output.stdout);
+    // A small run need not come to a line that the car can drive as well as a point mass.
+    assert!(
+        matches!(output.status.code(), Some(0 | 1)),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    timeless(serde_json::from_str(&text).expect("a summary"))
+}
+
+/// A summary without its times and rates.
+pub fn timeless(summary: Value) -> Value {
+    match summary {
+        Value::Object(fields) => fields
+            .into_iter()
+            .filter(|(key, _)| {
+                // Nor with what a run found done: one that goes on finds more.
+                key != "reused"
+                    && key != "longest_dispatch_ms"
+                    && !["elapsed_s", "per_s", "search_s"]
+                        .iter()
+                        .any(|e| key.ends_with(e))
+            })
+            .map(|(key, value)| (key, timeless(value)))
+            .collect(),
+        Value::Array(values) => values.into_iter().map(timeless).collect(),
+        value => value,
+    }
+}
+
+/// Waits until a run has written `marker`, and a number of milliseconds more; no longer than it works. Whether it still does.
+pub fn let_work(child: &mut Child, marker: &Path, ms: u64) -> bool {
+    let limit = Instant::now() + Duration::from_secs(120);
+    let mut saved = None;
+    while Instant::now() < limit && child.try_wait().expect("its state").is_none() {
+        if saved.is_none() && marker.is_file() {
+            saved = Some(Instant::now());
+        }
+        if saved.is_some_and(|at| at.elapsed() >= Duration::from_millis(ms)) {
+            return true;
+        }
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    false
+}
+
+/// How long a run goes on after it has written `marker`.
+pub fn works_for(child: &mut Child, marker: &Path) -> Duration {
+    let_work(child, marker, 0);
+    let began = Instant::now();
+    child.wait().expect("it ends");
+    began.elapsed()
+}
+
+/// Whether a file waits to be put in the place of another.
+fn on_its_way(path: &Path) -> bool {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    name.starts_with('.') || name.ends_with(".part")
+}
+
+/// No file of a folder is part of one, but for those on their way.
+pub fn nothing_half_written(folder: &Path) {
+    for entry in folder.read_dir().expect("a folder").flatten() {
+        let path = entry.path();
+        let name = path.display();
+        // The stages of a run.
+        if path.is_dir() {
+            nothing_half_written(&path);
+            continue;
+        }
+        if on_its_way(&path) {
+            continue;
+        }
+        let bytes = std::fs::read(&path).expect("a file");
+        let text = || std::str::from_utf8(&bytes).unwrap_or_else(|e| panic!("{name}: {e}"));
+        let json =
+            |text: &str| drop(serde_json::from_str::<Value>(text).unwrap_or_else(|e| panic!("{name}: {e}")));
+        match path.extension().and_then(|e| e.to_str()) {
+            Some("json") => json(text()),
+            Some("jsonl") => {
+                assert!(text().is_empty() || text().ends_with('\n'), "{name}");
+                text().lines().for_each(json);
+            }
+            Some("toml") => {
+                drop(toml::from_str::<toml::Table>(text()).unwrap_or_else(|e| panic!("{name}: {e}")))
+            }
+            Some("csv") => assert!(bytes.ends_with(b"\n"), "{name}"),
+            Some("svg") => assert!(text().trim_end().ends_with("</svg>"), "{name}"),
+            Some("html") => assert!(text().trim_end().ends_with("</html>"), "{name}"),
+            Some("parquet") => {
+                let both = bytes.len() > 8 && bytes.starts_with(b"PAR1") && bytes.ends_with(b"PAR1");
+                assert!(both, "{name}");
+            }
+            Some("lapswarm") => {
+                let loads = checkpoint::load::<SearchState>(&path).is_ok()
+                    || checkpoint::load::<LinesState>(&path).is_ok()
+                    || checkpoint::load::<Journal>(&path).is_ok()
+                    || checkpoint::load::<DriveState>(&path).is_ok();
+                assert!(loads, "{name} is no whole state");
+            }
+            // Every car's tyres here are the bundled ones with other figures.
+            Some("tir") => {
+                let key = |text: &str| {
+                    let last = text.lines().next_back().unwrap_or_default();
+                    last.split_once('=').map(|(key, _)| key.trim().to_owned())
+                };
+                let whole = text().ends_with('\n') && key(text()) == key(Car::BUNDLED_TYRE);
+                assert!(whole, "{name}");
+            }
+            other => panic!("{name}: nobody knows what a whole one is ({other:?})"),
+        }
+    }
+}
+
+/// A table without the columns that the clock fills.
+fn without_times(table: &str) -> String {
+    let mut kept: Vec<usize> = Vec::new();
+    let mut text = String::new();
+    for (number, line) in table.lines().enumerate() {
+        let cells: Vec<&str> = line.split(',').collect();
+        if number == 0 {
+            kept = (0..cells.len())
+                .filter(|i| !cells[*i].contains("elapsed"))
+                .collect();
+        }
+        let cells: Vec<&str> = kept.iter().map(|i| cells[*i]).collect();
+        text += &(cells.join(",") + "\n");
+    }
+    text
+}
+
+/// All results in a folder and those below it that do not depend on the clock, by their names: tables, cars and settings, and
+/// pictures but for those of how the search went on and those that say how long it took.
+pub fn results(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+    fn gather(folder: &Path, below: &str, results: &mut BTreeMap<String, Vec<u8>>) {
+        for entry in folder.read_dir().expect("a folder").flatten() {
+            let (path, name) = (entry.path(), entry.file_name().to_string_lossy().into_owned());
+            let place = format!("{below}{name}");
+            if path.is_dir() {
+                gather(&path, &format!("{place}/"), results);
+                continue;
+            }
+            let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
+            if !["csv", "toml", "tir", "svg", "parquet", "jsonl"].contains(&extension) {
+                continue;
+            }
+            let mut bytes = std::fs::read(&path).expect("a file");
+            if name == "traces.svg" || name.contains("convergence") && extension != "csv" {
+                continue;
+            }
+            if name.contains("convergence") {
+                bytes = without_times(&String::from_utf8_lossy(&bytes)).into_bytes();
+            }
+            results.insert(place, bytes);
+        }
+    }
+    let mut found = BTreeMap::new();
+    gather(folder, "", &mut found);
+    found
+}
+
+/// The results in a folder are those in another, to the byte.
+pub fn same_results(what: &str, found: &Path, wanted: &Path) {
+    let (found, wanted) = (results(found), results(wanted));
+    let names = |r: &BTreeMap<String, Vec<u8>>| r.keys().cloned().collect::<Vec<_>>();
+    assert_eq!(names(&found), names(&wanted), "{what}");
+    assert!(!wanted.is_empty(), "{what}");
+    for (name, bytes) in &wanted {
+        assert!(found[name] == *bytes, "{what}: another {name}");
+    }
+}
+
+/// Nothing that a run has on its way is left in its folder.
+pub fn nothing_on_its_way(folder: &Path) {
+    let left = folder.read_dir().expect("a folder").flatten();
+    let left: Vec<_> = left.map(|e| e.path()).filter(|p| on_its_way(p)).collect();
+    assert!(left.is_empty(), "{left:?}");
+}
+
+/// A line at a share of a road's width from the right, as `transient` reads one. At its edge many shares of the grip are tried
+/// until one is held.
+pub fn along(track: &str, alpha: f64) -> String {
+    let setup = set_up(&RacelineSettings {
+        track: track.to_owned(),
+        sections: 200,
+        ..RacelineSettings::default()
+    })
+    .expect("a track");
+    let points = setup.cuts.points(&vec![alpha; setup.cuts.len()]);
+    let rows = points.iter().map(|p| format!("{},{}\n", p.x, p.y));
+    format!("x_m,y_m\n{}", rows.collect::<String>())
+}
