@@ -53,6 +53,7 @@ fn write(path: &Path, size: u64) {
     while file.stream_position().expect("a place") < size {
         file.write_all(&block).expect("written");
     }
+    file.set_len(size).expect("cut to size");
 }
 
 #[test]

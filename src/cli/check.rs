@@ -144,11 +144,12 @@ fn guess(path: &Path) -> Result<Kind> {
     let start = String::from_utf8_lossy(&start);
     let head = start.lines().next().unwrap_or_default().to_lowercase();
     let has = |names: &[&str]| names.iter().all(|n| head.contains(n));
+    // Speeds and accelerations of a log end like places of a track do.
     Ok(if has(&["v_mps", "ay_mps2"]) {
         Kind::Envelope
     } else if has(&["station", "alpha"]) {
         Kind::Line
-    } else if has(&["x_m", "y_m"]) || has(&["lat", "lon"]) {
+    } else if has(&["x_m", "y_m"]) && !has(&["time_s"]) || has(&["lat", "lon"]) {
         Kind::Track
     } else {
         Kind::Log

@@ -167,13 +167,16 @@ fn create(folder: &Path) -> Result<()> {
 /// Size (bytes) and CRC-32 of each file of a stage, by name.
 type Sums = BTreeMap<String, (u64, u32)>;
 
+/// The name of a file and what is in it.
+type KeptFile = (String, Vec<u8>);
+
 fn sum(contents: &[u8]) -> (u64, u32) {
     (contents.len() as u64, crc32fast::hash(contents))
 }
 
 /// The files of a stage that is kept, each as it was when it was kept; nothing where there is no such stage, and where it is
 /// not what it was, as a loss of power may leave it: that one goes.
-fn whole(kept: &Path) -> Result<Option<Vec<(String, Vec<u8>)>>> {
+fn whole(kept: &Path) -> Result<Option<Vec<KeptFile>>> {
     if !kept.join(DONE).is_file() {
         return Ok(None);
     }
@@ -192,7 +195,7 @@ fn whole(kept: &Path) -> Result<Option<Vec<(String, Vec<u8>)>>> {
 }
 
 /// As [`whole`], or what is wrong with it.
-fn read_whole(kept: &Path) -> Result<Vec<(String, Vec<u8>)>, String> {
+fn read_whole(kept: &Path) -> Result<Vec<KeptFile>, String> {
     let mark = std::fs::read(kept.join(DONE)).map_err(|e| e.to_string())?;
     let sums: Sums = serde_json::from_slice(&mark).map_err(|e| format!("the list of its files: {e}"))?;
     let read = |(name, expected): (String, (u64, u32))| {
