@@ -8,7 +8,7 @@ use lapswarm::study::identify::{
 };
 use lapswarm::study::keeper::Keeper;
 use lapswarm::study::raceline::{
-    self, LineAlgorithm, LinesState, RacelineSettings, find_lines, find_lines_from,
+    self, LineAlgorithm, LinesState, RacelineSettings, StudyProgress, find_lines, find_lines_from,
 };
 use lapswarm::study::run_folder::STATE;
 use lapswarm::swarm::checkpoint;
@@ -220,6 +220,16 @@ fn lines_told(settings: &RacelineSettings, setup: &raceline::Setup, outcome: &ra
     )
 }
 
+/// Tells the steps of a search from the questions whether to go on while a solver works, which go by the clock.
+#[derive(Default)]
+struct Steps(Option<StudyProgress>);
+
+impl Steps {
+    fn is_next(&mut self, told: &StudyProgress) -> bool {
+        told.evaluations > 0 && self.0.replace(told.clone()).as_ref() != Some(told)
+    }
+}
+
 /// Breaks a search for lines off at each of these observations in turn, goes on each time, and holds the end against `wanted`.
 fn lines_in_pieces(
     (settings, setup): (&RacelineSettings, &raceline::Setup),
@@ -228,11 +238,13 @@ fn lines_in_pieces(
 ) {
     let folder = tempfile::tempdir().unwrap();
     let (mut seen, mut state): (usize, Option<LinesState>) = (0, None);
+    let mut steps = Steps::default();
     for at in breaks.iter().copied().chain([usize::MAX]) {
         let mut keeper = Keeper::new(folder.path());
-        let outcome = find_lines_from(settings, setup, state.take(), &mut keeper, |_| {
-            seen += 1;
-            if seen == at {
+        let outcome = find_lines_from(settings, setup, state.take(), &mut keeper, |p| {
+            let step = steps.is_next(p);
+            seen += usize::from(step);
+            if step && seen == at {
                 ControlFlow::Break(())
             } else {
                 ControlFlow::Continue(())
@@ -258,8 +270,11 @@ fn lines_go_on_bit_for_bit_from_every_stage() {
     let settings = lines();
     let setup = raceline::set_up(&settings).unwrap();
     let mut stages: Vec<String> = Vec::new();
+    let mut steps = Steps::default();
     let whole = find_lines(&settings, &setup, |p| {
-        stages.push(p.stage.clone());
+        if steps.is_next(p) {
+            stages.push(p.stage.clone());
+        }
         ControlFlow::Continue(())
     })
     .unwrap();
@@ -305,8 +320,9 @@ fn cold_searches_go_on_bit_for_bit_from_every_stage() {
         };
         let setup = raceline::set_up(&settings).unwrap();
         let mut all = 0;
-        let whole = find_lines(&settings, &setup, |_| {
-            all += 1;
+        let mut steps = Steps::default();
+        let whole = find_lines(&settings, &setup, |p| {
+            all += usize::from(steps.is_next(p));
             ControlFlow::Continue(())
         })
         .unwrap();
@@ -327,8 +343,11 @@ fn plain_swarms_go_on_bit_for_bit() {
         };
         let setup = raceline::set_up(&settings).unwrap();
         let mut stages: Vec<String> = Vec::new();
+        let mut steps = Steps::default();
         let whole = find_lines(&settings, &setup, |p| {
-            stages.push(p.stage.clone());
+            if steps.is_next(p) {
+                stages.push(p.stage.clone());
+            }
             ControlFlow::Continue(())
         })
         .unwrap();

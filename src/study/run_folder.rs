@@ -108,9 +108,14 @@ impl RunFolder {
         if !is_at(&lock, &file) {
             return Ok(None);
         }
-        lock.set_len(0)
+        if let Err(error) = lock
+            .set_len(0)
             .and_then(|()| write!(lock, "{}", std::process::id()))
-            .map_err(failed)?;
+        {
+            // A full disk: nothing is to stay behind.
+            let _ = std::fs::remove_file(&file);
+            return Err(failed(error));
+        }
         Ok(Some(Self {
             path: path.to_owned(),
             first: false,

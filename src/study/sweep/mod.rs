@@ -254,6 +254,7 @@ fn write_studies(
 ) -> Result<()> {
     let studies = folder.join("studies");
     if !resume {
+        std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, "create", e))?;
         // First: with it, what was broken off can be gone on with.
         write_whole(folder.join(SWEEP_FILE), settings.text().as_bytes())?;
     }
