@@ -6,6 +6,7 @@ use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
@@ -20,6 +21,40 @@ pub struct Document<'a> {
 pub const LARGEST_TEXT: u64 = 64 << 20;
 /// The largest log (bytes): hours of all channels at a kilohertz.
 pub const LARGEST_LOG: u64 = 1 << 30;
+/// Memory that the process may take where nothing else is said (MiB).
+pub const USUAL_MEMORY_MIB: u64 = 4096;
+
+static MEMORY_LIMIT: AtomicU64 = AtomicU64::new(USUAL_MEMORY_MIB << 20);
+
+/// From now on what is read of logs and states has to fit into so much memory (MiB). Like the memory, the limit is the
+/// process's.
+pub fn limit_memory(mib: u64) {
+    MEMORY_LIMIT.store(mib.saturating_mul(1 << 20), Ordering::Relaxed);
+}
+
+/// The memory that is allowed at present (bytes).
+pub fn memory_limit() -> u64 {
+    MEMORY_LIMIT.load(Ordering::Relaxed)
+}
+
+/// Whether what a file with so much in it takes, `needed` bytes, fits into `limit` bytes.
+///
+/// # Errors
+/// [`Error::Input`] with the file, what is in it, what that takes and the limit.
+pub fn check_memory(path: &Path, size: &str, needed: u64, limit: u64) -> Result<()> {
+    if needed <= limit {
+        return Ok(());
+    }
+    Err(Error::input(
+        path,
+        "file size",
+        format!(
+            "{size}, for which some {} MiB are needed",
+            needed.div_ceil(1 << 20)
+        ),
+        format!("a file that fits into {} MiB (--memory-limit-mib)", limit >> 20),
+    ))
+}
 
 /// Reads a file of at most `most` bytes, so that none takes all memory, not even one without an end.
 ///
@@ -33,7 +68,11 @@ pub fn read_bytes(path: &Path, most: u64) -> Result<Vec<u8>> {
     if told > most {
         return Err(too_large(format!("{told} bytes")));
     }
+    // As much as it tells and no more: what grows by doubling may come to twice that.
     let mut bytes = Vec::new();
+    bytes
+        .try_reserve_exact(usize::try_from(told + 1).unwrap_or(usize::MAX))
+        .map_err(|e| Error::io(path, "read", e.into()))?;
     // Pipes and devices do not tell their size.
     file.take(most + 1).read_to_end(&mut bytes).map_err(failed)?;
     if bytes.len() as u64 > most {
@@ -42,14 +81,29 @@ pub fn read_bytes(path: &Path, most: u64) -> Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// Reads a text file; a missing or unreadable one is an [`Error::Io`], one beyond [`LARGEST_TEXT`] an [`Error::Input`].
+/// The first bytes of a file, `most` of them at the most.
+///
+/// # Errors
+/// [`Error::Io`] if it is missing or cannot be read.
+pub fn read_start(path: &Path, most: u64) -> Result<Vec<u8>> {
+    let failed = |e| Error::io(path, "read", e);
+    let mut bytes = Vec::new();
+    let file = File::open(path).map_err(failed)?;
+    file.take(most).read_to_end(&mut bytes).map_err(failed)?;
+    Ok(bytes)
+}
+
+/// Reads a text file of at most [`LARGEST_TEXT`] bytes.
+///
+/// # Errors
+/// As [`read_bytes`], and [`Error::Input`] naming the line that is no UTF-8.
 pub fn read_text(path: &Path) -> Result<String> {
     String::from_utf8(read_bytes(path, LARGEST_TEXT)?).map_err(|e| {
-        Error::io(
-            path,
-            "read",
-            std::io::Error::new(std::io::ErrorKind::InvalidData, e),
-        )
+        let sound = e.utf8_error().valid_up_to();
+        let bytes = e.as_bytes();
+        let line = bytes[..sound].iter().filter(|&&b| b == b'\n').count() + 1;
+        let found = format!("the byte 0x{:02x}", bytes[sound]);
+        Error::input(path, format!("line {line}"), found, "text in UTF-8")
     })
 }
 
@@ -60,6 +114,9 @@ fn line_of(text: &str, offset: usize) -> usize {
         .count()
         + 1
 }
+
+/// The longest name of a car, a circuit, a section or a scenario (bytes): names become parts of files' names, which end at 255.
+pub const LONGEST_NAME: usize = 120;
 
 impl<'a> Document<'a> {
     /// Parses `text`, which came from `file`.
@@ -207,6 +264,16 @@ impl<'a> Table<'a> {
         match value.get_ref() {
             DeValue::String(s) => Ok(Some(s.as_ref())),
             _ => Err(self.wrong(key, value, "a string")),
+        }
+    }
+
+    /// A name of at most [`LONGEST_NAME`] bytes, if the key is there.
+    pub fn name(&self, key: &str) -> Result<Option<&'a str>> {
+        match self.string(key)? {
+            Some(name) if name.len() > LONGEST_NAME => {
+                Err(self.refuse(key, format!("a name of at most {LONGEST_NAME} bytes")))
+            }
+            name => Ok(name),
         }
     }
 

@@ -129,6 +129,7 @@ pub mod config;
 pub mod drive;
 pub mod error;
 pub mod evaluate;
+pub mod files;
 pub mod line;
 pub mod optimum;
 pub mod parity;

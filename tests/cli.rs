@@ -224,6 +224,45 @@ fn refused_input_leaves_nothing_in_the_way() {
 }
 
 #[test]
+fn a_log_that_a_study_takes_is_one_that_check_takes() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let bundled = concat!(env!("CARGO_MANIFEST_DIR"), "/data/laps/gt_silverstone.csv");
+    let mut log = std::fs::read_to_string(bundled).expect("a lap");
+    log = log.lines().skip(1).map(|line| format!("{line}\n")).collect();
+    // More than any other text may have, in lines that count for nothing.
+    let comment = format!("#{}\n", " ".repeat(1 << 20));
+    for _ in 0..66 {
+        log.push_str(&comment);
+    }
+    std::fs::write(folder.path().join("large.csv"), log).expect("a file");
+    let checked = lapswarm(folder.path(), &["check", "large.csv"]);
+    assert!(checked.status.success(), "{}", text(&checked.stderr));
+    assert!(
+        text(&checked.stdout).contains("a log of 1 laps"),
+        "{}",
+        text(&checked.stdout)
+    );
+    let planned = lapswarm(folder.path(), &["identify", "--log", "large.csv", "--dry-run"]);
+    assert!(planned.status.success(), "{}", text(&planned.stderr));
+    // Its size is told of where it does not fit.
+    let limited = [
+        "identify",
+        "--log",
+        "large.csv",
+        "--dry-run",
+        "--memory-limit-mib",
+        "64",
+    ];
+    let refused = lapswarm(folder.path(), &limited);
+    assert_eq!(refused.status.code(), Some(2));
+    let said = text(&refused.stderr);
+    let said = said.split_whitespace().collect::<Vec<_>>().join(" ");
+    for part in ["large.csv", "MiB are needed", "64 MiB", "--memory-limit-mib"] {
+        assert!(said.contains(part), "{said}");
+    }
+}
+
+#[test]
 fn completions_name_every_command() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let printed = lapswarm(folder.path(), &["completions", "bash"]);

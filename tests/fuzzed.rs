@@ -13,6 +13,7 @@ use lapswarm::study::keeper::Keeper;
 use lapswarm::study::raceline::{self, RacelineSettings};
 use lapswarm::study::run_folder::STATE;
 use lapswarm::study::sweep::{Row, SweepSettings};
+use lapswarm::study::transient::{DriveRequest, DriveState};
 use lapswarm::swarm::checkpoint::{self, Checkpoint};
 use lapswarm::swarm::{
     CooperativeSettings, CooperativeSwarm, CovarianceSettings, CovarianceSwarm, DifferenceSettings,
@@ -343,5 +344,15 @@ fn states() -> Vec<Vec<u8>> {
     recorder.over(&mut squares).evaluate(&[0.25, 0.5]).unwrap();
     recorder.keep().unwrap();
     let journal: Journal = checkpoint::load(&path).unwrap();
-    vec![inside(0, &search), inside(1, &lines), inside(2, &journal)]
+    let drive = DriveState::of(DriveRequest {
+        lines: vec!["line.csv".into()],
+        envelope: Some("envelope.csv".into()),
+        ..DriveRequest::default()
+    });
+    vec![
+        inside(0, &search),
+        inside(1, &lines),
+        inside(2, &journal),
+        inside(3, &drive),
+    ]
 }

@@ -1,10 +1,10 @@
 //! Runs that are broken off and gone on with end as if nothing had happened, to the last bit.
 
 use lapswarm::Error;
-use lapswarm::evaluate::BackendChoice;
 use lapswarm::evaluate::line::LineObjective;
+use lapswarm::evaluate::{BackendChoice, BackendInfo, Evaluation, Evaluator, FAILED_COST, Failure, Problem};
 use lapswarm::study::identify::{
-    self, IdentifySettings, ObjectiveChoice, SearchState, Setup, search, search_from,
+    self, IdentifySettings, ObjectiveChoice, SearchState, Setup, search, search_from, search_with,
 };
 use lapswarm::study::keeper::Keeper;
 use lapswarm::study::raceline::{
@@ -84,6 +84,64 @@ fn identify_in_pieces(settings: &IdentifySettings, setup: &Setup, breaks: &[usiz
         state = Some(checkpoint::load(&folder.path().join(STATE)).unwrap());
     }
     unreachable!("the last piece is not broken off")
+}
+
+/// Cars of which none drives.
+struct NothingDrives(Problem);
+
+impl Evaluator for NothingDrives {
+    fn problem(&self) -> &Problem {
+        &self.0
+    }
+
+    fn backend(&self) -> BackendInfo {
+        BackendInfo {
+            backend: "simd",
+            device: "none".to_owned(),
+            driver: String::new(),
+        }
+    }
+
+    fn evaluate(&mut self, population: &[f64]) -> lapswarm::Result<Evaluation> {
+        let cars = population.len() / self.0.variables.len();
+        Ok(Evaluation {
+            objectives: vec![FAILED_COST; cars * self.0.objectives.len()],
+            failures: vec![Some(Failure::Spun); cars],
+            violations: Vec::new(),
+        })
+    }
+}
+
+#[test]
+fn a_search_that_is_broken_off_before_anything_drives_is_interrupted() {
+    for objectives in [
+        &[ObjectiveChoice::All][..],
+        &[ObjectiveChoice::Channel(0), ObjectiveChoice::Channel(3)],
+    ] {
+        let settings = small(objectives);
+        let setup = identify::set_up(&settings).unwrap();
+        let mut evaluator = NothingDrives(setup.replay.problem.clone());
+        let folder = tempfile::tempdir().unwrap();
+        let mut go = |state: Option<SearchState>, at: usize| {
+            let mut seen = 0;
+            let mut keeper = Keeper::new(folder.path());
+            let outcome = search_with(&settings, &setup, &mut evaluator, (state, &mut keeper), |_| {
+                seen += 1;
+                if seen == at {
+                    ControlFlow::Break(())
+                } else {
+                    ControlFlow::Continue(())
+                }
+            });
+            outcome.map(|_| ()).expect_err("nothing drives")
+        };
+        let interrupted = go(None, 3);
+        assert_eq!(interrupted.exit_code(), 130, "{interrupted}");
+        assert!(matches!(interrupted, Error::Interrupted(at) if at == folder.path()));
+        // It is gone on with, and its end is that nothing drives.
+        let state: SearchState = checkpoint::load(&folder.path().join(STATE)).unwrap();
+        assert_eq!(go(Some(state), usize::MAX).exit_code(), 1);
+    }
 }
 
 #[test]
@@ -206,6 +264,12 @@ fn lines_go_on_bit_for_bit_from_every_stage() {
     })
     .unwrap();
     let wanted = lines_told(&settings, &setup, &whole);
+    // A run that is gone on with writes over what it had written when it was broken off.
+    let folder = tempfile::tempdir().unwrap();
+    let summary = raceline::summarise(&settings, &setup, &whole);
+    for _ in 0..2 {
+        raceline::write_results(folder.path(), &settings, &setup, &whole, &summary).unwrap();
+    }
     let all = stages.len();
     let first = |stage: &str| 1 + stages.iter().position(|s| s == stage).unwrap();
     let last = first("front") - 1;

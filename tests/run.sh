@@ -27,3 +27,5 @@ cargo test --release
 if command -v cargo-deny >/dev/null 2>&1; then
     cargo deny --offline check licenses bans sources
 fi
+# The unsafe code by itself, where it is: seconds.
+sh tests/sanitize.sh

@@ -2,7 +2,7 @@
 
 use lapswarm::study::sweep::{SweepSettings, sweep};
 use std::ops::ControlFlow;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 const SWEEP: &str = "study = \"identify\"
 [base]
@@ -30,6 +30,88 @@ fn files(folder: &Path) -> Vec<(String, Vec<u8>)> {
     ]
     .map(|name| (name.to_owned(), std::fs::read(folder.join(name)).expect(name)))
     .to_vec()
+}
+
+/// The states of the studies of a sweep.
+fn states(folder: &Path) -> Vec<PathBuf> {
+    let files = std::fs::read_dir(folder.join("studies")).expect("its studies");
+    files
+        .map(|file| file.expect("a file").path())
+        .filter(|path| path.extension().is_some_and(|e| e == "checkpoint"))
+        .collect()
+}
+
+const LINES: &str = "study = \"raceline\"
+[base]
+track = \"stadium:300:80:12\"
+sections = 60
+objectives = [\"gamma\"]
+algorithm = \"thesis\"
+warm_start = false
+local_search = false
+backend = \"simd\"
+population = 8
+iterations = 30
+[grid]
+seed = [1, 2]
+";
+
+/// A line's study within a sweep goes on from where it was; from another's state, or from none that can be read, it does not.
+#[test]
+fn the_study_at_work_goes_on_and_foreign_states_are_not_trusted() {
+    let root = tempfile::tempdir().expect("a temporary folder");
+    let settings = SweepSettings::parse(Path::new("sweep.toml"), LINES).expect("a sweep");
+    let whole = root.path().join("whole");
+    sweep(&settings, &whole, false, |_| ControlFlow::Continue(())).expect("it runs");
+    let broken_off = |name: &str| {
+        let part = root.path().join(name);
+        let mut told = 0;
+        let broken = sweep(&settings, &part, false, |p| {
+            told += usize::from(p.done == 1);
+            if told > 20 {
+                ControlFlow::Break(())
+            } else {
+                ControlFlow::Continue(())
+            }
+        });
+        assert_eq!(broken.expect_err("broken off").exit_code(), 130);
+        let kept = states(&part);
+        assert_eq!(kept.len(), 1);
+        (part, kept[0].clone())
+    };
+    let (part, kept) = broken_off("part");
+    let mut told = 0;
+    sweep(&settings, &part, true, |p| {
+        told += usize::from(p.done == 1);
+        ControlFlow::Continue(())
+    })
+    .expect("it goes on");
+    assert_eq!(files(&part), files(&whole));
+    // Thirty iterations are thirty words, of which most were said before.
+    assert!(told < 20, "told {told} times");
+    assert!(!kept.exists());
+
+    let (part, kept) = broken_off("garbled");
+    std::fs::write(&kept, b"no state at all").expect("room");
+    sweep(&settings, &part, true, |_| ControlFlow::Continue(())).expect("it begins anew");
+    assert_eq!(files(&part), files(&whole));
+
+    // The state of the same study with another seed.
+    let (part, kept) = broken_off("foreign");
+    let other = SweepSettings::parse(Path::new("sweep.toml"), &LINES.replace("[1, 2]", "[7, 8]"));
+    let mut told = 0;
+    let elsewhere = root.path().join("elsewhere");
+    let _ = sweep(&other.expect("a sweep"), &elsewhere, false, |p| {
+        told += usize::from(p.done == 1);
+        if told > 20 {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        }
+    });
+    std::fs::copy(&states(&elsewhere)[0], &kept).expect("room");
+    sweep(&settings, &part, true, |_| ControlFlow::Continue(())).expect("it begins anew");
+    assert_eq!(files(&part), files(&whole));
 }
 
 #[test]
@@ -63,8 +145,11 @@ fn a_sweep_broken_off_and_gone_on_with_is_the_same_to_the_byte() {
             130,
             "after {run} and {stop}"
         );
+        // Those at work have left their states, which the rows make needless.
+        assert_eq!(states(&part).is_empty(), stop == 1, "after {run} and {stop}");
         sweep(&settings, &part, true, |_| ControlFlow::Continue(())).expect("it goes on");
         assert_eq!(files(&part), files(&whole), "after {run} and {stop}");
+        assert!(states(&part).is_empty());
     }
     let other =
         SweepSettings::parse(Path::new("sweep.toml"), &SWEEP.replace("[4, 6]", "[4]")).expect("a sweep");

@@ -1,6 +1,7 @@
 //! `lapswarm check`: is this file what it should be?
 
-use lapswarm::config::{Document, read_text};
+use crate::cli::said::{errln, outln};
+use lapswarm::config::{Document, read_start, read_text};
 use lapswarm::study::hybrid::{self, HybridStudySettings};
 use lapswarm::study::identify::{self, IdentifySettings};
 use lapswarm::study::memory::USUAL_MIB;
@@ -69,6 +70,9 @@ impl Kind {
     }
 }
 
+/// Bytes of a file that tell what it is: the first line of any table.
+const HEAD: u64 = 1 << 16;
+
 /// What a file seems to be.
 fn guess(path: &Path) -> Result<Kind> {
     let extension = path
@@ -82,8 +86,8 @@ fn guess(path: &Path) -> Result<Kind> {
         "gpx" | "kml" => return Ok(Kind::Track),
         _ => {}
     }
-    let text = read_text(path)?;
     if extension == "toml" {
+        let text = read_text(path)?;
         let document = Document::parse(path, &text)?;
         let keys: Vec<String> = document.root().keys().map(str::to_owned).collect();
         let has = |names: &[&str]| names.iter().any(|n| keys.iter().any(|k| k == n));
@@ -135,7 +139,10 @@ fn guess(path: &Path) -> Result<Kind> {
         let of = own.iter().find(|(_, names)| has(names));
         return Ok(of.map_or(Kind::Identify, |(kind, _)| *kind));
     }
-    let head = text.lines().next().unwrap_or_default().to_lowercase();
+    // A log may be larger than any text, and need not be UTF-8.
+    let start = read_start(path, HEAD)?;
+    let start = String::from_utf8_lossy(&start);
+    let head = start.lines().next().unwrap_or_default().to_lowercase();
     let has = |names: &[&str]| names.iter().all(|n| head.contains(n));
     Ok(if has(&["v_mps", "ay_mps2"]) {
         Kind::Envelope
@@ -261,12 +268,12 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     for path in &arguments.files {
         let found = arguments.kind.map_or_else(|| guess(path), Ok).and_then(|kind| {
             // Whoever meant another kind sees why it is found wrong.
-            read(path, kind).inspect_err(|_| eprintln!("{}: read as {}", path.display(), kind.name()))
+            read(path, kind).inspect_err(|_| errln!("{}: read as {}", path.display(), kind.name()))
         });
         match found {
-            Ok(text) => println!("{}: {text}", path.display()),
+            Ok(text) => outln!("{}: {text}", path.display()),
             Err(error) if wrong.is_none() => wrong = Some(error),
-            Err(error) => eprintln!("{error}"),
+            Err(error) => errln!("{error}"),
         }
     }
     wrong.map_or(Ok(()), Err)

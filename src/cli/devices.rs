@@ -1,6 +1,7 @@
 //! `lapswarm devices`.
 
 use super::print_json;
+use crate::cli::said::outln;
 use lapswarm::Result;
 use lapswarm::evaluate::gpu::devices;
 use lapswarm::evaluate::simd::InstructionSet;
@@ -51,12 +52,12 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     if arguments.json {
         return print_json(&listing);
     }
-    println!("processor: f64 reference (cpu) and {} lanes (simd)", listing.simd);
+    outln!("processor: f64 reference (cpu) and {} lanes (simd)", listing.simd);
     if listing.gpus.is_empty() {
-        println!("no GPU: neither Vulkan, Metal nor DX12 found an adapter");
+        outln!("no GPU: neither Vulkan, Metal nor DX12 found an adapter");
     }
     for d in &listing.gpus {
-        println!(
+        outln!(
             "{}\n  {} ({}), driver {}\n  buffers to {} MiB, bindings to {} MiB, {} workgroups per dimension, timestamps: {}",
             d.name,
             d.backend,

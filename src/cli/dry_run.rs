@@ -1,6 +1,7 @@
 //! `--dry-run`: what a study would do, said and not done.
 
 use super::{Common, print_json};
+use crate::cli::said::out;
 use lapswarm::Result;
 use lapswarm::evaluate::{BackendChoice, BackendInfo};
 use lapswarm::study::run_folder;
@@ -126,7 +127,7 @@ impl Plan {
         self.folder = run_folder::would_be(self.study, common.out.as_deref())?;
         self.folder_exists = self.folder.is_dir();
         if !common.quiet {
-            print!("{}", self.to_text());
+            out!("{}", self.to_text());
         }
         if common.json {
             print_json(&self)?;

@@ -2,6 +2,7 @@
 
 use super::dry_run::Plan;
 use super::{Common, backend_flag, print_json};
+use crate::cli::said::{out, outln};
 use lapswarm::Result;
 use lapswarm::evaluate::BackendChoice;
 use lapswarm::study::envelope::{
@@ -95,8 +96,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let folder = run_folder::create("envelope", arguments.out.as_deref())?;
     write_results(&folder, &limits, Some(&surface), &summary)?;
     if !arguments.quiet {
-        print!("{}", summary.to_text(&limits));
-        println!("Results: {}", folder.display());
+        out!("{}", summary.to_text(&limits));
+        outln!("Results: {}", folder.display());
     }
     if arguments.json {
         print_json(&summary)?;

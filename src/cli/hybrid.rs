@@ -2,6 +2,7 @@
 
 use super::dry_run::Plan;
 use super::{Common, Memory, Resume, backend_flag, going_on, print_json, stop_flag};
+use crate::cli::said::{out, outln};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use lapswarm::evaluate::BackendChoice;
 use lapswarm::evaluate::hybrid::HybridObjective;
@@ -136,6 +137,7 @@ impl Arguments {
 
 /// Runs the study.
 pub fn run(arguments: &Arguments) -> Result<()> {
+    let limit_mib = arguments.memory.in_force();
     let stop = stop_flag();
     let out = arguments.common.out.as_deref();
     let moves = arguments.backend.is_some() || arguments.adapter.is_some();
@@ -150,7 +152,6 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         moves.then_some(moved),
     )?;
     let settings = begun.settings;
-    let limit_mib = arguments.memory.memory_limit_mib;
     // What no track has room for is refused before one is read.
     drop(settings.size().check(limit_mib)?);
     let inputs = read_inputs(&settings)?;
@@ -174,7 +175,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         Some(folder) => folder,
         None => run_folder::create("hybrid", out)?,
     };
-    let mut keeper = arguments.resume.keeper(&folder, moves)?;
+    let mut keeper = arguments.resume.keeper(&folder, moves);
     keeper.keep(&begun.journal)?;
     // Broken off, the search for the line is begun anew: it is a matter of seconds, and ends where it would have ended.
     let setup = inputs.with_line(&settings, &stop);
@@ -210,8 +211,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         keeper.done()?;
     }
     if !arguments.common.quiet {
-        print!("{}", summary.to_text());
-        println!("Results: {}", folder.display());
+        out!("{}", summary.to_text());
+        outln!("Results: {}", folder.display());
     }
     if arguments.common.json {
         print_json(&summary)?;

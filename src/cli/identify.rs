@@ -3,11 +3,13 @@
 use super::dry_run::Plan;
 use super::progress::SearchBar;
 use super::{Common, Memory, Resume, backend_flag, going_on, print_json, same_settings, stop_flag};
+use crate::cli::said::{out, outln};
 use lapswarm::evaluate::replay::{BackendChoice, Norm};
 use lapswarm::study::identify::{
     Algorithm, IdentifySettings, ObjectiveChoice, SearchState, check_swarms, parse_algorithm, parse_norm,
     parse_objective, search_from, set_up, summarise, write_results, write_settings,
 };
+use lapswarm::study::memory::Size;
 use lapswarm::study::run_folder;
 use lapswarm::{Error, Result};
 use std::path::PathBuf;
@@ -155,6 +157,7 @@ fn set_some<T: Clone>(setting: &mut Option<T>, flag: &Option<T>) {
 
 /// Runs the study.
 pub fn run(arguments: &Arguments) -> Result<()> {
+    let limit_mib = arguments.memory.in_force();
     let out = arguments.common.out.as_deref();
     let (folder, state, settings) = if arguments.resume.resume {
         let (folder, mut state) = arguments.resume.open::<SearchState>("identify", out)?;
@@ -169,15 +172,20 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     } else {
         (None, None, arguments.settings(IdentifySettings::default())?)
     };
-    let _allowed = settings.size().check(arguments.memory.memory_limit_mib)?;
+    drop(settings.size().check(limit_mib)?);
     let setup = set_up(&settings)?;
+    let size = Size {
+        samples: setup.log.samples(),
+        ..settings.size()
+    };
+    let _allowed = size.check(limit_mib)?;
     check_swarms(&settings, &setup)?;
     if arguments.common.dry_run {
         return Plan::new("identify", &settings.to_toml())
             .of_replay(&setup)
             .seed(settings.seed)
             .evaluations(settings.evaluations())
-            .memory_mib(settings.size().needed_mib())
+            .memory_mib(size.needed_mib())
             .backend(settings.backend, settings.adapter.as_deref())?
             .tell(&arguments.common);
     }
@@ -188,7 +196,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     };
     write_settings(&folder, &settings)?;
     let stop = stop_flag();
-    let mut keeper = arguments.resume.keeper(&folder, arguments.moves())?;
+    let mut keeper = arguments.resume.keeper(&folder, arguments.moves());
     let mut bar = SearchBar::new(arguments.common.quiet);
     let outcome = search_from(&settings, &setup, state, &mut keeper, |report| {
         bar.show(report);
@@ -205,13 +213,13 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     }
     if !arguments.common.quiet {
         for finding in &summary.calibration.findings {
-            println!("{finding}");
+            outln!("{finding}");
         }
         for note in &summary.calibration.notes {
-            println!("{note}");
+            outln!("{note}");
         }
-        print!("{}", summary.to_text(&settings));
-        println!("Results: {}", folder.display());
+        out!("{}", summary.to_text(&settings));
+        outln!("Results: {}", folder.display());
     }
     if arguments.common.json {
         print_json(&summary)?;

@@ -1,8 +1,9 @@
 //! `lapswarm init`: commented files to start from.
 
+use crate::cli::said::outln;
+use lapswarm::files;
 use lapswarm::vehicle::Car;
 use lapswarm::{Error, Result};
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// Flags of `init`.
@@ -39,20 +40,13 @@ enum Template {
 
 /// Writes a file that must not be there yet.
 fn write_new(path: &Path, text: &str) -> Result<()> {
-    let file = std::fs::OpenOptions::new()
-        .write(true)
-        .create_new(true)
-        .open(path);
-    match file {
-        Ok(mut file) => file
-            .write_all(text.as_bytes())
-            .map_err(|e| Error::io(path, "write", e)),
-        Err(e) if e.kind() == std::io::ErrorKind::AlreadyExists => {
+    files::write_new(path, text.as_bytes()).map_err(|error| match error {
+        Error::Io { source, .. } if source.kind() == std::io::ErrorKind::AlreadyExists => {
             let expected = "a file that does not exist: nothing is overwritten";
-            Err(Error::input(path, "FILE", "a file", expected))
+            Error::input(path, "FILE", "a file", expected)
         }
-        Err(e) => Err(Error::io(path, "create", e)),
-    }
+        error => error,
+    })
 }
 
 /// Writes it.
@@ -78,9 +72,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     if matches!(arguments.what, Template::Car) {
         let tyre = path.with_file_name("gt_slick.tir");
         write_new(&tyre, Car::BUNDLED_TYRE)?;
-        println!("{}", tyre.display());
+        outln!("{}", tyre.display());
     }
     write_new(&path, text)?;
-    println!("{}", path.display());
+    outln!("{}", path.display());
     Ok(())
 }

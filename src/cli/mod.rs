@@ -15,6 +15,7 @@ mod raceline;
 mod replay_flags;
 mod report;
 mod run;
+mod said;
 mod sensitivity;
 mod simulate;
 mod surface;
@@ -22,6 +23,7 @@ mod sweep;
 mod transient;
 
 use clap::{Args, CommandFactory, Parser, Subcommand};
+use lapswarm::config::limit_memory;
 use lapswarm::evaluate::replay::BackendChoice;
 use lapswarm::study::identify::{FreeParameter, IdentifySettings, load_circuit, parse_backend};
 use lapswarm::study::journal::Journal;
@@ -31,15 +33,15 @@ use lapswarm::study::run_folder::{self, RunFolder};
 use lapswarm::swarm::checkpoint::{self, Checkpoint};
 use lapswarm::track::Circuit;
 use lapswarm::{Error, Result};
+use said::{errln, out, outln};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
-use std::io::Write;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// Evaluate whole swarms of race cars at once.
 #[derive(Parser)]
@@ -122,7 +124,7 @@ pub struct Resume {
     #[arg(long, requires = "out", conflicts_with = "dry_run")]
     pub resume: bool,
     /// Time between saves of the run's state, s
-    #[arg(long, value_name = "SECONDS", default_value_t = 5.0)]
+    #[arg(long, value_name = "SECONDS", default_value_t = 5.0, value_parser = pause_flag)]
     pub save_every_s: f64,
 }
 
@@ -135,20 +137,29 @@ pub struct Memory {
     pub memory_limit_mib: u64,
 }
 
+fn pause_flag(text: &str) -> Result<f64, String> {
+    let seconds = text
+        .parse()
+        .ok()
+        .filter(|s| Duration::try_from_secs_f64(*s).is_ok());
+    seconds.ok_or_else(|| "expected a time in seconds, 0 or more".to_owned())
+}
+
+impl Memory {
+    /// Puts the limit in force, before anything large is read, and says it (MiB).
+    fn in_force(&self) -> u64 {
+        limit_memory(self.memory_limit_mib);
+        self.memory_limit_mib
+    }
+}
+
 impl Resume {
     /// What saves the run's state; `moves` if another backend may go on with it.
-    fn keeper(&self, folder: &Path, moves: bool) -> Result<Keeper> {
-        let interval = Duration::try_from_secs_f64(self.save_every_s).map_err(|_| {
-            let found = self.save_every_s.to_string();
-            Error::input(
-                "the command line",
-                "--save-every-s",
-                found,
-                "a time in seconds, 0 or more",
-            )
-        })?;
+    fn keeper(&self, folder: &Path, moves: bool) -> Keeper {
+        // The flag's parser has seen to what it can be.
+        let interval = Duration::try_from_secs_f64(self.save_every_s).unwrap_or_default();
         let keeper = Keeper::new(folder).every(interval);
-        Ok(if moves { keeper.may_move() } else { keeper })
+        if moves { keeper.may_move() } else { keeper }
     }
 
     /// What a study came to. Input that is refused only once the run has begun leaves nothing that stands in the way of the
@@ -268,11 +279,21 @@ fn circuit(track: Option<&str>) -> Result<Circuit> {
     load_circuit(track.unwrap_or(BUNDLED_TRACK))
 }
 
-/// A flag that rises when the user or the system asks the program to stop.
+/// Between a user's first request to stop and one that is another: those that come closer may be one that took two ways.
+const INSISTENT: Duration = Duration::from_secs(2);
+
+/// A flag that rises when the user or the system asks the program to stop. Who asks again later does not want to wait any
+/// longer: what was saved last stays.
 fn stop_flag() -> Arc<AtomicBool> {
     let flag = Arc::new(AtomicBool::new(false));
     let raised = Arc::clone(&flag);
-    let set = ctrlc::set_handler(move || raised.store(true, Ordering::Relaxed));
+    let mut first: Option<Instant> = None;
+    let set = ctrlc::set_handler(move || {
+        raised.store(true, Ordering::Relaxed);
+        if first.get_or_insert_with(Instant::now).elapsed() > INSISTENT {
+            std::process::exit(130);
+        }
+    });
     if let Err(error) = set {
         tracing::warn!("an interrupt will end the program at once: {error}");
     }
@@ -313,25 +334,21 @@ pub fn run() -> ExitCode {
         Command::Completions { shell } => {
             let mut script = Vec::new();
             clap_complete::generate(shell, &mut Cli::command(), "lapswarm", &mut script);
-            match std::io::stdout().write_all(&script) {
-                // Whoever reads has seen enough.
-                Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => {
-                    Err(Error::io("standard output", "write", e))
-                }
-                _ => Ok(()),
-            }
+            out!("{}", String::from_utf8_lossy(&script));
+            Ok(())
         }
         Command::Devices(arguments) => devices::run(&arguments),
         Command::Parity(arguments) => parity::run(&arguments),
         Command::Bench(arguments) => bench::run(&arguments),
     };
-    match outcome {
+    // What went wrong before is the cause.
+    match outcome.and_then(|()| said::finish()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             let code = error.exit_code();
             let mut report = miette::MietteDiagnostic::new(error.to_string());
             report.help = advice(&error);
-            eprintln!("{:?}", miette::Report::new(report));
+            errln!("{:?}", miette::Report::new(report));
             ExitCode::from(code)
         }
     }
@@ -352,6 +369,6 @@ fn advice(error: &Error) -> Option<String> {
 fn print_json(value: &impl serde::Serialize) -> Result<()> {
     let text = serde_json::to_string(value)
         .map_err(|e| Error::io("standard output", "write", std::io::Error::other(e)))?;
-    println!("{text}");
+    outln!("{text}");
     Ok(())
 }

@@ -2,8 +2,10 @@
 
 use super::kept::{self, Kept, Machine};
 use super::{backend_flag, print_json};
+use crate::cli::said::outln;
 use lapswarm::evaluate::BackendChoice;
 use lapswarm::evaluate::gpu::{DeviceSummary, devices};
+use lapswarm::files::write_whole;
 use lapswarm::parity::{Agreement, Subject, compare, subjects};
 use lapswarm::report::{BarPanel, BarSeries, Cells, Column, HtmlReport, significant, write_csv};
 use lapswarm::{Error, Result};
@@ -75,16 +77,20 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     });
     if !arguments.quiet {
         if device.is_none() && arguments.backend == BackendChoice::Auto && devices().is_empty() {
-            println!("no GPU: neither Vulkan, Metal nor DX12 found an adapter");
+            outln!("no GPU: neither Vulkan, Metal nor DX12 found an adapter");
         }
-        println!(
+        outln!(
             "{:<46}{:>10}{:>12}{:>10}{:>16}  bits as f32",
-            "kernel", "figures", "relative", "ULP", "of what may be"
+            "kernel",
+            "figures",
+            "relative",
+            "ULP",
+            "of what may be"
         );
     }
     let found = compare(&subjects, |a| {
         if !arguments.quiet {
-            println!(
+            outln!(
                 "{:<46}{:>10}{:>12.1e}{:>10.1}{:>15.1}%  {}{}",
                 a.key(),
                 a.figures,
@@ -125,7 +131,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     if let Some(path) = &arguments.file {
         let text = serde_json::to_string_pretty(&report)
             .map_err(|e| Error::io(path, "write", std::io::Error::other(e)))?;
-        std::fs::write(path, text).map_err(|e| Error::io(path, "write", e))?;
+        write_whole(path, text.as_bytes())?;
     }
     if let Some(folder) = &folder {
         let names = subjects.iter().map(|s| match s {
@@ -137,12 +143,12 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     }
     if !arguments.quiet {
         if let Some(folder) = &folder {
-            println!("Results: {}", folder.display());
+            outln!("Results: {}", folder.display());
         }
         if let Some(device) = device {
-            println!("{device}");
+            outln!("{device}");
         }
-        println!(
+        outln!(
             "{}",
             if pass {
                 "all agree with the f64 reference"

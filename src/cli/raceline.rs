@@ -2,6 +2,7 @@
 
 use super::dry_run::Plan;
 use super::{Common, Memory, Resume, backend_flag, going_on, print_json, same_settings, stop_flag};
+use crate::cli::said::{out, outln};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use lapswarm::evaluate::BackendChoice;
 use lapswarm::evaluate::line::LineObjective;
@@ -144,6 +145,7 @@ impl Arguments {
 
 /// Runs the study.
 pub fn run(arguments: &Arguments) -> Result<()> {
+    let limit_mib = arguments.memory.in_force();
     let out = arguments.common.out.as_deref();
     let (folder, state, settings) = if arguments.resume.resume {
         let (folder, mut state) = arguments.resume.open::<LinesState>("raceline", out)?;
@@ -158,7 +160,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     } else {
         (None, None, arguments.settings(RacelineSettings::default())?)
     };
-    let _allowed = settings.size().check(arguments.memory.memory_limit_mib)?;
+    let _allowed = settings.size().check(limit_mib)?;
     let setup = set_up(&settings)?;
     if arguments.common.dry_run {
         return Plan::new("raceline", &settings.to_toml())
@@ -174,7 +176,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         None => run_folder::create("raceline", out)?,
     };
     write_settings(&folder, &settings)?;
-    let mut keeper = arguments.resume.keeper(&folder, arguments.moves())?;
+    let mut keeper = arguments.resume.keeper(&folder, arguments.moves());
     let stop = stop_flag();
     let target = if arguments.common.quiet {
         ProgressDrawTarget::hidden()
@@ -201,8 +203,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         keeper.done()?;
     }
     if !arguments.common.quiet {
-        print!("{}", summary.to_text());
-        println!("Results: {}", folder.display());
+        out!("{}", summary.to_text());
+        outln!("Results: {}", folder.display());
     }
     if arguments.common.json {
         print_json(&summary)?;

@@ -1,6 +1,7 @@
 //! `lapswarm report`.
 
 use super::print_json;
+use crate::cli::said::outln;
 use lapswarm::study::compare::{Run, compare};
 use lapswarm::{Error, Result};
 use std::path::PathBuf;
@@ -48,7 +49,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         .collect::<Result<Vec<Run>>>()?;
     compare(&runs)?.write(out)?;
     if !arguments.quiet {
-        println!("Written: {}", out.display());
+        outln!("Written: {}", out.display());
     }
     if arguments.json {
         print_json(&Written {

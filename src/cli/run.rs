@@ -2,6 +2,7 @@
 
 use super::dry_run::Plan;
 use super::{Common, Memory, Resume, backend_flag, going_on, print_json, progress, stop_flag};
+use crate::cli::said::{out, outln};
 use lapswarm::evaluate::BackendChoice;
 use lapswarm::study::memory::Size;
 use lapswarm::study::run::{Means, RunSettings, prepare, run as run_all};
@@ -114,6 +115,7 @@ impl Arguments {
 
 /// Runs everything.
 pub fn run(arguments: &Arguments) -> Result<()> {
+    let limit_mib = arguments.memory.in_force();
     let stop = stop_flag();
     let out = arguments.common.out.as_deref();
     let moved: fn(&mut RunSettings, &RunSettings) = |kept, asked| {
@@ -130,13 +132,13 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     )?;
     let settings = begun.settings;
     // Each stage has the limit for itself; what none of them has room for is refused before the first.
-    let limit_mib = arguments.memory.memory_limit_mib;
     for size in [settings.identify.size(), settings.raceline.size()] {
         drop(size.check(limit_mib)?);
     }
     let prepared = prepare(&settings)?;
+    let sizes = [prepared.identify_size(), settings.raceline.size()];
+    drop(sizes[0].check(limit_mib)?);
     if arguments.common.dry_run {
-        let sizes = [settings.identify.size(), settings.raceline.size()];
         return Plan::new("run", &settings.to_toml())
             .of_replay(&prepared.setup)
             .of_road(&prepared.road)
@@ -149,7 +151,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         Some(folder) => folder,
         None => run_folder::create("run", out)?,
     };
-    let mut keeper = arguments.resume.keeper(&folder, arguments.moves())?;
+    let mut keeper = arguments.resume.keeper(&folder, arguments.moves());
     keeper.keep(&begun.journal)?;
     let bar = progress::saying(arguments.common.quiet);
     // Without a cache to share, a run that is broken off still finds its own stages again.
@@ -171,8 +173,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     }
     keeper.done()?;
     if !arguments.common.quiet {
-        print!("{}", summary.to_text());
-        println!("Results: {}", folder.display());
+        out!("{}", summary.to_text());
+        outln!("Results: {}", folder.display());
     }
     if arguments.common.json {
         print_json(&summary)?;

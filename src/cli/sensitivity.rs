@@ -3,6 +3,7 @@
 use super::dry_run::Plan;
 use super::replay_flags::ReplayFlags;
 use super::{Common, Memory, Resume, going_on, print_json, progress, stop_flag};
+use crate::cli::said::{out, outln};
 use lapswarm::study::journal::{Journal, Recorder};
 use lapswarm::study::memory;
 use lapswarm::study::run_folder;
@@ -61,6 +62,7 @@ impl Arguments {
 
 /// Runs the study.
 pub fn run(arguments: &Arguments) -> Result<()> {
+    let limit_mib = arguments.memory.in_force();
     let out = arguments.common.out.as_deref();
     let moves = arguments.replay.moves();
     let moved: fn(&mut SensitivitySettings, &SensitivitySettings) = |kept, asked| {
@@ -74,14 +76,17 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         moves.then_some(moved),
     )?;
     let settings = begun.settings;
-    let _allowed = memory::check(&settings.kept(), arguments.memory.memory_limit_mib)?;
+    drop(memory::check(&settings.kept(), limit_mib)?);
     let setup = set_up_sensitivity(&settings)?;
+    let [all] = settings.kept();
+    let kept = [all, memory::log_kept(setup.log.samples())];
+    let _allowed = memory::check(&kept, limit_mib)?;
     if arguments.common.dry_run {
         return Plan::new("sensitivity", &settings.to_toml())
             .of_replay(&setup)
             .seed(settings.replay.seed)
             .evaluations(settings.evaluations() as u64)
-            .memory_mib(memory::needed_mib(&settings.kept()))
+            .memory_mib(memory::needed_mib(&kept))
             .backend(settings.replay.backend, settings.replay.adapter.as_deref())?
             .tell(&arguments.common);
     }
@@ -89,7 +94,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         Some(folder) => folder,
         None => run_folder::create("sensitivity", out)?,
     };
-    let mut keeper = arguments.resume.keeper(&folder, moves)?;
+    let mut keeper = arguments.resume.keeper(&folder, moves);
     let mut recorder = Recorder::new(begun.journal, &mut keeper);
     let stop = stop_flag();
     let bar = progress::counting(arguments.common.quiet);
@@ -108,8 +113,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         keeper.done()?;
     }
     if !arguments.common.quiet {
-        print!("{}", summary.to_text());
-        println!("Results: {}", folder.display());
+        out!("{}", summary.to_text());
+        outln!("Results: {}", folder.display());
     }
     if arguments.common.json {
         print_json(&summary)?;

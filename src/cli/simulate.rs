@@ -2,6 +2,7 @@
 
 use super::dry_run::Plan;
 use super::{BUNDLED_TRACK, Common, circuit, print_json};
+use crate::cli::said::outln;
 use lapswarm::Result;
 use lapswarm::evaluate::BackendChoice;
 use lapswarm::simulate::{SensorSettings, SimulateSettings, simulate_lap};
@@ -153,7 +154,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         return Err(error);
     }
     if !arguments.common.quiet {
-        println!(
+        outln!(
             "{}: {:.2} s, {:.1} to {:.1} m/s, up to {:.1} m/s^2 sideways\nLog: {}",
             log.source,
             summary.lap_time_s,

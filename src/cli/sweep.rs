@@ -2,6 +2,7 @@
 
 use super::dry_run::Plan;
 use super::{Common, Memory, going_on, print_json, progress, stop_flag};
+use crate::cli::said::{out, outln};
 use lapswarm::Result;
 use lapswarm::study::run_folder;
 use lapswarm::study::sweep::{SWEEP_FILE, SweepSettings, plan, sweep_within};
@@ -27,8 +28,8 @@ pub struct Arguments {
 
 /// Runs the sweep.
 pub fn run(arguments: &Arguments) -> Result<()> {
+    let limit_mib = arguments.memory.in_force();
     let settings = SweepSettings::load(&arguments.sweep)?;
-    let limit_mib = arguments.memory.memory_limit_mib;
     if arguments.common.dry_run {
         let planned = plan(&settings, limit_mib)?;
         let mut told = Plan::new("sweep", settings.text())
@@ -64,8 +65,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     })?;
     bar.finish_and_clear();
     if !arguments.common.quiet {
-        print!("{}", summary.to_text());
-        println!("Results: {}", folder.display());
+        out!("{}", summary.to_text());
+        outln!("Results: {}", folder.display());
     }
     if arguments.common.json {
         print_json(&summary)?;

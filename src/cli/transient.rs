@@ -4,6 +4,7 @@ use super::dry_run::Plan;
 use super::{
     Begun, Common, Memory, Resume, backend_flag, going_on, print_json, progress, same_settings, stop_flag,
 };
+use crate::cli::said::{out, outln};
 use glam::DVec2;
 use lapswarm::evaluate::BackendChoice;
 use lapswarm::study::journal::{Journal, Recorder};
@@ -198,7 +199,7 @@ fn run_population(arguments: &Arguments, stop: &AtomicBool, begun: Begun<DriveRe
         Some(folder) => folder,
         None => run_folder::create("transient", arguments.common.out.as_deref())?,
     };
-    let mut keeper = arguments.resume.keeper(&folder, arguments.moves())?;
+    let mut keeper = arguments.resume.keeper(&folder, arguments.moves());
     keeper.keep(&begun.journal)?;
     let mut recorder = Recorder::new(begun.journal, &mut keeper);
     let bar = progress::counting(arguments.common.quiet);
@@ -223,8 +224,8 @@ fn run_population(arguments: &Arguments, stop: &AtomicBool, begun: Begun<DriveRe
         keeper.done()?;
     }
     if !arguments.common.quiet {
-        print!("{}{}", table_of(&lines, &outcome), summary.to_text());
-        println!("Results: {}", folder.display());
+        out!("{}{}", table_of(&lines, &outcome), summary.to_text());
+        outln!("Results: {}", folder.display());
     }
     if arguments.common.json {
         print_json(&summary)?;
@@ -242,6 +243,7 @@ fn run_population(arguments: &Arguments, stop: &AtomicBool, begun: Begun<DriveRe
 
 /// Drives and prints.
 pub fn run(arguments: &Arguments) -> Result<()> {
+    arguments.memory.in_force();
     let stop = stop_flag();
     let out = arguments.common.out.as_deref();
     if arguments.resume.resume {
@@ -311,7 +313,7 @@ fn run_line(
         Some(folder) => folder,
         None => run_folder::create("transient", arguments.common.out.as_deref())?,
     };
-    let mut keeper = arguments.resume.keeper(&folder, false)?;
+    let mut keeper = arguments.resume.keeper(&folder, false);
     let begun = (state, &mut keeper);
     let driven = drive_line_from(&car, &setup.car, &points, edges, &settings, begun, |_, _| {
         going_on(stop)
@@ -326,8 +328,8 @@ fn run_line(
     write_results(&folder, &outcome, &summary)?;
     keeper.done()?;
     if !arguments.common.quiet {
-        print!("{}", summary.to_text());
-        println!("Results: {}", folder.display());
+        out!("{}", summary.to_text());
+        outln!("Results: {}", folder.display());
     }
     if arguments.common.json {
         print_json(&summary)?;

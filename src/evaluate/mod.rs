@@ -160,6 +160,19 @@ pub fn add_failures(total: &mut FailureCounts, counts: &FailureCounts) {
     }
 }
 
+/// How many candidates failed and why, in words.
+pub(crate) fn failures_in_words(counts: &FailureCounts) -> String {
+    let told: Vec<String> = counts
+        .iter()
+        .map(|(reason, count)| format!("{count} {}", reason.replace('_', " ")))
+        .collect();
+    if told.is_empty() {
+        "none".to_owned()
+    } else {
+        told.join(", ")
+    }
+}
+
 impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {

@@ -109,8 +109,8 @@ pub fn dispatch<W: LaneWork>(set: InstructionSet, work: W) -> W::Output {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scalar::Real;
     use crate::scalar::lanes::Portable;
+    use crate::scalar::{Lookup, Real};
 
     /// What [`functions`] yields.
     const FUNCTIONS: usize = 14;
@@ -178,6 +178,95 @@ mod tests {
                         "function {number}, lane {lane}"
                     );
                 }
+            }
+        }
+    }
+
+    /// Arguments at and beyond both ends of a table, and what is no number.
+    const PLACES: [f32; 16] = [
+        0.0,
+        -0.0,
+        0.25,
+        0.999_999_94,
+        1.0,
+        1.5,
+        6.75,
+        7.0,
+        7.999_999_5,
+        8.0,
+        8.5,
+        -1.0,
+        1e30,
+        f32::INFINITY,
+        f32::NEG_INFINITY,
+        f32::NAN,
+    ];
+
+    /// What tables of so many rows of eight yield, lane by lane, in the order of the arguments.
+    struct LookedUp(usize);
+
+    impl LookedUp {
+        /// Ends with its last figure, so that a sanitizer sees what reads beyond.
+        fn table(&self) -> Box<[f32]> {
+            (0..8 * self.0).map(|i| i as f32 + 0.5).collect()
+        }
+    }
+
+    impl LaneWork for LookedUp {
+        type Output = Vec<f32>;
+
+        #[inline(always)]
+        fn run<L: Lanes>(self) -> Vec<f32> {
+            let table = self.table();
+            let mut found = Vec::new();
+            for start in (0..PLACES.len()).step_by(L::LANES) {
+                let x = L::from_fn(|lane| PLACES[start + lane]);
+                let (place, beyond) = x.place(self.0, 8);
+                let row = L::pick_row(&table, place);
+                // The last is beyond the row, and for the last row beyond the table.
+                let picked = [0, 3, 7, 9].map(|column| L::pick(&table, place, column));
+                // Places of a longer table than this one.
+                let (far, _) = x.place(self.0 + 3, 8);
+                for figure in L::pick_row(&table, far) {
+                    let mut lanes = [0.5; 16];
+                    figure.write(&mut lanes);
+                    assert!(lanes.iter().all(|x| table.contains(x)), "{lanes:?}");
+                }
+                let figures = [beyond, x.whole(5), L::pick(&table, far, 9)].into_iter();
+                let figures = figures.chain(row).chain(picked);
+                let mut lanes = [[0.0; 16]; 15];
+                for (lanes, figure) in lanes.iter_mut().zip(figures) {
+                    figure.write(lanes);
+                }
+                found.extend((0..L::LANES).flat_map(|lane| lanes.map(|figure| figure[lane])));
+            }
+            found
+        }
+    }
+
+    #[test]
+    fn tables_are_read_to_their_ends_and_no_further_in_every_instruction_set() {
+        for rows in [1, 2, 7, 8] {
+            let table = LookedUp(rows).table();
+            let alone: Vec<f32> = PLACES
+                .iter()
+                .flat_map(|x| {
+                    let (place, beyond) = x.place(rows, 8);
+                    let row = f32::pick_row(&table, place);
+                    let picked = [0, 3, 7, 9].map(|column| f32::pick(&table, place, column));
+                    let (far, _) = x.place(rows + 3, 8);
+                    let figures = [beyond, x.whole(5), f32::pick(&table, far, 9)].into_iter();
+                    let figures = figures.chain(row).chain(picked);
+                    figures.collect::<Vec<f32>>()
+                })
+                .collect();
+            let packs = InstructionSet::available()
+                .into_iter()
+                .map(|set| dispatch(set, LookedUp(rows)))
+                .chain([LookedUp(rows).run::<Portable>()]);
+            for pack in packs {
+                let bits = |figures: &[f32]| figures.iter().map(|x| x.to_bits()).collect::<Vec<u32>>();
+                assert_eq!(bits(&pack), bits(&alone), "{rows} rows");
             }
         }
     }

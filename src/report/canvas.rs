@@ -6,8 +6,8 @@ use plotters::prelude::{DrawingBackend, SVGBackend};
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use plotters::style::{Color, FontStyle, FontTransform, IntoFont, RGBColor, ShapeStyle, TextStyle};
 
-use super::files::write_whole;
 use super::style::{FONT, INK, TITLE_PX, WHITE};
+use crate::files::write_whole;
 use crate::{Error, Result};
 
 /// plotters draws on whole pixels, which makes steps of gentle curves. Drawing ten times as large

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use super::files::write_whole;
 use super::style::with_unit;
+use crate::files::write_whole;
 use crate::{Error, Result};
 
 /// What a column holds.

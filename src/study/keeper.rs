@@ -11,6 +11,8 @@ use std::time::{Duration, Instant};
 
 /// How long a study works between two saves of its state.
 const INTERVAL: Duration = Duration::from_secs(5);
+/// How many times as long as its last save took a study works at the least before the next: nine tenths of its time.
+const PAUSE: u32 = 9;
 
 /// Saves states at an interval.
 #[derive(Debug)]
@@ -18,6 +20,8 @@ pub struct Keeper {
     path: Option<PathBuf>,
     interval: Duration,
     last: Instant,
+    /// How long the last save took.
+    took: Duration,
     may_move: bool,
 }
 
@@ -28,7 +32,16 @@ impl Keeper {
             path: Some(folder.join(STATE)),
             interval: INTERVAL,
             last: Instant::now(),
+            took: Duration::ZERO,
             may_move: false,
+        }
+    }
+
+    /// Saves into a file, every five seconds.
+    pub fn at(file: PathBuf) -> Self {
+        Self {
+            path: Some(file),
+            ..Self::idle()
         }
     }
 
@@ -38,8 +51,14 @@ impl Keeper {
             path: None,
             interval: INTERVAL,
             last: Instant::now(),
+            took: Duration::ZERO,
             may_move: false,
         }
+    }
+
+    /// The state's file, or its usual name where nothing is saved.
+    pub fn file(&self) -> PathBuf {
+        self.path.clone().unwrap_or_else(|| STATE.into())
     }
 
     /// Saves this often.
@@ -47,14 +66,26 @@ impl Keeper {
         Self { interval, ..self }
     }
 
+    /// The folder that it saves into; no name where it saves nothing.
+    pub fn folder(&self) -> &Path {
+        let folder = self.path.as_deref().and_then(Path::parent);
+        folder.unwrap_or(Path::new(""))
+    }
+
     /// The time between saves.
     pub fn interval(&self) -> Duration {
         self.interval
     }
 
-    /// Whether it is time to save.
+    /// Whether it is time to save. Where a save takes long, more is worked than saved all the same; an interval of nothing
+    /// saves whenever it can be.
     pub fn due(&self) -> bool {
-        self.path.is_some() && self.last.elapsed() >= self.interval
+        let pause = if self.interval.is_zero() {
+            Duration::ZERO
+        } else {
+            self.interval.max(self.took.saturating_mul(PAUSE))
+        };
+        self.path.is_some() && self.last.elapsed() >= pause
     }
 
     /// The state that an earlier run has left, if it can be read.
@@ -70,11 +101,17 @@ impl Keeper {
     /// # Errors
     /// [`Error::Io`] if it cannot be written; the state that was saved before is still there then.
     pub fn keep<T: Checkpoint>(&mut self, state: &T) -> Result<()> {
+        let Some(path) = &self.path else {
+            return Ok(());
+        };
+        let began = Instant::now();
+        let saved = checkpoint::save(path, state);
+        #[cfg(test)]
+        std::thread::sleep(tests::SLOW.get());
+        // From the end of the save on, whether it was one or not: what takes longer than the interval would be due at once.
         self.last = Instant::now();
-        match &self.path {
-            Some(path) => checkpoint::save(path, state),
-            None => Ok(()),
-        }
+        self.took = self.last - began;
+        saved
     }
 
     /// As [`Keeper::keep`] for saves between: one that fails is told, and the study goes on.
@@ -97,7 +134,7 @@ impl Keeper {
     /// # Errors
     /// [`Error::Input`] naming what is not the same.
     pub fn check(&self, began: &Origin, now: &Origin) -> Result<()> {
-        let file = self.path.clone().unwrap_or_else(|| STATE.into());
+        let file = self.file();
         if began.inputs != now.inputs {
             let expected = "the files that the study reads as they were when the run began";
             return Err(Error::input(file, "inputs of the study", "others", expected));
@@ -155,5 +192,40 @@ impl Origin {
 impl fmt::Display for Origin {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{} ({})", self.backend, self.device)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::study::journal::Journal;
+    use std::cell::Cell;
+
+    thread_local! {
+        /// How long a save takes more than it does.
+        pub(super) static SLOW: Cell<Duration> = const { Cell::new(Duration::ZERO) };
+    }
+
+    #[test]
+    fn a_save_that_takes_longer_than_the_interval_is_not_due_again_at_once() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let interval = Duration::from_millis(20);
+        let mut keeper = Keeper::new(folder.path()).every(interval);
+        std::thread::sleep(interval);
+        assert!(keeper.due());
+        let state = Journal::new("study", &3u32).expect("a journal");
+        SLOW.set(Duration::from_millis(100));
+        keeper.keep(&state).expect("kept");
+        SLOW.set(Duration::ZERO);
+        std::thread::sleep(2 * interval);
+        // Nine tenths of a second from the end of the save; nothing that a loaded machine does makes it due before.
+        assert!(keeper.last.elapsed() > Duration::from_millis(800) || !keeper.due());
+        assert!(keeper.took >= Duration::from_millis(100));
+        while !keeper.due() {
+            std::thread::sleep(interval);
+        }
+        keeper.keep(&state).expect("kept");
+        assert!(keeper.took < Duration::from_secs(60), "of the last save only");
+        assert!(keeper.every(Duration::ZERO).due(), "whenever it can be");
     }
 }

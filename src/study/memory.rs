@@ -7,7 +7,7 @@ use crate::error::{Error, Result};
 use crate::evaluate::portions::{self, Allowance};
 
 /// Memory that a study may take where nothing else is said (MiB).
-pub const USUAL_MIB: u64 = 4096;
+pub const USUAL_MIB: u64 = crate::config::USUAL_MEMORY_MIB;
 /// Numbers that a swarm and its checkpoint keep for each variable of a particle, at the most: positions, velocities and best
 /// positions, the candidates asked for in the optimiser's and the parameters' coordinates, those of a portion, and the state
 /// as it is copied and written down, twice.
@@ -21,6 +21,9 @@ const ITERATION: u64 = 512;
 const CUT: u64 = 16 << 10;
 /// Bytes of a candidate's answer in a journal: five objectives and a failure, as they are and twice while they are written.
 pub const ANSWER: u64 = 3 * (5 * 8 + 8);
+/// Bytes of a sample of a log: the log itself (11 numbers), what is driven and scored of it for laps fitted and held out (9 each,
+/// and in single precision for each backend), and what a driven lap is judged and told by, as numbers and as text.
+const LOG_SAMPLE: u64 = 1 << 10;
 /// What evaluators are left at the least (bytes): as much as the smallest of [`portions`] takes.
 const LEAST: u64 = 4 << 20;
 
@@ -84,6 +87,15 @@ pub fn check(kept: &[Kept], limit_mib: u64) -> Result<Allowance> {
     Err(Error::input("the study", largest.name, found, expected))
 }
 
+/// A log of so many samples.
+pub fn log_kept(samples: usize) -> Kept {
+    Kept {
+        name: "samples of the log",
+        count: samples as u64,
+        each: LOG_SAMPLE,
+    }
+}
+
 /// What a study of swarms keeps goes with.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Size {
@@ -99,6 +111,8 @@ pub struct Size {
     pub archive: usize,
     /// Whether every answer is kept, in a journal.
     pub journal: bool,
+    /// Samples of the log, once it is read.
+    pub samples: usize,
 }
 
 impl Size {
@@ -133,7 +147,7 @@ impl Size {
         sizes.iter().flat_map(Self::kept).collect()
     }
 
-    fn kept(&self) -> [Kept; 4] {
+    fn kept(&self) -> [Kept; 5] {
         let particle = (self.variables as u64)
             .saturating_mul(8 * COPIES)
             .saturating_add(PARTICLE);
@@ -152,6 +166,7 @@ impl Size {
             kept("archive", self.archive, particle),
             kept("iterations", self.iterations, ITERATION.saturating_add(answers)),
             kept("sections", self.sections, CUT),
+            log_kept(self.samples),
         ]
     }
 }
@@ -215,6 +230,20 @@ mod tests {
             }
         }
         assert_eq!(Size::together(&sizes, 1), 1, "the first is refused by itself");
+    }
+
+    #[test]
+    fn a_log_counts() {
+        let size = |samples| Size {
+            population: 1000,
+            variables: 10,
+            samples,
+            ..Size::default()
+        };
+        drop(size(0).check(64).expect("without a log it fits"));
+        let fitting = said_to_fit(size(10_000_000).check(64));
+        drop(size(fitting).check(64).expect("as was said"));
+        assert!(size(fitting + 1).check(64).is_err());
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! The folder that a run writes into: one run each, nothing overwritten, one process at a time.
 
 use crate::error::{Error, Result};
+use crate::files::{is_temporary, write_whole};
 use std::fs::{File, TryLockError};
 use std::io::{Read, Write};
 use std::ops::Deref;
@@ -11,6 +12,8 @@ const RUNS: &str = "runs";
 /// The file that the process that writes into a folder holds locked; it says which process that is. The system gives the
 /// lock back when the process ends, however it ends.
 const LOCK: &str = ".lock";
+/// How often a lock file may be taken away just when it is locked, before something else is the matter.
+const LOCK_TRIES: usize = 1000;
 /// The state of a run that can be gone on with.
 pub const STATE: &str = "state.lapswarm";
 /// What a run writes before it begins.
@@ -61,6 +64,18 @@ impl Drop for RunFolder {
 impl RunFolder {
     /// Takes the folder for this process.
     fn lock(path: &Path) -> Result<Self> {
+        // A run that ends takes the lock file with it, and may take it from under one that waits for it.
+        for _ in 0..LOCK_TRIES {
+            if let Some(locked) = Self::try_lock(path)? {
+                return Ok(locked);
+            }
+        }
+        let changing = std::io::Error::other("the file there is another one each time");
+        Err(Error::io(path.join(LOCK), "lock", changing))
+    }
+
+    /// As [`RunFolder::lock`]; nothing if the file that is locked is not the one in the folder any more.
+    fn try_lock(path: &Path) -> Result<Option<Self>> {
         let file = path.join(LOCK);
         let failed = |e| Error::io(&file, "write", e);
         let mut lock = File::options()
@@ -70,6 +85,8 @@ impl RunFolder {
             .truncate(false)
             .open(&file)
             .map_err(failed)?;
+        #[cfg(test)]
+        tests::between_open_and_lock(path);
         match lock.try_lock() {
             Ok(()) => {}
             Err(TryLockError::WouldBlock) => {
@@ -88,21 +105,42 @@ impl RunFolder {
             Err(TryLockError::Error(e)) if e.kind() == std::io::ErrorKind::Unsupported => {}
             Err(TryLockError::Error(e)) => return Err(failed(e)),
         }
+        if !is_at(&lock, &file) {
+            return Ok(None);
+        }
         lock.set_len(0)
             .and_then(|()| write!(lock, "{}", std::process::id()))
             .map_err(failed)?;
-        Ok(Self {
+        Ok(Some(Self {
             path: path.to_owned(),
             first: false,
             made: Vec::new(),
             _lock: lock,
-        })
+        }))
     }
 }
 
-/// Whether a folder has anything in it but the lock of a run that has come to nothing.
+/// Whether an open file is the one that a path names.
+#[cfg(unix)]
+fn is_at(file: &File, path: &Path) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    match (file.metadata(), path.metadata()) {
+        (Ok(open), Ok(there)) => (open.dev(), open.ino()) == (there.dev(), there.ino()),
+        _ => false,
+    }
+}
+
+/// Whether an open file is the one that a path names: here a name is not free again before the file is closed.
+#[cfg(not(unix))]
+fn is_at(_: &File, path: &Path) -> bool {
+    path.exists()
+}
+
+/// Whether a folder has anything in it but what a run leaves that has come to nothing: its lock, its settings, and what it had
+/// half written. Settings without a lock are a user's own.
 fn holds_something(folder: &Path) -> bool {
-    holds_more_than(folder, &[LOCK])
+    let began = folder.join(LOCK).is_file();
+    holds_more_than(folder, if began { &[LOCK, SETTINGS] } else { &[] })
 }
 
 /// The folder that [`create`] would create, which is not touched.
@@ -111,8 +149,7 @@ fn holds_something(folder: &Path) -> bool {
 /// [`Error::Input`] if the folder asked for holds anything already.
 pub fn would_be(study: &str, asked: Option<&Path>) -> Result<PathBuf> {
     match asked {
-        Some(folder) if holds_something(folder) || folder.is_file() => Err(taken(folder)),
-        Some(folder) => Ok(folder.to_owned()),
+        Some(folder) => check_free(folder).map(|()| folder.to_owned()),
         None => {
             let numbered = |number: u32| Path::new(RUNS).join(format!("{study}-{number:03}"));
             Ok((1..u32::MAX)
@@ -120,6 +157,23 @@ pub fn would_be(study: &str, asked: Option<&Path>) -> Result<PathBuf> {
                 .find(|folder| !folder.exists())
                 .unwrap_or_else(|| numbered(u32::MAX)))
         }
+    }
+}
+
+/// Refuses a folder that holds anything, and what is no folder.
+fn check_free(folder: &Path) -> Result<()> {
+    match folder.read_dir() {
+        Err(e) if e.kind() != std::io::ErrorKind::NotFound && !folder.is_file() => {
+            Err(Error::io(folder, "read", e))
+        }
+        _ if folder.is_file() || holds_something(folder) => Err(taken(folder)),
+        _ if folder.is_symlink() && !folder.exists() => Err(Error::input(
+            folder,
+            "--out",
+            "a link to nowhere",
+            "a new or empty folder",
+        )),
+        _ => Ok(()),
     }
 }
 
@@ -135,9 +189,12 @@ fn taken(folder: &Path) -> Error {
 fn holds_more_than(folder: &Path, names: &[&str]) -> bool {
     match folder.read_dir() {
         // What cannot be read may hold anything.
-        Ok(mut entries) => {
-            entries.any(|entry| entry.map_or(true, |e| !names.iter().any(|name| e.file_name() == *name)))
-        }
+        Ok(mut entries) => entries.any(|entry| {
+            entry.map_or(true, |e| {
+                let name = e.file_name();
+                !names.iter().any(|n| name == *n) && !is_temporary(&name.to_string_lossy())
+            })
+        }),
         Err(error) => error.kind() != std::io::ErrorKind::NotFound,
     }
 }
@@ -159,9 +216,7 @@ fn missing(folder: &Path) -> Vec<PathBuf> {
 /// cannot be created.
 pub fn create(study: &str, asked: Option<&Path>) -> Result<RunFolder> {
     if let Some(folder) = asked {
-        if holds_something(folder) || folder.is_file() {
-            return Err(taken(folder));
-        }
+        check_free(folder)?;
         let made = missing(folder);
         std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, "create", e))?;
         let mut locked = RunFolder::lock(folder)?;
@@ -169,6 +224,7 @@ pub fn create(study: &str, asked: Option<&Path>) -> Result<RunFolder> {
         if holds_something(folder) {
             return Err(taken(folder));
         }
+        clean(folder, 0)?;
         (locked.first, locked.made) = (true, made);
         return Ok(locked);
     }
@@ -191,13 +247,15 @@ pub fn create(study: &str, asked: Option<&Path>) -> Result<RunFolder> {
     }
 }
 
-/// Takes a folder for this process, whatever is in it.
+/// Takes a folder for this process, whatever is in it; what a killed one had half written goes.
 ///
 /// # Errors
 /// [`Error::Input`] if another process writes into it; [`Error::Io`] if it cannot be created.
 pub fn take(folder: &Path) -> Result<RunFolder> {
     std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, "create", e))?;
-    RunFolder::lock(folder)
+    let locked = RunFolder::lock(folder)?;
+    clean(folder, 0)?;
+    Ok(locked)
 }
 
 /// Takes the folder of a run that was broken off, to go on with it.
@@ -217,7 +275,6 @@ pub fn reopen_by(folder: &Path, state: &str) -> Result<RunFolder> {
     if !folder.is_dir() {
         return refused("no such folder", "the folder of a run that was broken off");
     }
-    let part = format!("{state}.part");
     let state = folder.join(state);
     let nothing = || {
         if folder.join(MANIFEST).is_file() {
@@ -236,18 +293,50 @@ pub fn reopen_by(folder: &Path, state: &str) -> Result<RunFolder> {
     if !state.is_file() {
         return nothing();
     }
-    // What a killed process had half written, under names of their own.
-    for entry in folder
-        .read_dir()
-        .map_err(|e| Error::io(folder, "read", e))?
-        .flatten()
-    {
-        let name = entry.file_name().to_string_lossy().into_owned();
-        if name.starts_with('.') && name.ends_with(".tmp") || name == part {
-            std::fs::remove_file(entry.path()).map_err(|e| Error::io(entry.path(), "remove", e))?;
+    clean(folder, DEEPEST)?;
+    Ok(locked)
+}
+
+/// Folders within folders of a run: its stages, what they keep, and no more.
+const DEEPEST: usize = 4;
+
+/// Removes what a killed process had half written, under names of its own, in a folder and those in it.
+fn clean(folder: &Path, deepest: usize) -> Result<()> {
+    let entries = folder.read_dir().map_err(|e| Error::io(folder, "read", e))?;
+    for entry in entries.flatten() {
+        let path = entry.path();
+        let kind = entry.file_type().map_err(|e| Error::io(&path, "read", e))?;
+        if kind.is_dir() && deepest > 0 {
+            clean(&path, deepest - 1)?;
+        } else if kind.is_file() && is_temporary(&entry.file_name().to_string_lossy()) {
+            std::fs::remove_file(&path).map_err(|e| Error::io(&path, "remove", e))?;
         }
     }
-    Ok(locked)
+    Ok(())
+}
+
+/// What becomes of settings in a run's folder that are not the run's.
+const EDITED: &str = "study.edited.toml";
+
+/// Writes `study.toml`. One that says something else, as after an edit of a run that is gone on with, is kept beside it: a run
+/// goes by the settings that it was begun with.
+///
+/// # Errors
+/// [`Error::Io`] if it cannot be written.
+pub fn write_study(folder: &Path, toml: &str) -> Result<()> {
+    let path = folder.join(SETTINGS);
+    match std::fs::read(&path) {
+        Ok(before) if before == toml.as_bytes() => return Ok(()),
+        Ok(_) => {
+            std::fs::rename(&path, folder.join(EDITED)).map_err(|e| Error::io(&path, "move", e))?;
+            tracing::warn!(
+                "{} does not say what the run goes by; it is {EDITED} now",
+                path.display()
+            );
+        }
+        Err(_) => {}
+    }
+    write_whole(&path, toml.as_bytes())
 }
 
 /// Who made a run and of what, as `manifest.json` says it.
@@ -322,12 +411,58 @@ impl<'a> Manifest<'a> {
 pub fn write_json(path: &Path, value: &impl serde::Serialize) -> Result<()> {
     let text = serde_json::to_string_pretty(value)
         .map_err(|e| Error::io(path, "write", std::io::Error::other(e)))?;
-    crate::report::write_whole(path, text.as_bytes())
+    write_whole(path, text.as_bytes())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::cell::RefCell;
+
+    thread_local! {
+        static BETWEEN: RefCell<Option<RunFolder>> = const { RefCell::new(None) };
+    }
+
+    /// Lets go of a folder that is to be let go of when another is about to lock it.
+    pub(super) fn between_open_and_lock(path: &Path) {
+        BETWEEN.with_borrow_mut(|held| drop(held.take_if(|held| held.path == path)));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_lock_file_that_is_taken_away_while_another_waits_for_it_is_held_by_nobody() {
+        let root = tempfile::tempdir().expect("a temporary folder");
+        let first = take(root.path()).expect("nobody holds it");
+        BETWEEN.set(Some(first));
+        let second = take(root.path()).expect("the first has let go of it");
+        assert!(BETWEEN.take().is_none(), "it was let go of just then");
+        assert!(second.join(LOCK).is_file());
+        let refused = take(root.path()).expect_err("the second holds it");
+        assert!(refused.to_string().contains("process"), "{refused}");
+        drop(second);
+        drop(take(root.path()).expect("nobody holds it"));
+    }
+
+    #[test]
+    fn what_was_half_written_goes_wherever_it_is() {
+        let root = tempfile::tempdir().expect("a temporary folder");
+        for folder in ["", "1_identify", ".stages/raceline-1"] {
+            let folder = root.path().join(folder);
+            std::fs::create_dir_all(&folder).expect("a folder");
+            std::fs::write(folder.join(".lapswarm-7-0.tmp"), "hal").expect("a file");
+            std::fs::write(folder.join("kept.tmp"), "whole").expect("a file");
+        }
+        std::fs::write(root.path().join(STATE), "a state").expect("a file");
+        drop(reopen(root.path()).expect("a state"));
+        for folder in ["", "1_identify", ".stages/raceline-1"] {
+            let folder = root.path().join(folder);
+            assert!(!folder.join(".lapswarm-7-0.tmp").exists(), "{folder:?}");
+            assert!(folder.join("kept.tmp").exists(), "{folder:?}");
+        }
+        std::fs::write(root.path().join(".lapswarm-7-0.tmp"), "hal").expect("a file");
+        drop(take(root.path()).expect("nobody holds it"));
+        assert!(!root.path().join(".lapswarm-7-0.tmp").exists());
+    }
 
     #[test]
     fn one_process_at_a_time_and_a_dead_one_holds_nothing() {
@@ -416,6 +551,58 @@ mod tests {
         assert!(folder.join(SETTINGS).is_file() && folder.join(STATE).is_file());
         drop(reopen(&folder).expect("a state"));
         assert!(folder.join(SETTINGS).is_file() && folder.join(STATE).is_file());
+    }
+
+    /// What a run leaves that was killed before its first state: neither it nor the next may be in the way, and a user's own
+    /// settings are no such thing.
+    #[test]
+    fn what_a_run_killed_at_its_beginning_leaves_is_in_nobodys_way() {
+        let root = tempfile::tempdir().expect("a temporary folder");
+        let folder = root.path().join("run");
+        std::fs::create_dir(&folder).expect("a folder");
+        for leaves in [
+            &[LOCK][..],
+            &[LOCK, ".lapswarm-7-0.tmp"],
+            &[LOCK, SETTINGS, ".lapswarm-7-0.tmp"],
+        ] {
+            for name in leaves {
+                std::fs::write(folder.join(name), "").expect("a file");
+            }
+            assert_eq!(
+                would_be("study", Some(&folder)).expect("as good as empty"),
+                folder
+            );
+            let held = create("study", Some(&folder)).expect("as good as empty");
+            assert!(!held.join(".lapswarm-7-0.tmp").exists());
+            drop(held);
+            std::fs::create_dir_all(&folder).expect("a folder");
+        }
+        std::fs::write(folder.join(SETTINGS), "a user's own").expect("a file");
+        create("study", Some(&folder)).expect_err("not ours to overwrite");
+        std::fs::write(folder.join(LOCK), "7").expect("a file");
+        std::fs::write(folder.join("notes.txt"), "a user's own").expect("a file");
+        create("study", Some(&folder)).expect_err("not ours to overwrite");
+    }
+
+    #[test]
+    fn edited_settings_are_kept() {
+        let root = tempfile::tempdir().expect("a temporary folder");
+        let text = |name: &str| std::fs::read_to_string(root.path().join(name)).ok();
+        write_study(root.path(), "a = 1").expect("written");
+        write_study(root.path(), "a = 1").expect("written");
+        assert_eq!(text(EDITED), None);
+        std::fs::write(root.path().join(SETTINGS), "a = 2").expect("a file");
+        write_study(root.path(), "a = 1").expect("written");
+        assert_eq!(text(SETTINGS).as_deref(), Some("a = 1"));
+        assert_eq!(text(EDITED).as_deref(), Some("a = 2"));
+    }
+
+    #[test]
+    fn names_that_cannot_be_are_refused_for_that() {
+        let root = tempfile::tempdir().expect("a temporary folder");
+        let long = root.path().join("n".repeat(300));
+        let refused = create("study", Some(&long)).expect_err("too long").to_string();
+        assert!(!refused.contains("another run"), "{refused}");
     }
 
     #[test]

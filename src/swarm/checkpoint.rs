@@ -10,13 +10,12 @@ use super::device::DeviceState;
 use super::{
     CooperativeSwarm, CovarianceSwarm, DifferenceSwarm, HybridSwarm, Islands, Mopso, Nsga2, Pso, WindowSwarm,
 };
-use crate::config::read_bytes;
+use crate::config::{check_memory, memory_limit, read_bytes, read_start};
 use crate::error::{Error, Result};
+use crate::files::write_whole;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
-use std::fs::{self, File};
-use std::io::{Read, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// The format that this version writes, and the only one that it reads. It changes with the fields of any state.
 pub const VERSION: u32 = 3;
@@ -24,8 +23,6 @@ pub const VERSION: u32 = 3;
 const MAGIC: &[u8; 8] = b"LAPSWARM";
 /// Bytes of that and the version.
 const HEAD: u64 = 12;
-/// The largest state that is read (bytes): that of more particles than a study may have.
-const LARGEST: u64 = 64 << 30;
 
 /// A state that can be kept in a file.
 pub trait Checkpoint: Serialize + DeserializeOwned {
@@ -128,28 +125,7 @@ pub fn from_bytes<T: Checkpoint>(bytes: &[u8], file: &Path) -> Result<T> {
 /// # Errors
 /// [`Error::Io`] if the file cannot be written.
 pub fn save<T: Checkpoint>(path: &Path, state: &T) -> Result<()> {
-    let bytes = to_bytes(state)?;
-    let mut name = path.as_os_str().to_owned();
-    name.push(".part");
-    let part = PathBuf::from(name);
-    let write = || -> std::io::Result<()> {
-        let mut file = File::create(&part)?;
-        file.write_all(&bytes)?;
-        // On the disk before it takes the place of the last one.
-        file.sync_all()?;
-        fs::rename(&part, path)?;
-        // Not every system lets a folder be opened; there the move is as safe as it gets.
-        let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
-        if let Ok(folder) = File::open(folder.unwrap_or(Path::new("."))) {
-            let _ = folder.sync_all();
-        }
-        Ok(())
-    };
-    write().map_err(|e| {
-        // What is left of it is of no use; that it was not written is said already.
-        let _ = fs::remove_file(&part);
-        Error::io(path, "write", e)
-    })
+    write_whole(path, &to_bytes(state)?)
 }
 
 /// The state in the file `path`.
@@ -157,15 +133,43 @@ pub fn save<T: Checkpoint>(path: &Path, state: &T) -> Result<()> {
 /// # Errors
 /// [`Error::Io`] if the file cannot be read, [`Error::Input`] as [`from_bytes`].
 pub fn load<T: Checkpoint>(path: &Path) -> Result<T> {
-    let mut head = Vec::new();
-    let file = File::open(path).map_err(|e| Error::io(path, "read", e))?;
-    file.take(HEAD)
-        .read_to_end(&mut head)
-        .map_err(|e| Error::io(path, "read", e))?;
+    load_within(path, memory_limit())
+}
+
+/// As [`load`], within so much memory (bytes).
+fn load_within<T: Checkpoint>(path: &Path, limit: u64) -> Result<T> {
+    let head = read_start(path, HEAD)?;
     // What is none, or of another version, need not be read to be refused.
     if head.len() < HEAD as usize || !head.starts_with(MAGIC) || head[MAGIC.len()..] != VERSION.to_le_bytes()
     {
         return from_bytes(&head, path);
     }
-    from_bytes(&read_bytes(path, LARGEST)?, path)
+    let size = std::fs::metadata(path)
+        .map_err(|e| Error::io(path, "read", e))?
+        .len();
+    // As it is read and as it is; a study counts a state that is written down thrice at the least.
+    check_memory(path, &format!("{size} bytes"), size.saturating_mul(2), limit)?;
+    from_bytes(&read_bytes(path, limit)?, path)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::study::journal::Journal;
+
+    #[test]
+    fn a_state_that_does_not_fit_is_not_read() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("state");
+        let text = "x".repeat(1 << 20);
+        save(&path, &Journal::new("study", &text).expect("a journal")).expect("saved");
+        let said = load_within::<Journal>(&path, 2 << 20)
+            .expect_err("a little more than twice 1 MiB")
+            .to_string();
+        for part in ["state: file size", "some 3 MiB", "2 MiB (--memory-limit-mib)"] {
+            assert!(said.contains(part), "{said}");
+        }
+        let journal = load_within::<Journal>(&path, 3 << 20).expect("it fits");
+        assert_eq!(journal.settings::<String>("study").expect("its settings"), text);
+    }
 }

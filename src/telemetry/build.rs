@@ -1,6 +1,7 @@
 //! From mapped channels to the arrays of a log: conversion to SI, one clock, laps and distance.
 
 use std::borrow::Cow;
+use std::ops::RangeInclusive;
 use std::sync::Arc;
 
 use super::audit::check_magnitude;
@@ -142,6 +143,8 @@ pub(super) struct Build<'a> {
     pub options: &'a LogOptions,
     /// Reference rolling radius, m.
     pub radius: Option<f64>,
+    /// Whether a log of so many samples may be made.
+    pub fits: &'a dyn Fn(usize) -> Result<()>,
 }
 
 impl Build<'_> {
@@ -152,6 +155,17 @@ impl Build<'_> {
             Clocked::AsLogged(grid) => (grid, true),
             Clocked::Resampled(grid) => (grid, false),
         };
+        let rate_hz = 1.0 / grid.dt_s;
+        if !RATES_HZ.contains(&rate_hz) {
+            let expected = format!("{} to {} Hz", RATES_HZ.start(), RATES_HZ.end());
+            return Err(Error::input(
+                self.source,
+                "time",
+                format!("samples at {rate_hz} Hz"),
+                expected,
+            ));
+        }
+        (self.fits)(grid.samples)?;
         let sampled = |signal: &Signal<'_>| -> Vec<f64> {
             if through {
                 signal.values.to_vec()
@@ -199,24 +213,23 @@ impl Build<'_> {
             None => self.speed_of_wheels(&mut log)?,
         };
         log.laps = self.laps(signals, &grid, &mut log.calibration)?;
-        log.distance_m = match find(Role::Distance) {
-            Some(signal) if through && self.recording.format == Format::Native => signal.values.to_vec(),
-            Some(signal) => {
-                let running = running_distance(&signal.values);
-                let all = onto(&signal.times, &running, signal.nominal_s, signal.delay_s, &grid);
-                from_lap_start(&all, &log.laps)
+        let driven = integrated(&log.vx_mps, grid.dt_s);
+        let logged = find(Role::Distance).map(|signal| {
+            if through && self.recording.format == Format::Native {
+                return signal.values.to_vec();
             }
-            None => {
-                let mut all = Vec::with_capacity(grid.samples);
-                let mut sum = 0.0;
-                let mut last = log.vx_mps.first().copied().unwrap_or(0.0);
-                for &v in &log.vx_mps {
-                    sum += (last + v) / 2.0 * if all.is_empty() { 0.0 } else { grid.dt_s };
-                    last = v;
-                    all.push(sum);
-                }
-                from_lap_start(&all, &log.laps)
+            let running = running_distance(&signal.values);
+            let all = onto(&signal.times, &running, signal.nominal_s, signal.delay_s, &grid);
+            from_lap_start(&all, &log.laps)
+        });
+        log.distance_m = match logged {
+            Some(logged) if advances(&logged, &driven, &log.laps) => logged,
+            Some(_) => {
+                let note = "the logged distance does not go with the speed: distances are the speed's";
+                log.calibration.notes.push(note.to_owned());
+                from_lap_start(&driven, &log.laps)
             }
+            None => from_lap_start(&driven, &log.laps),
         };
         Ok(log)
     }
@@ -360,6 +373,11 @@ fn lap_numbers(source: &str, lap: &Signal<'_>) -> Result<Vec<u32>> {
     lap.values.iter().enumerate().map(number).collect()
 }
 
+/// Rates that a log may have (Hz).
+pub(super) const RATES_HZ: RangeInclusive<f64> = 0.1..=100_000.0;
+/// The least way (m) by which a logged distance is judged.
+const LEAST_M: f64 = 50.0;
+
 /// Distance that goes on where the logged one starts again at nought.
 fn running_distance(values: &[f64]) -> Vec<f64> {
     let mut carried = 0.0;
@@ -377,6 +395,38 @@ fn running_distance(values: &[f64]) -> Vec<f64> {
         .collect()
 }
 
+/// Distance by the trapezoidal rule (m) from speeds (m/s) so many seconds apart.
+fn integrated(vx_mps: &[f64], dt_s: f64) -> Vec<f64> {
+    let mut sum = 0.0;
+    let mut last = vx_mps.first().copied().unwrap_or(0.0);
+    let mut first = true;
+    let step = |&v: &f64| {
+        sum += (last + v) / 2.0 * if std::mem::take(&mut first) { 0.0 } else { dt_s };
+        last = v;
+        sum
+    };
+    vx_mps.iter().map(step).collect()
+}
+
+/// Whether a logged distance (m) advances about as the integrated speed does, all laps together: a dead sensor stands still, a
+/// broken one says anything. A factor of two is beyond any wheel's slip and any correction at a beacon.
+fn advances(logged_m: &[f64], driven_m: &[f64], laps: &[Lap]) -> bool {
+    let span = |part: &[f64]| {
+        let greatest = part.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        (greatest - part.iter().copied().fold(f64::INFINITY, f64::min)).max(0.0)
+    };
+    let length = |distance_m: &[f64]| -> f64 {
+        if laps.is_empty() {
+            return span(distance_m);
+        }
+        let parts = laps.iter().filter_map(|lap| distance_m.get(lap.start..lap.end));
+        parts.map(span).sum()
+    };
+    let (said, went) = (length(logged_m), length(driven_m));
+    // Of a car that hardly moves nothing can be told.
+    went < LEAST_M || (0.5 * went..=2.0 * went).contains(&said)
+}
+
 fn from_lap_start(all: &[f64], laps: &[Lap]) -> Vec<f64> {
     let mut out = all.to_vec();
     for lap in laps {
@@ -392,6 +442,31 @@ fn from_lap_start(all: &[f64], laps: &[Lap]) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_distance_that_does_not_go_with_the_speed_is_not_believed() {
+        let lap = |start, end| Lap {
+            number: 1,
+            start,
+            end,
+            complete: true,
+        };
+        let laps = [lap(0, 100), lap(100, 200)];
+        let speeds = vec![30.0; 200];
+        let driven = integrated(&speeds, 0.1);
+        assert!((driven[199] - 30.0 * 19.9).abs() < 1e-9);
+        let near: Vec<f64> = driven.iter().map(|d| 1.02 * d).collect();
+        for laps in [&laps[..], &[]] {
+            assert!(advances(&near, &driven, laps));
+            for broken in [0.0, 1e300, -7.0] {
+                assert!(!advances(&[broken; 200], &driven, laps), "{broken}");
+            }
+            let wild: Vec<f64> = driven.iter().map(|d| 1e9 * d).collect();
+            assert!(!advances(&wild, &driven, laps));
+        }
+        // A car in its box.
+        assert!(advances(&[0.0; 200], &integrated(&[0.01; 200], 0.1), &laps));
+    }
 
     #[test]
     fn logged_distance_starts_again_with_the_counter() {

@@ -242,6 +242,13 @@ impl ChannelMap {
         }
         Ok(mapped)
     }
+
+    /// Which of a recording's channels a log is made of.
+    pub(super) fn choose(&self, recording: &Recording) -> Result<Vec<bool>> {
+        let mapped = self.resolve(recording)?;
+        let of_log = |channel: &Channel| mapped.iter().any(|m| std::ptr::eq(m.channel, channel));
+        Ok(recording.channels.iter().map(of_log).collect())
+    }
 }
 
 fn check_unit(text: &str, role: Role) -> Result<Option<Unit>, String> {

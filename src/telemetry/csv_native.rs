@@ -5,10 +5,11 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use super::log::Log;
-use super::recording::{Format, Metadata, Recording};
+use super::recording::{Format, Metadata, Reading, Recording};
 use super::table::Table;
 use super::text::Rows;
 use super::units::Unit;
+use crate::files::write_whole;
 use crate::{Error, Result};
 
 /// The column every native file has.
@@ -33,7 +34,7 @@ pub const COLUMNS: [&str; 11] = [
 ];
 
 /// Reads a native file from its text; `path` is its name in error messages.
-pub(super) fn parse(text: &str, path: &Path) -> Result<Recording> {
+pub(super) fn parse(text: &str, path: &Path, reading: &Reading<'_>) -> Result<Recording> {
     let mut rows = Rows::new(text, path, true);
     let Some(header) = rows.next().transpose()? else {
         return Err(Error::input(path, "line 1", "no rows", "a header row"));
@@ -63,7 +64,7 @@ pub(super) fn parse(text: &str, path: &Path) -> Result<Recording> {
         ));
     };
     let units = names.iter().map(|n| unit_in_name(n).to_owned()).collect();
-    let mut table = Table::new(path, names, units, time_column);
+    let mut table = Table::new(path, text, (names, units), time_column, (Format::Native, reading))?;
     for row in rows {
         table.push(&row?)?;
     }
@@ -119,7 +120,7 @@ impl NativeFormat {
 pub fn write_native(log: &Log, path: impl AsRef<Path>, format: &NativeFormat) -> Result<()> {
     let path = path.as_ref();
     let text = render(log, path, format)?;
-    std::fs::write(path, text).map_err(|e| Error::io(path, "write", e))
+    write_whole(path, text.as_bytes())
 }
 
 fn render(log: &Log, path: &Path, format: &NativeFormat) -> Result<String> {

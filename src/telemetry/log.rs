@@ -4,15 +4,22 @@ use std::ops::Range;
 use std::path::Path;
 
 use super::audit::{check_gains, frozen_tail_s};
-use super::build::{Build, signals};
+use super::build::{Build, RATES_HZ, signals};
 use super::calibrate::{self, Calibration, CalibrationOptions, Declared, FindingKind};
 use super::channel_map::{Axle, ChannelMap, Mapped};
 use super::delays;
 use super::laps::Lap;
-use super::recording::{Format, Recording};
+use super::recording::{Format, Reading, Recording};
 use super::role::Role;
 use super::text::shown;
+use crate::config::{check_memory, memory_limit};
 use crate::{Error, Result};
+
+/// Bytes of a recorded sample while a log is made: as it was recorded, in SI, its time, the interval to the next, and a sum.
+const SIGNAL_SAMPLE: u64 = 5 * 8;
+/// Bytes of a sample of the log while it is made: its eleven numbers, those of the log before delays were found, and as many
+/// again for what is estimated from them.
+const SAMPLE: u64 = 3 * 11 * 8;
 
 /// How a recording is turned into a [`Log`].
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -67,7 +74,30 @@ impl Log {
     /// channels, unknown units, samples that are no numbers, times that do not rise, gaps, and values that no car
     /// reaches.
     pub fn read(path: impl AsRef<Path>, map: &ChannelMap, options: &LogOptions) -> Result<Self> {
-        Self::from_recording(&Recording::read(path)?, map, options)
+        Self::read_within(path, map, options, memory_limit())
+    }
+
+    /// As [`Log::read`], within so much memory (bytes) instead of what is allowed at present.
+    ///
+    /// # Errors
+    /// As for [`Log::read`].
+    pub fn read_within(
+        path: impl AsRef<Path>,
+        map: &ChannelMap,
+        options: &LogOptions,
+        limit: u64,
+    ) -> Result<Self> {
+        let choose = |recording: &Recording| map.choose(recording);
+        let reading = Reading {
+            choose: &choose,
+            limit,
+        };
+        Self::made_within(
+            &Recording::read_some(path.as_ref(), &reading)?,
+            map,
+            options,
+            limit,
+        )
     }
 
     /// Makes a log of a recording.
@@ -75,6 +105,15 @@ impl Log {
     /// # Errors
     /// As for [`Log::read`], save [`Error::Io`].
     pub fn from_recording(recording: &Recording, map: &ChannelMap, options: &LogOptions) -> Result<Self> {
+        Self::made_within(recording, map, options, memory_limit())
+    }
+
+    fn made_within(
+        recording: &Recording,
+        map: &ChannelMap,
+        options: &LogOptions,
+        limit: u64,
+    ) -> Result<Self> {
         check_options(options)?;
         let source = recording.source.display().to_string();
         let radius = map.rolling_radius_m.or(options.rolling_radius_m);
@@ -101,6 +140,13 @@ impl Log {
                 "steer: taken as the road-wheel angle: the channel map gives no steering_ratio".to_owned(),
             );
         }
+        let recorded: u64 = recording.channels.iter().map(|c| c.values.len() as u64).sum();
+        let fits = |samples: usize| {
+            let needed = (samples as u64).saturating_mul(SAMPLE);
+            let needed = needed.saturating_add(recorded.saturating_mul(SIGNAL_SAMPLE));
+            let size = format!("{recorded} samples, {samples} on one clock");
+            check_memory(&recording.source, &size, needed, limit)
+        };
         let mut signals = signals(&source, &mapped, map, options, radius)?;
         let build = Build {
             source: &source,
@@ -108,6 +154,7 @@ impl Log {
             map,
             options,
             radius,
+            fits: &fits,
         };
         let mut log = build.assemble(&signals, calibration)?;
         check_gains(&log)?;
@@ -226,7 +273,7 @@ impl Log {
 
 fn check_options(options: &LogOptions) -> Result<()> {
     let checks = [
-        ("sample rate", options.rate_hz, 0.1..=100_000.0, "Hz"),
+        ("sample rate", options.rate_hz, RATES_HZ, "Hz"),
         ("bridged gap", Some(options.bridge_gaps_s), 0.0..=1e6, "s"),
         ("rolling radius", options.rolling_radius_m, 0.05..=2.0, "m"),
     ];
@@ -406,5 +453,64 @@ mod tests {
             error.contains("found 7.950 s of log, expected at least one window of 8 s"),
             "{error}"
         );
+    }
+
+    fn refused(path: &Path, limit: u64) -> String {
+        let error = Log::read_within(path, &ChannelMap::default(), &off(), limit).unwrap_err();
+        assert_eq!(error.exit_code(), 2);
+        error.to_string()
+    }
+
+    #[test]
+    fn a_log_that_does_not_fit_is_refused_before_it_is_read() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("lap.csv");
+        let head = "time_s,wheel_speed_fl_radps,wheel_speed_fr_radps,wheel_speed_rl_radps,wheel_speed_rr_radps,\
+                    steer_rad,vx_mps,ax_mps2,ay_mps2,yaw_rate_radps,spare\n";
+        let rows = 10_000;
+        let text: String = (0..rows)
+            .map(|i| format!("{},60,60,60,60,0.01,20,0,0.5,0.025,1\n", f64::from(i) / 100.0))
+            .collect();
+        std::fs::write(&path, head.to_owned() + &text).unwrap();
+        let size = std::fs::metadata(&path).unwrap().len();
+        // As it is; with its ten columns that are read, lines and times; and as a log on one clock.
+        let read = size + 8 * (rows as u64 + 2) * 13;
+        let made = rows as u64 * (10 * SIGNAL_SAMPLE + SAMPLE);
+        for (limit, part) in [
+            (size - 1, format!("{size} bytes")),
+            (read - 1, format!("{size} bytes")),
+            (made - 1, format!("{} samples", 10 * rows)),
+        ] {
+            let said = refused(&path, limit);
+            assert!(said.contains("lap.csv") && said.contains(&part), "{said}");
+            assert!(said.contains("MiB (--memory-limit-mib)"), "{said}");
+        }
+        assert!(read < made);
+        let log = Log::read_within(&path, &ChannelMap::default(), &off(), made).unwrap();
+        assert_eq!(log.samples(), rows as usize);
+    }
+
+    #[test]
+    fn of_channels_that_no_log_is_made_of_no_samples_are_kept() {
+        let text = "time_s,wheel_speed_fl_radps,wheel_speed_fr_radps,wheel_speed_rl_radps,wheel_speed_rr_radps,\
+                    steer_rad,vx_mps,ax_mps2,ay_mps2,yaw_rate_radps,spare\n0,1,1,1,1,0,9,0,0,0,7\n1,1,1,1,1,0,9,0,0,0,7\n";
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("lap.csv");
+        std::fs::write(&path, text).unwrap();
+        let map = ChannelMap::default();
+        let reading = Reading {
+            choose: &|recording| map.choose(recording),
+            limit: u64::MAX,
+        };
+        let some = Recording::read_some(&path, &reading).unwrap();
+        let whole = Recording::read(&path).unwrap();
+        assert_eq!(some.channels.len(), whole.channels.len());
+        for (some, whole) in some.channels.iter().zip(&whole.channels) {
+            if some.name == "spare" {
+                assert!(some.values.is_empty() && whole.values == [7.0, 7.0]);
+            } else {
+                assert_eq!(some, whole);
+            }
+        }
     }
 }

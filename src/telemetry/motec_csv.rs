@@ -6,14 +6,14 @@
 use std::collections::HashSet;
 use std::path::Path;
 
-use super::recording::{Format, Metadata, Recording};
+use super::recording::{Format, Metadata, Reading, Recording};
 use super::table::Table;
 use super::text::{Row, Rows, shown};
 use super::units::{Quantity, Unit};
 use crate::{Error, Result};
 
 /// Reads an export from its text; `path` is its name in error messages.
-pub(super) fn parse(text: &str, path: &Path) -> Result<Recording> {
+pub(super) fn parse(text: &str, path: &Path, reading: &Reading<'_>) -> Result<Recording> {
     let mut rows = Rows::new(text, path, false);
     let mut metadata = Metadata::default();
     let mut beacons_s = Vec::new();
@@ -38,7 +38,7 @@ pub(super) fn parse(text: &str, path: &Path) -> Result<Recording> {
         candidate = is_names.then_some(row);
     };
     let units = (0..names.len()).map(|i| units.cell(i).to_owned()).collect();
-    let mut table = Table::new(path, names, units, 0);
+    let mut table = Table::new(path, text, (names, units), 0, (Format::MotecCsv, reading))?;
     for row in rows {
         table.push(&row?)?;
     }
@@ -130,7 +130,7 @@ mod tests {
 
     #[test]
     fn header_names_units_and_data() {
-        let r = parse(SMALL, Path::new("a.csv")).unwrap();
+        let r = Recording::parse(SMALL.as_bytes(), "a.csv").unwrap();
         assert_eq!(r.metadata.venue.as_deref(), Some("Calder"));
         assert_eq!(r.metadata.comment.as_deref(), Some("warm, dry"));
         assert_eq!(r.metadata.session.as_deref(), Some("2"));
@@ -163,7 +163,9 @@ mod tests {
             ("\"Yaw\"", "\"\"", "line 7, column 3: found an empty cell"),
         ] {
             let text = SMALL.replacen(from, to, 1);
-            let error = parse(&text, Path::new("a.csv")).unwrap_err().to_string();
+            let error = Recording::parse(text.as_bytes(), "a.csv")
+                .unwrap_err()
+                .to_string();
             assert!(error.contains(part), "{error}");
         }
     }

@@ -2,16 +2,18 @@
 //!
 //! That crate trusts the file: it follows a looping channel list for ever, panics on half-precision samples and on
 //! offsets, and gives up on a whole file for one degree sign in Latin-1. So the channel list is walked and checked
-//! here first, and what the crate cannot take is put right in a copy before the crate sees it.
+//! here first, and what the crate cannot take is put right before the crate sees it. Samples are read here: the crate keeps
+//! those of a channel in four times the memory that they take in the file.
 
+use std::borrow::Cow;
 use std::collections::HashSet;
 use std::io::Cursor;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 
-use motec_i2::{ChannelMetadata, Header, I2Error, LDReader, Sample};
+use motec_i2::{ChannelMetadata, Header, I2Error, LDReader};
 
-use super::recording::{Channel, Clock, Format, Metadata, Recording, Unreadable};
+use super::recording::{Channel, Clock, Format, MOST_CHANNELS, Metadata, Reading, Recording, Unreadable};
 use super::text::{decode, shown};
 use crate::config::{LARGEST_TEXT, read_bytes};
 use crate::{Error, Result};
@@ -36,16 +38,25 @@ const HEADER_STRINGS: [(usize, usize); 8] = [
 /// Text fields of a channel's entry.
 const ENTRY_STRINGS: [(usize, usize); 3] = [(32, 32), (64, 8), (72, 12)];
 
-/// How the samples of a channel are stored, where the crate's own reading of them would not do.
+/// How the samples of a channel are stored.
 #[derive(Clone, Copy, PartialEq)]
 enum Storage {
-    Plain,
-    /// Half-precision floats, which the crate is made to read as integers of the same size.
+    I16,
+    I32,
+    F32,
+    /// Half-precision floats, which the crate is told are integers of the same size.
     Half,
     Unknown {
         kind: u16,
         size: u16,
     },
+}
+
+/// The samples of a channel in the file; `range` lies in it.
+struct Stored {
+    storage: Storage,
+    range: std::ops::Range<usize>,
+    count: usize,
 }
 
 /// Whether the bytes start like a `.ld`.
@@ -54,12 +65,12 @@ pub(super) fn is_ld(bytes: &[u8]) -> bool {
 }
 
 /// Reads a `.ld` from memory; `path` is its name in error messages.
-pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<Recording> {
-    if !is_ld(bytes) || bytes.len() < HEADER_SIZE {
+pub(super) fn parse(bytes: Cow<'_, [u8]>, path: &Path, reading: &Reading<'_>) -> Result<Recording> {
+    if !is_ld(&bytes) || bytes.len() < HEADER_SIZE {
         return Err(Error::input(
             path,
             "header",
-            match u32_at(bytes, 0) {
+            match u32_at(&bytes, 0) {
                 Some(MARKER) => format!("{} bytes", bytes.len()),
                 Some(marker) => format!("marker {marker}"),
                 None => format!("{} bytes", bytes.len()),
@@ -67,49 +78,57 @@ pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<Recording> {
             format!("a MoTeC .ld: marker {MARKER} and at least {HEADER_SIZE} bytes"),
         ));
     }
-    let mut copy = bytes.to_vec();
+    let size = bytes.len() as u64;
+    // What is somebody else's is copied.
+    let copies = if matches!(bytes, Cow::Borrowed(_)) { 2 } else { 1 };
+    let mut bytes = bytes.into_owned();
     for (at, size) in HEADER_STRINGS {
-        to_utf8(&mut copy[at..at + size]);
+        to_utf8(&mut bytes[at..at + size]);
     }
-    let storage = check_channels(&mut copy, path)?;
+    let stored = check_channels(&mut bytes, path)?;
     // A panic of the crate that the checks above do not foresee must not take the program with it.
-    let read = catch_unwind(AssertUnwindSafe(|| read_all(copy)))
+    let read = catch_unwind(AssertUnwindSafe(|| read_head(&bytes)))
         .map_err(|_| broken(path, "a layout that the .ld reader cannot follow"))?;
-    let (header, channels) = read.map_err(|e| broken(path, &e.to_string()))?;
-    if channels.len() != storage.len() {
+    let (header, metas) = read.map_err(|e| broken(path, &e.to_string()))?;
+    if metas.len() != stored.len() {
         return Err(broken(path, "a channel list that changes when read twice"));
     }
     let mut names = HashSet::new();
-    let channels = channels
-        .into_iter()
-        .zip(storage)
-        .map(|((meta, samples), storage)| channel(&meta, &samples, storage, &mut names))
-        .collect();
-    Ok(Recording {
+    let heads = metas
+        .iter()
+        .zip(&stored)
+        .map(|(meta, stored)| head(meta, stored, &mut names));
+    let mut recording = Recording {
         source: path.to_owned(),
         format: Format::MotecLd,
-        channels,
+        channels: heads.collect(),
         beacons_s: Vec::new(),
         metadata: metadata(header),
-    })
+    };
+    let wanted = (reading.choose)(&recording)?;
+    let samples = stored.iter().zip(&wanted).filter(|(_, wanted)| **wanted);
+    let samples: u64 = samples.map(|(stored, _)| stored.count as u64).sum();
+    reading.fits(
+        path,
+        size,
+        samples.saturating_mul(8).saturating_add(copies * size),
+    )?;
+    let channels = recording.channels.iter_mut().zip(&metas).zip(&stored);
+    for (((channel, meta), stored), _) in channels.zip(wanted).filter(|(_, wanted)| *wanted) {
+        fill(channel, meta, stored.storage, &bytes[stored.range.clone()]);
+    }
+    Ok(recording)
 }
 
-type Logged = (ChannelMetadata, Vec<Sample>);
-
-fn read_all(bytes: Vec<u8>) -> Result<(Header, Vec<Logged>), I2Error> {
+/// The header and the list of the channels.
+fn read_head(bytes: &[u8]) -> Result<(Header, Vec<ChannelMetadata>), I2Error> {
     let mut cursor = Cursor::new(bytes);
     let mut reader = LDReader::new(&mut cursor);
-    let header = reader.read_header()?;
-    let mut logged = Vec::new();
-    for meta in reader.read_channels()? {
-        let samples = reader.channel_data(&meta)?;
-        logged.push((meta, samples));
-    }
-    Ok((header, logged))
+    Ok((reader.read_header()?, reader.read_channels()?))
 }
 
-/// Walks the channel list, checks every address and size, and makes the copy one that the crate can read.
-fn check_channels(bytes: &mut [u8], path: &Path) -> Result<Vec<Storage>> {
+/// Walks the channel list, checks every address and size, and makes the list one that the crate can read.
+fn check_channels(bytes: &mut [u8], path: &Path) -> Result<Vec<Stored>> {
     let mut storage = Vec::new();
     let mut seen = HashSet::new();
     let mut total = 0_u64;
@@ -135,20 +154,30 @@ fn check_channels(bytes: &mut [u8], path: &Path) -> Result<Vec<Storage>> {
                 "a list without loops",
             ));
         }
+        if index >= MOST_CHANNELS {
+            return Err(Error::input(
+                path,
+                place,
+                "more channels",
+                format!("at most {MOST_CHANNELS}"),
+            ));
+        }
         for (start, size) in ENTRY_STRINGS {
             to_utf8(&mut entry[start..start + size]);
         }
         let name = decode(entry[32..64].split(|&b| b == 0).next().unwrap_or(&[])).into_owned();
         let (kind, size) = (u16_at(entry, 18), u16_at(entry, 20));
         let kept = match (kind, size) {
-            (0 | 3 | 5, 2 | 4) | (7, 4) => Storage::Plain,
+            (0 | 3 | 5, 2) => Storage::I16,
+            (0 | 3 | 5, 4) => Storage::I32,
+            (7, 4) => Storage::F32,
             (7, 2) => Storage::Half,
             _ => Storage::Unknown { kind, size },
         };
         let (data, count) = (u32_at(entry, 8), u32_at(entry, 12));
         next = u32_at(entry, 4).unwrap_or(0);
         match kept {
-            Storage::Plain => {}
+            Storage::I16 | Storage::I32 | Storage::F32 => {}
             Storage::Half => entry[18..20].copy_from_slice(&3_u16.to_le_bytes()),
             Storage::Unknown { .. } => {
                 entry[12..16].fill(0);
@@ -156,6 +185,11 @@ fn check_channels(bytes: &mut [u8], path: &Path) -> Result<Vec<Storage>> {
                 entry[20..22].copy_from_slice(&2_u16.to_le_bytes());
             }
         }
+        let mut found = Stored {
+            storage: kept,
+            range: 0..0,
+            count: 0,
+        };
         if let (Some(data), Some(count), false) = (data, count, matches!(kept, Storage::Unknown { .. })) {
             let stored = u64::from(count) * u64::from(size);
             total += stored;
@@ -168,8 +202,10 @@ fn check_channels(bytes: &mut [u8], path: &Path) -> Result<Vec<Storage>> {
                     format!("samples inside the file of {length} bytes (is it cut short?)"),
                 ));
             }
+            found.range = data as usize..data as usize + stored as usize;
+            found.count = count as usize;
         }
-        storage.push(kept);
+        storage.push(found);
     }
     if storage.is_empty() {
         return Err(Error::input(path, "channel list", "no channels", "at least one"));
@@ -177,39 +213,15 @@ fn check_channels(bytes: &mut [u8], path: &Path) -> Result<Vec<Storage>> {
     Ok(storage)
 }
 
-fn channel(
-    meta: &ChannelMetadata,
-    samples: &[Sample],
-    storage: Storage,
-    names: &mut HashSet<String>,
-) -> Channel {
-    // The crate gives these as unsigned; a logger that reverses a sensor writes a negative multiplier.
-    let [offset, multiplier, scale] = [meta.offset, meta.mul, meta.scale].map(|raw| f64::from(raw as i16));
-    let power = 10_f64.powi(-i32::from(meta.dec_places));
-    let mut unreadable = match storage {
+/// A channel without its samples.
+fn head(meta: &ChannelMetadata, stored: &Stored, names: &mut HashSet<String>) -> Channel {
+    let unreadable = match stored.storage {
         Storage::Unknown { kind, size } => Some(Unreadable {
             sample: 0,
             text: format!("samples of type {kind}, {size} bytes each"),
         }),
-        Storage::Plain | Storage::Half => None,
+        _ => None,
     };
-    let mut values = Vec::with_capacity(samples.len());
-    for (index, sample) in samples.iter().enumerate() {
-        let raw = match (sample, storage) {
-            (Sample::I16(bits), Storage::Half) => half(*bits as u16),
-            (Sample::I16(v), _) => f64::from(*v),
-            (Sample::I32(v), _) => f64::from(*v),
-            (Sample::F32(v), _) => f64::from(*v),
-        };
-        let value = (raw / scale * power + offset) * multiplier;
-        if !value.is_finite() && unreadable.is_none() {
-            unreadable = Some(Unreadable {
-                sample: index,
-                text: value.to_string(),
-            });
-        }
-        values.push(if value.is_finite() { value } else { f64::NAN });
-    }
     let base = meta.name.trim();
     let mut name = base.to_owned();
     let mut copy = 2;
@@ -224,10 +236,54 @@ fn channel(
             start_s: 0.0,
             rate_hz: f64::from(meta.sample_rate),
         },
-        values,
+        values: Vec::new(),
         unreadable,
         lines: None,
     }
+}
+
+/// Reads a channel's samples.
+fn fill(channel: &mut Channel, meta: &ChannelMetadata, storage: Storage, bytes: &[u8]) {
+    // The crate gives these as unsigned; a logger that reverses a sensor writes a negative multiplier.
+    let [offset, multiplier, scale] = [meta.offset, meta.mul, meta.scale].map(|raw| f64::from(raw as i16));
+    let power = 10_f64.powi(-i32::from(meta.dec_places));
+    let unreadable = &mut channel.unreadable;
+    let value = |(index, raw): (usize, f64)| {
+        let value = (raw / scale * power + offset) * multiplier;
+        if value.is_finite() {
+            return value;
+        }
+        unreadable.get_or_insert_with(|| Unreadable {
+            sample: index,
+            text: value.to_string(),
+        });
+        f64::NAN
+    };
+    let words = bytes.as_chunks::<2>().0.iter();
+    let doubles = bytes.as_chunks::<4>().0.iter();
+    channel.values = match storage {
+        Storage::I16 => words
+            .map(|b| f64::from(i16::from_le_bytes(*b)))
+            .enumerate()
+            .map(value)
+            .collect(),
+        Storage::Half => words
+            .map(|b| half(u16::from_le_bytes(*b)))
+            .enumerate()
+            .map(value)
+            .collect(),
+        Storage::I32 => doubles
+            .map(|b| f64::from(i32::from_le_bytes(*b)))
+            .enumerate()
+            .map(value)
+            .collect(),
+        Storage::F32 => doubles
+            .map(|b| f64::from(f32::from_le_bytes(*b)))
+            .enumerate()
+            .map(value)
+            .collect(),
+        Storage::Unknown { .. } => Vec::new(),
+    };
 }
 
 fn half(bits: u16) -> f64 {
@@ -341,7 +397,7 @@ mod made_up;
 mod tests {
     use super::made_up::ENTRY;
     use super::*;
-    use motec_i2::Datatype;
+    use motec_i2::{Datatype, Sample};
     use proptest::prelude::*;
 
     fn small() -> Vec<u8> {
@@ -360,7 +416,7 @@ mod tests {
 
     #[test]
     fn channels_keep_their_own_rates() {
-        let r = parse(&small(), Path::new("a.ld")).unwrap();
+        let r = Recording::parse(&small(), "a.ld").unwrap();
         assert_eq!(r.metadata.venue.as_deref(), Some("Test"));
         let expected = [1.0, -2.5, 0.7];
         for (value, expected) in r.channels[0].values.iter().zip(expected) {
@@ -379,11 +435,11 @@ mod tests {
         bytes[ENTRY + 24] = 3;
         let data = u32_at(&bytes, ENTRY + 8).unwrap() as usize;
         bytes[data..data + 2].copy_from_slice(&0x3E00_u16.to_le_bytes());
-        let r = parse(&bytes, Path::new("a.ld")).unwrap();
+        let r = Recording::parse(&bytes, "a.ld").unwrap();
         assert_eq!(r.channels[0].unit, "°/s");
         assert!((r.channels[0].values[0] - 3.15).abs() < 1e-12);
         bytes[ENTRY + 18] = 99;
-        let r = parse(&bytes, Path::new("a.ld")).unwrap();
+        let r = Recording::parse(&bytes, "a.ld").unwrap();
         assert!(r.channels[0].values.is_empty() && r.channels[0].unreadable.is_some());
     }
 
@@ -400,7 +456,7 @@ mod tests {
         let patched = |at: usize, value: u32| {
             let mut bytes = small();
             bytes[at..at + 4].copy_from_slice(&value.to_le_bytes());
-            parse(&bytes, Path::new("a.ld")).unwrap_err().to_string()
+            Recording::parse(&bytes, "a.ld").unwrap_err().to_string()
         };
         for (error, part) in [
             (patched(0, 63), "header: found marker 63"),
@@ -417,7 +473,7 @@ mod tests {
         ] {
             assert!(error.contains(part), "{error}");
         }
-        let error = parse(&small()[..900], Path::new("a.ld")).unwrap_err();
+        let error = Recording::parse(&small()[..900], "a.ld").unwrap_err();
         assert!(error.to_string().contains("900 bytes"), "{error}");
     }
 
@@ -444,16 +500,16 @@ mod tests {
                     *byte = value;
                 }
             }
-            let _ = parse(&bytes, Path::new("a.ld"));
+            let _ = Recording::parse(&bytes, "a.ld");
             bytes.truncate(cut);
-            let _ = parse(&bytes, Path::new("a.ld"));
+            let _ = Recording::parse(&bytes, "a.ld");
         }
 
         #[test]
         fn never_panics_on_arbitrary_bytes(tail in prop::collection::vec(any::<u8>(), 0..3000)) {
             let mut bytes = MARKER.to_le_bytes().to_vec();
             bytes.extend(tail);
-            let _ = parse(&bytes, Path::new("a.ld"));
+            let _ = Recording::parse(&bytes, "a.ld");
         }
     }
 }

@@ -1,10 +1,11 @@
 //! A log file as it was logged, before anybody decided what its channels mean.
 
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::{csv_native, motec_csv, motec_ld, text};
-use crate::config::{LARGEST_LOG, read_bytes};
+use crate::config::{LARGEST_LOG, check_memory, memory_limit, read_bytes};
 use crate::{Error, Result};
 
 /// The file formats that can be read.
@@ -100,6 +101,33 @@ pub struct Metadata {
     pub range: Option<String>,
 }
 
+/// The most channels of a log: more than any logger has, and few enough that what is kept of each besides its samples does not
+/// count.
+pub(super) const MOST_CHANNELS: usize = 1 << 16;
+
+/// What of a log is read, and into how much memory that has to fit.
+pub(super) struct Reading<'a> {
+    /// Which of the channels, of which names and units are known and nothing else.
+    pub choose: &'a dyn Fn(&Recording) -> Result<Vec<bool>>,
+    /// Bytes.
+    pub limit: u64,
+}
+
+impl Reading<'_> {
+    /// All channels, into what is allowed at present.
+    fn whole() -> Self {
+        Self {
+            choose: &|recording| Ok(vec![true; recording.channels.len()]),
+            limit: memory_limit(),
+        }
+    }
+
+    /// Whether what is `needed` (bytes) to read a file of `size` bytes is allowed.
+    pub fn fits(&self, path: &Path, size: u64, needed: u64) -> Result<()> {
+        check_memory(path, &format!("{size} bytes"), needed, self.limit)
+    }
+}
+
 /// A log file as it was logged.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Recording {
@@ -122,9 +150,17 @@ impl Recording {
     /// [`Error::Io`] when the file cannot be read; [`Error::Input`], naming the line or channel, when it holds
     /// something it must not.
     pub fn read(path: impl AsRef<Path>) -> Result<Self> {
-        let path = path.as_ref();
-        let bytes = read_bytes(path, LARGEST_LOG)?;
-        let mut recording = Self::parse(&bytes, path)?;
+        Self::read_some(path.as_ref(), &Reading::whole())
+    }
+
+    /// As [`Recording::read`], of the channels that are chosen; the others have no samples.
+    pub(super) fn read_some(path: &Path, reading: &Reading<'_>) -> Result<Self> {
+        if let Ok(told) = std::fs::metadata(path) {
+            // It is in memory as it is while it is read.
+            reading.fits(path, told.len(), told.len())?;
+        }
+        let bytes = read_bytes(path, LARGEST_LOG.min(reading.limit))?;
+        let mut recording = Self::parse_some(Cow::Owned(bytes), path, reading)?;
         if recording.format == Format::MotecLd {
             recording.beacons_s = motec_ld::beacons_beside(path)?;
         }
@@ -137,20 +173,26 @@ impl Recording {
     /// # Errors
     /// As for [`Recording::read`].
     pub fn parse(bytes: &[u8], path: impl AsRef<Path>) -> Result<Self> {
-        let path = path.as_ref();
+        Self::parse_some(Cow::Borrowed(bytes), path.as_ref(), &Reading::whole())
+    }
+
+    fn parse_some(bytes: Cow<'_, [u8]>, path: &Path, reading: &Reading<'_>) -> Result<Self> {
         let is_ld = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("ld"));
-        if is_ld || motec_ld::is_ld(bytes) {
-            return motec_ld::parse(bytes, path);
+        if is_ld || motec_ld::is_ld(&bytes) {
+            return motec_ld::parse(bytes, path, reading);
         }
-        let text = text::decode(bytes);
+        let size = bytes.len() as u64;
+        // What is no UTF-8 is written anew, at most twice as long.
+        reading.fits(path, size, text::decoded_size(&bytes))?;
+        let text = text::decode(&bytes);
         let mut rows = text::Rows::new(&text, path, true);
         let Some(first) = rows.next().transpose()? else {
             return Err(Error::input(path, "line 1", "no rows", "a log"));
         };
         if first.cells.iter().any(|c| c == csv_native::TIME) {
-            csv_native::parse(&text, path)
+            csv_native::parse(&text, path, reading)
         } else if first.cell(0).eq_ignore_ascii_case("Format") {
-            motec_csv::parse(&text, path)
+            motec_csv::parse(&text, path, reading)
         } else {
             Err(Error::input(
                 path,

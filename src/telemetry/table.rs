@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use super::recording::{Channel, Clock, Unreadable};
+use super::recording::{Channel, Clock, Format, Metadata, Reading, Recording, Unreadable};
 use super::text::{Row, shown};
 use crate::{Error, Result};
 
@@ -13,24 +13,41 @@ pub(super) struct Table<'a> {
     names: Vec<String>,
     units: Vec<String>,
     time_column: usize,
+    /// Of columns that are not read nothing is kept.
+    wanted: Vec<bool>,
     columns: Vec<Vec<f64>>,
     unreadable: Vec<Option<Unreadable>>,
     lines: Vec<usize>,
 }
 
 impl<'a> Table<'a> {
-    /// An empty table; `names` are unique, `units` as many, `time_column` one of them.
-    pub fn new(file: &'a Path, names: Vec<String>, units: Vec<String>, time_column: usize) -> Self {
+    /// An empty table with room for the rows of `text`; `names` are unique, `units` as many, `time_column` one of them.
+    pub fn new(
+        file: &'a Path,
+        text: &str,
+        (names, units): (Vec<String>, Vec<String>),
+        time_column: usize,
+        (format, reading): (Format, &Reading<'_>),
+    ) -> Result<Self> {
         let width = names.len();
-        Self {
+        let wanted = wanted(file, (&names, &units), time_column, (format, reading))?;
+        let rows = text.bytes().filter(|&b| b == b'\n').count() + 1;
+        // Beside the text: the columns, the lines of the rows, and times and lines once more, as they are shared in the end.
+        let kept = wanted.iter().filter(|w| **w).count() as u64 + 3;
+        let needed = (rows as u64).saturating_mul(8 * kept);
+        let size = text.len() as u64;
+        reading.fits(file, size, needed.saturating_add(size))?;
+        let room = |wanted: &bool| Vec::with_capacity(if *wanted { rows } else { 0 });
+        Ok(Self {
             file,
             names,
             units,
             time_column,
-            columns: vec![Vec::new(); width],
+            columns: wanted.iter().map(room).collect(),
+            wanted,
             unreadable: vec![None; width],
-            lines: Vec::new(),
-        }
+            lines: Vec::with_capacity(rows),
+        })
     }
 
     /// Adds a row. A cell that is no finite number is remembered, not refused, unless it is the time.
@@ -48,6 +65,9 @@ impl<'a> Table<'a> {
         }
         let sample = self.lines.len();
         for (index, cell) in row.cells.iter().take(width).enumerate() {
+            if !self.wanted[index] {
+                continue;
+            }
             let value = match cell.parse::<f64>() {
                 Ok(value) if value.is_finite() => value,
                 _ if index == self.time_column => {
@@ -103,4 +123,34 @@ impl<'a> Table<'a> {
         }
         Ok(channels)
     }
+}
+
+/// Which columns are read: those that are chosen by their names and units, and the time.
+fn wanted(
+    file: &Path,
+    (names, units): (&[String], &[String]),
+    time_column: usize,
+    (format, reading): (Format, &Reading<'_>),
+) -> Result<Vec<bool>> {
+    let channels = names.iter().zip(units).enumerate();
+    let head = Recording {
+        source: file.to_owned(),
+        format,
+        channels: channels
+            .filter(|(index, _)| *index != time_column)
+            .map(|(_, (name, unit))| Channel {
+                name: name.clone(),
+                unit: unit.clone(),
+                clock: Clock::Times(Arc::default()),
+                values: Vec::new(),
+                unreadable: None,
+                lines: None,
+            })
+            .collect(),
+        beacons_s: Vec::new(),
+        metadata: Metadata::default(),
+    };
+    let mut wanted = (reading.choose)(&head)?;
+    wanted.insert(time_column, true);
+    Ok(wanted)
 }

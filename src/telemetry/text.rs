@@ -3,6 +3,7 @@
 use std::borrow::Cow;
 use std::path::Path;
 
+use super::recording::MOST_CHANNELS;
 use crate::{Error, Result};
 
 /// A quoted cell may span lines (a comment in a header); one that spans more than this was never closed.
@@ -14,8 +15,26 @@ pub(super) fn decode(bytes: &[u8]) -> Cow<'_, str> {
     let bytes = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes);
     match std::str::from_utf8(bytes) {
         Ok(text) => Cow::Borrowed(text),
-        Err(_) => Cow::Owned(bytes.iter().map(|&b| char::from(b)).collect()),
+        Err(_) => {
+            let mut text = String::with_capacity(latin_1_size(bytes));
+            text.extend(bytes.iter().map(|&b| char::from(b)));
+            Cow::Owned(text)
+        }
     }
+}
+
+/// Bytes of Latin-1 in UTF-8.
+fn latin_1_size(bytes: &[u8]) -> usize {
+    bytes.len() + bytes.iter().filter(|b| !b.is_ascii()).count()
+}
+
+/// What bytes and their text take together (bytes).
+pub(super) fn decoded_size(bytes: &[u8]) -> u64 {
+    let text = match std::str::from_utf8(bytes) {
+        Ok(_) => 0,
+        Err(_) => latin_1_size(bytes),
+    };
+    bytes.len() as u64 + text as u64
 }
 
 /// A string as an error message may show it: short, and on one line.
@@ -104,6 +123,16 @@ impl<'a> Iterator for Rows<'a> {
             match self.record() {
                 Ok((_, record)) if record.trim().is_empty() => {}
                 Ok((line, record)) => {
+                    let commas = record.bytes().filter(|&b| b == b',').count();
+                    if commas >= MOST_CHANNELS {
+                        self.rest = "";
+                        return Some(Err(Error::input(
+                            self.file,
+                            format!("line {line}"),
+                            format!("{commas} commas"),
+                            format!("a row of at most {MOST_CHANNELS} cells"),
+                        )));
+                    }
                     let cells = split(record);
                     return Some(Ok(Row { line, cells }));
                 }
@@ -172,6 +201,15 @@ mod tests {
             .find_map(Result::err)
             .unwrap();
         assert!(error.to_string().contains("t.csv: line 2"), "{error}");
+    }
+
+    #[test]
+    fn a_row_of_more_cells_than_any_log_has_is_refused() {
+        let row = ",".repeat(MOST_CHANNELS);
+        let refused = |text: &str| Rows::new(text, Path::new("t.csv"), false).find_map(Result::err);
+        let said = refused(&format!("a\n{row}\n")).unwrap().to_string();
+        assert!(said.contains("t.csv: line 2: found 65536 commas"), "{said}");
+        assert!(refused(&row[1..]).is_none());
     }
 
     #[test]

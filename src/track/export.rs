@@ -2,11 +2,10 @@
 
 use super::circuit::Circuit;
 use super::cross_sections::CrossSections;
+use crate::files::write_new;
 use crate::{Error, Result};
 use glam::DVec2;
 use std::fmt::Write as _;
-use std::fs::OpenOptions;
-use std::io::Write as _;
 use std::path::Path;
 
 /// A table of points with the distances to the right and left edges, to the micrometre.
@@ -17,13 +16,6 @@ fn table(rows: impl Iterator<Item = (DVec2, f64, f64)>) -> String {
         let _ = writeln!(text, "{:.6},{:.6},{right_m:.6},{left_m:.6}", point.x, point.y);
     }
     text
-}
-
-/// Writes a file that is not there yet.
-fn write_new(path: &Path, text: &str) -> Result<()> {
-    let file = OpenOptions::new().write(true).create_new(true).open(path);
-    file.and_then(|mut file| file.write_all(text.as_bytes()))
-        .map_err(|e| Error::io(path, "write", e))
 }
 
 impl Circuit {
@@ -39,7 +31,7 @@ impl Circuit {
     /// # Errors
     /// [`Error::Io`] when the file is there already or cannot be written.
     pub fn write_racetrack(&self, path: impl AsRef<Path>) -> Result<()> {
-        write_new(path.as_ref(), &self.to_racetrack_csv())
+        write_new(path, self.to_racetrack_csv().as_bytes())
     }
 }
 
@@ -63,7 +55,7 @@ impl CrossSections {
     /// # Errors
     /// [`Error::Io`] when the file is there already or cannot be written.
     pub fn write_racetrack(&self, path: impl AsRef<Path>) -> Result<()> {
-        write_new(path.as_ref(), &self.to_racetrack_csv())
+        write_new(path, self.to_racetrack_csv().as_bytes())
     }
 
     /// Writes [`CrossSections::line_to_racetrack_csv`] to a new file.
@@ -82,6 +74,6 @@ impl CrossSections {
                 format!("{}, one per cut", self.len()),
             ));
         }
-        write_new(path, &self.line_to_racetrack_csv(alpha))
+        write_new(path, self.line_to_racetrack_csv(alpha).as_bytes())
     }
 }

@@ -11,7 +11,8 @@ use super::circuit::{Circuit, Section};
 use super::from_curvature::{Closure, CurvatureRow, CurvatureTable};
 use super::reference::Smoothing;
 use super::survey::{Survey, SurveyOptions};
-use crate::config::read_text;
+use crate::config::{LONGEST_NAME, read_text};
+use crate::files::stem;
 use crate::{Error, Result};
 
 /// A circuit embedded in the crate: name, TOML and curvature table.
@@ -34,7 +35,7 @@ pub const BUNDLED: [&str; 1] = ["silverstone_gp"];
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct CircuitFile {
-    name: String,
+    name: Spanned<String>,
     #[serde(default = "yes")]
     closed: bool,
     curvature_table: Spanned<String>,
@@ -210,11 +211,21 @@ impl Checker<'_> {
         }
     }
 
+    /// A name that is short enough.
+    pub fn name(&self, name: &Spanned<String>, field: &str) -> Result<String> {
+        let text = name.get_ref();
+        if text.len() > LONGEST_NAME {
+            let expected = format!("a name of at most {LONGEST_NAME} bytes");
+            return Err(self.refuse(name.span(), field, format!("{} bytes", text.len()), &expected));
+        }
+        Ok(text.clone())
+    }
+
     /// Named stretches within a length (m).
     pub fn sections(&self, entries: &[SectionEntry], length_m: f64) -> Result<Vec<Section>> {
         let mut sections: Vec<Section> = Vec::with_capacity(entries.len());
         for entry in entries {
-            let name = entry.name.get_ref().trim().to_owned();
+            let name = self.name(&entry.name, "name")?.trim().to_owned();
             let start_m = self.within(&entry.start_m, "start_m", 0.0, length_m)?;
             let end_m = self.within(&entry.end_m, "end_m", 0.0, length_m)?;
             if end_m <= start_m {
@@ -225,16 +236,19 @@ impl Checker<'_> {
                     &format!("a station beyond start_m, {start_m}"),
                 ));
             }
-            let taken = sections
-                .iter()
-                .any(|s| s.name.to_lowercase() == name.to_lowercase());
-            if name.is_empty() || taken {
-                return Err(self.refuse(
-                    entry.name.span(),
-                    "name",
-                    format!("`{name}`"),
-                    "a name that no other section has",
-                ));
+            // Files are named by sections, not everywhere with regard to case.
+            let file_name = |name: &str| stem(name).to_lowercase();
+            let taken = sections.iter().find(|s| file_name(&s.name) == file_name(&name));
+            let expected = match taken {
+                None if name.is_empty() => Some("a name".to_owned()),
+                None => None,
+                Some(other) => Some(format!(
+                    "a name that no other section has: one that differs from `{}` in its letters and digits",
+                    other.name
+                )),
+            };
+            if let Some(expected) = expected {
+                return Err(self.refuse(entry.name.span(), "name", format!("`{name}`"), &expected));
             }
             sections.push(Section { name, start_m, end_m });
         }
@@ -266,7 +280,7 @@ fn assemble(
     let sections = check.sections(&file.sections, length_m)?;
     Ok(CurvatureTable {
         rows: parse_table(table_file, csv, length_m, file.closed, width_m)?,
-        name: file.name,
+        name: check.name(&file.name, "name")?,
         closed: file.closed,
         length_m,
         start_heading_rad: heading.to_radians(),

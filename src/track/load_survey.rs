@@ -15,7 +15,7 @@ use crate::Result;
 #[serde(deny_unknown_fields)]
 struct SurveyFile {
     survey: String,
-    name: Option<String>,
+    name: Option<Spanned<String>>,
     closed: Option<bool>,
     width_m: Option<Spanned<f64>>,
     lap: Option<u32>,
@@ -32,7 +32,7 @@ struct SurveyFile {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct CornerEntry {
-    name: String,
+    name: Spanned<String>,
     station_m: Spanned<f64>,
 }
 
@@ -64,15 +64,15 @@ pub(super) fn read(path: &Path, text: &str) -> Result<(Survey, Smoothing)> {
     };
     let beside = path.parent().unwrap_or(Path::new("")).join(&file.survey);
     let mut survey = Survey::read(beside, &options)?;
-    if let Some(name) = file.name {
-        survey.name = name;
+    if let Some(name) = &file.name {
+        survey.name = check.name(name, "name")?;
     }
     if !file.sections.is_empty() || !file.corners.is_empty() {
         let length_m = survey.smoothed(&smoothing)?.length_m();
         survey.sections = check.sections(&file.sections, length_m)?;
         for corner in &file.corners {
             survey.corners.push(Corner {
-                name: corner.name.clone(),
+                name: check.name(&corner.name, "name")?,
                 station_m: check.within(&corner.station_m, "station_m", 0.0, length_m)?,
             });
         }

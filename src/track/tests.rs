@@ -190,6 +190,39 @@ fn a_users_own_circuit_loads() {
 }
 
 #[test]
+fn names_that_files_cannot_have_or_share_are_refused() {
+    let section = |name: &str, start: u32| {
+        format!(
+            "[[sections]]\nname = \"{name}\"\nstart_m = {start}\nend_m = {}\n",
+            start + 5
+        )
+    };
+    let long = "n".repeat(121);
+    for (toml, parts) in [
+        (
+            format!("{TOML}{}{}", section("A b", 0), section("a/B", 10)),
+            ["line 10, field name", "`a/B`", "differs from `A b`"],
+        ),
+        (
+            format!("{TOML}{}", section(&long, 0)),
+            ["line 6, field name", "121 bytes", "at most 120 bytes"],
+        ),
+        (
+            TOML.replace("Own", &long),
+            ["line 1, field name", "121 bytes", "at most 120 bytes"],
+        ),
+    ] {
+        let (_folder, path) = Folder::with(&toml, TABLE);
+        let said = Circuit::load(&path).expect_err("refused").to_string();
+        for part in parts {
+            assert!(said.contains(part), "{said}");
+        }
+    }
+    let (_folder, path) = Folder::with(&TOML.replace("Own", &long[1..]), TABLE);
+    drop(Circuit::load(&path).expect("a name of 120 bytes"));
+}
+
+#[test]
 fn mistakes_are_named_by_file_line_and_field() {
     let section = "[[sections]]\nname = \"A\"\nstart_m = 10\nend_m = 5\n";
     let cases: [(String, String, &[&str]); 15] = [

@@ -7,6 +7,7 @@ use super::powertrain::Powertrain;
 use super::tyre::{LinearTyre, TyreCoefficients, TyreFile, TyreModel};
 use crate::config::{Document, Table, read_text};
 use crate::error::{Error, Result};
+use crate::files::write_whole;
 use std::path::Path;
 
 /// The tyres of both axles.
@@ -151,7 +152,7 @@ impl Car {
             None => None,
         };
         let car = Self {
-            name: root.string("name")?.unwrap_or("unnamed car").to_owned(),
+            name: root.name("name")?.unwrap_or("unnamed car").to_owned(),
             chassis,
             tyres,
             steering_ratio: steering.number("ratio", 0.1, 100.0, "")?.unwrap_or(1.0),
@@ -382,5 +383,5 @@ fn toml_string(text: &str) -> String {
 }
 
 fn write_file(path: &Path, text: &str) -> Result<()> {
-    std::fs::write(path, text).map_err(|e| Error::io(path, "write", e))
+    write_whole(path, text.as_bytes())
 }

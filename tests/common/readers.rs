@@ -10,7 +10,7 @@ use lapswarm::study::run::RunSettings;
 use lapswarm::study::sensitivity::SensitivitySettings;
 use lapswarm::study::surface::SurfaceSettings;
 use lapswarm::study::sweep::{self, SWEEP_FILE, SweepSettings};
-use lapswarm::study::transient::read_line;
+use lapswarm::study::transient::{DriveState, read_line};
 use lapswarm::swarm::checkpoint::{self, Checkpoint};
 use lapswarm::swarm::device::DeviceState;
 use lapswarm::swarm::{
@@ -316,10 +316,11 @@ pub fn state(data: &[u8]) {
     let Some((&kind, payload)) = data.split_first() else {
         return;
     };
-    match kind % 3 {
+    match kind % 4 {
         0 => forged::<SearchState>(payload),
         1 => forged::<LinesState>(payload),
-        _ => forged::<Journal>(payload),
+        2 => forged::<Journal>(payload),
+        _ => forged::<DriveState>(payload),
     }
 }
 

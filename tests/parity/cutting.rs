@@ -2,9 +2,11 @@
 
 use crate::common::{UNKNOWNS, bundled_car, problem};
 use crate::device::device;
-use lapswarm::evaluate::replay::{Batching, GpuEvaluator, Norm, ReplayProblem, SimdEvaluator};
+use lapswarm::evaluate::replay::{
+    Batching, GpuEvaluator, Norm, ReplayProblem, SimdEvaluator, open_evaluator,
+};
 use lapswarm::evaluate::simd::InstructionSet;
-use lapswarm::evaluate::{Evaluation, Evaluator, Failure};
+use lapswarm::evaluate::{BackendChoice, Evaluation, Evaluator, Failure};
 use lapswarm::parity::Draws;
 use lapswarm::parity::made_up::{Lap, candidates};
 
@@ -156,6 +158,70 @@ fn long_windows_are_driven_in_chunks_that_do_not_show() {
         assert_eq!(evaluator.statistics().dispatches, 1000usize.div_ceil(samples));
         assert_eq!(bits(&found), bits(&expected), "{samples} samples at a time");
     }
+}
+
+/// A software driver leaves all loops of a dispatch after 65,535 rounds without a word: however fast the device, no dispatch
+/// may take as many.
+#[test]
+fn windows_longer_than_a_driver_bears_are_driven_to_their_end() {
+    let Some(context) = device() else { return };
+    for substeps in [1, 3] {
+        let lap = Lap {
+            samples: 20_000,
+            substeps,
+            ..Lap::default()
+        };
+        let replay = problem(bundled_car(), &UNKNOWNS, lap);
+        let population = candidates(&replay, 4, 0.2, &mut Draws::new(8));
+        let mut evaluator = GpuEvaluator::new(&replay, context.clone()).expect("the kernels compile");
+        let unhurried = Batching {
+            dispatch_ms: 1e9,
+            ..evaluator.batching()
+        };
+        evaluator = evaluator.with_batching(unhurried);
+        evaluator.evaluate(&population).expect("it runs");
+        // As fast as can be, from what the first evaluation taught.
+        let found = evaluator.evaluate(&population).expect("it runs");
+        assert!(evaluator.statistics().dispatches > 1);
+        evaluator = evaluator.with_batching(Batching {
+            samples: Some(64),
+            ..unhurried
+        });
+        let expected = evaluator.evaluate(&population).expect("it runs");
+        assert_eq!(bits(&found), bits(&expected), "{substeps} steps a sample");
+        assert!(expected.failures.iter().flatten().count() < 4);
+    }
+}
+
+/// So many steps between samples that not one block of samples fits a software driver's loops: it says so, and lanes take over.
+#[test]
+fn more_steps_than_a_driver_bears_are_refused() {
+    let Some(context) = device() else { return };
+    if context.summary().kind.is_real() {
+        return;
+    }
+    let lap = Lap {
+        samples: 200,
+        substeps: 210,
+        ..Lap::default()
+    };
+    let replay = problem(bundled_car(), &UNKNOWNS, lap);
+    let refusal = GpuEvaluator::new(&replay, context).err().expect("too many");
+    assert!(
+        refusal.to_string().contains("202 steps between samples"),
+        "{refusal}"
+    );
+    let mut evaluator = open_evaluator(&replay, BackendChoice::Gpu, None).expect("lanes take over");
+    assert_eq!(evaluator.backend().backend, "simd");
+    assert!(evaluator.device_faults()[0].contains("202 steps"));
+    let population = candidates(&replay, 4, 0.2, &mut Draws::new(8));
+    assert!(
+        evaluator
+            .evaluate(&population)
+            .expect("it runs")
+            .failures
+            .contains(&None)
+    );
 }
 
 /// A window costs the same whether it is scored alone or among others.

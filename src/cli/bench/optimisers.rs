@@ -3,6 +3,7 @@
 use super::pages::of_optimisers;
 use crate::cli::kept::{self, Kept, Machine};
 use crate::cli::print_json;
+use crate::cli::said::outln;
 use lapswarm::swarm::comparison::{MULTI_OBJECTIVE, SINGLE_OBJECTIVE, compare, quartiles};
 use lapswarm::swarm::metrics::signed_rank;
 use lapswarm::swarm::problems::{NAMES, TestProblem};
@@ -74,10 +75,18 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let folder = arguments.kept.folder("bench")?;
     let mut rows = Vec::new();
     if !arguments.json {
-        println!("medians and interquartile ranges of {} seeds", arguments.seeds);
-        println!(
+        outln!("medians and interquartile ranges of {} seeds", arguments.seeds);
+        outln!(
             "{:<12}{:<18}{:>14}{:>10}{:>12}{:>14}{:>10}{:>12}{:>12}",
-            "problem", "algorithm", "hypervolume", "IQR", "IGD+", "error", "IQR", "best peer", "p"
+            "problem",
+            "algorithm",
+            "hypervolume",
+            "IQR",
+            "IGD+",
+            "error",
+            "IQR",
+            "best peer",
+            "p"
         );
     }
     for problem in NAMES
@@ -107,7 +116,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         let machine = Machine::of(["cpu"], None)?;
         kept::write(folder, "bench optimisers", &table, page, &machine)?;
         if !arguments.json {
-            println!("Results: {}", folder.display());
+            outln!("Results: {}", folder.display());
         }
     }
     if arguments.json {
@@ -159,7 +168,7 @@ fn print_row(row: &Row) {
         Some(_) => fixed(row.best_peer),
         None => short(row.best_peer),
     };
-    println!(
+    outln!(
         "{:<12}{:<18}{:>14}{:>10}{:>12}{:>14}{:>10}{:>12}{:>12}",
         row.problem,
         row.algorithm,

@@ -3,7 +3,9 @@
 use super::machine::{forget_peak_memory, peak_memory_bytes, peak_operations_per_s};
 use super::pages::of_scaling;
 use crate::cli::kept::{self, Kept, Machine};
+use crate::cli::said::outln;
 use crate::cli::{backend_flag, print_json};
+use lapswarm::config::read_text;
 use lapswarm::evaluate::drive::{CpuDriveEvaluator, DriveProblem, GpuDriveEvaluator, SimdDriveEvaluator};
 use lapswarm::evaluate::gpu::{GpuContext, devices};
 use lapswarm::evaluate::line::{
@@ -321,12 +323,12 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let peak = threads as f64 * peak_operations_per_s(InstructionSet::best());
     let mut rows: Vec<Row> = Vec::new();
     if !arguments.quiet {
-        println!(
+        outln!(
             "{threads} threads, {:.0} billion unfused {} operations per second at best",
             peak / 1e9,
             InstructionSet::best().name()
         );
-        println!(
+        outln!(
             "{:<8}{:<8}{:>10}{:>15}{:>14}{:>12}{:>10}{:>8}{:>10}{}",
             "problem",
             "backend",
@@ -392,7 +394,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         let machine = Machine::of(names, arguments.adapter.as_deref())?;
         kept::write(folder, "bench", &table, page, &machine)?;
         if !arguments.quiet {
-            println!("Results: {}", folder.display());
+            outln!("Results: {}", folder.display());
         }
     }
     if arguments.json {
@@ -438,7 +440,7 @@ fn print_row(row: &Row, other: Option<&Table>) {
             )
         })
     });
-    println!(
+    outln!(
         "{:<8}{:<8}{:>10}{:>15.1}{:>14}{:>12.1}{:>10}{:>8}{:>10}{ratio}   {}",
         row.problem,
         row.backend,
@@ -454,7 +456,7 @@ fn print_row(row: &Row, other: Option<&Table>) {
 }
 
 fn read_table(path: &Path) -> Result<Table> {
-    let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, "read", e))?;
+    let text = read_text(path)?;
     // A redirected run may have its table above the JSON, which is the last line.
     let last = text.lines().rev().find(|l| !l.trim().is_empty()).unwrap_or("");
     serde_json::from_str(last)

@@ -2,6 +2,7 @@
 
 use super::pages::of_studies;
 use crate::cli::kept::{self, Kept, Machine};
+use crate::cli::said::outln;
 use crate::cli::{backend_flag, print_json};
 use lapswarm::evaluate::line::{LineObjective, LineProblem, open_line_evaluator};
 use lapswarm::evaluate::replay::{CHANNEL_NAMES, ReplayProblem, open_evaluator};
@@ -282,11 +283,14 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         rows: Vec::new(),
     };
     if !arguments.json {
-        println!(
+        outln!(
             "{} evaluations, archive of {}, {} threads, medians of {} seeds; hypervolume as a share of the problem's box",
-            arguments.evaluations, arguments.archive, table.threads, arguments.seeds
+            arguments.evaluations,
+            arguments.archive,
+            table.threads,
+            arguments.seeds
         );
-        println!(
+        outln!(
             "{:<10}{:<18}{:>11}{:>12}{:>13}{:>10}{:>10}{:>14}",
             "problem",
             "algorithm",
@@ -337,7 +341,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         )?;
         kept::write(folder, "bench studies", &table, page, &machine)?;
         if !arguments.json {
-            println!("Results: {}", folder.display());
+            outln!("Results: {}", folder.display());
         }
     }
     if arguments.json {
@@ -347,7 +351,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 }
 
 fn print_row(row: &Row) {
-    println!(
+    outln!(
         "{:<10}{:<18}{:>11}{:>12}{:>13.4}{:>10.1e}{:>10.2}{:>14.2}",
         row.problem,
         row.algorithm,

@@ -2,6 +2,7 @@
 
 use super::pages::of_swarm;
 use crate::cli::kept::{self, Kept, Machine};
+use crate::cli::said::outln;
 use crate::cli::{backend_flag, print_json};
 use lapswarm::Result;
 use lapswarm::evaluate::gpu::{GpuContext, devices};
@@ -90,11 +91,11 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         growth: Vec::new(),
     };
     if !arguments.json {
-        println!(
+        outln!(
             "milliseconds per generation of the optimiser alone, {} threads",
             table.threads
         );
-        println!(
+        outln!(
             "{:<8}{:<8}{:>11}{:>11}{:>12}{:>12}{:>12}{:>12}{:>13}",
             "backend",
             "problem",
@@ -144,9 +145,11 @@ pub fn run(arguments: &Arguments) -> Result<()> {
                     exponent: slope(&times),
                 };
                 if !arguments.json {
-                    println!(
+                    outln!(
                         "{:<8}{:<8} time grows as particles^{:.2}",
-                        growth.backend, growth.problem, growth.exponent
+                        growth.backend,
+                        growth.problem,
+                        growth.exponent
                     );
                 }
                 table.growth.push(growth);
@@ -158,7 +161,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         let machine = Machine::of(table.rows.iter().map(|r| r.backend), arguments.adapter.as_deref())?;
         kept::write(folder, "bench swarm", &table, page, &machine)?;
         if !arguments.json {
-            println!("Results: {}", folder.display());
+            outln!("Results: {}", folder.display());
         }
     }
     if arguments.json {
@@ -168,7 +171,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 }
 
 fn print_row(row: &Row) {
-    println!(
+    outln!(
         "{:<8}{:<8}{:>11}{:>11}{:>12.3}{:>12.3}{:>12.3}{:>12}{:>13.4}   {}",
         row.backend,
         row.problem,

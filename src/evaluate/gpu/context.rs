@@ -49,6 +49,14 @@ pub struct GpuContext {
     kernels: Mutex<HashMap<String, Arc<Kernel>>>,
 }
 
+/// What did not happen in all the time that a device is given.
+fn hung(what: &str) -> String {
+    format!(
+        "{what} within {} s, so that the device counts as hung",
+        PATIENCE.as_secs()
+    )
+}
+
 fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     // What is guarded is replaced whole, so that a panic elsewhere leaves it sound.
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
@@ -430,9 +438,8 @@ impl GpuContext {
     fn waited(&self, outcome: std::result::Result<wgpu::PollStatus, wgpu::PollError>) -> Result<()> {
         match outcome {
             Ok(_) => self.check(),
-            Err(error @ wgpu::PollError::Timeout) => {
-                let message = format!("the device does not finish its work: {error}");
-                locked(&self.failure).get_or_insert(message);
+            Err(wgpu::PollError::Timeout) => {
+                locked(&self.failure).get_or_insert_with(|| hung("a dispatch did not come to its end"));
                 // Closing it would wait for that work without end: it stays open for as long as the process lives.
                 std::mem::forget((self.device.clone(), self.queue.clone()));
                 self.check()
@@ -470,6 +477,7 @@ impl GpuContext {
             self.wait(None)?;
             match receiver.recv_timeout(Duration::from_millis(1)) {
                 Err(RecvTimeoutError::Timeout) if start.elapsed() < PATIENCE => {}
+                Err(RecvTimeoutError::Timeout) => return Err(failed(hung("they were not handed over"))),
                 answer => break answer.map_err(|e| failed(e.to_string()))?,
             }
         };

@@ -4,9 +4,10 @@ use super::kernel::{BLOCK, CHANNELS};
 use super::problem::ReplayProblem;
 use crate::error::{Error, Result};
 use crate::evaluate::gpu::shader::{ReplayShape, base_vectors};
-use crate::evaluate::gpu::{Binding, DeviceKind, GpuContext, Kernel, workgroup};
+use crate::evaluate::gpu::{Binding, DeviceKind, GpuContext, Kernel, LOOP_ROUNDS, workgroup};
 use crate::evaluate::sound::{joined, sound};
 use crate::evaluate::{BackendInfo, Evaluation, Evaluator, ModelTable, Problem};
+use crate::vehicle::model::STAGES;
 use bytemuck::{Pod, Zeroable};
 use std::sync::Arc;
 use wgpu::BufferUsages as Usage;
@@ -65,6 +66,17 @@ pub struct Stretch {
 const PROGRESS_PLANES: usize = 6 + CHANNELS + 1;
 /// Floats per candidate that come back.
 const RESULT_PLANES: usize = CHANNELS + 1;
+
+/// Rounds of the kernel's loops in a step between samples: itself and its stages.
+const fn rounds_per_substep() -> usize {
+    1 + STAGES.len()
+}
+
+/// Rounds of the kernel's loops in a sample.
+const fn rounds_per_sample(substeps: usize) -> usize {
+    1 + substeps * rounds_per_substep()
+}
+
 /// Dispatches that one set of timestamps covers.
 const TIMED_DISPATCHES: u32 = 1024;
 
@@ -175,6 +187,18 @@ impl<'a> GpuEvaluator<'a> {
         let reduce = context.kernel(&shape.reduce(), "replay_reduce", &[Uniform, Read, Write])?;
 
         let plan = replay.plan.to_f32();
+        let (substeps, software) = (
+            plan.fractions.len(),
+            context.summary().kind == DeviceKind::Software,
+        );
+        if software && Self::most_samples(substeps) == 0 {
+            return Err(Error::Device(format!(
+                "{} leaves loops that are longer than it thinks good: at most {} steps between samples can be driven on it, \
+                 {substeps} are asked for",
+                context.summary(),
+                (LOOP_ROUNDS / BLOCK - 1) / rounds_per_substep(),
+            )));
+        }
         let mut base = table.base.clone();
         base.resize(base_vectors(base.len()) * 4, 0.0);
         let samples: Vec<DeviceSample> = plan
@@ -289,7 +313,9 @@ impl<'a> GpuEvaluator<'a> {
         let fitting = (self.batching.bytes.min(binding) / per_lane) as usize;
         let lanes = self.batching.lanes.min(fitting).max(self.workgroup);
         let most_groups = limits.max_compute_workgroups_per_dimension as usize;
-        // Windows are split only into whole blocks, because they are summed by the block.
+        // The kernel that joins windows takes a round for each, and they are split only into whole blocks, because they are
+        // summed by the block.
+        let most_groups = most_groups.min(LOOP_ROUNDS);
         let all = self.replay.plan.windows.len();
         let whole_blocks = (lanes / self.workgroup).min(most_groups) / BLOCK * BLOCK;
         let windows = if all * self.workgroup <= lanes && all <= most_groups {
@@ -355,13 +381,20 @@ impl<'a> GpuEvaluator<'a> {
         Ok(())
     }
 
+    /// The most samples of a dispatch, in whole blocks: a kernel's loops have a limit, see [`LOOP_ROUNDS`].
+    fn most_samples(substeps: usize) -> usize {
+        LOOP_ROUNDS / rounds_per_sample(substeps) / BLOCK * BLOCK
+    }
+
     /// Samples of the next dispatch, in whole blocks.
     fn next_samples(&self, lanes: usize) -> usize {
         let by_time = self.pace.map_or(BLOCK, |pace| {
             let ms_per_sample = pace.ms_per_sample * (lanes as f64 / pace.lanes as f64).max(1.0);
             (self.batching.dispatch_ms / ms_per_sample) as usize
         });
-        let samples = by_time.min(self.batching.samples.unwrap_or(usize::MAX));
+        let samples = by_time
+            .min(self.batching.samples.unwrap_or(usize::MAX))
+            .min(Self::most_samples(self.replay.plan.fractions.len()));
         (samples / BLOCK).max(1) * BLOCK
     }
 

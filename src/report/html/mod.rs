@@ -14,9 +14,9 @@ mod thin;
 pub use charts::{Front, Scale};
 pub use lap::{LapLine, LapMap, LapPanel, LapTrace, LapView};
 
-use super::files::write_whole;
 use super::table::{Cells, Column, plain_digits};
 use super::{BarPanel, CurvePanel, ParameterRow, SurfaceFigure};
+use crate::files::write_whole;
 use crate::{Error, Result};
 use charts::Chart;
 use escape::{html, json_in_script, raised};

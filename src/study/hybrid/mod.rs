@@ -24,8 +24,8 @@ pub use strategy::{FoundStrategy, StrategyFront, search_front, search_strategy, 
 pub use worth::{Worth, correlation, mean_worths, worth};
 
 use crate::error::Result;
-use crate::evaluate::BackendInfo;
 use crate::evaluate::gpu::DispatchWatch;
+use crate::evaluate::{BackendInfo, FailureCounts, add_failures};
 use crate::line::energy::{Gates, Mode};
 use crate::optimum::Deployment;
 use crate::study::journal::Recorder;
@@ -90,6 +90,8 @@ pub struct Outcome {
     pub backend: BackendInfo,
     /// What went wrong with devices and was got over.
     pub device_faults: Vec<String>,
+    /// Laps of the swarms that failed, by reason.
+    pub failures: FailureCounts,
     /// The longest that a dispatch kept the device (ms); nothing where none was at work.
     pub longest_dispatch_ms: Option<f64>,
     /// Laps evaluated.
@@ -173,7 +175,9 @@ pub fn run_recorded(
     if interrupted {
         recorder.keep()?;
     }
+    let mut failures = FailureCounts::new();
     let mut outcome = Outcome {
+        failures: FailureCounts::new(),
         evaluations: 1 + 2 * scenarios.len() as u64 + sized,
         engine,
         scenarios,
@@ -217,6 +221,7 @@ pub fn run_recorded(
         let search = Instant::now();
         let mut interrupted = outcome.interrupted;
         let swarm = search_strategy(setup, settings, budget_j / 1e6, recorder, |p| {
+            add_failures(&mut failures, &p.failures);
             let told = observe(&told("swarm", p.evaluations, format!("{:.4} s", p.best[0])));
             interrupted |= told.is_break();
             told
@@ -225,6 +230,7 @@ pub fn run_recorded(
         let mut swarm_front = None;
         if settings.objectives.len() > 1 && !interrupted {
             let found = search_front(setup, settings, budget_j / 1e6, recorder, |p| {
+                add_failures(&mut failures, &p.failures);
                 let best: Vec<String> = p.best.iter().map(|b| format!("{b:.3}")).collect();
                 let told = observe(&told("swarm front", p.evaluations, best.join(" ")));
                 interrupted |= told.is_break();
@@ -249,6 +255,7 @@ pub fn run_recorded(
             swarm_front,
         });
     }
+    outcome.failures = failures;
     outcome.device_faults = recorder.device_faults().to_vec();
     outcome.longest_dispatch_ms = dispatches.longest_ms();
     if let Some(backend) = recorder.backend() {

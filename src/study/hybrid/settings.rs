@@ -1,16 +1,20 @@
 //! What a hybrid study is asked to do.
 
 use super::scenario::{Scenario, published};
-use crate::config::{Document, Table, read_text};
+use crate::config::{Document, LONGEST_NAME, Table, read_text};
 use crate::error::{Error, Result};
 use crate::evaluate::BackendChoice;
 use crate::evaluate::hybrid::{HybridObjective, MOST_MOTOR};
+use crate::files::stem;
 use crate::line::energy::{Gates, Mode};
 use crate::study::identify::parse_backend;
 use crate::study::memory::Size;
 use crate::study::raceline::RacelineSettings;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
+
+/// Laps that a study has beside those of its scenarios.
+const OWN_LAPS: [&str; 3] = ["engine alone", "exact", "swarm"];
 
 /// What the swarm may change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -203,11 +207,24 @@ impl HybridStudySettings {
                 .keys()
                 .map(|name| {
                     let row = table.required_table(name)?;
+                    if name.len() > LONGEST_NAME {
+                        let expected = format!("a scenario whose name has at most {LONGEST_NAME} bytes");
+                        return Err(table.refuse(name, expected));
+                    }
                     let scenario = read_scenario(name, &row)?;
                     row.finish()?;
                     Ok(scenario)
                 })
                 .collect::<Result<_>>()?;
+            let mut stems: Vec<(String, &str)> = OWN_LAPS.map(|own| (stem(own).to_lowercase(), own)).into();
+            for name in table.keys() {
+                let stem = stem(name).to_lowercase();
+                if let Some((_, other)) = stems.iter().find(|(taken, _)| *taken == stem) {
+                    let expected = format!("a name that differs from `{other}` in its letters and digits");
+                    return Err(table.refuse(name, expected));
+                }
+                stems.push((stem, name));
+            }
             table.finish()?;
         }
         s.seed = root.integer("seed", 0, u64::MAX)?.unwrap_or(s.seed);
@@ -242,8 +259,8 @@ impl HybridStudySettings {
             // The journal holds those of all searches.
             iterations: self.iterations.saturating_mul(searches),
             sections: self.sections,
-            archive: 0,
             journal: true,
+            ..Size::default()
         }
     }
 
@@ -266,6 +283,7 @@ impl HybridStudySettings {
             ("sections", self.sections, 8, 1_000_000),
             ("population", self.population, 8, 10_000_000),
             ("iterations", self.iterations, 1, 1_000_000),
+            ("stint_laps", self.stint_laps, 0, 1000),
         ];
         for (name, value, least, most) in counts {
             if !(least..=most).contains(&value) {
@@ -277,6 +295,8 @@ impl HybridStudySettings {
             ("car_width_m", self.car_width_m, 0.0, 10.0),
             ("entry_mps", self.entry_mps, 0.5, 150.0),
             ("energy_mj", self.energy_mj.unwrap_or(0.0), 0.0, 1000.0),
+            ("stint_fuel_kg", self.stint_fuel_kg, 0.0, 500.0),
+            ("match_lap_time_s", self.match_lap_time_s.unwrap_or(1.0), 1.0, 1e5),
         ];
         for (name, value, least, most) in ranges {
             if !(least..=most).contains(&value) {
@@ -449,6 +469,15 @@ mod tests {
             ("[scenarios.own]\nsteer = 0.1", "scenarios.own.steer"),
             ("[scenarios.own]\nmode = \"both\"", "scenarios.own.mode"),
             ("[scenarios.own]\nsoc = 3", "scenarios.own.soc"),
+            // Their laps would be of one file.
+            (
+                "[scenarios.\"a b\"]\n[scenarios.\"a/b\"]\n",
+                "line 2, field scenarios.a/b",
+            ),
+            ("[scenarios.\"A b\"]\n[scenarios.a_b]\n", "differs from `A b`"),
+            ("[scenarios.swarm]\n", "differs from `swarm`"),
+            ("[scenarios.\"engine-alone\"]\n", "differs from `engine alone`"),
+            (&format!("[scenarios.{}]\n", "n".repeat(300)), "at most 120 bytes"),
         ] {
             std::fs::write(&path, text).unwrap();
             let error = HybridStudySettings::read(&path).unwrap_err().to_string();

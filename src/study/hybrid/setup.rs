@@ -141,8 +141,7 @@ impl HybridInputs {
         let (line_name, alpha, through) = match (&settings.line, given) {
             (Some(path), Some(points)) => (path.display().to_string(), None, points),
             _ => {
-                let solvers =
-                    ExactSolvers::stopped_by(&raceline, &raceline_settings, Some(Arc::clone(stop)))?;
+                let solvers = ExactSolvers::stopped_by(&raceline, &raceline_settings, Arc::clone(stop))?;
                 let found = solvers.best(LineObjective::LapTime)?;
                 if stop.load(Ordering::Relaxed) {
                     return Ok(None);

@@ -5,6 +5,7 @@ use super::search::{Judged, Outcome};
 use super::settings::IdentifySettings;
 use super::setup::{CHANNELS, Setup};
 use crate::error::Result;
+use crate::evaluate::failures_in_words;
 use crate::evaluate::replay::{CHANNEL_NAMES, CHANNEL_UNITS};
 use crate::report::{
     Cells, Column, Curve, CurvePanel, Front, HtmlReport, LapLine, LapPanel, LapTrace, LapView, Objective,
@@ -76,6 +77,7 @@ pub(super) fn write(
     page.provenance("adapter", &summary.adapter);
     page.provenance("driver", &summary.driver);
     page.provenance("candidates evaluated", summary.evaluations.to_string());
+    page.provenance("candidates that failed", failures_in_words(&summary.failures));
     page.provenance(
         "candidates per second",
         format!("{:.0}", summary.evaluations_per_s),

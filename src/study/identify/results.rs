@@ -6,8 +6,8 @@ use super::settings::IdentifySettings;
 use super::setup::{CHANNELS, Setup, cost_unit};
 use super::study_file::write_settings;
 use crate::error::Result;
-use crate::evaluate::FailureCounts;
 use crate::evaluate::replay::{CHANNEL_NAMES, CHANNEL_UNITS};
+use crate::evaluate::{FailureCounts, failures_in_words};
 use crate::report::{
     Cells, Column, ConvergenceRun, Objective, ParameterRow, ShadedSection, TraceFigure, TracePanel, TrackMap,
     plot_convergence, plot_parameters, plot_pareto, plot_traces, plot_track_map, write_csv,
@@ -604,12 +604,8 @@ impl Summary {
             self.elapsed_s
         ));
         if !self.failures.is_empty() {
-            let told: Vec<String> = self
-                .failures
-                .iter()
-                .map(|(reason, count)| format!("{count} {}", reason.replace('_', " ")))
-                .collect();
-            text.push_str(&format!("Candidates that failed: {}.\n", told.join(", ")));
+            let told = failures_in_words(&self.failures);
+            text.push_str(&format!("Candidates that failed: {told}.\n"));
         }
         for fault in &self.device_faults {
             text.push_str(&format!("Note: {fault}\n"));

@@ -200,7 +200,17 @@ pub fn search_with(
     let swarm_s = before_s + began.elapsed().as_secs_f64();
     let evaluations = state.history.last().map_or(0, |row| row.evaluations);
     let backend = evaluator.backend();
-    let (swarm_candidate, front) = best_so_far(&state.place, evaluator)?;
+    // Of a search that is broken off before anything drives there is nothing to tell yet; its state is saved.
+    let folder = keeper.folder().to_owned();
+    let nothing_yet = |error: Error, interrupted: bool| {
+        if interrupted {
+            Error::Interrupted(folder.clone())
+        } else {
+            error
+        }
+    };
+    let best = best_so_far(&state.place, evaluator);
+    let (swarm_candidate, front) = best.map_err(|e| nothing_yet(e, interrupted))?;
 
     let polish_began = Instant::now();
     let mut refined = None;
@@ -220,7 +230,9 @@ pub fn search_with(
         Some(r) => (r.candidate, r.drives, [r.hops, r.hops_gained]),
         None => (swarm_candidate.clone(), 0, [0, 0]),
     };
-    let residuals = replay.residuals(&candidate).ok_or_else(nothing_drives)?;
+    let residuals = replay
+        .residuals(&candidate)
+        .ok_or_else(|| nothing_yet(nothing_drives(), interrupted))?;
     Ok(Outcome {
         identifiability: judge(&residuals, &replay.problem.variables, &candidate, &setup.scales),
         polish_s: polish_began.elapsed().as_secs_f64(),

@@ -3,7 +3,7 @@
 use super::settings::{Algorithm, IdentifySettings, ObjectiveChoice};
 use crate::error::Result;
 use crate::evaluate::replay::{CHANNEL_NAMES, norm_name};
-use crate::report::write_whole;
+use crate::study::run_folder::write_study;
 use crate::swarm::Mutation;
 use std::path::Path;
 
@@ -12,7 +12,7 @@ use std::path::Path;
 /// # Errors
 /// [`crate::Error::Io`] if it cannot be written.
 pub fn write_settings(folder: &Path, settings: &IdentifySettings) -> Result<()> {
-    write_whole(folder.join("study.toml"), settings.to_toml().as_bytes())
+    write_study(folder, &settings.to_toml())
 }
 
 impl IdentifySettings {

@@ -7,12 +7,12 @@ use crate::evaluate::line::LineObjective;
 use crate::line::{FineLine, PointMass, cuts_about, shares_across};
 use crate::optimum::{
     Bounds, DescentSettings, LineMap, LineProblem, Optimum, PointMassLimits, Start, Status, Weights, fastest,
-    least_curvature, least_curvature_of, least_gamma, least_squared_length, polish_lines, shortest,
+    least_curvature_of, least_gamma, least_squared_length, polish_lines, shortest,
 };
 use crate::track::CrossSections;
 use glam::DVec2;
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// The solvers on one track.
 ///
@@ -28,7 +28,7 @@ pub struct ExactSolvers {
     limits: Option<PointMassLimits>,
     car: PointMass,
     entry_mps: f64,
-    stop: Option<Arc<AtomicBool>>,
+    stop: Arc<AtomicBool>,
 }
 
 /// A line of the exact solvers.
@@ -98,25 +98,21 @@ impl ExactSolvers {
     /// # Errors
     /// [`crate::Error::Input`] for a car that cannot be; [`crate::Error::Study`] if the least curved line is refused.
     pub fn new(setup: &Setup, settings: &RacelineSettings) -> Result<Self> {
-        Self::stopped_by(setup, settings, None)
+        Self::stopped_by(setup, settings, Arc::default())
     }
 
     /// As [`ExactSolvers::new`], ended by the flag: what they say once it is raised is no optimum.
     ///
     /// # Errors
     /// As [`ExactSolvers::new`].
-    pub fn stopped_by(
-        setup: &Setup,
-        settings: &RacelineSettings,
-        stop: Option<Arc<AtomicBool>>,
-    ) -> Result<Self> {
+    pub fn stopped_by(setup: &Setup, settings: &RacelineSettings, stop: Arc<AtomicBool>) -> Result<Self> {
         let cuts = setup.cuts.clone();
         let map = LineMap::at_every_cut(&cuts);
         let bounds = Bounds::road(cuts.len());
         let spacing_m = cuts.spacing_m();
         let start = least_gamma(&map, &spacing_m, &bounds)?.x;
         let curvature = LineProblem {
-            stop: stop.as_deref(),
+            stop: Some(&stop),
             ..LineProblem::of(&map)
         };
         let base = least_curvature_of(&curvature, &bounds, &start)?.x;
@@ -138,12 +134,17 @@ impl ExactSolvers {
         })
     }
 
+    /// The flag that ends them.
+    pub(super) fn flag(&self) -> &AtomicBool {
+        &self.stop
+    }
+
     fn problem<'a>(&'a self, map: &'a LineMap) -> LineProblem<'a> {
         LineProblem {
             limits: self.limits.as_ref().map(|l| l as _),
             start_mps: self.entry_mps,
             spacing_m: Some(&self.spacing_m),
-            stop: self.stop.as_deref(),
+            stop: Some(&self.stop),
             ..LineProblem::of(map)
         }
     }
@@ -166,7 +167,7 @@ impl ExactSolvers {
             LineObjective::Length => shortest(map, bounds)?,
             LineObjective::LengthSquared => least_squared_length(map, bounds)?,
             LineObjective::Gamma => least_gamma(map, &self.spacing_m, bounds)?,
-            LineObjective::Kappa2 => least_curvature(map, bounds, &self.base)?,
+            LineObjective::Kappa2 => least_curvature_of(&self.problem(map), bounds, &self.base)?,
             LineObjective::LapTime if self.limits.is_none() => return Ok(None),
             LineObjective::LapTime => {
                 let (map, bounds) = &self.smooth;
@@ -231,6 +232,9 @@ impl ExactSolvers {
         });
         let mut found: Option<Optimum> = None;
         let mut closer = |how: &About| -> Result<bool> {
+            if self.stop.load(Ordering::Relaxed) {
+                return Ok(false);
+            }
             let alpha = found.as_ref().map_or(alpha, |f| &f.x);
             let Some(closer) = self.taken_about(limits, alpha, how)? else {
                 return Ok(false);
@@ -265,6 +269,7 @@ impl ExactSolvers {
         let problem = LineProblem {
             limits: Some(limits),
             start_mps: self.entry_mps,
+            stop: Some(&self.stop),
             ..LineProblem::of(&map)
         };
         let start = vec![0.0; map.variables()];

@@ -3,6 +3,7 @@
 use super::exact::ExactSolvers;
 use super::lines::Setup;
 use super::settings::RacelineSettings;
+use super::watched::watched;
 use crate::error::Result;
 use crate::evaluate::line::{LineProblem, open_line_evaluator};
 use crate::evaluate::{BackendInfo, Evaluator, FAILED_COST, FailureCounts, add_failures};
@@ -13,6 +14,7 @@ use crate::swarm::metrics::hypervolume;
 use crate::swarm::{Archive, Mopso, MopsoSettings, Optimiser, Progress, PsoSettings, Truncation, step};
 use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
+use std::sync::atomic::Ordering;
 
 /// Lines none of which another betters in every objective.
 #[derive(Clone, Debug, Default)]
@@ -116,20 +118,19 @@ pub(super) fn search_front_from(
     let mut faults = DeviceFaults::of(evaluator.as_ref());
     // Opened anew, a device may meet what it has met before.
     let told = |own: &[String]| [known_faults, own].concat();
+    let mut latest = None;
     while !state.swarm.done() {
         let progress = step(&mut state.swarm, evaluator.as_mut())?;
         add_failures(&mut state.failures, &progress.failures);
         let met = faults.since(evaluator.as_ref(), &told(&state.device_faults));
         state.device_faults.extend(met);
         if observe(&progress, &state)?.is_break() {
+            solvers.flag().store(true, Ordering::Relaxed);
             break;
         }
+        latest = Some(progress);
     }
-    let FrontState {
-        swarm,
-        failures,
-        mut device_faults,
-    } = state;
+    let swarm = &state.swarm;
 
     let whole = LineProblem::new(
         cuts.clone(),
@@ -159,7 +160,13 @@ pub(super) fn search_front_from(
     let mut evaluations = swarm.evaluations();
     evaluations += insert_all(&mut archive, judge.as_mut(), &lines)?;
     if settings.local_search && settings.objectives.iter().all(|o| solvers.solves(*o)) {
-        let polished = polish_along(&archive, settings, solvers)?;
+        let polished = std::thread::scope(|scope| {
+            let led = scope.spawn(|| polish_along(&archive, settings, solvers));
+            watched(led, solvers.flag(), || match &latest {
+                Some(progress) => observe(progress, &state),
+                None => Ok(ControlFlow::Continue(())),
+            })
+        })?;
         evaluations += insert_all(&mut archive, judge.as_mut(), &polished)?;
     }
 
@@ -185,6 +192,11 @@ pub(super) fn search_front_from(
     } else {
         f64::NAN
     };
+    let FrontState {
+        failures,
+        mut device_faults,
+        ..
+    } = state;
     let met = judging.since(judge.as_ref(), &told(&device_faults));
     device_faults.extend(met);
     Ok(LineFront {

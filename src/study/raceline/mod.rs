@@ -13,6 +13,7 @@ mod results;
 mod search;
 mod settings;
 mod state;
+mod watched;
 
 pub use exact::{ExactLine, ExactSolvers, WeightedLine};
 pub use front::{LineFront, front_problem, search_front, starting_lines};
@@ -39,6 +40,7 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
+use watched::watched;
 
 /// What one objective came to.
 #[derive(Clone, Debug)]
@@ -186,7 +188,7 @@ pub fn find_lines_from(
 
     let reference = setup.report("reference", &setup.cuts.reference, settings)?;
     let stop = Arc::new(AtomicBool::new(false));
-    let solvers = ExactSolvers::stopped_by(setup, settings, Some(Arc::clone(&stop)))?;
+    let solvers = ExactSolvers::stopped_by(setup, settings, Arc::clone(&stop))?;
     let began = Instant::now();
     let mut device_faults = Vec::new();
     let mut failures = FailureCounts::new();
@@ -215,10 +217,7 @@ pub fn find_lines_from(
             .collect();
         for (k, (objective, exact)) in settings.objectives.iter().zip(exact).enumerate() {
             let waiting = Instant::now();
-            let (exact, own_s) = match exact.join() {
-                Ok(solved) => solved?,
-                Err(panic) => std::panic::resume_unwind(panic),
-            };
+            let (exact, own_s) = watched(exact, &stop, || work.asked("exact"))?;
             waited_s += waiting.elapsed().as_secs_f64();
             exact_s = own_s.max(exact_s);
             let start = exact
@@ -232,15 +231,13 @@ pub fn find_lines_from(
                 ),
                 None => {
                     let found = search_objective(settings, setup, *objective, start, &mut work)?;
-                    let best = best_line(
-                        settings,
-                        setup,
-                        *objective,
-                        start,
-                        &found,
-                        &solvers,
-                        work.interrupted,
-                    )?;
+                    let led = scope.spawn({
+                        let (solvers, found, interrupted) = (&solvers, found.alpha.clone(), work.interrupted);
+                        move || led_downhill(settings, *objective, &found, solvers, interrupted)
+                    });
+                    let led = watched(led, &stop, || work.asked("local search"))?;
+                    let rivals: Vec<_> = start.map(<[f64]>::to_vec).into_iter().chain(led).collect();
+                    let best = best_line(settings, setup, *objective, &found, &rivals)?;
                     let elapsed_s = before_s + began.elapsed().as_secs_f64() - waited_s;
                     work.finished(|state| {
                         state.finished.push(FinishedObjective {
@@ -342,31 +339,37 @@ pub fn find_lines_from(
     })
 }
 
-/// The best of what was found, what the local search makes of it, and the line that the search started from: one that goes
-/// from coarse to fine may lose a little of that.
+/// What the local search makes of a line that was found.
+fn led_downhill(
+    settings: &RacelineSettings,
+    objective: LineObjective,
+    found: &[f64],
+    solvers: &ExactSolvers,
+    interrupted: bool,
+) -> Result<Vec<Vec<f64>>> {
+    if !settings.local_search || !solvers.solves(objective) || interrupted {
+        return Ok(Vec::new());
+    }
+    if objective == LineObjective::LapTime
+        && let Some(led) = solvers.fastest_about(found)?
+    {
+        return Ok(vec![led.x]);
+    }
+    solvers.polish(vec![(found.to_vec(), vec![(objective, 1.0)])], 60)
+}
+
+/// The best of what was found and its rivals: the line that the search started from, of which one that goes from coarse to fine
+/// may lose a little, and what the local search makes of it.
 fn best_line(
     settings: &RacelineSettings,
     setup: &Setup,
     objective: LineObjective,
-    start: Option<&[f64]>,
     found: &FoundLine,
-    solvers: &ExactSolvers,
-    interrupted: bool,
+    rivals: &[Vec<f64>],
 ) -> Result<ReportedLine> {
-    let mut rivals: Vec<Vec<f64>> = start.map(<[f64]>::to_vec).into_iter().collect();
-    if settings.local_search && solvers.solves(objective) && !interrupted {
-        let led = match objective {
-            LineObjective::LapTime => solvers.fastest_about(&found.alpha)?.map(|led| led.x),
-            _ => None,
-        };
-        match led {
-            Some(led) => rivals.push(led),
-            None => rivals.extend(solvers.polish(vec![(found.alpha.clone(), vec![(objective, 1.0)])], 60)?),
-        }
-    }
     let mut best = setup.report(line_name(objective), &found.alpha, settings)?;
     for alpha in rivals {
-        let line = setup.report(line_name(objective), &alpha, settings)?;
+        let line = setup.report(line_name(objective), alpha, settings)?;
         if line.worth(objective) < best.worth(objective) {
             best = line;
         }

@@ -7,7 +7,8 @@ mod surfaces;
 
 use super::{Outcome, RacelineSettings, ReportedLine, Setup};
 use crate::error::Result;
-use crate::evaluate::FailureCounts;
+use crate::evaluate::{FailureCounts, failures_in_words};
+use crate::study::run_folder::write_study;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -277,6 +278,9 @@ impl Summary {
             self.adapter,
             self.exact_elapsed_s
         );
+        if !self.failures.is_empty() {
+            text += &format!("Lines that failed: {}\n", failures_in_words(&self.failures));
+        }
         for fault in &self.device_faults {
             text += &format!("Note: {fault}\n");
         }
@@ -292,7 +296,7 @@ impl Summary {
 /// # Errors
 /// [`crate::Error::Io`] if it cannot be written.
 pub fn write_settings(folder: &Path, settings: &RacelineSettings) -> Result<()> {
-    crate::report::write_whole(folder.join("study.toml"), settings.to_toml().as_bytes())
+    write_study(folder, &settings.to_toml())
 }
 
 /// Writes all files of a run into `folder`.

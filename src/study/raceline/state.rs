@@ -99,6 +99,16 @@ impl Work<'_> {
         Ok(flow)
     }
 
+    /// Whether to go on with what a solver is at.
+    pub fn asked(&mut self, stage: &str) -> Result<ControlFlow<()>> {
+        let progress = StudyProgress {
+            stage: stage.to_owned(),
+            evaluations: 0,
+            best: "not known yet".to_owned(),
+        };
+        self.told(&progress, |_| ())
+    }
+
     /// Takes a step that is done with into the state, and saves it.
     pub fn finished(&mut self, update: impl FnOnce(&mut LinesState)) {
         if !self.interrupted {

@@ -17,11 +17,12 @@ use crate::study::envelope::{self, EnvelopeSettings, car_limits};
 use crate::study::hybrid::{self, HybridStudySettings};
 use crate::study::identify::{self, IdentifySettings};
 use crate::study::journal::{Journal, Recorder};
+use crate::study::memory::Size;
 use crate::study::raceline::{self, RacelineSettings};
 use crate::study::transient::{self, DriveState, TransientSettings};
 use crate::vehicle::{Car, Envelope};
 use serde::{Deserialize, Serialize};
-use stage::go_on;
+pub(in crate::study) use stage::go_on;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -142,6 +143,16 @@ pub fn prepare(settings: &RunSettings) -> Result<Prepared<'_>> {
     })
 }
 
+impl Prepared<'_> {
+    /// What the identification's memory goes with.
+    pub fn identify_size(&self) -> Size {
+        Size {
+            samples: self.setup.log.samples(),
+            ..self.settings.identify.size()
+        }
+    }
+}
+
 /// What a run works with; nothing of it changes a result.
 #[derive(Clone, Copy, Debug)]
 pub struct Means<'a> {
@@ -180,7 +191,7 @@ pub fn run(
     inputs.add(&settings.identify);
     inputs.add(&(&setup.log, &setup.replay.free.car, &setup.truth));
     let stage = stages.run("1_identify", &inputs, |to, keeper| {
-        let _allowed = settings.identify.size().check(means.memory_limit_mib)?;
+        let _allowed = prepared.identify_size().check(means.memory_limit_mib)?;
         let outcome = go_on(keeper, |state, keeper| {
             identify::search_from(&settings.identify, setup, state, keeper, |report| {
                 let done = report.progress.map_or(String::new(), |p| {
@@ -188,7 +199,12 @@ pub fn run(
                 });
                 observe(&format!("the car: {:?}{done}", report.stage).to_lowercase())
             })
-        })?;
+        });
+        // The run's folder is what is gone on with, wherever the stage's state is.
+        let outcome = match outcome {
+            Err(Error::Interrupted(_)) => return Err(broken_off()),
+            outcome => outcome?,
+        };
         if outcome.interrupted {
             return Err(broken_off());
         }

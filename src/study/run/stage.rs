@@ -1,9 +1,11 @@
 //! Stages whose results are kept by what went into them.
 
 use crate::error::{Error, Result};
+use crate::files::{sync_folder, write_whole};
 use crate::study::keeper::Keeper;
-use crate::study::run_folder;
+use crate::study::run_folder::{self, RunFolder, STATE};
 use crate::swarm::checkpoint::Checkpoint;
+use std::collections::BTreeMap;
 use std::fmt::{Debug, Write as _};
 use std::hash::{DefaultHasher, Hasher};
 use std::path::{Path, PathBuf};
@@ -63,8 +65,10 @@ impl Inputs {
     }
 }
 
-/// Present in a stage's folder once all of its files are.
+/// Present in a stage's folder once all of its files are: what each of them was then.
 const DONE: &str = "done";
+/// The folder in that of a run for states of stages that have no place in the cache.
+const UNFINISHED: &str = ".unfinished";
 
 /// Where stages are kept between runs.
 pub struct Stages {
@@ -96,46 +100,45 @@ impl Stages {
     ) -> Result<(PathBuf, bool)> {
         let target = self.folder.join(name);
         create(&target)?;
-        let kept = self.cache.as_ref().map(|cache| {
-            // Stages of one kind share results whatever their number in a run.
-            let kind = name.trim_start_matches(|c: char| c.is_ascii_digit() || c == '_');
-            cache.join(format!("{kind}-{}", inputs.key()))
-        });
-        if let Some(kept) = kept.as_ref().filter(|k| k.join(DONE).is_file()) {
-            copy(kept, &target)?;
+        let Some(cache) = &self.cache else {
+            work(&target, &mut Keeper::idle())?;
+            return Ok((target, false));
+        };
+        // Stages of one kind share results whatever their number in a run.
+        let kind = name.trim_start_matches(|c: char| c.is_ascii_digit() || c == '_');
+        let kind = format!("{kind}-{}", inputs.key());
+        let kept = cache.join(&kind);
+        if let Some(files) = whole(&kept)? {
+            for (name, contents) in files {
+                write_whole(target.join(name), &contents)?;
+            }
             return Ok((target, true));
         }
-        // Where another run is at work on the same stage, that one keeps its state.
-        let unfinished = kept.as_ref().and_then(|kept| {
-            run_folder::take(&kept.with_extension("unfinished"))
-                .inspect_err(|error| tracing::warn!("the state of this stage is not saved: {error}"))
-                .ok()
-        });
-        let mut keeper = match &unfinished {
-            Some(folder) => Keeper::new(folder).every(self.every),
-            None => Keeper::idle(),
-        };
+        let unfinished = self.unfinished(&kept, &self.folder.join(UNFINISHED).join(&kind))?;
+        let mut keeper = Keeper::new(&unfinished).every(self.every);
         work(&target, &mut keeper)?;
-        if let Some(kept) = kept {
-            // Filled beside and renamed: another run sees all of it or nothing.
-            let beside = kept.with_extension(format!("partial-{}", std::process::id()));
-            create(&beside)?;
-            copy(&target, &beside)?;
-            std::fs::write(beside.join(DONE), "").map_err(|e| Error::io(&beside, "write", e))?;
-            if std::fs::rename(&beside, &kept).is_err() {
-                // Another run was first; its results are the same.
-                std::fs::remove_dir_all(&beside).map_err(|e| Error::io(&beside, "remove", e))?;
-            }
-        }
+        keep(&target, &kept)?;
         // Only now: until the stage is kept, its state is all there is of it.
         keeper.done()?;
-        if let Some(folder) = unfinished {
-            let path = folder.to_path_buf();
-            drop(folder);
-            // What is in it now is another run's.
-            let _ = std::fs::remove_dir(path);
-        }
+        let path = unfinished.to_path_buf();
+        drop(unfinished);
+        // What is in them now is another run's.
+        let _ = std::fs::remove_dir(path);
+        let _ = std::fs::remove_dir(self.folder.join(UNFINISHED));
         Ok((target, false))
+    }
+
+    /// Where the state of a stage is saved: beside its place in the cache, for whichever run comes next; where another run is at
+    /// work on the same stage, which saves its state there, in the run's `own` folder.
+    fn unfinished(&self, kept: &Path, own: &Path) -> Result<RunFolder> {
+        // Of a run that was broken off while another had the place in the cache.
+        if !own.join(STATE).is_file() {
+            match run_folder::take(&kept.with_extension("unfinished")) {
+                Ok(folder) => return Ok(folder),
+                Err(error) => tracing::warn!("the state of this stage is saved in the run's folder: {error}"),
+            }
+        }
+        run_folder::take(own)
     }
 }
 
@@ -144,7 +147,7 @@ impl Stages {
 ///
 /// # Errors
 /// Those of `work`.
-pub(super) fn go_on<S: Checkpoint, T>(
+pub(in crate::study) fn go_on<S: Checkpoint, T>(
     keeper: &mut Keeper,
     mut work: impl FnMut(Option<S>, &mut Keeper) -> Result<T>,
 ) -> Result<T> {
@@ -161,18 +164,96 @@ fn create(folder: &Path) -> Result<()> {
     std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, "create", e))
 }
 
-/// Copies the files of a folder, which has no folders, all but the mark that it is complete and what a killed process had half
-/// written.
-fn copy(from: &Path, to: &Path) -> Result<()> {
-    let failed = |e| Error::io(from, "read", e);
-    for entry in from.read_dir().map_err(failed)? {
-        let entry = entry.map_err(failed)?;
-        if entry.file_name() != DONE && !entry.file_name().to_string_lossy().starts_with('.') {
-            let target = to.join(entry.file_name());
-            std::fs::copy(entry.path(), &target).map_err(|e| Error::io(&target, "write", e))?;
+/// Size (bytes) and CRC-32 of each file of a stage, by name.
+type Sums = BTreeMap<String, (u64, u32)>;
+
+fn sum(contents: &[u8]) -> (u64, u32) {
+    (contents.len() as u64, crc32fast::hash(contents))
+}
+
+/// The files of a stage that is kept, each as it was when it was kept; nothing where there is no such stage, and where it is
+/// not what it was, as a loss of power may leave it: that one goes.
+fn whole(kept: &Path) -> Result<Option<Vec<(String, Vec<u8>)>>> {
+    if !kept.join(DONE).is_file() {
+        return Ok(None);
+    }
+    match read_whole(kept) {
+        Ok(files) => Ok(Some(files)),
+        Err(found) => {
+            tracing::warn!("{}: {found}; the stage is done anew", kept.display());
+            // Out of the way at once, whoever else looks at it.
+            let aside = aside(kept)?;
+            std::fs::rename(kept, &aside)
+                .and_then(|()| std::fs::remove_dir_all(&aside))
+                .map_err(|e| Error::io(kept, "remove", e))?;
+            Ok(None)
         }
     }
-    Ok(())
+}
+
+/// As [`whole`], or what is wrong with it.
+fn read_whole(kept: &Path) -> Result<Vec<(String, Vec<u8>)>, String> {
+    let mark = std::fs::read(kept.join(DONE)).map_err(|e| e.to_string())?;
+    let sums: Sums = serde_json::from_slice(&mark).map_err(|e| format!("the list of its files: {e}"))?;
+    let read = |(name, expected): (String, (u64, u32))| {
+        // A list that was tampered with reads nothing from elsewhere.
+        if Path::new(&name).file_name().is_none_or(|n| n != name.as_str()) {
+            return Err(format!("{name} is no name of a file in it"));
+        }
+        let contents = std::fs::read(kept.join(&name)).map_err(|e| format!("{name}: {e}"))?;
+        if sum(&contents) == expected {
+            Ok((name, contents))
+        } else {
+            Err(format!("{name} is not what was kept"))
+        }
+    };
+    sums.into_iter().map(read).collect()
+}
+
+/// Keeps the files of a finished stage, which has no folders, all but what a killed process had half written. It is filled beside
+/// its place and moved there: another run, or one after a loss of power, sees all of it or nothing.
+fn keep(from: &Path, kept: &Path) -> Result<()> {
+    let beside = aside(kept)?;
+    std::fs::create_dir(&beside).map_err(|e| Error::io(&beside, "create", e))?;
+    let filled = fill(from, &beside);
+    let moved = filled.and_then(|()| match std::fs::rename(&beside, kept) {
+        Ok(()) => Ok(true),
+        // Another run was first; its results are the same.
+        Err(_) if kept.join(DONE).is_file() => Ok(false),
+        Err(e) => Err(Error::io(kept, "create", e)),
+    });
+    if !matches!(moved, Ok(true)) {
+        // The first failure is the one to tell.
+        let _ = std::fs::remove_dir_all(&beside);
+    }
+    sync_folder(kept.parent().unwrap_or(Path::new("")));
+    moved.map(|_| ())
+}
+
+fn fill(from: &Path, to: &Path) -> Result<()> {
+    let failed = |e| Error::io(from, "read", e);
+    let mut sums = Sums::new();
+    for entry in from.read_dir().map_err(failed)? {
+        let entry = entry.map_err(failed)?;
+        let name = entry.file_name().to_string_lossy().into_owned();
+        if name == DONE || name.starts_with('.') {
+            continue;
+        }
+        let contents = std::fs::read(entry.path()).map_err(|e| Error::io(entry.path(), "read", e))?;
+        write_whole(to.join(&name), &contents)?;
+        sums.insert(name, sum(&contents));
+    }
+    run_folder::write_json(&to.join(DONE), &sums)
+}
+
+/// A name beside a kept stage that nothing has.
+fn aside(kept: &Path) -> Result<PathBuf> {
+    if let Some(cache) = kept.parent() {
+        create(cache)?;
+    }
+    let named = |number: u32| kept.with_extension(format!("partial-{}-{number}", std::process::id()));
+    let free = (0..u32::MAX).map(named).find(|path| !path.exists());
+    Ok(free.unwrap_or_else(|| named(u32::MAX)))
 }
 
 #[cfg(test)]
@@ -234,6 +315,81 @@ mod tests {
         assert_eq!(go("b", 1.5), ("1.5".to_owned(), true));
         assert_eq!(go("c", 2.5), ("2.5".to_owned(), false));
         assert_eq!(runs, 2);
+    }
+
+    #[test]
+    fn a_stage_that_is_not_what_was_kept_is_done_anew() {
+        let root = tempfile::tempdir().expect("a temporary folder");
+        let cache = root.path().join("cache");
+        let mut inputs = Inputs::new("stage");
+        inputs.add(&1);
+        let mut runs = 0;
+        let mut go = || {
+            runs += 1;
+            let run = root.path().join(format!("run-{runs}"));
+            let stages = Stages::new(&run, Some(&cache), EVERY);
+            let work = |folder: &Path, _: &mut Keeper| {
+                std::fs::write(folder.join("result"), "what was found").expect("a file");
+                std::fs::write(folder.join("table"), "1,2,3").expect("a file");
+                Ok(())
+            };
+            let (folder, reused) = stages.run("1_stage", &inputs, work).expect("it runs");
+            for (name, text) in [("result", "what was found"), ("table", "1,2,3")] {
+                assert_eq!(std::fs::read_to_string(folder.join(name)).expect("a file"), text);
+            }
+            reused
+        };
+        assert!(!go() && go());
+        let kept = cache.join(format!("stage-{}", inputs.key()));
+        // As a loss of power leaves files whose names were on the disk before what is in them.
+        let damages: [&dyn Fn(); 7] = [
+            &|| std::fs::write(kept.join("result"), "").expect("a file"),
+            &|| std::fs::write(kept.join("result"), "what was f\0\0\0\0").expect("a file"),
+            &|| std::fs::remove_file(kept.join("table")).expect("a file"),
+            &|| std::fs::write(kept.join(DONE), "").expect("a file"),
+            &|| std::fs::write(kept.join(DONE), "{\"result\": [14").expect("a file"),
+            &|| std::fs::write(kept.join(DONE), "{\"../stage\": [0, 0]}").expect("a file"),
+            &|| std::fs::write(kept.join(DONE), [0; 64]).expect("a file"),
+        ];
+        for damage in damages {
+            damage();
+            assert!(!go(), "it is done anew");
+            assert!(go(), "and kept again");
+        }
+        let left: Vec<_> = cache.read_dir().expect("the cache").flatten().collect();
+        assert_eq!(left.len(), 1, "{left:?}");
+    }
+
+    #[test]
+    fn a_stage_that_another_run_is_at_work_on_keeps_its_state_in_its_own_folder() {
+        let root = tempfile::tempdir().expect("a temporary folder");
+        let cache = root.path().join("cache");
+        let inputs = Inputs::new("stage");
+        let kept = cache.join(format!("stage-{}", inputs.key()));
+        let other = run_folder::take(&kept.with_extension("unfinished")).expect("nobody holds it");
+        let run = root.path().join("run");
+        let stages = Stages::new(&run, Some(&cache), EVERY);
+        let mut known = Vec::new();
+        let mut go = |last: bool| {
+            stages.run("1_stage", &inputs, |_, keeper| {
+                go_on(keeper, |state: Option<Journal>, keeper| {
+                    known.push(state.map(|s| s.settings::<u32>("stage")).transpose()?);
+                    keeper.keep(&Journal::new("stage", &7u32)?)
+                })?;
+                if last {
+                    Ok(())
+                } else {
+                    Err(Error::Interrupted(root.path().to_owned()))
+                }
+            })
+        };
+        assert!(go(false).is_err());
+        assert!(go(false).is_err(), "while the other is at work");
+        drop(other);
+        assert!(go(true).is_ok(), "and after");
+        assert_eq!(known, [None, Some(7), Some(7)]);
+        assert!(!run.join(UNFINISHED).exists(), "nothing is left of it");
+        assert!(kept.join(DONE).is_file());
     }
 
     #[test]

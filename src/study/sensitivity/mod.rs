@@ -14,7 +14,7 @@ use crate::error::{Error, Result};
 use crate::evaluate::gpu::DispatchWatch;
 use crate::evaluate::replay::kernel::{CHANNELS, drive_window};
 use crate::evaluate::replay::{CHANNEL_NAMES, ReplayProblem, Window, open_evaluator, trace};
-use crate::evaluate::{BackendInfo, Evaluator};
+use crate::evaluate::{BackendInfo, Evaluator, FailureCounts, add_failures};
 use crate::study::identify::{FreeParameter, IdentifySettings, ObjectiveChoice, Setup, set_up};
 use crate::study::journal::Recorder;
 use crate::study::keeper::Keeper;
@@ -178,6 +178,8 @@ pub struct Outcome {
     pub backend: BackendInfo,
     /// What went wrong with devices and was got over.
     pub device_faults: Vec<String>,
+    /// Candidates that failed, by reason.
+    pub failures: FailureCounts,
     /// The longest that a dispatch kept the device (ms); nothing where none was at work.
     pub longest_dispatch_ms: Option<f64>,
     /// Candidates evaluated.
@@ -281,10 +283,11 @@ pub(crate) fn start_as_base_drives(replay: &mut ReplayProblem) {
 /// Candidates of one call of the evaluator: enough to fill any device for a moment, few enough to be interrupted.
 const BATCH: usize = 1024;
 
-/// Costs of each candidate; nothing where one does not drive.
+/// Costs of each candidate; nothing where one does not drive, which is counted by reason.
 pub(crate) fn costs_of(
     evaluator: &mut dyn Evaluator,
     population: &[f64],
+    failures: &mut FailureCounts,
     mut observe: impl FnMut(usize) -> ControlFlow<()>,
 ) -> Result<Option<Vec<Option<Vec<f64>>>>> {
     let dimensions = evaluator.problem().variables.len();
@@ -292,6 +295,7 @@ pub(crate) fn costs_of(
     let mut costs = Vec::with_capacity(population.len() / dimensions);
     for batch in population.chunks(BATCH * dimensions) {
         let found = evaluator.evaluate(batch)?;
+        add_failures(failures, &found.failure_counts());
         let rows = found.objectives.chunks_exact(width).zip(&found.failures);
         costs.extend(rows.map(|(row, failure)| failure.is_none().then(|| row.to_vec())));
         if observe(costs.len()).is_break() {
@@ -390,7 +394,8 @@ pub fn measure_recorded(
     recorder.begin(inputs_of("sensitivity", setup), &evaluator.backend())?;
     let backend = evaluator.backend();
     let mut evaluator = recorder.over(evaluator.as_mut());
-    let single = costs_of(&mut evaluator, first, |done| {
+    let mut failures = FailureCounts::new();
+    let single = costs_of(&mut evaluator, first, &mut failures, |done| {
         interrupted |= watch(done, 0).is_break();
         ControlFlow::Continue(())
     })?
@@ -398,7 +403,7 @@ pub fn measure_recorded(
     let global = if interrupted {
         None
     } else {
-        costs_of(&mut evaluator, rest, |done| watch(done, singles))?
+        costs_of(&mut evaluator, rest, &mut failures, |done| watch(done, singles))?
     };
     interrupted |= global.is_none();
     if interrupted {
@@ -430,6 +435,7 @@ pub fn measure_recorded(
         base,
         backend: recorder.backend().cloned().unwrap_or(backend),
         device_faults: recorder.device_faults().to_vec(),
+        failures,
         longest_dispatch_ms: dispatches.longest_ms(),
         evaluations: if interrupted { singles } else { planned },
         elapsed_s: began.elapsed().as_secs_f64(),

@@ -3,6 +3,7 @@
 use super::results::{LABELS, ParameterSensitivity, Summary, one_at_a_time_panels, sobol_panels};
 use super::{LEVELS, Outcome, SobolIndex};
 use crate::error::Result;
+use crate::evaluate::failures_in_words;
 use crate::evaluate::replay::CHANNEL_UNITS;
 use crate::report::{Cells, Column, HtmlReport, LapLine, LapPanel, LapTrace, LapView};
 use crate::study::circuit_view;
@@ -46,6 +47,7 @@ pub(super) fn write(
     page.provenance("adapter", &summary.adapter);
     page.provenance("driver", &outcome.backend.driver);
     page.provenance("candidates evaluated", summary.evaluations.to_string());
+    page.provenance("candidates that failed", failures_in_words(&summary.failures));
     page.provenance(
         "candidates per second",
         format!("{:.0}", summary.evaluations_per_s),

@@ -2,13 +2,13 @@
 
 use super::{LEVELS, MOST_SAMPLES, Outcome, SensitivitySettings, SobolIndex};
 use crate::error::Result;
+use crate::evaluate::FailureCounts;
 use crate::evaluate::replay::CHANNEL_UNITS;
 use crate::report::{
     BarPanel, BarSeries, Cells, Column, Curve, CurvePanel, plot_bars, plot_curves, text_table, write_csv,
-    write_whole,
 };
 use crate::study::identify::Setup;
-use crate::study::run_folder::{Manifest, write_json};
+use crate::study::run_folder::{Manifest, write_json, write_study};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -48,6 +48,8 @@ pub struct Summary {
     pub elapsed_s: f64,
     /// Candidates evaluated.
     pub evaluations: usize,
+    /// Candidates that failed, by reason.
+    pub failures: FailureCounts,
     /// Candidates per second.
     pub evaluations_per_s: f64,
     /// How far every parameter went, as a share of its value.
@@ -155,6 +157,7 @@ pub fn summarise(settings: &SensitivitySettings, setup: &Setup, outcome: &Outcom
             .collect(),
         warnings: doubts(&parameters, settings.samples).into_iter().collect(),
         parameters,
+        failures: outcome.failures.clone(),
         interrupted: outcome.interrupted,
     }
 }
@@ -270,7 +273,7 @@ pub fn write_results(
         )
     };
     let study = settings.to_toml();
-    write_whole(folder.join("study.toml"), study.as_bytes())?;
+    write_study(folder, &study)?;
     write_one_at_a_time(folder, setup, outcome)?;
     plot_one_at_a_time(folder, summary)?;
     if !outcome.indices.is_empty() {

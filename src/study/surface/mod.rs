@@ -5,9 +5,9 @@ mod results;
 pub use results::{Summary, summarise, write_results};
 
 use crate::error::{Error, Result};
-use crate::evaluate::BackendInfo;
 use crate::evaluate::gpu::DispatchWatch;
 use crate::evaluate::replay::{CHANNEL_NAMES, open_evaluator};
+use crate::evaluate::{BackendInfo, FailureCounts};
 use crate::study::identify::{FreeParameter, IdentifySettings, ObjectiveChoice, Setup, set_up};
 use crate::study::journal::Recorder;
 use crate::study::keeper::Keeper;
@@ -119,6 +119,8 @@ pub struct Outcome {
     pub backend: BackendInfo,
     /// What went wrong with devices and was got over.
     pub device_faults: Vec<String>,
+    /// Candidates that failed, by reason.
+    pub failures: FailureCounts,
     /// The longest that a dispatch kept the device (ms); nothing where none was at work.
     pub longest_dispatch_ms: Option<f64>,
     /// Candidates evaluated.
@@ -203,7 +205,9 @@ pub fn measure_recorded(
         settings.replay.adapter.as_deref(),
     )?;
     recorder.begin(inputs_of("surface", setup), &evaluator.backend())?;
-    let found = costs_of(&mut recorder.over(evaluator.as_mut()), &population, &mut observe)?;
+    let mut failures = FailureCounts::new();
+    let mut recorded = recorder.over(evaluator.as_mut());
+    let found = costs_of(&mut recorded, &population, &mut failures, &mut observe)?;
     let interrupted = found.is_none();
     if interrupted {
         recorder.keep()?;
@@ -227,6 +231,7 @@ pub fn measure_recorded(
         costs,
         backend: recorder.backend().cloned().unwrap_or_else(|| evaluator.backend()),
         device_faults: recorder.device_faults().to_vec(),
+        failures,
         longest_dispatch_ms: dispatches.longest_ms(),
         evaluations: n * n,
         elapsed_s: began.elapsed().as_secs_f64(),

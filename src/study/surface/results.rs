@@ -2,11 +2,10 @@
 
 use super::{Outcome, SurfaceSettings};
 use crate::error::Result;
-use crate::report::{
-    Cells, Column, HtmlReport, Levels, SurfaceFigure, plot_surface, significant, write_csv, write_whole,
-};
+use crate::evaluate::{FailureCounts, failures_in_words};
+use crate::report::{Cells, Column, HtmlReport, Levels, SurfaceFigure, plot_surface, significant, write_csv};
 use crate::study::identify::Setup;
-use crate::study::run_folder::{Manifest, write_json};
+use crate::study::run_folder::{Manifest, write_json, write_study};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -47,6 +46,8 @@ pub struct Summary {
     pub least: BTreeMap<String, Option<Least>>,
     /// Candidates that did not drive.
     pub failed: usize,
+    /// The same by reason.
+    pub failures: FailureCounts,
     /// Whether the study was broken off.
     pub interrupted: bool,
 }
@@ -81,6 +82,7 @@ pub fn summarise(settings: &SurfaceSettings, setup: &Setup, outcome: &Outcome) -
             .map(|(o, costs)| (o.name.clone(), least_of(costs)))
             .collect(),
         failed: outcome.costs[0].iter().filter(|c| !c.is_finite()).count(),
+        failures: outcome.failures.clone(),
         interrupted: outcome.interrupted,
     }
 }
@@ -139,7 +141,7 @@ pub fn write_results(
     };
     let problem = &setup.replay.problem;
     let toml = settings.to_toml();
-    write_whole(folder.join("study.toml"), toml.as_bytes())?;
+    write_study(folder, &toml)?;
     if outcome.interrupted {
         return Ok(());
     }
@@ -243,8 +245,10 @@ fn begun_page(setup: &Setup, summary: &Summary) -> HtmlReport {
     }
     if summary.failed > 0 {
         page.warning(format!(
-            "{} of {} cars did not drive; they are left out.",
-            summary.failed, summary.evaluations
+            "{} of {} cars did not drive ({}); they are left out.",
+            summary.failed,
+            summary.evaluations,
+            failures_in_words(&summary.failures)
         ));
     }
     page.section(

@@ -1,12 +1,13 @@
 //! Identifications of a sweep, those of one problem together: their swarms share an evaluator, and its calls.
 
-use super::{Figures, Found};
-use crate::error::Result;
+use super::{Figures, Found, check_own, keeper_of};
+use crate::error::{Error, Result};
 use crate::evaluate::replay::open_evaluator;
 use crate::evaluate::{PackedClient, run_packed};
-use crate::study::identify::{self, IdentifySettings};
+use crate::study::identify::{self, IdentifySettings, SearchState};
 use crate::study::keeper::Keeper;
 use crate::study::memory::Size;
+use crate::study::run::go_on;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -69,12 +70,20 @@ pub(super) fn identified(
     let sizes: Vec<Size> = studies.iter().map(IdentifySettings::size).collect();
     let _allowed = Size::check_together(&sizes, memory_limit_mib)?;
     let setup = identify::set_up(first)?;
+    // The log is one for all of them.
+    let alone = Size {
+        samples: setup.log.samples(),
+        ..sizes[0]
+    };
+    drop(alone.check(memory_limit_mib)?);
     let mut evaluator = open_evaluator(&setup.replay, first.backend, first.adapter.as_deref())?;
     let stop = AtomicBool::new(false);
     let (setup, stopped) = (&setup, &stop);
+    let mut keepers: Vec<Keeper> = paths.iter().map(|path| keeper_of(path)).collect();
     let searches: Vec<_> = studies
         .iter()
-        .map(|settings| {
+        .zip(&mut keepers)
+        .map(|(settings, keeper)| {
             move |mut evaluator: PackedClient| -> Result<Option<Found>> {
                 let observe = |_: &identify::Report<'_>| {
                     if stopped.load(Ordering::Relaxed) {
@@ -83,8 +92,15 @@ pub(super) fn identified(
                         ControlFlow::Continue(())
                     }
                 };
-                let state = (None, &mut Keeper::idle());
-                let outcome = identify::search_with(settings, setup, &mut evaluator, state, observe)?;
+                let found = go_on(keeper, |state: Option<SearchState>, keeper| {
+                    let own = state.as_ref().is_none_or(|state| state.settings == *settings);
+                    check_own(own, keeper)?;
+                    identify::search_with(settings, setup, &mut evaluator, (state, keeper), observe)
+                });
+                let outcome = match found {
+                    Err(Error::Interrupted(_)) => return Ok(None),
+                    outcome => outcome?,
+                };
                 Ok((!outcome.interrupted).then(|| figures_of(settings, setup, &outcome)))
             }
         })

@@ -1,7 +1,8 @@
 //! The same study over a grid of settings and seeds: one row for each run, medians over the seeds.
 //!
 //! A run is a study file of its own, made of the base's keys and those of one point of the grid. Rows are kept as they
-//! come, so that a sweep that was broken off goes on where it stopped; they hold nothing that depends on the clock.
+//! come, and the states of the runs that are at work beside their study files, so that a sweep that was broken off goes on where
+//! it stopped; rows hold nothing that depends on the clock.
 
 mod grid;
 mod identified;
@@ -17,8 +18,10 @@ use crate::error::{Error, Result};
 use crate::evaluate::BackendInfo;
 use crate::report::write_whole;
 use crate::study::identify::{self, IdentifySettings};
+use crate::study::keeper::Keeper;
 use crate::study::memory::{Size, USUAL_MIB};
-use crate::study::raceline::{self, RacelineSettings};
+use crate::study::raceline::{self, LinesState, RacelineSettings};
+use crate::study::run::go_on;
 use crate::study::run_folder::{Manifest, write_json};
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
@@ -97,7 +100,14 @@ pub fn sweep_within(
     });
     if let Err(error) = ran {
         // What has come to nothing does not stand in the way of the next; what was broken off may be gone on with.
-        if !resume && rows.len() == began_with && !matches!(error, Error::Interrupted(_)) {
+        // So may what a full disk or a lost device has ended.
+        let begun = || (0..points.len()).any(|number| keeper_of(&path_of(number)).file().exists());
+        let mendable = match &error {
+            Error::Interrupted(_) => true,
+            Error::Io { .. } | Error::Device(_) => begun(),
+            _ => false,
+        };
+        if !resume && rows.len() == began_with && !mendable {
             let _ = std::fs::remove_dir_all(&studies);
             let _ = std::fs::remove_file(folder.join(SWEEP_FILE));
         }
@@ -243,10 +253,11 @@ fn write_studies(
     resume: bool,
 ) -> Result<()> {
     let studies = folder.join("studies");
-    std::fs::create_dir_all(&studies).map_err(|e| Error::io(&studies, "create", e))?;
     if !resume {
+        // First: with it, what was broken off can be gone on with.
         write_whole(folder.join(SWEEP_FILE), settings.text().as_bytes())?;
     }
+    std::fs::create_dir_all(&studies).map_err(|e| Error::io(&studies, "create", e))?;
     for (number, point) in points.iter().enumerate() {
         write_whole(path_of(number), point.study.as_bytes())?;
     }
@@ -309,6 +320,8 @@ impl Work<'_> {
                     front: found.front,
                 });
                 results::write_rows(&self.folder.join(ROWS), rows)?;
+                // Only now: until its row is kept, its state is all there is of it.
+                keeper_of(&paths[run]).done()?;
             }
         }
         Ok(())
@@ -342,6 +355,28 @@ impl Found {
     }
 }
 
+/// What keeps the state of the study at `path`, beside it.
+fn keeper_of(path: &Path) -> Keeper {
+    Keeper::at(path.with_extension("checkpoint"))
+}
+
+/// Whether a state is that of the study that goes on with it.
+///
+/// # Errors
+/// [`Error::Input`] if not.
+fn check_own(own: bool, keeper: &Keeper) -> Result<()> {
+    if own {
+        return Ok(());
+    }
+    let expected = "the state of this point of the grid";
+    Err(Error::input(
+        keeper.file(),
+        "settings",
+        "those of another study",
+        expected,
+    ))
+}
+
 fn lined(
     path: &Path,
     memory_limit_mib: u64,
@@ -350,7 +385,11 @@ fn lined(
     let settings = RacelineSettings::read(path)?;
     let _allowed = settings.size().check(memory_limit_mib)?;
     let setup = raceline::set_up(&settings)?;
-    let outcome = raceline::find_lines(&settings, &setup, |_| observe())?;
+    let outcome = go_on(&mut keeper_of(path), |state: Option<LinesState>, keeper| {
+        let own = state.as_ref().is_none_or(|state| state.settings == settings);
+        check_own(own, keeper)?;
+        raceline::find_lines_from(&settings, &setup, state, keeper, |_| observe())
+    })?;
     if outcome.interrupted {
         return Ok(None);
     }

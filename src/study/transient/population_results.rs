@@ -2,7 +2,7 @@
 
 use super::population::{Driven, DrivenBest, NamedLine, PopulationOutcome, PopulationSettings};
 use crate::error::Result;
-use crate::evaluate::FailureCounts;
+use crate::evaluate::{FailureCounts, failures_in_words};
 use crate::report::{Cells, Column, HtmlReport, write_csv};
 use crate::study::run_folder::{Manifest, write_json};
 use crate::vehicle::Car;
@@ -272,6 +272,7 @@ pub fn write_population(
     page.provenance("backend", &summary.backend);
     page.provenance("adapter", &summary.adapter);
     page.provenance("laps driven", summary.evaluations.to_string());
+    page.provenance("laps that failed", failures_in_words(&summary.failures));
     page.provenance("time", format!("{:.1} s", summary.elapsed_s));
     page.write(folder.join("report.html"))?;
     // Last: it says that the run is whole.

@@ -2,6 +2,7 @@
 
 use super::{EnvelopeSummary, surface};
 use crate::error::Result;
+use crate::evaluate::failures_in_words;
 use crate::report::{Cells, Column, CurvePanel, HtmlReport, Scale};
 use crate::study::envelope::{CarLimits, SpeedLimits, SteadySurface};
 use std::path::Path;
@@ -77,6 +78,7 @@ pub fn write(
         page.provenance("backend", found.backend.backend);
         page.provenance("adapter", &found.backend.device);
         page.provenance("driver", &found.backend.driver);
+        page.provenance("cars that failed", failures_in_words(&found.summary.failures));
     }
     page.provenance("steady states", summary.steady_states.to_string());
     page.provenance("time", format!("{:.2} s", summary.elapsed_s));

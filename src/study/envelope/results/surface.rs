@@ -1,7 +1,7 @@
 //! Tables and pictures of the surface of lateral acceleration.
 
 use crate::error::Result;
-use crate::evaluate::Failure;
+use crate::evaluate::{Failure, failures_in_words};
 use crate::report::{Cells, Column, Levels, SurfaceFigure, plot_surface, write_csv};
 use crate::study::envelope::{PopulationSummary, SteadySurface};
 use std::path::Path;
@@ -16,10 +16,7 @@ pub fn in_words(p: &PopulationSummary) -> String {
         "Surface of {} cars settled on circles, {:.0}/s, {} {}",
         p.evaluations, p.evaluations_per_s, p.backend, p.adapter
     );
-    for (reason, count) in &p.failures {
-        text += &format!("; {count} {}", reason.replace('_', " "));
-    }
-    text += "\n";
+    text += &format!("; failed: {}\n", failures_in_words(&p.failures));
     if let Some(off) = p.surface_difference_mps2 {
         text += &format!("Off the curves of steady states by {off:.1e} m/s^2 at most");
         if let (Some(off), Some(tolerance)) = (p.ridge_difference_mps2, p.ridge_tolerance_mps2) {

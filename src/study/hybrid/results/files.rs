@@ -2,17 +2,11 @@
 
 use super::{HybridSummary, told_laps};
 use crate::error::Result;
-use crate::report::{Cells, Column, write_csv, write_whole};
+use crate::files::stem;
+use crate::report::{Cells, Column, write_csv};
 use crate::study::hybrid::{HybridSetup, HybridStudySettings, Outcome, ReportedLap};
-use crate::study::run_folder::{Manifest, write_json};
+use crate::study::run_folder::{Manifest, write_json, write_study};
 use std::path::Path;
-
-/// A name as a part of a file's name.
-pub fn stem(name: &str) -> String {
-    name.chars()
-        .map(|c| if c.is_alphanumeric() { c } else { '_' })
-        .collect()
-}
 
 /// Written last: it says that the run is whole.
 pub fn write_manifest(
@@ -39,7 +33,7 @@ pub fn write(
     summary: &HybridSummary,
 ) -> Result<()> {
     write_json(&folder.join("summary.json"), summary)?;
-    write_whole(folder.join("study.toml"), settings.to_toml().as_bytes())?;
+    write_study(folder, &settings.to_toml())?;
     setup.car.car.write(folder, "car")?;
     let (x, y): (Vec<f64>, Vec<f64>) = setup.points_m.iter().map(|p| (p.x, p.y)).unzip();
     write_table(&folder.join("line.csv"), &[("x", "m", x), ("y", "m", y)])?;

@@ -8,6 +8,7 @@ use super::{
     HybridSetup, HybridStudySettings, Outcome, ReportedLap, Sizing, StintLap, correlation, mean_worths,
 };
 use crate::error::Result;
+use crate::evaluate::{FailureCounts, failures_in_words};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -148,6 +149,8 @@ pub struct HybridSummary {
     pub elapsed_s: f64,
     /// Laps evaluated.
     pub evaluations: u64,
+    /// Laps of the swarms that failed, by reason.
+    pub failures: FailureCounts,
     /// Laps per second of the swarms; `null` where none ran.
     pub evaluations_per_s: Option<f64>,
     /// What the rules allow to be deployed on this lap (MJ); `null` without a limit.
@@ -258,6 +261,7 @@ pub fn summarise(settings: &HybridStudySettings, setup: &HybridSetup, outcome: &
         stint: outcome.stint.clone(),
         sizing: outcome.sizing.clone(),
         warnings,
+        failures: outcome.failures.clone(),
         interrupted: outcome.interrupted,
     }
 }
@@ -368,6 +372,9 @@ impl HybridSummary {
                 "{} laps evaluated ({rate:.0} per second) on {} {}\n",
                 self.evaluations, self.backend, self.adapter
             );
+        }
+        if !self.failures.is_empty() {
+            text += &format!("Laps that failed: {}\n", failures_in_words(&self.failures));
         }
         for fault in &self.device_faults {
             text += &format!("Note: {fault}\n");

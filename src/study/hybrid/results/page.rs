@@ -3,6 +3,7 @@
 use super::pictures::{map_names, power_kw, soc, speeds, summed, time_energy};
 use super::{HybridSummary, ScenarioFigures, told_laps};
 use crate::error::Result;
+use crate::evaluate::failures_in_words;
 use crate::report::{
     Cells, Column, Front, HtmlReport, LapLine, LapMap, LapPanel, LapTrace, LapView, Objective, Scale,
 };
@@ -73,6 +74,7 @@ pub fn write(
     page.provenance("adapter", &summary.adapter);
     page.provenance("driver", &summary.driver);
     page.provenance("laps evaluated", summary.evaluations.to_string());
+    page.provenance("laps that failed", failures_in_words(&summary.failures));
     page.provenance("time", format!("{:.1} s", summary.elapsed_s));
     page.settings("study.toml, which repeats this run", settings.to_toml());
     page.write(folder.join("report.html"))

@@ -1,8 +1,8 @@
 //! Charge, power, energy, engine sites, maps and traces.
 
-use super::files::stem;
 use super::told_laps;
 use crate::error::Result;
+use crate::files::stem;
 use crate::report::{
     Curve, CurvePanel, Objective, SiteMap, TrackMap, plot_curves, plot_pareto, plot_site_map, plot_track_map,
 };

@@ -2,17 +2,11 @@
 
 use super::{Summary, told_lines};
 use crate::error::Result;
+use crate::files::stem;
 use crate::report::{Cells, Column, write_csv, write_whole};
 use crate::study::raceline::{Outcome, RacelineSettings, ReportedLine, Setup};
 use crate::study::run_folder::{Manifest, write_json};
 use std::path::Path;
-
-/// The name of a line as a part of a file's name.
-pub fn stem(name: &str) -> String {
-    name.chars()
-        .map(|c| if c.is_alphanumeric() { c } else { '_' })
-        .collect()
-}
 
 /// Written last: it says that the run is whole.
 pub fn write_manifest(
@@ -47,9 +41,11 @@ pub fn write(
     for line in told_lines(outcome) {
         let name = stem(&line.name);
         write_line(&folder.join(format!("line_{name}.csv")), setup, line)?;
-        setup
-            .cuts
-            .write_racetrack_line(&line.alpha, folder.join(format!("racetrack_{name}.csv")))?;
+        // Over what a run that was broken off has left: it is gone on with in the same folder.
+        write_whole(
+            folder.join(format!("racetrack_{name}.csv")),
+            setup.cuts.line_to_racetrack_csv(&line.alpha).as_bytes(),
+        )?;
     }
     write_front(folder, outcome)
 }

@@ -3,6 +3,7 @@
 use super::pictures::{along, lap_delta, map_names};
 use super::{LineFigures, Summary, told_lines};
 use crate::error::Result;
+use crate::evaluate::failures_in_words;
 use crate::evaluate::line::LineObjective;
 use crate::report::{
     Cells, Column, Curve, CurvePanel, Front, HtmlReport, LapLine, LapMap, LapPanel, LapTrace, LapView,
@@ -50,6 +51,7 @@ pub fn write(
     page.provenance("adapter", &summary.adapter);
     page.provenance("driver", &summary.driver);
     page.provenance("lines evaluated", summary.evaluations.to_string());
+    page.provenance("lines that failed", failures_in_words(&summary.failures));
     page.provenance("lines per second", format!("{:.0}", summary.evaluations_per_s));
     page.provenance(
         "swarms and local search",

@@ -1,8 +1,8 @@
 //! Maps, traces, lap deltas and the front.
 
-use super::files::stem;
 use super::told_lines;
 use crate::error::Result;
+use crate::files::stem;
 use crate::report::{
     Curve, CurvePanel, Objective, TrackMap, plot_curves, plot_parallel, plot_pareto, plot_track_map,
 };

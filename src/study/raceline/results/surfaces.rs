@@ -1,9 +1,9 @@
 //! Objectives over `alpha` at two neighbouring cuts, all others as they are on the best line.
 
-use super::files::stem;
 use crate::error::Result;
 use crate::evaluate::line::{LineProblem, open_line_evaluator};
 use crate::evaluate::{BackendChoice, FAILED_COST};
+use crate::files::stem;
 use crate::line::Parametrisation;
 use crate::report::{Levels, SurfaceFigure, plot_surface};
 use crate::study::raceline::{Outcome, RacelineSettings, Setup};

@@ -1,0 +1,218 @@
+//! Files that appear whole or not at all, and stay after a loss of power.
+
+use std::fs::{self, File};
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use crate::{Error, Result};
+
+/// Writes a file by way of a temporary one in the same folder, so that a reader, or a run that is stopped half way, never sees
+/// part of it.
+///
+/// # Errors
+/// [`Error::Io`] when the folder is missing or cannot be written to.
+pub fn write_whole(path: impl AsRef<Path>, contents: &[u8]) -> Result<()> {
+    let path = path.as_ref();
+    place(path, contents, |temporary| fs::rename(temporary, path))
+}
+
+/// As [`write_whole`], of a file that is not there yet.
+///
+/// # Errors
+/// As [`write_whole`], and of the kind [`io::ErrorKind::AlreadyExists`] when it is there.
+pub fn write_new(path: impl AsRef<Path>, contents: &[u8]) -> Result<()> {
+    let path = path.as_ref();
+    place(path, contents, |temporary| match fs::hard_link(temporary, path) {
+        Ok(()) => fs::remove_file(temporary),
+        Err(error) if error.kind() == io::ErrorKind::AlreadyExists => Err(error),
+        // A file system without links.
+        Err(_) if path.symlink_metadata().is_ok() => Err(io::ErrorKind::AlreadyExists.into()),
+        Err(_) => fs::rename(temporary, path),
+    })
+}
+
+/// Makes sure that the names in a folder are on the disk.
+pub fn sync_folder(folder: &Path) {
+    let folder = Some(folder).filter(|f| !f.as_os_str().is_empty());
+    // Not every system lets a folder be opened; there a move is as safe as it gets.
+    if let Ok(folder) = File::open(folder.unwrap_or(Path::new("."))) {
+        let _ = folder.sync_all();
+    }
+}
+
+/// A name as a part of a file's name: letters and digits, and never longer than it was (bytes).
+pub fn stem(name: &str) -> String {
+    name.chars()
+        .map(|c| if c.is_alphanumeric() { c } else { '_' })
+        .collect()
+}
+
+/// Whether a name is that of a file which a process that was killed had half written.
+pub fn is_temporary(name: &str) -> bool {
+    name.starts_with('.') && name.ends_with(".tmp")
+}
+
+/// Writes a temporary file beside `path`, and moves it there.
+fn place(path: &Path, contents: &[u8], put: impl FnOnce(&Path) -> io::Result<()>) -> Result<()> {
+    let (temporary, mut file) = temporary_beside(path).map_err(|e| Error::io(path, "write", e))?;
+    let write = || {
+        file.write_all(contents)?;
+        // On the disk before it takes the place of the last one.
+        file.sync_all()?;
+        drop(file);
+        put(&temporary)?;
+        sync_folder(path.parent().unwrap_or(Path::new("")));
+        Ok(())
+    };
+    write().map_err(|source| {
+        // The first failure is the one to report; a leftover that cannot be removed changes nothing.
+        let _ = fs::remove_file(&temporary);
+        Error::io(path, "write", source)
+    })
+}
+
+/// A new file in the same folder. Its name does not grow with that of the file, which may be as long as names can be.
+fn temporary_beside(path: &Path) -> io::Result<(PathBuf, File)> {
+    static SERIAL: AtomicU64 = AtomicU64::new(0);
+    loop {
+        let serial = SERIAL.fetch_add(1, Ordering::Relaxed);
+        let name = format!(".lapswarm-{}-{serial}.tmp", std::process::id());
+        let temporary = path.with_file_name(name);
+        match File::create_new(&temporary) {
+            // Of another machine, or of a process that had the same number and was killed.
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
+            created => return Ok((temporary, created?)),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(folder: &Path) -> Vec<String> {
+        let entries = folder.read_dir().expect("a folder").flatten();
+        let mut names: Vec<String> = entries
+            .map(|e| e.file_name().to_string_lossy().into_owned())
+            .collect();
+        names.sort();
+        names
+    }
+
+    #[test]
+    fn a_file_takes_the_place_of_the_last_one_and_leaves_nothing_beside_it() {
+        let folder = tempfile::tempdir().expect("a folder");
+        // The longest name there can be: there is none for a temporary file made of it.
+        let longest = "n".repeat(255);
+        let path = folder.path().join(&longest);
+        for contents in ["one", "another"] {
+            write_whole(&path, contents.as_bytes()).expect("written");
+            assert_eq!(fs::read_to_string(&path).expect("a file"), contents);
+        }
+        assert_eq!(names(folder.path()), [longest]);
+    }
+
+    #[test]
+    fn a_file_that_cannot_be_put_in_its_place_leaves_nothing() {
+        let folder = tempfile::tempdir().expect("a folder");
+        fs::create_dir(folder.path().join("taken")).expect("a folder");
+        fs::write(folder.path().join("taken/file"), "").expect("a file");
+        let error = write_whole(folder.path().join("taken"), b"text").expect_err("a folder is there");
+        assert!(matches!(error, Error::Io { action: "write", .. }), "{error}");
+        assert_eq!(names(folder.path()), ["taken"]);
+        assert!(write_whole(folder.path().join("none/file"), b"text").is_err());
+    }
+
+    #[test]
+    fn a_new_file_overwrites_nothing() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("file");
+        write_new(&path, b"first").expect("written");
+        let error = write_new(&path, b"second").expect_err("it is there");
+        let Error::Io { source, .. } = error else {
+            panic!("{error}");
+        };
+        assert_eq!(source.kind(), io::ErrorKind::AlreadyExists);
+        assert_eq!(fs::read_to_string(&path).expect("a file"), "first");
+        assert_eq!(names(folder.path()), ["file"]);
+    }
+
+    #[test]
+    fn names_that_lead_elsewhere_become_names_of_files() {
+        for (name, expected) in [
+            ("../../evil", "______evil"),
+            ("/evil", "_evil"),
+            ("C:\\evil", "C__evil"),
+            ("..", "__"),
+            ("nul\0", "nul_"),
+            ("Kurve Größe 1", "Kurve_Größe_1"),
+        ] {
+            assert_eq!(stem(name), expected);
+        }
+        let longest = "中\u{2028}".repeat(30);
+        assert!(stem(&longest).len() <= longest.len());
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn cars_and_laps_take_the_place_of_the_last_ones() {
+        use crate::telemetry::{ChannelMap, Log, LogOptions, NativeFormat, write_native};
+        let folder = tempfile::tempdir().expect("a folder");
+        let of = |name: &str| folder.path().join(name);
+        for name in ["car.toml", "car.tir", "lap.csv"] {
+            fs::write(of(name), "the last one").expect("a file");
+            // What is written in place shows through every name of a file.
+            fs::hard_link(of(name), of("other ").with_extension(name)).expect("a link");
+        }
+        crate::vehicle::Car::bundled()
+            .and_then(|car| car.write(folder.path(), "car"))
+            .expect("a car");
+        let lap = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/laps/gt_silverstone.csv");
+        let log = Log::read(lap, &ChannelMap::default(), &LogOptions::default()).expect("a log");
+        write_native(&log, of("lap.csv"), &NativeFormat::exact()).expect("written");
+        for name in ["car.toml", "car.tir", "lap.csv"] {
+            let other = fs::read_to_string(of("other ").with_extension(name)).expect("a file");
+            assert_eq!(other, "the last one", "{name}");
+            assert_ne!(fs::read_to_string(of(name)).expect("a file"), other);
+        }
+    }
+
+    /// What a program writes and a loss of power may cut in two goes through this module.
+    #[test]
+    fn nothing_else_writes_files() {
+        fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
+            for entry in folder.read_dir().expect("a folder").flatten() {
+                let path = entry.path();
+                if path.is_dir() {
+                    sources(&path, found);
+                } else if path.extension().is_some_and(|e| e == "rs") {
+                    found.push(path);
+                }
+            }
+        }
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+        let mut found = Vec::new();
+        sources(&root, &mut found);
+        assert!(found.len() > 100);
+        for path in found {
+            let name = path.file_name().unwrap_or_default().to_string_lossy();
+            if path == root.join("files.rs") || name.ends_with("tests.rs") {
+                continue;
+            }
+            let text = fs::read_to_string(&path).expect("a source");
+            let program = text.split("#[cfg(test)]\nmod tests {").next().unwrap_or_default();
+            for line in program.lines() {
+                let writes = ["fs::write(", "File::create", "fs::copy(", "create_new("]
+                    .iter()
+                    .any(|call| line.contains(call));
+                // A switch of the system's, which is no file.
+                assert!(
+                    !writes || line.contains("/proc/self/"),
+                    "{}: {line}",
+                    path.display()
+                );
+            }
+        }
+    }
+}
