@@ -114,7 +114,7 @@ impl Wanted {
             Fault::Gone => "does not open again (no usable device: the adapter is gone)",
             Fault::OutOfMemory => "emory",
             Fault::Validation => "MAP_READ",
-            Fault::Hung => "does not finish its work",
+            Fault::Hung => "counts as hung",
         };
         assert!(faults[0].contains(words), "{}, {what}: {faults:?}", kind.name);
         if fault == Fault::Gone {

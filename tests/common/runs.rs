@@ -103,10 +103,10 @@ pub fn works_for(child: &mut Child, marker: &Path) -> Duration {
     began.elapsed()
 }
 
-/// Whether a file waits to be put in the place of another.
+/// Whether a file waits to be put in the place of another, which a lock does not.
 fn on_its_way(path: &Path) -> bool {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
-    name.starts_with('.') || name.ends_with(".part")
+    name.starts_with('.') && name != ".lock" || name.ends_with(".part")
 }
 
 /// No file of a folder is part of one, but for those on their way.
@@ -119,7 +119,7 @@ pub fn nothing_half_written(folder: &Path) {
             nothing_half_written(&path);
             continue;
         }
-        if on_its_way(&path) {
+        if on_its_way(&path) || path.ends_with(".lock") {
             continue;
         }
         let bytes = std::fs::read(&path).expect("a file");
