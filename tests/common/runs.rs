@@ -158,6 +158,8 @@ pub fn nothing_half_written(folder: &Path) {
                 let whole = text().ends_with('\n') && key(text()) == key(Car::BUNDLED_TYRE);
                 assert!(whole, "{name}");
             }
+            // The mark of a stage of a run that is whole.
+            None if path.ends_with("done") => {}
             other => panic!("{name}: nobody knows what a whole one is ({other:?})"),
         }
     }
