@@ -36,6 +36,7 @@ use lapswarm::{Error, Result};
 use said::{errln, out, outln};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
+use std::io::IsTerminal;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -317,6 +318,11 @@ pub fn run() -> ExitCode {
         .with_writer(std::io::stderr)
         .with_max_level(tracing::Level::WARN)
         .init();
+    // Lines are as wide as a terminal; where none is, whoever reads wants names and flags whole.
+    let wraps = std::io::stderr().is_terminal();
+    let _ = miette::set_hook(Box::new(move |_| {
+        Box::new(miette::MietteHandlerOpts::new().wrap_lines(wraps).build())
+    }));
     let outcome = match cli.command {
         Command::Run(arguments) => run::run(&arguments),
         Command::Identify(arguments) => identify::run(&arguments),
