@@ -14,7 +14,8 @@ use std::os::unix::process::ExitStatusExt;
 use std::path::Path;
 use std::process::Command;
 
-const STUDY: &str = "section = \"Abbey\"\nbackend = \"simd\"\n[swarm]\npopulation = 24\niterations = 120\n";
+const STUDY: &str =
+    "section = \"Abbey\"\nbackend = \"simd\"\nhops = 0\n[swarm]\npopulation = 24\niterations = 120\n";
 
 /// A whole run, small. Without a hybrid drive, whose study would take longer than all the others here.
 const RUN: &str = "identify = \"car.toml\"\nraceline = \"line.toml\"\nrounds = 1\n";
@@ -129,7 +130,7 @@ impl<'a> Study<'a> {
 
 #[test]
 fn a_killed_identification_ends_as_one_that_was_left_alone() {
-    Study::new(&["identify", "study.toml"]).kill_and_go_on(8);
+    Study::new(&["identify", "study.toml"]).kill_and_go_on(6);
 }
 
 #[test]
@@ -215,7 +216,7 @@ fn a_killed_plain_swarm_ends_as_one_that_was_left_alone() {
         "--population",
         "16",
         "--iterations",
-        "240",
+        "160",
         "--backend",
         "simd",
     ];
@@ -234,7 +235,7 @@ fn a_killed_run_ends_as_one_that_was_left_alone() {
     Study::new(&study).kill_and_go_on(5);
 }
 
-/// Rows that are there stay, and what was at work is done anew.
+/// Rows that are there stay, and what was at work goes on.
 #[test]
 fn a_killed_sweep_goes_on_with_the_rows_that_it_has() {
     let sweep = Study {
@@ -257,7 +258,7 @@ fn runs_on_a_device_that_are_broken_off_end_as_those_that_were_left_alone() {
         "--backend",
         "gpu",
         "--population",
-        "16",
+        "8",
         "--iterations",
         "20",
     ];
