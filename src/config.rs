@@ -71,10 +71,12 @@ pub fn read_bytes(path: &Path, most: u64) -> Result<Vec<u8>> {
     // As much as it tells and no more: what grows by doubling may come to twice that.
     let mut bytes = Vec::new();
     bytes
-        .try_reserve_exact(usize::try_from(told + 1).unwrap_or(usize::MAX))
+        .try_reserve_exact(usize::try_from(told.saturating_add(1)).unwrap_or(usize::MAX))
         .map_err(|e| Error::io(path, "read", e.into()))?;
     // Pipes and devices do not tell their size.
-    file.take(most + 1).read_to_end(&mut bytes).map_err(failed)?;
+    file.take(most.saturating_add(1))
+        .read_to_end(&mut bytes)
+        .map_err(failed)?;
     if bytes.len() as u64 > most {
         return Err(too_large("more".to_owned()));
     }

@@ -45,6 +45,23 @@ pub enum Error {
 /// `Result` with this crate's [`Error`].
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
+/// Text from a file as a message tells it: not endless, and with nothing in it that a terminal would obey.
+fn told(text: &str) -> String {
+    const LONGEST: usize = 500;
+    let mut out = String::new();
+    for c in text.chars().take(LONGEST) {
+        if c.is_control() && c != '\n' {
+            out.extend(c.escape_debug());
+        } else {
+            out.push(c);
+        }
+    }
+    if text.chars().nth(LONGEST).is_some() {
+        out.push_str("...");
+    }
+    out
+}
+
 impl Error {
     /// An [`Error::Input`] from anything printable.
     pub fn input(
@@ -55,8 +72,8 @@ impl Error {
     ) -> Self {
         Self::Input {
             file: file.as_ref().display().to_string(),
-            place: place.into(),
-            found: found.into(),
+            place: told(&place.into()),
+            found: told(&found.into()),
             expected: expected.into(),
         }
     }

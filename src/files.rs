@@ -50,7 +50,7 @@ pub fn stem(name: &str) -> String {
 
 /// Whether a name is that of a file which a process that was killed had half written.
 pub fn is_temporary(name: &str) -> bool {
-    name.starts_with('.') && name.ends_with(".tmp")
+    name.starts_with(".lapswarm-") && name.ends_with(".tmp")
 }
 
 /// Writes a temporary file beside `path`, and moves it there.

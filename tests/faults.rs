@@ -80,6 +80,47 @@ fn faults_survive_a_resume_and_the_summary_names_what_ended_the_run() {
     }
 }
 
+/// An adapter that goes in the middle of a study stays away for all that the study opens after it: several levels of two
+/// searches, and the front between them.
+#[test]
+fn a_study_ends_without_the_adapter_that_it_began_with() {
+    let _turn = alone();
+    if !has_device() {
+        return;
+    }
+    let settings = RacelineSettings {
+        track: "stadium:300:80:12".to_owned(),
+        sections: 60,
+        population: 16,
+        iterations: 12,
+        objectives: vec![LineObjective::Length, LineObjective::Gamma],
+        warm_start: false,
+        local_search: false,
+        backend: BackendChoice::Gpu,
+        ..RacelineSettings::default()
+    };
+    let setup = raceline::set_up(&settings).unwrap();
+    let mut gone = false;
+    let ended = find_lines_from(&settings, &setup, None, &mut Keeper::idle(), |p| {
+        if p.evaluations > 0 && !std::mem::replace(&mut gone, true) {
+            faults::inject(Fault::Gone, 0, u64::MAX);
+        }
+        ControlFlow::Continue(())
+    });
+    faults::end();
+    let ended = ended.expect("lanes take over, and for those that come after too");
+    assert!(ended.front.is_some());
+    assert_eq!(ended.backend.backend, "simd");
+    assert!(
+        ended
+            .device_faults
+            .iter()
+            .any(|f| f.contains("the adapter is gone")),
+        "{:?}",
+        ended.device_faults
+    );
+}
+
 fn lapswarm(folder: &Path, driver: &Path, arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_lapswarm"))
         .args(arguments)

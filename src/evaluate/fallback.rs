@@ -23,8 +23,8 @@ impl<'a> FallbackEvaluator<'a> {
     /// An evaluator that `open` opens on a device, with that of `lanes` to take over.
     ///
     /// # Errors
-    /// [`Error::NoDevice`] if there is no device, unless `choice` leaves it to the program and names no `adapter`; a device
-    /// that is there and fails is none.
+    /// [`Error::NoDevice`] if there is no device, unless `choice` leaves it to the program and names no `adapter`, or the process
+    /// has had the device before; a device that is there and fails is none.
     pub fn new(
         problem: &'a Problem,
         (choice, adapter): (BackendChoice, Option<&str>),
@@ -44,7 +44,10 @@ impl<'a> FallbackEvaluator<'a> {
                 evaluator.current = Some(device);
                 evaluator.on_device = true;
             }
-            Err(error @ Error::NoDevice(_)) if choice == BackendChoice::Auto && adapter.is_none() => {
+            // A study that has had its device ends without it, rather than not at all.
+            Err(error @ Error::NoDevice(_))
+                if (choice == BackendChoice::Auto && adapter.is_none()) || GpuContext::was_open(adapter) =>
+            {
                 evaluator.take_over(error.to_string());
             }
             Err(Error::Device(message)) => evaluator.open_anew(message),

@@ -54,10 +54,7 @@ impl Drop for RunFolder {
             let _ = std::fs::remove_file(self.path.join(SETTINGS));
         }
         let _ = std::fs::remove_file(self.path.join(LOCK));
-        for folder in &self.made {
-            // Only what is empty goes.
-            let _ = std::fs::remove_dir(folder);
-        }
+        remove_empty(&self.made);
     }
 }
 
@@ -204,6 +201,13 @@ fn holds_more_than(folder: &Path, names: &[&str]) -> bool {
     }
 }
 
+/// Removes those of folders that are empty.
+fn remove_empty(folders: &[PathBuf]) {
+    for folder in folders {
+        let _ = std::fs::remove_dir(folder);
+    }
+}
+
 /// The folder and those around it that are not there, the innermost first.
 fn missing(folder: &Path) -> Vec<PathBuf> {
     let around = folder.ancestors().filter(|path| !path.as_os_str().is_empty());
@@ -224,7 +228,7 @@ pub fn create(study: &str, asked: Option<&Path>) -> Result<RunFolder> {
         check_free(folder)?;
         let made = missing(folder);
         std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, "create", e))?;
-        let mut locked = RunFolder::lock(folder)?;
+        let mut locked = RunFolder::lock(folder).inspect_err(|_| remove_empty(&made))?;
         // Another run may have come and gone between the look and the lock.
         if holds_something(folder) {
             return Err(taken(folder));
@@ -320,11 +324,8 @@ fn clean(folder: &Path, deepest: usize) -> Result<()> {
     Ok(())
 }
 
-/// What becomes of settings in a run's folder that are not the run's.
-const EDITED: &str = "study.edited.toml";
-
-/// Writes `study.toml`. One that says something else, as after an edit of a run that is gone on with, is kept beside it: a run
-/// goes by the settings that it was begun with.
+/// Writes `study.toml`. One that says something else, as after an edit of a run that is gone on with or from before that was
+/// moved to another backend, is kept beside it as `study.before.toml` or the next free of its kind.
 ///
 /// # Errors
 /// [`Error::Io`] if it cannot be written.
@@ -333,11 +334,18 @@ pub fn write_study(folder: &Path, toml: &str) -> Result<()> {
     match std::fs::read(&path) {
         Ok(before) if before == toml.as_bytes() => return Ok(()),
         Ok(_) => {
-            std::fs::rename(&path, folder.join(EDITED)).map_err(|e| Error::io(&path, "move", e))?;
-            tracing::warn!(
-                "{} does not say what the run goes by; it is {EDITED} now",
-                path.display()
-            );
+            let mut names = (1u32..).map(|number| match number {
+                1 => folder.join("study.before.toml"),
+                _ => folder.join(format!("study.before-{number}.toml")),
+            });
+            if let Some(free) = names.find(|name| !name.exists()) {
+                std::fs::rename(&path, &free).map_err(|e| Error::io(&path, "move", e))?;
+                tracing::warn!(
+                    "{} did not say what the run goes by now; it is kept as {}",
+                    path.display(),
+                    free.display()
+                );
+            }
         }
         Err(_) => {}
     }
@@ -595,11 +603,13 @@ mod tests {
         let text = |name: &str| std::fs::read_to_string(root.path().join(name)).ok();
         write_study(root.path(), "a = 1").expect("written");
         write_study(root.path(), "a = 1").expect("written");
-        assert_eq!(text(EDITED), None);
-        std::fs::write(root.path().join(SETTINGS), "a = 2").expect("a file");
-        write_study(root.path(), "a = 1").expect("written");
-        assert_eq!(text(SETTINGS).as_deref(), Some("a = 1"));
-        assert_eq!(text(EDITED).as_deref(), Some("a = 2"));
+        assert_eq!(text("study.before.toml"), None);
+        for (edit, kept) in [("a = 2", "study.before.toml"), ("a = 3", "study.before-2.toml")] {
+            std::fs::write(root.path().join(SETTINGS), edit).expect("a file");
+            write_study(root.path(), "a = 1").expect("written");
+            assert_eq!(text(SETTINGS).as_deref(), Some("a = 1"));
+            assert_eq!(text(kept).as_deref(), Some(edit));
+        }
     }
 
     #[test]

@@ -4,7 +4,9 @@ use super::problem::{DriveProblem, LAP_FIGURES};
 use crate::drive::kernel::{DrivenLap, STATE, ending};
 use crate::error::{Error, Result};
 use crate::evaluate::gpu::shader::DriveShape;
-use crate::evaluate::gpu::{Binding, GpuContext, StepBatching, Trajectories, TrajectoryKernel, workgroup};
+use crate::evaluate::gpu::{
+    Binding, GpuContext, StepBatching, Trajectories, TrajectoryKernel, rounds_of, workgroup,
+};
 use crate::evaluate::sound::{joined, sound};
 use crate::evaluate::{BackendInfo, Evaluation, Evaluator, Failure, ModelTable, Problem};
 use crate::vehicle::model::STAGES;
@@ -70,7 +72,7 @@ impl<'a> GpuDriveEvaluator<'a> {
             table: &table,
             others: LAP_FIGURES,
             tables,
-            rounds_per_step: 1 + STAGES.len() + drive.torque().stretches.len(),
+            rounds_per_step: 1 + rounds_of(STAGES.len()) + rounds_of(drive.torque().stretches.len()),
         };
         Ok(Self {
             drive,

@@ -65,6 +65,9 @@ fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 /// The device that the process has open, if any.
 static SHARED: Mutex<Option<Arc<GpuContext>>> = Mutex::new(None);
 
+/// What the devices that the process has opened were asked for by.
+static OPENED: Mutex<Vec<Option<String>>> = Mutex::new(Vec::new());
+
 impl GpuContext {
     /// The process's device, opened on the first call; `name` chooses the adapter (see
     /// [`super::devices`]). A lost device, or one that `name` does not mean, gives way to a new one.
@@ -89,7 +92,16 @@ impl GpuContext {
         *shared = None;
         let context = Arc::new(Self::open(name)?);
         *shared = Some(Arc::clone(&context));
+        let mut opened = locked(&OPENED);
+        if !opened.iter().any(|known| known.as_deref() == name) {
+            opened.push(name.map(str::to_owned));
+        }
         Ok(context)
+    }
+
+    /// Whether the process has had a device that `name` means: one that is not there any more has gone.
+    pub(crate) fn was_open(name: Option<&str>) -> bool {
+        locked(&OPENED).iter().any(|known| known.as_deref() == name)
     }
 
     /// Lets go of the process's device, so that the next call of [`GpuContext::shared`] opens one anew.

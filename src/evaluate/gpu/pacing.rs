@@ -10,6 +10,11 @@ const GROWTH: f64 = 4.0;
 /// limit, 65535, less what the other loops of a dispatch take.
 pub(crate) const LOOP_ROUNDS: usize = 65_000;
 
+/// Rounds that count of a loop of so many: in one more it finds that it is at its end.
+pub(crate) const fn rounds_of(count: usize) -> usize {
+    count + 1
+}
+
 /// How work is cut. Results do not depend on it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StepBatching {

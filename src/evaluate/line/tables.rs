@@ -11,7 +11,7 @@ use wgpu::BufferUsages as Usage;
 /// Lanes that a software driver works on at once: their figures fill one line of the processor's cache.
 const SOFTWARE_TILE: u32 = 8;
 
-/// Rounds of all loops of a kernel for each section, at the most: two of the shape's, two laps of either pass and one of the
+/// Rounds of all loops of a kernel for each section, at the most: three of the shape's, two laps of either pass and one of the
 /// times; with energy, the run-in and its two laps besides.
 const ROUNDS_PER_SECTION: usize = 10;
 

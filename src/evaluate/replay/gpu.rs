@@ -4,7 +4,7 @@ use super::kernel::{BLOCK, CHANNELS};
 use super::problem::ReplayProblem;
 use crate::error::{Error, Result};
 use crate::evaluate::gpu::shader::{ReplayShape, base_vectors};
-use crate::evaluate::gpu::{Binding, DeviceKind, GpuContext, Kernel, LOOP_ROUNDS, workgroup};
+use crate::evaluate::gpu::{Binding, DeviceKind, GpuContext, Kernel, LOOP_ROUNDS, rounds_of, workgroup};
 use crate::evaluate::sound::{joined, sound};
 use crate::evaluate::{BackendInfo, Evaluation, Evaluator, ModelTable, Problem};
 use crate::vehicle::model::STAGES;
@@ -69,12 +69,12 @@ const RESULT_PLANES: usize = CHANNELS + 1;
 
 /// Rounds of the kernel's loops in a step between samples: itself and its stages.
 const fn rounds_per_substep() -> usize {
-    1 + STAGES.len()
+    1 + rounds_of(STAGES.len())
 }
 
-/// Rounds of the kernel's loops in a sample.
+/// Rounds of the kernel's loops in a sample: itself and its steps, with the round in which these end.
 const fn rounds_per_sample(substeps: usize) -> usize {
-    1 + substeps * rounds_per_substep()
+    2 + substeps * rounds_per_substep()
 }
 
 /// Dispatches that one set of timestamps covers.
@@ -196,7 +196,7 @@ impl<'a> GpuEvaluator<'a> {
                 "{} leaves loops that are longer than it thinks good: at most {} steps between samples can be driven on it, \
                  {substeps} are asked for",
                 context.summary(),
-                (LOOP_ROUNDS / BLOCK - 1) / rounds_per_substep(),
+                (LOOP_ROUNDS / BLOCK - 2) / rounds_per_substep(),
             )));
         }
         let mut base = table.base.clone();

@@ -4,7 +4,9 @@ use super::kernel::{STATE, Settling};
 use super::problem::{AIM_FIGURES, Settled, SteadyProblem};
 use crate::error::Result;
 use crate::evaluate::gpu::shader::SteadyShape;
-use crate::evaluate::gpu::{Binding, GpuContext, StepBatching, Trajectories, TrajectoryKernel, workgroup};
+use crate::evaluate::gpu::{
+    Binding, GpuContext, StepBatching, Trajectories, TrajectoryKernel, rounds_of, workgroup,
+};
 use crate::evaluate::sound::{joined, sound};
 use crate::evaluate::{BackendInfo, Evaluation, Evaluator, Failure, ModelTable, Problem};
 use crate::vehicle::model::STAGES;
@@ -56,7 +58,7 @@ impl<'a> GpuSteadyEvaluator<'a> {
             table: &table,
             others: AIM_FIGURES,
             tables: vec![(Binding::Uniform, plan)],
-            rounds_per_step: 1 + STAGES.len(),
+            rounds_per_step: 1 + rounds_of(STAGES.len()),
         };
         Ok(Self {
             steady,

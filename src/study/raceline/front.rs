@@ -162,10 +162,17 @@ pub(super) fn search_front_from(
     if settings.local_search && settings.objectives.iter().all(|o| solvers.solves(*o)) {
         let polished = std::thread::scope(|scope| {
             let led = scope.spawn(|| polish_along(&archive, settings, solvers));
-            watched(led, solvers.flag(), || match &latest {
-                Some(progress) => observe(progress, &state),
-                None => Ok(ControlFlow::Continue(())),
-            })
+            // A search that is gone on with may have no step left to tell of.
+            let none = Progress {
+                iteration: 0,
+                evaluations: 0,
+                best: Vec::new(),
+                median: None,
+                failed: 0,
+                failures: FailureCounts::new(),
+            };
+            let told = latest.as_ref().unwrap_or(&none);
+            watched(led, solvers.flag(), || observe(told, &state))
         })?;
         evaluations += insert_all(&mut archive, judge.as_mut(), &polished)?;
     }

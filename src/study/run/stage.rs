@@ -112,6 +112,9 @@ impl Stages {
             for (name, contents) in files {
                 write_whole(target.join(name), &contents)?;
             }
+            // Of a run that was broken off while another was at work on the same stage.
+            let _ = std::fs::remove_dir_all(self.folder.join(UNFINISHED).join(&kind));
+            let _ = std::fs::remove_dir(self.folder.join(UNFINISHED));
             return Ok((target, true));
         }
         let unfinished = self.unfinished(&kept, &self.folder.join(UNFINISHED).join(&kind))?;
@@ -186,10 +189,11 @@ fn whole(kept: &Path) -> Result<Option<Vec<KeptFile>>> {
             tracing::warn!("{}: {found}; the stage is done anew", kept.display());
             // Out of the way at once, whoever else looks at it.
             let aside = aside(kept)?;
-            std::fs::rename(kept, &aside)
-                .and_then(|()| std::fs::remove_dir_all(&aside))
-                .map_err(|e| Error::io(kept, "remove", e))?;
-            Ok(None)
+            match std::fs::rename(kept, &aside).and_then(|()| std::fs::remove_dir_all(&aside)) {
+                // Another run has seen it too.
+                Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(Error::io(kept, "remove", e)),
+                _ => Ok(None),
+            }
         }
     }
 }

@@ -67,15 +67,14 @@ pub(super) fn identified(
     let Some(first) = studies.first() else {
         return Ok(Vec::new());
     };
-    let sizes: Vec<Size> = studies.iter().map(IdentifySettings::size).collect();
-    let _allowed = Size::check_together(&sizes, memory_limit_mib)?;
+    let mut sizes: Vec<Size> = studies.iter().map(IdentifySettings::size).collect();
+    drop(Size::check_together(&sizes, memory_limit_mib)?);
     let setup = identify::set_up(first)?;
-    // The log is one for all of them.
-    let alone = Size {
-        samples: setup.log.samples(),
-        ..sizes[0]
-    };
-    drop(alone.check(memory_limit_mib)?);
+    // The log is one for all of them, and may leave room for fewer.
+    sizes[0].samples = setup.log.samples();
+    let together = Size::together(&sizes, memory_limit_mib).max(1);
+    let (studies, paths) = (&studies[..together], &paths[..together]);
+    let _allowed = Size::check_together(&sizes[..together], memory_limit_mib)?;
     let mut evaluator = open_evaluator(&setup.replay, first.backend, first.adapter.as_deref())?;
     let stop = AtomicBool::new(false);
     let (setup, stopped) = (&setup, &stop);

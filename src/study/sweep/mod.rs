@@ -104,7 +104,7 @@ pub fn sweep_within(
         let begun = || (0..points.len()).any(|number| keeper_of(&path_of(number)).file().exists());
         let mendable = match &error {
             Error::Interrupted(_) => true,
-            Error::Io { .. } | Error::Device(_) => begun(),
+            Error::Io { .. } | Error::Device(_) | Error::NoDevice(_) => begun(),
             _ => false,
         };
         if !resume && rows.len() == began_with && !mendable {
