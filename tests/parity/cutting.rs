@@ -208,12 +208,12 @@ fn more_steps_than_a_driver_bears_are_refused() {
     let replay = problem(bundled_car(), &UNKNOWNS, lap);
     let refusal = GpuEvaluator::new(&replay, context).err().expect("too many");
     assert!(
-        refusal.to_string().contains("168 steps between samples"),
+        refusal.to_string().contains("144 steps between samples"),
         "{refusal}"
     );
     let mut evaluator = open_evaluator(&replay, BackendChoice::Gpu, None).expect("lanes take over");
     assert_eq!(evaluator.backend().backend, "simd");
-    assert!(evaluator.device_faults()[0].contains("168 steps"));
+    assert!(evaluator.device_faults()[0].contains("144 steps"));
     let population = candidates(&replay, 4, 0.2, &mut Draws::new(8));
     assert!(
         evaluator

@@ -72,9 +72,9 @@ const fn rounds_per_substep() -> usize {
     1 + rounds_of(STAGES.len())
 }
 
-/// Rounds of the kernel's loops in a sample: itself and its steps, with the round in which these end.
+/// Rounds of the kernel's loops in a sample: itself and its steps.
 const fn rounds_per_sample(substeps: usize) -> usize {
-    2 + substeps * rounds_per_substep()
+    1 + rounds_of(0) + substeps * rounds_per_substep()
 }
 
 /// Dispatches that one set of timestamps covers.
@@ -196,7 +196,7 @@ impl<'a> GpuEvaluator<'a> {
                 "{} leaves loops that are longer than it thinks good: at most {} steps between samples can be driven on it, \
                  {substeps} are asked for",
                 context.summary(),
-                (LOOP_ROUNDS / BLOCK - 2) / rounds_per_substep(),
+                (LOOP_ROUNDS / BLOCK - rounds_per_sample(0)) / rounds_per_substep(),
             )));
         }
         let mut base = table.base.clone();
