@@ -25,5 +25,5 @@ if [ "${1:-}" = all ]; then
 fi
 mkdir -p target/sanitize
 rustc --edition 2024 --test -Zsanitizer=address --target "$host" -C debug-assertions=on -C opt-level=1 -g \
-    -o target/sanitize/unsafe_code tests/unsafe_code/main.rs
+    -o target/sanitize/unsafe_code tests/unsafe_code/alone.rs
 exec target/sanitize/unsafe_code --quiet
