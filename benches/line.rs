@@ -12,11 +12,11 @@ use common::line::{circuit, gt_car, lines};
 use criterion::{BenchmarkId, Criterion, SamplingMode, Throughput};
 use glam::DVec2;
 use lapswarm::evaluate::Evaluator;
-use lapswarm::evaluate::gpu::GpuContext;
-use lapswarm::evaluate::hybrid::{
+use lapswarm::evaluate::energy::{
     CpuHybridEvaluator, GpuHybridEvaluator, HybridLine, HybridObjective, HybridProblem, SimdHybridEvaluator,
     Strategy,
 };
+use lapswarm::evaluate::gpu::GpuContext;
 use lapswarm::evaluate::line::{
     CpuLineEvaluator, GpuLineEvaluator, LineObjective, LineProblem, SimdLineEvaluator,
 };

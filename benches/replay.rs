@@ -14,7 +14,7 @@ use lapswarm::evaluate::gpu::GpuContext;
 use lapswarm::evaluate::replay::{CpuEvaluator, GpuEvaluator, ReplayProblem, SimdEvaluator};
 use lapswarm::evaluate::simd::InstructionSet;
 use lapswarm::parity::Draws;
-use lapswarm::parity::made_up::{Lap, candidates};
+use lapswarm::parity::synthetic_lap::{Lap, candidates};
 use std::time::Duration;
 
 fn backends(replay: &ReplayProblem) -> Vec<(String, usize, Box<dyn Evaluator + '_>)> {

@@ -6,7 +6,7 @@
 // motor, generator, drag and of their rises; of flows at four loads and of their rises; of the motor, the room for it and of their
 // rises; of each section's zone, position and one over its share.
 
-// Twin of `EnergyAccount` in `src/evaluate/hybrid/gpu.rs`.
+// Twin of `EnergyAccount` in `src/evaluate/energy/gpu.rs`.
 struct EnergyAccount {
     mass: f32,
     deploy_cost: f32,

@@ -1,4 +1,4 @@
-// Twin of `src/swarm/mopso/flock.rs`: how the particles of a large swarm learn and move. One lane to a particle, state
+// Twin of `src/swarm/mopso/blocks.rs`: how the particles of a large swarm learn and move. One lane to a particle, state
 // in blocks: a coordinate of all particles of a block lies in a row, and the coordinates of a block follow one another.
 // With `elementary.wgsl` and `random.wgsl`.
 

@@ -128,7 +128,7 @@ fn sphere() {
     give(0u, sum);
 }
 
-// With its optimum moved from one to nought.
+// With its optimum moved from one to zero.
 fn rosenbrock() {
     var bends = 0.0;
     var squares = 0.0;

@@ -1,5 +1,5 @@
 // Twin of the types in `src/vehicle/tyre/mod.rs` that every tyre model shares. The
-// four wheels are reckoned side by side.
+// four wheels are computed side by side.
 
 struct TyreInput {
     load: Wheels,

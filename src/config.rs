@@ -1,5 +1,8 @@
 //! TOML reading that knows its lines: every refusal names file, line and field, and no key goes unread.
 
+pub mod kinds;
+pub mod settings;
+
 use crate::error::{Error, Result};
 use std::cell::RefCell;
 use std::collections::BTreeSet;
@@ -122,6 +125,9 @@ pub const LONGEST_NAME: usize = 120;
 
 impl<'a> Document<'a> {
     /// Parses `text`, which came from `file`.
+    ///
+    /// # Errors
+    /// [`Error::Input`] naming the line if it is no TOML.
     pub fn parse(file: &Path, text: &'a str) -> Result<Self> {
         let root = DeTable::parse(text).map_err(|e| {
             let line = e.span().map_or(1, |s| line_of(text, s.start));
@@ -222,6 +228,9 @@ impl<'a> Table<'a> {
     }
 
     /// A finite number within `minimum..=maximum`, if the key is there.
+    ///
+    /// # Errors
+    /// [`Error::Input`] naming line and field if something else stands there.
     pub fn number(&self, key: &str, minimum: f64, maximum: f64, unit: &str) -> Result<Option<f64>> {
         let Some(value) = self.value(key) else {
             return Ok(None);
@@ -234,6 +243,9 @@ impl<'a> Table<'a> {
     }
 
     /// As [`Table::number`], but the key must be there.
+    ///
+    /// # Errors
+    /// As [`Table::number`]; [`Error::Input`] if nothing stands there.
     pub fn required_number(&self, key: &str, minimum: f64, maximum: f64, unit: &str) -> Result<f64> {
         self.number(key, minimum, maximum, unit)?.ok_or_else(|| {
             self.missing(
@@ -244,6 +256,9 @@ impl<'a> Table<'a> {
     }
 
     /// A whole number within `minimum..=maximum`, if the key is there.
+    ///
+    /// # Errors
+    /// [`Error::Input`] naming line and field if something else stands there.
     pub fn integer(&self, key: &str, minimum: u64, maximum: u64) -> Result<Option<u64>> {
         let Some(value) = self.value(key) else {
             return Ok(None);
@@ -259,6 +274,9 @@ impl<'a> Table<'a> {
     }
 
     /// A string, if the key is there.
+    ///
+    /// # Errors
+    /// [`Error::Input`] naming line and field if something else stands there.
     pub fn string(&self, key: &str) -> Result<Option<&'a str>> {
         let Some(value) = self.value(key) else {
             return Ok(None);
@@ -270,6 +288,9 @@ impl<'a> Table<'a> {
     }
 
     /// A name of at most [`LONGEST_NAME`] bytes, if the key is there.
+    ///
+    /// # Errors
+    /// As [`Table::string`]; [`Error::Input`] if the name is too long.
     pub fn name(&self, key: &str) -> Result<Option<&'a str>> {
         match self.string(key)? {
             Some(name) if name.len() > LONGEST_NAME => {
@@ -280,11 +301,40 @@ impl<'a> Table<'a> {
     }
 
     /// As [`Table::string`], but the key must be there.
+    ///
+    /// # Errors
+    /// As [`Table::string`]; [`Error::Input`] if nothing stands there.
     pub fn required_string(&self, key: &str, meaning: &str) -> Result<&'a str> {
         self.string(key)?.ok_or_else(|| self.missing(key, meaning))
     }
 
+    /// A string, a number or a truth value as text, if the key is there.
+    ///
+    /// # Errors
+    /// [`Error::Input`] naming line and field if a list or a table stands there.
+    pub fn word(&self, key: &str) -> Result<Option<String>> {
+        let Some(value) = self.value(key) else {
+            return Ok(None);
+        };
+        match value.get_ref() {
+            DeValue::String(s) => Ok(Some(s.as_ref().to_owned())),
+            DeValue::Integer(i) => Ok(Some(i.as_str().to_owned())),
+            DeValue::Float(f) => Ok(Some(f.as_str().to_owned())),
+            DeValue::Boolean(b) => Ok(Some(b.to_string())),
+            _ => Err(self.wrong(key, value, "a string or a number")),
+        }
+    }
+
+    /// Whether the key is there and stands for a table.
+    pub fn is_table(&self, key: &str) -> bool {
+        let value = self.entries.get(key);
+        value.is_some_and(|value| matches!(value.get_ref(), DeValue::Table(_)))
+    }
+
     /// A truth value, if the key is there.
+    ///
+    /// # Errors
+    /// [`Error::Input`] naming line and field if something else stands there.
     pub fn boolean(&self, key: &str) -> Result<Option<bool>> {
         let Some(value) = self.value(key) else {
             return Ok(None);
@@ -296,6 +346,9 @@ impl<'a> Table<'a> {
     }
 
     /// A list of strings, if the key is there.
+    ///
+    /// # Errors
+    /// [`Error::Input`] naming line and field if something else stands there.
     pub fn strings(&self, key: &str) -> Result<Option<Vec<&'a str>>> {
         let Some(value) = self.value(key) else {
             return Ok(None);
@@ -309,6 +362,9 @@ impl<'a> Table<'a> {
     }
 
     /// A list of finite numbers, if the key is there.
+    ///
+    /// # Errors
+    /// [`Error::Input`] naming line and field if something else stands there.
     pub fn numbers(&self, key: &str) -> Result<Option<Vec<f64>>> {
         let Some(value) = self.value(key) else {
             return Ok(None);
@@ -327,6 +383,9 @@ impl<'a> Table<'a> {
     }
 
     /// A list of lists of finite numbers, if the key is there.
+    ///
+    /// # Errors
+    /// [`Error::Input`] naming line and field if something else stands there.
     pub fn number_rows(&self, key: &str) -> Result<Option<Vec<Vec<f64>>>> {
         let Some(value) = self.value(key) else {
             return Ok(None);
@@ -347,6 +406,9 @@ impl<'a> Table<'a> {
     }
 
     /// A sub-table, if the key is there.
+    ///
+    /// # Errors
+    /// [`Error::Input`] naming line and field if something else stands there.
     pub fn table(&self, key: &str) -> Result<Option<Table<'a>>> {
         let Some(value) = self.value(key) else {
             return Ok(None);
@@ -364,6 +426,9 @@ impl<'a> Table<'a> {
     }
 
     /// As [`Table::table`], but the key must be there.
+    ///
+    /// # Errors
+    /// As [`Table::table`]; [`Error::Input`] if nothing stands there.
     pub fn required_table(&self, key: &str) -> Result<Table<'a>> {
         self.table(key)?
             .ok_or_else(|| self.missing(key, format!("a table [{}]", self.field(key))))
@@ -376,6 +441,9 @@ impl<'a> Table<'a> {
     }
 
     /// Refuses any key that nobody asked for.
+    ///
+    /// # Errors
+    /// [`Error::Input`] naming line and field of the first such key.
     pub fn finish(self) -> Result<()> {
         let read = self.read.borrow();
         for key in self.entries.keys() {

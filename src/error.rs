@@ -1,5 +1,7 @@
 //! The library's one error type. Its variants follow the exit codes of the command line.
 
+use serde::Serialize;
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
 /// Everything that can go wrong, grouped by what the user can do about it.
@@ -40,6 +42,17 @@ pub enum Error {
     /// The user stopped the run (exit code 130).
     #[error("interrupted; what was reached is saved in {}", .0.display())]
     Interrupted(PathBuf),
+}
+
+/// Where an error is.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Location<'a> {
+    /// The file, or the name of the bundled resource or flag.
+    pub file: Cow<'a, str>,
+    /// The line, from one.
+    pub line: Option<usize>,
+    /// The field, column or channel.
+    pub field: Option<&'a str>,
 }
 
 /// `Result` with this crate's [`Error`].
@@ -87,6 +100,34 @@ impl Error {
         }
     }
 
+    /// The file, line and field that the error is about, where it is about one.
+    pub fn location(&self) -> Option<Location<'_>> {
+        match self {
+            Self::Input { file, place, .. } => {
+                let mut location = Location {
+                    file: file.into(),
+                    line: None,
+                    field: None,
+                };
+                for part in place.split(", ") {
+                    let line = part.strip_prefix("line ").and_then(|n| n.parse().ok());
+                    if line.is_some() {
+                        location.line = line;
+                    } else {
+                        location.field = Some(part.strip_prefix("field ").unwrap_or(part));
+                    }
+                }
+                Some(location)
+            }
+            Self::Io { path, .. } => Some(Location {
+                file: path.to_string_lossy(),
+                line: None,
+                field: None,
+            }),
+            _ => None,
+        }
+    }
+
     /// The exit code the command line ends with (see the README).
     pub fn exit_code(&self) -> u8 {
         match self {
@@ -95,5 +136,25 @@ impl Error {
             Self::NoDevice(_) | Self::Device(_) => 3,
             Self::Interrupted(_) => 130,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn errors_say_where_they_are() {
+        let at = |place: &str| {
+            let error = Error::input("car.toml", place, "1", "2");
+            let location = error.location().expect("a file");
+            assert_eq!(location.file, "car.toml");
+            (location.line, location.field.map(str::to_owned))
+        };
+        let field = |name: &str| Some(name.to_owned());
+        assert_eq!(at("line 12, field mass_kg"), (Some(12), field("mass_kg")));
+        assert_eq!(at("line 3"), (Some(3), None));
+        assert_eq!(at("sections"), (None, field("sections")));
+        assert_eq!(Error::Device("lost".to_owned()).location(), None);
     }
 }

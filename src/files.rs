@@ -5,6 +5,7 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use crate::hold::{self, Point};
 use crate::{Error, Result};
 
 /// Writes a file by way of a temporary one in the same folder, so that a reader, or a run that is stopped half way, never sees
@@ -61,7 +62,9 @@ fn place(path: &Path, contents: &[u8], put: impl FnOnce(&Path) -> io::Result<()>
         // On the disk before it takes the place of the last one.
         file.sync_all()?;
         drop(file);
+        hold::pass(Point::Written);
         put(&temporary)?;
+        hold::pass(Point::Placed);
         sync_folder(path.parent().unwrap_or(Path::new("")));
         Ok(())
     };

@@ -2,7 +2,7 @@
 //!
 //! A [`evaluate::Problem`] names bounded decision variables and objectives, an [`evaluate::Evaluator`] scores whole
 //! populations of candidates of it, and a [`swarm::Optimiser`] is asked for candidates and told what they are worth.
-//! Evaluators come in three kinds that can stand in for one another: `f64` on the processor (the reference), `f32`
+//! Three backends evaluate the same problem and can replace one another: `f64` on the processor (the reference), `f32`
 //! lanes on the processor, and WGSL kernels on any graphics processor.
 //!
 //! | | |
@@ -10,11 +10,15 @@
 //! | [`vehicle`] | the car: tyres, body, loads, aero; written once over a [`scalar::Real`], with a WGSL twin in `shaders/` |
 //! | [`track`], [`telemetry`] | circuits and logs, as read from files |
 //! | [`simulate`] | a driver who takes a car round a circuit and logs it |
-//! | [`mod@line`], [`optimum`] | racing lines, the point-mass lap on them, and their exact optima |
+//! | [`mod@line`], [`optimum`] | racing lines, the quasi-steady-state lap on them, and their reference optima |
 //! | [`evaluate`], [`swarm`] | problems and their evaluators; optimisers |
 //! | [`study`], [`report`] | what users run, and the pictures and tables that it writes |
 //!
-//! A problem of your own, asked and told by hand: the front between being near nought and being near one.
+//! Comments cite two sources by short names. *The thesis* is *Integrated Optimisation for Dynamic Modelling, Path Planning and
+//! Energy Management in Hybrid Race Vehicles* (Lancaster University, 2020); figures in round brackets are the numbers of its
+//! equations. *The book* is the documentation in `book/` of the repository.
+//!
+//! A problem of your own, asked and told by hand: the front between being near zero and being near one.
 //!
 //! ```
 //! use lapswarm::evaluate::point::{CallCost, PointEvaluator};
@@ -23,7 +27,7 @@
 //!
 //! let problem = Problem {
 //!     variables: vec![Variable::new("x", "m", -2.0, 3.0), Variable::new("y", "m", -2.0, 3.0)],
-//!     objectives: vec![Objective::new("to nought", "m^2"), Objective::new("to one", "m^2")],
+//!     objectives: vec![Objective::new("to zero", "m^2"), Objective::new("to one", "m^2")],
 //! };
 //! let mut evaluator = PointEvaluator::new(problem.clone(), CallCost::Cheap, |x, f| {
 //!     f[0] = x.iter().map(|x| x * x).sum();
@@ -105,8 +109,8 @@
 //! Which car drove the bundled lap? A short search and no polish:
 //!
 //! ```no_run
-//! use lapswarm::study::identify::{IdentifySettings, search, set_up};
-//! use std::ops::ControlFlow;
+//! use lapswarm::study::framework::{Study, solve_unwatched};
+//! use lapswarm::study::identify::{Identify, IdentifySettings};
 //!
 //! let settings = IdentifySettings {
 //!     population: Some(32),
@@ -114,8 +118,8 @@
 //!     polish: false,
 //!     ..IdentifySettings::default()
 //! };
-//! let setup = set_up(&settings)?;
-//! let outcome = search(&settings, &setup, |_| ControlFlow::Continue(()))?;
+//! let setup = Identify::prepare(&settings)?;
+//! let outcome = solve_unwatched::<Identify>(&settings, &setup)?;
 //! let unknowns = &setup.replay.problem.variables;
 //! for (unknown, value) in unknowns.iter().zip(&outcome.swarm_candidate) {
 //!     println!("{} = {value:.4} {}", unknown.name, unknown.unit);
@@ -130,6 +134,7 @@ pub mod drive;
 pub mod error;
 pub mod evaluate;
 pub mod files;
+pub mod hold;
 pub mod line;
 pub mod optimum;
 pub mod parity;
@@ -143,4 +148,4 @@ pub mod telemetry;
 pub mod track;
 pub mod vehicle;
 
-pub use error::{Error, Result};
+pub use error::{Error, Location, Result};

@@ -77,7 +77,7 @@ impl Random {
         ((u64::from(words[index as usize % 4]) * bound as u64) >> 32) as usize
     }
 
-    /// A normal deviate of mean nought and variance one (Box and Muller, 1958).
+    /// A normal deviate of mean zero and variance one (Box and Muller, 1958).
     pub fn normal(self, purpose: u32, when: u32, who: u32, index: u32) -> f64 {
         let words = self.words(purpose, when, who, index / 2);
         let (a, b) = if index.is_multiple_of(2) {
@@ -85,7 +85,7 @@ impl Random {
         } else {
             (words[2], words[3])
         };
-        // One minus a number below one is never nought.
+        // One minus a number below one is never zero.
         let radius = (-2.0 * (1.0 - f64::from(a) * 2f64.powi(-32)).ln()).sqrt();
         radius * (2.0 * std::f64::consts::PI * unit(b)).cos()
     }

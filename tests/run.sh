@@ -1,8 +1,23 @@
 #!/bin/sh
-# All checks: format, lints, docs, tests. Installs a software Vulkan driver where apt is there, so that the GPU tests
-# run on machines without a GPU; elsewhere it says what to do.
+# All checks, in two tiers. Times are on two cores, without the build; tests/README.md has them by target.
+#
+#   tests/run.sh         format, lints, docs, and the tests with every kernel's parity and every reader: at most 10 minutes
+#   tests/run.sh full    also what takes long: kills, device faults, whole identifications and searches, the examples, a soak,
+#                        licences, and the unsafe code under the address sanitizer: about 40 minutes
+#
+# Installs a software Vulkan driver where apt is there, so that the GPU tests run on machines without a GPU; elsewhere it says
+# what to do.
 set -eu
 cd "$(dirname "$0")/.."
+tier=${1:-quick}
+case $tier in
+    quick) ignored= ;;
+    full) ignored=--include-ignored ;;
+    *)
+        echo "usage: tests/run.sh [full]" >&2
+        exit 2
+        ;;
+esac
 
 if command -v apt-get >/dev/null 2>&1; then
     if ! ls /usr/share/vulkan/icd.d/*.json >/dev/null 2>&1; then
@@ -14,7 +29,7 @@ if command -v apt-get >/dev/null 2>&1; then
     export LAPSWARM_REQUIRE_GPU=1
 else
     echo "No apt here: the GPU tests need a Vulkan, Metal or DX12 driver. macOS and Windows have theirs; on other" >&2
-    echo "Linuxes install Mesa's Vulkan drivers (lavapipe). Without one the GPU tests say that they are ignored." >&2
+    echo "Linuxes install Mesa's Vulkan drivers (lavapipe). Without one the GPU tests show as ignored." >&2
 fi
 # The Vulkan loader asks for it, though nothing here opens a window.
 export XDG_RUNTIME_DIR="${XDG_RUNTIME_DIR:-${TMPDIR:-/tmp}}"
@@ -22,10 +37,24 @@ export XDG_RUNTIME_DIR="${XDG_RUNTIME_DIR:-${TMPDIR:-/tmp}}"
 cargo fmt --check
 cargo clippy --all-targets -- -D warnings
 RUSTDOCFLAGS="-D warnings" cargo doc --no-deps --quiet
-cargo test --release
-# Licences, duplicates and sources of dependencies, where the tool is there; advisories need the network and are left out.
-if command -v cargo-deny >/dev/null 2>&1; then
-    cargo deny --offline check licenses bans sources
+
+results=$(mktemp -d)
+trap 'rm -rf "$results"' EXIT
+# Runs tests, shows what they say, and keeps it to be counted.
+counted() {
+    { "$@" 2>&1 || echo "$*" >>"$results/failed"; } | tee -a "$results/said"
+}
+counted cargo test --release --no-fail-fast -- $ignored
+if [ "$tier" = full ]; then
+    # The unsafe code by itself, where it is: seconds.
+    counted sh tests/sanitize.sh
+    sh tests/soak.sh 60
+    # Licences, duplicates and sources of dependencies, where the tool is there; advisories need the network and are left out.
+    if command -v cargo-deny >/dev/null 2>&1; then
+        cargo deny --offline check licenses bans sources
+    fi
 fi
-# The unsafe code by itself, where it is: seconds.
-sh tests/sanitize.sh
+# One line for all targets.
+sed -n 's/^test result: .*\. \([0-9]*\) passed; \([0-9]*\) failed; \([0-9]*\) ignored;.*/\1 \2 \3/p' "$results/said" |
+    awk '{ p += $1; f += $2; i += $3 } END { print p + 0 " passed, " f + 0 " failed, " i + 0 " skipped" }'
+[ ! -e "$results/failed" ]

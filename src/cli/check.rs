@@ -1,16 +1,12 @@
 //! `lapswarm check`: is this file what it should be?
 
-use crate::cli::said::{errln, outln};
+use crate::cli::output::{errln, outln};
+use lapswarm::config::settings::Declared;
 use lapswarm::config::{Document, read_start, read_text};
-use lapswarm::study::hybrid::{self, HybridStudySettings};
-use lapswarm::study::identify::{self, IdentifySettings};
-use lapswarm::study::memory::USUAL_MIB;
-use lapswarm::study::raceline::{self, RacelineSettings};
-use lapswarm::study::run::RunSettings;
-use lapswarm::study::sensitivity::{SensitivitySettings, set_up_sensitivity};
-use lapswarm::study::surface::{SurfaceSettings, set_up_surface};
+use lapswarm::line::read_line;
+use lapswarm::study::framework::memory::USUAL_MIB;
+use lapswarm::study::registry::{self, Registered, STUDIES};
 use lapswarm::study::sweep::{self, SweepSettings};
-use lapswarm::study::transient::read_line;
 use lapswarm::telemetry::{ChannelMap, Log, LogOptions};
 use lapswarm::track::Track;
 use lapswarm::vehicle::tyre::TyreFile;
@@ -28,11 +24,12 @@ pub struct Arguments {
     #[arg(required = true)]
     files: Vec<PathBuf>,
     /// What they are [default: guessed from their names and heads]
-    #[arg(long)]
+    #[arg(long, value_parser = kind_flag)]
     kind: Option<Kind>,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+/// What a file is.
+#[derive(Clone, Copy)]
 enum Kind {
     Car,
     Tyre,
@@ -40,33 +37,41 @@ enum Kind {
     Log,
     Envelope,
     Line,
-    Identify,
-    Raceline,
-    Hybrid,
-    Run,
-    Sensitivity,
-    Surface,
     Sweep,
+    Study(&'static dyn Registered),
+}
+
+/// Kinds of files that are no studies', with what messages call them.
+const FILES: [(Kind, &str, &str); 7] = [
+    (Kind::Car, "car", "a car"),
+    (Kind::Tyre, "tyre", "a tyre"),
+    (Kind::Track, "track", "a track"),
+    (Kind::Log, "log", "a log"),
+    (Kind::Envelope, "envelope", "a g-g-v envelope"),
+    (Kind::Line, "line", "a line"),
+    (Kind::Sweep, "sweep", "a sweep"),
+];
+
+/// Parses `--kind`.
+fn kind_flag(name: &str) -> Result<Kind, String> {
+    let file = FILES.iter().find(|(_, known, _)| *known == name);
+    let study = || registry::named(name).map(Kind::Study);
+    file.map(|(kind, _, _)| *kind).or_else(study).ok_or_else(|| {
+        let files = FILES.iter().map(|(_, name, _)| *name);
+        let all: Vec<&str> = files.chain(registry::names()).collect();
+        format!("expected one of {}", all.join(", "))
+    })
 }
 
 impl Kind {
     /// What messages call it.
-    fn name(self) -> &'static str {
-        match self {
-            Self::Car => "a car",
-            Self::Tyre => "a tyre",
-            Self::Track => "a track",
-            Self::Log => "a log",
-            Self::Envelope => "limits",
-            Self::Line => "a line",
-            Self::Identify => "a study of identify",
-            Self::Raceline => "a study of raceline",
-            Self::Hybrid => "a study of hybrid",
-            Self::Run => "a study of run",
-            Self::Sensitivity => "a study of sensitivity",
-            Self::Surface => "a study of surface",
-            Self::Sweep => "a sweep",
+    fn name(self) -> String {
+        if let Self::Study(study) = self {
+            return format!("a study of {}", study.name());
         }
+        let same = |kind: &Kind| std::mem::discriminant(kind) == std::mem::discriminant(&self);
+        let found = FILES.iter().find(|(kind, _, _)| same(kind));
+        found.map_or(String::new(), |(_, _, words)| (*words).to_owned())
     }
 }
 
@@ -95,49 +100,36 @@ fn guess(path: &Path) -> Result<Kind> {
         if matches!(document.root().table("grid"), Ok(Some(_))) {
             return Ok(Kind::Sweep);
         }
-        // A kind's own keys, those of the kinds that share keys with later ones first.
-        let own: [(Kind, &[&str]); 8] = [
-            (Kind::Car, &["chassis"]),
-            (Kind::Track, &["survey", "curvature"]),
-            (Kind::Sweep, &["study", "base"]),
-            (Kind::Sensitivity, &["samples", "resamples"]),
-            (Kind::Surface, &["grid", "parameters"]),
-            (Kind::Run, &["identify", "raceline", "margin_m", "rounds"]),
-            (
-                Kind::Hybrid,
-                &[
-                    "scenarios",
-                    "optimise",
-                    "energy_mj",
-                    "budgets_mj",
-                    "spacing_m",
-                    "line",
-                    "stint_laps",
-                    "stint_fuel_kg",
-                    "match_lap_time_s",
-                ],
-            ),
-            (
-                Kind::Raceline,
-                &[
-                    "sections",
-                    "envelope",
-                    "car_width_m",
-                    "as_surveyed",
-                    "ellipse_exponent",
-                    "entry_mps",
-                    "warm_start",
-                    "local_search",
-                    "algorithm",
-                    "groups",
-                    "population",
-                    "iterations",
-                    "archive",
-                ],
-            ),
+        // The study that knows most of the file's keys; of several the first in this order.
+        const ORDER: [&str; 8] = [
+            "identify",
+            "raceline",
+            "hybrid",
+            "surface",
+            "sensitivity",
+            "run",
+            "transient",
+            "envelope",
         ];
-        let of = own.iter().find(|(_, names)| has(names));
-        return Ok(of.map_or(Kind::Identify, |(kind, _)| *kind));
+        if has(&["chassis"]) {
+            return Ok(Kind::Car);
+        }
+        if has(&["survey", "curvature"]) {
+            return Ok(Kind::Track);
+        }
+        if has(&["study", "base"]) {
+            return Ok(Kind::Sweep);
+        }
+        let knows = |study: &&'static dyn Registered| {
+            let declared = study.declared();
+            let top = |d: &Declared| d.table().unwrap_or(d.key).to_owned();
+            let known: Vec<String> = declared.iter().map(top).collect();
+            keys.iter().filter(|key| known.contains(key)).count()
+        };
+        let mut studies: Vec<&'static dyn Registered> = STUDIES.to_vec();
+        let place = |name: &str| ORDER.iter().position(|n| *n == name).unwrap_or(ORDER.len());
+        studies.sort_by_key(|study| (std::cmp::Reverse(knows(study)), place(study.name())));
+        return Ok(Kind::Study(studies[0]));
     }
     // A log may be larger than any text, and need not be UTF-8.
     let start = read_start(path, HEAD)?;
@@ -195,72 +187,18 @@ fn read(path: &Path, kind: Kind) -> Result<String> {
         Kind::Envelope => {
             let envelope = Envelope::load(path)?;
             format!(
-                "limits at {} speeds up to {:.1} m/s",
+                "a g-g-v envelope at {} speeds up to {:.1} m/s",
                 envelope.rows().len(),
                 envelope.top_speed_mps()
             )
         }
         Kind::Line => format!("a line of {} points", read_line(path)?.len()),
-        Kind::Identify => {
-            let settings = IdentifySettings::read(path)?;
-            identify::set_up(&without_log(&settings))?;
-            format!("{}: {} free parameters", kind.name(), settings.free.len())
-        }
-        Kind::Raceline => {
-            let settings = RacelineSettings::read(path)?;
-            raceline::set_up(&settings)?;
-            format!(
-                "{}: {}, {} sections",
-                kind.name(),
-                settings.track,
-                settings.sections
-            )
-        }
-        Kind::Hybrid => {
-            let settings = HybridStudySettings::read(path)?;
-            hybrid::read_inputs(&settings)?;
-            let count = settings.scenarios.len();
-            format!("{}: {}, {count} scenarios", kind.name(), settings.track)
-        }
-        Kind::Run => {
-            let settings = RunSettings::read(path)?;
-            identify::set_up(&without_log(&settings.identify))?;
-            raceline::set_up(&settings.line_of(&settings.identify.car, None))?;
-            format!("{}: at most {} rounds", kind.name(), settings.rounds)
-        }
-        Kind::Sensitivity => {
-            let mut settings = SensitivitySettings::read(path)?;
-            settings.replay = without_log(&settings.replay);
-            set_up_sensitivity(&settings)?;
-            let count = settings.replay.free.len();
-            format!(
-                "{}: {count} parameters, {} samples",
-                kind.name(),
-                settings.samples
-            )
-        }
-        Kind::Surface => {
-            let mut settings = SurfaceSettings::read(path)?;
-            settings.replay = without_log(&settings.replay);
-            set_up_surface(&settings)?;
-            let [x, y] = &settings.parameters;
-            format!("{}: {y} over {x}", kind.name())
-        }
         Kind::Sweep => {
             let planned = sweep::plan(&SweepSettings::load(&name)?, USUAL_MIB)?;
             format!("{}: {planned}", kind.name())
         }
+        Kind::Study(study) => format!("{}: {}", kind.name(), study.check(path)?),
     })
-}
-
-/// A study whose log is given with `--log` names laps that the bundled lap has not: these are not looked for.
-fn without_log(settings: &IdentifySettings) -> IdentifySettings {
-    let mut settings = settings.clone();
-    if settings.log.is_none() {
-        settings.laps.clear();
-        settings.holdout.clear();
-    }
-    settings
 }
 
 /// Checks them all; the first that is wrong ends the program, once all have been told of.

@@ -1,7 +1,7 @@
 //! `lapswarm devices`.
 
 use super::print_json;
-use crate::cli::said::outln;
+use crate::cli::output::outln;
 use lapswarm::Result;
 use lapswarm::evaluate::gpu::devices;
 use lapswarm::evaluate::simd::InstructionSet;

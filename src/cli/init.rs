@@ -1,41 +1,25 @@
 //! `lapswarm init`: commented files to start from.
 
-use crate::cli::said::outln;
+use crate::cli::output::outln;
+use clap::builder::PossibleValuesParser;
 use lapswarm::files;
+use lapswarm::study::registry;
 use lapswarm::vehicle::Car;
 use lapswarm::{Error, Result};
 use std::path::{Path, PathBuf};
+
+/// What can be written beside the files of studies.
+const OTHERS: [&str; 3] = ["sweep", "car", "track"];
 
 /// Flags of `init`.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  lapswarm init car my_car.toml\n  lapswarm init identify study.toml")]
 pub struct Arguments {
-    /// What to write
-    what: Template,
+    /// What to write: a study's file, a sweep over a grid, a car with its tyre beside it, or a circuit from a survey
+    #[arg(value_parser = PossibleValuesParser::new(registry::names().into_iter().chain(OTHERS)))]
+    what: String,
     /// Where to [default: its name and .toml]; refused if it exists
     file: Option<PathBuf>,
-}
-
-#[derive(Clone, Copy, clap::ValueEnum)]
-enum Template {
-    /// A study of `identify`
-    Identify,
-    /// A study of `raceline`
-    Raceline,
-    /// A study of `hybrid`
-    Hybrid,
-    /// A study of `sensitivity`
-    Sensitivity,
-    /// A study of `surface`
-    Surface,
-    /// A sweep of a study over a grid
-    Sweep,
-    /// A study of `run`
-    Run,
-    /// A car, with its tyre beside it
-    Car,
-    /// A circuit from a survey
-    Track,
 }
 
 /// Writes a file that must not be there yet.
@@ -51,30 +35,24 @@ fn write_new(path: &Path, text: &str) -> Result<()> {
 
 /// Writes it.
 pub fn run(arguments: &Arguments) -> Result<()> {
-    let (name, text) = match arguments.what {
-        Template::Identify => ("identify", include_str!("../../data/templates/identify.toml")),
-        Template::Raceline => ("raceline", include_str!("../../data/templates/raceline.toml")),
-        Template::Hybrid => ("hybrid", include_str!("../../data/templates/hybrid.toml")),
-        Template::Sensitivity => (
-            "sensitivity",
-            include_str!("../../data/templates/sensitivity.toml"),
-        ),
-        Template::Surface => ("surface", include_str!("../../data/templates/surface.toml")),
-        Template::Sweep => ("sweep", include_str!("../../data/templates/sweep.toml")),
-        Template::Run => ("run", include_str!("../../data/templates/run.toml")),
-        Template::Track => ("track", include_str!("../../data/templates/track.toml")),
-        Template::Car => ("car", Car::BUNDLED_TOML),
+    let what = arguments.what.as_str();
+    let text = match what {
+        "sweep" => include_str!("../../data/templates/sweep.toml").to_owned(),
+        "track" => include_str!("../../data/templates/track.toml").to_owned(),
+        "car" => Car::BUNDLED_TOML.to_owned(),
+        // The parser lets nothing else through.
+        study => registry::named(study).map_or(String::new(), |study| study.template()),
     };
     let path = arguments
         .file
         .clone()
-        .unwrap_or_else(|| PathBuf::from(format!("{name}.toml")));
-    if matches!(arguments.what, Template::Car) {
+        .unwrap_or_else(|| PathBuf::from(format!("{what}.toml")));
+    if what == "car" {
         let tyre = path.with_file_name("gt_slick.tir");
         write_new(&tyre, Car::BUNDLED_TYRE)?;
         outln!("{}", tyre.display());
     }
-    write_new(&path, text)?;
+    write_new(&path, &text)?;
     outln!("{}", path.display());
     Ok(())
 }

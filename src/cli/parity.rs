@@ -1,13 +1,13 @@
 //! `lapswarm parity`.
 
-use super::kept::{self, Kept, Machine};
+use super::measurement::{self, Kept, Machine};
 use super::{backend_flag, print_json};
-use crate::cli::said::outln;
+use crate::cli::output::outln;
 use lapswarm::evaluate::BackendChoice;
 use lapswarm::evaluate::gpu::{DeviceSummary, devices};
 use lapswarm::files::write_whole;
 use lapswarm::parity::{Agreement, Subject, compare, subjects};
-use lapswarm::report::{BarPanel, BarSeries, Cells, Column, HtmlReport, significant, write_csv};
+use lapswarm::report::{BarPanel, Bars, HtmlReport, Table, significant};
 use lapswarm::{Error, Result};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -139,7 +139,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             Subject::Lanes(_) => "simd",
         });
         let machine = Machine::of(names, arguments.adapter.as_deref())?;
-        kept::write(folder, "parity", &report, page_of(folder, &report)?, &machine)?;
+        measurement::write(folder, "parity", &report, page_of(folder, &report)?, &machine)?;
     }
     if !arguments.quiet {
         if let Some(folder) = &folder {
@@ -214,44 +214,29 @@ fn page_of(folder: &Path, report: &Report) -> Result<HtmlReport> {
         "Greatest difference of each kernel as a share of its tolerance: 100 % would fail.",
     );
     let drawn = &found[..found.len().min(DRAWN)];
-    let panel = BarPanel {
-        title: "Share of the tolerance",
-        x_label: "greatest difference (% of what may be)",
-        names: drawn.iter().map(|(key, _)| key.as_str()).collect(),
-        series: vec![BarSeries {
-            label: "",
-            values: drawn.iter().map(|(_, a)| 100.0 * a.share_of_tolerance).collect(),
-            intervals: Vec::new(),
-        }],
-    };
-    page.bars(&panel, "")?;
-    let texts = |of: &dyn Fn(&Agreement) -> String| found.iter().map(|(_, a)| of(a)).collect::<Vec<_>>();
-    let numbers = |of: &dyn Fn(&Agreement) -> f64| found.iter().map(|(_, a)| of(a)).collect::<Vec<_>>();
-    let (subjects, kernels) = (texts(&|a| a.subject.clone()), texts(&|a| a.kernel.clone()));
-    let figures = numbers(&|a| a.figures as f64);
-    let (relative, ulp) = (numbers(&|a| a.max_relative), numbers(&|a| a.max_ulp));
-    let shares = numbers(&|a| 100.0 * a.share_of_tolerance);
-    let bits = texts(&|a| {
-        a.bits_as_scalar
-            .map_or("-", |same| if same { "yes" } else { "no" })
-            .to_owned()
-    });
-    let verdicts = texts(&|a| if a.pass { "agrees" } else { "FAILS" }.to_owned());
-    let worst = texts(&|a| a.worst.clone());
-    let column = |name, unit, cells| Column { name, unit, cells };
-    let columns = [
-        column("on", "", Cells::Texts(&subjects)),
-        column("kernel", "", Cells::Texts(&kernels)),
-        column("verdict", "", Cells::Texts(&verdicts)),
-        column("figures", "", Cells::Numbers(&figures)),
-        column("greatest relative difference", "", Cells::Numbers(&relative)),
-        column("greatest difference", "ULP", Cells::Numbers(&ulp)),
-        column("of what may be", "%", Cells::Numbers(&shares)),
-        column("bits as f32", "", Cells::Texts(&bits)),
-        column("furthest off", "", Cells::Texts(&worst)),
-    ];
-    write_csv(folder.join("kernels.csv"), &columns)?;
-    page.table("Every comparison", "", &columns)?;
+    let panel = BarPanel::new(
+        "Share of the tolerance",
+        "greatest difference (% of what may be)",
+        drawn.iter().map(|(key, _)| *key),
+    );
+    let shares = drawn.iter().map(|(_, a)| 100.0 * a.share_of_tolerance);
+    page.place(&Bars::new("Share of the tolerance", [panel.bars("", shares)]))?;
+    let table = Table::rows(found.iter().map(|(_, a)| *a))
+        .text("on", |a| &*a.subject)
+        .text("kernel", |a| &*a.kernel)
+        .text("verdict", |a| if a.pass { "agrees" } else { "FAILS" })
+        .number("figures", "", |a| a.figures as f64)
+        .number("greatest relative difference", "", |a| a.max_relative)
+        .number("greatest difference", "ULP", |a| a.max_ulp)
+        .number("of what may be", "%", |a| 100.0 * a.share_of_tolerance)
+        .text("bits as f32", |a| {
+            a.bits_as_scalar
+                .map_or("-", |same| if same { "yes" } else { "no" })
+        })
+        .text("furthest off", |a| &*a.worst)
+        .table();
+    table.write_csv(folder.join("kernels.csv"))?;
+    page.table("Every comparison", "", &table)?;
     page.provenance("figures compared", report.evaluations.to_string());
     page.provenance("time", format!("{:.1} s", report.elapsed_s));
     Ok(page)

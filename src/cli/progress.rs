@@ -1,18 +1,15 @@
 //! The progress bar on stderr; silent where stderr is no terminal.
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use lapswarm::study::identify::{Report, Stage};
-use std::time::Instant;
+use lapswarm::study::framework::Progress;
 
-/// Shows a search as it goes.
-pub struct SearchBar {
+/// Shows a study as it goes.
+pub struct Bar {
     bar: ProgressBar,
-    stage: Option<Stage>,
-    began: Instant,
-    before: u64,
+    stage: Option<String>,
 }
 
-impl SearchBar {
+impl Bar {
     /// A bar, or a silent one.
     pub fn new(quiet: bool) -> Self {
         // Stderr's target is silent by itself where it is no terminal.
@@ -21,87 +18,39 @@ impl SearchBar {
         } else {
             ProgressDrawTarget::stderr()
         };
-        let bar = ProgressBar::with_draw_target(Some(1), target);
-        let style = ProgressStyle::with_template("{prefix:9} [{bar:32}] {pos}/{len}  {msg}  {eta} left");
-        bar.set_style(
-            style
-                .unwrap_or_else(|_| ProgressStyle::default_bar())
-                .progress_chars("=> "),
-        );
         Self {
-            bar,
+            bar: ProgressBar::with_draw_target(None, target),
             stage: None,
-            began: Instant::now(),
-            before: 0,
         }
     }
 
-    /// Takes a report in.
-    pub fn show(&mut self, report: &Report<'_>) {
-        if self.stage != Some(report.stage) {
-            self.stage = Some(report.stage);
-            self.began = Instant::now();
-            self.before = 0;
+    /// Shows what a study tells.
+    pub fn show(&mut self, progress: &Progress) {
+        if self.stage.as_ref() != Some(&progress.stage) {
             self.bar.reset();
-            self.bar.set_length(report.planned as u64);
-            self.bar.set_prefix(match report.stage {
-                Stage::Explore => "exploring",
-                Stage::Gather => "gathering",
-                Stage::Polish => "polishing",
-            });
-            if report.stage == Stage::Polish {
-                self.bar.set_message("least squares on the exact Jacobian");
+            let template = match progress.planned {
+                Some(planned) => {
+                    self.bar.set_length(planned);
+                    "{prefix:12} [{bar:32}] {pos}/{len}  {per_sec}  {msg}  {eta} left"
+                }
+                None => {
+                    self.bar.unset_length();
+                    "{spinner} {elapsed_precise} {prefix:24} {msg}"
+                }
+            };
+            if let Ok(style) = ProgressStyle::with_template(template) {
+                self.bar.set_style(style.progress_chars("=> "));
             }
+            self.bar.set_prefix(progress.stage.clone());
+            self.stage = Some(progress.stage.clone());
         }
-        if let Some(progress) = report.progress {
-            let seconds = self.began.elapsed().as_secs_f64().max(1e-9);
-            let best = progress
-                .best
-                .iter()
-                .map(|b| format!("{b:.3e}"))
-                .collect::<Vec<_>>()
-                .join(" ");
-            self.bar.set_position(progress.iteration as u64);
-            let rate = progress.evaluations as f64 / seconds;
-            self.bar.set_message(format!(
-                "{rate:.0} evaluations/s, best {best}, {} failed",
-                progress.failed
-            ));
-        }
+        self.bar.set_position(progress.done);
+        self.bar.set_message(progress.reached.clone());
+        self.bar.tick();
     }
 
     /// Takes the bar away.
     pub fn finish(self) {
         self.bar.finish_and_clear();
     }
-}
-
-/// A bar that counts evaluations, or a silent one.
-pub fn counting(quiet: bool) -> ProgressBar {
-    let target = if quiet {
-        ProgressDrawTarget::hidden()
-    } else {
-        ProgressDrawTarget::stderr()
-    };
-    let bar = ProgressBar::with_draw_target(Some(1), target);
-    if let Ok(style) =
-        ProgressStyle::with_template("[{bar:32}] {pos}/{len} evaluations, {per_sec}, {eta} left")
-    {
-        bar.set_style(style.progress_chars("=> "));
-    }
-    bar
-}
-
-/// A line that says what is being done, or a silent one.
-pub fn saying(quiet: bool) -> ProgressBar {
-    let target = if quiet {
-        ProgressDrawTarget::hidden()
-    } else {
-        ProgressDrawTarget::stderr()
-    };
-    let bar = ProgressBar::with_draw_target(None, target);
-    if let Ok(style) = ProgressStyle::with_template("{spinner} {elapsed_precise} {msg}") {
-        bar.set_style(style);
-    }
-    bar
 }

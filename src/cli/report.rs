@@ -1,7 +1,7 @@
 //! `lapswarm report`.
 
 use super::print_json;
-use crate::cli::said::outln;
+use crate::cli::output::outln;
 use lapswarm::study::compare::{Run, compare};
 use lapswarm::{Error, Result};
 use std::path::PathBuf;

@@ -1,14 +1,14 @@
 //! `lapswarm simulate`.
 
-use super::dry_run::Plan;
-use super::{BUNDLED_TRACK, Common, circuit, print_json};
-use crate::cli::said::outln;
+use super::study::{print_plan, tell};
+use super::{Common, print_json};
 use lapswarm::Result;
 use lapswarm::evaluate::BackendChoice;
 use lapswarm::simulate::{SensorSettings, SimulateSettings, simulate_lap};
 use lapswarm::study::compare::{Run, compare};
-use lapswarm::study::identify::lap_format;
-use lapswarm::study::run_folder::{self, Manifest, write_json};
+use lapswarm::study::framework::run_folder::{self, Manifest, write_json};
+use lapswarm::study::framework::{Plan, RunRecord, Subject};
+use lapswarm::study::identify::{lap_format, load_circuit};
 use lapswarm::telemetry::write_native;
 use lapswarm::vehicle::Car;
 use serde::Serialize;
@@ -21,9 +21,12 @@ pub struct Arguments {
     /// The car: a bundled name (gt) or a TOML file
     #[arg(long, value_name = "NAME|FILE", default_value = "gt")]
     car: String,
-    /// The circuit: a bundled name, a TOML file, a survey (CSV, GPX, KML, log) or a shape [default: silverstone_gp]
-    #[arg(long, value_name = "NAME|FILE")]
-    track: Option<String>,
+    /// The circuit: a bundled name, a TOML file, a survey (CSV, GPX, KML, log) or a shape
+    #[arg(long, value_name = "NAME|FILE", default_value = "silverstone_gp")]
+    track: String,
+    /// Seed of all random numbers
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
     /// Sample rate of the log, Hz
     #[arg(long, value_name = "HZ", default_value_t = 50.0)]
     rate: f64,
@@ -58,7 +61,7 @@ const GREATEST_NOISE: f64 = 100.0;
 /// Greatest delay of a sensor (s): twice as long as `identify` looks for, and far beyond what filters and buses come to.
 const LONGEST_DELAY_S: f64 = 1.0;
 
-/// Four figures of a flag, each from nought to `most`.
+/// Four figures of a flag, each from zero to `most`.
 fn four(flag: &str, values: Option<&Vec<f64>>, most: f64) -> Result<[f64; 4]> {
     let values = values.map_or(&[0.0; 4][..], Vec::as_slice);
     match <[f64; 4]>::try_from(values) {
@@ -75,7 +78,7 @@ fn four(flag: &str, values: Option<&Vec<f64>>, most: f64) -> Result<[f64; 4]> {
 /// Drives and logs.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let car = Car::load(&arguments.car)?;
-    let circuit = circuit(arguments.track.as_deref())?;
+    let circuit = load_circuit(&arguments.track)?;
     let mut settings = SimulateSettings {
         rate_hz: arguments.rate,
         substeps: arguments.substeps,
@@ -83,7 +86,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             noise: four("--noise", arguments.noise.as_ref(), GREATEST_NOISE)?,
             delay_s: four("--delay", arguments.delay.as_ref(), LONGEST_DELAY_S)?,
         },
-        seed: arguments.common.seed.unwrap_or(1),
+        seed: arguments.seed,
         ..SimulateSettings::default()
     };
     if let Some(pace) = arguments.pace {
@@ -102,20 +105,21 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         settings.check(&circuit)?;
         let resolved = serde_json::json!({
             "car": arguments.car,
-            "track": arguments.track.as_deref().unwrap_or(BUNDLED_TRACK),
+            "track": arguments.track,
             "rate_hz": settings.rate_hz,
             "substeps": settings.substeps,
             "pace": settings.driver.pace,
             "noise": settings.sensors.noise,
             "delay_s": settings.sensors.delay_s,
         });
-        return Plan::with("simulate", resolved)
+        let plan = Plan::with("simulate", resolved)
             .reads(format!("car {}", car.name))
             .reads(format!("track {}, {:.1} m", circuit.name, circuit.length_m))
             .seed(settings.seed)
             .evaluations(1)
             .evaluated_by(BackendChoice::Cpu.would_be(None)?)
-            .tell(&arguments.common);
+            .into_folder(arguments.common.out.as_deref())?;
+        return print_plan(&arguments.common, &plan);
     }
     let log = simulate_lap(&car, &circuit, &settings)?;
     let folder = run_folder::create("simulate", arguments.common.out.as_deref())?;
@@ -137,11 +141,14 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     };
     write_json(&folder.join("summary.json"), &summary)?;
     let backend = BackendChoice::Cpu.would_be(None)?;
-    let manifest = Manifest {
-        track: Some(&circuit.name),
-        settings: "",
-        ..Manifest::new("simulate", settings.seed, &backend, &car.name)
+    let subject = Subject {
+        seed: settings.seed,
+        car: car.name.clone(),
+        log: None,
+        track: Some(circuit.name.clone()),
     };
+    let record = RunRecord::of(&backend);
+    let manifest = Manifest::new("simulate", &subject, &record, "");
     // The page of runs beside each other, of this one alone, which reads the manifest; without the page the run is not whole.
     let file = folder.join("manifest.json");
     write_json(&file, &manifest)?;
@@ -154,8 +161,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         return Err(error);
     }
     if !arguments.common.quiet {
-        outln!(
-            "{}: {:.2} s, {:.1} to {:.1} m/s, up to {:.1} m/s^2 sideways\nLog: {}",
+        let said = format!(
+            "{}: {:.2} s, {:.1} to {:.1} m/s, up to {:.1} m/s^2 sideways\nLog: {}\n",
             log.source,
             summary.lap_time_s,
             summary.slowest_mps,
@@ -163,6 +170,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             summary.greatest_ay_mps2,
             summary.log
         );
+        tell(&arguments.common, &said);
     }
     if arguments.common.json {
         print_json(&summary)

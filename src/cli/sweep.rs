@@ -1,10 +1,10 @@
 //! `lapswarm sweep`.
 
-use super::dry_run::Plan;
-use super::{Common, Memory, going_on, print_json, progress, stop_flag};
-use crate::cli::said::{out, outln};
+use super::study::{print_plan, tell};
+use super::{Common, Memory, print_json, progress::Bar, stop_flag, stopped};
 use lapswarm::Result;
-use lapswarm::study::run_folder;
+use lapswarm::config::limit_memory;
+use lapswarm::study::framework::{Plan, Progress, run_folder};
 use lapswarm::study::sweep::{SWEEP_FILE, SweepSettings, plan, sweep_within};
 
 /// Flags of `sweep`.
@@ -21,54 +21,51 @@ pub struct Arguments {
     common: Common,
     #[command(flatten)]
     memory: Memory,
-    /// Go on with the sweep that --out holds a part of
+    /// Resume the sweep that --out holds a part of
     #[arg(long, requires = "out", conflicts_with = "dry_run")]
     resume: bool,
 }
 
 /// Runs the sweep.
 pub fn run(arguments: &Arguments) -> Result<()> {
-    let limit_mib = arguments.memory.in_force();
+    let (common, limit_mib) = (&arguments.common, arguments.memory.memory_limit_mib);
+    limit_memory(limit_mib);
     let settings = SweepSettings::load(&arguments.sweep)?;
-    if arguments.common.dry_run {
+    if common.dry_run {
         let planned = plan(&settings, limit_mib)?;
-        let mut told = Plan::new("sweep", settings.text())
+        let told = Plan::of_file("sweep", settings.text())
             .reads(planned.to_string())
             .memory_mib(planned.memory_mib)
-            .evaluated_by(planned.backend);
-        if let Some(evaluations) = planned.evaluations {
-            told = told.evaluations(evaluations);
-        }
-        return told.tell(&arguments.common);
+            .on_device_of(&planned.plan);
+        let told = match planned.evaluations {
+            Some(evaluations) => told.evaluations(evaluations),
+            None => told,
+        };
+        return print_plan(common, &told.into_folder(common.out.as_deref())?);
     }
-    let folder = match (&arguments.common.out, arguments.resume) {
+    let folder = match (&common.out, arguments.resume) {
         (Some(folder), true) => run_folder::reopen_by(folder, SWEEP_FILE)?,
         (out, _) => run_folder::create("sweep", out.as_deref())?,
     };
     let stop = stop_flag();
-    let bar = progress::saying(arguments.common.quiet);
+    let mut bar = Bar::new(common.quiet);
     let summary = sweep_within(&settings, &folder, arguments.resume, limit_mib, |p| {
-        let point: Vec<String> = p
-            .point
-            .settings
-            .iter()
-            .map(|(key, value)| format!("{key} {value}"))
-            .collect();
-        bar.set_message(format!(
-            "run {} of {}: {}",
-            p.done + 1,
-            p.planned,
-            point.join(", ")
-        ));
-        bar.tick();
-        going_on(&stop)
+        let point = p.point.settings.iter();
+        let point: Vec<String> = point.map(|(key, value)| format!("{key} {value}")).collect();
+        bar.show(&Progress {
+            stage: "runs".to_owned(),
+            done: p.done as u64,
+            planned: Some(p.planned as u64),
+            reached: point.join(", "),
+        });
+        stopped(&stop)
     })?;
-    bar.finish_and_clear();
-    if !arguments.common.quiet {
-        out!("{}", summary.to_text());
-        outln!("Results: {}", folder.display());
+    bar.finish();
+    if !common.quiet {
+        tell(common, &summary.to_text());
+        tell(common, &format!("Results: {}\n", folder.display()));
     }
-    if arguments.common.json {
+    if common.json {
         print_json(&summary)?;
     }
     Ok(())

@@ -18,9 +18,9 @@ const STEER_LAG: f64 = 0.04;
 const STEER_RATE: f64 = 0.9;
 /// Steering added for understeer, rad per g and metre of wheelbase.
 const UNDERSTEER: f64 = 0.0025;
-/// Share of the load that the driven wheels are reckoned to carry.
+/// Share of the load that the driven wheels are computed to carry.
 const DRIVEN_SHARE: f64 = 0.55;
-/// Speed below which the driver reckons as at this one, m/s.
+/// Speed below which the driver computes as at this one, m/s.
 const LEAST_SPEED: f64 = 3.0;
 
 macro_rules! driver_table {
@@ -61,11 +61,11 @@ driver_table! {
     speed_gain,
     /// Greatest slip ratio, driven or braked.
     slip_limit,
-    /// Slip stiffness per load that the feet reckon with.
+    /// Slip stiffness per load that the feet compute with.
     slip_stiffness,
     /// Greatest road-wheel angle, rad.
     max_steer,
-    /// One for a driver who knows the car, nought for one who does not.
+    /// One for a driver who knows the car, zero for one who does not.
     knows,
     /// Slip angle of the rear axle for every m/s^2 of lateral acceleration, rad s^2/m.
     rear_slip_per_ay,
@@ -76,7 +76,7 @@ driver_table! {
     /// Steering added for understeer, rad per g of lateral acceleration and metre of wheelbase. It and those below are constants
     /// that compilers for devices would regroup if they knew.
     understeer,
-    /// Share of the load that the driven wheels are reckoned to carry.
+    /// Share of the load that the driven wheels are computed to carry.
     driven_share,
     /// Time constant of the arms, s.
     steer_lag,

@@ -12,8 +12,8 @@ mod record;
 mod road;
 mod settings;
 
-pub use path::{PATH_WIDTH, Pose, Row, View, frame_at, look};
+pub use path::{Pose, Row, View, frame_at, look};
 pub use plan::SpeedPlan;
 pub use record::{Drive, drive, drive_planned};
-pub use road::{Course, FRONT_CELLS, Line, PLAN_REACH_M, Road};
+pub use road::{Course, FRONT_CELLS, Line, PATH_WIDTH, PLAN_REACH_M, Road};
 pub use settings::{CarKnowledge, DriverSettings};

@@ -1,10 +1,7 @@
 //! The path that is followed, in the frame of its samples, and the car's place relative to it. Twin of `shaders/path.wgsl`.
 
-use super::road::Course;
+use super::road::{Course, PATH_WIDTH};
 use crate::scalar::Lookup;
-
-/// Figures of a row of the path's table.
-pub const PATH_WIDTH: usize = 12;
 
 /// One sample of the path with what lies up to the next one: curvature linear, heading its integral.
 #[derive(Clone, Copy, Debug)]

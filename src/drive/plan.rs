@@ -1,5 +1,5 @@
-//! The speed that the driver aims for: a forward and a backward pass under a friction ellipse
-//! (`physics.md` section 5, in its first-order form; a driver needs no better).
+//! The speed that the driver aims for: a forward and a backward pass under a friction ellipse (the book, chapter Model,
+//! section 5, in first-order form; a driver needs no better).
 
 use crate::track::Circuit;
 use crate::vehicle::{Car, Tyres};
@@ -98,7 +98,7 @@ impl SpeedPlan {
         Self { spacing_m, speed_mps }
     }
 
-    /// A plan of given speeds (m/s) at rising stations (m) of a closed lap of this length (m), the first at nought.
+    /// A plan of given speeds (m/s) at rising stations (m) of a closed lap of this length (m), the first at zero.
     pub fn of_speeds(station_m: &[f64], speed_mps: &[f64], length_m: f64) -> Self {
         let count = (length_m / SPACING).round().max(8.0) as usize;
         let spacing_m = length_m / count as f64;

@@ -1,6 +1,5 @@
 //! Lines and their plans of speed as tables that every backend reads alike.
 
-use super::path::PATH_WIDTH;
 use super::plan::SpeedPlan;
 use super::settings::DriverSettings;
 use crate::error::{Error, Result};
@@ -23,6 +22,9 @@ pub(super) const PLAN_AHEAD_S: f64 = 0.15;
 const MOST_COUNTED: f64 = 16_777_216.0;
 /// Samples of a path are at least this far apart (m): no car leaves two of them behind in one step.
 const LEAST_SPACING_M: f64 = 0.25;
+
+/// Figures of a row of the path's table.
+pub const PATH_WIDTH: usize = 12;
 
 /// Lines to drive, each with plans of speed of the same shares of grip.
 ///

@@ -10,7 +10,7 @@ pub struct DriverSettings {
     pub pace: f64,
     /// Greatest slip ratio, driven or braked.
     pub slip_limit: f64,
-    /// Slip stiffness per load that the driver's feet reckon with: the lower, the more slip for a wanted force.
+    /// Slip stiffness per load that the driver's feet compute with: the lower, the more slip for a wanted force.
     pub slip_stiffness: f64,
     /// How far ahead the driver looks, s.
     pub preview_s: f64,
@@ -24,7 +24,7 @@ pub struct DriverSettings {
     pub knowledge: Option<CarKnowledge>,
 }
 
-/// What a driver who knows the car reckons with: without it the car's own angle to its path looks like an error to steer
+/// What a driver who knows the car computes with: without it the car's own angle to its path looks like an error to steer
 /// against, and a foot that is down in a bend takes grip that the bend needs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CarKnowledge {

@@ -1,12 +1,11 @@
 //! Choice of backend.
 
+use super::BackendInfo;
 use super::gpu::{GpuContext, devices};
-use super::portions::Portions;
 use super::simd::InstructionSet;
-use super::{BackendInfo, Evaluator, FallbackEvaluator, Problem};
 use crate::error::{Error, Result};
 use serde::{Deserialize, Serialize};
-use std::sync::{Arc, OnceLock};
+use std::sync::OnceLock;
 
 /// Whether a real GPU is present. Asked once: it wakes every driver.
 fn real_gpu() -> bool {
@@ -24,9 +23,16 @@ pub enum BackendChoice {
     Cpu,
     /// `f32` lanes on the processor.
     Simd,
-    /// A GPU, or a software driver that poses as one.
+    /// A GPU, or a software driver that presents itself as one.
     Gpu,
 }
+
+crate::config::kinds::named!(BackendChoice {
+    Auto = "auto",
+    Cpu = "cpu",
+    Simd = "simd",
+    Gpu = "gpu",
+});
 
 impl BackendChoice {
     /// The backend to use; `adapter` is part of the name of the GPU that was asked for, if one was. Never `Auto`.
@@ -41,7 +47,7 @@ impl BackendChoice {
         }
     }
 
-    /// What would evaluate, as evaluators name themselves: the GPU is opened, nothing is compiled.
+    /// The backend that would evaluate, as evaluators report it. The GPU is opened, nothing is compiled.
     ///
     /// # Errors
     /// [`Error::NoDevice`] if a GPU was asked for and none fits.
@@ -50,7 +56,7 @@ impl BackendChoice {
         match self.decided(adapter) {
             Self::Gpu => match GpuContext::shared(adapter) {
                 Ok(context) => Ok(context.backend_info()),
-                // As evaluators do: lanes take over where no GPU was asked for, and from one that fails.
+                // Like evaluators: lanes take over if no GPU was asked for, and from a GPU that fails.
                 Err(Error::NoDevice(_)) if self == Self::Auto && adapter.is_none() => Ok(lanes()),
                 Err(Error::Device(_)) => Ok(lanes()),
                 Err(error) => Err(error),
@@ -58,56 +64,5 @@ impl BackendChoice {
             Self::Cpu => Ok(BackendInfo::reference()),
             _ => Ok(lanes()),
         }
-    }
-}
-
-/// How one kind of problem is evaluated on each backend.
-pub(super) struct Backends<G, L, R> {
-    /// On a device.
-    pub gpu: G,
-    /// In lanes.
-    pub lanes: L,
-    /// By the reference.
-    pub reference: R,
-    /// Bytes that a candidate takes at the most while it is evaluated.
-    pub bytes_each: u64,
-}
-
-impl<G, L, R> Backends<G, L, R> {
-    /// An evaluator of `problem` on the backend chosen; `adapter` is part of the name of the GPU to use (see
-    /// [`BackendChoice::decided`]). A GPU that fails at work is opened anew, and lanes take over from one that keeps failing
-    /// (see [`FallbackEvaluator`]); populations are cut to what memory is allowed (see [`Portions`]).
-    ///
-    /// # Errors
-    /// [`Error::NoDevice`] if a GPU was asked for and none fits. `Auto` without a named adapter never fails for want of one.
-    pub fn open<'a, OnDevice, InLanes, Reference>(
-        self,
-        problem: &'a Problem,
-        choice: BackendChoice,
-        adapter: Option<&str>,
-    ) -> Result<Box<dyn Evaluator + 'a>>
-    where
-        OnDevice: Evaluator + 'a,
-        InLanes: Evaluator + 'a,
-        Reference: Evaluator + 'a,
-        G: Fn(Arc<GpuContext>) -> Result<OnDevice> + 'a,
-        L: Fn(InstructionSet) -> InLanes + 'a,
-        R: FnOnce() -> Reference,
-    {
-        let Self { gpu, lanes, .. } = self;
-        let evaluator: Box<dyn Evaluator + 'a> = match choice.decided(adapter) {
-            BackendChoice::Gpu => {
-                let name = adapter.map(str::to_owned);
-                Box::new(FallbackEvaluator::new(
-                    problem,
-                    (choice, adapter),
-                    move || Ok(Box::new(gpu(GpuContext::shared(name.as_deref())?)?)),
-                    move || Box::new(lanes(InstructionSet::best())),
-                )?)
-            }
-            BackendChoice::Cpu => Box::new((self.reference)()),
-            _ => Box::new(lanes(InstructionSet::best())),
-        };
-        Ok(Box::new(Portions::new(evaluator, self.bytes_each)))
     }
 }

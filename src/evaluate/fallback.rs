@@ -1,17 +1,17 @@
-//! Evaluation on a device that may fail: it is opened anew once, and then lanes on the processor go on in its place.
+//! Evaluation on a device that may fail: the device is reopened once, then lanes on the processor replace it.
 
 use super::gpu::GpuContext;
 use super::{BackendChoice, BackendInfo, Evaluation, Evaluator, Problem};
 use crate::error::{Error, Result};
 
-/// An evaluator on whatever works.
+/// An evaluator on any backend.
 type Boxed<'a> = Box<dyn Evaluator + 'a>;
 
-/// Scores populations on a device as long as it works. One that fails is opened anew and given the same population; if that
-/// fails too, lanes on the processor take over for good. Candidates are scored within the backends' parity either way.
+/// Scores populations on a device as long as the device works. A device that fails is reopened and given the same population. If
+/// it fails again, lanes on the processor take over for good. The scores agree within the backends' parity either way.
 pub struct FallbackEvaluator<'a> {
     problem: &'a Problem,
-    /// Nothing only while one takes the place of another.
+    /// `None` only while one evaluator replaces another.
     current: Option<Boxed<'a>>,
     on_device: bool,
     open: Box<dyn Fn() -> Result<Boxed<'a>> + 'a>,
@@ -23,8 +23,8 @@ impl<'a> FallbackEvaluator<'a> {
     /// An evaluator that `open` opens on a device, with that of `lanes` to take over.
     ///
     /// # Errors
-    /// [`Error::NoDevice`] if there is no device, unless `choice` leaves it to the program and names no `adapter`, or the process
-    /// has had the device before; a device that is there and fails is none.
+    /// [`Error::NoDevice`] if there is no device. With [`BackendChoice::Auto`] and no `adapter`, or if the process had the device
+    /// before, lanes take over instead. So they do from a device that is present and fails.
     pub fn new(
         problem: &'a Problem,
         (choice, adapter): (BackendChoice, Option<&str>),
@@ -44,7 +44,7 @@ impl<'a> FallbackEvaluator<'a> {
                 evaluator.current = Some(device);
                 evaluator.on_device = true;
             }
-            // A study that has had its device ends without it, rather than not at all.
+            // A study that had its device finishes without it.
             Err(error @ Error::NoDevice(_))
                 if (choice == BackendChoice::Auto && adapter.is_none()) || GpuContext::was_open(adapter) =>
             {
@@ -61,7 +61,7 @@ impl<'a> FallbackEvaluator<'a> {
         self.faults.push(fault);
     }
 
-    /// Opens the device anew, or takes over.
+    /// Reopens the device, or takes over.
     fn open_anew(&mut self, message: String) {
         // The failed one closes first.
         self.current = None;
@@ -116,7 +116,7 @@ impl Evaluator for FallbackEvaluator<'_> {
         self.open_anew(first);
         match self.try_once(population) {
             Err(Error::Device(message)) if self.on_device => {
-                // Of the two, the failed device goes before its successor works.
+                // The failed device closes before its successor works.
                 self.current = None;
                 GpuContext::forget();
                 self.take_over(format!("the device failed again ({message})"));

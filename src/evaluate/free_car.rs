@@ -79,7 +79,7 @@ impl FreeCar {
         &self.sources
     }
 
-    /// A candidate's car in flat form; what comes after the free parameters is no concern of the car's.
+    /// A candidate's car in flat form. Variables behind the free parameters do not belong to the car.
     pub fn flat(&self, candidate: &[f64]) -> Vec<f64> {
         self.base
             .iter()
@@ -93,7 +93,7 @@ impl FreeCar {
         self.car.with_flat(&self.flat(candidate))
     }
 
-    /// Why a candidate need not be driven, if so: a variable that is no number, or a tyre that is none.
+    /// Why a candidate need not be driven, if so: a variable is not a finite number, or the coefficients make no tyre.
     pub fn preliminary_failure(&self, candidate: &[f64]) -> Option<Failure> {
         if !are_numbers(candidate) {
             return Some(Failure::NotFinite);

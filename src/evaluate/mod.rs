@@ -5,26 +5,33 @@
 
 mod backend;
 pub mod drive;
+pub mod energy;
 mod fallback;
 mod free_car;
 pub mod gpu;
-pub mod hybrid;
 pub mod line;
 mod model_table;
+mod objectives;
+mod open;
 mod packed;
+mod packs;
 pub mod point;
 pub mod portions;
+mod problem_kind;
 pub mod replay;
+pub mod resident;
 pub mod simd;
-mod sound;
 pub mod steady;
 
 pub use backend::BackendChoice;
-use backend::Backends;
 pub use fallback::FallbackEvaluator;
 pub use free_car::FreeCar;
 pub use model_table::ModelTable;
+pub use open::open_evaluator;
 pub use packed::{PackedClient, run_packed};
+pub use problem_kind::{
+    CpuBackend, DeviceKernel, GpuBackend, LaneTables, OutcomeOf, ProblemKind, SimdBackend,
+};
 
 use crate::error::Result;
 use crate::vehicle::tyre::IllFormed;
@@ -99,13 +106,13 @@ pub struct Problem {
 /// The cost of a candidate that failed: the worst finite one, on every backend.
 pub const FAILED_COST: f64 = 1e9;
 
-/// Whether these are objectives of a candidate that did not fail.
+/// Whether a candidate with these objectives did not fail.
 pub(crate) fn are_costs(row: &[f64]) -> bool {
     row.iter().all(|x| x.is_finite() && *x < FAILED_COST)
 }
 
-/// Whether all figures of a candidate are finite numbers in single precision, in which most backends reckon: what is none in
-/// there is none anywhere, so that all backends say the same.
+/// Whether all figures of a candidate are finite numbers in single precision. Most backends compute in it, and every backend
+/// refuses the same candidates.
 pub(crate) fn are_numbers(figures: &[f64]) -> bool {
     figures.iter().all(|x| (*x as f32).is_finite())
 }
@@ -113,19 +120,19 @@ pub(crate) fn are_numbers(figures: &[f64]) -> bool {
 /// Why a candidate has no cost of its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Failure {
-    /// Its tyre is none.
+    /// The coefficients of its tyre make no tyre.
     IllFormedTyre(IllFormed),
     /// It spun, rolled over or left the range of numbers.
     Spun,
     /// It left the road.
     LeftRoad,
-    /// It did not get to the end in time.
+    /// It did not reach the end in time.
     Unfinished,
     /// It came to a standstill.
     Standstill,
-    /// It was still on the move when it should have settled.
+    /// It was still moving when it should have settled.
     Unsettled,
-    /// No slip of its driven wheels held it at the speed asked for.
+    /// No slip of its driven wheels held the speed that was asked for.
     OffTheEnvelope,
     /// A decision variable was not a finite number in single precision.
     NotFinite,
@@ -153,7 +160,7 @@ impl Failure {
 /// Candidates that failed, by [`Failure::word`].
 pub type FailureCounts = BTreeMap<String, u64>;
 
-/// Adds counts to others.
+/// Adds `counts` to `total`.
 pub fn add_failures(total: &mut FailureCounts, counts: &FailureCounts) {
     for (reason, count) in counts {
         *total.entry(reason.clone()).or_default() += count;
@@ -196,14 +203,14 @@ pub struct Evaluation {
     pub objectives: Vec<f64>,
     /// Why a candidate failed, one per candidate.
     pub failures: Vec<Option<Failure>>,
-    /// By how much each candidate violates its constraints: the sum of those `G` that are above nought, where `G <= 0` is
+    /// By how much each candidate violates its constraints: the sum of those `G` that are above zero, where `G <= 0` is
     /// wanted. Empty for a problem without constraints. Optimisers go by Deb's rules (*An efficient constraint handling
     /// method for genetic algorithms*, 2000): a candidate that violates less is better, whatever its objectives.
     pub violations: Vec<f64>,
 }
 
-/// From here on up to [`FAILED_COST`] a cost stands for a violation, see [`violation_of`]. Costs of what violates nothing are
-/// below.
+/// Costs from here up to [`FAILED_COST`] stand for a violation of constraints, see [`violation_of`]. Feasible candidates cost
+/// less.
 pub const INFEASIBLE_COST: f64 = 536_870_912.0;
 
 /// A cost above all feasible ones and below that of a failure, in the order of violations: their leading 52 bits on top of
@@ -219,7 +226,7 @@ pub fn violation_of(cost: f64) -> Option<f64> {
 }
 
 impl Evaluation {
-    /// By how much a candidate violates its constraints: nought for none, infinite for what is no number.
+    /// By how much a candidate violates its constraints: zero if it violates none, infinite if the sum is not a number.
     pub fn violation(&self, candidate: usize) -> f64 {
         match self.violations.get(candidate) {
             None => 0.0,
@@ -235,7 +242,7 @@ impl Evaluation {
         rows.map(|(i, row)| {
             let violation = self.violation(i);
             if !row[0].is_finite() || row[0] >= FAILED_COST || violation == f64::INFINITY {
-                // A cost beyond that of a failure is one all the same.
+                // A cost beyond that of a failure is still a cost.
                 if row[0].is_finite() && self.violations.is_empty() {
                     row[0]
                 } else {
@@ -285,7 +292,7 @@ impl Evaluation {
     }
 }
 
-/// What ran an evaluation, for manifests and logs.
+/// The backend that ran an evaluation, for manifests and logs.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct BackendInfo {
     /// `cpu`, `simd` or `gpu`.
@@ -346,7 +353,7 @@ pub trait Evaluator {
     /// What does the work.
     fn backend(&self) -> BackendInfo;
 
-    /// What has gone wrong with devices so far and was got over, in words.
+    /// Faults of devices so far that evaluation recovered from, in words.
     fn device_faults(&self) -> &[String] {
         &[]
     }
@@ -354,6 +361,6 @@ pub trait Evaluator {
     /// Scores `population`: row-major, `n` by number of variables, values within their bounds.
     ///
     /// # Errors
-    /// [`crate::Error::Device`] if the device fails. A candidate that fails is no error.
+    /// [`crate::Error::Device`] if the device fails. A candidate that fails is not an error.
     fn evaluate(&mut self, population: &[f64]) -> Result<Evaluation>;
 }

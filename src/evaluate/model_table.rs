@@ -1,8 +1,11 @@
 //! Cars in the form that the `f32` kernels read: a shared table of ready figures, and for each candidate only
 //! those that the free parameters move.
 
+use super::packs::Pack;
 use super::{FreeCar, Variable};
 use crate::random::Random;
+use crate::scalar::lanes::Lanes;
+use crate::vehicle::tyre::Tyre;
 use crate::vehicle::{CarModel, LinearTyre, MagicFormula, TyreModel};
 use rayon::prelude::*;
 
@@ -68,6 +71,16 @@ impl ModelTable {
                 });
         }
         rows
+    }
+
+    /// The cars of a pack; `rows` are those of all candidates, see [`ModelTable::rows`].
+    #[inline(always)]
+    pub(crate) fn cars<L: Lanes, T: Tyre<L>>(&self, rows: &[f32], pack: Pack) -> CarModel<L, T> {
+        let width = self.varying.len();
+        CarModel::from_table(|place| match self.sources[place] {
+            Some(figure) => L::from_fn(|lane| rows[pack.candidate(lane) * width + figure]),
+            None => L::load(self.base[place]),
+        })
     }
 }
 

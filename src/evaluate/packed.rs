@@ -1,5 +1,5 @@
-//! Several searches on one evaluator: what they ask at the same time goes into one call, so that a device is not starved by
-//! small swarms.
+//! Several searches on one evaluator: candidates that are asked for at the same time go into one call. Small swarms thus fill a
+//! device.
 
 use super::{BackendInfo, Evaluation, Evaluator, Problem};
 use crate::error::{Error, Result};
@@ -7,7 +7,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::thread;
 use std::time::Duration;
 
-/// A search that asks nothing for this long is not waited for: it may be at work on something else.
+/// A search that asks for nothing this long is not waited for: it may be busy with something else.
 const PATIENCE: Duration = Duration::from_millis(20);
 
 enum Message {
@@ -71,10 +71,10 @@ impl Drop for PackedClient {
 /// Runs `searches` at the same time, each in a thread of its own and with an evaluator that goes through `evaluator`; what they
 /// come to, in their order. `pause` is called now and then in this thread, before every call of `evaluator` at least.
 ///
-/// Candidates are scored each for itself, so that who else is asking changes no result.
+/// Each candidate is scored by itself, so other searches do not change its result.
 ///
 /// # Errors
-/// Those of `evaluator`, to every search whose candidates were in the call; they come back as the searches pass them on.
+/// Every search whose candidates were in a failed call gets the error of `evaluator`, and may pass it on in its result.
 pub fn run_packed<T: Send>(
     evaluator: &mut dyn Evaluator,
     searches: Vec<impl FnOnce(PackedClient) -> T + Send>,
@@ -180,7 +180,7 @@ mod tests {
     use super::*;
     use crate::evaluate::{Objective, Variable};
 
-    /// The sum of squares; fails on a nought, and meets a fault of the device on each seven.
+    /// The sum of squares; fails on a zero, and meets a fault of the device on each seven.
     struct Squares {
         problem: Problem,
         calls: Vec<usize>,
@@ -203,7 +203,7 @@ mod tests {
         }
         fn evaluate(&mut self, population: &[f64]) -> Result<Evaluation> {
             if population.contains(&0.0) {
-                return Err(Error::Device("a nought".to_owned()));
+                return Err(Error::Device("a zero".to_owned()));
             }
             if population.contains(&7.0) {
                 self.faults.push("lost".to_owned());

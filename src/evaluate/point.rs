@@ -7,9 +7,9 @@ use rayon::prelude::*;
 /// What one call of the function costs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CallCost {
-    /// Less than handing it to another thread does: the candidates are evaluated one after the other.
+    /// Less than handing it to another thread costs: candidates are evaluated one after the other.
     Cheap,
-    /// More: they are spread over the threads.
+    /// More: candidates are spread over the threads.
     Dear,
 }
 

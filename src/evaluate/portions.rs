@@ -1,15 +1,15 @@
-//! Populations in portions: what an evaluator takes beside them stays within bounds, however large they are.
+//! Populations in portions: the memory of an evaluator stays within bounds for populations of any size.
 
 use super::{BackendInfo, Evaluation, Evaluator, Problem};
 use crate::error::Result;
 use std::sync::{Mutex, PoisonError};
 
-/// What evaluators take where nothing else is said (bytes).
+/// Memory that an evaluator may take by default (bytes).
 const USUAL: u64 = 1 << 30;
 /// Candidates of the smallest portion: enough to keep threads and devices at work.
 pub const LEAST: usize = 1024;
 
-/// What is allowed at present, and numbers to tell allowances apart.
+/// The allowances in force, each with its number.
 struct Allowed {
     next: u64,
     in_force: Vec<(u64, u64)>,
@@ -35,8 +35,8 @@ impl Drop for Allowance {
     }
 }
 
-/// Lets each evaluator that is opened while the allowance lives take so much memory beside its population (bytes); of several
-/// the latest holds. Like the device, the memory is the process's. What comes of a study does not depend on it.
+/// Lets each evaluator that is opened while the allowance lives take so much memory beside its population (bytes). Of several
+/// allowances the latest holds. The allowance is the process's. Results do not depend on it.
 pub fn allow(bytes: u64) -> Allowance {
     allowed(|a| {
         a.next += 1;
@@ -45,20 +45,20 @@ pub fn allow(bytes: u64) -> Allowance {
     })
 }
 
-/// What an evaluator that is opened now may take (bytes).
+/// Memory that an evaluator opened now may take (bytes).
 pub fn present() -> u64 {
     allowed(|a| a.in_force.last().map_or(USUAL, |(_, bytes)| *bytes))
 }
 
-/// Scores populations in portions, one after the other. A candidate's figures do not depend on its neighbours, so that they
-/// are the same to the bit.
+/// Scores populations in portions, one after the other. Scores of a candidate do not depend on its neighbours: they are the same
+/// bit for bit.
 pub struct Portions<E> {
     evaluator: E,
     candidates: usize,
 }
 
 impl<E: Evaluator> Portions<E> {
-    /// As many candidates at a time as may be, of which each takes `bytes_each` while it is evaluated.
+    /// As many candidates at a time as fit the allowance, each taking `bytes_each` bytes while it is evaluated.
     pub fn new(evaluator: E, bytes_each: u64) -> Self {
         let fitting = present() / bytes_each.max(1);
         let candidates = usize::try_from(fitting).unwrap_or(usize::MAX).max(LEAST);

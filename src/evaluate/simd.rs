@@ -182,7 +182,7 @@ mod tests {
         }
     }
 
-    /// Arguments at and beyond both ends of a table, and what is no number.
+    /// Arguments at and beyond both ends of a table, and what is not a number.
     const PLACES: [f32; 16] = [
         0.0,
         -0.0,

@@ -1,4 +1,4 @@
-//! Whether a line stays on the road, measured against the edges themselves and by nothing that made the line.
+//! Whether a line stays on the road, measured against the edges themselves, independently of how the line was made.
 
 use super::fine::FineLine;
 use glam::DVec2;

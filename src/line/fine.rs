@@ -1,4 +1,4 @@
-//! A line worked out anew on a fine spline through its points, which is what reports give.
+//! A line on a fine spline through its points. Reports give figures of this line.
 
 use super::point_mass::PointMass;
 use super::profile::{LapProfile, lap_profile};
@@ -6,7 +6,7 @@ use super::spline::Spline;
 use crate::error::{Error, Result};
 use glam::DVec2;
 
-/// A line on a fine grid: no wiggle between coarse points stays hidden, and none gains by it.
+/// A line on a fine grid, which shows wiggles between coarse points.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FineLine {
     /// Whether the end joins the start.
@@ -36,7 +36,7 @@ impl FineLine {
     /// `entry_mps` is the greatest speed at the start of an open line (m/s).
     ///
     /// # Errors
-    /// [`Error::Input`] if there are too few points, if neighbours coincide, or if the car or the spacing cannot be.
+    /// [`Error::Input`] if there are too few points, if neighbours coincide, or if the car or the spacing is out of range.
     pub fn new(
         points_m: &[DVec2],
         closed: bool,

@@ -1,8 +1,8 @@
 //! The line kernel: from a candidate's variables to the shape of its line and the time of a lap on it.
 //! Twin of `shaders/line.wgsl`.
 //!
-//! Curvature is the turn over the line's own spacing; the second differences of Gamma are over the cuts' spacing, which
-//! makes Gamma convex. The lap is that of a point mass on the limit:
+//! Curvature is the turn over the line's own spacing; the second differences of Gamma are over the cross-sections' spacing, which
+//! makes Gamma convex. The lap is the quasi-steady-state lap of a point mass on the limit:
 //! a forward pass of driving and a backward pass of braking on the speed squared, below the corner speeds (after
 //! D. Brayshaw and M. Harrison, *A quasi steady state approach to race car lap simulation*, 2005; N. R. Kapania,
 //! J. Subosits and J. C. Gerdes, *A sequential two-step algorithm for fast generation of vehicle racing trajectories*,
@@ -67,7 +67,7 @@ pub struct Shape<R> {
 struct Segment<R> {
     direction: [R; 2],
     length: R,
-    /// The step over the spacing by which second differences are reckoned, and one over that spacing (1/m).
+    /// The step over the spacing by which second differences are computed, and one over that spacing (1/m).
     slope: [R; 2],
     inverse_spacing: R,
 }
@@ -106,13 +106,13 @@ pub fn alpha<R: Real>(row: &SectionRow<R::Storage>, terms: usize, variables: &[R
     for term in 0..terms {
         sum = sum + R::load(row.weights[term]) * variables[row.sources[term] as usize];
     }
-    let (nought, one) = (R::lit(0.0), R::lit(1.0));
+    let (zero, one) = (R::lit(0.0), R::lit(1.0));
     // Not `min` and `max`: on the very edge the sum is kept, with its derivatives.
-    let sum = R::select(sum.less_than(nought), nought, sum);
+    let sum = R::select(sum.less_than(zero), zero, sum);
     R::select(one.less_than(sum), one, sum)
 }
 
-/// From the right end of a cut to the line (m).
+/// From the right end of a cross-section to the line (m).
 #[inline(always)]
 fn offset<R: Real>(row: &SectionRow<R::Storage>, terms: usize, variables: &[R]) -> [R; 2] {
     let share = alpha(row, terms, variables);
@@ -128,11 +128,11 @@ pub fn shape<R: Real>(
     course: &mut Course<R>,
 ) -> Shape<R> {
     let n = plan.rows.len();
-    let nought = R::lit(0.0);
+    let zero = R::lit(0.0);
     course.length.clear();
-    course.length.resize(n, nought);
+    course.length.resize(n, zero);
     course.curvature.clear();
-    course.curvature.resize(n, nought);
+    course.curvature.resize(n, zero);
 
     // No closure: what an instruction set compiles anew has to be inlined, and closures cannot be told to.
     let first = offset(&plan.rows[0], plan.terms, variables);
@@ -142,8 +142,8 @@ pub fn shape<R: Real>(
         let row = &plan.rows[n - 1];
         before = Some(Segment::between(row, offset(row, plan.terms, variables), first));
     }
-    let mut total = [nought; 4];
-    let mut block = [nought; 4];
+    let mut total = [zero; 4];
+    let mut block = [zero; 4];
     for i in 0..plan.segments() {
         let next = if i + 1 < n {
             offset(&plan.rows[i + 1], plan.terms, variables)
@@ -173,7 +173,7 @@ pub fn shape<R: Real>(
         if (i + 1) % BLOCK == 0 || i + 1 == plan.segments() {
             for (total, block) in total.iter_mut().zip(&mut block) {
                 *total = *total + *block;
-                *block = nought;
+                *block = zero;
             }
         }
         before = Some(segment);
@@ -250,11 +250,11 @@ pub fn longitudinal<R: Lookup>(limits: &LimitTable<R::Storage>, speed_squared: R
 /// way, and the mean 0.1% to 0.2%. On jagged lines no coarse grid is to be trusted.
 #[inline(always)]
 fn driven<R: Lookup>(limits: &LimitTable<R::Storage>, from: R, length: R, here: R, there: R) -> R {
-    let nought = R::lit(0.0);
+    let zero = R::lit(0.0);
     let [start, _] = longitudinal(limits, from, here);
-    let middle = (from + length * start).max(nought);
+    let middle = (from + length * start).max(zero);
     let [drive, _] = longitudinal(limits, middle, R::lit(0.5) * (here + there));
-    (from + length * (start + drive)).max(nought)
+    (from + length * (start + drive)).max(zero)
 }
 
 /// Speed squared from which the car just brakes to that of the next section.
@@ -268,7 +268,7 @@ pub(super) fn braked<R: Lookup>(limits: &LimitTable<R::Storage>, to: R, length: 
 
 /// Time of a lap (s) on `course`, whose lengths and curvatures are given; it has the speeds after.
 ///
-/// A closed lap's passes go on beyond the section where they started until they meet themselves, so that any start
+/// A closed lap's passes continue beyond the section where they started until they meet themselves, so that any start
 /// gives the same lap.
 #[inline(always)]
 pub fn lap_time<R: Lookup>(
@@ -335,8 +335,8 @@ pub fn lap_time<R: Lookup>(
     }
 
     let segments = if closed { n } else { n - 1 };
-    let nought = R::lit(0.0);
-    let (mut total, mut block) = (nought, nought);
+    let zero = R::lit(0.0);
+    let (mut total, mut block) = (zero, zero);
     let mut from = speeds[0].sqrt();
     for (here, length) in length[..segments].iter().enumerate() {
         let next = if here + 1 < n { here + 1 } else { 0 };
@@ -345,7 +345,7 @@ pub fn lap_time<R: Lookup>(
         from = to;
         if (here + 1) % BLOCK == 0 || here + 1 == segments {
             total = total + block;
-            block = nought;
+            block = zero;
         }
     }
     total

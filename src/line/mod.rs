@@ -1,21 +1,23 @@
-//! Racing lines: their shape, the point-mass lap on them, and what is reported of a line.
+//! Racing lines: their shape, the quasi-steady-state lap on them, and the figures that are reported of a line.
 //!
-//! A line crosses the cuts of [`crate::track::CrossSections`] at shares `alpha` of their width. [`kernel`] turns the
+//! A line crosses the cross-sections of [`crate::track::CrossSections`] at shares `alpha` of their width. [`kernel`] turns the
 //! few numbers that a [`Parametrisation`] gives a line into lengths, curvatures and a lap time, in every scalar; the
-//! evaluators of [`crate::evaluate::line`] run it on swarms. What a study reports of a line is worked out anew on a
-//! fine spline through its points ([`FineLine`]) and checked against the edges of the road ([`check_line`]).
+//! evaluators of [`crate::evaluate::line`] run it on swarms. Studies report figures of a fine spline through the line's
+//! points ([`FineLine`]), checked against the edges of the road ([`check_line`]).
 
 mod check;
+mod circuit;
 pub mod energy;
 mod fine;
 mod geometry;
 pub mod kernel;
 mod parametrisation;
+mod perpendicular;
 mod plan;
 mod point_mass;
 mod profile;
 mod spline;
-mod square;
+mod table;
 #[cfg(test)]
 mod tests;
 
@@ -24,7 +26,8 @@ pub use check::{Clearance, check_line};
 pub use fine::FineLine;
 pub use geometry::{Geometry, geometry};
 pub use parametrisation::Parametrisation;
+pub use perpendicular::{cuts_about, shares_across};
 pub use plan::{LinePlan, SectionRow, TERMS};
 pub use point_mass::{LimitTable, PointMass};
 pub use profile::{LapProfile, lap_profile};
-pub use square::{cuts_about, shares_across};
+pub use table::read_line;

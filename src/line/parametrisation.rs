@@ -28,7 +28,7 @@ pub struct Parametrisation {
 }
 
 /// How far beyond the road control points may reach by default, as a share of its width. A lone control point at 1.25
-/// among neighbours at 0.5 brings the line just to the edge, and what would go beyond is held there.
+/// among neighbours at 0.5 brings the line just to the edge. A line beyond the edge is held there.
 pub const OVERSHOOT: f64 = 0.25;
 
 impl Parametrisation {
@@ -81,7 +81,7 @@ impl Parametrisation {
     }
 
     /// # Errors
-    /// [`Error::Input`] naming the setting that does not fit `cuts`.
+    /// [`Error::Input`] naming the setting that does not fit `cuts`, the cross-sections.
     pub fn check(&self, cuts: &CrossSections) -> Result<()> {
         let wrong = |place: &str, found: String, expected: String| {
             Err(Error::input(
@@ -146,7 +146,7 @@ impl Parametrisation {
         }
     }
 
-    /// Bounds of all coefficients: a control point may reach the furthest edge among the cuts that it moves the line
+    /// Bounds of all coefficients: a control point may reach the furthest edge among the cross-sections that it moves the line
     /// on, and the overshoot beyond.
     fn bounds(&self, cuts: &CrossSections) -> Vec<(f64, f64)> {
         let Basis::ControlPoints { count, overshoot } = self.basis else {
@@ -167,7 +167,7 @@ impl Parametrisation {
         bounds
     }
 
-    /// How much of a cut's width a change by one of what the coefficients add up to is.
+    /// How much of a cross-section's width a change by one of what the coefficients add up to is.
     fn scales(&self, cuts: &CrossSections) -> Vec<f64> {
         if self.basis == Basis::Sections {
             return vec![1.0; cuts.len()];
@@ -178,7 +178,7 @@ impl Parametrisation {
         widths.into_iter().map(|width| mean / width).collect()
     }
 
-    /// `alpha` at a section where what the coefficients add up to is nought.
+    /// `alpha` at a section where what the coefficients add up to is zero.
     fn origin(&self, cuts: &CrossSections, section: usize, scale: f64) -> f64 {
         match self.basis {
             Basis::Sections => 0.0,
@@ -266,7 +266,7 @@ impl Parametrisation {
     /// The coefficients, free or not, whose line comes closest to `alpha` at every section, held within their bounds.
     ///
     /// # Errors
-    /// As [`Parametrisation::check`]; [`Error::Input`] if `alpha` has not a value per section.
+    /// As [`Parametrisation::check`]; [`Error::Input`] if `alpha` does not have one value per section.
     pub fn fit(&self, cuts: &CrossSections, alpha: &[f64]) -> Result<Vec<f64>> {
         self.check(cuts)?;
         if alpha.len() != cuts.len() || alpha.iter().any(|a| !a.is_finite()) {

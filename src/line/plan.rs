@@ -1,4 +1,4 @@
-//! What the kernels need to know of a line's sections.
+//! The tables of a line's cross-sections that kernels read.
 
 use crate::scalar::Real;
 use glam::DVec2;
@@ -6,14 +6,14 @@ use glam::DVec2;
 /// Terms of the sum that gives `alpha` at a section.
 pub const TERMS: usize = 4;
 
-/// One section, in differences: absolute coordinates would cost single precision its curvatures.
+/// One section, in differences: with absolute coordinates, single precision would lose the curvature.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SectionRow<S> {
-    /// From the right end of this cut to that of the next (m).
+    /// From the right end of this cross-section to that of the next (m).
     pub step: [S; 2],
-    /// From the right end of the cut to the left end (m).
+    /// From the right end of the cross-section to the left end (m).
     pub cut: [S; 2],
-    /// One over the spacing from this cut to the next by which second differences are reckoned (1/m).
+    /// One over the spacing from this cross-section to the next by which second differences are computed (1/m).
     pub inverse_spacing: S,
     /// The part of `alpha` that no variable moves.
     pub constant: S,
@@ -40,7 +40,7 @@ pub struct LinePlan<S> {
 }
 
 impl LinePlan<f64> {
-    /// The plan of the cuts between `right_m` and `left_m`, with `alpha` yet to be given by nothing and the spacing of
+    /// The plan of the cross-sections between `right_m` and `left_m`, with no variables for `alpha` yet and the spacing of
     /// their middles.
     pub fn of_cuts(right_m: &[DVec2], left_m: &[DVec2], closed: bool) -> Self {
         let n = right_m.len();
@@ -64,7 +64,7 @@ impl LinePlan<f64> {
         }
     }
 
-    /// The plan with the spacing (m) of every segment by which second differences are reckoned.
+    /// The plan with the spacing (m) of every segment by which second differences are computed.
     pub fn spaced(mut self, spacing_m: &[f64]) -> Self {
         for (row, spacing) in self.rows.iter_mut().zip(spacing_m) {
             row.inverse_spacing = spacing.recip();

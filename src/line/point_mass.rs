@@ -1,10 +1,10 @@
-//! The point mass that laps are timed with, and its limits as tables that every backend looks up alike.
+//! The point mass of quasi-steady-state laps, and its limits as tables that every backend looks up alike.
 
 use crate::error::{Error, Result};
 use crate::scalar::Real;
 use crate::vehicle::Envelope;
 
-/// A point mass with a car's limits.
+/// A point mass within a car's g-g-v envelope.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PointMass {
     /// The limits over speed.
@@ -13,7 +13,7 @@ pub struct PointMass {
     pub ellipse_exponent: f64,
     /// Wheelbase (m), by which a curvature asks for a steering angle.
     pub wheelbase_m: f64,
-    /// Greatest steering angle at the wheels (rad), if it is to limit.
+    /// Greatest steering angle at the wheels (rad), if steering is limited.
     ///
     /// A bend tighter than the lock allows cannot be driven. So that a search finds its way back from there, its corner
     /// speed squared falls with the fourth power of the radius instead of the line failing.
@@ -61,7 +61,7 @@ impl PointMass {
     }
 
     /// # Errors
-    /// [`Error::Input`] naming the first setting that cannot be.
+    /// [`Error::Input`] naming the first setting that is out of range.
     pub fn check(&self) -> Result<()> {
         let within = |name: &str, x: f64, least: f64, most: f64| {
             if x >= least && x <= most {
@@ -92,7 +92,7 @@ impl PointMass {
             [row.ay_mps2, row.ax_grip_mps2, row.ax_drive_mps2, row.drag_mps2]
         };
         let mut knots: Vec<[f64; 4]> = (0..=LIMIT_ROWS).map(at_knot).collect();
-        // Speed is held at the greatest, so that drive need not fall to nought within a row.
+        // Speed is held at the greatest, so that drive need not fall to zero within a row.
         let last = self.envelope.rows()[self.envelope.rows().len() - 1];
         knots[LIMIT_ROWS][2] = last.ax_drive_mps2;
         let (radius_top, corner_knots) = self.corners(top, &knots);

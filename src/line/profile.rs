@@ -26,7 +26,7 @@ pub struct LapProfile {
 }
 
 impl LapProfile {
-    /// Time at each section (s), from nought at the first.
+    /// Time at each section (s), from zero at the first.
     pub fn elapsed_s(&self) -> Vec<f64> {
         let mut time = 0.0;
         let mut elapsed = Vec::with_capacity(self.v_mps.len());

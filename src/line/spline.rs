@@ -72,7 +72,7 @@ impl Spline {
         self.chords[segment]
     }
 
-    /// The place at the parameter `t`, from nought to the chord, of a segment.
+    /// The place at the parameter `t`, from zero to the chord, of a segment.
     pub fn at(&self, segment: usize, t: f64) -> Place {
         let n = self.points.len();
         let (h, from, to) = (self.chords[segment], segment, (segment + 1) % n);

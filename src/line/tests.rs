@@ -333,16 +333,6 @@ fn clearance_is_the_distance_to_the_edges() {
     }
 }
 
-/// Points of a fine line at even steps.
-fn thinned(line: &FineLine, count: usize) -> Vec<DVec2> {
-    (0..count)
-        .map(|i| {
-            let station = line.length_m * i as f64 / count as f64;
-            line.points_m[line.station_m.partition_point(|s| *s < station)]
-        })
-        .collect()
-}
-
 /// The lap with the limits of each segment's start, forwards and backwards, which the kernel does not do.
 fn first_order_time(shape: &Geometry) -> f64 {
     let table = gt_car().table().unwrap();
@@ -379,52 +369,5 @@ fn limits_of_start_and_middle_beat_those_of_the_start() {
         let (second, first) = off(sections);
         println!("{sections} sections: {second:.4} s of {reference:.3} s off, start alone {first:.4} s");
         assert!(second.abs() < 0.6 * first.abs(), "{second} {first}");
-    }
-}
-
-/// The surveyed centreline, as far as the public database has it.
-#[test]
-fn the_surveyed_centreline_takes_what_others_found() {
-    let shared = std::env::var_os("LAPSWARM_SHARED").map_or_else(
-        || std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared"),
-        std::path::PathBuf::from,
-    );
-    let path = shared.join("data/tracks/Silverstone.csv");
-    let Ok(text) = std::fs::read_to_string(&path) else {
-        eprintln!("SKIPPED: no surveyed circuit at {}", path.display());
-        return;
-    };
-    let points: Vec<DVec2> = text
-        .lines()
-        .filter(|line| !line.starts_with('#'))
-        .map(|line| {
-            let mut fields = line.split(',').map(|f| f.trim().parse::<f64>().unwrap());
-            DVec2::new(fields.next().unwrap(), fields.next().unwrap())
-        })
-        .collect();
-    let line = FineLine::new(&points, true, 1.0, Some(&gt_car()), 0.0).unwrap();
-    let time = line.lap_time_s().unwrap();
-    println!("{time} s, {} m", line.length_m);
-    // A published minimum-time solution for this car has 146 s for the centreline.
-    assert!((time - 146.0).abs() < 1.5, "{time}");
-    for sections in [360, 720, 1440] {
-        let coarse = thinned(&line, sections);
-        let shape = geometry(&coarse, true);
-        let car = gt_car();
-        let lap = lap_profile(
-            &car,
-            &car.table().unwrap(),
-            &shape.segment_m,
-            &shape.curvature_1pm,
-            0.0,
-        )
-        .unwrap();
-        let fine = FineLine::new(&coarse, true, 1.0, Some(&car), 0.0).unwrap();
-        println!(
-            "{sections} sections: {:.3} s, limits at the start of segments {:.3} s, on a fine spline {:.3} s",
-            lap.time_s,
-            first_order_time(&shape),
-            fine.lap_time_s().unwrap()
-        );
     }
 }

@@ -1,7 +1,6 @@
-//! Where a line may run.
+//! Bounds of a line's variables.
 
 use super::conic::{Affine, ConicProgram, Status};
-use super::geometry::LineMap;
 use crate::{Error, Result};
 
 /// Least and greatest value of each variable of a line, and of sums of them.
@@ -78,7 +77,7 @@ impl Bounds {
         }
     }
 
-    /// Holds the sums within their bounds in a program for a step from `x`. Where rounding has left `x` outside, it may stay.
+    /// Holds the sums within their bounds in a program for a step from `x`. Where rounding has put `x` outside, it may stay there.
     pub(super) fn add_rows(&self, program: &mut ConicProgram, x: &[f64]) {
         for row in &self.rows {
             let sum = row.at(x);
@@ -93,18 +92,18 @@ impl Bounds {
     }
 }
 
-pub(super) fn check(map: &LineMap, bounds: &Bounds) -> Result<()> {
-    let n = map.variables();
+/// Checks bounds of a line of so many variables and points.
+pub(super) fn check((n, points): (usize, usize), bounds: &Bounds) -> Result<()> {
     let place = bounds
         .lower
         .iter()
         .zip(&bounds.upper)
         .position(|(l, u)| l.is_nan() || u.is_nan() || l > u);
-    if bounds.lower.len() != n || bounds.upper.len() != n || map.points() < 3 {
+    if bounds.lower.len() != n || bounds.upper.len() != n || points < 3 {
         return Err(Error::input(
             "the line",
             "bounds",
-            format!("{} bounds and {} points", bounds.lower.len(), map.points()),
+            format!("{} bounds and {points} points", bounds.lower.len()),
             format!("{n} bounds and three points at least"),
         ));
     }

@@ -66,11 +66,11 @@ pub(super) struct Solution {
 
 /// Relative accuracy asked of the solver. What it cannot reach it reports as [`Status::Almost`] at worst.
 const TOLERANCE: f64 = 1e-10;
-/// Accuracy below which a solution counts as none.
+/// Least accuracy of a solution.
 const REDUCED_TOLERANCE: f64 = 1e-6;
 
 impl ConicProgram {
-    /// Variables between `lower` and `upper`; an infinite bound is none.
+    /// Variables between `lower` and `upper`; an infinite bound does not count.
     pub fn new(lower: Vec<f64>, upper: Vec<f64>) -> Self {
         Self {
             linear: vec![0.0; lower.len()],
@@ -133,7 +133,7 @@ impl ConicProgram {
     /// Solves it.
     ///
     /// # Errors
-    /// [`Error::Study`] if the solver refuses the problem as it is put.
+    /// [`Error::Study`] if the solver refuses the problem.
     pub fn solve(&self) -> Result<Solution> {
         let n = self.lower.len();
         let mut linear = self.linear.clone();

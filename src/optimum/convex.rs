@@ -3,19 +3,19 @@
 use super::bounds::{Bounds, check};
 use super::conic::{Affine, ConicProgram, Status};
 use super::geometry::{LineMap, Shape};
-use super::objective::{LineProblem, Measures};
+use super::objective::{Measures, ReferenceProblem};
 use crate::{Error, Result};
 use glam::DVec2;
 use std::time::Instant;
 
-/// An exact optimum.
+/// A reference optimum: exact where the problem is convex, else a first-order point.
 #[derive(Clone, Debug)]
 pub struct Optimum {
     /// The line's variables.
     pub x: Vec<f64>,
-    /// The objective, worked out anew from the line.
+    /// The objective, computed from the line itself.
     pub value: f64,
-    /// What no line is better than, where the problem is convex.
+    /// A bound that no line is better than, if the problem is convex.
     pub lower_bound: Option<f64>,
     /// How the solver ended.
     pub status: Status,
@@ -34,7 +34,7 @@ pub struct Optimum {
 /// # Errors
 /// [`Error::Input`] for bounds that do not fit, [`Error::Study`] if the solver refuses.
 pub fn shortest(map: &LineMap, bounds: &Bounds) -> Result<Optimum> {
-    check(map, bounds)?;
+    check((map.variables(), map.points()), bounds)?;
     let n = map.variables();
     let (mut lower, mut upper) = (bounds.lower.clone(), bounds.upper.clone());
     let steps = steps(map);
@@ -60,7 +60,7 @@ pub fn shortest(map: &LineMap, bounds: &Bounds) -> Result<Optimum> {
 /// # Errors
 /// [`Error::Input`] for bounds that do not fit, [`Error::Study`] if the solver refuses.
 pub fn least_squared_length(map: &LineMap, bounds: &Bounds) -> Result<Optimum> {
-    check(map, bounds)?;
+    check((map.variables(), map.points()), bounds)?;
     let mut program = ConicProgram::new(bounds.lower.clone(), bounds.upper.clone());
     bounds.add_rows(&mut program, &vec![0.0; map.variables()]);
     for square in steps(map).into_iter().flatten() {
@@ -72,20 +72,19 @@ pub fn least_squared_length(map: &LineMap, bounds: &Bounds) -> Result<Optimum> {
 /// The line of least Gamma, `sqrt(sum |z_i|^2)` with second differences `z_i` over a fixed `spacing_m` of the
 /// segments: a quadratic program. Its value is Gamma (1/m).
 ///
-/// A line may gain by steps that differ from the spacing it is judged by: see [`super::least_curvature`] for what is
-/// not to be had this way.
+/// A line may gain by steps that differ from the spacing it is judged by; [`super::least_curvature`] does not allow that gain.
 ///
 /// # Errors
 /// [`Error::Input`] for bounds or spacing that do not fit, [`Error::Study`] if the solver refuses.
 pub fn least_gamma(map: &LineMap, spacing_m: &[f64], bounds: &Bounds) -> Result<Optimum> {
-    check(map, bounds)?;
+    check((map.variables(), map.points()), bounds)?;
     let steps = steps(map);
     if spacing_m.len() != steps.len() || !spacing_m.iter().all(|h| *h > 0.0) {
         return Err(Error::input(
             "the line",
             "spacing_m",
             format!("{} lengths", spacing_m.len()),
-            format!("{} lengths above nought", steps.len()),
+            format!("{} lengths above zero", steps.len()),
         ));
     }
     let mut program = ConicProgram::new(bounds.lower.clone(), bounds.upper.clone());
@@ -110,7 +109,7 @@ pub fn least_gamma(map: &LineMap, spacing_m: &[f64], bounds: &Bounds) -> Result<
         }
     }
     let mut optimum = solve(map, &program, |problem, x| {
-        let problem = LineProblem {
+        let problem = ReferenceProblem {
             spacing_m: Some(spacing_m),
             ..*problem
         };
@@ -152,12 +151,12 @@ fn scaled(map: &Affine, by: f64) -> Affine {
 fn solve(
     map: &LineMap,
     program: &ConicProgram,
-    value: impl Fn(&LineProblem, &[f64]) -> f64,
+    value: impl Fn(&ReferenceProblem, &[f64]) -> f64,
 ) -> Result<Optimum> {
     let start = Instant::now();
     let mut solution = program.solve()?;
     solution.x.truncate(map.variables());
-    let problem = LineProblem::of(map);
+    let problem = ReferenceProblem::of(map);
     Ok(Optimum {
         measures: problem.measures(&solution.x),
         programs: 1,

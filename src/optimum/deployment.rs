@@ -1,14 +1,14 @@
 //! Where a motor's energy buys most time on a fixed line.
 //!
-//! Speeds squared and the motor's share of its force in each segment are the unknowns. A lap's time is a convex function of
-//! the speeds squared, and what must be braked for bounds these from above whatever the motor does; only how far engine,
-//! tyres and motor take the car along a segment bends. A sequence of cone programs with that linearised about the last lap
-//! leads to the optimum, each lap being driven anew in full. After S. Ebbesen, M. Salazar, P. Elbert, C. Bussi and C. H.
+//! Speeds squared and the motor's share of its force in each segment are the unknowns. The lap time is a convex function of
+//! the speeds squared, and braking bounds them from above whatever the motor does. Only the acceleration by engine, tyres and
+//! motor is not linear. It is linearised about the last lap in a sequence of cone programs, which leads to the optimum; after
+//! each program the full lap is computed. After S. Ebbesen, M. Salazar, P. Elbert, C. Bussi and C. H.
 //! Onder, *Time-optimal control strategies for a hybrid electric race car*, IEEE Trans. Control Syst. Technol. 26, 2018.
 
 use super::conic::{Affine, ConicProgram, Status};
 use crate::error::{Error, Result};
-use crate::evaluate::hybrid::{HybridObjective, HybridProblem, Strategy};
+use crate::evaluate::energy::{HybridObjective, HybridProblem, Strategy};
 use crate::line::energy::kernel::motor_step;
 use crate::line::energy::{EnergyCar, EnergyLap, EnergyPlan, Gates, Mode};
 use glam::DVec2;
@@ -25,8 +25,8 @@ pub struct Deployment {
     pub status: Status,
     /// Programs solved.
     pub programs: usize,
-    /// The last program's bound on the time (s): no lap is faster to first order about the one before. Nothing where none was
-    /// solved, or not well enough to say.
+    /// The last program's bound on the time (s): to first order about the previous lap no lap is faster. `None` if no program was
+    /// solved well enough.
     pub bound_s: Option<f64>,
     /// Time that it took (s).
     pub seconds: f64,
@@ -52,7 +52,7 @@ const PROGRAMS: usize = 30;
 const GAIN_S: f64 = 2e-5;
 /// Shares move no further than this in the first program.
 const FIRST_MOVE: f64 = 1.0;
-/// Speeds squared are reckoned in these (m^2/s^2), so that all unknowns are about one.
+/// Speeds squared are computed in these (m^2/s^2), so that all unknowns are about one.
 const SQUARE: f64 = 1000.0;
 /// Step of the derivatives by the speed squared, as a share of it.
 const DERIVATIVE: f64 = 1e-4;
@@ -70,7 +70,7 @@ struct Linear {
 }
 
 impl DeploymentSearch<'_> {
-    /// The lap with these shares of the motor's force, segment by segment, within a budget (J); no harvest is counted on.
+    /// The lap with these shares of the motor's force, segment by segment, within a budget (J), without harvest.
     fn problem(&self, energy_j: f64) -> Result<HybridProblem> {
         let n = self.points_m.len();
         let gates = Gates {
@@ -80,14 +80,14 @@ impl DeploymentSearch<'_> {
             ..Gates::OPEN
         };
         HybridProblem::new(
-            crate::evaluate::hybrid::HybridLine::Fixed {
+            crate::evaluate::energy::HybridLine::Fixed {
                 points_m: self.points_m.to_vec(),
                 closed: self.closed,
             },
             self.car.clone(),
             EnergyPlan::single(n, self.run_in, Mode::Additional),
             Strategy {
-                free: (0..n).map(crate::evaluate::hybrid::Free::Zone).collect(),
+                free: (0..n).map(crate::evaluate::energy::Free::Zone).collect(),
                 ..Strategy::fixed(gates, n)
             },
             &[HybridObjective::LapTime],
@@ -98,7 +98,7 @@ impl DeploymentSearch<'_> {
     /// The fastest lap with no more than `energy_j` out of the store, started from `shares`.
     ///
     /// # Errors
-    /// [`Error::Input`] for a line or energy that cannot be; [`Error::Study`] if the solver refuses.
+    /// [`Error::Input`] for a line or energy out of range; [`Error::Study`] if the solver refuses.
     pub fn best(&self, energy_j: f64, start: Option<&[f64]>) -> Result<Deployment> {
         let began = Instant::now();
         if !(0.0..=1e12).contains(&energy_j) {

@@ -1,18 +1,18 @@
-//! Local optima of curvature, lap time and weighted sums, as sequences of cone programs.
+//! Local optima of curvature, lap time and weighted sums, by sequences of cone programs.
 
 use super::bounds::{Bounds, check};
 use super::conic::{Affine, ConicProgram, Status};
 use super::convex::Optimum;
 use super::geometry::{LineMap, Shape};
 use super::lap::Lap;
-use super::objective::{LineProblem, Measures, Weights};
+use super::objective::{Measures, ReferenceProblem, Weights};
 use super::time_model::add_time;
 use crate::{Error, Result};
 use glam::DVec2;
 use rayon::prelude::*;
 use std::time::Instant;
 
-/// When to stop, and how boldly to begin.
+/// When to stop, and how large the first step may be.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DescentSettings {
     /// Most cone programs. Three bring a smooth line within some parts in a thousand of its optimum.
@@ -34,7 +34,7 @@ impl Default for DescentSettings {
     }
 }
 
-/// A line and what it shall be judged by.
+/// A line and the weights that judge it.
 #[derive(Clone, Debug)]
 pub struct Start {
     /// The line's variables.
@@ -56,13 +56,13 @@ const MOST_CAUTION: f64 = 1e7;
 /// Weight of the squared step of a variable at a caution of 1, as a share of the cost over the number of variables.
 const DAMPING: f64 = 1e-3;
 
-/// Leads a line downhill from `x` until no step promises anything: a point that meets the first-order conditions.
+/// Improves a line from `x` until no step promises a gain: a point that meets the first-order conditions.
 ///
-/// Each step solves a cone program in line and speeds together: the tyres' demand, linear about the last line, stays inside the
-/// friction ellipse, which is kept as the cone that it is, so that a step sees every limit that it may run into and kinks
-/// do no harm. The other measures have their exact gradient and a positive semidefinite part of their second derivative
-/// (Gauss and Newton's). Distance from the last line is weighed against what the model leaves out, and steps are judged by
-/// the exact measures of the line that they lead to, so that no line ends worse than it starts.
+/// Each step solves a cone program in line and speeds together. The tyres' demand, linear about the last line, stays inside the
+/// friction ellipse. The ellipse is kept as a cone, so a step sees every limit that it may meet, and kinks do no harm. The other
+/// measures have their exact gradient and a positive semidefinite part of their second derivative (Gauss-Newton). A penalty on
+/// the distance from the last line makes up for what the model leaves out. Steps are judged by the exact measures of the new
+/// line, so no line ends worse than it starts.
 ///
 /// The optimum's value is the weighted cost.
 ///
@@ -73,12 +73,12 @@ const DAMPING: f64 = 1e-3;
 /// # Errors
 /// [`Error::Input`] for bounds or weights that do not fit, or time without a car; [`Error::Study`] if the solver refuses.
 pub fn descend(
-    problem: &LineProblem,
+    problem: &ReferenceProblem,
     bounds: &Bounds,
     start: &Start,
     settings: &DescentSettings,
 ) -> Result<Optimum> {
-    check(problem.map, bounds)?;
+    check((problem.map.variables(), problem.map.points()), bounds)?;
     check_start(problem, start)?;
     let clock = Instant::now();
     let weights = &start.weights;
@@ -96,7 +96,7 @@ pub fn descend(
     }
     while programs < settings.programs {
         if problem.stopped() {
-            status = Status::Failed("broken off".to_owned());
+            status = Status::Failed("interrupted".to_owned());
             break;
         }
         let program = here.program(problem, bounds, weights, caution);
@@ -146,7 +146,7 @@ pub fn descend(
 /// # Errors
 /// Those of [`descend`].
 pub fn polish_lines(
-    problem: &LineProblem,
+    problem: &ReferenceProblem,
     bounds: &Bounds,
     starts: &[Start],
     settings: &DescentSettings,
@@ -160,7 +160,7 @@ pub fn polish_lines(
 /// # Errors
 /// Those of [`descend`].
 pub fn fastest(
-    problem: &LineProblem,
+    problem: &ReferenceProblem,
     bounds: &Bounds,
     x: &[f64],
     settings: &DescentSettings,
@@ -186,14 +186,14 @@ pub fn fastest(
 /// # Errors
 /// Those of [`descend`].
 pub fn least_curvature(map: &LineMap, bounds: &Bounds, x: &[f64]) -> Result<Optimum> {
-    least_curvature_of(&LineProblem::of(map), bounds, x)
+    least_curvature_of(&ReferenceProblem::of(map), bounds, x)
 }
 
-/// The same of a problem that may be [stopped](LineProblem::stop).
+/// The same of a problem that may be [stopped](ReferenceProblem::stop).
 ///
 /// # Errors
 /// Those of [`descend`].
-pub fn least_curvature_of(problem: &LineProblem, bounds: &Bounds, x: &[f64]) -> Result<Optimum> {
+pub fn least_curvature_of(problem: &ReferenceProblem, bounds: &Bounds, x: &[f64]) -> Result<Optimum> {
     let weights = Weights {
         curvature: 1.0,
         ..Weights::default()
@@ -214,7 +214,7 @@ pub fn least_curvature_of(problem: &LineProblem, bounds: &Bounds, x: &[f64]) -> 
     )
 }
 
-fn check_start(problem: &LineProblem, start: &Start) -> Result<()> {
+fn check_start(problem: &ReferenceProblem, start: &Start) -> Result<()> {
     let n = problem.map.variables();
     if start.x.len() != n {
         let found = format!("{} variables", start.x.len());
@@ -223,7 +223,7 @@ fn check_start(problem: &LineProblem, start: &Start) -> Result<()> {
     let w = start.weights;
     let all = [w.time, w.length, w.squared_length, w.gamma, w.curvature];
     if !all.iter().all(|w| *w >= 0.0 && w.is_finite()) || all.iter().all(|w| *w == 0.0) {
-        let expected = "weights of nought or more, one of them more";
+        let expected = "weights of zero or more, one of them more";
         return Err(Error::input("the line", "weights", format!("{w:?}"), expected));
     }
     if w.time > 0.0 && problem.limits.is_none() {
@@ -247,7 +247,7 @@ struct Place {
 }
 
 impl Place {
-    fn of(problem: &LineProblem, weights: &Weights, x: Vec<f64>) -> Self {
+    fn of(problem: &ReferenceProblem, weights: &Weights, x: Vec<f64>) -> Self {
         let (shape, lap, measures) = problem.judged(weights, &x);
         let cost = weights.sum(&measures);
         Self {
@@ -263,7 +263,7 @@ impl Place {
     /// changes of the squared speeds at its points.
     fn program(
         &self,
-        problem: &LineProblem,
+        problem: &ReferenceProblem,
         bounds: &Bounds,
         weights: &Weights,
         caution: f64,

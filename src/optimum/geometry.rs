@@ -8,7 +8,7 @@ use glam::DVec2;
 
 /// The points of a line as a linear function of its variables: `point_j = origin_j + sum of reach_jk x_k`.
 ///
-/// Everything that a line is commonly given by is of this form: its place on every cut, the controls of a
+/// Everything that a line is commonly given by is of this form: its place on every cross-section, the controls of a
 /// B-spline, points that an interpolating spline goes through.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LineMap {
@@ -42,7 +42,7 @@ impl LineMap {
         map
     }
 
-    /// One variable for each cut: the line's `alpha` there.
+    /// One variable for each cross-section: the line's `alpha` there.
     pub fn at_every_cut(cuts: &CrossSections) -> Self {
         let points = (0..cuts.len()).map(|i| (cuts.right_m[i], vec![(i, cuts.left_m[i] - cuts.right_m[i])]));
         Self::new(cuts.closed, cuts.len(), points)
@@ -51,7 +51,7 @@ impl LineMap {
     /// The variables of a parametrisation, and the bounds that keep them and the line within theirs.
     ///
     /// # Errors
-    /// [`crate::Error::Input`] if the parametrisation does not fit the cuts.
+    /// [`crate::Error::Input`] if the parametrisation does not fit the cross-sections.
     pub fn parametrised(cuts: &CrossSections, parametrisation: &Parametrisation) -> Result<(Self, Bounds)> {
         let mut plan = LinePlan::of_cuts(&cuts.right_m, &cuts.left_m, cuts.closed);
         parametrisation.apply(cuts, &mut plan)?;
@@ -83,9 +83,9 @@ impl LineMap {
         Ok((map, bounds))
     }
 
-    /// A line `base` (its `alpha` on every cut) moved along the cuts by a cubic B-spline with `controls` (m, to the left),
-    /// and the bounds that keep it on the road at every cut. Where the base is smooth, all such lines are, however jagged
-    /// the edges; which `alpha` as a spline cannot say. The base itself may lie off the road.
+    /// A line `base` (its `alpha` on every cross-section) moved along the cross-sections by a cubic B-spline with `controls` (m,
+    /// to the left), and the bounds that keep it on the road at every cross-section. Where the base is smooth, all such lines
+    /// are, however jagged the edges; which `alpha` as a spline cannot say. The base itself may lie off the road.
     pub fn spline_about(cuts: &CrossSections, base: &[f64], controls: usize) -> (Self, Bounds) {
         let points = cuts.points(base);
         let across = |i: usize| (cuts.left_m[i] - cuts.right_m[i]).normalize();
@@ -145,7 +145,7 @@ impl LineMap {
     }
 }
 
-/// What each of `controls` evenly spaced controls of a cubic B-spline counts at cut `i`; the outer ones of an open
+/// What each of `controls` evenly spaced controls of a cubic B-spline counts at cross-section `i`; the outer ones of an open
 /// circuit count for those that would lie beyond its ends.
 fn spline_shares(cuts: &CrossSections, controls: usize, i: usize) -> Vec<(usize, f64)> {
     let last = controls as isize - 1;
@@ -182,7 +182,7 @@ pub(super) struct Shape {
     pub step_m: Vec<DVec2>,
     /// Lengths of the segments (m).
     pub length_m: Vec<f64>,
-    /// Angle turned through at each point (rad), left positive; nought at the ends of an open line.
+    /// Angle turned through at each point (rad), left positive; zero at the ends of an open line.
     pub turn_rad: Vec<f64>,
     /// Half the length of the segments on both sides of each point (m).
     pub spacing_m: Vec<f64>,
@@ -251,7 +251,7 @@ impl Shape {
         Self::add_step(map, s, across * (scale / self.length_m[s].powi(2)), terms);
     }
 
-    /// Adds `scale` times the change of the turn at point `i`; nought at the ends of an open line.
+    /// Adds `scale` times the change of the turn at point `i`; zero at the ends of an open line.
     pub fn add_turn(&self, map: &LineMap, i: usize, scale: f64, terms: &mut Vec<(usize, f64)>) {
         if let (Some(before), Some(after)) = self.neighbours(i) {
             self.add_heading(map, after, scale, terms);

@@ -1,17 +1,17 @@
-//! The quasi-steady lap of a point mass on a fixed line, with its derivatives in reverse.
+//! The quasi-steady-state lap of a point mass on a fixed line, with its derivatives in reverse mode.
 //!
 //! On a fixed line the state is one number, `e = v^2`, and both the most that it may rise and the most that it may fall
 //! over a segment are functions of `e` at the segment's other end. The continuous problem `de/ds <= 2 a_drive(e, s)`,
-//! `de/ds >= -2 a_brake(e, s)`, `e <= corner(s)` therefore has a greatest solution (solutions of a scalar differential equation
-//! do not cross), greatest at every station at once; since time is a falling function of `e`, it is the fastest, and
-//! one pass each way finds it. What is left to optimise is the line alone.
+//! `de/ds >= -2 a_brake(e, s)`, `e <= corner(s)` therefore has a solution that is the greatest at every station at once
+//! (solutions of a scalar differential equation do not cross). Time falls with `e`, so this solution is the fastest, and one
+//! pass each way finds it. Only the line is left to optimise.
 //! Sources: Bobrow, Dubowsky, Gibson, *Time-optimal control of robotic manipulators along specified paths*, IJRR 4 (1985);
 //! Kapania, Subosits, Gerdes, *A sequential two-step algorithm for fast generation of vehicle racing trajectories*, J. Dyn.
 //! Sys. Meas. Control 138 (2016).
 
 use super::geometry::Shape;
 
-/// A quantity at one speed, and what it changes by for each m/s.
+/// A quantity at one speed, and its change for each m/s.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Slope {
     /// The quantity.
@@ -64,12 +64,12 @@ enum Origin {
 /// Which curvature a segment is driven with.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum SegmentBend {
-    /// That of its tighter end: an error of the first order in the spacing, and the only choice where every cut has a variable
-    /// of its own. A line whose bends take turns in being tight and wide would go unpunished by the mean, and an optimiser finds
-    /// it.
+    /// That of its tighter end: an error of the first order in the spacing, and the only choice where every cross-section has a
+    /// variable of its own. The mean would not penalise a line whose bends alternate between tight and wide, and an optimiser
+    /// finds such lines.
     #[default]
     Tighter,
-    /// The mean of both ends: of the second order, for lines with several cuts to a control.
+    /// The mean of both ends: of the second order, for lines with several cross-sections to a control.
     Mean,
 }
 
@@ -219,7 +219,7 @@ fn corner_square(limits: &dyn Limits, curvature_1pm: f64) -> (f64, f64) {
     let k = curvature_1pm.abs();
     let top = limits.top_speed_mps();
     let mut high = top * top;
-    // Grip less need, falling through nought at the corner's speed.
+    // Grip less need, falling through zero at the corner's speed.
     let spare = |e: f64| {
         let v = e.sqrt();
         let lateral = limits.at(v).lateral;
@@ -393,8 +393,8 @@ fn drive_pass(
     (square, origins)
 }
 
-/// The drive pass of a closed lap. It starts at a node whose corner's speed the car reaches again a lap later; drag may keep
-/// it from that at the slowest corner, so another is tried, and where there is none (a circle) two laps are driven.
+/// The drive pass of a closed lap. It starts at a node whose corner speed the car reaches again a lap later. Drag may prevent
+/// that at the slowest corner; then another node is tried. If there is none (a circle), two laps are driven.
 fn closed_drive(shape: &Shape, bends: &Bends, limits: &dyn Limits, corner: &[f64]) -> Passed {
     let n = corner.len();
     let mut first = (0..n)

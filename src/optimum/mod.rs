@@ -1,13 +1,13 @@
-//! Exact optima of racing lines, for reference and for warm starts.
+//! Reference optima of racing lines, for comparison and for warm starts.
 //!
-//! Shortest path, squared length and second differences are convex problems, and one cone program each: their optima are
-//! global, with a bound that proves it. Curvature, lap time and weighted sums are led downhill by sequences of such
-//! programs ([`descend`], [`polish_lines`]) to points of the first order; starts that end in the same place tell that it
-//! is the optimum.
+//! Shortest path, squared length and second differences are convex problems, one cone program each. Their optima are exact:
+//! global, with a bound that proves it. Curvature, lap time and weighted sums are minimised by sequences of cone programs
+//! ([`descend`], [`polish_lines`]), which end at first-order points. Several starts that end in the same place suggest that the
+//! point is the optimum.
 //!
-//! A line is judged at its points. Where every cut has a variable of its own, curvature may alternate from point to point
-//! and gain what no car could; [`LineMap::spline_about`] a smooth line with two or more points for each control leaves no
-//! room for that, and `alpha` as a spline only serves roads whose edges are smooth.
+//! A line is judged at its points. If every cross-section has a variable of its own, curvature may alternate from point to
+//! point and gain what no car could. [`LineMap::spline_about`] a smooth line, with two or more points for each control, leaves no
+//! room for that. `alpha` as a spline only serves roads whose edges are smooth.
 
 mod bounds;
 mod conic;
@@ -31,5 +31,5 @@ pub use descent::{
 };
 pub use geometry::LineMap;
 pub use lap::{Grip, Limits, SegmentBend, Slope};
-pub use objective::{LineProblem, Measures, Weights};
+pub use objective::{Measures, ReferenceProblem, Weights};
 pub use point_mass::PointMassLimits;

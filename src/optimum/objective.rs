@@ -1,11 +1,12 @@
-//! What a line costs, with its gradient.
+//! The cost of a line, with its gradient.
 
 use super::geometry::{LineMap, Shape};
 use super::lap::{Lap, Limits, SegmentBend};
+use crate::hold::{self, Point};
 use glam::DVec2;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// How much each measure of a line counts; nought leaves one out.
+/// How much each measure of a line counts; zero leaves one out.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Weights {
     /// Lap time (s).
@@ -23,7 +24,7 @@ pub struct Weights {
 /// The measures of a line.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Measures {
-    /// Lap time (s); nought without a car or, where lines are weighed, without a weight.
+    /// Lap time (s); zero without a car or, where lines are weighed, without a weight.
     pub time_s: f64,
     /// Length (m).
     pub length_m: f64,
@@ -46,9 +47,9 @@ impl Weights {
     }
 }
 
-/// Lines and the car that drives them.
+/// Lines and the car that drives them, as the solvers of reference optima see them.
 #[derive(Clone, Copy)]
-pub struct LineProblem<'a> {
+pub struct ReferenceProblem<'a> {
     /// How a line's variables make its points.
     pub map: &'a LineMap,
     /// Limits of the car; needed only where time counts.
@@ -60,11 +61,11 @@ pub struct LineProblem<'a> {
     pub spacing_m: Option<&'a [f64]>,
     /// Which curvature a lap drives segments with.
     pub bend: SegmentBend,
-    /// Raised, it ends a sequence of programs after the one at work.
+    /// A flag that, once raised, ends a sequence of programs after the present one.
     pub stop: Option<&'a AtomicBool>,
 }
 
-impl<'a> LineProblem<'a> {
+impl<'a> ReferenceProblem<'a> {
     /// Lines alone, without a car.
     pub fn of(map: &'a LineMap) -> Self {
         Self {
@@ -77,9 +78,12 @@ impl<'a> LineProblem<'a> {
         }
     }
 
-    /// Whether what is at work is to end.
+    /// Whether the present sequence is to end.
     pub(super) fn stopped(&self) -> bool {
-        self.stop.is_some_and(|stop| stop.load(Ordering::Relaxed))
+        self.stop.is_some_and(|stop| {
+            hold::pass(Point::Solver);
+            stop.load(Ordering::Relaxed)
+        })
     }
 
     /// Shape, lap (where time counts) and measures of line `x`; all measures infinite where it has two points in one place.

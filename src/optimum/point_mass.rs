@@ -1,4 +1,4 @@
-//! The limits of a [`PointMass`] as the optima use them.
+//! The limits of a [`PointMass`] as the solvers use them.
 
 use super::lap::{Grip, Limits, Slope};
 use crate::line::PointMass;
@@ -17,8 +17,8 @@ impl PointMassLimits {
     /// Those of `car`.
     ///
     /// # Errors
-    /// [`Error::Input`] if its settings cannot be, or for a friction ellipse whose exponent is not 2: the solvers know no
-    /// other.
+    /// [`Error::Input`] for settings out of range, and for a friction ellipse whose exponent is not 2, the only one that the
+    /// solvers handle.
     pub fn new(car: &PointMass) -> Result<Self> {
         car.check()?;
         if car.ellipse_exponent != 2.0 {
@@ -26,7 +26,7 @@ impl PointMassLimits {
                 car.envelope.name(),
                 "ellipse_exponent",
                 car.ellipse_exponent.to_string(),
-                "2 for an exact optimum",
+                "2 for a reference optimum",
             ));
         }
         Ok(Self {

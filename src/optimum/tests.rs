@@ -82,10 +82,10 @@ fn gradients_are_those_of_differences() {
     for map in [LineMap::at_every_cut(&cuts), spline] {
         let spacing = spacing_m(&map, &vec![0.5; map.variables()]);
         for spacing_m in [None, Some(&spacing[..])] {
-            let problem = LineProblem {
+            let problem = ReferenceProblem {
                 limits: Some(&Racer),
                 spacing_m,
-                ..LineProblem::of(&map)
+                ..ReferenceProblem::of(&map)
             };
             let x = wandering(map.variables());
             for (name, weights) in weights() {
@@ -114,10 +114,10 @@ fn gradients_on_an_open_road() {
     let mut cuts = ellipse(200);
     cuts.closed = false;
     let map = LineMap::at_every_cut(&cuts);
-    let problem = LineProblem {
+    let problem = ReferenceProblem {
         limits: Some(&Racer),
         start_mps: 10.0,
-        ..LineProblem::of(&map)
+        ..ReferenceProblem::of(&map)
     };
     let x = wandering(200);
     let (cost, gradient) = problem.cost(&weights()[0].1, &x);
@@ -143,9 +143,9 @@ fn gradients_on_an_open_road() {
 fn a_steady_circle_is_driven_at_the_ellipse() {
     let circle = Shape::parse("circle:95:105").unwrap().unwrap();
     let map = LineMap::at_every_cut(&circle.cross_sections(&Spacing::equal(360)).unwrap());
-    let problem = LineProblem {
+    let problem = ReferenceProblem {
         limits: Some(&Racer),
-        ..LineProblem::of(&map)
+        ..ReferenceProblem::of(&map)
     };
     for v in problem.speeds_mps(&[0.5; 360]) {
         let grip = Racer.at(v);

@@ -1,10 +1,11 @@
-//! Layer six: cars driven round made-up circuits by the driver, with grip to spare; one step of the driver, and whole laps.
+//! Layer six: closed-loop laps of synthetic circuits, with grip to spare: one step of the driver, and whole laps.
 
-use super::{Agreement, Draws, Subject};
+pub use super::candidates;
+use super::{Agreement, Draws, Subject, free_about, neighbours};
 use crate::drive::driver::Pace;
 use crate::drive::kernel::{DriveState, DrivenLap, STATE, World, drive_on, ending};
 use crate::drive::{Course, DriverSettings, Line, SpeedPlan};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::evaluate::Failure;
 use crate::evaluate::drive::{
     CpuDriveEvaluator, DriveObjective, DriveProblem, DriveSettings, GpuDriveEvaluator, SimdDriveEvaluator,
@@ -44,7 +45,7 @@ const STEPS: u32 = 32;
 /// The problem of driving `car` round these circuits with these shares of its friction, set-ups a tenth about it.
 ///
 /// # Errors
-/// [`Error::Input`] naming a parameter that the car lacks or a circuit that is none.
+/// [`crate::Error::Input`] naming a parameter that the car lacks, or a circuit that does not exist.
 pub fn problem(car: Car, circuits: &[&str], paces: &[f64], step_s: f64) -> Result<DriveProblem> {
     problem_of(car, circuits, paces, step_s, &PARAMETERS)
 }
@@ -79,37 +80,12 @@ pub fn problem_of(
         .zip(&plans)
         .map(|(circuit, plans)| Line { circuit, plans })
         .collect();
-    let flat = car.to_flat();
-    let free = parameters
-        .iter()
-        .map(|name| {
-            let known = || Error::input(&car.name, *name, "no such parameter", "a parameter of the car");
-            let parameter = car.parameter(name).ok_or_else(known)?;
-            let value = flat[parameter.slots[0]];
-            let reach = SHARE * value.abs();
-            Ok((parameter, value - reach, value + reach))
-        })
-        .collect::<Result<Vec<_>>>()?;
+    let free = free_about(&car, parameters, SHARE)?;
     let settings = DriveSettings {
         step_s,
         ..DriveSettings::new(driver)
     };
     DriveProblem::new(car, free, &lines, paces, &settings, &DriveObjective::ALL)
-}
-
-/// Random candidates from all over the bounds.
-pub fn candidates(problem: &DriveProblem, count: usize, draws: &mut Draws) -> Vec<Vec<f64>> {
-    (0..count)
-        .map(|_| {
-            let variables = problem.problem.variables.iter();
-            variables
-                .map(|v| {
-                    let x = draws.within(v.lower, v.upper);
-                    if v.whole { x.round() } else { x }
-                })
-                .collect()
-        })
-        .collect()
 }
 
 /// What single precision may move of a lap's time, its distance to the edges and its steering rate.
@@ -264,19 +240,12 @@ impl Cases {
         let problem = problem(Car::bundled()?, &CIRCUITS, &PACES, STEP)?;
         let mut draws = Draws::new(7);
         let mut cars = candidates(&problem, COUNT, &mut draws);
-        let near: Vec<Vec<f64>> = cars
-            .iter()
-            .flat_map(|car| std::iter::repeat_n(car, NEIGHBOURS))
-            .map(|car| {
-                let off = |x: &f64| x * (1.0 + draws.within(-NEXT_TO, NEXT_TO));
-                car.iter().map(off).collect()
-            })
-            .collect();
+        let near = neighbours(&cars, NEIGHBOURS, NEXT_TO, &mut draws);
         // One that cannot be evaluated, which every backend must say alike.
         cars[COUNT - 1].fill(f64::NAN);
         let reference = CpuDriveEvaluator::new(&problem);
         let all: Vec<&[f64]> = cars.iter().chain(&near).map(Vec::as_slice).collect();
-        let mut exact = reference.laps(&all);
+        let mut exact = reference.outcomes(&all);
         let near = exact.split_off(COUNT);
         let determined = (0..COUNT)
             .map(|car| {
@@ -338,11 +307,11 @@ impl Cases {
         let (laps, steps) = match subject {
             Subject::Lanes(set) => {
                 let evaluator = SimdDriveEvaluator::new(problem, *set);
-                (evaluator.laps(&all), evaluator.advance(&stepped, &from, 1))
+                (evaluator.outcomes(&all), evaluator.advance(&stepped, &from, 1))
             }
             Subject::Device(context) => {
                 let mut evaluator = GpuDriveEvaluator::new(problem, Arc::clone(context))?;
-                (evaluator.laps(&all)?, evaluator.advance(&stepped, &from, 1)?)
+                (evaluator.outcomes(&all)?, evaluator.advance(&stepped, &from, 1)?)
             }
         };
         let mut agreements = vec![self.compare_steps(subject, &steps)];

@@ -1,8 +1,9 @@
 //! Layer five: laps with a hybrid's energy on a fixed line, their time, fuel and accounts.
 
 use super::{Agreement, Draws, Subject};
-use crate::error::Result;
-use crate::evaluate::hybrid::{
+use crate::error::{Error, Result};
+use crate::evaluate::OutcomeOf;
+use crate::evaluate::energy::{
     CpuHybridEvaluator, Free, GpuHybridEvaluator, HybridLine, HybridObjective, HybridProblem,
     SimdHybridEvaluator, Strategy,
 };
@@ -15,7 +16,7 @@ use std::sync::Arc;
 
 /// Strategies of each mode.
 const COUNT: usize = 64;
-/// Cuts of the circuit.
+/// Cross-sections of the circuit.
 const SECTIONS: usize = 480;
 /// Gates that every strategy sets, in this order.
 const GATES: [Free; 6] = [
@@ -26,6 +27,12 @@ const GATES: [Free; 6] = [
     Free::Energy,
     Free::Motor,
 ];
+
+/// The laps of candidates, none of which may fail.
+fn driven(laps: Vec<OutcomeOf<HybridProblem>>) -> Result<Vec<EnergyLap<f64>>> {
+    let laps = laps.into_iter().collect::<std::result::Result<_, _>>();
+    laps.map_err(|failure| Error::Study(format!("a lap with energy: {failure}")))
+}
 
 /// What single precision may move of a lap.
 #[derive(Clone, Copy, Debug)]
@@ -127,7 +134,7 @@ impl Cases {
                 })
                 .collect();
             let slices: Vec<&[f64]> = candidates.iter().map(Vec::as_slice).collect();
-            let exact = CpuHybridEvaluator::new(&problem).laps(&slices);
+            let exact = driven(CpuHybridEvaluator::new(&problem).outcomes(&slices))?;
             Ok(Case {
                 mode: name,
                 problem,
@@ -150,12 +157,12 @@ impl Cases {
         } in &self.0
         {
             let slices: Vec<&[f64]> = strategies.iter().map(Vec::as_slice).collect();
-            let found = match subject {
-                Subject::Lanes(set) => SimdHybridEvaluator::new(problem, *set).laps(&slices),
+            let found = driven(match subject {
+                Subject::Lanes(set) => SimdHybridEvaluator::new(problem, *set).outcomes(&slices),
                 Subject::Device(context) => {
-                    GpuHybridEvaluator::new(problem, Arc::clone(context))?.laps(&slices)?
+                    GpuHybridEvaluator::new(problem, Arc::clone(context))?.outcomes(&slices)?
                 }
-            };
+            })?;
             let named = |what: &str| Agreement::new(&format!("energy, {mode}, {what}"), subject);
             let mut all = [
                 named("time"),
@@ -165,7 +172,7 @@ impl Cases {
             ];
             for (number, (lap, exact)) in found.iter().zip(exact).enumerate() {
                 let Allowed { time, fuel, energy } = allowed(problem, exact);
-                // What passes through the store in a lap: an energy of nought is exact to a share of that.
+                // What passes through the store in a lap: an energy of zero is exact to a share of that.
                 let passed = exact.deployed + exact.harvested_k + exact.harvested_h;
                 let figures = [
                     (lap.time, exact.time, exact.time, time),

@@ -1,6 +1,6 @@
 //! Layer three: a made-up lap, driven by cars about the one that logged it.
 
-use super::made_up::{Lap, candidates, problem};
+use super::synthetic_lap::{Lap, candidates, problem};
 use super::{Agreement, Draws, Subject};
 use crate::error::Result;
 use crate::evaluate::replay::ReplayProblem;
@@ -22,7 +22,7 @@ const NEIGHBOURS: usize = 4;
 const NEXT_TO: f64 = 1e-6;
 /// What single precision may add to a cost, as a share of it. A forward speed of 50 m/s in `f32` is off by up to
 /// 2e-6 m/s, which is a slip of 4e-8 at all wheels alike; slip stiffness is some 25 times the load, so that accelerations
-/// are off by 1e-5 m/s^2 however the rest is reckoned, and by a few times that with the rounding of what makes a slip.
+/// are off by 1e-5 m/s^2 however the rest is computed, and by a few times that with the rounding of what makes a slip.
 /// Errors do not grow along the lap: wheels at given speeds and angles hold the car.
 const TOLERANCE: f64 = 1e-4;
 /// The same, absolute, for cars whose cost is small (m/s, m/s^2, m/s^2, rad/s): the error in the mean.

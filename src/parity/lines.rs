@@ -13,21 +13,21 @@ use std::sync::Arc;
 
 /// Lines by each parametrisation.
 const COUNT: usize = 64;
-/// Cuts of the circuit.
+/// Cross-sections of the circuit.
 const SECTIONS: usize = 360;
 
 /// How far single precision may be off, absolute, for each of [`LineObjective::ALL`], on a line that costs `exact` in
 /// `f64`; roads up to 14 m wide with bends of 30 m radius and more.
 ///
 /// `alpha` is a sum of four rounded products and a constant: 5 roundings of 6e-8 of up to 1.25, so that a point is off by
-/// 4e-7 of the 14 m road, and rounding of the steps between cuts adds 3e-8 of these: 6e-6 m in all. Across the road it changes a
-/// length by no more than a third of it at either end, beside the 70 roundings of a sum in blocks of 64. A second
+/// 4e-7 of the 14 m road, and rounding of the steps between cross-sections adds 3e-8 of these: 6e-6 m in all. Across the road it
+/// changes a length by no more than a third of it at either end, beside the 70 roundings of a sum in blocks of 64. A second
 /// difference is off by four times that over the shortest spacing squared, and two roots of sums of squares differ by no
 /// more than the root of the sum of the squared differences. Where corner speed decides, time goes with half the relative
 /// error of the curvature, and no bend wider than 400 m slows any of the cars; 1e-4 is the limit of whole laps. Beside it,
 /// on the lateral limit itself, what is left of the ellipse is the root of a difference that three roundings of 6e-8 can
-/// fill: `sqrt(2 * 1.8e-7)` or 6e-4 of the grip `g`. Half of `2 h` times that, over a corner's speed squared `g r`, is off by `h / r`
-/// times 6e-4, its root and so the time by half of that, in corners: 1.6e-4 at 16 m in bends of 30 m.
+/// fill: `sqrt(2 * 1.8e-7)` or 6e-4 of the grip `g`. Half of `2 h` times that, over a corner's speed squared `g r`, is off by `h
+/// / r` times 6e-4, its root and so the time by half of that, in corners: 1.6e-4 at 16 m in bends of 30 m.
 pub fn line_tolerances(problem: &LineProblem, exact: &[f64]) -> [f64; 5] {
     let cuts = problem.cuts();
     let n = cuts.len() as f64;

@@ -10,19 +10,19 @@ pub mod elementary;
 pub mod energy;
 pub mod laps;
 mod lines;
-pub mod made_up;
 pub mod steady;
 pub mod step;
+pub mod synthetic_lap;
 
 pub use lines::line_tolerances;
 
-use crate::error::Result;
-use crate::evaluate::BackendChoice;
+use crate::error::{Error, Result};
 use crate::evaluate::gpu::shader::{ELEMENTARY, car_fragments, loaders};
 use crate::evaluate::gpu::{DeviceKind, GpuContext, devices};
 use crate::evaluate::simd::InstructionSet;
+use crate::evaluate::{BackendChoice, ProblemKind};
 use crate::random::Random;
-use crate::vehicle::TyreModel;
+use crate::vehicle::{Car, CarParameter, TyreModel};
 use serde::Serialize;
 use std::sync::Arc;
 
@@ -205,6 +205,48 @@ impl Draws {
         self.drawn += 1;
         low + (high - low) * self.random.uniform(PARITY, 0, 0, self.drawn)
     }
+}
+
+/// Random candidates from all over the bounds of a problem.
+pub fn candidates(problem: &impl ProblemKind, count: usize, draws: &mut Draws) -> Vec<Vec<f64>> {
+    let variables = &problem.problem().variables;
+    (0..count)
+        .map(|_| {
+            let values = variables.iter().map(|v| {
+                let x = draws.within(v.lower, v.upper);
+                if v.whole { x.round() } else { x }
+            });
+            values.collect()
+        })
+        .collect()
+}
+
+/// So many neighbours of each candidate, every figure up to a share of itself off.
+fn neighbours(candidates: &[Vec<f64>], each: usize, share: f64, draws: &mut Draws) -> Vec<Vec<f64>> {
+    candidates
+        .iter()
+        .flat_map(|candidate| std::iter::repeat_n(candidate, each))
+        .map(|candidate| {
+            let off = |x: &f64| x * (1.0 + draws.within(-share, share));
+            candidate.iter().map(off).collect()
+        })
+        .collect()
+}
+
+/// Parameters of `car` that are free within a share of themselves about themselves.
+///
+/// # Errors
+/// [`Error::Input`] naming a parameter that the car lacks.
+fn free_about(car: &Car, names: &[&str], share: f64) -> Result<Vec<(CarParameter, f64, f64)>> {
+    let flat = car.to_flat();
+    let free = names.iter().map(|name| {
+        let known = || Error::input(&car.name, *name, "no such parameter", "a parameter of the car");
+        let parameter = car.parameter(name).ok_or_else(known)?;
+        let value = flat[parameter.slots[0]];
+        let reach = share * value.abs();
+        Ok((parameter, value - reach, value + reach))
+    });
+    free.collect()
 }
 
 /// Purpose of the draws of cases in the counter.

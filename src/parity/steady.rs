@@ -1,7 +1,8 @@
-//! Layer seven: cars that settle on circles.
+//! Layer seven: cars that settle in steady-state cornering.
 
-use super::{Agreement, Draws, Subject, spacing, step};
-use crate::error::{Error, Result};
+pub use super::candidates;
+use super::{Agreement, Draws, Subject, free_about, neighbours, spacing, step};
+use crate::error::Result;
 use crate::evaluate::Failure;
 use crate::evaluate::steady::kernel::{Aim, INTEGRATED, STATE, Settling, ending, settle};
 use crate::evaluate::steady::modes::{displaced, slopes};
@@ -35,9 +36,9 @@ const PARAMETERS: [&[&str]; 2] = [
 ];
 /// How far they go, as a share of themselves.
 const SHARE: f64 = 0.1;
-/// Speeds of the circles, m/s.
+/// Path speeds, m/s.
 const SPEEDS: [f64; 2] = [20.0, 70.0];
-/// Cars, each on a circle of its own.
+/// Cars, each with its own speed and steering.
 const COUNT: usize = 96;
 /// Cars next to each, every figure up to a millionth off, whose verdicts in `f64` must be the car's own; otherwise it says
 /// nothing of arithmetic and is left out.
@@ -47,39 +48,19 @@ const NEXT_TO: f64 = 1e-6;
 /// back along the curve of trims, nothing holds the car in its place.
 const DETERMINED: f64 = 0.02;
 
-/// The problem of `car` on circles, those of its parameters that `model` has a tenth about themselves, steered as far as its
-/// wheels turn.
+/// The problem of steady-state cornering of `car`. Those of its parameters that its tyre model lists are free within a tenth about
+/// themselves; steering goes as far as the wheels turn.
 ///
 /// # Errors
-/// [`Error::Input`] naming a parameter that the car lacks.
+/// [`crate::Error::Input`] naming a parameter that the car lacks.
 pub fn problem(car: Car) -> Result<SteadyProblem> {
-    let flat = car.to_flat();
     let names = match car.tyre_model() {
         TyreModel::MagicFormula => PARAMETERS[0],
         TyreModel::Linear => PARAMETERS[1],
     };
-    let free = names
-        .iter()
-        .map(|name| {
-            let known = || Error::input(&car.name, *name, "no such parameter", "a parameter of the car");
-            let parameter = car.parameter(name).ok_or_else(known)?;
-            let value = flat[parameter.slots[0]];
-            let reach = SHARE * value.abs();
-            Ok((parameter, value - reach, value + reach))
-        })
-        .collect::<Result<Vec<_>>>()?;
+    let free = free_about(&car, names, SHARE)?;
     let lock = car.max_steer_rad;
     SteadyProblem::new(car, free, SPEEDS, [-lock, lock], &SteadyObjective::ALL)
-}
-
-/// Random candidates from all over the bounds.
-pub fn candidates(problem: &SteadyProblem, count: usize, draws: &mut Draws) -> Vec<Vec<f64>> {
-    (0..count)
-        .map(|_| {
-            let variables = problem.problem.variables.iter();
-            variables.map(|v| draws.within(v.lower, v.upper)).collect()
-        })
-        .collect()
 }
 
 /// A candidate's car as kernels read it.
@@ -167,7 +148,7 @@ struct OneModel {
     exact: Vec<Found>,
     /// What may be off of a trim; nothing for a car that is left out.
     limits: Vec<Option<[f64; 4]>>,
-    single: Vec<[f32; STATE]>,
+    single: Vec<[f64; STATE]>,
 }
 
 impl OneModel {
@@ -177,16 +158,9 @@ impl OneModel {
         let mut cars = candidates(&problem, COUNT, &mut draws);
         // One that cannot be evaluated, which every backend must say alike.
         cars[COUNT - 1].fill(f64::NAN);
-        let near: Vec<Vec<f64>> = cars
-            .iter()
-            .flat_map(|car| std::iter::repeat_n(car, NEIGHBOURS))
-            .map(|car| {
-                let off = |x: &f64| x * (1.0 + draws.within(-NEXT_TO, NEXT_TO));
-                car.iter().map(off).collect()
-            })
-            .collect();
+        let near = neighbours(&cars, NEIGHBOURS, NEXT_TO, &mut draws);
         let all: Vec<&[f64]> = cars.iter().chain(&near).map(Vec::as_slice).collect();
-        let states = CpuSteadyEvaluator::new(&problem).states(&all);
+        let states = CpuSteadyEvaluator::new(&problem).outcomes(&all);
         let verdict = |place: usize| match &states[place] {
             Ok(state) => problem.settled(all[place], state),
             Err(failure) => Err(*failure),
@@ -213,7 +187,7 @@ impl OneModel {
             exact: (0..COUNT).map(verdict).collect(),
             single: all[..COUNT - 1]
                 .iter()
-                .map(|car| settled_in::<f32>(&problem, car).to_array())
+                .map(|car| settled_in::<f32>(&problem, car).widened().to_array())
                 .collect(),
             limits,
             problem,
@@ -224,12 +198,12 @@ impl OneModel {
     fn compare(&self, subject: &Subject) -> Result<Vec<Agreement>> {
         let all: Vec<&[f64]> = self.cars.iter().map(Vec::as_slice).collect();
         let states = match subject {
-            Subject::Lanes(set) => SimdSteadyEvaluator::new(&self.problem, *set).states(&all),
+            Subject::Lanes(set) => SimdSteadyEvaluator::new(&self.problem, *set).outcomes(&all),
             Subject::Device(context) => {
-                GpuSteadyEvaluator::new(&self.problem, Arc::clone(context))?.states(&all)?
+                GpuSteadyEvaluator::new(&self.problem, Arc::clone(context))?.outcomes(&all)?
             }
         };
-        let bits = |figures: [f32; STATE]| figures.map(f32::to_bits);
+        let bits = |figures: [f64; STATE]| figures.map(f64::to_bits);
         let alike = self.single.iter().zip(&states).all(|(single, found)| {
             found
                 .as_ref()
@@ -249,7 +223,7 @@ impl OneModel {
             for car in 0..COUNT {
                 let Some(limits) = &self.limits[car] else { continue };
                 let found = match &states[car] {
-                    Ok(state) => self.problem.settled(all[car], &state.widened()),
+                    Ok(state) => self.problem.settled(all[car], state),
                     Err(failure) => Err(*failure),
                 };
                 agreement.verdict(found.err() == self.exact[car].err(), || {

@@ -65,7 +65,7 @@ impl Axis {
         axis
     }
 
-    /// An axis for errors as large as this, with ticks at nought and at a round value either way.
+    /// An axis for errors as large as this, with ticks at zero and at a round value either way.
     pub(super) fn around_zero(largest: f64, pixels: (f64, f64)) -> Self {
         let largest = if largest > 0.0 && largest.is_finite() {
             largest

@@ -4,16 +4,19 @@ use std::path::Path;
 
 use super::axis::Axis;
 use super::canvas::{Align, Canvas, Type, draw_to_file};
+use super::html::raised;
 use super::style::{BLUE, FAINT_INK, GREYED, GRID, INK, SHADE, TICK_PX, VERMILLION, significant, trimmed};
+use super::{Figure, HtmlReport};
 use crate::{Error, Result};
+use serde_json::json;
 
 /// One parameter of the table.
-#[derive(Debug, Clone, Copy)]
-pub struct ParameterRow<'a> {
+#[derive(Debug, Clone)]
+pub struct ParameterRow {
     /// Its name, as in `rBx1`.
-    pub name: &'a str,
+    pub name: String,
     /// Its unit; empty for none.
-    pub unit: &'a str,
+    pub unit: String,
     /// Lower bound of the search.
     pub lower: f64,
     /// Upper bound of the search.
@@ -48,13 +51,13 @@ struct Layout {
 }
 
 impl Layout {
-    fn new(rows: &[ParameterRow<'_>]) -> Self {
+    fn new(rows: &[ParameterRow]) -> Self {
         let look = Type::new(TICK_PX + 0.5, INK, Align::Left);
-        let widest = |look: Type, text: &dyn Fn(&ParameterRow<'_>) -> f64| {
+        let widest = |look: Type, text: &dyn Fn(&ParameterRow) -> f64| {
             rows.iter().map(text).fold(look.width("parameter"), f64::max)
         };
-        let names = widest(look.bold(), &|r| look.bold().width(r.name) + 20.0);
-        let units = widest(look, &|r| look.width(r.unit));
+        let names = widest(look.bold(), &|r| look.bold().width(&r.name) + 20.0);
+        let units = widest(look, &|r| look.width(&r.unit));
         let unit_x = (NAME_X + names + 20.0).min(340.0);
         let lower_x = (unit_x + units + 80.0).min(500.0);
         Self {
@@ -71,48 +74,79 @@ impl Layout {
     }
 }
 
-/// Draws a table of parameters to an SVG file, each with its place between its bounds.
-///
-/// # Errors
-/// [`Error::Input`] when there are no rows or more than 200, or when bounds are not a finite range;
-/// [`Error::Io`] when the file cannot be written.
-pub fn plot_parameters(path: impl AsRef<Path>, title: &str, rows: &[ParameterRow<'_>]) -> Result<()> {
-    let path = path.as_ref();
-    if !(1..=200).contains(&rows.len()) {
-        return Err(Error::input(path, "rows", rows.len().to_string(), "1 to 200"));
-    }
-    for row in rows {
-        let sound = row.lower.is_finite() && row.upper.is_finite() && row.lower < row.upper;
-        if !sound {
-            return Err(Error::input(
-                path,
-                format!("parameter {}", row.name),
-                format!("bounds {} to {}", row.lower, row.upper),
-                "a finite lower bound below a finite upper bound",
-            ));
-        }
-    }
-    let layout = Layout::new(rows);
-    let bottom = HEAD + ROW * rows.len() as f64;
-    draw_to_file(path, (WIDTH, bottom + 48.0), title, |canvas| {
-        draw_head(canvas, rows, &layout);
-        for i in (0..rows.len()).step_by(2) {
-            let y = HEAD + ROW * i as f64;
-            canvas.rect((16.0, y), (WIDTH - 16.0, y + ROW), SHADE, 0.6);
-        }
-        for quarter in 0..=4 {
-            let x = layout.track.0 + f64::from(quarter) / 4.0 * (layout.track.1 - layout.track.0);
-            canvas.line((x, HEAD), (x, bottom), GRID, 0.8);
-        }
-        for (i, row) in rows.iter().enumerate() {
-            let y = HEAD + ROW * (i as f64 + 0.5);
-            draw_row(canvas, row, &layout, y);
-        }
-        draw_key(canvas, rows, &layout, bottom + 24.0);
-    })
+/// Parameters within their bounds, with standard errors and the truth where known.
+#[derive(Debug, Clone)]
+pub struct Parameters {
+    /// Title of the figure.
+    pub title: String,
+    /// What a reader should know of it; may be empty.
+    pub note: String,
+    /// The parameters, from the top.
+    pub rows: Vec<ParameterRow>,
 }
 
-fn draw_head(canvas: &mut Canvas<'_>, rows: &[ParameterRow<'_>], layout: &Layout) {
+impl Figure for Parameters {
+    fn write_svg(&self, path: &Path) -> Result<()> {
+        let rows = &self.rows;
+        if !(1..=200).contains(&rows.len()) {
+            return Err(Error::input(path, "rows", rows.len().to_string(), "1 to 200"));
+        }
+        for row in rows {
+            let sound = row.lower.is_finite() && row.upper.is_finite() && row.lower < row.upper;
+            if !sound {
+                return Err(Error::input(
+                    path,
+                    format!("parameter {}", row.name),
+                    format!("bounds {} to {}", row.lower, row.upper),
+                    "a finite lower bound below a finite upper bound",
+                ));
+            }
+        }
+        let layout = Layout::new(rows);
+        let bottom = HEAD + ROW * rows.len() as f64;
+        draw_to_file(path, (WIDTH, bottom + 48.0), &self.title, |canvas| {
+            draw_head(canvas, rows, &layout);
+            for i in (0..rows.len()).step_by(2) {
+                let y = HEAD + ROW * i as f64;
+                canvas.rect((16.0, y), (WIDTH - 16.0, y + ROW), SHADE, 0.6);
+            }
+            for quarter in 0..=4 {
+                let x = layout.track.0 + f64::from(quarter) / 4.0 * (layout.track.1 - layout.track.0);
+                canvas.line((x, HEAD), (x, bottom), GRID, 0.8);
+            }
+            for (i, row) in rows.iter().enumerate() {
+                let y = HEAD + ROW * (i as f64 + 0.5);
+                draw_row(canvas, row, &layout, y);
+            }
+            draw_key(canvas, rows, &layout, bottom + 24.0);
+        })
+    }
+
+    fn place(&self, page: &mut HtmlReport) -> Result<()> {
+        let row = |r: &ParameterRow| {
+            json!({
+                "name": r.name,
+                "unit": raised(&r.unit),
+                "lower": r.lower,
+                "upper": r.upper,
+                "swarm": r.swarm,
+                "fitted": r.fitted,
+                "error": r.standard_error,
+                "truth": r.truth,
+                "told": r.identifiable,
+            })
+        };
+        let rows: Vec<_> = self.rows.iter().map(row).collect();
+        page.chart(
+            &self.title,
+            &self.note,
+            json!({ "kind": "parameters", "rows": rows }),
+        );
+        Ok(())
+    }
+}
+
+fn draw_head(canvas: &mut Canvas<'_>, rows: &[ParameterRow], layout: &Layout) {
     let head = |align| Type::new(TICK_PX + 1.0, INK, align).bold();
     let y = HEAD - 16.0;
     canvas.text("parameter", (NAME_X, y), head(Align::Left));
@@ -129,7 +163,7 @@ fn draw_head(canvas: &mut Canvas<'_>, rows: &[ParameterRow<'_>], layout: &Layout
     canvas.line((16.0, HEAD - 2.0), (WIDTH - 16.0, HEAD - 2.0), INK, 1.0);
 }
 
-fn draw_row(canvas: &mut Canvas<'_>, row: &ParameterRow<'_>, layout: &Layout, y: f64) {
+fn draw_row(canvas: &mut Canvas<'_>, row: &ParameterRow, layout: &Layout, y: f64) {
     let (ink, quiet) = if row.identifiable {
         (INK, FAINT_INK)
     } else {
@@ -142,7 +176,7 @@ fn draw_row(canvas: &mut Canvas<'_>, row: &ParameterRow<'_>, layout: &Layout, y:
         format!("{} \u{2715}", row.name)
     };
     canvas.text(&name, (NAME_X, y), cell(ink, Align::Left).bold());
-    canvas.text(row.unit, (layout.unit_x, y), cell(quiet, Align::Left));
+    canvas.text(&row.unit, (layout.unit_x, y), cell(quiet, Align::Left));
     let lower = trimmed(row.lower, 4);
     canvas.text(&lower, (layout.lower_x, y), cell(quiet, Align::Right));
     let upper = trimmed(row.upper, 4);
@@ -211,7 +245,7 @@ fn to_error(value: f64, error: f64) -> String {
     format!("{value:.decimals$}").replace('-', "\u{2212}")
 }
 
-fn draw_key(canvas: &mut Canvas<'_>, rows: &[ParameterRow<'_>], layout: &Layout, y: f64) {
+fn draw_key(canvas: &mut Canvas<'_>, rows: &[ParameterRow], layout: &Layout, y: f64) {
     let look = Type::new(TICK_PX, FAINT_INK, Align::Left);
     canvas.ring((layout.track.0 + 4.0, y), 4.0, INK, 1.2);
     canvas.text("swarm", (layout.track.0 + 16.0, y), look);

@@ -1,57 +1,132 @@
 //! An archive of compromises between objectives.
 
+mod parallel;
+
 use std::path::Path;
+
+use serde_json::json;
 
 use super::axis::{Axis, Labels, Plot, extent};
 use super::canvas::{Align, Canvas, Type, draw_to_file};
+use super::html::{Numbers, raised};
 use super::style::{BLUE, FRAME, GRID, INK, TICK_PX, VERMILLION, significant, viridis, with_unit};
+use super::{Figure, HtmlReport};
 use crate::{Error, Result};
 
 /// One objective, to be made small.
-#[derive(Debug, Clone, Copy)]
-pub struct Objective<'a> {
-    /// Its name, as in `lap time`.
-    pub name: &'a str,
-    /// Its unit, as in `s`; empty for none.
-    pub unit: &'a str,
+#[derive(Debug, Clone)]
+struct Objective {
+    name: String,
+    unit: String,
 }
 
-/// Draws an archive to an SVG file: a scatter of two objectives, or a matrix of scatters of up to
-/// six. Each point holds one value per objective; `chosen` is the index of the point to mark.
-///
-/// # Errors
-/// [`Error::Input`] when there are fewer than two or more than six objectives, when a point has
-/// another number of values, when no point is finite or `chosen` is not a point; [`Error::Io`] when
-/// the file cannot be written.
-pub fn plot_pareto(
-    path: impl AsRef<Path>,
-    title: &str,
-    objectives: &[Objective<'_>],
-    points: &[Vec<f64>],
-    chosen: Option<usize>,
-) -> Result<()> {
-    let path = path.as_ref();
-    let n = objectives.len();
-    let Drawable { finite, ranges, mark } = drawable(path, (n, 6), points, chosen)?;
-    let archive = Archive {
-        objectives,
-        finite: &finite,
-        ranges: &ranges,
-        mark,
-    };
-    if n == 2 {
-        draw_to_file(path, (1200.0, 680.0), title, |canvas| {
-            archive.scatter(canvas, (0, 1), (110.0, 1170.0), (610.0, 76.0), Axes::Full);
-            archive.legend(canvas, 1170.0);
+/// Candidates by their objectives: scatters of every two, on a page also parallel coordinates.
+#[derive(Clone, Debug, Default)]
+pub struct Front {
+    title: String,
+    objectives: Vec<Objective>,
+    points: Vec<Vec<f64>>,
+    marked: Vec<(usize, String)>,
+}
+
+impl Front {
+    /// Candidates, one row each with one value per objective.
+    pub fn new(title: impl Into<String>, points: &[Vec<f64>]) -> Self {
+        Self {
+            title: title.into(),
+            points: points.to_vec(),
+            ..Self::default()
+        }
+    }
+
+    /// Adds an objective by its name, as in `lap time`, and its unit, which may be empty.
+    #[must_use]
+    pub fn objective(mut self, name: impl Into<String>, unit: impl Into<String>) -> Self {
+        self.objectives.push(Objective {
+            name: name.into(),
+            unit: unit.into(),
+        });
+        self
+    }
+
+    /// Marks a candidate, by its row and a name; pictures mark the first that is marked.
+    #[must_use]
+    pub fn mark(mut self, candidate: usize, name: impl Into<String>) -> Self {
+        self.marked.push((candidate, name.into()));
+        self
+    }
+
+    /// Draws parallel coordinates to an SVG file (A. Inselberg, *The plane with parallel coordinates*, The Visual Computer
+    /// 1, 1985). Every axis goes from the least value, below, to the greatest; lines are coloured by the last objective.
+    /// Points that are not finite are left out.
+    ///
+    /// # Errors
+    /// [`Error::Input`] when there are fewer than two objectives, when a point has another number of values, when no
+    /// point is finite or the marked one is not there; [`Error::Io`] when the file cannot be written.
+    pub fn write_parallel(&self, path: impl AsRef<Path>, title: &str) -> Result<()> {
+        parallel::draw(path.as_ref(), title, &self.drawable(path.as_ref(), usize::MAX)?)
+    }
+
+    /// Checks an archive of which a picture can hold `most` objectives.
+    fn drawable(&self, path: &Path, most: usize) -> Result<Archive<'_>> {
+        let refuse =
+            |place: String, found: String, expected: &str| Err(Error::input(path, place, found, expected));
+        let n = self.objectives.len();
+        if !(2..=most).contains(&n) {
+            let expected = match most {
+                usize::MAX => "2 or more".to_owned(),
+                most => format!("2 to {most}"),
+            };
+            return refuse("objectives".into(), n.to_string(), &expected);
+        }
+        if let Some((i, point)) = self.points.iter().enumerate().find(|(_, p)| p.len() != n) {
+            let found = format!("{} values", point.len());
+            return refuse(format!("point {i}"), found, &format!("{n} values"));
+        }
+        if let Some((index, name)) = self.marked.iter().find(|(i, _)| *i >= self.points.len()) {
+            let expected = format!("one of {} points", self.points.len());
+            return refuse(format!("{name} point"), index.to_string(), &expected);
+        }
+        let finite: Vec<&Vec<f64>> = self
+            .points
+            .iter()
+            .filter(|p| p.iter().all(|v| v.is_finite()))
+            .collect();
+        let ranges: Option<Vec<(f64, f64)>> = (0..n).map(|k| extent(finite.iter().map(|p| &p[k]))).collect();
+        let Some(ranges) = ranges else {
+            return refuse("points".into(), "none that is finite".into(), "at least one");
+        };
+        let mark = self
+            .marked
+            .first()
+            .map(|(i, name)| (&self.points[*i], name.as_str()));
+        Ok(Archive {
+            objectives: &self.objectives,
+            mark: mark.filter(|(p, _)| finite.contains(p)),
+            finite,
+            ranges,
         })
-    } else {
+    }
+}
+
+impl Figure for Front {
+    /// A scatter of two objectives, or a matrix of scatters of up to six.
+    fn write_svg(&self, path: &Path) -> Result<()> {
+        let archive = self.drawable(path, 6)?;
+        let n = self.objectives.len();
+        if n == 2 {
+            return draw_to_file(path, (1200.0, 680.0), &self.title, |canvas| {
+                archive.scatter(canvas, (0, 1), (110.0, 1170.0), (610.0, 76.0), Axes::Full);
+                archive.legend(canvas, 1170.0);
+            });
+        }
         // The lower triangle holds every pair once; the legend stands in the empty half.
         let cells = n - 1;
         let cell = (1000.0 / cells as f64).clamp(200.0, 420.0);
         let (left, top) = (100.0, 60.0);
         let side = cell * cells as f64;
         let size = (left + side + 20.0, top + side + 50.0);
-        draw_to_file(path, size, title, |canvas| {
+        draw_to_file(path, size, &self.title, |canvas| {
             for (row, column) in (0..cells).flat_map(|r| (0..=r).map(move |c| (r, c))) {
                 let x = left + cell * column as f64;
                 let y = top + cell * row as f64;
@@ -68,57 +143,20 @@ pub fn plot_pareto(
             }
         })
     }
-}
 
-/// What of an archive can be drawn.
-pub(super) struct Drawable<'a> {
-    /// Points that are finite.
-    pub finite: Vec<&'a Vec<f64>>,
-    /// Least and greatest value of each objective over these.
-    pub ranges: Vec<(f64, f64)>,
-    /// The chosen point, if it is one of them.
-    pub mark: Option<&'a Vec<f64>>,
-}
-
-/// Checks an archive of `n` objectives, of which a picture can hold `most`.
-///
-/// # Errors
-/// [`Error::Input`] when there are fewer than two or more than `most`, when a point has another number of values, when no
-/// point is finite or `chosen` is not a point.
-pub(super) fn drawable<'a>(
-    path: &Path,
-    (n, most): (usize, usize),
-    points: &'a [Vec<f64>],
-    chosen: Option<usize>,
-) -> Result<Drawable<'a>> {
-    let refuse =
-        |place: String, found: String, expected: &str| Err(Error::input(path, place, found, expected));
-    if !(2..=most).contains(&n) {
-        let expected = if most == usize::MAX {
-            "2 or more".to_owned()
-        } else {
-            format!("2 to {most}")
-        };
-        return refuse("objectives".into(), n.to_string(), &expected);
+    fn place(&self, page: &mut HtmlReport) -> Result<()> {
+        self.drawable(Path::new(&self.title), usize::MAX)?;
+        let column = |k: usize| Numbers::new(self.points.iter().map(|p| p[k]));
+        let named = |o: &Objective| (o.name.clone(), raised(&o.unit));
+        let chart = json!({
+            "kind": "front",
+            "objectives": self.objectives.iter().map(named).collect::<Vec<_>>(),
+            "points": (0..self.objectives.len()).map(column).collect::<Vec<_>>(),
+            "marked": self.marked,
+        });
+        page.chart(&self.title, "", chart);
+        Ok(())
     }
-    if let Some((i, point)) = points.iter().enumerate().find(|(_, p)| p.len() != n) {
-        let found = format!("{} values", point.len());
-        return refuse(format!("point {i}"), found, &format!("{n} values"));
-    }
-    if let Some(index) = chosen.filter(|&c| c >= points.len()) {
-        let expected = format!("one of {} points", points.len());
-        return refuse("chosen point".into(), index.to_string(), &expected);
-    }
-    let finite: Vec<&Vec<f64>> = points
-        .iter()
-        .filter(|p| p.iter().all(|v| v.is_finite()))
-        .collect();
-    let ranges: Option<Vec<(f64, f64)>> = (0..n).map(|k| extent(finite.iter().map(|p| &p[k]))).collect();
-    let Some(ranges) = ranges else {
-        return refuse("points".into(), "none that is finite".into(), "at least one");
-    };
-    let mark = chosen.map(|c| &points[c]).filter(|p| finite.contains(p));
-    Ok(Drawable { finite, ranges, mark })
 }
 
 /// Which axes of a scatter are labelled.
@@ -128,16 +166,20 @@ enum Axes {
     Edges { below: bool, beside: bool },
 }
 
+/// What of a front can be drawn.
 struct Archive<'a> {
-    objectives: &'a [Objective<'a>],
-    finite: &'a [&'a Vec<f64>],
-    ranges: &'a [(f64, f64)],
-    mark: Option<&'a Vec<f64>>,
+    objectives: &'a [Objective],
+    /// Points that are finite.
+    finite: Vec<&'a Vec<f64>>,
+    /// Least and greatest value of each objective over these.
+    ranges: Vec<(f64, f64)>,
+    /// The marked point with its name, if it is one of them.
+    mark: Option<(&'a Vec<f64>, &'a str)>,
 }
 
 impl Archive<'_> {
     fn title(&self, k: usize) -> String {
-        with_unit(self.objectives[k].name, self.objectives[k].unit)
+        with_unit(&self.objectives[k].name, &self.objectives[k].unit)
     }
 
     fn scatter(
@@ -169,11 +211,11 @@ impl Archive<'_> {
             plot.draw_inner(canvas, labels);
         }
         let radius = if matches!(axes, Axes::Full) { 4.0 } else { 2.5 };
-        for point in self.finite {
+        for point in &self.finite {
             let at = (plot.x.at(point[across]), plot.y.at(point[up]));
             canvas.dot(at, radius, BLUE, 0.55);
         }
-        if let Some(point) = self.mark {
+        if let Some((point, _)) = self.mark {
             let at = (plot.x.at(point[across]), plot.y.at(point[up]));
             canvas.dot(at, radius + 1.0, VERMILLION, 1.0);
             canvas.ring(at, radius + 5.0, VERMILLION, 1.6);
@@ -224,7 +266,7 @@ impl Archive<'_> {
             canvas.line(foot, head, GRID, 0.6);
             canvas.dot(head, 3.0, viridis(place[2]), 0.95);
         }
-        if let Some(point) = self.mark {
+        if let Some((point, _)) = self.mark {
             canvas.ring(project(share(point)), 7.5, VERMILLION, 1.6);
         }
         let name = |canvas: &mut Canvas<'_>, k: usize, at: [f64; 3], align: Align| {
@@ -237,16 +279,16 @@ impl Archive<'_> {
 
     fn legend(&self, canvas: &mut Canvas<'_>, right: f64) {
         let look = Type::new(TICK_PX + 1.0, INK, Align::Right);
-        let archive = format!("{} compromises", self.finite.len());
+        let archive = format!("{} candidates", self.finite.len());
         canvas.text(&archive, (right, 28.0), look);
         canvas.dot((right - look.width(&archive) - 10.0, 28.0), 4.0, BLUE, 0.55);
-        if let Some(point) = self.mark {
+        if let Some((point, name)) = self.mark {
             let values: Vec<String> = point
                 .iter()
                 .zip(self.objectives)
                 .map(|(v, o)| format!("{} {}", significant(*v, 4), o.unit))
                 .collect();
-            let text = format!("chosen: {}", values.join(", "));
+            let text = format!("{name}: {}", values.join(", "));
             canvas.text(text.trim_end(), (right, 52.0), look);
             // Viewers choose wider fonts than the one that widths are guessed by.
             let x = right - 1.1 * look.width(text.trim_end()) - 14.0;

@@ -1,6 +1,7 @@
 //! Tables as Apache Parquet, for those who read them with data frames.
 
-use super::{Cells, Column, write_whole};
+use super::table::{Cells, Table};
+use super::write_whole;
 use crate::error::{Error, Result};
 use parquet::basic::{LogicalType, Repetition, Type as Physical};
 use parquet::data_type::{ByteArray, ByteArrayType, DoubleType};
@@ -11,26 +12,28 @@ use parquet::schema::types::Type;
 use std::path::Path;
 use std::sync::Arc;
 
-/// Writes a table, whole or not at all: numbers as nullable doubles, null where not a number, texts as UTF-8.
-///
-/// # Errors
-/// [`Error::Io`] if it cannot be written.
-pub fn write_parquet(path: impl AsRef<Path>, columns: &[Column<'_>]) -> Result<()> {
-    let path = path.as_ref();
-    let bytes =
-        bytes_of(columns).map_err(|e| Error::io(path, "write", std::io::Error::other(e.to_string())))?;
-    write_whole(path, &bytes)
+impl Table<'_> {
+    /// Writes a Parquet file, whole or not at all: numbers as nullable doubles, null where not a number, texts as UTF-8.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if it cannot be written.
+    pub fn write_parquet(&self, path: impl AsRef<Path>) -> Result<()> {
+        let path = path.as_ref();
+        let failed = |e: ParquetError| Error::io(path, "write", std::io::Error::other(e.to_string()));
+        write_whole(path, &bytes_of(self).map_err(failed)?)
+    }
 }
 
-fn bytes_of(columns: &[Column<'_>]) -> std::result::Result<Vec<u8>, ParquetError> {
+fn bytes_of(table: &Table<'_>) -> std::result::Result<Vec<u8>, ParquetError> {
+    let columns = &table.columns;
     let fields = columns
         .iter()
         .map(|column| {
             let field = match column.cells {
-                Cells::Texts(_) => Type::primitive_type_builder(column.name, Physical::BYTE_ARRAY)
+                Cells::Texts(_) => Type::primitive_type_builder(&column.name, Physical::BYTE_ARRAY)
                     .with_repetition(Repetition::REQUIRED)
                     .with_logical_type(Some(LogicalType::String)),
-                Cells::Numbers(_) => Type::primitive_type_builder(column.name, Physical::DOUBLE)
+                Cells::Numbers(_) => Type::primitive_type_builder(&column.name, Physical::DOUBLE)
                     .with_repetition(Repetition::OPTIONAL),
             };
             field.build().map(Arc::new)
@@ -77,23 +80,17 @@ mod tests {
     fn a_table_comes_back_as_it_was_with_nulls_for_what_is_not_a_number() {
         let names = ["a \"b\"".to_owned(), "ö, c".to_owned(), String::new()];
         let numbers = [0.1, f64::NAN, f64::NEG_INFINITY];
-        let table = |cells, name| Column {
-            name,
-            unit: "",
-            cells,
-        };
-        let columns = [
-            table(Cells::Texts(&names), "name"),
-            table(Cells::Numbers(&numbers), "lap time (s)"),
-        ];
-        let bytes = bytes_of(&columns).expect("a table");
+        let table = Table::new()
+            .texts("name", &names)
+            .numbers("lap time (s)", "", &numbers[..]);
+        let bytes = bytes_of(&table).expect("a table");
         assert_eq!(
             bytes,
-            bytes_of(&columns).expect("a table"),
+            bytes_of(&table).expect("a table"),
             "the same bytes each time"
         );
         let file = tempfile::NamedTempFile::new().expect("a temporary file");
-        write_parquet(file.path(), &columns).expect("it is written");
+        table.write_parquet(file.path()).expect("it is written");
         let file = std::fs::File::open(file.path()).expect("the file");
         let reader = SerializedFileReader::new(file).expect("a parquet file");
         let rows: Vec<_> = reader

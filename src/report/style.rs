@@ -78,7 +78,7 @@ pub fn significant(x: f64, figures: usize) -> String {
     text.replace('-', "\u{2212}")
 }
 
-/// As [`significant`], without noughts that only fill up the figures.
+/// As [`significant`], without zeros that only fill up the figures.
 pub(super) fn trimmed(x: f64, figures: usize) -> String {
     let text = significant(x, figures);
     if text.contains('.') && !text.contains('\u{00d7}') {
@@ -100,7 +100,7 @@ pub(super) fn power_of_ten(exponent: i32) -> String {
 }
 
 /// A name with its unit in brackets, as axes carry it; quantities without a unit say `1`.
-pub(super) fn with_unit(name: &str, unit: &str) -> String {
+pub fn with_unit(name: &str, unit: &str) -> String {
     if unit.is_empty() {
         name.to_owned()
     } else {

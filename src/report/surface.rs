@@ -2,9 +2,13 @@
 
 use super::axis::{Axis, Labels, Plot, extent};
 use super::canvas::{Align, Canvas, Type, draw_to_file};
+use super::html::Numbers;
+use super::html::thin::picked;
 use super::style::{FAINT_INK, INK, LABEL_PX, TICK_PX, VERMILLION, WHITE, significant, viridis};
+use super::{Figure, HtmlReport};
 use crate::{Error, Result};
 use contour::ContourBuilder;
+use serde_json::json;
 use std::path::Path;
 
 /// How colours and levels are spread.
@@ -16,27 +20,27 @@ pub enum Levels {
     Even,
 }
 
-/// A cost over an even grid of two parameters.
+/// A cost over an even grid of two parameters: its levels from above, and the surface in space.
 #[derive(Clone, Debug)]
-pub struct SurfaceFigure<'a> {
+pub struct Surface {
     /// Above it.
-    pub title: &'a str,
+    pub title: String,
     /// Horizontal parameter with its unit.
-    pub x_label: &'a str,
+    pub x_label: String,
     /// Vertical parameter with its unit.
-    pub y_label: &'a str,
+    pub y_label: String,
     /// The cost with its unit.
-    pub z_label: &'a str,
+    pub z_label: String,
     /// Values of the horizontal parameter, evenly spaced and ascending.
-    pub x: &'a [f64],
+    pub x: Vec<f64>,
     /// Values of the vertical parameter, likewise.
-    pub y: &'a [f64],
+    pub y: Vec<f64>,
     /// The cost, row by row of `y`; what is not finite is left white.
-    pub z: &'a [f64],
+    pub z: Vec<f64>,
     /// How colours and levels are spread over it.
     pub levels: Levels,
     /// Places to mark, with their names.
-    pub marks: Vec<(&'a str, [f64; 2])>,
+    pub marks: Vec<(String, [f64; 2])>,
 }
 
 impl Levels {
@@ -63,43 +67,76 @@ const MARK_PX: f64 = 5.0;
 /// Levels between the least and the greatest cost.
 const LEVELS: usize = 12;
 
-/// Draws the levels and the surface beside each other to an SVG file.
-///
-/// # Errors
-/// [`Error::Input`] when the grid is smaller than 2 by 2, does not fit the costs, or has nothing finite; [`Error::Io`]
-/// when the file cannot be written.
-pub fn plot_surface(path: impl AsRef<Path>, figure: &SurfaceFigure<'_>) -> Result<()> {
-    let path = path.as_ref();
-    let (nx, ny) = (figure.x.len(), figure.y.len());
-    let range = extent(figure.z);
-    let Some((least, most)) = range.filter(|_| nx >= 2 && ny >= 2 && nx * ny == figure.z.len()) else {
-        let found = format!("{nx} by {ny} places and {} costs", figure.z.len());
-        return Err(Error::input(
-            path,
-            "grid",
-            found,
-            "2 by 2 places or more, one cost each, some of them finite",
-        ));
-    };
-    let spread = (most - least).max(1e-300);
-    let levels = figure.levels;
-    let share = move |z: f64| levels.colour(((z - least) / spread).max(0.0));
-    draw_to_file(path, SIZE, figure.title, |canvas| {
-        draw_levels(canvas, figure, &share, (least, spread));
-        draw_in_space(canvas, figure, &share);
-        draw_scale(canvas, figure, (least, spread));
-    })
+/// Values along each side of a surface that go into a page at most.
+const GRID: usize = 100;
+
+impl Figure for Surface {
+    fn write_svg(&self, path: &Path) -> Result<()> {
+        let (least, most) = self.check(path)?;
+        let spread = (most - least).max(1e-300);
+        let levels = self.levels;
+        let share = move |z: f64| levels.colour(((z - least) / spread).max(0.0));
+        draw_to_file(path, SIZE, &self.title, |canvas| {
+            draw_levels(canvas, self, &share, (least, spread));
+            draw_in_space(canvas, self, &share);
+            draw_scale(canvas, self, (least, spread));
+        })
+    }
+
+    fn place(&self, page: &mut HtmlReport) -> Result<()> {
+        self.check(Path::new(&self.title))?;
+        let (nx, ny) = (self.x.len(), self.y.len());
+        // The ends stay; what is between them is as even as it can be.
+        let kept = |n: usize| -> Vec<usize> {
+            let count = n.min(GRID);
+            (0..count).map(|i| i * (n - 1) / (count - 1)).collect()
+        };
+        let (columns, rows) = (kept(nx), kept(ny));
+        let note = if nx.max(ny) > GRID {
+            let (kept, of) = (columns.len().max(rows.len()), nx.max(ny));
+            format!("{kept} of up to {of} values along a side are drawn.")
+        } else {
+            String::new()
+        };
+        let row = |j: &usize| Numbers::new(columns.iter().map(|i| self.z[j * nx + i]));
+        let marked = self.marks.iter().map(|(name, [x, y])| (x, y, name));
+        let chart = json!({
+            "kind": "surface",
+            "x_label": self.x_label,
+            "y_label": self.y_label,
+            "value_label": self.z_label,
+            "x": Numbers::new(picked(&self.x, &columns)),
+            "y": Numbers::new(picked(&self.y, &rows)),
+            "values": rows.iter().map(row).collect::<Vec<_>>(),
+            "marked": marked.collect::<Vec<_>>(),
+        });
+        page.chart(&self.title, &note, chart);
+        Ok(())
+    }
+}
+
+impl Surface {
+    /// The least and the greatest cost of a sound grid.
+    fn check(&self, path: &Path) -> Result<(f64, f64)> {
+        let (nx, ny) = (self.x.len(), self.y.len());
+        let sound = nx >= 2 && ny >= 2 && nx * ny == self.z.len();
+        extent(&self.z).filter(|_| sound).ok_or_else(|| {
+            let found = format!("{nx} by {ny} places and {} costs", self.z.len());
+            let expected = "2 by 2 places or more, one cost each, some of them finite";
+            Error::input(path, "grid", found, expected)
+        })
+    }
 }
 
 fn draw_levels(
     canvas: &mut Canvas<'_>,
-    figure: &SurfaceFigure<'_>,
+    figure: &Surface,
     share: &dyn Fn(f64) -> f64,
     (least, spread): (f64, f64),
 ) {
     let (nx, ny) = (figure.x.len(), figure.y.len());
     let step = |v: &[f64]| (v[v.len() - 1] - v[0]) / (v.len() - 1) as f64;
-    let (dx, dy) = (step(figure.x), step(figure.y));
+    let (dx, dy) = (step(&figure.x), step(&figure.y));
     let plot = Plot {
         x: Axis::linear(
             (figure.x[0] - 0.5 * dx, figure.x[nx - 1] + 0.5 * dx),
@@ -143,8 +180,8 @@ fn draw_levels(
     plot.draw_axes(
         canvas,
         Labels {
-            x: Some(figure.x_label),
-            y: Some(figure.y_label),
+            x: Some(&figure.x_label),
+            y: Some(&figure.y_label),
             x_ticks: 6,
             y_ticks: 8,
         },
@@ -162,7 +199,7 @@ fn draw_levels(
 }
 
 /// Dots with names, those that fall together under one; names right of `inwards_px` stand on the left.
-fn draw_marks(canvas: &mut Canvas<'_>, figure: &SurfaceFigure<'_>, places: Vec<(f64, f64)>, inwards_px: f64) {
+fn draw_marks(canvas: &mut Canvas<'_>, figure: &Surface, places: Vec<(f64, f64)>, inwards_px: f64) {
     let mut told: Vec<((f64, f64), String)> = Vec::new();
     for ((name, _), at) in figure.marks.iter().zip(places) {
         let together = told
@@ -170,7 +207,7 @@ fn draw_marks(canvas: &mut Canvas<'_>, figure: &SurfaceFigure<'_>, places: Vec<(
             .find(|(there, _)| !name.is_empty() && (there.0 - at.0).hypot(there.1 - at.1) < 2.0 * MARK_PX);
         match together {
             Some((_, names)) => *names = format!("{names}, {name}"),
-            None => told.push((at, (*name).to_owned())),
+            None => told.push((at, name.clone())),
         }
     }
     for (at, names) in told {
@@ -195,7 +232,7 @@ fn draw_marks(canvas: &mut Canvas<'_>, figure: &SurfaceFigure<'_>, places: Vec<(
 }
 
 /// The surface seen from the front right and above, drawn from the back to the front.
-fn draw_in_space(canvas: &mut Canvas<'_>, figure: &SurfaceFigure<'_>, share: &dyn Fn(f64) -> f64) {
+fn draw_in_space(canvas: &mut Canvas<'_>, figure: &Surface, share: &dyn Fn(f64) -> f64) {
     let (nx, ny) = (figure.x.len(), figure.y.len());
     let (turn, tilt) = (0.62f64, 0.52f64);
     let project = |u: f64, v: f64, w: f64| -> (f64, f64) {
@@ -238,8 +275,8 @@ fn draw_in_space(canvas: &mut Canvas<'_>, figure: &SurfaceFigure<'_>, share: &dy
     let along_x = |u: f64| project(u, -0.08, 0.0);
     let along_y = |v: f64| project(-0.08, v, 0.0);
     let down = |at: (f64, f64)| (at.0, at.1 + 8.0);
-    canvas.text(figure.x_label, down(along_x(0.5)), name(Align::Left));
-    canvas.text(figure.y_label, down(along_y(0.5)), name(Align::Right));
+    canvas.text(&figure.x_label, down(along_x(0.5)), name(Align::Left));
+    canvas.text(&figure.y_label, down(along_y(0.5)), name(Align::Right));
     for (share, at) in [(0.04, 0), (1.0, nx - 1)] {
         canvas.text(&significant(figure.x[at], 3), along_x(share), end(Align::Left));
     }
@@ -252,16 +289,16 @@ fn draw_in_space(canvas: &mut Canvas<'_>, figure: &SurfaceFigure<'_>, share: &dy
         (((x - values[0]) / step).round().max(0.0) as usize).min(values.len() - 1)
     };
     let places = figure.marks.iter().map(|(_, at)| {
-        let (column, row) = (nearest(figure.x, at[0]), nearest(figure.y, at[1]));
+        let (column, row) = (nearest(&figure.x, at[0]), nearest(&figure.y, at[1]));
         let (u, v) = (column as f64 / (nx - 1) as f64, row as f64 / (ny - 1) as f64);
         place(column, row).unwrap_or_else(|| project(u, v, 0.0))
     });
     draw_marks(canvas, figure, places.collect(), SIZE.0 - 160.0);
 }
 
-fn draw_scale(canvas: &mut Canvas<'_>, figure: &SurfaceFigure<'_>, (least, spread): (f64, f64)) {
+fn draw_scale(canvas: &mut Canvas<'_>, figure: &Surface, (least, spread): (f64, f64)) {
     let (left, right, y) = (760.0, 1220.0, 600.0);
-    // As many figures as tell the labels apart, where a cost is far from nought.
+    // As many figures as tell the labels apart, where a cost is far from zero.
     let far = (least.abs().max((least + spread).abs()) / spread).log10();
     let figures = 3 + far.clamp(0.0, 9.0) as usize;
     for i in 0..92 {
@@ -278,5 +315,5 @@ fn draw_scale(canvas: &mut Canvas<'_>, figure: &SurfaceFigure<'_>, (least, sprea
         );
     }
     let look = Type::new(LABEL_PX, INK, Align::Left);
-    canvas.text(figure.z_label, (left, y - 12.0), look);
+    canvas.text(&figure.z_label, (left, y - 12.0), look);
 }

@@ -1,5 +1,6 @@
-//! Tables: CSV files and aligned text for a terminal.
+//! Tables: CSV and Parquet files, aligned text for a terminal, tables of a page.
 
+use std::borrow::Cow;
 use std::path::Path;
 
 use super::style::with_unit;
@@ -7,40 +8,91 @@ use crate::files::write_whole;
 use crate::{Error, Result};
 
 /// What a column holds.
-#[derive(Debug, Clone, Copy)]
-pub enum Cells<'a> {
+#[derive(Debug, Clone)]
+pub(super) enum Cells<'a> {
     /// Numbers, in the column's unit; what is not finite is left empty.
-    Numbers(&'a [f64]),
+    Numbers(Cow<'a, [f64]>),
     /// Words.
-    Texts(&'a [String]),
+    Texts(Vec<String>),
 }
 
 /// One column of a table.
-#[derive(Debug, Clone, Copy)]
-pub struct Column<'a> {
-    /// The quantity.
-    pub name: &'a str,
-    /// Its unit; empty for none.
-    pub unit: &'a str,
-    /// Its values, from the first row.
+#[derive(Debug, Clone)]
+pub(super) struct Column<'a> {
+    pub name: String,
+    /// Empty for none.
+    pub unit: String,
     pub cells: Cells<'a>,
+}
+
+/// A table, stated once for files, terminals and pages. Columns stand in the order in which they are added.
+///
+/// ```
+/// use lapswarm::report::Table;
+///
+/// let laps = [("first", 114.29), ("second", 122.31)];
+/// let table = Table::rows(laps).text("line", |l| l.0).number("lap time", "s", |l| l.1).table();
+/// assert!(table.to_text().contains("lap time (s)"));
+/// ```
+#[derive(Debug, Clone, Default)]
+pub struct Table<'a> {
+    pub(super) columns: Vec<Column<'a>>,
+}
+
+/// A table of what rows hold, column by column.
+#[derive(Debug, Clone)]
+pub struct Rows<T> {
+    rows: Vec<T>,
+    table: Table<'static>,
+}
+
+impl<T> Rows<T> {
+    /// Adds a column of words.
+    #[must_use]
+    pub fn text<S: Into<String>>(mut self, name: impl Into<String>, of: impl Fn(&T) -> S) -> Self {
+        self.table = self.table.texts(name, self.rows.iter().map(of));
+        self
+    }
+
+    /// Adds a column of numbers; a row without one has an empty cell.
+    #[must_use]
+    pub fn number<N: Into<Option<f64>>>(
+        mut self,
+        name: impl Into<String>,
+        unit: impl Into<String>,
+        of: impl Fn(&T) -> N,
+    ) -> Self {
+        let values = self.rows.iter().map(|row| of(row).into().unwrap_or(f64::NAN));
+        self.table = self.table.numbers(name, unit, values.collect::<Vec<f64>>());
+        self
+    }
+
+    /// Whether there is no row.
+    pub fn is_empty(&self) -> bool {
+        self.rows.is_empty()
+    }
+
+    /// The table.
+    pub fn table(self) -> Table<'static> {
+        self.table
+    }
 }
 
 impl Column<'_> {
     pub(super) fn len(&self) -> usize {
-        match self.cells {
+        match &self.cells {
             Cells::Numbers(x) => x.len(),
             Cells::Texts(t) => t.len(),
         }
     }
 
     fn header(&self) -> String {
-        with_unit(self.name, self.unit)
+        with_unit(&self.name, &self.unit)
     }
 
     /// A cell with every digit of a number, so that it reads back as it was.
     fn exact(&self, row: usize) -> String {
-        match self.cells {
+        match &self.cells {
             Cells::Numbers(x) => x
                 .get(row)
                 .filter(|v| v.is_finite())
@@ -51,7 +103,7 @@ impl Column<'_> {
 
     /// A cell for reading.
     fn short(&self, row: usize) -> String {
-        match self.cells {
+        match &self.cells {
             Cells::Numbers(x) => match x.get(row) {
                 None => String::new(),
                 Some(v) if !v.is_finite() => "-".to_owned(),
@@ -68,7 +120,7 @@ fn printable(text: &str) -> String {
     text.chars().map(keep).collect()
 }
 
-/// Six significant digits without trailing noughts.
+/// Six significant digits without trailing zeros.
 pub(super) fn plain_digits(v: f64) -> String {
     if v == 0.0 {
         return "0".to_owned();
@@ -86,83 +138,146 @@ pub(super) fn plain_digits(v: f64) -> String {
     }
 }
 
-/// Writes columns to a CSV file, headed by names with units, whole or not at all. Numbers keep all
-/// their digits.
-///
-/// # Errors
-/// [`Error::Input`] when there are no columns or they differ in length; [`Error::Io`] when the file
-/// cannot be written.
-pub fn write_csv(path: impl AsRef<Path>, columns: &[Column<'_>]) -> Result<()> {
-    let path = path.as_ref();
-    let rows = columns.first().map_or(0, Column::len);
-    if columns.is_empty() {
-        return Err(Error::input(path, "columns", "none", "at least one"));
+impl<'a> Table<'a> {
+    /// A table without columns.
+    pub fn new() -> Self {
+        Self::default()
     }
-    if let Some(odd) = columns.iter().find(|c| c.len() != rows) {
-        return Err(Error::input(
-            path,
-            format!("column {}", odd.name),
-            format!("{} rows", odd.len()),
-            format!("{rows}, as in column {}", columns[0].name),
-        ));
-    }
-    let failed = |e: csv::Error| Error::io(path, "write", std::io::Error::other(e));
-    let mut writer = csv::Writer::from_writer(Vec::new());
-    writer
-        .write_record(columns.iter().map(Column::header))
-        .map_err(failed)?;
-    for row in 0..rows {
-        writer
-            .write_record(columns.iter().map(|c| c.exact(row)))
-            .map_err(failed)?;
-    }
-    let text = writer
-        .into_inner()
-        .map_err(|e| Error::io(path, "write", e.into_error()))?;
-    write_whole(path, &text)
-}
 
-/// Columns as text for a terminal: numbers to six digits aligned to the right, words to the left.
-/// Columns may differ in length.
-pub fn text_table(columns: &[Column<'_>]) -> String {
-    let rows = columns.iter().map(Column::len).max().unwrap_or(0);
-    let cells: Vec<Vec<String>> = columns
-        .iter()
-        .map(|c| {
-            let body = (0..rows).map(|row| c.short(row));
-            std::iter::once(printable(&c.header())).chain(body).collect()
-        })
-        .collect();
-    let widths: Vec<usize> = cells
-        .iter()
-        .map(|column| column.iter().map(|c| c.chars().count()).max().unwrap_or(0))
-        .collect();
-    let mut text = String::new();
-    if columns.is_empty() {
-        return text;
-    }
-    let mut push_line = |line: String| {
-        text.push_str(line.trim_end());
-        text.push('\n');
-    };
-    // The header is the row before the first.
-    for row in 0..=rows {
-        let line: Vec<String> = columns
-            .iter()
-            .zip(cells.iter().zip(&widths))
-            .map(|(column, (cells, &width))| {
-                let cell = &cells[row];
-                match column.cells {
-                    Cells::Numbers(_) => format!("{cell:>width$}"),
-                    Cells::Texts(_) => format!("{cell:<width$}"),
-                }
-            })
-            .collect();
-        push_line(line.join("  "));
-        if row == 0 {
-            let rules: Vec<String> = widths.iter().map(|&w| "-".repeat(w)).collect();
-            push_line(rules.join("  "));
+    /// A table to be filled from rows.
+    pub fn rows<T>(rows: impl IntoIterator<Item = T>) -> Rows<T> {
+        Rows {
+            rows: rows.into_iter().collect(),
+            table: Table::new(),
         }
     }
-    text
+
+    /// Adds a column of words.
+    #[must_use]
+    pub fn texts<S: Into<String>>(
+        mut self,
+        name: impl Into<String>,
+        cells: impl IntoIterator<Item = S>,
+    ) -> Self {
+        self.columns.push(Column {
+            name: name.into(),
+            unit: String::new(),
+            cells: Cells::Texts(cells.into_iter().map(Into::into).collect()),
+        });
+        self
+    }
+
+    /// Adds a column of numbers in a unit, which may be empty.
+    #[must_use]
+    pub fn numbers(
+        mut self,
+        name: impl Into<String>,
+        unit: impl Into<String>,
+        values: impl Into<Cow<'a, [f64]>>,
+    ) -> Self {
+        self.columns.push(Column {
+            name: name.into(),
+            unit: unit.into(),
+            cells: Cells::Numbers(values.into()),
+        });
+        self
+    }
+
+    /// The first columns alone.
+    #[must_use]
+    pub fn first(mut self, columns: usize) -> Self {
+        self.columns.truncate(columns);
+        self
+    }
+
+    /// The table without the columns that are empty in every row.
+    #[must_use]
+    pub fn without_empty(mut self) -> Self {
+        self.columns.retain(|column| match &column.cells {
+            Cells::Numbers(x) => x.iter().any(|v| v.is_finite()),
+            Cells::Texts(t) => t.iter().any(|t| !t.is_empty()),
+        });
+        self
+    }
+
+    /// Writes a CSV file, headed by names with units, whole or not at all. Numbers keep all their digits.
+    ///
+    /// # Errors
+    /// [`Error::Input`] when there are no columns or they differ in length; [`Error::Io`] when the file
+    /// cannot be written.
+    pub fn write_csv(&self, path: impl AsRef<Path>) -> Result<()> {
+        let (path, columns) = (path.as_ref(), &self.columns);
+        let rows = columns.first().map_or(0, Column::len);
+        if columns.is_empty() {
+            return Err(Error::input(path, "columns", "none", "at least one"));
+        }
+        if let Some(odd) = columns.iter().find(|c| c.len() != rows) {
+            return Err(Error::input(
+                path,
+                format!("column {}", odd.name),
+                format!("{} rows", odd.len()),
+                format!("{rows}, as in column {}", columns[0].name),
+            ));
+        }
+        let failed = |e: csv::Error| Error::io(path, "write", std::io::Error::other(e));
+        let mut writer = csv::Writer::from_writer(Vec::new());
+        writer
+            .write_record(columns.iter().map(Column::header))
+            .map_err(failed)?;
+        for row in 0..rows {
+            writer
+                .write_record(columns.iter().map(|c| c.exact(row)))
+                .map_err(failed)?;
+        }
+        let text = writer
+            .into_inner()
+            .map_err(|e| Error::io(path, "write", e.into_error()))?;
+        write_whole(path, &text)
+    }
+
+    /// The table as text for a terminal: numbers to six digits aligned to the right, words to the left.
+    /// Columns may differ in length.
+    pub fn to_text(&self) -> String {
+        let columns = &self.columns;
+        let rows = columns.iter().map(Column::len).max().unwrap_or(0);
+        let cells: Vec<Vec<String>> = columns
+            .iter()
+            .map(|c| {
+                let body = (0..rows).map(|row| c.short(row));
+                std::iter::once(printable(&c.header())).chain(body).collect()
+            })
+            .collect();
+        let widths: Vec<usize> = cells
+            .iter()
+            .map(|column| column.iter().map(|c| c.chars().count()).max().unwrap_or(0))
+            .collect();
+        let mut text = String::new();
+        if columns.is_empty() {
+            return text;
+        }
+        let mut push_line = |line: String| {
+            text.push_str(line.trim_end());
+            text.push('\n');
+        };
+        // The header is the row before the first.
+        for row in 0..=rows {
+            let line: Vec<String> = columns
+                .iter()
+                .zip(cells.iter().zip(&widths))
+                .map(|(column, (cells, &width))| {
+                    let cell = &cells[row];
+                    match &column.cells {
+                        Cells::Numbers(_) => format!("{cell:>width$}"),
+                        Cells::Texts(_) => format!("{cell:<width$}"),
+                    }
+                })
+                .collect();
+            push_line(line.join("  "));
+            if row == 0 {
+                let rules: Vec<String> = widths.iter().map(|&w| "-".repeat(w)).collect();
+                push_line(rules.join("  "));
+            }
+        }
+        text
+    }
 }

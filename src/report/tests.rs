@@ -72,26 +72,23 @@ fn traces(name: &str, samples: usize, title: &str, section: &str) -> Result<Stri
         ("lateral acceleration", "m/s²", 9.0, 2.0),
         ("yaw rate", "rad/s", 0.35, 2.2),
     ];
-    let mut data: Vec<_> = channels.iter().map(|c| lap(samples, c.2, c.3)).collect();
-    for v in &mut data[0].0 {
-        *v += 45.0;
+    let line = |name| LapLine::new(name, &x[..]);
+    let (mut logged, mut model, mut error) = (line("measured").wide(), line("fitted"), line("error"));
+    let mut view = LapView::new(title);
+    for (k, (label, unit, scale, phase)) in channels.into_iter().enumerate() {
+        let (mut measured, fitted) = lap(samples, scale, phase);
+        if samples > 100 && k == 2 {
+            measured[samples / 2..samples / 2 + samples / 30].fill(f64::NAN);
+        }
+        let errors: Vec<f64> = fitted.iter().zip(&measured).map(|(f, m)| f - m).collect();
+        view = view
+            .panel(label, unit)
+            .low_panel("error", unit)
+            .panel_note("rms error 0.3");
+        logged = logged.trace(2 * k, measured);
+        model = model.trace(2 * k, fitted);
+        error = error.trace(2 * k + 1, errors);
     }
-    for v in &mut data[0].1 {
-        *v += 45.0;
-    }
-    if samples > 100 {
-        data[2].0[samples / 2..samples / 2 + samples / 30].fill(f64::NAN);
-    }
-    let panels = channels
-        .iter()
-        .zip(&data)
-        .map(|(c, (measured, fitted))| TracePanel {
-            label: c.0,
-            unit: c.1,
-            measured,
-            fitted,
-        })
-        .collect();
     let sections = [
         (section, 310.0, 520.0),
         ("Village/The Loop", 790.0, 1320.0),
@@ -99,16 +96,10 @@ fn traces(name: &str, samples: usize, title: &str, section: &str) -> Result<Stri
         ("Maggotts/Becketts", 3500.0, 4260.0),
         ("Vale", 5380.0, 5700.0),
     ];
-    let figure = TraceFigure {
-        title,
-        x_label: "distance (m)",
-        x: &x,
-        panels,
-        sections: sections
-            .map(|(name, start, end)| ShadedSection { name, start, end })
-            .to_vec(),
-    };
-    drawn(name, |path| plot_traces(path, &figure))
+    let view = view
+        .lines([logged, model, error])
+        .sections(sections.map(|(name, start, end)| (name.to_owned(), start, end)));
+    drawn(name, |path| view.write_svg(path))
 }
 
 #[test]
@@ -140,40 +131,30 @@ fn names_from_files_cannot_inject_markup() {
 
 #[test]
 fn hopeless_traces_are_refused_and_poor_ones_drawn() {
-    for samples in [0, 1] {
-        let error = traces("short", samples, "short", "A").expect_err("no extent");
-        assert!(error.to_string().contains("horizontal axis"), "{error}");
-    }
-    let x = [0.0, 1.0, 2.0];
-    let draw = |measured: &[f64], fitted: &[f64]| {
-        let figure = TraceFigure {
-            title: "poor",
-            x_label: "time (s)",
-            x: &x,
-            panels: vec![TracePanel {
-                label: "roll",
-                unit: "rad",
-                measured,
-                fitted,
-            }],
-            sections: vec![],
-        };
-        drawn("poor", |path| plot_traces(path, &figure))
+    let error = traces("short", 0, "short", "A").expect_err("no point");
+    assert!(error.to_string().contains("no point"), "{error}");
+    let error = traces("short", 1, "short", "A").expect_err("no extent");
+    assert!(error.to_string().contains("horizontal axis"), "{error}");
+    let draw = |values: &[f64]| {
+        let line = LapLine::new("one", vec![0.0, 1.0, 2.0])
+            .trace(0, values)
+            .band(values, values);
+        let view = LapView::new("poor")
+            .x("time", "s")
+            .panel("roll", "rad")
+            .line(line);
+        drawn("poor", |path| view.write_svg(path))
     };
-    let gap = [f64::NAN; 3];
-    assert!(draw(&gap, &gap).expect("drawn").contains("no common samples"));
-    assert!(draw(&[1.0; 3], &[1.0; 3]).is_ok());
-    assert!(draw(&[1e300, -1e300, 0.0], &[f64::INFINITY, 0.0, 1e-300]).is_ok());
-    let error = draw(&[1.0; 2], &[1.0; 3]).expect_err("lengths differ");
-    assert!(
-        error
-            .to_string()
-            .contains("panel roll: found 2 measured and 3 fitted")
-    );
+    assert!(draw(&[f64::NAN; 3]).is_ok());
+    assert!(draw(&[1.0; 3]).is_ok());
+    assert!(draw(&[1e300, -1e300, 0.0]).is_ok());
+    assert!(draw(&[f64::INFINITY, 0.0, 1e-300]).is_ok());
+    let error = draw(&[1.0; 2]).expect_err("lengths differ");
+    assert!(error.to_string().contains("poor, line one"), "{error}");
 }
 
 #[test]
-fn convergence_shows_every_run() {
+fn curves_show_every_run() {
     let spent: Vec<f64> = (1..=400).map(|i| i as f64 * 4096.0).collect();
     let curve = |rate: f64, floor: f64| -> Vec<f64> {
         spent
@@ -181,73 +162,82 @@ fn convergence_shows_every_run() {
             .map(|e| floor + 8.0 * (-rate * e / 1e5).exp())
             .collect()
     };
-    let (a, b, m) = (curve(1.0, 2e-4), curve(0.7, 3e-3), curve(0.4, 2e-2));
-    let run = |label, best, median| ConvergenceRun {
-        label,
-        evaluations: &spent,
-        best,
-        median,
+    let panel = || {
+        Panel::new("Cost")
+            .x("evaluations", "")
+            .y("cost", "1")
+            .scales(Scale::Linear, Scale::Log)
     };
-    let runs = [
-        run("GPU, seed 1", a.as_slice(), Some(m.as_slice())),
-        run("CPU, seed 2", &b, None),
-    ];
-    let draw = |runs: &[ConvergenceRun<'_>]| {
-        drawn("convergence", |p| {
-            plot_convergence(p, "Convergence", "cost (1)", runs)
-        })
+    let draw = |panels: &[Panel]| {
+        let figure = Curves::new("Convergence", panels.to_vec());
+        drawn("curves", |p| figure.write_svg(p))
     };
-    let svg = draw(&runs).expect("drawn");
+    let several = panel()
+        .curve("GPU, seed 1", &spent, &curve(1.0, 2e-4))
+        .curve("CPU, seed 2", &spent, &curve(0.7, 3e-3))
+        .shaded(0.4, "median", &spent, &curve(0.4, 2e-2));
+    let svg = draw(std::slice::from_ref(&several)).expect("drawn");
     assert!(svg.contains("evaluations") && svg.contains("GPU, seed 1") && svg.contains("cost (1)"));
+    let population: Vec<f64> = (6..18).map(|k| f64::from(1 << k)).collect();
+    let rate: Vec<f64> = population.iter().map(|p| 2.5e6 * p / (p + 2e4)).collect();
+    let rates = Panel::new("Rate")
+        .x("population", "candidates")
+        .scales(Scale::Log, Scale::Log)
+        .curve("GPU (Vulkan)", &population, &rate)
+        .curve("one", &[64.0], &[5.0]);
+    let shown = Panel::new("Quality")
+        .shown(0.4, 0.9)
+        .dots("late", [(1.0, 0.1), (2.0, 0.8)]);
+    let svg = draw(&[several.clone(), rates, shown]).expect("drawn");
+    assert!(svg.contains("population (candidates)") && svg.contains("GPU (Vulkan)"));
     assert!(draw(&[]).is_err());
-    let nothing = vec![f64::NAN; 400];
-    assert!(draw(&[run("lost", &nothing, None)]).is_err());
-    assert!(draw(&[run("short", &a[1..], None)]).is_err());
-    let one = ConvergenceRun {
-        label: "one",
-        evaluations: &[0.0],
-        best: &[0.5],
-        median: None,
-    };
-    assert!(drawn("one", |p| plot_convergence(p, "One", "cost", &[one])).is_ok());
-    assert!(draw(&runs[..1]).is_ok());
+    let nothing = panel().curve("lost", &spent, &[f64::NAN; 400]);
+    assert!(!nothing.has_points() && draw(&[nothing]).is_err());
+    let negative = panel().curve("below", &spent, &[-1.0; 400]);
+    assert!(draw(&[negative]).is_err());
+    assert!(draw(&[several.curve("short", &spent, &[1.0])]).is_err());
+    assert!(draw(&[panel().curve("one", &[0.0], &[0.5])]).is_ok());
 }
 
 #[test]
 fn pareto_marks_the_choice() {
-    let objectives = [("lap time", "s"), ("fuel", "l"), ("tyre energy", "MJ")]
-        .map(|(name, unit)| Objective { name, unit });
+    let names = [("lap time", "s"), ("fuel", "l"), ("tyre energy", "MJ")];
     let points: Vec<Vec<f64>> = (0..200)
         .map(|i| {
             let t = i as f64 / 199.0;
             vec![118.0 + 5.0 * t * t, 1.2 + 1.5 * (1.0 - t).powi(2), 8.0 + noise(i)]
         })
         .collect();
-    let draw = |name: &str, k: usize, chosen| {
-        let some: Vec<Vec<f64>> = points.iter().map(|p| p[..k].to_vec()).collect();
-        drawn(name, |p| {
-            plot_pareto(p, "Compromises", &objectives[..k], &some, chosen)
-        })
+    let front = |points: &[Vec<f64>], k: usize, chosen: usize| {
+        let front = Front::new("Compromises", points).mark(chosen, "chosen");
+        let named = names[..k].iter();
+        named.fold(front, |front, (name, unit)| front.objective(*name, *unit))
     };
-    assert!(draw("pareto2", 2, Some(90)).expect("drawn").contains("chosen: "));
+    let draw = |name: &str, k: usize, chosen: usize| {
+        let some: Vec<Vec<f64>> = points.iter().map(|p| p[..k].to_vec()).collect();
+        drawn(name, |p| front(&some, k, chosen).write_svg(p))
+    };
+    assert!(draw("pareto2", 2, 90).expect("drawn").contains("chosen: "));
+    assert!(draw("pareto3", 3, 90).expect("drawn").contains("tyre energy"));
+    assert!(draw("bad", 2, 200).is_err() && draw("bad", 1, 0).is_err());
+    let bad = [vec![f64::NAN, 1.0]];
+    assert!(drawn("bad", |p| front(&bad, 2, 0).write_svg(p)).is_err());
+    let one = [vec![1.0, 1.0]];
+    assert!(drawn("one", |p| front(&one, 2, 0).write_svg(p)).is_ok());
+    let parallel = |p: &Path| front(&points, 3, 90).write_parallel(p, "Parallel");
     assert!(
-        draw("pareto3", 3, Some(90))
+        drawn("parallel", parallel)
             .expect("drawn")
             .contains("tyre energy")
     );
-    assert!(draw("bad", 2, Some(200)).is_err() && draw("bad", 1, None).is_err());
-    let bad = [vec![f64::NAN, 1.0]];
-    assert!(drawn("bad", |p| plot_pareto(p, "Bad", &objectives[..2], &bad, None)).is_err());
-    let one = [vec![1.0, 1.0]];
-    assert!(drawn("one", |p| plot_pareto(p, "One", &objectives[..2], &one, Some(0))).is_ok());
 }
 
-fn row(i: usize, name: &str) -> ParameterRow<'_> {
+fn row(i: usize, name: &str) -> ParameterRow {
     let scale = 10f64.powi(i as i32 % 7 - 2);
     let place = 0.5 + 0.4 * noise(i);
     ParameterRow {
-        name,
-        unit: ["", "N m/rad", "N m s/rad"][i % 3],
+        name: name.to_owned(),
+        unit: ["", "N m/rad", "N m s/rad"][i % 3].to_owned(),
         lower: -scale,
         upper: 3.0 * scale,
         swarm: scale * (-1.0 + 4.0 * place) + 0.2 * scale * noise(i + 99),
@@ -269,11 +259,18 @@ fn parameters_list_every_row() {
             }
         })
         .collect();
+    let draw = |name: &str, rows: &[ParameterRow]| {
+        let figure = Parameters {
+            title: "Identified parameters".to_owned(),
+            note: String::new(),
+            rows: rows.to_vec(),
+        };
+        drawn(name, |p| figure.write_svg(p))
+    };
     for n in [1, 22, 60] {
         let rows: Vec<_> = (0..n).map(|i| row(i, &names[i])).collect();
-        let name = format!("parameters{n}");
-        let svg = drawn(&name, |p| plot_parameters(p, "Identified parameters", &rows)).expect("drawn");
-        assert!(rows.iter().all(|r| svg.contains(r.name)));
+        let svg = draw(&format!("parameters{n}"), &rows).expect("drawn");
+        assert!(rows.iter().all(|r| svg.contains(&r.name)));
         assert_eq!(svg.contains("not identifiable"), n > 5);
     }
     let wild = ParameterRow {
@@ -283,43 +280,15 @@ fn parameters_list_every_row() {
         truth: Some(f64::NEG_INFINITY),
         ..row(0, "wild")
     };
-    assert!(drawn("wild", |p| plot_parameters(p, "Wild", &[wild])).is_ok());
+    assert!(draw("wild", std::slice::from_ref(&wild)).is_ok());
     let reversed = ParameterRow {
         lower: 2.0,
         upper: 1.0,
         ..wild
     };
-    let error = drawn("bad", |p| plot_parameters(p, "Bad", &[reversed])).expect_err("reversed");
+    let error = draw("bad", &[reversed]).expect_err("reversed");
     assert!(error.to_string().contains("parameter wild: found bounds 2 to 1"));
-    assert!(drawn("bad", |p| plot_parameters(p, "Bad", &[])).is_err());
-}
-
-#[test]
-fn scaling_shows_every_backend() {
-    let population: Vec<f64> = (6..18).map(|k| f64::from(1 << k)).collect();
-    let rate =
-        |peak: f64, half: f64| -> Vec<f64> { population.iter().map(|p| peak * p / (p + half)).collect() };
-    let (gpu, cpu) = (rate(2.5e6, 2e4), rate(9e3, 8.0));
-    let series = [("GPU (Vulkan)", &gpu), ("CPU, 16 threads", &cpu)].map(|(label, rates)| ScalingSeries {
-        label,
-        population: &population,
-        evaluations_per_s: rates,
-    });
-    let svg = drawn("scaling", |p| plot_scaling(p, "Throughput", &series)).expect("drawn");
-    assert!(svg.contains("population (candidates)") && svg.contains("GPU (Vulkan)"));
-    assert!(drawn("bad", |p| plot_scaling(p, "None", &[])).is_err());
-    assert!(
-        drawn("one", |p| plot_scaling(
-            p,
-            "One",
-            &[ScalingSeries {
-                label: "one",
-                population: &[64.0],
-                evaluations_per_s: &[5.0],
-            }]
-        ))
-        .is_ok()
-    );
+    assert!(draw("bad", &[]).is_err());
 }
 
 #[test]
@@ -339,57 +308,61 @@ fn the_map_shows_a_circuit() {
             speed[i] = speed[i].min(reachable.sqrt());
         }
     }
-    let (left, right) = (circuit.left_edge(), circuit.right_edge());
-    let names = circuit
-        .sections
-        .iter()
-        .map(|s| (s.name.as_str(), circuit.position_at(0.5 * (s.start_m + s.end_m))))
-        .collect();
+    let sections = circuit.sections.iter();
     let mut map = TrackMap {
-        title: "Silverstone Grand Prix: speed along the lap",
-        left_edge_m: &left,
-        right_edge_m: &right,
-        line_m: &circuit.centreline_m,
-        values: &speed,
-        value_label: "speed",
-        value_unit: "m/s",
-        closed: true,
-        names,
+        title: "Silverstone Grand Prix: speed along the lap".to_owned(),
+        road: Road {
+            left_edge_m: circuit.left_edge(),
+            right_edge_m: circuit.right_edge(),
+            closed: true,
+            names: sections
+                .map(|s| (s.name.clone(), circuit.position_at(0.5 * (s.start_m + s.end_m))))
+                .collect(),
+        },
+        line_m: circuit.centreline_m.clone(),
+        values: speed,
+        value_label: "speed".to_owned(),
+        value_unit: "m/s".to_owned(),
     };
-    let svg = drawn("track_map", |p| plot_track_map(p, &map)).expect("drawn");
+    let svg = drawn("track_map", |p| map.write_svg(p)).expect("drawn");
     for label in ["Abbey", "Village/The Loop", "start", "speed (m/s)", "500 m"] {
         assert!(svg.contains(label), "{label}");
     }
     let corners = circuit.corners.iter();
-    map.names = corners
-        .map(|c| (c.name.as_str(), circuit.position_at(c.station_m)))
+    map.road.names = corners
+        .map(|c| (c.name.clone(), circuit.position_at(c.station_m)))
         .collect();
-    assert!(drawn("track_map_corners", |p| plot_track_map(p, &map)).is_ok());
+    assert!(drawn("track_map_corners", |p| map.write_svg(p)).is_ok());
 }
 
 #[test]
 fn poor_maps_are_drawn_or_refused() {
-    let nan = DVec2::NAN;
-    let line = [DVec2::ZERO, DVec2::X * 50.0, nan, DVec2::Y * 50.0, DVec2::ONE];
-    let map = |line_m: &'static [DVec2], values: &'static [f64]| TrackMap {
-        title: "poor",
-        left_edge_m: &[],
-        right_edge_m: &[],
-        line_m,
-        values,
-        value_label: "speed",
-        value_unit: "m/s",
-        closed: true,
-        names: vec![("lost", DVec2::NAN), ("", DVec2::ZERO)],
+    let draw = |line_m: &[DVec2], values: &[f64]| {
+        let map = TrackMap {
+            title: "poor".to_owned(),
+            road: Road {
+                closed: true,
+                names: vec![("lost".to_owned(), DVec2::NAN), (String::new(), DVec2::ZERO)],
+                ..Road::default()
+            },
+            line_m: line_m.to_vec(),
+            values: values.to_vec(),
+            ..TrackMap::default()
+        };
+        drawn("poor_map", |p| map.write_svg(p))
     };
-    let draw = |m: TrackMap<'_>| drawn("poor_map", |p| plot_track_map(p, &m));
-    let mut poor = map(&[], &[f64::NAN, 1.0, 1.0, f64::INFINITY, 2.0]);
-    poor.line_m = &line;
-    assert!(draw(poor).is_ok());
-    assert!(draw(map(&[], &[])).is_err());
-    assert!(draw(map(&[DVec2::ONE], &[1.0])).is_err());
-    assert!(draw(map(&[DVec2::ONE; 3], &[1.0; 3])).is_err());
-    assert!(draw(map(&[DVec2::ONE; 3], &[1.0; 2])).is_err());
+    let line = [
+        DVec2::ZERO,
+        DVec2::X * 50.0,
+        DVec2::NAN,
+        DVec2::Y * 50.0,
+        DVec2::ONE,
+    ];
+    assert!(draw(&line, &[f64::NAN, 1.0, 1.0, f64::INFINITY, 2.0]).is_ok());
+    assert!(draw(&[], &[]).is_err());
+    assert!(draw(&[DVec2::ONE], &[1.0]).is_err());
+    assert!(draw(&[DVec2::ONE; 3], &[1.0; 3]).is_err());
+    assert!(draw(&[DVec2::ONE; 3], &[1.0; 2]).is_err());
 }
 
 #[test]
@@ -398,50 +371,37 @@ fn tables_keep_their_digits_and_their_units() {
     let path = folder.path().join("table.csv");
     let names = ["plain".to_owned(), "with, comma\u{1b}[31m".to_owned()];
     let numbers = [0.1 + 0.2, f64::NAN];
-    let columns = [
-        Column {
-            name: "candidate",
-            unit: "",
-            cells: Cells::Texts(&names),
-        },
-        Column {
-            name: "yaw rate",
-            unit: "rad/s",
-            cells: Cells::Numbers(&numbers),
-        },
-    ];
-    write_csv(&path, &columns).expect("written");
+    let words = || Table::new().texts("candidate", &names);
+    let whole = words().numbers("yaw rate", "rad/s", &numbers[..]);
+    whole.write_csv(&path).expect("written");
     let text = std::fs::read_to_string(&path).expect("read");
     assert!(
         text.starts_with("candidate,yaw rate (rad/s)\nplain,0.30000000000000004\n"),
         "{text}"
     );
-    let table = text_table(&columns);
+    let table = whole.to_text();
     assert!(
         !table.contains('\u{1b}') && table.contains("             0.3\n"),
         "{table}"
     );
     assert_eq!(table.lines().count(), 4);
-    assert_eq!(text_table(&[]), "");
+    assert_eq!(Table::new().to_text(), "");
 
-    let short = Column {
-        cells: Cells::Numbers(&numbers[..1]),
-        ..columns[1]
-    };
-    let error = write_csv(&path, &[columns[0], short]).expect_err("lengths differ");
+    let short = words().numbers("yaw rate", "rad/s", &numbers[..1]);
+    let error = short.write_csv(&path).expect_err("lengths differ");
     assert!(
         error
             .to_string()
             .contains("column yaw rate: found 1 rows, expected 2")
     );
-    assert!(write_csv(&path, &[]).is_err());
+    assert!(Table::new().write_csv(&path).is_err());
     assert_eq!(
         std::fs::read_to_string(&path).expect("read"),
         text,
         "left as it was"
     );
     let nowhere = folder.path().join("absent/table.csv");
-    assert!(matches!(write_csv(&nowhere, &columns), Err(Error::Io { .. })));
+    assert!(matches!(whole.write_csv(&nowhere), Err(Error::Io { .. })));
     assert_eq!(std::fs::read_dir(&folder).expect("listed").count(), 1);
 }
 
@@ -453,26 +413,22 @@ proptest! {
         places in prop::collection::vec(prop::num::f64::ANY, 12),
     ) {
         let places = &places[..values.len()];
-        let figure = TraceFigure {
-            title: "any",
-            x_label: "time (s)",
-            x: places,
-            panels: vec![TracePanel { label: "a", unit: "1", measured: &values, fitted: places }],
-            sections: vec![ShadedSection { name: "s", start: values[0], end: values[1] }],
-        };
-        let _ = drawn("any", |p| plot_traces(p, &figure));
-        let run = ConvergenceRun { label: "r", evaluations: places, best: &values, median: None };
-        let _ = drawn("any", |p| plot_convergence(p, "any", "cost", &[run]));
-        let one = ScalingSeries { label: "s", population: places, evaluations_per_s: &values };
-        let _ = drawn("any", |p| plot_scaling(p, "any", &[one]));
+        let line = LapLine::new("a", places).trace(0, &values[..]).trace(1, places);
+        let view = LapView::new("any").panel("a", "1").low_panel("b", "").line(line);
+        let view = view.sections([("s".to_owned(), values[0], values[1])]);
+        let _ = drawn("any", |p| view.write_svg(p));
+        for scale in [Scale::Linear, Scale::Log] {
+            let panel = Panel::new("any").scales(scale, scale).curve("r", places, &values);
+            let _ = drawn("any", |p| Curves::new("any", [panel]).write_svg(p));
+        }
         let line: Vec<DVec2> = places.iter().zip(&values).map(|(&x, &y)| DVec2::new(x, y)).collect();
-        let map = TrackMap {
-            title: "any", left_edge_m: &line, right_edge_m: &line, line_m: &line, values: &values,
-            value_label: "v", value_unit: "1", closed: false, names: vec![("n", line[0])],
+        let road = Road {
+            left_edge_m: line.clone(), right_edge_m: line.clone(), closed: false, names: vec![("n".to_owned(), line[0])],
         };
-        let _ = drawn("any", |p| plot_track_map(p, &map));
         let points: Vec<Vec<f64>> = line.iter().map(|p| vec![p.x, p.y]).collect();
-        let objectives = [Objective { name: "a", unit: "" }; 2];
-        let _ = drawn("any", |p| plot_pareto(p, "any", &objectives, &points, Some(0)));
+        let map = TrackMap { road, line_m: line, values, ..TrackMap::default() };
+        let _ = drawn("any", |p| map.write_svg(p));
+        let front = Front::new("any", &points).objective("a", "").objective("a", "").mark(0, "m");
+        let _ = drawn("any", |p| front.write_svg(p));
     }
 }

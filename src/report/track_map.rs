@@ -10,27 +10,34 @@ use super::canvas::{Align, Canvas, Type, draw_to_file};
 use super::style::{FAINT_INK, FRAME, GREYED, INK, LABEL_PX, TICK_PX, TITLE_PX, viridis, with_unit};
 use crate::{Error, Result};
 
-/// A circuit and what to colour it by.
-#[derive(Debug, Clone)]
-pub struct TrackMap<'a> {
-    /// Title of the figure.
-    pub title: &'a str,
-    /// Left edge of the road (m); may be empty.
-    pub left_edge_m: &'a [DVec2],
-    /// Right edge of the road (m); may be empty.
-    pub right_edge_m: &'a [DVec2],
-    /// The line to colour (m), from the start line on.
-    pub line_m: &'a [DVec2],
-    /// One value per point of the line; grey where not finite.
-    pub values: &'a [f64],
-    /// The quantity, as in `speed`.
-    pub value_label: &'a str,
-    /// Its unit, as in `m/s`.
-    pub value_unit: &'a str,
-    /// Whether the last point joins the first.
+/// A road from above.
+#[derive(Debug, Clone, Default)]
+pub struct Road {
+    /// Left edge (m); may be empty.
+    pub left_edge_m: Vec<DVec2>,
+    /// Right edge (m); may be empty.
+    pub right_edge_m: Vec<DVec2>,
+    /// Whether the ends join.
     pub closed: bool,
     /// Names and the places they belong to (m).
-    pub names: Vec<(&'a str, DVec2)>,
+    pub names: Vec<(String, DVec2)>,
+}
+
+/// A line on a road, coloured by a quantity.
+#[derive(Debug, Clone, Default)]
+pub struct TrackMap {
+    /// Title of the figure.
+    pub title: String,
+    /// The road under the line.
+    pub road: Road,
+    /// The line to colour (m), from the start line on.
+    pub line_m: Vec<DVec2>,
+    /// One value per point of the line; grey where not finite.
+    pub values: Vec<f64>,
+    /// The quantity, as in `speed`.
+    pub value_label: String,
+    /// Its unit, as in `m/s`.
+    pub value_unit: String,
 }
 
 /// Room around the circuit for names (px).
@@ -58,64 +65,66 @@ impl View {
     }
 }
 
-/// Draws a circuit coloured by a quantity to an SVG file, the same scale both ways.
-///
-/// # Errors
-/// [`Error::Input`] when there are fewer than two different finite points, or values of another
-/// number than points; [`Error::Io`] when the file cannot be written.
-pub fn plot_track_map(path: impl AsRef<Path>, map: &TrackMap<'_>) -> Result<()> {
-    let path = path.as_ref();
-    if map.values.len() != map.line_m.len() {
-        return Err(Error::input(
-            path,
-            "values",
-            format!("{} values", map.values.len()),
-            format!("{}, one per point of the line", map.line_m.len()),
-        ));
-    }
-    let all: Vec<DVec2> = [map.line_m, map.left_edge_m, map.right_edge_m]
-        .concat()
-        .into_iter()
-        .filter(|p| p.is_finite())
-        .collect();
-    let low = all.iter().copied().reduce(DVec2::min).unwrap_or_default();
-    let high = all.iter().copied().reduce(DVec2::max).unwrap_or_default();
-    let size = high - low;
-    if map.line_m.len() < 2 || size.max_element() <= 0.0 {
-        return Err(Error::input(
-            path,
-            "line",
-            format!("{} points without any extent", map.line_m.len()),
-            "at least two different finite points",
-        ));
-    }
-    let room = DVec2::new(1200.0 - BAR_ROOM - 2.0 * ROOM.0, 900.0 - TOP - 2.0 * ROOM.1);
-    let px_per_m = (room.x / size.x.max(1e-9)).min(room.y / size.y.max(1e-9));
-    let drawn = size * px_per_m;
-    let title = Type::new(TITLE_PX, INK, Align::Left).bold().width(map.title);
-    let width = (drawn.x + 2.0 * ROOM.0 + BAR_ROOM)
-        .max(title + 48.0)
-        .max(640.0)
-        .ceil();
-    let height = (TOP + drawn.y + 2.0 * ROOM.1).max(420.0).ceil();
-    let view = View {
-        corner: low,
-        px_per_m,
-        bottom: 0.5 * (height + TOP + drawn.y),
-        left: 0.5 * (width - BAR_ROOM - drawn.x),
-    };
-    let range = extent(map.values);
-    draw_to_file(path, (width, height), map.title, |canvas| {
-        draw_road(canvas, map, &view);
-        draw_line(canvas, map, &view, range);
-        let start = draw_start(canvas, map, &view);
-        draw_names(canvas, map, &view, start, DVec2::new(width - BAR_ROOM, height));
-        draw_scale(canvas, &view, size.max_element(), height);
-        if let Some(range) = range {
-            let bar = (width - BAR_ROOM + 24.0, height);
-            draw_colour_bar(canvas, map, range, bar);
+impl TrackMap {
+    /// Draws the circuit to an SVG file, the same scale both ways.
+    ///
+    /// # Errors
+    /// [`Error::Input`] when there are fewer than two different finite points, or values of another
+    /// number than points; [`Error::Io`] when the file cannot be written.
+    pub fn write_svg(&self, path: impl AsRef<Path>) -> Result<()> {
+        let (path, map) = (path.as_ref(), self);
+        if map.values.len() != map.line_m.len() {
+            return Err(Error::input(
+                path,
+                "values",
+                format!("{} values", map.values.len()),
+                format!("{}, one per point of the line", map.line_m.len()),
+            ));
         }
-    })
+        let all: Vec<DVec2> = [&map.line_m[..], &map.road.left_edge_m, &map.road.right_edge_m]
+            .concat()
+            .into_iter()
+            .filter(|p| p.is_finite())
+            .collect();
+        let low = all.iter().copied().reduce(DVec2::min).unwrap_or_default();
+        let high = all.iter().copied().reduce(DVec2::max).unwrap_or_default();
+        let size = high - low;
+        if map.line_m.len() < 2 || size.max_element() <= 0.0 {
+            return Err(Error::input(
+                path,
+                "line",
+                format!("{} points without any extent", map.line_m.len()),
+                "at least two different finite points",
+            ));
+        }
+        let room = DVec2::new(1200.0 - BAR_ROOM - 2.0 * ROOM.0, 900.0 - TOP - 2.0 * ROOM.1);
+        let px_per_m = (room.x / size.x.max(1e-9)).min(room.y / size.y.max(1e-9));
+        let drawn = size * px_per_m;
+        let title = Type::new(TITLE_PX, INK, Align::Left).bold().width(&map.title);
+        let width = (drawn.x + 2.0 * ROOM.0 + BAR_ROOM)
+            .max(title + 48.0)
+            .max(640.0)
+            .ceil();
+        let height = (TOP + drawn.y + 2.0 * ROOM.1).max(420.0).ceil();
+        let view = View {
+            corner: low,
+            px_per_m,
+            bottom: 0.5 * (height + TOP + drawn.y),
+            left: 0.5 * (width - BAR_ROOM - drawn.x),
+        };
+        let range = extent(&map.values);
+        draw_to_file(path, (width, height), &map.title, |canvas| {
+            draw_road(canvas, map, &view);
+            draw_line(canvas, map, &view, range);
+            let start = draw_start(canvas, map, &view);
+            draw_names(canvas, map, &view, start, DVec2::new(width - BAR_ROOM, height));
+            draw_scale(canvas, &view, size.max_element(), height);
+            if let Some(range) = range {
+                let bar = (width - BAR_ROOM + 24.0, height);
+                draw_colour_bar(canvas, map, range, bar);
+            }
+        })
+    }
 }
 
 /// Points far enough apart to be seen apart; runs end where a point is not finite.
@@ -140,9 +149,9 @@ fn runs(points: &[DVec2], view: &View, closed: bool) -> Vec<Vec<(f64, f64)>> {
     all
 }
 
-fn draw_road(canvas: &mut Canvas<'_>, map: &TrackMap<'_>, view: &View) {
-    let left = runs(map.left_edge_m, view, map.closed);
-    let right = runs(map.right_edge_m, view, map.closed);
+fn draw_road(canvas: &mut Canvas<'_>, map: &TrackMap, view: &View) {
+    let left = runs(&map.road.left_edge_m, view, map.road.closed);
+    let right = runs(&map.road.right_edge_m, view, map.road.closed);
     if let ([left], [right]) = (left.as_slice(), right.as_slice()) {
         let around = left.iter().chain(right.iter().rev()).copied();
         canvas.polygon(around, ROAD);
@@ -152,7 +161,7 @@ fn draw_road(canvas: &mut Canvas<'_>, map: &TrackMap<'_>, view: &View) {
     }
 }
 
-fn draw_line(canvas: &mut Canvas<'_>, map: &TrackMap<'_>, view: &View, range: Option<(f64, f64)>) {
+fn draw_line(canvas: &mut Canvas<'_>, map: &TrackMap, view: &View, range: Option<(f64, f64)>) {
     let shade = |value: f64| -> Option<u32> {
         let (low, high) = range?;
         let share = if high > low {
@@ -163,7 +172,7 @@ fn draw_line(canvas: &mut Canvas<'_>, map: &TrackMap<'_>, view: &View, range: Op
         value.is_finite().then(|| (share * SHADES).round() as u32)
     };
     let n = map.line_m.len();
-    let steps = if map.closed { n } else { n - 1 };
+    let steps = if map.road.closed { n } else { n - 1 };
     let mut run: Vec<(f64, f64)> = Vec::new();
     let mut colour = None;
     let flush = |canvas: &mut Canvas<'_>, run: &mut Vec<(f64, f64)>, shade: Option<u32>| {
@@ -199,7 +208,7 @@ fn draw_line(canvas: &mut Canvas<'_>, map: &TrackMap<'_>, view: &View, range: Op
 }
 
 /// The start line and an arrow the way the lap goes; returns where they stand (px).
-fn draw_start(canvas: &mut Canvas<'_>, map: &TrackMap<'_>, view: &View) -> Option<[DVec2; 2]> {
+fn draw_start(canvas: &mut Canvas<'_>, map: &TrackMap, view: &View) -> Option<[DVec2; 2]> {
     let start = view.at(*map.line_m.first()?);
     // Neighbouring points may lie closer than rounding can tell a direction from.
     let ahead = map
@@ -209,7 +218,7 @@ fn draw_start(canvas: &mut Canvas<'_>, map: &TrackMap<'_>, view: &View) -> Optio
         .find(|p| p.distance(start) > 2.0)?;
     let along = (ahead - start).normalize_or_zero();
     let across = along.perp();
-    let half = match (map.left_edge_m.first(), map.right_edge_m.first()) {
+    let half = match (map.road.left_edge_m.first(), map.road.right_edge_m.first()) {
         (Some(&l), Some(&r)) => (0.5 * l.distance(r) * view.px_per_m).clamp(5.0, 30.0),
         _ => 5.0,
     } + 5.0;
@@ -247,12 +256,12 @@ impl Block {
 /// Puts each name beside its place where it covers neither the road nor another name.
 fn draw_names(
     canvas: &mut Canvas<'_>,
-    map: &TrackMap<'_>,
+    map: &TrackMap,
     view: &View,
     start: Option<[DVec2; 2]>,
     limits: DVec2,
 ) {
-    let road: Vec<DVec2> = runs(map.line_m, view, map.closed)
+    let road: Vec<DVec2> = runs(&map.line_m, view, map.road.closed)
         .concat()
         .into_iter()
         .step_by(3)
@@ -264,7 +273,11 @@ fn draw_names(
     });
     let mut taken: Vec<Block> = arrow.into_iter().collect();
     let look = Type::new(LABEL_PX, INK, Align::Centre);
-    let named = map.names.iter().map(|&(name, place)| (name, view.at(place)));
+    let named = map
+        .road
+        .names
+        .iter()
+        .map(|(name, place)| (name.as_str(), view.at(*place)));
     let first = start.map(|[at, _]| ("start", at));
     let all: Vec<(&str, DVec2)> = first.into_iter().chain(named).collect();
     let places: Vec<DVec2> = all.iter().map(|(_, place)| *place).collect();
@@ -349,12 +362,7 @@ fn draw_scale(canvas: &mut Canvas<'_>, view: &View, extent_m: f64, height: f64) 
     );
 }
 
-fn draw_colour_bar(
-    canvas: &mut Canvas<'_>,
-    map: &TrackMap<'_>,
-    range: (f64, f64),
-    (left, height): (f64, f64),
-) {
+fn draw_colour_bar(canvas: &mut Canvas<'_>, map: &TrackMap, range: (f64, f64), (left, height): (f64, f64)) {
     let (top, bottom) = (TOP + 40.0, height - 50.0);
     let right = left + 16.0;
     let axis = Axis::linear(range, (bottom, top));
@@ -372,7 +380,7 @@ fn draw_colour_bar(
         canvas.line((right, y), (right + 4.0, y), INK, 0.8);
         canvas.text(&label, (right + 8.0, y), Type::new(TICK_PX, INK, Align::Left));
     }
-    let text = with_unit(map.value_label, map.value_unit);
+    let text = with_unit(&map.value_label, &map.value_unit);
     let look = Type::new(LABEL_PX, INK, Align::Centre);
     let middle = left + 24.0;
     canvas.text(&text, (middle, top - 18.0), look);

@@ -120,7 +120,7 @@ impl<const N: usize> Real for Dual<N> {
     #[inline(always)]
     fn sqrt(self) -> Self {
         let root = self.value.sqrt();
-        // At nought the slope is infinite; a nought there keeps 0 * inf out of the gradient.
+        // At zero the slope is infinite; a zero there keeps 0 * inf out of the gradient.
         let slope = if root > 0.0 { 0.5 / root } else { 0.0 };
         self.chain(root, slope)
     }

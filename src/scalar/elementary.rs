@@ -40,7 +40,7 @@ pub trait SinglePrecision: Real {
 const PI_HIGH: f64 = 3.140625;
 const PI_LOW: f64 = 9.676_535_897_932_385e-4;
 
-/// `sin r` for `r` within a quarter turn either side of nought; relative error 6.2e-9.
+/// `sin r` for `r` within a quarter turn either side of zero; relative error 6.2e-9.
 #[inline(always)]
 fn sine_polynomial<R: SinglePrecision>(r: R) -> R {
     let t = r * r;
@@ -51,7 +51,7 @@ fn sine_polynomial<R: SinglePrecision>(r: R) -> R {
     r + r * (p * t)
 }
 
-/// `cos r` for `r` within a quarter turn either side of nought; relative error of its departure from one 8e-10.
+/// `cos r` for `r` within a quarter turn either side of zero; relative error of its departure from one 8e-10.
 #[inline(always)]
 fn cosine_polynomial<R: SinglePrecision>(r: R) -> R {
     let t = r * r;
@@ -63,7 +63,7 @@ fn cosine_polynomial<R: SinglePrecision>(r: R) -> R {
     R::lit(1.0) + t * p
 }
 
-/// `sin(pi r)` for `r` within one half either side of nought; relative error 2.9e-8, nearly all of it from the
+/// `sin(pi r)` for `r` within one half either side of zero; relative error 2.9e-8, nearly all of it from the
 /// rounding of pi.
 #[inline(always)]
 fn sine_pi_polynomial<R: SinglePrecision>(r: R) -> R {
@@ -173,7 +173,7 @@ pub fn ln(x: f32) -> f32 {
     (fraction + exponent * -2.121_944_4e-4) + exponent * 0.693_359_4
 }
 
-/// `base` to the power of `exponent`; nought for a base that is not positive. The relative error grows with the
+/// `base` to the power of `exponent`; zero for a base that is not positive. The relative error grows with the
 /// magnitude of the result's logarithm.
 #[inline(always)]
 pub fn power(base: f32, exponent: f32) -> f32 {

@@ -9,11 +9,11 @@ pub trait Lookup: Real {
     type Place: Copy;
 
     /// The row that `self` counted in rows falls into, of `rows` rows of `width` figures, and how far it is beyond
-    /// the row's start, from nought to one. Arguments off either end (and what is no number) go to that end.
+    /// the row's start, from zero to one. Arguments off either end (and what is not a number) go to that end.
     fn place(self, rows: usize, width: usize) -> (Self::Place, Self);
 
-    /// The greatest whole number that is not above `self`, held between nought and `most`, which is below 2^24; nought for
-    /// what is no number.
+    /// The greatest whole number that is not above `self`, held between zero and `most`, which is below 2^24; zero for
+    /// what is not a number.
     fn whole(self, most: usize) -> Self;
 
     /// The figure `column` places behind `place`, from a table that is not empty; never beyond its end.

@@ -1,9 +1,11 @@
 //! The archive of solutions that nothing found so far dominates.
 
 use super::Front;
-use super::metrics::{Columns, non_dominated};
-use super::settings::Truncation;
+use super::metrics::{Columns, dominates, non_dominated};
+use super::settings::{MopsoSettings, Truncation, setting};
 use super::space::Space;
+use crate::error::Result;
+use crate::evaluate::FAILED_COST;
 use serde::{Deserialize, Serialize};
 
 /// A bounded set of non-dominated solutions; all objectives are minimised.
@@ -28,16 +30,23 @@ pub struct Archive {
     fixed: bool,
 }
 
-/// Whether `a` is at least as good as `b` in every objective and better in one.
-pub fn dominates(a: &[f64], b: &[f64]) -> bool {
-    let mut better = false;
-    for (x, y) in a.iter().zip(b) {
-        if x > y {
-            return false;
+impl MopsoSettings {
+    /// The empty archive of a swarm of so many objectives.
+    ///
+    /// # Errors
+    /// As [`MopsoSettings::validate`], and for a reference of another length.
+    pub(super) fn empty_archive(&self, objectives: usize) -> Result<Archive> {
+        self.validate()?;
+        let archive = Archive::new(self.archive, self.truncation);
+        match &self.reference {
+            None => Ok(archive),
+            Some(reference) if reference.len() == objectives => Ok(archive.measured_from(reference.clone())),
+            Some(reference) => {
+                let expected = format!("a number for each of {objectives} objectives");
+                Err(setting("reference", format!("{reference:?}"), &expected))
+            }
         }
-        better |= x < y;
     }
-    better
 }
 
 /// The reference point lies this share of the archive's range beyond its worst values, so that extremes count.
@@ -59,10 +68,10 @@ impl Archive {
         }
     }
 
-    /// The same with contributions measured up to `reference`, for one to three objectives. The hypervolume up to there then
-    /// never falls while solutions violate nothing: whoever leaves contributes no more than the newcomer. The ends of the
-    /// front have no privilege, and what does not better the reference leaves first. Without it the reference moves with the
-    /// members and the ends stay.
+    /// The same with contributions measured up to `reference`, for one to three objectives. The hypervolume up to the reference
+    /// then never falls while solutions are feasible: a member that leaves contributes no more than the newcomer. The ends of the
+    /// front have no privilege, and solutions that are no better than the reference leave first. Without a fixed reference, the
+    /// reference moves with the members and the ends stay.
     pub fn measured_from(self, reference: Vec<f64>) -> Self {
         Self {
             truncation: Truncation::Contribution,
@@ -82,7 +91,7 @@ impl Archive {
         self.objectives.is_empty()
     }
 
-    /// By how much all members violate the constraints; nought once something feasible is known, infinite for an empty
+    /// By how much all members violate the constraints; zero once something feasible is known, infinite for an empty
     /// archive.
     pub fn violation(&self) -> f64 {
         self.violation
@@ -93,11 +102,10 @@ impl Archive {
         self.insert_violating(position, objectives, 0.0)
     }
 
-    /// Takes a solution in unless a member dominates or equals it; members that it dominates leave. If there
-    /// is one too many then, the one leaves that would be missed least and is not the best in any objective, which
-    /// may be the new one. What violates the constraints less is better than what violates them more, whatever the
-    /// objectives (Deb's rules), so that all members violate them by as much. Objectives that are not finite do not come
-    /// in. Returns whether it came in.
+    /// Inserts a solution unless a member dominates or equals it; members that it dominates leave. If the archive is then too
+    /// full, the member leaves that contributes least and is not the best in any objective; this may be the new one. A smaller
+    /// violation of the constraints beats a larger one, whatever the objectives (Deb's rules), so all members violate them
+    /// equally. Solutions with objectives that are not finite are refused. Returns whether the solution was inserted.
     pub fn insert_violating(&mut self, position: &[f64], objectives: &[f64], violation: f64) -> bool {
         if objectives.iter().any(|x| !x.is_finite()) || !self.reached(violation) {
             return false;
@@ -127,8 +135,8 @@ impl Archive {
         true
     }
 
-    /// Takes in solutions with their objectives all at once: what no other of them and no member dominates or equals
-    /// comes in, and then those leave, one at a time, that would be missed least.
+    /// Inserts solutions with their objectives all at once: first those that no other solution and no member dominates or equals,
+    /// then the members that contribute least leave, one at a time.
     pub(super) fn insert_all(&mut self, solutions: Vec<(Vec<f64>, Vec<f64>)>, violation: f64) {
         if solutions.is_empty() || !self.reached(violation) {
             return;
@@ -165,7 +173,7 @@ impl Archive {
         }
     }
 
-    /// Whether a violation is as small as the archive's. If it is smaller the members leave, whoever comes.
+    /// Whether a violation is as small as the archive's. If it is smaller, the members leave.
     fn reached(&mut self, violation: f64) -> bool {
         if !(violation <= self.violation && violation.is_finite()) {
             return false;
@@ -180,7 +188,7 @@ impl Archive {
         true
     }
 
-    /// Lets the member go that would be missed least and is not the best in any objective; its objectives.
+    /// Removes the member that contributes least and is not the best in any objective; returns its objectives.
     fn drop_least(&mut self) -> Vec<f64> {
         let mut worth = self.worth();
         // The ends of a front are what its users look for first.
@@ -202,10 +210,10 @@ impl Archive {
         left
     }
 
-    /// The least value of an objective; infinite without members.
-    pub fn least(&self, objective: usize) -> f64 {
-        let values = self.objectives.iter().map(|m| m[objective]);
-        values.fold(f64::INFINITY, f64::min)
+    /// The least value of each of so many objectives; [`FAILED_COST`] without members.
+    pub fn best(&self, objectives: usize) -> Vec<f64> {
+        let least = |k: usize| self.objectives.iter().map(|m| m[k]).fold(FAILED_COST, f64::min);
+        (0..objectives).map(least).collect()
     }
 
     /// The members, their positions scaled to the variables' units.
@@ -216,7 +224,7 @@ impl Archive {
         }
     }
 
-    /// How much the archive would miss each member, by the measure that it is truncated by.
+    /// How much each member contributes, by the measure that truncation uses.
     pub fn worth(&self) -> Vec<f64> {
         if self.by_contribution() {
             return self.shares.iter().map(|s| s.0).collect();
@@ -241,7 +249,7 @@ impl Archive {
         }
     }
 
-    /// Brings the shares up to date after `change` came or went.
+    /// Updates the shares after `change` came or went.
     fn refresh(&mut self, change: &[f64]) {
         let beyond = |k: usize| {
             let (low, high) = self.range(k);
@@ -282,7 +290,7 @@ impl Archive {
     }
 
     /// Distance of each member to its nearest neighbour, each objective as a share of its range; ties, which
-    /// every nearest pair is, by the next neighbours. As ranks, from nought.
+    /// every nearest pair is, by the next neighbours. As ranks, from zero.
     fn remoteness(&self) -> Vec<f64> {
         let n = self.len();
         let width = self.objectives.first().map_or(0, Vec::len);

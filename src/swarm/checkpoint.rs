@@ -1,10 +1,10 @@
-//! States on disk, so that a run goes on where it was broken off, bit for bit.
+//! States on disk: a run resumes where it stopped, bit for bit.
 //!
 //! A checkpoint is a file of its own kind: `LAPSWARM`, the format's version (`u32`, little endian like all numbers in
 //! it), the length (`u32`) and the name of the kind of state, the length (`u64`) of the state, the state as `postcard`
 //! writes it, and a CRC-32 of all of that. Floats keep every bit, infinities and all. A file that is foreign, newer,
 //! torn or of another state is refused. It is written beside its place and then moved there, so that a run that is
-//! broken off while it writes leaves the last one whole.
+//! interrupted while it writes leaves the last one whole.
 
 use super::device::DeviceState;
 use super::{
@@ -155,7 +155,8 @@ fn load_within<T: Checkpoint>(path: &Path, limit: u64) -> Result<T> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::study::journal::Journal;
+    use crate::study::framework::State;
+    use crate::study::framework::journal::Journal;
 
     #[test]
     fn a_state_that_does_not_fit_is_not_read() {
@@ -170,6 +171,7 @@ mod tests {
             assert!(said.contains(part), "{said}");
         }
         let journal = load_within::<Journal>(&path, 3 << 20).expect("it fits");
-        assert_eq!(journal.settings::<String>("study").expect("its settings"), text);
+        let settings: String = journal.settings("study").expect("its settings");
+        assert_eq!(settings, text);
     }
 }

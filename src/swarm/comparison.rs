@@ -52,7 +52,7 @@ const FRONT_POINTS: usize = 2000;
 /// The optimiser of that name for `problem` at the budget of the comparison.
 ///
 /// # Errors
-/// [`Error::Input`] if there is none of that name for so many objectives.
+/// [`Error::Input`] if no optimiser of that name exists for this number of objectives.
 pub fn optimiser(name: &str, problem: &Problem, seed: u64) -> Result<Box<dyn Optimiser + Send>> {
     let (population, evaluations) = budget(problem);
     let iterations = evaluations / population;
@@ -145,10 +145,10 @@ pub struct Sizes {
     pub seed: u64,
 }
 
-/// The optimiser of that name for several objectives. Its first candidates are those of `start`, as far as they go.
+/// The optimiser of that name for several objectives. Its first candidates are those of `start`.
 ///
 /// # Errors
-/// [`Error::Input`] if there is none of that name, and those of its settings.
+/// [`Error::Input`] if no optimiser of that name exists, and those of its settings.
 pub fn several(
     name: &str,
     problem: &Problem,
@@ -203,11 +203,11 @@ pub fn several(
 pub struct Score {
     /// Hypervolume of what was found; for one objective how far the best cost is from the optimum's.
     pub quality: f64,
-    /// IGD+; nothing for one objective.
+    /// IGD+; `None` for one objective.
     pub igd_plus: Option<f64>,
 }
 
-/// Runs an algorithm on a problem once for each of the seeds from one to `seeds`, a run to a thread.
+/// Runs an algorithm on a problem once for each seed from one to `seeds`, each run in a thread.
 ///
 /// # Errors
 /// Those of [`optimiser`].
@@ -271,7 +271,10 @@ mod tests {
 
     #[test]
     fn all_names_are_known() {
-        for (problem, names) in [("zdt1", MULTI_OBJECTIVE), ("sphere", SINGLE_OBJECTIVE)] {
+        for (problem, names) in [
+            ("zdt1", MULTI_OBJECTIVE.as_slice()),
+            ("sphere", &SINGLE_OBJECTIVE),
+        ] {
             let problem = TestProblem::by_name(problem).unwrap();
             for name in names {
                 optimiser(name, problem.problem(), 1).unwrap();

@@ -9,7 +9,7 @@
 use super::motion::{Particles, Purpose};
 use super::settings::{BoundHandling, Constriction, PsoSettings, Randomness, Schedule, setting};
 use super::space::Space;
-use super::{Front, Optimiser};
+use super::{Counters, Front, Optimiser};
 use crate::error::Result;
 use crate::evaluate::{Evaluation, FAILED_COST, Problem};
 use crate::random::Random;
@@ -110,8 +110,7 @@ pub struct CooperativeSwarm {
     cost: f64,
     /// Turns that the groups have had; none before there is a context that can be evaluated.
     turns: usize,
-    iteration: usize,
-    evaluations: u64,
+    counters: Counters,
 }
 
 impl CooperativeSwarm {
@@ -154,8 +153,7 @@ impl CooperativeSwarm {
             context,
             cost: FAILED_COST,
             turns: 0,
-            iteration: 0,
-            evaluations: 0,
+            counters: Counters::default(),
         })
     }
 
@@ -205,12 +203,13 @@ impl Optimiser for CooperativeSwarm {
                 }
             }
         }
-        self.evaluations += costs.len() as u64;
-        self.iteration += 1;
+        self.counters.told(costs.len());
         if self.cost >= FAILED_COST {
             for group in &mut self.groups {
                 for particle in 0..group.particles.count {
-                    group.particles.rescatter(particle, self.iteration, group.random);
+                    group
+                        .particles
+                        .rescatter(particle, self.counters.iteration, group.random);
                 }
             }
             return;
@@ -223,16 +222,12 @@ impl Optimiser for CooperativeSwarm {
         }
     }
 
-    fn iteration(&self) -> usize {
-        self.iteration
+    fn counters(&self) -> Counters {
+        self.counters
     }
 
     fn planned_iterations(&self) -> usize {
         self.settings.motion.iterations
-    }
-
-    fn evaluations(&self) -> u64 {
-        self.evaluations
     }
 
     fn front(&self) -> Front {

@@ -5,49 +5,24 @@
 //! processor does, the swarm is the one that [`super::Mopso`] keeps in lanes, bit for bit.
 
 use super::archive::Archive;
+use super::mopso::blocks::Generation;
 use super::mopso::filter::{Point, front};
-use super::mopso::flock::Generation;
-use super::mopso::sieve::{PER_PLACE, sieve};
+use super::mopso::thinning::{PER_PLACE, thinned};
 use super::mopso::{leaders, learn_from};
 use super::settings::MopsoSettings;
 use super::space::Space;
-use super::{Front, Progress};
+use super::{Counters, Front, Progress};
 use crate::error::{Error, Result};
 use crate::evaluate::gpu::shader::{swarm, swarm_gather};
 use crate::evaluate::gpu::{Binding, GpuContext, Kernel};
-use crate::evaluate::{BackendInfo, FAILED_COST, FailureCounts, Problem};
+use crate::evaluate::resident::groups;
+use crate::evaluate::{BackendInfo, FailureCounts, Problem};
 use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
 use std::sync::Arc;
 use wgpu::BufferUsages as Usage;
 
-pub use super::mopso::flock::BLOCK;
-
-/// Objectives of particles whose positions are on a device.
-pub trait DeviceObjectives {
-    /// The problem that they are of.
-    fn problem(&self) -> &Problem;
-
-    /// Writes the objectives of `particles` particles. Both buffers are in blocks of [`BLOCK`] particles: a coordinate of
-    /// all particles of a block in a row of `f32`, the coordinates of a block one after the other. Positions are
-    /// in the unit cube of those variables whose bounds differ.
-    ///
-    /// # Errors
-    /// [`Error::Device`] if the device fails.
-    fn evaluate(
-        &mut self,
-        particles: usize,
-        position: &wgpu::Buffer,
-        objectives: &wgpu::Buffer,
-    ) -> Result<()>;
-}
-
-/// Workgroups along two dimensions, for a particle to a lane.
-pub(crate) fn groups(particles: usize) -> (u32, u32) {
-    let all = particles.div_ceil(BLOCK);
-    let wide = all.clamp(1, 1 << 15);
-    (wide as u32, all.div_ceil(wide) as u32)
-}
+pub use crate::evaluate::resident::{BLOCK, DeviceObjectives};
 
 /// Particles whose own front stands in for the archive in the first generation.
 const SAMPLE: usize = 64 * BLOCK;
@@ -73,8 +48,7 @@ pub struct DeviceState {
     best_position: Vec<f32>,
     best_objectives: Vec<f32>,
     archive: Archive,
-    iteration: usize,
-    evaluations: u64,
+    counters: Counters,
 }
 
 struct Kernels {
@@ -110,8 +84,7 @@ pub struct DeviceMopso {
     kernels: Kernels,
     buffers: Buffers,
     archive: Archive,
-    iteration: usize,
-    evaluations: u64,
+    counters: Counters,
 }
 
 impl DeviceMopso {
@@ -227,8 +200,7 @@ impl DeviceMopso {
             context,
             kernels,
             buffers,
-            iteration: 0,
-            evaluations: 0,
+            counters: Counters::default(),
         };
         Ok((swarm, scatter))
     }
@@ -256,7 +228,7 @@ impl DeviceMopso {
         Ok(())
     }
 
-    /// The whole swarm, read back from the device: what [`DeviceMopso::from_state`] goes on with.
+    /// The whole swarm, read back from the device, for [`DeviceMopso::from_state`].
     ///
     /// # Errors
     /// [`Error::Device`] if the device fails.
@@ -273,12 +245,11 @@ impl DeviceMopso {
             space: self.space.clone(),
             objectives: self.objectives,
             archive: self.archive.clone(),
-            iteration: self.iteration,
-            evaluations: self.evaluations,
+            counters: self.counters,
         })
     }
 
-    /// A swarm that goes on from `state` on `context`'s device.
+    /// A swarm resumed from `state` on `context`'s device.
     ///
     /// # Errors
     /// [`Error::Device`] if the device cannot hold it.
@@ -300,18 +271,17 @@ impl DeviceMopso {
             swarm.context.write(buffer, bytemuck::cast_slice(rows));
         }
         Ok(Self {
-            iteration: state.iteration,
-            evaluations: state.evaluations,
+            counters: state.counters,
             ..swarm
         })
     }
 
-    /// What does the work.
+    /// The device that does the work.
     pub fn backend(&self) -> BackendInfo {
         self.context.backend_info()
     }
 
-    /// Memory of the swarm on the device, bytes to a particle.
+    /// Memory of the swarm on the device, bytes for each particle.
     pub fn bytes_per_particle(&self) -> usize {
         // Objectives stand there twice, and each particle has a place in the list of candidates and in its copy.
         (3 * self.space.dimensions() + 2 * self.objectives) * size_of::<f32>() + 16
@@ -320,7 +290,7 @@ impl DeviceMopso {
     /// Runs a kernel of the swarm for the present iteration against so many members.
     fn dispatch(&self, kernel: &Kernel, members: usize) -> Result<()> {
         let sizes = (self.space.dimensions(), self.objectives, members);
-        let generation = Generation::new(&self.settings, sizes, self.iteration);
+        let generation = Generation::new(&self.settings, sizes, self.counters.iteration);
         self.context
             .write(&self.buffers.generation, bytemuck::bytes_of(&generation));
         let (x, y) = groups(self.settings.motion.population);
@@ -336,21 +306,20 @@ impl DeviceMopso {
     fn read<T: bytemuck::Pod>(&self, from: &wgpu::Buffer, bytes: u64) -> Result<Vec<T>> {
         let readback = &self.buffers.readback;
         self.context
-            .run(|encoder| encoder.copy_buffer_to_buffer(from, 0, readback, 0, bytes))?;
-        self.context.read(readback, bytes, bytemuck::pod_collect_to_vec)
+            .read_back((from, 0), readback, bytes, bytemuck::pod_collect_to_vec)
     }
 
-    /// The front of the first particles, for want of an archive.
+    /// The front of the first particles, used while the archive is empty.
     fn sample(&self) -> Result<Vec<Point>> {
         let width = self.objectives;
         let n = self.settings.motion.population.min(SAMPLE);
         let lanes = n.next_multiple_of(BLOCK);
         let rows: Vec<f32> = self.read(&self.buffers.objectives, (lanes * width * 4) as u64)?;
         let plain = row_major(&rows, n, width);
-        Ok(sieve(learn_from(&plain, width), width, SAMPLE_FRONT))
+        Ok(thinned(learn_from(&plain, width), width, SAMPLE_FRONT))
     }
 
-    /// The particles that the archive should see.
+    /// The particles that may enter the archive.
     fn found(&self) -> Result<Vec<Point>> {
         let count = self.read::<u32>(&self.buffers.found, 4)?[0];
         let count = u64::from(count).min(self.settings.motion.population as u64);
@@ -432,7 +401,7 @@ impl DeviceMopso {
         let mut points = self.found()?;
         // They were among the members, so that the list leaves them out.
         points.extend(sample);
-        let points = sieve(
+        let points = thinned(
             front(points, self.objectives),
             self.objectives,
             PER_PLACE * self.settings.archive,
@@ -444,8 +413,7 @@ impl DeviceMopso {
         };
         let solutions = points.iter().zip(rows.chunks_exact(d)).map(solution);
         self.archive.insert_all(solutions.collect(), 0.0);
-        self.evaluations += self.settings.motion.population as u64;
-        self.iteration += 1;
+        self.counters.told(self.settings.motion.population);
         self.context.write(
             &self.buffers.archive,
             bytemuck::cast_slice(&leaders(&self.archive)),
@@ -453,7 +421,7 @@ impl DeviceMopso {
         self.dispatch(&self.kernels.advance, self.archive.len())
     }
 
-    /// Steps until the planned iterations are done or `observe` breaks off.
+    /// Steps until the planned iterations are done or `observe` returns `Break`.
     ///
     /// # Errors
     /// Those of [`DeviceMopso::step`].
@@ -462,11 +430,11 @@ impl DeviceMopso {
         objectives: &mut dyn DeviceObjectives,
         mut observe: impl FnMut(&Progress) -> ControlFlow<()>,
     ) -> Result<()> {
-        while self.iteration < self.settings.motion.iterations {
+        while self.counters.iteration < self.settings.motion.iterations {
             self.step(objectives)?;
             let progress = Progress {
-                iteration: self.iteration,
-                evaluations: self.evaluations,
+                iteration: self.counters.iteration,
+                evaluations: self.counters.evaluations,
                 best: self.best(),
                 median: None,
                 failed: 0,
@@ -509,19 +477,17 @@ impl DeviceMopso {
 
     /// Iterations done.
     pub fn iteration(&self) -> usize {
-        self.iteration
+        self.counters.iteration
     }
 
     /// Candidates evaluated.
     pub fn evaluations(&self) -> u64 {
-        self.evaluations
+        self.counters.evaluations
     }
 
     /// The least value seen of each objective.
     pub fn best(&self) -> Vec<f64> {
-        (0..self.objectives)
-            .map(|k| self.archive.least(k).min(FAILED_COST))
-            .collect()
+        self.archive.best(self.objectives)
     }
 
     /// The archive.

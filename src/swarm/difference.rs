@@ -8,7 +8,7 @@
 
 use super::motion::{Particles, Purpose};
 use super::settings::setting;
-use super::{Front, Optimiser, Welcome};
+use super::{Counters, Front, Optimiser, Welcome};
 use crate::error::Result;
 use crate::evaluate::{Evaluation, Problem};
 use crate::random::Random;
@@ -70,8 +70,7 @@ pub struct DifferenceSwarm {
     /// Scale and share of coordinates of each particle, and those of its present try.
     control: Vec<[f64; 2]>,
     tried: Vec<[f64; 2]>,
-    iteration: usize,
-    evaluations: u64,
+    counters: Counters,
 }
 
 impl DifferenceSwarm {
@@ -92,8 +91,7 @@ impl DifferenceSwarm {
             random,
             particles,
             settings,
-            iteration: 0,
-            evaluations: 0,
+            counters: Counters::default(),
         })
     }
 
@@ -121,7 +119,7 @@ impl DifferenceSwarm {
     }
 
     fn advance(&mut self) {
-        let when = self.iteration as u32;
+        let when = self.counters.iteration as u32;
         for particle in 0..self.settings.population {
             let who = particle as u32;
             let uniform = |index: usize| {
@@ -161,7 +159,7 @@ impl DifferenceSwarm {
 
     /// Three different particles, none of them this one.
     fn three_others(&self, particle: usize) -> [usize; 3] {
-        let (when, who) = (self.iteration as u32, particle as u32);
+        let (when, who) = (self.counters.iteration as u32, particle as u32);
         let mut taken = [particle, 0, 0, 0];
         for k in 0..3 {
             let free = self.settings.population - 1 - k;
@@ -208,21 +206,16 @@ impl Optimiser for DifferenceSwarm {
                 self.home[range.clone()].copy_from_slice(&self.particles.position[range]);
             }
         }
-        self.evaluations += self.settings.population as u64;
-        self.iteration += 1;
+        self.counters.told(self.settings.population);
         self.advance();
     }
 
-    fn iteration(&self) -> usize {
-        self.iteration
+    fn counters(&self) -> Counters {
+        self.counters
     }
 
     fn planned_iterations(&self) -> usize {
         self.settings.iterations
-    }
-
-    fn evaluations(&self) -> u64 {
-        self.evaluations
     }
 
     fn front(&self) -> Front {

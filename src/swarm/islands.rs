@@ -1,20 +1,20 @@
 //! Several swarms on one problem, evaluated together: seeds side by side, with or without migration.
 //!
 //! All islands are asked at once, so that a device is given one large population and not many small ones. Every few
-//! iterations some of what each has found may move to the next, in a ring (Cohoon, Hegde, Martin, Richards, *Punctuated
-//! equilibria: a parallel genetic algorithm*, ICGA 1987). It is the same run whatever the threads, and without
-//! migration each island is what it would be alone.
+//! iterations some solutions of each island may move to the next, in a ring (Cohoon, Hegde, Martin, Richards, *Punctuated
+//! equilibria: a parallel genetic algorithm*, ICGA 1987). The run does not depend on the threads. Without migration each
+//! island gives the run that it would give alone.
 
 use super::settings::setting;
-use super::{Front, Optimiser};
+use super::{Counters, Front, Optimiser};
 use crate::error::Result;
 use crate::evaluate::Evaluation;
 use crate::swarm::metrics::non_dominated;
 use serde::{Deserialize, Serialize};
 
-/// An optimiser that takes in what others have found.
+/// An optimiser that accepts solutions of others.
 pub trait Welcome: Optimiser {
-    /// What its front violates, if its objectives do not say so themselves.
+    /// The violation of constraints of its front, if its objectives do not include it.
     fn violation(&self) -> f64 {
         0.0
     }
@@ -24,7 +24,7 @@ pub trait Welcome: Optimiser {
     fn welcome(&mut self, migrants: &Front, violation: f64);
 }
 
-/// Who moves between islands, and when.
+/// How many solutions move between islands, and when.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Migration {
     /// Iterations between two moves.
@@ -46,10 +46,10 @@ pub struct Islands<O> {
 }
 
 impl<O: Welcome> Islands<O> {
-    /// Of these swarms, all on `problem`; one after the other in each population.
+    /// Islands of these swarms, all on `problem`, in this order in each population.
     ///
     /// # Errors
-    /// [`crate::Error::Input`] if there is none, or if migration is never or of nobody.
+    /// [`crate::Error::Input`] if there are no swarms, or if migration has a period or a count of zero.
     pub fn new(
         problem: &crate::evaluate::Problem,
         islands: Vec<O>,
@@ -137,8 +137,11 @@ impl<O: Welcome> Optimiser for Islands<O> {
         }
     }
 
-    fn iteration(&self) -> usize {
-        self.iteration
+    fn counters(&self) -> Counters {
+        Counters {
+            iteration: self.iteration,
+            evaluations: self.islands.iter().map(Optimiser::evaluations).sum(),
+        }
     }
 
     fn planned_iterations(&self) -> usize {
@@ -150,17 +153,13 @@ impl<O: Welcome> Optimiser for Islands<O> {
         self.islands.iter().all(Optimiser::done)
     }
 
-    fn evaluations(&self) -> u64 {
-        self.islands.iter().map(Optimiser::evaluations).sum()
-    }
-
     fn best(&self) -> Vec<f64> {
         let all: Vec<Vec<f64>> = self.islands.iter().map(Optimiser::best).collect();
         let least = |k: usize| all.iter().map(|best| best[k]).fold(f64::INFINITY, f64::min);
         (0..all[0].len()).map(least).collect()
     }
 
-    /// What no island has found anything better than.
+    /// The solutions of all islands that no other island dominates.
     fn front(&self) -> Front {
         let mut all = Front::default();
         let least = self

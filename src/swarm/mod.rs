@@ -1,22 +1,22 @@
-//! Swarms and their kin for one objective and for several, by ask and tell or in one run.
+//! Swarms and other population-based optimisers for one objective and for several, by ask and tell or in one run.
 //!
 //! | Objectives | Optimiser | |
 //! |---|---|---|
-//! | one | [`HybridSwarm`] | explores, then gathers; the choice where nothing is known |
+//! | one | [`HybridSwarm`] | explores, then gathers; the default choice for an unknown problem |
 //! | one | [`Pso`] | particle swarm, with or without difference moves |
 //! | one | [`CovarianceSwarm`] | CMA: learns the shape of a valley, with or without restarts |
 //! | one | [`DifferenceSwarm`] | differential evolution that adapts itself |
 //! | one | [`CooperativeSwarm`] | CPSO-S_K: a swarm to each group of variables |
 //! | more | [`Mopso`] | particle swarm with an archive: the default, SMPSO and the thesis's are settings of it |
-//! | more | [`device::DeviceMopso`] | the same on a device, where its problem is there too |
+//! | more | [`device::DeviceMopso`] | the same on a device, for problems that are evaluated there |
 //! | more | [`Nsga2`] | the genetic algorithm that swarms are compared with |
 //!
-//! [`Islands`] are several swarms in one population, with or without migration. [`checkpoint`] keeps the state of any of
-//! them in a file. [`comparison`] runs them on [`problems`] whose answers are known and judges them by [`metrics`].
+//! [`Islands`] are several swarms in one population, with or without migration. [`checkpoint`] keeps the state of any
+//! optimiser in a file. [`comparison`] runs optimisers on [`problems`] with known answers and judges them by [`metrics`].
 //!
-//! Positions live in the unit cube and are scaled to the bounds when asked for, so a swarm does not notice where
-//! its bounds lie. Random numbers are functions of seed, iteration, particle and purpose ([`crate::random`]), so
-//! the same seed gives the same run whatever the threads.
+//! Positions live in the unit cube and are scaled to the bounds when asked for, so results do not depend on where the
+//! bounds lie. Random numbers are functions of seed, iteration, particle and purpose ([`crate::random`]), so
+//! the same seed gives the same run with any number of threads.
 //!
 //! References, as the settings cite them:
 //! 1. Kennedy, Eberhart, *Particle swarm optimization*, ICNN 1995.
@@ -37,7 +37,6 @@ mod cooperative;
 mod covariance;
 pub mod device;
 mod difference;
-mod hybrid;
 mod islands;
 pub mod metrics;
 mod mopso;
@@ -47,13 +46,13 @@ pub mod problems;
 mod pso;
 mod settings;
 mod space;
+mod two_phase;
 mod windows;
 
 pub use archive::Archive;
 pub use cooperative::{CooperativeSettings, CooperativeSwarm};
 pub use covariance::{Beyond, CovarianceSettings, CovarianceSwarm, Restarts};
 pub use difference::{DifferenceSettings, DifferenceSwarm};
-pub use hybrid::{HybridSettings, HybridSwarm};
 pub use islands::{Islands, Migration, Welcome};
 pub use mopso::{Generation, MANY, Mopso};
 pub use nsga2::{Nsga2, Nsga2Settings};
@@ -62,13 +61,32 @@ pub use settings::{
     BoundHandling, Constriction, DRAWN_PULLS, Leaders, MopsoSettings, Mutation, PsoSettings, Randomness,
     Schedule, Truncation,
 };
+pub use two_phase::{HybridSettings, HybridSwarm};
 pub use windows::{WindowSettings, WindowSwarm};
 
 use crate::error::Result;
 use crate::evaluate::{Evaluation, Evaluator, FailureCounts};
+use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
 
-/// A population-based optimiser that is asked for candidates and told what they are worth.
+/// What an optimiser has done so far.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Counters {
+    /// Iterations told.
+    pub iteration: usize,
+    /// Candidates evaluated.
+    pub evaluations: u64,
+}
+
+impl Counters {
+    /// Counts an iteration of so many candidates.
+    fn told(&mut self, candidates: usize) {
+        self.iteration += 1;
+        self.evaluations += candidates as u64;
+    }
+}
+
+/// A population-based optimiser: asked for candidates, then told their objectives.
 pub trait Optimiser {
     /// The candidates to evaluate next: row-major, values within the bounds.
     fn ask(&mut self) -> Vec<f64>;
@@ -76,24 +94,31 @@ pub trait Optimiser {
     /// Takes the objectives of the candidates last asked for.
     fn tell(&mut self, evaluation: &Evaluation);
 
+    /// Iterations told and candidates evaluated so far.
+    fn counters(&self) -> Counters;
+
     /// Iterations told so far.
-    fn iteration(&self) -> usize;
+    fn iteration(&self) -> usize {
+        self.counters().iteration
+    }
 
     /// Iterations that the settings plan for.
     fn planned_iterations(&self) -> usize;
 
-    /// Whether what the settings plan for is done.
+    /// Whether the planned iterations are done.
     fn done(&self) -> bool {
         self.iteration() >= self.planned_iterations()
     }
 
     /// Candidates evaluated so far.
-    fn evaluations(&self) -> u64;
+    fn evaluations(&self) -> u64 {
+        self.counters().evaluations
+    }
 
     /// The least value seen of each objective.
     fn best(&self) -> Vec<f64>;
 
-    /// What has been found: the archive, or the one best candidate with its cost.
+    /// The result so far: the archive, or the one best candidate with its cost.
     fn front(&self) -> Front;
 }
 
@@ -135,7 +160,7 @@ pub struct Progress {
 /// Asks, evaluates and tells once.
 ///
 /// # Errors
-/// Those of the evaluator; the optimiser is as it was then, but for having been asked.
+/// Those of the evaluator. The optimiser has then been asked, but not told.
 pub fn step(optimiser: &mut dyn Optimiser, evaluator: &mut dyn Evaluator) -> Result<Progress> {
     let width = evaluator.problem().objectives.len();
     let population = optimiser.ask();
@@ -157,7 +182,7 @@ pub fn step(optimiser: &mut dyn Optimiser, evaluator: &mut dyn Evaluator) -> Res
     })
 }
 
-/// Asks, evaluates and tells until the planned iterations are done or `observe` breaks off.
+/// Asks, evaluates and tells until the planned iterations are done or `observe` returns `Break`.
 ///
 /// # Errors
 /// Those of the evaluator.

@@ -8,7 +8,7 @@ use super::archive::crowding;
 use super::metrics::{non_dominated, ranks};
 use super::motion::{Particles, Purpose, polynomial};
 use super::settings::setting;
-use super::{Front, Optimiser};
+use super::{Counters, Front, Optimiser};
 use crate::error::Result;
 use crate::evaluate::{Evaluation, FAILED_COST, Problem};
 use crate::random::Random;
@@ -97,8 +97,7 @@ pub struct Nsga2 {
     children: Particles,
     objectives: usize,
     parents: Vec<Member>,
-    iteration: usize,
-    evaluations: u64,
+    counters: Counters,
 }
 
 impl Nsga2 {
@@ -115,8 +114,7 @@ impl Nsga2 {
             parents: Vec::new(),
             random,
             settings,
-            iteration: 0,
-            evaluations: 0,
+            counters: Counters::default(),
         })
     }
 
@@ -132,7 +130,7 @@ impl Nsga2 {
     /// The better of two parents drawn at random: by front, then by crowding.
     fn parent(&self, pair: usize, which: u32) -> &Member {
         let draw = |index| {
-            let (when, who) = (self.iteration as u32, pair as u32);
+            let (when, who) = (self.counters.iteration as u32, pair as u32);
             &self.parents[self
                 .random
                 .below(self.parents.len(), Purpose::Leader as u32, when, who, index)]
@@ -147,7 +145,7 @@ impl Nsga2 {
 
     fn breed(&mut self) {
         let d = self.children.dimensions();
-        let when = self.iteration as u32;
+        let when = self.counters.iteration as u32;
         for pair in 0..self.settings.population / 2 {
             let uniform = |index: u32| {
                 self.random
@@ -238,7 +236,7 @@ impl Known {
     fn is_new(&mut self, position: &[f64], objectives: &[f64], all: &[Member]) -> bool {
         let mut digest = DefaultHasher::new();
         for x in position.iter().chain(objectives) {
-            // Nought has two signs and one place.
+            // Zero has two signs and one place.
             (x + 0.0).to_bits().hash(&mut digest);
         }
         let places = self.places.entry(digest.finish()).or_default();
@@ -306,21 +304,16 @@ impl Optimiser for Nsga2 {
         kept.truncate(self.settings.population);
         let mut all: Vec<Option<Member>> = all.into_iter().map(Some).collect();
         self.parents = kept.into_iter().filter_map(|i| all[i].take()).collect();
-        self.evaluations += self.settings.population as u64;
-        self.iteration += 1;
+        self.counters.told(self.settings.population);
         self.breed();
     }
 
-    fn iteration(&self) -> usize {
-        self.iteration
+    fn counters(&self) -> Counters {
+        self.counters
     }
 
     fn planned_iterations(&self) -> usize {
         self.settings.iterations
-    }
-
-    fn evaluations(&self) -> u64 {
-        self.evaluations
     }
 
     fn best(&self) -> Vec<f64> {

@@ -2,7 +2,7 @@
 
 use super::motion::{Particles, Purpose};
 use super::settings::PsoSettings;
-use super::{Front, Optimiser, Welcome};
+use super::{Counters, Front, Optimiser, Welcome};
 use crate::error::Result;
 use crate::evaluate::{Evaluation, Problem};
 use crate::random::Random;
@@ -18,8 +18,7 @@ pub struct Pso {
     best_position: Vec<f64>,
     best_cost: Vec<f64>,
     leader: usize,
-    iteration: usize,
-    evaluations: u64,
+    counters: Counters,
 }
 
 /// Share of the swarm, best first, from which difference moves take their leaders.
@@ -42,8 +41,7 @@ impl Pso {
             particles,
             settings,
             leader: 0,
-            iteration: 0,
-            evaluations: 0,
+            counters: Counters::default(),
         })
     }
 
@@ -54,15 +52,18 @@ impl Pso {
     }
 
     fn advance(&mut self) {
-        let share = self.iteration as f64 / (self.settings.iterations.max(2) - 1) as f64;
+        let share = self.counters.iteration as f64 / (self.settings.iterations.max(2) - 1) as f64;
         let d = self.particles.dimensions();
         let mut order: Vec<usize> = (0..self.settings.population).collect();
         order.sort_by(|&a, &b| self.best_cost[a].total_cmp(&self.best_cost[b]));
         let elite = ((self.settings.population as f64 * ELITE_SHARE) as usize).max(2);
         for particle in 0..self.settings.population {
-            let coin = self
-                .random
-                .uniform(Purpose::Coin as u32, self.iteration as u32, particle as u32, 0);
+            let coin = self.random.uniform(
+                Purpose::Coin as u32,
+                self.counters.iteration as u32,
+                particle as u32,
+                0,
+            );
             if coin < self.settings.difference_share {
                 self.difference_move(particle, &order[..elite.min(order.len())]);
             } else {
@@ -72,7 +73,7 @@ impl Pso {
                     particle,
                     (&own, &leader),
                     &self.settings,
-                    (share, self.iteration),
+                    (share, self.counters.iteration),
                     self.random,
                 );
             }
@@ -82,7 +83,7 @@ impl Pso {
     /// From a particle's own best towards one of the elite, plus the difference of two others' bests; only some
     /// coordinates move, so that what is good already is not all given up at once.
     fn difference_move(&mut self, particle: usize, elite: &[usize]) {
-        let (when, who) = (self.iteration as u32, particle as u32);
+        let (when, who) = (self.counters.iteration as u32, particle as u32);
         let purpose = Purpose::Difference as u32;
         let d = self.particles.dimensions();
         let uniform = |index: u32| self.random.uniform(purpose, when, who, index);
@@ -156,21 +157,16 @@ impl Optimiser for Pso {
                 self.leader = particle;
             }
         }
-        self.evaluations += self.settings.population as u64;
-        self.iteration += 1;
+        self.counters.told(self.settings.population);
         self.advance();
     }
 
-    fn iteration(&self) -> usize {
-        self.iteration
+    fn counters(&self) -> Counters {
+        self.counters
     }
 
     fn planned_iterations(&self) -> usize {
         self.settings.iterations
-    }
-
-    fn evaluations(&self) -> u64 {
-        self.evaluations
     }
 
     fn front(&self) -> Front {

@@ -1,6 +1,5 @@
 //! Settings of the swarms, validated in one place.
 
-use super::archive::Archive;
 use crate::error::{Error, Result};
 use serde::{Deserialize, Serialize};
 
@@ -44,7 +43,7 @@ pub enum Randomness {
 /// What becomes of a particle that would leave its bounds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum BoundHandling {
-    /// It stops at the bound and its velocity there becomes nought.
+    /// It stops at the bound and its velocity there becomes zero.
     Absorb,
     /// It stops at the bound and its velocity there is reversed and halved.
     Bounce,
@@ -59,7 +58,7 @@ pub enum Constriction {
     None,
     /// By the coefficient of Clerc and Kennedy \[3\] for the sum of the pulls; the inertia is then one.
     Clerc,
-    /// As in SMPSO \[6\]: the pulls are drawn anew for each particle and iteration, uniformly between
+    /// As in SMPSO \[6\]: the pulls are drawn for each particle and iteration, uniformly between
     /// [`DRAWN_PULLS`], and the coefficient is used with its sign, which turns the step round where they add up to
     /// more than four.
     Signed,
@@ -93,7 +92,7 @@ pub struct PsoSettings {
     pub bounds: BoundHandling,
     /// Share of the moves that are difference moves \[7\]: from a particle's best towards one of the swarm's best
     /// particles, plus the difference of two others' bests. They follow valleys that run across the axes, where
-    /// the pulls of a swarm alone stall. Nought gives the plain swarm.
+    /// the pulls of a swarm alone stall. Zero gives the plain swarm.
     pub difference_share: f64,
 }
 
@@ -179,7 +178,7 @@ pub enum Leaders {
     Random,
 }
 
-/// By what an archive that is too full chooses who leaves; one member at a time.
+/// The measure by which a full archive removes members, one at a time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Truncation {
     /// The least crowding distance \[5\].
@@ -198,7 +197,7 @@ pub enum Mutation {
     /// With probability `(1 - t)^(1/mu)` at the share `t` of the run, one dimension is redrawn within that share
     /// of the range \[4\], with this exponent `mu`.
     Fixed(f64),
-    /// The same with a `mu` drawn anew for each particle and iteration, between nought and one.
+    /// The same with a `mu` drawn for each particle and iteration, between zero and one.
     Random,
     /// Polynomial mutation \[5\] of this share of the particles, each of whose dimensions is disturbed with
     /// probability one over their number.
@@ -226,10 +225,10 @@ pub struct MopsoSettings {
     pub motion: PsoSettings,
     /// Most members of the archive.
     pub archive: usize,
-    /// Who leaves an archive that is too full.
+    /// Which members leave a full archive.
     pub truncation: Truncation,
-    /// Where contributions are measured from, a value for each of up to three objectives: the archive's hypervolume up to
-    /// there then never falls. None lets the archive choose, who keeps the ends of its front for it.
+    /// The reference point of contributions, a value for each of up to three objectives. The archive's hypervolume up to this
+    /// point then never falls. With `None` the archive chooses the point and keeps the ends of its front.
     pub reference: Option<Vec<f64>>,
     /// Choice of leaders.
     pub leaders: Leaders,
@@ -288,23 +287,6 @@ impl MopsoSettings {
             reference: None,
             leaders: Leaders::Tournament,
             mutation: Mutation::Fixed(0.3),
-        }
-    }
-
-    /// The empty archive of a swarm of so many objectives.
-    ///
-    /// # Errors
-    /// As [`MopsoSettings::validate`], and for a reference of another length.
-    pub(super) fn empty_archive(&self, objectives: usize) -> Result<Archive> {
-        self.validate()?;
-        let archive = Archive::new(self.archive, self.truncation);
-        match &self.reference {
-            None => Ok(archive),
-            Some(reference) if reference.len() == objectives => Ok(archive.measured_from(reference.clone())),
-            Some(reference) => {
-                let expected = format!("a number for each of {objectives} objectives");
-                Err(setting("reference", format!("{reference:?}"), &expected))
-            }
         }
     }
 

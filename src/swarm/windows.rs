@@ -15,7 +15,7 @@
 use super::covariance::Distribution;
 use super::settings::setting;
 use super::space::Space;
-use super::{Front, Optimiser};
+use super::{Counters, Front, Optimiser};
 use crate::error::{Error, Result};
 use crate::evaluate::{Evaluation, FAILED_COST, Problem};
 use crate::random::Random;
@@ -122,8 +122,7 @@ pub struct WindowSwarm {
     turns: Vec<Vec<Window>>,
     context: Vec<f64>,
     best: (Vec<f64>, f64),
-    iteration: usize,
-    evaluations: u64,
+    counters: Counters,
 }
 
 /// What the draws are for, in the counter.
@@ -181,8 +180,7 @@ impl WindowSwarm {
             bounds,
             turns,
             context,
-            iteration: 0,
-            evaluations: 0,
+            counters: Counters::default(),
             settings,
         };
         swarm.sample();
@@ -196,15 +194,15 @@ impl WindowSwarm {
 
     /// Turns of every kind that have been completed.
     pub fn rounds(&self) -> usize {
-        self.iteration / (self.settings.turn * self.turns.len())
+        self.counters.iteration / (self.settings.turn * self.turns.len())
     }
 
     fn turn(&self) -> usize {
-        self.iteration / self.settings.turn % self.turns.len()
+        self.counters.iteration / self.settings.turn % self.turns.len()
     }
 
     fn sample(&mut self) {
-        let (turn, when) = (self.turn(), self.iteration as u32);
+        let (turn, when) = (self.turn(), self.counters.iteration as u32);
         let (random, count) = (self.random, self.settings.population);
         for (w, window) in self.turns[turn].iter_mut().enumerate() {
             let draw = |particle: usize| {
@@ -304,7 +302,7 @@ impl Optimiser for WindowSwarm {
     fn tell(&mut self, evaluation: &Evaluation) {
         let costs = evaluation.costs(self.objectives);
         let (turn, count) = (self.turn(), self.settings.population);
-        self.evaluations += costs.len() as u64;
+        self.counters.evaluations += costs.len() as u64;
         let Some((&own, costs)) = costs.split_first() else {
             return;
         };
@@ -332,8 +330,8 @@ impl Optimiser for WindowSwarm {
         }
         self.hold(&mut context);
         self.context = context;
-        self.iteration += 1;
-        if self.iteration.is_multiple_of(self.settings.turn) {
+        self.counters.iteration += 1;
+        if self.counters.iteration.is_multiple_of(self.settings.turn) {
             // All windows moved at once; what that has spoilt is taken back.
             self.context.clone_from(&self.best.0);
             let next = self.turn();
@@ -344,16 +342,12 @@ impl Optimiser for WindowSwarm {
         self.sample();
     }
 
-    fn iteration(&self) -> usize {
-        self.iteration
+    fn counters(&self) -> Counters {
+        self.counters
     }
 
     fn planned_iterations(&self) -> usize {
         self.settings.iterations
-    }
-
-    fn evaluations(&self) -> u64 {
-        self.evaluations
     }
 
     fn front(&self) -> Front {
@@ -401,7 +395,7 @@ mod tests {
     }
 
     /// A chain held at both ends that wants to be straight (sum of squared second differences, condition number of the
-    /// order of n^4): nought at the optimum. That the waves of the start go, not how fast the longest ones do, is what is
+    /// order of n^4): zero at the optimum. That the waves of the start go, not how fast the longest ones do, is what is
     /// held here; how close lines come to their optima is tested where they are searched for.
     #[test]
     fn a_stiff_chain_straightens() {

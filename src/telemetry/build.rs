@@ -5,7 +5,7 @@ use std::ops::RangeInclusive;
 use std::sync::Arc;
 
 use super::audit::check_magnitude;
-use super::calibrate::Calibration;
+use super::calibration::Calibration;
 use super::channel_map::{Axle, ChannelMap, Mapped};
 use super::laps::{self, Lap};
 use super::log::{Log, LogOptions};
@@ -149,6 +149,9 @@ pub(super) struct Build<'a> {
 
 impl Build<'_> {
     /// The log at the signals' present delays, not calibrated otherwise.
+    ///
+    /// # Errors
+    /// [`Error::Input`] for gaps, times that do not fit one clock, and what does not fit into memory.
     pub fn assemble(&self, signals: &[Signal<'_>], calibration: Calibration) -> Result<Log> {
         let grid = self.grid(signals)?;
         let (grid, through) = match grid {
@@ -378,7 +381,7 @@ pub(super) const RATES_HZ: RangeInclusive<f64> = 0.1..=100_000.0;
 /// The least way (m) by which a logged distance is judged.
 const LEAST_M: f64 = 50.0;
 
-/// Distance that goes on where the logged one starts again at nought.
+/// Distance that goes on where the logged one starts again at zero.
 fn running_distance(values: &[f64]) -> Vec<f64> {
     let mut carried = 0.0;
     let mut last = values.first().copied().unwrap_or(0.0);

@@ -4,8 +4,7 @@
 //! track times yaw rate; `ay` and steering follow yaw, `ax` follows the change of speed. Delays are relative to yaw
 //! rate: a delay common to all channels neither shows nor matters.
 
-use serde::{Deserialize, Serialize};
-
+use super::calibration::{CalibrationOptions, Declared, Finding, FindingKind};
 use super::derived::{
     LEAST_S, STRAIGHT_YAW, SURE_OF_SIGN, acceleration, front_difference, moving, product, unbraked,
 };
@@ -22,134 +21,6 @@ const STRAIGHT_AY: f64 = 1.0;
 const COASTING_AX: f64 = 1.0;
 /// Standing still, m/s.
 const STANDSTILL_MPS: f64 = 0.3;
-
-/// Whether to do something, or let the file format decide.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Switch {
-    /// On for foreign files, off for native ones, which are calibrated already.
-    #[default]
-    Auto,
-    /// Always.
-    On,
-    /// Never.
-    Off,
-}
-
-impl Switch {
-    pub(super) fn is_on(self, format: Format) -> bool {
-        match self {
-            Self::Auto => format != Format::Native,
-            Self::On => true,
-            Self::Off => false,
-        }
-    }
-}
-
-/// Which corrections are estimated from the log and applied to it.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct CalibrationOptions {
-    /// Signs of yaw rate, `ay`, `ax` and steering.
-    pub signs: Switch,
-    /// Delays of the channels relative to yaw rate.
-    pub delays: Switch,
-    /// Zero offsets of yaw rate and `ay`.
-    pub offsets: Switch,
-    /// Rolling radius of each wheel.
-    pub rolling_radius: Switch,
-}
-
-impl CalibrationOptions {
-    /// Everything on, or everything off.
-    pub fn all(switch: Switch) -> Self {
-        Self {
-            signs: switch,
-            delays: switch,
-            offsets: switch,
-            rolling_radius: switch,
-        }
-    }
-}
-
-/// What was estimated.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum FindingKind {
-    /// 1 or -1, by which the channel was multiplied.
-    Sign,
-    /// How much later than yaw rate the channel was recorded, s; taken off.
-    Delay,
-    /// What the channel shows where it should show nought, in its SI unit; taken off.
-    Offset,
-    /// Ground speed over angular speed of a freely rolling wheel, m.
-    RollingRadius,
-    /// Slope of the channel on what it should equal; 1 is right. Never applied.
-    Gain,
-}
-
-/// One thing that was estimated from the log.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Finding {
-    /// The channel.
-    pub role: Role,
-    /// What was estimated.
-    pub kind: FindingKind,
-    /// Its value, in the unit that `kind` names.
-    pub value: f64,
-    /// Whether the log was corrected by it.
-    pub applied: bool,
-    /// The correlation it rests on, where it rests on one.
-    pub correlation: Option<f64>,
-    /// Samples it rests on.
-    pub samples: usize,
-    /// What it was measured against, and why it was not applied where it was not.
-    pub evidence: String,
-}
-
-impl std::fmt::Display for Finding {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let state = if self.applied {
-            "corrected"
-        } else {
-            "left as it is"
-        };
-        write!(
-            f,
-            "{:?} {:?}: {:.4}, {state} ({})",
-            self.role, self.kind, self.value, self.evidence
-        )
-    }
-}
-
-/// Everything that was estimated from a log, and what was done about it.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct Calibration {
-    /// What was estimated, in the order it was applied.
-    pub findings: Vec<Finding>,
-    /// What else a reader of the results should know: channels guessed, speeds made up, evidence that is missing.
-    pub notes: Vec<String>,
-}
-
-impl Calibration {
-    /// The finding of a kind for a channel.
-    pub fn finding(&self, role: Role, kind: FindingKind) -> Option<&Finding> {
-        self.findings.iter().find(|f| f.role == role && f.kind == kind)
-    }
-
-    /// The value of a finding that was applied.
-    pub fn applied(&self, role: Role, kind: FindingKind) -> Option<f64> {
-        self.finding(role, kind).filter(|f| f.applied).map(|f| f.value)
-    }
-}
-
-/// What the channel map declares, which is believed over the log.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Declared {
-    pub signs: Vec<Role>,
-    pub delays: Vec<Role>,
-    pub rolling_radius_m: Option<f64>,
-    /// Ground speed is made of wheel speeds, and has no delay of its own.
-    pub speed_of_wheels: bool,
-}
 
 /// Estimates and applies signs, offsets and rolling radii, in this order; delays have been taken off before.
 pub(super) fn apply(log: &mut Log, options: &CalibrationOptions, format: Format, declared: &Declared) {
@@ -257,7 +128,7 @@ fn values_mut(log: &mut Log, role: Role) -> &mut [f64] {
 }
 
 /// Samples on straights, given the offsets of yaw rate and `ay`: stretches, because yaw rate also passes through
-/// nought in the middle of an S.
+/// zero in the middle of an S.
 fn straights(log: &Log, yaw_offset: f64, ay_offset: f64) -> Vec<bool> {
     let mut mask: Vec<bool> = (0..log.samples())
         .map(|i| {
@@ -394,7 +265,7 @@ fn rolling_radii(log: &mut Log, reference_m: Option<f64>) {
 mod tests {
     use super::*;
     use crate::telemetry::synthetic::{Car, Faults, motec_text};
-    use crate::telemetry::{ChannelMap, LogOptions, Recording};
+    use crate::telemetry::{ChannelMap, LogOptions, Recording, Switch};
 
     const FAULTS: Faults = Faults {
         vx_delay_s: 0.07,

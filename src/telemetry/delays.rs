@@ -1,6 +1,6 @@
 //! Delays of the channels relative to yaw rate.
 
-use super::calibrate::{Calibration, Declared, Finding, FindingKind};
+use super::calibration::{Calibration, Declared, Finding, FindingKind};
 use super::derived::{MOVING_MPS, SURE_OF_SIGN, acceleration, front_difference, moving, product, unbraked};
 use super::log::Log;
 use super::role::Role;

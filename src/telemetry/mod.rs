@@ -16,6 +16,7 @@
 mod audit;
 mod build;
 mod calibrate;
+mod calibration;
 mod channel_map;
 mod csv_native;
 mod delays;
@@ -23,8 +24,10 @@ mod derived;
 mod driven;
 mod laps;
 mod log;
+mod make_log;
 mod motec_csv;
 mod motec_ld;
+mod read;
 mod recording;
 mod resample;
 mod role;
@@ -35,7 +38,7 @@ mod table;
 mod text;
 mod units;
 
-pub use calibrate::{Calibration, CalibrationOptions, Finding, FindingKind, Switch};
+pub use calibration::{Calibration, CalibrationOptions, Finding, FindingKind, Switch};
 pub use channel_map::{Axle, ChannelEntry, ChannelMap, Mapped};
 pub use csv_native::{COLUMNS, NativeFormat, write_native};
 pub use driven::DrivenLap;

@@ -391,24 +391,24 @@ fn attribute<'a>(tag: &'a str, name: &str) -> Option<&'a str> {
 
 #[cfg(test)]
 #[path = "../../tests/common/ld.rs"]
-mod made_up;
+mod sample_file;
 
 #[cfg(test)]
 mod tests {
-    use super::made_up::ENTRY;
+    use super::sample_file::ENTRY;
     use super::*;
     use motec_i2::{Datatype, Sample};
     use proptest::prelude::*;
 
     fn small() -> Vec<u8> {
-        let channel = |name, datatype, rate| made_up::channel(name, "deg", datatype, rate);
+        let channel = |name, datatype, rate| sample_file::channel(name, "deg", datatype, rate);
         let tenths = ChannelMetadata {
             dec_places: 1,
             ..channel("Steer", Datatype::I16, 20)
         };
         let integers = vec![Sample::I16(10), Sample::I16(-25), Sample::I16(7)];
         let floats = vec![Sample::F32(0.5), Sample::F32(-0.25)];
-        made_up::file(vec![
+        sample_file::file(vec![
             (tenths, integers),
             (channel("Yaw", Datatype::F32, 50), floats),
         ])

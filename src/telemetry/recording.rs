@@ -1,12 +1,10 @@
 //! A log file as it was logged, before anybody decided what its channels mean.
 
-use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::{csv_native, motec_csv, motec_ld, text};
-use crate::config::{LARGEST_LOG, check_memory, memory_limit, read_bytes};
-use crate::{Error, Result};
+use crate::Result;
+use crate::config::{check_memory, memory_limit};
 
 /// The file formats that can be read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -115,7 +113,7 @@ pub(super) struct Reading<'a> {
 
 impl Reading<'_> {
     /// All channels, into what is allowed at present.
-    fn whole() -> Self {
+    pub fn whole() -> Self {
         Self {
             choose: &|recording| Ok(vec![true; recording.channels.len()]),
             limit: memory_limit(),
@@ -123,6 +121,9 @@ impl Reading<'_> {
     }
 
     /// Whether what is `needed` (bytes) to read a file of `size` bytes is allowed.
+    ///
+    /// # Errors
+    /// [`crate::Error::Input`] if it is not.
     pub fn fits(&self, path: &Path, size: u64, needed: u64) -> Result<()> {
         check_memory(path, &format!("{size} bytes"), needed, self.limit)
     }
@@ -144,96 +145,11 @@ pub struct Recording {
 }
 
 impl Recording {
-    /// Reads a log file; content decides the format, and the extension where content does not.
-    ///
-    /// # Errors
-    /// [`Error::Io`] when the file cannot be read; [`Error::Input`], naming the line or channel, when it holds
-    /// something it must not.
-    pub fn read(path: impl AsRef<Path>) -> Result<Self> {
-        Self::read_some(path.as_ref(), &Reading::whole())
-    }
-
-    /// As [`Recording::read`], of the channels that are chosen; the others have no samples.
-    pub(super) fn read_some(path: &Path, reading: &Reading<'_>) -> Result<Self> {
-        if let Ok(told) = std::fs::metadata(path) {
-            // It is in memory as it is while it is read.
-            reading.fits(path, told.len(), told.len())?;
-        }
-        let bytes = read_bytes(path, LARGEST_LOG.min(reading.limit))?;
-        let mut recording = Self::parse_some(Cow::Owned(bytes), path, reading)?;
-        if recording.format == Format::MotecLd {
-            recording.beacons_s = motec_ld::beacons_beside(path)?;
-        }
-        Ok(recording)
-    }
-
-    /// Reads a log from memory; `path` is its name in error messages, and its extension counts where the content
-    /// does not decide the format. The `.ldx` file that may lie beside a `.ld` is not looked for.
-    ///
-    /// # Errors
-    /// As for [`Recording::read`].
-    pub fn parse(bytes: &[u8], path: impl AsRef<Path>) -> Result<Self> {
-        Self::parse_some(Cow::Borrowed(bytes), path.as_ref(), &Reading::whole())
-    }
-
-    fn parse_some(bytes: Cow<'_, [u8]>, path: &Path, reading: &Reading<'_>) -> Result<Self> {
-        let is_ld = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("ld"));
-        if is_ld || motec_ld::is_ld(&bytes) {
-            return motec_ld::parse(bytes, path, reading);
-        }
-        let size = bytes.len() as u64;
-        // What is no UTF-8 is written anew, at most twice as long.
-        reading.fits(path, size, text::decoded_size(&bytes))?;
-        let text = text::decode(&bytes);
-        let mut rows = text::Rows::new(&text, path, true);
-        let Some(first) = rows.next().transpose()? else {
-            return Err(Error::input(path, "line 1", "no rows", "a log"));
-        };
-        if first.cells.iter().any(|c| c == csv_native::TIME) {
-            csv_native::parse(&text, path, reading)
-        } else if first.cell(0).eq_ignore_ascii_case("Format") {
-            motec_csv::parse(&text, path, reading)
-        } else {
-            Err(Error::input(
-                path,
-                format!("line {}", first.line),
-                text::shown(first.cell(0)),
-                "a header row with a time_s column, a MoTeC CSV export (first cell \"Format\"), or a .ld file",
-            ))
-        }
-    }
-
     /// The channel called `name`, exactly or else without regard to case.
     pub fn channel(&self, name: &str) -> Option<&Channel> {
         self.channels
             .iter()
             .find(|c| c.name == name)
             .or_else(|| self.channels.iter().find(|c| c.name.eq_ignore_ascii_case(name)))
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn content_decides_the_format() {
-        let native = Recording::parse(b"# x\ntime_s,vx_mps\n0,1\n1,2\n", "a.txt").unwrap();
-        assert_eq!(native.format, Format::Native);
-        let motec = b"\"Format\",\"MoTeC CSV File\"\n\nTime,V\ns,km/h\n0,1\n1,2\n";
-        assert_eq!(Recording::parse(motec, "a.csv").unwrap().format, Format::MotecCsv);
-    }
-
-    #[test]
-    fn what_is_no_log_is_refused_with_what_was_found() {
-        for (bytes, found) in [(&b""[..], "no rows"), (b"hello;there", "hello;there")] {
-            let error = Recording::parse(bytes, "a.csv").unwrap_err().to_string();
-            assert!(
-                error.contains("a.csv: line 1") && error.contains(found),
-                "{error}"
-            );
-        }
-        let missing = Recording::read("no/such/file.csv").unwrap_err();
-        assert!(matches!(missing, Error::Io { action: "read", .. }));
     }
 }

@@ -26,6 +26,9 @@ impl Grid {
 
     /// The clock with interval `dt_s` that starts at `origin_s` or whole intervals later, and lies within
     /// `start_s..=end_s`.
+    ///
+    /// # Errors
+    /// [`Error::Input`] if the clock has fewer than two samples, or too many.
     pub fn within(source: &str, origin_s: f64, start_s: f64, end_s: f64, dt_s: f64) -> Result<Self> {
         let skipped = ((start_s - origin_s) / dt_s - 1e-6).ceil().max(0.0);
         let start_s = origin_s + skipped * dt_s;

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::calibrate::Calibration;
+use super::calibration::Calibration;
 use super::csv_native::COLUMNS;
 use super::laps::Lap;
 use super::log::Log;

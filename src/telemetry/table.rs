@@ -22,6 +22,9 @@ pub(super) struct Table<'a> {
 
 impl<'a> Table<'a> {
     /// An empty table with room for the rows of `text`; `names` are unique, `units` as many, `time_column` one of them.
+    ///
+    /// # Errors
+    /// [`Error::Input`] if the rows do not fit into what memory is allowed.
     pub fn new(
         file: &'a Path,
         text: &str,
@@ -51,6 +54,9 @@ impl<'a> Table<'a> {
     }
 
     /// Adds a row. A cell that is no finite number is remembered, not refused, unless it is the time.
+    ///
+    /// # Errors
+    /// [`Error::Input`] for a row of another width, and for a time that is not a number or does not rise.
     pub fn push(&mut self, row: &Row<'_>) -> Result<()> {
         let (width, line) = (self.names.len(), row.line);
         // A trailing comma adds an empty cell and loses nothing.
@@ -93,6 +99,9 @@ impl<'a> Table<'a> {
     }
 
     /// The channels, with time (multiplied by `time_factor` to seconds) as their common clock.
+    ///
+    /// # Errors
+    /// [`Error::Input`] for fewer than two rows.
     pub fn finish(mut self, time_factor: f64) -> Result<Vec<Channel>> {
         if self.lines.len() < 2 {
             return Err(Error::input(

@@ -2,7 +2,7 @@
 
 use glam::DVec2;
 
-use super::from_curvature::displacement;
+use super::clothoid::displacement;
 use crate::{Error, Result};
 
 /// A named stretch of a circuit.
@@ -132,7 +132,7 @@ impl Circuit {
             return station_m.clamp(0.0, self.length_m);
         }
         let wrapped = station_m.rem_euclid(self.length_m);
-        // rem_euclid rounds to the length itself for stations a hair below nought.
+        // rem_euclid rounds to the length itself for stations a hair below zero.
         if wrapped >= self.length_m { 0.0 } else { wrapped }
     }
 

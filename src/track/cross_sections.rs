@@ -1,13 +1,13 @@
-//! A circuit cut across at stations: the straight cuts that a racing line crosses.
+//! Cross-sections of a circuit at stations: the straight segments that a racing line crosses.
 
 use super::circuit::{Corner, Section};
 use crate::{Error, Result};
 use glam::DVec2;
 
-/// Cuts across a circuit, each from its right edge to its left one.
+/// Cross-sections across a circuit, each from its right edge to its left one.
 ///
-/// A line crosses cut `i` at `right_m[i] + alpha_i (left_m[i] - right_m[i])`, with `alpha` from 0 (the driver's
-/// right) to 1 (left). On a closed circuit the last cut is followed by the first, which is not repeated.
+/// A line crosses cross-section `i` at `right_m[i] + alpha_i (left_m[i] - right_m[i])`, with `alpha` from 0 (the driver's
+/// right) to 1 (left). On a closed circuit the last cross-section is followed by the first, which is not repeated.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CrossSections {
     /// Name for titles and messages.
@@ -16,13 +16,13 @@ pub struct CrossSections {
     pub closed: bool,
     /// Length of the reference line (m), the closing stretch of a closed circuit included.
     pub length_m: f64,
-    /// Station of each cut along the reference line (m), ascending from 0.
+    /// Station of each cross-section along the reference line (m), ascending from 0.
     pub station_m: Vec<f64>,
-    /// Right end of each cut (m).
+    /// Right end of each cross-section (m).
     pub right_m: Vec<DVec2>,
-    /// Left end of each cut (m).
+    /// Left end of each cross-section (m).
     pub left_m: Vec<DVec2>,
-    /// Where the smooth reference line crosses each cut, as a share of its width from the right.
+    /// Where the smooth reference line crosses each cross-section, as a share of its width from the right.
     pub reference: Vec<f64>,
     /// Named stretches, by station.
     pub sections: Vec<Section>,
@@ -31,7 +31,7 @@ pub struct CrossSections {
 }
 
 impl CrossSections {
-    /// Number of cuts.
+    /// Number of cross-sections.
     pub fn len(&self) -> usize {
         self.station_m.len()
     }
@@ -41,7 +41,8 @@ impl CrossSections {
         self.station_m.is_empty()
     }
 
-    /// Distance along the reference line from each cut to the next (m), the closing stretch of a closed circuit included.
+    /// Distance along the reference line from each cross-section to the next (m), the closing stretch of a closed circuit
+    /// included.
     pub fn spacing_m(&self) -> Vec<f64> {
         let after = self.station_m.iter().copied().skip(1);
         let ends = after.chain(self.closed.then_some(self.length_m));
@@ -52,7 +53,7 @@ impl CrossSections {
             .collect()
     }
 
-    /// The same cuts with a reference line that leaves out what is shorter than `wavelength_m`, such as the noise of a
+    /// The same cross-sections with a reference line that leaves out what is shorter than `wavelength_m`, such as the noise of a
     /// survey, held on the road: see [`CrossSections::smoothed`].
     pub fn with_smooth_reference(&self, wavelength_m: f64) -> Self {
         let smooth = self.smoothed(&self.reference, wavelength_m);
@@ -62,10 +63,10 @@ impl CrossSections {
         }
     }
 
-    /// A line (`alpha` at every cut) without what is shorter than `wavelength_m`: of all lines across the cuts the one
-    /// that is least far from the given one and least bent, weighed so that a wave of that length keeps half its height
-    /// (E. T. Whittaker, *On a new method of graduation*, Proc. Edinburgh Math. Soc. 41, 1923). It may leave the road,
-    /// where a line held at its edge would have a kink.
+    /// A line (`alpha` at every cross-section) without what is shorter than `wavelength_m`: of all lines across the
+    /// cross-sections the one that is least far from the given one and least bent, weighed so that a wave of that length keeps
+    /// half its height (E. T. Whittaker, *On a new method of graduation*, Proc. Edinburgh Math. Soc. 41, 1923). It may leave the
+    /// road, where a line held at its edge would have a kink.
     pub fn smoothed(&self, alpha: &[f64], wavelength_m: f64) -> Vec<f64> {
         let n = self.len();
         if n < 5 {
@@ -113,17 +114,17 @@ impl CrossSections {
         moved.map(|((a, offset), width)| a + offset / width).collect()
     }
 
-    /// The same cuts shortened at both ends by half the width of a car (m), so that its middle may use all of them.
+    /// The same cross-sections shortened at both ends by half the width of a car (m), so that its middle may use all of them.
     ///
     /// # Errors
-    /// [`Error::Input`] naming the station of the first cut that is not wider than the car.
+    /// [`Error::Input`] naming the station of the first cross-section that is not wider than the car.
     pub fn narrowed(&self, car_width_m: f64) -> Result<Self> {
         let mut narrowed = self.clone();
         let ends = narrowed.right_m.iter_mut().zip(&mut narrowed.left_m);
         let cuts = ends.zip(&mut narrowed.reference).zip(&self.station_m);
         for (((right, left), reference), station) in cuts {
             let width = right.distance(*left);
-            // What is no number fits nowhere.
+            // What is not a number fits nowhere.
             let fits = width > car_width_m && car_width_m >= 0.0;
             if !fits {
                 return Err(Error::input(
@@ -142,18 +143,18 @@ impl CrossSections {
         Ok(narrowed)
     }
 
-    /// The `count` cuts from `first` on as an open stretch, round the end of a closed circuit if need be. Stations start
-    /// from nought; named sections and corners stay with the whole.
+    /// The `count` cross-sections from `first` on as an open stretch, round the end of a closed circuit if need be. Stations
+    /// start from zero; named sections and corners stay with the whole.
     ///
     /// # Errors
-    /// [`Error::Input`] if the stretch has fewer than two cuts, or more than there are.
+    /// [`Error::Input`] if the stretch has fewer than two cross-sections, or more than there are.
     pub fn stretch(&self, first: usize, count: usize) -> Result<Self> {
         let n = self.len();
         let most = if self.closed { n } else { n.saturating_sub(first) };
         if first >= n || count < 2 || count > most {
             return Err(Error::input(
                 &self.name,
-                "stretch of cuts",
+                "stretch of cross-sections",
                 format!("{count} from {first} on"),
                 format!("2 to {most} of {n}"),
             ));
@@ -176,7 +177,7 @@ impl CrossSections {
         })
     }
 
-    /// The points of a line (m), one per cut, from its `alpha` at every cut.
+    /// The points of a line (m), one per cross-section, from its `alpha` at every cross-section.
     pub fn points(&self, alpha: &[f64]) -> Vec<DVec2> {
         self.right_m
             .iter()
@@ -260,7 +261,7 @@ mod tests {
 
     #[test]
     fn a_smooth_reference_keeps_long_waves_and_leaves_short_ones_out() {
-        // A straight road, closed only in that the last cut is followed by the first: waves alone bend its reference.
+        // A straight road, closed only in that the last cross-section is followed by the first: waves alone bend its reference.
         let n = 600;
         let wavy = |length_m: f64| {
             let wave = |i: usize| 0.1 * (std::f64::consts::TAU * i as f64 / length_m).sin();

@@ -5,7 +5,7 @@ use glam::DVec2;
 /// A straight stretch between two points (m).
 pub(super) type Stretch = [DVec2; 2];
 
-/// Pairs of boxes looked at before giving up, so that a hostile file cannot keep a program busy for hours.
+/// The most pairs of boxes that are compared, so that a hostile file cannot keep a program busy for hours.
 const BUDGET: u64 = 200_000_000;
 
 /// The stretches are too tangled to be checked.

@@ -36,13 +36,13 @@ impl Circuit {
 }
 
 impl CrossSections {
-    /// The middles of the cuts and half their widths in the racetrack database's format.
+    /// The middles of the cross-sections and half their widths in the racetrack database's format.
     pub fn to_racetrack_csv(&self) -> String {
         self.line_to_racetrack_csv(&vec![0.5; self.len()])
     }
 
-    /// A line in the racetrack database's format, with its distances to both edges along the cuts; `alpha` has a value
-    /// for every cut.
+    /// A line in the racetrack database's format, with its distances to both edges along the cross-sections; `alpha` has a value
+    /// for every cross-section.
     pub fn line_to_racetrack_csv(&self, alpha: &[f64]) -> String {
         let points = self.points(alpha);
         let ends = self.right_m.iter().zip(&self.left_m);
@@ -61,7 +61,7 @@ impl CrossSections {
     /// Writes [`CrossSections::line_to_racetrack_csv`] to a new file.
     ///
     /// # Errors
-    /// [`Error::Input`] when there are not as many values as cuts; [`Error::Io`] when the file is there already or
+    /// [`Error::Input`] when there are not as many values as cross-sections; [`Error::Io`] when the file is there already or
     /// cannot be written.
     pub fn write_racetrack_line(&self, alpha: &[f64], path: impl AsRef<Path>) -> Result<()> {
         let path = path.as_ref();
@@ -71,7 +71,7 @@ impl CrossSections {
                 path,
                 "line",
                 found,
-                format!("{}, one per cut", self.len()),
+                format!("{}, one per cross-section", self.len()),
             ));
         }
         write_new(path, self.line_to_racetrack_csv(alpha).as_bytes())

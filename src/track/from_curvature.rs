@@ -16,6 +16,7 @@ use glam::{DMat3, DVec2, DVec3};
 use std::f64::consts::TAU;
 
 use super::circuit::{Circuit, Corner, Section};
+use super::clothoid::displacement;
 use crate::{Error, Result};
 
 /// Distance between samples of a circuit (m), before rounding to a whole number of steps.
@@ -61,7 +62,7 @@ pub struct CurvatureTable {
     pub sections: Vec<Section>,
 }
 
-/// What closing a lap took; all nought for an open circuit.
+/// What closing a lap took; all zero for an open circuit.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Closure {
     /// By how much the table's total turn missed a whole number of turns (rad).
@@ -74,27 +75,6 @@ pub struct Closure {
     pub heading_change_rad: f64,
     /// Largest change of position (m), the start staying where it is.
     pub position_change_m: f64,
-}
-
-/// Displacement (m) after travelling `length` (m) from a place with this heading (rad), curvature
-/// (1/m) and slope of curvature (1/m^2). Gauss-Legendre with five points: for turns below half a
-/// radian the error is below rounding.
-pub(super) fn displacement(heading: f64, curvature: f64, slope: f64, length: f64) -> DVec2 {
-    const NODES: [(f64, f64); 5] = [
-        (0.046_910_077_030_668, 0.118_463_442_528_094_54),
-        (0.230_765_344_947_158_45, 0.239_314_335_249_683_23),
-        (0.5, 0.284_444_444_444_444_44),
-        (0.769_234_655_052_841_5, 0.239_314_335_249_683_23),
-        (0.953_089_922_969_332, 0.118_463_442_528_094_54),
-    ];
-    NODES
-        .iter()
-        .map(|&(node, weight)| {
-            let s = node * length;
-            weight * DVec2::from_angle(heading + s * (curvature + 0.5 * slope * s))
-        })
-        .sum::<DVec2>()
-        * length
 }
 
 /// A centreline integrated from evenly spaced curvature; one more entry than curvature steps.
@@ -273,7 +253,7 @@ impl CurvatureTable {
         let run = |k: &[f64]| integrate(k, spacing, true, self.start_heading_rad);
         let original = run(curvature);
         let (turn, _) = original.end();
-        // A figure of eight turns by nought in all, a simple lap by one turn either way.
+        // A figure of eight turns by zero in all, a simple lap by one turn either way.
         let wanted = TAU * (turn / TAU).round().clamp(-1.0, 1.0);
         let turn_error_rad = turn - wanted;
         if turn_error_rad.abs() > LARGEST_TURN_ERROR {

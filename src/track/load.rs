@@ -1,18 +1,16 @@
 //! Reads circuits from TOML files with a curvature table or a survey beside them, bundled or the user's own.
 
-use std::ops::Range;
 use std::path::Path;
 
 use serde::Deserialize;
-use serde::de::DeserializeOwned;
 use toml::Spanned;
 
-use super::circuit::{Circuit, Section};
+use super::checker::{Checker, SectionEntry, line_of, parse_toml};
+use super::circuit::Circuit;
 use super::from_curvature::{Closure, CurvatureRow, CurvatureTable};
 use super::reference::Smoothing;
 use super::survey::{Survey, SurveyOptions};
-use crate::config::{LONGEST_NAME, read_text};
-use crate::files::stem;
+use crate::config::read_text;
 use crate::{Error, Result};
 
 /// A circuit embedded in the crate: name, TOML and curvature table.
@@ -46,14 +44,6 @@ struct CircuitFile {
     width_m: Option<Spanned<f64>>,
     #[serde(default)]
     sections: Vec<SectionEntry>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct SectionEntry {
-    name: Spanned<String>,
-    start_m: Spanned<f64>,
-    end_m: Spanned<f64>,
 }
 
 fn yes() -> bool {
@@ -128,6 +118,9 @@ pub(super) enum CircuitSource {
 
 impl CircuitSource {
     /// Reads a TOML file with what it names, or a survey.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if a file cannot be read; [`Error::Input`] naming line and field for what it must not hold.
     pub fn read(path: &Path) -> Result<Self> {
         if !path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) {
             let survey = Survey::read(path, &SurveyOptions::default())?;
@@ -168,92 +161,6 @@ fn build(table: &CurvatureTable, table_file: &str) -> Result<(Circuit, Closure)>
         } => Error::input(table_file, place, found, expected),
         other => other,
     })
-}
-
-/// The line (from 1) where a byte of a text lies.
-fn line_of(text: &str, at: usize) -> usize {
-    1 + text.bytes().take(at).filter(|&b| b == b'\n').count()
-}
-
-pub(super) fn parse_toml<T: DeserializeOwned>(file: &str, text: &str, what: &str) -> Result<T> {
-    toml::from_str(text).map_err(|error| {
-        let place = match error.span() {
-            Some(span) => format!("line {}", line_of(text, span.start)),
-            None => "document".to_owned(),
-        };
-        let message = error.message().trim().replace('\n', ", ");
-        // serde's messages end with what they wanted, as in "unknown field `x`, expected one of ...".
-        match message.split_once(", expected ") {
-            Some((found, expected)) => Error::input(file, place, found, expected),
-            None => Error::input(file, place, message, what),
-        }
-    })
-}
-
-/// A checked value of the TOML file.
-pub(super) struct Checker<'a> {
-    pub file: &'a str,
-    pub text: &'a str,
-}
-
-impl Checker<'_> {
-    pub fn refuse(&self, span: Range<usize>, field: &str, found: String, expected: &str) -> Error {
-        let place = format!("line {}, field {field}", line_of(self.text, span.start));
-        Error::input(self.file, place, found, expected)
-    }
-
-    pub fn within(&self, value: &Spanned<f64>, field: &str, low: f64, high: f64) -> Result<f64> {
-        let x = *value.get_ref();
-        if x >= low && x <= high {
-            Ok(x)
-        } else {
-            Err(self.refuse(value.span(), field, x.to_string(), &format!("{low} to {high}")))
-        }
-    }
-
-    /// A name that is short enough.
-    pub fn name(&self, name: &Spanned<String>, field: &str) -> Result<String> {
-        let text = name.get_ref();
-        if text.len() > LONGEST_NAME {
-            let expected = format!("a name of at most {LONGEST_NAME} bytes");
-            return Err(self.refuse(name.span(), field, format!("{} bytes", text.len()), &expected));
-        }
-        Ok(text.clone())
-    }
-
-    /// Named stretches within a length (m).
-    pub fn sections(&self, entries: &[SectionEntry], length_m: f64) -> Result<Vec<Section>> {
-        let mut sections: Vec<Section> = Vec::with_capacity(entries.len());
-        for entry in entries {
-            let name = self.name(&entry.name, "name")?.trim().to_owned();
-            let start_m = self.within(&entry.start_m, "start_m", 0.0, length_m)?;
-            let end_m = self.within(&entry.end_m, "end_m", 0.0, length_m)?;
-            if end_m <= start_m {
-                return Err(self.refuse(
-                    entry.end_m.span(),
-                    "end_m",
-                    end_m.to_string(),
-                    &format!("a station beyond start_m, {start_m}"),
-                ));
-            }
-            // Files are named by sections, not everywhere with regard to case.
-            let file_name = |name: &str| stem(name).to_lowercase();
-            let taken = sections.iter().find(|s| file_name(&s.name) == file_name(&name));
-            let expected = match taken {
-                None if name.is_empty() => Some("a name".to_owned()),
-                None => None,
-                Some(other) => Some(format!(
-                    "a name that no other section has: one that differs from `{}` in its letters and digits",
-                    other.name
-                )),
-            };
-            if let Some(expected) = expected {
-                return Err(self.refuse(entry.name.span(), "name", format!("`{name}`"), &expected));
-            }
-            sections.push(Section { name, start_m, end_m });
-        }
-        Ok(sections)
-    }
 }
 
 fn assemble(

@@ -5,8 +5,8 @@ use std::path::Path;
 use serde::Deserialize;
 use toml::Spanned;
 
+use super::checker::{Checker, SectionEntry, parse_toml};
 use super::circuit::Corner;
-use super::load::{Checker, SectionEntry, parse_toml};
 use super::reference::Smoothing;
 use super::survey::{Survey, SurveyOptions};
 use crate::Result;

@@ -1,4 +1,4 @@
-//! Circuits and other roads: centrelines with curvature, widths and named sections, and the cuts across them.
+//! Circuits and other roads: centrelines with curvature, widths and named sections, and the cross-sections across them.
 //!
 //! A [`Circuit`] is built from a table of curvature against station ([`CurvatureTable`]), read from a file
 //! ([`Circuit::load`]) or taken from the ones that come with the crate ([`Circuit::bundled`]). Curvature, heading and
@@ -6,12 +6,14 @@
 //!
 //! A [`Survey`] is a line of points with widths, from a file of any of the usual formats. It becomes a smooth
 //! [`ReferenceLine`], and that a circuit or the [`CrossSections`] that a racing line crosses. A [`Shape`] is a circuit
-//! with known answers. [`Track::load`] takes whatever a `--track` may name.
+//! with known answers. [`Track::load`] opens a circuit, a survey or a shape by name.
 
+mod checker;
 mod circuit;
+mod clothoid;
 mod cross_sections;
 mod crossing;
-mod cuts;
+mod cutting;
 mod export;
 mod from_curvature;
 mod load;

@@ -2,7 +2,7 @@
 
 use super::circuit::{Circuit, Corner, Section};
 use super::cross_sections::CrossSections;
-use super::cuts::cross_sections;
+use super::cutting::cross_sections;
 use super::from_curvature::Closure;
 use super::road::{Road, RoadFrame, Spacing, circuit};
 use super::spline::{Deviation, Spline};
@@ -14,7 +14,7 @@ use glam::DVec2;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Smoothing {
     /// Greatest distance of the reference line from the surveyed centre points (m). The edges stay where they are:
-    /// their distances are measured anew from the smooth line. With 0 the line passes through every point.
+    /// their distances are measured from the smooth line. With 0 the line passes through every point.
     pub line_m: f64,
     /// Greatest change of an edge's distance from the reference line (m). With 0 the edge passes through every point.
     pub edges_m: f64,
@@ -223,7 +223,7 @@ impl ReferenceLine {
         (frame.left_m, frame.right_m)
     }
 
-    /// Cuts across the road along the normals of the line; normals that cross are turned until they do not.
+    /// Cross-sections across the road along the normals of the line; normals that cross are turned until they do not.
     ///
     /// # Errors
     /// [`Error::Input`] naming the station where the road overlaps itself or is wider than a bend allows, or for a

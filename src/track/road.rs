@@ -106,7 +106,7 @@ pub(super) fn circuit(road: &dyn Road) -> Result<(Circuit, Closure)> {
             CurvatureRow {
                 station_m,
                 curvature_1pm: turned / (to - from),
-                // A spline through widths of nought dips below it.
+                // A spline through widths of zero dips below it.
                 width_left_m: frame.left_m.max(0.0),
                 width_right_m: frame.right_m.max(0.0),
                 corner: String::new(),
@@ -193,7 +193,7 @@ pub(super) fn spread(road: &dyn Road, spacing: &Spacing) -> Result<Vec<f64>> {
     if corner_density == 1.0 {
         return Ok((0..cuts).map(even).collect());
     }
-    // Cuts per metre by station: 1 on straights, corner_density where the curvature is greatest.
+    // Cross-sections per metre by station: 1 on straights, corner_density where the curvature is greatest.
     let samples = even_stations(road, 2.0);
     let step = length / (samples.len() - usize::from(!road.closed())) as f64;
     let bends: Vec<f64> = samples

@@ -4,7 +4,6 @@ use super::*;
 use glam::DVec2;
 use proptest::prelude::*;
 use std::f64::consts::{PI, TAU};
-use std::path::{Path, PathBuf};
 
 fn polygon_length(points: &[DVec2], closed: bool) -> f64 {
     let open: f64 = points.windows(2).map(|p| p[0].distance(p[1])).sum();
@@ -381,83 +380,6 @@ proptest! {
             }
         }
     }
-}
-
-fn shared(name: &str) -> Option<PathBuf> {
-    let folder = std::env::var_os("LAPSWARM_SHARED").map_or_else(
-        || Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared"),
-        PathBuf::from,
-    );
-    let path = folder.join(name);
-    if path.is_file() {
-        return Some(path);
-    }
-    eprintln!("SKIPPED: no {}", path.display());
-    None
-}
-
-#[test]
-fn the_surveyed_silverstone_is_cut_as_others_cut_it() {
-    let Some(path) = shared("data/tracks/Silverstone.csv") else {
-        return;
-    };
-    let survey = Survey::read(&path, &SurveyOptions::default()).unwrap();
-    assert!(survey.closed && survey.centre_m.len() == 1178);
-    let raw = survey.as_surveyed().unwrap();
-    let cuts = raw.cross_sections(&Spacing::equal(360)).unwrap();
-    // Figures of the same construction in Python (SciPy's CubicSpline with periodic ends over chord lengths). On these
-    // cuts Clarabel gives a shortest path of 5710.944 m, and 5734.241 m for a car 2 m wide.
-    assert!((raw.length_m() - 5887.369016).abs() < 1e-5, "{}", raw.length_m());
-    for (alpha, wanted) in [(0.0, 5839.944606), (0.5, 5883.661769), (1.0, 5927.850141)] {
-        assert!((line_length(&cuts, alpha) - wanted).abs() < 2e-5, "{alpha}");
-    }
-    let smooth = survey.smoothed(&Smoothing::default()).unwrap();
-    for deviation in [
-        smooth.line_deviation,
-        smooth.left_deviation,
-        smooth.right_deviation,
-    ] {
-        assert!(
-            deviation.greatest_m <= 0.25 + 1e-9 && deviation.rms_m < 0.06,
-            "{deviation:?}"
-        );
-    }
-    // The edges lie where they lay, and bend less on their way.
-    let edges = |line: &ReferenceLine| line.cross_sections(&Spacing::equal(1962)).unwrap();
-    let (rough, even) = (edges(&raw), edges(&smooth));
-    let bending = |p: &[DVec2]| -> f64 {
-        (0..p.len())
-            .map(|i| p[i] + p[(i + 2) % p.len()] - 2.0 * p[(i + 1) % p.len()])
-            .map(|z| z.length_squared())
-            .sum()
-    };
-    let gamma = [&rough.right_m, &even.right_m, &rough.left_m, &even.left_m].map(|p| bending(p));
-    println!("squared second differences of the edges: {gamma:?}");
-    assert!(gamma[1] < gamma[0] && gamma[3] < gamma[2]);
-    for point in even.left_m.iter().step_by(10) {
-        let near = rough
-            .left_m
-            .iter()
-            .map(|p| p.distance(*point))
-            .fold(f64::INFINITY, f64::min);
-        assert!(near < 1.6, "{near}");
-    }
-    let (circuit, closure) = smooth.circuit().unwrap();
-    assert!(closure.gap_m < 0.01, "{closure:?}");
-    for &s in &circuit.station_m {
-        assert!(circuit.position_at(s).distance(smooth.position_at(s)) < 0.03);
-    }
-    let most = |line: &ReferenceLine| {
-        (0..5886)
-            .map(|s| line.curvature_at(f64::from(s)).abs())
-            .fold(0.0, f64::max)
-    };
-    println!(
-        "greatest curvature {:.4} 1/m as surveyed, {:.4} smoothed",
-        most(&raw),
-        most(&smooth)
-    );
-    assert!(most(&smooth) < most(&raw));
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use super::circuit::{Circuit, Corner, Section};
 use super::cross_sections::CrossSections;
-use super::cuts::cross_sections;
+use super::cutting::cross_sections;
 use super::road::{Road, RoadFrame, Spacing, circuit};
 use crate::{Error, Result};
 use glam::DVec2;
@@ -148,7 +148,7 @@ impl Shape {
         Ok(())
     }
 
-    /// Cuts across the road, along the normals.
+    /// Cross-sections across the road, along the normals.
     ///
     /// # Errors
     /// [`Error::Input`] for a shape or spacing out of range.

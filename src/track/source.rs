@@ -3,7 +3,7 @@
 use super::circuit::Circuit;
 use super::cross_sections::CrossSections;
 use super::load::CircuitSource;
-use super::reference::{ReferenceLine, Smoothing};
+use super::reference::Smoothing;
 use super::road::Spacing;
 use super::shapes::Shape;
 use super::survey::Survey;
@@ -72,18 +72,7 @@ impl Track {
         }
     }
 
-    /// The reference line of a survey with what smoothing it took; nothing for what is no survey.
-    ///
-    /// # Errors
-    /// As [`Track::circuit`].
-    pub fn reference_line(&self) -> Result<Option<ReferenceLine>> {
-        match self {
-            Self::Survey(survey, smoothing) => survey.smoothed(smoothing).map(Some),
-            _ => Ok(None),
-        }
-    }
-
-    /// Cuts across the track. A survey is smoothed first, unless `as_surveyed`.
+    /// Cross-sections across the track. A survey is smoothed first, unless `as_surveyed`.
     ///
     /// # Errors
     /// As [`Track::circuit`], and for a spacing out of range.

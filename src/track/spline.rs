@@ -3,7 +3,7 @@
 //! Of all curves that stay as close to the data, the smoothing spline has the least integral of the squared second
 //! derivative: it minimises `sum |y_i - g(t_i)|^2 + lambda integral |g''|^2 dt`. C. H. Reinsch, "Smoothing by spline
 //! functions", Numerische Mathematik 10 (1967); the banded system and its periodic form as in P. J. Green and B. W.
-//! Silverman, *Nonparametric Regression and Generalized Linear Models*, 1994, sections 2.3 and 2.5. With `lambda` nought
+//! Silverman, *Nonparametric Regression and Generalized Linear Models*, 1994, sections 2.3 and 2.5. With `lambda` zero
 //! it is the interpolating spline, natural at open ends.
 
 use glam::DVec2;
@@ -300,7 +300,7 @@ impl System {
         }
     }
 
-    /// The second derivatives at all data, nought at the ends of an open spline.
+    /// The second derivatives at all data, zero at the ends of an open spline.
     fn solve<T: Value>(&self, data: &[T]) -> Vec<T> {
         let n = data.len();
         debug_assert!(self.lambda >= 0.0);

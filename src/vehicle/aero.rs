@@ -1,4 +1,5 @@
-//! Drag and downforce with centre of pressure, headwind and DRS (`physics.md` section 2, "Aero").
+//! Drag and downforce with centre of pressure, headwind and DRS (the book, chapter Model,
+//! section 2).
 
 use super::chassis::Chassis;
 use crate::scalar::Real;

@@ -79,7 +79,10 @@ impl Car {
     /// The tyre file that it names.
     pub const BUNDLED_TYRE: &str = include_str!("../../data/cars/gt_slick.tir");
 
-    /// The bundled GT car (`physics.md` section 8).
+    /// The bundled GT car (the book, chapter Model, section 8).
+    ///
+    /// # Errors
+    /// None in practice: those of [`Car::parse`] for a file that is part of the program.
     pub fn bundled() -> Result<Self> {
         Self::parse(Path::new("the bundled car gt.toml"), Self::BUNDLED_TOML, |name| {
             TyreFile::parse(Path::new(name), Self::BUNDLED_TYRE)
@@ -87,6 +90,9 @@ impl Car {
     }
 
     /// The bundled GT car with its engine map and a hybrid drive.
+    ///
+    /// # Errors
+    /// None in practice: those of [`Car::parse`] for a file that is part of the program.
     pub fn bundled_hybrid() -> Result<Self> {
         Self::parse(
             Path::new("the bundled car gt_hybrid.toml"),
@@ -96,6 +102,9 @@ impl Car {
     }
 
     /// A bundled car by name (`gt`, `gt_hybrid`), or a car file; tyre files are looked for beside it.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if a file cannot be read; [`Error::Input`] naming file and key for what it must not hold.
     pub fn load(name_or_path: &str) -> Result<Self> {
         match name_or_path {
             "gt" => return Self::bundled(),
@@ -168,6 +177,9 @@ impl Car {
     }
 
     /// Writes `<stem>.toml` and the tyre files it names into `folder`.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if a file cannot be written.
     pub fn write(&self, folder: &Path, stem: &str) -> Result<()> {
         let mut text = format!("name = {}\n\n[chassis]\n", toml_string(&self.name));
         push_parameters(&mut text, Chassis::<f64>::PARAMETERS, &self.chassis.to_flat());
@@ -250,7 +262,7 @@ impl Car {
     /// As [`Car::parameter`], for a name that stands at `place` of `file`.
     ///
     /// # Errors
-    /// [`Error::Input`] for an unknown name, with those that are most like it.
+    /// [`Error::Input`] for an unknown name, with the most similar ones.
     pub fn known_parameter(&self, file: &str, place: &str, name: &str) -> Result<CarParameter> {
         self.parameter(name).ok_or_else(|| {
             let like = self.parameters_like(name);
@@ -266,7 +278,7 @@ impl Car {
         })
     }
 
-    /// Names of parameters that one may have meant who wrote `name`, the likest first.
+    /// Names of parameters that resemble `name`, the most similar first.
     fn parameters_like(&self, name: &str) -> Vec<String> {
         let (axle, key) = match name.split_once('.') {
             Some((axle @ ("front" | "rear"), key)) => (format!("{axle}."), key),

@@ -1,4 +1,5 @@
-//! The 4DOF body with roll: longitudinal, lateral, yaw and roll (`physics.md` section 2).
+//! The 4DOF body with roll: longitudinal, lateral, yaw and roll (the book, chapter Model,
+//! section 2).
 
 use super::parameters::parameters;
 use crate::scalar::Real;
@@ -70,7 +71,8 @@ pub struct BodyForces<R> {
     pub yaw_moment: R,
 }
 
-/// Time derivatives of [`BodyState`] in its order (`physics.md` section 2, four bullet equations).
+/// Time derivatives of [`BodyState`] in its order (the book, chapter Model, section 2). The thesis misprints some of these equations
+/// (the book, chapter Model, section 9).
 ///
 /// `roll`'s derivative is `roll_rate` itself.
 #[inline(always)]

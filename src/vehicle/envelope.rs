@@ -1,4 +1,4 @@
-//! What a car can do at each speed: the limits that a point mass is driven within.
+//! The g-g-v envelope of a car: the greatest accelerations at each speed, within which a point mass laps.
 //!
 //! The tyres' acceleration stays inside a friction ellipse whose half axes, the greatest lateral and longitudinal
 //! acceleration, depend on speed, and driving is limited by the engine too. Drag is no force of the tyres and stays
@@ -7,11 +7,12 @@
 
 use crate::config::read_text;
 use crate::error::{Error, Result};
+use serde::{Deserialize, Serialize};
 use std::fmt::Write as _;
 use std::path::Path;
 
 /// Limits at one speed.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct EnvelopeRow {
     /// Speed (m/s).
     pub v_mps: f64,
@@ -74,7 +75,7 @@ impl Envelope {
     /// An envelope of these rows; `name` is what errors and titles call it.
     ///
     /// # Errors
-    /// [`Error::Input`] if there are fewer than two rows, if speeds do not rise, or if a figure cannot be.
+    /// [`Error::Input`] if there are fewer than two rows, if speeds do not rise, or if a figure is out of range.
     pub fn new(name: impl Into<String>, rows: Vec<EnvelopeRow>) -> Result<Self> {
         let name = name.into();
         for (index, row) in rows.iter().enumerate() {
@@ -84,11 +85,24 @@ impl Envelope {
         Ok(Self { name, rows })
     }
 
+    /// The envelope with a share of the grip; drive and drag are the car's own.
+    ///
+    /// # Errors
+    /// [`Error::Input`] if no grip is left.
+    pub fn with_grip_share(&self, share: f64) -> Result<Self> {
+        let rows = self.rows.iter().map(|row| EnvelopeRow {
+            ay_mps2: share * row.ay_mps2,
+            ax_grip_mps2: share * row.ax_grip_mps2,
+            ..*row
+        });
+        Self::new(format!("{}, {share:.3} of its grip", self.name), rows.collect())
+    }
+
     /// Reads an envelope from a CSV file with the columns [`ENVELOPE_COLUMNS`] in any order; lines that begin with
     /// `#` are comments.
     ///
     /// # Errors
-    /// [`Error::Io`] if the file cannot be read, [`Error::Input`] with line and field if it is no envelope.
+    /// [`Error::Io`] if the file cannot be read, [`Error::Input`] with line and field if it holds no envelope.
     pub fn load(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
         let text = read_text(path)?;

@@ -1,4 +1,5 @@
-//! Vertical wheel loads: static, aerodynamic, roll and longitudinal transfer (`physics.md` section 2, "Loads").
+//! Vertical wheel loads: static, aerodynamic, roll and longitudinal transfer (the book, chapter
+//! Model, section 2; the thesis's (3.20)-(3.23) without longitudinal transfer).
 
 use super::aero::AeroForces;
 use super::chassis::{BodyState, Chassis};

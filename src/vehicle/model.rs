@@ -1,5 +1,5 @@
 //! The whole car: wheels, tyres, aero, loads and body put together, and one Runge-Kutta step of it
-//! (`physics.md` section 2). Twin of `shaders/car.wgsl`.
+//! (the book, chapter Model, section 2). Twin of `shaders/car.wgsl`.
 
 use super::aero::aero_forces;
 use super::chassis::{BodyForces, BodyState, Chassis, body_derivative};
@@ -59,7 +59,7 @@ pub struct WheelSlip<R> {
 }
 
 /// Slip of a wheel at `(x, y)` (m) from the point under the centre of gravity, turned by the angle whose cosine
-/// and sine are given, with rim speed `rim_speed` (m/s). `floor` is the least speed slip is reckoned with.
+/// and sine are given, with rim speed `rim_speed` (m/s). `floor` is the least speed slip is computed with.
 #[inline(always)]
 pub fn wheel_slip<R: Real>(
     body: &BodyState<R>,
@@ -186,7 +186,7 @@ impl<R: Real, T: Tyre<R>> CarModel<R, T> {
         for axle in 0..2 {
             let direction = directions[axle];
             let x = axle_x[axle];
-            let mut inputs = [TyreInput::nought(); 2];
+            let mut inputs = [TyreInput::zero(); 2];
             for half in 0..2 {
                 let side = R::lit(SIDES[half]);
                 let place = (x, half_track[axle] * side);

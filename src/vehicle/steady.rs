@@ -1,10 +1,10 @@
-//! Steady cornering and the greatest push of the tyres, from the car's own equations of motion.
+//! Steady-state cornering and the greatest push of the tyres, from the car's own equations of motion.
 //!
 //! A trim is a state in which the car goes round a circle: its sideways, yaw, roll and pitch accelerations are
-//! nought. With no push of the tyres along the path (drag then slows the car, as a point-mass lap takes off by
+//! zero. With no push of the tyres along the path (drag then slows the car, as a quasi-steady-state lap takes off by
 //! itself) the trims of a speed form a curve through straight running. It is followed by its arc length (Keller,
 //! *Numerical solution of bifurcation and nonlinear eigenvalue problems*, 1977), because neither steering angle nor
-//! lateral acceleration rises along it for ever: an oversteering car needs less steering the faster it corners, and
+//! lateral acceleration rises along it without end: an oversteering car needs less steering the faster it corners, and
 //! every car has a greatest lateral acceleration.
 
 use super::aero::aero_forces;

@@ -1,21 +1,19 @@
 //! One small problem of every kind that is evaluated, how it is evaluated, and how far its backends may be apart.
 
+use super::harness::adapter;
 use super::line::{gt_car, line_problem, ring};
 use super::{bundled_car, linear_car, problem};
 use lapswarm::Error;
 use lapswarm::evaluate::drive::{
-    CpuDriveEvaluator, DriveBatching, DriveProblem, GpuDriveEvaluator, SimdDriveEvaluator,
-    open_drive_evaluator,
+    CpuDriveEvaluator, DriveProblem, GpuDriveEvaluator, SimdDriveEvaluator, open_drive_evaluator,
 };
-use lapswarm::evaluate::gpu::{GpuContext, StepBatching};
-use lapswarm::evaluate::hybrid::{
+use lapswarm::evaluate::energy::{
     Free, GpuHybridEvaluator, HybridLine, HybridObjective, HybridProblem, SimdHybridEvaluator, Strategy,
     open_hybrid_evaluator,
 };
-use lapswarm::evaluate::line::{
-    GpuLineEvaluator, LineBatching, LineProblem, SimdLineEvaluator, open_line_evaluator,
-};
-use lapswarm::evaluate::replay::{Batching, GpuEvaluator, ReplayProblem, SimdEvaluator, open_evaluator};
+use lapswarm::evaluate::gpu::{Batching, GpuContext};
+use lapswarm::evaluate::line::{GpuLineEvaluator, LineProblem, SimdLineEvaluator, open_line_evaluator};
+use lapswarm::evaluate::replay::{GpuEvaluator, ReplayProblem, SimdEvaluator, open_evaluator};
 use lapswarm::evaluate::simd::InstructionSet;
 use lapswarm::evaluate::steady::{
     CpuSteadyEvaluator, GpuSteadyEvaluator, SimdSteadyEvaluator, SteadyProblem, open_steady_evaluator,
@@ -25,7 +23,7 @@ use lapswarm::evaluate::{
 };
 use lapswarm::line::energy::{EnergyCar, EnergyPlan, Gates, Mode, Traction};
 use lapswarm::line::{Parametrisation, geometry};
-use lapswarm::parity::made_up::Lap;
+use lapswarm::parity::synthetic_lap::Lap;
 use lapswarm::parity::{Draws, drive, energy, laps, line_tolerances, steady};
 use lapswarm::study::envelope::{EnvelopeSettings, car_limits};
 use lapswarm::vehicle::Car;
@@ -37,23 +35,10 @@ pub fn alone() -> MutexGuard<'static, ()> {
     TURN.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Whether there is a device; without one where there must be one, the test fails.
-pub fn has_device() -> bool {
-    match GpuContext::shared(None) {
-        Ok(_) => true,
-        Err(error) => {
-            let required = std::env::var("LAPSWARM_REQUIRE_GPU").is_ok_and(|x| x == "1");
-            assert!(!required, "LAPSWARM_REQUIRE_GPU=1, but {error}");
-            eprintln!("IGNORED: no GPU adapter ({error})");
-            false
-        }
-    }
-}
-
 /// The backends that there are.
 pub fn choices() -> &'static [BackendChoice] {
     let choices = &[BackendChoice::Cpu, BackendChoice::Simd, BackendChoice::Gpu];
-    &choices[..if has_device() { 3 } else { 2 }]
+    &choices[..if adapter().is_ok() { 3 } else { 2 }]
 }
 
 /// All of an evaluation, in a form that compares to the bit.
@@ -146,15 +131,16 @@ impl Problems {
 
     pub fn kinds(&self) -> [Kind<'_>; 5] {
         // As long as steps are not cut by time they are always cut alike.
-        let steps = |steps| StepBatching {
+        let steps = |steps| Batching {
             lanes: 64,
+            bytes: u64::MAX,
             dispatch_ms: 1e9,
             steps: Some(steps),
         };
-        let lines = LineBatching {
+        let lines = Batching {
             bytes: 1 << 16,
-            lanes: 64,
-            dispatch_ms: 1e9,
+            steps: None,
+            ..steps(1)
         };
         [
             Kind {
@@ -166,7 +152,7 @@ impl Problems {
                         lanes: 128,
                         bytes: 1 << 20,
                         dispatch_ms: 1e9,
-                        samples: Some(1),
+                        steps: Some(1),
                     };
                     Ok(Box::new(
                         GpuEvaluator::new(&self.replay, context)?.with_batching(batching),
@@ -217,14 +203,14 @@ impl Problems {
                 problem: &self.drive.problem,
                 open: Box::new(|choice| open_drive_evaluator(&self.drive, choice, None).expect("it opens")),
                 cut: Box::new(move |context| {
-                    let all: DriveBatching = steps(usize::MAX);
+                    let all = steps(usize::MAX);
                     Ok(Box::new(
                         GpuDriveEvaluator::new(&self.drive, context)?.with_batching(all),
                     ))
                 }),
                 lanes: Box::new(|| Box::new(SimdDriveEvaluator::new(&self.drive, InstructionSet::best()))),
                 allowed: Box::new(|candidate, _| {
-                    let lap = CpuDriveEvaluator::new(&self.drive).laps(&[candidate])[0].ok()?;
+                    let lap = CpuDriveEvaluator::new(&self.drive).outcomes(&[candidate])[0].ok()?;
                     Some(drive::allowed(&self.drive, &lap).to_vec())
                 }),
             },
@@ -240,7 +226,7 @@ impl Problems {
                 }),
                 lanes: Box::new(|| Box::new(SimdSteadyEvaluator::new(&self.steady, InstructionSet::best()))),
                 allowed: Box::new(|candidate, row| {
-                    let state = CpuSteadyEvaluator::new(&self.steady).states(&[candidate])[0].ok()?;
+                    let state = CpuSteadyEvaluator::new(&self.steady).outcomes(&[candidate])[0].ok()?;
                     let [across, sideslip, roll, slip] = steady::allowed(&self.steady, candidate, &state)?;
                     let [speed, _] = self.steady.aim_figures(candidate);
                     // The order of the objectives, of which the first is speed times the third.

@@ -1,17 +1,19 @@
-//! What the parity tests and the benchmark share: a made-up lap, problems on it, and a small random generator.
+//! What tests and benchmarks share: a harness, problems, runs of the program, and a small random generator.
 
 #![allow(dead_code)] // Each of the crates that include this module uses a part of it.
 
+#[macro_use]
+pub mod harness;
 pub mod kinds;
 pub mod line;
 pub mod runs;
 
 use lapswarm::evaluate::replay::ReplayProblem;
-use lapswarm::parity::made_up;
-use lapswarm::parity::made_up::Lap;
+use lapswarm::parity::synthetic_lap;
+use lapswarm::parity::synthetic_lap::Lap;
 use lapswarm::vehicle::{Car, LinearTyre, Tyres};
 
-/// The 22 unknowns of the identification (`physics.md` section 3).
+/// The 22 unknowns of the identification.
 pub const UNKNOWNS: [&str; 22] = [
     "rBx1", "rBx2", "rCx1", "rEx1", "rEx2", "rHx1", "rBy1", "rBy2", "rBy3", "rCy1", "rEy1", "rEy2", "rHy1",
     "rHy2", "rVy1", "rVy2", "rVy3", "rVy4", "rVy5", "rVy6", "K", "C",
@@ -59,5 +61,5 @@ pub fn linear_car() -> Car {
 
 /// The problem of finding `free` (all between 0.2 and 1.8 times their value in `car`) from a lap that `car` drove.
 pub fn problem(car: Car, free: &[&str], lap: Lap) -> ReplayProblem {
-    made_up::problem(car, free, lap).expect("a sound problem")
+    synthetic_lap::problem(car, free, lap).expect("a sound problem")
 }

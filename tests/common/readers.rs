@@ -1,16 +1,19 @@
 //! Every reader given bytes from anywhere: what it takes is sound, what it refuses it refuses by file and place, and it never
 //! panics. The fuzz targets of `fuzz/` and the tests of what they found share this file.
 
+use lapswarm::config::settings::Settings;
+use lapswarm::line::read_line;
 use lapswarm::study::compare::{self, Run};
+use lapswarm::study::envelope::EnvelopeSettings;
+use lapswarm::study::framework::journal::Journal;
 use lapswarm::study::hybrid::{self, HybridStudySettings};
 use lapswarm::study::identify::{IdentifySettings, SearchState};
-use lapswarm::study::journal::Journal;
 use lapswarm::study::raceline::{LinesState, RacelineSettings};
 use lapswarm::study::run::RunSettings;
 use lapswarm::study::sensitivity::SensitivitySettings;
 use lapswarm::study::surface::SurfaceSettings;
 use lapswarm::study::sweep::{self, SWEEP_FILE, SweepSettings};
-use lapswarm::study::transient::{DriveState, read_line};
+use lapswarm::study::transient::{DriveState, TransientSettings};
 use lapswarm::swarm::checkpoint::{self, Checkpoint};
 use lapswarm::swarm::device::DeviceState;
 use lapswarm::swarm::{
@@ -90,7 +93,7 @@ fn on_disk(name: &str, bytes: &[u8]) -> PathBuf {
     path
 }
 
-/// What stands before and after the first nought.
+/// What stands before and after the first zero.
 fn split(data: &[u8]) -> (&[u8], &[u8]) {
     let mut parts = data.splitn(2, |&byte| byte == 0);
     (parts.next().unwrap_or_default(), parts.next().unwrap_or_default())
@@ -175,6 +178,8 @@ pub fn study(data: &[u8]) {
     taken_from_disk(RunSettings::read(&path));
     taken_from_disk(SensitivitySettings::read(&path));
     taken_from_disk(SurfaceSettings::read(&path));
+    taken_from_disk(EnvelopeSettings::read(&path));
+    taken_from_disk(TransientSettings::read(&path));
     taken(ChannelMap::parse(&String::from_utf8_lossy(data), "f.toml"));
 }
 
@@ -186,7 +191,7 @@ pub fn sweep(data: &[u8]) {
     }
 }
 
-/// A circuit's file and, behind a nought, its table of curvature.
+/// A circuit's file and, behind a zero, its table of curvature.
 pub fn curvature(data: &[u8]) {
     let (toml, table) = split(data);
     let path = on_disk("circuit.toml", toml);
@@ -346,7 +351,7 @@ pub fn line(data: &[u8]) {
     }
 }
 
-/// A file that names a survey and, behind a nought, the survey.
+/// A file that names a survey and, behind a zero, the survey.
 pub fn survey_file(data: &[u8]) {
     let (toml, table) = split(data);
     let path = on_disk("surveyed.toml", toml);

@@ -1,15 +1,16 @@
 //! Running the program, breaking it off, and holding what it leaves against what it should have left.
 
 use super::Random;
+use lapswarm::hold::{self, Point};
+use lapswarm::study::framework::journal::Journal;
 use lapswarm::study::identify::SearchState;
-use lapswarm::study::journal::Journal;
 use lapswarm::study::raceline::{LinesState, RacelineSettings, set_up};
 use lapswarm::study::transient::DriveState;
 use lapswarm::swarm::checkpoint;
 use lapswarm::vehicle::Car;
 use serde_json::Value;
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
@@ -27,21 +28,28 @@ pub fn moments(study: &str) -> Random {
     Random(seed)
 }
 
-pub fn start(folder: &Path, arguments: &[&str]) -> Child {
+/// The line that a held program writes.
+const HELD: &str = "held";
+
+fn program(folder: &Path, arguments: &[&str]) -> Command {
     let saves: &[&str] = match arguments[0] {
         // Keeps every row as it comes.
         "sweep" => &[],
         _ => &["--save-every-s", "0"],
     };
-    Command::new(env!("CARGO_BIN_EXE_lapswarm"))
+    let mut program = Command::new(env!("CARGO_BIN_EXE_lapswarm"));
+    program
         .args(arguments)
         .args(["--json", "--quiet"])
         .args(saves)
         .current_dir(folder)
         .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .expect("the program starts")
+        .stderr(Stdio::piped());
+    program
+}
+
+pub fn start(folder: &Path, arguments: &[&str]) -> Child {
+    program(folder, arguments).spawn().expect("the program starts")
 }
 
 pub fn finish(child: Child) -> Output {
@@ -79,28 +87,69 @@ pub fn timeless(summary: Value) -> Value {
     }
 }
 
-/// Waits until a run has written `marker`, and a number of milliseconds more; no longer than it works. Whether it still does.
-pub fn let_work(child: &mut Child, marker: &Path, ms: u64) -> bool {
-    let limit = Instant::now() + Duration::from_secs(120);
-    let mut saved = None;
-    while Instant::now() < limit && child.try_wait().expect("its state").is_none() {
-        if saved.is_none() && marker.is_file() {
-            saved = Some(Instant::now());
-        }
-        if saved.is_some_and(|at| at.elapsed() >= Duration::from_millis(ms)) {
-            return true;
-        }
-        std::thread::sleep(Duration::from_millis(2));
-    }
-    false
+/// A run that is held at a point, as `lapswarm::hold` has them.
+pub struct Held {
+    child: Child,
+    /// What it has passed.
+    passed: PathBuf,
 }
 
-/// How long a run goes on after it has written `marker`.
-pub fn works_for(child: &mut Child, marker: &Path) -> Duration {
-    let_work(child, marker, 0);
-    let began = Instant::now();
-    child.wait().expect("it ends");
-    began.elapsed()
+impl Held {
+    /// Begins a study in `folder` that is held when it passes `point` for the `number`-th time; never if that is 0.
+    pub fn start(folder: &Path, study: &[&str], out: &str, (point, number): (&str, usize)) -> Self {
+        let passed = folder.join(format!("{out}.passed"));
+        let child = program(folder, &[study, &["--out", out]].concat())
+            .env(hold::VARIABLE, format!("{point}:{number}:{}", passed.display()))
+            .spawn()
+            .expect("the program starts");
+        Self { child, passed }
+    }
+
+    /// The points that it has passed until now.
+    pub fn passed(&self) -> Vec<String> {
+        let text = std::fs::read_to_string(&self.passed).unwrap_or_default();
+        text.lines().map(str::to_owned).collect()
+    }
+
+    /// Waits until it is held, or until it ends without having been; whether it is.
+    pub fn is_held(&mut self) -> bool {
+        // No run here takes a tenth of this on any machine: a guard against waiting for ever.
+        let limit = Instant::now() + Duration::from_secs(1200);
+        loop {
+            let ended = self.child.try_wait().expect("its state").is_some();
+            if self.passed().iter().any(|line| line == HELD) {
+                return true;
+            }
+            if ended {
+                return false;
+            }
+            assert!(
+                Instant::now() < limit,
+                "neither held nor ended: {:?}",
+                self.passed
+            );
+            std::thread::sleep(Duration::from_millis(2));
+        }
+    }
+
+    /// Sends it a signal and waits for its end; with how many steps it and its solvers took after that.
+    pub fn signal(self, signal: &str) -> (Output, usize) {
+        let told = Command::new("kill")
+            .args([signal, &self.child.id().to_string()])
+            .status();
+        assert!(told.expect("kill").success());
+        let passed = self.passed.clone();
+        let ended = finish(self.child);
+        let text = std::fs::read_to_string(passed).expect("what it passed");
+        let after = text.lines().skip_while(|line| *line != HELD);
+        let steps = [Point::Step, Point::Solver].map(Point::name);
+        (ended, after.filter(|line| steps.contains(line)).count())
+    }
+
+    /// Waits for its end.
+    pub fn finish(self) -> Output {
+        finish(self.child)
+    }
 }
 
 /// Whether a file waits to be put in the place of another, which a lock does not.

@@ -1,14 +1,23 @@
 //! Layer five: results do not depend on how the work is cut.
 
 use crate::common::{UNKNOWNS, bundled_car, problem};
-use crate::device::device;
+use crate::device::{device, the_device};
 use lapswarm::evaluate::replay::{
     Batching, GpuEvaluator, Norm, ReplayProblem, SimdEvaluator, open_evaluator,
 };
 use lapswarm::evaluate::simd::InstructionSet;
 use lapswarm::evaluate::{BackendChoice, Evaluation, Evaluator, Failure};
 use lapswarm::parity::Draws;
-use lapswarm::parity::made_up::{Lap, candidates};
+use lapswarm::parity::synthetic_lap::{Lap, candidates};
+
+tests! {
+    a_candidate_costs_the_same_alone_and_among_others: also_device,
+    batches_and_chunks_do_not_show: device,
+    long_windows_are_driven_in_chunks_that_do_not_show: device,
+    windows_longer_than_a_driver_bears_are_driven_to_their_end: device,
+    more_steps_than_a_driver_bears_are_refused: device,
+    windows_add_up: device,
+}
 
 fn bits(evaluation: &Evaluation) -> (Vec<u64>, Vec<Option<Failure>>) {
     let objectives = evaluation.objectives.iter().map(|x| x.to_bits()).collect();
@@ -38,7 +47,6 @@ fn population(replay: &ReplayProblem, count: usize) -> Vec<f64> {
     population
 }
 
-#[test]
 fn a_candidate_costs_the_same_alone_and_among_others() {
     let lap = Lap {
         samples: 1_500,
@@ -85,9 +93,8 @@ fn a_candidate_costs_the_same_alone_and_among_others() {
     }
 }
 
-#[test]
 fn batches_and_chunks_do_not_show() {
-    let Some(context) = device() else { return };
+    let context = the_device();
     for norm in [Norm::One, Norm::Infinity] {
         let replay = many_windows(norm);
         let population = population(&replay, 200);
@@ -112,7 +119,7 @@ fn batches_and_chunks_do_not_show() {
             },
             // One block of samples at a time, and two workgroups of candidates.
             Batching {
-                samples: Some(1),
+                steps: Some(1),
                 lanes: 2 * 150 * 64,
                 ..usual
             },
@@ -130,9 +137,8 @@ fn batches_and_chunks_do_not_show() {
     }
 }
 
-#[test]
 fn long_windows_are_driven_in_chunks_that_do_not_show() {
-    let Some(context) = device() else { return };
+    let context = the_device();
     let lap = Lap {
         samples: 1_000,
         ..Lap::default()
@@ -151,7 +157,7 @@ fn long_windows_are_driven_in_chunks_that_do_not_show() {
     assert_eq!(evaluator.statistics().dispatches, 1);
     for samples in [64, 128, 960] {
         evaluator = evaluator.with_batching(Batching {
-            samples: Some(samples),
+            steps: Some(samples),
             ..whole
         });
         let found = evaluator.evaluate(&population).expect("it runs");
@@ -162,9 +168,8 @@ fn long_windows_are_driven_in_chunks_that_do_not_show() {
 
 /// A software driver leaves all loops of a dispatch after 65,535 rounds without a word: however fast the device, no dispatch
 /// may take as many.
-#[test]
 fn windows_longer_than_a_driver_bears_are_driven_to_their_end() {
-    let Some(context) = device() else { return };
+    let context = the_device();
     for substeps in [1, 3] {
         let lap = Lap {
             samples: 20_000,
@@ -184,7 +189,7 @@ fn windows_longer_than_a_driver_bears_are_driven_to_their_end() {
         let found = evaluator.evaluate(&population).expect("it runs");
         assert!(evaluator.statistics().dispatches > 1);
         evaluator = evaluator.with_batching(Batching {
-            samples: Some(64),
+            steps: Some(64),
             ..unhurried
         });
         let expected = evaluator.evaluate(&population).expect("it runs");
@@ -194,9 +199,8 @@ fn windows_longer_than_a_driver_bears_are_driven_to_their_end() {
 }
 
 /// So many steps between samples that not one block of samples fits a software driver's loops: it says so, and lanes take over.
-#[test]
 fn more_steps_than_a_driver_bears_are_refused() {
-    let Some(context) = device() else { return };
+    let context = the_device();
     if context.summary().kind.is_real() {
         return;
     }
@@ -225,9 +229,8 @@ fn more_steps_than_a_driver_bears_are_refused() {
 }
 
 /// A window costs the same whether it is scored alone or among others.
-#[test]
 fn windows_add_up() {
-    let Some(context) = device() else { return };
+    let context = the_device();
     let replay = many_windows(Norm::One);
     let population = candidates(&replay, 8, 0.2, &mut Draws::new(4));
     let all = GpuEvaluator::new(&replay, context.clone())

@@ -5,17 +5,14 @@ use lapswarm::evaluate::simd::InstructionSet;
 use lapswarm::parity::Subject;
 use std::sync::Arc;
 
-/// The device; `None` with a word on standard error if there is none and none is required.
+/// The device, if there is one.
 pub fn device() -> Option<Arc<GpuContext>> {
-    match GpuContext::shared(None) {
-        Ok(context) => Some(context),
-        Err(error) => {
-            let required = std::env::var("LAPSWARM_REQUIRE_GPU").is_ok_and(|x| x == "1");
-            assert!(!required, "LAPSWARM_REQUIRE_GPU=1, but {error}");
-            eprintln!("IGNORED: no GPU adapter ({error})");
-            None
-        }
-    }
+    GpuContext::shared(None).ok()
+}
+
+/// The device of a test that needs one.
+pub fn the_device() -> Arc<GpuContext> {
+    GpuContext::shared(None).expect("the harness has looked")
 }
 
 /// Every instruction set, and the device if there is one.

@@ -13,7 +13,14 @@ use lapswarm::parity::Draws;
 use lapswarm::parity::drive::{Cases, candidates, problem};
 use lapswarm::track::Track;
 
-#[test]
+tests! {
+    steps_of_the_driver_and_laps_agree_on_every_backend: also_device,
+    the_evaluators_lap_is_the_recorded_one: plain,
+    a_lap_is_the_same_alone_and_among_others_however_it_is_cut: also_device,
+    candidates_that_fail_say_why: also_device,
+    plans_blend_between_their_shares: plain,
+}
+
 fn steps_of_the_driver_and_laps_agree_on_every_backend() {
     let cases = Cases::new().expect("the bundled car drives");
     for subject in subjects() {
@@ -43,7 +50,6 @@ fn slices(candidates: &[Vec<f64>]) -> Vec<&[f64]> {
 /// The evaluator's lap is that of the drive which is recorded: the same kernel, the times put together otherwise. The
 /// recording has samples every 10 ms, between which it takes the speed for steady: at 10 m/s^2 and 20 m/s that is off by half
 /// of `10 (0.01 s)^2 / 20 m/s`, 2.5e-5 s, at either line.
-#[test]
 fn the_evaluators_lap_is_the_recorded_one() {
     let car = bundled_car();
     let circuit = Track::load("stadium:200:70:14")
@@ -54,7 +60,7 @@ fn the_evaluators_lap_is_the_recorded_one() {
     let flat = car.to_flat();
     let mut candidate: Vec<f64> = problem.free.parameters.iter().map(|p| flat[p.slots[0]]).collect();
     candidate.push(pace);
-    let laps = CpuDriveEvaluator::new(&problem).laps(&[&candidate]);
+    let laps = CpuDriveEvaluator::new(&problem).outcomes(&[&candidate]);
     let lap = laps[0].expect("it is driven");
     assert_eq!(lap.ending, ending::FINISHED);
 
@@ -90,7 +96,6 @@ fn bits(laps: &[Result<DrivenLap, Failure>]) -> Vec<Result<[u64; 4], Failure>> {
 }
 
 /// How the work is cut does not show, nor does the company; instruction sets have the same bits.
-#[test]
 fn a_lap_is_the_same_alone_and_among_others_however_it_is_cut() {
     for car in [bundled_car(), linear_car()] {
         let linear = car.tyre_model() == linear_car().tyre_model();
@@ -106,13 +111,17 @@ fn a_lap_is_the_same_alone_and_among_others_however_it_is_cut() {
         let mut same: Option<Vec<_>> = None;
         for set in InstructionSet::available() {
             let evaluator = SimdDriveEvaluator::new(&problem, set);
-            let together = bits(&evaluator.laps(&all));
-            assert_eq!(bits(&evaluator.laps(&all[33..34])), together[33..34], "{set:?}");
+            let together = bits(&evaluator.outcomes(&all));
+            assert_eq!(
+                bits(&evaluator.outcomes(&all[33..34])),
+                together[33..34],
+                "{set:?}"
+            );
             assert_eq!(*same.get_or_insert_with(|| together.clone()), together, "{set:?}");
         }
-        let Some(context) = device() else { return };
+        let Some(context) = device() else { continue };
         let mut evaluator = GpuDriveEvaluator::new(&problem, context.clone()).expect("the kernel compiles");
-        let whole = bits(&evaluator.laps(&all).expect("it runs"));
+        let whole = bits(&evaluator.outcomes(&all).expect("it runs"));
         // The last asks for a whole lap at once.
         for (lanes, steps, dispatch_ms) in [
             (64, None, 70.0),
@@ -122,22 +131,22 @@ fn a_lap_is_the_same_alone_and_among_others_however_it_is_cut() {
             let batching = DriveBatching {
                 lanes,
                 steps,
+                bytes: u64::MAX,
                 dispatch_ms,
             };
             let mut cut = GpuDriveEvaluator::new(&problem, context.clone())
                 .expect("the kernel compiles")
                 .with_batching(batching);
-            assert_eq!(bits(&cut.laps(&all).expect("it runs")), whole, "{batching:?}");
+            assert_eq!(bits(&cut.outcomes(&all).expect("it runs")), whole, "{batching:?}");
         }
         assert_eq!(
-            bits(&evaluator.laps(&all[33..34]).expect("it runs")),
+            bits(&evaluator.outcomes(&all[33..34]).expect("it runs")),
             whole[33..34]
         );
     }
 }
 
 /// What cannot be driven to the end costs the most and says why, alike on every backend.
-#[test]
 fn candidates_that_fail_say_why() {
     // Twice the grip there is: the car runs wide at once.
     let circuits = ["stadium:150:60:14"];
@@ -186,7 +195,6 @@ fn candidates_that_fail_say_why() {
 }
 
 /// A blend of two plans of the same speed is that plan; between two plans the lap time is between theirs.
-#[test]
 fn plans_blend_between_their_shares() {
     let problem = small(bundled_car());
     let mut candidate = candidates(&problem, 1, &mut Draws::new(2)).remove(0);
@@ -194,7 +202,7 @@ fn plans_blend_between_their_shares() {
     let mut times = Vec::new();
     for share in [0.4, 0.44, 0.5, 0.55] {
         candidate[pace] = share;
-        let lap = CpuDriveEvaluator::new(&problem).laps(&[&candidate]).remove(0);
+        let lap = CpuDriveEvaluator::new(&problem).outcomes(&[&candidate]).remove(0);
         times.push(lap.expect("it is driven").time_s);
     }
     assert!(times.windows(2).all(|w| w[1] < w[0]), "{times:?}");

@@ -3,7 +3,10 @@
 use crate::device::subjects;
 use lapswarm::parity::elementary::{FUNCTIONS, compare};
 
-#[test]
+tests! {
+    every_backend_has_the_bits_of_the_scalar_or_nearly: also_device,
+}
+
 fn every_backend_has_the_bits_of_the_scalar_or_nearly() {
     for subject in subjects() {
         let found = compare(&subject).expect("the kernel runs");

@@ -4,17 +4,22 @@ use crate::common::Random;
 use crate::common::line::circuit;
 use crate::device::device;
 use glam::DVec2;
-use lapswarm::evaluate::Evaluator;
-use lapswarm::evaluate::hybrid::{
+use lapswarm::evaluate::energy::{
     CpuHybridEvaluator, Free, GpuHybridEvaluator, HybridLine, HybridObjective, HybridProblem,
     SimdHybridEvaluator, Strategy,
 };
 use lapswarm::evaluate::simd::InstructionSet;
+use lapswarm::evaluate::{Evaluator, Failure};
 use lapswarm::line::energy::{EnergyCar, EnergyLap, EnergyPlan, Gates, Mode, Traction};
 use lapswarm::line::{Parametrisation, geometry};
 use lapswarm::parity::energy::{Allowed, allowed};
 use lapswarm::study::envelope::{EnvelopeSettings, car_limits};
 use lapswarm::vehicle::Car;
+
+tests! {
+    laps_with_energy_agree_and_balance: also_device,
+    evaluations_are_rows_of_laps_and_candidates_that_are_no_numbers_fail: also_device,
+}
 
 fn hybrid_car(exponent: f64) -> EnergyCar {
     let car = Car::load("gt_hybrid").expect("bundled");
@@ -125,25 +130,31 @@ fn check_books(name: &str, problem: &HybridProblem, laps: &[EnergyLap<f64>], eps
     }
 }
 
+fn driven(laps: Vec<Result<EnergyLap<f64>, Failure>>) -> Vec<EnergyLap<f64>> {
+    laps.into_iter().map(|lap| lap.expect("it is driven")).collect()
+}
+
 /// Books balance to rounding on every lap of every particle, and single precision gives the laps of `f64`.
 ///
 /// How far off they may be says `lapswarm::parity::energy`.
-#[test]
 fn laps_with_energy_agree_and_balance() {
     let mut random = Random(77);
     for (name, problem) in problems() {
         let rows = candidates(&problem, 70, &mut random);
         let slices: Vec<&[f64]> = rows.iter().map(Vec::as_slice).collect();
-        let expected = CpuHybridEvaluator::new(&problem).laps(&slices);
+        let expected = driven(CpuHybridEvaluator::new(&problem).outcomes(&slices));
         check_books(&name, &problem, &expected, f64::EPSILON);
         let mut found: Vec<(String, Vec<EnergyLap<f64>>)> = Vec::new();
         for set in InstructionSet::available() {
-            let laps = SimdHybridEvaluator::new(&problem, set).laps(&slices);
+            let laps = driven(SimdHybridEvaluator::new(&problem, set).outcomes(&slices));
             found.push((format!("simd {}", set.name()), laps));
         }
         if let Some(context) = device() {
             let mut evaluator = GpuHybridEvaluator::new(&problem, context).expect("the kernel compiles");
-            found.push(("gpu".to_owned(), evaluator.laps(&slices).expect("it runs")));
+            found.push((
+                "gpu".to_owned(),
+                driven(evaluator.outcomes(&slices).expect("it runs")),
+            ));
         }
         for (backend, laps) in found {
             check_books(
@@ -182,7 +193,6 @@ fn laps_with_energy_agree_and_balance() {
     }
 }
 
-#[test]
 fn evaluations_are_rows_of_laps_and_candidates_that_are_no_numbers_fail() {
     let (_, problem) = problems().swap_remove(2);
     let mut random = Random(3);

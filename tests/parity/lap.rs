@@ -7,13 +7,19 @@ use lapswarm::evaluate::replay::{
     CHANNEL_NAMES, CpuEvaluator, GpuEvaluator, ModelTable, Norm, Plan, ReplayProblem, SimdEvaluator, trace,
 };
 use lapswarm::evaluate::simd::InstructionSet;
-use lapswarm::evaluate::{Evaluation, Evaluator};
-use lapswarm::parity::made_up::{INTERVAL_S, Lap, candidates};
+use lapswarm::evaluate::{Evaluation, Evaluator, ProblemKind};
+use lapswarm::parity::synthetic_lap::{INTERVAL_S, Lap, candidates};
 use lapswarm::parity::{Draws, car_source};
 use lapswarm::scalar::Real;
 use lapswarm::vehicle::tyre::Tyre;
 use lapswarm::vehicle::{CarModel, LinearTyre, MagicFormula, TyreModel};
 use std::fmt::Write as _;
+
+tests! {
+    a_whole_lap_agrees_on_every_backend_in_every_norm: also_device,
+    a_lap_at_the_limit_agrees_on_who_spins: also_device,
+    windows_substeps_and_the_linear_tyre_agree: also_device,
+}
 
 /// Allowed difference of an objective, as a share of it.
 ///
@@ -68,7 +74,7 @@ fn scalar(replay: &ReplayProblem, population: &[f64]) -> Evaluation {
                 TyreModel::Linear => single::<LinearTyre<f32>>(replay, &plan, &figures),
             }
         };
-        let (row, spun) = replay.objective_row(errors);
+        let (row, spun) = replay.objective_row(candidate, Ok(&errors));
         evaluation.objectives.extend(row);
         evaluation.failures.push(failure.or(spun));
     }
@@ -218,7 +224,7 @@ fn neighbours(replay: &ReplayProblem, candidate: &[f64]) -> Evaluation {
             TyreModel::MagicFormula => near::<MagicFormula<f64>>(replay, &flat),
             TyreModel::Linear => near::<LinearTyre<f64>>(replay, &flat),
         };
-        let (row, spun) = replay.objective_row(errors);
+        let (row, spun) = replay.objective_row(candidate, Ok(&errors));
         evaluation.objectives.extend(row);
         evaluation.failures.push(spun);
     }
@@ -330,7 +336,6 @@ fn all_backends(what: &str, replay: &ReplayProblem, count: usize, share: f64) ->
 
 const NORMS: [Norm; 4] = [Norm::One, Norm::Two, Norm::Infinity, Norm::MeanSquare];
 
-#[test]
 fn a_whole_lap_agrees_on_every_backend_in_every_norm() {
     for norm in NORMS {
         let lap = Lap {
@@ -343,7 +348,6 @@ fn a_whole_lap_agrees_on_every_backend_in_every_norm() {
     }
 }
 
-#[test]
 fn a_lap_at_the_limit_agrees_on_who_spins() {
     let lap = Lap {
         grip: 14.0,
@@ -358,7 +362,6 @@ fn a_lap_at_the_limit_agrees_on_who_spins() {
     );
 }
 
-#[test]
 fn windows_substeps_and_the_linear_tyre_agree() {
     let lap = Lap {
         windows: 24,

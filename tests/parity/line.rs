@@ -2,7 +2,7 @@
 
 use crate::common::Random;
 use crate::common::line::{circuit, gt_car, line_problem, lines, random_car, ring};
-use crate::device::device;
+use crate::device::{device, the_device};
 use glam::DVec2;
 use lapswarm::evaluate::line::{
     CpuLineEvaluator, GpuLineEvaluator, LineBatching, LineObjective, LineProblem, SimdLineEvaluator,
@@ -11,6 +11,15 @@ use lapswarm::evaluate::simd::InstructionSet;
 use lapswarm::evaluate::{Evaluation, Evaluator, FAILED_COST, Failure};
 use lapswarm::line::Parametrisation;
 use lapswarm::parity::line_tolerances;
+
+tests! {
+    lines_cost_what_the_reference_says_on_every_backend: also_device,
+    circles_have_the_shape_of_their_polygons_on_every_backend: also_device,
+    lines_do_not_know_where_on_earth_they_are: also_device,
+    a_line_costs_the_same_alone_and_among_others: also_device,
+    batches_and_dispatches_of_lines_do_not_show: device,
+    objectives_do_not_depend_on_each_other: also_device,
+}
 
 /// The single-precision backends.
 fn backends(problem: &LineProblem) -> Vec<(String, Box<dyn Evaluator + '_>)> {
@@ -89,7 +98,6 @@ fn problems() -> Vec<(&'static str, LineProblem)> {
     problems
 }
 
-#[test]
 fn lines_cost_what_the_reference_says_on_every_backend() {
     for (kind, problem) in problems() {
         let population = lines(&problem, 70, &mut Random(6));
@@ -110,7 +118,6 @@ fn lines_cost_what_the_reference_says_on_every_backend() {
     }
 }
 
-#[test]
 fn circles_have_the_shape_of_their_polygons_on_every_backend() {
     let cuts = ring(590.0, 600.0, 361);
     // Second differences are over the spacing of the cuts, whatever the radius of the line.
@@ -139,7 +146,6 @@ fn circles_have_the_shape_of_their_polygons_on_every_backend() {
 
 /// A circuit far from the origin: its lines cost the same to the last bit that the differences have, because no backend
 /// subtracts coordinates in single precision.
-#[test]
 fn lines_do_not_know_where_on_earth_they_are() {
     let near = circuit(360, 16.0, true, DVec2::ZERO, &mut Random(9));
     let far = circuit(360, 16.0, true, DVec2::new(3e5, -5.2e6), &mut Random(9));
@@ -175,7 +181,6 @@ fn bits(evaluation: &Evaluation) -> (Vec<u64>, Vec<Option<Failure>>) {
     (objectives, evaluation.failures.clone())
 }
 
-#[test]
 fn a_line_costs_the_same_alone_and_among_others() {
     let cuts = circuit(300, 14.0, true, DVec2::ZERO, &mut Random(11));
     let problem = line_problem(cuts, Parametrisation::control_points(50), gt_car());
@@ -205,9 +210,8 @@ fn a_line_costs_the_same_alone_and_among_others() {
     }
 }
 
-#[test]
 fn batches_and_dispatches_of_lines_do_not_show() {
-    let Some(context) = device() else { return };
+    let context = the_device();
     let cuts = circuit(120, 14.0, true, DVec2::ZERO, &mut Random(13));
     let problem = line_problem(cuts, Parametrisation::control_points(30), gt_car());
     let population = lines(&problem, 400, &mut Random(14));
@@ -235,7 +239,6 @@ fn batches_and_dispatches_of_lines_do_not_show() {
 }
 
 /// Each objective alone gives what it gives among all: kernels are specialised to what is asked for.
-#[test]
 fn objectives_do_not_depend_on_each_other() {
     let cuts = circuit(100, 14.0, true, DVec2::ZERO, &mut Random(15));
     let all = line_problem(cuts.clone(), Parametrisation::sections(), gt_car());

@@ -1,8 +1,9 @@
 //! The single-precision backends against each other and against the `f64` reference, in four layers: elementary
-//! functions, one derivative and one Runge-Kutta step, whole laps, and how the work is cut.
+//! functions, one derivative and one Runge-Kutta step, whole laps, and how the work is cut; and the kernels' sources.
 //!
-//! A machine without an adapter says so and skips what needs one; `LAPSWARM_REQUIRE_GPU=1` makes that a failure.
+//! What needs an adapter shows as ignored on a machine without one; `LAPSWARM_REQUIRE_GPU=1` makes that a failure.
 
+#[macro_use]
 #[path = "../common/mod.rs"]
 mod common;
 mod cutting;
@@ -12,7 +13,24 @@ mod elementary;
 mod energy;
 mod lap;
 mod line;
+mod shaders;
 mod steady;
 mod step;
 mod swarm;
 mod swarm_lines;
+
+fn main() -> std::process::ExitCode {
+    common::harness::main([
+        cutting::tests(),
+        drive::tests(),
+        elementary::tests(),
+        energy::tests(),
+        lap::tests(),
+        line::tests(),
+        shaders::tests(),
+        steady::tests(),
+        step::tests(),
+        swarm::tests(),
+        swarm_lines::tests(),
+    ])
+}

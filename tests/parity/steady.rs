@@ -13,7 +13,12 @@ use lapswarm::parity::Draws;
 use lapswarm::parity::steady::{Cases, candidates, problem};
 use lapswarm::vehicle::{Car, Tyres};
 
-#[test]
+tests! {
+    trims_agree_on_every_backend: also_device,
+    a_trim_is_the_same_alone_and_among_others_however_it_is_cut: also_device,
+    cars_that_fail_say_why: also_device,
+}
+
 fn trims_agree_on_every_backend() {
     let cases = Cases::new().expect("the bundled car settles");
     for subject in subjects() {
@@ -36,15 +41,14 @@ fn slices(candidates: &[Vec<f64>]) -> Vec<&[f64]> {
     candidates.iter().map(Vec::as_slice).collect()
 }
 
-fn bits(states: &[Result<Settling<f32>, Failure>]) -> Vec<Result<[u32; 8], Failure>> {
+fn bits(states: &[Result<Settling<f64>, Failure>]) -> Vec<Result<[u64; 8], Failure>> {
     states
         .iter()
-        .map(|state| state.map(|s| s.to_array().map(f32::to_bits)))
+        .map(|state| state.map(|s| s.to_array().map(f64::to_bits)))
         .collect()
 }
 
 /// How the work is cut does not show, nor does the company; instruction sets have the same bits, and so has a second time.
-#[test]
 fn a_trim_is_the_same_alone_and_among_others_however_it_is_cut() {
     for car in [bundled_car(), linear_car()] {
         let problem = problem(car).expect("a sound problem");
@@ -53,26 +57,31 @@ fn a_trim_is_the_same_alone_and_among_others_however_it_is_cut() {
         let mut same: Option<Vec<_>> = None;
         for set in InstructionSet::available() {
             let evaluator = SimdSteadyEvaluator::new(&problem, set);
-            let together = bits(&evaluator.states(&all));
-            assert_eq!(bits(&evaluator.states(&all[33..34])), together[33..34], "{set:?}");
+            let together = bits(&evaluator.outcomes(&all));
+            assert_eq!(
+                bits(&evaluator.outcomes(&all[33..34])),
+                together[33..34],
+                "{set:?}"
+            );
             assert_eq!(*same.get_or_insert_with(|| together.clone()), together, "{set:?}");
         }
-        let Some(context) = device() else { return };
+        let Some(context) = device() else { continue };
         let mut evaluator = GpuSteadyEvaluator::new(&problem, context.clone()).expect("the kernel compiles");
-        let whole = bits(&evaluator.states(&all).expect("it runs"));
-        assert_eq!(bits(&evaluator.states(&all).expect("it runs")), whole);
+        let whole = bits(&evaluator.outcomes(&all).expect("it runs"));
+        assert_eq!(bits(&evaluator.outcomes(&all).expect("it runs")), whole);
         for (lanes, steps) in [(64, Some(77)), (128, None)] {
             let batching = DriveBatching {
                 lanes,
                 steps,
+                bytes: u64::MAX,
                 dispatch_ms: 70.0,
             };
             let mut cut = GpuSteadyEvaluator::new(&problem, context.clone())
                 .expect("the kernel compiles")
                 .with_batching(batching);
-            assert_eq!(bits(&cut.states(&all).expect("it runs")), whole, "{batching:?}");
+            assert_eq!(bits(&cut.outcomes(&all).expect("it runs")), whole, "{batching:?}");
         }
-        let alone = evaluator.states(&all[33..34]).expect("it runs");
+        let alone = evaluator.outcomes(&all[33..34]).expect("it runs");
         assert_eq!(bits(&alone), whole[33..34]);
     }
 }
@@ -110,7 +119,6 @@ fn on_circles(car: Car) -> SteadyProblem {
 }
 
 /// Cars that do not come to rest cost the most and say why, alike on every backend.
-#[test]
 fn cars_that_fail_say_why() {
     // Rear tyres that hold less than the front ones: beyond its critical speed the car turns round.
     let mut loose = linear_car();

@@ -6,7 +6,13 @@ use lapswarm::parity::step::{Case, TOLERANCE, cases, compare, plain, scales};
 use lapswarm::vehicle::{CarModel, Chassis, MagicFormula, TyreModel};
 use proptest::prelude::*;
 
-#[test]
+tests! {
+    a_derivative_and_a_step_agree_on_every_backend: also_device,
+    any_car_in_any_state_agrees_with_the_reference: plain,
+    a_linear_car_in_the_mirror_does_the_mirrored: plain,
+    the_table_starts_with_the_chassis: plain,
+}
+
 fn a_derivative_and_a_step_agree_on_every_backend() {
     for subject in subjects() {
         for found in compare(&subject).expect("the kernel runs") {
@@ -38,7 +44,6 @@ fn mirrored(case: &Case) -> Case {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 256, failure_persistence: None, ..ProptestConfig::default() })]
 
-    #[test]
     fn any_car_in_any_state_agrees_with_the_reference(seed: u64, linear: bool) {
         let model = MODELS[usize::from(linear)];
         let case = cases(model, 1, seed).expect("the bundled car").remove(0);
@@ -49,7 +54,6 @@ proptest! {
         }
     }
 
-    #[test]
     fn a_linear_car_in_the_mirror_does_the_mirrored(seed: u64) {
         let mut case = cases(TyreModel::Linear, 1, seed).expect("the bundled car").remove(0);
         // Shares of load and the steering's offset are what tells left from right.
@@ -70,7 +74,6 @@ proptest! {
 }
 
 /// Keeps the cars that cases are made from honest: the fields that the scales read are where they think.
-#[test]
 fn the_table_starts_with_the_chassis() {
     let car = bundled_car();
     let table = CarModel::<f64, MagicFormula<f64>>::from_parameters(|i| car.to_flat()[i]).to_table();

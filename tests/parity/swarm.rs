@@ -1,7 +1,7 @@
 //! Random numbers, test problems and swarms: processor and device against each other.
 
 use crate::common::Random;
-use crate::device::device;
+use crate::device::{device, the_device};
 use lapswarm::evaluate::Evaluator;
 use lapswarm::evaluate::gpu::GpuContext;
 use lapswarm::evaluate::gpu::shader::{ELEMENTARY, random};
@@ -13,6 +13,13 @@ use lapswarm::swarm::device::DeviceMopso;
 use lapswarm::swarm::problems::{GpuTestEvaluator, NAMES, SimdTestEvaluator, TestProblem};
 use lapswarm::swarm::{Mopso, MopsoSettings, Mutation, Optimiser, PsoSettings};
 use std::sync::Arc;
+
+tests! {
+    the_device_draws_the_same_random_numbers: device,
+    the_device_takes_the_same_powers: device,
+    test_problems_are_the_same_everywhere: also_device,
+    swarms_in_lanes_and_on_the_device_in_lockstep: device,
+}
 
 /// Whether the device is known to round every operation as the processor does.
 fn rounds_like_the_processor(context: &Arc<GpuContext>) -> bool {
@@ -42,9 +49,8 @@ fn map_words(context: &GpuContext, fragments: &str, expression: &str, inputs: &[
     bytemuck::cast_slice(&found).to_vec()
 }
 
-#[test]
 fn the_device_draws_the_same_random_numbers() {
-    let Some(context) = device() else { return };
+    let context = the_device();
     let mut source = Random(3);
     let mut inputs: Vec<u32> = (0..8 * 100_000).map(|_| source.bits() as u32).collect();
     // All ones carry furthest.
@@ -57,9 +63,8 @@ fn the_device_draws_the_same_random_numbers() {
 }
 
 /// Integer work and one division: exact where divisions are, else as far as the logarithm carries their 2.5 ULP.
-#[test]
 fn the_device_takes_the_same_powers() {
-    let Some(context) = device() else { return };
+    let context = the_device();
     let mut source = Random(4);
     let inputs: Vec<f32> = (0..100_000)
         .flat_map(|_| {
@@ -113,7 +118,6 @@ fn candidates(test: &TestProblem, count: usize) -> Vec<f64> {
 /// Against `f64`: a float's spacing of 6e-8 of the largest term, times the number of operations of a sum (30 variables,
 /// some four each), times what the steepest function makes of an argument's rounding: cosines of 20 half turns
 /// times 100 in DTLZ1.
-#[test]
 fn test_problems_are_the_same_everywhere() {
     let context = device();
     for name in NAMES {
@@ -168,9 +172,8 @@ const GENERATIONS: usize = 100;
 /// One hundred generations on smooth fronts: bit for bit where the device rounds as the processor does. Elsewhere the
 /// first rounding that turns a comparison makes another swarm, so that there the first generation is held to the
 /// rounding of its few operations (ten spacings of one), and the end to how good the front is.
-#[test]
 fn swarms_in_lanes_and_on_the_device_in_lockstep() {
-    let Some(context) = device() else { return };
+    let context = the_device();
     let default = MopsoSettings::default();
     let thesis = MopsoSettings {
         mutation: Mutation::Random,

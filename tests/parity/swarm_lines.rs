@@ -2,7 +2,7 @@
 
 use crate::common::Random;
 use crate::common::line::{circuit, gt_car, lines};
-use crate::device::device;
+use crate::device::the_device;
 use glam::DVec2;
 use lapswarm::evaluate::Evaluator;
 use lapswarm::evaluate::gpu::GpuContext;
@@ -14,6 +14,11 @@ use lapswarm::swarm::metrics::{hypervolume, non_dominated};
 use lapswarm::swarm::{MANY, Mopso, MopsoSettings, Optimiser, PsoSettings};
 use std::path::Path;
 use std::sync::Arc;
+
+tests! {
+    objectives_are_those_of_the_host: device,
+    fronts_are_those_of_the_host: device,
+}
 
 /// A few more than a whole number of blocks.
 const PARTICLES: usize = MANY + 5;
@@ -51,9 +56,8 @@ fn swarm(line: &LineProblem, context: &Arc<GpuContext>) -> DeviceMopso {
 
 /// The device scales positions in `f32`: a control point is off by two spacings of a float beside one, 2.4e-7 of 12 m, which
 /// between cuts 12 m apart is 8e-8 1/m of curvatures of some 0.01, and less of all else: under 2e-5 of any objective.
-#[test]
 fn objectives_are_those_of_the_host() {
-    let Some(context) = device() else { return };
+    let context = the_device();
     for objectives in [
         &LineObjective::ALL[2..],
         &[LineObjective::LapTime, LineObjective::Length],
@@ -90,9 +94,8 @@ fn objectives_are_those_of_the_host() {
 
 /// The swarm on the device comes as far as the one that is asked and told; what it keeps is worth what it says; and it goes
 /// on from a file as if nothing had been.
-#[test]
 fn fronts_are_those_of_the_host() {
-    let Some(context) = device() else { return };
+    let context = the_device();
     let line = problem(&[
         LineObjective::Gamma,
         LineObjective::Length,

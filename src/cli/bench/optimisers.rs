@@ -1,9 +1,9 @@
 //! `lapswarm bench optimisers`: every algorithm on every test problem.
 
+use super::finish;
 use super::pages::of_optimisers;
-use crate::cli::kept::{self, Kept, Machine};
-use crate::cli::print_json;
-use crate::cli::said::outln;
+use crate::cli::measurement::Kept;
+use crate::cli::output::outln;
 use lapswarm::swarm::comparison::{MULTI_OBJECTIVE, SINGLE_OBJECTIVE, compare, quartiles};
 use lapswarm::swarm::metrics::signed_rank;
 use lapswarm::swarm::problems::{NAMES, TestProblem};
@@ -69,7 +69,7 @@ const PEERS: [(&str, f64); 11] = [
 /// Measures and prints.
 pub fn run(arguments: &Arguments) -> Result<()> {
     check("--problems", &arguments.problems, &NAMES)?;
-    let algorithms = [MULTI_OBJECTIVE, SINGLE_OBJECTIVE].concat();
+    let algorithms = [MULTI_OBJECTIVE.as_slice(), &SINGLE_OBJECTIVE].concat();
     check("--algorithms", &arguments.algorithms, &algorithms)?;
     let wanted = |chosen: &[String], name: &str| chosen.is_empty() || chosen.iter().any(|c| c == name);
     let folder = arguments.kept.folder("bench")?;
@@ -95,11 +95,12 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         .filter_map(TestProblem::by_name)
     {
         let single = problem.problem().objectives.len() == 1;
-        let algorithms = if single { SINGLE_OBJECTIVE } else { MULTI_OBJECTIVE };
-        for algorithm in algorithms
-            .into_iter()
-            .filter(|a| wanted(&arguments.algorithms, a))
-        {
+        let algorithms = if single {
+            SINGLE_OBJECTIVE.as_slice()
+        } else {
+            &MULTI_OBJECTIVE
+        };
+        for algorithm in algorithms.iter().filter(|a| wanted(&arguments.algorithms, a)) {
             let row = measure(&problem, algorithm, arguments.seeds)?;
             if !arguments.json {
                 print_row(&row);
@@ -111,18 +112,13 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         study: "bench optimisers",
         rows,
     };
-    if let Some(folder) = &folder {
-        let page = of_optimisers(folder, &table.rows)?;
-        let machine = Machine::of(["cpu"], None)?;
-        kept::write(folder, "bench optimisers", &table, page, &machine)?;
-        if !arguments.json {
-            outln!("Results: {}", folder.display());
-        }
-    }
-    if arguments.json {
-        print_json(&table)?;
-    }
-    Ok(())
+    finish(
+        ("bench optimisers", &table),
+        folder.as_ref(),
+        |folder| of_optimisers(folder, &table.rows),
+        (["cpu"], None),
+        (!arguments.json, arguments.json),
+    )
 }
 
 fn check(flag: &str, chosen: &[String], known: &[&str]) -> Result<()> {

@@ -1,22 +1,11 @@
-//! Pages of what was measured.
+//! Pages of what was measured: a figure for each, and every measurement as a table and as `rows.csv`.
 
-use super::scaling::{self, Table};
+use super::scaling::{self, Table as Rates};
 use super::{optimisers, studies, swarm};
 use lapswarm::Result;
-use lapswarm::report::{
-    BarPanel, BarSeries, Cells, Column, Curve, CurvePanel, HtmlReport, Scale, significant, write_csv,
-};
+use lapswarm::report::{BarPanel, Bars, Curves, HtmlReport, Panel, Scale, Table, significant};
+use lapswarm::swarm::comparison::quartiles;
 use std::path::Path;
-
-/// A column of words.
-fn words<T>(rows: &[T], of: impl Fn(&T) -> &str) -> Vec<String> {
-    rows.iter().map(|r| of(r).to_owned()).collect()
-}
-
-/// A column of numbers, gaps where there are none.
-fn numbers<T>(rows: &[T], of: impl Fn(&T) -> Option<f64>) -> Vec<f64> {
-    rows.iter().map(|r| of(r).unwrap_or(f64::NAN)).collect()
-}
 
 /// Rows that share a label, in the order in which labels come.
 fn by_label<T>(rows: &[T], label: impl Fn(&T) -> String) -> Vec<(String, Vec<&T>)> {
@@ -33,42 +22,46 @@ fn by_label<T>(rows: &[T], label: impl Fn(&T) -> String) -> Vec<(String, Vec<&T>
 
 /// A quantity over the population, both by equal ratios, a curve for each label.
 fn over_population<T>(
-    page: &mut HtmlReport,
-    (title, y_label): (&str, &str),
+    panel: Panel,
     families: &[(String, Vec<&T>)],
     population: impl Fn(&T) -> usize,
     value: impl Fn(&T) -> Option<f64>,
-) -> Result<()> {
-    let curves = families
-        .iter()
-        .map(|(label, rows)| Curve {
-            label,
-            x: rows.iter().map(|r| population(r) as f64).collect(),
-            y: rows.iter().map(|r| value(r).unwrap_or(f64::NAN)).collect(),
-            shade: None,
-        })
-        .collect();
-    let panel = CurvePanel {
-        title,
-        x_label: "population (candidates)",
-        y_label,
-        curves,
-    };
-    page.curves(&panel, "", [Scale::Log, Scale::Log])
+) -> Panel {
+    let panel = panel.x("population", "candidates").scales(Scale::Log, Scale::Log);
+    families.iter().fold(panel, |panel, (label, rows)| {
+        let points = rows
+            .iter()
+            .map(|r| (population(r) as f64, value(r).unwrap_or(f64::NAN)));
+        panel.points(label, points)
+    })
 }
 
 /// A table on the page, and the same as `rows.csv`.
-fn table(page: &mut HtmlReport, folder: &Path, columns: &[(&str, &str, Cells<'_>)]) -> Result<()> {
-    let columns: Vec<Column<'_>> = columns
-        .iter()
-        .map(|&(name, unit, cells)| Column { name, unit, cells })
-        .collect();
-    write_csv(folder.join("rows.csv"), &columns)?;
-    page.table("Every measurement", "", &columns)
+fn rows_of(page: &mut HtmlReport, folder: &Path, table: &Table<'_>) -> Result<()> {
+    table.write_csv(folder.join("rows.csv"))?;
+    page.table("Every measurement", "", table)
+}
+
+/// The rates of `bench` against the population, and what they come of.
+pub fn rates(rows: &[scaling::Row]) -> Curves {
+    let families = by_label(rows, |r| format!("{}, {}", r.problem, r.backend));
+    let population = |r: &scaling::Row| r.population;
+    let rate = Panel::new("Rate").y("evaluations per second", "1/s");
+    let time = Panel::new("Time of a generation").y("time", "ms");
+    let memory = Panel::new("Memory of the process at its greatest").y("memory", "MiB");
+    let panels = [
+        over_population(rate, &families, population, |r| Some(r.evaluations_per_s)),
+        over_population(time, &families, population, |r| Some(r.generation_ms)),
+        over_population(memory, &families, population, |r| r.peak_memory_mib),
+    ];
+    Curves::new(
+        "Evaluations per second against population",
+        panels.into_iter().filter(Panel::has_points),
+    )
 }
 
 /// The page of `bench`; `other` is what another machine had.
-pub fn of_scaling(folder: &Path, table_of: &Table, other: Option<&Table>) -> Result<HtmlReport> {
+pub fn of_scaling(folder: &Path, table_of: &Rates, other: Option<&Rates>) -> Result<HtmlReport> {
     let rows = &table_of.rows;
     let mut page = HtmlReport::new("bench", "Evaluations against population");
     for (problem, of) in by_label(rows, |r| r.problem.clone()) {
@@ -86,48 +79,26 @@ pub fn of_scaling(folder: &Path, table_of: &Table, other: Option<&Table>) -> Res
     }
     page.section(
         "Against population",
-        "Candidates of a population are evaluated all at once; devices need many of them to be busy.",
+        "The candidates of a population are evaluated all at once. Devices need many of them to be busy.",
     );
-    let families = by_label(rows, |r| format!("{}, {}", r.problem, r.backend));
-    let population = |r: &scaling::Row| r.population;
-    let rate = ("Rate", "evaluations per second (1/s)");
-    over_population(&mut page, rate, &families, population, |r| {
-        Some(r.evaluations_per_s)
-    })?;
-    let time = ("Time of a generation", "time (ms)");
-    over_population(&mut page, time, &families, population, |r| Some(r.generation_ms))?;
-    if rows.iter().any(|r| r.peak_memory_mib.is_some()) {
-        let memory = ("Memory of the process at its greatest", "memory (MiB)");
-        over_population(&mut page, memory, &families, population, |r| r.peak_memory_mib)?;
+    page.figure(folder.join("scaling.svg"), &rates(rows))?;
+    let mut table = Table::rows(rows)
+        .text("problem", |r| &*r.problem)
+        .text("backend", |r| &*r.backend)
+        .number("population", "", |r| r.population as f64)
+        .number("evaluations", "1/s", |r| r.evaluations_per_s)
+        .number("steps of cars", "1/s", |r| r.particle_steps_per_s)
+        .number("generation", "ms", |r| r.generation_ms)
+        .number("kernel", "ms", |r| r.kernel_ms)
+        .number("arithmetic peak", "%", |r| Some(100.0 * r.arithmetic_peak_share?))
+        .number("memory", "MiB", |r| r.peak_memory_mib)
+        .text("device", |r| &*r.adapter);
+    if let Some(other) = other {
+        table = table.number("times the other", "", |r| {
+            Some(r.evaluations_per_s / other.like(r)?.evaluations_per_s)
+        });
     }
-    let (problems, backends) = (words(rows, |r| &r.problem), words(rows, |r| &r.backend));
-    let adapters = words(rows, |r| &r.adapter);
-    let populations = numbers(rows, |r| Some(r.population as f64));
-    let rates = numbers(rows, |r| Some(r.evaluations_per_s));
-    let steps = numbers(rows, |r| r.particle_steps_per_s);
-    let times = numbers(rows, |r| Some(r.generation_ms));
-    let kernels = numbers(rows, |r| r.kernel_ms);
-    let shares = numbers(rows, |r| r.arithmetic_peak_share.map(|s| 100.0 * s));
-    let memory = numbers(rows, |r| r.peak_memory_mib);
-    let ratios = numbers(rows, |r| {
-        Some(r.evaluations_per_s / other?.like(r)?.evaluations_per_s)
-    });
-    let mut columns = vec![
-        ("problem", "", Cells::Texts(&problems)),
-        ("backend", "", Cells::Texts(&backends)),
-        ("population", "", Cells::Numbers(&populations)),
-        ("evaluations", "1/s", Cells::Numbers(&rates)),
-        ("steps of cars", "1/s", Cells::Numbers(&steps)),
-        ("generation", "ms", Cells::Numbers(&times)),
-        ("kernel", "ms", Cells::Numbers(&kernels)),
-        ("arithmetic peak", "%", Cells::Numbers(&shares)),
-        ("memory", "MiB", Cells::Numbers(&memory)),
-        ("device", "", Cells::Texts(&adapters)),
-    ];
-    if other.is_some() {
-        columns.push(("times the other", "", Cells::Numbers(&ratios)));
-    }
-    table(&mut page, folder, &columns)?;
+    rows_of(&mut page, folder, &table.table())?;
     page.provenance("time", format!("{:.1} s", table_of.elapsed_s));
     Ok(page)
 }
@@ -149,62 +120,36 @@ pub fn of_optimisers(folder: &Path, rows: &[optimisers::Row]) -> Result<HtmlRepo
         let sign = if several { -1.0 } else { 1.0 };
         let mut ranked = of.clone();
         ranked.sort_by(|a, b| (sign * value(a)).total_cmp(&(sign * value(b))));
-        if let Some(best) = ranked.first() {
-            let what = if several { "hypervolume" } else { "error" };
-            page.sentence(format!(
-                "{problem}: {} is best, with {what} {}.",
-                best.algorithm,
-                significant(value(best), 4)
-            ));
-            // How far the others stay behind: hypervolumes themselves are alike, errors many orders apart.
-            if several {
-                let behind = ranked.iter().map(|r| value(best) - value(r)).collect();
-                panels.push((problem, ranked.iter().map(|r| r.algorithm).collect(), behind));
-            }
+        let Some(best) = ranked.first() else { continue };
+        let what = if several { "hypervolume" } else { "error" };
+        page.sentence(format!(
+            "{problem}: {} is best, with {what} {}.",
+            best.algorithm,
+            significant(value(best), 4)
+        ));
+        // How far the others stay behind: hypervolumes themselves are alike, errors many orders apart.
+        if several {
+            let names = ranked.iter().map(|r| r.algorithm);
+            let behind = ranked.iter().map(|r| value(best) - value(r));
+            panels.push(BarPanel::new(problem, "hypervolume below the best", names).bars("", behind));
         }
     }
     page.section(
         "Behind the best",
-        "Hypervolume that an optimiser's median lacks of the best one's.",
+        "Hypervolume that the median of an optimiser lacks of the best one's.",
     );
-    for (problem, names, values) in panels {
-        let series = BarSeries {
-            label: "",
-            values,
-            intervals: Vec::new(),
-        };
-        let panel = BarPanel {
-            title: problem,
-            x_label: "hypervolume below the best",
-            names,
-            series: vec![series],
-        };
-        page.bars(&panel, "")?;
-    }
-    let (problems, algorithms) = (words(rows, |r| r.problem), words(rows, |r| r.algorithm));
-    let volumes = numbers(rows, |r| r.hypervolume_median);
-    let volume_spreads = numbers(rows, |r| r.hypervolume_iqr);
-    let distances = numbers(rows, |r| r.igd_plus_median);
-    let errors = numbers(rows, |r| r.error_median);
-    let error_spreads = numbers(rows, |r| r.error_iqr);
-    let peers = numbers(rows, |r| r.best_peer);
-    let chances = numbers(rows, |r| r.better_than_peer_p);
-    let columns = [
-        ("problem", "", Cells::Texts(&problems)),
-        ("algorithm", "", Cells::Texts(&algorithms)),
-        ("hypervolume", "", Cells::Numbers(&volumes)),
-        ("its interquartile range", "", Cells::Numbers(&volume_spreads)),
-        ("IGD+", "", Cells::Numbers(&distances)),
-        ("error", "", Cells::Numbers(&errors)),
-        (
-            "the error's interquartile range",
-            "",
-            Cells::Numbers(&error_spreads),
-        ),
-        ("best peer", "", Cells::Numbers(&peers)),
-        ("p of being better", "", Cells::Numbers(&chances)),
-    ];
-    table(&mut page, folder, &columns)?;
+    page.place(&Bars::new("Behind the best", panels))?;
+    let table = Table::rows(rows)
+        .text("problem", |r| r.problem)
+        .text("algorithm", |r| r.algorithm)
+        .number("hypervolume", "", |r| r.hypervolume_median)
+        .number("its interquartile range", "", |r| r.hypervolume_iqr)
+        .number("IGD+", "", |r| r.igd_plus_median)
+        .number("error", "", |r| r.error_median)
+        .number("the error's interquartile range", "", |r| r.error_iqr)
+        .number("best peer", "", |r| r.best_peer)
+        .number("p of being better", "", |r| r.better_than_peer_p);
+    rows_of(&mut page, folder, &table.table())?;
     Ok(page)
 }
 
@@ -224,33 +169,55 @@ pub fn of_swarm(folder: &Path, rows: &[swarm::Row]) -> Result<HtmlReport> {
     }
     page.section("Against the particles", "");
     let population = |r: &swarm::Row| r.population;
-    let own = ("The swarm itself", "time of a generation (ms)");
-    over_population(&mut page, own, &families, population, |r| Some(r.generation_ms))?;
-    let others = ("Evaluations", "time of a generation (ms)");
-    over_population(&mut page, others, &families, population, |r| {
-        Some(r.evaluation_ms)
-    })?;
-    let (problems, backends) = (words(rows, |r| r.problem), words(rows, |r| r.backend));
-    let devices = words(rows, |r| &r.device);
-    let populations = numbers(rows, |r| Some(r.population as f64));
-    let times = numbers(rows, |r| Some(r.generation_ms));
-    let slowest = numbers(rows, |r| Some(r.slowest_generation_ms));
-    let evaluations = numbers(rows, |r| Some(r.evaluation_ms));
-    let bytes = numbers(rows, |r| Some(r.bytes_per_particle as f64));
-    let volumes = numbers(rows, |r| Some(r.hypervolume));
-    let columns = [
-        ("problem", "", Cells::Texts(&problems)),
-        ("backend", "", Cells::Texts(&backends)),
-        ("particles", "", Cells::Numbers(&populations)),
-        ("generation", "ms", Cells::Numbers(&times)),
-        ("slowest generation", "ms", Cells::Numbers(&slowest)),
-        ("evaluations", "ms", Cells::Numbers(&evaluations)),
-        ("memory of a particle", "bytes", Cells::Numbers(&bytes)),
-        ("hypervolume", "", Cells::Numbers(&volumes)),
-        ("device", "", Cells::Texts(&devices)),
-    ];
-    table(&mut page, folder, &columns)?;
+    let [own, evaluations] =
+        ["The swarm itself", "Evaluations"].map(|title| Panel::new(title).y("time of a generation", "ms"));
+    page.place(&Curves::new(
+        "Time of a generation",
+        [
+            over_population(own, &families, population, |r| Some(r.generation_ms)),
+            over_population(evaluations, &families, population, |r| Some(r.evaluation_ms)),
+        ],
+    ))?;
+    let table = Table::rows(rows)
+        .text("problem", |r| r.problem)
+        .text("backend", |r| r.backend)
+        .number("particles", "", |r| r.population as f64)
+        .number("generation", "ms", |r| r.generation_ms)
+        .number("slowest generation", "ms", |r| r.slowest_generation_ms)
+        .number("evaluations", "ms", |r| r.evaluation_ms)
+        .number("memory of a particle", "bytes", |r| r.bytes_per_particle as f64)
+        .number("hypervolume", "", |r| r.hypervolume)
+        .text("device", |r| &*r.device);
+    rows_of(&mut page, folder, &table.table())?;
     Ok(page)
+}
+
+/// Hypervolume against time, a panel for each population and problem, all of a problem over the same range: what the lower
+/// half of the runs end at is in it, how they began need not be.
+pub fn qualities(rows: &[studies::Row]) -> Curves {
+    let mut panels = by_label(rows, |r| format!("{}, population {}", r.problem, r.population));
+    panels.sort_by_key(|(_, of)| of.first().map(|r| r.population));
+    let panel = |(title, of): (String, Vec<&studies::Row>)| {
+        let alike = rows
+            .iter()
+            .filter(|r| of.iter().any(|own| own.problem == r.problem));
+        let ends: Vec<f64> = alike.map(|r| r.hypervolume_median).collect();
+        let [low, ..] = quartiles(&ends);
+        let most = ends.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let range = (most - low).max(1e-3);
+        let panel = Panel::new(title)
+            .x("time", "s")
+            .y("hypervolume", "")
+            .scales(Scale::Log, Scale::Linear)
+            .shown((low - range).max(0.0), (most + 0.1 * range).min(1.0));
+        of.iter().fold(panel, |panel, r| {
+            panel.curve(&*r.algorithm, &r.history.seconds, &r.history.hypervolume)
+        })
+    };
+    Curves::new(
+        "Hypervolume against time at equal evaluations",
+        panels.into_iter().map(panel),
+    )
 }
 
 /// The page of `bench studies`.
@@ -267,7 +234,7 @@ pub fn of_studies(folder: &Path, rows: &[studies::Row]) -> Result<HtmlReport> {
         if let Some(best) = best {
             let volume = significant(best.hypervolume_median, 4);
             page.sentence(format!(
-                "{problem}: {} with a population of {} comes furthest, to {volume} in {} s.",
+                "{problem}: {} with a population of {} is best, with {volume} in {} s.",
                 best.algorithm,
                 best.population,
                 significant(best.seconds_median, 3)
@@ -275,45 +242,17 @@ pub fn of_studies(folder: &Path, rows: &[studies::Row]) -> Result<HtmlReport> {
             page.tile(&format!("{problem}, hypervolume"), volume, "");
         }
     }
-    page.section(
-        "Against time",
-        "The run of each that comes nearest to the median.",
-    );
-    for (title, of) in by_label(rows, |r| format!("{}, population {}", r.problem, r.population)) {
-        let curves = of
-            .iter()
-            .map(|r| Curve {
-                label: &r.algorithm,
-                x: r.history.seconds.clone(),
-                y: r.history.hypervolume.clone(),
-                shade: None,
-            })
-            .collect();
-        let panel = CurvePanel {
-            title: &title,
-            x_label: "time (s)",
-            y_label: "hypervolume",
-            curves,
-        };
-        page.curves(&panel, "", [Scale::Log, Scale::Linear])?;
-    }
-    let (problems, algorithms) = (words(rows, |r| r.problem), words(rows, |r| &r.algorithm));
-    let populations = numbers(rows, |r| Some(r.population as f64));
-    let generations = numbers(rows, |r| Some(r.generations as f64));
-    let volumes = numbers(rows, |r| Some(r.hypervolume_median));
-    let spreads = numbers(rows, |r| Some(r.hypervolume_iqr));
-    let times = numbers(rows, |r| Some(r.seconds_median));
-    let evaluating = numbers(rows, |r| Some(r.evaluation_s_median));
-    let columns = [
-        ("problem", "", Cells::Texts(&problems)),
-        ("algorithm", "", Cells::Texts(&algorithms)),
-        ("population", "", Cells::Numbers(&populations)),
-        ("generations", "", Cells::Numbers(&generations)),
-        ("hypervolume", "", Cells::Numbers(&volumes)),
-        ("its interquartile range", "", Cells::Numbers(&spreads)),
-        ("time", "s", Cells::Numbers(&times)),
-        ("of which evaluations", "s", Cells::Numbers(&evaluating)),
-    ];
-    table(&mut page, folder, &columns)?;
+    page.section("Against time", "The run of each that is nearest to the median.");
+    page.figure(folder.join("quality.svg"), &qualities(rows))?;
+    let table = Table::rows(rows)
+        .text("problem", |r| r.problem)
+        .text("algorithm", |r| &*r.algorithm)
+        .number("population", "", |r| r.population as f64)
+        .number("generations", "", |r| r.generations as f64)
+        .number("hypervolume", "", |r| r.hypervolume_median)
+        .number("its interquartile range", "", |r| r.hypervolume_iqr)
+        .number("time", "s", |r| r.seconds_median)
+        .number("of which evaluations", "s", |r| r.evaluation_s_median);
+    rows_of(&mut page, folder, &table.table())?;
     Ok(page)
 }

@@ -1,10 +1,11 @@
 //! `lapswarm bench`: evaluations per second against population on every backend.
 
+use super::finish;
 use super::machine::{forget_peak_memory, peak_memory_bytes, peak_operations_per_s};
-use super::pages::of_scaling;
-use crate::cli::kept::{self, Kept, Machine};
-use crate::cli::said::outln;
-use crate::cli::{backend_flag, print_json};
+use super::pages::{of_scaling, rates};
+use crate::cli::backend_flag;
+use crate::cli::measurement::Kept;
+use crate::cli::output::outln;
 use lapswarm::config::read_text;
 use lapswarm::evaluate::drive::{CpuDriveEvaluator, DriveProblem, GpuDriveEvaluator, SimdDriveEvaluator};
 use lapswarm::evaluate::gpu::{GpuContext, devices};
@@ -20,7 +21,7 @@ use lapswarm::evaluate::{Evaluator, Problem};
 use lapswarm::line::{Parametrisation, kernel};
 use lapswarm::parity;
 use lapswarm::random::Random;
-use lapswarm::report::{ScalingSeries, plot_scaling};
+use lapswarm::report::Figure;
 use lapswarm::scalar::{Counted, operations_of};
 use lapswarm::study::identify::{IdentifySettings, set_up};
 use lapswarm::study::raceline::{self, RacelineSettings};
@@ -385,22 +386,18 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         rows,
     };
     if let Some(path) = &arguments.plot {
-        draw(path, &table)?;
+        rates(&table.rows).write_svg(path)?;
     }
-    if let Some(folder) = &folder {
-        draw(&folder.join("scaling.svg"), &table)?;
-        let page = of_scaling(folder, &table, other.as_ref())?;
-        let names = table.rows.iter().map(|r| r.backend.as_str());
-        let machine = Machine::of(names, arguments.adapter.as_deref())?;
-        kept::write(folder, "bench", &table, page, &machine)?;
-        if !arguments.quiet {
-            outln!("Results: {}", folder.display());
-        }
-    }
-    if arguments.json {
-        print_json(&table)?;
-    }
-    Ok(())
+    finish(
+        ("bench", &table),
+        folder.as_ref(),
+        |folder| of_scaling(folder, &table, other.as_ref()),
+        (
+            table.rows.iter().map(|r| r.backend.as_str()),
+            arguments.adapter.as_deref(),
+        ),
+        (!arguments.quiet, arguments.json),
+    )
 }
 
 fn measure(case: &Case, backend: &mut Backend<'_>, population: usize, peak: f64) -> Result<Row> {
@@ -469,46 +466,4 @@ fn read_table(path: &Path) -> Result<Table> {
                 "what `lapswarm bench --json` printed",
             )
         })
-}
-
-fn draw(path: &Path, table: &Table) -> Result<()> {
-    let mut labels: Vec<(String, &str, &str)> = table
-        .rows
-        .iter()
-        .map(|r| {
-            (
-                format!("{}, {}", r.problem, r.backend),
-                r.problem.as_str(),
-                r.backend.as_str(),
-            )
-        })
-        .collect();
-    labels.sort_unstable();
-    labels.dedup();
-    let columns: Vec<(&str, Vec<f64>, Vec<f64>)> = labels
-        .iter()
-        .map(|(label, problem, backend)| {
-            let of = |f: &dyn Fn(&Row) -> f64| {
-                let rows = table
-                    .rows
-                    .iter()
-                    .filter(|r| r.problem == *problem && r.backend == *backend);
-                rows.map(f).collect()
-            };
-            (
-                label.as_str(),
-                of(&|r| r.population as f64),
-                of(&|r| r.evaluations_per_s),
-            )
-        })
-        .collect();
-    let series: Vec<ScalingSeries<'_>> = columns
-        .iter()
-        .map(|(label, population, rate)| ScalingSeries {
-            label,
-            population,
-            evaluations_per_s: rate,
-        })
-        .collect();
-    plot_scaling(path, "Evaluations per second against population", &series)
 }

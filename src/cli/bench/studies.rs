@@ -1,16 +1,17 @@
 //! `lapswarm bench studies`: every optimiser of several objectives on the studies' own problems, hypervolume against time.
 
-use super::pages::of_studies;
-use crate::cli::kept::{self, Kept, Machine};
-use crate::cli::said::outln;
-use crate::cli::{backend_flag, print_json};
+use super::finish;
+use super::pages::{of_studies, qualities};
+use crate::cli::backend_flag;
+use crate::cli::measurement::Kept;
+use crate::cli::output::outln;
 use lapswarm::evaluate::line::{LineObjective, LineProblem, open_line_evaluator};
 use lapswarm::evaluate::replay::{CHANNEL_NAMES, ReplayProblem, open_evaluator};
 use lapswarm::evaluate::{BackendChoice, Evaluator, FAILED_COST, Problem};
 use lapswarm::random::Random;
-use lapswarm::report::{QualityPanel, QualityRun, plot_quality};
+use lapswarm::report::Figure;
 use lapswarm::study::identify::{self, IdentifySettings, ObjectiveChoice};
-use lapswarm::study::raceline::{self, ExactSolvers, RacelineSettings};
+use lapswarm::study::raceline::{self, RacelineSettings, ReferenceSolvers};
 use lapswarm::swarm::comparison::{MULTI_OBJECTIVE, Sizes, quartiles, several};
 use lapswarm::swarm::metrics::hypervolume;
 use lapswarm::{Error, Result};
@@ -196,7 +197,7 @@ impl Case {
             ..RacelineSettings::default()
         };
         let setup = raceline::set_up(&settings)?;
-        let solvers = ExactSolvers::new(&setup, &settings)?;
+        let solvers = ReferenceSolvers::new(&setup, &settings)?;
         let mut known = Vec::new();
         for objective in &settings.objectives {
             known.extend(solvers.best(*objective)?.map(|line| line.alpha));
@@ -233,8 +234,8 @@ impl Case {
     fn evaluator(&self, arguments: &Arguments) -> Result<Box<dyn Evaluator + '_>> {
         let adapter = arguments.adapter.as_deref();
         match &self.kind {
-            Kind::Replay(replay) => open_evaluator(replay, arguments.backend, adapter),
-            Kind::Line(line) => open_line_evaluator(line, arguments.backend, adapter),
+            Kind::Replay(replay) => open_evaluator(&**replay, arguments.backend, adapter),
+            Kind::Line(line) => open_line_evaluator(&**line, arguments.backend, adapter),
         }
     }
 
@@ -330,24 +331,18 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         }
     }
     if let Some(path) = &arguments.plot {
-        plot(path, &table)?;
+        qualities(&table.rows).write_svg(path)?;
     }
-    if let Some(folder) = &folder {
-        plot(&folder.join("quality.svg"), &table)?;
-        let page = of_studies(folder, &table.rows)?;
-        let machine = Machine::of(
+    finish(
+        ("bench studies", &table),
+        folder.as_ref(),
+        |folder| of_studies(folder, &table.rows),
+        (
             table.problems.iter().map(|p| p.backend),
             arguments.adapter.as_deref(),
-        )?;
-        kept::write(folder, "bench studies", &table, page, &machine)?;
-        if !arguments.json {
-            outln!("Results: {}", folder.display());
-        }
-    }
-    if arguments.json {
-        print_json(&table)?;
-    }
-    Ok(())
+        ),
+        (!arguments.json, arguments.json),
+    )
 }
 
 fn print_row(row: &Row) {
@@ -427,50 +422,4 @@ fn follow(case: &Case, algorithm: &str, sizes: Sizes, arguments: &Arguments) -> 
         }
     }
     Ok((history, evaluating))
-}
-
-/// A panel for each population and problem, all of a problem over the same range: what the lower half of the runs end at
-/// is in it, how they began need not be.
-fn plot(path: &std::path::Path, table: &Table) -> Result<()> {
-    let mut panels = Vec::new();
-    let mut populations: Vec<usize> = table.rows.iter().map(|r| r.population).collect();
-    populations.sort_unstable();
-    populations.dedup();
-    for population in populations {
-        for problem in table.problems.iter().map(|p| p.problem) {
-            let ends: Vec<f64> = table
-                .rows
-                .iter()
-                .filter(|r| r.problem == problem)
-                .map(|r| r.hypervolume_median)
-                .collect();
-            let [low, _, _] = quartiles(&ends);
-            let most = ends.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-            let range = (most - low).max(1e-3);
-            let runs: Vec<QualityRun<'_>> = table
-                .rows
-                .iter()
-                .filter(|r| r.problem == problem && r.population == population)
-                .map(|r| QualityRun {
-                    label: &r.algorithm,
-                    seconds: r.history.seconds.clone(),
-                    hypervolume: r.history.hypervolume.clone(),
-                })
-                .collect();
-            panels.push((
-                format!("{problem}, population {population}"),
-                runs,
-                ((low - range).max(0.0), (most + 0.1 * range).min(1.0)),
-            ));
-        }
-    }
-    let panels: Vec<QualityPanel<'_>> = panels
-        .iter()
-        .map(|(title, runs, shown)| QualityPanel {
-            title,
-            runs: runs.clone(),
-            shown: *shown,
-        })
-        .collect();
-    plot_quality(path, "Hypervolume against time at equal evaluations", &panels)
 }

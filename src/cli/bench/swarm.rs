@@ -1,9 +1,10 @@
 //! `lapswarm bench swarm`: what a generation costs besides its evaluations, against the number of particles.
 
+use super::finish;
 use super::pages::of_swarm;
-use crate::cli::kept::{self, Kept, Machine};
-use crate::cli::said::outln;
-use crate::cli::{backend_flag, print_json};
+use crate::cli::backend_flag;
+use crate::cli::measurement::Kept;
+use crate::cli::output::outln;
 use lapswarm::Result;
 use lapswarm::evaluate::gpu::{GpuContext, devices};
 use lapswarm::evaluate::simd::InstructionSet;
@@ -156,18 +157,13 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             }
         }
     }
-    if let Some(folder) = &folder {
-        let page = of_swarm(folder, &table.rows)?;
-        let machine = Machine::of(table.rows.iter().map(|r| r.backend), arguments.adapter.as_deref())?;
-        kept::write(folder, "bench swarm", &table, page, &machine)?;
-        if !arguments.json {
-            outln!("Results: {}", folder.display());
-        }
-    }
-    if arguments.json {
-        print_json(&table)?;
-    }
-    Ok(())
+    finish(
+        ("bench swarm", &table),
+        folder.as_ref(),
+        |folder| of_swarm(folder, &table.rows),
+        (table.rows.iter().map(|r| r.backend), arguments.adapter.as_deref()),
+        (!arguments.json, arguments.json),
+    )
 }
 
 fn print_row(row: &Row) {

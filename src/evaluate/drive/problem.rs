@@ -1,47 +1,27 @@
-//! What is asked of driven laps: which parameters of the car are free, which lines and plans there are to choose from, and
-//! what is to be small.
+//! Problems of closed-loop laps: which parameters of the car are free, which lines and plans are to be chosen from, and the
+//! objectives.
 
 use crate::drive::driver::{DriverTable, WheelTorque};
-use crate::drive::kernel::{DriveState, DrivenLap, World, ending};
+use crate::drive::kernel::{DriveState, DrivenLap, World};
 use crate::drive::{DriverSettings, Line, Road};
 use crate::error::{Error, Result};
-use crate::evaluate::{FAILED_COST, Failure, FreeCar, Objective, Problem, Variable, are_costs};
+use crate::evaluate::objectives::{listed, missing_or_twice, objectives};
+use crate::evaluate::{FreeCar, Problem, Variable};
 use crate::vehicle::{Car, CarParameter, TyreModel};
-use serde::{Deserialize, Serialize};
 
-/// What of a driven lap can be minimised.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum DriveObjective {
-    /// Its time, s.
-    LapTime,
-    /// Greatest distance beyond an edge, m; below nought it is the least room left.
-    Beyond,
-    /// Mean rate at which the road wheels are turned, rad/s.
-    Steering,
+objectives! {
+    /// What of a driven lap can be minimised.
+    DriveObjective {
+        /// Its time, s.
+        LapTime: "lap_time_s", "s", "lap time";
+        /// Greatest distance beyond an edge, m; below zero it is the least room left.
+        Beyond: "beyond_m", "m", "distance beyond the edge";
+        /// Mean rate at which the road wheels are turned, rad/s.
+        Steering: "steering_radps", "rad/s", "steering rate";
+    }
 }
 
 impl DriveObjective {
-    /// Every objective.
-    pub const ALL: [Self; 3] = [Self::LapTime, Self::Beyond, Self::Steering];
-
-    /// The name in studies.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::LapTime => "lap_time_s",
-            Self::Beyond => "beyond_m",
-            Self::Steering => "steering_radps",
-        }
-    }
-
-    /// The unit.
-    pub fn unit(self) -> &'static str {
-        match self {
-            Self::LapTime => "s",
-            Self::Beyond => "m",
-            Self::Steering => "rad/s",
-        }
-    }
-
     /// The figure of a lap.
     pub fn of(self, lap: &DrivenLap) -> f64 {
         match self {
@@ -59,7 +39,7 @@ pub struct DriveSettings {
     pub driver: DriverSettings,
     /// Integration step of the closed loop, s.
     pub step_s: f64,
-    /// How far beyond an edge (m) the lap is over; edges are those of the lines' circuits.
+    /// Distance beyond an edge (m) at which the lap is over. The edges are those of the lines' circuits.
     pub run_off_m: f64,
 }
 
@@ -78,7 +58,7 @@ impl DriveSettings {
 const LONGEST_STEP_S: f64 = 6e-3;
 /// Shortest step, s.
 const SHORTEST_STEP_S: f64 = 1e-4;
-/// What kernels are told of a candidate beside its car: line, plan and share of the next plan.
+/// Figures of a candidate that kernels read beside its car: line, plan and share of the next plan.
 pub const LAP_FIGURES: usize = 3;
 
 /// Finding set-ups, lines and paces by driving them.
@@ -94,7 +74,7 @@ pub struct DriveProblem {
     torque: WheelTorque<f64>,
     lines: usize,
     shares: Vec<f64>,
-    objectives: Vec<DriveObjective>,
+    pub(super) objectives: Vec<DriveObjective>,
 }
 
 impl DriveProblem {
@@ -126,8 +106,7 @@ impl DriveProblem {
             let found = format!("{shares:?}");
             return refuse("shares", found, "rising shares, one for each plan of a line");
         }
-        let twice = |(i, o): (usize, &DriveObjective)| objectives[..i].contains(o);
-        if objectives.is_empty() || objectives.iter().enumerate().any(twice) {
+        if missing_or_twice(objectives) {
             let found = format!("{objectives:?}");
             return refuse("objectives", found, "at least one, each once");
         }
@@ -145,10 +124,7 @@ impl DriveProblem {
         Ok(Self {
             problem: Problem {
                 variables,
-                objectives: objectives
-                    .iter()
-                    .map(|o| Objective::new(o.name(), o.unit()))
-                    .collect(),
+                objectives: listed(objectives),
             },
             free,
             road,
@@ -214,35 +190,5 @@ impl DriveProblem {
     /// The lap whose last state is given in the order of [`DriveState::to_array`].
     pub(super) fn lap(&self, state: [f64; crate::drive::kernel::STATE]) -> DrivenLap {
         DrivenLap::of_state(&DriveState::from_array(state), self.driver.step)
-    }
-
-    /// Why a candidate need not be driven, if so.
-    pub fn preliminary_failure(&self, candidate: &[f64]) -> Option<Failure> {
-        self.free.preliminary_failure(candidate)
-    }
-
-    /// The objectives' row of a candidate from its lap, or from the reason why there is none.
-    pub fn objective_row(&self, lap: std::result::Result<DrivenLap, Failure>) -> (Vec<f64>, Option<Failure>) {
-        let row = lap.and_then(|lap| {
-            if lap.ending == ending::LEFT_ROAD {
-                return Err(Failure::LeftRoad);
-            }
-            if lap.ending == ending::TOO_LATE {
-                return Err(Failure::Unfinished);
-            }
-            if lap.ending != ending::FINISHED {
-                return Err(Failure::Spun);
-            }
-            let row: Vec<f64> = self.objectives.iter().map(|o| o.of(&lap)).collect();
-            if are_costs(&row) {
-                Ok(row)
-            } else {
-                Err(Failure::Undefined)
-            }
-        });
-        match row {
-            Ok(row) => (row, None),
-            Err(failure) => (vec![FAILED_COST; self.objectives.len()], Some(failure)),
-        }
     }
 }

@@ -1,12 +1,12 @@
-//! Which graphics processor: what there is, and the choice among it.
+//! Graphics processors: the adapters of the machine, and the choice among them.
 
 use crate::error::{Error, Result};
 use std::fmt;
 
-/// The environment variable that names an adapter where no flag does.
+/// The environment variable that names an adapter if no flag does.
 pub const ADAPTER_VARIABLE: &str = "LAPSWARM_ADAPTER";
 
-/// What sort of device an adapter is, best first.
+/// Kinds of devices, best first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum DeviceKind {
     /// A card with memory of its own.
@@ -22,13 +22,13 @@ pub enum DeviceKind {
 }
 
 impl DeviceKind {
-    /// Whether it is known to be a graphics processor, and not a driver that poses as one.
+    /// Whether it is known to be a graphics processor, and not a software driver that presents itself as one.
     pub fn is_real(self) -> bool {
         matches!(self, Self::Discrete | Self::Integrated | Self::Virtual)
     }
 
     /// How long a dispatch should take (ms): well under the watchdogs' two seconds and a desktop's patience, well over its
-    /// overhead. A software driver shares the processor: what comes in between may double it.
+    /// overhead. A software driver shares the processor: other work may double the time.
     pub(crate) fn dispatch_ms(self) -> f64 {
         match self {
             Self::Software => 40.0,
@@ -140,7 +140,7 @@ pub fn devices() -> Vec<DeviceSummary> {
 /// [`ADAPTER_VARIABLE`] counts.
 ///
 /// # Errors
-/// [`Error::NoDevice`] if there is none, listing what there is.
+/// [`Error::NoDevice`] if no adapter fits, listing the adapters.
 pub(super) fn choose(name: Option<&str>) -> Result<(wgpu::Adapter, DeviceSummary)> {
     let from_environment = std::env::var(ADAPTER_VARIABLE)
         .ok()

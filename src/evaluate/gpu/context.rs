@@ -1,7 +1,7 @@
 //! The process's device: buffers, kernels and their errors.
 //!
-//! Nothing that wgpu reports reaches the user as a panic: allocation and compilation run inside error scopes, and
-//! what happens outside them is kept by the handlers and handed out as [`Error::Device`] at the next check.
+//! No error of wgpu reaches the user as a panic. Allocation and compilation run inside error scopes; handlers keep errors that
+//! occur outside them and return them as [`Error::Device`] at the next check.
 
 use super::adapter::{DeviceSummary, choose};
 use super::dispatches;
@@ -70,10 +70,10 @@ static OPENED: Mutex<Vec<Option<String>>> = Mutex::new(Vec::new());
 
 impl GpuContext {
     /// The process's device, opened on the first call; `name` chooses the adapter (see
-    /// [`super::devices`]). A lost device, or one that `name` does not mean, gives way to a new one.
+    /// [`super::devices`]). A lost device, or one that does not match `name`, is replaced by a new one.
     ///
     /// # Errors
-    /// [`Error::NoDevice`] if there is none of that name, [`Error::Device`] if it does not open.
+    /// [`Error::NoDevice`] if no device has that name, [`Error::Device`] if it does not open.
     pub fn shared(name: Option<&str>) -> Result<Arc<Self>> {
         let mut shared = locked(&SHARED);
         if let Some(context) = shared.as_ref() {
@@ -99,12 +99,12 @@ impl GpuContext {
         Ok(context)
     }
 
-    /// Whether the process has had a device that `name` means: one that is not there any more has gone.
+    /// Whether the process has opened a device that matches `name` before. If it is absent now, it has gone.
     pub(crate) fn was_open(name: Option<&str>) -> bool {
         locked(&OPENED).iter().any(|known| known.as_deref() == name)
     }
 
-    /// Lets go of the process's device, so that the next call of [`GpuContext::shared`] opens one anew.
+    /// Releases the process's device; the next call of [`GpuContext::shared`] opens a new one.
     pub fn forget() {
         *locked(&SHARED) = None;
     }
@@ -163,7 +163,7 @@ impl GpuContext {
         &self.summary
     }
 
-    /// What the device is, as evaluators say it.
+    /// The device, as evaluators report it.
     pub(crate) fn backend_info(&self) -> BackendInfo {
         BackendInfo {
             backend: "gpu",
@@ -188,7 +188,7 @@ impl GpuContext {
         }
     }
 
-    /// Runs `work` in error scopes; `what` says in errors what was tried.
+    /// Runs `work` in error scopes; `what` names it in errors.
     fn scoped<T>(&self, what: &str, work: impl FnOnce() -> T) -> Result<T> {
         self.check()?;
         let scopes = [
@@ -242,6 +242,22 @@ impl GpuContext {
         let buffer = self.buffer(label, data.len() as u64, usage | wgpu::BufferUsages::COPY_DST)?;
         self.write(&buffer, data);
         Ok(buffer)
+    }
+
+    /// A table that kernels read from storage.
+    ///
+    /// # Errors
+    /// [`Error::Device`] if it does not fit a binding or the device.
+    pub(crate) fn table(&self, label: &str, data: &[u8], usage: wgpu::BufferUsages) -> Result<wgpu::Buffer> {
+        let most = self.limits().max_storage_buffer_binding_size;
+        if data.len() as u64 > most {
+            return Err(Error::Device(format!(
+                "{} holds at most {most} bytes of {label}, {} are needed",
+                self.summary(),
+                data.len()
+            )));
+        }
+        self.buffer_of(label, data, usage | wgpu::BufferUsages::STORAGE)
     }
 
     /// Writes to the front of `buffer` before the next submission.
@@ -368,7 +384,7 @@ impl GpuContext {
         Ok(())
     }
 
-    /// Runs `kernel` over so many workgroups; hands back how long that took with its submission and the wait (ms, above nought).
+    /// Runs `kernel` over so many workgroups; returns how long that took with its submission and the wait (ms, above zero).
     ///
     /// # Errors
     /// As [`GpuContext::run`].
@@ -503,6 +519,21 @@ impl GpuContext {
         Ok(result)
     }
 
+    /// Copies `bytes` bytes from the place `first` of `from` to `readback`, which is mappable, and hands them to `read`.
+    ///
+    /// # Errors
+    /// [`Error::Device`] if they cannot be read.
+    pub(crate) fn read_back<T>(
+        &self,
+        (from, first): (&wgpu::Buffer, u64),
+        readback: &wgpu::Buffer,
+        bytes: u64,
+        read: impl FnOnce(&[u8]) -> T,
+    ) -> Result<T> {
+        self.run(|encoder| encoder.copy_buffer_to_buffer(from, first, readback, 0, bytes))?;
+        self.read(readback, bytes, read)
+    }
+
     /// A set of `count` timestamps with a buffer to resolve it into, where the device has such.
     pub(crate) fn timestamps(&self, count: u32) -> Result<Option<wgpu::QuerySet>> {
         if !self.device.features().contains(wgpu::Features::TIMESTAMP_QUERY) {
@@ -522,7 +553,7 @@ impl GpuContext {
         f64::from(self.queue.get_timestamp_period()) * 1e-6
     }
 
-    /// Runs a one-off kernel with `lanes` lanes in workgroups of 64 over `input` (binding 0, read) and hands back
+    /// Runs a one-off kernel with `lanes` lanes in workgroups of 64 over `input` (binding 0, read) and returns
     /// the `outputs` floats that it wrote (binding 1). Made for testing single shader functions.
     ///
     /// # Errors

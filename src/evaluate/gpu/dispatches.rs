@@ -7,8 +7,8 @@ use std::time::Duration;
 /// Those that watch at present.
 static WATCHES: Mutex<Vec<Weak<AtomicU64>>> = Mutex::new(Vec::new());
 
-/// Watches every dispatch from its beginning on, of whatever evaluator and thread: studies have one each, and one that runs
-/// others sees theirs too.
+/// Watches every dispatch of every evaluator and thread from its creation on. Each study has one. The watch of a study that runs
+/// other studies covers theirs too.
 #[derive(Clone, Debug)]
 pub struct DispatchWatch {
     /// Whole microseconds, so that they fit an atomic.
@@ -26,8 +26,8 @@ impl DispatchWatch {
         Self { longest_us }
     }
 
-    /// The longest that a submission has kept a device since the beginning (ms), what the driver compiled at the first one and
-    /// the wait for other processes included; nothing before the first.
+    /// The longest time that a submission has kept a device since the beginning (ms). It includes compilation by the driver at the
+    /// first submission and waiting for other processes. `None` before the first submission.
     pub fn longest_ms(&self) -> Option<f64> {
         match self.longest_us.load(Ordering::Relaxed) {
             0 => None,

@@ -1,4 +1,4 @@
-//! Faults on purpose, so that tests see what a run makes of devices that fail.
+//! Injected faults, so that tests can see how a run handles devices that fail.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -6,15 +6,15 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 /// What happens to a device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fault {
-    /// It goes, as when a driver resets or a card is pulled.
+    /// The device is lost, as when a driver resets or a card is removed.
     Lost,
-    /// It goes with its adapter: until the drill ends, no device opens.
+    /// The device and its adapter are lost: until the drill ends, no device opens.
     Gone,
     /// It has no memory left.
     OutOfMemory,
-    /// It is asked for what it does not do.
+    /// The device rejects an operation.
     Validation,
-    /// It is at work for longer than anybody waits.
+    /// The device does not finish within the time limit.
     Hung,
 }
 
@@ -56,7 +56,7 @@ fn drill() -> MutexGuard<'static, Option<Drill>> {
 }
 
 /// From now on the process's submissions to devices are counted, and those from number `from` on (the first is 0) fail,
-/// `count` of them, whatever device they go to. A drill takes the place of the one before.
+/// `count` of them, on any device. A drill replaces the previous one.
 pub fn inject(fault: Fault, from: u64, count: u64) {
     inject_at(Place::Submission, fault, from, count);
 }

@@ -1,9 +1,9 @@
 //! What kernels must not do, checked on naga's representation.
 //!
 //! WGSL promises only 2^-11 for the built-in `sin` and `cos` and 4096 ULP for `atan`, and drivers differ by as
-//! much, so one candidate would cost something else on every machine. Kernels bring their own functions
+//! much: one candidate would have different costs on different machines. Kernels bring their own functions
 //! (`shaders/elementary.wgsl`). Double precision is not in WGSL's core, and where drivers offer it, its
-//! transcendentals return garbage without a word.
+//! transcendentals return wrong values without an error.
 
 use naga::{Expression, MathFunction, ScalarKind, TypeInner};
 use std::fmt;

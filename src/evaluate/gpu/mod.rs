@@ -12,7 +12,7 @@ mod trajectories;
 pub use adapter::{ADAPTER_VARIABLE, DeviceKind, DeviceSummary, devices};
 pub use context::{Binding, GpuContext, Kernel};
 pub use dispatches::DispatchWatch;
-pub use pacing::StepBatching;
+pub use pacing::Batching;
 pub(crate) use pacing::{LOOP_ROUNDS, LanePacing, rounds_of};
 pub use trajectories::TrajectoryStretch;
 pub(crate) use trajectories::{Trajectories, TrajectoryKernel, workgroup};

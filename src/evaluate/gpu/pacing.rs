@@ -1,4 +1,4 @@
-//! How many steps of trajectories a dispatch takes.
+//! How work is cut into dispatches, and how long these take.
 
 use super::DeviceKind;
 
@@ -6,42 +6,43 @@ use super::DeviceKind;
 const FIRST: usize = 1 << 16;
 /// How much longer than the last one a dispatch may be.
 const GROWTH: f64 = 4.0;
-/// Rounds of all loops of a kernel together, from which on llvmpipe leaves every loop after one round without a word: its own
-/// limit, 65535, less what the other loops of a dispatch take.
+/// The most rounds of all loops of a kernel together on llvmpipe. Beyond its own limit, 65535, it ends every loop after one round
+/// without an error; the difference is for other loops of a dispatch.
 pub(crate) const LOOP_ROUNDS: usize = 65_000;
 
-/// Rounds that count of a loop of so many, at the most: in one more it finds that it is at its end, and another was seen to count
-/// where loops are nested (a replay's sample of `s` steps takes `3 + 6 s` in all).
+/// The most rounds that llvmpipe counts for a loop of `count` rounds: one more to detect the end, and another one that was
+/// observed in nested loops (a replay's sample of `s` steps takes `3 + 6 s` in all).
 pub(crate) const fn rounds_of(count: usize) -> usize {
     count + 2
 }
 
 /// How work is cut. Results do not depend on it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct StepBatching {
-    /// The most lanes of one batch.
+pub struct Batching {
+    /// The most lanes: of one batch, or of one dispatch where lanes do all of their work in one.
     pub lanes: usize,
+    /// The most bytes of any buffer that grows with the lanes.
+    pub bytes: u64,
     /// How long a dispatch should take, ms: well under the watchdogs' two seconds, well over its overhead.
     pub dispatch_ms: f64,
-    /// The most steps of a dispatch; `None` leaves it to the time.
+    /// The most steps of a dispatch, for kernels that take candidates on step by step; `None` leaves it to the time. Samples
+    /// of a replay are rounded up to whole blocks.
     pub steps: Option<usize>,
 }
 
-impl StepBatching {
-    /// What suits a kind of device: a step of all lanes takes milliseconds on a software driver, and fills a large card.
-    pub fn for_kind(kind: DeviceKind) -> Self {
+impl Batching {
+    /// So many lanes and bytes, dispatches as long as suits a kind of device.
+    pub(crate) fn new(kind: DeviceKind, lanes: usize, bytes: u64) -> Self {
         Self {
-            lanes: match kind {
-                DeviceKind::Software => 1 << 12,
-                _ => 1 << 17,
-            },
+            lanes,
+            bytes,
             dispatch_ms: kind.dispatch_ms(),
             steps: None,
         }
     }
 }
 
-/// What the last dispatch taught of the next.
+/// Chooses the steps of the next dispatch from the time of the last one.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Pacing {
     rounds_per_step: usize,
@@ -59,7 +60,7 @@ impl Pacing {
     }
 
     /// Steps of the next dispatch of `lanes` lanes.
-    pub fn steps(&self, lanes: usize, batching: &StepBatching) -> usize {
+    pub fn steps(&self, lanes: usize, batching: &Batching) -> usize {
         let by_time = match self.last {
             // A device that was not full takes no longer for more lanes, so that a rise is taken in full and a fall not at all.
             Some((steps, before, ms)) => {
@@ -118,16 +119,16 @@ mod tests {
     /// Watchdogs and desktops are patient for longer.
     const LONGEST_MS: f64 = 100.0;
 
-    /// A device that does nothing, in its own time: so many lanes at once in so long, twice as slow and twice as fast by turns
-    /// as somebody else comes and goes, beside what a submission takes.
-    struct MadeUp {
+    /// A model of a device that takes time and does nothing else: so many lanes at once in so long, up to twice as slow while other
+    /// work runs, plus the time of a submission.
+    struct ModelDevice {
         at_once: usize,
         lane_step_ms: f64,
         submission_ms: f64,
         draws: u32,
     }
 
-    impl MadeUp {
+    impl ModelDevice {
         fn next(&mut self, below: u32) -> u32 {
             self.draws = self.draws.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
             (self.draws >> 16) % below
@@ -142,14 +143,14 @@ mod tests {
     }
 
     /// From a processor that takes 64 lanes in turns to a card that takes all at once.
-    fn devices() -> [MadeUp; 4] {
+    fn devices() -> [ModelDevice; 4] {
         [
             (1, 2e-4, 0.2),
             (64, 2e-2, 0.05),
             (1 << 14, 1.5, 1.0),
             (1 << 20, 1e-5, 0.01),
         ]
-        .map(|(at_once, lane_step_ms, submission_ms)| MadeUp {
+        .map(|(at_once, lane_step_ms, submission_ms)| ModelDevice {
             at_once,
             lane_step_ms,
             submission_ms,
@@ -159,8 +160,9 @@ mod tests {
 
     #[test]
     fn no_dispatch_of_steps_but_the_first_is_long_on_a_device_whose_speed_changes() {
-        let batching = StepBatching {
+        let batching = Batching {
             lanes: usize::MAX,
+            bytes: u64::MAX,
             dispatch_ms: TARGET_MS,
             steps: None,
         };
@@ -196,8 +198,9 @@ mod tests {
 
     #[test]
     fn a_first_dispatch_that_takes_seconds_to_compile_and_one_that_takes_no_time_teach_no_harm() {
-        let batching = StepBatching {
+        let batching = Batching {
             lanes: usize::MAX,
+            bytes: u64::MAX,
             dispatch_ms: TARGET_MS,
             steps: None,
         };
@@ -207,7 +210,7 @@ mod tests {
         pacing.took(1, 64, 1e-3);
         assert_eq!(pacing.steps(64, &batching), GROWTH as usize);
         // More steps than wanted, or fewer.
-        let few = StepBatching {
+        let few = Batching {
             steps: Some(3),
             ..batching
         };

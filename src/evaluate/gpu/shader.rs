@@ -1,5 +1,5 @@
 //! Composition of the kernels from the fragments under `shaders/`, one list per kernel, and the generated parts:
-//! constants, and the loaders that tell the figures that candidates share from those in which they differ.
+//! constants, and the loaders, which read shared figures from one table and varying figures from the candidate's row.
 
 use crate::evaluate::replay::Norm;
 use crate::line::kernel::Wanted;
@@ -78,61 +78,129 @@ pub fn tyre_struct(model: TyreModel) -> (&'static str, &'static [&'static str]) 
     }
 }
 
-/// What a replay kernel is specialised to.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct ReplayShape<'a> {
+/// The generated lines of a kernel.
+struct Generated(String);
+
+impl Generated {
+    fn new() -> Self {
+        Self("\n// Generated.\n".to_owned())
+    }
+
+    fn line(mut self, line: &str) -> Self {
+        self.0.push_str(line);
+        self.0.push('\n');
+        self
+    }
+
+    /// A constant that is a whole number.
+    fn count(self, name: &str, figure: impl std::fmt::Display) -> Self {
+        self.line(&format!("const {name}: u32 = {figure}u;"))
+    }
+
+    /// A whole number as a float constant.
+    fn float(self, name: &str, figure: usize) -> Self {
+        self.line(&format!("const {name}: f32 = {figure}.0;"))
+    }
+
+    fn flag(self, name: &str, flag: bool) -> Self {
+        self.line(&format!("const {name}: bool = {flag};"))
+    }
+
+    /// A table at a binding: uniform if its length is given, else in storage.
+    fn table(self, binding: usize, name: &str, of: &str, uniform: Option<usize>) -> Self {
+        self.line(&match uniform {
+            Some(rows) => format!("@group(0) @binding({binding}) var<uniform> {name}: array<{of}, {rows}>;"),
+            None => format!("@group(0) @binding({binding}) var<storage, read> {name}: array<{of}>;"),
+        })
+    }
+
+    fn end(self) -> String {
+        self.line("").0
+    }
+}
+
+/// What every kernel of cars is specialised to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct CarShape<'a> {
     /// The tyre model.
     pub model: TyreModel,
     /// For each figure of a ready car, which varying figure it is, if it varies: `ModelTable::sources`.
     pub sources: &'a [Option<usize>],
-    /// The norm.
-    pub norm: Norm,
     /// Lanes of a workgroup.
     pub workgroup: u32,
+}
+
+impl CarShape<'_> {
+    fn constants(&self) -> Generated {
+        Generated::new()
+            .count("WORKGROUP", self.workgroup)
+            .count("BASE_VECTORS", base_vectors(self.sources.len()))
+    }
+
+    /// The car, the constants, the fragments and the loaders.
+    fn kernel(&self, constants: Generated, fragments: &[&str]) -> String {
+        let mut source = car_fragments(self.model).concat();
+        source.push_str(&constants.end());
+        source.extend(fragments.iter().copied());
+        source.push_str(&loaders(self.model, self.sources));
+        source
+    }
+
+    /// The same for a kernel that takes candidates on step by step. `VARYING` figures of a candidate vary; the figures that are
+    /// not its car's stand behind them.
+    fn trajectories(&self, constants: Generated, fragments: &[&str]) -> String {
+        let constants = constants.count("VARYING", self.sources.iter().flatten().count());
+        self.kernel(constants, &[&[TRAJECTORIES], fragments].concat())
+    }
+
+    /// Source of the kernel of steady-state cornering; entry point `settle`.
+    pub fn steady(&self) -> String {
+        self.trajectories(self.constants(), &[STEADY])
+    }
+}
+
+/// What a replay kernel is specialised to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ReplayShape<'a> {
+    /// The car.
+    pub car: CarShape<'a>,
+    /// The norm.
+    pub norm: Norm,
 }
 
 impl ReplayShape<'_> {
     /// Source of the kernel that drives and scores; entry point `replay`.
     pub fn replay(&self) -> String {
-        let mut source = car_fragments(self.model).concat();
-        source.push_str(&self.constants());
-        source.push_str(REPLAY_COMMON);
-        source.push_str(REPLAY);
-        source.push_str(&loaders(self.model, self.sources));
-        source
+        self.car.kernel(self.constants(), &[REPLAY_COMMON, REPLAY])
     }
 
     /// Source of the kernel that joins the windows; entry point `replay_reduce`.
     pub fn reduce(&self) -> String {
-        [&self.constants(), REPLAY_COMMON, REPLAY_REDUCE].concat()
+        [&self.constants().end(), REPLAY_COMMON, REPLAY_REDUCE].concat()
     }
 
-    fn constants(&self) -> String {
-        format!(
-            "\n// Generated.\nconst NORM_ONE: u32 = 0u;\nconst NORM_TWO: u32 = 1u;\nconst NORM_INFINITY: u32 = 2u;\n\
-             const NORM_MEAN_SQUARE: u32 = 3u;\nconst NORM: u32 = {}u;\nconst WORKGROUP: u32 = {}u;\n\
-             const BASE_VECTORS: u32 = {}u;\n\n",
-            match self.norm {
-                Norm::One => 0,
-                Norm::Two => 1,
-                Norm::Infinity => 2,
-                Norm::MeanSquare => 3,
-            },
-            self.workgroup,
-            base_vectors(self.sources.len()),
-        )
+    fn constants(&self) -> Generated {
+        let norm = match self.norm {
+            Norm::One => 0,
+            Norm::Two => 1,
+            Norm::Infinity => 2,
+            Norm::MeanSquare => 3,
+        };
+        self.car
+            .constants()
+            .count("NORM_ONE", 0)
+            .count("NORM_TWO", 1)
+            .count("NORM_INFINITY", 2)
+            .count("NORM_MEAN_SQUARE", 3)
+            .count("NORM", norm)
     }
 }
 
-/// What a drive kernel is specialised to.
+/// What a kernel of closed-loop laps is specialised to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DriveShape<'a> {
-    /// The tyre model.
-    pub model: TyreModel,
-    /// For each figure of a ready car, which varying figure it is, if it varies: `ModelTable::sources`.
-    pub sources: &'a [Option<usize>],
-    /// How many figures vary; behind them stand the line, the plan and the share of the next plan.
-    pub varying: usize,
+    /// The car.
+    pub car: CarShape<'a>,
     /// Stretches of the powertrain's torque.
     pub stretches: usize,
     /// The most rows that a driver looks ahead.
@@ -141,60 +209,19 @@ pub struct DriveShape<'a> {
     pub cells_ahead: usize,
     /// Whether there are plans to blend.
     pub blends: bool,
-    /// Lanes of a workgroup.
-    pub workgroup: u32,
 }
 
 impl DriveShape<'_> {
     /// Source of the kernel; entry point `drive`.
     pub fn source(&self) -> String {
-        let constants = format!(
-            "\n// Generated.\nconst WORKGROUP: u32 = {}u;\nconst BASE_VECTORS: u32 = {}u;\nconst VARYING: u32 = {}u;\n\
-             const STRETCHES: u32 = {}u;\nconst ROWS_AHEAD: f32 = {}.0;\nconst CELLS_AHEAD: f32 = {}.0;\n\
-             const BLENDS: bool = {};\n\n",
-            self.workgroup,
-            base_vectors(self.sources.len()),
-            self.varying,
-            self.stretches,
-            self.rows_ahead,
-            self.cells_ahead,
-            self.blends,
-        );
-        let [car, loaders] = [
-            car_fragments(self.model).concat(),
-            loaders(self.model, self.sources),
-        ];
-        [&car, &constants, TRAJECTORIES, PATH, DRIVER, DRIVE, &loaders].concat()
-    }
-}
-
-/// What a kernel of steady states is specialised to.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct SteadyShape<'a> {
-    /// The tyre model.
-    pub model: TyreModel,
-    /// For each figure of a ready car, which varying figure it is, if it varies: `ModelTable::sources`.
-    pub sources: &'a [Option<usize>],
-    /// Varying figures of a candidate's car.
-    pub varying: usize,
-    /// Lanes of a workgroup.
-    pub workgroup: u32,
-}
-
-impl SteadyShape<'_> {
-    /// Source of the kernel; entry point `settle`.
-    pub fn source(&self) -> String {
-        let constants = format!(
-            "\n// Generated.\nconst WORKGROUP: u32 = {}u;\nconst BASE_VECTORS: u32 = {}u;\nconst VARYING: u32 = {}u;\n\n",
-            self.workgroup,
-            base_vectors(self.sources.len()),
-            self.varying,
-        );
-        let [car, loaders] = [
-            car_fragments(self.model).concat(),
-            loaders(self.model, self.sources),
-        ];
-        [&car, &constants, TRAJECTORIES, STEADY, &loaders].concat()
+        let constants = self
+            .car
+            .constants()
+            .count("STRETCHES", self.stretches)
+            .float("ROWS_AHEAD", self.rows_ahead)
+            .float("CELLS_AHEAD", self.cells_ahead)
+            .flag("BLENDS", self.blends);
+        self.car.trajectories(constants, &[PATH, DRIVER, DRIVE])
     }
 }
 
@@ -203,7 +230,7 @@ impl SteadyShape<'_> {
 pub struct LineShape {
     /// Whether the line's end joins its start.
     pub closed: bool,
-    /// Terms of the sum that gives `alpha` at a section: none, one or four.
+    /// Terms of the sum that gives `alpha` at a cross-section: none, one or four.
     pub terms: usize,
     /// What is asked for beyond lengths.
     pub wanted: Wanted,
@@ -211,52 +238,37 @@ pub struct LineShape {
     pub limit_rows: usize,
     /// Rows of the table of corner speeds.
     pub corner_rows: usize,
-    /// Rows of the table of the ellipse, nought where there is none.
+    /// Rows of the table of the ellipse, zero where there is none.
     pub ellipse_rows: usize,
-    /// Sections, if their table is to be uniform.
+    /// Cross-sections, if their table is to be uniform.
     pub uniform_sections: Option<usize>,
     /// Whether the tables of limits, of corner speeds and of the ellipse are to be uniform.
     pub uniform_limits: bool,
     /// Lanes of a workgroup.
     pub workgroup: u32,
-    /// Lanes whose figures of a section stand together in memory; divides the workgroup.
+    /// Lanes whose figures of a cross-section stand together in memory; divides the workgroup.
     pub tile: u32,
 }
 
 impl LineShape {
     /// Source of the kernel; entry point `line`.
     pub fn source(&self) -> String {
-        let table = |name: &str, rows: usize| {
-            if self.uniform_limits {
-                format!("var<uniform> {name}: array<vec4<f32>, {rows}>")
-            } else {
-                format!("var<storage, read> {name}: array<vec4<f32>>")
-            }
-        };
-        let constants = format!(
-            "\n// Generated.\nconst CLOSED: bool = {};\nconst TERMS: u32 = {}u;\nconst WANTS_INTEGRAL: bool = {};\n\
-             const WANTS_LAP: bool = {};\nconst LIMIT_ROWS: u32 = {}u;\nconst CORNER_ROWS: u32 = {}u;\n\
-             const ELLIPSE_ROWS: u32 = {}u;\nconst WORKGROUP: u32 = {}u;\nconst TILE: u32 = {}u;\n\
-             @group(0) @binding(1) {};\n@group(0) @binding(2) {};\n@group(0) @binding(3) {};\n\
-             @group(0) @binding(4) {};\n\n",
-            self.closed,
-            self.terms,
-            self.wanted.integral,
-            self.wanted.lap,
-            self.limit_rows,
-            self.corner_rows,
-            self.ellipse_rows,
-            self.workgroup,
-            self.tile,
-            match self.uniform_sections {
-                Some(count) => format!("var<uniform> sections: array<Section, {count}>"),
-                None => "var<storage, read> sections: array<Section>".to_owned(),
-            },
-            table("limits", 2 * self.limit_rows),
-            table("corners", self.corner_rows),
-            table("ellipse", self.ellipse_rows.max(1)),
-        );
-        [ELEMENTARY, &constants, LINE].concat()
+        let rows = |rows: usize| self.uniform_limits.then_some(rows);
+        let generated = Generated::new()
+            .flag("CLOSED", self.closed)
+            .count("TERMS", self.terms)
+            .flag("WANTS_INTEGRAL", self.wanted.integral)
+            .flag("WANTS_LAP", self.wanted.lap)
+            .count("LIMIT_ROWS", self.limit_rows)
+            .count("CORNER_ROWS", self.corner_rows)
+            .count("ELLIPSE_ROWS", self.ellipse_rows)
+            .count("WORKGROUP", self.workgroup)
+            .count("TILE", self.tile)
+            .table(1, "sections", "Section", self.uniform_sections)
+            .table(2, "limits", "vec4<f32>", rows(2 * self.limit_rows))
+            .table(3, "corners", "vec4<f32>", rows(self.corner_rows))
+            .table(4, "ellipse", "vec4<f32>", rows(self.ellipse_rows.max(1)));
+        [ELEMENTARY, &generated.end(), LINE].concat()
     }
 }
 
@@ -269,34 +281,26 @@ pub struct EnergyShape {
     pub line_variables: usize,
     /// Whether the motor adds to the engine.
     pub additional: bool,
-    /// Whether the charge has a say in where the motor works.
+    /// Whether the state of charge helps decide where the motor works.
     pub counts_charge: bool,
     /// Vectors of four in the energy tables, if they are to be uniform.
     pub uniform_energy: Option<usize>,
 }
 
 impl EnergyShape {
-    /// Where in the table of vectors of four the flows, the boosts and the zones begin.
-    pub fn places(&self) -> [usize; 3] {
-        let rows = self.line.limit_rows;
-        [2 * rows, 4 * rows, 5 * rows]
-    }
-
     /// Source of the kernel; entry point `energy_line`.
     pub fn source(&self) -> String {
-        let [flows, boosts, zones] = self.places();
-        let constants = format!(
-            "\n// Generated.\nconst STRATEGY: u32 = {}u;\nconst ADDITIONAL: bool = {};\nconst COUNTS_CHARGE: bool = {};\nconst FLOWS_AT: u32 = {flows}u;\n\
-             const BOOSTS_AT: u32 = {boosts}u;\nconst ZONES_AT: u32 = {zones}u;\n@group(0) @binding(10) {};\n\n",
-            self.line_variables,
-            self.additional,
-            self.counts_charge,
-            match self.uniform_energy {
-                Some(vectors) => format!("var<uniform> energy: array<vec4<f32>, {vectors}>"),
-                None => "var<storage, read> energy: array<vec4<f32>>".to_owned(),
-            },
-        );
-        [&self.line.source(), &constants, ENERGY].concat()
+        // Where in the table of vectors of four the flows, the boosts and the zones begin.
+        let rows = self.line.limit_rows;
+        let generated = Generated::new()
+            .count("STRATEGY", self.line_variables)
+            .flag("ADDITIONAL", self.additional)
+            .flag("COUNTS_CHARGE", self.counts_charge)
+            .count("FLOWS_AT", 2 * rows)
+            .count("BOOSTS_AT", 4 * rows)
+            .count("ZONES_AT", 5 * rows)
+            .table(10, "energy", "vec4<f32>", self.uniform_energy);
+        [&self.line.source(), &generated.end(), ENERGY].concat()
     }
 }
 

@@ -1,7 +1,8 @@
 //! Candidates that a kernel takes on step by step: the figures of their cars and their states on the device, a batch at a time.
 
+use super::DeviceKind;
 use super::context::{Binding, GpuContext, Kernel};
-use super::pacing::{Pacing, StepBatching};
+use super::pacing::{Batching, Pacing};
 use super::shader::base_vectors;
 use crate::error::{Error, Result};
 use crate::evaluate::ModelTable;
@@ -61,7 +62,7 @@ struct BatchBuffers {
 pub(crate) struct Trajectories<const STATE: usize> {
     context: Arc<GpuContext>,
     kernel: Arc<Kernel>,
-    batching: StepBatching,
+    batching: Batching,
     workgroup: usize,
     /// Figures of a candidate: those of its car that vary and the others.
     varying: usize,
@@ -92,7 +93,11 @@ impl<const STATE: usize> Trajectories<STATE> {
         )?;
         let varying = parts.table.varying.len();
         Ok(Self {
-            batching: StepBatching::for_kind(context.summary().kind),
+            // A step of all lanes takes milliseconds on a software driver, and fills a large card.
+            batching: match context.summary().kind {
+                kind @ DeviceKind::Software => Batching::new(kind, 1 << 12, u64::MAX),
+                kind => Batching::new(kind, 1 << 17, u64::MAX),
+            },
             workgroup: workgroup(&context) as usize,
             context,
             kernel,
@@ -112,12 +117,12 @@ impl<const STATE: usize> Trajectories<STATE> {
     }
 
     /// Cuts the work differently.
-    pub fn cut(&mut self, batching: StepBatching) {
+    pub fn cut(&mut self, batching: Batching) {
         self.batching = batching;
         self.batch = None;
     }
 
-    pub fn batching(&self) -> StepBatching {
+    pub fn batching(&self) -> Batching {
         self.batching
     }
 
@@ -133,10 +138,13 @@ impl<const STATE: usize> Trajectories<STATE> {
     /// The most candidates of one batch.
     pub fn batch_size(&self) -> usize {
         let limits = self.context.limits();
-        let binding = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+        let bytes = limits
+            .max_storage_buffer_binding_size
+            .min(limits.max_buffer_size)
+            .min(self.batching.bytes);
         let planes = self.figures.max(STATE) as u64;
         let most_groups = limits.max_compute_workgroups_per_dimension as usize;
-        let lanes = self.batching.lanes.min((binding / (4 * planes)) as usize) / self.workgroup;
+        let lanes = self.batching.lanes.min((bytes / (4 * planes)) as usize) / self.workgroup;
         lanes.clamp(1, most_groups) * self.workgroup
     }
 
@@ -175,6 +183,9 @@ impl<const STATE: usize> Trajectories<STATE> {
 
     /// Makes room for a batch of `candidates` and puts its figures on the device: the rows of their cars (see
     /// [`ModelTable::rows`]) and what `others` says of each.
+    ///
+    /// # Errors
+    /// [`Error::Device`] if the device fails.
     pub fn load<const OTHERS: usize>(
         &mut self,
         candidates: usize,
@@ -199,7 +210,10 @@ impl<const STATE: usize> Trajectories<STATE> {
     }
 
     /// Takes a batch, whose figures are on the device, some steps further, as many as the last dispatch taught but `most`;
-    /// hands back how many.
+    /// returns how many.
+    ///
+    /// # Errors
+    /// [`Error::Device`] if the device fails.
     pub fn go_on(&mut self, candidates: usize, first_step: usize, most: usize) -> Result<usize> {
         let lanes = candidates.next_multiple_of(self.workgroup);
         let steps = self.pacing.steps(lanes, &self.batching).min(most);
@@ -209,7 +223,10 @@ impl<const STATE: usize> Trajectories<STATE> {
         Ok(steps)
     }
 
-    /// Takes a batch so many steps further; hands back how long that took, ms.
+    /// Takes a batch so many steps further; returns how long that took, ms.
+    ///
+    /// # Errors
+    /// [`Error::Device`] if the device fails.
     pub fn dispatch(&self, candidates: usize, first_step: usize, steps: usize) -> Result<f64> {
         let batch = self.buffers()?;
         let stretch = TrajectoryStretch {
@@ -229,21 +246,24 @@ impl<const STATE: usize> Trajectories<STATE> {
         let buffers = self.buffers()?;
         let plane = (buffers.stride * 4) as u64;
         let bytes = plane * (STATE - first) as u64;
-        self.context.run(|encoder| {
-            let from = plane * first as u64;
-            encoder.copy_buffer_to_buffer(&buffers.progress, from, &buffers.readback, 0, bytes);
-        })?;
-        self.context.read(&buffers.readback, bytes, |data| {
+        let from = (&buffers.progress, plane * first as u64);
+        self.context.read_back(from, &buffers.readback, bytes, |data| {
             read(bytemuck::cast_slice(data), buffers.stride)
         })
     }
 
     /// The last figure of the states of a batch.
+    ///
+    /// # Errors
+    /// [`Error::Device`] if the device fails.
     pub fn last_figures<T>(&self, candidates: usize, read: impl FnOnce(&[f32]) -> T) -> Result<T> {
         self.read_planes(STATE - 1, |plane, _| read(&plane[..candidates]))
     }
 
     /// The states of a batch.
+    ///
+    /// # Errors
+    /// [`Error::Device`] if the device fails.
     pub fn states(&self, candidates: usize) -> Result<Vec<[f32; STATE]>> {
         self.read_planes(0, |planes, stride| {
             (0..candidates)
@@ -253,6 +273,9 @@ impl<const STATE: usize> Trajectories<STATE> {
     }
 
     /// Puts states of a batch, whose figures are on the device, in the place of those that it has there.
+    ///
+    /// # Errors
+    /// [`Error::Device`] if the device fails.
     pub fn put(&self, states: &[[f32; STATE]]) -> Result<()> {
         let batch = self.buffers()?;
         let mut planes = vec![0.0f32; STATE * batch.stride];

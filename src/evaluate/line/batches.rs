@@ -2,7 +2,7 @@
 
 use super::tables::LineTables;
 use crate::error::{Error, Result};
-use crate::evaluate::gpu::{Binding, DeviceKind, GpuContext, Kernel, LanePacing};
+use crate::evaluate::gpu::{Batching, Binding, DeviceKind, GpuContext, Kernel, LanePacing};
 use crate::line::{LimitTable, LinePlan};
 use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;
@@ -47,32 +47,6 @@ impl LineStretch {
     }
 }
 
-/// How work is cut. Results do not depend on it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LineBatching {
-    /// The most bytes of any buffer that grows with the candidates.
-    pub bytes: u64,
-    /// The most candidates of one dispatch.
-    pub lanes: usize,
-    /// How long a dispatch should take, ms: well under the watchdogs' two seconds, well over its overhead.
-    pub dispatch_ms: f64,
-}
-
-impl LineBatching {
-    /// What suits a kind of device: a large card is only filled by many lines at once.
-    pub fn for_kind(kind: DeviceKind) -> Self {
-        Self {
-            bytes: match kind {
-                // So few that a batch goes through the processor's caches.
-                DeviceKind::Software => 24 << 20,
-                _ => 1 << 30,
-            },
-            lanes: usize::MAX,
-            dispatch_ms: kind.dispatch_ms(),
-        }
-    }
-}
-
 /// A kernel that scores lines, and what it reads.
 pub(in crate::evaluate) struct LineKernel<'k> {
     pub source: &'k str,
@@ -106,7 +80,7 @@ struct BatchBuffers {
 pub(in crate::evaluate) struct LineBatches<const FIGURES: usize> {
     context: Arc<GpuContext>,
     kernel: Arc<Kernel>,
-    batching: LineBatching,
+    batching: Batching,
     workgroup: usize,
     task: LineStretch,
     stretch: wgpu::Buffer,
@@ -150,7 +124,12 @@ impl<const FIGURES: usize> LineBatches<FIGURES> {
         )?;
         let sections = parts.plan.rows.len();
         Ok(Self {
-            batching: LineBatching::for_kind(context.summary().kind),
+            batching: match context.summary().kind {
+                // So few bytes that a batch goes through the processor's caches.
+                kind @ DeviceKind::Software => Batching::new(kind, usize::MAX, 24 << 20),
+                // A large card is only filled by many lines at once.
+                kind => Batching::new(kind, usize::MAX, 1 << 30),
+            },
             context,
             kernel,
             workgroup: parts.tables.shape.workgroup as usize,
@@ -171,12 +150,12 @@ impl<const FIGURES: usize> LineBatches<FIGURES> {
     }
 
     /// Cuts the work differently.
-    pub fn cut(&mut self, batching: LineBatching) {
+    pub fn cut(&mut self, batching: Batching) {
         self.batching = batching;
         self.batch = None;
     }
 
-    pub fn batching(&self) -> LineBatching {
+    pub fn batching(&self) -> Batching {
         self.batching
     }
 
@@ -205,6 +184,9 @@ impl<const FIGURES: usize> LineBatches<FIGURES> {
     }
 
     /// Makes room for a batch of `candidates`.
+    ///
+    /// # Errors
+    /// [`Error::Device`] if the device has too little memory.
     pub fn reserve(&mut self, candidates: usize) -> Result<()> {
         let stride = candidates.next_multiple_of(self.workgroup);
         if self.batch.as_ref().is_some_and(|b| b.stride >= stride) {
@@ -244,13 +226,19 @@ impl<const FIGURES: usize> LineBatches<FIGURES> {
             .ok_or_else(|| Error::Device("a batch without buffers".to_owned()))
     }
 
-    /// Distance between the rows of a batch's figures, those figures, and what they come to.
+    /// Distance between the rows of a batch, its variables and its results.
+    ///
+    /// # Errors
+    /// [`Error::Device`] before any batch was reserved.
     pub fn rows(&self) -> Result<(usize, &wgpu::Buffer, &wgpu::Buffer)> {
         let batch = self.buffers()?;
         Ok((batch.stride, &batch.variables, &batch.results))
     }
 
     /// Scores one batch, whose figures are on the device.
+    ///
+    /// # Errors
+    /// [`Error::Device`] if the device fails.
     pub fn score_batch(&mut self, candidates: usize) -> Result<()> {
         let most_groups = self.context.limits().max_compute_workgroups_per_dimension as usize;
         let mut first = 0;
@@ -280,7 +268,10 @@ impl<const FIGURES: usize> LineBatches<FIGURES> {
         Ok(())
     }
 
-    /// What candidates come to, in order; `figure` tells a figure of a candidate.
+    /// The results of candidates, in order; `figure` gives a figure of a candidate.
+    ///
+    /// # Errors
+    /// [`Error::Device`] if the device fails.
     pub fn score(
         &mut self,
         candidates: usize,
@@ -293,7 +284,7 @@ impl<const FIGURES: usize> LineBatches<FIGURES> {
             self.reserve(count)?;
             let batch = self.buffers()?;
             let stride = batch.stride;
-            // Figure by figure, so that neighbouring lanes read neighbouring memory. What is no number never reaches the
+            // Figure by figure, so that neighbouring lanes read neighbouring memory. What is not a number never reaches the
             // device, where it may count as anything.
             let mut variables = vec![0.0f32; stride * self.variables];
             variables
@@ -310,9 +301,8 @@ impl<const FIGURES: usize> LineBatches<FIGURES> {
             self.score_batch(count)?;
             let batch = self.buffers()?;
             let bytes = (stride * FIGURES * 4) as u64;
-            self.context
-                .run(|encoder| encoder.copy_buffer_to_buffer(&batch.results, 0, &batch.readback, 0, bytes))?;
-            self.context.read(&batch.readback, bytes, |data| {
+            let results = (&batch.results, 0);
+            self.context.read_back(results, &batch.readback, bytes, |data| {
                 let planes: &[f32] = bytemuck::cast_slice(data);
                 found.extend((0..count).map(|lane| {
                     std::array::from_fn::<f64, FIGURES, _>(|k| f64::from(planes[k * stride + lane]))

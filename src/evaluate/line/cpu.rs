@@ -1,27 +1,13 @@
 //! The reference backend: `f64`, one line after another, threads by rayon.
 
-use super::problem::{LineProblem, MeasuresOf};
-use crate::error::Result;
-use crate::evaluate::{BackendInfo, Evaluation, Evaluator, Problem};
+use super::problem::{LineProblem, Measures, MeasuresOf};
 use crate::line::LimitTable;
 use crate::line::LinePlan;
 use crate::line::kernel::{Course, Wanted, lap_time, shape};
 use crate::scalar::Lookup;
 use rayon::prelude::*;
 
-/// Scores lines in `f64`.
-pub struct CpuLineEvaluator<'a> {
-    line: &'a LineProblem,
-}
-
-impl<'a> CpuLineEvaluator<'a> {
-    /// An evaluator of `line`.
-    pub fn new(line: &'a LineProblem) -> Self {
-        Self { line }
-    }
-}
-
-/// All figures of the line that `variables` give; the time is nought where none is wanted.
+/// All figures of the line that `variables` give; the time is zero where none is wanted.
 #[inline(always)]
 pub(super) fn measure<R: Lookup>(
     plan: &LinePlan<R::Storage>,
@@ -38,27 +24,12 @@ pub(super) fn measure<R: Lookup>(
     (sums, time).into()
 }
 
-impl Evaluator for CpuLineEvaluator<'_> {
-    fn problem(&self) -> &Problem {
-        &self.line.problem
-    }
-
-    fn backend(&self) -> BackendInfo {
-        BackendInfo::reference()
-    }
-
-    fn evaluate(&mut self, population: &[f64]) -> Result<Evaluation> {
-        let line = self.line;
-        let rows: Vec<_> = population
-            .par_chunks_exact(line.dimensions().max(1))
-            .map_init(Course::default, |course, candidate| {
-                if let Some(failure) = line.preliminary_failure(candidate) {
-                    return line.failed_row(failure);
-                }
-                let found = measure::<f64>(line.plan(), line.limits(), line.wanted(), candidate, course);
-                line.objective_row(&found.0)
-            })
-            .collect();
-        Ok(Evaluation::of_rows(rows))
-    }
+/// The figures of candidates in `f64`.
+pub(super) fn measures(line: &LineProblem, candidates: &[&[f64]]) -> Vec<Measures> {
+    candidates
+        .par_iter()
+        .map_init(Course::default, |course, candidate| {
+            measure::<f64>(line.plan(), line.limits(), line.wanted(), candidate, course).0
+        })
+        .collect()
 }

@@ -1,30 +1,25 @@
-//! The graphics backend: `f32`, one lane per line.
+//! The graphics backend: `f32`, one lane per line, for populations from the host and for swarms that live on the device.
 
-use super::batches::{LineBatches, LineBatching, LineKernel};
-use super::problem::{LineProblem, MEASURES};
-use super::swarm::Exchange;
+use super::batches::{LineBatches, LineKernel};
+use super::exchange::Exchange;
+use super::problem::{LineProblem, MEASURES, Measures};
 use super::tables::LineTables;
 use crate::error::Result;
-use crate::evaluate::gpu::GpuContext;
-use crate::evaluate::{BackendInfo, Evaluation, Evaluator, Problem};
+use crate::evaluate::gpu::{Batching, GpuContext};
+use crate::evaluate::resident::DeviceObjectives;
+use crate::evaluate::{DeviceKernel, GpuBackend, Problem, ProblemKind};
 use crate::line::LimitTable;
-use rayon::prelude::*;
 use std::sync::Arc;
 
-/// Scores lines on a graphics processor.
-pub struct GpuLineEvaluator<'a> {
-    pub(super) line: &'a LineProblem,
-    pub(super) batches: LineBatches<MEASURES>,
+/// The line kernel on a device.
+pub struct LineDevice {
+    batches: LineBatches<MEASURES>,
     /// For swarms that live on the device.
-    pub(super) exchange: Option<Exchange>,
+    exchange: Option<Exchange>,
 }
 
-impl<'a> GpuLineEvaluator<'a> {
-    /// An evaluator of `line` on `context`'s device.
-    ///
-    /// # Errors
-    /// [`crate::Error::Device`] if the kernel does not compile or the sections do not fit the device.
-    pub fn new(line: &'a LineProblem, context: Arc<GpuContext>) -> Result<Self> {
+impl DeviceKernel<LineProblem> for LineDevice {
+    fn open(line: &LineProblem, context: Arc<GpuContext>) -> Result<Self> {
         let plan = line.plan().stored::<f32>();
         // Without laps the tables are there but not read.
         let limits = line.limits().map_or(
@@ -50,55 +45,65 @@ impl<'a> GpuLineEvaluator<'a> {
             lap: line.wanted().lap,
         };
         Ok(Self {
-            line,
             batches: LineBatches::new(context, kernel)?,
             exchange: None,
         })
     }
 
-    /// Cuts the work differently.
-    pub fn with_batching(mut self, batching: LineBatching) -> Self {
-        self.batches.cut(batching);
-        self
+    fn context(&self) -> &GpuContext {
+        self.batches.context()
     }
 
-    /// How the work is cut.
-    pub fn batching(&self) -> LineBatching {
+    fn batching(&self) -> Batching {
         self.batches.batching()
     }
 
-    /// The longest dispatch of the last evaluation with its submission and the wait, ms.
-    pub fn longest_dispatch_ms(&self) -> f64 {
-        self.batches.longest_ms()
+    fn cut(&mut self, batching: Batching) {
+        self.batches.cut(batching);
+    }
+
+    fn outcomes(&mut self, _: &LineProblem, candidates: &[&[f64]]) -> Result<Vec<Measures>> {
+        self.batches.watch_anew();
+        self.batches.score(candidates.len(), |candidate, variable| {
+            candidates[candidate][variable]
+        })
     }
 }
 
-impl Evaluator for GpuLineEvaluator<'_> {
+impl GpuBackend<'_, LineProblem> {
+    /// The longest dispatch of the last evaluation with its submission and the wait, ms.
+    pub fn longest_dispatch_ms(&self) -> f64 {
+        self.device.batches.longest_ms()
+    }
+}
+
+impl DeviceObjectives for GpuBackend<'_, LineProblem> {
     fn problem(&self) -> &Problem {
-        &self.line.problem
+        ProblemKind::problem(self.kind)
     }
 
-    fn backend(&self) -> BackendInfo {
-        self.batches.context().backend_info()
-    }
-
-    fn evaluate(&mut self, population: &[f64]) -> Result<Evaluation> {
-        self.batches.watch_anew();
-        let line = self.line;
-        let candidates: Vec<&[f64]> = population.chunks_exact(line.dimensions().max(1)).collect();
-        let measures = self.batches.score(candidates.len(), |candidate, variable| {
-            candidates[candidate][variable]
-        })?;
-        let rows = candidates
-            .par_iter()
-            .zip(&measures)
-            .map(
-                |(candidate, measures)| match line.preliminary_failure(candidate) {
-                    Some(failure) => line.failed_row(failure),
-                    None => line.objective_row(measures),
-                },
-            )
-            .collect();
-        Ok(Evaluation::of_rows(rows))
+    fn evaluate(
+        &mut self,
+        particles: usize,
+        position: &wgpu::Buffer,
+        objectives: &wgpu::Buffer,
+    ) -> Result<()> {
+        let LineDevice { batches, exchange } = &mut self.device;
+        let context = Arc::clone(batches.context());
+        let exchange = match exchange {
+            Some(exchange) => exchange,
+            None => exchange.insert(Exchange::new(self.kind, &context)?),
+        };
+        let most = batches.batch_size();
+        for first in (0..particles).step_by(most) {
+            let candidates = (particles - first).min(most);
+            batches.reserve(candidates)?;
+            let (stride, variables, _) = batches.rows()?;
+            exchange.take(&context, [first, candidates, stride], position, variables)?;
+            batches.score_batch(candidates)?;
+            let (_, _, results) = batches.rows()?;
+            exchange.give(&context, [first, candidates, stride], results, objectives)?;
+        }
+        Ok(())
     }
 }

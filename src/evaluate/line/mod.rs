@@ -1,20 +1,63 @@
-//! Scoring racing lines: lengths, curvatures and point-mass lap times of whole swarms of them.
+//! Scoring racing lines: lengths, curvatures and quasi-steady-state lap times of whole swarms of them.
 
-mod backend;
 mod batches;
 mod cpu;
+mod exchange;
 mod gpu;
 mod problem;
 mod simd;
-mod swarm;
 mod tables;
 
-pub use backend::open_line_evaluator;
+pub use crate::evaluate::gpu::Batching as LineBatching;
+pub use crate::evaluate::open_evaluator as open_line_evaluator;
+pub use batches::LineStretch;
 pub(in crate::evaluate) use batches::{LineBatches, LineKernel};
-pub use batches::{LineBatching, LineStretch};
-pub use cpu::CpuLineEvaluator;
-pub use gpu::GpuLineEvaluator;
 pub use problem::{LineObjective, LineProblem};
-pub use simd::SimdLineEvaluator;
 pub use tables::DeviceSection;
 pub(in crate::evaluate) use tables::LineTables;
+
+use super::{Failure, Problem, ProblemKind, are_numbers};
+use problem::Measures;
+
+/// Scores lines in `f64`.
+pub type CpuLineEvaluator<'a> = crate::evaluate::CpuBackend<'a, LineProblem>;
+/// Scores lines in `f32` lanes.
+pub type SimdLineEvaluator<'a> = crate::evaluate::SimdBackend<'a, LineProblem>;
+/// Scores lines on a graphics processor.
+pub type GpuLineEvaluator<'a> = crate::evaluate::GpuBackend<'a, LineProblem>;
+
+impl ProblemKind for LineProblem {
+    type Outcome = Measures;
+    type Lanes = simd::LineLanes;
+    type Device = gpu::LineDevice;
+    const WITHOUT_COST: Failure = Failure::Standstill;
+
+    fn problem(&self) -> &Problem {
+        &self.problem
+    }
+
+    /// The variables in single precision, once here and once on a device, three figures of each cross-section there, the place,
+    /// the measures and the row.
+    fn bytes_each(&self) -> u64 {
+        8 * self.dimensions() as u64 + 12 * self.plan().rows.len() as u64 + 320
+    }
+
+    fn preliminary_failure(&self, candidate: &[f64]) -> Option<Failure> {
+        (!are_numbers(candidate)).then_some(Failure::NotFinite)
+    }
+
+    fn reference(&self, candidates: &[&[f64]]) -> Vec<Measures> {
+        cpu::measures(self, candidates)
+    }
+
+    fn objectives_of(&self, _: &[f64], measures: &Measures) -> std::result::Result<Vec<f64>, Failure> {
+        let figure = |objective: &LineObjective| {
+            let figure = measures[*objective as usize];
+            match objective {
+                LineObjective::Gamma => figure.sqrt(),
+                _ => figure,
+            }
+        };
+        Ok(self.objectives.iter().map(figure).collect())
+    }
+}

@@ -1,69 +1,46 @@
-//! What is asked of racing lines: the sections they cross, how few numbers give them, and what is to be small.
+//! Problems of racing lines: the cross-sections they cross, the variables that give them, and the objectives.
 
 use crate::error::{Error, Result};
-use crate::evaluate::{FAILED_COST, Failure, Objective, Problem, are_costs, are_numbers};
+use crate::evaluate::Problem;
+use crate::evaluate::objectives::{listed, objectives};
 use crate::line::kernel::{Shape, Wanted};
 use crate::line::{LimitTable, LinePlan, Parametrisation, PointMass, geometry};
 use crate::track::CrossSections;
 use glam::DVec2;
-use serde::{Deserialize, Serialize};
 
-/// What of a line can be minimised.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum LineObjective {
-    /// Its length, m.
-    Length,
-    /// The sum of its segments' squared lengths, m^2.
-    LengthSquared,
-    /// The root of the sum of its squared second differences over the cuts' spacing, 1/m.
-    Gamma,
-    /// The integral of its curvature squared over the length, 1/m.
-    Kappa2,
-    /// The time of a point mass's lap on it, s.
-    LapTime,
+objectives! {
+    /// What of a line can be minimised.
+    LineObjective {
+        /// Its length, m.
+        Length: "length", "m", "length";
+        /// The sum of its segments' squared lengths, m^2.
+        LengthSquared: "length_squared", "m^2", "squared length";
+        /// The root of the sum of its squared second differences over the spacing of the cross-sections, 1/m.
+        Gamma: "gamma", "1/m", "second difference";
+        /// The integral of its curvature squared over the length, 1/m.
+        Kappa2: "kappa2", "1/m", "squared curvature";
+        /// The time of the quasi-steady-state lap on it, s.
+        LapTime: "lap_time", "s", "lap time";
+    }
 }
 
 impl LineObjective {
-    /// Every objective.
-    pub const ALL: [Self; 5] = [
-        Self::Length,
-        Self::LengthSquared,
-        Self::Gamma,
-        Self::Kappa2,
-        Self::LapTime,
-    ];
-
-    /// The name in studies.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Length => "length",
-            Self::LengthSquared => "length_squared",
-            Self::Gamma => "gamma",
-            Self::Kappa2 => "kappa2",
-            Self::LapTime => "lap_time",
-        }
-    }
-
-    /// The unit.
-    pub fn unit(self) -> &'static str {
-        match self {
-            Self::Length => "m",
-            Self::LengthSquared => "m^2",
-            Self::Gamma | Self::Kappa2 => "1/m",
-            Self::LapTime => "s",
-        }
-    }
-
-    /// The objective of this name.
-    pub fn named(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|o| o.name() == name)
+    /// What the line is called on which the objective is least; files are named after it.
+    pub fn line_name(self) -> &'static str {
+        [
+            "shortest",
+            "least squared length",
+            "least second difference",
+            "least curved",
+            "fastest",
+        ][self as usize]
     }
 }
 
-/// Figures of one line: length, squared length, squared second differences, integral and time.
+/// Figures of one line, one for each [`LineObjective`] and in their order: of Gamma the square.
 pub(super) type Measures = [f64; MEASURES];
 /// How many those are.
-pub(super) const MEASURES: usize = 5;
+pub(super) const MEASURES: usize = LineObjective::ALL.len();
 
 impl<R: Copy> From<(Shape<R>, R)> for MeasuresOf<R> {
     fn from((shape, time): (Shape<R>, R)) -> Self {
@@ -92,20 +69,20 @@ pub struct LineProblem {
     pub problem: Problem,
     cuts: CrossSections,
     parametrisation: Parametrisation,
-    objectives: Vec<LineObjective>,
+    pub(super) objectives: Vec<LineObjective>,
     plan: LinePlan<f64>,
     car: Option<PointMass>,
     limits: Option<LimitTable<f64>>,
 }
 
 impl LineProblem {
-    /// The problem of finding lines across `cuts`, which the middle of the car may use from end to end (see
+    /// The problem of finding lines across the cross-sections `cuts`, which the middle of the car may use from end to end (see
     /// [`CrossSections::narrowed`]). `car` drives the laps; `entry_mps` is its greatest speed at the start of an open
     /// circuit (m/s).
     ///
     /// # Errors
     /// [`Error::Input`] if there are fewer than three sections, if objectives are missing or come twice, if a lap time is
-    /// asked for without a car, or if the parametrisation or the car cannot be.
+    /// asked for without a car, or if the parametrisation or the car is out of range.
     pub fn new(
         cuts: CrossSections,
         parametrisation: Parametrisation,
@@ -124,7 +101,7 @@ impl LineProblem {
         if !(finite(&cuts.right_m) && finite(&cuts.left_m)) {
             return wrong(
                 "sections",
-                "a position that is no number".to_owned(),
+                "a position that is not finite".to_owned(),
                 "finite positions",
             );
         }
@@ -161,13 +138,7 @@ impl LineProblem {
         Ok(Self {
             problem: Problem {
                 variables: parametrisation.variables(&cuts),
-                objectives: objectives
-                    .iter()
-                    .map(|o| Objective {
-                        name: o.name().to_owned(),
-                        unit: o.unit().to_owned(),
-                    })
-                    .collect(),
+                objectives: listed(objectives),
             },
             cuts,
             parametrisation,
@@ -198,7 +169,7 @@ impl LineProblem {
         self.car.as_ref()
     }
 
-    /// The car's limits.
+    /// The car's limits, a table made from its g-g-v envelope.
     pub fn limits(&self) -> Option<&LimitTable<f64>> {
         self.limits.as_ref()
     }
@@ -236,8 +207,8 @@ impl LineProblem {
         Ok(self.parametrisation.variables_of(&coefficients))
     }
 
-    /// Moves the variables of `candidate` so that its line lies on the road at every section, where the kernels would hold
-    /// it at the edge with a kink; returns the sum of the squared moves.
+    /// Moves the variables of `candidate` so that its line lies on the road at every cross-section; returns the sum of the squared
+    /// moves. Kernels would hold such a line at the edge with a kink.
     ///
     /// Sections off the road are put back on it one after the other, each by the least move of its variables, until none
     /// is left (S. Kaczmarz, *Angenäherte Auflösung von Systemen linearer Gleichungen*, 1937; for inequalities S. Agmon,
@@ -298,42 +269,11 @@ impl LineProblem {
         moved.map(|(after, before)| (after - before).powi(2)).sum()
     }
 
-    /// What the kernels must work out.
+    /// What the kernels must compute.
     pub(super) fn wanted(&self) -> Wanted {
         Wanted {
             integral: self.objectives.contains(&LineObjective::Kappa2),
             lap: self.objectives.contains(&LineObjective::LapTime),
-        }
-    }
-
-    /// Why a candidate need not be scored, if so.
-    pub(super) fn preliminary_failure(&self, candidate: &[f64]) -> Option<Failure> {
-        (!are_numbers(candidate)).then_some(Failure::NotFinite)
-    }
-
-    /// The row of a candidate that failed.
-    pub(super) fn failed_row(&self, failure: Failure) -> (Vec<f64>, Option<Failure>) {
-        (vec![FAILED_COST; self.objectives.len()], Some(failure))
-    }
-
-    /// The objectives' row of a line's figures.
-    pub(super) fn objective_row(&self, measures: &Measures) -> (Vec<f64>, Option<Failure>) {
-        let [length, length_squared, second_differences, integral, time] = *measures;
-        let row: Vec<f64> = self
-            .objectives
-            .iter()
-            .map(|objective| match objective {
-                LineObjective::Length => length,
-                LineObjective::LengthSquared => length_squared,
-                LineObjective::Gamma => second_differences.sqrt(),
-                LineObjective::Kappa2 => integral,
-                LineObjective::LapTime => time,
-            })
-            .collect();
-        if are_costs(&row) {
-            (row, None)
-        } else {
-            self.failed_row(Failure::Standstill)
         }
     }
 }

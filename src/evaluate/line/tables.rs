@@ -23,9 +23,9 @@ pub struct DeviceSection {
     pub sources: [u32; TERMS],
     /// Their weights.
     pub weights: [f32; TERMS],
-    /// From the right end of this cut to that of the next, m.
+    /// From the right end of this cross-section to that of the next, m.
     pub step: [f32; 2],
-    /// From the right end of the cut to the left end, m.
+    /// From the right end of the cross-section to the left end, m.
     pub cut: [f32; 2],
     /// The part of `alpha` that no variable moves.
     pub constant: f32,
@@ -100,18 +100,10 @@ impl LineTables {
             ellipse = vec![0.0; 4];
         }
         let sections: &[u8] = bytemuck::cast_slice(&sections);
-        let most = device.max_storage_buffer_binding_size;
-        if sections.len() as u64 > most {
-            return Err(Error::Device(format!(
-                "{} holds at most {most} bytes of sections, {} are needed",
-                context.summary(),
-                sections.len()
-            )));
-        }
         let most = LOOP_ROUNDS / ROUNDS_PER_SECTION;
         if software && plan.rows.len() > most {
             return Err(Error::Device(format!(
-                "{} leaves loops that are longer than it thinks good: at most {most} sections can be evaluated on it, {} are needed",
+                "{} limits the length of loops: it can evaluate at most {most} cross-sections, {} are needed",
                 context.summary(),
                 plan.rows.len()
             )));
@@ -153,7 +145,7 @@ impl LineTables {
                 limits_binding,
             ],
             buffers: [
-                context.buffer_of("sections", sections, both)?,
+                context.table("sections", sections, Usage::UNIFORM)?,
                 table("limits", &limits.limits)?,
                 table("corners", &corners)?,
                 table("ellipse", &ellipse)?,

@@ -3,10 +3,11 @@
 use super::kernel::{BLOCK, CHANNELS};
 use super::problem::ReplayProblem;
 use crate::error::{Error, Result};
-use crate::evaluate::gpu::shader::{ReplayShape, base_vectors};
-use crate::evaluate::gpu::{Binding, DeviceKind, GpuContext, Kernel, LOOP_ROUNDS, rounds_of, workgroup};
-use crate::evaluate::sound::{joined, sound};
-use crate::evaluate::{BackendInfo, Evaluation, Evaluator, ModelTable, Problem};
+use crate::evaluate::gpu::shader::{CarShape, ReplayShape, base_vectors};
+use crate::evaluate::gpu::{
+    Batching, Binding, DeviceKind, GpuContext, Kernel, LOOP_ROUNDS, rounds_of, workgroup,
+};
+use crate::evaluate::{DeviceKernel, GpuBackend, ModelTable};
 use crate::vehicle::model::STAGES;
 use bytemuck::{Pod, Zeroable};
 use std::sync::Arc;
@@ -80,35 +81,6 @@ const fn rounds_per_sample(substeps: usize) -> usize {
 /// Dispatches that one set of timestamps covers.
 const TIMED_DISPATCHES: u32 = 1024;
 
-/// How work is cut. Results do not depend on it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Batching {
-    /// The most lanes (candidates times windows) of one dispatch.
-    pub lanes: usize,
-    /// The most bytes of progress between dispatches.
-    pub bytes: u64,
-    /// How long a dispatch should take, ms: well under the watchdogs' two seconds, well over its overhead.
-    pub dispatch_ms: f64,
-    /// The most samples of a dispatch, rounded up to whole blocks; `None` leaves it to the time.
-    pub samples: Option<usize>,
-}
-
-impl Batching {
-    /// What suits a kind of device: the first dispatch of a block of samples must end in reasonable time on a
-    /// software driver, and fill a large card.
-    pub fn for_kind(kind: DeviceKind) -> Self {
-        Self {
-            lanes: match kind {
-                DeviceKind::Software => 1 << 14,
-                _ => 1 << 18,
-            },
-            bytes: 128 << 20,
-            dispatch_ms: kind.dispatch_ms(),
-            samples: None,
-        }
-    }
-}
-
 /// What the last evaluation asked of the device.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct DispatchStatistics {
@@ -144,15 +116,16 @@ struct Stopwatch {
     readback: wgpu::Buffer,
 }
 
-/// Scores replays on a graphics processor.
-pub struct GpuEvaluator<'a> {
-    replay: &'a ReplayProblem,
+/// The replay kernels on a device.
+pub struct ReplayDevice {
     table: ModelTable,
     context: Arc<GpuContext>,
     batching: Batching,
     drive: Arc<Kernel>,
     reduce: Arc<Kernel>,
     workgroup: usize,
+    windows: usize,
+    substeps: usize,
     stretch: wgpu::Buffer,
     /// In the order of the replay kernel's bindings 1 to 4.
     tables: [wgpu::Buffer; 4],
@@ -163,20 +136,17 @@ pub struct GpuEvaluator<'a> {
     kernel_ms: Option<f64>,
 }
 
-impl<'a> GpuEvaluator<'a> {
-    /// An evaluator of `replay` on `context`'s device.
-    ///
-    /// # Errors
-    /// [`Error::Device`] if the kernels do not compile or the log does not fit the device.
-    pub fn new(replay: &'a ReplayProblem, context: Arc<GpuContext>) -> Result<Self> {
-        let limits = context.limits();
+impl DeviceKernel<ReplayProblem> for ReplayDevice {
+    fn open(replay: &ReplayProblem, context: Arc<GpuContext>) -> Result<Self> {
         let workgroup = workgroup(&context);
         let table = ModelTable::new(&replay.free, &replay.problem.variables);
         let shape = ReplayShape {
-            model: replay.tyre_model(),
-            sources: &table.sources,
+            car: CarShape {
+                model: replay.tyre_model(),
+                sources: &table.sources,
+                workgroup,
+            },
             norm: replay.plan.norm,
-            workgroup,
         };
         use Binding::{Read, Uniform, Write};
         let drive = context.kernel(
@@ -193,8 +163,7 @@ impl<'a> GpuEvaluator<'a> {
         );
         if software && Self::most_samples(substeps) == 0 {
             return Err(Error::Device(format!(
-                "{} leaves loops that are longer than it thinks good: at most {} steps between samples can be driven on it, \
-                 {substeps} are asked for",
+                "{} limits the length of loops: it can drive at most {} steps between samples, {substeps} are needed",
                 context.summary(),
                 (LOOP_ROUNDS / BLOCK - rounds_per_sample(0)) / rounds_per_substep(),
             )));
@@ -227,17 +196,7 @@ impl<'a> GpuEvaluator<'a> {
             })
             .collect::<Result<Vec<_>>>()?;
         let fractions: Vec<[f32; 4]> = plan.fractions.iter().map(|f| [f[0], f[1], f[2], 0.0]).collect();
-        let storage = |label: &str, data: &[u8]| {
-            let most = limits.max_storage_buffer_binding_size;
-            if data.len() as u64 > most {
-                return Err(Error::Device(format!(
-                    "{} holds at most {most} bytes of {label}, {} are needed",
-                    context.summary(),
-                    data.len()
-                )));
-            }
-            context.buffer_of(label, data, Usage::STORAGE)
-        };
+        let storage = |label: &str, data: &[u8]| context.table(label, data, Usage::STORAGE);
         let tables = [
             context.buffer_of("parameters", bytemuck::cast_slice(&base), Usage::UNIFORM)?,
             storage("samples", bytemuck::cast_slice(&samples))?,
@@ -261,9 +220,14 @@ impl<'a> GpuEvaluator<'a> {
             None => None,
         };
         Ok(Self {
-            replay,
             table,
-            batching: Batching::for_kind(context.summary().kind),
+            // The first dispatch of a block of samples must end in reasonable time on a software driver, and fill a large card.
+            batching: match context.summary().kind {
+                kind @ DeviceKind::Software => Batching::new(kind, 1 << 14, 128 << 20),
+                kind => Batching::new(kind, 1 << 18, 128 << 20),
+            },
+            windows: plan.windows.len(),
+            substeps,
             context,
             drive,
             reduce,
@@ -278,33 +242,50 @@ impl<'a> GpuEvaluator<'a> {
         })
     }
 
-    /// Cuts the work differently.
-    pub fn with_batching(mut self, batching: Batching) -> Self {
-        self.batching = batching;
-        self.batch = None;
-        self
+    fn context(&self) -> &GpuContext {
+        &self.context
     }
 
-    /// How the work is cut.
-    pub fn batching(&self) -> Batching {
+    fn batching(&self) -> Batching {
         self.batching
     }
 
+    fn cut(&mut self, batching: Batching) {
+        self.batching = batching;
+        self.batch = None;
+    }
+
+    fn outcomes(
+        &mut self,
+        replay: &ReplayProblem,
+        candidates: &[&[f64]],
+    ) -> Result<Vec<Option<[f64; CHANNELS]>>> {
+        self.statistics = DispatchStatistics::default();
+        self.kernel_ms = None;
+        let errors = self.drive(replay, candidates)?;
+        self.kernel_ms = self.read_stopwatch()?;
+        Ok(errors)
+    }
+}
+
+impl GpuBackend<'_, ReplayProblem> {
     /// Time that the device itself spent driving in the last evaluation, ms; `None` where it cannot tell.
     pub fn last_kernel_ms(&self) -> Option<f64> {
-        self.kernel_ms
+        self.device.kernel_ms
     }
 
     /// What the last evaluation asked of the device.
     pub fn statistics(&self) -> DispatchStatistics {
-        self.statistics
+        self.device.statistics
     }
 
     /// How long the replay kernel took to compile, ms.
     pub fn compile_ms(&self) -> f64 {
-        self.drive.compile_ms
+        self.device.drive.compile_ms
     }
+}
 
+impl ReplayDevice {
     /// The most candidates and windows of one batch, for a population of `count`.
     fn batch_size(&self, count: usize) -> (usize, usize) {
         let limits = self.context.limits();
@@ -316,7 +297,7 @@ impl<'a> GpuEvaluator<'a> {
         // The kernel that joins windows takes a round for each, and they are split only into whole blocks, because they are
         // summed by the block.
         let most_groups = most_groups.min(LOOP_ROUNDS);
-        let all = self.replay.plan.windows.len();
+        let all = self.windows;
         let whole_blocks = (lanes / self.workgroup).min(most_groups) / BLOCK * BLOCK;
         let windows = if all * self.workgroup <= lanes && all <= most_groups {
             all
@@ -381,6 +362,12 @@ impl<'a> GpuEvaluator<'a> {
         Ok(())
     }
 
+    fn buffers(&self) -> Result<&BatchBuffers> {
+        self.batch
+            .as_ref()
+            .ok_or_else(|| Error::Device("a batch without buffers".to_owned()))
+    }
+
     /// The most samples of a dispatch, in whole blocks: a kernel's loops have a limit, see [`LOOP_ROUNDS`].
     fn most_samples(substeps: usize) -> usize {
         LOOP_ROUNDS / rounds_per_sample(substeps) / BLOCK * BLOCK
@@ -393,15 +380,15 @@ impl<'a> GpuEvaluator<'a> {
             (self.batching.dispatch_ms / ms_per_sample) as usize
         });
         let samples = by_time
-            .min(self.batching.samples.unwrap_or(usize::MAX))
-            .min(Self::most_samples(self.replay.plan.fractions.len()));
+            .min(self.batching.steps.unwrap_or(usize::MAX))
+            .min(Self::most_samples(self.substeps));
         (samples / BLOCK).max(1) * BLOCK
     }
 
     /// Drives one batch of candidates, whose figures are on the device, through one batch of windows.
-    fn drive_batch(&mut self, mut stretch: Stretch) -> Result<()> {
+    fn drive_batch(&mut self, replay: &ReplayProblem, mut stretch: Stretch) -> Result<()> {
         let first = stretch.first_window as usize;
-        let windows = &self.replay.plan.windows[first..first + stretch.windows as usize];
+        let windows = &replay.plan.windows[first..first + stretch.windows as usize];
         let longest = windows.iter().map(|w| w.end - w.start).max().unwrap_or(0);
         let lanes = stretch.candidates as usize * windows.len();
         let groups = stretch.candidates.div_ceil(self.workgroup as u32);
@@ -423,9 +410,7 @@ impl<'a> GpuEvaluator<'a> {
                     beginning_of_pass_write_index: Some(query),
                     end_of_pass_write_index: Some(query + 1),
                 });
-            let Some(batch) = &self.batch else {
-                return Err(Error::Device("a batch without buffers".to_owned()));
-            };
+            let batch = self.buffers()?;
             let ms = self.context.dispatch(
                 &self.drive,
                 &batch.replay_group,
@@ -441,27 +426,25 @@ impl<'a> GpuEvaluator<'a> {
             self.statistics.longest_ms = self.statistics.longest_ms.max(ms);
             done += samples;
         }
-        let Some(batch) = &self.batch else {
-            return Err(Error::Device("a batch without buffers".to_owned()));
-        };
+        let batch = self.buffers()?;
         self.context
             .dispatch(&self.reduce, &batch.reduce_group, [groups, 1], None)
             .map(drop)
     }
 
     /// Errors per channel of candidates that can be driven; `None` of those that do not reach the end.
-    fn drive(&mut self, rows: &[&[f64]]) -> Result<Vec<Option<[f64; CHANNELS]>>> {
+    fn drive(&mut self, replay: &ReplayProblem, rows: &[&[f64]]) -> Result<Vec<Option<[f64; CHANNELS]>>> {
         let mut errors = Vec::with_capacity(rows.len());
         if rows.is_empty() {
             return Ok(errors);
         }
         let (most_candidates, most_windows) = self.batch_size(rows.len());
-        let all_windows = self.replay.plan.windows.len();
+        let all_windows = self.windows;
         self.reserve(most_candidates, most_windows)?;
         for candidates in rows.chunks(most_candidates) {
             let stride = candidates.len().next_multiple_of(self.workgroup);
             let varying = self.table.varying.len();
-            let by_candidate = self.table.rows(&self.replay.free, candidates);
+            let by_candidate = self.table.rows(&replay.free, candidates);
             // Figure by figure, so that neighbouring lanes read neighbouring memory.
             let mut figures = vec![0.0f32; stride * varying];
             for (candidate, row) in by_candidate.chunks_exact(varying.max(1)).enumerate() {
@@ -469,29 +452,25 @@ impl<'a> GpuEvaluator<'a> {
                     figures[figure * stride + candidate] = *value;
                 }
             }
-            let Some(batch) = &self.batch else {
-                return Err(Error::Device("a batch without buffers".to_owned()));
-            };
+            let batch = self.buffers()?;
             self.context.write(&batch.figures, bytemuck::cast_slice(&figures));
             for first_window in (0..all_windows).step_by(most_windows) {
-                self.drive_batch(Stretch {
+                let stretch = Stretch {
                     candidates: candidates.len() as u32,
                     stride: stride as u32,
                     windows: most_windows.min(all_windows - first_window) as u32,
                     first_window: first_window as u32,
                     first_sample: 0,
                     samples: 0,
-                    substeps: self.replay.plan.fractions.len() as u32,
-                    step: self.replay.plan.step as f32,
-                })?;
+                    substeps: self.substeps as u32,
+                    step: replay.plan.step as f32,
+                };
+                self.drive_batch(replay, stretch)?;
             }
-            let Some(batch) = &self.batch else {
-                return Err(Error::Device("a batch without buffers".to_owned()));
-            };
+            let batch = self.buffers()?;
             let bytes = (stride * RESULT_PLANES * 4) as u64;
-            self.context
-                .run(|encoder| encoder.copy_buffer_to_buffer(&batch.results, 0, &batch.readback, 0, bytes))?;
-            self.context.read(&batch.readback, bytes, |data| {
+            let results = (&batch.results, 0);
+            self.context.read_back(results, &batch.readback, bytes, |data| {
                 let planes: &[f32] = bytemuck::cast_slice(data);
                 errors.extend((0..candidates.len()).map(|candidate| {
                     let at = |plane: usize| f64::from(planes[plane * stride + candidate]);
@@ -524,26 +503,5 @@ impl<'a> GpuEvaluator<'a> {
                 .sum()
         })?;
         Ok(Some(ticks as f64 * self.context.tick_ms()))
-    }
-}
-
-impl Evaluator for GpuEvaluator<'_> {
-    fn problem(&self) -> &Problem {
-        &self.replay.problem
-    }
-
-    fn backend(&self) -> BackendInfo {
-        self.context.backend_info()
-    }
-
-    fn evaluate(&mut self, population: &[f64]) -> Result<Evaluation> {
-        self.statistics = DispatchStatistics::default();
-        self.kernel_ms = None;
-        let replay = self.replay;
-        let candidates: Vec<&[f64]> = population.chunks_exact(replay.dimensions().max(1)).collect();
-        let (preliminary, rows) = sound(&candidates, |c| replay.free.preliminary_failure(c));
-        let errors = self.drive(&rows)?.into_iter();
-        self.kernel_ms = self.read_stopwatch()?;
-        Ok(replay.evaluation_of(joined(preliminary, errors)))
     }
 }

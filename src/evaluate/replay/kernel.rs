@@ -1,14 +1,12 @@
 //! The replay kernel: drive a candidate car by the logged inputs and score what it does against what was logged.
 //! Twin of `shaders/replay.wgsl`.
 
-use super::problem::{Norm, Plan, Sample, Window};
+pub use super::plan::CHANNELS;
+use super::plan::{Norm, Plan, Sample, Window};
 use crate::scalar::Real;
 use crate::vehicle::model::runge_kutta_step;
 use crate::vehicle::tyre::Tyre;
 use crate::vehicle::{CarInput, CarModel, CarState};
-
-/// The compared outputs: forward speed (m/s), longitudinal and lateral acceleration (m/s^2), yaw rate (rad/s).
-pub const CHANNELS: usize = 4;
 
 /// Samples that are summed up before they join the running total, which keeps `f32` sums of long laps from
 /// losing their tails: the error grows with the number of terms in each level, not with their product.
@@ -24,8 +22,8 @@ fn input_between<R: Real>(from: &Sample<R::Storage>, to: &Sample<R::Storage>, fr
     }
 }
 
-/// Who is shown the compared outputs at every sample. A trait, because lanes are only fast where all is inlined into what is
-/// compiled for their instruction set, and a closure that is called from two places is not.
+/// Receives the compared outputs at every sample. This is a trait because lanes are only fast if everything is inlined into the
+/// code for their instruction set. A closure that is called from two places is not inlined.
 pub trait Visit<R> {
     /// The outputs at a sample of the window.
     fn visit(&mut self, sample: usize, outputs: [R; CHANNELS]);
@@ -40,7 +38,7 @@ impl<R, F: FnMut(usize, [R; CHANNELS])> Visit<R> for F {
 
 /// Drives `car` through `window`, showing `visitor` the four compared outputs at every sample of it.
 ///
-/// Returns where the car drove to the end, and its last state; a car that is lost stays as it was last.
+/// Returns the lanes in which the car drove to the end, and its last state. A car that is lost keeps its last valid state.
 #[inline(always)]
 pub fn drive_window<R: Real, T: Tyre<R>>(
     car: &CarModel<R, T>,

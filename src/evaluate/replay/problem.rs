@@ -1,83 +1,15 @@
-//! What a replay is: the log, how it is cut into windows, which parameters are free, and what is compared.
+//! What is asked of a replay: which parameters are free, and how errors make objectives.
 
-use super::kernel::CHANNELS;
+use super::plan::{CHANNELS, Norm, Plan, Sample, Window, step_fractions};
 use crate::error::{Error, Result};
-use crate::evaluate::{Evaluation, FAILED_COST, Failure, FreeCar, Objective, Problem, are_costs};
+use crate::evaluate::{FreeCar, Objective, Problem};
 use crate::vehicle::car::CarParameter;
 use crate::vehicle::{Car, TyreModel};
-use serde::{Deserialize, Serialize};
 
 /// Names of the compared channels, in the order of all arrays of four.
 pub const CHANNEL_NAMES: [&str; CHANNELS] = ["vx", "ax", "ay", "yaw_rate"];
 /// Their units.
 pub const CHANNEL_UNITS: [&str; CHANNELS] = ["m/s", "m/s^2", "m/s^2", "rad/s"];
-
-/// How the error of a channel becomes a cost.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Norm {
-    /// Integral of the magnitude over time.
-    One,
-    /// Root of the integral of the square over time.
-    Two,
-    /// Greatest magnitude.
-    Infinity,
-    /// Mean of the square.
-    MeanSquare,
-}
-
-/// One sample of the log: inputs, and measured outputs in the order of [`CHANNEL_NAMES`].
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Sample<S> {
-    /// Wheel speeds FL FR RL RR, rad/s.
-    pub wheel_speed: [S; 4],
-    /// Road-wheel angle, rad.
-    pub steer: S,
-    /// Measured outputs.
-    pub measured: [S; CHANNELS],
-}
-
-/// A stretch of the log that is driven open loop from a known start.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Window<S> {
-    /// First sample.
-    pub start: usize,
-    /// One past the last sample; at least two samples long.
-    pub end: usize,
-    /// Samples from the start that are driven but not scored, while unknown states settle.
-    pub scored_from: usize,
-    /// State at the first sample, in the order of [`crate::vehicle::CarState::to_array`].
-    pub initial: [S; 6],
-}
-
-/// The state that a window starts from: speed and yaw rate as measured, nothing else moving. Lateral speed, roll
-/// and the lagged acceleration are not logged; they settle in a few tenths of a second.
-pub fn initial_state(sample: &Sample<f64>) -> [f64; 6] {
-    [sample.measured[0], 0.0, sample.measured[3], 0.0, 0.0, 0.0]
-}
-
-/// [`Plan::fractions`] for equal sub-steps.
-pub fn step_fractions(substeps: usize) -> Vec<[f64; 3]> {
-    let n = substeps as f64;
-    (0..substeps)
-        .map(|i| i as f64)
-        .map(|i| [i / n, (i + 0.5) / n, (i + 1.0) / n])
-        .collect()
-}
-
-/// Everything shared by all candidates, in the precision of a backend.
-#[derive(Clone, Debug)]
-pub struct Plan<S> {
-    /// The log.
-    pub samples: Vec<Sample<S>>,
-    /// The windows.
-    pub windows: Vec<Window<S>>,
-    /// Integration step, s.
-    pub step: S,
-    /// For each sub-step, where it starts, halves and ends as a share of the sample interval.
-    pub fractions: Vec<[S; 3]>,
-    /// The norm.
-    pub norm: Norm,
-}
 
 /// An objective as a norm of weighted channel costs, the same norm that their samples are put together in.
 #[derive(Clone, Debug, PartialEq)]
@@ -196,45 +128,6 @@ impl ReplayProblem {
         })
     }
 
-    /// The objectives' row of a candidate that drove to the end, from its windows' errors; the failed row
-    /// otherwise, or if a figure is not finite or that of a failure.
-    pub fn objective_row(&self, errors: Option<[f64; CHANNELS]>) -> (Vec<f64>, Option<Failure>) {
-        let row = errors.map(|e| {
-            let costs = self.channel_costs(&e);
-            let weighted = |o: &ChannelWeights| {
-                let each = o.weights.iter().zip(costs).map(|(w, c)| w * c);
-                match self.plan.norm {
-                    Norm::One | Norm::MeanSquare => each.sum(),
-                    // A sum of roots has a crease along which each of them is nought, which swarms get caught in.
-                    Norm::Two => each.fold(0.0, f64::hypot),
-                    // Not f64::max, which would lose what is not a number.
-                    Norm::Infinity => each.fold(
-                        0.0,
-                        |most: f64, c| if most > c || most.is_nan() { most } else { c },
-                    ),
-                }
-            };
-            self.objectives.iter().map(weighted).collect::<Vec<f64>>()
-        });
-        // A car that is so far off has left the range of what cars do, whatever it was that it did.
-        match row.filter(|row| are_costs(row)) {
-            Some(row) => (row, None),
-            None => (vec![FAILED_COST; self.objectives.len()], Some(Failure::Spun)),
-        }
-    }
-
-    /// The objectives of candidates from their errors, see [`ReplayProblem::objective_row`], or from why they have none.
-    pub(super) fn evaluation_of(
-        &self,
-        errors: Vec<std::result::Result<Option<[f64; CHANNELS]>, Failure>>,
-    ) -> Evaluation {
-        let rows = errors.into_iter().map(|errors| match errors {
-            Ok(errors) => self.objective_row(errors),
-            Err(failure) => (self.objective_row(None).0, Some(failure)),
-        });
-        Evaluation::of_rows(rows.collect())
-    }
-
     /// Adds one window's errors to those of the windows before.
     pub fn accumulate(&self, total: &mut [f64; CHANNELS], errors: [f64; CHANNELS]) {
         for (t, e) in total.iter_mut().zip(errors) {
@@ -243,36 +136,6 @@ impl ReplayProblem {
             } else {
                 *t + e
             };
-        }
-    }
-}
-
-impl Plan<f64> {
-    /// The plan in single precision, for the f32 backends.
-    pub fn to_f32(&self) -> Plan<f32> {
-        Plan {
-            samples: self
-                .samples
-                .iter()
-                .map(|s| Sample {
-                    wheel_speed: s.wheel_speed.map(|x| x as f32),
-                    steer: s.steer as f32,
-                    measured: s.measured.map(|x| x as f32),
-                })
-                .collect(),
-            windows: self
-                .windows
-                .iter()
-                .map(|w| Window {
-                    start: w.start,
-                    end: w.end,
-                    scored_from: w.scored_from,
-                    initial: w.initial.map(|x| x as f32),
-                })
-                .collect(),
-            step: self.step as f32,
-            fractions: self.fractions.iter().map(|f| f.map(|x| x as f32)).collect(),
-            norm: self.norm,
         }
     }
 }

@@ -1,126 +1,88 @@
 //! The lane backend: `f32`, as many candidates at once as a register holds, threads by rayon.
 
 use super::kernel::{CHANNELS, score_window};
-use super::problem::{Plan, ReplayProblem, Window};
-use crate::error::Result;
-use crate::evaluate::simd::{InstructionSet, LaneWork, dispatch};
-use crate::evaluate::sound::{joined, sound};
-use crate::evaluate::{BackendInfo, Evaluation, Evaluator, ModelTable, Problem};
+use super::plan::Plan;
+use super::problem::ReplayProblem;
+use crate::evaluate::packs::{LaneFigures, LaneKernel, Pack};
+use crate::evaluate::simd::InstructionSet;
+use crate::evaluate::{LaneTables, ModelTable};
 use crate::scalar::lanes::Lanes;
 use crate::vehicle::tyre::Tyre;
 use crate::vehicle::{CarModel, LinearTyre, MagicFormula, TyreModel};
-use rayon::prelude::*;
 
-/// The most lanes of any pack.
-const MOST_LANES: usize = 16;
+/// Figures of a candidate in a window: an error per channel, and one where the car drove to the end.
+const FIGURES: usize = CHANNELS + 1;
 
-/// Scores replays in `f32` lanes.
-pub struct SimdEvaluator<'a> {
-    replay: &'a ReplayProblem,
+/// What lanes read of a problem.
+pub struct ReplayLanes {
     plan: Plan<f32>,
     table: ModelTable,
-    set: InstructionSet,
 }
 
-/// One pack of candidates through one window.
-struct PackThroughWindow<'a> {
-    evaluator: &'a SimdEvaluator<'a>,
-    /// Varying figures of the candidates, at most as many rows as lanes.
-    rows: &'a [f32],
-    window: &'a Window<f32>,
+/// Candidates through one window in each round.
+struct Kernel<'a> {
+    model: TyreModel,
+    tables: &'a ReplayLanes,
+    /// Varying figures of the candidates' cars.
+    rows: Vec<f32>,
 }
 
-/// Errors per channel and lane, and a bit per lane that drove to the end.
-type PackScore = ([[f32; MOST_LANES]; CHANNELS], u32);
-
-impl PackThroughWindow<'_> {
+impl Kernel<'_> {
     #[inline(always)]
-    fn score<L: Lanes, T: Tyre<L>>(&self) -> PackScore {
-        let table = &self.evaluator.table;
-        let width = table.varying.len();
-        let last = (self.rows.len() / width.max(1)).saturating_sub(1);
-        let car = CarModel::<L, T>::from_table(|place| match table.sources[place] {
-            // Lanes without a candidate repeat the last one, so that they cost no special case.
-            Some(figure) => L::from_fn(|lane| self.rows[lane.min(last) * width + figure]),
-            None => L::load(table.base[place]),
-        });
-        let score = score_window(&car, &self.evaluator.plan, self.window);
-        let mut errors = [[0.0; MOST_LANES]; CHANNELS];
-        for (out, lanes) in errors.iter_mut().zip(score.errors) {
-            lanes.write(out);
-        }
-        (errors, L::mask_bits(score.drives))
+    fn score<L: Lanes, T: Tyre<L>>(&self, pack: Pack) -> [L; FIGURES] {
+        let plan = &self.tables.plan;
+        let car: CarModel<L, T> = self.tables.table.cars(&self.rows, pack);
+        let score = score_window(&car, plan, &plan.windows[pack.round]);
+        let [vx, ax, ay, yaw_rate] = score.errors;
+        let drives = L::select(score.drives, L::lit(1.0), L::lit(0.0));
+        [vx, ax, ay, yaw_rate, drives]
     }
 }
 
-impl LaneWork for PackThroughWindow<'_> {
-    type Output = PackScore;
+impl LaneKernel<FIGURES> for Kernel<'_> {
+    type Memory<L: Lanes> = ();
 
     #[inline(always)]
-    fn run<L: Lanes>(self) -> PackScore {
-        match self.evaluator.replay.tyre_model() {
-            TyreModel::MagicFormula => self.score::<L, MagicFormula<L>>(),
-            TyreModel::Linear => self.score::<L, LinearTyre<L>>(),
+    fn figures<L: Lanes>(&self, pack: Pack, (): &mut ()) -> [L; FIGURES] {
+        match self.model {
+            TyreModel::MagicFormula => self.score::<L, MagicFormula<L>>(pack),
+            TyreModel::Linear => self.score::<L, LinearTyre<L>>(pack),
         }
     }
 }
 
-impl<'a> SimdEvaluator<'a> {
-    /// An evaluator of `replay` in the lanes of `set`.
-    pub fn new(replay: &'a ReplayProblem, set: InstructionSet) -> Self {
+impl LaneTables<ReplayProblem> for ReplayLanes {
+    fn new(replay: &ReplayProblem) -> Self {
         Self {
-            replay,
             plan: replay.plan.to_f32(),
             table: ModelTable::new(&replay.free, &replay.problem.variables),
-            set,
         }
     }
-}
 
-impl Evaluator for SimdEvaluator<'_> {
-    fn problem(&self) -> &Problem {
-        &self.replay.problem
-    }
-
-    fn backend(&self) -> BackendInfo {
-        BackendInfo::of_lanes(self.set)
-    }
-
-    fn evaluate(&mut self, population: &[f64]) -> Result<Evaluation> {
-        let candidates: Vec<&[f64]> = population.chunks_exact(self.replay.dimensions().max(1)).collect();
-        let replay = self.replay;
-        let (preliminary, rows) = sound(&candidates, |c| replay.free.preliminary_failure(c));
-        let figures = self.table.rows(&self.replay.free, &rows);
-
-        let windows = &self.plan.windows;
-        let (lanes, width) = (self.set.lanes(), self.table.varying.len());
-        let packs = rows.len().div_ceil(lanes);
-        let evaluator = &*self;
-        let scores: Vec<PackScore> = (0..packs * windows.len())
-            .into_par_iter()
-            .map(|job| {
-                let pack = job / windows.len();
-                let work = PackThroughWindow {
-                    evaluator,
-                    rows: &figures[pack * lanes * width..((pack + 1) * lanes).min(rows.len()) * width],
-                    window: &windows[job % windows.len()],
-                };
-                dispatch(evaluator.set, work)
-            })
-            .collect();
-
-        let totals = (0..rows.len()).map(|place| {
-            let (pack, lane) = (place / lanes, place % lanes);
-            let mut total = Some([0.0; CHANNELS]);
-            for (errors, drives) in &scores[pack * windows.len()..(pack + 1) * windows.len()] {
-                total = total.filter(|_| drives >> lane & 1 == 1);
-                if let Some(total) = &mut total {
-                    let errors: [f64; CHANNELS] = std::array::from_fn(|k| f64::from(errors[k][lane]));
-                    replay.accumulate(total, errors);
+    fn outcomes(
+        &self,
+        replay: &ReplayProblem,
+        set: InstructionSet,
+        candidates: &[&[f64]],
+    ) -> Vec<Option<[f64; CHANNELS]>> {
+        let windows = self.plan.windows.len();
+        let kernel = Kernel {
+            model: replay.tyre_model(),
+            tables: self,
+            rows: self.table.rows(&replay.free, candidates),
+        };
+        let found = LaneFigures::of(set, &kernel, (candidates.len(), windows), 1);
+        let total = |candidate: usize| {
+            let mut total = [0.0; CHANNELS];
+            for window in 0..windows {
+                let [vx, ax, ay, yaw_rate, drives] = found.get(candidate, window).map(f64::from);
+                if drives == 0.0 {
+                    return None;
                 }
+                replay.accumulate(&mut total, [vx, ax, ay, yaw_rate]);
             }
-            total
-        });
-        Ok(replay.evaluation_of(joined(preliminary, totals)))
+            Some(total)
+        };
+        (0..candidates.len()).map(total).collect()
     }
 }

@@ -2,9 +2,8 @@
 //! the circle asks for. Twin of `shaders/steady.wgsl`.
 //!
 //! Where nothing changes any more, the car is in a trim as [`crate::vehicle::steady`] defines it: sideways, yaw, roll and
-//! pitch accelerations are nought, and the tyres do not push along the path.
+//! pitch accelerations are zero, and the tyres do not push along the path.
 
-use super::modes::SettlePlan;
 use crate::scalar::Real;
 use crate::vehicle::aero::aero_forces;
 use crate::vehicle::chassis::BodyState;
@@ -42,6 +41,31 @@ pub struct Aim<R> {
 pub const STATE: usize = 8;
 /// Those of them that are integrated.
 pub const INTEGRATED: usize = 6;
+
+/// How candidates are brought to settle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SettlePlan<S> {
+    /// Length of a step, s.
+    pub step: S,
+    /// Share of the steering angle that each of the first steps adds, until all of it is there.
+    pub steer_per_step: S,
+    /// How fast the driven wheels' slip follows the tyres' push, s/m.
+    pub gain: S,
+    /// Number of steps.
+    pub steps: u32,
+}
+
+impl SettlePlan<f64> {
+    /// The plan in the precision that the scalar `R` stores tables in.
+    pub fn stored<R: Real>(&self) -> SettlePlan<R::Storage> {
+        SettlePlan {
+            step: R::store(self.step),
+            steer_per_step: R::store(self.steer_per_step),
+            gain: R::store(self.gain),
+            steps: self.steps,
+        }
+    }
+}
 
 /// A car on its way into a trim.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,9 +1,10 @@
 //! How long and in which steps a car is driven until it has settled, from the modes of its own equations.
 
+pub use super::kernel::SettlePlan;
 use super::kernel::{INTEGRATED, settle_rate};
 use crate::evaluate::{FreeCar, Variable};
 use crate::random::Random;
-use crate::scalar::{Dual, Real};
+use crate::scalar::Dual;
 use crate::vehicle::tyre::Tyre;
 use crate::vehicle::{CarModel, LinearTyre, MagicFormula, TyreModel};
 use nalgebra::SMatrix;
@@ -46,22 +47,9 @@ pub fn displaced(slopes: &Slopes, off: &[f64; INTEGRATED]) -> Option<[f64; INTEG
     Some(std::array::from_fn(part))
 }
 
-/// How candidates are brought to settle.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SettlePlan<S> {
-    /// Length of a step, s.
-    pub step: S,
-    /// Share of the steering angle that each of the first steps adds, until all of it is there.
-    pub steer_per_step: S,
-    /// How fast the driven wheels' slip follows the tyres' push, s/m.
-    pub gain: S,
-    /// Number of steps.
-    pub steps: u32,
-}
-
 /// Length of a step over the time constant of the stiffest mode. Runge and Kutta's method is stable up to 2.78 on the real axis;
 /// what is left is for tyres that are stiffer in a bend than straight on, by the load that has moved to them. Where a car
-/// settles does not depend on the step: at rest every stage is nought.
+/// settles does not depend on the step: at rest every stage is zero.
 const STEP_SHARE: f64 = 1.4;
 /// How fast slip follows the push where the tyres are stiffest (1/s): as fast as the body's own modes, no faster.
 const SLIP_RATE: f64 = 10.0;
@@ -143,16 +131,6 @@ impl SettlePlan<f64> {
             steer_per_step: 1.0 / ramp,
             gain,
             steps: steps as u32,
-        }
-    }
-
-    /// The plan in the precision that the scalar `R` stores tables in.
-    pub fn stored<R: Real>(&self) -> SettlePlan<R::Storage> {
-        SettlePlan {
-            step: R::store(self.step),
-            steer_per_step: R::store(self.steer_per_step),
-            gain: R::store(self.gain),
-            steps: self.steps,
         }
     }
 }

@@ -1,59 +1,29 @@
-//! What is asked of cars on circles: which parameters are free, between which speeds and steering angles, and what is to be
-//! small.
+//! Problems of steady-state cornering: which parameters are free, the bounds of speed and steering, and the objectives.
 
-use super::kernel::{INTEGRATED, Settling, ending};
-use super::modes::{SettlePlan, displaced, slopes};
+use super::kernel::{INTEGRATED, SettlePlan, Settling, ending};
+use super::modes::{displaced, slopes};
 use crate::error::{Error, Result};
-use crate::evaluate::{Evaluation, FAILED_COST, Failure, FreeCar, Objective, Problem, Variable, are_costs};
+use crate::evaluate::objectives::{listed, missing_or_twice, objectives};
+use crate::evaluate::{Failure, FreeCar, Problem, Variable};
 use crate::vehicle::{Car, CarParameter, Chassis, TyreModel};
-use serde::{Deserialize, Serialize};
 
-/// What of a trim can be minimised.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum SteadyObjective {
-    /// Lateral acceleration with its sign changed (m/s^2), so that the least is the most to the left.
-    Cornering,
-    /// Sideslip angle, either way (rad).
-    Sideslip,
-    /// Yaw rate, either way (rad/s).
-    YawRate,
-    /// Roll angle, either way (rad).
-    Roll,
-    /// Slip ratio of the driven wheels, either way.
-    SlipRatio,
+objectives! {
+    /// What of a trim can be minimised.
+    SteadyObjective {
+        /// Lateral acceleration with its sign changed (m/s^2), so that the least is the most to the left.
+        Cornering: "minus_ay_mps2", "m/s^2", "lateral acceleration to the right";
+        /// Sideslip angle, either way (rad).
+        Sideslip: "sideslip_rad", "rad", "sideslip";
+        /// Yaw rate, either way (rad/s).
+        YawRate: "yaw_rate_radps", "rad/s", "yaw rate";
+        /// Roll angle, either way (rad).
+        Roll: "roll_rad", "rad", "roll";
+        /// Slip ratio of the driven wheels, either way.
+        SlipRatio: "slip_ratio", "-", "slip ratio";
+    }
 }
 
 impl SteadyObjective {
-    /// Every objective.
-    pub const ALL: [Self; 5] = [
-        Self::Cornering,
-        Self::Sideslip,
-        Self::YawRate,
-        Self::Roll,
-        Self::SlipRatio,
-    ];
-
-    /// The name in studies.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Cornering => "minus_ay_mps2",
-            Self::Sideslip => "sideslip_rad",
-            Self::YawRate => "yaw_rate_radps",
-            Self::Roll => "roll_rad",
-            Self::SlipRatio => "slip_ratio",
-        }
-    }
-
-    /// The unit.
-    pub fn unit(self) -> &'static str {
-        match self {
-            Self::Cornering => "m/s^2",
-            Self::Sideslip | Self::Roll => "rad",
-            Self::YawRate => "rad/s",
-            Self::SlipRatio => "-",
-        }
-    }
-
     /// The figure of a trim.
     pub fn of(self, trim: &Settled) -> f64 {
         match self {
@@ -88,13 +58,13 @@ pub struct Settled {
 /// ten times as much. What it leaves open of lateral acceleration is as little, by the stiffness of the trim: 0.03 % of 15 m/s^2.
 pub const SETTLED: f64 = 5e-3;
 /// Slowest and greatest speed that may be asked for (m/s).
-const SPEEDS: [f64; 2] = [3.0, 160.0];
+pub(super) const SPEEDS: [f64; 2] = [3.0, 160.0];
 /// Greatest steering angle that may be asked for (rad).
 const GREATEST_STEER: f64 = 0.6;
-/// What kernels are told of a candidate beside its car: speed and steering.
+/// Figures of a candidate that kernels read beside its car: speed and steering.
 pub const AIM_FIGURES: usize = 2;
 
-/// Cars on circles.
+/// Cars in steady-state cornering.
 #[derive(Clone, Debug)]
 pub struct SteadyProblem {
     /// Variables and objectives. The car's parameters come first, then `speed_mps` and `steer_rad`.
@@ -102,7 +72,7 @@ pub struct SteadyProblem {
     /// The car and which of its parameters are free.
     pub free: FreeCar,
     plan: SettlePlan<f64>,
-    objectives: Vec<SteadyObjective>,
+    pub(super) objectives: Vec<SteadyObjective>,
 }
 
 impl SteadyProblem {
@@ -131,8 +101,7 @@ impl SteadyProblem {
             let expected = format!("rising bounds of -{GREATEST_STEER} to {GREATEST_STEER} rad");
             return refuse("steer_rad", format!("{steers:?}"), expected);
         }
-        let twice = |(i, o): (usize, &SteadyObjective)| objectives[..i].contains(o);
-        if objectives.is_empty() || objectives.iter().enumerate().any(twice) {
+        if missing_or_twice(objectives) {
             let found = format!("{objectives:?}");
             return refuse("objectives", found, "at least one, each once".to_owned());
         }
@@ -143,10 +112,7 @@ impl SteadyProblem {
             plan: SettlePlan::new(&free, &variables),
             problem: Problem {
                 variables,
-                objectives: objectives
-                    .iter()
-                    .map(|o| Objective::new(o.name(), o.unit()))
-                    .collect(),
+                objectives: listed(objectives),
             },
             free,
             objectives: objectives.to_vec(),
@@ -200,8 +166,8 @@ impl SteadyProblem {
         })
     }
 
-    /// By how much at most lateral acceleration (m/s^2) is off that of the trim with these figures, for what counts as settled
-    /// next to it; nothing next to a trim that nothing holds the car in.
+    /// The most by which lateral acceleration (m/s^2) of a settled car differs from that of the trim with these figures. `None` if
+    /// nothing holds the car in that trim.
     pub fn left_open(&self, candidate: &[f64], figures: [f64; INTEGRATED]) -> Option<f64> {
         let flat = self.free.flat(candidate);
         let c = Chassis::from_flat(|slot| flat[slot]);
@@ -218,48 +184,5 @@ impl SteadyProblem {
         ];
         let slopes = slopes((self.tyre_model(), &flat), gain, (speed, steer), figures);
         Some(speed * displaced(&slopes, &off)?[1])
-    }
-
-    /// Why a candidate need not be driven, if so. Circles at no speed, or at one that no problem may ask for, are off the
-    /// envelope.
-    pub fn preliminary_failure(&self, candidate: &[f64]) -> Option<Failure> {
-        let [speed, _] = self.aim_figures(candidate);
-        let driven = (SPEEDS[0]..=SPEEDS[1]).contains(&speed);
-        let failure = self.free.preliminary_failure(candidate);
-        failure.or_else(|| (!driven).then_some(Failure::OffTheEnvelope))
-    }
-
-    /// The objectives' row of a candidate from its trim, or from the reason why there is none.
-    pub fn objective_row(&self, trim: std::result::Result<Settled, Failure>) -> (Vec<f64>, Option<Failure>) {
-        let row = trim.and_then(|trim| {
-            let row: Vec<f64> = self.objectives.iter().map(|o| o.of(&trim)).collect();
-            if are_costs(&row) {
-                Ok(row)
-            } else {
-                Err(Failure::Undefined)
-            }
-        });
-        match row {
-            Ok(row) => (row, None),
-            Err(failure) => (vec![FAILED_COST; self.objectives.len()], Some(failure)),
-        }
-    }
-
-    /// The trims of candidates from their last states.
-    pub(super) fn trims_of<S: Copy + Into<f64>>(
-        &self,
-        candidates: &[&[f64]],
-        states: Vec<std::result::Result<Settling<S>, Failure>>,
-    ) -> Vec<std::result::Result<Settled, Failure>> {
-        let states = states.into_iter().zip(candidates);
-        states
-            .map(|(state, candidate)| self.settled(candidate, &state?.widened()))
-            .collect()
-    }
-
-    /// The objectives of trims.
-    pub(super) fn evaluation_of(&self, trims: Vec<std::result::Result<Settled, Failure>>) -> Evaluation {
-        let rows = trims.into_iter().map(|trim| self.objective_row(trim));
-        Evaluation::of_rows(rows.collect())
     }
 }

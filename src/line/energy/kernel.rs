@@ -149,7 +149,7 @@ fn zone_share<R: Real>(row: &ZoneRow<R::Storage>, strategy: &[R]) -> R {
     into.max(R::lit(0.0)).min(R::lit(1.0))
 }
 
-/// Where both hold, `x`, else nought.
+/// Where both hold, `x`, else zero.
 #[inline(always)]
 fn gated<R: Real>(mask: R::Mask, x: R) -> R {
     R::select(mask, x, R::lit(0.0))
@@ -183,10 +183,10 @@ impl<R: Lookup> Car<'_, R> {
     #[inline(always)]
     fn additional(&self, here: usize, from: R, length: R, bends: [R; 2], most: R, left: R) -> Step<R> {
         let inverse = R::lit(1.0) / length;
-        let nought = R::lit(0.0);
+        let zero = R::lit(0.0);
         let [grip, drive, drag] = limits_at(self.limits, from, bends[0]);
         let engine = grip.min(drive);
-        let ahead = (from + length * (engine - drag)).max(nought);
+        let ahead = (from + length * (engine - drag)).max(zero);
         let rows = self.table.boosts.len() / 4;
         let (place, beyond) = (ahead * R::load(self.table.rows_per_speed_squared)).place(rows, 4);
         let [motor, room] = [0, 1].map(|column| look_up(&self.table.boosts, 4, place, beyond, column));
@@ -196,17 +196,17 @@ impl<R: Lookup> Car<'_, R> {
         let boost = wanted.min(self.reach(left, inverse));
 
         let both = grip.min(drive + boost);
-        let middle = (from + length * (both - drag)).max(nought);
+        let middle = (from + length * (both - drag)).max(zero);
         let [grip, drive, later_drag] = limits_at(self.limits, middle, R::lit(0.5) * (bends[0] + bends[1]));
         let later_both = grip.min(drive + boost);
         let motor = R::lit(0.5) * ((both - engine) + (later_both - grip.min(drive)));
-        let reached = (from + length * ((both - drag) + (later_both - later_drag))).max(nought);
+        let reached = (from + length * ((both - drag) + (later_both - later_drag))).max(zero);
         let end = reached.min(most);
         // Where less is needed than both could give, the motor gives way first.
         let spare = R::lit(0.5) * (reached - end) * inverse;
         Step {
             end,
-            motor: (motor - spare).max(nought),
+            motor: (motor - spare).max(zero),
             wanted,
             boost,
         }
@@ -246,20 +246,20 @@ impl<R: Lookup> Car<'_, R> {
     /// Drives along a segment by the engine alone.
     #[inline(always)]
     fn engine_only(&self, from: R, length: R, bends: [R; 2], most: R) -> R {
-        let nought = R::lit(0.0);
+        let zero = R::lit(0.0);
         let [grip, drive, drag] = limits_at(self.limits, from, bends[0]);
         let first = grip.min(drive) - drag;
-        let middle = (from + length * first).max(nought);
+        let middle = (from + length * first).max(zero);
         let [grip, drive, drag] = limits_at(self.limits, middle, R::lit(0.5) * (bends[0] + bends[1]));
         let second = grip.min(drive) - drag;
-        (from + length * (first + second)).max(nought).min(most)
+        (from + length * (first + second)).max(zero).min(most)
     }
 
     /// One segment of the lap that only finds the speed at the start line, with the motor beside the engine: what is deployed,
     /// and what is harvested by the MGU-K where the charge has a say. The little that the MGU-H adds is left out here.
     #[inline(always)]
     fn provisional(&self, state: &mut State<R>, here: usize, length: R, bends: [R; 2], most: R) -> Step<R> {
-        let nought = R::lit(0.0);
+        let zero = R::lit(0.0);
         let table = self.table;
         let from = state.speed_squared;
         let step = self.additional(here, from, length, bends, most, self.left(state));
@@ -275,9 +275,9 @@ impl<R: Lookup> Car<'_, R> {
             let inverse = R::lit(1.0) / length;
             let force = R::lit(0.5) * (step.end - from) * inverse + (row[3] + beyond * row[7]);
             let unharvested = R::load(table.harvest_most) - state.harvested_k;
-            let room = (unharvested * R::load(table.force_per_harvested) * inverse).max(nought);
+            let room = (unharvested * R::load(table.force_per_harvested) * inverse).max(zero);
             let most = (row[2] + beyond * row[6]) * self.strategy[5];
-            let generator = (-force).max(nought).min(most).min(room);
+            let generator = (-force).max(zero).min(most).min(room);
             let harvested_k = joules * generator * R::load(table.harvest_gain);
             state.change = state.change + (harvested_k - deployed);
             state.harvested_k = state.harvested_k + harvested_k;
@@ -296,7 +296,7 @@ impl<R: Lookup> Car<'_, R> {
         (length, bends, most): (R, [R; 2], R),
         first: (Option<[R; 4]>, R),
     ) -> SegmentEnergy<R> {
-        let (nought, one) = (R::lit(0.0), R::lit(1.0));
+        let (zero, one) = (R::lit(0.0), R::lit(1.0));
         let table = self.table;
         let from = state.speed_squared;
         let left = self.left(state);
@@ -306,9 +306,9 @@ impl<R: Lookup> Car<'_, R> {
             }
             Mode::Offset => Step {
                 end: self.engine_only(from, length, bends, most),
-                motor: nought,
-                wanted: nought,
-                boost: nought,
+                motor: zero,
+                wanted: zero,
+                boost: zero,
             },
         };
         let end = step.end;
@@ -322,8 +322,8 @@ impl<R: Lookup> Car<'_, R> {
         let ax = R::lit(0.5) * (end - from) * inverse;
         // What the tyres do, forwards or backwards.
         let force = ax + drag;
-        let demand = force.max(nought);
-        let shed = (-force).max(nought);
+        let demand = force.max(zero);
+        let shed = (-force).max(zero);
         let joules = R::load(table.mass) * length;
         let motor = match self.plan.mode {
             Mode::Additional => step.motor.min(demand),
@@ -338,7 +338,7 @@ impl<R: Lookup> Car<'_, R> {
         let engine = demand - motor;
         let unharvested = R::load(table.harvest_most) - state.harvested_k;
         let room = unharvested * R::load(table.force_per_harvested) * inverse;
-        let generator = shed.min(generator_most * self.strategy[5]).min(room.max(nought));
+        let generator = shed.min(generator_most * self.strategy[5]).min(room.max(zero));
         let deployed = joules * motor * R::load(table.deploy_cost);
         let harvested_k = joules * generator * R::load(table.harvest_gain);
 
@@ -348,14 +348,14 @@ impl<R: Lookup> Car<'_, R> {
         let thirds = R::lit(3.0) * load;
         let flow = flows[0]
             + (flows[1] - flows[0]) * thirds.min(one)
-            + (flows[2] - flows[1]) * (thirds - one).max(nought).min(one)
-            + (flows[3] - flows[2]) * (thirds - R::lit(2.0)).max(nought);
+            + (flows[2] - flows[1]) * (thirds - one).max(zero).min(one)
+            + (flows[3] - flows[2]) * (thirds - R::lit(2.0)).max(zero);
         let end_root = end.sqrt();
         let time = R::lit(2.0) * length / (*root + end_root);
         *root = end_root;
         let burnt = flow * time;
         let spins = !mean.less_than(R::load(table.exhaust_from))
-            & nought.less_than(ax)
+            & zero.less_than(ax)
             & !R::load(table.exhaust_to_ax).less_than(ax);
         let harvested_h = gated(spins, R::load(table.exhaust_gain) * burnt);
 
@@ -470,11 +470,11 @@ pub fn energy_lap<R: Lookup>(
 ) -> EnergyLap<R> {
     ceilings(limits, closed, start, entry, course);
     let n = course.curvature.len();
-    let nought = R::lit(0.0);
+    let zero = R::lit(0.0);
     let (length, curvature, most) = (&course.length, &course.curvature, &course.speed_squared);
     let first_drive = &mut course.first_drive;
     first_drive.clear();
-    let mut first_speed_squared = nought;
+    let mut first_speed_squared = zero;
     let after = |here: usize| if here + 1 < n { here + 1 } else { 0 };
     let bends = |here: usize| [curvature[here], curvature[after(here)]];
     let car = Car {
@@ -485,9 +485,9 @@ pub fn energy_lap<R: Lookup>(
     };
     let fresh = |speed_squared: R| State {
         speed_squared,
-        change: nought,
-        deployed: nought,
-        harvested_k: nought,
+        change: zero,
+        deployed: zero,
+        harvested_k: zero,
     };
     let mut speed_squared = most[0];
     if closed {
@@ -517,17 +517,17 @@ pub fn energy_lap<R: Lookup>(
 
     let mut state = fresh(speed_squared);
     let mut root = speed_squared.sqrt();
-    let (mut greatest, mut least) = (nought, nought);
-    let mut total = [nought; 6];
-    let mut block = [nought; 6];
+    let (mut greatest, mut least) = (zero, zero);
+    let mut total = [zero; 6];
+    let mut block = [zero; 6];
     let segments = if closed { n } else { n - 1 };
     for here in 0..segments {
         let first = first_drive.get(here).copied();
         let along = (length[here], bends(here), most[after(here)]);
         let s = car.segment(&mut state, &mut root, here, along, (first, first_speed_squared));
-        first_speed_squared = first.map_or(nought, |[end, ..]| end);
+        first_speed_squared = first.map_or(zero, |[end, ..]| end);
         record(here, &s);
-        let motor_time = gated(nought.less_than(s.deployed), s.time);
+        let motor_time = gated(zero.less_than(s.deployed), s.time);
         let terms = [
             s.time,
             s.fuel,
@@ -544,7 +544,7 @@ pub fn energy_lap<R: Lookup>(
         if (here + 1) % BLOCK == 0 || here + 1 == segments {
             for (total, block) in total.iter_mut().zip(&mut block) {
                 *total = *total + *block;
-                *block = nought;
+                *block = zero;
             }
         }
     }

@@ -70,7 +70,7 @@ pub struct EnergyTable<S> {
 const CONSUMPTION_KGPJ: f64 = 0.270 / 3.6e6;
 /// Room without end (m/s^2), whose rises are numbers all the same.
 const ENDLESS_MPS2: f64 = 1e4;
-/// Motors have a torque at standstill, and a power over nought would be none.
+/// Motors have a torque at standstill, and a power over zero would be none.
 const SLOWEST_MPS: f64 = 1.0;
 
 /// What a car's energy is accounted with: gears, engine map and hybrid drive.

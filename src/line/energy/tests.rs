@@ -1,5 +1,5 @@
 use super::*;
-use crate::evaluate::hybrid::{Free, HybridLine, HybridObjective, HybridProblem, Strategy};
+use crate::evaluate::energy::{Free, HybridLine, HybridObjective, HybridProblem, Strategy};
 use crate::study::envelope::{EnvelopeSettings, car_limits};
 use crate::vehicle::Car;
 use glam::DVec2;

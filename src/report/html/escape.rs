@@ -21,7 +21,7 @@ pub(super) fn html(text: &str) -> String {
 }
 
 /// A unit with its exponents raised, as in `m/s\u{b2}` for `m/s^2`; others as they are.
-pub(super) fn raised(unit: &str) -> String {
+pub(in crate::report) fn raised(unit: &str) -> String {
     unit.replace("^2", "\u{b2}").replace("^3", "\u{b3}")
 }
 
@@ -40,7 +40,7 @@ pub(super) fn json_in_script(json: &str) -> String {
 
 /// Numbers with as many digits as a chart can show; gaps are `null`.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct Numbers(Vec<Option<f64>>);
+pub(in crate::report) struct Numbers(Vec<Option<f64>>);
 
 /// Digits that a chart resolves, of a single number and of a range.
 const DIGITS: i32 = 6;
@@ -105,7 +105,7 @@ mod tests {
             json(&[0.0, 1.0 / 3.0, f64::NAN, 2e-12]),
             "[0,0.333333,null,2e-12]"
         );
-        // Eastings: a metre of range far from nought still has its micrometres.
+        // Eastings: a metre of range far from zero still has its micrometres.
         assert_eq!(json(&[500_000.123_456, 500_001.0]), "[500000.123456,500001]");
         assert_eq!(json(&[f64::INFINITY, 1e300]), "[null,1e+300]");
     }

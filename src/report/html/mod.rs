@@ -5,34 +5,29 @@
 //! ECharts, which stands in the page with the data; words and tables read without any script. All text is escaped, in
 //! HTML and in JSON alike: names of channels, cars and tracks come from files.
 
-mod charts;
 mod escape;
-mod lap;
 mod page;
-mod thin;
+pub(super) mod thin;
 
-pub use charts::{Front, Scale};
-pub use lap::{LapLine, LapMap, LapPanel, LapTrace, LapView};
+pub(super) use escape::{Numbers, raised};
 
 use super::table::{Cells, Column, plain_digits};
-use super::{BarPanel, CurvePanel, ParameterRow, SurfaceFigure};
+use super::{Figure, Table};
 use crate::files::write_whole;
 use crate::{Error, Result};
-use charts::Chart;
-use escape::{html, json_in_script, raised};
+use escape::{html, json_in_script};
+use serde_json::Value;
 use std::path::Path;
 
 /// The page of a run, filled from the top.
 ///
 /// ```
-/// use lapswarm::report::{Cells, Column, HtmlReport};
+/// use lapswarm::report::{HtmlReport, Table};
 ///
 /// let mut page = HtmlReport::new("raceline", "Silverstone with the GT car");
 /// page.sentence("The fastest line takes 114.29 s.");
 /// page.tile("Lap time", "114.29", "s");
-/// let times_s = [114.29, 122.31];
-/// let column = Column { name: "lap time", unit: "s", cells: Cells::Numbers(&times_s) };
-/// page.table("Lines", "", &[column])?;
+/// page.table("Lines", "", &Table::new().numbers("lap time", "s", vec![114.29, 122.31]))?;
 /// page.provenance("seed", "1");
 /// let folder = std::env::temp_dir();
 /// page.write(folder.join("lapswarm-doc-report.html"))?;
@@ -46,7 +41,7 @@ pub struct HtmlReport {
     tiles: Vec<[String; 3]>,
     warnings: Vec<String>,
     body: Vec<Block>,
-    charts: Vec<Chart>,
+    charts: Vec<Value>,
     sections: Vec<String>,
     provenance: Vec<[String; 2]>,
     settings: Vec<[String; 2]>,
@@ -84,6 +79,14 @@ impl HtmlReport {
         self.warnings.push(text.into());
     }
 
+    /// Warnings, and that the run did not come to its end if it was `interrupted`.
+    pub fn warnings(&mut self, warnings: &[String], interrupted: bool) {
+        self.warnings.extend_from_slice(warnings);
+        if interrupted {
+            self.warning("The run was interrupted. These are the results that it had reached.");
+        }
+    }
+
     /// A heading, and what is to be seen under it; `text` may be empty.
     pub fn section(&mut self, title: &str, text: &str) {
         let number = self.sections.len();
@@ -119,7 +122,7 @@ impl HtmlReport {
     ///
     /// # Errors
     /// [`Error::Input`] when the columns differ in length.
-    pub fn table(&mut self, title: &str, note: &str, columns: &[Column<'_>]) -> Result<()> {
+    pub fn table(&mut self, title: &str, note: &str, columns: &Table<'_>) -> Result<()> {
         let table = table(title, note, columns)?;
         self.push(table);
         Ok(())
@@ -129,7 +132,7 @@ impl HtmlReport {
     ///
     /// # Errors
     /// [`Error::Input`] when the columns differ in length.
-    pub fn folded_table(&mut self, title: &str, note: &str, columns: &[Column<'_>]) -> Result<()> {
+    pub fn folded_table(&mut self, title: &str, note: &str, columns: &Table<'_>) -> Result<()> {
         let table = table(title, note, columns)?;
         self.push(format!(
             "<details><summary>{}</summary>{table}</details>\n",
@@ -138,74 +141,27 @@ impl HtmlReport {
         Ok(())
     }
 
-    /// Traces of lines over a lap, linked with a map.
+    /// A figure as charts.
     ///
     /// # Errors
-    /// [`Error::Input`] when a trace has another number of values than its line has places, or a panel that is not there.
-    pub fn lap(&mut self, view: &LapView<'_>) -> Result<()> {
-        let (data, thinned) = view.data()?;
-        let mut note = view.note.to_owned();
-        if let Some((kept, of)) = thinned {
-            let stated = format!("Drawn are {kept} of up to {of} samples, chosen so that peaks stay.");
-            note = [note, stated].join(" ").trim().to_owned();
-        }
-        self.chart(view.title, &note, Chart::Lap(data));
-        Ok(())
+    /// [`Error::Input`] when it cannot be drawn.
+    pub fn place(&mut self, figure: &impl Figure) -> Result<()> {
+        figure.place(self)
     }
 
-    /// Curves over a common quantity.
+    /// A figure as charts, and the same as an SVG file.
     ///
     /// # Errors
-    /// [`Error::Input`] when a curve has another number of `y` than of `x`.
-    pub fn curves(&mut self, panel: &CurvePanel<'_>, note: &str, scales: [Scale; 2]) -> Result<()> {
-        let chart = Chart::curves(panel, scales)?;
-        self.chart(panel.title, note, chart);
-        Ok(())
+    /// [`Error::Input`] when it cannot be drawn, [`Error::Io`] when the file cannot be written.
+    pub fn figure(&mut self, svg: impl AsRef<Path>, figure: &impl Figure) -> Result<()> {
+        figure.write_svg(svg.as_ref())?;
+        figure.place(self)
     }
 
-    /// Candidates by their objectives.
-    ///
-    /// # Errors
-    /// [`Error::Input`] with fewer than two objectives, points with another number of values, or marks on no point.
-    pub fn front(&mut self, front: &Front<'_>) -> Result<()> {
-        let chart = Chart::front(front)?;
-        self.chart(front.title, front.note, chart);
-        Ok(())
-    }
-
-    /// Parameters within their bounds, with standard errors and the truth where known.
-    pub fn parameters(&mut self, title: &str, note: &str, rows: &[ParameterRow<'_>]) {
-        self.chart(title, note, Chart::parameters(rows));
-    }
-
-    /// A cost over two parameters, from above and in space. Colours go with the root of the cost above its least, which
-    /// spreads a basin's bottom.
-    ///
-    /// # Errors
-    /// [`Error::Input`] when there is not one value per pair, or none that is finite.
-    pub fn surface(&mut self, figure: &SurfaceFigure<'_>, note: &str) -> Result<()> {
-        let (chart, thinned) = Chart::surface(figure)?;
-        let mut note = note.to_owned();
-        if let Some((kept, of)) = thinned {
-            note += &format!(" Drawn are {kept} of up to {of} values along a side.");
-        }
-        self.chart(figure.title, note.trim(), chart);
-        Ok(())
-    }
-
-    /// Horizontal bars, with intervals where they are known.
-    ///
-    /// # Errors
-    /// [`Error::Input`] when there is not one value per name.
-    pub fn bars(&mut self, panel: &BarPanel<'_>, note: &str) -> Result<()> {
-        let chart = Chart::bars(panel)?;
-        self.chart(panel.title, note, chart);
-        Ok(())
-    }
-
-    fn chart(&mut self, title: &str, note: &str, chart: Chart) {
+    /// A chart as the page's script reads it.
+    pub(super) fn chart(&mut self, title: &str, note: &str, chart: Value) {
         let number = self.charts.len();
-        let half = matches!(chart, Chart::Curves { .. } | Chart::Bars { .. });
+        let half = chart["kind"] == "curves" || chart["kind"] == "bars";
         let html = format!(
             "<figure><figcaption>{}</figcaption><div class=\"chart\" data-chart=\"{number}\"></div>{}</figure>\n",
             html(title),
@@ -220,6 +176,13 @@ impl HtmlReport {
         let value = value.into();
         if !value.is_empty() {
             self.provenance.push([what.to_owned(), value]);
+        }
+    }
+
+    /// What the run was made with, several values at once.
+    pub fn facts(&mut self, facts: &[(&str, &dyn std::fmt::Display)]) {
+        for (what, value) in facts {
+            self.provenance(what, value.to_string());
         }
     }
 
@@ -247,18 +210,18 @@ impl HtmlReport {
     }
 }
 
-fn table(title: &str, note: &str, columns: &[Column<'_>]) -> Result<String> {
+/// An error of a figure that no page can hold.
+pub(super) fn refused<T>(title: &str, found: &str, expected: &str) -> Result<T> {
+    Err(Error::input(Path::new("report.html"), title, found, expected))
+}
+
+fn table(title: &str, note: &str, table: &Table<'_>) -> Result<String> {
+    let columns = &table.columns;
     let rows = columns.first().map_or(0, Column::len);
     if columns.iter().any(|c| c.len() != rows) {
-        let expected = "columns of one length";
-        return Err(Error::input(
-            Path::new("report.html"),
-            title,
-            "columns that differ",
-            expected,
-        ));
+        return refused(title, "columns that differ", "columns of one length");
     }
-    let class = |c: &Column<'_>| match c.cells {
+    let class = |c: &Column<'_>| match &c.cells {
         Cells::Numbers(_) => " class=\"number\"",
         Cells::Texts(_) => "",
     };
@@ -267,17 +230,17 @@ fn table(title: &str, note: &str, columns: &[Column<'_>]) -> Result<String> {
         html(title)
     );
     for c in columns {
-        let unit = match c.unit {
+        let unit = match c.unit.as_str() {
             "" => String::new(),
             unit => format!(" <span class=\"unit\">{}</span>", html(&raised(unit))),
         };
-        text += &format!("<th scope=\"col\"{}>{}{unit}</th>", class(c), html(c.name));
+        text += &format!("<th scope=\"col\"{}>{}{unit}</th>", class(c), html(&c.name));
     }
     text += "</tr></thead>\n<tbody>\n";
     for row in 0..rows {
         text += "<tr>";
         for c in columns {
-            match c.cells {
+            match &c.cells {
                 Cells::Numbers(x) if x[row].is_finite() => {
                     let shown = plain_digits(x[row]).replace('-', "\u{2212}");
                     text += &format!("<td class=\"number\" data-value=\"{}\">{shown}</td>", x[row]);

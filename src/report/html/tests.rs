@@ -1,5 +1,5 @@
 use super::*;
-use crate::report::{BarSeries, Curve};
+use crate::report::{BarPanel, Bars, Curves, Front, LapLine, LapView, Panel, Road, Scale};
 use glam::DVec2;
 
 const HOSTILE: &str = "<script>alert(1)</script><!-- & \"'\u{2028}";
@@ -12,74 +12,31 @@ fn hostile() -> HtmlReport {
     page.warning(HOSTILE);
     page.section(HOSTILE, HOSTILE);
     page.paragraph(HOSTILE);
-    let names = [HOSTILE.to_owned()];
-    let column = |cells| Column {
-        name: HOSTILE,
-        unit: HOSTILE,
-        cells,
-    };
-    page.table(
-        HOSTILE,
-        HOSTILE,
-        &[column(Cells::Texts(&names)), column(Cells::Numbers(&[1.0]))],
-    )
-    .unwrap();
-    let line = LapLine {
-        name: HOSTILE,
-        x: vec![0.0, 1.0],
-        traces: vec![LapTrace {
-            panel: 0,
-            values: vec![1.0, 2.0],
-            band: None,
-        }],
-        place_m: vec![DVec2::ZERO, DVec2::X],
-        wide: false,
-    };
-    page.lap(&LapView {
-        title: HOSTILE,
-        note: HOSTILE,
-        x_label: HOSTILE,
-        x_unit: HOSTILE,
-        panels: vec![LapPanel {
-            label: HOSTILE,
-            unit: HOSTILE,
-            height: 1.0,
-        }],
-        lines: vec![line],
-        sections: vec![crate::report::ShadedSection {
-            name: HOSTILE,
-            start: 0.0,
-            end: 1.0,
-        }],
-        map: Some(LapMap {
-            names: vec![(HOSTILE, DVec2::ZERO)],
-            ..LapMap::default()
-        }),
-    })
-    .unwrap();
-    let panel = CurvePanel {
-        title: HOSTILE,
-        x_label: HOSTILE,
-        y_label: HOSTILE,
-        curves: vec![Curve {
-            label: HOSTILE,
-            x: vec![0.0],
-            y: vec![1.0],
-            shade: None,
-        }],
-    };
-    page.curves(&panel, HOSTILE, [Scale::Linear, Scale::Log]).unwrap();
-    let bars = BarPanel {
-        title: HOSTILE,
-        x_label: HOSTILE,
-        names: vec![HOSTILE],
-        series: vec![BarSeries {
-            label: HOSTILE,
-            values: vec![1.0],
-            intervals: vec![[0.5, f64::NAN]],
-        }],
-    };
-    page.bars(&bars, HOSTILE).unwrap();
+    let table = Table::new().texts(HOSTILE, [HOSTILE]);
+    page.table(HOSTILE, HOSTILE, &table.numbers(HOSTILE, HOSTILE, vec![1.0]))
+        .unwrap();
+    let line = LapLine::new(HOSTILE, vec![0.0, 1.0])
+        .trace(0, vec![1.0, 2.0])
+        .at(vec![DVec2::ZERO, DVec2::X]);
+    let view = LapView::new(HOSTILE)
+        .note(HOSTILE)
+        .x(HOSTILE, HOSTILE)
+        .panel(HOSTILE, HOSTILE)
+        .line(line)
+        .sections([(HOSTILE.to_owned(), 0.0, 1.0)])
+        .road(Road {
+            names: vec![(HOSTILE.to_owned(), DVec2::ZERO)],
+            ..Road::default()
+        });
+    page.place(&view).unwrap();
+    let panel = Panel::new(HOSTILE)
+        .x(HOSTILE, "")
+        .y(HOSTILE, "")
+        .scales(Scale::Linear, Scale::Log)
+        .curve(HOSTILE, &[0.0], &[1.0]);
+    page.place(&Curves::new(HOSTILE, [panel])).unwrap();
+    let bars = BarPanel::new(HOSTILE, HOSTILE, [HOSTILE]).with_intervals(HOSTILE, [1.0], [[0.5, f64::NAN]]);
+    page.place(&Bars::new(HOSTILE, [bars])).unwrap();
     page.provenance(HOSTILE, HOSTILE);
     page.settings(HOSTILE, HOSTILE);
     page
@@ -111,33 +68,16 @@ fn the_page_is_whole_small_and_asks_for_nothing() {
     let mut page = HtmlReport::new("identify", "long lap");
     let n = 14_000;
     let x: Vec<f64> = (0..n).map(f64::from).collect();
-    let trace = |panel| LapTrace {
-        panel,
-        values: x.iter().map(|v| (v * 0.01).sin() + v * 1e-7).collect(),
-        band: None,
-    };
-    let line = LapLine {
-        name: "measured",
-        x: x.clone(),
-        traces: (0..8).map(trace).collect(),
-        place_m: x.iter().map(|v| DVec2::new(*v, -v)).collect(),
-        wide: false,
-    };
-    let panel = LapPanel {
-        label: "speed",
-        unit: "m/s",
-        height: 1.0,
-    };
-    page.lap(&LapView {
-        title: "Traces",
-        x_label: "distance",
-        x_unit: "m",
-        panels: vec![panel; 8],
-        lines: vec![line; 3],
-        map: Some(LapMap::default()),
-        ..LapView::default()
-    })
-    .unwrap();
+    let wave: Vec<f64> = x.iter().map(|v| (v * 0.01).sin() + v * 1e-7).collect();
+    let places: Vec<DVec2> = x.iter().map(|v| DVec2::new(*v, -v)).collect();
+    let line = (0..8).fold(LapLine::new("measured", x).at(places), |line, k| {
+        line.trace(k, &wave[..])
+    });
+    let view = LapView::new("Traces")
+        .panels([("speed", "m/s"); 8])
+        .lines(vec![line; 3])
+        .road(Road::default());
+    page.place(&view).unwrap();
     let html = page.to_html().unwrap();
     assert!(html.len() < 6_000_000, "{} bytes", html.len());
     assert!(html.contains("of up to 14000 samples"));
@@ -154,32 +94,15 @@ fn the_page_is_whole_small_and_asks_for_nothing() {
 #[test]
 fn lengths_that_differ_are_refused_by_name() {
     let mut page = HtmlReport::new("raceline", "odd");
-    let view = LapView {
-        title: "Odd traces",
-        panels: vec![],
-        lines: vec![LapLine {
-            name: "short",
-            x: vec![0.0, 1.0],
-            ..LapLine::default()
-        }],
-        ..LapView::default()
-    };
-    assert!(page.lap(&view).is_ok());
-    let mut odd = view.clone();
-    odd.lines[0].place_m = vec![DVec2::ZERO];
-    let message = page.lap(&odd).unwrap_err().to_string();
+    let line = LapLine::new("short", vec![0.0, 1.0]);
+    let view = LapView::new("Odd traces");
+    assert!(page.place(&view.clone().line(line.clone())).is_ok());
+    let odd = view.line(line.at(vec![DVec2::ZERO]));
+    let message = page.place(&odd).unwrap_err().to_string();
     assert!(message.contains("Odd traces, line short"), "{message}");
-    let front = Front {
-        title: "Odd front",
-        objectives: vec![],
-        ..Front::default()
-    };
-    assert!(page.front(&front).unwrap_err().to_string().contains("Odd front"));
-    let bars = BarPanel {
-        title: "Odd bars",
-        x_label: "share",
-        names: vec![],
-        series: vec![],
-    };
-    assert!(page.bars(&bars, "").unwrap_err().to_string().contains("Odd bars"));
+    let message = page.place(&Front::new("Odd front", &[])).unwrap_err().to_string();
+    assert!(message.contains("Odd front"), "{message}");
+    let bars = BarPanel::new("Odd bars", "share", [""; 0]);
+    let message = page.place(&Bars::new("", [bars])).unwrap_err().to_string();
+    assert!(message.contains("Odd bars"), "{message}");
 }

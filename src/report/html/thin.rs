@@ -1,12 +1,12 @@
 //! Fewer points that look alike.
 
 /// Points of a trace that go into a page at most: more than a screen has columns, so that a zoom still shows more.
-pub(super) const POINTS: usize = 3000;
+pub(in crate::report) const POINTS: usize = 3000;
 
 /// Which of the points to draw so that all series over a common axis look as they did: in each of `limit` buckets the one
 /// that spans the largest triangles with its neighbours, taken over all series (Steinarsson, *Downsampling Time Series
 /// for Visual Representation*, 2013, there for one series). The ends of gaps are kept.
-pub(super) fn thinned(x: &[f64], series: &[&[f64]], limit: usize) -> Vec<usize> {
+pub(in crate::report) fn thinned(x: &[f64], series: &[&[f64]], limit: usize) -> Vec<usize> {
     let n = x.len();
     if n <= limit || limit < 3 {
         return (0..n).collect();
@@ -63,7 +63,7 @@ fn spread(values: &[f64]) -> f64 {
 }
 
 /// The chosen entries of `values`.
-pub(super) fn picked<T: Copy>(values: &[T], which: &[usize]) -> Vec<T> {
+pub(in crate::report) fn picked<T: Copy>(values: &[T], which: &[usize]) -> Vec<T> {
     which.iter().filter_map(|&i| values.get(i).copied()).collect()
 }
 

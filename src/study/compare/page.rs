@@ -2,10 +2,7 @@
 
 use super::read::{Run, Trace};
 use crate::error::{Error, Result};
-use crate::report::{
-    Cells, Column, Curve, CurvePanel, HtmlReport, LapLine, LapMap, LapPanel, LapTrace, LapView, Scale,
-    significant,
-};
+use crate::report::{Curves, HtmlReport, LapLine, LapView, Panel, Road, Scale, Table, significant};
 use glam::DVec2;
 
 /// Runs that a page takes at most: more lines than colours cannot be told apart.
@@ -72,12 +69,17 @@ pub fn compare(runs: &[Run]) -> Result<HtmlReport> {
     let mut page = HtmlReport::new("report", &title);
     head(&mut page, runs, &names);
     page.section("Runs", "");
-    about(&mut page, runs, &names)?;
-    figures(&mut page, runs, &names, true)?;
+    page.table("What was run", "", &about(runs, &names))?;
+    let note = "Units are the endings of the names.";
+    if let Some(table) = figures(runs, &names, true) {
+        page.table("Headline figures", note, &table)?;
+    }
     laps(&mut page, runs, &names)?;
     limits(&mut page, runs, &names)?;
     convergence(&mut page, runs, &names)?;
-    figures(&mut page, runs, &names, false)?;
+    if let Some(table) = figures(runs, &names, false) {
+        page.folded_table("All other figures", note, &table)?;
+    }
     for (run, name) in runs.iter().zip(&names) {
         page.provenance(name, run.folder.display().to_string());
         if let Some(settings) = &run.settings {
@@ -142,36 +144,21 @@ fn head(page: &mut HtmlReport, runs: &[Run], names: &[String]) {
     for (run, name) in runs.iter().zip(names) {
         if run.said("interrupted") == Some("true") {
             page.warning(format!(
-                "{name} was interrupted: its figures are what it had reached."
+                "{name} was interrupted. Its figures are the results that it had reached."
             ));
         }
     }
 }
 
-fn about(page: &mut HtmlReport, runs: &[Run], names: &[String]) -> Result<()> {
+fn about(runs: &[Run], names: &[String]) -> Table<'static> {
     let keys = [
         "study", "track", "car", "log", "seed", "backend", "adapter", "driver", "version",
     ];
-    let said = |key: &str| -> Vec<String> {
-        runs.iter()
-            .map(|r| r.said(key).unwrap_or_default().to_owned())
-            .collect()
-    };
-    let told: Vec<(&str, Vec<String>)> = keys.iter().map(|key| (*key, said(key))).collect();
-    let mut columns = vec![Column {
-        name: "run",
-        unit: "",
-        cells: Cells::Texts(names),
-    }];
-    let present = told
+    let table = Table::rows(runs.iter().zip(names)).text("run", |(_, name)| *name);
+    let table = keys
         .iter()
-        .filter(|(_, cells)| cells.iter().any(|c| !c.is_empty()));
-    columns.extend(present.map(|(name, cells)| Column {
-        name,
-        unit: "",
-        cells: Cells::Texts(cells),
-    }));
-    page.table("What was run", "", &columns)
+        .fold(table, |t, key| t.text(*key, |(r, _)| r.said(key).unwrap_or("")));
+    table.table().without_empty()
 }
 
 fn is_headline(name: &str) -> bool {
@@ -180,60 +167,34 @@ fn is_headline(name: &str) -> bool {
     HEADLINES.contains(&first) && (first != "best" || BEST.contains(&last))
 }
 
-/// The numbers of the summaries: the headlines, or all others.
-fn figures(page: &mut HtmlReport, runs: &[Run], names: &[String], headlines: bool) -> Result<()> {
-    let mut rows: Vec<&str> = Vec::new();
+/// The numbers of the summaries: the headlines, or all others; nothing if there are none.
+fn figures(runs: &[Run], names: &[String], headlines: bool) -> Option<Table<'static>> {
     let mut known = std::collections::HashSet::new();
-    for figure in runs.iter().flat_map(|r| &r.figures) {
-        if known.insert(figure.name.as_str()) {
-            rows.push(&figure.name);
-        }
-    }
-    rows.retain(|name| is_headline(name) == headlines);
-    if rows.is_empty() {
-        return Ok(());
-    }
+    let mut rows: Vec<&str> = Vec::new();
+    let all = runs.iter().flat_map(|r| &r.figures).map(|f| f.name.as_str());
+    rows.extend(all.filter(|name| known.insert(*name) && is_headline(name) == headlines));
     let by_name: Vec<std::collections::HashMap<&str, f64>> = runs
         .iter()
         .map(|r| r.figures.iter().map(|f| (f.name.as_str(), f.value)).collect())
         .collect();
-    let labels: Vec<String> = rows.iter().map(|r| (*r).to_owned()).collect();
-    let values: Vec<Vec<f64>> = by_name
-        .iter()
-        .map(|of| {
-            rows.iter()
-                .map(|row| of.get(row).copied().unwrap_or(f64::NAN))
-                .collect()
-        })
-        .collect();
-    let mut columns = vec![Column {
-        name: "figure",
-        unit: "",
-        cells: Cells::Texts(&labels),
-    }];
-    columns.extend(names.iter().zip(&values).map(|(name, values)| Column {
-        name,
-        unit: "",
-        cells: Cells::Numbers(values),
-    }));
+    let table = Table::rows(rows).text("figure", |name| *name);
+    if table.is_empty() {
+        return None;
+    }
+    let columns = names.iter().zip(&by_name);
+    let table = columns.fold(table, |table, (name, of)| {
+        table.number(name, "", |row| of.get(row).copied())
+    });
     // With two runs the difference is what one looks for.
-    let change: Vec<f64> = match values.as_slice() {
-        [a, b] => a.iter().zip(b).map(|(a, b)| 100.0 * (b - a) / a.abs()).collect(),
-        _ => Vec::new(),
-    };
-    if !change.is_empty() {
-        columns.push(Column {
-            name: "second against first",
-            unit: "%",
-            cells: Cells::Numbers(&change),
-        });
-    }
-    let note = "Units are the endings of the names.";
-    if headlines {
-        page.table("Headline figures", note, &columns)
-    } else {
-        page.folded_table("All other figures", note, &columns)
-    }
+    Some(match by_name.as_slice() {
+        [a, b] => table
+            .number("second against first", "%", |row| {
+                let (a, b) = (a.get(row)?, b.get(row)?);
+                Some(100.0 * (b - a) / a.abs())
+            })
+            .table(),
+        _ => table.table(),
+    })
 }
 
 /// A lap on the way into the page: what it has at places that rise.
@@ -293,7 +254,7 @@ fn laps(page: &mut HtmlReport, runs: &[Run], names: &[String]) -> Result<()> {
         .zip(names)
         .filter_map(|(run, name)| {
             let trace = run.traces.first()?;
-            Some((run, format!("{name}: {}", said_of(&trace.name)), trace))
+            Some((run, format!("{name}: {}", words_of(&trace.name)), trace))
         })
         .collect();
     let Some((first, _, trace)) = best.first() else {
@@ -343,80 +304,56 @@ pub(crate) fn overlay(
     let alone = laps.len() == 1;
     // A lap alone loses no time on another.
     let clock = if one_track && !alone { first.clock() } else { None };
-    let lines: Vec<LapLine<'_>> = laps
+    let mut placed = false;
+    let lines: Vec<LapLine> = laps
         .iter()
         .map(|(name, lap)| {
+            let length_m = lap.length_m();
             let stretch = if one_track {
-                first.length_m() / lap.length_m()
+                first.length_m() / length_m
             } else {
                 1.0
             };
-            let row = |(row, &panel): (usize, &usize)| {
-                Some(LapTrace {
-                    panel: row,
-                    values: lap.column(PANELS[panel].0)?,
-                    band: None,
-                })
-            };
-            let mut traces: Vec<LapTrace<'_>> = panels.iter().enumerate().filter_map(row).collect();
-            if let (Some(first), Some(mine)) = (&clock, lap.clock()) {
-                let lost = |s: &f64| mine(s / lap.length_m()) - first(s / lap.length_m());
-                traces.push(LapTrace {
-                    panel: panels.len(),
-                    values: lap.station_m.iter().map(lost).collect(),
-                    band: None,
-                });
-            }
             let place = lap.column(&["x"]).zip(lap.column(&["y"])).filter(|_| one_track);
-            LapLine {
-                name,
-                x: lap.station_m.iter().map(|s| s * stretch).collect(),
-                traces,
-                place_m: place.map_or(Vec::new(), |(x, y)| {
-                    x.into_iter().zip(y).map(DVec2::from).collect()
-                }),
-                wide: false,
-            }
+            placed |= place.is_some();
+            let place = place.into_iter().flat_map(|(x, y)| x.into_iter().zip(y));
+            let x: Vec<f64> = lap.station_m.iter().map(|s| s * stretch).collect();
+            let line = LapLine::new(*name, x).at(place.map(DVec2::from).collect::<Vec<_>>());
+            let line = panels.iter().enumerate().fold(line, |line, (row, &panel)| {
+                line.maybe(row, lap.column(PANELS[panel].0))
+            });
+            let lost = clock.as_ref().zip(lap.clock()).map(|(first, mine)| {
+                let shares = lap.station_m.iter().map(|s| s / length_m);
+                shares.map(|share| mine(share) - first(share)).collect()
+            });
+            line.maybe(panels.len(), lost)
         })
-        .filter(|line| !line.traces.is_empty())
+        .filter(|line| !line.is_empty())
         .collect();
-    let mut rows: Vec<LapPanel<'_>> = panels
-        .iter()
-        .map(|&panel| LapPanel {
-            label: PANELS[panel].1,
-            unit: PANELS[panel].2,
-            height: 1.0,
-        })
-        .collect();
-    rows.extend(clock.as_ref().map(|_| LapPanel {
-        label: "time lost",
-        unit: "s",
-        height: 1.0,
-    }));
-    let mapped = lines.iter().any(|line| !line.place_m.is_empty());
-    let edges = road.and_then(edges).unwrap_or_default();
-    page.lap(&LapView {
-        title: if alone { "The lap" } else { "Laps over one another" },
-        note: if alone {
-            ""
-        } else if one_track {
-            "Distances are stretched to the first lap's length, so that what is beside each other on the road stands above \
-             each other; time lost is against that lap."
-        } else {
-            "The laps are of different tracks: only their distances are shared."
-        },
-        x_label: "distance",
-        x_unit: "m",
-        panels: rows,
-        lines,
-        map: mapped.then(|| LapMap {
-            left_edge_m: &edges[0],
-            right_edge_m: &edges[1],
-            closed: true,
-            names: Vec::new(),
-        }),
-        ..LapView::default()
-    })
+    let title = if alone { "The lap" } else { "Laps over one another" };
+    let note = if alone {
+        ""
+    } else if one_track {
+        "Distances are stretched to the length of the first lap, so that what lies side by side on the road stands one above \
+         the other. Time lost is against that lap."
+    } else {
+        "The laps are of different tracks. Only their distances are shared."
+    };
+    let [left_edge_m, right_edge_m] = road.and_then(edges).unwrap_or_default();
+    let road = Road {
+        left_edge_m,
+        right_edge_m,
+        closed: true,
+        names: Vec::new(),
+    };
+    page.place(
+        &LapView::new(title)
+            .note(note)
+            .panels(panels.iter().map(|&panel| (PANELS[panel].1, PANELS[panel].2)))
+            .panels(clock.as_ref().map(|_| ("time lost", "s")))
+            .lines(lines)
+            .road(placed.then_some(road)),
+    )
 }
 
 /// Left and right edge of a road (m), from its line and the widths at right angles to it.
@@ -434,7 +371,7 @@ fn edges(road: &Trace) -> Option<[Vec<DVec2>; 2]> {
 }
 
 /// What a file's name says of its line: `line_least_curved` is `least curved`.
-fn said_of(stem: &str) -> String {
+fn words_of(stem: &str) -> String {
     match stem.strip_prefix("line_") {
         Some(line) => line.replace('_', " "),
         None if stem == "drive" => "driven".to_owned(),
@@ -443,23 +380,21 @@ fn said_of(stem: &str) -> String {
     }
 }
 
-fn curves_of<'a>(
-    runs: &[Run],
-    names: &'a [String],
+/// A panel of a column over another, a curve for each run that has both.
+fn over(
+    panel: Panel,
+    (runs, names): (&[Run], &[String]),
     of: fn(&Run) -> Option<&Trace>,
-    [x, y]: [&[&str]; 2],
-) -> Vec<Curve<'a>> {
-    let curve = |(run, name): (&Run, &'a String)| {
-        let table = of(run)?;
-        let (x, y) = (table.column(x)?.to_vec(), table.column(y)?.to_vec());
-        (x.len() == y.len() && y.iter().any(|v| v.is_finite())).then_some(Curve {
-            label: name,
-            x,
-            y,
-            shade: None,
-        })
-    };
-    runs.iter().zip(names).filter_map(curve).collect()
+    [x, y]: [&str; 2],
+) -> Panel {
+    runs.iter().zip(names).fold(panel, |panel, (run, name)| {
+        let columns = of(run).and_then(|table| table.column(&[x]).zip(table.column(&[y])));
+        let sound = |(x, y): &(&[f64], &[f64])| x.len() == y.len() && y.iter().any(|v| v.is_finite());
+        match columns.filter(sound) {
+            Some((x, y)) => panel.curve(name, x, y),
+            None => panel,
+        }
+    })
 }
 
 fn limits(page: &mut HtmlReport, runs: &[Run], names: &[String]) -> Result<()> {
@@ -469,42 +404,32 @@ fn limits(page: &mut HtmlReport, runs: &[Run], names: &[String]) -> Result<()> {
         ("Drive", "ax_drive_mps2"),
         ("Drag", "drag_mps2"),
     ];
-    let mut begun = false;
-    for (title, column) in panels {
-        let curves = curves_of(runs, names, |r| r.envelope.as_ref(), [&["v_mps"], &[column]]);
-        if curves.is_empty() {
-            continue;
-        }
-        if !std::mem::replace(&mut begun, true) {
-            page.section("Limits over speed", "");
-        }
-        let panel = CurvePanel {
-            title,
-            x_label: "speed (m/s)",
-            y_label: "acceleration (m/s\u{b2})",
-            curves,
-        };
-        page.curves(&panel, "", [Scale::Linear; 2])?;
+    let panels = panels.map(|(title, column)| {
+        let panel = Panel::new(title).x("speed", "m/s").y("acceleration", "m/s\u{b2}");
+        over(panel, (runs, names), |r| r.envelope.as_ref(), ["v_mps", column])
+    });
+    let figure = Curves::new("Limits over speed", panels.into_iter().filter(Panel::has_points));
+    if figure.is_empty() {
+        return Ok(());
     }
-    Ok(())
+    page.section("Limits over speed", "");
+    page.place(&figure)
 }
 
 fn convergence(page: &mut HtmlReport, runs: &[Run], names: &[String]) -> Result<()> {
-    let curves = curves_of(
-        runs,
-        names,
+    let panel = Panel::new("Cost of the swarms' best")
+        .x("candidates evaluated", "")
+        .y("cost", "")
+        .scales(Scale::Linear, Scale::Log);
+    let panel = over(
+        panel,
+        (runs, names),
         |r| r.convergence.as_ref(),
-        [&["evaluations"], &["best"]],
+        ["evaluations", "best"],
     );
-    if curves.is_empty() {
+    if !panel.has_points() {
         return Ok(());
     }
     page.section("Convergence", "");
-    let panel = CurvePanel {
-        title: "Cost of the swarms' best",
-        x_label: "candidates evaluated",
-        y_label: "cost",
-        curves,
-    };
-    page.curves(&panel, "", [Scale::Linear, Scale::Log])
+    page.place(&Curves::new("Convergence", [panel]))
 }

@@ -1,69 +1,183 @@
-//! What a car can do at each speed, from its 4DOF model: the limits that racing lines are driven within.
+//! What a car can do at each speed, from its 4DOF model: the g-g-v envelope that racing lines are driven within.
 //!
 //! At every speed the steady states of the car ([`crate::vehicle::steady`]) give lateral acceleration over steering and
 //! its ridge, straight-line running the greatest braking and traction, and the powertrain what the engine can give
 //! through the gears. The rows make an [`Envelope`]; the small-angle end of the curves gives the handling figures.
 //!
-//! The surface of lateral acceleration over speed and steering also comes from a population of cars that settle on circles
+//! The surface of lateral acceleration over speed and steering also comes from a population of cars in steady-state cornering
 //! ([`crate::evaluate::steady`]), on any backend; the limits stay those of the curves, which are exact.
 
 mod population;
 mod results;
 
-pub use population::{
-    MOST_STEERS, PopulationSettings, PopulationSummary, RidgePoint, SteadySurface, steady_surface,
-};
-pub use results::{EnvelopeSummary, summarise, write_results};
+pub use population::{RidgePoint, SteadySurface, SurfaceFigures};
+pub use results::EnvelopeSummary;
 
+use crate::config::kinds::{choice, count, name_or_file, number, optional, text};
+use crate::config::settings::{Settings, settings};
 use crate::error::{Error, Result};
+use crate::evaluate::{BackendChoice, BackendInfo};
+use crate::study::framework::journal::Journal;
+use crate::study::framework::memory::{ANSWER, Kept};
+use crate::study::framework::{Plan, RunRecord, Study, Subject, Watch, Work};
 use crate::vehicle::{Car, Envelope, EnvelopeRow, Trim, steady_car};
 use rayon::prelude::*;
+use std::path::Path;
 
-/// Settings of the study.
-#[derive(Clone, Debug, PartialEq)]
-pub struct EnvelopeSettings {
-    /// Slowest speed (m/s); below it the limits are taken to be its.
-    pub from_mps: f64,
-    /// Greatest speed (m/s), if the engine goes that far.
-    pub to_mps: f64,
-    /// Step between speeds (m/s).
-    pub step_mps: f64,
+/// The study.
+pub struct EnvelopeStudy;
+
+settings! {
+    /// Settings of an envelope study.
+    pub struct EnvelopeSettings {
+        car: String ["-"] = "gt".to_owned(), name_or_file(),
+            "The car: a bundled name (gt) or a TOML file, such as the one that identify writes";
+        from_mps: f64 ["m/s"] = 18.0, number(3.0, 150.0),
+            "Slowest speed; below it the limits are taken to be its";
+        to_mps: f64 ["m/s"] = 77.0, number(4.0, 160.0),
+            "Greatest speed, if the engine goes that far";
+        step_mps: f64 ["m/s"] = 2.0, number(0.05, 50.0),
+            "Step between speeds";
+        steers: usize ["-"] = 128, count(4, 10_000),
+            "Steering angles of the surface, from straight on to the lock";
+        backend: BackendChoice ["-"] = BackendChoice::Auto, choice().place(),
+            "Where the surface is evaluated; the limits are worked out in f64";
+        adapter: Option<String> ["-"] = None, optional(text()).place().example("\"llvmpipe\""),
+            "Part of the name of the GPU to use";
+    }
+
+    fn consistent(&self) -> Result<()> {
+        let least = self.from_mps + 1.0;
+        if self.to_mps < least {
+            let expected = format!("{least} m/s or more, as from_mps is {}", self.from_mps);
+            return Err(Error::input("the study", "to_mps", self.to_mps.to_string(), expected));
+        }
+        Ok(())
+    }
 }
 
-impl Default for EnvelopeSettings {
-    /// 20 to 70 m/s, and a tenth beyond either end.
-    fn default() -> Self {
-        Self {
-            from_mps: 18.0,
-            to_mps: 77.0,
-            step_mps: 2.0,
+/// All that the study reads.
+#[derive(Clone, Debug)]
+pub struct Prepared {
+    /// The car.
+    pub car: Car,
+    /// Speeds that its limits are looked for at (m/s).
+    pub speeds: Vec<f64>,
+}
+
+/// What the study finds.
+#[derive(Clone, Debug)]
+pub struct Outcome {
+    /// The limits.
+    pub limits: CarLimits,
+    /// The surface of lateral acceleration, if it was asked for.
+    pub surface: Option<SteadySurface>,
+    /// How the study ran; candidates are those of the surface.
+    pub record: RunRecord,
+}
+
+/// Bytes of a car of the surface, with its tables, cells of a picture and places on a page.
+const CAR: u64 = (4 << 10) + ANSWER;
+
+impl Study for EnvelopeStudy {
+    const NAME: &'static str = "envelope";
+    const ABOUT: &'static str =
+        "Find a car's limits at each speed: the g-g-v envelope that racing lines are driven within.";
+    const DETAILS: &'static str =
+        "Examples:\n  lapswarm envelope\n  lapswarm envelope --car runs/identify-001/car.toml --step-mps 5";
+    type Settings = EnvelopeSettings;
+    type State = Journal;
+    type Prepared = Prepared;
+    type Outcome = Outcome;
+    type Summary = EnvelopeSummary;
+
+    fn prepare(settings: &EnvelopeSettings) -> Result<Prepared> {
+        let car = Car::load(&settings.car)?;
+        let speeds = speeds_of(&car, settings)?;
+        Ok(Prepared { car, speeds })
+    }
+
+    fn size(settings: &EnvelopeSettings, prepared: Option<&Prepared>) -> Vec<Kept> {
+        let speeds = prepared.map_or_else(|| settings.most_speeds(), |prepared| prepared.speeds.len());
+        vec![Kept {
+            name: "steers, at each speed",
+            count: (settings.steers as u64).saturating_mul(speeds as u64),
+            each: CAR,
+        }]
+    }
+
+    fn plan(settings: &EnvelopeSettings, prepared: &Prepared, plan: Plan) -> Result<Plan> {
+        let Prepared { car, speeds } = prepared;
+        plan.reads(format!("car {}, {} speeds", car.name, speeds.len()))
+            .evaluations((speeds.len() * settings.steers) as u64)
+            .backend(settings.backend, settings.adapter.as_deref())
+    }
+
+    fn solve(
+        settings: &EnvelopeSettings,
+        prepared: &Prepared,
+        work: Work<'_, Journal>,
+    ) -> Result<Option<Outcome>> {
+        population::measure(settings, prepared, work)
+    }
+
+    fn record(outcome: &Outcome) -> &RunRecord {
+        &outcome.record
+    }
+
+    fn summarise(_: &EnvelopeSettings, prepared: &Prepared, outcome: &Outcome) -> EnvelopeSummary {
+        results::summarise(&prepared.car.name, outcome)
+    }
+
+    fn subject(_: &EnvelopeSettings, prepared: &Prepared) -> Subject {
+        Subject {
+            car: prepared.car.name.clone(),
+            ..Subject::default()
         }
+    }
+
+    fn report(
+        folder: &Path,
+        _: &EnvelopeSettings,
+        _: &Prepared,
+        outcome: &Outcome,
+        summary: &EnvelopeSummary,
+    ) -> Result<()> {
+        results::report(folder, outcome, summary)
+    }
+
+    fn text(_: &EnvelopeSettings, summary: &EnvelopeSummary) -> String {
+        summary.to_text()
+    }
+
+    fn check(path: &Path) -> Result<String> {
+        let settings = EnvelopeSettings::read(path)?;
+        let prepared = Self::prepare(&settings)?;
+        Ok(format!("{}, {} speeds", prepared.car.name, prepared.speeds.len()))
     }
 }
 
 impl EnvelopeSettings {
-    /// Checks every setting.
-    ///
-    /// # Errors
-    /// [`Error::Input`] naming the setting.
-    pub fn validate(&self) -> Result<()> {
-        let checks = [
-            ("from", self.from_mps, 3.0, 150.0),
-            ("to", self.to_mps, self.from_mps + 1.0, 160.0),
-            ("step", self.step_mps, 0.05, 50.0),
-        ];
-        for (name, value, least, most) in checks {
-            if !(least..=most).contains(&value) {
-                return Err(Error::input(
-                    "the envelope's settings",
-                    name,
-                    value.to_string(),
-                    format!("{least} to {most} m/s"),
-                ));
-            }
-        }
-        Ok(())
+    /// Speeds in even steps, as many as there are whatever the engine does.
+    fn most_speeds(&self) -> usize {
+        ((self.to_mps - self.from_mps) / self.step_mps + 1e-9).floor() as usize + 1
     }
+}
+
+/// The limits without the surface.
+///
+/// # Errors
+/// As [`car_limits`].
+pub fn limits_alone(settings: &EnvelopeSettings, prepared: &Prepared) -> Result<Outcome> {
+    let watch = Watch::begin();
+    let limits = car_limits(&prepared.car, settings)?;
+    let mut record = RunRecord::of(&BackendInfo::reference());
+    record.elapsed_s = watch.elapsed_s();
+    Ok(Outcome {
+        limits,
+        surface: None,
+        record,
+    })
 }
 
 /// What the car does at one speed.
@@ -93,7 +207,7 @@ pub struct Handling {
     pub critical_speed_mps: Option<f64>,
 }
 
-/// The outcome of the study.
+/// A car's limits.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CarLimits {
     /// Limits by rising speed.
@@ -153,8 +267,8 @@ pub fn speeds_of(car: &Car, settings: &EnvelopeSettings) -> Result<Vec<f64>> {
     settings.validate()?;
     let force = engine_of(car)?;
     let mut speeds: Vec<f64> = Vec::new();
-    let count = ((settings.to_mps - settings.from_mps) / settings.step_mps + 1e-9).floor() as usize;
-    for i in 0..=count {
+    let count = settings.most_speeds();
+    for i in 0..count {
         let speed = settings.from_mps + settings.step_mps * i as f64;
         if force(speed) <= 0.0 {
             break;
@@ -162,7 +276,7 @@ pub fn speeds_of(car: &Car, settings: &EnvelopeSettings) -> Result<Vec<f64>> {
         speeds.push(speed);
     }
     if let Some(&last) = speeds.last()
-        && speeds.len() <= count
+        && speeds.len() < count
     {
         // The engine ends between two speeds: that is the car's greatest.
         let (mut low, mut high) = (last, last + settings.step_mps);

@@ -1,44 +1,21 @@
-//! The surface of lateral acceleration over speed and steering, and its ridge: a population of cars that settle on circles,
+//! The surface of lateral acceleration over speed and steering, and its ridge: a population of cars in steady-state cornering,
 //! held against the curves of trims.
 
-use super::{CarLimits, STEER_TO_GRIP};
-use crate::error::{Error, Result};
-use crate::evaluate::gpu::DispatchWatch;
+use super::{CarLimits, EnvelopeSettings, EnvelopeStudy, Outcome, Prepared, STEER_TO_GRIP, car_limits};
+use crate::error::Result;
 use crate::evaluate::steady::kernel::INTEGRATED;
 use crate::evaluate::steady::{SteadyObjective, SteadyProblem, open_steady_evaluator};
-use crate::evaluate::{BackendChoice, BackendInfo, Failure, FailureCounts};
+use crate::evaluate::{Evaluation, Evaluator, Failure, add_failures};
+use crate::study::framework::journal::{Journal, Recorder};
+use crate::study::framework::{Inputs, Progress, RunRecord, Study, Watch, Work};
 use crate::vehicle::aero::aero_forces;
 use crate::vehicle::{Car, Trim, steady_car};
 use rayon::prelude::*;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
-/// How the population is evaluated.
-#[derive(Clone, Debug, PartialEq)]
-pub struct PopulationSettings {
-    /// Where.
-    pub backend: BackendChoice,
-    /// Part of the name of the GPU to use.
-    pub adapter: Option<String>,
-    /// Steering angles, from straight on to the lock.
-    pub steers: usize,
-}
-
-impl Default for PopulationSettings {
-    /// Steering in steps of 1.4 mrad where the lock is 10 degrees.
-    fn default() -> Self {
-        Self {
-            backend: BackendChoice::Auto,
-            adapter: None,
-            steers: 128,
-        }
-    }
-}
-
-/// Most steering angles.
-pub const MOST_STEERS: usize = 10_000;
-/// Cars of the surface at the most: with their tables, cells of a picture and places on a page some four kilobytes each.
-const MOST_CARS: usize = 1 << 18;
+/// Cars of one call of the evaluator: enough to fill any device for a moment, few enough to be interrupted.
+const BATCH: usize = 1 << 14;
 /// What is asked of each trim, in the order of [`SteadySurface::figures`].
 pub(super) const OBJECTIVES: [SteadyObjective; 5] = SteadyObjective::ALL;
 
@@ -73,28 +50,12 @@ pub struct SteadySurface {
     /// The ridge, speed by speed.
     pub ridge: Vec<RidgePoint>,
     /// What it comes to.
-    pub summary: PopulationSummary,
-    /// What evaluated.
-    pub backend: BackendInfo,
-    /// The longest that a dispatch kept the device (ms); nothing where none was at work.
-    pub longest_dispatch_ms: Option<f64>,
+    pub summary: SurfaceFigures,
 }
 
-/// The figures of the population.
-#[derive(Clone, Debug, Serialize)]
-pub struct PopulationSummary {
-    /// `cpu`, `simd` or `gpu`.
-    pub backend: &'static str,
-    /// Instruction set or adapter.
-    pub adapter: String,
-    /// What went wrong with devices and was got over.
-    pub device_faults: Vec<String>,
-    /// Cars settled.
-    pub evaluations: usize,
-    /// How many of them in a second.
-    pub evaluations_per_s: f64,
-    /// Cars that failed, by reason.
-    pub failures: FailureCounts,
+/// How the surface compares with the curves of trims.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct SurfaceFigures {
     /// Greatest difference of a lateral acceleration from the curves of trims (m/s^2), wherever the two have the same angle.
     pub surface_difference_mps2: Option<f64>,
     /// Speeds at which the grid surrounds the ridge.
@@ -153,26 +114,20 @@ fn ridge_of(x: &[f64], values: &[f64]) -> Option<(f64, f64, Option<f64>)> {
     Some((x[top] + shift, peak.min(z + slack), Some(slack)))
 }
 
-/// Settles the population of `limits`' speeds by even steering angles up to the car's lock.
+/// Works the limits out and settles a population of their speeds by even steering angles up to the car's lock; nothing if the
+/// observer ends it.
 ///
 /// # Errors
-/// [`Error::Input`] for settings out of range; those of the evaluator.
-pub fn steady_surface(car: &Car, limits: &CarLimits, settings: &PopulationSettings) -> Result<SteadySurface> {
-    if !(4..=MOST_STEERS).contains(&settings.steers) {
-        let expected = format!("4 to {MOST_STEERS} angles");
-        return Err(Error::input(
-            "the envelope's settings",
-            "steers",
-            settings.steers.to_string(),
-            expected,
-        ));
-    }
-    let speeds: Vec<f64> = limits.speeds.iter().map(|s| s.row.v_mps).collect();
-    if speeds.len() * settings.steers > MOST_CARS {
-        let found = format!("{} angles at each of {} speeds", settings.steers, speeds.len());
-        let expected = format!("at most {MOST_CARS} cars in all");
-        return Err(Error::input("the envelope's settings", "steers", found, expected));
-    }
+/// As [`car_limits`]; [`crate::Error::Input`] if the journal belongs to other inputs; those of the evaluator.
+pub(super) fn measure(
+    settings: &EnvelopeSettings,
+    prepared: &Prepared,
+    work: Work<'_, Journal>,
+) -> Result<Option<Outcome>> {
+    let watch = Watch::begin();
+    let Prepared { car, speeds } = prepared;
+    // Refuses a car that has no drive at these speeds.
+    let limits = car_limits(car, settings)?;
     let lock = car.max_steer_rad.min(STEER_TO_GRIP);
     let last = settings.steers - 1;
     let steers: Vec<f64> = (0..=last).map(|i| lock * i as f64 / last as f64).collect();
@@ -182,11 +137,47 @@ pub fn steady_surface(car: &Car, limits: &CarLimits, settings: &PopulationSettin
         .iter()
         .flat_map(|v| steers.iter().flat_map(|d| [*v, *d]))
         .collect();
-    let began = Instant::now();
-    let dispatches = DispatchWatch::begin();
+    let all = (speeds.len() * steers.len()) as u64;
     let mut evaluator = open_steady_evaluator(&problem, settings.backend, settings.adapter.as_deref())?;
-    let found = evaluator.evaluate(&population)?;
-    let took = began.elapsed().as_secs_f64();
+    let mut recorder = Recorder::of(EnvelopeStudy::NAME, settings, work.state, work.state_file)?;
+    let mut inputs = Inputs::new(EnvelopeStudy::NAME);
+    inputs.add(&(car, speeds, settings.steers));
+    recorder.begin(inputs.key(), &evaluator.backend())?;
+    let mut record = RunRecord::of(&evaluator.backend());
+    let began = Instant::now();
+    let mut found = Evaluation::default();
+    for batch in population.chunks(2 * BATCH) {
+        let done = found.failures.len() as u64;
+        if (work.observe)(&Progress::counted(done, all)).is_break() {
+            recorder.save()?;
+            return Ok(None);
+        }
+        let answer = recorder.over(evaluator.as_mut()).evaluate(batch)?;
+        add_failures(&mut record.failures, &answer.failure_counts());
+        found.objectives.extend(answer.objectives);
+        found.failures.extend(answer.failures);
+    }
+    let busy_s = began.elapsed().as_secs_f64();
+    let surface = compared(car, &limits, &problem, steers, found);
+    recorder.complete(&mut record);
+    record.took(all, watch.elapsed_s(), busy_s);
+    record.longest_dispatch_ms = watch.longest_dispatch_ms();
+    Ok(Some(Outcome {
+        limits,
+        surface: Some(surface),
+        record,
+    }))
+}
+
+/// The surface beside the curves of trims.
+fn compared(
+    car: &Car,
+    limits: &CarLimits,
+    problem: &SteadyProblem,
+    steers: Vec<f64>,
+    found: Evaluation,
+) -> SteadySurface {
+    let lock = steers.last().copied().unwrap_or(STEER_TO_GRIP);
     let figure = |k: usize| -> Vec<f64> {
         let rows = found
             .objectives
@@ -239,31 +230,21 @@ pub fn steady_surface(car: &Car, limits: &CarLimits, settings: &PopulationSettin
         .filter_map(|r| Some([(r.ay_mps2 - r.exact_mps2?).abs(), r.tolerance_mps2?]))
         .collect();
     let greatest = |k: usize| differences.iter().map(|d| d[k]).reduce(f64::max);
-    let backend = evaluator.backend();
-    let summary = PopulationSummary {
-        backend: backend.backend,
-        adapter: backend.device.clone(),
-        device_faults: evaluator.device_faults().to_vec(),
-        evaluations: found.failures.len(),
-        evaluations_per_s: found.failures.len() as f64 / took.max(1e-9),
-        failures: found.failure_counts(),
+    let summary = SurfaceFigures {
         surface_difference_mps2: compared.iter().filter_map(|(_, off)| *off).reduce(f64::max),
         ridge_speeds: differences.len(),
         ridge_difference_mps2: greatest(0),
         ridge_tolerance_mps2: greatest(1),
         ridge_agrees: differences.iter().all(|[off, tolerance]| off <= tolerance),
     };
-    drop(evaluator);
-    Ok(SteadySurface {
-        speeds,
+    SteadySurface {
+        speeds: limits.speeds.iter().map(|s| s.row.v_mps).collect(),
         steers,
         figures,
-        longest_dispatch_ms: dispatches.longest_ms(),
         failures: found.failures,
         ridge,
         summary,
-        backend,
-    })
+    }
 }
 
 /// The trim of greatest lateral acceleration of a curve up to a steering angle, to rounding.

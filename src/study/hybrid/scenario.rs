@@ -2,7 +2,7 @@
 
 use super::setup::HybridSetup;
 use crate::error::Result;
-use crate::evaluate::hybrid::{HybridObjective, HybridProblem, Strategy};
+use crate::evaluate::energy::{HybridObjective, HybridProblem, Strategy};
 use crate::line::energy::{EnergyLap, EnergyPlan, Gates, Mode, SegmentEnergy};
 use serde::{Deserialize, Serialize};
 

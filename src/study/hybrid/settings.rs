@@ -1,14 +1,18 @@
 //! What a hybrid study is asked to do.
 
 use super::scenario::{Scenario, published};
-use crate::config::{Document, LONGEST_NAME, Table, read_text};
+use crate::config::kinds::{
+    Kind, choice, choices, count, file, name_or_file, named, number, numbers, of, optional, quoted, switch,
+    text,
+};
+use crate::config::settings::{Flag, Written, settings};
+use crate::config::{LONGEST_NAME, Table};
 use crate::error::{Error, Result};
 use crate::evaluate::BackendChoice;
-use crate::evaluate::hybrid::{HybridObjective, MOST_MOTOR};
+use crate::evaluate::energy::{HybridObjective, MOST_MOTOR};
 use crate::files::stem;
 use crate::line::energy::{Gates, Mode};
-use crate::study::identify::parse_backend;
-use crate::study::memory::Size;
+use crate::study::framework::memory::Size;
 use crate::study::raceline::RacelineSettings;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -27,217 +31,82 @@ pub enum FreePart {
     Both,
 }
 
-impl FreePart {
-    /// The name in studies.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Strategy => "strategy",
-            Self::Line => "line",
-            Self::Both => "both",
-        }
+named!(FreePart {
+    Strategy = "strategy",
+    Line = "line",
+    Both = "both",
+});
+
+settings! {
+    /// Settings of a hybrid study.
+    pub struct HybridStudySettings {
+        track: String ["-"] = "silverstone_gp".to_owned(), name_or_file(),
+            "The circuit: a bundled name, a shape such as stadium:500:100:12, or a file";
+        car: String ["-"] = "gt_hybrid".to_owned(), name_or_file(),
+            "The car, with an engine map and a hybrid drive: a bundled name (gt_hybrid) or a TOML file";
+        envelope: Option<PathBuf> ["-"] = None, optional(file()).example("\"envelope.csv\""),
+            "A g-g-v envelope (columns v_mps, ay_mps2, ax_grip_mps2, ax_drive_mps2, drag_mps2) instead of the car's own";
+        line: Option<PathBuf> ["-"] = None, optional(file()).example("\"line_fastest.csv\""),
+            "A line (CSV with columns x and y in m) instead of the fastest one";
+        sections: usize ["-"] = 960, count(8, 1_000_000),
+            "Cross-sections of the track that the fastest line is found through";
+        spacing_m: f64 ["m"] = 4.0, number(0.5, 50.0),
+            "Greatest distance between the points at which energy is accounted";
+        car_width_m: f64 ["m"] = 2.0, number(0.0, 10.0),
+            "Width of the car";
+        entry_mps: f64 ["m/s"] = 10.0, number(0.5, 150.0),
+            "Greatest speed at the start of an open track";
+        scenarios: Vec<Scenario> ["-"] = published(), of(Scenarios),
+            "Strategies set by hand, each a table of its mode (offset or additional) and its gates";
+        optimise: bool ["-"] = true, switch(true).flag(Flag::Switch("scenarios_only", false)),
+            "Whether deployment is optimised too; else only the scenarios are driven";
+        free: FreePart ["-"] = FreePart::Strategy, choice(),
+            "What the front's swarm may change";
+        objectives: Vec<HybridObjective> ["-"] = usual_objectives(), choices(),
+            "What the swarm minimises; more than one for a front";
+        energy_mj: Option<f64> ["MJ"] = None, optional(number(0.0, 1000.0)).example("2.1"),
+            "Energy that may be deployed in a lap; without it what rules and store allow";
+        budgets_mj: Vec<f64> ["MJ"] = usual_budgets_mj(), numbers(0.0, 1000.0),
+            "Energies of the front of time against energy";
+        stint_laps: usize ["-"] = 0, count(0, 1000),
+            "Laps of a stint that sustains its charge; zero for none";
+        stint_fuel_kg: f64 ["kg"] = 60.0, number(0.0, 500.0),
+            "Fuel on board at the start of the stint";
+        match_lap_time_s: Option<f64> ["s"] = None, optional(number(1.0, 1e5)).example("113.5"),
+            "Motor and store are sized so that the car laps in this time";
+        population: usize ["-"] = 64, count(8, 10_000_000).search(),
+            "Particles of the swarms";
+        iterations: usize ["-"] = 300, count(1, 1_000_000).search(),
+            "Iterations of the swarms";
+        seed: u64 ["-"] = 1, count(0, u64::MAX).search(),
+            "Seed of all random numbers";
+        backend: BackendChoice ["-"] = BackendChoice::Auto, choice().place(),
+            "Where laps are evaluated";
+        adapter: Option<String> ["-"] = None, optional(text()).place().example("\"llvmpipe\""),
+            "Part of the name of the GPU to use";
     }
 
-    /// The part of this name.
-    pub fn named(name: &str) -> Option<Self> {
-        [Self::Strategy, Self::Line, Self::Both]
-            .into_iter()
-            .find(|p| p.name() == name)
+    fn consistent(&self) -> Result<()> {
+        if self.scenarios.is_empty() && !self.optimise {
+            let found = "none, and no optimisation";
+            return Err(Error::input("the study", "scenarios", found, "something to do"));
+        }
+        Ok(())
     }
 }
 
-/// Settings of a hybrid study.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct HybridStudySettings {
-    /// A bundled circuit, a shape or a file.
-    pub track: String,
-    /// A bundled car or a file, with an engine map and a hybrid drive.
-    pub car: String,
-    /// A table of limits that takes the place of the car's own.
-    pub envelope: Option<PathBuf>,
-    /// A line (CSV with columns `x` and `y` in m) that takes the place of the fastest one.
-    pub line: Option<PathBuf>,
-    /// Cuts across the track that the fastest line is found through.
-    pub sections: usize,
-    /// Greatest distance between the points that energy is accounted at (m).
-    pub spacing_m: f64,
-    /// Width of the car (m).
-    pub car_width_m: f64,
-    /// Greatest speed at the start of an open track (m/s).
-    pub entry_mps: f64,
-    /// The scenarios.
-    pub scenarios: Vec<Scenario>,
-    /// Whether deployment is optimised too.
-    pub optimise: bool,
-    /// What the swarm for several objectives may change.
-    pub free: FreePart,
-    /// Its objectives; with one alone there is no front.
-    pub objectives: Vec<HybridObjective>,
-    /// Energy that may be deployed in a lap (MJ); without it what rules and store allow.
-    pub energy_mj: Option<f64>,
-    /// Energies of the front of time against energy (MJ).
-    pub budgets_mj: Vec<f64>,
-    /// Laps of a stint, nought for none.
-    pub stint_laps: usize,
-    /// Fuel on board at the start of a stint (kg).
-    pub stint_fuel_kg: f64,
-    /// Lap time of another car that a hybrid is sized to (s).
-    pub match_lap_time_s: Option<f64>,
-    /// Particles of the swarms.
-    pub population: usize,
-    /// Their iterations.
-    pub iterations: usize,
-    /// Seed of all random numbers.
-    pub seed: u64,
-    /// Where laps are evaluated.
-    pub backend: BackendChoice,
-    /// Part of the name of the GPU to use.
-    pub adapter: Option<String>,
+fn usual_objectives() -> Vec<HybridObjective> {
+    vec![HybridObjective::LapTime, HybridObjective::EnergyUsed]
 }
 
-impl Default for HybridStudySettings {
-    fn default() -> Self {
-        Self {
-            track: "silverstone_gp".to_owned(),
-            car: "gt_hybrid".to_owned(),
-            envelope: None,
-            line: None,
-            sections: 960,
-            spacing_m: 4.0,
-            car_width_m: 2.0,
-            entry_mps: 10.0,
-            scenarios: published(),
-            optimise: true,
-            free: FreePart::Strategy,
-            objectives: vec![HybridObjective::LapTime, HybridObjective::EnergyUsed],
-            energy_mj: None,
-            budgets_mj: vec![0.0, 0.5, 1.0, 1.5, 2.1, 3.0, 4.0, 5.3],
-            stint_laps: 0,
-            stint_fuel_kg: 60.0,
-            match_lap_time_s: None,
-            population: 64,
-            iterations: 300,
-            seed: 1,
-            backend: BackendChoice::Auto,
-            adapter: None,
-        }
-    }
+fn usual_budgets_mj() -> Vec<f64> {
+    vec![0.0, 0.5, 1.0, 1.5, 2.1, 3.0, 4.0, 5.3]
 }
 
 /// Searches that a sizing comes to at most: in each of eight ranges a whole one and seven of a quarter.
 const SIZING: usize = 22;
 
-/// Objectives that a study may name.
-pub const HYBRID_OBJECTIVES: &str = "lap_time_s, fuel_l, energy_used_mj, soc_swing";
-
 impl HybridStudySettings {
-    /// The same with the paths of files absolute, so that they mean the same from every folder.
-    pub fn absolute(mut self) -> Self {
-        let placed = RacelineSettings {
-            track: self.track,
-            car: self.car,
-            envelope: self.envelope,
-            ..RacelineSettings::default()
-        }
-        .absolute();
-        (self.track, self.car, self.envelope) = (placed.track, placed.car, placed.envelope);
-        self.line = self.line.map(|path| std::path::absolute(&path).unwrap_or(path));
-        self
-    }
-
-    /// Reads a study file; files that it names are relative to it.
-    ///
-    /// # Errors
-    /// [`Error::Io`] if it cannot be read, [`Error::Input`] naming line and field if it says something wrong.
-    pub fn read(path: &Path) -> Result<Self> {
-        let text = read_text(path)?;
-        let document = Document::parse(path, &text)?;
-        let root = document.root();
-        let mut s = Self::default();
-        let folder = path.parent().unwrap_or(Path::new(""));
-        let named_or_file = |name: &str| {
-            if Path::new(name).extension().is_some() {
-                folder.join(name).display().to_string()
-            } else {
-                name.to_owned()
-            }
-        };
-        if let Some(name) = root.string("track")? {
-            s.track = named_or_file(name);
-        }
-        if let Some(name) = root.string("car")? {
-            s.car = named_or_file(name);
-        }
-        s.envelope = root.string("envelope")?.map(|name| folder.join(name));
-        s.line = root.string("line")?.map(|name| folder.join(name));
-        let count = |key: &str, least: u64, most: u64, value: usize| -> Result<usize> {
-            Ok(root.integer(key, least, most)?.map_or(value, |n| n as usize))
-        };
-        s.sections = count("sections", 8, 1_000_000, s.sections)?;
-        s.population = count("population", 8, 10_000_000, s.population)?;
-        s.iterations = count("iterations", 1, 1_000_000, s.iterations)?;
-        s.stint_laps = count("stint_laps", 0, 1000, s.stint_laps)?;
-        let number = |key: &str, least: f64, most: f64, unit: &str, value: f64| -> Result<f64> {
-            Ok(root.number(key, least, most, unit)?.unwrap_or(value))
-        };
-        s.spacing_m = number("spacing_m", 0.5, 50.0, "m", s.spacing_m)?;
-        s.car_width_m = number("car_width_m", 0.0, 10.0, "m", s.car_width_m)?;
-        s.entry_mps = number("entry_mps", 0.5, 150.0, "m/s", s.entry_mps)?;
-        s.stint_fuel_kg = number("stint_fuel_kg", 0.0, 500.0, "kg", s.stint_fuel_kg)?;
-        s.optimise = root.boolean("optimise")?.unwrap_or(s.optimise);
-        s.energy_mj = root.number("energy_mj", 0.0, 1000.0, "MJ")?;
-        s.match_lap_time_s = root.number("match_lap_time_s", 1.0, 1e5, "s")?;
-        if let Some(budgets) = root.numbers("budgets_mj")? {
-            if budgets.iter().any(|b| !(0.0..=1000.0).contains(b)) {
-                return Err(root.refuse("budgets_mj", "energies of 0 to 1000 MJ"));
-            }
-            s.budgets_mj = budgets;
-        }
-        if let Some(name) = root.string("free")? {
-            s.free = FreePart::named(name)
-                .ok_or_else(|| root.refuse("free", "\"strategy\", \"line\" or \"both\""))?;
-        }
-        if let Some(names) = root.strings("objectives")? {
-            let parsed: Option<Vec<_>> = names.iter().map(|n| HybridObjective::named(n)).collect();
-            s.objectives = parsed
-                .filter(|o| !o.is_empty())
-                .ok_or_else(|| root.refuse("objectives", format!("a list of {HYBRID_OBJECTIVES}")))?;
-        }
-        if let Some(table) = root.table("scenarios")? {
-            s.scenarios = table
-                .keys()
-                .map(|name| {
-                    let row = table.required_table(name)?;
-                    if name.len() > LONGEST_NAME {
-                        let expected = format!("a scenario whose name has at most {LONGEST_NAME} bytes");
-                        return Err(table.refuse(name, expected));
-                    }
-                    let scenario = read_scenario(name, &row)?;
-                    row.finish()?;
-                    Ok(scenario)
-                })
-                .collect::<Result<_>>()?;
-            let mut stems: Vec<(String, &str)> = OWN_LAPS.map(|own| (stem(own).to_lowercase(), own)).into();
-            for name in table.keys() {
-                let stem = stem(name).to_lowercase();
-                if let Some((_, other)) = stems.iter().find(|(taken, _)| *taken == stem) {
-                    let expected = format!("a name that differs from `{other}` in its letters and digits");
-                    return Err(table.refuse(name, expected));
-                }
-                stems.push((stem, name));
-            }
-            table.finish()?;
-        }
-        s.seed = root.integer("seed", 0, u64::MAX)?.unwrap_or(s.seed);
-        if let Some(name) = root.string("backend")? {
-            s.backend = parse_backend(name)
-                .ok_or_else(|| root.refuse("backend", "\"auto\", \"cpu\", \"simd\" or \"gpu\""))?;
-        }
-        s.adapter = root.string("adapter")?.map(str::to_owned);
-        root.finish()?;
-        s.validate()?;
-        Ok(s)
-    }
-
     /// What the study's memory goes with at the least, whatever the track; see
     /// [`HybridInputs::size`](super::HybridInputs::size).
     pub fn size(&self) -> Size {
@@ -264,57 +133,6 @@ impl HybridStudySettings {
         }
     }
 
-    /// Checks what ranges alone do not tell.
-    ///
-    /// # Errors
-    /// [`Error::Input`] naming the setting.
-    pub fn validate(&self) -> Result<()> {
-        let wrong = |place: &str, found: String, expected: &str| {
-            Err(Error::input("the study", place, found, expected))
-        };
-        if self.scenarios.is_empty() && !self.optimise {
-            return wrong(
-                "scenarios",
-                "none, and no optimisation".to_owned(),
-                "something to do",
-            );
-        }
-        let counts = [
-            ("sections", self.sections, 8, 1_000_000),
-            ("population", self.population, 8, 10_000_000),
-            ("iterations", self.iterations, 1, 1_000_000),
-            ("stint_laps", self.stint_laps, 0, 1000),
-        ];
-        for (name, value, least, most) in counts {
-            if !(least..=most).contains(&value) {
-                return wrong(name, value.to_string(), &format!("{least} to {most}"));
-            }
-        }
-        let ranges = [
-            ("spacing_m", self.spacing_m, 0.5, 50.0),
-            ("car_width_m", self.car_width_m, 0.0, 10.0),
-            ("entry_mps", self.entry_mps, 0.5, 150.0),
-            ("energy_mj", self.energy_mj.unwrap_or(0.0), 0.0, 1000.0),
-            ("stint_fuel_kg", self.stint_fuel_kg, 0.0, 500.0),
-            ("match_lap_time_s", self.match_lap_time_s.unwrap_or(1.0), 1.0, 1e5),
-        ];
-        for (name, value, least, most) in ranges {
-            if !(least..=most).contains(&value) {
-                return wrong(name, value.to_string(), &format!("{least} to {most}"));
-            }
-        }
-        let twice = (1..self.objectives.len()).find(|&i| self.objectives[..i].contains(&self.objectives[i]));
-        match (self.objectives.len(), twice) {
-            (0, _) => wrong("objectives", "none".to_owned(), HYBRID_OBJECTIVES),
-            (_, Some(i)) => wrong(
-                "objectives",
-                format!("{} twice", self.objectives[i].name()),
-                "each once",
-            ),
-            _ => Ok(()),
-        }
-    }
-
     /// Settings of the racing line that laps are driven on.
     pub(super) fn raceline(&self) -> RacelineSettings {
         RacelineSettings {
@@ -330,71 +148,75 @@ impl HybridStudySettings {
             ..RacelineSettings::default()
         }
     }
+}
 
-    /// The study file that repeats this study.
-    pub fn to_toml(&self) -> String {
-        let quoted = |text: &str| toml::Value::String(text.to_owned()).to_string();
-        let objectives: Vec<String> = self.objectives.iter().map(|o| quoted(o.name())).collect();
-        let mut text = format!(
-            "track = {}\ncar = {}\nsections = {}\nspacing_m = {:?}\ncar_width_m = {:?}\nentry_mps = {:?}\noptimise = {}\n\
-             free = {}\nobjectives = [{}]\nbudgets_mj = {:?}\nstint_laps = {}\nstint_fuel_kg = {:?}\npopulation = {}\n\
-             iterations = {}\nseed = {}\nbackend = {}\n",
-            quoted(&absolute(&self.track)),
-            quoted(&absolute(&self.car)),
-            self.sections,
-            self.spacing_m,
-            self.car_width_m,
-            self.entry_mps,
-            self.optimise,
-            quoted(self.free.name()),
-            objectives.join(", "),
-            self.budgets_mj,
-            self.stint_laps,
-            self.stint_fuel_kg,
-            self.population,
-            self.iterations,
-            self.seed,
-            quoted(match self.backend {
-                BackendChoice::Auto => "auto",
-                BackendChoice::Cpu => "cpu",
-                BackendChoice::Simd => "simd",
-                BackendChoice::Gpu => "gpu",
-            }),
-        );
-        for (key, path) in [("envelope", &self.envelope), ("line", &self.line)] {
-            if let Some(path) = path {
-                text += &format!("{key} = {}\n", quoted(&absolute(&path.display().to_string())));
+/// Strategies set by hand: the tables `[scenarios.*]`.
+struct Scenarios;
+
+impl Kind<Vec<Scenario>> for Scenarios {
+    fn read(&self, table: &Table<'_>, key: &str, _: &str, _: &Path) -> Result<Option<Vec<Scenario>>> {
+        let Some(table) = table.table(key)? else {
+            return Ok(None);
+        };
+        let scenarios = table
+            .keys()
+            .map(|name| {
+                let row = table.required_table(name)?;
+                if name.len() > LONGEST_NAME {
+                    let expected = format!("a scenario whose name has at most {LONGEST_NAME} bytes");
+                    return Err(table.refuse(name, expected));
+                }
+                let scenario = read_scenario(name, &row)?;
+                row.finish()?;
+                Ok(scenario)
+            })
+            .collect::<Result<_>>()?;
+        // Laps are files named after their scenarios.
+        let mut stems: Vec<(String, &str)> = OWN_LAPS.map(|own| (stem(own).to_lowercase(), own)).into();
+        for name in table.keys() {
+            let stem = stem(name).to_lowercase();
+            if let Some((_, other)) = stems.iter().find(|(taken, _)| *taken == stem) {
+                let expected = format!("a name that differs from `{other}` in its letters and digits");
+                return Err(table.refuse(name, expected));
             }
+            stems.push((stem, name));
         }
-        if let Some(mj) = self.energy_mj {
-            text += &format!("energy_mj = {mj:?}\n");
-        }
-        if let Some(s) = self.match_lap_time_s {
-            text += &format!("match_lap_time_s = {s:?}\n");
-        }
-        if let Some(adapter) = &self.adapter {
-            text += &format!("adapter = {}\n", quoted(adapter));
-        }
-        for scenario in &self.scenarios {
-            let g = &scenario.gates;
-            text += &format!(
-                "\n[scenarios.{}]\nmode = {}\nsteer_rad = {:?}\nspeed_mps = {:?}\nax_mps2 = {:?}\nsoc = {:?}\nenergy_mj = {:?}\n\
-                 motor_share = {:?}\n",
-                quoted(&scenario.name),
-                quoted(scenario.mode.name()),
-                g.steer_rad,
-                g.speed_mps,
-                g.ax_mps2,
-                g.soc,
-                g.energy_mj,
-                g.motor_share
-            );
-        }
-        if self.scenarios.is_empty() {
-            text += "\n[scenarios]\n";
-        }
-        text
+        table.finish()?;
+        Ok(Some(scenarios))
     }
+
+    fn write(&self, scenarios: &Vec<Scenario>) -> Option<Written> {
+        let rows: Vec<String> = scenarios.iter().map(scenario_table).collect();
+        Some(Written::Table(if rows.is_empty() {
+            "[scenarios]\n".to_owned()
+        } else {
+            rows.join("\n")
+        }))
+    }
+
+    fn parse(&self, _: &str, _: &Vec<Scenario>) -> Result<Vec<Scenario>, String> {
+        Err("expected tables [scenarios.NAME] in a study file".to_owned())
+    }
+
+    fn flag(&self, _: &'static str) -> Flag {
+        Flag::None
+    }
+}
+
+fn scenario_table(scenario: &Scenario) -> String {
+    let g = &scenario.gates;
+    format!(
+        "[scenarios.{}]\nmode = {}\nsteer_rad = {:?}\nspeed_mps = {:?}\nax_mps2 = {:?}\nsoc = {:?}\nenergy_mj = {:?}\n\
+         motor_share = {:?}\n",
+        quoted(&scenario.name),
+        quoted(scenario.mode.name()),
+        g.steer_rad,
+        g.speed_mps,
+        g.ax_mps2,
+        g.soc,
+        g.energy_mj,
+        g.motor_share
+    )
 }
 
 fn read_scenario(name: &str, row: &Table<'_>) -> Result<Scenario> {
@@ -420,18 +242,10 @@ fn read_scenario(name: &str, row: &Table<'_>) -> Result<Scenario> {
     })
 }
 
-/// A file's path made absolute, so that a study file can be read from its run folder; names stay as they are.
-fn absolute(name: &str) -> String {
-    let path = Path::new(name);
-    if path.extension().is_none() {
-        return name.to_owned();
-    }
-    std::path::absolute(path).map_or_else(|_| name.to_owned(), |p| p.display().to_string())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::config::settings::Settings;
 
     #[test]
     fn a_study_file_repeats_its_study() {

@@ -1,20 +1,32 @@
 //! Track, car and line.
 
 use super::settings::HybridStudySettings;
-use super::strategy::{GAP_M, control_points};
+use crate::config::settings::Settings;
 use crate::error::{Error, Result};
-use crate::evaluate::hybrid::HybridLine;
+use crate::evaluate::energy::HybridLine;
 use crate::evaluate::line::LineObjective;
 use crate::line::FineLine;
 use crate::line::energy::{EnergyCar, Traction, hybrid_parts};
 use crate::study::envelope::{EnvelopeSettings, car_limits};
-use crate::study::memory::Size;
-use crate::study::raceline::{self, ExactSolvers, RacelineSettings};
+use crate::study::framework::memory::Size;
+use crate::study::raceline::{self, RacelineSettings, ReferenceSolvers};
+use crate::track::CrossSections;
 use crate::vehicle::{Car, Envelope};
 use glam::DVec2;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Gaps shorter than this do not end a stretch (m).
+pub(super) const GAP_M: f64 = 8.0;
+
+/// Metres of the reference line for each control point of free lines.
+const CONTROL_SPACING_M: f64 = 40.0;
+
+/// Control points of lines across these cross-sections.
+pub(super) fn control_points(cuts: &CrossSections) -> usize {
+    ((cuts.length_m / CONTROL_SPACING_M) as usize).clamp(4, cuts.len().max(4))
+}
 
 /// Everything that laps are driven with.
 #[derive(Clone, Debug)]
@@ -122,12 +134,12 @@ impl HybridInputs {
         settings.size_of(zones + controls + 1)
     }
 
-    /// Finds the line, if none is given; nothing if `stop` was raised before it was found.
+    /// All that laps are driven with. The line is found if none is given; nothing if `stop` was raised before it was found.
     ///
     /// # Errors
     /// [`Error::Study`] if the solver of the fastest line refuses.
     pub fn with_line(
-        self,
+        &self,
         settings: &HybridStudySettings,
         stop: &Arc<AtomicBool>,
     ) -> Result<Option<HybridSetup>> {
@@ -136,12 +148,12 @@ impl HybridInputs {
             raceline_settings,
             car,
             given,
-        } = self;
+        } = self.clone();
         let closed = raceline.cuts.closed;
         let (line_name, alpha, through) = match (&settings.line, given) {
             (Some(path), Some(points)) => (path.display().to_string(), None, points),
             _ => {
-                let solvers = ExactSolvers::stopped_by(&raceline, &raceline_settings, Arc::clone(stop))?;
+                let solvers = ReferenceSolvers::stopped_by(&raceline, &raceline_settings, Arc::clone(stop))?;
                 let found = solvers.best(LineObjective::LapTime)?;
                 if stop.load(Ordering::Relaxed) {
                     return Ok(None);
@@ -175,7 +187,7 @@ impl HybridInputs {
 /// Those of [`read_inputs`] and [`HybridInputs::with_line`].
 pub fn set_up(settings: &HybridStudySettings) -> Result<HybridSetup> {
     let found = read_inputs(settings)?.with_line(settings, &Arc::default())?;
-    found.ok_or_else(|| Error::Study("the search for the line was broken off".to_owned()))
+    found.ok_or_else(|| Error::Study("the search for the line was interrupted".to_owned()))
 }
 
 impl HybridSetup {
@@ -196,60 +208,13 @@ impl HybridSetup {
     }
 }
 
-/// Points of a line from the columns `x` and `y` in m, whatever that is written like, at least `spacing_m` apart.
+/// As [`crate::line::read_line`], points at least `spacing_m` apart.
 ///
 /// # Errors
-/// [`Error::Io`] if it cannot be read, [`Error::Input`] naming line and field where it is no table of points.
+/// As there.
 pub fn read_line(path: &Path, spacing_m: f64) -> Result<Vec<DVec2>> {
-    let file = path.display().to_string();
-    let text = crate::config::read_text(path)?;
-    let mut reader = csv::ReaderBuilder::new()
-        .comment(Some(b'#'))
-        .trim(csv::Trim::All)
-        .from_reader(text.as_bytes());
-    let unreadable = |e: csv::Error| {
-        let line = e.position().map_or(0, csv::Position::line);
-        Error::input(
-            &file,
-            format!("line {line}"),
-            e.to_string(),
-            "a row like the header",
-        )
-    };
-    let header = reader.headers().map_err(unreadable)?.clone();
-    let column = |name: &str| {
-        let matches =
-            |h: &str| h == name || h.starts_with(&format!("{name}_")) || h.starts_with(&format!("{name} "));
-        header
-            .iter()
-            .position(|h| matches(h) || h.starts_with(&format!("{name}[")))
-            .ok_or_else(|| {
-                let found = header.iter().collect::<Vec<_>>().join(",");
-                Error::input(
-                    &file,
-                    format!("line 1, column {name}"),
-                    found,
-                    "columns x and y in m",
-                )
-            })
-    };
-    let (x, y) = (column("x")?, column("y")?);
     let mut points: Vec<DVec2> = Vec::new();
-    for record in reader.records() {
-        let record = record.map_err(unreadable)?;
-        let line = record.position().map_or(0, csv::Position::line);
-        let number = |column: usize, name: &str| {
-            let field = record.get(column).unwrap_or_default();
-            field
-                .parse::<f64>()
-                .ok()
-                .filter(|x| x.is_finite())
-                .ok_or_else(|| {
-                    let place = format!("line {line}, field {name}");
-                    Error::input(&file, place, format!("`{field}`"), "a number")
-                })
-        };
-        let point = DVec2::new(number(x, "x")?, number(y, "y")?);
+    for point in crate::line::read_line(path)? {
         if points.last().is_none_or(|last| last.distance(point) >= spacing_m) {
             points.push(point);
         }

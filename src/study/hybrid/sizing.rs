@@ -5,19 +5,19 @@ use super::settings::HybridStudySettings;
 use super::setup::HybridSetup;
 use super::strategy::{MOST_MJ, zone_gates};
 use crate::error::{Error, Result};
-use crate::evaluate::hybrid::{Free, HybridObjective, HybridProblem, open_hybrid_evaluator};
+use crate::evaluate::energy::{Free, HybridObjective, HybridProblem, open_hybrid_evaluator};
 use crate::line::energy::{Gates, Mode};
-use crate::study::journal::Recorder;
+use crate::study::framework::journal::Recorder;
 use crate::swarm::{
     CovarianceSettings, CovarianceSwarm, HybridSettings, HybridSwarm, Optimiser, Progress, run,
 };
 use crate::vehicle::Hybrid;
 use rayon::prelude::*;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
 
 /// A hybrid that laps like another car.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Sizing {
     /// Power of the motor (kW).
     pub power_kw: f64,
@@ -193,7 +193,7 @@ pub fn size(
                 few.1 *= 0.5;
             }
         }
-        // What a range had come to when it was broken off is no answer.
+        // What a range had come to when it was interrupted is no answer.
         if interrupted {
             break;
         }
@@ -205,7 +205,7 @@ pub fn size(
     }
     let rival = engine_only(setup, lap_time_s)?;
     let mut rows: Vec<Sizing> = Vec::new();
-    // The exact solver takes seconds for each, in which it may be broken off too.
+    // The solver takes seconds for each; the study may be interrupted between them too.
     for some in found.chunks(2) {
         let told = Progress {
             iteration: 0,

@@ -5,10 +5,10 @@ use super::setup::HybridSetup;
 use super::strategy::{budget_at, gate_speeds};
 use crate::error::{Error, Result};
 use crate::line::energy::{Gates, Mode};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// A lap of a stint.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct StintLap {
     /// Mass at its start (kg).
     pub mass_kg: f64,

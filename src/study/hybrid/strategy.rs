@@ -1,35 +1,25 @@
-//! Where the motor works: by the exact optimum, by a swarm, and along the fronts between objectives.
+//! Where the motor works: by the reference optimum, by a swarm, and along the fronts between objectives.
 
 use super::scenario::{ReportedLap, drive};
 use super::settings::{FreePart, HybridStudySettings};
-use super::setup::{HybridSetup, late_bend};
+use super::setup::{GAP_M, HybridSetup, control_points, late_bend};
 use crate::error::Result;
 use crate::evaluate::BackendInfo;
-use crate::evaluate::hybrid::{
+use crate::evaluate::energy::{
     Free, HybridLine, HybridObjective, HybridProblem, Strategy, open_hybrid_evaluator,
 };
 use crate::line::energy::{EnergyPlan, Gates, Mode};
 use crate::line::{Parametrisation, geometry};
 use crate::optimum::{Deployment, DeploymentSearch};
 use crate::random::Random;
-use crate::study::journal::Recorder;
+use crate::study::framework::journal::Recorder;
 use crate::swarm::{
     HybridSettings, HybridSwarm, Mopso, MopsoSettings, Optimiser, Progress, PsoSettings, run,
 };
-use crate::track::CrossSections;
 use std::ops::ControlFlow;
 
-/// Gaps shorter than this do not end a stretch (m).
-pub(super) const GAP_M: f64 = 8.0;
 /// Stretches of less are none (J).
 const LEAST_J: f64 = 5e3;
-/// Metres of the reference line for each control point of free lines.
-const CONTROL_SPACING_M: f64 = 40.0;
-
-/// Control points of lines across these cuts.
-pub(super) fn control_points(cuts: &CrossSections) -> usize {
-    ((cuts.length_m / CONTROL_SPACING_M) as usize).clamp(4, cuts.len().max(4))
-}
 
 /// Gates that leave all to the zones, but for the energy (MJ).
 pub fn zone_gates(energy_mj: f64) -> Gates {
@@ -351,7 +341,7 @@ pub fn gate_speeds() -> impl Iterator<Item = f64> {
 /// Budgets are looked for up to this (MJ).
 pub const MOST_MJ: f64 = 30.0;
 
-/// The budget (MJ) at which `excess`, which falls with it, comes to nought; the greatest if it never does, nought if it
+/// The budget (MJ) at which `excess`, which falls with it, comes to zero; the greatest if it never does, zero if it
 /// always has.
 ///
 /// # Errors

@@ -20,16 +20,16 @@ pub struct Identifiability {
     /// Standard deviation of the errors that remain, per channel.
     pub noise: [f64; CHANNELS],
     /// How far a step of least squares would move a parameter that can be told and stands free of its bounds, in its
-    /// standard errors, at most: nought at a minimum. Standard errors are of the neighbourhood of a minimum.
+    /// standard errors, at most: zero at a minimum. Standard errors are of the neighbourhood of a minimum.
     pub step_in_errors: f64,
     /// Whether the errors that remain look like noise, for which standard errors take them, or are mere rounding.
     pub looks_like_noise: bool,
 }
 
-/// Singular values under this share of the greatest count as nought: the Jacobian's own rounding, about the square
+/// Singular values under this share of the greatest count as zero: the Jacobian's own rounding, about the square
 /// root of its number of rows times the precision of a double, lies well below.
 const NOUGHT: f64 = 1e-11;
-/// A parameter with more than this share of itself in directions of nought cannot be told.
+/// A parameter with more than this share of itself in directions of zero cannot be told.
 const NULL_SHARE: f64 = 1e-6;
 /// Noise is taken for no less than this share of a channel's scale: the rounding of a simulated log's figures.
 const LEAST_NOISE: f64 = 1e-10;
@@ -53,7 +53,7 @@ pub(super) fn at_bound(value: f64, bounds: [f64; 2]) -> bool {
 
 /// Judges the parameters at a candidate with these residuals.
 ///
-/// A parameter counts as not identifiable where the Jacobian is blind to it (a singular value of nought), or where
+/// A parameter counts as not identifiable where the Jacobian is blind to it (a singular value of zero), or where
 /// its standard error exceeds the standard deviation of a guess anywhere between its bounds (range / sqrt 12).
 pub fn judge(
     residuals: &Residuals,

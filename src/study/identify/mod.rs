@@ -11,19 +11,172 @@ mod search;
 mod settings;
 mod setup;
 mod state;
-mod study_file;
 
 pub use identifiability::{Identifiability, judge};
 pub use polish::{Polished, polish};
-pub use results::{Summary, summarise, write_results};
-pub use search::{
-    Front, HistoryRow, Judged, Outcome, Report, Stage, check_swarms, judge_candidate, search, search_from,
-    search_with, total_parameter_error,
-};
-pub use settings::{
-    Algorithm, FreeParameter, IdentifySettings, ObjectiveChoice, parse_algorithm, parse_backend, parse_norm,
-    parse_objective,
-};
+pub use results::Summary;
+pub use search::{Judged, Outcome, judge_candidate, search_with, total_parameter_error};
+pub use settings::{Algorithm, FreeParameter, IdentifySettings, ObjectiveChoice};
 pub use setup::{Setup, cost_unit, lap_format, load_circuit, set_up};
-pub use state::SearchState;
-pub use study_file::write_settings;
+pub(in crate::study) use setup::{planned, subject, without_laps};
+pub use state::{Front, HistoryRow, SearchState, Stage};
+
+use crate::config::settings::{Role, Settings};
+use crate::error::{Error, Result};
+use crate::evaluate::replay::open_evaluator;
+use crate::evaluate::{PackedClient, run_packed};
+use crate::study::framework::memory::{Kept, Size};
+use crate::study::framework::state_file::StateFile;
+use crate::study::framework::{Figures, Plan, Progress, RunRecord, Study, Subject, Work, resumed_or_new};
+use std::ops::ControlFlow;
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// The study.
+pub struct Identify;
+
+/// A swarm of more particles than this fills a device by itself.
+const SMALL: usize = 4096;
+
+impl Study for Identify {
+    const NAME: &'static str = "identify";
+    const ABOUT: &'static str =
+        "Find a car's unknown parameters from a logged lap; with no argument, on the bundled lap.";
+    const DETAILS: &'static str = "Examples:\n  lapswarm identify\n  lapswarm identify study.toml --seed 7 --json\n  lapswarm \
+        identify --log lap.csv --car start.toml --laps 1,2 --holdout 3";
+    type Settings = IdentifySettings;
+    type State = SearchState;
+    type Prepared = Setup;
+    type Outcome = Outcome;
+    type Summary = Summary;
+
+    fn prepare(settings: &IdentifySettings) -> Result<Setup> {
+        let setup = set_up(settings)?;
+        search::check_swarms(settings, &setup)?;
+        Ok(setup)
+    }
+
+    fn size(settings: &IdentifySettings, prepared: Option<&Setup>) -> Vec<Kept> {
+        let samples = prepared.map_or(0, |setup| setup.log.samples());
+        let size = settings.size();
+        Size { samples, ..size }.kept().to_vec()
+    }
+
+    fn plan(settings: &IdentifySettings, setup: &Setup, plan: Plan) -> Result<Plan> {
+        planned(settings, setup, plan.evaluations(settings.evaluations()))
+    }
+
+    fn solve(
+        settings: &IdentifySettings,
+        setup: &Setup,
+        work: Work<'_, SearchState>,
+    ) -> Result<Option<Outcome>> {
+        let mut evaluator = open_evaluator(&setup.replay, settings.backend, settings.adapter.as_deref())?;
+        let begun = (work.state, work.state_file);
+        search_with(settings, setup, evaluator.as_mut(), begun, work.observe).map(Some)
+    }
+
+    /// Eight swarms of fifty particles fill the lanes of a small device.
+    fn together(settings: &IdentifySettings) -> usize {
+        if settings.size().population <= SMALL { 8 } else { 1 }
+    }
+
+    /// The swarms share an evaluator, and its calls.
+    fn solve_together(
+        studies: &[IdentifySettings],
+        setup: &Setup,
+        state_files: &mut [StateFile],
+        observe: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
+    ) -> Result<Vec<Result<Option<Outcome>>>> {
+        let Some(first) = studies.first() else {
+            return Ok(Vec::new());
+        };
+        let mut evaluator = open_evaluator(&setup.replay, first.backend, first.adapter.as_deref())?;
+        let stop = AtomicBool::new(false);
+        let stopped = &stop;
+        let searches: Vec<_> = studies
+            .iter()
+            .zip(state_files)
+            .map(|(settings, state_file)| {
+                move |mut evaluator: PackedClient| -> Result<Option<Outcome>> {
+                    let mut told = |_: &Progress| {
+                        if stopped.load(Ordering::Relaxed) {
+                            ControlFlow::Break(())
+                        } else {
+                            ControlFlow::Continue(())
+                        }
+                    };
+                    let found = resumed_or_new::<Self, _>(settings, state_file, true, |state, state_file| {
+                        search_with(settings, setup, &mut evaluator, (state, state_file), &mut told)
+                    });
+                    match found {
+                        Err(Error::Interrupted(_)) => Ok(None),
+                        outcome => outcome.map(Some),
+                    }
+                }
+            })
+            .collect();
+        Ok(run_packed(evaluator.as_mut(), searches, || {
+            if observe(&Progress::default()).is_break() {
+                stop.store(true, Ordering::Relaxed);
+            }
+        }))
+    }
+
+    fn record(outcome: &Outcome) -> &RunRecord {
+        &outcome.record
+    }
+
+    fn summarise(settings: &IdentifySettings, setup: &Setup, outcome: &Outcome) -> Summary {
+        results::summarise(settings, setup, outcome)
+    }
+
+    fn subject(settings: &IdentifySettings, setup: &Setup) -> Subject {
+        subject(settings, setup)
+    }
+
+    fn report(
+        folder: &Path,
+        settings: &IdentifySettings,
+        setup: &Setup,
+        outcome: &Outcome,
+        summary: &Summary,
+    ) -> Result<()> {
+        results::report(folder, settings, setup, outcome, summary)
+    }
+
+    fn text(settings: &IdentifySettings, summary: &Summary) -> String {
+        let calibration = &summary.calibration;
+        let findings = calibration.findings.iter().map(|finding| format!("{finding}\n"));
+        let notes = calibration.notes.iter().map(|note| format!("{note}\n"));
+        findings.chain(notes).chain([summary.to_text(settings)]).collect()
+    }
+
+    fn check(path: &Path) -> Result<String> {
+        let settings = IdentifySettings::read(path)?;
+        set_up(&without_laps(&settings))?;
+        Ok(format!("{} free parameters", settings.free.len()))
+    }
+
+    fn figures(outcome: &Outcome, summary: &Summary) -> Figures {
+        let best = outcome.history.last().and_then(|row| row.best.first().copied());
+        let mut figures: Figures = [
+            ("evaluations", Some(outcome.record.evaluations as f64)),
+            ("best_cost", best),
+            ("swarm_total_parameter_error", summary.swarm_total_parameter_error),
+            ("total_parameter_error", summary.total_parameter_error),
+        ]
+        .map(|(name, figure)| (name.to_owned(), figure))
+        .into();
+        let costs = summary.costs.iter();
+        figures.extend(costs.map(|(channel, cost)| (format!("cost_{channel}"), Some(*cost))));
+        figures
+    }
+}
+
+impl IdentifySettings {
+    /// The settings of the same problem with the usual search.
+    pub fn problem(self) -> Self {
+        self.with_role_of(Role::Search, &Self::default())
+    }
+}

@@ -20,7 +20,7 @@ pub struct Polished {
     pub evaluations: usize,
     /// Whether the method met one of its tolerances.
     pub converged: bool,
-    /// Whether it was broken off.
+    /// Whether it was interrupted.
     pub interrupted: bool,
 }
 
@@ -47,7 +47,7 @@ struct Bounded<'a> {
     /// Asked before every drive.
     watch: &'a mut dyn FnMut() -> ControlFlow<()>,
     interrupted: bool,
-    /// The best point so far and its cost: where the method is broken off it stands at one that was not driven.
+    /// The best point so far and its cost: where the method is interrupted it stands at one that was not driven.
     best: (DVector<f64>, f64),
 }
 

@@ -1,24 +1,20 @@
-//! What an identification leaves behind: figures for people and scripts, files, pictures.
+//! What an identification leaves behind: figures for people and scripts, files, figures.
 
 use super::identifiability::at_bound;
 use super::search::{Judged, Outcome, judge_candidate, total_parameter_error};
 use super::settings::IdentifySettings;
-use super::setup::{CHANNELS, Setup, cost_unit};
-use super::study_file::write_settings;
+use super::setup::{CHANNELS, Setup};
 use crate::error::Result;
+use crate::evaluate::failures_in_words;
 use crate::evaluate::replay::{CHANNEL_NAMES, CHANNEL_UNITS};
-use crate::evaluate::{FailureCounts, failures_in_words};
-use crate::report::{
-    Cells, Column, ConvergenceRun, Objective, ParameterRow, ShadedSection, TraceFigure, TracePanel, TrackMap,
-    plot_convergence, plot_parameters, plot_pareto, plot_traces, plot_track_map, write_csv,
-};
-use crate::study::run_folder::{Manifest, write_json};
-use serde::Serialize;
+use crate::report::{ParameterRow, Table};
+use crate::study::framework::RunRecord;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
 
 /// One parameter's outcome.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct ParameterSummary {
     /// Its name.
     pub name: String,
@@ -39,32 +35,17 @@ pub struct ParameterSummary {
 }
 
 /// The figures of an identification; `--json` prints this.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Summary {
     /// `identify`.
-    pub study: &'static str,
+    pub study: String,
     /// Seed of all random numbers.
     pub seed: u64,
-    /// `cpu`, `simd` or `gpu`.
-    pub backend: &'static str,
-    /// Instruction set, or name of the adapter.
-    pub adapter: String,
-    /// Driver of the adapter.
-    pub driver: String,
-    /// Search and polish, s.
-    pub elapsed_s: f64,
+    /// How the study ran: search and polish, candidates of the swarm, and their rate while it worked.
+    #[serde(flatten)]
+    pub record: RunRecord,
     /// Swarm alone, s.
     pub swarm_elapsed_s: f64,
-    /// Whether the search or the polish was broken off.
-    pub interrupted: bool,
-    /// Candidates that the swarm evaluated.
-    pub evaluations: u64,
-    /// Candidates that failed, by reason.
-    pub failures: FailureCounts,
-    /// What went wrong with devices and was got over; the study's figures hold all the same.
-    pub device_faults: Vec<String>,
-    /// Candidates per second of the swarm.
-    pub evaluations_per_s: f64,
     /// Runge-Kutta steps of one candidate per second, over all candidates.
     pub particle_steps_per_s: f64,
     /// Sum of relative errors of the identifiable parameters (5.14); nothing without a truth.
@@ -72,20 +53,20 @@ pub struct Summary {
     /// The same for the swarm's best, before the polish.
     pub swarm_total_parameter_error: Option<f64>,
     /// Cost of each channel.
-    pub costs: BTreeMap<&'static str, f64>,
+    pub costs: BTreeMap<String, f64>,
     /// Root mean square error of each channel, in its unit.
-    pub rms_error: BTreeMap<&'static str, f64>,
+    pub rms_error: BTreeMap<String, f64>,
     /// Root mean square of each measured channel, in its unit.
-    pub rms_signal: BTreeMap<&'static str, f64>,
+    pub rms_signal: BTreeMap<String, f64>,
     /// Root mean square error on the laps held out; nothing without any.
-    pub holdout_rms_error: Option<BTreeMap<&'static str, f64>>,
+    pub holdout_rms_error: Option<BTreeMap<String, f64>>,
     /// Root mean square of the measured channels on the laps held out.
-    pub holdout_rms_signal: Option<BTreeMap<&'static str, f64>>,
+    pub holdout_rms_signal: Option<BTreeMap<String, f64>>,
     /// Windows on the laps held out, and how many of them lost the car.
     pub holdout_lost_windows: Option<[usize; 2]>,
     /// Parameters that the log cannot tell.
     pub unidentifiable: Vec<String>,
-    /// How far least squares would still move a told parameter, in its standard errors, at most; nought at a minimum.
+    /// How far least squares would still move an identifiable parameter, in its standard errors, at most; zero at a minimum.
     pub step_in_standard_errors: Option<f64>,
     /// Whether the errors that remain look like noise, for which standard errors take them.
     pub errors_look_like_noise: bool,
@@ -94,7 +75,7 @@ pub struct Summary {
     /// Singular values of the scaled Jacobian, greatest first.
     pub singular_values: Vec<f64>,
     /// Standard deviation of the errors that remain, in the channel's unit.
-    pub noise_estimate: BTreeMap<&'static str, f64>,
+    pub noise_estimate: BTreeMap<String, f64>,
     /// The parameters.
     pub parameters: Vec<ParameterSummary>,
     /// Sample interval, s.
@@ -107,12 +88,12 @@ pub struct Summary {
     pub calibration: crate::telemetry::Calibration,
 }
 
-fn by_channel(values: [f64; CHANNELS]) -> BTreeMap<&'static str, f64> {
-    CHANNEL_NAMES.into_iter().zip(values).collect()
+fn by_channel(values: [f64; CHANNELS]) -> BTreeMap<String, f64> {
+    CHANNEL_NAMES.into_iter().map(str::to_owned).zip(values).collect()
 }
 
 /// The candidate to hand out: fitted values, but the starting car's where the log cannot tell.
-fn told_candidate(setup: &Setup, outcome: &Outcome) -> Vec<f64> {
+fn reported_candidate(setup: &Setup, outcome: &Outcome) -> Vec<f64> {
     let base = setup.replay.free.base();
     outcome
         .candidate
@@ -129,7 +110,7 @@ fn told_candidate(setup: &Setup, outcome: &Outcome) -> Vec<f64> {
 }
 
 /// Works the figures out.
-pub fn summarise(settings: &IdentifySettings, setup: &Setup, outcome: &Outcome) -> Summary {
+pub(super) fn summarise(settings: &IdentifySettings, setup: &Setup, outcome: &Outcome) -> Summary {
     let replay = &setup.replay;
     let judged = judge_candidate(replay, &outcome.candidate);
     let held = setup
@@ -150,7 +131,6 @@ pub fn summarise(settings: &IdentifySettings, setup: &Setup, outcome: &Outcome) 
         .iter()
         .map(|w| (w.end - w.start - 1) * replay.plan.fractions.len())
         .sum();
-    let rate = outcome.evaluations as f64 / outcome.swarm_s.max(1e-9);
     let parameters: Vec<ParameterSummary> = replay
         .problem
         .variables
@@ -168,19 +148,11 @@ pub fn summarise(settings: &IdentifySettings, setup: &Setup, outcome: &Outcome) 
         })
         .collect();
     Summary {
-        study: "identify",
+        study: "identify".to_owned(),
         seed: settings.seed,
-        backend: outcome.backend.backend,
-        adapter: outcome.backend.device.clone(),
-        driver: outcome.backend.driver.clone(),
-        elapsed_s: outcome.swarm_s + outcome.polish_s,
+        record: outcome.record.clone(),
         swarm_elapsed_s: outcome.swarm_s,
-        interrupted: outcome.interrupted,
-        evaluations: outcome.evaluations,
-        failures: outcome.failures.clone(),
-        device_faults: outcome.device_faults.clone(),
-        evaluations_per_s: rate,
-        particle_steps_per_s: rate * steps as f64,
+        particle_steps_per_s: outcome.record.evaluations_per_s * steps as f64,
         total_parameter_error: error_of(&outcome.candidate),
         swarm_total_parameter_error: error_of(&outcome.swarm_candidate),
         costs: by_channel(judged.costs),
@@ -207,11 +179,11 @@ pub fn summarise(settings: &IdentifySettings, setup: &Setup, outcome: &Outcome) 
     }
 }
 
-/// Writes all files of a run into `folder`.
+/// Writes the car, tables, figures and the page.
 ///
 /// # Errors
 /// [`crate::Error::Io`] if one cannot be written.
-pub fn write_results(
+pub(super) fn report(
     folder: &Path,
     settings: &IdentifySettings,
     setup: &Setup,
@@ -219,18 +191,9 @@ pub fn write_results(
     summary: &Summary,
 ) -> Result<()> {
     let replay = &setup.replay;
-    write_json(&folder.join("summary.json"), summary)?;
-    write_settings(folder, settings)?;
-    let manifest = Manifest {
-        log: Some(&setup.log.source),
-        interrupted: outcome.interrupted,
-        device_faults: &outcome.device_faults,
-        longest_dispatch_ms: outcome.longest_dispatch_ms,
-        ..Manifest::new("identify", settings.seed, &outcome.backend, &replay.free.car.name)
-    };
     replay
         .free
-        .candidate_car(&told_candidate(setup, outcome))
+        .candidate_car(&reported_candidate(setup, outcome))
         .write(folder, "car")?;
     write_history(folder, outcome)?;
     write_parameters(folder, summary)?;
@@ -238,118 +201,58 @@ pub fn write_results(
         write_front(folder, setup, front)?;
     }
     let judged = judge_candidate(replay, &outcome.candidate);
-    write_traces(folder, setup, &judged, summary)?;
-    super::page::write(folder, settings, setup, outcome, &judged, summary)?;
-    // Last: it says that the run is whole.
-    write_json(&folder.join("manifest.json"), &manifest)
+    write_traces(folder, setup, &judged)?;
+    super::page::write(folder, settings, setup, outcome, &judged, summary)
 }
 
 fn write_history(folder: &Path, outcome: &Outcome) -> Result<()> {
     let rows = &outcome.history;
-    let of = |f: &dyn Fn(&super::HistoryRow) -> f64| rows.iter().map(f).collect::<Vec<f64>>();
-    let iteration = of(&|r| r.iteration as f64);
-    let evaluations = of(&|r| r.evaluations as f64);
-    let median = of(&|r| r.median.unwrap_or(f64::NAN));
-    let failed = of(&|r| r.failed as f64);
-    let elapsed = of(&|r| r.elapsed_s);
     let width = rows.first().map_or(0, |r| r.best.len());
-    let best: Vec<Vec<f64>> = (0..width).map(|k| of(&|r| r.best[k])).collect();
-    let names: Vec<String> = (0..width)
-        .map(|k| {
-            if width == 1 {
-                "best".into()
-            } else {
-                format!("best_{k}")
-            }
-        })
-        .collect();
-    let number = |name, unit, values| Column {
-        name,
-        unit,
-        cells: Cells::Numbers(values),
-    };
-    let mut columns = vec![
-        number("iteration", "", &iteration),
-        number("evaluations", "", &evaluations),
-    ];
-    columns.extend(
-        names
-            .iter()
-            .zip(&best)
-            .map(|(name, values)| number(name.as_str(), "", values)),
-    );
-    columns.extend([
-        number("median", "", &median),
-        number("failed", "", &failed),
-        number("elapsed", "s", &elapsed),
-    ]);
-    write_csv(folder.join("convergence.csv"), &columns)?;
-    if width == 1 {
-        plot_convergence(
-            folder.join("convergence.svg"),
-            "Convergence",
-            "cost relative to the channels' spread (-)",
-            &[ConvergenceRun {
-                label: "swarm",
-                evaluations: &evaluations,
-                best: &best[0],
-                median: Some(&median),
-            }],
-        )?;
+    let mut table = Table::rows(rows)
+        .number("iteration", "", |r| r.iteration as f64)
+        .number("evaluations", "", |r| r.evaluations as f64);
+    for k in 0..width {
+        let name = match width {
+            1 => "best".to_owned(),
+            _ => format!("best_{k}"),
+        };
+        table = table.number(name, "", |r| r.best[k]);
     }
-    Ok(())
+    table
+        .number("median", "", |r| r.median)
+        .number("failed", "", |r| r.failed as f64)
+        .number("elapsed", "s", |r| r.elapsed_s)
+        .table()
+        .write_csv(folder.join("convergence.csv"))
 }
 
 fn write_parameters(folder: &Path, summary: &Summary) -> Result<()> {
-    let p = &summary.parameters;
-    let texts = |f: &dyn Fn(&ParameterSummary) -> String| p.iter().map(f).collect::<Vec<String>>();
-    let numbers = |f: &dyn Fn(&ParameterSummary) -> f64| p.iter().map(f).collect::<Vec<f64>>();
-    let (names, units) = (texts(&|p| p.name.clone()), texts(&|p| p.unit.clone()));
-    let figures: [(&str, Vec<f64>); 7] = [
-        ("lower", numbers(&|p| p.bounds[0])),
-        ("upper", numbers(&|p| p.bounds[1])),
-        ("swarm_value", numbers(&|p| p.swarm_value)),
-        ("value", numbers(&|p| p.value.unwrap_or(f64::NAN))),
-        (
-            "standard_error",
-            numbers(&|p| p.standard_error.unwrap_or(f64::NAN)),
-        ),
-        ("truth", numbers(&|p| p.truth.unwrap_or(f64::NAN))),
-        ("at_bound", numbers(&|p| f64::from(u8::from(p.at_bound)))),
-    ];
-    let mut columns = vec![
-        Column {
-            name: "parameter",
-            unit: "",
-            cells: Cells::Texts(&names),
-        },
-        Column {
-            name: "unit",
-            unit: "",
-            cells: Cells::Texts(&units),
-        },
-    ];
-    columns.extend(figures.iter().map(|(name, values)| Column {
-        name,
-        unit: "",
-        cells: Cells::Numbers(values),
-    }));
-    write_csv(folder.join("parameters.csv"), &columns)?;
-    plot_parameters(
-        folder.join("parameters.svg"),
-        "Parameters within their bounds",
-        &parameter_rows(summary),
-    )
+    Table::rows(&summary.parameters)
+        .text("parameter", |p| &*p.name)
+        .text("unit", |p| &*p.unit)
+        .number("lower", "", |p| p.bounds[0])
+        .number("upper", "", |p| p.bounds[1])
+        .number("swarm_value", "", |p| p.swarm_value)
+        .number("value", "", |p| p.value)
+        .number("standard_error", "", |p| p.standard_error)
+        .number("truth", "", |p| p.truth)
+        .number("at_bound", "", |p| f64::from(u8::from(p.at_bound)))
+        .table()
+        .write_csv(folder.join("parameters.csv"))
 }
 
 /// The parameters as figures show them.
-pub(super) fn parameter_rows(summary: &Summary) -> Vec<ParameterRow<'_>> {
+pub(super) fn parameter_rows(summary: &Summary) -> Vec<ParameterRow> {
     summary
         .parameters
         .iter()
         .map(|p| ParameterRow {
-            name: &p.name,
-            unit: if p.unit == "-" { "" } else { &p.unit },
+            name: p.name.clone(),
+            unit: if p.unit == "-" {
+                String::new()
+            } else {
+                p.unit.clone()
+            },
             lower: p.bounds[0],
             upper: p.bounds[1],
             swarm: p.swarm_value,
@@ -363,47 +266,17 @@ pub(super) fn parameter_rows(summary: &Summary) -> Vec<ParameterRow<'_>> {
 
 fn write_front(folder: &Path, setup: &Setup, front: &super::Front) -> Result<()> {
     let problem = &setup.replay.problem;
-    let columns_of = |rows: &[Vec<f64>], width: usize| -> Vec<Vec<f64>> {
-        (0..width)
-            .map(|k| rows.iter().map(|row| row[k]).collect())
-            .collect()
+    let columns = |rows: &[Vec<f64>], named: Vec<(&String, &String)>| {
+        let mut table = Table::rows(rows);
+        for (k, (name, unit)) in named.into_iter().enumerate() {
+            table = table.number(name, unit, |row| row[k]);
+        }
+        table.table()
     };
-    let objectives = columns_of(&front.objectives, problem.objectives.len());
-    let variables = columns_of(&front.candidates, problem.variables.len());
-    let column = |name, unit, values| Column {
-        name,
-        unit,
-        cells: Cells::Numbers(values),
-    };
-    let fun: Vec<_> = problem
-        .objectives
-        .iter()
-        .zip(&objectives)
-        .map(|(o, c)| column(o.name.as_str(), o.unit.as_str(), c))
-        .collect();
-    let var: Vec<_> = problem
-        .variables
-        .iter()
-        .zip(&variables)
-        .map(|(v, c)| column(v.name.as_str(), v.unit.as_str(), c))
-        .collect();
-    write_csv(folder.join("FUN.csv"), &fun)?;
-    write_csv(folder.join("VAR.csv"), &var)?;
-    let named: Vec<Objective<'_>> = problem
-        .objectives
-        .iter()
-        .map(|o| Objective {
-            name: &o.name,
-            unit: &o.unit,
-        })
-        .collect();
-    plot_pareto(
-        folder.join("pareto.svg"),
-        "Pareto front",
-        &named,
-        &front.objectives,
-        Some(front.chosen),
-    )
+    let objectives = problem.objectives.iter().map(|o| (&o.name, &o.unit));
+    columns(&front.objectives, objectives.collect()).write_csv(folder.join("FUN.csv"))?;
+    let variables = problem.variables.iter().map(|v| (&v.name, &v.unit));
+    columns(&front.candidates, variables.collect()).write_csv(folder.join("VAR.csv"))
 }
 
 /// Labels of the channels in pictures.
@@ -421,98 +294,19 @@ pub(super) fn traced_lap(log: &crate::telemetry::Log, judged: &Judged) -> std::o
     laps.find(|r| r.clone().any(fitted)).unwrap_or(0..log.samples())
 }
 
-fn write_traces(folder: &Path, setup: &Setup, judged: &Judged, summary: &Summary) -> Result<()> {
+fn write_traces(folder: &Path, setup: &Setup, judged: &Judged) -> Result<()> {
     let log = &setup.log;
     let measured = [&log.vx_mps, &log.ax_mps2, &log.ay_mps2, &log.yaw_rate_radps];
-    let range = traced_lap(log, judged);
-    let distance = &log.distance_m[range.clone()];
-    let mut columns = vec![
-        Column {
-            name: "time",
-            unit: "s",
-            cells: Cells::Numbers(&log.time_s),
-        },
-        Column {
-            name: "distance",
-            unit: "m",
-            cells: Cells::Numbers(&log.distance_m),
-        },
-    ];
-    let names: Vec<[String; 2]> = CHANNEL_NAMES
-        .iter()
-        .map(|n| [format!("{n}_measured"), format!("{n}_fitted")])
-        .collect();
+    let mut table = Table::new()
+        .numbers("time", "s", &log.time_s)
+        .numbers("distance", "m", &log.distance_m);
     for k in 0..CHANNELS {
-        columns.push(Column {
-            name: &names[k][0],
-            unit: CHANNEL_UNITS[k],
-            cells: Cells::Numbers(measured[k]),
-        });
-        columns.push(Column {
-            name: &names[k][1],
-            unit: CHANNEL_UNITS[k],
-            cells: Cells::Numbers(&judged.outputs[k]),
-        });
+        let (name, unit) = (CHANNEL_NAMES[k], CHANNEL_UNITS[k]);
+        table = table
+            .numbers(format!("{name}_measured"), unit, measured[k])
+            .numbers(format!("{name}_fitted"), unit, &judged.outputs[k]);
     }
-    write_csv(folder.join("traces.csv"), &columns)?;
-    let sections = setup.circuit.as_ref().map_or(Vec::new(), |circuit| {
-        circuit
-            .sections
-            .iter()
-            .map(|s| ShadedSection {
-                name: &s.name,
-                start: s.start_m,
-                end: s.end_m,
-            })
-            .collect()
-    });
-    // The file's name alone: a long path would run into the legend.
-    let source = Path::new(&log.source)
-        .file_name()
-        .map_or_else(|| log.source.clone().into(), |n| n.to_string_lossy());
-    let title = format!(
-        "{source}, fitted in {:.0} s on {}",
-        summary.elapsed_s, summary.backend
-    );
-    plot_traces(
-        folder.join("traces.svg"),
-        &TraceFigure {
-            title: &title,
-            x_label: "distance (m)",
-            x: distance,
-            panels: (0..CHANNELS)
-                .map(|k| TracePanel {
-                    label: LABELS[k],
-                    unit: CHANNEL_UNITS[k],
-                    measured: &measured[k][range.clone()],
-                    fitted: &judged.outputs[k][range.clone()],
-                })
-                .collect(),
-            sections,
-        },
-    )?;
-    if let Some(circuit) = &setup.circuit {
-        let line: Vec<_> = distance.iter().map(|s| circuit.position_at(*s)).collect();
-        plot_track_map(
-            folder.join("map.svg"),
-            &TrackMap {
-                title: &circuit.name,
-                left_edge_m: &circuit.left_edge(),
-                right_edge_m: &circuit.right_edge(),
-                line_m: &line,
-                values: &log.vx_mps[range],
-                value_label: "speed",
-                value_unit: "m/s",
-                closed: circuit.closed,
-                names: circuit
-                    .sections
-                    .iter()
-                    .map(|s| (s.name.as_str(), circuit.position_at(0.5 * (s.start_m + s.end_m))))
-                    .collect(),
-            },
-        )?;
-    }
-    Ok(())
+    table.write_csv(folder.join("traces.csv"))
 }
 
 /// Least squares may still move a parameter by this many of its standard errors at what counts as a minimum.
@@ -523,12 +317,12 @@ impl Summary {
     pub fn caution(&self) -> Option<String> {
         match self.step_in_standard_errors {
             Some(step) if step <= AT_MINIMUM => (!self.errors_look_like_noise).then(|| {
-                "The errors that remain do not look like noise: the model lacks something that this car did, and the standard \
-                 errors, which take them for noise, are too small."
+                "The residuals do not look like noise: the model lacks something of this car, and the standard errors are too \
+                 small."
                     .to_owned()
             }),
             step => Some(format!(
-                "This car is at no minimum of the errors{}: standard errors, and what the log tells, hold near one only.",
+                "This car is not at a minimum of the cost{}: standard errors and identifiability hold near a minimum only.",
                 step.map_or(String::new(), |s| format!(
                     " (least squares would move a parameter by {s:.0} of its standard errors)"
                 ))
@@ -538,43 +332,14 @@ impl Summary {
 
     /// The parameter table and the errors, for a terminal.
     pub fn to_text(&self, settings: &IdentifySettings) -> String {
-        let mut text = format!(
-            "{:<28}{:>14}{:>14}{:>14}\n",
-            "parameter", "fitted", "std. error", "truth"
-        );
-        let shown = |x: Option<f64>, none: &str| x.map_or(none.to_owned(), |x| format!("{x:.6}"));
-        for p in &self.parameters {
-            text.push_str(&format!(
-                "{:<28}{:>14}{:>14}{:>14}{}\n",
-                format!("{} ({})", p.name, p.unit),
-                shown(p.value, "not told"),
-                p.standard_error.map_or("-".to_owned(), |e| format!("{e:.2e}")),
-                shown(p.truth, "-"),
-                if p.at_bound { "   at its bound" } else { "" },
-            ));
-        }
-        text.push_str(&format!(
-            "\n{:<28}{:>14}{:>14}{:>14}{:>14}\n",
-            "channel", "cost", "rms error", "rms signal", "held out"
-        ));
-        for (k, name) in CHANNEL_NAMES.iter().enumerate() {
-            text.push_str(&format!(
-                "{:<28}{:>14.3e}{:>14.3e}{:>14.3e}{:>14}   cost in {}\n",
-                format!("{name} ({})", CHANNEL_UNITS[k]),
-                self.costs[name],
-                self.rms_error[name],
-                self.rms_signal[name],
-                self.holdout_rms_error
-                    .as_ref()
-                    .map_or("-".to_owned(), |h| format!("{:.3e}", h[name])),
-                cost_unit(settings.norm, CHANNEL_UNITS[k]),
-            ));
-        }
+        let mut text = super::page::parameters(self).to_text();
+        text.push('\n');
+        text.push_str(&super::page::channels(settings, self).to_text());
         if self.unidentifiable.is_empty() {
-            text.push_str("\nThe log tells all parameters.\n");
+            text.push_str("\nAll parameters are identifiable from this log.\n");
         } else {
             text.push_str(&format!(
-                "\nThe log cannot tell: {}. The starting car's values stand in their place.\n",
+                "\nNot identifiable from this log: {}. The starting car's values stand in their place.\n",
                 self.unidentifiable.join(", ")
             ));
         }
@@ -584,7 +349,7 @@ impl Summary {
         }
         if let [tried @ (1..), gained] = self.hops {
             text.push_str(&format!(
-                "What was left over did not look like noise: {tried} hops to other minima, {gained} of which led further down.\n"
+                "The residuals did not look like noise: {tried} hops to other minima, {gained} of which led to a lower cost.\n"
             ));
         }
         if let Some(error) = self.total_parameter_error {
@@ -595,21 +360,19 @@ impl Summary {
         }
         text.push_str(&format!(
             "{} evaluations in {:.1} s on {} ({}): {:.0} per second, {:.2} million particle-steps per second; {:.1} s in all.\n",
-            self.evaluations,
+            self.record.evaluations,
             self.swarm_elapsed_s,
-            self.backend,
-            self.adapter,
-            self.evaluations_per_s,
+            self.record.backend,
+            self.record.adapter,
+            self.record.evaluations_per_s,
             self.particle_steps_per_s / 1e6,
-            self.elapsed_s
+            self.record.elapsed_s
         ));
-        if !self.failures.is_empty() {
-            let told = failures_in_words(&self.failures);
+        if !self.record.failures.is_empty() {
+            let told = failures_in_words(&self.record.failures);
             text.push_str(&format!("Candidates that failed: {told}.\n"));
         }
-        for fault in &self.device_faults {
-            text.push_str(&format!("Note: {fault}\n"));
-        }
+        text.push_str(&self.record.notes());
         text
     }
 }

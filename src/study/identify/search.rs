@@ -3,68 +3,17 @@
 use super::coordinates::Logarithmic;
 use super::identifiability::{Identifiability, judge};
 use super::refine::refine;
-use super::settings::{Algorithm, IdentifySettings};
+use super::settings::{Algorithm, EXPLORE, FRONT, GATHER, IdentifySettings};
 use super::setup::{CHANNELS, Setup};
-use super::state::{Place, SearchState, inputs_of};
+use super::state::{Front, HistoryRow, Place, SearchState, Stage, inputs_of};
 use crate::error::{Error, Result};
-use crate::evaluate::gpu::DispatchWatch;
-use crate::evaluate::replay::{ReplayProblem, open_evaluator, trace};
-use crate::evaluate::{BackendInfo, Evaluator, FAILED_COST, FailureCounts, add_failures};
-use crate::study::device_faults::DeviceFaults;
-use crate::study::keeper::{Keeper, Origin};
+use crate::evaluate::replay::{ReplayProblem, trace};
+use crate::evaluate::{Evaluator, FAILED_COST, FailureCounts, add_failures};
+use crate::study::framework::state_file::{Origin, StateFile};
+use crate::study::framework::{DeviceFaults, Progress as Told, RunRecord, Watch};
 use crate::swarm::{CovarianceSettings, CovarianceSwarm, Mopso, MopsoSettings, Progress, Pso, PsoSettings};
-use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
 use std::time::Instant;
-
-/// A stage of the work, for progress reports.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Stage {
-    /// The exploring swarm.
-    Explore,
-    /// The swarm that learns the valley.
-    Gather,
-    /// The least-squares polish.
-    Polish,
-}
-
-/// What an observer of the search is told.
-pub struct Report<'a> {
-    /// The stage.
-    pub stage: Stage,
-    /// Iterations that the stage plans.
-    pub planned: usize,
-    /// What the swarm did last; nothing during the polish.
-    pub progress: Option<&'a Progress>,
-}
-
-/// One line of the convergence history.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct HistoryRow {
-    /// Iterations over both stages.
-    pub iteration: usize,
-    /// Evaluations over both stages.
-    pub evaluations: u64,
-    /// Best value of each objective.
-    pub best: Vec<f64>,
-    /// Median of the first objective over the iteration's candidates that did not fail.
-    pub median: Option<f64>,
-    /// Candidates of the iteration that failed.
-    pub failed: usize,
-    /// Seconds since the search began.
-    pub elapsed_s: f64,
-}
-
-/// Non-dominated candidates and their objectives.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Front {
-    /// One row per member.
-    pub candidates: Vec<Vec<f64>>,
-    /// One row per member.
-    pub objectives: Vec<Vec<f64>>,
-    /// The member nearest to the ideal point, each objective as a share of its range.
-    pub chosen: usize,
-}
 
 /// The outcome of an identification.
 pub struct Outcome {
@@ -78,16 +27,8 @@ pub struct Outcome {
     pub history: Vec<HistoryRow>,
     /// What the log says of each parameter.
     pub identifiability: Identifiability,
-    /// What evaluated.
-    pub backend: BackendInfo,
-    /// Candidates that failed, by reason.
-    pub failures: FailureCounts,
-    /// What went wrong with devices and was got over.
-    pub device_faults: Vec<String>,
-    /// The longest that a dispatch kept the device (ms); nothing where none was at work.
-    pub longest_dispatch_ms: Option<f64>,
-    /// Candidates evaluated by the swarm.
-    pub evaluations: u64,
+    /// How it ran.
+    pub record: RunRecord,
     /// Time that the swarm took, s.
     pub swarm_s: f64,
     /// Time that the polish took, s.
@@ -96,66 +37,27 @@ pub struct Outcome {
     pub polish_evaluations: usize,
     /// Hops to other minima that were tried, and that led further down.
     pub hops: [usize; 2],
-    /// Whether the search was broken off by the observer.
-    pub interrupted: bool,
 }
 
-/// Exploring swarm of the adaptive search: many particles for a short while. Twice as many as a study's own number at most,
-/// and for no more iterations than that has.
-pub(super) const EXPLORE: (usize, usize) = (128, 50);
-/// Gathering swarm of the adaptive search.
-pub(super) const GATHER: (usize, usize) = (64, 1500);
-
-/// Swarm of a search for several costs: of 64 to 1024 particles with as many cars in all, those that came furthest
-/// (`lapswarm bench studies`).
-pub(super) const FRONT: (usize, usize) = (512, 75);
-
-/// Runs the search.
+/// Searches on an evaluator that is open: one of `setup`'s replay. Starts from the state of an interrupted search of the same
+/// settings if one is given, and hands the state to `state_file` while it works.
 ///
 /// # Errors
-/// [`Error::Study`] if no candidate could be driven at all; those of the evaluator.
-pub fn search(
-    settings: &IdentifySettings,
-    setup: &Setup,
-    observe: impl FnMut(&Report<'_>) -> ControlFlow<()>,
-) -> Result<Outcome> {
-    search_from(settings, setup, None, &mut Keeper::idle(), observe)
-}
-
-/// As [`search`], from the state of a search of the same settings that was broken off, if one is given, and with the state
-/// handed to `keeper` while it works.
-///
-/// # Errors
-/// As [`search`]; [`Error::Input`] if the state belongs to other inputs or another backend; [`Error::Io`] if the state
-/// cannot be saved when the search is broken off.
-pub fn search_from(
-    settings: &IdentifySettings,
-    setup: &Setup,
-    state: Option<SearchState>,
-    keeper: &mut Keeper,
-    observe: impl FnMut(&Report<'_>) -> ControlFlow<()>,
-) -> Result<Outcome> {
-    let mut evaluator = open_evaluator(&setup.replay, settings.backend, settings.adapter.as_deref())?;
-    search_with(settings, setup, evaluator.as_mut(), (state, keeper), observe)
-}
-
-/// As [`search_from`], on an evaluator that is open: one of `setup`'s replay.
-///
-/// # Errors
-/// As [`search_from`].
+/// [`Error::Study`] if no candidate could be driven at all; those of the evaluator; [`Error::Input`] if the state belongs to
+/// other inputs or another backend; [`Error::Io`] if the state cannot be saved when the search is interrupted.
 pub fn search_with(
     settings: &IdentifySettings,
     setup: &Setup,
     evaluator: &mut dyn Evaluator,
-    (state, keeper): (Option<SearchState>, &mut Keeper),
-    mut observe: impl FnMut(&Report<'_>) -> ControlFlow<()>,
+    (state, state_file): (Option<SearchState>, &mut StateFile),
+    observe: &mut dyn FnMut(&Told) -> ControlFlow<()>,
 ) -> Result<Outcome> {
-    let dispatches = DispatchWatch::begin();
+    let watch = Watch::begin();
     let replay = &setup.replay;
     let origin = Origin::new(inputs_of(setup), &evaluator.backend());
     let mut state = match state {
         Some(state) => {
-            keeper.check(&state.origin, &origin)?;
+            state_file.check(&state.origin, &origin)?;
             state
         }
         None => SearchState {
@@ -168,7 +70,7 @@ pub fn search_with(
             place: first_place(settings, setup)?,
         },
     };
-    keeper.keep(&state)?;
+    state_file.save(&state)?;
     let before_s = state.elapsed_s;
     let mut faults = DeviceFaults::of(evaluator);
     let began = Instant::now();
@@ -176,32 +78,34 @@ pub fn search_with(
     while !matches!(state.place, Place::Searched { .. }) {
         let Some((stage, planned, progress)) = state.place.advance(evaluator)? else {
             state.place = next_place(state.place, settings, evaluator)?;
-            keeper.keep_or_warn(&state);
+            state_file.save_or_warn(&state);
             continue;
         };
         state.elapsed_s = before_s + began.elapsed().as_secs_f64();
         state.note(&progress);
         let met = faults.since(evaluator, &state.device_faults);
         state.device_faults.extend(met);
-        let flow = observe(&Report {
-            stage,
-            planned,
-            progress: Some(&progress),
+        let best: Vec<String> = progress.best.iter().map(|b| format!("{b:.3e}")).collect();
+        let flow = observe(&Told {
+            stage: stage.doing().to_owned(),
+            done: progress.iteration as u64,
+            planned: Some(planned as u64),
+            reached: format!("best {}, {} failed", best.join(" "), progress.failed),
         });
         if flow.is_break() {
-            keeper.keep(&state)?;
+            state_file.save(&state)?;
             interrupted = true;
             break;
         }
-        if keeper.due() {
-            keeper.keep_or_warn(&state);
+        if state_file.due() {
+            state_file.save_or_warn(&state);
         }
     }
     let swarm_s = before_s + began.elapsed().as_secs_f64();
     let evaluations = state.history.last().map_or(0, |row| row.evaluations);
     let backend = evaluator.backend();
-    // Of a search that is broken off before anything drives there is nothing to tell yet; its state is saved.
-    let folder = keeper.folder().to_owned();
+    // Of a search that is interrupted before anything drives there is nothing to tell yet; its state is saved.
+    let folder = state_file.folder().to_owned();
     let nothing_yet = |error: Error, interrupted: bool| {
         if interrupted {
             Error::Interrupted(folder.clone())
@@ -215,14 +119,14 @@ pub fn search_with(
     let polish_began = Instant::now();
     let mut refined = None;
     if settings.polish && !interrupted {
-        let mut watch = || {
-            observe(&Report {
-                stage: Stage::Polish,
-                planned: 0,
-                progress: None,
-            })
+        let mut told = || {
+            observe(&Told::reached(
+                Stage::Polish.doing(),
+                0,
+                "least squares on the exact Jacobian",
+            ))
         };
-        let found = refine(settings, setup, evaluator, &swarm_candidate, &mut watch)?;
+        let found = refine(settings, setup, evaluator, &swarm_candidate, &mut told)?;
         interrupted |= found.interrupted;
         refined = Some(found);
     }
@@ -233,22 +137,24 @@ pub fn search_with(
     let residuals = replay
         .residuals(&candidate)
         .ok_or_else(|| nothing_yet(nothing_drives(), interrupted))?;
+    let polish_s = polish_began.elapsed().as_secs_f64();
+    let mut record = RunRecord::of(&backend);
+    record.failures = state.failures;
+    record.device_faults = state.device_faults;
+    record.longest_dispatch_ms = watch.longest_dispatch_ms();
+    record.interrupted = interrupted;
+    record.took(evaluations, swarm_s + polish_s, swarm_s);
     Ok(Outcome {
         identifiability: judge(&residuals, &replay.problem.variables, &candidate, &setup.scales),
-        polish_s: polish_began.elapsed().as_secs_f64(),
+        polish_s,
         swarm_candidate,
         candidate,
         front,
         history: state.history,
-        backend,
-        failures: state.failures,
-        device_faults: state.device_faults,
-        longest_dispatch_ms: dispatches.longest_ms(),
-        evaluations,
+        record,
         swarm_s,
         polish_evaluations,
         hops,
-        interrupted,
     })
 }
 
@@ -454,6 +360,7 @@ impl SearchState {
     }
 }
 
+/// The front of a swarm's archive.
 fn front_of(swarm: &Mopso) -> Option<Front> {
     let objectives = swarm.archive().objectives.clone();
     let width = objectives.first()?.len();

@@ -1,14 +1,29 @@
-//! Settings of an identification, from a study file.
+//! Settings of an identification.
 
-use super::search::{EXPLORE, FRONT, GATHER};
-use crate::config::{Document, Table, read_text};
+use crate::config::Table;
+use crate::config::kinds::{
+    Choice, Kind, choice, choices, count, counts, file, name_or_file, number, of, optional, quoted, shared,
+    switch, text,
+};
+use crate::config::settings::{Flag, Written, settings};
 use crate::error::{Error, Result};
-use crate::evaluate::replay::{BackendChoice, CHANNEL_NAMES, Norm};
-use crate::study::memory::Size;
+use crate::evaluate::BackendChoice;
+use crate::evaluate::replay::{CHANNEL_NAMES, Norm};
+use crate::study::framework::memory::Size;
 use crate::swarm::{Mutation, Schedule};
-use crate::telemetry::{CalibrationOptions, Switch};
+use crate::telemetry::CalibrationOptions;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
+
+/// Exploring swarm of the adaptive search: many particles for a short while. Twice as many as a study's own number at most,
+/// and for no more iterations than that has.
+pub(super) const EXPLORE: (usize, usize) = (128, 50);
+/// Gathering swarm of the adaptive search.
+pub(super) const GATHER: (usize, usize) = (64, 1500);
+
+/// Swarm of a search for several costs: of 64 to 1024 particles with as many cars in all, those that came furthest
+/// (`lapswarm bench studies`).
+pub(super) const FRONT: (usize, usize) = (512, 75);
 
 /// A parameter to find, and where to look for it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -31,6 +46,23 @@ pub enum ObjectiveChoice {
     Channel(usize),
 }
 
+impl Choice for ObjectiveChoice {
+    const ALL: &'static [Self] = &[
+        Self::All,
+        Self::Channel(0),
+        Self::Channel(1),
+        Self::Channel(2),
+        Self::Channel(3),
+    ];
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::All => "all",
+            Self::Channel(k) => CHANNEL_NAMES[k],
+        }
+    }
+}
+
 /// Which swarm searches.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Algorithm {
@@ -42,72 +74,97 @@ pub enum Algorithm {
     Thesis,
 }
 
-/// Settings of an identification.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct IdentifySettings {
-    /// The car that fixed parameters come from: a bundled name or a file.
-    pub car: String,
-    /// The log; the bundled lap where none is given.
-    pub log: Option<PathBuf>,
-    /// Channel names, units and delays of the log.
-    pub channel_map: Option<PathBuf>,
-    /// The circuit that sections are named on, and that the map shows.
-    pub track: Option<String>,
-    /// The car that drove the log, where known.
-    pub truth: Option<String>,
-    /// Parameters to find.
-    pub free: Vec<FreeParameter>,
-    /// Objectives; more than one makes the search multi-objective.
-    pub objectives: Vec<ObjectiveChoice>,
-    /// Norm of the costs.
-    pub norm: Norm,
-    /// Length of the windows, s; whole laps where not given.
-    pub window_s: Option<f64>,
-    /// Time at the start of each window that is driven but not scored, s.
-    pub settle_s: f64,
-    /// Only this section of the track is scored.
-    pub section: Option<String>,
-    /// Laps to fit; the complete ones but those held out where empty.
-    pub laps: Vec<u32>,
-    /// Laps that are not fitted but judged on.
-    pub holdout: Vec<u32>,
-    /// Slowest speed of a window, m/s: slower ones are left out.
-    pub least_speed_mps: f64,
-    /// Sample rate to which the log is brought, Hz; its own where not given.
-    pub rate_hz: Option<f64>,
-    /// Runge-Kutta steps per sample; chosen for stability where not given.
-    pub substeps: Option<usize>,
-    /// Corrections estimated from the log.
-    pub calibration: CalibrationOptions,
-    /// The swarm.
-    pub algorithm: Algorithm,
-    /// Particles; the algorithm's own where not given.
-    pub population: Option<usize>,
-    /// Iterations; the algorithm's own where not given.
-    pub iterations: Option<usize>,
-    /// Inertia weight; the algorithm's own where not given.
-    pub inertia: Option<Schedule>,
-    /// Pull towards the own best.
-    pub cognitive: Option<Schedule>,
-    /// Pull towards the leader.
-    pub social: Option<Schedule>,
-    /// Mutation of the multi-objective swarm.
-    pub mutation: Option<Mutation>,
-    /// Members of the multi-objective archive.
-    pub archive: usize,
-    /// Seed of all random numbers.
-    pub seed: u64,
-    /// Whether the swarm's best is polished by least squares.
-    pub polish: bool,
-    /// Hops from the polished minimum to others that are tried, where what is left over does not look like noise.
-    pub hops: usize,
-    /// Backend.
-    pub backend: BackendChoice,
-    /// Part of the name of the adapter to use.
-    pub adapter: Option<String>,
+crate::config::kinds::named!(Algorithm {
+    Adaptive = "adaptive",
+    Pso = "pso",
+    Thesis = "thesis",
+});
+
+settings! {
+    /// Settings of an identification.
+    pub struct IdentifySettings {
+        car: String ["-"] = "gt".to_owned(), name_or_file(),
+            "The car that fixed parameters come from: a bundled name (gt, gt_hybrid) or a TOML file";
+        log: Option<PathBuf> ["-"] = None, optional(file()).example("\"lap.csv\""),
+            "The log: our CSV, a MoTeC i2 CSV export or a MoTeC .ld file; without it the bundled lap";
+        channel_map: Option<PathBuf> ["-"] = None, optional(file()).example("\"channels.toml\""),
+            "Channel names, units, signs and delays of the log, as TOML; without it they are guessed";
+        track: Option<String> ["-"] = None, optional(name_or_file()).example("\"silverstone_gp\""),
+            "The circuit that sections are named on: a bundled name, a TOML file, a survey (CSV, GPX, KML, log) or a shape";
+        truth: Option<String> ["-"] = None, optional(name_or_file()).example("\"gt\""),
+            "The car that drove the log, where it is known: the parameters' errors are stated against it";
+        free: Vec<FreeParameter> ["-"] = usual_unknowns(), of(Bounds),
+            "Parameters to find, each with its least and greatest value";
+        objectives: Vec<ObjectiveChoice> ["-"] = vec![ObjectiveChoice::All], choices(),
+            "What is fitted: all channels together, or channels at once; more than one searches a Pareto front";
+        norm: Norm ["-"] = Norm::Two, choice(),
+            "Norm of the costs";
+        window_s: Option<f64> ["s"] = None, optional(number(0.2, 1e5)).example("3.0"),
+            "Length of the windows that restart from the log; without it whole laps are driven";
+        settle_s: f64 ["s"] = 0.5, number(0.0, 60.0),
+            "Time at the start of each window that is driven but not scored";
+        section: Option<String> ["-"] = None, optional(text()).example("\"Abbey\""),
+            "Only this section of the track is scored";
+        laps: Vec<u32> ["-"] = Vec::new(), counts().example("[1, 2]"),
+            "Laps to drive; without it all complete ones but those held out";
+        holdout: Vec<u32> ["-"] = Vec::new(), counts().example("[3]"),
+            "Laps to judge on, not to fit";
+        least_speed_mps: f64 ["m/s"] = 8.0, number(1.0, 60.0),
+            "Windows that are slower than this somewhere are left out";
+        rate_hz: Option<f64> ["Hz"] = None, optional(number(5.0, 1000.0)).example("100.0"),
+            "Sample rate to which the log is brought; without it its own";
+        substeps: Option<usize> ["-"] = None, optional(count(1, 1000)).example("4"),
+            "Runge-Kutta steps per sample; without it as many as stability needs";
+        calibration: CalibrationOptions ["-"] = CalibrationOptions::default(), shared(),
+            "Corrections that are estimated from the log";
+        algorithm: Algorithm as "swarm.algorithm" ["-"] = Algorithm::Adaptive, choice().search(),
+            "The search";
+        population: Option<usize> as "swarm.population" ["-"] = None, optional(count(2, 100_000_000)).search().example("64"),
+            "Particles; without it the algorithm's own number";
+        iterations: Option<usize> as "swarm.iterations" ["-"] = None, optional(count(1, 100_000_000)).search().example("1500"),
+            "Iterations; without it the algorithm's own number";
+        inertia: Option<Schedule> as "swarm.inertia" ["-"] = None, of(Scheduled).search().example("[0.9, 0.4]"),
+            "Inertia weight: a number, or the first and the last of a linear schedule; without it the algorithm's own";
+        cognitive: Option<Schedule> as "swarm.cognitive" ["-"] = None, of(Scheduled).search().example("1.5"),
+            "Pull towards the particle's own best, as inertia is given";
+        social: Option<Schedule> as "swarm.social" ["-"] = None, of(Scheduled).search().example("1.5"),
+            "Pull towards the leader, as inertia is given";
+        mutation: Option<Mutation> as "swarm.mutation" ["-"] = None, of(Mutated).search().example("\"polynomial\""),
+            "Mutation of the multi-objective swarm: an exponent from 0 (none) to 10, random or polynomial";
+        archive: usize as "swarm.archive" ["-"] = 100, count(2, 100_000).search(),
+            "Members of the archive of the multi-objective swarm";
+        seed: u64 ["-"] = 1, count(0, u64::MAX).search(),
+            "Seed of all random numbers";
+        polish: bool ["-"] = true, switch(true).flag(Flag::Switch("no_polish", false)).search(),
+            "Whether the swarm's best is polished by least squares";
+        hops: usize ["-"] = 2, count(0, 1000).search(),
+            "Hops from the polished minimum to others that are tried where the errors that remain do not look like noise";
+        backend: BackendChoice ["-"] = BackendChoice::Auto, choice().place(),
+            "Where candidates are evaluated";
+        adapter: Option<String> ["-"] = None, optional(text()).place().example("\"llvmpipe\""),
+            "Part of the name of the GPU to use";
+    }
+
+    fn consistent(&self) -> Result<()> {
+        if self.free.is_empty() {
+            let expected = "at least one parameter = [lower, upper]";
+            return Err(Error::input("the study", "table [free]", "no parameter", expected));
+        }
+        Ok(())
+    }
 }
 
 /// The 22 unknowns of the thesis (5.11) within wide bounds.
+fn usual_unknowns() -> Vec<FreeParameter> {
+    let free = |(name, lower, upper): (&str, f64, f64)| FreeParameter {
+        name: name.to_owned(),
+        lower,
+        upper,
+    };
+    USUAL_UNKNOWNS.map(free).to_vec()
+}
+
+/// Names and bounds of [`usual_unknowns`].
 const USUAL_UNKNOWNS: [(&str, f64, f64); 22] = [
     ("rBx1", 5.0, 25.0),
     ("rBx2", 2.0, 25.0),
@@ -133,221 +190,7 @@ const USUAL_UNKNOWNS: [(&str, f64, f64); 22] = [
     ("C", 3e3, 5e4),
 ];
 
-impl Default for IdentifySettings {
-    fn default() -> Self {
-        let free = |(name, lower, upper): (&str, f64, f64)| FreeParameter {
-            name: name.to_owned(),
-            lower,
-            upper,
-        };
-        Self {
-            car: "gt".to_owned(),
-            log: None,
-            channel_map: None,
-            track: None,
-            truth: None,
-            free: USUAL_UNKNOWNS.map(free).to_vec(),
-            objectives: vec![ObjectiveChoice::All],
-            norm: Norm::Two,
-            window_s: None,
-            settle_s: 0.5,
-            section: None,
-            laps: Vec::new(),
-            holdout: Vec::new(),
-            least_speed_mps: 8.0,
-            rate_hz: None,
-            substeps: None,
-            calibration: CalibrationOptions::default(),
-            algorithm: Algorithm::Adaptive,
-            population: None,
-            iterations: None,
-            inertia: None,
-            cognitive: None,
-            social: None,
-            mutation: None,
-            archive: 100,
-            seed: 1,
-            polish: true,
-            hops: 2,
-            backend: BackendChoice::Auto,
-            adapter: None,
-        }
-    }
-}
-
-/// Parses a backend's name.
-pub fn parse_backend(name: &str) -> Option<BackendChoice> {
-    Some(match name {
-        "auto" => BackendChoice::Auto,
-        "cpu" => BackendChoice::Cpu,
-        "simd" => BackendChoice::Simd,
-        "gpu" => BackendChoice::Gpu,
-        _ => return None,
-    })
-}
-
-/// Parses an objective's name: `all`, or a channel.
-pub fn parse_objective(name: &str) -> Option<ObjectiveChoice> {
-    if name == "all" {
-        return Some(ObjectiveChoice::All);
-    }
-    CHANNEL_NAMES
-        .iter()
-        .position(|c| *c == name)
-        .map(ObjectiveChoice::Channel)
-}
-
-/// Parses a norm's name: `1`, `2`, `infinity` or `mse`.
-pub fn parse_norm(name: &str) -> Option<Norm> {
-    Some(match name {
-        "1" => Norm::One,
-        "2" => Norm::Two,
-        "infinity" => Norm::Infinity,
-        "mse" => Norm::MeanSquare,
-        _ => return None,
-    })
-}
-
-/// Parses an algorithm's name: `adaptive`, `pso` or `thesis`.
-pub fn parse_algorithm(name: &str) -> Option<Algorithm> {
-    Some(match name {
-        "adaptive" => Algorithm::Adaptive,
-        "pso" => Algorithm::Pso,
-        "thesis" => Algorithm::Thesis,
-        _ => return None,
-    })
-}
-
 impl IdentifySettings {
-    /// Reads a study file. Paths in it are relative to the file.
-    ///
-    /// # Errors
-    /// [`Error::Input`] naming line and field for anything unknown or out of range.
-    pub fn read(path: &Path) -> Result<Self> {
-        Self::read_beside(path, Self::default(), |_| Ok(()))
-    }
-
-    /// As [`IdentifySettings::read`], of a file's text; `path` is its name in messages, and paths are relative to it.
-    ///
-    /// # Errors
-    /// As [`IdentifySettings::read`].
-    pub fn parse(path: &Path, text: &str) -> Result<Self> {
-        Self::parse_beside(path, text, Self::default(), |_| Ok(()))
-    }
-
-    /// As [`IdentifySettings::read`] from other defaults, for studies of a replay that have settings of their own:
-    /// `own` reads these from the same file.
-    ///
-    /// # Errors
-    /// As [`IdentifySettings::read`], and those of `own`.
-    pub(crate) fn read_beside(
-        path: &Path,
-        defaults: Self,
-        own: impl FnOnce(&Table<'_>) -> Result<()>,
-    ) -> Result<Self> {
-        Self::parse_beside(path, &read_text(path)?, defaults, own)
-    }
-
-    fn parse_beside(
-        path: &Path,
-        text: &str,
-        defaults: Self,
-        own: impl FnOnce(&Table<'_>) -> Result<()>,
-    ) -> Result<Self> {
-        let folder = path.parent().unwrap_or(Path::new("."));
-        let document = Document::parse(path, text)?;
-        let root = document.root();
-        let mut s = defaults;
-        own(&root)?;
-        let file = |name: &str| folder.join(name);
-        let named_or_file = |name: &str| {
-            if Path::new(name).extension().is_some() {
-                file(name).display().to_string()
-            } else {
-                name.to_owned()
-            }
-        };
-        if let Some(name) = root.string("car")? {
-            s.car = named_or_file(name);
-        }
-        s.log = root.string("log")?.map(file);
-        s.channel_map = root.string("channel_map")?.map(file);
-        s.track = root.string("track")?.map(named_or_file);
-        s.truth = root.string("truth")?.map(named_or_file);
-        s.section = root.string("section")?.map(str::to_owned);
-        if let Some(names) = root.strings("objectives")? {
-            let parsed: Option<Vec<_>> = names.iter().map(|n| parse_objective(n)).collect();
-            s.objectives = parsed.filter(|o| !o.is_empty()).ok_or_else(|| {
-                root.refuse(
-                    "objectives",
-                    "a list of \"all\", \"vx\", \"ax\", \"ay\", \"yaw_rate\"",
-                )
-            })?;
-        }
-        s.norm = choice(
-            &root,
-            "norm",
-            s.norm,
-            parse_norm,
-            "\"1\", \"2\", \"infinity\" or \"mse\"",
-        )?;
-        s.window_s = root.number("window_s", 0.2, 1e5, "s")?.or(s.window_s);
-        s.settle_s = root.number("settle_s", 0.0, 60.0, "s")?.unwrap_or(s.settle_s);
-        s.least_speed_mps = root
-            .number("least_speed_mps", 1.0, 60.0, "m/s")?
-            .unwrap_or(s.least_speed_mps);
-        s.rate_hz = root.number("rate_hz", 5.0, 1000.0, "Hz")?;
-        s.substeps = root.integer("substeps", 1, 1000)?.map(|n| n as usize);
-        s.laps = lap_numbers(&root, "laps")?;
-        s.holdout = lap_numbers(&root, "holdout")?;
-        s.seed = root.integer("seed", 0, u64::MAX)?.unwrap_or(s.seed);
-        s.polish = root.boolean("polish")?.unwrap_or(s.polish);
-        s.hops = root.integer("hops", 0, 1000)?.map_or(s.hops, |n| n as usize);
-        s.backend = choice(
-            &root,
-            "backend",
-            s.backend,
-            parse_backend,
-            "\"auto\", \"cpu\", \"simd\" or \"gpu\"",
-        )?;
-        s.adapter = root.string("adapter")?.map(str::to_owned);
-        if let Some(table) = root.table("swarm")? {
-            s.read_swarm(&table)?;
-            table.finish()?;
-        }
-        if let Some(table) = root.table("calibration")? {
-            s.calibration = read_calibration(&table)?;
-            table.finish()?;
-        }
-        if let Some(table) = root.table("free")? {
-            s.free = table
-                .keys()
-                .map(|name| {
-                    let expected = "[lower, upper], two numbers in ascending order";
-                    match table.numbers(name)?.as_deref() {
-                        Some(&[lower, upper]) if lower < upper => Ok(FreeParameter {
-                            name: name.to_owned(),
-                            lower,
-                            upper,
-                        }),
-                        _ => Err(table.refuse(name, expected)),
-                    }
-                })
-                .collect::<Result<_>>()?;
-            table.finish()?;
-        }
-        root.finish()?;
-        if s.free.is_empty() {
-            return Err(Error::input(
-                path,
-                "table [free]",
-                "no parameter",
-                "at least one parameter = [lower, upper]",
-            ));
-        }
-        Ok(s)
-    }
-
     /// What the study's memory goes with.
     pub fn size(&self) -> Size {
         let several = self.objectives.len() > 1;
@@ -360,110 +203,164 @@ impl IdentifySettings {
             ..Size::default()
         }
     }
+}
 
-    /// The same with the paths of files absolute, so that they mean the same from every folder.
-    ///
-    /// # Errors
-    /// [`Error::Io`] if the present folder cannot be told.
-    pub fn absolute(mut self) -> Result<Self> {
-        let whole = |path: &mut PathBuf| -> Result<()> {
-            *path = std::path::absolute(&path).map_err(|e| Error::io(&path, "find", e))?;
-            Ok(())
+/// Names of parameters with their bounds: the table `[free]`.
+struct Bounds;
+
+impl Kind<Vec<FreeParameter>> for Bounds {
+    fn read(&self, table: &Table<'_>, key: &str, _: &str, _: &Path) -> Result<Option<Vec<FreeParameter>>> {
+        let Some(table) = table.table(key)? else {
+            return Ok(None);
         };
-        for path in [&mut self.log, &mut self.channel_map].into_iter().flatten() {
-            whole(path)?;
-        }
-        for name in [Some(&mut self.car), self.track.as_mut(), self.truth.as_mut()]
-            .into_iter()
-            .flatten()
-            .filter(|name| Path::new(name).is_file())
-        {
-            let mut path = PathBuf::from(&name);
-            whole(&mut path)?;
-            *name = path.display().to_string();
-        }
-        Ok(self)
+        let bounds = |name: &str| match table.numbers(name)?.as_deref() {
+            Some(&[lower, upper]) if lower < upper => Ok(FreeParameter {
+                name: name.to_owned(),
+                lower,
+                upper,
+            }),
+            _ => Err(table.refuse(name, "[lower, upper], two numbers in ascending order")),
+        };
+        let found = table.keys().map(bounds).collect::<Result<_>>()?;
+        table.finish()?;
+        Ok(Some(found))
     }
 
-    fn read_swarm(&mut self, table: &Table<'_>) -> Result<()> {
-        self.algorithm = choice(
-            table,
-            "algorithm",
-            self.algorithm,
-            parse_algorithm,
-            "\"adaptive\", \"pso\" or \"thesis\"",
-        )?;
-        self.population = table.integer("population", 2, 100_000_000)?.map(|n| n as usize);
-        self.iterations = table.integer("iterations", 1, 100_000_000)?.map(|n| n as usize);
-        self.archive = table
-            .integer("archive", 2, 100_000)?
-            .map_or(self.archive, |n| n as usize);
-        let schedule = |key: &str| -> Result<Option<Schedule>> {
-            if let Ok(fixed) = table.number(key, 0.0, 10.0, "") {
-                return Ok(fixed.map(Schedule::Fixed));
-            }
-            match table.numbers(key)?.as_deref() {
-                Some(&[from, to]) => Ok(Some(Schedule::Linear { from, to })),
-                _ => Err(table.refuse(key, "a number, or [first, last] for a linear schedule")),
-            }
+    fn write(&self, free: &Vec<FreeParameter>) -> Option<Written> {
+        let row = |free: &FreeParameter| {
+            let dotted = free.name.contains('.');
+            let key = if dotted {
+                quoted(&free.name)
+            } else {
+                free.name.clone()
+            };
+            format!("{key} = [{:?}, {:?}]\n", free.lower, free.upper)
         };
-        self.inertia = schedule("inertia")?;
-        self.cognitive = schedule("cognitive")?;
-        self.social = schedule("social")?;
-        self.mutation = match (table.number("mutation", 0.0, 10.0, ""), table.string("mutation")) {
-            (Ok(None), _) => self.mutation,
-            (Ok(Some(mu)), _) => Some(if mu > 0.0 {
+        let rows: String = free.iter().map(row).collect();
+        Some(Written::Table(format!("[free]\n{rows}")))
+    }
+
+    /// Names whose bounds are those of the present list, or from zero to one, or `name=lower:upper`.
+    fn parse(&self, text: &str, present: &Vec<FreeParameter>) -> Result<Vec<FreeParameter>, String> {
+        let named = |part: &str| {
+            if let Some((name, bounds)) = part.split_once('=') {
+                let parsed = bounds
+                    .split_once(':')
+                    .and_then(|(lower, upper)| Some((lower.parse().ok()?, upper.parse().ok()?)));
+                return match parsed {
+                    Some((lower, upper)) if lower < upper => Ok(FreeParameter {
+                        name: name.to_owned(),
+                        lower,
+                        upper,
+                    }),
+                    _ => Err("expected NAME=LOWER:UPPER, two numbers in ascending order".to_owned()),
+                };
+            }
+            let known = present.iter().find(|free| free.name == part);
+            Ok(known.cloned().unwrap_or(FreeParameter {
+                name: part.to_owned(),
+                lower: 0.0,
+                upper: 1.0,
+            }))
+        };
+        text.split(',').map(|part| named(part.trim())).collect()
+    }
+
+    fn value_name(&self) -> &'static str {
+        "LIST"
+    }
+
+    fn flag(&self, name: &'static str) -> Flag {
+        Flag::List(name)
+    }
+}
+
+/// A [`Schedule`]: a number, or two.
+struct Scheduled;
+
+impl Kind<Option<Schedule>> for Scheduled {
+    fn read(&self, table: &Table<'_>, key: &str, _: &str, _: &Path) -> Result<Option<Option<Schedule>>> {
+        if let Ok(fixed) = table.number(key, 0.0, 10.0, "") {
+            return Ok(Some(fixed.map(Schedule::Fixed)));
+        }
+        match table.numbers(key)?.as_deref() {
+            Some(&[from, to]) => Ok(Some(Some(Schedule::Linear { from, to }))),
+            _ => Err(table.refuse(key, "a number, or [first, last] for a linear schedule")),
+        }
+    }
+
+    fn write(&self, schedule: &Option<Schedule>) -> Option<Written> {
+        schedule.map(|schedule| {
+            Written::Value(match schedule {
+                Schedule::Fixed(v) => format!("{v:?}"),
+                Schedule::Linear { from, to } => format!("[{from:?}, {to:?}]"),
+            })
+        })
+    }
+
+    fn parse(&self, text: &str, _: &Option<Schedule>) -> Result<Option<Schedule>, String> {
+        let numbers: Result<Vec<f64>, _> = text.split(',').map(|part| part.trim().parse()).collect();
+        match numbers.as_deref() {
+            Ok([v]) if (0.0..=10.0).contains(v) => Ok(Some(Schedule::Fixed(*v))),
+            Ok([from, to]) if from.is_finite() && to.is_finite() => {
+                Ok(Some(Schedule::Linear { from: *from, to: *to }))
+            }
+            _ => Err("expected a number from 0 to 10, or FIRST,LAST".to_owned()),
+        }
+    }
+
+    fn range(&self) -> String {
+        "0 to 10".to_owned()
+    }
+
+    fn value_name(&self) -> &'static str {
+        "X|FIRST,LAST"
+    }
+}
+
+/// A [`Mutation`]: an exponent, or a name.
+struct Mutated;
+
+impl Kind<Option<Mutation>> for Mutated {
+    fn read(&self, table: &Table<'_>, key: &str, _: &str, _: &Path) -> Result<Option<Option<Mutation>>> {
+        let fixed = |mu: f64| {
+            if mu > 0.0 {
                 Mutation::Fixed(mu)
             } else {
                 Mutation::None
-            }),
-            (_, Ok(Some("random"))) => Some(Mutation::Random),
-            (_, Ok(Some("polynomial"))) => Some(Mutation::SMPSO),
-            _ => return Err(table.refuse("mutation", "a number from 0 to 10, \"random\" or \"polynomial\"")),
-        };
-        Ok(())
-    }
-}
-
-fn choice<T>(
-    table: &Table<'_>,
-    key: &str,
-    default: T,
-    parse: impl Fn(&str) -> Option<T>,
-    expected: &str,
-) -> Result<T> {
-    match table.string(key)? {
-        Some(name) => parse(name).ok_or_else(|| table.refuse(key, expected)),
-        None => Ok(default),
-    }
-}
-
-fn lap_numbers(table: &Table<'_>, key: &str) -> Result<Vec<u32>> {
-    let numbers = table.numbers(key)?.unwrap_or_default();
-    numbers
-        .iter()
-        .map(|&x| {
-            if (0.0..=1e6).contains(&x) && x.fract() == 0.0 {
-                Ok(x as u32)
-            } else {
-                Err(table.refuse(key, "a list of lap numbers"))
             }
-        })
-        .collect()
-}
+        };
+        match (table.number(key, 0.0, 10.0, ""), table.string(key)) {
+            (Ok(None), _) => Ok(None),
+            (Ok(Some(mu)), _) => Ok(Some(Some(fixed(mu)))),
+            (_, Ok(Some("random"))) => Ok(Some(Some(Mutation::Random))),
+            (_, Ok(Some("polynomial"))) => Ok(Some(Some(Mutation::SMPSO))),
+            _ => Err(table.refuse(key, "a number from 0 to 10, \"random\" or \"polynomial\"")),
+        }
+    }
 
-fn read_calibration(table: &Table<'_>) -> Result<CalibrationOptions> {
-    let switch = |key: &str| -> Result<Switch> {
-        Ok(match table.boolean(key)? {
-            None => Switch::Auto,
-            Some(true) => Switch::On,
-            Some(false) => Switch::Off,
+    fn write(&self, mutation: &Option<Mutation>) -> Option<Written> {
+        mutation.map(|mutation| {
+            Written::Value(match mutation {
+                Mutation::None => "0".to_owned(),
+                Mutation::Fixed(mu) => format!("{mu:?}"),
+                Mutation::Random => quoted("random"),
+                Mutation::Polynomial { .. } => quoted("polynomial"),
+            })
         })
-    };
-    Ok(CalibrationOptions {
-        signs: switch("signs")?,
-        delays: switch("delays")?,
-        offsets: switch("offsets")?,
-        rolling_radius: switch("rolling_radius")?,
-    })
+    }
+
+    fn parse(&self, text: &str, _: &Option<Mutation>) -> Result<Option<Mutation>, String> {
+        match (text, text.parse::<f64>()) {
+            ("random", _) => Ok(Some(Mutation::Random)),
+            ("polynomial", _) => Ok(Some(Mutation::SMPSO)),
+            (_, Ok(0.0)) => Ok(Some(Mutation::None)),
+            (_, Ok(mu)) if (0.0..=10.0).contains(&mu) => Ok(Some(Mutation::Fixed(mu))),
+            _ => Err("expected a number from 0 to 10, random or polynomial".to_owned()),
+        }
+    }
+
+    fn value_name(&self) -> &'static str {
+        "MU|NAME"
+    }
 }

@@ -6,6 +6,7 @@ use crate::evaluate::Objective;
 use crate::evaluate::replay::{
     CHANNEL_NAMES, CHANNEL_UNITS, ChannelWeights, Norm, ReplayProblem, Sample, Window, initial_state,
 };
+use crate::study::framework::{Plan, Subject};
 use crate::telemetry::{ChannelMap, Log, LogOptions, NativeFormat, Recording};
 use crate::track::{Circuit, Track};
 use crate::vehicle::Car;
@@ -38,7 +39,7 @@ pub struct Setup {
 /// are stiffer than the estimate below.
 const STABLE_STEP: f64 = 2.4;
 
-/// The fastest mode (1/s) of a car at a speed (m/s), after the figures of `physics.md` section 2 ("Step size").
+/// The fastest mode (1/s) of a car at a speed (m/s), after the figures of the book, chapter Model, section 2.
 fn fastest_mode(speed: f64) -> f64 {
     60.0 + 620.0 / speed
 }
@@ -133,6 +134,47 @@ pub fn set_up(settings: &IdentifySettings) -> Result<Setup> {
         replay,
         log,
     })
+}
+
+/// A study file whose log is given by a flag names laps that the bundled log does not have: a check does not look for them.
+pub(in crate::study) fn without_laps(settings: &IdentifySettings) -> IdentifySettings {
+    let mut settings = settings.clone();
+    if settings.log.is_none() {
+        settings.laps.clear();
+        settings.holdout.clear();
+    }
+    settings
+}
+
+/// Says that car, log and track were read, and what evaluates.
+///
+/// # Errors
+/// [`crate::Error::NoDevice`] where there is no device that is to be used.
+pub(in crate::study) fn planned(settings: &IdentifySettings, setup: &Setup, plan: Plan) -> Result<Plan> {
+    let (log, replay) = (&setup.log, &setup.replay);
+    let plan = plan.reads(format!("car {}", replay.free.car.name)).reads(format!(
+        "log {}: {} samples at {:.0} Hz, {} windows",
+        log.source,
+        log.samples(),
+        1.0 / log.dt_s,
+        replay.plan.windows.len()
+    ));
+    let plan = match &setup.circuit {
+        Some(circuit) => plan.reads(format!("track {}, {:.1} m", circuit.name, circuit.length_m)),
+        None => plan,
+    };
+    plan.seed(settings.seed)
+        .backend(settings.backend, settings.adapter.as_deref())
+}
+
+/// What a study of a replayed lap is about.
+pub(in crate::study) fn subject(settings: &IdentifySettings, setup: &Setup) -> Subject {
+    Subject {
+        seed: settings.seed,
+        car: setup.replay.free.car.name.clone(),
+        log: Some(setup.log.source.clone()),
+        track: None,
+    }
 }
 
 /// The circuit of a track's name or file (see [`Track::load`]).

@@ -1,16 +1,65 @@
 //! The state of a search: all that it takes to go on.
 
 use super::coordinates::Logarithmic;
-use super::search::{Front, HistoryRow, Stage};
 use super::settings::IdentifySettings;
 use super::setup::Setup;
 use crate::error::Result;
 use crate::evaluate::{Evaluator, FailureCounts};
-use crate::study::keeper::Origin;
-use crate::study::run::Inputs;
+use crate::study::framework::state_file::Origin;
+use crate::study::framework::{Inputs, State};
 use crate::swarm::checkpoint::Checkpoint;
 use crate::swarm::{CovarianceSwarm, Mopso, Optimiser, Progress, Pso, step};
 use serde::{Deserialize, Serialize};
+
+/// A stage of the work, for progress reports.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stage {
+    /// The exploring swarm.
+    Explore,
+    /// The swarm that learns the valley.
+    Gather,
+    /// The least-squares polish.
+    Polish,
+}
+
+impl Stage {
+    /// What is being done, in a word.
+    pub(super) fn doing(self) -> &'static str {
+        match self {
+            Self::Explore => "exploring",
+            Self::Gather => "gathering",
+            Self::Polish => "polishing",
+        }
+    }
+}
+
+/// One line of the convergence history.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct HistoryRow {
+    /// Iterations over both stages.
+    pub iteration: usize,
+    /// Evaluations over both stages.
+    pub evaluations: u64,
+    /// Best value of each objective.
+    pub best: Vec<f64>,
+    /// Median of the first objective over the iteration's candidates that did not fail.
+    pub median: Option<f64>,
+    /// Candidates of the iteration that failed.
+    pub failed: usize,
+    /// Seconds since the search began.
+    pub elapsed_s: f64,
+}
+
+/// Non-dominated candidates and their objectives.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Front {
+    /// One row per member.
+    pub candidates: Vec<Vec<f64>>,
+    /// One row per member.
+    pub objectives: Vec<Vec<f64>>,
+    /// The member nearest to the ideal point, each objective as a share of its range.
+    pub chosen: usize,
+}
 
 /// Where a search is.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -42,9 +91,17 @@ pub struct SearchState {
     pub(super) place: Place,
 }
 
-impl SearchState {
-    /// Whether nothing has been evaluated yet.
-    pub fn is_untouched(&self) -> bool {
+impl State<IdentifySettings> for SearchState {
+    fn settings(&self, _: &str) -> Result<IdentifySettings> {
+        Ok(self.settings.clone())
+    }
+
+    fn set_settings(&mut self, settings: &IdentifySettings) -> Result<()> {
+        self.settings = settings.clone();
+        Ok(())
+    }
+
+    fn is_untouched(&self) -> bool {
         self.history.is_empty()
     }
 }

@@ -1,15 +1,15 @@
 //! The front between several objectives: a swarm of whole lines, then the local search along it.
 
-use super::exact::ExactSolvers;
-use super::lines::Setup;
+use super::reference_optimum::ReferenceSolvers;
 use super::settings::RacelineSettings;
-use super::watched::watched;
+use super::setup::Setup;
+use super::solver_thread::watched;
 use crate::error::Result;
 use crate::evaluate::line::{LineProblem, open_line_evaluator};
 use crate::evaluate::{BackendInfo, Evaluator, FAILED_COST, FailureCounts, add_failures};
 use crate::line::Parametrisation;
 use crate::random::Random;
-use crate::study::device_faults::DeviceFaults;
+use crate::study::framework::DeviceFaults;
 use crate::swarm::metrics::hypervolume;
 use crate::swarm::{Archive, Mopso, MopsoSettings, Optimiser, Progress, PsoSettings, Truncation, step};
 use serde::{Deserialize, Serialize};
@@ -27,7 +27,7 @@ pub struct LineFront {
     pub hypervolume: f64,
     /// The point from which the volume is measured.
     pub reference: Vec<f64>,
-    /// The least value of each objective on the front or by the exact solvers.
+    /// The least value of each objective on the front or by the solvers of reference optima.
     pub ideal: Vec<f64>,
     /// Lines evaluated.
     pub evaluations: u64,
@@ -67,7 +67,7 @@ const PROGRAMS: usize = 6;
 pub fn search_front(
     setup: &Setup,
     settings: &RacelineSettings,
-    solvers: &ExactSolvers,
+    solvers: &ReferenceSolvers,
     known: &[Vec<f64>],
     mut observe: impl FnMut(&Progress) -> ControlFlow<()>,
 ) -> Result<LineFront> {
@@ -76,7 +76,7 @@ pub fn search_front(
     })
 }
 
-/// As [`search_front`], from the swarm of the same search that was broken off, if one is given; `observe` is told the swarm
+/// As [`search_front`], from the swarm of the same search that was interrupted, if one is given; `observe` is told the swarm
 /// after each iteration.
 ///
 /// # Errors
@@ -84,7 +84,7 @@ pub fn search_front(
 pub(super) fn search_front_from(
     setup: &Setup,
     settings: &RacelineSettings,
-    solvers: &ExactSolvers,
+    solvers: &ReferenceSolvers,
     known: &[Vec<f64>],
     state: Option<FrontState>,
     known_faults: &[String],
@@ -162,7 +162,7 @@ pub(super) fn search_front_from(
     if settings.local_search && settings.objectives.iter().all(|o| solvers.solves(*o)) {
         let polished = std::thread::scope(|scope| {
             let led = scope.spawn(|| polish_along(&archive, settings, solvers));
-            // A search that is gone on with may have no step left to tell of.
+            // A search that is resumed may have no step left to tell of.
             let none = Progress {
                 iteration: 0,
                 evaluations: 0,
@@ -297,7 +297,7 @@ fn insert_all(archive: &mut Archive, judge: &mut dyn Evaluator, lines: &[Vec<f64
 fn polish_along(
     archive: &Archive,
     settings: &RacelineSettings,
-    solvers: &ExactSolvers,
+    solvers: &ReferenceSolvers,
 ) -> Result<Vec<Vec<f64>>> {
     let m = settings.objectives.len();
     let rows = &archive.objectives;

@@ -2,30 +2,29 @@
 
 mod files;
 mod page;
-mod pictures;
 mod surfaces;
 
 use super::{Outcome, RacelineSettings, ReportedLine, Setup};
 use crate::error::Result;
-use crate::evaluate::{FailureCounts, failures_in_words};
-use crate::study::run_folder::write_study;
-use serde::Serialize;
+use crate::evaluate::failures_in_words;
+use crate::study::framework::RunRecord;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Where the lap time through the cuts and the one on the fine spline differ by more than this share, the study says so.
+/// Where the lap time through the cross-sections and the one on the fine spline differ by more than this share, the study says so.
 const COARSE_AND_FINE: f64 = 0.003;
 
 /// The figures of one line.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct LineFigures {
-    /// Length through the cuts (m).
+    /// Length through the cross-sections (m).
     pub length_m: f64,
-    /// Root of the sum of squared second differences through the cuts (1/m); grows with their number.
+    /// Root of the sum of squared second differences through the cross-sections (1/m); grows with their number.
     pub gamma_1pm: f64,
-    /// Integral of squared curvature through the cuts (1/m).
+    /// Integral of squared curvature through the cross-sections (1/m).
     pub integral_kappa2_1pm: f64,
-    /// Lap time through the cuts (s).
+    /// Lap time through the cross-sections (s).
     pub lap_time_s: f64,
     /// Lap time on the fine spline (s).
     pub lap_time_fine_s: f64,
@@ -53,37 +52,24 @@ impl LineFigures {
 }
 
 /// The figures of a study; `--json` prints this.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Summary {
     /// `raceline`.
-    pub study: &'static str,
+    pub study: String,
     /// The track.
     pub track: String,
     /// The car, or the file of its envelope.
     pub car: String,
     /// Seed of all random numbers.
     pub seed: u64,
-    /// `cpu`, `simd` or `gpu`.
-    pub backend: &'static str,
-    /// Instruction set, or name of the adapter.
-    pub adapter: String,
-    /// Driver of the adapter.
-    pub driver: String,
-    /// Exact solvers, swarms and local search (s).
-    pub elapsed_s: f64,
+    /// How the study ran.
+    #[serde(flatten)]
+    pub record: RunRecord,
     /// Swarms and local search (s).
     pub search_elapsed_s: f64,
-    /// Exact solvers (s).
+    /// Solvers of reference optima (s).
     pub exact_elapsed_s: f64,
-    /// Lines evaluated by the swarms.
-    pub evaluations: u64,
-    /// Lines that failed, by reason.
-    pub failures: FailureCounts,
-    /// What went wrong with devices and was got over; the study's figures hold all the same.
-    pub device_faults: Vec<String>,
-    /// Lines per second of the search.
-    pub evaluations_per_s: f64,
-    /// Cuts across the track.
+    /// Cross-sections of the track.
     pub sections: usize,
     /// Width of the car (m).
     pub car_width_m: f64,
@@ -92,15 +78,15 @@ pub struct Summary {
     /// Whether gradients finished what they found.
     pub local_search: bool,
     /// The best line by each objective.
-    pub best: BTreeMap<&'static str, LineFigures>,
+    pub best: BTreeMap<String, LineFigures>,
     /// What the swarm alone reached of each objective, in its unit.
-    pub swarm: BTreeMap<&'static str, f64>,
-    /// The exact solvers' lines; `null` where there is no solver.
-    pub exact: BTreeMap<&'static str, Option<LineFigures>>,
-    /// How the exact solver ended, in its own words; `null` where there is no solver.
-    pub exact_status: BTreeMap<&'static str, Option<String>>,
-    /// How much more the best line costs than the exact one, of each objective (%); lap times on the fine spline.
-    pub above_exact_percent: BTreeMap<&'static str, Option<f64>>,
+    pub swarm: BTreeMap<String, f64>,
+    /// The reference optima; `null` where there is no solver.
+    pub exact: BTreeMap<String, Option<LineFigures>>,
+    /// How their solver ended, in its own words; `null` where there is no solver.
+    pub exact_status: BTreeMap<String, Option<String>>,
+    /// How much more the best line costs than the reference optimum, of each objective (%); lap times on the fine spline.
+    pub above_exact_percent: BTreeMap<String, Option<f64>>,
     /// The reference line.
     pub reference: LineFigures,
     /// The compromise of the front nearest to the ideal.
@@ -112,32 +98,27 @@ pub struct Summary {
     /// Lines on the front.
     pub front_size: usize,
     /// Best lines on which the car's side is more than 0.1 m beyond an edge, by the names of their objectives.
-    pub off_road: Vec<&'static str>,
+    pub off_road: Vec<String>,
     /// What a reader must know before believing the figures.
     pub warnings: Vec<String>,
-    /// Whether the study was broken off.
-    pub interrupted: bool,
 }
 
 /// Puts the figures together.
-pub fn summarise(settings: &RacelineSettings, setup: &Setup, outcome: &Outcome) -> Summary {
-    let each = || outcome.objectives.iter().map(|o| (o.objective.name(), o));
-    let elapsed_s = outcome.search_s + outcome.waited_s;
+pub(super) fn summarise(settings: &RacelineSettings, setup: &Setup, outcome: &Outcome) -> Summary {
+    let each = || {
+        outcome
+            .objectives
+            .iter()
+            .map(|o| (o.objective.name().to_owned(), o))
+    };
     Summary {
-        study: "raceline",
+        study: "raceline".to_owned(),
         track: setup.track_name.clone(),
         car: setup.car_name.clone(),
         seed: settings.seed,
-        backend: outcome.backend.backend,
-        adapter: outcome.backend.device.clone(),
-        driver: outcome.backend.driver.clone(),
-        elapsed_s,
+        record: outcome.record.clone(),
         search_elapsed_s: outcome.search_s,
         exact_elapsed_s: outcome.exact_s,
-        evaluations: outcome.evaluations,
-        failures: outcome.failures.clone(),
-        device_faults: outcome.device_faults.clone(),
-        evaluations_per_s: outcome.evaluations as f64 / outcome.search_s.max(1e-9),
         sections: setup.cuts.len(),
         car_width_m: settings.car_width_m,
         warm_start: settings.warm_start,
@@ -165,15 +146,14 @@ pub fn summarise(settings: &RacelineSettings, setup: &Setup, outcome: &Outcome) 
             .objectives
             .iter()
             .filter(|o| o.best.clearance.margin_m < -CLOSE_M)
-            .map(|o| o.objective.name())
+            .map(|o| o.objective.name().to_owned())
             .collect(),
         warnings: warnings(outcome),
-        interrupted: outcome.interrupted,
     }
 }
 
 /// The lines that a study tells of, the reference line last.
-fn told_lines(outcome: &Outcome) -> Vec<&ReportedLine> {
+fn reported_lines(outcome: &Outcome) -> Vec<&ReportedLine> {
     let best = outcome.objectives.iter().map(|o| &o.best);
     best.chain(&outcome.compromise)
         .chain([&outcome.reference])
@@ -182,12 +162,12 @@ fn told_lines(outcome: &Outcome) -> Vec<&ReportedLine> {
 
 fn warnings(outcome: &Outcome) -> Vec<String> {
     let mut warnings = Vec::new();
-    for line in told_lines(outcome) {
+    for line in reported_lines(outcome) {
         let (coarse, fine) = (line.lap_time_s, line.lap_time_fine_s());
         if (fine / coarse - 1.0).abs() > COARSE_AND_FINE {
             warnings.push(format!(
-                "{}: {coarse:.2} s through the cuts but {fine:.2} s on the spline between them; believe the latter, or \
-                 ask for more --sections",
+                "{}: {coarse:.2} s at the cross-sections but {fine:.2} s on the spline through them: believe the latter, \
+                 or ask for more --sections",
                 line.name
             ));
         }
@@ -210,14 +190,14 @@ fn warnings(outcome: &Outcome) -> Vec<String> {
     warnings
 }
 
-/// How far beyond an edge is not worth a word (m): between cuts a spline bulges, and edges are straight there.
+/// How far beyond an edge is not worth a word (m): between cross-sections a spline bulges, and edges are straight there.
 const CLOSE_M: f64 = 0.1;
 
 impl Summary {
     /// What there is to say of best lines that leave the road, and what to do about it.
     pub fn off_road_text(&self) -> String {
         format!(
-            "the best line by {} leaves the road between the cuts: {} of them are too few, ask for more --sections",
+            "the best line by {} leaves the road between the cross-sections: {} are too few, ask for more --sections",
             self.off_road.join(", "),
             self.sections
         )
@@ -225,65 +205,30 @@ impl Summary {
 
     /// The figures in words.
     pub fn to_text(&self) -> String {
+        let record = &self.record;
         let mut text = format!(
-            "{} with the {}: {} sections, car {} m wide\n{:24}{:>10}{:>10}{:>12}{:>10}{:>10}{:>12}\n",
+            "{} with the {}: {} sections, car {} m wide\n{}",
             self.track,
             self.car,
             self.sections,
             self.car_width_m,
-            "line",
-            "length m",
-            "Gamma 1/m",
-            "kappa2 1/m",
-            "lap s",
-            "fine s",
-            "to exact %"
+            page::lines_table(self).first(7).to_text()
         );
-        let mut row = |name: &str, f: &LineFigures, gap: Option<f64>| {
-            text += &format!(
-                "{name:24}{:>10.2}{:>10.4}{:>12.4}{:>10.3}{:>10.3}{:>12}\n",
-                f.length_m,
-                f.gamma_1pm,
-                f.integral_kappa2_1pm,
-                f.lap_time_s,
-                f.lap_time_fine_s,
-                gap.map_or(String::new(), |g| format!("{g:+.3}"))
-            );
-        };
-        for (name, figures) in &self.best {
-            row(
-                &format!("best {name}"),
-                figures,
-                self.above_exact_percent.get(name).copied().flatten(),
-            );
-        }
-        for (name, figures) in &self.exact {
-            if let Some(figures) = figures {
-                row(&format!("exact {name}"), figures, None);
-            }
-        }
-        if let Some(figures) = &self.compromise {
-            row("compromise", figures, None);
-        }
-        row("reference", &self.reference, None);
         if let Some(volume) = self.hypervolume {
             text += &format!("Front of {} lines, hypervolume {volume:.4}\n", self.front_size);
         }
         text += &format!(
-            "{} lines evaluated in {:.1} s ({:.0} per second) on {} {}; exact solvers {:.1} s\n",
-            self.evaluations,
+            "{} lines evaluated in {:.1} s ({:.0} per second) on {}; reference optima {:.1} s\n",
+            record.evaluations,
             self.search_elapsed_s,
-            self.evaluations_per_s,
-            self.backend,
-            self.adapter,
+            record.evaluations_per_s,
+            record.device(),
             self.exact_elapsed_s
         );
-        if !self.failures.is_empty() {
-            text += &format!("Lines that failed: {}\n", failures_in_words(&self.failures));
+        if !record.failures.is_empty() {
+            text += &format!("Lines that failed: {}\n", failures_in_words(&record.failures));
         }
-        for fault in &self.device_faults {
-            text += &format!("Note: {fault}\n");
-        }
+        text += &record.notes();
         for warning in &self.warnings {
             text += &format!("Note: {warning}\n");
         }
@@ -291,28 +236,17 @@ impl Summary {
     }
 }
 
-/// Writes the resolved settings into `folder`, as a study file that repeats the run.
-///
-/// # Errors
-/// [`crate::Error::Io`] if it cannot be written.
-pub fn write_settings(folder: &Path, settings: &RacelineSettings) -> Result<()> {
-    write_study(folder, &settings.to_toml())
-}
-
-/// Writes all files of a run into `folder`.
+/// Writes lines, fronts, figures and the page into `folder`.
 ///
 /// # Errors
 /// [`crate::Error::Io`] if one cannot be written.
-pub fn write_results(
+pub(super) fn report(
     folder: &Path,
     settings: &RacelineSettings,
     setup: &Setup,
     outcome: &Outcome,
     summary: &Summary,
 ) -> Result<()> {
-    files::write(folder, settings, setup, outcome, summary)?;
-    pictures::draw(folder, setup, outcome)?;
-    surfaces::draw(folder, settings, setup, outcome)?;
-    page::write(folder, settings, setup, outcome, summary)?;
-    files::write_manifest(folder, settings, setup, outcome)
+    files::write(folder, setup, outcome)?;
+    page::write(folder, settings, setup, outcome, summary)
 }

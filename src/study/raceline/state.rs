@@ -1,13 +1,13 @@
-//! The state of a racing-line study: all that it takes to go on.
+//! The state of a racing-line study: all that it takes to resume it.
 
+use super::Setup;
 use super::front::FrontState;
-use super::plain::PlainState;
-use super::search::{FoundLine, LineState};
 use super::settings::RacelineSettings;
-use super::{Setup, StudyProgress};
+use super::whole_line_search::WholeLineState;
+use super::window_search::{FoundLine, LineState};
 use crate::error::Result;
-use crate::study::keeper::{Keeper, Origin};
-use crate::study::run::Inputs;
+use crate::study::framework::state_file::{Origin, StateFile};
+use crate::study::framework::{Inputs, Progress, State};
 use crate::swarm::checkpoint::Checkpoint;
 use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
@@ -21,7 +21,7 @@ pub(super) struct FinishedObjective {
     pub best: Vec<f64>,
 }
 
-/// The state of a study. A checkpoint of it goes on bit for bit on the backend where it began.
+/// The state of a study. A checkpoint of it is resumed bit for bit on the backend where it began.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct LinesState {
     /// What the study was asked to do.
@@ -34,19 +34,13 @@ pub struct LinesState {
     pub(super) steps: Vec<FoundLine>,
     /// The search in hand.
     pub(super) search: Option<Box<LineState>>,
-    /// The plain swarm in hand.
-    pub(super) plain: Option<Box<PlainState>>,
+    /// The swarm of whole lines in hand.
+    pub(super) whole_lines: Option<Box<WholeLineState>>,
     /// The swarm that looks for the front.
     pub(super) front: Option<Box<FrontState>>,
 }
 
 impl LinesState {
-    /// Whether nothing has been evaluated yet.
-    pub fn is_untouched(&self) -> bool {
-        let at_work = self.search.is_some() || self.plain.is_some() || self.front.is_some();
-        self.finished.is_empty() && self.steps.is_empty() && !at_work
-    }
-
     /// What has gone wrong with devices in all that is done with.
     pub(super) fn device_faults(&self) -> Vec<String> {
         let done = self.finished.iter().map(|objective| &objective.found);
@@ -54,6 +48,22 @@ impl LinesState {
             .flat_map(|found| &found.device_faults)
             .cloned()
             .collect()
+    }
+}
+
+impl State<RacelineSettings> for LinesState {
+    fn settings(&self, _: &str) -> Result<RacelineSettings> {
+        Ok(self.settings.clone())
+    }
+
+    fn set_settings(&mut self, settings: &RacelineSettings) -> Result<()> {
+        self.settings.clone_from(settings);
+        Ok(())
+    }
+
+    fn is_untouched(&self) -> bool {
+        let at_work = self.search.is_some() || self.whole_lines.is_some() || self.front.is_some();
+        self.finished.is_empty() && self.steps.is_empty() && !at_work
     }
 }
 
@@ -69,21 +79,21 @@ pub(super) fn inputs_of(setup: &Setup) -> String {
 }
 
 /// A study at work: its state, where that is kept, and who watches.
-pub(super) struct Work<'a> {
+pub(super) struct Running<'a> {
     pub state: LinesState,
-    pub keeper: &'a mut Keeper,
-    pub observe: &'a mut dyn FnMut(&StudyProgress) -> ControlFlow<()>,
+    pub state_file: &'a mut StateFile,
+    pub observe: &'a mut dyn FnMut(&Progress) -> ControlFlow<()>,
     pub interrupted: bool,
 }
 
-impl Work<'_> {
+impl Running<'_> {
     /// Tells what is being done and saves the state if that is due, brought up to date by `update` before.
     pub fn told(
         &mut self,
-        progress: &StudyProgress,
+        progress: &Progress,
         update: impl FnOnce(&mut LinesState),
     ) -> Result<ControlFlow<()>> {
-        // Once broken off, the state stays as it was then: what is reported after is of searches cut short.
+        // Once interrupted, the state stays as it was then: what is reported after is of searches cut short.
         if self.interrupted {
             return Ok(ControlFlow::Break(()));
         }
@@ -91,29 +101,24 @@ impl Work<'_> {
         self.interrupted = flow.is_break();
         if self.interrupted {
             update(&mut self.state);
-            self.keeper.keep(&self.state)?;
-        } else if self.keeper.due() {
+            self.state_file.save(&self.state)?;
+        } else if self.state_file.due() {
             update(&mut self.state);
-            self.keeper.keep_or_warn(&self.state);
+            self.state_file.save_or_warn(&self.state);
         }
         Ok(flow)
     }
 
     /// Whether to go on with what a solver is at.
     pub fn asked(&mut self, stage: &str) -> Result<ControlFlow<()>> {
-        let progress = StudyProgress {
-            stage: stage.to_owned(),
-            evaluations: 0,
-            best: "not known yet".to_owned(),
-        };
-        self.told(&progress, |_| ())
+        self.told(&Progress::reached(stage, 0, "not known yet"), |_| ())
     }
 
     /// Takes a step that is done with into the state, and saves it.
     pub fn finished(&mut self, update: impl FnOnce(&mut LinesState)) {
         if !self.interrupted {
             update(&mut self.state);
-            self.keeper.keep_or_warn(&self.state);
+            self.state_file.save_or_warn(&self.state);
         }
     }
 }

@@ -1,299 +1,312 @@
-//! The whole way from a log to a lap: the car that drove it, its limits, the line that suits it, that line driven by the
-//! car itself, whose grip is fed back into the limits until both laps agree, and a hybrid's energy on it.
+//! The whole way from a log to a lap: the car that drove it, its g-g-v envelope, the line that suits it, that line driven by the
+//! car itself, whose grip is fed back into the envelope until both laps agree, and a hybrid's energy on it.
 
 mod page;
+mod settings;
 mod stage;
-mod story;
+mod summary;
 
-pub use stage::{Inputs, Stages};
-pub use story::{EnergySummary, RoundSummary, Summary};
+pub use settings::RunSettings;
+pub use stage::Stages;
+pub use summary::{EnergySummary, RoundSummary, Summary};
 
-use crate::config::{Document, read_text};
+use crate::config::settings::Settings;
 use crate::error::{Error, Result};
-use crate::evaluate::gpu::DispatchWatch;
-use crate::line::PointMass;
 use crate::line::energy::hybrid_parts;
-use crate::study::envelope::{self, EnvelopeSettings, car_limits};
-use crate::study::hybrid::{self, HybridStudySettings};
-use crate::study::identify::{self, IdentifySettings};
-use crate::study::journal::{Journal, Recorder};
-use crate::study::memory::Size;
-use crate::study::raceline::{self, RacelineSettings};
-use crate::study::transient::{self, DriveState, TransientSettings};
+use crate::line::read_line;
+use crate::report::write_whole;
+use crate::study::envelope::{EnvelopeSettings, EnvelopeStudy};
+use crate::study::framework::journal::Journal;
+use crate::study::framework::memory::{self, Kept};
+use crate::study::framework::{
+    Inputs, Plan, Progress, RunRecord, Study, Subject, Watch, Work, resumed_or_new, write_results,
+};
+use crate::study::hybrid::{Hybrid, HybridStudySettings};
+use crate::study::identify::{self, Identify, planned, without_laps};
+use crate::study::raceline::{self, Raceline, RacelineSettings, road_read};
+use crate::study::transient::{self, NamedLine, Transient, TransientSettings};
 use crate::vehicle::{Car, Envelope};
-use serde::{Deserialize, Serialize};
-pub(in crate::study) use stage::go_on;
+use serde::de::DeserializeOwned;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::sync::atomic::AtomicBool;
 
-/// Settings of a run.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct RunSettings {
-    /// How the car is identified.
-    pub identify: IdentifySettings,
-    /// How the line is found; car and envelope are those of the run.
-    pub raceline: RacelineSettings,
-    /// Room that the line leaves on either side of the car for the driver's errors (m).
-    pub margin_m: f64,
-    /// Most lines that are driven, each within the limits that the one before it left.
-    pub rounds: usize,
-    /// Where stages are kept for runs of the same inputs; nothing to keep them in the run's own folder until it is done.
-    pub cache: Option<PathBuf>,
-}
-
-impl Default for RunSettings {
-    fn default() -> Self {
-        Self {
-            identify: IdentifySettings {
-                // The bundled car with all that the story tells of: an engine map and a hybrid drive.
-                car: "gt_hybrid".to_owned(),
-                ..IdentifySettings::default()
-            },
-            raceline: RacelineSettings::default(),
-            margin_m: 0.5,
-            rounds: 2,
-            cache: None,
-        }
-    }
-}
-
-impl RunSettings {
-    /// Reads a study file: `identify` and `raceline` name study files of these, `margin_m` and `rounds` are its own.
-    ///
-    /// # Errors
-    /// [`Error::Io`] if a file cannot be read, [`Error::Input`] naming file, line and field if it says something wrong.
-    pub fn read(path: &Path) -> Result<Self> {
-        let text = read_text(path)?;
-        let folder = path.parent().unwrap_or(Path::new(""));
-        let document = Document::parse(path, &text)?;
-        let root = document.root();
-        let mut s = Self::default();
-        if let Some(name) = root.string("identify")? {
-            s.identify = IdentifySettings::read(&folder.join(name))?;
-        }
-        if let Some(name) = root.string("raceline")? {
-            s.raceline = RacelineSettings::read(&folder.join(name))?;
-        }
-        s.margin_m = root.number("margin_m", 0.0, 5.0, "m")?.unwrap_or(s.margin_m);
-        s.rounds = root.integer("rounds", 1, 20)?.map_or(s.rounds, |n| n as usize);
-        root.finish()?;
-        Ok(s)
-    }
-}
-
-impl RunSettings {
-    /// How a line of `car` is found, within limits from a file where there are any: with room for the driver's errors.
-    pub fn line_of(&self, car: &str, envelope: Option<PathBuf>) -> RacelineSettings {
-        RacelineSettings {
-            car: car.to_owned(),
-            envelope,
-            car_width_m: self.raceline.car_width_m + 2.0 * self.margin_m,
-            ..self.raceline.clone()
-        }
-    }
-
-    /// The settings as TOML, with those of the stages in tables: to be read by people, the stages of a study file are files.
-    pub fn to_toml(&self) -> String {
-        let within = |stage: &str, toml: &str| toml.replace("\n[", &format!("\n[{stage}."));
-        let cache = self.cache.as_ref().map_or(String::new(), |cache| {
-            let path = toml::Value::String(cache.display().to_string());
-            format!("cache = {path}\n")
-        });
-        format!(
-            "margin_m = {:?}\nrounds = {}\n{cache}\n[identify]\n{}\n[raceline]\n{}",
-            self.margin_m,
-            self.rounds,
-            within("identify", &self.identify.to_toml()),
-            within("raceline", &self.raceline.to_toml())
-        )
-    }
-}
+/// The study.
+pub struct Run;
 
 /// Change of the grip's share from one line to the next below which another line would be the same.
 const SETTLED: f64 = 0.015;
 
 /// What a run begins with: all that it reads, and could refuse.
-pub struct Prepared<'a> {
-    settings: &'a RunSettings,
+pub struct Prepared {
     /// Log and car.
     pub setup: identify::Setup,
-    /// Track and limits, those of the car that the identification begins with.
+    /// Track and envelope, that of the car which the identification begins with.
     pub road: raceline::Setup,
 }
 
-/// Reads what the run's stages are to read.
-///
-/// # Errors
-/// [`Error::Io`] and [`Error::Input`] for what cannot be read or used.
-pub fn prepare(settings: &RunSettings) -> Result<Prepared<'_>> {
-    let setup = identify::set_up(&settings.identify)?;
-    identify::check_swarms(&settings.identify, &setup)?;
-    let road = raceline::set_up(&settings.line_of(&settings.identify.car, None))?;
-    let car = Car::load(&settings.identify.car)?;
-    if car.hybrid.is_some() {
-        // What the last stage is to need shows before the first.
-        hybrid_parts(&car)?;
-    }
-    Ok(Prepared {
-        settings,
-        setup,
-        road,
-    })
-}
+impl Study for Run {
+    const NAME: &'static str = "run";
+    const ABOUT: &'static str =
+        "The whole way from a log to a lap: the car, its g-g-v envelope, its line, and that line driven.";
+    const DETAILS: &'static str = "Examples:\n  lapswarm run\n  lapswarm run --log lap.csv --car start.toml --track circuit.csv\n\n\
+        A study file names study files of the stages, or has their settings in tables: identify = \"identify.toml\", [raceline].";
+    type Settings = RunSettings;
+    type State = Journal;
+    type Prepared = Prepared;
+    type Outcome = Outcome;
+    type Summary = Summary;
 
-impl Prepared<'_> {
-    /// What the identification's memory goes with.
-    pub fn identify_size(&self) -> Size {
-        Size {
-            samples: self.setup.log.samples(),
-            ..self.settings.identify.size()
+    fn prepare(settings: &RunSettings) -> Result<Prepared> {
+        let setup = Identify::prepare(&settings.identify)?;
+        let road = raceline::set_up(&settings.line_of(&settings.identify.car, None))?;
+        let car = Car::load(&settings.identify.car)?;
+        if car.hybrid.is_some() {
+            // What the last stage is to need shows before the first.
+            hybrid_parts(&car)?;
+        }
+        Ok(Prepared { setup, road })
+    }
+
+    /// Each stage has the memory for itself: the one that needs most counts.
+    fn size(settings: &RunSettings, prepared: Option<&Prepared>) -> Vec<Kept> {
+        let setup = prepared.map(|prepared| &prepared.setup);
+        let identify = Identify::size(&settings.identify, setup);
+        let raceline = Raceline::size(&settings.raceline, None);
+        if memory::needed_mib(&identify) >= memory::needed_mib(&raceline) {
+            identify
+        } else {
+            raceline
         }
     }
+
+    fn plan(settings: &RunSettings, prepared: &Prepared, plan: Plan) -> Result<Plan> {
+        let plan = planned(&settings.identify, &prepared.setup, plan)?;
+        Ok(road_read(plan, &prepared.road))
+    }
+
+    fn solve(
+        settings: &RunSettings,
+        prepared: &Prepared,
+        work: Work<'_, Journal>,
+    ) -> Result<Option<Outcome>> {
+        run(settings, prepared, work).map(Some)
+    }
+
+    fn record(outcome: &Outcome) -> &RunRecord {
+        &outcome.summary.record
+    }
+
+    fn summarise(_: &RunSettings, _: &Prepared, outcome: &Outcome) -> Summary {
+        outcome.summary.clone()
+    }
+
+    fn subject(settings: &RunSettings, prepared: &Prepared) -> Subject {
+        Subject {
+            seed: settings.identify.seed,
+            car: prepared.setup.replay.free.car.name.clone(),
+            log: Some(prepared.setup.log.source.clone()),
+            track: None,
+        }
+    }
+
+    fn report(folder: &Path, _: &RunSettings, _: &Prepared, _: &Outcome, summary: &Summary) -> Result<()> {
+        write_whole(folder.join("story.txt"), summary.to_text().as_bytes())?;
+        page::write(folder, summary)
+    }
+
+    fn text(_: &RunSettings, summary: &Summary) -> String {
+        summary.to_text()
+    }
+
+    fn verdict(_: &RunSettings, summary: &Summary) -> Result<()> {
+        if summary.agrees {
+            return Ok(());
+        }
+        let text = "the driven lap and the quasi-steady-state lap differ by more than half a percent (see the story above)";
+        Err(Error::Study(text.to_owned()))
+    }
+
+    fn check(path: &Path) -> Result<String> {
+        let settings = RunSettings::read(path)?;
+        identify::set_up(&without_laps(&settings.identify))?;
+        raceline::set_up(&settings.line_of(&settings.identify.car, None))?;
+        Ok(format!("at most {} rounds", settings.rounds))
+    }
 }
 
-/// What a run works with; nothing of it changes a result.
-#[derive(Clone, Copy, Debug)]
-pub struct Means<'a> {
-    /// Where results of stages are kept, if anywhere.
-    pub cache: Option<&'a Path>,
-    /// Time between two saves of the state of the stage at work.
-    pub every: Duration,
-    /// Memory that each stage may take (MiB).
-    pub memory_limit_mib: u64,
+/// What came of a run: its figures are those of its stages.
+pub struct Outcome {
+    /// The figures.
+    pub summary: Summary,
 }
 
-/// Runs everything into `folder`. `observe` is told what is being done, and may break the run off.
+/// A run at work.
+struct Going<'a> {
+    stages: Stages,
+    folder: PathBuf,
+    memory_limit_mib: u64,
+    observe: &'a mut dyn FnMut(&Progress) -> ControlFlow<()>,
+    stop: Arc<AtomicBool>,
+    /// Names of stages that were taken from earlier runs.
+    reused: Vec<String>,
+}
+
+impl Going<'_> {
+    /// A stage: its folder, and its figures.
+    fn stage<S: Study>(
+        &mut self,
+        number: usize,
+        doing: &str,
+        inputs: &Inputs,
+        settings: &S::Settings,
+        prepared: &S::Prepared,
+    ) -> Result<(PathBuf, S::Summary)> {
+        let (observe, stop, folder) = (&mut *self.observe, &self.stop, &self.folder);
+        let limit_mib = self.memory_limit_mib;
+        let name = format!("{number}_{}", S::NAME);
+        let interrupted = || Error::Interrupted(folder.clone());
+        if observe(&Progress::reached(doing, 0, "")).is_break() {
+            return Err(interrupted());
+        }
+        let (at, reused) = self.stages.run(&name, inputs, |to, state_file| {
+            let _allowed = memory::check(&S::size(settings, Some(prepared)), limit_mib)?;
+            let mut told = |progress: &Progress| {
+                let mut progress = progress.clone();
+                progress.stage = format!("{doing}: {}", progress.stage);
+                observe(&progress)
+            };
+            // Where the stage's file lies is the run's matter: whatever state was left for these inputs is used.
+            let outcome = resumed_or_new::<S, _>(settings, state_file, false, |state, state_file| {
+                let work = Work {
+                    state,
+                    state_file,
+                    observe: &mut told,
+                    stop: Arc::clone(stop),
+                };
+                S::solve(settings, prepared, work)
+            });
+            // The run's folder is what is resumed, wherever the stage's state is.
+            let outcome = match outcome {
+                Err(Error::Interrupted(_)) => None,
+                outcome => outcome?,
+            };
+            let outcome = outcome.filter(|outcome| !S::record(outcome).interrupted);
+            write_results::<S>(to, settings, prepared, &outcome.ok_or_else(interrupted)?).map(drop)
+        })?;
+        if reused {
+            self.reused.push(S::NAME.to_owned());
+        }
+        let summary = read_summary(&at)?;
+        Ok((at, summary))
+    }
+}
+
+/// The figures of a stage.
+fn read_summary<T: DeserializeOwned>(folder: &Path) -> Result<T> {
+    let path = folder.join("summary.json");
+    let text = std::fs::read_to_string(&path).map_err(|e| Error::io(&path, "read", e))?;
+    serde_json::from_str(&text)
+        .map_err(|e| Error::input(&path, "contents", e.to_string(), "the summary of a stage"))
+}
+
+/// Runs everything into the folder of the state_file.
 ///
 /// # Errors
-/// Those of the stages; [`Error::Interrupted`] if the run was broken off.
-pub fn run(
-    prepared: &Prepared<'_>,
-    folder: &Path,
-    means: &Means<'_>,
-    mut observe: impl FnMut(&str) -> ControlFlow<()>,
-) -> Result<Summary> {
-    let Prepared { settings, setup, .. } = prepared;
-    let dispatches = DispatchWatch::begin();
-    let began = Instant::now();
-    let stages = Stages::new(folder, means.cache, means.every);
-    let mut reused = Vec::new();
-    let mut keep = |name: &str, stage: (PathBuf, bool)| {
-        if stage.1 {
-            reused.push(name.to_owned());
-        }
-        stage.0
+/// Those of the stages; [`Error::Interrupted`] if the run was interrupted.
+fn run(settings: &RunSettings, prepared: &Prepared, work: Work<'_, Journal>) -> Result<Outcome> {
+    let watch = Watch::begin();
+    let journal = work.state.map_or_else(|| Journal::new(Run::NAME, settings), Ok)?;
+    work.state_file.save(&journal)?;
+    let folder = work.state_file.folder().to_owned();
+    // Without a cache to share, an interrupted run still finds its own stages again.
+    let own = folder.join(".stages");
+    let cache = settings.cache.as_ref().unwrap_or(&own);
+    let mut going = Going {
+        stages: Stages::new(&folder, Some(cache), work.state_file.interval()),
+        folder,
+        memory_limit_mib: memory::limit_mib(),
+        observe: work.observe,
+        stop: work.stop,
+        reused: Vec::new(),
     };
-    let broken_off = || Error::Interrupted(folder.to_owned());
+    let outcome = run_stages(settings, prepared, &mut going, &watch)?;
+    if own.exists() {
+        std::fs::remove_dir_all(&own).map_err(|e| Error::io(&own, "remove", e))?;
+    }
+    Ok(outcome)
+}
 
-    let mut inputs = Inputs::of_program("identify");
+/// The stages, one after the other.
+fn run_stages(
+    settings: &RunSettings,
+    prepared: &Prepared,
+    going: &mut Going<'_>,
+    watch: &Watch,
+) -> Result<Outcome> {
+    let setup = &prepared.setup;
+    let mut inputs = Inputs::of_program(Identify::NAME);
     inputs.add(&settings.identify);
     inputs.add(&(&setup.log, &setup.replay.free.car, &setup.truth));
-    let stage = stages.run("1_identify", &inputs, |to, keeper| {
-        let _allowed = prepared.identify_size().check(means.memory_limit_mib)?;
-        let outcome = go_on(keeper, |state, keeper| {
-            identify::search_from(&settings.identify, setup, state, keeper, |report| {
-                let done = report.progress.map_or(String::new(), |p| {
-                    format!(" {} of {}, best {:.2e}", p.iteration, report.planned, p.best[0])
-                });
-                observe(&format!("the car: {:?}{done}", report.stage).to_lowercase())
-            })
-        });
-        // The run's folder is what is gone on with, wherever the stage's state is.
-        let outcome = match outcome {
-            Err(Error::Interrupted(_)) => return Err(broken_off()),
-            outcome => outcome?,
-        };
-        if outcome.interrupted {
-            return Err(broken_off());
-        }
-        let summary = identify::summarise(&settings.identify, setup, &outcome);
-        identify::write_results(to, &settings.identify, setup, &outcome, &summary)
-    })?;
-    let identified = keep("identify", stage);
-    let car_path = identified.join("car.toml");
-    let car = Car::load(&car_path.display().to_string())?;
+    let (identified, fitted) = going.stage::<Identify>(1, "the car", &inputs, &settings.identify, setup)?;
+    let car_path = identified.join("car.toml").display().to_string();
+    let car = Car::load(&car_path)?;
 
-    if observe("the car's limits").is_break() {
-        return Err(broken_off());
-    }
-    let mut inputs = Inputs::of_program("envelope");
+    let envelope = EnvelopeSettings {
+        car: car_path.clone(),
+        ..EnvelopeSettings::default()
+    };
+    let mut inputs = Inputs::of_program(EnvelopeStudy::NAME);
     inputs.add(&car);
-    let stage = stages.run("2_envelope", &inputs, |to, _| {
-        let began = Instant::now();
-        let limits = car_limits(&car, &EnvelopeSettings::default())?;
-        let summary = envelope::summarise(&car.name, &limits, None, began.elapsed().as_secs_f64());
-        envelope::write_results(to, &limits, None, &summary)
-    })?;
-    let whole = Envelope::load(keep("envelope", stage).join("envelope.csv"))?;
+    let envelope_of = EnvelopeStudy::prepare(&envelope)?;
+    let (at, _) = going.stage::<EnvelopeStudy>(2, "its envelope", &inputs, &envelope, &envelope_of)?;
+    let whole = Envelope::load(at.join("envelope.csv"))?;
 
     let mut rounds: Vec<RoundSummary> = Vec::new();
     let mut driven_within: Option<PathBuf> = None;
     let mut last_line: Option<PathBuf> = None;
     for round in 1..=settings.rounds {
-        let number = 1 + 2 * round;
-        let line_settings = settings.line_of(&car_path.display().to_string(), driven_within.clone());
-        let line_setup = raceline::set_up(&line_settings)?;
-        let mut inputs = Inputs::of_program("raceline");
-        // The car is in its limits; where its file lies does not matter.
+        let line = settings.line_of(&car_path, driven_within.clone());
+        let road = raceline::set_up(&line)?;
+        let mut inputs = Inputs::of_program(Raceline::NAME);
+        // The car is in its envelope; where its file lies does not matter.
         inputs.add(&RacelineSettings {
             car: String::new(),
             envelope: None,
-            ..line_settings.clone()
+            ..line.clone()
         });
-        inputs.add(&(&line_setup.cuts, line_setup.car.envelope.rows()));
-        let stage = stages.run(&format!("{number}_raceline"), &inputs, |to, keeper| {
-            let _allowed = line_settings.size().check(means.memory_limit_mib)?;
-            let outcome = go_on(keeper, |state, keeper| {
-                raceline::find_lines_from(&line_settings, &line_setup, state, keeper, |p| {
-                    observe(&format!(
-                        "line {round}: {}, {} lines, best {}",
-                        p.stage, p.evaluations, p.best
-                    ))
-                })
-            })?;
-            if outcome.interrupted {
-                return Err(broken_off());
-            }
-            let summary = raceline::summarise(&line_settings, &line_setup, &outcome);
-            raceline::write_results(to, &line_settings, &line_setup, &outcome, &summary)
-        })?;
-        let line_folder = keep("raceline", stage);
-        let line_path = line_folder.join("line_fastest.csv");
+        inputs.add(&(&road.cuts, road.car.envelope.rows()));
+        let doing = format!("line {round}");
+        let (at, found) = going.stage::<Raceline>(1 + 2 * round, &doing, &inputs, &line, &road)?;
+        let line_path = at.join("line_fastest.csv");
 
-        if observe(&format!("line {round}: driven by the car")).is_break() {
-            return Err(broken_off());
-        }
-        let points = transient::read_line(&line_path)?;
-        let limits = PointMass {
-            envelope: whole.clone(),
-            ..line_setup.car.clone()
-        };
-        let edges = [line_setup.edges_m[0].as_slice(), line_setup.edges_m[1].as_slice()];
-        let drive_settings = TransientSettings {
+        let drive = TransientSettings {
+            line: vec![line_path.clone()],
+            track: line.track.clone(),
+            car: car_path.clone(),
             car_width_m: settings.raceline.car_width_m,
             ..TransientSettings::default()
         };
-        let mut inputs = Inputs::of_program("transient");
-        inputs.add(&(&car, &drive_settings, whole.rows(), &line_setup.edges_m));
+        let points_m = read_line(&line_path)?;
+        let width_m = settings.raceline.car_width_m;
+        let name = "fastest".to_owned();
+        let fastest = NamedLine::new(name, points_m, &road.edges_m, width_m)?;
+        let mut road = road;
+        road.car.envelope = whole.clone();
+        let mut inputs = Inputs::of_program(Transient::NAME);
+        inputs.add(&(&car, drive.car_width_m, whole.rows(), &road.edges_m));
         inputs.add_file(&line_path)?;
-        let stage = stages.run(&format!("{}_transient", number + 1), &inputs, |to, keeper| {
-            let began = Instant::now();
-            let outcome = go_on(keeper, |state: Option<DriveState>, keeper| {
-                let begun = (state.unwrap_or_default(), keeper);
-                transient::drive_line_from(&car, &limits, &points, edges, &drive_settings, begun, |_, _| {
-                    observe(&format!("line {round}: driven by the car"))
-                })
-            })?;
-            let outcome = outcome.ok_or_else(broken_off)?;
-            let summary = transient::summarise(&car.name, &outcome, began.elapsed().as_secs_f64());
-            transient::write_results(to, &outcome, &summary)
-        })?;
-        let driven = keep("transient", stage);
-        driven_within = Some(driven.join("envelope_driven.csv"));
+        let driven = transient::Prepared {
+            car: car.clone(),
+            road,
+            lines: vec![fastest],
+        };
+        let doing = format!("line {round}, driven by the car");
+        let (at, lap) = going.stage::<Transient>(2 + 2 * round, &doing, &inputs, &drive, &driven)?;
+        driven_within = Some(at.join("envelope_driven.csv"));
         last_line = Some(line_path);
-        let found = RoundSummary::read(&line_folder, &driven)?;
+        let found = RoundSummary::of(&found, &lap)?;
         let settled = rounds
             .last()
             .is_some_and(|before| (before.grip_share - found.grip_share).abs() <= SETTLED);
@@ -304,9 +317,9 @@ pub fn run(
     }
     let mut energy = None;
     if car.hybrid.is_some() {
-        let energy_settings = HybridStudySettings {
+        let deployed = HybridStudySettings {
             track: settings.raceline.track.clone(),
-            car: car_path.display().to_string(),
+            car: car_path,
             envelope: driven_within,
             line: last_line,
             car_width_m: settings.raceline.car_width_m,
@@ -315,58 +328,35 @@ pub fn run(
             adapter: settings.raceline.adapter.clone(),
             ..HybridStudySettings::default()
         };
-        let energy_inputs = hybrid::read_inputs(&energy_settings)?;
-        let energy_size = energy_inputs.size(&energy_settings);
-        // The line is given, and found at once.
-        let Some(energy_setup) = energy_inputs.with_line(&energy_settings, &Arc::default())? else {
-            return Err(broken_off());
-        };
-        let mut inputs = Inputs::of_program("hybrid");
-        for path in energy_settings.line.iter().chain(&energy_settings.envelope) {
+        let mut inputs = Inputs::of_program(Hybrid::NAME);
+        for path in deployed.line.iter().chain(&deployed.envelope) {
             inputs.add_file(path)?;
         }
-        inputs.add(&(
-            &car,
-            &energy_settings.backend,
-            &energy_settings.adapter,
-            energy_settings.seed,
-        ));
-        inputs.add(&(&energy_settings.track, energy_settings.car_width_m));
+        inputs.add(&(&car, &deployed.backend, &deployed.adapter, deployed.seed));
+        inputs.add(&(&deployed.track, deployed.car_width_m));
+        let prepared = Hybrid::prepare(&deployed)?;
         let number = 3 + 2 * rounds.len();
-        let stage = stages.run(&format!("{number}_hybrid"), &inputs, |to, keeper| {
-            let _allowed = energy_size.check(means.memory_limit_mib)?;
-            let outcome = go_on(keeper, |journal, keeper| {
-                let journal = match journal {
-                    Some(journal) => journal,
-                    None => Journal::new("hybrid", &energy_settings)?,
-                };
-                let mut recorder = Recorder::new(journal, keeper);
-                hybrid::run_recorded(&energy_settings, &energy_setup, &mut recorder, |p| {
-                    observe(&format!(
-                        "energy: {}, {} laps, {}",
-                        p.stage, p.evaluations, p.best
-                    ))
-                })
-            })?;
-            if outcome.interrupted {
-                return Err(broken_off());
-            }
-            let summary = hybrid::summarise(&energy_settings, &energy_setup, &outcome);
-            hybrid::write_results(to, &energy_settings, &energy_setup, &outcome, &summary)
-        })?;
-        energy = Some(EnergySummary::read(&keep("hybrid", stage))?);
+        let (_, found) = going.stage::<Hybrid>(number, "energy", &inputs, &deployed, &prepared)?;
+        energy = Some(EnergySummary::of(&found)?);
     }
-    let mut summary = Summary::put_together(
-        settings,
-        setup,
-        &identified,
-        &car,
-        &whole,
-        rounds,
-        reused,
-        began.elapsed().as_secs_f64(),
-    )?;
-    summary.energy = energy;
-    summary.write(folder, dispatches.longest_ms())?;
-    Ok(summary)
+    let mut record = fitted.record.clone();
+    record.elapsed_s = watch.elapsed_s();
+    record.longest_dispatch_ms = watch.longest_dispatch_ms();
+    Ok(Outcome {
+        summary: Summary {
+            study: Run::NAME.to_owned(),
+            seed: settings.identify.seed,
+            record,
+            log: setup.log.source.clone(),
+            car: car.name.clone(),
+            total_parameter_error: fitted.total_parameter_error,
+            rms_error: fitted.rms_error,
+            ay_mps2: [25.0, 65.0].map(|v| whole.at(v).ay_mps2),
+            top_speed_mps: whole.top_speed_mps(),
+            agrees: rounds.last().is_some_and(RoundSummary::agrees),
+            rounds,
+            energy,
+            reused: std::mem::take(&mut going.reused),
+        },
+    })
 }

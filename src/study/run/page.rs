@@ -1,8 +1,8 @@
 //! The interactive report of a run, over those of its stages.
 
-use super::story::{RoundSummary, Summary};
+use super::summary::{RoundSummary, Summary};
 use crate::error::Result;
-use crate::report::{Cells, Column, Curve, CurvePanel, HtmlReport, Scale};
+use crate::report::{Curves, HtmlReport, Panel, Table};
 use crate::study::compare::{Trace, overlay, read_table};
 use std::path::Path;
 
@@ -14,7 +14,7 @@ pub(super) fn write(folder: &Path, summary: &Summary) -> Result<()> {
     if let Some(last) = summary.rounds.last() {
         page.tile("Driven lap", format!("{:.3}", last.driven_lap_time_s), "s");
         page.tile(
-            "Point mass with as much grip",
+            "Quasi-steady-state lap with as much grip",
             format!("{:.3}", last.point_mass_lap_time_s),
             "s",
         );
@@ -23,7 +23,7 @@ pub(super) fn write(folder: &Path, summary: &Summary) -> Result<()> {
     }
     page.tile("Top speed", format!("{:.1}", summary.top_speed_mps), "m/s");
     if !summary.agrees {
-        page.warning("The driven lap and the point mass's differ by more than half a percent.");
+        page.warning("The driven lap and the quasi-steady-state lap differ by more than half a percent.");
     }
     // Identification, limits, then a line and its drive for each round.
     let rounds = summary.rounds.len();
@@ -37,7 +37,7 @@ pub(super) fn write(folder: &Path, summary: &Summary) -> Result<()> {
     }
     page.section("Stages", "Each has a report of its own.");
     page.reports_within(&stages);
-    table(&mut page, &summary.rounds)?;
+    page.table("Lines, one after the other", "", &table(&summary.rounds))?;
 
     let read =
         |number: usize, name: &str, file: &str| read_table(&folder.join(stage(number, name)).join(file));
@@ -51,24 +51,27 @@ pub(super) fn write(folder: &Path, summary: &Summary) -> Result<()> {
             "The last line as it was planned, and as the car itself drives it.",
         );
         let laps = [
-            ("planned by the point mass", planned),
+            ("planned, quasi-steady-state", planned),
             ("driven by the 4DOF car", driven),
         ];
         overlay(&mut page, &laps, road.as_ref(), true)?;
     }
     let whole = read(2, "envelope", "envelope.csv")?;
     let held = read(line_of + 1, "transient", "envelope_driven.csv")?;
-    limits(&mut page, [whole.as_ref(), held.as_ref()])?;
-    page.provenance("log", &summary.log);
-    page.provenance("seed", summary.seed.to_string());
-    page.provenance("backend", &summary.backend);
-    page.provenance("adapter", &summary.adapter);
-    page.provenance(
-        "candidates of the identification",
-        summary.evaluations.to_string(),
+    page.section(
+        "Limits",
+        "What the car can do in steady states, and what of it was held on the line.",
     );
-    page.provenance("time", format!("{:.1} s", summary.elapsed_s));
-    page.provenance("stages taken from earlier runs", summary.reused.join(", "));
+    page.place(&limits([("the car's", whole.as_ref()), ("held", held.as_ref())]))?;
+    page.facts(&[
+        ("log", &summary.log),
+        ("seed", &summary.seed),
+        ("backend", &summary.record.backend),
+        ("adapter", &summary.record.adapter),
+        ("candidates of the identification", &summary.record.evaluations),
+        ("time", &format!("{:.1} s", summary.record.elapsed_s)),
+        ("stages taken from earlier runs", &summary.reused.join(", ")),
+    ]);
     page.write(folder.join("report.html"))
 }
 
@@ -88,57 +91,34 @@ fn sentence(line: &str) -> String {
     told.to_owned()
 }
 
-fn table(page: &mut HtmlReport, rounds: &[RoundSummary]) -> Result<()> {
-    let of = |f: &dyn Fn(&RoundSummary) -> f64| rounds.iter().map(f).collect::<Vec<f64>>();
-    let number: Vec<f64> = (1..=rounds.len()).map(|n| n as f64).collect();
-    let figures = [
-        ("line", "", number),
-        ("length", "m", of(&|r| r.length_m)),
-        ("planned lap", "s", of(&|r| r.planned_lap_time_s)),
-        ("grip held", "%", of(&|r| 100.0 * r.grip_share)),
-        ("point mass with that grip", "s", of(&|r| r.point_mass_lap_time_s)),
-        ("driven lap", "s", of(&|r| r.driven_lap_time_s)),
-        ("driven against point mass", "%", of(&|r| r.disagreement_percent)),
-        ("least room", "m", of(&|r| r.margin_m)),
-    ];
-    let columns: Vec<Column<'_>> = figures
-        .iter()
-        .map(|(name, unit, values)| Column {
-            name,
-            unit,
-            cells: Cells::Numbers(values),
+fn table(rounds: &[RoundSummary]) -> Table<'static> {
+    Table::rows(rounds.iter().enumerate())
+        .number("line", "", |(i, _)| (i + 1) as f64)
+        .number("length", "m", |(_, r)| r.length_m)
+        .number("planned lap", "s", |(_, r)| r.planned_lap_time_s)
+        .number("grip held", "%", |(_, r)| 100.0 * r.grip_share)
+        .number("quasi-steady-state lap with that grip", "s", |(_, r)| {
+            r.point_mass_lap_time_s
         })
-        .collect();
-    page.table("Lines, one after the other", "", &columns)
+        .number("driven lap", "s", |(_, r)| r.driven_lap_time_s)
+        .number("driven against quasi-steady-state", "%", |(_, r)| {
+            r.disagreement_percent
+        })
+        .number("least room", "m", |(_, r)| r.margin_m)
+        .table()
 }
 
 /// The limits of the car, and those that the driver held.
-fn limits(page: &mut HtmlReport, tables: [Option<&Trace>; 2]) -> Result<()> {
-    page.section(
-        "Limits",
-        "What the car can do in steady states, and what of it was held on the line.",
-    );
-    for (title, column) in [("Cornering", "ay_mps2"), ("Braking grip", "ax_grip_mps2")] {
-        let curve = |(label, table): (&'static str, Option<&Trace>)| {
-            let table = table?;
-            Some(Curve {
-                label,
-                x: table.column(&["v_mps"])?.to_vec(),
-                y: table.column(&[column])?.to_vec(),
-                shade: None,
-            })
-        };
-        let panel = CurvePanel {
-            title,
-            x_label: "speed (m/s)",
-            y_label: "acceleration (m/s\u{b2})",
-            curves: ["the car's", "held"]
-                .into_iter()
-                .zip(tables)
-                .filter_map(curve)
-                .collect(),
-        };
-        page.curves(&panel, "", [Scale::Linear; 2])?;
-    }
-    Ok(())
+fn limits(tables: [(&str, Option<&Trace>); 2]) -> Curves {
+    let panels = [("Cornering", "ay_mps2"), ("Braking grip", "ax_grip_mps2")].map(|(title, column)| {
+        let panel = Panel::new(title).x("speed", "m/s").y("acceleration", "m/s\u{b2}");
+        tables.iter().fold(panel, |panel, (label, table)| {
+            let columns = table.and_then(|t| t.column(&["v_mps"]).zip(t.column(&[column])));
+            match columns {
+                Some((v, a)) => panel.curve(*label, v, a),
+                None => panel,
+            }
+        })
+    });
+    Curves::new("Limits", panels)
 }

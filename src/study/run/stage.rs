@@ -2,68 +2,12 @@
 
 use crate::error::{Error, Result};
 use crate::files::{sync_folder, write_whole};
-use crate::study::keeper::Keeper;
-use crate::study::run_folder::{self, RunFolder, STATE};
-use crate::swarm::checkpoint::Checkpoint;
+use crate::study::framework::Inputs;
+use crate::study::framework::run_folder::{self, RunFolder, STATE};
+use crate::study::framework::state_file::StateFile;
 use std::collections::BTreeMap;
-use std::fmt::{Debug, Write as _};
-use std::hash::{DefaultHasher, Hasher};
 use std::path::{Path, PathBuf};
-use std::sync::OnceLock;
 use std::time::Duration;
-
-/// What went into a stage, as one number: the program's version, and whatever is [added](Inputs::add).
-pub struct Inputs(DefaultHasher);
-
-impl Inputs {
-    /// Of a stage of this name.
-    pub fn new(stage: &str) -> Self {
-        let mut inputs = Self(DefaultHasher::new());
-        inputs.add(&(stage, env!("CARGO_PKG_VERSION")));
-        inputs
-    }
-
-    /// As [`Inputs::new`], and of the very program that runs: what it finds may differ from build to build of one version.
-    pub fn of_program(stage: &str) -> Self {
-        static PROGRAM: OnceLock<Option<u64>> = OnceLock::new();
-        let mut inputs = Self::new(stage);
-        // Where the program cannot be read its version has to do.
-        inputs.add(PROGRAM.get_or_init(|| {
-            let mut hasher = DefaultHasher::new();
-            hasher.write(&std::fs::read(std::env::current_exe().ok()?).ok()?);
-            Some(hasher.finish())
-        }));
-        inputs
-    }
-
-    /// Adds a value with all that it holds.
-    pub fn add(&mut self, value: &impl Debug) {
-        struct Into<'a>(&'a mut DefaultHasher);
-        impl std::fmt::Write for Into<'_> {
-            fn write_str(&mut self, text: &str) -> std::fmt::Result {
-                self.0.write(text.as_bytes());
-                Ok(())
-            }
-        }
-        // Writing to a hasher cannot fail.
-        let _ = write!(Into(&mut self.0), "{value:?};");
-    }
-
-    /// Adds a file's contents.
-    ///
-    /// # Errors
-    /// [`Error::Io`] if it cannot be read.
-    pub fn add_file(&mut self, path: &Path) -> Result<()> {
-        self.0
-            .write(&std::fs::read(path).map_err(|e| Error::io(path, "read", e))?);
-        Ok(())
-    }
-
-    /// The number, as text.
-    pub fn key(&self) -> String {
-        format!("{:016x}", self.0.finish())
-    }
-}
 
 /// Present in a stage's folder once all of its files are: what each of them was then.
 const DONE: &str = "done";
@@ -88,7 +32,7 @@ impl Stages {
     }
 
     /// The folder of a stage in the run, and whether it was taken from an earlier run of the same inputs. `work` fills
-    /// it otherwise, and has the keeper of its state, which may have that of a run that was broken off.
+    /// it otherwise, and has the state_file of its state, which may have that of an interrupted run.
     ///
     /// # Errors
     /// Those of `work`; [`Error::Io`] if folders or files cannot be made.
@@ -96,12 +40,12 @@ impl Stages {
         &self,
         name: &str,
         inputs: &Inputs,
-        work: impl FnOnce(&Path, &mut Keeper) -> Result<()>,
+        work: impl FnOnce(&Path, &mut StateFile) -> Result<()>,
     ) -> Result<(PathBuf, bool)> {
         let target = self.folder.join(name);
         create(&target)?;
         let Some(cache) = &self.cache else {
-            work(&target, &mut Keeper::idle())?;
+            work(&target, &mut StateFile::idle())?;
             return Ok((target, false));
         };
         // Stages of one kind share results whatever their number in a run.
@@ -112,17 +56,17 @@ impl Stages {
             for (name, contents) in files {
                 write_whole(target.join(name), &contents)?;
             }
-            // Of a run that was broken off while another was at work on the same stage.
+            // Of a run that was interrupted while another was at work on the same stage.
             let _ = std::fs::remove_dir_all(self.folder.join(UNFINISHED).join(&kind));
             let _ = std::fs::remove_dir(self.folder.join(UNFINISHED));
             return Ok((target, true));
         }
         let unfinished = self.unfinished(&kept, &self.folder.join(UNFINISHED).join(&kind))?;
-        let mut keeper = Keeper::new(&unfinished).every(self.every);
-        work(&target, &mut keeper)?;
+        let mut state_file = StateFile::new(&unfinished).every(self.every);
+        work(&target, &mut state_file)?;
         keep(&target, &kept)?;
         // Only now: until the stage is kept, its state is all there is of it.
-        keeper.done()?;
+        state_file.done()?;
         let path = unfinished.to_path_buf();
         drop(unfinished);
         // What is in them now is another run's.
@@ -134,7 +78,7 @@ impl Stages {
     /// Where the state of a stage is saved: beside its place in the cache, for whichever run comes next; where another run is at
     /// work on the same stage, which saves its state there, in the run's `own` folder.
     fn unfinished(&self, kept: &Path, own: &Path) -> Result<RunFolder> {
-        // Of a run that was broken off while another had the place in the cache.
+        // Of a run that was interrupted while another had the place in the cache.
         if !own.join(STATE).is_file() {
             match run_folder::take(&kept.with_extension("unfinished")) {
                 Ok(folder) => return Ok(folder),
@@ -143,24 +87,6 @@ impl Stages {
         }
         run_folder::take(own)
     }
-}
-
-/// Does what `work` does from the state that an earlier run has left, and from the start where there is none or it belongs to
-/// something else.
-///
-/// # Errors
-/// Those of `work`.
-pub(in crate::study) fn go_on<S: Checkpoint, T>(
-    keeper: &mut Keeper,
-    mut work: impl FnMut(Option<S>, &mut Keeper) -> Result<T>,
-) -> Result<T> {
-    if let Some(state) = keeper.saved() {
-        match work(Some(state), keeper) {
-            Err(error @ Error::Input { .. }) => tracing::warn!("the stage is done anew: {error}"),
-            outcome => return outcome,
-        }
-    }
-    work(None, keeper)
 }
 
 fn create(folder: &Path) -> Result<()> {
@@ -266,9 +192,16 @@ fn aside(kept: &Path) -> Result<PathBuf> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::study::journal::Journal;
+    use crate::study::framework::State;
+    use crate::study::framework::journal::Journal;
 
     const EVERY: Duration = Duration::ZERO;
+
+    /// What the state that a state_file finds was begun with.
+    fn begun(state_file: &StateFile) -> Option<u32> {
+        let state: Journal = state_file.saved::<u32, Journal>()?;
+        Some(state.settings("stage").expect("the settings of a stage"))
+    }
 
     #[test]
     fn a_stage_that_is_broken_off_finds_its_state_again_and_leaves_none_when_it_is_done() {
@@ -278,12 +211,9 @@ mod tests {
         let inputs = Inputs::new("stage");
         let mut known = Vec::new();
         for round in 0..3u32 {
-            let outcome = stages.run("1_stage", &inputs, |_, keeper| {
-                go_on(keeper, |state: Option<Journal>, keeper| {
-                    let before = state.map(|s| s.settings::<u32>("stage")).transpose()?;
-                    known.push(before);
-                    keeper.keep(&Journal::new("stage", &round)?)
-                })?;
+            let outcome = stages.run("1_stage", &inputs, |_, state_file| {
+                known.push(begun(state_file));
+                state_file.save(&Journal::new("stage", &round)?)?;
                 if round == 2 {
                     Ok(())
                 } else {
@@ -335,7 +265,7 @@ mod tests {
             runs += 1;
             let run = root.path().join(format!("run-{runs}"));
             let stages = Stages::new(&run, Some(&cache), EVERY);
-            let work = |folder: &Path, _: &mut Keeper| {
+            let work = |folder: &Path, _: &mut StateFile| {
                 std::fs::write(folder.join("result"), "what was found").expect("a file");
                 std::fs::write(folder.join("table"), "1,2,3").expect("a file");
                 Ok(())
@@ -378,11 +308,9 @@ mod tests {
         let stages = Stages::new(&run, Some(&cache), EVERY);
         let mut known = Vec::new();
         let mut go = |last: bool| {
-            stages.run("1_stage", &inputs, |_, keeper| {
-                go_on(keeper, |state: Option<Journal>, keeper| {
-                    known.push(state.map(|s| s.settings::<u32>("stage")).transpose()?);
-                    keeper.keep(&Journal::new("stage", &7u32)?)
-                })?;
+            stages.run("1_stage", &inputs, |_, state_file| {
+                known.push(begun(state_file));
+                state_file.save(&Journal::new("stage", &7u32)?)?;
                 if last {
                     Ok(())
                 } else {
@@ -405,7 +333,7 @@ mod tests {
         let cache = root.path().join("cache");
         let stages = Stages::new(&root.path().join("run"), Some(&cache), EVERY);
         let inputs = Inputs::new("stage");
-        let fail = |_: &Path, _: &mut Keeper| Err(Error::Study("no".to_owned()));
+        let fail = |_: &Path, _: &mut StateFile| Err(Error::Study("no".to_owned()));
         assert!(stages.run("1_stage", &inputs, fail).is_err());
         let (_, reused) = stages.run("1_stage", &inputs, |_, _| Ok(())).expect("it runs");
         assert!(!reused);

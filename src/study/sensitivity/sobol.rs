@@ -8,7 +8,7 @@
 use crate::random::Random;
 
 /// What of an output's variance comes from one variable.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct SobolIndex {
     /// By the variable alone.
     pub first: f64,
@@ -34,7 +34,7 @@ pub struct DesignOutputs {
 /// Purpose of the draws of resamples in the counter.
 const RESAMPLE: u32 = 0x50b0;
 
-/// The rows of a Saltelli design over the unit cube: `n (d + 2)` of `dimensions` numbers from nought to one, the first
+/// The rows of a Saltelli design over the unit cube: `n (d + 2)` of `dimensions` numbers from zero to one, the first
 /// matrix, the second, then the mixed one of each variable. From an Owen-scrambled Sobol sequence.
 pub fn design(dimensions: usize, n: usize, seed: u64) -> Vec<f64> {
     let seed = (seed ^ (seed >> 32)) as u32;

@@ -1,17 +1,18 @@
 //! The grid of settings of a sweep.
 
-use super::SweptStudy;
 use crate::config::read_text;
 use crate::error::{Error, Result};
+use crate::study::registry::{self, Registered};
 use std::collections::BTreeMap;
+use std::fmt;
 use std::path::Path;
 use toml::{Table, Value};
 
 /// A sweep: which study, what all of its runs share, and what they differ in.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone)]
 pub struct SweepSettings {
     /// The study.
-    pub study: SweptStudy,
+    pub study: &'static dyn Registered,
     /// Keys that all runs share.
     base: Table,
     /// Values of each key of the grid, in the order of the file's keys; the last key changes fastest.
@@ -19,6 +20,17 @@ pub struct SweepSettings {
     /// The sweep file, as it was read.
     text: String,
     file: String,
+}
+
+impl fmt::Debug for SweepSettings {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("SweepSettings")
+            .field("study", &self.study.name())
+            .field("base", &self.base)
+            .field("axes", &self.axes)
+            .field("file", &self.file)
+            .finish_non_exhaustive()
+    }
 }
 
 /// One run of a sweep.
@@ -55,9 +67,6 @@ const MOST_RUNS: usize = 100_000;
 const MOST_TEXT: usize = 256 << 20;
 /// Most tables within tables that a key of the grid goes through.
 const MOST_DOTS: usize = 8;
-/// Keys that name files, which are relative to the sweep file.
-const FILES: [&str; 6] = ["car", "log", "channel_map", "track", "truth", "envelope"];
-
 impl SweepSettings {
     /// A bundled sweep by name, or a sweep file.
     ///
@@ -93,21 +102,29 @@ impl SweepSettings {
                 return refuse(&format!("line {line}"), e.message().to_owned(), "a TOML file");
             }
         };
-        let study = match root.remove("study") {
-            Some(Value::String(name)) if name == "identify" => SweptStudy::Identify,
-            Some(Value::String(name)) if name == "raceline" => SweptStudy::Raceline,
-            other => {
-                let found = other.map_or("nothing".to_owned(), |v| v.to_string());
-                return refuse("study", found, "\"identify\" or \"raceline\"");
-            }
+        let named = |value: &Value| registry::named(value.as_str()?);
+        let asked = root.remove("study");
+        let Some(study) = asked.as_ref().and_then(named) else {
+            let found = asked.map_or("nothing".to_owned(), |v| v.to_string());
+            return refuse(
+                "study",
+                found,
+                &format!("one of {}", registry::names().join(", ")),
+            );
         };
+        // Keys that name files, which are relative to the sweep file.
+        let declared = study.declared().into_iter();
+        let files: Vec<&str> = declared
+            .filter(|d| d.value_name.contains("FILE"))
+            .map(|d| d.key)
+            .collect();
         let mut base = match root.remove("base") {
             None => Table::new(),
             Some(Value::Table(base)) => base,
             Some(other) => return refuse("base", other.to_string(), "a table of the study's keys"),
         };
         let folder = std::path::absolute(path.parent().unwrap_or(Path::new(""))).unwrap_or_default();
-        make_absolute(&mut base, &folder);
+        make_absolute(&mut base, &files, &folder);
         let Some(Value::Table(grid)) = root.remove("grid") else {
             return refuse(
                 "grid",
@@ -128,7 +145,7 @@ impl SweepSettings {
                 Value::Array(values) if !values.is_empty() => {
                     let values: Vec<Value> = values
                         .into_iter()
-                        .map(|v| absolute_value(&key, v, &folder))
+                        .map(|v| absolute_value(files.contains(&key.as_str()), v, &folder))
                         .collect();
                     axes.push((key, values));
                 }
@@ -270,45 +287,41 @@ fn plain(value: &Value) -> String {
     }
 }
 
-fn absolute_value(key: &str, value: Value, folder: &Path) -> Value {
+/// Makes the files of a value absolute, if it names any.
+fn absolute_value(names_files: bool, value: Value, folder: &Path) -> Value {
     match value {
-        Value::String(name) if FILES.contains(&key) && Path::new(&name).extension().is_some() => {
+        Value::String(name) if names_files && Path::new(&name).extension().is_some() => {
             Value::String(folder.join(name).display().to_string())
+        }
+        Value::Array(values) => {
+            let each = values.into_iter().map(|v| absolute_value(names_files, v, folder));
+            Value::Array(each.collect())
         }
         other => other,
     }
 }
 
-fn make_absolute(base: &mut Table, folder: &Path) {
+fn make_absolute(base: &mut Table, files: &[&str], folder: &Path) {
     for (key, value) in base.iter_mut() {
         let taken = std::mem::replace(value, Value::Boolean(false));
-        *value = absolute_value(key, taken, folder);
+        *value = absolute_value(files.contains(&key.as_str()), taken, folder);
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::path::PathBuf;
 
     #[test]
     fn bundled_sweeps_are_grids_of_sound_studies() {
-        let folder = tempfile::tempdir().expect("a temporary folder");
         for (name, _) in BUNDLED {
             let sweep = SweepSettings::load(name).expect(name);
             let points = sweep.points().expect(name);
             assert!(points.len() >= 9, "{name}");
-            for point in points {
-                let path = folder.path().join("study.toml");
-                std::fs::write(&path, &point.study).expect("a study");
-                match sweep.study {
-                    SweptStudy::Identify => {
-                        crate::study::identify::IdentifySettings::read(&path).expect(name);
-                    }
-                    SweptStudy::Raceline => {
-                        crate::study::raceline::RacelineSettings::read(&path).expect(name);
-                    }
-                }
-            }
+            let path_of = |number: usize| PathBuf::from(format!("{number:05}.toml"));
+            let checked = sweep.study.check_points(&sweep, &points, &path_of, 4096);
+            checked.expect(name);
         }
     }
 

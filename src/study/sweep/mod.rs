@@ -1,11 +1,10 @@
 //! The same study over a grid of settings and seeds: one row for each run, medians over the seeds.
 //!
 //! A run is a study file of its own, made of the base's keys and those of one point of the grid. Rows are kept as they
-//! come, and the states of the runs that are at work beside their study files, so that a sweep that was broken off goes on where
+//! come, and the states of the runs that are at work beside their study files, so that a sweep that was interrupted goes on where
 //! it stopped; rows hold nothing that depends on the clock.
 
 mod grid;
-mod identified;
 mod joint;
 mod page;
 mod results;
@@ -13,33 +12,22 @@ mod results;
 pub use grid::{Point, SweepSettings};
 pub use results::{Row, Summary, medians};
 
-use self::identified::{alike, identified, problem_of};
+use crate::config::settings::{Role, Settings};
 use crate::error::{Error, Result};
-use crate::evaluate::BackendInfo;
 use crate::report::write_whole;
-use crate::study::identify::{self, IdentifySettings};
-use crate::study::keeper::Keeper;
-use crate::study::memory::{Size, USUAL_MIB};
-use crate::study::raceline::{self, LinesState, RacelineSettings};
-use crate::study::run::go_on;
-use crate::study::run_folder::{Manifest, write_json};
-use std::collections::BTreeMap;
+use crate::study::framework::memory::{self, Kept, USUAL_MIB};
+use crate::study::framework::run_folder::{Manifest, write_json};
+use crate::study::framework::state_file::StateFile;
+use crate::study::framework::{Entry, Plan, Progress, Study};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
-
-/// The studies that can be swept.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum SweptStudy {
-    /// Identification.
-    Identify,
-    /// Racing lines.
-    Raceline,
-}
 
 /// Rows of a sweep as they are kept, one JSON object per line.
 const ROWS: &str = "rows.jsonl";
 /// The sweep that a folder holds.
 pub const SWEEP_FILE: &str = "sweep.toml";
+/// Most problems whose inputs are kept while a sweep is planned.
+const MOST_PREPARED: usize = 16;
 
 /// What an observer is told before each run.
 pub struct SweepProgress<'a> {
@@ -50,6 +38,9 @@ pub struct SweepProgress<'a> {
     /// The point of the grid.
     pub point: &'a Point,
 }
+
+/// Is told of the progress of a sweep and may end it.
+type Observer<'a> = dyn FnMut(&SweepProgress<'_>) -> ControlFlow<()> + 'a;
 
 /// As [`sweep_within`], in the usual memory.
 ///
@@ -81,7 +72,9 @@ pub fn sweep_within(
     let studies = folder.join("studies");
     let path_of = |number: usize| studies.join(format!("{number:05}.toml"));
     // Every point is read before anything is written: a mistake in the last shows at once, and leaves nothing behind.
-    read_points(settings, &points, path_of, memory_limit_mib)?;
+    settings
+        .study
+        .check_points(settings, &points, &path_of, memory_limit_mib)?;
     let mut rows = if resume {
         results::read_rows(&folder.join(ROWS), &folder.join(SWEEP_FILE), settings, &points)?
     } else {
@@ -90,18 +83,18 @@ pub fn sweep_within(
     let began_with = rows.len();
     let ran = write_studies(settings, folder, &points, path_of, resume).and_then(|()| {
         let work = Work {
-            settings,
+            sweep: settings,
             folder,
             points: &points,
             paths: (0..points.len()).map(path_of).collect(),
             memory_limit_mib,
         };
-        work.run_points(&mut rows, &mut observe)
+        settings.study.run_points(&work, &mut rows, &mut observe)
     });
     if let Err(error) = ran {
-        // What has come to nothing does not stand in the way of the next; what was broken off may be gone on with.
+        // What has come to nothing does not stand in the way of the next; what was interrupted may be resumed.
         // So may what a full disk or a lost device has ended.
-        let begun = || (0..points.len()).any(|number| keeper_of(&path_of(number)).file().exists());
+        let begun = || (0..points.len()).any(|number| state_file_of(&path_of(number)).file().exists());
         let mendable = match &error {
             Error::Interrupted(_) => true,
             Error::Io { .. } | Error::Device(_) | Error::NoDevice(_) => begun(),
@@ -118,47 +111,212 @@ pub fn sweep_within(
     Ok(summary)
 }
 
-/// The study of a point, read.
-enum PointStudy {
-    Identify(Box<IdentifySettings>),
-    Raceline(Box<RacelineSettings>),
-}
+/// A kind of study that can be swept: all of those in the registry.
+pub trait Swept: Sync {
+    /// Refuses points whose study is wrong or too large.
+    ///
+    /// # Errors
+    /// [`Error::Input`] naming the point.
+    fn check_points(
+        &self,
+        sweep: &SweepSettings,
+        points: &[Point],
+        path_of: &dyn Fn(usize) -> PathBuf,
+        memory_limit_mib: u64,
+    ) -> Result<()>;
 
-impl PointStudy {
-    fn size(&self) -> Size {
-        match self {
-            Self::Identify(s) => s.size(),
-            Self::Raceline(s) => s.size(),
-        }
-    }
+    /// Says what a sweep over these points would do; see [`plan`].
+    ///
+    /// # Errors
+    /// As [`plan`].
+    fn plan_points(
+        &self,
+        sweep: &SweepSettings,
+        points: &[Point],
+        path_of: &dyn Fn(usize) -> PathBuf,
+        memory_limit_mib: u64,
+    ) -> Result<SweepPlan>;
+
+    /// Runs the points that have no row yet, and keeps the rows as they come.
+    ///
+    /// # Errors
+    /// [`Error::Interrupted`] if the observer ended it; those of the studies.
+    fn run_points(&self, work: &Work<'_>, rows: &mut Vec<Row>, observe: &mut Observer<'_>) -> Result<()>;
 }
 
 /// Reads the study of every point, and refuses what is wrong or too large.
-fn read_points(
-    settings: &SweepSettings,
+fn read_points<S: Study>(
+    sweep: &SweepSettings,
     points: &[Point],
-    path_of: impl Fn(usize) -> PathBuf,
+    path_of: &dyn Fn(usize) -> PathBuf,
     memory_limit_mib: u64,
-) -> Result<Vec<PointStudy>> {
+) -> Result<Vec<S::Settings>> {
     let read = |(number, point): (usize, &Point)| {
         let path = path_of(number);
-        let study = match settings.study {
-            SweptStudy::Identify => {
-                IdentifySettings::parse(&path, &point.study).map(|s| PointStudy::Identify(Box::new(s)))
-            }
-            SweptStudy::Raceline => {
-                RacelineSettings::parse(&path, &point.study).map(|s| PointStudy::Raceline(Box::new(s)))
-            }
-        };
+        let study = S::Settings::parse(&path, &point.study).map(Settings::absolute);
         study
-            .and_then(|study| study.size().check(memory_limit_mib).map(|_| study))
-            .map_err(|e| settings.of_point(e, number, point, &path))
+            .and_then(|study| memory::check(&S::size(&study, None), memory_limit_mib).map(|_| study))
+            .map_err(|e| sweep.of_point(e, number, point, &path))
     };
     points.iter().enumerate().map(read).collect()
 }
 
+/// The problem that a study solves: what only the search goes by is left out.
+fn problem_of<S: Study>(settings: &S::Settings) -> S::Settings {
+    settings
+        .clone()
+        .with_role_of(Role::Search, &S::Settings::default())
+}
+
+/// How many studies, from the first on, are of one problem and may be solved together within the memory (MiB); the first in any
+/// case.
+fn alike<S: Study>(studies: &[S::Settings], prepared: &S::Prepared, memory_limit_mib: u64) -> usize {
+    let Some(first) = studies.first() else {
+        return 0;
+    };
+    let problem = problem_of::<S>(first);
+    let like = |settings: &&S::Settings| S::together(settings) > 1 && problem_of::<S>(settings) == problem;
+    let together = studies[1..].iter().take(S::together(first) - 1).take_while(like);
+    let mut kept = S::size(first, Some(prepared));
+    let fits = |settings: &&S::Settings| {
+        // What was prepared is one for all of them.
+        kept.extend(S::size(settings, None));
+        memory::fits(&kept, memory_limit_mib)
+    };
+    1 + together.take_while(fits).count()
+}
+
+impl<S: Study> Swept for Entry<S> {
+    fn check_points(
+        &self,
+        sweep: &SweepSettings,
+        points: &[Point],
+        path_of: &dyn Fn(usize) -> PathBuf,
+        memory_limit_mib: u64,
+    ) -> Result<()> {
+        read_points::<S>(sweep, points, path_of, memory_limit_mib).map(drop)
+    }
+
+    fn plan_points(
+        &self,
+        sweep: &SweepSettings,
+        points: &[Point],
+        path_of: &dyn Fn(usize) -> PathBuf,
+        memory_limit_mib: u64,
+    ) -> Result<SweepPlan> {
+        let studies = read_points::<S>(sweep, points, path_of, memory_limit_mib)?;
+        let mut problems: Vec<S::Settings> = Vec::new();
+        let mut prepared: Vec<(S::Settings, S::Prepared)> = Vec::new();
+        let mut planned: Option<SweepPlan> = None;
+        for (number, settings) in studies.iter().enumerate() {
+            let of_point = |e| sweep.of_point(e, number, &points[number], &path_of(number));
+            let problem = problem_of::<S>(settings);
+            if !problems.contains(&problem) {
+                problems.push(problem.clone());
+            }
+            let place = match prepared.iter().position(|(known, _)| *known == problem) {
+                Some(place) => place,
+                None => {
+                    prepared.truncate(MOST_PREPARED - 1);
+                    prepared.insert(0, (problem, S::prepare(settings).map_err(of_point)?));
+                    0
+                }
+            };
+            let inputs = &prepared[place].1;
+            let kept = S::size(settings, Some(inputs));
+            drop(memory::check(&kept, memory_limit_mib).map_err(of_point)?);
+            let plan = S::plan(settings, inputs, Plan::of(S::NAME, settings)).map_err(of_point)?;
+            let memory_mib = memory::needed_mib(&kept);
+            planned = Some(match planned {
+                None => SweepPlan {
+                    runs: points.len(),
+                    problems: 0,
+                    evaluations: plan.most_evaluations(),
+                    memory_mib,
+                    plan,
+                },
+                Some(before) => SweepPlan {
+                    evaluations: before
+                        .evaluations
+                        .zip(plan.most_evaluations())
+                        .map(|(all, more)| all.saturating_add(more)),
+                    memory_mib: before.memory_mib.max(memory_mib),
+                    ..before
+                },
+            });
+        }
+        let problems = problems.len();
+        let planned = planned.map(|plan| SweepPlan { problems, ..plan });
+        planned.ok_or_else(|| Error::input("the sweep", "grid", "no point", "one point at least"))
+    }
+
+    fn run_points(&self, work: &Work<'_>, rows: &mut Vec<Row>, observe: &mut Observer<'_>) -> Result<()> {
+        let (points, paths) = (work.points, &work.paths);
+        let of_point = |e, number: usize| work.sweep.of_point(e, number, &points[number], &paths[number]);
+        let path_of = |number: usize| paths[number].clone();
+        let studies = read_points::<S>(work.sweep, points, &path_of, work.memory_limit_mib)?;
+        let mut prepared: Option<(S::Settings, S::Prepared)> = None;
+        while rows.len() < points.len() {
+            let number = rows.len();
+            let progress = SweepProgress {
+                done: number,
+                planned: points.len(),
+                point: &points[number],
+            };
+            if observe(&progress).is_break() {
+                return Err(Error::Interrupted(work.folder.to_owned()));
+            }
+            let problem = problem_of::<S>(&studies[number]);
+            let known = prepared.take().filter(|(known, _)| *known == problem);
+            let (problem, inputs) = match known {
+                Some(known) => known,
+                None => {
+                    let inputs = S::prepare(&studies[number]).map_err(|e| of_point(e, number))?;
+                    (problem, inputs)
+                }
+            };
+            let together = alike::<S>(&studies[number..], &inputs, work.memory_limit_mib);
+            let chosen = &studies[number..number + together];
+            let mut kept: Vec<Kept> = S::size(&chosen[0], Some(&inputs));
+            kept.extend(chosen[1..].iter().flat_map(|settings| S::size(settings, None)));
+            let _allowed = memory::check(&kept, work.memory_limit_mib).map_err(|e| of_point(e, number))?;
+            let mut state_files: Vec<StateFile> = (number..number + together)
+                .map(|number| state_file_of(&paths[number]))
+                .collect();
+            let mut told = |_: &Progress| observe(&progress);
+            let found = S::solve_together(chosen, &inputs, &mut state_files, &mut told);
+            let found = found.map_err(|e| of_point(e, number))?;
+            for ((run, settings), outcome) in (number..).zip(chosen).zip(found) {
+                // An interrupted run is no row: it is resumed, as is what comes after it.
+                let outcome = outcome.map_err(|e| of_point(e, run))?;
+                let Some(outcome) = outcome.filter(|outcome| !S::record(outcome).interrupted) else {
+                    return Err(Error::Interrupted(work.folder.to_owned()));
+                };
+                let record = S::record(&outcome);
+                // What depends on the clock stands beside the study, and not in the row.
+                let subject = S::subject(settings, &inputs);
+                let manifest = Manifest::new(S::NAME, &subject, record, "");
+                write_json(&paths[run].with_extension("json"), &manifest)?;
+                let summary = S::summarise(settings, &inputs, &outcome);
+                rows.push(Row {
+                    run,
+                    settings: points[run].settings.clone(),
+                    figures: S::figures(&outcome, &summary),
+                    device_faults: record.device_faults.clone(),
+                    front: S::front(&outcome),
+                });
+                results::write_rows(&work.folder.join(ROWS), rows)?;
+                // Only now: until its row is kept, its state is all there is of it.
+                state_file_of(&paths[run]).done()?;
+            }
+            prepared = Some((problem, inputs));
+        }
+        Ok(())
+    }
+}
+
 /// What a sweep would do.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone)]
 pub struct SweepPlan {
     /// Runs.
     pub runs: usize,
@@ -168,8 +326,8 @@ pub struct SweepPlan {
     pub evaluations: Option<u64>,
     /// What the largest study keeps (MiB).
     pub memory_mib: u64,
-    /// What evaluates.
-    pub backend: BackendInfo,
+    /// The plan of the first study.
+    pub plan: Plan,
 }
 
 impl std::fmt::Display for SweepPlan {
@@ -190,58 +348,9 @@ impl std::fmt::Display for SweepPlan {
 pub fn plan(settings: &SweepSettings, memory_limit_mib: u64) -> Result<SweepPlan> {
     let points = settings.points()?;
     let path_of = |number: usize| PathBuf::from(format!("{number:05}.toml"));
-    let studies = read_points(settings, &points, path_of, memory_limit_mib)?;
-    let mut identified: Vec<IdentifySettings> = Vec::new();
-    let mut lined: Vec<RacelineSettings> = Vec::new();
-    let mut chosen = Vec::new();
-    for (number, study) in studies.iter().enumerate() {
-        let set_up = match study {
-            PointStudy::Identify(s) => {
-                chosen.push((s.backend, s.adapter.clone()));
-                let problem = problem_of((**s).clone());
-                if identified.contains(&problem) {
-                    continue;
-                }
-                identified.push(problem);
-                identify::set_up(s).map(drop)
-            }
-            PointStudy::Raceline(s) => {
-                chosen.push((s.backend, s.adapter.clone()));
-                let problem = RacelineSettings {
-                    track: s.track.clone(),
-                    car: s.car.clone(),
-                    envelope: s.envelope.clone(),
-                    section: s.section.clone(),
-                    sections: s.sections,
-                    as_surveyed: s.as_surveyed,
-                    car_width_m: s.car_width_m,
-                    ..RacelineSettings::default()
-                };
-                if lined.contains(&problem) {
-                    continue;
-                }
-                lined.push(problem);
-                raceline::set_up(s).map(drop)
-            }
-        };
-        set_up.map_err(|e| settings.of_point(e, number, &points[number], &path_of(number)))?;
-    }
-    chosen.dedup();
-    let mut backends = chosen
-        .iter()
-        .map(|(backend, adapter)| backend.would_be(adapter.as_deref()))
-        .collect::<Result<Vec<_>>>()?;
-    let evaluations = studies.iter().map(|study| match study {
-        PointStudy::Identify(s) => Some(s.evaluations()),
-        PointStudy::Raceline(_) => None,
-    });
-    Ok(SweepPlan {
-        runs: points.len(),
-        problems: identified.len() + lined.len(),
-        evaluations: evaluations.sum(),
-        memory_mib: studies.iter().map(|s| s.size().needed_mib()).max().unwrap_or(0),
-        backend: backends.swap_remove(0),
-    })
+    settings
+        .study
+        .plan_points(settings, &points, &path_of, memory_limit_mib)
 }
 
 /// Writes the sweep and the study of every point.
@@ -255,7 +364,7 @@ fn write_studies(
     let studies = folder.join("studies");
     if !resume {
         std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, "create", e))?;
-        // First: with it, what was broken off can be gone on with.
+        // First: with it, an interrupted sweep can be resumed.
         write_whole(folder.join(SWEEP_FILE), settings.text().as_bytes())?;
     }
     std::fs::create_dir_all(&studies).map_err(|e| Error::io(&studies, "create", e))?;
@@ -266,8 +375,8 @@ fn write_studies(
 }
 
 /// What runs of a sweep work with.
-struct Work<'a> {
-    settings: &'a SweepSettings,
+pub struct Work<'a> {
+    sweep: &'a SweepSettings,
     folder: &'a Path,
     points: &'a [Point],
     /// Their studies.
@@ -275,150 +384,7 @@ struct Work<'a> {
     memory_limit_mib: u64,
 }
 
-impl Work<'_> {
-    /// Runs the points that have no row yet, and keeps the rows as they come.
-    fn run_points(
-        &self,
-        rows: &mut Vec<Row>,
-        observe: &mut dyn FnMut(&SweepProgress<'_>) -> ControlFlow<()>,
-    ) -> Result<()> {
-        let (points, paths) = (self.points, &self.paths);
-        let of_point = |error, number: usize| {
-            self.settings
-                .of_point(error, number, &points[number], &paths[number])
-        };
-        while rows.len() < points.len() {
-            let number = rows.len();
-            let progress = SweepProgress {
-                done: number,
-                planned: points.len(),
-                point: &points[number],
-            };
-            if observe(&progress).is_break() {
-                return Err(Error::Interrupted(self.folder.to_owned()));
-            }
-            let told = || observe(&progress);
-            let found = match self.settings.study {
-                SweptStudy::Identify => {
-                    let together = alike(&paths[number..], self.memory_limit_mib);
-                    identified(&paths[number..number + together], self.memory_limit_mib, told)
-                }
-                SweptStudy::Raceline => Ok(vec![lined(&paths[number], self.memory_limit_mib, told)]),
-            };
-            let found = found.map_err(|e| of_point(e, number))?;
-            for (run, found) in (number..).zip(found) {
-                // A run that was broken off is no row: it is done anew, as is what comes after it.
-                let Some(found) = found.map_err(|e| of_point(e, run))? else {
-                    return Err(Error::Interrupted(self.folder.to_owned()));
-                };
-                // What depends on the clock stands beside the study, and not in the row.
-                write_json(&paths[run].with_extension("json"), &found.manifest())?;
-                rows.push(Row {
-                    run,
-                    settings: points[run].settings.clone(),
-                    figures: found.figures,
-                    device_faults: found.device_faults,
-                    front: found.front,
-                });
-                results::write_rows(&self.folder.join(ROWS), rows)?;
-                // Only now: until its row is kept, its state is all there is of it.
-                keeper_of(&paths[run]).done()?;
-            }
-        }
-        Ok(())
-    }
-}
-
-type Figures = BTreeMap<String, Option<f64>>;
-
-/// What a run came to.
-struct Found {
-    figures: Figures,
-    /// The objectives of a front, where there is one.
-    front: Vec<Vec<f64>>,
-    study: &'static str,
-    seed: u64,
-    car: String,
-    backend: BackendInfo,
-    device_faults: Vec<String>,
-    longest_dispatch_ms: Option<f64>,
-}
-
-impl Found {
-    fn manifest(&self) -> Manifest<'_> {
-        Manifest {
-            device_faults: &self.device_faults,
-            longest_dispatch_ms: self.longest_dispatch_ms,
-            // Its name is that of the manifest.
-            settings: "",
-            ..Manifest::new(self.study, self.seed, &self.backend, &self.car)
-        }
-    }
-}
-
 /// What keeps the state of the study at `path`, beside it.
-fn keeper_of(path: &Path) -> Keeper {
-    Keeper::at(path.with_extension("checkpoint"))
-}
-
-/// Whether a state is that of the study that goes on with it.
-///
-/// # Errors
-/// [`Error::Input`] if not.
-fn check_own(own: bool, keeper: &Keeper) -> Result<()> {
-    if own {
-        return Ok(());
-    }
-    let expected = "the state of this point of the grid";
-    Err(Error::input(
-        keeper.file(),
-        "settings",
-        "those of another study",
-        expected,
-    ))
-}
-
-fn lined(
-    path: &Path,
-    memory_limit_mib: u64,
-    mut observe: impl FnMut() -> ControlFlow<()>,
-) -> Result<Option<Found>> {
-    let settings = RacelineSettings::read(path)?;
-    let _allowed = settings.size().check(memory_limit_mib)?;
-    let setup = raceline::set_up(&settings)?;
-    let outcome = go_on(&mut keeper_of(path), |state: Option<LinesState>, keeper| {
-        let own = state.as_ref().is_none_or(|state| state.settings == settings);
-        check_own(own, keeper)?;
-        raceline::find_lines_from(&settings, &setup, state, keeper, |_| observe())
-    })?;
-    if outcome.interrupted {
-        return Ok(None);
-    }
-    let mut figures = Figures::from([("evaluations".to_owned(), Some(outcome.evaluations as f64))]);
-    for o in &outcome.objectives {
-        let name = o.objective.name();
-        let unit = o.objective.unit().replace('/', "p").replace('^', "");
-        figures.insert(format!("swarm_{name}_{unit}"), Some(o.swarm_cost));
-        figures.insert(format!("best_{name}_{unit}"), Some(o.best.worth(o.objective)));
-        figures.insert(
-            format!("exact_{name}_{unit}"),
-            o.exact.as_ref().map(|line| line.worth(o.objective)),
-        );
-    }
-    let mut front = Vec::new();
-    if let Some(found) = outcome.front {
-        figures.insert("hypervolume".to_owned(), Some(found.hypervolume));
-        figures.insert("front_size".to_owned(), Some(found.alpha.len() as f64));
-        front = found.objectives;
-    }
-    Ok(Some(Found {
-        figures,
-        front,
-        study: "raceline",
-        seed: settings.seed,
-        car: setup.car_name,
-        backend: outcome.backend,
-        device_faults: outcome.device_faults,
-        longest_dispatch_ms: outcome.longest_dispatch_ms,
-    }))
+fn state_file_of(path: &Path) -> StateFile {
+    StateFile::at(path.with_extension("checkpoint"))
 }

@@ -1,9 +1,9 @@
 //! The report of a sweep: what the medians say, figure by figure.
 
-use super::results::{Group, Spread, Summary, columns};
-use super::{SweepSettings, SweptStudy};
+use super::SweepSettings;
+use super::results::{Group, Spread, Summary};
 use crate::error::Result;
-use crate::report::{BarPanel, BarSeries, HtmlReport, plot_bars, significant};
+use crate::report::{BarPanel, Bars, HtmlReport, significant};
 use std::path::Path;
 
 /// Settings that bars are drawn of: more are a wall, and stand in the table.
@@ -89,67 +89,36 @@ fn short_name(group: &Group) -> String {
     }
 }
 
-/// A figure as it is drawn.
-struct Drawn<'a> {
-    title: &'a str,
-    x_label: String,
-    names: Vec<String>,
-    medians: Vec<f64>,
-    quartiles: Vec<[f64; 2]>,
-}
-
-impl<'a> Drawn<'a> {
-    /// Nothing for a figure that is the same in all runs.
-    fn new(summary: &Summary, figure: &'a str) -> Option<Self> {
-        let groups = ranked(summary, figure);
-        let shown = &groups[..groups.len().min(DRAWN)];
-        let ends = || {
-            shown
-                .iter()
-                .flat_map(|(_, s)| [s.lower_quartile, s.upper_quartile])
-        };
-        let least = ends().fold(f64::INFINITY, f64::min);
-        let most = ends().fold(f64::NEG_INFINITY, f64::max);
-        if most <= least {
-            return None;
-        }
-        // Bars begin at nought; where all are nearly as long, it is what they are above the least that tells.
-        let (from, x_label) = if least > ALIKE * most {
-            (least, format!("{figure} above {}", significant(least, 6)))
-        } else {
-            (0.0, figure.to_owned())
-        };
-        Some(Self {
-            title: figure,
-            x_label,
-            names: shown.iter().map(|(g, _)| short_name(g)).collect(),
-            medians: shown.iter().map(|(_, s)| s.median - from).collect(),
-            quartiles: shown
-                .iter()
-                .map(|(_, s)| [s.lower_quartile - from, s.upper_quartile - from])
-                .collect(),
-        })
+/// The bars of a figure; nothing for one that is the same in all runs.
+fn panel(summary: &Summary, figure: &str) -> Option<BarPanel> {
+    let groups = ranked(summary, figure);
+    let shown = &groups[..groups.len().min(DRAWN)];
+    let ends = || {
+        shown
+            .iter()
+            .flat_map(|(_, s)| [s.lower_quartile, s.upper_quartile])
+    };
+    let least = ends().fold(f64::INFINITY, f64::min);
+    let most = ends().fold(f64::NEG_INFINITY, f64::max);
+    if most <= least {
+        return None;
     }
-
-    fn panel(&self) -> BarPanel<'_> {
-        BarPanel {
-            title: self.title,
-            x_label: &self.x_label,
-            names: self.names.iter().map(String::as_str).collect(),
-            series: vec![BarSeries {
-                label: "",
-                values: self.medians.clone(),
-                intervals: self.quartiles.clone(),
-            }],
-        }
-    }
+    // Bars begin at zero; where all are nearly as long, the part above the least is what matters.
+    let (from, x_label) = if least > ALIKE * most {
+        (least, format!("{figure} above {}", significant(least, 6)))
+    } else {
+        (0.0, figure.to_owned())
+    };
+    let medians = shown.iter().map(|(_, s)| s.median - from);
+    let quartiles = shown
+        .iter()
+        .map(|(_, s)| [s.lower_quartile - from, s.upper_quartile - from]);
+    let names = shown.iter().map(|(g, _)| short_name(g));
+    Some(BarPanel::new(figure, x_label, names).with_intervals("", medians, quartiles))
 }
 
 pub(super) fn write(folder: &Path, summary: &Summary, settings: &SweepSettings) -> Result<()> {
-    let study = match settings.study {
-        SweptStudy::Identify => "identify",
-        SweptStudy::Raceline => "raceline",
-    };
+    let study = settings.study.name();
     let (runs, groups) = (summary.rows.len(), summary.groups.len());
     let axes = settings.keys();
     let mut page = HtmlReport::new("sweep", &format!("{study} over {}", axes.join(", ")));
@@ -212,28 +181,26 @@ pub(super) fn write(folder: &Path, summary: &Summary, settings: &SweepSettings) 
     );
     if groups > DRAWN {
         page.paragraph(&format!(
-            "Drawn are the best {DRAWN} of {groups} settings; the table has all."
+            "The best {DRAWN} of {groups} settings are drawn. The table has all."
         ));
     }
-    let drawn: Vec<Drawn<'_>> = figures(summary)
+    let panels = figures(summary)
         .into_iter()
-        .filter_map(|figure| Drawn::new(summary, figure))
-        .collect();
-    let panels: Vec<BarPanel<'_>> = drawn.iter().map(Drawn::panel).collect();
-    if !panels.is_empty() {
-        let title = format!("Medians over the seeds, with quartiles, by {order}");
-        plot_bars(folder.join("medians.svg"), &title, &panels)?;
-    }
-    for panel in &panels {
-        page.bars(panel, "")?;
+        .filter_map(|figure| panel(summary, figure));
+    let bars = Bars::new(
+        format!("Medians over the seeds, with quartiles, by {order}"),
+        panels,
+    );
+    if !bars.is_empty() {
+        page.figure(folder.join("medians.svg"), &bars)?;
     }
     let medians = summary.median_table(&[
         ("", |s| s.median),
         (", quartile below", |s| s.lower_quartile),
         (", quartile above", |s| s.upper_quartile),
     ]);
-    page.table("Every setting", "", &columns(&medians))?;
-    page.folded_table("Every run", "", &columns(&summary.row_table()))?;
+    page.table("Every setting", "", &medians)?;
+    page.folded_table("Every run", "", &summary.row_table())?;
     page.provenance("study", study);
     page.provenance("runs", runs.to_string());
     page.settings("sweep.toml, which repeats this sweep", settings.text());

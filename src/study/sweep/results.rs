@@ -3,8 +3,8 @@
 use super::{Point, SweepSettings};
 use crate::config::{LARGEST_LOG, read_bytes, read_text};
 use crate::error::{Error, Result};
-use crate::report::{Cells, Column, text_table, write_csv, write_parquet, write_whole};
-use crate::study::run_folder::write_json;
+use crate::report::{Rows, Table, write_whole};
+use crate::study::framework::run_folder::write_json;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -12,7 +12,7 @@ use std::path::Path;
 /// One run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Row {
-    /// Its number, from nought.
+    /// Its number, from 0.
     pub run: usize,
     /// What it differed in.
     pub settings: BTreeMap<String, String>,
@@ -62,13 +62,13 @@ pub struct Summary {
 }
 
 /// Faults with the numbers of the runs that met them, as in the file names of their studies.
-fn told_faults(rows: &[Row]) -> Vec<String> {
+fn faults_by_run(rows: &[Row]) -> Vec<String> {
     let mut faults: Vec<(&String, Vec<String>)> = Vec::new();
     for row in rows {
         for fault in &row.device_faults {
             let number = format!("{:05}", row.run);
             match faults.iter_mut().find(|(known, _)| *known == fault) {
-                // More than once in a run is told once.
+                // More than once in a run is listed once.
                 Some((_, runs)) if runs.last() != Some(&number) => runs.push(number),
                 Some(_) => {}
                 None => faults.push((fault, vec![number])),
@@ -191,7 +191,7 @@ impl Summary {
         Ok(Self {
             study: "sweep",
             groups: medians(&rows),
-            device_faults: told_faults(&rows),
+            device_faults: faults_by_run(&rows),
             rows,
         })
     }
@@ -202,7 +202,7 @@ impl Summary {
             return String::new();
         }
         let medians = self.median_table(&[("", |s| s.median)]);
-        let mut text = format!("Medians over the seeds\n{}", text_table(&columns(&medians)));
+        let mut text = format!("Medians over the seeds\n{}", medians.to_text());
         for fault in &self.device_faults {
             text += &format!("{fault}\n");
         }
@@ -210,55 +210,29 @@ impl Summary {
     }
 
     /// Settings and figures of every run.
-    pub(super) fn row_table(&self) -> Vec<OwnColumn> {
-        let Some(first) = self.rows.first() else {
-            return Vec::new();
-        };
-        let settings = first.settings.keys().map(|key| OwnColumn {
-            name: key.clone(),
-            cells: OwnCells::Texts(self.rows.iter().map(|r| r.settings[key].clone()).collect()),
-        });
-        let value = |r: &Row, name: &String| r.figures.get(name).copied().flatten().unwrap_or(f64::NAN);
+    pub(super) fn row_table(&self) -> Table<'static> {
+        let table = with_settings(&self.rows, |r| &r.settings);
         // Rows of other objectives have other figures.
         let names: BTreeSet<&String> = self.rows.iter().flat_map(|r| r.figures.keys()).collect();
-        let figures = names.into_iter().map(|name| OwnColumn {
-            name: name.clone(),
-            cells: OwnCells::Numbers(self.rows.iter().map(|r| value(r, name)).collect()),
+        let table = names.into_iter().fold(table, |table, name| {
+            table.number(name, "", |r| r.figures.get(name).copied().flatten())
         });
-        settings.chain(figures).collect()
+        table.table()
     }
 
-    /// Settings of every group and these of each of its figures, with endings of their names.
-    pub(super) fn median_table(&self, of: &[NamedPart]) -> Vec<OwnColumn> {
-        let Some(first) = self.groups.first() else {
-            return Vec::new();
-        };
-        let mut table: Vec<OwnColumn> = first
-            .settings
-            .keys()
-            .map(|key| OwnColumn {
-                name: key.clone(),
-                cells: OwnCells::Texts(self.groups.iter().map(|g| g.settings[key].clone()).collect()),
-            })
-            .collect();
+    /// Settings of every group and these parts of each of its figures, with endings of their names.
+    pub(super) fn median_table(&self, of: &[NamedPart]) -> Table<'static> {
+        let mut table = with_settings(&self.groups, |g| &g.settings);
         let names: BTreeSet<&String> = self.groups.iter().flat_map(|g| g.figures.keys()).collect();
         for name in names {
-            table.extend(of.iter().map(|(ending, of)| {
-                OwnColumn {
-                    name: format!("{name}{ending}"),
-                    cells: OwnCells::Numbers(
-                        self.groups
-                            .iter()
-                            .map(|g| g.figures.get(name).map_or(f64::NAN, of))
-                            .collect(),
-                    ),
-                }
-            }));
+            for (ending, part) in of {
+                table = table.number(format!("{name}{ending}"), "", |g| g.figures.get(name).map(part));
+            }
         }
-        table
+        table.table()
     }
 
-    /// Writes `sweep` and `medians` as CSV and as Parquet, `summary.json`, the picture `medians.svg` and `report.html`.
+    /// Writes `sweep` and `medians` as CSV and as Parquet, `summary.json`, the figure `medians.svg` and `report.html`.
     ///
     /// # Errors
     /// [`Error::Io`] if a file cannot be written.
@@ -268,15 +242,15 @@ impl Summary {
             return Ok(());
         }
         let rows = self.row_table();
-        write_csv(folder.join("sweep.csv"), &columns(&rows))?;
-        write_parquet(folder.join("sweep.parquet"), &columns(&rows))?;
+        rows.write_csv(folder.join("sweep.csv"))?;
+        rows.write_parquet(folder.join("sweep.parquet"))?;
         let medians = self.median_table(&[
             ("_lower_quartile", |s| s.lower_quartile),
             ("_median", |s| s.median),
             ("_upper_quartile", |s| s.upper_quartile),
         ]);
-        write_csv(folder.join("medians.csv"), &columns(&medians))?;
-        write_parquet(folder.join("medians.parquet"), &columns(&medians))?;
+        medians.write_csv(folder.join("medians.csv"))?;
+        medians.write_parquet(folder.join("medians.parquet"))?;
         super::page::write(folder, self, settings)
     }
 }
@@ -284,29 +258,12 @@ impl Summary {
 /// A part of a spread, and how the names of its columns end.
 pub(super) type NamedPart = (&'static str, fn(&Spread) -> f64);
 
-/// A column of a table with its cells.
-pub(super) struct OwnColumn {
-    name: String,
-    cells: OwnCells,
-}
-
-enum OwnCells {
-    Texts(Vec<String>),
-    Numbers(Vec<f64>),
-}
-
-/// The columns, to be written.
-pub(super) fn columns(own: &[OwnColumn]) -> Vec<Column<'_>> {
-    own.iter()
-        .map(|column| Column {
-            name: &column.name,
-            unit: "",
-            cells: match &column.cells {
-                OwnCells::Texts(cells) => Cells::Texts(cells),
-                OwnCells::Numbers(cells) => Cells::Numbers(cells),
-            },
-        })
-        .collect()
+/// A table of the settings of rows.
+fn with_settings<T>(rows: &[T], settings: fn(&T) -> &BTreeMap<String, String>) -> Rows<&T> {
+    let keys = rows.first().into_iter().flat_map(|row| settings(row).keys());
+    keys.fold(Table::rows(rows), |table, key| {
+        table.text(key, |row| &*settings(row)[key])
+    })
 }
 
 #[cfg(test)]

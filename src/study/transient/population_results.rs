@@ -1,21 +1,21 @@
 //! What a population of drives leaves behind.
 
-use super::population::{Driven, DrivenBest, NamedLine, PopulationOutcome, PopulationSettings};
+use super::population::{Driven, DrivenBest, PopulationOutcome};
+use super::{Prepared, TransientSettings};
 use crate::error::Result;
-use crate::evaluate::{FailureCounts, failures_in_words};
-use crate::report::{Cells, Column, HtmlReport, write_csv};
-use crate::study::run_folder::{Manifest, write_json};
-use crate::vehicle::Car;
-use serde::Serialize;
+use crate::evaluate::failures_in_words;
+use crate::report::{HtmlReport, Table};
+use crate::study::framework::RunRecord;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
 
 /// A set-up on a line, in figures.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Entry {
     /// The line.
     pub line: String,
-    /// The set-up: nought is the car as it is.
+    /// The set-up: zero is the car as it is.
     pub setup: usize,
     /// Values of the parameters, by name.
     pub values: BTreeMap<String, f64>,
@@ -30,22 +30,15 @@ pub struct Entry {
 }
 
 /// The figures of a population; `--json` prints this.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct PopulationSummary {
     /// `transient`.
-    pub study: &'static str,
+    pub study: String,
     /// Seed of the set-ups.
     pub seed: u64,
-    /// `cpu`, `simd` or `gpu`.
-    pub backend: String,
-    /// Instruction set, or name of the adapter.
-    pub adapter: String,
-    /// Time taken (s).
-    pub elapsed_s: f64,
-    /// Laps driven.
-    pub evaluations: usize,
-    /// Laps per second, plans and files aside.
-    pub evaluations_per_s: f64,
+    /// How the study ran; candidates are laps.
+    #[serde(flatten)]
+    pub record: RunRecord,
     /// The car.
     pub car: String,
     /// Lines.
@@ -62,68 +55,49 @@ pub struct PopulationSummary {
     pub best: Option<Entry>,
     /// The car as it is on the line where it is fastest.
     pub as_it_is: Option<Entry>,
+    /// The ten fastest.
+    pub fastest: Vec<Entry>,
     /// By what the lap of each set-up was chosen among those with other shares of the grip.
-    pub rule: &'static str,
-    /// Laps that failed, by reason.
-    pub failures: FailureCounts,
-    /// What devices failed of and what was done about it.
-    pub device_faults: Vec<String>,
-    /// Whether it was broken off.
-    pub interrupted: bool,
-}
-
-fn entry(outcome: &PopulationOutcome, lines: &[NamedLine], driven: &Driven) -> Entry {
-    let names = outcome.parameters.iter().map(|p| p.name.clone());
-    let figure = |of: fn(&DrivenBest) -> f64| driven.best.as_ref().map(of);
-    Entry {
-        line: lines[driven.line].name.clone(),
-        setup: driven.setup,
-        values: names.zip(driven.values.iter().copied()).collect(),
-        grip_share: figure(|b| b.grip_share),
-        lap_time_s: figure(|b| b.lap_time_s),
-        room_m: figure(|b| b.room_m),
-        steering_radps: figure(|b| b.steering_radps),
-    }
+    pub rule: String,
 }
 
 /// Puts the figures together.
-pub fn summarise_population(
-    car: &str,
-    lines: &[NamedLine],
-    settings: &PopulationSettings,
+pub(super) fn summarise(
+    settings: &TransientSettings,
+    prepared: &Prepared,
     outcome: &PopulationOutcome,
-    elapsed_s: f64,
 ) -> PopulationSummary {
-    let within = |d: &&Driven| d.best.is_some();
+    let names = || outcome.parameters.iter().map(|p| p.name.clone());
+    let entry = |driven: &Driven| {
+        let figure = |of: fn(&DrivenBest) -> f64| driven.best.as_ref().map(of);
+        Entry {
+            line: prepared.lines[driven.line].name.clone(),
+            setup: driven.setup,
+            values: names().zip(driven.values.iter().copied()).collect(),
+            grip_share: figure(|b| b.grip_share),
+            lap_time_s: figure(|b| b.lap_time_s),
+            room_m: figure(|b| b.room_m),
+            steering_radps: figure(|b| b.steering_radps),
+        }
+    };
+    // The fastest first.
+    let within = || outcome.driven.iter().filter(|d| d.best.is_some());
+    let rule = "the fastest lap within the edges, whether or not it agrees with the quasi-steady-state lap; one line alone is held \
+                to that agreement";
     PopulationSummary {
-        study: "transient",
+        study: "transient".to_owned(),
         seed: settings.seed,
-        backend: outcome.backend.backend.to_owned(),
-        adapter: outcome.backend.device.clone(),
-        elapsed_s,
-        evaluations: outcome.evaluations,
-        evaluations_per_s: outcome.evaluations as f64 / outcome.driving_s.max(1e-9),
-        car: car.to_owned(),
-        lines: lines.iter().map(|l| l.name.clone()).collect(),
-        parameters: outcome.parameters.iter().map(|p| p.name.clone()).collect(),
+        record: outcome.record.clone(),
+        car: prepared.car.name.clone(),
+        lines: prepared.lines.iter().map(|l| l.name.clone()).collect(),
+        parameters: names().collect(),
         share: settings.share,
-        within_edges: outcome.driven.iter().filter(within).count(),
+        within_edges: within().count(),
         driven: outcome.driven.len(),
-        best: outcome
-            .driven
-            .first()
-            .filter(within)
-            .map(|d| entry(outcome, lines, d)),
-        as_it_is: outcome
-            .driven
-            .iter()
-            .find(|d| d.setup == 0 && d.best.is_some())
-            .map(|d| entry(outcome, lines, d)),
-        rule: "the fastest lap within the edges, whether or not it agrees with the point mass's; one line alone is held to that \
-               agreement",
-        failures: outcome.failures.clone(),
-        device_faults: outcome.device_faults.clone(),
-        interrupted: outcome.interrupted,
+        best: within().next().map(entry),
+        as_it_is: within().find(|d| d.setup == 0).map(entry),
+        fastest: within().take(PRINTED).map(entry).collect(),
+        rule: rule.to_owned(),
     }
 }
 
@@ -135,7 +109,12 @@ impl PopulationSummary {
     pub fn to_text(&self) -> String {
         let mut text = format!(
             "{} laps of {} driven on {} ({:.0} a second); {} of {} set-ups and lines stay within the edges.\n",
-            self.evaluations, self.car, self.adapter, self.evaluations_per_s, self.within_edges, self.driven
+            self.record.evaluations,
+            self.car,
+            self.record.adapter,
+            self.record.evaluations_per_s,
+            self.within_edges,
+            self.driven
         );
         if let (Some(best), Some(own)) = (&self.best, &self.as_it_is)
             && let (Some(fastest), Some(time)) = (best.lap_time_s, own.lap_time_s)
@@ -149,102 +128,60 @@ impl PopulationSummary {
             text.push_str(&format!("Chosen of each set-up on each line: {}.\n", self.rule));
         }
         if self.best.is_none() {
-            let counts: Vec<String> = self
-                .failures
-                .iter()
-                .map(|(why, n)| format!("{why} {n}"))
-                .collect();
             text.push_str(&format!(
                 "None does with any share of the grip ({}); a line found for a wider car has more room.\n",
-                counts.join(", ")
+                failures_in_words(&self.record.failures)
             ));
         }
-        text
+        text + &self.record.notes()
+    }
+
+    /// The fastest as a table of text.
+    pub fn table(&self) -> String {
+        let table = Table::rows(&self.fastest)
+            .text("line", |e| &*e.line)
+            .number("set-up", "", |e| e.setup as f64)
+            .number("lap time", "s", |e| e.lap_time_s)
+            .number("room", "m", |e| e.room_m)
+            .number("grip share", "", |e| e.grip_share);
+        let parameters = self.parameters.iter();
+        parameters
+            .fold(table, |table, p| {
+                table.number(p, "", |e| e.values.get(p).copied())
+            })
+            .table()
+            .to_text()
     }
 }
 
-/// The fastest set-ups as a table of text.
-pub fn table_of(lines: &[NamedLine], outcome: &PopulationOutcome) -> String {
-    // As wide as the longest name.
-    let names = lines.iter().map(|l| l.name.chars().count());
-    let width = names.max().unwrap_or(0).max(4) + 2;
-    let mut text = format!(
-        "{:>4}  {:<width$}{:>6}{:>10}{:>8}{:>6}",
-        "", "line", "set-up", "lap s", "room m", "grip"
-    );
-    for parameter in &outcome.parameters {
-        text.push_str(&format!("  {}", parameter.name));
-    }
-    text.push('\n');
-    let best = outcome.driven.iter().filter_map(|d| d.best.map(|b| (d, b)));
-    for (rank, (driven, best)) in best.take(PRINTED).enumerate() {
-        text.push_str(&format!(
-            "{:>4}  {:<width$}{:>6}{:>10.3}{:>8.2}{:>6.2}",
-            rank + 1,
-            lines[driven.line].name,
-            driven.setup,
-            best.lap_time_s,
-            best.room_m,
-            best.grip_share
-        ));
-        for (parameter, value) in outcome.parameters.iter().zip(&driven.values) {
-            let width = parameter.name.len() + 2;
-            // Short names leave no room for six figures.
-            text.push_str(&format!("{:>width$}", format!(" {value:.6}")));
-        }
-        text.push('\n');
-    }
-    text
-}
-
-/// Writes `summary.json`, `setups.csv`, the fastest car as `car.toml`, `report.html` and `manifest.json`.
+/// Writes `setups.csv`, the fastest car as `car.toml`, and `report.html`.
 ///
 /// # Errors
 /// [`crate::Error::Io`] if a file cannot be written.
-pub fn write_population(
+pub(super) fn report(
     folder: &Path,
-    car: &Car,
-    lines: &[NamedLine],
+    prepared: &Prepared,
     outcome: &PopulationOutcome,
     summary: &PopulationSummary,
 ) -> Result<()> {
-    write_json(&folder.join("summary.json"), summary)?;
+    let Prepared { car, lines, .. } = prepared;
     let all = &outcome.driven;
-    let names: Vec<String> = all.iter().map(|d| lines[d.line].name.clone()).collect();
-    let setups: Vec<f64> = all.iter().map(|d| d.setup as f64).collect();
-    let figure = |of: fn(&DrivenBest) -> f64| -> Vec<f64> {
-        all.iter().map(|d| d.best.as_ref().map_or(f64::NAN, of)).collect()
-    };
-    let times = figure(|b| b.lap_time_s);
-    let rooms = figure(|b| b.room_m);
-    let grips = figure(|b| b.grip_share);
-    let steering = figure(|b| b.steering_radps);
-    let values: Vec<Vec<f64>> = (0..outcome.parameters.len())
-        .map(|k| all.iter().map(|d| d.values[k]).collect())
-        .collect();
-    let mut columns = vec![Column {
-        name: "line",
-        unit: "",
-        cells: Cells::Texts(&names),
-    }];
-    let numbers: [(&str, &str, &[f64]); 5] = [
-        ("set-up", "", &setups),
-        ("lap time", "s", &times),
-        ("room", "m", &rooms),
-        ("grip share", "", &grips),
-        ("steering rate", "rad/s", &steering),
-    ];
-    let own = outcome
-        .parameters
-        .iter()
-        .zip(&values)
-        .map(|(p, values)| (p.name.as_str(), p.info.unit, values.as_slice()));
-    columns.extend(numbers.into_iter().chain(own).map(|(name, unit, values)| Column {
-        name,
-        unit: if unit == "-" { "" } else { unit },
-        cells: Cells::Numbers(values),
-    }));
-    write_csv(folder.join("setups.csv"), &columns)?;
+    let mut table = Table::rows(all)
+        .text("line", |d| &*lines[d.line].name)
+        .number("set-up", "", |d| d.setup as f64)
+        .number("lap time", "s", |d| Some(d.best?.lap_time_s))
+        .number("room", "m", |d| Some(d.best?.room_m))
+        .number("grip share", "", |d| Some(d.best?.grip_share))
+        .number("steering rate", "rad/s", |d| Some(d.best?.steering_radps));
+    for (k, parameter) in outcome.parameters.iter().enumerate() {
+        let unit = match parameter.info.unit {
+            "-" => "",
+            unit => unit,
+        };
+        table = table.number(&*parameter.name, unit, |d| d.values[k]);
+    }
+    let table = table.table();
+    table.write_csv(folder.join("setups.csv"))?;
     if let Some(best) = all.first().filter(|d| d.best.is_some()) {
         let mut flat = car.to_flat();
         for (parameter, value) in outcome.parameters.iter().zip(&best.values) {
@@ -267,21 +204,8 @@ pub fn write_population(
     }
     page.section("Set-ups", "");
     let note = "Each with the share of the envelope's grip with which it was fastest within the edges.";
-    page.table("All set-ups on all lines", note, &columns)?;
+    page.table("All set-ups on all lines", note, &table)?;
     page.provenance("car", &summary.car);
-    page.provenance("backend", &summary.backend);
-    page.provenance("adapter", &summary.adapter);
-    page.provenance("laps driven", summary.evaluations.to_string());
-    page.provenance("laps that failed", failures_in_words(&summary.failures));
-    page.provenance("time", format!("{:.1} s", summary.elapsed_s));
-    page.write(folder.join("report.html"))?;
-    // Last: it says that the run is whole.
-    let manifest = Manifest {
-        settings: "",
-        interrupted: outcome.interrupted,
-        device_faults: &outcome.device_faults,
-        longest_dispatch_ms: outcome.longest_dispatch_ms,
-        ..Manifest::new("transient", summary.seed, &outcome.backend, &summary.car)
-    };
-    write_json(&folder.join("manifest.json"), &manifest)
+    summary.record.provenance(&mut page, "laps driven");
+    page.write(folder.join("report.html"))
 }

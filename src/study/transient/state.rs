@@ -1,75 +1,22 @@
-//! What a drive is asked to do, and how far it has come: all that it takes to go on.
+//! How far a drive has come: all that it takes to resume it.
 
-use super::PopulationSettings;
-use crate::study::raceline::RacelineSettings;
-use crate::swarm::checkpoint::Checkpoint;
+use super::TransientSettings;
+use crate::error::{Error, Result};
+use crate::study::framework::State;
+use crate::study::framework::journal::Journal;
+use crate::study::framework::run_folder::STATE;
+use crate::swarm::checkpoint::{self, Checkpoint};
 use serde::{Deserialize, Serialize};
-use std::path::PathBuf;
+use std::path::Path;
 
-/// What the flags ask for.
+/// How far the search for the share of the grip that is held has come. Every share is driven by itself, so that a resumed search
+/// ends with the same bits.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct DriveRequest {
-    /// Files of the lines.
-    pub lines: Vec<PathBuf>,
-    /// The circuit, for its edges.
-    pub track: String,
-    /// The car.
-    pub car: String,
-    /// The point mass's limits from a table instead of the car's own.
-    pub envelope: Option<PathBuf>,
-    /// Width of the car (m).
-    pub car_width_m: f64,
-    /// Set-ups and several lines, driven all at once.
-    pub population: Option<PopulationSettings>,
-}
-
-impl Default for DriveRequest {
-    fn default() -> Self {
-        Self {
-            lines: Vec::new(),
-            track: "silverstone_gp".to_owned(),
-            car: "gt".to_owned(),
-            envelope: None,
-            car_width_m: 2.0,
-            population: None,
-        }
-    }
-}
-
-impl DriveRequest {
-    /// What the circuit and the limits are set up from.
-    pub fn raceline(&self) -> RacelineSettings {
-        RacelineSettings {
-            track: self.track.clone(),
-            car: self.car.clone(),
-            envelope: self.envelope.clone(),
-            car_width_m: self.car_width_m,
-            ..RacelineSettings::default()
-        }
-    }
-
-    /// The same with the paths of files absolute, so that they mean the same from every folder.
-    pub fn absolute(mut self) -> Self {
-        let placed = self.raceline().absolute();
-        (self.track, self.car, self.envelope) = (placed.track, placed.car, placed.envelope);
-        for line in &mut self.lines {
-            if let Ok(path) = std::path::absolute(&line) {
-                *line = path;
-            }
-        }
-        self
-    }
-}
-
-/// How far the search for the share of the grip that is held has come. Every share is driven by itself, so that going on ends
-/// with the same bits.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct DriveState {
-    /// What the flags asked for, where flags did.
-    pub request: Option<DriveRequest>,
+    pub(super) settings: TransientSettings,
     /// A sum over what is read; nothing before the first drive.
     pub(super) inputs: Option<String>,
-    /// Shares that were tried, from the first on.
+    /// Shares that were tried, from the greatest on.
     pub(super) tried: usize,
     /// What became of those that failed.
     pub(super) failures: Vec<(f64, String)>,
@@ -79,19 +26,84 @@ pub struct DriveState {
 
 impl DriveState {
     /// Of a drive that is to begin.
-    pub fn of(request: DriveRequest) -> Self {
+    pub fn new(settings: TransientSettings) -> Self {
         Self {
-            request: Some(request),
-            ..Self::default()
+            settings,
+            inputs: None,
+            tried: 0,
+            failures: Vec::new(),
+            best: None,
         }
-    }
-
-    /// Whether nothing has been driven yet.
-    pub fn is_untouched(&self) -> bool {
-        self.tried == 0
     }
 }
 
 impl Checkpoint for DriveState {
-    const KIND: &'static str = concat!("drive of transient, lapswarm ", env!("CARGO_PKG_VERSION"));
+    const KIND: &'static str = concat!("drive of a line, lapswarm ", env!("CARGO_PKG_VERSION"));
+}
+
+/// The state of one line alone, or of a population. Files hold the one or the other, never this.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub enum TransientState {
+    /// Of one line alone.
+    Line(DriveState),
+    /// Of a population.
+    Population(Journal),
+}
+
+impl Checkpoint for TransientState {
+    const KIND: &'static str = "drive";
+}
+
+impl TransientState {
+    fn foreign<T>() -> Result<T> {
+        let (found, expected) = ("that of another kind of drive", "that of this drive");
+        Err(Error::input(STATE, "state", found, expected))
+    }
+
+    pub(super) fn line(self) -> Result<DriveState> {
+        match self {
+            Self::Line(state) => Ok(state),
+            Self::Population(_) => Self::foreign(),
+        }
+    }
+
+    pub(super) fn population(self) -> Result<Journal> {
+        match self {
+            Self::Population(journal) => Ok(journal),
+            Self::Line(_) => Self::foreign(),
+        }
+    }
+}
+
+impl State<TransientSettings> for TransientState {
+    fn load(file: &Path) -> Result<Self> {
+        match checkpoint::load(file) {
+            Ok(state) => Ok(Self::Line(state)),
+            Err(_) => checkpoint::load(file).map(Self::Population),
+        }
+    }
+
+    fn settings(&self, study: &str) -> Result<TransientSettings> {
+        match self {
+            Self::Line(state) => Ok(state.settings.clone()),
+            Self::Population(journal) => journal.settings(study),
+        }
+    }
+
+    fn set_settings(&mut self, settings: &TransientSettings) -> Result<()> {
+        match self {
+            Self::Line(state) => {
+                state.settings.clone_from(settings);
+                Ok(())
+            }
+            Self::Population(journal) => journal.set_settings(settings),
+        }
+    }
+
+    fn is_untouched(&self) -> bool {
+        match self {
+            Self::Line(state) => state.tried == 0,
+            Self::Population(journal) => State::<TransientSettings>::is_untouched(journal),
+        }
+    }
 }

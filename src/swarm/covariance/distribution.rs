@@ -174,7 +174,7 @@ mod tests {
         };
         let read = |bytes: &[u8]| postcard::from_bytes::<Distribution>(bytes).map(drop);
         read(&written(0, 0)).expect("an empty one");
-        // Rows times columns are nought where they are counted in 64 bits.
+        // Rows times columns are zero where they are counted in 64 bits.
         assert!(read(&written(1 << 63, 2)).is_err());
         assert!(read(&written(1 << 32, 1 << 32)).is_err());
         assert!(read(&written(2, 2)).is_err());

@@ -13,7 +13,7 @@
 mod distribution;
 
 use super::space::Space;
-use super::{Front, Optimiser};
+use super::{Counters, Front, Optimiser};
 use crate::error::{Error, Result};
 use crate::evaluate::{Evaluation, FAILED_COST, Problem};
 use crate::random::Random;
@@ -22,14 +22,14 @@ use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 
-/// What becomes of a swarm whose distribution has collapsed.
+/// What a swarm does whose distribution has collapsed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Restarts {
-    /// It goes on.
+    /// It continues.
     None,
-    /// It starts again anywhere, with twice the particles of the start before.
+    /// It restarts at a random place, with twice the particles of the previous start.
     Growing,
-    /// It starts again by turns as `Growing` and with few particles and a random spread; whichever has had fewer
+    /// It restarts either as `Growing` does, or with few particles and a random spread: whichever kind has had fewer
     /// evaluations.
     Alternating,
 }
@@ -97,8 +97,7 @@ pub struct CovarianceSwarm {
     /// Whether the present start is a small one, and the evaluations that small and other starts have had.
     small: bool,
     spent: [u64; 2],
-    iteration: usize,
-    evaluations: u64,
+    counters: Counters,
 }
 
 /// What the draws are for, in the counter.
@@ -156,8 +155,7 @@ impl CovarianceSwarm {
             doublings: 0,
             small: false,
             spent: [0; 2],
-            iteration: 0,
-            evaluations: 0,
+            counters: Counters::default(),
             settings,
         };
         swarm.sample(swarm.settings.population);
@@ -175,7 +173,7 @@ impl CovarianceSwarm {
     }
 
     fn sample(&mut self, count: usize) {
-        let when = self.iteration as u32;
+        let when = self.counters.iteration as u32;
         let draw = |particle: usize| {
             let normal = |k: usize| self.random.normal(SAMPLE, when, particle as u32, k as u32);
             let drawn = self.distribution.sample(normal);
@@ -204,11 +202,11 @@ impl CovarianceSwarm {
         level || self.distribution.width() < COLLAPSED || self.distribution.condition() > ILL_CONDITIONED
     }
 
-    /// Starts again anywhere; returns the number of particles.
+    /// Restarts at a random place; returns the number of particles.
     fn restart(&mut self) -> usize {
         let uniform = |index: usize| {
             self.random
-                .uniform(RESTART, self.iteration as u32, 0, index as u32)
+                .uniform(RESTART, self.counters.iteration as u32, 0, index as u32)
         };
         let d = self.space.dimensions();
         let mean = DVector::from_fn(d, |k, _| uniform(2 + k));
@@ -217,7 +215,7 @@ impl CovarianceSwarm {
         self.small = self.settings.restarts == Restarts::Alternating
             && self.doublings > 0
             && self.spent[1] < self.spent[0];
-        let remaining = self.budget().saturating_sub(self.evaluations).max(4) as usize;
+        let remaining = self.budget().saturating_sub(self.counters.evaluations).max(4) as usize;
         if self.small {
             let least = ((4.0 + 3.0 * (d as f64).ln()) as usize).min(usual);
             let large = (usual << self.doublings.min(20)) as f64;
@@ -261,7 +259,7 @@ impl Optimiser for CovarianceSwarm {
         if costs[first] < self.best.1 {
             self.best = (self.positions[first].clone(), costs[first]);
         }
-        self.evaluations += costs.len() as u64;
+        self.counters.evaluations += costs.len() as u64;
         self.spent[usize::from(self.small)] += costs.len() as u64;
         let mut count = self.positions.len();
         // A population that failed as a whole says nothing about where to go.
@@ -272,12 +270,12 @@ impl Optimiser for CovarianceSwarm {
                 count = self.restart();
             }
         }
-        self.iteration += 1;
+        self.counters.iteration += 1;
         self.sample(count);
     }
 
-    fn iteration(&self) -> usize {
-        self.iteration
+    fn counters(&self) -> Counters {
+        self.counters
     }
 
     fn planned_iterations(&self) -> usize {
@@ -285,11 +283,7 @@ impl Optimiser for CovarianceSwarm {
     }
 
     fn done(&self) -> bool {
-        self.evaluations + self.positions.len() as u64 > self.budget()
-    }
-
-    fn evaluations(&self) -> u64 {
-        self.evaluations
+        self.counters.evaluations + self.positions.len() as u64 > self.budget()
     }
 
     fn front(&self) -> Front {

@@ -7,7 +7,7 @@ use crate::scalar::lanes::Lanes;
 use serde::{Deserialize, Serialize};
 
 /// The volume, up to `reference`, that each of `points` dominates and no other does, for one to three
-/// objectives. Nought for a point that another equals or dominates, or that is not better than the reference.
+/// objectives. Zero for a point that another equals or dominates, or that is not better than the reference.
 ///
 /// # Errors
 /// As [`hypervolume`].
@@ -21,7 +21,7 @@ pub fn contributions(points: &[Vec<f64>], reference: &[f64]) -> Result<Vec<f64>>
         .collect())
 }
 
-/// Points of up to three objectives by objective; missing ones are nought, against a reference of one.
+/// Points of up to three objectives by objective; missing ones are zero, against a reference of one.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(in crate::swarm) struct Columns {
     x: Vec<f64>,

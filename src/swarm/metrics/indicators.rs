@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Result};
 
-/// An affine map of each objective, which takes a front's best value to nought and its worst to one.
+/// An affine map of each objective, which takes a front's best value to zero and its worst to one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scale {
     least: Vec<f64>,
@@ -36,7 +36,7 @@ impl Scale {
     }
 }
 
-/// Mean over the true front of how far the set is from dominating it \[2\]: nought at best. `O(n m)`.
+/// Mean over the true front of how far the set is from dominating it \[2\]: zero at best. `O(n m)`.
 ///
 /// # Errors
 /// [`Error::Input`] if either is empty or rows differ in width.
@@ -72,7 +72,7 @@ pub fn epsilon(points: &[Vec<f64>], front: &[Vec<f64>]) -> Result<f64> {
 }
 
 /// The generalised spread \[3\]: how unequal the distances of the points to their nearest neighbours are, and how
-/// far the set stays off the front's extremes. Nought for an even set that reaches them.
+/// far the set stays off the front's extremes. Zero for an even set that reaches them.
 ///
 /// # Errors
 /// As [`igd_plus`].

@@ -29,6 +29,7 @@ pub(super) use contribution::Columns;
 pub use contribution::contributions;
 pub use hypervolume::hypervolume;
 pub use indicators::{Scale, epsilon, igd_plus, spread};
+pub(super) use non_dominated::dominates;
 pub use non_dominated::non_dominated;
 pub use ranks::ranks;
 pub use significance::signed_rank;

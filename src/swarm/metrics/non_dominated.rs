@@ -1,8 +1,19 @@
 //! Which points of a set no other dominates.
 
 use super::staircase::Staircase;
-use crate::swarm::archive::dominates;
 use std::cmp::Ordering;
+
+/// Whether `a` is at least as good as `b` in every objective and better in one.
+pub fn dominates(a: &[f64], b: &[f64]) -> bool {
+    let mut better = false;
+    for (x, y) in a.iter().zip(b) {
+        if x > y {
+            return false;
+        }
+        better |= x < y;
+    }
+    better
+}
 
 /// Indices of the points that no other dominates, ascending; of equal points the first. `O(n log n)` for up to
 /// three objectives \[5\], `O(n m)` for a front of `m` beyond. Rows with a number that is not finite are left

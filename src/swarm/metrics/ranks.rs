@@ -1,10 +1,9 @@
 //! Which front of a set each point is in.
 
-use super::non_dominated::by_last;
+use super::non_dominated::{by_last, dominates};
 use super::staircase::Staircase;
-use crate::swarm::archive::dominates;
 
-/// The number of the front that each point is in: nought for those that no other dominates, one for those that no other
+/// The number of the front that each point is in: zero for those that no other dominates, one for those that no other
 /// dominates once these are gone, and so on \[5, 6\]. Equal points are in the same front; rows with a number that is not
 /// finite are in one of their own after all others. `O(n log n log k)` for up to three objectives and `k` fronts,
 /// `O(n^2)` at worst beyond.

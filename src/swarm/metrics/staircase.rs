@@ -11,7 +11,7 @@ pub(in crate::swarm) struct Staircase {
 
 /// A word that is ordered as the number is.
 fn word(x: f64) -> u64 {
-    // Nought has two signs and one place.
+    // Zero has two signs and one place.
     let bits = (x + 0.0).to_bits();
     if bits >> 63 == 1 { !bits } else { bits | 1 << 63 }
 }

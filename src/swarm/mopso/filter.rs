@@ -1,4 +1,4 @@
-//! What of a swarm an archive should see: the points that nothing in it or in the swarm dominates.
+//! The points of a swarm that may enter the archive: those that no member and no other point dominates.
 //!
 //! A swarm is filtered, never ranked. Points that a member of the archive dominates or equals go first, then those that
 //! a few good points of their part of the swarm dominate; what is left of each part, and then of all parts together, is
@@ -6,11 +6,11 @@
 //! running minimum for two objectives, a staircase for three. The parts have a fixed size, so that the outcome does
 //! not depend on the threads.
 
-use super::flock::BLOCK;
 use crate::evaluate::FAILED_COST;
+use crate::evaluate::resident::BLOCK;
 use crate::swarm::metrics::Staircase;
 
-/// Objectives, nought where there are fewer than three, and whose they are.
+/// Objectives (zero for those beyond the number of objectives) and the number of the particle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Point {
     pub at: [f64; 3],
@@ -26,8 +26,8 @@ pub fn point(row: &[f64], who: u32) -> Point {
     Point { at, who }
 }
 
-/// The rows of a part of the swarm, `first` being the number of its first particle, that are sound and that no member
-/// dominates or equals, less those that others of the part dominate or equal.
+/// The sound rows of a part of the swarm that no member and no other row of the part dominates or equals; `first` is the number of
+/// the part's first particle.
 #[inline(always)]
 pub fn part(
     rows: &[f64],
@@ -72,7 +72,7 @@ pub fn part(
 /// Fewer points than this are swept as they are.
 const FEW: usize = 32;
 
-/// The points that no other dominates, in order of who they are; of equal ones the first. `O(n log n)`.
+/// The points that no other dominates, by number of the particle; of equal points the first. `O(n log n)`.
 pub fn front(mut points: Vec<Point>, width: usize) -> Vec<Point> {
     if points.len() > FEW {
         for pivot in pivots(&points, width) {
@@ -107,7 +107,7 @@ pub fn front(mut points: Vec<Point>, width: usize) -> Vec<Point> {
     kept
 }
 
-/// As the numbers compare, so that nought has one place whatever its sign. There is no NaN among them.
+/// As the numbers compare, so that zero has one place whatever its sign. There is no NaN among them.
 fn order<T: PartialOrd>(a: &T, b: &T) -> std::cmp::Ordering {
     a.partial_cmp(b).unwrap_or(std::cmp::Ordering::Equal)
 }

@@ -1,21 +1,21 @@
 //! Multi-objective particle swarm with an archive of leaders.
 
-mod few;
+pub(super) mod blocks;
 pub(super) mod filter;
-pub(super) mod flock;
-mod many;
-pub(super) mod sieve;
+mod large_swarm;
+mod small_swarm;
+pub(super) mod thinning;
 
 use super::archive::Archive;
 use super::settings::MopsoSettings;
-use super::{Front, Optimiser, Welcome};
+use super::{Counters, Front, Optimiser, Welcome};
 use crate::error::Result;
 use crate::evaluate::{Evaluation, Problem};
-use few::Few;
-pub use flock::Generation;
-use many::Many;
-pub(super) use many::{leaders, learn_from};
+pub use blocks::Generation;
+use large_swarm::LargeSwarm;
+pub(super) use large_swarm::{leaders, learn_from};
 use serde::{Deserialize, Serialize};
+use small_swarm::SmallSwarm;
 
 /// From this many particles on, a swarm of two or three objectives is kept in single precision and moved in lanes and
 /// threads.
@@ -23,10 +23,10 @@ pub const MANY: usize = 4096;
 
 /// A swarm that follows an archive of non-dominated solutions (references 4 and 5 of [`super`]).
 ///
-/// With fewer than [`MANY`] particles it is kept in `f64` and told one candidate after the other. From there on it is
-/// kept in `f32` (a coordinate to 6e-8 of its range), `4 (3 d + m)` bytes to a particle of `d` variables and `m`
-/// objectives, and a generation costs time in proportion to the particles: moved in lanes and threads, filtered and
-/// not ranked, the archive told only what may enter it. Results do not depend on the threads or the lanes.
+/// With fewer than [`MANY`] particles the swarm is kept in `f64` and told one candidate after the other. A larger swarm is
+/// kept in `f32` (a coordinate to 6e-8 of its range): `4 (3 d + m)` bytes for a particle of `d` variables and `m`
+/// objectives. Its generations take time in proportion to the particles: they are moved in lanes and threads and filtered
+/// instead of ranked, and the archive is told only what may enter it. Results depend neither on threads nor on lanes.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Mopso {
     kind: Kind,
@@ -34,8 +34,8 @@ pub struct Mopso {
 
 #[derive(Clone, Debug, Serialize, Deserialize)]
 enum Kind {
-    Few(Few),
-    Many(Many),
+    Small(SmallSwarm),
+    Large(LargeSwarm),
 }
 
 impl Mopso {
@@ -49,9 +49,9 @@ impl Mopso {
             && problem.variables.iter().any(|v| v.upper > v.lower);
         Ok(Self {
             kind: if many {
-                Kind::Many(Many::new(problem, settings)?)
+                Kind::Large(LargeSwarm::new(problem, settings)?)
             } else {
-                Kind::Few(Few::new(problem, settings)?)
+                Kind::Small(SmallSwarm::new(problem, settings)?)
             },
         })
     }
@@ -59,16 +59,16 @@ impl Mopso {
     /// Puts the first particles at these candidates (in the variables' units), before the first population is asked for.
     pub fn start_from(&mut self, candidates: &[Vec<f64>]) {
         match &mut self.kind {
-            Kind::Few(few) => few.start_from(candidates),
-            Kind::Many(many) => many.start_from(candidates),
+            Kind::Small(swarm) => swarm.start_from(candidates),
+            Kind::Large(swarm) => swarm.start_from(candidates),
         }
     }
 
     /// The archive; its positions are in the unit cube, see [`Mopso::archive_candidates`].
     pub fn archive(&self) -> &Archive {
         match &self.kind {
-            Kind::Few(few) => few.archive(),
-            Kind::Many(many) => many.archive(),
+            Kind::Small(swarm) => swarm.archive(),
+            Kind::Large(swarm) => swarm.archive(),
         }
     }
 
@@ -77,18 +77,18 @@ impl Mopso {
         self.front().candidates
     }
 
-    /// Memory of the swarm's state, bytes to a particle; the archive is beside it.
+    /// Memory of the swarm's state, bytes for each particle, without the archive.
     pub fn bytes_per_particle(&self) -> usize {
         match &self.kind {
-            Kind::Few(few) => few.bytes_per_particle(),
-            Kind::Many(many) => many.bytes_per_particle(),
+            Kind::Small(swarm) => swarm.bytes_per_particle(),
+            Kind::Large(swarm) => swarm.bytes_per_particle(),
         }
     }
 
     fn present(&self) -> &dyn Optimiser {
         match &self.kind {
-            Kind::Few(few) => few,
-            Kind::Many(many) => many,
+            Kind::Small(swarm) => swarm,
+            Kind::Large(swarm) => swarm,
         }
     }
 }
@@ -100,8 +100,8 @@ impl Welcome for Mopso {
 
     fn welcome(&mut self, migrants: &Front, violation: f64) {
         match &mut self.kind {
-            Kind::Few(few) => few.welcome(migrants, violation),
-            Kind::Many(many) => many.welcome(migrants, violation),
+            Kind::Small(swarm) => swarm.welcome(migrants, violation),
+            Kind::Large(swarm) => swarm.welcome(migrants, violation),
         }
     }
 }
@@ -109,28 +109,24 @@ impl Welcome for Mopso {
 impl Optimiser for Mopso {
     fn ask(&mut self) -> Vec<f64> {
         match &mut self.kind {
-            Kind::Few(few) => few.ask(),
-            Kind::Many(many) => many.ask(),
+            Kind::Small(swarm) => swarm.ask(),
+            Kind::Large(swarm) => swarm.ask(),
         }
     }
 
     fn tell(&mut self, evaluation: &Evaluation) {
         match &mut self.kind {
-            Kind::Few(few) => few.tell(evaluation),
-            Kind::Many(many) => many.tell(evaluation),
+            Kind::Small(swarm) => swarm.tell(evaluation),
+            Kind::Large(swarm) => swarm.tell(evaluation),
         }
     }
 
-    fn iteration(&self) -> usize {
-        self.present().iteration()
+    fn counters(&self) -> Counters {
+        self.present().counters()
     }
 
     fn planned_iterations(&self) -> usize {
         self.present().planned_iterations()
-    }
-
-    fn evaluations(&self) -> u64 {
-        self.present().evaluations()
     }
 
     fn best(&self) -> Vec<f64> {

@@ -5,8 +5,8 @@ use super::lanes::failures;
 use crate::error::{Error, Result};
 use crate::evaluate::gpu::shader::test_problem;
 use crate::evaluate::gpu::{Binding, GpuContext, Kernel};
+use crate::evaluate::resident::{BLOCK, DeviceObjectives, groups};
 use crate::evaluate::{BackendInfo, Evaluation, Evaluator, Problem};
-use crate::swarm::device::{BLOCK, DeviceObjectives, groups};
 use bytemuck::{Pod, Zeroable};
 use std::sync::Arc;
 use wgpu::BufferUsages as Usage;
@@ -153,12 +153,11 @@ impl Evaluator for GpuTestEvaluator<'_> {
                 .buffer("readback", bytes, Usage::MAP_READ | Usage::COPY_DST)?;
             self.dispatch((count, d), &self.plain, &position, &objectives)?;
             self.context
-                .run(|encoder| encoder.copy_buffer_to_buffer(&objectives, 0, &readback, 0, bytes))?;
-            self.context.read(&readback, bytes, |data| {
-                let rows: &[f32] = bytemuck::cast_slice(data);
-                let at = |i: usize, k: usize| rows[(i / BLOCK * width + k) * BLOCK + i % BLOCK];
-                evaluation.extend((0..count * width).map(|j| f64::from(at(j / width, j % width))));
-            })?;
+                .read_back((&objectives, 0), &readback, bytes, |data| {
+                    let rows: &[f32] = bytemuck::cast_slice(data);
+                    let at = |i: usize, k: usize| rows[(i / BLOCK * width + k) * BLOCK + i % BLOCK];
+                    evaluation.extend((0..count * width).map(|j| f64::from(at(j / width, j % width))));
+                })?;
         }
         let failures = failures(population, d, &mut evaluation, width);
         Ok(Evaluation {

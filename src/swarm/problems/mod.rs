@@ -153,17 +153,6 @@ impl TestProblem {
         }
     }
 
-    /// The same problem moved by `shift`, one per variable, bounds and all: an optimiser should not notice.
-    pub fn translated(mut self, shift: &[f64]) -> Self {
-        self.shift.resize(self.problem.variables.len(), 0.0);
-        for ((variable, own), by) in self.problem.variables.iter_mut().zip(&mut self.shift).zip(shift) {
-            variable.lower += by;
-            variable.upper += by;
-            *own += by;
-        }
-        self
-    }
-
     /// Its name.
     pub fn name(&self) -> &'static str {
         self.name
@@ -210,7 +199,7 @@ impl TestProblem {
     }
 }
 
-/// `count` numbers from nought to one, ends included.
+/// `count` numbers from zero to one, ends included.
 fn even(count: usize) -> impl Iterator<Item = f64> {
     let last = count.max(2) - 1;
     (0..=last).map(move |i| i as f64 / last as f64)

@@ -31,7 +31,7 @@ pub(super) fn sphere<R: Real>(x: &[R], f: &mut [R]) {
     f[0] = sum(x, |x| x * x);
 }
 
-/// With its optimum moved from one to nought.
+/// With its optimum moved from one to zero.
 #[inline(always)]
 pub(super) fn rosenbrock<R: Real>(x: &[R], f: &mut [R]) {
     let (mut bends, mut squares) = (R::lit(0.0), R::lit(0.0));

@@ -169,7 +169,7 @@ pub(super) fn check_crossings(
 
 impl Survey {
     /// Checks that this can be a road: enough points, none twice, no turning back, no crossing beyond the bridges
-    /// allowed, widths that are none below nought and together at least 0.1 m (an edge may touch the line). Widths
+    /// allowed, widths that are none below zero and together at least 0.1 m (an edge may touch the line). Widths
     /// against bends are checked where cross-sections are made.
     ///
     /// # Errors

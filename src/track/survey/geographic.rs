@@ -25,7 +25,7 @@ impl Fix {
         DVec3::new(cos * north, cos * east, sin)
     }
 
-    /// Earth-centred coordinates (m), at height nought.
+    /// Earth-centred coordinates (m), at height zero.
     fn earth_centred(self) -> DVec3 {
         let up = self.normal();
         let squared_eccentricity = FLATTENING * (2.0 - FLATTENING);

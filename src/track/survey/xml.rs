@@ -51,7 +51,7 @@ pub(super) fn read(text: &str, path: &Path) -> Result<Raw> {
     reader.finish(name)
 }
 
-/// Elements of a name, whatever the namespace: files of the wild declare many.
+/// Elements of a name in any namespace: real files declare many.
 fn children<'a, 'i>(node: Node<'a, 'i>, name: &'static str) -> impl Iterator<Item = Node<'a, 'i>> {
     node.children().filter(move |n| n.tag_name().name() == name)
 }

@@ -93,7 +93,7 @@ impl MguH {
 /// The store.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Store {
-    /// What a state of charge of one is (J). Paper laps may go beyond, which then sizes the store.
+    /// Energy at a state of charge of one (J). Laps of a study may go beyond it, which then sizes the store.
     pub capacity_j: f64,
     /// State of charge at the start of a lap.
     pub start_soc: f64,

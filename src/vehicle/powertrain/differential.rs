@@ -5,8 +5,8 @@ use crate::error::Result;
 
 /// How torque is split between axles and, at the rear, from side to side.
 ///
-/// The right rear wheel's share of its axle is `1/2 + a steer + b yaw_rate`, held within nought and one, so that with
-/// positive factors the outer wheel gets more. An open or locked differential of a point mass has nought for both.
+/// The right rear wheel's share of its axle is `1/2 + a steer + b yaw_rate`, held within zero and one, so that with
+/// positive factors the outer wheel gets more. An open or locked differential of a point mass has zero for both.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Differential {
     /// The front axle's share.

@@ -92,6 +92,9 @@ impl Powertrain {
     }
 
     /// Reads `[powertrain]`.
+    ///
+    /// # Errors
+    /// [`crate::Error::Input`] naming the key whose value is missing or out of range.
     pub fn from_table(table: &Table<'_>) -> Result<Self> {
         let list = |key: &str, least: usize, minimum: f64, meaning: &str| -> Result<Vec<f64>> {
             let values = table.numbers(key)?.unwrap_or_default();
@@ -150,7 +153,7 @@ impl Powertrain {
         )
     }
 
-    /// Full-throttle engine torque (N m), linear between points; nought beyond the last one.
+    /// Full-throttle engine torque (N m), linear between points; zero beyond the last one.
     pub fn torque_at(&self, engine_speed_rpm: f64) -> f64 {
         let speeds = &self.engine_speed_rpm;
         match speeds.iter().position(|s| *s >= engine_speed_rpm) {

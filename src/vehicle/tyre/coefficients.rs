@@ -3,8 +3,7 @@
 use crate::vehicle::parameters::parameters;
 
 parameters! {
-    /// A complete MF 5.2 coefficient set for combined slip with aligning moment. Twin of `TyreCoefficients` in
-    /// `shaders/tyre.wgsl`. Names are Pacejka's; a `.tir` key is the name in capitals.
+    /// A complete MF 5.2 coefficient set for combined slip with aligning moment. Names are Pacejka's; a `.tir` key is the name in capitals.
     ///
     /// Bounds are those outside which the formula loses its meaning, not those of likely tyres.
     pub struct TyreCoefficients {

@@ -1,5 +1,5 @@
 //! Magic Formula 5.2 forces and moment (Pacejka, *Tyre and Vehicle Dynamics*, ch. 4, equations 4.E1-4.E78;
-//! `physics.md` section 1). Twin of `shaders/tyre.wgsl`: the same functions in the same order.
+//! the book, chapter Model, section 1). Twin of `shaders/tyre.wgsl`: the same functions in the same order.
 
 use super::prepared::MagicFormula;
 use super::{LEAST_LOAD, Tyre, TyreCoefficients, TyreForces, TyreInput, TyreModel};

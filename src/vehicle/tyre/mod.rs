@@ -16,7 +16,7 @@ pub use well_formed::IllFormed;
 use super::parameters::ParameterInfo;
 use crate::scalar::Real;
 
-/// The load under which slopes are reckoned as at this load (N); the forces of an unloaded tyre are nought.
+/// The load under which slopes are computed as at this load (N); the forces of an unloaded tyre are zero.
 /// It only keeps 0/0 out of slopes that are ratios of things proportional to load.
 const LEAST_LOAD: f64 = 1e-3;
 
@@ -34,9 +34,9 @@ pub struct TyreInput<R> {
 }
 
 impl<R: Real> TyreInput<R> {
-    /// Nought throughout.
+    /// Zero throughout.
     #[inline(always)]
-    pub fn nought() -> Self {
+    pub fn zero() -> Self {
         let zero = R::lit(0.0);
         Self {
             load: zero,

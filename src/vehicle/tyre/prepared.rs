@@ -29,7 +29,7 @@ fields! {
 
 impl<R: Real> TyreCoefficients<R> {
     /// Makes the tyre ready for an axle whose left wheel leans to the right by `inclination` (rad); the right
-    /// wheel leans to the left as much (`physics.md` section 1).
+    /// wheel leans to the left as much (the book, chapter Model, section 1).
     pub fn prepare(&self, inclination: R) -> MagicFormula<R> {
         let one = R::lit(1.0);
         let nominal = self.fnomin * self.lfz0;

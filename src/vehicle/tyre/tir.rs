@@ -66,7 +66,7 @@ impl TyreFile {
     ///
     /// # Errors
     /// [`Error::Io`] if it cannot be read; [`Error::Input`] naming line and key for a wrong `FITTYP`, units other
-    /// than SI, a coefficient that is no number or out of its range, a repeated or a missing one.
+    /// than SI, a coefficient that is not a number or out of its range, a repeated or a missing one.
     pub fn read(path: &Path) -> Result<Self> {
         let bytes = read_bytes(path, LARGEST_TEXT)?;
         // Comments in the wild are Latin-1; the keys and figures are ASCII either way.
@@ -74,6 +74,9 @@ impl TyreFile {
     }
 
     /// Parses the text of a `.tir` file; `file` is only named in errors.
+    ///
+    /// # Errors
+    /// [`Error::Input`] as for [`TyreFile::read`].
     pub fn parse(file: &Path, text: &str) -> Result<Self> {
         let table = TyreCoefficients::<f64>::PARAMETERS;
         let keys: Vec<String> = table.iter().map(|p| tir_key(p.name)).collect();

@@ -10,11 +10,11 @@ use std::fmt;
 pub enum IllFormed {
     /// A coefficient is not a finite number.
     NotFinite,
-    /// Peak friction is not positive (or next to nought) somewhere in the working range of loads.
+    /// Peak friction is not positive (or next to zero) somewhere in the working range of loads.
     Friction,
     /// Slip or cornering stiffness has the wrong sign or vanishes somewhere in the working range of loads.
     Stiffness,
-    /// A combined-slip weight divides by (nearly) nought, or leaves a negative force at slips driven daily.
+    /// A combined-slip weight divides by (nearly) zero, or leaves a negative force at slips driven daily.
     Weighting,
 }
 
@@ -33,10 +33,10 @@ impl fmt::Display for IllFormed {
 
 /// Loads (in nominal loads) at which a tyre is judged: from nearly lifted to a loaded outer wheel.
 const LOADS: [f64; 4] = [0.1, 0.5, 1.0, 2.0];
-/// The least peak friction, a hundredth of that on wet ice; below it slopes divide by (nearly) nought.
+/// The least peak friction, a hundredth of that on wet ice; below it slopes divide by (nearly) zero.
 const LEAST_FRICTION: f64 = 1e-3;
 /// The least stiffness per load, a hundredth of a real tyre's. Other terms divide by stiffness, and what is small but
-/// fine in `f64` is nought in the single precision of the backends.
+/// fine in `f64` is zero in the single precision of the backends.
 const LEAST_STIFFNESS: f64 = 0.1;
 /// The slip within which the weights must stay positive, as slip ratio and as tangent of the slip angle.
 const WORKING_SLIP: f64 = 0.15;
@@ -44,7 +44,10 @@ const WORKING_SLIP: f64 = 0.15;
 const LEAST_DENOMINATOR: f64 = 0.1;
 
 impl TyreCoefficients<f64> {
-    /// Whether the coefficients make a tyre (`physics.md` section 1, "Numerics").
+    /// Whether the coefficients make a tyre (the book, chapter Model, section 1).
+    ///
+    /// # Errors
+    /// Why they make none.
     pub fn well_formed(&self) -> Result<(), IllFormed> {
         if self.to_flat().iter().any(|x| !x.is_finite()) {
             return Err(IllFormed::NotFinite);
@@ -71,7 +74,7 @@ impl TyreCoefficients<f64> {
             let ex = self.rex1 + self.rex2 * dfz;
             let ey = self.rey1 + self.rey2 * dfz;
             let shift = self.rhy1 + self.rhy2 * dfz;
-            // The slopes are steepest, and so the denominators least, where the other slip is nought.
+            // The slopes are steepest, and so the denominators least, where the other slip is zero.
             let bx = self.rbx1 * self.lxal;
             let by = self.rby1 * self.lyka;
             if !(shape(self.rcx1, bx, ex, self.rhx1) > LEAST_DENOMINATOR

@@ -80,7 +80,7 @@ function number(value, figures = 4) {
   const raised = [...String(Number(exponent))].map((c) => SUPERSCRIPT[c]).join("");
   return `${digits.replace("-", "−")}×10${raised}`;
 }
-// As above, without noughts that only fill up: for axes.
+// As above, without zeros that only fill up: for axes.
 function tick(value) {
   const text = number(value, 5);
   return text.includes("×")

@@ -19,6 +19,8 @@ draw.curves = (place, data) => {
   // Only curves over rising values have one height at each of them.
   const overX =
     curves.length <= MOST_IN_TIP && curves.every((c) => c.x.every((x, k) => k === 0 || x >= c.x[k - 1]));
+  // A curve of gaps is dots.
+  const isDots = (curve) => curve.y.every((y, k) => y === null || k === 0 || curve.y[k - 1] === null);
   const rows = (items) =>
     items.map((p) => [p.color, curves[p.seriesIndex].label || data.y_label, number(p.value[1], 5)]);
   const option = () => ({
@@ -50,7 +52,8 @@ draw.curves = (place, data) => {
       name: curve.label,
       type: "line",
       data: points(curve),
-      showSymbol: curve.x.length === 1,
+      showSymbol: isDots(curve),
+      showAllSymbol: isDots(curve),
       symbol: "circle",
       symbolSize: overX ? 5 : 4,
       lineStyle: { color: colour(curve, i), width: 1.8 },
@@ -63,7 +66,7 @@ draw.curves = (place, data) => {
             showSymbol: true,
             showAllSymbol: true,
             symbolSize: 6,
-            itemStyle: { color: colour(curve, i), opacity: 0 },
+            itemStyle: { color: colour(curve, i), opacity: isDots(curve) ? 1 : 0 },
             emphasis: { itemStyle: { opacity: 1 } },
           }),
     })),

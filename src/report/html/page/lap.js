@@ -263,7 +263,7 @@ draw.lap = (place, lap) => {
   );
 };
 
-// Where an axis starts: at nought if the first value is all but there.
+// Where an axis starts: at zero if the first value is all but there.
 const startOf = ({ min, max }) => (Math.abs(min) < 0.01 * (max - min) ? Math.min(min, 0) : min);
 
 // The room between two curves over `x`.

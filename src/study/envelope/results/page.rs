@@ -1,23 +1,18 @@
-//! The interactive report of a car's limits.
+//! The interactive report of a car's g-g-v envelope.
 
-use super::{EnvelopeSummary, surface};
+use super::{EnvelopeSummary, curves, surface};
 use crate::error::Result;
-use crate::evaluate::failures_in_words;
-use crate::report::{Cells, Column, CurvePanel, HtmlReport, Scale};
-use crate::study::envelope::{CarLimits, SpeedLimits, SteadySurface};
+use crate::report::{HtmlReport, Table};
+use crate::study::envelope::{CarLimits, Outcome};
 use std::path::Path;
 
-pub fn write(
-    folder: &Path,
-    (limits, surface): (&CarLimits, Option<&SteadySurface>),
-    summary: &EnvelopeSummary,
-    panels: &[CurvePanel<'_>],
-) -> Result<()> {
-    let mut page = HtmlReport::new("envelope", &format!("Limits of the {}", summary.car));
+pub fn write(folder: &Path, outcome: &Outcome, summary: &EnvelopeSummary) -> Result<()> {
+    let limits = &outcome.limits;
+    let mut page = HtmlReport::new("envelope", &format!("g-g-v envelope of the {}", summary.car));
     if let (Some(slow), Some(fast)) = (limits.speeds.first(), limits.speeds.last()) {
         page.sentence(format!(
             "The {} corners at up to {:.1} m/s\u{b2} at {:.0} m/s and {:.1} m/s\u{b2} at {:.0} m/s, brakes at up to {:.1} and \
-             {:.1} m/s\u{b2}, and ends at {:.1} m/s.",
+             {:.1} m/s\u{b2}, and reaches {:.1} m/s.",
             summary.car,
             slow.row.ay_mps2,
             slow.row.v_mps,
@@ -39,48 +34,38 @@ pub fn write(
     page.sentence(format!("At small angles the car {}.", summary.balance()));
     page.section(
         "Limits",
-        "From steady states of the 4DOF model at each speed; the engine's limit is that of its best gear.",
+        "From steady states of the 4DOF model at each speed. The engine's limit is that of its best gear.",
     );
-    for panel in panels {
-        page.curves(panel, "", [Scale::Linear; 2])?;
-    }
-    if let Some(found) = surface {
+    page.figure(folder.join("envelope.svg"), &curves(limits, &summary.car))?;
+    if let Some(found) = &outcome.surface {
+        surface::write_tables(folder, found)?;
         page.section("The surface", surface::ABOUT);
-        page.paragraph(&surface::in_words(&found.summary));
-        surface::with_figure(found, &summary.car, |figure| page.surface(figure, ""))?;
+        page.paragraph(&surface::in_words(&found.summary, &outcome.record));
+        if let Some(figure) = surface::figure(found, &summary.car) {
+            page.figure(folder.join("surface.svg"), &figure)?;
+        }
     }
-    let of = |f: &dyn Fn(&SpeedLimits) -> f64| limits.speeds.iter().map(f).collect::<Vec<f64>>();
-    let figures = [
-        ("speed", "m/s", of(&|s| s.row.v_mps)),
-        ("cornering", "m/s^2", of(&|s| s.row.ay_mps2)),
-        ("braking grip", "m/s^2", of(&|s| s.row.ax_grip_mps2)),
-        ("drive", "m/s^2", of(&|s| s.row.ax_drive_mps2)),
-        ("traction", "m/s^2", of(&|s| s.traction_mps2)),
-        ("engine", "m/s^2", of(&|s| s.engine_mps2)),
-        ("drag", "m/s^2", of(&|s| s.row.drag_mps2)),
-    ];
-    let columns: Vec<Column<'_>> = figures
-        .iter()
-        .map(|(name, unit, values)| Column {
-            name,
-            unit,
-            cells: Cells::Numbers(values),
-        })
-        .collect();
     page.table(
         "Limits at each speed",
-        "Drive is the lesser of traction and engine. Drag is to be taken off drive, and helps the brakes.",
-        &columns,
+        "Drive is the lesser of traction and engine. Drag reduces the drive and helps the brakes.",
+        &speeds_table(limits),
     )?;
     page.provenance("car", &summary.car);
     page.provenance("limits", "cpu, f64");
-    if let Some(found) = surface {
-        page.provenance("backend", found.backend.backend);
-        page.provenance("adapter", &found.backend.device);
-        page.provenance("driver", &found.backend.driver);
-        page.provenance("cars that failed", failures_in_words(&found.summary.failures));
-    }
     page.provenance("steady states", summary.steady_states.to_string());
-    page.provenance("time", format!("{:.2} s", summary.elapsed_s));
+    summary.record.provenance(&mut page, "cars of the surface");
     page.write(folder.join("report.html"))
+}
+
+/// Accelerations by speed.
+fn speeds_table(limits: &CarLimits) -> Table<'static> {
+    Table::rows(&limits.speeds)
+        .number("speed", "m/s", |s| s.row.v_mps)
+        .number("cornering", "m/s^2", |s| s.row.ay_mps2)
+        .number("braking grip", "m/s^2", |s| s.row.ax_grip_mps2)
+        .number("drive", "m/s^2", |s| s.row.ax_drive_mps2)
+        .number("traction", "m/s^2", |s| s.traction_mps2)
+        .number("engine", "m/s^2", |s| s.engine_mps2)
+        .number("drag", "m/s^2", |s| s.row.drag_mps2)
+        .table()
 }

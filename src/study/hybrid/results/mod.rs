@@ -1,23 +1,24 @@
 //! What a hybrid study leaves behind: figures for people and scripts, laps, pictures.
 
+mod figures;
 mod files;
 mod page;
-mod pictures;
 
 use super::{
     HybridSetup, HybridStudySettings, Outcome, ReportedLap, Sizing, StintLap, correlation, mean_worths,
 };
 use crate::error::Result;
-use crate::evaluate::{FailureCounts, failures_in_words};
-use serde::Serialize;
+use crate::evaluate::failures_in_words;
+use crate::study::framework::RunRecord;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
 
 /// The figures of a scenario.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct ScenarioFigures {
     /// `offset` or `additional`.
-    pub mode: &'static str,
+    pub mode: String,
     /// Energy out of the store (MJ).
     pub deployed_mj: f64,
     /// Energy of the MGU-K into the store (MJ).
@@ -52,7 +53,7 @@ impl ScenarioFigures {
         let greatest = own.change_j().into_iter().fold(0.0, f64::max);
         let generating = own.segments.iter().filter(|s| s.generator > 0.0).map(|s| s.time);
         Self {
-            mode: own.mode.name(),
+            mode: own.mode.name().to_owned(),
             deployed_mj: lap.deployed / 1e6,
             harvested_k_mj: lap.harvested_k / 1e6,
             harvested_h_mj: lap.harvested_h / 1e6,
@@ -70,7 +71,7 @@ impl ScenarioFigures {
 }
 
 /// A point of the front of time against energy.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct FrontFigures {
     /// Energy that may leave the store (MJ).
     pub energy_mj: f64,
@@ -81,7 +82,7 @@ pub struct FrontFigures {
 }
 
 /// The deployment of the study's energy.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct DeploymentFigures {
     /// Energy that may leave the store (MJ).
     pub energy_mj: f64,
@@ -123,10 +124,10 @@ pub struct DeploymentFigures {
 }
 
 /// The figures of a study; `--json` prints this.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct HybridSummary {
     /// `hybrid`.
-    pub study: &'static str,
+    pub study: String,
     /// The track.
     pub track: String,
     /// The car.
@@ -137,22 +138,9 @@ pub struct HybridSummary {
     pub length_m: f64,
     /// Seed of all random numbers.
     pub seed: u64,
-    /// `cpu`, `simd` or `gpu`.
-    pub backend: &'static str,
-    /// Instruction set, or name of the adapter.
-    pub adapter: String,
-    /// Driver of the adapter.
-    pub driver: String,
-    /// What went wrong with devices and was got over; the study's figures hold all the same.
-    pub device_faults: Vec<String>,
-    /// Scenarios, solvers and swarms (s).
-    pub elapsed_s: f64,
-    /// Laps evaluated.
-    pub evaluations: u64,
-    /// Laps of the swarms that failed, by reason.
-    pub failures: FailureCounts,
-    /// Laps per second of the swarms; `null` where none ran.
-    pub evaluations_per_s: Option<f64>,
+    /// How the study ran; its rate is that of the swarms.
+    #[serde(flatten)]
+    pub record: RunRecord,
     /// What the rules allow to be deployed on this lap (MJ); `null` without a limit.
     pub rules_deployed_mj: Option<f64>,
     /// Time of the engine alone (s).
@@ -169,12 +157,14 @@ pub struct HybridSummary {
     pub sizing: Vec<Sizing>,
     /// What a reader must know before believing the figures.
     pub warnings: Vec<String>,
-    /// Whether the study was broken off.
-    pub interrupted: bool,
 }
 
 /// Puts the figures together.
-pub fn summarise(settings: &HybridStudySettings, setup: &HybridSetup, outcome: &Outcome) -> HybridSummary {
+pub(super) fn summarise(
+    settings: &HybridStudySettings,
+    setup: &HybridSetup,
+    outcome: &Outcome,
+) -> HybridSummary {
     let scenarios: BTreeMap<String, ScenarioFigures> = outcome
         .scenarios
         .iter()
@@ -201,31 +191,25 @@ pub fn summarise(settings: &HybridStudySettings, setup: &HybridSetup, outcome: &
         }
         if s.soc_end < 0.0 {
             warnings.push(format!(
-                "{name}: the store is led to {:.3} of its charge: it is too small",
+                "{name}: the charge of the store falls to {:.3}: the store is too small",
                 s.soc_end
             ));
         }
         if s.soc_greatest > 1.0 + 1e-9 {
             warnings.push(format!(
-                "{name}: the charge reaches {:.3} of the store, which would have to be so much larger",
+                "{name}: the charge reaches {:.3} of the store: the store is too small",
                 s.soc_greatest
             ));
         }
     }
     HybridSummary {
-        study: "hybrid",
+        study: "hybrid".to_owned(),
         track: setup.raceline.track_name.clone(),
         car: setup.car.name.clone(),
         line: setup.line_name.clone(),
         length_m: setup.length_m,
         seed: settings.seed,
-        backend: outcome.backend.backend,
-        adapter: outcome.backend.device.clone(),
-        device_faults: outcome.device_faults.clone(),
-        driver: outcome.backend.driver.clone(),
-        elapsed_s: outcome.elapsed_s,
-        evaluations: outcome.evaluations,
-        evaluations_per_s: (outcome.search_s > 0.0).then(|| outcome.evaluations as f64 / outcome.search_s),
+        record: outcome.record.clone(),
         rules_deployed_mj: rules,
         engine_lap_time_s: outcome.engine.lap.time,
         engine_fuel_l: outcome.engine.lap.fuel / setup.car.fuel_density_kgpl,
@@ -261,8 +245,6 @@ pub fn summarise(settings: &HybridStudySettings, setup: &HybridSetup, outcome: &
         stint: outcome.stint.clone(),
         sizing: outcome.sizing.clone(),
         warnings,
-        failures: outcome.failures.clone(),
-        interrupted: outcome.interrupted,
     }
 }
 
@@ -274,33 +256,7 @@ impl HybridSummary {
             self.track, self.car, self.line, self.length_m, self.engine_lap_time_s, self.engine_fuel_l
         );
         if !self.scenarios.is_empty() {
-            text += &format!(
-                "{:22}{:>11}{:>9}{:>9}{:>9}{:>8}{:>9}{:>8}{:>10}{:>12}\n",
-                "scenario",
-                "mode",
-                "out MJ",
-                "K MJ",
-                "H MJ",
-                "SOC",
-                "motor %",
-                "fuel l",
-                "lap s",
-                "added lap s"
-            );
-        }
-        for (name, s) in &self.scenarios {
-            text += &format!(
-                "{name:22}{:>11}{:>9.3}{:>9.3}{:>9.3}{:>8.3}{:>9.1}{:>8.3}{:>10.3}{:>12.3}\n",
-                s.mode,
-                s.deployed_mj,
-                s.harvested_k_mj,
-                s.harvested_h_mj,
-                s.soc_end,
-                100.0 * s.motor_time_share,
-                s.fuel_l,
-                s.lap_time_s,
-                s.additional_lap_time_s
-            );
+            text += &page::scenarios_table(self).first(10).to_text();
         }
         if let Some(d) = &self.deployment {
             text += &format!(
@@ -329,56 +285,25 @@ impl HybridSummary {
                 );
             }
         }
-        for (i, lap) in self.stint.iter().enumerate() {
+        if !self.stint.is_empty() {
+            text += &page::stint_table(&self.stint).to_text();
+        }
+        for sizing in &self.sizing {
+            text += &(sizing_in_words(sizing) + "\n");
+        }
+        let record = &self.record;
+        if record.evaluations_per_s.is_finite() {
             text += &format!(
-                "lap {:>3}: {:.1} kg, {:.3} s and {:.3} l (engine alone {:.3} s, {:.3} l), {:.3} MJ out and {:.3} in, SOC {:.3}\n",
-                i + 1,
-                lap.mass_kg,
-                lap.lap_time_s,
-                lap.fuel_l,
-                lap.engine_lap_time_s,
-                lap.engine_fuel_l,
-                lap.deployed_mj,
-                lap.harvested_mj,
-                lap.soc_end
+                "{} laps evaluated ({:.0} per second) on {}\n",
+                record.evaluations,
+                record.evaluations_per_s,
+                record.device()
             );
         }
-        for s in &self.sizing {
-            text += &match s.energy_mj {
-                Some(mj) => format!(
-                    "{:>6.0} kW and {mj:.2} MJ a lap ({:.2} harvested, a store of {:.2}) lap in {:.3} s (exact deployment {:.3} s) \
-                     with {:.3} l{}\n",
-                    s.power_kw,
-                    s.harvested_mj,
-                    s.store_mj,
-                    s.lap_time_s,
-                    s.exact_lap_time_s.unwrap_or(s.lap_time_s),
-                    s.fuel_l,
-                    match (s.engine_share, s.fuel_saving_l) {
-                        (Some(share), Some(saving)) => format!(
-                            ", {saving:.3} l less than an engine of {share:.3} times the power that laps as fast"
-                        ),
-                        _ => String::new(),
-                    }
-                ),
-                None => format!(
-                    "{:>6.0} kW do not suffice: {:.3} s at best\n",
-                    s.power_kw, s.lap_time_s
-                ),
-            };
+        if !record.failures.is_empty() {
+            text += &format!("Laps that failed: {}\n", failures_in_words(&record.failures));
         }
-        if let Some(rate) = self.evaluations_per_s {
-            text += &format!(
-                "{} laps evaluated ({rate:.0} per second) on {} {}\n",
-                self.evaluations, self.backend, self.adapter
-            );
-        }
-        if !self.failures.is_empty() {
-            text += &format!("Laps that failed: {}\n", failures_in_words(&self.failures));
-        }
-        for fault in &self.device_faults {
-            text += &format!("Note: {fault}\n");
-        }
+        text += &record.notes();
         for warning in &self.warnings {
             text += &format!("Note: {warning}\n");
         }
@@ -386,25 +311,47 @@ impl HybridSummary {
     }
 }
 
-/// Writes all files of a run into `folder`.
+/// What a motor of a power does for a lap time, in words.
+fn sizing_in_words(s: &Sizing) -> String {
+    let Some(mj) = s.energy_mj else {
+        let (power, time) = (s.power_kw, s.lap_time_s);
+        return format!("A motor of {power:.0} kW is not enough: {time:.3} s at best.");
+    };
+    let saved = match (s.engine_share, s.fuel_saving_l) {
+        (Some(share), Some(saving)) => format!(
+            ", {saving:.3} l less than a car without a motor whose engine has {share:.3} times the power and that laps as fast"
+        ),
+        _ => String::new(),
+    };
+    format!(
+        "A motor of {:.0} kW with {mj:.2} MJ a lap, {:.2} MJ of them harvested, and a store of {:.2} MJ laps in {:.3} s (exact \
+         deployment {:.3} s) with {:.3} l{saved}.",
+        s.power_kw,
+        s.harvested_mj,
+        s.store_mj,
+        s.lap_time_s,
+        s.exact_lap_time_s.unwrap_or(s.lap_time_s),
+        s.fuel_l
+    )
+}
+
+/// Writes the car, the line, laps, fronts, figures and the page into `folder`.
 ///
 /// # Errors
 /// [`crate::Error::Io`] if one cannot be written.
-pub fn write_results(
+pub(super) fn report(
     folder: &Path,
     settings: &HybridStudySettings,
     setup: &HybridSetup,
     outcome: &Outcome,
     summary: &HybridSummary,
 ) -> Result<()> {
-    files::write(folder, settings, setup, outcome, summary)?;
-    pictures::draw(folder, settings, setup, outcome)?;
-    page::write(folder, settings, setup, outcome, summary)?;
-    files::write_manifest(folder, settings, setup, outcome)
+    files::write(folder, settings, setup, outcome)?;
+    page::write(folder, settings, setup, outcome, summary)
 }
 
 /// The laps that a study tells of.
-fn told_laps(outcome: &Outcome) -> Vec<&ReportedLap> {
+fn reported_laps(outcome: &Outcome) -> Vec<&ReportedLap> {
     let mut laps = vec![&outcome.engine];
     laps.extend(outcome.scenarios.iter().map(|s| &s.own));
     if let Some(o) = &outcome.optimised {

@@ -1,24 +1,12 @@
-//! The interactive report of a hybrid study.
+//! The interactive report of a hybrid study, with its figures.
 
-use super::pictures::{map_names, power_kw, soc, speeds, summed, time_energy};
-use super::{HybridSummary, ScenarioFigures, told_laps};
+use super::{HybridSummary, ScenarioFigures, figures, reported_laps, sizing_in_words};
+use crate::config::settings::Settings;
 use crate::error::Result;
-use crate::evaluate::failures_in_words;
-use crate::report::{
-    Cells, Column, Front, HtmlReport, LapLine, LapMap, LapPanel, LapTrace, LapView, Objective, Scale,
-};
+use crate::files::stem;
+use crate::report::{Figure, Front, HtmlReport, Table};
 use crate::study::hybrid::{HybridSetup, HybridStudySettings, Outcome, ReportedLap, StintLap};
 use std::path::Path;
-
-/// Rows of the traces, from the top.
-const PANELS: [(&str, &str); 6] = [
-    ("speed", "m/s"),
-    ("time gained", "s"),
-    ("motor", "kW"),
-    ("regeneration", "kW"),
-    ("energy out", "MJ"),
-    ("charge", ""),
-];
 
 pub fn write(
     folder: &Path,
@@ -31,53 +19,77 @@ pub fn write(
     head(&mut page, summary);
     page.section(
         "Laps",
-        "Where the motor works and what it buys; time is gained on the engine alone.",
+        "Where the motor works and what it gains on the engine alone.",
     );
-    page.lap(&lap(setup, outcome))?;
-    scenarios(&mut page, summary)?;
-    let panels = time_energy(outcome);
-    if !panels.is_empty() {
+    page.figure(folder.join("traces.svg"), &figures::all_laps(setup, outcome))?;
+    pictures(folder, setup, outcome)?;
+    if !summary.scenarios.is_empty() {
+        page.table(
+            "Scenarios",
+            "Added: by the same gates with the motor beside the engine.",
+            &scenarios_table(summary),
+        )?;
+    }
+    if let Some(figure) = figures::time_energy(outcome) {
         page.section(
             "Time against energy",
             "Each point of the curve is an exact optimum of its energy.",
         );
-        for panel in &panels {
-            page.curves(panel, "", [Scale::Linear; 2])?;
-        }
+        page.figure(folder.join("time_energy.svg"), &figure)?;
+    }
+    if let Some(o) = outcome.optimised.as_ref().filter(|o| !o.worth.is_empty()) {
+        page.figure(folder.join("worth.svg"), &figures::worth(outcome, &o.worth))?;
     }
     let front = outcome.optimised.as_ref().and_then(|o| o.swarm_front.as_ref());
-    if let Some(front) = front.filter(|f| settings.objectives.len() > 1 && !f.objectives.is_empty()) {
+    if let Some(found) = front.filter(|f| settings.objectives.len() > 1 && !f.objectives.is_empty()) {
         page.section(
             "The front",
             "No lap here is better than another by every objective at once.",
         );
-        page.front(&Front {
-            title: "Laps on the front",
-            objectives: settings
-                .objectives
-                .iter()
-                .map(|o| Objective {
-                    name: o.words(),
-                    unit: o.unit(),
-                })
-                .collect(),
-            points: &front.objectives,
-            ..Front::default()
-        })?;
+        let front = Front::new("Laps on the front", &found.objectives);
+        let named = settings.objectives.iter();
+        let front = named.fold(front, |front, o| front.objective(o.words(), o.unit()));
+        page.figure(folder.join("front.svg"), &front)?;
+        figures::parallel(settings, found).write_svg(&folder.join("parallel.svg"))?;
     }
-    stint(&mut page, &outcome.stint)?;
-    page.provenance("track", &summary.track);
-    page.provenance("car", &summary.car);
-    page.provenance("line", format!("{}, {:.1} m", summary.line, summary.length_m));
-    page.provenance("seed", summary.seed.to_string());
-    page.provenance("backend", summary.backend);
-    page.provenance("adapter", &summary.adapter);
-    page.provenance("driver", &summary.driver);
-    page.provenance("laps evaluated", summary.evaluations.to_string());
-    page.provenance("laps that failed", failures_in_words(&summary.failures));
-    page.provenance("time", format!("{:.1} s", summary.elapsed_s));
+    if !outcome.stint.is_empty() {
+        page.section("Stint", "");
+        page.table("Laps of the stint", "", &stint_table(&outcome.stint))?;
+    }
+    page.facts(&[
+        ("track", &summary.track),
+        ("car", &summary.car),
+        ("line", &format!("{}, {:.1} m", summary.line, summary.length_m)),
+        ("seed", &summary.seed),
+    ]);
+    summary.record.provenance(&mut page, "laps evaluated");
     page.settings("study.toml, which repeats this run", settings.to_toml());
     page.write(folder.join("report.html"))
+}
+
+/// Files of what the lap view of the page has in one: each lap, the scenarios, and the best deployment.
+fn pictures(folder: &Path, setup: &HybridSetup, outcome: &Outcome) -> Result<()> {
+    for lap in reported_laps(outcome).into_iter().skip(1) {
+        let name = format!("energy_{}.svg", stem(&lap.name));
+        figures::lap(setup, outcome, lap).write_svg(&folder.join(name))?;
+    }
+    let scenarios: Vec<&ReportedLap> = outcome.scenarios.iter().map(|s| &s.own).collect();
+    if !scenarios.is_empty() {
+        let title = format!("{}: scenarios", setup.raceline.track_name);
+        figures::laps(setup, outcome, &scenarios, title).write_svg(&folder.join("charge.svg"))?;
+    }
+    // The best deployment if there is one, else the last scenario.
+    let shown = match &outcome.optimised {
+        Some(o) => Some(&o.swarm.lap),
+        None => scenarios.last().copied(),
+    };
+    if let Some(lap) = shown {
+        figures::map(setup, lap).write_svg(folder.join("map.svg"))?;
+        if let Some(sites) = figures::engine_sites(setup, &outcome.engine, lap) {
+            sites.write_svg(folder.join("engine_sites.svg"))?;
+        }
+    }
+    Ok(())
 }
 
 fn head(page: &mut HtmlReport, summary: &HybridSummary) {
@@ -98,147 +110,40 @@ fn head(page: &mut HtmlReport, summary: &HybridSummary) {
         page.tile("Energy out", format!("{:.2}", d.swarm_deployed_mj), "MJ");
     }
     for sizing in &summary.sizing {
-        page.sentence(match sizing.energy_mj {
-            Some(mj) => format!(
-                "A motor of {:.0} kW with {mj:.2} MJ a lap and a store of {:.2} MJ laps in {:.2} s with {:.2} l{}.",
-                sizing.power_kw,
-                sizing.store_mj,
-                sizing.lap_time_s,
-                sizing.fuel_l,
-                match (sizing.engine_share, sizing.fuel_saving_l) {
-                    (Some(share), Some(saving)) => format!(
-                        ", {saving:.2} l less than a car without a motor whose engine has {share:.2} times the power"
-                    ),
-                    _ => String::new(),
-                }
-            ),
-            None => format!(
-                "A motor of {:.0} kW does not suffice: {:.2} s at best.",
-                sizing.power_kw, sizing.lap_time_s
-            ),
-        });
+        page.sentence(sizing_in_words(sizing));
     }
-    for warning in &summary.warnings {
-        page.warning(warning);
-    }
-    if summary.interrupted {
-        page.warning("The run was interrupted; this is what it had reached.");
-    }
+    page.warnings(&summary.warnings, summary.record.interrupted);
 }
 
-fn lap<'a>(setup: &'a HybridSetup, outcome: &'a Outcome) -> LapView<'a> {
-    let engine = &outcome.engine;
-    let elapsed_s = |lap: &ReportedLap| summed(lap.segments.iter().map(|s| 1e6 * s.time));
-    let alone = elapsed_s(engine);
-    let line = |lap: &'a ReportedLap| {
-        let trace = |panel, values| LapTrace {
-            panel,
-            values,
-            band: None,
-        };
-        let gained = alone.iter().zip(elapsed_s(lap)).map(|(a, b)| a - b).collect();
-        let mut traces = vec![trace(0, speeds(lap)), trace(1, gained)];
-        // The engine alone has none of these.
-        if !std::ptr::eq(lap, engine) {
-            traces.extend([
-                trace(2, power_kw(setup, lap, |s| s.motor)),
-                trace(3, power_kw(setup, lap, |s| s.generator)),
-                trace(4, summed(lap.segments.iter().map(|s| s.deployed))),
-                trace(5, soc(setup, lap)),
-            ]);
-        }
-        LapLine {
-            name: &lap.name,
-            x: lap.station_m[..lap.segments.len()].to_vec(),
-            traces,
-            place_m: setup.points_m[..lap.segments.len()].to_vec(),
-            wide: false,
-        }
-    };
-    let mut laps = told_laps(outcome);
-    // The best deployment first: it colours the map.
-    laps.sort_by(|a, b| a.lap.time.total_cmp(&b.lap.time));
-    LapView {
-        title: "Speed, power and charge",
-        note: "Powers are at the wheels.",
-        x_label: "distance",
-        x_unit: "m",
-        panels: PANELS
-            .iter()
-            .map(|(label, unit)| LapPanel {
-                label,
-                unit,
-                height: 1.0,
-            })
-            .collect(),
-        lines: laps.into_iter().map(line).collect(),
-        map: Some(LapMap {
-            left_edge_m: &setup.raceline.edges_m[1],
-            right_edge_m: &setup.raceline.edges_m[0],
-            closed: setup.closed,
-            names: map_names(setup),
-        }),
-        ..LapView::default()
-    }
+/// The figures of the scenarios.
+pub fn scenarios_table(summary: &HybridSummary) -> Table<'static> {
+    let of = |f: fn(&ScenarioFigures) -> f64| move |(_, s): &(&String, &ScenarioFigures)| f(s);
+    Table::rows(&summary.scenarios)
+        .text("scenario", |(name, _)| name.replace('_', " "))
+        .text("mode", |(_, s)| s.mode.clone())
+        .number("lap", "s", of(|s| s.lap_time_s))
+        .number("lap, added", "s", of(|s| s.additional_lap_time_s))
+        .number("out", "MJ", of(|s| s.deployed_mj))
+        .number("MGU-K in", "MJ", of(|s| s.harvested_k_mj))
+        .number("MGU-H in", "MJ", of(|s| s.harvested_h_mj))
+        .number("charge at the end", "-", of(|s| s.soc_end))
+        .number("motor on", "% of time", of(|s| 100.0 * s.motor_time_share))
+        .number("fuel", "l", of(|s| s.fuel_l))
+        .number("balance error", "J", of(|s| s.balance_error_j))
+        .table()
 }
 
-fn scenarios(page: &mut HtmlReport, summary: &HybridSummary) -> Result<()> {
-    if summary.scenarios.is_empty() {
-        return Ok(());
-    }
-    let names: Vec<String> = summary.scenarios.keys().map(|n| n.replace('_', " ")).collect();
-    let modes: Vec<String> = summary.scenarios.values().map(|s| s.mode.to_owned()).collect();
-    let of = |f: &dyn Fn(&ScenarioFigures) -> f64| summary.scenarios.values().map(f).collect::<Vec<f64>>();
-    let figures = [
-        ("lap", "s", of(&|s| s.lap_time_s)),
-        ("lap, added", "s", of(&|s| s.additional_lap_time_s)),
-        ("out", "MJ", of(&|s| s.deployed_mj)),
-        ("MGU-K in", "MJ", of(&|s| s.harvested_k_mj)),
-        ("MGU-H in", "MJ", of(&|s| s.harvested_h_mj)),
-        ("charge at the end", "-", of(&|s| s.soc_end)),
-        ("motor on", "% of time", of(&|s| 100.0 * s.motor_time_share)),
-        ("fuel", "l", of(&|s| s.fuel_l)),
-        ("balance error", "J", of(&|s| s.balance_error_j)),
-    ];
-    let mut columns: Vec<Column<'_>> = [("scenario", &names), ("mode", &modes)]
-        .map(|(name, cells)| Column {
-            name,
-            unit: "",
-            cells: Cells::Texts(cells),
-        })
-        .into();
-    columns.extend(numbers(&figures));
-    page.table(
-        "Scenarios",
-        "Added: by the same gates with the motor beside the engine.",
-        &columns,
-    )
-}
-
-fn numbers<'a>(figures: &'a [(&'a str, &'a str, Vec<f64>)]) -> impl Iterator<Item = Column<'a>> {
-    figures.iter().map(|(name, unit, values)| Column {
-        name,
-        unit,
-        cells: Cells::Numbers(values),
-    })
-}
-
-fn stint(page: &mut HtmlReport, laps: &[StintLap]) -> Result<()> {
-    if laps.is_empty() {
-        return Ok(());
-    }
-    let of = |f: &dyn Fn(&StintLap) -> f64| laps.iter().map(f).collect::<Vec<f64>>();
-    let figures = [
-        ("lap", "", (1..=laps.len()).map(|n| n as f64).collect()),
-        ("mass", "kg", of(&|l| l.mass_kg)),
-        ("time", "s", of(&|l| l.lap_time_s)),
-        ("engine alone", "s", of(&|l| l.engine_lap_time_s)),
-        ("fuel", "l", of(&|l| l.fuel_l)),
-        ("fuel, engine alone", "l", of(&|l| l.engine_fuel_l)),
-        ("out", "MJ", of(&|l| l.deployed_mj)),
-        ("in", "MJ", of(&|l| l.harvested_mj)),
-        ("charge at the end", "-", of(&|l| l.soc_end)),
-    ];
-    page.section("Stint", "");
-    page.table("Laps of the stint", "", &numbers(&figures).collect::<Vec<_>>())
+/// The laps of a stint.
+pub fn stint_table(laps: &[StintLap]) -> Table<'static> {
+    Table::rows(laps.iter().enumerate())
+        .number("lap", "", |(i, _)| (i + 1) as f64)
+        .number("mass", "kg", |(_, l)| l.mass_kg)
+        .number("time", "s", |(_, l)| l.lap_time_s)
+        .number("engine alone", "s", |(_, l)| l.engine_lap_time_s)
+        .number("fuel", "l", |(_, l)| l.fuel_l)
+        .number("fuel, engine alone", "l", |(_, l)| l.engine_fuel_l)
+        .number("out", "MJ", |(_, l)| l.deployed_mj)
+        .number("in", "MJ", |(_, l)| l.harvested_mj)
+        .number("charge at the end", "-", |(_, l)| l.soc_end)
+        .table()
 }

@@ -1,15 +1,13 @@
-//! The interactive report of a racing-line study.
+//! The figures of a racing-line study and its interactive report.
 
-use super::pictures::{along, lap_delta, map_names};
-use super::{LineFigures, Summary, told_lines};
+use super::surfaces::surface;
+use super::{LineFigures, Summary, reported_lines};
+use crate::config::settings::Settings;
 use crate::error::Result;
-use crate::evaluate::failures_in_words;
-use crate::evaluate::line::LineObjective;
-use crate::report::{
-    Cells, Column, Curve, CurvePanel, Front, HtmlReport, LapLine, LapMap, LapPanel, LapTrace, LapView,
-    Objective, Scale, ShadedSection,
-};
+use crate::files::stem;
+use crate::report::{Curves, Front, HtmlReport, LapLine, LapView, Panel, Road, Table, TrackMap};
 use crate::study::raceline::{Outcome, RacelineSettings, ReportedLine, Setup};
+use glam::DVec2;
 use std::path::Path;
 
 /// Rows of the traces, from the top.
@@ -21,6 +19,8 @@ const PANELS: [(&str, &str); 6] = [
     ("curvature", "1/m"),
     ("steering", "deg"),
 ];
+/// Room before and behind a section in its close-up (m).
+const ROOM_M: f64 = 60.0;
 
 pub fn write(
     folder: &Path,
@@ -32,36 +32,75 @@ pub fn write(
     let title = format!("{} with the {}", summary.track, summary.car);
     let mut page = HtmlReport::new("raceline", &title);
     // The fastest first: it colours the map, and time is lost on it.
-    let mut lines = told_lines(outcome);
+    let mut lines = reported_lines(outcome);
     lines.sort_by(|a, b| a.lap_time_fine_s().total_cmp(&b.lap_time_fine_s()));
     head(&mut page, outcome, summary, &lines);
     page.section(
         "Lines",
-        "What is beside each other on the road stands above each other here: distances are those of the reference line.",
+        "Distances are those of the reference line, so that what lies side by side on the road stands one above the other here.",
     );
-    page.lap(&lap(setup, &lines))?;
-    table(&mut page, summary)?;
-    front(&mut page, outcome)?;
-    convergence(&mut page, outcome)?;
-    page.provenance("track", &summary.track);
-    page.provenance("car", &summary.car);
-    page.provenance("cuts across the track", summary.sections.to_string());
-    page.provenance("seed", summary.seed.to_string());
-    page.provenance("backend", summary.backend);
-    page.provenance("adapter", &summary.adapter);
-    page.provenance("driver", &summary.driver);
-    page.provenance("lines evaluated", summary.evaluations.to_string());
-    page.provenance("lines that failed", failures_in_words(&summary.failures));
-    page.provenance("lines per second", format!("{:.0}", summary.evaluations_per_s));
-    page.provenance(
-        "swarms and local search",
-        format!("{:.1} s", summary.search_elapsed_s),
-    );
-    page.provenance("exact solvers", format!("{:.1} s", summary.exact_elapsed_s));
-    for (name, status) in &summary.exact_status {
-        if let Some(status) = status {
-            page.provenance(&format!("exact solver, {name}"), status);
+    let view = laps(setup, &lines);
+    page.figure(folder.join("traces.svg"), &view)?;
+    if let Some(fastest) = lines.first() {
+        let (track, car, name) = (&setup.track_name, &setup.car_name, &fastest.name);
+        let title = format!(
+            "{track}, {name} line of the {car}: {:.2} s",
+            fastest.lap_time_fine_s()
+        );
+        if let Some(map) = view.track_map(&*title) {
+            map.write_svg(folder.join("map.svg"))?;
+            close_ups(folder, setup, fastest, &map)?;
         }
+    }
+    page.table(
+        "Lines compared",
+        "Values at the cross-sections are what the solvers see. Fine values are on a spline at 1 m through them, and are the \
+         ones to believe. Clearance is the least distance from the sides of the car to the edges.",
+        &lines_table(summary),
+    )?;
+    front(&mut page, folder, outcome)?;
+    let histories = outcome.objectives.iter().zip(&outcome.history);
+    let histories = histories.filter(|(_, history)| !history.is_empty());
+    let panels = histories.map(|(o, history)| {
+        Panel::new(&*o.best.name)
+            .x("lines evaluated", "")
+            .y(o.objective.words(), o.objective.unit())
+            .points("", history.iter().map(|(n, best)| (*n as f64, *best)))
+    });
+    let convergence = Curves::new("Convergence of the swarms", panels);
+    if !convergence.is_empty() {
+        page.section("Convergence of the swarms", "");
+        page.figure(folder.join("convergence.svg"), &convergence)?;
+    }
+    page.section(
+        "Objectives about the best lines",
+        "Each over the line's place at the cross-section where it bends most and at the next.",
+    );
+    for found in &outcome.objectives {
+        if let Some(surface) = surface(settings, setup, found)? {
+            let name = format!("surface_{}.svg", stem(&found.best.name));
+            page.figure(folder.join(name), &surface)?;
+        }
+    }
+    page.facts(&[
+        ("track", &summary.track),
+        ("car", &summary.car),
+        ("cross-sections", &summary.sections),
+        ("seed", &summary.seed),
+    ]);
+    summary.record.provenance(&mut page, "lines evaluated");
+    page.facts(&[
+        (
+            "swarms and local search",
+            &format!("{:.1} s", summary.search_elapsed_s),
+        ),
+        ("reference optima", &format!("{:.1} s", summary.exact_elapsed_s)),
+    ]);
+    for (name, status) in &summary.exact_status {
+        page.provenance(
+            &format!("reference optimum, {name}"),
+            status.as_deref().unwrap_or_default(),
+        );
     }
     page.settings("study.toml, which repeats this run", settings.to_toml());
     page.write(folder.join("report.html"))
@@ -71,7 +110,7 @@ fn head(page: &mut HtmlReport, outcome: &Outcome, summary: &Summary, lines: &[&R
     if let Some(fastest) = lines.first() {
         let time = fastest.lap_time_fine_s();
         page.sentence(format!(
-            "The quickest way round {} is the {} line: {time:.2} s over {:.0} m.",
+            "The fastest line round {} is the {} line: {time:.2} s over {:.0} m.",
             summary.track, fastest.name, fastest.fine.length_m
         ));
         page.tile("Lap time", format!("{time:.3}"), "s");
@@ -90,218 +129,218 @@ fn head(page: &mut HtmlReport, outcome: &Outcome, summary: &Summary, lines: &[&R
             page.tile("Top speed", format!("{:.1}", most(&lap.v_mps)), "m/s");
             page.tile("Slowest corner", format!("{:.1}", least(&lap.v_mps)), "m/s");
         }
-        let losses: Vec<String> = lines[1..]
+        let others = lines[1..]
             .iter()
-            .filter(|line| line.lap_time_fine_s().is_finite())
+            .filter(|line| line.lap_time_fine_s().is_finite());
+        let losses: Vec<String> = others
             .map(|line| format!("the {} line {:.2} s", line.name, line.lap_time_fine_s() - time))
             .collect();
         if !losses.is_empty() {
-            page.sentence(format!("Beside it, {} are lost.", losses.join(", ")));
+            page.sentence(format!("Time lost by the others: {}.", losses.join(", ")));
         }
     }
     let gaps: Vec<String> = outcome
         .objectives
         .iter()
         .filter_map(|o| {
-            let gap = summary
-                .above_exact_percent
-                .get(o.objective.name())
-                .copied()
-                .flatten()?;
-            Some(format!("{} {gap:+.3} %", words(o.objective)))
+            let gap = summary.above_exact_percent.get(o.objective.name());
+            Some(format!(
+                "{} {:+.3} %",
+                o.objective.words(),
+                gap.copied().flatten()?
+            ))
         })
         .collect();
     if !gaps.is_empty() {
-        page.sentence(format!("Against the exact solvers: {}.", gaps.join(", ")));
+        page.sentence(format!("Against the reference optima: {}.", gaps.join(", ")));
     }
     if let Some(volume) = summary.hypervolume {
         page.tile("Lines on the front", summary.front_size.to_string(), "");
         page.tile("Hypervolume", format!("{volume:.4}"), "of the box");
     }
-    for warning in &summary.warnings {
-        page.warning(warning);
-    }
-    if outcome.interrupted {
-        page.warning("The run was interrupted; this is what it had reached.");
-    }
+    page.warnings(&summary.warnings, outcome.record.interrupted);
 }
 
-fn words(objective: LineObjective) -> &'static str {
-    match objective {
-        LineObjective::Length => "length",
-        LineObjective::LengthSquared => "squared length",
-        LineObjective::Gamma => "second difference",
-        LineObjective::Kappa2 => "squared curvature",
-        LineObjective::LapTime => "lap time",
-    }
-}
-
-fn lap<'a>(setup: &'a Setup, lines: &[&'a ReportedLine]) -> LapView<'a> {
-    let road = &setup.road;
-    let line = |line: &'a ReportedLine| {
-        let x = along(setup, line);
-        let trace = |panel, values| LapTrace {
-            panel,
-            values,
-            band: None,
+impl Setup {
+    /// The road that lines are found on, with the names of its corners, or of its stretches where corners have none.
+    pub(in crate::study) fn drawn_road(&self) -> Road {
+        let road = &self.road;
+        let at = |station: f64| {
+            let i = road
+                .station_m
+                .partition_point(|s| *s < station)
+                .min(road.len() - 1);
+            0.5 * (road.left_m[i] + road.right_m[i])
         };
-        let mut traces = Vec::new();
-        if let Some(lap) = &line.fine.lap {
-            traces.push(trace(0, lap.v_mps.clone()));
-            let shares: Vec<f64> = x.iter().map(|s| s / road.length_m).collect();
-            traces.extend(
-                lines
-                    .first()
-                    .and_then(|fastest| lap_delta(line, fastest, &shares))
-                    .map(|lost| trace(1, lost)),
-            );
-            traces.push(trace(2, lap.ax_mps2.clone()));
-            traces.push(trace(3, lap.ay_mps2.clone()));
-            traces.push(trace(
-                5,
-                lap.steering_rad.iter().map(|a| a.to_degrees()).collect(),
-            ));
-        }
-        traces.push(trace(4, line.fine.curvature_1pm.clone()));
-        LapLine {
-            name: &line.name,
-            x,
-            traces,
-            place_m: line.fine.points_m.clone(),
-            wide: false,
-        }
-    };
-    LapView {
-        title: "Speed and what limits it",
-        note: "Time lost is against the first of the lines. Curvature and lateral acceleration are positive to the left.",
-        x_label: "distance",
-        x_unit: "m",
-        panels: PANELS
-            .iter()
-            .map(|(label, unit)| LapPanel {
-                label,
-                unit,
-                height: 1.0,
-            })
-            .collect(),
-        lines: lines.iter().map(|l| line(l)).collect(),
-        sections: road
-            .sections
-            .iter()
-            .filter(|s| s.start_m < s.end_m)
-            .map(|s| ShadedSection {
-                name: &s.name,
-                start: s.start_m,
-                end: s.end_m,
-            })
-            .collect(),
-        map: Some(LapMap {
-            left_edge_m: &setup.edges_m[1],
-            right_edge_m: &setup.edges_m[0],
+        let corners = road.corners.iter().map(|c| (c.name.clone(), at(c.station_m)));
+        let sections = road.sections.iter();
+        let sections = sections.map(|s| (s.name.clone(), at(0.5 * (s.start_m + s.end_m))));
+        Road {
+            left_edge_m: self.edges_m[1].clone(),
+            right_edge_m: self.edges_m[0].clone(),
             closed: road.closed,
-            names: map_names(setup),
-        }),
-    }
-}
-
-fn table(page: &mut HtmlReport, summary: &Summary) -> Result<()> {
-    let mut rows: Vec<(String, &LineFigures, f64)> = Vec::new();
-    for (name, figures) in &summary.best {
-        let gap = summary.above_exact_percent.get(name).copied().flatten();
-        rows.push((format!("best {name}"), figures, gap.unwrap_or(f64::NAN)));
-    }
-    for (name, figures) in &summary.exact {
-        rows.extend(figures.as_ref().map(|f| (format!("exact {name}"), f, f64::NAN)));
-    }
-    rows.extend(
-        summary
-            .compromise
-            .as_ref()
-            .map(|f| ("compromise".to_owned(), f, f64::NAN)),
-    );
-    rows.push(("reference".to_owned(), &summary.reference, f64::NAN));
-    let names: Vec<String> = rows.iter().map(|(name, ..)| name.clone()).collect();
-    let of = |f: &dyn Fn(&LineFigures) -> f64| rows.iter().map(|(_, line, _)| f(line)).collect::<Vec<f64>>();
-    let figures = [
-        ("lap time, fine", "s", of(&|l| l.lap_time_fine_s)),
-        ("lap time, cuts", "s", of(&|l| l.lap_time_s)),
-        ("above exact", "%", rows.iter().map(|(.., gap)| *gap).collect()),
-        ("length, fine", "m", of(&|l| l.length_fine_m)),
-        ("length, cuts", "m", of(&|l| l.length_m)),
-        ("Gamma", "1/m", of(&|l| l.gamma_1pm)),
-        (
-            "curvature\u{b2}, fine",
-            "1/m",
-            of(&|l| l.integral_kappa2_fine_1pm),
-        ),
-        ("curvature\u{b2}, cuts", "1/m", of(&|l| l.integral_kappa2_1pm)),
-        ("clearance", "m", of(&|l| l.clearance_m)),
-    ];
-    let mut columns = vec![Column {
-        name: "line",
-        unit: "",
-        cells: Cells::Texts(&names),
-    }];
-    columns.extend(figures.iter().map(|(name, unit, values)| Column {
-        name,
-        unit,
-        cells: Cells::Numbers(values),
-    }));
-    page.table(
-        "Lines compared",
-        "Through the cuts is what the solvers see; fine is on a spline at 1 m between them, and is the one to believe. \
-         Clearance is the least distance from the car's sides to the edges.",
-        &columns,
-    )
-}
-
-fn front(page: &mut HtmlReport, outcome: &Outcome) -> Result<()> {
-    let Some(front) = outcome.front.as_ref().filter(|f| !f.alpha.is_empty()) else {
-        return Ok(());
-    };
-    let chosen = outcome
-        .compromise
-        .as_ref()
-        .and_then(|line| front.alpha.iter().position(|alpha| *alpha == line.alpha));
-    page.section(
-        "The front",
-        "No line here is better than another by every objective at once. Figures are through the cuts.",
-    );
-    page.front(&Front {
-        title: "Lines on the front",
-        objectives: outcome
-            .objectives
-            .iter()
-            .map(|o| Objective {
-                name: words(o.objective),
-                unit: o.objective.unit(),
-            })
-            .collect(),
-        points: &front.objectives,
-        marked: chosen.map(|i| (i, "compromise")).into_iter().collect(),
-        ..Front::default()
-    })
-}
-
-fn convergence(page: &mut HtmlReport, outcome: &Outcome) -> Result<()> {
-    let histories = outcome.objectives.iter().zip(&outcome.history);
-    let mut first = true;
-    for (o, history) in histories.filter(|(_, history)| !history.is_empty()) {
-        if std::mem::take(&mut first) {
-            page.section("Convergence of the swarms", "");
+            names: if road.corners.is_empty() {
+                sections.collect()
+            } else {
+                corners.collect()
+            },
         }
-        let panel = CurvePanel {
-            title: &o.best.name,
-            x_label: "lines evaluated",
-            y_label: &format!("{} ({})", words(o.objective), o.objective.unit()),
-            curves: vec![Curve {
-                label: "",
-                x: history.iter().map(|(n, _)| *n as f64).collect(),
-                y: history.iter().map(|(_, best)| *best).collect(),
-                shade: None,
-            }],
+    }
+}
+
+/// The lines over one another, the time that each loses being against the first.
+fn laps(setup: &Setup, lines: &[&ReportedLine]) -> LapView {
+    let road = &setup.road;
+    let line = |line: &&ReportedLine| {
+        // Lines differ in length: what is beside each other on the road stands above each other.
+        let stretch = road.length_m / line.fine.length_m;
+        let x: Vec<f64> = line.fine.station_m.iter().map(|s| s * stretch).collect();
+        let shares: Vec<f64> = x.iter().map(|s| s / road.length_m).collect();
+        let mut view = LapLine::new(&*line.name, x).at(&line.fine.points_m[..]);
+        if let Some(lap) = &line.fine.lap {
+            let lost = lines
+                .first()
+                .and_then(|fastest| lap_delta(line, fastest, &shares));
+            let steering = lap.steering_rad.iter().map(|a| a.to_degrees());
+            view = view
+                .trace(0, &lap.v_mps[..])
+                .maybe(1, lost)
+                .trace(2, &lap.ax_mps2[..])
+                .trace(3, &lap.ay_mps2[..])
+                .trace(5, steering.collect::<Vec<f64>>());
+        }
+        view.trace(4, &line.fine.curvature_1pm[..])
+    };
+    let sections = road.sections.iter().filter(|s| s.start_m < s.end_m);
+    LapView::new(format!("{}: lines of the {}", setup.track_name, setup.car_name))
+        .note("Time lost is against the first line. Curvature and lateral acceleration are positive to the left.")
+        .panels(PANELS)
+        .lines(lines.iter().map(line))
+        .sections(sections.map(|s| (s.name.clone(), s.start_m, s.end_m)))
+        .road(setup.drawn_road())
+}
+
+/// The time that one line loses on another (s), after each share of the lap.
+fn lap_delta(line: &ReportedLine, other: &ReportedLine, shares: &[f64]) -> Option<Vec<f64>> {
+    let clock = |line: &ReportedLine| {
+        let fine = &line.fine;
+        let lap = fine.lap.as_ref()?;
+        let (elapsed, end) = (lap.elapsed_s(), (fine.length_m, lap.time_s));
+        let station = fine.station_m.clone();
+        Some(move |share: f64| {
+            let at = share * end.0;
+            let after = station.partition_point(|s| *s <= at).max(1);
+            let (s0, t0) = (station[after - 1], elapsed[after - 1]);
+            let s1 = station.get(after).copied().unwrap_or(end.0);
+            let t1 = elapsed.get(after).copied().unwrap_or(end.1);
+            if s1 > s0 {
+                t0 + (at - s0) / (s1 - s0) * (t1 - t0)
+            } else {
+                t0
+            }
+        })
+    };
+    let (mine, its) = (clock(line)?, clock(other)?);
+    Some(shares.iter().map(|&share| mine(share) - its(share)).collect())
+}
+
+/// A close-up of the map for each named section.
+fn close_ups(folder: &Path, setup: &Setup, line: &ReportedLine, map: &TrackMap) -> Result<()> {
+    let road = &setup.road;
+    let inside = |station: f64, start: f64, end: f64| {
+        if road.closed {
+            (station - start).rem_euclid(road.length_m) <= (end - start).rem_euclid(road.length_m)
+        } else {
+            (start..=end).contains(&station)
+        }
+    };
+    // A point of the fine line lies at its cross-section's station of the reference line, and so on to the next.
+    let station_of = |i: usize| {
+        let (cut, share) = line.fine.section[i];
+        let here = road.station_m[cut.min(road.len() - 1)];
+        let next = road.station_m.get(cut + 1).copied().unwrap_or(road.length_m);
+        here + share * (next - here)
+    };
+    // In order of travel, also where the stretch goes through the start line.
+    let stretch = |count: usize, within: &dyn Fn(usize) -> bool| -> Vec<usize> {
+        let first = (0..count).find(|&i| within(i) && !within((i + count - 1) % count));
+        let ahead = (0..count).map(|k| (first.unwrap_or(0) + k) % count);
+        ahead.take_while(|&i| within(i)).collect()
+    };
+    for section in &road.sections {
+        let (start, end) = (section.start_m - ROOM_M, section.end_m + ROOM_M);
+        if end - start >= road.length_m {
+            continue;
+        }
+        let points = stretch(map.line_m.len(), &|i| inside(station_of(i), start, end));
+        let dense = map.road.left_edge_m.len();
+        let station = |i: usize| road.length_m * i as f64 / dense as f64;
+        let edge = stretch(dense, &|i| inside(station(i), start, end));
+        if points.len() < 2 || edge.len() < 2 {
+            continue;
+        }
+        let of = |points: &[DVec2], which: &[usize]| which.iter().map(|&i| points[i]).collect::<Vec<_>>();
+        let close_up = TrackMap {
+            title: format!("{}: {}", section.name, map.title),
+            road: Road {
+                left_edge_m: of(&map.road.left_edge_m, &edge),
+                right_edge_m: of(&map.road.right_edge_m, &edge),
+                ..Road::default()
+            },
+            line_m: of(&map.line_m, &points),
+            values: points.iter().map(|&i| map.values[i]).collect(),
+            ..map.clone()
         };
-        page.curves(&panel, "", [Scale::Linear; 2])?;
+        close_up.write_svg(folder.join(format!("section_{}.svg", stem(&section.name))))?;
     }
     Ok(())
+}
+
+/// The figures of the lines, those that a terminal has room for first.
+pub fn lines_table(summary: &Summary) -> Table<'static> {
+    let mut rows: Vec<(String, &LineFigures, Option<f64>)> = Vec::new();
+    for (name, figures) in &summary.best {
+        let gap = summary.above_exact_percent.get(name).copied().flatten();
+        rows.push((format!("best {name}"), figures, gap));
+    }
+    for (name, figures) in &summary.exact {
+        rows.extend(figures.as_ref().map(|f| (format!("exact {name}"), f, None)));
+    }
+    let compromise = summary.compromise.as_ref();
+    rows.extend(compromise.map(|f| ("compromise".to_owned(), f, None)));
+    rows.push(("reference".to_owned(), &summary.reference, None));
+    Table::rows(rows)
+        .text("line", |r| r.0.clone())
+        .number("lap time, fine", "s", |r| r.1.lap_time_fine_s)
+        .number("lap time", "s", |r| r.1.lap_time_s)
+        .number("above exact", "%", |r| r.2)
+        .number("length", "m", |r| r.1.length_m)
+        .number("Gamma", "1/m", |r| r.1.gamma_1pm)
+        .number("curvature\u{b2}", "1/m", |r| r.1.integral_kappa2_1pm)
+        .number("length, fine", "m", |r| r.1.length_fine_m)
+        .number("curvature\u{b2}, fine", "1/m", |r| r.1.integral_kappa2_fine_1pm)
+        .number("clearance", "m", |r| r.1.clearance_m)
+        .table()
+}
+
+fn front(page: &mut HtmlReport, folder: &Path, outcome: &Outcome) -> Result<()> {
+    let Some(found) = outcome.front.as_ref().filter(|f| !f.alpha.is_empty()) else {
+        return Ok(());
+    };
+    page.section(
+        "The front",
+        "No line here is better than another by every objective at once. Values are those at the cross-sections.",
+    );
+    let mut front = Front::new("Lines on the front", &found.objectives);
+    for o in &outcome.objectives {
+        front = front.objective(o.objective.words(), o.objective.unit());
+    }
+    let compromise = outcome.compromise.as_ref();
+    if let Some(chosen) =
+        compromise.and_then(|line| found.alpha.iter().position(|alpha| *alpha == line.alpha))
+    {
+        front = front.mark(chosen, "compromise");
+    }
+    front.write_parallel(folder.join("parallel.svg"), "The front in parallel coordinates")?;
+    page.figure(folder.join("front.svg"), &front)
 }

@@ -1,0 +1,65 @@
+//! What commands print. A reader that goes away ends no study, and an output that takes no more is told at the end.
+
+use std::fmt::Arguments;
+use std::io::{self, Write};
+use std::sync::{Mutex, PoisonError};
+
+/// The first failure of standard output.
+static FAILED: Mutex<Option<io::Error>> = Mutex::new(None);
+
+fn note(outcome: io::Result<()>) {
+    if let Err(error) = outcome {
+        FAILED
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .get_or_insert(error);
+    }
+}
+
+/// Writes to standard output.
+pub fn to_stdout(text: Arguments<'_>) {
+    note(io::stdout().write_fmt(text));
+}
+
+/// Writes to standard error, and if that takes no more, to nobody.
+pub fn to_stderr(text: Arguments<'_>) {
+    let _ = io::stderr().write_fmt(text);
+}
+
+/// What became of standard output, once all is printed: a reader that has gone away has had all that it wanted.
+///
+/// # Errors
+/// [`lapswarm::Error::Io`] if it took no more.
+pub fn finish() -> lapswarm::Result<()> {
+    note(io::stdout().flush());
+    let failed = FAILED.lock().unwrap_or_else(PoisonError::into_inner).take();
+    match failed {
+        Some(error) if error.kind() != io::ErrorKind::BrokenPipe => {
+            Err(lapswarm::Error::io("standard output", "write", error))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// As `print!`, which panics where nobody reads.
+macro_rules! out {
+    ($($text:tt)*) => {
+        $crate::cli::output::to_stdout(format_args!($($text)*))
+    };
+}
+
+/// As `println!`, which panics where nobody reads.
+macro_rules! outln {
+    ($($text:tt)*) => {
+        $crate::cli::output::to_stdout(format_args!("{}\n", format_args!($($text)*)))
+    };
+}
+
+/// As `eprintln!`, which panics where nobody reads.
+macro_rules! errln {
+    ($($text:tt)*) => {
+        $crate::cli::output::to_stderr(format_args!("{}\n", format_args!($($text)*)))
+    };
+}
+
+pub(crate) use {errln, out, outln};

@@ -1,0 +1,33 @@
+//! Populations that live on a device, where neither candidates nor objectives cross the bus.
+
+use super::Problem;
+use crate::error::Result;
+
+/// Particles of a block: a coordinate of all of them lies in a row, and the coordinates of a block follow one another.
+pub const BLOCK: usize = 64;
+
+/// Objectives of particles whose positions are on a device.
+pub trait DeviceObjectives {
+    /// The problem that they are of.
+    fn problem(&self) -> &Problem;
+
+    /// Writes the objectives of `particles` particles. Both buffers are in blocks of [`BLOCK`] particles: a coordinate of
+    /// all particles of a block in a row of `f32`, the coordinates of a block one after the other. Positions are
+    /// in the unit cube of those variables whose bounds differ.
+    ///
+    /// # Errors
+    /// [`crate::Error::Device`] if the device fails.
+    fn evaluate(
+        &mut self,
+        particles: usize,
+        position: &wgpu::Buffer,
+        objectives: &wgpu::Buffer,
+    ) -> Result<()>;
+}
+
+/// Workgroups along two dimensions, for a particle to a lane.
+pub(crate) fn groups(particles: usize) -> (u32, u32) {
+    let all = particles.div_ceil(BLOCK);
+    let wide = all.clamp(1, 1 << 15);
+    (wide as u32, all.div_ceil(wide) as u32)
+}

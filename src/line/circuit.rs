@@ -1,0 +1,87 @@
+//! A line as a circuit of its own, to be driven along.
+
+use super::{FineLine, Polyline};
+use crate::error::{Error, Result};
+use crate::track::Circuit;
+use glam::DVec2;
+use rayon::prelude::*;
+
+impl FineLine {
+    /// A circuit whose centreline is this line between edges (m, right and left). Widths are from the line to the edges less
+    /// half the car (m); `name` is what errors call the line.
+    ///
+    /// # Errors
+    /// [`Error::Input`] if the line is open or leaves no room for the car.
+    pub fn circuit(&self, name: &str, edges_m: &[Vec<DVec2>; 2], car_width_m: f64) -> Result<Circuit> {
+        if !self.closed {
+            return Err(Error::input(
+                name,
+                "line",
+                "an open one",
+                "a closed line: the lap driven is a flying one",
+            ));
+        }
+        let n = self.points_m.len();
+        let count = self.length_m.round().max(16.0) as usize;
+        let spacing = self.length_m / count as f64;
+        let mut heading = Vec::with_capacity(n + 1);
+        for i in 0..n {
+            let along = self.points_m[(i + 1) % n] - self.points_m[(i + n - 1) % n];
+            let angle = along.y.atan2(along.x);
+            let before = heading.last().copied().unwrap_or(angle);
+            heading.push(
+                before + (angle - before + std::f64::consts::PI).rem_euclid(std::f64::consts::TAU)
+                    - std::f64::consts::PI,
+            );
+        }
+        let mut circuit = Circuit {
+            name: name.to_owned(),
+            closed: true,
+            length_m: self.length_m,
+            station_m: (0..count).map(|i| i as f64 * spacing).collect(),
+            centreline_m: Vec::with_capacity(count),
+            heading_rad: Vec::with_capacity(count),
+            curvature_1pm: Vec::with_capacity(count),
+            width_left_m: Vec::new(),
+            width_right_m: Vec::new(),
+            sections: Vec::new(),
+            corners: Vec::new(),
+        };
+        let mut at = 0;
+        for station in &circuit.station_m {
+            while at + 1 < n && self.station_m[at + 1] <= *station {
+                at += 1;
+            }
+            let next = (at + 1) % n;
+            let share = ((station - self.station_m[at]) / self.segment_m[at]).clamp(0.0, 1.0);
+            let mix = |a: f64, b: f64| a + share * (b - a);
+            let turned = (heading[next] - heading[at] + std::f64::consts::PI)
+                .rem_euclid(std::f64::consts::TAU)
+                - std::f64::consts::PI;
+            circuit
+                .centreline_m
+                .push(self.points_m[at].lerp(self.points_m[next], share));
+            circuit.heading_rad.push(heading[at] + share * turned);
+            circuit
+                .curvature_1pm
+                .push(mix(self.curvature_1pm[at], self.curvature_1pm[next]));
+        }
+        let room = |edge: &[DVec2], side: f64| -> Vec<f64> {
+            let edge = Polyline::new(edge, true);
+            circuit
+                .centreline_m
+                .par_iter()
+                .map(|p| side * edge.leftward_distance(*p) - 0.5 * car_width_m)
+                .collect()
+        };
+        let (right, left) = (room(&edges_m[0], 1.0), room(&edges_m[1], -1.0));
+        let least = right.iter().chain(&left).fold(f64::INFINITY, |a, b| a.min(*b));
+        // What the line's own report allows: the spline between cross-sections may pass an edge by a hair.
+        if least < -0.5 {
+            let found = format!("a line that leaves the car's side {:.2} m beyond an edge", -least);
+            return Err(Error::input(name, "line", found, "a line within the edges"));
+        }
+        (circuit.width_right_m, circuit.width_left_m) = (right, left);
+        Ok(circuit)
+    }
+}

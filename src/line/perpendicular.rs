@@ -1,0 +1,239 @@
+//! Cross-sections square to a line, instead of the road's own.
+//!
+//! The direction of a road's cross-sections comes from its survey. A line that lies far from the reference line inherits their
+//! jitter. Where it bends unlike the reference line, a few control points cannot describe it. Along cross-sections square to a
+//! line that is nearly right, a smooth `alpha` gives a smooth line in the plane.
+
+use super::fine::FineLine;
+use crate::error::{Error, Result};
+use crate::track::CrossSections;
+use glam::DVec2;
+
+/// Distance between the points that curves are followed by (m). A chord of this length is half a millimetre off a bend of 15 m.
+const STEP_M: f64 = 0.25;
+/// How far along the road an edge may lie from the cross-section that looks for it (m).
+const REACH_M: f64 = 60.0;
+/// Usable road that is left where edges meet (m).
+const LEAST_M: f64 = 0.1;
+
+/// Where a curve crosses one cross-section.
+struct Crossing {
+    /// Distance along the curve (m).
+    station_m: f64,
+    /// Share of the cross-section from the right; beyond zero and one off the road.
+    alpha: f64,
+}
+
+/// Where the straight line from `from` along `step` meets the stretch from `start` to `end`, in shares of both.
+fn meeting(from: DVec2, step: DVec2, start: DVec2, end: DVec2) -> Option<[f64; 2]> {
+    let along = end - start;
+    let cross = step.perp_dot(along);
+    let apart = start - from;
+    let shares = [apart.perp_dot(along) / cross, apart.perp_dot(step) / cross];
+    shares.iter().all(|s| s.is_finite()).then_some(shares)
+}
+
+fn unseen(road: &CrossSections, what: &str, station_m: f64) -> Error {
+    Error::Study(format!("{}: {what} at {station_m:.0} m", road.name))
+}
+
+/// A closed curve through `points_m`, in steps of [`STEP_M`].
+fn followed(road: &CrossSections, points_m: &[DVec2]) -> Result<FineLine> {
+    if !road.closed {
+        return Err(unseen(
+            road,
+            "only a closed road has cross-sections square to a line",
+            0.0,
+        ));
+    }
+    FineLine::new(points_m, true, STEP_M, None, 0.0)
+}
+
+/// Where `curve` crosses each cross-section, one after the other.
+fn crossings(road: &CrossSections, curve: &FineLine) -> Result<Vec<Crossing>> {
+    let (n, k) = (road.len(), curve.points_m.len());
+    let at = |cut: usize, segment: usize| -> Option<Crossing> {
+        let (right, across) = (road.right_m[cut], road.left_m[cut] - road.right_m[cut]);
+        let ends = [curve.points_m[segment % k], curve.points_m[(segment + 1) % k]];
+        let [alpha, share] = meeting(right, across, ends[0], ends[1])?;
+        // A whisker more than the segment, so that none slips through between two.
+        let crosses = (-1e-9..=1.0 + 1e-9).contains(&share) && (-0.5..=1.5).contains(&alpha);
+        crosses.then(|| Crossing {
+            station_m: curve.station_m[segment % k] + share * curve.segment_m[segment % k],
+            alpha,
+        })
+    };
+    let off = |c: &Crossing| (c.alpha - 0.5).abs();
+    let first = (0..k)
+        .filter_map(|segment| Some((segment, at(0, segment)?)))
+        .min_by(|a, b| off(&a.1).total_cmp(&off(&b.1)));
+    let (mut segment, crossing) = first.ok_or_else(|| unseen(road, "no line", road.station_m[0]))?;
+    let mut found = vec![crossing];
+    let spacing = road.spacing_m();
+    for cut in 1..n {
+        let most = ((2.0 * spacing[cut - 1] + REACH_M) / STEP_M) as usize;
+        let next = (segment..segment + most).find_map(|s| Some((s, at(cut, s)?)));
+        let (place, crossing) = next.ok_or_else(|| unseen(road, "no line", road.station_m[cut]))?;
+        segment = place;
+        found.push(crossing);
+    }
+    Ok(found)
+}
+
+/// `alpha` of the closed line through `points_m` at every cross-section of `road`; beyond zero and one off the road.
+///
+/// # Errors
+/// [`Error::Study`] if the road is open, or the line does not cross its cross-sections one after the other.
+pub fn shares_across(road: &CrossSections, points_m: &[DVec2]) -> Result<Vec<f64>> {
+    let found = crossings(road, &followed(road, points_m)?)?;
+    Ok(found.into_iter().map(|c| c.alpha).collect())
+}
+
+/// `count` cross-sections square to the closed line through `points_m`, evenly spaced along it, between the edges of `road`; the
+/// line is their reference, and may lie off the road. At the cross-sections a line within these is within `road`; between two of
+/// them an edge bulges in by no more than the square of their spacing over eight times its radius.
+///
+/// # Errors
+/// As [`shares_across`]; [`Error::Study`] where an edge does not lie abreast of the line.
+pub fn cuts_about(road: &CrossSections, points_m: &[DVec2], count: usize) -> Result<CrossSections> {
+    let curve = followed(road, points_m)?;
+    let (n, k) = (road.len(), curve.points_m.len());
+    let mut by_station: Vec<(f64, usize)> = crossings(road, &curve)?
+        .into_iter()
+        .enumerate()
+        .map(|(cut, c)| (c.station_m, cut))
+        .collect();
+    by_station.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let spacing_m = curve.length_m / count as f64;
+    let reach = (REACH_M * n as f64 / road.length_m).ceil() as usize + 2;
+    let reach = reach.min(n / 2);
+    // The direction to the left at a point of the curve.
+    let left_at = |point: usize| {
+        let along = curve.points_m[(point + 3) % k] - curve.points_m[(point + k - 3) % k];
+        along.perp().normalize()
+    };
+
+    let mut places = Vec::with_capacity(count);
+    let mut limits = Vec::with_capacity(count);
+    for i in 0..count {
+        let station_m = spacing_m * i as f64;
+        let segment = curve.station_m.partition_point(|s| *s <= station_m).max(1) - 1;
+        let share = (station_m - curve.station_m[segment]) / curve.segment_m[segment];
+        let place = curve.points_m[segment].lerp(curve.points_m[(segment + 1) % k], share);
+        let left = left_at(segment).lerp(left_at(segment + 1), share).normalize();
+        let near = by_station.partition_point(|(s, _)| *s <= station_m).max(1) - 1;
+        let near = by_station[near].1;
+        // Of several places where an edge is met, as in a hairpin, the nearest is the line's own.
+        let edge = |ends: &[DVec2]| {
+            (0..2 * reach)
+                .map(|j| (near + n + j - reach) % n)
+                .filter_map(|j| meeting(place, left, ends[j], ends[(j + 1) % n]))
+                .filter(|[_, share]| (-1e-9..=1.0 + 1e-9).contains(share))
+                .map(|[distance, _]| distance)
+                .min_by(|a, b| a.abs().total_cmp(&b.abs()))
+        };
+        let (Some(right), Some(left_end)) = (edge(&road.right_m), edge(&road.left_m)) else {
+            return Err(unseen(road, "no edge abreast of the line", station_m));
+        };
+        places.push((place, left));
+        limits.push([right, left_end]);
+    }
+
+    // Between two cross-sections a corner of an edge may stand further in than at either: both keep clear of it.
+    for (station_m, cut) in by_station {
+        for (side, end) in [road.right_m[cut], road.left_m[cut]].into_iter().enumerate() {
+            let about = curve.station_m.partition_point(|s| *s <= station_m) + k;
+            let steps = ((REACH_M / STEP_M) as usize).min(k / 2);
+            let nearest = (about - steps..about + steps)
+                .map(|p| p % k)
+                .min_by(|a, b| {
+                    let distance = |p: &usize| curve.points_m[*p].distance_squared(end);
+                    distance(a).total_cmp(&distance(b))
+                })
+                .unwrap_or(0);
+            let inward = (end - curve.points_m[nearest]).dot(left_at(nearest));
+            let before = (curve.station_m[nearest] / spacing_m) as usize;
+            for i in [before % count, (before + 1) % count] {
+                let limit = &mut limits[i][side];
+                *limit = if side == 0 {
+                    limit.max(inward)
+                } else {
+                    limit.min(inward)
+                };
+            }
+        }
+    }
+
+    let mut cuts = CrossSections {
+        length_m: curve.length_m,
+        station_m: (0..count).map(|i| spacing_m * i as f64).collect(),
+        right_m: Vec::with_capacity(count),
+        left_m: Vec::with_capacity(count),
+        reference: Vec::with_capacity(count),
+        ..road.clone()
+    };
+    for ((place, left), [right, left_end]) in places.into_iter().zip(limits) {
+        let (middle, half) = (
+            0.5 * (right + left_end),
+            (0.5 * (left_end - right)).max(0.5 * LEAST_M),
+        );
+        cuts.right_m.push(place + (middle - half) * left);
+        cuts.left_m.push(place + (middle + half) * left);
+        cuts.reference.push((half - middle) / (2.0 * half));
+    }
+    Ok(cuts)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::track::{Shape, Spacing, Track};
+
+    /// Square to a line in a ring, cross-sections lie along the radii, and reach from edge to edge.
+    #[test]
+    fn cuts_about_a_circle_are_its_radii() {
+        let ring = Shape::parse("circle:90:110").unwrap().unwrap();
+        let road = ring.cross_sections(&Spacing::equal(400)).unwrap();
+        let points = road.points(&vec![0.3; 400]);
+        let cuts = cuts_about(&road, &points, 300).unwrap();
+        for i in 0..300 {
+            let radii = [cuts.right_m[i], cuts.left_m[i]].map(DVec2::length);
+            // Polygons of 400 corners: a sagitta is 3.4 mm.
+            let edges = [radii[0].min(radii[1]), radii[0].max(radii[1])];
+            assert!(
+                (edges[0] - 90.0).abs() < 5e-3 && (edges[1] - 110.0).abs() < 5e-3,
+                "{radii:?}"
+            );
+            assert!((cuts.reference[i] - 0.3).abs() < 1e-3, "{}", cuts.reference[i]);
+            let along = (cuts.left_m[i] - cuts.right_m[i]).normalize();
+            assert!(along.perp_dot(cuts.right_m[i].normalize()).abs() < 1e-3);
+        }
+        let back = shares_across(&road, &cuts.points(&cuts.reference)).unwrap();
+        assert!(back.iter().all(|a| (a - 0.3).abs() < 1e-4));
+    }
+
+    /// On a circuit with hairpins every line within the new cross-sections is within the old ones, but for what it bulges between
+    /// two.
+    #[test]
+    fn lines_within_are_on_the_road() {
+        let track = Track::load("silverstone_gp").unwrap();
+        let road = track.cross_sections(&Spacing::equal(720), false).unwrap();
+        let cuts = cuts_about(&road, &road.points(&road.reference), 1440).unwrap();
+        for alpha in [0.0, 0.5, 1.0] {
+            let shares = shares_across(&road, &cuts.points(&vec![alpha; 1440])).unwrap();
+            let worst = shares.iter().fold(0.0f64, |w, a| w.max((a - 0.5).abs() - 0.5));
+            // 1 % of 15 m: half of a cross-section's spacing squared over eight times the tightest radius of an edge, 10 m.
+            assert!(worst < 0.01, "{alpha}: {worst}");
+        }
+    }
+
+    #[test]
+    fn an_open_road_is_refused() {
+        let track = Track::load("silverstone_gp").unwrap();
+        let mut road = track.cross_sections(&Spacing::equal(120), false).unwrap();
+        let points = road.points(&road.reference);
+        road.closed = false;
+        let error = cuts_about(&road, &points, 100).unwrap_err().to_string();
+        assert!(error.contains("closed"), "{error}");
+    }
+}

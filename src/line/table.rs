@@ -1,0 +1,55 @@
+//! Lines in tables.
+
+use crate::config::read_text;
+use crate::error::{Error, Result};
+use glam::DVec2;
+use std::path::Path;
+
+/// The fewest points of a line.
+const LEAST_POINTS: usize = 8;
+
+/// The points of a line (m) from the columns `x` and `y` of a table, as `x (m)`, `x_m` or `x[m]`. Lines that begin with `#` are
+/// comments.
+///
+/// # Errors
+/// [`Error::Io`] if it cannot be read, [`Error::Input`] naming the line of the file where it is no table of points.
+pub fn read_line(path: &Path) -> Result<Vec<DVec2>> {
+    let text = read_text(path)?;
+    let mut reader = csv::ReaderBuilder::new()
+        .comment(Some(b'#'))
+        .trim(csv::Trim::All)
+        .from_reader(text.as_bytes());
+    let refuse = |place: String, found: String| {
+        let expected = "columns `x (m)` and `y (m)` of finite numbers, 8 rows or more";
+        Error::input(path, place, found, expected)
+    };
+    let unreadable = |e: csv::Error| {
+        let line = e.position().map_or(1, csv::Position::line);
+        refuse(format!("line {line}"), e.to_string())
+    };
+    let joined = |record: &csv::StringRecord| record.iter().collect::<Vec<_>>().join(",");
+    let header = reader.headers().map_err(unreadable)?.clone();
+    let column = |name: &str| {
+        let named = |h: &str| {
+            let unit = h.strip_prefix(name);
+            unit.is_some_and(|unit| unit.is_empty() || unit.starts_with(['_', ' ', '[']))
+        };
+        let found = header.iter().position(named);
+        found.ok_or_else(|| refuse("line 1".to_owned(), joined(&header)))
+    };
+    let columns = [column("x")?, column("y")?];
+    let mut points = Vec::new();
+    for record in reader.records() {
+        let record = record.map_err(unreadable)?;
+        let number = |k: usize| record.get(k)?.parse().ok().filter(|v: &f64| v.is_finite());
+        let [Some(x), Some(y)] = columns.map(number) else {
+            let line = record.position().map_or(0, csv::Position::line);
+            return Err(refuse(format!("line {line}"), joined(&record)));
+        };
+        points.push(DVec2::new(x, y));
+    }
+    if points.len() < LEAST_POINTS {
+        return Err(refuse("rows".to_owned(), points.len().to_string()));
+    }
+    Ok(points)
+}

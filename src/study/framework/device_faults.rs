@@ -1,0 +1,86 @@
+//! What goes wrong with devices over a whole study, each fault told once.
+
+use crate::evaluate::Evaluator;
+
+/// What has been seen of an evaluator's [device faults](Evaluator::device_faults).
+#[derive(Debug)]
+pub struct DeviceFaults {
+    /// How many were met when it was opened; zero once they are told.
+    opening: usize,
+    seen: usize,
+}
+
+impl DeviceFaults {
+    /// Of an evaluator as it was opened.
+    pub fn of(evaluator: &dyn Evaluator) -> Self {
+        let met = evaluator.device_faults().len();
+        Self {
+            opening: met,
+            seen: met,
+        }
+    }
+
+    /// What has gone wrong since the last look. A study that opens one evaluator after the other, or is resumed, meets at
+    /// every opening what it met at the first: of that, only what is not among those `told`.
+    pub fn since(&mut self, evaluator: &dyn Evaluator, told: &[String]) -> Vec<String> {
+        let met = evaluator.device_faults();
+        let opening = &met[..std::mem::take(&mut self.opening)];
+        let mut new: Vec<String> = opening
+            .iter()
+            .filter(|fault| !told.contains(fault))
+            .cloned()
+            .collect();
+        new.extend_from_slice(&met[self.seen..]);
+        self.seen = met.len();
+        new
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::error::Result;
+    use crate::evaluate::{BackendInfo, Evaluation, Problem};
+
+    /// What has faults and evaluates nothing.
+    struct Faulty(Problem, Vec<String>);
+
+    impl Faulty {
+        fn opened_with(faults: &[&str]) -> Self {
+            let problem = Problem {
+                variables: Vec::new(),
+                objectives: Vec::new(),
+            };
+            Self(problem, faults.iter().map(|f| (*f).to_owned()).collect())
+        }
+    }
+
+    impl Evaluator for Faulty {
+        fn problem(&self) -> &Problem {
+            &self.0
+        }
+        fn backend(&self) -> BackendInfo {
+            BackendInfo::reference()
+        }
+        fn device_faults(&self) -> &[String] {
+            &self.1
+        }
+        fn evaluate(&mut self, _: &[f64]) -> Result<Evaluation> {
+            Ok(Evaluation::default())
+        }
+    }
+
+    #[test]
+    fn what_is_met_at_every_opening_is_told_once_and_all_else_as_often_as_it_happens() {
+        let mut told: Vec<String> = Vec::new();
+        for _ in 0..3 {
+            let mut device = Faulty::opened_with(&["late"]);
+            let mut faults = DeviceFaults::of(&device);
+            told.extend(faults.since(&device, &told));
+            device.1.push("lost".to_owned());
+            told.extend(faults.since(&device, &told));
+            told.extend(faults.since(&device, &told));
+        }
+        assert_eq!(told, ["late", "lost", "lost", "lost"]);
+    }
+}

@@ -1,0 +1,238 @@
+//! The life of a study: from a request to files and figures.
+
+use super::run_folder::{self, Manifest, RunFolder, STATE, write_json, write_study};
+use super::state_file::StateFile;
+use super::study::{apply, moves};
+use super::{Plan, Progress, State, Study, Work, memory};
+use crate::config::limit_memory;
+use crate::config::settings::{Role, Settings};
+use crate::error::{Error, Result};
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+use std::time::Duration;
+
+/// What is asked of a study.
+pub struct Request<'a> {
+    /// A study file, if there is one.
+    pub file: Option<&'a Path>,
+    /// Keys of settings and what flags say of them, over the file.
+    pub flags: &'a [(String, String)],
+    /// The run folder; the next free one where not given.
+    pub out: Option<&'a Path>,
+    /// Whether the interrupted run in that folder is resumed.
+    pub resume: bool,
+    /// Time between saves of the state.
+    pub save_every: Duration,
+    /// Memory that the study may take (MiB).
+    pub memory_limit_mib: u64,
+    /// Whether the study is planned only.
+    pub dry_run: bool,
+    /// Raised when the study is to end.
+    pub stop: Arc<AtomicBool>,
+    /// Is told of the progress and may end the study.
+    pub observe: &'a mut dyn FnMut(&Progress) -> ControlFlow<()>,
+}
+
+/// What comes of a request.
+pub enum Answer {
+    /// What would be done.
+    Planned(Plan),
+    /// What was done.
+    Finished(Finished),
+}
+
+/// A study that has ended.
+pub struct Finished {
+    /// Where its files are.
+    pub folder: PathBuf,
+    /// Its figures in words.
+    pub text: String,
+    /// Its figures as one JSON object.
+    pub json: String,
+    /// What the user must be told whatever is printed.
+    pub warnings: Vec<String>,
+    /// Whether it was interrupted, or missed what it was asked to reach.
+    pub verdict: Result<()>,
+}
+
+/// The run that is resumed.
+struct Resumed<T> {
+    folder: RunFolder,
+    state: T,
+}
+
+/// A study's settings, and the run that is resumed, if one is.
+type Begun<S> = (<S as Study>::Settings, Option<Resumed<<S as Study>::State>>);
+
+/// Settings from study file and flags, over those that the run was begun with if it is resumed.
+fn begin<S: Study>(request: &Request<'_>) -> Result<Begun<S>> {
+    let asked = |base: S::Settings| -> Result<S::Settings> {
+        let mut settings = match request.file {
+            Some(path) => S::Settings::read(path)?,
+            None => base,
+        };
+        apply(&mut settings, request.flags)?;
+        settings.validate()?;
+        Ok(settings.absolute())
+    };
+    if !request.resume {
+        return Ok((asked(S::Settings::default())?, None));
+    }
+    let Some(out) = request.out else {
+        let expected = format!("--out, the folder of a run of {}", S::NAME);
+        return Err(Error::input("the command line", "--resume", "no --out", expected));
+    };
+    let folder = run_folder::reopen(out)?;
+    let mut state = S::State::load(&folder.join(STATE))?;
+    let mut begun = state.settings(S::NAME)?;
+    let settings = asked(begun.clone())?;
+    // Where candidates are evaluated may change if the flags say so; what is evaluated may not.
+    if moves::<S::Settings>(request.flags) {
+        begun = begun.with_role_of(Role::Place, &settings);
+        state.set_settings(&begun)?;
+    }
+    if begun != settings {
+        return Err(Error::input(
+            folder.join(STATE),
+            "settings",
+            "other settings on the command line",
+            "those that the run was begun with (study.toml beside it), or none",
+        ));
+    }
+    Ok((settings, Some(Resumed { folder, state })))
+}
+
+/// Runs a study as a request says.
+///
+/// # Errors
+/// Those of the study. Input that is refused leaves nothing behind.
+pub(in crate::study) fn run<S: Study>(request: Request<'_>) -> Result<Answer> {
+    let limit_mib = request.memory_limit_mib;
+    limit_memory(limit_mib);
+    let (settings, resumed) = begin::<S>(&request)?;
+    // What no input has room for is refused before any is read.
+    drop(memory::check(&S::size(&settings, None), limit_mib)?);
+    let prepared = S::prepare(&settings)?;
+    let kept = S::size(&settings, Some(&prepared));
+    let _allowed = memory::check(&kept, limit_mib)?;
+    if request.dry_run {
+        let plan = Plan::of(S::NAME, &settings).memory_mib(memory::needed_mib(&kept));
+        let plan = S::plan(&settings, &prepared, plan)?;
+        return Ok(Answer::Planned(plan.into_folder(request.out)?));
+    }
+    let (folder, state) = match resumed {
+        Some(resumed) => (resumed.folder, Some(resumed.state)),
+        None => (run_folder::create(S::NAME, request.out)?, None),
+    };
+    write_study(&folder, &settings.to_toml())?;
+    let mut state_file = StateFile::new(&folder).every(request.save_every);
+    if moves::<S::Settings>(request.flags) {
+        state_file = state_file.may_move();
+    }
+    let outcome = S::solve(
+        &settings,
+        &prepared,
+        Work {
+            state,
+            state_file: &mut state_file,
+            observe: request.observe,
+            stop: request.stop,
+        },
+    );
+    // Input that is refused only now leaves no state in the way of the next run.
+    let refused = matches!(
+        outcome,
+        Err(Error::Input { .. } | Error::Io { .. } | Error::NoDevice(_))
+    );
+    let untouched = || {
+        let saved = state_file.saved::<S::Settings, S::State>();
+        saved.is_some_and(|state| state.is_untouched())
+    };
+    if refused && !request.resume && untouched() {
+        state_file.done()?;
+    }
+    let Some(outcome) = outcome? else {
+        return Err(Error::Interrupted(folder.to_path_buf()));
+    };
+    let summary = write_results::<S>(&folder, &settings, &prepared, &outcome)?;
+    let interrupted = S::record(&outcome).interrupted;
+    if !interrupted {
+        state_file.done()?;
+    }
+    let json = serde_json::to_string(&summary)
+        .map_err(|e| Error::io("standard output", "write", std::io::Error::other(e)))?;
+    Ok(Answer::Finished(Finished {
+        text: S::text(&settings, &summary),
+        json,
+        warnings: S::warnings(&summary),
+        verdict: if interrupted {
+            Err(Error::Interrupted(folder.to_path_buf()))
+        } else {
+            S::verdict(&settings, &summary)
+        },
+        folder: folder.to_path_buf(),
+    }))
+}
+
+/// Writes all files of a study into `folder`, the manifest last: it says that the run is whole.
+///
+/// # Errors
+/// [`Error::Io`] if one cannot be written.
+pub fn write_results<S: Study>(
+    folder: &Path,
+    settings: &S::Settings,
+    prepared: &S::Prepared,
+    outcome: &S::Outcome,
+) -> Result<S::Summary> {
+    let summary = S::summarise(settings, prepared, outcome);
+    write_study(folder, &settings.to_toml())?;
+    write_json(&folder.join("summary.json"), &summary)?;
+    S::report(folder, settings, prepared, outcome, &summary)?;
+    let subject = S::subject(settings, prepared);
+    let manifest = Manifest::new(S::NAME, &subject, S::record(outcome), "study.toml");
+    write_json(&folder.join("manifest.json"), &manifest)?;
+    Ok(summary)
+}
+
+/// Does what `work` does from the state that an earlier run has left, and from the start where there is none or it belongs to
+/// something else. With `own` the state must be of the very same settings.
+///
+/// # Errors
+/// Those of `work`.
+pub(in crate::study) fn resumed_or_new<S: Study, T>(
+    settings: &S::Settings,
+    state_file: &mut StateFile,
+    own: bool,
+    mut work: impl FnMut(Option<S::State>, &mut StateFile) -> Result<T>,
+) -> Result<T> {
+    if let Some(state) = state_file.saved::<S::Settings, S::State>() {
+        let begun = state.settings(S::NAME);
+        if own && !begun.is_ok_and(|begun| begun == *settings) {
+            let file = state_file.file();
+            tracing::warn!("{}: a state of other settings is not used", file.display());
+        } else {
+            match work(Some(state), state_file) {
+                Err(error @ Error::Input { .. }) => tracing::warn!("started anew: {error}"),
+                outcome => return outcome,
+            }
+        }
+    }
+    work(None, state_file)
+}
+
+/// Solves a study that nobody watches, and saves nothing.
+///
+/// # Errors
+/// Those of the study.
+pub fn solve_unwatched<S: Study>(settings: &S::Settings, prepared: &S::Prepared) -> Result<S::Outcome> {
+    let work = Work {
+        state: None,
+        state_file: &mut StateFile::idle(),
+        observe: &mut |_| ControlFlow::Continue(()),
+        stop: Arc::default(),
+    };
+    let outcome = S::solve(settings, prepared, work)?;
+    outcome.ok_or_else(|| Error::Study("the study ended without a result".to_owned()))
+}

@@ -1,0 +1,280 @@
+//! How large a study may be: what it would need is reckoned before any of it is taken, so that none is ended by the system.
+//!
+//! What a study keeps (its swarm, archive, history, journal, cuts) cannot be split and has to fit; what evaluators take
+//! beside that is cut to what is left, by [`portions`].
+
+use crate::error::{Error, Result};
+use crate::evaluate::portions::{self, Allowance};
+
+/// Memory that a study may take where nothing else is said (MiB).
+pub const USUAL_MIB: u64 = crate::config::USUAL_MEMORY_MIB;
+/// Numbers that a swarm and its checkpoint keep for each variable of a particle, at the most: positions, velocities and best
+/// positions, the candidates asked for in the optimiser's and the parameters' coordinates, those of a portion, and the state
+/// as it is copied and written down, twice.
+const COPIES: u64 = 11;
+/// Bytes of a particle besides its variables: objectives, failures, order, rows of an evaluation.
+const PARTICLE: u64 = 320;
+/// Bytes of an iteration in the history and in the tables and pictures that it comes to.
+const ITERATION: u64 = 512;
+/// Bytes of a cut across the track: in every level of the search, in the cone programs of the exact solvers, whose
+/// factors are what is largest, in the edges that lines are checked against and the lines that are reported.
+const CUT: u64 = 16 << 10;
+/// Bytes of a candidate's answer in a journal: five objectives and a failure, as they are and twice while they are written.
+pub const ANSWER: u64 = 3 * (5 * 8 + 8);
+/// Bytes of a sample of a log: the log itself (11 numbers), what is driven and scored of it for laps fitted and held out (9 each,
+/// and in single precision for each backend), and what a driven lap is judged and told by, as numbers and as text.
+const LOG_SAMPLE: u64 = 1 << 10;
+/// What evaluators are left at the least (bytes): as much as the smallest of [`portions`] takes.
+const LEAST: u64 = 4 << 20;
+
+/// Something of which a study keeps many.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Kept {
+    /// The setting that says how many.
+    pub name: &'static str,
+    /// How many.
+    pub count: u64,
+    /// Bytes of each.
+    pub each: u64,
+}
+
+impl Kept {
+    fn bytes(&self) -> u64 {
+        self.count.saturating_mul(self.each)
+    }
+}
+
+/// Memory that so much takes, that of the evaluators at the least with it (MiB, rounded up).
+pub fn needed_mib(kept: &[Kept]) -> u64 {
+    needed(kept).div_ceil(1 << 20)
+}
+
+/// What is needed to keep all of this and to evaluate (bytes).
+fn needed(kept: &[Kept]) -> u64 {
+    kept.iter().map(Kept::bytes).fold(LEAST, u64::saturating_add)
+}
+
+/// The limit that is in force (MiB).
+pub fn limit_mib() -> u64 {
+    crate::config::memory_limit() >> 20
+}
+
+/// Whether all of this fits into so much memory (MiB).
+pub fn fits(kept: &[Kept], limit_mib: u64) -> bool {
+    needed(kept) <= bytes_of(limit_mib)
+}
+
+fn bytes_of(limit_mib: u64) -> u64 {
+    limit_mib.saturating_mul(1 << 20)
+}
+
+/// What a study keeps must fit into so much memory; the rest is left to its evaluators as long as the allowance lives.
+///
+/// # Errors
+/// [`Error::Input`] naming what takes most of it, and how much of that would fit beside the rest.
+pub fn check(kept: &[Kept], limit_mib: u64) -> Result<Allowance> {
+    let limit = bytes_of(limit_mib);
+    let needed = needed(kept);
+    let Some(largest) = kept
+        .iter()
+        .max_by_key(|kept| kept.bytes())
+        .filter(|_| needed > limit)
+    else {
+        return Ok(portions::allow(
+            limit.saturating_sub(needed).saturating_add(LEAST),
+        ));
+    };
+    let rest = needed.saturating_sub(largest.bytes());
+    let expected = match limit.saturating_sub(rest) / largest.each.max(1) {
+        0 => "a smaller study, or a higher --memory-limit-mib".to_owned(),
+        fitting => format!("at most {fitting}, which fits into {limit_mib} MiB (--memory-limit-mib)"),
+    };
+    let found = format!(
+        "{}, for which some {} MiB are needed",
+        largest.count,
+        needed >> 20
+    );
+    Err(Error::input("the study", largest.name, found, expected))
+}
+
+/// A log of so many samples.
+pub fn log_kept(samples: usize) -> Kept {
+    Kept {
+        name: "samples of the log",
+        count: samples as u64,
+        each: LOG_SAMPLE,
+    }
+}
+
+/// What a study of swarms keeps goes with.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Size {
+    /// Particles of the largest swarm.
+    pub population: usize,
+    /// Variables of a particle.
+    pub variables: usize,
+    /// Iterations.
+    pub iterations: usize,
+    /// Cuts across the track.
+    pub sections: usize,
+    /// Members of the archive.
+    pub archive: usize,
+    /// Whether every answer is kept, in a journal.
+    pub journal: bool,
+    /// Samples of the log, once it is read.
+    pub samples: usize,
+}
+
+impl Size {
+    /// As [`check`] of all that the study keeps.
+    ///
+    /// # Errors
+    /// As [`check`].
+    pub fn check(&self, limit_mib: u64) -> Result<Allowance> {
+        check(&self.kept(), limit_mib)
+    }
+
+    /// As [`needed_mib`] of all that the study keeps.
+    pub fn needed_mib(&self) -> u64 {
+        needed_mib(&self.kept())
+    }
+
+    /// As [`check`] of all that studies keep which run at the same time.
+    ///
+    /// # Errors
+    /// As [`check`].
+    pub fn check_together(sizes: &[Self], limit_mib: u64) -> Result<Allowance> {
+        check(&Self::kept_together(sizes), limit_mib)
+    }
+
+    /// How many of the studies, from the first on, may run at the same time; the first in any case.
+    pub fn together(sizes: &[Self], limit_mib: u64) -> usize {
+        let fit = |count: &usize| needed(&Self::kept_together(&sizes[..*count])) <= bytes_of(limit_mib);
+        (2..=sizes.len()).take_while(fit).last().unwrap_or(1)
+    }
+
+    fn kept_together(sizes: &[Self]) -> Vec<Kept> {
+        sizes.iter().flat_map(Self::kept).collect()
+    }
+
+    /// What the study keeps many of.
+    pub fn kept(&self) -> [Kept; 5] {
+        let particle = (self.variables as u64)
+            .saturating_mul(8 * COPIES)
+            .saturating_add(PARTICLE);
+        let answers = if self.journal {
+            ANSWER.saturating_mul(self.population as u64)
+        } else {
+            0
+        };
+        let kept = |name, count: usize, each| Kept {
+            name,
+            count: count as u64,
+            each,
+        };
+        [
+            kept("population", self.population, particle),
+            kept("archive", self.archive, particle),
+            kept("iterations", self.iterations, ITERATION.saturating_add(answers)),
+            kept("sections", self.sections, CUT),
+            log_kept(self.samples),
+        ]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The figure that a refusal says would fit.
+    fn said_to_fit(refused: Result<Allowance>) -> usize {
+        let said = refused.expect_err("it does not fit").to_string();
+        said.split("at most ")
+            .nth(1)
+            .and_then(|rest| rest.split(',').next())
+            .and_then(|figure| figure.parse().ok())
+            .expect("a figure")
+    }
+
+    #[test]
+    fn what_is_said_to_fit_does() {
+        let size = |population| Size {
+            population,
+            variables: 22,
+            iterations: 1500,
+            archive: 100,
+            ..Size::default()
+        };
+        drop(size(100_000).check(USUAL_MIB).expect("it fits"));
+        let fitting = said_to_fit(size(1_000_000_000).check(USUAL_MIB));
+        drop(size(fitting).check(USUAL_MIB).expect("as was said"));
+        assert!(size(fitting + 1).check(USUAL_MIB).is_err());
+        assert_eq!(size(fitting).needed_mib(), USUAL_MIB);
+        assert!(size(fitting + 1).needed_mib() > USUAL_MIB);
+        let absurd = Size {
+            population: usize::MAX,
+            sections: usize::MAX,
+            journal: true,
+            ..size(usize::MAX)
+        };
+        assert_eq!(absurd.check(1).expect_err("no overflow").exit_code(), 2);
+    }
+
+    #[test]
+    fn what_runs_together_shares_the_limit() {
+        let size = Size {
+            population: 1000,
+            variables: 22,
+            iterations: 1500,
+            ..Size::default()
+        };
+        let sizes = [size; 8];
+        let alone: u64 = size.kept().iter().map(Kept::bytes).sum();
+        for count in 1..=8u64 {
+            let limit_mib = (count * alone + LEAST).div_ceil(1 << 20);
+            // Rounded up to whole MiB there is not room for another.
+            assert!(alone > 1 << 20);
+            assert_eq!(Size::together(&sizes, limit_mib) as u64, count);
+            drop(Size::check_together(&sizes[..count as usize], limit_mib).expect("they fit"));
+            if count < 8 {
+                assert!(Size::check_together(&sizes[..=count as usize], limit_mib).is_err());
+            }
+        }
+        assert_eq!(Size::together(&sizes, 1), 1, "the first is refused by itself");
+    }
+
+    #[test]
+    fn a_log_counts() {
+        let size = |samples| Size {
+            population: 1000,
+            variables: 10,
+            samples,
+            ..Size::default()
+        };
+        drop(size(0).check(64).expect("without a log it fits"));
+        let fitting = said_to_fit(size(10_000_000).check(64));
+        drop(size(fitting).check(64).expect("as was said"));
+        assert!(size(fitting + 1).check(64).is_err());
+    }
+
+    #[test]
+    fn a_journal_counts() {
+        let size = |iterations, journal| Size {
+            population: 1000,
+            variables: 10,
+            iterations,
+            journal,
+            ..Size::default()
+        };
+        drop(
+            size(10_000, false)
+                .check(1024)
+                .expect("without a journal it fits"),
+        );
+        let fitting = said_to_fit(size(10_000, true).check(1024));
+        // 144 bytes to each of a thousand answers.
+        assert!((7000..7500).contains(&fitting), "{fitting}");
+        drop(size(fitting, true).check(1024).expect("as was said"));
+        assert!(size(fitting + 1, true).check(1024).is_err());
+    }
+}

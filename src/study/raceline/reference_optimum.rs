@@ -1,0 +1,346 @@
+//! The reference optima beside the swarm, and the local search by exact gradients.
+
+use super::settings::RacelineSettings;
+use super::setup::{FINE_M, Setup};
+use crate::error::Result;
+use crate::evaluate::line::LineObjective;
+use crate::line::{FineLine, PointMass, cuts_about, shares_across};
+use crate::optimum::{
+    Bounds, DescentSettings, LineMap, Optimum, PointMassLimits, ReferenceProblem, Start, Status, Weights,
+    fastest, least_curvature_of, least_gamma, least_squared_length, polish_lines, shortest,
+};
+use crate::track::CrossSections;
+use glam::DVec2;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// The solvers on one track.
+///
+/// Lines without a lap time have a variable at every cut. With one, cuts' worth of zigzag between them would pay, so that
+/// lines are then a spline's distance from the minimum-curvature line, with three cross-sections for each control point.
+pub struct ReferenceSolvers {
+    cuts: CrossSections,
+    spacing_m: Vec<f64>,
+    every: (LineMap, Bounds),
+    smooth: (LineMap, Bounds),
+    /// The minimum-curvature line, from which the smooth lines are measured.
+    base: Vec<f64>,
+    limits: Option<PointMassLimits>,
+    car: PointMass,
+    entry_mps: f64,
+    stop: Arc<AtomicBool>,
+}
+
+/// A reference optimum.
+#[derive(Clone, Debug)]
+pub struct OptimumLine {
+    /// Share of the usable width at every cut.
+    pub alpha: Vec<f64>,
+    /// How the solver ended.
+    pub status: Status,
+    /// Time taken (s).
+    pub seconds: f64,
+}
+
+/// A line to be led downhill (`alpha` at every cut), and the weight of each objective.
+pub type WeightedLine = (Vec<f64>, Vec<(LineObjective, f64)>);
+
+/// A line taken anew about itself: the distance between the cuts square to it (m), and how many of them there are for each
+/// control point.
+struct About {
+    spacing_m: f64,
+    cuts_per_control: usize,
+}
+
+impl About {
+    /// Distance between control points (m).
+    const fn control_m(&self) -> f64 {
+        self.spacing_m * self.cuts_per_control as f64
+    }
+}
+
+/// At 4 m a lap's time is that on a fine spline to a few parts in ten thousand.
+const ABOUT: About = About {
+    spacing_m: 4.0,
+    cuts_per_control: 4,
+};
+/// A thousandth of a lap better, at several times the cost: cuts ever closer together (m), with a control for as many of them
+/// as the study's own cuts can say, [`CUTS_TO_SAY_CONTROL`] each; where controls come closer by a quarter at least.
+const CLOSELY_M: [f64; 2] = [2.0, 1.0];
+const CLOSER: f64 = 0.75;
+const CUTS_TO_SAY_CONTROL: f64 = 1.4;
+/// Share of a lap below which no cone program is worth its second: a hundredth of what lies between two cuts.
+const LEAST_GAIN_ABOUT: f64 = 1e-5;
+/// Times that the fastest line is taken anew about itself.
+const ABOUTS: usize = 2;
+
+/// With two, ripples are left between the cuts that their lap time does not feel and a fine spline does.
+const CUTS_PER_CONTROL: usize = 3;
+
+/// Weights of the solvers.
+fn weights(terms: impl IntoIterator<Item = (LineObjective, f64)>) -> Weights {
+    let mut weights = Weights::default();
+    for (objective, weight) in terms {
+        match objective {
+            LineObjective::Length => weights.length = weight,
+            LineObjective::LengthSquared => weights.squared_length = weight,
+            LineObjective::Gamma => weights.gamma = weight,
+            LineObjective::Kappa2 => weights.curvature = weight,
+            LineObjective::LapTime => weights.time = weight,
+        }
+    }
+    weights
+}
+
+impl ReferenceSolvers {
+    /// The solvers of `setup`. Lap times are theirs only on a friction ellipse of exponent 2.
+    ///
+    /// # Errors
+    /// [`crate::Error::Input`] for a car that cannot be; [`crate::Error::Study`] if the minimum-curvature line is refused.
+    pub fn new(setup: &Setup, settings: &RacelineSettings) -> Result<Self> {
+        Self::stopped_by(setup, settings, Arc::default())
+    }
+
+    /// As [`ReferenceSolvers::new`], ended by the flag: what they say once it is raised is no optimum.
+    ///
+    /// # Errors
+    /// As [`ReferenceSolvers::new`].
+    pub fn stopped_by(setup: &Setup, settings: &RacelineSettings, stop: Arc<AtomicBool>) -> Result<Self> {
+        let cuts = setup.cuts.clone();
+        let map = LineMap::at_every_cut(&cuts);
+        let bounds = Bounds::road(cuts.len());
+        let spacing_m = cuts.spacing_m();
+        let start = least_gamma(&map, &spacing_m, &bounds)?.x;
+        let curvature = ReferenceProblem {
+            stop: Some(&stop),
+            ..ReferenceProblem::of(&map)
+        };
+        let base = least_curvature_of(&curvature, &bounds, &start)?.x;
+        let controls = (cuts.len() / CUTS_PER_CONTROL).max(4);
+        Ok(Self {
+            smooth: LineMap::spline_about(&cuts, &base, controls),
+            every: (map, bounds),
+            base,
+            limits: if setup.car.ellipse_exponent == 2.0 {
+                Some(PointMassLimits::new(&setup.car)?)
+            } else {
+                None
+            },
+            car: setup.car.clone(),
+            entry_mps: settings.entry_mps,
+            spacing_m,
+            cuts,
+            stop,
+        })
+    }
+
+    /// The flag that ends them.
+    pub(super) fn flag(&self) -> &AtomicBool {
+        &self.stop
+    }
+
+    fn problem<'a>(&'a self, map: &'a LineMap) -> ReferenceProblem<'a> {
+        ReferenceProblem {
+            limits: self.limits.as_ref().map(|l| l as _),
+            start_mps: self.entry_mps,
+            spacing_m: Some(&self.spacing_m),
+            stop: Some(&self.stop),
+            ..ReferenceProblem::of(map)
+        }
+    }
+
+    /// Whether there is a solver for this objective.
+    pub fn solves(&self, objective: LineObjective) -> bool {
+        objective != LineObjective::LapTime || self.limits.is_some()
+    }
+
+    /// The line that is best by one objective; nothing where there is no solver for it.
+    ///
+    /// Length, squared length and Gamma are convex, so that theirs is the optimum. Curvature and lap time are led
+    /// downhill, the latter from the minimum-curvature line; starts all over the road lead to the same.
+    ///
+    /// # Errors
+    /// [`crate::Error::Study`] if a solver refuses.
+    pub fn best(&self, objective: LineObjective) -> Result<Option<OptimumLine>> {
+        let (map, bounds) = &self.every;
+        let solved = match objective {
+            LineObjective::Length => shortest(map, bounds)?,
+            LineObjective::LengthSquared => least_squared_length(map, bounds)?,
+            LineObjective::Gamma => least_gamma(map, &self.spacing_m, bounds)?,
+            LineObjective::Kappa2 => least_curvature_of(&self.problem(map), bounds, &self.base)?,
+            LineObjective::LapTime if self.limits.is_none() => return Ok(None),
+            LineObjective::LapTime => {
+                let (map, bounds) = &self.smooth;
+                let settings = DescentSettings::default();
+                let start = vec![0.0; map.variables()];
+                let mut solved = fastest(&self.problem(map), bounds, &start, &settings)?;
+                solved.x = self.shares(map, &solved.x);
+                solved
+            }
+        };
+        Ok(Some(OptimumLine {
+            alpha: solved.x.iter().map(|a| a.clamp(0.0, 1.0)).collect(),
+            status: solved.status,
+            seconds: solved.seconds,
+        }))
+    }
+
+    /// As [`ReferenceSolvers::best`], and the fastest line taken anew about itself while it gains by that, which is the reference
+    /// that swarms are held against.
+    ///
+    /// # Errors
+    /// As [`ReferenceSolvers::best`].
+    pub fn reference(&self, objective: LineObjective) -> Result<Option<OptimumLine>> {
+        let mut best = self.best(objective)?;
+        if objective == LineObjective::LapTime
+            && let Some(line) = &mut best
+            && let Some(about) = self.about_itself(&line.alpha, ABOUTS)?
+        {
+            line.seconds += about.seconds;
+            (line.alpha, line.status) = (about.x, about.status);
+        }
+        Ok(best)
+    }
+
+    /// The fastest line near one, as splines about it and across cuts square to it: they say more than splines as short about
+    /// the minimum-curvature line. Nothing where the road cannot be cut so, or the line is not faster for it on a fine spline.
+    ///
+    /// # Errors
+    /// [`crate::Error::Study`] if a solver refuses.
+    pub fn fastest_about(&self, alpha: &[f64]) -> Result<Option<Optimum>> {
+        self.about_itself(alpha, 1)
+    }
+
+    /// The same, at first `abouts` times.
+    fn about_itself(&self, alpha: &[f64], abouts: usize) -> Result<Option<Optimum>> {
+        let Some(limits) = &self.limits else {
+            return Ok(None);
+        };
+        let own_m = self.cuts.length_m / self.cuts.len() as f64;
+        let mut control_m = CLOSER * ABOUT.control_m();
+        let closely = CLOSELY_M.into_iter().filter_map(|spacing_m| {
+            let needed = (CUTS_TO_SAY_CONTROL * own_m / spacing_m).ceil() as usize;
+            let how = About {
+                spacing_m,
+                cuts_per_control: needed.max(CUTS_PER_CONTROL),
+            };
+            let closer = how.control_m() <= control_m;
+            if closer {
+                control_m = CLOSER * how.control_m();
+            }
+            closer.then_some(how)
+        });
+        let mut found: Option<Optimum> = None;
+        let mut closer = |how: &About| -> Result<bool> {
+            if self.stop.load(Ordering::Relaxed) {
+                return Ok(false);
+            }
+            let alpha = found.as_ref().map_or(alpha, |f| &f.x);
+            let Some(closer) = self.taken_about(limits, alpha, how)? else {
+                return Ok(false);
+            };
+            let before_s = found.as_ref().map_or(0.0, |f| f.seconds);
+            found = Some(Optimum {
+                seconds: before_s + closer.seconds,
+                ..closer
+            });
+            Ok(true)
+        };
+        // The same again, from the same line, would come to the same.
+        for _ in 0..abouts {
+            if !closer(&ABOUT)? {
+                break;
+            }
+        }
+        for how in closely {
+            closer(&how)?;
+        }
+        Ok(found)
+    }
+
+    fn taken_about(&self, limits: &PointMassLimits, alpha: &[f64], how: &About) -> Result<Option<Optimum>> {
+        let own = self.cuts.points(alpha);
+        let count = ((self.cuts.length_m / how.spacing_m).ceil() as usize).max(self.cuts.len());
+        let Ok(about) = cuts_about(&self.cuts, &own, count) else {
+            return Ok(None);
+        };
+        let controls = (about.len() / how.cuts_per_control).max(4);
+        let (map, bounds) = LineMap::spline_about(&about, &about.reference, controls);
+        let problem = ReferenceProblem {
+            limits: Some(limits),
+            start_mps: self.entry_mps,
+            stop: Some(&self.stop),
+            ..ReferenceProblem::of(&map)
+        };
+        let start = vec![0.0; map.variables()];
+        // Where the cuts are so far apart that no such spline is on the road, the line stays as it is.
+        let settings = DescentSettings {
+            least_gain: LEAST_GAIN_ABOUT,
+            ..DescentSettings::default()
+        };
+        let Ok(solved) = fastest(&problem, &bounds, &start, &settings) else {
+            return Ok(None);
+        };
+        let Ok(shares) = shares_across(&self.cuts, &map.line(&solved.x)) else {
+            return Ok(None);
+        };
+        let x: Vec<f64> = shares.into_iter().map(|a| a.clamp(0.0, 1.0)).collect();
+        let time = |points: &[DVec2]| -> Result<Option<f64>> {
+            let fine = FineLine::new(points, true, FINE_M, Some(&self.car), self.entry_mps)?;
+            Ok(fine.lap_time_s())
+        };
+        let faster = time(&self.cuts.points(&x))? < time(&own)?;
+        Ok(faster.then_some(Optimum { x, ..solved }))
+    }
+
+    /// `alpha` at every cut of a line of `map`.
+    fn shares(&self, map: &LineMap, x: &[f64]) -> Vec<f64> {
+        let points = map.line(x);
+        let ends = self.cuts.right_m.iter().zip(&self.cuts.left_m);
+        points
+            .iter()
+            .zip(ends)
+            .map(|(point, (right, left))| {
+                let across = *left - *right;
+                (*point - *right).dot(across) / across.length_squared()
+            })
+            .collect()
+    }
+
+    /// Leads lines to the nearest optimum, each by its own weights of the objectives, in `programs` cone programs at most.
+    ///
+    /// # Errors
+    /// [`crate::Error::Study`] if a solver refuses.
+    pub fn polish(&self, lines: Vec<WeightedLine>, programs: usize) -> Result<Vec<Vec<f64>>> {
+        let timed = lines
+            .iter()
+            .flat_map(|(_, terms)| terms)
+            .any(|(o, w)| *o == LineObjective::LapTime && *w > 0.0);
+        let (map, bounds) = if timed { &self.smooth } else { &self.every };
+        let settings = DescentSettings {
+            programs,
+            ..DescentSettings::default()
+        };
+        let starts: Vec<Start> = lines
+            .into_iter()
+            .map(|(alpha, terms)| Start {
+                x: if timed { self.offsets(&alpha) } else { alpha },
+                weights: weights(terms),
+            })
+            .collect();
+        let polished = polish_lines(&self.problem(map), bounds, &starts, &settings)?;
+        let alpha = |p: Optimum| self.shares(map, &p.x).iter().map(|a| a.clamp(0.0, 1.0)).collect();
+        Ok(polished.into_iter().map(alpha).collect())
+    }
+
+    /// Control points (m) of a smooth line near `alpha`: its distances from the base where they stand.
+    fn offsets(&self, alpha: &[f64]) -> Vec<f64> {
+        let (n, controls) = (self.cuts.len(), self.smooth.0.variables());
+        (0..controls)
+            .map(|k| {
+                let i = (k * n / controls).min(n - 1);
+                (alpha[i] - self.base[i]) * self.cuts.left_m[i].distance(self.cuts.right_m[i])
+            })
+            .collect()
+    }
+}

@@ -1,0 +1,260 @@
+//! The track, the car and lines as a study reports them.
+
+use super::settings::RacelineSettings;
+use crate::config::settings::Settings;
+use crate::error::{Error, Result};
+use crate::evaluate::line::{LineObjective, LineProblem};
+use crate::line::{Clearance, FineLine, Parametrisation, PointMass, TERMS, check_line};
+use crate::study::envelope::{EnvelopeSettings, car_limits};
+use crate::study::framework::Plan;
+use crate::track::{CrossSections, Spacing, Track};
+use crate::vehicle::powertrain::Powertrain;
+use crate::vehicle::{Car, Envelope};
+use glam::DVec2;
+
+/// Distance between the points of the fine spline that lines are reported on (m).
+pub const FINE_M: f64 = 1.0;
+/// Waves of a survey's reference line that are shorter than this are noise (m): the tightest bend of a road is longer.
+const REFERENCE_M: f64 = 60.0;
+/// Distance between the points of the edges that lines are checked against (m).
+const EDGE_M: f64 = 2.0;
+
+/// The track and the car, ready for lines.
+#[derive(Clone, Debug)]
+pub struct Setup {
+    /// Title of the track.
+    pub track_name: String,
+    /// The cuts from edge to edge.
+    pub road: CrossSections,
+    /// The cuts that the car's middle may use.
+    pub cuts: CrossSections,
+    /// The edges at close steps (m), right and left, which no cut has a part in.
+    pub edges_m: [Vec<DVec2>; 2],
+    /// The car.
+    pub car: PointMass,
+    /// Its name.
+    pub car_name: String,
+    /// Its gearbox and the rolling radius of the driven wheels (m), where the limits are its own.
+    pub gearbox: Option<(Powertrain, f64)>,
+}
+
+/// Reads track and car.
+///
+/// # Errors
+/// [`Error::Input`] and [`Error::Io`] for what cannot be read or used.
+pub fn set_up(settings: &RacelineSettings) -> Result<Setup> {
+    settings.validate()?;
+    let track = Track::load(&settings.track)?;
+    let road = track
+        .cross_sections(&Spacing::equal(settings.sections), settings.as_surveyed)?
+        .with_smooth_reference(REFERENCE_M);
+    let close = ((road.length_m / EDGE_M).ceil() as usize).clamp(settings.sections, 1_000_000);
+    let dense = track.cross_sections(&Spacing::equal(close), settings.as_surveyed)?;
+    let (road, dense) = match &settings.section {
+        Some(name) => {
+            let (first_m, length_m) = section_named(&road, name)?;
+            let stretch = stretch_of(&road, first_m, length_m, 0)?;
+            if stretch.len() < TERMS {
+                let found = format!("{}, of which {} lie in {name}", settings.sections, stretch.len());
+                let expected = format!("so many that at least {TERMS} lie in it");
+                return Err(Error::input("the study", "sections", found, expected));
+            }
+            // The edges reach past the stretch's own ends, wherever its cuts have put these.
+            let from_m = road.station_m[first_cut(&road, first_m)];
+            let edges = stretch_of(&dense, from_m - road.length_m / close as f64, stretch.length_m, 3)?;
+            (stretch, edges)
+        }
+        None => (road, dense),
+    };
+    let cuts = road.narrowed(settings.car_width_m)?;
+    let car = Car::load(&settings.car)?;
+    let (envelope, car_name) = match &settings.envelope {
+        Some(path) => (Envelope::load(path)?, path.display().to_string()),
+        None => (
+            car_limits(&car, &EnvelopeSettings::default())?.envelope,
+            car.name.clone(),
+        ),
+    };
+    let gearbox = car.powertrain.clone().filter(|_| settings.envelope.is_none());
+    let gearbox = gearbox.map(|powertrain| (powertrain, car.chassis.radius_rear));
+    let wheelbase = car.chassis.cg_to_front + car.chassis.cg_to_rear;
+    let car = PointMass {
+        ellipse_exponent: settings.ellipse_exponent,
+        ..PointMass::new(envelope, wheelbase)
+    };
+    car.check()?;
+    Ok(Setup {
+        track_name: track.name(),
+        road,
+        cuts,
+        edges_m: [dense.right_m, dense.left_m],
+        car,
+        car_name,
+        gearbox,
+    })
+}
+
+/// Says that the track and the car's g-g-v envelope were read.
+pub fn road_read(plan: Plan, setup: &Setup) -> Plan {
+    let (road, envelope) = (&setup.road, &setup.car.envelope);
+    plan.reads(format!(
+        "track {}, {:.1} m, {} cross-sections",
+        setup.track_name,
+        road.length_m,
+        road.len()
+    ))
+    .reads(format!(
+        "g-g-v envelope of {} at {} speeds up to {:.1} m/s",
+        setup.car_name,
+        envelope.rows().len(),
+        envelope.top_speed_mps()
+    ))
+}
+
+/// Where the section of this name, or of one of its names, begins (m), and its length (m).
+fn section_named(road: &CrossSections, name: &str) -> Result<(f64, f64)> {
+    let called = |all: &str| all == name || all.split('/').any(|one| one.trim() == name);
+    let Some(section) = road.sections.iter().find(|s| called(&s.name)) else {
+        let known: Vec<&str> = road.sections.iter().map(|s| s.name.as_str()).collect();
+        let expected = if known.is_empty() {
+            "none: the circuit names no sections".to_owned()
+        } else {
+            format!("one of {}", known.join(", "))
+        };
+        return Err(Error::input(&road.name, "section", name, expected));
+    };
+    Ok((section.start_m, section.length_m()))
+}
+
+/// The first cut at or after a station (m).
+fn first_cut(road: &CrossSections, from_m: f64) -> usize {
+    let from_m = if road.closed {
+        from_m.rem_euclid(road.length_m)
+    } else {
+        from_m
+    };
+    let first = road.station_m.partition_point(|s| *s < from_m);
+    if road.closed {
+        first % road.len()
+    } else {
+        first.min(road.len() - 2)
+    }
+}
+
+/// The cuts from a station (m) on over a length (m), and some `more`, as an open road.
+fn stretch_of(road: &CrossSections, from_m: f64, length_m: f64, more: usize) -> Result<CrossSections> {
+    let first = first_cut(road, from_m);
+    let spacing_m = road.length_m / road.len() as f64;
+    let most = if road.closed {
+        road.len()
+    } else {
+        road.len() - first
+    };
+    let count = (length_m / spacing_m).round() as usize + 1 + more;
+    road.stretch(first, count.clamp(2, most))
+}
+
+/// One line with everything that is reported of it.
+#[derive(Clone, Debug)]
+pub struct ReportedLine {
+    /// What it is, as in `shortest`.
+    pub name: String,
+    /// Share of the usable width from the right at every cut.
+    pub alpha: Vec<f64>,
+    /// Length (m) through the cuts.
+    pub length_m: f64,
+    /// Sum of the squared lengths of the segments (m^2).
+    pub length_squared_m2: f64,
+    /// Root of the sum of squared second differences through the cuts (1/m).
+    pub gamma_1pm: f64,
+    /// Integral of squared curvature through the cuts (1/m).
+    pub integral_kappa2_1pm: f64,
+    /// Lap time through the cuts (s).
+    pub lap_time_s: f64,
+    /// The line on the fine spline, with its lap.
+    pub fine: FineLine,
+    /// How close its sides come to the edges.
+    pub clearance: Clearance,
+}
+
+impl ReportedLine {
+    /// Lap time on the fine spline (s): the one to believe.
+    pub fn lap_time_fine_s(&self) -> f64 {
+        self.fine.lap_time_s().unwrap_or(f64::NAN)
+    }
+
+    /// What an objective comes to where lines are compared: lap times on the fine spline, so that no line wins by zigzag
+    /// between the cuts, the others through the cuts.
+    pub fn worth(&self, objective: LineObjective) -> f64 {
+        match objective {
+            LineObjective::LapTime => self.lap_time_fine_s(),
+            _ => self.objective(objective),
+        }
+    }
+
+    /// What an objective comes to through the cuts.
+    pub fn objective(&self, objective: LineObjective) -> f64 {
+        match objective {
+            LineObjective::Length => self.length_m,
+            LineObjective::LengthSquared => self.length_squared_m2,
+            LineObjective::Gamma => self.gamma_1pm,
+            LineObjective::Kappa2 => self.integral_kappa2_1pm,
+            LineObjective::LapTime => self.lap_time_s,
+        }
+    }
+}
+
+impl Setup {
+    /// Works out everything that is reported of a line.
+    ///
+    /// # Errors
+    /// [`Error::Study`] if the line cannot be driven at all.
+    pub fn report(&self, name: &str, alpha: &[f64], settings: &RacelineSettings) -> Result<ReportedLine> {
+        let problem = LineProblem::new(
+            self.cuts.clone(),
+            Parametrisation::sections(),
+            &LineObjective::ALL,
+            Some(self.car.clone()),
+            settings.entry_mps,
+        )?;
+        let mut evaluator = crate::evaluate::line::CpuLineEvaluator::new(&problem);
+        let figures = crate::evaluate::Evaluator::evaluate(&mut evaluator, alpha)?;
+        if let Some(failure) = figures.failures.first().copied().flatten() {
+            return Err(Error::Study(format!(
+                "the line `{name}` cannot be driven: {failure}"
+            )));
+        }
+        let points = self.cuts.points(alpha);
+        let fine = FineLine::new(
+            &points,
+            self.cuts.closed,
+            FINE_M,
+            Some(&self.car),
+            settings.entry_mps,
+        )?;
+        let clearance = check_line(&fine, &self.edges_m[0], &self.edges_m[1], settings.car_width_m);
+        let Ok(
+            [
+                length_m,
+                length_squared_m2,
+                gamma_1pm,
+                integral_kappa2_1pm,
+                lap_time_s,
+            ],
+        ) = <[f64; 5]>::try_from(figures.objectives)
+        else {
+            return Err(Error::Study(format!("the line `{name}` was not evaluated")));
+        };
+        Ok(ReportedLine {
+            name: name.to_owned(),
+            alpha: alpha.to_vec(),
+            length_m,
+            length_squared_m2,
+            gamma_1pm,
+            integral_kappa2_1pm,
+            lap_time_s,
+            fine,
+            clearance,
+        })
+    }
+}

@@ -1,0 +1,147 @@
+//! What studies of a replayed lap share: settings, ranges of parameters, costs of candidates.
+
+use crate::config::kinds::{Shared, shared};
+use crate::config::settings::{Declared, Flag, Role};
+use crate::error::Result;
+use crate::evaluate::replay::kernel::{CHANNELS, drive_window};
+use crate::evaluate::replay::{CHANNEL_NAMES, ReplayProblem, Window};
+use crate::evaluate::{Evaluator, FailureCounts, add_failures};
+use crate::study::framework::Inputs;
+use crate::study::identify::{FreeParameter, IdentifySettings, ObjectiveChoice, Setup, set_up};
+use crate::vehicle::tyre::Tyre;
+use crate::vehicle::{Car, CarModel, LinearTyre, MagicFormula, TyreModel};
+use std::ops::ControlFlow;
+
+/// The settings of an identification as another study of a replayed lap shares them. What concerns the search alone has no flag
+/// there.
+pub(in crate::study) fn replay_settings(
+    renamed: &'static [(&'static str, Flag)],
+) -> Shared<IdentifySettings> {
+    const OTHER: [&str; 4] = ["truth", "objectives", "holdout", "free"];
+    let without = |d: &Declared| (d.role == Role::Search && d.key != "seed") || OTHER.contains(&d.key);
+    shared().without_flags(without).renamed(renamed)
+}
+
+/// The usual settings with windows of a second and a half: figures are of the parameters' own effect, and not of what a spin makes
+/// of it many corners later.
+pub(in crate::study) fn windowed() -> IdentifySettings {
+    IdentifySettings {
+        window_s: Some(1.5),
+        ..IdentifySettings::default()
+    }
+}
+
+/// Reads car and lap. Objectives are all channels together, then each alone; windows start as the base car comes there.
+///
+/// # Errors
+/// As [`set_up`].
+pub(in crate::study) fn set_up_channels(
+    settings: &IdentifySettings,
+    free: Vec<FreeParameter>,
+) -> Result<Setup> {
+    let channels = (0..CHANNEL_NAMES.len()).map(ObjectiveChoice::Channel);
+    let mut setup = set_up(&IdentifySettings {
+        free,
+        objectives: std::iter::once(ObjectiveChoice::All).chain(channels).collect(),
+        ..settings.clone()
+    })?;
+    start_as_base_drives(&mut setup.replay);
+    Ok(setup)
+}
+
+/// The ranges of the parameters about the base car's values.
+pub(in crate::study) fn ranges_about(
+    settings: &IdentifySettings,
+    names: &[String],
+    share: f64,
+) -> Result<Vec<FreeParameter>> {
+    let car = Car::load(&settings.car)?;
+    let flat = car.to_flat();
+    names
+        .iter()
+        .map(|name| {
+            let parameter = car.known_parameter("the study", "parameters", name)?;
+            let value = flat[parameter.slots[0]];
+            let bounds = settings.free.iter().find(|f| f.name == *name);
+            let reach = if value == 0.0 {
+                bounds.map_or(1.0, |f| 0.5 * (f.upper - f.lower))
+            } else {
+                value.abs()
+            };
+            let info = parameter.info;
+            Ok(FreeParameter {
+                name: name.clone(),
+                lower: (value - share * reach).max(info.minimum),
+                upper: (value + share * reach).min(info.maximum),
+            })
+        })
+        .collect()
+}
+
+/// Lets every window start from the state in which the base car comes there, lateral speed and roll with it, which no
+/// log has: the base car's cost is then that of whole laps, and what others add is their own. A window that the base car
+/// does not reach starts as before.
+fn start_as_base_drives(replay: &mut ReplayProblem) {
+    fn chained<T: Tyre<f64>>(replay: &mut ReplayProblem, car: &CarModel<f64, T>) {
+        let mut before: Option<Window<f64>> = None;
+        for k in 0..replay.plan.windows.len() {
+            let window = replay.plan.windows[k];
+            if let Some(before) = before.filter(|b| b.start < window.start) {
+                let between = Window {
+                    end: window.start + 1,
+                    ..before
+                };
+                let (drives, state) =
+                    drive_window(car, &replay.plan, &between, |_: usize, _: [f64; CHANNELS]| {});
+                if drives {
+                    replay.plan.windows[k].initial = state.to_array();
+                }
+            }
+            before = Some(replay.plan.windows[k]);
+        }
+    }
+    let base = replay.free.base().to_vec();
+    match replay.tyre_model() {
+        TyreModel::MagicFormula => {
+            let car = CarModel::<f64, MagicFormula<f64>>::from_parameters(|i| base[i]);
+            chained(replay, &car);
+        }
+        TyreModel::Linear => {
+            let car = CarModel::<f64, LinearTyre<f64>>::from_parameters(|i| base[i]);
+            chained(replay, &car);
+        }
+    }
+}
+
+/// Candidates of one call of the evaluator: enough to fill any device for a moment, few enough to be interrupted.
+const BATCH: usize = 1024;
+
+/// Costs of each candidate; nothing where one does not drive, which is counted by reason.
+pub(in crate::study) fn costs_of(
+    evaluator: &mut dyn Evaluator,
+    population: &[f64],
+    failures: &mut FailureCounts,
+    mut observe: impl FnMut(usize) -> ControlFlow<()>,
+) -> Result<Option<Vec<Option<Vec<f64>>>>> {
+    let dimensions = evaluator.problem().variables.len();
+    let width = evaluator.problem().objectives.len();
+    let mut costs = Vec::with_capacity(population.len() / dimensions);
+    for batch in population.chunks(BATCH * dimensions) {
+        let found = evaluator.evaluate(batch)?;
+        add_failures(failures, &found.failure_counts());
+        let rows = found.objectives.chunks_exact(width).zip(&found.failures);
+        costs.extend(rows.map(|(row, failure)| failure.is_none().then(|| row.to_vec())));
+        if observe(costs.len()).is_break() {
+            return Ok(None);
+        }
+    }
+    Ok(Some(costs))
+}
+
+/// What the costs of this setup depend on.
+pub(in crate::study) fn inputs_of(study: &str, setup: &Setup) -> String {
+    let replay = &setup.replay;
+    let mut inputs = Inputs::new(study);
+    inputs.add(&(&replay.plan, &replay.problem, &replay.free.car));
+    inputs.key()
+}

@@ -1,0 +1,201 @@
+//! One line alone, driven in `f64` with the greatest share of the grip that is held.
+
+use super::state::DriveState;
+use super::{NamedLine, Prepared, TransientSettings, TransientState, planned};
+use crate::drive::{Drive, DriverSettings, drive_planned};
+use crate::error::{Error, Result};
+use crate::evaluate::BackendInfo;
+use crate::line::FineLine;
+use crate::study::framework::run_folder::STATE;
+use crate::study::framework::{Inputs, Progress, RunRecord, Watch, Work};
+use crate::track::Circuit;
+use crate::vehicle::Envelope;
+use rayon::prelude::*;
+
+/// Sample interval of the drive that is kept (s).
+pub const INTERVAL_S: f64 = 0.01;
+/// Agreement of the two laps that is asked for.
+pub const AGREEMENT: f64 = 0.005;
+
+/// What a line driven alone comes to.
+#[derive(Clone, Debug)]
+pub struct DrivenLine {
+    /// The greatest share of the envelope's grip that the car and the driver held; where the laps agree with none, the
+    /// share with which they agree best.
+    pub grip_share: f64,
+    /// The envelope with that share.
+    pub envelope: Envelope,
+    /// The quasi-steady-state lap within it.
+    pub point_mass: FineLine,
+    /// The lap that was driven.
+    pub drive: Drive,
+    /// Its time (s).
+    pub lap_time_s: f64,
+    /// The line as a circuit of its own, its widths the room that the car's side has to the edges.
+    pub line: Circuit,
+    /// Least room left between the car's side and an edge (m).
+    pub margin_m: f64,
+    /// Why greater shares failed: the share and what became of the car.
+    pub failures: Vec<(f64, String)>,
+    /// How it ran.
+    pub record: RunRecord,
+}
+
+impl DrivenLine {
+    /// How far the driven lap is off the quasi-steady-state lap, as a share of it.
+    pub fn disagreement(&self) -> f64 {
+        let point_mass = self.point_mass.lap_time_s().unwrap_or(f64::NAN);
+        self.lap_time_s / point_mass - 1.0
+    }
+}
+
+/// Drives the first of the lines; nothing if the observer ends it.
+///
+/// # Errors
+/// [`Error::Study`] if the car gets round with none of the shares; [`Error::Input`] if the state belongs to other inputs;
+/// [`Error::Io`] if it cannot be saved.
+pub(super) fn drive(
+    settings: &TransientSettings,
+    prepared: &Prepared,
+    work: Work<'_, TransientState>,
+) -> Result<Option<DrivenLine>> {
+    let watch = Watch::begin();
+    let mut record = RunRecord::of(&BackendInfo::reference());
+    let found = greatest_share(settings, prepared, work)?;
+    Ok(found.map(|mut found| {
+        let elapsed_s = watch.elapsed_s();
+        record.took(found.failures.len() as u64 + 1, elapsed_s, elapsed_s);
+        found.record = record;
+        found
+    }))
+}
+
+fn greatest_share(
+    settings: &TransientSettings,
+    prepared: &Prepared,
+    work: Work<'_, TransientState>,
+) -> Result<Option<DrivenLine>> {
+    let (car, limits) = (&prepared.car, &prepared.road.car);
+    let Some(NamedLine {
+        points_m, circuit, ..
+    }) = prepared.lines.first()
+    else {
+        return Err(Error::input("the study", "line", "none", "a line to drive"));
+    };
+    let Work {
+        state,
+        state_file,
+        observe,
+        ..
+    } = work;
+    let driver = DriverSettings::racing(car)?;
+    // The greatest first.
+    let shares: Vec<f64> = settings.shares().into_iter().rev().collect();
+    let mut inputs = Inputs::new("transient");
+    inputs.add(&(car, limits, points_m, circuit, &shares));
+    let inputs = inputs.key();
+    let mut state = match state {
+        Some(state) => state.line()?,
+        None => DriveState::new(settings.clone()),
+    };
+    if state.inputs.as_ref().is_some_and(|began| *began != inputs) {
+        let expected = "the files that the drive reads as they were when it began";
+        return Err(Error::input(STATE, "inputs of the study", "others", expected));
+    }
+    state.inputs = Some(inputs);
+    state_file.save(&state)?;
+    let attempt = |share: f64| -> Result<(Envelope, FineLine, Drive)> {
+        let (envelope, fine, plan) = planned(limits, points_m, share)?;
+        let drive = drive_planned(car, circuit, plan, &driver, INTERVAL_S)?;
+        Ok((envelope, fine, drive))
+    };
+    let outcome_of = |share: f64, (envelope, point_mass, drive): (Envelope, FineLine, Drive), failures| {
+        let lap_time_s = drive.lap_time_s(circuit.length_m, INTERVAL_S)?;
+        Some(DrivenLine {
+            grip_share: share,
+            envelope,
+            point_mass,
+            lap_time_s,
+            margin_m: least_room(circuit, &drive),
+            drive,
+            line: circuit.clone(),
+            failures,
+            record: RunRecord::default(),
+        })
+    };
+    let mut best = match state.best {
+        Some(share) => {
+            let before = state.failures.iter().take_while(|(failed, _)| *failed != share);
+            outcome_of(share, attempt(share)?, before.cloned().collect())
+        }
+        None => None,
+    };
+    let planned = shares.len();
+    // A few at once: the greatest that works ends the search.
+    let together = rayon::current_num_threads().max(2);
+    while state.tried < planned {
+        if observe(&Progress::counted(state.tried as u64, planned as u64)).is_break() {
+            state_file.save(&state)?;
+            return Ok(None);
+        }
+        let end = planned.min(state.tried + together);
+        let batch = &shares[state.tried..end];
+        let found: Vec<_> = batch.par_iter().map(|share| (*share, attempt(*share))).collect();
+        for (share, driven) in found {
+            match driven {
+                Ok(driven) => {
+                    let Some(outcome) = outcome_of(share, driven, state.failures.clone()) else {
+                        continue;
+                    };
+                    let off = outcome.disagreement();
+                    if off.abs() <= AGREEMENT {
+                        return Ok(Some(outcome));
+                    }
+                    // It gets round, but more slowly than its plan: the limits are not held yet.
+                    let why = format!(
+                        "the driven lap is {:+.2}% off the quasi-steady-state lap",
+                        100.0 * off
+                    );
+                    state.failures.push((share, why));
+                    let nearer = best
+                        .as_ref()
+                        .is_none_or(|b: &DrivenLine| off.abs() < b.disagreement().abs());
+                    if nearer {
+                        state.best = Some(share);
+                        best = Some(outcome);
+                    }
+                }
+                Err(error @ Error::Input { .. }) => return Err(error),
+                Err(error) => state.failures.push((share, error.to_string())),
+            }
+        }
+        state.tried = end;
+        if state_file.due() {
+            state_file.save_or_warn(&state);
+        }
+    }
+    if let Some(best) = best {
+        return Ok(Some(best));
+    }
+    let last = state
+        .failures
+        .last()
+        .map_or(String::new(), |(share, why)| format!(" (at {share:.2}: {why})"));
+    Err(Error::Study(format!(
+        "the car does not get round the line with any share of the envelope's grip that was tried{last}; a line with more room \
+         to the edges (found for a wider car), or through more sections, is easier to drive"
+    )))
+}
+
+/// Least room between the car's side and an edge over a drive (m).
+fn least_room(circuit: &Circuit, drive: &Drive) -> f64 {
+    drive
+        .station_m
+        .iter()
+        .zip(&drive.offset_m)
+        .map(|(station, offset)| {
+            let (left, right) = circuit.widths_at(*station);
+            (left - offset).min(right + offset)
+        })
+        .fold(f64::INFINITY, f64::min)
+}

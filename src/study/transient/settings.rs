@@ -1,0 +1,170 @@
+//! Settings of a drive.
+
+use crate::config::kinds::{
+    choice, count, file, files, name_or_file, number, numbers, optional, text, texts,
+};
+use crate::config::settings::settings;
+use crate::error::{Error, Result};
+use crate::evaluate::BackendChoice;
+use crate::study::framework::memory::{ANSWER, Kept};
+use crate::study::raceline::RacelineSettings;
+use crate::vehicle::{Car, CarParameter};
+use std::path::PathBuf;
+
+/// The most set-ups of a population.
+pub const MOST_SETUPS: usize = 1 << 16;
+/// The most parameters that set-ups move: those of the Sobol sequence.
+const MOST_PARAMETERS: usize = 256;
+
+settings! {
+    /// Settings of a drive.
+    pub struct TransientSettings {
+        line: Vec<PathBuf> ["-"] = Vec::new(), files().example("[\"line_fastest.csv\"]"),
+            "The lines to drive, at least one: tables that raceline wrote, or any with columns x_m and y_m";
+        track: String ["-"] = "silverstone_gp".to_owned(), name_or_file(),
+            "The circuit, for its edges: a bundled name, a shape, or a file";
+        car: String ["-"] = "gt".to_owned(), name_or_file(),
+            "The car: a bundled name (gt) or a TOML file";
+        envelope: Option<PathBuf> ["-"] = None, optional(file()).example("\"envelope.csv\""),
+            "The g-g-v envelope from a table instead of the car's own";
+        car_width_m: f64 ["m"] = 2.0, number(0.0, 10.0),
+            "Width of the car, all of which stays within the edges";
+        grip_shares: Option<Vec<f64>> ["-"] = None, optional(numbers(0.05, 1.0)).example("[0.7, 0.8, 0.9]"),
+            "Shares of the envelope's grip to drive with; without it from 0.6 on for one line alone and from 0.8 on for a population";
+        setups: Option<usize> ["-"] = None, optional(count(0, MOST_SETUPS as u64)).example("63"),
+            "Set-ups of the car to drive beside the car as it is";
+        parameters: Vec<String> ["-"] = ["front_roll_moment_share", "aero_balance_front"].map(str::to_owned).to_vec(), texts(),
+            "Parameters that set-ups move";
+        share: f64 ["-"] = 0.1, number(1e-6, 1.0),
+            "How far each goes either way, as a share of its value";
+        seed: u64 ["-"] = 1, count(0, u64::MAX).search(),
+            "Seed of the set-ups";
+        backend: BackendChoice ["-"] = BackendChoice::Auto, choice().place(),
+            "Where set-ups and several lines are driven; one line alone is driven in f64";
+        adapter: Option<String> ["-"] = None, optional(text()).place().example("\"llvmpipe\""),
+            "Part of the name of the GPU to use";
+    }
+
+    fn consistent(&self) -> Result<()> {
+        let refuse = |place: &str, found: String, expected: &str| {
+            Err(Error::input("the study", place, found, expected))
+        };
+        let count = self.parameters.len();
+        if self.setups.is_some_and(|n| n > 0) && count == 0 || count > MOST_PARAMETERS {
+            return refuse("parameters", format!("{count} of them"), "1 to 256");
+        }
+        if self.grip_shares.as_ref().is_some_and(Vec::is_empty) {
+            return refuse("grip_shares", "none".to_owned(), "at least one share");
+        }
+        Ok(())
+    }
+}
+
+impl TransientSettings {
+    /// Whether all set-ups on all lines are driven at once, and not one line alone.
+    pub fn is_population(&self) -> bool {
+        self.setups.is_some() || self.line.len() > 1
+    }
+
+    /// Shares of the envelope's grip to drive with, rising.
+    pub fn shares(&self) -> Vec<f64> {
+        let mut shares = self.grip_shares.clone().unwrap_or_else(|| {
+            if self.is_population() {
+                (0..21).map(|i| 0.8 + 0.01 * f64::from(i)).collect()
+            } else {
+                (0..41).map(|i| 1.0 - 0.01 * f64::from(i)).collect()
+            }
+        });
+        shares.sort_by(f64::total_cmp);
+        shares.dedup();
+        shares
+    }
+
+    /// Laps to drive, at the most.
+    pub fn laps(&self) -> usize {
+        (self.setups.unwrap_or(0) + 1) * self.line.len().max(1) * self.shares().len()
+    }
+
+    /// What a population keeps in memory.
+    pub(super) fn kept(&self) -> Vec<Kept> {
+        if !self.is_population() {
+            return Vec::new();
+        }
+        let [lines, shares] = [self.line.len(), self.shares().len()].map(|n| n as u64);
+        let variables = self.parameters.len() as u64 + 2;
+        vec![Kept {
+            name: "setups",
+            count: self.setups.unwrap_or(0) as u64 + 1,
+            each: (lines * shares).saturating_mul(ANSWER) + lines * 3 * 8 * variables,
+        }]
+    }
+
+    /// Checks that there is a line, that one line alone is driven where it can be, and that there are set-ups for what is said of
+    /// them.
+    ///
+    /// # Errors
+    /// [`Error::Input`] naming the setting.
+    pub(super) fn complete(&self) -> Result<()> {
+        let refuse =
+            |place: &str, found: &str, expected: &str| Err(Error::input("the study", place, found, expected));
+        if self.line.is_empty() {
+            return refuse("line", "none", "a line to drive: --line FILE");
+        }
+        let usual = Self::default();
+        if self.setups.is_none() && (&self.parameters, self.share) != (&usual.parameters, usual.share) {
+            return refuse(
+                "setups",
+                "none",
+                "how many set-ups move the parameters: --setups N",
+            );
+        }
+        let elsewhere = matches!(self.backend, BackendChoice::Simd | BackendChoice::Gpu);
+        if !self.is_population() && (elsewhere || self.adapter.is_some()) {
+            let expected = "--backend cpu, --setups N, or several lines: one line is driven in f64 alone";
+            return refuse("backend", "one line and no set-ups", expected);
+        }
+        Ok(())
+    }
+
+    /// What the circuit and the limits are set up from.
+    pub(super) fn raceline(&self) -> RacelineSettings {
+        RacelineSettings {
+            track: self.track.clone(),
+            car: self.car.clone(),
+            envelope: self.envelope.clone(),
+            car_width_m: self.car_width_m,
+            ..RacelineSettings::default()
+        }
+    }
+
+    /// Free parameters of `car` with their bounds. A share of zero is zero: a parameter of that value is refused.
+    ///
+    /// # Errors
+    /// [`Error::Input`] naming the parameter.
+    pub(super) fn free(&self, car: &Car) -> Result<Vec<(CarParameter, f64, f64)>> {
+        if self.setups.unwrap_or(0) == 0 {
+            return Ok(Vec::new());
+        }
+        let flat = car.to_flat();
+        self.parameters
+            .iter()
+            .map(|name| {
+                let parameter = car.known_parameter(&car.name, "parameters", name)?;
+                let value = flat[parameter.slots[0]];
+                if parameter.slots.iter().any(|slot| flat[*slot] != value) {
+                    let expected = format!("front.{name} or rear.{name}, whose values differ");
+                    let found = format!("`{name}`");
+                    return Err(Error::input(&car.name, "parameters", found, expected));
+                }
+                if value == 0.0 {
+                    let expected = "one that is not zero, which no share of itself moves";
+                    return Err(Error::input(&car.name, name, "0", expected));
+                }
+                let reach = self.share * value.abs();
+                let within = |x: f64| x.clamp(parameter.info.minimum, parameter.info.maximum);
+                let (lower, upper) = (within(value - reach), within(value + reach));
+                Ok((parameter, lower, upper))
+            })
+            .collect()
+    }
+}

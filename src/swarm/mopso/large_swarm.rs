@@ -1,0 +1,415 @@
+//! A swarm of thousands to millions: particles in lanes and threads, and an archive that is given only what may enter it.
+//!
+//! The moves are those of the small swarm, in single precision and drawn from the same generator; [`super::blocks`] is
+//! the twin of the kernel that moves swarms on a device. [`super::filter`] and [`super::thinning`] stand between the swarm
+//! and its archive. All of it is linear in the particles but for sorting the few that nothing dominates.
+
+use super::blocks::{Generation, UNKNOWN, advance, judge, scatter};
+use super::filter::{Point, front, part, point};
+use super::thinning::{PER_PLACE, thinned};
+use crate::error::Result;
+use crate::evaluate::resident::BLOCK;
+use crate::evaluate::simd::{InstructionSet, LaneWork, dispatch};
+use crate::evaluate::{Evaluation, FAILED_COST, Failure, Problem};
+use crate::random::Random;
+use crate::scalar::lanes::Lanes;
+use crate::swarm::archive::Archive;
+use crate::swarm::settings::MopsoSettings;
+use crate::swarm::space::Space;
+use crate::swarm::{Counters, Front, Optimiser};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+/// Particles that are filtered together and that one thread handles in a row.
+const PART: usize = 64 * BLOCK;
+
+/// State of a large swarm. Rows of a block follow one another; its last block may have lanes without a particle.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub(super) struct LargeSwarm {
+    settings: MopsoSettings,
+    random: Random,
+    space: Space,
+    objectives: usize,
+    position: Vec<f32>,
+    velocity: Vec<f32>,
+    best_position: Vec<f32>,
+    best_objectives: Vec<f32>,
+    /// `None` before any violation was told.
+    best_violation: Vec<f64>,
+    archive: Archive,
+    counters: Counters,
+}
+
+/// Scatters a part of the swarm, whose first particle is `first`.
+struct Scatter<'a> {
+    generation: &'a Generation,
+    random: Random,
+    first: usize,
+    position: &'a mut [f32],
+}
+
+impl LaneWork for Scatter<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) {
+        let size = BLOCK * self.generation.dimensions as usize;
+        for (block, rows) in self.position.chunks_exact_mut(size).enumerate() {
+            let first = (self.first + block * BLOCK) as u32;
+            scatter(self.generation, self.random, first, rows);
+        }
+    }
+}
+
+/// Updates the personal bests of a part of the swarm, and finds its points that may enter the archive.
+struct Learn<'a> {
+    generation: &'a Generation,
+    random: Random,
+    first: usize,
+    rows: &'a [f64],
+    failures: &'a [Option<Failure>],
+    /// Nothing where there are no constraints, as is the best of each particle.
+    violations: &'a [f64],
+    best_violation: &'a mut [f64],
+    /// The violation that the archive takes.
+    level: f64,
+    position: &'a [f32],
+    best_position: &'a mut [f32],
+    best_objectives: &'a mut [f32],
+    members: &'a [[f64; 3]],
+}
+
+impl LaneWork for Learn<'_> {
+    type Output = Vec<Point>;
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) -> Vec<Point> {
+        let width = self.generation.objectives as usize;
+        let size = BLOCK * self.generation.dimensions as usize;
+        let mut objectives = vec![UNKNOWN; BLOCK * width];
+        let blocks = self
+            .position
+            .chunks_exact(size)
+            .zip(self.best_position.chunks_exact_mut(size))
+            .zip(self.best_objectives.chunks_exact_mut(BLOCK * width));
+        for (block, ((position, best_position), best_objectives)) in blocks.enumerate() {
+            let rows = self.rows.chunks_exact(width).skip(block * BLOCK).take(BLOCK);
+            objectives.fill(UNKNOWN);
+            for (lane, row) in rows.enumerate() {
+                let i = block * BLOCK + lane;
+                let mut sound = self.failures[i].is_none();
+                if let (Some(best), Some(violation)) =
+                    (self.best_violation.get_mut(i), self.violations.get(i))
+                {
+                    // Less is better whatever was known before, and more is never.
+                    let usable = sound && row.iter().all(|x| x.is_finite() && *x < FAILED_COST);
+                    if usable && *violation < *best {
+                        *best = *violation;
+                        (0..width).for_each(|k| best_objectives[k * BLOCK + lane] = UNKNOWN);
+                    }
+                    sound &= *violation == *best;
+                }
+                if sound {
+                    for (k, value) in row.iter().enumerate() {
+                        objectives[k * BLOCK + lane] = *value as f32;
+                    }
+                }
+            }
+            judge(
+                self.generation,
+                self.random,
+                (self.first + block * BLOCK) as u32,
+                (position, &objectives),
+                (best_position, best_objectives),
+            );
+        }
+        let sound =
+            |i: usize| self.failures[i].is_none() && self.violations.get(i).is_none_or(|v| *v == self.level);
+        part(self.rows, width, self.first as u32, sound, self.members)
+    }
+}
+
+/// Moves a part of the swarm.
+struct Move<'a> {
+    generation: &'a Generation,
+    random: Random,
+    first: usize,
+    best_position: &'a [f32],
+    leaders: &'a [f32],
+    position: &'a mut [f32],
+    velocity: &'a mut [f32],
+}
+
+impl LaneWork for Move<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) {
+        let size = BLOCK * self.generation.dimensions as usize;
+        let blocks = self
+            .position
+            .chunks_exact_mut(size)
+            .zip(self.velocity.chunks_exact_mut(size))
+            .zip(self.best_position.chunks_exact(size));
+        for (block, ((position, velocity), best)) in blocks.enumerate() {
+            let first = (self.first + block * BLOCK) as u32;
+            advance(
+                self.generation,
+                self.random,
+                first,
+                best,
+                self.leaders,
+                (position, velocity),
+            );
+        }
+    }
+}
+
+impl LargeSwarm {
+    /// # Errors
+    /// [`crate::Error::Input`] naming the setting that is out of its range.
+    pub fn new(problem: &Problem, settings: MopsoSettings) -> Result<Self> {
+        settings.validate()?;
+        let space = Space::new(problem)?;
+        let (d, width) = (space.dimensions(), problem.objectives.len());
+        let lanes = settings.motion.population.next_multiple_of(BLOCK);
+        let random = Random::new(settings.motion.seed);
+        let generation = Generation::new(&settings, (d, width, 0), 0);
+        let mut position = vec![0.0; lanes * d];
+        position
+            .par_chunks_mut((PART * d).max(1))
+            .enumerate()
+            .for_each(|(number, position)| {
+                let scatter = Scatter {
+                    generation: &generation,
+                    random,
+                    first: number * PART,
+                    position,
+                };
+                dispatch(InstructionSet::best(), scatter);
+            });
+        Ok(Self {
+            velocity: vec![0.0; lanes * d],
+            best_position: position.clone(),
+            best_objectives: vec![UNKNOWN; lanes * width],
+            best_violation: Vec::new(),
+            archive: settings.empty_archive(problem.objectives.len())?,
+            objectives: width,
+            position,
+            random,
+            space,
+            settings,
+            counters: Counters::default(),
+        })
+    }
+
+    pub fn start_from(&mut self, candidates: &[Vec<f64>]) {
+        for (particle, candidate) in candidates
+            .iter()
+            .enumerate()
+            .take(self.settings.motion.population)
+        {
+            for (k, x) in self.space.position(candidate).into_iter().enumerate() {
+                let place = self.place(particle, k);
+                self.position[place] = x as f32;
+                self.best_position[place] = x as f32;
+            }
+        }
+    }
+
+    pub fn archive(&self) -> &Archive {
+        &self.archive
+    }
+
+    /// They join the archive.
+    pub fn welcome(&mut self, migrants: &Front, violation: f64) {
+        let rows = migrants.candidates.iter().zip(&migrants.objectives);
+        let solution =
+            |(candidate, row): (&Vec<f64>, &Vec<f64>)| (self.space.position(candidate), row.clone());
+        self.archive.insert_all(rows.map(solution).collect(), violation);
+    }
+
+    pub fn bytes_per_particle(&self) -> usize {
+        (3 * self.space.dimensions() + self.objectives) * size_of::<f32>()
+    }
+
+    /// Where a coordinate of a particle stands.
+    fn place(&self, particle: usize, k: usize) -> usize {
+        (particle / BLOCK * self.space.dimensions() + k) * BLOCK + particle % BLOCK
+    }
+
+    fn generation(&self) -> Generation {
+        let sizes = (self.space.dimensions(), self.objectives, self.archive.len());
+        Generation::new(&self.settings, sizes, self.counters.iteration)
+    }
+
+    /// The points of the swarm that may enter the archive, and their violation.
+    fn learn(&mut self, evaluation: &Evaluation) -> (Vec<Point>, f64) {
+        let (d, width) = (self.space.dimensions(), self.objectives);
+        let generation = self.generation();
+        let random = self.random;
+        let n = self.settings.motion.population;
+        let violations: Vec<f64> = if evaluation.violations.is_empty() {
+            Vec::new()
+        } else {
+            (0..n).map(|i| evaluation.violation(i)).collect()
+        };
+        if !violations.is_empty() && self.best_violation.is_empty() {
+            // What was told of before violated nothing.
+            let known = if self.counters.iteration > 0 {
+                0.0
+            } else {
+                f64::INFINITY
+            };
+            self.best_violation = vec![known; n];
+        }
+        let level = self.level(evaluation, &violations);
+        let better = level < self.archive.violation();
+        let rows = self.archive.objectives.iter().filter(|_| !better);
+        let members: Vec<[f64; 3]> = rows.map(|row| point(row, 0).at).collect();
+        let part_of = |i: usize, all: usize| (i * PART).min(all)..((i + 1) * PART).min(all);
+        let parts = evaluation
+            .objectives
+            .par_chunks(PART * width)
+            .zip(evaluation.failures.par_chunks(PART))
+            .zip(self.position.par_chunks(PART * d))
+            .zip(self.best_position.par_chunks_mut(PART * d))
+            .zip(self.best_objectives.par_chunks_mut(PART * width))
+            .zip(pieces(&mut self.best_violation, n))
+            .enumerate();
+        let fronts: Vec<Vec<Point>> = parts
+            .map(
+                |(
+                    number,
+                    (((((rows, failures), position), best_position), best_objectives), best_violation),
+                )| {
+                    let learn = Learn {
+                        generation: &generation,
+                        random,
+                        first: number * PART,
+                        rows,
+                        failures,
+                        violations: &violations[part_of(number, violations.len())],
+                        best_violation,
+                        level,
+                        position,
+                        best_position,
+                        best_objectives,
+                        members: &members,
+                    };
+                    dispatch(InstructionSet::best(), learn)
+                },
+            )
+            .collect();
+        (front(fronts.concat(), width), level)
+    }
+
+    /// The violation that the archive takes after this evaluation: the least of its own and of those that are told.
+    fn level(&self, evaluation: &Evaluation, violations: &[f64]) -> f64 {
+        if violations.is_empty() {
+            return 0.0;
+        }
+        let rows = evaluation.objectives.chunks_exact(self.objectives);
+        let sound = rows
+            .zip(&evaluation.failures)
+            .map(|(row, failure)| failure.is_none() && row.iter().all(|x| x.is_finite() && *x < FAILED_COST));
+        let told = sound.zip(violations).filter(|(sound, _)| *sound).map(|(_, v)| *v);
+        told.fold(self.archive.violation(), f64::min)
+    }
+
+    /// Moves the swarm.
+    fn advance(&mut self) {
+        let d = self.space.dimensions();
+        let generation = self.generation();
+        let random = self.random;
+        let leaders = leaders(&self.archive);
+        self.position
+            .par_chunks_mut(PART * d)
+            .zip(self.velocity.par_chunks_mut(PART * d))
+            .zip(self.best_position.par_chunks(PART * d))
+            .enumerate()
+            .for_each(|(number, ((position, velocity), best_position))| {
+                let step = Move {
+                    generation: &generation,
+                    random,
+                    first: number * PART,
+                    best_position,
+                    leaders: &leaders,
+                    position,
+                    velocity,
+                };
+                dispatch(InstructionSet::best(), step);
+            });
+    }
+}
+
+/// The pieces of `state` that go with the parts of a swarm of `n`, empty ones if it is.
+fn pieces(state: &mut [f64], n: usize) -> Vec<&mut [f64]> {
+    if state.is_empty() {
+        return (0..n.div_ceil(PART)).map(|_| Default::default()).collect();
+    }
+    state.chunks_mut(PART).collect()
+}
+
+/// The archive's positions, the greatest contribution first.
+pub fn leaders(archive: &Archive) -> Vec<f32> {
+    let worth = archive.worth();
+    let mut order: Vec<usize> = (0..worth.len()).collect();
+    order.sort_by(|&a, &b| worth[b].total_cmp(&worth[a]));
+    let coordinate = |i: usize| archive.positions[i].iter().map(|x| *x as f32);
+    order.into_iter().flat_map(coordinate).collect()
+}
+
+/// The front of a part of a swarm by itself.
+pub fn learn_from(rows: &[f64], width: usize) -> Vec<Point> {
+    part(rows, width, 0, |_| true, &[])
+}
+
+impl Optimiser for LargeSwarm {
+    fn ask(&mut self) -> Vec<f64> {
+        let (n, width) = (self.settings.motion.population, self.space.variables());
+        let d = self.space.dimensions();
+        let mut candidates = vec![0.0; n * width];
+        candidates
+            .par_chunks_mut(PART * width)
+            .enumerate()
+            .for_each(|(number, part)| {
+                for (block, rows) in part.chunks_mut(BLOCK * width).enumerate() {
+                    let from = (number * PART / BLOCK + block) * BLOCK * d;
+                    self.space
+                        .scale_block(&self.position[from..from + BLOCK * d], BLOCK, rows);
+                }
+            });
+        candidates
+    }
+
+    fn tell(&mut self, evaluation: &Evaluation) {
+        let (found, violation) = self.learn(evaluation);
+        let found = thinned(found, self.objectives, PER_PLACE * self.settings.archive);
+        let d = self.space.dimensions();
+        let positions = found.iter().map(|p| {
+            let at = |k: usize| f64::from(self.position[self.place(p.who as usize, k)]);
+            (0..d).map(at).collect()
+        });
+        let rows = found.iter().map(|p| p.at[..self.objectives].to_vec());
+        self.archive.insert_all(positions.zip(rows).collect(), violation);
+        self.counters.told(self.settings.motion.population);
+        self.advance();
+    }
+
+    fn counters(&self) -> Counters {
+        self.counters
+    }
+
+    fn planned_iterations(&self) -> usize {
+        self.settings.motion.iterations
+    }
+
+    fn front(&self) -> Front {
+        self.archive.front(&self.space)
+    }
+
+    fn best(&self) -> Vec<f64> {
+        self.archive.best(self.objectives)
+    }
+}

@@ -1,0 +1,234 @@
+//! The small swarm: double precision, one particle after the other.
+
+use crate::error::Result;
+use crate::evaluate::{Evaluation, FAILED_COST, Problem};
+use crate::random::Random;
+use crate::swarm::archive::Archive;
+use crate::swarm::metrics::dominates;
+use crate::swarm::motion::{Particles, Purpose, polynomial};
+use crate::swarm::settings::{Leaders, MopsoSettings, Mutation};
+use crate::swarm::{Counters, Front, Optimiser};
+use serde::{Deserialize, Serialize};
+
+/// Particles in rows, and their archive.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub(super) struct SmallSwarm {
+    settings: MopsoSettings,
+    random: Random,
+    particles: Particles,
+    objectives: usize,
+    best_position: Vec<f64>,
+    best_objectives: Vec<Vec<f64>>,
+    best_violation: Vec<f64>,
+    archive: Archive,
+    counters: Counters,
+}
+
+impl SmallSwarm {
+    /// # Errors
+    /// [`crate::Error::Input`] naming the setting that is out of its range.
+    pub fn new(problem: &Problem, settings: MopsoSettings) -> Result<Self> {
+        settings.validate()?;
+        let random = Random::new(settings.motion.seed);
+        let particles = Particles::scattered(problem, settings.motion.population, random)?;
+        Ok(Self {
+            best_position: particles.position.clone(),
+            best_objectives: vec![vec![f64::INFINITY; problem.objectives.len()]; settings.motion.population],
+            best_violation: vec![f64::INFINITY; settings.motion.population],
+            objectives: problem.objectives.len(),
+            archive: settings.empty_archive(problem.objectives.len())?,
+            random,
+            particles,
+            settings,
+            counters: Counters::default(),
+        })
+    }
+
+    pub fn start_from(&mut self, candidates: &[Vec<f64>]) {
+        for (particle, candidate) in candidates.iter().enumerate().take(self.particles.count) {
+            let row = self.particles.row(particle);
+            let position = self.particles.space.position(candidate);
+            self.particles.position[row.clone()].copy_from_slice(&position);
+            self.best_position[row].copy_from_slice(&position);
+        }
+    }
+
+    pub fn archive(&self) -> &Archive {
+        &self.archive
+    }
+
+    /// They join the archive.
+    pub fn welcome(&mut self, migrants: &Front, violation: f64) {
+        for (candidate, row) in migrants.candidates.iter().zip(&migrants.objectives) {
+            let position = self.particles.space.position(candidate);
+            self.archive.insert_violating(&position, row, violation);
+        }
+    }
+
+    pub fn bytes_per_particle(&self) -> usize {
+        let row = size_of::<Vec<f64>>() + self.objectives * size_of::<f64>();
+        3 * self.particles.dimensions() * size_of::<f64>() + row
+    }
+
+    fn leader(&self, worth: &[f64], particle: usize) -> usize {
+        let draw = |index| {
+            let (when, who) = (self.counters.iteration as u32, particle as u32);
+            self.random
+                .below(self.archive.len(), Purpose::Leader as u32, when, who, index)
+        };
+        let first = draw(0);
+        match self.settings.leaders {
+            Leaders::Random => first,
+            Leaders::Tournament => {
+                let second = draw(1);
+                if worth[second] > worth[first] {
+                    second
+                } else {
+                    first
+                }
+            }
+        }
+    }
+
+    fn mutate(&mut self, particle: usize, share: f64) {
+        let (when, who) = (self.counters.iteration as u32, particle as u32);
+        let uniform = |index| self.random.uniform(Purpose::Mutation as u32, when, who, index);
+        let d = self.particles.dimensions();
+        let mu = match self.settings.mutation {
+            Mutation::None => return,
+            Mutation::Fixed(mu) => mu,
+            Mutation::Random => uniform(0).max(1e-3),
+            Mutation::Polynomial { share, index } => {
+                if uniform(0) < share {
+                    for (k, i) in self.particles.row(particle).enumerate() {
+                        if uniform(1 + 2 * k as u32) * (d as f64) < 1.0 {
+                            let x = self.particles.position[i];
+                            self.particles.position[i] = polynomial(x, uniform(2 + 2 * k as u32), index);
+                        }
+                    }
+                }
+                return;
+            }
+        };
+        // A range that shrinks over the run (equation 5.13 of the thesis).
+        let probability = (1.0 - share.min(1.0)).powf(1.0 / mu);
+        if d == 0 || uniform(1) >= probability {
+            return;
+        }
+        let k = self.random.below(d, Purpose::Mutation as u32, when, who, 2);
+        let i = particle * d + k;
+        let x = self.particles.position[i];
+        let (low, high) = ((x - probability).max(0.0), (x + probability).min(1.0));
+        self.particles.position[i] = low + uniform(3) * (high - low);
+    }
+
+    /// From an archive member along the difference of two others, in some of the coordinates \[7\].
+    fn difference_move(&mut self, particle: usize, leader: usize) {
+        let (when, who) = (self.counters.iteration as u32, particle as u32);
+        let purpose = Purpose::Difference as u32;
+        let pick = |index: u32, count: usize| self.random.below(count, purpose, when, who, index);
+        let members = self.archive.len();
+        let [from, first, second] =
+            [leader, pick(0, members), pick(1, members)].map(|m| &self.archive.positions[m]);
+        let row = self.particles.row(particle);
+        let always = pick(2, row.len().max(1));
+        for (k, i) in row.enumerate() {
+            let chosen = self.random.uniform(purpose, when, who, 4 + k as u32) < CROSSOVER;
+            let step = if chosen || k == always {
+                SCALE * (first[k] - second[k])
+            } else {
+                0.0
+            };
+            self.particles.position[i] = (from[k] + step).clamp(0.0, 1.0);
+            self.particles.velocity[i] = 0.0;
+        }
+    }
+
+    fn advance(&mut self) {
+        let share = self.counters.iteration as f64 / (self.settings.motion.iterations.max(2) - 1) as f64;
+        let worth = self.archive.worth();
+        for particle in 0..self.settings.motion.population {
+            if self.archive.is_empty() {
+                // Nobody knows anything yet.
+                self.particles
+                    .rescatter(particle, self.counters.iteration, self.random);
+            } else {
+                let leader = self.leader(&worth, particle);
+                if self.coin(Purpose::Recombine, particle) < self.settings.motion.difference_share {
+                    self.difference_move(particle, leader);
+                } else {
+                    let own = &self.best_position[self.particles.row(particle)];
+                    self.particles.pull(
+                        particle,
+                        (own, &self.archive.positions[leader]),
+                        &self.settings.motion,
+                        (share, self.counters.iteration),
+                        self.random,
+                    );
+                }
+            }
+            self.mutate(particle, share);
+        }
+    }
+
+    fn coin(&self, purpose: Purpose, particle: usize) -> f64 {
+        let (when, who) = (self.counters.iteration as u32, particle as u32);
+        self.random.uniform(purpose as u32, when, who, 0)
+    }
+}
+
+/// Share of the difference that a difference move takes.
+const SCALE: f64 = 0.5;
+/// Share of the coordinates that a difference move changes. A third solves ZDT4 where all of them sometimes do
+/// not, and spreads DTLZ2's front better.
+const CROSSOVER: f64 = 0.3;
+
+impl Optimiser for SmallSwarm {
+    fn ask(&mut self) -> Vec<f64> {
+        self.particles.candidates()
+    }
+
+    fn tell(&mut self, evaluation: &Evaluation) {
+        let rows = evaluation
+            .objectives
+            .chunks_exact(self.objectives)
+            .zip(&evaluation.failures);
+        for (particle, (row, failure)) in rows.enumerate() {
+            let range = self.particles.row(particle);
+            let position = &self.particles.position[range.clone()];
+            let sound = failure.is_none() && row.iter().all(|x| x.is_finite() && *x < FAILED_COST);
+            if !sound {
+                continue;
+            }
+            let violation = evaluation.violation(particle);
+            self.archive.insert_violating(position, row, violation);
+            let heads = self.coin(Purpose::Coin, particle) < 0.5;
+            let best = &mut self.best_objectives[particle];
+            let least = self.best_violation[particle];
+            let open = violation == least && !dominates(best, row) && heads;
+            if violation < least || (violation == least && dominates(row, best)) || open {
+                self.best_violation[particle] = violation;
+                best.copy_from_slice(row);
+                self.best_position[range].copy_from_slice(position);
+            }
+        }
+        self.counters.told(self.settings.motion.population);
+        self.advance();
+    }
+
+    fn counters(&self) -> Counters {
+        self.counters
+    }
+
+    fn planned_iterations(&self) -> usize {
+        self.settings.motion.iterations
+    }
+
+    fn front(&self) -> Front {
+        self.archive.front(&self.particles.space)
+    }
+
+    fn best(&self) -> Vec<f64> {
+        self.archive.best(self.objectives)
+    }
+}

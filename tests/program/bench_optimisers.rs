@@ -1,0 +1,61 @@
+//! `lapswarm bench optimisers` as its users run it.
+
+use std::process::{Command, Output};
+
+fn bench(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_lapswarm"))
+        .args(["bench", "optimisers"])
+        .args(arguments)
+        .output()
+        .unwrap()
+}
+
+#[test]
+fn rows_as_json() {
+    let output = bench(&[
+        "--seeds",
+        "2",
+        "--problems",
+        "zdt6,ackley",
+        "--algorithms",
+        "default,nsga2",
+        "--json",
+    ]);
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    let table: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let rows = table["rows"].as_array().unwrap();
+    let names: Vec<(&str, &str)> = rows
+        .iter()
+        .map(|r| (r["problem"].as_str().unwrap(), r["algorithm"].as_str().unwrap()))
+        .collect();
+    assert_eq!(
+        names,
+        [("zdt6", "default"), ("zdt6", "nsga2"), ("ackley", "default")]
+    );
+    let figure = |row: usize, key: &str| rows[row][key].as_f64().unwrap();
+    // The volume under the whole front is 0.6164; NSGA-II is a little slow on this one.
+    assert!((0.610..0.6164).contains(&figure(0, "hypervolume_median")));
+    assert!((0.58..0.61).contains(&figure(1, "hypervolume_median")));
+    assert!(figure(0, "igd_plus_median") < figure(1, "igd_plus_median"));
+    // Rounding: four times 2^-46 of the bounds of 32.
+    assert!(figure(2, "error_median") < 2e-12 && rows[2]["hypervolume_median"].is_null());
+    assert!(rows.iter().all(|r| r["seeds"] == 2));
+}
+
+#[test]
+fn unknown_names_are_refused() {
+    for flags in [["--problems", "zdt5"], ["--algorithms", "best"]] {
+        let output = bench(&flags);
+        assert_eq!(output.status.code(), Some(2));
+        let message = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(
+            message.contains(flags[0]) && message.contains(flags[1]),
+            "{message}"
+        );
+    }
+    assert_eq!(bench(&["--seeds", "0"]).status.code(), Some(2));
+}

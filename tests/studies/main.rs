@@ -1,0 +1,32 @@
+//! Studies through the library: what they find, what they write, and that they go on where they were.
+
+mod hybrid;
+mod identify;
+mod registry;
+mod resume;
+mod sensitivity;
+mod states;
+mod surface;
+mod sweep;
+mod transient;
+
+use lapswarm::study::framework::state_file::StateFile;
+use lapswarm::study::framework::{Progress, Study, Work};
+use std::ops::ControlFlow;
+use std::sync::Arc;
+
+/// Solves a study that is watched, from a state if one is given.
+fn solve<S: Study>(
+    settings: &S::Settings,
+    prepared: &S::Prepared,
+    (state, state_file): (Option<S::State>, &mut StateFile),
+    mut observe: impl FnMut(&Progress) -> ControlFlow<()>,
+) -> lapswarm::Result<Option<S::Outcome>> {
+    let work = Work {
+        state,
+        state_file,
+        observe: &mut observe,
+        stop: Arc::default(),
+    };
+    S::solve(settings, prepared, work)
+}

@@ -1,0 +1,107 @@
+//! The sensitivity study end to end on the bundled lap.
+
+use crate::solve;
+use lapswarm::config::settings::Settings;
+use lapswarm::study::framework::state_file::StateFile;
+use lapswarm::study::framework::{Study, solve_unwatched, write_results};
+use lapswarm::study::identify::IdentifySettings;
+use lapswarm::study::sensitivity::{LEVELS, Sensitivity, SensitivitySettings};
+use std::ops::ControlFlow;
+
+fn settings() -> SensitivitySettings {
+    let base = SensitivitySettings::default();
+    let free = base
+        .replay
+        .free
+        .iter()
+        .filter(|f| ["rBy1", "rEy2", "K"].contains(&f.name.as_str()));
+    SensitivitySettings {
+        replay: IdentifySettings {
+            free: free.cloned().collect(),
+            ..base.replay.clone()
+        },
+        samples: 32,
+        resamples: 50,
+        share: 0.02,
+    }
+}
+
+#[test]
+fn the_lap_feels_grip_more_than_roll_and_files_say_so() {
+    let settings = settings();
+    let setup = Sensitivity::prepare(&settings).expect("the bundled lap");
+    let outcome = solve_unwatched::<Sensitivity>(&settings, &setup).expect("it runs");
+    assert_eq!(outcome.record.evaluations, 1 + 3 * LEVELS.len() as u64 + 32 * 5);
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let written = write_results::<Sensitivity>(folder.path(), &settings, &setup, &outcome);
+    let summary = written.expect("files are written");
+    let ranked: Vec<&str> = summary.parameters.iter().map(|p| p.name.as_str()).collect();
+    assert_eq!(ranked[0], "rBy1", "{ranked:?}");
+    let total = |name: &str| {
+        let p = summary
+            .parameters
+            .iter()
+            .find(|p| p.name == name)
+            .expect("a parameter");
+        p.sobol["ay"].total
+    };
+    // One parameter that matters far more than the others has nearly all of the variance.
+    assert!(
+        total("rBy1") > 0.9 && total("rEy2") < 0.1,
+        "{} {}",
+        total("rBy1"),
+        total("rEy2")
+    );
+    for name in [
+        "summary.json",
+        "manifest.json",
+        "study.toml",
+        "sobol.csv",
+        "one_at_a_time.csv",
+        "sobol.svg",
+        "bands.svg",
+    ] {
+        assert!(folder.path().join(name).is_file(), "{name}");
+    }
+    // The settings that were written are the ones that were used.
+    let read = SensitivitySettings::read(&folder.path().join("study.toml")).expect("it reads back");
+    assert_eq!(read.replay.free.len(), 3);
+    assert_eq!((read.share, read.samples), (0.02, 32));
+}
+
+#[test]
+fn a_study_that_is_broken_off_says_so() {
+    let settings = settings();
+    let setup = Sensitivity::prepare(&settings).expect("the bundled lap");
+    let outcome = solve::<Sensitivity>(&settings, &setup, (None, &mut StateFile::idle()), |_| {
+        ControlFlow::Break(())
+    })
+    .expect("it runs")
+    .expect("what was found until then");
+    assert!(outcome.record.interrupted && outcome.indices.is_empty());
+    assert_eq!(outcome.one_at_a_time.len(), 3 * LEVELS.len());
+}
+
+#[test]
+fn settings_out_of_range_are_named() {
+    let base = settings();
+    for (bad, place) in [
+        (
+            SensitivitySettings {
+                share: 0.0,
+                ..base.clone()
+            },
+            "share",
+        ),
+        (
+            SensitivitySettings {
+                samples: 1,
+                ..base.clone()
+            },
+            "samples",
+        ),
+    ] {
+        let error = bad.validate().expect_err("out of range").to_string();
+        assert!(error.contains(place), "{error}");
+    }
+}

@@ -1,0 +1,252 @@
+//! Sweeps: a grid of small studies, broken off and gone on with.
+
+use lapswarm::study::sweep::{SweepSettings, sweep};
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+
+const SWEEP: &str = "study = \"identify\"
+[base]
+polish = false
+[base.free]
+K = [3e4, 3e5]
+[base.swarm]
+algorithm = \"thesis\"
+iterations = 2
+[grid]
+\"swarm.population\" = [4, 6]
+norm = [\"1\", \"2\"]
+seed = [1, 2]
+";
+
+fn files(folder: &Path) -> Vec<(String, Vec<u8>)> {
+    [
+        "sweep.csv",
+        "medians.csv",
+        "sweep.parquet",
+        "medians.parquet",
+        "rows.jsonl",
+        "summary.json",
+        "sweep.toml",
+    ]
+    .map(|name| (name.to_owned(), std::fs::read(folder.join(name)).expect(name)))
+    .to_vec()
+}
+
+/// The states of the studies of a sweep.
+fn states(folder: &Path) -> Vec<PathBuf> {
+    let files = std::fs::read_dir(folder.join("studies")).expect("its studies");
+    files
+        .map(|file| file.expect("a file").path())
+        .filter(|path| path.extension().is_some_and(|e| e == "checkpoint"))
+        .collect()
+}
+
+const LINES: &str = "study = \"raceline\"
+[base]
+track = \"stadium:300:80:12\"
+sections = 60
+objectives = [\"gamma\"]
+algorithm = \"thesis\"
+warm_start = false
+local_search = false
+backend = \"simd\"
+population = 8
+iterations = 30
+[grid]
+seed = [1, 2]
+";
+
+/// A line's study within a sweep goes on from where it was; from another's state, or from none that can be read, it does not.
+#[test]
+fn the_study_at_work_goes_on_and_foreign_states_are_not_trusted() {
+    let root = tempfile::tempdir().expect("a temporary folder");
+    let settings = SweepSettings::parse(Path::new("sweep.toml"), LINES).expect("a sweep");
+    let whole = root.path().join("whole");
+    sweep(&settings, &whole, false, |_| ControlFlow::Continue(())).expect("it runs");
+    let broken_off = |name: &str| {
+        let part = root.path().join(name);
+        let mut told = 0;
+        let broken = sweep(&settings, &part, false, |p| {
+            told += usize::from(p.done == 1);
+            if told > 20 {
+                ControlFlow::Break(())
+            } else {
+                ControlFlow::Continue(())
+            }
+        });
+        assert_eq!(broken.expect_err("broken off").exit_code(), 130);
+        let kept = states(&part);
+        assert_eq!(kept.len(), 1);
+        (part, kept[0].clone())
+    };
+    let (part, kept) = broken_off("part");
+    let mut told = 0;
+    sweep(&settings, &part, true, |p| {
+        told += usize::from(p.done == 1);
+        ControlFlow::Continue(())
+    })
+    .expect("it goes on");
+    assert_eq!(files(&part), files(&whole));
+    // Thirty iterations are thirty words, of which most were said before.
+    assert!(told < 20, "told {told} times");
+    assert!(!kept.exists());
+
+    let (part, kept) = broken_off("garbled");
+    std::fs::write(&kept, b"no state at all").expect("room");
+    sweep(&settings, &part, true, |_| ControlFlow::Continue(())).expect("it begins anew");
+    assert_eq!(files(&part), files(&whole));
+
+    // The state of the same study with another seed.
+    let (part, kept) = broken_off("foreign");
+    let other = SweepSettings::parse(Path::new("sweep.toml"), &LINES.replace("[1, 2]", "[7, 8]"));
+    let mut told = 0;
+    let elsewhere = root.path().join("elsewhere");
+    let _ = sweep(&other.expect("a sweep"), &elsewhere, false, |p| {
+        told += usize::from(p.done == 1);
+        if told > 20 {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        }
+    });
+    std::fs::copy(&states(&elsewhere)[0], &kept).expect("room");
+    sweep(&settings, &part, true, |_| ControlFlow::Continue(())).expect("it begins anew");
+    assert_eq!(files(&part), files(&whole));
+}
+
+#[test]
+#[ignore = "full tier: eleven sweeps"]
+fn a_sweep_broken_off_and_gone_on_with_is_the_same_to_the_byte() {
+    let root = tempfile::tempdir().expect("a temporary folder");
+    let settings = SweepSettings::parse(Path::new("sweep.toml"), SWEEP).expect("a sweep");
+    let whole = root.path().join("whole");
+    let summary = sweep(&settings, &whole, false, |_| ControlFlow::Continue(())).expect("it runs");
+    assert_eq!((summary.rows.len(), summary.groups.len()), (8, 4));
+    assert!(
+        summary
+            .rows
+            .iter()
+            .all(|r| r.figures["best_cost"].is_some_and(f64::is_finite))
+    );
+    // Broken off at the n-th word from it about a run, be it before the run or within it. Runs of one problem go together, here
+    // the four of each norm.
+    for (run, stop) in [(0usize, 1usize), (0, 2), (4, 1), (4, 2), (4, 3)] {
+        let part = root.path().join(format!("part{run}_{stop}"));
+        let mut told = 0;
+        let broken = sweep(&settings, &part, false, |p| {
+            told += usize::from(p.done == run);
+            if told >= stop {
+                ControlFlow::Break(())
+            } else {
+                ControlFlow::Continue(())
+            }
+        });
+        assert_eq!(
+            broken.expect_err("broken off").exit_code(),
+            130,
+            "after {run} and {stop}"
+        );
+        // Those at work have left their states, which the rows make needless.
+        assert_eq!(states(&part).is_empty(), stop == 1, "after {run} and {stop}");
+        sweep(&settings, &part, true, |_| ControlFlow::Continue(())).expect("it goes on");
+        assert_eq!(files(&part), files(&whole), "after {run} and {stop}");
+        assert!(states(&part).is_empty());
+    }
+    let other =
+        SweepSettings::parse(Path::new("sweep.toml"), &SWEEP.replace("[4, 6]", "[4]")).expect("a sweep");
+    let refused = sweep(&other, &whole, true, |_| ControlFlow::Continue(()));
+    assert_eq!(refused.expect_err("another sweep").exit_code(), 2);
+}
+
+#[test]
+fn a_mistake_in_the_last_point_shows_before_the_first_is_run() {
+    let root = tempfile::tempdir().expect("a temporary folder");
+    let text = SWEEP.replace("[4, 6]", "[4, -6]");
+    let settings = SweepSettings::parse(Path::new("sweep.toml"), &text).expect("a sweep");
+    let mut told = 0;
+    let folder = root.path().join("s");
+    let refused = sweep(&settings, &folder, false, |_| {
+        told += 1;
+        ControlFlow::Continue(())
+    });
+    let refused = refused.expect_err("a negative population");
+    assert_eq!(refused.exit_code(), 2);
+    assert_eq!(told, 0);
+    // Of the file that the user wrote, and the point in it.
+    let said = refused.to_string();
+    assert!(
+        said.starts_with("sweep.toml: run 3 (norm 1, seed 1, swarm.population -6), field"),
+        "{said}"
+    );
+    assert!(!folder.exists(), "nothing was begun");
+}
+
+#[test]
+fn a_sweep_that_fails_leaves_nothing_that_stops_the_next() {
+    let root = tempfile::tempdir().expect("a temporary folder");
+    let folder = root.path().join("s");
+    // A log that is not there shows when the first point is set up.
+    let text = SWEEP.replace("polish = false", "polish = false\nlog = \"nowhere.csv\"");
+    let settings = SweepSettings::parse(Path::new("sweep.toml"), &text).expect("a sweep");
+    let failed = sweep(&settings, &folder, false, |_| ControlFlow::Continue(()));
+    assert_eq!(failed.expect_err("no log").exit_code(), 2);
+    let left: Vec<_> = folder.read_dir().expect("a folder").flatten().collect();
+    assert!(left.is_empty(), "{left:?}");
+    let settings = SweepSettings::parse(Path::new("sweep.toml"), SWEEP).expect("a sweep");
+    sweep(&settings, &folder, false, |_| ControlFlow::Continue(())).expect("the mended one runs");
+}
+
+#[test]
+fn sweeps_beyond_all_measure_are_refused() {
+    let runs = "[1,2,3,4,5,6,7,8,9,10]";
+    let many: String = ["a", "b", "c", "d", "e", "f"]
+        .iter()
+        .map(|k| format!("{k} = {runs}\n"))
+        .collect();
+    let deep = format!("\"{}\" = [1]\n", ["a"; 100_000].join("."));
+    // Each a small file; the studies of the second would fill 400 MB.
+    let long = format!("# {}\n", "long ".repeat(8000));
+    let four: String = ["a", "b", "c", "d"]
+        .iter()
+        .map(|k| format!("{k} = {runs}\n"))
+        .collect();
+    for (grid, word) in [
+        (many, "1000000 runs"),
+        (four + &long, "10000 runs of"),
+        (deep, "a.a.a"),
+    ] {
+        let text = format!("study = \"identify\"\n[grid]\n{grid}");
+        let refused = SweepSettings::parse(Path::new("s.toml"), &text).expect_err(word);
+        assert!(refused.to_string().contains(word), "{refused}");
+        assert!(refused.to_string().len() < 500);
+    }
+}
+
+#[test]
+fn figures_of_all_objectives_have_their_columns() {
+    let root = tempfile::tempdir().expect("a temporary folder");
+    let text = "study = \"raceline\"
+[base]
+track = \"stadium:200:60:12\"
+sections = 40
+warm_start = false
+local_search = false
+algorithm = \"thesis\"
+population = 8
+iterations = 2
+[grid]
+objectives = [[\"length\"], [\"gamma\"]]
+seed = [1, 2]
+";
+    let settings = SweepSettings::parse(Path::new("sweep.toml"), text).expect("a sweep");
+    let folder = root.path().join("lines");
+    sweep(&settings, &folder, false, |_| ControlFlow::Continue(())).expect("it runs");
+    for (file, ending) in [("sweep.csv", ""), ("medians.csv", "_median")] {
+        let table = std::fs::read_to_string(folder.join(file)).expect(file);
+        let head = table.lines().next().expect("a head");
+        for name in ["best_length_m", "best_gamma_1pm"] {
+            let name = format!("{name}{ending}");
+            assert!(head.split(',').any(|column| column == name), "{file}: {head}");
+        }
+    }
+}

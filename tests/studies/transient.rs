@@ -1,0 +1,283 @@
+//! A line driven by the 4DOF car, and the whole way from a log to a lap.
+
+use crate::solve;
+use lapswarm::evaluate::BackendChoice;
+use lapswarm::evaluate::line::LineObjective;
+use lapswarm::line::read_line;
+use lapswarm::study::framework::state_file::StateFile;
+use lapswarm::study::framework::{Study, solve_unwatched, write_results};
+use lapswarm::study::identify::{Algorithm, IdentifySettings};
+use lapswarm::study::raceline::{RacelineSettings, set_up};
+use lapswarm::study::run::{Run, RunSettings};
+use lapswarm::study::transient::{
+    AGREEMENT, DrivenLine, NamedLine, Outcome, PopulationOutcome, Prepared, Summary, Transient,
+    TransientSettings,
+};
+use lapswarm::vehicle::Car;
+use std::ops::ControlFlow;
+use std::path::PathBuf;
+
+fn stadium() -> lapswarm::study::raceline::Setup {
+    set_up(&RacelineSettings {
+        track: "stadium:400:120:14".to_owned(),
+        sections: 200,
+        ..RacelineSettings::default()
+    })
+    .expect("a stadium")
+}
+
+/// The bundled car, and lines at these distances from the reference line, as shares of the road's width.
+fn on_lines(lines: &[(&str, f64)]) -> Prepared {
+    let road = stadium();
+    let line = |(name, beside): &(&str, f64)| {
+        let alpha: Vec<f64> = road.cuts.reference.iter().map(|a| a - beside).collect();
+        let points = road.cuts.points(&alpha);
+        NamedLine::new((*name).to_owned(), points, &road.edges_m, 2.0).expect("a line")
+    };
+    Prepared {
+        car: Car::bundled().expect("the bundled car"),
+        lines: lines.iter().map(line).collect(),
+        road,
+    }
+}
+
+fn line_of(outcome: &Outcome) -> &DrivenLine {
+    match outcome {
+        Outcome::Line(line) => line,
+        Outcome::Population(_) => panic!("one line was to be driven"),
+    }
+}
+
+fn population_of(outcome: &Outcome) -> &PopulationOutcome {
+    match outcome {
+        Outcome::Population(population) => population,
+        Outcome::Line(_) => panic!("a population was to be driven"),
+    }
+}
+
+#[test]
+fn the_car_drives_a_line_as_fast_as_the_point_mass() {
+    let prepared = on_lines(&[("middle", 0.0)]);
+    let settings = TransientSettings::default();
+    let found = solve_unwatched::<Transient>(&settings, &prepared).expect("it drives");
+    let outcome = line_of(&found);
+    assert!(
+        outcome.disagreement().abs() <= AGREEMENT,
+        "{}",
+        outcome.disagreement()
+    );
+    assert!(outcome.margin_m > 0.0, "{}", outcome.margin_m);
+    assert!(outcome.grip_share > 0.7, "{}", outcome.grip_share);
+    // The time is that of the samples: speeds integrated over the lap give its length.
+    let driven: f64 = outcome.drive.states.iter().map(|s| s[0].hypot(s[1]) * 0.01).sum();
+    let length = outcome.line.length_m;
+    assert!((driven / length - 1.0).abs() < 0.005, "{driven} and {length}");
+
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let summary = write_results::<Transient>(folder.path(), &settings, &prepared, &found);
+    let Summary::Line(summary) = summary.expect("files are written") else {
+        panic!("the figures of one line")
+    };
+    let words = summary.to_text();
+    assert!(
+        summary.agrees && words.contains("Chosen: the greatest share of the grip"),
+        "{words}"
+    );
+    for name in [
+        "drive.csv",
+        "speeds.svg",
+        "map.svg",
+        "envelope_driven.csv",
+        "summary.json",
+    ] {
+        assert!(folder.path().join(name).is_file(), "{name}");
+    }
+}
+
+/// Set-ups on two lines: the fastest within the edges comes first, the car as it is on a line laps as that line driven alone
+/// with the same share of the grip, and a search can be broken off.
+#[test]
+fn set_ups_and_lines_are_driven_all_at_once() {
+    let prepared = on_lines(&[("middle", 0.0), ("beside it", 0.1)]);
+    let settings = TransientSettings {
+        line: ["middle.csv", "beside it.csv"].map(PathBuf::from).to_vec(),
+        setups: Some(5),
+        grip_shares: Some(vec![0.7, 0.8, 0.9]),
+        backend: BackendChoice::Simd,
+        ..TransientSettings::default()
+    };
+    let found = solve_unwatched::<Transient>(&settings, &prepared).expect("they are driven");
+    let outcome = population_of(&found);
+    assert_eq!(outcome.record.evaluations, 6 * 2 * 3);
+    assert_eq!(outcome.driven.len(), 6 * 2);
+    let times: Vec<f64> = outcome
+        .driven
+        .iter()
+        .map(|d| d.best.map_or(f64::INFINITY, |b| b.lap_time_s))
+        .collect();
+    assert!(times.is_sorted() && times[0].is_finite(), "{times:?}");
+    assert!(
+        outcome
+            .driven
+            .iter()
+            .flat_map(|d| d.best)
+            .all(|b| b.room_m >= 0.0)
+    );
+
+    let own = outcome
+        .driven
+        .iter()
+        .find(|d| d.setup == 0 && d.line == 0)
+        .and_then(|d| d.best)
+        .expect("the bundled car drives");
+    let alone = TransientSettings {
+        grip_shares: Some(vec![own.grip_share]),
+        ..TransientSettings::default()
+    };
+    let alone = solve_unwatched::<Transient>(&alone, &on_lines(&[("middle", 0.0)])).expect("it drives");
+    let alone = line_of(&alone);
+    // Single precision, and a recording every 10 ms: see the parity of drives.
+    assert!(
+        (own.lap_time_s / alone.lap_time_s - 1.0).abs() < 5e-5,
+        "{own:?} and {}",
+        alone.lap_time_s
+    );
+    assert!(
+        (own.room_m - alone.margin_m).abs() < 0.01,
+        "{own:?} and {}",
+        alone.margin_m
+    );
+
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let summary = write_results::<Transient>(folder.path(), &settings, &prepared, &found);
+    let Summary::Population(summary) = summary.expect("files are written") else {
+        panic!("the figures of a population")
+    };
+    let words = summary.to_text();
+    assert!(
+        words.contains("Chosen of each set-up on each line: the fastest lap within the edges"),
+        "{words}"
+    );
+    let fastest = Car::load(&folder.path().join("car.toml").display().to_string()).expect("a car");
+    let value = |name: &str, car: &Car| car.to_flat()[car.parameter(name).expect(name).slots[0]];
+    for (parameter, expected) in outcome.parameters.iter().zip(&outcome.driven[0].values) {
+        assert!(
+            (value(&parameter.name, &fastest) - expected).abs() < 1e-12,
+            "{}",
+            parameter.name
+        );
+    }
+    let table = std::fs::read_to_string(folder.path().join("setups.csv")).expect("a table");
+    assert_eq!(table.lines().count(), 1 + outcome.driven.len(), "{table}");
+    assert!(summary.table().contains("beside it"));
+
+    let many = TransientSettings {
+        setups: Some(700),
+        grip_shares: Some(vec![0.3]),
+        ..settings
+    };
+    let after = |laps: u64| {
+        let mut state_file = StateFile::idle();
+        solve::<Transient>(&many, &prepared, (None, &mut state_file), |told| {
+            if told.done >= laps {
+                ControlFlow::Break(())
+            } else {
+                ControlFlow::Continue(())
+            }
+        })
+        .expect("it is broken off")
+    };
+    // While the lines are planned there is nothing yet to tell of.
+    assert!(after(0).is_none());
+    let broken = after(1).expect("some laps");
+    let record = Transient::record(&broken);
+    assert!(
+        record.interrupted && record.evaluations < 2 * 701,
+        "{}",
+        record.evaluations
+    );
+}
+
+#[test]
+fn a_road_too_narrow_for_the_car_and_a_table_of_something_else_are_refused() {
+    let setup = stadium();
+    let points = setup.cuts.points(&setup.cuts.reference);
+    let error = NamedLine::new("middle".to_owned(), points, &setup.edges_m, 16.0).expect_err("no room");
+    assert_eq!(error.exit_code(), 2, "{error}");
+
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = folder.path().join("line.csv");
+    for (text, place) in [
+        ("a,b\n1,2\n", "line 1"),
+        ("x_m,y_m\n1,2\n3,oops\n", "line 3"),
+        ("x_m,y_m\n1,2\n", "rows"),
+    ] {
+        std::fs::write(&path, text).expect("a file");
+        let error = read_line(&path).expect_err("no line").to_string();
+        assert!(error.contains(place), "{error}");
+    }
+}
+
+#[test]
+fn a_run_goes_from_the_log_to_a_driven_lap_and_remembers_its_stages() {
+    let root = tempfile::tempdir().expect("a temporary folder");
+    let base = RunSettings::default();
+    let free = base
+        .identify
+        .free
+        .iter()
+        .filter(|f| f.name == "K")
+        .cloned()
+        .collect();
+    let settings = RunSettings {
+        identify: IdentifySettings {
+            free,
+            // Without a hybrid drive, whose study would take longer than all the others here.
+            car: "gt".to_owned(),
+            algorithm: Algorithm::Pso,
+            population: Some(8),
+            iterations: Some(3),
+            ..base.identify.clone()
+        },
+        raceline: RacelineSettings {
+            // Coarser cuts leave kinks in the spline that no steering follows.
+            objectives: vec![LineObjective::LapTime],
+            ..base.raceline.clone()
+        },
+        rounds: 1,
+        cache: Some(root.path().join("cache")),
+        ..base
+    };
+    let go = |name: &str| {
+        let folder = root.path().join(name);
+        std::fs::create_dir(&folder).expect("a folder");
+        let prepared = Run::prepare(&settings).expect("it is sound");
+        let mut state_file = StateFile::new(&folder);
+        let outcome = solve::<Run>(&settings, &prepared, (None, &mut state_file), |_| {
+            ControlFlow::Continue(())
+        });
+        let outcome = outcome.expect("it runs").expect("to its end");
+        write_results::<Run>(&folder, &settings, &prepared, &outcome).expect("files are written")
+    };
+    let first = go("first");
+    assert!(first.reused.is_empty(), "{:?}", first.reused);
+    assert!(first.agrees, "{:?}", first.rounds);
+    assert!(first.rounds[0].margin_m > 0.0, "the car stays on the road");
+    assert!(
+        first.total_parameter_error.is_some_and(|e| e < 1e-3),
+        "{:?}",
+        first.total_parameter_error
+    );
+    let again = go("again");
+    assert_eq!(again.reused, ["identify", "envelope", "raceline", "transient"]);
+    assert_eq!(format!("{:?}", again.rounds), format!("{:?}", first.rounds));
+    for name in [
+        "story.txt",
+        "summary.json",
+        "1_identify/car.toml",
+        "3_raceline/line_fastest.csv",
+        "4_transient/drive.csv",
+    ] {
+        assert!(root.path().join("again").join(name).is_file(), "{name}");
+    }
+}

@@ -1,0 +1,223 @@
+//! Swarms of thousands: how good, that nothing is lost, and that threads change nothing.
+
+use lapswarm::evaluate::point::{CallCost, PointEvaluator};
+use lapswarm::evaluate::simd::InstructionSet;
+use lapswarm::evaluate::{Evaluation, Evaluator, FAILED_COST, Objective, Problem, Variable};
+use lapswarm::random::Random;
+use lapswarm::swarm::metrics::{Scale, hypervolume, non_dominated};
+use lapswarm::swarm::problems::{SimdTestEvaluator, TestProblem};
+use lapswarm::swarm::{
+    BoundHandling, Constriction, Leaders, MANY, Mopso, MopsoSettings, Mutation, Optimiser, PsoSettings,
+    Randomness, Truncation, run,
+};
+use std::ops::ControlFlow;
+
+fn settings(population: usize, iterations: usize) -> MopsoSettings {
+    let default = MopsoSettings::default();
+    MopsoSettings {
+        motion: PsoSettings {
+            population,
+            iterations,
+            ..default.motion
+        },
+        ..default
+    }
+}
+
+/// Hypervolume, reference 1.1 on the true front's scale, of what a swarm finds in 25 generations.
+fn quality(name: &str, population: usize) -> f64 {
+    let test = TestProblem::by_name(name).unwrap();
+    let mut swarm = Mopso::new(test.problem(), settings(population, 25)).unwrap();
+    let mut evaluator = SimdTestEvaluator::new(&test, InstructionSet::best());
+    run(&mut swarm, &mut evaluator, |_| ControlFlow::Continue(())).unwrap();
+    let front = test.front(2000);
+    let found = Scale::of(&front).apply(&swarm.front().objectives);
+    assert!(found.len() <= 100 && non_dominated(&found).len() == found.len());
+    hypervolume(&found, &vec![1.1; front[0].len()]).unwrap()
+}
+
+/// The archive does not get worse as the swarm grows.
+#[test]
+fn large_swarms_find_good_fronts_in_25_generations() {
+    for population in [10_000, 100_000] {
+        for (name, bar) in [("zdt4", 0.871), ("dtlz2", 0.755)] {
+            let found = quality(name, population);
+            assert!(found >= bar, "{name}, {population} particles: {found}");
+        }
+    }
+}
+
+fn plain(variables: usize, objectives: usize) -> Problem {
+    Problem {
+        variables: (0..variables)
+            .map(|k| Variable::new(format!("x{k}"), "-", -1.0, 3.0))
+            .collect(),
+        objectives: (0..objectives)
+            .map(|k| Objective::new(format!("f{k}"), "-"))
+            .collect(),
+    }
+}
+
+/// What is told of random candidates, on a coarse grid so that there are ties and duplicates; some fail.
+fn made_up(count: usize, width: usize, when: u32) -> Evaluation {
+    let random = Random::new(77);
+    let mut evaluation = Evaluation::default();
+    for i in 0..count as u32 {
+        let draw = |k: u32| random.below(400, 1, when, i, k) as f64 / 8.0;
+        let mut row: Vec<f64> = (0..width as u32).map(draw).collect();
+        match random.below(50, 2, when, i, 0) {
+            0 => row[0] = f64::NAN,
+            1 => row[width - 1] = f64::INFINITY,
+            2 => row.fill(FAILED_COST),
+            3 => row[0] = f64::NEG_INFINITY,
+            _ => {}
+        }
+        evaluation.objectives.extend(row);
+        evaluation.failures.push(None);
+    }
+    evaluation
+}
+
+/// With room for all, the archive is exactly what nothing that was ever told dominates, one of each.
+#[test]
+fn nothing_is_lost_but_by_truncation() {
+    for width in [2, 3] {
+        let mut swarm = Mopso::new(
+            &plain(3, width),
+            MopsoSettings {
+                archive: 5000,
+                ..settings(MANY + 100, 10)
+            },
+        )
+        .unwrap();
+        let mut told: Vec<Vec<f64>> = Vec::new();
+        for when in 0..5 {
+            swarm.ask();
+            let evaluation = made_up(MANY + 100, width, when);
+            let rows = evaluation.objectives.chunks_exact(width);
+            told.extend(
+                rows.filter(|r| r.iter().all(|x| x.is_finite() && *x < FAILED_COST))
+                    .map(<[f64]>::to_vec),
+            );
+            swarm.tell(&evaluation);
+            let mut expected: Vec<_> = non_dominated(&told)
+                .into_iter()
+                .map(|i| told[i].clone())
+                .collect();
+            let mut found = swarm.front().objectives;
+            let key = |a: &Vec<f64>, b: &Vec<f64>| a.partial_cmp(b).unwrap();
+            expected.sort_by(key);
+            found.sort_by(key);
+            assert!(found == expected, "{width} objectives, generation {when}");
+        }
+    }
+}
+
+/// Every combination that the settings have, on one thread and on three: the same candidates and the same front.
+#[test]
+fn threads_change_nothing() {
+    let test = TestProblem::sized("dtlz2", 5).unwrap();
+    let variants = [
+        settings(MANY + 1, 10),
+        MopsoSettings {
+            mutation: Mutation::Random,
+            truncation: Truncation::Crowding,
+            ..MopsoSettings::thesis()
+        },
+        MopsoSettings {
+            motion: PsoSettings {
+                constriction: Constriction::Clerc,
+                randomness: Randomness::PerDimension,
+                bounds: BoundHandling::Bounce,
+                ..MopsoSettings::smpso().motion
+            },
+            leaders: Leaders::Random,
+            truncation: Truncation::MutualNearest,
+            mutation: Mutation::None,
+            archive: 30,
+            reference: None,
+        },
+    ];
+    for variant in variants {
+        let with = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new()
+                .num_threads(threads)
+                .build()
+                .unwrap();
+            pool.install(|| {
+                let motion = PsoSettings {
+                    population: 2 * MANY + 70,
+                    iterations: 10,
+                    ..variant.motion.clone()
+                };
+                let mut swarm = Mopso::new(
+                    test.problem(),
+                    MopsoSettings {
+                        motion,
+                        ..variant.clone()
+                    },
+                )
+                .unwrap();
+                let mut evaluator = test.threaded_evaluator();
+                while !swarm.done() {
+                    let population = swarm.ask();
+                    assert!(population.iter().all(|x| (0.0..=1.0).contains(x)));
+                    swarm.tell(&evaluator.evaluate(&population).unwrap());
+                }
+                (swarm.ask(), swarm.front())
+            })
+        };
+        let (one, three) = (with(1), with(3));
+        assert!(one == three, "{variant:?}");
+        assert!(one.1.objectives.len() > 20);
+    }
+}
+
+/// Bounds that do not lie about zero, moved: the same swarm. The function sees coordinates on a grid that the rounding
+/// of moved bounds does not reach.
+#[test]
+fn translation_changes_nothing_and_corners_are_reached() {
+    const GRID: f64 = 65536.0;
+    let bounds = [(0.0, 8.0), (-1.0, 3.0), (2.5, 2.5), (-0.5, 31.5)];
+    let from = |shift: f64| {
+        let problem = Problem {
+            variables: bounds
+                .iter()
+                .map(|(a, b)| Variable::new("x", "-", a + shift, b + shift))
+                .collect(),
+            ..plain(0, 2)
+        };
+        let function = move |x: &[f64], f: &mut [f64]| {
+            let back: Vec<f64> = x.iter().map(|x| ((x - shift) * GRID).round() / GRID).collect();
+            for (k, f) in f.iter_mut().enumerate() {
+                *f = back
+                    .iter()
+                    .enumerate()
+                    .map(|(i, x)| (x - if i == k { 0.0 } else { 0.25 }).powi(2))
+                    .sum();
+            }
+        };
+        let mut evaluator = PointEvaluator::new(problem.clone(), CallCost::Dear, function);
+        let mut swarm = Mopso::new(&problem, settings(MANY, 20)).unwrap();
+        run(&mut swarm, &mut evaluator, |_| ControlFlow::Continue(())).unwrap();
+        assert!(swarm.front().candidates.iter().all(|c| c[2] == 2.5 + shift));
+        swarm.front().objectives
+    };
+    let found = from(0.0);
+    assert_eq!(found, from(1024.0));
+    // The fixed variable is 2.25 away from where each objective would have it; the rest can be met.
+    let least = found.iter().map(|f| f[0]).fold(f64::INFINITY, f64::min);
+    assert!(least < 2.25f64.powi(2) + 0.01, "{least}");
+}
+
+#[test]
+fn nothing_that_can_be_evaluated_is_survived() {
+    let problem = plain(3, 2);
+    let mut swarm = Mopso::new(&problem, settings(MANY, 5)).unwrap();
+    let mut evaluator = PointEvaluator::new(problem, CallCost::Dear, |_: &[f64], f: &mut [f64]| {
+        f.fill(f64::NAN)
+    });
+    run(&mut swarm, &mut evaluator, |_| ControlFlow::Continue(())).unwrap();
+    assert!(swarm.front().objectives.is_empty());
+    assert_eq!(swarm.best(), [FAILED_COST; 2]);
+}
