@@ -1,14 +1,17 @@
 //! Every study of the registry, whichever it is: it is planned, starved, interrupted and resumed by the same means.
 
 use lapswarm::Error;
+use lapswarm::config::settings::Flag;
+use lapswarm::study::framework::memory::USUAL_MIB;
 use lapswarm::study::framework::{Answer, Finished, Request};
 use lapswarm::study::registry::{Registered, STUDIES};
 use std::ops::ControlFlow;
 use std::path::Path;
+use std::process::Command;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// Flags that make a study small, and how many MiB starve it. A new study has a row here.
+/// Flags that make a study small. A new study has a row here.
 fn small(study: &str, folder: &Path) -> Vec<(String, String)> {
     let ring = || {
         let points = (0..400).map(|i| {
@@ -84,7 +87,7 @@ fn ask(
     study: &dyn Registered,
     flags: &[(String, String)],
     out: &Path,
-    (resume, dry_run, limit_mib, interrupted): (bool, bool, u64, Option<usize>),
+    (resume, dry_run, interrupted): (bool, bool, Option<usize>),
 ) -> lapswarm::Result<Answer> {
     let mut told = 0;
     study.run(Request {
@@ -93,7 +96,7 @@ fn ask(
         out: Some(out),
         resume,
         save_every: Duration::ZERO,
-        memory_limit_mib: limit_mib,
+        memory_limit_mib: USUAL_MIB,
         dry_run,
         stop: Arc::default(),
         observe: &mut |_| {
@@ -138,29 +141,41 @@ fn every_study_is_planned_and_leaves_nothing() {
         let root = tempfile::tempdir().expect("a folder");
         let out = root.path().join("out");
         let flags = small(study.name(), root.path());
-        let answer = ask(study, &flags, &out, (false, true, 4096, None));
+        let answer = ask(study, &flags, &out, (false, true, None));
         assert!(matches!(answer, Ok(Answer::Planned(_))), "{}", study.name());
         assert!(!out.exists(), "{}", study.name());
     }
 }
 
+/// In a process of its own: the limit is the process's.
 #[test]
 fn every_study_that_has_too_little_memory_is_refused_and_leaves_nothing() {
     for study in STUDIES {
         let root = tempfile::tempdir().expect("a folder");
         let out = root.path().join("out");
         let flags = small(study.name(), root.path());
-        match ask(study, &flags, &out, (false, false, 1, None)) {
-            Err(Error::Input { expected, .. }) => {
-                assert!(
-                    expected.contains("--memory-limit-mib"),
-                    "{}: {expected}",
-                    study.name()
-                );
+        let mut command = Command::new(env!("CARGO_BIN_EXE_lapswarm"));
+        command
+            .arg(study.name())
+            .args(["--memory-limit-mib", "1", "--out"])
+            .arg(&out);
+        for d in study.declared() {
+            let value = flags.iter().find(|(key, _)| key == d.key).map(|(_, value)| value);
+            match (d.flag, d.typed(), value) {
+                (Flag::Switch(_, on), Some(flag), Some(value)) if *value == on.to_string() => {
+                    command.arg(flag);
+                }
+                (Flag::Switch(..), ..) => {}
+                (_, Some(flag), Some(value)) => {
+                    command.arg(flag).arg(value);
+                }
+                _ => {}
             }
-            Err(error) => panic!("{}: {error}", study.name()),
-            Ok(_) => panic!("{} fits into 1 MiB", study.name()),
         }
+        let told = command.output().expect("the program starts");
+        let words = String::from_utf8_lossy(&told.stderr);
+        assert_eq!(told.status.code(), Some(2), "{}: {words}", study.name());
+        assert!(words.contains("--memory-limit-mib"), "{}: {words}", study.name());
         assert!(!out.exists(), "{}", study.name());
     }
 }
@@ -173,23 +188,18 @@ fn every_study_that_is_interrupted_is_resumed_to_the_same_figures() {
         let root = tempfile::tempdir().expect("a folder");
         let flags = small(name, root.path());
         let whole = finished(
-            ask(
-                study,
-                &flags,
-                &root.path().join("whole"),
-                (false, false, 4096, None),
-            ),
+            ask(study, &flags, &root.path().join("whole"), (false, false, None)),
             name,
         );
         let out = root.path().join("out");
-        let error = match ask(study, &flags, &out, (false, false, 4096, Some(1))) {
+        let error = match ask(study, &flags, &out, (false, false, Some(1))) {
             Err(error) => error,
             Ok(Answer::Finished(finished)) => finished.verdict.expect_err(name),
             Ok(Answer::Planned(_)) => panic!("{name} was planned only"),
         };
         assert!(matches!(error, Error::Interrupted(_)), "{name}: {error}");
         assert!(out.join("state.lapswarm").is_file(), "{name}");
-        let resumed = finished(ask(study, &[], &out, (true, false, 4096, None)), name);
+        let resumed = finished(ask(study, &[], &out, (true, false, None)), name);
         assert_eq!(figures(&resumed.json), figures(&whole.json), "{name}");
         assert!(!out.join("state.lapswarm").exists(), "{name}");
     }
