@@ -4,7 +4,7 @@ use super::study::{print_plan, tell};
 use super::{Common, print_json};
 use lapswarm::Result;
 use lapswarm::evaluate::BackendChoice;
-use lapswarm::simulate::{SensorSettings, SimulateSettings, simulate_lap};
+use lapswarm::simulate::{SensorSettings, SimulateSettings, Simulated, simulate_lap};
 use lapswarm::study::compare::{Run, compare};
 use lapswarm::study::framework::run_folder::{self, Manifest, write_json};
 use lapswarm::study::framework::{Plan, RunRecord, Subject};
@@ -30,9 +30,9 @@ pub struct Arguments {
     /// Sample rate of the log, Hz
     #[arg(long, value_name = "HZ", default_value_t = 50.0)]
     rate: f64,
-    /// Runge-Kutta steps per sample with which the logged outputs are worked out
-    #[arg(long, value_name = "N", default_value_t = 1)]
-    substeps: usize,
+    /// Runge-Kutta steps per sample with which the logged outputs are worked out; as many as the car needs without it
+    #[arg(long, value_name = "N")]
+    substeps: Option<usize>,
     /// Share of the tyres' friction that the driver uses
     #[arg(long, value_name = "SHARE")]
     pace: Option<f64>,
@@ -121,10 +121,10 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             .into_folder(arguments.common.out.as_deref())?;
         return print_plan(&arguments.common, &plan);
     }
-    let log = simulate_lap(&car, &circuit, &settings)?;
+    let Simulated { log, substeps } = simulate_lap(&car, &circuit, &settings)?;
     let folder = run_folder::create("simulate", arguments.common.out.as_deref())?;
     let path = folder.join("lap.csv");
-    let step_ms = 1e3 * log.dt_s / settings.substeps as f64;
+    let step_ms = 1e3 * log.dt_s / substeps as f64;
     let comment = format!("{}; outputs worked out at a step of {step_ms:.3} ms", log.source);
     write_native(&log, &path, &lap_format().comment(comment))?;
     car.write(&folder, "truth")?;

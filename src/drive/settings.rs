@@ -1,7 +1,7 @@
 //! How the driver drives, and what the driver knows of the car.
 
 use crate::error::{Error, Result};
-use crate::vehicle::{Car, steady_car};
+use crate::vehicle::{Car, Turn, steady_car};
 
 /// How the driver drives.
 #[derive(Clone, Debug, PartialEq)]
@@ -45,14 +45,18 @@ impl CarKnowledge {
         let mut slips = Vec::new();
         let mut frictions = Vec::new();
         for speed in [25.0f64, 40.0, 55.0] {
-            let trims = steady.cornering(speed, car.max_steer_rad.max(0.3));
+            let trims = steady.cornering(speed, car.max_steer_rad.max(0.3), Turn::Left);
             let most = trims.iter().map(|t| t.ay_mps2).fold(0.0, f64::max);
+            if most == 0.0 {
+                continue;
+            }
             let load = c.gravity + 0.5 * c.air_density * c.lift_area * speed * speed / c.mass;
             frictions.push(most / load);
             let ridge = trims.iter().position(|t| t.ay_mps2 == most).unwrap_or(0);
             slips.extend(
-                trims[..=ridge.min(trims.len().saturating_sub(1))]
+                trims
                     .iter()
+                    .take(ridge + 1)
                     .filter(|t| (0.6..0.9).contains(&(t.ay_mps2 / most)))
                     // Without slip the rear axle follows the path: its share of the angle is geometry.
                     .map(|t| c.cg_to_rear / (speed * speed) - t.sideslip_rad / t.ay_mps2),

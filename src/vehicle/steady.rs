@@ -40,12 +40,21 @@ pub struct Trim {
     pub wheel_load_n: [f64; 4],
 }
 
+/// Which way a car turns.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Turn {
+    /// To the left: a positive yaw rate.
+    Left,
+    /// To the right.
+    Right,
+}
+
 /// Steady states and limits of one car.
 pub trait SteadyCar: Send + Sync {
-    /// The curve of trims at `speed` (m/s) from straight running to the left, until the road wheels reach
+    /// The curve of trims at `speed` (m/s) from straight running to one side, until the road wheels reach
     /// `greatest_steer` (rad), the car stands across the road, or lateral acceleration has fallen well below its
     /// peak. In order along the curve; at least straight running unless not even that has a solution.
-    fn cornering(&self, speed: f64, greatest_steer: f64) -> Vec<Trim>;
+    fn cornering(&self, speed: f64, greatest_steer: f64, turn: Turn) -> Vec<Trim>;
 
     /// The trim under `steer` (rad) between two trims of `curve`, which is [`SteadyCar::cornering`] at `speed` (m/s), on the part
     /// of it where the steering angle has not yet turned back; nothing beyond.
@@ -255,13 +264,18 @@ fn greatest(low: f64, high: f64, f: impl Fn(f64) -> f64) -> f64 {
 const GREATEST_SLIP: f64 = 0.4;
 
 impl<T: Tyre<f64>, D: Tyre<Exact>> SteadyCar for Ready<T, D> {
-    fn cornering(&self, speed: f64, greatest_steer: f64) -> Vec<Trim> {
-        let steering = Point::from_fn(|i, _| f64::from(i == 4));
-        let Some((mut point, mut tangent)) = self.solve(speed, &Point::zeros(), &steering) else {
+    fn cornering(&self, speed: f64, greatest_steer: f64, turn: Turn) -> Vec<Trim> {
+        // Straight running is no steering. Near its critical speed, a car whose sides differ answers to that with a bend: there it
+        // is no yaw rate, whatever the steering.
+        let held = |unknown: usize| {
+            let direction = Point::from_fn(|i, _| f64::from(i == unknown));
+            self.solve(speed, &Point::zeros(), &direction)
+        };
+        let Some((mut point, mut tangent)) = held(4).or_else(|| held(1)) else {
             return Vec::new();
         };
-        // To the left: a yaw rate to the left, whichever way the steering goes.
-        if tangent[1] < 0.0 {
+        // The yaw rate tells the side, whichever way the steering goes.
+        if (tangent[1] < 0.0) == (turn == Turn::Left) {
             tangent = -tangent;
         }
         let mut trims = vec![self.trim(speed, &point)];
@@ -285,9 +299,9 @@ impl<T: Tyre<f64>, D: Tyre<Exact>> SteadyCar for Ready<T, D> {
             if trim.steer_rad.abs() > greatest_steer || trim.sideslip_rad.abs() > GREATEST_SIDESLIP {
                 break;
             }
-            peak = peak.max(trim.ay_mps2);
+            peak = peak.max(trim.ay_mps2.abs());
             trims.push(trim);
-            if trim.ay_mps2 < PAST_THE_PEAK * peak {
+            if trim.ay_mps2.abs() < PAST_THE_PEAK * peak {
                 break;
             }
         }
@@ -364,7 +378,7 @@ mod tests {
         let front = stiffness(40_000.0, b / (a + b));
         let rear = stiffness(55_000.0, a / (a + b));
         let gradient = c.mass / (a + b) * (b / front - a / rear);
-        let trims = steady_car(&car).cornering(speed, 0.17);
+        let trims = steady_car(&car).cornering(speed, 0.17, Turn::Left);
         let small = trims.iter().find(|t| t.ay_mps2 > 0.01).unwrap();
         let bicycle = (a + b) * small.ay_mps2 / speed.powi(2) + gradient * small.ay_mps2;
         // The first point lies at a few hundredths of a m/s^2: angles of 1e-3 rad, whose squares are a millionth,
@@ -381,7 +395,7 @@ mod tests {
         let car = Car::bundled().unwrap();
         let steady = steady_car(&car);
         for speed in [16.0, 25.0, 45.0, 65.0] {
-            let trims = steady.cornering(speed, 0.1745);
+            let trims = steady.cornering(speed, 0.1745, Turn::Left);
             let peak = trims.iter().map(|t| t.ay_mps2).fold(0.0, f64::max);
             assert!(trims.len() > 10 && peak > 10.0, "{speed}: {} {peak}", trims.len());
             // What the wheels carry is the car and its downforce.

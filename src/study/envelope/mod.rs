@@ -20,7 +20,7 @@ use crate::evaluate::{BackendChoice, BackendInfo};
 use crate::study::framework::journal::Journal;
 use crate::study::framework::memory::{ANSWER, Kept};
 use crate::study::framework::{Plan, RunRecord, Study, Subject, Watch, Work};
-use crate::vehicle::{Car, Envelope, EnvelopeRow, Trim, steady_car};
+use crate::vehicle::{Car, Envelope, EnvelopeRow, Trim, Turn, steady_car};
 use rayon::prelude::*;
 use std::path::Path;
 
@@ -185,6 +185,8 @@ pub fn limits_alone(settings: &EnvelopeSettings, prepared: &Prepared) -> Result<
 pub struct SpeedLimits {
     /// The row of the envelope.
     pub row: EnvelopeRow,
+    /// Greatest lateral acceleration to the right (m/s^2). The row has the lesser of both sides.
+    pub right_mps2: f64,
     /// Steady cornering to the left, in order along the curve of steady states.
     pub cornering: Vec<Trim>,
     /// Greatest acceleration by the driven tyres (m/s^2).
@@ -216,6 +218,8 @@ pub struct CarLimits {
     pub handling: Handling,
     /// The envelope.
     pub envelope: Envelope,
+    /// Speeds at which the car has no steady state in a bend (m/s). The envelope goes on between its neighbours there.
+    pub left_out_mps: Vec<f64>,
 }
 
 /// Steering up to which the tyres' own limit is looked for (rad): a car whose lock is reached first still has it.
@@ -230,33 +234,60 @@ pub fn car_limits(car: &Car, settings: &EnvelopeSettings) -> Result<CarLimits> {
     let speeds = speeds_of(car, settings)?;
     let force = engine_of(car)?;
     let steady = steady_car(car);
-    let limits: Vec<SpeedLimits> = speeds
+    // The two sides of a car with even loads are each other's mirror image.
+    let even = car.chassis.left_share_front == 0.5 && car.chassis.left_share_rear == 0.5;
+    let found: Vec<SpeedLimits> = speeds
         .into_par_iter()
         .map(|speed| {
-            let cornering = steady.cornering(speed, STEER_TO_GRIP);
+            let cornering = steady.cornering(speed, STEER_TO_GRIP, Turn::Left);
+            let peak = |trims: &[Trim]| trims.iter().map(|t| t.ay_mps2.abs()).fold(0.0, f64::max);
+            let right_mps2 = match even {
+                true => peak(&cornering),
+                false => peak(&steady.cornering(speed, STEER_TO_GRIP, Turn::Right)),
+            };
             let traction_mps2 = steady.greatest_traction(speed);
             let engine_mps2 = force(speed) / car.chassis.mass;
             SpeedLimits {
                 row: EnvelopeRow {
                     v_mps: speed,
-                    ay_mps2: cornering.iter().map(|t| t.ay_mps2).fold(0.0, f64::max),
+                    ay_mps2: peak(&cornering).min(right_mps2),
                     ax_grip_mps2: steady.greatest_braking(speed),
                     ax_drive_mps2: traction_mps2.min(engine_mps2),
                     drag_mps2: steady.drag(speed),
                 },
+                right_mps2,
                 cornering,
                 traction_mps2,
                 engine_mps2,
             }
         })
         .collect();
+    let corners = |l: &SpeedLimits| l.row.ay_mps2 > 0.0 && l.row.ax_grip_mps2 > 0.0;
+    let (limits, left_out): (Vec<_>, Vec<_>) = found.into_iter().partition(corners);
+    let left_out_mps: Vec<f64> = left_out.iter().map(|l| l.row.v_mps).collect();
+    if limits.len() < 2 {
+        return Err(Error::Study(format!(
+            "{} has no steady state in bends at {} of {} speeds ({}): its tyres cannot hold it on the road there",
+            car.name,
+            left_out_mps.len(),
+            left_out_mps.len() + limits.len(),
+            in_words(&left_out_mps)
+        )));
+    }
     let envelope = Envelope::new(&car.name, limits.iter().map(|l| l.row).collect())?;
     let wheelbase = car.chassis.cg_to_front + car.chassis.cg_to_rear;
     Ok(CarLimits {
         handling: handling(&limits[limits.len() / 2], wheelbase),
         speeds: limits,
         envelope,
+        left_out_mps,
     })
+}
+
+/// Speeds (m/s) in words.
+fn in_words(speeds_mps: &[f64]) -> String {
+    let words: Vec<String> = speeds_mps.iter().map(|v| format!("{v:.1}")).collect();
+    format!("{} m/s", words.join(", "))
 }
 
 /// The speeds that a car's limits are looked for at (m/s), the last of them where its engine ends.

@@ -35,8 +35,11 @@ pub struct EnvelopeSummary {
     pub characteristic_speed_mps: Option<f64>,
     /// Critical speed (m/s) of a car that oversteers.
     pub critical_speed_mps: Option<f64>,
-    /// The limits at each speed.
+    /// The limits at each speed, for turns to the side on which the car can do less.
     pub limits: Vec<EnvelopeRow>,
+    /// What the limits leave out or differ in, in words.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub notes: Vec<String>,
     /// The figures of the surface, if one was evaluated.
     #[serde(flatten, skip_serializing_if = "Option::is_none")]
     pub surface: Option<SurfaceFigures>,
@@ -59,8 +62,33 @@ pub(super) fn summarise(car: &str, outcome: &Outcome) -> EnvelopeSummary {
         characteristic_speed_mps: limits.handling.characteristic_speed_mps,
         critical_speed_mps: limits.handling.critical_speed_mps,
         limits: limits.envelope.rows().to_vec(),
+        notes: notes(limits),
         surface: outcome.surface.as_ref().map(|s| s.summary.clone()),
     }
+}
+
+/// What a reader of the limits must know of them.
+fn notes(limits: &CarLimits) -> Vec<String> {
+    let mut notes = Vec::new();
+    if !limits.left_out_mps.is_empty() {
+        notes.push(format!(
+            "The car has no steady state in bends at {}: these speeds are left out.",
+            super::in_words(&limits.left_out_mps)
+        ));
+    }
+    let left = |s: &super::SpeedLimits| s.cornering.iter().map(|t| t.ay_mps2).fold(0.0, f64::max);
+    let uneven = limits.speeds.iter().map(|s| (s, left(s), s.right_mps2));
+    let most = uneven.max_by(|a, b| (a.1 - a.2).abs().total_cmp(&(b.1 - b.2).abs()));
+    if let Some((at, left, right)) = most
+        && left != right
+    {
+        notes.push(format!(
+            "The car's sides differ: at {:.1} m/s it corners at up to {left:.2} m/s^2 to the left and {right:.2} m/s^2 to the \
+             right. The limits are the lesser of both.",
+            at.row.v_mps
+        ));
+    }
+    notes
 }
 
 impl EnvelopeSummary {
@@ -94,6 +122,9 @@ impl EnvelopeSummary {
             "Understeer gradient {:.3} deg/g, stability factor {:.3e} s^2/m^2: {balance}\n",
             self.understeer_gradient_deg_per_g, self.stability_factor_s2_per_m2
         );
+        for note in &self.notes {
+            text += &format!("{note}\n");
+        }
         if let Some(surface) = &self.surface {
             text += &surface::in_words(surface, &self.record);
         }

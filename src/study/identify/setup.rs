@@ -10,6 +10,7 @@ use crate::study::framework::{Plan, Subject};
 use crate::telemetry::{ChannelMap, Log, LogOptions, NativeFormat, Recording};
 use crate::track::{Circuit, Track};
 use crate::vehicle::Car;
+use crate::vehicle::modes::{fastest_mode_within, stable_steps};
 use std::path::Path;
 
 /// Number of compared channels.
@@ -33,15 +34,6 @@ pub struct Setup {
     pub circuit: Option<Circuit>,
     /// Standard deviation of each channel over the scored samples, which its errors are set against.
     pub scales: [f64; CHANNELS],
-}
-
-/// The stability limit of the classical Runge-Kutta method on the negative real axis, with a margin for modes that
-/// are stiffer than the estimate below.
-const STABLE_STEP: f64 = 2.4;
-
-/// The fastest mode (1/s) of a car at a speed (m/s), after the figures of the book, chapter Model, section 2.
-fn fastest_mode(speed: f64) -> f64 {
-    60.0 + 620.0 / speed
 }
 
 /// Reads what the settings name and puts the problem together.
@@ -90,20 +82,25 @@ pub fn set_up(settings: &IdentifySettings) -> Result<Setup> {
             "at least one window of the length asked for",
         ));
     }
+    let held_windows = windows_over(settings, &log, &samples, &held, circuit.as_ref())?;
     let slowest = fit_windows
         .iter()
+        .chain(&held_windows)
         .flat_map(|w| &samples[w.start..w.end])
         .map(|s| s.measured[0])
         .fold(f64::INFINITY, f64::min);
-    let automatic = (log.dt_s * fastest_mode(slowest.max(1.0)) / STABLE_STEP).ceil() as usize;
-    let substeps = settings.substeps.unwrap_or(automatic.max(1));
+    let free = free_parameters(settings, &car)?;
+    // As fine as the stiffest car within the bounds needs it at the slowest place.
+    let substeps = settings.substeps.unwrap_or_else(|| {
+        let fastest = fastest_mode_within(&car.to_flat(), car.tyre_model(), &free, slowest.max(1.0));
+        stable_steps(log.dt_s, fastest)
+    });
     let scales = channel_scales(&samples, &fit_windows);
     let problem = |windows: Vec<Window<f64>>| {
-        let free = free_parameters(settings, &car)?;
         let weights = objective_weights(settings, &scales, &windows, log.dt_s);
         ReplayProblem::new(
             car.clone(),
-            free,
+            free.clone(),
             samples.clone(),
             windows,
             (log.dt_s, substeps),
@@ -112,15 +109,9 @@ pub fn set_up(settings: &IdentifySettings) -> Result<Setup> {
         )
     };
     let replay = problem(fit_windows)?;
-    let holdout = if held.is_empty() {
-        None
-    } else {
-        let windows = windows_over(settings, &log, &samples, &held, circuit.as_ref())?;
-        if windows.is_empty() {
-            None
-        } else {
-            Some(problem(windows)?)
-        }
+    let holdout = match held_windows.is_empty() {
+        true => None,
+        false => Some(problem(held_windows)?),
     };
     let truth = truth_car.map(|truth| {
         let flat = truth.to_flat();

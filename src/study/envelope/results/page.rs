@@ -32,6 +32,9 @@ pub fn write(folder: &Path, outcome: &Outcome, summary: &EnvelopeSummary) -> Res
         "deg/g",
     );
     page.sentence(format!("At small angles the car {}.", summary.balance()));
+    for note in &summary.notes {
+        page.sentence(note.clone());
+    }
     page.section(
         "Limits",
         "From steady states of the 4DOF model at each speed. The engine's limit is that of its best gear.",
