@@ -13,6 +13,7 @@ mod html;
 mod lap;
 mod parameters;
 mod pareto;
+#[cfg(feature = "parquet")]
 mod parquet;
 mod site_map;
 mod style;

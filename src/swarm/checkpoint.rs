@@ -6,7 +6,6 @@
 //! torn or of another state is refused. It is written beside its place and then moved there, so that a run that is
 //! interrupted while it writes leaves the last one whole.
 
-use super::device::DeviceState;
 use super::{
     CooperativeSwarm, CovarianceSwarm, DifferenceSwarm, HybridSwarm, Islands, Mopso, Nsga2, Pso, WindowSwarm,
 };
@@ -39,7 +38,6 @@ macro_rules! checkpoints {
 checkpoints! {
     CooperativeSwarm: "cooperative swarm",
     CovarianceSwarm: "covariance swarm",
-    DeviceState: "swarm of a device",
     DifferenceSwarm: "difference swarm",
     HybridSwarm: "hybrid swarm",
     Mopso: "multi-objective swarm",

@@ -5,10 +5,11 @@
 //! processor does, the swarm is the one that [`super::Mopso`] keeps in lanes, bit for bit.
 
 use super::archive::Archive;
+use super::checkpoint::Checkpoint;
 use super::mopso::blocks::Generation;
 use super::mopso::filter::{Point, front};
+use super::mopso::large_swarm::{leaders, learn_from};
 use super::mopso::thinning::{PER_PLACE, thinned};
-use super::mopso::{leaders, learn_from};
 use super::settings::MopsoSettings;
 use super::space::Space;
 use super::{Counters, Front, Progress};
@@ -49,6 +50,10 @@ pub struct DeviceState {
     best_objectives: Vec<f32>,
     archive: Archive,
     counters: Counters,
+}
+
+impl Checkpoint for DeviceState {
+    const KIND: &'static str = "swarm of a device";
 }
 
 struct Kernels {

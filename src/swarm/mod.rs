@@ -35,6 +35,7 @@ pub mod checkpoint;
 pub mod comparison;
 mod cooperative;
 mod covariance;
+#[cfg(feature = "gpu")]
 pub mod device;
 mod difference;
 mod islands;

@@ -1,13 +1,13 @@
 //! The graphics backend: `f32`, one lane per candidate and window, the windows joined on the device.
 
+pub use crate::evaluate::gpu::Batching;
+
 use super::kernel::{BLOCK, CHANNELS};
 use super::problem::ReplayProblem;
 use crate::error::{Error, Result};
 use crate::evaluate::gpu::shader::{CarShape, ReplayShape, base_vectors};
-use crate::evaluate::gpu::{
-    Batching, Binding, DeviceKind, GpuContext, Kernel, LOOP_ROUNDS, rounds_of, workgroup,
-};
-use crate::evaluate::{DeviceKernel, GpuBackend, ModelTable};
+use crate::evaluate::gpu::{Binding, DeviceKind, GpuContext, Kernel, LOOP_ROUNDS, rounds_of, workgroup};
+use crate::evaluate::{DeviceKernel, GpuBackend, ModelTable, OnDevice};
 use crate::vehicle::model::STAGES;
 use bytemuck::{Pod, Zeroable};
 use std::sync::Arc;
@@ -134,6 +134,13 @@ pub struct ReplayDevice {
     pace: Option<Pace>,
     statistics: DispatchStatistics,
     kernel_ms: Option<f64>,
+}
+
+/// Scores replays on a graphics processor.
+pub type GpuEvaluator<'a> = GpuBackend<'a, ReplayProblem>;
+
+impl OnDevice for ReplayProblem {
+    type Device = ReplayDevice;
 }
 
 impl DeviceKernel<ReplayProblem> for ReplayDevice {

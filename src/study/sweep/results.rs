@@ -243,6 +243,7 @@ impl Summary {
         }
         let rows = self.row_table();
         rows.write_csv(folder.join("sweep.csv"))?;
+        #[cfg(feature = "parquet")]
         rows.write_parquet(folder.join("sweep.parquet"))?;
         let medians = self.median_table(&[
             ("_lower_quartile", |s| s.lower_quartile),
@@ -250,6 +251,7 @@ impl Summary {
             ("_upper_quartile", |s| s.upper_quartile),
         ]);
         medians.write_csv(folder.join("medians.csv"))?;
+        #[cfg(feature = "parquet")]
         medians.write_parquet(folder.join("medians.parquet"))?;
         super::page::write(folder, self, settings)
     }
