@@ -199,11 +199,15 @@ fn advice(error: &Error) -> Option<&'static str> {
 /// Whether the JSON object that was asked for stands on stdout.
 static JSON_TOLD: AtomicBool = AtomicBool::new(false);
 
+/// A serialisable value as one JSON object.
+fn to_json(value: &impl serde::Serialize) -> Result<String> {
+    let failed = |e| Error::io("standard output", "write", std::io::Error::other(e));
+    serde_json::to_string(value).map_err(failed)
+}
+
 /// Prints a serialisable value as one JSON object on stdout.
 fn print_json(value: &impl serde::Serialize) -> Result<()> {
-    let text = serde_json::to_string(value)
-        .map_err(|e| Error::io("standard output", "write", std::io::Error::other(e)))?;
-    print_json_text(&text);
+    print_json_text(&to_json(value)?);
     Ok(())
 }
 

@@ -374,6 +374,11 @@ pub trait Evaluator {
         &[]
     }
 
+    /// Time that a device itself spent on the last evaluation (ms); `None` where none can tell.
+    fn last_kernel_ms(&self) -> Option<f64> {
+        None
+    }
+
     /// Scores `population`: row-major, `n` by number of variables, values within their bounds.
     ///
     /// # Errors

@@ -7,6 +7,7 @@
 mod axis;
 mod bars;
 mod canvas;
+pub mod compare;
 mod curves;
 mod figure;
 mod html;

@@ -3,7 +3,7 @@
 
 use lapswarm::config::settings::Settings;
 use lapswarm::line::read_line;
-use lapswarm::study::compare::{self, Run};
+use lapswarm::report::compare::{self, Run};
 use lapswarm::study::envelope::EnvelopeSettings;
 use lapswarm::study::framework::journal::Journal;
 use lapswarm::study::hybrid::{self, HybridStudySettings};

@@ -29,6 +29,11 @@ pub trait DeviceKernel<K: ProblemKind>: Sized {
     /// Cuts the work differently.
     fn cut(&mut self, batching: Batching);
 
+    /// Time that the device itself spent on the last outcomes (ms), where it can tell.
+    fn kernel_ms(&self) -> Option<f64> {
+        None
+    }
+
     /// The outcomes of candidates.
     ///
     /// # Errors
@@ -83,6 +88,10 @@ impl<K: OnDevice> Evaluator for GpuBackend<'_, K> {
 
     fn backend(&self) -> BackendInfo {
         self.device.context().backend_info()
+    }
+
+    fn last_kernel_ms(&self) -> Option<f64> {
+        self.device.kernel_ms()
     }
 
     fn evaluate(&mut self, population: &[f64]) -> Result<Evaluation> {

@@ -262,6 +262,10 @@ impl DeviceKernel<ReplayProblem> for ReplayDevice {
         self.batch = None;
     }
 
+    fn kernel_ms(&self) -> Option<f64> {
+        self.kernel_ms
+    }
+
     fn outcomes(
         &mut self,
         replay: &ReplayProblem,
@@ -276,11 +280,6 @@ impl DeviceKernel<ReplayProblem> for ReplayDevice {
 }
 
 impl GpuBackend<'_, ReplayProblem> {
-    /// Time that the device itself spent driving in the last evaluation, ms; `None` where it cannot tell.
-    pub fn last_kernel_ms(&self) -> Option<f64> {
-        self.device.kernel_ms
-    }
-
     /// What the last evaluation asked of the device.
     pub fn statistics(&self) -> DispatchStatistics {
         self.device.statistics

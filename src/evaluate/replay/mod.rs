@@ -16,7 +16,7 @@ pub use cpu::trace;
 pub use gpu::{Batching, DeviceSample, DeviceWindow, DispatchStatistics, GpuEvaluator, Stretch};
 pub use jacobian::Residuals;
 pub use plan::{Norm, Plan, Sample, Window, initial_state, step_fractions};
-pub use problem::{CHANNEL_NAMES, CHANNEL_UNITS, ChannelWeights, ReplayProblem};
+pub use problem::{CHANNEL_LABELS, CHANNEL_NAMES, CHANNEL_UNITS, ChannelWeights, ReplayProblem};
 
 use super::{Failure, Problem, ProblemKind};
 use plan::CHANNELS;

@@ -310,6 +310,7 @@ fn make_absolute(base: &mut Table, files: &[&str], folder: &Path) {
 
 #[cfg(test)]
 mod tests {
+    use super::super::Work;
     use super::*;
     use std::path::PathBuf;
 
@@ -319,9 +320,8 @@ mod tests {
             let sweep = SweepSettings::load(name).expect(name);
             let points = sweep.points().expect(name);
             assert!(points.len() >= 9, "{name}");
-            let path_of = |number: usize| PathBuf::from(format!("{number:05}.toml"));
-            let checked = sweep.study.check_points(&sweep, &points, &path_of, 4096);
-            checked.expect(name);
+            let work = Work::new(&sweep, Path::new(""), PathBuf::new()).expect(name);
+            sweep.study.check_points(&work).expect(name);
         }
     }
 
