@@ -3,7 +3,7 @@
 pub mod kinds;
 pub mod settings;
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Place, Result};
 use std::cell::RefCell;
 use std::collections::BTreeSet;
 use std::fs::File;
@@ -43,20 +43,18 @@ pub fn memory_limit() -> u64 {
 /// Whether what a file with so much in it takes, `needed` bytes, fits into `limit` bytes.
 ///
 /// # Errors
-/// [`Error::Input`] with the file, what is in it, what that takes and the limit.
+/// [`Error::Memory`] with the file, what is in it, what that takes and the limit.
 pub fn check_memory(path: &Path, size: &str, needed: u64, limit: u64) -> Result<()> {
     if needed <= limit {
         return Ok(());
     }
-    Err(Error::input(
-        path,
-        "file size",
-        format!(
-            "{size}, for which some {} MiB are needed",
-            needed.div_ceil(1 << 20)
-        ),
-        format!("a file that fits into {} MiB (--memory-limit-mib)", limit >> 20),
-    ))
+    Err(Error::Memory {
+        file: path.display().to_string(),
+        what: "file size",
+        found: size.to_owned(),
+        needed_mib: needed.div_ceil(1 << 20),
+        expected: format!("a file that fits into {} MiB", limit >> 20),
+    })
 }
 
 /// Reads a file of at most `most` bytes, so that none takes all memory, not even one without an end.
@@ -108,7 +106,7 @@ pub fn read_text(path: &Path) -> Result<String> {
         let bytes = e.as_bytes();
         let line = bytes[..sound].iter().filter(|&&b| b == b'\n').count() + 1;
         let found = format!("the byte 0x{:02x}", bytes[sound]);
-        Error::input(path, format!("line {line}"), found, "text in UTF-8")
+        Error::input(path, Place::line(line), found, "text in UTF-8")
     })
 }
 
@@ -131,7 +129,7 @@ impl<'a> Document<'a> {
     pub fn parse(file: &Path, text: &'a str) -> Result<Self> {
         let root = DeTable::parse(text).map_err(|e| {
             let line = e.span().map_or(1, |s| line_of(text, s.start));
-            Error::input(file, format!("line {line}"), e.message().to_owned(), "valid TOML")
+            Error::input(file, Place::line(line), e.message().to_owned(), "valid TOML")
         })?;
         Ok(Self {
             file: file.to_owned(),
@@ -189,7 +187,7 @@ impl<'a> Table<'a> {
         let line = line_of(self.document.text, value.span().start);
         Error::input(
             &self.document.file,
-            format!("line {line}, field {}", self.field(key)),
+            Place::line(line).field(self.field(key)),
             Self::describe(value.get_ref()),
             expected,
         )
@@ -204,14 +202,14 @@ impl<'a> Table<'a> {
     }
 
     fn missing(&self, key: &str, expected: impl Into<String>) -> Error {
-        let table = if self.name.is_empty() {
-            "top level".to_owned()
+        let place = if self.name.is_empty() {
+            Place::default()
         } else {
-            format!("line {}, table [{}]", self.line, self.name)
+            Place::line(self.line)
         };
         Error::input(
             &self.document.file,
-            format!("{table}, field {}", self.field(key)),
+            place.field(self.field(key)),
             "nothing",
             expected,
         )
@@ -453,7 +451,7 @@ impl<'a> Table<'a> {
                 let known = read.iter().map(String::as_str).collect::<Vec<_>>().join(", ");
                 return Err(Error::input(
                     &self.document.file,
-                    format!("line {line}, field {}", self.field(name)),
+                    Place::line(line).field(self.field(name)),
                     "an unknown key",
                     format!("one of {known}"),
                 ));

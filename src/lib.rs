@@ -148,4 +148,4 @@ pub mod telemetry;
 pub mod track;
 pub mod vehicle;
 
-pub use error::{Error, Location, Result};
+pub use error::{Error, Place, Result};

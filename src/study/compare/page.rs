@@ -53,8 +53,8 @@ pub fn compare(runs: &[Run]) -> Result<HtmlReport> {
     if runs.is_empty() || runs.len() > MOST_RUNS {
         let expected = format!("1 to {MOST_RUNS}");
         return Err(Error::input(
-            "the command line",
-            "RUN",
+            "the comparison",
+            "runs",
             runs.len().to_string(),
             expected,
         ));
