@@ -13,7 +13,7 @@ pub(crate) use choice::named;
 #[cfg(feature = "vehicle")]
 pub use document::{Document, Table};
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Place, Result};
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
@@ -42,20 +42,18 @@ pub fn memory_limit() -> u64 {
 /// Whether what a file with so much in it takes, `needed` bytes, fits into `limit` bytes.
 ///
 /// # Errors
-/// [`Error::Input`] with the file, what is in it, what that takes and the limit.
+/// [`Error::Memory`] with the file, what is in it, what that takes and the limit.
 pub fn check_memory(path: &Path, size: &str, needed: u64, limit: u64) -> Result<()> {
     if needed <= limit {
         return Ok(());
     }
-    Err(Error::input(
-        path,
-        "file size",
-        format!(
-            "{size}, for which some {} MiB are needed",
-            needed.div_ceil(1 << 20)
-        ),
-        format!("a file that fits into {} MiB (--memory-limit-mib)", limit >> 20),
-    ))
+    Err(Error::Memory {
+        file: path.display().to_string(),
+        what: "file size",
+        found: size.to_owned(),
+        needed_mib: needed.div_ceil(1 << 20),
+        expected: format!("a file that fits into {} MiB", limit >> 20),
+    })
 }
 
 /// Reads a file of at most `most` bytes, so that none takes all memory, not even one without an end.
@@ -107,7 +105,7 @@ pub fn read_text(path: &Path) -> Result<String> {
         let bytes = e.as_bytes();
         let line = bytes[..sound].iter().filter(|&&b| b == b'\n').count() + 1;
         let found = format!("the byte 0x{:02x}", bytes[sound]);
-        Error::input(path, format!("line {line}"), found, "text in UTF-8")
+        Error::input(path, Place::line(line), found, "text in UTF-8")
     })
 }
 

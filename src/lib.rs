@@ -161,4 +161,4 @@ pub mod track;
 #[cfg(feature = "vehicle")]
 pub mod vehicle;
 
-pub use error::{Error, Location, Result};
+pub use error::{Error, Place, Result};

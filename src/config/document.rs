@@ -1,7 +1,7 @@
 //! TOML reading that knows its lines: every refusal names file, line and field, and no key goes unread.
 
 use super::LONGEST_NAME;
-use crate::error::{Error, Result};
+use crate::error::{Error, Place, Result};
 use std::cell::RefCell;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -31,7 +31,7 @@ impl<'a> Document<'a> {
     pub fn parse(file: &Path, text: &'a str) -> Result<Self> {
         let root = DeTable::parse(text).map_err(|e| {
             let line = e.span().map_or(1, |s| line_of(text, s.start));
-            Error::input(file, format!("line {line}"), e.message().to_owned(), "valid TOML")
+            Error::input(file, Place::line(line), e.message().to_owned(), "valid TOML")
         })?;
         Ok(Self {
             file: file.to_owned(),
@@ -89,7 +89,7 @@ impl<'a> Table<'a> {
         let line = line_of(self.document.text, value.span().start);
         Error::input(
             &self.document.file,
-            format!("line {line}, field {}", self.field(key)),
+            Place::line(line).field(self.field(key)),
             Self::describe(value.get_ref()),
             expected,
         )
@@ -104,14 +104,14 @@ impl<'a> Table<'a> {
     }
 
     fn missing(&self, key: &str, expected: impl Into<String>) -> Error {
-        let table = if self.name.is_empty() {
-            "top level".to_owned()
+        let place = if self.name.is_empty() {
+            Place::default()
         } else {
-            format!("line {}, table [{}]", self.line, self.name)
+            Place::line(self.line)
         };
         Error::input(
             &self.document.file,
-            format!("{table}, field {}", self.field(key)),
+            place.field(self.field(key)),
             "nothing",
             expected,
         )
@@ -353,7 +353,7 @@ impl<'a> Table<'a> {
                 let known = read.iter().map(String::as_str).collect::<Vec<_>>().join(", ");
                 return Err(Error::input(
                     &self.document.file,
-                    format!("line {line}, field {}", self.field(name)),
+                    Place::line(line).field(self.field(name)),
                     "an unknown key",
                     format!("one of {known}"),
                 ));

@@ -360,15 +360,7 @@ pub trait Settings: Clone + Default + PartialEq + Send + Sync + 'static {
     fn parse(path: &Path, text: &str) -> Result<Self> {
         let document = Document::parse(path, text)?;
         let settings = Self::read_table(document.root(), path.parent().unwrap_or(Path::new("")))?;
-        settings.validate().map_err(|error| match error {
-            Error::Input {
-                place,
-                found,
-                expected,
-                ..
-            } => Error::input(path, place, found, expected),
-            other => other,
-        })?;
+        settings.validate().map_err(|error| error.of_file(path))?;
         Ok(settings)
     }
 

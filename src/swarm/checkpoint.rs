@@ -165,7 +165,7 @@ mod tests {
         let said = load_within::<Journal>(&path, 2 << 20)
             .expect_err("a little more than twice 1 MiB")
             .to_string();
-        for part in ["state: file size", "some 3 MiB", "2 MiB (--memory-limit-mib)"] {
+        for part in ["state: file size", "some 3 MiB", "fits into 2 MiB"] {
             assert!(said.contains(part), "{said}");
         }
         let journal = load_within::<Journal>(&path, 3 << 20).expect("it fits");

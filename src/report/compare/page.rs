@@ -56,7 +56,7 @@ type Named<'a> = (String, &'a Run);
 pub fn compare(runs: &[Run]) -> Result<HtmlReport> {
     if runs.is_empty() || runs.len() > MOST_RUNS {
         let (found, expected) = (runs.len().to_string(), format!("1 to {MOST_RUNS}"));
-        return Err(Error::input("the command line", "RUN", found, expected));
+        return Err(Error::input("the comparison", "runs", found, expected));
     }
     let runs = &named(runs)[..];
     let title = match runs {

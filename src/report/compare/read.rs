@@ -1,7 +1,7 @@
 //! A run's folder, read back.
 
 use crate::config::read_bytes;
-use crate::error::{Error, Result};
+use crate::error::{Error, Place, Result};
 use serde_json::{Map, Value};
 use std::path::{Path, PathBuf};
 
@@ -157,7 +157,7 @@ fn object(path: &Path, text: &str) -> Result<Map<String, Value>> {
         Ok(_) => Err(Error::input(path, "file", "another value", "a JSON object")),
         Err(e) => Err(Error::input(
             path,
-            format!("line {}", e.line()),
+            Place::line(e.line()),
             shortened(&e.to_string()),
             "JSON",
         )),
@@ -202,7 +202,7 @@ pub(crate) fn read_table(path: &Path) -> Result<Option<Trace>> {
         let line = e.position().map_or(1, csv::Position::line);
         Error::input(
             path,
-            format!("line {line}"),
+            Place::line(line as usize),
             shortened(&e.to_string()),
             "a table with a header",
         )

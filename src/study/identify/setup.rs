@@ -241,7 +241,7 @@ fn windows_over(
                 "the study",
                 "section",
                 name,
-                "a track (--track, or track in the study) on which the section is named",
+                "a track on which the section is named (the setting track)",
             ));
         }
         (None, _) => None,

@@ -252,7 +252,7 @@ fn indices_of(
         .collect();
     if 2 * driven.len() < n {
         return Err(Error::Study(format!(
-            "of {n} samples only {} drive with every change: a smaller --share keeps more of them on the road",
+            "of {n} samples only {} drive with every change: a smaller share keeps more of them on the road",
             driven.len()
         )));
     }

@@ -1,7 +1,7 @@
 //! The grid of settings of a sweep.
 
 use crate::config::read_text;
-use crate::error::{Error, Result};
+use crate::error::{Error, Place, Result};
 use crate::study::registry::{self, Registered};
 use std::collections::BTreeMap;
 use std::fmt;
@@ -99,7 +99,7 @@ impl SweepSettings {
                 let line = e
                     .span()
                     .map_or(0, |s| text[..s.start.min(text.len())].matches('\n').count() + 1);
-                return refuse(&format!("line {line}"), e.message().to_owned(), "a TOML file");
+                return Err(Error::input(path, Place::line(line), e.message(), "a TOML file"));
             }
         };
         let named = |value: &Value| registry::named(value.as_str()?);
@@ -234,12 +234,9 @@ impl SweepSettings {
                 expected,
             } if Path::new(&file) == study || file == "the study" => {
                 // Lines are those of the made file.
-                let place = match place.split_once(", ") {
-                    Some((line, rest)) if line.starts_with("line ") => rest,
-                    _ => &place,
-                };
+                let place = place.field.map_or_else(String::new, |field| format!(", {field}"));
                 let at: Vec<String> = point.settings.iter().map(|(k, v)| format!("{k} {v}")).collect();
-                let place = format!("run {} ({}), {place}", number + 1, at.join(", "));
+                let place = format!("run {} ({}){place}", number + 1, at.join(", "));
                 Error::input(&self.file, place, found, expected)
             }
             other => other,

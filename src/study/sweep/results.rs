@@ -2,7 +2,7 @@
 
 use super::{Point, SweepSettings};
 use crate::config::{LARGEST_LOG, read_bytes, read_text};
-use crate::error::{Error, Result};
+use crate::error::{Error, Place, Result};
 use crate::report::{Rows, Table, write_whole};
 use crate::study::framework::run_folder::write_json;
 use crate::swarm::comparison::quartiles;
@@ -142,7 +142,7 @@ pub(super) fn read_rows(
 ) -> Result<Vec<Row>> {
     if read_text(sweep)? != settings.text() {
         let expected = "the sweep that the folder holds";
-        return Err(Error::input(sweep, "--resume", "another sweep", expected));
+        return Err(Error::input(sweep, "resume", "another sweep", expected));
     }
     if !path.exists() {
         return Ok(Vec::new());
@@ -160,7 +160,7 @@ pub(super) fn read_rows(
             row.filter(own).ok_or_else(|| {
                 Error::input(
                     path,
-                    format!("line {}", number + 1),
+                    Place::line(number + 1),
                     line.chars().take(60).collect::<String>(),
                     "a row of this sweep",
                 )
