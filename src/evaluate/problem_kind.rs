@@ -2,7 +2,7 @@
 
 use super::gpu::{Batching, GpuContext};
 use super::simd::InstructionSet;
-use super::{BackendInfo, Evaluation, Evaluator, FAILED_COST, Failure, Problem, are_costs};
+use super::{BackendInfo, Evaluation, Evaluator, FAILED_COST, Failure, Problem, are_numbers};
 use crate::error::Result;
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -18,7 +18,8 @@ pub trait ProblemKind: Sync + Sized {
     type Lanes: LaneTables<Self>;
     /// The kernel on a device, with its tables and buffers.
     type Device: DeviceKernel<Self>;
-    /// Why a candidate failed whose objectives are not finite or cost as much as a failure.
+    /// Why a candidate failed whose objectives are not finite numbers in single precision. Kernels compute in it, and every backend
+    /// refuses the same candidates.
     const WITHOUT_COST: Failure;
 
     /// Variables and objectives.
@@ -51,7 +52,7 @@ pub trait ProblemKind: Sync + Sized {
     ) -> (Vec<f64>, Option<Failure>) {
         let row = outcome.and_then(|outcome| {
             let row = self.objectives_of(candidate, outcome)?;
-            if are_costs(&row) {
+            if are_numbers(&row) {
                 Ok(row)
             } else {
                 Err(Self::WITHOUT_COST)

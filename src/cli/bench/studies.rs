@@ -7,13 +7,14 @@ use crate::cli::measurement::Kept;
 use crate::cli::output::outln;
 use lapswarm::evaluate::line::{LineObjective, LineProblem, open_line_evaluator};
 use lapswarm::evaluate::replay::{CHANNEL_NAMES, ReplayProblem, open_evaluator};
-use lapswarm::evaluate::{BackendChoice, Evaluator, FAILED_COST, Problem};
+use lapswarm::evaluate::{BackendChoice, Evaluator, Problem};
 use lapswarm::random::Random;
 use lapswarm::report::Figure;
 use lapswarm::study::identify::{self, IdentifySettings, ObjectiveChoice};
 use lapswarm::study::raceline::{self, RacelineSettings, ReferenceSolvers};
-use lapswarm::swarm::comparison::{MULTI_OBJECTIVE, Sizes, quartiles, several};
+use lapswarm::swarm::comparison::quartiles;
 use lapswarm::swarm::metrics::hypervolume;
+use lapswarm::swarm::{MULTI_OBJECTIVE, Sizes, several_by_name};
 use lapswarm::{Error, Result};
 use serde::Serialize;
 use std::path::PathBuf;
@@ -163,14 +164,13 @@ impl Case {
                     .map(move |(k, v)| v.lower + random.uniform(CARS, 0, car, k as u32) * (v.upper - v.lower))
             })
             .collect();
-        let costs = open_evaluator(&replay, arguments.backend, arguments.adapter.as_deref())?
-            .evaluate(&cars)?
-            .objectives;
+        let costs =
+            open_evaluator(&replay, arguments.backend, arguments.adapter.as_deref())?.evaluate(&cars)?;
         let width = channels.len();
         let reference: Vec<f64> = (0..width)
             .map(|k| {
-                let column = costs.iter().skip(k).step_by(width);
-                quartiles(&column.copied().filter(|c| *c < FAILED_COST).collect::<Vec<_>>())[1]
+                let cost = |car: usize| costs.success(car, width).map(|row| row[k]);
+                quartiles(&(0..RANDOM_CARS).filter_map(cost).collect::<Vec<_>>())[1]
             })
             .collect();
         if reference.iter().any(|r| !r.is_finite()) {
@@ -399,7 +399,7 @@ fn measure(case: &Case, algorithm: &str, population: usize, arguments: &Argument
 fn follow(case: &Case, algorithm: &str, sizes: Sizes, arguments: &Arguments) -> Result<(History, f64)> {
     let mut evaluator = case.evaluator(arguments)?;
     let start = case.start(sizes.population, sizes.seed)?;
-    let mut optimiser = several(algorithm, case.problem(), sizes, &start)?;
+    let mut optimiser = several_by_name(algorithm, case.problem(), sizes, &start)?;
     drop(start);
     let mut history = History::default();
     let (mut seconds, mut evaluating, mut noted) = (0.0, 0.0, 0.0);
@@ -409,7 +409,7 @@ fn follow(case: &Case, algorithm: &str, sizes: Sizes, arguments: &Arguments) -> 
         let asked = began.elapsed().as_secs_f64();
         let evaluation = evaluator.evaluate(&population)?;
         evaluating += began.elapsed().as_secs_f64() - asked;
-        optimiser.tell(&evaluation);
+        optimiser.tell(&evaluation)?;
         seconds += began.elapsed().as_secs_f64();
         let done = optimiser.evaluations();
         if done as f64 >= SPACING * noted || optimiser.done() {
