@@ -41,7 +41,7 @@
 //! let mut swarm = Mopso::new(&problem, settings)?;
 //! while !swarm.done() {
 //!     let candidates = swarm.ask();
-//!     swarm.tell(&evaluator.evaluate(&candidates)?);
+//!     swarm.tell(&evaluator.evaluate(&candidates)?)?;
 //! }
 //! // On the front, the roots of the two objectives add up to the distance between their optima.
 //! for f in &swarm.front().objectives {
@@ -162,3 +162,4 @@ pub mod track;
 pub mod vehicle;
 
 pub use error::{Error, Place, Result};
+pub use swarm::{minimise, minimise_batch, minimise_several};

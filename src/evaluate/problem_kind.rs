@@ -1,7 +1,7 @@
 //! One kind of problem on every backend: what a kind says of itself, and the evaluators that follow from it.
 
 use super::simd::InstructionSet;
-use super::{BackendInfo, Evaluation, Evaluator, FAILED_COST, Failure, Problem, are_costs};
+use super::{BackendInfo, Evaluation, Evaluator, FAILED_COST, Failure, Problem, are_numbers};
 use crate::error::Result;
 use rayon::prelude::*;
 
@@ -14,7 +14,8 @@ pub trait ProblemKind: Sync + Sized {
     type Outcome: Send + Sync;
     /// The kernel in lanes, with its tables in single precision.
     type Lanes: LaneTables<Self>;
-    /// Why a candidate failed whose objectives are not finite or cost as much as a failure.
+    /// Why a candidate failed whose objectives are not finite numbers in single precision. Kernels compute in it, and every backend
+    /// refuses the same candidates.
     const WITHOUT_COST: Failure;
 
     /// Variables and objectives.
@@ -47,7 +48,7 @@ pub trait ProblemKind: Sync + Sized {
     ) -> (Vec<f64>, Option<Failure>) {
         let row = outcome.and_then(|outcome| {
             let row = self.objectives_of(candidate, outcome)?;
-            if are_costs(&row) {
+            if are_numbers(&row) {
                 Ok(row)
             } else {
                 Err(Self::WITHOUT_COST)

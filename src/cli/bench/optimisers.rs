@@ -4,9 +4,10 @@ use super::finish;
 use super::pages::of_optimisers;
 use crate::cli::measurement::Kept;
 use crate::cli::output::{Columns, line_of, outln};
-use lapswarm::swarm::comparison::{MULTI_OBJECTIVE, SINGLE_OBJECTIVE, compare, quartiles};
+use lapswarm::swarm::comparison::{compare, quartiles};
 use lapswarm::swarm::metrics::signed_rank;
 use lapswarm::swarm::problems::{NAMES, TestProblem};
+use lapswarm::swarm::{MULTI_OBJECTIVE, SINGLE_OBJECTIVE};
 use lapswarm::{Error, Result};
 use serde::Serialize;
 

@@ -8,13 +8,14 @@ use crate::cli::output::{Columns, line_of, outln};
 use clap::builder::PossibleValuesParser;
 use lapswarm::evaluate::line::{LineObjective, LineProblem};
 use lapswarm::evaluate::replay::{CHANNEL_NAMES, ReplayProblem};
-use lapswarm::evaluate::{BackendChoice, Evaluator, FAILED_COST, ProblemKind, open_evaluator};
+use lapswarm::evaluate::{BackendChoice, Evaluator, ProblemKind, open_evaluator};
 use lapswarm::random::Random;
 use lapswarm::report::Figure;
 use lapswarm::study::identify::{self, IdentifySettings, ObjectiveChoice};
 use lapswarm::study::raceline::{self, RacelineSettings, ReferenceSolvers};
-use lapswarm::swarm::comparison::{MULTI_OBJECTIVE, Sizes, quartiles, several};
+use lapswarm::swarm::comparison::quartiles;
 use lapswarm::swarm::metrics::hypervolume;
+use lapswarm::swarm::{MULTI_OBJECTIVE, Sizes, several_by_name};
 use lapswarm::{Error, Result};
 use serde::Serialize;
 use std::path::PathBuf;
@@ -163,13 +164,12 @@ fn identify(arguments: &Arguments) -> Result<Case<ReplayProblem>> {
         })
         .collect();
     let costs = open_evaluator(&replay, arguments.backend, arguments.adapter.as_deref())?
-        .evaluate(&cars)?
-        .objectives;
+        .evaluate(&cars)?;
     let width = channels.len();
     let reference: Vec<f64> = (0..width)
         .map(|k| {
-            let column = costs.iter().skip(k).step_by(width);
-            quartiles(&column.copied().filter(|c| *c < FAILED_COST).collect::<Vec<_>>())[1]
+            let cost = |car: usize| costs.success(car, width).map(|row| row[k]);
+            quartiles(&(0..RANDOM_CARS).filter_map(cost).collect::<Vec<_>>())[1]
         })
         .collect();
     if reference.iter().any(|r| !r.is_finite()) {
@@ -308,7 +308,7 @@ impl<K: ProblemKind> Case<K> {
     fn follow(&self, algorithm: &str, sizes: Sizes, arguments: &Arguments) -> Result<(History, f64)> {
         let mut evaluator = self.evaluator(arguments)?;
         let start = (self.start)(&self.kind, sizes.population, sizes.seed)?;
-        let mut optimiser = several(algorithm, self.kind.problem(), sizes, &start)?;
+        let mut optimiser = several_by_name(algorithm, self.kind.problem(), sizes, &start)?;
         drop(start);
         let mut history = History::default();
         let (mut seconds, mut evaluating, mut noted) = (0.0, 0.0, 0.0);
@@ -318,7 +318,7 @@ impl<K: ProblemKind> Case<K> {
             let asked = began.elapsed().as_secs_f64();
             let evaluation = evaluator.evaluate(&population)?;
             evaluating += began.elapsed().as_secs_f64() - asked;
-            optimiser.tell(&evaluation);
+            optimiser.tell(&evaluation)?;
             seconds += began.elapsed().as_secs_f64();
             let done = optimiser.evaluations();
             if done as f64 >= SPACING * noted || optimiser.done() {

@@ -219,7 +219,8 @@ fn on_the_host(problem: &TestProblem, settings: MopsoSettings) -> Result<Row> {
         let (asking, candidates) = timed(|| swarm.ask());
         let (others, evaluation) = timed(|| evaluator.evaluate(&candidates));
         let evaluation = evaluation?;
-        let (telling, ()) = timed(|| swarm.tell(&evaluation));
+        let (telling, told) = timed(|| swarm.tell(&evaluation));
+        told?;
         times.note(asking + telling, others);
     }
     let measured_by = if population < MANY {

@@ -160,6 +160,7 @@ impl Study for Identify {
 
     fn figures(outcome: &Outcome, summary: &Summary) -> Figures {
         let best = outcome.history.last().and_then(|row| row.best.first().copied());
+        let best = best.filter(|cost| cost.is_finite());
         let mut figures: Figures = [
             ("evaluations", Some(outcome.record.evaluations as f64)),
             ("best_cost", best),

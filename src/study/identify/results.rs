@@ -215,7 +215,8 @@ fn write_history(folder: &Path, outcome: &Outcome) -> Result<()> {
             1 => "best".to_owned(),
             _ => format!("best_{k}"),
         };
-        table = table.number(name, "", |r| r.best[k]);
+        // Nothing before a candidate has succeeded.
+        table = table.number(name, "", |r| Some(r.best[k]).filter(|best| best.is_finite()));
     }
     table
         .number("median", "", |r| r.median)

@@ -8,7 +8,7 @@ use super::setup::{CHANNELS, Setup};
 use super::state::{Front, HistoryRow, Place, SearchState, inputs_of};
 use crate::error::{Error, Result};
 use crate::evaluate::replay::{ReplayProblem, trace};
-use crate::evaluate::{Evaluator, FAILED_COST, FailureCounts, add_failures};
+use crate::evaluate::{Evaluator, FailureCounts, add_failures};
 use crate::study::framework::state_file::{Origin, StateFile};
 use crate::study::framework::{DeviceFaults, Progress as Told, RunRecord, Watch};
 use crate::swarm::metrics::Scale;
@@ -200,12 +200,12 @@ fn next_place(place: Place, settings: &IdentifySettings, evaluator: &mut dyn Eva
     if let Place::Explore(swarm) = &place
         && settings.algorithm == Algorithm::Adaptive
     {
-        let (best, cost) = swarm.best_candidate();
+        let (best, worth) = swarm.best_candidate();
         let seen = Logarithmic::new(evaluator);
         let swarm = CovarianceSwarm::new(seen.problem(), &seen.of_parameters(&best), gathering(settings))?;
         return Ok(Place::Gather {
             best,
-            cost,
+            worth,
             swarm: Box::new(swarm),
         });
     }
@@ -215,23 +215,23 @@ fn next_place(place: Place, settings: &IdentifySettings, evaluator: &mut dyn Eva
 
 /// The best candidate that a search has come to, and the front of a search that has one.
 fn best_so_far(place: &Place, evaluator: &mut dyn Evaluator) -> Result<(Vec<f64>, Option<Front>)> {
-    let (best, cost) = match place {
+    let (best, worth) = match place {
         Place::Searched { best, front } => return Ok((best.clone(), front.clone())),
         Place::Front(swarm) => {
             let front = front_of(swarm).ok_or_else(nothing_drives)?;
             return Ok((front.candidates[front.chosen].clone(), Some(front)));
         }
         Place::Explore(swarm) => swarm.best_candidate(),
-        Place::Gather { best, cost, swarm } => {
+        Place::Gather { best, worth, swarm } => {
             let (gathered, least) = swarm.best_candidate();
-            if least < *cost {
+            if least < *worth {
                 (Logarithmic::new(evaluator).to_parameters(&gathered), least)
             } else {
-                (best.clone(), *cost)
+                (best.clone(), *worth)
             }
         }
     };
-    if cost >= FAILED_COST {
+    if !worth.succeeded() {
         return Err(nothing_drives());
     }
     Ok((best, None))

@@ -4,7 +4,7 @@ use super::coordinates::Logarithmic;
 use super::settings::IdentifySettings;
 use super::setup::Setup;
 use crate::error::Result;
-use crate::evaluate::{Evaluator, FailureCounts};
+use crate::evaluate::{Evaluator, FailureCounts, Worth};
 use crate::study::framework::state_file::Origin;
 use crate::study::framework::{Inputs, State};
 use crate::swarm::checkpoint::Checkpoint;
@@ -49,7 +49,7 @@ pub(super) enum Place {
     /// The swarm that learns the valley, and the best before it.
     Gather {
         best: Vec<f64>,
-        cost: f64,
+        worth: Worth,
         swarm: Box<CovarianceSwarm>,
     },
     /// The swarms are done.

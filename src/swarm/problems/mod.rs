@@ -191,7 +191,7 @@ impl TestProblem {
 
     /// An evaluator on all threads, for populations that are worth it.
     pub fn threaded_evaluator(&self) -> PointEvaluator<impl Fn(&[f64], &mut [f64]) + Sync> {
-        self.evaluator_on(CallCost::Dear)
+        self.evaluator_on(CallCost::Expensive)
     }
 
     fn evaluator_on(&self, cost: CallCost) -> PointEvaluator<impl Fn(&[f64], &mut [f64]) + Sync> {
