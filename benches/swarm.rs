@@ -34,7 +34,7 @@ fn in_stride<T: Optimiser>(mut optimiser: T, problem: &TestProblem) -> (T, Evalu
     for _ in 0..BEFORE {
         let candidates = optimiser.ask();
         let evaluation = evaluator.evaluate(&candidates).expect("no device");
-        optimiser.tell(&evaluation);
+        optimiser.tell(&evaluation).expect("its own");
     }
     let candidates = optimiser.ask();
     let evaluation = evaluator.evaluate(&candidates).expect("no device");
@@ -62,7 +62,7 @@ fn generations(criterion: &mut Criterion) {
             let id = BenchmarkId::new(format!("mopso, {objectives} objectives"), population);
             group.bench_function(id, |bencher| {
                 let generation = |mut swarm: Mopso| {
-                    swarm.tell(&told);
+                    swarm.tell(&told).expect("its own");
                     (swarm.ask(), swarm)
                 };
                 bencher.iter_batched(|| swarm.clone(), generation, BatchSize::LargeInput);
@@ -76,7 +76,7 @@ fn generations(criterion: &mut Criterion) {
             let id = BenchmarkId::new(format!("nsga2, {objectives} objectives"), population);
             group.bench_function(id, |bencher| {
                 let generation = |mut genetic: Nsga2| {
-                    genetic.tell(&told);
+                    genetic.tell(&told).expect("its own");
                     (genetic.ask(), genetic)
                 };
                 bencher.iter_batched(|| genetic.clone(), generation, BatchSize::LargeInput);

@@ -5,7 +5,7 @@
 //!
 //! `cargo run --release --example own_optimiser`
 
-use lapswarm::evaluate::{Evaluation, Problem};
+use lapswarm::evaluate::{Evaluation, Problem, Worth};
 use lapswarm::random::Random;
 use lapswarm::swarm::problems::TestProblem;
 use lapswarm::swarm::{Counters, Front, Optimiser, run};
@@ -16,7 +16,7 @@ const CHILDREN: usize = 20;
 struct Scatter<'a> {
     problem: &'a Problem,
     best: Vec<f64>,
-    cost: f64,
+    worth: Worth,
     asked: Vec<f64>,
     counters: Counters,
 }
@@ -36,15 +36,16 @@ impl Optimiser for Scatter<'_> {
         self.asked.clone()
     }
 
-    fn tell(&mut self, evaluation: &Evaluation) {
-        let costs = evaluation.costs(self.problem.objectives.len());
-        for (child, cost) in self.asked.chunks_exact(self.best.len()).zip(costs) {
-            if cost < self.cost {
-                (self.best, self.cost) = (child.to_vec(), cost);
+    fn tell(&mut self, evaluation: &Evaluation) -> lapswarm::Result<()> {
+        evaluation.check(CHILDREN, 1)?;
+        for (child, worth) in self.asked.chunks_exact(self.best.len()).zip(evaluation.worths(1)) {
+            if worth < self.worth {
+                (self.best, self.worth) = (child.to_vec(), worth);
             }
         }
         self.counters.iteration += 1;
         self.counters.evaluations += CHILDREN as u64;
+        Ok(())
     }
 
     fn counters(&self) -> Counters {
@@ -56,14 +57,14 @@ impl Optimiser for Scatter<'_> {
     }
 
     fn best(&self) -> Vec<f64> {
-        vec![self.cost]
+        vec![self.worth.cost]
     }
 
     fn front(&self) -> Front {
-        let (candidates, objectives) = (vec![self.best.clone()], vec![self.best()]);
         Front {
-            candidates,
-            objectives,
+            candidates: vec![self.best.clone()],
+            objectives: vec![self.best()],
+            violation: self.worth.violation,
         }
     }
 }
@@ -75,7 +76,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut scatter = Scatter {
         problem,
         best,
-        cost: f64::INFINITY,
+        worth: Worth::FAILED,
         asked: Vec::new(),
         counters: Counters::default(),
     };
@@ -84,10 +85,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     })?;
     println!(
         "{:.1e} from the optimum after {} evaluations",
-        scatter.cost,
+        scatter.worth.cost,
         scatter.evaluations()
     );
-    if scatter.cost > 1e-6 {
+    if scatter.worth.cost > 1e-6 {
         return Err("the optimiser did not converge".into());
     }
     Ok(())

@@ -5,7 +5,7 @@
 //!
 //! `cargo run --release --example own_problem`
 
-use lapswarm::evaluate::point::{CallCost, PointEvaluator};
+use lapswarm::evaluate::point::{CallCost, Constraint, PointEvaluator};
 use lapswarm::evaluate::{Evaluator, Objective, Problem, Variable};
 use lapswarm::swarm::{HybridSettings, HybridSwarm, Optimiser};
 use std::f64::consts::PI;
@@ -22,7 +22,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         objectives: vec![Objective::new("sheet metal", "m^2")],
     };
     // One constraint `G <= 0`, written behind the objective: the volume that is missing, as a share of what is wanted.
-    let mut evaluator = PointEvaluator::constrained(problem.clone(), 1, CallCost::Cheap, |x, f| {
+    let constraints = vec![Constraint::at_most_zero()];
+    let mut evaluator = PointEvaluator::constrained(problem.clone(), constraints, CallCost::Cheap, |x, f| {
         let (radius, height) = (x[0], x[1]);
         f[0] = 2.0 * PI * radius * (radius + height);
         f[1] = 1.0 - PI * radius * radius * height / VOLUME_M3;
@@ -36,14 +37,14 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     while !swarm.done() {
         let candidates = swarm.ask();
         let evaluation = evaluator.evaluate(&candidates)?;
-        swarm.tell(&evaluation);
+        swarm.tell(&evaluation)?;
     }
 
-    let (best, sheet_m2) = swarm.best_candidate();
+    let (best, worth) = swarm.best_candidate();
     let expected_m = (VOLUME_M3 / (2.0 * PI)).cbrt();
     println!(
-        "radius {:.4} m, height {:.4} m: {sheet_m2:.4} m^2 of sheet",
-        best[0], best[1]
+        "radius {:.4} m, height {:.4} m: {:.4} m^2 of sheet",
+        best[0], best[1], worth.cost
     );
     println!(
         "known optimum: radius {expected_m:.4} m, height {:.4} m",

@@ -30,7 +30,6 @@ struct Generation {
 
 const BLOCK: u32 = 64u;
 const UNKNOWN: f32 = 3.4028234e38;
-const FAILED_COST: f32 = 1e9;
 const SCALE: f32 = 0.5;
 const CROSSOVER: f32 = 0.3;
 
@@ -52,9 +51,11 @@ const RECOMBINE: u32 = 9u;
 @group(0) @binding(4) var<storage, read_write> best_position: array<f32>;
 @group(0) @binding(5) var<storage, read_write> best_objectives: array<f32>;
 @group(0) @binding(6) var<storage, read_write> objectives: array<f32>;
-// How many points no member dominates or equals, then those: the particle and its objectives, three to each.
+// How many points no member dominates or equals, and how many particles failed; then those points: the particle and its
+// objectives, three to each.
 struct Found {
     count: atomic<u32>,
+    failed: atomic<u32>,
     points: array<vec4<u32>>,
 }
 @group(0) @binding(7) var<storage, read_write> found: Found;
@@ -113,9 +114,10 @@ fn learn(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) 
         let best = best_objectives[i];
         no_worse = no_worse && value <= best;
         no_better = no_better && best <= value;
-        sound = sound && is_finite(value) && value < FAILED_COST;
+        sound = sound && is_finite(value) && abs(value) < UNKNOWN;
         at[k] = value;
     }
+    if !sound { atomicAdd(&found.failed, 1u); }
     let heads = words(COIN, who, 0u).x < 0x80000000u;
     let better = no_worse && !no_better;
     let open = no_worse == no_better;

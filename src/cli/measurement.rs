@@ -6,6 +6,7 @@ use lapswarm::report::HtmlReport;
 use lapswarm::study::framework::run_folder::{self, Manifest, RunFolder, write_json};
 use lapswarm::study::framework::{RunRecord, Subject};
 use serde::Serialize;
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 /// Where a measurement is kept.
@@ -16,34 +17,6 @@ pub struct Kept {
     out: Option<PathBuf>,
 }
 
-/// What measured.
-pub struct Machine {
-    backends: String,
-    adapter: String,
-    driver: String,
-}
-
-impl Machine {
-    /// Of the names of backends, the GPU among them being that of the flag `--adapter`.
-    pub fn of<'a>(backends: impl IntoIterator<Item = &'a str>, adapter: Option<&str>) -> Result<Self> {
-        let mut names: Vec<&str> = backends.into_iter().collect();
-        names.sort_unstable();
-        names.dedup();
-        let gpu = names.contains(&"gpu");
-        let choice = if gpu {
-            BackendChoice::Gpu
-        } else {
-            BackendChoice::Simd
-        };
-        let info = choice.would_be(adapter.filter(|_| gpu))?;
-        Ok(Self {
-            backends: names.join(", "),
-            adapter: info.device,
-            driver: info.driver,
-        })
-    }
-}
-
 impl Kept {
     /// The folder, if one is asked for; refused before anything is measured.
     pub fn folder(&self, study: &str) -> Result<Option<RunFolder>> {
@@ -52,37 +25,48 @@ impl Kept {
     }
 }
 
-/// Writes `summary.json`, `report.html` and `manifest.json`, and ends the page with what measured.
-pub fn write(
+/// Names, each once.
+pub fn distinct<'a>(names: impl IntoIterator<Item = &'a str>) -> Vec<&'a str> {
+    let names: BTreeSet<&str> = names.into_iter().collect();
+    names.into_iter().collect()
+}
+
+/// Keeps what was measured: writes `summary.json`, `manifest.json` and `report.html`, whose page ends with what measured. The GPU
+/// among the backends is that of the flag `--adapter`.
+pub fn keep<'a>(
     folder: &RunFolder,
     study: &'static str,
     summary: &impl Serialize,
     mut page: HtmlReport,
-    machine: &Machine,
+    (backends, adapter): (impl IntoIterator<Item = &'a str>, Option<&str>),
 ) -> Result<()> {
+    let backends = distinct(backends);
+    let measured_by = if backends.contains(&"gpu") {
+        BackendChoice::Gpu.would_be(adapter)?
+    } else {
+        BackendChoice::Simd.would_be(None)?
+    };
+    let record = RunRecord {
+        backend: backends.join(", "),
+        ..RunRecord::of(&measured_by)
+    };
     write_json(&folder.join("summary.json"), summary)?;
-    page.provenance("backends", &machine.backends);
-    page.provenance("adapter", &machine.adapter);
-    page.provenance("driver", &machine.driver);
-    page.provenance(
-        "threads",
-        std::thread::available_parallelism().map_or(String::new(), |n| n.to_string()),
-    );
-    page.provenance(
-        "system",
-        format!("{} {}", std::env::consts::OS, std::env::consts::ARCH),
-    );
+    let threads = std::thread::available_parallelism().map_or(String::new(), |n| n.to_string());
+    page.facts(&[
+        ("backends", &record.backend),
+        ("adapter", &record.adapter),
+        ("driver", &record.driver),
+        ("threads", &threads),
+        (
+            "system",
+            &format!("{} {}", std::env::consts::OS, std::env::consts::ARCH),
+        ),
+    ]);
     page.write(folder.join("report.html"))?;
     // Last: it says that the run is whole.
     let subject = Subject {
         seed: 1,
         ..Subject::default()
-    };
-    let record = RunRecord {
-        backend: machine.backends.clone(),
-        adapter: machine.adapter.clone(),
-        driver: machine.driver.clone(),
-        ..RunRecord::default()
     };
     let manifest = Manifest::new(study, &subject, &record, "");
     write_json(&folder.join("manifest.json"), &manifest)

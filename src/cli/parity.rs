@@ -1,8 +1,8 @@
 //! `lapswarm parity`.
 
-use super::measurement::{self, Kept, Machine};
+use super::measurement::{Kept, keep};
 use super::{backend_flag, print_json};
-use crate::cli::output::outln;
+use crate::cli::output::{Columns, line_of, outln};
 use lapswarm::evaluate::BackendChoice;
 use lapswarm::evaluate::gpu::{DeviceSummary, devices};
 use lapswarm::files::write_whole;
@@ -54,6 +54,26 @@ struct Report {
     pass: bool,
 }
 
+/// The table on a terminal.
+const COLUMNS: &Columns<Agreement> = &[
+    ("kernel", -46, Agreement::key),
+    ("figures", 10, |a| a.figures.to_string()),
+    ("relative", 12, |a| format!("{:.1e}", a.max_relative)),
+    ("ULP", 10, |a| format!("{:.1}", a.max_ulp)),
+    ("of what may be", 16, |a| {
+        format!("{:.1}%", 100.0 * a.share_of_tolerance)
+    }),
+];
+
+/// Whether the bits are those of the plain scalar.
+fn bits(agreement: &Agreement) -> &'static str {
+    match agreement.bits_as_scalar {
+        Some(true) => "yes",
+        Some(false) => "no",
+        None => "-",
+    }
+}
+
 /// Compares and prints.
 pub fn run(arguments: &Arguments) -> Result<()> {
     if let Some(path) = arguments.file.as_ref().filter(|p| p.exists()) {
@@ -79,35 +99,16 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         if device.is_none() && arguments.backend == BackendChoice::Auto && devices().is_empty() {
             outln!("no GPU: neither Vulkan, Metal nor DX12 found an adapter");
         }
-        outln!(
-            "{:<46}{:>10}{:>12}{:>10}{:>16}  bits as f32",
-            "kernel",
-            "figures",
-            "relative",
-            "ULP",
-            "of what may be"
-        );
+        outln!("{}  bits as f32", line_of(COLUMNS, None));
     }
     let found = compare(&subjects, |a| {
         if !arguments.quiet {
-            outln!(
-                "{:<46}{:>10}{:>12.1e}{:>10.1}{:>15.1}%  {}{}",
-                a.key(),
-                a.figures,
-                a.max_relative,
-                a.max_ulp,
-                100.0 * a.share_of_tolerance,
-                match a.bits_as_scalar {
-                    Some(true) => "yes",
-                    Some(false) => "no",
-                    None => "-",
-                },
-                if a.pass {
-                    String::new()
-                } else {
-                    format!("  FAILS: {}", a.worst)
-                }
-            );
+            let fails = if a.pass {
+                String::new()
+            } else {
+                format!("  FAILS: {}", a.worst)
+            };
+            outln!("{}  {}{fails}", line_of(COLUMNS, Some(a)), bits(a));
         }
     })?;
     let pass = found.iter().all(|a| a.pass);
@@ -138,8 +139,14 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             Subject::Device(_) => "gpu",
             Subject::Lanes(_) => "simd",
         });
-        let machine = Machine::of(names, arguments.adapter.as_deref())?;
-        measurement::write(folder, "parity", &report, page_of(folder, &report)?, &machine)?;
+        let page = page_of(folder, &report)?;
+        keep(
+            folder,
+            "parity",
+            &report,
+            page,
+            (names, arguments.adapter.as_deref()),
+        )?;
     }
     if !arguments.quiet {
         if let Some(folder) = &folder {
@@ -229,10 +236,7 @@ fn page_of(folder: &Path, report: &Report) -> Result<HtmlReport> {
         .number("greatest relative difference", "", |a| a.max_relative)
         .number("greatest difference", "ULP", |a| a.max_ulp)
         .number("of what may be", "%", |a| 100.0 * a.share_of_tolerance)
-        .text("bits as f32", |a| {
-            a.bits_as_scalar
-                .map_or("-", |same| if same { "yes" } else { "no" })
-        })
+        .text("bits as f32", |a| bits(a))
         .text("furthest off", |a| &*a.worst)
         .table();
     table.write_csv(folder.join("kernels.csv"))?;

@@ -4,38 +4,55 @@
 //! it. Optimisers see nothing else, so they run any problem on any backend.
 
 mod backend;
+mod dispatches;
+#[cfg(feature = "vehicle")]
 pub mod drive;
+#[cfg(feature = "vehicle")]
 pub mod energy;
-mod fallback;
+#[cfg(feature = "vehicle")]
 mod free_car;
+#[cfg(feature = "gpu")]
 pub mod gpu;
+#[cfg(not(feature = "gpu"))]
+#[path = "no_gpu.rs"]
+pub mod gpu;
+mod ill_formed;
+#[cfg(feature = "vehicle")]
 pub mod line;
+#[cfg(feature = "vehicle")]
 mod model_table;
+#[cfg(feature = "vehicle")]
 mod objectives;
 mod open;
 mod packed;
+#[cfg(feature = "vehicle")]
 mod packs;
 pub mod point;
 pub mod portions;
 mod problem_kind;
+#[cfg(feature = "vehicle")]
 pub mod replay;
 pub mod resident;
 pub mod simd;
+#[cfg(feature = "vehicle")]
 pub mod steady;
 
 pub use backend::BackendChoice;
-pub use fallback::FallbackEvaluator;
+#[cfg(feature = "vehicle")]
 pub use free_car::FreeCar;
+pub use gpu::OnDevice;
+#[cfg(feature = "gpu")]
+pub use gpu::{DeviceKernel, FallbackEvaluator, GpuBackend};
+pub use ill_formed::IllFormed;
+#[cfg(feature = "vehicle")]
 pub use model_table::ModelTable;
 pub use open::open_evaluator;
 pub use packed::{PackedClient, run_packed};
-pub use problem_kind::{
-    CpuBackend, DeviceKernel, GpuBackend, LaneTables, OutcomeOf, ProblemKind, SimdBackend,
-};
+pub use problem_kind::{CpuBackend, LaneTables, OutcomeOf, ProblemKind, SimdBackend};
 
-use crate::error::Result;
-use crate::vehicle::tyre::IllFormed;
+use crate::error::{Error, Result};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use std::cmp::Ordering;
 use std::collections::BTreeMap;
 use std::fmt;
 
@@ -103,13 +120,8 @@ pub struct Problem {
     pub objectives: Vec<Objective>,
 }
 
-/// The cost of a candidate that failed: the worst finite one, on every backend.
-pub const FAILED_COST: f64 = 1e9;
-
-/// Whether a candidate with these objectives did not fail.
-pub(crate) fn are_costs(row: &[f64]) -> bool {
-    row.iter().all(|x| x.is_finite() && *x < FAILED_COST)
-}
+/// What stands in the row of objectives of a candidate that failed. It is no cost: [`Evaluation::failures`] says what failed.
+pub const FAILED_COST: f64 = f64::INFINITY;
 
 /// Whether all figures of a candidate are finite numbers in single precision. Most backends compute in it, and every backend
 /// refuses the same candidates.
@@ -138,6 +150,8 @@ pub enum Failure {
     NotFinite,
     /// An objective was not a finite number.
     Undefined,
+    /// An objective was not a finite number in single precision.
+    BeyondSinglePrecision,
 }
 
 impl Failure {
@@ -153,6 +167,7 @@ impl Failure {
             Self::OffTheEnvelope => "off_the_envelope",
             Self::NotFinite => "variable_not_finite",
             Self::Undefined => "objective_not_finite",
+            Self::BeyondSinglePrecision => "objective_beyond_single_precision",
         }
     }
 }
@@ -192,6 +207,9 @@ impl fmt::Display for Failure {
             Self::OffTheEnvelope => f.write_str("has no grip to hold the speed"),
             Self::NotFinite => f.write_str("a variable that is not a finite number"),
             Self::Undefined => f.write_str("an objective that is not a finite number"),
+            Self::BeyondSinglePrecision => {
+                f.write_str("an objective that is not a finite number in single precision")
+            }
         }
     }
 }
@@ -199,7 +217,7 @@ impl fmt::Display for Failure {
 /// The objectives of a population.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Evaluation {
-    /// Row-major `n` by number of objectives; [`FAILED_COST`] where a candidate failed.
+    /// Row-major `n` by number of objectives; any finite number is a cost. [`FAILED_COST`] where a candidate failed.
     pub objectives: Vec<f64>,
     /// Why a candidate failed, one per candidate.
     pub failures: Vec<Option<Failure>>,
@@ -209,54 +227,86 @@ pub struct Evaluation {
     pub violations: Vec<f64>,
 }
 
-/// Costs from here up to [`FAILED_COST`] stand for a violation of constraints, see [`violation_of`]. Feasible candidates cost
-/// less.
-pub const INFEASIBLE_COST: f64 = 536_870_912.0;
-
-/// A cost above all feasible ones and below that of a failure, in the order of violations: their leading 52 bits on top of
-/// those of [`INFEASIBLE_COST`].
-fn infeasible(violation: f64) -> f64 {
-    f64::from_bits(INFEASIBLE_COST.to_bits() + (violation.to_bits() >> 12))
+/// What a candidate of one objective is worth. The violation counts first, then the cost (Deb's rules).
+#[derive(Clone, Copy, Debug, PartialEq, PartialOrd, Serialize, Deserialize)]
+pub struct Worth {
+    /// By how much it violates its constraints; infinite if it failed.
+    pub violation: f64,
+    /// Its cost; infinite if it failed.
+    pub cost: f64,
 }
 
-/// The violation that a cost stands for (to 40 bits), if the candidate violates its constraints.
-pub fn violation_of(cost: f64) -> Option<f64> {
-    let infeasible = (INFEASIBLE_COST..FAILED_COST).contains(&cost);
-    infeasible.then(|| f64::from_bits((cost.to_bits() - INFEASIBLE_COST.to_bits()) << 12))
+impl Worth {
+    /// Of a candidate that failed, and of none at all.
+    pub const FAILED: Self = Self {
+        violation: f64::INFINITY,
+        cost: f64::INFINITY,
+    };
+
+    /// Whether there is such a candidate and it did not fail.
+    pub fn succeeded(&self) -> bool {
+        self.violation < f64::INFINITY
+    }
+
+    /// The order from the best to the worst.
+    pub fn order(&self, other: &Self) -> Ordering {
+        let by_violation = self.violation.total_cmp(&other.violation);
+        by_violation.then(self.cost.total_cmp(&other.cost))
+    }
 }
 
 impl Evaluation {
+    /// Checks that this is of so many candidates and objectives.
+    ///
+    /// # Errors
+    /// [`Error::Input`] naming the column that is too short or too long.
+    pub fn check(&self, candidates: usize, objectives: usize) -> Result<()> {
+        let columns = [
+            (
+                "objectives",
+                self.objectives.len(),
+                candidates.saturating_mul(objectives),
+            ),
+            ("failures", self.failures.len(), candidates),
+            ("violations", self.violations.len(), candidates),
+        ];
+        for (name, found, expected) in columns {
+            if found != expected && !(name == "violations" && found == 0) {
+                let expected = format!("{expected}, for {candidates} candidates of {objectives} objectives");
+                return Err(Error::input("the evaluation", name, found.to_string(), expected));
+            }
+        }
+        Ok(())
+    }
+
     /// By how much a candidate violates its constraints: zero if it violates none, infinite if the sum is not a number.
     pub fn violation(&self, candidate: usize) -> f64 {
         match self.violations.get(candidate) {
             None => 0.0,
             Some(v) if v.is_nan() => f64::INFINITY,
-            Some(v) => v.max(0.0),
+            // Zero has two signs and one place.
+            Some(v) => v.max(0.0) + 0.0,
         }
     }
 
-    /// The first of `width` objectives of every candidate as one figure to compare by: [`FAILED_COST`] for one that failed,
-    /// and between that and what is feasible those that violate constraints, see [`violation_of`].
-    pub fn costs(&self, width: usize) -> Vec<f64> {
-        let rows = self.objectives.chunks_exact(width).enumerate();
-        rows.map(|(i, row)| {
-            let violation = self.violation(i);
-            if !row[0].is_finite() || row[0] >= FAILED_COST || violation == f64::INFINITY {
-                // A cost beyond that of a failure is still a cost.
-                if row[0].is_finite() && self.violations.is_empty() {
-                    row[0]
-                } else {
-                    FAILED_COST
-                }
-            } else if violation > 0.0 {
-                infeasible(violation)
-            } else if self.violations.is_empty() {
-                row[0]
-            } else {
-                row[0].min(INFEASIBLE_COST.next_down())
-            }
-        })
-        .collect()
+    /// The objectives of a candidate of `width` objectives, unless it failed. One whose figures are not finite numbers has failed,
+    /// whatever its flag says.
+    pub fn success(&self, candidate: usize, width: usize) -> Option<&[f64]> {
+        let row = &self.objectives[candidate * width..(candidate + 1) * width];
+        let finite = row.iter().all(|x| x.is_finite()) && self.violation(candidate).is_finite();
+        (self.failures[candidate].is_none() && finite).then_some(row)
+    }
+
+    /// What every candidate is worth by the first of `width` objectives.
+    pub fn worths(&self, width: usize) -> Vec<Worth> {
+        let worth = |i: usize| match self.success(i, width) {
+            Some(row) => Worth {
+                violation: self.violation(i),
+                cost: row[0],
+            },
+            None => Worth::FAILED,
+        };
+        (0..self.failures.len()).map(worth).collect()
     }
 
     /// The part of some of the candidates, of `width` objectives.
@@ -358,7 +408,13 @@ pub trait Evaluator {
         &[]
     }
 
-    /// Scores `population`: row-major, `n` by number of variables, values within their bounds.
+    /// Time that a device itself spent on the last evaluation (ms); `None` where none can tell.
+    fn last_kernel_ms(&self) -> Option<f64> {
+        None
+    }
+
+    /// Scores `population`: row-major, `n` by number of variables, values within their bounds. Every candidate has a row of
+    /// objectives and a place among the failures.
     ///
     /// # Errors
     /// [`crate::Error::Device`] if the device fails. A candidate that fails is not an error.

@@ -3,7 +3,7 @@
 use super::point_mass::PointMass;
 use super::profile::{LapProfile, lap_profile};
 use super::spline::Spline;
-use crate::error::{Error, Result};
+use crate::error::{Error, Place, Result};
 use glam::DVec2;
 
 /// A line on a fine grid, which shows wiggles between coarse points.
@@ -54,7 +54,7 @@ impl FineLine {
         let segments = n - usize::from(!closed);
         if let Some(i) = (0..segments).find(|&i| !(apart(i) > 1e-6 && apart(i).is_finite())) {
             let found = format!("{} m to the next", apart(i));
-            return Err(Error::input("line", format!("point {i}"), found, "points apart"));
+            return Err(Error::input("line", Place::point(i + 1), found, "points apart"));
         }
         if !(0.01..=1000.0).contains(&spacing_m) {
             return Err(Error::input(

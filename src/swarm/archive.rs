@@ -5,7 +5,6 @@ use super::metrics::{Columns, dominates, non_dominated};
 use super::settings::{MopsoSettings, Truncation, setting};
 use super::space::Space;
 use crate::error::Result;
-use crate::evaluate::FAILED_COST;
 use serde::{Deserialize, Serialize};
 
 /// A bounded set of non-dominated solutions; all objectives are minimised.
@@ -210,9 +209,9 @@ impl Archive {
         left
     }
 
-    /// The least value of each of so many objectives; [`FAILED_COST`] without members.
+    /// The least value of each of so many objectives; infinite without members.
     pub fn best(&self, objectives: usize) -> Vec<f64> {
-        let least = |k: usize| self.objectives.iter().map(|m| m[k]).fold(FAILED_COST, f64::min);
+        let least = |k: usize| self.objectives.iter().map(|m| m[k]).fold(f64::INFINITY, f64::min);
         (0..objectives).map(least).collect()
     }
 
@@ -221,6 +220,7 @@ impl Archive {
         Front {
             candidates: self.positions.iter().map(|p| space.scaled(p, 1)).collect(),
             objectives: self.objectives.clone(),
+            violation: self.violation,
         }
     }
 

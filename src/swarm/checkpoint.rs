@@ -6,9 +6,9 @@
 //! torn or of another state is refused. It is written beside its place and then moved there, so that a run that is
 //! interrupted while it writes leaves the last one whole.
 
-use super::device::DeviceState;
 use super::{
-    CooperativeSwarm, CovarianceSwarm, DifferenceSwarm, HybridSwarm, Islands, Mopso, Nsga2, Pso, WindowSwarm,
+    CooperativeSwarm, CovarianceSwarm, DifferenceSwarm, HybridSwarm, Islands, Mopso, Nsga2, Optimiser, Pso,
+    WindowSwarm,
 };
 use crate::config::{check_memory, memory_limit, read_bytes, read_start};
 use crate::error::{Error, Result};
@@ -18,7 +18,7 @@ use serde::de::DeserializeOwned;
 use std::path::Path;
 
 /// The format that this version writes, and the only one that it reads. It changes with the fields of any state.
-pub const VERSION: u32 = 3;
+pub const VERSION: u32 = 4;
 
 const MAGIC: &[u8; 8] = b"LAPSWARM";
 /// Bytes of that and the version.
@@ -36,10 +36,33 @@ macro_rules! checkpoints {
     };
 }
 
+/// Reads the bytes of a checkpoint of an optimiser; the path is what errors call them.
+type Reader = fn(&[u8], &Path) -> Result<Box<dyn Optimiser + Send>>;
+
+macro_rules! readers {
+    ($($state:ty),* $(,)?) => {
+        [$((<$state>::KIND, |bytes, file| Ok(Box::new(from_bytes::<$state>(bytes, file)?)))),*]
+    };
+}
+
+/// The states that are optimisers.
+const READERS: [(&str, Reader); 11] = readers![
+    CooperativeSwarm,
+    CovarianceSwarm,
+    DifferenceSwarm,
+    HybridSwarm,
+    Mopso,
+    Nsga2,
+    Pso,
+    WindowSwarm,
+    Islands<Mopso>,
+    Islands<Pso>,
+    Islands<DifferenceSwarm>,
+];
+
 checkpoints! {
     CooperativeSwarm: "cooperative swarm",
     CovarianceSwarm: "covariance swarm",
-    DeviceState: "swarm of a device",
     DifferenceSwarm: "difference swarm",
     HybridSwarm: "hybrid swarm",
     Mopso: "multi-objective swarm",
@@ -72,18 +95,47 @@ pub fn to_bytes<T: Checkpoint>(state: &T) -> Result<Vec<u8>> {
 /// The state in the bytes of a checkpoint; `file` is what errors call them.
 ///
 /// # Errors
-/// [`Error::Input`] if they are no checkpoint, of a newer version, damaged, or of another kind of state.
+/// [`Error::Input`] if they are no checkpoint, of another version, damaged, or of another kind of state.
 pub fn from_bytes<T: Checkpoint>(bytes: &[u8], file: &Path) -> Result<T> {
+    let (kind, state) = opened(bytes, file)?;
+    if kind != T::KIND.as_bytes() {
+        return Err(other_kind(kind, file, &format!("a {}", T::KIND)));
+    }
+    postcard::from_bytes(state).map_err(|_| damaged(file))
+}
+
+/// The optimiser in the bytes of a checkpoint, whichever it is; `file` is what errors call them.
+///
+/// # Errors
+/// As [`from_bytes`].
+pub fn optimiser_from_bytes(bytes: &[u8], file: &Path) -> Result<Box<dyn Optimiser + Send>> {
+    let (kind, _) = opened(bytes, file)?;
+    match READERS.iter().find(|(known, _)| known.as_bytes() == kind) {
+        Some((_, read)) => read(bytes, file),
+        None => Err(other_kind(kind, file, "an optimiser")),
+    }
+}
+
+fn damaged(file: &Path) -> Error {
+    Error::input(
+        file,
+        "checkpoint",
+        "a damaged one",
+        "a whole one, as it was written",
+    )
+}
+
+fn other_kind(kind: &[u8], file: &Path, expected: &str) -> Error {
+    let found = format!("a {}", String::from_utf8_lossy(kind));
+    Error::input(file, "state in the checkpoint", found, expected)
+}
+
+/// The name of the kind of state in the bytes of a checkpoint, and the state.
+fn opened<'b>(bytes: &'b [u8], file: &Path) -> Result<(&'b [u8], &'b [u8])> {
     let wrong = |place: &str, found: String, expected: String| Error::input(file, place, found, expected);
-    let damaged = || {
-        wrong(
-            "checkpoint",
-            "a damaged one".to_owned(),
-            "a whole one, as it was written".to_owned(),
-        )
-    };
+    let damaged = || damaged(file);
     let mut rest = bytes;
-    let mut take = |count: usize| -> Option<&[u8]> {
+    let mut take = |count: usize| -> Option<&'b [u8]> {
         let (head, tail) = rest.split_at_checked(count)?;
         rest = tail;
         Some(head)
@@ -108,16 +160,12 @@ pub fn from_bytes<T: Checkpoint>(bytes: &[u8], file: &Path) -> Result<T> {
     }
     let length = word(take(4)).ok_or_else(damaged)? as usize;
     let kind = take(length).ok_or_else(damaged)?;
-    if kind != T::KIND.as_bytes() {
-        let found = format!("a {}", String::from_utf8_lossy(kind));
-        return Err(wrong("state in the checkpoint", found, format!("a {}", T::KIND)));
-    }
     let length = take(8).and_then(|b| b.try_into().ok()).map(u64::from_le_bytes);
     let payload = length
         .and_then(|length| usize::try_from(length).ok())
         .and_then(&mut take)
         .ok_or_else(damaged)?;
-    postcard::from_bytes(payload).map_err(|_| damaged())
+    Ok((kind, payload))
 }
 
 /// Keeps `state` in the file `path`, in the place of what may be there from before.
@@ -136,20 +184,40 @@ pub fn load<T: Checkpoint>(path: &Path) -> Result<T> {
     load_within(path, memory_limit())
 }
 
+/// Keeps the state of an optimiser in the file `path`, in the place of what may be there from before.
+///
+/// # Errors
+/// [`Error::Io`] if the file cannot be written, and those of [`Optimiser::to_checkpoint`].
+pub fn save_optimiser(path: &Path, optimiser: &dyn Optimiser) -> Result<()> {
+    write_whole(path, &optimiser.to_checkpoint()?)
+}
+
+/// The optimiser in the file `path`, whichever it is.
+///
+/// # Errors
+/// As [`load`].
+pub fn load_optimiser(path: &Path) -> Result<Box<dyn Optimiser + Send>> {
+    read_within(path, memory_limit(), optimiser_from_bytes)
+}
+
 /// As [`load`], within so much memory (bytes).
 fn load_within<T: Checkpoint>(path: &Path, limit: u64) -> Result<T> {
+    read_within(path, limit, from_bytes)
+}
+
+fn read_within<T>(path: &Path, limit: u64, read: impl Fn(&[u8], &Path) -> Result<T>) -> Result<T> {
     let head = read_start(path, HEAD)?;
     // What is none, or of another version, need not be read to be refused.
     if head.len() < HEAD as usize || !head.starts_with(MAGIC) || head[MAGIC.len()..] != VERSION.to_le_bytes()
     {
-        return from_bytes(&head, path);
+        return read(&head, path);
     }
     let size = std::fs::metadata(path)
         .map_err(|e| Error::io(path, "read", e))?
         .len();
     // As it is read and as it is; a study counts a state that is written down thrice at the least.
     check_memory(path, &format!("{size} bytes"), size.saturating_mul(2), limit)?;
-    from_bytes(&read_bytes(path, limit)?, path)
+    read(&read_bytes(path, limit)?, path)
 }
 
 #[cfg(test)]
@@ -167,7 +235,7 @@ mod tests {
         let said = load_within::<Journal>(&path, 2 << 20)
             .expect_err("a little more than twice 1 MiB")
             .to_string();
-        for part in ["state: file size", "some 3 MiB", "2 MiB (--memory-limit-mib)"] {
+        for part in ["state: file size", "some 3 MiB", "fits into 2 MiB"] {
             assert!(said.contains(part), "{said}");
         }
         let journal = load_within::<Journal>(&path, 3 << 20).expect("it fits");

@@ -6,12 +6,13 @@
 //! The groups take turns, one in each iteration, each from the context that the one before has left. Before that,
 //! all groups together draw whole candidates until one of these can be evaluated: it is the first context.
 
+use super::checkpoint::to_bytes;
 use super::motion::{Particles, Purpose};
 use super::settings::{BoundHandling, Constriction, PsoSettings, Randomness, Schedule, setting};
 use super::space::Space;
 use super::{Counters, Front, Optimiser};
 use crate::error::Result;
-use crate::evaluate::{Evaluation, FAILED_COST, Problem};
+use crate::evaluate::{Evaluation, Problem, Worth};
 use crate::random::Random;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
@@ -68,17 +69,17 @@ struct Group {
     columns: Range<usize>,
     particles: Particles,
     best_position: Vec<f64>,
-    best_cost: Vec<f64>,
+    best: Vec<Worth>,
     turns: usize,
     random: Random,
 }
 
 impl Group {
-    /// Takes the costs of its particles.
-    fn note(&mut self, costs: &[f64]) {
-        for (particle, &cost) in costs.iter().enumerate() {
-            if cost < self.best_cost[particle] {
-                self.best_cost[particle] = cost;
+    /// Takes what its particles are worth.
+    fn note(&mut self, worths: &[Worth]) {
+        for (particle, &worth) in worths.iter().enumerate() {
+            if worth < self.best[particle] {
+                self.best[particle] = worth;
                 let range = self.particles.row(particle);
                 self.best_position[range.clone()].copy_from_slice(&self.particles.position[range]);
             }
@@ -98,16 +99,15 @@ impl Group {
     }
 }
 
-/// Groups of particles about a common context; minimises the first objective.
+/// Groups of particles about a common context, for a single objective.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct CooperativeSwarm {
     settings: CooperativeSettings,
     space: Space,
-    objectives: usize,
     groups: Vec<Group>,
-    /// The best position of each group, put together, and its cost.
+    /// The best position of each group, put together, and what it is worth.
     context: Vec<f64>,
-    cost: f64,
+    best: Worth,
     /// Turns that the groups have had; none before there is a context that can be evaluated.
     turns: usize,
     counters: Counters,
@@ -117,10 +117,10 @@ impl CooperativeSwarm {
     /// Swarms over the variables of `problem`.
     ///
     /// # Errors
-    /// [`crate::Error::Input`] naming the setting that is out of its range.
+    /// [`crate::Error::Input`] naming the setting that is out of its range, and for a problem of several objectives.
     pub fn new(problem: &Problem, settings: CooperativeSettings) -> Result<Self> {
         settings.validate()?;
-        let space = Space::new(problem)?;
+        let space = Space::of_one_objective(problem)?;
         let d = space.dimensions();
         let count = settings.groups.min(d).max(1);
         let groups: Vec<Group> = (0..count)
@@ -133,7 +133,7 @@ impl CooperativeSwarm {
                     Particles::scattered_in(space.part(columns.clone()), settings.motion.population, random);
                 Group {
                     best_position: particles.position.clone(),
-                    best_cost: vec![f64::INFINITY; settings.motion.population],
+                    best: vec![Worth::FAILED; settings.motion.population],
                     columns,
                     particles,
                     turns: 0,
@@ -148,10 +148,9 @@ impl CooperativeSwarm {
         Ok(Self {
             settings,
             space,
-            objectives: problem.objectives.len(),
             groups,
             context,
-            cost: FAILED_COST,
+            best: Worth::FAILED,
             turns: 0,
             counters: Counters::default(),
         })
@@ -166,9 +165,9 @@ impl CooperativeSwarm {
         turn..turn + 1
     }
 
-    /// The best candidate so far, in the variables' units, and its cost.
-    pub fn best_candidate(&self) -> (Vec<f64>, f64) {
-        (self.space.scaled(&self.context, 1), self.cost)
+    /// The best candidate so far, in the variables' units, and what it is worth.
+    pub fn best_candidate(&self) -> (Vec<f64>, Worth) {
+        (self.space.scaled(&self.context, 1), self.best)
     }
 }
 
@@ -188,23 +187,24 @@ impl Optimiser for CooperativeSwarm {
         self.space.scaled(&rows, count)
     }
 
-    fn tell(&mut self, evaluation: &Evaluation) {
-        let costs = evaluation.costs(self.objectives);
+    fn tell(&mut self, evaluation: &Evaluation) -> Result<()> {
+        evaluation.check(self.settings.motion.population, 1)?;
+        let worths = evaluation.worths(1);
         let moving = self.moving();
         for group in &mut self.groups[moving.clone()] {
-            group.note(&costs);
+            group.note(&worths);
         }
-        for (particle, &cost) in costs.iter().enumerate() {
-            if cost < self.cost {
-                self.cost = cost;
+        for (particle, &worth) in worths.iter().enumerate() {
+            if worth < self.best {
+                self.best = worth;
                 for group in &self.groups[moving.clone()] {
                     self.context[group.columns.clone()]
                         .copy_from_slice(&group.particles.position[group.particles.row(particle)]);
                 }
             }
         }
-        self.counters.told(costs.len());
-        if self.cost >= FAILED_COST {
+        self.counters.told(worths.len());
+        if !self.best.succeeded() {
             for group in &mut self.groups {
                 for particle in 0..group.particles.count {
                     group
@@ -212,7 +212,7 @@ impl Optimiser for CooperativeSwarm {
                         .rescatter(particle, self.counters.iteration, group.random);
                 }
             }
-            return;
+            return Ok(());
         }
         let planned = (self.settings.motion.iterations / self.groups.len()).max(2) - 1;
         for group in &mut self.groups[moving] {
@@ -220,10 +220,15 @@ impl Optimiser for CooperativeSwarm {
             group.advance(&leader, &self.settings.motion, planned);
             self.turns += 1;
         }
+        Ok(())
     }
 
     fn counters(&self) -> Counters {
         self.counters
+    }
+
+    fn to_checkpoint(&self) -> Result<Vec<u8>> {
+        to_bytes(self)
     }
 
     fn planned_iterations(&self) -> usize {
@@ -231,11 +236,10 @@ impl Optimiser for CooperativeSwarm {
     }
 
     fn front(&self) -> Front {
-        let (candidate, cost) = self.best_candidate();
-        Front::single(candidate, cost)
+        Front::single(self.best_candidate())
     }
 
     fn best(&self) -> Vec<f64> {
-        vec![self.cost]
+        vec![self.best.cost]
     }
 }

@@ -5,10 +5,11 @@
 //! processor does, the swarm is the one that [`super::Mopso`] keeps in lanes, bit for bit.
 
 use super::archive::Archive;
+use super::checkpoint::Checkpoint;
 use super::mopso::blocks::Generation;
 use super::mopso::filter::{Point, front};
+use super::mopso::large_swarm::{leaders, learn_from};
 use super::mopso::thinning::{PER_PLACE, thinned};
-use super::mopso::{leaders, learn_from};
 use super::settings::MopsoSettings;
 use super::space::Space;
 use super::{Counters, Front, Progress};
@@ -16,7 +17,7 @@ use crate::error::{Error, Result};
 use crate::evaluate::gpu::shader::{swarm, swarm_gather};
 use crate::evaluate::gpu::{Binding, GpuContext, Kernel};
 use crate::evaluate::resident::groups;
-use crate::evaluate::{BackendInfo, FailureCounts, Problem};
+use crate::evaluate::{BackendInfo, Failure, FailureCounts, Problem};
 use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -49,6 +50,10 @@ pub struct DeviceState {
     best_objectives: Vec<f32>,
     archive: Archive,
     counters: Counters,
+}
+
+impl Checkpoint for DeviceState {
+    const KIND: &'static str = "swarm of a device";
 }
 
 struct Kernels {
@@ -208,17 +213,18 @@ impl DeviceMopso {
     /// Puts the first particles at these candidates (in the variables' units), before the first generation.
     ///
     /// # Errors
-    /// [`Error::Device`] if the device fails.
+    /// [`Error::Input`] naming a candidate that is no finite value for each variable, [`Error::Device`] if the device fails.
     pub fn start_from(&mut self, candidates: &[Vec<f64>]) -> Result<()> {
         let d = self.space.dimensions();
-        let count = candidates.len().min(self.settings.motion.population);
+        let starts = self.space.starts(candidates, self.settings.motion.population)?;
+        let count = starts.len();
         if count == 0 {
             return Ok(());
         }
         let bytes = (count.next_multiple_of(BLOCK) * d * 4) as u64;
         let mut rows: Vec<f32> = self.read(&self.buffers.position, bytes)?;
-        for (i, candidate) in candidates.iter().take(count).enumerate() {
-            for (k, x) in self.space.position(candidate).into_iter().enumerate() {
+        for (i, position) in starts.into_iter().enumerate() {
+            for (k, x) in position.into_iter().enumerate() {
                 rows[(i / BLOCK * d + k) * BLOCK + i % BLOCK] = x as f32;
             }
         }
@@ -319,12 +325,13 @@ impl DeviceMopso {
         Ok(thinned(learn_from(&plain, width), width, SAMPLE_FRONT))
     }
 
-    /// The particles that may enter the archive.
-    fn found(&self) -> Result<Vec<Point>> {
-        let count = self.read::<u32>(&self.buffers.found, 4)?[0];
-        let count = u64::from(count).min(self.settings.motion.population as u64);
+    /// The particles that may enter the archive, and how many have failed.
+    fn found(&self) -> Result<(Vec<Point>, usize)> {
+        let counts: Vec<u32> = self.read(&self.buffers.found, 8)?;
+        let failed = counts[1] as usize;
+        let count = u64::from(counts[0]).min(self.settings.motion.population as u64);
         if count == 0 {
-            return Ok(Vec::new());
+            return Ok((Vec::new(), failed));
         }
         let words: Vec<u32> = self.read(&self.buffers.found, HEADER + 16 * count)?;
         let of = |word: u32| f64::from(f32::from_bits(word));
@@ -332,7 +339,7 @@ impl DeviceMopso {
             at: [of(p[1]), of(p[2]), of(p[3])],
             who: p[0],
         });
-        Ok(points.collect())
+        Ok((points.collect(), failed))
     }
 
     /// Positions of these particles.
@@ -357,11 +364,12 @@ impl DeviceMopso {
         self.read(&self.buffers.rows, (points.len() * d * 4) as u64)
     }
 
-    /// One generation: evaluates the particles by `objectives`, lets archive and personal bests learn, moves.
+    /// One generation: evaluates the particles by `objectives`, lets archive and personal bests learn, moves. A particle has failed
+    /// whose objectives are not finite numbers in single precision.
     ///
     /// # Errors
     /// [`Error::Device`] if the device fails.
-    pub fn step(&mut self, objectives: &mut dyn DeviceObjectives) -> Result<()> {
+    pub fn step(&mut self, objectives: &mut dyn DeviceObjectives) -> Result<Progress> {
         self.evaluate(objectives)?;
         self.learn_and_move()
     }
@@ -379,7 +387,7 @@ impl DeviceMopso {
     ///
     /// # Errors
     /// [`Error::Device`] if the device fails.
-    pub fn learn_and_move(&mut self) -> Result<()> {
+    pub fn learn_and_move(&mut self) -> Result<Progress> {
         let d = self.space.dimensions();
         let sample = if self.archive.is_empty() {
             self.sample()?
@@ -398,7 +406,7 @@ impl DeviceMopso {
             .write(&self.buffers.archive, bytemuck::cast_slice(&table));
         self.context.write(&self.buffers.found, &[0; HEADER as usize]);
         self.dispatch(&self.kernels.learn, members.len())?;
-        let mut points = self.found()?;
+        let (mut points, failed) = self.found()?;
         // They were among the members, so that the list leaves them out.
         points.extend(sample);
         let points = thinned(
@@ -418,7 +426,21 @@ impl DeviceMopso {
             &self.buffers.archive,
             bytemuck::cast_slice(&leaders(&self.archive)),
         );
-        self.dispatch(&self.kernels.advance, self.archive.len())
+        self.dispatch(&self.kernels.advance, self.archive.len())?;
+        let mut failures = FailureCounts::new();
+        if failed > 0 {
+            let reason = Failure::BeyondSinglePrecision.word().to_owned();
+            failures.insert(reason, failed as u64);
+        }
+        Ok(Progress {
+            iteration: self.counters.iteration,
+            evaluations: self.counters.evaluations,
+            best: self.best(),
+            violation: self.archive.violation(),
+            median: None,
+            failed,
+            failures,
+        })
     }
 
     /// Steps until the planned iterations are done or `observe` returns `Break`.
@@ -431,15 +453,7 @@ impl DeviceMopso {
         mut observe: impl FnMut(&Progress) -> ControlFlow<()>,
     ) -> Result<()> {
         while self.counters.iteration < self.settings.motion.iterations {
-            self.step(objectives)?;
-            let progress = Progress {
-                iteration: self.counters.iteration,
-                evaluations: self.counters.evaluations,
-                best: self.best(),
-                median: None,
-                failed: 0,
-                failures: FailureCounts::new(),
-            };
+            let progress = self.step(objectives)?;
             if observe(&progress).is_break() {
                 break;
             }
@@ -485,7 +499,7 @@ impl DeviceMopso {
         self.counters.evaluations
     }
 
-    /// The least value seen of each objective.
+    /// The least value seen of each objective; infinite before any particle has succeeded.
     pub fn best(&self) -> Vec<f64> {
         self.archive.best(self.objectives)
     }

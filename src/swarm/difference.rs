@@ -6,11 +6,13 @@
 //! Global Optimization 11, 1997; Brest et al., *Self-adapting control parameters in differential evolution*, IEEE
 //! TEC 10, 2006, with its constants). It explores many hollows where a swarm with one leader commits itself to one.
 
+use super::checkpoint::to_bytes;
 use super::motion::{Particles, Purpose};
 use super::settings::setting;
-use super::{Counters, Front, Optimiser, Welcome};
+use super::space::Space;
+use super::{AcceptsMigrants, Counters, Front, Optimiser};
 use crate::error::Result;
-use crate::evaluate::{Evaluation, Problem};
+use crate::evaluate::{Evaluation, Problem, Worth};
 use crate::random::Random;
 use serde::{Deserialize, Serialize};
 
@@ -57,16 +59,15 @@ impl DifferenceSettings {
     }
 }
 
-/// A swarm of self-adapted difference moves; minimises the first objective.
+/// A swarm of self-adapted difference moves, for a single objective.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct DifferenceSwarm {
     settings: DifferenceSettings,
     random: Random,
     /// Where the particles try next.
     particles: Particles,
-    objectives: usize,
     home: Vec<f64>,
-    cost: Vec<f64>,
+    worth: Vec<Worth>,
     /// Scale and share of coordinates of each particle, and those of its present try.
     control: Vec<[f64; 2]>,
     tried: Vec<[f64; 2]>,
@@ -77,17 +78,17 @@ impl DifferenceSwarm {
     /// A swarm over the variables of `problem`.
     ///
     /// # Errors
-    /// [`crate::Error::Input`] naming the setting that is out of its range.
+    /// [`crate::Error::Input`] naming the setting that is out of its range, and for a problem of several objectives.
     pub fn new(problem: &Problem, settings: DifferenceSettings) -> Result<Self> {
         settings.validate()?;
         let random = Random::new(settings.seed);
-        let particles = Particles::scattered(problem, settings.population, random)?;
+        let space = Space::of_one_objective(problem)?;
+        let particles = Particles::scattered_in(space, settings.population, random);
         Ok(Self {
             home: particles.position.clone(),
-            cost: vec![f64::INFINITY; settings.population],
+            worth: vec![Worth::FAILED; settings.population],
             control: vec![[0.5; 2]; settings.population],
             tried: vec![[0.5; 2]; settings.population],
-            objectives: problem.objectives.len(),
             random,
             particles,
             settings,
@@ -96,15 +97,15 @@ impl DifferenceSwarm {
     }
 
     fn leader(&self) -> usize {
-        let by = |&a: &usize, &b: &usize| self.cost[a].total_cmp(&self.cost[b]);
-        (0..self.cost.len()).min_by(by).unwrap_or(0)
+        let by = |&a: &usize, &b: &usize| self.worth[a].order(&self.worth[b]);
+        (0..self.worth.len()).min_by(by).unwrap_or(0)
     }
 
-    /// The best candidate so far, in the variables' units, and its cost.
-    pub fn best_candidate(&self) -> (Vec<f64>, f64) {
+    /// The best candidate so far, in the variables' units, and what it is worth.
+    pub fn best_candidate(&self) -> (Vec<f64>, Worth) {
         let leader = self.leader();
         let row = &self.home[self.particles.row(leader)];
-        (self.particles.space.scaled(row, 1), self.cost[leader])
+        (self.particles.space.scaled(row, 1), self.worth[leader])
     }
 
     /// Root mean square distance of the particles from their mean along an axis, as a share of the ranges.
@@ -178,15 +179,15 @@ impl DifferenceSwarm {
     }
 }
 
-impl Welcome for DifferenceSwarm {
+impl AcceptsMigrants for DifferenceSwarm {
     /// Each takes the home of the worst particle, if it is better.
-    fn welcome(&mut self, migrants: &Front, _violation: f64) {
-        for (candidate, row) in migrants.candidates.iter().zip(&migrants.objectives) {
-            let worst = (0..self.cost.len()).max_by(|&a, &b| self.cost[a].total_cmp(&self.cost[b]));
-            if let Some(worst) = worst.filter(|&p| row[0] < self.cost[p]) {
+    fn accept_migrants(&mut self, migrants: &Front) {
+        for (candidate, worth) in migrants.singles() {
+            let worst = (0..self.worth.len()).max_by(|&a, &b| self.worth[a].order(&self.worth[b]));
+            if let Some(worst) = worst.filter(|&p| worth < self.worth[p]) {
                 let place = self.particles.row(worst);
                 self.home[place].copy_from_slice(&self.particles.space.position(candidate));
-                self.cost[worst] = row[0];
+                self.worth[worst] = worth;
             }
         }
     }
@@ -197,10 +198,11 @@ impl Optimiser for DifferenceSwarm {
         self.particles.candidates()
     }
 
-    fn tell(&mut self, evaluation: &Evaluation) {
-        for (particle, cost) in evaluation.costs(self.objectives).into_iter().enumerate() {
-            if cost <= self.cost[particle] {
-                self.cost[particle] = cost;
+    fn tell(&mut self, evaluation: &Evaluation) -> Result<()> {
+        evaluation.check(self.settings.population, 1)?;
+        for (particle, worth) in evaluation.worths(1).into_iter().enumerate() {
+            if worth <= self.worth[particle] {
+                self.worth[particle] = worth;
                 self.control[particle] = self.tried[particle];
                 let range = self.particles.row(particle);
                 self.home[range.clone()].copy_from_slice(&self.particles.position[range]);
@@ -208,10 +210,15 @@ impl Optimiser for DifferenceSwarm {
         }
         self.counters.told(self.settings.population);
         self.advance();
+        Ok(())
     }
 
     fn counters(&self) -> Counters {
         self.counters
+    }
+
+    fn to_checkpoint(&self) -> Result<Vec<u8>> {
+        to_bytes(self)
     }
 
     fn planned_iterations(&self) -> usize {
@@ -219,11 +226,10 @@ impl Optimiser for DifferenceSwarm {
     }
 
     fn front(&self) -> Front {
-        let (candidate, cost) = self.best_candidate();
-        Front::single(candidate, cost)
+        Front::single(self.best_candidate())
     }
 
     fn best(&self) -> Vec<f64> {
-        vec![self.cost[self.leader()]]
+        vec![self.worth[self.leader()].cost]
     }
 }

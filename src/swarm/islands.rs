@@ -13,15 +13,9 @@ use crate::swarm::metrics::non_dominated;
 use serde::{Deserialize, Serialize};
 
 /// An optimiser that accepts solutions of others.
-pub trait Welcome: Optimiser {
-    /// The violation of constraints of its front, if its objectives do not include it.
-    fn violation(&self) -> f64 {
-        0.0
-    }
-
-    /// Takes in solutions of the same problem, with objectives that were evaluated; `violation` is the
-    /// [`Welcome::violation`] of where they come from.
-    fn welcome(&mut self, migrants: &Front, violation: f64);
+pub trait AcceptsMigrants: Optimiser {
+    /// Takes in solutions of the same problem, with objectives that were evaluated.
+    fn accept_migrants(&mut self, migrants: &Front);
 }
 
 /// How many solutions move between islands, and when.
@@ -45,7 +39,7 @@ pub struct Islands<O> {
     iteration: usize,
 }
 
-impl<O: Welcome> Islands<O> {
+impl<O: AcceptsMigrants> Islands<O> {
     /// Islands of these swarms, all on `problem`, in this order in each population.
     ///
     /// # Errors
@@ -81,9 +75,17 @@ impl<O: Welcome> Islands<O> {
         &self.islands
     }
 
+    /// Those whose result violates the constraints least.
+    fn least_violating(&self) -> impl Iterator<Item = &O> {
+        let least = self.violation();
+        self.islands
+            .iter()
+            .filter(move |island| island.violation() <= least)
+    }
+
     /// Each sends a part of its front, evenly over it, to the next.
     fn migrate(&mut self, count: usize) {
-        let parties: Vec<(Front, f64)> = self
+        let parties: Vec<Front> = self
             .islands
             .iter()
             .map(|island| {
@@ -91,21 +93,21 @@ impl<O: Welcome> Islands<O> {
                 let all = front.objectives.len();
                 let sent = count.min(all);
                 let chosen = |rows: &[Vec<f64>]| (0..sent).map(|i| rows[i * all / sent].clone()).collect();
-                let party = Front {
+                Front {
                     candidates: chosen(&front.candidates),
                     objectives: chosen(&front.objectives),
-                };
-                (party, island.violation())
+                    violation: front.violation,
+                }
             })
             .collect();
         let n = self.islands.len();
-        for (i, (party, violation)) in parties.iter().enumerate() {
-            self.islands[(i + 1) % n].welcome(party, *violation);
+        for (i, party) in parties.iter().enumerate() {
+            self.islands[(i + 1) % n].accept_migrants(party);
         }
     }
 }
 
-impl<O: Welcome> Optimiser for Islands<O> {
+impl<O: AcceptsMigrants> Optimiser for Islands<O> {
     fn ask(&mut self) -> Vec<f64> {
         let mut population = Vec::new();
         for (island, asked) in self.islands.iter_mut().zip(&mut self.asked) {
@@ -120,11 +122,12 @@ impl<O: Welcome> Optimiser for Islands<O> {
         population
     }
 
-    fn tell(&mut self, evaluation: &Evaluation) {
+    fn tell(&mut self, evaluation: &Evaluation) -> Result<()> {
+        evaluation.check(self.asked.iter().sum(), self.objectives)?;
         let mut from = 0;
         for (island, &count) in self.islands.iter_mut().zip(&self.asked) {
             if count > 0 {
-                island.tell(&evaluation.part(from..from + count, self.objectives));
+                island.tell(&evaluation.part(from..from + count, self.objectives))?;
                 from += count;
             }
         }
@@ -135,6 +138,7 @@ impl<O: Welcome> Optimiser for Islands<O> {
         {
             self.migrate(m.count);
         }
+        Ok(())
     }
 
     fn counters(&self) -> Counters {
@@ -154,20 +158,20 @@ impl<O: Welcome> Optimiser for Islands<O> {
     }
 
     fn best(&self) -> Vec<f64> {
-        let all: Vec<Vec<f64>> = self.islands.iter().map(Optimiser::best).collect();
+        let all: Vec<Vec<f64>> = self.least_violating().map(Optimiser::best).collect();
         let least = |k: usize| all.iter().map(|best| best[k]).fold(f64::INFINITY, f64::min);
-        (0..all[0].len()).map(least).collect()
+        (0..self.objectives).map(least).collect()
+    }
+
+    fn violation(&self) -> f64 {
+        let all = self.islands.iter().map(Optimiser::violation);
+        all.fold(f64::INFINITY, f64::min)
     }
 
     /// The solutions of all islands that no other island dominates.
     fn front(&self) -> Front {
         let mut all = Front::default();
-        let least = self
-            .islands
-            .iter()
-            .map(Welcome::violation)
-            .fold(f64::INFINITY, f64::min);
-        for island in self.islands.iter().filter(|island| island.violation() <= least) {
+        for island in self.least_violating() {
             let front = island.front();
             all.candidates.extend(front.candidates);
             all.objectives.extend(front.objectives);
@@ -176,6 +180,7 @@ impl<O: Welcome> Optimiser for Islands<O> {
         Front {
             candidates: kept.iter().map(|&i| all.candidates[i].clone()).collect(),
             objectives: kept.iter().map(|&i| all.objectives[i].clone()).collect(),
+            violation: self.violation(),
         }
     }
 }

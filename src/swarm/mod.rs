@@ -31,14 +31,17 @@
 //! 9. Zitzler, Laumanns, Thiele, *SPEA2*, TIK report 103 (2001) (truncation by the nearest neighbours).
 
 mod archive;
+mod by_name;
 pub mod checkpoint;
 pub mod comparison;
 mod cooperative;
 mod covariance;
+#[cfg(feature = "gpu")]
 pub mod device;
 mod difference;
 mod islands;
 pub mod metrics;
+mod minimise;
 mod mopso;
 mod motion;
 mod nsga2;
@@ -50,10 +53,12 @@ mod two_phase;
 mod windows;
 
 pub use archive::Archive;
+pub use by_name::{MULTI_OBJECTIVE, SINGLE_OBJECTIVE, Sizes, by_name, several_by_name};
 pub use cooperative::{CooperativeSettings, CooperativeSwarm};
-pub use covariance::{Beyond, CovarianceSettings, CovarianceSwarm, Restarts};
+pub use covariance::{CovarianceSettings, CovarianceSwarm, OutOfBounds, Restarts};
 pub use difference::{DifferenceSettings, DifferenceSwarm};
-pub use islands::{Islands, Migration, Welcome};
+pub use islands::{AcceptsMigrants, Islands, Migration};
+pub use minimise::{Indicators, Minimise, Minimum, Stopped, minimise, minimise_batch, minimise_several};
 pub use mopso::{Generation, MANY, Mopso};
 pub use nsga2::{Nsga2, Nsga2Settings};
 pub use pso::Pso;
@@ -64,8 +69,8 @@ pub use settings::{
 pub use two_phase::{HybridSettings, HybridSwarm};
 pub use windows::{WindowSettings, WindowSwarm};
 
-use crate::error::Result;
-use crate::evaluate::{Evaluation, Evaluator, FailureCounts};
+use crate::error::{Error, Result};
+use crate::evaluate::{Evaluation, Evaluator, Failure, FailureCounts, Worth};
 use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
 
@@ -92,7 +97,11 @@ pub trait Optimiser {
     fn ask(&mut self) -> Vec<f64>;
 
     /// Takes the objectives of the candidates last asked for.
-    fn tell(&mut self, evaluation: &Evaluation);
+    ///
+    /// # Errors
+    /// [`Error::Input`] if the evaluation is not of these candidates, see [`Evaluation::check`]. The optimiser has then not
+    /// been told.
+    fn tell(&mut self, evaluation: &Evaluation) -> Result<()>;
 
     /// Iterations told and candidates evaluated so far.
     fn counters(&self) -> Counters;
@@ -115,28 +124,124 @@ pub trait Optimiser {
         self.counters().evaluations
     }
 
-    /// The least value seen of each objective.
+    /// The least value of each objective among the candidates that violate the constraints least; infinite before any candidate
+    /// has succeeded. [`Optimiser::violation`] says whether they are feasible.
     fn best(&self) -> Vec<f64>;
 
-    /// The result so far: the archive, or the one best candidate with its cost.
+    /// By how much the result violates the constraints: zero once something feasible is known, infinite before any candidate has
+    /// succeeded.
+    fn violation(&self) -> f64 {
+        self.front().violation
+    }
+
+    /// The result so far: the archive, or the one best candidate with its cost. It is empty before any candidate has succeeded.
     fn front(&self) -> Front;
+
+    /// A checkpoint of its whole state, which [`checkpoint::load_optimiser`] reads. The optimisers of this crate have one; of
+    /// islands, [`checkpoint::save`] does.
+    ///
+    /// # Errors
+    /// [`Error::Study`] if it has none.
+    fn to_checkpoint(&self) -> Result<Vec<u8>> {
+        Err(Error::Study("this optimiser has no checkpoint".to_owned()))
+    }
 }
 
-/// Candidates, none of which another dominates, and their objectives.
-#[derive(Clone, Debug, Default, PartialEq)]
+impl<O: Optimiser + ?Sized> Optimiser for Box<O> {
+    fn ask(&mut self) -> Vec<f64> {
+        (**self).ask()
+    }
+
+    fn tell(&mut self, evaluation: &Evaluation) -> Result<()> {
+        (**self).tell(evaluation)
+    }
+
+    fn counters(&self) -> Counters {
+        (**self).counters()
+    }
+
+    fn iteration(&self) -> usize {
+        (**self).iteration()
+    }
+
+    fn planned_iterations(&self) -> usize {
+        (**self).planned_iterations()
+    }
+
+    fn done(&self) -> bool {
+        (**self).done()
+    }
+
+    fn evaluations(&self) -> u64 {
+        (**self).evaluations()
+    }
+
+    fn best(&self) -> Vec<f64> {
+        (**self).best()
+    }
+
+    fn violation(&self) -> f64 {
+        (**self).violation()
+    }
+
+    fn front(&self) -> Front {
+        (**self).front()
+    }
+
+    fn to_checkpoint(&self) -> Result<Vec<u8>> {
+        (**self).to_checkpoint()
+    }
+}
+
+/// Candidates, none of which another dominates, and their objectives. All of them violate the constraints equally.
+#[derive(Clone, Debug, PartialEq)]
 pub struct Front {
     /// Rows of variables, in their units.
     pub candidates: Vec<Vec<f64>>,
     /// Rows of objectives.
     pub objectives: Vec<Vec<f64>>,
+    /// By how much each of them violates the constraints: zero if they are feasible, infinite if there are none.
+    pub violation: f64,
+}
+
+impl Default for Front {
+    /// An empty one.
+    fn default() -> Self {
+        Self {
+            candidates: Vec::new(),
+            objectives: Vec::new(),
+            violation: f64::INFINITY,
+        }
+    }
 }
 
 impl Front {
-    fn single(candidate: Vec<f64>, cost: f64) -> Self {
+    /// The front of one candidate, empty if it did not succeed.
+    fn single((candidate, worth): (Vec<f64>, Worth)) -> Self {
+        if !worth.succeeded() {
+            return Self::default();
+        }
         Self {
             candidates: vec![candidate],
-            objectives: vec![vec![cost]],
+            objectives: vec![vec![worth.cost]],
+            violation: worth.violation,
         }
+    }
+
+    /// Candidates of one objective, and what they are worth.
+    fn singles(&self) -> impl Iterator<Item = (&Vec<f64>, Worth)> {
+        let violation = self.violation;
+        let worth = move |row: &Vec<f64>| Worth {
+            violation,
+            cost: row[0],
+        };
+        let rows = self.objectives.iter().map(worth);
+        self.candidates.iter().zip(rows)
+    }
+
+    /// Whether there are candidates and they violate no constraint.
+    pub fn is_feasible(&self) -> bool {
+        self.violation == 0.0
     }
 }
 
@@ -147,8 +252,10 @@ pub struct Progress {
     pub iteration: usize,
     /// Candidates evaluated.
     pub evaluations: u64,
-    /// The least value seen of each objective.
+    /// The least value of each objective, see [`Optimiser::best`].
     pub best: Vec<f64>,
+    /// By how much the best violate the constraints, see [`Optimiser::violation`].
+    pub violation: f64,
     /// The median of the first objective over this iteration's candidates that did not fail, if any did not.
     pub median: Option<f64>,
     /// Candidates of this iteration that failed.
@@ -160,32 +267,37 @@ pub struct Progress {
 /// Asks, evaluates and tells once.
 ///
 /// # Errors
-/// Those of the evaluator. The optimiser has then been asked, but not told.
+/// Those of the evaluator and of [`Optimiser::tell`]. The optimiser has then been asked, but not told.
 pub fn step(optimiser: &mut dyn Optimiser, evaluator: &mut dyn Evaluator) -> Result<Progress> {
     let width = evaluator.problem().objectives.len();
     let population = optimiser.ask();
     let evaluation = evaluator.evaluate(&population)?;
-    optimiser.tell(&evaluation);
-    let rows = evaluation
-        .objectives
-        .chunks_exact(width)
-        .zip(&evaluation.failures);
-    let mut costs: Vec<f64> = rows.filter(|(_, f)| f.is_none()).map(|(row, _)| row[0]).collect();
+    optimiser.tell(&evaluation)?;
+    let first = |i: usize| evaluation.success(i, width).map(|row| row[0]);
+    let candidates = evaluation.failures.len();
+    let mut costs: Vec<f64> = (0..candidates).filter_map(first).collect();
+    let failed = candidates - costs.len();
+    let mut failures = evaluation.failure_counts();
+    let unflagged = failed as u64 - failures.values().sum::<u64>();
+    if unflagged > 0 {
+        *failures.entry(Failure::Undefined.word().to_owned()).or_default() += unflagged;
+    }
     let middle = costs.len() / 2;
     Ok(Progress {
         iteration: optimiser.iteration(),
         evaluations: optimiser.evaluations(),
         best: optimiser.best(),
+        violation: optimiser.violation(),
         median: (!costs.is_empty()).then(|| *costs.select_nth_unstable_by(middle, f64::total_cmp).1),
-        failed: evaluation.failures.iter().filter(|f| f.is_some()).count(),
-        failures: evaluation.failure_counts(),
+        failed,
+        failures,
     })
 }
 
 /// Asks, evaluates and tells until the planned iterations are done or `observe` returns `Break`.
 ///
 /// # Errors
-/// Those of the evaluator.
+/// Those of [`step`].
 pub fn run(
     optimiser: &mut dyn Optimiser,
     evaluator: &mut dyn Evaluator,

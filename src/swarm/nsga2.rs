@@ -5,12 +5,13 @@
 //! Complex Systems 9 (1995), in the form that keeps to the bounds.
 
 use super::archive::crowding;
+use super::checkpoint::to_bytes;
 use super::metrics::{non_dominated, ranks};
 use super::motion::{Particles, Purpose, polynomial};
 use super::settings::setting;
 use super::{Counters, Front, Optimiser};
 use crate::error::Result;
-use crate::evaluate::{Evaluation, FAILED_COST, Problem};
+use crate::evaluate::{Evaluation, Problem, Worth};
 use crate::random::Random;
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
@@ -84,6 +85,7 @@ impl Nsga2Settings {
 struct Member {
     position: Vec<f64>,
     objectives: Vec<f64>,
+    /// By how much it violates the constraints; infinite if it failed.
     violation: f64,
     rank: usize,
     crowding: f64,
@@ -119,12 +121,22 @@ impl Nsga2 {
     }
 
     /// Puts the first members at these candidates (in the variables' units), before the first population is asked for.
-    pub fn start_from(&mut self, candidates: &[Vec<f64>]) {
-        for (member, candidate) in candidates.iter().enumerate().take(self.settings.population) {
+    ///
+    /// # Errors
+    /// [`crate::Error::Input`] naming a candidate that is no finite value for each variable.
+    pub fn start_from(&mut self, candidates: &[Vec<f64>]) -> Result<()> {
+        let starts = self.children.space.starts(candidates, self.settings.population)?;
+        for (member, position) in starts.iter().enumerate() {
             let row = self.children.row(member);
-            let position = self.children.space.position(candidate);
-            self.children.position[row].copy_from_slice(&position);
+            self.children.position[row].copy_from_slice(position);
         }
+        Ok(())
+    }
+
+    /// The members of the first front, unless they failed.
+    fn first_front(&self) -> impl Iterator<Item = &Member> {
+        let first = |m: &&Member| m.rank == 0 && m.violation.is_finite();
+        self.parents.iter().filter(first)
     }
 
     /// The better of two parents drawn at random: by front, then by crowding.
@@ -254,27 +266,18 @@ impl Optimiser for Nsga2 {
         self.children.candidates()
     }
 
-    fn tell(&mut self, evaluation: &Evaluation) {
+    fn tell(&mut self, evaluation: &Evaluation) -> Result<()> {
+        evaluation.check(self.settings.population, self.objectives)?;
         let mut known = Known::default();
         let mut all = Vec::with_capacity(2 * self.settings.population);
         for parent in std::mem::take(&mut self.parents) {
             known.is_new(&parent.position, &parent.objectives, &all);
             all.push(parent);
         }
-        let rows = evaluation
-            .objectives
-            .chunks_exact(self.objectives)
-            .zip(&evaluation.failures);
-        for (child, (row, failure)) in rows.enumerate() {
-            let sound = failure.is_none() && row.iter().all(|x| x.is_finite());
-            let objectives = if sound {
-                row.to_vec()
-            } else {
-                vec![FAILED_COST; self.objectives]
-            };
-            let violation = match evaluation.violation(child) {
-                _ if sound || evaluation.violations.is_empty() => evaluation.violation(child),
-                _ => f64::INFINITY,
+        for child in 0..self.settings.population {
+            let (objectives, violation) = match evaluation.success(child, self.objectives) {
+                Some(row) => (row.to_vec(), evaluation.violation(child)),
+                None => (vec![Worth::FAILED.cost; self.objectives], Worth::FAILED.violation),
             };
             let position = self.children.position[self.children.row(child)].to_vec();
             // A copy of a member brings nothing and would crowd it out.
@@ -306,10 +309,15 @@ impl Optimiser for Nsga2 {
         self.parents = kept.into_iter().filter_map(|i| all[i].take()).collect();
         self.counters.told(self.settings.population);
         self.breed();
+        Ok(())
     }
 
     fn counters(&self) -> Counters {
         self.counters
+    }
+
+    fn to_checkpoint(&self) -> Result<Vec<u8>> {
+        to_bytes(self)
     }
 
     fn planned_iterations(&self) -> usize {
@@ -317,17 +325,23 @@ impl Optimiser for Nsga2 {
     }
 
     fn best(&self) -> Vec<f64> {
-        let column = |k: usize| self.parents.iter().map(move |m| m.objectives[k]);
+        let column = |k: usize| self.first_front().map(move |m| m.objectives[k]);
         (0..self.objectives)
-            .map(|k| column(k).fold(FAILED_COST, f64::min))
+            .map(|k| column(k).fold(f64::INFINITY, f64::min))
             .collect()
     }
 
+    fn violation(&self) -> f64 {
+        self.first_front().next().map_or(f64::INFINITY, |m| m.violation)
+    }
+
     fn front(&self) -> Front {
-        let first = |m: &&Member| m.rank == 0 && m.objectives.iter().all(|&x| x < FAILED_COST);
-        let members: Vec<&Member> = self.parents.iter().filter(first).collect();
+        let members: Vec<&Member> = self.first_front().collect();
         let rows: Vec<Vec<f64>> = members.iter().map(|m| m.objectives.clone()).collect();
-        let mut front = Front::default();
+        let mut front = Front {
+            violation: self.violation(),
+            ..Front::default()
+        };
         // One of those that are worth the same.
         for i in non_dominated(&rows) {
             let position = &members[i].position;

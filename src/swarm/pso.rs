@@ -1,10 +1,12 @@
-//! Single-objective particle swarm; minimises the first objective.
+//! Single-objective particle swarm.
 
+use super::checkpoint::to_bytes;
 use super::motion::{Particles, Purpose};
 use super::settings::PsoSettings;
-use super::{Counters, Front, Optimiser, Welcome};
+use super::space::Space;
+use super::{AcceptsMigrants, Counters, Front, Optimiser};
 use crate::error::Result;
-use crate::evaluate::{Evaluation, Problem};
+use crate::evaluate::{Evaluation, Problem, Worth};
 use crate::random::Random;
 use serde::{Deserialize, Serialize};
 
@@ -14,9 +16,8 @@ pub struct Pso {
     settings: PsoSettings,
     random: Random,
     particles: Particles,
-    objectives: usize,
     best_position: Vec<f64>,
-    best_cost: Vec<f64>,
+    best: Vec<Worth>,
     leader: usize,
     counters: Counters,
 }
@@ -28,15 +29,15 @@ impl Pso {
     /// A swarm over the variables of `problem`.
     ///
     /// # Errors
-    /// [`crate::Error::Input`] naming the setting that is out of its range.
+    /// [`crate::Error::Input`] naming the setting that is out of its range, and for a problem of several objectives.
     pub fn new(problem: &Problem, settings: PsoSettings) -> Result<Self> {
         settings.validate()?;
         let random = Random::new(settings.seed);
-        let particles = Particles::scattered(problem, settings.population, random)?;
+        let space = Space::of_one_objective(problem)?;
+        let particles = Particles::scattered_in(space, settings.population, random);
         Ok(Self {
             best_position: particles.position.clone(),
-            best_cost: vec![f64::INFINITY; settings.population],
-            objectives: problem.objectives.len(),
+            best: vec![Worth::FAILED; settings.population],
             random,
             particles,
             settings,
@@ -45,17 +46,17 @@ impl Pso {
         })
     }
 
-    /// The best candidate so far, in the variables' units, and its cost.
-    pub fn best_candidate(&self) -> (Vec<f64>, f64) {
+    /// The best candidate so far, in the variables' units, and what it is worth.
+    pub fn best_candidate(&self) -> (Vec<f64>, Worth) {
         let row = &self.best_position[self.particles.row(self.leader)];
-        (self.particles.space.scaled(row, 1), self.best_cost[self.leader])
+        (self.particles.space.scaled(row, 1), self.best[self.leader])
     }
 
     fn advance(&mut self) {
         let share = self.counters.iteration as f64 / (self.settings.iterations.max(2) - 1) as f64;
         let d = self.particles.dimensions();
         let mut order: Vec<usize> = (0..self.settings.population).collect();
-        order.sort_by(|&a, &b| self.best_cost[a].total_cmp(&self.best_cost[b]));
+        order.sort_by(|&a, &b| self.best[a].order(&self.best[b]));
         let elite = ((self.settings.population as f64 * ELITE_SHARE) as usize).max(2);
         for particle in 0..self.settings.population {
             let coin = self.random.uniform(
@@ -121,19 +122,18 @@ impl Pso {
     }
 }
 
-impl Welcome for Pso {
+impl AcceptsMigrants for Pso {
     /// Each becomes the best of the particle whose best is worst, if it is better.
-    fn welcome(&mut self, migrants: &Front, _violation: f64) {
-        for (candidate, row) in migrants.candidates.iter().zip(&migrants.objectives) {
-            let worst =
-                (0..self.best_cost.len()).max_by(|&a, &b| self.best_cost[a].total_cmp(&self.best_cost[b]));
-            let Some(worst) = worst.filter(|&p| row[0] < self.best_cost[p]) else {
+    fn accept_migrants(&mut self, migrants: &Front) {
+        for (candidate, worth) in migrants.singles() {
+            let worst = (0..self.best.len()).max_by(|&a, &b| self.best[a].order(&self.best[b]));
+            let Some(worst) = worst.filter(|&p| worth < self.best[p]) else {
                 continue;
             };
             let place = self.particles.row(worst);
             self.best_position[place].copy_from_slice(&self.particles.space.position(candidate));
-            self.best_cost[worst] = row[0];
-            if row[0] < self.best_cost[self.leader] {
+            self.best[worst] = worth;
+            if worth < self.best[self.leader] {
                 self.leader = worst;
             }
         }
@@ -145,24 +145,30 @@ impl Optimiser for Pso {
         self.particles.candidates()
     }
 
-    fn tell(&mut self, evaluation: &Evaluation) {
+    fn tell(&mut self, evaluation: &Evaluation) -> Result<()> {
+        evaluation.check(self.settings.population, 1)?;
         let d = self.particles.dimensions();
-        for (particle, cost) in evaluation.costs(self.objectives).into_iter().enumerate() {
-            if cost < self.best_cost[particle] {
-                self.best_cost[particle] = cost;
+        for (particle, worth) in evaluation.worths(1).into_iter().enumerate() {
+            if worth < self.best[particle] {
+                self.best[particle] = worth;
                 let range = particle * d..(particle + 1) * d;
                 self.best_position[range.clone()].copy_from_slice(&self.particles.position[range]);
             }
-            if self.best_cost[particle] < self.best_cost[self.leader] {
+            if self.best[particle] < self.best[self.leader] {
                 self.leader = particle;
             }
         }
         self.counters.told(self.settings.population);
         self.advance();
+        Ok(())
     }
 
     fn counters(&self) -> Counters {
         self.counters
+    }
+
+    fn to_checkpoint(&self) -> Result<Vec<u8>> {
+        to_bytes(self)
     }
 
     fn planned_iterations(&self) -> usize {
@@ -170,11 +176,10 @@ impl Optimiser for Pso {
     }
 
     fn front(&self) -> Front {
-        let (candidate, cost) = self.best_candidate();
-        Front::single(candidate, cost)
+        Front::single(self.best_candidate())
     }
 
     fn best(&self) -> Vec<f64> {
-        vec![self.best_cost[self.leader]]
+        vec![self.best[self.leader].cost]
     }
 }

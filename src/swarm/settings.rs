@@ -18,11 +18,11 @@ pub enum Schedule {
 }
 
 impl Schedule {
-    /// The value `share` of the way through the run.
+    /// The value `share` of the way through the run; beyond its ends, the value there.
     pub fn at(self, share: f64) -> f64 {
         match self {
             Self::Fixed(value) => value,
-            Self::Linear { from, to } => from + (to - from) * share,
+            Self::Linear { from, to } => from + (to - from) * share.clamp(0.0, 1.0),
         }
     }
 

@@ -105,6 +105,40 @@ impl Space {
         candidates
     }
 
+    /// # Errors
+    /// [`Error::Input`] if the problem has several objectives, as [`Space::new`] else.
+    pub fn of_one_objective(problem: &Problem) -> Result<Self> {
+        if problem.objectives.len() > 1 {
+            let found = format!("{} objectives", problem.objectives.len());
+            let expected = "one: this optimiser minimises a single objective";
+            return Err(Error::input("the problem", "objectives", found, expected));
+        }
+        Self::new(problem)
+    }
+
+    /// The positions of the first candidates that an optimiser is given, at most `count` of them.
+    ///
+    /// # Errors
+    /// [`Error::Input`] naming a candidate that is no finite value for each variable.
+    pub fn starts(&self, candidates: &[Vec<f64>], count: usize) -> Result<Vec<Vec<f64>>> {
+        let start = |(i, candidate): (usize, &Vec<f64>)| {
+            if candidate.len() != self.variables() || candidate.iter().any(|x| !x.is_finite()) {
+                let place = format!("candidate {}", i + 1);
+                let finite = candidate.iter().filter(|x| x.is_finite()).count();
+                let found = format!("{} values, {finite} of them finite", candidate.len());
+                let expected = format!("{} finite ones, one for each variable", self.variables());
+                return Err(Error::input(
+                    "the candidates to start from",
+                    place,
+                    found,
+                    expected,
+                ));
+            }
+            Ok(self.position(candidate))
+        };
+        candidates.iter().take(count).enumerate().map(start).collect()
+    }
+
     /// The position of a candidate, brought within the bounds.
     pub fn position(&self, candidate: &[f64]) -> Vec<f64> {
         let share = |&k: &usize| {

@@ -3,13 +3,14 @@
 //! [`DifferenceSwarm`] explores, which finds the right hollow among many; [`CovarianceSwarm`] then gathers about
 //! its best, which follows a valley to its end, and starts again elsewhere when it has got there.
 
+use super::checkpoint::to_bytes;
 use super::settings::setting;
 use super::{
-    Beyond, Counters, CovarianceSettings, CovarianceSwarm, DifferenceSettings, DifferenceSwarm, Front,
-    Optimiser, Restarts,
+    Counters, CovarianceSettings, CovarianceSwarm, DifferenceSettings, DifferenceSwarm, Front, Optimiser,
+    OutOfBounds, Restarts,
 };
 use crate::error::Result;
-use crate::evaluate::{Evaluation, Problem};
+use crate::evaluate::{Evaluation, Problem, Worth};
 use serde::{Deserialize, Serialize};
 
 /// Settings of [`HybridSwarm`].
@@ -64,7 +65,7 @@ impl HybridSettings {
     }
 }
 
-/// An exploring swarm followed by a gathering one; minimises the first objective.
+/// An exploring swarm followed by a gathering one, for a single objective.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct HybridSwarm {
     settings: HybridSettings,
@@ -81,7 +82,7 @@ impl HybridSwarm {
     /// A swarm over the variables of `problem`.
     ///
     /// # Errors
-    /// [`crate::Error::Input`] naming the setting that is out of its range.
+    /// [`crate::Error::Input`] naming the setting that is out of its range, and for a problem of several objectives.
     pub fn new(problem: &Problem, settings: HybridSettings) -> Result<Self> {
         settings.validate()?;
         Ok(Self {
@@ -92,8 +93,8 @@ impl HybridSwarm {
         })
     }
 
-    /// The best candidate so far, in the variables' units, and its cost.
-    pub fn best_candidate(&self) -> (Vec<f64>, f64) {
+    /// The best candidate so far, in the variables' units, and what it is worth.
+    pub fn best_candidate(&self) -> (Vec<f64>, Worth) {
         let explored = self.explorers.best_candidate();
         match self.gatherers.as_ref().map(CovarianceSwarm::best_candidate) {
             Some(gathered) if gathered.1 < explored.1 => gathered,
@@ -117,11 +118,11 @@ impl Optimiser for HybridSwarm {
         }
     }
 
-    fn tell(&mut self, evaluation: &Evaluation) {
+    fn tell(&mut self, evaluation: &Evaluation) -> Result<()> {
         if let Some(gatherers) = &mut self.gatherers {
             return gatherers.tell(evaluation);
         }
-        self.explorers.tell(evaluation);
+        self.explorers.tell(evaluation)?;
         if self.explorers.done() && self.explorers.iteration() < self.settings.iterations {
             let settings = CovarianceSettings {
                 population: self.settings.population,
@@ -129,13 +130,13 @@ impl Optimiser for HybridSwarm {
                 seed: self.settings.seed,
                 spread: self.explorers.spread().clamp(SPREAD[0], SPREAD[1]),
                 active: true,
-                beyond: Beyond::Drawn,
+                beyond: OutOfBounds::AsDrawn,
                 restarts: Restarts::Alternating,
             };
             let (start, _) = self.explorers.best_candidate();
-            // The settings come from checked ones, so this is never an error; exploring on would serve as well.
-            self.gatherers = CovarianceSwarm::new(&self.problem, &start, settings).ok();
+            self.gatherers = Some(CovarianceSwarm::new(&self.problem, &start, settings)?);
         }
+        Ok(())
     }
 
     fn counters(&self) -> Counters {
@@ -147,6 +148,10 @@ impl Optimiser for HybridSwarm {
         }
     }
 
+    fn to_checkpoint(&self) -> Result<Vec<u8>> {
+        to_bytes(self)
+    }
+
     fn planned_iterations(&self) -> usize {
         self.settings.iterations
     }
@@ -156,11 +161,10 @@ impl Optimiser for HybridSwarm {
     }
 
     fn front(&self) -> Front {
-        let (candidate, cost) = self.best_candidate();
-        Front::single(candidate, cost)
+        Front::single(self.best_candidate())
     }
 
     fn best(&self) -> Vec<f64> {
-        vec![self.best_candidate().1]
+        vec![self.best_candidate().1.cost]
     }
 }

@@ -12,12 +12,13 @@
 //! whose particles move smooth bumps of many variables: they find what is long, as a coarse grid does for a fine one
 //! (Briggs, Henson, McCormick, *A multigrid tutorial*, 2nd ed., 2000).
 
+use super::checkpoint::to_bytes;
 use super::covariance::Distribution;
 use super::settings::setting;
 use super::space::Space;
 use super::{Counters, Front, Optimiser};
 use crate::error::{Error, Result};
-use crate::evaluate::{Evaluation, FAILED_COST, Problem};
+use crate::evaluate::{Evaluation, Problem, Worth};
 use crate::random::Random;
 use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
@@ -110,18 +111,17 @@ impl Window {
     }
 }
 
-/// Windows of particles about a common context; minimises the first objective.
+/// Windows of particles about a common context, for a single objective.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct WindowSwarm {
     settings: WindowSettings,
     /// Bounds of the variables; bumps and context are in the variables' own units.
     bounds: Vec<(f64, f64)>,
-    objectives: usize,
     random: Random,
     /// The windows of each turn; together they cover all variables.
     turns: Vec<Vec<Window>>,
     context: Vec<f64>,
-    best: (Vec<f64>, f64),
+    best: (Vec<f64>, Worth),
     counters: Counters,
 }
 
@@ -136,10 +136,10 @@ impl WindowSwarm {
     /// thing at one place after another, so one spread fits all.
     ///
     /// # Errors
-    /// [`Error::Input`] naming the setting that is out of its range.
+    /// [`Error::Input`] naming the setting that is out of its range, and for a problem of several objectives.
     pub fn new(problem: &Problem, start: &[f64], settings: WindowSettings) -> Result<Self> {
         settings.validate()?;
-        Space::new(problem)?;
+        Space::of_one_objective(problem)?;
         if let Some(v) = problem.variables.iter().find(|v| v.whole) {
             let expected = "a swarm in windows moves real numbers only";
             return Err(Error::input("the problem", &v.name, "whole numbers", expected));
@@ -174,9 +174,8 @@ impl WindowSwarm {
         let held = start.iter().zip(&bounds);
         let context: Vec<f64> = held.map(|(x, (lower, upper))| x.clamp(*lower, *upper)).collect();
         let mut swarm = Self {
-            objectives: problem.objectives.len(),
             random: Random::new(settings.seed),
-            best: (context.clone(), f64::INFINITY),
+            best: (context.clone(), Worth::FAILED),
             bounds,
             turns,
             context,
@@ -187,8 +186,8 @@ impl WindowSwarm {
         Ok(swarm)
     }
 
-    /// The best candidate so far, in the variables' units, and its cost.
-    pub fn best_candidate(&self) -> (Vec<f64>, f64) {
+    /// The best candidate so far, in the variables' units, and what it is worth.
+    pub fn best_candidate(&self) -> (Vec<f64>, Worth) {
         self.best.clone()
     }
 
@@ -299,27 +298,27 @@ impl Optimiser for WindowSwarm {
         rows
     }
 
-    fn tell(&mut self, evaluation: &Evaluation) {
-        let costs = evaluation.costs(self.objectives);
+    fn tell(&mut self, evaluation: &Evaluation) -> Result<()> {
         let (turn, count) = (self.turn(), self.settings.population);
-        self.counters.evaluations += costs.len() as u64;
-        let Some((&own, costs)) = costs.split_first() else {
-            return;
-        };
+        evaluation.check(1 + count * self.turns[turn].len(), 1)?;
+        let worths = evaluation.worths(1);
+        self.counters.evaluations += worths.len() as u64;
+        let (own, worths) = (worths[0], &worths[1..]);
         if own < self.best.1 {
             self.best = (self.context.clone(), own);
         }
-        let least = (0..costs.len()).min_by(|&a, &b| costs[a].total_cmp(&costs[b]));
-        if let Some(i) = least.filter(|&i| costs[i] < self.best.1) {
+        let least = (0..worths.len()).min_by(|&a, &b| worths[a].order(&worths[b]));
+        if let Some(i) = least.filter(|&i| worths[i] < self.best.1) {
             let window = &self.turns[turn][i / count];
-            self.best = (self.row(window, &window.heights[i % count]), costs[i]);
+            self.best = (self.row(window, &window.heights[i % count]), worths[i]);
         }
         let mut context = std::mem::take(&mut self.context);
-        for (window, costs) in self.turns[turn].iter_mut().zip(costs.chunks_exact(count)) {
+        for (window, worths) in self.turns[turn].iter_mut().zip(worths.chunks_exact(count)) {
             let mut order: Vec<usize> = (0..count).collect();
-            order.sort_by(|&a, &b| costs[a].total_cmp(&costs[b]));
+            order.sort_by(|&a, &b| worths[a].order(&worths[b]));
             // A window that failed as a whole, or to which nothing matters, says nothing about where to go.
-            if costs[order[0]] >= FAILED_COST || costs[order[0]] == costs[order[count - 1]] {
+            let (best, worst) = (worths[order[0]], worths[order[count - 1]]);
+            if !best.succeeded() || best == worst {
                 continue;
             }
             let ranked: Vec<&DVector<f64>> = order.iter().map(|&i| &window.heights[i]).collect();
@@ -340,10 +339,15 @@ impl Optimiser for WindowSwarm {
             }
         }
         self.sample();
+        Ok(())
     }
 
     fn counters(&self) -> Counters {
         self.counters
+    }
+
+    fn to_checkpoint(&self) -> Result<Vec<u8>> {
+        to_bytes(self)
     }
 
     fn planned_iterations(&self) -> usize {
@@ -351,12 +355,11 @@ impl Optimiser for WindowSwarm {
     }
 
     fn front(&self) -> Front {
-        let (candidate, cost) = self.best_candidate();
-        Front::single(candidate, cost)
+        Front::single(self.best_candidate())
     }
 
     fn best(&self) -> Vec<f64> {
-        vec![self.best.1]
+        vec![self.best.1.cost]
     }
 }
 
@@ -422,10 +425,10 @@ mod tests {
         while !swarm.done() {
             let rows = swarm.ask();
             let scored = rows.chunks_exact(n).map(|x| (vec![cost(x)], None)).collect();
-            swarm.tell(&Evaluation::of_rows(scored));
+            swarm.tell(&Evaluation::of_rows(scored)).unwrap();
         }
         let (x, best) = swarm.best_candidate();
-        assert!(best < 0.05 * first, "{first} to {best}");
-        assert_eq!(best, cost(&x));
+        assert!(best.cost < 0.05 * first, "{first} to {best:?}");
+        assert_eq!(best.cost, cost(&x));
     }
 }

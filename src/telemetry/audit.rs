@@ -5,7 +5,7 @@ use super::derived::{acceleration, moving, product};
 use super::log::Log;
 use super::role::Role;
 use super::statistics::fit;
-use crate::{Error, Result};
+use crate::{Error, Place, Result};
 
 /// Largest believable magnitude in SI, and what is usually wrong beyond it.
 fn limit(role: Role) -> Option<(f64, &'static str, &'static str)> {
@@ -65,7 +65,7 @@ pub(super) fn check_gains(log: &Log) -> Result<()> {
         if found.correlation.abs() > CLOSELY && !(0.4..=2.5).contains(&gain) {
             return Err(Error::input(
                 &log.source,
-                format!("channel {name}"),
+                Place::default().channel(name),
                 format!("values {gain:.3} times {against}"),
                 "about the same size; is one of the units wrong?",
             ));

@@ -14,7 +14,7 @@ use super::resample::{Grid, check_times, onto, uniform_interval};
 use super::role::Role;
 use super::text::shown;
 use super::units::Quantity;
-use crate::{Error, Result};
+use crate::{Error, Place, Result};
 
 /// A mapped channel in SI, with its times.
 pub(super) struct Signal<'a> {
@@ -53,7 +53,7 @@ pub(super) fn signals<'a>(
         if times.len() != channel.values.len() {
             return Err(Error::input(
                 source,
-                format!("channel {}", channel.name),
+                Place::default().channel(&channel.name),
                 format!("{} samples at {} times", channel.values.len(), times.len()),
                 "as many samples as times",
             ));
@@ -81,7 +81,7 @@ fn check_samples(source: &str, channel: &Channel) -> Result<()> {
         return Ok(());
     };
     let (place, found) = if channel.values.is_empty() {
-        (format!("channel {}", channel.name), bad.text.clone())
+        (Place::default().channel(&channel.name), bad.text.clone())
     } else if bad.text.is_empty() {
         (channel.place(bad.sample), "an empty cell".to_owned())
     } else {
@@ -105,7 +105,7 @@ fn times(source: &str, channel: &Channel) -> Result<Arc<[f64]>> {
         }
         Clock::Rate { rate_hz, .. } => Err(Error::input(
             source,
-            format!("channel {}", channel.name),
+            Place::default().channel(&channel.name),
             format!("a sample rate of {rate_hz} Hz"),
             "one above 0",
         )),
@@ -126,7 +126,7 @@ fn factor(source: &str, m: &Mapped<'_>, map: &ChannelMap, radius: Option<f64>) -
         factor /= radius.ok_or_else(|| {
             Error::input(
                 source,
-                format!("channel {}", m.channel.name),
+                Place::default().channel(&m.channel.name),
                 "a linear wheel speed and no rolling radius to turn it into rad/s",
                 "rolling_radius_m in [vehicle] of the channel map",
             )
@@ -187,7 +187,7 @@ impl Build<'_> {
             Some(signal) => Ok(sampled(signal)),
             None => Err(Error::input(
                 self.source,
-                format!("channel {}", role.key()),
+                Place::default().channel(role.key()),
                 "none",
                 "one",
             )),
@@ -279,7 +279,7 @@ impl Build<'_> {
         let Some(radius) = self.radius else {
             return Err(Error::input(
                 self.source,
-                "channel vx",
+                Place::default().channel("vx"),
                 "no ground speed, and no rolling radius to make one of wheel speeds",
                 "a ground speed channel, or rolling_radius_m in [vehicle] of the channel map",
             ));
@@ -288,7 +288,7 @@ impl Build<'_> {
         if let Some(channel) = self.recording.channels.iter().find(|c| c.name.starts_with("vx_")) {
             return Err(Error::input(
                 self.source,
-                format!("channel {}", channel.name),
+                Place::default().channel(&channel.name),
                 "a forward speed in a unit that is not known",
                 "vx_mps, or the channel with its unit in the channel map",
             ));

@@ -11,7 +11,7 @@ use super::role::Role;
 use super::text::shown;
 use super::units::Unit;
 use crate::config::read_text;
-use crate::{Error, Result};
+use crate::{Error, Place, Result};
 
 /// One of the car's axles.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -115,8 +115,8 @@ impl ChannelMap {
         let line_of = |at: usize| 1 + text.bytes().take(at).filter(|&byte| byte == b'\n').count();
         let file: FileMap = toml::from_str(text).map_err(|e| {
             let place = match e.span() {
-                Some(span) => format!("line {}", line_of(span.start)),
-                None => "the file".to_owned(),
+                Some(span) => Place::line(line_of(span.start)),
+                None => "the file".into(),
             };
             let message = e.message().replace('\n', " ");
             let (found, expected) = message
@@ -128,7 +128,7 @@ impl ChannelMap {
             |value: Option<Spanned<f64>>, key: &str, expected: &str, fits: fn(f64) -> bool| match value {
                 Some(value) if !fits(*value.get_ref()) => Err(Error::input(
                     path,
-                    format!("line {}, field {key}", line_of(value.span().start)),
+                    Place::line(line_of(value.span().start)).field(key),
                     value.get_ref().to_string(),
                     expected,
                 )),
@@ -141,7 +141,7 @@ impl ChannelMap {
             {
                 check_unit(unit.get_ref(), role).map_err(|expected| {
                     let line = line_of(unit.span().start);
-                    let place = format!("line {line}, field channels.{}.unit", role.key());
+                    let place = Place::line(line).field(format!("channels.{}.unit", role.key()));
                     Error::input(path, place, shown(unit.get_ref()), expected)
                 })?;
             }
@@ -191,7 +191,7 @@ impl ChannelMap {
                 Some(name) => Some(recording.channel(name).ok_or_else(|| {
                     Error::input(
                         &recording.source,
-                        format!("channel {}", role.key()),
+                        Place::default().channel(role.key()),
                         format!("no channel {}; it has {}", shown(name), listed(recording)),
                         "the name that the channel map gives",
                     )
@@ -202,7 +202,7 @@ impl ChannelMap {
                 if role.required() || entry.is_some() {
                     return Err(Error::input(
                         &recording.source,
-                        format!("channel {}", role.key()),
+                        Place::default().channel(role.key()),
                         format!("none with a usual name; it has {}", listed(recording)),
                         format!(
                             "a [channels.{}] entry with its name in the channel map",
@@ -222,7 +222,7 @@ impl ChannelMap {
                 Err(expected) => {
                     return Err(Error::input(
                         &recording.source,
-                        format!("channel {}", channel.name),
+                        Place::default().channel(&channel.name),
                         format!("the unit {}", shown(unit_text)),
                         format!(
                             "{expected}; a unit in [channels.{}] of the channel map overrides it",

@@ -2,7 +2,7 @@
 
 use super::recording::{Channel, Clock, Format, Recording};
 use super::{csv_native, motec_ld, text};
-use crate::{Error, Result};
+use crate::{Error, Place, Result};
 use std::path::Path;
 
 /// One lap as positions on the globe.
@@ -64,7 +64,7 @@ impl Recording {
             self.usual(names).ok_or_else(|| {
                 Error::input(
                     &self.source,
-                    format!("channel {what}"),
+                    Place::default().channel(what),
                     "none",
                     format!("a channel called {}", names.join(", ")),
                 )
@@ -74,7 +74,7 @@ impl Recording {
         if latitude.values.len() != longitude.values.len() {
             return Err(Error::input(
                 &self.source,
-                format!("channel {}", longitude.name),
+                Place::default().channel(&longitude.name),
                 format!("{} samples", longitude.values.len()),
                 format!("{}, as {} has", latitude.values.len(), latitude.name),
             ));
@@ -101,7 +101,7 @@ impl Recording {
             _ => {
                 return Err(Error::input(
                     &self.source,
-                    format!("channel {}, unit", channel.name),
+                    Place::default().channel(&channel.name),
                     text::shown(&channel.unit),
                     "deg, rad or min",
                 ));

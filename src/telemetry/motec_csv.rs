@@ -10,7 +10,7 @@ use super::recording::{Format, Metadata, Reading, Recording};
 use super::table::Table;
 use super::text::{Row, Rows, shown};
 use super::units::{Quantity, Unit};
-use crate::{Error, Result};
+use crate::{Error, Place, Result};
 
 /// Reads an export from its text; `path` is its name in error messages.
 pub(super) fn parse(text: &str, path: &Path, reading: &Reading<'_>) -> Result<Recording> {
@@ -23,7 +23,7 @@ pub(super) fn parse(text: &str, path: &Path, reading: &Reading<'_>) -> Result<Re
         let Some(row) = rows.next().transpose()? else {
             return Err(Error::input(
                 path,
-                format!("line {last_line}"),
+                Place::line(last_line),
                 "the end of the file",
                 "a row of channel names that starts with \"Time\", and a row of their units under it",
             ));
@@ -61,7 +61,7 @@ fn unique_names(row: &Row<'_>, path: &Path) -> Result<Vec<String>> {
         if cell.is_empty() {
             return Err(Error::input(
                 path,
-                format!("line {}, column {}", row.line, index + 1),
+                Place::line(row.line).named(format!("column {}", index + 1)),
                 "an empty cell",
                 "a channel name",
             ));
@@ -85,7 +85,7 @@ fn describe(row: &Row<'_>, path: &Path, metadata: &mut Metadata, beacons_s: &mut
                 _ => {
                     return Err(Error::input(
                         path,
-                        format!("line {}, Beacon Markers", row.line),
+                        Place::line(row.line).named("Beacon Markers"),
                         shown(word),
                         "times in seconds",
                     ));
@@ -140,7 +140,7 @@ mod tests {
         assert_eq!(r.channels[1].unit, "°/s");
         assert_eq!(r.channels[0].values, [36.0, 72.0]);
         assert_eq!(r.channels[1].unreadable.as_ref().unwrap().sample, 1);
-        assert_eq!(r.channels[1].place(1), "line 12, channel Yaw");
+        assert_eq!(r.channels[1].place(1).to_string(), "line 12, channel Yaw");
     }
 
     #[test]

@@ -16,7 +16,7 @@ use motec_i2::{ChannelMetadata, Header, I2Error, LDReader};
 use super::recording::{Channel, Clock, Format, MOST_CHANNELS, Metadata, Reading, Recording, Unreadable};
 use super::text::{decode, shown};
 use crate::config::{LARGEST_TEXT, read_bytes};
-use crate::{Error, Result};
+use crate::{Error, Place, Result};
 
 /// First four bytes of a `.ld`, little-endian.
 const MARKER: u32 = 64;
@@ -197,7 +197,7 @@ fn check_channels(bytes: &mut [u8], path: &Path) -> Result<Vec<Stored>> {
             if u64::from(data) + stored > length as u64 || total > length as u64 {
                 return Err(Error::input(
                     path,
-                    format!("channel {}", shown(&name)),
+                    Place::default().channel(shown(&name)),
                     format!("{count} samples of {size} bytes at address {data}"),
                     format!("samples inside the file of {length} bytes (is it cut short?)"),
                 ));
@@ -372,7 +372,7 @@ fn beacons(xml: &str, path: &Path) -> Result<Vec<f64>> {
                 _ => {
                     return Err(Error::input(
                         path,
-                        format!("line {}, Marker", line + 1),
+                        Place::line(line + 1).named("Marker"),
                         shown(time),
                         "a Time in microseconds",
                     ));

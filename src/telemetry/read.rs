@@ -6,7 +6,7 @@ use std::path::Path;
 use super::recording::{Format, Reading, Recording};
 use super::{csv_native, motec_csv, motec_ld, text};
 use crate::config::{LARGEST_LOG, read_bytes};
-use crate::{Error, Result};
+use crate::{Error, Place, Result};
 
 impl Recording {
     /// Reads a log file; content decides the format, and the extension where content does not.
@@ -52,7 +52,7 @@ impl Recording {
         let text = text::decode(&bytes);
         let mut rows = text::Rows::new(&text, path, true);
         let Some(first) = rows.next().transpose()? else {
-            return Err(Error::input(path, "line 1", "no rows", "a log"));
+            return Err(Error::input(path, Place::line(1), "no rows", "a log"));
         };
         if first.cells.iter().any(|c| c == csv_native::TIME) {
             csv_native::parse(&text, path, reading)
@@ -61,7 +61,7 @@ impl Recording {
         } else {
             Err(Error::input(
                 path,
-                format!("line {}", first.line),
+                Place::line(first.line),
                 text::shown(first.cell(0)),
                 "a header row with a time_s column, a MoTeC CSV export (first cell \"Format\"), or a .ld file",
             ))

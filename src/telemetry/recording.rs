@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use crate::Result;
 use crate::config::{check_memory, memory_limit};
+use crate::error::Place;
 
 /// The file formats that can be read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -68,10 +69,10 @@ impl Channel {
     }
 
     /// Where a sample stands, for an error message: `line 12, channel X`, or its time in a binary file.
-    pub fn place(&self, sample: usize) -> String {
+    pub fn place(&self, sample: usize) -> Place {
         match self.lines.as_ref().and_then(|lines| lines.get(sample)) {
-            Some(line) => format!("line {line}, channel {}", self.name),
-            None => format!("channel {}, t = {:.3} s", self.name, self.time_s(sample)),
+            Some(&line) => Place::line(line).channel(&self.name),
+            None => Place::time(self.time_s(sample)).channel(&self.name),
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Bringing channels with their own clocks onto one uniform clock.
 
 use super::recording::Channel;
-use crate::{Error, Result};
+use crate::{Error, Place, Result};
 
 /// By how much of a sample interval logged times may stray from a uniform clock and still count as on it: i2 writes
 /// milliseconds, which is 3 % of an interval at 60 Hz.
@@ -69,7 +69,7 @@ pub(super) fn check_times(source: &str, channel: &Channel, times: &[f64], bridge
     if intervals.is_empty() {
         return Err(Error::input(
             source,
-            format!("channel {}", channel.name),
+            Place::default().channel(&channel.name),
             format!("{} samples", times.len()),
             "at least two",
         ));

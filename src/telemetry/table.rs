@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::recording::{Channel, Clock, Format, Metadata, Reading, Recording, Unreadable};
 use super::text::{Row, shown};
-use crate::{Error, Result};
+use crate::{Error, Place, Result};
 
 /// Columns of numbers as they are read.
 pub(super) struct Table<'a> {
@@ -64,7 +64,7 @@ impl<'a> Table<'a> {
         if row.cells.len() < width || surplus {
             return Err(Error::input(
                 self.file,
-                format!("line {line}"),
+                Place::line(line),
                 format!("{} cells", row.cells.len()),
                 format!("{width} cells, one for each column"),
             ));
@@ -79,7 +79,7 @@ impl<'a> Table<'a> {
                 _ if index == self.time_column => {
                     return Err(Error::input(
                         self.file,
-                        format!("line {line}, channel {}", self.names[index]),
+                        Place::line(line).channel(&self.names[index]),
                         shown(cell),
                         "a time in seconds",
                     ));

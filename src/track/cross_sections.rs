@@ -1,7 +1,7 @@
 //! Cross-sections of a circuit at stations: the straight segments that a racing line crosses.
 
 use super::circuit::{Corner, Section};
-use crate::{Error, Result};
+use crate::{Error, Place, Result};
 use glam::DVec2;
 
 /// Cross-sections across a circuit, each from its right edge to its left one.
@@ -129,7 +129,7 @@ impl CrossSections {
             if !fits {
                 return Err(Error::input(
                     &self.name,
-                    format!("width at station {station:.1} m"),
+                    Place::station(*station).named("width"),
                     format!("{width:.2} m"),
                     format!("more than the car's {car_width_m:.2} m"),
                 ));

@@ -9,7 +9,7 @@ use super::circuit::Circuit;
 use super::cross_sections::CrossSections;
 use super::crossing::{Stretch, crossings, stretches};
 use super::road::{Road, RoadFrame, Spacing, even_stations, spread};
-use crate::{Error, Result};
+use crate::{Error, Place, Result};
 use glam::DVec2;
 
 /// A cross-section is turned no further from the normal than this (rad).
@@ -96,7 +96,7 @@ impl<'a> Cutter<'a> {
             if width.is_nan() || width <= 0.0 {
                 return Err(Error::input(
                     road.source(),
-                    format!("width at station {station:.1} m"),
+                    Place::station(*station).named("width"),
                     format!("{width:.2} m"),
                     "a road wider than zero",
                 ));
@@ -144,8 +144,8 @@ impl<'a> Cutter<'a> {
         let [a, b] = [i, j].map(|i| self.stations[i.min(self.stations.len() - 1)]);
         Error::input(
             self.road.source(),
-            format!("stations {a:.1} m and {b:.1} m"),
-            "edges that cross: the road overlaps itself",
+            Place::station(a),
+            format!("edges that cross those at station {b:.1} m: the road overlaps itself"),
             "widths that leave room between the two stretches",
         )
     }
@@ -225,7 +225,7 @@ impl<'a> Cutter<'a> {
         };
         Error::input(
             self.road.source(),
-            format!("station {:.1} m", self.stations[cut]),
+            Place::station(self.stations[cut]),
             format!(
                 "cross-sections that cross: {inside:.1} m of road inside a bend of {:.1} m radius",
                 1.0 / frame.curvature_1pm.abs().max(1e-9)

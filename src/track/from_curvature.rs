@@ -17,7 +17,7 @@ use std::f64::consts::TAU;
 
 use super::circuit::{Circuit, Corner, Section};
 use super::clothoid::displacement;
-use crate::{Error, Result};
+use crate::{Error, Place, Result};
 
 /// Distance between samples of a circuit (m), before rounding to a whole number of steps.
 const SPACING_M: f64 = 1.0;
@@ -178,7 +178,7 @@ impl CurvatureTable {
         Ok((circuit, closure))
     }
 
-    fn refuse<T>(&self, place: impl Into<String>, found: String, expected: &str) -> Result<T> {
+    fn refuse<T>(&self, place: impl Into<Place>, found: String, expected: &str) -> Result<T> {
         Err(Error::input(&self.name, place, found, expected))
     }
 
@@ -197,7 +197,7 @@ impl CurvatureTable {
         }
         let mut last = f64::NEG_INFINITY;
         for (i, row) in self.rows.iter().enumerate() {
-            let place = |field: &str| format!("row {}, field {field}", i + 1);
+            let place = |field: &str| Place::row(i + 1).field(field);
             let s = row.station_m;
             let ends = if self.closed { s < length } else { s <= length };
             if !(s >= 0.0 && s > last && ends) {

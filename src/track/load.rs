@@ -11,7 +11,7 @@ use super::from_curvature::{Closure, CurvatureRow, CurvatureTable};
 use super::reference::Smoothing;
 use super::survey::{Survey, SurveyOptions};
 use crate::config::read_text;
-use crate::{Error, Result};
+use crate::{Error, Place, Result};
 
 /// A circuit embedded in the crate: name, TOML and curvature table.
 struct Bundled {
@@ -152,15 +152,7 @@ impl CircuitSource {
 
 /// Builds, naming the table's file where the library names the circuit.
 fn build(table: &CurvatureTable, table_file: &str) -> Result<(Circuit, Closure)> {
-    table.build().map_err(|error| match error {
-        Error::Input {
-            place,
-            found,
-            expected,
-            ..
-        } => Error::input(table_file, place, found, expected),
-        other => other,
-    })
+    table.build().map_err(|error| error.of_file(table_file))
 }
 
 fn assemble(
@@ -235,7 +227,7 @@ fn parse_table(
             } => format!("{len} fields where the header has {expected_len}"),
             _ => error.to_string(),
         };
-        Error::input(file, format!("line {line}"), found, "a row like the header")
+        Error::input(file, Place::line(line), found, "a row like the header")
     };
     let header = reader.headers().map_err(unreadable)?.clone();
     let header_line = line_at(header.position());
@@ -246,7 +238,7 @@ fn parse_table(
             _ => {
                 return Err(Error::input(
                     file,
-                    format!("line {header_line}, column {}", i + 1),
+                    Place::line(header_line).named(format!("column {}", i + 1)),
                     format!("`{found}`"),
                     format!("each of {} once at most", COLUMNS.join(", ")),
                 ));
@@ -255,7 +247,7 @@ fn parse_table(
     }
     let [station, curvature, left, right, corner] = column;
     let missing = |name: &str, found: &str| {
-        let place = format!("line {header_line}, column {name}");
+        let place = Place::line(header_line).column(name);
         Error::input(file, place, found, "this column")
     };
     let station = station.ok_or_else(|| missing(COLUMNS[0], "nothing"))?;
@@ -276,7 +268,7 @@ fn parse_table(
                 Ok(x) if x >= low && x <= high => Ok(x),
                 _ => Err(Error::input(
                     file,
-                    format!("line {line}, field {}", &header[column]),
+                    Place::line(line).field(&header[column]),
                     format!("`{found}`"),
                     format!("a number from {low} to {high}"),
                 )),
@@ -300,7 +292,7 @@ fn parse_table(
         if !fits {
             return Err(Error::input(
                 file,
-                format!("line {line}, field station_m"),
+                Place::line(line).field("station_m"),
                 row.station_m.to_string(),
                 if rows.is_empty() {
                     "0 in the first row".to_owned()

@@ -2,7 +2,7 @@
 
 use super::circuit::{Circuit, Corner, Section};
 use super::from_curvature::{Closure, CurvatureRow, CurvatureTable};
-use crate::{Error, Result};
+use crate::{Error, Place, Result};
 use glam::DVec2;
 use std::f64::consts::PI;
 
@@ -116,7 +116,7 @@ pub(super) fn circuit(road: &dyn Road) -> Result<(Circuit, Closure)> {
     if let Some(row) = rows.iter().find(|r| !(-1.0..=1.0).contains(&r.curvature_1pm)) {
         return Err(Error::input(
             road.source(),
-            format!("station {:.1} m", row.station_m),
+            Place::station(row.station_m),
             format!("a bend of {:.2} m radius", 1.0 / row.curvature_1pm.abs()),
             "bends of at least 1 m radius",
         ));

@@ -6,7 +6,7 @@
 //! Proc. IMechE D 219, 2005, for the g-g-speed surface.)
 
 use crate::config::read_text;
-use crate::error::{Error, Result};
+use crate::error::{Error, Place, Result};
 use serde::{Deserialize, Serialize};
 use std::fmt::Write as _;
 use std::path::Path;
@@ -79,7 +79,7 @@ impl Envelope {
     pub fn new(name: impl Into<String>, rows: Vec<EnvelopeRow>) -> Result<Self> {
         let name = name.into();
         for (index, row) in rows.iter().enumerate() {
-            check_row(&name, &format!("row {}", index + 1), row, rows[..index].last())?;
+            check_row(&name, Place::row(index + 1), row, rows[..index].last())?;
         }
         check_count(&name, rows.len())?;
         Ok(Self { name, rows })
@@ -135,7 +135,7 @@ impl Envelope {
                 } => format!("{len} fields where the header has {expected_len}"),
                 _ => error.to_string(),
             };
-            let place = format!("line {}", line_at(error.position()));
+            let place = Place::line(line_at(error.position()));
             Error::input(file, place, found, "a row like the header")
         };
         let header = reader.headers().map_err(unreadable)?.clone();
@@ -148,7 +148,7 @@ impl Envelope {
                 (first, _) => {
                     return Err(Error::input(
                         file,
-                        format!("line {header_line}, column {name}"),
+                        Place::line(header_line).column(name),
                         if first.is_some() {
                             "it twice".to_owned()
                         } else {
@@ -169,14 +169,14 @@ impl Envelope {
                 *figure = field.parse().map_err(|_| {
                     Error::input(
                         file,
-                        format!("line {line}, field {name}"),
+                        Place::line(line).field(name),
                         format!("`{field}`"),
                         "a number",
                     )
                 })?;
             }
             let row = EnvelopeRow::from_array(figures);
-            check_row(file, &format!("line {line}"), &row, rows.last())?;
+            check_row(file, Place::line(line), &row, rows.last())?;
             rows.push(row);
         }
         check_count(file, rows.len())?;
@@ -241,12 +241,12 @@ fn check_count(file: &str, rows: usize) -> Result<()> {
     Ok(())
 }
 
-fn check_row(file: &str, place: &str, row: &EnvelopeRow, before: Option<&EnvelopeRow>) -> Result<()> {
+fn check_row(file: &str, place: Place, row: &EnvelopeRow, before: Option<&EnvelopeRow>) -> Result<()> {
     for ((x, name), (least, allowed, most)) in row.to_array().into_iter().zip(ENVELOPE_COLUMNS).zip(RANGES) {
         if !(x > least && x <= most || allowed && x == least) {
             return Err(Error::input(
                 file,
-                format!("{place}, field {name}"),
+                place.field(name),
                 x.to_string(),
                 if allowed {
                     format!("{least} to {most}")
@@ -260,7 +260,7 @@ fn check_row(file: &str, place: &str, row: &EnvelopeRow, before: Option<&Envelop
     if !rises {
         return Err(Error::input(
             file,
-            format!("{place}, field {}", ENVELOPE_COLUMNS[0]),
+            place.field(ENVELOPE_COLUMNS[0]),
             row.v_mps.to_string(),
             "a speed beyond that of the row before",
         ));

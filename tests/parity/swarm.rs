@@ -219,7 +219,7 @@ fn swarms_in_lanes_and_on_the_device_in_lockstep() {
                     "{name}, generation {generation}: {furthest} apart"
                 );
             }
-            lanes.tell(&judge.evaluate(&candidates).unwrap());
+            lanes.tell(&judge.evaluate(&candidates).unwrap()).unwrap();
             there.step(&mut judge_there).unwrap();
         }
         if exact {

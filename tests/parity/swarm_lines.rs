@@ -123,11 +123,11 @@ fn fronts_are_those_of_the_host() {
     assert_eq!(again.candidates().unwrap(), there.candidates().unwrap());
 
     let mut here = Mopso::new(&line.problem, settings()).unwrap();
-    here.start_from(&start(&line));
+    here.start_from(&start(&line)).unwrap();
     let first = judge.evaluate(&here.ask()).unwrap().objectives;
     while !here.done() {
         let candidates = here.ask();
-        here.tell(&judge.evaluate(&candidates).unwrap());
+        here.tell(&judge.evaluate(&candidates).unwrap()).unwrap();
     }
     let found = there.front();
     assert_eq!(non_dominated(&found.objectives).len(), found.objectives.len());

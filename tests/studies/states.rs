@@ -1,12 +1,12 @@
 //! What optimisers carry from one iteration to the next: checkpoints, islands, constraints, whole numbers.
 
-use lapswarm::evaluate::point::{CallCost, PointEvaluator};
-use lapswarm::evaluate::{Evaluator, Objective, Problem, Variable, violation_of};
+use lapswarm::evaluate::point::{CallCost, Constraint, PointEvaluator};
+use lapswarm::evaluate::{Evaluator, Objective, Problem, Variable};
 use lapswarm::swarm::checkpoint::{Checkpoint, VERSION, from_bytes, load, save, to_bytes};
 use lapswarm::swarm::{
-    Beyond, CooperativeSettings, CooperativeSwarm, CovarianceSettings, CovarianceSwarm, DifferenceSettings,
+    CooperativeSettings, CooperativeSwarm, CovarianceSettings, CovarianceSwarm, DifferenceSettings,
     DifferenceSwarm, HybridSettings, HybridSwarm, Islands, MANY, Migration, Mopso, MopsoSettings, Nsga2,
-    Nsga2Settings, Optimiser, Pso, PsoSettings, Restarts, WindowSettings, WindowSwarm,
+    Nsga2Settings, Optimiser, OutOfBounds, Pso, PsoSettings, Restarts, WindowSettings, WindowSwarm,
 };
 use proptest::prelude::*;
 use std::path::Path;
@@ -39,7 +39,7 @@ fn evaluator(objectives: usize) -> impl Evaluator {
 fn steps(optimiser: &mut dyn Optimiser, evaluator: &mut dyn Evaluator, count: usize) {
     for _ in 0..count {
         let population = optimiser.ask();
-        optimiser.tell(&evaluator.evaluate(&population).unwrap());
+        optimiser.tell(&evaluator.evaluate(&population).unwrap()).unwrap();
     }
 }
 
@@ -122,8 +122,8 @@ proptest! {
         let hybrid = HybridSettings { iterations: 60, ..Default::default() };
         goes_on(|s| HybridSwarm::new(&one, HybridSettings { seed: s, ..hybrid.clone() }).unwrap(), 1, seed, at);
         for (active, beyond, restarts) in [
-            (false, Beyond::Reflected, Restarts::None),
-            (true, Beyond::Drawn, Restarts::Alternating),
+            (false, OutOfBounds::Reflected, Restarts::None),
+            (true, OutOfBounds::AsDrawn, Restarts::Alternating),
         ] {
             let settings = CovarianceSettings { active, beyond, restarts, ..Default::default() };
             goes_on(|s| CovarianceSwarm::new(&one, &middle, CovarianceSettings { seed: s, ..settings.clone() }).unwrap(), 1, seed, at);
@@ -228,7 +228,7 @@ fn islands_are_their_swarms_and_migrants_arrive() {
 fn constrained(objectives: usize) -> impl Evaluator {
     PointEvaluator::constrained(
         problem(objectives),
-        1,
+        vec![Constraint::at_most_zero()],
         CallCost::Cheap,
         move |x: &[f64], f: &mut [f64]| {
             distances(x, &mut f[..objectives]);
@@ -316,7 +316,7 @@ fn without_anything_feasible_the_least_violation_is_kept() {
     let hopeless = |objectives: usize| {
         PointEvaluator::constrained(
             problem(objectives),
-            2,
+            vec![Constraint::at_most_zero(); 2],
             CallCost::Cheap,
             move |x: &[f64], f: &mut [f64]| {
                 distances(x, &mut f[..objectives]);
@@ -339,9 +339,13 @@ fn without_anything_feasible_the_least_violation_is_kept() {
     }
     let mut swarm = pso(1);
     steps(&mut swarm, &mut hopeless(1), 40);
-    let violation = violation_of(swarm.best()[0]).expect("it says so");
+    let violation = swarm.violation();
     assert!((1.0..1.1).contains(&violation), "{violation}");
-    assert_eq!(violation_of(3.0), None);
+    assert!(!swarm.front().is_feasible());
+    let (x, mut f) = (&swarm.front().candidates[0], [0.0]);
+    distances(x, &mut f);
+    assert_eq!(swarm.best(), f, "the cost is the candidate's own");
+    assert_eq!(violation, 1.0 + x[0]);
 }
 
 #[test]
@@ -361,7 +365,7 @@ fn whole_numbers_and_bad_bounds() {
             ..default.motion
         };
         let mut swarm = Mopso::new(&mixed, MopsoSettings { motion, ..default }).unwrap();
-        swarm.start_from(&[vec![1.0, 5.0, 0.0, 0.0, 1.5]]);
+        swarm.start_from(&[vec![1.0, 5.0, 0.0, 0.0, 1.5]]).unwrap();
         assert_eq!(swarm.ask()[1], 5.0);
         let mut judge = PointEvaluator::new(mixed.clone(), CallCost::Cheap, function);
         let first = swarm.ask();

@@ -99,7 +99,7 @@ fn nothing_is_lost_but_by_truncation() {
                 rows.filter(|r| r.iter().all(|x| x.is_finite() && *x < FAILED_COST))
                     .map(<[f64]>::to_vec),
             );
-            swarm.tell(&evaluation);
+            swarm.tell(&evaluation).unwrap();
             let mut expected: Vec<_> = non_dominated(&told)
                 .into_iter()
                 .map(|i| told[i].clone())
@@ -162,7 +162,7 @@ fn threads_change_nothing() {
                 while !swarm.done() {
                     let population = swarm.ask();
                     assert!(population.iter().all(|x| (0.0..=1.0).contains(x)));
-                    swarm.tell(&evaluator.evaluate(&population).unwrap());
+                    swarm.tell(&evaluator.evaluate(&population).unwrap()).unwrap();
                 }
                 (swarm.ask(), swarm.front())
             })
@@ -197,7 +197,7 @@ fn translation_changes_nothing_and_corners_are_reached() {
                     .sum();
             }
         };
-        let mut evaluator = PointEvaluator::new(problem.clone(), CallCost::Dear, function);
+        let mut evaluator = PointEvaluator::new(problem.clone(), CallCost::Expensive, function);
         let mut swarm = Mopso::new(&problem, settings(MANY, 20)).unwrap();
         run(&mut swarm, &mut evaluator, |_| ControlFlow::Continue(())).unwrap();
         assert!(swarm.front().candidates.iter().all(|c| c[2] == 2.5 + shift));
@@ -214,10 +214,11 @@ fn translation_changes_nothing_and_corners_are_reached() {
 fn nothing_that_can_be_evaluated_is_survived() {
     let problem = plain(3, 2);
     let mut swarm = Mopso::new(&problem, settings(MANY, 5)).unwrap();
-    let mut evaluator = PointEvaluator::new(problem, CallCost::Dear, |_: &[f64], f: &mut [f64]| {
+    let mut evaluator = PointEvaluator::new(problem, CallCost::Expensive, |_: &[f64], f: &mut [f64]| {
         f.fill(f64::NAN)
     });
     run(&mut swarm, &mut evaluator, |_| ControlFlow::Continue(())).unwrap();
     assert!(swarm.front().objectives.is_empty());
-    assert_eq!(swarm.best(), [FAILED_COST; 2]);
+    assert_eq!(swarm.best(), [f64::INFINITY; 2]);
+    assert_eq!(swarm.violation(), f64::INFINITY);
 }

@@ -7,7 +7,7 @@ mod scaling;
 mod studies;
 mod swarm;
 
-use crate::cli::measurement::{self, Machine};
+use crate::cli::measurement::keep;
 use crate::cli::output::outln;
 use crate::cli::print_json;
 use lapswarm::Result;
@@ -56,12 +56,11 @@ fn finish<'a>(
     (study, table): (&'static str, &impl Serialize),
     folder: Option<&RunFolder>,
     page: impl FnOnce(&Path) -> Result<HtmlReport>,
-    (backends, adapter): (impl IntoIterator<Item = &'a str>, Option<&str>),
+    measured_by: (impl IntoIterator<Item = &'a str>, Option<&str>),
     (told, json): (bool, bool),
 ) -> Result<()> {
     if let Some(folder) = folder {
-        let machine = Machine::of(backends, adapter)?;
-        measurement::write(folder, study, table, page(folder)?, &machine)?;
+        keep(folder, study, table, page(folder)?, measured_by)?;
         if told {
             outln!("Results: {}", folder.display());
         }

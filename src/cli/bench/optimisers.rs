@@ -3,10 +3,11 @@
 use super::finish;
 use super::pages::of_optimisers;
 use crate::cli::measurement::Kept;
-use crate::cli::output::outln;
-use lapswarm::swarm::comparison::{MULTI_OBJECTIVE, SINGLE_OBJECTIVE, compare, quartiles};
+use crate::cli::output::{Columns, line_of, outln};
+use lapswarm::swarm::comparison::{compare, quartiles};
 use lapswarm::swarm::metrics::signed_rank;
 use lapswarm::swarm::problems::{NAMES, TestProblem};
+use lapswarm::swarm::{MULTI_OBJECTIVE, SINGLE_OBJECTIVE};
 use lapswarm::{Error, Result};
 use serde::Serialize;
 
@@ -76,18 +77,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let mut rows = Vec::new();
     if !arguments.json {
         outln!("medians and interquartile ranges of {} seeds", arguments.seeds);
-        outln!(
-            "{:<12}{:<18}{:>14}{:>10}{:>12}{:>14}{:>10}{:>12}{:>12}",
-            "problem",
-            "algorithm",
-            "hypervolume",
-            "IQR",
-            "IGD+",
-            "error",
-            "IQR",
-            "best peer",
-            "p"
-        );
+        outln!("{}", line_of(COLUMNS, None));
     }
     for problem in NAMES
         .into_iter()
@@ -103,7 +93,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         for algorithm in algorithms.iter().filter(|a| wanted(&arguments.algorithms, a)) {
             let row = measure(&problem, algorithm, arguments.seeds)?;
             if !arguments.json {
-                print_row(&row);
+                outln!("{}", line_of(COLUMNS, Some(&row)));
             }
             rows.push(row);
         }
@@ -157,23 +147,26 @@ fn measure(problem: &TestProblem, algorithm: &'static str, seeds: u64) -> Result
     })
 }
 
-fn print_row(row: &Row) {
-    let fixed = |x: Option<f64>| x.map_or(String::new(), |x| format!("{x:.4}"));
-    let short = |x: Option<f64>| x.map_or(String::new(), |x| format!("{x:.1e}"));
-    let peer = match row.hypervolume_median {
-        Some(_) => fixed(row.best_peer),
-        None => short(row.best_peer),
-    };
-    outln!(
-        "{:<12}{:<18}{:>14}{:>10}{:>12}{:>14}{:>10}{:>12}{:>12}",
-        row.problem,
-        row.algorithm,
-        fixed(row.hypervolume_median),
-        short(row.hypervolume_iqr),
-        fixed(row.igd_plus_median),
-        short(row.error_median),
-        short(row.error_iqr),
-        peer,
-        short(row.better_than_peer_p),
-    );
+/// The table on a terminal.
+const COLUMNS: &Columns<Row> = &[
+    ("problem", -12, |r| r.problem.to_owned()),
+    ("algorithm", -18, |r| r.algorithm.to_owned()),
+    ("hypervolume", 14, |r| fixed(r.hypervolume_median)),
+    ("IQR", 10, |r| short(r.hypervolume_iqr)),
+    ("IGD+", 12, |r| fixed(r.igd_plus_median)),
+    ("error", 14, |r| short(r.error_median)),
+    ("IQR", 10, |r| short(r.error_iqr)),
+    ("best peer", 12, |r| match r.hypervolume_median {
+        Some(_) => fixed(r.best_peer),
+        None => short(r.best_peer),
+    }),
+    ("p", 12, |r| short(r.better_than_peer_p)),
+];
+
+fn fixed(x: Option<f64>) -> String {
+    x.map_or(String::new(), |x| format!("{x:.4}"))
+}
+
+fn short(x: Option<f64>) -> String {
+    x.map_or(String::new(), |x| format!("{x:.1e}"))
 }

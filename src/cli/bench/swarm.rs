@@ -4,8 +4,7 @@ use super::finish;
 use super::pages::of_swarm;
 use crate::cli::backend_flag;
 use crate::cli::measurement::Kept;
-use crate::cli::output::outln;
-use lapswarm::Result;
+use crate::cli::output::{Columns, line_of, outln};
 use lapswarm::evaluate::gpu::{GpuContext, devices};
 use lapswarm::evaluate::simd::InstructionSet;
 use lapswarm::evaluate::{BackendChoice, Evaluator};
@@ -13,6 +12,7 @@ use lapswarm::swarm::device::DeviceMopso;
 use lapswarm::swarm::metrics::{Scale, hypervolume};
 use lapswarm::swarm::problems::{GpuTestEvaluator, SimdTestEvaluator, TestProblem};
 use lapswarm::swarm::{MANY, Mopso, MopsoSettings, Optimiser, PsoSettings};
+use lapswarm::{Error, Result};
 use serde::Serialize;
 use std::time::Instant;
 
@@ -96,34 +96,17 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             "milliseconds per generation of the optimiser alone, {} threads",
             table.threads
         );
-        outln!(
-            "{:<8}{:<8}{:>11}{:>11}{:>12}{:>12}{:>12}{:>12}{:>13}",
-            "backend",
-            "problem",
-            "objectives",
-            "particles",
-            "generation",
-            "slowest",
-            "evaluation",
-            "bytes each",
-            "hypervolume"
-        );
+        outln!("{}", line_of(COLUMNS, None));
     }
     for name in &arguments.problems {
-        let problem = TestProblem::by_name(name)
-            .filter(|p| p.problem().objectives.len() > 1)
-            .ok_or_else(|| {
-                lapswarm::Error::input(
-                    "--problems",
-                    "name",
-                    name,
-                    "a test problem of two or three objectives",
-                )
-            })?;
-        let problem = if arguments.variables > 0 {
-            TestProblem::sized(name, arguments.variables).unwrap_or(problem)
-        } else {
-            problem
+        let own = TestProblem::by_name(name).filter(|p| p.problem().objectives.len() > 1);
+        let own = own.ok_or_else(|| {
+            let expected = "a test problem of two or three objectives";
+            Error::input("--problems", "name", name, expected)
+        })?;
+        let problem = match arguments.variables {
+            0 => own,
+            variables => TestProblem::sized(name, variables).unwrap_or(own),
         };
         for here in [true, false] {
             let mut times = Vec::new();
@@ -135,7 +118,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
                 let row = measure(&problem, population, here, arguments)?;
                 times.push((population as f64, row.generation_ms));
                 if !arguments.json {
-                    print_row(&row);
+                    outln!("{}   {}", line_of(COLUMNS, Some(&row)), row.device);
                 }
                 table.rows.push(row);
             }
@@ -166,21 +149,18 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     )
 }
 
-fn print_row(row: &Row) {
-    outln!(
-        "{:<8}{:<8}{:>11}{:>11}{:>12.3}{:>12.3}{:>12.3}{:>12}{:>13.4}   {}",
-        row.backend,
-        row.problem,
-        row.objectives,
-        row.population,
-        row.generation_ms,
-        row.slowest_generation_ms,
-        row.evaluation_ms,
-        row.bytes_per_particle,
-        row.hypervolume,
-        row.device
-    );
-}
+/// The table on a terminal.
+const COLUMNS: &Columns<Row> = &[
+    ("backend", -8, |r| r.backend.to_owned()),
+    ("problem", -8, |r| r.problem.to_owned()),
+    ("objectives", 11, |r| r.objectives.to_string()),
+    ("particles", 11, |r| r.population.to_string()),
+    ("generation", 12, |r| format!("{:.3}", r.generation_ms)),
+    ("slowest", 12, |r| format!("{:.3}", r.slowest_generation_ms)),
+    ("evaluation", 12, |r| format!("{:.3}", r.evaluation_ms)),
+    ("bytes each", 12, |r| r.bytes_per_particle.to_string()),
+    ("hypervolume", 13, |r| format!("{:.4}", r.hypervolume)),
+];
 
 /// Seconds of one run: the optimiser's own, its slowest generation's, and the evaluations'.
 #[derive(Default)]
@@ -226,7 +206,7 @@ fn measure(problem: &TestProblem, population: usize, here: bool, arguments: &Arg
             best = Some(row);
         }
     }
-    best.ok_or_else(|| lapswarm::Error::Study("nothing was measured".to_owned()))
+    best.ok_or_else(|| Error::Study("nothing was measured".to_owned()))
 }
 
 fn on_the_host(problem: &TestProblem, settings: MopsoSettings) -> Result<Row> {
@@ -239,22 +219,22 @@ fn on_the_host(problem: &TestProblem, settings: MopsoSettings) -> Result<Row> {
         let (asking, candidates) = timed(|| swarm.ask());
         let (others, evaluation) = timed(|| evaluator.evaluate(&candidates));
         let evaluation = evaluation?;
-        let (telling, ()) = timed(|| swarm.tell(&evaluation));
+        let (telling, told) = timed(|| swarm.tell(&evaluation));
+        told?;
         times.note(asking + telling, others);
     }
-    let (backend, device) = if population < MANY {
+    let measured_by = if population < MANY {
         ("cpu", "f64".to_owned())
     } else {
         ("simd", InstructionSet::best().name().to_owned())
     };
     let found = swarm.front().objectives;
-    let bytes = swarm.bytes_per_particle();
     row(
         problem,
-        (backend, device),
+        measured_by,
         (population, generations),
         &times,
-        bytes,
+        swarm.bytes_per_particle(),
         &found,
     )
 }
@@ -278,14 +258,14 @@ fn on_a_device(problem: &TestProblem, settings: MopsoSettings, arguments: &Argum
         times.note(own, others);
     }
     let info = swarm.backend();
+    let measured_by = (info.backend, info.device);
     let found = swarm.front().objectives;
-    let bytes = swarm.bytes_per_particle();
     row(
         problem,
-        (info.backend, info.device),
+        measured_by,
         (population, generations),
         &times,
-        bytes,
+        swarm.bytes_per_particle(),
         &found,
     )
 }

@@ -4,11 +4,10 @@
 //! occur outside them and return them as [`Error::Device`] at the next check.
 
 use super::adapter::{DeviceSummary, choose};
-use super::dispatches;
 use super::faults::{self, Fault, Place};
 use super::lint;
 use crate::error::{Error, Result};
-use crate::evaluate::BackendInfo;
+use crate::evaluate::{BackendInfo, dispatches};
 use std::collections::HashMap;
 use std::sync::mpsc::RecvTimeoutError;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};

@@ -80,7 +80,7 @@ const SLOWEST_MPS: f64 = 1.0;
 pub fn hybrid_parts(car: &Car) -> Result<(&Powertrain, &EngineMap, &Hybrid)> {
     let missing = |place: &str, expected: &str| Error::input(&car.name, place, "none", expected);
     let Some(hybrid) = &car.hybrid else {
-        let expected = "a motor-generator and a store, as the bundled gt_hybrid has (--car gt_hybrid)";
+        let expected = "a motor-generator and a store, as the bundled car gt_hybrid has";
         return Err(missing("[hybrid]", expected));
     };
     let Some(powertrain) = &car.powertrain else {

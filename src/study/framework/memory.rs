@@ -71,7 +71,7 @@ fn bytes_of(limit_mib: u64) -> u64 {
 /// What a study keeps must fit into so much memory; the rest is left to its evaluators as long as the allowance lives.
 ///
 /// # Errors
-/// [`Error::Input`] naming what takes most of it, and how much of that would fit beside the rest.
+/// [`Error::Memory`] naming what takes most of it, and how much of that would fit beside the rest.
 pub fn check(kept: &[Kept], limit_mib: u64) -> Result<Allowance> {
     let limit = bytes_of(limit_mib);
     let needed = needed(kept);
@@ -86,15 +86,16 @@ pub fn check(kept: &[Kept], limit_mib: u64) -> Result<Allowance> {
     };
     let rest = needed.saturating_sub(largest.bytes());
     let expected = match limit.saturating_sub(rest) / largest.each.max(1) {
-        0 => "a smaller study, or a higher --memory-limit-mib".to_owned(),
-        fitting => format!("at most {fitting}, which fits into {limit_mib} MiB (--memory-limit-mib)"),
+        0 => format!("a study that fits into {limit_mib} MiB"),
+        fitting => format!("at most {fitting}, which fits into {limit_mib} MiB"),
     };
-    let found = format!(
-        "{}, for which some {} MiB are needed",
-        largest.count,
-        needed >> 20
-    );
-    Err(Error::input("the study", largest.name, found, expected))
+    Err(Error::Memory {
+        file: "the study".to_owned(),
+        what: largest.name,
+        found: largest.count.to_string(),
+        needed_mib: needed >> 20,
+        expected,
+    })
 }
 
 /// A log of so many samples.

@@ -93,12 +93,7 @@ impl RunFolder {
                 // Not every system lets a locked file be read.
                 let _ = lock.read_to_string(&mut owner);
                 let found = format!("a folder that process {} writes into", owner.trim());
-                return Err(Error::input(
-                    path,
-                    "--out",
-                    found,
-                    "one that no run is at work in",
-                ));
+                return Err(Error::input(path, "out", found, "one that no run is at work in"));
             }
             // A file system without locks: what a run leaves behind still keeps others out.
             Err(TryLockError::Error(e)) if e.kind() == std::io::ErrorKind::Unsupported => {}
@@ -173,7 +168,7 @@ fn check_free(folder: &Path) -> Result<()> {
         _ if folder.is_file() || holds_something(folder) => Err(taken(folder)),
         _ if folder.is_symlink() && !folder.exists() => Err(Error::input(
             folder,
-            "--out",
+            "out",
             "a link to nowhere",
             "a new or empty folder",
         )),
@@ -184,7 +179,7 @@ fn check_free(folder: &Path) -> Result<()> {
 fn taken(folder: &Path) -> Error {
     Error::input(
         folder,
-        "--out",
+        "out",
         "a folder that holds another run, or a file",
         "a new or empty folder: nothing is overwritten",
     )
@@ -282,7 +277,7 @@ pub fn reopen(folder: &Path) -> Result<RunFolder> {
 /// # Errors
 /// As [`reopen`].
 pub fn reopen_by(folder: &Path, state: &str) -> Result<RunFolder> {
-    let refused = |found: &str, expected: &str| Err(Error::input(folder, "--resume", found, expected));
+    let refused = |found: &str, expected: &str| Err(Error::input(folder, "resume", found, expected));
     if !folder.is_dir() {
         return refused("no such folder", "the folder of an interrupted run");
     }
@@ -293,7 +288,7 @@ pub fn reopen_by(folder: &Path, state: &str) -> Result<RunFolder> {
         } else {
             refused(
                 "no saved state",
-                "an interrupted run; one that had not begun is started anew, without --resume",
+                "an interrupted run; one that had not begun is started anew, not resumed",
             )
         }
     };

@@ -152,7 +152,7 @@ impl StateFile {
                 "the run began on {began} and is resumed on {now}: its end will differ in the last digits"
             );
         } else if began != now {
-            let expected = format!("{began}, where the run began; --backend NAME moves it");
+            let expected = format!("{began}, where the run began; a backend that is asked for moves it");
             return Err(Error::input(file, "backend", now.to_string(), expected));
         }
         Ok(())

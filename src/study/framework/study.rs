@@ -369,17 +369,16 @@ pub(super) fn moves<S: Settings>(keys: &[(String, String)]) -> bool {
 /// Sets what flags say.
 ///
 /// # Errors
-/// [`Error::Input`] naming the flag.
+/// [`Error::Input`] naming the setting.
 pub(super) fn apply<S: Settings>(settings: &mut S, flags: &[(String, String)]) -> Result<()> {
     let declared = S::settings();
     for (key, text) in flags {
         let Some(setting) = declared.iter().find(|s| s.declared.key == key) else {
             continue;
         };
-        setting.parse(settings, text).map_err(|expected| {
-            let flag = setting.declared.typed().unwrap_or_else(|| key.clone());
-            Error::input("the command line", flag, text.clone(), expected)
-        })?;
+        setting
+            .parse(settings, text)
+            .map_err(|expected| Error::input("the study", key, text.clone(), expected))?;
     }
     Ok(())
 }

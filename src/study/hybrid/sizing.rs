@@ -178,7 +178,9 @@ pub fn size(
                 flow
             })?;
             evaluations += swarm.evaluations();
-            best.clone_from(&swarm.front().candidates[0]);
+            if let Some(found) = swarm.front().candidates.first() {
+                best.clone_from(found);
+            }
             lap = ReportedLap::of("sized", &problem, &best);
             let late_s = lap.lap.time - lap_time_s;
             if late_s.abs() <= CLOSE_S {
@@ -211,6 +213,7 @@ pub fn size(
             iteration: 0,
             evaluations,
             best: rows.iter().map(|row| row.lap_time_s).take(1).collect(),
+            violation: 0.0,
             median: None,
             failed: 0,
             failures: Default::default(),

@@ -183,8 +183,7 @@ pub fn search_strategy(
         history.push((progress.evaluations, progress.best[0]));
         observe(progress)
     })?;
-    let front = swarm.front();
-    let shares = front.candidates[0].clone();
+    let (shares, _) = swarm.best_candidate();
     Ok(FoundStrategy {
         lap: ReportedLap::of("swarm", &problem, &shares),
         shares,
@@ -267,7 +266,7 @@ pub fn search_front(
         ..MopsoSettings::default()
     };
     let mut swarm = Mopso::new(&problem.problem, mopso)?;
-    swarm.start_from(&starting_candidates(&problem, settings, &starts));
+    swarm.start_from(&starting_candidates(&problem, settings, &starts))?;
     let mut evaluator = open_hybrid_evaluator(&problem, settings.backend, settings.adapter.as_deref())?;
     run(&mut swarm, &mut recorder.over(evaluator.as_mut()), observe)?;
     Ok(StrategyFront {

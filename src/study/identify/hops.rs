@@ -5,8 +5,8 @@ use super::coordinates::Logarithmic;
 use super::polish::{Polished, polish_watched};
 use super::setup::CHANNELS;
 use crate::error::Result;
+use crate::evaluate::Evaluator;
 use crate::evaluate::replay::ReplayProblem;
-use crate::evaluate::{Evaluator, FAILED_COST};
 use crate::random::Random;
 use std::ops::ControlFlow;
 
@@ -62,11 +62,11 @@ pub(super) fn hop(
         })
         .collect();
     let width = seen.problem().objectives.len();
-    let costs = seen.evaluate(&starts)?.costs(width);
+    let worths = seen.evaluate(&starts)?.worths(width);
     let best = (0..STARTS)
-        .min_by(|&a, &b| costs[a].total_cmp(&costs[b]))
+        .min_by(|&a, &b| worths[a].order(&worths[b]))
         .unwrap_or(0);
-    if costs[best] >= FAILED_COST {
+    if !worths[best].succeeded() {
         return Ok(None);
     }
     let dimensions = centre.len();

@@ -17,11 +17,11 @@ pub use polish::{Polished, polish};
 pub use results::Summary;
 pub use search::{Judged, Outcome, judge_candidate, search_with, total_parameter_error};
 pub use settings::{Algorithm, FreeParameter, IdentifySettings, ObjectiveChoice};
-pub use setup::{Setup, cost_unit, lap_format, load_circuit, set_up};
+pub use setup::{Setup, cost_unit, lap_format, set_up};
 pub(in crate::study) use setup::{planned, subject, without_laps};
-pub use state::{Front, HistoryRow, SearchState, Stage};
+pub use state::{Front, HistoryRow, SearchState};
 
-use crate::config::settings::{Role, Settings};
+use crate::config::settings::Settings;
 use crate::error::{Error, Result};
 use crate::evaluate::replay::open_evaluator;
 use crate::evaluate::{PackedClient, run_packed};
@@ -160,6 +160,7 @@ impl Study for Identify {
 
     fn figures(outcome: &Outcome, summary: &Summary) -> Figures {
         let best = outcome.history.last().and_then(|row| row.best.first().copied());
+        let best = best.filter(|cost| cost.is_finite());
         let mut figures: Figures = [
             ("evaluations", Some(outcome.record.evaluations as f64)),
             ("best_cost", best),
@@ -171,12 +172,5 @@ impl Study for Identify {
         let costs = summary.costs.iter();
         figures.extend(costs.map(|(channel, cost)| (format!("cost_{channel}"), Some(*cost))));
         figures
-    }
-}
-
-impl IdentifySettings {
-    /// The settings of the same problem with the usual search.
-    pub fn problem(self) -> Self {
-        self.with_role_of(Role::Search, &Self::default())
     }
 }

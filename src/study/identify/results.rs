@@ -94,19 +94,18 @@ fn by_channel(values: [f64; CHANNELS]) -> BTreeMap<String, f64> {
 
 /// The candidate to hand out: fitted values, but the starting car's where the log cannot tell.
 fn reported_candidate(setup: &Setup, outcome: &Outcome) -> Vec<f64> {
-    let base = setup.replay.free.base();
-    outcome
+    let free = &setup.replay.free;
+    let mut candidate = free.values_in(free.base());
+    let told = outcome
         .candidate
         .iter()
-        .enumerate()
-        .map(|(k, x)| {
-            if outcome.identifiability.identifiable[k] {
-                *x
-            } else {
-                base[setup.replay.free.parameters[k].slots[0]]
-            }
-        })
-        .collect()
+        .zip(&outcome.identifiability.identifiable);
+    for (x, (fitted, told)) in candidate.iter_mut().zip(told) {
+        if *told {
+            *x = *fitted;
+        }
+    }
+    candidate
 }
 
 /// Works the figures out.
@@ -216,7 +215,8 @@ fn write_history(folder: &Path, outcome: &Outcome) -> Result<()> {
             1 => "best".to_owned(),
             _ => format!("best_{k}"),
         };
-        table = table.number(name, "", |r| r.best[k]);
+        // Nothing before a candidate has succeeded.
+        table = table.number(name, "", |r| Some(r.best[k]).filter(|best| best.is_finite()));
     }
     table
         .number("median", "", |r| r.median)
@@ -278,14 +278,6 @@ fn write_front(folder: &Path, setup: &Setup, front: &super::Front) -> Result<()>
     let variables = problem.variables.iter().map(|v| (&v.name, &v.unit));
     columns(&front.candidates, variables.collect()).write_csv(folder.join("VAR.csv"))
 }
-
-/// Labels of the channels in pictures.
-pub(super) const LABELS: [&str; CHANNELS] = [
-    "speed",
-    "longitudinal acceleration",
-    "lateral acceleration",
-    "yaw rate",
-];
 
 /// One lap, the first that has a fitted sample: laps over one another would not be legible.
 pub(super) fn traced_lap(log: &crate::telemetry::Log, judged: &Judged) -> std::ops::Range<usize> {

@@ -5,12 +5,13 @@ use super::identifiability::{Identifiability, judge};
 use super::refine::refine;
 use super::settings::{Algorithm, EXPLORE, FRONT, GATHER, IdentifySettings};
 use super::setup::{CHANNELS, Setup};
-use super::state::{Front, HistoryRow, Place, SearchState, Stage, inputs_of};
+use super::state::{Front, HistoryRow, Place, SearchState, inputs_of};
 use crate::error::{Error, Result};
 use crate::evaluate::replay::{ReplayProblem, trace};
-use crate::evaluate::{Evaluator, FAILED_COST, FailureCounts, add_failures};
+use crate::evaluate::{Evaluator, FailureCounts, add_failures};
 use crate::study::framework::state_file::{Origin, StateFile};
 use crate::study::framework::{DeviceFaults, Progress as Told, RunRecord, Watch};
+use crate::swarm::metrics::Scale;
 use crate::swarm::{CovarianceSettings, CovarianceSwarm, Mopso, MopsoSettings, Progress, Pso, PsoSettings};
 use std::ops::ControlFlow;
 use std::time::Instant;
@@ -31,10 +32,6 @@ pub struct Outcome {
     pub record: RunRecord,
     /// Time that the swarm took, s.
     pub swarm_s: f64,
-    /// Time that the polish took, s.
-    pub polish_s: f64,
-    /// Drives that the polish took.
-    pub polish_evaluations: usize,
     /// Hops to other minima that were tried, and that led further down.
     pub hops: [usize; 2],
 }
@@ -76,7 +73,7 @@ pub fn search_with(
     let began = Instant::now();
     let mut interrupted = false;
     while !matches!(state.place, Place::Searched { .. }) {
-        let Some((stage, planned, progress)) = state.place.advance(evaluator)? else {
+        let Some((doing, planned, progress)) = state.place.advance(evaluator)? else {
             state.place = next_place(state.place, settings, evaluator)?;
             state_file.save_or_warn(&state);
             continue;
@@ -87,7 +84,7 @@ pub fn search_with(
         state.device_faults.extend(met);
         let best: Vec<String> = progress.best.iter().map(|b| format!("{b:.3e}")).collect();
         let flow = observe(&Told {
-            stage: stage.doing().to_owned(),
+            stage: doing.to_owned(),
             done: progress.iteration as u64,
             planned: Some(planned as u64),
             reached: format!("best {}, {} failed", best.join(" "), progress.failed),
@@ -121,7 +118,7 @@ pub fn search_with(
     if settings.polish && !interrupted {
         let mut told = || {
             observe(&Told::reached(
-                Stage::Polish.doing(),
+                "polishing",
                 0,
                 "least squares on the exact Jacobian",
             ))
@@ -130,9 +127,9 @@ pub fn search_with(
         interrupted |= found.interrupted;
         refined = Some(found);
     }
-    let (candidate, polish_evaluations, hops) = match refined {
-        Some(r) => (r.candidate, r.drives, [r.hops, r.hops_gained]),
-        None => (swarm_candidate.clone(), 0, [0, 0]),
+    let (candidate, hops) = match refined {
+        Some(r) => (r.candidate, [r.hops, r.hops_gained]),
+        None => (swarm_candidate.clone(), [0, 0]),
     };
     let residuals = replay
         .residuals(&candidate)
@@ -146,14 +143,12 @@ pub fn search_with(
     record.took(evaluations, swarm_s + polish_s, swarm_s);
     Ok(Outcome {
         identifiability: judge(&residuals, &replay.problem.variables, &candidate, &setup.scales),
-        polish_s,
         swarm_candidate,
         candidate,
         front,
         history: state.history,
         record,
         swarm_s,
-        polish_evaluations,
         hops,
     })
 }
@@ -205,12 +200,12 @@ fn next_place(place: Place, settings: &IdentifySettings, evaluator: &mut dyn Eva
     if let Place::Explore(swarm) = &place
         && settings.algorithm == Algorithm::Adaptive
     {
-        let (best, cost) = swarm.best_candidate();
+        let (best, worth) = swarm.best_candidate();
         let seen = Logarithmic::new(evaluator);
         let swarm = CovarianceSwarm::new(seen.problem(), &seen.of_parameters(&best), gathering(settings))?;
         return Ok(Place::Gather {
             best,
-            cost,
+            worth,
             swarm: Box::new(swarm),
         });
     }
@@ -220,23 +215,23 @@ fn next_place(place: Place, settings: &IdentifySettings, evaluator: &mut dyn Eva
 
 /// The best candidate that a search has come to, and the front of a search that has one.
 fn best_so_far(place: &Place, evaluator: &mut dyn Evaluator) -> Result<(Vec<f64>, Option<Front>)> {
-    let (best, cost) = match place {
+    let (best, worth) = match place {
         Place::Searched { best, front } => return Ok((best.clone(), front.clone())),
         Place::Front(swarm) => {
             let front = front_of(swarm).ok_or_else(nothing_drives)?;
             return Ok((front.candidates[front.chosen].clone(), Some(front)));
         }
         Place::Explore(swarm) => swarm.best_candidate(),
-        Place::Gather { best, cost, swarm } => {
+        Place::Gather { best, worth, swarm } => {
             let (gathered, least) = swarm.best_candidate();
-            if least < *cost {
+            if least < *worth {
                 (Logarithmic::new(evaluator).to_parameters(&gathered), least)
             } else {
-                (best.clone(), *cost)
+                (best.clone(), *worth)
             }
         }
     };
-    if cost >= FAILED_COST {
+    if !worth.succeeded() {
         return Err(nothing_drives());
     }
     Ok((best, None))
@@ -363,25 +358,9 @@ impl SearchState {
 /// The front of a swarm's archive.
 fn front_of(swarm: &Mopso) -> Option<Front> {
     let objectives = swarm.archive().objectives.clone();
-    let width = objectives.first()?.len();
-    let bound = |k: usize, f: fn(f64, f64) -> f64, start: f64| objectives.iter().map(|o| o[k]).fold(start, f);
-    let distance = |row: &Vec<f64>| -> f64 {
-        (0..width)
-            .map(|k| {
-                let (low, high) = (
-                    bound(k, f64::min, f64::INFINITY),
-                    bound(k, f64::max, f64::NEG_INFINITY),
-                );
-                if high > low {
-                    ((row[k] - low) / (high - low)).powi(2)
-                } else {
-                    0.0
-                }
-            })
-            .sum()
-    };
-    let chosen = (0..objectives.len())
-        .min_by(|&a, &b| distance(&objectives[a]).total_cmp(&distance(&objectives[b])))?;
+    let shares = Scale::of(&objectives).apply(&objectives);
+    let distance = |i: usize| shares[i].iter().map(|x| x * x).sum::<f64>();
+    let chosen = (0..objectives.len()).min_by(|&a, &b| distance(a).total_cmp(&distance(b)))?;
     Some(Front {
         candidates: swarm.archive_candidates(),
         objectives,

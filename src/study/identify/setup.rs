@@ -61,11 +61,9 @@ pub fn set_up(settings: &IdentifySettings) -> Result<Setup> {
         }
     };
     let track = settings.track.as_deref().or(bundled.then_some(BUNDLED_TRACK));
-    let circuit = track.map(load_circuit).transpose()?;
-    let truth_car = match settings.truth.as_deref().or(bundled.then_some("gt")) {
-        Some(name) => Some(Car::load(name)?),
-        None => None,
-    };
+    let circuit = track.map(|name| Track::load(name)?.circuit()).transpose()?;
+    let truth_car = settings.truth.as_deref().or(bundled.then_some("gt"));
+    let truth_car = truth_car.map(Car::load).transpose()?;
 
     let samples = samples_of(&log);
     let (fitted, held) = choose_laps(settings, &log)?;
@@ -109,14 +107,10 @@ pub fn set_up(settings: &IdentifySettings) -> Result<Setup> {
         )
     };
     let replay = problem(fit_windows)?;
-    let holdout = match held_windows.is_empty() {
-        true => None,
-        false => Some(problem(held_windows)?),
-    };
-    let truth = truth_car.map(|truth| {
-        let flat = truth.to_flat();
-        replay.free.parameters.iter().map(|p| flat[p.slots[0]]).collect()
-    });
+    let holdout = (!held_windows.is_empty())
+        .then(|| problem(held_windows))
+        .transpose()?;
+    let truth = truth_car.map(|truth| replay.free.values_in(&truth.to_flat()));
     Ok(Setup {
         truth,
         circuit,
@@ -166,11 +160,6 @@ pub(in crate::study) fn subject(settings: &IdentifySettings, setup: &Setup) -> S
         log: Some(setup.log.source.clone()),
         track: None,
     }
-}
-
-/// The circuit of a track's name or file (see [`Track::load`]).
-pub fn load_circuit(name_or_path: &str) -> Result<Circuit> {
-    Track::load(name_or_path)?.circuit()
 }
 
 fn samples_of(log: &Log) -> Vec<Sample<f64>> {
@@ -248,7 +237,7 @@ fn windows_over(
                 "the study",
                 "section",
                 name,
-                "a track (--track, or track in the study) on which the section is named",
+                "a track on which the section is named (the setting track)",
             ));
         }
         (None, _) => None,

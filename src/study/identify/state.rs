@@ -4,34 +4,12 @@ use super::coordinates::Logarithmic;
 use super::settings::IdentifySettings;
 use super::setup::Setup;
 use crate::error::Result;
-use crate::evaluate::{Evaluator, FailureCounts};
+use crate::evaluate::{Evaluator, FailureCounts, Worth};
 use crate::study::framework::state_file::Origin;
 use crate::study::framework::{Inputs, State};
 use crate::swarm::checkpoint::Checkpoint;
 use crate::swarm::{CovarianceSwarm, Mopso, Optimiser, Progress, Pso, step};
 use serde::{Deserialize, Serialize};
-
-/// A stage of the work, for progress reports.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Stage {
-    /// The exploring swarm.
-    Explore,
-    /// The swarm that learns the valley.
-    Gather,
-    /// The least-squares polish.
-    Polish,
-}
-
-impl Stage {
-    /// What is being done, in a word.
-    pub(super) fn doing(self) -> &'static str {
-        match self {
-            Self::Explore => "exploring",
-            Self::Gather => "gathering",
-            Self::Polish => "polishing",
-        }
-    }
-}
 
 /// One line of the convergence history.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -71,7 +49,7 @@ pub(super) enum Place {
     /// The swarm that learns the valley, and the best before it.
     Gather {
         best: Vec<f64>,
-        cost: f64,
+        worth: Worth,
         swarm: Box<CovarianceSwarm>,
     },
     /// The swarms are done.
@@ -120,26 +98,26 @@ pub(super) fn inputs_of(setup: &Setup) -> String {
 }
 
 impl Place {
-    /// One iteration of the present stage, with the stage and what it plans; nothing once it is done.
+    /// One iteration of the present stage, with what it does and how many it plans; nothing once it is done.
     pub(super) fn advance(
         &mut self,
         evaluator: &mut dyn Evaluator,
-    ) -> Result<Option<(Stage, usize, Progress)>> {
+    ) -> Result<Option<(&'static str, usize, Progress)>> {
         fn go(
-            stage: Stage,
+            doing: &'static str,
             swarm: &mut dyn Optimiser,
             evaluator: &mut dyn Evaluator,
-        ) -> Result<Option<(Stage, usize, Progress)>> {
+        ) -> Result<Option<(&'static str, usize, Progress)>> {
             if swarm.done() {
                 return Ok(None);
             }
             let progress = step(swarm, evaluator)?;
-            Ok(Some((stage, swarm.planned_iterations(), progress)))
+            Ok(Some((doing, swarm.planned_iterations(), progress)))
         }
         match self {
-            Self::Explore(swarm) => go(Stage::Explore, swarm.as_mut(), evaluator),
-            Self::Front(swarm) => go(Stage::Explore, swarm.as_mut(), evaluator),
-            Self::Gather { swarm, .. } => go(Stage::Gather, swarm.as_mut(), &mut Logarithmic::new(evaluator)),
+            Self::Explore(swarm) => go("exploring", swarm.as_mut(), evaluator),
+            Self::Front(swarm) => go("exploring", swarm.as_mut(), evaluator),
+            Self::Gather { swarm, .. } => go("gathering", swarm.as_mut(), &mut Logarithmic::new(evaluator)),
             Self::Searched { .. } => Ok(None),
         }
     }

@@ -6,7 +6,7 @@ use super::setup::Setup;
 use super::solver_thread::watched;
 use crate::error::Result;
 use crate::evaluate::line::{LineProblem, open_line_evaluator};
-use crate::evaluate::{BackendInfo, Evaluator, FAILED_COST, FailureCounts, add_failures};
+use crate::evaluate::{BackendInfo, Evaluator, FailureCounts, add_failures};
 use crate::line::Parametrisation;
 use crate::random::Random;
 use crate::study::framework::DeviceFaults;
@@ -106,7 +106,7 @@ pub(super) fn search_front_from(
         Some(state) => state,
         None => {
             let mut swarm = Mopso::new(&problem.problem, mopso)?;
-            swarm.start_from(&starting_lines(&problem, settings, known)?);
+            swarm.start_from(&starting_lines(&problem, settings, known)?)?;
             FrontState {
                 swarm,
                 failures: FailureCounts::new(),
@@ -167,6 +167,7 @@ pub(super) fn search_front_from(
                 iteration: 0,
                 evaluations: 0,
                 best: Vec::new(),
+                violation: f64::INFINITY,
                 median: None,
                 failed: 0,
                 failures: FailureCounts::new(),
@@ -284,9 +285,9 @@ pub fn starting_lines(
 /// Scores lines and offers them to the archive; returns how many.
 fn insert_all(archive: &mut Archive, judge: &mut dyn Evaluator, lines: &[Vec<f64>]) -> Result<u64> {
     let width = judge.problem().objectives.len();
-    let rows = judge.evaluate(&lines.concat())?.objectives;
-    for (line, row) in lines.iter().zip(rows.chunks_exact(width)) {
-        if row.iter().all(|x| *x < FAILED_COST) {
+    let found = judge.evaluate(&lines.concat())?;
+    for (i, line) in lines.iter().enumerate() {
+        if let Some(row) = found.success(i, width) {
             archive.insert(line, row);
         }
     }

@@ -167,7 +167,7 @@ fn warnings(outcome: &Outcome) -> Vec<String> {
         if (fine / coarse - 1.0).abs() > COARSE_AND_FINE {
             warnings.push(format!(
                 "{}: {coarse:.2} s at the cross-sections but {fine:.2} s on the spline through them: believe the latter, \
-                 or ask for more --sections",
+                 or ask for more sections",
                 line.name
             ));
         }
@@ -197,7 +197,7 @@ impl Summary {
     /// What there is to say of best lines that leave the road, and what to do about it.
     pub fn off_road_text(&self) -> String {
         format!(
-            "the best line by {} leaves the road between the cross-sections: {} are too few, ask for more --sections",
+            "the best line by {} leaves the road between the cross-sections: {} are too few, ask for more sections",
             self.off_road.join(", "),
             self.sections
         )

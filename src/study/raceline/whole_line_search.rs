@@ -5,7 +5,7 @@ use super::settings::{LineAlgorithm, RacelineSettings};
 use super::setup::Setup;
 use super::state::Running;
 use super::window_search::{FoundLine, LevelRow};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::evaluate::line::{CpuLineEvaluator, LineObjective, LineProblem, open_line_evaluator};
 use crate::evaluate::{Evaluator, FailureCounts, add_failures};
 use crate::line::Parametrisation;
@@ -137,10 +137,13 @@ pub(super) fn search_whole_lines(
     } = state;
     let swarm = swarm.swarm();
     let front = swarm.front();
-    let alpha = problem.alpha(&front.candidates[0]);
-    let cost = CpuLineEvaluator::new(&problem)
-        .evaluate(&front.candidates[0])?
-        .objectives[0];
+    let Some(best) = front.candidates.first() else {
+        return Err(Error::Study(
+            "none of the lines that were tried could be evaluated".to_owned(),
+        ));
+    };
+    let alpha = problem.alpha(best);
+    let cost = CpuLineEvaluator::new(&problem).evaluate(best)?.objectives[0];
     Ok(FoundLine {
         alpha,
         cost,

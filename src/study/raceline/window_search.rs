@@ -299,9 +299,9 @@ pub fn search_line_from(
             } else {
                 evaluator.evaluate(&candidates)?
             };
-            swarm.tell(&evaluation);
+            swarm.tell(&evaluation)?;
             add_failures(&mut state.found.failures, &evaluation.failure_counts());
-            let best = swarm.best_candidate().1;
+            let best = swarm.best_candidate().1.cost;
             let progress = LineProgress {
                 level,
                 levels: levels.len(),

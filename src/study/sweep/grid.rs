@@ -1,7 +1,7 @@
 //! The grid of settings of a sweep.
 
 use crate::config::read_text;
-use crate::error::{Error, Result};
+use crate::error::{Error, Place, Result};
 use crate::study::registry::{self, Registered};
 use std::collections::BTreeMap;
 use std::fmt;
@@ -99,7 +99,7 @@ impl SweepSettings {
                 let line = e
                     .span()
                     .map_or(0, |s| text[..s.start.min(text.len())].matches('\n').count() + 1);
-                return refuse(&format!("line {line}"), e.message().to_owned(), "a TOML file");
+                return Err(Error::input(path, Place::line(line), e.message(), "a TOML file"));
             }
         };
         let named = |value: &Value| registry::named(value.as_str()?);
@@ -234,12 +234,9 @@ impl SweepSettings {
                 expected,
             } if Path::new(&file) == study || file == "the study" => {
                 // Lines are those of the made file.
-                let place = match place.split_once(", ") {
-                    Some((line, rest)) if line.starts_with("line ") => rest,
-                    _ => &place,
-                };
+                let place = place.field.map_or_else(String::new, |field| format!(", {field}"));
                 let at: Vec<String> = point.settings.iter().map(|(k, v)| format!("{k} {v}")).collect();
-                let place = format!("run {} ({}), {place}", number + 1, at.join(", "));
+                let place = format!("run {} ({}){place}", number + 1, at.join(", "));
                 Error::input(&self.file, place, found, expected)
             }
             other => other,
@@ -310,6 +307,7 @@ fn make_absolute(base: &mut Table, files: &[&str], folder: &Path) {
 
 #[cfg(test)]
 mod tests {
+    use super::super::Work;
     use super::*;
     use std::path::PathBuf;
 
@@ -319,9 +317,8 @@ mod tests {
             let sweep = SweepSettings::load(name).expect(name);
             let points = sweep.points().expect(name);
             assert!(points.len() >= 9, "{name}");
-            let path_of = |number: usize| PathBuf::from(format!("{number:05}.toml"));
-            let checked = sweep.study.check_points(&sweep, &points, &path_of, 4096);
-            checked.expect(name);
+            let work = Work::new(&sweep, Path::new(""), PathBuf::new()).expect(name);
+            sweep.study.check_points(&work).expect(name);
         }
     }
 

@@ -165,7 +165,7 @@ fn greatest_share(
                         best = Some(outcome);
                     }
                 }
-                Err(error @ Error::Input { .. }) => return Err(error),
+                Err(error @ (Error::Input { .. } | Error::Memory { .. })) => return Err(error),
                 Err(error) => state.failures.push((share, error.to_string())),
             }
         }

@@ -12,10 +12,11 @@
 
 mod distribution;
 
+use super::checkpoint::to_bytes;
 use super::space::Space;
 use super::{Counters, Front, Optimiser};
 use crate::error::{Error, Result};
-use crate::evaluate::{Evaluation, FAILED_COST, Problem};
+use crate::evaluate::{Evaluation, Problem, Worth};
 use crate::random::Random;
 pub(super) use distribution::Distribution;
 use nalgebra::DVector;
@@ -37,10 +38,10 @@ pub enum Restarts {
 /// What the distribution learns from where particles lie beyond the bounds; they are evaluated where reflection at
 /// the bounds puts them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Beyond {
+pub enum OutOfBounds {
     /// From where they lie: an optimum on a bound is one in the open, with its mirror image beyond. It is found to
     /// full precision.
-    Drawn,
+    AsDrawn,
     /// From where reflection puts them. At a bound all steps then lead inwards, which keeps the distribution off
     /// it; an optimum in a corner of many bounds is missed.
     Reflected,
@@ -60,7 +61,7 @@ pub struct CovarianceSettings {
     /// Whether the worst steps are unlearnt, besides the best being learnt.
     pub active: bool,
     /// What the distribution learns from of particles beyond the bounds.
-    pub beyond: Beyond,
+    pub beyond: OutOfBounds,
     /// Restarts.
     pub restarts: Restarts,
 }
@@ -73,25 +74,24 @@ impl Default for CovarianceSettings {
             seed: 1,
             spread: 0.1,
             active: false,
-            beyond: Beyond::Drawn,
+            beyond: OutOfBounds::AsDrawn,
             restarts: Restarts::None,
         }
     }
 }
 
-/// A swarm drawn from an adapted normal distribution; minimises the first objective.
+/// A swarm drawn from an adapted normal distribution, for a single objective.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct CovarianceSwarm {
     settings: CovarianceSettings,
     space: Space,
-    objectives: usize,
     random: Random,
     distribution: Distribution,
     /// The present population over the plane that the unit cube tiles by reflection, see [`folded`].
     positions: Vec<DVector<f64>>,
-    best: (DVector<f64>, f64),
-    /// Best costs of the last iterations since the last start.
-    history: VecDeque<f64>,
+    best: (DVector<f64>, Worth),
+    /// The best of the last iterations since the last start.
+    history: VecDeque<Worth>,
     /// Starts so far that doubled the particles.
     doublings: u32,
     /// Whether the present start is a small one, and the evaluations that small and other starts have had.
@@ -116,9 +116,9 @@ impl CovarianceSwarm {
     /// A swarm over the variables of `problem` about `start` (in the variables' units).
     ///
     /// # Errors
-    /// [`Error::Input`] naming the setting that is out of its range.
+    /// [`Error::Input`] naming the setting that is out of its range, and for a problem of several objectives.
     pub fn new(problem: &Problem, start: &[f64], settings: CovarianceSettings) -> Result<Self> {
-        let space = Space::new(problem)?;
+        let space = Space::of_one_objective(problem)?;
         let d = problem.variables.len();
         if settings.population < 4 || start.len() != d || start.iter().any(|x| !x.is_finite()) {
             let found = format!(
@@ -145,9 +145,8 @@ impl CovarianceSwarm {
         }
         let mean = DVector::from_vec(space.position(start));
         let mut swarm = Self {
-            objectives: problem.objectives.len(),
             random: Random::new(settings.seed),
-            best: (mean.clone(), f64::INFINITY),
+            best: (mean.clone(), Worth::FAILED),
             distribution: Distribution::new(mean, settings.spread),
             space,
             positions: Vec::new(),
@@ -162,8 +161,8 @@ impl CovarianceSwarm {
         Ok(swarm)
     }
 
-    /// The best candidate so far, in the variables' units, and its cost.
-    pub fn best_candidate(&self) -> (Vec<f64>, f64) {
+    /// The best candidate so far, in the variables' units, and what it is worth.
+    pub fn best_candidate(&self) -> (Vec<f64>, Worth) {
         let position: Vec<f64> = self.best.0.iter().copied().map(folded).collect();
         (self.space.scaled(&position, 1), self.best.1)
     }
@@ -178,24 +177,27 @@ impl CovarianceSwarm {
             let normal = |k: usize| self.random.normal(SAMPLE, when, particle as u32, k as u32);
             let drawn = self.distribution.sample(normal);
             match self.settings.beyond {
-                Beyond::Drawn => drawn,
-                Beyond::Reflected => drawn.map(folded),
+                OutOfBounds::AsDrawn => drawn,
+                OutOfBounds::Reflected => drawn.map(folded),
             }
         };
         self.positions = (0..count).map(draw).collect();
     }
 
-    /// Notes the iteration's best cost and says whether there is nothing left to gain from this start.
-    fn collapsed(&mut self, cost: f64) -> bool {
+    /// Notes the iteration's best and says whether there is nothing left to gain from this start.
+    fn collapsed(&mut self, best: Worth) -> bool {
         let kept = 10 + (30 * self.space.dimensions()).div_ceil(self.positions.len());
-        self.history.push_back(cost);
+        self.history.push_back(best);
         if self.history.len() > kept {
             self.history.pop_front();
         }
+        // Where something is infeasible the violation is what the swarm goes by.
+        let feasible = self.history.iter().all(|w| w.violation == 0.0);
         let (least, most) = self
             .history
             .iter()
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &c| {
+            .map(|w| if feasible { w.cost } else { w.violation })
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), c| {
                 (low.min(c), high.max(c))
             });
         let level = self.history.len() == kept && most - least <= SAME_COST * least.abs();
@@ -249,33 +251,39 @@ impl Optimiser for CovarianceSwarm {
         self.space.scaled(&rows, self.positions.len())
     }
 
-    fn tell(&mut self, evaluation: &Evaluation) {
-        let costs = evaluation.costs(self.objectives);
-        let mut order: Vec<usize> = (0..costs.len()).collect();
-        order.sort_by(|&a, &b| costs[a].total_cmp(&costs[b]));
-        let Some(&first) = order.first() else {
-            return;
-        };
-        if costs[first] < self.best.1 {
-            self.best = (self.positions[first].clone(), costs[first]);
-        }
-        self.counters.evaluations += costs.len() as u64;
-        self.spent[usize::from(self.small)] += costs.len() as u64;
+    fn tell(&mut self, evaluation: &Evaluation) -> Result<()> {
         let mut count = self.positions.len();
+        evaluation.check(count, 1)?;
+        let worths = evaluation.worths(1);
+        let mut order: Vec<usize> = (0..count).collect();
+        order.sort_by(|&a, &b| worths[a].order(&worths[b]));
+        let Some(&first) = order.first() else {
+            return Ok(());
+        };
+        if worths[first] < self.best.1 {
+            self.best = (self.positions[first].clone(), worths[first]);
+        }
+        self.counters.evaluations += count as u64;
+        self.spent[usize::from(self.small)] += count as u64;
         // A population that failed as a whole says nothing about where to go.
-        if costs[first] < FAILED_COST && self.space.dimensions() > 0 {
+        if worths[first].succeeded() && self.space.dimensions() > 0 {
             let ranked: Vec<&DVector<f64>> = order.iter().map(|&i| &self.positions[i]).collect();
             self.distribution.adapt(&ranked, self.settings.active);
-            if self.settings.restarts != Restarts::None && self.collapsed(costs[first]) {
+            if self.settings.restarts != Restarts::None && self.collapsed(worths[first]) {
                 count = self.restart();
             }
         }
         self.counters.iteration += 1;
         self.sample(count);
+        Ok(())
     }
 
     fn counters(&self) -> Counters {
         self.counters
+    }
+
+    fn to_checkpoint(&self) -> Result<Vec<u8>> {
+        to_bytes(self)
     }
 
     fn planned_iterations(&self) -> usize {
@@ -287,11 +295,10 @@ impl Optimiser for CovarianceSwarm {
     }
 
     fn front(&self) -> Front {
-        let (candidate, cost) = self.best_candidate();
-        Front::single(candidate, cost)
+        Front::single(self.best_candidate())
     }
 
     fn best(&self) -> Vec<f64> {
-        vec![self.best.1]
+        vec![self.best.1.cost]
     }
 }

@@ -5,7 +5,6 @@
 //! Every loop over the lanes of a block is plain arithmetic without branches, which the compiler turns into vector
 //! instructions. Results depend neither on the instruction set nor on how blocks are spread over threads.
 
-use crate::evaluate::FAILED_COST;
 use crate::evaluate::resident::BLOCK;
 use crate::random::{Random, below_u32, unit_f32};
 use crate::scalar::elementary::{exp, power};
@@ -15,7 +14,7 @@ use crate::swarm::settings::{
 };
 use bytemuck::{Pod, Zeroable};
 
-/// The objectives of a personal best that is not known yet.
+/// The objectives of a personal best that is not known yet, and of a particle that failed. Those of others lie within it.
 pub const UNKNOWN: f32 = f32::MAX;
 /// Share of the difference that a difference move takes, and of the coordinates that it changes, as for small swarms.
 const SCALE: f32 = 0.5;
@@ -173,7 +172,7 @@ pub fn judge(
         for lane in 0..BLOCK {
             no_worse[lane] &= row[lane] <= best[lane];
             no_better[lane] &= best[lane] <= row[lane];
-            sound[lane] &= row[lane] < FAILED_COST as f32 && row[lane] > f32::MIN;
+            sound[lane] &= row[lane].abs() < UNKNOWN;
         }
     }
     let mut taken = [false; BLOCK];

@@ -6,7 +6,6 @@
 //! running minimum for two objectives, a staircase for three. The parts have a fixed size, so that the outcome does
 //! not depend on the threads.
 
-use crate::evaluate::FAILED_COST;
 use crate::evaluate::resident::BLOCK;
 use crate::swarm::metrics::Staircase;
 
@@ -44,7 +43,7 @@ pub fn part(
             alive[lane] = sound(number * BLOCK + lane);
             for (column, value) in at.iter_mut().zip(row) {
                 column[lane] = *value;
-                alive[lane] &= value.is_finite() & (*value < FAILED_COST);
+                alive[lane] &= value.is_finite();
             }
         }
         for some in members.chunks(8) {

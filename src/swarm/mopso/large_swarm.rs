@@ -10,7 +10,7 @@ use super::thinning::{PER_PLACE, thinned};
 use crate::error::Result;
 use crate::evaluate::resident::BLOCK;
 use crate::evaluate::simd::{InstructionSet, LaneWork, dispatch};
-use crate::evaluate::{Evaluation, FAILED_COST, Failure, Problem};
+use crate::evaluate::{Evaluation, Failure, Problem};
 use crate::random::Random;
 use crate::scalar::lanes::Lanes;
 use crate::swarm::archive::Archive;
@@ -19,6 +19,9 @@ use crate::swarm::space::Space;
 use crate::swarm::{Counters, Front, Optimiser};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+
+/// The greatest objective that a personal best can have. Beyond it, the archive alone knows which of two is better.
+const GREATEST: f32 = UNKNOWN.next_down();
 
 /// Particles that are filtered together and that one thread handles in a row.
 const PART: usize = 64 * BLOCK;
@@ -97,13 +100,12 @@ impl LaneWork for Learn<'_> {
             objectives.fill(UNKNOWN);
             for (lane, row) in rows.enumerate() {
                 let i = block * BLOCK + lane;
-                let mut sound = self.failures[i].is_none();
+                let mut sound = self.failures[i].is_none() && row.iter().all(|x| x.is_finite());
                 if let (Some(best), Some(violation)) =
                     (self.best_violation.get_mut(i), self.violations.get(i))
                 {
                     // Less is better whatever was known before, and more is never.
-                    let usable = sound && row.iter().all(|x| x.is_finite() && *x < FAILED_COST);
-                    if usable && *violation < *best {
+                    if sound && *violation < *best {
                         *best = *violation;
                         (0..width).for_each(|k| best_objectives[k * BLOCK + lane] = UNKNOWN);
                     }
@@ -111,7 +113,7 @@ impl LaneWork for Learn<'_> {
                 }
                 if sound {
                     for (k, value) in row.iter().enumerate() {
-                        objectives[k * BLOCK + lane] = *value as f32;
+                        objectives[k * BLOCK + lane] = (*value as f32).clamp(-GREATEST, GREATEST);
                     }
                 }
             }
@@ -203,18 +205,18 @@ impl LargeSwarm {
         })
     }
 
-    pub fn start_from(&mut self, candidates: &[Vec<f64>]) {
-        for (particle, candidate) in candidates
-            .iter()
-            .enumerate()
-            .take(self.settings.motion.population)
-        {
-            for (k, x) in self.space.position(candidate).into_iter().enumerate() {
+    /// # Errors
+    /// Those of [`super::Mopso::start_from`].
+    pub fn start_from(&mut self, candidates: &[Vec<f64>]) -> Result<()> {
+        let starts = self.space.starts(candidates, self.settings.motion.population)?;
+        for (particle, position) in starts.into_iter().enumerate() {
+            for (k, x) in position.into_iter().enumerate() {
                 let place = self.place(particle, k);
                 self.position[place] = x as f32;
                 self.best_position[place] = x as f32;
             }
         }
+        Ok(())
     }
 
     pub fn archive(&self) -> &Archive {
@@ -222,11 +224,12 @@ impl LargeSwarm {
     }
 
     /// They join the archive.
-    pub fn welcome(&mut self, migrants: &Front, violation: f64) {
+    pub fn accept_migrants(&mut self, migrants: &Front) {
         let rows = migrants.candidates.iter().zip(&migrants.objectives);
         let solution =
             |(candidate, row): (&Vec<f64>, &Vec<f64>)| (self.space.position(candidate), row.clone());
-        self.archive.insert_all(rows.map(solution).collect(), violation);
+        self.archive
+            .insert_all(rows.map(solution).collect(), migrants.violation);
     }
 
     pub fn bytes_per_particle(&self) -> usize {
@@ -312,7 +315,7 @@ impl LargeSwarm {
         let rows = evaluation.objectives.chunks_exact(self.objectives);
         let sound = rows
             .zip(&evaluation.failures)
-            .map(|(row, failure)| failure.is_none() && row.iter().all(|x| x.is_finite() && *x < FAILED_COST));
+            .map(|(row, failure)| failure.is_none() && row.iter().all(|x| x.is_finite()));
         let told = sound.zip(violations).filter(|(sound, _)| *sound).map(|(_, v)| *v);
         told.fold(self.archive.violation(), f64::min)
     }
@@ -383,7 +386,8 @@ impl Optimiser for LargeSwarm {
         candidates
     }
 
-    fn tell(&mut self, evaluation: &Evaluation) {
+    fn tell(&mut self, evaluation: &Evaluation) -> Result<()> {
+        evaluation.check(self.settings.motion.population, self.objectives)?;
         let (found, violation) = self.learn(evaluation);
         let found = thinned(found, self.objectives, PER_PLACE * self.settings.archive);
         let d = self.space.dimensions();
@@ -395,6 +399,7 @@ impl Optimiser for LargeSwarm {
         self.archive.insert_all(positions.zip(rows).collect(), violation);
         self.counters.told(self.settings.motion.population);
         self.advance();
+        Ok(())
     }
 
     fn counters(&self) -> Counters {
@@ -411,5 +416,9 @@ impl Optimiser for LargeSwarm {
 
     fn best(&self) -> Vec<f64> {
         self.archive.best(self.objectives)
+    }
+
+    fn violation(&self) -> f64 {
+        self.archive.violation()
     }
 }

@@ -2,18 +2,18 @@
 
 pub(super) mod blocks;
 pub(super) mod filter;
-mod large_swarm;
+pub(super) mod large_swarm;
 mod small_swarm;
 pub(super) mod thinning;
 
 use super::archive::Archive;
+use super::checkpoint::to_bytes;
 use super::settings::MopsoSettings;
-use super::{Counters, Front, Optimiser, Welcome};
+use super::{AcceptsMigrants, Counters, Front, Optimiser};
 use crate::error::Result;
 use crate::evaluate::{Evaluation, Problem};
 pub use blocks::Generation;
 use large_swarm::LargeSwarm;
-pub(super) use large_swarm::{leaders, learn_from};
 use serde::{Deserialize, Serialize};
 use small_swarm::SmallSwarm;
 
@@ -57,7 +57,10 @@ impl Mopso {
     }
 
     /// Puts the first particles at these candidates (in the variables' units), before the first population is asked for.
-    pub fn start_from(&mut self, candidates: &[Vec<f64>]) {
+    ///
+    /// # Errors
+    /// [`crate::Error::Input`] naming a candidate that is no finite value for each variable.
+    pub fn start_from(&mut self, candidates: &[Vec<f64>]) -> Result<()> {
         match &mut self.kind {
             Kind::Small(swarm) => swarm.start_from(candidates),
             Kind::Large(swarm) => swarm.start_from(candidates),
@@ -93,15 +96,11 @@ impl Mopso {
     }
 }
 
-impl Welcome for Mopso {
-    fn violation(&self) -> f64 {
-        self.archive().violation()
-    }
-
-    fn welcome(&mut self, migrants: &Front, violation: f64) {
+impl AcceptsMigrants for Mopso {
+    fn accept_migrants(&mut self, migrants: &Front) {
         match &mut self.kind {
-            Kind::Small(swarm) => swarm.welcome(migrants, violation),
-            Kind::Large(swarm) => swarm.welcome(migrants, violation),
+            Kind::Small(swarm) => swarm.accept_migrants(migrants),
+            Kind::Large(swarm) => swarm.accept_migrants(migrants),
         }
     }
 }
@@ -114,7 +113,7 @@ impl Optimiser for Mopso {
         }
     }
 
-    fn tell(&mut self, evaluation: &Evaluation) {
+    fn tell(&mut self, evaluation: &Evaluation) -> Result<()> {
         match &mut self.kind {
             Kind::Small(swarm) => swarm.tell(evaluation),
             Kind::Large(swarm) => swarm.tell(evaluation),
@@ -125,12 +124,20 @@ impl Optimiser for Mopso {
         self.present().counters()
     }
 
+    fn to_checkpoint(&self) -> Result<Vec<u8>> {
+        to_bytes(self)
+    }
+
     fn planned_iterations(&self) -> usize {
         self.present().planned_iterations()
     }
 
     fn best(&self) -> Vec<f64> {
         self.present().best()
+    }
+
+    fn violation(&self) -> f64 {
+        self.present().violation()
     }
 
     fn front(&self) -> Front {

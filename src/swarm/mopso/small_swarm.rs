@@ -1,7 +1,7 @@
 //! The small swarm: double precision, one particle after the other.
 
 use crate::error::Result;
-use crate::evaluate::{Evaluation, FAILED_COST, Problem};
+use crate::evaluate::{Evaluation, Problem};
 use crate::random::Random;
 use crate::swarm::archive::Archive;
 use crate::swarm::metrics::dominates;
@@ -44,13 +44,16 @@ impl SmallSwarm {
         })
     }
 
-    pub fn start_from(&mut self, candidates: &[Vec<f64>]) {
-        for (particle, candidate) in candidates.iter().enumerate().take(self.particles.count) {
+    /// # Errors
+    /// Those of [`super::Mopso::start_from`].
+    pub fn start_from(&mut self, candidates: &[Vec<f64>]) -> Result<()> {
+        let starts = self.particles.space.starts(candidates, self.particles.count)?;
+        for (particle, position) in starts.iter().enumerate() {
             let row = self.particles.row(particle);
-            let position = self.particles.space.position(candidate);
-            self.particles.position[row.clone()].copy_from_slice(&position);
-            self.best_position[row].copy_from_slice(&position);
+            self.particles.position[row.clone()].copy_from_slice(position);
+            self.best_position[row].copy_from_slice(position);
         }
+        Ok(())
     }
 
     pub fn archive(&self) -> &Archive {
@@ -58,10 +61,10 @@ impl SmallSwarm {
     }
 
     /// They join the archive.
-    pub fn welcome(&mut self, migrants: &Front, violation: f64) {
+    pub fn accept_migrants(&mut self, migrants: &Front) {
         for (candidate, row) in migrants.candidates.iter().zip(&migrants.objectives) {
             let position = self.particles.space.position(candidate);
-            self.archive.insert_violating(&position, row, violation);
+            self.archive.insert_violating(&position, row, migrants.violation);
         }
     }
 
@@ -188,18 +191,14 @@ impl Optimiser for SmallSwarm {
         self.particles.candidates()
     }
 
-    fn tell(&mut self, evaluation: &Evaluation) {
-        let rows = evaluation
-            .objectives
-            .chunks_exact(self.objectives)
-            .zip(&evaluation.failures);
-        for (particle, (row, failure)) in rows.enumerate() {
+    fn tell(&mut self, evaluation: &Evaluation) -> Result<()> {
+        evaluation.check(self.particles.count, self.objectives)?;
+        for particle in 0..self.particles.count {
+            let Some(row) = evaluation.success(particle, self.objectives) else {
+                continue;
+            };
             let range = self.particles.row(particle);
             let position = &self.particles.position[range.clone()];
-            let sound = failure.is_none() && row.iter().all(|x| x.is_finite() && *x < FAILED_COST);
-            if !sound {
-                continue;
-            }
             let violation = evaluation.violation(particle);
             self.archive.insert_violating(position, row, violation);
             let heads = self.coin(Purpose::Coin, particle) < 0.5;
@@ -214,6 +213,7 @@ impl Optimiser for SmallSwarm {
         }
         self.counters.told(self.settings.motion.population);
         self.advance();
+        Ok(())
     }
 
     fn counters(&self) -> Counters {
@@ -230,5 +230,9 @@ impl Optimiser for SmallSwarm {
 
     fn best(&self) -> Vec<f64> {
         self.archive.best(self.objectives)
+    }
+
+    fn violation(&self) -> f64 {
+        self.archive.violation()
     }
 }

@@ -98,7 +98,7 @@ impl Evaluator for SimdTestEvaluator<'_> {
     }
 }
 
-/// Why candidates failed, whose objectives become the worst.
+/// Why candidates failed, of objectives in single precision.
 pub(super) fn failures(
     population: &[f64],
     d: usize,
@@ -113,7 +113,7 @@ pub(super) fn failures(
             let failure = if candidate.iter().any(|x| !x.is_finite()) {
                 Some(Failure::NotFinite)
             } else if row.iter().any(|x| !x.is_finite()) {
-                Some(Failure::Undefined)
+                Some(Failure::BeyondSinglePrecision)
             } else {
                 None
             };

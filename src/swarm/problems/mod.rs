@@ -8,12 +8,14 @@
 //! 3. Suganthan et al., *Problem definitions and evaluation criteria for the CEC 2005 special session on
 //!    real-parameter optimization* (the single-objective functions and that their optima are shifted).
 
+#[cfg(feature = "gpu")]
 mod device;
 mod dtlz;
 mod lanes;
 mod single;
 mod zdt;
 
+#[cfg(feature = "gpu")]
 pub use device::GpuTestEvaluator;
 pub use lanes::SimdTestEvaluator;
 
@@ -189,7 +191,7 @@ impl TestProblem {
 
     /// An evaluator on all threads, for populations that are worth it.
     pub fn threaded_evaluator(&self) -> PointEvaluator<impl Fn(&[f64], &mut [f64]) + Sync> {
-        self.evaluator_on(CallCost::Dear)
+        self.evaluator_on(CallCost::Expensive)
     }
 
     fn evaluator_on(&self, cost: CallCost) -> PointEvaluator<impl Fn(&[f64], &mut [f64]) + Sync> {

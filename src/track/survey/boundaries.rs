@@ -9,7 +9,7 @@ use super::super::spline::Spline;
 use super::check::{check_crossings, check_line, close};
 use super::csv_columns::Edge;
 use super::{Survey, SurveyOptions, place, stem};
-use crate::{Error, Result};
+use crate::{Error, Place, Result};
 use glam::DVec2;
 use std::path::Path;
 
@@ -68,7 +68,7 @@ pub(super) fn survey(left: &Edge, right: &Edge, path: &Path, options: &SurveyOpt
     for (side, edge) in [("left", left), ("right", right)] {
         let mut points = edge.points.clone();
         let is_closed = close(&mut points, &edge.lines, path, options.closed)?;
-        let at = |i: usize| format!("{}, {side} edge", place(&edge.lines, i));
+        let at = |i: usize| place(&edge.lines, i).named(format!("{side} edge"));
         check_line(&points, is_closed, &source, &at)?;
         check_crossings(&points, is_closed, options.bridges, &source, &at)?;
         sides.push(points);
@@ -238,7 +238,7 @@ fn measure(
                     let side = ["left", "right"][side];
                     Error::input(
                         path,
-                        format!("about {:.0} m from the start", t),
+                        Place::station(t).named("both edges"),
                         format!("no {side} edge beside the middle of the road"),
                         format!("edges side by side, at most {WIDEST_ROAD_M} m apart"),
                     )

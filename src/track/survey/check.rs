@@ -2,7 +2,7 @@
 
 use super::super::crossing::{crossings, stretches};
 use super::{MOST_POINTS, Survey, WIDEST_M, place};
-use crate::{Error, Result};
+use crate::{Error, Place, Result};
 use glam::DVec2;
 use std::path::Path;
 
@@ -77,10 +77,10 @@ pub(super) fn check_line(
     points: &[DVec2],
     closed: bool,
     source: &str,
-    place: &dyn Fn(usize) -> String,
+    place: &dyn Fn(usize) -> Place,
 ) -> Result<()> {
     let refuse =
-        |place: String, found: String, expected: String| Err(Error::input(source, place, found, expected));
+        |place: Place, found: String, expected: String| Err(Error::input(source, place, found, expected));
     let n = points.len();
     let fewest = if closed { FEWEST.0 } else { FEWEST.1 };
     if !(fewest..=MOST_POINTS).contains(&n) {
@@ -140,7 +140,7 @@ pub(super) fn check_crossings(
     closed: bool,
     bridges: usize,
     source: &str,
-    place: &dyn Fn(usize) -> String,
+    place: &dyn Fn(usize) -> Place,
 ) -> Result<()> {
     let found = crossings(&stretches(points, closed), bridges.saturating_add(1));
     match found {
@@ -149,8 +149,12 @@ pub(super) fn check_crossings(
             let (i, j) = crossed[0];
             Err(Error::input(
                 source,
-                format!("{} and {}", place(i), place(j)),
-                format!("a line that crosses itself, {} time(s) or more", crossed.len()),
+                place(i),
+                format!(
+                    "a line that crosses itself at {}, {} time(s) or more in all",
+                    place(j),
+                    crossed.len()
+                ),
                 match bridges {
                     0 => "a line that does not, or a TOML file with `bridges`, the number of its crossings"
                         .to_owned(),
@@ -190,7 +194,7 @@ impl Survey {
             if let Some(i) = widths.iter().position(|w| !(0.0..=WIDEST_M).contains(w)) {
                 return Err(Error::input(
                     &self.source,
-                    format!("{}, {field}", place(i)),
+                    place(i).named(field),
                     format!("{} m", widths[i]),
                     format!("0 to {WIDEST_M} m"),
                 ));
@@ -204,7 +208,7 @@ impl Survey {
         {
             return Err(Error::input(
                 &self.source,
-                format!("{}, width of the road", place(i)),
+                place(i).named("width of the road"),
                 format!("{width} m"),
                 format!("at least {NARROWEST_M} m"),
             ));

@@ -1,6 +1,6 @@
 //! Latitudes and longitudes on a local plane.
 
-use crate::{Error, Result};
+use crate::{Error, Place, Result};
 use glam::{DVec2, DVec3};
 use std::path::Path;
 
@@ -36,7 +36,7 @@ impl Fix {
 
 /// Places as distances east and north (m) on the plane that touches the ellipsoid at their middle. Heights are left
 /// out: a road's slope makes it longer than its map by half the slope squared.
-pub(super) fn project(fixes: &[Fix], path: &Path, place: &dyn Fn(usize) -> String) -> Result<Vec<DVec2>> {
+pub(super) fn project(fixes: &[Fix], path: &Path, place: &dyn Fn(usize) -> Place) -> Result<Vec<DVec2>> {
     let out_of_range = |f: &Fix| !(f.latitude_deg.abs() <= 90.0 && f.longitude_deg.abs() <= 180.0);
     if let Some(i) = fixes.iter().position(out_of_range) {
         return Err(Error::input(
@@ -102,7 +102,7 @@ mod tests {
             fix(52.0, -1.005),
             fix(52.0, -0.995),
         ];
-        let points = project(&fixes, Path::new("a"), &|i| i.to_string()).unwrap();
+        let points = project(&fixes, Path::new("a"), &Place::point).unwrap();
         let north = points[1] - points[0];
         let east = points[3] - points[2];
         assert!(
@@ -118,10 +118,10 @@ mod tests {
             latitude_deg: -17.0,
             longitude_deg,
         };
-        let points = project(&[fix(179.999), fix(-179.999)], Path::new("a"), &|i| i.to_string()).unwrap();
+        let points = project(&[fix(179.999), fix(-179.999)], Path::new("a"), &Place::point).unwrap();
         assert!(points[0].distance(points[1]) < 300.0);
         let far = project(&[fix(0.0), fix(0.0), fix(30.0)], Path::new("a"), &|i| {
-            format!("point {i}")
+            Place::point(i)
         });
         assert!(far.unwrap_err().to_string().contains("km from the middle"));
     }

@@ -24,7 +24,7 @@ mod xml;
 
 use super::circuit::{Corner, Section};
 use crate::config::read_bytes;
-use crate::{Error, Result};
+use crate::{Error, Place, Result};
 use glam::DVec2;
 use std::path::Path;
 
@@ -119,15 +119,15 @@ impl Survey {
     }
 
     /// Where a point stands, for error messages.
-    pub(super) fn place(&self, point: usize) -> String {
+    pub(super) fn place(&self, point: usize) -> Place {
         place(&self.lines, point)
     }
 }
 
-fn place(lines: &[usize], point: usize) -> String {
+fn place(lines: &[usize], point: usize) -> Place {
     match lines.get(point) {
-        Some(line) => format!("line {line}"),
-        None => format!("point {}", point + 1),
+        Some(&line) => Place::line(line),
+        None => Place::point(point + 1),
     }
 }
 

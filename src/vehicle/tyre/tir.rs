@@ -2,7 +2,7 @@
 
 use super::TyreCoefficients;
 use crate::config::{LARGEST_TEXT, read_bytes};
-use crate::error::{Error, Result};
+use crate::error::{Error, Place, Result};
 use std::fmt::Write as _;
 use std::path::Path;
 
@@ -85,13 +85,13 @@ impl TyreFile {
         let mut section = String::new();
         let mut fit_type = None;
         for (number, line) in text.lines().enumerate() {
-            let place = |key: &str| format!("line {}, key {key}", number + 1);
+            let place = |key: &str| Place::line(number + 1).key(key);
             let trimmed = line.trim();
             if let Some(name) = trimmed.strip_prefix('[') {
                 let Some(end) = name.find(']') else {
                     return Err(Error::input(
                         file,
-                        format!("line {}", number + 1),
+                        Place::line(number + 1),
                         trimmed,
                         "a section name in [brackets]",
                     ));
@@ -111,7 +111,7 @@ impl TyreFile {
             let (value, comment) = split_comment(rest);
             let value = unquote(value);
             if section == "UNITS" {
-                check_unit(file, &place(&key), &key, value)?;
+                check_unit(file, place(&key), &key, value)?;
             }
             if section == "MODEL" && key == "FITTYP" {
                 if !FIT_TYPES.contains(&value) {
@@ -156,16 +156,25 @@ impl TyreFile {
         if fit_type.is_none() {
             return Err(Error::input(
                 file,
-                "section [MODEL], key FITTYP",
+                Place::default().key("FITTYP"),
                 "nothing",
-                "6, 21 or 52 (Magic Formula 5.2)",
+                "6, 21 or 52 (Magic Formula 5.2) in section [MODEL]",
             ));
         }
         let mut flat = Vec::with_capacity(table.len());
         for (info, value) in table.iter().zip(values) {
             flat.push(value.or(info.default).ok_or_else(|| {
-                let place = format!("section [{}], key {}", tir_section(info.name), tir_key(info.name));
-                Error::input(file, place, "nothing", format!("a number ({})", info.meaning))
+                let expected = format!(
+                    "a number ({}) in section [{}]",
+                    info.meaning,
+                    tir_section(info.name)
+                );
+                Error::input(
+                    file,
+                    Place::default().key(tir_key(info.name)),
+                    "nothing",
+                    expected,
+                )
             })?);
         }
         Ok(Self {
@@ -249,7 +258,7 @@ impl TyreFile {
     }
 }
 
-fn check_unit(file: &Path, place: &str, key: &str, value: &str) -> Result<()> {
+fn check_unit(file: &Path, place: Place, key: &str, value: &str) -> Result<()> {
     let allowed: &[&str] = match key {
         "LENGTH" => &["meter", "metre", "m"],
         "FORCE" => &["newton", "n"],

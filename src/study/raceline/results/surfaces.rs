@@ -1,8 +1,8 @@
 //! Objectives over `alpha` at two neighbouring cross-sections, all others as they are on the best line.
 
 use crate::error::Result;
+use crate::evaluate::BackendChoice;
 use crate::evaluate::line::{LineProblem, open_line_evaluator};
-use crate::evaluate::{BackendChoice, FAILED_COST};
 use crate::line::Parametrisation;
 use crate::report::{Levels, Surface, with_unit};
 use crate::study::raceline::{ObjectiveOutcome, RacelineSettings, Setup};
@@ -42,7 +42,7 @@ pub fn surface(
         .collect();
     // In f64: a surface's bottom is flatter than single precision.
     let mut evaluator = open_line_evaluator(&problem, BackendChoice::Cpu, None)?;
-    let costs = evaluator.evaluate(&grid)?.objectives.into_iter();
+    let costs = evaluator.evaluate(&grid)?.worths(1).into_iter();
     let (name, unit) = (found.objective.name(), found.objective.unit());
     let label = |i: usize| format!("alpha at {:.1} m", setup.cuts.station_m[i]);
     Ok(Some(Surface {
@@ -56,7 +56,7 @@ pub fn surface(
         y: axis.clone(),
         x: axis,
         z: costs
-            .map(|c| if c < FAILED_COST { c } else { f64::NAN })
+            .map(|worth| if worth.succeeded() { worth.cost } else { f64::NAN })
             .collect(),
         levels: Levels::Basin,
         marks: vec![(line.name.clone(), [line.alpha[cut], line.alpha[cut + 1]])],

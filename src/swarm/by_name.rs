@@ -1,0 +1,205 @@
+//! Optimisers by name, with what most users set: how many particles, for how long, from which seed.
+
+use super::{
+    CooperativeSettings, CooperativeSwarm, CovarianceSettings, CovarianceSwarm, DifferenceSettings,
+    DifferenceSwarm, HybridSettings, HybridSwarm, Mopso, MopsoSettings, Mutation, Nsga2, Nsga2Settings,
+    Optimiser, OutOfBounds, Pso, PsoSettings, Restarts, Truncation,
+};
+use crate::error::{Error, Result};
+use crate::evaluate::Problem;
+
+/// Names of the optimisers for several objectives; `default` is [`MopsoSettings::default`].
+pub const MULTI_OBJECTIVE: [&str; 6] = [
+    "default",
+    "default_nearest",
+    "smpso",
+    "nsga2",
+    "thesis",
+    "thesis_random_mu",
+];
+/// Names of the optimisers for one objective; `default` is [`HybridSettings::default`].
+pub const SINGLE_OBJECTIVE: [&str; 6] = [
+    "default",
+    "pso",
+    "covariance",
+    "difference",
+    "cooperative",
+    "thesis",
+];
+
+/// How large a run of an optimiser is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Sizes {
+    /// Candidates of a generation. The cooperative swarm has ten to a group instead, and as many more generations.
+    pub population: usize,
+    /// Generations; their product with the population is the budget of evaluations.
+    pub iterations: usize,
+    /// Most members of the archive of several objectives; the genetic algorithm's is its population.
+    pub archive: usize,
+    /// Seed of all random numbers.
+    pub seed: u64,
+}
+
+/// The optimiser of that name for `problem`: one of [`SINGLE_OBJECTIVE`] or [`MULTI_OBJECTIVE`], by its number of objectives.
+///
+/// # Errors
+/// [`Error::Input`] if no optimiser of that name exists for this number of objectives, and those of its settings.
+pub fn by_name(name: &str, problem: &Problem, sizes: Sizes) -> Result<Box<dyn Optimiser + Send>> {
+    if problem.objectives.len() > 1 {
+        return several_by_name(name, problem, sizes, &[]);
+    }
+    let Sizes {
+        population,
+        iterations,
+        seed,
+        ..
+    } = sizes;
+    let pso = |settings: PsoSettings| -> Result<Box<dyn Optimiser + Send>> {
+        let settings = PsoSettings {
+            population,
+            iterations,
+            seed,
+            ..settings
+        };
+        Ok(Box::new(Pso::new(problem, settings)?))
+    };
+    Ok(match name {
+        "default" => {
+            let settings = HybridSettings {
+                population,
+                iterations,
+                seed,
+                ..HybridSettings::default()
+            };
+            Box::new(HybridSwarm::new(problem, settings)?)
+        }
+        "pso" => pso(PsoSettings::default())?,
+        "thesis" => pso(PsoSettings::thesis())?,
+        "covariance" => {
+            let settings = CovarianceSettings {
+                population,
+                iterations,
+                seed,
+                spread: 0.3,
+                active: true,
+                beyond: OutOfBounds::AsDrawn,
+                restarts: Restarts::Alternating,
+            };
+            let middle: Vec<f64> = problem
+                .variables
+                .iter()
+                .map(|v| 0.5 * (v.lower + v.upper))
+                .collect();
+            Box::new(CovarianceSwarm::new(problem, &middle, settings)?)
+        }
+        "difference" => {
+            let settings = DifferenceSettings {
+                population,
+                iterations,
+                seed,
+                ..DifferenceSettings::default()
+            };
+            Box::new(DifferenceSwarm::new(problem, settings)?)
+        }
+        "cooperative" => {
+            let base = CooperativeSettings::default();
+            let motion = PsoSettings {
+                iterations: population.saturating_mul(iterations) / base.motion.population,
+                seed,
+                ..base.motion
+            };
+            Box::new(CooperativeSwarm::new(
+                problem,
+                CooperativeSettings { motion, ..base },
+            )?)
+        }
+        _ => return Err(unknown(name, &SINGLE_OBJECTIVE)),
+    })
+}
+
+fn unknown(name: &str, known: &[&str]) -> Error {
+    Error::input("the optimisers", "name", name, known.join(", "))
+}
+
+/// The optimiser of that name for several objectives. Its first candidates are those of `start`.
+///
+/// # Errors
+/// As [`by_name`], and [`Error::Input`] naming a candidate of `start` that is no finite value for each variable.
+pub fn several_by_name(
+    name: &str,
+    problem: &Problem,
+    sizes: Sizes,
+    start: &[Vec<f64>],
+) -> Result<Box<dyn Optimiser + Send>> {
+    let mopso = |settings: MopsoSettings| -> Result<Box<dyn Optimiser + Send>> {
+        let motion = PsoSettings {
+            population: sizes.population,
+            iterations: sizes.iterations,
+            seed: sizes.seed,
+            ..settings.motion
+        };
+        let settings = MopsoSettings {
+            motion,
+            archive: sizes.archive,
+            ..settings
+        };
+        let mut swarm = Mopso::new(problem, settings)?;
+        swarm.start_from(start)?;
+        Ok(Box::new(swarm))
+    };
+    match name {
+        "default" => mopso(MopsoSettings::default()),
+        "default_nearest" => mopso(MopsoSettings {
+            truncation: Truncation::MutualNearest,
+            ..MopsoSettings::default()
+        }),
+        "smpso" => mopso(MopsoSettings::smpso()),
+        "thesis" => mopso(MopsoSettings::thesis()),
+        "thesis_random_mu" => mopso(MopsoSettings {
+            mutation: Mutation::Random,
+            ..MopsoSettings::thesis()
+        }),
+        "nsga2" => {
+            let settings = Nsga2Settings {
+                population: sizes.population,
+                iterations: sizes.iterations,
+                seed: sizes.seed,
+                ..Nsga2Settings::default()
+            };
+            let mut genetic = Nsga2::new(problem, settings)?;
+            genetic.start_from(start)?;
+            Ok(Box::new(genetic))
+        }
+        _ => Err(unknown(name, &MULTI_OBJECTIVE)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::swarm::problems::TestProblem;
+
+    #[test]
+    fn all_names_are_known() {
+        for (problem, names) in [
+            ("zdt1", MULTI_OBJECTIVE.as_slice()),
+            ("sphere", &SINGLE_OBJECTIVE),
+        ] {
+            let problem = TestProblem::by_name(problem).unwrap();
+            let sizes = Sizes {
+                population: 20,
+                iterations: 5,
+                archive: 10,
+                seed: 1,
+            };
+            for name in names {
+                by_name(name, problem.problem(), sizes).unwrap();
+            }
+            let said = by_name("best", problem.problem(), sizes)
+                .err()
+                .unwrap()
+                .to_string();
+            assert!(said.contains("best") && said.contains("default"), "{said}");
+        }
+    }
+}

@@ -1,0 +1,241 @@
+//! One call to minimise a function: what comes back, why it stops, and that it is what ask and tell would give.
+
+use lapswarm::evaluate::point::{CallCost, Constraint, PointEvaluator};
+use lapswarm::evaluate::{Objective, Problem, Variable};
+use lapswarm::swarm::checkpoint::{load_optimiser, save, save_optimiser};
+use lapswarm::swarm::{
+    Front, Islands, MULTI_OBJECTIVE, Mopso, MopsoSettings, Optimiser, SINGLE_OBJECTIVE, Sizes, Stopped,
+    by_name, run, step,
+};
+use lapswarm::{minimise, minimise_batch, minimise_several};
+use std::ops::ControlFlow;
+use std::time::Duration;
+
+const BOUNDS: [(f64, f64); 3] = [(-4.0, 6.0), (0.0, 3.0), (-1.0, 2.0)];
+
+fn sphere(x: &[f64]) -> f64 {
+    x.iter().map(|x| (x - 0.5).powi(2)).sum()
+}
+
+/// Squared distances to zero and to one.
+fn distances(x: &[f64], f: &mut [f64]) {
+    for (k, value) in f[..2].iter_mut().enumerate() {
+        *value = x.iter().map(|x| (x - k as f64).powi(2)).sum();
+    }
+}
+
+fn problem(objectives: usize) -> Problem {
+    let variable = |(k, &(lower, upper))| Variable::new(format!("x{k}"), "-", lower, upper);
+    Problem {
+        variables: BOUNDS.iter().enumerate().map(variable).collect(),
+        objectives: (0..objectives)
+            .map(|k| Objective::new(format!("f{k}"), "-"))
+            .collect(),
+    }
+}
+
+#[test]
+fn one_objective_by_a_closure_with_a_state() {
+    let mut calls = 0;
+    let found = minimise(&BOUNDS, |x| {
+        calls += 1;
+        sphere(x)
+    })
+    .evaluations(8_000)
+    .population(20)
+    .seed(5)
+    .run()
+    .unwrap();
+    assert_eq!(calls, found.evaluations);
+    assert_eq!(found.stopped, Stopped::Evaluations);
+    let (x, cost) = found.best().unwrap();
+    assert!(cost < 1e-12 && cost == sphere(x), "{cost}");
+    assert!(found.is_feasible() && found.failures.is_empty());
+    let evaluations = found.history.iter().map(|h| h.evaluations);
+    assert!(evaluations.is_sorted() && found.history.last().unwrap().evaluations == found.evaluations);
+    let costs: Vec<f64> = found.history.iter().map(|h| h.best[0]).collect();
+    assert!(costs.is_sorted_by(|a, b| a >= b) && costs.last() == Some(&cost));
+
+    // The same by hand.
+    let sizes = Sizes {
+        population: 20,
+        iterations: 400,
+        archive: 100,
+        seed: 5,
+    };
+    let mut swarm = by_name("default", &problem(1), sizes).unwrap();
+    let mut evaluator = PointEvaluator::new(problem(1), CallCost::Cheap, |x: &[f64], f: &mut [f64]| {
+        f[0] = sphere(x)
+    });
+    run(&mut swarm, &mut evaluator, |_| ControlFlow::Continue(())).unwrap();
+    assert_eq!(swarm.front(), found.front);
+}
+
+#[test]
+fn batches_give_what_single_calls_give() {
+    let each = minimise_several(&BOUNDS, 2, distances)
+        .evaluations(3_000)
+        .run()
+        .unwrap();
+    let batch = minimise_batch(&BOUNDS, 2, |xs, fs| {
+        let rows = xs.chunks_exact(3).zip(fs.chunks_exact_mut(2));
+        rows.for_each(|(x, f)| distances(x, f));
+    });
+    let batch = batch.evaluations(3_000).run().unwrap();
+    assert_eq!(each.front, batch.front);
+    assert!(each.front.objectives.len() > 50);
+    // The roots of the two objectives add up to the distance between their optima.
+    for f in &each.front.objectives {
+        assert!((f[0].sqrt() + f[1].sqrt() - 3f64.sqrt()).abs() < 0.05, "{f:?}");
+    }
+}
+
+#[test]
+fn every_reason_to_stop_is_told() {
+    let target = minimise(&BOUNDS, sphere).target(1e-3).run().unwrap();
+    assert_eq!(target.stopped, Stopped::Target);
+    assert!(target.best().unwrap().1 <= 1e-3);
+    let before = target
+        .history
+        .len()
+        .checked_sub(2)
+        .map(|i| target.history[i].best[0]);
+    assert!(before.is_none_or(|cost| cost > 1e-3), "no later than it must");
+
+    let time = minimise(&BOUNDS, sphere).time(Duration::ZERO).run().unwrap();
+    assert_eq!((time.stopped, time.history.len()), (Stopped::Time, 1));
+
+    // Nothing is gained after the first generation.
+    let flat = minimise(&BOUNDS, |_| 3.0).stagnation(400, 0.0).run().unwrap();
+    assert_eq!((flat.stopped, flat.evaluations), (Stopped::Stagnation, 440));
+
+    let watched = minimise(&BOUNDS, sphere).run_watched(|now| match now.evaluations {
+        0..200 => ControlFlow::Continue(()),
+        _ => ControlFlow::Break(()),
+    });
+    let watched = watched.unwrap();
+    assert_eq!((watched.stopped, watched.evaluations), (Stopped::Observer, 200));
+
+    let volume = minimise_several(&BOUNDS, 2, distances)
+        .reference(vec![4.0, 4.0])
+        .stagnation(1_000, 1e-3)
+        .run()
+        .unwrap();
+    assert_eq!(volume.stopped, Stopped::Stagnation);
+    let volumes: Vec<f64> = volume.history.iter().filter_map(|h| h.hypervolume).collect();
+    let [.., before, _, _, _, _, _, _, _, _, _, last] = volumes[..] else {
+        panic!("too few generations: {volumes:?}");
+    };
+    assert!(last <= before * (1.0 + 1e-3), "{before} to {last}");
+    assert!(volume.evaluations < 25_000);
+}
+
+/// The nearest point to (1/2, 1/2, 1/2) on the plane where the variables add up to 3: (1, 1, 1).
+#[test]
+fn equalities_hold_within_their_tolerance() {
+    let function = |x: &[f64], f: &mut [f64]| {
+        f[0] = sphere(x);
+        f[1] = 1e6 * (x[0] + x[1] + x[2] - 3.0);
+        f[2] = x[2] - 1.5;
+    };
+    let constraints = vec![
+        Constraint::zero_within(10.0).in_units_of(1e6),
+        Constraint::at_most_zero(),
+    ];
+    let found = minimise_several(&BOUNDS, 1, function)
+        .constraints(constraints)
+        .run()
+        .unwrap();
+    let (x, cost) = found.best().unwrap();
+    assert!(found.is_feasible(), "{}", found.front.violation);
+    assert!((x.iter().sum::<f64>() - 3.0).abs() <= 1e-5, "{x:?}");
+    assert!((cost - 0.75).abs() < 1e-3, "{cost} at {x:?}");
+
+    let hopeless = minimise_several(&BOUNDS, 1, |x, f| (f[0], f[1]) = (sphere(x), 5.0 + x[0]));
+    let found = hopeless
+        .constraints(vec![Constraint::at_most_zero()])
+        .evaluations(4_000)
+        .run()
+        .unwrap();
+    assert!(!found.is_feasible());
+    assert!(
+        (1.0..1.01).contains(&found.front.violation),
+        "{}",
+        found.front.violation
+    );
+}
+
+#[test]
+fn nothing_found_is_told() {
+    let found = minimise(&BOUNDS, |_| f64::NAN).evaluations(400).run().unwrap();
+    assert_eq!((found.best(), found.is_feasible()), (None, false));
+    assert_eq!(found.front, Front::default());
+    assert_eq!(found.failures["objective_not_finite"], 400);
+}
+
+#[test]
+fn settings_out_of_range_are_named() {
+    let one = || minimise(&BOUNDS, sphere);
+    let two = || minimise_several(&BOUNDS, 2, distances);
+    let wrong = [
+        (one().population(50).evaluations(40), "population"),
+        (one().evaluations(0), "population"),
+        (one().evaluations(3), "population"),
+        (one().algorithm("smpso"), "smpso"),
+        (one().stagnation(10, 1.0), "stagnation"),
+        (two().target(1.0), "target"),
+        (two().stagnation(10, 0.0), "reference"),
+        (two().reference(vec![1.0]), "reference"),
+        (two().archive(1), "archive"),
+        (minimise(&[(0.0, 1.0), (1.0, 0.0)], sphere), "x2"),
+        (minimise(&[], sphere), "variables"),
+        (minimise_several(&BOUNDS, 0, distances), "objectives"),
+        (
+            minimise_several(&BOUNDS, 1, |_, f| f.fill(0.0))
+                .constraints(vec![Constraint::at_most_zero().in_units_of(-1.0)]),
+            "scale",
+        ),
+    ];
+    for (wrong, name) in wrong {
+        let error = wrong.run().expect_err(name);
+        assert_eq!(error.exit_code(), 2);
+        assert!(error.to_string().contains(name), "{error}, not {name}");
+    }
+}
+
+/// Whatever a name makes is saved and loaded without knowing what it is.
+#[test]
+fn any_optimiser_goes_on_from_a_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("state");
+    let single = SINGLE_OBJECTIVE.map(|name| (name, 1)).into_iter();
+    for (name, objectives) in single.chain(MULTI_OBJECTIVE.map(|name| (name, 2))) {
+        let sizes = Sizes {
+            population: 20,
+            iterations: 30,
+            archive: 20,
+            seed: 4,
+        };
+        let function =
+            |x: &[f64], f: &mut [f64]| (0..f.len()).for_each(|k| f[k] = sphere(x) + k as f64 * x[0]);
+        let mut evaluator = PointEvaluator::new(problem(objectives), CallCost::Cheap, function);
+        let mut whole = by_name(name, &problem(objectives), sizes).unwrap();
+        (0..10).for_each(|_| drop(step(&mut whole, &mut evaluator).unwrap()));
+        save_optimiser(&path, &whole).unwrap();
+        let mut part = load_optimiser(&path).unwrap();
+        for _ in 0..5 {
+            let (a, b) = (step(&mut whole, &mut evaluator), step(&mut part, &mut evaluator));
+            assert_eq!(a.unwrap(), b.unwrap(), "{name}");
+        }
+        assert_eq!(
+            whole.to_checkpoint().unwrap(),
+            part.to_checkpoint().unwrap(),
+            "{name}"
+        );
+    }
+    let swarms = vec![Mopso::new(&problem(2), MopsoSettings::default()).unwrap()];
+    let islands = Islands::new(&problem(2), swarms, None).unwrap();
+    save(&path, &islands).unwrap();
+    assert_eq!(load_optimiser(&path).unwrap().iteration(), 0);
+    assert!(islands.to_checkpoint().is_err());
+}
