@@ -54,6 +54,7 @@ pub use cooperative::{CooperativeSettings, CooperativeSwarm};
 pub use covariance::{Beyond, CovarianceSettings, CovarianceSwarm, Restarts};
 pub use difference::{DifferenceSettings, DifferenceSwarm};
 pub use islands::{Islands, Migration, Welcome};
+pub(crate) use mopso::thinning::PER_PLACE;
 pub use mopso::{Generation, MANY, Mopso};
 pub use nsga2::{Nsga2, Nsga2Settings};
 pub use pso::Pso;
