@@ -322,7 +322,7 @@ impl DeviceMopso {
         let lanes = n.next_multiple_of(BLOCK);
         let rows: Vec<f32> = self.read(&self.buffers.objectives, (lanes * width * 4) as u64)?;
         let plain = row_major(&rows, n, width);
-        Ok(thinned(learn_from(&plain, width), width, SAMPLE_FRONT))
+        Ok(thinned(learn_from(&plain, width), width, SAMPLE_FRONT, None))
     }
 
     /// The particles that may enter the archive, and how many have failed.
@@ -413,6 +413,7 @@ impl DeviceMopso {
             front(points, self.objectives),
             self.objectives,
             PER_PLACE * self.settings.archive,
+            self.archive.fixed_reference(),
         );
         let rows = self.gather(&points)?;
         let solution = |(p, row): (&Point, &[f32])| {

@@ -5,6 +5,7 @@
 
 use crate::error::{Error, Result};
 use crate::evaluate::portions::{self, Allowance};
+use crate::swarm::PER_PLACE;
 
 /// Memory that a study may take where nothing else is said (MiB).
 pub const USUAL_MIB: u64 = crate::config::USUAL_MEMORY_MIB;
@@ -14,6 +15,9 @@ pub const USUAL_MIB: u64 = crate::config::USUAL_MEMORY_MIB;
 const COPIES: u64 = 11;
 /// Bytes of a particle besides its variables: objectives, failures, order, rows of an evaluation.
 const PARTICLE: u64 = 320;
+/// Bytes of a member of the archive, or of a particle that may become one, besides its variables: position and objectives as
+/// rows of their own, what it contributes, and its box while a front is thinned.
+const MEMBER: u64 = 320;
 /// Bytes of an iteration in the history and in the tables and pictures that it comes to.
 const ITERATION: u64 = 512;
 /// Bytes of a cut across the track: in every level of the search, in the cone programs of the exact solvers, whose
@@ -168,6 +172,11 @@ impl Size {
         } else {
             0
         };
+        // While a large swarm learns, its archive stands there with all that may enter it.
+        let candidate = (self.variables as u64).saturating_mul(8).saturating_add(MEMBER);
+        let member = candidate
+            .saturating_mul(1 + PER_PLACE as u64)
+            .saturating_add(particle);
         let kept = |name, count: usize, each| Kept {
             name,
             count: count as u64,
@@ -175,7 +184,7 @@ impl Size {
         };
         [
             kept("population", self.population, particle),
-            kept("archive", self.archive, particle),
+            kept("archive", self.archive, member),
             kept("iterations", self.iterations, ITERATION.saturating_add(answers)),
             kept("sections", self.sections, CUT),
             log_kept(self.samples),
