@@ -1,4 +1,4 @@
-//! A simulated log: the driver's inputs, and what the model makes of them.
+//! A simulated log: the driver's inputs and the model's outputs.
 
 use super::sensors::{SensorSettings, distort};
 use crate::drive::{DriverSettings, drive};
@@ -15,7 +15,7 @@ pub struct SimulateSettings {
     pub driver: DriverSettings,
     /// Sample rate of the log, Hz.
     pub rate_hz: f64,
-    /// Runge-Kutta steps per sample interval with which the outputs are worked out.
+    /// Runge-Kutta steps per sample interval for the outputs.
     pub substeps: usize,
     /// Noise and delay of the outputs.
     pub sensors: SensorSettings,
@@ -36,7 +36,7 @@ impl Default for SimulateSettings {
 }
 
 impl SimulateSettings {
-    /// Whether a lap of the circuit can be driven and logged so.
+    /// Checks that a lap of the circuit can be driven and logged with these settings.
     ///
     /// # Errors
     /// [`Error::Input`] for a setting out of range or an open road.
@@ -62,8 +62,8 @@ impl SimulateSettings {
     }
 }
 
-/// Decimal places to which the logged inputs are rounded, so that the log's figures are the very inputs that its
-/// outputs were worked out from: wheel speeds (rad/s) and steering (rad).
+/// Decimal places of the logged inputs: wheel speeds (rad/s) and steering (rad). The outputs are computed from the rounded
+/// inputs, so that the log contains exactly the inputs of its outputs.
 const INPUT_DECIMALS: [i32; 2] = [6, 8];
 
 fn rounded(x: f64, decimals: i32) -> f64 {
@@ -73,9 +73,9 @@ fn rounded(x: f64, decimals: i32) -> f64 {
 
 /// Drives one flying lap and logs it.
 ///
-/// The driver's closed loop runs at a fine step. The logged outputs are those of the model fed the logged inputs,
-/// linear between samples, from the start that an identification assumes: so the truth fits the log exactly when
-/// the fit takes the same step.
+/// The driver's closed loop runs at a fine step. The logged outputs are those of the model with the logged inputs, linear between
+/// samples, from the start that an identification assumes. The true parameters therefore fit the log exactly if the fit takes the
+/// same step.
 ///
 /// # Errors
 /// [`Error::Input`] for a setting out of range or an open road, [`Error::Study`] if the car does not get round.
