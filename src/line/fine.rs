@@ -6,14 +6,14 @@ use super::spline::Spline;
 use crate::error::{Error, Place, Result};
 use glam::DVec2;
 
-/// A line on a fine grid, which shows wiggles between coarse points.
+/// A line on a fine grid, which shows oscillations between coarse points.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FineLine {
     /// Whether the end joins the start.
     pub closed: bool,
     /// Points (m), the given ones among them.
     pub points_m: Vec<DVec2>,
-    /// For each point, the given point at it or before it and how far on to the next it is, as a share.
+    /// For each point, the given point at or before it, and its position towards the next one as a share.
     pub section: Vec<(usize, f64)>,
     /// Distance along the curve from the start at each point (m).
     pub station_m: Vec<f64>,
@@ -80,7 +80,7 @@ impl FineLine {
         let mut gamma_squared = 0.0;
         for segment in 0..spline.segments() {
             let chord = spline.chord(segment);
-            // The curve is longer than the chord, and faster at one end than at the other.
+            // The curve is longer than its chord, and its parameter speed differs between the ends.
             let fastest = (0..=4)
                 .map(|i| spline.at(segment, chord * f64::from(i) / 4.0).speed)
                 .fold(1.0, f64::max);

@@ -1,4 +1,4 @@
-//! Everything about a lap on one line.
+//! All figures of a lap on one line.
 
 use super::kernel::{Course, lap_time};
 use super::point_mass::{LimitTable, PointMass};

@@ -1,4 +1,4 @@
-//! A simulated log: the driver's inputs, and what the model makes of them.
+//! A simulated log: the driver's inputs and the model's outputs.
 
 use super::sensors::{SensorSettings, distort};
 use crate::drive::{DriverSettings, drive};
@@ -46,7 +46,7 @@ pub struct Simulated {
 }
 
 impl SimulateSettings {
-    /// Whether a lap of the circuit can be driven and logged so.
+    /// Checks that a lap of the circuit can be driven and logged with these settings.
     ///
     /// # Errors
     /// [`Error::Input`] for a setting out of range or an open road.
@@ -72,8 +72,8 @@ impl SimulateSettings {
     }
 }
 
-/// Decimal places to which the logged inputs are rounded, so that the log's figures are the very inputs that its
-/// outputs were worked out from: wheel speeds (rad/s) and steering (rad).
+/// Decimal places of the logged inputs: wheel speeds (rad/s) and steering (rad). The outputs are computed from the rounded
+/// inputs, so that the log contains exactly the inputs of its outputs.
 const INPUT_DECIMALS: [i32; 2] = [6, 8];
 
 /// Greatest difference of yaw rate between the lap driven and its replay, as a share of the lap's greatest. Linear inputs
@@ -87,9 +87,9 @@ fn rounded(x: f64, decimals: i32) -> f64 {
 
 /// Drives one flying lap and logs it.
 ///
-/// The driver's closed loop runs at a fine step. The logged outputs are those of the model fed the logged inputs,
-/// linear between samples, from the start that an identification assumes: so the truth fits the log exactly when
-/// the fit takes the same steps.
+/// The driver's closed loop runs at a fine step. The logged outputs are those of the model with the logged inputs, linear between
+/// samples, from the start that an identification assumes. The true parameters therefore fit the log exactly if the fit takes the
+/// same steps.
 ///
 /// # Errors
 /// [`Error::Input`] for a setting out of range or an open road, [`Error::Study`] if the car does not get round.

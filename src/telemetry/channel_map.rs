@@ -1,4 +1,4 @@
-//! Which logged channel plays which role: from a small TOML file, and by the usual names where it says nothing.
+//! Which logged channel plays which role: from a small TOML file, or else by the usual names.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -24,30 +24,30 @@ pub enum Axle {
     Rear,
 }
 
-/// What a channel map says about one role.
+/// One role's entry in a channel map.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ChannelEntry {
-    /// The channel's name in the log; by the usual names where it is not given.
+    /// The channel's name in the log; `None` to look for the usual names.
     pub name: Option<String>,
-    /// The unit to believe instead of the one the log gives.
+    /// The unit that replaces the one in the log.
     pub unit: Option<String>,
-    /// 1 or -1, multiplied to the values. Given, it is not estimated from the log.
+    /// Factor of the values, 1 or -1. If it is given, it is not estimated from the log.
     pub sign: Option<f64>,
-    /// How much later than the event the logger recorded it, s; taken off its times. Given, it is not estimated.
+    /// Delay with which the logger recorded the event, s; it is subtracted from the times. If it is given, it is not estimated.
     pub delay_s: Option<f64>,
 }
 
 /// Which channel plays which role, with the few figures of the car that are needed to convert them.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ChannelMap {
-    /// What was said about roles; the others go by the usual names.
+    /// The entries for roles. The other roles are found by the usual names.
     pub channels: BTreeMap<Role, ChannelEntry>,
     /// Steering-wheel angle over road-wheel angle, for a log of the steering-wheel angle.
     pub steering_ratio: Option<f64>,
     /// Rolling radius (m) by which wheel speeds logged in km/h are divided to give rad/s, and on which wheel speeds
     /// are calibrated.
     pub rolling_radius_m: Option<f64>,
-    /// The axle whose wheel speeds stand in for a ground speed that is not logged: the undriven one.
+    /// The axle whose wheel speeds replace a ground speed that is not logged: the undriven one.
     pub speed_axle: Axle,
 }
 
@@ -215,7 +215,7 @@ impl ChannelMap {
             let unit_text = entry.and_then(|e| e.unit.as_deref()).unwrap_or(&channel.unit);
             let unit = match check_unit(unit_text, role) {
                 Ok(unit) => unit,
-                // A pedal in volts is of no use, and nobody asked for it.
+                // A pedal in volts cannot be used, and the map does not name it.
                 Err(_) if name.is_none() && matches!(role, Role::Throttle | Role::Brake) => {
                     continue;
                 }

@@ -12,7 +12,7 @@ use super::units::Unit;
 use crate::files::write_whole;
 use crate::{Error, Place, Result};
 
-/// The column every native file has.
+/// The column that every native file has.
 pub(super) const TIME: &str = "time_s";
 
 /// The columns of a native file, in the order they are written: time and distance, four wheel speeds, road-wheel
@@ -84,8 +84,8 @@ fn unit_in_name(name: &str) -> &str {
         .unwrap_or("")
 }
 
-/// How numbers are written: with a fixed number of decimals in some columns, and in the others with the fewest digits
-/// that read back as the same number.
+/// How numbers are written. Some columns have a fixed number of decimals; the others have the fewest digits that read back as the
+/// same number.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct NativeFormat {
     decimals: BTreeMap<String, usize>,
@@ -111,8 +111,8 @@ impl NativeFormat {
     }
 }
 
-/// Writes a log as a native CSV file. Laps are written as columns unless the log is one complete lap numbered 1,
-/// which is what a file without them means.
+/// Writes a log as a native CSV file. Laps are written as columns unless the log is one complete lap numbered 1, which a file
+/// without such columns means.
 ///
 /// # Errors
 /// [`Error::Io`] when the file cannot be written; [`Error::Input`] when the log's arrays differ in length, a value is

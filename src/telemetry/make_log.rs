@@ -33,7 +33,7 @@ impl Log {
         Self::read_within(path, map, options, memory_limit())
     }
 
-    /// As [`Log::read`], within so much memory (bytes) instead of what is allowed at present.
+    /// As [`Log::read`], within a limit of memory (bytes) of its own.
     ///
     /// # Errors
     /// As for [`Log::read`].

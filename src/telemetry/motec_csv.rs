@@ -1,7 +1,7 @@
 //! CSV exports of MoTeC i2: a block of `key,value` rows, a row of names, a row of units, then numbers.
 //!
-//! AiM Race Studio writes the same layout. Nothing is expected at a fixed line: the row of names is the one that
-//! starts with `Time` and is followed by a row that starts with a unit of time.
+//! AiM Race Studio writes the same layout. No row has a fixed line: the row of names is the one that starts with `Time` and is
+//! followed by a row that starts with a unit of time.
 
 use std::collections::HashSet;
 use std::path::Path;
@@ -52,7 +52,7 @@ pub(super) fn parse(text: &str, path: &Path, reading: &Reading<'_>) -> Result<Re
     })
 }
 
-/// i2 writes a channel once per worksheet it appears in. The first keeps its name, later ones are told apart.
+/// i2 writes a channel once for each worksheet that has it. The first one keeps its name; later ones get a number.
 fn unique_names(row: &Row<'_>, path: &Path) -> Result<Vec<String>> {
     let end = row.cells.iter().rposition(|c| !c.is_empty()).unwrap_or(0);
     let mut seen = HashSet::new();

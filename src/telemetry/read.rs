@@ -21,7 +21,7 @@ impl Recording {
     /// As [`Recording::read`], of the channels that are chosen; the others have no samples.
     pub(super) fn read_some(path: &Path, reading: &Reading<'_>) -> Result<Self> {
         if let Ok(told) = std::fs::metadata(path) {
-            // It is in memory as it is while it is read.
+            // The whole file is in memory while it is read.
             reading.fits(path, told.len(), told.len())?;
         }
         let bytes = read_bytes(path, LARGEST_LOG.min(reading.limit))?;
@@ -47,7 +47,7 @@ impl Recording {
             return motec_ld::parse(bytes, path, reading);
         }
         let size = bytes.len() as u64;
-        // What is no UTF-8 is written anew, at most twice as long.
+        // Text that is not UTF-8 is converted, to at most twice its length.
         reading.fits(path, size, text::decoded_size(&bytes))?;
         let text = text::decode(&bytes);
         let mut rows = text::Rows::new(&text, path, true);

@@ -13,7 +13,7 @@ pub(super) struct Table<'a> {
     names: Vec<String>,
     units: Vec<String>,
     time_column: usize,
-    /// Of columns that are not read nothing is kept.
+    /// Columns that are not read keep no samples.
     wanted: Vec<bool>,
     columns: Vec<Vec<f64>>,
     unreadable: Vec<Option<Unreadable>>,
@@ -53,7 +53,7 @@ impl<'a> Table<'a> {
         })
     }
 
-    /// Adds a row. A cell that is no finite number is remembered, not refused, unless it is the time.
+    /// Adds a row. A cell that is not a finite number is recorded and not refused, unless it is the time.
     ///
     /// # Errors
     /// [`Error::Input`] for a row of another width, and for a time that is not a number or does not rise.

@@ -6,7 +6,7 @@ use std::path::Path;
 use super::recording::MOST_CHANNELS;
 use crate::{Error, Place, Result};
 
-/// A quoted cell may span lines (a comment in a header); one that spans more than this was never closed.
+/// A quoted cell may span lines (a comment in a header); one that spans more lines was never closed.
 const MAX_LINES_PER_ROW: usize = 64;
 
 /// Text from bytes that are UTF-8, or else Latin-1, which loggers write for the degree sign. A byte-order mark is
@@ -28,7 +28,7 @@ fn latin_1_size(bytes: &[u8]) -> usize {
     bytes.len() + bytes.iter().filter(|b| !b.is_ascii()).count()
 }
 
-/// What bytes and their text take together (bytes).
+/// Memory of bytes and their text together (bytes).
 pub(super) fn decoded_size(bytes: &[u8]) -> u64 {
     let text = match std::str::from_utf8(bytes) {
         Ok(_) => 0,

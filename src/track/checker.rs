@@ -33,7 +33,7 @@ pub(super) fn parse_toml<T: DeserializeOwned>(file: &str, text: &str, what: &str
             None => "document".into(),
         };
         let message = error.message().trim().replace('\n', ", ");
-        // serde's messages end with what they wanted, as in "unknown field `x`, expected one of ...".
+        // serde's messages end with what was expected, as in "unknown field `x`, expected one of ...".
         match message.split_once(", expected ") {
             Some((found, expected)) => Error::input(file, place, found, expected),
             None => Error::input(file, place, message, what),
@@ -97,7 +97,7 @@ impl Checker<'_> {
                     &format!("a station beyond start_m, {start_m}"),
                 ));
             }
-            // Files are named by sections, not everywhere with regard to case.
+            // Sections give names to files, and not every file system distinguishes case.
             let file_name = |name: &str| stem(name).to_lowercase();
             let taken = sections.iter().find(|s| file_name(&s.name) == file_name(&name));
             let expected = match taken {

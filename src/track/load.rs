@@ -87,9 +87,8 @@ impl Circuit {
     /// `smoothing_edges_m` as in [`Smoothing`], `[[sections]]` as below and `[[corners]]` with `name` and `station_m`.
     ///
     /// Keys with a curvature table: `name`, `curvature_table` (a CSV file with columns `station_m`, `curvature_1pm` and, if
-    /// wanted, `width_left_m`, `width_right_m`, `corner`), `length_m`; `closed` (true unless said
-    /// otherwise), `start_heading_deg` (0), `width_m` (of the whole road, where the table has no
-    /// widths), and `[[sections]]` with `name`, `start_m`, `end_m`.
+    /// wanted, `width_left_m`, `width_right_m`, `corner`), `length_m`; `closed` (default true), `start_heading_deg` (0),
+    /// `width_m` (of the whole road, where the table has no widths), and `[[sections]]` with `name`, `start_m`, `end_m`.
     ///
     /// # Errors
     /// [`Error::Io`] when a file cannot be read; [`Error::Input`] with the file, line and field when
@@ -98,7 +97,7 @@ impl Circuit {
         Ok(Self::load_with_closure(path)?.0)
     }
 
-    /// As [`Circuit::load`], with what closing the lap took.
+    /// As [`Circuit::load`], with the changes that close the lap.
     ///
     /// # Errors
     /// As [`Circuit::load`].
@@ -110,7 +109,7 @@ impl Circuit {
     }
 }
 
-/// What a circuit file holds.
+/// The content of a circuit file.
 pub(super) enum CircuitSource {
     Curvature(Circuit, Closure),
     Survey(Survey, Smoothing),
@@ -195,8 +194,7 @@ const COLUMNS: [&str; 5] = [
     "corner",
 ];
 
-/// The line of the row that the reader started to look for here: the reader's own count is that of
-/// the comments and empty lines before the row.
+/// The line of the row at this position. The reader's own count is that of the comments and empty lines before the row.
 fn row_line(text: &str, position: Option<&csv::Position>) -> usize {
     let start = position.map_or(0, |p| p.byte() as usize).min(text.len());
     let skipped = text.as_bytes()[start..]

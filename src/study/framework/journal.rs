@@ -1,4 +1,4 @@
-//! What a study has had evaluated, so that a run goes on where it was interrupted.
+//! The populations that a study has had evaluated, so that an interrupted run can be resumed.
 //!
 //! A study whose work is a sequence of populations is a function of its settings, of what it reads and of the answers to
 //! these populations. Run again and given the answers it has had, it arrives at the place where it was interrupted with every

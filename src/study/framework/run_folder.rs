@@ -267,7 +267,7 @@ pub fn take(folder: &Path) -> Result<RunFolder> {
 /// Takes the folder of an interrupted run, to resume it.
 ///
 /// # Errors
-/// [`Error::Input`] if there is nothing in it to go on with, or another process writes into it.
+/// [`Error::Input`] if there is nothing in it to resume, or another process writes into it.
 pub fn reopen(folder: &Path) -> Result<RunFolder> {
     reopen_by(folder, STATE)
 }

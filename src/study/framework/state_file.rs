@@ -129,7 +129,7 @@ impl StateFile {
         }
     }
 
-    /// A state may go on with another backend than it began on: its end is another then, which is said.
+    /// A state may be resumed on another backend. Its end is then another one, and a warning says so.
     pub fn may_move(self) -> Self {
         Self {
             may_move: true,
@@ -158,7 +158,7 @@ impl StateFile {
         Ok(())
     }
 
-    /// Takes the saved state away, when nothing is left to go on with.
+    /// Removes the saved state when there is nothing left to resume.
     ///
     /// # Errors
     /// [`Error::Io`] if it stays.

@@ -324,7 +324,7 @@ fn front_settings(settings: &IdentifySettings, motion: PsoSettings) -> MopsoSett
 }
 
 impl SearchState {
-    /// Notes an iteration down; counts go on from the stage before.
+    /// Records an iteration; counts continue from the stage before.
     fn note(&mut self, progress: &Progress) {
         let last = self.history.last();
         let (iteration, evaluations) = last.map_or((0, 0), |r| (r.iteration, r.evaluations));

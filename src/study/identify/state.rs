@@ -1,4 +1,4 @@
-//! The state of a search: all that it takes to go on.
+//! The state of a search: all that it takes to resume it.
 
 use super::coordinates::Logarithmic;
 use super::settings::IdentifySettings;
@@ -56,7 +56,7 @@ pub(super) enum Place {
     Searched { best: Vec<f64>, front: Option<Front> },
 }
 
-/// The state of a search. A checkpoint of it goes on bit for bit on the backend where it began.
+/// The state of a search. A search that is resumed from its checkpoint on the same backend gives the same bits.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct SearchState {
     /// What the search was asked to do.

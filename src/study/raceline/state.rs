@@ -109,7 +109,7 @@ impl Running<'_> {
         Ok(flow)
     }
 
-    /// Whether to go on with what a solver is at.
+    /// Whether a solver is to continue.
     pub fn asked(&mut self, stage: &str) -> Result<ControlFlow<()>> {
         self.told(&Progress::reached(stage, 0, "not known yet"), |_| ())
     }

@@ -1,4 +1,4 @@
-//! Whether points can be the line of a road.
+//! Checks whether points can be the line of a road.
 
 use super::super::crossing::{crossings, stretches};
 use super::{MOST_POINTS, Survey, WIDEST_M, place};
@@ -14,12 +14,12 @@ const DUPLICATE_M: f64 = 1e-3;
 pub(super) const FURTHEST_M: f64 = 2e7;
 /// Range of the length of a road (m).
 const LENGTH_M: (f64, f64) = (10.0, 200_000.0);
-/// A turn at one point beyond this is no bend (degrees).
+/// Greatest turn at one point (degrees).
 const SHARPEST_DEG: f64 = 120.0;
-/// A road is at least this wide in all (m).
+/// Least width of a road (m).
 const NARROWEST_M: f64 = 0.1;
-/// The end of a line joins its start when the gap is no longer than this many of its longest steps, and does not when
-/// the gap is longer than this share of the line.
+/// A line is closed if its gap is no longer than this many of its longest steps, and open if the gap is longer than this share of
+/// its length.
 const JOINED_STEPS: f64 = 2.0;
 const OPEN_SHARE: f64 = 0.05;
 
@@ -172,9 +172,9 @@ pub(super) fn check_crossings(
 }
 
 impl Survey {
-    /// Checks that this can be a road: enough points, none twice, no turning back, no crossing beyond the bridges
-    /// allowed, widths that are none below zero and together at least 0.1 m (an edge may touch the line). Widths
-    /// against bends are checked where cross-sections are made.
+    /// Checks that this can be a road: enough points, none twice, no turning back, no more crossings than bridges, widths of zero
+    /// or more (an edge may touch the line) and together at least 0.1 m. Widths against bends are checked where cross-sections
+    /// are made.
     ///
     /// # Errors
     /// [`Error::Input`] naming the first point that cannot be.

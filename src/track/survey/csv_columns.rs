@@ -14,7 +14,7 @@ pub(super) struct Edge {
     pub lines: Vec<usize>,
 }
 
-/// What a file turned out to hold.
+/// The content of a file.
 pub(super) enum Content {
     Line(Raw),
     Edges { left: Edge, right: Edge },
@@ -201,7 +201,7 @@ fn number(table: &Table<'_>, line: usize, cells: &[&str], at: usize, low: f64, h
     }
 }
 
-/// Refuses one point more than may be read.
+/// Refuses more points than are allowed.
 pub(super) fn bounded(path: &Path, place: impl Fn() -> Place, count: usize) -> Result<()> {
     if count < MOST_POINTS {
         return Ok(());
@@ -268,7 +268,7 @@ fn read_edges<'a>(
     for (line, text) in rows {
         let cells = row(table, line, text)?;
         for (edge, columns) in [(&mut lefts, left), (&mut rights, right)] {
-            // The shorter edge has nothing in the last rows.
+            // The cells of the shorter edge are empty in the last rows.
             if columns.iter().all(|&at| cells[at].is_empty()) {
                 continue;
             }

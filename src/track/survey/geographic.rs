@@ -14,7 +14,7 @@ pub(super) struct Fix {
 /// Half the great axis of the WGS 84 ellipsoid (m) and its flattening.
 const GREAT_AXIS_M: f64 = 6_378_137.0;
 const FLATTENING: f64 = 1.0 / 298.257_223_563;
-/// Beyond this distance from the middle (m) a plane is no map any more: at 20 km it is 3 cm short.
+/// Greatest distance from the middle (m) at which a plane is an accurate map: at 20 km it is 3 cm short.
 const FURTHEST_M: f64 = 100_000.0;
 
 impl Fix {
@@ -49,7 +49,7 @@ pub(super) fn project(fixes: &[Fix], path: &Path, place: &dyn Fn(usize) -> Place
             "degrees from -90 to 90 and from -180 to 180",
         ));
     }
-    // The mean of normals, which needs no care at the date line.
+    // The mean of normals needs no special case at the date line.
     let up = fixes
         .iter()
         .map(|f| f.normal())

@@ -92,7 +92,7 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// The only element of a list, or the reason why there is none.
+    /// The only element of a list, or an error if there is none or several.
     fn only<'a, 'i>(&self, mut found: Vec<Node<'a, 'i>>, what: &str) -> Result<Node<'a, 'i>> {
         match (found.pop(), found.len()) {
             (Some(one), 0) => Ok(one),
@@ -148,7 +148,7 @@ impl Reader<'_> {
                 let text = inner.text().unwrap_or_default();
                 if tuples_have_commas {
                     for tuple in text.split_ascii_whitespace() {
-                        // Where the text has character references this is off by their length, on the same line mostly.
+                        // Character references in the text shift this by their length, mostly within the same line.
                         let offset = start + (tuple.as_ptr() as usize).saturating_sub(text.as_ptr() as usize);
                         self.tuple(node, offset, tuple.split(','))?;
                     }
