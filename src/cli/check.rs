@@ -1,7 +1,6 @@
 //! `lapswarm check`: is this file what it should be?
 
 use crate::cli::output::{errln, outln};
-use lapswarm::config::settings::Declared;
 use lapswarm::config::{Document, read_start, read_text};
 use lapswarm::line::read_line;
 use lapswarm::study::registry::{self, Registered, STUDIES};
@@ -11,6 +10,7 @@ use lapswarm::track::Track;
 use lapswarm::vehicle::tyre::TyreFile;
 use lapswarm::vehicle::{Car, Envelope};
 use lapswarm::{Error, Result};
+use std::cmp::Reverse;
 use std::path::{Path, PathBuf};
 
 /// Flags of `check`.
@@ -160,17 +160,6 @@ fn guess(path: &Path) -> Result<Kind> {
         if matches!(document.root().table("grid"), Ok(Some(_))) {
             return Ok(Kind::File(&SWEEP));
         }
-        // The study that knows most of the file's keys; of several the first in this order.
-        const ORDER: [&str; 8] = [
-            "identify",
-            "raceline",
-            "hybrid",
-            "surface",
-            "sensitivity",
-            "run",
-            "transient",
-            "envelope",
-        ];
         if has(&["chassis"]) {
             return Ok(Kind::File(&CAR));
         }
@@ -180,16 +169,15 @@ fn guess(path: &Path) -> Result<Kind> {
         if has(&["study", "base"]) {
             return Ok(Kind::File(&SWEEP));
         }
-        let knows = |study: &&'static dyn Registered| {
+        // The study that knows most of the file's keys; of several the one with the fewest others.
+        let others = |study: &&&'static dyn Registered| {
             let declared = study.declared();
-            let top = |d: &Declared| d.table().unwrap_or(d.key).to_owned();
-            let known: Vec<String> = declared.iter().map(top).collect();
-            keys.iter().filter(|key| known.contains(key)).count()
+            let known = |key: &&String| declared.iter().any(|d| d.table().unwrap_or(d.key) == **key);
+            (Reverse(keys.iter().filter(known).count()), declared.len())
         };
-        let mut studies: Vec<&'static dyn Registered> = STUDIES.to_vec();
-        let place = |name: &str| ORDER.iter().position(|n| *n == name).unwrap_or(ORDER.len());
-        studies.sort_by_key(|study| (std::cmp::Reverse(knows(study)), place(study.name())));
-        return Ok(Kind::Study(studies[0]));
+        if let Some(study) = STUDIES.iter().min_by_key(others) {
+            return Ok(Kind::Study(*study));
+        }
     }
     // A log may be larger than any text, and need not be UTF-8.
     let start = read_start(path, HEAD)?;

@@ -1,5 +1,7 @@
 //! Measurements that are kept in a folder, with a page.
 
+use super::output::outln;
+use super::print_json;
 use lapswarm::Result;
 use lapswarm::evaluate::BackendChoice;
 use lapswarm::report::HtmlReport;
@@ -7,7 +9,7 @@ use lapswarm::study::framework::run_folder::{self, Manifest, RunFolder, write_js
 use lapswarm::study::framework::{RunRecord, Subject};
 use serde::Serialize;
 use std::collections::BTreeSet;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Where a measurement is kept.
 #[derive(clap::Args)]
@@ -15,13 +17,90 @@ pub struct Kept {
     /// Keep the figures in this folder, with pictures and report.html; refused if it holds anything
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// Print one JSON object as the last thing on stdout
+    #[arg(long)]
+    pub json: bool,
 }
 
 impl Kept {
-    /// The folder, if one is asked for; refused before anything is measured.
-    pub fn folder(&self, study: &str) -> Result<Option<RunFolder>> {
+    /// The folder is refused before anything is measured; `adapter` is what the flag `--adapter` says.
+    pub fn begin<'a>(&self, study: &'static str, adapter: Option<&'a str>) -> Result<Keeping<'a>> {
         let create = |path| run_folder::create(study, Some(path));
-        self.out.as_deref().map(create).transpose()
+        Ok(Keeping {
+            study,
+            folder: self.out.as_deref().map(create).transpose()?,
+            adapter,
+            json: self.json,
+        })
+    }
+}
+
+/// What becomes of a measurement.
+pub struct Keeping<'a> {
+    study: &'static str,
+    folder: Option<RunFolder>,
+    adapter: Option<&'a str>,
+    json: bool,
+}
+
+impl Keeping<'_> {
+    /// Keeps what was measured, if a folder is asked for, and prints it as JSON, if that is; `told` says whether words go to the
+    /// terminal. The folder gets `summary.json`, `manifest.json` and `report.html`, whose page ends with what measured.
+    pub fn finish<'b>(
+        self,
+        told: bool,
+        summary: &impl Serialize,
+        backends: impl IntoIterator<Item = &'b str>,
+        page: impl FnOnce(&Path) -> Result<HtmlReport>,
+    ) -> Result<()> {
+        if let Some(folder) = &self.folder {
+            self.write(folder, summary, &distinct(backends), page(folder)?)?;
+            if told {
+                outln!("Results: {}", folder.display());
+            }
+        }
+        if self.json {
+            print_json(summary)?;
+        }
+        Ok(())
+    }
+
+    fn write(
+        &self,
+        folder: &Path,
+        summary: &impl Serialize,
+        backends: &[&str],
+        mut page: HtmlReport,
+    ) -> Result<()> {
+        let measured_by = if backends.contains(&"gpu") {
+            BackendChoice::Gpu.would_be(self.adapter)?
+        } else {
+            BackendChoice::Simd.would_be(None)?
+        };
+        let record = RunRecord {
+            backend: backends.join(", "),
+            ..RunRecord::of(&measured_by)
+        };
+        write_json(&folder.join("summary.json"), summary)?;
+        let threads = std::thread::available_parallelism().map_or(String::new(), |n| n.to_string());
+        page.facts(&[
+            ("backends", &record.backend),
+            ("adapter", &record.adapter),
+            ("driver", &record.driver),
+            ("threads", &threads),
+            (
+                "system",
+                &format!("{} {}", std::env::consts::OS, std::env::consts::ARCH),
+            ),
+        ]);
+        page.write(folder.join("report.html"))?;
+        // Last: it says that the run is whole.
+        let subject = Subject {
+            seed: 1,
+            ..Subject::default()
+        };
+        let manifest = Manifest::new(self.study, &subject, &record, "");
+        write_json(&folder.join("manifest.json"), &manifest)
     }
 }
 
@@ -29,45 +108,4 @@ impl Kept {
 pub fn distinct<'a>(names: impl IntoIterator<Item = &'a str>) -> Vec<&'a str> {
     let names: BTreeSet<&str> = names.into_iter().collect();
     names.into_iter().collect()
-}
-
-/// Keeps what was measured: writes `summary.json`, `manifest.json` and `report.html`, whose page ends with what measured. The GPU
-/// among the backends is that of the flag `--adapter`.
-pub fn keep<'a>(
-    folder: &RunFolder,
-    study: &'static str,
-    summary: &impl Serialize,
-    mut page: HtmlReport,
-    (backends, adapter): (impl IntoIterator<Item = &'a str>, Option<&str>),
-) -> Result<()> {
-    let backends = distinct(backends);
-    let measured_by = if backends.contains(&"gpu") {
-        BackendChoice::Gpu.would_be(adapter)?
-    } else {
-        BackendChoice::Simd.would_be(None)?
-    };
-    let record = RunRecord {
-        backend: backends.join(", "),
-        ..RunRecord::of(&measured_by)
-    };
-    write_json(&folder.join("summary.json"), summary)?;
-    let threads = std::thread::available_parallelism().map_or(String::new(), |n| n.to_string());
-    page.facts(&[
-        ("backends", &record.backend),
-        ("adapter", &record.adapter),
-        ("driver", &record.driver),
-        ("threads", &threads),
-        (
-            "system",
-            &format!("{} {}", std::env::consts::OS, std::env::consts::ARCH),
-        ),
-    ]);
-    page.write(folder.join("report.html"))?;
-    // Last: it says that the run is whole.
-    let subject = Subject {
-        seed: 1,
-        ..Subject::default()
-    };
-    let manifest = Manifest::new(study, &subject, &record, "");
-    write_json(&folder.join("manifest.json"), &manifest)
 }

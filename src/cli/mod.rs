@@ -67,7 +67,7 @@ fn command() -> Command {
              interrupted (what was reached is saved).\n\nExamples:\n  lapswarm run\n  lapswarm identify study.toml --seed 7 \
              --json\n  lapswarm simulate --rate 100 --out lap\n  lapswarm devices",
         );
-    Tool::augment_subcommands(command.subcommands(STUDIES.into_iter().map(study::command)))
+    Tool::augment_subcommands(command.subcommands(STUDIES.iter().map(|study| study::command(*study))))
 }
 
 /// Flags of everything that writes into a run folder.

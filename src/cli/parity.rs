@@ -1,7 +1,7 @@
 //! `lapswarm parity`.
 
-use super::measurement::{Kept, keep};
-use super::{backend_flag, print_json};
+use super::backend_flag;
+use super::measurement::Kept;
 use crate::cli::output::{Columns, line_of, outln};
 use lapswarm::evaluate::BackendChoice;
 use lapswarm::evaluate::gpu::{DeviceSummary, devices};
@@ -31,9 +31,6 @@ pub struct Arguments {
     file: Option<PathBuf>,
     #[command(flatten)]
     kept: Kept,
-    /// Print one JSON object as the last thing on stdout
-    #[arg(long)]
-    json: bool,
     /// No table
     #[arg(long)]
     quiet: bool,
@@ -90,7 +87,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         let expected = "auto, simd or gpu: cpu is the reference that these are held against";
         return Err(Error::input("the command line", "--backend", "cpu", expected));
     }
-    let folder = arguments.kept.folder("parity")?;
+    let keeping = arguments.kept.begin("parity", arguments.adapter.as_deref())?;
     let device: Option<&DeviceSummary> = subjects.iter().find_map(|s| match s {
         Subject::Device(context) => Some(context.summary()),
         Subject::Lanes(_) => None,
@@ -134,48 +131,29 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             .map_err(|e| Error::io(path, "write", std::io::Error::other(e)))?;
         write_whole(path, text.as_bytes())?;
     }
-    if let Some(folder) = &folder {
-        let names = subjects.iter().map(|s| match s {
-            Subject::Device(_) => "gpu",
-            Subject::Lanes(_) => "simd",
-        });
-        let page = page_of(folder, &report)?;
-        keep(
-            folder,
-            "parity",
-            &report,
-            page,
-            (names, arguments.adapter.as_deref()),
-        )?;
-    }
     if !arguments.quiet {
-        if let Some(folder) = &folder {
-            outln!("Results: {}", folder.display());
-        }
         if let Some(device) = device {
             outln!("{device}");
         }
-        outln!(
-            "{}",
-            if pass {
-                "all agree with the f64 reference"
-            } else {
-                "NOT ALL AGREE"
-            }
-        );
+        let verdict = if pass {
+            "all agree with the f64 reference"
+        } else {
+            "NOT ALL AGREE"
+        };
+        outln!("{verdict}");
     }
-    if arguments.json {
-        print_json(&report)?;
-    }
+    let names = subjects.iter().map(|s| match s {
+        Subject::Device(_) => "gpu",
+        Subject::Lanes(_) => "simd",
+    });
+    keeping.finish(!arguments.quiet, &report, names, |folder| {
+        page_of(folder, &report)
+    })?;
     if pass {
         return Ok(());
     }
-    let failing: Vec<&str> = report
-        .kernels
-        .iter()
-        .filter(|(_, a)| !a.pass)
-        .map(|(k, _)| k.as_str())
-        .collect();
+    let failing = report.kernels.iter().filter(|(_, a)| !a.pass);
+    let failing: Vec<&str> = failing.map(|(key, _)| key.as_str()).collect();
     Err(Error::Study(format!(
         "off the reference by more than may be: {}",
         failing.join("; ")

@@ -208,23 +208,6 @@ impl<'a> Table<'a> {
         self.string(key)?.ok_or_else(|| self.missing(key, meaning))
     }
 
-    /// A string, a number or a truth value as text, if the key is there.
-    ///
-    /// # Errors
-    /// [`Error::Input`] naming line and field if a list or a table stands there.
-    pub fn word(&self, key: &str) -> Result<Option<String>> {
-        let Some(value) = self.value(key) else {
-            return Ok(None);
-        };
-        match value.get_ref() {
-            DeValue::String(s) => Ok(Some(s.as_ref().to_owned())),
-            DeValue::Integer(i) => Ok(Some(i.as_str().to_owned())),
-            DeValue::Float(f) => Ok(Some(f.as_str().to_owned())),
-            DeValue::Boolean(b) => Ok(Some(b.to_string())),
-            _ => Err(self.wrong(key, value, "a string or a number")),
-        }
-    }
-
     /// Whether the key is there and stands for a table.
     pub fn is_table(&self, key: &str) -> bool {
         let value = self.entries.get(key);

@@ -184,7 +184,7 @@ pub fn spacing(magnitude: f64) -> f64 {
 pub type Layer = Box<dyn Fn(&Subject) -> Result<Vec<Agreement>>>;
 
 /// The layers, each of which needs those before it.
-const LAYERS: [fn() -> Result<Layer>; 7] = [
+const LAYERS: &[fn() -> Result<Layer>] = &[
     || Ok(Box::new(elementary::compare)),
     || Ok(Box::new(step::compare)),
     laps::layer,

@@ -1,6 +1,5 @@
 //! `lapswarm bench optimisers`: every algorithm on every test problem.
 
-use super::finish;
 use super::pages::of_optimisers;
 use crate::cli::measurement::Kept;
 use crate::cli::output::{Columns, line_of, outln};
@@ -25,9 +24,6 @@ pub struct Arguments {
     algorithms: Vec<String>,
     #[command(flatten)]
     kept: Kept,
-    /// Print one JSON object
-    #[arg(long)]
-    json: bool,
 }
 
 /// One algorithm on one problem; hypervolume for several objectives, error for one.
@@ -73,9 +69,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let algorithms = [MULTI_OBJECTIVE.as_slice(), &SINGLE_OBJECTIVE].concat();
     check("--algorithms", &arguments.algorithms, &algorithms)?;
     let wanted = |chosen: &[String], name: &str| chosen.is_empty() || chosen.iter().any(|c| c == name);
-    let folder = arguments.kept.folder("bench")?;
+    let keeping = arguments.kept.begin("bench optimisers", None)?;
     let mut rows = Vec::new();
-    if !arguments.json {
+    if !arguments.kept.json {
         outln!("medians and interquartile ranges of {} seeds", arguments.seeds);
         outln!("{}", line_of(COLUMNS, None));
     }
@@ -92,7 +88,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         };
         for algorithm in algorithms.iter().filter(|a| wanted(&arguments.algorithms, a)) {
             let row = measure(&problem, algorithm, arguments.seeds)?;
-            if !arguments.json {
+            if !arguments.kept.json {
                 outln!("{}", line_of(COLUMNS, Some(&row)));
             }
             rows.push(row);
@@ -102,13 +98,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         study: "bench optimisers",
         rows,
     };
-    finish(
-        ("bench optimisers", &table),
-        folder.as_ref(),
-        |folder| of_optimisers(folder, &table.rows),
-        (["cpu"], None),
-        (!arguments.json, arguments.json),
-    )
+    keeping.finish(!arguments.kept.json, &table, ["cpu"], |folder| {
+        of_optimisers(folder, &table.rows)
+    })
 }
 
 fn check(flag: &str, chosen: &[String], known: &[&str]) -> Result<()> {

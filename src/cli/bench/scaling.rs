@@ -1,6 +1,5 @@
 //! `lapswarm bench`: evaluations per second against population on every backend.
 
-use super::finish;
 use super::machine::{forget_peak_memory, peak_memory_bytes, peak_operations_per_s};
 use super::pages::{of_scaling, rates};
 use crate::cli::backend_flag;
@@ -39,7 +38,7 @@ pub struct Arguments {
     /// Problems: replay (the bundled lap, 22 unknowns), line (lap time, 360 cuts, 90 control points), drive (set-ups driven
     /// round a stadium of 840 m by the driver), steady (set-ups that settle on circles), energy (strategies of a hybrid on one line)
     #[arg(long, value_delimiter = ',', default_value = "replay,line",
-          value_parser = PossibleValuesParser::new(PROBLEMS.map(|(name, _)| name)))]
+          value_parser = PossibleValuesParser::new(PROBLEMS.iter().map(|(name, _)| *name)))]
     problems: Vec<String>,
     /// Populations to measure
     #[arg(long, value_delimiter = ',', default_value = "64,256,1024,4096,16384",
@@ -62,9 +61,6 @@ pub struct Arguments {
     against: Option<PathBuf>,
     #[command(flatten)]
     kept: Kept,
-    /// Print one JSON object as the last thing on stdout
-    #[arg(long)]
-    json: bool,
     /// No table
     #[arg(long)]
     quiet: bool,
@@ -126,7 +122,7 @@ struct Case<K> {
 }
 
 /// The problems, by name.
-const PROBLEMS: [(&str, fn(&mut Bench<'_>) -> Result<()>); 5] = [
+const PROBLEMS: &[(&str, fn(&mut Bench<'_>) -> Result<()>)] = &[
     ("replay", |bench| bench.measure_all("replay", &replay()?)),
     ("line", |bench| bench.measure_all("line", &line()?)),
     ("drive", |bench| bench.measure_all("drive", &drive()?)),
@@ -379,7 +375,7 @@ impl Bench<'_> {
 /// Measures and prints.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let other = arguments.against.as_deref().map(read_table).transpose()?;
-    let folder = arguments.kept.folder("bench")?;
+    let keeping = arguments.kept.begin("bench", arguments.adapter.as_deref())?;
     let began = Instant::now();
     let threads = rayon::current_num_threads();
     let peak = threads as f64 * peak_operations_per_s(InstructionSet::best());
@@ -421,16 +417,10 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     if let Some(path) = &arguments.plot {
         rates(&table.rows).write_svg(path)?;
     }
-    finish(
-        ("bench", &table),
-        folder.as_ref(),
-        |folder| of_scaling(folder, &table, other.as_ref()),
-        (
-            table.rows.iter().map(|r| r.backend.as_str()),
-            arguments.adapter.as_deref(),
-        ),
-        (!arguments.quiet, arguments.json),
-    )
+    let backends = table.rows.iter().map(|r| r.backend.as_str());
+    keeping.finish(!arguments.quiet, &table, backends, |folder| {
+        of_scaling(folder, &table, other.as_ref())
+    })
 }
 
 fn read_table(path: &Path) -> Result<Table> {

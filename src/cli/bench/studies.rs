@@ -1,6 +1,5 @@
 //! `lapswarm bench studies`: every optimiser of several objectives on the studies' own problems, hypervolume against time.
 
-use super::finish;
 use super::pages::{of_studies, qualities};
 use crate::cli::backend_flag;
 use crate::cli::measurement::Kept;
@@ -59,9 +58,6 @@ pub struct Arguments {
     plot: Option<PathBuf>,
     #[command(flatten)]
     kept: Kept,
-    /// Print one JSON object
-    #[arg(long)]
-    json: bool,
 }
 
 /// The problems, by name.
@@ -258,7 +254,7 @@ impl<K: OnDevice> Case<K> {
         for &population in &arguments.populations {
             for algorithm in &algorithms {
                 let row = self.measure(algorithm, population as usize, arguments)?;
-                if !arguments.json {
+                if !arguments.kept.json {
                     outln!("{}", line_of(COLUMNS, Some(&row)));
                 }
                 table.rows.push(row);
@@ -348,7 +344,9 @@ impl<K: OnDevice> Case<K> {
 
 /// Measures and prints.
 pub fn run(arguments: &Arguments) -> Result<()> {
-    let folder = arguments.kept.folder("bench")?;
+    let keeping = arguments
+        .kept
+        .begin("bench studies", arguments.adapter.as_deref())?;
     let mut table = Table {
         study: "bench studies",
         threads: rayon::current_num_threads(),
@@ -356,7 +354,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         problems: Vec::new(),
         rows: Vec::new(),
     };
-    if !arguments.json {
+    if !arguments.kept.json {
         outln!(
             "{} evaluations, archive of {}, {} threads, medians of {} seeds; hypervolume as a share of the problem's box",
             arguments.evaluations,
@@ -374,16 +372,10 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     if let Some(path) = &arguments.plot {
         qualities(&table.rows).write_svg(path)?;
     }
-    finish(
-        ("bench studies", &table),
-        folder.as_ref(),
-        |folder| of_studies(folder, &table.rows),
-        (
-            table.problems.iter().map(|p| p.backend),
-            arguments.adapter.as_deref(),
-        ),
-        (!arguments.json, arguments.json),
-    )
+    let backends = table.problems.iter().map(|p| p.backend);
+    keeping.finish(!arguments.kept.json, &table, backends, |folder| {
+        of_studies(folder, &table.rows)
+    })
 }
 
 /// The table on a terminal.

@@ -142,7 +142,19 @@ impl Study for Identify {
         outcome: &Outcome,
         summary: &Summary,
     ) -> Result<()> {
-        results::report(folder, settings, setup, outcome, summary)
+        let car = setup
+            .replay
+            .free
+            .candidate_car(&results::reported_candidate(setup, outcome));
+        car.write(folder, "car")?;
+        results::write_history(folder, outcome)?;
+        results::write_parameters(folder, summary)?;
+        if let Some(front) = &outcome.front {
+            results::write_front(folder, setup, front)?;
+        }
+        let judged = judge_candidate(&setup.replay, &outcome.candidate);
+        results::write_traces(folder, setup, &judged)?;
+        page::write(folder, settings, setup, outcome, &judged, summary)
     }
 
     fn text(settings: &IdentifySettings, summary: &Summary) -> String {

@@ -262,27 +262,30 @@ impl IdentifySettings {
 }
 
 fn swarm_settings(settings: &IdentifySettings) -> PsoSettings {
+    let several = settings.objectives.len() > 1;
     let base = match settings.algorithm {
         Algorithm::Thesis => PsoSettings::thesis(),
         _ => PsoSettings::default(),
     };
-    let adaptive = settings.algorithm == Algorithm::Adaptive && settings.objectives.len() == 1;
-    let usual = match settings.algorithm {
-        Algorithm::Thesis => (base.population, base.iterations),
-        _ if settings.objectives.len() > 1 => FRONT,
-        _ => (base.population, base.iterations),
-    };
-    let (population, iterations) = if adaptive {
-        let most = |given: Option<usize>, times: usize| given.map_or(usize::MAX, |n| n.saturating_mul(times));
-        (
-            EXPLORE.0.min(most(settings.population, 2)),
-            EXPLORE.1.min(most(settings.iterations, 1)),
-        )
-    } else {
-        (
-            settings.population.unwrap_or(usual.0),
-            settings.iterations.unwrap_or(usual.1),
-        )
+    let (population, iterations) = match settings.algorithm {
+        Algorithm::Adaptive if !several => {
+            let most =
+                |given: Option<usize>, times: usize| given.map_or(usize::MAX, |n| n.saturating_mul(times));
+            let population = EXPLORE.0.min(most(settings.population, 2));
+            (population, EXPLORE.1.min(most(settings.iterations, 1)))
+        }
+        algorithm => {
+            let own = several && algorithm != Algorithm::Thesis;
+            let usual = if own {
+                FRONT
+            } else {
+                (base.population, base.iterations)
+            };
+            (
+                settings.population.unwrap_or(usual.0),
+                settings.iterations.unwrap_or(usual.1),
+            )
+        }
     };
     PsoSettings {
         population,

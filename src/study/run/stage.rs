@@ -191,7 +191,10 @@ mod tests {
     use crate::study::framework::State;
     use crate::study::framework::journal::Journal;
 
-    const EVERY: Duration = Duration::ZERO;
+    /// Stages of a run of this name beside a cache that all runs share.
+    fn stages_of(root: &Path, run: &str) -> Stages {
+        Stages::new(&root.join(run), &root.join("cache"), Duration::ZERO)
+    }
 
     /// What the state that a state_file finds was begun with.
     fn begun(state_file: &StateFile) -> Option<u32> {
@@ -203,7 +206,7 @@ mod tests {
     fn a_stage_that_is_broken_off_finds_its_state_again_and_leaves_none_when_it_is_done() {
         let root = tempfile::tempdir().expect("a temporary folder");
         let cache = root.path().join("cache");
-        let stages = Stages::new(&root.path().join("run"), &cache, EVERY);
+        let stages = stages_of(root.path(), "run");
         let inputs = Inputs::new("stage");
         let mut known = Vec::new();
         for round in 0..3u32 {
@@ -227,10 +230,9 @@ mod tests {
     #[test]
     fn a_stage_runs_once_for_the_same_inputs_and_again_for_others() {
         let root = tempfile::tempdir().expect("a temporary folder");
-        let cache = root.path().join("cache");
         let mut runs = 0;
         let mut go = |run: &str, input: f64| {
-            let stages = Stages::new(&root.path().join(run), &cache, EVERY);
+            let stages = stages_of(root.path(), run);
             let mut inputs = Inputs::new("stage");
             inputs.add(&input);
             let (folder, reused) = stages
@@ -259,8 +261,7 @@ mod tests {
         let mut runs = 0;
         let mut go = || {
             runs += 1;
-            let run = root.path().join(format!("run-{runs}"));
-            let stages = Stages::new(&run, &cache, EVERY);
+            let stages = stages_of(root.path(), &format!("run-{runs}"));
             let work = |folder: &Path, _: &mut StateFile| {
                 std::fs::write(folder.join("result"), "what was found").expect("a file");
                 std::fs::write(folder.join("table"), "1,2,3").expect("a file");
@@ -300,8 +301,7 @@ mod tests {
         let inputs = Inputs::new("stage");
         let kept = cache.join(format!("stage-{}", inputs.key()));
         let other = run_folder::take(&kept.with_extension("unfinished")).expect("nobody holds it");
-        let run = root.path().join("run");
-        let stages = Stages::new(&run, &cache, EVERY);
+        let stages = stages_of(root.path(), "run");
         let mut known = Vec::new();
         let mut go = |last: bool| {
             stages.run("1_stage", &inputs, |_, state_file| {
@@ -319,15 +319,14 @@ mod tests {
         drop(other);
         assert!(go(true).is_ok(), "and after");
         assert_eq!(known, [None, Some(7), Some(7)]);
-        assert!(!run.join(UNFINISHED).exists(), "nothing is left of it");
+        assert!(!stages.folder.join(UNFINISHED).exists(), "nothing is left of it");
         assert!(kept.join(DONE).is_file());
     }
 
     #[test]
     fn a_stage_that_fails_is_not_kept() {
         let root = tempfile::tempdir().expect("a temporary folder");
-        let cache = root.path().join("cache");
-        let stages = Stages::new(&root.path().join("run"), &cache, EVERY);
+        let stages = stages_of(root.path(), "run");
         let inputs = Inputs::new("stage");
         let fail = |_: &Path, _: &mut StateFile| Err(Error::Study("no".to_owned()));
         assert!(stages.run("1_stage", &inputs, fail).is_err());

@@ -160,6 +160,7 @@ impl Study for Sensitivity {
         subject(&settings.replay, setup)
     }
 
+    /// Writes `sobol.csv`, `one_at_a_time.csv`, the figures `sobol.svg`, `one_at_a_time.svg` and `bands.svg`, and `report.html`.
     fn report(
         folder: &Path,
         settings: &SensitivitySettings,
@@ -167,7 +168,11 @@ impl Study for Sensitivity {
         outcome: &Outcome,
         summary: &Summary,
     ) -> Result<()> {
-        results::report(folder, settings, setup, outcome, summary)
+        results::write_one_at_a_time(folder, setup, outcome)?;
+        if !outcome.indices.is_empty() {
+            results::write_sobol(folder, summary)?;
+        }
+        page::write(folder, &settings.to_toml(), setup, outcome, summary)
     }
 
     fn text(_: &SensitivitySettings, summary: &Summary) -> String {

@@ -1,7 +1,6 @@
 //! What a sensitivity study leaves behind.
 
 use super::{MOST_SAMPLES, Outcome, SensitivitySettings, SobolIndex};
-use crate::config::settings::Settings;
 use crate::error::Result;
 use crate::report::{BarPanel, Bars, Table};
 use crate::study::framework::RunRecord;
@@ -178,26 +177,7 @@ impl Summary {
     }
 }
 
-/// Writes `summary.json`, `manifest.json`, `study.toml`, `sobol.csv`, `one_at_a_time.csv`, the figures `sobol.svg`,
-/// `one_at_a_time.svg` and `bands.svg`, and `report.html`.
-///
-/// # Errors
-/// [`crate::Error::Io`] if a file cannot be written.
-pub(super) fn report(
-    folder: &Path,
-    settings: &SensitivitySettings,
-    setup: &Setup,
-    outcome: &Outcome,
-    summary: &Summary,
-) -> Result<()> {
-    write_one_at_a_time(folder, setup, outcome)?;
-    if !outcome.indices.is_empty() {
-        write_sobol(folder, summary)?;
-    }
-    super::page::write(folder, &settings.to_toml(), setup, outcome, summary)
-}
-
-fn write_one_at_a_time(folder: &Path, setup: &Setup, outcome: &Outcome) -> Result<()> {
+pub(super) fn write_one_at_a_time(folder: &Path, setup: &Setup, outcome: &Outcome) -> Result<()> {
     let problem = &setup.replay.problem;
     let mut table = Table::rows(&outcome.one_at_a_time)
         .text("parameter", |r| &*problem.variables[r.parameter].name)
@@ -208,7 +188,7 @@ fn write_one_at_a_time(folder: &Path, setup: &Setup, outcome: &Outcome) -> Resul
     table.table().write_csv(folder.join("one_at_a_time.csv"))
 }
 
-fn write_sobol(folder: &Path, summary: &Summary) -> Result<()> {
+pub(super) fn write_sobol(folder: &Path, summary: &Summary) -> Result<()> {
     let all = summary.parameters.iter();
     Table::rows(all.flat_map(|p| p.sobol.iter().map(|(cost, index)| (&*p.name, &**cost, index))))
         .text("parameter", |(name, ..)| *name)
