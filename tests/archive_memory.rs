@@ -55,7 +55,7 @@ fn the_archive_takes_what_is_reckoned() {
     let told = [0, 1].map(|when| curve(PARTICLES, when));
     let before = peak();
     for evaluation in told {
-        swarm.tell(&evaluation);
+        swarm.tell(&evaluation).unwrap();
         assert_eq!(swarm.front().objectives.len(), MEMBERS);
     }
     let taken = peak() - before;

@@ -1,7 +1,7 @@
 //! The grid of settings of a sweep.
 
 use crate::config::{Document, read_text};
-use crate::error::{Error, Place, Result};
+use crate::error::{Error, Result};
 use crate::study::registry::{self, Registered};
 use std::collections::BTreeMap;
 use std::fmt;
