@@ -1,6 +1,6 @@
 //! The folder that a run writes into: one run each, nothing overwritten, one process at a time.
 
-use super::{RunRecord, Subject};
+use super::{Head, RunRecord, Subject};
 use crate::error::{Error, Result};
 use crate::files::{is_temporary, write_whole};
 use serde::Serialize;
@@ -361,38 +361,25 @@ pub struct Manifest<'a> {
     pub program: &'static str,
     /// Its version.
     pub version: &'static str,
-    /// The study.
-    pub study: &'a str,
-    /// Seed of all random numbers.
-    pub seed: u64,
-    /// The log, if one was read.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub log: Option<&'a str>,
-    /// The track, if there is one.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub track: Option<&'a str>,
-    /// The car.
-    pub car: &'a str,
+    /// The study, what it was about and how it ran.
+    #[serde(flatten)]
+    pub head: Head,
     /// The file of resolved settings.
     pub settings: &'a str,
-    /// How the study ran.
-    #[serde(flatten)]
-    pub record: &'a RunRecord,
 }
 
 impl<'a> Manifest<'a> {
     /// The manifest of a study whose settings are in the file `settings`.
-    pub fn new(study: &'a str, subject: &'a Subject, record: &'a RunRecord, settings: &'a str) -> Self {
+    pub fn new(study: &str, subject: &Subject, record: &RunRecord, settings: &'a str) -> Self {
         Self {
             program: "lapswarm",
             version: env!("CARGO_PKG_VERSION"),
-            study,
-            seed: subject.seed,
-            log: subject.log.as_deref(),
-            track: subject.track.as_deref(),
-            car: &subject.car,
+            head: Head {
+                study: study.to_owned(),
+                subject: subject.clone(),
+                record: record.clone(),
+            },
             settings,
-            record,
         }
     }
 }
