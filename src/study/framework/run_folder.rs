@@ -93,12 +93,8 @@ impl RunFolder {
                 // Not every system lets a locked file be read.
                 let _ = lock.read_to_string(&mut owner);
                 let found = format!("a folder that process {} writes into", owner.trim());
-                return Err(Error::input(
-                    path,
-                    "--out",
-                    found,
-                    "one that no run is at work in",
-                ));
+                let expected = "one that no run is at work in";
+                return Err(Error::input(path, "--out", found, expected));
             }
             // A file system without locks: what a run leaves behind still keeps others out.
             Err(TryLockError::Error(e)) if e.kind() == std::io::ErrorKind::Unsupported => {}
@@ -171,23 +167,18 @@ fn check_free(folder: &Path) -> Result<()> {
             Err(Error::io(folder, "read", e))
         }
         _ if folder.is_file() || holds_something(folder) => Err(taken(folder)),
-        _ if folder.is_symlink() && !folder.exists() => Err(Error::input(
-            folder,
-            "--out",
-            "a link to nowhere",
-            "a new or empty folder",
-        )),
+        _ if folder.is_symlink() && !folder.exists() => {
+            let expected = "a new or empty folder";
+            Err(Error::input(folder, "--out", "a link to nowhere", expected))
+        }
         _ => Ok(()),
     }
 }
 
 fn taken(folder: &Path) -> Error {
-    Error::input(
-        folder,
-        "--out",
-        "a folder that holds another run, or a file",
-        "a new or empty folder: nothing is overwritten",
-    )
+    let found = "a folder that holds another run, or a file";
+    let expected = "a new or empty folder: nothing is overwritten";
+    Error::input(folder, "--out", found, expected)
 }
 
 fn holds_more_than(folder: &Path, names: &[&str]) -> bool {

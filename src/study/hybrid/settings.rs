@@ -230,12 +230,10 @@ fn read_scenario(name: &str, row: &Table<'_>) -> Result<Scenario> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::settings::Settings;
+    use crate::config::settings::testing::{assert_refused, assert_repeated};
 
     #[test]
     fn a_study_file_repeats_its_study() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("study.toml");
         let own = Scenario {
             name: "own one".to_owned(),
             mode: Mode::Additional,
@@ -244,23 +242,19 @@ mod tests {
                 ..Gates::OPEN
             },
         };
-        let settings = HybridStudySettings {
+        assert_repeated(&HybridStudySettings {
             scenarios: vec![own],
             objectives: vec![HybridObjective::Fuel, HybridObjective::SocSwing],
             free: FreePart::Both,
             energy_mj: Some(2.5),
             stint_laps: 3,
             ..HybridStudySettings::default()
-        };
-        std::fs::write(&path, settings.to_toml()).unwrap();
-        assert_eq!(HybridStudySettings::read(&path).unwrap(), settings);
+        });
     }
 
     #[test]
     fn mistakes_are_named() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("study.toml");
-        for (text, wanted) in [
+        assert_refused::<HybridStudySettings>(&[
             ("sections = 3", "sections"),
             ("objectives = [\"speed\"]", "objectives"),
             ("free = \"car\"", "free"),
@@ -277,10 +271,6 @@ mod tests {
             ("[scenarios.swarm]\n", "differs from `swarm`"),
             ("[scenarios.\"engine-alone\"]\n", "differs from `engine alone`"),
             (&format!("[scenarios.{}]\n", "n".repeat(300)), "at most 120 bytes"),
-        ] {
-            std::fs::write(&path, text).unwrap();
-            let error = HybridStudySettings::read(&path).unwrap_err().to_string();
-            assert!(error.contains(wanted), "{error} should say {wanted}");
-        }
+        ]);
     }
 }

@@ -142,8 +142,15 @@ impl Study for Raceline {
 
     /// Lines that leave the road are no failure: they are the best through the cross-sections that were asked for.
     fn warnings(summary: &Summary) -> Vec<String> {
+        let said = || {
+            format!(
+                "the best line by {} leaves the road between the cross-sections: {} are too few, ask for more --sections",
+                summary.off_road.join(", "),
+                summary.sections
+            )
+        };
         let off = !summary.off_road.is_empty();
-        off.then(|| summary.off_road_text()).into_iter().collect()
+        off.then(said).into_iter().collect()
     }
 
     fn check(path: &Path) -> Result<String> {

@@ -177,15 +177,6 @@ fn warnings(outcome: &Outcome) -> Vec<String> {
 const CLOSE_M: f64 = 0.1;
 
 impl Summary {
-    /// What there is to say of best lines that leave the road, and what to do about it.
-    pub fn off_road_text(&self) -> String {
-        format!(
-            "the best line by {} leaves the road between the cross-sections: {} are too few, ask for more --sections",
-            self.off_road.join(", "),
-            self.sections
-        )
-    }
-
     /// The figures in words.
     pub fn to_text(&self) -> String {
         let record = &self.head.record;

@@ -29,29 +29,21 @@ pub(super) struct WholeLineState {
 
 impl WholeLineState {
     fn new(settings: &RacelineSettings, problem: &LineProblem) -> Result<Self> {
-        let swarm = match settings.algorithm {
-            LineAlgorithm::Cooperative => {
-                let usual = CooperativeSettings::default();
-                let groups = settings.groups.min(problem.dimensions());
-                // The groups take turns, and each has the iterations that are asked for.
-                let motion = PsoSettings {
-                    population: settings.population,
-                    iterations: settings.iterations.saturating_mul(groups),
-                    seed: settings.seed,
-                    ..usual.motion
-                };
-                let settings = CooperativeSettings { motion, groups };
-                WholeLineSwarm::Cooperative(Box::new(CooperativeSwarm::new(&problem.problem, settings)?))
-            }
-            LineAlgorithm::Windows | LineAlgorithm::Thesis => {
-                let motion = PsoSettings {
-                    population: settings.population,
-                    iterations: settings.iterations,
-                    seed: settings.seed,
-                    ..PsoSettings::thesis()
-                };
-                WholeLineSwarm::Thesis(Box::new(Pso::new(&problem.problem, motion)?))
-            }
+        let sized = |motion: PsoSettings, turns: usize| PsoSettings {
+            population: settings.population,
+            iterations: settings.iterations.saturating_mul(turns),
+            seed: settings.seed,
+            ..motion
+        };
+        let swarm = if settings.algorithm == LineAlgorithm::Cooperative {
+            // The groups take turns, and each has the iterations that are asked for.
+            let groups = settings.groups.min(problem.dimensions());
+            let motion = sized(CooperativeSettings::default().motion, groups);
+            let settings = CooperativeSettings { motion, groups };
+            WholeLineSwarm::Cooperative(Box::new(CooperativeSwarm::new(&problem.problem, settings)?))
+        } else {
+            let motion = sized(PsoSettings::thesis(), 1);
+            WholeLineSwarm::Thesis(Box::new(Pso::new(&problem.problem, motion)?))
         };
         Ok(Self {
             swarm,
