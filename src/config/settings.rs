@@ -556,3 +556,29 @@ pub(crate) use settings;
 pub(crate) const fn key_of(names: &[&'static str]) -> &'static str {
     names[names.len() - 1]
 }
+
+/// What the tests of every study's settings share.
+#[cfg(test)]
+pub(crate) mod testing {
+    use super::Settings;
+    use std::fmt::Debug;
+
+    /// A study file of these settings says them again.
+    pub(crate) fn assert_repeated<S: Settings + Debug>(settings: &S) {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("study.toml");
+        std::fs::write(&path, settings.to_toml()).expect("a file");
+        assert_eq!(S::read(&path).expect("settings"), *settings);
+    }
+
+    /// Each of these study files is refused in words that say so.
+    pub(crate) fn assert_refused<S: Settings + Debug>(cases: &[(&str, &str)]) {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("study.toml");
+        for (text, wanted) in cases {
+            std::fs::write(&path, text).expect("a file");
+            let error = S::read(&path).expect_err("a mistake").to_string();
+            assert!(error.contains(wanted), "{error} should say {wanted}");
+        }
+    }
+}

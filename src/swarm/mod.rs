@@ -247,7 +247,7 @@ impl Front {
 }
 
 /// What an observer of a run sees after each iteration.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Progress {
     /// Iterations done.
     pub iteration: usize,

@@ -125,7 +125,7 @@ fn the_populations_ridge_is_that_of_the_curves() {
         let prepared = Prepared { car, speeds };
         let solved = || solve_unwatched::<EnvelopeStudy>(&settings, &prepared).expect("a surface");
         let found = solved();
-        let (limits, surface) = (found.limits, found.surface.expect("a surface"));
+        let (limits, surface) = (found.limits, found.surface);
         let summary = &surface.summary;
         assert_eq!(found.record.evaluations, 96 * limits.speeds.len() as u64);
         assert!(summary.ridge_agrees, "{summary:?}\n{:#?}", surface.ridge);
@@ -140,7 +140,7 @@ fn the_populations_ridge_is_that_of_the_curves() {
             let known = along.map(|t| t.ay_mps2).fold(0.0, f64::max);
             assert!(exact >= known - 1e-9 && exact < 1.01 * known, "{exact} {known}");
         }
-        let again = solved().surface.expect("a surface");
+        let again = solved().surface;
         assert_eq!(again.figures.map(bits), surface.figures.map(bits));
     }
 }

@@ -16,12 +16,13 @@ pub use results::EnvelopeSummary;
 use crate::config::kinds::{choice, count, name_or_file, number, optional, text};
 use crate::config::settings::{Settings, settings};
 use crate::error::{Error, Result};
-use crate::evaluate::{BackendChoice, BackendInfo};
+use crate::evaluate::BackendChoice;
 use crate::study::framework::journal::Journal;
 use crate::study::framework::memory::{ANSWER, Kept};
-use crate::study::framework::{Plan, RunRecord, Study, Subject, Watch, Work};
+use crate::study::framework::{Plan, RunRecord, Study, Subject, Work};
 use crate::vehicle::{Car, Envelope, EnvelopeRow, Trim, Turn, steady_car};
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 use std::path::Path;
 
 /// The study.
@@ -70,8 +71,8 @@ pub struct Prepared {
 pub struct Outcome {
     /// The limits.
     pub limits: CarLimits,
-    /// The surface of lateral acceleration, if it was asked for.
-    pub surface: Option<SteadySurface>,
+    /// The surface of lateral acceleration.
+    pub surface: SteadySurface,
     /// How the study ran; candidates are those of the surface.
     pub record: RunRecord,
 }
@@ -125,8 +126,8 @@ impl Study for EnvelopeStudy {
         &outcome.record
     }
 
-    fn summarise(_: &EnvelopeSettings, prepared: &Prepared, outcome: &Outcome) -> EnvelopeSummary {
-        results::summarise(&prepared.car.name, outcome)
+    fn summarise(settings: &EnvelopeSettings, prepared: &Prepared, outcome: &Outcome) -> EnvelopeSummary {
+        results::summarise(Self::head(settings, prepared, outcome), outcome)
     }
 
     fn subject(_: &EnvelopeSettings, prepared: &Prepared) -> Subject {
@@ -164,22 +165,6 @@ impl EnvelopeSettings {
     }
 }
 
-/// The limits without the surface.
-///
-/// # Errors
-/// As [`car_limits`].
-pub fn limits_alone(settings: &EnvelopeSettings, prepared: &Prepared) -> Result<Outcome> {
-    let watch = Watch::begin();
-    let limits = car_limits(&prepared.car, settings)?;
-    let mut record = RunRecord::of(&BackendInfo::reference());
-    record.elapsed_s = watch.elapsed_s();
-    Ok(Outcome {
-        limits,
-        surface: None,
-        record,
-    })
-}
-
 /// What the car does at one speed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SpeedLimits {
@@ -196,13 +181,13 @@ pub struct SpeedLimits {
 }
 
 /// How the car steers at small lateral acceleration (R. Gillespie, *Fundamentals of Vehicle Dynamics*, 1992, ch. 6).
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Handling {
-    /// Steering at the wheels beyond what geometry asks for, over lateral acceleration (rad s^2/m); positive
+    /// Steering at the wheels beyond what geometry asks for, over lateral acceleration (deg per g); positive
     /// understeers.
-    pub understeer_gradient: f64,
+    pub understeer_gradient_deg_per_g: f64,
     /// `K` in `steer = L kappa (1 + K v^2)` (s^2/m^2).
-    pub stability_factor: f64,
+    pub stability_factor_s2_per_m2: f64,
     /// Speed at which an understeering car answers most to the steering wheel (m/s).
     pub characteristic_speed_mps: Option<f64>,
     /// Speed at which an oversteering car becomes unstable (m/s).
@@ -342,6 +327,8 @@ fn engine_of(car: &Car) -> Result<impl Fn(f64) -> f64 + Sync> {
 /// The slope of steering over lateral acceleration, between the two steady states nearest to 0 and 2 m/s^2: small
 /// against any tyre's limit, large against rounding.
 fn handling(limits: &SpeedLimits, wheelbase: f64) -> Handling {
+    /// Standard gravity (m/s^2).
+    const G: f64 = 9.806_65;
     let first = limits.cornering.first();
     let second = limits
         .cornering
@@ -356,8 +343,8 @@ fn handling(limits: &SpeedLimits, wheelbase: f64) -> Handling {
     let understeer_gradient = slope - wheelbase / v.powi(2);
     let stability_factor = understeer_gradient / wheelbase;
     Handling {
-        understeer_gradient,
-        stability_factor,
+        understeer_gradient_deg_per_g: understeer_gradient.to_degrees() * G,
+        stability_factor_s2_per_m2: stability_factor,
         characteristic_speed_mps: (stability_factor > 0.0).then(|| stability_factor.recip().sqrt()),
         critical_speed_mps: (stability_factor < 0.0).then(|| (-stability_factor).recip().sqrt()),
     }
@@ -387,7 +374,7 @@ mod tests {
                 .iter()
                 .all(|s| s.row.ax_drive_mps2 <= s.traction_mps2)
         );
-        assert!(limits.handling.stability_factor.abs() < 0.01);
+        assert!(limits.handling.stability_factor_s2_per_m2.abs() < 0.01);
     }
 
     #[test]

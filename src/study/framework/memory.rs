@@ -131,39 +131,8 @@ pub struct Size {
 }
 
 impl Size {
-    /// As [`check`] of all that the study keeps.
-    ///
-    /// # Errors
-    /// As [`check`].
-    pub fn check(&self, limit_mib: u64) -> Result<Allowance> {
-        check(&self.kept(), limit_mib)
-    }
-
-    /// As [`needed_mib`] of all that the study keeps.
-    pub fn needed_mib(&self) -> u64 {
-        needed_mib(&self.kept())
-    }
-
-    /// As [`check`] of all that studies keep which run at the same time.
-    ///
-    /// # Errors
-    /// As [`check`].
-    pub fn check_together(sizes: &[Self], limit_mib: u64) -> Result<Allowance> {
-        check(&Self::kept_together(sizes), limit_mib)
-    }
-
-    /// How many of the studies, from the first on, may run at the same time; the first in any case.
-    pub fn together(sizes: &[Self], limit_mib: u64) -> usize {
-        let fit = |count: &usize| needed(&Self::kept_together(&sizes[..*count])) <= bytes_of(limit_mib);
-        (2..=sizes.len()).take_while(fit).last().unwrap_or(1)
-    }
-
-    fn kept_together(sizes: &[Self]) -> Vec<Kept> {
-        sizes.iter().flat_map(Self::kept).collect()
-    }
-
     /// What the study keeps many of.
-    pub fn kept(&self) -> [Kept; 5] {
+    pub fn kept(&self) -> Vec<Kept> {
         let particle = (self.variables as u64)
             .saturating_mul(8 * COPIES)
             .saturating_add(PARTICLE);
@@ -182,7 +151,7 @@ impl Size {
             count: count as u64,
             each,
         };
-        [
+        vec![
             kept("population", self.population, particle),
             kept("archive", self.archive, member),
             kept("iterations", self.iterations, ITERATION.saturating_add(answers)),
@@ -206,6 +175,10 @@ mod tests {
             .expect("a figure")
     }
 
+    fn checked(size: Size, limit_mib: u64) -> Result<Allowance> {
+        check(&size.kept(), limit_mib)
+    }
+
     #[test]
     fn what_is_said_to_fit_does() {
         let size = |population| Size {
@@ -215,19 +188,19 @@ mod tests {
             archive: 100,
             ..Size::default()
         };
-        drop(size(100_000).check(USUAL_MIB).expect("it fits"));
-        let fitting = said_to_fit(size(1_000_000_000).check(USUAL_MIB));
-        drop(size(fitting).check(USUAL_MIB).expect("as was said"));
-        assert!(size(fitting + 1).check(USUAL_MIB).is_err());
-        assert_eq!(size(fitting).needed_mib(), USUAL_MIB);
-        assert!(size(fitting + 1).needed_mib() > USUAL_MIB);
+        drop(checked(size(100_000), USUAL_MIB).expect("it fits"));
+        let fitting = said_to_fit(checked(size(1_000_000_000), USUAL_MIB));
+        drop(checked(size(fitting), USUAL_MIB).expect("as was said"));
+        assert!(checked(size(fitting + 1), USUAL_MIB).is_err());
+        assert_eq!(needed_mib(&size(fitting).kept()), USUAL_MIB);
+        assert!(needed_mib(&size(fitting + 1).kept()) > USUAL_MIB);
         let absurd = Size {
             population: usize::MAX,
             sections: usize::MAX,
             journal: true,
             ..size(usize::MAX)
         };
-        assert_eq!(absurd.check(1).expect_err("no overflow").exit_code(), 2);
+        assert_eq!(checked(absurd, 1).expect_err("no overflow").exit_code(), 2);
     }
 
     #[test]
@@ -238,19 +211,16 @@ mod tests {
             iterations: 1500,
             ..Size::default()
         };
-        let sizes = [size; 8];
+        let together = |count: u64| -> Vec<Kept> { (0..count).flat_map(|_| size.kept()).collect() };
         let alone: u64 = size.kept().iter().map(Kept::bytes).sum();
         for count in 1..=8u64 {
             let limit_mib = (count * alone + LEAST).div_ceil(1 << 20);
             // Rounded up to whole MiB there is not room for another.
             assert!(alone > 1 << 20);
-            assert_eq!(Size::together(&sizes, limit_mib) as u64, count);
-            drop(Size::check_together(&sizes[..count as usize], limit_mib).expect("they fit"));
-            if count < 8 {
-                assert!(Size::check_together(&sizes[..=count as usize], limit_mib).is_err());
-            }
+            assert!(fits(&together(count), limit_mib) && !fits(&together(count + 1), limit_mib));
+            drop(check(&together(count), limit_mib).expect("they fit"));
+            assert!(check(&together(count + 1), limit_mib).is_err());
         }
-        assert_eq!(Size::together(&sizes, 1), 1, "the first is refused by itself");
     }
 
     #[test]
@@ -261,10 +231,10 @@ mod tests {
             samples,
             ..Size::default()
         };
-        drop(size(0).check(64).expect("without a log it fits"));
-        let fitting = said_to_fit(size(10_000_000).check(64));
-        drop(size(fitting).check(64).expect("as was said"));
-        assert!(size(fitting + 1).check(64).is_err());
+        drop(checked(size(0), 64).expect("without a log it fits"));
+        let fitting = said_to_fit(checked(size(10_000_000), 64));
+        drop(checked(size(fitting), 64).expect("as was said"));
+        assert!(checked(size(fitting + 1), 64).is_err());
     }
 
     #[test]
@@ -276,15 +246,11 @@ mod tests {
             journal,
             ..Size::default()
         };
-        drop(
-            size(10_000, false)
-                .check(1024)
-                .expect("without a journal it fits"),
-        );
-        let fitting = said_to_fit(size(10_000, true).check(1024));
+        drop(checked(size(10_000, false), 1024).expect("without a journal it fits"));
+        let fitting = said_to_fit(checked(size(10_000, true), 1024));
         // 144 bytes to each of a thousand answers.
         assert!((7000..7500).contains(&fitting), "{fitting}");
-        drop(size(fitting, true).check(1024).expect("as was said"));
-        assert!(size(fitting + 1, true).check(1024).is_err());
+        drop(checked(size(fitting, true), 1024).expect("as was said"));
+        assert!(checked(size(fitting + 1, true), 1024).is_err());
     }
 }

@@ -30,13 +30,7 @@ pub struct StateFile {
 impl StateFile {
     /// Saves into a run folder, every five seconds.
     pub fn new(folder: &Path) -> Self {
-        Self {
-            path: Some(folder.join(STATE)),
-            interval: INTERVAL,
-            last: Instant::now(),
-            took: Duration::ZERO,
-            may_move: false,
-        }
+        Self::at(folder.join(STATE))
     }
 
     /// Saves into a file, every five seconds.
@@ -173,7 +167,7 @@ impl StateFile {
 }
 
 /// What a state was reached with. Only the same may resume it, or the end would be another.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Origin {
     /// A sum over what the study has read.
     pub inputs: String,

@@ -59,7 +59,7 @@ impl Study for Identify {
     fn size(settings: &IdentifySettings, prepared: Option<&Setup>) -> Vec<Kept> {
         let samples = prepared.map_or(0, |setup| setup.log.samples());
         let size = settings.size();
-        Size { samples, ..size }.kept().to_vec()
+        Size { samples, ..size }.kept()
     }
 
     fn plan(settings: &IdentifySettings, setup: &Setup, plan: Plan) -> Result<Plan> {
