@@ -5,7 +5,9 @@ use crate::common::{Random, bundled_car, linear_car};
 use lapswarm::evaluate::steady::kernel::Settling;
 use lapswarm::evaluate::steady::{CpuSteadyEvaluator, SETTLED, SteadyObjective, SteadyProblem};
 use lapswarm::evaluate::{BackendChoice, Failure};
-use lapswarm::study::envelope::{EnvelopeSettings, EnvelopeStudy, Prepared, speeds_of};
+use lapswarm::study::envelope::{
+    EnvelopeSettings, EnvelopeStudy, Prepared, SpeedLimits, car_limits, speeds_of,
+};
 use lapswarm::study::framework::solve_unwatched;
 use lapswarm::vehicle::{Car, Turn, Tyres, steady_car};
 
@@ -164,4 +166,50 @@ fn what_cannot_be_asked_is_refused() {
     let problem = on_circles(bundled_car());
     let found = CpuSteadyEvaluator::new(&problem).outcomes(&[&[f64::NAN, 0.0]]);
     assert_eq!(found[0], Err(Failure::NotFinite));
+}
+
+#[test]
+fn limits_hold_for_turns_to_both_sides() {
+    let limits_of = |share: f64| {
+        let mut car = bundled_car();
+        (car.chassis.left_share_front, car.chassis.left_share_rear) = (share, share);
+        let settings = EnvelopeSettings {
+            step_mps: 15.0,
+            ..EnvelopeSettings::default()
+        };
+        car_limits(&car, &settings).expect("a car that corners").speeds
+    };
+    let left = |s: &SpeedLimits| s.cornering.iter().map(|t| t.ay_mps2).fold(0.0, f64::max);
+    let (light, heavy, even) = (limits_of(0.4), limits_of(0.6), limits_of(0.5));
+    for ((light, heavy), even) in light.iter().zip(&heavy).zip(&even) {
+        // The one car is the other's mirror image. Both curves are followed in the same steps.
+        assert!((left(light) / heavy.right_mps2 - 1.0).abs() < 1e-6, "{light:?}");
+        assert!((light.right_mps2 / left(heavy) - 1.0).abs() < 1e-6, "{light:?}");
+        // The side that carries less to begin with is the outer one where the car corners best.
+        assert!((left(light) - light.right_mps2).abs() > 0.1, "{light:?}");
+        assert_eq!(light.row.ay_mps2, left(light).min(light.right_mps2));
+        assert_eq!((even.row.ay_mps2, even.right_mps2), (left(even), left(even)));
+    }
+}
+
+#[test]
+fn speeds_without_a_steady_state_are_left_out() {
+    // Nearly all the grip in front and no understeer from the tyres: beyond its critical speed the car has no steady bend.
+    let mut car = bundled_car();
+    (car.chassis.cg_to_front, car.chassis.cg_to_rear) = (2.2, 0.4);
+    car.chassis.aero_balance_front = 0.7;
+    let found = car_limits(&car, &EnvelopeSettings::default());
+    match found {
+        Ok(limits) => {
+            let rows = limits.envelope.rows();
+            assert!(rows.iter().all(|row| row.ay_mps2 > 0.0 && row.ax_grip_mps2 > 0.0));
+            assert!(
+                limits
+                    .left_out_mps
+                    .iter()
+                    .all(|v| rows.iter().all(|row| row.v_mps != *v))
+            );
+        }
+        Err(error) => assert!(error.to_string().contains("no steady state in bends"), "{error}"),
+    }
 }

@@ -8,7 +8,7 @@ use lapswarm::study::identify::{
     Algorithm, FreeParameter, Identify, IdentifySettings, Setup, judge, lap_format, polish, set_up,
     total_parameter_error,
 };
-use lapswarm::telemetry::write_native;
+use lapswarm::telemetry::{Log, write_native};
 use lapswarm::track::Circuit;
 use lapswarm::vehicle::Car;
 use std::path::Path;
@@ -186,6 +186,36 @@ fn a_car_without_camber_cannot_reveal_rvy3() {
         .collect();
     assert_eq!(blind, ["rVy3"]);
     assert_eq!(*verdict.singular_values.last().unwrap(), 0.0);
+}
+
+#[test]
+fn a_log_of_any_rate_is_of_the_lap_that_was_driven() {
+    let (car, circuit) = (Car::bundled().unwrap(), Circuit::silverstone_gp().unwrap());
+    let logged = |rate_hz: f64, substeps: Option<usize>| {
+        let mut settings = SimulateSettings {
+            rate_hz,
+            substeps,
+            ..SimulateSettings::default()
+        };
+        settings.driver.pace = 0.6;
+        simulate_lap(&car, &circuit, &settings)
+    };
+    let greatest = |log: &Log| log.ay_mps2.iter().fold(0.0f64, |most, ay| most.max(ay.abs()));
+    let fine = greatest(&logged(100.0, None).unwrap().log);
+    // Samples 0.04 s and 0.1 s apart miss a peak that lasts half a second by a few percent.
+    for rate_hz in [25.0, 10.0] {
+        let coarse = greatest(&logged(rate_hz, None).unwrap().log);
+        assert!(
+            (coarse / fine - 1.0).abs() < 0.05,
+            "{rate_hz} Hz: {coarse} of {fine}"
+        );
+    }
+    // One step per sample is too long for the car's modes at 25 Hz.
+    let lost = logged(25.0, Some(1)).unwrap_err().to_string();
+    assert!(
+        lost.contains("leaves the lap") || lost.contains("is lost"),
+        "{lost}"
+    );
 }
 
 #[test]

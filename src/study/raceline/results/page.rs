@@ -3,8 +3,8 @@
 use super::{LineFigures, Summary, reported_lines};
 use crate::config::settings::Settings;
 use crate::error::Result;
-use crate::evaluate::line::open_line_evaluator;
 use crate::evaluate::BackendChoice;
+use crate::evaluate::line::open_line_evaluator;
 use crate::files::stem;
 use crate::line::Parametrisation;
 use crate::report::{
