@@ -169,13 +169,27 @@ fn guess(path: &Path) -> Result<Kind> {
         if has(&["study", "base"]) {
             return Ok(Kind::File(&SWEEP));
         }
-        // The study that knows most of the file's keys; of several the one with the fewest others.
-        let others = |study: &&&'static dyn Registered| {
+        // The study that knows most of the file's keys; of several the first in this order.
+        const ORDER: [&str; 8] = [
+            "identify",
+            "raceline",
+            "hybrid",
+            "surface",
+            "sensitivity",
+            "run",
+            "transient",
+            "envelope",
+        ];
+        let rank = |study: &&&'static dyn Registered| {
             let declared = study.declared();
             let known = |key: &&String| declared.iter().any(|d| d.table().unwrap_or(d.key) == **key);
-            (Reverse(keys.iter().filter(known).count()), declared.len())
+            let place = ORDER.iter().position(|name| *name == study.name());
+            (
+                Reverse(keys.iter().filter(known).count()),
+                place.unwrap_or(ORDER.len()),
+            )
         };
-        if let Some(study) = STUDIES.iter().min_by_key(others) {
+        if let Some(study) = STUDIES.iter().min_by_key(rank) {
             return Ok(Kind::Study(*study));
         }
     }

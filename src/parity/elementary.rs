@@ -30,7 +30,8 @@ impl Function {
     const fn new(
         name: &'static str,
         reach: f64,
-        (scalar, reference): (fn(f32) -> f32, fn(f64) -> f64),
+        scalar: fn(f32) -> f32,
+        reference: fn(f64) -> f64,
         floor: f64,
         own_ulp: f64,
     ) -> Self {
@@ -55,13 +56,13 @@ fn cos_pi(x: f64) -> f64 {
 
 /// All of them.
 pub const FUNCTIONS: [Function; 7] = [
-    Function::new("sin", 40.0, (elementary::sin, f64::sin), 1e-2, 3.0),
-    Function::new("cos", 40.0, (elementary::cos, f64::cos), 1e-2, 3.0),
-    Function::new("tan", 1.2, (elementary::tan, f64::tan), 1e-4, 4.0),
-    Function::new("atan", 50.0, (elementary::atan, f64::atan), 1e-30, 3.0),
-    Function::new("exp", 20.0, (elementary::exp, f64::exp), 1e-30, 2.5),
-    Function::new("sin_pi", 12.0, (elementary::sin_pi, sin_pi), 1e-2, 4.0),
-    Function::new("cos_pi", 12.0, (elementary::cos_pi, cos_pi), 1e-2, 4.0),
+    Function::new("sin", 40.0, elementary::sin, f64::sin, 1e-2, 3.0),
+    Function::new("cos", 40.0, elementary::cos, f64::cos, 1e-2, 3.0),
+    Function::new("tan", 1.2, elementary::tan, f64::tan, 1e-4, 4.0),
+    Function::new("atan", 50.0, elementary::atan, f64::atan, 1e-30, 3.0),
+    Function::new("exp", 20.0, elementary::exp, f64::exp, 1e-30, 2.5),
+    Function::new("sin_pi", 12.0, elementary::sin_pi, sin_pi, 1e-2, 4.0),
+    Function::new("cos_pi", 12.0, elementary::cos_pi, cos_pi, 1e-2, 4.0),
 ];
 
 /// More that a device may be off that rounds otherwise, in ULP: each of the dozen operations of the longest function

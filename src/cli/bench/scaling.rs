@@ -121,8 +121,11 @@ struct Case<K> {
     operations: u64,
 }
 
+/// Measures a problem.
+type Measure = fn(&mut Bench<'_>) -> Result<()>;
+
 /// The problems, by name.
-const PROBLEMS: &[(&str, fn(&mut Bench<'_>) -> Result<()>)] = &[
+const PROBLEMS: &[(&str, Measure)] = &[
     ("replay", |bench| bench.measure_all("replay", &replay()?)),
     ("line", |bench| bench.measure_all("line", &line()?)),
     ("drive", |bench| bench.measure_all("drive", &drive()?)),

@@ -60,8 +60,11 @@ pub struct Arguments {
     kept: Kept,
 }
 
+/// Compares the optimisers on a problem.
+type Compare = fn(&Arguments, &mut Table) -> Result<()>;
+
 /// The problems, by name.
-const PROBLEMS: [(&str, fn(&Arguments, &mut Table) -> Result<()>); 2] = [
+const PROBLEMS: [(&str, Compare); 2] = [
     ("identify", |arguments, table| {
         identify(arguments)?.compare(arguments, table)
     }),
