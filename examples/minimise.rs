@@ -27,14 +27,14 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         cigar.stopped
     );
 
-    // Figures of constraints stand behind the objectives: here the volume of a can, less the litre that it must hold.
+    // Figures of constraints stand behind the objectives: here the volume of a can, less the litre that it must
+    // hold to a millilitre.
     let can = minimise_several(&[(0.01, 0.2), (0.01, 0.4)], 1, |x, f| {
         let (radius, height) = (x[0], x[1]);
         f[0] = 2.0 * PI * radius * (radius + height);
         f[1] = PI * radius * radius * height - 1e-3;
     })
-    .constraints(vec![Constraint::zero_within(1e-9).in_units_of(1e-3)])
-    .evaluations(40_000)
+    .constraints(vec![Constraint::zero_within(1e-6).in_units_of(1e-3)])
     .run()?;
     let (x, sheet_m2) = can.best().ok_or("every candidate failed")?;
     println!(
