@@ -9,7 +9,9 @@ use lapswarm::evaluate::{Evaluation, Evaluator};
 use lapswarm::random::Random;
 use lapswarm::swarm::metrics::{contributions, hypervolume, non_dominated, ranks};
 use lapswarm::swarm::problems::{SimdTestEvaluator, TestProblem};
-use lapswarm::swarm::{Mopso, MopsoSettings, Nsga2, Nsga2Settings, Optimiser, PsoSettings};
+use lapswarm::swarm::{
+    Archive, Mopso, MopsoSettings, Nsga2, Nsga2Settings, Optimiser, PsoSettings, Truncation,
+};
 use std::time::Duration;
 
 /// Variables of the problems.
@@ -133,6 +135,22 @@ fn metrics(criterion: &mut Criterion) {
         let id = BenchmarkId::new(format!("contributions to a front, {width} objectives"), 100);
         group.bench_function(id, |bencher| {
             bencher.iter(|| contributions(&front, &vec![1.1; width]));
+        });
+    }
+    // One point after the other into an archive: of a front that is a surface, and of one that is nearly a curve.
+    let curve = |point: &Vec<f64>| {
+        let across = (0.5 * (point[0].powi(2) + point[1].powi(2))).sqrt();
+        vec![across, across + 1e-9 * point[0], point[2]]
+    };
+    let surface = sphere(1000, 3);
+    let curve: Vec<Vec<f64>> = surface.iter().map(curve).collect();
+    group.throughput(Throughput::Elements(1000));
+    for (what, front) in [("surface", surface), ("curve", curve)] {
+        group.bench_function(BenchmarkId::new(format!("archive of a {what}"), 100), |bencher| {
+            bencher.iter(|| {
+                let mut archive = Archive::new(100, Truncation::Contribution);
+                front.iter().filter(|row| archive.insert(row, row)).count()
+            });
         });
     }
     group.finish();

@@ -31,9 +31,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             adapter: None,
             known_faults: &[],
         };
-        match search_line(&search, &LineSearchSettings::default(), |_| {
-            ControlFlow::Continue(())
-        }) {
+        let settings = LineSearchSettings::default();
+        match search_line(&search, &settings, None, |_, _, _| Ok(ControlFlow::Continue(()))) {
             Ok(found) => {
                 let device = found.backend.map_or(String::new(), |info| info.device);
                 println!(

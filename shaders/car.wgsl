@@ -148,7 +148,8 @@ fn stage_reach(stage: u32) -> f32 {
     return select(select(0.5, 1.0, stage == 2u), 0.0, stage == 3u);
 }
 
-// `CarState::drives`. A state that is not a number is lost; so says the exponent, whatever a driver thinks of NaN.
+// `CarState::drives`. A state that is not a number is lost. The test reads the exponent, because drivers may assume that there is
+// no NaN.
 fn still_drives(state: CarState) -> bool {
     let b = state.body;
     return abs(b.vy) < b.vx + 3.0

@@ -1,4 +1,4 @@
-// Twin of `src/vehicle/chassis.rs`: the 4DOF body with roll. Units and meanings stand there.
+// Twin of `src/vehicle/chassis.rs`: the 4DOF body with roll. Units and meanings are documented there.
 
 struct Chassis {
     mass: f32,

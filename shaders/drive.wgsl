@@ -1,5 +1,5 @@
-// Twin of `src/drive/kernel.rs`: a driver takes a candidate car round a line, step by step. Its other figures are its line, its
-// plan and its share of the next plan; its state is that of `DriveState::to_array`.
+// Twin of `src/drive/kernel.rs`: a driver takes a candidate car round a line, step by step. The candidate's other figures are its
+// line, its plan and its share of the next plan. Its state is that of `DriveState::to_array`.
 
 const UNDER_WAY: f32 = 0.0;
 const FINISHED: f32 = 1.0;
@@ -36,7 +36,7 @@ fn begin(course: Course, pace: Pace) -> DriveState {
     );
 }
 
-// A car that is lost stays as it was last.
+// A lost car keeps its last state.
 fn drive_step(car: CarModel, course: Course, pace: Pace, number: f32, before: DriveState) -> DriveState {
     var state = before;
     let view = look(course, before.pose);

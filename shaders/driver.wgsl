@@ -22,7 +22,7 @@ struct Driver {
 }
 
 @group(0) @binding(7) var<uniform> driver: Driver;
-// From a speed, the torque there, its rise.
+// Speed at the start of a stretch, torque there, slope.
 @group(0) @binding(8) var<uniform> torque: array<vec4<f32>, STRETCHES>;
 
 fn torque_at(speed: f32) -> f32 {

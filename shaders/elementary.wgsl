@@ -1,13 +1,12 @@
-// Twin of `src/scalar/elementary.rs`: our own sine, cosine, tangent, inverse tangent and
-// exponential, because WGSL only promises 2^-11 for `sin` and `cos` and 4096 ULP for `atan`. Same functions,
-// same order, same operations.
-// Drivers may regroup literals, so no product has more than one.
+// Twin of `src/scalar/elementary.rs`: sine, cosine, tangent, inverse tangent and exponential of known accuracy, because WGSL only
+// promises 2^-11 for `sin` and `cos` and 4096 ULP for `atan`. Same functions, same order, same operations. Drivers may regroup
+// literals, so no product has more than one.
 //
-// They work on four figures side by side, one per wheel: polynomials are long chains of dependent operations, and
-// one chain fills the other's waits, as `Pair` in `src/scalar/pair.rs` has it on the processor. Where two functions of
-// the wheels are wanted at once, `_each` takes them in lockstep, for the same reason; a lone one is half of that, of
-// which every compiler sees that its halves are the same. Compilers put one chain behind the other again to save
-// registers, so the longest polynomials are split by powers of the square as well: their halves wait for nothing.
+// They work on four figures side by side, one per wheel. Polynomials are long chains of dependent operations, and several chains
+// hide each other's latency, as `Pair` in `src/scalar/pair.rs` does on the processor. `_each` computes two functions of the
+// wheels in lockstep for the same reason. A single function is half of that; every compiler sees that both halves are the same.
+// Compilers may serialise the chains to save registers, so the longest polynomials are also split by powers of the square into
+// independent halves.
 
 // Figures of the wheels FL, FR, RL, RR.
 alias Wheels = vec4<f32>;
@@ -31,8 +30,8 @@ fn sec_atan(x: Wheels) -> Wheels {
     return sqrt(1.0 + x * x);
 }
 
-// Added to a whole number below 2^22, leaves that number in the low bits: `WHOLE` in `src/scalar/float.rs`. Cheaper
-// than a conversion to integers, whose range WGSL has to check.
+// Added to a whole number below 2^22, leaves that number in the low bits: `WHOLE` in `src/scalar/float.rs`. This is cheaper than
+// a conversion to integers, whose range WGSL has to check.
 const WHOLE: f32 = 12582912.0;
 const WHOLE_AND_BIAS: f32 = 12583039.0;
 
@@ -165,7 +164,7 @@ fn own_exp(argument: Wheels) -> Wheels {
     return (r * r * p + (r + 1.0)) * two_to_the(n);
 }
 
-// Of one figure; the others are of the wheels.
+// For one figure; the functions above are for four wheels.
 fn own_ln(x: f32) -> f32 {
     let offset = bitcast<u32>(x) - 0x3f3504f3u;
     let exponent = f32(bitcast<i32>(offset) >> 23u);

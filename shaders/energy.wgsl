@@ -1,10 +1,10 @@
 // Twin of `src/line/energy/kernel.rs`: a lap on a line's lengths and curvatures with engine, motor-generators and store.
 //
-// Follows `line.wgsl`, whose course, limits and variables it reads; the strategy's figures are the variables from row
-// STRATEGY on. The constants STRATEGY, ADDITIONAL, COUNTS_CHARGE, FLOWS_AT, BOOSTS_AT and ZONES_AT are generated: where in `energy` the
-// flows, the boosts and the zones begin, after the forces. So is binding 10, `energy`, an array of vectors of four: rows of engine,
-// motor, generator, drag and of their rises; of flows at four loads and of their rises; of the motor, the room for it and of their
-// rises; of each section's zone, position and one over its share.
+// Follows `line.wgsl`, whose course, envelope and variables it reads. The figures of the strategy are the variables from row
+// STRATEGY on. The constants STRATEGY, ADDITIONAL, COUNTS_CHARGE, FLOWS_AT, BOOSTS_AT and ZONES_AT are generated: where in
+// `energy` the flows, the boosts and the zones begin, after the forces. So is binding 10, `energy`, an array of vectors of four:
+// rows of engine, motor, generator, drag and of their rises; of flows at four loads and of their rises; of the motor, the room
+// for it and of their rises; of each section's zone, position and one over its share.
 
 // Twin of `EnergyAccount` in `src/evaluate/energy/gpu.rs`.
 struct EnergyAccount {
@@ -71,7 +71,7 @@ fn gates_open(curvature: f32, speed_squared: f32) -> bool {
     return !(gates.curvature < curvature) && !(gates.speed_squared < speed_squared);
 }
 
-// Less than this stays in the store: rounding would hand it out in ever smaller shares.
+// A remainder below this is left in the store. Rounding would spend it in ever smaller shares.
 const LEAST_J: f32 = 5.0;
 
 fn store_left(state: EnergyState) -> f32 {
@@ -102,7 +102,7 @@ fn additional(section: u32, start: f32, length: f32, here: f32, there: f32, most
     let motor = 0.5 * ((both - engine) + (later_both - min(later.x, later.y)));
     let reached = max(start + length * ((both - first.z) + (later_both - later.z)), 0.0);
     let end = min(reached, most);
-    // Where less is needed than both could give, the motor gives way first.
+    // Where less force is needed than both can give, the motor is reduced first.
     let spare = 0.5 * (reached - end) * inverse;
     return Step(end, max(motor - spare, 0.0));
 }
@@ -173,7 +173,7 @@ fn segment_energy(
     let forces = energy[2u * row] + beyond * energy[2u * row + 1u];
     let inverse = 1.0 / length;
     let ax = 0.5 * (end - start) * inverse;
-    // What the tyres do, forwards or backwards.
+    // The force of the tyres, driving or braking.
     let force = ax + forces.w;
     let demand = max(force, 0.0);
     let shed = max(-force, 0.0);
@@ -213,14 +213,15 @@ fn segment_energy(
     return SegmentEnergy(time, burnt + account.exhaust_cost * harvested_h, deployed, harvested_k, harvested_h);
 }
 
-// Leaves in `speeds_squared` the greatest from which all that follows can be braked for.
+// Fills `speeds_squared` with the greatest speeds squared from which the car can brake for all that follows.
 fn ceilings(candidate: u32) {
     let n = stretch.sections;
     var next = select(n - 1u, stretch.start, CLOSED);
     var curvature = course[place_of(next, candidate)].y;
     var speed_squared = corner(curvature);
     speeds_squared[place_of(next, candidate)] = speed_squared;
-    // The first time round a section is only held to its corner speed; a closed lap goes on until it meets itself.
+    // In the first round a section is limited by its corner speed alone. On a closed line the pass continues until it meets its
+    // own values.
     let steps = select(n - 1u, 2u * n, CLOSED);
     for (var i = 0u; i < steps; i++) {
         let before = select(n - 1u, next - 1u, next > 0u);
@@ -261,7 +262,7 @@ fn energy_lap(candidate: u32) {
     let n = stretch.sections;
     var speed_squared = speeds_squared[place_of(0u, candidate)];
     if CLOSED {
-        // From a slow section late in the lap to the start line, as if the store held enough.
+        // From a slow section late in the lap to the start line, with the store taken as full enough.
         var from_late = speeds_squared[place_of(account.run_in, candidate)];
         var bend = course[place_of(account.run_in, candidate)];
         for (var here = account.run_in; here < n; here++) {
@@ -290,7 +291,8 @@ fn energy_lap(candidate: u32) {
         }
     }
 
-    // The twin takes over what the first drive found wherever this one comes to the same, which changes nothing but the time.
+    // The twin reuses results of the first drive where the second one would give the same. That changes nothing but the time it
+    // takes.
     var state = EnergyState(speed_squared, 0.0, 0.0, 0.0);
     var greatest = 0.0;
     var least = 0.0;

@@ -1,14 +1,14 @@
 // Twin of `src/line/kernel.rs`: from a candidate's variables to the shape of its line and the time of a lap on it.
 //
-// One lane per candidate. Segment lengths, curvatures and speeds squared stand in a buffer, in tiles of TILE lanes: section
-// by section within a tile, so that neighbouring lanes meet in neighbouring memory and so do neighbouring sections. All
-// lanes start a lap's passes at the same section, for the same reason. The constants CLOSED, TERMS, WANTS_INTEGRAL,
-// WANTS_LAP, LIMIT_ROWS, CORNER_ROWS, ELLIPSE_ROWS, WORKGROUP and TILE are generated, and so are the bindings 1 to 4:
-// `sections`; `limits` in rows of lateral, grip, drive, drag at their start and then of their rises; `corners` and
-// `ellipse` in rows of a figure and its rise. All lanes read the same section, so that these are uniform where they fit;
-// limits only where the driver does not mind that lanes read different rows.
+// One lane per candidate. Segment lengths, curvatures and speeds squared stand in a buffer, in tiles of TILE lanes: section by
+// section within a tile, so that neighbouring lanes and neighbouring sections read neighbouring memory. All lanes start a lap's
+// passes at the same section for the same reason. The constants CLOSED, TERMS, WANTS_INTEGRAL, WANTS_LAP, LIMIT_ROWS,
+// CORNER_ROWS, ELLIPSE_ROWS, WORKGROUP and TILE are generated, and so are the bindings 1 to 4: `sections`; `limits` in rows of
+// lateral, grip, drive, drag at their start and then of their rises; `corners` and `ellipse` in rows of a figure and its rise.
+// All lanes read the same section, so these tables are uniform buffers if they fit. The envelope is one only on drivers that let
+// lanes read different rows at full speed.
 
-// What a dispatch is to do; twin of `LineStretch` in `src/evaluate/line/gpu.rs`.
+// The work of a dispatch; twin of `LineStretch` in `src/evaluate/line/gpu.rs`.
 struct LineStretch {
     // One past the last candidate, the distance between rows in the buffers, and the first candidate.
     candidates: u32,
@@ -73,7 +73,7 @@ fn variable(source: u32, candidate: u32) -> f32 {
     return variables[source * stretch.stride + candidate];
 }
 
-// The variables that `alpha` is the sum of at a section.
+// The variables that are summed for `alpha` at a section.
 fn variables_of(section: u32, candidate: u32) -> vec4<f32> {
     var own = vec4<f32>(0.0);
     let sources = sections[section].sources;
@@ -169,7 +169,7 @@ fn corner(curvature: f32) -> f32 {
     return figures.x + (held - f32(row)) * figures.y;
 }
 
-// What is left of the grip lengthways, drive and drag.
+// The longitudinal grip that is left, the drive and the drag.
 fn limits_at(speed_squared: f32, curvature: f32) -> vec3<f32> {
     let held = min(max(speed_squared * stretch.rows_per_speed_squared, 0.0), f32(LIMIT_ROWS));
     let row = min(u32(held), LIMIT_ROWS - 1u);
@@ -221,7 +221,7 @@ fn lap_time(candidate: u32) -> f32 {
         let next = select(0u, here + 1u, here + 1u < n);
         let there = course[place_of(next, candidate)];
         let reached = driven(speed_squared, bend.x, bend.y, there.y);
-        // The first time round a section is only held to its corner speed.
+        // In the first round a section is limited by its corner speed alone.
         let again = i + 1u >= n;
         var most: f32;
         if again {

@@ -1,4 +1,4 @@
-// Between a swarm that lives on the device and the line kernel. Twin of `src/evaluate/line/exchange.rs`. The swarm's rows are in
+// Exchange between a swarm on the device and the line kernel. Twin of `src/evaluate/line/exchange.rs`. The swarm's rows are in
 // blocks of particles, the kernel's in planes of candidates.
 
 struct Exchange {

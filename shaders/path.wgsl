@@ -1,12 +1,12 @@
 // Twin of `src/drive/path.rs`: the path that is followed, in the frame of its samples, and the car's place relative to it.
 // The constants ROWS_AHEAD, CELLS_AHEAD and BLENDS are generated.
 
-// Three vectors for each row of the path: the figures of `PathRow` in its order, and one that says nothing.
+// Three vectors for each row of the path: the figures of `PathRow` in its order, and one without meaning.
 @group(0) @binding(4) var<storage, read> path: array<vec4<f32>>;
 @group(0) @binding(5) var<storage, read> plans: array<f32>;
 @group(0) @binding(6) var<storage, read> courses: array<Course>;
 
-// Of a line as a whole; twin of `Course` in `src/drive/road.rs`.
+// Figures of a whole line; twin of `Course` in `src/drive/road.rs`.
 struct Course {
     path_at: f32,
     rows: f32,
@@ -56,7 +56,7 @@ struct View {
     beyond: f32,
 }
 
-// A place in a table that a whole number counts; reads beyond a table's end are the binding's to prevent.
+// An index of a table, from a whole number. The binding prevents reads beyond the end of the table.
 fn place_of_number(number: f32) -> u32 {
     return u32(min(max(number, 0.0), 16777215.0));
 }
@@ -74,11 +74,12 @@ fn path_row(number: f32) -> PathRow {
     return PathRow(a.x, a.y, a.z, a.w, b.x, b.y, b.z, b.w, c.x, c.y, c.z);
 }
 
-// The path `along` metres behind the sample of `row`: `frame_at` and `resolve` in one, which take sines of the same angles.
+// The path `along` metres behind the sample of `row`: `frame_at` and `resolve` in one, because both take sines of the same
+// angles.
 struct Sight {
     heading: f32,
     curvature: f32,
-    // How far the car is ahead and to the left.
+    // Distance of the car ahead of the path's frame and to its left.
     ahead: f32,
     left: f32,
 }

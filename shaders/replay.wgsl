@@ -1,11 +1,11 @@
 // Twin of `src/evaluate/replay/kernel.rs`: drive a candidate car by the logged inputs and score it.
 //
-// One lane per candidate (x) and window (y). A dispatch drives a stretch of every window, of a multiple of BLOCK
-// samples, and leaves its state in a buffer for the next, so that no dispatch runs long enough for a watchdog to
-// kill it and the sums group as in the twin however the stretches are cut.
+// One lane per candidate (x) and window (y). A dispatch drives a stretch of every window, of a multiple of BLOCK samples, and
+// leaves its state in a buffer for the next, so that no dispatch runs long enough for a watchdog to kill it. The sums are grouped
+// as in the twin, whatever the stretches are.
 //
-// A car comes as the ready figures of `CarModel::to_table`: those that all candidates share from `base`, the others
-// from `figures`, variable by variable. The loaders (`load_chassis`, `load_tyres`) and the constants NORM and WORKGROUP are generated.
+// A car is given by the figures of `CarModel::to_table`: those that all candidates share from `base`, the others from `figures`,
+// variable by variable. The loaders (`load_chassis`, `load_tyres`) and the constants NORM and WORKGROUP are generated.
 
 struct Sample {
     wheel_speed: vec4<f32>,

@@ -1,7 +1,7 @@
-// What the replay kernels share: the orders of a dispatch, where figures stand between dispatches, and how errors
-// join. The constants NORM and WORKGROUP are generated.
+// The parts that the replay kernels share: the work of a dispatch, the layout of figures between dispatches, and the sums of
+// errors. The constants NORM and WORKGROUP are generated.
 
-// What a dispatch is to do; twin of `Stretch` in `src/evaluate/replay/gpu.rs`.
+// The work of a dispatch; twin of `Stretch` in `src/evaluate/replay/gpu.rs`.
 struct Stretch {
     // Candidates in this batch, and the distance between their rows in the buffers.
     candidates: u32,
@@ -18,7 +18,7 @@ struct Stretch {
 
 @group(0) @binding(0) var<uniform> stretch: Stretch;
 
-// Samples that are summed up before they join the total, and likewise windows; twin of `BLOCK`.
+// Number of samples, and of windows, that are summed before they are added to the total; twin of `BLOCK`.
 const BLOCK: u32 = 64u;
 
 fn joined(sum: vec4<f32>, term: vec4<f32>) -> vec4<f32> {

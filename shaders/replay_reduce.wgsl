@@ -1,5 +1,5 @@
-// Joins the windows' errors per candidate: twin of `ReplayProblem::accumulate`, in single precision. Sums are taken
-// in blocks of BLOCK windows, and batches of windows hold whole blocks, so that the batches do not show.
+// Joins the windows' errors per candidate: twin of `ReplayProblem::accumulate`, in single precision. Sums are taken in blocks of
+// BLOCK windows, and batches of windows hold whole blocks, so results do not depend on the batches.
 
 @group(0) @binding(1) var<storage, read> progress: array<f32>;
 // Planes of 4 errors and the drives flag.

@@ -1,5 +1,5 @@
-// Twin of `src/evaluate/steady/kernel.rs`: a car that settles on a circle at a held path speed. Its other figures are its speed
-// and its steering; its state is that of `Settling::to_array`.
+// Twin of `src/evaluate/steady/kernel.rs`: a car that settles on a circle at a constant path speed. The candidate's other figures
+// are speed and steering. Its state is that of `Settling::to_array`.
 
 // Twin of `DevicePlan` in `src/evaluate/steady/gpu.rs`.
 struct SettlePlan {

@@ -2,7 +2,7 @@
 // in blocks: a coordinate of all particles of a block lies in a row, and the coordinates of a block follow one another.
 // With `elementary.wgsl` and `random.wgsl`.
 
-// What is the same for all particles of a generation.
+// Figures that all particles of a generation share.
 struct Generation {
     key: vec2<u32>,
     when: u32,
@@ -44,7 +44,7 @@ const PULLS: u32 = 8u;
 const RECOMBINE: u32 = 9u;
 
 @group(0) @binding(0) var<uniform> generation: Generation;
-// Positions of the archive's members, the one that it would miss most first; then their objectives, three to each.
+// Positions of the archive's members, ordered by their contribution, the greatest first; then their objectives, three to each.
 @group(0) @binding(1) var<storage, read> archive: array<f32>;
 @group(0) @binding(2) var<storage, read_write> position: array<f32>;
 @group(0) @binding(3) var<storage, read_write> velocity: array<f32>;
@@ -97,7 +97,7 @@ fn scatter_one(who: u32) {
     }
 }
 
-// Takes positions for personal bests where their objectives are better; where neither is, by a coin. Then notes the
+// Takes positions for personal bests where their objectives are better; where neither is better, at random. Then notes the
 // particle if no member of the archive dominates or equals it.
 @compute @workgroup_size(BLOCK)
 fn learn(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
@@ -148,7 +148,7 @@ fn advance(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups
     let who = id.y * groups.x * BLOCK + id.x;
     if who >= generation.particles { return; }
     if generation.members == 0u {
-        // Nobody knows anything yet.
+        // The archive is empty: nothing to learn from yet.
         scatter_one(who);
         return;
     }

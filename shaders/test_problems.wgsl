@@ -1,5 +1,6 @@
 // Twin of `src/swarm/problems/zdt.rs`, `dtlz.rs` and `single.rs`: the test problems, one lane to a candidate. `PROBLEM` and
-// `FACTOR` are generated. With `elementary.wgsl`. Drivers move literals to the outside of sums: there they stand here.
+// `FACTOR` are generated. With `elementary.wgsl`. Drivers move literals to the outside of sums, so they are written
+// there.
 
 struct Task {
     candidates: u32,

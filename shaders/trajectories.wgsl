@@ -1,10 +1,10 @@
-// Twin of `src/evaluate/gpu/trajectories.rs`: candidates that are taken on step by step.
+// Twin of `src/evaluate/gpu/trajectories.rs`: candidates that are integrated step by step.
 //
-// One lane per candidate. A dispatch takes some steps and leaves its state in a buffer for the next, so that no dispatch runs
-// long enough for a watchdog to kill it; how the steps are cut does not show. A car comes as in `replay.wgsl`; behind its
-// figures stand the others of its candidate. The loaders and the constants WORKGROUP and VARYING are generated.
+// One lane per candidate. A dispatch computes some steps and leaves its state in a buffer for the next, so that no dispatch runs
+// long enough for a watchdog to kill it. Results do not depend on how the steps are divided. A car is given as in `replay.wgsl`;
+// the other figures of the candidate follow its own. The loaders and the constants WORKGROUP and VARYING are generated.
 
-// What a dispatch is to do.
+// The work of a dispatch.
 struct TrajectoryStretch {
     // Candidates in this batch, and the distance between their rows in the buffers.
     candidates: u32,
@@ -20,7 +20,7 @@ struct TrajectoryStretch {
 // The figures of a state, one plane of candidates each.
 @group(0) @binding(3) var<storage, read_write> progress: array<f32>;
 
-// A figure of the candidate behind those of its car.
+// A figure of the candidate, after those of its car.
 fn other_figure(number: u32, candidate: u32) -> f32 {
     return figures[(VARYING + number) * stretch.stride + candidate];
 }

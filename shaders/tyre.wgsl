@@ -1,5 +1,5 @@
-// Twin of `src/vehicle/tyre/magic_formula.rs`: Magic Formula 5.2 forces and moment, the same functions in the same
-// order. The struct is that of `src/vehicle/tyre/prepared.rs`: the tyre made ready for its axle on the host.
+// Twin of `src/vehicle/tyre/magic_formula.rs`: Magic Formula 5.2 forces and moment, the same functions in the same order. The
+// struct is that of `src/vehicle/tyre/prepared.rs`: the tyre prepared for its axle on the host.
 
 struct MagicFormula {
     inverse_nominal: Wheels,
@@ -92,7 +92,7 @@ alias Tyre = MagicFormula;
 // `LEAST_LOAD` in `src/vehicle/tyre/mod.rs`.
 const LEAST_LOAD: f32 = 1e-3;
 
-// The angle `C atan(B x - E (B x - atan(B x)))`, in half turns, of which a curve is the sine or the cosine.
+// The angle `C atan(B x - E (B x - atan(B x)))`, in half turns. A curve of the formula is its sine or cosine.
 struct Curve {
     c: Wheels,
     b: Wheels,

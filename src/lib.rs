@@ -132,25 +132,38 @@
 //! ```
 
 #![warn(missing_docs, clippy::undocumented_unsafe_blocks)]
+#![cfg_attr(docsrs, feature(doc_cfg))]
+// What parts that are left out would use is not dead.
+#![cfg_attr(not(feature = "cli"), allow(dead_code))]
 
 pub mod config;
+#[cfg(feature = "vehicle")]
 pub mod drive;
 pub mod error;
 pub mod evaluate;
 pub mod files;
 pub mod hold;
+#[cfg(feature = "vehicle")]
 pub mod line;
+#[cfg(feature = "vehicle")]
 pub mod optimum;
+#[cfg(all(feature = "gpu", feature = "studies"))]
 pub mod parity;
 pub mod random;
+#[cfg(feature = "report")]
 pub mod report;
 pub mod scalar;
+#[cfg(feature = "vehicle")]
 pub mod simulate;
+#[cfg(feature = "studies")]
 pub mod study;
 pub mod swarm;
+#[cfg(feature = "vehicle")]
 pub mod telemetry;
+#[cfg(feature = "vehicle")]
 pub mod track;
+#[cfg(feature = "vehicle")]
 pub mod vehicle;
 
-pub use error::{Error, Location, Result};
+pub use error::{Error, Place, Result};
 pub use swarm::{minimise, minimise_batch, minimise_several};

@@ -46,6 +46,14 @@ counted() {
 }
 counted cargo test --release --no-fail-fast -- $ignored
 if [ "$tier" = full ]; then
+    # Features: every set that makes sense builds, and a library of optimisers stays light.
+    for features in '' gpu vehicle vehicle,gpu report studies; do
+        counted cargo clippy --quiet --lib --no-default-features --features "$features" -- -D warnings
+    done
+    crates=$(cargo tree --no-default-features --edges normal,build --no-dedupe --prefix none --format '{p}' | sort -u | wc -l)
+    if [ "$crates" -ge 40 ]; then
+        echo "$crates crates without features, under 40 expected" | tee -a "$results/failed" >&2
+    fi
     # The unsafe code by itself, where it is: seconds.
     counted sh tests/sanitize.sh
     sh tests/soak.sh 60

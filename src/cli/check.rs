@@ -1,10 +1,8 @@
 //! `lapswarm check`: is this file what it should be?
 
 use crate::cli::output::{errln, outln};
-use lapswarm::config::settings::Declared;
 use lapswarm::config::{Document, read_start, read_text};
 use lapswarm::line::read_line;
-use lapswarm::study::framework::memory::USUAL_MIB;
 use lapswarm::study::registry::{self, Registered, STUDIES};
 use lapswarm::study::sweep::{self, SweepSettings};
 use lapswarm::telemetry::{ChannelMap, Log, LogOptions};
@@ -12,6 +10,7 @@ use lapswarm::track::Track;
 use lapswarm::vehicle::tyre::TyreFile;
 use lapswarm::vehicle::{Car, Envelope};
 use lapswarm::{Error, Result};
+use std::cmp::Reverse;
 use std::path::{Path, PathBuf};
 
 /// Flags of `check`.
@@ -31,33 +30,88 @@ pub struct Arguments {
 /// What a file is.
 #[derive(Clone, Copy)]
 enum Kind {
-    Car,
-    Tyre,
-    Track,
-    Log,
-    Envelope,
-    Line,
-    Sweep,
+    File(&'static FileKind),
     Study(&'static dyn Registered),
 }
 
-/// Kinds of files that are no studies', with what messages call them.
-const FILES: [(Kind, &str, &str); 7] = [
-    (Kind::Car, "car", "a car"),
-    (Kind::Tyre, "tyre", "a tyre"),
-    (Kind::Track, "track", "a track"),
-    (Kind::Log, "log", "a log"),
-    (Kind::Envelope, "envelope", "a g-g-v envelope"),
-    (Kind::Line, "line", "a line"),
-    (Kind::Sweep, "sweep", "a sweep"),
-];
+/// Files that are no studies'.
+struct FileKind {
+    name: &'static str,
+    /// What messages call it.
+    words: &'static str,
+    /// Reads it, and says in a line what is in it.
+    read: fn(&Path) -> Result<String>,
+}
+
+const fn file(name: &'static str, words: &'static str, read: fn(&Path) -> Result<String>) -> FileKind {
+    FileKind { name, words, read }
+}
+
+static CAR: FileKind = file("car", "a car", |path| {
+    let car = Car::load(&path.display().to_string())?;
+    let engine = if car.powertrain.is_some() {
+        ""
+    } else {
+        ", no powertrain"
+    };
+    Ok(format!("a car, {}: {} kg{engine}", car.name, car.chassis.mass))
+});
+
+static TYRE: FileKind = file("tyre", "a tyre", |path| {
+    TyreFile::read(path)?;
+    Ok("a tyre".to_owned())
+});
+
+static TRACK: FileKind = file("track", "a track", |path| {
+    let circuit = Track::load(&path.display().to_string())?.circuit()?;
+    let shape = if circuit.closed { "closed" } else { "open" };
+    Ok(format!(
+        "a {shape} track, {}: {:.1} m",
+        circuit.name, circuit.length_m
+    ))
+});
+
+static LOG: FileKind = file("log", "a log", |path| {
+    // As for an identification of the bundled car.
+    let options = LogOptions {
+        rolling_radius_m: Some(Car::bundled()?.chassis.radius_front),
+        ..LogOptions::default()
+    };
+    let log = Log::read(path, &ChannelMap::default(), &options)?;
+    Ok(format!(
+        "a log of {} laps: {} samples at {:.0} Hz",
+        log.laps.len(),
+        log.time_s.len(),
+        1.0 / log.dt_s
+    ))
+});
+
+static ENVELOPE: FileKind = file("envelope", "a g-g-v envelope", |path| {
+    let envelope = Envelope::load(path)?;
+    Ok(format!(
+        "a g-g-v envelope at {} speeds up to {:.1} m/s",
+        envelope.rows().len(),
+        envelope.top_speed_mps()
+    ))
+});
+
+static LINE: FileKind = file("line", "a line", |path| {
+    Ok(format!("a line of {} points", read_line(path)?.len()))
+});
+
+static SWEEP: FileKind = file("sweep", "a sweep", |path| {
+    let planned = sweep::plan(&SweepSettings::load(&path.display().to_string())?)?;
+    Ok(format!("a sweep: {planned}"))
+});
+
+static FILES: [&FileKind; 7] = [&CAR, &TYRE, &TRACK, &LOG, &ENVELOPE, &LINE, &SWEEP];
 
 /// Parses `--kind`.
 fn kind_flag(name: &str) -> Result<Kind, String> {
-    let file = FILES.iter().find(|(_, known, _)| *known == name);
+    let file = FILES.iter().find(|file| file.name == name);
     let study = || registry::named(name).map(Kind::Study);
-    file.map(|(kind, _, _)| *kind).or_else(study).ok_or_else(|| {
-        let files = FILES.iter().map(|(_, name, _)| *name);
+    file.map(|file| Kind::File(file)).or_else(study).ok_or_else(|| {
+        let files = FILES.iter().map(|file| file.name);
         let all: Vec<&str> = files.chain(registry::names()).collect();
         format!("expected one of {}", all.join(", "))
     })
@@ -66,12 +120,18 @@ fn kind_flag(name: &str) -> Result<Kind, String> {
 impl Kind {
     /// What messages call it.
     fn name(self) -> String {
-        if let Self::Study(study) = self {
-            return format!("a study of {}", study.name());
+        match self {
+            Self::File(file) => file.words.to_owned(),
+            Self::Study(study) => format!("a study of {}", study.name()),
         }
-        let same = |kind: &Kind| std::mem::discriminant(kind) == std::mem::discriminant(&self);
-        let found = FILES.iter().find(|(kind, _, _)| same(kind));
-        found.map_or(String::new(), |(_, _, words)| (*words).to_owned())
+    }
+
+    /// Reads a file as what it is, and says in a line what is in it.
+    fn read(self, path: &Path) -> Result<String> {
+        match self {
+            Self::File(file) => (file.read)(path),
+            Self::Study(study) => Ok(format!("{}: {}", self.name(), study.check(path)?)),
+        }
     }
 }
 
@@ -86,9 +146,9 @@ fn guess(path: &Path) -> Result<Kind> {
         .to_string_lossy()
         .to_lowercase();
     match extension.as_str() {
-        "tir" => return Ok(Kind::Tyre),
-        "ld" => return Ok(Kind::Log),
-        "gpx" | "kml" => return Ok(Kind::Track),
+        "tir" => return Ok(Kind::File(&TYRE)),
+        "ld" => return Ok(Kind::File(&LOG)),
+        "gpx" | "kml" => return Ok(Kind::File(&TRACK)),
         _ => {}
     }
     if extension == "toml" {
@@ -98,38 +158,26 @@ fn guess(path: &Path) -> Result<Kind> {
         let has = |names: &[&str]| names.iter().any(|n| keys.iter().any(|k| k == n));
         // A surface's grid is a number.
         if matches!(document.root().table("grid"), Ok(Some(_))) {
-            return Ok(Kind::Sweep);
+            return Ok(Kind::File(&SWEEP));
         }
-        // The study that knows most of the file's keys; of several the first in this order.
-        const ORDER: [&str; 8] = [
-            "identify",
-            "raceline",
-            "hybrid",
-            "surface",
-            "sensitivity",
-            "run",
-            "transient",
-            "envelope",
-        ];
         if has(&["chassis"]) {
-            return Ok(Kind::Car);
+            return Ok(Kind::File(&CAR));
         }
         if has(&["survey", "curvature"]) {
-            return Ok(Kind::Track);
+            return Ok(Kind::File(&TRACK));
         }
         if has(&["study", "base"]) {
-            return Ok(Kind::Sweep);
+            return Ok(Kind::File(&SWEEP));
         }
-        let knows = |study: &&'static dyn Registered| {
+        // The study that knows most of the file's keys; of several the one with the fewest others.
+        let others = |study: &&&'static dyn Registered| {
             let declared = study.declared();
-            let top = |d: &Declared| d.table().unwrap_or(d.key).to_owned();
-            let known: Vec<String> = declared.iter().map(top).collect();
-            keys.iter().filter(|key| known.contains(key)).count()
+            let known = |key: &&String| declared.iter().any(|d| d.table().unwrap_or(d.key) == **key);
+            (Reverse(keys.iter().filter(known).count()), declared.len())
         };
-        let mut studies: Vec<&'static dyn Registered> = STUDIES.to_vec();
-        let place = |name: &str| ORDER.iter().position(|n| *n == name).unwrap_or(ORDER.len());
-        studies.sort_by_key(|study| (std::cmp::Reverse(knows(study)), place(study.name())));
-        return Ok(Kind::Study(studies[0]));
+        if let Some(study) = STUDIES.iter().min_by_key(others) {
+            return Ok(Kind::Study(*study));
+        }
     }
     // A log may be larger than any text, and need not be UTF-8.
     let start = read_start(path, HEAD)?;
@@ -138,66 +186,13 @@ fn guess(path: &Path) -> Result<Kind> {
     let has = |names: &[&str]| names.iter().all(|n| head.contains(n));
     // Speeds and accelerations of a log end like places of a track do.
     Ok(if has(&["v_mps", "ay_mps2"]) {
-        Kind::Envelope
+        Kind::File(&ENVELOPE)
     } else if has(&["station", "alpha"]) {
-        Kind::Line
+        Kind::File(&LINE)
     } else if has(&["x_m", "y_m"]) && !has(&["time_s"]) || has(&["lat", "lon"]) {
-        Kind::Track
+        Kind::File(&TRACK)
     } else {
-        Kind::Log
-    })
-}
-
-/// Reads a file as what it is, and says in a line what is in it.
-fn read(path: &Path, kind: Kind) -> Result<String> {
-    let name = path.display().to_string();
-    Ok(match kind {
-        Kind::Car => {
-            let car = Car::load(&name)?;
-            let engine = if car.powertrain.is_some() {
-                ""
-            } else {
-                ", no powertrain"
-            };
-            format!("a car, {}: {} kg{engine}", car.name, car.chassis.mass)
-        }
-        Kind::Tyre => {
-            TyreFile::read(path)?;
-            "a tyre".to_owned()
-        }
-        Kind::Track => {
-            let circuit = Track::load(&name)?.circuit()?;
-            let shape = if circuit.closed { "closed" } else { "open" };
-            format!("a {shape} track, {}: {:.1} m", circuit.name, circuit.length_m)
-        }
-        Kind::Log => {
-            // As for an identification of the bundled car.
-            let options = LogOptions {
-                rolling_radius_m: Some(Car::bundled()?.chassis.radius_front),
-                ..LogOptions::default()
-            };
-            let log = Log::read(path, &ChannelMap::default(), &options)?;
-            format!(
-                "a log of {} laps: {} samples at {:.0} Hz",
-                log.laps.len(),
-                log.time_s.len(),
-                1.0 / log.dt_s
-            )
-        }
-        Kind::Envelope => {
-            let envelope = Envelope::load(path)?;
-            format!(
-                "a g-g-v envelope at {} speeds up to {:.1} m/s",
-                envelope.rows().len(),
-                envelope.top_speed_mps()
-            )
-        }
-        Kind::Line => format!("a line of {} points", read_line(path)?.len()),
-        Kind::Sweep => {
-            let planned = sweep::plan(&SweepSettings::load(&name)?, USUAL_MIB)?;
-            format!("{}: {planned}", kind.name())
-        }
-        Kind::Study(study) => format!("{}: {}", kind.name(), study.check(path)?),
+        Kind::File(&LOG)
     })
 }
 
@@ -207,7 +202,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     for path in &arguments.files {
         let found = arguments.kind.map_or_else(|| guess(path), Ok).and_then(|kind| {
             // Whoever meant another kind sees why it is found wrong.
-            read(path, kind).inspect_err(|_| errln!("{}: read as {}", path.display(), kind.name()))
+            kind.read(path)
+                .inspect_err(|_| errln!("{}: read as {}", path.display(), kind.name()))
         });
         match found {
             Ok(text) => outln!("{}: {text}", path.display()),

@@ -1,12 +1,15 @@
 //! Measurements that are kept in a folder, with a page.
 
+use super::output::outln;
+use super::print_json;
 use lapswarm::Result;
 use lapswarm::evaluate::BackendChoice;
 use lapswarm::report::HtmlReport;
 use lapswarm::study::framework::run_folder::{self, Manifest, RunFolder, write_json};
 use lapswarm::study::framework::{RunRecord, Subject};
 use serde::Serialize;
-use std::path::PathBuf;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
 
 /// Where a measurement is kept.
 #[derive(clap::Args)]
@@ -14,76 +17,95 @@ pub struct Kept {
     /// Keep the figures in this folder, with pictures and report.html; refused if it holds anything
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// Print one JSON object as the last thing on stdout
+    #[arg(long)]
+    pub json: bool,
 }
 
-/// What measured.
-pub struct Machine {
-    backends: String,
-    adapter: String,
-    driver: String,
-}
-
-impl Machine {
-    /// Of the names of backends, the GPU among them being that of the flag `--adapter`.
-    pub fn of<'a>(backends: impl IntoIterator<Item = &'a str>, adapter: Option<&str>) -> Result<Self> {
-        let mut names: Vec<&str> = backends.into_iter().collect();
-        names.sort_unstable();
-        names.dedup();
-        let gpu = names.contains(&"gpu");
-        let choice = if gpu {
-            BackendChoice::Gpu
-        } else {
-            BackendChoice::Simd
-        };
-        let info = choice.would_be(adapter.filter(|_| gpu))?;
-        Ok(Self {
-            backends: names.join(", "),
-            adapter: info.device,
-            driver: info.driver,
+impl Kept {
+    /// The folder is refused before anything is measured; `adapter` is what the flag `--adapter` says.
+    pub fn begin<'a>(&self, study: &'static str, adapter: Option<&'a str>) -> Result<Keeping<'a>> {
+        let create = |path| run_folder::create(study, Some(path));
+        Ok(Keeping {
+            study,
+            folder: self.out.as_deref().map(create).transpose()?,
+            adapter,
+            json: self.json,
         })
     }
 }
 
-impl Kept {
-    /// The folder, if one is asked for; refused before anything is measured.
-    pub fn folder(&self, study: &str) -> Result<Option<RunFolder>> {
-        let create = |path| run_folder::create(study, Some(path));
-        self.out.as_deref().map(create).transpose()
+/// What becomes of a measurement.
+pub struct Keeping<'a> {
+    study: &'static str,
+    folder: Option<RunFolder>,
+    adapter: Option<&'a str>,
+    json: bool,
+}
+
+impl Keeping<'_> {
+    /// Keeps what was measured, if a folder is asked for, and prints it as JSON, if that is; `told` says whether words go to the
+    /// terminal. The folder gets `summary.json`, `manifest.json` and `report.html`, whose page ends with what measured.
+    pub fn finish<'b>(
+        self,
+        told: bool,
+        summary: &impl Serialize,
+        backends: impl IntoIterator<Item = &'b str>,
+        page: impl FnOnce(&Path) -> Result<HtmlReport>,
+    ) -> Result<()> {
+        if let Some(folder) = &self.folder {
+            self.write(folder, summary, &distinct(backends), page(folder)?)?;
+            if told {
+                outln!("Results: {}", folder.display());
+            }
+        }
+        if self.json {
+            print_json(summary)?;
+        }
+        Ok(())
+    }
+
+    fn write(
+        &self,
+        folder: &Path,
+        summary: &impl Serialize,
+        backends: &[&str],
+        mut page: HtmlReport,
+    ) -> Result<()> {
+        let measured_by = if backends.contains(&"gpu") {
+            BackendChoice::Gpu.would_be(self.adapter)?
+        } else {
+            BackendChoice::Simd.would_be(None)?
+        };
+        let record = RunRecord {
+            backend: backends.join(", "),
+            ..RunRecord::of(&measured_by)
+        };
+        write_json(&folder.join("summary.json"), summary)?;
+        let threads = std::thread::available_parallelism().map_or(String::new(), |n| n.to_string());
+        page.facts(&[
+            ("backends", &record.backend),
+            ("adapter", &record.adapter),
+            ("driver", &record.driver),
+            ("threads", &threads),
+            (
+                "system",
+                &format!("{} {}", std::env::consts::OS, std::env::consts::ARCH),
+            ),
+        ]);
+        page.write(folder.join("report.html"))?;
+        // Last: it says that the run is whole.
+        let subject = Subject {
+            seed: 1,
+            ..Subject::default()
+        };
+        let manifest = Manifest::new(self.study, &subject, &record, "");
+        write_json(&folder.join("manifest.json"), &manifest)
     }
 }
 
-/// Writes `summary.json`, `report.html` and `manifest.json`, and ends the page with what measured.
-pub fn write(
-    folder: &RunFolder,
-    study: &'static str,
-    summary: &impl Serialize,
-    mut page: HtmlReport,
-    machine: &Machine,
-) -> Result<()> {
-    write_json(&folder.join("summary.json"), summary)?;
-    page.provenance("backends", &machine.backends);
-    page.provenance("adapter", &machine.adapter);
-    page.provenance("driver", &machine.driver);
-    page.provenance(
-        "threads",
-        std::thread::available_parallelism().map_or(String::new(), |n| n.to_string()),
-    );
-    page.provenance(
-        "system",
-        format!("{} {}", std::env::consts::OS, std::env::consts::ARCH),
-    );
-    page.write(folder.join("report.html"))?;
-    // Last: it says that the run is whole.
-    let subject = Subject {
-        seed: 1,
-        ..Subject::default()
-    };
-    let record = RunRecord {
-        backend: machine.backends.clone(),
-        adapter: machine.adapter.clone(),
-        driver: machine.driver.clone(),
-        ..RunRecord::default()
-    };
-    let manifest = Manifest::new(study, &subject, &record, "");
-    write_json(&folder.join("manifest.json"), &manifest)
+/// Names, each once.
+pub fn distinct<'a>(names: impl IntoIterator<Item = &'a str>) -> Vec<&'a str> {
+    let names: BTreeSet<&str> = names.into_iter().collect();
+    names.into_iter().collect()
 }

@@ -15,6 +15,7 @@ mod sweep;
 
 use clap::{Args, Command, FromArgMatches, Subcommand};
 use lapswarm::config::kinds::Choice;
+use lapswarm::error::Field;
 use lapswarm::evaluate::BackendChoice;
 use lapswarm::hold::{self, Point};
 use lapswarm::study::framework::memory::USUAL_MIB;
@@ -66,7 +67,7 @@ fn command() -> Command {
              interrupted (what was reached is saved).\n\nExamples:\n  lapswarm run\n  lapswarm identify study.toml --seed 7 \
              --json\n  lapswarm simulate --rate 100 --out lap\n  lapswarm devices",
         );
-    Tool::augment_subcommands(command.subcommands(STUDIES.into_iter().map(study::command)))
+    Tool::augment_subcommands(command.subcommands(STUDIES.iter().map(|study| study::command(*study))))
 }
 
 /// Flags of everything that writes into a run folder.
@@ -160,7 +161,11 @@ pub fn run() -> ExitCode {
                 print_error_json(&error);
             }
             errln!("error: {error}");
-            if let Some(advice) = advice(&error) {
+            let whole = command();
+            let asked = matches
+                .subcommand_name()
+                .and_then(|name| whole.find_subcommand(name));
+            if let Some(advice) = asked.and_then(|asked| advice(&error, asked)) {
                 errln!("help: {advice}");
             }
             ExitCode::from(code)
@@ -188,22 +193,44 @@ fn run_tool(tool: &Tool) -> Result<()> {
 }
 
 /// What the user can do about an error, where that is known.
-fn advice(error: &Error) -> Option<&'static str> {
+fn advice(error: &Error, command: &Command) -> Option<String> {
     Some(match error {
-        Error::NoDevice(_) => "`lapswarm devices` lists what there is; `--backend simd` needs no GPU",
-        Error::Device(_) => "`--backend simd` runs the same study on the processor",
+        Error::NoDevice(_) => {
+            "`lapswarm devices` lists what there is; `--backend simd` needs no GPU".to_owned()
+        }
+        Error::Device(_) => "`--backend simd` runs the same study on the processor".to_owned(),
+        Error::Memory { .. } => format!("`--{}` sets the limit", flag_of(command, "memory_limit_mib")?),
+        Error::Input { place, .. } => {
+            let Some(Field::Named(setting)) = &place.field else {
+                return None;
+            };
+            format!("`--{}` sets it", flag_of(command, setting)?)
+        }
         _ => return None,
     })
+}
+
+/// The flag of a setting. A setting of a table goes by its key within it.
+fn flag_of<'a>(command: &'a Command, setting: &str) -> Option<&'a str> {
+    let of_table = |id: &str| id.rsplit('.').next() == Some(setting);
+    let mut flags = command.get_arguments();
+    flags
+        .find(|flag| flag.get_id() == setting || of_table(flag.get_id().as_str()))?
+        .get_long()
 }
 
 /// Whether the JSON object that was asked for stands on stdout.
 static JSON_TOLD: AtomicBool = AtomicBool::new(false);
 
+/// A serialisable value as one JSON object.
+fn to_json(value: &impl serde::Serialize) -> Result<String> {
+    let failed = |e| Error::io("standard output", "write", std::io::Error::other(e));
+    serde_json::to_string(value).map_err(failed)
+}
+
 /// Prints a serialisable value as one JSON object on stdout.
 fn print_json(value: &impl serde::Serialize) -> Result<()> {
-    let text = serde_json::to_string(value)
-        .map_err(|e| Error::io("standard output", "write", std::io::Error::other(e)))?;
-    print_json_text(&text);
+    print_json_text(&to_json(value)?);
     Ok(())
 }
 
@@ -215,12 +242,14 @@ fn print_json_text(text: &str) {
 
 /// Prints an error as a JSON object, where JSON was asked for and nothing else has been told.
 fn print_error_json(error: &Error) {
-    let location = error.location();
+    let place = error.place();
+    let line = place.as_ref().and_then(|p| p.line_number());
+    let field = place.as_ref().and_then(|p| p.name());
     let told = serde_json::json!({"error": {
         "message": error.to_string(),
-        "file": location.as_ref().map(|l| &l.file),
-        "line": location.as_ref().and_then(|l| l.line),
-        "field": location.as_ref().and_then(|l| l.field),
+        "file": error.file(),
+        "line": line,
+        "field": field,
     }});
     if !JSON_TOLD.load(Ordering::Relaxed) {
         // The error itself is what counts.

@@ -41,6 +41,23 @@ pub fn finish() -> lapswarm::Result<()> {
     }
 }
 
+/// Columns of a table that is printed as its rows come: head, width (below zero to the left), and the cell of a row.
+pub type Columns<R> = [(&'static str, isize, fn(&R) -> String)];
+
+/// A row of a table, or the heads of its columns.
+pub fn line_of<R>(columns: &Columns<R>, row: Option<&R>) -> String {
+    let cell = |(head, width, cell): &(&'static str, isize, fn(&R) -> String)| {
+        let text = row.map_or((*head).to_owned(), cell);
+        let wide = width.unsigned_abs();
+        if *width < 0 {
+            format!("{text:<wide$}")
+        } else {
+            format!("{text:>wide$}")
+        }
+    };
+    columns.iter().map(cell).collect()
+}
+
 /// As `print!`, which panics where nobody reads.
 macro_rules! out {
     ($($text:tt)*) => {

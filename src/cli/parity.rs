@@ -1,8 +1,8 @@
 //! `lapswarm parity`.
 
-use super::measurement::{self, Kept, Machine};
-use super::{backend_flag, print_json};
-use crate::cli::output::outln;
+use super::backend_flag;
+use super::measurement::Kept;
+use crate::cli::output::{Columns, line_of, outln};
 use lapswarm::evaluate::BackendChoice;
 use lapswarm::evaluate::gpu::{DeviceSummary, devices};
 use lapswarm::files::write_whole;
@@ -31,9 +31,6 @@ pub struct Arguments {
     file: Option<PathBuf>,
     #[command(flatten)]
     kept: Kept,
-    /// Print one JSON object as the last thing on stdout
-    #[arg(long)]
-    json: bool,
     /// No table
     #[arg(long)]
     quiet: bool,
@@ -54,6 +51,26 @@ struct Report {
     pass: bool,
 }
 
+/// The table on a terminal.
+const COLUMNS: &Columns<Agreement> = &[
+    ("kernel", -46, Agreement::key),
+    ("figures", 10, |a| a.figures.to_string()),
+    ("relative", 12, |a| format!("{:.1e}", a.max_relative)),
+    ("ULP", 10, |a| format!("{:.1}", a.max_ulp)),
+    ("of what may be", 16, |a| {
+        format!("{:.1}%", 100.0 * a.share_of_tolerance)
+    }),
+];
+
+/// Whether the bits are those of the plain scalar.
+fn bits(agreement: &Agreement) -> &'static str {
+    match agreement.bits_as_scalar {
+        Some(true) => "yes",
+        Some(false) => "no",
+        None => "-",
+    }
+}
+
 /// Compares and prints.
 pub fn run(arguments: &Arguments) -> Result<()> {
     if let Some(path) = arguments.file.as_ref().filter(|p| p.exists()) {
@@ -70,7 +87,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         let expected = "auto, simd or gpu: cpu is the reference that these are held against";
         return Err(Error::input("the command line", "--backend", "cpu", expected));
     }
-    let folder = arguments.kept.folder("parity")?;
+    let keeping = arguments.kept.begin("parity", arguments.adapter.as_deref())?;
     let device: Option<&DeviceSummary> = subjects.iter().find_map(|s| match s {
         Subject::Device(context) => Some(context.summary()),
         Subject::Lanes(_) => None,
@@ -79,35 +96,16 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         if device.is_none() && arguments.backend == BackendChoice::Auto && devices().is_empty() {
             outln!("no GPU: neither Vulkan, Metal nor DX12 found an adapter");
         }
-        outln!(
-            "{:<46}{:>10}{:>12}{:>10}{:>16}  bits as f32",
-            "kernel",
-            "figures",
-            "relative",
-            "ULP",
-            "of what may be"
-        );
+        outln!("{}  bits as f32", line_of(COLUMNS, None));
     }
     let found = compare(&subjects, |a| {
         if !arguments.quiet {
-            outln!(
-                "{:<46}{:>10}{:>12.1e}{:>10.1}{:>15.1}%  {}{}",
-                a.key(),
-                a.figures,
-                a.max_relative,
-                a.max_ulp,
-                100.0 * a.share_of_tolerance,
-                match a.bits_as_scalar {
-                    Some(true) => "yes",
-                    Some(false) => "no",
-                    None => "-",
-                },
-                if a.pass {
-                    String::new()
-                } else {
-                    format!("  FAILS: {}", a.worst)
-                }
-            );
+            let fails = if a.pass {
+                String::new()
+            } else {
+                format!("  FAILS: {}", a.worst)
+            };
+            outln!("{}  {}{fails}", line_of(COLUMNS, Some(a)), bits(a));
         }
     })?;
     let pass = found.iter().all(|a| a.pass);
@@ -133,42 +131,29 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             .map_err(|e| Error::io(path, "write", std::io::Error::other(e)))?;
         write_whole(path, text.as_bytes())?;
     }
-    if let Some(folder) = &folder {
-        let names = subjects.iter().map(|s| match s {
-            Subject::Device(_) => "gpu",
-            Subject::Lanes(_) => "simd",
-        });
-        let machine = Machine::of(names, arguments.adapter.as_deref())?;
-        measurement::write(folder, "parity", &report, page_of(folder, &report)?, &machine)?;
-    }
     if !arguments.quiet {
-        if let Some(folder) = &folder {
-            outln!("Results: {}", folder.display());
-        }
         if let Some(device) = device {
             outln!("{device}");
         }
-        outln!(
-            "{}",
-            if pass {
-                "all agree with the f64 reference"
-            } else {
-                "NOT ALL AGREE"
-            }
-        );
+        let verdict = if pass {
+            "all agree with the f64 reference"
+        } else {
+            "NOT ALL AGREE"
+        };
+        outln!("{verdict}");
     }
-    if arguments.json {
-        print_json(&report)?;
-    }
+    let names = subjects.iter().map(|s| match s {
+        Subject::Device(_) => "gpu",
+        Subject::Lanes(_) => "simd",
+    });
+    keeping.finish(!arguments.quiet, &report, names, |folder| {
+        page_of(folder, &report)
+    })?;
     if pass {
         return Ok(());
     }
-    let failing: Vec<&str> = report
-        .kernels
-        .iter()
-        .filter(|(_, a)| !a.pass)
-        .map(|(k, _)| k.as_str())
-        .collect();
+    let failing = report.kernels.iter().filter(|(_, a)| !a.pass);
+    let failing: Vec<&str> = failing.map(|(key, _)| key.as_str()).collect();
     Err(Error::Study(format!(
         "off the reference by more than may be: {}",
         failing.join("; ")
@@ -229,10 +214,7 @@ fn page_of(folder: &Path, report: &Report) -> Result<HtmlReport> {
         .number("greatest relative difference", "", |a| a.max_relative)
         .number("greatest difference", "ULP", |a| a.max_ulp)
         .number("of what may be", "%", |a| 100.0 * a.share_of_tolerance)
-        .text("bits as f32", |a| {
-            a.bits_as_scalar
-                .map_or("-", |same| if same { "yes" } else { "no" })
-        })
+        .text("bits as f32", |a| bits(a))
         .text("furthest off", |a| &*a.worst)
         .table();
     table.write_csv(folder.join("kernels.csv"))?;

@@ -2,7 +2,7 @@
 
 use super::print_json;
 use crate::cli::output::outln;
-use lapswarm::study::compare::{Run, compare};
+use lapswarm::report::compare::{Run, compare};
 use lapswarm::{Error, Result};
 use std::path::PathBuf;
 

@@ -1,16 +1,17 @@
 //! `lapswarm simulate`.
 
-use super::study::{print_plan, tell};
-use super::{Common, print_json};
-use lapswarm::Result;
+use super::study::{print_plan, print_results};
+use super::{Common, to_json};
 use lapswarm::evaluate::BackendChoice;
-use lapswarm::simulate::{SensorSettings, SimulateSettings, simulate_lap};
-use lapswarm::study::compare::{Run, compare};
+use lapswarm::report::compare::{Run, compare};
+use lapswarm::simulate::{SensorSettings, SimulateSettings, Simulated, simulate_lap};
 use lapswarm::study::framework::run_folder::{self, Manifest, write_json};
 use lapswarm::study::framework::{Plan, RunRecord, Subject};
-use lapswarm::study::identify::{lap_format, load_circuit};
+use lapswarm::study::identify::lap_format;
 use lapswarm::telemetry::write_native;
+use lapswarm::track::Track;
 use lapswarm::vehicle::Car;
+use lapswarm::{Error, Result};
 use serde::Serialize;
 
 /// Flags of `simulate`.
@@ -30,9 +31,9 @@ pub struct Arguments {
     /// Sample rate of the log, Hz
     #[arg(long, value_name = "HZ", default_value_t = 50.0)]
     rate: f64,
-    /// Runge-Kutta steps per sample with which the logged outputs are worked out
-    #[arg(long, value_name = "N", default_value_t = 1)]
-    substeps: usize,
+    /// Runge-Kutta steps per sample with which the logged outputs are worked out; as many as the car needs without it
+    #[arg(long, value_name = "N")]
+    substeps: Option<usize>,
     /// Share of the tyres' friction that the driver uses
     #[arg(long, value_name = "SHARE")]
     pace: Option<f64>,
@@ -66,19 +67,22 @@ fn four(flag: &str, values: Option<&Vec<f64>>, most: f64) -> Result<[f64; 4]> {
     let values = values.map_or(&[0.0; 4][..], Vec::as_slice);
     match <[f64; 4]>::try_from(values) {
         Ok(four) if four.iter().all(|x| (0.0..=most).contains(x)) => Ok(four),
-        _ => Err(lapswarm::Error::input(
-            "the command line",
-            flag,
-            format!("{values:?}"),
-            format!("four numbers from 0 to {most}: vx, ax, ay, yaw rate"),
-        )),
+        _ => {
+            let expected = format!("four numbers from 0 to {most}: vx, ax, ay, yaw rate");
+            Err(Error::input(
+                "the command line",
+                flag,
+                format!("{values:?}"),
+                expected,
+            ))
+        }
     }
 }
 
 /// Drives and logs.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let car = Car::load(&arguments.car)?;
-    let circuit = load_circuit(&arguments.track)?;
+    let circuit = Track::load(&arguments.track)?.circuit()?;
     let mut settings = SimulateSettings {
         rate_hz: arguments.rate,
         substeps: arguments.substeps,
@@ -91,13 +95,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     };
     if let Some(pace) = arguments.pace {
         if !(pace > 0.0 && pace <= 1.5) {
-            let found = pace.to_string();
-            return Err(lapswarm::Error::input(
-                "the command line",
-                "--pace",
-                found,
-                "a share above 0 up to 1.5",
-            ));
+            let (found, expected) = (pace.to_string(), "a share above 0 up to 1.5");
+            return Err(Error::input("the command line", "--pace", found, expected));
         }
         settings.driver.pace = pace;
     }
@@ -121,10 +120,10 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             .into_folder(arguments.common.out.as_deref())?;
         return print_plan(&arguments.common, &plan);
     }
-    let log = simulate_lap(&car, &circuit, &settings)?;
+    let Simulated { log, substeps } = simulate_lap(&car, &circuit, &settings)?;
     let folder = run_folder::create("simulate", arguments.common.out.as_deref())?;
     let path = folder.join("lap.csv");
-    let step_ms = 1e3 * log.dt_s / settings.substeps as f64;
+    let step_ms = 1e3 * log.dt_s / substeps as f64;
     let comment = format!("{}; outputs worked out at a step of {step_ms:.3} ms", log.source);
     write_native(&log, &path, &lap_format().comment(comment))?;
     car.write(&folder, "truth")?;
@@ -160,21 +159,15 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         let _ = std::fs::remove_file(&file);
         return Err(error);
     }
-    if !arguments.common.quiet {
-        let said = format!(
-            "{}: {:.2} s, {:.1} to {:.1} m/s, up to {:.1} m/s^2 sideways\nLog: {}\n",
-            log.source,
-            summary.lap_time_s,
-            summary.slowest_mps,
-            summary.top_speed_mps,
-            summary.greatest_ay_mps2,
-            summary.log
-        );
-        tell(&arguments.common, &said);
-    }
-    if arguments.common.json {
-        print_json(&summary)
-    } else {
-        Ok(())
-    }
+    let text = format!(
+        "{}: {:.2} s, {:.1} to {:.1} m/s, up to {:.1} m/s^2 sideways\nLog: {}\n",
+        log.source,
+        summary.lap_time_s,
+        summary.slowest_mps,
+        summary.top_speed_mps,
+        summary.greatest_ay_mps2,
+        summary.log
+    );
+    print_results(&arguments.common, &text, None, &to_json(&summary)?);
+    Ok(())
 }

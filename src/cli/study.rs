@@ -1,13 +1,13 @@
 //! The subcommands of the studies, made from the registry.
 
-use super::output::{errln, out};
-use super::{Common, Memory, progress::Bar, stop_flag, stopped};
+use super::output::{errln, out, to_stderr};
+use super::{Common, Memory, print_json_text, progress::Bar, stop_flag, stopped, to_json};
 use clap::{Arg, ArgAction, ArgMatches, Args, Command, FromArgMatches, value_parser};
 use lapswarm::config::settings::{Declared, Flag};
-use lapswarm::study::framework::{Answer, Finished, Plan, Request};
+use lapswarm::study::framework::{Answer, Plan, Request};
 use lapswarm::study::registry::Registered;
 use lapswarm::{Error, Result};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 /// Flags of a run that can be resumed.
@@ -126,40 +126,33 @@ pub fn run(study: &'static dyn Registered, matches: &ArgMatches) -> Result<()> {
     bar.finish();
     match answer? {
         Answer::Planned(plan) => print_plan(&common, &plan),
-        Answer::Finished(finished) => print(&common, finished),
+        Answer::Finished(finished) => {
+            print_results(&common, &finished.text, Some(&finished.folder), &finished.json);
+            for warning in &finished.warnings {
+                errln!("Warning: {warning}");
+            }
+            finished.verdict
+        }
     }
 }
 
 /// Prints a plan, as words or as JSON.
 pub fn print_plan(common: &Common, plan: &Plan) -> Result<()> {
-    if !common.quiet {
-        tell(common, &plan.to_text());
-    }
-    if common.json {
-        super::print_json(plan)?;
-    }
+    print_results(common, &plan.to_text(), None, &to_json(plan)?);
     Ok(())
 }
 
-/// Words: on stdout, or on stderr where JSON is to stand on stdout by itself.
-pub fn tell(common: &Common, text: &str) {
-    if common.json {
-        super::output::to_stderr(format_args!("{text}"));
-    } else {
-        out!("{text}");
-    }
-}
-
-fn print(common: &Common, finished: Finished) -> Result<()> {
+/// Prints what was found, as words and as JSON. Words stand on stdout, or on stderr where JSON is to stand on stdout by itself.
+pub fn print_results(common: &Common, text: &str, folder: Option<&Path>, json: &str) {
     if !common.quiet {
-        tell(common, &finished.text);
-        tell(common, &format!("Results: {}\n", finished.folder.display()));
+        let at = folder.map_or(String::new(), |folder| format!("Results: {}\n", folder.display()));
+        if common.json {
+            to_stderr(format_args!("{text}{at}"));
+        } else {
+            out!("{text}{at}");
+        }
     }
     if common.json {
-        super::print_json_text(&finished.json);
+        print_json_text(json);
     }
-    for warning in &finished.warnings {
-        errln!("Warning: {warning}");
-    }
-    finished.verdict
 }

@@ -1,11 +1,11 @@
 //! `lapswarm sweep`.
 
-use super::study::{print_plan, tell};
-use super::{Common, Memory, print_json, progress::Bar, stop_flag, stopped};
+use super::study::{print_plan, print_results};
+use super::{Common, Memory, progress::Bar, stop_flag, stopped, to_json};
 use lapswarm::Result;
 use lapswarm::config::limit_memory;
-use lapswarm::study::framework::{Plan, Progress, run_folder};
-use lapswarm::study::sweep::{SWEEP_FILE, SweepSettings, plan, sweep_within};
+use lapswarm::study::framework::{Plan, run_folder};
+use lapswarm::study::sweep::{SWEEP_FILE, SweepSettings, plan, sweep};
 
 /// Flags of `sweep`.
 #[derive(clap::Args)]
@@ -28,11 +28,11 @@ pub struct Arguments {
 
 /// Runs the sweep.
 pub fn run(arguments: &Arguments) -> Result<()> {
-    let (common, limit_mib) = (&arguments.common, arguments.memory.memory_limit_mib);
-    limit_memory(limit_mib);
+    let common = &arguments.common;
+    limit_memory(arguments.memory.memory_limit_mib);
     let settings = SweepSettings::load(&arguments.sweep)?;
     if common.dry_run {
-        let planned = plan(&settings, limit_mib)?;
+        let planned = plan(&settings)?;
         let told = Plan::of_file("sweep", settings.text())
             .reads(planned.to_string())
             .memory_mib(planned.memory_mib)
@@ -49,24 +49,11 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     };
     let stop = stop_flag();
     let mut bar = Bar::new(common.quiet);
-    let summary = sweep_within(&settings, &folder, arguments.resume, limit_mib, |p| {
-        let point = p.point.settings.iter();
-        let point: Vec<String> = point.map(|(key, value)| format!("{key} {value}")).collect();
-        bar.show(&Progress {
-            stage: "runs".to_owned(),
-            done: p.done as u64,
-            planned: Some(p.planned as u64),
-            reached: point.join(", "),
-        });
+    let summary = sweep(&settings, &folder, arguments.resume, |progress| {
+        bar.show(progress);
         stopped(&stop)
     })?;
     bar.finish();
-    if !common.quiet {
-        tell(common, &summary.to_text());
-        tell(common, &format!("Results: {}\n", folder.display()));
-    }
-    if common.json {
-        print_json(&summary)?;
-    }
+    print_results(common, &summary.to_text(), Some(&folder), &to_json(&summary)?);
     Ok(())
 }

@@ -243,24 +243,12 @@ impl<S, T> Access<S> for Inner<S, T> {
 }
 
 /// Several settings that one key sets.
-struct Linked<S> {
-    set: fn(&mut S, &str) -> Result<(), String>,
-    copy: fn(&S, &mut S),
-}
+struct Linked<S>(Vec<Setting<S>>);
 
 impl<S> Access<S> for Linked<S> {
     fn read(&self, s: &mut S, table: &Table<'_>, declared: &Declared, folder: &Path) -> Result<()> {
-        let key = declared.key_within();
-        let Some(text) = table.word(key)? else {
-            return Ok(());
-        };
-        let names_file = declared.value_name.contains("FILE") && Path::new(&text).extension().is_some();
-        let text = if names_file {
-            folder.join(text).display().to_string()
-        } else {
-            text
-        };
-        (self.set)(s, &text).map_err(|expected| table.refuse(key, expected))
+        let mut parts = self.0.iter();
+        parts.try_for_each(|part| part.access.read(s, table, declared, folder))
     }
 
     fn write(&self, _: &S) -> Option<Written> {
@@ -268,7 +256,7 @@ impl<S> Access<S> for Linked<S> {
     }
 
     fn parse(&self, s: &mut S, text: &str) -> Result<(), String> {
-        (self.set)(s, text)
+        self.0.iter().try_for_each(|part| part.access.parse(s, text))
     }
 
     fn check(&self, _: &S) -> Result<(), Wrong> {
@@ -278,7 +266,7 @@ impl<S> Access<S> for Linked<S> {
     fn make_absolute(&self, _: &mut S) {}
 
     fn copy(&self, from: &S, to: &mut S) {
-        (self.copy)(from, to);
+        self.0.iter().for_each(|part| part.access.copy(from, to));
     }
 }
 
@@ -301,20 +289,16 @@ impl<S: 'static> Setting<S> {
         }
     }
 
-    /// One that sets several at once, from a word; `copy` takes them from other settings.
-    pub fn linked(
-        declared: Declared,
-        set: fn(&mut S, &str) -> Result<(), String>,
-        copy: fn(&S, &mut S),
-    ) -> Self {
+    /// One key that sets several others.
+    pub fn linked(declared: Declared, parts: Vec<Self>) -> Self {
         Self {
             declared,
-            access: Arc::new(Linked { set, copy }),
+            access: Arc::new(Linked(parts)),
         }
     }
 
     /// The same setting of a struct that `S` is a part of.
-    pub(super) fn within<O: 'static>(self, lens: &Lens<O, S>) -> Setting<O> {
+    pub(crate) fn within<O: 'static>(self, lens: &Lens<O, S>) -> Setting<O> {
         Setting {
             declared: self.declared,
             access: Arc::new(Inner {
@@ -376,15 +360,7 @@ pub trait Settings: Clone + Default + PartialEq + Send + Sync + 'static {
     fn parse(path: &Path, text: &str) -> Result<Self> {
         let document = Document::parse(path, text)?;
         let settings = Self::read_table(document.root(), path.parent().unwrap_or(Path::new("")))?;
-        settings.validate().map_err(|error| match error {
-            Error::Input {
-                place,
-                found,
-                expected,
-                ..
-            } => Error::input(path, place, found, expected),
-            other => other,
-        })?;
+        settings.validate().map_err(|error| error.of_file(path))?;
         Ok(settings)
     }
 
@@ -579,4 +555,30 @@ pub(crate) use settings;
 /// The last of a field's names.
 pub(crate) const fn key_of(names: &[&'static str]) -> &'static str {
     names[names.len() - 1]
+}
+
+/// What the tests of every study's settings share.
+#[cfg(test)]
+pub(crate) mod testing {
+    use super::Settings;
+    use std::fmt::Debug;
+
+    /// A study file of these settings says them again.
+    pub(crate) fn assert_repeated<S: Settings + Debug>(settings: &S) {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("study.toml");
+        std::fs::write(&path, settings.to_toml()).expect("a file");
+        assert_eq!(S::read(&path).expect("settings"), *settings);
+    }
+
+    /// Each of these study files is refused in words that say so.
+    pub(crate) fn assert_refused<S: Settings + Debug>(cases: &[(&str, &str)]) {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("study.toml");
+        for (text, wanted) in cases {
+            std::fs::write(&path, text).expect("a file");
+            let error = S::read(&path).expect_err("a mistake").to_string();
+            assert!(error.contains(wanted), "{error} should say {wanted}");
+        }
+    }
 }

@@ -61,7 +61,7 @@ driver_table! {
     speed_gain,
     /// Greatest slip ratio, driven or braked.
     slip_limit,
-    /// Slip stiffness per load that the feet compute with.
+    /// Slip stiffness per load with which the driver computes slip from force.
     slip_stiffness,
     /// Greatest road-wheel angle, rad.
     max_steer,
@@ -71,10 +71,10 @@ driver_table! {
     rear_slip_per_ay,
     /// Lateral acceleration that the tyres give for every m/s^2 of load over mass.
     friction,
-    /// How far beyond an edge the car is lost, m.
+    /// Distance beyond an edge at which a car counts as lost, m.
     run_off,
-    /// Steering added for understeer, rad per g of lateral acceleration and metre of wheelbase. It and those below are constants
-    /// that compilers for devices would regroup if they knew.
+    /// Steering added for understeer, rad per g of lateral acceleration and metre of wheelbase. This figure and those below are
+    /// constants. They are passed as data because compilers for devices would regroup known constants.
     understeer,
     /// Share of the load that the driven wheels are computed to carry.
     driven_share,
@@ -82,7 +82,7 @@ driver_table! {
     steer_lag,
     /// Time constant of the feet, s.
     pedal_lag,
-    /// Over how far on either side the plan's acceleration is taken, m.
+    /// Half of the length over which the plan's acceleration is taken, m.
     reach,
 }
 
@@ -152,7 +152,7 @@ impl WheelTorque<f64> {
     fn of_powertrain(powertrain: &Powertrain) -> Self {
         let speeds = &powertrain.engine_speed_rpm;
         let torques = &powertrain.torque_nm;
-        // Every gear's lines: from where, the torque there, its rise.
+        // The lines of every gear: speed at the start, torque there, slope.
         let mut lines: Vec<Vec<[f64; 3]>> = Vec::new();
         let mut ends = vec![0.0];
         for gear in &powertrain.gear_ratios {
@@ -175,7 +175,7 @@ impl WheelTorque<f64> {
         let value = |line: [f64; 3], speed: f64| line[1] + (speed - line[0]) * line[2];
         ends.sort_unstable_by(f64::total_cmp);
         ends.dedup();
-        // Between two ends every gear is one line; where two of them cross, another one may take over.
+        // Between two ends every gear is one line. Where two lines cross, the gear that gives most may change.
         let mut crossings = Vec::new();
         for pair in ends.windows(2) {
             let middle = 0.5 * (pair[0] + pair[1]);
@@ -241,7 +241,7 @@ pub fn torque_at<R: Real>(torque: &WheelTorque<R::Storage>, speed: R) -> R {
     found
 }
 
-/// What the driver's arms and feet are doing.
+/// The state of the driver's arms and feet.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Controls<R> {
     /// Road-wheel angle (rad).
@@ -252,12 +252,12 @@ pub struct Controls<R> {
     pub rear_slip: R,
 }
 
-/// The plan of a candidate: two neighbouring ones of its line, and how much of the second.
+/// The plan of a candidate: a blend of two neighbouring plans of its line.
 #[derive(Clone, Copy, Debug)]
 pub struct Pace<R> {
-    /// The first plan's number, a whole one.
+    /// Number of the first plan, a whole number.
     pub plan: R,
-    /// The second's share, 0 to 1.
+    /// Share of the second plan, 0 to 1.
     pub share: R,
 }
 

@@ -8,23 +8,23 @@ use crate::vehicle::model::runge_kutta_step;
 use crate::vehicle::tyre::Tyre;
 use crate::vehicle::{CarInput, CarModel, CarState};
 
-/// How a lap ended: whole numbers, which every backend counts alike.
+/// How a lap ended, as whole numbers that every backend represents exactly.
 pub mod ending {
-    /// It has not.
+    /// The lap is under way.
     pub const UNDER_WAY: f64 = 0.0;
-    /// At the line.
+    /// The car crossed the finish line.
     pub const FINISHED: f64 = 1.0;
     /// The car spun, rolled over or turned its back to the path.
     pub const SPUN: f64 = 2.0;
     /// The car left the road.
     pub const LEFT_ROAD: f64 = 3.0;
-    /// It took too long.
+    /// The lap took too long.
     pub const TOO_LATE: f64 = 4.0;
 }
 
-/// Angle to the path at which a car is on its way back, rad.
+/// Angle to the path beyond which the car counts as turned back, rad.
 const TURNED_ROUND: f64 = std::f64::consts::FRAC_PI_2;
-/// What stands for the distance beyond an edge before any was seen, m.
+/// Start value of the greatest distance beyond an edge, m: below any distance that occurs.
 const FAR_INSIDE: f64 = -1e6;
 
 /// What all laps of a population share.
@@ -49,13 +49,13 @@ pub struct DriveState<R> {
     pub pose: Pose<R>,
     /// Steps since the start line.
     pub steps: R,
-    /// What the lap's time is beyond its steps (s): the start line was crossed before a step, the finish line too.
+    /// Lap time less the time of its whole steps (s). Both lines are crossed within a step.
     pub rest: R,
     /// Greatest distance beyond an edge so far (m), negative within the road.
     pub beyond: R,
-    /// How far the road wheels have been turned to and fro in the rows behind (rad).
+    /// Sum of all changes of the road-wheel angle in the rows that the car has passed (rad).
     pub turned: R,
-    /// And in this row (rad): sums of few terms lose no tails in `f32`.
+    /// The same in the present row (rad). Two short sums lose less precision in `f32` than a long one.
     pub turned_here: R,
     /// How it ended, see [`ending`].
     pub ending: R,
@@ -164,15 +164,15 @@ impl<R: Lookup> DriveState<R> {
         }
     }
 
-    /// Where the lap has not ended.
+    /// The lanes in which the lap is under way.
     #[inline(always)]
     pub fn under_way(&self) -> R::Mask {
         self.ending.less_than(R::lit(0.5))
     }
 }
 
-/// One step, the `number`-th since the run-up began, of a lap that is under way; others stay as they are. `watch` is shown
-/// what the driver saw and did.
+/// One step of every lap that is under way, the `number`-th since the run-up began. Laps that have ended stay as they are.
+/// `watch` receives what the driver saw and did.
 #[inline(always)]
 pub fn drive_step<R: Lookup, T: Tyre<R>>(
     car: &CarModel<R, T>,
@@ -198,7 +198,7 @@ pub fn drive_step<R: Lookup, T: Tyre<R>>(
     let verdict = R::select(turned_round, R::lit(ending::SPUN), verdict);
     let lost = turned_round | off | late;
 
-    // Time since the line was crossed, and what that adds to the steps: at the start, and taken away at the finish.
+    // Time since the line was crossed. It is added at the start line and subtracted at the finish line.
     let since = (pose.row * course.spacing + pose.along) / before.car.body.vx;
     let has_started = before.pose.lap.less_than(-half) & !pose.lap.less_than(-half);
     let finished = !pose.lap.less_than(half);
@@ -251,7 +251,7 @@ pub fn drive_step<R: Lookup, T: Tyre<R>>(
         turned_here: R::select(passed, zero, here),
         ending: verdict,
     };
-    // A car that is lost stays as it was last; of one that has finished, its time counts.
+    // A lost car keeps its last state. A car that has finished keeps its time.
     let stays = !under_way | lost | spun | finished;
     let (kept, moved) = (before.to_array(), after.to_array());
     let mut figures = kept;
@@ -269,16 +269,17 @@ pub fn drive_step<R: Lookup, T: Tyre<R>>(
 pub struct DrivenLap {
     /// Its time (s).
     pub time_s: f64,
-    /// Greatest distance of the car beyond an edge (m); negative for the least room that was left.
+    /// Greatest distance of the car beyond an edge (m). It is negative if the car stayed on the road: the least room, with a
+    /// minus sign.
     pub beyond_m: f64,
-    /// How fast the road wheels were turned, on the mean (rad/s).
+    /// Mean rate at which the road wheels were turned (rad/s).
     pub steering_radps: f64,
-    /// How it ended, see [`ending`]. The other figures are those of a whole lap where it finished.
+    /// How it ended, see [`ending`]. The other figures are those of a whole lap only if it finished.
     pub ending: f64,
 }
 
 impl DrivenLap {
-    /// The lap whose state at its end is given, driven in steps of `step_s`.
+    /// The outcome of a lap from its last state; `step_s` (s) is the step of the integration.
     pub fn of_state(state: &DriveState<f64>, step_s: f64) -> Self {
         let time_s = state.steps * step_s + state.rest;
         Self {

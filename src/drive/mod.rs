@@ -1,8 +1,8 @@
 //! A driver takes the 4DOF car round a line: path, plan of speeds, driver and car as one kernel over the scalar, for one lap
 //! in `f64` that is recorded ([`drive`]) or for whole populations of set-ups ([`crate::evaluate::drive`]).
 //!
-//! A car's place is kept relative to the path it follows, in the frame of the path's last sample: figures of metres, whose
-//! rounding in `f32` is a ten-millionth of one, however long the lap.
+//! A car's position is kept relative to the path, in the frame of the last sample that it passed. These figures are a few metres
+//! however long the lap is, so `f32` rounds them by a ten-millionth of a metre.
 
 pub mod driver;
 pub mod kernel;

@@ -18,15 +18,15 @@ pub struct Row<R> {
     pub turn: R,
     /// Distance to the left edge (m).
     pub left: R,
-    /// How much that rises up to the next sample (m).
+    /// Rise of that distance up to the next sample (m).
     pub left_rise: R,
     /// Distance to the right edge (m).
     pub right: R,
-    /// How much that rises up to the next sample (m).
+    /// Rise of that distance up to the next sample (m).
     pub right_rise: R,
     /// The cell of the plan that the sample lies in, a whole number.
     pub cell: R,
-    /// How far into it, as a share of it.
+    /// Position of the sample within that cell, as a share of its length.
     pub cell_share: R,
 }
 
@@ -52,12 +52,12 @@ impl<R: Lookup> Row<R> {
     }
 }
 
-/// Where a car is: relative to a row of the path, whose sample is the origin and whose direction the first axis.
+/// Position of a car relative to a row of the path. The row's sample is the origin and its direction the first axis.
 #[derive(Clone, Copy, Debug)]
 pub struct Pose<R> {
     /// The row, a whole number.
     pub row: R,
-    /// Laps since the start line was crossed first, a whole number: -1 before that.
+    /// Laps since the start line was crossed first, a whole number: -1 before the first crossing.
     pub lap: R,
     /// Distance of the car's foot on the path from the sample (m).
     pub along: R,
@@ -118,7 +118,7 @@ fn resolve<R: Lookup>(frame: &Frame<R>, pose: &Pose<R>) -> (R, R) {
     (x * cos + y * sin, y * cos - x * sin)
 }
 
-/// Keeps a foot from being flung onto another part of the path (m).
+/// Longest step of Newton's method (m), so that the foot stays on its part of the path.
 const LONGEST_STEP_M: f64 = 10.0;
 
 /// One step of Newton's method towards the foot of the perpendicular from the car.
@@ -137,11 +137,11 @@ fn nearer<R: Lookup>(row: &Row<R>, pose: &Pose<R>) -> R {
 /// What a driver sees of the path.
 #[derive(Clone, Copy, Debug)]
 pub struct View<R> {
-    /// The row that the car is in.
+    /// The row of the path that the car is in.
     pub row: Row<R>,
-    /// Where the car is, its foot on the path found.
+    /// Position of the car, with its foot on the path.
     pub pose: Pose<R>,
-    /// Where a row was left behind for this one.
+    /// The lanes in which the car has just moved on to this row.
     pub passed: R,
     /// Distance from the path, left positive (m).
     pub offset: R,

@@ -18,7 +18,7 @@ const LINEAR_TYRE_FRICTION: f64 = 1.0;
 /// Grid spacing along the centreline, m.
 const SPACING: f64 = 2.0;
 
-/// What the car can do at a speed, roughly: lateral and longitudinal grip, drive and drag, all in m/s^2.
+/// Estimates of what the car can do at a speed: lateral and longitudinal grip, drive and drag, all in m/s^2.
 struct Limits<'a> {
     car: &'a Car,
     friction: f64,
@@ -82,7 +82,7 @@ impl SpeedPlan {
                 v
             })
             .collect();
-        // Twice round, so that the start of a closed lap knows what comes before it.
+        // Two rounds, because the start of a closed lap needs the speed at its end.
         for step in 0..2 * count {
             let (i, next) = (step % count, (step + 1) % count);
             let v = speed_mps[i];

@@ -24,8 +24,8 @@ pub struct Drive {
 }
 
 impl Drive {
-    /// Time of the lap (s), whose length (m) and sample interval (s) are given: the samples' own, less what the first
-    /// was late and more what the last was short.
+    /// Time (s) of a lap of this length (m), sampled at this interval (s). The first sample lies behind the start line and the
+    /// last one before the finish line: the time is corrected for both.
     pub fn lap_time_s(&self, length_m: f64, interval_s: f64) -> Option<f64> {
         let (first, last) = (self.station_m.first()?, self.station_m.last()?);
         let (from, to) = (self.states.first()?[0], self.states.last()?[0]);

@@ -10,17 +10,17 @@ use std::f64::consts::{PI, TAU};
 
 /// How long before the start line the flying lap begins, m.
 const RUN_UP_M: f64 = 500.0;
-/// A lap slower than this mean speed is no lap, half of it counting the run-up, m/s.
+/// Least mean speed of a lap, m/s. Slower laps are not waited for.
 const SLOWEST_MPS: f64 = 5.0;
-/// Cells of a plan before its first, for what lies just behind the start line.
+/// Cells of a plan before its first cell, for the stretch just before the start line.
 pub const FRONT_CELLS: usize = 2;
-/// Over how far on either side a plan's acceleration is taken, m.
+/// Half of the length over which a plan's acceleration is taken, m.
 pub const PLAN_REACH_M: f64 = 2.0;
 /// How far ahead a driver looks into the plan, s.
 pub(super) const PLAN_AHEAD_S: f64 = 0.15;
 /// Whole numbers beyond this are not exact in `f32`.
 const MOST_COUNTED: f64 = 16_777_216.0;
-/// Samples of a path are at least this far apart (m): no car leaves two of them behind in one step.
+/// Least distance between samples of a path (m), so that no car passes two of them in one step.
 const LEAST_SPACING_M: f64 = 0.25;
 
 /// Figures of a row of the path's table.
@@ -28,7 +28,8 @@ pub const PATH_WIDTH: usize = 12;
 
 /// Lines to drive, each with plans of speed of the same shares of grip.
 ///
-/// Rows and cells behind the end of a line repeat its beginning, as far as a driver looks ahead, so that nothing wraps.
+/// The rows and cells after the end of a line repeat its beginning, as far as a driver looks ahead. Kernels therefore never wrap
+/// an index.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Road<S> {
     /// Rows of [`super::Row`] of all lines, one line after the other.
@@ -47,7 +48,7 @@ pub struct Road<S> {
 
 macro_rules! course {
     ($($(#[$doc:meta])* $field:ident),* $(,)?) => {
-        /// What is known of a line as a whole. Twin of `Course` in `shaders/path.wgsl`.
+        /// Figures of a whole line. Twin of `Course` in `shaders/path.wgsl`.
         #[derive(Clone, Copy, Debug)]
         pub struct Course<R> {
             $($(#[$doc])* pub $field: R,)*
@@ -88,21 +89,21 @@ macro_rules! course {
 }
 
 course! {
-    /// The line's first row in the table of paths, a whole number like all that count.
+    /// First row of the line in the table of paths. Like all counts here it is a whole number.
     path_at,
     /// Rows of the lap.
     rows,
     /// Distance between samples (m).
     spacing,
-    /// One over that (1/m).
+    /// One over the distance between samples (1/m).
     per_metre,
     /// The row in which the run-up begins.
     begin_row,
-    /// How far into it (m).
+    /// Distance along the path from that row's sample to the start of the run-up (m).
     begin_along,
-    /// Where that is, ahead of the row's sample (m).
+    /// Position of that start ahead of the row's sample (m).
     begin_x,
-    /// And to its left (m).
+    /// Position of that start to the left of the sample (m).
     begin_y,
     /// The path's direction there (rad).
     begin_yaw,
@@ -112,7 +113,7 @@ course! {
     plan_stride,
     /// Cells per metre (1/m).
     cells_per_metre,
-    /// Steps after which no lap is waited for.
+    /// Most steps of a lap; a lap that has not ended by then has taken too long.
     most_steps,
 }
 

@@ -1,7 +1,7 @@
 //! How the driver drives, and what the driver knows of the car.
 
 use crate::error::{Error, Result};
-use crate::vehicle::{Car, steady_car};
+use crate::vehicle::{Car, Turn, steady_car};
 
 /// How the driver drives.
 #[derive(Clone, Debug, PartialEq)]
@@ -10,7 +10,7 @@ pub struct DriverSettings {
     pub pace: f64,
     /// Greatest slip ratio, driven or braked.
     pub slip_limit: f64,
-    /// Slip stiffness per load that the driver's feet compute with: the lower, the more slip for a wanted force.
+    /// Slip stiffness per load with which the driver computes slip from force: the lower it is, the more slip a force takes.
     pub slip_stiffness: f64,
     /// How far ahead the driver looks, s.
     pub preview_s: f64,
@@ -24,8 +24,8 @@ pub struct DriverSettings {
     pub knowledge: Option<CarKnowledge>,
 }
 
-/// What a driver who knows the car computes with: without it the car's own angle to its path looks like an error to steer
-/// against, and a foot that is down in a bend takes grip that the bend needs.
+/// What a driver who knows the car computes with. Without the first figure the driver would steer against the car's normal drift
+/// angle. Without the second the driver would use grip for driving that the bend needs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CarKnowledge {
     /// Slip angle of the rear axle for every m/s^2 of lateral acceleration (rad s^2/m): it turns the car into the bend.
@@ -45,16 +45,20 @@ impl CarKnowledge {
         let mut slips = Vec::new();
         let mut frictions = Vec::new();
         for speed in [25.0f64, 40.0, 55.0] {
-            let trims = steady.cornering(speed, car.max_steer_rad.max(0.3));
+            let trims = steady.cornering(speed, car.max_steer_rad.max(0.3), Turn::Left);
             let most = trims.iter().map(|t| t.ay_mps2).fold(0.0, f64::max);
+            if most == 0.0 {
+                continue;
+            }
             let load = c.gravity + 0.5 * c.air_density * c.lift_area * speed * speed / c.mass;
             frictions.push(most / load);
             let ridge = trims.iter().position(|t| t.ay_mps2 == most).unwrap_or(0);
             slips.extend(
-                trims[..=ridge.min(trims.len().saturating_sub(1))]
+                trims
                     .iter()
+                    .take(ridge + 1)
                     .filter(|t| (0.6..0.9).contains(&(t.ay_mps2 / most)))
-                    // Without slip the rear axle follows the path: its share of the angle is geometry.
+                    // Without slip the rear axle follows the path. That part of the angle is geometry.
                     .map(|t| c.cg_to_rear / (speed * speed) - t.sideslip_rad / t.ay_mps2),
             );
         }

@@ -1,17 +1,10 @@
 //! Choice of backend.
 
 use super::BackendInfo;
-use super::gpu::{GpuContext, devices};
+use super::gpu;
 use super::simd::InstructionSet;
 use crate::error::{Error, Result};
 use serde::{Deserialize, Serialize};
-use std::sync::OnceLock;
-
-/// Whether a real GPU is present. Asked once: it wakes every driver.
-fn real_gpu() -> bool {
-    static PRESENT: OnceLock<bool> = OnceLock::new();
-    *PRESENT.get_or_init(|| devices().iter().any(|d| d.kind.is_real()))
-}
 
 /// Where evaluations run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -27,7 +20,7 @@ pub enum BackendChoice {
     Gpu,
 }
 
-crate::config::kinds::named!(BackendChoice {
+crate::config::named!(BackendChoice {
     Auto = "auto",
     Cpu = "cpu",
     Simd = "simd",
@@ -41,7 +34,7 @@ impl BackendChoice {
     /// adapter asks for it, whatever it is.
     pub fn decided(self, adapter: Option<&str>) -> Self {
         match self {
-            Self::Auto if adapter.is_some() || real_gpu() => Self::Gpu,
+            Self::Auto if adapter.is_some() || gpu::is_real() => Self::Gpu,
             Self::Auto => Self::Simd,
             chosen => chosen,
         }
@@ -54,8 +47,8 @@ impl BackendChoice {
     pub fn would_be(self, adapter: Option<&str>) -> Result<BackendInfo> {
         let lanes = || BackendInfo::of_lanes(InstructionSet::best());
         match self.decided(adapter) {
-            Self::Gpu => match GpuContext::shared(adapter) {
-                Ok(context) => Ok(context.backend_info()),
+            Self::Gpu => match gpu::would_be(adapter) {
+                Ok(info) => Ok(info),
                 // Like evaluators: lanes take over if no GPU was asked for, and from a GPU that fails.
                 Err(Error::NoDevice(_)) if self == Self::Auto && adapter.is_none() => Ok(lanes()),
                 Err(Error::Device(_)) => Ok(lanes()),

@@ -74,6 +74,11 @@ impl FreeCar {
         &self.base
     }
 
+    /// The values that the free parameters have in a car in flat form.
+    pub fn values_in(&self, flat: &[f64]) -> Vec<f64> {
+        self.parameters.iter().map(|p| flat[p.slots[0]]).collect()
+    }
+
     /// For each place of the flat form, the variable that sets it, if any.
     pub fn sources(&self) -> &[Option<usize>] {
         &self.sources

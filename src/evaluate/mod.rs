@@ -4,37 +4,53 @@
 //! it. Optimisers see nothing else, so they run any problem on any backend.
 
 mod backend;
+mod dispatches;
+#[cfg(feature = "vehicle")]
 pub mod drive;
+#[cfg(feature = "vehicle")]
 pub mod energy;
-mod fallback;
+#[cfg(feature = "vehicle")]
 mod free_car;
+#[cfg(feature = "gpu")]
 pub mod gpu;
+#[cfg(not(feature = "gpu"))]
+#[path = "no_gpu.rs"]
+pub mod gpu;
+mod ill_formed;
+#[cfg(feature = "vehicle")]
 pub mod line;
+#[cfg(feature = "vehicle")]
 mod model_table;
+#[cfg(feature = "vehicle")]
 mod objectives;
 mod open;
 mod packed;
+#[cfg(feature = "vehicle")]
 mod packs;
 pub mod point;
 pub mod portions;
 mod problem_kind;
+#[cfg(feature = "vehicle")]
 pub mod replay;
 pub mod resident;
 pub mod simd;
+#[cfg(feature = "vehicle")]
 pub mod steady;
 
 pub use backend::BackendChoice;
-pub use fallback::FallbackEvaluator;
+#[cfg(feature = "vehicle")]
 pub use free_car::FreeCar;
+pub use gpu::OnDevice;
+#[cfg(feature = "gpu")]
+pub use gpu::{DeviceKernel, FallbackEvaluator, GpuBackend};
+pub use ill_formed::IllFormed;
+#[cfg(feature = "vehicle")]
 pub use model_table::ModelTable;
 pub use open::open_evaluator;
 pub use packed::{PackedClient, run_packed};
-pub use problem_kind::{
-    CpuBackend, DeviceKernel, GpuBackend, LaneTables, OutcomeOf, ProblemKind, SimdBackend,
-};
+pub use problem_kind::{CpuBackend, LaneTables, OutcomeOf, ProblemKind, SimdBackend};
 
 use crate::error::{Error, Result};
-use crate::vehicle::tyre::IllFormed;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::cmp::Ordering;
 use std::collections::BTreeMap;
@@ -390,6 +406,11 @@ pub trait Evaluator {
     /// Faults of devices so far that evaluation recovered from, in words.
     fn device_faults(&self) -> &[String] {
         &[]
+    }
+
+    /// Time that a device itself spent on the last evaluation (ms); `None` where none can tell.
+    fn last_kernel_ms(&self) -> Option<f64> {
+        None
     }
 
     /// Scores `population`: row-major, `n` by number of variables, values within their bounds. Every candidate has a row of

@@ -48,7 +48,7 @@ macro_rules! objectives {
             }
         }
 
-        impl $crate::config::kinds::Choice for $kind {
+        impl $crate::config::Choice for $kind {
             const ALL: &'static [Self] = &<$kind>::ALL;
 
             fn name(self) -> &'static str {

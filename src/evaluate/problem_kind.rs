@@ -1,23 +1,19 @@
 //! One kind of problem on every backend: what a kind says of itself, and the evaluators that follow from it.
 
-use super::gpu::{Batching, GpuContext};
 use super::simd::InstructionSet;
 use super::{BackendInfo, Evaluation, Evaluator, FAILED_COST, Failure, Problem, are_numbers};
 use crate::error::Result;
 use rayon::prelude::*;
-use std::sync::Arc;
 
 /// What a kernel finds of a candidate, or why the candidate need not be evaluated.
 pub type OutcomeOf<K> = std::result::Result<<K as ProblemKind>::Outcome, Failure>;
 
-/// A kind of problem that every backend evaluates.
+/// A kind of problem that every backend evaluates; those of devices want `OnDevice` too.
 pub trait ProblemKind: Sync + Sized {
     /// What the kernel finds of a candidate, before objectives are made of it.
     type Outcome: Send + Sync;
     /// The kernel in lanes, with its tables in single precision.
     type Lanes: LaneTables<Self>;
-    /// The kernel on a device, with its tables and buffers.
-    type Device: DeviceKernel<Self>;
     /// Why a candidate failed whose objectives are not finite numbers in single precision. Kernels compute in it, and every backend
     /// refuses the same candidates.
     const WITHOUT_COST: Failure;
@@ -74,32 +70,8 @@ pub trait LaneTables<K: ProblemKind>: Sync {
     fn outcomes(&self, kind: &K, set: InstructionSet, candidates: &[&[f64]]) -> Vec<K::Outcome>;
 }
 
-/// The kernel of a kind of problem on a device.
-pub trait DeviceKernel<K: ProblemKind>: Sized {
-    /// The kernel and its tables on `context`'s device.
-    ///
-    /// # Errors
-    /// [`crate::Error::Device`] if the kernel does not compile or the tables do not fit the device.
-    fn open(kind: &K, context: Arc<GpuContext>) -> Result<Self>;
-
-    /// The device.
-    fn context(&self) -> &GpuContext;
-
-    /// How the work is cut.
-    fn batching(&self) -> Batching;
-
-    /// Cuts the work differently.
-    fn cut(&mut self, batching: Batching);
-
-    /// The outcomes of candidates.
-    ///
-    /// # Errors
-    /// [`crate::Error::Device`] if the device fails.
-    fn outcomes(&mut self, kind: &K, candidates: &[&[f64]]) -> Result<Vec<K::Outcome>>;
-}
-
 /// The candidates of a population; a problem without variables has one, which is empty.
-fn candidates<'p>(problem: &Problem, population: &'p [f64]) -> Vec<&'p [f64]> {
+pub(super) fn candidates<'p>(problem: &Problem, population: &'p [f64]) -> Vec<&'p [f64]> {
     match problem.variables.len() {
         0 => vec![&[]],
         width => population.chunks_exact(width).collect(),
@@ -107,14 +79,14 @@ fn candidates<'p>(problem: &Problem, population: &'p [f64]) -> Vec<&'p [f64]> {
 }
 
 /// Candidates of which some fail before they are evaluated.
-struct Checked<'c> {
+pub(super) struct Checked<'c> {
     failures: Vec<Option<Failure>>,
     /// Those that must be evaluated.
-    rows: Vec<&'c [f64]>,
+    pub rows: Vec<&'c [f64]>,
 }
 
 impl<'c> Checked<'c> {
-    fn new<K: ProblemKind>(kind: &K, candidates: &[&'c [f64]]) -> Self {
+    pub fn new<K: ProblemKind>(kind: &K, candidates: &[&'c [f64]]) -> Self {
         let failures: Vec<_> = candidates
             .par_iter()
             .map(|c| kind.preliminary_failure(c))
@@ -128,7 +100,7 @@ impl<'c> Checked<'c> {
     }
 
     /// Outcomes of those that were evaluated, in their places among those that were not.
-    fn joined<T>(self, outcomes: Vec<T>) -> Vec<std::result::Result<T, Failure>> {
+    pub fn joined<T>(self, outcomes: Vec<T>) -> Vec<std::result::Result<T, Failure>> {
         let mut outcomes = outcomes.into_iter();
         self.failures
             .into_iter()
@@ -140,7 +112,11 @@ impl<'c> Checked<'c> {
     }
 }
 
-fn evaluation<K: ProblemKind>(kind: &K, candidates: &[&[f64]], outcomes: Vec<OutcomeOf<K>>) -> Evaluation {
+pub(super) fn evaluation<K: ProblemKind>(
+    kind: &K,
+    candidates: &[&[f64]],
+    outcomes: Vec<OutcomeOf<K>>,
+) -> Evaluation {
     let rows = candidates.par_iter().zip(&outcomes);
     let rows =
         rows.map(|(candidate, outcome)| kind.objective_row(candidate, outcome.as_ref().map_err(|f| *f)));
@@ -219,62 +195,6 @@ impl<K: ProblemKind> Evaluator for SimdBackend<'_, K> {
     fn evaluate(&mut self, population: &[f64]) -> Result<Evaluation> {
         let candidates = candidates(self.kind.problem(), population);
         let outcomes = self.outcomes(&candidates);
-        Ok(evaluation(self.kind, &candidates, outcomes))
-    }
-}
-
-/// The graphics backend: `f32`, one lane per candidate.
-pub struct GpuBackend<'a, K: ProblemKind> {
-    pub(super) kind: &'a K,
-    pub(super) device: K::Device,
-}
-
-impl<'a, K: ProblemKind> GpuBackend<'a, K> {
-    /// An evaluator of `kind` on `context`'s device.
-    ///
-    /// # Errors
-    /// [`crate::Error::Device`] if the kernel does not compile or its tables do not fit the device.
-    pub fn new(kind: &'a K, context: Arc<GpuContext>) -> Result<Self> {
-        Ok(Self {
-            device: K::Device::open(kind, context)?,
-            kind,
-        })
-    }
-
-    /// Cuts the work differently.
-    pub fn with_batching(mut self, batching: Batching) -> Self {
-        self.device.cut(batching);
-        self
-    }
-
-    /// How the work is cut.
-    pub fn batching(&self) -> Batching {
-        self.device.batching()
-    }
-
-    /// The outcomes of candidates.
-    ///
-    /// # Errors
-    /// [`crate::Error::Device`] if the device fails.
-    pub fn outcomes(&mut self, candidates: &[&[f64]]) -> Result<Vec<OutcomeOf<K>>> {
-        let checked = Checked::new(self.kind, candidates);
-        let outcomes = self.device.outcomes(self.kind, &checked.rows)?;
-        Ok(checked.joined(outcomes))
-    }
-}
-
-impl<K: ProblemKind> Evaluator for GpuBackend<'_, K> {
-    fn problem(&self) -> &Problem {
-        self.kind.problem()
-    }
-
-    fn backend(&self) -> BackendInfo {
-        self.device.context().backend_info()
-    }
-
-    fn evaluate(&mut self, population: &[f64]) -> Result<Evaluation> {
-        let candidates = candidates(self.kind.problem(), population);
-        let outcomes = self.outcomes(&candidates)?;
         Ok(evaluation(self.kind, &candidates, outcomes))
     }
 }

@@ -1,15 +1,13 @@
 //! Populations that live on a device, where neither candidates nor objectives cross the bus.
 
-use super::Problem;
-use crate::error::Result;
-
 /// Particles of a block: a coordinate of all of them lies in a row, and the coordinates of a block follow one another.
 pub const BLOCK: usize = 64;
 
 /// Objectives of particles whose positions are on a device.
+#[cfg(feature = "gpu")]
 pub trait DeviceObjectives {
     /// The problem that they are of.
-    fn problem(&self) -> &Problem;
+    fn problem(&self) -> &super::Problem;
 
     /// Writes the objectives of `particles` particles. Both buffers are in blocks of [`BLOCK`] particles: a coordinate of
     /// all particles of a block in a row of `f32`, the coordinates of a block one after the other. Positions are
@@ -22,7 +20,7 @@ pub trait DeviceObjectives {
         particles: usize,
         position: &wgpu::Buffer,
         objectives: &wgpu::Buffer,
-    ) -> Result<()>;
+    ) -> crate::Result<()>;
 }
 
 /// Workgroups along two dimensions, for a particle to a lane.

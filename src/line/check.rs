@@ -15,9 +15,8 @@ pub struct Clearance {
     pub left: bool,
 }
 
-/// The least clearance of a car of this width (m) on `line` between the edges, polylines in the direction of travel,
-/// closed if the line is. Distances are to the nearest point of each edge, at every fine point; the side is the
-/// nearest point's own.
+/// The least clearance of a car of this width (m) on `line` between the edges, polylines in the direction of travel, closed if
+/// the line is. Distances are to the nearest point of each edge, at every fine point; the side is that of the nearest point.
 pub fn check_line(line: &FineLine, right_m: &[DVec2], left_m: &[DVec2], car_width_m: f64) -> Clearance {
     let mut worst = Clearance {
         margin_m: f64::INFINITY,
@@ -42,7 +41,7 @@ pub fn check_line(line: &FineLine, right_m: &[DVec2], left_m: &[DVec2], car_widt
     worst
 }
 
-/// A polyline that knows which of its stretches are near a point.
+/// A polyline that finds the stretches near a point quickly.
 pub(crate) struct Polyline<'a> {
     points_m: &'a [DVec2],
     stretches: Vec<Stretch>,
@@ -83,7 +82,7 @@ impl<'a> Polyline<'a> {
     pub(crate) fn leftward_distance(&self, point: DVec2) -> f64 {
         let n = self.points_m.len();
         let away_m = |stretch: &Stretch| point.distance(stretch.centre_m);
-        // No stretch is further off than the far side of its circle; the whisker is for rounding.
+        // No stretch is further away than the far side of its circle. The small margin is for rounding.
         let reach_m = self
             .stretches
             .iter()
@@ -106,8 +105,8 @@ impl<'a> Polyline<'a> {
             let away = point - from;
             let share = (away.dot(along) / square).clamp(0.0, 1.0);
             let distance = (away - share * along).length_squared();
-            // How squarely the point lies off the segment: where two segments share the nearest point, the one that
-            // faces it tells the side.
+            // How nearly the point lies at right angles to the segment. Where two segments share the nearest point, the one that
+            // faces the point decides the side.
             let facing = along.perp_dot(away) / square.sqrt();
             let same = (distance - nearest).abs() <= 1e-12 * nearest;
             if distance < nearest && !same || same && facing.abs() > f64::abs(leftward) {

@@ -76,7 +76,7 @@ impl FineLine {
         };
         let (right, left) = (room(&edges_m[0], 1.0), room(&edges_m[1], -1.0));
         let least = right.iter().chain(&left).fold(f64::INFINITY, |a, b| a.min(*b));
-        // What the line's own report allows: the spline between cross-sections may pass an edge by a hair.
+        // The same tolerance as in the report of the line: the spline between cross-sections may pass an edge slightly.
         if least < -0.5 {
             let found = format!("a line that leaves the car's side {:.2} m beyond an edge", -least);
             return Err(Error::input(name, "line", found, "a line within the edges"));

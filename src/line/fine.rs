@@ -3,17 +3,17 @@
 use super::point_mass::PointMass;
 use super::profile::{LapProfile, lap_profile};
 use super::spline::Spline;
-use crate::error::{Error, Result};
+use crate::error::{Error, Place, Result};
 use glam::DVec2;
 
-/// A line on a fine grid, which shows wiggles between coarse points.
+/// A line on a fine grid, which shows oscillations between coarse points.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FineLine {
     /// Whether the end joins the start.
     pub closed: bool,
     /// Points (m), the given ones among them.
     pub points_m: Vec<DVec2>,
-    /// For each point, the given point at it or before it and how far on to the next it is, as a share.
+    /// For each point, the given point at or before it, and its position towards the next one as a share.
     pub section: Vec<(usize, f64)>,
     /// Distance along the curve from the start at each point (m).
     pub station_m: Vec<f64>,
@@ -54,7 +54,7 @@ impl FineLine {
         let segments = n - usize::from(!closed);
         if let Some(i) = (0..segments).find(|&i| !(apart(i) > 1e-6 && apart(i).is_finite())) {
             let found = format!("{} m to the next", apart(i));
-            return Err(Error::input("line", format!("point {i}"), found, "points apart"));
+            return Err(Error::input("line", Place::point(i + 1), found, "points apart"));
         }
         if !(0.01..=1000.0).contains(&spacing_m) {
             return Err(Error::input(
@@ -80,7 +80,7 @@ impl FineLine {
         let mut gamma_squared = 0.0;
         for segment in 0..spline.segments() {
             let chord = spline.chord(segment);
-            // The curve is longer than the chord, and faster at one end than at the other.
+            // The curve is longer than its chord, and its parameter speed differs between the ends.
             let fastest = (0..=4)
                 .map(|i| spline.at(segment, chord * f64::from(i) / 4.0).speed)
                 .fold(1.0, f64::max);

@@ -12,10 +12,10 @@ use super::plan::{LinePlan, SectionRow};
 use super::point_mass::{LIMIT_WIDTH, LimitTable};
 use crate::scalar::{Lookup, Real};
 
-/// Terms that are summed up before they join the running total, which keeps `f32` sums of long laps exact enough.
+/// Terms that are summed before they are added to the running total. This keeps `f32` sums over long laps accurate.
 pub const BLOCK: usize = 64;
 
-/// What of a line is asked for beyond its length.
+/// The figures of a line that are wanted beside its length.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Wanted {
     /// The integral of the curvature squared.
@@ -33,8 +33,8 @@ pub struct Course<R> {
     pub curvature: Vec<R>,
     /// Speed squared at each section (m^2/s^2).
     pub speed_squared: Vec<R>,
-    /// What the first of the two drives of a lap with a motor beside the engine found of each segment: speed squared at its
-    /// end (m^2/s^2), and the motor's force over the mass (m/s^2), what was wanted of it, and what the store had energy for.
+    /// Results of the first drive of a lap with a motor beside the engine, for each segment: speed squared at its end (m^2/s^2),
+    /// and over the mass (m/s^2) the force of the motor, the force that was wanted, and the force for which the store had energy.
     pub first_drive: Vec<[R; 4]>,
 }
 
@@ -77,7 +77,7 @@ impl<R: Real> Segment<R> {
     fn between(row: &SectionRow<R::Storage>, here: [R; 2], next: [R; 2]) -> Self {
         let x = R::load(row.step[0]) + (next[0] - here[0]);
         let y = R::load(row.step[1]) + (next[1] - here[1]);
-        // Points that coincide have no direction; a tenth of a millimetre gives them one.
+        // Points that coincide have no direction. A distance of a tenth of a millimetre gives them one.
         let length = (x * x + y * y).max(R::lit(1e-8)).sqrt();
         let inverse_spacing = R::load(row.inverse_spacing);
         Self {
@@ -107,7 +107,7 @@ pub fn alpha<R: Real>(row: &SectionRow<R::Storage>, terms: usize, variables: &[R
         sum = sum + R::load(row.weights[term]) * variables[row.sources[term] as usize];
     }
     let (zero, one) = (R::lit(0.0), R::lit(1.0));
-    // Not `min` and `max`: on the very edge the sum is kept, with its derivatives.
+    // `min` and `max` would lose the derivatives of a sum exactly on the edge.
     let sum = R::select(sum.less_than(zero), zero, sum);
     R::select(one.less_than(sum), one, sum)
 }
@@ -134,7 +134,7 @@ pub fn shape<R: Real>(
     course.curvature.clear();
     course.curvature.resize(n, zero);
 
-    // No closure: what an instruction set compiles anew has to be inlined, and closures cannot be told to.
+    // This is not a closure. Code that is compiled for an instruction set has to be inlined, and closures cannot be marked so.
     let first = offset(&plan.rows[0], plan.terms, variables);
     let mut here = first;
     let mut before = None;
@@ -207,13 +207,13 @@ pub(super) fn look_up<R: Lookup>(
 /// Greatest speed squared (m^2/s^2) in a bend.
 #[inline(always)]
 pub fn corner<R: Lookup>(limits: &LimitTable<R::Storage>, curvature: R) -> R {
-    // Straights have no radius; a thousand kilometres will do.
+    // Straights have no radius; a thousand kilometres stand for it.
     let radius = R::lit(1.0) / curvature.max(R::lit(1e-6));
     let (place, beyond) = (radius * R::load(limits.rows_per_radius)).place(limits.corners.len() / 2, 2);
     look_up(&limits.corners, 2, place, beyond, 0)
 }
 
-/// What is left of the grip lengthways, drive and drag (m/s^2) at a speed squared in a bend.
+/// The longitudinal grip that is left, the drive and the drag (m/s^2) at a speed squared in a bend.
 #[inline(always)]
 pub(super) fn limits_at<R: Lookup>(
     limits: &LimitTable<R::Storage>,
@@ -244,10 +244,10 @@ pub fn longitudinal<R: Lookup>(limits: &LimitTable<R::Storage>, speed_squared: R
     [grip.min(drive) - drag, grip + drag]
 }
 
-/// Speed squared after driving from a section to the next, on the mean of the limits at the start and at the middle.
-/// Out of a bend's middle the ellipse opens within a segment: the middle alone is then optimistic and the start alone
-/// pessimistic. On smooth lines at 5 to 16 m the middle was 0.4% to 1.2% of a lap off, the start 0.4% to 0.5% the other
-/// way, and the mean 0.1% to 0.2%. On jagged lines no coarse grid is to be trusted.
+/// Speed squared after driving from a section to the next, on the mean of the limits at the start and at the middle. Out of a
+/// bend's middle the ellipse opens within a segment: the middle alone is then optimistic and the start alone pessimistic. On
+/// smooth lines at 5 to 16 m the middle was 0.4% to 1.2% of a lap off, the start 0.4% to 0.5% the other way, and the mean 0.1% to
+/// 0.2%. On jagged lines no coarse grid is accurate.
 #[inline(always)]
 fn driven<R: Lookup>(limits: &LimitTable<R::Storage>, from: R, length: R, here: R, there: R) -> R {
     let zero = R::lit(0.0);
@@ -257,7 +257,7 @@ fn driven<R: Lookup>(limits: &LimitTable<R::Storage>, from: R, length: R, here: 
     (from + length * (start + drive)).max(zero)
 }
 
-/// Speed squared from which the car just brakes to that of the next section.
+/// Greatest speed squared from which the car can brake to that of the next section.
 #[inline(always)]
 pub(super) fn braked<R: Lookup>(limits: &LimitTable<R::Storage>, to: R, length: R, there: R, here: R) -> R {
     let [_, end] = longitudinal(limits, to, there);
@@ -301,7 +301,7 @@ pub fn lap_time<R: Lookup>(
             curvature[here],
             curvature[next],
         );
-        // The first time round a section is only held to its corner speed.
+        // In the first round a section is limited by its corner speed alone.
         let again = step + 1 >= n;
         let most = if again {
             speeds[next]

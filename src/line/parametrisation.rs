@@ -1,4 +1,4 @@
-//! How few or many numbers give a line.
+//! The numbers that describe a line.
 
 use super::plan::{LinePlan, TERMS};
 use crate::error::{Error, Result};
@@ -6,20 +6,20 @@ use crate::evaluate::Variable;
 use crate::track::CrossSections;
 use nalgebra::{DMatrix, DVector};
 
-/// What the coefficients of a line are.
+/// The meaning of a line's coefficients.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Basis {
     /// `alpha` at every section.
     Sections,
-    /// Control points of a uniform cubic B-spline over the station: periodic on a closed circuit, clamped at the ends of
-    /// an open one (L. Piegl and W. Tiller, *The NURBS Book*, 2nd ed., 1997, ch. 2). It is the line's distance from the
-    /// reference line, in mean widths of the road and from one half on: `alpha` where the road is even, and smooth as
-    /// the reference line is where its edges are jagged, which no smooth `alpha` could be.
+    /// Control points of a uniform cubic B-spline over the station: periodic on a closed circuit, clamped at the ends of an open
+    /// one (L. Piegl and W. Tiller, *The NURBS Book*, 2nd ed., 1997, ch. 2). It is the line's distance from the reference line,
+    /// in mean widths of the road and from one half on: This is `alpha` where the road has an even width. Where the edges are
+    /// jagged, the line is still as smooth as the reference line; a line with a smooth `alpha` would not be.
     ControlPoints { count: usize, overshoot: f64 },
 }
 
-/// How a line's `alpha` follows from a candidate's variables: the values of all the coefficients, or of some of them
-/// while the others keep those of a context line.
+/// How a line's `alpha` follows from a candidate's variables. The variables are all coefficients, or some of them; the others
+/// keep their values of a context line.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Parametrisation {
     basis: Basis,
@@ -167,7 +167,7 @@ impl Parametrisation {
         bounds
     }
 
-    /// How much of a cross-section's width a change by one of what the coefficients add up to is.
+    /// Change of `alpha` at a section when the sum of its coefficients changes by one.
     fn scales(&self, cuts: &CrossSections) -> Vec<f64> {
         if self.basis == Basis::Sections {
             return vec![1.0; cuts.len()];
@@ -178,7 +178,7 @@ impl Parametrisation {
         widths.into_iter().map(|width| mean / width).collect()
     }
 
-    /// `alpha` at a section where what the coefficients add up to is zero.
+    /// `alpha` at a section when the sum of its coefficients is zero.
     fn origin(&self, cuts: &CrossSections, section: usize, scale: f64) -> f64 {
         match self.basis {
             Basis::Sections => 0.0,
@@ -186,7 +186,7 @@ impl Parametrisation {
         }
     }
 
-    /// The coefficients that `alpha` at a section is the sum of, and their weights.
+    /// The coefficients that are summed for `alpha` at a section, and their weights.
     fn weights_at(&self, cuts: &CrossSections, section: usize) -> [(usize, f64); TERMS] {
         let Basis::ControlPoints { count, .. } = self.basis else {
             return [(section, 1.0), (section, 0.0), (section, 0.0), (section, 0.0)];
@@ -281,7 +281,8 @@ impl Parametrisation {
             return Ok(alpha.iter().map(|a| a.clamp(0.0, 1.0)).collect());
         };
         let scales = self.scales(cuts);
-        // Normal equations, with a trace of the identity: control points that no section sees stay in the middle.
+        // Normal equations plus a very small multiple of the identity, so that control points without a section stay in the
+        // middle.
         let mut matrix = DMatrix::<f64>::identity(count, count) * 1e-9;
         let mut right = DVector::from_element(count, 0.5e-9);
         for (section, alpha) in alpha.iter().enumerate() {

@@ -1,8 +1,8 @@
 //! Cross-sections square to a line, instead of the road's own.
 //!
 //! The direction of a road's cross-sections comes from its survey. A line that lies far from the reference line inherits their
-//! jitter. Where it bends unlike the reference line, a few control points cannot describe it. Along cross-sections square to a
-//! line that is nearly right, a smooth `alpha` gives a smooth line in the plane.
+//! jitter. Where the line bends unlike the reference line, a few control points cannot describe it. Along cross-sections square
+//! to a line that is nearly right, a smooth `alpha` gives a smooth line in the plane.
 
 use super::fine::FineLine;
 use crate::error::{Error, Result};
@@ -11,7 +11,7 @@ use glam::DVec2;
 
 /// Distance between the points that curves are followed by (m). A chord of this length is half a millimetre off a bend of 15 m.
 const STEP_M: f64 = 0.25;
-/// How far along the road an edge may lie from the cross-section that looks for it (m).
+/// Greatest distance along the road between a cross-section and the piece of edge that it meets (m).
 const REACH_M: f64 = 60.0;
 /// Usable road that is left where edges meet (m).
 const LEAST_M: f64 = 0.1;
@@ -56,7 +56,7 @@ fn crossings(road: &CrossSections, curve: &FineLine) -> Result<Vec<Crossing>> {
         let (right, across) = (road.right_m[cut], road.left_m[cut] - road.right_m[cut]);
         let ends = [curve.points_m[segment % k], curve.points_m[(segment + 1) % k]];
         let [alpha, share] = meeting(right, across, ends[0], ends[1])?;
-        // A whisker more than the segment, so that none slips through between two.
+        // Slightly more than the segment, so that no crossing is missed between two segments.
         let crosses = (-1e-9..=1.0 + 1e-9).contains(&share) && (-0.5..=1.5).contains(&alpha);
         crosses.then(|| Crossing {
             station_m: curve.station_m[segment % k] + share * curve.segment_m[segment % k],
@@ -123,7 +123,7 @@ pub fn cuts_about(road: &CrossSections, points_m: &[DVec2], count: usize) -> Res
         let left = left_at(segment).lerp(left_at(segment + 1), share).normalize();
         let near = by_station.partition_point(|(s, _)| *s <= station_m).max(1) - 1;
         let near = by_station[near].1;
-        // Of several places where an edge is met, as in a hairpin, the nearest is the line's own.
+        // In a hairpin an edge is met several times. The nearest place belongs to the line.
         let edge = |ends: &[DVec2]| {
             (0..2 * reach)
                 .map(|j| (near + n + j - reach) % n)
@@ -139,7 +139,7 @@ pub fn cuts_about(road: &CrossSections, points_m: &[DVec2], count: usize) -> Res
         limits.push([right, left_end]);
     }
 
-    // Between two cross-sections a corner of an edge may stand further in than at either: both keep clear of it.
+    // Between two cross-sections a corner of an edge may stand further in than at either: both are shortened to it.
     for (station_m, cut) in by_station {
         for (side, end) in [road.right_m[cut], road.left_m[cut]].into_iter().enumerate() {
             let about = curve.station_m.partition_point(|s| *s <= station_m) + k;

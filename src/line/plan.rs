@@ -6,7 +6,7 @@ use glam::DVec2;
 /// Terms of the sum that gives `alpha` at a section.
 pub const TERMS: usize = 4;
 
-/// One section, in differences: with absolute coordinates, single precision would lose the curvature.
+/// One section, in differences of coordinates. Absolute coordinates in single precision would lose the curvature.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SectionRow<S> {
     /// From the right end of this cross-section to that of the next (m).
@@ -23,7 +23,7 @@ pub struct SectionRow<S> {
     pub sources: [u32; TERMS],
 }
 
-/// All sections, and how the lap goes through them.
+/// All sections, and the order in which a lap passes them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LinePlan<S> {
     /// Whether the last section is followed by the first.
@@ -45,7 +45,7 @@ impl LinePlan<f64> {
     pub fn of_cuts(right_m: &[DVec2], left_m: &[DVec2], closed: bool) -> Self {
         let n = right_m.len();
         let middle = |i: usize| 0.5 * (right_m[i] + left_m[i]);
-        // As kernels have it, points that coincide are a tenth of a millimetre apart.
+        // As in the kernels, points that coincide count as a tenth of a millimetre apart.
         let spacing = |i: usize| middle(i).distance(middle((i + 1) % n)).max(1e-4);
         let rows = (0..n).map(|i| SectionRow {
             step: (right_m[(i + 1) % n] - right_m[i]).to_array(),
@@ -72,7 +72,7 @@ impl LinePlan<f64> {
         self
     }
 
-    /// The plan of one line that no variable moves.
+    /// The plan of one fixed line.
     pub fn of_points(points_m: &[DVec2], closed: bool) -> Self {
         Self::of_cuts(points_m, points_m, closed)
     }

@@ -1,4 +1,4 @@
-//! The point mass of quasi-steady-state laps, and its limits as tables that every backend looks up alike.
+//! The point mass of quasi-steady-state laps, and its envelope as tables that every backend looks up in the same way.
 
 use crate::error::{Error, Result};
 use crate::scalar::Real;
@@ -7,7 +7,7 @@ use crate::vehicle::Envelope;
 /// A point mass within a car's g-g-v envelope.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PointMass {
-    /// The limits over speed.
+    /// Its g-g-v envelope.
     pub envelope: Envelope,
     /// Exponent of the friction ellipse, 1 to 4: 2 is the ellipse itself.
     pub ellipse_exponent: f64,
@@ -15,14 +15,14 @@ pub struct PointMass {
     pub wheelbase_m: f64,
     /// Greatest steering angle at the wheels (rad), if steering is limited.
     ///
-    /// A bend tighter than the lock allows cannot be driven. So that a search finds its way back from there, its corner
-    /// speed squared falls with the fourth power of the radius instead of the line failing.
+    /// A bend tighter than the lock allows cannot be driven. The line does not fail: the corner speed squared falls with the
+    /// fourth power of the radius, so that a search is led back to lines that can be driven.
     pub max_steer_rad: Option<f64>,
 }
 
-/// The limits of a [`PointMass`] over even steps of the speed squared, in which its equation of motion is written.
+/// The envelope of a [`PointMass`] over even steps of the speed squared, the variable of its equation of motion.
 ///
-/// Tables have for each row the figures at its start and then how much they rise to its end.
+/// Each row of a table has the figures at its start, then their rises to its end.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LimitTable<S> {
     /// Greatest speed squared (m^2/s^2).
@@ -46,7 +46,7 @@ pub const LIMIT_WIDTH: usize = 8;
 const LIMIT_ROWS: usize = 512;
 /// Rows over radius. Corner speed squared bends so little over it that a step of the usual 0.3 m costs 1e-6 of it.
 const CORNER_ROWS: usize = 1024;
-/// Rows over the share.
+/// Rows over the lateral share.
 const ELLIPSE_ROWS: usize = 256;
 
 impl PointMass {
@@ -80,7 +80,7 @@ impl PointMass {
             .map_or(Ok(()), |x| within("max_steer_rad", x, 0.01, 1.5))
     }
 
-    /// The tables of the limits.
+    /// The tables of its envelope.
     ///
     /// # Errors
     /// As [`PointMass::check`].
@@ -92,7 +92,7 @@ impl PointMass {
             [row.ay_mps2, row.ax_grip_mps2, row.ax_drive_mps2, row.drag_mps2]
         };
         let mut knots: Vec<[f64; 4]> = (0..=LIMIT_ROWS).map(at_knot).collect();
-        // Speed is held at the greatest, so that drive need not fall to zero within a row.
+        // Speed is limited to the greatest one, so the drive need not fall to zero within a row.
         let last = self.envelope.rows()[self.envelope.rows().len() - 1];
         knots[LIMIT_ROWS][2] = last.ax_drive_mps2;
         let (radius_top, corner_knots) = self.corners(top, &knots);
@@ -122,7 +122,7 @@ impl PointMass {
         let mut row = 0;
         let corners = (0..=CORNER_ROWS).map(|i| {
             let radius = radius_top * i as f64 / CORNER_ROWS as f64;
-            // The first row at whose end the limit is passed; with the radius it only moves on.
+            // The first row at whose end the limit is passed; it moves up as the radius grows.
             while row < LIMIT_ROWS && (row + 1) as f64 * step <= lateral(row + 1) * radius {
                 row += 1;
             }

@@ -1,4 +1,4 @@
-//! Everything about a lap on one line.
+//! All figures of a lap on one line.
 
 use super::kernel::{Course, lap_time};
 use super::point_mass::{LimitTable, PointMass};
@@ -52,9 +52,8 @@ pub fn lap_profile(
     entry_mps: f64,
 ) -> Result<LapProfile> {
     let n = curvature_1pm.len();
-    let wrong = |place: &str, found: String, expected: &str| {
-        Err(Error::input("line", place.to_owned(), found, expected))
-    };
+    let wrong =
+        |place: &str, found: String, expected: &str| Err(Error::input("line", place, found, expected));
     let closed = segment_m.len() == n;
     if n < 2 || !(closed || segment_m.len() + 1 == n) {
         let found = format!("{} segments and {n} sections", segment_m.len());

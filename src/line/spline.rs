@@ -120,7 +120,7 @@ fn solve(below: &[f64], middle: &[f64], above: &[f64], right: &[DVec2]) -> Vec<D
     x
 }
 
-/// The same with `below[0]` and `above[n - 1]` in the corners, by the formula of Sherman and Morrison.
+/// The same for a periodic system, with `below[0]` and `above[n - 1]` in the corners, by the formula of Sherman and Morrison.
 fn solve_cyclic(below: &[f64], middle: &[f64], above: &[f64], right: &[DVec2]) -> Vec<DVec2> {
     let n = right.len();
     let (corner_high, corner_low) = (below[0], above[n - 1]);

@@ -1,7 +1,7 @@
 //! Lines in tables.
 
 use crate::config::read_text;
-use crate::error::{Error, Result};
+use crate::error::{Error, Place, Result};
 use glam::DVec2;
 use std::path::Path;
 
@@ -19,13 +19,13 @@ pub fn read_line(path: &Path) -> Result<Vec<DVec2>> {
         .comment(Some(b'#'))
         .trim(csv::Trim::All)
         .from_reader(text.as_bytes());
-    let refuse = |place: String, found: String| {
+    let refuse = |place: Place, found: String| {
         let expected = "columns `x (m)` and `y (m)` of finite numbers, 8 rows or more";
         Error::input(path, place, found, expected)
     };
     let unreadable = |e: csv::Error| {
         let line = e.position().map_or(1, csv::Position::line);
-        refuse(format!("line {line}"), e.to_string())
+        refuse(Place::line(line as usize), e.to_string())
     };
     let joined = |record: &csv::StringRecord| record.iter().collect::<Vec<_>>().join(",");
     let header = reader.headers().map_err(unreadable)?.clone();
@@ -35,7 +35,7 @@ pub fn read_line(path: &Path) -> Result<Vec<DVec2>> {
             unit.is_some_and(|unit| unit.is_empty() || unit.starts_with(['_', ' ', '[']))
         };
         let found = header.iter().position(named);
-        found.ok_or_else(|| refuse("line 1".to_owned(), joined(&header)))
+        found.ok_or_else(|| refuse(Place::line(1), joined(&header)))
     };
     let columns = [column("x")?, column("y")?];
     let mut points = Vec::new();
@@ -44,12 +44,12 @@ pub fn read_line(path: &Path) -> Result<Vec<DVec2>> {
         let number = |k: usize| record.get(k)?.parse().ok().filter(|v: &f64| v.is_finite());
         let [Some(x), Some(y)] = columns.map(number) else {
             let line = record.position().map_or(0, csv::Position::line);
-            return Err(refuse(format!("line {line}"), joined(&record)));
+            return Err(refuse(Place::line(line as usize), joined(&record)));
         };
         points.push(DVec2::new(x, y));
     }
     if points.len() < LEAST_POINTS {
-        return Err(refuse("rows".to_owned(), points.len().to_string()));
+        return Err(refuse("rows".into(), points.len().to_string()));
     }
     Ok(points)
 }

@@ -23,7 +23,7 @@ pub(super) struct Affine {
 }
 
 impl Affine {
-    /// A map without constant, as of a change.
+    /// A map without a constant.
     pub fn change(terms: Vec<(usize, f64)>) -> Self {
         Self { constant: 0.0, terms }.merged()
     }
@@ -64,13 +64,13 @@ pub(super) struct Solution {
     pub iterations: usize,
 }
 
-/// Relative accuracy asked of the solver. What it cannot reach it reports as [`Status::Almost`] at worst.
+/// Relative accuracy that is asked of the solver. A solution of less accuracy is reported as [`Status::Almost`].
 const TOLERANCE: f64 = 1e-10;
 /// Least accuracy of a solution.
 const REDUCED_TOLERANCE: f64 = 1e-6;
 
 impl ConicProgram {
-    /// Variables between `lower` and `upper`; an infinite bound does not count.
+    /// Variables between `lower` and `upper`; an infinite bound is no bound.
     pub fn new(lower: Vec<f64>, upper: Vec<f64>) -> Self {
         Self {
             linear: vec![0.0; lower.len()],
@@ -109,7 +109,7 @@ impl ConicProgram {
         self.nonnegatives.push(map);
     }
 
-    /// Solves to a relative `tolerance` only, as for a step of a sequence.
+    /// Sets the relative `tolerance`; steps of a sequence need less accuracy.
     pub fn with_tolerance(mut self, tolerance: f64) -> Self {
         self.tolerance = tolerance;
         self
@@ -120,7 +120,7 @@ impl ConicProgram {
         self.cones.push(cone);
     }
 
-    /// The objective at `x`, less the squares' part that does not change.
+    /// The objective at `x` without the constant part of the squares.
     pub fn value(&self, x: &[f64]) -> f64 {
         let linear: f64 = self.linear.iter().zip(x).map(|(c, x)| c * x).sum();
         let square = |map: &Affine| {

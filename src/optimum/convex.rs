@@ -15,7 +15,7 @@ pub struct Optimum {
     pub x: Vec<f64>,
     /// The objective, computed from the line itself.
     pub value: f64,
-    /// A bound that no line is better than, if the problem is convex.
+    /// A bound on the objective that no line passes, if the problem is convex.
     pub lower_bound: Option<f64>,
     /// How the solver ended.
     pub status: Status,
@@ -25,7 +25,7 @@ pub struct Optimum {
     pub programs: usize,
     /// Steps of the solver in all of them.
     pub iterations: usize,
-    /// Time that it took (s).
+    /// Elapsed time (s).
     pub seconds: f64,
 }
 
@@ -115,7 +115,7 @@ pub fn least_gamma(map: &LineMap, spacing_m: &[f64], bounds: &Bounds) -> Result<
         };
         problem.measures(x).gamma_1pm
     })?;
-    // The program knows the square.
+    // The program minimises the square.
     optimum.lower_bound = optimum.lower_bound.map(|square| square.max(0.0).sqrt());
     Ok(optimum)
 }

@@ -1,4 +1,4 @@
-//! Where a motor's energy buys most time on a fixed line.
+//! The deployment of a motor's energy that saves most time on a fixed line.
 //!
 //! Speeds squared and the motor's share of its force in each segment are the unknowns. The lap time is a convex function of
 //! the speeds squared, and braking bounds them from above whatever the motor does. Only the acceleration by engine, tyres and
@@ -28,11 +28,11 @@ pub struct Deployment {
     /// The last program's bound on the time (s): to first order about the previous lap no lap is faster. `None` if no program was
     /// solved well enough.
     pub bound_s: Option<f64>,
-    /// Time that it took (s).
+    /// Elapsed time (s).
     pub seconds: f64,
 }
 
-/// Where deployments are looked for.
+/// The line and the car of a search for deployments.
 pub struct DeploymentSearch<'a> {
     /// The car.
     pub car: &'a EnergyCar,
@@ -48,11 +48,11 @@ pub struct DeploymentSearch<'a> {
 
 /// Programs at most.
 const PROGRAMS: usize = 30;
-/// A gain of time below which the search ends (s), well under what a lap is measured to.
+/// Gain of time below which the search ends (s), well below the resolution of lap times.
 const GAIN_S: f64 = 2e-5;
-/// Shares move no further than this in the first program.
+/// Greatest change of a share in the first program.
 const FIRST_MOVE: f64 = 1.0;
-/// Speeds squared are computed in these (m^2/s^2), so that all unknowns are about one.
+/// Unit of speeds squared in the programs (m^2/s^2), so that all unknowns are about one.
 const SQUARE: f64 = 1000.0;
 /// Step of the derivatives by the speed squared, as a share of it.
 const DERIVATIVE: f64 = 1e-4;
@@ -144,7 +144,7 @@ impl DeploymentSearch<'_> {
                     break;
                 }
             } else {
-                // The model is only good nearby.
+                // The linear model holds near the last lap only.
                 reach *= 0.4;
                 if reach < 1e-3 {
                     break;
@@ -171,12 +171,13 @@ impl DeploymentSearch<'_> {
         let around = DERIVATIVE * square;
         let (low, high) = (step(square - around, share), step(square + around, share));
         let slope = |k: usize| (high[k] - low[k]) / (2.0 * around);
-        // Between no motor and all of it: beyond what the tyres take, a share changes neither speed nor energy.
+        // The derivative is taken between no motor and the whole motor. Beyond the grip of the tyres a share changes neither
+        // speed nor energy.
         let (none, all) = (step(square, 0.0), step(square, 1.0));
         Linear {
             reached,
-            // Arriving faster never means leaving slower: where a step on the very limit of grip says so, a program would
-            // slow down for it, and the next lap would not.
+            // A greater speed at the start never gives a smaller one at the end. At the limit of grip a finite step may suggest
+            // so; a program would then slow down, and the next lap would not.
             by_square: slope(0).max(0.0),
             by_share: all[0] - none[0],
             energy: cost * motor,

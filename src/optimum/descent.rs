@@ -17,7 +17,7 @@ use std::time::Instant;
 pub struct DescentSettings {
     /// Most cone programs. Three bring a smooth line within some parts in a thousand of its optimum.
     pub programs: usize,
-    /// The sequence ends when no step promises more than this share of the cost.
+    /// The sequence ends when no step predicts a gain above this share of the cost.
     pub least_gain: f64,
     /// First weight of the distance from the line that a step starts at. At 1 it outweighs, for lap time, what a step's
     /// model leaves out.
@@ -45,23 +45,23 @@ pub struct Start {
 
 /// Relative accuracy of a program.
 const PROGRAM_TOLERANCE: f64 = 1e-8;
-/// Share of the promise below which a step is taken back.
+/// Share of the predicted gain below which a step is rejected.
 const LEAST_KEPT: f64 = 0.1;
-/// Share of the promise above which the next step may be bolder.
+/// Share of the predicted gain above which the penalty on the next step is reduced.
 const WELL_KEPT: f64 = 0.7;
-/// What caution is multiplied by after a step taken back, and after one that kept its promise.
+/// Factors on the penalty after a rejected step and after a good one.
 const CAUTION: (f64, f64) = (4.0, 0.4);
-/// Caution beyond which nothing but rounding is left.
+/// Penalty beyond which only rounding is left to gain.
 const MOST_CAUTION: f64 = 1e7;
-/// Weight of the squared step of a variable at a caution of 1, as a share of the cost over the number of variables.
+/// Weight of the squared step of a variable at a penalty of 1, as a share of the cost over the number of variables.
 const DAMPING: f64 = 1e-3;
 
-/// Improves a line from `x` until no step promises a gain: a point that meets the first-order conditions.
+/// Improves a line from `x` until no step predicts a gain: a point that meets the first-order conditions.
 ///
 /// Each step solves a cone program in line and speeds together. The tyres' demand, linear about the last line, stays inside the
 /// friction ellipse. The ellipse is kept as a cone, so a step sees every limit that it may meet, and kinks do no harm. The other
 /// measures have their exact gradient and a positive semidefinite part of their second derivative (Gauss-Newton). A penalty on
-/// the distance from the last line makes up for what the model leaves out. Steps are judged by the exact measures of the new
+/// the distance from the last line accounts for what the model leaves out. Steps are judged by the exact measures of the new
 /// line, so no line ends worse than it starts.
 ///
 /// The optimum's value is the weighted cost.

@@ -8,8 +8,8 @@ use glam::DVec2;
 
 /// The points of a line as a linear function of its variables: `point_j = origin_j + sum of reach_jk x_k`.
 ///
-/// Everything that a line is commonly given by is of this form: its place on every cross-section, the controls of a
-/// B-spline, points that an interpolating spline goes through.
+/// All usual descriptions of a line have this form: its position on every cross-section, the controls of a B-spline, the points
+/// of an interpolating spline.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LineMap {
     /// Whether the last point is followed by the first.
@@ -68,7 +68,7 @@ impl LineMap {
             (cuts.right_m[i] + row.constant * across, reach.collect())
         });
         let map = Self::new(cuts.closed, variables.len(), points);
-        // A single variable at a section is within its own bounds.
+        // A single variable at a section has its own bounds.
         let sums = plan.rows.iter().filter(|_| plan.terms > 1);
         let rows = sums.map(|row| RowBound {
             terms: shares(row),
@@ -84,8 +84,9 @@ impl LineMap {
     }
 
     /// A line `base` (its `alpha` on every cross-section) moved along the cross-sections by a cubic B-spline with `controls` (m,
-    /// to the left), and the bounds that keep it on the road at every cross-section. Where the base is smooth, all such lines
-    /// are, however jagged the edges; which `alpha` as a spline cannot say. The base itself may lie off the road.
+    /// to the left), and the bounds that keep it on the road at every cross-section. If the base is smooth, so are all such
+    /// lines, however jagged the edges are. Lines whose `alpha` is a spline lack that property. The base itself may lie off the
+    /// road.
     pub fn spline_about(cuts: &CrossSections, base: &[f64], controls: usize) -> (Self, Bounds) {
         let points = cuts.points(base);
         let across = |i: usize| (cuts.left_m[i] - cuts.right_m[i]).normalize();
@@ -119,7 +120,7 @@ impl LineMap {
         self.origin_m.len()
     }
 
-    /// What moves point `j`: variables and reaches (m).
+    /// The variables that move point `j`, with their reaches (m).
     pub fn reach(&self, j: usize) -> &[(usize, DVec2)] {
         &self.reach[self.starts[j]..self.starts[j + 1]]
     }
@@ -145,8 +146,8 @@ impl LineMap {
     }
 }
 
-/// What each of `controls` evenly spaced controls of a cubic B-spline counts at cross-section `i`; the outer ones of an open
-/// circuit count for those that would lie beyond its ends.
+/// Weights of `controls` evenly spaced controls of a cubic B-spline at cross-section `i`. On an open circuit the outer controls
+/// also stand for those that would lie beyond the ends.
 fn spline_shares(cuts: &CrossSections, controls: usize, i: usize) -> Vec<(usize, f64)> {
     let last = controls as isize - 1;
     let spans = if cuts.closed { controls as f64 } else { last as f64 };
@@ -293,7 +294,7 @@ impl Shape {
         let mut by_point = vec![DVec2::ZERO; n];
         for (s, step) in self.step_m.iter().enumerate() {
             let length = self.length_m[s];
-            // A step grows along itself and turns across itself.
+            // A change along the step changes its length, and a change across it turns it.
             let along = *step * (by_length[s] / length);
             let across = step.perp() * (by_heading[s] / (length * length));
             by_point[(s + 1) % n] += along + across;

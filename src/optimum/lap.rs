@@ -11,7 +11,7 @@
 
 use super::geometry::Shape;
 
-/// A quantity at one speed, and its change for each m/s.
+/// A quantity at one speed, with its derivative by speed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Slope {
     /// The quantity.
@@ -23,32 +23,32 @@ pub struct Slope {
 /// What a point mass can do at one speed, all in m/s^2.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Grip {
-    /// Most that the tyres give sideways.
+    /// Greatest lateral acceleration by the tyres.
     pub lateral: Slope,
-    /// Most that the tyres give lengthways.
+    /// Greatest longitudinal acceleration by the tyres.
     pub longitudinal: Slope,
-    /// Most that the drive train asks of the tyres.
+    /// Greatest acceleration by the drive train.
     pub drive: Slope,
-    /// Deceleration by drag, which is no tyre force.
+    /// Deceleration by drag, which is not a force of the tyres.
     pub drag: Slope,
 }
 
-/// Limits of a point mass, by speed.
+/// The g-g-v envelope of a point mass.
 pub trait Limits: Sync {
-    /// The limits at a speed (m/s).
+    /// The envelope at a speed (m/s).
     fn at(&self, speed_mps: f64) -> Grip;
-    /// The speed that is never exceeded (m/s).
+    /// The top speed (m/s).
     fn top_speed_mps(&self) -> f64;
 }
 
-/// Which way a segment is driven: out of a corner, or, backwards, into one.
+/// The direction of a pass: driving out of a corner, or backwards into one for braking.
 #[derive(Clone, Copy, PartialEq)]
 enum Pass {
     Drive,
     Brake,
 }
 
-/// Where `e` of a node came from, with the derivatives of a segment's end by its start, curvature and length.
+/// What determines `e` at a node, with the derivatives of the value at a segment's end by its start, curvature and length.
 #[derive(Clone, Copy, Debug)]
 enum Origin {
     /// The node's own limit (of a corner, or what the drive pass left).
@@ -73,7 +73,7 @@ pub enum SegmentBend {
     Mean,
 }
 
-/// The curvature of every segment (1/m), and what each of its ends counts for in it.
+/// The curvature of every segment (1/m), and the weight of each of its ends in it.
 #[derive(Clone, Debug)]
 pub(super) struct Bends {
     pub curvature_1pm: Vec<f64>,
@@ -116,7 +116,8 @@ pub(super) struct Lap {
     brake: Vec<(usize, Origin)>,
 }
 
-/// Newton's steps, with halving to fall back on, of a segment. Halving alone needs 52 for every bit of an `f64`.
+/// Most iterations for a segment: Newton's steps, or bisection where they fail. Bisection alone takes 52 for all bits of an
+/// `f64`.
 const MOST_STEPS: usize = 60;
 /// Relative accuracy of `e` at which Newton's steps end.
 const ACCURACY: f64 = 1e-12;
@@ -219,7 +220,7 @@ fn corner_square(limits: &dyn Limits, curvature_1pm: f64) -> (f64, f64) {
     let k = curvature_1pm.abs();
     let top = limits.top_speed_mps();
     let mut high = top * top;
-    // Grip less need, falling through zero at the corner's speed.
+    // The grip less the need for it, which falls through zero at the corner speed.
     let spare = |e: f64| {
         let v = e.sqrt();
         let lateral = limits.at(v).lateral;
@@ -284,7 +285,8 @@ fn push(limits: &dyn Limits, pass: Pass, e: f64, curvature_1pm: f64) -> Push {
         };
     }
     if left <= 0.0 {
-        // Beyond the tyres' limit: coasting. Over in O(h) round a corner's slowest point, never on the fastest line's flank.
+        // Beyond the limit of the tyres the car coasts. This happens within O(h) of the slowest point of a corner, never on the
+        // flanks of the fastest line.
         return Push {
             share: 1.0,
             value: drag_value,
@@ -304,7 +306,7 @@ fn push(limits: &dyn Limits, pass: Pass, e: f64, curvature_1pm: f64) -> Push {
     }
 }
 
-/// The middle of a segment if limits did not change over it: where a parabola meets the ellipse.
+/// The middle of a segment if the envelope did not change over it: the intersection of a parabola and the ellipse.
 fn guess(limits: &dyn Limits, pass: Pass, start: f64, curvature_1pm: f64, h: f64) -> f64 {
     let grip = limits.at(start.sqrt().max(f64::MIN_POSITIVE));
     let drag = match pass {
@@ -325,11 +327,12 @@ fn guess(limits: &dyn Limits, pass: Pass, start: f64, curvature_1pm: f64, h: f64
     }
 }
 
-/// The `e` that a pass reaches from `start` over one segment, by the implicit midpoint rule: the limit is that at the
-/// middle, `e_m = start + h a(e_m)`, which is of second order and, the limit falling with speed, never unstable.
+/// The `e` that a pass reaches from `start` over one segment, by the implicit midpoint rule: the acceleration is that at the
+/// middle, `e_m = start + h a(e_m)`. The rule is of second order, and stable because the envelope falls with speed.
 fn across(limits: &dyn Limits, pass: Pass, start: f64, curvature_1pm: f64, h: f64) -> (f64, Origin) {
     let first = push(limits, pass, start, curvature_1pm);
-    // No limit rises so fast with e that h times its slope passes one half, so the middle lies within twice Euler's step.
+    // No acceleration rises so fast with `e` that `h` times its slope exceeds one half. The middle therefore lies within twice
+    // the step of Euler's method.
     let reach = 2.0 * h * first.value;
     let (mut low, mut high) = ((start + reach.min(0.0)).max(0.0), start + reach.max(0.0));
     let mut e = guess(limits, pass, start, curvature_1pm, h).clamp(low, high);
@@ -364,7 +367,7 @@ fn across(limits: &dyn Limits, pass: Pass, start: f64, curvature_1pm: f64, h: f6
 
 type Passed = (Vec<f64>, Vec<(usize, Origin)>);
 
-/// Drives `count` nodes from `first` on, which has its corner's speed.
+/// Drives `count` nodes from `first` on, where the car has its corner speed.
 fn drive_pass(
     shape: &Shape,
     bends: &Bends,
@@ -427,8 +430,8 @@ fn closed_drive(shape: &Shape, bends: &Bends, limits: &dyn Limits, corner: &[f64
     drive_pass(shape, bends, limits, corner, first, 2 * n)
 }
 
-/// Brakes for what the drive pass left, backwards from its slowest node (whose speed is below all that could demand less)
-/// on a closed line and from the end of an open one.
+/// The braking pass, backwards below the speeds of the drive pass. It starts at the slowest node of a closed line, which no
+/// braking can lower, or at the end of an open one.
 fn brake_pass(shape: &Shape, bends: &Bends, limits: &dyn Limits, after_drive: &[f64]) -> Passed {
     let n = after_drive.len();
     let slowest = (0..n)

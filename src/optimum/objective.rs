@@ -6,7 +6,7 @@ use crate::hold::{self, Point};
 use glam::DVec2;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// How much each measure of a line counts; zero leaves one out.
+/// Weight of each measure of a line; zero leaves a measure out.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Weights {
     /// Lap time (s).
@@ -24,7 +24,7 @@ pub struct Weights {
 /// The measures of a line.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Measures {
-    /// Lap time (s); zero without a car or, where lines are weighed, without a weight.
+    /// Lap time (s); zero without a car, or if its weight is zero in a weighted sum.
     pub time_s: f64,
     /// Length (m).
     pub length_m: f64,
@@ -47,26 +47,26 @@ impl Weights {
     }
 }
 
-/// Lines and the car that drives them, as the solvers of reference optima see them.
+/// The lines and the car of a reference optimum.
 #[derive(Clone, Copy)]
 pub struct ReferenceProblem<'a> {
-    /// How a line's variables make its points.
+    /// The map from a line's variables to its points.
     pub map: &'a LineMap,
-    /// Limits of the car; needed only where time counts.
+    /// Envelope of the car; needed only for lap times.
     pub limits: Option<&'a dyn Limits>,
     /// Speed at the start of an open line (m/s).
     pub start_mps: f64,
     /// Spacing (m) for the second differences of Gamma, one for each segment: that of the reference line.
     /// `None` takes the line's own, which changes with it.
     pub spacing_m: Option<&'a [f64]>,
-    /// Which curvature a lap drives segments with.
+    /// The curvature that a lap takes for each segment.
     pub bend: SegmentBend,
     /// A flag that, once raised, ends a sequence of programs after the present one.
     pub stop: Option<&'a AtomicBool>,
 }
 
 impl<'a> ReferenceProblem<'a> {
-    /// Lines alone, without a car.
+    /// The problem of lines without a car.
     pub fn of(map: &'a LineMap) -> Self {
         Self {
             map,
@@ -155,7 +155,7 @@ impl<'a> ReferenceProblem<'a> {
         let mut by_curvature = vec![0.0; shape.turn_rad.len()];
         if weights.curvature != 0.0 {
             for (i, bar) in by_curvature.iter_mut().enumerate() {
-                // kappa^2 s with the spacing s of its own: what kappa leaves of the derivative by spacing is kappa^2.
+                // kappa^2 s with the spacing s of its own: at fixed kappa, the derivative by spacing is kappa^2.
                 *bar += 2.0 * weights.curvature * shape.turn_rad[i];
                 let (before, after) = shape.neighbours(i);
                 for segment in [before, after].into_iter().flatten() {

@@ -1,20 +1,20 @@
-//! The limits of a [`PointMass`] as the solvers use them.
+//! The g-g-v envelope of a [`PointMass`], as the solvers use it.
 
 use super::lap::{Grip, Limits, Slope};
 use crate::line::PointMass;
 use crate::vehicle::EnvelopeRow;
 use crate::{Error, Result};
 
-/// Limits of a point mass, linear in speed between the rows of its envelope.
+/// The envelope of a point mass, linear in speed between its rows.
 ///
-/// The steering lock is left out: it would make corners that the car cannot take slow, which no fast line has.
+/// The steering lock is left out. It would slow the car in corners that are too tight for it, and no fast line has such corners.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PointMassLimits {
     rows: Vec<EnvelopeRow>,
 }
 
 impl PointMassLimits {
-    /// Those of `car`.
+    /// The envelope of `car`.
     ///
     /// # Errors
     /// [`Error::Input`] for settings out of range, and for a friction ellipse whose exponent is not 2, the only one that the

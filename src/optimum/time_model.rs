@@ -1,10 +1,10 @@
-//! Lap time as a step of line and speeds sees it: the limits about a lap, and the time with its second derivative.
+//! The model of lap time in a step of line and speeds: the envelope about the last lap, and the time with its second derivative.
 
 use super::conic::{Affine, ConicProgram};
 use super::geometry::{LineMap, Shape};
 use super::lap::{Lap, Limits};
 
-/// Least relative change of a squared speed in a step: a car does not stop.
+/// Least relative change of a squared speed in a step, so that speeds stay above zero.
 const LEAST_CHANGE: f64 = -0.9;
 
 /// Adds the time, times `weight`, of `lap` to a program whose variables so far are changes
@@ -24,7 +24,7 @@ pub(super) fn add_time(
     let speed: Vec<f64> = squares.iter().map(|e| e.sqrt()).collect();
     let top = limits.top_speed_mps().powi(2);
     let bounds = squares.iter().enumerate().map(|(i, e)| {
-        // The start of an open line is given, and so is a standstill.
+        // The speed at the start of an open line is fixed, and so is a standstill.
         let held = *e <= 0.0 || (!map.closed && i == 0);
         if held {
             (0.0, 0.0)
@@ -42,7 +42,7 @@ pub(super) fn add_time(
         for (k, slope) in by_length {
             program.add_linear(k, slope);
         }
-        // dT/de = -h/(S^2 v); half of d2T/de2 is the squares' sum.
+        // dT/de = -h/(S^2 v); half of d2T/de2 is the sum of squares.
         let both = (0.5 * weight * h / sum.powi(3)).sqrt();
         let mut terms = Vec::new();
         for i in [s, next].into_iter().filter(|i| speed[*i] > 0.0) {
@@ -60,15 +60,15 @@ pub(super) fn add_time(
         let grip = limits.at(speed[i].max(f64::MIN_POSITIVE)).lateral;
         let used = shape.curvature_1pm[i] * squares[i] / grip.value;
         let by_square = used * (1.0 - 0.5 * speed[i] * grip.by_speed / grip.value);
-        // What a linear model of grip leaves out is the product of the relative changes of curvature and speed squared, and
-        // it costs at most half the time spent here times that product; of which the squares are a bound.
+        // A linear model of grip leaves out the product of the relative changes of curvature and of speed squared. That costs at
+        // most half the time spent here times the product, which the squares bound.
         let time = weight * shape.spacing_m[i] / speed[i].max(1.0);
         let caution = (0.25 * caution * time).sqrt();
         let mut bend = Vec::new();
         shape.add_curvature(map, i, caution * squares[i] / grip.value, &mut bend);
         program.add_square(Affine::change(bend));
         program.add_square(Affine::change(vec![(square(i), caution)]));
-        // To either side: on a straight a step may bend the line both ways.
+        // Both signs: on a straight a step may bend the line either way.
         for sign in [1.0, -1.0] {
             let mut terms = vec![(square(i), -sign * by_square)];
             shape.add_curvature(map, i, -sign * squares[i] / grip.value, &mut terms);
@@ -104,7 +104,7 @@ fn add_segment(
     };
     let affine = |constant: f64, terms| Affine { constant, terms }.merged();
     let along = grip.longitudinal.value;
-    // Half of what a change at the middle does belongs to each end.
+    // Each end has half of the effect of a change at the middle.
     let slope = 0.5 * per_square * (grip.drag.by_speed - demand * grip.longitudinal.by_speed / along) / along;
     let by_length = -acceleration / (h * along);
     let longitudinal = affine(
@@ -112,7 +112,7 @@ fn add_segment(
         terms(slope - 0.5 / (h * along), slope + 0.5 / (h * along), by_length),
     );
     let across = grip.lateral.value;
-    // The tighter end may be the other one after a step: both are held.
+    // After a step the other end may be the tighter one, so both are limited.
     let mixtures = match lap.bends.ends[s] {
         mean @ [0.5, 0.5] => vec![mean],
         _ => vec![[1.0, 0.0], [0.0, 1.0]],
@@ -129,7 +129,8 @@ fn add_segment(
         for (end, share) in ends {
             shape.add_curvature(map, end, share * middle / across, &mut change);
         }
-        // A segment beyond the ellipse by rounding, or by what the middle of a coasting one leaves, may stay there.
+        // A segment may lie slightly beyond the ellipse, by rounding or because the car coasts through its middle. It may stay
+        // there.
         let whole = affine(longitudinal.constant.hypot(used).max(1.0), Vec::new());
         program.add_cone([whole, longitudinal.clone(), affine(used, change)]);
     }

@@ -1,14 +1,14 @@
 //! Layer six: closed-loop laps of synthetic circuits, with grip to spare: one step of the driver, and whole laps.
 
 pub use super::candidates;
-use super::{Agreement, Draws, Subject, free_about, neighbours};
+use super::cases::{Cases, Compared};
+use super::{Agreement, Draws, Layer, Subject, free_about};
 use crate::drive::driver::Pace;
 use crate::drive::kernel::{DriveState, DrivenLap, STATE, World, drive_on, ending};
 use crate::drive::{Course, DriverSettings, Line, SpeedPlan};
 use crate::error::Result;
-use crate::evaluate::Failure;
 use crate::evaluate::drive::{
-    CpuDriveEvaluator, DriveObjective, DriveProblem, DriveSettings, GpuDriveEvaluator, SimdDriveEvaluator,
+    DriveObjective, DriveProblem, DriveSettings, GpuDriveEvaluator, SimdDriveEvaluator,
 };
 use crate::scalar::{Counted, Lookup, operations_of};
 use crate::track::Track;
@@ -33,10 +33,8 @@ const PARAMETERS: [&str; 6] = [
 const SHARE: f64 = 0.1;
 /// Cars that drive a lap.
 const COUNT: usize = 20;
-/// Cars next to each, every figure up to a millionth off, whose laps in `f64` say how well the car's own is determined: a lap
-/// that a millionth moves by more than is allowed says nothing of arithmetic and is left out.
+/// Cars next to each, whose laps in `f64` say how well the car's own is determined.
 const NEIGHBOURS: usize = 2;
-const NEXT_TO: f64 = 1e-6;
 /// Step of the closed loop, s.
 const STEP: f64 = 2e-3;
 /// Places of each car's lap from which a single step is compared.
@@ -114,25 +112,13 @@ pub fn allowed(problem: &DriveProblem, lap: &DrivenLap) -> [f64; 3] {
     [time, across, steering]
 }
 
-fn figures(lap: &DrivenLap) -> [f64; 3] {
-    [lap.time_s, lap.beyond_m, lap.steering_radps]
-}
+impl Compared for DriveProblem {
+    const NOUN: &'static str = "car";
 
-/// A lap, or why there is none.
-type Driven = std::result::Result<DrivenLap, Failure>;
-
-/// How a lap ended, in a form that compares.
-fn verdict(lap: &Driven) -> std::result::Result<u64, Failure> {
-    lap.map(|lap| lap.ending as u64)
-}
-
-/// The cars, and what the reference says of them.
-pub struct Cases {
-    problem: DriveProblem,
-    cars: Vec<Vec<f64>>,
-    exact: Vec<Driven>,
-    determined: Vec<bool>,
-    steps: Vec<Step>,
+    fn limits(&self, _: &[f64], lap: &DrivenLap, exact: &[f64]) -> Option<Vec<[f64; 2]>> {
+        let scales = exact.iter().map(|x| x.abs());
+        Some(scales.zip(allowed(self, lap)).map(Into::into).collect())
+    }
 }
 
 /// A state that a car was in on its lap, as `f32` has it, and what becomes of it in one step.
@@ -231,136 +217,78 @@ pub fn work_of_a_lap(problem: &DriveProblem, candidate: &[f64]) -> (usize, u64) 
     (steps as usize, u64::from(steps) * (count(1000) - count(0)) / 1000)
 }
 
-impl Cases {
-    /// Drives them in `f64`.
-    ///
-    /// # Errors
-    /// Those of reading the bundled car.
-    pub fn new() -> Result<Self> {
-        let problem = problem(Car::bundled()?, &CIRCUITS, &PACES, STEP)?;
-        let mut draws = Draws::new(7);
-        let mut cars = candidates(&problem, COUNT, &mut draws);
-        let near = neighbours(&cars, NEIGHBOURS, NEXT_TO, &mut draws);
-        // One that cannot be evaluated, which every backend must say alike.
-        cars[COUNT - 1].fill(f64::NAN);
-        let reference = CpuDriveEvaluator::new(&problem);
-        let all: Vec<&[f64]> = cars.iter().chain(&near).map(Vec::as_slice).collect();
-        let mut exact = reference.outcomes(&all);
-        let near = exact.split_off(COUNT);
-        let determined = (0..COUNT)
-            .map(|car| {
-                car == COUNT - 1
-                    || near[car * NEIGHBOURS..(car + 1) * NEIGHBOURS]
-                        .iter()
-                        .all(|other| match (&exact[car], other) {
-                            (Ok(own), Ok(other)) => {
-                                let limits = allowed(&problem, own);
-                                own.ending == other.ending
-                                    && (0..3)
-                                        .all(|k| (figures(own)[k] - figures(other)[k]).abs() <= limits[k])
-                            }
-                            _ => false,
-                        })
-            })
-            .collect();
-        let steps = (0..COUNT - 1)
-            .into_par_iter()
-            .flat_map_iter(|car| {
-                let candidate = &cars[car];
-                // From all over the lap, the run-up included.
-                let (states, _) = trail::<f64>(&problem, candidate, None, (0..STEPS).map(|i| i * 431));
-                let cases: Vec<Step> = states
-                    .into_iter()
-                    .filter(|state| state[STATE - 1] == ending::UNDER_WAY)
-                    .map(|state| {
-                        let from = state.map(|x| x as f32);
-                        let once = 2..3;
-                        Step {
-                            car,
-                            from,
-                            exact: trail(&problem, candidate, Some(from.map(f64::from)), once.clone()).0[0],
-                            single: trail(&problem, candidate, Some(from), once).0[0],
-                        }
-                    })
-                    .collect();
-                cases
-            })
-            .collect();
-        Ok(Self {
-            problem,
-            cars,
-            exact,
-            determined,
-            steps,
-        })
-    }
-
-    /// Single steps of the driver and whole laps on `subject`.
-    ///
-    /// # Errors
-    /// [`crate::Error::Device`] if the device fails.
-    pub fn compare(&self, subject: &Subject) -> Result<Vec<Agreement>> {
-        let problem = &self.problem;
-        let all: Vec<&[f64]> = self.cars.iter().map(Vec::as_slice).collect();
-        let stepped: Vec<&[f64]> = self.steps.iter().map(|s| all[s.car]).collect();
-        let from: Vec<[f32; STATE]> = self.steps.iter().map(|s| s.from).collect();
-        let (laps, steps) = match subject {
-            Subject::Lanes(set) => {
-                let evaluator = SimdDriveEvaluator::new(problem, *set);
-                (evaluator.outcomes(&all), evaluator.advance(&stepped, &from, 1))
-            }
-            Subject::Device(context) => {
-                let mut evaluator = GpuDriveEvaluator::new(problem, Arc::clone(context))?;
-                (evaluator.outcomes(&all)?, evaluator.advance(&stepped, &from, 1)?)
-            }
-        };
-        let mut agreements = vec![self.compare_steps(subject, &steps)];
-        for (k, name) in ["time", "room", "steering"].into_iter().enumerate() {
-            let mut agreement = Agreement::new(&format!("drive, {name}"), subject);
-            let determined = self.determined.iter().filter(|d| **d).count();
-            agreement.verdict(2 * determined > COUNT, || {
-                format!("{determined} cars whose lap is determined")
-            });
-            for car in (0..COUNT).filter(|car| self.determined[*car]) {
-                agreement.verdict(verdict(&laps[car]) == verdict(&self.exact[car]), || {
-                    format!("car {car}: {:?} for {:?}", laps[car], self.exact[car])
-                });
-                if let (Ok(found), Ok(exact)) = (&laps[car], &self.exact[car])
-                    && exact.ending == ending::FINISHED
-                {
-                    let limit = allowed(problem, exact)[k];
-                    let (found, exact) = (figures(found)[k], figures(exact)[k]);
-                    agreement.note(found, exact, exact.abs(), limit, || format!("car {car}"));
+/// Steps from all over the laps of cars, their run-ups included.
+fn steps_of(problem: &DriveProblem, cars: &[Vec<f64>]) -> Vec<Step> {
+    let of_car = |(car, candidate): (usize, &Vec<f64>)| {
+        let (states, _) = trail::<f64>(problem, candidate, None, (0..STEPS).map(|i| i * 431));
+        let under_way = states
+            .into_iter()
+            .filter(|state| state[STATE - 1] == ending::UNDER_WAY);
+        let steps: Vec<Step> = under_way
+            .map(|state| {
+                let from = state.map(|x| x as f32);
+                let once = 2..3;
+                Step {
+                    car,
+                    from,
+                    exact: trail(problem, candidate, Some(from.map(f64::from)), once.clone()).0[0],
+                    single: trail(problem, candidate, Some(from), once).0[0],
                 }
-            }
-            agreements.push(agreement);
-        }
-        Ok(agreements)
-    }
+            })
+            .collect();
+        steps
+    };
+    cars.par_iter().enumerate().flat_map_iter(of_car).collect()
+}
 
-    fn compare_steps(&self, subject: &Subject, found: &[[f32; STATE]]) -> Agreement {
-        let mut agreement = Agreement::new("drive, step of the driver", subject);
-        let mut alike = true;
-        for (number, (case, found)) in self.steps.iter().zip(found).enumerate() {
-            alike &= case.single == *found;
-            // In another row, or ended: the same in both.
-            for k in [9, 10, STATE - 1] {
-                agreement.verdict(f64::from(found[k]) == case.exact[k], || {
-                    format!("figure {k} of case {number}")
-                });
-            }
-            let scales = scales(&self.problem, &case.from);
-            for ((k, name), scale) in OF_A_STEP.into_iter().zip(scales) {
-                let allowed = STEP_TOLERANCE * scale;
-                agreement.note(f64::from(found[k]), case.exact[k], scale, allowed, || {
-                    format!("{name} of case {number}")
-                });
-            }
+/// The layer: single steps of the driver, and whole laps.
+///
+/// # Errors
+/// Those of reading the bundled car.
+pub fn layer() -> Result<Layer> {
+    let problem = problem(Car::bundled()?, &CIRCUITS, &PACES, STEP)?;
+    let mut draws = Draws::new(7);
+    let cars = candidates(&problem, COUNT, &mut draws);
+    let names = ["time", "room", "steering"].map(|name| format!("drive, {name}"));
+    let cases = Cases::among_neighbours(names.to_vec(), problem, cars, NEIGHBOURS, &mut draws);
+    // The last car is none that drives.
+    let steps = steps_of(&cases.problem, &cases.candidates[..COUNT - 1]);
+    Ok(Box::new(move |subject| {
+        let mut agreements = vec![compare_steps(&cases, &steps, subject)?];
+        agreements.extend(cases.compare(subject)?);
+        Ok(agreements)
+    }))
+}
+
+fn compare_steps(cases: &Cases<DriveProblem>, steps: &[Step], subject: &Subject) -> Result<Agreement> {
+    let problem = &cases.problem;
+    let cars: Vec<&[f64]> = steps.iter().map(|s| &*cases.candidates[s.car]).collect();
+    let from: Vec<[f32; STATE]> = steps.iter().map(|s| s.from).collect();
+    let found = match subject {
+        Subject::Lanes(set) => SimdDriveEvaluator::new(problem, *set).advance(&cars, &from, 1),
+        Subject::Device(context) => {
+            GpuDriveEvaluator::new(problem, Arc::clone(context))?.advance(&cars, &from, 1)?
         }
-        agreement.bits_as_scalar = Some(alike);
-        if matches!(subject, Subject::Lanes(_)) {
-            agreement.verdict(alike, || "lanes have other bits than one float".to_owned());
+    };
+    let mut agreement = Agreement::new("drive, step of the driver", subject);
+    for (number, (case, found)) in steps.iter().zip(&found).enumerate() {
+        // In another row, or ended: the same in both.
+        for k in [9, 10, STATE - 1] {
+            agreement.verdict(f64::from(found[k]) == case.exact[k], || {
+                format!("figure {k} of case {number}")
+            });
         }
-        agreement
+        for ((k, name), scale) in OF_A_STEP.into_iter().zip(scales(problem, &case.from)) {
+            let allowed = STEP_TOLERANCE * scale;
+            agreement.note(f64::from(found[k]), case.exact[k], scale, allowed, || {
+                format!("{name} of case {number}")
+            });
+        }
     }
+    let alike = steps
+        .iter()
+        .zip(&found)
+        .all(|(case, found)| case.single == *found);
+    agreement.bits(alike, subject);
+    Ok(agreement)
 }

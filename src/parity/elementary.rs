@@ -2,20 +2,19 @@
 
 use super::{Agreement, Draws, Subject, map, spacing};
 use crate::error::Result;
-use crate::evaluate::simd::{InstructionSet, LaneWork, dispatch};
+use crate::evaluate::simd::{LaneWork, dispatch};
 use crate::scalar::elementary;
 use crate::scalar::lanes::Lanes;
 
 /// Inputs per function, a multiple of every width of lanes.
 const COUNT: usize = 1 << 18;
 
-/// A function, its name in WGSL, and the range of inputs that the physics puts into it with a wide margin.
+/// A function, and the range of inputs that the physics puts into it with a wide margin.
 pub struct Function {
-    /// The function's name.
+    /// The function's name; shaders have `own_` before it.
     pub name: &'static str,
-    /// Its name in the shaders.
-    pub shader: &'static str,
-    range: (f64, f64),
+    /// Greatest size of an input.
+    reach: f64,
     scalar: fn(f32) -> f32,
     reference: fn(f64) -> f64,
     /// Results smaller than this are measured in its spacing: functions that cross zero between representable
@@ -25,81 +24,44 @@ pub struct Function {
     /// final sum, half for each factor, and its own error. At the top of the waves by half turns the last two factors
     /// and the term before them each round by a whole spacing, as those just below one are half of those above it.
     own_ulp: f64,
-    index: usize,
+}
+
+impl Function {
+    const fn new(
+        name: &'static str,
+        reach: f64,
+        (scalar, reference): (fn(f32) -> f32, fn(f64) -> f64),
+        floor: f64,
+        own_ulp: f64,
+    ) -> Self {
+        Self {
+            name,
+            reach,
+            scalar,
+            reference,
+            floor,
+            own_ulp,
+        }
+    }
+}
+
+fn sin_pi(x: f64) -> f64 {
+    (std::f64::consts::PI * x).sin()
+}
+
+fn cos_pi(x: f64) -> f64 {
+    (std::f64::consts::PI * x).cos()
 }
 
 /// All of them.
 pub const FUNCTIONS: [Function; 7] = [
-    Function {
-        name: "sin",
-        shader: "own_sin",
-        range: (-40.0, 40.0),
-        scalar: elementary::sin,
-        reference: f64::sin,
-        floor: 1e-2,
-        own_ulp: 3.0,
-        index: 0,
-    },
-    Function {
-        name: "cos",
-        shader: "own_cos",
-        range: (-40.0, 40.0),
-        scalar: elementary::cos,
-        reference: f64::cos,
-        floor: 1e-2,
-        own_ulp: 3.0,
-        index: 1,
-    },
-    Function {
-        name: "tan",
-        shader: "own_tan",
-        range: (-1.2, 1.2),
-        scalar: elementary::tan,
-        reference: f64::tan,
-        floor: 1e-4,
-        own_ulp: 4.0,
-        index: 2,
-    },
-    Function {
-        name: "atan",
-        shader: "own_atan",
-        range: (-50.0, 50.0),
-        scalar: elementary::atan,
-        reference: f64::atan,
-        floor: 1e-30,
-        own_ulp: 3.0,
-        index: 3,
-    },
-    Function {
-        name: "exp",
-        shader: "own_exp",
-        range: (-20.0, 20.0),
-        scalar: elementary::exp,
-        reference: f64::exp,
-        floor: 1e-30,
-        own_ulp: 2.5,
-        index: 4,
-    },
-    Function {
-        name: "sin_pi",
-        shader: "own_sin_pi",
-        range: (-12.0, 12.0),
-        scalar: elementary::sin_pi,
-        reference: |x| (std::f64::consts::PI * x).sin(),
-        floor: 1e-2,
-        own_ulp: 4.0,
-        index: 5,
-    },
-    Function {
-        name: "cos_pi",
-        shader: "own_cos_pi",
-        range: (-12.0, 12.0),
-        scalar: elementary::cos_pi,
-        reference: |x| (std::f64::consts::PI * x).cos(),
-        floor: 1e-2,
-        own_ulp: 4.0,
-        index: 6,
-    },
+    Function::new("sin", 40.0, (elementary::sin, f64::sin), 1e-2, 3.0),
+    Function::new("cos", 40.0, (elementary::cos, f64::cos), 1e-2, 3.0),
+    Function::new("tan", 1.2, (elementary::tan, f64::tan), 1e-4, 4.0),
+    Function::new("atan", 50.0, (elementary::atan, f64::atan), 1e-30, 3.0),
+    Function::new("exp", 20.0, (elementary::exp, f64::exp), 1e-30, 2.5),
+    Function::new("sin_pi", 12.0, (elementary::sin_pi, sin_pi), 1e-2, 4.0),
+    Function::new("cos_pi", 12.0, (elementary::cos_pi, cos_pi), 1e-2, 4.0),
 ];
 
 /// More that a device may be off that rounds otherwise, in ULP: each of the dozen operations of the longest function
@@ -108,11 +70,11 @@ pub const FUNCTIONS: [Function; 7] = [
 const OTHER_DEVICES_ULP: f64 = 5.0;
 
 /// Half evenly through the range, half over all magnitudes down to 1e-12.
-fn inputs((low, high): (f64, f64), seed: u64) -> Vec<f32> {
+fn inputs(reach: f64, seed: u64) -> Vec<f32> {
     let mut draws = Draws::new(seed);
     (0..COUNT)
         .map(|i| {
-            let x = draws.within(low, high);
+            let x = draws.within(-reach, reach);
             let shrink = if i % 2 == 0 {
                 1.0
             } else {
@@ -148,10 +110,6 @@ impl LaneWork for Mapped<'_> {
     }
 }
 
-fn in_lanes(set: InstructionSet, function: &Function, inputs: &[f32]) -> Vec<f32> {
-    dispatch(set, Mapped(function.index, inputs))
-}
-
 /// Every function on `subject`: within a few ULP of `f64`, and where the subject rounds as the processor does, the bits
 /// of the plain scalar.
 ///
@@ -160,11 +118,12 @@ fn in_lanes(set: InstructionSet, function: &Function, inputs: &[f32]) -> Vec<f32
 pub fn compare(subject: &Subject) -> Result<Vec<Agreement>> {
     FUNCTIONS
         .iter()
-        .map(|f| {
-            let x = inputs(f.range, f.index as u64 + 1);
+        .enumerate()
+        .map(|(index, f)| {
+            let x = inputs(f.reach, index as u64 + 1);
             let found = match subject {
-                Subject::Lanes(set) => in_lanes(*set, f, &x),
-                Subject::Device(context) => map(context, f.shader, &x)?,
+                Subject::Lanes(set) => dispatch(*set, Mapped(index, &x)),
+                Subject::Device(context) => map(context, &format!("own_{}", f.name), &x)?,
             };
             let alike = subject.rounds_like_the_processor();
             let ulp = f.own_ulp + if alike { 0.0 } else { OTHER_DEVICES_ULP };

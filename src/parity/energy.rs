@@ -1,18 +1,15 @@
 //! Layer five: laps with a hybrid's energy on a fixed line, their time, fuel and accounts.
 
-use super::{Agreement, Draws, Subject};
+use super::cases::{Cases, Compared, layer_of};
+use super::{Draws, Layer};
 use crate::error::{Error, Result};
-use crate::evaluate::OutcomeOf;
-use crate::evaluate::energy::{
-    CpuHybridEvaluator, Free, GpuHybridEvaluator, HybridLine, HybridObjective, HybridProblem,
-    SimdHybridEvaluator, Strategy,
-};
+use crate::evaluate::Failure;
+use crate::evaluate::energy::{Free, HybridLine, HybridObjective, HybridProblem, Strategy};
 use crate::line::energy::{EnergyCar, EnergyLap, EnergyPlan, Gates, Mode, Traction};
 use crate::line::geometry;
 use crate::study::envelope::{EnvelopeSettings, car_limits};
 use crate::study::raceline::{RacelineSettings, set_up};
 use crate::vehicle::Car;
-use std::sync::Arc;
 
 /// Strategies of each mode.
 const COUNT: usize = 64;
@@ -27,12 +24,15 @@ const GATES: [Free; 6] = [
     Free::Energy,
     Free::Motor,
 ];
-
-/// The laps of candidates, none of which may fail.
-fn driven(laps: Vec<OutcomeOf<HybridProblem>>) -> Result<Vec<EnergyLap<f64>>> {
-    let laps = laps.into_iter().collect::<std::result::Result<_, _>>();
-    laps.map_err(|failure| Error::Study(format!("a lap with energy: {failure}")))
-}
+/// Least and greatest figures of these gates.
+const RANGES: [(f64, f64); GATES.len()] = [
+    (0.005, 0.15),
+    (30.0, 75.0),
+    (0.0, 3.0),
+    (0.7, 1.0),
+    (0.0, 4.0),
+    (0.0, 240.0),
+];
 
 /// What single precision may move of a lap.
 #[derive(Clone, Copy, Debug)]
@@ -69,130 +69,94 @@ pub fn allowed(problem: &HybridProblem, exact: &EnergyLap<f64>) -> Allowed {
     }
 }
 
-/// Problems of both modes, strategies, and what the reference says of them.
-pub(super) struct Cases(Vec<Case>);
+impl Compared for HybridProblem {
+    const NOUN: &'static str = "strategy";
 
-struct Case {
-    mode: &'static str,
-    problem: HybridProblem,
-    strategies: Vec<Vec<f64>>,
-    exact: Vec<EnergyLap<f64>>,
+    fn figures(&self, _: &[f64], lap: &EnergyLap<f64>) -> std::result::Result<Vec<f64>, Failure> {
+        let harvested = lap.harvested_k + lap.harvested_h;
+        Ok(vec![lap.time, lap.fuel, lap.deployed, harvested])
+    }
+
+    fn limits(&self, _: &[f64], lap: &EnergyLap<f64>, _: &[f64]) -> Option<Vec<[f64; 2]>> {
+        let Allowed { time, fuel, energy } = allowed(self, lap);
+        // What passes through the store in a lap: an energy of zero is exact to a share of that.
+        let passed = lap.deployed + lap.harvested_k + lap.harvested_h;
+        let limits = [
+            (lap.time, time),
+            (lap.fuel, fuel),
+            (passed, energy),
+            (passed, 2.0 * energy),
+        ];
+        Some(limits.map(|(scale, allowed)| [scale.max(1.0), allowed]).to_vec())
+    }
 }
 
-impl Cases {
-    /// # Errors
-    /// Those of reading the bundled circuit and car.
-    pub(super) fn new() -> Result<Self> {
-        let setup = set_up(&RacelineSettings {
-            sections: SECTIONS,
-            ..RacelineSettings::default()
-        })?;
-        let points_m = setup.cuts.points(&setup.cuts.reference);
-        let length = geometry(&points_m, true).segment_m;
-        let car = Car::bundled_hybrid()?;
-        let limits = car_limits(
-            &car,
-            &EnvelopeSettings {
-                step_mps: 8.0,
-                ..EnvelopeSettings::default()
-            },
-        )?;
-        let rows = limits
-            .speeds
-            .iter()
-            .map(|s| (s.row.v_mps, s.traction_mps2))
-            .collect();
-        let car = EnergyCar::new(car, limits.envelope, Traction { rows }, 2.0)?;
-        let mut draws = Draws::new(5);
-        let modes = [("offset", Mode::Offset), ("additional", Mode::Additional)];
-        let cases = modes.into_iter().map(|(name, mode)| {
-            let plan = EnergyPlan::zoned(&length, &[40, 160, 300, 420], true, SECTIONS / 2, mode);
-            let strategy = Strategy {
-                free: GATES
-                    .into_iter()
-                    .chain((0..plan.count()).map(Free::Zone))
-                    .collect(),
-                ..Strategy::fixed(Gates::OPEN, plan.count())
-            };
-            let line = HybridLine::Fixed {
-                points_m: points_m.clone(),
-                closed: true,
-            };
-            let problem = HybridProblem::new(line, car.clone(), plan, strategy, &HybridObjective::ALL, 30.0)?;
-            let candidates: Vec<Vec<f64>> = (0..COUNT)
-                .map(|_| {
-                    let mut candidate = vec![
-                        draws.within(0.005, 0.15),
-                        draws.within(30.0, 75.0),
-                        draws.within(0.0, 3.0),
-                        draws.within(0.7, 1.0),
-                        draws.within(0.0, 4.0),
-                        draws.within(0.0, 240.0),
-                    ];
-                    candidate.extend((6..problem.dimensions()).map(|_| draws.within(0.0, 1.0)));
-                    candidate
-                })
-                .collect();
-            let slices: Vec<&[f64]> = candidates.iter().map(Vec::as_slice).collect();
-            let exact = driven(CpuHybridEvaluator::new(&problem).outcomes(&slices))?;
-            Ok(Case {
-                mode: name,
-                problem,
-                strategies: candidates,
-                exact,
-            })
-        });
-        Ok(Self(cases.collect::<Result<_>>()?))
-    }
-
-    /// # Errors
-    /// [`crate::Error::Device`] if the device fails.
-    pub(super) fn compare(&self, subject: &Subject) -> Result<Vec<Agreement>> {
-        let mut agreements = Vec::new();
-        for Case {
-            mode,
-            problem,
-            strategies,
-            exact,
-        } in &self.0
-        {
-            let slices: Vec<&[f64]> = strategies.iter().map(Vec::as_slice).collect();
-            let found = driven(match subject {
-                Subject::Lanes(set) => SimdHybridEvaluator::new(problem, *set).outcomes(&slices),
-                Subject::Device(context) => {
-                    GpuHybridEvaluator::new(problem, Arc::clone(context))?.outcomes(&slices)?
-                }
-            })?;
-            let named = |what: &str| Agreement::new(&format!("energy, {mode}, {what}"), subject);
-            let mut all = [
-                named("time"),
-                named("fuel"),
-                named("deployed"),
-                named("harvested"),
-            ];
-            for (number, (lap, exact)) in found.iter().zip(exact).enumerate() {
-                let Allowed { time, fuel, energy } = allowed(problem, exact);
-                // What passes through the store in a lap: an energy of zero is exact to a share of that.
-                let passed = exact.deployed + exact.harvested_k + exact.harvested_h;
-                let figures = [
-                    (lap.time, exact.time, exact.time, time),
-                    (lap.fuel, exact.fuel, exact.fuel, fuel),
-                    (lap.deployed, exact.deployed, passed, energy),
-                    (
-                        lap.harvested_k + lap.harvested_h,
-                        exact.harvested_k + exact.harvested_h,
-                        passed,
-                        2.0 * energy,
-                    ),
-                ];
-                for (agreement, (found, exact, scale, allowed)) in all.iter_mut().zip(figures) {
-                    agreement.note(found, exact, scale.max(1.0), allowed, || {
-                        format!("strategy {number}")
-                    });
-                }
+/// The layer, with a problem of each mode.
+///
+/// # Errors
+/// Those of reading the bundled circuit and car.
+pub(super) fn layer() -> Result<Layer> {
+    let modes = [Mode::Offset, Mode::Additional];
+    let mut draws = Draws::new(5);
+    let cases = problems(SECTIONS, &modes)?
+        .into_iter()
+        .zip(modes)
+        .map(|(problem, mode)| {
+            let zones = problem.dimensions() - GATES.len();
+            let strategies = (0..COUNT).map(|_| {
+                let mut strategy = RANGES.map(|(low, high)| draws.within(low, high)).to_vec();
+                strategy.extend((0..zones).map(|_| draws.within(0.0, 1.0)));
+                strategy
+            });
+            let strategies = strategies.collect();
+            let figures = ["time", "fuel", "deployed", "harvested"];
+            let names = figures.map(|what| format!("energy, {}, {what}", mode.name()));
+            let cases = Cases::new(names.to_vec(), problem, strategies, &[]);
+            if cases.all_succeed() {
+                Ok(cases)
+            } else {
+                Err(Error::Study(
+                    "a lap with energy is not driven to its end".to_owned(),
+                ))
             }
-            agreements.extend(all);
-        }
-        Ok(agreements)
-    }
+        });
+    Ok(layer_of(cases.collect::<Result<_>>()?))
+}
+
+/// Problems of deploying the bundled hybrid's energy on the bundled circuit's reference line, cut into so many cross-sections, a
+/// problem of each mode. All gates and four zones are free.
+///
+/// # Errors
+/// Those of reading the bundled circuit and car.
+pub fn problems(sections: usize, modes: &[Mode]) -> Result<Vec<HybridProblem>> {
+    let setup = set_up(&RacelineSettings {
+        sections,
+        ..RacelineSettings::default()
+    })?;
+    let points_m = setup.cuts.points(&setup.cuts.reference);
+    let length_m = geometry(&points_m, true).segment_m;
+    let car = Car::bundled_hybrid()?;
+    let coarse = EnvelopeSettings {
+        step_mps: 8.0,
+        ..EnvelopeSettings::default()
+    };
+    let limits = car_limits(&car, &coarse)?;
+    let rows = limits.speeds.iter().map(|s| (s.row.v_mps, s.traction_mps2));
+    let rows = rows.collect();
+    let car = EnergyCar::new(car, limits.envelope, Traction { rows }, 2.0)?;
+    let zones = [2, 8, 15, 21].map(|part| part * sections / 24);
+    let problems = modes.iter().map(|mode| {
+        let plan = EnergyPlan::zoned(&length_m, &zones, true, sections / 2, *mode);
+        let zones = (0..plan.count()).map(Free::Zone);
+        let strategy = Strategy {
+            free: GATES.into_iter().chain(zones).collect(),
+            ..Strategy::fixed(Gates::OPEN, plan.count())
+        };
+        let line = HybridLine::Fixed {
+            points_m: points_m.clone(),
+            closed: true,
+        };
+        HybridProblem::new(line, car.clone(), plan, strategy, &HybridObjective::ALL, 30.0)
+    });
+    problems.collect()
 }

@@ -1,15 +1,12 @@
 //! Layer four: lines round the bundled circuit, their shape and their lap time.
 
-use super::{Agreement, Draws, Subject};
+use super::cases::{Cases, Compared, layer_of};
+use super::{Draws, Layer};
 use crate::error::Result;
-use crate::evaluate::line::{
-    CpuLineEvaluator, GpuLineEvaluator, LineObjective, LineProblem, SimdLineEvaluator,
-};
-use crate::evaluate::{Evaluation, Evaluator};
+use crate::evaluate::line::{LineObjective, LineProblem};
 use crate::line::{Parametrisation, geometry};
 use crate::study::raceline::{RacelineSettings, set_up};
 use std::f64::consts::TAU;
-use std::sync::Arc;
 
 /// Lines by each parametrisation.
 const COUNT: usize = 64;
@@ -54,76 +51,55 @@ pub fn line_tolerances(problem: &LineProblem, exact: &[f64]) -> [f64; 5] {
     ]
 }
 
-/// Smooth lines: they wander over the road a few times a lap, as lines in a search do after its first moments.
-fn lines(dimensions: usize, draws: &mut Draws) -> Vec<f64> {
-    let mut population = Vec::with_capacity(dimensions * COUNT);
-    for _ in 0..COUNT {
-        let waves: Vec<(f64, f64, f64)> = (1..8)
-            .map(|k| (f64::from(k), draws.within(0.0, 0.2), draws.within(0.0, TAU)))
-            .collect();
-        population.extend((0..dimensions).map(|i| {
-            let angle = TAU * i as f64 / dimensions as f64;
-            let wave: f64 = waves.iter().map(|(k, a, p)| a * (k * angle + p).sin()).sum();
-            (0.5 + wave).clamp(0.0, 1.0)
-        }));
+impl Compared for LineProblem {
+    const NOUN: &'static str = "line";
+
+    fn limits(&self, _: &[f64], _: &Self::Outcome, exact: &[f64]) -> Option<Vec<[f64; 2]>> {
+        let scales = exact.iter().map(|x| x.abs());
+        Some(scales.zip(line_tolerances(self, exact)).map(Into::into).collect())
     }
-    population
 }
 
-/// Problems, lines, and what the reference says of them.
-pub(super) struct Cases(Vec<(&'static str, LineProblem, Vec<f64>, Evaluation)>);
+/// A smooth line: it wanders over the road a few times a lap, as lines in a search do after its first moments.
+fn line(dimensions: usize, draws: &mut Draws) -> Vec<f64> {
+    let waves: Vec<(f64, f64, f64)> = (1..8)
+        .map(|k| (f64::from(k), draws.within(0.0, 0.2), draws.within(0.0, TAU)))
+        .collect();
+    let points = (0..dimensions).map(|i| {
+        let angle = TAU * i as f64 / dimensions as f64;
+        let wave: f64 = waves.iter().map(|(k, a, p)| a * (k * angle + p).sin()).sum();
+        (0.5 + wave).clamp(0.0, 1.0)
+    });
+    points.collect()
+}
 
-impl Cases {
-    /// # Errors
-    /// Those of reading the bundled circuit and car.
-    pub(super) fn new() -> Result<Self> {
-        let setup = set_up(&RacelineSettings {
-            sections: SECTIONS,
-            ..RacelineSettings::default()
-        })?;
-        let mut draws = Draws::new(4);
-        let ways = [
-            ("control points", Parametrisation::control_points(SECTIONS / 4)),
-            ("sections", Parametrisation::sections()),
-        ];
-        let cases = ways.into_iter().map(|(name, way)| {
-            let car = Some(setup.car.clone());
-            let problem = LineProblem::new(setup.cuts.clone(), way, &LineObjective::ALL, car, 30.0)?;
-            let population = lines(problem.dimensions(), &mut draws);
-            let exact = CpuLineEvaluator::new(&problem).evaluate(&population)?;
-            Ok((name, problem, population, exact))
-        });
-        Ok(Self(cases.collect::<Result<_>>()?))
-    }
-
-    /// # Errors
-    /// [`crate::Error::Device`] if the device fails.
-    pub(super) fn compare(&self, subject: &Subject) -> Result<Vec<Agreement>> {
-        let width = LineObjective::ALL.len();
-        let mut agreements = Vec::new();
-        for (way, problem, population, exact) in &self.0 {
-            let found = match subject {
-                Subject::Lanes(set) => SimdLineEvaluator::new(problem, *set).evaluate(population)?,
-                Subject::Device(context) => {
-                    GpuLineEvaluator::new(problem, Arc::clone(context))?.evaluate(population)?
-                }
-            };
-            for (k, objective) in LineObjective::ALL.into_iter().enumerate() {
-                let mut agreement = Agreement::new(&format!("line, {}, {way}", objective.name()), subject);
-                let rows = found
-                    .objectives
-                    .chunks_exact(width)
-                    .zip(exact.objectives.chunks_exact(width));
-                for (line, (found, exact)) in rows.enumerate() {
-                    let allowed = line_tolerances(problem, exact)[k];
-                    agreement.note(found[k], exact[k], exact[k].abs(), allowed, || {
-                        format!("line {line}")
-                    });
-                }
-                agreement.verdict(found.failures == exact.failures, || "other failures".to_owned());
-                agreements.push(agreement);
-            }
-        }
-        Ok(agreements)
-    }
+/// The layer.
+///
+/// # Errors
+/// Those of reading the bundled circuit and car.
+pub(super) fn layer() -> Result<Layer> {
+    let setup = set_up(&RacelineSettings {
+        sections: SECTIONS,
+        ..RacelineSettings::default()
+    })?;
+    let mut draws = Draws::new(4);
+    let ways = [
+        ("control points", Parametrisation::control_points(SECTIONS / 4)),
+        ("sections", Parametrisation::sections()),
+    ];
+    let cases = ways.into_iter().map(|(way, parametrisation)| {
+        let car = Some(setup.car.clone());
+        let problem = LineProblem::new(
+            setup.cuts.clone(),
+            parametrisation,
+            &LineObjective::ALL,
+            car,
+            30.0,
+        )?;
+        let dimensions = problem.dimensions();
+        let lines = (0..COUNT).map(|_| line(dimensions, &mut draws)).collect();
+        let names = LineObjective::ALL.map(|objective| format!("line, {}, {way}", objective.name()));
+        Ok(Cases::new(names.to_vec(), problem, lines, &[]))
+    });
+    Ok(layer_of(cases.collect::<Result<_>>()?))
 }

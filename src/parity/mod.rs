@@ -5,11 +5,12 @@
 //! [`Agreement`] says how far it was off, in relative terms and in spacings of `f32` at the exact value (ULP), and
 //! whether that is within a tolerance derived from the roundings of the kernel.
 
+mod cases;
 pub mod drive;
 pub mod elementary;
 pub mod energy;
 pub mod laps;
-mod lines;
+pub mod lines;
 pub mod steady;
 pub mod step;
 pub mod synthetic_lap;
@@ -20,7 +21,7 @@ use crate::error::{Error, Result};
 use crate::evaluate::gpu::shader::{ELEMENTARY, car_fragments, loaders};
 use crate::evaluate::gpu::{DeviceKind, GpuContext, devices};
 use crate::evaluate::simd::InstructionSet;
-use crate::evaluate::{BackendChoice, ProblemKind};
+use crate::evaluate::{BackendChoice, GpuBackend, OnDevice, OutcomeOf, SimdBackend};
 use crate::random::Random;
 use crate::vehicle::{Car, CarParameter, TyreModel};
 use serde::Serialize;
@@ -41,6 +42,17 @@ impl Subject {
         match self {
             Self::Lanes(set) => format!("simd {}", set.name()),
             Self::Device(_) => "gpu".to_owned(),
+        }
+    }
+
+    /// The outcomes of candidates on it.
+    ///
+    /// # Errors
+    /// [`Error::Device`] if the device fails.
+    pub fn outcomes<K: OnDevice>(&self, kind: &K, candidates: &[&[f64]]) -> Result<Vec<OutcomeOf<K>>> {
+        match self {
+            Self::Lanes(set) => Ok(SimdBackend::new(kind, *set).outcomes(candidates)),
+            Self::Device(context) => GpuBackend::new(kind, Arc::clone(context))?.outcomes(candidates),
         }
     }
 
@@ -136,6 +148,15 @@ impl Agreement {
         self.pass &= off <= allowed;
     }
 
+    /// Takes up whether all bits are those of the plain scalar, which those of lanes must be.
+    fn bits(&mut self, alike: bool, subject: &Subject) {
+        self.bits_as_scalar = Some(alike);
+        let must = matches!(subject, Subject::Lanes(_));
+        self.verdict(alike || !must, || {
+            "lanes have other bits than one float".to_owned()
+        });
+    }
+
     /// Takes up a verdict that must be the reference's own.
     pub fn verdict(&mut self, same: bool, case: impl FnOnce() -> String) {
         if !same && self.pass {
@@ -156,31 +177,36 @@ pub fn spacing(magnitude: f64) -> f64 {
         * 2f64.powi(-23)
 }
 
+/// Compares the kernels of one layer on a subject.
+///
+/// # Errors
+/// Those of the evaluators: a device that fails.
+pub type Layer = Box<dyn Fn(&Subject) -> Result<Vec<Agreement>>>;
+
+/// The layers, each of which needs those before it.
+const LAYERS: &[fn() -> Result<Layer>] = &[
+    || Ok(Box::new(elementary::compare)),
+    || Ok(Box::new(step::compare)),
+    laps::layer,
+    lines::layer,
+    energy::layer,
+    drive::layer,
+    steady::layer,
+];
+
 /// Compares every kernel of every subject; `observe` is told of each comparison as it is done.
 ///
 /// # Errors
 /// Those of the evaluators: a device that fails. Disagreement is no error but a comparison that does not pass.
 pub fn compare(subjects: &[Subject], mut observe: impl FnMut(&Agreement)) -> Result<Vec<Agreement>> {
+    let layers: Vec<Layer> = LAYERS.iter().map(|layer| layer()).collect::<Result<_>>()?;
     let mut all = Vec::new();
-    let mut take = |found: Vec<Agreement>| {
-        for agreement in found {
-            observe(&agreement);
-            all.push(agreement);
-        }
-    };
-    let lines = lines::Cases::new()?;
-    let laps = laps::Cases::new()?;
-    let energies = energy::Cases::new()?;
-    let drives = drive::Cases::new()?;
-    let circles = steady::Cases::new()?;
     for subject in subjects {
-        take(elementary::compare(subject)?);
-        take(step::compare(subject)?);
-        take(laps.compare(subject)?);
-        take(lines.compare(subject)?);
-        take(energies.compare(subject)?);
-        take(drives.compare(subject)?);
-        take(circles.compare(subject)?);
+        for layer in &layers {
+            let found = layer(subject)?;
+            found.iter().for_each(&mut observe);
+            all.extend(found);
+        }
     }
     Ok(all)
 }
@@ -208,7 +234,7 @@ impl Draws {
 }
 
 /// Random candidates from all over the bounds of a problem.
-pub fn candidates(problem: &impl ProblemKind, count: usize, draws: &mut Draws) -> Vec<Vec<f64>> {
+pub fn candidates(problem: &impl OnDevice, count: usize, draws: &mut Draws) -> Vec<Vec<f64>> {
     let variables = &problem.problem().variables;
     (0..count)
         .map(|_| {
@@ -221,19 +247,7 @@ pub fn candidates(problem: &impl ProblemKind, count: usize, draws: &mut Draws) -
         .collect()
 }
 
-/// So many neighbours of each candidate, every figure up to a share of itself off.
-fn neighbours(candidates: &[Vec<f64>], each: usize, share: f64, draws: &mut Draws) -> Vec<Vec<f64>> {
-    candidates
-        .iter()
-        .flat_map(|candidate| std::iter::repeat_n(candidate, each))
-        .map(|candidate| {
-            let off = |x: &f64| x * (1.0 + draws.within(-share, share));
-            candidate.iter().map(off).collect()
-        })
-        .collect()
-}
-
-/// Parameters of `car` that are free within a share of themselves about themselves.
+/// Parameters of `car` that are free within a share of themselves about themselves; those near zero, within a share of a thousandth.
 ///
 /// # Errors
 /// [`Error::Input`] naming a parameter that the car lacks.
@@ -243,7 +257,7 @@ fn free_about(car: &Car, names: &[&str], share: f64) -> Result<Vec<(CarParameter
         let known = || Error::input(&car.name, *name, "no such parameter", "a parameter of the car");
         let parameter = car.parameter(name).ok_or_else(known)?;
         let value = flat[parameter.slots[0]];
-        let reach = share * value.abs();
+        let reach = share * value.abs().max(1e-3);
         Ok((parameter, value - reach, value + reach))
     });
     free.collect()

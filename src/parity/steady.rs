@@ -1,20 +1,16 @@
 //! Layer seven: cars that settle in steady-state cornering.
 
 pub use super::candidates;
-use super::{Agreement, Draws, Subject, free_about, neighbours, spacing, step};
+use super::cases::{Cases, Compared, layer_of};
+use super::{Draws, Layer, free_about, spacing, step};
 use crate::error::Result;
 use crate::evaluate::Failure;
-use crate::evaluate::steady::kernel::{Aim, INTEGRATED, STATE, Settling, ending, settle};
+use crate::evaluate::steady::kernel::{Aim, INTEGRATED, Settling, ending, settle};
 use crate::evaluate::steady::modes::{displaced, slopes};
-use crate::evaluate::steady::{
-    CpuSteadyEvaluator, GpuSteadyEvaluator, SETTLED, Settled, SimdSteadyEvaluator, SteadyObjective,
-    SteadyProblem,
-};
-use crate::scalar::Counted;
-use crate::scalar::{Real, operations_of};
+use crate::evaluate::steady::{SETTLED, SteadyObjective, SteadyProblem};
+use crate::scalar::{Counted, Real, operations_of};
 use crate::vehicle::tyre::Tyre;
 use crate::vehicle::{Car, CarModel, LinearTyre, MagicFormula, TyreModel};
-use std::sync::Arc;
 
 /// Parameters that random cars differ in, for either tyre model.
 const PARAMETERS: [&[&str]; 2] = [
@@ -40,10 +36,8 @@ const SHARE: f64 = 0.1;
 const SPEEDS: [f64; 2] = [20.0, 70.0];
 /// Cars, each with its own speed and steering.
 const COUNT: usize = 96;
-/// Cars next to each, every figure up to a millionth off, whose verdicts in `f64` must be the car's own; otherwise it says
-/// nothing of arithmetic and is left out.
+/// Cars next to each, whose trims in `f64` say how well the car's own is determined.
 const NEIGHBOURS: usize = 2;
-const NEXT_TO: f64 = 1e-6;
 /// A trim that the roundings of `f32` may move by more than this (m/s^2) is next to none, and left out too: where steering turns
 /// back along the curve of trims, nothing holds the car in its place.
 const DETERMINED: f64 = 0.02;
@@ -130,139 +124,55 @@ pub fn allowed(problem: &SteadyProblem, candidate: &[f64], state: &Settling<f64>
     Some([speed * moved[1], moved[0] / vx, moved[2], moved[5]])
 }
 
-/// Their names.
-const FIGURES: [&str; 4] = ["lateral acceleration", "sideslip", "roll", "slip"];
+impl Compared for SteadyProblem {
+    const NOUN: &'static str = "car";
 
-fn figures(trim: &Settled) -> [f64; 4] {
-    [trim.ay_mps2, trim.sideslip_rad, trim.roll_rad, trim.slip_ratio]
+    fn figures(&self, candidate: &[f64], state: &Settling<f64>) -> std::result::Result<Vec<f64>, Failure> {
+        let trim = self.settled(candidate, state)?;
+        Ok(vec![
+            trim.ay_mps2,
+            trim.sideslip_rad,
+            trim.roll_rad,
+            trim.slip_ratio,
+        ])
+    }
+
+    fn limits(&self, candidate: &[f64], state: &Settling<f64>, exact: &[f64]) -> Option<Vec<[f64; 2]>> {
+        // A residual this near to the edge may fall on its other side.
+        let near = (0.5 * SETTLED..2.0 * SETTLED).contains(&state.residual);
+        if state.ending == ending::SETTLING && near {
+            return None;
+        }
+        if exact.is_empty() {
+            return Some(Vec::new());
+        }
+        let limits = allowed(self, candidate, state)?;
+        let scales = exact.iter().map(|x| x.abs());
+        (limits[0] < DETERMINED).then(|| scales.zip(limits).map(Into::into).collect())
+    }
+
+    fn alike(&self, candidate: &[f64], found: &Settling<f64>) -> Option<bool> {
+        let bits = |state: Settling<f64>| state.to_array().map(f64::to_bits);
+        Some(bits(settled_in::<f32>(self, candidate).widened()) == bits(*found))
+    }
 }
 
-/// A trim, or why there is none.
-type Found = std::result::Result<Settled, Failure>;
-
-/// Cars on one tyre model, and what the reference says of them.
-struct OneModel {
-    name: &'static str,
-    problem: SteadyProblem,
-    cars: Vec<Vec<f64>>,
-    exact: Vec<Found>,
-    /// What may be off of a trim; nothing for a car that is left out.
-    limits: Vec<Option<[f64; 4]>>,
-    single: Vec<[f64; STATE]>,
-}
-
-impl OneModel {
-    fn new(name: &'static str, car: Car) -> Result<Self> {
+/// The layer: random cars on both tyre models.
+///
+/// # Errors
+/// Those of reading the bundled car.
+pub fn layer() -> Result<Layer> {
+    let car = Car::bundled()?;
+    let linear = step::on_linear_tyres(&car);
+    let cases = [("Magic Formula", car), ("linear tyre", linear)].map(|(tyre, car)| {
         let problem = problem(car)?;
         let mut draws = Draws::new(17);
-        let mut cars = candidates(&problem, COUNT, &mut draws);
-        // One that cannot be evaluated, which every backend must say alike.
-        cars[COUNT - 1].fill(f64::NAN);
-        let near = neighbours(&cars, NEIGHBOURS, NEXT_TO, &mut draws);
-        let all: Vec<&[f64]> = cars.iter().chain(&near).map(Vec::as_slice).collect();
-        let states = CpuSteadyEvaluator::new(&problem).outcomes(&all);
-        let verdict = |place: usize| match &states[place] {
-            Ok(state) => problem.settled(all[place], state),
-            Err(failure) => Err(*failure),
-        };
-        let limits = (0..COUNT)
-            .map(|car| {
-                let own = verdict(car);
-                let first = COUNT + car * NEIGHBOURS;
-                let alike = (first..first + NEIGHBOURS).all(|n| verdict(n).err() == own.err());
-                // A residual this near to the edge may fall on its other side.
-                let near = |s: &Settling<f64>| {
-                    s.ending == ending::SETTLING && (0.5 * SETTLED..2.0 * SETTLED).contains(&s.residual)
-                };
-                let limits = match &states[car] {
-                    Ok(state) if own.is_ok() => allowed(&problem, all[car], state)?,
-                    _ => [0.0; 4],
-                };
-                let clear = !states[car].as_ref().is_ok_and(near);
-                (alike && clear && limits[0] < DETERMINED).then_some(limits)
-            })
-            .collect();
-        Ok(Self {
-            name,
-            exact: (0..COUNT).map(verdict).collect(),
-            single: all[..COUNT - 1]
-                .iter()
-                .map(|car| settled_in::<f32>(&problem, car).widened().to_array())
-                .collect(),
-            limits,
-            problem,
-            cars,
-        })
-    }
-
-    fn compare(&self, subject: &Subject) -> Result<Vec<Agreement>> {
-        let all: Vec<&[f64]> = self.cars.iter().map(Vec::as_slice).collect();
-        let states = match subject {
-            Subject::Lanes(set) => SimdSteadyEvaluator::new(&self.problem, *set).outcomes(&all),
-            Subject::Device(context) => {
-                GpuSteadyEvaluator::new(&self.problem, Arc::clone(context))?.outcomes(&all)?
-            }
-        };
-        let bits = |figures: [f64; STATE]| figures.map(f64::to_bits);
-        let alike = self.single.iter().zip(&states).all(|(single, found)| {
-            found
-                .as_ref()
-                .is_ok_and(|found| bits(found.to_array()) == bits(*single))
-        });
-        let determined = self.limits.iter().flatten().count();
-        let mut agreements = Vec::new();
-        for (k, figure) in FIGURES.into_iter().enumerate() {
-            let mut agreement = Agreement::new(&format!("steady, {}, {figure}", self.name), subject);
-            agreement.bits_as_scalar = Some(alike);
-            if matches!(subject, Subject::Lanes(_)) {
-                agreement.verdict(alike, || "lanes have other bits than one float".to_owned());
-            }
-            agreement.verdict(2 * determined > COUNT, || {
-                format!("{determined} cars whose trim is determined")
-            });
-            for car in 0..COUNT {
-                let Some(limits) = &self.limits[car] else { continue };
-                let found = match &states[car] {
-                    Ok(state) => self.problem.settled(all[car], state),
-                    Err(failure) => Err(*failure),
-                };
-                agreement.verdict(found.err() == self.exact[car].err(), || {
-                    format!("car {car}: {found:?} for {:?}", self.exact[car])
-                });
-                if let (Ok(found), Ok(exact)) = (&found, &self.exact[car]) {
-                    let (found, exact) = (figures(found)[k], figures(exact)[k]);
-                    agreement.note(found, exact, exact.abs(), limits[k], || format!("car {car}"));
-                }
-            }
-            agreements.push(agreement);
-        }
-        Ok(agreements)
-    }
-}
-
-/// Random cars on both tyre models, and what the reference says of them.
-pub struct Cases(Vec<OneModel>);
-
-impl Cases {
-    /// Settles them in `f64`.
-    ///
-    /// # Errors
-    /// Those of reading the bundled car.
-    pub fn new() -> Result<Self> {
-        let car = Car::bundled()?;
-        let linear = step::on_linear_tyres(&car);
-        Ok(Self(vec![
-            OneModel::new("Magic Formula", car)?,
-            OneModel::new("linear tyre", linear)?,
-        ]))
-    }
-
-    /// The trims on `subject`.
-    ///
-    /// # Errors
-    /// [`crate::Error::Device`] if the device fails.
-    pub fn compare(&self, subject: &Subject) -> Result<Vec<Agreement>> {
-        let each: Vec<_> = self.0.iter().map(|m| m.compare(subject)).collect::<Result<_>>()?;
-        Ok(each.concat())
-    }
+        let cars = candidates(&problem, COUNT, &mut draws);
+        let figures = ["lateral acceleration", "sideslip", "roll", "slip"];
+        let names = figures.map(|figure| format!("steady, {tyre}, {figure}")).to_vec();
+        Ok(Cases::among_neighbours(
+            names, problem, cars, NEIGHBOURS, &mut draws,
+        ))
+    });
+    Ok(layer_of(cases.into_iter().collect::<Result<_>>()?))
 }

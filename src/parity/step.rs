@@ -301,10 +301,7 @@ pub fn compare(subject: &Subject) -> Result<Vec<Agreement>> {
                 }
                 alike &= plain::<f32>(*model, case) == *found;
             }
-            agreement.bits_as_scalar = Some(alike);
-            if matches!(subject, Subject::Lanes(_)) {
-                agreement.verdict(alike, || "lanes have other bits than one float".to_owned());
-            }
+            agreement.bits(alike, subject);
             Ok(agreement)
         })
         .collect()

@@ -3,13 +3,13 @@
 //! Near the limit a lap amplifies roundings: on the bundled one, a millionth of a parameter moves the costs of most cars
 //! near the truth by more than a ten-thousandth, in `f64` too. A lap that keeps clear of it tells arithmetic apart.
 
-use super::Draws;
+use super::{Draws, free_about};
 use crate::error::{Error, Result};
 use crate::evaluate::Objective;
 use crate::evaluate::replay::{
     CHANNEL_NAMES, CHANNEL_UNITS, ChannelWeights, Norm, ReplayProblem, Sample, Window, trace,
 };
-use crate::vehicle::{Car, CarParameter};
+use crate::vehicle::Car;
 
 /// Sample interval, s.
 pub const INTERVAL_S: f64 = 0.01;
@@ -77,23 +77,8 @@ impl Default for Lap {
 /// # Errors
 /// [`Error::Input`] naming a parameter that the car lacks, [`Error::Study`] for a car that cannot drive the lap.
 pub fn problem(car: Car, free: &[&str], lap: Lap) -> Result<ReplayProblem> {
-    let parameters: Vec<CarParameter> = free
-        .iter()
-        .map(|name| {
-            let known = || Error::input(&car.name, *name, "no such parameter", "a parameter of the car");
-            car.parameter(name).ok_or_else(known)
-        })
-        .collect::<Result<_>>()?;
     let flat = car.to_flat();
-    let bounds = |p: &CarParameter| {
-        let value = flat[p.slots[0]];
-        let reach = 0.8 * value.abs().max(1e-3);
-        (value - reach, value + reach)
-    };
-    let free: Vec<_> = parameters
-        .iter()
-        .map(|p| (p.clone(), bounds(p).0, bounds(p).1))
-        .collect();
+    let free = free_about(&car, free, 0.8)?;
     let mut samples = inputs(&car, lap.samples, lap.grip);
     let initial = [
         samples[0].wheel_speed[0] * car.chassis.radius_front,

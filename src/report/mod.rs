@@ -7,12 +7,14 @@
 mod axis;
 mod bars;
 mod canvas;
+pub mod compare;
 mod curves;
 mod figure;
 mod html;
 mod lap;
 mod parameters;
 mod pareto;
+#[cfg(feature = "parquet")]
 mod parquet;
 mod site_map;
 mod style;

@@ -4,5 +4,5 @@ mod lap;
 mod sensors;
 
 pub use crate::drive::{CarKnowledge, Drive, DriverSettings, SpeedPlan, drive, drive_planned};
-pub use lap::{SimulateSettings, simulate_lap};
+pub use lap::{SimulateSettings, Simulated, simulate_lap};
 pub use sensors::{SensorSettings, distort};

@@ -1,4 +1,4 @@
-//! What sensors make of the truth: noise and delay.
+//! Noise and delay of sensors.
 
 use crate::evaluate::replay::{CHANNEL_NAMES, Sample};
 use crate::random::Random;
@@ -15,8 +15,7 @@ pub struct SensorSettings {
     pub delay_s: [f64; CHANNEL_NAMES.len()],
 }
 
-/// Delays and disturbs the measured channels of a uniform log in place; before the start a channel reads its
-/// first value.
+/// Delays and disturbs the measured channels of a uniform log in place; a delayed channel begins with its first value.
 pub fn distort(samples: &mut [Sample<f64>], interval_s: f64, settings: &SensorSettings, seed: u64) {
     let random = Random::new(seed);
     for channel in 0..CHANNEL_NAMES.len() {

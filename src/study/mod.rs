@@ -1,6 +1,5 @@
 //! The studies that users run.
 
-pub mod compare;
 pub mod envelope;
 pub mod framework;
 pub mod hybrid;

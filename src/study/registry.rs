@@ -18,7 +18,7 @@ impl<T: AnyStudy + Swept> Registered for T {}
 
 /// Every study. A line here gives it its subcommand, its files for `init`, its place in `check` and `sweep`, its page of
 /// settings in the book, and its share of the tests.
-pub static STUDIES: [&dyn Registered; 8] = [
+pub static STUDIES: &[&dyn Registered] = &[
     &Entry::<Run>::NEW,
     &Entry::<Identify>::NEW,
     &Entry::<EnvelopeStudy>::NEW,
@@ -31,7 +31,7 @@ pub static STUDIES: [&dyn Registered; 8] = [
 
 /// The study of this name.
 pub fn named(name: &str) -> Option<&'static dyn Registered> {
-    STUDIES.into_iter().find(|study| study.name() == name)
+    STUDIES.iter().copied().find(|study| study.name() == name)
 }
 
 /// The names of all studies.

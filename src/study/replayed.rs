@@ -4,13 +4,13 @@ use crate::config::kinds::{Shared, shared};
 use crate::config::settings::{Declared, Flag, Role};
 use crate::error::Result;
 use crate::evaluate::replay::kernel::{CHANNELS, drive_window};
-use crate::evaluate::replay::{CHANNEL_NAMES, ReplayProblem, Window};
-use crate::evaluate::{Evaluator, FailureCounts, add_failures};
-use crate::study::framework::Inputs;
+use crate::evaluate::replay::{CHANNEL_NAMES, ReplayProblem, Window, open_evaluator};
+use crate::evaluate::{Evaluator, add_failures};
+use crate::study::framework::journal::{Journal, Recorder};
+use crate::study::framework::{Inputs, Progress, RunRecord, Study, Watch, Work};
 use crate::study::identify::{FreeParameter, IdentifySettings, ObjectiveChoice, Setup, set_up};
 use crate::vehicle::tyre::Tyre;
 use crate::vehicle::{Car, CarModel, LinearTyre, MagicFormula, TyreModel};
-use std::ops::ControlFlow;
 
 /// The settings of an identification as another study of a replayed lap shares them. What concerns the search alone has no flag
 /// there.
@@ -116,30 +116,67 @@ fn start_as_base_drives(replay: &mut ReplayProblem) {
 /// Candidates of one call of the evaluator: enough to fill any device for a moment, few enough to be interrupted.
 const BATCH: usize = 1024;
 
-/// Costs of each candidate; nothing where one does not drive, which is counted by reason.
-pub(in crate::study) fn costs_of(
-    evaluator: &mut dyn Evaluator,
-    population: &[f64],
-    failures: &mut FailureCounts,
-    mut observe: impl FnMut(usize) -> ControlFlow<()>,
-) -> Result<Option<Vec<Option<Vec<f64>>>>> {
-    let dimensions = evaluator.problem().variables.len();
-    let width = evaluator.problem().objectives.len();
-    let mut costs = Vec::with_capacity(population.len() / dimensions);
-    for batch in population.chunks(BATCH * dimensions) {
-        let found = evaluator.evaluate(batch)?;
-        add_failures(failures, &found.failure_counts());
+/// Candidates that were driven through a log.
+pub(in crate::study) struct Driven {
+    /// Costs of each candidate up to where the study was interrupted, if it was; nothing where one does not drive.
+    pub costs: Vec<Option<Vec<f64>>>,
+    record: RunRecord,
+    watch: Watch,
+}
+
+impl Driven {
+    /// Whether the study was interrupted.
+    pub fn interrupted(&self) -> bool {
+        self.record.interrupted
+    }
+
+    /// How the study ran, which ends now.
+    pub fn record(mut self) -> RunRecord {
+        let elapsed_s = self.watch.elapsed_s();
+        self.record.took(self.costs.len() as u64, elapsed_s, elapsed_s);
+        self.record.longest_dispatch_ms = self.watch.longest_dispatch_ms();
+        self.record
+    }
+}
+
+/// Drives the candidates of several populations through a log, one after the other, and keeps a journal of the answers.
+///
+/// # Errors
+/// Those of the evaluator and of the journal.
+pub(in crate::study) fn drive<S: Study>(
+    settings: &S::Settings,
+    (replay, setup): (&IdentifySettings, &Setup),
+    populations: &[&[f64]],
+    work: Work<'_, Journal>,
+) -> Result<Driven> {
+    let watch = Watch::begin();
+    let mut evaluator = open_evaluator(&setup.replay, replay.backend, replay.adapter.as_deref())?;
+    let mut recorder = Recorder::of(S::NAME, settings, work.state, work.state_file)?;
+    recorder.begin(inputs_of(S::NAME, setup), &evaluator.backend())?;
+    let mut record = RunRecord::of(&evaluator.backend());
+    let mut recorded = recorder.over(evaluator.as_mut());
+    let dimensions = setup.replay.dimensions();
+    let width = setup.replay.problem.objectives.len();
+    let planned = populations.concat().len() / dimensions;
+    let mut costs = Vec::with_capacity(planned);
+    for batch in populations.iter().flat_map(|p| p.chunks(BATCH * dimensions)) {
+        let found = recorded.evaluate(batch)?;
+        add_failures(&mut record.failures, &found.failure_counts());
         let rows = found.objectives.chunks_exact(width).zip(&found.failures);
         costs.extend(rows.map(|(row, failure)| failure.is_none().then(|| row.to_vec())));
-        if observe(costs.len()).is_break() {
-            return Ok(None);
+        let progress = Progress::counted(costs.len() as u64, planned as u64);
+        if (work.observe)(&progress).is_break() {
+            record.interrupted = true;
+            recorder.save()?;
+            break;
         }
     }
-    Ok(Some(costs))
+    recorder.complete(&mut record);
+    Ok(Driven { costs, record, watch })
 }
 
 /// What the costs of this setup depend on.
-pub(in crate::study) fn inputs_of(study: &str, setup: &Setup) -> String {
+fn inputs_of(study: &str, setup: &Setup) -> String {
     let replay = &setup.replay;
     let mut inputs = Inputs::new(study);
     inputs.add(&(&replay.plan, &replay.problem, &replay.free.car));

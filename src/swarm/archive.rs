@@ -80,6 +80,11 @@ impl Archive {
         }
     }
 
+    /// The reference point that contributions are measured up to, if it was given.
+    pub(super) fn fixed_reference(&self) -> Option<&[f64]> {
+        self.fixed.then_some(self.reference.as_slice())
+    }
+
     /// Number of members.
     pub fn len(&self) -> usize {
         self.objectives.len()
@@ -121,15 +126,23 @@ impl Archive {
                 i += 1;
             }
         }
+        let before = (self.len() >= self.capacity).then(|| (self.shares.clone(), self.reference.clone()));
         self.objectives.push(objectives.to_vec());
         self.positions.push(position.to_vec());
         if self.by_contribution() {
             self.shares.push((0.0, [f64::INFINITY; 3]));
             self.columns.push(objectives);
-            self.refresh(objectives);
+            self.refresh(objectives, true);
         }
-        if self.len() > self.capacity {
-            return self.drop_least() != objectives;
+        if let Some((shares, reference)) = before {
+            let least = self.least();
+            if least + 1 == self.len() {
+                // Nothing came of it.
+                self.drop_member(least);
+                (self.shares, self.reference) = (shares, reference);
+                return false;
+            }
+            self.drop_least(least);
         }
         true
     }
@@ -165,10 +178,10 @@ impl Archive {
             // No point lies at it, so that all shares are worked out.
             self.reference.clear();
             let first = self.objectives[0].clone();
-            self.refresh(&first);
+            self.refresh(&first, false);
         }
         while self.len() > self.capacity {
-            self.drop_least();
+            self.drop_least(self.least());
         }
     }
 
@@ -187,8 +200,8 @@ impl Archive {
         true
     }
 
-    /// Removes the member that contributes least and is not the best in any objective; returns its objectives.
-    fn drop_least(&mut self) -> Vec<f64> {
+    /// The member that contributes least and is not the best in any objective.
+    fn least(&self) -> usize {
         let mut worth = self.worth();
         // The ends of a front are what its users look for first.
         let privileged = if self.fixed { 0 } else { self.objectives[0].len() };
@@ -198,15 +211,18 @@ impl Archive {
                 worth[end] = f64::INFINITY;
             }
         }
-        let least = (0..self.len())
+        (0..self.len())
             .min_by(|&a, &b| worth[a].total_cmp(&worth[b]))
-            .unwrap_or(0);
+            .unwrap_or(0)
+    }
+
+    /// Removes member `least`; the shares of the others grow by what was its.
+    fn drop_least(&mut self, least: usize) {
         let left = self.objectives[least].clone();
         self.drop_member(least);
         if self.by_contribution() {
-            self.refresh(&left);
+            self.refresh(&left, false);
         }
-        left
     }
 
     /// The least value of each of so many objectives; infinite without members.
@@ -249,8 +265,8 @@ impl Archive {
         }
     }
 
-    /// Updates the shares after `change` came or went.
-    fn refresh(&mut self, change: &[f64]) {
+    /// Updates the shares after `change` came, as the last member, or left.
+    fn refresh(&mut self, change: &[f64], came: bool) {
         let beyond = |k: usize| {
             let (low, high) = self.range(k);
             high + if high > low { BEYOND * (high - low) } else { 1.0 }
@@ -262,14 +278,15 @@ impl Archive {
         };
         let moved = reference != self.reference;
         self.reference = reference;
+        let new = came.then(|| self.len() - 1);
         for i in 0..self.len() {
-            // Only what lies at or below the corner of a member's box touches its share.
-            if moved
-                || change
-                    .iter()
-                    .zip(&self.shares[i].1)
-                    .all(|(x, corner)| x <= corner)
-            {
+            // Only what lies at or below the corner of a member's box touches its share, and only where no other lies between:
+            // on a front that is nearly a curve, its neighbours.
+            let reaches = |corner: &[f64; 3]| change.iter().zip(corner).all(|(x, corner)| x <= corner);
+            let touched = moved
+                || new == Some(i)
+                || (reaches(&self.shares[i].1) && self.columns.touches(change, new, i, &self.reference));
+            if touched {
                 self.shares[i] = self.columns.exclusive(i, &self.reference);
             }
         }

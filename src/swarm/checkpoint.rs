@@ -6,7 +6,6 @@
 //! torn or of another state is refused. It is written beside its place and then moved there, so that a run that is
 //! interrupted while it writes leaves the last one whole.
 
-use super::device::DeviceState;
 use super::{
     CooperativeSwarm, CovarianceSwarm, DifferenceSwarm, HybridSwarm, Islands, Mopso, Nsga2, Optimiser, Pso,
     WindowSwarm,
@@ -64,7 +63,6 @@ const READERS: [(&str, Reader); 11] = readers![
 checkpoints! {
     CooperativeSwarm: "cooperative swarm",
     CovarianceSwarm: "covariance swarm",
-    DeviceState: "swarm of a device",
     DifferenceSwarm: "difference swarm",
     HybridSwarm: "hybrid swarm",
     Mopso: "multi-objective swarm",
@@ -237,7 +235,7 @@ mod tests {
         let said = load_within::<Journal>(&path, 2 << 20)
             .expect_err("a little more than twice 1 MiB")
             .to_string();
-        for part in ["state: file size", "some 3 MiB", "2 MiB (--memory-limit-mib)"] {
+        for part in ["state: file size", "some 3 MiB", "fits into 2 MiB"] {
             assert!(said.contains(part), "{said}");
         }
         let journal = load_within::<Journal>(&path, 3 << 20).expect("it fits");

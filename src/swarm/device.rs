@@ -5,10 +5,11 @@
 //! processor does, the swarm is the one that [`super::Mopso`] keeps in lanes, bit for bit.
 
 use super::archive::Archive;
+use super::checkpoint::Checkpoint;
 use super::mopso::blocks::Generation;
 use super::mopso::filter::{Point, front};
+use super::mopso::large_swarm::{leaders, learn_from};
 use super::mopso::thinning::{PER_PLACE, thinned};
-use super::mopso::{leaders, learn_from};
 use super::settings::MopsoSettings;
 use super::space::Space;
 use super::{Counters, Front, Progress};
@@ -49,6 +50,10 @@ pub struct DeviceState {
     best_objectives: Vec<f32>,
     archive: Archive,
     counters: Counters,
+}
+
+impl Checkpoint for DeviceState {
+    const KIND: &'static str = "swarm of a device";
 }
 
 struct Kernels {
@@ -317,7 +322,7 @@ impl DeviceMopso {
         let lanes = n.next_multiple_of(BLOCK);
         let rows: Vec<f32> = self.read(&self.buffers.objectives, (lanes * width * 4) as u64)?;
         let plain = row_major(&rows, n, width);
-        Ok(thinned(learn_from(&plain, width), width, SAMPLE_FRONT))
+        Ok(thinned(learn_from(&plain, width), width, SAMPLE_FRONT, None))
     }
 
     /// The particles that may enter the archive, and how many have failed.
@@ -408,6 +413,7 @@ impl DeviceMopso {
             front(points, self.objectives),
             self.objectives,
             PER_PLACE * self.settings.archive,
+            self.archive.fixed_reference(),
         );
         let rows = self.gather(&points)?;
         let solution = |(p, row): (&Point, &[f32])| {

@@ -36,6 +36,7 @@ pub mod checkpoint;
 pub mod comparison;
 mod cooperative;
 mod covariance;
+#[cfg(feature = "gpu")]
 pub mod device;
 mod difference;
 mod islands;
@@ -58,6 +59,7 @@ pub use covariance::{CovarianceSettings, CovarianceSwarm, OutOfBounds, Restarts}
 pub use difference::{DifferenceSettings, DifferenceSwarm};
 pub use islands::{AcceptsMigrants, Islands, Migration};
 pub use minimise::{Indicators, Minimise, Minimum, Stopped, minimise, minimise_batch, minimise_several};
+pub(crate) use mopso::thinning::PER_PLACE;
 pub use mopso::{Generation, MANY, Mopso};
 pub use nsga2::{Nsga2, Nsga2Settings};
 pub use pso::Pso;
@@ -245,7 +247,7 @@ impl Front {
 }
 
 /// What an observer of a run sees after each iteration.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Progress {
     /// Iterations done.
     pub iteration: usize,

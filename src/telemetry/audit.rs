@@ -1,13 +1,13 @@
-//! Values that cannot be what they are declared to be: nearly always a wrong unit.
+//! Values that contradict their declared unit, which is nearly always wrong then.
 
 use super::channel_map::Mapped;
 use super::derived::{acceleration, moving, product};
 use super::log::Log;
 use super::role::Role;
 use super::statistics::fit;
-use crate::{Error, Result};
+use crate::{Error, Place, Result};
 
-/// Largest believable magnitude in SI, and what is usually wrong beyond it.
+/// Largest plausible magnitude in SI, and the usual error beyond it.
 fn limit(role: Role) -> Option<(f64, &'static str, &'static str)> {
     Some(match role {
         Role::WheelSpeedFl | Role::WheelSpeedFr | Role::WheelSpeedRl | Role::WheelSpeedRr => {
@@ -48,7 +48,7 @@ pub(super) fn check_magnitude(source: &str, mapped: &Mapped<'_>, values: &[f64])
     ))
 }
 
-/// Refuses a log whose accelerations follow what they should equal closely, but by a factor that only a wrong unit
+/// Refuses a log whose accelerations correlate well with what they should equal, but differ by a factor that only a wrong unit
 /// explains: `ay` against `vx` times yaw rate, `ax` against the change of `vx`.
 pub(super) fn check_gains(log: &Log) -> Result<()> {
     const CLOSELY: f64 = 0.8;
@@ -65,7 +65,7 @@ pub(super) fn check_gains(log: &Log) -> Result<()> {
         if found.correlation.abs() > CLOSELY && !(0.4..=2.5).contains(&gain) {
             return Err(Error::input(
                 &log.source,
-                format!("channel {name}"),
+                Place::default().channel(name),
                 format!("values {gain:.3} times {against}"),
                 "about the same size; is one of the units wrong?",
             ));
@@ -74,7 +74,7 @@ pub(super) fn check_gains(log: &Log) -> Result<()> {
     Ok(())
 }
 
-/// How long (s) the end of the log repeats its last sample, where that is longer than sensors at rest would.
+/// Time (s) for which the end of the log repeats its last sample. `None` if sensors at rest would explain it.
 pub(super) fn frozen_tail_s(log: &Log) -> Option<f64> {
     const LONGEST_S: f64 = 2.0;
     let frozen = [&log.vx_mps, &log.ax_mps2, &log.ay_mps2, &log.yaw_rate_radps]

@@ -14,7 +14,7 @@ use super::resample::{Grid, check_times, onto, uniform_interval};
 use super::role::Role;
 use super::text::shown;
 use super::units::Quantity;
-use crate::{Error, Result};
+use crate::{Error, Place, Result};
 
 /// A mapped channel in SI, with its times.
 pub(super) struct Signal<'a> {
@@ -22,7 +22,7 @@ pub(super) struct Signal<'a> {
     times: Arc<[f64]>,
     nominal_s: f64,
     values: Cow<'a, [f64]>,
-    /// Taken off its times, s.
+    /// Delay that is subtracted from its times, s.
     pub delay_s: f64,
 }
 
@@ -53,7 +53,7 @@ pub(super) fn signals<'a>(
         if times.len() != channel.values.len() {
             return Err(Error::input(
                 source,
-                format!("channel {}", channel.name),
+                Place::default().channel(&channel.name),
                 format!("{} samples at {} times", channel.values.len(), times.len()),
                 "as many samples as times",
             ));
@@ -81,7 +81,7 @@ fn check_samples(source: &str, channel: &Channel) -> Result<()> {
         return Ok(());
     };
     let (place, found) = if channel.values.is_empty() {
-        (format!("channel {}", channel.name), bad.text.clone())
+        (Place::default().channel(&channel.name), bad.text.clone())
     } else if bad.text.is_empty() {
         (channel.place(bad.sample), "an empty cell".to_owned())
     } else {
@@ -105,14 +105,14 @@ fn times(source: &str, channel: &Channel) -> Result<Arc<[f64]>> {
         }
         Clock::Rate { rate_hz, .. } => Err(Error::input(
             source,
-            format!("channel {}", channel.name),
+            Place::default().channel(&channel.name),
             format!("a sample rate of {rate_hz} Hz"),
             "one above 0",
         )),
     }
 }
 
-/// What a channel's values are multiplied by to become SI with the declared sign.
+/// The factor that turns a channel's values into SI with the declared sign.
 fn factor(source: &str, m: &Mapped<'_>, map: &ChannelMap, radius: Option<f64>) -> Result<f64> {
     let mut factor = m.sign.unwrap_or(1.0);
     let Some(unit) = m.unit else {
@@ -126,7 +126,7 @@ fn factor(source: &str, m: &Mapped<'_>, map: &ChannelMap, radius: Option<f64>) -
         factor /= radius.ok_or_else(|| {
             Error::input(
                 source,
-                format!("channel {}", m.channel.name),
+                Place::default().channel(&m.channel.name),
                 "a linear wheel speed and no rolling radius to turn it into rad/s",
                 "rolling_radius_m in [vehicle] of the channel map",
             )
@@ -135,7 +135,7 @@ fn factor(source: &str, m: &Mapped<'_>, map: &ChannelMap, radius: Option<f64>) -
     Ok(factor)
 }
 
-/// What the arrays of a log are made with.
+/// What the arrays of a log are made from.
 pub(super) struct Build<'a> {
     pub source: &'a str,
     pub recording: &'a Recording,
@@ -143,12 +143,12 @@ pub(super) struct Build<'a> {
     pub options: &'a LogOptions,
     /// Reference rolling radius, m.
     pub radius: Option<f64>,
-    /// Whether a log of so many samples may be made.
+    /// Checks that a log of so many samples fits into memory.
     pub fits: &'a dyn Fn(usize) -> Result<()>,
 }
 
 impl Build<'_> {
-    /// The log at the signals' present delays, not calibrated otherwise.
+    /// The log with the signals' present delays and no other calibration.
     ///
     /// # Errors
     /// [`Error::Input`] for gaps, times that do not fit one clock, and what does not fit into memory.
@@ -187,7 +187,7 @@ impl Build<'_> {
             Some(signal) => Ok(sampled(signal)),
             None => Err(Error::input(
                 self.source,
-                format!("channel {}", role.key()),
+                Place::default().channel(role.key()),
                 "none",
                 "one",
             )),
@@ -253,7 +253,7 @@ impl Build<'_> {
                 samples: first.times.len(),
             }));
         }
-        // Lap numbers and distance may be logged slowly or start late without holding the others back.
+        // Lap numbers and distance may be logged slowly or start late. They do not shorten the log.
         let driving = || {
             signals
                 .iter()
@@ -279,16 +279,16 @@ impl Build<'_> {
         let Some(radius) = self.radius else {
             return Err(Error::input(
                 self.source,
-                "channel vx",
+                Place::default().channel("vx"),
                 "no ground speed, and no rolling radius to make one of wheel speeds",
                 "a ground speed channel, or rolling_radius_m in [vehicle] of the channel map",
             ));
         };
-        // In the place of a speed that is there after all, the wheels' would be scored without a word.
+        // The log has a speed in an unknown unit. To replace it by the speed of the wheels without notice would be wrong.
         if let Some(channel) = self.recording.channels.iter().find(|c| c.name.starts_with("vx_")) {
             return Err(Error::input(
                 self.source,
-                format!("channel {}", channel.name),
+                Place::default().channel(&channel.name),
                 "a forward speed in a unit that is not known",
                 "vx_mps, or the channel with its unit in the channel map",
             ));
@@ -378,17 +378,17 @@ fn lap_numbers(source: &str, lap: &Signal<'_>) -> Result<Vec<u32>> {
 
 /// Rates that a log may have (Hz).
 pub(super) const RATES_HZ: RangeInclusive<f64> = 0.1..=100_000.0;
-/// The least way (m) by which a logged distance is judged.
+/// Least distance (m) over which a logged distance is checked.
 const LEAST_M: f64 = 50.0;
 
-/// Distance that goes on where the logged one starts again at zero.
+/// Distance that continues where the logged one restarts at zero.
 fn running_distance(values: &[f64]) -> Vec<f64> {
     let mut carried = 0.0;
     let mut last = values.first().copied().unwrap_or(0.0);
     values
         .iter()
         .map(|&value| {
-            // Half of what was reached: a counter that corrects itself by a few metres has not started again.
+            // The threshold is half of the distance reached, because a counter may correct itself by a few metres.
             if value < 0.5 * last {
                 carried += last;
             }
@@ -398,7 +398,7 @@ fn running_distance(values: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-/// Distance by the trapezoidal rule (m) from speeds (m/s) so many seconds apart.
+/// Distance (m) by the trapezoidal rule from speeds (m/s) at this interval (s).
 fn integrated(vx_mps: &[f64], dt_s: f64) -> Vec<f64> {
     let mut sum = 0.0;
     let mut last = vx_mps.first().copied().unwrap_or(0.0);
@@ -411,8 +411,8 @@ fn integrated(vx_mps: &[f64], dt_s: f64) -> Vec<f64> {
     vx_mps.iter().map(step).collect()
 }
 
-/// Whether a logged distance (m) advances about as the integrated speed does, all laps together: a dead sensor stands still, a
-/// broken one says anything. A factor of two is beyond any wheel's slip and any correction at a beacon.
+/// Whether a logged distance (m) advances about as the integrated speed does, all laps together: a dead sensor stands still, and
+/// a broken one gives any value. A factor of two is more than wheel slip or a correction at a beacon can explain.
 fn advances(logged_m: &[f64], driven_m: &[f64], laps: &[Lap]) -> bool {
     let span = |part: &[f64]| {
         let greatest = part.iter().copied().fold(f64::NEG_INFINITY, f64::max);
@@ -426,7 +426,7 @@ fn advances(logged_m: &[f64], driven_m: &[f64], laps: &[Lap]) -> bool {
         parts.map(span).sum()
     };
     let (said, went) = (length(logged_m), length(driven_m));
-    // Of a car that hardly moves nothing can be told.
+    // A car that hardly moves gives no evidence.
     went < LEAST_M || (0.5 * went..=2.0 * went).contains(&said)
 }
 
@@ -467,7 +467,7 @@ mod tests {
             let wild: Vec<f64> = driven.iter().map(|d| 1e9 * d).collect();
             assert!(!advances(&wild, &driven, laps));
         }
-        // A car in its box.
+        // A car that stands in its box.
         assert!(advances(&[0.0; 200], &integrated(&[0.01; 200], 0.1), &laps));
     }
 

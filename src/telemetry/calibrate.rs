@@ -1,8 +1,8 @@
-//! What a log says about its own sensors: signs, delays, zero offsets and rolling radii.
+//! Calibration of sensors from the log itself: signs, delays, zero offsets and rolling radii.
 //!
-//! Yaw rate is what everything else is measured against. Its sign comes from the front wheels, whose speeds differ by
-//! track times yaw rate; `ay` and steering follow yaw, `ax` follows the change of speed. Delays are relative to yaw
-//! rate: a delay common to all channels neither shows nor matters.
+//! Yaw rate is the reference for everything else. Its sign comes from the front wheels, whose speeds differ by track times yaw
+//! rate; `ay` and steering follow yaw, `ax` follows the change of speed. Delays are relative to yaw rate: a delay that is common
+//! to all channels cannot be seen and does not matter.
 
 use super::calibration::{CalibrationOptions, Declared, Finding, FindingKind};
 use super::derived::{
@@ -13,7 +13,7 @@ use super::recording::Format;
 use super::role::Role;
 use super::statistics::{Fit, fit, median, quantile};
 
-/// Slower than this (m/s) wheel speeds are too coarse to tell a rolling radius.
+/// Speed (m/s) below which wheel speeds are too coarse for a rolling radius.
 const STRAIGHT_MPS: f64 = 12.0;
 /// On a straight lateral acceleration (m/s^2) stays within this of its offset.
 const STRAIGHT_AY: f64 = 1.0;
@@ -22,7 +22,7 @@ const COASTING_AX: f64 = 1.0;
 /// Standing still, m/s.
 const STANDSTILL_MPS: f64 = 0.3;
 
-/// Estimates and applies signs, offsets and rolling radii, in this order; delays have been taken off before.
+/// Estimates and applies signs, offsets and rolling radii, in this order; delays have been corrected before.
 pub(super) fn apply(log: &mut Log, options: &CalibrationOptions, format: Format, declared: &Declared) {
     if options.signs.is_on(format) {
         signs(log, declared);
@@ -158,7 +158,7 @@ fn enough(mask: &[bool], dt_s: f64) -> bool {
 fn offsets(log: &mut Log) {
     let (mut yaw, mut ay) = (0.0, 0.0);
     let mut mask = straights(log, yaw, ay);
-    // Straights are where yaw rate and ay are near their offsets, which are what is sought: a few rounds settle it.
+    // On straights, yaw rate and ay are near their offsets, which are unknown. A few rounds of iteration find both.
     for _ in 0..8 {
         if let (Some(y), Some(a)) = (
             median(chosen(&log.yaw_rate_radps, &mask)),
@@ -176,7 +176,7 @@ fn offsets(log: &mut Log) {
     for role in [Role::YawRate, Role::Ay] {
         let samples = chosen(values_mut(log, role), &mask);
         let varies = samples.windows(2).any(|pair| pair[0] != pair[1]);
-        // A logger that goes on after its sensors are switched off repeats their last value.
+        // A logger that keeps running after its sensors are switched off repeats their last values.
         let usable = enough(&mask, log.dt_s) && (place == "on straights" || varies);
         let (Some(value), true) = (mean_of_middle(samples.clone()), usable) else {
             log.calibration.notes.push(format!(
@@ -200,7 +200,7 @@ fn offsets(log: &mut Log) {
     }
 }
 
-/// Mean of the middle half: as sturdy as the median for this, and finer than the steps of a coarse sensor.
+/// Mean of the middle half. It is as robust as the median here, and finer than the steps of a coarse sensor.
 fn mean_of_middle(values: Vec<f64>) -> Option<f64> {
     let low = quantile(values.clone(), 0.25)?;
     let high = quantile(values.clone(), 0.75)?;
@@ -347,7 +347,7 @@ mod tests {
         assert_eq!(c.finding(Role::Steer, FindingKind::Sign).unwrap().value, 1.0);
         let ay = c.finding(Role::Ay, FindingKind::Delay).unwrap();
         assert!(!ay.applied && ay.value.abs() < 0.005, "{ay:?}");
-        // Without a reference radius the radii are told and nothing is scaled.
+        // Without a reference radius the radii are reported and nothing is scaled.
         let fl = c.finding(Role::WheelSpeedFl, FindingKind::RollingRadius).unwrap();
         assert!(!fl.applied && (fl.value / RADII[0] - 1.0).abs() < 1e-3);
     }

@@ -1,4 +1,4 @@
-//! What is estimated of a log's own sensors, and what was found.
+//! What is estimated about a log's sensors, and the findings.
 
 use crate::config::Table;
 use crate::config::kinds::{Kind, of};
@@ -10,7 +10,7 @@ use std::path::Path;
 use super::recording::Format;
 use super::role::Role;
 
-/// Whether to do something, or let the file format decide.
+/// On, off, or as the file format suggests.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Switch {
     /// On for foreign files, off for native ones, which are calibrated already.
@@ -32,7 +32,7 @@ impl Switch {
     }
 }
 
-/// A [`Switch`] in files and flags: true, false, or nothing for `Auto`.
+/// A [`Switch`] in files and flags: true, false, or no value for `Auto`.
 struct Switched;
 
 impl Kind<Switch> for Switched {
@@ -96,13 +96,13 @@ impl CalibrationOptions {
 pub enum FindingKind {
     /// 1 or -1, by which the channel was multiplied.
     Sign,
-    /// How much later than yaw rate the channel was recorded, s; taken off.
+    /// Delay of the channel relative to yaw rate, s; it was corrected.
     Delay,
-    /// What the channel shows where it should show zero, in its SI unit; taken off.
+    /// Zero offset of the channel in its SI unit; it was corrected.
     Offset,
     /// Ground speed over angular speed of a freely rolling wheel, m.
     RollingRadius,
-    /// Slope of the channel on what it should equal; 1 is right. Never applied.
+    /// Slope of the channel on what it should equal; 1 is right. It is never applied.
     Gain,
 }
 
@@ -117,11 +117,11 @@ pub struct Finding {
     pub value: f64,
     /// Whether the log was corrected by it.
     pub applied: bool,
-    /// The correlation it rests on, where it rests on one.
+    /// The correlation behind it, if there is one.
     pub correlation: Option<f64>,
-    /// Samples it rests on.
+    /// Number of samples behind it.
     pub samples: usize,
-    /// What it was measured against, and why it was not applied where it was not.
+    /// What it was measured against, and the reason if it was not applied.
     pub evidence: String,
 }
 
@@ -140,12 +140,12 @@ impl std::fmt::Display for Finding {
     }
 }
 
-/// Everything that was estimated from a log, and what was done about it.
+/// Everything that was estimated from a log, and whether it was applied.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Calibration {
     /// What was estimated, in the order it was applied.
     pub findings: Vec<Finding>,
-    /// What else a reader of the results should know: channels guessed, speeds made up, evidence that is missing.
+    /// Notes for readers of the results: channels that were guessed, speeds that were computed from wheels, missing evidence.
     pub notes: Vec<String>,
 }
 
@@ -161,12 +161,12 @@ impl Calibration {
     }
 }
 
-/// What the channel map declares, which is believed over the log.
+/// What the channel map declares. It takes precedence over the log.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Declared {
     pub signs: Vec<Role>,
     pub delays: Vec<Role>,
     pub rolling_radius_m: Option<f64>,
-    /// Ground speed is made of wheel speeds, and has no delay of its own.
+    /// Ground speed was computed from wheel speeds and has no delay of its own.
     pub speed_of_wheels: bool,
 }

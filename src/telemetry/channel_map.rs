@@ -1,4 +1,4 @@
-//! Which logged channel plays which role: from a small TOML file, and by the usual names where it says nothing.
+//! Which logged channel plays which role: from a small TOML file, or else by the usual names.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -11,7 +11,7 @@ use super::role::Role;
 use super::text::shown;
 use super::units::Unit;
 use crate::config::read_text;
-use crate::{Error, Result};
+use crate::{Error, Place, Result};
 
 /// One of the car's axles.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -24,30 +24,30 @@ pub enum Axle {
     Rear,
 }
 
-/// What a channel map says about one role.
+/// One role's entry in a channel map.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ChannelEntry {
-    /// The channel's name in the log; by the usual names where it is not given.
+    /// The channel's name in the log; `None` to look for the usual names.
     pub name: Option<String>,
-    /// The unit to believe instead of the one the log gives.
+    /// The unit that replaces the one in the log.
     pub unit: Option<String>,
-    /// 1 or -1, multiplied to the values. Given, it is not estimated from the log.
+    /// Factor of the values, 1 or -1. If it is given, it is not estimated from the log.
     pub sign: Option<f64>,
-    /// How much later than the event the logger recorded it, s; taken off its times. Given, it is not estimated.
+    /// Delay with which the logger recorded the event, s; it is subtracted from the times. If it is given, it is not estimated.
     pub delay_s: Option<f64>,
 }
 
 /// Which channel plays which role, with the few figures of the car that are needed to convert them.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ChannelMap {
-    /// What was said about roles; the others go by the usual names.
+    /// The entries for roles. The other roles are found by the usual names.
     pub channels: BTreeMap<Role, ChannelEntry>,
     /// Steering-wheel angle over road-wheel angle, for a log of the steering-wheel angle.
     pub steering_ratio: Option<f64>,
     /// Rolling radius (m) by which wheel speeds logged in km/h are divided to give rad/s, and on which wheel speeds
     /// are calibrated.
     pub rolling_radius_m: Option<f64>,
-    /// The axle whose wheel speeds stand in for a ground speed that is not logged: the undriven one.
+    /// The axle whose wheel speeds replace a ground speed that is not logged: the undriven one.
     pub speed_axle: Axle,
 }
 
@@ -115,8 +115,8 @@ impl ChannelMap {
         let line_of = |at: usize| 1 + text.bytes().take(at).filter(|&byte| byte == b'\n').count();
         let file: FileMap = toml::from_str(text).map_err(|e| {
             let place = match e.span() {
-                Some(span) => format!("line {}", line_of(span.start)),
-                None => "the file".to_owned(),
+                Some(span) => Place::line(line_of(span.start)),
+                None => "the file".into(),
             };
             let message = e.message().replace('\n', " ");
             let (found, expected) = message
@@ -128,7 +128,7 @@ impl ChannelMap {
             |value: Option<Spanned<f64>>, key: &str, expected: &str, fits: fn(f64) -> bool| match value {
                 Some(value) if !fits(*value.get_ref()) => Err(Error::input(
                     path,
-                    format!("line {}, field {key}", line_of(value.span().start)),
+                    Place::line(line_of(value.span().start)).field(key),
                     value.get_ref().to_string(),
                     expected,
                 )),
@@ -141,7 +141,7 @@ impl ChannelMap {
             {
                 check_unit(unit.get_ref(), role).map_err(|expected| {
                     let line = line_of(unit.span().start);
-                    let place = format!("line {line}, field channels.{}.unit", role.key());
+                    let place = Place::line(line).field(format!("channels.{}.unit", role.key()));
                     Error::input(path, place, shown(unit.get_ref()), expected)
                 })?;
             }
@@ -191,7 +191,7 @@ impl ChannelMap {
                 Some(name) => Some(recording.channel(name).ok_or_else(|| {
                     Error::input(
                         &recording.source,
-                        format!("channel {}", role.key()),
+                        Place::default().channel(role.key()),
                         format!("no channel {}; it has {}", shown(name), listed(recording)),
                         "the name that the channel map gives",
                     )
@@ -202,7 +202,7 @@ impl ChannelMap {
                 if role.required() || entry.is_some() {
                     return Err(Error::input(
                         &recording.source,
-                        format!("channel {}", role.key()),
+                        Place::default().channel(role.key()),
                         format!("none with a usual name; it has {}", listed(recording)),
                         format!(
                             "a [channels.{}] entry with its name in the channel map",
@@ -215,14 +215,14 @@ impl ChannelMap {
             let unit_text = entry.and_then(|e| e.unit.as_deref()).unwrap_or(&channel.unit);
             let unit = match check_unit(unit_text, role) {
                 Ok(unit) => unit,
-                // A pedal in volts is of no use, and nobody asked for it.
+                // A pedal in volts cannot be used, and the map does not name it.
                 Err(_) if name.is_none() && matches!(role, Role::Throttle | Role::Brake) => {
                     continue;
                 }
                 Err(expected) => {
                     return Err(Error::input(
                         &recording.source,
-                        format!("channel {}", channel.name),
+                        Place::default().channel(&channel.name),
                         format!("the unit {}", shown(unit_text)),
                         format!(
                             "{expected}; a unit in [channels.{}] of the channel map overrides it",

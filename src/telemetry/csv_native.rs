@@ -10,9 +10,9 @@ use super::table::Table;
 use super::text::Rows;
 use super::units::Unit;
 use crate::files::write_whole;
-use crate::{Error, Result};
+use crate::{Error, Place, Result};
 
-/// The column every native file has.
+/// The column that every native file has.
 pub(super) const TIME: &str = "time_s";
 
 /// The columns of a native file, in the order they are written: time and distance, four wheel speeds, road-wheel
@@ -37,7 +37,7 @@ pub const COLUMNS: [&str; 11] = [
 pub(super) fn parse(text: &str, path: &Path, reading: &Reading<'_>) -> Result<Recording> {
     let mut rows = Rows::new(text, path, true);
     let Some(header) = rows.next().transpose()? else {
-        return Err(Error::input(path, "line 1", "no rows", "a header row"));
+        return Err(Error::input(path, Place::line(1), "no rows", "a header row"));
     };
     let names: Vec<String> = header.cells.iter().map(|c| c.to_string()).collect();
     let mut seen = HashSet::new();
@@ -45,7 +45,7 @@ pub(super) fn parse(text: &str, path: &Path, reading: &Reading<'_>) -> Result<Re
         if name.is_empty() || !seen.insert(name) {
             return Err(Error::input(
                 path,
-                format!("line {}, column {}", header.line, index + 1),
+                Place::line(header.line).named(format!("column {}", index + 1)),
                 if name.is_empty() {
                     "an empty cell".to_owned()
                 } else {
@@ -58,7 +58,7 @@ pub(super) fn parse(text: &str, path: &Path, reading: &Reading<'_>) -> Result<Re
     let Some(time_column) = names.iter().position(|n| n == TIME) else {
         return Err(Error::input(
             path,
-            format!("line {}", header.line),
+            Place::line(header.line),
             format!("no {TIME} column"),
             format!("the columns {}", COLUMNS.join(",")),
         ));
@@ -84,8 +84,8 @@ fn unit_in_name(name: &str) -> &str {
         .unwrap_or("")
 }
 
-/// How numbers are written: with a fixed number of decimals in some columns, and in the others with the fewest digits
-/// that read back as the same number.
+/// How numbers are written. Some columns have a fixed number of decimals; the others have the fewest digits that read back as the
+/// same number.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct NativeFormat {
     decimals: BTreeMap<String, usize>,
@@ -111,8 +111,8 @@ impl NativeFormat {
     }
 }
 
-/// Writes a log as a native CSV file. Laps are written as columns unless the log is one complete lap numbered 1,
-/// which is what a file without them means.
+/// Writes a log as a native CSV file. Laps are written as columns unless the log is one complete lap numbered 1, which a file
+/// without such columns means.
 ///
 /// # Errors
 /// [`Error::Io`] when the file cannot be written; [`Error::Input`] when the log's arrays differ in length, a value is
@@ -138,7 +138,7 @@ fn render(log: &Log, path: &Path, format: &NativeFormat) -> Result<String> {
         if values.len() != samples {
             return Err(Error::input(
                 path,
-                format!("column {name}"),
+                Place::default().column(name),
                 format!("{} values", values.len()),
                 format!("{samples}, as many as times"),
             ));
@@ -146,7 +146,7 @@ fn render(log: &Log, path: &Path, format: &NativeFormat) -> Result<String> {
         if let Some(at) = values.iter().position(|v| !v.is_finite()) {
             return Err(Error::input(
                 path,
-                format!("column {name}, sample {at}"),
+                Place::sample(at).column(name),
                 values[at].to_string(),
                 "a finite number",
             ));

@@ -6,11 +6,11 @@ use super::log::Log;
 use super::role::Role;
 use super::statistics::{Lag, best_lag, least_error_lag};
 
-/// Delays are looked for up to this, s.
+/// Greatest delay in the search, s.
 const MOST_DELAY_S: f64 = 0.5;
-/// A correlation below this decides no delay.
+/// Least correlation for a delay.
 const SURE_OF_DELAY: f64 = 0.6;
-/// Wheels are not braked when the car gains speed faster than this, m/s^2.
+/// Acceleration above which wheels cannot be braked, m/s^2.
 const DRIVING_AX: f64 = 0.3;
 /// Delays shorter than this share of a sample interval are left alone: interpolating would blur more than it moves.
 const LEAST_SHIFT: f64 = 0.1;
@@ -21,7 +21,7 @@ const LEAST_SHIFT: f64 = 0.1;
 /// Slip looks like a delay, since both grow with acceleration. An undriven wheel that is not braked has none, so only
 /// such samples count, and an error above a limit counts no more than the limit.
 fn wheel_lag(log: &Log, undriven: [usize; 2], accel: &[f64], most: usize) -> Option<Lag> {
-    /// Larger errors are slip or spikes, m/s.
+    /// Limit of an error, m/s: larger ones are slip or spikes.
     const LIMIT: f64 = 1.0;
     let [left, right] = undriven.map(|w| &log.wheel_speed_radps[w]);
     let pairs = left.iter().zip(right);
@@ -45,7 +45,7 @@ pub(super) fn delays(log: &Log, declared: &Declared, undriven: [usize; 2], calib
         let lag = best_lag(&log.yaw_rate_radps, &difference, &unbraked(log, &accel), most);
         lag.filter(|l| l.correlation.abs() >= SURE_OF_SIGN)
     });
-    // All four wheel speeds come off one input board, and the driven wheels' own delay cannot be told from slip.
+    // All four wheel speeds come from one input board. The delay of the driven wheels cannot be told from slip.
     let wheels = wheel_lag(log, undriven, &accel, most).filter(sure);
     let mut report = |role: Role, lag: Option<(f64, &Lag)>, against: &str| {
         let Some((samples, lag)) = lag else {
@@ -71,7 +71,7 @@ pub(super) fn delays(log: &Log, declared: &Declared, undriven: [usize; 2], calib
             evidence: format!("against {against}{why}"),
         });
     };
-    // Without the front wheels to tie them to yaw rate, the speed channels are at least tied to each other.
+    // Without the front wheels the speed channels cannot be compared with yaw rate. They are compared with each other.
     let front_samples = front.as_ref().map(|f| f.samples);
     let (wheel_samples, speed_samples) = match (front_samples, &wheels) {
         (Some(front), Some(wheels)) => (Some(front), front - wheels.samples),

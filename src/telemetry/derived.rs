@@ -1,21 +1,21 @@
-//! What calibration and audit compute from a log to compare its channels with.
+//! References for calibration and audit, computed from the log.
 
 use super::log::Log;
 use super::statistics::{derivative, median, quantile};
 
-/// Slower than this (m/s) a car says little about its sensors.
+/// Speed (m/s) below which a car gives little evidence about its sensors.
 pub(super) const MOVING_MPS: f64 = 8.0;
-/// Speed is differentiated over this long to each side, s: long enough to quieten 0.1 km/h steps.
+/// Half of the interval over which speed is differentiated, s: long enough to smooth steps of 0.1 km/h.
 const DERIVATIVE_S: f64 = 0.1;
-/// The front wheels' speed difference counts up to this many times what it stays within for nine tenths of the time.
+/// Limit of the front wheels' speed difference, in multiples of its 90 % quantile.
 const CLIP: f64 = 2.0;
-/// Brakes are hardly on when ax (m/s^2) is above this.
+/// Value of ax (m/s^2) above which the brakes are hardly on.
 const UNBRAKED_AX: f64 = -1.0;
 /// On a straight yaw rate (rad/s) stays within this of its offset.
 pub(super) const STRAIGHT_YAW: f64 = 0.03;
 /// Evidence from a straight or standstill needs this much of it, s.
 pub(super) const LEAST_S: f64 = 2.0;
-/// A correlation below this decides no sign.
+/// Least correlation for a sign.
 pub(super) const SURE_OF_SIGN: f64 = 0.4;
 
 /// Samples at which the car moves.
@@ -40,7 +40,7 @@ pub(super) fn front_difference(log: &Log) -> Option<Vec<f64>> {
     let (left, right) = (linear_speed(log, left)?, linear_speed(log, right)?);
     let pairs = right.iter().zip(&left);
     let mut difference: Vec<f64> = pairs.map(|(r, l)| r - l).collect();
-    // A spike or a locked wheel is worth no more than a tight corner.
+    // A spike or a locked wheel counts no more than a tight corner.
     let most = CLIP * quantile(difference.iter().map(|d| d.abs()).collect(), 0.9)?;
     for d in &mut difference {
         *d = d.clamp(-most, most);
@@ -54,8 +54,8 @@ pub(super) fn unbraked(log: &Log, accel: &[f64]) -> Vec<bool> {
     pairs.map(|(&v, &a)| v > MOVING_MPS && a > UNBRAKED_AX).collect()
 }
 
-/// Speed of a wheel in m/s, with a rolling radius that is good enough to compare it with others: that where the car
-/// hardly turns, since a wheel inside of most corners would look too large, or else that of all running.
+/// Speed of a wheel in m/s, with a rolling radius that is good enough to compare wheels. It is estimated where the car hardly
+/// turns, since a wheel that is inside in most corners would look too large. Without such stretches all samples are used.
 fn linear_speed(log: &Log, wheel: &[f64]) -> Option<Vec<f64>> {
     let radius = |most_yaw: f64| {
         let ratios: Vec<f64> = (0..log.samples())

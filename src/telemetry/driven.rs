@@ -1,8 +1,8 @@
-//! Where the car drove: one lap of a log with GPS.
+//! The path of the car: one lap of a log with GPS.
 
 use super::recording::{Channel, Clock, Format, Recording};
 use super::{csv_native, motec_ld, text};
-use crate::{Error, Result};
+use crate::{Error, Place, Result};
 use std::path::Path;
 
 /// One lap as positions on the globe.
@@ -18,7 +18,7 @@ pub struct DrivenLap {
     pub number: Option<u32>,
 }
 
-/// What loggers call these channels, in lower case and without anything but letters and digits.
+/// Names of these channels, in lower case and without anything but letters and digits.
 const LATITUDE: [&str; 5] = ["latitudedeg", "gpslatitude", "latitude", "gpslat", "lat"];
 const LONGITUDE: [&str; 7] = [
     "longitudedeg",
@@ -64,7 +64,7 @@ impl Recording {
             self.usual(names).ok_or_else(|| {
                 Error::input(
                     &self.source,
-                    format!("channel {what}"),
+                    Place::default().channel(what),
                     "none",
                     format!("a channel called {}", names.join(", ")),
                 )
@@ -74,7 +74,7 @@ impl Recording {
         if latitude.values.len() != longitude.values.len() {
             return Err(Error::input(
                 &self.source,
-                format!("channel {}", longitude.name),
+                Place::default().channel(&longitude.name),
                 format!("{} samples", longitude.values.len()),
                 format!("{}, as {} has", latitude.values.len(), latitude.name),
             ));
@@ -96,12 +96,12 @@ impl Recording {
         let factor = match unit.as_str() {
             "" | "deg" | "°" | "degrees" | "degree" => 1.0,
             "rad" => 1f64.to_degrees(),
-            // Racelogic logs minutes.
+            // Racelogic logs minutes of arc.
             "min" | "minutes" => 1.0 / 60.0,
             _ => {
                 return Err(Error::input(
                     &self.source,
-                    format!("channel {}, unit", channel.name),
+                    Place::default().channel(&channel.name),
                     text::shown(&channel.unit),
                     "deg, rad or min",
                 ));
@@ -163,7 +163,7 @@ impl Recording {
             .map(|c| (c[0].1, index(c[0].0)..index(c[1].0)))
             .collect();
         if let (Format::Native, Some(number)) = (self.format, first_number) {
-            // Our own files begin and end on the line.
+            // Native files begin and end on the line.
             laps.insert(0, (number, 0..index(cuts[0].0)));
             let (time, last) = cuts[cuts.len() - 1];
             laps.push((last, index(time)..samples));

@@ -55,7 +55,7 @@ pub(super) fn cuts_from_numbers(times: &[f64], numbers: &[u32]) -> Vec<Cut> {
 /// The laps between cuts, in time order. What comes before the first cut is lap `first_number`. A lap is complete when
 /// a cut stands at both its ends; the end of the log counts as one when a cut is within one sample of it.
 pub(super) fn cut(cuts: &[Cut], first_number: u32, span: Grid) -> Vec<Lap> {
-    // Logged times are rounded; a cut on a sample must not fall behind it.
+    // Logged times are rounded; a cut on a sample must not fall after it.
     let index = |time: f64| {
         let position = (time - span.start_s) / span.dt_s - JITTER;
         (position.ceil().max(0.0) as usize).min(span.samples)

@@ -1,4 +1,4 @@
-//! The log that an identification works on.
+//! The log for an identification.
 
 use std::ops::Range;
 
@@ -9,14 +9,14 @@ use crate::{Error, Result};
 /// How a recording is turned into a [`Log`].
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LogOptions {
-    /// Sample rate of the log, Hz; the highest rate among the channels needed where it is not given.
+    /// Sample rate of the log, Hz; `None` for the highest rate among the channels that are needed.
     pub rate_hz: Option<f64>,
     /// Gaps of up to this (s) are bridged by a straight line; longer ones are errors. Intervals of up to three times
     /// the nominal one are no gaps.
     pub bridge_gaps_s: f64,
     /// The rolling radius (m) to use where the channel map gives none: that of the car being identified.
     pub rolling_radius_m: Option<f64>,
-    /// What is estimated from the log and corrected.
+    /// The corrections that are estimated from the log.
     pub calibration: CalibrationOptions,
 }
 
@@ -128,7 +128,7 @@ impl Log {
     /// # Errors
     /// [`Error::Input`] with both lengths.
     pub fn check_length(&self, window_s: f64) -> Result<()> {
-        // The last sample's time is reached only to rounding.
+        // The time of the last sample is exact only to rounding.
         if self.duration_s() + 1e-6 * self.dt_s >= window_s {
             return Ok(());
         }

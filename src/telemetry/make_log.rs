@@ -33,7 +33,7 @@ impl Log {
         Self::read_within(path, map, options, memory_limit())
     }
 
-    /// As [`Log::read`], within so much memory (bytes) instead of what is allowed at present.
+    /// As [`Log::read`], within a limit of memory (bytes) of its own.
     ///
     /// # Errors
     /// As for [`Log::read`].
@@ -351,7 +351,7 @@ mod tests {
         ] {
             let said = refused(&path, limit);
             assert!(said.contains("lap.csv") && said.contains(&part), "{said}");
-            assert!(said.contains("MiB (--memory-limit-mib)"), "{said}");
+            assert!(said.contains("a file that fits into"), "{said}");
         }
         assert!(read < made);
         let log = Log::read_within(&path, &ChannelMap::default(), &off(), made).unwrap();

@@ -1,7 +1,7 @@
 //! CSV exports of MoTeC i2: a block of `key,value` rows, a row of names, a row of units, then numbers.
 //!
-//! AiM Race Studio writes the same layout. Nothing is expected at a fixed line: the row of names is the one that
-//! starts with `Time` and is followed by a row that starts with a unit of time.
+//! AiM Race Studio writes the same layout. No row has a fixed line: the row of names is the one that starts with `Time` and is
+//! followed by a row that starts with a unit of time.
 
 use std::collections::HashSet;
 use std::path::Path;
@@ -10,7 +10,7 @@ use super::recording::{Format, Metadata, Reading, Recording};
 use super::table::Table;
 use super::text::{Row, Rows, shown};
 use super::units::{Quantity, Unit};
-use crate::{Error, Result};
+use crate::{Error, Place, Result};
 
 /// Reads an export from its text; `path` is its name in error messages.
 pub(super) fn parse(text: &str, path: &Path, reading: &Reading<'_>) -> Result<Recording> {
@@ -23,7 +23,7 @@ pub(super) fn parse(text: &str, path: &Path, reading: &Reading<'_>) -> Result<Re
         let Some(row) = rows.next().transpose()? else {
             return Err(Error::input(
                 path,
-                format!("line {last_line}"),
+                Place::line(last_line),
                 "the end of the file",
                 "a row of channel names that starts with \"Time\", and a row of their units under it",
             ));
@@ -52,7 +52,7 @@ pub(super) fn parse(text: &str, path: &Path, reading: &Reading<'_>) -> Result<Re
     })
 }
 
-/// i2 writes a channel once per worksheet it appears in. The first keeps its name, later ones are told apart.
+/// i2 writes a channel once for each worksheet that has it. The first one keeps its name; later ones get a number.
 fn unique_names(row: &Row<'_>, path: &Path) -> Result<Vec<String>> {
     let end = row.cells.iter().rposition(|c| !c.is_empty()).unwrap_or(0);
     let mut seen = HashSet::new();
@@ -61,7 +61,7 @@ fn unique_names(row: &Row<'_>, path: &Path) -> Result<Vec<String>> {
         if cell.is_empty() {
             return Err(Error::input(
                 path,
-                format!("line {}, column {}", row.line, index + 1),
+                Place::line(row.line).named(format!("column {}", index + 1)),
                 "an empty cell",
                 "a channel name",
             ));
@@ -85,7 +85,7 @@ fn describe(row: &Row<'_>, path: &Path, metadata: &mut Metadata, beacons_s: &mut
                 _ => {
                     return Err(Error::input(
                         path,
-                        format!("line {}, Beacon Markers", row.line),
+                        Place::line(row.line).named("Beacon Markers"),
                         shown(word),
                         "times in seconds",
                     ));
@@ -140,7 +140,7 @@ mod tests {
         assert_eq!(r.channels[1].unit, "°/s");
         assert_eq!(r.channels[0].values, [36.0, 72.0]);
         assert_eq!(r.channels[1].unreadable.as_ref().unwrap().sample, 1);
-        assert_eq!(r.channels[1].place(1), "line 12, channel Yaw");
+        assert_eq!(r.channels[1].place(1).to_string(), "line 12, channel Yaw");
     }
 
     #[test]

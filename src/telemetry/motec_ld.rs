@@ -1,9 +1,9 @@
 //! MoTeC's binary `.ld`, read through the `motec-i2` crate.
 //!
-//! That crate trusts the file: it follows a looping channel list for ever, panics on half-precision samples and on
-//! offsets, and gives up on a whole file for one degree sign in Latin-1. So the channel list is walked and checked
-//! here first, and what the crate cannot take is put right before the crate sees it. Samples are read here: the crate keeps
-//! those of a channel in four times the memory that they take in the file.
+//! That crate trusts the file. It follows a looping channel list for ever, panics on half-precision samples and on offsets, and
+//! rejects a whole file for one degree sign in Latin-1. This module therefore walks and checks the channel list first, and
+//! corrects what the crate cannot read. Samples are read here, because the crate needs four times the memory that they take in
+//! the file.
 
 use std::borrow::Cow;
 use std::collections::HashSet;
@@ -16,11 +16,11 @@ use motec_i2::{ChannelMetadata, Header, I2Error, LDReader};
 use super::recording::{Channel, Clock, Format, MOST_CHANNELS, Metadata, Reading, Recording, Unreadable};
 use super::text::{decode, shown};
 use crate::config::{LARGEST_TEXT, read_bytes};
-use crate::{Error, Result};
+use crate::{Error, Place, Result};
 
 /// First four bytes of a `.ld`, little-endian.
 const MARKER: u32 = 64;
-/// Length of the fixed part of the header that the reader goes through, bytes.
+/// Length of the fixed part of the header, bytes.
 const HEADER_SIZE: usize = 1762;
 /// Length of one entry of the channel list, bytes.
 const ENTRY_SIZE: usize = 124;
@@ -44,7 +44,7 @@ enum Storage {
     I16,
     I32,
     F32,
-    /// Half-precision floats, which the crate is told are integers of the same size.
+    /// Half-precision floats. The crate is given them as integers of the same size.
     Half,
     Unknown {
         kind: u16,
@@ -79,14 +79,14 @@ pub(super) fn parse(bytes: Cow<'_, [u8]>, path: &Path, reading: &Reading<'_>) ->
         ));
     }
     let size = bytes.len() as u64;
-    // What is somebody else's is copied.
+    // Borrowed bytes are copied.
     let copies = if matches!(bytes, Cow::Borrowed(_)) { 2 } else { 1 };
     let mut bytes = bytes.into_owned();
     for (at, size) in HEADER_STRINGS {
         to_utf8(&mut bytes[at..at + size]);
     }
     let stored = check_channels(&mut bytes, path)?;
-    // A panic of the crate that the checks above do not foresee must not take the program with it.
+    // A panic in the crate must not end the program.
     let read = catch_unwind(AssertUnwindSafe(|| read_head(&bytes)))
         .map_err(|_| broken(path, "a layout that the .ld reader cannot follow"))?;
     let (header, metas) = read.map_err(|e| broken(path, &e.to_string()))?;
@@ -193,11 +193,11 @@ fn check_channels(bytes: &mut [u8], path: &Path) -> Result<Vec<Stored>> {
         if let (Some(data), Some(count), false) = (data, count, matches!(kept, Storage::Unknown { .. })) {
             let stored = u64::from(count) * u64::from(size);
             total += stored;
-            // Data of all channels together cannot be longer than the file that holds them.
+            // The data of all channels together cannot be longer than the file.
             if u64::from(data) + stored > length as u64 || total > length as u64 {
                 return Err(Error::input(
                     path,
-                    format!("channel {}", shown(&name)),
+                    Place::default().channel(shown(&name)),
                     format!("{count} samples of {size} bytes at address {data}"),
                     format!("samples inside the file of {length} bytes (is it cut short?)"),
                 ));
@@ -372,7 +372,7 @@ fn beacons(xml: &str, path: &Path) -> Result<Vec<f64>> {
                 _ => {
                     return Err(Error::input(
                         path,
-                        format!("line {}, Marker", line + 1),
+                        Place::line(line + 1).named("Marker"),
                         shown(time),
                         "a Time in microseconds",
                     ));

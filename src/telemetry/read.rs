@@ -6,7 +6,7 @@ use std::path::Path;
 use super::recording::{Format, Reading, Recording};
 use super::{csv_native, motec_csv, motec_ld, text};
 use crate::config::{LARGEST_LOG, read_bytes};
-use crate::{Error, Result};
+use crate::{Error, Place, Result};
 
 impl Recording {
     /// Reads a log file; content decides the format, and the extension where content does not.
@@ -21,7 +21,7 @@ impl Recording {
     /// As [`Recording::read`], of the channels that are chosen; the others have no samples.
     pub(super) fn read_some(path: &Path, reading: &Reading<'_>) -> Result<Self> {
         if let Ok(told) = std::fs::metadata(path) {
-            // It is in memory as it is while it is read.
+            // The whole file is in memory while it is read.
             reading.fits(path, told.len(), told.len())?;
         }
         let bytes = read_bytes(path, LARGEST_LOG.min(reading.limit))?;
@@ -47,12 +47,12 @@ impl Recording {
             return motec_ld::parse(bytes, path, reading);
         }
         let size = bytes.len() as u64;
-        // What is no UTF-8 is written anew, at most twice as long.
+        // Text that is not UTF-8 is converted, to at most twice its length.
         reading.fits(path, size, text::decoded_size(&bytes))?;
         let text = text::decode(&bytes);
         let mut rows = text::Rows::new(&text, path, true);
         let Some(first) = rows.next().transpose()? else {
-            return Err(Error::input(path, "line 1", "no rows", "a log"));
+            return Err(Error::input(path, Place::line(1), "no rows", "a log"));
         };
         if first.cells.iter().any(|c| c == csv_native::TIME) {
             csv_native::parse(&text, path, reading)
@@ -61,7 +61,7 @@ impl Recording {
         } else {
             Err(Error::input(
                 path,
-                format!("line {}", first.line),
+                Place::line(first.line),
                 text::shown(first.cell(0)),
                 "a header row with a time_s column, a MoTeC CSV export (first cell \"Format\"), or a .ld file",
             ))

@@ -1,10 +1,11 @@
-//! A log file as it was logged, before anybody decided what its channels mean.
+//! A log file as it was logged, before roles are assigned to its channels.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use crate::Result;
 use crate::config::{check_memory, memory_limit};
+use crate::error::Place;
 
 /// The file formats that can be read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -51,8 +52,8 @@ pub struct Channel {
     pub clock: Clock,
     /// Its samples in `unit`; NaN where the file holds no finite number.
     pub values: Vec<f64>,
-    /// The first sample that is not a finite number. A channel nobody needs may have gaps, so this becomes an error
-    /// only when the channel is used.
+    /// The first sample that is not a finite number. A channel that is not needed may have gaps, so this is an error only if the
+    /// channel is used.
     pub unreadable: Option<Unreadable>,
     /// The file line of each sample, for text formats.
     pub lines: Option<Arc<[usize]>>,
@@ -68,15 +69,15 @@ impl Channel {
     }
 
     /// Where a sample stands, for an error message: `line 12, channel X`, or its time in a binary file.
-    pub fn place(&self, sample: usize) -> String {
+    pub fn place(&self, sample: usize) -> Place {
         match self.lines.as_ref().and_then(|lines| lines.get(sample)) {
-            Some(line) => format!("line {line}, channel {}", self.name),
-            None => format!("channel {}, t = {:.3} s", self.name, self.time_s(sample)),
+            Some(&line) => Place::line(line).channel(&self.name),
+            None => Place::time(self.time_s(sample)).channel(&self.name),
         }
     }
 }
 
-/// What a file says about itself beside its channels. Everything may be missing.
+/// Details of a file beside its channels. Each may be missing.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Metadata {
     /// The circuit.
@@ -89,7 +90,7 @@ pub struct Metadata {
     pub device: Option<String>,
     /// The session.
     pub session: Option<String>,
-    /// The comment the engineer left.
+    /// The comment of the engineer.
     pub comment: Option<String>,
     /// Date, as written in the file.
     pub log_date: Option<String>,
@@ -99,20 +100,19 @@ pub struct Metadata {
     pub range: Option<String>,
 }
 
-/// The most channels of a log: more than any logger has, and few enough that what is kept of each besides its samples does not
-/// count.
+/// Most channels of a log: more than any logger has, and so few that the memory for each besides its samples does not matter.
 pub(super) const MOST_CHANNELS: usize = 1 << 16;
 
-/// What of a log is read, and into how much memory that has to fit.
+/// Which channels of a log are read, and the limit of memory.
 pub(super) struct Reading<'a> {
-    /// Which of the channels, of which names and units are known and nothing else.
+    /// Chooses channels by their names and units.
     pub choose: &'a dyn Fn(&Recording) -> Result<Vec<bool>>,
     /// Bytes.
     pub limit: u64,
 }
 
 impl Reading<'_> {
-    /// All channels, into what is allowed at present.
+    /// All channels, within the present limit of memory.
     pub fn whole() -> Self {
         Self {
             choose: &|recording| Ok(vec![true; recording.channels.len()]),

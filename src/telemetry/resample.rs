@@ -1,14 +1,14 @@
 //! Bringing channels with their own clocks onto one uniform clock.
 
 use super::recording::Channel;
-use crate::{Error, Result};
+use crate::{Error, Place, Result};
 
-/// By how much of a sample interval logged times may stray from a uniform clock and still count as on it: i2 writes
-/// milliseconds, which is 3 % of an interval at 60 Hz.
+/// Largest deviation of logged times from a uniform clock, as a share of a sample interval: i2 writes milliseconds, which is 3 %
+/// of an interval at 60 Hz.
 pub(super) const JITTER: f64 = 0.04;
-/// Longer than this many nominal intervals between two samples is a gap.
+/// A longer pause between two samples is a gap, in nominal intervals.
 const GAP_INTERVALS: f64 = 3.0;
-/// Most samples of a resampled log; more is a wrong rate or a wrong unit of time, not a log.
+/// Most samples of a resampled log. More samples mean a wrong rate or a wrong unit of time.
 const MOST_SAMPLES: f64 = 5e6;
 
 /// A uniform clock.
@@ -69,7 +69,7 @@ pub(super) fn check_times(source: &str, channel: &Channel, times: &[f64], bridge
     if intervals.is_empty() {
         return Err(Error::input(
             source,
-            format!("channel {}", channel.name),
+            Place::default().channel(&channel.name),
             format!("{} samples", times.len()),
             "at least two",
         ));
@@ -107,9 +107,9 @@ pub(super) fn uniform_interval(times: &[f64]) -> Option<f64> {
     })
 }
 
-/// Values of a channel at the times of the grid, each `delay_s` later in the channel's own time: linear between
-/// samples, or, where the grid is more than twice as coarse as the samples, the mean over one grid interval of that
-/// line, which keeps what is too fast for the grid from folding into it.
+/// Values of a channel at the times of the grid, each `delay_s` later in the channel's own time: linear between samples, or,
+/// where the grid is more than twice as coarse as the samples, the mean over one grid interval of that line, which prevents
+/// aliasing.
 pub(super) fn onto(times: &[f64], values: &[f64], nominal_s: f64, delay_s: f64, grid: &Grid) -> Vec<f64> {
     let average = grid.dt_s > 2.0 * nominal_s;
     if !average {

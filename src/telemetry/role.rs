@@ -1,10 +1,10 @@
-//! What the channels of a log are needed for, and what loggers call them.
+//! The roles of channels, and the usual names of loggers for them.
 
 use serde::{Deserialize, Serialize};
 
 use super::units::Quantity;
 
-/// What a channel is needed for.
+/// The role of a channel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Role {

@@ -12,7 +12,7 @@ pub(super) fn median(values: Vec<f64>) -> Option<f64> {
     quantile(values, 0.5)
 }
 
-/// How two signals go together.
+/// Correlation and slope of two signals.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Fit {
     /// Pearson's correlation.
@@ -58,7 +58,7 @@ pub(super) fn fit(a: &[f64], b: &[f64], mask: &[bool], lag: isize) -> Option<Fit
     })
 }
 
-/// By how many samples a signal comes after another.
+/// The lag of a signal behind another, in samples.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Lag {
     /// The lag, samples, between samples by a parabola through the peak.
@@ -86,7 +86,8 @@ fn search(most: isize, score: impl Fn(isize) -> Option<f64>) -> Option<isize> {
 /// The lag within `-most..=most` samples at which `late` correlates most strongly, with either sign, with `early`.
 /// None when the strongest is at the end of the range: then there is no peak.
 pub(super) fn best_lag(early: &[f64], late: &[f64], mask: &[bool], most: usize) -> Option<Lag> {
-    // Samples whose partner falls off either end at some lag are left out at all lags, lest a few at the ends decide.
+    // Samples whose partner falls off either end at some lag are left out at all lags, so that a few samples at the ends do not
+    // decide.
     let inner = most..early.len().checked_sub(most)?;
     let mask: Vec<bool> = mask
         .iter()
@@ -132,7 +133,7 @@ pub(super) fn least_error_lag(
         for i in inner.clone().filter(|&i| mask[i]) {
             pairs.push((early[i], *late.get(i.checked_add_signed(lag)?)?));
         }
-        // A wrong factor would be made up for by a wrong lag wherever the signal mostly grows.
+        // Where the signal mostly grows, a wrong lag would compensate for a wrong factor.
         let factor = median(pairs.iter().map(|(e, l)| e / l).collect())?;
         let errors = pairs.iter().map(|(e, l)| (e - factor * l).abs().min(limit));
         Some(errors.map(|e| e * e).sum::<f64>())

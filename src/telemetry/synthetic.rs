@@ -1,4 +1,4 @@
-//! A made-up outing with known truth, for the tests of this module.
+//! A synthetic outing with known truth, for the tests of this module.
 
 use std::fmt::Write as _;
 

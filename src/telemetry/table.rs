@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::recording::{Channel, Clock, Format, Metadata, Reading, Recording, Unreadable};
 use super::text::{Row, shown};
-use crate::{Error, Result};
+use crate::{Error, Place, Result};
 
 /// Columns of numbers as they are read.
 pub(super) struct Table<'a> {
@@ -13,7 +13,7 @@ pub(super) struct Table<'a> {
     names: Vec<String>,
     units: Vec<String>,
     time_column: usize,
-    /// Of columns that are not read nothing is kept.
+    /// Columns that are not read keep no samples.
     wanted: Vec<bool>,
     columns: Vec<Vec<f64>>,
     unreadable: Vec<Option<Unreadable>>,
@@ -53,7 +53,7 @@ impl<'a> Table<'a> {
         })
     }
 
-    /// Adds a row. A cell that is no finite number is remembered, not refused, unless it is the time.
+    /// Adds a row. A cell that is not a finite number is recorded and not refused, unless it is the time.
     ///
     /// # Errors
     /// [`Error::Input`] for a row of another width, and for a time that is not a number or does not rise.
@@ -64,7 +64,7 @@ impl<'a> Table<'a> {
         if row.cells.len() < width || surplus {
             return Err(Error::input(
                 self.file,
-                format!("line {line}"),
+                Place::line(line),
                 format!("{} cells", row.cells.len()),
                 format!("{width} cells, one for each column"),
             ));
@@ -79,7 +79,7 @@ impl<'a> Table<'a> {
                 _ if index == self.time_column => {
                     return Err(Error::input(
                         self.file,
-                        format!("line {line}, channel {}", self.names[index]),
+                        Place::line(line).channel(&self.names[index]),
                         shown(cell),
                         "a time in seconds",
                     ));

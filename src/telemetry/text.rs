@@ -4,9 +4,9 @@ use std::borrow::Cow;
 use std::path::Path;
 
 use super::recording::MOST_CHANNELS;
-use crate::{Error, Result};
+use crate::{Error, Place, Result};
 
-/// A quoted cell may span lines (a comment in a header); one that spans more than this was never closed.
+/// A quoted cell may span lines (a comment in a header); one that spans more lines was never closed.
 const MAX_LINES_PER_ROW: usize = 64;
 
 /// Text from bytes that are UTF-8, or else Latin-1, which loggers write for the degree sign. A byte-order mark is
@@ -28,7 +28,7 @@ fn latin_1_size(bytes: &[u8]) -> usize {
     bytes.len() + bytes.iter().filter(|b| !b.is_ascii()).count()
 }
 
-/// What bytes and their text take together (bytes).
+/// Memory of bytes and their text together (bytes).
 pub(super) fn decoded_size(bytes: &[u8]) -> u64 {
     let text = match std::str::from_utf8(bytes) {
         Ok(_) => 0,
@@ -97,7 +97,7 @@ impl<'a> Rows<'a> {
             if end == self.rest.len() || self.line - first >= MAX_LINES_PER_ROW {
                 return Err(Error::input(
                     self.file,
-                    format!("line {first}"),
+                    Place::line(first),
                     "a quotation mark that is never closed",
                     "quotation marks in pairs",
                 ));
@@ -128,7 +128,7 @@ impl<'a> Iterator for Rows<'a> {
                         self.rest = "";
                         return Some(Err(Error::input(
                             self.file,
-                            format!("line {line}"),
+                            Place::line(line),
                             format!("{commas} commas"),
                             format!("a row of at most {MOST_CHANNELS} cells"),
                         )));

@@ -9,7 +9,7 @@ use toml::Spanned;
 use super::circuit::Section;
 use crate::config::LONGEST_NAME;
 use crate::files::stem;
-use crate::{Error, Result};
+use crate::{Error, Place, Result};
 
 /// A named stretch of a road.
 #[derive(Deserialize)]
@@ -29,11 +29,11 @@ pub(super) fn line_of(text: &str, at: usize) -> usize {
 pub(super) fn parse_toml<T: DeserializeOwned>(file: &str, text: &str, what: &str) -> Result<T> {
     toml::from_str(text).map_err(|error| {
         let place = match error.span() {
-            Some(span) => format!("line {}", line_of(text, span.start)),
-            None => "document".to_owned(),
+            Some(span) => Place::line(line_of(text, span.start)),
+            None => "document".into(),
         };
         let message = error.message().trim().replace('\n', ", ");
-        // serde's messages end with what they wanted, as in "unknown field `x`, expected one of ...".
+        // serde's messages end with what was expected, as in "unknown field `x`, expected one of ...".
         match message.split_once(", expected ") {
             Some((found, expected)) => Error::input(file, place, found, expected),
             None => Error::input(file, place, message, what),
@@ -49,7 +49,7 @@ pub(super) struct Checker<'a> {
 
 impl Checker<'_> {
     pub fn refuse(&self, span: Range<usize>, field: &str, found: String, expected: &str) -> Error {
-        let place = format!("line {}, field {field}", line_of(self.text, span.start));
+        let place = Place::line(line_of(self.text, span.start)).field(field);
         Error::input(self.file, place, found, expected)
     }
 
@@ -97,7 +97,7 @@ impl Checker<'_> {
                     &format!("a station beyond start_m, {start_m}"),
                 ));
             }
-            // Files are named by sections, not everywhere with regard to case.
+            // Sections give names to files, and not every file system distinguishes case.
             let file_name = |name: &str| stem(name).to_lowercase();
             let taken = sections.iter().find(|s| file_name(&s.name) == file_name(&name));
             let expected = match taken {

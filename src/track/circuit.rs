@@ -1,4 +1,4 @@
-//! A circuit sampled at even steps along its centreline, and the questions a driver asks of it.
+//! A circuit sampled at even steps along its centreline, with its positions, headings and curvatures.
 
 use glam::DVec2;
 
@@ -98,7 +98,7 @@ struct Frame {
     curvature_1pm: f64,
 }
 
-/// A station as the samples before and after it and the distance from the former.
+/// A station as the samples before and after it and the distance from the sample before.
 struct Place {
     laps: f64,
     before: usize,
@@ -132,7 +132,7 @@ impl Circuit {
             return station_m.clamp(0.0, self.length_m);
         }
         let wrapped = station_m.rem_euclid(self.length_m);
-        // rem_euclid rounds to the length itself for stations a hair below zero.
+        // rem_euclid rounds to the length itself for stations just below zero.
         if wrapped >= self.length_m { 0.0 } else { wrapped }
     }
 
@@ -197,8 +197,8 @@ impl Circuit {
         }
     }
 
-    /// The section of this name. Case does not matter, and a beginning will do where it fits one
-    /// section only; each name of a section called `Village/The Loop` counts.
+    /// The section of this name. Case does not matter. The beginning of a name is enough if it fits one section only. A section
+    /// called `Village/The Loop` has two names.
     ///
     /// # Errors
     /// [`Error::Input`] listing the names when none or several fit.
@@ -238,13 +238,12 @@ impl Circuit {
 
     /// The foot of the perpendicular from a point, found from a station nearby.
     ///
-    /// Newton's method, two or three steps when the hint is the last millisecond's answer. It is a
-    /// local search: on a hairpin a hint on the wrong leg finds the wrong leg. Use
-    /// [`Circuit::project_anywhere`] when nothing is known.
+    /// Newton's method takes two or three steps if the hint is the foot of a millisecond ago. The search is local: on a hairpin,
+    /// a hint on the wrong leg finds a foot on the wrong leg. [`Circuit::project_anywhere`] needs no hint.
     pub fn project(&self, point_m: DVec2, station_hint_m: f64) -> Projection {
         /// Far smaller than any effect on a driver, far larger than rounding at 10 km.
         const SETTLED_M: f64 = 1e-9;
-        /// Keeps a bad hint from being flung onto another part of the circuit.
+        /// Longest step of Newton's method, so that a bad hint does not lead to another part of the circuit.
         const LONGEST_STEP_M: f64 = 10.0;
         let mut station = self.wrap(station_hint_m);
         for _ in 0..25 {
@@ -272,8 +271,8 @@ impl Circuit {
         self.at_sample(point_m, self.nearest(point_m, nearby))
     }
 
-    /// The nearest foot of a perpendicular from a point anywhere, without a hint. Looks at every
-    /// sample: for starting points, not for every millisecond.
+    /// The nearest foot of a perpendicular from a point anywhere, without a hint. It looks at every sample, so it is meant for
+    /// starting points and not for every step.
     pub fn project_anywhere(&self, point_m: DVec2) -> Projection {
         let nearest = self.nearest(point_m, 0..self.station_m.len());
         let refined = self.project(point_m, self.station_m[nearest]);

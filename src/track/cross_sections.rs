@@ -1,7 +1,7 @@
 //! Cross-sections of a circuit at stations: the straight segments that a racing line crosses.
 
 use super::circuit::{Corner, Section};
-use crate::{Error, Result};
+use crate::{Error, Place, Result};
 use glam::DVec2;
 
 /// Cross-sections across a circuit, each from its right edge to its left one.
@@ -63,10 +63,10 @@ impl CrossSections {
         }
     }
 
-    /// A line (`alpha` at every cross-section) without what is shorter than `wavelength_m`: of all lines across the
-    /// cross-sections the one that is least far from the given one and least bent, weighed so that a wave of that length keeps
-    /// half its height (E. T. Whittaker, *On a new method of graduation*, Proc. Edinburgh Math. Soc. 41, 1923). It may leave the
-    /// road, where a line held at its edge would have a kink.
+    /// A line (`alpha` at every cross-section) without what is shorter than `wavelength_m`: the line that minimises a weighted
+    /// sum of its distance from the given line and its bending; with this weight, a wave of that length keeps half its height (E.
+    /// T. Whittaker, *On a new method of graduation*, Proc. Edinburgh Math. Soc. 41, 1923). It may leave the road, where a line
+    /// held at its edge would have a kink.
     pub fn smoothed(&self, alpha: &[f64], wavelength_m: f64) -> Vec<f64> {
         let n = self.len();
         if n < 5 {
@@ -79,7 +79,7 @@ impl CrossSections {
             .collect();
         let mean_m = self.length_m / if self.closed { n } else { n - 1 } as f64;
         let weight = (wavelength_m / (std::f64::consts::TAU * mean_m)).powi(4);
-        // Second differences over the mean spacing, in units of the spacing; and what they are the transpose of.
+        // Second differences over the mean spacing, in units of the spacing, and their transpose.
         let inner = if self.closed { 0..n } else { 1..n - 1 };
         let bend = |points: &[DVec2]| -> Vec<DVec2> {
             let mut bend = vec![DVec2::ZERO; n];
@@ -124,12 +124,12 @@ impl CrossSections {
         let cuts = ends.zip(&mut narrowed.reference).zip(&self.station_m);
         for (((right, left), reference), station) in cuts {
             let width = right.distance(*left);
-            // What is not a number fits nowhere.
+            // NaN does not fit.
             let fits = width > car_width_m && car_width_m >= 0.0;
             if !fits {
                 return Err(Error::input(
                     &self.name,
-                    format!("width at station {station:.1} m"),
+                    Place::station(*station).named("width"),
                     format!("{width:.2} m"),
                     format!("more than the car's {car_width_m:.2} m"),
                 ));
@@ -143,8 +143,8 @@ impl CrossSections {
         Ok(narrowed)
     }
 
-    /// The `count` cross-sections from `first` on as an open stretch, round the end of a closed circuit if need be. Stations
-    /// start from zero; named sections and corners stay with the whole.
+    /// The `count` cross-sections from `first` on as an open stretch, across the start line of a closed circuit if necessary.
+    /// Stations start from zero; named sections and corners stay with the whole.
     ///
     /// # Errors
     /// [`Error::Input`] if the stretch has fewer than two cross-sections, or more than there are.

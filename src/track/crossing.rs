@@ -5,7 +5,7 @@ use glam::DVec2;
 /// A straight stretch between two points (m).
 pub(super) type Stretch = [DVec2; 2];
 
-/// The most pairs of boxes that are compared, so that a hostile file cannot keep a program busy for hours.
+/// Most pairs of boxes that are compared, so that no file keeps the program busy for hours.
 const BUDGET: u64 = 200_000_000;
 
 /// The stretches are too tangled to be checked.
@@ -54,7 +54,7 @@ pub(super) fn crossings(stretches: &[Stretch], most: usize) -> Result<Vec<(usize
     if stretches.len() < 2 {
         return Ok(found);
     }
-    // Leaves of a full binary tree, in the order along the line, so that what is near is together.
+    // Leaves of a full binary tree, in the order along the line, so that neighbours are together.
     let leaves = stretches.len().next_power_of_two();
     let nowhere = Bounds {
         low: DVec2::INFINITY,

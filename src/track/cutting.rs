@@ -9,16 +9,16 @@ use super::circuit::Circuit;
 use super::cross_sections::CrossSections;
 use super::crossing::{Stretch, crossings, stretches};
 use super::road::{Road, RoadFrame, Spacing, even_stations, spread};
-use crate::{Error, Result};
+use crate::{Error, Place, Result};
 use glam::DVec2;
 
-/// A cross-section is turned no further from the normal than this (rad).
+/// Greatest turn of a cross-section from the normal (rad).
 const FURTHEST_TURN_RAD: f64 = 0.6;
-/// Rounds of turning before a bend is given up.
+/// Most rounds of turning; then the bend is refused.
 const ROUNDS: usize = 300;
 /// Step of the reference line against which the ends of turned cross-sections are found (m).
 const FINE_M: f64 = 0.5;
-/// Gap between neighbouring cross-sections' ends that mending leaves, as a share of the step between the cross-sections.
+/// Least gap between the ends of turned neighbours, as a share of the step between the cross-sections.
 const LEAST_STEP: f64 = 0.02;
 
 impl Circuit {
@@ -79,11 +79,11 @@ struct Cutter<'a> {
     turned: Vec<f64>,
     /// Right and left end of each cross-section (m).
     ends: Vec<Stretch>,
-    /// Greatest distance between two cross-sections' stations that mending brings apart (m).
+    /// Greatest distance between the stations of two cross-sections that turning can separate (m).
     near_m: f64,
     /// Pairs of stations where the reference line crosses itself, as on a bridge (m).
     bridges: Vec<(f64, f64)>,
-    /// The reference line at fine steps; made when a cross-section is first turned.
+    /// The reference line at fine steps; computed when the first cross-section is turned.
     fine: Vec<Sample>,
 }
 
@@ -96,7 +96,7 @@ impl<'a> Cutter<'a> {
             if width.is_nan() || width <= 0.0 {
                 return Err(Error::input(
                     road.source(),
-                    format!("width at station {station:.1} m"),
+                    Place::station(*station).named("width"),
                     format!("{width:.2} m"),
                     "a road wider than zero",
                 ));
@@ -144,8 +144,8 @@ impl<'a> Cutter<'a> {
         let [a, b] = [i, j].map(|i| self.stations[i.min(self.stations.len() - 1)]);
         Error::input(
             self.road.source(),
-            format!("stations {a:.1} m and {b:.1} m"),
-            "edges that cross: the road overlaps itself",
+            Place::station(a),
+            format!("edges that cross those at station {b:.1} m: the road overlaps itself"),
             "widths that leave room between the two stretches",
         )
     }
@@ -188,7 +188,7 @@ impl<'a> Cutter<'a> {
             let spread = 1 + round / 3;
             let mut zone = vec![false; n];
             for &(i, j) in &crossed {
-                // The shorter way from one to the other.
+                // The shorter way along the road between the two.
                 let (from, to) = if j - i <= n / 2 { (i, j) } else { (j, i + n) };
                 for k in from as isize - spread as isize..=(to + spread) as isize {
                     if self.road.closed() {
@@ -225,7 +225,7 @@ impl<'a> Cutter<'a> {
         };
         Error::input(
             self.road.source(),
-            format!("station {:.1} m", self.stations[cut]),
+            Place::station(self.stations[cut]),
             format!(
                 "cross-sections that cross: {inside:.1} m of road inside a bend of {:.1} m radius",
                 1.0 / frame.curvature_1pm.abs().max(1e-9)
@@ -252,7 +252,7 @@ impl<'a> Cutter<'a> {
         let frame = &self.frames[cut];
         let left = frame.tangent.rotate(DVec2::from_angle(self.turned[cut])).perp();
         let reach = |way: f64, width: f64| {
-            // How far a point along the cross-section is short of the edge beside it.
+            // Distance of a point on the cross-section from the edge beside it.
             let short = |along: f64| {
                 let (away, sample) = self.nearest(frame.position_m + way * along * left, self.stations[cut]);
                 let width = if way > 0.0 { sample.left_m } else { sample.right_m };

@@ -1,10 +1,9 @@
 //! Builds a circuit from its curvature.
 //!
-//! Curvature measured off a map never quite closes: the lap misses 360 degrees by a little and its
-//! end misses its start by metres. Shifting positions to hide that would leave a circuit whose
-//! curvature no longer describes its centreline. Instead the curvature itself is changed, by the
-//! least amount (in the root mean square over the lap) that closes the lap; heading and position
-//! are then its integrals and stay consistent, and so does the arc length.
+//! Curvature that was measured on a map does not close exactly: the lap misses 360 degrees by a little, and its end misses its
+//! start by metres. Shifting positions to hide that would leave a circuit whose curvature no longer describes its centreline.
+//! Instead the curvature itself is changed, by the least amount (in the root mean square over the lap) that closes the lap;
+//! heading and position are then its integrals and stay consistent, and so does the arc length.
 //!
 //! A small change `dk(s)` of curvature turns everything after `s`, so it moves the end by
 //! `dk(s) ds * perp(P_end - P(s))` and turns it by `dk(s) ds`. The least change meeting three such
@@ -17,12 +16,12 @@ use std::f64::consts::TAU;
 
 use super::circuit::{Circuit, Corner, Section};
 use super::clothoid::displacement;
-use crate::{Error, Result};
+use crate::{Error, Place, Result};
 
 /// Distance between samples of a circuit (m), before rounding to a whole number of steps.
 const SPACING_M: f64 = 1.0;
-/// The end of a closed lap lies this close to its start (m), on laps up to this length (m); the rounding of longer ones
-/// grows with their size and with their number of steps.
+/// Greatest gap of a closed lap (m) for laps up to this length (m). On longer laps, rounding grows with their size and number of
+/// steps.
 const CLOSED_TO_M: f64 = 1e-10;
 const CLOSED_TO_UP_TO_M: f64 = 10_000.0;
 /// A gap beyond this share of the length is a mistake in the table, not a measuring error.
@@ -62,12 +61,12 @@ pub struct CurvatureTable {
     pub sections: Vec<Section>,
 }
 
-/// What closing a lap took; all zero for an open circuit.
+/// The changes that close a lap; all zero for an open circuit.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Closure {
-    /// By how much the table's total turn missed a whole number of turns (rad).
+    /// Error of the table's total turn against a whole number of turns (rad).
     pub turn_error_rad: f64,
-    /// By how much the end missed the start, once the turn was right (m).
+    /// Distance of the end from the start once the turn was corrected (m).
     pub gap_m: f64,
     /// Largest change of curvature (1/m).
     pub curvature_change_1pm: f64,
@@ -140,7 +139,7 @@ impl CurvatureTable {
         }
     }
 
-    /// Builds the circuit, sampled about every metre, and says what closing it took.
+    /// Builds the circuit, sampled about every metre, and returns the changes that close it.
     ///
     /// # Errors
     /// [`Error::Input`] naming the row when the table is out of order or out of range, or when it
@@ -178,7 +177,7 @@ impl CurvatureTable {
         Ok((circuit, closure))
     }
 
-    fn refuse<T>(&self, place: impl Into<String>, found: String, expected: &str) -> Result<T> {
+    fn refuse<T>(&self, place: impl Into<Place>, found: String, expected: &str) -> Result<T> {
         Err(Error::input(&self.name, place, found, expected))
     }
 
@@ -197,7 +196,7 @@ impl CurvatureTable {
         }
         let mut last = f64::NEG_INFINITY;
         for (i, row) in self.rows.iter().enumerate() {
-            let place = |field: &str| format!("row {}, field {field}", i + 1);
+            let place = |field: &str| Place::row(i + 1).field(field);
             let s = row.station_m;
             let ends = if self.closed { s < length } else { s <= length };
             if !(s >= 0.0 && s > last && ends) {
@@ -286,7 +285,7 @@ impl CurvatureTable {
         for _ in 0..30 {
             let (turn, end) = line.end();
             let miss = DVec3::new(end.x, end.y, turn - wanted);
-            // The turn is held to what would move the far side of the circuit by the same amount.
+            // The tolerance of the turn moves the far side of the circuit by as much as the gap.
             if end.length() < closed_to && miss.z.abs() * size < closed_to {
                 let places = line.position.iter().zip(&original.position);
                 return Ok(Closure {

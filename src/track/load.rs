@@ -11,7 +11,7 @@ use super::from_curvature::{Closure, CurvatureRow, CurvatureTable};
 use super::reference::Smoothing;
 use super::survey::{Survey, SurveyOptions};
 use crate::config::read_text;
-use crate::{Error, Result};
+use crate::{Error, Place, Result};
 
 /// A circuit embedded in the crate: name, TOML and curvature table.
 struct Bundled {
@@ -87,9 +87,8 @@ impl Circuit {
     /// `smoothing_edges_m` as in [`Smoothing`], `[[sections]]` as below and `[[corners]]` with `name` and `station_m`.
     ///
     /// Keys with a curvature table: `name`, `curvature_table` (a CSV file with columns `station_m`, `curvature_1pm` and, if
-    /// wanted, `width_left_m`, `width_right_m`, `corner`), `length_m`; `closed` (true unless said
-    /// otherwise), `start_heading_deg` (0), `width_m` (of the whole road, where the table has no
-    /// widths), and `[[sections]]` with `name`, `start_m`, `end_m`.
+    /// wanted, `width_left_m`, `width_right_m`, `corner`), `length_m`; `closed` (default true), `start_heading_deg` (0),
+    /// `width_m` (of the whole road, where the table has no widths), and `[[sections]]` with `name`, `start_m`, `end_m`.
     ///
     /// # Errors
     /// [`Error::Io`] when a file cannot be read; [`Error::Input`] with the file, line and field when
@@ -98,7 +97,7 @@ impl Circuit {
         Ok(Self::load_with_closure(path)?.0)
     }
 
-    /// As [`Circuit::load`], with what closing the lap took.
+    /// As [`Circuit::load`], with the changes that close the lap.
     ///
     /// # Errors
     /// As [`Circuit::load`].
@@ -110,7 +109,7 @@ impl Circuit {
     }
 }
 
-/// What a circuit file holds.
+/// The content of a circuit file.
 pub(super) enum CircuitSource {
     Curvature(Circuit, Closure),
     Survey(Survey, Smoothing),
@@ -152,15 +151,7 @@ impl CircuitSource {
 
 /// Builds, naming the table's file where the library names the circuit.
 fn build(table: &CurvatureTable, table_file: &str) -> Result<(Circuit, Closure)> {
-    table.build().map_err(|error| match error {
-        Error::Input {
-            place,
-            found,
-            expected,
-            ..
-        } => Error::input(table_file, place, found, expected),
-        other => other,
-    })
+    table.build().map_err(|error| error.of_file(table_file))
 }
 
 fn assemble(
@@ -203,8 +194,7 @@ const COLUMNS: [&str; 5] = [
     "corner",
 ];
 
-/// The line of the row that the reader started to look for here: the reader's own count is that of
-/// the comments and empty lines before the row.
+/// The line of the row at this position. The reader's own count is that of the comments and empty lines before the row.
 fn row_line(text: &str, position: Option<&csv::Position>) -> usize {
     let start = position.map_or(0, |p| p.byte() as usize).min(text.len());
     let skipped = text.as_bytes()[start..]
@@ -235,7 +225,7 @@ fn parse_table(
             } => format!("{len} fields where the header has {expected_len}"),
             _ => error.to_string(),
         };
-        Error::input(file, format!("line {line}"), found, "a row like the header")
+        Error::input(file, Place::line(line), found, "a row like the header")
     };
     let header = reader.headers().map_err(unreadable)?.clone();
     let header_line = line_at(header.position());
@@ -246,7 +236,7 @@ fn parse_table(
             _ => {
                 return Err(Error::input(
                     file,
-                    format!("line {header_line}, column {}", i + 1),
+                    Place::line(header_line).named(format!("column {}", i + 1)),
                     format!("`{found}`"),
                     format!("each of {} once at most", COLUMNS.join(", ")),
                 ));
@@ -255,7 +245,7 @@ fn parse_table(
     }
     let [station, curvature, left, right, corner] = column;
     let missing = |name: &str, found: &str| {
-        let place = format!("line {header_line}, column {name}");
+        let place = Place::line(header_line).column(name);
         Error::input(file, place, found, "this column")
     };
     let station = station.ok_or_else(|| missing(COLUMNS[0], "nothing"))?;
@@ -276,7 +266,7 @@ fn parse_table(
                 Ok(x) if x >= low && x <= high => Ok(x),
                 _ => Err(Error::input(
                     file,
-                    format!("line {line}, field {}", &header[column]),
+                    Place::line(line).field(&header[column]),
                     format!("`{found}`"),
                     format!("a number from {low} to {high}"),
                 )),
@@ -300,7 +290,7 @@ fn parse_table(
         if !fits {
             return Err(Error::input(
                 file,
-                format!("line {line}, field station_m"),
+                Place::line(line).field("station_m"),
                 row.station_m.to_string(),
                 if rows.is_empty() {
                     "0 in the first row".to_owned()

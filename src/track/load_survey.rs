@@ -1,4 +1,4 @@
-//! TOML files that name a survey and say what the survey's file cannot.
+//! TOML files that name a survey and add what the survey's file lacks.
 
 use std::path::Path;
 

@@ -10,7 +10,7 @@ use super::survey::Survey;
 use crate::{Error, Result};
 use glam::DVec2;
 
-/// How far smoothing may depart from a survey.
+/// Largest deviations of a smoothed road from its survey.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Smoothing {
     /// Greatest distance of the reference line from the surveyed centre points (m). The edges stay where they are:
@@ -29,13 +29,13 @@ impl Default for Smoothing {
     }
 }
 
-/// Features of the line longer than this are never smoothed away, whatever the deviation allowed (m).
+/// Features of the line longer than this (m) are kept, whatever deviation is allowed.
 const LONGEST_WAVE_M: f64 = 100.0;
 /// The same for the widths (m).
 const LONGEST_WIDTH_WAVE_M: f64 = 200.0;
-/// Distance between the cross-sections by which a road is tried (m).
+/// Distance between the cross-sections with which a road is checked (m).
 const TRIED_EVERY_M: f64 = 5.0;
-/// The most that may be asked for (m).
+/// Largest deviation that may be allowed (m).
 const MOST_SMOOTHING_M: f64 = 10.0;
 
 /// Widths by the parameter of the line.
@@ -135,8 +135,8 @@ impl Survey {
         let mut left = Vec::with_capacity(n);
         let mut right = Vec::with_capacity(n);
         for (i, &knot) in knots.iter().enumerate().take(n) {
-            // The surveyed edges stand beside the surveyed points; measured from the smooth line beside them they are
-            // nearer by as much as the line moved.
+            // The surveyed edges belong to the surveyed points. Where the line has moved towards an edge, the distance to that
+            // edge is smaller by as much.
             let here = line.at(knot);
             let normal = here.first.normalize_or_zero().perp();
             let moved = (here.value - through.at(knot).value).dot(normal);
@@ -232,8 +232,8 @@ impl ReferenceLine {
         cross_sections(self, spacing)
     }
 
-    /// A circuit along the line, and what closing it took. Cross-sections every few metres are tried first, so that
-    /// a road that cannot be is found here and not in a study.
+    /// A circuit along the line, and the changes that close it. Cross-sections every few metres are made first, so that an
+    /// impossible road is refused here and not within a study.
     ///
     /// # Errors
     /// [`Error::Input`] naming the station where the line or its widths cannot be a road's.

@@ -1,8 +1,8 @@
-//! What circuits, smoothed surveys and generated shapes have in common, and what is made from any of them.
+//! The interface that circuits, smoothed surveys and generated shapes share, and what is made from it.
 
 use super::circuit::{Circuit, Corner, Section};
 use super::from_curvature::{Closure, CurvatureRow, CurvatureTable};
-use crate::{Error, Result};
+use crate::{Error, Place, Result};
 use glam::DVec2;
 use std::f64::consts::PI;
 
@@ -97,7 +97,7 @@ pub(super) fn circuit(road: &dyn Road) -> Result<(Circuit, Closure)> {
         .iter()
         .map(|&station_m| {
             let frame = road.frame(station_m);
-            // The mean curvature about the row, not the curvature at it: so headings do not drift from row to row.
+            // The row has the mean curvature about it, not the curvature at it, so that headings do not drift from row to row.
             let (mut from, mut to) = (station_m - 0.5 * step, station_m + 0.5 * step);
             if !road.closed() {
                 (from, to) = (from.max(0.0), to.min(road.length_m()));
@@ -106,7 +106,7 @@ pub(super) fn circuit(road: &dyn Road) -> Result<(Circuit, Closure)> {
             CurvatureRow {
                 station_m,
                 curvature_1pm: turned / (to - from),
-                // A spline through widths of zero dips below it.
+                // A spline through widths of zero may be slightly negative.
                 width_left_m: frame.left_m.max(0.0),
                 width_right_m: frame.right_m.max(0.0),
                 corner: String::new(),
@@ -116,7 +116,7 @@ pub(super) fn circuit(road: &dyn Road) -> Result<(Circuit, Closure)> {
     if let Some(row) = rows.iter().find(|r| !(-1.0..=1.0).contains(&r.curvature_1pm)) {
         return Err(Error::input(
             road.source(),
-            format!("station {:.1} m", row.station_m),
+            Place::station(row.station_m),
             format!("a bend of {:.2} m radius", 1.0 / row.curvature_1pm.abs()),
             "bends of at least 1 m radius",
         ));
@@ -149,7 +149,7 @@ pub(super) fn circuit(road: &dyn Road) -> Result<(Circuit, Closure)> {
 pub struct Spacing {
     /// Number of cross-sections.
     pub cuts: usize,
-    /// How many times closer they stand in the tightest corners than on straights; 1 for equal steps.
+    /// Factor by which they are denser in the tightest corners than on straights; 1 for equal steps.
     pub corner_density: f64,
 }
 

@@ -218,7 +218,7 @@ fn a_hairpin_whose_edges_cross_is_refused_by_station() {
     let legs = survey(points, false, 14.0).as_surveyed().unwrap();
     let error = legs.cross_sections(&Spacing::equal(120)).unwrap_err().to_string();
     assert!(
-        error.contains("stations") && error.contains("overlaps itself"),
+        error.contains("station") && error.contains("overlaps itself"),
         "{error}"
     );
 }

@@ -1,4 +1,4 @@
-//! Circuits of a stated shape, with known answers.
+//! Circuits of simple shapes with known optima.
 
 use super::circuit::{Circuit, Corner, Section};
 use super::cross_sections::CrossSections;
@@ -8,7 +8,7 @@ use crate::{Error, Result};
 use glam::DVec2;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-/// A closed circuit of a stated shape about the origin.
+/// A closed circuit of a simple shape about the origin.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Shape {
     /// Two circles. The road runs clockwise where the right edge is the inner one, anticlockwise where the left one is.
@@ -45,7 +45,7 @@ const SIZE_M: (f64, f64) = (5.0, 20_000.0);
 const NARROWEST_M: f64 = 0.5;
 
 impl Shape {
-    /// Reads `circle:590:600`, `ellipse:400:250:12` or `stadium:500:100:12`; nothing for what names no shape.
+    /// Reads `circle:590:600`, `ellipse:400:250:12` or `stadium:500:100:12`; `None` if the text names no shape.
     ///
     /// # Errors
     /// [`Error::Input`] when a shape is named and its figures are not as many as it takes, or cannot be a road's.
@@ -170,7 +170,7 @@ impl Shape {
 /// Steps of the table that turns distance along an ellipse into its angle.
 const ELLIPSE_STEPS: usize = 20_000;
 
-/// A shape with its length worked out.
+/// A shape with its length.
 struct Shaped {
     shape: Shape,
     name: String,

@@ -1,4 +1,4 @@
-//! What a `--track` may name.
+//! Tracks by name or file.
 
 use super::circuit::Circuit;
 use super::cross_sections::CrossSections;
@@ -10,15 +10,15 @@ use super::survey::Survey;
 use crate::Result;
 use std::path::Path;
 
-/// A track from wherever it comes.
+/// A track of any kind.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Track {
     /// Built from curvature: bundled, or a TOML file with a curvature table.
     Circuit(Circuit),
-    /// Surveyed: a survey file, or a TOML file that names one and says how much to smooth it.
+    /// Surveyed: a survey file, or a TOML file that names one and its smoothing.
     Survey(Survey, Smoothing),
-    /// A stated shape.
+    /// A simple shape.
     Shape(Shape),
 }
 

@@ -9,7 +9,7 @@
 use glam::DVec2;
 use std::ops::{Add, Mul, Sub};
 
-/// What a spline may run through: numbers and points of the plane.
+/// Values of a spline: numbers or points of the plane.
 pub(super) trait Value:
     Copy + Default + Add<Output = Self> + Sub<Output = Self> + Mul<f64, Output = Self>
 {
@@ -29,7 +29,7 @@ impl Value for DVec2 {
     }
 }
 
-/// How far a smoothed curve lies from the data it was made from.
+/// Deviation of a smoothed curve from its data.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Deviation {
     /// Root mean square (m).
@@ -90,7 +90,7 @@ impl<T: Value> Spline<T> {
         if fits(&smoothest) {
             return smoothest;
         }
-        // From no smoothing that could be noticed up to the most: the deviation grows with lambda.
+        // From negligible smoothing up to the most. The deviation grows with lambda.
         let (mut low, mut high) = ((most * 1e-16).ln(), most.ln());
         let mut best = fit(0.0);
         for _ in 0..24 {
@@ -166,14 +166,14 @@ impl<T: Value> Spline<T> {
     }
 }
 
-/// The symmetric matrix `R + lambda Q^T Q` of the second derivatives, factored. It has five diagonals; on a closed spline
-/// they wrap round, and the last two unknowns are solved for apart (a bordered system).
+/// The symmetric matrix `R + lambda Q^T Q` of the second derivatives, factored. It has five diagonals; on a closed spline they
+/// wrap round, and the last two unknowns are solved separately (a bordered system).
 struct System {
     step: Vec<f64>,
     closed: bool,
     lambda: f64,
     band: Band,
-    /// Columns of the band's matrix that belong to the two bordering unknowns, and what solves them.
+    /// Columns of the two bordering unknowns, and the matrix that solves for them.
     border: [Vec<f64>; 2],
     solved: [Vec<f64>; 2],
     corner: [f64; 3],

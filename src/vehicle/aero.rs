@@ -28,7 +28,7 @@ pub fn aero_forces<R: Real>(chassis: &Chassis<R>, vx: R) -> AeroForces<R> {
     AeroForces {
         drag: drag * (R::lit(1.0) - chassis.drs_drag * percent),
         downforce_front: downforce * chassis.pressure_centre,
-        // (1 - eta) (1 - T/(1 - eta)) written so that eta = 1 divides by nothing.
+        // (1 - eta) (1 - T/(1 - eta)) written so that eta = 1 causes no division by zero.
         downforce_rear: downforce * (rear_share - chassis.drs_lift * percent),
     }
 }

@@ -1,4 +1,4 @@
-//! A car as its users write it: TOML with units in the keys, tyres by `.tir`.
+//! A car as its file has it: TOML with units in the keys, and `.tir` files for the tyres.
 
 use super::chassis::Chassis;
 use super::hybrid::Hybrid;
@@ -42,7 +42,7 @@ pub struct Car {
     pub steering_ratio: f64,
     /// The greatest road-wheel angle, rad.
     pub max_steer_rad: f64,
-    /// Engine and gears, where known.
+    /// Engine and gears, if the car has them.
     pub powertrain: Option<Powertrain>,
     /// Motor-generators and store, where there are any.
     pub hybrid: Option<Hybrid>,
@@ -65,10 +65,10 @@ const ALIASES: [(&str, &str); 2] = [
     ("C", "roll_damping_nms_per_rad"),
 ];
 
-/// Likeness (Jaro-Winkler, 1 for the same) above which a name may be what was meant: one letter wrong in four has 0.85,
-/// two names of the same few letters in another order less than 0.8.
+/// Likeness (Jaro-Winkler, 1 for equal names) above which a name is suggested. One wrong letter in four gives 0.85. The same few
+/// letters in another order give less than 0.8.
 const LIKE: f64 = 0.8;
-/// Names that are suggested at most.
+/// Most names that are suggested.
 const SUGGESTED: usize = 3;
 
 const BUNDLED_HYBRID: &str = include_str!("../../data/cars/gt_hybrid.toml");
@@ -259,7 +259,7 @@ impl Car {
         car
     }
 
-    /// As [`Car::parameter`], for a name that stands at `place` of `file`.
+    /// As [`Car::parameter`], for a name at `place` in `file`.
     ///
     /// # Errors
     /// [`Error::Input`] for an unknown name, with the most similar ones.

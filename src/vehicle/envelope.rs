@@ -1,17 +1,17 @@
 //! The g-g-v envelope of a car: the greatest accelerations at each speed, within which a point mass laps.
 //!
-//! The tyres' acceleration stays inside a friction ellipse whose half axes, the greatest lateral and longitudinal
-//! acceleration, depend on speed, and driving is limited by the engine too. Drag is no force of the tyres and stays
-//! outside the ellipse. (D. L. Brayshaw and M. F. Harrison, *A quasi steady state approach to race car lap simulation*,
-//! Proc. IMechE D 219, 2005, for the g-g-speed surface.)
+//! The acceleration by the tyres stays inside a friction ellipse. Its half axes are the greatest lateral and longitudinal
+//! acceleration, which depend on speed. The engine limits driving too. Drag is not a force of the tyres, so it stays outside the
+//! ellipse. (D. L. Brayshaw and M. F. Harrison, *A quasi steady state approach to race car lap simulation*, Proc. IMechE D 219,
+//! 2005, for the g-g-speed surface.)
 
 use crate::config::read_text;
-use crate::error::{Error, Result};
+use crate::error::{Error, Place, Result};
 use serde::{Deserialize, Serialize};
 use std::fmt::Write as _;
 use std::path::Path;
 
-/// Limits at one speed.
+/// The g-g-v envelope at one speed.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct EnvelopeRow {
     /// Speed (m/s).
@@ -20,7 +20,7 @@ pub struct EnvelopeRow {
     pub ay_mps2: f64,
     /// Greatest longitudinal acceleration by the tyres' grip, driving or braking (m/s^2).
     pub ax_grip_mps2: f64,
-    /// Greatest acceleration that the engine can give, drag not taken off (m/s^2).
+    /// Greatest acceleration that the engine can give, before drag (m/s^2).
     pub ax_drive_mps2: f64,
     /// Deceleration by drag (m/s^2).
     pub drag_mps2: f64,
@@ -48,10 +48,10 @@ impl EnvelopeRow {
     }
 }
 
-/// Limits over speed.
+/// A g-g-v envelope: greatest accelerations over speed.
 ///
-/// Between rows they are linear in speed, below the first they are the first's. There is no drive at or above the
-/// last speed, which is thus the car's greatest.
+/// Between rows the figures are linear in speed; below the first row they are those of the first row. There is no drive at or
+/// above the last speed, which is therefore the top speed of the car.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Envelope {
     name: String,
@@ -61,12 +61,12 @@ pub struct Envelope {
 /// The columns of an envelope's table, in the order that [`Envelope::to_csv`] writes them.
 pub const ENVELOPE_COLUMNS: [&str; 5] = ["v_mps", "ay_mps2", "ax_grip_mps2", "ax_drive_mps2", "drag_mps2"];
 
-/// What each column may hold: the least, whether that least itself is allowed, and the greatest.
+/// Range of each column: the least value, whether that value itself is allowed, and the greatest.
 const RANGES: [(f64, bool, f64); 5] = [
     (0.0, true, 200.0),
     (0.0, false, 200.0),
     (0.0, false, 200.0),
-    // Constant power is without bounds towards standstill.
+    // At constant power, acceleration grows without bounds towards standstill.
     (0.0, true, 1e5),
     (0.0, true, 200.0),
 ];
@@ -79,7 +79,7 @@ impl Envelope {
     pub fn new(name: impl Into<String>, rows: Vec<EnvelopeRow>) -> Result<Self> {
         let name = name.into();
         for (index, row) in rows.iter().enumerate() {
-            check_row(&name, &format!("row {}", index + 1), row, rows[..index].last())?;
+            check_row(&name, Place::row(index + 1), row, rows[..index].last())?;
         }
         check_count(&name, rows.len())?;
         Ok(Self { name, rows })
@@ -119,7 +119,7 @@ impl Envelope {
             .comment(Some(b'#'))
             .trim(csv::Trim::All)
             .from_reader(text.as_bytes());
-        // The reader counts from before the comments and empty lines that it skips on its way to a row.
+        // The reader counts lines from before the comments and empty lines that it skips.
         let line_at = |position: Option<&csv::Position>| {
             let start = position.map_or(0, |p| p.byte() as usize).min(text.len());
             let skipped = text.as_bytes()[start..]
@@ -135,7 +135,7 @@ impl Envelope {
                 } => format!("{len} fields where the header has {expected_len}"),
                 _ => error.to_string(),
             };
-            let place = format!("line {}", line_at(error.position()));
+            let place = Place::line(line_at(error.position()));
             Error::input(file, place, found, "a row like the header")
         };
         let header = reader.headers().map_err(unreadable)?.clone();
@@ -148,7 +148,7 @@ impl Envelope {
                 (first, _) => {
                     return Err(Error::input(
                         file,
-                        format!("line {header_line}, column {name}"),
+                        Place::line(header_line).column(name),
                         if first.is_some() {
                             "it twice".to_owned()
                         } else {
@@ -169,14 +169,14 @@ impl Envelope {
                 *figure = field.parse().map_err(|_| {
                     Error::input(
                         file,
-                        format!("line {line}, field {name}"),
+                        Place::line(line).field(name),
                         format!("`{field}`"),
                         "a number",
                     )
                 })?;
             }
             let row = EnvelopeRow::from_array(figures);
-            check_row(file, &format!("line {line}"), &row, rows.last())?;
+            check_row(file, Place::line(line), &row, rows.last())?;
             rows.push(row);
         }
         check_count(file, rows.len())?;
@@ -212,7 +212,7 @@ impl Envelope {
         self.rows[self.rows.len() - 1].v_mps
     }
 
-    /// The limits at a speed (m/s), without drive at the greatest and above.
+    /// The envelope at a speed (m/s). At the top speed and above there is no drive.
     pub fn at(&self, v_mps: f64) -> EnvelopeRow {
         let after = self
             .rows
@@ -241,12 +241,12 @@ fn check_count(file: &str, rows: usize) -> Result<()> {
     Ok(())
 }
 
-fn check_row(file: &str, place: &str, row: &EnvelopeRow, before: Option<&EnvelopeRow>) -> Result<()> {
+fn check_row(file: &str, place: Place, row: &EnvelopeRow, before: Option<&EnvelopeRow>) -> Result<()> {
     for ((x, name), (least, allowed, most)) in row.to_array().into_iter().zip(ENVELOPE_COLUMNS).zip(RANGES) {
         if !(x > least && x <= most || allowed && x == least) {
             return Err(Error::input(
                 file,
-                format!("{place}, field {name}"),
+                place.field(name),
                 x.to_string(),
                 if allowed {
                     format!("{least} to {most}")
@@ -260,7 +260,7 @@ fn check_row(file: &str, place: &str, row: &EnvelopeRow, before: Option<&Envelop
     if !rises {
         return Err(Error::input(
             file,
-            format!("{place}, field {}", ENVELOPE_COLUMNS[0]),
+            place.field(ENVELOPE_COLUMNS[0]),
             row.v_mps.to_string(),
             "a speed beyond that of the row before",
         ));

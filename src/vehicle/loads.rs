@@ -5,10 +5,10 @@ use super::aero::AeroForces;
 use super::chassis::{BodyState, Chassis};
 use crate::scalar::Real;
 
-/// Vertical loads of the four wheels, FL FR RL RR, N. A lifted wheel's is negative.
+/// Vertical loads of the four wheels, FL FR RL RR, N. The load of a lifted wheel is negative.
 ///
-/// `longitudinal_acceleration` (m/s^2) is the lagged one that pitch has answered to. The right wheels gain and
-/// the left lose `share (K phi + C p) / (2 w)`; the front pair shares `-(m ax h + D hD)/L`, the rear the opposite.
+/// `longitudinal_acceleration` (m/s^2) is the lagged acceleration, which stands for the pitch of the body. The right wheels gain
+/// and the left lose `share (K phi + C p) / (2 w)`; the front pair shares `-(m ax h + D hD)/L`, the rear the opposite.
 #[inline(always)]
 pub fn wheel_loads<R: Real>(
     chassis: &Chassis<R>,

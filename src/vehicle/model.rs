@@ -21,12 +21,12 @@ pub struct CarInput<R> {
 pub struct CarState<R> {
     /// The body's state.
     pub body: BodyState<R>,
-    /// The longitudinal acceleration that load transfer has answered to, m/s^2: it follows the true one with
-    /// the pitch lag, which stands for the pitching body and keeps the loads free of an algebraic loop.
+    /// The lagged longitudinal acceleration, from which load transfer is computed, m/s^2. It follows the true one with the pitch
+    /// lag. The lag stands for the pitching body and avoids an algebraic loop between loads and acceleration.
     pub pitch_acceleration: R,
 }
 
-/// The rate of change of the state, and what an accelerometer on the roll axis reads meanwhile.
+/// The rate of change of the state, and the reading of an accelerometer on the roll axis.
 #[derive(Clone, Copy, Debug)]
 pub struct CarRate<R> {
     /// Time derivative of the state.
@@ -37,7 +37,7 @@ pub struct CarRate<R> {
     pub ay: R,
 }
 
-/// A car whose tyres are ready for its camber.
+/// A car with its tyres prepared for their camber.
 #[derive(Clone, Copy, Debug)]
 pub struct CarModel<R, T> {
     /// Body, wheels and air.
@@ -46,7 +46,7 @@ pub struct CarModel<R, T> {
     pub tyres: [T; 2],
 }
 
-/// On which side an axle's wheels are, left positive.
+/// The side of each wheel of an axle, left positive.
 const SIDES: [f64; 2] = [1.0, -1.0];
 
 /// Slip of one wheel.
@@ -58,8 +58,8 @@ pub struct WheelSlip<R> {
     pub tangent: R,
 }
 
-/// Slip of a wheel at `(x, y)` (m) from the point under the centre of gravity, turned by the angle whose cosine
-/// and sine are given, with rim speed `rim_speed` (m/s). `floor` is the least speed slip is computed with.
+/// Slip of a wheel at `(x, y)` (m) from the point under the centre of gravity, turned by the angle whose cosine and sine are
+/// given, with rim speed `rim_speed` (m/s). `floor` (m/s) is the least speed with which slip is computed.
 #[inline(always)]
 pub fn wheel_slip<R: Real>(
     body: &BodyState<R>,
@@ -180,9 +180,9 @@ impl<R: Real, T: Tyre<R>> CarModel<R, T> {
             y: zero,
             yaw_moment: zero,
         };
-        // One copy of the tyre's code serves both axles, indexed rather than chosen between: the code then fits
-        // the processor's instruction cache and the coefficients stay in memory. The loops over an axle's wheels
-        // are loops because large closures would not be compiled for the instruction set of their surroundings.
+        // One copy of the tyre's code serves both axles by an index, so that the code fits the processor's instruction cache and
+        // the coefficients stay in memory. The loops over the wheels are not closures, because large closures would not be
+        // compiled for the instruction set of their surroundings.
         for axle in 0..2 {
             let direction = directions[axle];
             let x = axle_x[axle];
@@ -225,11 +225,11 @@ impl<R: Real, T: Tyre<R>> CarModel<R, T> {
 /// One stage of the classical Runge-Kutta method.
 #[derive(Clone, Copy, Debug)]
 pub struct Stage {
-    /// Which of a step's inputs it sees: 0 at the start, 1 half-way, 2 at the end.
+    /// Number of the input that it reads: 0 at the start of the step, 1 half-way, 2 at the end.
     pub input: usize,
-    /// Its rate's weight in the step.
+    /// Weight of its rate in the step.
     pub weight: f64,
-    /// How far its rate carries the state for the next stage, as a share of the step.
+    /// Share of the step by which its rate moves the state for the next stage.
     pub reach: f64,
 }
 
@@ -258,8 +258,8 @@ pub const STAGES: [Stage; 4] = [
     },
 ];
 
-/// One Runge-Kutta step of `step` seconds from `state`; `input` yields a step's three inputs by number (see
-/// [`Stage::input`]), and `watch` is shown the first stage's rate.
+/// One Runge-Kutta step of `step` seconds from `state`; `input` yields a step's three inputs by number (see [`Stage::input`]),
+/// and `watch` receives the rate of the first stage.
 #[inline(always)]
 pub fn runge_kutta_step<R: Real, T: Tyre<R>>(
     car: &CarModel<R, T>,
@@ -332,8 +332,8 @@ impl<R: Real> CarState<R> {
         }
     }
 
-    /// Where the car still drives: it neither slides sideways by more than half a right angle (plus 3 m/s), nor
-    /// spins, rolls over or has left the range of numbers. Written so that NaN counts as lost.
+    /// The lanes in which the car still drives. A car is lost if it slides sideways by more than half a right angle (plus 3 m/s),
+    /// spins, rolls over, or has figures that are not finite. The comparisons are written so that NaN counts as lost.
     #[inline(always)]
     pub fn drives(&self) -> R::Mask {
         let b = &self.body;
@@ -349,7 +349,7 @@ impl<R: Real> CarState<R> {
     }
 }
 
-/// Sideways speed that a car may have over its forward speed, m/s.
+/// Allowed sideways speed in excess of the forward speed, m/s.
 pub const SLIDE_MARGIN: f64 = 3.0;
 /// Forward speed at which a candidate counts as lost, m/s.
 pub const GREATEST_SPEED: f64 = 200.0;

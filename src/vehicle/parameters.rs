@@ -1,18 +1,18 @@
 //! Named, bounded parameters: one table per struct, from which readers, writers, optimisers and the shader
 //! loader all take names, units and order.
 
-/// What is known of one parameter.
+/// The declaration of one parameter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ParameterInfo {
     /// The key in files and studies.
     pub name: &'static str,
     /// The unit, `-` for none.
     pub unit: &'static str,
-    /// The least value that makes sense.
+    /// The least value that is accepted.
     pub minimum: f64,
-    /// The greatest value that makes sense.
+    /// The greatest value that is accepted.
     pub maximum: f64,
-    /// The value where a file is silent; `None` where it must speak.
+    /// The default; `None` for a parameter that every file must give.
     pub default: Option<f64>,
     /// What it means.
     pub meaning: &'static str,

@@ -1,11 +1,11 @@
-//! Steady-state cornering and the greatest push of the tyres, from the car's own equations of motion.
+//! Steady-state cornering and the greatest longitudinal force of the tyres, from the car's own equations of motion.
 //!
-//! A trim is a state in which the car goes round a circle: its sideways, yaw, roll and pitch accelerations are
-//! zero. With no push of the tyres along the path (drag then slows the car, as a quasi-steady-state lap takes off by
-//! itself) the trims of a speed form a curve through straight running. It is followed by its arc length (Keller,
-//! *Numerical solution of bifurcation and nonlinear eigenvalue problems*, 1977), because neither steering angle nor
-//! lateral acceleration rises along it without end: an oversteering car needs less steering the faster it corners, and
-//! every car has a greatest lateral acceleration.
+//! A trim is a state in which the car goes round a circle: its sideways, yaw, roll and pitch accelerations are zero. The tyres
+//! exert no force along the path, so drag slows the car; a quasi-steady-state lap accounts for drag by itself. The trims at one
+//! speed then form a curve that passes through straight running. The curve is followed by its arc length (Keller, *Numerical
+//! solution of bifurcation and nonlinear eigenvalue problems*, 1977), because neither steering angle nor lateral acceleration
+//! rises all along it: an oversteering car needs less steering the faster it corners, and every car has a greatest lateral
+//! acceleration.
 
 use super::aero::aero_forces;
 use super::chassis::BodyState;
@@ -40,30 +40,39 @@ pub struct Trim {
     pub wheel_load_n: [f64; 4],
 }
 
+/// Which way a car turns.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Turn {
+    /// To the left: a positive yaw rate.
+    Left,
+    /// To the right.
+    Right,
+}
+
 /// Steady states and limits of one car.
 pub trait SteadyCar: Send + Sync {
-    /// The curve of trims at `speed` (m/s) from straight running to the left, until the road wheels reach
-    /// `greatest_steer` (rad), the car stands across the road, or lateral acceleration has fallen well below its
-    /// peak. In order along the curve; at least straight running unless not even that has a solution.
-    fn cornering(&self, speed: f64, greatest_steer: f64) -> Vec<Trim>;
+    /// The curve of trims at `speed` (m/s) from straight running to one side, until the road wheels reach `greatest_steer` (rad),
+    /// the car stands across the road, or lateral acceleration has fallen well below its peak. The trims are in order along the
+    /// curve. The curve has at least straight running, or is empty if that has no solution.
+    fn cornering(&self, speed: f64, greatest_steer: f64, turn: Turn) -> Vec<Trim>;
 
-    /// The trim under `steer` (rad) between two trims of `curve`, which is [`SteadyCar::cornering`] at `speed` (m/s), on the part
-    /// of it where the steering angle has not yet turned back; nothing beyond.
+    /// The trim under `steer` (rad) between two trims of `curve`, which is [`SteadyCar::cornering`] at `speed` (m/s), on its
+    /// first part, up to where the steering angle turns back. `None` beyond that part.
     fn trim_at(&self, speed: f64, steer: f64, curve: &[Trim]) -> Option<Trim>;
 
     /// The greatest deceleration by the tyres (m/s^2) running straight at `speed` (m/s), each axle at the slip at
     /// which it brakes hardest.
     fn greatest_braking(&self, speed: f64) -> f64;
 
-    /// The greatest acceleration by the driven rear tyres (m/s^2) running straight at `speed` (m/s), the engine
-    /// left aside.
+    /// The greatest acceleration by the driven rear tyres (m/s^2) running straight at `speed` (m/s), whatever the engine can
+    /// give.
     fn greatest_traction(&self, speed: f64) -> f64;
 
     /// Deceleration by drag (m/s^2) at `speed` (m/s).
     fn drag(&self, speed: f64) -> f64;
 }
 
-/// The steady states of a car on whichever tyres it has.
+/// The steady states of a car, for either tyre model.
 pub fn steady_car(car: &Car) -> Box<dyn SteadyCar> {
     match car.tyre_model() {
         TyreModel::MagicFormula => Box::new(Ready::<MagicFormula<f64>, MagicFormula<Exact>>::new(car)),
@@ -71,7 +80,7 @@ pub fn steady_car(car: &Car) -> Box<dyn SteadyCar> {
     }
 }
 
-/// A car made ready in plain and in dual numbers.
+/// A car prepared in `f64` and in dual numbers.
 struct Ready<T, D> {
     plain: CarModel<f64, T>,
     exact: CarModel<Exact, D>,
@@ -83,7 +92,7 @@ const SCALES: [f64; UNKNOWNS] = [0.01, 2.0, 0.01, 0.01, 0.01];
 /// Steps along the curve, in [`SCALES`]: the longest, and the one below which the curve is taken to end.
 const LONGEST_STEP: f64 = 0.7;
 const SHORTEST_STEP: f64 = 1e-4;
-/// Points of a curve at most.
+/// Most points of a curve.
 const MOST_POINTS: usize = 2000;
 /// Sideslip at which a car counts as standing across the road (rad).
 const GREATEST_SIDESLIP: f64 = 0.5;
@@ -99,7 +108,7 @@ impl<T: Tyre<f64>, D: Tyre<Exact>> Ready<T, D> {
         }
     }
 
-    /// What the four equations leave over at a point of the curve, with the derivatives to its unknowns.
+    /// Residuals of the four equations at a point of the curve, with their derivatives with respect to the unknowns.
     fn residual(&self, speed: f64, point: &Point) -> [Exact; 4] {
         let unknown = |i: usize| Exact::variable(point[i] * SCALES[i], i);
         let [sideslip, across, roll, slip_ratio, steer] = std::array::from_fn(unknown);
@@ -116,7 +125,7 @@ impl<T: Tyre<f64>, D: Tyre<Exact>> Ready<T, D> {
             roll_rate: zero,
         };
         let chassis = &self.exact.chassis;
-        // No push along the path: the tyres' push along the car is what balances their push across it.
+        // The force along the path is zero: the tyres' forces along the car and across it balance in that direction.
         let drag = aero_forces(chassis, body.vx).drag / chassis.mass;
         let state = CarState {
             pitch_acceleration: -(body.vx * yaw_rate * sin / cos) - drag,
@@ -142,7 +151,7 @@ impl<T: Tyre<f64>, D: Tyre<Exact>> Ready<T, D> {
             let along = turned.0 * hub_x + turned.1 * hub_y;
             along * rolling / radius
         });
-        // The model takes the angle that a sensor reads.
+        // The model takes the angle as a sensor reads it.
         let steer = (steer - chassis.steer_offset) / chassis.steer_scale;
         let rate = self.exact.rate(&state, &CarInput { wheel_speed, steer });
         [
@@ -172,12 +181,12 @@ impl<T: Tyre<f64>, D: Tyre<Exact>> Ready<T, D> {
             slopes.set_row(4, &direction.transpose());
             let factors = slopes.lu();
             if value.amax() < BALANCED {
-                // Along the curve nothing but the fifth equation changes.
+                // Only the fifth equation changes along the curve.
                 let tangent = factors.solve(&Point::from_fn(|i, _| f64::from(i == 4)))?;
                 return Some((point, tangent.normalize()));
             }
             let step = factors.solve(&value)?;
-            // A long step has left the curve that was followed.
+            // The step was too long and has left the curve.
             if !step.iter().all(|x| x.is_finite()) || step.norm() > 20.0 {
                 return None;
             }
@@ -224,7 +233,8 @@ impl<T: Tyre<f64>, D: Tyre<Exact>> Ready<T, D> {
             wheel_speed,
             steer: -chassis.steer_offset / chassis.steer_scale,
         };
-        // Load transfer and push settle on each other; what one moves the other is a sixth at most.
+        // Load transfer and force depend on each other. The iteration converges, since a change of one changes the other by a
+        // sixth at most.
         for _ in 0..40 {
             let rate = self.plain.rate(&state, &input).state.pitch_acceleration;
             state.pitch_acceleration += rate * chassis.pitch_lag;
@@ -251,17 +261,22 @@ fn greatest(low: f64, high: f64, f: impl Fn(f64) -> f64) -> f64 {
     0.5 * (a + b)
 }
 
-/// Slip ratio up to which limits are looked for.
+/// Greatest slip ratio in the search for the limits.
 const GREATEST_SLIP: f64 = 0.4;
 
 impl<T: Tyre<f64>, D: Tyre<Exact>> SteadyCar for Ready<T, D> {
-    fn cornering(&self, speed: f64, greatest_steer: f64) -> Vec<Trim> {
-        let steering = Point::from_fn(|i, _| f64::from(i == 4));
-        let Some((mut point, mut tangent)) = self.solve(speed, &Point::zeros(), &steering) else {
+    fn cornering(&self, speed: f64, greatest_steer: f64, turn: Turn) -> Vec<Trim> {
+        // Straight running is no steering. Near its critical speed, a car whose sides differ answers to that with a bend: there it
+        // is no yaw rate, whatever the steering.
+        let held = |unknown: usize| {
+            let direction = Point::from_fn(|i, _| f64::from(i == unknown));
+            self.solve(speed, &Point::zeros(), &direction)
+        };
+        let Some((mut point, mut tangent)) = held(4).or_else(|| held(1)) else {
             return Vec::new();
         };
-        // To the left: a yaw rate to the left, whichever way the steering goes.
-        if tangent[1] < 0.0 {
+        // A left turn has a yaw rate to the left, whatever the steering does.
+        if (tangent[1] < 0.0) == (turn == Turn::Left) {
             tangent = -tangent;
         }
         let mut trims = vec![self.trim(speed, &point)];
@@ -273,7 +288,7 @@ impl<T: Tyre<f64>, D: Tyre<Exact>> SteadyCar for Ready<T, D> {
                 length *= 0.5;
                 continue;
             };
-            // Two tangents across one another are two branches, not one step of a curve.
+            // Two tangents at more than a right angle belong to two branches, not to one step along a curve.
             let ahead = direction.dot(&tangent);
             if ahead.abs() < 0.9 {
                 length *= 0.5;
@@ -285,9 +300,9 @@ impl<T: Tyre<f64>, D: Tyre<Exact>> SteadyCar for Ready<T, D> {
             if trim.steer_rad.abs() > greatest_steer || trim.sideslip_rad.abs() > GREATEST_SIDESLIP {
                 break;
             }
-            peak = peak.max(trim.ay_mps2);
+            peak = peak.max(trim.ay_mps2.abs());
             trims.push(trim);
-            if trim.ay_mps2 < PAST_THE_PEAK * peak {
+            if trim.ay_mps2.abs() < PAST_THE_PEAK * peak {
                 break;
             }
         }
@@ -312,7 +327,7 @@ impl<T: Tyre<f64>, D: Tyre<Exact>> SteadyCar for Ready<T, D> {
 
     fn greatest_braking(&self, speed: f64) -> f64 {
         let mut slip = [-0.1; 2];
-        // Each axle's best slip depends on the other's through the loads alone, so that a few rounds settle it.
+        // The best slip of each axle depends on that of the other through the loads alone, so a few rounds are enough.
         for _ in 0..3 {
             slip[0] = greatest(-GREATEST_SLIP, 0.0, |s| -self.push(speed, [s, slip[1]]));
             slip[1] = greatest(-GREATEST_SLIP, 0.0, |s| -self.push(speed, [slip[0], s]));
@@ -364,7 +379,7 @@ mod tests {
         let front = stiffness(40_000.0, b / (a + b));
         let rear = stiffness(55_000.0, a / (a + b));
         let gradient = c.mass / (a + b) * (b / front - a / rear);
-        let trims = steady_car(&car).cornering(speed, 0.17);
+        let trims = steady_car(&car).cornering(speed, 0.17, Turn::Left);
         let small = trims.iter().find(|t| t.ay_mps2 > 0.01).unwrap();
         let bicycle = (a + b) * small.ay_mps2 / speed.powi(2) + gradient * small.ay_mps2;
         // The first point lies at a few hundredths of a m/s^2: angles of 1e-3 rad, whose squares are a millionth,
@@ -381,7 +396,7 @@ mod tests {
         let car = Car::bundled().unwrap();
         let steady = steady_car(&car);
         for speed in [16.0, 25.0, 45.0, 65.0] {
-            let trims = steady.cornering(speed, 0.1745);
+            let trims = steady.cornering(speed, 0.1745, Turn::Left);
             let peak = trims.iter().map(|t| t.ay_mps2).fold(0.0, f64::max);
             assert!(trims.len() > 10 && peak > 10.0, "{speed}: {} {peak}", trims.len());
             // What the wheels carry is the car and its downforce.

@@ -3,7 +3,7 @@
 
 use lapswarm::config::settings::Settings;
 use lapswarm::line::read_line;
-use lapswarm::study::compare::{self, Run};
+use lapswarm::report::compare::{self, Run};
 use lapswarm::study::envelope::EnvelopeSettings;
 use lapswarm::study::framework::journal::Journal;
 use lapswarm::study::hybrid::{self, HybridStudySettings};
@@ -63,6 +63,10 @@ fn taken<T>(result: Result<T>) -> Option<T> {
         }) => {
             assert!(!file.is_empty() && !place.is_empty());
             assert!(found.len() < 4096, "{place}: a message of {} bytes", found.len());
+            None
+        }
+        Err(Error::Memory { file, .. }) => {
+            assert!(!file.is_empty());
             None
         }
         Err(error) => panic!("refused without a place: {error}"),

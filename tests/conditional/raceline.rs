@@ -8,7 +8,8 @@ use lapswarm::line::{FineLine, Parametrisation, cuts_about};
 use lapswarm::optimum::{DescentSettings, LineMap, PointMassLimits, ReferenceProblem, fastest};
 use lapswarm::study::framework::{solve_unwatched, write_results};
 use lapswarm::study::raceline::{
-    LineAlgorithm, Outcome, Raceline, RacelineSettings, ReferenceSolvers, Setup, set_up,
+    LineAlgorithm, ObjectiveOutcome, Outcome, Raceline, RacelineSettings, ReferenceSolvers, ReportedLine,
+    Setup, set_up,
 };
 use std::path::PathBuf;
 
@@ -52,9 +53,10 @@ fn a_swarm_alone_finds_the_inside_of_a_circle() {
     let (_, outcome) = run(&cold("circle:590:600", 361, &[LineObjective::Length]));
     let inside = 361.0 * 2.0 * 590.0 * (std::f64::consts::PI / 361.0).sin();
     let found = &outcome.objectives[0];
-    assert!((found.exact.as_ref().unwrap().length_m / inside - 1.0).abs() < 1e-9);
+    let length_m = |line: &ReportedLine| line.objective(LineObjective::Length);
+    assert!((length_m(found.exact.as_ref().unwrap()) / inside - 1.0).abs() < 1e-9);
     // An inner polygon to a ten-thousandth, 0.37 m of 3707 m.
-    let error = found.best.length_m / inside - 1.0;
+    let error = length_m(&found.best) / inside - 1.0;
     println!("{error:e}");
     assert!((-1e-9..1e-4).contains(&error), "{error}");
 }
@@ -67,16 +69,13 @@ fn the_surveyed_circuit_gives_the_published_optima() {
     };
     // The exact solvers to the figures' own digits; the swarm from a cold start, without gradients, to five and three times
     // what is claimed of it and measured here, 0.002 % and 0.1 %: other libraries' roundings lead a search elsewhere.
-    let exact = |o: &lapswarm::study::raceline::ObjectiveOutcome| o.exact.clone().unwrap();
-    assert!((exact(length).length_m - 5710.944).abs() < 1e-3);
-    assert!((exact(gamma).gamma_1pm - 0.12610).abs() < 1e-5);
+    let exact = |o: &ObjectiveOutcome| o.exact.as_ref().unwrap().objective(o.objective);
+    assert!((exact(length) - 5710.944).abs() < 1e-3);
+    assert!((exact(gamma) - 0.12610).abs() < 1e-5);
     println!("swarm alone: {} m, Gamma {}", length.swarm_cost, gamma.swarm_cost);
-    assert!(
-        length.best.length_m < 5710.944 * 1.0001,
-        "{}",
-        length.best.length_m
-    );
-    assert!(gamma.best.gamma_1pm < 0.12610 * 1.003, "{}", gamma.best.gamma_1pm);
+    let [length, gamma] = [length, gamma].map(|o| o.best.objective(o.objective));
+    assert!(length < 5710.944 * 1.0001, "{length}");
+    assert!(gamma < 0.12610 * 1.003, "{gamma}");
 }
 
 /// 1245 kg, 330 kW, CdA 0.9 m^2, 15 to 18 m/s^2 sideways and 14 to 18 lengthways over 25 to 65 m/s, 70 m/s.
@@ -143,7 +142,7 @@ fn fastest_lines(cases: &[(String, Option<PathBuf>, usize)]) {
         );
         assert!(swarm < exact * 1.003, "{swarm} and {exact}");
         // Through the cuts and on the fine spline it is the same lap: nothing hides between them.
-        assert!((found.best.lap_time_s / swarm - 1.0).abs() < 3e-3);
+        assert!((found.best.objective(LineObjective::LapTime) / swarm - 1.0).abs() < 3e-3);
         if envelope.is_none() {
             continue;
         }
@@ -180,8 +179,10 @@ fn plain_swarms_and_sections_can_be_asked_for() {
         };
         assert!(outcome.record.evaluations >= 10 * 20 * per_group);
         let found = &outcome.objectives[0];
-        let [first, last] = [0, outcome.history[0].len() - 1].map(|i| outcome.history[0][i].1);
-        assert!(last < first && found.best.length_m >= found.exact.as_ref().unwrap().length_m - 1e-6);
+        let [first, last] = [0, found.history.len() - 1].map(|i| found.history[i].1);
+        let [best, exact] =
+            [&found.best, found.exact.as_ref().unwrap()].map(|l| l.objective(found.objective));
+        assert!(last < first && best >= exact - 1e-6);
     }
     let lost = RacelineSettings {
         section: Some("Nowhere".to_owned()),

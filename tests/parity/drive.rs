@@ -10,7 +10,7 @@ use lapswarm::evaluate::drive::{
 use lapswarm::evaluate::simd::InstructionSet;
 use lapswarm::evaluate::{Evaluator, FAILED_COST, Failure};
 use lapswarm::parity::Draws;
-use lapswarm::parity::drive::{Cases, candidates, problem};
+use lapswarm::parity::drive::{candidates, layer, problem};
 use lapswarm::track::Track;
 
 tests! {
@@ -22,9 +22,9 @@ tests! {
 }
 
 fn steps_of_the_driver_and_laps_agree_on_every_backend() {
-    let cases = Cases::new().expect("the bundled car drives");
+    let layer = layer().expect("the bundled car drives");
     for subject in subjects() {
-        for found in cases.compare(&subject).expect("the kernel runs") {
+        for found in layer(&subject).expect("the kernel runs") {
             println!(
                 "{}: {:.1e} off, {:.1}% of what may be, bits as the scalar's: {:?}; {}",
                 found.key(),

@@ -10,7 +10,7 @@ use lapswarm::evaluate::steady::{
 };
 use lapswarm::evaluate::{Evaluator, FAILED_COST, Failure};
 use lapswarm::parity::Draws;
-use lapswarm::parity::steady::{Cases, candidates, problem};
+use lapswarm::parity::steady::{candidates, layer, problem};
 use lapswarm::vehicle::{Car, Tyres};
 
 tests! {
@@ -20,9 +20,9 @@ tests! {
 }
 
 fn trims_agree_on_every_backend() {
-    let cases = Cases::new().expect("the bundled car settles");
+    let layer = layer().expect("the bundled car settles");
     for subject in subjects() {
-        for found in cases.compare(&subject).expect("the kernel runs") {
+        for found in layer(&subject).expect("the kernel runs") {
             println!(
                 "{}: {} figures, {:.1e} off, {:.1}% of what may be, bits as the scalar's: {:?}; {}",
                 found.key(),

@@ -2,14 +2,16 @@
 
 use crate::common::Random;
 use crate::device::{device, the_device};
-use lapswarm::evaluate::gpu::GpuContext;
+use lapswarm::Result;
 use lapswarm::evaluate::gpu::shader::{ELEMENTARY, random};
+use lapswarm::evaluate::gpu::{Binding, GpuContext, Kernel};
 use lapswarm::evaluate::simd::InstructionSet;
-use lapswarm::evaluate::{Evaluator, Failure};
+use lapswarm::evaluate::{Evaluator, Failure, Objective, Problem, Variable};
 use lapswarm::parity::Subject;
 use lapswarm::random::philox;
 use lapswarm::scalar::elementary::{ln, power};
-use lapswarm::swarm::device::DeviceMopso;
+use lapswarm::swarm::device::{BLOCK, DeviceMopso};
+use lapswarm::swarm::metrics::hypervolume;
 use lapswarm::swarm::problems::{GpuTestEvaluator, NAMES, SimdTestEvaluator, TestProblem};
 use lapswarm::swarm::{Mopso, MopsoSettings, Mutation, Optimiser, PsoSettings};
 use std::sync::Arc;
@@ -21,6 +23,7 @@ tests! {
     swarms_in_lanes_and_on_the_device_in_lockstep: device,
     a_swarm_on_the_device_takes_costs_of_any_size: device,
     a_swarm_on_the_device_counts_what_is_beyond_single_precision: device,
+    swarms_on_the_device_keep_the_knee_of_a_front_with_long_tails: device,
 }
 
 /// Whether the device is known to round every operation as the processor does.
@@ -302,4 +305,90 @@ fn a_swarm_on_the_device_counts_what_is_beyond_single_precision() {
         said.contains("candidate 1") && said.contains("3 values"),
         "{said}"
     );
+}
+
+/// 10^u and 10^-u, u from -4 to 4.
+struct Tails {
+    problem: Problem,
+    context: Arc<GpuContext>,
+    kernel: Arc<Kernel>,
+}
+
+impl Tails {
+    fn new(context: Arc<GpuContext>) -> Self {
+        let source = "
+            @group(0) @binding(0) var<storage, read> position: array<f32>;
+            @group(0) @binding(1) var<storage, read_write> objectives: array<f32>;
+            @compute @workgroup_size(64) fn tails(@builtin(global_invocation_id) id: vec3<u32>) {
+                let u = 8.0 * position[id.x] - 4.0;
+                let first = id.x / 64u * 128u + id.x % 64u;
+                objectives[first] = exp2(3.321928 * u);
+                objectives[first + 64u] = exp2(-3.321928 * u);
+            }";
+        Self {
+            problem: Problem {
+                variables: vec![Variable::new("u", "-", -4.0, 4.0)],
+                objectives: ["right", "left"].map(|name| Objective::new(name, "-")).to_vec(),
+            },
+            kernel: context
+                .kernel(source, "tails", &[Binding::Read, Binding::Write])
+                .expect("it compiles"),
+            context,
+        }
+    }
+}
+
+impl lapswarm::swarm::device::DeviceObjectives for Tails {
+    fn problem(&self) -> &Problem {
+        &self.problem
+    }
+
+    fn evaluate(
+        &mut self,
+        particles: usize,
+        position: &wgpu::Buffer,
+        objectives: &wgpu::Buffer,
+    ) -> Result<()> {
+        let group = self.context.bind(&self.kernel, &[position, objectives])?;
+        let groups = [particles.div_ceil(BLOCK) as u32, 1];
+        self.context.dispatch(&self.kernel, &group, groups, None)?;
+        Ok(())
+    }
+}
+
+fn swarms_on_the_device_keep_the_knee_of_a_front_with_long_tails() {
+    let mut tails = Tails::new(the_device());
+    // What a thousand points spread evenly over u dominate up to 25, in the knee.
+    let even: Vec<Vec<f64>> = (0..1000)
+        .map(|i| 10f64.powf(-4.0 + 8.0 * f64::from(i) / 999.0))
+        .map(|x| vec![x, 1.0 / x])
+        .collect();
+    let most = hypervolume(&even, &[25.0; 2]).unwrap();
+    for (population, reference, least) in [
+        (4096, None, 30),
+        (16_384, None, 30),
+        (4096, Some(vec![25.0; 2]), 99),
+    ] {
+        let settings = MopsoSettings {
+            motion: PsoSettings {
+                population,
+                iterations: 30,
+                ..MopsoSettings::default().motion
+            },
+            reference,
+            ..MopsoSettings::default()
+        };
+        let mut swarm = DeviceMopso::new(&tails.problem, settings, Arc::clone(&tails.context)).unwrap();
+        swarm
+            .run(&mut tails, |_| std::ops::ControlFlow::Continue(()))
+            .unwrap();
+        let found = swarm.front().objectives;
+        let members = found.iter().filter(|row| row.iter().all(|x| *x < 25.0)).count();
+        let volume = hypervolume(&found, &[25.0; 2]).unwrap();
+        assert!(members >= least, "{population} particles: {members}");
+        assert!(
+            volume > 0.998 * most,
+            "{population} particles: {volume} of {most}"
+        );
+    }
 }

@@ -7,7 +7,7 @@ use lapswarm::evaluate::steady::{CpuSteadyEvaluator, SETTLED, SteadyObjective, S
 use lapswarm::evaluate::{BackendChoice, Failure};
 use lapswarm::study::envelope::{EnvelopeSettings, EnvelopeStudy, Prepared, speeds_of};
 use lapswarm::study::framework::solve_unwatched;
-use lapswarm::vehicle::{Car, Tyres, steady_car};
+use lapswarm::vehicle::{Car, Turn, Tyres, steady_car};
 
 fn on_circles(car: Car) -> SteadyProblem {
     SteadyProblem::new(car, Vec::new(), [18.0, 70.0], [-0.2, 0.2], &SteadyObjective::ALL)
@@ -88,7 +88,7 @@ fn cars_settle_on_the_curve_of_trims() {
         let problem = on_circles(car);
         let evaluator = CpuSteadyEvaluator::new(&problem);
         for speed in [20.0, 42.0, 68.0] {
-            let curve = steady.cornering(speed, 0.2);
+            let curve = steady.cornering(speed, 0.2, Turn::Left);
             let aims: Vec<Vec<f64>> = (1..=16).map(|i| vec![speed, 0.01 * f64::from(i)]).collect();
             let rows: Vec<&[f64]> = aims.iter().map(Vec::as_slice).collect();
             let mut compared = 0;
@@ -125,7 +125,7 @@ fn the_populations_ridge_is_that_of_the_curves() {
         let prepared = Prepared { car, speeds };
         let solved = || solve_unwatched::<EnvelopeStudy>(&settings, &prepared).expect("a surface");
         let found = solved();
-        let (limits, surface) = (found.limits, found.surface.expect("a surface"));
+        let (limits, surface) = (found.limits, found.surface);
         let summary = &surface.summary;
         assert_eq!(found.record.evaluations, 96 * limits.speeds.len() as u64);
         assert!(summary.ridge_agrees, "{summary:?}\n{:#?}", surface.ridge);
@@ -140,7 +140,7 @@ fn the_populations_ridge_is_that_of_the_curves() {
             let known = along.map(|t| t.ay_mps2).fold(0.0, f64::max);
             assert!(exact >= known - 1e-9 && exact < 1.01 * known, "{exact} {known}");
         }
-        let again = solved().surface.expect("a surface");
+        let again = solved().surface;
         assert_eq!(again.figures.map(bits), surface.figures.map(bits));
     }
 }

@@ -99,7 +99,11 @@ fn seeds() -> Vec<(&'static str, Vec<u8>)> {
     ]
     .map(|(name, text)| (name, text.as_bytes().to_vec()))
     .into();
-    seeds.extend(STUDIES.map(|study| ("study", study.template().into_bytes())));
+    seeds.extend(
+        STUDIES
+            .iter()
+            .map(|study| ("study", study.template().into_bytes())),
+    );
     seeds.push(("sweep_rows", sweep_rows()));
     seeds.extend(tracks().into_iter().map(|(name, text)| (name, text.into_bytes())));
     let lap: String = include_str!("../../data/laps/gt_silverstone.csv")

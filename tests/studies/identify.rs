@@ -162,7 +162,8 @@ fn a_car_without_camber_cannot_reveal_rvy3() {
         &Circuit::silverstone_gp().unwrap(),
         &SimulateSettings::default(),
     )
-    .unwrap();
+    .unwrap()
+    .log;
     let path = folder.path().join("lap.csv");
     write_native(&log, &path, &lap_format()).unwrap();
     let name = folder.path().join("flat.toml").display().to_string();
@@ -199,7 +200,9 @@ fn noise_stays_within_three_standard_errors() {
         ..SimulateSettings::default()
     };
     let car = Car::bundled().unwrap();
-    let log = simulate_lap(&car, &Circuit::silverstone_gp().unwrap(), &settings).unwrap();
+    let log = simulate_lap(&car, &Circuit::silverstone_gp().unwrap(), &settings)
+        .unwrap()
+        .log;
     let path = folder.path().join("noisy.csv");
     write_native(&log, &path, &lap_format()).unwrap();
     let study = IdentifySettings {

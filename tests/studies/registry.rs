@@ -137,7 +137,7 @@ fn figures(json: &str) -> serde_json::Value {
 
 #[test]
 fn every_study_is_planned_and_leaves_nothing() {
-    for study in STUDIES {
+    for &study in STUDIES {
         let root = tempfile::tempdir().expect("a folder");
         let out = root.path().join("out");
         let flags = small(study.name(), root.path());
@@ -150,7 +150,7 @@ fn every_study_is_planned_and_leaves_nothing() {
 /// In a process of its own: the limit is the process's.
 #[test]
 fn every_study_that_has_too_little_memory_is_refused_and_leaves_nothing() {
-    for study in STUDIES {
+    for &study in STUDIES {
         let root = tempfile::tempdir().expect("a folder");
         let out = root.path().join("out");
         let flags = small(study.name(), root.path());
@@ -183,7 +183,7 @@ fn every_study_that_has_too_little_memory_is_refused_and_leaves_nothing() {
 /// All but `run`, whose stages are these studies: its own interruptions are in `tests/interrupted`.
 #[test]
 fn every_study_that_is_interrupted_is_resumed_to_the_same_figures() {
-    for study in STUDIES.into_iter().filter(|study| study.name() != "run") {
+    for study in STUDIES.iter().copied().filter(|study| study.name() != "run") {
         let name = study.name();
         let root = tempfile::tempdir().expect("a folder");
         let flags = small(name, root.path());

@@ -217,14 +217,14 @@ fn lines() -> RacelineSettings {
 
 fn lines_told(settings: &RacelineSettings, setup: &raceline::Setup, outcome: &raceline::Outcome) -> String {
     let summary = Raceline::summarise(settings, setup, outcome);
-    let best: Vec<_> = outcome.objectives.iter().map(|o| &o.best.alpha).collect();
+    let each = outcome.objectives.iter();
+    let best: Vec<_> = each.map(|o| (&o.best.alpha, &o.history)).collect();
     format!(
-        "{best:?} {:?} {:?} {}",
+        "{best:?} {:?} {}",
         outcome
             .front
             .as_ref()
             .map(|f| (&f.alpha, &f.objectives, f.evaluations)),
-        outcome.history,
         timeless(serde_json::to_value(&summary).unwrap())
     )
 }

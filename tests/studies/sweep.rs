@@ -134,7 +134,7 @@ fn a_sweep_broken_off_and_gone_on_with_is_the_same_to_the_byte() {
         let part = root.path().join(format!("part{run}_{stop}"));
         let mut told = 0;
         let broken = sweep(&settings, &part, false, |p| {
-            told += usize::from(p.done == run);
+            told += usize::from(p.done == run as u64);
             if told >= stop {
                 ControlFlow::Break(())
             } else {

@@ -47,6 +47,43 @@ fn large_swarms_find_good_fronts_in_25_generations() {
     }
 }
 
+/// A front whose ends lie far out: 10^u and 10^-u, u from -4 to 4. What 30 generations of such a swarm keep of it: the hypervolume
+/// up to 25, a knee of a four-hundredth of the ranges, and the members there.
+fn knee(population: usize, reference: Option<Vec<f64>>) -> (f64, usize) {
+    let problem = Problem {
+        variables: vec![Variable::new("u", "-", -4.0, 4.0)],
+        ..plain(0, 2)
+    };
+    let settings = MopsoSettings {
+        reference,
+        ..settings(population, 30)
+    };
+    let mut swarm = Mopso::new(&problem, settings).unwrap();
+    let mut evaluator = PointEvaluator::new(problem, CallCost::Cheap, |x: &[f64], f: &mut [f64]| {
+        f.copy_from_slice(&[10f64.powf(x[0]), 10f64.powf(-x[0])]);
+    });
+    run(&mut swarm, &mut evaluator, |_| ControlFlow::Continue(())).unwrap();
+    let found = swarm.front().objectives;
+    let near = found.iter().filter(|row| row.iter().all(|x| *x < 25.0)).count();
+    (hypervolume(&found, &[25.0; 2]).unwrap(), near)
+}
+
+#[test]
+fn a_large_swarm_keeps_the_knee_of_a_front_with_long_tails() {
+    for (reference, least) in [(None, 30), (Some(vec![25.0; 2]), 99)] {
+        let (small, members) = knee(MANY - 1, reference.clone());
+        assert!(members >= least, "{members} of a small swarm");
+        for population in [MANY, 4 * MANY] {
+            let (large, members) = knee(population, reference.clone());
+            assert!(
+                large > 0.999 * small,
+                "{population}, {reference:?}: {large} after {small}"
+            );
+            assert!(members >= least, "{population}, {reference:?}: {members}");
+        }
+    }
+}
+
 fn plain(variables: usize, objectives: usize) -> Problem {
     Problem {
         variables: (0..variables)

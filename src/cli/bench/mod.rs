@@ -7,14 +7,7 @@ mod scaling;
 mod studies;
 mod swarm;
 
-use crate::cli::measurement::{self, Machine};
-use crate::cli::output::outln;
-use crate::cli::print_json;
 use lapswarm::Result;
-use lapswarm::report::HtmlReport;
-use lapswarm::study::framework::run_folder::RunFolder;
-use serde::Serialize;
-use std::path::Path;
 
 /// Flags of `bench`.
 #[derive(clap::Args)]
@@ -48,26 +41,4 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         Some(What::Swarm(arguments)) => swarm::run(arguments),
         None => scaling::run(&arguments.scaling),
     }
-}
-
-/// Keeps what was measured with its page, if a folder is asked for, and prints it as JSON, if that is; `told` says whether
-/// words go to the terminal.
-fn finish<'a>(
-    (study, table): (&'static str, &impl Serialize),
-    folder: Option<&RunFolder>,
-    page: impl FnOnce(&Path) -> Result<HtmlReport>,
-    (backends, adapter): (impl IntoIterator<Item = &'a str>, Option<&str>),
-    (told, json): (bool, bool),
-) -> Result<()> {
-    if let Some(folder) = folder {
-        let machine = Machine::of(backends, adapter)?;
-        measurement::write(folder, study, table, page(folder)?, &machine)?;
-        if told {
-            outln!("Results: {}", folder.display());
-        }
-    }
-    if json {
-        print_json(table)?;
-    }
-    Ok(())
 }

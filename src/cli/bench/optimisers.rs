@@ -1,9 +1,8 @@
 //! `lapswarm bench optimisers`: every algorithm on every test problem.
 
-use super::finish;
 use super::pages::of_optimisers;
 use crate::cli::measurement::Kept;
-use crate::cli::output::outln;
+use crate::cli::output::{Columns, line_of, outln};
 use lapswarm::swarm::comparison::{compare, quartiles};
 use lapswarm::swarm::metrics::signed_rank;
 use lapswarm::swarm::problems::{NAMES, TestProblem};
@@ -25,9 +24,6 @@ pub struct Arguments {
     algorithms: Vec<String>,
     #[command(flatten)]
     kept: Kept,
-    /// Print one JSON object
-    #[arg(long)]
-    json: bool,
 }
 
 /// One algorithm on one problem; hypervolume for several objectives, error for one.
@@ -73,22 +69,11 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let algorithms = [MULTI_OBJECTIVE.as_slice(), &SINGLE_OBJECTIVE].concat();
     check("--algorithms", &arguments.algorithms, &algorithms)?;
     let wanted = |chosen: &[String], name: &str| chosen.is_empty() || chosen.iter().any(|c| c == name);
-    let folder = arguments.kept.folder("bench")?;
+    let keeping = arguments.kept.begin("bench optimisers", None)?;
     let mut rows = Vec::new();
-    if !arguments.json {
+    if !arguments.kept.json {
         outln!("medians and interquartile ranges of {} seeds", arguments.seeds);
-        outln!(
-            "{:<12}{:<18}{:>14}{:>10}{:>12}{:>14}{:>10}{:>12}{:>12}",
-            "problem",
-            "algorithm",
-            "hypervolume",
-            "IQR",
-            "IGD+",
-            "error",
-            "IQR",
-            "best peer",
-            "p"
-        );
+        outln!("{}", line_of(COLUMNS, None));
     }
     for problem in NAMES
         .into_iter()
@@ -103,8 +88,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         };
         for algorithm in algorithms.iter().filter(|a| wanted(&arguments.algorithms, a)) {
             let row = measure(&problem, algorithm, arguments.seeds)?;
-            if !arguments.json {
-                print_row(&row);
+            if !arguments.kept.json {
+                outln!("{}", line_of(COLUMNS, Some(&row)));
             }
             rows.push(row);
         }
@@ -113,13 +98,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         study: "bench optimisers",
         rows,
     };
-    finish(
-        ("bench optimisers", &table),
-        folder.as_ref(),
-        |folder| of_optimisers(folder, &table.rows),
-        (["cpu"], None),
-        (!arguments.json, arguments.json),
-    )
+    keeping.finish(!arguments.kept.json, &table, ["cpu"], |folder| {
+        of_optimisers(folder, &table.rows)
+    })
 }
 
 fn check(flag: &str, chosen: &[String], known: &[&str]) -> Result<()> {
@@ -158,23 +139,26 @@ fn measure(problem: &TestProblem, algorithm: &'static str, seeds: u64) -> Result
     })
 }
 
-fn print_row(row: &Row) {
-    let fixed = |x: Option<f64>| x.map_or(String::new(), |x| format!("{x:.4}"));
-    let short = |x: Option<f64>| x.map_or(String::new(), |x| format!("{x:.1e}"));
-    let peer = match row.hypervolume_median {
-        Some(_) => fixed(row.best_peer),
-        None => short(row.best_peer),
-    };
-    outln!(
-        "{:<12}{:<18}{:>14}{:>10}{:>12}{:>14}{:>10}{:>12}{:>12}",
-        row.problem,
-        row.algorithm,
-        fixed(row.hypervolume_median),
-        short(row.hypervolume_iqr),
-        fixed(row.igd_plus_median),
-        short(row.error_median),
-        short(row.error_iqr),
-        peer,
-        short(row.better_than_peer_p),
-    );
+/// The table on a terminal.
+const COLUMNS: &Columns<Row> = &[
+    ("problem", -12, |r| r.problem.to_owned()),
+    ("algorithm", -18, |r| r.algorithm.to_owned()),
+    ("hypervolume", 14, |r| fixed(r.hypervolume_median)),
+    ("IQR", 10, |r| short(r.hypervolume_iqr)),
+    ("IGD+", 12, |r| fixed(r.igd_plus_median)),
+    ("error", 14, |r| short(r.error_median)),
+    ("IQR", 10, |r| short(r.error_iqr)),
+    ("best peer", 12, |r| match r.hypervolume_median {
+        Some(_) => fixed(r.best_peer),
+        None => short(r.best_peer),
+    }),
+    ("p", 12, |r| short(r.better_than_peer_p)),
+];
+
+fn fixed(x: Option<f64>) -> String {
+    x.map_or(String::new(), |x| format!("{x:.4}"))
+}
+
+fn short(x: Option<f64>) -> String {
+    x.map_or(String::new(), |x| format!("{x:.1e}"))
 }

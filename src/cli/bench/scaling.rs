@@ -1,23 +1,21 @@
 //! `lapswarm bench`: evaluations per second against population on every backend.
 
-use super::finish;
 use super::machine::{forget_peak_memory, peak_memory_bytes, peak_operations_per_s};
 use super::pages::{of_scaling, rates};
 use crate::cli::backend_flag;
-use crate::cli::measurement::Kept;
-use crate::cli::output::outln;
+use crate::cli::measurement::{Kept, distinct};
+use crate::cli::output::{Columns, line_of, outln};
+use clap::builder::PossibleValuesParser;
 use lapswarm::config::read_text;
-use lapswarm::evaluate::drive::{CpuDriveEvaluator, DriveProblem, GpuDriveEvaluator, SimdDriveEvaluator};
+use lapswarm::evaluate::drive::DriveProblem;
+use lapswarm::evaluate::energy::HybridProblem;
 use lapswarm::evaluate::gpu::{GpuContext, devices};
-use lapswarm::evaluate::line::{
-    CpuLineEvaluator, GpuLineEvaluator, LineObjective, LineProblem, SimdLineEvaluator,
-};
-use lapswarm::evaluate::replay::{BackendChoice, CpuEvaluator, GpuEvaluator, ReplayProblem, SimdEvaluator};
+use lapswarm::evaluate::line::{LineObjective, LineProblem};
+use lapswarm::evaluate::replay::ReplayProblem;
 use lapswarm::evaluate::simd::InstructionSet;
-use lapswarm::evaluate::steady::{
-    CpuSteadyEvaluator, GpuSteadyEvaluator, SimdSteadyEvaluator, SteadyProblem,
-};
-use lapswarm::evaluate::{Evaluator, Problem};
+use lapswarm::evaluate::steady::SteadyProblem;
+use lapswarm::evaluate::{BackendChoice, CpuBackend, Evaluator, GpuBackend, OnDevice, Problem, SimdBackend};
+use lapswarm::line::energy::Mode;
 use lapswarm::line::{Parametrisation, kernel};
 use lapswarm::parity;
 use lapswarm::random::Random;
@@ -38,8 +36,9 @@ use std::time::Instant;
 #[group(skip)]
 pub struct Arguments {
     /// Problems: replay (the bundled lap, 22 unknowns), line (lap time, 360 cuts, 90 control points), drive (set-ups driven
-    /// round a stadium of 840 m by the driver), steady (set-ups that settle on circles)
-    #[arg(long, value_delimiter = ',', value_parser = ["replay", "line", "drive", "steady"], default_value = "replay,line")]
+    /// round a stadium of 840 m by the driver), steady (set-ups that settle on circles), energy (strategies of a hybrid on one line)
+    #[arg(long, value_delimiter = ',', default_value = "replay,line",
+          value_parser = PossibleValuesParser::new(PROBLEMS.iter().map(|(name, _)| *name)))]
     problems: Vec<String>,
     /// Populations to measure
     #[arg(long, value_delimiter = ',', default_value = "64,256,1024,4096,16384",
@@ -62,9 +61,6 @@ pub struct Arguments {
     against: Option<PathBuf>,
     #[command(flatten)]
     kept: Kept,
-    /// Print one JSON object as the last thing on stdout
-    #[arg(long)]
-    json: bool,
     /// No table
     #[arg(long)]
     quiet: bool,
@@ -111,13 +107,12 @@ impl Table {
 const CANDIDATES: u32 = 0xbe0c;
 /// Cars lie within this share of the truth, so that all of them drive and none ends early.
 const SPREAD: f64 = 0.02;
-/// Cuts of the circuit that lines are driven on.
+/// Cuts of the circuit that lines are driven on, and that energy is deployed on.
 const SECTIONS: usize = 360;
 
 /// A problem with what is known of its arithmetic.
-struct Case {
-    name: &'static str,
-    kind: Kind,
+struct Case<K> {
+    kind: K,
     /// Candidates are drawn this far about these, each variable on its own.
     about: Vec<(f64, f64)>,
     /// Runge-Kutta steps of an evaluation, if it has any.
@@ -126,126 +121,129 @@ struct Case {
     operations: u64,
 }
 
-enum Kind {
-    Replay(Box<ReplayProblem>),
-    Line(Box<LineProblem>),
-    Drive(Box<DriveProblem>),
-    Steady(Box<SteadyProblem>),
-}
+/// The problems, by name.
+const PROBLEMS: &[(&str, fn(&mut Bench<'_>) -> Result<()>)] = &[
+    ("replay", |bench| bench.measure_all("replay", &replay()?)),
+    ("line", |bench| bench.measure_all("line", &line()?)),
+    ("drive", |bench| bench.measure_all("drive", &drive()?)),
+    ("steady", |bench| bench.measure_all("steady", &steady()?)),
+    ("energy", |bench| bench.measure_all("energy", &energy()?)),
+];
 
 /// The circuit that set-ups are driven round, with this share of the car's friction in steps of so many seconds.
 const DRIVEN: (&str, f64, f64) = ("stadium:200:70:14", 0.6, 2e-3);
 
-impl Case {
-    fn replay() -> Result<Self> {
-        let replay = set_up(&IdentifySettings::default())?.replay;
-        let base = replay.free.base();
-        let truth: Vec<f64> = replay.free.parameters.iter().map(|p| base[p.slots[0]]).collect();
-        let samples: usize = replay.plan.windows.iter().map(|w| w.end - w.start - 1).sum();
-        let steps = samples * replay.plan.fractions.len();
-        let car = CarModel::<Counted, MagicFormula<Counted>>::from_parameters(|i| Counted(base[i] as f32));
-        let window = &replay.plan.windows[0];
-        let sample = &replay.plan.samples[window.start];
-        let input = CarInput {
-            wheel_speed: sample.wheel_speed.map(|x| Counted(x as f32)),
-            steer: Counted(sample.steer as f32),
-        };
-        let state = CarState::from_array(window.initial.map(|x| Counted(x as f32)));
-        let per_step = operations_of(|| {
-            runge_kutta_step(&car, &state, |_| input, Counted(0.01), |_| {});
+/// Every value, and how far candidates are off it.
+fn spread(values: &[f64]) -> Vec<(f64, f64)> {
+    values.iter().map(|x| (*x, SPREAD * x.abs())).collect()
+}
+
+/// The middle of the bounds.
+fn middle(problem: &Problem) -> Vec<f64> {
+    let variables = problem.variables.iter();
+    variables.map(|v| 0.5 * (v.lower + v.upper)).collect()
+}
+
+fn replay() -> Result<Case<ReplayProblem>> {
+    let replay = set_up(&IdentifySettings::default())?.replay;
+    let base = replay.free.base();
+    let samples: usize = replay.plan.windows.iter().map(|w| w.end - w.start - 1).sum();
+    let steps = samples * replay.plan.fractions.len();
+    let car = CarModel::<Counted, MagicFormula<Counted>>::from_parameters(|i| Counted(base[i] as f32));
+    let window = &replay.plan.windows[0];
+    let sample = &replay.plan.samples[window.start];
+    let input = CarInput {
+        wheel_speed: sample.wheel_speed.map(|x| Counted(x as f32)),
+        steer: Counted(sample.steer as f32),
+    };
+    let state = CarState::from_array(window.initial.map(|x| Counted(x as f32)));
+    let per_step = operations_of(|| {
+        runge_kutta_step(&car, &state, |_| input, Counted(0.01), |_| {});
+    });
+    Ok(Case {
+        about: spread(&replay.free.values_in(base)),
+        steps: Some(steps),
+        operations: per_step * steps as u64,
+        kind: replay,
+    })
+}
+
+fn line() -> Result<Case<LineProblem>> {
+    let setup = raceline::set_up(&RacelineSettings {
+        sections: SECTIONS,
+        ..RacelineSettings::default()
+    })?;
+    let way = Parametrisation::control_points(SECTIONS / 4);
+    let objectives = [LineObjective::LapTime];
+    let line = LineProblem::new(setup.cuts, way, &objectives, Some(setup.car), 0.0)?;
+    let dimensions = line.dimensions();
+    let plan = line.plan().stored::<Counted>();
+    let middle = vec![Counted(0.5); dimensions];
+    let mut operations = 0;
+    if let Some(limits) = line.limits() {
+        let limits = limits.stored::<Counted>();
+        operations = operations_of(|| {
+            let mut course = kernel::Course::default();
+            let wanted = kernel::Wanted {
+                integral: false,
+                lap: true,
+            };
+            kernel::shape(&plan, wanted, &middle, &mut course);
+            kernel::lap_time(&limits, plan.closed, plan.start, Counted(plan.entry), &mut course);
         });
-        Ok(Self {
-            name: "replay",
-            about: truth.iter().map(|x| (*x, SPREAD * x.abs())).collect(),
-            steps: Some(steps),
-            operations: per_step * steps as u64,
-            kind: Kind::Replay(Box::new(replay)),
-        })
     }
+    Ok(Case {
+        about: vec![(0.5, 0.3); dimensions],
+        steps: None,
+        operations,
+        kind: line,
+    })
+}
 
-    fn line() -> Result<Self> {
-        let setup = raceline::set_up(&RacelineSettings {
-            sections: SECTIONS,
-            ..RacelineSettings::default()
-        })?;
-        let way = Parametrisation::control_points(SECTIONS / 4);
-        let objectives = [LineObjective::LapTime];
-        let line = LineProblem::new(setup.cuts, way, &objectives, Some(setup.car), 0.0)?;
-        let dimensions = line.dimensions();
-        let plan = line.plan().stored::<Counted>();
-        let middle = vec![Counted(0.5); dimensions];
-        let mut operations = 0;
-        if let Some(limits) = line.limits() {
-            let limits = limits.stored::<Counted>();
-            operations = operations_of(|| {
-                let mut course = kernel::Course::default();
-                let wanted = kernel::Wanted {
-                    integral: false,
-                    lap: true,
-                };
-                kernel::shape(&plan, wanted, &middle, &mut course);
-                kernel::lap_time(&limits, plan.closed, plan.start, Counted(plan.entry), &mut course);
-            });
-        }
-        Ok(Self {
-            name: "line",
-            about: vec![(0.5, 0.3); dimensions],
-            steps: None,
-            operations,
-            kind: Kind::Line(Box::new(line)),
-        })
-    }
+fn drive() -> Result<Case<DriveProblem>> {
+    let (circuit, pace, step) = DRIVEN;
+    let drive = parity::drive::problem(Car::bundled()?, &[circuit], &[pace], step)?;
+    let middle = middle(&drive.problem);
+    let (steps, operations) = parity::drive::work_of_a_lap(&drive, &middle);
+    Ok(Case {
+        about: spread(&middle),
+        steps: Some(steps),
+        operations,
+        kind: drive,
+    })
+}
 
-    fn drive() -> Result<Self> {
-        let (circuit, pace, step) = DRIVEN;
-        let drive = parity::drive::problem(Car::bundled()?, &[circuit], &[pace], step)?;
-        let middle: Vec<f64> = drive
-            .problem
-            .variables
-            .iter()
-            .map(|v| 0.5 * (v.lower + v.upper))
-            .collect();
-        let (steps, operations) = parity::drive::work_of_a_lap(&drive, &middle);
-        Ok(Self {
-            name: "drive",
-            about: middle.iter().map(|x| (*x, SPREAD * x.abs())).collect(),
-            steps: Some(steps),
-            operations,
-            kind: Kind::Drive(Box::new(drive)),
-        })
-    }
+fn steady() -> Result<Case<SteadyProblem>> {
+    let steady = parity::steady::problem(Car::bundled()?)?;
+    let middle = middle(&steady.problem);
+    Ok(Case {
+        about: spread(&middle),
+        steps: Some(steady.plan().steps as usize),
+        operations: parity::steady::work_of(&steady, &middle),
+        kind: steady,
+    })
+}
 
-    fn steady() -> Result<Self> {
-        let steady = parity::steady::problem(Car::bundled()?)?;
-        let middle: Vec<f64> = steady
-            .problem
-            .variables
-            .iter()
-            .map(|v| 0.5 * (v.lower + v.upper))
-            .collect();
-        Ok(Self {
-            name: "steady",
-            about: middle.iter().map(|x| (*x, SPREAD * x.abs())).collect(),
-            steps: Some(steady.plan().steps as usize),
-            operations: parity::steady::work_of(&steady, &middle),
-            kind: Kind::Steady(Box::new(steady)),
-        })
-    }
+fn energy() -> Result<Case<HybridProblem>> {
+    let mut problems = parity::energy::problems(SECTIONS, &[Mode::Additional])?;
+    let hybrid = problems.remove(0);
+    let middle = middle(&hybrid.problem);
+    Ok(Case {
+        about: spread(&middle),
+        steps: None,
+        operations: operations_of(|| {
+            hybrid.lap_in::<Counted>(&middle);
+        }),
+        kind: hybrid,
+    })
+}
 
-    fn problem(&self) -> &Problem {
-        match &self.kind {
-            Kind::Steady(steady) => &steady.problem,
-            Kind::Drive(drive) => &drive.problem,
-            Kind::Replay(replay) => &replay.problem,
-            Kind::Line(line) => &line.problem,
-        }
-    }
-
+impl<K: OnDevice> Case<K> {
     fn candidates(&self, count: usize) -> Vec<f64> {
         let random = Random::new(1);
         let mut all = Vec::with_capacity(count * self.about.len());
         for i in 0..count as u32 {
-            let draws = self.about.iter().zip(&self.problem().variables).zip(0..);
+            let draws = self.about.iter().zip(&self.kind.problem().variables).zip(0..);
             all.extend(draws.map(|(((middle, reach), variable), k)| {
                 let off = 2.0 * random.uniform(CANDIDATES, 0, i, k) - 1.0;
                 (middle + reach * off).clamp(variable.lower, variable.upper)
@@ -253,132 +251,163 @@ impl Case {
         }
         all
     }
-}
 
-/// A backend, and how long its kernels took where it can tell.
-enum Backend<'a> {
-    Any(Box<dyn Evaluator + 'a>),
-    Replay(Box<GpuEvaluator<'a>>),
-    Line(Box<GpuLineEvaluator<'a>>),
-}
-
-impl Backend<'_> {
-    fn evaluator(&mut self) -> &mut dyn Evaluator {
-        match self {
-            Self::Any(evaluator) => evaluator.as_mut(),
-            Self::Replay(evaluator) => evaluator.as_mut(),
-            Self::Line(evaluator) => evaluator.as_mut(),
+    /// Evaluators of the backends that are asked for.
+    fn evaluators(&self, arguments: &Arguments) -> Result<Vec<Box<dyn Evaluator + '_>>> {
+        let choice = arguments.backend.unwrap_or_default();
+        let wanted = |backend| choice == backend || choice == BackendChoice::Auto;
+        let mut found: Vec<Box<dyn Evaluator + '_>> = Vec::new();
+        if wanted(BackendChoice::Cpu) {
+            found.push(Box::new(CpuBackend::new(&self.kind)));
         }
-    }
-
-    fn kernel_ms(&self) -> Option<f64> {
-        match self {
-            Self::Replay(evaluator) => evaluator.last_kernel_ms(),
-            _ => None,
+        if wanted(BackendChoice::Simd) {
+            found.push(Box::new(SimdBackend::new(&self.kind, InstructionSet::best())));
         }
+        let asked = choice == BackendChoice::Gpu || arguments.adapter.is_some();
+        if asked || (wanted(BackendChoice::Gpu) && !devices().is_empty()) {
+            let context = GpuContext::shared(arguments.adapter.as_deref())?;
+            found.push(Box::new(GpuBackend::new(&self.kind, context)?));
+        }
+        Ok(found)
     }
 }
 
-fn backends<'a>(case: &'a Case, arguments: &Arguments) -> Result<Vec<Backend<'a>>> {
-    let wanted = |choice| {
-        let asked = arguments.backend.unwrap_or_default();
-        asked == choice || asked == BackendChoice::Auto
-    };
-    let mut found: Vec<Backend<'a>> = Vec::new();
-    if wanted(BackendChoice::Cpu) {
-        found.push(Backend::Any(match &case.kind {
-            Kind::Replay(replay) => Box::new(CpuEvaluator::new(replay)),
-            Kind::Line(line) => Box::new(CpuLineEvaluator::new(line)),
-            Kind::Drive(drive) => Box::new(CpuDriveEvaluator::new(drive)),
-            Kind::Steady(steady) => Box::new(CpuSteadyEvaluator::new(steady)),
-        }));
+/// The table on a terminal.
+const COLUMNS: &Columns<Row> = &[
+    ("problem", -8, |r| r.problem.clone()),
+    ("backend", -8, |r| r.backend.clone()),
+    ("particles", 10, |r| r.population.to_string()),
+    ("evaluations/s", 15, |r| format!("{:.1}", r.evaluations_per_s)),
+    ("million steps", 14, |r| {
+        or_dash(r.particle_steps_per_s.map(|s| format!("{:.3}", s / 1e6)))
+    }),
+    ("ms", 12, |r| format!("{:.1}", r.generation_ms)),
+    ("kernel ms", 10, |r| {
+        or_dash(r.kernel_ms.map(|ms| format!("{ms:.1}")))
+    }),
+    ("peak", 8, |r| {
+        or_dash(r.arithmetic_peak_share.map(|s| format!("{:.0}%", 100.0 * s)))
+    }),
+    ("MiB", 10, |r| {
+        or_dash(r.peak_memory_mib.map(|m| format!("{m:.0}")))
+    }),
+];
+
+fn or_dash(text: Option<String>) -> String {
+    text.unwrap_or("-".to_owned())
+}
+
+/// What has been measured so far.
+struct Bench<'a> {
+    arguments: &'a Arguments,
+    /// What another machine had.
+    other: Option<Table>,
+    /// Operations per second at best.
+    peak: f64,
+    rows: Vec<Row>,
+}
+
+impl Bench<'_> {
+    /// Measures a problem on every backend with every population.
+    fn measure_all<K: OnDevice>(&mut self, name: &str, case: &Case<K>) -> Result<()> {
+        for mut evaluator in case.evaluators(self.arguments)? {
+            let mut rate: Option<f64> = None;
+            for &population in &self.arguments.populations {
+                let population = population as usize;
+                if rate.is_some_and(|rate| population as f64 / rate > self.arguments.longest_s) {
+                    continue;
+                }
+                let row = self.measure(name, case, evaluator.as_mut(), population)?;
+                rate = Some(row.evaluations_per_s);
+                if !self.arguments.quiet {
+                    self.print(&row);
+                }
+                self.rows.push(row);
+            }
+        }
+        Ok(())
     }
-    if wanted(BackendChoice::Simd) {
-        let set = InstructionSet::best();
-        found.push(Backend::Any(match &case.kind {
-            Kind::Replay(replay) => Box::new(SimdEvaluator::new(replay, set)),
-            Kind::Line(line) => Box::new(SimdLineEvaluator::new(line, set)),
-            Kind::Drive(drive) => Box::new(SimdDriveEvaluator::new(drive, set)),
-            Kind::Steady(steady) => Box::new(SimdSteadyEvaluator::new(steady, set)),
-        }));
+
+    fn measure<K: OnDevice>(
+        &self,
+        name: &str,
+        case: &Case<K>,
+        evaluator: &mut dyn Evaluator,
+        population: usize,
+    ) -> Result<Row> {
+        let candidates = case.candidates(population);
+        // The first call compiles kernels and fills caches.
+        let few = population.min(64) * case.about.len();
+        evaluator.evaluate(&candidates[..few])?;
+        forget_peak_memory();
+        let began = Instant::now();
+        evaluator.evaluate(&candidates)?;
+        let seconds = began.elapsed().as_secs_f64();
+        let peak_memory_mib = peak_memory_bytes().map(|b| b as f64 / (1 << 20) as f64);
+        let info = evaluator.backend();
+        let rate = population as f64 / seconds;
+        let share = rate * case.operations as f64 / self.peak;
+        Ok(Row {
+            problem: name.to_owned(),
+            backend: info.backend.to_owned(),
+            adapter: info.device,
+            population,
+            evaluations_per_s: rate,
+            particle_steps_per_s: case.steps.map(|s| rate * s as f64),
+            kernel_ms: evaluator.last_kernel_ms(),
+            generation_ms: seconds * 1e3,
+            arithmetic_peak_share: (info.backend == "simd").then_some(share),
+            peak_memory_mib,
+        })
     }
-    let asked = arguments.backend == Some(BackendChoice::Gpu) || arguments.adapter.is_some();
-    if asked || (wanted(BackendChoice::Gpu) && !devices().is_empty()) {
-        let context = GpuContext::shared(arguments.adapter.as_deref())?;
-        found.push(match &case.kind {
-            Kind::Replay(replay) => Backend::Replay(Box::new(GpuEvaluator::new(replay, context)?)),
-            Kind::Line(line) => Backend::Line(Box::new(GpuLineEvaluator::new(line, context)?)),
-            Kind::Drive(drive) => Backend::Any(Box::new(GpuDriveEvaluator::new(drive, context)?)),
-            Kind::Steady(steady) => Backend::Any(Box::new(GpuSteadyEvaluator::new(steady, context)?)),
+
+    fn print(&self, row: &Row) {
+        let ratio = self.other.as_ref().map_or(String::new(), |table| {
+            table.like(row).map_or("   -".to_owned(), |r| {
+                let times = row.evaluations_per_s / r.evaluations_per_s;
+                format!("   {times:.2}  {}", r.adapter)
+            })
         });
+        outln!("{}{ratio}   {}", line_of(COLUMNS, Some(row)), row.adapter);
     }
-    Ok(found)
 }
 
 /// Measures and prints.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let other = arguments.against.as_deref().map(read_table).transpose()?;
-    let folder = arguments.kept.folder("bench")?;
+    let keeping = arguments.kept.begin("bench", arguments.adapter.as_deref())?;
     let began = Instant::now();
     let threads = rayon::current_num_threads();
     let peak = threads as f64 * peak_operations_per_s(InstructionSet::best());
-    let mut rows: Vec<Row> = Vec::new();
     if !arguments.quiet {
         outln!(
             "{threads} threads, {:.0} billion unfused {} operations per second at best",
             peak / 1e9,
             InstructionSet::best().name()
         );
-        outln!(
-            "{:<8}{:<8}{:>10}{:>15}{:>14}{:>12}{:>10}{:>8}{:>10}{}",
-            "problem",
-            "backend",
-            "particles",
-            "evaluations/s",
-            "million steps",
-            "ms",
-            "kernel ms",
-            "peak",
-            "MiB",
-            if other.is_some() { "   times the other" } else { "" }
-        );
+        let times = if other.is_some() { "   times the other" } else { "" };
+        outln!("{}{times}", line_of(COLUMNS, None));
     }
+    let mut bench = Bench {
+        arguments,
+        other,
+        peak,
+        rows: Vec::new(),
+    };
     for name in &arguments.problems {
-        let case = match name.as_str() {
-            "replay" => Case::replay()?,
-            "drive" => Case::drive()?,
-            "steady" => Case::steady()?,
-            _ => Case::line()?,
-        };
-        for mut backend in backends(&case, arguments)? {
-            let mut rate: Option<f64> = None;
-            for &population in &arguments.populations {
-                let population = population as usize;
-                if rate.is_some_and(|rate| population as f64 / rate > arguments.longest_s) {
-                    continue;
-                }
-                let row = measure(&case, &mut backend, population, peak)?;
-                rate = Some(row.evaluations_per_s);
-                if !arguments.quiet {
-                    print_row(&row, other.as_ref());
-                }
-                rows.push(row);
-            }
+        for (_, measure) in PROBLEMS.iter().filter(|(known, _)| known == name) {
+            measure(&mut bench)?;
         }
     }
+    let Bench { other, rows, .. } = bench;
     let evaluations = rows.iter().map(|r| r.population as u64).sum();
     let elapsed_s = began.elapsed().as_secs_f64();
-    let mut names: Vec<&str> = rows.iter().map(|r| r.backend.as_str()).collect();
-    names.sort_unstable();
-    names.dedup();
+    let gpu = rows.iter().find(|r| r.backend == "gpu");
     let table = Table {
         study: "bench".to_owned(),
         seed: 1,
-        backend: names.join(", "),
-        adapter: rows
-            .iter()
-            .find(|r| r.backend == "gpu")
-            .map(|r| r.adapter.clone()),
+        backend: distinct(rows.iter().map(|r| r.backend.as_str())).join(", "),
+        adapter: gpu.map(|r| r.adapter.clone()),
         elapsed_s,
         evaluations,
         evaluations_per_s: evaluations as f64 / elapsed_s,
@@ -388,68 +417,10 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     if let Some(path) = &arguments.plot {
         rates(&table.rows).write_svg(path)?;
     }
-    finish(
-        ("bench", &table),
-        folder.as_ref(),
-        |folder| of_scaling(folder, &table, other.as_ref()),
-        (
-            table.rows.iter().map(|r| r.backend.as_str()),
-            arguments.adapter.as_deref(),
-        ),
-        (!arguments.quiet, arguments.json),
-    )
-}
-
-fn measure(case: &Case, backend: &mut Backend<'_>, population: usize, peak: f64) -> Result<Row> {
-    let candidates = case.candidates(population);
-    // The first call compiles kernels and fills caches.
-    let few = population.min(64) * case.about.len();
-    backend.evaluator().evaluate(&candidates[..few])?;
-    forget_peak_memory();
-    let began = Instant::now();
-    backend.evaluator().evaluate(&candidates)?;
-    let seconds = began.elapsed().as_secs_f64();
-    let peak_memory_mib = peak_memory_bytes().map(|b| b as f64 / (1 << 20) as f64);
-    let info = backend.evaluator().backend();
-    let rate = population as f64 / seconds;
-    Ok(Row {
-        problem: case.name.to_owned(),
-        backend: info.backend.to_owned(),
-        adapter: info.device,
-        population,
-        evaluations_per_s: rate,
-        particle_steps_per_s: case.steps.map(|s| rate * s as f64),
-        kernel_ms: backend.kernel_ms(),
-        generation_ms: seconds * 1e3,
-        arithmetic_peak_share: (info.backend == "simd").then(|| rate * case.operations as f64 / peak),
-        peak_memory_mib,
+    let backends = table.rows.iter().map(|r| r.backend.as_str());
+    keeping.finish(!arguments.quiet, &table, backends, |folder| {
+        of_scaling(folder, &table, other.as_ref())
     })
-}
-
-fn print_row(row: &Row, other: Option<&Table>) {
-    let or_dash = |x: Option<String>| x.unwrap_or("-".to_owned());
-    let ratio = other.map_or(String::new(), |table| {
-        table.like(row).map_or("   -".to_owned(), |r| {
-            format!(
-                "   {:.2}  {}",
-                row.evaluations_per_s / r.evaluations_per_s,
-                r.adapter
-            )
-        })
-    });
-    outln!(
-        "{:<8}{:<8}{:>10}{:>15.1}{:>14}{:>12.1}{:>10}{:>8}{:>10}{ratio}   {}",
-        row.problem,
-        row.backend,
-        row.population,
-        row.evaluations_per_s,
-        or_dash(row.particle_steps_per_s.map(|s| format!("{:.3}", s / 1e6))),
-        row.generation_ms,
-        or_dash(row.kernel_ms.map(|ms| format!("{ms:.1}"))),
-        or_dash(row.arithmetic_peak_share.map(|s| format!("{:.0}%", 100.0 * s))),
-        or_dash(row.peak_memory_mib.map(|m| format!("{m:.0}"))),
-        row.adapter,
-    );
 }
 
 fn read_table(path: &Path) -> Result<Table> {

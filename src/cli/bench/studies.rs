@@ -1,13 +1,13 @@
 //! `lapswarm bench studies`: every optimiser of several objectives on the studies' own problems, hypervolume against time.
 
-use super::finish;
 use super::pages::{of_studies, qualities};
 use crate::cli::backend_flag;
 use crate::cli::measurement::Kept;
-use crate::cli::output::outln;
-use lapswarm::evaluate::line::{LineObjective, LineProblem, open_line_evaluator};
-use lapswarm::evaluate::replay::{CHANNEL_NAMES, ReplayProblem, open_evaluator};
-use lapswarm::evaluate::{BackendChoice, Evaluator, Problem};
+use crate::cli::output::{Columns, line_of, outln};
+use clap::builder::PossibleValuesParser;
+use lapswarm::evaluate::line::{LineObjective, LineProblem};
+use lapswarm::evaluate::replay::{CHANNEL_NAMES, ReplayProblem};
+use lapswarm::evaluate::{BackendChoice, Evaluator, OnDevice, open_evaluator};
 use lapswarm::random::Random;
 use lapswarm::report::Figure;
 use lapswarm::study::identify::{self, IdentifySettings, ObjectiveChoice};
@@ -25,7 +25,8 @@ use std::time::Instant;
 pub struct Arguments {
     /// Problems: identify (speed, lateral acceleration and yaw rate through Maggotts and Becketts, 22 unknowns), raceline
     /// (Gamma, length and lap time at Silverstone, from the exact lines)
-    #[arg(long, value_delimiter = ',', value_parser = PROBLEMS, default_value = "identify,raceline")]
+    #[arg(long, value_delimiter = ',', default_value = "identify,raceline",
+          value_parser = PossibleValuesParser::new(PROBLEMS.map(|(name, _)| name)))]
     problems: Vec<String>,
     /// Only these algorithms [default: all for several objectives]
     #[arg(long, value_delimiter = ',', value_parser = MULTI_OBJECTIVE)]
@@ -57,12 +58,17 @@ pub struct Arguments {
     plot: Option<PathBuf>,
     #[command(flatten)]
     kept: Kept,
-    /// Print one JSON object
-    #[arg(long)]
-    json: bool,
 }
 
-const PROBLEMS: [&str; 2] = ["identify", "raceline"];
+/// The problems, by name.
+const PROBLEMS: [(&str, fn(&Arguments, &mut Table) -> Result<()>); 2] = [
+    ("identify", |arguments, table| {
+        identify(arguments)?.compare(arguments, table)
+    }),
+    ("raceline", |arguments, table| {
+        raceline(arguments)?.compare(arguments, table)
+    }),
+];
 /// The part of the bundled lap that cars are identified on.
 const SECTION: &str = "Maggotts/Becketts";
 /// Random cars whose median costs are the reference point.
@@ -72,17 +78,15 @@ const CARS: u32 = 0x57d1;
 /// A hypervolume is noted down when so many times the evaluations are done as when the last was.
 const SPACING: f64 = 1.03;
 
-enum Kind {
-    Replay(Box<ReplayProblem>),
-    Line(Box<LineProblem>),
-}
+/// Lines or other candidates that a run begins with, for a population and a seed.
+type Start<K> = Box<dyn Fn(&K, usize, u64) -> Result<Vec<Vec<f64>>>>;
 
 /// A problem with the box that hypervolumes are shares of.
-struct Case {
+struct Case<K> {
     name: &'static str,
-    kind: Kind,
-    /// The lines that runs start from, and the settings that say how.
-    lines: Option<(RacelineSettings, Vec<Vec<f64>>)>,
+    kind: K,
+    /// The first candidates, as the study would choose them.
+    start: Start<K>,
     ideal: Vec<f64>,
     reference: Vec<f64>,
 }
@@ -133,125 +137,195 @@ struct Table {
     rows: Vec<Row>,
 }
 
-impl Case {
-    fn new(name: &str, arguments: &Arguments) -> Result<Self> {
-        if name == "identify" {
-            Self::identify(arguments)
-        } else {
-            Self::raceline(arguments)
-        }
-    }
-
-    /// The box reaches from no error at all to the median costs of random cars that drive.
-    fn identify(arguments: &Arguments) -> Result<Self> {
-        let channels = ["vx", "ay", "yaw_rate"];
-        let place = |name: &&str| CHANNEL_NAMES.iter().position(|c| c == name);
-        let settings = IdentifySettings {
-            section: Some(SECTION.to_owned()),
-            objectives: channels
-                .iter()
-                .filter_map(place)
-                .map(ObjectiveChoice::Channel)
-                .collect(),
-            ..IdentifySettings::default()
-        };
-        let replay = identify::set_up(&settings)?.replay;
-        let random = Random::new(1);
-        let cars: Vec<f64> = (0..RANDOM_CARS as u32)
-            .flat_map(|car| {
-                let variables = replay.problem.variables.iter().enumerate();
-                variables
-                    .map(move |(k, v)| v.lower + random.uniform(CARS, 0, car, k as u32) * (v.upper - v.lower))
-            })
-            .collect();
-        let costs =
-            open_evaluator(&replay, arguments.backend, arguments.adapter.as_deref())?.evaluate(&cars)?;
-        let width = channels.len();
-        let reference: Vec<f64> = (0..width)
-            .map(|k| {
-                let cost = |car: usize| costs.success(car, width).map(|row| row[k]);
-                quartiles(&(0..RANDOM_CARS).filter_map(cost).collect::<Vec<_>>())[1]
-            })
-            .collect();
-        if reference.iter().any(|r| !r.is_finite()) {
-            return Err(Error::Study("none of the random cars drives".to_owned()));
-        }
-        Ok(Self {
-            name: "identify",
-            ideal: vec![0.0; width],
-            reference,
-            lines: None,
-            kind: Kind::Replay(Box::new(replay)),
+/// The box reaches from no error at all to the median costs of random cars that drive.
+fn identify(arguments: &Arguments) -> Result<Case<ReplayProblem>> {
+    let channels = ["vx", "ay", "yaw_rate"];
+    let place = |name: &&str| CHANNEL_NAMES.iter().position(|c| c == name);
+    let settings = IdentifySettings {
+        section: Some(SECTION.to_owned()),
+        objectives: channels
+            .iter()
+            .filter_map(place)
+            .map(ObjectiveChoice::Channel)
+            .collect(),
+        ..IdentifySettings::default()
+    };
+    let replay = identify::set_up(&settings)?.replay;
+    let random = Random::new(1);
+    let cars: Vec<f64> = (0..RANDOM_CARS as u32)
+        .flat_map(|car| {
+            let variables = replay.problem.variables.iter().enumerate();
+            variables
+                .map(move |(k, v)| v.lower + random.uniform(CARS, 0, car, k as u32) * (v.upper - v.lower))
         })
-    }
-
-    /// The box reaches from the best to the worst of each objective among the exact lines and the reference line.
-    fn raceline(arguments: &Arguments) -> Result<Self> {
-        let settings = RacelineSettings {
-            sections: arguments.sections as usize,
-            objectives: vec![
-                LineObjective::Gamma,
-                LineObjective::Length,
-                LineObjective::LapTime,
-            ],
-            ..RacelineSettings::default()
-        };
-        let setup = raceline::set_up(&settings)?;
-        let solvers = ReferenceSolvers::new(&setup, &settings)?;
-        let mut known = Vec::new();
-        for objective in &settings.objectives {
-            known.extend(solvers.best(*objective)?.map(|line| line.alpha));
-        }
-        let problem = raceline::front_problem(&setup, &settings)?;
-        let mut lines: Vec<f64> = problem.candidate(&setup.cuts.reference)?;
-        for alpha in &known {
-            lines.extend(problem.candidate(alpha)?);
-        }
-        let rows = open_line_evaluator(&problem, arguments.backend, arguments.adapter.as_deref())?
-            .evaluate(&lines)?
-            .objectives;
-        let width = settings.objectives.len();
-        let extreme = |from: f64, f: fn(f64, f64) -> f64| -> Vec<f64> {
-            let column = |k: usize| rows.iter().skip(k).step_by(width).copied();
-            (0..width).map(|k| column(k).fold(from, f)).collect()
-        };
-        Ok(Self {
-            name: "raceline",
-            ideal: extreme(f64::INFINITY, f64::min),
-            reference: extreme(f64::NEG_INFINITY, f64::max),
-            lines: Some((settings, known)),
-            kind: Kind::Line(Box::new(problem)),
+        .collect();
+    let costs = open_evaluator(&replay, arguments.backend, arguments.adapter.as_deref())?.evaluate(&cars)?;
+    let width = channels.len();
+    let reference: Vec<f64> = (0..width)
+        .map(|k| {
+            let cost = |car: usize| costs.success(car, width).map(|row| row[k]);
+            quartiles(&(0..RANDOM_CARS).filter_map(cost).collect::<Vec<_>>())[1]
         })
+        .collect();
+    if reference.iter().any(|r| !r.is_finite()) {
+        return Err(Error::Study("none of the random cars drives".to_owned()));
     }
+    Ok(Case {
+        name: "identify",
+        ideal: vec![0.0; width],
+        reference,
+        start: Box::new(|_, _, _| Ok(Vec::new())),
+        kind: replay,
+    })
+}
 
-    fn problem(&self) -> &Problem {
-        match &self.kind {
-            Kind::Replay(replay) => &replay.problem,
-            Kind::Line(line) => &line.problem,
-        }
+/// The box reaches from the best to the worst of each objective among the exact lines and the reference line.
+fn raceline(arguments: &Arguments) -> Result<Case<LineProblem>> {
+    let settings = RacelineSettings {
+        sections: arguments.sections as usize,
+        objectives: vec![
+            LineObjective::Gamma,
+            LineObjective::Length,
+            LineObjective::LapTime,
+        ],
+        ..RacelineSettings::default()
+    };
+    let setup = raceline::set_up(&settings)?;
+    let solvers = ReferenceSolvers::new(&setup, &settings)?;
+    let mut known = Vec::new();
+    for objective in &settings.objectives {
+        known.extend(solvers.best(*objective)?.map(|line| line.alpha));
     }
+    let problem = raceline::front_problem(&setup, &settings)?;
+    let mut lines: Vec<f64> = problem.candidate(&setup.cuts.reference)?;
+    for alpha in &known {
+        lines.extend(problem.candidate(alpha)?);
+    }
+    let rows = open_evaluator(&problem, arguments.backend, arguments.adapter.as_deref())?
+        .evaluate(&lines)?
+        .objectives;
+    let width = settings.objectives.len();
+    let extreme = |from: f64, f: fn(f64, f64) -> f64| -> Vec<f64> {
+        let column = |k: usize| rows.iter().skip(k).step_by(width).copied();
+        (0..width).map(|k| column(k).fold(from, f)).collect()
+    };
+    Ok(Case {
+        name: "raceline",
+        ideal: extreme(f64::INFINITY, f64::min),
+        reference: extreme(f64::NEG_INFINITY, f64::max),
+        start: Box::new(move |problem, population, seed| {
+            let settings = RacelineSettings {
+                population,
+                seed,
+                ..settings.clone()
+            };
+            raceline::starting_lines(problem, &settings, &known)
+        }),
+        kind: problem,
+    })
+}
 
+impl<K: OnDevice> Case<K> {
     fn evaluator(&self, arguments: &Arguments) -> Result<Box<dyn Evaluator + '_>> {
-        let adapter = arguments.adapter.as_deref();
-        match &self.kind {
-            Kind::Replay(replay) => open_evaluator(&**replay, arguments.backend, adapter),
-            Kind::Line(line) => open_line_evaluator(&**line, arguments.backend, adapter),
-        }
+        open_evaluator(&self.kind, arguments.backend, arguments.adapter.as_deref())
     }
 
-    /// The first candidates, as the study would choose them.
-    fn start(&self, population: usize, seed: u64) -> Result<Vec<Vec<f64>>> {
-        match (&self.kind, &self.lines) {
-            (Kind::Line(problem), Some((settings, known))) => {
-                let settings = RacelineSettings {
-                    population,
-                    seed,
-                    ..settings.clone()
-                };
-                raceline::starting_lines(problem, &settings, known)
+    /// Compares the optimisers on it.
+    fn compare(&self, arguments: &Arguments, table: &mut Table) -> Result<()> {
+        let backend = self.evaluator(arguments)?.backend();
+        let problem = self.kind.problem();
+        table.problems.push(Scored {
+            problem: self.name,
+            variables: problem.variables.len(),
+            objectives: problem
+                .objectives
+                .iter()
+                .map(|o| format!("{} ({})", o.name, o.unit))
+                .collect(),
+            ideal: self.ideal.clone(),
+            reference: self.reference.clone(),
+            backend: backend.backend,
+            device: backend.device,
+        });
+        let algorithms = match &arguments.algorithms[..] {
+            [] => MULTI_OBJECTIVE.to_vec(),
+            chosen => chosen.iter().map(String::as_str).collect(),
+        };
+        for &population in &arguments.populations {
+            for algorithm in &algorithms {
+                let row = self.measure(algorithm, population as usize, arguments)?;
+                if !arguments.kept.json {
+                    outln!("{}", line_of(COLUMNS, Some(&row)));
+                }
+                table.rows.push(row);
             }
-            _ => Ok(Vec::new()),
         }
+        Ok(())
+    }
+
+    fn measure(&self, algorithm: &str, population: usize, arguments: &Arguments) -> Result<Row> {
+        // The genetic algorithm breeds pairs.
+        let population = population.next_multiple_of(2);
+        let generations = ((arguments.evaluations as f64 / population as f64).round() as usize).max(1);
+        let mut runs = Vec::new();
+        for seed in 1..=arguments.seeds {
+            let sizes = Sizes {
+                population,
+                iterations: generations,
+                archive: arguments.archive as usize,
+                seed,
+            };
+            runs.push(self.follow(algorithm, sizes, arguments)?);
+        }
+        let last = |values: &[f64]| values.last().copied().unwrap_or(f64::NAN);
+        let reached: Vec<f64> = runs.iter().map(|r| last(&r.0.hypervolume)).collect();
+        let seconds: Vec<f64> = runs.iter().map(|r| last(&r.0.seconds)).collect();
+        let evaluating: Vec<f64> = runs.iter().map(|r| r.1).collect();
+        let [low, median, high] = quartiles(&reached);
+        let nearest = (0..runs.len())
+            .min_by(|&a, &b| f64::total_cmp(&(reached[a] - median).abs(), &(reached[b] - median).abs()));
+        Ok(Row {
+            problem: self.name,
+            algorithm: algorithm.to_owned(),
+            population,
+            generations,
+            evaluations: (population * generations) as u64,
+            seeds: arguments.seeds,
+            hypervolume_median: median,
+            hypervolume_iqr: high - low,
+            seconds_median: quartiles(&seconds)[1],
+            evaluation_s_median: quartiles(&evaluating)[1],
+            history: nearest.map(|i| runs[i].0.clone()).unwrap_or_default(),
+        })
+    }
+
+    /// One run, and the seconds that its evaluations took.
+    fn follow(&self, algorithm: &str, sizes: Sizes, arguments: &Arguments) -> Result<(History, f64)> {
+        let mut evaluator = self.evaluator(arguments)?;
+        let start = (self.start)(&self.kind, sizes.population, sizes.seed)?;
+        let mut optimiser = several_by_name(algorithm, self.kind.problem(), sizes, &start)?;
+        drop(start);
+        let mut history = History::default();
+        let (mut seconds, mut evaluating, mut noted) = (0.0, 0.0, 0.0);
+        while !optimiser.done() {
+            let began = Instant::now();
+            let population = optimiser.ask();
+            let asked = began.elapsed().as_secs_f64();
+            let evaluation = evaluator.evaluate(&population)?;
+            evaluating += began.elapsed().as_secs_f64() - asked;
+            optimiser.tell(&evaluation)?;
+            seconds += began.elapsed().as_secs_f64();
+            let done = optimiser.evaluations();
+            if done as f64 >= SPACING * noted || optimiser.done() {
+                noted = done as f64;
+                history.evaluations.push(done);
+                history.seconds.push(seconds);
+                history
+                    .hypervolume
+                    .push(self.quality(&optimiser.front().objectives)?);
+            }
+        }
+        Ok((history, evaluating))
     }
 
     /// Share of the box that a front dominates.
@@ -270,12 +344,9 @@ impl Case {
 
 /// Measures and prints.
 pub fn run(arguments: &Arguments) -> Result<()> {
-    let algorithms: Vec<&str> = if arguments.algorithms.is_empty() {
-        MULTI_OBJECTIVE.to_vec()
-    } else {
-        arguments.algorithms.iter().map(String::as_str).collect()
-    };
-    let folder = arguments.kept.folder("bench")?;
+    let keeping = arguments
+        .kept
+        .begin("bench studies", arguments.adapter.as_deref())?;
     let mut table = Table {
         study: "bench studies",
         threads: rayon::current_num_threads(),
@@ -283,7 +354,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         problems: Vec::new(),
         rows: Vec::new(),
     };
-    if !arguments.json {
+    if !arguments.kept.json {
         outln!(
             "{} evaluations, archive of {}, {} threads, medians of {} seeds; hypervolume as a share of the problem's box",
             arguments.evaluations,
@@ -291,135 +362,30 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             table.threads,
             arguments.seeds
         );
-        outln!(
-            "{:<10}{:<18}{:>11}{:>12}{:>13}{:>10}{:>10}{:>14}",
-            "problem",
-            "algorithm",
-            "population",
-            "generations",
-            "hypervolume",
-            "IQR",
-            "seconds",
-            "evaluation s"
-        );
+        outln!("{}", line_of(COLUMNS, None));
     }
     for name in &arguments.problems {
-        let case = Case::new(name, arguments)?;
-        let backend = case.evaluator(arguments)?.backend();
-        let problem = case.problem();
-        table.problems.push(Scored {
-            problem: case.name,
-            variables: problem.variables.len(),
-            objectives: problem
-                .objectives
-                .iter()
-                .map(|o| format!("{} ({})", o.name, o.unit))
-                .collect(),
-            ideal: case.ideal.clone(),
-            reference: case.reference.clone(),
-            backend: backend.backend,
-            device: backend.device,
-        });
-        for &population in &arguments.populations {
-            for algorithm in &algorithms {
-                let row = measure(&case, algorithm, population as usize, arguments)?;
-                if !arguments.json {
-                    print_row(&row);
-                }
-                table.rows.push(row);
-            }
+        for (_, compare) in PROBLEMS.iter().filter(|(known, _)| known == name) {
+            compare(arguments, &mut table)?;
         }
     }
     if let Some(path) = &arguments.plot {
         qualities(&table.rows).write_svg(path)?;
     }
-    finish(
-        ("bench studies", &table),
-        folder.as_ref(),
-        |folder| of_studies(folder, &table.rows),
-        (
-            table.problems.iter().map(|p| p.backend),
-            arguments.adapter.as_deref(),
-        ),
-        (!arguments.json, arguments.json),
-    )
-}
-
-fn print_row(row: &Row) {
-    outln!(
-        "{:<10}{:<18}{:>11}{:>12}{:>13.4}{:>10.1e}{:>10.2}{:>14.2}",
-        row.problem,
-        row.algorithm,
-        row.population,
-        row.generations,
-        row.hypervolume_median,
-        row.hypervolume_iqr,
-        row.seconds_median,
-        row.evaluation_s_median
-    );
-}
-
-fn measure(case: &Case, algorithm: &str, population: usize, arguments: &Arguments) -> Result<Row> {
-    // The genetic algorithm breeds pairs.
-    let population = population.next_multiple_of(2);
-    let generations = ((arguments.evaluations as f64 / population as f64).round() as usize).max(1);
-    let mut runs = Vec::new();
-    for seed in 1..=arguments.seeds {
-        let sizes = Sizes {
-            population,
-            iterations: generations,
-            archive: arguments.archive as usize,
-            seed,
-        };
-        runs.push(follow(case, algorithm, sizes, arguments)?);
-    }
-    let last = |values: &[f64]| values.last().copied().unwrap_or(f64::NAN);
-    let reached: Vec<f64> = runs.iter().map(|r| last(&r.0.hypervolume)).collect();
-    let seconds: Vec<f64> = runs.iter().map(|r| last(&r.0.seconds)).collect();
-    let evaluating: Vec<f64> = runs.iter().map(|r| r.1).collect();
-    let [low, median, high] = quartiles(&reached);
-    let nearest = (0..runs.len())
-        .min_by(|&a, &b| f64::total_cmp(&(reached[a] - median).abs(), &(reached[b] - median).abs()));
-    Ok(Row {
-        problem: case.name,
-        algorithm: algorithm.to_owned(),
-        population,
-        generations,
-        evaluations: (population * generations) as u64,
-        seeds: arguments.seeds,
-        hypervolume_median: median,
-        hypervolume_iqr: high - low,
-        seconds_median: quartiles(&seconds)[1],
-        evaluation_s_median: quartiles(&evaluating)[1],
-        history: nearest.map(|i| runs[i].0.clone()).unwrap_or_default(),
+    let backends = table.problems.iter().map(|p| p.backend);
+    keeping.finish(!arguments.kept.json, &table, backends, |folder| {
+        of_studies(folder, &table.rows)
     })
 }
 
-/// One run, and the seconds that its evaluations took.
-fn follow(case: &Case, algorithm: &str, sizes: Sizes, arguments: &Arguments) -> Result<(History, f64)> {
-    let mut evaluator = case.evaluator(arguments)?;
-    let start = case.start(sizes.population, sizes.seed)?;
-    let mut optimiser = several_by_name(algorithm, case.problem(), sizes, &start)?;
-    drop(start);
-    let mut history = History::default();
-    let (mut seconds, mut evaluating, mut noted) = (0.0, 0.0, 0.0);
-    while !optimiser.done() {
-        let began = Instant::now();
-        let population = optimiser.ask();
-        let asked = began.elapsed().as_secs_f64();
-        let evaluation = evaluator.evaluate(&population)?;
-        evaluating += began.elapsed().as_secs_f64() - asked;
-        optimiser.tell(&evaluation)?;
-        seconds += began.elapsed().as_secs_f64();
-        let done = optimiser.evaluations();
-        if done as f64 >= SPACING * noted || optimiser.done() {
-            noted = done as f64;
-            history.evaluations.push(done);
-            history.seconds.push(seconds);
-            history
-                .hypervolume
-                .push(case.quality(&optimiser.front().objectives)?);
-        }
-    }
-    Ok((history, evaluating))
-}
+/// The table on a terminal.
+const COLUMNS: &Columns<Row> = &[
+    ("problem", -10, |r| r.problem.to_owned()),
+    ("algorithm", -18, |r| r.algorithm.clone()),
+    ("population", 11, |r| r.population.to_string()),
+    ("generations", 12, |r| r.generations.to_string()),
+    ("hypervolume", 13, |r| format!("{:.4}", r.hypervolume_median)),
+    ("IQR", 10, |r| format!("{:.1e}", r.hypervolume_iqr)),
+    ("seconds", 10, |r| format!("{:.2}", r.seconds_median)),
+    ("evaluation s", 14, |r| format!("{:.2}", r.evaluation_s_median)),
+];

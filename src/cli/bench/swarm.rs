@@ -1,11 +1,9 @@
 //! `lapswarm bench swarm`: what a generation costs besides its evaluations, against the number of particles.
 
-use super::finish;
 use super::pages::of_swarm;
 use crate::cli::backend_flag;
 use crate::cli::measurement::Kept;
-use crate::cli::output::outln;
-use lapswarm::Result;
+use crate::cli::output::{Columns, line_of, outln};
 use lapswarm::evaluate::gpu::{GpuContext, devices};
 use lapswarm::evaluate::simd::InstructionSet;
 use lapswarm::evaluate::{BackendChoice, Evaluator};
@@ -13,6 +11,7 @@ use lapswarm::swarm::device::DeviceMopso;
 use lapswarm::swarm::metrics::{Scale, hypervolume};
 use lapswarm::swarm::problems::{GpuTestEvaluator, SimdTestEvaluator, TestProblem};
 use lapswarm::swarm::{MANY, Mopso, MopsoSettings, Optimiser, PsoSettings};
+use lapswarm::{Error, Result};
 use serde::Serialize;
 use std::time::Instant;
 
@@ -42,9 +41,6 @@ pub struct Arguments {
     adapter: Option<String>,
     #[command(flatten)]
     kept: Kept,
-    /// Print one JSON object
-    #[arg(long)]
-    json: bool,
 }
 
 /// One population on one problem.
@@ -84,46 +80,31 @@ const REFERENCE: f64 = 1.1;
 
 /// Measures and prints.
 pub fn run(arguments: &Arguments) -> Result<()> {
-    let folder = arguments.kept.folder("bench")?;
+    let keeping = arguments
+        .kept
+        .begin("bench swarm", arguments.adapter.as_deref())?;
     let mut table = Table {
         study: "bench swarm",
         threads: rayon::current_num_threads(),
         rows: Vec::new(),
         growth: Vec::new(),
     };
-    if !arguments.json {
+    if !arguments.kept.json {
         outln!(
             "milliseconds per generation of the optimiser alone, {} threads",
             table.threads
         );
-        outln!(
-            "{:<8}{:<8}{:>11}{:>11}{:>12}{:>12}{:>12}{:>12}{:>13}",
-            "backend",
-            "problem",
-            "objectives",
-            "particles",
-            "generation",
-            "slowest",
-            "evaluation",
-            "bytes each",
-            "hypervolume"
-        );
+        outln!("{}", line_of(COLUMNS, None));
     }
     for name in &arguments.problems {
-        let problem = TestProblem::by_name(name)
-            .filter(|p| p.problem().objectives.len() > 1)
-            .ok_or_else(|| {
-                lapswarm::Error::input(
-                    "--problems",
-                    "name",
-                    name,
-                    "a test problem of two or three objectives",
-                )
-            })?;
-        let problem = if arguments.variables > 0 {
-            TestProblem::sized(name, arguments.variables).unwrap_or(problem)
-        } else {
-            problem
+        let own = TestProblem::by_name(name).filter(|p| p.problem().objectives.len() > 1);
+        let own = own.ok_or_else(|| {
+            let expected = "a test problem of two or three objectives";
+            Error::input("--problems", "name", name, expected)
+        })?;
+        let problem = match arguments.variables {
+            0 => own,
+            variables => TestProblem::sized(name, variables).unwrap_or(own),
         };
         for here in [true, false] {
             let mut times = Vec::new();
@@ -134,8 +115,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             for &population in arguments.populations.iter().filter(|_| wanted) {
                 let row = measure(&problem, population, here, arguments)?;
                 times.push((population as f64, row.generation_ms));
-                if !arguments.json {
-                    print_row(&row);
+                if !arguments.kept.json {
+                    outln!("{}   {}", line_of(COLUMNS, Some(&row)), row.device);
                 }
                 table.rows.push(row);
             }
@@ -145,7 +126,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
                     problem: problem.name(),
                     exponent: slope(&times),
                 };
-                if !arguments.json {
+                if !arguments.kept.json {
                     outln!(
                         "{:<8}{:<8} time grows as particles^{:.2}",
                         growth.backend,
@@ -157,30 +138,24 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             }
         }
     }
-    finish(
-        ("bench swarm", &table),
-        folder.as_ref(),
-        |folder| of_swarm(folder, &table.rows),
-        (table.rows.iter().map(|r| r.backend), arguments.adapter.as_deref()),
-        (!arguments.json, arguments.json),
-    )
+    let backends = table.rows.iter().map(|r| r.backend);
+    keeping.finish(!arguments.kept.json, &table, backends, |folder| {
+        of_swarm(folder, &table.rows)
+    })
 }
 
-fn print_row(row: &Row) {
-    outln!(
-        "{:<8}{:<8}{:>11}{:>11}{:>12.3}{:>12.3}{:>12.3}{:>12}{:>13.4}   {}",
-        row.backend,
-        row.problem,
-        row.objectives,
-        row.population,
-        row.generation_ms,
-        row.slowest_generation_ms,
-        row.evaluation_ms,
-        row.bytes_per_particle,
-        row.hypervolume,
-        row.device
-    );
-}
+/// The table on a terminal.
+const COLUMNS: &Columns<Row> = &[
+    ("backend", -8, |r| r.backend.to_owned()),
+    ("problem", -8, |r| r.problem.to_owned()),
+    ("objectives", 11, |r| r.objectives.to_string()),
+    ("particles", 11, |r| r.population.to_string()),
+    ("generation", 12, |r| format!("{:.3}", r.generation_ms)),
+    ("slowest", 12, |r| format!("{:.3}", r.slowest_generation_ms)),
+    ("evaluation", 12, |r| format!("{:.3}", r.evaluation_ms)),
+    ("bytes each", 12, |r| r.bytes_per_particle.to_string()),
+    ("hypervolume", 13, |r| format!("{:.4}", r.hypervolume)),
+];
 
 /// Seconds of one run: the optimiser's own, its slowest generation's, and the evaluations'.
 #[derive(Default)]
@@ -205,33 +180,61 @@ fn timed<T>(work: impl FnOnce() -> T) -> (f64, T) {
     (began.elapsed().as_secs_f64(), result)
 }
 
-/// The best of the repeats.
-fn measure(problem: &TestProblem, population: usize, here: bool, arguments: &Arguments) -> Result<Row> {
-    let mut best: Option<Row> = None;
-    for _ in 0..arguments.repeats {
-        let settings = MopsoSettings {
-            motion: PsoSettings {
-                population,
-                iterations: arguments.generations as usize,
-                ..MopsoSettings::default().motion
-            },
-            ..MopsoSettings::default()
-        };
-        let row = if here {
-            on_the_host(problem, settings)?
-        } else {
-            on_a_device(problem, settings, arguments)?
-        };
-        if best.as_ref().is_none_or(|b| row.generation_ms < b.generation_ms) {
-            best = Some(row);
-        }
-    }
-    best.ok_or_else(|| lapswarm::Error::Study("nothing was measured".to_owned()))
+/// What a run came to.
+struct Run {
+    backend: &'static str,
+    device: String,
+    times: Times,
+    bytes_per_particle: usize,
+    front: Vec<Vec<f64>>,
 }
 
-fn on_the_host(problem: &TestProblem, settings: MopsoSettings) -> Result<Row> {
-    let generations = settings.motion.iterations;
-    let population = settings.motion.population;
+/// The best of the repeats.
+fn measure(problem: &TestProblem, population: usize, here: bool, arguments: &Arguments) -> Result<Row> {
+    let settings = MopsoSettings {
+        motion: PsoSettings {
+            population,
+            iterations: arguments.generations as usize,
+            ..MopsoSettings::default().motion
+        },
+        ..MopsoSettings::default()
+    };
+    let run = |_| {
+        if here {
+            on_the_host(problem, settings.clone())
+        } else {
+            on_a_device(problem, settings.clone(), arguments)
+        }
+    };
+    let runs: Vec<Run> = (0..arguments.repeats).map(run).collect::<Result<_>>()?;
+    let best = runs
+        .into_iter()
+        .min_by(|a, b| a.times.own.total_cmp(&b.times.own));
+    let best = best.ok_or_else(|| Error::Study("nothing was measured".to_owned()))?;
+    let truth = problem.front(2000);
+    let width = problem.problem().objectives.len();
+    let each = 1e3 / f64::from(arguments.generations);
+    Ok(Row {
+        backend: best.backend,
+        device: best.device,
+        problem: problem.name(),
+        objectives: width,
+        variables: problem.problem().variables.len(),
+        population,
+        generation_ms: best.times.own * each,
+        slowest_generation_ms: best.times.slowest * 1e3,
+        evaluation_ms: best.times.others * each,
+        bytes_per_particle: best.bytes_per_particle,
+        hypervolume: hypervolume(&Scale::of(&truth).apply(&best.front), &vec![REFERENCE; width])?,
+    })
+}
+
+fn on_the_host(problem: &TestProblem, settings: MopsoSettings) -> Result<Run> {
+    let (backend, device) = if settings.motion.population < MANY {
+        ("cpu", "f64")
+    } else {
+        ("simd", InstructionSet::best().name())
+    };
     let mut swarm = Mopso::new(problem.problem(), settings)?;
     let mut evaluator = SimdTestEvaluator::new(problem, InstructionSet::best());
     let mut times = Times::default();
@@ -243,26 +246,16 @@ fn on_the_host(problem: &TestProblem, settings: MopsoSettings) -> Result<Row> {
         told?;
         times.note(asking + telling, others);
     }
-    let (backend, device) = if population < MANY {
-        ("cpu", "f64".to_owned())
-    } else {
-        ("simd", InstructionSet::best().name().to_owned())
-    };
-    let found = swarm.front().objectives;
-    let bytes = swarm.bytes_per_particle();
-    row(
-        problem,
-        (backend, device),
-        (population, generations),
-        &times,
-        bytes,
-        &found,
-    )
+    Ok(Run {
+        backend,
+        device: device.to_owned(),
+        times,
+        bytes_per_particle: swarm.bytes_per_particle(),
+        front: swarm.front().objectives,
+    })
 }
 
-fn on_a_device(problem: &TestProblem, settings: MopsoSettings, arguments: &Arguments) -> Result<Row> {
-    let generations = settings.motion.iterations;
-    let population = settings.motion.population;
+fn on_a_device(problem: &TestProblem, settings: MopsoSettings, arguments: &Arguments) -> Result<Run> {
     let context = GpuContext::shared(arguments.adapter.as_deref())?;
     let mut evaluator = GpuTestEvaluator::new(problem, context.clone())?;
     // The first generation of a swarm compiles its kernels.
@@ -271,7 +264,7 @@ fn on_a_device(problem: &TestProblem, settings: MopsoSettings, arguments: &Argum
     drop(first);
     let mut swarm = DeviceMopso::new(problem.problem(), settings, context)?;
     let mut times = Times::default();
-    for _ in 0..generations {
+    for _ in 0..arguments.generations {
         let (others, evaluated) = timed(|| swarm.evaluate(&mut evaluator));
         evaluated?;
         let (own, moved) = timed(|| swarm.learn_and_move());
@@ -279,41 +272,12 @@ fn on_a_device(problem: &TestProblem, settings: MopsoSettings, arguments: &Argum
         times.note(own, others);
     }
     let info = swarm.backend();
-    let found = swarm.front().objectives;
-    let bytes = swarm.bytes_per_particle();
-    row(
-        problem,
-        (info.backend, info.device),
-        (population, generations),
-        &times,
-        bytes,
-        &found,
-    )
-}
-
-fn row(
-    problem: &TestProblem,
-    (backend, device): (&'static str, String),
-    (population, generations): (usize, usize),
-    times: &Times,
-    bytes_per_particle: usize,
-    found: &[Vec<f64>],
-) -> Result<Row> {
-    let front = problem.front(2000);
-    let width = problem.problem().objectives.len();
-    let each = 1e3 / generations as f64;
-    Ok(Row {
-        backend,
-        device,
-        problem: problem.name(),
-        objectives: width,
-        variables: problem.problem().variables.len(),
-        population,
-        generation_ms: times.own * each,
-        slowest_generation_ms: times.slowest * 1e3,
-        evaluation_ms: times.others * each,
-        bytes_per_particle,
-        hypervolume: hypervolume(&Scale::of(&front).apply(found), &vec![REFERENCE; width])?,
+    Ok(Run {
+        backend: info.backend,
+        device: info.device,
+        times,
+        bytes_per_particle: swarm.bytes_per_particle(),
+        front: swarm.front().objectives,
     })
 }
 

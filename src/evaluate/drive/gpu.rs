@@ -1,5 +1,7 @@
 //! The graphics backend: `f32`, one lane per lap.
 
+pub use crate::evaluate::gpu::Batching as DriveBatching;
+
 use super::problem::{DriveProblem, LAP_FIGURES};
 use crate::drive::kernel::{DrivenLap, STATE, ending};
 use crate::error::Result;
@@ -7,7 +9,7 @@ use crate::evaluate::gpu::shader::{CarShape, DriveShape};
 use crate::evaluate::gpu::{
     Batching, Binding, GpuContext, Trajectories, TrajectoryKernel, rounds_of, workgroup,
 };
-use crate::evaluate::{DeviceKernel, GpuBackend, ModelTable};
+use crate::evaluate::{DeviceKernel, GpuBackend, ModelTable, OnDevice};
 use crate::vehicle::model::STAGES;
 use std::sync::Arc;
 use wgpu::BufferUsages as Usage;
@@ -41,6 +43,13 @@ impl DriveDevice {
             }
         }
     }
+}
+
+/// Drives laps on a graphics processor.
+pub type GpuDriveEvaluator<'a> = GpuBackend<'a, DriveProblem>;
+
+impl OnDevice for DriveProblem {
+    type Device = DriveDevice;
 }
 
 impl DeviceKernel<DriveProblem> for DriveDevice {

@@ -1,12 +1,14 @@
 //! Closed-loop laps: set-ups driven round lines by a driver, the 4DOF car in closed loop, whole populations of it.
 
 mod cpu;
+#[cfg(feature = "gpu")]
 mod gpu;
 mod problem;
 mod simd;
 
-pub use crate::evaluate::gpu::Batching as DriveBatching;
 pub use crate::evaluate::open_evaluator as open_drive_evaluator;
+#[cfg(feature = "gpu")]
+pub use gpu::{DriveBatching, GpuDriveEvaluator};
 pub use problem::{DriveObjective, DriveProblem, DriveSettings, LAP_FIGURES};
 
 use super::{Failure, Problem, ProblemKind};
@@ -16,13 +18,10 @@ use crate::drive::kernel::{DrivenLap, ending};
 pub type CpuDriveEvaluator<'a> = crate::evaluate::CpuBackend<'a, DriveProblem>;
 /// Drives laps in `f32` lanes.
 pub type SimdDriveEvaluator<'a> = crate::evaluate::SimdBackend<'a, DriveProblem>;
-/// Drives laps on a graphics processor.
-pub type GpuDriveEvaluator<'a> = crate::evaluate::GpuBackend<'a, DriveProblem>;
 
 impl ProblemKind for DriveProblem {
     type Outcome = DrivenLap;
     type Lanes = simd::DriveLanes;
-    type Device = gpu::DriveDevice;
     const WITHOUT_COST: Failure = Failure::Undefined;
 
     fn problem(&self) -> &Problem {

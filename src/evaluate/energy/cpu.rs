@@ -70,6 +70,24 @@ impl HybridProblem {
         }
     }
 
+    /// The lap of a candidate in the scalar `R`.
+    pub fn lap_in<R: Lookup>(&self, candidate: &[f64]) -> EnergyLap<R> {
+        let tables = Tables {
+            plan: &self.plan().stored::<R>(),
+            limits: &self.car().limits.stored::<R>(),
+            table: &self.car().table.stored::<R>(),
+            energy: &self.energy().stored::<R>(),
+        };
+        let figures: Vec<R> = self.figures(candidate).into_iter().map(R::lit).collect();
+        measure(
+            &tables,
+            self.line_variables(),
+            &figures,
+            &mut Course::default(),
+            |_, _| {},
+        )
+    }
+
     /// The lap of a candidate in `f64`, with every segment.
     pub fn lap(&self, candidate: &[f64]) -> (EnergyLap<f64>, Vec<SegmentEnergy<f64>>, Course<f64>) {
         let mut course = Course::default();

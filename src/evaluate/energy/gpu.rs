@@ -2,10 +2,10 @@
 
 use super::problem::HybridProblem;
 use crate::error::Result;
-use crate::evaluate::DeviceKernel;
 use crate::evaluate::gpu::shader::EnergyShape;
 use crate::evaluate::gpu::{Batching, Binding, DeviceKind, GpuContext};
-use crate::evaluate::line::{LineBatches, LineKernel, LineTables};
+use crate::evaluate::line::gpu::{LineBatches, LineKernel, LineTables};
+use crate::evaluate::{DeviceKernel, GpuBackend, OnDevice};
 use crate::line::energy::kernel::FIGURES;
 use crate::line::energy::{EnergyLap, EnergyPlan, EnergyTable, Mode};
 use crate::line::kernel::Wanted;
@@ -63,6 +63,13 @@ fn energy_vectors(table: &EnergyTable<f32>, plan: &EnergyPlan<f32>) -> Vec<[f32;
             .map(|row| [row.zone as f32, row.position, row.per_share, 0.0]),
     );
     vectors
+}
+
+/// Scores laps with energy on a graphics processor.
+pub type GpuHybridEvaluator<'a> = GpuBackend<'a, HybridProblem>;
+
+impl OnDevice for HybridProblem {
+    type Device = EnergyDevice;
 }
 
 impl DeviceKernel<HybridProblem> for EnergyDevice {

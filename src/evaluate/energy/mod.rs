@@ -1,12 +1,14 @@
 //! Scoring laps with energy: lines, strategies or both, whole swarms of them.
 
 mod cpu;
+#[cfg(feature = "gpu")]
 mod gpu;
 mod problem;
 mod simd;
 
 pub use crate::evaluate::open_evaluator as open_hybrid_evaluator;
-pub use gpu::EnergyAccount;
+#[cfg(feature = "gpu")]
+pub use gpu::{EnergyAccount, GpuHybridEvaluator};
 pub use problem::{Free, HybridLine, HybridObjective, HybridProblem, MOST_MOTOR, Strategy};
 
 use super::{Failure, Problem, ProblemKind, are_numbers};
@@ -16,13 +18,10 @@ use crate::line::energy::EnergyLap;
 pub type CpuHybridEvaluator<'a> = crate::evaluate::CpuBackend<'a, HybridProblem>;
 /// Scores laps with energy in `f32` lanes.
 pub type SimdHybridEvaluator<'a> = crate::evaluate::SimdBackend<'a, HybridProblem>;
-/// Scores laps with energy on a graphics processor.
-pub type GpuHybridEvaluator<'a> = crate::evaluate::GpuBackend<'a, HybridProblem>;
 
 impl ProblemKind for HybridProblem {
     type Outcome = EnergyLap<f64>;
     type Lanes = simd::EnergyLanes;
-    type Device = gpu::EnergyDevice;
     const WITHOUT_COST: Failure = Failure::Standstill;
 
     fn problem(&self) -> &Problem {

@@ -4,11 +4,10 @@
 //! occur outside them and return them as [`Error::Device`] at the next check.
 
 use super::adapter::{DeviceSummary, choose};
-use super::dispatches;
 use super::faults::{self, Fault, Place};
 use super::lint;
 use crate::error::{Error, Result};
-use crate::evaluate::BackendInfo;
+use crate::evaluate::{BackendInfo, dispatches};
 use std::collections::HashMap;
 use std::sync::mpsc::RecvTimeoutError;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -342,7 +341,7 @@ impl GpuContext {
     ///
     /// # Errors
     /// [`Error::Device`] if a buffer does not fit its binding.
-    pub(crate) fn bind(&self, kernel: &Kernel, buffers: &[&wgpu::Buffer]) -> Result<wgpu::BindGroup> {
+    pub fn bind(&self, kernel: &Kernel, buffers: &[&wgpu::Buffer]) -> Result<wgpu::BindGroup> {
         let entries: Vec<_> = buffers
             .iter()
             .zip(0..)
@@ -387,8 +386,8 @@ impl GpuContext {
     /// Runs `kernel` over so many workgroups; returns how long that took with its submission and the wait (ms, above zero).
     ///
     /// # Errors
-    /// As [`GpuContext::run`].
-    pub(crate) fn dispatch(
+    /// [`Error::Device`] if that fails or takes too long.
+    pub fn dispatch(
         &self,
         kernel: &Kernel,
         group: &wgpu::BindGroup,

@@ -1,18 +1,26 @@
 //! The graphics processor: which one, its device, the kernels' sources and the rules they keep.
 
 mod adapter;
+mod backend;
 mod context;
-mod dispatches;
+mod fallback;
 pub mod faults;
 pub mod lint;
 mod pacing;
 pub mod shader;
+#[cfg(feature = "vehicle")]
 mod trajectories;
 
+pub use super::dispatches::DispatchWatch;
 pub use adapter::{ADAPTER_VARIABLE, DeviceKind, DeviceSummary, devices};
+pub use backend::{DeviceKernel, GpuBackend, OnDevice};
+pub(super) use backend::{is_real, open, would_be};
 pub use context::{Binding, GpuContext, Kernel};
-pub use dispatches::DispatchWatch;
+pub use fallback::FallbackEvaluator;
 pub use pacing::Batching;
+#[cfg(feature = "vehicle")]
 pub(crate) use pacing::{LOOP_ROUNDS, LanePacing, rounds_of};
+#[cfg(feature = "vehicle")]
 pub use trajectories::TrajectoryStretch;
+#[cfg(feature = "vehicle")]
 pub(crate) use trajectories::{Trajectories, TrajectoryKernel, workgroup};

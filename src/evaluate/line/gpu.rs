@@ -1,14 +1,22 @@
 //! The graphics backend: `f32`, one lane per line, for populations from the host and for swarms that live on the device.
 
-use super::batches::{LineBatches, LineKernel};
-use super::exchange::Exchange;
+mod batches;
+mod exchange;
+mod tables;
+
+pub use crate::evaluate::gpu::Batching as LineBatching;
+pub use batches::LineStretch;
+pub(in crate::evaluate) use batches::{LineBatches, LineKernel};
+pub use tables::DeviceSection;
+pub(in crate::evaluate) use tables::LineTables;
+
 use super::problem::{LineProblem, MEASURES, Measures};
-use super::tables::LineTables;
 use crate::error::Result;
 use crate::evaluate::gpu::{Batching, GpuContext};
 use crate::evaluate::resident::DeviceObjectives;
-use crate::evaluate::{DeviceKernel, GpuBackend, Problem, ProblemKind};
+use crate::evaluate::{DeviceKernel, GpuBackend, OnDevice, Problem, ProblemKind};
 use crate::line::LimitTable;
+use exchange::Exchange;
 use std::sync::Arc;
 
 /// The line kernel on a device.
@@ -16,6 +24,13 @@ pub struct LineDevice {
     batches: LineBatches<MEASURES>,
     /// For swarms that live on the device.
     exchange: Option<Exchange>,
+}
+
+/// Scores lines on a graphics processor.
+pub type GpuLineEvaluator<'a> = GpuBackend<'a, LineProblem>;
+
+impl OnDevice for LineProblem {
+    type Device = LineDevice;
 }
 
 impl DeviceKernel<LineProblem> for LineDevice {

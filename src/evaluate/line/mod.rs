@@ -1,20 +1,15 @@
 //! Scoring racing lines: lengths, curvatures and quasi-steady-state lap times of whole swarms of them.
 
-mod batches;
 mod cpu;
-mod exchange;
-mod gpu;
+#[cfg(feature = "gpu")]
+pub(in crate::evaluate) mod gpu;
 mod problem;
 mod simd;
-mod tables;
 
-pub use crate::evaluate::gpu::Batching as LineBatching;
 pub use crate::evaluate::open_evaluator as open_line_evaluator;
-pub use batches::LineStretch;
-pub(in crate::evaluate) use batches::{LineBatches, LineKernel};
+#[cfg(feature = "gpu")]
+pub use gpu::{DeviceSection, GpuLineEvaluator, LineBatching, LineStretch};
 pub use problem::{LineObjective, LineProblem};
-pub use tables::DeviceSection;
-pub(in crate::evaluate) use tables::LineTables;
 
 use super::{Failure, Problem, ProblemKind, are_numbers};
 use problem::Measures;
@@ -23,13 +18,10 @@ use problem::Measures;
 pub type CpuLineEvaluator<'a> = crate::evaluate::CpuBackend<'a, LineProblem>;
 /// Scores lines in `f32` lanes.
 pub type SimdLineEvaluator<'a> = crate::evaluate::SimdBackend<'a, LineProblem>;
-/// Scores lines on a graphics processor.
-pub type GpuLineEvaluator<'a> = crate::evaluate::GpuBackend<'a, LineProblem>;
 
 impl ProblemKind for LineProblem {
     type Outcome = Measures;
     type Lanes = simd::LineLanes;
-    type Device = gpu::LineDevice;
     const WITHOUT_COST: Failure = Failure::Standstill;
 
     fn problem(&self) -> &Problem {

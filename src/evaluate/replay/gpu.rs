@@ -1,13 +1,13 @@
 //! The graphics backend: `f32`, one lane per candidate and window, the windows joined on the device.
 
+pub use crate::evaluate::gpu::Batching;
+
 use super::kernel::{BLOCK, CHANNELS};
 use super::problem::ReplayProblem;
 use crate::error::{Error, Result};
 use crate::evaluate::gpu::shader::{CarShape, ReplayShape, base_vectors};
-use crate::evaluate::gpu::{
-    Batching, Binding, DeviceKind, GpuContext, Kernel, LOOP_ROUNDS, rounds_of, workgroup,
-};
-use crate::evaluate::{DeviceKernel, GpuBackend, ModelTable};
+use crate::evaluate::gpu::{Binding, DeviceKind, GpuContext, Kernel, LOOP_ROUNDS, rounds_of, workgroup};
+use crate::evaluate::{DeviceKernel, GpuBackend, ModelTable, OnDevice};
 use crate::vehicle::model::STAGES;
 use bytemuck::{Pod, Zeroable};
 use std::sync::Arc;
@@ -136,6 +136,13 @@ pub struct ReplayDevice {
     kernel_ms: Option<f64>,
 }
 
+/// Scores replays on a graphics processor.
+pub type GpuEvaluator<'a> = GpuBackend<'a, ReplayProblem>;
+
+impl OnDevice for ReplayProblem {
+    type Device = ReplayDevice;
+}
+
 impl DeviceKernel<ReplayProblem> for ReplayDevice {
     fn open(replay: &ReplayProblem, context: Arc<GpuContext>) -> Result<Self> {
         let workgroup = workgroup(&context);
@@ -255,6 +262,10 @@ impl DeviceKernel<ReplayProblem> for ReplayDevice {
         self.batch = None;
     }
 
+    fn kernel_ms(&self) -> Option<f64> {
+        self.kernel_ms
+    }
+
     fn outcomes(
         &mut self,
         replay: &ReplayProblem,
@@ -269,11 +280,6 @@ impl DeviceKernel<ReplayProblem> for ReplayDevice {
 }
 
 impl GpuBackend<'_, ReplayProblem> {
-    /// Time that the device itself spent driving in the last evaluation, ms; `None` where it cannot tell.
-    pub fn last_kernel_ms(&self) -> Option<f64> {
-        self.device.kernel_ms
-    }
-
     /// What the last evaluation asked of the device.
     pub fn statistics(&self) -> DispatchStatistics {
         self.device.statistics

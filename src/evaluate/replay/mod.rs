@@ -1,6 +1,7 @@
 //! Replaying a logged lap with candidate cars: the identification's evaluator and its backends.
 
 mod cpu;
+#[cfg(feature = "gpu")]
 mod gpu;
 mod jacobian;
 pub mod kernel;
@@ -9,13 +10,13 @@ mod problem;
 mod simd;
 
 pub use super::{BackendChoice, ModelTable};
-pub use crate::evaluate::gpu::Batching;
 pub use crate::evaluate::open_evaluator;
 pub use cpu::trace;
-pub use gpu::{DeviceSample, DeviceWindow, DispatchStatistics, Stretch};
+#[cfg(feature = "gpu")]
+pub use gpu::{Batching, DeviceSample, DeviceWindow, DispatchStatistics, GpuEvaluator, Stretch};
 pub use jacobian::Residuals;
 pub use plan::{Norm, Plan, Sample, Window, initial_state, step_fractions};
-pub use problem::{CHANNEL_NAMES, CHANNEL_UNITS, ChannelWeights, ReplayProblem};
+pub use problem::{CHANNEL_LABELS, CHANNEL_NAMES, CHANNEL_UNITS, ChannelWeights, ReplayProblem};
 
 use super::{Failure, Problem, ProblemKind};
 use plan::CHANNELS;
@@ -24,14 +25,11 @@ use plan::CHANNELS;
 pub type CpuEvaluator<'a> = super::CpuBackend<'a, ReplayProblem>;
 /// Scores replays in `f32` lanes.
 pub type SimdEvaluator<'a> = super::SimdBackend<'a, ReplayProblem>;
-/// Scores replays on a graphics processor.
-pub type GpuEvaluator<'a> = super::GpuBackend<'a, ReplayProblem>;
 
 impl ProblemKind for ReplayProblem {
     /// The errors of all windows, if the car drove to the end.
     type Outcome = Option<[f64; CHANNELS]>;
     type Lanes = simd::ReplayLanes;
-    type Device = gpu::ReplayDevice;
     /// A car that is so far off has left the range of what cars do.
     const WITHOUT_COST: Failure = Failure::Spun;
 

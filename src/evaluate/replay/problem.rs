@@ -8,6 +8,13 @@ use crate::vehicle::{Car, TyreModel};
 
 /// Names of the compared channels, in the order of all arrays of four.
 pub const CHANNEL_NAMES: [&str; CHANNELS] = ["vx", "ax", "ay", "yaw_rate"];
+/// What reports call them.
+pub const CHANNEL_LABELS: [&str; CHANNELS] = [
+    "speed",
+    "longitudinal acceleration",
+    "lateral acceleration",
+    "yaw rate",
+];
 /// Their units.
 pub const CHANNEL_UNITS: [&str; CHANNELS] = ["m/s", "m/s^2", "m/s^2", "rad/s"];
 

@@ -7,7 +7,7 @@ use crate::evaluate::gpu::shader::CarShape;
 use crate::evaluate::gpu::{
     Batching, Binding, GpuContext, Trajectories, TrajectoryKernel, rounds_of, workgroup,
 };
-use crate::evaluate::{DeviceKernel, ModelTable};
+use crate::evaluate::{DeviceKernel, GpuBackend, ModelTable, OnDevice};
 use crate::vehicle::model::STAGES;
 use bytemuck::{Pod, Zeroable};
 use std::sync::Arc;
@@ -43,6 +43,13 @@ impl SteadyDevice {
         }
         self.trajectories.states(batch.len())
     }
+}
+
+/// Settles cars on a graphics processor.
+pub type GpuSteadyEvaluator<'a> = GpuBackend<'a, SteadyProblem>;
+
+impl OnDevice for SteadyProblem {
+    type Device = SteadyDevice;
 }
 
 impl DeviceKernel<SteadyProblem> for SteadyDevice {

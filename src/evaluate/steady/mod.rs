@@ -4,6 +4,7 @@
 //! a car under a held steering wheel is.
 
 mod cpu;
+#[cfg(feature = "gpu")]
 mod gpu;
 pub mod kernel;
 pub mod modes;
@@ -11,7 +12,8 @@ mod problem;
 mod simd;
 
 pub use crate::evaluate::open_evaluator as open_steady_evaluator;
-pub use gpu::DevicePlan;
+#[cfg(feature = "gpu")]
+pub use gpu::{DevicePlan, GpuSteadyEvaluator};
 pub use problem::{AIM_FIGURES, SETTLED, Settled, SteadyObjective, SteadyProblem};
 
 use super::{Failure, Problem, ProblemKind};
@@ -22,13 +24,10 @@ use problem::SPEEDS;
 pub type CpuSteadyEvaluator<'a> = crate::evaluate::CpuBackend<'a, SteadyProblem>;
 /// Settles cars in `f32` lanes.
 pub type SimdSteadyEvaluator<'a> = crate::evaluate::SimdBackend<'a, SteadyProblem>;
-/// Settles cars on a graphics processor.
-pub type GpuSteadyEvaluator<'a> = crate::evaluate::GpuBackend<'a, SteadyProblem>;
 
 impl ProblemKind for SteadyProblem {
     type Outcome = Settling<f64>;
     type Lanes = simd::SteadyLanes;
-    type Device = gpu::SteadyDevice;
     const WITHOUT_COST: Failure = Failure::Undefined;
 
     fn problem(&self) -> &Problem {

@@ -5,22 +5,22 @@ use super::table::{EnergyTable, Traction, hybrid_parts};
 use crate::error::Result;
 use crate::vehicle::{Car, Envelope, Hybrid};
 
-/// A car as energy laps need it.
+/// A car for laps with energy.
 #[derive(Clone, Debug)]
 pub struct EnergyCar {
     /// Its name.
     pub name: String,
     /// The point mass, with the rolling resistance in its drag.
     pub point_mass: PointMass,
-    /// Its limits.
+    /// The table of its envelope.
     pub limits: LimitTable<f64>,
-    /// Its energy.
+    /// The tables of its energy.
     pub table: EnergyTable<f64>,
-    /// Its electric half.
+    /// Its hybrid drive.
     pub hybrid: Hybrid,
     /// Density of its fuel (kg/l).
     pub fuel_density_kgpl: f64,
-    /// What it was made from.
+    /// The envelope, traction and car that it was made from.
     pub car: Car,
     envelope: Envelope,
     traction: Traction,
@@ -28,7 +28,7 @@ pub struct EnergyCar {
 }
 
 impl EnergyCar {
-    /// `car` within `envelope` (its limits without rolling resistance) and `traction`.
+    /// `car` within `envelope` (without rolling resistance) and `traction`.
     ///
     /// # Errors
     /// [`crate::Error::Input`] for a car without engine map or hybrid drive, or limits that cannot be.
@@ -56,7 +56,7 @@ impl EnergyCar {
         })
     }
 
-    /// The same with other motors or another store.
+    /// The same car with another hybrid drive.
     ///
     /// # Errors
     /// As [`EnergyCar::new`].
@@ -71,7 +71,8 @@ impl EnergyCar {
         )
     }
 
-    /// The same with another mass (kg): engine, motors and drag move it, and its tyres' limits are taken to grow with it.
+    /// The same car with another mass (kg). Engine, motors and drag keep their forces; the grip of the tyres is taken to grow
+    /// with the mass.
     ///
     /// # Errors
     /// As [`EnergyCar::new`].
@@ -93,8 +94,7 @@ impl EnergyCar {
         Self::new(car, envelope, self.traction.clone(), self.ellipse_exponent)
     }
 
-    /// The same with torque and fuel flow of the engine multiplied by `share` at every engine speed, as far as the traction
-    /// goes.
+    /// The same car with torque and fuel flow of the engine multiplied by `share` at every engine speed, within its traction.
     ///
     /// # Errors
     /// As [`EnergyCar::new`].
@@ -116,7 +116,7 @@ impl EnergyCar {
         Self::new(car, envelope, self.traction.clone(), self.ellipse_exponent)
     }
 
-    /// The kernels' figures of gates.
+    /// The figures of gates that kernels read.
     pub fn gate_figures(&self, gates: &super::Gates) -> [f64; super::GATES] {
         let store = &self.hybrid.store;
         gates.figures(self.point_mass.wheelbase_m, store.capacity_j, store.start_soc)

@@ -1,14 +1,14 @@
 //! The energy kernel: a lap on a line's lengths and curvatures with engine, motor-generators and store.
 //! Twin of `shaders/energy.wgsl`.
 //!
-//! Braking first: a backward pass from the corner speeds gives at every section the greatest speed from which all that
-//! follows can still be braked for. A forward pass below it is then the lap itself, section after section, so that it can
-//! carry the store along and open and shut the motor's gates by what has really been used. Energies are counted from the
-//! start line, which the car crosses as fast as it ends the lap: a closed lap is driven once to find that speed and once
-//! more for the accounts.
+//! Braking comes first. A backward pass from the corner speeds gives the greatest speed at every section from which the car can
+//! still brake for all that follows. The lap itself is a forward pass below these speeds. It goes from section to section, so it
+//! knows the charge of the store and the energy used so far, on which the gates of the motor depend. Energies are counted from
+//! the start line. The car must cross it at the speed with which it ends the lap, so a closed lap is driven twice: once to find
+//! that speed and once for the accounts.
 //!
 //! After R. Lot and S. A. Evangelou, *Lap time optimization of a sports series hybrid electric vehicle*, World Congress on
-//! Engineering 2013, for what is accounted; the passes are those of [`super::super::kernel`].
+//! Engineering 2013, for the energies that are accounted; the passes are those of [`super::super::kernel`].
 
 use super::super::kernel::{BLOCK, Course, braked, corner, limits_at, look_up};
 use super::super::point_mass::LimitTable;
@@ -16,7 +16,7 @@ use super::plan::{EnergyPlan, GATES, Mode, ZoneRow};
 use super::table::EnergyTable;
 use crate::scalar::{Lookup, Real};
 
-/// What a lap came to.
+/// Figures of a lap.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct EnergyLap<R> {
     /// Time (s).
@@ -29,9 +29,9 @@ pub struct EnergyLap<R> {
     pub harvested_k: R,
     /// Energy of the MGU-H into the store (J).
     pub harvested_h: R,
-    /// Change of the charge over the lap (J), which adds up beside the three before.
+    /// Change of the charge over the lap (J), summed by itself.
     pub change: R,
-    /// Greatest less least charge along the lap (J).
+    /// Greatest charge less least charge along the lap (J).
     pub swing: R,
     /// Time with the motor on (s).
     pub motor_time: R,
@@ -90,13 +90,13 @@ pub struct SegmentEnergy<R> {
     pub end: R,
     /// Time (s).
     pub time: R,
-    /// Force over mass at the wheels of the engine (m/s^2),
+    /// Force over mass at the wheels by the engine (m/s^2),
     pub engine: R,
-    /// of the motor,
+    /// by the motor,
     pub motor: R,
-    /// of the generator,
+    /// by the generator,
     pub generator: R,
-    /// and of the hydraulic brakes.
+    /// and by the hydraulic brakes.
     pub hydraulic: R,
     /// Share of the engine's greatest power.
     pub load: R,
@@ -119,7 +119,7 @@ struct State<R> {
     harvested_k: R,
 }
 
-/// Less than this (J) stays in the store: in single precision rounding would hand it out in ever smaller shares.
+/// A remainder below this (J) is left in the store. In single precision, rounding would spend it in ever smaller shares.
 const LEAST_J: f64 = 5.0;
 
 /// All that does not change along a lap.
@@ -136,13 +136,13 @@ struct Step<R> {
     end: R,
     /// Force of the motor over the mass (m/s^2).
     motor: R,
-    /// What of the motor the gates and the zone would let work (m/s^2),
+    /// Force of the motor over the mass that the gates and the zone allow (m/s^2),
     wanted: R,
-    /// and what of that the store has energy for.
+    /// and the part of it for which the store has energy.
     boost: R,
 }
 
-/// The share of a segment in which its zone lets the motor work.
+/// The share of a segment in which its zone allows the motor to work.
 #[inline(always)]
 fn zone_share<R: Real>(row: &ZoneRow<R::Storage>, strategy: &[R]) -> R {
     let into = (strategy[GATES + row.zone as usize] - R::load(row.position)) * R::load(row.per_share);
@@ -162,7 +162,7 @@ impl<R: Lookup> Car<'_, R> {
         !self.strategy[0].less_than(curvature) & !self.strategy[1].less_than(speed_squared)
     }
 
-    /// What may still leave the store (J).
+    /// Energy that may still leave the store (J).
     #[inline(always)]
     fn left(&self, state: &State<R>) -> R {
         let of_charge = state.change - self.strategy[3];
@@ -171,8 +171,8 @@ impl<R: Lookup> Car<'_, R> {
         R::select(left.less_than(R::lit(LEAST_J)), R::lit(0.0), left)
     }
 
-    /// What the force of the motor over the mass (m/s^2) is at most with so much left (J) for a segment of one over this
-    /// length (m).
+    /// Greatest force of the motor over the mass (m/s^2) with `left` (J) of energy for a segment; `inverse` is one over its
+    /// length (1/m).
     #[inline(always)]
     fn reach(&self, left: R, inverse: R) -> R {
         left * R::load(self.table.force_per_deployed) * inverse
@@ -202,7 +202,7 @@ impl<R: Lookup> Car<'_, R> {
         let motor = R::lit(0.5) * ((both - engine) + (later_both - grip.min(drive)));
         let reached = (from + length * ((both - drag) + (later_both - later_drag))).max(zero);
         let end = reached.min(most);
-        // Where less is needed than both could give, the motor gives way first.
+        // Where less force is needed than both can give, the motor is reduced first.
         let spare = R::lit(0.5) * (reached - end) * inverse;
         Step {
             end,
@@ -212,8 +212,8 @@ impl<R: Lookup> Car<'_, R> {
         }
     }
 
-    /// The same, from what the first drive of the lap found of this segment if that began it as fast and had as much for it in
-    /// every lane: beyond the first slow bend the two drives differ only where the store runs out.
+    /// As the function above, but reuses the results of the first drive if that entered the segment at the same speed and with
+    /// the same energy in every lane. After the first slow bend the two drives differ only where the store runs out.
     #[inline(always)]
     #[allow(clippy::too_many_arguments)]
     fn additional_again(
@@ -256,7 +256,7 @@ impl<R: Lookup> Car<'_, R> {
     }
 
     /// One segment of the lap that only finds the speed at the start line, with the motor beside the engine: what is deployed,
-    /// and what is harvested by the MGU-K where the charge has a say. The little that the MGU-H adds is left out here.
+    /// and what the MGU-K harvests where the charge matters. The small contribution of the MGU-H is left out here.
     #[inline(always)]
     fn provisional(&self, state: &mut State<R>, here: usize, length: R, bends: [R; 2], most: R) -> Step<R> {
         let zero = R::lit(0.0);
@@ -285,8 +285,8 @@ impl<R: Lookup> Car<'_, R> {
         step
     }
 
-    /// One segment with its accounts, up to the greatest speed squared at its end. `first` is what the first drive found of
-    /// it and the speed squared that it began it with.
+    /// One segment with its accounts, up to the greatest speed squared at its end. `first` has the results of the first drive for
+    /// this segment and the speed squared with which that drive entered it.
     #[inline(always)]
     fn segment(
         &self,
@@ -320,7 +320,7 @@ impl<R: Lookup> Car<'_, R> {
             std::array::from_fn(|column| row[column] + beyond * row[4 + column]);
         let inverse = R::lit(1.0) / length;
         let ax = R::lit(0.5) * (end - from) * inverse;
-        // What the tyres do, forwards or backwards.
+        // The force of the tyres, driving or braking.
         let force = ax + drag;
         let demand = force.max(zero);
         let shed = (-force).max(zero);
@@ -424,7 +424,8 @@ fn ceilings<R: Lookup>(
     speeds.resize(n, R::lit(0.0));
     let mut next = if closed { start } else { n - 1 };
     speeds[next] = corner(limits, curvature[next]);
-    // The first time round a section is only held to its corner speed; a closed lap goes on until it meets itself.
+    // In the first round a section is limited by its corner speed alone. On a closed line the pass continues until it meets its
+    // own values.
     let steps = if closed { 2 * n } else { n - 1 };
     for step in 0..steps {
         let here = if next > 0 { next - 1 } else { n - 1 };
@@ -453,10 +454,10 @@ fn ceilings<R: Lookup>(
     }
 }
 
-/// A lap with energy on `course`, whose lengths and curvatures are given; its speeds squared are those that can be braked
-/// for after. `start` is where braking begins to be worked out, as in [`super::super::kernel::lap_time`]; `entry` is the
-/// greatest speed squared at the start of an open line. `strategy` has the figures of the gates, then the share of each
-/// zone. `record` sees every segment of the lap that counts.
+/// A lap with energy on `course`, whose lengths and curvatures are given; afterwards its speeds squared are those from which the
+/// car can still brake. `start` is the section where the braking pass begins, as in [`super::super::kernel::lap_time`]; `entry`
+/// is the greatest speed squared at the start of an open line. `strategy` has the figures of the gates, then the share of each
+/// zone. `record` receives every segment of the lap that is accounted.
 #[inline(always)]
 #[allow(clippy::too_many_arguments)]
 pub fn energy_lap<R: Lookup>(
@@ -491,7 +492,7 @@ pub fn energy_lap<R: Lookup>(
     };
     let mut speed_squared = most[0];
     if closed {
-        // From a slow section late in the lap to the start line, as if the store held enough.
+        // From a slow section late in the lap to the start line, with the store taken as full enough.
         let mut state = most[plan.run_in];
         for here in plan.run_in..n {
             let (h, bend, held) = (length[here], bends(here), most[after(here)]);

@@ -1,14 +1,14 @@
-//! What a lap's energy strategy is made of.
+//! The parts of a lap's energy strategy.
 
 use crate::scalar::Real;
 use serde::{Deserialize, Serialize};
 
-/// What the motor does with its power.
+/// How the power of the motor is used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Mode {
-    /// It takes the engine's place on the engine's own lap: the same time for less fuel.
+    /// It replaces power of the engine: the lap takes the same time and less fuel.
     Offset,
-    /// It adds to the engine where that gives all it has: less time.
+    /// It adds to the engine at full power: the lap takes less time.
     Additional,
 }
 
@@ -36,9 +36,9 @@ pub struct Gates {
     pub steer_rad: f64,
     /// Greatest speed (m/s).
     pub speed_mps: f64,
-    /// Acceleration that must be exceeded (m/s^2).
+    /// Least acceleration (m/s^2), which must be exceeded.
     pub ax_mps2: f64,
-    /// State of charge below which the store is not led.
+    /// Least state of charge.
     pub soc: f64,
     /// Energy that may leave the store in a lap (MJ).
     pub energy_mj: f64,
@@ -47,7 +47,7 @@ pub struct Gates {
 }
 
 impl Gates {
-    /// Gates that are open wherever the car accelerates and the store holds anything.
+    /// Gates that are open wherever the car accelerates and the store is not empty.
     pub const OPEN: Self = Self {
         steer_rad: 2.0,
         speed_mps: 200.0,
@@ -74,10 +74,10 @@ impl Gates {
 /// Figures of [`Gates`] at the head of a strategy; shares of zones follow.
 pub const GATES: usize = 6;
 
-/// The zone that a segment belongs to: the motor works in the first part of it, a share that the strategy gives.
+/// The zone of a segment. The motor works in the first part of each zone, whose share the strategy gives.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ZoneRow<S> {
-    /// Which zone.
+    /// Number of the zone.
     pub zone: u32,
     /// Share of the zone before the segment.
     pub position: S,
@@ -85,21 +85,21 @@ pub struct ZoneRow<S> {
     pub per_share: S,
 }
 
-/// How the segments belong to zones, and how the lap is begun.
+/// The zones of the segments, and where the lap begins.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EnergyPlan<S> {
     /// One for each section.
     pub zones: Vec<ZoneRow<S>>,
     /// A slow section late in the lap, from which the speed at the start line is found.
     pub run_in: usize,
-    /// What the motor does.
+    /// How the power of the motor is used.
     pub mode: Mode,
-    /// Whether the charge has a say in where the motor works.
+    /// Whether the state of charge is among the gates.
     pub counts_charge: bool,
 }
 
 impl EnergyPlan<f64> {
-    /// The whole lap as one zone of which a share of one is open, or all of it.
+    /// The whole lap as one zone, a share of which the strategy opens.
     pub fn whole(sections: usize, run_in: usize, mode: Mode) -> Self {
         let row = ZoneRow {
             zone: 0,
@@ -114,7 +114,7 @@ impl EnergyPlan<f64> {
         }
     }
 
-    /// Every segment a zone of its own.
+    /// Each segment as a zone of its own.
     pub fn single(sections: usize, run_in: usize, mode: Mode) -> Self {
         let mut plan = Self::whole(sections, run_in, mode);
         for (zone, row) in plan.zones.iter_mut().enumerate() {

@@ -1,4 +1,4 @@
-//! What engine, motors and fuel come to at each speed, as tables that every backend looks up alike.
+//! Forces and fuel flows of engine and motors over speed, as tables that every backend looks up in the same way.
 
 use super::super::point_mass::{LIMIT_WIDTH, LimitTable};
 use crate::error::{Error, Result};
@@ -6,8 +6,8 @@ use crate::scalar::Real;
 use crate::vehicle::powertrain::{EngineMap, GRAVITY_MPS2};
 use crate::vehicle::{Car, Envelope, EnvelopeRow, Hybrid, Powertrain};
 
-/// Greatest acceleration by the driven tyres (m/s^2) over speed (m/s), by rising speed; without rows there is no limit but
-/// the friction ellipse.
+/// Greatest acceleration by the driven tyres (m/s^2) over speed (m/s), by rising speed; without rows only the friction ellipse
+/// limits driving.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Traction {
     /// Speeds and accelerations.
@@ -32,8 +32,8 @@ impl Traction {
 
 /// Figures of a car's energy over even steps of the speed squared, those of its [`LimitTable`].
 ///
-/// Tables have for each row the figures at its start and then how much they rise to its end. Forces are over the car's
-/// mass, in m/s^2 at the wheels.
+/// Each row of a table has the figures at its start, then their rises to its end. Forces are over the car's mass, in m/s^2 at the
+/// wheels.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EnergyTable<S> {
     /// Mass (kg).
@@ -48,7 +48,7 @@ pub struct EnergyTable<S> {
     pub force_per_deployed: S,
     /// Force over mass for each joule of the MGU-K into the store, times the length (m^2/s^2/J).
     pub force_per_harvested: S,
-    /// What the MGU-K may put into the store in a lap (J).
+    /// Energy that the MGU-K may put into the store in a lap (J).
     pub harvest_most: S,
     /// Energy of the MGU-H into the store for each kilogram of fuel (J/kg).
     pub exhaust_gain: S,
@@ -56,31 +56,31 @@ pub struct EnergyTable<S> {
     pub exhaust_cost: S,
     /// Speed squared from which the MGU-H generates (m^2/s^2).
     pub exhaust_from: S,
-    /// Acceleration up to which it does (m/s^2).
+    /// Greatest acceleration at which the MGU-H generates (m/s^2).
     pub exhaust_to_ax: S,
     /// Engine, motor, generator, drag, then their rises.
     pub forces: Vec<S>,
     /// Fuel flow (kg/s) at a load of 0, 1/3, 2/3 and 1, then the rises.
     pub flows: Vec<S>,
-    /// Force of the motor and what engine and tyres leave it room for, then their rises.
+    /// Force of the motor and the room that engine and tyres leave for it, then their rises.
     pub boosts: Vec<S>,
 }
 
-/// Best specific consumption that the cost of the MGU-H at the crank is made up at, if the map has none (kg/J): 270 g/kWh.
+/// Specific consumption with which the cost of the MGU-H at the crank is converted to fuel if the map has none (kg/J): 270 g/kWh.
 const CONSUMPTION_KGPJ: f64 = 0.270 / 3.6e6;
-/// Room without end (m/s^2), whose rises are numbers all the same.
+/// Stands for unlimited room (m/s^2); its rises are finite numbers.
 const ENDLESS_MPS2: f64 = 1e4;
-/// Motors have a torque at standstill, and a power over zero would be none.
+/// At standstill motors have a torque, but power divided by speed is undefined.
 const SLOWEST_MPS: f64 = 1.0;
 
-/// What a car's energy is accounted with: gears, engine map and hybrid drive.
+/// The parts of a car that energy needs: gears, engine map and hybrid drive.
 ///
 /// # Errors
 /// [`Error::Input`] for a car that lacks one of them.
 pub fn hybrid_parts(car: &Car) -> Result<(&Powertrain, &EngineMap, &Hybrid)> {
     let missing = |place: &str, expected: &str| Error::input(&car.name, place, "none", expected);
     let Some(hybrid) = &car.hybrid else {
-        let expected = "a motor-generator and a store, as the bundled gt_hybrid has (--car gt_hybrid)";
+        let expected = "a motor-generator and a store, as the bundled car gt_hybrid has";
         return Err(missing("[hybrid]", expected));
     };
     let Some(powertrain) = &car.powertrain else {
@@ -122,7 +122,7 @@ impl EnergyTable<f64> {
                 g.engine_speed_rpm
             });
             let drive = gear.map_or(0.0, |g| g.force_n / mass);
-            // At its last speed an envelope has no drive, and its tables that of just below.
+            // An envelope has no drive at its last speed. The tables take the drive just below it.
             let driven = if knot == rows {
                 last.ax_drive_mps2
             } else {

@@ -16,12 +16,13 @@ pub use results::EnvelopeSummary;
 use crate::config::kinds::{choice, count, name_or_file, number, optional, text};
 use crate::config::settings::{Settings, settings};
 use crate::error::{Error, Result};
-use crate::evaluate::{BackendChoice, BackendInfo};
+use crate::evaluate::BackendChoice;
 use crate::study::framework::journal::Journal;
 use crate::study::framework::memory::{ANSWER, Kept};
-use crate::study::framework::{Plan, RunRecord, Study, Subject, Watch, Work};
-use crate::vehicle::{Car, Envelope, EnvelopeRow, Trim, steady_car};
+use crate::study::framework::{Plan, RunRecord, Study, Subject, Work};
+use crate::vehicle::{Car, Envelope, EnvelopeRow, Trim, Turn, steady_car};
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 use std::path::Path;
 
 /// The study.
@@ -70,8 +71,8 @@ pub struct Prepared {
 pub struct Outcome {
     /// The limits.
     pub limits: CarLimits,
-    /// The surface of lateral acceleration, if it was asked for.
-    pub surface: Option<SteadySurface>,
+    /// The surface of lateral acceleration.
+    pub surface: SteadySurface,
     /// How the study ran; candidates are those of the surface.
     pub record: RunRecord,
 }
@@ -125,8 +126,8 @@ impl Study for EnvelopeStudy {
         &outcome.record
     }
 
-    fn summarise(_: &EnvelopeSettings, prepared: &Prepared, outcome: &Outcome) -> EnvelopeSummary {
-        results::summarise(&prepared.car.name, outcome)
+    fn summarise(settings: &EnvelopeSettings, prepared: &Prepared, outcome: &Outcome) -> EnvelopeSummary {
+        results::summarise(Self::head(settings, prepared, outcome), outcome)
     }
 
     fn subject(_: &EnvelopeSettings, prepared: &Prepared) -> Subject {
@@ -164,27 +165,13 @@ impl EnvelopeSettings {
     }
 }
 
-/// The limits without the surface.
-///
-/// # Errors
-/// As [`car_limits`].
-pub fn limits_alone(settings: &EnvelopeSettings, prepared: &Prepared) -> Result<Outcome> {
-    let watch = Watch::begin();
-    let limits = car_limits(&prepared.car, settings)?;
-    let mut record = RunRecord::of(&BackendInfo::reference());
-    record.elapsed_s = watch.elapsed_s();
-    Ok(Outcome {
-        limits,
-        surface: None,
-        record,
-    })
-}
-
 /// What the car does at one speed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SpeedLimits {
     /// The row of the envelope.
     pub row: EnvelopeRow,
+    /// Greatest lateral acceleration to the right (m/s^2). The row has the lesser of both sides.
+    pub right_mps2: f64,
     /// Steady cornering to the left, in order along the curve of steady states.
     pub cornering: Vec<Trim>,
     /// Greatest acceleration by the driven tyres (m/s^2).
@@ -194,13 +181,13 @@ pub struct SpeedLimits {
 }
 
 /// How the car steers at small lateral acceleration (R. Gillespie, *Fundamentals of Vehicle Dynamics*, 1992, ch. 6).
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Handling {
-    /// Steering at the wheels beyond what geometry asks for, over lateral acceleration (rad s^2/m); positive
+    /// Steering at the wheels beyond what geometry asks for, over lateral acceleration (deg per g); positive
     /// understeers.
-    pub understeer_gradient: f64,
+    pub understeer_gradient_deg_per_g: f64,
     /// `K` in `steer = L kappa (1 + K v^2)` (s^2/m^2).
-    pub stability_factor: f64,
+    pub stability_factor_s2_per_m2: f64,
     /// Speed at which an understeering car answers most to the steering wheel (m/s).
     pub characteristic_speed_mps: Option<f64>,
     /// Speed at which an oversteering car becomes unstable (m/s).
@@ -216,6 +203,8 @@ pub struct CarLimits {
     pub handling: Handling,
     /// The envelope.
     pub envelope: Envelope,
+    /// Speeds at which the car has no steady state in a bend (m/s). The envelope goes on between its neighbours there.
+    pub left_out_mps: Vec<f64>,
 }
 
 /// Steering up to which the tyres' own limit is looked for (rad): a car whose lock is reached first still has it.
@@ -230,33 +219,60 @@ pub fn car_limits(car: &Car, settings: &EnvelopeSettings) -> Result<CarLimits> {
     let speeds = speeds_of(car, settings)?;
     let force = engine_of(car)?;
     let steady = steady_car(car);
-    let limits: Vec<SpeedLimits> = speeds
+    // The two sides of a car with even loads are each other's mirror image.
+    let even = car.chassis.left_share_front == 0.5 && car.chassis.left_share_rear == 0.5;
+    let found: Vec<SpeedLimits> = speeds
         .into_par_iter()
         .map(|speed| {
-            let cornering = steady.cornering(speed, STEER_TO_GRIP);
+            let cornering = steady.cornering(speed, STEER_TO_GRIP, Turn::Left);
+            let peak = |trims: &[Trim]| trims.iter().map(|t| t.ay_mps2.abs()).fold(0.0, f64::max);
+            let right_mps2 = match even {
+                true => peak(&cornering),
+                false => peak(&steady.cornering(speed, STEER_TO_GRIP, Turn::Right)),
+            };
             let traction_mps2 = steady.greatest_traction(speed);
             let engine_mps2 = force(speed) / car.chassis.mass;
             SpeedLimits {
                 row: EnvelopeRow {
                     v_mps: speed,
-                    ay_mps2: cornering.iter().map(|t| t.ay_mps2).fold(0.0, f64::max),
+                    ay_mps2: peak(&cornering).min(right_mps2),
                     ax_grip_mps2: steady.greatest_braking(speed),
                     ax_drive_mps2: traction_mps2.min(engine_mps2),
                     drag_mps2: steady.drag(speed),
                 },
+                right_mps2,
                 cornering,
                 traction_mps2,
                 engine_mps2,
             }
         })
         .collect();
+    let corners = |l: &SpeedLimits| l.row.ay_mps2 > 0.0 && l.row.ax_grip_mps2 > 0.0;
+    let (limits, left_out): (Vec<_>, Vec<_>) = found.into_iter().partition(corners);
+    let left_out_mps: Vec<f64> = left_out.iter().map(|l| l.row.v_mps).collect();
+    if limits.len() < 2 {
+        return Err(Error::Study(format!(
+            "{} has no steady state in bends at {} of {} speeds ({}): its tyres cannot hold it on the road there",
+            car.name,
+            left_out_mps.len(),
+            left_out_mps.len() + limits.len(),
+            in_words(&left_out_mps)
+        )));
+    }
     let envelope = Envelope::new(&car.name, limits.iter().map(|l| l.row).collect())?;
     let wheelbase = car.chassis.cg_to_front + car.chassis.cg_to_rear;
     Ok(CarLimits {
         handling: handling(&limits[limits.len() / 2], wheelbase),
         speeds: limits,
         envelope,
+        left_out_mps,
     })
+}
+
+/// Speeds (m/s) in words.
+fn in_words(speeds_mps: &[f64]) -> String {
+    let words: Vec<String> = speeds_mps.iter().map(|v| format!("{v:.1}")).collect();
+    format!("{} m/s", words.join(", "))
 }
 
 /// The speeds that a car's limits are looked for at (m/s), the last of them where its engine ends.
@@ -311,6 +327,8 @@ fn engine_of(car: &Car) -> Result<impl Fn(f64) -> f64 + Sync> {
 /// The slope of steering over lateral acceleration, between the two steady states nearest to 0 and 2 m/s^2: small
 /// against any tyre's limit, large against rounding.
 fn handling(limits: &SpeedLimits, wheelbase: f64) -> Handling {
+    /// Standard gravity (m/s^2).
+    const G: f64 = 9.806_65;
     let first = limits.cornering.first();
     let second = limits
         .cornering
@@ -325,8 +343,8 @@ fn handling(limits: &SpeedLimits, wheelbase: f64) -> Handling {
     let understeer_gradient = slope - wheelbase / v.powi(2);
     let stability_factor = understeer_gradient / wheelbase;
     Handling {
-        understeer_gradient,
-        stability_factor,
+        understeer_gradient_deg_per_g: understeer_gradient.to_degrees() * G,
+        stability_factor_s2_per_m2: stability_factor,
         characteristic_speed_mps: (stability_factor > 0.0).then(|| stability_factor.recip().sqrt()),
         critical_speed_mps: (stability_factor < 0.0).then(|| (-stability_factor).recip().sqrt()),
     }
@@ -356,7 +374,7 @@ mod tests {
                 .iter()
                 .all(|s| s.row.ax_drive_mps2 <= s.traction_mps2)
         );
-        assert!(limits.handling.stability_factor.abs() < 0.01);
+        assert!(limits.handling.stability_factor_s2_per_m2.abs() < 0.01);
     }
 
     #[test]

@@ -164,7 +164,7 @@ pub(super) fn measure(
     record.longest_dispatch_ms = watch.longest_dispatch_ms();
     Ok(Some(Outcome {
         limits,
-        surface: Some(surface),
+        surface,
         record,
     }))
 }

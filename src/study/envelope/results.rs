@@ -1,12 +1,10 @@
 //! Tables and figures of a car's g-g-v envelope.
 
-mod page;
-mod surface;
-
-use super::{CarLimits, Outcome, SurfaceFigures};
+use super::{CarLimits, Handling, Outcome, SpeedLimits, SteadySurface, SurfaceFigures};
 use crate::error::Result;
-use crate::report::{Curves, Panel, Table, write_whole};
-use crate::study::framework::RunRecord;
+use crate::evaluate::{Failure, failures_in_words};
+use crate::report::{Curves, HtmlReport, Levels, Panel, Surface, Table, write_whole};
+use crate::study::framework::{Head, RunRecord};
 use crate::vehicle::{EnvelopeRow, Trim};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -14,59 +12,69 @@ use std::path::Path;
 /// The figures of the study; `--json` prints this.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct EnvelopeSummary {
-    /// `envelope`.
-    pub study: String,
-    /// Zero: nothing is drawn at random.
-    pub seed: u64,
-    /// The car.
-    pub car: String,
-    /// How the study ran; candidates are cars of the surface.
+    /// The study; candidates are cars of the surface, and nothing is drawn at random.
     #[serde(flatten)]
-    pub record: RunRecord,
+    pub head: Head,
     /// Steady states found.
     pub steady_states: usize,
     /// Greatest speed (m/s).
     pub top_speed_mps: f64,
-    /// Understeer gradient at the wheels, small angles, in the middle of the range of speeds (deg per g).
-    pub understeer_gradient_deg_per_g: f64,
-    /// Stability factor (s^2/m^2).
-    pub stability_factor_s2_per_m2: f64,
-    /// Characteristic speed (m/s) of a car that understeers.
-    pub characteristic_speed_mps: Option<f64>,
-    /// Critical speed (m/s) of a car that oversteers.
-    pub critical_speed_mps: Option<f64>,
-    /// The limits at each speed.
+    /// Handling in the middle of the range of speeds.
+    #[serde(flatten)]
+    pub handling: Handling,
+    /// The limits at each speed, for turns to the side on which the car can do less.
     pub limits: Vec<EnvelopeRow>,
-    /// The figures of the surface, if one was evaluated.
-    #[serde(flatten, skip_serializing_if = "Option::is_none")]
-    pub surface: Option<SurfaceFigures>,
+    /// What the limits leave out or differ in, in words.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub notes: Vec<String>,
+    /// The figures of the surface.
+    #[serde(flatten)]
+    pub surface: SurfaceFigures,
 }
 
 /// Puts the figures together.
-pub(super) fn summarise(car: &str, outcome: &Outcome) -> EnvelopeSummary {
-    /// Standard gravity (m/s^2).
-    const G: f64 = 9.806_65;
+pub(super) fn summarise(head: Head, outcome: &Outcome) -> EnvelopeSummary {
     let limits = &outcome.limits;
     EnvelopeSummary {
-        study: "envelope".to_owned(),
-        seed: 0,
-        car: car.to_owned(),
-        record: outcome.record.clone(),
+        head,
         steady_states: limits.speeds.iter().map(|s| s.cornering.len()).sum(),
         top_speed_mps: limits.envelope.top_speed_mps(),
-        understeer_gradient_deg_per_g: limits.handling.understeer_gradient.to_degrees() * G,
-        stability_factor_s2_per_m2: limits.handling.stability_factor,
-        characteristic_speed_mps: limits.handling.characteristic_speed_mps,
-        critical_speed_mps: limits.handling.critical_speed_mps,
+        handling: limits.handling,
         limits: limits.envelope.rows().to_vec(),
-        surface: outcome.surface.as_ref().map(|s| s.summary.clone()),
+        notes: notes(limits),
+        surface: outcome.surface.summary.clone(),
     }
+}
+
+/// What a reader of the limits must know of them.
+fn notes(limits: &CarLimits) -> Vec<String> {
+    let mut notes = Vec::new();
+    if !limits.left_out_mps.is_empty() {
+        notes.push(format!(
+            "The car has no steady state in bends at {}: these speeds are left out.",
+            super::in_words(&limits.left_out_mps)
+        ));
+    }
+    let left = |s: &super::SpeedLimits| s.cornering.iter().map(|t| t.ay_mps2).fold(0.0, f64::max);
+    let uneven = limits.speeds.iter().map(|s| (s, left(s), s.right_mps2));
+    let most = uneven.max_by(|a, b| (a.1 - a.2).abs().total_cmp(&(b.1 - b.2).abs()));
+    if let Some((at, left, right)) = most
+        && left != right
+    {
+        notes.push(format!(
+            "The car's sides differ: at {:.1} m/s it corners at up to {left:.2} m/s^2 to the left and {right:.2} m/s^2 to the \
+             right. The limits are the lesser of both.",
+            at.row.v_mps
+        ));
+    }
+    notes
 }
 
 impl EnvelopeSummary {
     /// Which way the car is balanced, in words.
     fn balance(&self) -> String {
-        match (self.characteristic_speed_mps, self.critical_speed_mps) {
+        let handling = &self.handling;
+        match (handling.characteristic_speed_mps, handling.critical_speed_mps) {
             (Some(v), _) => format!("understeers; characteristic speed {v:.1} m/s"),
             (_, Some(v)) => format!("oversteers; critical speed {v:.1} m/s"),
             _ => "steers neutrally".to_owned(),
@@ -77,9 +85,9 @@ impl EnvelopeSummary {
     pub fn to_text(&self) -> String {
         let mut text = format!(
             "{}: {} steady states in {:.2} s\n{}",
-            self.car,
+            self.head.subject.car,
             self.steady_states,
-            self.record.elapsed_s,
+            self.head.record.elapsed_s,
             Table::rows(&self.limits)
                 .number("speed", "m/s", |r| r.v_mps)
                 .number("cornering", "m/s^2", |r| r.ay_mps2)
@@ -92,16 +100,18 @@ impl EnvelopeSummary {
         let balance = self.balance();
         text += &format!(
             "Understeer gradient {:.3} deg/g, stability factor {:.3e} s^2/m^2: {balance}\n",
-            self.understeer_gradient_deg_per_g, self.stability_factor_s2_per_m2
+            self.handling.understeer_gradient_deg_per_g, self.handling.stability_factor_s2_per_m2
         );
-        if let Some(surface) = &self.surface {
-            text += &surface::in_words(surface, &self.record);
+        for note in &self.notes {
+            text += &format!("{note}\n");
         }
-        text + &self.record.notes()
+        text += &surface_in_words(&self.surface, &self.head.record);
+        text + &self.head.record.notes()
     }
 }
 
-/// Writes `envelope.csv` (as `--envelope` reads it), `cornering.csv`, `envelope.svg` and `report.html`; with a surface also `surface.csv`, `ridge.csv` and `surface.svg`.
+/// Writes `envelope.csv` (as `--envelope` reads it), `cornering.csv`, `surface.csv`, `ridge.csv`, figures and
+/// `report.html`.
 ///
 /// # Errors
 /// [`crate::Error::Io`] if a file cannot be written.
@@ -109,7 +119,8 @@ pub(super) fn report(folder: &Path, outcome: &Outcome, summary: &EnvelopeSummary
     let limits = &outcome.limits;
     write_whole(folder.join("envelope.csv"), limits.envelope.to_csv().as_bytes())?;
     write_cornering(&folder.join("cornering.csv"), limits)?;
-    page::write(folder, outcome, summary)
+    write_surface(folder, &outcome.surface)?;
+    write_page(folder, outcome, summary)
 }
 
 fn write_cornering(path: &Path, limits: &CarLimits) -> Result<()> {
@@ -129,10 +140,10 @@ fn write_cornering(path: &Path, limits: &CarLimits) -> Result<()> {
         .write_csv(path)
 }
 
-fn curves(limits: &CarLimits, car: &str) -> Curves {
+fn limits_figure(limits: &CarLimits, car: &str) -> Curves {
     let speeds = &limits.speeds;
     let v: Vec<f64> = speeds.iter().map(|s| s.row.v_mps).collect();
-    let over_speed = |f: &dyn Fn(&super::SpeedLimits) -> f64| speeds.iter().map(f).collect::<Vec<f64>>();
+    let over_speed = |f: &dyn Fn(&SpeedLimits) -> f64| speeds.iter().map(f).collect::<Vec<f64>>();
     let mut cornering = Panel::new("Steady-state cornering")
         .x("road-wheel angle", "deg")
         .y("lateral acceleration", "m/s\u{b2}");
@@ -173,4 +184,147 @@ fn curves(limits: &CarLimits, car: &str) -> Curves {
         format!("g-g-v envelope of the {car}"),
         [cornering, limits, diagram, sideslip],
     )
+}
+
+fn write_page(folder: &Path, outcome: &Outcome, summary: &EnvelopeSummary) -> Result<()> {
+    let limits = &outcome.limits;
+    let (car, record) = (&summary.head.subject.car, &summary.head.record);
+    let mut page = HtmlReport::new(&summary.head.study, &format!("g-g-v envelope of the {car}"));
+    if let (Some(slow), Some(fast)) = (limits.speeds.first(), limits.speeds.last()) {
+        page.sentence(format!(
+            "The {car} corners at up to {:.1} m/s\u{b2} at {:.0} m/s and {:.1} m/s\u{b2} at {:.0} m/s, brakes at up to {:.1} and \
+             {:.1} m/s\u{b2}, and reaches {:.1} m/s.",
+            slow.row.ay_mps2,
+            slow.row.v_mps,
+            fast.row.ay_mps2,
+            fast.row.v_mps,
+            slow.row.ax_grip_mps2,
+            fast.row.ax_grip_mps2,
+            summary.top_speed_mps
+        ));
+        page.tile("Cornering, slow", format!("{:.2}", slow.row.ay_mps2), "m/s\u{b2}");
+        page.tile("Cornering, fast", format!("{:.2}", fast.row.ay_mps2), "m/s\u{b2}");
+    }
+    page.tile("Top speed", format!("{:.1}", summary.top_speed_mps), "m/s");
+    let gradient = format!("{:.3}", summary.handling.understeer_gradient_deg_per_g);
+    page.tile("Understeer gradient", gradient.replace('-', "\u{2212}"), "deg/g");
+    page.sentence(format!("At small angles the car {}.", summary.balance()));
+    for note in &summary.notes {
+        page.sentence(note.clone());
+    }
+    page.section(
+        "Limits",
+        "From steady states of the 4DOF model at each speed. The engine's limit is that of its best gear.",
+    );
+    page.figure(folder.join("envelope.svg"), &limits_figure(limits, car))?;
+    page.section("The surface", ABOUT_SURFACE);
+    page.paragraph(&surface_in_words(&summary.surface, record));
+    if let Some(figure) = surface_figure(&outcome.surface, car) {
+        page.figure(folder.join("surface.svg"), &figure)?;
+    }
+    page.table(
+        "Limits at each speed",
+        "Drive is the lesser of traction and engine. Drag reduces the drive and helps the brakes.",
+        &speeds_table(limits),
+    )?;
+    page.provenance("car", car);
+    page.provenance("limits", "cpu, f64");
+    page.provenance("steady states", summary.steady_states.to_string());
+    record.provenance(&mut page, "cars of the surface");
+    page.write(folder.join("report.html"))
+}
+
+/// Accelerations by speed.
+fn speeds_table(limits: &CarLimits) -> Table<'static> {
+    Table::rows(&limits.speeds)
+        .number("speed", "m/s", |s| s.row.v_mps)
+        .number("cornering", "m/s^2", |s| s.row.ay_mps2)
+        .number("braking grip", "m/s^2", |s| s.row.ax_grip_mps2)
+        .number("drive", "m/s^2", |s| s.row.ax_drive_mps2)
+        .number("traction", "m/s^2", |s| s.traction_mps2)
+        .number("engine", "m/s^2", |s| s.engine_mps2)
+        .number("drag", "m/s^2", |s| s.row.drag_mps2)
+        .table()
+}
+
+/// What the surface is, in words.
+const ABOUT_SURFACE: &str = "Lateral acceleration that a car settles at under a held steering angle and path speed, without drive \
+                         along the path, and its ridge. Where nothing is drawn, no car settled.";
+
+/// The surface's figures in words.
+fn surface_in_words(p: &SurfaceFigures, record: &RunRecord) -> String {
+    let mut text = format!(
+        "Surface of {} cars in steady-state cornering, {:.0}/s, {}; failed: {}\n",
+        record.evaluations,
+        record.evaluations_per_s,
+        record.device(),
+        failures_in_words(&record.failures)
+    );
+    if let Some(off) = p.surface_difference_mps2 {
+        text += &format!("Off the curves of steady states by {off:.1e} m/s^2 at most");
+        if let (Some(off), Some(tolerance)) = (p.ridge_difference_mps2, p.ridge_tolerance_mps2) {
+            text += &format!(
+                "; its ridge, which the grid surrounds at {} speeds, by {off:.1e} of the {tolerance:.1e} m/s^2 that its steps and the settling leave open",
+                p.ridge_speeds
+            );
+        }
+        text += "\n";
+    }
+    if !p.ridge_agrees {
+        text += "Warning: the ridge differs from that of the curves by more than the grid explains; the limits are the curves'.\n";
+    }
+    text
+}
+
+/// Writes `surface.csv` and `ridge.csv`.
+fn write_surface(folder: &Path, surface: &SteadySurface) -> Result<()> {
+    let n = surface.steers.len();
+    let rows = |of: fn(&SteadySurface, usize, usize) -> f64| -> Vec<f64> {
+        let all = 0..surface.failures.len();
+        all.map(|i| of(surface, i / n, i % n)).collect()
+    };
+    let word = |f: &Option<Failure>| f.map_or("", Failure::word);
+    let [ay, sideslip, yaw_rate, roll, slip_ratio] = &surface.figures;
+    Table::new()
+        .numbers("v", "m/s", rows(|s, i, _| s.speeds[i]))
+        .numbers("steer", "rad", rows(|s, _, k| s.steers[k]))
+        .numbers("ay", "m/s^2", ay)
+        .numbers("sideslip_magnitude", "rad", sideslip)
+        .numbers("yaw_rate_magnitude", "rad/s", yaw_rate)
+        .numbers("roll_magnitude", "rad", roll)
+        .numbers("slip_ratio_magnitude", "-", slip_ratio)
+        .texts("failure", surface.failures.iter().map(word))
+        .write_csv(folder.join("surface.csv"))?;
+    Table::rows(&surface.ridge)
+        .number("v", "m/s", |r| r.v_mps)
+        .number("steer", "rad", |r| r.steer_rad)
+        .number("ay", "m/s^2", |r| r.ay_mps2)
+        .number("tolerance", "m/s^2", |r| r.tolerance_mps2)
+        .number("ay_of_curve", "m/s^2", |r| r.exact_mps2)
+        .table()
+        .write_csv(folder.join("ridge.csv"))
+}
+
+/// The surface, if enough of it settled.
+fn surface_figure(surface: &SteadySurface, car: &str) -> Option<Surface> {
+    let speeds = &surface.speeds;
+    // The engine's end may lie nearer than a step; figures are even.
+    let step = |i: usize| speeds[i + 1] - speeds[i];
+    let uneven = speeds.len() > 2 && (step(speeds.len() - 2) - step(0)).abs() > 0.1 * step(0);
+    let rows = speeds.len() - usize::from(uneven);
+    let settled = surface.figures[0].iter().any(|ay| ay.is_finite());
+    let marks = surface.ridge.iter().take(rows);
+    (rows >= 2 && settled).then(|| Surface {
+        title: format!("Lateral acceleration of the {car}, and its ridge"),
+        x_label: "road-wheel angle (deg)".to_owned(),
+        y_label: "speed (m/s)".to_owned(),
+        z_label: "lateral acceleration (m/s\u{b2})".to_owned(),
+        x: surface.steers.iter().map(|d| d.to_degrees()).collect(),
+        y: speeds[..rows].to_vec(),
+        z: surface.figures[0][..rows * surface.steers.len()].to_vec(),
+        levels: Levels::Even,
+        marks: marks
+            .map(|r| (String::new(), [r.steer_rad.to_degrees(), r.v_mps]))
+            .collect(),
+    })
 }

@@ -8,6 +8,8 @@ pub struct DeviceFaults {
     /// How many were met when it was opened; zero once they are told.
     opening: usize,
     seen: usize,
+    /// What the study has been told of before.
+    known: Vec<String>,
 }
 
 impl DeviceFaults {
@@ -17,6 +19,16 @@ impl DeviceFaults {
         Self {
             opening: met,
             seen: met,
+            known: Vec::new(),
+        }
+    }
+
+    /// The same for a study that has been told of these before.
+    pub fn beyond(known: &[String], evaluator: &dyn Evaluator) -> Self {
+        let known = known.to_vec();
+        Self {
+            known,
+            ..Self::of(evaluator)
         }
     }
 
@@ -27,7 +39,7 @@ impl DeviceFaults {
         let opening = &met[..std::mem::take(&mut self.opening)];
         let mut new: Vec<String> = opening
             .iter()
-            .filter(|fault| !told.contains(fault))
+            .filter(|fault| !told.contains(fault) && !self.known.contains(fault))
             .cloned()
             .collect();
         new.extend_from_slice(&met[self.seen..]);

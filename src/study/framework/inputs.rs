@@ -1,9 +1,7 @@
 //! What a result depends on, as one number.
 
-use crate::error::{Error, Result};
 use std::fmt::{Debug, Write as _};
 use std::hash::{DefaultHasher, Hasher};
-use std::path::Path;
 use std::sync::OnceLock;
 
 /// What went into a stage, as one number: the program's version, and whatever is [added](Inputs::add).
@@ -41,16 +39,6 @@ impl Inputs {
         }
         // Writing to a hasher cannot fail.
         let _ = write!(Into(&mut self.0), "{value:?};");
-    }
-
-    /// Adds a file's contents.
-    ///
-    /// # Errors
-    /// [`Error::Io`] if it cannot be read.
-    pub fn add_file(&mut self, path: &Path) -> Result<()> {
-        self.0
-            .write(&std::fs::read(path).map_err(|e| Error::io(path, "read", e))?);
-        Ok(())
     }
 
     /// The number, as text.

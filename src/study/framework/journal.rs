@@ -1,4 +1,4 @@
-//! What a study has had evaluated, so that a run goes on where it was interrupted.
+//! The populations that a study has had evaluated, so that an interrupted run can be resumed.
 //!
 //! A study whose work is a sequence of populations is a function of its settings, of what it reads and of the answers to
 //! these populations. Run again and given the answers it has had, it arrives at the place where it was interrupted with every
@@ -92,10 +92,10 @@ pub struct Recorder<'k> {
 }
 
 impl<'k> Recorder<'k> {
-    /// Goes by a journal, and has `state_file` keep it.
-    pub fn new(journal: Journal, state_file: &'k mut StateFile) -> Self {
+    /// Goes by a journal, and has `state_file` keep it; notes nothing without one.
+    pub fn new(journal: impl Into<Option<Journal>>, state_file: &'k mut StateFile) -> Self {
         Self {
-            journal: Some(journal),
+            journal: journal.into(),
             next: 0,
             device_faults: Vec::new(),
             backend: None,
@@ -122,13 +122,7 @@ impl<'k> Recorder<'k> {
 
     /// Has everything evaluated and notes nothing.
     pub fn idle(state_file: &'k mut StateFile) -> Self {
-        Self {
-            journal: None,
-            next: 0,
-            device_faults: Vec::new(),
-            backend: None,
-            state_file,
-        }
+        Self::new(None::<Journal>, state_file)
     }
 
     /// What the answers depend on, to be said before the first of them: a sum over what the study has read, and what
@@ -146,16 +140,6 @@ impl<'k> Recorder<'k> {
         }
         journal.origin = Some(now);
         self.save()
-    }
-
-    /// What has gone wrong with devices in all answers so far, known ones with them.
-    pub fn device_faults(&self) -> &[String] {
-        &self.device_faults
-    }
-
-    /// What gave the last answer, if there has been one.
-    pub fn backend(&self) -> Option<&BackendInfo> {
-        self.backend.as_ref()
     }
 
     /// Says in a record what gave the last answer and what went wrong with devices in all of them.
@@ -279,11 +263,7 @@ mod tests {
         }
 
         fn backend(&self) -> BackendInfo {
-            BackendInfo {
-                backend: "cpu",
-                device: "none".to_owned(),
-                driver: String::new(),
-            }
+            BackendInfo::reference()
         }
 
         fn evaluate(&mut self, population: &[f64]) -> Result<Evaluation> {
@@ -383,8 +363,8 @@ mod tests {
             recorder.over(&mut device).evaluate(&[x]).expect("a square");
         }
         let told = ["opened late", "lost", "lost"];
-        assert_eq!(recorder.device_faults(), told);
-        assert_eq!(recorder.backend().map(|b| b.backend), Some("simd"));
+        assert_eq!(recorder.device_faults, told);
+        assert_eq!(recorder.backend.as_ref().map(|b| b.backend), Some("simd"));
         recorder.save().expect("it is kept");
 
         let journal: Journal = checkpoint::load(&folder.path().join(STATE)).expect("a journal");

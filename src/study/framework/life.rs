@@ -81,8 +81,8 @@ fn begin<S: Study>(request: &Request<'_>) -> Result<Begun<S>> {
         return Ok((asked(S::Settings::default())?, None));
     }
     let Some(out) = request.out else {
-        let expected = format!("--out, the folder of a run of {}", S::NAME);
-        return Err(Error::input("the command line", "--resume", "no --out", expected));
+        let expected = format!("the folder of the run of {} that is resumed", S::NAME);
+        return Err(Error::input("the study", "out", "none", expected));
     };
     let folder = run_folder::reopen(out)?;
     let mut state = S::State::load(&folder.join(STATE))?;
@@ -97,7 +97,7 @@ fn begin<S: Study>(request: &Request<'_>) -> Result<Begun<S>> {
         return Err(Error::input(
             folder.join(STATE),
             "settings",
-            "other settings on the command line",
+            "other settings, asked for now",
             "those that the run was begun with (study.toml beside it), or none",
         ));
     }
@@ -144,7 +144,7 @@ pub(in crate::study) fn run<S: Study>(request: Request<'_>) -> Result<Answer> {
     // Input that is refused only now leaves no state in the way of the next run.
     let refused = matches!(
         outcome,
-        Err(Error::Input { .. } | Error::Io { .. } | Error::NoDevice(_))
+        Err(Error::Input { .. } | Error::Memory { .. } | Error::Io { .. } | Error::NoDevice(_))
     );
     let untouched = || {
         let saved = state_file.saved::<S::Settings, S::State>();
@@ -214,7 +214,9 @@ pub(in crate::study) fn resumed_or_new<S: Study, T>(
             tracing::warn!("{}: a state of other settings is not used", file.display());
         } else {
             match work(Some(state), state_file) {
-                Err(error @ Error::Input { .. }) => tracing::warn!("started anew: {error}"),
+                Err(error @ (Error::Input { .. } | Error::Memory { .. })) => {
+                    tracing::warn!("started anew: {error}")
+                }
                 outcome => return outcome,
             }
         }

@@ -5,6 +5,7 @@
 
 use crate::error::{Error, Result};
 use crate::evaluate::portions::{self, Allowance};
+use crate::swarm::PER_PLACE;
 
 /// Memory that a study may take where nothing else is said (MiB).
 pub const USUAL_MIB: u64 = crate::config::USUAL_MEMORY_MIB;
@@ -14,6 +15,9 @@ pub const USUAL_MIB: u64 = crate::config::USUAL_MEMORY_MIB;
 const COPIES: u64 = 11;
 /// Bytes of a particle besides its variables: objectives, failures, order, rows of an evaluation.
 const PARTICLE: u64 = 320;
+/// Bytes of a member of the archive, or of a particle that may become one, besides its variables: position and objectives as
+/// rows of their own, what it contributes, and its box while a front is thinned.
+const MEMBER: u64 = 320;
 /// Bytes of an iteration in the history and in the tables and pictures that it comes to.
 const ITERATION: u64 = 512;
 /// Bytes of a cut across the track: in every level of the search, in the cone programs of the exact solvers, whose
@@ -71,7 +75,7 @@ fn bytes_of(limit_mib: u64) -> u64 {
 /// What a study keeps must fit into so much memory; the rest is left to its evaluators as long as the allowance lives.
 ///
 /// # Errors
-/// [`Error::Input`] naming what takes most of it, and how much of that would fit beside the rest.
+/// [`Error::Memory`] naming what takes most of it, and how much of that would fit beside the rest.
 pub fn check(kept: &[Kept], limit_mib: u64) -> Result<Allowance> {
     let limit = bytes_of(limit_mib);
     let needed = needed(kept);
@@ -86,15 +90,16 @@ pub fn check(kept: &[Kept], limit_mib: u64) -> Result<Allowance> {
     };
     let rest = needed.saturating_sub(largest.bytes());
     let expected = match limit.saturating_sub(rest) / largest.each.max(1) {
-        0 => "a smaller study, or a higher --memory-limit-mib".to_owned(),
-        fitting => format!("at most {fitting}, which fits into {limit_mib} MiB (--memory-limit-mib)"),
+        0 => format!("a study that fits into {limit_mib} MiB"),
+        fitting => format!("at most {fitting}, which fits into {limit_mib} MiB"),
     };
-    let found = format!(
-        "{}, for which some {} MiB are needed",
-        largest.count,
-        needed >> 20
-    );
-    Err(Error::input("the study", largest.name, found, expected))
+    Err(Error::Memory {
+        file: "the study".to_owned(),
+        what: largest.name,
+        found: largest.count.to_string(),
+        needed_mib: needed >> 20,
+        expected,
+    })
 }
 
 /// A log of so many samples.
@@ -126,39 +131,8 @@ pub struct Size {
 }
 
 impl Size {
-    /// As [`check`] of all that the study keeps.
-    ///
-    /// # Errors
-    /// As [`check`].
-    pub fn check(&self, limit_mib: u64) -> Result<Allowance> {
-        check(&self.kept(), limit_mib)
-    }
-
-    /// As [`needed_mib`] of all that the study keeps.
-    pub fn needed_mib(&self) -> u64 {
-        needed_mib(&self.kept())
-    }
-
-    /// As [`check`] of all that studies keep which run at the same time.
-    ///
-    /// # Errors
-    /// As [`check`].
-    pub fn check_together(sizes: &[Self], limit_mib: u64) -> Result<Allowance> {
-        check(&Self::kept_together(sizes), limit_mib)
-    }
-
-    /// How many of the studies, from the first on, may run at the same time; the first in any case.
-    pub fn together(sizes: &[Self], limit_mib: u64) -> usize {
-        let fit = |count: &usize| needed(&Self::kept_together(&sizes[..*count])) <= bytes_of(limit_mib);
-        (2..=sizes.len()).take_while(fit).last().unwrap_or(1)
-    }
-
-    fn kept_together(sizes: &[Self]) -> Vec<Kept> {
-        sizes.iter().flat_map(Self::kept).collect()
-    }
-
     /// What the study keeps many of.
-    pub fn kept(&self) -> [Kept; 5] {
+    pub fn kept(&self) -> Vec<Kept> {
         let particle = (self.variables as u64)
             .saturating_mul(8 * COPIES)
             .saturating_add(PARTICLE);
@@ -167,14 +141,19 @@ impl Size {
         } else {
             0
         };
+        // While a large swarm learns, its archive stands there with all that may enter it.
+        let candidate = (self.variables as u64).saturating_mul(8).saturating_add(MEMBER);
+        let member = candidate
+            .saturating_mul(1 + PER_PLACE as u64)
+            .saturating_add(particle);
         let kept = |name, count: usize, each| Kept {
             name,
             count: count as u64,
             each,
         };
-        [
+        vec![
             kept("population", self.population, particle),
-            kept("archive", self.archive, particle),
+            kept("archive", self.archive, member),
             kept("iterations", self.iterations, ITERATION.saturating_add(answers)),
             kept("sections", self.sections, CUT),
             log_kept(self.samples),
@@ -196,6 +175,10 @@ mod tests {
             .expect("a figure")
     }
 
+    fn checked(size: Size, limit_mib: u64) -> Result<Allowance> {
+        check(&size.kept(), limit_mib)
+    }
+
     #[test]
     fn what_is_said_to_fit_does() {
         let size = |population| Size {
@@ -205,19 +188,19 @@ mod tests {
             archive: 100,
             ..Size::default()
         };
-        drop(size(100_000).check(USUAL_MIB).expect("it fits"));
-        let fitting = said_to_fit(size(1_000_000_000).check(USUAL_MIB));
-        drop(size(fitting).check(USUAL_MIB).expect("as was said"));
-        assert!(size(fitting + 1).check(USUAL_MIB).is_err());
-        assert_eq!(size(fitting).needed_mib(), USUAL_MIB);
-        assert!(size(fitting + 1).needed_mib() > USUAL_MIB);
+        drop(checked(size(100_000), USUAL_MIB).expect("it fits"));
+        let fitting = said_to_fit(checked(size(1_000_000_000), USUAL_MIB));
+        drop(checked(size(fitting), USUAL_MIB).expect("as was said"));
+        assert!(checked(size(fitting + 1), USUAL_MIB).is_err());
+        assert_eq!(needed_mib(&size(fitting).kept()), USUAL_MIB);
+        assert!(needed_mib(&size(fitting + 1).kept()) > USUAL_MIB);
         let absurd = Size {
             population: usize::MAX,
             sections: usize::MAX,
             journal: true,
             ..size(usize::MAX)
         };
-        assert_eq!(absurd.check(1).expect_err("no overflow").exit_code(), 2);
+        assert_eq!(checked(absurd, 1).expect_err("no overflow").exit_code(), 2);
     }
 
     #[test]
@@ -228,19 +211,16 @@ mod tests {
             iterations: 1500,
             ..Size::default()
         };
-        let sizes = [size; 8];
+        let together = |count: u64| -> Vec<Kept> { (0..count).flat_map(|_| size.kept()).collect() };
         let alone: u64 = size.kept().iter().map(Kept::bytes).sum();
         for count in 1..=8u64 {
             let limit_mib = (count * alone + LEAST).div_ceil(1 << 20);
             // Rounded up to whole MiB there is not room for another.
             assert!(alone > 1 << 20);
-            assert_eq!(Size::together(&sizes, limit_mib) as u64, count);
-            drop(Size::check_together(&sizes[..count as usize], limit_mib).expect("they fit"));
-            if count < 8 {
-                assert!(Size::check_together(&sizes[..=count as usize], limit_mib).is_err());
-            }
+            assert!(fits(&together(count), limit_mib) && !fits(&together(count + 1), limit_mib));
+            drop(check(&together(count), limit_mib).expect("they fit"));
+            assert!(check(&together(count + 1), limit_mib).is_err());
         }
-        assert_eq!(Size::together(&sizes, 1), 1, "the first is refused by itself");
     }
 
     #[test]
@@ -251,10 +231,10 @@ mod tests {
             samples,
             ..Size::default()
         };
-        drop(size(0).check(64).expect("without a log it fits"));
-        let fitting = said_to_fit(size(10_000_000).check(64));
-        drop(size(fitting).check(64).expect("as was said"));
-        assert!(size(fitting + 1).check(64).is_err());
+        drop(checked(size(0), 64).expect("without a log it fits"));
+        let fitting = said_to_fit(checked(size(10_000_000), 64));
+        drop(checked(size(fitting), 64).expect("as was said"));
+        assert!(checked(size(fitting + 1), 64).is_err());
     }
 
     #[test]
@@ -266,15 +246,11 @@ mod tests {
             journal,
             ..Size::default()
         };
-        drop(
-            size(10_000, false)
-                .check(1024)
-                .expect("without a journal it fits"),
-        );
-        let fitting = said_to_fit(size(10_000, true).check(1024));
+        drop(checked(size(10_000, false), 1024).expect("without a journal it fits"));
+        let fitting = said_to_fit(checked(size(10_000, true), 1024));
         // 144 bytes to each of a thousand answers.
         assert!((7000..7500).contains(&fitting), "{fitting}");
-        drop(size(fitting, true).check(1024).expect("as was said"));
-        assert!(size(fitting + 1, true).check(1024).is_err());
+        drop(checked(size(fitting, true), 1024).expect("as was said"));
+        assert!(checked(size(fitting + 1, true), 1024).is_err());
     }
 }

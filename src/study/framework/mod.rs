@@ -16,8 +16,8 @@ pub use inputs::Inputs;
 pub(in crate::study) use life::resumed_or_new;
 pub use life::{Answer, Finished, Request, solve_unwatched, write_results};
 pub use plan::Plan;
-pub use record::RunRecord;
 pub(in crate::study) use record::Watch;
-pub use study::{AnyStudy, Entry, Figures, Progress, State, Study, Subject, Work};
+pub use record::{Losses, RunRecord};
+pub use study::{AnyStudy, Entry, Figures, Head, Progress, State, Study, Subject, Work};
 
 pub(in crate::study) use device_faults::DeviceFaults;

@@ -9,7 +9,7 @@ use serde_json::Value;
 use std::path::{Path, PathBuf};
 
 /// What a study would do. Whoever makes one has read and checked all that the study would read before it begins.
-#[derive(Clone, Serialize)]
+#[derive(Clone, Default, Serialize)]
 pub struct Plan {
     study: &'static str,
     dry_run: bool,
@@ -44,15 +44,8 @@ impl Plan {
         Self {
             study,
             dry_run: true,
-            seed: None,
-            backend: None,
-            adapter: None,
-            evaluations: None,
-            memory_mib: None,
-            folder: PathBuf::new(),
-            folder_exists: false,
-            reads: Vec::new(),
             settings,
+            ..Self::default()
         }
     }
 
@@ -131,13 +124,9 @@ impl Plan {
         if let (Some(backend), Some(adapter)) = (self.backend, &self.adapter) {
             row("backend", format!("{backend}, {adapter}"));
         }
-        row(
-            "evaluations",
-            self.evaluations.map_or_else(
-                || "as many as the search comes to".to_owned(),
-                |n| format!("{n} at the most"),
-            ),
-        );
+        let most = self.evaluations.map(|n| format!("{n} at the most"));
+        let unknown = || "as many as the search comes to".to_owned();
+        row("evaluations", most.unwrap_or_else(unknown));
         if let Some(mib) = self.memory_mib {
             row("memory", format!("{mib} MiB kept, evaluators beside"));
         }

@@ -1,10 +1,40 @@
 //! How a study ran.
 
+use super::DeviceFaults;
 use crate::evaluate::gpu::DispatchWatch;
-use crate::evaluate::{BackendInfo, FailureCounts, failures_in_words};
+use crate::evaluate::{BackendInfo, Evaluator, FailureCounts, add_failures, failures_in_words};
 use crate::report::HtmlReport;
 use serde::{Deserialize, Deserializer, Serialize};
 use std::time::Instant;
+
+/// What went wrong while candidates were evaluated.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Losses {
+    /// Candidates that failed, by reason.
+    pub failures: FailureCounts,
+    /// What went wrong with devices and was got over.
+    pub device_faults: Vec<String>,
+}
+
+impl Losses {
+    /// Adds the failures of an evaluation, and what has gone wrong with the device since the last.
+    pub(in crate::study) fn note(
+        &mut self,
+        failures: &FailureCounts,
+        faults: &mut DeviceFaults,
+        evaluator: &dyn Evaluator,
+    ) {
+        add_failures(&mut self.failures, failures);
+        let met = faults.since(evaluator, &self.device_faults);
+        self.device_faults.extend(met);
+    }
+
+    /// Adds those of another part of the study.
+    pub(in crate::study) fn add(&mut self, other: &Self) {
+        add_failures(&mut self.failures, &other.failures);
+        self.device_faults.extend_from_slice(&other.device_faults);
+    }
+}
 
 /// How a study ran: flattened into its summary and its manifest.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -50,6 +80,15 @@ impl RunRecord {
         self.driver.clone_from(&backend.driver);
     }
 
+    /// Adds what went wrong in a part of the study, and says what evaluated last in it.
+    pub(in crate::study) fn add(&mut self, losses: &Losses, backend: Option<&BackendInfo>) {
+        add_failures(&mut self.failures, &losses.failures);
+        self.device_faults.extend_from_slice(&losses.device_faults);
+        if let Some(backend) = backend {
+            self.moved_to(backend);
+        }
+    }
+
     /// So many candidates in so much time (s), of which they were evaluated in `busy_s`.
     pub fn took(&mut self, evaluations: u64, elapsed_s: f64, busy_s: f64) {
         self.evaluations = evaluations;
@@ -64,6 +103,20 @@ impl RunRecord {
     /// What evaluated, as in `simd avx512`.
     pub fn device(&self) -> String {
         format!("{} {}", self.backend, self.adapter)
+    }
+
+    /// The last lines of a summary: candidates that failed, as in `Laps that failed`, then what a reader must know.
+    pub(in crate::study) fn ending(&self, candidates: &str, warnings: &[String]) -> String {
+        let failed = if self.failures.is_empty() {
+            String::new()
+        } else {
+            format!(
+                "{candidates} that failed: {}\n",
+                failures_in_words(&self.failures)
+            )
+        };
+        let warnings = warnings.iter().map(|warning| format!("Note: {warning}\n"));
+        failed + &self.notes() + &warnings.collect::<String>()
     }
 
     /// What went wrong with devices, a line each.

@@ -1,6 +1,6 @@
 //! The folder that a run writes into: one run each, nothing overwritten, one process at a time.
 
-use super::{RunRecord, Subject};
+use super::{Head, RunRecord, Subject};
 use crate::error::{Error, Result};
 use crate::files::{is_temporary, write_whole};
 use serde::Serialize;
@@ -93,12 +93,8 @@ impl RunFolder {
                 // Not every system lets a locked file be read.
                 let _ = lock.read_to_string(&mut owner);
                 let found = format!("a folder that process {} writes into", owner.trim());
-                return Err(Error::input(
-                    path,
-                    "--out",
-                    found,
-                    "one that no run is at work in",
-                ));
+                let expected = "one that no run is at work in";
+                return Err(Error::input(path, "out", found, expected));
             }
             // A file system without locks: what a run leaves behind still keeps others out.
             Err(TryLockError::Error(e)) if e.kind() == std::io::ErrorKind::Unsupported => {}
@@ -171,23 +167,18 @@ fn check_free(folder: &Path) -> Result<()> {
             Err(Error::io(folder, "read", e))
         }
         _ if folder.is_file() || holds_something(folder) => Err(taken(folder)),
-        _ if folder.is_symlink() && !folder.exists() => Err(Error::input(
-            folder,
-            "--out",
-            "a link to nowhere",
-            "a new or empty folder",
-        )),
+        _ if folder.is_symlink() && !folder.exists() => {
+            let expected = "a new or empty folder";
+            Err(Error::input(folder, "out", "a link to nowhere", expected))
+        }
         _ => Ok(()),
     }
 }
 
 fn taken(folder: &Path) -> Error {
-    Error::input(
-        folder,
-        "--out",
-        "a folder that holds another run, or a file",
-        "a new or empty folder: nothing is overwritten",
-    )
+    let found = "a folder that holds another run, or a file";
+    let expected = "a new or empty folder: nothing is overwritten";
+    Error::input(folder, "out", found, expected)
 }
 
 fn holds_more_than(folder: &Path, names: &[&str]) -> bool {
@@ -272,7 +263,7 @@ pub fn take(folder: &Path) -> Result<RunFolder> {
 /// Takes the folder of an interrupted run, to resume it.
 ///
 /// # Errors
-/// [`Error::Input`] if there is nothing in it to go on with, or another process writes into it.
+/// [`Error::Input`] if there is nothing in it to resume, or another process writes into it.
 pub fn reopen(folder: &Path) -> Result<RunFolder> {
     reopen_by(folder, STATE)
 }
@@ -282,7 +273,7 @@ pub fn reopen(folder: &Path) -> Result<RunFolder> {
 /// # Errors
 /// As [`reopen`].
 pub fn reopen_by(folder: &Path, state: &str) -> Result<RunFolder> {
-    let refused = |found: &str, expected: &str| Err(Error::input(folder, "--resume", found, expected));
+    let refused = |found: &str, expected: &str| Err(Error::input(folder, "resume", found, expected));
     if !folder.is_dir() {
         return refused("no such folder", "the folder of an interrupted run");
     }
@@ -293,7 +284,7 @@ pub fn reopen_by(folder: &Path, state: &str) -> Result<RunFolder> {
         } else {
             refused(
                 "no saved state",
-                "an interrupted run; one that had not begun is started anew, without --resume",
+                "an interrupted run; one that had not begun is started anew, not resumed",
             )
         }
     };
@@ -361,38 +352,25 @@ pub struct Manifest<'a> {
     pub program: &'static str,
     /// Its version.
     pub version: &'static str,
-    /// The study.
-    pub study: &'a str,
-    /// Seed of all random numbers.
-    pub seed: u64,
-    /// The log, if one was read.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub log: Option<&'a str>,
-    /// The track, if there is one.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub track: Option<&'a str>,
-    /// The car.
-    pub car: &'a str,
+    /// The study, what it was about and how it ran.
+    #[serde(flatten)]
+    pub head: Head,
     /// The file of resolved settings.
     pub settings: &'a str,
-    /// How the study ran.
-    #[serde(flatten)]
-    pub record: &'a RunRecord,
 }
 
 impl<'a> Manifest<'a> {
     /// The manifest of a study whose settings are in the file `settings`.
-    pub fn new(study: &'a str, subject: &'a Subject, record: &'a RunRecord, settings: &'a str) -> Self {
+    pub fn new(study: &str, subject: &Subject, record: &RunRecord, settings: &'a str) -> Self {
         Self {
             program: "lapswarm",
             version: env!("CARGO_PKG_VERSION"),
-            study,
-            seed: subject.seed,
-            log: subject.log.as_deref(),
-            track: subject.track.as_deref(),
-            car: &subject.car,
+            head: Head {
+                study: study.to_owned(),
+                subject: subject.clone(),
+                record: record.clone(),
+            },
             settings,
-            record,
         }
     }
 }

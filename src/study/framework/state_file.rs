@@ -30,13 +30,7 @@ pub struct StateFile {
 impl StateFile {
     /// Saves into a run folder, every five seconds.
     pub fn new(folder: &Path) -> Self {
-        Self {
-            path: Some(folder.join(STATE)),
-            interval: INTERVAL,
-            last: Instant::now(),
-            took: Duration::ZERO,
-            may_move: false,
-        }
+        Self::at(folder.join(STATE))
     }
 
     /// Saves into a file, every five seconds.
@@ -129,7 +123,7 @@ impl StateFile {
         }
     }
 
-    /// A state may go on with another backend than it began on: its end is another then, which is said.
+    /// A state may be resumed on another backend. Its end is then another one, and a warning says so.
     pub fn may_move(self) -> Self {
         Self {
             may_move: true,
@@ -152,13 +146,13 @@ impl StateFile {
                 "the run began on {began} and is resumed on {now}: its end will differ in the last digits"
             );
         } else if began != now {
-            let expected = format!("{began}, where the run began; --backend NAME moves it");
+            let expected = format!("{began}, where the run began; a backend that is asked for moves it");
             return Err(Error::input(file, "backend", now.to_string(), expected));
         }
         Ok(())
     }
 
-    /// Takes the saved state away, when nothing is left to go on with.
+    /// Removes the saved state when there is nothing left to resume.
     ///
     /// # Errors
     /// [`Error::Io`] if it stays.
@@ -173,7 +167,7 @@ impl StateFile {
 }
 
 /// What a state was reached with. Only the same may resume it, or the end would be another.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Origin {
     /// A sum over what the study has read.
     pub inputs: String,

@@ -7,8 +7,8 @@ use super::{Plan, RunRecord};
 use crate::config::settings::{Declared, Role, Settings};
 use crate::error::{Error, Result};
 use crate::swarm::checkpoint::{self, Checkpoint};
-use serde::Serialize;
 use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::marker::PhantomData;
 use std::ops::ControlFlow;
@@ -185,6 +185,15 @@ pub trait Study: Sized + 'static {
     /// What it was about, for the manifest.
     fn subject(settings: &Self::Settings, prepared: &Self::Prepared) -> Subject;
 
+    /// The head of its summary.
+    fn head(settings: &Self::Settings, prepared: &Self::Prepared, outcome: &Self::Outcome) -> Head {
+        Head {
+            study: Self::NAME.to_owned(),
+            subject: Self::subject(settings, prepared),
+            record: Self::record(outcome).clone(),
+        }
+    }
+
     /// Writes tables, pictures and the page. `study.toml` and `summary.json` are written before, the manifest after.
     ///
     /// # Errors
@@ -235,16 +244,43 @@ pub trait Study: Sized + 'static {
 }
 
 /// What a study was about.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Subject {
     /// Seed of all random numbers.
     pub seed: u64,
     /// The car.
     pub car: String,
     /// The log, if one was read.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub log: Option<String>,
     /// The track, if there is one.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub track: Option<String>,
+}
+
+impl Subject {
+    /// Track and car in words.
+    pub fn words(&self) -> String {
+        format!("{} with the {}", self.track_name(), self.car)
+    }
+
+    /// The track's name.
+    pub fn track_name(&self) -> &str {
+        self.track.as_deref().unwrap_or_default()
+    }
+}
+
+/// The head of a summary, and of the manifest: what the study was about, and how it ran.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct Head {
+    /// The study.
+    pub study: String,
+    /// What it was about.
+    #[serde(flatten)]
+    pub subject: Subject,
+    /// How it ran.
+    #[serde(flatten)]
+    pub record: RunRecord,
 }
 
 /// Ends of keys whose figures depend on the clock.
@@ -369,17 +405,16 @@ pub(super) fn moves<S: Settings>(keys: &[(String, String)]) -> bool {
 /// Sets what flags say.
 ///
 /// # Errors
-/// [`Error::Input`] naming the flag.
+/// [`Error::Input`] naming the setting.
 pub(super) fn apply<S: Settings>(settings: &mut S, flags: &[(String, String)]) -> Result<()> {
     let declared = S::settings();
     for (key, text) in flags {
         let Some(setting) = declared.iter().find(|s| s.declared.key == key) else {
             continue;
         };
-        setting.parse(settings, text).map_err(|expected| {
-            let flag = setting.declared.typed().unwrap_or_else(|| key.clone());
-            Error::input("the command line", flag, text.clone(), expected)
-        })?;
+        setting
+            .parse(settings, text)
+            .map_err(|expected| Error::input("the study", key, text.clone(), expected))?;
     }
     Ok(())
 }

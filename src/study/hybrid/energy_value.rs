@@ -4,8 +4,7 @@ use super::scenario::ReportedLap;
 use super::setup::HybridSetup;
 use super::strategy::zone_gates;
 use crate::error::Result;
-use crate::evaluate::energy::{Free, HybridObjective, HybridProblem, Strategy};
-use crate::line::energy::{EnergyPlan, Mode};
+use crate::evaluate::energy::{Free, Strategy};
 
 /// Length of the stretches that the motor is tried on by itself (m).
 const STRETCH_M: f64 = 25.0;
@@ -30,20 +29,13 @@ pub struct Worth {
 /// What the motor is worth on each stretch of the lap on which it is of use, and how much of it `deployed` uses.
 ///
 /// # Errors
-/// Those of [`HybridProblem::new`].
+/// Those of [`HybridSetup::problem`].
 pub fn worth(setup: &HybridSetup, engine: &ReportedLap, deployed: &ReportedLap) -> Result<Vec<Worth>> {
     let n = setup.points_m.len();
-    let problem = HybridProblem::new(
-        setup.fixed_line(),
-        setup.car.clone(),
-        EnergyPlan::single(n, setup.run_in, Mode::Additional),
-        Strategy {
-            free: (0..n).map(Free::Zone).collect(),
-            ..Strategy::fixed(zone_gates(1e6), n)
-        },
-        &[HybridObjective::LapTime],
-        setup.entry_mps,
-    )?;
+    let problem = setup.by_segment(Strategy {
+        free: (0..n).map(Free::Zone).collect(),
+        ..Strategy::fixed(zone_gates(1e6), n)
+    })?;
     let segments = engine.segments.len();
     let mut shares = vec![0.0; n];
     let none = problem.lap(&shares).0.time;

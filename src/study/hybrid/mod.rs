@@ -16,7 +16,7 @@ mod stint;
 mod strategy;
 
 pub use energy_value::{Worth, correlation, mean_worths, worth};
-pub use results::{HybridSummary, ScenarioFigures};
+pub use results::{FrontFigures, HybridSummary, ScenarioFigures};
 pub use scenario::{ReportedLap, Scenario, drive, published};
 pub use settings::{FreePart, HybridStudySettings};
 pub use setup::{HybridInputs, HybridSetup, read_inputs, read_line, set_up};
@@ -45,15 +45,6 @@ pub struct DrivenScenario {
     pub additional: ReportedLap,
 }
 
-/// An energy and the optimal deployment of it.
-#[derive(Clone, Debug)]
-pub struct FrontPoint {
-    /// The energy that may leave the store (J).
-    pub budget_j: f64,
-    /// The optimal deployment.
-    pub deployment: Deployment,
-}
-
 /// The deployment of the study's energy.
 #[derive(Clone, Debug)]
 pub struct Optimised {
@@ -66,7 +57,7 @@ pub struct Optimised {
     /// The swarm's.
     pub swarm: FoundStrategy,
     /// The reference optima of several energies.
-    pub front: Vec<FrontPoint>,
+    pub front: Vec<FrontFigures>,
     /// What an endless store is used for (J): no greater budget binds.
     pub unbound_j: f64,
     /// What the motor is worth along the lap of the engine alone, and how much of it the swarm uses.
@@ -116,17 +107,17 @@ impl Study for Hybrid {
     }
 
     fn size(settings: &HybridStudySettings, prepared: Option<&HybridInputs>) -> Vec<Kept> {
-        let size = prepared.map_or_else(|| settings.size(), |inputs| inputs.size(settings));
-        size.kept().into()
+        let variables = prepared.map_or(1, HybridInputs::variables);
+        settings.size_of(variables).kept()
     }
 
     fn plan(settings: &HybridStudySettings, inputs: &HybridInputs, plan: Plan) -> Result<Plan> {
-        let line = match (&settings.line, inputs.given_points()) {
-            (Some(path), Some(points)) => format!("{}, {points} points", path.display()),
+        let line = match (&settings.line, &inputs.given) {
+            (Some(path), Some(points)) => format!("{}, {} points", path.display(), points.len()),
             _ => "the fastest one, found first".to_owned(),
         };
-        road_read(plan, inputs.road())
-            .reads(format!("hybrid drive of {}", inputs.car().name))
+        road_read(plan, &inputs.raceline)
+            .reads(format!("hybrid drive of {}", inputs.car.name))
             .reads(format!("line: {line}"))
             .seed(settings.seed)
             .backend(settings.backend, settings.adapter.as_deref())
@@ -144,16 +135,16 @@ impl Study for Hybrid {
         &outcome.record
     }
 
-    fn summarise(settings: &HybridStudySettings, _: &HybridInputs, outcome: &Outcome) -> HybridSummary {
-        results::summarise(settings, &outcome.setup, outcome)
+    fn summarise(settings: &HybridStudySettings, inputs: &HybridInputs, outcome: &Outcome) -> HybridSummary {
+        results::summarise(Self::head(settings, inputs, outcome), outcome)
     }
 
     fn subject(settings: &HybridStudySettings, inputs: &HybridInputs) -> Subject {
         Subject {
             seed: settings.seed,
-            car: inputs.car().name.clone(),
+            car: inputs.car.name.clone(),
             log: None,
-            track: Some(inputs.road().track_name.clone()),
+            track: Some(inputs.raceline.track_name.clone()),
         }
     }
 
@@ -164,7 +155,8 @@ impl Study for Hybrid {
         outcome: &Outcome,
         summary: &HybridSummary,
     ) -> Result<()> {
-        results::report(folder, settings, &outcome.setup, outcome, summary)
+        results::write_files(folder, settings, outcome)?;
+        results::write_page(folder, settings, outcome, summary)
     }
 
     fn text(_: &HybridStudySettings, summary: &HybridSummary) -> String {

@@ -2,8 +2,8 @@
 
 use super::setup::HybridSetup;
 use crate::error::Result;
-use crate::evaluate::energy::{HybridObjective, HybridProblem, Strategy};
-use crate::line::energy::{EnergyLap, EnergyPlan, Gates, Mode, SegmentEnergy};
+use crate::evaluate::energy::HybridProblem;
+use crate::line::energy::{EnergyLap, Gates, Mode, SegmentEnergy};
 use serde::{Deserialize, Serialize};
 
 /// A strategy by its gates.
@@ -101,14 +101,17 @@ impl ReportedLap {
 /// # Errors
 /// Those of [`HybridProblem::new`].
 pub fn drive(setup: &HybridSetup, name: &str, mode: Mode, gates: Gates) -> Result<ReportedLap> {
-    let n = setup.points_m.len();
-    let problem = HybridProblem::new(
-        setup.fixed_line(),
-        setup.car.clone(),
-        EnergyPlan::whole(n, setup.run_in, mode),
-        Strategy::fixed(gates, 1),
-        &[HybridObjective::LapTime],
-        setup.entry_mps,
-    )?;
-    Ok(ReportedLap::of(name, &problem, &[]))
+    Ok(ReportedLap::of(name, &setup.gated(mode, gates)?, &[]))
+}
+
+/// Drives the lap of the engine alone.
+///
+/// # Errors
+/// As [`drive`].
+pub(super) fn drive_engine_alone(setup: &HybridSetup) -> Result<ReportedLap> {
+    let none = Gates {
+        energy_mj: 0.0,
+        ..Gates::OPEN
+    };
+    drive(setup, "engine alone", Mode::Offset, none)
 }

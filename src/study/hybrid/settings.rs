@@ -107,20 +107,10 @@ fn usual_budgets_mj() -> Vec<f64> {
 const SIZING: usize = 22;
 
 impl HybridStudySettings {
-    /// What the study's memory goes with at the least, whatever the track; see
-    /// [`HybridInputs::size`](super::HybridInputs::size).
-    pub fn size(&self) -> Size {
-        self.size_of(1)
-    }
-
     /// What the study's memory goes with, with so many variables of a strategy and a line.
     pub(super) fn size_of(&self, variables: usize) -> Size {
         let front = usize::from(self.objectives.len() > 1);
-        let sizing = if self.match_lap_time_s.is_some() {
-            SIZING
-        } else {
-            0
-        };
+        let sizing = self.match_lap_time_s.map_or(0, |_| SIZING);
         let searches = if self.optimise { 1 + front } else { 0 } + sizing;
         Size {
             population: self.population,
@@ -203,54 +193,47 @@ impl Kind<Vec<Scenario>> for Scenarios {
     }
 }
 
+/// A gate: its key, its range, and its place.
+type Gate = (&'static str, [f64; 2], fn(&mut Gates) -> &mut f64);
+
+const GATES: [Gate; 6] = [
+    ("steer_rad", [0.0, 2.0], |g| &mut g.steer_rad),
+    ("speed_mps", [0.0, 200.0], |g| &mut g.speed_mps),
+    ("ax_mps2", [-100.0, 100.0], |g| &mut g.ax_mps2),
+    ("soc", [-100.0, 2.0], |g| &mut g.soc),
+    ("energy_mj", [0.0, 1000.0], |g| &mut g.energy_mj),
+    ("motor_share", [0.0, MOST_MOTOR], |g| &mut g.motor_share),
+];
+
 fn scenario_table(scenario: &Scenario) -> String {
-    let g = &scenario.gates;
-    format!(
-        "[scenarios.{}]\nmode = {}\nsteer_rad = {:?}\nspeed_mps = {:?}\nax_mps2 = {:?}\nsoc = {:?}\nenergy_mj = {:?}\n\
-         motor_share = {:?}\n",
-        quoted(&scenario.name),
-        quoted(scenario.mode.name()),
-        g.steer_rad,
-        g.speed_mps,
-        g.ax_mps2,
-        g.soc,
-        g.energy_mj,
-        g.motor_share
-    )
+    let (name, mode) = (quoted(&scenario.name), quoted(scenario.mode.name()));
+    let mut gates = scenario.gates;
+    let rows = GATES.map(|(key, _, of)| format!("{key} = {:?}\n", of(&mut gates)));
+    format!("[scenarios.{name}]\nmode = {mode}\n{}", rows.concat())
 }
 
 fn read_scenario(name: &str, row: &Table<'_>) -> Result<Scenario> {
-    let open = Gates::OPEN;
-    let number = |key: &str, least: f64, most: f64, value: f64| -> Result<f64> {
-        Ok(row.number(key, least, most, "")?.unwrap_or(value))
-    };
     let mode = match row.string("mode")? {
         Some(mode) => Mode::named(mode).ok_or_else(|| row.refuse("mode", "\"offset\" or \"additional\""))?,
         None => Mode::Offset,
     };
-    Ok(Scenario {
-        name: name.to_owned(),
-        mode,
-        gates: Gates {
-            steer_rad: number("steer_rad", 0.0, 2.0, open.steer_rad)?,
-            speed_mps: number("speed_mps", 0.0, 200.0, open.speed_mps)?,
-            ax_mps2: number("ax_mps2", -100.0, 100.0, open.ax_mps2)?,
-            soc: number("soc", -100.0, 2.0, open.soc)?,
-            energy_mj: number("energy_mj", 0.0, 1000.0, open.energy_mj)?,
-            motor_share: number("motor_share", 0.0, MOST_MOTOR, open.motor_share)?,
-        },
-    })
+    let mut gates = Gates::OPEN;
+    for (key, [least, most], of) in GATES {
+        if let Some(value) = row.number(key, least, most, "")? {
+            *of(&mut gates) = value;
+        }
+    }
+    let name = name.to_owned();
+    Ok(Scenario { name, mode, gates })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::settings::Settings;
+    use crate::config::settings::testing::{assert_refused, assert_repeated};
 
     #[test]
     fn a_study_file_repeats_its_study() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("study.toml");
         let own = Scenario {
             name: "own one".to_owned(),
             mode: Mode::Additional,
@@ -259,23 +242,19 @@ mod tests {
                 ..Gates::OPEN
             },
         };
-        let settings = HybridStudySettings {
+        assert_repeated(&HybridStudySettings {
             scenarios: vec![own],
             objectives: vec![HybridObjective::Fuel, HybridObjective::SocSwing],
             free: FreePart::Both,
             energy_mj: Some(2.5),
             stint_laps: 3,
             ..HybridStudySettings::default()
-        };
-        std::fs::write(&path, settings.to_toml()).unwrap();
-        assert_eq!(HybridStudySettings::read(&path).unwrap(), settings);
+        });
     }
 
     #[test]
     fn mistakes_are_named() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("study.toml");
-        for (text, wanted) in [
+        assert_refused::<HybridStudySettings>(&[
             ("sections = 3", "sections"),
             ("objectives = [\"speed\"]", "objectives"),
             ("free = \"car\"", "free"),
@@ -292,10 +271,6 @@ mod tests {
             ("[scenarios.swarm]\n", "differs from `swarm`"),
             ("[scenarios.\"engine-alone\"]\n", "differs from `engine alone`"),
             (&format!("[scenarios.{}]\n", "n".repeat(300)), "at most 120 bytes"),
-        ] {
-            std::fs::write(&path, text).unwrap();
-            let error = HybridStudySettings::read(&path).unwrap_err().to_string();
-            assert!(error.contains(wanted), "{error} should say {wanted}");
-        }
+        ]);
     }
 }

@@ -3,12 +3,11 @@
 use super::settings::HybridStudySettings;
 use crate::config::settings::Settings;
 use crate::error::{Error, Result};
-use crate::evaluate::energy::HybridLine;
+use crate::evaluate::energy::{HybridLine, HybridObjective, HybridProblem, Strategy};
 use crate::evaluate::line::LineObjective;
 use crate::line::FineLine;
-use crate::line::energy::{EnergyCar, Traction, hybrid_parts};
+use crate::line::energy::{EnergyCar, EnergyPlan, Gates, Mode, Traction, hybrid_parts};
 use crate::study::envelope::{EnvelopeSettings, car_limits};
-use crate::study::framework::memory::Size;
 use crate::study::raceline::{self, RacelineSettings, ReferenceSolvers};
 use crate::track::CrossSections;
 use crate::vehicle::{Car, Envelope};
@@ -67,11 +66,13 @@ pub(super) fn late_bend(curvature_1pm: &[f64]) -> usize {
 /// Track, car and limits as they are read; the line may be still to be found.
 #[derive(Clone, Debug)]
 pub struct HybridInputs {
-    raceline: raceline::Setup,
+    /// Track and limits as racing lines know them.
+    pub raceline: raceline::Setup,
     raceline_settings: RacelineSettings,
-    car: EnergyCar,
+    /// The car.
+    pub car: EnergyCar,
     /// The points of a line that is given (m).
-    given: Option<Vec<DVec2>>,
+    pub given: Option<Vec<DVec2>>,
 }
 
 /// Reads all that the settings name: the car, the line where one is given, track and limits. What is least work comes first, so
@@ -111,27 +112,11 @@ pub fn read_inputs(settings: &HybridStudySettings) -> Result<HybridInputs> {
 }
 
 impl HybridInputs {
-    /// Track and limits as racing lines know them.
-    pub fn road(&self) -> &raceline::Setup {
-        &self.raceline
-    }
-
-    /// The car.
-    pub fn car(&self) -> &EnergyCar {
-        &self.car
-    }
-
-    /// How many points a line has that is given.
-    pub fn given_points(&self) -> Option<usize> {
-        self.given.as_ref().map(Vec::len)
-    }
-
-    /// What the study's memory goes with on this track.
-    pub fn size(&self, settings: &HybridStudySettings) -> Size {
+    /// The most variables of a strategy and a line on this track.
+    pub(super) fn variables(&self) -> usize {
         let zones = (self.raceline.cuts.length_m / GAP_M).ceil() as usize;
-        let controls = control_points(&self.raceline.cuts);
         // The motor's power is one more.
-        settings.size_of(zones + controls + 1)
+        zones + control_points(&self.raceline.cuts) + 1
     }
 
     /// All that laps are driven with. The line is found if none is given; nothing if `stop` was raised before it was found.
@@ -191,12 +176,39 @@ pub fn set_up(settings: &HybridStudySettings) -> Result<HybridSetup> {
 }
 
 impl HybridSetup {
-    /// The line, fixed.
-    pub fn fixed_line(&self) -> HybridLine {
-        HybridLine::Fixed {
+    /// The problem of laps on the line, which stays as it is.
+    ///
+    /// # Errors
+    /// Those of [`HybridProblem::new`].
+    pub fn problem(
+        &self,
+        plan: EnergyPlan<f64>,
+        strategy: Strategy,
+        objectives: &[HybridObjective],
+    ) -> Result<HybridProblem> {
+        let line = HybridLine::Fixed {
             points_m: self.points_m.clone(),
             closed: self.closed,
-        }
+        };
+        HybridProblem::new(line, self.car.clone(), plan, strategy, objectives, self.entry_mps)
+    }
+
+    /// The same with gates that hold for the whole lap.
+    ///
+    /// # Errors
+    /// As [`HybridSetup::problem`].
+    pub fn gated(&self, mode: Mode, gates: Gates) -> Result<HybridProblem> {
+        let plan = EnergyPlan::whole(self.points_m.len(), self.run_in, mode);
+        self.problem(plan, Strategy::fixed(gates, 1), &[HybridObjective::LapTime])
+    }
+
+    /// The same with a strategy of every segment by itself, the motor beside the engine.
+    ///
+    /// # Errors
+    /// As [`HybridSetup::problem`].
+    pub fn by_segment(&self, strategy: Strategy) -> Result<HybridProblem> {
+        let plan = EnergyPlan::single(self.points_m.len(), self.run_in, Mode::Additional);
+        self.problem(plan, strategy, &[HybridObjective::LapTime])
     }
 
     /// What may be deployed in a lap (J): of what is asked for, the rules and a full store the least.

@@ -1,12 +1,12 @@
 //! Hybrids sized to another car's lap: the powers and energies with which this car laps as fast, found by a swarm.
 
-use super::scenario::{ReportedLap, drive};
+use super::scenario::{ReportedLap, drive, drive_engine_alone};
 use super::settings::HybridStudySettings;
 use super::setup::HybridSetup;
 use super::strategy::{MOST_MJ, zone_gates};
 use crate::error::{Error, Result};
 use crate::evaluate::energy::{Free, HybridObjective, HybridProblem, open_hybrid_evaluator};
-use crate::line::energy::{Gates, Mode};
+use crate::line::energy::Mode;
 use crate::study::framework::journal::Recorder;
 use crate::swarm::{
     CovarianceSettings, CovarianceSwarm, HybridSettings, HybridSwarm, Optimiser, Progress, run,
@@ -55,11 +55,7 @@ pub fn engine_only(setup: &HybridSetup, lap_time_s: f64) -> Result<Option<(f64, 
             car: setup.car.with_engine(share)?,
             ..setup.clone()
         };
-        let none = Gates {
-            energy_mj: 0.0,
-            ..Gates::OPEN
-        };
-        drive(&other, "engine alone", Mode::Offset, none)
+        drive_engine_alone(&other)
     };
     let [mut low, mut high] = ENGINES;
     if lap_with(low)?.lap.time < lap_time_s || lap_with(high)?.lap.time > lap_time_s {
@@ -107,7 +103,8 @@ pub fn size(
     recorder: &mut Recorder<'_>,
     mut observe: impl FnMut(&Progress) -> ControlFlow<()>,
 ) -> Result<(Vec<Sizing>, u64)> {
-    let whole = setup.zone_problem_with(&[Free::Motor], MOST_MJ, &[HybridObjective::LapTime])?;
+    let zoned = |energy_mj| setup.zone_problem(&[Free::Motor], energy_mj, &[HybridObjective::LapTime]);
+    let whole = zoned(MOST_MJ)?;
     let upper: Vec<f64> = whole.problem.variables.iter().map(|v| v.upper).collect();
     let step_kw = upper[MOTOR] / RANGES as f64;
     let engine_s = drive(setup, "engine alone", Mode::Additional, zone_gates(0.0))?
@@ -139,8 +136,7 @@ pub fn size(
                 break;
             }
             let energy_mj = few.0 + (many.0 - few.0) * few.1 / (few.1 - many.1);
-            let mut problem =
-                setup.zone_problem_with(&[Free::Motor], energy_mj, &[HybridObjective::LapTime])?;
+            let mut problem = zoned(energy_mj)?;
             let motor = &mut problem.problem.variables[MOTOR];
             [motor.lower, motor.upper] = bounds_kw;
             let (population, seed) = (settings.population, settings.seed.wrapping_add(range as u64));
@@ -210,13 +206,9 @@ pub fn size(
     // The solver takes seconds for each; the study may be interrupted between them too.
     for some in found.chunks(2) {
         let told = Progress {
-            iteration: 0,
             evaluations,
             best: rows.iter().map(|row| row.lap_time_s).take(1).collect(),
-            violation: 0.0,
-            median: None,
-            failed: 0,
-            failures: Default::default(),
+            ..Progress::default()
         };
         if observe(&told).is_break() {
             break;
@@ -258,14 +250,12 @@ fn row_of(
     };
     let fuel_l = lap.fuel / setup.car.fuel_density_kgpl;
     let power_kw = hybrid.mgu_k.power_w / 1e3;
-    let exact_lap_time_s = if met {
+    let exact_lap_time_s = || -> Result<f64> {
         let sized = HybridSetup {
             car: setup.car.with_hybrid(hybrid)?,
             ..setup.clone()
         };
-        Some(sized.exact(lap.deployed, None)?.lap.time)
-    } else {
-        None
+        Ok(sized.exact(lap.deployed, None)?.lap.time)
     };
     Ok(Sizing {
         power_kw,
@@ -273,7 +263,7 @@ fn row_of(
         harvested_mj: (lap.harvested_k + lap.harvested_h) / 1e6,
         store_mj: store_j / 1e6,
         lap_time_s: lap.time,
-        exact_lap_time_s,
+        exact_lap_time_s: met.then(exact_lap_time_s).transpose()?,
         fuel_l,
         engine_share: rival.map(|(share, _)| share),
         fuel_saving_l: rival.map(|(_, burnt_l)| burnt_l - fuel_l),

@@ -1,15 +1,17 @@
 //! The work of the study: scenarios, stint and sizes, then the deployment by solver and swarms.
 
+use super::scenario::drive_engine_alone;
 use super::{
-    DrivenScenario, FrontPoint, Hybrid, HybridInputs, HybridSetup, HybridStudySettings, Optimised, Outcome,
+    DrivenScenario, FrontFigures, Hybrid, HybridInputs, HybridStudySettings, Optimised, Outcome, Scenario,
     drive, search_front, search_strategy, size, stint, worth,
 };
 use crate::error::Result;
-use crate::evaluate::energy::{HybridObjective, HybridProblem, Strategy, open_hybrid_evaluator};
-use crate::evaluate::{BackendInfo, add_failures};
-use crate::line::energy::{EnergyPlan, Gates, Mode};
+use crate::evaluate::add_failures;
+use crate::evaluate::energy::open_hybrid_evaluator;
+use crate::line::energy::{Gates, Mode};
 use crate::study::framework::journal::{Journal, Recorder};
 use crate::study::framework::{Inputs, Progress, RunRecord, Study, Watch, Work};
+use std::cell::Cell;
 use std::time::Instant;
 
 /// Runs the study, with the answers to the swarms noted in a journal, or known from one; nothing if it was interrupted before
@@ -28,90 +30,84 @@ pub(super) fn deploy(
     let Some(setup) = inputs.with_line(settings, &work.stop)? else {
         return Ok(None);
     };
-    let observe = work.observe;
     let watch = Watch::begin();
-    let backend = probe(&setup, settings)?;
+    let probe = setup.gated(Mode::Offset, Gates::OPEN)?;
+    let backend = open_hybrid_evaluator(&probe, settings.backend, settings.adapter.as_deref())?.backend();
     let mut read = Inputs::new(Hybrid::NAME);
     read.add(&setup);
     recorder.begin(read.key(), &backend)?;
     let mut record = RunRecord::of(&backend);
-    let none = Gates {
-        energy_mj: 0.0,
-        ..Gates::OPEN
+    let interrupted = Cell::new(false);
+    let mut tell = |stage: &str, evaluations: u64, reached: String| {
+        let flow = (work.observe)(&Progress::reached(stage, evaluations, reached));
+        interrupted.set(interrupted.get() || flow.is_break());
+        flow
     };
-    let engine = drive(&setup, "engine alone", Mode::Offset, none)?;
+    let engine = drive_engine_alone(&setup)?;
+    let driven = |s: &Scenario| {
+        Ok(DrivenScenario {
+            own: drive(&setup, &s.name, s.mode, s.gates)?,
+            additional: drive(&setup, &s.name, Mode::Additional, s.gates)?,
+        })
+    };
     let scenarios = settings
         .scenarios
         .iter()
-        .map(|s| {
-            Ok(DrivenScenario {
-                own: drive(&setup, &s.name, s.mode, s.gates)?,
-                additional: drive(&setup, &s.name, Mode::Additional, s.gates)?,
-            })
-        })
+        .map(driven)
         .collect::<Result<Vec<_>>>()?;
-    let stint_laps = stint(&setup, settings.stint_laps, settings.stint_fuel_kg)?;
-    let mut interrupted = false;
+    let stint = stint(&setup, settings.stint_laps, settings.stint_fuel_kg)?;
     let (sizing, sized) = match settings.match_lap_time_s {
         Some(time) => size(&setup, settings, time, &mut recorder, |p| {
             let best = p.best.first().map_or(String::new(), |s| format!("{s:.4} s"));
-            let told = observe(&Progress::reached("sizes", p.evaluations, best));
-            interrupted |= told.is_break();
-            told
+            tell("sizes", p.evaluations, best)
         })?,
         None => (Vec::new(), 0),
     };
-    if interrupted {
+    if interrupted.get() {
         recorder.save()?;
     }
     let mut evaluations = 1 + 2 * scenarios.len() as u64 + sized;
     let mut optimised = None;
     let mut search_s = 0.0;
-    if settings.optimise && !interrupted {
+    if settings.optimise && !interrupted.get() {
         let budget_j = setup.budget_j(settings.energy_mj);
         let exact = setup.exact(budget_j, None)?;
-        let best = format!("{:.4} s", exact.lap.time);
-        interrupted = observe(&Progress::reached("reference optimum", 0, best)).is_break();
+        // Whether to go on is asked before each step.
+        let _ = tell("reference optimum", 0, format!("{:.4} s", exact.lap.time));
         let unbound = setup.exact(1e9, Some(&exact.shares))?;
-        let mut front: Vec<FrontPoint> = Vec::new();
+        let mut front = Vec::new();
+        let mut before: Option<Vec<f64>> = None;
         for &mj in &settings.budgets_mj {
-            if !interrupted {
-                let before = front.last().map(|p| p.deployment.shares.as_slice());
-                let deployment = setup.exact(1e6 * mj, before)?;
-                let best = format!("{mj} MJ: {:.4} s", deployment.lap.time);
-                interrupted = observe(&Progress::reached("front", 0, best)).is_break();
-                front.push(FrontPoint {
-                    budget_j: 1e6 * mj,
-                    deployment,
+            if !interrupted.get() {
+                let found = setup.exact(1e6 * mj, before.as_deref())?;
+                let _ = tell("front", 0, format!("{mj} MJ: {:.4} s", found.lap.time));
+                front.push(FrontFigures {
+                    energy_mj: 1e6 * mj / 1e6,
+                    deployed_mj: found.lap.deployed / 1e6,
+                    lap_time_s: found.lap.time,
                 });
+                before = Some(found.shares);
             }
         }
         let search = Instant::now();
-        let swarm = search_strategy(&setup, settings, budget_j / 1e6, &mut recorder, |p| {
+        let energy_mj = budget_j / 1e6;
+        let swarm = search_strategy(&setup, settings, energy_mj, &mut recorder, |p| {
             add_failures(&mut record.failures, &p.failures);
-            let told = observe(&Progress::reached(
-                "swarm",
-                p.evaluations,
-                format!("{:.4} s", p.best[0]),
-            ));
-            interrupted |= told.is_break();
-            told
+            tell("swarm", p.evaluations, format!("{:.4} s", p.best[0]))
         })?;
         evaluations += swarm.evaluations;
         let mut swarm_front = None;
-        if settings.objectives.len() > 1 && !interrupted {
-            let found = search_front(&setup, settings, budget_j / 1e6, &mut recorder, |p| {
+        if settings.objectives.len() > 1 && !interrupted.get() {
+            let found = search_front(&setup, settings, energy_mj, &mut recorder, |p| {
                 add_failures(&mut record.failures, &p.failures);
                 let best: Vec<String> = p.best.iter().map(|b| format!("{b:.3}")).collect();
-                let told = observe(&Progress::reached("swarm front", p.evaluations, best.join(" ")));
-                interrupted |= told.is_break();
-                told
+                tell("swarm front", p.evaluations, best.join(" "))
             })?;
             evaluations += found.evaluations;
             swarm_front = Some(found);
         }
         search_s = search.elapsed().as_secs_f64();
-        if interrupted {
+        if interrupted.get() {
             recorder.save()?;
         }
         optimised = Some(Optimised {
@@ -128,28 +124,14 @@ pub(super) fn deploy(
     recorder.complete(&mut record);
     record.took(evaluations, watch.elapsed_s(), search_s);
     record.longest_dispatch_ms = watch.longest_dispatch_ms();
-    record.interrupted = interrupted;
+    record.interrupted = interrupted.get();
     Ok(Some(Outcome {
         setup,
         engine,
         scenarios,
         optimised,
-        stint: stint_laps,
+        stint,
         sizing,
         record,
     }))
-}
-
-/// What evaluates.
-fn probe(setup: &HybridSetup, settings: &HybridStudySettings) -> Result<BackendInfo> {
-    let n = setup.points_m.len();
-    let problem = HybridProblem::new(
-        setup.fixed_line(),
-        setup.car.clone(),
-        EnergyPlan::whole(n, setup.run_in, Mode::Offset),
-        Strategy::fixed(Gates::OPEN, 1),
-        &[HybridObjective::LapTime],
-        setup.entry_mps,
-    )?;
-    Ok(open_hybrid_evaluator(&problem, settings.backend, settings.adapter.as_deref())?.backend())
 }

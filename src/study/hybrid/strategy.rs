@@ -4,7 +4,6 @@ use super::scenario::{ReportedLap, drive};
 use super::settings::{FreePart, HybridStudySettings};
 use super::setup::{GAP_M, HybridSetup, control_points, late_bend};
 use crate::error::Result;
-use crate::evaluate::BackendInfo;
 use crate::evaluate::energy::{
     Free, HybridLine, HybridObjective, HybridProblem, Strategy, open_hybrid_evaluator,
 };
@@ -75,10 +74,6 @@ pub struct FoundStrategy {
     pub lap: ReportedLap,
     /// Laps evaluated.
     pub evaluations: u64,
-    /// Best time (s) against evaluations.
-    pub history: Vec<(u64, f64)>,
-    /// What evaluated.
-    pub backend: BackendInfo,
 }
 
 impl HybridSetup {
@@ -102,34 +97,19 @@ impl HybridSetup {
     /// # Errors
     /// Those of [`HybridProblem::new`].
     pub fn exact_lap(&self, name: &str, shares: &[f64], energy_j: f64) -> Result<ReportedLap> {
-        let n = self.points_m.len();
-        let problem = HybridProblem::new(
-            self.fixed_line(),
-            self.car.clone(),
-            EnergyPlan::single(n, self.run_in, Mode::Additional),
-            Strategy {
-                shares: shares.to_vec(),
-                ..Strategy::fixed(zone_gates(energy_j / 1e6), n)
-            },
-            &[HybridObjective::LapTime],
-            self.entry_mps,
-        )?;
+        let problem = self.by_segment(Strategy {
+            shares: shares.to_vec(),
+            ..Strategy::fixed(zone_gates(energy_j / 1e6), self.points_m.len())
+        })?;
         Ok(ReportedLap::of(name, &problem, &[]))
     }
 
-    /// The problem of sharing an energy (MJ) out over the stretches that the motor is of use on.
+    /// The problem of sharing an energy (MJ) out over the stretches that the motor is of use on. Variables of other parts of the
+    /// strategy that are free come before those of the zones.
     ///
     /// # Errors
     /// Those of [`HybridProblem::new`].
-    pub fn zone_problem(&self, energy_mj: f64, objectives: &[HybridObjective]) -> Result<HybridProblem> {
-        self.zone_problem_with(&[], energy_mj, objectives)
-    }
-
-    /// The same with other parts of the strategy free, whose variables come before those of the zones.
-    ///
-    /// # Errors
-    /// As [`HybridSetup::zone_problem`].
-    pub(super) fn zone_problem_with(
+    pub fn zone_problem(
         &self,
         free: &[Free],
         energy_mj: f64,
@@ -142,17 +122,11 @@ impl HybridSetup {
         length.resize(self.points_m.len(), 0.0);
         let plan = EnergyPlan::zoned(&length, &starts, self.closed, self.run_in, Mode::Additional);
         let zones = plan.count();
-        HybridProblem::new(
-            self.fixed_line(),
-            self.car.clone(),
-            plan,
-            Strategy {
-                free: free.iter().copied().chain((0..zones).map(Free::Zone)).collect(),
-                ..Strategy::fixed(zone_gates(energy_mj), zones)
-            },
-            objectives,
-            self.entry_mps,
-        )
+        let strategy = Strategy {
+            free: free.iter().copied().chain((0..zones).map(Free::Zone)).collect(),
+            ..Strategy::fixed(zone_gates(energy_mj), zones)
+        };
+        self.problem(plan, strategy, objectives)
     }
 }
 
@@ -165,9 +139,9 @@ pub fn search_strategy(
     settings: &HybridStudySettings,
     energy_mj: f64,
     recorder: &mut Recorder<'_>,
-    mut observe: impl FnMut(&Progress) -> ControlFlow<()>,
+    observe: impl FnMut(&Progress) -> ControlFlow<()>,
 ) -> Result<FoundStrategy> {
-    let problem = setup.zone_problem(energy_mj, &[HybridObjective::LapTime])?;
+    let problem = setup.zone_problem(&[], energy_mj, &[HybridObjective::LapTime])?;
     let mut swarm = HybridSwarm::new(
         &problem.problem,
         HybridSettings {
@@ -178,18 +152,12 @@ pub fn search_strategy(
         },
     )?;
     let mut evaluator = open_hybrid_evaluator(&problem, settings.backend, settings.adapter.as_deref())?;
-    let mut history = Vec::new();
-    run(&mut swarm, &mut recorder.over(evaluator.as_mut()), |progress| {
-        history.push((progress.evaluations, progress.best[0]));
-        observe(progress)
-    })?;
+    run(&mut swarm, &mut recorder.over(evaluator.as_mut()), observe)?;
     let (shares, _) = swarm.best_candidate();
     Ok(FoundStrategy {
         lap: ReportedLap::of("swarm", &problem, &shares),
         shares,
         evaluations: swarm.evaluations(),
-        history,
-        backend: evaluator.backend(),
     })
 }
 
@@ -217,22 +185,20 @@ pub fn search_front(
     recorder: &mut Recorder<'_>,
     observe: impl FnMut(&Progress) -> ControlFlow<()>,
 ) -> Result<StrategyFront> {
-    let fixed = setup.zone_problem(energy_mj, &settings.objectives)?;
-    let mut starts: Vec<Vec<f64>> = Vec::new();
-    let problem = match (settings.free, &setup.alpha) {
-        (FreePart::Strategy, _) | (_, None) => fixed,
+    let fixed = setup.zone_problem(&[], energy_mj, &settings.objectives)?;
+    let (problem, line) = match (settings.free, &setup.alpha) {
+        (FreePart::Strategy, _) | (_, None) => (fixed, Vec::new()),
         (free, Some(alpha)) => {
             // Control points move the line about the fastest one, which a few of them alone could not say.
             let mut cuts = setup.raceline.cuts.clone();
             cuts.reference.clone_from(alpha);
-            let n = cuts.len();
             let parametrisation = Parametrisation::control_points(control_points(&cuts));
             let coefficients = parametrisation.fit(&cuts, alpha)?;
             let line = parametrisation.variables_of(&coefficients);
             // Zones lie where they do on the fixed line, by distance.
             let shape = geometry(&cuts.points(alpha), cuts.closed);
             let mut length = shape.segment_m.clone();
-            length.resize(n, 0.0);
+            length.resize(cuts.len(), 0.0);
             let zone_sections = sections_of(&fixed, &length);
             let run_in = late_bend(&shape.curvature_1pm);
             let plan = EnergyPlan::zoned(&length, &zone_sections, cuts.closed, run_in, Mode::Additional);
@@ -252,8 +218,7 @@ pub fn search_front(
                 &settings.objectives,
                 settings.entry_mps,
             )?;
-            starts = vec![line];
-            problem
+            (problem, line)
         }
     };
     let mopso = MopsoSettings {
@@ -266,7 +231,7 @@ pub fn search_front(
         ..MopsoSettings::default()
     };
     let mut swarm = Mopso::new(&problem.problem, mopso)?;
-    swarm.start_from(&starting_candidates(&problem, settings, &starts))?;
+    swarm.start_from(&starting_candidates(&problem, settings, &line))?;
     let mut evaluator = open_hybrid_evaluator(&problem, settings.backend, settings.adapter.as_deref())?;
     run(&mut swarm, &mut recorder.over(evaluator.as_mut()), observe)?;
     Ok(StrategyFront {
@@ -301,26 +266,22 @@ fn sections_of(fixed: &HybridProblem, length_m: &[f64]) -> Vec<usize> {
     if starts.is_empty() { vec![0] } else { starts }
 }
 
-/// Known lines, or none, with shares of all zones from none to all.
+/// The known line, where lines are free, with shares of all zones from none to all.
 fn starting_candidates(
     problem: &HybridProblem,
     settings: &HybridStudySettings,
-    lines: &[Vec<f64>],
+    line: &[f64],
 ) -> Vec<Vec<f64>> {
     /// Purpose of the draws in the counter.
     const SPREAD: u32 = 0x11e9;
     let random = Random::new(settings.seed);
     let shares = problem.dimensions() - problem.line_variables();
-    let line_of = |i: usize| match lines {
-        [] => Vec::new(),
-        lines => lines[i % lines.len()].clone(),
-    };
     (0..settings.population)
         .map(|i| {
             let level = i as f64 / (settings.population - 1) as f64;
             let noise = |k: usize| random.uniform(SPREAD, 0, i as u32, k as u32) - 0.5;
-            let mut candidate = line_of(i);
-            if i >= lines.len() {
+            let mut candidate = line.to_vec();
+            if i > 0 {
                 for (k, x) in candidate.iter_mut().enumerate() {
                     let v = &problem.problem.variables[k];
                     *x = (*x + 0.002 * noise(shares + k) * (v.upper - v.lower)).clamp(v.lower, v.upper);

@@ -17,11 +17,11 @@ pub use polish::{Polished, polish};
 pub use results::Summary;
 pub use search::{Judged, Outcome, judge_candidate, search_with, total_parameter_error};
 pub use settings::{Algorithm, FreeParameter, IdentifySettings, ObjectiveChoice};
-pub use setup::{Setup, cost_unit, lap_format, load_circuit, set_up};
+pub use setup::{Setup, cost_unit, lap_format, set_up};
 pub(in crate::study) use setup::{planned, subject, without_laps};
-pub use state::{Front, HistoryRow, SearchState, Stage};
+pub use state::{Front, HistoryRow, SearchState};
 
-use crate::config::settings::{Role, Settings};
+use crate::config::settings::Settings;
 use crate::error::{Error, Result};
 use crate::evaluate::replay::open_evaluator;
 use crate::evaluate::{PackedClient, run_packed};
@@ -59,7 +59,7 @@ impl Study for Identify {
     fn size(settings: &IdentifySettings, prepared: Option<&Setup>) -> Vec<Kept> {
         let samples = prepared.map_or(0, |setup| setup.log.samples());
         let size = settings.size();
-        Size { samples, ..size }.kept().to_vec()
+        Size { samples, ..size }.kept()
     }
 
     fn plan(settings: &IdentifySettings, setup: &Setup, plan: Plan) -> Result<Plan> {
@@ -142,7 +142,19 @@ impl Study for Identify {
         outcome: &Outcome,
         summary: &Summary,
     ) -> Result<()> {
-        results::report(folder, settings, setup, outcome, summary)
+        let car = setup
+            .replay
+            .free
+            .candidate_car(&results::reported_candidate(setup, outcome));
+        car.write(folder, "car")?;
+        results::write_history(folder, outcome)?;
+        results::write_parameters(folder, summary)?;
+        if let Some(front) = &outcome.front {
+            results::write_front(folder, setup, front)?;
+        }
+        let judged = judge_candidate(&setup.replay, &outcome.candidate);
+        results::write_traces(folder, setup, &judged)?;
+        page::write(folder, settings, setup, outcome, &judged, summary)
     }
 
     fn text(settings: &IdentifySettings, summary: &Summary) -> String {
@@ -172,12 +184,5 @@ impl Study for Identify {
         let costs = summary.costs.iter();
         figures.extend(costs.map(|(channel, cost)| (format!("cost_{channel}"), Some(*cost))));
         figures
-    }
-}
-
-impl IdentifySettings {
-    /// The settings of the same problem with the usual search.
-    pub fn problem(self) -> Self {
-        self.with_role_of(Role::Search, &Self::default())
     }
 }

@@ -1,12 +1,12 @@
 //! The interactive report of an identification, with its figures.
 
-use super::results::{LABELS, Summary, parameter_rows, traced_lap};
+use super::results::{Summary, parameter_rows, traced_lap};
 use super::search::{Judged, Outcome};
 use super::settings::IdentifySettings;
 use super::setup::{CHANNELS, Setup, cost_unit};
 use crate::config::settings::Settings;
 use crate::error::Result;
-use crate::evaluate::replay::{CHANNEL_NAMES, CHANNEL_UNITS};
+use crate::evaluate::replay::{CHANNEL_LABELS, CHANNEL_NAMES, CHANNEL_UNITS};
 use crate::report::{
     Curves, Figure, Front, HtmlReport, LapLine, LapView, Panel, Parameters, Scale, Table, significant,
 };
@@ -147,7 +147,7 @@ fn head(page: &mut HtmlReport, car: &str, source: &str, outcome: &Outcome, summa
         page.tile("Total parameter error", significant(error, 3), "");
     }
     page.tile("Identifiable parameters", format!("{sound} of {count}"), "");
-    for (k, label) in LABELS.iter().enumerate() {
+    for (k, label) in CHANNEL_LABELS.iter().enumerate() {
         page.tile(
             &format!("Error of {label}"),
             significant(share(CHANNEL_NAMES[k]), 2),
@@ -174,7 +174,7 @@ fn head(page: &mut HtmlReport, car: &str, source: &str, outcome: &Outcome, summa
 /// `part [unit]` of each channel in words.
 fn by_channel(of: impl Fn(&str) -> String) -> String {
     let unit = |k: usize| CHANNEL_UNITS[k].replace("^2", "\u{b2}");
-    let part = |k: usize| format!("{} {} {}", LABELS[k], of(CHANNEL_NAMES[k]), unit(k));
+    let part = |k: usize| format!("{} {} {}", CHANNEL_LABELS[k], of(CHANNEL_NAMES[k]), unit(k));
     (0..CHANNELS).map(part).collect::<Vec<_>>().join(", ")
 }
 
@@ -195,7 +195,7 @@ fn lap(setup: &Setup, judged: &Judged, title: String) -> LapView {
         let (own, model) = (&measured[k][range.clone()], &judged.outputs[k][range.clone()]);
         let errors: Vec<f64> = model.iter().zip(own).map(|(f, m)| f - m).collect();
         view = view
-            .panel(LABELS[k], CHANNEL_UNITS[k])
+            .panel(CHANNEL_LABELS[k], CHANNEL_UNITS[k])
             .low_panel("error", CHANNEL_UNITS[k])
             .panel_note(rms_text(&errors, CHANNEL_UNITS[k]));
         logged = logged.trace(2 * k, own);
@@ -224,7 +224,7 @@ fn rms_text(errors: &[f64], unit: &str) -> String {
 pub(super) fn channels(settings: &IdentifySettings, summary: &Summary) -> Table<'static> {
     let held = |name| summary.holdout_rms_error.as_ref().map(|h| h[name]);
     let table = Table::rows(0..CHANNELS)
-        .text("channel", |k| LABELS[*k])
+        .text("channel", |k| CHANNEL_LABELS[*k])
         .text("unit", |k| CHANNEL_UNITS[*k])
         .number("rms signal", "", |k| summary.rms_signal[CHANNEL_NAMES[*k]])
         .number("rms error", "", |k| summary.rms_error[CHANNEL_NAMES[*k]])

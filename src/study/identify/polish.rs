@@ -1,13 +1,11 @@
 //! Least-squares polish of a candidate: Levenberg-Marquardt on the exact Jacobian, in `f64`, within the bounds.
 
+use super::setup::CHANNELS;
 use crate::evaluate::Variable;
-use crate::evaluate::replay::{CHANNEL_NAMES, ReplayProblem, Residuals};
+use crate::evaluate::replay::{ReplayProblem, Residuals};
 use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
 use nalgebra::{DMatrix, DVector, Dyn, VecStorage};
 use std::ops::ControlFlow;
-
-/// Number of compared channels.
-const CHANNELS: usize = CHANNEL_NAMES.len();
 
 /// The outcome of a polish.
 #[derive(Clone, Debug)]
@@ -16,10 +14,6 @@ pub struct Polished {
     pub candidate: Vec<f64>,
     /// Half the sum of the squares of the weighted errors.
     pub cost: f64,
-    /// Drives of the car that it took.
-    pub evaluations: usize,
-    /// Whether the method met one of its tolerances.
-    pub converged: bool,
     /// Whether it was interrupted.
     pub interrupted: bool,
 }
@@ -43,7 +37,6 @@ struct Bounded<'a> {
     u: DVector<f64>,
     current: Option<Residuals>,
     length: usize,
-    evaluations: usize,
     /// Asked before every drive.
     watch: &'a mut dyn FnMut() -> ControlFlow<()>,
     interrupted: bool,
@@ -74,7 +67,6 @@ impl LeastSquaresProblem<f64, Dyn, Dyn> for Bounded<'_> {
         self.interrupted |= (self.watch)().is_break();
         if !self.interrupted {
             self.current = self.replay.residuals(&self.candidate(u));
-            self.evaluations += 1;
             if let Some(r) = &self.current {
                 let weighted = r.errors.iter().enumerate().map(|(i, e)| self.weight(i) * e);
                 let cost = 0.5 * weighted.map(|e| e * e).sum::<f64>();
@@ -142,22 +134,19 @@ pub(super) fn polish_watched(
         u: u.clone(),
         current: None,
         length,
-        evaluations: 0,
         watch,
         interrupted: false,
         best: (u.clone(), f64::INFINITY),
     };
     problem.set_params(&u);
     let patience = (most_drives / (variables.len() + 1)).max(1);
-    let (problem, report) = LevenbergMarquardt::new()
+    let (problem, _) = LevenbergMarquardt::new()
         .with_patience(patience)
         .with_ftol(LEAST_GAIN)
         .minimize(problem);
     Some(Polished {
         candidate: problem.candidate(&problem.best.0),
         cost: problem.best.1,
-        evaluations: problem.evaluations,
-        converged: report.termination.was_successful(),
         interrupted: problem.interrupted,
     })
 }

@@ -12,8 +12,6 @@ use std::ops::ControlFlow;
 /// What the refinement came to.
 pub(super) struct Refined {
     pub candidate: Vec<f64>,
-    /// Drives that it took, those of the hops' starts left out.
-    pub drives: usize,
     /// Hops that were tried, and that led further down.
     pub hops: usize,
     pub hops_gained: usize,
@@ -37,7 +35,6 @@ pub(super) fn refine(
     let replay = &setup.replay;
     let mut refined = Refined {
         candidate: candidate.to_vec(),
-        drives: 0,
         hops: 0,
         hops_gained: 0,
         interrupted: false,
@@ -46,7 +43,6 @@ pub(super) fn refine(
     let Some(polished) = polish_watched(replay, candidate, spread, MOST_DRIVES, watch) else {
         return Ok(refined);
     };
-    refined.drives += polished.evaluations;
     refined.interrupted = polished.interrupted;
     refined.candidate = polished.candidate;
     let mut cost = polished.cost;
@@ -71,7 +67,6 @@ pub(super) fn refine(
             // Maximum likelihood for white noise of these sizes.
             let weights = noise.map(|n| 1.0 / n);
             if let Some(p) = polish_watched(replay, &refined.candidate, weights, MOST_DRIVES, watch) {
-                refined.drives += p.evaluations;
                 refined.interrupted = p.interrupted;
                 refined.candidate = p.candidate;
             }
@@ -81,7 +76,6 @@ pub(super) fn refine(
         let hopped = hop(replay, evaluator, from, (settings.seed, refined.hops), watch)?;
         refined.hops += 1;
         if let Some(hopped) = hopped {
-            refined.drives += hopped.evaluations;
             refined.interrupted = hopped.interrupted;
             if gains(&hopped, cost) {
                 refined.hops_gained += 1;

@@ -93,20 +93,19 @@ fn by_channel(values: [f64; CHANNELS]) -> BTreeMap<String, f64> {
 }
 
 /// The candidate to hand out: fitted values, but the starting car's where the log cannot tell.
-fn reported_candidate(setup: &Setup, outcome: &Outcome) -> Vec<f64> {
-    let base = setup.replay.free.base();
-    outcome
+pub(super) fn reported_candidate(setup: &Setup, outcome: &Outcome) -> Vec<f64> {
+    let free = &setup.replay.free;
+    let mut candidate = free.values_in(free.base());
+    let told = outcome
         .candidate
         .iter()
-        .enumerate()
-        .map(|(k, x)| {
-            if outcome.identifiability.identifiable[k] {
-                *x
-            } else {
-                base[setup.replay.free.parameters[k].slots[0]]
-            }
-        })
-        .collect()
+        .zip(&outcome.identifiability.identifiable);
+    for (x, (fitted, told)) in candidate.iter_mut().zip(told) {
+        if *told {
+            *x = *fitted;
+        }
+    }
+    candidate
 }
 
 /// Works the figures out.
@@ -179,33 +178,7 @@ pub(super) fn summarise(settings: &IdentifySettings, setup: &Setup, outcome: &Ou
     }
 }
 
-/// Writes the car, tables, figures and the page.
-///
-/// # Errors
-/// [`crate::Error::Io`] if one cannot be written.
-pub(super) fn report(
-    folder: &Path,
-    settings: &IdentifySettings,
-    setup: &Setup,
-    outcome: &Outcome,
-    summary: &Summary,
-) -> Result<()> {
-    let replay = &setup.replay;
-    replay
-        .free
-        .candidate_car(&reported_candidate(setup, outcome))
-        .write(folder, "car")?;
-    write_history(folder, outcome)?;
-    write_parameters(folder, summary)?;
-    if let Some(front) = &outcome.front {
-        write_front(folder, setup, front)?;
-    }
-    let judged = judge_candidate(replay, &outcome.candidate);
-    write_traces(folder, setup, &judged)?;
-    super::page::write(folder, settings, setup, outcome, &judged, summary)
-}
-
-fn write_history(folder: &Path, outcome: &Outcome) -> Result<()> {
+pub(super) fn write_history(folder: &Path, outcome: &Outcome) -> Result<()> {
     let rows = &outcome.history;
     let width = rows.first().map_or(0, |r| r.best.len());
     let mut table = Table::rows(rows)
@@ -227,7 +200,7 @@ fn write_history(folder: &Path, outcome: &Outcome) -> Result<()> {
         .write_csv(folder.join("convergence.csv"))
 }
 
-fn write_parameters(folder: &Path, summary: &Summary) -> Result<()> {
+pub(super) fn write_parameters(folder: &Path, summary: &Summary) -> Result<()> {
     Table::rows(&summary.parameters)
         .text("parameter", |p| &*p.name)
         .text("unit", |p| &*p.unit)
@@ -265,7 +238,7 @@ pub(super) fn parameter_rows(summary: &Summary) -> Vec<ParameterRow> {
         .collect()
 }
 
-fn write_front(folder: &Path, setup: &Setup, front: &super::Front) -> Result<()> {
+pub(super) fn write_front(folder: &Path, setup: &Setup, front: &super::Front) -> Result<()> {
     let problem = &setup.replay.problem;
     let columns = |rows: &[Vec<f64>], named: Vec<(&String, &String)>| {
         let mut table = Table::rows(rows);
@@ -280,14 +253,6 @@ fn write_front(folder: &Path, setup: &Setup, front: &super::Front) -> Result<()>
     columns(&front.candidates, variables.collect()).write_csv(folder.join("VAR.csv"))
 }
 
-/// Labels of the channels in pictures.
-pub(super) const LABELS: [&str; CHANNELS] = [
-    "speed",
-    "longitudinal acceleration",
-    "lateral acceleration",
-    "yaw rate",
-];
-
 /// One lap, the first that has a fitted sample: laps over one another would not be legible.
 pub(super) fn traced_lap(log: &crate::telemetry::Log, judged: &Judged) -> std::ops::Range<usize> {
     let fitted = |i: usize| judged.outputs[0][i].is_finite();
@@ -295,7 +260,7 @@ pub(super) fn traced_lap(log: &crate::telemetry::Log, judged: &Judged) -> std::o
     laps.find(|r| r.clone().any(fitted)).unwrap_or(0..log.samples())
 }
 
-fn write_traces(folder: &Path, setup: &Setup, judged: &Judged) -> Result<()> {
+pub(super) fn write_traces(folder: &Path, setup: &Setup, judged: &Judged) -> Result<()> {
     let log = &setup.log;
     let measured = [&log.vx_mps, &log.ax_mps2, &log.ay_mps2, &log.yaw_rate_radps];
     let mut table = Table::new()

@@ -5,12 +5,13 @@ use super::identifiability::{Identifiability, judge};
 use super::refine::refine;
 use super::settings::{Algorithm, EXPLORE, FRONT, GATHER, IdentifySettings};
 use super::setup::{CHANNELS, Setup};
-use super::state::{Front, HistoryRow, Place, SearchState, Stage, inputs_of};
+use super::state::{Front, HistoryRow, Place, SearchState, inputs_of};
 use crate::error::{Error, Result};
 use crate::evaluate::replay::{ReplayProblem, trace};
 use crate::evaluate::{Evaluator, FailureCounts, add_failures};
 use crate::study::framework::state_file::{Origin, StateFile};
 use crate::study::framework::{DeviceFaults, Progress as Told, RunRecord, Watch};
+use crate::swarm::metrics::Scale;
 use crate::swarm::{CovarianceSettings, CovarianceSwarm, Mopso, MopsoSettings, Progress, Pso, PsoSettings};
 use std::ops::ControlFlow;
 use std::time::Instant;
@@ -31,10 +32,6 @@ pub struct Outcome {
     pub record: RunRecord,
     /// Time that the swarm took, s.
     pub swarm_s: f64,
-    /// Time that the polish took, s.
-    pub polish_s: f64,
-    /// Drives that the polish took.
-    pub polish_evaluations: usize,
     /// Hops to other minima that were tried, and that led further down.
     pub hops: [usize; 2],
 }
@@ -76,7 +73,7 @@ pub fn search_with(
     let began = Instant::now();
     let mut interrupted = false;
     while !matches!(state.place, Place::Searched { .. }) {
-        let Some((stage, planned, progress)) = state.place.advance(evaluator)? else {
+        let Some((doing, planned, progress)) = state.place.advance(evaluator)? else {
             state.place = next_place(state.place, settings, evaluator)?;
             state_file.save_or_warn(&state);
             continue;
@@ -87,7 +84,7 @@ pub fn search_with(
         state.device_faults.extend(met);
         let best: Vec<String> = progress.best.iter().map(|b| format!("{b:.3e}")).collect();
         let flow = observe(&Told {
-            stage: stage.doing().to_owned(),
+            stage: doing.to_owned(),
             done: progress.iteration as u64,
             planned: Some(planned as u64),
             reached: format!("best {}, {} failed", best.join(" "), progress.failed),
@@ -121,7 +118,7 @@ pub fn search_with(
     if settings.polish && !interrupted {
         let mut told = || {
             observe(&Told::reached(
-                Stage::Polish.doing(),
+                "polishing",
                 0,
                 "least squares on the exact Jacobian",
             ))
@@ -130,9 +127,9 @@ pub fn search_with(
         interrupted |= found.interrupted;
         refined = Some(found);
     }
-    let (candidate, polish_evaluations, hops) = match refined {
-        Some(r) => (r.candidate, r.drives, [r.hops, r.hops_gained]),
-        None => (swarm_candidate.clone(), 0, [0, 0]),
+    let (candidate, hops) = match refined {
+        Some(r) => (r.candidate, [r.hops, r.hops_gained]),
+        None => (swarm_candidate.clone(), [0, 0]),
     };
     let residuals = replay
         .residuals(&candidate)
@@ -146,14 +143,12 @@ pub fn search_with(
     record.took(evaluations, swarm_s + polish_s, swarm_s);
     Ok(Outcome {
         identifiability: judge(&residuals, &replay.problem.variables, &candidate, &setup.scales),
-        polish_s,
         swarm_candidate,
         candidate,
         front,
         history: state.history,
         record,
         swarm_s,
-        polish_evaluations,
         hops,
     })
 }
@@ -267,27 +262,30 @@ impl IdentifySettings {
 }
 
 fn swarm_settings(settings: &IdentifySettings) -> PsoSettings {
+    let several = settings.objectives.len() > 1;
     let base = match settings.algorithm {
         Algorithm::Thesis => PsoSettings::thesis(),
         _ => PsoSettings::default(),
     };
-    let adaptive = settings.algorithm == Algorithm::Adaptive && settings.objectives.len() == 1;
-    let usual = match settings.algorithm {
-        Algorithm::Thesis => (base.population, base.iterations),
-        _ if settings.objectives.len() > 1 => FRONT,
-        _ => (base.population, base.iterations),
-    };
-    let (population, iterations) = if adaptive {
-        let most = |given: Option<usize>, times: usize| given.map_or(usize::MAX, |n| n.saturating_mul(times));
-        (
-            EXPLORE.0.min(most(settings.population, 2)),
-            EXPLORE.1.min(most(settings.iterations, 1)),
-        )
-    } else {
-        (
-            settings.population.unwrap_or(usual.0),
-            settings.iterations.unwrap_or(usual.1),
-        )
+    let (population, iterations) = match settings.algorithm {
+        Algorithm::Adaptive if !several => {
+            let most =
+                |given: Option<usize>, times: usize| given.map_or(usize::MAX, |n| n.saturating_mul(times));
+            let population = EXPLORE.0.min(most(settings.population, 2));
+            (population, EXPLORE.1.min(most(settings.iterations, 1)))
+        }
+        algorithm => {
+            let own = several && algorithm != Algorithm::Thesis;
+            let usual = if own {
+                FRONT
+            } else {
+                (base.population, base.iterations)
+            };
+            (
+                settings.population.unwrap_or(usual.0),
+                settings.iterations.unwrap_or(usual.1),
+            )
+        }
     };
     PsoSettings {
         population,
@@ -329,7 +327,7 @@ fn front_settings(settings: &IdentifySettings, motion: PsoSettings) -> MopsoSett
 }
 
 impl SearchState {
-    /// Notes an iteration down; counts go on from the stage before.
+    /// Records an iteration; counts continue from the stage before.
     fn note(&mut self, progress: &Progress) {
         let last = self.history.last();
         let (iteration, evaluations) = last.map_or((0, 0), |r| (r.iteration, r.evaluations));
@@ -363,25 +361,9 @@ impl SearchState {
 /// The front of a swarm's archive.
 fn front_of(swarm: &Mopso) -> Option<Front> {
     let objectives = swarm.archive().objectives.clone();
-    let width = objectives.first()?.len();
-    let bound = |k: usize, f: fn(f64, f64) -> f64, start: f64| objectives.iter().map(|o| o[k]).fold(start, f);
-    let distance = |row: &Vec<f64>| -> f64 {
-        (0..width)
-            .map(|k| {
-                let (low, high) = (
-                    bound(k, f64::min, f64::INFINITY),
-                    bound(k, f64::max, f64::NEG_INFINITY),
-                );
-                if high > low {
-                    ((row[k] - low) / (high - low)).powi(2)
-                } else {
-                    0.0
-                }
-            })
-            .sum()
-    };
-    let chosen = (0..objectives.len())
-        .min_by(|&a, &b| distance(&objectives[a]).total_cmp(&distance(&objectives[b])))?;
+    let shares = Scale::of(&objectives).apply(&objectives);
+    let distance = |i: usize| shares[i].iter().map(|x| x * x).sum::<f64>();
+    let chosen = (0..objectives.len()).min_by(|&a, &b| distance(a).total_cmp(&distance(b)))?;
     Some(Front {
         candidates: swarm.archive_candidates(),
         objectives,

@@ -10,6 +10,7 @@ use crate::study::framework::{Plan, Subject};
 use crate::telemetry::{ChannelMap, Log, LogOptions, NativeFormat, Recording};
 use crate::track::{Circuit, Track};
 use crate::vehicle::Car;
+use crate::vehicle::modes::{fastest_mode_within, stable_steps};
 use std::path::Path;
 
 /// Number of compared channels.
@@ -33,15 +34,6 @@ pub struct Setup {
     pub circuit: Option<Circuit>,
     /// Standard deviation of each channel over the scored samples, which its errors are set against.
     pub scales: [f64; CHANNELS],
-}
-
-/// The stability limit of the classical Runge-Kutta method on the negative real axis, with a margin for modes that
-/// are stiffer than the estimate below.
-const STABLE_STEP: f64 = 2.4;
-
-/// The fastest mode (1/s) of a car at a speed (m/s), after the figures of the book, chapter Model, section 2.
-fn fastest_mode(speed: f64) -> f64 {
-    60.0 + 620.0 / speed
 }
 
 /// Reads what the settings name and puts the problem together.
@@ -69,11 +61,9 @@ pub fn set_up(settings: &IdentifySettings) -> Result<Setup> {
         }
     };
     let track = settings.track.as_deref().or(bundled.then_some(BUNDLED_TRACK));
-    let circuit = track.map(load_circuit).transpose()?;
-    let truth_car = match settings.truth.as_deref().or(bundled.then_some("gt")) {
-        Some(name) => Some(Car::load(name)?),
-        None => None,
-    };
+    let circuit = track.map(|name| Track::load(name)?.circuit()).transpose()?;
+    let truth_car = settings.truth.as_deref().or(bundled.then_some("gt"));
+    let truth_car = truth_car.map(Car::load).transpose()?;
 
     let samples = samples_of(&log);
     let (fitted, held) = choose_laps(settings, &log)?;
@@ -90,20 +80,25 @@ pub fn set_up(settings: &IdentifySettings) -> Result<Setup> {
             "at least one window of the length asked for",
         ));
     }
+    let held_windows = windows_over(settings, &log, &samples, &held, circuit.as_ref())?;
     let slowest = fit_windows
         .iter()
+        .chain(&held_windows)
         .flat_map(|w| &samples[w.start..w.end])
         .map(|s| s.measured[0])
         .fold(f64::INFINITY, f64::min);
-    let automatic = (log.dt_s * fastest_mode(slowest.max(1.0)) / STABLE_STEP).ceil() as usize;
-    let substeps = settings.substeps.unwrap_or(automatic.max(1));
+    let free = free_parameters(settings, &car)?;
+    // As fine as the stiffest car within the bounds needs it at the slowest place.
+    let substeps = settings.substeps.unwrap_or_else(|| {
+        let fastest = fastest_mode_within(&car.to_flat(), car.tyre_model(), &free, slowest.max(1.0));
+        stable_steps(log.dt_s, fastest)
+    });
     let scales = channel_scales(&samples, &fit_windows);
     let problem = |windows: Vec<Window<f64>>| {
-        let free = free_parameters(settings, &car)?;
         let weights = objective_weights(settings, &scales, &windows, log.dt_s);
         ReplayProblem::new(
             car.clone(),
-            free,
+            free.clone(),
             samples.clone(),
             windows,
             (log.dt_s, substeps),
@@ -112,20 +107,10 @@ pub fn set_up(settings: &IdentifySettings) -> Result<Setup> {
         )
     };
     let replay = problem(fit_windows)?;
-    let holdout = if held.is_empty() {
-        None
-    } else {
-        let windows = windows_over(settings, &log, &samples, &held, circuit.as_ref())?;
-        if windows.is_empty() {
-            None
-        } else {
-            Some(problem(windows)?)
-        }
-    };
-    let truth = truth_car.map(|truth| {
-        let flat = truth.to_flat();
-        replay.free.parameters.iter().map(|p| flat[p.slots[0]]).collect()
-    });
+    let holdout = (!held_windows.is_empty())
+        .then(|| problem(held_windows))
+        .transpose()?;
+    let truth = truth_car.map(|truth| replay.free.values_in(&truth.to_flat()));
     Ok(Setup {
         truth,
         circuit,
@@ -175,11 +160,6 @@ pub(in crate::study) fn subject(settings: &IdentifySettings, setup: &Setup) -> S
         log: Some(setup.log.source.clone()),
         track: None,
     }
-}
-
-/// The circuit of a track's name or file (see [`Track::load`]).
-pub fn load_circuit(name_or_path: &str) -> Result<Circuit> {
-    Track::load(name_or_path)?.circuit()
 }
 
 fn samples_of(log: &Log) -> Vec<Sample<f64>> {
@@ -257,7 +237,7 @@ fn windows_over(
                 "the study",
                 "section",
                 name,
-                "a track (--track, or track in the study) on which the section is named",
+                "a track on which the section is named (the setting track)",
             ));
         }
         (None, _) => None,

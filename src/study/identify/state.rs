@@ -1,4 +1,4 @@
-//! The state of a search: all that it takes to go on.
+//! The state of a search: all that it takes to resume it.
 
 use super::coordinates::Logarithmic;
 use super::settings::IdentifySettings;
@@ -10,28 +10,6 @@ use crate::study::framework::{Inputs, State};
 use crate::swarm::checkpoint::Checkpoint;
 use crate::swarm::{CovarianceSwarm, Mopso, Optimiser, Progress, Pso, step};
 use serde::{Deserialize, Serialize};
-
-/// A stage of the work, for progress reports.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Stage {
-    /// The exploring swarm.
-    Explore,
-    /// The swarm that learns the valley.
-    Gather,
-    /// The least-squares polish.
-    Polish,
-}
-
-impl Stage {
-    /// What is being done, in a word.
-    pub(super) fn doing(self) -> &'static str {
-        match self {
-            Self::Explore => "exploring",
-            Self::Gather => "gathering",
-            Self::Polish => "polishing",
-        }
-    }
-}
 
 /// One line of the convergence history.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -78,7 +56,7 @@ pub(super) enum Place {
     Searched { best: Vec<f64>, front: Option<Front> },
 }
 
-/// The state of a search. A checkpoint of it goes on bit for bit on the backend where it began.
+/// The state of a search. A search that is resumed from its checkpoint on the same backend gives the same bits.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct SearchState {
     /// What the search was asked to do.
@@ -120,26 +98,26 @@ pub(super) fn inputs_of(setup: &Setup) -> String {
 }
 
 impl Place {
-    /// One iteration of the present stage, with the stage and what it plans; nothing once it is done.
+    /// One iteration of the present stage, with what it does and how many it plans; nothing once it is done.
     pub(super) fn advance(
         &mut self,
         evaluator: &mut dyn Evaluator,
-    ) -> Result<Option<(Stage, usize, Progress)>> {
+    ) -> Result<Option<(&'static str, usize, Progress)>> {
         fn go(
-            stage: Stage,
+            doing: &'static str,
             swarm: &mut dyn Optimiser,
             evaluator: &mut dyn Evaluator,
-        ) -> Result<Option<(Stage, usize, Progress)>> {
+        ) -> Result<Option<(&'static str, usize, Progress)>> {
             if swarm.done() {
                 return Ok(None);
             }
             let progress = step(swarm, evaluator)?;
-            Ok(Some((stage, swarm.planned_iterations(), progress)))
+            Ok(Some((doing, swarm.planned_iterations(), progress)))
         }
         match self {
-            Self::Explore(swarm) => go(Stage::Explore, swarm.as_mut(), evaluator),
-            Self::Front(swarm) => go(Stage::Explore, swarm.as_mut(), evaluator),
-            Self::Gather { swarm, .. } => go(Stage::Gather, swarm.as_mut(), &mut Logarithmic::new(evaluator)),
+            Self::Explore(swarm) => go("exploring", swarm.as_mut(), evaluator),
+            Self::Front(swarm) => go("exploring", swarm.as_mut(), evaluator),
+            Self::Gather { swarm, .. } => go("gathering", swarm.as_mut(), &mut Logarithmic::new(evaluator)),
             Self::Searched { .. } => Ok(None),
         }
     }

@@ -6,10 +6,10 @@ use super::setup::Setup;
 use super::solver_thread::watched;
 use crate::error::Result;
 use crate::evaluate::line::{LineProblem, open_line_evaluator};
-use crate::evaluate::{BackendInfo, Evaluator, FailureCounts, add_failures};
+use crate::evaluate::{BackendInfo, Evaluator, FailureCounts};
 use crate::line::Parametrisation;
 use crate::random::Random;
-use crate::study::framework::DeviceFaults;
+use crate::study::framework::{DeviceFaults, Losses};
 use crate::swarm::metrics::hypervolume;
 use crate::swarm::{Archive, Mopso, MopsoSettings, Optimiser, Progress, PsoSettings, Truncation, step};
 use serde::{Deserialize, Serialize};
@@ -31,10 +31,8 @@ pub struct LineFront {
     pub ideal: Vec<f64>,
     /// Lines evaluated.
     pub evaluations: u64,
-    /// Lines that failed, by reason.
-    pub failures: FailureCounts,
-    /// What went wrong with devices and was got over.
-    pub device_faults: Vec<String>,
+    /// What went wrong.
+    pub losses: Losses,
     /// What evaluated in the end.
     pub backend: Option<BackendInfo>,
 }
@@ -43,8 +41,7 @@ pub struct LineFront {
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct FrontState {
     pub swarm: Mopso,
-    pub failures: FailureCounts,
-    pub device_faults: Vec<String>,
+    pub losses: Losses,
 }
 
 /// Metres of the reference line for each control point of the front's lines.
@@ -60,34 +57,18 @@ const LATTICE: u32 = 5;
 /// Cone programs for each line of the local search: most of the gain is in the first.
 const PROGRAMS: usize = 6;
 
-/// Looks for the front. `known` are lines to start from and to keep (`alpha` at every cut).
+/// Looks for the front. `known` are lines to start from and to keep (`alpha` at every cut). `begun` is the swarm of the same
+/// search that was interrupted, if one was, and what is known to go wrong with devices; `observe` is told the swarm after
+/// each iteration.
 ///
 /// # Errors
-/// Those of the evaluator and of the solvers.
-pub fn search_front(
+/// Those of the evaluator, of the solvers and of `observe`.
+pub(super) fn search_front(
     setup: &Setup,
     settings: &RacelineSettings,
     solvers: &ReferenceSolvers,
     known: &[Vec<f64>],
-    mut observe: impl FnMut(&Progress) -> ControlFlow<()>,
-) -> Result<LineFront> {
-    search_front_from(setup, settings, solvers, known, None, &[], |progress, _| {
-        Ok(observe(progress))
-    })
-}
-
-/// As [`search_front`], from the swarm of the same search that was interrupted, if one is given; `observe` is told the swarm
-/// after each iteration.
-///
-/// # Errors
-/// As [`search_front`], and those of `observe`.
-pub(super) fn search_front_from(
-    setup: &Setup,
-    settings: &RacelineSettings,
-    solvers: &ReferenceSolvers,
-    known: &[Vec<f64>],
-    state: Option<FrontState>,
-    known_faults: &[String],
+    (state, known_faults): (Option<FrontState>, &[String]),
     mut observe: impl FnMut(&Progress, &FrontState) -> Result<ControlFlow<()>>,
 ) -> Result<LineFront> {
     let cuts = &setup.cuts;
@@ -107,45 +88,31 @@ pub(super) fn search_front_from(
         None => {
             let mut swarm = Mopso::new(&problem.problem, mopso)?;
             swarm.start_from(&starting_lines(&problem, settings, known)?)?;
-            FrontState {
-                swarm,
-                failures: FailureCounts::new(),
-                device_faults: Vec::new(),
-            }
+            let losses = Losses::default();
+            FrontState { swarm, losses }
         }
     };
     let mut evaluator = open_line_evaluator(&problem, settings.backend, settings.adapter.as_deref())?;
-    let mut faults = DeviceFaults::of(evaluator.as_ref());
     // Opened anew, a device may meet what it has met before.
-    let told = |own: &[String]| [known_faults, own].concat();
-    let mut latest = None;
+    let mut faults = DeviceFaults::beyond(known_faults, evaluator.as_ref());
+    // A search that is resumed may have no step left to tell of.
+    let mut latest = Progress::default();
     while !state.swarm.done() {
-        let progress = step(&mut state.swarm, evaluator.as_mut())?;
-        add_failures(&mut state.failures, &progress.failures);
-        let met = faults.since(evaluator.as_ref(), &told(&state.device_faults));
-        state.device_faults.extend(met);
-        if observe(&progress, &state)?.is_break() {
+        latest = step(&mut state.swarm, evaluator.as_mut())?;
+        let losses = &mut state.losses;
+        losses.note(&latest.failures, &mut faults, evaluator.as_ref());
+        if observe(&latest, &state)?.is_break() {
             solvers.flag().store(true, Ordering::Relaxed);
             break;
         }
-        latest = Some(progress);
     }
     let swarm = &state.swarm;
 
-    let whole = LineProblem::new(
-        cuts.clone(),
-        Parametrisation::sections(),
-        &settings.objectives,
-        Some(setup.car.clone()),
-        settings.entry_mps,
-    )?;
+    let whole = setup.problem(Parametrisation::sections(), &settings.objectives, settings)?;
     let mut judge = open_line_evaluator(&whole, settings.backend, settings.adapter.as_deref())?;
-    let mut judging = DeviceFaults::of(judge.as_ref());
-    let mut lines: Vec<Vec<f64>> = swarm
-        .archive_candidates()
-        .iter()
-        .map(|c| problem.alpha(c))
-        .collect();
+    let mut judging = DeviceFaults::beyond(known_faults, judge.as_ref());
+    let archived = swarm.archive_candidates();
+    let mut lines: Vec<Vec<f64>> = archived.iter().map(|c| problem.alpha(c)).collect();
     // The known lines, and what lies evenly between them.
     let blend = |shares: &[f64], i: usize| shares.iter().zip(known).map(|(s, line)| s * line[i]).sum::<f64>();
     if !known.is_empty() {
@@ -162,18 +129,7 @@ pub(super) fn search_front_from(
     if settings.local_search && settings.objectives.iter().all(|o| solvers.solves(*o)) {
         let polished = std::thread::scope(|scope| {
             let led = scope.spawn(|| polish_along(&archive, settings, solvers));
-            // A search that is resumed may have no step left to tell of.
-            let none = Progress {
-                iteration: 0,
-                evaluations: 0,
-                best: Vec::new(),
-                violation: f64::INFINITY,
-                median: None,
-                failed: 0,
-                failures: FailureCounts::new(),
-            };
-            let told = latest.as_ref().unwrap_or(&none);
-            watched(led, solvers.flag(), || observe(told, &state))
+            watched(led, solvers.flag(), || observe(&latest, &state))
         })?;
         evaluations += insert_all(&mut archive, judge.as_mut(), &polished)?;
     }
@@ -200,19 +156,13 @@ pub(super) fn search_front_from(
     } else {
         f64::NAN
     };
-    let FrontState {
-        failures,
-        mut device_faults,
-        ..
-    } = state;
-    let met = judging.since(judge.as_ref(), &told(&device_faults));
-    device_faults.extend(met);
+    let mut losses = state.losses;
+    losses.note(&FailureCounts::new(), &mut judging, judge.as_ref());
     Ok(LineFront {
-        device_faults,
+        losses,
         backend: Some(judge.backend()),
-        failures,
-        alpha: archive.positions.clone(),
-        objectives: archive.objectives.clone(),
+        alpha: archive.positions,
+        objectives: archive.objectives,
         hypervolume: volume,
         reference,
         ideal,
@@ -227,12 +177,10 @@ pub(super) fn search_front_from(
 pub fn front_problem(setup: &Setup, settings: &RacelineSettings) -> Result<LineProblem> {
     let cuts = &setup.cuts;
     let controls = ((cuts.length_m / CONTROL_SPACING_M) as usize).clamp(4, cuts.len());
-    LineProblem::new(
-        cuts.clone(),
+    setup.problem(
         Parametrisation::control_points(controls),
         &settings.objectives,
-        Some(setup.car.clone()),
-        settings.entry_mps,
+        settings,
     )
 }
 

@@ -1,7 +1,7 @@
 //! The racing line: shortest, of minimum curvature, fastest, and the front between them, beside the reference optima.
 //!
 //! Every objective has a swarm of its own ([`search_line`]), all together have one that looks for their front
-//! ([`search_front`]), and solvers of reference optima ([`ReferenceSolvers`]) say how far from the optimum each is. Whatever
+//! ([`LineFront`]), and solvers of reference optima ([`ReferenceSolvers`]) say how far from the optimum each is. Whatever
 //! is reported is worked out anew on a fine spline and checked against the edges ([`Setup::report`]).
 
 mod front;
@@ -16,16 +16,13 @@ mod state;
 mod whole_line_search;
 mod window_search;
 
-pub use front::{LineFront, front_problem, search_front, starting_lines};
+pub use front::{LineFront, front_problem, starting_lines};
 pub use reference_optimum::{OptimumLine, ReferenceSolvers, WeightedLine};
 pub use results::{LineFigures, Summary};
 pub use settings::{LineAlgorithm, RacelineSettings};
 pub use setup::{FINE_M, ReportedLine, Setup, road_read, set_up};
 pub use state::LinesState;
-pub use window_search::{
-    FoundLine, LevelRow, LineProgress, LineSearch, LineSearchSettings, LineState, search_line,
-    search_line_from,
-};
+pub use window_search::{FoundLine, LevelRow, LineSearch, LineSearchSettings, LineState, search_line};
 
 use crate::config::settings::Settings;
 use crate::error::Result;
@@ -49,8 +46,10 @@ pub struct ObjectiveOutcome {
     pub swarm_cost: f64,
     /// The reference optimum, where there is a solver for it.
     pub exact: Option<ReportedLine>,
-    /// How its solver ended, and the time that it took (s).
-    pub exact_status: Option<(String, f64)>,
+    /// How its solver ended.
+    pub exact_status: Option<String>,
+    /// Best cost against evaluations of its swarm.
+    pub history: Vec<(u64, f64)>,
 }
 
 /// The outcome of a study.
@@ -68,8 +67,6 @@ pub struct Outcome {
     pub search_s: f64,
     /// Time of the longest of the solvers of reference optima (s), which work beside each other and beside the swarms.
     pub exact_s: f64,
-    /// Best cost against evaluations of each objective's swarm.
-    pub history: Vec<Vec<(u64, f64)>>,
     /// How it ran; its lines are those of the swarms, and its time that of the swarms and of their waiting for the solvers.
     pub record: RunRecord,
 }
@@ -94,7 +91,7 @@ impl Study for Raceline {
     }
 
     fn size(settings: &RacelineSettings, _: Option<&Setup>) -> Vec<Kept> {
-        settings.size().kept().into()
+        settings.size().kept()
     }
 
     fn plan(settings: &RacelineSettings, setup: &Setup, plan: Plan) -> Result<Plan> {
@@ -135,7 +132,8 @@ impl Study for Raceline {
         outcome: &Outcome,
         summary: &Summary,
     ) -> Result<()> {
-        results::report(folder, settings, setup, outcome, summary)
+        results::write_files(folder, setup, outcome)?;
+        results::write_page(folder, settings, setup, outcome, summary)
     }
 
     fn text(_: &RacelineSettings, summary: &Summary) -> String {
@@ -144,8 +142,15 @@ impl Study for Raceline {
 
     /// Lines that leave the road are no failure: they are the best through the cross-sections that were asked for.
     fn warnings(summary: &Summary) -> Vec<String> {
+        let said = || {
+            format!(
+                "the best line by {} leaves the road between the cross-sections: {} are too few, ask for more --sections",
+                summary.off_road.join(", "),
+                summary.sections
+            )
+        };
         let off = !summary.off_road.is_empty();
-        off.then(|| summary.off_road_text()).into_iter().collect()
+        off.then(said).into_iter().collect()
     }
 
     fn check(path: &Path) -> Result<String> {
@@ -179,9 +184,4 @@ impl Study for Raceline {
             .as_ref()
             .map_or(Vec::new(), |front| front.objectives.clone())
     }
-}
-
-/// Name of the line that is best by an objective.
-fn line_name(objective: LineObjective) -> &'static str {
-    objective.line_name()
 }

@@ -1,17 +1,15 @@
 //! The searches that an objective takes: one for most, several for the fastest line.
 
-use super::line_name;
+use super::reference_optimum::within_road;
 use super::settings::{LineAlgorithm, RacelineSettings};
 use super::setup::Setup;
 use super::state::Running;
 use super::whole_line_search::search_whole_lines;
-use super::window_search::{FoundLine, LevelRow, LineSearch, LineSearchSettings, search_line_from};
+use super::window_search::{FoundLine, LevelRow, LineSearch, LineSearchSettings, search_line};
 use crate::error::Result;
-use crate::evaluate::add_failures;
 use crate::evaluate::line::LineObjective;
 use crate::line::{cuts_about, shares_across};
 use crate::study::framework::Progress;
-use std::time::Instant;
 
 /// Rounds of a search that starts from a reference optimum.
 const WARM_ROUNDS: usize = 2;
@@ -36,31 +34,22 @@ struct Stage {
     spread: f64,
 }
 
+impl Stage {
+    const fn new(coarseness: usize, wave: f64, rounds: usize, spread: f64) -> Self {
+        Self {
+            coarseness,
+            wave,
+            rounds,
+            spread,
+        }
+    }
+}
+
 const STAGES: [Stage; 4] = [
-    Stage {
-        coarseness: 4,
-        wave: 4.0,
-        rounds: 2,
-        spread: 0.02,
-    },
-    Stage {
-        coarseness: 2,
-        wave: 3.0,
-        rounds: 2,
-        spread: 0.02,
-    },
-    Stage {
-        coarseness: 1,
-        wave: 2.0,
-        rounds: 2,
-        spread: 0.01,
-    },
-    Stage {
-        coarseness: 1,
-        wave: 2.0,
-        rounds: 3,
-        spread: 0.005,
-    },
+    Stage::new(4, 4.0, 2, 0.02),
+    Stage::new(2, 3.0, 2, 0.02),
+    Stage::new(1, 2.0, 2, 0.01),
+    Stage::new(1, 2.0, 3, 0.005),
 ];
 
 /// The swarm's line for one objective.
@@ -95,13 +84,8 @@ pub(super) fn search_objective(
         return search_step(&search, &plain, objective, (0, 0), work);
     }
     // Open roads, and what folds over itself, cannot be cut square to lines on it.
-    if cuts_about(
-        &setup.cuts,
-        &setup.cuts.points(&setup.cuts.reference),
-        setup.cuts.len(),
-    )
-    .is_ok()
-    {
+    let cuts = &setup.cuts;
+    if cuts_about(cuts, &cuts.points(&cuts.reference), cuts.len()).is_ok() {
         search_about(settings, setup, &search, &plain, work)
     } else {
         search_across(settings, setup, &search, &plain, work)
@@ -185,9 +169,8 @@ fn search_about(
         let before = (usize::from(search.start.is_none()) + number, found.evaluations);
         let step = search_step(&level, &few, objective, before, work)?;
         found.evaluations += step.evaluations;
-        found.device_faults.extend(step.device_faults);
+        found.losses.add(&step.losses);
         found.backend = step.backend;
-        add_failures(&mut found.failures, &step.failures);
         found.history.extend(step.history.into_iter().map(|row| LevelRow {
             evaluations: before.1 + row.evaluations,
             ..row
@@ -197,8 +180,7 @@ fn search_about(
         let Ok(shares) = shares_across(road, &cuts.points(&line)) else {
             break;
         };
-        let shares: Vec<f64> = shares.into_iter().map(|a| a.clamp(0.0, 1.0)).collect();
-        let told = setup.report("fastest", &shares, settings)?;
+        let told = setup.report("fastest", &within_road(shares), settings)?;
         if told.lap_time_fine_s() < best.lap_time_fine_s() {
             best = told;
         }
@@ -207,7 +189,8 @@ fn search_about(
         // Cuts so far apart that lines on them cannot be cut square to.
         return search_across(settings, setup, search, across, work);
     }
-    (found.alpha, found.cost) = (best.alpha, best.lap_time_s);
+    found.cost = best.objective(objective);
+    found.alpha = best.alpha;
     Ok(found)
 }
 
@@ -256,8 +239,8 @@ fn search_across(
     let before = (1, curved.evaluations);
     let mut found = search_step(&fast, &fast_settings, objective, before, work)?;
     found.evaluations += curved.evaluations;
-    found.device_faults.splice(0..0, curved.device_faults);
-    add_failures(&mut found.failures, &curved.failures);
+    let before = std::mem::replace(&mut found.losses, curved.losses);
+    found.losses.add(&before);
     let mut fastest = setup.report("fastest", &found.alpha, settings)?;
     cuts.reference.clone_from(&found.alpha);
     for wavelength in RIPPLES_M {
@@ -267,7 +250,8 @@ fn search_across(
             fastest = line;
         }
     }
-    (found.alpha, found.cost) = (fastest.alpha, fastest.lap_time_s);
+    found.cost = fastest.objective(objective);
+    found.alpha = fastest.alpha;
     Ok(found)
 }
 
@@ -283,26 +267,20 @@ fn search_step(
     if let Some(found) = work.state.steps.get(place) {
         return Ok(found.clone());
     }
-    let before_s = work.state.elapsed_s;
-    let began = Instant::now();
     let state = work.state.search.take().map(|state| *state);
     let known_faults = work.state.device_faults();
     let search = LineSearch {
         known_faults: &known_faults,
         ..*search
     };
-    let found = search_line_from(&search, settings, state, |progress, state| {
-        let best = format!("best {:.4} {}", progress.best, search.objective.unit());
-        let told = Progress::reached(line_name(objective), before + progress.evaluations, best);
-        work.told(&told, |kept| {
-            kept.search = Some(Box::new(state.clone()));
-            kept.elapsed_s = before_s + began.elapsed().as_secs_f64();
-        })
+    let found = search_line(&search, settings, state, |evaluations, best, state| {
+        let best = format!("best {best:.4} {}", search.objective.unit());
+        let told = Progress::reached(objective.line_name(), before + evaluations, best);
+        work.told(&told, |kept| kept.search = Some(Box::new(state.clone())))
     })?;
     work.finished(|state| {
         state.steps.push(found.clone());
         state.search = None;
-        state.elapsed_s = before_s + began.elapsed().as_secs_f64();
     });
     Ok(found)
 }

@@ -77,20 +77,11 @@ const ABOUTS: usize = 2;
 /// With two, ripples are left between the cuts that their lap time does not feel and a fine spline does.
 const CUTS_PER_CONTROL: usize = 3;
 
-/// Weights of the solvers.
-fn weights(terms: impl IntoIterator<Item = (LineObjective, f64)>) -> Weights {
-    let mut weights = Weights::default();
-    for (objective, weight) in terms {
-        match objective {
-            LineObjective::Length => weights.length = weight,
-            LineObjective::LengthSquared => weights.squared_length = weight,
-            LineObjective::Gamma => weights.gamma = weight,
-            LineObjective::Kappa2 => weights.curvature = weight,
-            LineObjective::LapTime => weights.time = weight,
-        }
-    }
-    weights
-}
+/// What the solvers know of an objective: its weight where lines are led downhill, and its optimum.
+type Solver = (
+    fn(&mut Weights) -> &mut f64,
+    fn(&ReferenceSolvers) -> Result<Optimum>,
+);
 
 impl ReferenceSolvers {
     /// The solvers of `setup`. Lap times are theirs only on a friction ellipse of exponent 2.
@@ -149,37 +140,58 @@ impl ReferenceSolvers {
         }
     }
 
+    /// The solver of an objective; nothing where there is none for it.
+    ///
+    /// Length, squared length and Gamma are convex, so that theirs is the optimum. Curvature and lap time are led
+    /// downhill, the latter from the minimum-curvature line; starts all over the road lead to the same.
+    fn solver(&self, objective: LineObjective) -> Option<Solver> {
+        let solver: Solver = match objective {
+            LineObjective::Length => (|w| &mut w.length, |s| shortest(&s.every.0, &s.every.1)),
+            LineObjective::LengthSquared => (
+                |w| &mut w.squared_length,
+                |s| least_squared_length(&s.every.0, &s.every.1),
+            ),
+            LineObjective::Gamma => (
+                |w| &mut w.gamma,
+                |s| least_gamma(&s.every.0, &s.spacing_m, &s.every.1),
+            ),
+            LineObjective::Kappa2 => (
+                |w| &mut w.curvature,
+                |s| least_curvature_of(&s.problem(&s.every.0), &s.every.1, &s.base),
+            ),
+            LineObjective::LapTime if self.limits.is_none() => return None,
+            LineObjective::LapTime => (|w| &mut w.time, Self::fastest),
+        };
+        Some(solver)
+    }
+
+    /// The fastest line, `alpha` at every cut.
+    fn fastest(&self) -> Result<Optimum> {
+        let (map, bounds) = &self.smooth;
+        let start = vec![0.0; map.variables()];
+        let solved = fastest(&self.problem(map), bounds, &start, &DescentSettings::default())?;
+        Ok(Optimum {
+            x: self.shares(map, &solved.x),
+            ..solved
+        })
+    }
+
     /// Whether there is a solver for this objective.
     pub fn solves(&self, objective: LineObjective) -> bool {
-        objective != LineObjective::LapTime || self.limits.is_some()
+        self.solver(objective).is_some()
     }
 
     /// The line that is best by one objective; nothing where there is no solver for it.
     ///
-    /// Length, squared length and Gamma are convex, so that theirs is the optimum. Curvature and lap time are led
-    /// downhill, the latter from the minimum-curvature line; starts all over the road lead to the same.
-    ///
     /// # Errors
     /// [`crate::Error::Study`] if a solver refuses.
     pub fn best(&self, objective: LineObjective) -> Result<Option<OptimumLine>> {
-        let (map, bounds) = &self.every;
-        let solved = match objective {
-            LineObjective::Length => shortest(map, bounds)?,
-            LineObjective::LengthSquared => least_squared_length(map, bounds)?,
-            LineObjective::Gamma => least_gamma(map, &self.spacing_m, bounds)?,
-            LineObjective::Kappa2 => least_curvature_of(&self.problem(map), bounds, &self.base)?,
-            LineObjective::LapTime if self.limits.is_none() => return Ok(None),
-            LineObjective::LapTime => {
-                let (map, bounds) = &self.smooth;
-                let settings = DescentSettings::default();
-                let start = vec![0.0; map.variables()];
-                let mut solved = fastest(&self.problem(map), bounds, &start, &settings)?;
-                solved.x = self.shares(map, &solved.x);
-                solved
-            }
+        let Some((_, solve)) = self.solver(objective) else {
+            return Ok(None);
         };
+        let solved = solve(self)?;
         Ok(Some(OptimumLine {
-            alpha: solved.x.iter().map(|a| a.clamp(0.0, 1.0)).collect(),
+            alpha: within_road(solved.x),
             status: solved.status,
             seconds: solved.seconds,
         }))
@@ -284,7 +296,7 @@ impl ReferenceSolvers {
         let Ok(shares) = shares_across(&self.cuts, &map.line(&solved.x)) else {
             return Ok(None);
         };
-        let x: Vec<f64> = shares.into_iter().map(|a| a.clamp(0.0, 1.0)).collect();
+        let x = within_road(shares);
         let time = |points: &[DVec2]| -> Result<Option<f64>> {
             let fine = FineLine::new(points, true, FINE_M, Some(&self.car), self.entry_mps)?;
             Ok(fine.lap_time_s())
@@ -325,12 +337,22 @@ impl ReferenceSolvers {
             .into_iter()
             .map(|(alpha, terms)| Start {
                 x: if timed { self.offsets(&alpha) } else { alpha },
-                weights: weights(terms),
+                weights: self.weights(terms),
             })
             .collect();
         let polished = polish_lines(&self.problem(map), bounds, &starts, &settings)?;
-        let alpha = |p: Optimum| self.shares(map, &p.x).iter().map(|a| a.clamp(0.0, 1.0)).collect();
+        let alpha = |p: Optimum| within_road(self.shares(map, &p.x));
         Ok(polished.into_iter().map(alpha).collect())
+    }
+
+    fn weights(&self, terms: Vec<(LineObjective, f64)>) -> Weights {
+        let mut weights = Weights::default();
+        for (objective, share) in terms {
+            if let Some((weight, _)) = self.solver(objective) {
+                *weight(&mut weights) = share;
+            }
+        }
+        weights
     }
 
     /// Control points (m) of a smooth line near `alpha`: its distances from the base where they stand.
@@ -343,4 +365,9 @@ impl ReferenceSolvers {
             })
             .collect()
     }
+}
+
+/// Shares of the usable width, none beyond its ends.
+pub(super) fn within_road(shares: Vec<f64>) -> Vec<f64> {
+    shares.into_iter().map(|share| share.clamp(0.0, 1.0)).collect()
 }

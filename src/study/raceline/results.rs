@@ -1,13 +1,15 @@
 //! What a racing-line study leaves behind: figures for people and scripts, lines, pictures.
 
-mod files;
 mod page;
-mod surfaces;
 
-use super::{Outcome, RacelineSettings, ReportedLine, Setup};
+pub(super) use page::write as write_page;
+
+use super::{Outcome, Raceline, RacelineSettings, ReportedLine, Setup};
 use crate::error::Result;
-use crate::evaluate::failures_in_words;
-use crate::study::framework::RunRecord;
+use crate::evaluate::line::LineObjective;
+use crate::files::stem;
+use crate::report::{Table, write_whole};
+use crate::study::framework::{Head, Study};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -39,10 +41,10 @@ pub struct LineFigures {
 impl LineFigures {
     fn of(line: &ReportedLine) -> Self {
         Self {
-            length_m: line.length_m,
-            gamma_1pm: line.gamma_1pm,
-            integral_kappa2_1pm: line.integral_kappa2_1pm,
-            lap_time_s: line.lap_time_s,
+            length_m: line.objective(LineObjective::Length),
+            gamma_1pm: line.objective(LineObjective::Gamma),
+            integral_kappa2_1pm: line.objective(LineObjective::Kappa2),
+            lap_time_s: line.objective(LineObjective::LapTime),
             lap_time_fine_s: line.lap_time_fine_s(),
             length_fine_m: line.fine.length_m,
             integral_kappa2_fine_1pm: line.fine.integral_kappa2_1pm,
@@ -54,17 +56,9 @@ impl LineFigures {
 /// The figures of a study; `--json` prints this.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Summary {
-    /// `raceline`.
-    pub study: String,
-    /// The track.
-    pub track: String,
-    /// The car, or the file of its envelope.
-    pub car: String,
-    /// Seed of all random numbers.
-    pub seed: u64,
-    /// How the study ran.
+    /// The study; the car may be the file of its envelope.
     #[serde(flatten)]
-    pub record: RunRecord,
+    pub head: Head,
     /// Swarms and local search (s).
     pub search_elapsed_s: f64,
     /// Solvers of reference optima (s).
@@ -105,18 +99,11 @@ pub struct Summary {
 
 /// Puts the figures together.
 pub(super) fn summarise(settings: &RacelineSettings, setup: &Setup, outcome: &Outcome) -> Summary {
-    let each = || {
-        outcome
-            .objectives
-            .iter()
-            .map(|o| (o.objective.name().to_owned(), o))
-    };
+    let objectives = || outcome.objectives.iter();
+    let each = || objectives().map(|o| (o.objective.name().to_owned(), o));
+    let front = outcome.front.as_ref();
     Summary {
-        study: "raceline".to_owned(),
-        track: setup.track_name.clone(),
-        car: setup.car_name.clone(),
-        seed: settings.seed,
-        record: outcome.record.clone(),
+        head: Raceline::head(settings, setup, outcome),
         search_elapsed_s: outcome.search_s,
         exact_elapsed_s: outcome.exact_s,
         sections: setup.cuts.len(),
@@ -128,9 +115,7 @@ pub(super) fn summarise(settings: &RacelineSettings, setup: &Setup, outcome: &Ou
         exact: each()
             .map(|(name, o)| (name, o.exact.as_ref().map(LineFigures::of)))
             .collect(),
-        exact_status: each()
-            .map(|(name, o)| (name, o.exact_status.as_ref().map(|(status, _)| status.clone())))
-            .collect(),
+        exact_status: each().map(|(name, o)| (name, o.exact_status.clone())).collect(),
         above_exact_percent: each()
             .map(|(name, o)| {
                 let exact = o.exact.as_ref().map(|line| line.worth(o.objective));
@@ -139,12 +124,10 @@ pub(super) fn summarise(settings: &RacelineSettings, setup: &Setup, outcome: &Ou
             .collect(),
         reference: LineFigures::of(&outcome.reference),
         compromise: outcome.compromise.as_ref().map(LineFigures::of),
-        hypervolume: outcome.front.as_ref().map(|f| f.hypervolume),
-        hypervolume_reference: outcome.front.as_ref().map(|f| f.reference.clone()),
-        front_size: outcome.front.as_ref().map_or(0, |f| f.alpha.len()),
-        off_road: outcome
-            .objectives
-            .iter()
+        hypervolume: front.map(|f| f.hypervolume),
+        hypervolume_reference: front.map(|f| f.reference.clone()),
+        front_size: front.map_or(0, |f| f.alpha.len()),
+        off_road: objectives()
             .filter(|o| o.best.clearance.margin_m < -CLOSE_M)
             .map(|o| o.objective.name().to_owned())
             .collect(),
@@ -163,11 +146,11 @@ fn reported_lines(outcome: &Outcome) -> Vec<&ReportedLine> {
 fn warnings(outcome: &Outcome) -> Vec<String> {
     let mut warnings = Vec::new();
     for line in reported_lines(outcome) {
-        let (coarse, fine) = (line.lap_time_s, line.lap_time_fine_s());
+        let (coarse, fine) = (line.objective(LineObjective::LapTime), line.lap_time_fine_s());
         if (fine / coarse - 1.0).abs() > COARSE_AND_FINE {
             warnings.push(format!(
                 "{}: {coarse:.2} s at the cross-sections but {fine:.2} s on the spline through them: believe the latter, \
-                 or ask for more --sections",
+                 or ask for more sections",
                 line.name
             ));
         }
@@ -194,22 +177,12 @@ fn warnings(outcome: &Outcome) -> Vec<String> {
 const CLOSE_M: f64 = 0.1;
 
 impl Summary {
-    /// What there is to say of best lines that leave the road, and what to do about it.
-    pub fn off_road_text(&self) -> String {
-        format!(
-            "the best line by {} leaves the road between the cross-sections: {} are too few, ask for more --sections",
-            self.off_road.join(", "),
-            self.sections
-        )
-    }
-
     /// The figures in words.
     pub fn to_text(&self) -> String {
-        let record = &self.record;
+        let record = &self.head.record;
         let mut text = format!(
-            "{} with the {}: {} sections, car {} m wide\n{}",
-            self.track,
-            self.car,
+            "{}: {} sections, car {} m wide\n{}",
+            self.head.subject.words(),
             self.sections,
             self.car_width_m,
             page::lines_table(self).first(7).to_text()
@@ -225,28 +198,83 @@ impl Summary {
             record.device(),
             self.exact_elapsed_s
         );
-        if !record.failures.is_empty() {
-            text += &format!("Lines that failed: {}\n", failures_in_words(&record.failures));
-        }
-        text += &record.notes();
-        for warning in &self.warnings {
-            text += &format!("Note: {warning}\n");
-        }
-        text
+        text + &record.ending("Lines", &self.warnings)
     }
 }
 
-/// Writes lines, fronts, figures and the page into `folder`.
+/// Writes the envelope, the lines and the front into `folder`.
 ///
 /// # Errors
 /// [`crate::Error::Io`] if one cannot be written.
-pub(super) fn report(
-    folder: &Path,
-    settings: &RacelineSettings,
-    setup: &Setup,
-    outcome: &Outcome,
-    summary: &Summary,
-) -> Result<()> {
-    files::write(folder, setup, outcome)?;
-    page::write(folder, settings, setup, outcome, summary)
+pub(super) fn write_files(folder: &Path, setup: &Setup, outcome: &Outcome) -> Result<()> {
+    let envelope = setup.car.envelope.to_csv();
+    write_whole(folder.join("envelope.csv"), envelope.as_bytes())?;
+    for line in reported_lines(outcome) {
+        let name = stem(&line.name);
+        write_line(&folder.join(format!("line_{name}.csv")), setup, line)?;
+        // Replaces what an interrupted run has left, since it is resumed in the same folder.
+        let racetrack = setup.cuts.line_to_racetrack_csv(&line.alpha);
+        write_whole(folder.join(format!("racetrack_{name}.csv")), racetrack.as_bytes())?;
+    }
+    write_front(folder, outcome)
+}
+
+/// The line on its fine spline: station, place, alpha, curvature, speed, accelerations, steering, time, and the gear that
+/// gives most (from 1) where there is a gearbox.
+fn write_line(path: &Path, setup: &Setup, line: &ReportedLine) -> Result<()> {
+    let fine = &line.fine;
+    let n = line.alpha.len();
+    let alpha: Vec<f64> = fine
+        .section
+        .iter()
+        .map(|&(section, share)| {
+            let next = if fine.closed {
+                (section + 1) % n
+            } else {
+                (section + 1).min(n - 1)
+            };
+            let here = section.min(n - 1);
+            line.alpha[here] + share * (line.alpha[next] - line.alpha[here])
+        })
+        .collect();
+    let (x, y): (Vec<f64>, Vec<f64>) = fine.points_m.iter().map(|p| (p.x, p.y)).unzip();
+    let mut table = Table::new()
+        .numbers("station", "m", &fine.station_m)
+        .numbers("x", "m", x)
+        .numbers("y", "m", y)
+        .numbers("alpha", "-", alpha)
+        .numbers("curvature", "1/m", &fine.curvature_1pm);
+    if let Some(lap) = &fine.lap {
+        table = table
+            .numbers("v", "m/s", &lap.v_mps)
+            .numbers("ax", "m/s^2", &lap.ax_mps2)
+            .numbers("ay", "m/s^2", &lap.ay_mps2)
+            .numbers("steering", "rad", &lap.steering_rad)
+            .numbers("time", "s", lap.elapsed_s());
+        if let Some((powertrain, radius_m)) = &setup.gearbox {
+            let gear = |v: &f64| {
+                let gear = powertrain.gear(*v, *radius_m);
+                gear.map_or(powertrain.gear_ratios.len(), |g| g.index + 1) as f64
+            };
+            table = table.numbers("gear", "-", lap.v_mps.iter().map(gear).collect::<Vec<f64>>());
+        }
+    }
+    table.write_csv(path)
+}
+
+/// Objectives of the front's lines, and their `alpha` at every cross-section.
+fn write_front(folder: &Path, outcome: &Outcome) -> Result<()> {
+    let Some(front) = outcome.front.as_ref().filter(|f| !f.alpha.is_empty()) else {
+        return Ok(());
+    };
+    let mut objectives = Table::rows(&front.objectives);
+    for (k, o) in outcome.objectives.iter().enumerate() {
+        objectives = objectives.number(o.objective.name(), o.objective.unit(), |row| row[k]);
+    }
+    objectives.table().write_csv(folder.join("front.csv"))?;
+    let mut lines = Table::rows(&front.alpha);
+    for i in 0..front.alpha[0].len() {
+        lines = lines.number(format!("alpha_{i}"), "-", |row| row[i]);
+    }
+    lines.table().write_csv(folder.join("front_lines.csv"))
 }

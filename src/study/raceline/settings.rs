@@ -100,13 +100,11 @@ impl RacelineSettings {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::settings::Settings;
+    use crate::config::settings::testing::{assert_refused, assert_repeated};
 
     #[test]
     fn a_study_file_repeats_its_study() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("study.toml");
-        let settings = RacelineSettings {
+        assert_repeated(&RacelineSettings {
             objectives: vec![LineObjective::Kappa2, LineObjective::LapTime],
             warm_start: false,
             algorithm: LineAlgorithm::Cooperative,
@@ -114,26 +112,18 @@ mod tests {
             section: Some("Abbey".to_owned()),
             seed: 7,
             ..RacelineSettings::default()
-        };
-        std::fs::write(&path, settings.to_toml()).unwrap();
-        assert_eq!(RacelineSettings::read(&path).unwrap(), settings);
+        });
     }
 
     #[test]
     fn mistakes_are_named() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("study.toml");
-        for (text, wanted) in [
+        assert_refused::<RacelineSettings>(&[
             ("sections = 3", "sections"),
             ("objectives = [\"speed\"]", "objectives"),
             ("objectives = [\"gamma\", \"gamma\"]", "gamma twice"),
             ("width = 2.0", "width"),
             ("algorithm = \"ants\"", "algorithm"),
             ("car_width_m = \"wide\"", "car_width_m"),
-        ] {
-            std::fs::write(&path, text).unwrap();
-            let error = RacelineSettings::read(&path).unwrap_err().to_string();
-            assert!(error.contains(wanted), "{error} should say {wanted}");
-        }
+        ]);
     }
 }

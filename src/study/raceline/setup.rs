@@ -3,7 +3,8 @@
 use super::settings::RacelineSettings;
 use crate::config::settings::Settings;
 use crate::error::{Error, Result};
-use crate::evaluate::line::{LineObjective, LineProblem};
+use crate::evaluate::Evaluator;
+use crate::evaluate::line::{CpuLineEvaluator, LineObjective, LineProblem};
 use crate::line::{Clearance, FineLine, Parametrisation, PointMass, TERMS, check_line};
 use crate::study::envelope::{EnvelopeSettings, car_limits};
 use crate::study::framework::Plan;
@@ -161,16 +162,8 @@ pub struct ReportedLine {
     pub name: String,
     /// Share of the usable width from the right at every cut.
     pub alpha: Vec<f64>,
-    /// Length (m) through the cuts.
-    pub length_m: f64,
-    /// Sum of the squared lengths of the segments (m^2).
-    pub length_squared_m2: f64,
-    /// Root of the sum of squared second differences through the cuts (1/m).
-    pub gamma_1pm: f64,
-    /// Integral of squared curvature through the cuts (1/m).
-    pub integral_kappa2_1pm: f64,
-    /// Lap time through the cuts (s).
-    pub lap_time_s: f64,
+    /// What each objective comes to through the cuts, in the order of [`LineObjective::ALL`].
+    pub through_cuts: Vec<f64>,
     /// The line on the fine spline, with its lap.
     pub fine: FineLine,
     /// How close its sides come to the edges.
@@ -194,67 +187,45 @@ impl ReportedLine {
 
     /// What an objective comes to through the cuts.
     pub fn objective(&self, objective: LineObjective) -> f64 {
-        match objective {
-            LineObjective::Length => self.length_m,
-            LineObjective::LengthSquared => self.length_squared_m2,
-            LineObjective::Gamma => self.gamma_1pm,
-            LineObjective::Kappa2 => self.integral_kappa2_1pm,
-            LineObjective::LapTime => self.lap_time_s,
-        }
+        self.through_cuts[objective as usize]
     }
 }
 
 impl Setup {
+    /// The problem of lines through the cuts that are given `way`.
+    ///
+    /// # Errors
+    /// Those of [`LineProblem::new`].
+    pub fn problem(
+        &self,
+        way: Parametrisation,
+        objectives: &[LineObjective],
+        settings: &RacelineSettings,
+    ) -> Result<LineProblem> {
+        let car = Some(self.car.clone());
+        LineProblem::new(self.cuts.clone(), way, objectives, car, settings.entry_mps)
+    }
+
     /// Works out everything that is reported of a line.
     ///
     /// # Errors
     /// [`Error::Study`] if the line cannot be driven at all.
     pub fn report(&self, name: &str, alpha: &[f64], settings: &RacelineSettings) -> Result<ReportedLine> {
-        let problem = LineProblem::new(
-            self.cuts.clone(),
-            Parametrisation::sections(),
-            &LineObjective::ALL,
-            Some(self.car.clone()),
-            settings.entry_mps,
-        )?;
-        let mut evaluator = crate::evaluate::line::CpuLineEvaluator::new(&problem);
-        let figures = crate::evaluate::Evaluator::evaluate(&mut evaluator, alpha)?;
-        if let Some(failure) = figures.failures.first().copied().flatten() {
+        let problem = self.problem(Parametrisation::sections(), &LineObjective::ALL, settings)?;
+        let found = CpuLineEvaluator::new(&problem).evaluate(alpha)?;
+        if let Some(failure) = found.failures.first().copied().flatten() {
             return Err(Error::Study(format!(
                 "the line `{name}` cannot be driven: {failure}"
             )));
         }
-        let points = self.cuts.points(alpha);
-        let fine = FineLine::new(
-            &points,
-            self.cuts.closed,
-            FINE_M,
-            Some(&self.car),
-            settings.entry_mps,
-        )?;
-        let clearance = check_line(&fine, &self.edges_m[0], &self.edges_m[1], settings.car_width_m);
-        let Ok(
-            [
-                length_m,
-                length_squared_m2,
-                gamma_1pm,
-                integral_kappa2_1pm,
-                lap_time_s,
-            ],
-        ) = <[f64; 5]>::try_from(figures.objectives)
-        else {
-            return Err(Error::Study(format!("the line `{name}` was not evaluated")));
-        };
+        let (points, closed, car) = (self.cuts.points(alpha), self.cuts.closed, Some(&self.car));
+        let fine = FineLine::new(&points, closed, FINE_M, car, settings.entry_mps)?;
         Ok(ReportedLine {
             name: name.to_owned(),
             alpha: alpha.to_vec(),
-            length_m,
-            length_squared_m2,
-            gamma_1pm,
-            integral_kappa2_1pm,
-            lap_time_s,
+            through_cuts: found.objectives,
+            clearance: check_line(&fine, &self.edges_m[0], &self.edges_m[1], settings.car_width_m),
             fine,
-            clearance,
         })
     }
 }

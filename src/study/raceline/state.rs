@@ -7,10 +7,11 @@ use super::whole_line_search::WholeLineState;
 use super::window_search::{FoundLine, LineState};
 use crate::error::Result;
 use crate::study::framework::state_file::{Origin, StateFile};
-use crate::study::framework::{Inputs, Progress, State};
+use crate::study::framework::{Inputs, Progress, State, Work};
 use crate::swarm::checkpoint::Checkpoint;
 use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
+use std::time::Instant;
 
 /// An objective that is done with.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -22,7 +23,7 @@ pub(super) struct FinishedObjective {
 }
 
 /// The state of a study. A checkpoint of it is resumed bit for bit on the backend where it began.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct LinesState {
     /// What the study was asked to do.
     pub settings: RacelineSettings,
@@ -45,7 +46,7 @@ impl LinesState {
     pub(super) fn device_faults(&self) -> Vec<String> {
         let done = self.finished.iter().map(|objective| &objective.found);
         done.chain(&self.steps)
-            .flat_map(|found| &found.device_faults)
+            .flat_map(|found| &found.losses.device_faults)
             .cloned()
             .collect()
     }
@@ -84,9 +85,66 @@ pub(super) struct Running<'a> {
     pub state_file: &'a mut StateFile,
     pub observe: &'a mut dyn FnMut(&Progress) -> ControlFlow<()>,
     pub interrupted: bool,
+    /// Since when it is at work.
+    pub began: Instant,
+    /// Time that it took in earlier runs (s).
+    before_s: f64,
+    /// Of the time since it began, that of waiting for solvers of reference optima (s).
+    pub waited_s: f64,
+    /// Since when it waits for one.
+    waiting: Option<Instant>,
 }
 
-impl Running<'_> {
+impl<'a> Running<'a> {
+    /// A study that begins, or is resumed if there is a state.
+    pub fn begin(settings: &RacelineSettings, origin: Origin, work: Work<'a, LinesState>) -> Result<Self> {
+        let state_file = work.state_file;
+        let state = match work.state {
+            Some(state) => {
+                state_file.check(&state.origin, &origin)?;
+                state
+            }
+            None => LinesState {
+                settings: settings.clone(),
+                origin,
+                ..LinesState::default()
+            },
+        };
+        state_file.save(&state)?;
+        Ok(Self {
+            before_s: state.elapsed_s,
+            waited_s: 0.0,
+            state,
+            state_file,
+            observe: work.observe,
+            interrupted: false,
+            began: Instant::now(),
+            waiting: None,
+        })
+    }
+
+    /// Time that the study has taken but for waiting (s), in earlier runs too.
+    pub fn elapsed_s(&self) -> f64 {
+        let waiting_s = self.waiting.map_or(0.0, |since| since.elapsed().as_secs_f64());
+        self.before_s + self.began.elapsed().as_secs_f64() - self.waited_s - waiting_s
+    }
+
+    /// Waits for what `wait` waits for; returns what that comes to.
+    pub fn waited<T>(&mut self, wait: impl FnOnce(&mut Self) -> Result<T>) -> Result<T> {
+        let since = Instant::now();
+        self.waiting = Some(since);
+        let found = wait(self);
+        self.waiting = None;
+        self.waited_s += since.elapsed().as_secs_f64();
+        found
+    }
+
+    /// Brings the state up to date.
+    fn update(&mut self, update: impl FnOnce(&mut LinesState)) {
+        update(&mut self.state);
+        self.state.elapsed_s = self.elapsed_s();
+    }
+
     /// Tells what is being done and saves the state if that is due, brought up to date by `update` before.
     pub fn told(
         &mut self,
@@ -100,16 +158,16 @@ impl Running<'_> {
         let flow = (self.observe)(progress);
         self.interrupted = flow.is_break();
         if self.interrupted {
-            update(&mut self.state);
+            self.update(update);
             self.state_file.save(&self.state)?;
         } else if self.state_file.due() {
-            update(&mut self.state);
+            self.update(update);
             self.state_file.save_or_warn(&self.state);
         }
         Ok(flow)
     }
 
-    /// Whether to go on with what a solver is at.
+    /// Whether a solver is to continue.
     pub fn asked(&mut self, stage: &str) -> Result<ControlFlow<()>> {
         self.told(&Progress::reached(stage, 0, "not known yet"), |_| ())
     }
@@ -117,7 +175,7 @@ impl Running<'_> {
     /// Takes a step that is done with into the state, and saves it.
     pub fn finished(&mut self, update: impl FnOnce(&mut LinesState)) {
         if !self.interrupted {
-            update(&mut self.state);
+            self.update(update);
             self.state_file.save_or_warn(&self.state);
         }
     }

@@ -5,9 +5,9 @@
 
 use crate::error::{Error, Result};
 use crate::evaluate::line::{CpuLineEvaluator, LineObjective, LineProblem, open_line_evaluator};
-use crate::evaluate::{BackendChoice, BackendInfo, Evaluator, FailureCounts, add_failures};
-use crate::line::{Parametrisation, PointMass, TERMS};
-use crate::study::framework::DeviceFaults;
+use crate::evaluate::{BackendChoice, BackendInfo, Evaluator};
+use crate::line::{Parametrisation, PointMass, SectionRow, TERMS};
+use crate::study::framework::{DeviceFaults, Losses};
 use crate::swarm::{Optimiser, WindowSettings, WindowSwarm};
 use crate::track::CrossSections;
 use rayon::prelude::*;
@@ -137,19 +137,6 @@ impl LineSearchSettings {
     }
 }
 
-/// What an observer of a search sees after each iteration.
-#[derive(Clone, Debug, PartialEq)]
-pub struct LineProgress {
-    /// The level, from zero.
-    pub level: usize,
-    /// Number of levels.
-    pub levels: usize,
-    /// Lines evaluated so far, on all levels.
-    pub evaluations: u64,
-    /// The least cost on this level, over its own sections.
-    pub best: f64,
-}
-
 /// What was reached by the end of a level.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LevelRow {
@@ -166,7 +153,7 @@ pub struct LevelRow {
 }
 
 /// The line that a search has found.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct FoundLine {
     /// `alpha` at every section.
     pub alpha: Vec<f64>,
@@ -176,10 +163,8 @@ pub struct FoundLine {
     pub evaluations: u64,
     /// The levels.
     pub history: Vec<LevelRow>,
-    /// Lines that failed, by reason.
-    pub failures: FailureCounts,
-    /// What went wrong with devices and was got over.
-    pub device_faults: Vec<String>,
+    /// What went wrong.
+    pub losses: Losses,
     /// What evaluated in the end; nothing before anything was evaluated.
     pub backend: Option<BackendInfo>,
 }
@@ -190,17 +175,13 @@ impl FoundLine {
         Self {
             alpha,
             cost,
-            evaluations: 0,
-            history: Vec::new(),
-            failures: FailureCounts::new(),
-            device_faults: Vec::new(),
-            backend: None,
+            ..Self::default()
         }
     }
 }
 
 /// Where a search is: all that it takes to resume it.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct LineState {
     level: usize,
     /// `alpha` that the level started from, as the control points have it.
@@ -215,29 +196,17 @@ pub struct LineState {
 }
 
 /// Looks for the line of the least objective until all levels are done or `observe` breaks off. Without a break the result
-/// is a function of the search and its settings.
+/// is a function of the search and its settings. A `state` is that of the same search that was interrupted. After each
+/// iteration `observe` is told the lines evaluated so far, the least cost on the level, over its own sections, and the state.
 ///
 /// # Errors
-/// [`Error::Input`] for a setting out of its range or a start that does not fit, those of [`LineProblem::new`], and
-/// [`Error::Device`] if the device fails.
+/// [`Error::Input`] for a setting out of its range or a start that does not fit, those of [`LineProblem::new`] and of
+/// `observe`, and [`Error::Device`] if the device fails.
 pub fn search_line(
     search: &LineSearch,
     settings: &LineSearchSettings,
-    mut observe: impl FnMut(&LineProgress) -> ControlFlow<()>,
-) -> Result<FoundLine> {
-    search_line_from(search, settings, None, |progress, _| Ok(observe(progress)))
-}
-
-/// As [`search_line`], from the state of the same search that was interrupted, if one is given; `observe` is told the state
-/// after each iteration.
-///
-/// # Errors
-/// As [`search_line`], and those of `observe`.
-pub fn search_line_from(
-    search: &LineSearch,
-    settings: &LineSearchSettings,
     state: Option<LineState>,
-    mut observe: impl FnMut(&LineProgress, &LineState) -> Result<ControlFlow<()>>,
+    mut observe: impl FnMut(u64, f64, &LineState) -> Result<ControlFlow<()>>,
 ) -> Result<FoundLine> {
     settings.validate()?;
     let clock = Instant::now();
@@ -250,13 +219,9 @@ pub fn search_line_from(
             // A line is handed on by its `alpha` as the control points have it, which may lie beyond the edges.
             let sums = judge.candidate(search.start.unwrap_or(&cuts.reference))?;
             LineState {
-                level: 0,
                 found: FoundLine::given(sums.clone(), cost(&judge, &sums)?),
                 sums,
-                swarm: None,
-                before: f64::INFINITY,
-                rounds: 0,
-                elapsed_s: 0.0,
+                ..LineState::default()
             }
         }
     };
@@ -276,7 +241,7 @@ pub fn search_line_from(
             (state.before, state.rounds) = (f64::INFINITY, 0);
         }
         let mut evaluator = open_line_evaluator(&line, search.backend, search.adapter)?;
-        let mut faults = DeviceFaults::of(evaluator.as_ref());
+        let mut faults = DeviceFaults::beyond(search.known_faults, evaluator.as_ref());
         let last = level + 1 == levels.len();
         let least_gain = settings.least_gain * if last { 0.2 } else { 1.0 };
         let mut stopped = false;
@@ -286,41 +251,31 @@ pub fn search_line_from(
             && !settled
         {
             let mut candidates = swarm.ask();
-            let evaluation = if settings.inside {
-                let moves: Vec<f64> = candidates
-                    .par_chunks_mut(line.dimensions())
-                    .map(|row| line.bring_inside(row))
-                    .collect();
-                let mut evaluation = evaluator.evaluate(&candidates)?;
-                for (cost, moved) in evaluation.objectives.iter_mut().zip(moves) {
-                    *cost *= 1.0 + MOVED_COST * moved;
-                }
-                evaluation
-            } else {
-                evaluator.evaluate(&candidates)?
-            };
+            let mut moves = Vec::new();
+            if settings.inside {
+                let rows = candidates.par_chunks_mut(line.dimensions());
+                rows.map(|row| line.bring_inside(row))
+                    .collect_into_vec(&mut moves);
+            }
+            let mut evaluation = evaluator.evaluate(&candidates)?;
+            for (cost, moved) in evaluation.objectives.iter_mut().zip(moves) {
+                *cost *= 1.0 + MOVED_COST * moved;
+            }
             swarm.tell(&evaluation)?;
-            add_failures(&mut state.found.failures, &evaluation.failure_counts());
+            let losses = &mut state.found.losses;
+            losses.note(&evaluation.failure_counts(), &mut faults, evaluator.as_ref());
+            state.found.backend = Some(evaluator.backend());
             let best = swarm.best_candidate().1.cost;
-            let progress = LineProgress {
-                level,
-                levels: levels.len(),
-                evaluations: state.found.evaluations + swarm.evaluations(),
-                best,
-            };
+            let evaluations = state.found.evaluations + swarm.evaluations();
             if swarm.rounds() > state.rounds {
                 state.rounds = swarm.rounds();
                 settled = state.before - best < least_gain * best.abs();
                 state.before = best;
             }
             state.elapsed_s = before_s + clock.elapsed().as_secs_f64();
-            let told = [search.known_faults, &state.found.device_faults].concat();
-            let met = faults.since(evaluator.as_ref(), &told);
-            state.found.device_faults.extend(met);
-            state.found.backend = Some(evaluator.backend());
             // A settled level is left before anyone can break off: its swarm would go on if it were taken up again.
             if !settled {
-                stopped = observe(&progress, &state)?.is_break();
+                stopped = observe(evaluations, best, &state)?.is_break();
             }
         }
         let Some(swarm) = state.swarm.take() else { break };
@@ -334,12 +289,10 @@ pub fn search_line_from(
         // Control points count in mean widths of the road, and the mean is over other cuts here.
         let scale = mean_width_m(line.cuts()) / mean_width_m(cuts);
         let candidate: Vec<f64> = candidate.iter().map(|c| 0.5 + scale * (c - 0.5)).collect();
-        let row = |row: &crate::line::SectionRow<f64>| {
+        let row = |row: &SectionRow<f64>| {
             let terms = row.weights.iter().zip(row.sources);
-            row.constant
-                + terms
-                    .map(|(weight, source)| weight * candidate[source as usize])
-                    .sum::<f64>()
+            let terms = terms.map(|(weight, source)| weight * candidate[source as usize]);
+            row.constant + terms.sum::<f64>()
         };
         state.sums = whole.plan().rows.iter().map(row).collect();
         found.alpha = whole.alpha(&candidate);
@@ -360,13 +313,8 @@ pub fn search_line_from(
 }
 
 fn problem(search: &LineSearch, cuts: CrossSections, way: Parametrisation) -> Result<LineProblem> {
-    LineProblem::new(
-        cuts,
-        way,
-        &[search.objective],
-        search.car.cloned(),
-        search.entry_mps,
-    )
+    let car = search.car.cloned();
+    LineProblem::new(cuts, way, &[search.objective], car, search.entry_mps)
 }
 
 /// The objective of one candidate, in `f64`.

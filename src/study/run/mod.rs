@@ -27,6 +27,7 @@ use crate::study::raceline::{self, Raceline, RacelineSettings, road_read};
 use crate::study::transient::{self, NamedLine, Transient, TransientSettings};
 use crate::vehicle::{Car, Envelope};
 use serde::de::DeserializeOwned;
+use std::fmt::Debug;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -55,7 +56,7 @@ impl Study for Run {
     type Settings = RunSettings;
     type State = Journal;
     type Prepared = Prepared;
-    type Outcome = Outcome;
+    type Outcome = Summary;
     type Summary = Summary;
 
     fn prepare(settings: &RunSettings) -> Result<Prepared> {
@@ -90,16 +91,16 @@ impl Study for Run {
         settings: &RunSettings,
         prepared: &Prepared,
         work: Work<'_, Journal>,
-    ) -> Result<Option<Outcome>> {
+    ) -> Result<Option<Summary>> {
         run(settings, prepared, work).map(Some)
     }
 
-    fn record(outcome: &Outcome) -> &RunRecord {
-        &outcome.summary.record
+    fn record(summary: &Summary) -> &RunRecord {
+        &summary.record
     }
 
-    fn summarise(_: &RunSettings, _: &Prepared, outcome: &Outcome) -> Summary {
-        outcome.summary.clone()
+    fn summarise(_: &RunSettings, _: &Prepared, summary: &Summary) -> Summary {
+        summary.clone()
     }
 
     fn subject(settings: &RunSettings, prepared: &Prepared) -> Subject {
@@ -111,7 +112,7 @@ impl Study for Run {
         }
     }
 
-    fn report(folder: &Path, _: &RunSettings, _: &Prepared, _: &Outcome, summary: &Summary) -> Result<()> {
+    fn report(folder: &Path, _: &RunSettings, _: &Prepared, _: &Summary, summary: &Summary) -> Result<()> {
         write_whole(folder.join("story.txt"), summary.to_text().as_bytes())?;
         page::write(folder, summary)
     }
@@ -136,12 +137,6 @@ impl Study for Run {
     }
 }
 
-/// What came of a run: its figures are those of its stages.
-pub struct Outcome {
-    /// The figures.
-    pub summary: Summary,
-}
-
 /// A run at work.
 struct Going<'a> {
     stages: Stages,
@@ -154,23 +149,24 @@ struct Going<'a> {
 }
 
 impl Going<'_> {
-    /// A stage: its folder, and its figures.
+    /// A stage: its folder, and its figures. Stages of the same `inputs` find the same.
     fn stage<S: Study>(
         &mut self,
-        number: usize,
-        doing: &str,
-        inputs: &Inputs,
+        (number, doing): (usize, String),
+        inputs: &impl Debug,
         settings: &S::Settings,
         prepared: &S::Prepared,
     ) -> Result<(PathBuf, S::Summary)> {
         let (observe, stop, folder) = (&mut *self.observe, &self.stop, &self.folder);
         let limit_mib = self.memory_limit_mib;
         let name = format!("{number}_{}", S::NAME);
+        let mut key = Inputs::of_program(S::NAME);
+        key.add(inputs);
         let interrupted = || Error::Interrupted(folder.clone());
-        if observe(&Progress::reached(doing, 0, "")).is_break() {
+        if observe(&Progress::reached(&*doing, 0, "")).is_break() {
             return Err(interrupted());
         }
-        let (at, reused) = self.stages.run(&name, inputs, |to, state_file| {
+        let (at, reused) = self.stages.run(&name, &key, |to, state_file| {
             let _allowed = memory::check(&S::size(settings, Some(prepared)), limit_mib)?;
             let mut told = |progress: &Progress| {
                 let mut progress = progress.clone();
@@ -215,7 +211,7 @@ fn read_summary<T: DeserializeOwned>(folder: &Path) -> Result<T> {
 ///
 /// # Errors
 /// Those of the stages; [`Error::Interrupted`] if the run was interrupted.
-fn run(settings: &RunSettings, prepared: &Prepared, work: Work<'_, Journal>) -> Result<Outcome> {
+fn run(settings: &RunSettings, prepared: &Prepared, work: Work<'_, Journal>) -> Result<Summary> {
     let watch = Watch::begin();
     let journal = work.state.map_or_else(|| Journal::new(Run::NAME, settings), Ok)?;
     work.state_file.save(&journal)?;
@@ -224,7 +220,7 @@ fn run(settings: &RunSettings, prepared: &Prepared, work: Work<'_, Journal>) -> 
     let own = folder.join(".stages");
     let cache = settings.cache.as_ref().unwrap_or(&own);
     let mut going = Going {
-        stages: Stages::new(&folder, Some(cache), work.state_file.interval()),
+        stages: Stages::new(&folder, cache, work.state_file.interval()),
         folder,
         memory_limit_mib: memory::limit_mib(),
         observe: work.observe,
@@ -244,12 +240,16 @@ fn run_stages(
     prepared: &Prepared,
     going: &mut Going<'_>,
     watch: &Watch,
-) -> Result<Outcome> {
+) -> Result<Summary> {
     let setup = &prepared.setup;
-    let mut inputs = Inputs::of_program(Identify::NAME);
-    inputs.add(&settings.identify);
-    inputs.add(&(&setup.log, &setup.replay.free.car, &setup.truth));
-    let (identified, fitted) = going.stage::<Identify>(1, "the car", &inputs, &settings.identify, setup)?;
+    let inputs = (
+        &settings.identify,
+        &setup.log,
+        &setup.replay.free.car,
+        &setup.truth,
+    );
+    let (identified, fitted) =
+        going.stage::<Identify>((1, "the car".to_owned()), &inputs, &settings.identify, setup)?;
     let car_path = identified.join("car.toml").display().to_string();
     let car = Car::load(&car_path)?;
 
@@ -257,10 +257,9 @@ fn run_stages(
         car: car_path.clone(),
         ..EnvelopeSettings::default()
     };
-    let mut inputs = Inputs::of_program(EnvelopeStudy::NAME);
-    inputs.add(&car);
     let envelope_of = EnvelopeStudy::prepare(&envelope)?;
-    let (at, _) = going.stage::<EnvelopeStudy>(2, "its envelope", &inputs, &envelope, &envelope_of)?;
+    let (at, _) =
+        going.stage::<EnvelopeStudy>((2, "its envelope".to_owned()), &car, &envelope, &envelope_of)?;
     let whole = Envelope::load(at.join("envelope.csv"))?;
 
     let mut rounds: Vec<RoundSummary> = Vec::new();
@@ -269,16 +268,15 @@ fn run_stages(
     for round in 1..=settings.rounds {
         let line = settings.line_of(&car_path, driven_within.clone());
         let road = raceline::set_up(&line)?;
-        let mut inputs = Inputs::of_program(Raceline::NAME);
         // The car is in its envelope; where its file lies does not matter.
-        inputs.add(&RacelineSettings {
+        let alike = RacelineSettings {
             car: String::new(),
             envelope: None,
             ..line.clone()
-        });
-        inputs.add(&(&road.cuts, road.car.envelope.rows()));
-        let doing = format!("line {round}");
-        let (at, found) = going.stage::<Raceline>(1 + 2 * round, &doing, &inputs, &line, &road)?;
+        };
+        let inputs = (alike, &road.cuts, road.car.envelope.rows());
+        let stage = (1 + 2 * round, format!("line {round}"));
+        let (at, found) = going.stage::<Raceline>(stage, &inputs, &line, &road)?;
         let line_path = at.join("line_fastest.csv");
 
         let drive = TransientSettings {
@@ -294,16 +292,21 @@ fn run_stages(
         let fastest = NamedLine::new(name, points_m, &road.edges_m, width_m)?;
         let mut road = road;
         road.car.envelope = whole.clone();
-        let mut inputs = Inputs::of_program(Transient::NAME);
-        inputs.add(&(&car, drive.car_width_m, whole.rows(), &road.edges_m));
-        inputs.add_file(&line_path)?;
         let driven = transient::Prepared {
             car: car.clone(),
             road,
             lines: vec![fastest],
         };
-        let doing = format!("line {round}, driven by the car");
-        let (at, lap) = going.stage::<Transient>(2 + 2 * round, &doing, &inputs, &drive, &driven)?;
+        let (line, road) = (&driven.lines[0], &driven.road);
+        let inputs = (
+            &car,
+            drive.car_width_m,
+            whole.rows(),
+            &road.edges_m,
+            &line.points_m,
+        );
+        let stage = (2 + 2 * round, format!("line {round}, driven by the car"));
+        let (at, lap) = going.stage::<Transient>(stage, &inputs, &drive, &driven)?;
         driven_within = Some(at.join("envelope_driven.csv"));
         last_line = Some(line_path);
         let found = RoundSummary::of(&found, &lap)?;
@@ -328,35 +331,37 @@ fn run_stages(
             adapter: settings.raceline.adapter.clone(),
             ..HybridStudySettings::default()
         };
-        let mut inputs = Inputs::of_program(Hybrid::NAME);
-        for path in deployed.line.iter().chain(&deployed.envelope) {
-            inputs.add_file(path)?;
-        }
-        inputs.add(&(&car, &deployed.backend, &deployed.adapter, deployed.seed));
-        inputs.add(&(&deployed.track, deployed.car_width_m));
+        let line = deployed.line.as_deref().map(read_line).transpose()?;
+        let within = deployed.envelope.as_deref().map(Envelope::load).transpose()?;
+        let place = (&deployed.backend, &deployed.adapter, deployed.seed);
+        let road = (
+            line,
+            within.as_ref().map(Envelope::rows),
+            &deployed.track,
+            deployed.car_width_m,
+        );
+        let inputs = (&car, road, place);
         let prepared = Hybrid::prepare(&deployed)?;
-        let number = 3 + 2 * rounds.len();
-        let (_, found) = going.stage::<Hybrid>(number, "energy", &inputs, &deployed, &prepared)?;
+        let stage = (3 + 2 * rounds.len(), "energy".to_owned());
+        let (_, found) = going.stage::<Hybrid>(stage, &inputs, &deployed, &prepared)?;
         energy = Some(EnergySummary::of(&found)?);
     }
     let mut record = fitted.record.clone();
     record.elapsed_s = watch.elapsed_s();
     record.longest_dispatch_ms = watch.longest_dispatch_ms();
-    Ok(Outcome {
-        summary: Summary {
-            study: Run::NAME.to_owned(),
-            seed: settings.identify.seed,
-            record,
-            log: setup.log.source.clone(),
-            car: car.name.clone(),
-            total_parameter_error: fitted.total_parameter_error,
-            rms_error: fitted.rms_error,
-            ay_mps2: [25.0, 65.0].map(|v| whole.at(v).ay_mps2),
-            top_speed_mps: whole.top_speed_mps(),
-            agrees: rounds.last().is_some_and(RoundSummary::agrees),
-            rounds,
-            energy,
-            reused: std::mem::take(&mut going.reused),
-        },
+    Ok(Summary {
+        study: Run::NAME.to_owned(),
+        seed: settings.identify.seed,
+        record,
+        log: setup.log.source.clone(),
+        car: car.name.clone(),
+        total_parameter_error: fitted.total_parameter_error,
+        rms_error: fitted.rms_error,
+        ay_mps2: [25.0, 65.0].map(|v| whole.at(v).ay_mps2),
+        top_speed_mps: whole.top_speed_mps(),
+        agrees: rounds.last().is_some_and(RoundSummary::agrees),
+        rounds,
+        energy,
+        reused: std::mem::take(&mut going.reused),
     })
 }

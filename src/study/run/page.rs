@@ -2,8 +2,8 @@
 
 use super::summary::{RoundSummary, Summary};
 use crate::error::Result;
-use crate::report::{Curves, HtmlReport, Panel, Table};
-use crate::study::compare::{Trace, overlay, read_table};
+use crate::report::compare::{LIMITS, limits, overlay, read_table};
+use crate::report::{HtmlReport, Table};
 use std::path::Path;
 
 pub(super) fn write(folder: &Path, summary: &Summary) -> Result<()> {
@@ -62,7 +62,8 @@ pub(super) fn write(folder: &Path, summary: &Summary) -> Result<()> {
         "Limits",
         "What the car can do in steady states, and what of it was held on the line.",
     );
-    page.place(&limits([("the car's", whole.as_ref()), ("held", held.as_ref())]))?;
+    let envelopes = [("the car's", whole.as_ref()), ("held", held.as_ref())];
+    page.place(&limits("Limits", &LIMITS[..2], envelopes.into_iter()))?;
     page.facts(&[
         ("log", &summary.log),
         ("seed", &summary.seed),
@@ -106,19 +107,4 @@ fn table(rounds: &[RoundSummary]) -> Table<'static> {
         })
         .number("least room", "m", |(_, r)| r.margin_m)
         .table()
-}
-
-/// The limits of the car, and those that the driver held.
-fn limits(tables: [(&str, Option<&Trace>); 2]) -> Curves {
-    let panels = [("Cornering", "ay_mps2"), ("Braking grip", "ax_grip_mps2")].map(|(title, column)| {
-        let panel = Panel::new(title).x("speed", "m/s").y("acceleration", "m/s\u{b2}");
-        tables.iter().fold(panel, |panel, (label, table)| {
-            let columns = table.and_then(|t| t.column(&["v_mps"]).zip(t.column(&[column])));
-            match columns {
-                Some((v, a)) => panel.curve(*label, v, a),
-                None => panel,
-            }
-        })
-    });
-    Curves::new("Limits", panels)
 }

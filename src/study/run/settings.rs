@@ -1,10 +1,9 @@
 //! Settings of a run.
 
 use crate::config::Table;
-use crate::config::kinds::{Choice, Kind, count, number, of, quoted};
-use crate::config::settings::{Declared, Flag, Role, Setting, Settings, Written, Wrong, settings};
+use crate::config::kinds::{Kind, count, number, of, quoted};
+use crate::config::settings::{Declared, Flag, Lens, Role, Setting, Settings, Written, Wrong, settings};
 use crate::error::{Error, Result};
-use crate::evaluate::BackendChoice;
 use crate::study::identify::IdentifySettings;
 use crate::study::raceline::RacelineSettings;
 use std::path::{Path, PathBuf};
@@ -25,8 +24,44 @@ settings! {
     }
 
     fn linked() -> Vec<Setting<Self>> {
-        linked()
+        let identify = Lens::new(|s: &Self| &s.identify, |s: &mut Self| &mut s.identify);
+        let raceline = Lens::new(|s: &Self| &s.raceline, |s: &mut Self| &mut s.raceline);
+        let cache = Lens::new(|s: &Self| &s.cache, |s: &mut Self| &mut s.cache);
+        let named = LINKED.iter().filter_map(|(key, meaning)| {
+            let stage = setting_of::<IdentifySettings>(key)?;
+            let declared = Declared {
+                meaning,
+                flag: Flag::Value(key),
+                role: if stage.declared.role == Role::Place { Role::Place } else { Role::Problem },
+                example: None,
+                ..stage.declared.clone()
+            };
+            // The car of the line is the one that was identified.
+            let line = setting_of::<RacelineSettings>(key).filter(|_| *key != "car");
+            let parts = std::iter::once(stage.within(&identify)).chain(line.map(|line| line.within(&raceline)));
+            Some(Setting::linked(declared, parts.collect()))
+        });
+        let no_cache = of(NoCache).flag(Flag::Switch("no_cache", true));
+        let meaning = "Every stage is done anew, and none is kept";
+        named.chain(no_cache.declare("no_cache", "-", meaning, &cache)).collect()
     }
+}
+
+/// Settings of the identification that have a flag here, and mean the line's of the same name as well.
+const LINKED: [(&str, &str); 6] = [
+    ("log", "The log, for the identification"),
+    ("car", "The car that fixed parameters come from"),
+    ("track", "The circuit, for identification and line"),
+    ("backend", "Where candidates are evaluated"),
+    ("adapter", "Part of the name of the GPU to use"),
+    ("seed", "Seed of all random numbers"),
+];
+
+/// The setting of a stage that has this key.
+fn setting_of<S: Settings>(key: &str) -> Option<Setting<S>> {
+    S::settings()
+        .into_iter()
+        .find(|setting| setting.declared.key == key)
 }
 
 /// The bundled car with all that a run tells of: an engine map and a hybrid drive.
@@ -47,115 +82,6 @@ impl RunSettings {
             ..self.raceline.clone()
         }
     }
-}
-
-/// What identification and line have in common, set for both.
-fn linked() -> Vec<Setting<RunSettings>> {
-    let declared = |key, value_name, meaning| Declared {
-        key,
-        unit: "-",
-        meaning,
-        value_name,
-        range: String::new(),
-        flag: Flag::Value(key),
-        role: Role::Problem,
-        example: None,
-    };
-    let place = |declared| Declared {
-        role: Role::Place,
-        ..declared
-    };
-    let no_cache = Declared {
-        flag: Flag::Switch("no_cache", true),
-        ..declared(
-            "no_cache",
-            "true|false",
-            "Every stage is done anew, and none is kept",
-        )
-    };
-    let backend = declared("backend", "NAME", "Where candidates are evaluated");
-    vec![
-        Setting::linked(
-            declared("log", "FILE", "The log, for the identification"),
-            |s, text| {
-                s.identify.log = Some(PathBuf::from(text));
-                Ok(())
-            },
-            |from, to| to.identify.log.clone_from(&from.identify.log),
-        ),
-        Setting::linked(
-            declared("car", "NAME|FILE", "The car that fixed parameters come from"),
-            |s, text| {
-                text.clone_into(&mut s.identify.car);
-                Ok(())
-            },
-            |from, to| to.identify.car.clone_from(&from.identify.car),
-        ),
-        Setting::linked(
-            declared("track", "NAME|FILE", "The circuit, for identification and line"),
-            |s, text| {
-                s.identify.track = Some(text.to_owned());
-                text.clone_into(&mut s.raceline.track);
-                Ok(())
-            },
-            |from, to| {
-                to.identify.track.clone_from(&from.identify.track);
-                to.raceline.track.clone_from(&from.raceline.track);
-            },
-        ),
-        Setting::linked(
-            place(Declared {
-                range: BackendChoice::names(),
-                ..backend
-            }),
-            |s, text| {
-                let expected = || format!("expected {}", BackendChoice::names());
-                let backend = BackendChoice::named(text).ok_or_else(expected)?;
-                (s.identify.backend, s.raceline.backend) = (backend, backend);
-                Ok(())
-            },
-            |from, to| {
-                to.identify.backend = from.identify.backend;
-                to.raceline.backend = from.raceline.backend;
-            },
-        ),
-        Setting::linked(
-            place(declared("adapter", "NAME", "Part of the name of the GPU to use")),
-            |s, text| {
-                s.identify.adapter = Some(text.to_owned());
-                s.raceline.adapter = Some(text.to_owned());
-                Ok(())
-            },
-            |from, to| {
-                to.identify.adapter.clone_from(&from.identify.adapter);
-                to.raceline.adapter.clone_from(&from.raceline.adapter);
-            },
-        ),
-        Setting::linked(
-            declared("seed", "N", "Seed of all random numbers"),
-            |s, text| {
-                let seed = text
-                    .parse()
-                    .map_err(|_| "expected a whole number, 0 or more".to_owned())?;
-                (s.identify.seed, s.raceline.seed) = (seed, seed);
-                Ok(())
-            },
-            |from, to| {
-                to.identify.seed = from.identify.seed;
-                to.raceline.seed = from.raceline.seed;
-            },
-        ),
-        Setting::linked(
-            no_cache,
-            |s, text| {
-                if text == "true" {
-                    s.cache = None;
-                }
-                Ok(())
-            },
-            |from, to| to.cache.clone_from(&from.cache),
-        ),
-    ]
 }
 
 /// Settings of a stage: a study file, or a table.
@@ -234,5 +160,26 @@ impl Kind<Option<PathBuf>> for Cache {
 
     fn value_name(&self) -> &'static str {
         "DIR"
+    }
+}
+
+/// A switch that empties the name of the cache.
+struct NoCache;
+
+impl Kind<Option<PathBuf>> for NoCache {
+    fn read(&self, table: &Table<'_>, key: &str, _: &str, _: &Path) -> Result<Option<Option<PathBuf>>> {
+        Ok(table.boolean(key)?.filter(|none| *none).map(|_| None))
+    }
+
+    fn write(&self, _: &Option<PathBuf>) -> Option<Written> {
+        None
+    }
+
+    fn parse(&self, text: &str, present: &Option<PathBuf>) -> Result<Option<PathBuf>, String> {
+        Ok(present.clone().filter(|_| text != "true"))
+    }
+
+    fn value_name(&self) -> &'static str {
+        "true|false"
     }
 }

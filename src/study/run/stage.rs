@@ -16,17 +16,17 @@ const UNFINISHED: &str = ".unfinished";
 
 /// Where stages are kept between runs.
 pub struct Stages {
-    cache: Option<PathBuf>,
+    cache: PathBuf,
     folder: PathBuf,
     every: Duration,
 }
 
 impl Stages {
-    /// Stages of a run in `folder`, kept in `cache` if that is given; the state of one at work is saved `every` so often.
-    pub fn new(folder: &Path, cache: Option<&Path>, every: Duration) -> Self {
+    /// Stages of a run in `folder`, kept in `cache`; the state of one at work is saved `every` so often.
+    pub fn new(folder: &Path, cache: &Path, every: Duration) -> Self {
         Self {
             every,
-            cache: cache.map(Path::to_owned),
+            cache: cache.to_owned(),
             folder: folder.to_owned(),
         }
     }
@@ -44,14 +44,10 @@ impl Stages {
     ) -> Result<(PathBuf, bool)> {
         let target = self.folder.join(name);
         create(&target)?;
-        let Some(cache) = &self.cache else {
-            work(&target, &mut StateFile::idle())?;
-            return Ok((target, false));
-        };
         // Stages of one kind share results whatever their number in a run.
         let kind = name.trim_start_matches(|c: char| c.is_ascii_digit() || c == '_');
         let kind = format!("{kind}-{}", inputs.key());
-        let kept = cache.join(&kind);
+        let kept = self.cache.join(&kind);
         if let Some(files) = whole(&kept)? {
             for (name, contents) in files {
                 write_whole(target.join(name), &contents)?;
@@ -195,7 +191,10 @@ mod tests {
     use crate::study::framework::State;
     use crate::study::framework::journal::Journal;
 
-    const EVERY: Duration = Duration::ZERO;
+    /// Stages of a run of this name beside a cache that all runs share.
+    fn stages_of(root: &Path, run: &str) -> Stages {
+        Stages::new(&root.join(run), &root.join("cache"), Duration::ZERO)
+    }
 
     /// What the state that a state_file finds was begun with.
     fn begun(state_file: &StateFile) -> Option<u32> {
@@ -207,7 +206,7 @@ mod tests {
     fn a_stage_that_is_broken_off_finds_its_state_again_and_leaves_none_when_it_is_done() {
         let root = tempfile::tempdir().expect("a temporary folder");
         let cache = root.path().join("cache");
-        let stages = Stages::new(&root.path().join("run"), Some(&cache), EVERY);
+        let stages = stages_of(root.path(), "run");
         let inputs = Inputs::new("stage");
         let mut known = Vec::new();
         for round in 0..3u32 {
@@ -231,10 +230,9 @@ mod tests {
     #[test]
     fn a_stage_runs_once_for_the_same_inputs_and_again_for_others() {
         let root = tempfile::tempdir().expect("a temporary folder");
-        let cache = root.path().join("cache");
         let mut runs = 0;
         let mut go = |run: &str, input: f64| {
-            let stages = Stages::new(&root.path().join(run), Some(&cache), EVERY);
+            let stages = stages_of(root.path(), run);
             let mut inputs = Inputs::new("stage");
             inputs.add(&input);
             let (folder, reused) = stages
@@ -263,8 +261,7 @@ mod tests {
         let mut runs = 0;
         let mut go = || {
             runs += 1;
-            let run = root.path().join(format!("run-{runs}"));
-            let stages = Stages::new(&run, Some(&cache), EVERY);
+            let stages = stages_of(root.path(), &format!("run-{runs}"));
             let work = |folder: &Path, _: &mut StateFile| {
                 std::fs::write(folder.join("result"), "what was found").expect("a file");
                 std::fs::write(folder.join("table"), "1,2,3").expect("a file");
@@ -304,8 +301,7 @@ mod tests {
         let inputs = Inputs::new("stage");
         let kept = cache.join(format!("stage-{}", inputs.key()));
         let other = run_folder::take(&kept.with_extension("unfinished")).expect("nobody holds it");
-        let run = root.path().join("run");
-        let stages = Stages::new(&run, Some(&cache), EVERY);
+        let stages = stages_of(root.path(), "run");
         let mut known = Vec::new();
         let mut go = |last: bool| {
             stages.run("1_stage", &inputs, |_, state_file| {
@@ -323,15 +319,14 @@ mod tests {
         drop(other);
         assert!(go(true).is_ok(), "and after");
         assert_eq!(known, [None, Some(7), Some(7)]);
-        assert!(!run.join(UNFINISHED).exists(), "nothing is left of it");
+        assert!(!stages.folder.join(UNFINISHED).exists(), "nothing is left of it");
         assert!(kept.join(DONE).is_file());
     }
 
     #[test]
     fn a_stage_that_fails_is_not_kept() {
         let root = tempfile::tempdir().expect("a temporary folder");
-        let cache = root.path().join("cache");
-        let stages = Stages::new(&root.path().join("run"), Some(&cache), EVERY);
+        let stages = stages_of(root.path(), "run");
         let inputs = Inputs::new("stage");
         let fail = |_: &Path, _: &mut StateFile| Err(Error::Study("no".to_owned()));
         assert!(stages.run("1_stage", &inputs, fail).is_err());

@@ -13,14 +13,13 @@ pub use sobol::{DesignOutputs, MOST_SAMPLES, MOST_VARIABLES, SobolIndex, design,
 use crate::config::kinds::{count, number};
 use crate::config::settings::{Flag, Settings, settings};
 use crate::error::{Error, Result};
-use crate::evaluate::replay::{CHANNEL_NAMES, ReplayProblem, open_evaluator, trace};
-use crate::study::framework::journal::{Journal, Recorder};
+use crate::evaluate::replay::{CHANNEL_NAMES, ReplayProblem, trace};
+use crate::study::framework::journal::Journal;
 use crate::study::framework::memory::{ANSWER, Kept, log_kept};
-use crate::study::framework::{Plan, Progress, RunRecord, Study, Subject, Watch, Work};
-use crate::study::identify::{FreeParameter, IdentifySettings, Setup, planned, subject, without_laps};
-use crate::study::replayed::{costs_of, inputs_of, ranges_about, replay_settings, set_up_channels, windowed};
+use crate::study::framework::{Plan, RunRecord, Study, Subject, Work};
+use crate::study::identify::{IdentifySettings, Setup, planned, subject, without_laps};
+use crate::study::replayed::{drive, ranges_about, replay_settings, set_up_channels, windowed};
 use rayon::prelude::*;
-use std::ops::ControlFlow;
 use std::path::Path;
 
 /// The study.
@@ -86,9 +85,7 @@ pub struct Band {
 
 /// The outcome of a study.
 pub struct Outcome {
-    /// Parameters with their ranges.
-    pub ranges: Vec<FreeParameter>,
-    /// Their values in the base car.
+    /// The parameters' values in the base car.
     pub base: Vec<f64>,
     /// The base car's costs, objective by objective.
     pub base_costs: Vec<f64>,
@@ -163,6 +160,7 @@ impl Study for Sensitivity {
         subject(&settings.replay, setup)
     }
 
+    /// Writes `sobol.csv`, `one_at_a_time.csv`, the figures `sobol.svg`, `one_at_a_time.svg` and `bands.svg`, and `report.html`.
     fn report(
         folder: &Path,
         settings: &SensitivitySettings,
@@ -170,7 +168,11 @@ impl Study for Sensitivity {
         outcome: &Outcome,
         summary: &Summary,
     ) -> Result<()> {
-        results::report(folder, settings, setup, outcome, summary)
+        results::write_one_at_a_time(folder, setup, outcome)?;
+        if !outcome.indices.is_empty() {
+            results::write_sobol(folder, summary)?;
+        }
+        page::write(folder, &settings.to_toml(), setup, outcome, summary)
     }
 
     fn text(_: &SensitivitySettings, summary: &Summary) -> String {
@@ -191,27 +193,12 @@ impl Study for Sensitivity {
 /// # Errors
 /// [`Error::Study`] if the base car does not drive the lap, or too few of its neighbours do; those of the evaluator.
 fn measure(settings: &SensitivitySettings, setup: &Setup, work: Work<'_, Journal>) -> Result<Outcome> {
-    let watch = Watch::begin();
     let replay = &setup.replay;
     let dimensions = replay.dimensions();
-    let base: Vec<f64> = replay
-        .free
-        .parameters
-        .iter()
-        .map(|p| replay.free.base()[p.slots[0]])
-        .collect();
+    let base = replay.free.values_in(replay.free.base());
     let variables = &replay.problem.variables;
-    let ranges: Vec<FreeParameter> = variables
-        .iter()
-        .map(|v| FreeParameter {
-            name: v.name.clone(),
-            lower: v.lower,
-            upper: v.upper,
-        })
-        .collect();
-
-    // The base car, every parameter at every level, then the design of the indices.
-    let mut population = base.clone();
+    // The base car and every parameter at every level, then the design of the indices.
+    let mut first = base.clone();
     for (k, variable) in variables.iter().enumerate() {
         for level in LEVELS {
             let end = if level < 0.0 {
@@ -221,49 +208,17 @@ fn measure(settings: &SensitivitySettings, setup: &Setup, work: Work<'_, Journal
             };
             let mut row = base.clone();
             row[k] += level.abs() * (end - base[k]);
-            population.extend(row);
+            first.extend(row);
         }
     }
-    let singles = population.len() / dimensions;
-    for row in design(dimensions, settings.samples, settings.replay.seed).chunks_exact(dimensions) {
-        population.extend(
-            row.iter()
-                .zip(variables)
-                .map(|(u, v)| v.lower + u * (v.upper - v.lower)),
-        );
-    }
-    let planned = population.len() / dimensions;
-    let mut evaluator = open_evaluator(
-        replay,
-        settings.replay.backend,
-        settings.replay.adapter.as_deref(),
-    )?;
-    let observe = work.observe;
-    let mut told =
-        |done: usize, before: usize| observe(&Progress::counted((before + done) as u64, planned as u64));
-    let (first, rest) = population.split_at(singles * dimensions);
-    let mut interrupted = false;
-    let mut recorder = Recorder::of(Sensitivity::NAME, settings, work.state, work.state_file)?;
-    recorder.begin(inputs_of(Sensitivity::NAME, setup), &evaluator.backend())?;
-    let mut record = RunRecord::of(&evaluator.backend());
-    let failures = &mut record.failures;
-    let mut evaluator = recorder.over(evaluator.as_mut());
-    let single = costs_of(&mut evaluator, first, failures, |done| {
-        interrupted |= told(done, 0).is_break();
-        ControlFlow::Continue(())
-    })?
-    .unwrap_or_default();
-    let global = if interrupted {
-        None
-    } else {
-        costs_of(&mut evaluator, rest, failures, |done| told(done, singles))?
-    };
-    interrupted |= global.is_none();
-    if interrupted {
-        recorder.save()?;
-    }
-
-    let base_costs = single.first().cloned().flatten().ok_or_else(|| {
+    let shares = design(dimensions, settings.samples, settings.replay.seed);
+    let within = shares.iter().zip(variables.iter().cycle());
+    let rest: Vec<f64> = within.map(|(u, v)| v.lower + u * (v.upper - v.lower)).collect();
+    let shared = (&settings.replay, setup);
+    // The first are few enough to be driven whole, however soon the study is interrupted.
+    let driven = drive::<Sensitivity>(settings, shared, &[&first, &rest], work)?;
+    let (single, global) = driven.costs.split_at(first.len() / dimensions);
+    let base_costs = single[0].clone().ok_or_else(|| {
         Error::Study("the base car does not drive the lap: nothing to set changes against".to_owned())
     })?;
     let one_at_a_time = (0..dimensions * LEVELS.len())
@@ -273,26 +228,19 @@ fn measure(settings: &SensitivitySettings, setup: &Setup, work: Work<'_, Journal
             costs: single[i + 1].clone(),
         })
         .collect();
-    let mut indices = Vec::new();
-    let mut left_out = 0;
-    if let Some(global) = global {
-        (indices, left_out) = indices_of(settings, &global, base_costs.len(), dimensions)?;
-    }
-    recorder.complete(&mut record);
-    record.interrupted = interrupted;
-    record.longest_dispatch_ms = watch.longest_dispatch_ms();
-    let evaluated = if interrupted { singles } else { planned };
-    let elapsed_s = watch.elapsed_s();
-    record.took(evaluated as u64, elapsed_s, elapsed_s);
+    let (indices, left_out) = if driven.interrupted() {
+        (Vec::new(), 0)
+    } else {
+        indices_of(settings, global, base_costs.len(), dimensions)?
+    };
     Ok(Outcome {
-        ranges,
+        base,
         base_costs,
         one_at_a_time,
         indices,
         left_out,
-        band: band(setup, first, dimensions),
-        base,
-        record,
+        band: band(setup, &first, dimensions),
+        record: driven.record(),
     })
 }
 
@@ -309,7 +257,7 @@ fn indices_of(
         .collect();
     if 2 * driven.len() < n {
         return Err(Error::Study(format!(
-            "of {n} samples only {} drive with every change: a smaller --share keeps more of them on the road",
+            "of {n} samples only {} drive with every change: a smaller share keeps more of them on the road",
             driven.len()
         )));
     }

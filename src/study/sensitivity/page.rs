@@ -1,11 +1,9 @@
 //! The interactive report of a sensitivity study, with its figures.
 
-use super::results::{
-    LABELS, ParameterSensitivity, Summary, one_at_a_time_figure, parameter_table, sobol_figure,
-};
+use super::results::{ParameterSensitivity, Summary, one_at_a_time_figure, parameter_table, sobol_figure};
 use super::{LEVELS, Outcome};
 use crate::error::Result;
-use crate::evaluate::replay::CHANNEL_UNITS;
+use crate::evaluate::replay::{CHANNEL_LABELS, CHANNEL_UNITS};
 use crate::report::{HtmlReport, LapLine, LapView};
 use crate::study::framework::circuit_view::{circuit_road, sections};
 use crate::study::identify::Setup;
@@ -103,7 +101,7 @@ fn bands(setup: &Setup, outcome: &Outcome) -> LapView {
         .collect::<Vec<_>>();
     let line = |name: &str| LapLine::new(name, &band.distance_m[..]).at(&places[..]);
     let (mut greatest, mut least) = (line("greatest"), line("least"));
-    for k in 0..LABELS.len() {
+    for k in 0..CHANNEL_LABELS.len() {
         let change =
             |end: &[f64]| -> Vec<f64> { end.iter().zip(&band.base[k]).map(|(e, b)| e - b).collect() };
         let (low, high) = (change(&band.low[k]), change(&band.high[k]));
@@ -112,11 +110,11 @@ fn bands(setup: &Setup, outcome: &Outcome) -> LapView {
     }
     LapView::new(format!(
         "What {} parameters change along the lap, one at a time at {} steps",
-        outcome.ranges.len(),
+        outcome.base.len(),
         LEVELS.len()
     ))
     .note("Output minus that of the base car: the least and the greatest over all parameters.")
-    .panels((0..LABELS.len()).map(|k| (LABELS[k], CHANNEL_UNITS[k])))
+    .panels((0..CHANNEL_LABELS.len()).map(|k| (CHANNEL_LABELS[k], CHANNEL_UNITS[k])))
     .line(greatest)
     .line(least)
     .sections(circuit.into_iter().flat_map(sections))

@@ -1,7 +1,6 @@
 //! What a sensitivity study leaves behind.
 
 use super::{MOST_SAMPLES, Outcome, SensitivitySettings, SobolIndex};
-use crate::config::settings::Settings;
 use crate::error::Result;
 use crate::report::{BarPanel, Bars, Table};
 use crate::study::framework::RunRecord;
@@ -89,29 +88,23 @@ fn doubts(parameters: &[ParameterSensitivity], samples: usize) -> Option<String>
 /// Puts the figures together.
 pub(super) fn summarise(settings: &SensitivitySettings, setup: &Setup, outcome: &Outcome) -> Summary {
     let problem = &setup.replay.problem;
-    let names: Vec<&String> = problem.objectives.iter().map(|o| &o.name).collect();
-    let mut parameters: Vec<ParameterSensitivity> = outcome
-        .ranges
-        .iter()
-        .enumerate()
-        .map(|(k, range)| ParameterSensitivity {
-            name: range.name.clone(),
-            unit: problem.variables[k].unit.clone(),
+    let names = || problem.objectives.iter().map(|o| o.name.clone());
+    let each = problem.variables.iter().enumerate();
+    let mut parameters: Vec<ParameterSensitivity> = each
+        .map(|(k, variable)| ParameterSensitivity {
+            name: variable.name.clone(),
+            unit: variable.unit.clone(),
             value: outcome.base[k],
-            range: [range.lower, range.upper],
-            one_at_a_time: names
-                .iter()
-                .enumerate()
-                .map(|(o, name)| ((*name).clone(), greatest_change(outcome, k, o)))
+            range: [variable.lower, variable.upper],
+            one_at_a_time: names()
+                .zip((0..).map(|o| greatest_change(outcome, k, o)))
                 .collect(),
-            sobol: names
-                .iter()
-                .zip(&outcome.indices)
-                .map(|(name, indices)| ((*name).clone(), indices[k]))
+            sobol: names()
+                .zip(outcome.indices.iter().map(|indices| indices[k]))
                 .collect(),
         })
         .collect();
-    let first = names[0].clone();
+    let first = problem.objectives[0].name.clone();
     let rank = |p: &ParameterSensitivity| {
         let change = p.one_at_a_time[&first].map_or(f64::INFINITY, f64::abs);
         p.sobol.get(&first).map_or(change, |i| i.total)
@@ -124,15 +117,9 @@ pub(super) fn summarise(settings: &SensitivitySettings, setup: &Setup, outcome: 
         share: settings.share,
         samples: settings.samples,
         left_out: outcome.left_out,
-        base_costs: names
-            .iter()
-            .map(|n| (*n).clone())
-            .zip(outcome.base_costs.clone())
-            .collect(),
-        cost_units: problem
-            .objectives
-            .iter()
-            .map(|o| (o.name.clone(), o.unit.clone()))
+        base_costs: names().zip(outcome.base_costs.clone()).collect(),
+        cost_units: names()
+            .zip(problem.objectives.iter().map(|o| o.unit.clone()))
             .collect(),
         warnings: doubts(&parameters, settings.samples).into_iter().collect(),
         parameters,
@@ -190,37 +177,18 @@ impl Summary {
     }
 }
 
-/// Writes `summary.json`, `manifest.json`, `study.toml`, `sobol.csv`, `one_at_a_time.csv`, the figures `sobol.svg`,
-/// `one_at_a_time.svg` and `bands.svg`, and `report.html`.
-///
-/// # Errors
-/// [`crate::Error::Io`] if a file cannot be written.
-pub(super) fn report(
-    folder: &Path,
-    settings: &SensitivitySettings,
-    setup: &Setup,
-    outcome: &Outcome,
-    summary: &Summary,
-) -> Result<()> {
-    write_one_at_a_time(folder, setup, outcome)?;
-    if !outcome.indices.is_empty() {
-        write_sobol(folder, summary)?;
-    }
-    super::page::write(folder, &settings.to_toml(), setup, outcome, summary)
-}
-
-fn write_one_at_a_time(folder: &Path, setup: &Setup, outcome: &Outcome) -> Result<()> {
-    let objectives = &setup.replay.problem.objectives;
+pub(super) fn write_one_at_a_time(folder: &Path, setup: &Setup, outcome: &Outcome) -> Result<()> {
+    let problem = &setup.replay.problem;
     let mut table = Table::rows(&outcome.one_at_a_time)
-        .text("parameter", |r| &*outcome.ranges[r.parameter].name)
+        .text("parameter", |r| &*problem.variables[r.parameter].name)
         .number("value", "", |r| r.value);
-    for (k, o) in objectives.iter().enumerate() {
+    for (k, o) in problem.objectives.iter().enumerate() {
         table = table.number(&*o.name, &*o.unit, |r| r.costs.as_ref().map(|c| c[k]));
     }
     table.table().write_csv(folder.join("one_at_a_time.csv"))
 }
 
-fn write_sobol(folder: &Path, summary: &Summary) -> Result<()> {
+pub(super) fn write_sobol(folder: &Path, summary: &Summary) -> Result<()> {
     let all = summary.parameters.iter();
     Table::rows(all.flat_map(|p| p.sobol.iter().map(|(cost, index)| (&*p.name, &**cost, index))))
         .text("parameter", |(name, ..)| *name)
@@ -294,11 +262,3 @@ pub(super) fn one_at_a_time_figure(summary: &Summary) -> Bars {
     );
     Bars::new(title, panels.filter(BarPanel::has_bars))
 }
-
-/// Labels of the channels in figures.
-pub(super) const LABELS: [&str; 4] = [
-    "speed",
-    "longitudinal acceleration",
-    "lateral acceleration",
-    "yaw rate",
-];

@@ -7,12 +7,11 @@ pub use results::Summary;
 use crate::config::kinds::{count, number, optional, two_texts};
 use crate::config::settings::{Settings, settings};
 use crate::error::{Error, Result};
-use crate::evaluate::replay::open_evaluator;
-use crate::study::framework::journal::{Journal, Recorder};
+use crate::study::framework::journal::Journal;
 use crate::study::framework::memory::{ANSWER, Kept, log_kept};
-use crate::study::framework::{Plan, Progress, RunRecord, Study, Subject, Watch, Work};
+use crate::study::framework::{Plan, RunRecord, Study, Subject, Work};
 use crate::study::identify::{FreeParameter, IdentifySettings, Setup, planned, subject, without_laps};
-use crate::study::replayed::{costs_of, inputs_of, ranges_about, replay_settings, set_up_channels, windowed};
+use crate::study::replayed::{drive, ranges_about, replay_settings, set_up_channels, windowed};
 use std::path::Path;
 
 /// The study.
@@ -130,57 +129,37 @@ impl Study for Surface {
 /// # Errors
 /// [`Error::Study`] if no candidate drives the lap; those of the evaluator.
 fn measure(settings: &SurfaceSettings, setup: &Setup, work: Work<'_, Journal>) -> Result<Outcome> {
-    let watch = Watch::begin();
-    let replay = &setup.replay;
+    let problem = &setup.replay.problem;
     let n = settings.grid;
-    let axis = |k: usize| -> Vec<f64> {
-        let v = &replay.problem.variables[k];
+    let axes = [0, 1].map(|k| -> Vec<f64> {
+        let v = &problem.variables[k];
         (0..n)
             .map(|i| v.lower + (v.upper - v.lower) * i as f64 / (n - 1) as f64)
             .collect()
-    };
-    let axes = [axis(0), axis(1)];
+    });
     let population: Vec<f64> = axes[1]
         .iter()
         .flat_map(|y| axes[0].iter().flat_map(|x| [*x, *y]))
         .collect();
-    let mut evaluator = open_evaluator(
-        replay,
-        settings.replay.backend,
-        settings.replay.adapter.as_deref(),
-    )?;
-    let mut recorder = Recorder::of(Surface::NAME, settings, work.state, work.state_file)?;
-    recorder.begin(inputs_of(Surface::NAME, setup), &evaluator.backend())?;
-    let mut record = RunRecord::of(&evaluator.backend());
-    let mut recorded = recorder.over(evaluator.as_mut());
-    let found = costs_of(&mut recorded, &population, &mut record.failures, |done| {
-        (work.observe)(&Progress::counted(done as u64, (n * n) as u64))
-    })?;
-    record.interrupted = found.is_none();
-    if record.interrupted {
-        recorder.save()?;
-    }
-    let rows = found.unwrap_or_else(|| vec![None; n * n]);
-    if !record.interrupted && rows.iter().all(Option::is_none) {
+    let driven = drive::<Surface>(settings, (&settings.replay, setup), &[&population], work)?;
+    let rows = &driven.costs;
+    if !driven.interrupted() && rows.iter().all(Option::is_none) {
         let text = "no car of the grid drives the lap to its end: a smaller share, or shorter windows, keep more of them on the road";
         return Err(Error::Study(text.to_owned()));
     }
-    let costs = (0..replay.problem.objectives.len())
-        .map(|k| {
-            rows.iter()
-                .map(|row| row.as_ref().map_or(f64::NAN, |r| r[k]))
-                .collect()
-        })
-        .collect();
-    let base = replay.free.base();
-    recorder.complete(&mut record);
-    let elapsed_s = watch.elapsed_s();
-    record.took((n * n) as u64, elapsed_s, elapsed_s);
-    record.longest_dispatch_ms = watch.longest_dispatch_ms();
+    // Of an interrupted study nothing is told.
+    let cost = |i: usize, k: usize| match rows.get(i) {
+        Some(Some(row)) if !driven.interrupted() => row[k],
+        _ => f64::NAN,
+    };
+    let costs = (0..problem.objectives.len()).map(|k| (0..n * n).map(|i| cost(i, k)).collect());
+    let costs = costs.collect();
+    let free = &setup.replay.free;
+    let base = free.values_in(free.base());
     Ok(Outcome {
         axes,
-        base: [0, 1].map(|k| base[replay.free.parameters[k].slots[0]]),
+        base: [base[0], base[1]],
         costs,
-        record,
+        record: driven.record(),
     })
 }

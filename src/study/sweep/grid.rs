@@ -1,6 +1,6 @@
 //! The grid of settings of a sweep.
 
-use crate::config::read_text;
+use crate::config::{Document, read_text};
 use crate::error::{Error, Result};
 use crate::study::registry::{self, Registered};
 use std::collections::BTreeMap;
@@ -42,24 +42,21 @@ pub struct Point {
     pub study: String,
 }
 
+macro_rules! bundled {
+    ($($name:literal),*) => {
+        [$(($name, include_str!(concat!("../../../data/sweeps/", $name, ".toml")))),*]
+    };
+}
+
 /// Sweep files that come with the crate, by name.
-const BUNDLED: [(&str, &str); 6] = [
-    (
-        "thesis_inertia",
-        include_str!("../../../data/sweeps/thesis_inertia.toml"),
-    ),
-    (
-        "thesis_population",
-        include_str!("../../../data/sweeps/thesis_population.toml"),
-    ),
-    (
-        "thesis_lines",
-        include_str!("../../../data/sweeps/thesis_lines.toml"),
-    ),
-    ("front", include_str!("../../../data/sweeps/front.toml")),
-    ("norms", include_str!("../../../data/sweeps/norms.toml")),
-    ("sections", include_str!("../../../data/sweeps/sections.toml")),
-];
+const BUNDLED: [(&str, &str); 6] = bundled!(
+    "thesis_inertia",
+    "thesis_population",
+    "thesis_lines",
+    "front",
+    "norms",
+    "sections"
+);
 
 /// Most runs of a sweep.
 const MOST_RUNS: usize = 100_000;
@@ -90,91 +87,77 @@ impl SweepSettings {
     /// # Errors
     /// [`Error::Input`] naming what is wrong in it.
     pub fn parse(path: &Path, text: &str) -> Result<Self> {
-        let refuse =
-            |place: &str, found: String, expected: &str| Err(Error::input(path, place, found, expected));
-        let mut root: Table = match text.parse() {
-            Ok(root) => root,
-            Err(e) => {
-                let e: toml::de::Error = e;
-                let line = e
-                    .span()
-                    .map_or(0, |s| text[..s.start.min(text.len())].matches('\n').count() + 1);
-                return refuse(&format!("line {line}"), e.message().to_owned(), "a TOML file");
-            }
-        };
-        let named = |value: &Value| registry::named(value.as_str()?);
+        // Says what is wrong in text that is no TOML.
+        Document::parse(path, text)?;
+        let mut root: Table = text.parse().unwrap_or_default();
+        let refuse = |place: &str, found: String, expected: &str| Error::input(path, place, found, expected);
         let asked = root.remove("study");
-        let Some(study) = asked.as_ref().and_then(named) else {
+        let study = asked.as_ref().and_then(|name| registry::named(name.as_str()?));
+        let study = study.ok_or_else(|| {
             let found = asked.map_or("nothing".to_owned(), |v| v.to_string());
-            return refuse(
+            refuse(
                 "study",
                 found,
                 &format!("one of {}", registry::names().join(", ")),
-            );
-        };
+            )
+        })?;
         // Keys that name files, which are relative to the sweep file.
-        let declared = study.declared().into_iter();
-        let files: Vec<&str> = declared
-            .filter(|d| d.value_name.contains("FILE"))
-            .map(|d| d.key)
-            .collect();
+        let declared = study.declared();
+        let names_files = |key: &str| {
+            let own = declared.iter().find(|d| d.key == key);
+            own.is_some_and(|d| d.value_name.contains("FILE"))
+        };
+        let folder = std::path::absolute(path.parent().unwrap_or(Path::new(""))).unwrap_or_default();
+        let absolute = |key: &str, value| absolute_value(names_files(key), value, &folder);
         let mut base = match root.remove("base") {
             None => Table::new(),
             Some(Value::Table(base)) => base,
-            Some(other) => return refuse("base", other.to_string(), "a table of the study's keys"),
+            Some(other) => return Err(refuse("base", other.to_string(), "a table of the study's keys")),
         };
-        let folder = std::path::absolute(path.parent().unwrap_or(Path::new(""))).unwrap_or_default();
-        make_absolute(&mut base, &files, &folder);
+        for (key, value) in &mut base {
+            *value = absolute(key, value.clone());
+        }
         let Some(Value::Table(grid)) = root.remove("grid") else {
-            return refuse(
-                "grid",
-                "no such table".to_owned(),
-                "a table of the study's keys, each with a list of values",
-            );
+            let expected = "a table of the study's keys, each with a list of values";
+            return Err(refuse("grid", "no such table".to_owned(), expected));
         };
         if let Some((key, value)) = root.iter().next() {
-            return refuse(key, value.to_string(), "no other keys than study, base and grid");
+            let expected = "no other keys than study, base and grid";
+            return Err(refuse(key, value.to_string(), expected));
         }
-        let mut axes = Vec::new();
-        for (key, value) in grid {
-            if key.matches('.').count() > MOST_DOTS {
+        let axis = |(key, value): (String, Value)| match value {
+            _ if key.matches('.').count() > MOST_DOTS => {
                 let key: String = key.chars().take(60).collect();
-                return refuse("grid", key, "keys that go through a few tables at most");
+                Err(refuse("grid", key, "keys that go through a few tables at most"))
             }
-            match value {
-                Value::Array(values) if !values.is_empty() => {
-                    let values: Vec<Value> = values
-                        .into_iter()
-                        .map(|v| absolute_value(files.contains(&key.as_str()), v, &folder))
-                        .collect();
-                    axes.push((key, values));
-                }
-                other => {
-                    return refuse(
-                        &format!("grid, {key}"),
-                        other.to_string(),
-                        "a list of values, at least one",
-                    );
-                }
+            Value::Array(values) if !values.is_empty() => {
+                let values = values.into_iter().map(|v| absolute(&key, v)).collect();
+                Ok((key, values))
             }
-        }
+            other => {
+                let place = format!("grid, {key}");
+                Err(refuse(
+                    &place,
+                    other.to_string(),
+                    "a list of values, at least one",
+                ))
+            }
+        };
+        let mut axes: Vec<(String, Vec<Value>)> = grid.into_iter().map(axis).collect::<Result<_>>()?;
         // Seeds change fastest, so that the runs that a median is taken over lie beside each other.
         axes.sort_by_key(|(key, _)| key == "seed");
         let runs = axes.iter().try_fold(1usize, |n, (_, v)| n.checked_mul(v.len()));
-        if runs.is_none_or(|n| n > MOST_RUNS) {
+        let Some(runs) = runs.filter(|n| *n <= MOST_RUNS) else {
             let found = runs.map_or("more runs than can be counted".to_owned(), |n| {
                 format!("{n} runs")
             });
-            return refuse("grid", found, "at most 100000 runs");
-        }
+            return Err(refuse("grid", found, "at most 100000 runs"));
+        };
         // Every run has a study of its own, with all of the base in it.
-        if runs.is_some_and(|n| n.saturating_mul(text.len()) > MOST_TEXT) {
-            let found = format!("{} runs of {} bytes", runs.unwrap_or_default(), text.len());
-            return refuse(
-                "grid",
-                found,
-                &format!("studies of {MOST_TEXT} bytes together at most"),
-            );
+        if runs.saturating_mul(text.len()) > MOST_TEXT {
+            let found = format!("{runs} runs of {} bytes", text.len());
+            let expected = format!("studies of {MOST_TEXT} bytes together at most");
+            return Err(refuse("grid", found, &expected));
         }
         Ok(Self {
             study,
@@ -234,12 +217,9 @@ impl SweepSettings {
                 expected,
             } if Path::new(&file) == study || file == "the study" => {
                 // Lines are those of the made file.
-                let place = match place.split_once(", ") {
-                    Some((line, rest)) if line.starts_with("line ") => rest,
-                    _ => &place,
-                };
+                let place = place.field.map_or_else(String::new, |field| format!(", {field}"));
                 let at: Vec<String> = point.settings.iter().map(|(k, v)| format!("{k} {v}")).collect();
-                let place = format!("run {} ({}), {place}", number + 1, at.join(", "));
+                let place = format!("run {} ({}){place}", number + 1, at.join(", "));
                 Error::input(&self.file, place, found, expected)
             }
             other => other,
@@ -248,19 +228,19 @@ impl SweepSettings {
 
     /// Sets `a.b` of nested tables; a table's keys are added to what is there.
     fn set(&self, table: &mut Table, key: &str, value: &Value) -> Result<()> {
-        let refuse = || {
-            Err(Error::input(
-                &self.file,
-                format!("grid, {key}"),
-                "a key through no table",
-                "a key of the study",
-            ))
-        };
         if let Some((first, rest)) = key.split_once('.') {
             let inner = table.entry(first).or_insert_with(|| Value::Table(Table::new()));
             return match inner {
                 Value::Table(inner) => self.set(inner, rest, value),
-                _ => refuse(),
+                _ => {
+                    let place = format!("grid, {key}");
+                    Err(Error::input(
+                        &self.file,
+                        place,
+                        "a key through no table",
+                        "a key of the study",
+                    ))
+                }
             };
         }
         if let (Some(Value::Table(there)), Value::Table(more)) = (table.get_mut(key), value) {
@@ -301,15 +281,9 @@ fn absolute_value(names_files: bool, value: Value, folder: &Path) -> Value {
     }
 }
 
-fn make_absolute(base: &mut Table, files: &[&str], folder: &Path) {
-    for (key, value) in base.iter_mut() {
-        let taken = std::mem::replace(value, Value::Boolean(false));
-        *value = absolute_value(files.contains(&key.as_str()), taken, folder);
-    }
-}
-
 #[cfg(test)]
 mod tests {
+    use super::super::Work;
     use super::*;
     use std::path::PathBuf;
 
@@ -319,9 +293,8 @@ mod tests {
             let sweep = SweepSettings::load(name).expect(name);
             let points = sweep.points().expect(name);
             assert!(points.len() >= 9, "{name}");
-            let path_of = |number: usize| PathBuf::from(format!("{number:05}.toml"));
-            let checked = sweep.study.check_points(&sweep, &points, &path_of, 4096);
-            checked.expect(name);
+            let work = Work::new(&sweep, Path::new(""), PathBuf::new()).expect(name);
+            sweep.study.check_points(&work).expect(name);
         }
     }
 

@@ -1,6 +1,7 @@
 //! Fronts of several runs against the front of all of them together.
 
 use super::Row;
+use super::results::by_settings;
 use crate::error::Result;
 use crate::swarm::metrics::{hypervolume, non_dominated};
 
@@ -15,29 +16,23 @@ pub(super) const SHARE: &str = "hypervolume_share";
 /// # Errors
 /// Those of [`hypervolume`].
 pub(super) fn compare(rows: &mut [Row]) -> Result<()> {
-    let settings = |row: &Row| {
-        let mut settings = row.settings.clone();
-        settings.remove("seed");
-        settings
-    };
     // Volumes are worked out in two and three dimensions.
-    let comparable = |row: &Row| row.front.first().is_some_and(|p| (2..=3).contains(&p.len()));
-    let mut done = vec![false; rows.len()];
-    for first in 0..rows.len() {
-        if std::mem::replace(&mut done[first], true) || !comparable(&rows[first]) {
+    let width_of = |row: &Row| {
+        row.front
+            .first()
+            .map(Vec::len)
+            .filter(|width| (2..=3).contains(width))
+    };
+    for (_, mut members) in by_settings(rows) {
+        let Some(width) = members.iter().find_map(|&i| width_of(&rows[i])) else {
             continue;
-        }
-        let own = settings(&rows[first]);
-        let members: Vec<usize> = (first..rows.len())
-            .filter(|&i| comparable(&rows[i]) && settings(&rows[i]) == own)
-            .filter(|&i| rows[i].front[0].len() == rows[first].front[0].len())
-            .collect();
+        };
+        members.retain(|&i| width_of(&rows[i]) == Some(width));
         let all: Vec<Vec<f64>> = members
             .iter()
             .flat_map(|&i| rows[i].front.iter().cloned())
             .collect();
         let joint: Vec<Vec<f64>> = non_dominated(&all).into_iter().map(|i| all[i].clone()).collect();
-        let width = all[0].len();
         let over = |k: usize, f: fn(f64, f64) -> f64| joint.iter().map(|p| p[k]).reduce(f).unwrap_or(0.0);
         let best: Vec<f64> = (0..width).map(|k| over(k, f64::min)).collect();
         let range: Vec<f64> = (0..width)
@@ -52,7 +47,6 @@ pub(super) fn compare(rows: &mut [Row]) -> Result<()> {
         };
         let whole = volume(&joint)?;
         for i in members {
-            done[i] = true;
             let share = volume(&rows[i].front)? / whole;
             rows[i].figures.insert(SHARE.to_owned(), Some(share));
         }

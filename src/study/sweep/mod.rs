@@ -14,8 +14,9 @@ pub use results::{Row, Summary, medians};
 
 use crate::config::settings::{Role, Settings};
 use crate::error::{Error, Result};
+use crate::evaluate::portions::Allowance;
 use crate::report::write_whole;
-use crate::study::framework::memory::{self, Kept, USUAL_MIB};
+use crate::study::framework::memory::{self, Kept};
 use crate::study::framework::run_folder::{Manifest, write_json};
 use crate::study::framework::state_file::StateFile;
 use crate::study::framework::{Entry, Plan, Progress, Study};
@@ -29,79 +30,48 @@ pub const SWEEP_FILE: &str = "sweep.toml";
 /// Most problems whose inputs are kept while a sweep is planned.
 const MOST_PREPARED: usize = 16;
 
-/// What an observer is told before each run.
-pub struct SweepProgress<'a> {
-    /// Runs done.
-    pub done: usize,
-    /// Runs in all.
-    pub planned: usize,
-    /// The point of the grid.
-    pub point: &'a Point,
-}
-
-/// Is told of the progress of a sweep and may end it.
-type Observer<'a> = dyn FnMut(&SweepProgress<'_>) -> ControlFlow<()> + 'a;
-
-/// As [`sweep_within`], in the usual memory.
-///
-/// # Errors
-/// As [`sweep_within`].
-pub fn sweep(
-    settings: &SweepSettings,
-    folder: &Path,
-    resume: bool,
-    observe: impl FnMut(&SweepProgress<'_>) -> ControlFlow<()>,
-) -> Result<Summary> {
-    sweep_within(settings, folder, resume, USUAL_MIB, observe)
-}
+/// Is told of the progress of a sweep before each run and while it works, and may end it.
+type Observer<'a> = dyn FnMut(&Progress) -> ControlFlow<()> + 'a;
 
 /// Runs what is left of a sweep in `folder`, which holds nothing yet or, to `resume`, a part of the same sweep. Runs that are
-/// at work at the same time share `memory_limit_mib` (MiB), which changes no row.
+/// at work at the same time share the [memory that is allowed](memory::limit_mib), which changes no row.
 ///
 /// # Errors
 /// [`Error::Input`] if the folder holds another sweep, or a point of the grid is no study; [`Error::Interrupted`] if the
 /// observer broke the sweep off; those of the studies.
-pub fn sweep_within(
+pub fn sweep(
     settings: &SweepSettings,
     folder: &Path,
     resume: bool,
-    memory_limit_mib: u64,
-    mut observe: impl FnMut(&SweepProgress<'_>) -> ControlFlow<()>,
+    mut observe: impl FnMut(&Progress) -> ControlFlow<()>,
 ) -> Result<Summary> {
-    let points = settings.points()?;
-    let studies = folder.join("studies");
-    let path_of = |number: usize| studies.join(format!("{number:05}.toml"));
+    let work = Work::new(settings, folder, folder.join("studies"))?;
     // Every point is read before anything is written: a mistake in the last shows at once, and leaves nothing behind.
-    settings
-        .study
-        .check_points(settings, &points, &path_of, memory_limit_mib)?;
+    settings.study.check_points(&work)?;
     let mut rows = if resume {
-        results::read_rows(&folder.join(ROWS), &folder.join(SWEEP_FILE), settings, &points)?
+        results::read_rows(
+            &folder.join(ROWS),
+            &folder.join(SWEEP_FILE),
+            settings,
+            &work.points,
+        )?
     } else {
         Vec::new()
     };
     let began_with = rows.len();
-    let ran = write_studies(settings, folder, &points, path_of, resume).and_then(|()| {
-        let work = Work {
-            sweep: settings,
-            folder,
-            points: &points,
-            paths: (0..points.len()).map(path_of).collect(),
-            memory_limit_mib,
-        };
-        settings.study.run_points(&work, &mut rows, &mut observe)
-    });
+    let ran = work.write_studies(resume);
+    let ran = ran.and_then(|()| settings.study.run_points(&work, &mut rows, &mut observe));
     if let Err(error) = ran {
         // What has come to nothing does not stand in the way of the next; what was interrupted may be resumed.
         // So may what a full disk or a lost device has ended.
-        let begun = || (0..points.len()).any(|number| state_file_of(&path_of(number)).file().exists());
+        let begun = || (0..work.points.len()).any(|number| work.state_file_of(number).file().exists());
         let mendable = match &error {
             Error::Interrupted(_) => true,
             Error::Io { .. } | Error::Device(_) | Error::NoDevice(_) => begun(),
             _ => false,
         };
         if !resume && rows.len() == began_with && !mendable {
-            let _ = std::fs::remove_dir_all(&studies);
+            let _ = std::fs::remove_dir_all(&work.studies);
             let _ = std::fs::remove_file(folder.join(SWEEP_FILE));
         }
         return Err(error);
@@ -111,54 +81,100 @@ pub fn sweep_within(
     Ok(summary)
 }
 
+/// Reads every point, sets up every problem among them, and runs none.
+///
+/// # Errors
+/// Those that [`sweep`] would have before its runs begin, and those of the problems.
+pub fn plan(settings: &SweepSettings) -> Result<SweepPlan> {
+    let work = Work::new(settings, Path::new(""), PathBuf::new())?;
+    settings.study.plan_points(&work)
+}
+
+/// What runs of a sweep work with.
+pub struct Work<'a> {
+    sweep: &'a SweepSettings,
+    folder: &'a Path,
+    /// The folder of their studies.
+    studies: PathBuf,
+    points: Vec<Point>,
+    memory_limit_mib: u64,
+}
+
+impl<'a> Work<'a> {
+    fn new(sweep: &'a SweepSettings, folder: &'a Path, studies: PathBuf) -> Result<Self> {
+        Ok(Self {
+            points: sweep.points()?,
+            sweep,
+            folder,
+            studies,
+            memory_limit_mib: memory::limit_mib(),
+        })
+    }
+
+    /// The study of a point.
+    fn path_of(&self, number: usize) -> PathBuf {
+        self.studies.join(format!("{number:05}.toml"))
+    }
+
+    /// What keeps the state of a study, beside it.
+    fn state_file_of(&self, number: usize) -> StateFile {
+        StateFile::at(self.path_of(number).with_extension("checkpoint"))
+    }
+
+    /// An error in the study of a point, said of the sweep.
+    fn of_point(&self, error: Error, number: usize) -> Error {
+        let point = &self.points[number];
+        self.sweep.of_point(error, number, point, &self.path_of(number))
+    }
+
+    /// Refuses what needs more memory than is allowed.
+    fn check(&self, kept: &[Kept], number: usize) -> Result<Allowance> {
+        memory::check(kept, self.memory_limit_mib).map_err(|e| self.of_point(e, number))
+    }
+
+    /// Reads the study of every point, and refuses what is wrong or too large.
+    fn read<S: Study>(&self) -> Result<Vec<S::Settings>> {
+        let read = |(number, point): (usize, &Point)| {
+            let study = S::Settings::parse(&self.path_of(number), &point.study).map(Settings::absolute);
+            let study = study.map_err(|e| self.of_point(e, number))?;
+            self.check(&S::size(&study, None), number).map(|_| study)
+        };
+        self.points.iter().enumerate().map(read).collect()
+    }
+
+    /// Writes the sweep and the study of every point.
+    fn write_studies(&self, resume: bool) -> Result<()> {
+        let (folder, studies) = (self.folder, &self.studies);
+        if !resume {
+            std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, "create", e))?;
+            // First: with it, an interrupted sweep can be resumed.
+            write_whole(folder.join(SWEEP_FILE), self.sweep.text().as_bytes())?;
+        }
+        std::fs::create_dir_all(studies).map_err(|e| Error::io(studies, "create", e))?;
+        let mut points = self.points.iter().enumerate();
+        points.try_for_each(|(number, point)| write_whole(self.path_of(number), point.study.as_bytes()))
+    }
+}
+
 /// A kind of study that can be swept: all of those in the registry.
 pub trait Swept: Sync {
     /// Refuses points whose study is wrong or too large.
     ///
     /// # Errors
     /// [`Error::Input`] naming the point.
-    fn check_points(
-        &self,
-        sweep: &SweepSettings,
-        points: &[Point],
-        path_of: &dyn Fn(usize) -> PathBuf,
-        memory_limit_mib: u64,
-    ) -> Result<()>;
+    fn check_points(&self, work: &Work<'_>) -> Result<()>;
 
     /// Says what a sweep over these points would do; see [`plan`].
     ///
     /// # Errors
     /// As [`plan`].
-    fn plan_points(
-        &self,
-        sweep: &SweepSettings,
-        points: &[Point],
-        path_of: &dyn Fn(usize) -> PathBuf,
-        memory_limit_mib: u64,
-    ) -> Result<SweepPlan>;
+    fn plan_points(&self, work: &Work<'_>) -> Result<SweepPlan>;
 
     /// Runs the points that have no row yet, and keeps the rows as they come.
     ///
     /// # Errors
     /// [`Error::Interrupted`] if the observer ended it; those of the studies.
     fn run_points(&self, work: &Work<'_>, rows: &mut Vec<Row>, observe: &mut Observer<'_>) -> Result<()>;
-}
-
-/// Reads the study of every point, and refuses what is wrong or too large.
-fn read_points<S: Study>(
-    sweep: &SweepSettings,
-    points: &[Point],
-    path_of: &dyn Fn(usize) -> PathBuf,
-    memory_limit_mib: u64,
-) -> Result<Vec<S::Settings>> {
-    let read = |(number, point): (usize, &Point)| {
-        let path = path_of(number);
-        let study = S::Settings::parse(&path, &point.study).map(Settings::absolute);
-        study
-            .and_then(|study| memory::check(&S::size(&study, None), memory_limit_mib).map(|_| study))
-            .map_err(|e| sweep.of_point(e, number, point, &path))
-    };
-    points.iter().enumerate().map(read).collect()
 }
 
 /// The problem that a study solves: what only the search goes by is left out.
@@ -186,118 +202,100 @@ fn alike<S: Study>(studies: &[S::Settings], prepared: &S::Prepared, memory_limit
     1 + together.take_while(fits).count()
 }
 
+/// Problems that have been set up, the last first.
+struct Known<S: Study>(Vec<(S::Settings, S::Prepared)>);
+
+impl<S: Study> Known<S> {
+    /// The inputs of a study; no more than so many problems are kept.
+    fn of(&mut self, settings: &S::Settings, most: usize) -> Result<&S::Prepared> {
+        let problem = problem_of::<S>(settings);
+        let known = self.0.iter().position(|(known, _)| *known == problem);
+        let place = known.unwrap_or(0);
+        if known.is_none() {
+            self.0.truncate(most - 1);
+            self.0.insert(0, (problem, S::prepare(settings)?));
+        }
+        Ok(&self.0[place].1)
+    }
+}
+
 impl<S: Study> Swept for Entry<S> {
-    fn check_points(
-        &self,
-        sweep: &SweepSettings,
-        points: &[Point],
-        path_of: &dyn Fn(usize) -> PathBuf,
-        memory_limit_mib: u64,
-    ) -> Result<()> {
-        read_points::<S>(sweep, points, path_of, memory_limit_mib).map(drop)
+    fn check_points(&self, work: &Work<'_>) -> Result<()> {
+        work.read::<S>().map(drop)
     }
 
-    fn plan_points(
-        &self,
-        sweep: &SweepSettings,
-        points: &[Point],
-        path_of: &dyn Fn(usize) -> PathBuf,
-        memory_limit_mib: u64,
-    ) -> Result<SweepPlan> {
-        let studies = read_points::<S>(sweep, points, path_of, memory_limit_mib)?;
+    fn plan_points(&self, work: &Work<'_>) -> Result<SweepPlan> {
         let mut problems: Vec<S::Settings> = Vec::new();
-        let mut prepared: Vec<(S::Settings, S::Prepared)> = Vec::new();
-        let mut planned: Option<SweepPlan> = None;
-        for (number, settings) in studies.iter().enumerate() {
-            let of_point = |e| sweep.of_point(e, number, &points[number], &path_of(number));
+        let mut known = Known::<S>(Vec::new());
+        let mut first: Option<Plan> = None;
+        let (mut evaluations, mut memory_mib) = (Some(0u64), 0);
+        for (number, settings) in work.read::<S>()?.iter().enumerate() {
+            let of_point = |e| work.of_point(e, number);
             let problem = problem_of::<S>(settings);
             if !problems.contains(&problem) {
-                problems.push(problem.clone());
+                problems.push(problem);
             }
-            let place = match prepared.iter().position(|(known, _)| *known == problem) {
-                Some(place) => place,
-                None => {
-                    prepared.truncate(MOST_PREPARED - 1);
-                    prepared.insert(0, (problem, S::prepare(settings).map_err(of_point)?));
-                    0
-                }
-            };
-            let inputs = &prepared[place].1;
+            let inputs = known.of(settings, MOST_PREPARED).map_err(of_point)?;
             let kept = S::size(settings, Some(inputs));
-            drop(memory::check(&kept, memory_limit_mib).map_err(of_point)?);
+            drop(work.check(&kept, number)?);
             let plan = S::plan(settings, inputs, Plan::of(S::NAME, settings)).map_err(of_point)?;
-            let memory_mib = memory::needed_mib(&kept);
-            planned = Some(match planned {
-                None => SweepPlan {
-                    runs: points.len(),
-                    problems: 0,
-                    evaluations: plan.most_evaluations(),
-                    memory_mib,
-                    plan,
-                },
-                Some(before) => SweepPlan {
-                    evaluations: before
-                        .evaluations
-                        .zip(plan.most_evaluations())
-                        .map(|(all, more)| all.saturating_add(more)),
-                    memory_mib: before.memory_mib.max(memory_mib),
-                    ..before
-                },
-            });
+            let both = evaluations.zip(plan.most_evaluations());
+            evaluations = both.map(|(all, more)| all.saturating_add(more));
+            memory_mib = memory_mib.max(memory::needed_mib(&kept));
+            first.get_or_insert(plan);
         }
-        let problems = problems.len();
-        let planned = planned.map(|plan| SweepPlan { problems, ..plan });
-        planned.ok_or_else(|| Error::input("the sweep", "grid", "no point", "one point at least"))
+        let no_point = || Error::input("the sweep", "grid", "no point", "one point at least");
+        Ok(SweepPlan {
+            runs: work.points.len(),
+            problems: problems.len(),
+            evaluations,
+            memory_mib,
+            plan: first.ok_or_else(no_point)?,
+        })
     }
 
     fn run_points(&self, work: &Work<'_>, rows: &mut Vec<Row>, observe: &mut Observer<'_>) -> Result<()> {
-        let (points, paths) = (work.points, &work.paths);
-        let of_point = |e, number: usize| work.sweep.of_point(e, number, &points[number], &paths[number]);
-        let path_of = |number: usize| paths[number].clone();
-        let studies = read_points::<S>(work.sweep, points, &path_of, work.memory_limit_mib)?;
-        let mut prepared: Option<(S::Settings, S::Prepared)> = None;
+        let points = &work.points;
+        let studies = work.read::<S>()?;
+        let mut known = Known::<S>(Vec::new());
         while rows.len() < points.len() {
             let number = rows.len();
-            let progress = SweepProgress {
-                done: number,
-                planned: points.len(),
-                point: &points[number],
+            let point = points[number].settings.iter();
+            let point: Vec<String> = point.map(|(key, value)| format!("{key} {value}")).collect();
+            let progress = Progress {
+                stage: "runs".to_owned(),
+                done: number as u64,
+                planned: Some(points.len() as u64),
+                reached: point.join(", "),
             };
             if observe(&progress).is_break() {
                 return Err(Error::Interrupted(work.folder.to_owned()));
             }
-            let problem = problem_of::<S>(&studies[number]);
-            let known = prepared.take().filter(|(known, _)| *known == problem);
-            let (problem, inputs) = match known {
-                Some(known) => known,
-                None => {
-                    let inputs = S::prepare(&studies[number]).map_err(|e| of_point(e, number))?;
-                    (problem, inputs)
-                }
-            };
-            let together = alike::<S>(&studies[number..], &inputs, work.memory_limit_mib);
+            let inputs = known
+                .of(&studies[number], 1)
+                .map_err(|e| work.of_point(e, number))?;
+            let together = alike::<S>(&studies[number..], inputs, work.memory_limit_mib);
             let chosen = &studies[number..number + together];
-            let mut kept: Vec<Kept> = S::size(&chosen[0], Some(&inputs));
+            let mut kept: Vec<Kept> = S::size(&chosen[0], Some(inputs));
             kept.extend(chosen[1..].iter().flat_map(|settings| S::size(settings, None)));
-            let _allowed = memory::check(&kept, work.memory_limit_mib).map_err(|e| of_point(e, number))?;
-            let mut state_files: Vec<StateFile> = (number..number + together)
-                .map(|number| state_file_of(&paths[number]))
-                .collect();
+            let _allowed = work.check(&kept, number)?;
+            let state_files = (number..number + together).map(|number| work.state_file_of(number));
+            let mut state_files: Vec<StateFile> = state_files.collect();
             let mut told = |_: &Progress| observe(&progress);
-            let found = S::solve_together(chosen, &inputs, &mut state_files, &mut told);
-            let found = found.map_err(|e| of_point(e, number))?;
+            let found = S::solve_together(chosen, inputs, &mut state_files, &mut told);
+            let found = found.map_err(|e| work.of_point(e, number))?;
             for ((run, settings), outcome) in (number..).zip(chosen).zip(found) {
                 // An interrupted run is no row: it is resumed, as is what comes after it.
-                let outcome = outcome.map_err(|e| of_point(e, run))?;
+                let outcome = outcome.map_err(|e| work.of_point(e, run))?;
                 let Some(outcome) = outcome.filter(|outcome| !S::record(outcome).interrupted) else {
                     return Err(Error::Interrupted(work.folder.to_owned()));
                 };
                 let record = S::record(&outcome);
                 // What depends on the clock stands beside the study, and not in the row.
-                let subject = S::subject(settings, &inputs);
+                let subject = S::subject(settings, inputs);
                 let manifest = Manifest::new(S::NAME, &subject, record, "");
-                write_json(&paths[run].with_extension("json"), &manifest)?;
-                let summary = S::summarise(settings, &inputs, &outcome);
+                write_json(&work.path_of(run).with_extension("json"), &manifest)?;
+                let summary = S::summarise(settings, inputs, &outcome);
                 rows.push(Row {
                     run,
                     settings: points[run].settings.clone(),
@@ -307,9 +305,8 @@ impl<S: Study> Swept for Entry<S> {
                 });
                 results::write_rows(&work.folder.join(ROWS), rows)?;
                 // Only now: until its row is kept, its state is all there is of it.
-                state_file_of(&paths[run]).done()?;
+                work.state_file_of(run).done()?;
             }
-            prepared = Some((problem, inputs));
         }
         Ok(())
     }
@@ -339,52 +336,4 @@ impl std::fmt::Display for SweepPlan {
         };
         write!(f, "{} runs of {of}", self.runs)
     }
-}
-
-/// Reads every point, sets up every problem among them, and runs none, none of which may take more than so much memory (MiB).
-///
-/// # Errors
-/// Those that [`sweep`] would have before its runs begin, and those of the problems.
-pub fn plan(settings: &SweepSettings, memory_limit_mib: u64) -> Result<SweepPlan> {
-    let points = settings.points()?;
-    let path_of = |number: usize| PathBuf::from(format!("{number:05}.toml"));
-    settings
-        .study
-        .plan_points(settings, &points, &path_of, memory_limit_mib)
-}
-
-/// Writes the sweep and the study of every point.
-fn write_studies(
-    settings: &SweepSettings,
-    folder: &Path,
-    points: &[Point],
-    path_of: impl Fn(usize) -> PathBuf,
-    resume: bool,
-) -> Result<()> {
-    let studies = folder.join("studies");
-    if !resume {
-        std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, "create", e))?;
-        // First: with it, an interrupted sweep can be resumed.
-        write_whole(folder.join(SWEEP_FILE), settings.text().as_bytes())?;
-    }
-    std::fs::create_dir_all(&studies).map_err(|e| Error::io(&studies, "create", e))?;
-    for (number, point) in points.iter().enumerate() {
-        write_whole(path_of(number), point.study.as_bytes())?;
-    }
-    Ok(())
-}
-
-/// What runs of a sweep work with.
-pub struct Work<'a> {
-    sweep: &'a SweepSettings,
-    folder: &'a Path,
-    points: &'a [Point],
-    /// Their studies.
-    paths: Vec<PathBuf>,
-    memory_limit_mib: u64,
-}
-
-/// What keeps the state of the study at `path`, beside it.
-fn state_file_of(path: &Path) -> StateFile {
-    StateFile::at(path.with_extension("checkpoint"))
 }

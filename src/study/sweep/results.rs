@@ -2,9 +2,10 @@
 
 use super::{Point, SweepSettings};
 use crate::config::{LARGEST_LOG, read_bytes, read_text};
-use crate::error::{Error, Result};
+use crate::error::{Error, Place, Result};
 use crate::report::{Rows, Table, write_whole};
 use crate::study::framework::run_folder::write_json;
+use crate::swarm::comparison::quartiles;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -82,52 +83,43 @@ fn faults_by_run(rows: &[Row]) -> Vec<String> {
     told.collect()
 }
 
-/// Linear interpolation between order statistics (type 7 of R. Hyndman and Y. Fan, *Sample quantiles in statistical
-/// packages*, Am. Stat. 50, 1996).
-fn quantile(sorted: &[f64], share: f64) -> f64 {
-    let place = share * (sorted.len() - 1) as f64;
-    let below = place.floor() as usize;
-    let above = (below + 1).min(sorted.len() - 1);
-    sorted[below] + (place - below as f64) * (sorted[above] - sorted[below])
+/// Settings but for the seed, each with its rows, in the order in which they were run.
+pub(super) fn by_settings(rows: &[Row]) -> Vec<(BTreeMap<String, String>, Vec<usize>)> {
+    let mut groups: Vec<(BTreeMap<String, String>, Vec<usize>)> = Vec::new();
+    for (number, row) in rows.iter().enumerate() {
+        let mut settings = row.settings.clone();
+        settings.remove("seed");
+        match groups.iter_mut().find(|(s, _)| *s == settings) {
+            Some((_, members)) => members.push(number),
+            None => groups.push((settings, vec![number])),
+        }
+    }
+    groups
 }
 
 /// Medians over runs that differ in nothing but the seed, in the order in which they were run.
 pub fn medians(rows: &[Row]) -> Vec<Group> {
-    let mut groups: Vec<(BTreeMap<String, String>, Vec<&Row>)> = Vec::new();
-    for row in rows {
-        let mut settings = row.settings.clone();
-        settings.remove("seed");
-        match groups.iter_mut().find(|(s, _)| *s == settings) {
-            Some((_, members)) => members.push(row),
-            None => groups.push((settings, vec![row])),
+    let group = |(settings, members): (BTreeMap<String, String>, Vec<usize>)| {
+        let mut values: BTreeMap<&String, Vec<f64>> = BTreeMap::new();
+        for (name, figure) in members.iter().flat_map(|row| &rows[*row].figures) {
+            values.entry(name).or_default().extend(figure);
         }
-    }
-    groups
-        .into_iter()
-        .map(|(settings, members)| {
-            let mut figures = BTreeMap::new();
-            for name in members.iter().flat_map(|r| r.figures.keys()) {
-                let mut values: Vec<f64> = members
-                    .iter()
-                    .filter_map(|r| r.figures.get(name).copied().flatten())
-                    .collect();
-                values.sort_unstable_by(f64::total_cmp);
-                if !values.is_empty() {
-                    let spread = Spread {
-                        lower_quartile: quantile(&values, 0.25),
-                        median: quantile(&values, 0.5),
-                        upper_quartile: quantile(&values, 0.75),
-                    };
-                    figures.insert(name.clone(), spread);
-                }
-            }
-            Group {
-                settings,
-                runs: members.len(),
-                figures,
-            }
-        })
-        .collect()
+        let spread = |(name, values): (&String, Vec<f64>)| {
+            let [lower_quartile, median, upper_quartile] = quartiles(&values);
+            let spread = Spread {
+                lower_quartile,
+                median,
+                upper_quartile,
+            };
+            (!values.is_empty()).then(|| (name.clone(), spread))
+        };
+        Group {
+            settings,
+            runs: members.len(),
+            figures: values.into_iter().filter_map(spread).collect(),
+        }
+    };
+    by_settings(rows).into_iter().map(group).collect()
 }
 
 pub(super) fn write_rows(path: &Path, rows: &[Row]) -> Result<()> {
@@ -148,14 +140,9 @@ pub(super) fn read_rows(
     settings: &SweepSettings,
     points: &[Point],
 ) -> Result<Vec<Row>> {
-    let held = read_text(sweep)?;
-    if held != settings.text() {
-        return Err(Error::input(
-            sweep,
-            "--resume",
-            "another sweep",
-            "the sweep that the folder holds",
-        ));
+    if read_text(sweep)? != settings.text() {
+        let expected = "the sweep that the folder holds";
+        return Err(Error::input(sweep, "resume", "another sweep", expected));
     }
     if !path.exists() {
         return Ok(Vec::new());
@@ -173,7 +160,7 @@ pub(super) fn read_rows(
             row.filter(own).ok_or_else(|| {
                 Error::input(
                     path,
-                    format!("line {}", number + 1),
+                    Place::line(number + 1),
                     line.chars().take(60).collect::<String>(),
                     "a row of this sweep",
                 )
@@ -243,6 +230,7 @@ impl Summary {
         }
         let rows = self.row_table();
         rows.write_csv(folder.join("sweep.csv"))?;
+        #[cfg(feature = "parquet")]
         rows.write_parquet(folder.join("sweep.parquet"))?;
         let medians = self.median_table(&[
             ("_lower_quartile", |s| s.lower_quartile),
@@ -250,6 +238,7 @@ impl Summary {
             ("_upper_quartile", |s| s.upper_quartile),
         ]);
         medians.write_csv(folder.join("medians.csv"))?;
+        #[cfg(feature = "parquet")]
         medians.write_parquet(folder.join("medians.parquet"))?;
         super::page::write(folder, self, settings)
     }

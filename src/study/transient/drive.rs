@@ -104,14 +104,11 @@ fn greatest_share(
     }
     state.inputs = Some(inputs);
     state_file.save(&state)?;
-    let attempt = |share: f64| -> Result<(Envelope, FineLine, Drive)> {
-        let (envelope, fine, plan) = planned(limits, points_m, share)?;
+    let attempt = |share: f64| -> Result<Option<DrivenLine>> {
+        let (envelope, point_mass, plan) = planned(limits, points_m, share)?;
         let drive = drive_planned(car, circuit, plan, &driver, INTERVAL_S)?;
-        Ok((envelope, fine, drive))
-    };
-    let outcome_of = |share: f64, (envelope, point_mass, drive): (Envelope, FineLine, Drive), failures| {
-        let lap_time_s = drive.lap_time_s(circuit.length_m, INTERVAL_S)?;
-        Some(DrivenLine {
+        let lap_time_s = drive.lap_time_s(circuit.length_m, INTERVAL_S);
+        Ok(lap_time_s.map(|lap_time_s| DrivenLine {
             grip_share: share,
             envelope,
             point_mass,
@@ -119,17 +116,16 @@ fn greatest_share(
             margin_m: least_room(circuit, &drive),
             drive,
             line: circuit.clone(),
-            failures,
+            failures: Vec::new(),
             record: RunRecord::default(),
-        })
+        }))
     };
-    let mut best = match state.best {
-        Some(share) => {
-            let before = state.failures.iter().take_while(|(failed, _)| *failed != share);
-            outcome_of(share, attempt(share)?, before.cloned().collect())
-        }
-        None => None,
-    };
+    let mut best = state.best.map(attempt).transpose()?.flatten();
+    if let Some(best) = &mut best {
+        let before = state.failures.iter();
+        let before = before.take_while(|(failed, _)| *failed != best.grip_share);
+        best.failures = before.cloned().collect();
+    }
     let planned = shares.len();
     // A few at once: the greatest that works ends the search.
     let together = rayon::current_num_threads().max(2);
@@ -143,10 +139,9 @@ fn greatest_share(
         let found: Vec<_> = batch.par_iter().map(|share| (*share, attempt(*share))).collect();
         for (share, driven) in found {
             match driven {
-                Ok(driven) => {
-                    let Some(outcome) = outcome_of(share, driven, state.failures.clone()) else {
-                        continue;
-                    };
+                Ok(None) => {}
+                Ok(Some(mut outcome)) => {
+                    outcome.failures.clone_from(&state.failures);
                     let off = outcome.disagreement();
                     if off.abs() <= AGREEMENT {
                         return Ok(Some(outcome));
@@ -165,7 +160,7 @@ fn greatest_share(
                         best = Some(outcome);
                     }
                 }
-                Err(error @ Error::Input { .. }) => return Err(error),
+                Err(error @ (Error::Input { .. } | Error::Memory { .. })) => return Err(error),
                 Err(error) => state.failures.push((share, error.to_string())),
             }
         }

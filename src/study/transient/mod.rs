@@ -6,7 +6,6 @@
 //! this share is fed back, and both laps are set side by side. Several lines, or set-ups of the car, are driven all at once.
 
 mod drive;
-mod page;
 mod population;
 mod population_results;
 mod results;
@@ -125,26 +124,12 @@ impl Study for Transient {
     }
 
     fn plan(settings: &TransientSettings, prepared: &Prepared, plan: Plan) -> Result<Plan> {
-        let (road, limits) = (&prepared.road.road, &prepared.road.car.envelope);
-        let plan = plan
-            .reads(format!(
-                "track {}, {:.1} m, {} cross-sections",
-                prepared.road.track_name,
-                road.length_m,
-                road.len()
-            ))
-            .reads(format!(
-                "g-g-v envelope of {} at {} speeds up to {:.1} m/s",
-                prepared.road.car_name,
-                limits.rows().len(),
-                limits.top_speed_mps()
-            ));
-        let lines = prepared.lines.iter();
-        let plan = lines
-            .fold(plan, |plan, line| {
-                plan.reads(format!("line {}, {:.1} m", line.name, line.circuit.length_m))
-            })
-            .evaluations(settings.laps() as u64);
+        let plan = raceline::road_read(plan, &prepared.road);
+        let read = |plan: Plan, line: &NamedLine| {
+            plan.reads(format!("line {}, {:.1} m", line.name, line.circuit.length_m))
+        };
+        let plan = prepared.lines.iter().fold(plan, read);
+        let plan = plan.evaluations(settings.laps() as u64);
         if settings.is_population() {
             plan.seed(settings.seed)
                 .backend(settings.backend, settings.adapter.as_deref())
@@ -175,11 +160,15 @@ impl Study for Transient {
     }
 
     fn summarise(settings: &TransientSettings, prepared: &Prepared, outcome: &Outcome) -> Summary {
+        let mut head = Self::head(settings, prepared, outcome);
+        // Figures name the lines; the track gives no more than their edges.
+        head.subject.track = None;
         match outcome {
-            Outcome::Line(line) => Summary::Line(Box::new(results::summarise(settings, prepared, line))),
-            Outcome::Population(population) => Summary::Population(Box::new(population_results::summarise(
-                settings, prepared, population,
-            ))),
+            Outcome::Line(line) => Summary::Line(Box::new(LineSummary::of(head, line))),
+            Outcome::Population(population) => {
+                let summary = population_results::summarise(head, settings, prepared, population);
+                Summary::Population(Box::new(summary))
+            }
         }
     }
 

@@ -12,6 +12,7 @@ use crate::study::framework::journal::Recorder;
 use crate::study::framework::{Inputs, Progress, RunRecord, Study, Watch, Work};
 use crate::vehicle::CarParameter;
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
 /// Laps between two reports of progress, of which no backend is short.
@@ -31,7 +32,7 @@ pub struct Driven {
 }
 
 /// A lap within the edges.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DrivenBest {
     /// The share of the envelope's grip in its plan.
     pub grip_share: f64,

@@ -5,7 +5,7 @@ use super::{Prepared, TransientSettings};
 use crate::error::Result;
 use crate::evaluate::failures_in_words;
 use crate::report::{HtmlReport, Table};
-use crate::study::framework::RunRecord;
+use crate::study::framework::Head;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -19,28 +19,17 @@ pub struct Entry {
     pub setup: usize,
     /// Values of the parameters, by name.
     pub values: BTreeMap<String, f64>,
-    /// The share of the envelope's grip in the plan of its fastest lap within the edges.
-    pub grip_share: Option<f64>,
-    /// That lap (s).
-    pub lap_time_s: Option<f64>,
-    /// Least room between the car's side and an edge on it (m).
-    pub room_m: Option<f64>,
-    /// Mean rate at which the road wheels were turned on it (rad/s).
-    pub steering_radps: Option<f64>,
+    /// Its fastest lap within the edges.
+    #[serde(flatten)]
+    pub best: DrivenBest,
 }
 
 /// The figures of a population; `--json` prints this.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct PopulationSummary {
-    /// `transient`.
-    pub study: String,
-    /// Seed of the set-ups.
-    pub seed: u64,
-    /// How the study ran; candidates are laps.
+    /// The study; candidates are laps, and the seed is that of the set-ups.
     #[serde(flatten)]
-    pub record: RunRecord,
-    /// The car.
-    pub car: String,
+    pub head: Head,
     /// Lines.
     pub lines: Vec<String>,
     /// Parameters that set-ups move.
@@ -63,40 +52,34 @@ pub struct PopulationSummary {
 
 /// Puts the figures together.
 pub(super) fn summarise(
+    head: Head,
     settings: &TransientSettings,
     prepared: &Prepared,
     outcome: &PopulationOutcome,
 ) -> PopulationSummary {
     let names = || outcome.parameters.iter().map(|p| p.name.clone());
     let entry = |driven: &Driven| {
-        let figure = |of: fn(&DrivenBest) -> f64| driven.best.as_ref().map(of);
-        Entry {
+        Some(Entry {
             line: prepared.lines[driven.line].name.clone(),
             setup: driven.setup,
             values: names().zip(driven.values.iter().copied()).collect(),
-            grip_share: figure(|b| b.grip_share),
-            lap_time_s: figure(|b| b.lap_time_s),
-            room_m: figure(|b| b.room_m),
-            steering_radps: figure(|b| b.steering_radps),
-        }
+            best: driven.best?,
+        })
     };
     // The fastest first.
     let within = || outcome.driven.iter().filter(|d| d.best.is_some());
     let rule = "the fastest lap within the edges, whether or not it agrees with the quasi-steady-state lap; one line alone is held \
                 to that agreement";
     PopulationSummary {
-        study: "transient".to_owned(),
-        seed: settings.seed,
-        record: outcome.record.clone(),
-        car: prepared.car.name.clone(),
+        head,
         lines: prepared.lines.iter().map(|l| l.name.clone()).collect(),
         parameters: names().collect(),
         share: settings.share,
         within_edges: within().count(),
         driven: outcome.driven.len(),
-        best: within().next().map(entry),
-        as_it_is: within().find(|d| d.setup == 0).map(entry),
-        fastest: within().take(PRINTED).map(entry).collect(),
+        best: within().next().and_then(entry),
+        as_it_is: within().find(|d| d.setup == 0).and_then(entry),
+        fastest: within().take(PRINTED).filter_map(entry).collect(),
         rule: rule.to_owned(),
     }
 }
@@ -107,33 +90,32 @@ const PRINTED: usize = 10;
 impl PopulationSummary {
     /// The figures in words.
     pub fn to_text(&self) -> String {
+        let record = &self.head.record;
         let mut text = format!(
             "{} laps of {} driven on {} ({:.0} a second); {} of {} set-ups and lines stay within the edges.\n",
-            self.record.evaluations,
-            self.car,
-            self.record.adapter,
-            self.record.evaluations_per_s,
+            record.evaluations,
+            self.head.subject.car,
+            record.adapter,
+            record.evaluations_per_s,
             self.within_edges,
             self.driven
         );
-        if let (Some(best), Some(own)) = (&self.best, &self.as_it_is)
-            && let (Some(fastest), Some(time)) = (best.lap_time_s, own.lap_time_s)
-        {
-            text.push_str(&format!(
+        if let (Some(best), Some(own)) = (&self.best, &self.as_it_is) {
+            let (fastest, time) = (best.best.lap_time_s, own.best.lap_time_s);
+            text += &format!(
                 "The fastest laps in {fastest:.3} s, {:.3} s less than the car as it is on its best line ({time:.3} s).\n",
                 time - fastest
-            ));
+            );
         }
-        if self.best.is_some() {
-            text.push_str(&format!("Chosen of each set-up on each line: {}.\n", self.rule));
-        }
-        if self.best.is_none() {
-            text.push_str(&format!(
+        text += &if self.best.is_some() {
+            format!("Chosen of each set-up on each line: {}.\n", self.rule)
+        } else {
+            format!(
                 "None does with any share of the grip ({}); a line found for a wider car has more room.\n",
-                failures_in_words(&self.record.failures)
-            ));
-        }
-        text + &self.record.notes()
+                failures_in_words(&record.failures)
+            )
+        };
+        text + &record.notes()
     }
 
     /// The fastest as a table of text.
@@ -141,9 +123,9 @@ impl PopulationSummary {
         let table = Table::rows(&self.fastest)
             .text("line", |e| &*e.line)
             .number("set-up", "", |e| e.setup as f64)
-            .number("lap time", "s", |e| e.lap_time_s)
-            .number("room", "m", |e| e.room_m)
-            .number("grip share", "", |e| e.grip_share);
+            .number("lap time", "s", |e| e.best.lap_time_s)
+            .number("room", "m", |e| e.best.room_m)
+            .number("grip share", "", |e| e.best.grip_share);
         let parameters = self.parameters.iter();
         parameters
             .fold(table, |table, p| {
@@ -192,20 +174,20 @@ pub(super) fn report(
         car.with_flat(&flat).write(folder, "car")?;
     }
 
-    let mut page = HtmlReport::new("transient", &format!("Set-ups of the {}, driven", summary.car));
+    let title = format!("Set-ups of the {}, driven", car.name);
+    let mut page = HtmlReport::new(&summary.head.study, &title);
     for sentence in summary.to_text().lines() {
         page.sentence(sentence);
     }
-    if let Some(best) = &summary.best {
-        let of = |x: Option<f64>, decimals: usize| x.map_or(String::new(), |x| format!("{x:.decimals$}"));
-        page.tile("Fastest lap", of(best.lap_time_s, 3), "s");
-        page.tile("Least room", of(best.room_m, 2), "m");
-        page.tile("Grip held", of(best.grip_share.map(|g| 100.0 * g), 0), "%");
+    if let Some(best) = summary.best.as_ref().map(|entry| entry.best) {
+        page.tile("Fastest lap", format!("{:.3}", best.lap_time_s), "s");
+        page.tile("Least room", format!("{:.2}", best.room_m), "m");
+        page.tile("Grip held", format!("{:.0}", 100.0 * best.grip_share), "%");
     }
     page.section("Set-ups", "");
     let note = "Each with the share of the envelope's grip with which it was fastest within the edges.";
     page.table("All set-ups on all lines", note, &table)?;
-    page.provenance("car", &summary.car);
-    summary.record.provenance(&mut page, "laps driven");
+    page.provenance("car", &car.name);
+    summary.head.record.provenance(&mut page, "laps driven");
     page.write(folder.join("report.html"))
 }

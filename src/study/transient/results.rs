@@ -1,26 +1,28 @@
 //! What a drive leaves behind.
 
 use super::drive::{AGREEMENT, DrivenLine, INTERVAL_S};
-use super::{Prepared, TransientSettings};
 use crate::error::Result;
-use crate::report::{Table, write_whole};
-use crate::study::framework::RunRecord;
+use crate::report::{HtmlReport, LapLine, LapView, Road, Table, write_whole};
+use crate::study::framework::Head;
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
+/// Rows of the traces, from the top.
+const PANELS: [(&str, &str); 5] = [
+    ("speed", "m/s"),
+    ("off the line", "m"),
+    ("steering", "deg"),
+    ("yaw rate", "rad/s"),
+    ("lateral speed", "m/s"),
+];
+
 /// The figures of one line alone; `--json` prints this.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct LineSummary {
-    /// `transient`.
-    pub study: String,
-    /// Seed of all random numbers: none are drawn.
-    pub seed: u64,
-    /// How the study ran: the drive is in `f64`, and candidates are laps.
+    /// The study: the drive is in `f64`, candidates are laps, and no random numbers are drawn.
     #[serde(flatten)]
-    pub record: RunRecord,
-    /// The car.
-    pub car: String,
+    pub head: Head,
     /// The greatest share of the envelope's grip that was held.
     pub grip_share: f64,
     /// The driven lap (s).
@@ -41,36 +43,28 @@ pub struct LineSummary {
     pub beyond: Option<String>,
 }
 
-/// Puts the figures together.
-pub(super) fn summarise(
-    settings: &TransientSettings,
-    prepared: &Prepared,
-    outcome: &DrivenLine,
-) -> LineSummary {
-    let agrees = outcome.disagreement().abs() <= AGREEMENT;
-    let rule = if agrees {
-        "the greatest share of the grip at which the driven lap and the quasi-steady-state lap agree to half a percent"
-    } else {
-        "the share of the grip at which the driven lap and the quasi-steady-state lap agree best, for they do to half a percent at none"
-    };
-    LineSummary {
-        study: "transient".to_owned(),
-        seed: settings.seed,
-        record: outcome.record.clone(),
-        car: prepared.car.name.clone(),
-        grip_share: outcome.grip_share,
-        lap_time_s: outcome.lap_time_s,
-        point_mass_lap_time_s: outcome.point_mass.lap_time_s().unwrap_or(f64::NAN),
-        disagreement_percent: 100.0 * outcome.disagreement(),
-        agrees,
-        rule: rule.to_owned(),
-        margin_m: outcome.margin_m,
-        greatest_offset_m: outcome.drive.offset_m.iter().fold(0.0, |a, b| a.max(b.abs())),
-        beyond: outcome.failures.last().map(|(_, why)| why.clone()),
-    }
-}
-
 impl LineSummary {
+    pub(super) fn of(head: Head, outcome: &DrivenLine) -> Self {
+        let agrees = outcome.disagreement().abs() <= AGREEMENT;
+        let rule = if agrees {
+            "the greatest share of the grip at which the driven lap and the quasi-steady-state lap agree to half a percent"
+        } else {
+            "the share of the grip at which the driven lap and the quasi-steady-state lap agree best, for they do to half a percent at none"
+        };
+        Self {
+            head,
+            grip_share: outcome.grip_share,
+            lap_time_s: outcome.lap_time_s,
+            point_mass_lap_time_s: outcome.point_mass.lap_time_s().unwrap_or(f64::NAN),
+            disagreement_percent: 100.0 * outcome.disagreement(),
+            agrees,
+            rule: rule.to_owned(),
+            margin_m: outcome.margin_m,
+            greatest_offset_m: outcome.drive.offset_m.iter().fold(0.0, |a, b| a.max(b.abs())),
+            beyond: outcome.failures.last().map(|(_, why)| why.clone()),
+        }
+    }
+
     /// The figures in words.
     pub fn to_text(&self) -> String {
         let beyond = self
@@ -80,7 +74,7 @@ impl LineSummary {
         format!(
             "{} drives the line in {:.3} s, with {:.0}% of the envelope's grip; the quasi-steady-state lap with as much takes {:.3} s \
              ({:+.2}%{}).\n{beyond}Chosen: {}.\nAt most {:.2} m off the line; {:.2} m left between the car's side and the edge.\n",
-            self.car,
+            self.head.subject.car,
             self.lap_time_s,
             100.0 * self.grip_share,
             self.point_mass_lap_time_s,
@@ -102,10 +96,8 @@ impl LineSummary {
 /// # Errors
 /// [`crate::Error::Io`] if a file cannot be written.
 pub(super) fn report(folder: &Path, outcome: &DrivenLine, summary: &LineSummary) -> Result<()> {
-    write_whole(
-        folder.join("envelope_driven.csv"),
-        outcome.envelope.to_csv().as_bytes(),
-    )?;
+    let envelope = outcome.envelope.to_csv();
+    write_whole(folder.join("envelope_driven.csv"), envelope.as_bytes())?;
     let drive = &outcome.drive;
     let driven_m = driven_m(outcome);
     let state = |k: usize| -> Vec<f64> { drive.states.iter().map(|s| s[k]).collect() };
@@ -124,7 +116,7 @@ pub(super) fn report(folder: &Path, outcome: &DrivenLine, summary: &LineSummary)
         .numbers("roll", "rad", state(3))
         .numbers("steering", "rad", steer)
         .write_csv(folder.join("drive.csv"))?;
-    super::page::write(folder, outcome, summary, &driven_m)
+    write_page(folder, outcome, summary, &driven_m)
 }
 
 /// Where the car went (m).
@@ -137,4 +129,55 @@ fn driven_m(outcome: &DrivenLine) -> Vec<DVec2> {
             line.position_at(*station) + *offset * heading.perp()
         })
         .collect()
+}
+
+fn write_page(folder: &Path, outcome: &DrivenLine, summary: &LineSummary, driven_m: &[DVec2]) -> Result<()> {
+    let car = &summary.head.subject.car;
+    let mut page = HtmlReport::new(&summary.head.study, &format!("A line driven by the {car}"));
+    for sentence in summary.to_text().lines() {
+        page.sentence(sentence);
+    }
+    page.tile("Driven lap", format!("{:.3}", summary.lap_time_s), "s");
+    let point_mass_s = format!("{:.3}", summary.point_mass_lap_time_s);
+    page.tile("Quasi-steady-state lap", point_mass_s, "s");
+    page.tile("Grip held", format!("{:.0}", 100.0 * summary.grip_share), "%");
+    page.tile("Least room", format!("{:.2}", summary.margin_m), "m");
+    if !summary.agrees {
+        page.warning("The two laps differ by more than the half percent asked for.");
+    }
+    let (drive, line) = (&outcome.drive, &outcome.line);
+    let state = |k: usize| drive.states.iter().map(|s| s[k]).collect::<Vec<f64>>();
+    let steer_deg = drive.inputs.iter().map(|(_, steer)| steer.to_degrees());
+    let driven = LapLine::new("4DOF car and driver", &drive.station_m[..])
+        .trace(0, state(0))
+        .trace(1, &drive.offset_m[..])
+        .trace(2, steer_deg.collect::<Vec<f64>>())
+        .trace(3, state(2))
+        .trace(4, state(1))
+        .at(driven_m);
+    let point_mass = outcome.point_mass.lap.iter().map(|lap| {
+        LapLine::new("quasi-steady-state lap", &lap.station_m[..])
+            .trace(0, &lap.v_mps[..])
+            .at(&outcome.point_mass.points_m[..])
+    });
+    let view = LapView::new("The line, driven")
+        .note("Of the road, the map shows what the middle of the car may use. Positive is to the left.")
+        .x("distance along the line", "m")
+        .panels(PANELS)
+        .line(driven)
+        .lines(point_mass)
+        .road(Road {
+            left_edge_m: line.left_edge(),
+            right_edge_m: line.right_edge(),
+            closed: true,
+            names: Vec::new(),
+        });
+    page.section("Lap", "");
+    page.figure(folder.join("speeds.svg"), &view)?;
+    if let Some(map) = view.track_map(format!("Driven in {:.2} s", outcome.lap_time_s)) {
+        map.write_svg(folder.join("map.svg"))?;
+    }
+    page.provenance("car", car);
+    summary.head.record.provenance(&mut page, "laps driven");
+    page.write(folder.join("report.html"))
 }

@@ -108,20 +108,16 @@ impl TransientSettings {
         let refuse =
             |place: &str, found: &str, expected: &str| Err(Error::input("the study", place, found, expected));
         if self.line.is_empty() {
-            return refuse("line", "none", "a line to drive: --line FILE");
+            return refuse("line", "none", "a line to drive");
         }
         let usual = Self::default();
         if self.setups.is_none() && (&self.parameters, self.share) != (&usual.parameters, usual.share) {
-            return refuse(
-                "setups",
-                "none",
-                "how many set-ups move the parameters: --setups N",
-            );
+            return refuse("setups", "none", "how many set-ups move the parameters");
         }
         let elsewhere = matches!(self.backend, BackendChoice::Simd | BackendChoice::Gpu);
         if !self.is_population() && (elsewhere || self.adapter.is_some()) {
-            let expected = "--backend cpu, --setups N, or several lines: one line is driven in f64 alone";
-            return refuse("backend", "one line and no set-ups", expected);
+            let expected = "cpu, or set-ups or several lines: one line is driven in f64 alone";
+            return refuse("backend", "another one for one line and no set-ups", expected);
         }
         Ok(())
     }

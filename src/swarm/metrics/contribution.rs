@@ -64,6 +64,41 @@ impl Columns {
         dispatch(InstructionSet::best(), work)
     }
 
+    /// Whether a point that came or left can have changed the volume that point `i` alone dominates: no other than these two
+    /// dominates what both of them do. `came` is the number of that point, if it is here.
+    pub fn touches(&self, point: &[f64], came: Option<usize>, i: usize, reference: &[f64]) -> bool {
+        let work = Touches {
+            columns: self,
+            point,
+            came: came.unwrap_or(i),
+            i,
+            reference,
+        };
+        dispatch(InstructionSet::best(), work)
+    }
+
+    #[inline(always)]
+    fn touches_in_lanes(&self, work: &Touches<'_>) -> bool {
+        let own = [self.x[work.i], self.y[work.i], self.z[work.i]];
+        let at = |k: usize| work.point.get(k).map_or(own[k], |x| x.max(own[k]));
+        let [x, y, z] = [at(0), at(1), at(2)];
+        if [x, y, z].iter().zip(work.reference).any(|(x, end)| x >= end) {
+            return false;
+        }
+        for from in (0..self.x.len()).step_by(WIDE) {
+            let [us, vs, ws] = self.block(from);
+            let mut hidden = [false; WIDE];
+            for lane in 0..WIDE {
+                let other = (from + lane != work.i) & (from + lane != work.came);
+                hidden[lane] = (us[lane] <= x) & (vs[lane] <= y) & (ws[lane] <= z) & other;
+            }
+            if hidden.contains(&true) {
+                return false;
+            }
+        }
+        true
+    }
+
     /// The block of points that number `from` is the first of; infinite ones fill up the last.
     #[inline(always)]
     fn block(&self, from: usize) -> [[f64; WIDE]; 3] {
@@ -131,13 +166,22 @@ impl Columns {
                 }
             }
         }
-        above.sort_by(|a, b| a.0.total_cmp(&b.0));
+        // One that bites much off spares the sorting of those behind it.
+        let bite = |p: &(f64, f64, f64)| (p.0 - x) * (top - y) + (p.1 - y) * (right - x);
+        if let Some(first) = inside.iter().copied().min_by(|a, b| bite(a).total_cmp(&bite(b))) {
+            inside.retain(|p| p.0 < first.0 || p.1 < first.1 || *p == first);
+            above.retain(|p| p.1 < first.0 || p.2 < first.1);
+        }
+        above.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
         let far = (right, top);
-        inside.sort_by(place);
+        inside.sort_unstable_by(place);
         let mut area = window(&mut inside, (x, y), (right, top));
         let (mut level, mut volume) = (z, 0.0);
         for (w, u, v) in above {
-            if u >= right || v >= top {
+            // What lies behind others changes nothing, not even how the sum is rounded.
+            let before = inside.partition_point(|p| p.0 <= u);
+            let hidden = before > 0 && inside[before - 1].1 <= v;
+            if u >= right || v >= top || hidden {
                 continue;
             }
             volume += area * (w - level);
@@ -146,10 +190,7 @@ impl Columns {
                 // Both is not met: the window would have closed there.
                 (true, _) => top = v,
                 (false, true) => right = u,
-                (false, false) => {
-                    let point = (u, v, w);
-                    inside.insert(inside.partition_point(|p| place(p, &point).is_le()), point);
-                }
+                (false, false) => inside.insert(before, (u, v, w)),
             }
             area = window(&mut inside, (x, y), (right, top));
         }
@@ -173,6 +214,24 @@ impl LaneWork for Exclusive<'_> {
     #[inline(always)]
     fn run<L: Lanes>(self) -> Self::Output {
         self.columns.exclusive_in_lanes(self.i, self.reference)
+    }
+}
+
+/// [`Columns::touches`], compiled for each instruction set.
+struct Touches<'a> {
+    columns: &'a Columns,
+    point: &'a [f64],
+    came: usize,
+    i: usize,
+    reference: &'a [f64],
+}
+
+impl LaneWork for Touches<'_> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) -> bool {
+        self.columns.touches_in_lanes(&self)
     }
 }
 
@@ -254,6 +313,47 @@ mod tests {
                 near.extend(rest.iter().filter(touches).cloned());
                 assert_eq!(columns(&near).exclusive(0, &reference).0, volume);
             }
+        }
+    }
+
+    /// What comes or leaves touches exactly the shares that change; on a curve its neighbours'.
+    #[test]
+    fn touches_what_changes() {
+        let random = Random::new(6);
+        let columns = |points: &[Vec<f64>]| {
+            let mut columns = Columns::default();
+            points.iter().for_each(|row| columns.push(row));
+            columns
+        };
+        for case in 0..400 {
+            let width = 1 + case as usize % 3;
+            let count = 2 + random.below(14, 1, case, 0, 0);
+            let draw = |i: u32, k: u32| random.below(10, 2, case, i, k) as f64 / 8.0 - 0.25;
+            let row = |i: u32| (0..width as u32).map(|k| draw(i, k)).collect();
+            let points: Vec<Vec<f64>> = (0..count as u32).map(row).collect();
+            let reference = vec![0.875; width];
+            let (last, rest) = points.split_last().unwrap();
+            let (with, without) = (columns(&points), columns(rest));
+            for i in 0..rest.len() {
+                let share = |columns: &Columns| columns.exclusive(i, &reference).0;
+                let changes = share(&with) != share(&without);
+                assert_eq!(with.touches(last, Some(rest.len()), i, &reference), changes);
+                assert_eq!(
+                    without.touches(last, None, i, &reference),
+                    changes,
+                    "{i} of {points:?}"
+                );
+            }
+        }
+        let on = |t: f64| vec![t, t + 1e-9 * (1e3 * t).sin(), 1.0 - t * t];
+        let curve: Vec<Vec<f64>> = (0..100).map(|i| on(f64::from(i) / 99.0)).collect();
+        let members = columns(&curve);
+        for i in 0..99 {
+            let new = on((f64::from(i) + 0.5) / 99.0);
+            let touched = (0..100)
+                .filter(|&i| members.touches(&new, None, i, &[1.1, 1.1, 1.1]))
+                .count();
+            assert!((1..=2).contains(&touched), "{touched} at {i}");
         }
     }
 }

@@ -389,7 +389,8 @@ impl Optimiser for LargeSwarm {
     fn tell(&mut self, evaluation: &Evaluation) -> Result<()> {
         evaluation.check(self.settings.motion.population, self.objectives)?;
         let (found, violation) = self.learn(evaluation);
-        let found = thinned(found, self.objectives, PER_PLACE * self.settings.archive);
+        let wanted = PER_PLACE * self.settings.archive;
+        let found = thinned(found, self.objectives, wanted, self.archive.fixed_reference());
         let d = self.space.dimensions();
         let positions = found.iter().map(|p| {
             let at = |k: usize| f64::from(self.position[self.place(p.who as usize, k)]);

@@ -2,7 +2,7 @@
 
 pub(super) mod blocks;
 pub(super) mod filter;
-mod large_swarm;
+pub(super) mod large_swarm;
 mod small_swarm;
 pub(super) mod thinning;
 
@@ -14,7 +14,6 @@ use crate::error::Result;
 use crate::evaluate::{Evaluation, Problem};
 pub use blocks::Generation;
 use large_swarm::LargeSwarm;
-pub(super) use large_swarm::{leaders, learn_from};
 use serde::{Deserialize, Serialize};
 use small_swarm::SmallSwarm;
 

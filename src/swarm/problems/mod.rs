@@ -8,12 +8,14 @@
 //! 3. Suganthan et al., *Problem definitions and evaluation criteria for the CEC 2005 special session on
 //!    real-parameter optimization* (the single-objective functions and that their optima are shifted).
 
+#[cfg(feature = "gpu")]
 mod device;
 mod dtlz;
 mod lanes;
 mod single;
 mod zdt;
 
+#[cfg(feature = "gpu")]
 pub use device::GpuTestEvaluator;
 pub use lanes::SimdTestEvaluator;
 

@@ -1,15 +1,15 @@
 //! The middle of a road between two edges.
 //!
-//! The edges may have any numbers of points. Links across the road are drawn first, by always stepping on along the edge
-//! that gives the shorter next link, as two sides of a zip are joined; their middles give a rough centreline. A smooth
-//! line through these has normals, and where the normals meet the edges are the road's ends; what lies halfway between
-//! them is the centre point of the survey, and the distances from it to the edges are the widths.
+//! The edges may have any numbers of points. Links across the road are drawn first, by always stepping on along the edge that
+//! gives the shorter next link, like the two sides of a zip; their middles give a rough centreline. The normals of a smooth line
+//! through these meet the edges. The centre points of the survey lie halfway between, and their distances to the edges are the
+//! widths.
 
 use super::super::spline::Spline;
 use super::check::{check_crossings, check_line, close};
 use super::csv_columns::Edge;
 use super::{Survey, SurveyOptions, place, stem};
-use crate::{Error, Result};
+use crate::{Error, Place, Result};
 use glam::DVec2;
 use std::path::Path;
 
@@ -17,7 +17,7 @@ use std::path::Path;
 const STEP_M: f64 = 3.0;
 /// Most steps along an edge, which bounds the work.
 const MOST_STEPS: f64 = 6000.0;
-/// The middle of the links wanders by no more than this about the smooth line taken for its normals (m).
+/// Greatest deviation of the smooth line from the middles of the links (m).
 const ROUGHNESS_M: f64 = 1.0;
 /// Widest road (m).
 const WIDEST_ROAD_M: f64 = 200.0;
@@ -68,7 +68,7 @@ pub(super) fn survey(left: &Edge, right: &Edge, path: &Path, options: &SurveyOpt
     for (side, edge) in [("left", left), ("right", right)] {
         let mut points = edge.points.clone();
         let is_closed = close(&mut points, &edge.lines, path, options.closed)?;
-        let at = |i: usize| format!("{}, {side} edge", place(&edge.lines, i));
+        let at = |i: usize| place(&edge.lines, i).named(format!("{side} edge"));
         check_line(&points, is_closed, &source, &at)?;
         check_crossings(&points, is_closed, options.bridges, &source, &at)?;
         sides.push(points);
@@ -125,7 +125,7 @@ fn nearest(points: &[DVec2], to: DVec2) -> usize {
         .unwrap_or(0)
 }
 
-/// Refuses edges that run against each other or lie on each other's side.
+/// Refuses edges that run in opposite directions or are swapped.
 fn check_sides(left: &[DVec2], right: &[DVec2], edge: &Edge, path: &Path) -> Result<()> {
     let mut against = 0;
     let mut swapped = Vec::new();
@@ -146,7 +146,7 @@ fn check_sides(left: &[DVec2], right: &[DVec2], edge: &Edge, path: &Path) -> Res
             "both edges in the direction of driving",
         ));
     }
-    // A few wrong sides are corners cut by coarse points.
+    // Coarse points may cut a corner, which gives a few wrong sides.
     let (nearly_all, hardly_any) = (n - n / 10, n / 50);
     if swapped.len() > nearly_all {
         return Err(Error::input(
@@ -207,7 +207,7 @@ fn measure(
     };
     let mut line = Polyline::new(middles.to_vec(), false).resampled(step);
     let (mut centre, mut widths) = (Vec::new(), Vec::new());
-    // The second round stands on the middles that the first one found.
+    // The second round starts from the middles of the first one.
     for round in 0..2 {
         if closed && round == 0 {
             line.pop();
@@ -238,7 +238,7 @@ fn measure(
                     let side = ["left", "right"][side];
                     Error::input(
                         path,
-                        format!("about {:.0} m from the start", t),
+                        Place::station(t).named("both edges"),
                         format!("no {side} edge beside the middle of the road"),
                         format!("edges side by side, at most {WIDEST_ROAD_M} m apart"),
                     )
@@ -252,7 +252,7 @@ fn measure(
     Ok((centre, widths.clone(), widths))
 }
 
-/// Distance (m) from a point along a direction to an edge, looked for around the last hit first.
+/// Distance (m) from a point along a direction to an edge, searched around the last hit first.
 fn hit(edge: &Polyline, from: DVec2, way: DVec2, hint: &mut usize) -> Option<f64> {
     let n = edge.points.len() - 1;
     let on = |k: usize| {

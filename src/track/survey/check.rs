@@ -1,8 +1,8 @@
-//! Whether points can be the line of a road.
+//! Checks whether points can be the line of a road.
 
 use super::super::crossing::{crossings, stretches};
 use super::{MOST_POINTS, Survey, WIDEST_M, place};
-use crate::{Error, Result};
+use crate::{Error, Place, Result};
 use glam::DVec2;
 use std::path::Path;
 
@@ -14,12 +14,12 @@ const DUPLICATE_M: f64 = 1e-3;
 pub(super) const FURTHEST_M: f64 = 2e7;
 /// Range of the length of a road (m).
 const LENGTH_M: (f64, f64) = (10.0, 200_000.0);
-/// A turn at one point beyond this is no bend (degrees).
+/// Greatest turn at one point (degrees).
 const SHARPEST_DEG: f64 = 120.0;
-/// A road is at least this wide in all (m).
+/// Least width of a road (m).
 const NARROWEST_M: f64 = 0.1;
-/// The end of a line joins its start when the gap is no longer than this many of its longest steps, and does not when
-/// the gap is longer than this share of the line.
+/// A line is closed if its gap is no longer than this many of its longest steps, and open if the gap is longer than this share of
+/// its length.
 const JOINED_STEPS: f64 = 2.0;
 const OPEN_SHARE: f64 = 0.05;
 
@@ -77,10 +77,10 @@ pub(super) fn check_line(
     points: &[DVec2],
     closed: bool,
     source: &str,
-    place: &dyn Fn(usize) -> String,
+    place: &dyn Fn(usize) -> Place,
 ) -> Result<()> {
     let refuse =
-        |place: String, found: String, expected: String| Err(Error::input(source, place, found, expected));
+        |place: Place, found: String, expected: String| Err(Error::input(source, place, found, expected));
     let n = points.len();
     let fewest = if closed { FEWEST.0 } else { FEWEST.1 };
     if !(fewest..=MOST_POINTS).contains(&n) {
@@ -140,7 +140,7 @@ pub(super) fn check_crossings(
     closed: bool,
     bridges: usize,
     source: &str,
-    place: &dyn Fn(usize) -> String,
+    place: &dyn Fn(usize) -> Place,
 ) -> Result<()> {
     let found = crossings(&stretches(points, closed), bridges.saturating_add(1));
     match found {
@@ -149,8 +149,12 @@ pub(super) fn check_crossings(
             let (i, j) = crossed[0];
             Err(Error::input(
                 source,
-                format!("{} and {}", place(i), place(j)),
-                format!("a line that crosses itself, {} time(s) or more", crossed.len()),
+                place(i),
+                format!(
+                    "a line that crosses itself at {}, {} time(s) or more in all",
+                    place(j),
+                    crossed.len()
+                ),
                 match bridges {
                     0 => "a line that does not, or a TOML file with `bridges`, the number of its crossings"
                         .to_owned(),
@@ -168,9 +172,9 @@ pub(super) fn check_crossings(
 }
 
 impl Survey {
-    /// Checks that this can be a road: enough points, none twice, no turning back, no crossing beyond the bridges
-    /// allowed, widths that are none below zero and together at least 0.1 m (an edge may touch the line). Widths
-    /// against bends are checked where cross-sections are made.
+    /// Checks that this can be a road: enough points, none twice, no turning back, no more crossings than bridges, widths of zero
+    /// or more (an edge may touch the line) and together at least 0.1 m. Widths against bends are checked where cross-sections
+    /// are made.
     ///
     /// # Errors
     /// [`Error::Input`] naming the first point that cannot be.
@@ -190,7 +194,7 @@ impl Survey {
             if let Some(i) = widths.iter().position(|w| !(0.0..=WIDEST_M).contains(w)) {
                 return Err(Error::input(
                     &self.source,
-                    format!("{}, {field}", place(i)),
+                    place(i).named(field),
                     format!("{} m", widths[i]),
                     format!("0 to {WIDEST_M} m"),
                 ));
@@ -204,7 +208,7 @@ impl Survey {
         {
             return Err(Error::input(
                 &self.source,
-                format!("{}, width of the road", place(i)),
+                place(i).named("width of the road"),
                 format!("{width} m"),
                 format!("at least {NARROWEST_M} m"),
             ));

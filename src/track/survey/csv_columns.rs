@@ -3,7 +3,7 @@
 use super::check::FURTHEST_M;
 use super::geographic::{self, Fix};
 use super::{MOST_POINTS, Raw, WIDEST_M};
-use crate::{Error, Result};
+use crate::{Error, Place, Result};
 use glam::DVec2;
 use std::path::Path;
 
@@ -14,7 +14,7 @@ pub(super) struct Edge {
     pub lines: Vec<usize>,
 }
 
-/// What a file turned out to hold.
+/// The content of a file.
 pub(super) enum Content {
     Line(Raw),
     Edges { left: Edge, right: Edge },
@@ -106,7 +106,7 @@ fn header<'a>(line: &str, number: usize, path: &'a Path) -> Result<Option<Table<
         if header.iter().any(|(_, c)| *c == column) {
             return Err(Error::input(
                 path,
-                format!("line {number}, column {}", i + 1),
+                Place::line(number).named(format!("column {}", i + 1)),
                 format!("a second column like {}", shown(cell)),
                 "each column once",
             ));
@@ -131,7 +131,7 @@ pub(super) fn read(text: &str, path: &Path) -> Result<Content> {
     let mut lines = text.lines().enumerate().map(|(i, line)| (i + 1, line.trim()));
     let table = loop {
         let Some((number, line)) = lines.next() else {
-            return Err(Error::input(path, "line 1", "no rows", EXPECTED));
+            return Err(Error::input(path, Place::line(1), "no rows", EXPECTED));
         };
         if line.is_empty() {
             continue;
@@ -140,12 +140,7 @@ pub(super) fn read(text: &str, path: &Path) -> Result<Content> {
             Some(table) => break table,
             None if line.starts_with('#') => {}
             None => {
-                return Err(Error::input(
-                    path,
-                    format!("line {number}"),
-                    shown(line),
-                    EXPECTED,
-                ));
+                return Err(Error::input(path, Place::line(number), shown(line), EXPECTED));
             }
         }
     };
@@ -180,7 +175,7 @@ fn row<'a>(table: &Table<'_>, number: usize, line: &'a str) -> Result<Vec<&'a st
     if found.len() < table.width || surplus {
         return Err(Error::input(
             table.path,
-            format!("line {number}"),
+            Place::line(number),
             format!("{} cells", found.len()),
             format!("{}, as the header has", table.width),
         ));
@@ -198,7 +193,7 @@ fn number(table: &Table<'_>, line: usize, cells: &[&str], at: usize, low: f64, h
                 .map_or("", |(name, _)| *name);
             Err(Error::input(
                 table.path,
-                format!("line {line}, column {} ({name})", at + 1),
+                Place::line(line).named(format!("column {} ({name})", at + 1)),
                 shown(cells[at]),
                 format!("a number from {low} to {high}"),
             ))
@@ -206,8 +201,8 @@ fn number(table: &Table<'_>, line: usize, cells: &[&str], at: usize, low: f64, h
     }
 }
 
-/// Refuses one point more than may be read.
-pub(super) fn bounded(path: &Path, place: impl Fn() -> String, count: usize) -> Result<()> {
+/// Refuses more points than are allowed.
+pub(super) fn bounded(path: &Path, place: impl Fn() -> Place, count: usize) -> Result<()> {
     if count < MOST_POINTS {
         return Ok(());
     }
@@ -233,7 +228,7 @@ fn read_line<'a>(
     for (line, text) in rows {
         let cells = row(table, line, text)?;
         let cell = |at: usize, low: f64, high: f64| number(table, line, &cells, at, low, high);
-        bounded(table.path, || format!("line {line}"), raw.lines.len())?;
+        bounded(table.path, || Place::line(line), raw.lines.len())?;
         if is_plane {
             let range = (-FURTHEST_M, FURTHEST_M);
             raw.points.push(DVec2::new(
@@ -273,11 +268,11 @@ fn read_edges<'a>(
     for (line, text) in rows {
         let cells = row(table, line, text)?;
         for (edge, columns) in [(&mut lefts, left), (&mut rights, right)] {
-            // The shorter edge has nothing in the last rows.
+            // The cells of the shorter edge are empty in the last rows.
             if columns.iter().all(|&at| cells[at].is_empty()) {
                 continue;
             }
-            bounded(table.path, || format!("line {line}"), edge.points.len())?;
+            bounded(table.path, || Place::line(line), edge.points.len())?;
             let cell = |at: usize| number(table, line, &cells, at, -FURTHEST_M, FURTHEST_M);
             edge.points.push(DVec2::new(cell(columns[0])?, cell(columns[1])?));
             edge.lines.push(line);

@@ -6,8 +6,8 @@ use crate::Result;
 use crate::telemetry::{DrivenLap, Recording};
 use std::path::Path;
 
-/// Points of a driven line stand at least so far apart (m): GPS repeats positions between its own samples, and
-/// its error grows in share as steps shrink.
+/// Least distance between points of a driven line (m). GPS repeats positions between its own samples, and its relative error
+/// grows as steps shrink.
 const STEP_M: f64 = 2.0;
 
 /// Whether a file is a log rather than a survey.

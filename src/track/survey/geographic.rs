@@ -1,6 +1,6 @@
 //! Latitudes and longitudes on a local plane.
 
-use crate::{Error, Result};
+use crate::{Error, Place, Result};
 use glam::{DVec2, DVec3};
 use std::path::Path;
 
@@ -14,7 +14,7 @@ pub(super) struct Fix {
 /// Half the great axis of the WGS 84 ellipsoid (m) and its flattening.
 const GREAT_AXIS_M: f64 = 6_378_137.0;
 const FLATTENING: f64 = 1.0 / 298.257_223_563;
-/// Beyond this distance from the middle (m) a plane is no map any more: at 20 km it is 3 cm short.
+/// Greatest distance from the middle (m) at which a plane is an accurate map: at 20 km it is 3 cm short.
 const FURTHEST_M: f64 = 100_000.0;
 
 impl Fix {
@@ -36,7 +36,7 @@ impl Fix {
 
 /// Places as distances east and north (m) on the plane that touches the ellipsoid at their middle. Heights are left
 /// out: a road's slope makes it longer than its map by half the slope squared.
-pub(super) fn project(fixes: &[Fix], path: &Path, place: &dyn Fn(usize) -> String) -> Result<Vec<DVec2>> {
+pub(super) fn project(fixes: &[Fix], path: &Path, place: &dyn Fn(usize) -> Place) -> Result<Vec<DVec2>> {
     let out_of_range = |f: &Fix| !(f.latitude_deg.abs() <= 90.0 && f.longitude_deg.abs() <= 180.0);
     if let Some(i) = fixes.iter().position(out_of_range) {
         return Err(Error::input(
@@ -49,7 +49,7 @@ pub(super) fn project(fixes: &[Fix], path: &Path, place: &dyn Fn(usize) -> Strin
             "degrees from -90 to 90 and from -180 to 180",
         ));
     }
-    // The mean of normals, which needs no care at the date line.
+    // The mean of normals needs no special case at the date line.
     let up = fixes
         .iter()
         .map(|f| f.normal())
@@ -102,7 +102,7 @@ mod tests {
             fix(52.0, -1.005),
             fix(52.0, -0.995),
         ];
-        let points = project(&fixes, Path::new("a"), &|i| i.to_string()).unwrap();
+        let points = project(&fixes, Path::new("a"), &Place::point).unwrap();
         let north = points[1] - points[0];
         let east = points[3] - points[2];
         assert!(
@@ -118,10 +118,10 @@ mod tests {
             latitude_deg: -17.0,
             longitude_deg,
         };
-        let points = project(&[fix(179.999), fix(-179.999)], Path::new("a"), &|i| i.to_string()).unwrap();
+        let points = project(&[fix(179.999), fix(-179.999)], Path::new("a"), &Place::point).unwrap();
         assert!(points[0].distance(points[1]) < 300.0);
         let far = project(&[fix(0.0), fix(0.0), fix(30.0)], Path::new("a"), &|i| {
-            format!("point {i}")
+            Place::point(i)
         });
         assert!(far.unwrap_err().to_string().contains("km from the middle"));
     }

@@ -9,7 +9,7 @@
 //! - GPX (`trk` or `rte`) and KML (`LineString`, `LinearRing` or `gx:Track`);
 //! - a telemetry log with GPS, of which one lap becomes the line.
 //!
-//! What is geographic is projected onto the plane that touches the WGS 84 ellipsoid at the middle of the line.
+//! Geographic coordinates are projected onto the plane that touches the WGS 84 ellipsoid at the middle of the line.
 
 mod boundaries;
 mod check;
@@ -24,7 +24,7 @@ mod xml;
 
 use super::circuit::{Corner, Section};
 use crate::config::read_bytes;
-use crate::{Error, Result};
+use crate::{Error, Place, Result};
 use glam::DVec2;
 use std::path::Path;
 
@@ -35,14 +35,14 @@ const LARGEST_FILE: u64 = 1 << 30;
 /// The widest distance of an edge from the line (m).
 const WIDEST_M: f64 = 200.0;
 
-/// What a file cannot say, or says ambiguously.
+/// Options for what a file does not say, or says ambiguously.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SurveyOptions {
-    /// Whether the end joins the start; found out from the gap between them unless said.
+    /// Whether the end joins the start; `None` to decide by the gap between them.
     pub closed: Option<bool>,
     /// Width of the whole road (m), half on each side of the line, where the file has no widths.
     pub width_m: Option<f64>,
-    /// The lap of a telemetry log to use; the first complete one unless said.
+    /// The lap of a telemetry log; `None` for the first complete one.
     pub lap: Option<u32>,
     /// How many times the line may cross itself, as at the bridge of a figure of eight.
     pub bridges: usize,
@@ -73,7 +73,7 @@ pub struct Survey {
     pub bridges: usize,
 }
 
-/// A line as read: points of a plane or of the globe, with whatever widths the file gives.
+/// A line as read: points of a plane or of the globe, with the widths that the file gives.
 #[derive(Default)]
 struct Raw {
     points: Vec<DVec2>,
@@ -119,15 +119,15 @@ impl Survey {
     }
 
     /// Where a point stands, for error messages.
-    pub(super) fn place(&self, point: usize) -> String {
+    pub(super) fn place(&self, point: usize) -> Place {
         place(&self.lines, point)
     }
 }
 
-fn place(lines: &[usize], point: usize) -> String {
+fn place(lines: &[usize], point: usize) -> Place {
     match lines.get(point) {
-        Some(line) => format!("line {line}"),
-        None => format!("point {}", point + 1),
+        Some(&line) => Place::line(line),
+        None => Place::point(point + 1),
     }
 }
 
@@ -164,7 +164,7 @@ fn assemble(mut raw: Raw, path: &Path, options: &SurveyOptions) -> Result<Survey
             ));
         }
     };
-    // The repeated first point of a closed line is gone, and its widths with it.
+    // The repeated first point of a closed line was dropped, so its widths are dropped too.
     left_m.truncate(n);
     right_m.truncate(n);
     raw.lines.truncate(n);

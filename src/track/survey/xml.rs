@@ -3,7 +3,7 @@
 use super::csv_columns::bounded;
 use super::geographic::{self, Fix};
 use super::{MOST_POINTS, Raw};
-use crate::{Error, Result};
+use crate::{Error, Place, Result};
 use roxmltree::{Document, Node, ParsingOptions};
 use std::path::Path;
 
@@ -26,7 +26,7 @@ pub(super) fn read(text: &str, path: &Path) -> Result<Raw> {
         ..ParsingOptions::default()
     };
     let document = Document::parse_with_options(text, options).map_err(|error| {
-        let place = format!("line {}", error.pos().row);
+        let place = Place::line(error.pos().row as usize);
         Error::input(path, place, error.to_string(), "a GPX or KML document")
     })?;
     let mut reader = Reader {
@@ -67,8 +67,8 @@ impl Reader<'_> {
         1 + before.iter().filter(|&&b| b == b'\n').count()
     }
 
-    fn place(&self, node: Node<'_, '_>) -> String {
-        format!("line {}", self.line(node.range().start))
+    fn place(&self, node: Node<'_, '_>) -> Place {
+        Place::line(self.line(node.range().start))
     }
 
     fn push(&mut self, node: Node<'_, '_>, offset: usize, latitude: &str, longitude: &str) -> Result<()> {
@@ -78,7 +78,7 @@ impl Reader<'_> {
             parsed.ok().filter(|x| x.abs() <= most).ok_or_else(|| {
                 Error::input(
                     self.path,
-                    format!("line {}", self.line(offset)),
+                    Place::line(self.line(offset)),
                     format!("`{}`", text.chars().take(40).collect::<String>().escape_debug()),
                     format!("degrees from -{most} to {most}"),
                 )
@@ -92,12 +92,12 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// The only element of a list, or the reason why there is none.
+    /// The only element of a list, or an error if there is none or several.
     fn only<'a, 'i>(&self, mut found: Vec<Node<'a, 'i>>, what: &str) -> Result<Node<'a, 'i>> {
         match (found.pop(), found.len()) {
             (Some(one), 0) => Ok(one),
             (second, others) => {
-                let place = second.map_or_else(|| "whole file".to_owned(), |n| self.place(n));
+                let place = second.map_or_else(|| "whole file".into(), |n| self.place(n));
                 let count = others + usize::from(second.is_some());
                 Err(Error::input(
                     self.path,
@@ -148,7 +148,7 @@ impl Reader<'_> {
                 let text = inner.text().unwrap_or_default();
                 if tuples_have_commas {
                     for tuple in text.split_ascii_whitespace() {
-                        // Where the text has character references this is off by their length, on the same line mostly.
+                        // Character references in the text shift this by their length, mostly within the same line.
                         let offset = start + (tuple.as_ptr() as usize).saturating_sub(text.as_ptr() as usize);
                         self.tuple(node, offset, tuple.split(','))?;
                     }

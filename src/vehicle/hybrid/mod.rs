@@ -1,5 +1,5 @@
-//! The electric half of a hybrid: motor-generators on the crank (MGU-K) and on the turbocharger (MGU-H), the store, and
-//! what the rules let flow between them.
+//! The electric half of a hybrid: motor-generators on the crank (MGU-K) and on the turbocharger (MGU-H), the store, and the
+//! energy flows that the rules allow.
 
 mod read;
 #[cfg(test)]
@@ -14,13 +14,13 @@ pub struct MguK {
     pub ratio: f64,
     /// Its speeds, ascending (rpm).
     pub speed_rpm: Vec<f64>,
-    /// Torque that it gives or takes at those speeds (N m), linear between; none beyond the last.
+    /// Greatest torque at those speeds, driving or generating (N m). It is linear between them and zero beyond the last.
     pub torque_nm: Vec<f64>,
-    /// The power that it never exceeds, either way (W).
+    /// Greatest power, driving or generating (W).
     pub power_w: f64,
-    /// Share of the store's power that reaches the shaft.
+    /// Efficiency from the store to the shaft.
     pub motor_efficiency: f64,
-    /// Share of the shaft's power that reaches the store.
+    /// Efficiency from the shaft to the store.
     pub generator_efficiency: f64,
 }
 
@@ -34,14 +34,14 @@ impl MguK {
         }
     }
 
-    /// The greatest power at its shaft (W), either way, at a speed of the crank (rpm).
+    /// The greatest power at its shaft (W), driving or generating, at a speed of the crank (rpm).
     pub fn power_at(&self, crank_rpm: f64) -> f64 {
         let rpm = self.ratio * crank_rpm;
         let after = self.speed_rpm.partition_point(|s| *s <= rpm);
         let torque = if after == 0 {
             self.torque_nm[0]
         } else if after == self.speed_rpm.len() {
-            // At the last speed itself it still gives its torque.
+            // At the last speed itself there still is torque.
             if rpm > self.speed_rpm[after - 1] {
                 0.0
             } else {
@@ -61,15 +61,15 @@ impl MguK {
 pub struct MguH {
     /// Greatest power in as a motor (W).
     pub motor_w: f64,
-    /// What that is worth at the crank (W).
+    /// Gain of power at the crank from that (W).
     pub motor_gain_w: f64,
     /// Greatest power out as a generator (W).
     pub generator_w: f64,
-    /// What that costs at the crank (W).
+    /// Loss of power at the crank from that (W).
     pub generator_cost_w: f64,
-    /// It generates from this speed on (m/s),
+    /// Least speed at which it generates (m/s),
     pub from_speed_mps: f64,
-    /// while the car accelerates by no more than this (m/s^2).
+    /// and greatest acceleration of the car at which it does (m/s^2).
     pub to_ax_mps2: f64,
 }
 
@@ -81,9 +81,9 @@ impl MguH {
         ((self.motor_w + self.generator_w) * waste_gate - self.generator_w) * flow_share
     }
 
-    /// Power at the crank (W) with the MGU-H at `power_w`, of an engine that gives `ice_w` at full generation:
-    /// `P_add (P_H - Pmin) / (Pmax - Pmin) + P_ice`, the thesis's (4.8), where `P_add` is what lies between full generation
-    /// and full boost.
+    /// Power at the crank (W) with the MGU-H at `power_w`, of an engine that gives `ice_w` at full generation: `P_add (P_H -
+    /// Pmin) / (Pmax - Pmin) + P_ice`, the thesis's (4.8), where `P_add` is the difference between full generation and full
+    /// boost.
     pub fn boosted_w(&self, ice_w: f64, power_w: f64) -> f64 {
         let added = self.motor_gain_w + self.generator_cost_w;
         added * (power_w + self.generator_w) / (self.motor_w + self.generator_w) + ice_w
@@ -93,13 +93,13 @@ impl MguH {
 /// The store.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Store {
-    /// Energy at a state of charge of one (J). Laps of a study may go beyond it, which then sizes the store.
+    /// Energy at a state of charge of one (J). A lap in a study may need more: the study then says how large the store must be.
     pub capacity_j: f64,
     /// State of charge at the start of a lap.
     pub start_soc: f64,
 }
 
-/// Energies that the rules let flow in a lap.
+/// Energies that the rules allow in a lap.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct EnergyRules {
     /// From the store to the MGU-K (J).
@@ -112,7 +112,7 @@ pub struct EnergyRules {
 
 /// Length of a lap of Le Mans (m).
 const LE_MANS_M: f64 = 13_626.0;
-/// Other circuits get so much more for each metre.
+/// Factor on the energy per metre for other circuits.
 const ELSEWHERE: f64 = 1.55;
 
 impl EnergyRules {
@@ -123,7 +123,7 @@ impl EnergyRules {
         scaled: false,
     };
 
-    /// The class of so many joules a lap of Le Mans.
+    /// The class with this energy (J) for a lap of Le Mans.
     pub fn le_mans(deployed_j: f64) -> Self {
         Self {
             deployed_j: Some(deployed_j),
@@ -143,7 +143,7 @@ impl EnergyRules {
     }
 }
 
-/// The electric half.
+/// The electric half of a hybrid.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Hybrid {
     /// On the crank.
@@ -154,11 +154,11 @@ pub struct Hybrid {
     pub store: Store,
     /// The rules.
     pub rules: EnergyRules,
-    /// Coefficient of rolling resistance, which laps with energy count.
+    /// Coefficient of rolling resistance, used in laps with energy.
     pub rolling_resistance: f64,
 }
 
-/// What braking splits into.
+/// How braking is shared.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Blend {
     /// Power into the generator's shaft (W).
@@ -168,8 +168,8 @@ pub struct Blend {
 }
 
 impl MguK {
-    /// Brakes by the generator as far as it goes, by the hydraulics beyond; `shed_w` is what the wheels are to lose and
-    /// `efficiency` what of it reaches the crank.
+    /// Shares braking between generator and hydraulics: the generator takes as much as it can. `shed_w` (W) is the power that the
+    /// wheels lose, and `efficiency` the share of it that reaches the crank.
     pub fn blend(&self, shed_w: f64, crank_rpm: f64, efficiency: f64) -> Blend {
         let generator_w = (shed_w * efficiency).clamp(0.0, self.power_at(crank_rpm));
         Blend {

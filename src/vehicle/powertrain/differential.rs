@@ -1,12 +1,12 @@
-//! The wheels' shares of the drive torque.
+//! How the drive torque is shared between the wheels.
 
 use crate::config::Table;
 use crate::error::Result;
 
 /// How torque is split between axles and, at the rear, from side to side.
 ///
-/// The right rear wheel's share of its axle is `1/2 + a steer + b yaw_rate`, held within zero and one, so that with
-/// positive factors the outer wheel gets more. An open or locked differential of a point mass has zero for both.
+/// The right rear wheel's share of its axle is `1/2 + a steer + b yaw_rate`, held within zero and one, so that with positive
+/// factors the outer wheel gets more. Both factors are zero for equal shares.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Differential {
     /// The front axle's share.
@@ -18,7 +18,7 @@ pub struct Differential {
 }
 
 impl Differential {
-    /// Reads `[powertrain.differential]`; without it the rear wheels share alike.
+    /// Reads `[powertrain.differential]`; without it both rear wheels get half.
     pub(super) fn from_table(table: &Table<'_>) -> Result<Self> {
         let Some(table) = table.table("differential")? else {
             return Ok(Self::default());

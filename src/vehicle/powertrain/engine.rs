@@ -13,7 +13,7 @@ pub struct FlowLimit {
     pub below_rpm: f64,
     /// Slope of the line (kg/h per rpm).
     pub slope_kgph_per_rpm: f64,
-    /// The line at standstill (kg/h).
+    /// Value of the line at standstill (kg/h).
     pub offset_kgph: f64,
 }
 
@@ -50,13 +50,13 @@ pub struct EngineMap {
     pub fuel_flow_kgph: Vec<Vec<f64>>,
     /// Density of the fuel (kg/l).
     pub fuel_density_kgpl: f64,
-    /// What the rules allow to flow.
+    /// The limit of the fuel flow by the rules.
     pub flow_limit: Option<FlowLimit>,
 }
 
-/// Heat of combustion of petrol (J/kg): no engine makes more of it.
+/// Heat of combustion of petrol (J/kg), an upper bound of what an engine gets from it.
 const HEAT_JPKG: f64 = 43.0e6;
-/// Steps of the full-throttle curve between two speeds of the map: a limit of the flow bends it there.
+/// Steps of the full-throttle curve between two speeds of the map. A limit of the fuel flow bends the curve between them.
 const STEPS: usize = 10;
 
 /// Where `x` lies on an ascending axis: the knot before it and the share of the way to the next.
@@ -175,7 +175,7 @@ impl EngineMap {
         low + up * (along(&map[j + 1]) - low)
     }
 
-    /// Torque (N m), whatever the rules say of the flow.
+    /// Torque (N m), without regard to the limit of the fuel flow.
     pub fn torque_at(&self, engine_speed_rpm: f64, throttle_deg: f64) -> f64 {
         self.at(&self.torque_nm, engine_speed_rpm, throttle_deg)
     }
@@ -185,13 +185,13 @@ impl EngineMap {
         self.at(&self.fuel_flow_kgph, engine_speed_rpm, throttle_deg)
     }
 
-    /// Brake specific fuel consumption (g/kWh); nothing where there is no power.
+    /// Brake specific fuel consumption (g/kWh); `None` where there is no power.
     pub fn bsfc_gpkwh(&self, engine_speed_rpm: f64, throttle_deg: f64) -> Option<f64> {
         let kilowatts = self.torque_at(engine_speed_rpm, throttle_deg) * engine_speed_rpm * TAU / 60.0 / 1e3;
         (kilowatts > 0.0).then(|| 1e3 * self.fuel_flow_at(engine_speed_rpm, throttle_deg) / kilowatts)
     }
 
-    /// The greatest torque (N m) that the rules let the engine give, and its throttle (degrees).
+    /// The greatest torque (N m) within the limit of the fuel flow, and its throttle (degrees).
     pub fn greatest_torque(&self, engine_speed_rpm: f64) -> (f64, f64) {
         let most = self
             .flow_limit
@@ -203,7 +203,7 @@ impl EngineMap {
                 best = (torque, throttle);
             }
         };
-        // Both torque and flow are linear between two openings, so that the greatest is at an end or on the limit.
+        // Torque and flow are linear between two throttle openings, so the greatest torque is at an end or on the limit.
         for pair in self.throttle_deg.windows(2) {
             let flows = [pair[0], pair[1]].map(|throttle| self.fuel_flow_at(engine_speed_rpm, throttle));
             for (throttle, flow) in pair.iter().zip(flows) {
@@ -212,7 +212,7 @@ impl EngineMap {
                 }
             }
             if (flows[0] <= most) != (flows[1] <= most) {
-                // A hair inside, so that rounding does not carry the flow over its limit.
+                // Slightly inside the limit, so that rounding does not exceed it.
                 let share = (most - flows[0]) / (flows[1] - flows[0]);
                 let inside = if flows[0] <= most { -1e-12 } else { 1e-12 };
                 offer(pair[0] + (share + inside) * (pair[1] - pair[0]));
@@ -232,7 +232,7 @@ impl EngineMap {
         (speeds, torques)
     }
 
-    /// The least throttle (degrees) that gives a torque (N m); that of the greatest torque where none does.
+    /// The least throttle (degrees) that gives a torque (N m); if none does, that of the greatest torque.
     pub fn throttle_for(&self, engine_speed_rpm: f64, torque_nm: f64) -> f64 {
         for pair in self.throttle_deg.windows(2) {
             let [low, high] = [pair[0], pair[1]].map(|throttle| self.torque_at(engine_speed_rpm, throttle));

@@ -1,4 +1,4 @@
-//! Engine, gears and driven axles: what the wheels can be given at a speed, and what it takes to give them less.
+//! Engine, gears and driven axles: the greatest force at the wheels at a speed, and the engine state for any smaller one.
 
 mod differential;
 mod engine;
@@ -25,7 +25,7 @@ pub struct Powertrain {
     pub final_drive: f64,
     /// Share of engine torque that reaches the wheels.
     pub efficiency: f64,
-    /// Torque and fuel over engine speed and throttle, where known.
+    /// Torque and fuel over engine speed and throttle, if the car has such maps.
     pub engine: Option<EngineMap>,
     /// How the driven wheels share the torque.
     pub differential: Differential,
@@ -42,7 +42,7 @@ pub struct Gear {
     pub force_n: f64,
 }
 
-/// What the engine does for a power at the wheels.
+/// The state of the engine for a power at the wheels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OperatingPoint {
     /// The gear.
@@ -57,12 +57,12 @@ pub struct OperatingPoint {
     pub load: f64,
     /// Fuel flow (kg/h).
     pub fuel_flow_kgph: f64,
-    /// What was asked for at the crank beyond the greatest power (W).
+    /// Power that was asked for at the crank in excess of the greatest power (W).
     pub missing_w: f64,
 }
 
-/// The power (W) that takes a car along: `v (m g f_r + D + m I a)` with the coefficient of rolling resistance `f_r`, the
-/// drag `D` (N) and the factor of rotating masses `I` (R. Rajamani, *Vehicle Dynamics and Control*, 2012, ch. 4).
+/// The power (W) that a car needs to move: `v (m g f_r + D + m I a)` with the coefficient of rolling resistance `f_r`, the drag
+/// `D` (N) and the factor of rotating masses `I` (R. Rajamani, *Vehicle Dynamics and Control*, 2012, ch. 4).
 pub fn demand_w(v_mps: f64, ax_mps2: f64, mass_kg: f64, drag_n: f64, rolling: f64, rotating: f64) -> f64 {
     v_mps * (mass_kg * GRAVITY_MPS2 * rolling + drag_n + mass_kg * rotating * ax_mps2)
 }
@@ -71,7 +71,7 @@ pub fn demand_w(v_mps: f64, ax_mps2: f64, mass_kg: f64, drag_n: f64, rolling: f6
 pub const GRAVITY_MPS2: f64 = 9.80665;
 
 impl Powertrain {
-    /// The same with torque and fuel flow, and what the rules let flow, multiplied by `share` at every engine speed.
+    /// The same powertrain with torque, fuel flow and the limit of the flow multiplied by `share` at every engine speed.
     pub fn scaled(&self, share: f64) -> Self {
         let all = |values: &[f64]| -> Vec<f64> { values.iter().map(|x| share * x).collect() };
         Self {
@@ -166,8 +166,8 @@ impl Powertrain {
         }
     }
 
-    /// The gear that gives most at road speed `speed` (m/s), the lowest of those that give the same; none above the
-    /// speed that the engine reaches in top gear.
+    /// The gear with the greatest force at road speed `speed` (m/s), the lowest one of equals. `None` above the speed that the
+    /// engine reaches in top gear.
     pub fn gear(&self, speed: f64, wheel_radius: f64) -> Option<Gear> {
         let wheel_rpm = speed / wheel_radius * 60.0 / TAU;
         let mut best: Option<Gear> = None;
@@ -186,12 +186,12 @@ impl Powertrain {
         best
     }
 
-    /// The greatest force at the wheels (N) at road speed `speed` (m/s), in the gear that gives most.
+    /// The greatest force at the wheels (N) at road speed `speed` (m/s), in the best gear.
     pub fn wheel_force(&self, speed: f64, wheel_radius: f64) -> f64 {
         self.gear(speed, wheel_radius).map_or(0.0, |gear| gear.force_n)
     }
 
-    /// Road speeds (m/s) from which the next gear gives more, one fewer than gears; nothing where it never does.
+    /// Road speeds (m/s) from which the next gear gives more force, one fewer than gears. `None` where it never does.
     pub fn shift_points_mps(&self, wheel_radius: f64) -> Vec<Option<f64>> {
         let top_rpm = self.engine_speed_rpm[self.engine_speed_rpm.len() - 1];
         let force = |gear: usize, speed: f64| {
@@ -202,7 +202,7 @@ impl Powertrain {
             .map(|next| {
                 let end =
                     top_rpm * TAU / 60.0 * wheel_radius / (self.gear_ratios[next - 1] * self.final_drive);
-                // Above its last speed a gear gives nothing, so that the next one wins there if nowhere before.
+                // Above its last speed a gear gives no force, so the next one takes over there at the latest.
                 const STEPS: usize = 2000;
                 (1..=STEPS + 1)
                     .map(|i| end * i as f64 / STEPS as f64)
@@ -211,8 +211,8 @@ impl Powertrain {
             .collect()
     }
 
-    /// What the engine does for a power (W) at the wheels at a road speed (m/s): gear, engine speed, throttle and fuel.
-    /// Nothing without an engine map, or beyond the speed of the top gear.
+    /// The state of the engine for a power (W) at the wheels at a road speed (m/s): gear, engine speed, throttle and fuel. `None`
+    /// without an engine map, or beyond the speed of the top gear.
     pub fn operating_point(
         &self,
         speed: f64,

@@ -5,7 +5,7 @@ use crate::vehicle::parameters::parameters;
 parameters! {
     /// A complete MF 5.2 coefficient set for combined slip with aligning moment. Names are Pacejka's; a `.tir` key is the name in capitals.
     ///
-    /// Bounds are those outside which the formula loses its meaning, not those of likely tyres.
+    /// Outside the bounds the formula has no meaning. Real tyres lie in much narrower ranges.
     pub struct TyreCoefficients {
         r0: "R0" ["m"] 0.05..=2.0, None, "unloaded radius";
         fnomin: "FNOMIN" ["N"] 10.0..=1000000.0, None, "nominal load";

@@ -5,7 +5,7 @@ use super::prepared::MagicFormula;
 use super::{LEAST_LOAD, Tyre, TyreCoefficients, TyreForces, TyreInput, TyreModel};
 use crate::scalar::{Pair, Real};
 
-/// The angle `C atan(B x - E (B x - atan(B x)))`, in half turns, of which a curve is the sine or the cosine.
+/// The angle `C atan(B x - E (B x - atan(B x)))`, in half turns. A curve of the formula is its sine or cosine.
 #[derive(Clone, Copy)]
 struct Curve<R> {
     /// `C / pi`.
@@ -36,14 +36,14 @@ fn clamp_curvature<R: Real>(e: R) -> R {
     e.min(R::lit(1.0))
 }
 
-/// The load (N, floored) and its difference from nominal as a share of nominal.
+/// The load (N, at least `LEAST_LOAD`) and its difference from the nominal load, as a share of it.
 #[derive(Clone, Copy)]
 struct Load<R> {
     force: R,
     difference: R,
 }
 
-/// What pure slip yields and the other formulas need: the force is `peak sin(angle) + shift`.
+/// Results of pure slip that the other formulas need. The force is `peak sin(angle) + shift`.
 #[derive(Clone, Copy)]
 struct PureSlip<R> {
     curve: Curve<R>,
@@ -75,7 +75,7 @@ fn pure_longitudinal<R: Real>(t: &MagicFormula<R>, load: Load<R>, slip_ratio: R)
     }
 }
 
-/// Pure side slip, and what the residual moment needs of it: `By Cy` and `SHy + SVy/Ky`.
+/// Pure side slip, with two figures for the residual moment: `By Cy` and `SHy + SVy/Ky`.
 #[inline(always)]
 fn pure_lateral<R: Real>(
     t: &MagicFormula<R>,
@@ -107,8 +107,7 @@ fn pure_lateral<R: Real>(
     (pure, slope, horizontal_shift + vertical_shift / stiffness)
 }
 
-/// The curve whose cosine at `x`, over that at its shift, is the weight that side slip leaves of the longitudinal
-/// force.
+/// The curve of the weight by which side slip reduces the longitudinal force: its cosine at `x` over its cosine at the shift.
 #[inline(always)]
 fn longitudinal_weight<R: Real>(
     t: &MagicFormula<R>,
@@ -123,7 +122,7 @@ fn longitudinal_weight<R: Real>(
     [Curve { c, b, e, x }, Curve { c, b, e, x: shift }]
 }
 
-/// The like for the weight that slip ratio leaves of the side force.
+/// The curve of the weight by which slip ratio reduces the side force.
 #[inline(always)]
 fn lateral_weight<R: Real>(
     t: &MagicFormula<R>,
@@ -138,8 +137,8 @@ fn lateral_weight<R: Real>(
     [Curve { c, b, e, x }, Curve { c, b, e, x: shift }]
 }
 
-/// The tangent of the equivalent slip angle: `x`'s, whose tangent is given, with the slip ratio's share added. `x` is
-/// itself the tangent of a slip angle, and the formula as published takes the tangent once more.
+/// The tangent of the equivalent slip angle, which adds the share of the slip ratio to `x`. `x` is itself the tangent of a slip
+/// angle; the published formula takes the tangent of it once more, and so does this function.
 #[inline(always)]
 fn equivalent_tangent<R: Real>(x: R, tangent: R, slip_share: R) -> R {
     (tangent * tangent + slip_share * slip_share).sqrt() * x.sign()
@@ -158,8 +157,8 @@ fn combined_slip<R: Real>(t: &MagicFormula<R>, input: TyreInput<R>) -> TyreForce
     let pure_x = pure_longitudinal(t, load, slip_ratio);
     let (pure_y, slope, residual_shift) = pure_lateral(t, load, slip_tangent, side);
 
-    // Each curve is a chain of an inner arc tangent, an outer one and a sine or cosine: `f` of a pure force, `w` of
-    // a weight and `w0` of its shift, `m` of the trail. All of a kind that are ready are worked out side by side.
+    // Each curve is a chain of an inner arc tangent, an outer one and a sine or cosine: `f` of a pure force, `w` of a weight and
+    // `w0` of its shift, `m` of the trail. Curves of one kind are computed side by side.
     let [wx, wx0] = longitudinal_weight(t, load, slip_ratio, slip_tangent);
     let [wy, wy0] = lateral_weight(t, load, slip_ratio, slip_tangent);
     let (fx, fy) = (pure_x.curve, pure_y.curve);
@@ -221,7 +220,7 @@ fn combined_slip<R: Real>(t: &MagicFormula<R>, input: TyreInput<R>) -> TyreForce
     let d = load.force * (t.dt1 + t.dt2 * dfz) * (t.dt_even + t.dt_odd * side);
     let trail = d * cos_m / slip_tangent.sec_atan();
     let residual_slope = t.br1 + t.br2 * slope;
-    // The cosine of `a* = tan(alpha)` itself, unlike that of the trail: the reference implementation has it so.
+    // This is the cosine of `a* = tan(alpha)` itself, as in the reference implementation. The trail uses another cosine.
     let residual_peak =
         load.force * (t.dr1 + t.dr2 * dfz + (t.dr_camber1 + t.dr_camber2 * dfz) * side) * slip_tangent.cos();
     let residual = residual_peak / (residual_slope * residual_slip).sec_atan();

@@ -16,11 +16,11 @@ pub use well_formed::IllFormed;
 use super::parameters::ParameterInfo;
 use crate::scalar::Real;
 
-/// The load under which slopes are computed as at this load (N); the forces of an unloaded tyre are zero.
-/// It only keeps 0/0 out of slopes that are ratios of things proportional to load.
+/// Least load with which slopes are computed (N). It avoids 0/0 in slopes that are ratios of two quantities proportional to load.
+/// The forces of an unloaded tyre are zero.
 const LEAST_LOAD: f64 = 1e-3;
 
-/// What a tyre feels.
+/// The inputs of a tyre.
 #[derive(Clone, Copy, Debug)]
 pub struct TyreInput<R> {
     /// Vertical load, N.
@@ -34,7 +34,7 @@ pub struct TyreInput<R> {
 }
 
 impl<R: Real> TyreInput<R> {
-    /// Zero throughout.
+    /// No force and no moment.
     #[inline(always)]
     pub fn zero() -> Self {
         let zero = R::lit(0.0);
@@ -47,7 +47,7 @@ impl<R: Real> TyreInput<R> {
     }
 }
 
-/// What a tyre answers, in its own axes.
+/// The forces of a tyre, in its own axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TyreForces<R> {
     /// Longitudinal force, N.
@@ -58,21 +58,21 @@ pub struct TyreForces<R> {
     pub aligning_moment: R,
 }
 
-/// A tyre model over a scalar, ready for an axle. Each model has its twin module under `shaders/`.
+/// A tyre model over a scalar, prepared for an axle. Each model has its twin module under `shaders/`.
 pub trait Tyre<R: Real>: Copy + Send + Sync {
     /// Which model it is.
     const MODEL: TyreModel;
-    /// Names of the figures of its ready form, in order.
+    /// Names of the figures of its prepared form, in order.
     const FIELDS: &'static [&'static str];
 
-    /// Makes the tyre ready for an axle whose left wheel leans to the right by `inclination` (rad), from the
-    /// model's parameters in the order of [`TyreModel::parameters`].
+    /// Prepares the tyre for an axle whose left wheel leans to the right by `inclination` (rad). The model's parameters come in
+    /// the order of [`TyreModel::parameters`].
     fn from_parameters(at: impl FnMut(usize) -> R, inclination: R) -> Self;
 
-    /// From the ready form's figures.
+    /// From the figures of the prepared form.
     fn from_flat(at: impl FnMut(usize) -> R) -> Self;
 
-    /// To the ready form's figures.
+    /// To the figures of the prepared form.
     fn to_flat(&self) -> Vec<R>;
 
     /// Forces and aligning moment.
@@ -86,7 +86,7 @@ pub trait Tyre<R: Real>: Copy + Send + Sync {
     }
 }
 
-/// The tyre models there are.
+/// The tyre models.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum TyreModel {
     /// [`MagicFormula`].

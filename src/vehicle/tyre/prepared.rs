@@ -1,17 +1,17 @@
-//! Tyres made ready for a wheel: scale factors, camber and everything else that does not change while driving
-//! folded into fewer figures. This is the form that kernels read, on every backend.
+//! Tyres prepared for an axle: scale factors, camber and all else that does not change while driving are folded into fewer
+//! figures. Kernels on every backend read this form.
 
 use super::TyreCoefficients;
 use crate::scalar::Real;
 use crate::vehicle::parameters::fields;
 
 fields! {
-    /// Magic Formula 5.2 of one axle, its static camber folded in. Twin of `MagicFormula` in `shaders/tyre.wgsl`.
+    /// Magic Formula 5.2 of one axle, with its static camber folded in. Twin of `MagicFormula` in `shaders/tyre.wgsl`.
     ///
-    /// Terms odd in camber hold for the left wheel and are multiplied by the side (`+1` left, `-1` right), on
-    /// which the same camber leans the other way; even terms hold for both. The shape factors that multiply an
-    /// angle (`cx`, `cy`, `rcx1`, `rcy1`, `rvy5` and `ct`) are divided by pi, so that the product is in half turns;
-    /// `bct` is that of the trail as it was.
+    /// Terms odd in camber hold for the left wheel and are multiplied by the side (`+1` left, `-1` right), on which the same
+    /// camber leans the other way; even terms hold for both. The shape factors that multiply an angle (`cx`, `cy`, `rcx1`,
+    /// `rcy1`, `rvy5` and `ct`) are divided by pi, so that the product is in half turns; `bct` is the shape factor of the trail,
+    /// undivided.
     pub struct MagicFormula {
         inverse_nominal,
         cx, inverse_cx, dx1, dx2, kx1, kx2, kx3, hx1, hx2, vx1, vx2, ex1, ex2, ex3, ex4,
@@ -28,8 +28,8 @@ fields! {
 }
 
 impl<R: Real> TyreCoefficients<R> {
-    /// Makes the tyre ready for an axle whose left wheel leans to the right by `inclination` (rad); the right
-    /// wheel leans to the left as much (the book, chapter Model, section 1).
+    /// Prepares the tyre for an axle whose left wheel leans to the right by `inclination` (rad); the right wheel leans to the
+    /// left as much (the book, chapter Model, section 1).
     pub fn prepare(&self, inclination: R) -> MagicFormula<R> {
         let one = R::lit(1.0);
         let nominal = self.fnomin * self.lfz0;
@@ -69,7 +69,7 @@ impl<R: Real> TyreCoefficients<R> {
             inverse_cy: one / cy,
             dy1: self.pdy1 * friction_y,
             dy2: self.pdy2 * friction_y,
-            // The two of sin(2 atan z) = 2 z / (1 + z^2) is here.
+            // This contains the factor 2 of sin(2 atan z) = 2 z / (1 + z^2).
             ky: R::lit(2.0) * self.pky1 * nominal * (one - self.pky3 * g.abs()) * self.lky,
             ky_load: one / (self.pky2 * nominal),
             hy1: self.phy1 * self.lhy,

@@ -1,12 +1,12 @@
-//! `.tir` tyre property files, the field's own format: read, changed in place, and written.
+//! Tyre property files (`.tir`): read, changed in place, and written.
 
 use super::TyreCoefficients;
 use crate::config::{LARGEST_TEXT, read_bytes};
-use crate::error::{Error, Result};
+use crate::error::{Error, Place, Result};
 use std::fmt::Write as _;
 use std::path::Path;
 
-/// A `.tir` file with the coefficients in it; what lapswarm does not use is kept and written back as it was.
+/// A `.tir` file and its coefficients. Lines that lapswarm does not use are kept and written back unchanged.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TyreFile {
     /// The MF 5.2 coefficients.
@@ -31,7 +31,7 @@ const FIT_TYPES: [&str; 3] = ["6", "21", "52"];
 fn tir_key(name: &str) -> String {
     match name {
         "R0" => "UNLOADED_RADIUS".to_owned(),
-        // With the letter O, as every tool writes it.
+        // With the letter O instead of a zero, as every tool writes it.
         "lFz0" => "LFZO".to_owned(),
         _ => name.to_uppercase(),
     }
@@ -69,7 +69,7 @@ impl TyreFile {
     /// than SI, a coefficient that is not a number or out of its range, a repeated or a missing one.
     pub fn read(path: &Path) -> Result<Self> {
         let bytes = read_bytes(path, LARGEST_TEXT)?;
-        // Comments in the wild are Latin-1; the keys and figures are ASCII either way.
+        // Comments of real files are often Latin-1. Keys and figures are ASCII in any case.
         Self::parse(path, &String::from_utf8_lossy(&bytes))
     }
 
@@ -85,13 +85,13 @@ impl TyreFile {
         let mut section = String::new();
         let mut fit_type = None;
         for (number, line) in text.lines().enumerate() {
-            let place = |key: &str| format!("line {}, key {key}", number + 1);
+            let place = |key: &str| Place::line(number + 1).key(key);
             let trimmed = line.trim();
             if let Some(name) = trimmed.strip_prefix('[') {
                 let Some(end) = name.find(']') else {
                     return Err(Error::input(
                         file,
-                        format!("line {}", number + 1),
+                        Place::line(number + 1),
                         trimmed,
                         "a section name in [brackets]",
                     ));
@@ -111,7 +111,7 @@ impl TyreFile {
             let (value, comment) = split_comment(rest);
             let value = unquote(value);
             if section == "UNITS" {
-                check_unit(file, &place(&key), &key, value)?;
+                check_unit(file, place(&key), &key, value)?;
             }
             if section == "MODEL" && key == "FITTYP" {
                 if !FIT_TYPES.contains(&value) {
@@ -156,16 +156,25 @@ impl TyreFile {
         if fit_type.is_none() {
             return Err(Error::input(
                 file,
-                "section [MODEL], key FITTYP",
+                Place::default().key("FITTYP"),
                 "nothing",
-                "6, 21 or 52 (Magic Formula 5.2)",
+                "6, 21 or 52 (Magic Formula 5.2) in section [MODEL]",
             ));
         }
         let mut flat = Vec::with_capacity(table.len());
         for (info, value) in table.iter().zip(values) {
             flat.push(value.or(info.default).ok_or_else(|| {
-                let place = format!("section [{}], key {}", tir_section(info.name), tir_key(info.name));
-                Error::input(file, place, "nothing", format!("a number ({})", info.meaning))
+                let expected = format!(
+                    "a number ({}) in section [{}]",
+                    info.meaning,
+                    tir_section(info.name)
+                );
+                Error::input(
+                    file,
+                    Place::default().key(tir_key(info.name)),
+                    "nothing",
+                    expected,
+                )
             })?);
         }
         Ok(Self {
@@ -174,7 +183,7 @@ impl TyreFile {
         })
     }
 
-    /// A file of its own for coefficients that came from nowhere.
+    /// A new file for coefficients that were not read from one.
     pub fn new(coefficients: TyreCoefficients<f64>) -> Self {
         let header = "[MDI_HEADER]\nFILE_TYPE = 'tir'\nFILE_VERSION = 3.0\nFILE_FORMAT = 'ASCII'\n[UNITS]\nLENGTH = 'meter'\nFORCE = 'newton'\nANGLE = 'radians'\nMASS = 'kg'\nTIME = 'second'\n[MODEL]\nPROPERTY_FILE_FORMAT = 'PAC2002'\nFITTYP = 6";
         Self {
@@ -192,7 +201,7 @@ impl TyreFile {
         }
     }
 
-    /// The text of the file with the present coefficients, figures that read back bit for bit.
+    /// The text of the file with the present coefficients. Figures read back bit for bit.
     pub fn to_text(&self) -> String {
         let table = TyreCoefficients::<f64>::PARAMETERS;
         let flat = self.coefficients.to_flat();
@@ -204,7 +213,7 @@ impl TyreFile {
                 _ => None,
             })
             .collect();
-        // A coefficient the file did not have is only worth a line where it differs from its default.
+        // A coefficient that the file did not have gets a line only if it differs from its default.
         let mut missing: Vec<usize> = (0..table.len())
             .filter(|i| {
                 !written.contains(i) && table[*i].default.map(f64::to_bits) != Some(flat[*i].to_bits())
@@ -249,7 +258,7 @@ impl TyreFile {
     }
 }
 
-fn check_unit(file: &Path, place: &str, key: &str, value: &str) -> Result<()> {
+fn check_unit(file: &Path, place: Place, key: &str, value: &str) -> Result<()> {
     let allowed: &[&str] = match key {
         "LENGTH" => &["meter", "metre", "m"],
         "FORCE" => &["newton", "n"],

@@ -1,42 +1,15 @@
-//! Which Magic Formula coefficients make no tyre. Judged once per candidate in `f64`, before any integration,
-//! so that every backend refuses the same candidates for the same reasons.
+//! Refuses Magic Formula coefficients that describe no tyre. Each candidate is checked once in `f64`, before any integration, so
+//! that every backend refuses the same candidates for the same reasons.
 
 use super::{LEAST_LOAD, Tyre, TyreCoefficients, TyreInput};
-use serde::{Deserialize, Serialize};
-use std::fmt;
+pub use crate::evaluate::IllFormed;
 
-/// Why a set of coefficients makes no tyre.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum IllFormed {
-    /// A coefficient is not a finite number.
-    NotFinite,
-    /// Peak friction is not positive (or next to zero) somewhere in the working range of loads.
-    Friction,
-    /// Slip or cornering stiffness has the wrong sign or vanishes somewhere in the working range of loads.
-    Stiffness,
-    /// A combined-slip weight divides by (nearly) zero, or leaves a negative force at slips driven daily.
-    Weighting,
-}
-
-impl fmt::Display for IllFormed {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::NotFinite => "a coefficient that is not a finite number",
-            Self::Friction => "friction that is not positive",
-            Self::Stiffness => {
-                "slip stiffness that is not positive or cornering stiffness that is not negative"
-            }
-            Self::Weighting => "combined-slip weights that vanish or turn negative",
-        })
-    }
-}
-
-/// Loads (in nominal loads) at which a tyre is judged: from nearly lifted to a loaded outer wheel.
+/// Loads (in nominal loads) at which a tyre is checked: from a nearly lifted wheel to a loaded outer one.
 const LOADS: [f64; 4] = [0.1, 0.5, 1.0, 2.0];
 /// The least peak friction, a hundredth of that on wet ice; below it slopes divide by (nearly) zero.
 const LEAST_FRICTION: f64 = 1e-3;
-/// The least stiffness per load, a hundredth of a real tyre's. Other terms divide by stiffness, and what is small but
-/// fine in `f64` is zero in the single precision of the backends.
+/// The least stiffness per load, a hundredth of a real tyre's. Other terms divide by stiffness, and a very small number in `f64`
+/// may be zero in single precision.
 const LEAST_STIFFNESS: f64 = 0.1;
 /// The slip within which the weights must stay positive, as slip ratio and as tangent of the slip angle.
 const WORKING_SLIP: f64 = 0.15;
@@ -44,10 +17,10 @@ const WORKING_SLIP: f64 = 0.15;
 const LEAST_DENOMINATOR: f64 = 0.1;
 
 impl TyreCoefficients<f64> {
-    /// Whether the coefficients make a tyre (the book, chapter Model, section 1).
+    /// Whether the coefficients describe a tyre (the book, chapter Model, section 1).
     ///
     /// # Errors
-    /// Why they make none.
+    /// The reason why they do not.
     pub fn well_formed(&self) -> Result<(), IllFormed> {
         if self.to_flat().iter().any(|x| !x.is_finite()) {
             return Err(IllFormed::NotFinite);
@@ -74,7 +47,7 @@ impl TyreCoefficients<f64> {
             let ex = self.rex1 + self.rex2 * dfz;
             let ey = self.rey1 + self.rey2 * dfz;
             let shift = self.rhy1 + self.rhy2 * dfz;
-            // The slopes are steepest, and so the denominators least, where the other slip is zero.
+            // The slopes are steepest where the other slip is zero, so the denominators are least there.
             let bx = self.rbx1 * self.lxal;
             let by = self.rby1 * self.lyka;
             if !(shape(self.rcx1, bx, ex, self.rhx1) > LEAST_DENOMINATOR

@@ -47,8 +47,8 @@ fn road(setup: &HybridSetup) -> Road {
 }
 
 /// Laps over one another: what the motor does and what it gains on the engine alone.
-pub fn laps(setup: &HybridSetup, outcome: &Outcome, laps: &[&ReportedLap], title: String) -> LapView {
-    let engine = &outcome.engine;
+pub fn laps(outcome: &Outcome, laps: &[&ReportedLap], title: String) -> LapView {
+    let (setup, engine) = (&outcome.setup, &outcome.engine);
     let (alone_mps, alone_s) = (speeds(engine), summed(engine, |s| s.time));
     let store = &setup.car.hybrid.store;
     let line = |lap: &&ReportedLap| {
@@ -97,7 +97,8 @@ pub fn laps(setup: &HybridSetup, outcome: &Outcome, laps: &[&ReportedLap], title
 }
 
 /// One lap beside the engine alone.
-pub fn lap(setup: &HybridSetup, outcome: &Outcome, lap: &ReportedLap) -> LapView {
+pub fn lap(outcome: &Outcome, lap: &ReportedLap) -> LapView {
+    let setup = &outcome.setup;
     let title = format!(
         "{}, {} ({}): {:.3} s, {:.2} MJ out, {:.3} l",
         setup.raceline.track_name,
@@ -107,18 +108,18 @@ pub fn lap(setup: &HybridSetup, outcome: &Outcome, lap: &ReportedLap) -> LapView
         lap.lap.deployed / 1e6,
         lap.lap.fuel / setup.car.fuel_density_kgpl
     );
-    laps(setup, outcome, &[lap, &outcome.engine], title)
+    laps(outcome, &[lap, &outcome.engine], title)
 }
 
 /// All laps, the fastest first: it colours the map.
-pub fn all_laps(setup: &HybridSetup, outcome: &Outcome) -> LapView {
+pub fn all_laps(outcome: &Outcome) -> LapView {
     let mut all = reported_laps(outcome);
     all.sort_by(|a, b| a.lap.time.total_cmp(&b.lap.time));
     let title = format!(
         "{}: speed, power and charge; {:.3} s by the engine alone",
-        setup.raceline.track_name, outcome.engine.lap.time
+        outcome.setup.raceline.track_name, outcome.engine.lap.time
     );
-    laps(setup, outcome, &all, title)
+    laps(outcome, &all, title)
 }
 
 /// Deployment and harvest on the circuit.
@@ -201,7 +202,7 @@ pub fn time_energy(outcome: &Outcome) -> Option<Curves> {
     let mut exact: Vec<(f64, f64)> = o
         .front
         .iter()
-        .map(|p| (p.budget_j / 1e6, p.deployment.lap.time))
+        .map(|p| (p.energy_mj, p.lap_time_s))
         .chain([(o.budget_j / 1e6, o.exact.lap.time)])
         .collect();
     exact.sort_by(|a, b| a.0.total_cmp(&b.0));

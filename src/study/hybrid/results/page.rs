@@ -5,24 +5,28 @@ use crate::config::settings::Settings;
 use crate::error::Result;
 use crate::files::stem;
 use crate::report::{Figure, Front, HtmlReport, Table};
-use crate::study::hybrid::{HybridSetup, HybridStudySettings, Outcome, ReportedLap, StintLap};
+use crate::study::hybrid::{HybridStudySettings, Outcome, ReportedLap, StintLap};
 use std::path::Path;
 
+/// Draws figures into `folder`, and writes the page.
+///
+/// # Errors
+/// [`crate::Error::Io`] if one cannot be written.
 pub fn write(
     folder: &Path,
     settings: &HybridStudySettings,
-    setup: &HybridSetup,
     outcome: &Outcome,
     summary: &HybridSummary,
 ) -> Result<()> {
-    let mut page = HtmlReport::new("hybrid", &format!("{} with the {}", summary.track, summary.car));
+    let subject = &summary.head.subject;
+    let mut page = HtmlReport::new(&summary.head.study, &subject.words());
     head(&mut page, summary);
     page.section(
         "Laps",
         "Where the motor works and what it gains on the engine alone.",
     );
-    page.figure(folder.join("traces.svg"), &figures::all_laps(setup, outcome))?;
-    pictures(folder, setup, outcome)?;
+    page.figure(folder.join("traces.svg"), &figures::all_laps(outcome))?;
+    pictures(folder, outcome)?;
     if !summary.scenarios.is_empty() {
         page.table(
             "Scenarios",
@@ -57,26 +61,27 @@ pub fn write(
         page.table("Laps of the stint", "", &stint_table(&outcome.stint))?;
     }
     page.facts(&[
-        ("track", &summary.track),
-        ("car", &summary.car),
+        ("track", &subject.track_name()),
+        ("car", &subject.car),
         ("line", &format!("{}, {:.1} m", summary.line, summary.length_m)),
-        ("seed", &summary.seed),
+        ("seed", &subject.seed),
     ]);
-    summary.record.provenance(&mut page, "laps evaluated");
+    summary.head.record.provenance(&mut page, "laps evaluated");
     page.settings("study.toml, which repeats this run", settings.to_toml());
     page.write(folder.join("report.html"))
 }
 
 /// Files of what the lap view of the page has in one: each lap, the scenarios, and the best deployment.
-fn pictures(folder: &Path, setup: &HybridSetup, outcome: &Outcome) -> Result<()> {
+fn pictures(folder: &Path, outcome: &Outcome) -> Result<()> {
+    let setup = &outcome.setup;
     for lap in reported_laps(outcome).into_iter().skip(1) {
         let name = format!("energy_{}.svg", stem(&lap.name));
-        figures::lap(setup, outcome, lap).write_svg(&folder.join(name))?;
+        figures::lap(outcome, lap).write_svg(&folder.join(name))?;
     }
     let scenarios: Vec<&ReportedLap> = outcome.scenarios.iter().map(|s| &s.own).collect();
     if !scenarios.is_empty() {
         let title = format!("{}: scenarios", setup.raceline.track_name);
-        figures::laps(setup, outcome, &scenarios, title).write_svg(&folder.join("charge.svg"))?;
+        figures::laps(outcome, &scenarios, title).write_svg(&folder.join("charge.svg"))?;
     }
     // The best deployment if there is one, else the last scenario.
     let shown = match &outcome.optimised {
@@ -93,9 +98,10 @@ fn pictures(folder: &Path, setup: &HybridSetup, outcome: &Outcome) -> Result<()>
 }
 
 fn head(page: &mut HtmlReport, summary: &HybridSummary) {
+    let (car, track) = (&summary.head.subject.car, summary.head.subject.track_name());
     page.sentence(format!(
-        "By the engine alone the {} laps {} in {:.2} s with {:.2} l of fuel.",
-        summary.car, summary.track, summary.engine_lap_time_s, summary.engine_fuel_l
+        "By the engine alone the {car} laps {track} in {:.2} s with {:.2} l of fuel.",
+        summary.engine_lap_time_s, summary.engine_fuel_l
     ));
     page.tile("Engine alone", format!("{:.3}", summary.engine_lap_time_s), "s");
     if let Some(d) = &summary.deployment {
@@ -112,7 +118,7 @@ fn head(page: &mut HtmlReport, summary: &HybridSummary) {
     for sizing in &summary.sizing {
         page.sentence(sizing_in_words(sizing));
     }
-    page.warnings(&summary.warnings, summary.record.interrupted);
+    page.warnings(&summary.warnings, summary.head.record.interrupted);
 }
 
 /// The figures of the scenarios.

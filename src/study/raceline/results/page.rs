@@ -1,12 +1,16 @@
 //! The figures of a racing-line study and its interactive report.
 
-use super::surfaces::surface;
 use super::{LineFigures, Summary, reported_lines};
 use crate::config::settings::Settings;
 use crate::error::Result;
+use crate::evaluate::BackendChoice;
+use crate::evaluate::line::open_line_evaluator;
 use crate::files::stem;
-use crate::report::{Curves, Front, HtmlReport, LapLine, LapView, Panel, Road, Table, TrackMap};
-use crate::study::raceline::{Outcome, RacelineSettings, ReportedLine, Setup};
+use crate::line::Parametrisation;
+use crate::report::{
+    Curves, Front, HtmlReport, LapLine, LapView, Levels, Panel, Road, Surface, Table, TrackMap, with_unit,
+};
+use crate::study::raceline::{ObjectiveOutcome, Outcome, RacelineSettings, ReportedLine, Setup};
 use glam::DVec2;
 use std::path::Path;
 
@@ -21,7 +25,13 @@ const PANELS: [(&str, &str); 6] = [
 ];
 /// Room before and behind a section in its close-up (m).
 const ROOM_M: f64 = 60.0;
+/// Values of each `alpha` of a surface.
+const GRID: usize = 41;
 
+/// Draws figures into `folder`, and writes the page.
+///
+/// # Errors
+/// [`crate::Error::Io`] if one cannot be written.
 pub fn write(
     folder: &Path,
     settings: &RacelineSettings,
@@ -29,8 +39,8 @@ pub fn write(
     outcome: &Outcome,
     summary: &Summary,
 ) -> Result<()> {
-    let title = format!("{} with the {}", summary.track, summary.car);
-    let mut page = HtmlReport::new("raceline", &title);
+    let (subject, record) = (&summary.head.subject, &summary.head.record);
+    let mut page = HtmlReport::new(&summary.head.study, &subject.words());
     // The fastest first: it colours the map, and time is lost on it.
     let mut lines = reported_lines(outcome);
     lines.sort_by(|a, b| a.lap_time_fine_s().total_cmp(&b.lap_time_fine_s()));
@@ -43,10 +53,8 @@ pub fn write(
     page.figure(folder.join("traces.svg"), &view)?;
     if let Some(fastest) = lines.first() {
         let (track, car, name) = (&setup.track_name, &setup.car_name, &fastest.name);
-        let title = format!(
-            "{track}, {name} line of the {car}: {:.2} s",
-            fastest.lap_time_fine_s()
-        );
+        let time_s = fastest.lap_time_fine_s();
+        let title = format!("{track}, {name} line of the {car}: {time_s:.2} s");
         if let Some(map) = view.track_map(&*title) {
             map.write_svg(folder.join("map.svg"))?;
             close_ups(folder, setup, fastest, &map)?;
@@ -59,13 +67,12 @@ pub fn write(
         &lines_table(summary),
     )?;
     front(&mut page, folder, outcome)?;
-    let histories = outcome.objectives.iter().zip(&outcome.history);
-    let histories = histories.filter(|(_, history)| !history.is_empty());
-    let panels = histories.map(|(o, history)| {
+    let searched = outcome.objectives.iter().filter(|o| !o.history.is_empty());
+    let panels = searched.map(|o| {
         Panel::new(&*o.best.name)
             .x("lines evaluated", "")
             .y(o.objective.words(), o.objective.unit())
-            .points("", history.iter().map(|(n, best)| (*n as f64, *best)))
+            .points("", o.history.iter().map(|(n, best)| (*n as f64, *best)))
     });
     let convergence = Curves::new("Convergence of the swarms", panels);
     if !convergence.is_empty() {
@@ -83,19 +90,15 @@ pub fn write(
         }
     }
     page.facts(&[
-        ("track", &summary.track),
-        ("car", &summary.car),
+        ("track", &subject.track_name()),
+        ("car", &subject.car),
         ("cross-sections", &summary.sections),
-        ("seed", &summary.seed),
+        ("seed", &subject.seed),
     ]);
-    summary.record.provenance(&mut page, "lines evaluated");
-    page.facts(&[
-        (
-            "swarms and local search",
-            &format!("{:.1} s", summary.search_elapsed_s),
-        ),
-        ("reference optima", &format!("{:.1} s", summary.exact_elapsed_s)),
-    ]);
+    record.provenance(&mut page, "lines evaluated");
+    let seconds = |s: f64| format!("{s:.1} s");
+    page.provenance("swarms and local search", seconds(summary.search_elapsed_s));
+    page.provenance("reference optima", seconds(summary.exact_elapsed_s));
     for (name, status) in &summary.exact_status {
         page.provenance(
             &format!("reference optimum, {name}"),
@@ -111,7 +114,9 @@ fn head(page: &mut HtmlReport, outcome: &Outcome, summary: &Summary, lines: &[&R
         let time = fastest.lap_time_fine_s();
         page.sentence(format!(
             "The fastest line round {} is the {} line: {time:.2} s over {:.0} m.",
-            summary.track, fastest.name, fastest.fine.length_m
+            summary.head.subject.track_name(),
+            fastest.name,
+            fastest.fine.length_m
         ));
         page.tile("Lap time", format!("{time:.3}"), "s");
         page.tile("Length", format!("{:.1}", fastest.fine.length_m), "m");
@@ -343,4 +348,47 @@ fn front(page: &mut HtmlReport, folder: &Path, outcome: &Outcome) -> Result<()> 
     }
     front.write_parallel(folder.join("parallel.svg"), "The front in parallel coordinates")?;
     page.figure(folder.join("front.svg"), &front)
+}
+
+/// An objective at the cross-section where its best line bends most and the next; none with fewer than two.
+fn surface(settings: &RacelineSettings, setup: &Setup, found: &ObjectiveOutcome) -> Result<Option<Surface>> {
+    let n = setup.cuts.len();
+    let axis: Vec<f64> = (0..GRID).map(|i| i as f64 / (GRID - 1) as f64).collect();
+    let line = &found.best;
+    let bend = |i: usize| {
+        let at = |place: &(usize, f64)| place.0 == i && place.1 == 0.0;
+        let point = line.fine.section.iter().position(at);
+        point.map_or(0.0, |p| line.fine.curvature_1pm[p].abs())
+    };
+    let bends = (0..n.saturating_sub(1)).map(|i| (i, bend(i)));
+    let Some((cut, _)) = bends.max_by(|a, b| a.1.total_cmp(&b.1)) else {
+        return Ok(None);
+    };
+    let pair = Parametrisation::sections().with_free(vec![cut, cut + 1], line.alpha.clone());
+    let problem = setup.problem(pair, &[found.objective], settings)?;
+    let grid: Vec<f64> = axis
+        .iter()
+        .flat_map(|y| axis.iter().flat_map(|x| [*x, *y]))
+        .collect();
+    // In f64: a surface's bottom is flatter than single precision.
+    let mut evaluator = open_line_evaluator(&problem, BackendChoice::Cpu, None)?;
+    let costs = evaluator.evaluate(&grid)?.worths(1).into_iter();
+    let (name, unit) = (found.objective.name(), found.objective.unit());
+    let label = |i: usize| format!("alpha at {:.1} m", setup.cuts.station_m[i]);
+    Ok(Some(Surface {
+        title: format!(
+            "{}: {name} over the {} line's place on two neighbouring cross-sections",
+            setup.track_name, line.name
+        ),
+        x_label: label(cut),
+        y_label: label(cut + 1),
+        z_label: with_unit(name, unit),
+        y: axis.clone(),
+        x: axis,
+        z: costs
+            .map(|worth| if worth.succeeded() { worth.cost } else { f64::NAN })
+            .collect(),
+        levels: Levels::Basin,
+        marks: vec![(line.name.clone(), [line.alpha[cut], line.alpha[cut + 1]])],
+    }))
 }

@@ -13,7 +13,7 @@ fn found(cuts: &CrossSections, objective: LineObjective, settings: &LineSearchSe
         adapter: None,
         known_faults: &[],
     };
-    search_line(&search, settings, |_| ControlFlow::Continue(())).unwrap()
+    search_line(&search, settings, None, |_, _, _| Ok(ControlFlow::Continue(()))).unwrap()
 }
 
 /// A ring of 590 and 600 m with as many sections as corners: the inner polygon is the shortest line.
@@ -33,27 +33,34 @@ fn the_ring_is_driven_along_the_inside() {
     }
 }
 
-/// A third of the bundled circuit as an open road, whose ends are free: within 0.05 % of its exact shortest line.
-#[test]
-fn an_open_road_is_searched_to_its_ends() {
-    let whole = Track::load("silverstone_gp").unwrap();
-    let mut cuts = whole.cross_sections(&Spacing::equal(360), false).unwrap();
-    let part: Vec<usize> = (0..120).collect();
-    cuts = thinned(&cuts, &part);
-    cuts.closed = false;
-    let map = crate::optimum::LineMap::at_every_cut(&cuts);
-    let exact = crate::optimum::shortest(&map, &crate::optimum::Bounds::road(120))
-        .unwrap()
-        .value;
-    let line = found(&cuts, LineObjective::Length, &LineSearchSettings::default());
+/// The bundled circuit.
+fn circuit(sections: usize) -> CrossSections {
+    let track = Track::load("silverstone_gp").unwrap();
+    track.cross_sections(&Spacing::equal(sections), false).unwrap()
+}
+
+/// The line found is within 0.05 % of the exact shortest one.
+fn is_shortest(cuts: &CrossSections) {
+    let map = crate::optimum::LineMap::at_every_cut(cuts);
+    let bounds = crate::optimum::Bounds::road(cuts.len());
+    let exact = crate::optimum::shortest(&map, &bounds).unwrap().value;
+    let line = found(cuts, LineObjective::Length, &LineSearchSettings::default());
     let short = line.cost / exact - 1.0;
     assert!((-1e-6..5e-4).contains(&short), "{short:e}");
 }
 
+/// A third of the bundled circuit as an open road, whose ends are free.
+#[test]
+fn an_open_road_is_searched_to_its_ends() {
+    let part: Vec<usize> = (0..120).collect();
+    let mut cuts = thinned(&circuit(360), &part);
+    cuts.closed = false;
+    is_shortest(&cuts);
+}
+
 #[test]
 fn the_same_seed_finds_the_same_line() {
-    let track = Track::load("silverstone_gp").unwrap();
-    let cuts = track.cross_sections(&Spacing::equal(120), false).unwrap();
+    let cuts = circuit(120);
     let quick = LineSearchSettings {
         rounds: 1,
         first_controls: 30,
@@ -71,18 +78,10 @@ fn the_same_seed_finds_the_same_line() {
     assert_ne!(bits(&quick), bits(&other));
 }
 
-/// Within 0.05 % of the exact shortest line of the bundled circuit, from the reference line on.
+/// From the reference line on.
 #[test]
 fn the_shortest_line_of_the_bundled_circuit() {
-    let track = Track::load("silverstone_gp").unwrap();
-    let cuts = track.cross_sections(&Spacing::equal(360), false).unwrap();
-    let map = crate::optimum::LineMap::at_every_cut(&cuts);
-    let exact = crate::optimum::shortest(&map, &crate::optimum::Bounds::road(360))
-        .unwrap()
-        .value;
-    let line = found(&cuts, LineObjective::Length, &LineSearchSettings::default());
-    let short = line.cost / exact - 1.0;
-    assert!((-1e-6..5e-4).contains(&short), "{short:e}");
+    is_shortest(&circuit(360));
 }
 
 #[test]

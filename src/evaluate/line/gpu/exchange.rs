@@ -1,10 +1,10 @@
 //! Lines of a swarm that lives on the device: neither candidates nor objectives cross the bus. Twin of
 //! `shaders/line_swarm.wgsl`.
 
-use super::problem::LineProblem;
 use crate::error::{Error, Result};
 use crate::evaluate::gpu::shader::line_swarm;
 use crate::evaluate::gpu::{Binding, GpuContext, Kernel};
+use crate::evaluate::line::problem::LineProblem;
 use crate::evaluate::resident::groups;
 use bytemuck::{Pod, Zeroable};
 use std::sync::Arc;

@@ -1,9 +1,8 @@
 //! A run's folder, read back.
 
-use crate::error::{Error, Result};
+use crate::config::read_bytes;
+use crate::error::{Error, Place, Result};
 use serde_json::{Map, Value};
-use std::fs::File;
-use std::io::Read;
 use std::path::{Path, PathBuf};
 
 /// Greatest size of a file that is read (bytes): what studies write is far smaller, and a foreign file shall not fill the
@@ -140,28 +139,10 @@ impl Run {
 
 /// The file's text; nothing if there is no such file.
 fn read_text(path: &Path) -> Result<Option<String>> {
-    let file = match File::open(path) {
-        Ok(file) => file,
-        // A folder that is a file, or none at all, has no files in it.
-        Err(e)
-            if matches!(
-                e.kind(),
-                std::io::ErrorKind::NotFound | std::io::ErrorKind::NotADirectory
-            ) =>
-        {
-            return Ok(None);
-        }
-        Err(e) => return Err(Error::io(path, "read", e)),
-    };
-    let mut bytes = Vec::new();
-    file.take(MOST_BYTES + 1)
-        .read_to_end(&mut bytes)
-        .map_err(|e| Error::io(path, "read", e))?;
-    if bytes.len() as u64 > MOST_BYTES {
-        let expected = format!("at most {} MiB", MOST_BYTES >> 20);
-        return Err(Error::input(path, "file", "a larger one", expected));
+    if !path.exists() {
+        return Ok(None);
     }
-    String::from_utf8(bytes)
+    String::from_utf8(read_bytes(path, MOST_BYTES)?)
         .map(Some)
         .map_err(|_| Error::input(path, "file", "bytes that are no UTF-8", "text"))
 }
@@ -176,7 +157,7 @@ fn object(path: &Path, text: &str) -> Result<Map<String, Value>> {
         Ok(_) => Err(Error::input(path, "file", "another value", "a JSON object")),
         Err(e) => Err(Error::input(
             path,
-            format!("line {}", e.line()),
+            Place::line(e.line()),
             shortened(&e.to_string()),
             "JSON",
         )),
@@ -221,7 +202,7 @@ pub(crate) fn read_table(path: &Path) -> Result<Option<Trace>> {
         let line = e.position().map_or(1, csv::Position::line);
         Error::input(
             path,
-            format!("line {line}"),
+            Place::line(line as usize),
             shortened(&e.to_string()),
             "a table with a header",
         )

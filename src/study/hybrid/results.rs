@@ -1,15 +1,19 @@
 //! What a hybrid study leaves behind: figures for people and scripts, laps, pictures.
 
 mod figures;
-mod files;
 mod page;
+
+pub(super) use page::write as write_page;
 
 use super::{
     HybridSetup, HybridStudySettings, Outcome, ReportedLap, Sizing, StintLap, correlation, mean_worths,
 };
 use crate::error::Result;
-use crate::evaluate::failures_in_words;
-use crate::study::framework::RunRecord;
+use crate::files::stem;
+use crate::line::energy::SegmentEnergy;
+use crate::report::Table;
+use crate::study::framework::Head;
+use figures::power_kw;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -126,21 +130,13 @@ pub struct DeploymentFigures {
 /// The figures of a study; `--json` prints this.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct HybridSummary {
-    /// `hybrid`.
-    pub study: String,
-    /// The track.
-    pub track: String,
-    /// The car.
-    pub car: String,
+    /// The study; its rate is that of the swarms.
+    #[serde(flatten)]
+    pub head: Head,
     /// The line.
     pub line: String,
     /// Its length (m).
     pub length_m: f64,
-    /// Seed of all random numbers.
-    pub seed: u64,
-    /// How the study ran; its rate is that of the swarms.
-    #[serde(flatten)]
-    pub record: RunRecord,
     /// What the rules allow to be deployed on this lap (MJ); `null` without a limit.
     pub rules_deployed_mj: Option<f64>,
     /// Time of the engine alone (s).
@@ -160,28 +156,15 @@ pub struct HybridSummary {
 }
 
 /// Puts the figures together.
-pub(super) fn summarise(
-    settings: &HybridStudySettings,
-    setup: &HybridSetup,
-    outcome: &Outcome,
-) -> HybridSummary {
-    let scenarios: BTreeMap<String, ScenarioFigures> = outcome
-        .scenarios
-        .iter()
-        .map(|s| {
-            (
-                s.own.name.clone(),
-                ScenarioFigures::of(setup, &s.own, &s.additional),
-            )
-        })
-        .collect();
+pub(super) fn summarise(head: Head, outcome: &Outcome) -> HybridSummary {
+    let setup = &outcome.setup;
+    let figures = outcome.scenarios.iter();
+    let figures = figures.map(|s| ScenarioFigures::of(setup, &s.own, &s.additional));
+    let names = outcome.scenarios.iter().map(|s| s.own.name.clone());
+    let scenarios: BTreeMap<String, ScenarioFigures> = names.zip(figures).collect();
     let mut warnings = Vec::new();
-    let rules = setup
-        .car
-        .hybrid
-        .rules
-        .deployed_on(setup.length_m)
-        .map(|j| j / 1e6);
+    let rules = setup.car.hybrid.rules.deployed_on(setup.length_m);
+    let rules = rules.map(|j| j / 1e6);
     for (name, s) in &scenarios {
         if let Some(most) = rules.filter(|most| s.deployed_mj > most + 1e-9) {
             warnings.push(format!(
@@ -203,13 +186,9 @@ pub(super) fn summarise(
         }
     }
     HybridSummary {
-        study: "hybrid".to_owned(),
-        track: setup.raceline.track_name.clone(),
-        car: setup.car.name.clone(),
+        head,
         line: setup.line_name.clone(),
         length_m: setup.length_m,
-        seed: settings.seed,
-        record: outcome.record.clone(),
         rules_deployed_mj: rules,
         engine_lap_time_s: outcome.engine.lap.time,
         engine_fuel_l: outcome.engine.lap.fuel / setup.car.fuel_density_kgpl,
@@ -228,15 +207,7 @@ pub(super) fn summarise(
             gain_s: outcome.engine.lap.time - o.swarm.lap.lap.time,
             zones: o.swarm.shares.len(),
             binds_up_to_mj: o.unbound_j / 1e6,
-            front: o
-                .front
-                .iter()
-                .map(|p| FrontFigures {
-                    energy_mj: p.budget_j / 1e6,
-                    deployed_mj: p.deployment.lap.deployed / 1e6,
-                    lap_time_s: p.deployment.lap.time,
-                })
-                .collect(),
+            front: o.front.clone(),
             swarm_front_size: o.swarm_front.as_ref().map(|f| f.objectives.len()),
             worth_speed_correlation: correlation(&o.worth),
             worth_taken_s_per_mj: mean_worths(&o.worth)[0],
@@ -252,8 +223,12 @@ impl HybridSummary {
     /// The figures in words.
     pub fn to_text(&self) -> String {
         let mut text = format!(
-            "{} with the {}, {} line of {:.0} m: {:.3} s and {:.3} l by the engine alone\n",
-            self.track, self.car, self.line, self.length_m, self.engine_lap_time_s, self.engine_fuel_l
+            "{}, {} line of {:.0} m: {:.3} s and {:.3} l by the engine alone\n",
+            self.head.subject.words(),
+            self.line,
+            self.length_m,
+            self.engine_lap_time_s,
+            self.engine_fuel_l
         );
         if !self.scenarios.is_empty() {
             text += &page::scenarios_table(self).first(10).to_text();
@@ -291,7 +266,7 @@ impl HybridSummary {
         for sizing in &self.sizing {
             text += &(sizing_in_words(sizing) + "\n");
         }
-        let record = &self.record;
+        let record = &self.head.record;
         if record.evaluations_per_s.is_finite() {
             text += &format!(
                 "{} laps evaluated ({:.0} per second) on {}\n",
@@ -300,14 +275,7 @@ impl HybridSummary {
                 record.device()
             );
         }
-        if !record.failures.is_empty() {
-            text += &format!("Laps that failed: {}\n", failures_in_words(&record.failures));
-        }
-        text += &record.notes();
-        for warning in &self.warnings {
-            text += &format!("Note: {warning}\n");
-        }
-        text
+        text + &record.ending("Laps", &self.warnings)
     }
 }
 
@@ -335,21 +303,6 @@ fn sizing_in_words(s: &Sizing) -> String {
     )
 }
 
-/// Writes the car, the line, laps, fronts, figures and the page into `folder`.
-///
-/// # Errors
-/// [`crate::Error::Io`] if one cannot be written.
-pub(super) fn report(
-    folder: &Path,
-    settings: &HybridStudySettings,
-    setup: &HybridSetup,
-    outcome: &Outcome,
-    summary: &HybridSummary,
-) -> Result<()> {
-    files::write(folder, settings, setup, outcome)?;
-    page::write(folder, settings, setup, outcome, summary)
-}
-
 /// The laps that a study tells of.
 fn reported_laps(outcome: &Outcome) -> Vec<&ReportedLap> {
     let mut laps = vec![&outcome.engine];
@@ -358,4 +311,56 @@ fn reported_laps(outcome: &Outcome) -> Vec<&ReportedLap> {
         laps.extend([&o.exact_lap, &o.swarm.lap]);
     }
     laps
+}
+
+/// Writes the car, the line, laps and the front into `folder`.
+///
+/// # Errors
+/// [`crate::Error::Io`] if one cannot be written.
+pub(super) fn write_files(folder: &Path, settings: &HybridStudySettings, outcome: &Outcome) -> Result<()> {
+    let setup = &outcome.setup;
+    setup.car.car.write(folder, "car")?;
+    let (x, y): (Vec<f64>, Vec<f64>) = setup.points_m.iter().map(|p| (p.x, p.y)).unzip();
+    let line = Table::new().numbers("x", "m", x).numbers("y", "m", y);
+    line.write_csv(folder.join("line.csv"))?;
+    for lap in reported_laps(outcome) {
+        write_lap(&folder.join(format!("lap_{}.csv", stem(&lap.name))), setup, lap)?;
+    }
+    if let Some(front) = outcome.optimised.as_ref().and_then(|o| o.swarm_front.as_ref()) {
+        let mut table = Table::rows(front.objectives.iter().zip(&front.candidates));
+        for (k, o) in settings.objectives.iter().enumerate() {
+            table = table.number(o.name(), o.unit(), |(objectives, _)| objectives[k]);
+        }
+        for (k, name) in front.names.iter().enumerate() {
+            table = table.number(name, "-", |(_, candidate)| candidate[k]);
+        }
+        table.table().write_csv(folder.join("front.csv"))?;
+    }
+    Ok(())
+}
+
+/// A lap, segment by segment: place, speed, powers at the wheels, energies, charge, fuel.
+fn write_lap(path: &Path, setup: &HybridSetup, lap: &ReportedLap) -> Result<()> {
+    let each = |f: fn(&SegmentEnergy<f64>) -> f64| lap.segments.iter().map(f).collect::<Vec<f64>>();
+    let power = |f: fn(&SegmentEnergy<f64>) -> f64| power_kw(setup, lap, f);
+    let store = &setup.car.hybrid.store;
+    let change_j = lap.change_j();
+    let soc = change_j[..lap.segments.len()]
+        .iter()
+        .map(|c| store.start_soc + c / store.capacity_j);
+    Table::new()
+        .numbers("station", "m", &lap.station_m)
+        .numbers("v", "m/s", each(|s| s.start.sqrt()))
+        .numbers("time", "s", each(|s| s.time))
+        .numbers("engine_power", "kW", power(|s| s.engine))
+        .numbers("motor_power", "kW", power(|s| s.motor))
+        .numbers("generator_power", "kW", power(|s| s.generator))
+        .numbers("brake_power", "kW", power(|s| s.hydraulic))
+        .numbers("load", "-", each(|s| s.load))
+        .numbers("deployed", "J", each(|s| s.deployed))
+        .numbers("harvested_k", "J", each(|s| s.harvested_k))
+        .numbers("harvested_h", "J", each(|s| s.harvested_h))
+        .numbers("soc", "-", soc.collect::<Vec<f64>>())
+        .numbers("fuel", "kg", each(|s| s.fuel))
+        .write_csv(path)
 }

@@ -1,8 +1,8 @@
 //! Evaluation on a device that may fail: the device is reopened once, then lanes on the processor replace it.
 
-use super::gpu::GpuContext;
-use super::{BackendChoice, BackendInfo, Evaluation, Evaluator, Problem};
+use super::GpuContext;
 use crate::error::{Error, Result};
+use crate::evaluate::{BackendChoice, BackendInfo, Evaluation, Evaluator, Problem};
 
 /// An evaluator on any backend.
 type Boxed<'a> = Box<dyn Evaluator + 'a>;

@@ -4,6 +4,6 @@ mod page;
 mod read;
 
 pub use page::compare;
-pub(crate) use page::overlay;
+pub(crate) use page::{LIMITS, limits, overlay};
 pub(crate) use read::read_table;
 pub use read::{Figure, Run, Trace};

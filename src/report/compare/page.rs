@@ -4,6 +4,7 @@ use super::read::{Run, Trace};
 use crate::error::{Error, Result};
 use crate::report::{Curves, HtmlReport, LapLine, LapView, Panel, Road, Scale, Table, significant};
 use glam::DVec2;
+use std::collections::{HashMap, HashSet};
 
 /// Runs that a page takes at most: more lines than colours cannot be told apart.
 const MOST_RUNS: usize = 24;
@@ -45,42 +46,45 @@ const PANELS: [(&[&str], &str, &str); 7] = [
     (&["steering", "steer"], "steering", "rad"),
 ];
 
+/// A run, and its name on the page.
+type Named<'a> = (String, &'a Run);
+
 /// Lays runs side by side: what they are, their figures, and their laps, limits and convergence over one another.
 ///
 /// # Errors
 /// [`Error::Input`] for no run, or more than can be told apart.
 pub fn compare(runs: &[Run]) -> Result<HtmlReport> {
     if runs.is_empty() || runs.len() > MOST_RUNS {
-        let expected = format!("1 to {MOST_RUNS}");
-        return Err(Error::input(
-            "the command line",
-            "RUN",
-            runs.len().to_string(),
-            expected,
-        ));
+        let (found, expected) = (runs.len().to_string(), format!("1 to {MOST_RUNS}"));
+        return Err(Error::input("the comparison", "runs", found, expected));
     }
-    let names = distinct_names(runs);
-    let title = match names.as_slice() {
-        [one] => one.clone(),
-        [first, second] => format!("{first} beside {second}"),
-        [first, .., last] => format!("{} runs, {first} to {last}", runs.len()),
+    let runs = &named(runs)[..];
+    let title = match runs {
+        [(one, _)] => one.clone(),
+        [(first, _), (second, _)] => format!("{first} beside {second}"),
+        [(first, _), .., (last, _)] => format!("{} runs, {first} to {last}", runs.len()),
         [] => String::new(),
     };
     let mut page = HtmlReport::new("report", &title);
-    head(&mut page, runs, &names);
+    head(&mut page, runs);
     page.section("Runs", "");
-    page.table("What was run", "", &about(runs, &names))?;
+    page.table("What was run", "", &about(runs))?;
     let note = "Units are the endings of the names.";
-    if let Some(table) = figures(runs, &names, true) {
+    if let Some(table) = figures(runs, true) {
         page.table("Headline figures", note, &table)?;
     }
-    laps(&mut page, runs, &names)?;
-    limits(&mut page, runs, &names)?;
-    convergence(&mut page, runs, &names)?;
-    if let Some(table) = figures(runs, &names, false) {
+    laps(&mut page, runs)?;
+    let envelopes = runs.iter().map(|(name, run)| (&**name, run.envelope.as_ref()));
+    let limits = limits("Limits over speed", &LIMITS, envelopes);
+    if !limits.is_empty() {
+        page.section("Limits over speed", "");
+        page.place(&limits)?;
+    }
+    convergence(&mut page, runs)?;
+    if let Some(table) = figures(runs, false) {
         page.folded_table("All other figures", note, &table)?;
     }
-    for (run, name) in runs.iter().zip(&names) {
+    for (name, run) in runs {
         page.provenance(name, run.folder.display().to_string());
         if let Some(settings) = &run.settings {
             page.settings(&format!("study.toml of {name}"), settings);
@@ -89,17 +93,14 @@ pub fn compare(runs: &[Run]) -> Result<HtmlReport> {
     Ok(page)
 }
 
-/// Folders' names, with their paths where two are the same.
-fn distinct_names(runs: &[Run]) -> Vec<String> {
+/// Runs by their folders' names, with their paths where two are the same.
+fn named(runs: &[Run]) -> Vec<Named<'_>> {
     let twice = |name: &str| runs.iter().filter(|r| r.name == name).count() > 1;
-    let named = |r: &Run| {
-        if twice(&r.name) {
-            r.folder.display().to_string()
-        } else {
-            r.name.clone()
-        }
+    let name = |r: &Run| match twice(&r.name) {
+        true => r.folder.display().to_string(),
+        false => r.name.clone(),
     };
-    runs.iter().map(named).collect()
+    runs.iter().map(|run| (name(run), run)).collect()
 }
 
 /// What a study is judged by, where one number says it: its name, words for it, its unit.
@@ -114,50 +115,44 @@ fn verdict(study: &str) -> Option<(&'static str, &'static str, &'static str)> {
     }
 }
 
-fn head(page: &mut HtmlReport, runs: &[Run], names: &[String]) {
-    let mut studies: Vec<&str> = runs.iter().map(|r| r.study.as_str()).collect();
+fn head(page: &mut HtmlReport, runs: &[Named<'_>]) {
+    let mut studies: Vec<&str> = runs.iter().map(|(_, r)| r.study.as_str()).collect();
     studies.sort_unstable();
     studies.dedup();
     for study in studies {
-        let of = || runs.iter().zip(names).filter(|(r, _)| r.study == study);
-        let count = of().count();
-        let plural = if count == 1 { "run" } else { "runs" };
-        let mut sentence = format!("{count} {plural} of {study}");
-        if let Some((figure, words, unit)) = verdict(study) {
-            let told: Vec<String> = of()
-                .filter_map(|(r, name)| {
-                    let value = significant(r.figure(figure)?, 6);
-                    Some(format!("{name} {value} {unit}").trim_end().to_owned())
-                })
-                .collect();
-            if !told.is_empty() {
-                sentence += &format!(", by {words}: {}", told.join(", "));
-            }
-            for (r, name) in of() {
-                if let Some(value) = r.figure(figure) {
-                    page.tile(&format!("{name}, {words}"), significant(value, 6), unit);
-                }
-            }
+        let of: Vec<&Named<'_>> = runs.iter().filter(|(_, r)| r.study == study).collect();
+        let plural = if of.len() == 1 { "run" } else { "runs" };
+        let mut sentence = format!("{} {plural} of {study}", of.len());
+        let judged = verdict(study).into_iter().flat_map(|(figure, words, unit)| {
+            of.iter()
+                .filter_map(move |(name, r)| Some((name, words, significant(r.figure(figure)?, 6), unit)))
+        });
+        for (number, (name, words, value, unit)) in judged.enumerate() {
+            sentence += &if number == 0 {
+                format!(", by {words}: ")
+            } else {
+                ", ".to_owned()
+            };
+            sentence += format!("{name} {value} {unit}").trim_end();
+            page.tile(&format!("{name}, {words}"), value, unit);
         }
         page.sentence(sentence + ".");
     }
-    for (run, name) in runs.iter().zip(names) {
-        if run.said("interrupted") == Some("true") {
-            page.warning(format!(
-                "{name} was interrupted. Its figures are the results that it had reached."
-            ));
-        }
+    for (name, _) in runs.iter().filter(|(_, r)| r.said("interrupted") == Some("true")) {
+        page.warning(format!(
+            "{name} was interrupted. Its figures are the results that it had reached."
+        ));
     }
 }
 
-fn about(runs: &[Run], names: &[String]) -> Table<'static> {
+fn about(runs: &[Named<'_>]) -> Table<'static> {
     let keys = [
         "study", "track", "car", "log", "seed", "backend", "adapter", "driver", "version",
     ];
-    let table = Table::rows(runs.iter().zip(names)).text("run", |(_, name)| *name);
+    let table = Table::rows(runs).text("run", |(name, _)| name);
     let table = keys
         .iter()
-        .fold(table, |t, key| t.text(*key, |(r, _)| r.said(key).unwrap_or("")));
+        .fold(table, |t, key| t.text(*key, |(_, r)| r.said(key).unwrap_or("")));
     table.table().without_empty()
 }
 
@@ -168,21 +163,19 @@ fn is_headline(name: &str) -> bool {
 }
 
 /// The numbers of the summaries: the headlines, or all others; nothing if there are none.
-fn figures(runs: &[Run], names: &[String], headlines: bool) -> Option<Table<'static>> {
-    let mut known = std::collections::HashSet::new();
-    let mut rows: Vec<&str> = Vec::new();
-    let all = runs.iter().flat_map(|r| &r.figures).map(|f| f.name.as_str());
-    rows.extend(all.filter(|name| known.insert(*name) && is_headline(name) == headlines));
-    let by_name: Vec<std::collections::HashMap<&str, f64>> = runs
-        .iter()
-        .map(|r| r.figures.iter().map(|f| (f.name.as_str(), f.value)).collect())
-        .collect();
-    let table = Table::rows(rows).text("figure", |name| *name);
+fn figures(runs: &[Named<'_>], headlines: bool) -> Option<Table<'static>> {
+    let mut known = HashSet::new();
+    let all = runs.iter().flat_map(|(_, r)| &r.figures).map(|f| f.name.as_str());
+    let table = Table::rows(all.filter(|name| known.insert(*name) && is_headline(name) == headlines))
+        .text("figure", |name| *name);
     if table.is_empty() {
         return None;
     }
-    let columns = names.iter().zip(&by_name);
-    let table = columns.fold(table, |table, (name, of)| {
+    let by_name: Vec<HashMap<&str, f64>> = runs
+        .iter()
+        .map(|(_, r)| r.figures.iter().map(|f| (f.name.as_str(), f.value)).collect())
+        .collect();
+    let table = runs.iter().zip(&by_name).fold(table, |table, ((name, _), of)| {
         table.number(name, "", |row| of.get(row).copied())
     });
     // With two runs the difference is what one looks for.
@@ -248,25 +241,25 @@ impl<'a> Lap<'a> {
 /// Lines of one circuit differ by less than this share in length.
 const ONE_CIRCUIT: f64 = 0.06;
 
-fn laps(page: &mut HtmlReport, runs: &[Run], names: &[String]) -> Result<()> {
+fn laps(page: &mut HtmlReport, runs: &[Named<'_>]) -> Result<()> {
     let best: Vec<(&Run, String, &Trace)> = runs
         .iter()
-        .zip(names)
-        .filter_map(|(run, name)| {
+        .filter_map(|(name, run)| {
             let trace = run.traces.first()?;
-            Some((run, format!("{name}: {}", words_of(&trace.name)), trace))
+            Some((*run, format!("{name}: {}", words_of(&trace.name)), trace))
         })
         .collect();
     let Some((first, _, trace)) = best.first() else {
         return Ok(());
     };
-    let length_m = Lap::new(trace).map_or(f64::NAN, |lap| lap.length_m());
-    let track = first.said("track");
-    let alike = |run: &Run, trace: &Trace| {
-        let length = Lap::new(trace).map_or(f64::NAN, |lap| lap.length_m());
-        run.said("track")
-            .is_none_or(|t| track.is_none_or(|first| first == t))
-            && (length / length_m - 1.0).abs() < ONE_CIRCUIT
+    let length_of = |trace| Lap::new(trace).map_or(f64::NAN, |lap| lap.length_m());
+    let (length_m, track) = (length_of(trace), first.said("track"));
+    let alike = |run: &Run, trace| {
+        let other_track = run
+            .said("track")
+            .zip(track)
+            .is_some_and(|(own, first)| own != first);
+        !other_track && (length_of(trace) / length_m - 1.0).abs() < ONE_CIRCUIT
     };
     let one_track = best.iter().all(|(run, _, trace)| alike(run, trace));
     let road = best.iter().find_map(|(run, ..)| run.road.as_ref());
@@ -380,15 +373,14 @@ fn words_of(stem: &str) -> String {
     }
 }
 
-/// A panel of a column over another, a curve for each run that has both.
-fn over(
+/// A panel of a column over another, a curve for each table that has both.
+fn over<'a>(
     panel: Panel,
-    (runs, names): (&[Run], &[String]),
-    of: fn(&Run) -> Option<&Trace>,
+    tables: impl Iterator<Item = (&'a str, Option<&'a Trace>)>,
     [x, y]: [&str; 2],
 ) -> Panel {
-    runs.iter().zip(names).fold(panel, |panel, (run, name)| {
-        let columns = of(run).and_then(|table| table.column(&[x]).zip(table.column(&[y])));
+    tables.fold(panel, |panel, (name, table)| {
+        let columns = table.and_then(|table| table.column(&[x]).zip(table.column(&[y])));
         let sound = |(x, y): &(&[f64], &[f64])| x.len() == y.len() && y.iter().any(|v| v.is_finite());
         match columns.filter(sound) {
             Some((x, y)) => panel.curve(name, x, y),
@@ -397,36 +389,36 @@ fn over(
     })
 }
 
-fn limits(page: &mut HtmlReport, runs: &[Run], names: &[String]) -> Result<()> {
-    let panels = [
-        ("Cornering", "ay_mps2"),
-        ("Braking grip", "ax_grip_mps2"),
-        ("Drive", "ax_drive_mps2"),
-        ("Drag", "drag_mps2"),
-    ];
-    let panels = panels.map(|(title, column)| {
-        let panel = Panel::new(title).x("speed", "m/s").y("acceleration", "m/s\u{b2}");
-        over(panel, (runs, names), |r| r.envelope.as_ref(), ["v_mps", column])
+/// What a g-g-v envelope has over speed: a title, and the name of its column.
+pub(crate) const LIMITS: [(&str, &str); 4] = [
+    ("Cornering", "ay_mps2"),
+    ("Braking grip", "ax_grip_mps2"),
+    ("Drive", "ax_drive_mps2"),
+    ("Drag", "drag_mps2"),
+];
+
+/// Some of the [`LIMITS`] of several envelopes over speed.
+pub(crate) fn limits<'a>(
+    title: &str,
+    of: &[(&str, &str)],
+    envelopes: impl Iterator<Item = (&'a str, Option<&'a Trace>)> + Clone,
+) -> Curves {
+    let panels = of.iter().map(|(title, column)| {
+        let panel = Panel::new(*title)
+            .x("speed", "m/s")
+            .y("acceleration", "m/s\u{b2}");
+        over(panel, envelopes.clone(), ["v_mps", column])
     });
-    let figure = Curves::new("Limits over speed", panels.into_iter().filter(Panel::has_points));
-    if figure.is_empty() {
-        return Ok(());
-    }
-    page.section("Limits over speed", "");
-    page.place(&figure)
+    Curves::new(title, panels.filter(Panel::has_points))
 }
 
-fn convergence(page: &mut HtmlReport, runs: &[Run], names: &[String]) -> Result<()> {
+fn convergence(page: &mut HtmlReport, runs: &[Named<'_>]) -> Result<()> {
     let panel = Panel::new("Cost of the swarms' best")
         .x("candidates evaluated", "")
         .y("cost", "")
         .scales(Scale::Linear, Scale::Log);
-    let panel = over(
-        panel,
-        (runs, names),
-        |r| r.convergence.as_ref(),
-        ["evaluations", "best"],
-    );
+    let tables = runs.iter().map(|(name, run)| (&**name, run.convergence.as_ref()));
+    let panel = over(panel, tables, ["evaluations", "best"]);
     if !panel.has_points() {
         return Ok(());
     }

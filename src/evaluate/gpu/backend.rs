@@ -1,0 +1,128 @@
+//! Kinds of problems on a device, and the evaluator that follows.
+
+use super::{Batching, FallbackEvaluator, GpuContext, devices};
+use crate::error::Result;
+use crate::evaluate::problem_kind::{Checked, candidates, evaluation};
+use crate::evaluate::{BackendChoice, BackendInfo, Evaluation, Evaluator, OutcomeOf, Problem, ProblemKind};
+use std::sync::{Arc, OnceLock};
+
+/// A kind of problem that devices evaluate.
+pub trait OnDevice: ProblemKind {
+    /// The kernel on a device, with its tables and buffers.
+    type Device: DeviceKernel<Self>;
+}
+
+/// The kernel of a kind of problem on a device.
+pub trait DeviceKernel<K: ProblemKind>: Sized {
+    /// The kernel and its tables on `context`'s device.
+    ///
+    /// # Errors
+    /// [`crate::Error::Device`] if the kernel does not compile or the tables do not fit the device.
+    fn open(kind: &K, context: Arc<GpuContext>) -> Result<Self>;
+
+    /// The device.
+    fn context(&self) -> &GpuContext;
+
+    /// How the work is cut.
+    fn batching(&self) -> Batching;
+
+    /// Cuts the work differently.
+    fn cut(&mut self, batching: Batching);
+
+    /// Time that the device itself spent on the last outcomes (ms), where it can tell.
+    fn kernel_ms(&self) -> Option<f64> {
+        None
+    }
+
+    /// The outcomes of candidates.
+    ///
+    /// # Errors
+    /// [`crate::Error::Device`] if the device fails.
+    fn outcomes(&mut self, kind: &K, candidates: &[&[f64]]) -> Result<Vec<K::Outcome>>;
+}
+
+/// The graphics backend: `f32`, one lane per candidate.
+pub struct GpuBackend<'a, K: OnDevice> {
+    pub(in crate::evaluate) kind: &'a K,
+    pub(in crate::evaluate) device: K::Device,
+}
+
+impl<'a, K: OnDevice> GpuBackend<'a, K> {
+    /// An evaluator of `kind` on `context`'s device.
+    ///
+    /// # Errors
+    /// [`crate::Error::Device`] if the kernel does not compile or its tables do not fit the device.
+    pub fn new(kind: &'a K, context: Arc<GpuContext>) -> Result<Self> {
+        Ok(Self {
+            device: K::Device::open(kind, context)?,
+            kind,
+        })
+    }
+
+    /// Cuts the work differently.
+    pub fn with_batching(mut self, batching: Batching) -> Self {
+        self.device.cut(batching);
+        self
+    }
+
+    /// How the work is cut.
+    pub fn batching(&self) -> Batching {
+        self.device.batching()
+    }
+
+    /// The outcomes of candidates.
+    ///
+    /// # Errors
+    /// [`crate::Error::Device`] if the device fails.
+    pub fn outcomes(&mut self, candidates: &[&[f64]]) -> Result<Vec<OutcomeOf<K>>> {
+        let checked = Checked::new(self.kind, candidates);
+        let outcomes = self.device.outcomes(self.kind, &checked.rows)?;
+        Ok(checked.joined(outcomes))
+    }
+}
+
+impl<K: OnDevice> Evaluator for GpuBackend<'_, K> {
+    fn problem(&self) -> &Problem {
+        self.kind.problem()
+    }
+
+    fn backend(&self) -> BackendInfo {
+        self.device.context().backend_info()
+    }
+
+    fn last_kernel_ms(&self) -> Option<f64> {
+        self.device.kernel_ms()
+    }
+
+    fn evaluate(&mut self, population: &[f64]) -> Result<Evaluation> {
+        let candidates = candidates(self.kind.problem(), population);
+        let outcomes = self.outcomes(&candidates)?;
+        Ok(evaluation(self.kind, &candidates, outcomes))
+    }
+}
+
+/// Whether a real GPU is present. Asked once: it wakes every driver.
+pub(in crate::evaluate) fn is_real() -> bool {
+    static PRESENT: OnceLock<bool> = OnceLock::new();
+    *PRESENT.get_or_init(|| devices().iter().any(|d| d.kind.is_real()))
+}
+
+/// The device that would evaluate. It is opened, nothing is compiled.
+pub(in crate::evaluate) fn would_be(adapter: Option<&str>) -> Result<BackendInfo> {
+    Ok(GpuContext::shared(adapter)?.backend_info())
+}
+
+/// An evaluator of `kind` on a device, which `lanes` take over from.
+pub(in crate::evaluate) fn open<'a, K: OnDevice>(
+    kind: &'a K,
+    (choice, adapter): (BackendChoice, Option<&str>),
+    lanes: impl Fn() -> Box<dyn Evaluator + 'a> + 'a,
+) -> Result<Box<dyn Evaluator + 'a>> {
+    let name = adapter.map(str::to_owned);
+    let open = move || -> Result<Box<dyn Evaluator + 'a>> {
+        let context = GpuContext::shared(name.as_deref())?;
+        Ok(Box::new(GpuBackend::new(kind, context)?))
+    };
+    let evaluator = FallbackEvaluator::new(kind.problem(), (choice, adapter), open, lanes)?;
+    Ok(Box::new(evaluator))
+}

@@ -1,0 +1,150 @@
+//! How fast a car's own motions are, and so how fine the steps must be with which it is integrated.
+
+use super::car::CarParameter;
+use super::chassis::BodyState;
+use super::model::{CarInput, CarModel, CarState, wheel_speeds};
+use super::tyre::{LinearTyre, MagicFormula, Tyre, TyreModel};
+use nalgebra::Matrix6;
+
+/// The greatest product of a mode's rate and the step, by which classical Runge-Kutta steps go. The method is stable up to 2.78
+/// on the negative real axis and 2.82 on the imaginary one; the rest is a margin for a car that corners.
+pub const STABLE_STEP: f64 = 2.4;
+
+/// The greatest magnitude (1/s) of the eigenvalues of a car that rolls straight ahead at `speed` (m/s), its wheels free of slip:
+/// tyres, roll and the pitch lag. `flat` is the car in flat form ([`super::Car::to_flat`]). Not finite for figures that are no car.
+pub fn fastest_mode(flat: &[f64], tyre: TyreModel, speed: f64) -> f64 {
+    match tyre {
+        TyreModel::MagicFormula => fastest::<MagicFormula<f64>>(flat, speed),
+        TyreModel::Linear => fastest::<LinearTyre<f64>>(flat, speed),
+    }
+}
+
+fn fastest<T: Tyre<f64>>(flat: &[f64], speed: f64) -> f64 {
+    let car = CarModel::<f64, T>::from_parameters(|i| flat[i]);
+    let state = |x: [f64; 6]| CarState {
+        body: BodyState {
+            vx: x[0],
+            vy: x[1],
+            yaw_rate: x[2],
+            roll: x[3],
+            roll_rate: x[4],
+        },
+        pitch_acceleration: x[5],
+    };
+    let straight = [speed, 0.0, 0.0, 0.0, 0.0, 0.0];
+    let input = CarInput {
+        wheel_speed: wheel_speeds(&car.chassis, &state(straight).body, (1.0, 0.0), [0.0; 2]),
+        steer: 0.0,
+    };
+    let rate = |x: [f64; 6]| {
+        let rate = car.rate(&state(x), &input).state;
+        let body = rate.body;
+        [
+            body.vx,
+            body.vy,
+            body.yaw_rate,
+            body.roll,
+            body.roll_rate,
+            rate.pitch_acceleration,
+        ]
+    };
+    // Central differences: a state's unit is a tenth or more of what the car has in a corner.
+    let step = 1e-5;
+    let mut jacobian = Matrix6::zeros();
+    for k in 0..6 {
+        let [mut above, mut below] = [straight; 2];
+        above[k] += step;
+        below[k] -= step;
+        let (above, below) = (rate(above), rate(below));
+        for row in 0..6 {
+            jacobian[(row, k)] = (above[row] - below[row]) / (2.0 * step);
+        }
+    }
+    if !jacobian.iter().all(|x| x.is_finite()) {
+        return f64::NAN;
+    }
+    jacobian
+        .complex_eigenvalues()
+        .iter()
+        .map(|x| x.norm())
+        .fold(0.0, f64::max)
+}
+
+/// The greatest [`fastest_mode`] among the cars whose parameters lie between bounds: each parameter stands at the bound that
+/// makes the car faster.
+pub fn fastest_mode_within(
+    flat: &[f64],
+    tyre: TyreModel,
+    free: &[(CarParameter, f64, f64)],
+    speed: f64,
+) -> f64 {
+    let at = |car: &mut [f64], parameter: &CarParameter, value: f64| {
+        for &slot in &parameter.slots {
+            car[slot] = value;
+        }
+    };
+    let mut fastest = flat.to_vec();
+    for (parameter, lower, upper) in free {
+        let mode = |value: f64| {
+            let mut car = flat.to_vec();
+            at(&mut car, parameter, value);
+            fastest_mode(&car, tyre, speed)
+        };
+        at(
+            &mut fastest,
+            parameter,
+            if mode(*lower) > mode(*upper) {
+                *lower
+            } else {
+                *upper
+            },
+        );
+    }
+    fastest_mode(flat, tyre, speed).max(fastest_mode(&fastest, tyre, speed))
+}
+
+/// Runge-Kutta steps in which a car with modes up to `fastest` (1/s) is integrated over `interval_s` (s): one at least.
+pub fn stable_steps(interval_s: f64, fastest: f64) -> usize {
+    (interval_s * fastest / STABLE_STEP).ceil().max(1.0) as usize
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::vehicle::Car;
+
+    fn mode(change: impl Fn(&mut Car), speed: f64) -> f64 {
+        let mut car = Car::load("gt").unwrap();
+        change(&mut car);
+        fastest_mode(&car.to_flat(), car.tyre_model(), speed)
+    }
+
+    #[test]
+    fn slow_cars_and_stiff_springs_are_fast_modes() {
+        let pitch = 1.0 / Car::load("gt").unwrap().chassis.pitch_lag;
+        // The tyres hold a car the faster, the slower it goes.
+        assert!(mode(|_| (), 5.0) > 1.5 * mode(|_| (), 10.0));
+        // At speed the pitch lag is the fastest; only half of it may go by the share of the tyres' load transfer.
+        assert!((mode(|_| (), 70.0) / pitch - 1.0).abs() < 0.5);
+        // A spring a hundred times as stiff is a mode ten times as fast, once it is the fastest of all.
+        let stiff = |factor: f64| mode(|car| car.chassis.roll_stiffness *= factor, 40.0);
+        let ratio = stiff(1e6) / stiff(1e4);
+        assert!((ratio - 10.0).abs() < 0.5, "{ratio}");
+    }
+
+    #[test]
+    fn bounds_are_tried_at_both_ends() {
+        let car = Car::load("gt").unwrap();
+        let mass = car.known_parameter("test", "free", "mass_kg").unwrap();
+        let (flat, tyre) = (car.to_flat(), car.tyre_model());
+        let within = |lower, upper| fastest_mode_within(&flat, tyre, &[(mass.clone(), lower, upper)], 5.0);
+        // Half the mass is held the faster by the same tyres.
+        assert!(
+            within(0.5 * car.chassis.mass, car.chassis.mass)
+                > 1.2 * within(car.chassis.mass, car.chassis.mass)
+        );
+        assert_eq!(stable_steps(0.02, 100.0), 1);
+        assert_eq!(stable_steps(0.02, 130.0), 2);
+        assert_eq!(stable_steps(0.02, 0.0), 1);
+    }
+}
