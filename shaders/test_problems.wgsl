@@ -1,5 +1,6 @@
-// Twin of `src/swarm/problems/zdt.rs`, `dtlz.rs` and `single.rs`: the test problems, one lane to a candidate. `PROBLEM` is
-// generated. With `elementary.wgsl`. Drivers move literals to the outside of sums, so they are written there.
+// Twin of `src/swarm/problems/zdt.rs`, `dtlz.rs` and `single.rs`: the test problems, one lane to a candidate. `PROBLEM` and
+// `FACTOR` are generated. With `elementary.wgsl`. Drivers move literals to the outside of sums, so they are written
+// there.
 
 struct Task {
     candidates: u32,
@@ -32,7 +33,7 @@ fn x(v: u32) -> f32 {
 }
 
 fn give(k: u32, value: f32) {
-    objectives[(who / 64u * task.objectives + k) * 64u + who % 64u] = value;
+    objectives[(who / 64u * task.objectives + k) * 64u + who % 64u] = value * FACTOR;
 }
 
 fn sin_pi(x: f32) -> f32 {

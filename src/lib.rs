@@ -18,12 +18,20 @@
 //! Energy Management in Hybrid Race Vehicles* (Lancaster University, 2020); figures in round brackets are the numbers of its
 //! equations. *The book* is the documentation in `book/` of the repository.
 //!
+//! One call minimises a function of your own, see [`minimise`], [`minimise_several`] and [`minimise_batch`]:
+//!
+//! ```
+//! let found = lapswarm::minimise(&[(-2.0, 3.0); 2], |x| (x[0] - 1.0).powi(2) + x[1] * x[1]).evaluations(8_000).run()?;
+//! assert!(found.best().is_some_and(|(x, cost)| cost < 1e-12 && (x[0] - 1.0).abs() < 1e-6));
+//! # Ok::<(), lapswarm::Error>(())
+//! ```
+//!
 //! A problem of your own, asked and told by hand: the front between being near zero and being near one.
 //!
 //! ```
 //! use lapswarm::evaluate::point::{CallCost, PointEvaluator};
 //! use lapswarm::evaluate::{Evaluator, Objective, Problem, Variable};
-//! use lapswarm::swarm::{Mopso, MopsoSettings, Optimiser, PsoSettings};
+//! use lapswarm::swarm::{Mopso, MopsoSettings, Optimiser};
 //!
 //! let problem = Problem {
 //!     variables: vec![Variable::new("x", "m", -2.0, 3.0), Variable::new("y", "m", -2.0, 3.0)],
@@ -33,11 +41,7 @@
 //!     f[0] = x.iter().map(|x| x * x).sum();
 //!     f[1] = x.iter().map(|x| (x - 1.0) * (x - 1.0)).sum();
 //! });
-//! let settings = MopsoSettings {
-//!     motion: PsoSettings { population: 40, iterations: 60, ..MopsoSettings::default().motion },
-//!     archive: 20,
-//!     ..MopsoSettings::default()
-//! };
+//! let settings = MopsoSettings { archive: 20, ..MopsoSettings::default() }.with_size(40, 60);
 //! let mut swarm = Mopso::new(&problem, settings)?;
 //! while !swarm.done() {
 //!     let candidates = swarm.ask();

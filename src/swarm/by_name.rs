@@ -132,17 +132,13 @@ pub fn several_by_name(
     start: &[Vec<f64>],
 ) -> Result<Box<dyn Optimiser + Send>> {
     let mopso = |settings: MopsoSettings| -> Result<Box<dyn Optimiser + Send>> {
-        let motion = PsoSettings {
-            population: sizes.population,
-            iterations: sizes.iterations,
-            seed: sizes.seed,
-            ..settings.motion
-        };
         let settings = MopsoSettings {
-            motion,
             archive: sizes.archive,
             ..settings
         };
+        let settings = settings
+            .with_size(sizes.population, sizes.iterations)
+            .with_seed(sizes.seed);
         let mut swarm = Mopso::new(problem, settings)?;
         swarm.start_from(start)?;
         Ok(Box::new(swarm))

@@ -29,7 +29,7 @@ const FRONT_POINTS: usize = 2000;
 /// The optimiser of that name for `problem` at the budget of the comparison.
 ///
 /// # Errors
-/// Those of [`by_name`].
+/// Those of [`by_name()`].
 pub fn optimiser(name: &str, problem: &Problem, seed: u64) -> Result<Box<dyn Optimiser + Send>> {
     let (population, evaluations) = budget(problem);
     let sizes = Sizes {

@@ -278,6 +278,20 @@ impl MopsoSettings {
         }
     }
 
+    /// The same with so many particles and iterations.
+    #[must_use]
+    pub fn with_size(mut self, population: usize, iterations: usize) -> Self {
+        (self.motion.population, self.motion.iterations) = (population, iterations);
+        self
+    }
+
+    /// The same from this seed.
+    #[must_use]
+    pub fn with_seed(mut self, seed: u64) -> Self {
+        self.motion.seed = seed;
+        self
+    }
+
     /// The thesis's swarm: its [`PsoSettings::thesis`], mutation with `mu` 0.3.
     pub fn thesis() -> Self {
         Self {

@@ -86,7 +86,7 @@ fn kernels() -> Vec<(&'static str, String)> {
     for entry in ["variables_of_positions", "objectives_of_figures"] {
         kernels.push((entry, line_swarm()));
     }
-    kernels.extend((0..NAMES.len() as u32).map(|number| ("test_problem", test_problem(number))));
+    kernels.extend((0..NAMES.len() as u32).map(|number| ("test_problem", test_problem(number, 1.5e30))));
     kernels
 }
 

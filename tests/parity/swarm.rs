@@ -6,7 +6,7 @@ use lapswarm::Result;
 use lapswarm::evaluate::gpu::shader::{ELEMENTARY, random};
 use lapswarm::evaluate::gpu::{Binding, GpuContext, Kernel};
 use lapswarm::evaluate::simd::InstructionSet;
-use lapswarm::evaluate::{Evaluator, Objective, Problem, Variable};
+use lapswarm::evaluate::{Evaluator, Failure, Objective, Problem, Variable};
 use lapswarm::parity::Subject;
 use lapswarm::random::philox;
 use lapswarm::scalar::elementary::{ln, power};
@@ -21,6 +21,8 @@ tests! {
     the_device_takes_the_same_powers: device,
     test_problems_are_the_same_everywhere: also_device,
     swarms_in_lanes_and_on_the_device_in_lockstep: device,
+    a_swarm_on_the_device_takes_costs_of_any_size: device,
+    a_swarm_on_the_device_counts_what_is_beyond_single_precision: device,
     swarms_on_the_device_keep_the_knee_of_a_front_with_long_tails: device,
 }
 
@@ -237,6 +239,72 @@ fn swarms_in_lanes_and_on_the_device_in_lockstep() {
         );
         assert!((here - there).abs() < 2e-3, "{name}: {here} and {there}");
     }
+}
+
+fn on_the_device(test: &TestProblem, context: &Arc<GpuContext>, generations: usize) -> DeviceMopso {
+    let settings = MopsoSettings::default().with_size(1000, generations);
+    DeviceMopso::new(test.problem(), settings, Arc::clone(context)).unwrap()
+}
+
+/// A power of two changes no digit: every figure of the front is that many times as large, to the last bit.
+fn a_swarm_on_the_device_takes_costs_of_any_size() {
+    let context = the_device();
+    let front = |factor: f32| {
+        let test = TestProblem::sized("zdt1", 8).unwrap().times(factor);
+        let mut swarm = on_the_device(&test, &context, 15);
+        let mut judge = GpuTestEvaluator::new(&test, Arc::clone(&context)).unwrap();
+        let mut failed = 0;
+        swarm
+            .run(&mut judge, |progress| {
+                failed += progress.failed;
+                std::ops::ControlFlow::Continue(())
+            })
+            .unwrap();
+        assert_eq!(failed, 0);
+        assert!(swarm.front().is_feasible() && swarm.front().objectives.len() > 20);
+        swarm.front()
+    };
+    let usual = front(1.0);
+    for factor in [2f32.powi(-30), 2f32.powi(31), 2f32.powi(50), 2f32.powi(120)] {
+        let found = front(factor);
+        let times = |row: &Vec<f64>| row.iter().map(|f| f * f64::from(factor)).collect();
+        let expected: Vec<Vec<f64>> = usual.objectives.iter().map(times).collect();
+        assert_eq!(found.objectives, expected, "times {factor}");
+        assert_eq!(found.candidates, usual.candidates, "times {factor}");
+    }
+}
+
+/// Half of what ZDT1 can cost is beyond the greatest float here.
+fn a_swarm_on_the_device_counts_what_is_beyond_single_precision() {
+    let context = the_device();
+    let test = TestProblem::sized("zdt1", 8).unwrap().times(2f32.powi(126));
+    let mut swarm = on_the_device(&test, &context, 15);
+    assert_eq!(swarm.best(), [f64::INFINITY; 2]);
+    let mut judge = GpuTestEvaluator::new(&test, Arc::clone(&context)).unwrap();
+    let candidates = swarm.candidates().unwrap();
+    let there = judge.evaluate(&candidates).unwrap();
+    let expected = there.failures.iter().flatten().count();
+    let progress = swarm.step(&mut judge).unwrap();
+    assert!((50..950).contains(&expected), "{expected}");
+    // Candidates are rounded on their way here and back, which may turn the last digit of one on the edge.
+    assert!(
+        progress.failed.abs_diff(expected) <= 1,
+        "{} and {expected}",
+        progress.failed
+    );
+    assert_eq!(
+        progress.failures["objective_beyond_single_precision"],
+        progress.failed as u64
+    );
+    assert!(there.failures.contains(&Some(Failure::BeyondSinglePrecision)));
+    let best = progress.best;
+    assert!(best.iter().all(|x| x.is_finite()), "{best:?}");
+    let start = [vec![0.5; 3]];
+    let said = swarm.start_from(&start).unwrap_err().to_string();
+    assert!(
+        said.contains("candidate 1") && said.contains("3 values"),
+        "{said}"
+    );
 }
 
 /// 10^u and 10^-u, u from -4 to 4.

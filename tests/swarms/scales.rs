@@ -6,8 +6,8 @@ use lapswarm::swarm::comparison::optimiser;
 use lapswarm::swarm::metrics::hypervolume;
 use lapswarm::swarm::problems::TestProblem;
 use lapswarm::swarm::{
-    Front, MANY, Mopso, MopsoSettings, Nsga2, Nsga2Settings, Optimiser, PsoSettings, SINGLE_OBJECTIVE,
-    WindowSettings, WindowSwarm, run,
+    Front, MANY, Mopso, MopsoSettings, Nsga2, Nsga2Settings, Optimiser, SINGLE_OBJECTIVE, WindowSettings,
+    WindowSwarm, run,
 };
 use std::ops::ControlFlow;
 
@@ -21,13 +21,11 @@ fn problem(variables: usize, objectives: usize) -> Problem {
 }
 
 fn mopso(problem: &Problem, population: usize, iterations: usize) -> Mopso {
-    let default = MopsoSettings::default();
-    let motion = PsoSettings {
-        population,
-        iterations,
-        ..default.motion
-    };
-    Mopso::new(problem, MopsoSettings { motion, ..default }).unwrap()
+    Mopso::new(
+        problem,
+        MopsoSettings::default().with_size(population, iterations),
+    )
+    .unwrap()
 }
 
 /// The swarms for several objectives.

@@ -38,7 +38,8 @@ pub fn line_swarm() -> String {
 
 /// Source of the kernel of the test problem of that number among
 /// [`crate::swarm::problems::NAMES`]; entry point `test_problem`.
-pub fn test_problem(number: u32) -> String {
-    let constants = format!("\n// Generated.\nconst PROBLEM: u32 = {number}u;\n\n");
+pub fn test_problem(number: u32, factor: f32) -> String {
+    let constants =
+        format!("\n// Generated.\nconst PROBLEM: u32 = {number}u;\nconst FACTOR: f32 = {factor:e}f;\n\n");
     [ELEMENTARY, &constants, TEST_PROBLEMS].concat()
 }

@@ -53,7 +53,7 @@ impl<'a> GpuTestEvaluator<'a> {
     /// [`Error::Device`] if the kernel does not compile.
     pub fn new(test: &'a TestProblem, context: Arc<GpuContext>) -> Result<Self> {
         use Binding::{Read, Uniform, Write};
-        let source = test_problem(test.function as u32);
+        let source = test_problem(test.function as u32, test.factor);
         let kernel = context.kernel(&source, "test_problem", &[Uniform, Read, Read, Write])?;
         let mut free = 0;
         let variables = test.problem.variables.iter().enumerate();

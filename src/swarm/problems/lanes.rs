@@ -46,6 +46,8 @@ impl LaneWork for Part<'_> {
                 *x = value - L::lit(shift);
             }
             self.test.function.evaluate(&x, &mut f);
+            f.iter_mut()
+                .for_each(|f| *f = *f * L::lit(f64::from(self.test.factor)));
             let mut column = [0.0; MOST_LANES];
             for (k, lanes) in f.iter().enumerate() {
                 lanes.write(&mut column);

@@ -31,6 +31,8 @@ pub struct TestProblem {
     function: Function,
     /// Taken off a candidate before it is evaluated: where the optimum lies, or nothing.
     shift: Vec<f64>,
+    /// What the objectives are multiplied by.
+    factor: f32,
     front: fn(usize) -> Vec<Vec<f64>>,
 }
 
@@ -151,8 +153,14 @@ impl TestProblem {
             },
             function,
             shift: Vec::new(),
+            factor: 1.0,
             front,
         }
+    }
+
+    /// The same with objectives `factor` times as large, on every backend.
+    pub fn times(self, factor: f32) -> Self {
+        Self { factor, ..self }
     }
 
     /// Its name.
@@ -167,7 +175,13 @@ impl TestProblem {
 
     /// About `count` points of the true front, evenly over it; the least value for a single objective.
     pub fn front(&self, count: usize) -> Vec<Vec<f64>> {
-        (self.front)(count)
+        let mut front = (self.front)(count);
+        self.enlarge(front.iter_mut().flatten());
+        front
+    }
+
+    fn enlarge<'a>(&self, objectives: impl Iterator<Item = &'a mut f64>) {
+        objectives.for_each(|f| *f *= f64::from(self.factor));
     }
 
     /// Where the optimum of a single-objective problem lies; nothing for the others.
@@ -178,10 +192,12 @@ impl TestProblem {
     /// Writes the objectives of `candidate`.
     pub fn evaluate(&self, candidate: &[f64], objectives: &mut [f64]) {
         if self.shift.is_empty() {
-            return self.function.evaluate(candidate, objectives);
+            self.function.evaluate(candidate, objectives);
+        } else {
+            let moved: Vec<f64> = candidate.iter().zip(&self.shift).map(|(x, s)| x - s).collect();
+            self.function.evaluate(&moved, objectives);
         }
-        let moved: Vec<f64> = candidate.iter().zip(&self.shift).map(|(x, s)| x - s).collect();
-        self.function.evaluate(&moved, objectives);
+        self.enlarge(objectives.iter_mut());
     }
 
     /// An evaluator on one thread.
