@@ -191,25 +191,3 @@ fn limits_hold_for_turns_to_both_sides() {
         assert_eq!((even.row.ay_mps2, even.right_mps2), (left(even), left(even)));
     }
 }
-
-#[test]
-fn speeds_without_a_steady_state_are_left_out() {
-    // Nearly all the grip in front and no understeer from the tyres: beyond its critical speed the car has no steady bend.
-    let mut car = bundled_car();
-    (car.chassis.cg_to_front, car.chassis.cg_to_rear) = (2.2, 0.4);
-    car.chassis.aero_balance_front = 0.7;
-    let found = car_limits(&car, &EnvelopeSettings::default());
-    match found {
-        Ok(limits) => {
-            let rows = limits.envelope.rows();
-            assert!(rows.iter().all(|row| row.ay_mps2 > 0.0 && row.ax_grip_mps2 > 0.0));
-            assert!(
-                limits
-                    .left_out_mps
-                    .iter()
-                    .all(|v| rows.iter().all(|row| row.v_mps != *v))
-            );
-        }
-        Err(error) => assert!(error.to_string().contains("no steady state in bends"), "{error}"),
-    }
-}
