@@ -221,7 +221,8 @@ impl Mutation {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MopsoSettings {
     /// The motion's settings. A difference move goes from an archive member along the difference of two others
-    /// \[7\].
+    /// \[7\]. A swarm that is told one candidate after the other takes their share as where to begin: it makes more or fewer of
+    /// them by what they earn. A share of zero or one stays.
     pub motion: PsoSettings,
     /// Most members of the archive.
     pub archive: usize,
@@ -237,8 +238,8 @@ pub struct MopsoSettings {
 }
 
 impl Default for MopsoSettings {
-    /// The best found for two and three objectives over the test problems: the motion of SMPSO, a quarter of
-    /// difference moves, and an archive by contribution.
+    /// The best found for two and three objectives over the test problems: the motion of SMPSO, some difference
+    /// moves, and an archive by contribution.
     fn default() -> Self {
         let smpso = Self::smpso();
         Self {

@@ -1,5 +1,6 @@
 //! The small swarm: double precision, one particle after the other.
 
+use super::earnings::Earnings;
 use crate::error::Result;
 use crate::evaluate::{Evaluation, Problem};
 use crate::random::Random;
@@ -21,6 +22,7 @@ pub(super) struct SmallSwarm {
     best_objectives: Vec<Vec<f64>>,
     best_violation: Vec<f64>,
     archive: Archive,
+    earnings: Earnings,
     counters: Counters,
 }
 
@@ -40,6 +42,7 @@ impl SmallSwarm {
             random,
             particles,
             settings,
+            earnings: Earnings::default(),
             counters: Counters::default(),
         })
     }
@@ -150,6 +153,7 @@ impl SmallSwarm {
     fn advance(&mut self) {
         let share = self.counters.iteration as f64 / (self.settings.motion.iterations.max(2) - 1) as f64;
         let worth = self.archive.worth();
+        let differences = self.earnings.share(self.settings.motion.difference_share);
         for particle in 0..self.settings.motion.population {
             if self.archive.is_empty() {
                 // Nobody knows anything yet.
@@ -157,7 +161,7 @@ impl SmallSwarm {
                     .rescatter(particle, self.counters.iteration, self.random);
             } else {
                 let leader = self.leader(&worth, particle);
-                if self.coin(Purpose::Recombine, particle) < self.settings.motion.difference_share {
+                if self.coin(Purpose::Recombine, particle) < differences {
                     self.difference_move(particle, leader);
                 } else {
                     let own = &self.best_position[self.particles.row(particle)];
@@ -193,6 +197,10 @@ impl Optimiser for SmallSwarm {
 
     fn tell(&mut self, evaluation: &Evaluation) -> Result<()> {
         evaluation.check(self.particles.count, self.objectives)?;
+        // Nobody moved towards anything yet.
+        let scattered = self.archive.is_empty() || self.counters.iteration == 0;
+        let differences = self.earnings.share(self.settings.motion.difference_share);
+        self.earnings.fade();
         for particle in 0..self.particles.count {
             let Some(row) = evaluation.success(particle, self.objectives) else {
                 continue;
@@ -200,7 +208,15 @@ impl Optimiser for SmallSwarm {
             let range = self.particles.row(particle);
             let position = &self.particles.position[range.clone()];
             let violation = evaluation.violation(particle);
-            self.archive.insert_violating(position, row, violation);
+            let (members, level) = (self.archive.len(), self.archive.violation());
+            let entered = self.archive.insert_violating(position, row, violation);
+            if !scattered {
+                // It takes no more room than what it dominates, and leaves some.
+                let room = self.archive.len() <= members && self.archive.len() < self.settings.archive;
+                let earned = entered && (room || self.archive.violation() < level);
+                let difference = self.coin(Purpose::Recombine, particle) < differences;
+                self.earnings.count(difference, earned);
+            }
             let heads = self.coin(Purpose::Coin, particle) < 0.5;
             let best = &mut self.best_objectives[particle];
             let least = self.best_violation[particle];
