@@ -204,7 +204,13 @@ mod tests {
                 continue;
             }
             let text = fs::read_to_string(&path).expect("a source");
-            let program = text.split("#[cfg(test)]\nmod tests {").next().unwrap_or_default();
+            let tests = [
+                "#[cfg(test)]\nmod tests {",
+                "#[cfg(test)]\npub(crate) mod testing {",
+            ];
+            let program = tests.iter().fold(text.as_str(), |program, start| {
+                program.split(start).next().unwrap_or_default()
+            });
             for line in program.lines() {
                 let writes = ["fs::write(", "File::create", "fs::copy(", "create_new("]
                     .iter()

@@ -59,6 +59,7 @@ pub use covariance::{CovarianceSettings, CovarianceSwarm, OutOfBounds, Restarts}
 pub use difference::{DifferenceSettings, DifferenceSwarm};
 pub use islands::{AcceptsMigrants, Islands, Migration};
 pub use minimise::{Indicators, Minimise, Minimum, Stopped, minimise, minimise_batch, minimise_several};
+#[cfg(feature = "studies")]
 pub(crate) use mopso::thinning::PER_PLACE;
 pub use mopso::{Generation, MANY, Mopso};
 pub use nsga2::{Nsga2, Nsga2Settings};

@@ -276,7 +276,7 @@ mod tests {
         let mut broken = log.clone();
         broken.ax_mps2[3] = f64::NAN;
         let error = render(&broken, Path::new("a.csv"), &format).unwrap_err();
-        assert!(error.to_string().contains("column ax_mps2, sample 3: found NaN"));
+        assert!(error.to_string().contains("sample 3, column ax_mps2: found NaN"));
     }
 
     #[test]

@@ -271,7 +271,7 @@ mod tests {
         assert!(
             error
                 .to_string()
-                .contains("channel Lap Number, t = 2.000 s: found 4.5"),
+                .contains("t = 2.000 s, channel Lap Number: found 4.5"),
             "{error}"
         );
     }

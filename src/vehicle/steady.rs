@@ -94,6 +94,8 @@ const LONGEST_STEP: f64 = 0.7;
 const SHORTEST_STEP: f64 = 1e-4;
 /// Most points of a curve.
 const MOST_POINTS: usize = 2000;
+/// A step this short or shorter may turn the curve sharply.
+const KINK: f64 = 0.01;
 /// Sideslip at which a car counts as standing across the road (rad).
 const GREATEST_SIDESLIP: f64 = 0.5;
 /// The curve is left where lateral acceleration has fallen to this share of its peak.
@@ -266,13 +268,14 @@ const GREATEST_SLIP: f64 = 0.4;
 
 impl<T: Tyre<f64>, D: Tyre<Exact>> SteadyCar for Ready<T, D> {
     fn cornering(&self, speed: f64, greatest_steer: f64, turn: Turn) -> Vec<Trim> {
-        // Straight running is no steering. Near its critical speed, a car whose sides differ answers to that with a bend: there it
-        // is no yaw rate, whatever the steering.
+        // Straight running. A car with even sides needs no steering for it. Another may answer to no steering with a bend, and near
+        // its critical speed with none that can be found: it starts without a yaw rate, whatever the steering.
         let held = |unknown: usize| {
             let direction = Point::from_fn(|i, _| f64::from(i == unknown));
             self.solve(speed, &Point::zeros(), &direction)
         };
-        let Some((mut point, mut tangent)) = held(4).or_else(|| held(1)) else {
+        let unsteered = held(4).filter(|(point, _)| point[1].abs() < 1e-6);
+        let Some((mut point, mut tangent)) = unsteered.or_else(|| held(1)) else {
             return Vec::new();
         };
         // A left turn has a yaw rate to the left, whatever the steering does.
@@ -290,7 +293,7 @@ impl<T: Tyre<f64>, D: Tyre<Exact>> SteadyCar for Ready<T, D> {
             };
             // Two tangents at more than a right angle belong to two branches, not to one step along a curve.
             let ahead = direction.dot(&tangent);
-            if ahead.abs() < 0.9 {
+            if ahead.abs() < if length > KINK { 0.9 } else { 0.1 } {
                 length *= 0.5;
                 continue;
             }

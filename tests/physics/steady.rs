@@ -182,11 +182,12 @@ fn limits_hold_for_turns_to_both_sides() {
     let left = |s: &SpeedLimits| s.cornering.iter().map(|t| t.ay_mps2).fold(0.0, f64::max);
     let (light, heavy, even) = (limits_of(0.4), limits_of(0.6), limits_of(0.5));
     for ((light, heavy), even) in light.iter().zip(&heavy).zip(&even) {
-        // The one car is the other's mirror image. Both curves are followed in the same steps.
-        assert!((left(light) / heavy.right_mps2 - 1.0).abs() < 1e-6, "{light:?}");
-        assert!((light.right_mps2 / left(heavy) - 1.0).abs() < 1e-6, "{light:?}");
-        // The side that carries less to begin with is the outer one where the car corners best.
-        assert!((left(light) - light.right_mps2).abs() > 0.1, "{light:?}");
+        // The one car is the other's mirror image. Points of a curve lie up to 1.4 m/s^2 apart: near its flat top that is 0.5 %.
+        let apart = |a: f64, b: f64| (a / b - 1.0).abs();
+        assert!(apart(left(light), heavy.right_mps2) < 0.005, "{:?}", light.row);
+        assert!(apart(light.right_mps2, left(heavy)) < 0.005, "{:?}", light.row);
+        // Turning towards the lighter side lifts the inner wheels sooner.
+        assert!(light.right_mps2 - left(light) > 0.1, "{:?}", light.row);
         assert_eq!(light.row.ay_mps2, left(light).min(light.right_mps2));
         assert_eq!((even.row.ay_mps2, even.right_mps2), (left(even), left(even)));
     }

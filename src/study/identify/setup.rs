@@ -10,7 +10,7 @@ use crate::study::framework::{Plan, Subject};
 use crate::telemetry::{ChannelMap, Log, LogOptions, NativeFormat, Recording};
 use crate::track::{Circuit, Track};
 use crate::vehicle::Car;
-use crate::vehicle::modes::{fastest_mode_within, stable_steps};
+use crate::vehicle::modes::{fastest_mode, stable_steps};
 use std::path::Path;
 
 /// Number of compared channels.
@@ -88,9 +88,9 @@ pub fn set_up(settings: &IdentifySettings) -> Result<Setup> {
         .map(|s| s.measured[0])
         .fold(f64::INFINITY, f64::min);
     let free = free_parameters(settings, &car)?;
-    // As fine as the stiffest car within the bounds needs it at the slowest place.
+    // As fine as the car that the search starts from needs it at the slowest place.
     let substeps = settings.substeps.unwrap_or_else(|| {
-        let fastest = fastest_mode_within(&car.to_flat(), car.tyre_model(), &free, slowest.max(1.0));
+        let fastest = fastest_mode(&car.to_flat(), car.tyre_model(), slowest.max(1.0));
         stable_steps(log.dt_s, fastest)
     });
     let scales = channel_scales(&samples, &fit_windows);

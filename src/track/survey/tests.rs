@@ -276,7 +276,10 @@ fn a_motec_export_with_gps_becomes_a_line() {
         "m.csv",
         &wide(),
     );
-    assert!(text.contains("GPS Latitude, unit"), "{text}");
+    assert!(
+        text.contains("channel GPS Latitude: found \"V\", expected deg, rad or min"),
+        "{text}"
+    );
 }
 
 #[test]
