@@ -127,6 +127,16 @@ pub fn simulate_lap(car: &Car, circuit: &Circuit, settings: &SimulateSettings) -
         .max(1.0);
     let needed = stable_steps(interval, fastest_mode(&flat, car.tyre_model(), slowest));
     let substeps = settings.substeps.unwrap_or(needed);
+    if substeps < needed {
+        return Err(Error::input(
+            "simulate",
+            "substeps",
+            format!("{substeps} at {} Hz", settings.rate_hz),
+            format!(
+                "{needed} or more: the car's own motions at {slowest:.1} m/s are too fast for longer steps"
+            ),
+        ));
+    }
     let plan = Plan {
         samples: samples.clone(),
         windows: vec![window],

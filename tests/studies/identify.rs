@@ -213,7 +213,7 @@ fn a_log_of_any_rate_is_of_the_lap_that_was_driven() {
     // One step per sample is too long for the car's modes at 25 Hz.
     let lost = logged(25.0, Some(1)).unwrap_err().to_string();
     assert!(
-        lost.contains("leaves the lap") || lost.contains("is lost"),
+        lost.contains("substeps: found 1 at 25 Hz, expected 2 or more"),
         "{lost}"
     );
 }
