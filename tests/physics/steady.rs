@@ -182,10 +182,11 @@ fn limits_hold_for_turns_to_both_sides() {
     let left = |s: &SpeedLimits| s.cornering.iter().map(|t| t.ay_mps2).fold(0.0, f64::max);
     let (light, heavy, even) = (limits_of(0.4), limits_of(0.6), limits_of(0.5));
     for ((light, heavy), even) in light.iter().zip(&heavy).zip(&even) {
-        // The one car is the other's mirror image. Points of a curve lie up to 1.4 m/s^2 apart: near its flat top that is 0.5 %.
+        // The one car is the other's mirror image: towards the heavier side no wheel lifts, and the curves are smooth. Their points
+        // lie up to 1.4 m/s^2 apart, which is 0.5 % near the flat top.
         let apart = |a: f64, b: f64| (a / b - 1.0).abs();
         assert!(apart(light.right_mps2, left(heavy)) < 0.005, "{:?}", light.row);
-        assert!((light.right_mps2 - left(light)).abs() > 1e-3, "{:?}", light.row);
+        assert!((light.right_mps2 - left(light)).abs() > 0.01, "{:?}", light.row);
         assert_eq!(light.row.ay_mps2, left(light).min(light.right_mps2));
         assert_eq!((even.row.ay_mps2, even.right_mps2), (left(even), left(even)));
     }
