@@ -1,6 +1,6 @@
-"""Points of all problems and their values by published packages, for the test of the ports.
+"""Points of all problems and their values by published packages, as CSV on standard output, to check ports of the problems with.
 
-    python reference_points.py > ../../tests/swarms/reference_points.csv
+    python reference_points.py > reference_points.csv
 """
 
 from importlib.metadata import version

@@ -1,7 +1,7 @@
 """Runs other libraries' optimisers on the suites at the budget of `lapswarm bench optimisers`.
 
     python run.py --seeds 5 --out ../results/peers.csv      the peers' medians
-    python run.py --check fronts.csv                         the hypervolumes of `bench optimisers --fronts`, by moocore
+    python run.py --check fronts.csv                         the hypervolumes of fronts in a file, by moocore
 
 25,000 evaluations for several objectives, with populations and archives of 100; 100,000 for one, with populations of 40.
 Settings are the libraries' own defaults. Hypervolumes are moocore's, on the scale of `scales.csv`, with the reference at 1.1

@@ -15,7 +15,7 @@ from opfunu.utils import operator as opfunu
 from pymoo.problems.many import cdtlz, dtlz, wfg
 from pymoo.problems.multi import bnh, osy, tnk, welded_beam, zdt
 
-SCALES = Path(__file__).parents[2] / "src/swarm/problems/suites/scales.csv"
+SCALES = Path(__file__).with_name("scales.csv")
 
 
 @dataclass

@@ -51,14 +51,12 @@ impl SimulateSettings {
     /// # Errors
     /// [`Error::Input`] for a setting out of range or an open road.
     pub fn check(&self, circuit: &Circuit) -> Result<()> {
-        if !(self.rate_hz >= 5.0 && self.rate_hz <= 1000.0) || self.substeps == Some(0) {
-            let found = format!("{} Hz, {} sub-steps", self.rate_hz, self.substeps.unwrap_or(1));
-            return Err(Error::input(
-                "simulate",
-                "rate_hz, substeps",
-                found,
-                "5 to 1000 Hz and 1 or more sub-steps",
-            ));
+        if !(self.rate_hz >= 5.0 && self.rate_hz <= 1000.0) {
+            let found = format!("{} Hz", self.rate_hz);
+            return Err(Error::input("simulate", "rate_hz", found, "5 to 1000 Hz"));
+        }
+        if self.substeps == Some(0) {
+            return Err(Error::input("simulate", "substeps", "0", "1 or more"));
         }
         if !circuit.closed {
             return Err(Error::input(
@@ -92,7 +90,8 @@ fn rounded(x: f64, decimals: i32) -> f64 {
 /// same steps.
 ///
 /// # Errors
-/// [`Error::Input`] for a setting out of range or an open road, [`Error::Study`] if the car does not get round.
+/// [`Error::Input`] for a setting out of range, an open road, or steps that are too long for the car; [`Error::Study`] if the car
+/// does not get round, or if its replay leaves the lap that was driven.
 pub fn simulate_lap(car: &Car, circuit: &Circuit, settings: &SimulateSettings) -> Result<Simulated> {
     settings.check(circuit)?;
     let interval = 1.0 / settings.rate_hz;

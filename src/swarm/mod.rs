@@ -11,8 +11,9 @@
 //! | more | [`device::DeviceMopso`] | the same on a device, for problems that are evaluated there |
 //! | more | [`Nsga2`] | the genetic algorithm that swarms are compared with |
 //!
-//! [`minimise()`] runs one of them on a closure in one call, and [`by_name()`] makes one of its name. [`Islands`] are several swarms in one population, with or without migration. [`checkpoint`] keeps the state of any
-//! optimiser in a file. [`comparison`] runs optimisers on [`problems`] with known answers and judges them by [`metrics`].
+//! [`minimise()`] runs one of them on a closure in one call, and [`by_name()`] makes one of its name. [`Islands`] are several
+//! swarms in one population, with or without migration. [`checkpoint`] keeps the state of any optimiser in a file.
+//! [`comparison`] runs optimisers on [`problems`] with known answers and judges them by [`metrics`].
 //!
 //! Positions live in the unit cube and are scaled to the bounds when asked for, so results do not depend on where the
 //! bounds lie. Random numbers are functions of seed, iteration, particle and purpose ([`crate::random`]), so

@@ -1,13 +1,16 @@
-//! How fast a car's own motions are, and so how fine the steps must be with which it is integrated.
+//! How fast a car's own motions are, and how fine the steps of its integration must be.
 
 use super::chassis::BodyState;
 use super::model::{CarInput, CarModel, CarState, wheel_speeds};
 use super::tyre::{LinearTyre, MagicFormula, Tyre, TyreModel};
 use nalgebra::Matrix6;
 
-/// The greatest product of a mode's rate and the step, by which classical Runge-Kutta steps go. The method is stable up to 2.78
-/// on the negative real axis and 2.82 on the imaginary one; the rest is a margin for a car that corners.
+/// The greatest product of a mode's rate (1/s) and a step (s). The classical Runge-Kutta method is stable up to 2.78 on the negative
+/// real axis and 2.82 on the imaginary one (E. Hairer and G. Wanner, *Solving Ordinary Differential Equations II*, 1996, ch. IV.2).
+/// The rest is a margin for a car that corners.
 pub const STABLE_STEP: f64 = 2.4;
+/// Most steps per sample, as many as the setting `substeps` admits. A car that needs more is lost, which its study says.
+const MOST_STEPS: usize = 1000;
 
 /// The greatest magnitude (1/s) of the eigenvalues of a car that rolls straight ahead at `speed` (m/s), its wheels free of slip:
 /// tyres, roll and the pitch lag. `flat` is the car in flat form ([`super::Car::to_flat`]). Not finite for figures that are no car.
@@ -69,9 +72,9 @@ fn fastest<T: Tyre<f64>>(flat: &[f64], speed: f64) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// Runge-Kutta steps in which a car with modes up to `fastest` (1/s) is integrated over `interval_s` (s): one at least.
+/// Runge-Kutta steps in which a car with modes up to `fastest` (1/s) is integrated over `interval_s` (s): 1 to 1000.
 pub fn stable_steps(interval_s: f64, fastest: f64) -> usize {
-    (interval_s * fastest / STABLE_STEP).ceil().max(1.0) as usize
+    ((interval_s * fastest / STABLE_STEP).ceil() as usize).clamp(1, MOST_STEPS)
 }
 
 #[cfg(test)]
@@ -104,5 +107,9 @@ mod tests {
         assert_eq!(stable_steps(0.02, 100.0), 1);
         assert_eq!(stable_steps(0.02, 130.0), 2);
         assert_eq!(stable_steps(0.02, 0.0), 1);
+        assert_eq!(
+            [f64::NAN, f64::INFINITY].map(|fastest| stable_steps(0.02, fastest)),
+            [1, 1000]
+        );
     }
 }

@@ -1,26 +1,21 @@
 //! `lapswarm bench optimisers` as its users run it.
 
-use std::process::{Command, Output};
-
-fn bench(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_lapswarm"))
-        .args(["bench", "optimisers"])
-        .args(arguments)
-        .output()
-        .unwrap()
-}
+use crate::bench;
 
 #[test]
 fn rows_as_json() {
-    let output = bench(&[
-        "--seeds",
-        "2",
-        "--problems",
-        "zdt6,ackley",
-        "--algorithms",
-        "default,nsga2",
-        "--json",
-    ]);
+    let output = bench(
+        "optimisers",
+        &[
+            "--seeds",
+            "2",
+            "--problems",
+            "zdt6,ackley",
+            "--algorithms",
+            "default,nsga2",
+            "--json",
+        ],
+    );
     assert!(
         output.status.success(),
         "{}",
@@ -49,7 +44,7 @@ fn rows_as_json() {
 #[test]
 fn unknown_names_are_refused() {
     for flags in [["--problems", "zdt5"], ["--algorithms", "best"]] {
-        let output = bench(&flags);
+        let output = bench("optimisers", &flags);
         assert_eq!(output.status.code(), Some(2));
         let message = String::from_utf8_lossy(&output.stderr).into_owned();
         assert!(
@@ -57,5 +52,5 @@ fn unknown_names_are_refused() {
             "{message}"
         );
     }
-    assert_eq!(bench(&["--seeds", "0"]).status.code(), Some(2));
+    assert_eq!(bench("optimisers", &["--seeds", "0"]).status.code(), Some(2));
 }

@@ -1,36 +1,31 @@
 //! `lapswarm bench studies` as its users run it.
 
-use std::process::{Command, Output};
-
-fn bench(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_lapswarm"))
-        .args(["bench", "studies"])
-        .args(arguments)
-        .output()
-        .unwrap()
-}
+use crate::bench;
 
 #[test]
 fn rows_and_a_picture() {
     let folder = tempfile::tempdir().unwrap();
     let picture = folder.path().join("quality.svg");
-    let output = bench(&[
-        "--populations",
-        "20,60",
-        "--evaluations",
-        "120",
-        "--seeds",
-        "2",
-        "--algorithms",
-        "default,nsga2",
-        "--sections",
-        "120",
-        "--backend",
-        "simd",
-        "--json",
-        "--plot",
-        picture.to_str().unwrap(),
-    ]);
+    let output = bench(
+        "studies",
+        &[
+            "--populations",
+            "20,60",
+            "--evaluations",
+            "120",
+            "--seeds",
+            "2",
+            "--algorithms",
+            "default,nsga2",
+            "--sections",
+            "120",
+            "--backend",
+            "simd",
+            "--json",
+            "--plot",
+            picture.to_str().unwrap(),
+        ],
+    );
     assert!(
         output.status.success(),
         "{}",
@@ -102,7 +97,7 @@ fn unknown_names_are_refused() {
         ["--algorithms", "best"],
         ["--populations", "3"],
     ] {
-        let output = bench(&flags);
+        let output = bench("studies", &flags);
         assert_eq!(output.status.code(), Some(2));
         let message = String::from_utf8_lossy(&output.stderr).into_owned();
         assert!(message.contains(flags[0]), "{message}");

@@ -1,28 +1,23 @@
 //! `lapswarm bench swarm` as its users run it.
 
-use std::process::{Command, Output};
-
-fn bench(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_lapswarm"))
-        .args(["bench", "swarm"])
-        .args(arguments)
-        .output()
-        .unwrap()
-}
+use crate::bench;
 
 #[test]
 fn rows_as_json() {
-    let output = bench(&[
-        "--populations",
-        "200,5000",
-        "--repeats",
-        "1",
-        "--generations",
-        "15",
-        "--backend",
-        "simd",
-        "--json",
-    ]);
+    let output = bench(
+        "swarm",
+        &[
+            "--populations",
+            "200,5000",
+            "--repeats",
+            "1",
+            "--generations",
+            "15",
+            "--backend",
+            "simd",
+            "--json",
+        ],
+    );
     assert!(
         output.status.success(),
         "{}",
@@ -63,7 +58,7 @@ fn rows_as_json() {
 #[test]
 fn unknown_problems_are_refused() {
     for name in ["zdt5", "sphere"] {
-        let output = bench(&["--problems", name]);
+        let output = bench("swarm", &["--problems", name]);
         assert_eq!(output.status.code(), Some(2));
         let message = String::from_utf8_lossy(&output.stderr).into_owned();
         assert!(

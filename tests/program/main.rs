@@ -6,3 +6,12 @@ mod bench_swarm;
 mod cli;
 mod examples;
 mod paths;
+
+/// A bench of a kind, run to its end.
+fn bench(kind: &str, arguments: &[&str]) -> std::process::Output {
+    std::process::Command::new(env!("CARGO_BIN_EXE_lapswarm"))
+        .args(["bench", kind])
+        .args(arguments)
+        .output()
+        .unwrap()
+}

@@ -213,8 +213,8 @@ const STEER_TO_GRIP: f64 = 0.6;
 /// Sweeps the car over speed and steering.
 ///
 /// # Errors
-/// [`Error::Input`] for settings out of range, for a car without a powertrain, and for one that has no steady state or
-/// no drive at a speed that is asked for.
+/// [`Error::Input`] for settings out of range and for a car without a powertrain, [`Error::Study`] for one that has a steady
+/// state in bends at fewer than two of the speeds.
 pub fn car_limits(car: &Car, settings: &EnvelopeSettings) -> Result<CarLimits> {
     let speeds = speeds_of(car, settings)?;
     let force = engine_of(car)?;
