@@ -23,13 +23,13 @@ use lapswarm::evaluate::line::{
 use lapswarm::evaluate::simd::InstructionSet;
 use lapswarm::line::Parametrisation;
 use lapswarm::line::energy::{EnergyCar, EnergyPlan, Gates, Mode, Traction};
-use lapswarm::study::envelope::{EnvelopeSettings, car_limits};
+use lapswarm::study::envelope::{EnvelopeSettings, car_envelope};
 use lapswarm::vehicle::Car;
 use std::time::Duration;
 
 /// Lap times on a circuit of `sections`, lines by a control point for every four of them.
 fn problem(sections: usize) -> LineProblem {
-    let cuts = circuit(
+    let cross_sections = circuit(
         sections,
         5760.0 / sections as f64,
         true,
@@ -37,7 +37,14 @@ fn problem(sections: usize) -> LineProblem {
         &mut Random(1),
     );
     let way = Parametrisation::control_points(sections / 4);
-    LineProblem::new(cuts, way, &[LineObjective::LapTime], Some(gt_car()), 0.0).expect("a sound problem")
+    LineProblem::new(
+        cross_sections,
+        way,
+        &[LineObjective::LapTime],
+        Some(gt_car()),
+        0.0,
+    )
+    .expect("a sound problem")
 }
 
 fn gpu(problem: &LineProblem) -> Option<(String, Box<dyn Evaluator + '_>)> {
@@ -119,7 +126,7 @@ fn energy(criterion: &mut Criterion) {
     let car = hybrid_car();
     let with_energy = [Mode::Offset, Mode::Additional].map(|mode| {
         let line = HybridLine::Free {
-            cuts: Box::new(plain.cuts().clone()),
+            cross_sections: Box::new(plain.cross_sections().clone()),
             parametrisation: plain.parametrisation().clone(),
         };
         let plan = EnergyPlan::whole(sections, sections - 60, mode);
@@ -133,7 +140,7 @@ fn energy(criterion: &mut Criterion) {
     });
     // The same car's lap without energy.
     let plain = LineProblem::new(
-        plain.cuts().clone(),
+        plain.cross_sections().clone(),
         plain.parametrisation().clone(),
         &[LineObjective::LapTime],
         Some(car.point_mass.clone()),
@@ -178,7 +185,7 @@ fn energy(criterion: &mut Criterion) {
 
 fn hybrid_car() -> EnergyCar {
     let car = Car::load("gt_hybrid").expect("bundled");
-    let limits = car_limits(&car, &EnvelopeSettings::default()).expect("limits");
+    let limits = car_envelope(&car, &EnvelopeSettings::default()).expect("limits");
     let rows = limits
         .speeds
         .iter()

@@ -5,7 +5,7 @@
 //!
 //! `cargo run --release --example identify`
 
-use lapswarm::study::framework::{Study, solve_unwatched};
+use lapswarm::study::framework::{Study, solve_unobserved};
 use lapswarm::study::identify::{FreeParameter, Identify, IdentifySettings};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -26,7 +26,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         ..IdentifySettings::default()
     };
     let setup = Identify::prepare(&settings)?;
-    let outcome = solve_unwatched::<Identify>(&settings, &setup)?;
+    let outcome = solve_unobserved::<Identify>(&settings, &setup)?;
     let truth = setup.truth.as_deref().ok_or("the bundled lap has no truth")?;
 
     let mut worst: f64 = 0.0;

@@ -17,12 +17,15 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let track = Track::load("ellipse:400:250:12")?;
     // The middle of a car of 2 m may use what its sides leave of the road.
     let sections = track.cross_sections(&Spacing::equal(120), true)?.narrowed(2.0)?;
-    let exact = shortest(&LineMap::at_every_cut(&sections), &Bounds::road(sections.len()))?;
+    let exact = shortest(
+        &LineMap::at_every_cross_section(&sections),
+        &Bounds::road(sections.len()),
+    )?;
     println!("exact   {:.4} m", exact.value);
 
     for backend in [BackendChoice::Cpu, BackendChoice::Simd, BackendChoice::Gpu] {
         let search = LineSearch {
-            cuts: &sections,
+            cross_sections: &sections,
             objective: LineObjective::Length,
             car: None,
             entry_mps: 0.0,

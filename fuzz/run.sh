@@ -11,7 +11,7 @@ if [ -z "${FUZZ_BIN:-}" ]; then
     FUZZ_BIN=target/$(rustc -vV | sed -n 's/^host: //p')/release
 fi
 [ $# -gt 0 ] || set -- car maps tyre study sweep curvature track_csv boundaries latlon gpx_kml log_csv motec_csv \
-    motec_ld limits checkpoint state run_folder line survey sweep_rows
+    motec_ld envelope checkpoint state run_folder line survey sweep_rows
 for target in "$@"; do
     mkdir -p "corpus/$target" "artifacts/$target"
     case $target in

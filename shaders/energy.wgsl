@@ -82,11 +82,11 @@ fn store_left(state: EnergyState) -> f32 {
 }
 
 fn additional(section: u32, start: f32, length: f32, here: f32, there: f32, most: f32, left: f32, candidate: u32) -> Step {
-    let first = limits_at(start, here);
+    let first = envelope_at(start, here);
     let engine = min(first.x, first.y);
     let ahead = max(start + length * (engine - first.z), 0.0);
-    let held = min(max(ahead * account.rows_per_speed_squared, 0.0), f32(LIMIT_ROWS));
-    let row = min(u32(held), LIMIT_ROWS - 1u);
+    let held = min(max(ahead * account.rows_per_speed_squared, 0.0), f32(ENVELOPE_ROWS));
+    let row = min(u32(held), ENVELOPE_ROWS - 1u);
     let figures = energy[BOOSTS_AT + row];
     let force_and_room = figures.xy + (held - f32(row)) * figures.zw;
     let greatest = min(force_and_room.x * gates.motor, force_and_room.y);
@@ -97,7 +97,7 @@ fn additional(section: u32, start: f32, length: f32, here: f32, there: f32, most
 
     let both = min(first.x, first.y + boost);
     let middle = max(start + length * (both - first.z), 0.0);
-    let later = limits_at(middle, 0.5 * (here + there));
+    let later = envelope_at(middle, 0.5 * (here + there));
     let later_both = min(later.x, later.y + boost);
     let motor = 0.5 * ((both - engine) + (later_both - min(later.x, later.y)));
     let reached = max(start + length * ((both - first.z) + (later_both - later.z)), 0.0);
@@ -108,10 +108,10 @@ fn additional(section: u32, start: f32, length: f32, here: f32, there: f32, most
 }
 
 fn engine_only(start: f32, length: f32, here: f32, there: f32, most: f32) -> f32 {
-    let at_start = limits_at(start, here);
+    let at_start = envelope_at(start, here);
     let first = min(at_start.x, at_start.y) - at_start.z;
     let middle = max(start + length * first, 0.0);
-    let later = limits_at(middle, 0.5 * (here + there));
+    let later = envelope_at(middle, 0.5 * (here + there));
     let second = min(later.x, later.y) - later.z;
     return min(max(start + length * (first + second), 0.0), most);
 }
@@ -134,8 +134,8 @@ fn provisional(
     (*state).deployed = (*state).deployed + deployed;
     if COUNTS_CHARGE {
         let mean = 0.5 * (start + step.end);
-        let held = min(max(mean * account.rows_per_speed_squared, 0.0), f32(LIMIT_ROWS));
-        let row = min(u32(held), LIMIT_ROWS - 1u);
+        let held = min(max(mean * account.rows_per_speed_squared, 0.0), f32(ENVELOPE_ROWS));
+        let row = min(u32(held), ENVELOPE_ROWS - 1u);
         let forces = energy[2u * row] + (held - f32(row)) * energy[2u * row + 1u];
         let inverse = 1.0 / length;
         let force = 0.5 * (step.end - start) * inverse + forces.w;
@@ -167,8 +167,8 @@ fn segment_energy(
     }
     let end = step.end;
     let mean = 0.5 * (start + end);
-    let held = min(max(mean * account.rows_per_speed_squared, 0.0), f32(LIMIT_ROWS));
-    let row = min(u32(held), LIMIT_ROWS - 1u);
+    let held = min(max(mean * account.rows_per_speed_squared, 0.0), f32(ENVELOPE_ROWS));
+    let row = min(u32(held), ENVELOPE_ROWS - 1u);
     let beyond = held - f32(row);
     let forces = energy[2u * row] + beyond * energy[2u * row + 1u];
     let inverse = 1.0 / length;

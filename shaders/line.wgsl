@@ -2,8 +2,8 @@
 //
 // One lane per candidate. Segment lengths, curvatures and speeds squared stand in a buffer, in tiles of TILE lanes: section by
 // section within a tile, so that neighbouring lanes and neighbouring sections read neighbouring memory. All lanes start a lap's
-// passes at the same section for the same reason. The constants CLOSED, TERMS, WANTS_INTEGRAL, WANTS_LAP, LIMIT_ROWS,
-// CORNER_ROWS, ELLIPSE_ROWS, WORKGROUP and TILE are generated, and so are the bindings 1 to 4: `sections`; `limits` in rows of
+// passes at the same section for the same reason. The constants CLOSED, TERMS, WANTS_INTEGRAL, WANTS_LAP, ENVELOPE_ROWS,
+// CORNER_ROWS, ELLIPSE_ROWS, WORKGROUP and TILE are generated, and so are the bindings 1 to 4: `sections`; `envelope` in rows of
 // lateral, grip, drive, drag at their start and then of their rises; `corners` and `ellipse` in rows of a figure and its rise.
 // All lanes read the same section, so these tables are uniform buffers if they fit. The envelope is one only on drivers that let
 // lanes read different rows at full speed.
@@ -27,7 +27,7 @@ struct Section {
     sources: vec4<u32>,
     weights: vec4<f32>,
     step: vec2<f32>,
-    cut: vec2<f32>,
+    across: vec2<f32>,
     constant: f32,
     inverse_spacing: f32,
     // The next section that takes other variables, or one past the last.
@@ -104,7 +104,7 @@ fn alpha(section: u32, own: vec4<f32>) -> f32 {
 }
 
 fn offset(section: u32, own: vec4<f32>) -> vec2<f32> {
-    return alpha(section, own) * sections[section].cut;
+    return alpha(section, own) * sections[section].across;
 }
 
 // Sums of length, squared length, squared second differences and integral.
@@ -170,10 +170,10 @@ fn corner(curvature: f32) -> f32 {
 }
 
 // The longitudinal grip that is left, the drive and the drag.
-fn limits_at(speed_squared: f32, curvature: f32) -> vec3<f32> {
-    let held = min(max(speed_squared * stretch.rows_per_speed_squared, 0.0), f32(LIMIT_ROWS));
-    let row = min(u32(held), LIMIT_ROWS - 1u);
-    let at = limits[2u * row] + (held - f32(row)) * limits[2u * row + 1u];
+fn envelope_at(speed_squared: f32, curvature: f32) -> vec3<f32> {
+    let held = min(max(speed_squared * stretch.rows_per_speed_squared, 0.0), f32(ENVELOPE_ROWS));
+    let row = min(u32(held), ENVELOPE_ROWS - 1u);
+    let at = envelope[2u * row] + (held - f32(row)) * envelope[2u * row + 1u];
     let share = curvature * speed_squared / at.x;
     var left = sqrt(max(1.0 - share * share, 0.0));
     if ELLIPSE_ROWS > 0u {
@@ -187,7 +187,7 @@ fn limits_at(speed_squared: f32, curvature: f32) -> vec3<f32> {
 
 // Greatest acceleration and greatest deceleration.
 fn longitudinal(speed_squared: f32, curvature: f32) -> vec2<f32> {
-    let at = limits_at(speed_squared, curvature);
+    let at = envelope_at(speed_squared, curvature);
     return vec2<f32>(min(at.x, at.y) - at.z, at.x + at.z);
 }
 

@@ -63,8 +63,8 @@
 //! use lapswarm::line::Parametrisation;
 //! use lapswarm::track::{Spacing, Track};
 //!
-//! let cuts = Track::load("circle:590:600")?.cross_sections(&Spacing::equal(361), true)?;
-//! let problem = LineProblem::new(cuts, Parametrisation::sections(), &[LineObjective::Length], None, 0.0)?;
+//! let cross_sections = Track::load("circle:590:600")?.cross_sections(&Spacing::equal(361), true)?;
+//! let problem = LineProblem::new(cross_sections, Parametrisation::sections(), &[LineObjective::Length], None, 0.0)?;
 //! let lines = [vec![0.0; 361], vec![1.0; 361]].concat();
 //! let reference = CpuLineEvaluator::new(&problem).evaluate(&lines)?;
 //! let lanes = SimdLineEvaluator::new(&problem, InstructionSet::best()).evaluate(&lines)?;
@@ -101,8 +101,8 @@
 //!     }
 //! }
 //!
-//! let cuts = Track::load("circle:590:600")?.cross_sections(&Spacing::equal(100), true)?;
-//! let problem = LineProblem::new(cuts, Parametrisation::sections(), &[LineObjective::Length], None, 0.0)?;
+//! let cross_sections = Track::load("circle:590:600")?.cross_sections(&Spacing::equal(100), true)?;
+//! let problem = LineProblem::new(cross_sections, Parametrisation::sections(), &[LineObjective::Length], None, 0.0)?;
 //! let mut charged = Charged(CpuLineEvaluator::new(&problem));
 //! let plain = CpuLineEvaluator::new(&problem).evaluate(&[1.0; 100])?;
 //! let more = charged.evaluate(&[1.0; 100])?;
@@ -113,7 +113,7 @@
 //! Which car drove the bundled lap? A short search and no polish:
 //!
 //! ```no_run
-//! use lapswarm::study::framework::{Study, solve_unwatched};
+//! use lapswarm::study::framework::{Study, solve_unobserved};
 //! use lapswarm::study::identify::{Identify, IdentifySettings};
 //!
 //! let settings = IdentifySettings {
@@ -123,7 +123,7 @@
 //!     ..IdentifySettings::default()
 //! };
 //! let setup = Identify::prepare(&settings)?;
-//! let outcome = solve_unwatched::<Identify>(&settings, &setup)?;
+//! let outcome = solve_unobserved::<Identify>(&settings, &setup)?;
 //! let unknowns = &setup.replay.problem.variables;
 //! for (unknown, value) in unknowns.iter().zip(&outcome.swarm_candidate) {
 //!     println!("{} = {value:.4} {}", unknown.name, unknown.unit);
@@ -131,7 +131,7 @@
 //! # Ok::<(), lapswarm::Error>(())
 //! ```
 
-#![warn(missing_docs, clippy::undocumented_unsafe_blocks)]
+#![warn(missing_docs, clippy::missing_errors_doc, clippy::undocumented_unsafe_blocks)]
 #![cfg_attr(docsrs, feature(doc_cfg))]
 // What parts that are left out would use is not dead.
 #![cfg_attr(not(feature = "cli"), allow(dead_code))]

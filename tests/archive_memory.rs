@@ -65,7 +65,7 @@ fn the_archive_takes_what_is_reckoned() {
         archive: MEMBERS,
         ..Size::default()
     };
-    let kept = size.kept();
+    let kept = size.memory_items();
     let archive = kept
         .iter()
         .find(|kept| kept.name == "archive")

@@ -11,9 +11,9 @@ use serde::Serialize;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-/// Where a measurement is kept.
+/// The flag of the folder that a measurement is kept in.
 #[derive(clap::Args)]
-pub struct Kept {
+pub struct FolderFlag {
     /// Keep the figures in this folder, with pictures and report.html; refused if it holds anything
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -22,7 +22,7 @@ pub struct Kept {
     pub json: bool,
 }
 
-impl Kept {
+impl FolderFlag {
     /// The folder is refused before anything is measured; `adapter` is what the flag `--adapter` says.
     pub fn begin<'a>(&self, study: &'static str, adapter: Option<&'a str>) -> Result<Keeping<'a>> {
         let create = |path| run_folder::create(study, Some(path));

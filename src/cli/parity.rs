@@ -1,7 +1,7 @@
 //! `lapswarm parity`.
 
 use super::backend_flag;
-use super::measurement::Kept;
+use super::measurement::FolderFlag;
 use crate::cli::output::{Columns, line_of, outln};
 use lapswarm::evaluate::BackendChoice;
 use lapswarm::evaluate::gpu::{DeviceSummary, devices};
@@ -30,7 +30,7 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE")]
     file: Option<PathBuf>,
     #[command(flatten)]
-    kept: Kept,
+    kept: FolderFlag,
     /// No table
     #[arg(long)]
     quiet: bool,

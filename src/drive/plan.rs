@@ -19,12 +19,12 @@ const LINEAR_TYRE_FRICTION: f64 = 1.0;
 const SPACING: f64 = 2.0;
 
 /// Estimates of what the car can do at a speed: lateral and longitudinal grip, drive and drag, all in m/s^2.
-struct Limits<'a> {
+struct TyreEnvelope<'a> {
     car: &'a Car,
     friction: f64,
 }
 
-impl Limits<'_> {
+impl TyreEnvelope<'_> {
     fn grip(&self, speed: f64) -> f64 {
         let c = &self.car.chassis;
         self.friction * (c.gravity + 0.5 * c.air_density * c.lift_area * speed * speed / c.mass)
@@ -65,7 +65,7 @@ impl SpeedPlan {
                 }
                 Tyres::Linear { .. } => LINEAR_TYRE_FRICTION,
             };
-        let limits = Limits { car, friction };
+        let envelope = TyreEnvelope { car, friction };
         let count = (circuit.length_m / SPACING).round().max(8.0) as usize;
         let spacing_m = circuit.length_m / count as f64;
         let curvature: Vec<f64> = (0..count)
@@ -77,7 +77,7 @@ impl SpeedPlan {
                 // Grip grows with speed, so the corner speed is a fixed point; a few rounds settle it.
                 let mut v = top_speed;
                 for _ in 0..60 {
-                    v = (limits.grip(v) / k.abs().max(1e-9)).sqrt().min(top_speed);
+                    v = (envelope.grip(v) / k.abs().max(1e-9)).sqrt().min(top_speed);
                 }
                 v
             })
@@ -86,13 +86,13 @@ impl SpeedPlan {
         for step in 0..2 * count {
             let (i, next) = (step % count, (step + 1) % count);
             let v = speed_mps[i];
-            let a = limits.drive(v).min(0.6 * limits.remaining(v, curvature[i])) - limits.drag(v);
+            let a = envelope.drive(v).min(0.6 * envelope.remaining(v, curvature[i])) - envelope.drag(v);
             speed_mps[next] = speed_mps[next].min((v * v + 2.0 * a * spacing_m).max(1.0).sqrt());
         }
         for step in (0..2 * count).rev() {
             let (i, next) = (step % count, (step + 1) % count);
             let v = speed_mps[next];
-            let a = 0.85 * limits.remaining(v, curvature[next]) + limits.drag(v);
+            let a = 0.85 * envelope.remaining(v, curvature[next]) + envelope.drag(v);
             speed_mps[i] = speed_mps[i].min((v * v + 2.0 * a * spacing_m).sqrt());
         }
         Self { spacing_m, speed_mps }

@@ -9,7 +9,7 @@
 //! J. Dyn. Sys., Meas., Control 138, 2016).
 
 use super::plan::{LinePlan, SectionRow};
-use super::point_mass::{LIMIT_WIDTH, LimitTable};
+use super::point_mass::{ENVELOPE_WIDTH, EnvelopeTable};
 use crate::scalar::{Lookup, Real};
 
 /// Terms that are summed before they are added to the running total. This keeps `f32` sums over long laps accurate.
@@ -116,7 +116,7 @@ pub fn alpha<R: Real>(row: &SectionRow<R::Storage>, terms: usize, variables: &[R
 #[inline(always)]
 fn offset<R: Real>(row: &SectionRow<R::Storage>, terms: usize, variables: &[R]) -> [R; 2] {
     let share = alpha(row, terms, variables);
-    [share * R::load(row.cut[0]), share * R::load(row.cut[1])]
+    [share * R::load(row.across[0]), share * R::load(row.across[1])]
 }
 
 /// The shape of the line that `variables` give; `course` has its lengths and curvatures after.
@@ -206,41 +206,45 @@ pub(super) fn look_up<R: Lookup>(
 
 /// Greatest speed squared (m^2/s^2) in a bend.
 #[inline(always)]
-pub fn corner<R: Lookup>(limits: &LimitTable<R::Storage>, curvature: R) -> R {
+pub fn corner<R: Lookup>(envelope: &EnvelopeTable<R::Storage>, curvature: R) -> R {
     // Straights have no radius; a thousand kilometres stand for it.
     let radius = R::lit(1.0) / curvature.max(R::lit(1e-6));
-    let (place, beyond) = (radius * R::load(limits.rows_per_radius)).place(limits.corners.len() / 2, 2);
-    look_up(&limits.corners, 2, place, beyond, 0)
+    let (place, beyond) = (radius * R::load(envelope.rows_per_radius)).place(envelope.corners.len() / 2, 2);
+    look_up(&envelope.corners, 2, place, beyond, 0)
 }
 
 /// The longitudinal grip that is left, the drive and the drag (m/s^2) at a speed squared in a bend.
 #[inline(always)]
-pub(super) fn limits_at<R: Lookup>(
-    limits: &LimitTable<R::Storage>,
+pub(super) fn envelope_at<R: Lookup>(
+    envelope: &EnvelopeTable<R::Storage>,
     speed_squared: R,
     curvature: R,
 ) -> [R; 3] {
-    let rows = limits.limits.len() / LIMIT_WIDTH;
-    let argument = speed_squared * R::load(limits.rows_per_speed_squared);
-    let (place, beyond) = argument.place(rows, LIMIT_WIDTH);
-    let row = R::pick_row(&limits.limits, place);
-    let at = |column: usize| row[column] + beyond * row[LIMIT_WIDTH / 2 + column];
+    let rows = envelope.rows.len() / ENVELOPE_WIDTH;
+    let argument = speed_squared * R::load(envelope.rows_per_speed_squared);
+    let (place, beyond) = argument.place(rows, ENVELOPE_WIDTH);
+    let row = R::pick_row(&envelope.rows, place);
+    let at = |column: usize| row[column] + beyond * row[ENVELOPE_WIDTH / 2 + column];
     let share = curvature * speed_squared / at(0);
     let root = (R::lit(1.0) - share * share).max(R::lit(0.0)).sqrt();
-    let left = if limits.ellipse.is_empty() {
+    let left = if envelope.ellipse.is_empty() {
         root
     } else {
-        let rows = limits.ellipse.len() / 2;
+        let rows = envelope.ellipse.len() / 2;
         let (place, beyond) = (root * R::lit(rows as f64)).place(rows, 2);
-        look_up(&limits.ellipse, 2, place, beyond, 0)
+        look_up(&envelope.ellipse, 2, place, beyond, 0)
     };
     [at(1) * left, at(2), at(3)]
 }
 
 /// Greatest acceleration and greatest deceleration (m/s^2) at a speed squared in a bend.
 #[inline(always)]
-pub fn longitudinal<R: Lookup>(limits: &LimitTable<R::Storage>, speed_squared: R, curvature: R) -> [R; 2] {
-    let [grip, drive, drag] = limits_at(limits, speed_squared, curvature);
+pub fn longitudinal<R: Lookup>(
+    envelope: &EnvelopeTable<R::Storage>,
+    speed_squared: R,
+    curvature: R,
+) -> [R; 2] {
+    let [grip, drive, drag] = envelope_at(envelope, speed_squared, curvature);
     [grip.min(drive) - drag, grip + drag]
 }
 
@@ -249,20 +253,26 @@ pub fn longitudinal<R: Lookup>(limits: &LimitTable<R::Storage>, speed_squared: R
 /// smooth lines at 5 to 16 m the middle was 0.4% to 1.2% of a lap off, the start 0.4% to 0.5% the other way, and the mean 0.1% to
 /// 0.2%. On jagged lines no coarse grid is accurate.
 #[inline(always)]
-fn driven<R: Lookup>(limits: &LimitTable<R::Storage>, from: R, length: R, here: R, there: R) -> R {
+fn driven<R: Lookup>(envelope: &EnvelopeTable<R::Storage>, from: R, length: R, here: R, there: R) -> R {
     let zero = R::lit(0.0);
-    let [start, _] = longitudinal(limits, from, here);
+    let [start, _] = longitudinal(envelope, from, here);
     let middle = (from + length * start).max(zero);
-    let [drive, _] = longitudinal(limits, middle, R::lit(0.5) * (here + there));
+    let [drive, _] = longitudinal(envelope, middle, R::lit(0.5) * (here + there));
     (from + length * (start + drive)).max(zero)
 }
 
 /// Greatest speed squared from which the car can brake to that of the next section.
 #[inline(always)]
-pub(super) fn braked<R: Lookup>(limits: &LimitTable<R::Storage>, to: R, length: R, there: R, here: R) -> R {
-    let [_, end] = longitudinal(limits, to, there);
+pub(super) fn braked<R: Lookup>(
+    envelope: &EnvelopeTable<R::Storage>,
+    to: R,
+    length: R,
+    there: R,
+    here: R,
+) -> R {
+    let [_, end] = longitudinal(envelope, to, there);
     let middle = to + length * end;
-    let [_, brake] = longitudinal(limits, middle, R::lit(0.5) * (here + there));
+    let [_, brake] = longitudinal(envelope, middle, R::lit(0.5) * (here + there));
     to + length * (end + brake)
 }
 
@@ -272,7 +282,7 @@ pub(super) fn braked<R: Lookup>(limits: &LimitTable<R::Storage>, to: R, length: 
 /// gives the same lap.
 #[inline(always)]
 pub fn lap_time<R: Lookup>(
-    limits: &LimitTable<R::Storage>,
+    envelope: &EnvelopeTable<R::Storage>,
     closed: bool,
     start: usize,
     entry: R,
@@ -284,7 +294,7 @@ pub fn lap_time<R: Lookup>(
     speeds.clear();
     speeds.resize(n, R::lit(0.0));
     let start = if closed { start } else { 0 };
-    speeds[start] = corner(limits, curvature[start]);
+    speeds[start] = corner(envelope, curvature[start]);
     if !closed {
         speeds[0] = speeds[0].min(entry);
     }
@@ -295,7 +305,7 @@ pub fn lap_time<R: Lookup>(
     for step in 0..steps {
         let next = if here + 1 < n { here + 1 } else { 0 };
         let reached = driven(
-            limits,
+            envelope,
             speeds[here],
             length[here],
             curvature[here],
@@ -306,7 +316,7 @@ pub fn lap_time<R: Lookup>(
         let most = if again {
             speeds[next]
         } else {
-            corner(limits, curvature[next])
+            corner(envelope, curvature[next])
         };
         let slower = reached.less_than(most);
         speeds[next] = R::select(slower, reached, most);
@@ -320,7 +330,7 @@ pub fn lap_time<R: Lookup>(
     for step in 0..steps {
         let here = if next > 0 { next - 1 } else { n - 1 };
         let reached = braked(
-            limits,
+            envelope,
             speeds[next],
             length[here],
             curvature[next],

@@ -72,32 +72,32 @@ impl Parametrisation {
         self.with_free(inner, context)
     }
 
-    /// Number of coefficients, free or not, of a line over `cuts`.
-    pub fn coefficients(&self, cuts: &CrossSections) -> usize {
+    /// Number of coefficients, free or not, of a line over `cross_sections`.
+    pub fn coefficients(&self, cross_sections: &CrossSections) -> usize {
         match self.basis {
-            Basis::Sections => cuts.len(),
+            Basis::Sections => cross_sections.len(),
             Basis::ControlPoints { count, .. } => count,
         }
     }
 
     /// # Errors
-    /// [`Error::Input`] naming the setting that does not fit `cuts`, the cross-sections.
-    pub fn check(&self, cuts: &CrossSections) -> Result<()> {
+    /// [`Error::Input`] naming the setting that does not fit `cross_sections`.
+    pub fn check(&self, cross_sections: &CrossSections) -> Result<()> {
         let wrong = |place: &str, found: String, expected: String| {
             Err(Error::input(
-                &cuts.name,
+                &cross_sections.name,
                 format!("line, {place}"),
                 found,
                 expected,
             ))
         };
-        let all = self.coefficients(cuts);
+        let all = self.coefficients(cross_sections);
         if let Basis::ControlPoints { count, overshoot } = self.basis {
-            if count < TERMS || count > cuts.len() {
+            if count < TERMS || count > cross_sections.len() {
                 return wrong(
                     "control points",
                     count.to_string(),
-                    format!("{TERMS} to {}, the number of sections", cuts.len()),
+                    format!("{TERMS} to {}, the number of sections", cross_sections.len()),
                 );
             }
             if !(0.0..=10.0).contains(&overshoot) {
@@ -126,9 +126,9 @@ impl Parametrisation {
         Ok(())
     }
 
-    /// The decision variables over `cuts`.
-    pub fn variables(&self, cuts: &CrossSections) -> Vec<Variable> {
-        let bounds = self.bounds(cuts);
+    /// The decision variables over `cross_sections`.
+    pub fn variables(&self, cross_sections: &CrossSections) -> Vec<Variable> {
+        let bounds = self.bounds(cross_sections);
         let name = match self.basis {
             Basis::Sections => "alpha",
             Basis::ControlPoints { .. } => "control",
@@ -141,22 +141,22 @@ impl Parametrisation {
             whole: false,
         };
         match &self.free {
-            None => (0..self.coefficients(cuts)).map(variable).collect(),
+            None => (0..self.coefficients(cross_sections)).map(variable).collect(),
             Some((free, _)) => free.iter().copied().map(variable).collect(),
         }
     }
 
     /// Bounds of all coefficients: a control point may reach the furthest edge among the cross-sections that it moves the line
     /// on, and the overshoot beyond.
-    fn bounds(&self, cuts: &CrossSections) -> Vec<(f64, f64)> {
+    fn bounds(&self, cross_sections: &CrossSections) -> Vec<(f64, f64)> {
         let Basis::ControlPoints { count, overshoot } = self.basis else {
-            return vec![(0.0, 1.0); cuts.len()];
+            return vec![(0.0, 1.0); cross_sections.len()];
         };
         let mut bounds = vec![(0.5f64, 0.5f64); count];
-        for (section, scale) in self.scales(cuts).into_iter().enumerate() {
-            let reference = cuts.reference[section];
+        for (section, scale) in self.scales(cross_sections).into_iter().enumerate() {
+            let reference = cross_sections.reference[section];
             let (right, left) = (0.5 - reference / scale, 0.5 + (1.0 - reference) / scale);
-            for (index, weight) in self.weights_at(cuts, section) {
+            for (index, weight) in self.weights_at(cross_sections, section) {
                 if weight > 0.0 {
                     let (lower, upper) = &mut bounds[index];
                     *lower = lower.min(right - overshoot);
@@ -168,32 +168,32 @@ impl Parametrisation {
     }
 
     /// Change of `alpha` at a section when the sum of its coefficients changes by one.
-    fn scales(&self, cuts: &CrossSections) -> Vec<f64> {
+    fn scales(&self, cross_sections: &CrossSections) -> Vec<f64> {
         if self.basis == Basis::Sections {
-            return vec![1.0; cuts.len()];
+            return vec![1.0; cross_sections.len()];
         }
-        let ends = cuts.right_m.iter().zip(&cuts.left_m);
+        let ends = cross_sections.right_m.iter().zip(&cross_sections.left_m);
         let widths: Vec<f64> = ends.map(|(right, left)| right.distance(*left)).collect();
         let mean = widths.iter().sum::<f64>() / widths.len() as f64;
         widths.into_iter().map(|width| mean / width).collect()
     }
 
     /// `alpha` at a section when the sum of its coefficients is zero.
-    fn origin(&self, cuts: &CrossSections, section: usize, scale: f64) -> f64 {
+    fn origin(&self, cross_sections: &CrossSections, section: usize, scale: f64) -> f64 {
         match self.basis {
             Basis::Sections => 0.0,
-            Basis::ControlPoints { .. } => cuts.reference[section] - 0.5 * scale,
+            Basis::ControlPoints { .. } => cross_sections.reference[section] - 0.5 * scale,
         }
     }
 
     /// The coefficients that are summed for `alpha` at a section, and their weights.
-    fn weights_at(&self, cuts: &CrossSections, section: usize) -> [(usize, f64); TERMS] {
+    fn weights_at(&self, cross_sections: &CrossSections, section: usize) -> [(usize, f64); TERMS] {
         let Basis::ControlPoints { count, .. } = self.basis else {
             return [(section, 1.0), (section, 0.0), (section, 0.0), (section, 0.0)];
         };
-        let station = cuts.station_m[section];
-        if cuts.closed {
-            let place = station / cuts.length_m * count as f64;
+        let station = cross_sections.station_m[section];
+        if cross_sections.closed {
+            let place = station / cross_sections.length_m * count as f64;
             let t = place.fract();
             let s = 1.0 - t;
             let weights = [
@@ -206,7 +206,7 @@ impl Parametrisation {
             return std::array::from_fn(|j| ((first + j) % count, weights[j]));
         }
         let spans = count - 3;
-        let last = cuts.station_m[cuts.len() - 1];
+        let last = cross_sections.station_m[cross_sections.len() - 1];
         let place = station / last * spans as f64;
         let span = (place as usize).min(spans - 1);
         // Knots are whole numbers, held at the ends.
@@ -225,13 +225,13 @@ impl Parametrisation {
         std::array::from_fn(|j| (span + j, weights[j]))
     }
 
-    /// Gives `plan`, which is of `cuts`, its `alpha`.
+    /// Sets the `alpha` of `plan`, the plan of `cross_sections`.
     ///
     /// # Errors
     /// As [`Parametrisation::check`].
-    pub fn apply(&self, cuts: &CrossSections, plan: &mut LinePlan<f64>) -> Result<()> {
-        self.check(cuts)?;
-        let all = self.coefficients(cuts);
+    pub fn apply(&self, cross_sections: &CrossSections, plan: &mut LinePlan<f64>) -> Result<()> {
+        self.check(cross_sections)?;
+        let all = self.coefficients(cross_sections);
         let mut sources: Vec<Option<usize>> = (0..all).map(Some).collect();
         if let Some((free, _)) = &self.free {
             sources.fill(None);
@@ -240,12 +240,12 @@ impl Parametrisation {
             }
         }
         plan.terms = if self.basis == Basis::Sections { 1 } else { TERMS };
-        let scales = self.scales(cuts);
+        let scales = self.scales(cross_sections);
         for (section, row) in plan.rows.iter_mut().enumerate() {
             let scale = scales[section];
             (row.weights, row.sources) = ([0.0; TERMS], [0; TERMS]);
-            row.constant = self.origin(cuts, section, scale);
-            for (term, (index, weight)) in self.weights_at(cuts, section).into_iter().enumerate() {
+            row.constant = self.origin(cross_sections, section, scale);
+            for (term, (index, weight)) in self.weights_at(cross_sections, section).into_iter().enumerate() {
                 let weight = scale * weight;
                 match (sources[index], &self.free) {
                     (Some(variable), _) => {
@@ -267,27 +267,27 @@ impl Parametrisation {
     ///
     /// # Errors
     /// As [`Parametrisation::check`]; [`Error::Input`] if `alpha` does not have one value per section.
-    pub fn fit(&self, cuts: &CrossSections, alpha: &[f64]) -> Result<Vec<f64>> {
-        self.check(cuts)?;
-        if alpha.len() != cuts.len() || alpha.iter().any(|a| !a.is_finite()) {
+    pub fn fit(&self, cross_sections: &CrossSections, alpha: &[f64]) -> Result<Vec<f64>> {
+        self.check(cross_sections)?;
+        if alpha.len() != cross_sections.len() || alpha.iter().any(|a| !a.is_finite()) {
             return Err(Error::input(
-                &cuts.name,
+                &cross_sections.name,
                 "line, alpha",
                 format!("{} values", alpha.len()),
-                format!("{} finite ones, one per section", cuts.len()),
+                format!("{} finite ones, one per section", cross_sections.len()),
             ));
         }
         let Basis::ControlPoints { count, .. } = self.basis else {
             return Ok(alpha.iter().map(|a| a.clamp(0.0, 1.0)).collect());
         };
-        let scales = self.scales(cuts);
+        let scales = self.scales(cross_sections);
         // Normal equations plus a very small multiple of the identity, so that control points without a section stay in the
         // middle.
         let mut matrix = DMatrix::<f64>::identity(count, count) * 1e-9;
         let mut right = DVector::from_element(count, 0.5e-9);
         for (section, alpha) in alpha.iter().enumerate() {
-            let weights = self.weights_at(cuts, section);
-            let sum = (alpha - self.origin(cuts, section, scales[section])) / scales[section];
+            let weights = self.weights_at(cross_sections, section);
+            let sum = (alpha - self.origin(cross_sections, section, scales[section])) / scales[section];
             for (i, weight) in weights {
                 right[i] += weight * sum;
                 for (j, other) in weights {
@@ -297,13 +297,13 @@ impl Parametrisation {
         }
         let solution = matrix.cholesky().map(|c| c.solve(&right)).ok_or_else(|| {
             Error::input(
-                &cuts.name,
+                &cross_sections.name,
                 "line, control points",
                 count.to_string(),
                 "a number that the sections determine",
             )
         })?;
-        let bounds = self.bounds(cuts);
+        let bounds = self.bounds(cross_sections);
         let held = solution.iter().zip(bounds);
         Ok(held.map(|(c, (lower, upper))| c.clamp(lower, upper)).collect())
     }

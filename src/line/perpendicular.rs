@@ -52,8 +52,11 @@ fn followed(road: &CrossSections, points_m: &[DVec2]) -> Result<FineLine> {
 /// Where `curve` crosses each cross-section, one after the other.
 fn crossings(road: &CrossSections, curve: &FineLine) -> Result<Vec<Crossing>> {
     let (n, k) = (road.len(), curve.points_m.len());
-    let at = |cut: usize, segment: usize| -> Option<Crossing> {
-        let (right, across) = (road.right_m[cut], road.left_m[cut] - road.right_m[cut]);
+    let at = |section: usize, segment: usize| -> Option<Crossing> {
+        let (right, across) = (
+            road.right_m[section],
+            road.left_m[section] - road.right_m[section],
+        );
         let ends = [curve.points_m[segment % k], curve.points_m[(segment + 1) % k]];
         let [alpha, share] = meeting(right, across, ends[0], ends[1])?;
         // Slightly more than the segment, so that no crossing is missed between two segments.
@@ -70,10 +73,10 @@ fn crossings(road: &CrossSections, curve: &FineLine) -> Result<Vec<Crossing>> {
     let (mut segment, crossing) = first.ok_or_else(|| unseen(road, "no line", road.station_m[0]))?;
     let mut found = vec![crossing];
     let spacing = road.spacing_m();
-    for cut in 1..n {
-        let most = ((2.0 * spacing[cut - 1] + REACH_M) / STEP_M) as usize;
-        let next = (segment..segment + most).find_map(|s| Some((s, at(cut, s)?)));
-        let (place, crossing) = next.ok_or_else(|| unseen(road, "no line", road.station_m[cut]))?;
+    for section in 1..n {
+        let most = ((2.0 * spacing[section - 1] + REACH_M) / STEP_M) as usize;
+        let next = (segment..segment + most).find_map(|s| Some((s, at(section, s)?)));
+        let (place, crossing) = next.ok_or_else(|| unseen(road, "no line", road.station_m[section]))?;
         segment = place;
         found.push(crossing);
     }
@@ -95,13 +98,13 @@ pub fn shares_across(road: &CrossSections, points_m: &[DVec2]) -> Result<Vec<f64
 ///
 /// # Errors
 /// As [`shares_across`]; [`Error::Study`] where an edge does not lie abreast of the line.
-pub fn cuts_about(road: &CrossSections, points_m: &[DVec2], count: usize) -> Result<CrossSections> {
+pub fn cross_sections_about(road: &CrossSections, points_m: &[DVec2], count: usize) -> Result<CrossSections> {
     let curve = followed(road, points_m)?;
     let (n, k) = (road.len(), curve.points_m.len());
     let mut by_station: Vec<(f64, usize)> = crossings(road, &curve)?
         .into_iter()
         .enumerate()
-        .map(|(cut, c)| (c.station_m, cut))
+        .map(|(section, c)| (c.station_m, section))
         .collect();
     by_station.sort_by(|a, b| a.0.total_cmp(&b.0));
     let spacing_m = curve.length_m / count as f64;
@@ -140,8 +143,11 @@ pub fn cuts_about(road: &CrossSections, points_m: &[DVec2], count: usize) -> Res
     }
 
     // Between two cross-sections a corner of an edge may stand further in than at either: both are shortened to it.
-    for (station_m, cut) in by_station {
-        for (side, end) in [road.right_m[cut], road.left_m[cut]].into_iter().enumerate() {
+    for (station_m, section) in by_station {
+        for (side, end) in [road.right_m[section], road.left_m[section]]
+            .into_iter()
+            .enumerate()
+        {
             let about = curve.station_m.partition_point(|s| *s <= station_m) + k;
             let steps = ((REACH_M / STEP_M) as usize).min(k / 2);
             let nearest = (about - steps..about + steps)
@@ -164,7 +170,7 @@ pub fn cuts_about(road: &CrossSections, points_m: &[DVec2], count: usize) -> Res
         }
     }
 
-    let mut cuts = CrossSections {
+    let mut cross_sections = CrossSections {
         length_m: curve.length_m,
         station_m: (0..count).map(|i| spacing_m * i as f64).collect(),
         right_m: Vec::with_capacity(count),
@@ -177,11 +183,11 @@ pub fn cuts_about(road: &CrossSections, points_m: &[DVec2], count: usize) -> Res
             0.5 * (right + left_end),
             (0.5 * (left_end - right)).max(0.5 * LEAST_M),
         );
-        cuts.right_m.push(place + (middle - half) * left);
-        cuts.left_m.push(place + (middle + half) * left);
-        cuts.reference.push((half - middle) / (2.0 * half));
+        cross_sections.right_m.push(place + (middle - half) * left);
+        cross_sections.left_m.push(place + (middle + half) * left);
+        cross_sections.reference.push((half - middle) / (2.0 * half));
     }
-    Ok(cuts)
+    Ok(cross_sections)
 }
 
 #[cfg(test)]
@@ -191,24 +197,28 @@ mod tests {
 
     /// Square to a line in a ring, cross-sections lie along the radii, and reach from edge to edge.
     #[test]
-    fn cuts_about_a_circle_are_its_radii() {
+    fn cross_sections_about_a_circle_are_its_radii() {
         let ring = Shape::parse("circle:90:110").unwrap().unwrap();
         let road = ring.cross_sections(&Spacing::equal(400)).unwrap();
         let points = road.points(&vec![0.3; 400]);
-        let cuts = cuts_about(&road, &points, 300).unwrap();
+        let cross_sections = cross_sections_about(&road, &points, 300).unwrap();
         for i in 0..300 {
-            let radii = [cuts.right_m[i], cuts.left_m[i]].map(DVec2::length);
+            let radii = [cross_sections.right_m[i], cross_sections.left_m[i]].map(DVec2::length);
             // Polygons of 400 corners: a sagitta is 3.4 mm.
             let edges = [radii[0].min(radii[1]), radii[0].max(radii[1])];
             assert!(
                 (edges[0] - 90.0).abs() < 5e-3 && (edges[1] - 110.0).abs() < 5e-3,
                 "{radii:?}"
             );
-            assert!((cuts.reference[i] - 0.3).abs() < 1e-3, "{}", cuts.reference[i]);
-            let along = (cuts.left_m[i] - cuts.right_m[i]).normalize();
-            assert!(along.perp_dot(cuts.right_m[i].normalize()).abs() < 1e-3);
+            assert!(
+                (cross_sections.reference[i] - 0.3).abs() < 1e-3,
+                "{}",
+                cross_sections.reference[i]
+            );
+            let along = (cross_sections.left_m[i] - cross_sections.right_m[i]).normalize();
+            assert!(along.perp_dot(cross_sections.right_m[i].normalize()).abs() < 1e-3);
         }
-        let back = shares_across(&road, &cuts.points(&cuts.reference)).unwrap();
+        let back = shares_across(&road, &cross_sections.points(&cross_sections.reference)).unwrap();
         assert!(back.iter().all(|a| (a - 0.3).abs() < 1e-4));
     }
 
@@ -218,9 +228,9 @@ mod tests {
     fn lines_within_are_on_the_road() {
         let track = Track::load("silverstone_gp").unwrap();
         let road = track.cross_sections(&Spacing::equal(720), false).unwrap();
-        let cuts = cuts_about(&road, &road.points(&road.reference), 1440).unwrap();
+        let cross_sections = cross_sections_about(&road, &road.points(&road.reference), 1440).unwrap();
         for alpha in [0.0, 0.5, 1.0] {
-            let shares = shares_across(&road, &cuts.points(&vec![alpha; 1440])).unwrap();
+            let shares = shares_across(&road, &cross_sections.points(&vec![alpha; 1440])).unwrap();
             let worst = shares.iter().fold(0.0f64, |w, a| w.max((a - 0.5).abs() - 0.5));
             // 1 % of 15 m: half of a cross-section's spacing squared over eight times the tightest radius of an edge, 10 m.
             assert!(worst < 0.01, "{alpha}: {worst}");
@@ -233,7 +243,7 @@ mod tests {
         let mut road = track.cross_sections(&Spacing::equal(120), false).unwrap();
         let points = road.points(&road.reference);
         road.closed = false;
-        let error = cuts_about(&road, &points, 100).unwrap_err().to_string();
+        let error = cross_sections_about(&road, &points, 100).unwrap_err().to_string();
         assert!(error.contains("closed"), "{error}");
     }
 }

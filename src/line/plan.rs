@@ -12,7 +12,7 @@ pub struct SectionRow<S> {
     /// From the right end of this cross-section to that of the next (m).
     pub step: [S; 2],
     /// From the right end of the cross-section to the left end (m).
-    pub cut: [S; 2],
+    pub across: [S; 2],
     /// One over the spacing from this cross-section to the next by which second differences are computed (1/m).
     pub inverse_spacing: S,
     /// The part of `alpha` that no variable moves.
@@ -42,14 +42,14 @@ pub struct LinePlan<S> {
 impl LinePlan<f64> {
     /// The plan of the cross-sections between `right_m` and `left_m`, with no variables for `alpha` yet and the spacing of
     /// their middles.
-    pub fn of_cuts(right_m: &[DVec2], left_m: &[DVec2], closed: bool) -> Self {
+    pub fn of_cross_sections(right_m: &[DVec2], left_m: &[DVec2], closed: bool) -> Self {
         let n = right_m.len();
         let middle = |i: usize| 0.5 * (right_m[i] + left_m[i]);
         // As in the kernels, points that coincide count as a tenth of a millimetre apart.
         let spacing = |i: usize| middle(i).distance(middle((i + 1) % n)).max(1e-4);
         let rows = (0..n).map(|i| SectionRow {
             step: (right_m[(i + 1) % n] - right_m[i]).to_array(),
-            cut: (left_m[i] - right_m[i]).to_array(),
+            across: (left_m[i] - right_m[i]).to_array(),
             inverse_spacing: spacing(i).recip(),
             constant: 0.0,
             weights: [0.0; TERMS],
@@ -74,7 +74,7 @@ impl LinePlan<f64> {
 
     /// The plan of one fixed line.
     pub fn of_points(points_m: &[DVec2], closed: bool) -> Self {
-        Self::of_cuts(points_m, points_m, closed)
+        Self::of_cross_sections(points_m, points_m, closed)
     }
 
     /// The plan in the precision that the scalar `R` stores tables in.
@@ -90,7 +90,7 @@ impl LinePlan<f64> {
                 .iter()
                 .map(|row| SectionRow {
                     step: row.step.map(store),
-                    cut: row.cut.map(store),
+                    across: row.across.map(store),
                     inverse_spacing: store(row.inverse_spacing),
                     constant: store(row.constant),
                     weights: row.weights.map(store),

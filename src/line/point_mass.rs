@@ -24,14 +24,14 @@ pub struct PointMass {
 ///
 /// Each row of a table has the figures at its start, then their rises to its end.
 #[derive(Clone, Debug, PartialEq)]
-pub struct LimitTable<S> {
+pub struct EnvelopeTable<S> {
     /// Greatest speed squared (m^2/s^2).
     pub top: S,
-    /// Rows of [`LimitTable::limits`] per speed squared (s^2/m^2).
+    /// Rows of [`EnvelopeTable::rows`] per speed squared (s^2/m^2).
     pub rows_per_speed_squared: S,
     /// Lateral, grip, drive, drag (m/s^2), then their rises.
-    pub limits: Vec<S>,
-    /// Rows of [`LimitTable::corners`] per radius (1/m).
+    pub rows: Vec<S>,
+    /// Rows of [`EnvelopeTable::corners`] per radius (1/m).
     pub rows_per_radius: S,
     /// Corner speed squared (m^2/s^2) over the radius, then its rise.
     pub corners: Vec<S>,
@@ -40,10 +40,10 @@ pub struct LimitTable<S> {
     pub ellipse: Vec<S>,
 }
 
-/// Figures of a row of [`LimitTable::limits`].
-pub const LIMIT_WIDTH: usize = 8;
+/// Figures of a row of [`EnvelopeTable::rows`].
+pub const ENVELOPE_WIDTH: usize = 8;
 /// Rows over speed squared. At 70 m/s a step is 9.6 m^2/s^2: 0.2 m/s at 25 m/s.
-const LIMIT_ROWS: usize = 512;
+const ENVELOPE_ROWS: usize = 512;
 /// Rows over radius. Corner speed squared bends so little over it that a step of the usual 0.3 m costs 1e-6 of it.
 const CORNER_ROWS: usize = 1024;
 /// Rows over the lateral share.
@@ -84,22 +84,24 @@ impl PointMass {
     ///
     /// # Errors
     /// As [`PointMass::check`].
-    pub fn table(&self) -> Result<LimitTable<f64>> {
+    pub fn table(&self) -> Result<EnvelopeTable<f64>> {
         self.check()?;
         let top = self.envelope.top_speed_mps().powi(2);
         let at_knot = |knot: usize| {
-            let row = self.envelope.at((top * knot as f64 / LIMIT_ROWS as f64).sqrt());
+            let row = self
+                .envelope
+                .at((top * knot as f64 / ENVELOPE_ROWS as f64).sqrt());
             [row.ay_mps2, row.ax_grip_mps2, row.ax_drive_mps2, row.drag_mps2]
         };
-        let mut knots: Vec<[f64; 4]> = (0..=LIMIT_ROWS).map(at_knot).collect();
+        let mut knots: Vec<[f64; 4]> = (0..=ENVELOPE_ROWS).map(at_knot).collect();
         // Speed is limited to the greatest one, so the drive need not fall to zero within a row.
         let last = self.envelope.rows()[self.envelope.rows().len() - 1];
-        knots[LIMIT_ROWS][2] = last.ax_drive_mps2;
+        knots[ENVELOPE_ROWS][2] = last.ax_drive_mps2;
         let (radius_top, corner_knots) = self.corners(top, &knots);
-        Ok(LimitTable {
+        Ok(EnvelopeTable {
             top,
-            rows_per_speed_squared: LIMIT_ROWS as f64 / top,
-            limits: with_rises(&knots),
+            rows_per_speed_squared: ENVELOPE_ROWS as f64 / top,
+            rows: with_rises(&knots),
             rows_per_radius: CORNER_ROWS as f64 / radius_top,
             corners: with_rises(&corner_knots),
             ellipse: if self.ellipse_exponent == 2.0 {
@@ -113,9 +115,9 @@ impl PointMass {
     /// The radius from which on no speed is too great, and the corner speed squared at even steps up to it: the least
     /// `w` at which `w / radius` exceeds the lateral limit, which itself rises with downforce.
     fn corners(&self, top: f64, knots: &[[f64; 4]]) -> (f64, Vec<[f64; 1]>) {
-        let step = top / LIMIT_ROWS as f64;
+        let step = top / ENVELOPE_ROWS as f64;
         let lateral = |knot: usize| knots[knot][0];
-        let radius_top = (0..=LIMIT_ROWS)
+        let radius_top = (0..=ENVELOPE_ROWS)
             .map(|k| k as f64 * step / lateral(k))
             .fold(0.0, f64::max);
         let lock_radius = self.max_steer_rad.map_or(0.0, |lock| self.wheelbase_m / lock);
@@ -123,10 +125,10 @@ impl PointMass {
         let corners = (0..=CORNER_ROWS).map(|i| {
             let radius = radius_top * i as f64 / CORNER_ROWS as f64;
             // The first row at whose end the limit is passed; it moves up as the radius grows.
-            while row < LIMIT_ROWS && (row + 1) as f64 * step <= lateral(row + 1) * radius {
+            while row < ENVELOPE_ROWS && (row + 1) as f64 * step <= lateral(row + 1) * radius {
                 row += 1;
             }
-            let corner = if row == LIMIT_ROWS {
+            let corner = if row == ENVELOPE_ROWS {
                 top
             } else {
                 let start = row as f64 * step;
@@ -166,14 +168,14 @@ fn with_rises<const N: usize>(knots: &[[f64; N]]) -> Vec<f64> {
         .collect()
 }
 
-impl LimitTable<f64> {
+impl EnvelopeTable<f64> {
     /// The tables in the precision that the scalar `R` stores tables in.
-    pub fn stored<R: Real>(&self) -> LimitTable<R::Storage> {
+    pub fn stored<R: Real>(&self) -> EnvelopeTable<R::Storage> {
         let all = |table: &[f64]| table.iter().map(|x| R::store(*x)).collect();
-        LimitTable {
+        EnvelopeTable {
             top: R::store(self.top),
             rows_per_speed_squared: R::store(self.rows_per_speed_squared),
-            limits: all(&self.limits),
+            rows: all(&self.rows),
             rows_per_radius: R::store(self.rows_per_radius),
             corners: all(&self.corners),
             ellipse: all(&self.ellipse),

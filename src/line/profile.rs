@@ -1,7 +1,7 @@
 //! All figures of a lap on one line.
 
 use super::kernel::{Course, lap_time};
-use super::point_mass::{LimitTable, PointMass};
+use super::point_mass::{EnvelopeTable, PointMass};
 use crate::error::{Error, Result};
 
 /// A lap, section by section.
@@ -46,7 +46,7 @@ impl LapProfile {
 /// standstill.
 pub fn lap_profile(
     car: &PointMass,
-    table: &LimitTable<f64>,
+    table: &EnvelopeTable<f64>,
     segment_m: &[f64],
     curvature_1pm: &[f64],
     entry_mps: f64,

@@ -59,9 +59,9 @@ fn gt_car() -> PointMass {
 
 #[test]
 fn circles_have_the_length_and_curvature_of_their_polygons() {
-    let cuts = ring(590.0, 600.0, 361);
+    let cross_sections = ring(590.0, 600.0, 361);
     for (alpha, radius) in [(0.0, 600.0), (1.0, 590.0), (0.5, 595.0)] {
-        let found = geometry(&cuts.points(&vec![alpha; 361]), true);
+        let found = geometry(&cross_sections.points(&vec![alpha; 361]), true);
         let side = 2.0 * radius * (PI / 361.0).sin();
         assert!((found.length_m - 361.0 * side).abs() < 1e-9, "{}", found.length_m);
         assert!((found.length_squared_m2 - 361.0 * side * side).abs() < 1e-9 * 361.0 * side);
@@ -127,7 +127,7 @@ fn corner_speed_meets_the_lateral_limit_or_never_binds() {
         ..car
     };
     let locked = locked.table().unwrap();
-    let at = |table: &LimitTable<f64>, radius: f64| kernel::corner::<f64>(table, 1.0 / radius);
+    let at = |table: &EnvelopeTable<f64>, radius: f64| kernel::corner::<f64>(table, 1.0 / radius);
     assert_eq!(at(&table, 20.0), at(&locked, 20.0));
     assert!(at(&locked, 10.0) < 0.3 * at(&table, 10.0));
 }
@@ -212,14 +212,14 @@ fn duals_give_the_gradient_of_the_lap_time() {
     let table = car.table().unwrap();
     let right = wavy(200);
     let left: Vec<DVec2> = right.iter().map(|p| *p * 0.97).collect();
-    let cuts = CrossSections {
+    let cross_sections = CrossSections {
         right_m: right,
         left_m: left,
         ..ring(290.0, 300.0, 200)
     };
     let way = Parametrisation::control_points(40);
-    let mut plan = LinePlan::of_cuts(&cuts.right_m, &cuts.left_m, true);
-    way.apply(&cuts, &mut plan).unwrap();
+    let mut plan = LinePlan::of_cross_sections(&cross_sections.right_m, &cross_sections.left_m, true);
+    way.apply(&cross_sections, &mut plan).unwrap();
     let wanted = Wanted {
         integral: true,
         lap: true,
@@ -255,10 +255,14 @@ fn control_points_give_lines_and_lines_control_points() {
     let closed = ring(590.0, 600.0, 100);
     let mut open = closed.clone();
     open.closed = false;
-    for cuts in [&closed, &open] {
+    for cross_sections in [&closed, &open] {
         let way = Parametrisation::control_points(17);
-        let mut plan = LinePlan::of_cuts(&cuts.right_m, &cuts.left_m, cuts.closed);
-        way.apply(cuts, &mut plan).unwrap();
+        let mut plan = LinePlan::of_cross_sections(
+            &cross_sections.right_m,
+            &cross_sections.left_m,
+            cross_sections.closed,
+        );
+        way.apply(cross_sections, &mut plan).unwrap();
         for row in &plan.rows {
             assert!((row.weights.iter().sum::<f64>() - 1.0).abs() < 1e-12);
             assert!(row.weights.iter().all(|w| *w >= 0.0));
@@ -269,7 +273,7 @@ fn control_points_give_lines_and_lines_control_points() {
             .iter()
             .map(|row| kernel::alpha(row, plan.terms, &coefficients))
             .collect();
-        let back = way.fit(cuts, &alpha).unwrap();
+        let back = way.fit(cross_sections, &alpha).unwrap();
         for (a, b) in back.iter().zip(&coefficients) {
             assert!((a - b).abs() < 1e-6, "{a} {b}");
         }
@@ -280,15 +284,15 @@ fn control_points_give_lines_and_lines_control_points() {
         assert!(rough.fold(0.0, f64::max) < 0.02);
 
         let some = way.with_free(vec![3, 16], coefficients.clone());
-        assert_eq!(some.variables(cuts)[1].name, "control_16");
-        some.apply(cuts, &mut plan).unwrap();
+        assert_eq!(some.variables(cross_sections)[1].name, "control_16");
+        some.apply(cross_sections, &mut plan).unwrap();
         let variables = some.variables_of(&coefficients);
         for (row, alpha) in plan.rows.iter().zip(&alpha) {
             assert!((kernel::alpha(row, plan.terms, &variables) - alpha).abs() < 1e-12);
         }
     }
     let ends = Parametrisation::control_points(9).with_fixed_ends(vec![0.25; 9]);
-    let mut plan = LinePlan::of_cuts(&open.right_m, &open.left_m, false);
+    let mut plan = LinePlan::of_cross_sections(&open.right_m, &open.left_m, false);
     ends.apply(&open, &mut plan).unwrap();
     assert!((kernel::alpha::<f64>(&plan.rows[0], 4, &[1.0; 7]) - 0.25).abs() < 1e-12);
     assert!((kernel::alpha::<f64>(&plan.rows[99], 4, &[1.0; 7]) - 0.25).abs() < 1e-12);
@@ -323,10 +327,10 @@ fn a_fine_line_knows_the_circle_that_its_points_lie_on() {
 
 #[test]
 fn clearance_is_the_distance_to_the_edges() {
-    let cuts = ring(590.0, 600.0, 720);
+    let cross_sections = ring(590.0, 600.0, 720);
     for (alpha, expected, left) in [(0.5, 4.0, true), (0.9, 0.0, true), (0.02, -0.8, false)] {
-        let line = FineLine::new(&cuts.points(&[alpha; 720]), true, 1.0, None, 0.0).unwrap();
-        let found = check_line(&line, &cuts.right_m, &cuts.left_m, 2.0);
+        let line = FineLine::new(&cross_sections.points(&[alpha; 720]), true, 1.0, None, 0.0).unwrap();
+        let found = check_line(&line, &cross_sections.right_m, &cross_sections.left_m, 2.0);
         // The edges are polygons: at half a side they are 6 mm nearer the middle than the circle.
         assert!((found.margin_m - expected).abs() < 0.008, "{found:?}");
         assert!(found.left == left || alpha == 0.5);

@@ -72,7 +72,8 @@ pub fn least_squared_length(map: &LineMap, bounds: &Bounds) -> Result<Optimum> {
 /// The line of least Gamma, `sqrt(sum |z_i|^2)` with second differences `z_i` over a fixed `spacing_m` of the
 /// segments: a quadratic program. Its value is Gamma (1/m).
 ///
-/// A line may gain by steps that differ from the spacing it is judged by; [`super::least_curvature`] does not allow that gain.
+/// The spacing is fixed while the steps of the line are not, so a line may gain by uneven steps. [`super::minimum_curvature`]
+/// does not allow that gain.
 ///
 /// # Errors
 /// [`Error::Input`] for bounds or spacing that do not fit, [`Error::Study`] if the solver refuses.

@@ -164,8 +164,9 @@ impl DeploymentSearch<'_> {
     fn linear(&self, length: &[f64], curvature: &[f64], i: usize, square: f64, share: f64) -> Linear {
         let (h, n) = (length[i], curvature.len());
         let bends = [curvature[i], curvature[(i + 1) % n]];
-        let step =
-            |square: f64, share: f64| motor_step(&self.car.limits, &self.car.table, square, h, bends, share);
+        let step = |square: f64, share: f64| {
+            motor_step(&self.car.envelope_table, &self.car.table, square, h, bends, share)
+        };
         let cost = self.car.table.mass * self.car.table.deploy_cost * h;
         let [reached, motor] = step(square, share);
         let around = DERIVATIVE * square;

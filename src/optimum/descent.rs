@@ -185,15 +185,15 @@ pub fn fastest(
 ///
 /// # Errors
 /// Those of [`descend`].
-pub fn least_curvature(map: &LineMap, bounds: &Bounds, x: &[f64]) -> Result<Optimum> {
-    least_curvature_of(&ReferenceProblem::of(map), bounds, x)
+pub fn minimum_curvature(map: &LineMap, bounds: &Bounds, x: &[f64]) -> Result<Optimum> {
+    minimum_curvature_of(&ReferenceProblem::of(map), bounds, x)
 }
 
 /// The same of a problem that may be [stopped](ReferenceProblem::stop).
 ///
 /// # Errors
 /// Those of [`descend`].
-pub fn least_curvature_of(problem: &ReferenceProblem, bounds: &Bounds, x: &[f64]) -> Result<Optimum> {
+pub fn minimum_curvature_of(problem: &ReferenceProblem, bounds: &Bounds, x: &[f64]) -> Result<Optimum> {
     let weights = Weights {
         curvature: 1.0,
         ..Weights::default()
@@ -226,10 +226,10 @@ fn check_start(problem: &ReferenceProblem, start: &Start) -> Result<()> {
         let expected = "weights of zero or more, one of them more";
         return Err(Error::input("the line", "weights", format!("{w:?}"), expected));
     }
-    if w.time > 0.0 && problem.limits.is_none() {
+    if w.time > 0.0 && problem.envelope.is_none() {
         return Err(Error::input(
             "the line",
-            "limits",
+            "envelope",
             "none",
             "a car, for its lap time",
         ));
@@ -331,8 +331,8 @@ impl Place {
                 }
             }
         }
-        if let (Some(lap), Some(limits)) = (&self.lap, problem.limits) {
-            add_time(&mut program, map, limits, shape, lap, weights.time, caution);
+        if let (Some(lap), Some(envelope)) = (&self.lap, problem.envelope) {
+            add_time(&mut program, map, envelope, shape, lap, weights.time, caution);
         }
         program
     }

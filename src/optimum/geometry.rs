@@ -43,19 +43,31 @@ impl LineMap {
     }
 
     /// One variable for each cross-section: the line's `alpha` there.
-    pub fn at_every_cut(cuts: &CrossSections) -> Self {
-        let points = (0..cuts.len()).map(|i| (cuts.right_m[i], vec![(i, cuts.left_m[i] - cuts.right_m[i])]));
-        Self::new(cuts.closed, cuts.len(), points)
+    pub fn at_every_cross_section(cross_sections: &CrossSections) -> Self {
+        let points = (0..cross_sections.len()).map(|i| {
+            (
+                cross_sections.right_m[i],
+                vec![(i, cross_sections.left_m[i] - cross_sections.right_m[i])],
+            )
+        });
+        Self::new(cross_sections.closed, cross_sections.len(), points)
     }
 
     /// The variables of a parametrisation, and the bounds that keep them and the line within theirs.
     ///
     /// # Errors
     /// [`crate::Error::Input`] if the parametrisation does not fit the cross-sections.
-    pub fn parametrised(cuts: &CrossSections, parametrisation: &Parametrisation) -> Result<(Self, Bounds)> {
-        let mut plan = LinePlan::of_cuts(&cuts.right_m, &cuts.left_m, cuts.closed);
-        parametrisation.apply(cuts, &mut plan)?;
-        let variables = parametrisation.variables(cuts);
+    pub fn parametrised(
+        cross_sections: &CrossSections,
+        parametrisation: &Parametrisation,
+    ) -> Result<(Self, Bounds)> {
+        let mut plan = LinePlan::of_cross_sections(
+            &cross_sections.right_m,
+            &cross_sections.left_m,
+            cross_sections.closed,
+        );
+        parametrisation.apply(cross_sections, &mut plan)?;
+        let variables = parametrisation.variables(cross_sections);
         let shares = |row: &SectionRow<f64>| {
             let terms = row.sources.iter().zip(&row.weights).take(plan.terms);
             let used = terms.filter(|(_, weight)| **weight != 0.0);
@@ -63,11 +75,11 @@ impl LineMap {
                 .collect::<Vec<_>>()
         };
         let points = plan.rows.iter().enumerate().map(|(i, row)| {
-            let across = cuts.left_m[i] - cuts.right_m[i];
+            let across = cross_sections.left_m[i] - cross_sections.right_m[i];
             let reach = shares(row).into_iter().map(|(k, share)| (k, share * across));
-            (cuts.right_m[i] + row.constant * across, reach.collect())
+            (cross_sections.right_m[i] + row.constant * across, reach.collect())
         });
-        let map = Self::new(cuts.closed, variables.len(), points);
+        let map = Self::new(cross_sections.closed, variables.len(), points);
         // A single variable at a section has its own bounds.
         let sums = plan.rows.iter().filter(|_| plan.terms > 1);
         let rows = sums.map(|row| RowBound {
@@ -87,27 +99,27 @@ impl LineMap {
     /// to the left), and the bounds that keep it on the road at every cross-section. If the base is smooth, so are all such
     /// lines, however jagged the edges are. Lines whose `alpha` is a spline lack that property. The base itself may lie off the
     /// road.
-    pub fn spline_about(cuts: &CrossSections, base: &[f64], controls: usize) -> (Self, Bounds) {
-        let points = cuts.points(base);
-        let across = |i: usize| (cuts.left_m[i] - cuts.right_m[i]).normalize();
-        let reaches = (0..cuts.len()).map(|i| {
-            let reach = spline_shares(cuts, controls, i).into_iter();
+    pub fn spline_about(cross_sections: &CrossSections, base: &[f64], controls: usize) -> (Self, Bounds) {
+        let points = cross_sections.points(base);
+        let across = |i: usize| (cross_sections.left_m[i] - cross_sections.right_m[i]).normalize();
+        let reaches = (0..cross_sections.len()).map(|i| {
+            let reach = spline_shares(cross_sections, controls, i).into_iter();
             (
                 points[i],
                 reach.map(|(k, share)| (k, share * across(i))).collect(),
             )
         });
-        let rows = (0..cuts.len()).map(|i| RowBound {
-            terms: spline_shares(cuts, controls, i),
-            lower: (cuts.right_m[i] - points[i]).dot(across(i)),
-            upper: (cuts.left_m[i] - points[i]).dot(across(i)),
+        let rows = (0..cross_sections.len()).map(|i| RowBound {
+            terms: spline_shares(cross_sections, controls, i),
+            lower: (cross_sections.right_m[i] - points[i]).dot(across(i)),
+            upper: (cross_sections.left_m[i] - points[i]).dot(across(i)),
         });
         let bounds = Bounds {
             lower: vec![f64::NEG_INFINITY; controls],
             upper: vec![f64::INFINITY; controls],
             rows: rows.collect(),
         };
-        (Self::new(cuts.closed, controls, reaches), bounds)
+        (Self::new(cross_sections.closed, controls, reaches), bounds)
     }
 
     /// Number of variables.
@@ -148,10 +160,14 @@ impl LineMap {
 
 /// Weights of `controls` evenly spaced controls of a cubic B-spline at cross-section `i`. On an open circuit the outer controls
 /// also stand for those that would lie beyond the ends.
-fn spline_shares(cuts: &CrossSections, controls: usize, i: usize) -> Vec<(usize, f64)> {
+fn spline_shares(cross_sections: &CrossSections, controls: usize, i: usize) -> Vec<(usize, f64)> {
     let last = controls as isize - 1;
-    let spans = if cuts.closed { controls as f64 } else { last as f64 };
-    let place = cuts.station_m[i] / cuts.length_m * spans;
+    let spans = if cross_sections.closed {
+        controls as f64
+    } else {
+        last as f64
+    };
+    let place = cross_sections.station_m[i] / cross_sections.length_m * spans;
     let t = place - place.floor();
     let weights = [
         (1.0 - t).powi(3) / 6.0,
@@ -162,7 +178,7 @@ fn spline_shares(cuts: &CrossSections, controls: usize, i: usize) -> Vec<(usize,
     let mut row: Vec<(usize, f64)> = Vec::with_capacity(4);
     for (weight, offset) in weights.into_iter().zip(-1..) {
         let k = place.floor() as isize + offset;
-        let k = if cuts.closed {
+        let k = if cross_sections.closed {
             k.rem_euclid(last + 1)
         } else {
             k.clamp(0, last)

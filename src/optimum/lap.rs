@@ -34,7 +34,7 @@ pub struct Grip {
 }
 
 /// The g-g-v envelope of a point mass.
-pub trait Limits: Sync {
+pub trait GripEnvelope: Sync {
     /// The envelope at a speed (m/s).
     fn at(&self, speed_mps: f64) -> Grip;
     /// The top speed (m/s).
@@ -123,13 +123,13 @@ const MOST_STEPS: usize = 60;
 const ACCURACY: f64 = 1e-12;
 
 impl Lap {
-    /// Drives `shape` as fast as `limits` allow, from `start_mps` on an open line.
-    pub fn of(shape: &Shape, limits: &dyn Limits, start_mps: f64, bend: SegmentBend) -> Self {
+    /// Drives `shape` as fast as `envelope` allows, from `start_mps` on an open line.
+    pub fn of(shape: &Shape, envelope: &dyn GripEnvelope, start_mps: f64, bend: SegmentBend) -> Self {
         let n = shape.curvature_1pm.len();
         let bends = Bends::of(shape, bend);
         let (mut corner, mut corner_by_curvature) = (Vec::with_capacity(n), Vec::with_capacity(n));
         for curvature in &shape.curvature_1pm {
-            let (square, slope) = corner_square(limits, *curvature);
+            let (square, slope) = corner_square(envelope, *curvature);
             corner.push(square);
             corner_by_curvature.push(slope);
         }
@@ -141,11 +141,11 @@ impl Lap {
             }
         }
         let (after_drive, drive) = if shape.closed {
-            closed_drive(shape, &bends, limits, &corner)
+            closed_drive(shape, &bends, envelope, &corner)
         } else {
-            drive_pass(shape, &bends, limits, &corner, 0, n)
+            drive_pass(shape, &bends, envelope, &corner, 0, n)
         };
-        let (square, brake) = brake_pass(shape, &bends, limits, &after_drive);
+        let (square, brake) = brake_pass(shape, &bends, envelope, &after_drive);
         let speed: Vec<f64> = square.iter().map(|e| e.sqrt()).collect();
         let segments = shape.length_m.iter().enumerate();
         let time_s = segments
@@ -216,21 +216,21 @@ impl Lap {
 }
 
 /// The greatest `e` that a curvature (1/m) allows, and its derivative by curvature.
-fn corner_square(limits: &dyn Limits, curvature_1pm: f64) -> (f64, f64) {
+fn corner_square(envelope: &dyn GripEnvelope, curvature_1pm: f64) -> (f64, f64) {
     let k = curvature_1pm.abs();
-    let top = limits.top_speed_mps();
+    let top = envelope.top_speed_mps();
     let mut high = top * top;
     // The grip less the need for it, which falls through zero at the corner speed.
     let spare = |e: f64| {
         let v = e.sqrt();
-        let lateral = limits.at(v).lateral;
+        let lateral = envelope.at(v).lateral;
         (lateral.value - k * e, 0.5 * lateral.by_speed / v - k)
     };
     if spare(high).0 >= 0.0 {
         return (high, 0.0);
     }
     let mut low = 0.0;
-    let mut e = (limits.at(0.5 * top).lateral.value / k).min(high);
+    let mut e = (envelope.at(0.5 * top).lateral.value / k).min(high);
     for _ in 0..MOST_STEPS {
         let (value, slope) = spare(e);
         if value > 0.0 {
@@ -262,10 +262,10 @@ struct Push {
     by_curvature: f64,
 }
 
-fn push(limits: &dyn Limits, pass: Pass, e: f64, curvature_1pm: f64) -> Push {
+fn push(envelope: &dyn GripEnvelope, pass: Pass, e: f64, curvature_1pm: f64) -> Push {
     let v = e.sqrt().max(f64::MIN_POSITIVE);
     let per_square = 0.5 / v;
-    let grip = limits.at(v);
+    let grip = envelope.at(v);
     let lateral = grip.lateral.value;
     let used = curvature_1pm * e / lateral;
     let left = 1.0 - used * used;
@@ -307,8 +307,8 @@ fn push(limits: &dyn Limits, pass: Pass, e: f64, curvature_1pm: f64) -> Push {
 }
 
 /// The middle of a segment if the envelope did not change over it: the intersection of a parabola and the ellipse.
-fn guess(limits: &dyn Limits, pass: Pass, start: f64, curvature_1pm: f64, h: f64) -> f64 {
-    let grip = limits.at(start.sqrt().max(f64::MIN_POSITIVE));
+fn guess(envelope: &dyn GripEnvelope, pass: Pass, start: f64, curvature_1pm: f64, h: f64) -> f64 {
+    let grip = envelope.at(start.sqrt().max(f64::MIN_POSITIVE));
     let drag = match pass {
         Pass::Drive => -h * grip.drag.value,
         Pass::Brake => h * grip.drag.value,
@@ -329,14 +329,14 @@ fn guess(limits: &dyn Limits, pass: Pass, start: f64, curvature_1pm: f64, h: f64
 
 /// The `e` that a pass reaches from `start` over one segment, by the implicit midpoint rule: the acceleration is that at the
 /// middle, `e_m = start + h a(e_m)`. The rule is of second order, and stable because the envelope falls with speed.
-fn across(limits: &dyn Limits, pass: Pass, start: f64, curvature_1pm: f64, h: f64) -> (f64, Origin) {
-    let first = push(limits, pass, start, curvature_1pm);
+fn across(envelope: &dyn GripEnvelope, pass: Pass, start: f64, curvature_1pm: f64, h: f64) -> (f64, Origin) {
+    let first = push(envelope, pass, start, curvature_1pm);
     // No acceleration rises so fast with `e` that `h` times its slope exceeds one half. The middle therefore lies within twice
     // the step of Euler's method.
     let reach = 2.0 * h * first.value;
     let (mut low, mut high) = ((start + reach.min(0.0)).max(0.0), start + reach.max(0.0));
-    let mut e = guess(limits, pass, start, curvature_1pm, h).clamp(low, high);
-    let mut p = push(limits, pass, e, curvature_1pm);
+    let mut e = guess(envelope, pass, start, curvature_1pm, h).clamp(low, high);
+    let mut p = push(envelope, pass, e, curvature_1pm);
     for _ in 0..MOST_STEPS {
         let excess = e - start - h * p.value;
         if excess <= 0.0 {
@@ -353,7 +353,7 @@ fn across(limits: &dyn Limits, pass: Pass, start: f64, curvature_1pm: f64, h: f6
         } else {
             0.5 * (low + high)
         };
-        p = push(limits, pass, e, curvature_1pm);
+        p = push(envelope, pass, e, curvature_1pm);
     }
     let gain = p.share / (p.share - h * p.by_square);
     let by_curvature = h * p.by_curvature / (p.share - h * p.by_square);
@@ -371,7 +371,7 @@ type Passed = (Vec<f64>, Vec<(usize, Origin)>);
 fn drive_pass(
     shape: &Shape,
     bends: &Bends,
-    limits: &dyn Limits,
+    envelope: &dyn GripEnvelope,
     corner: &[f64],
     first: usize,
     count: usize,
@@ -383,7 +383,7 @@ fn drive_pass(
         let (previous, node) = ((first + step - 1) % n, (first + step) % n);
         let curvature = bends.curvature_1pm[previous];
         let (reached, origin) = across(
-            limits,
+            envelope,
             Pass::Drive,
             square[previous],
             curvature,
@@ -398,17 +398,17 @@ fn drive_pass(
 
 /// The drive pass of a closed lap. It starts at a node whose corner speed the car reaches again a lap later. Drag may prevent
 /// that at the slowest corner; then another node is tried. If there is none (a circle), two laps are driven.
-fn closed_drive(shape: &Shape, bends: &Bends, limits: &dyn Limits, corner: &[f64]) -> Passed {
+fn closed_drive(shape: &Shape, bends: &Bends, envelope: &dyn GripEnvelope, corner: &[f64]) -> Passed {
     let n = corner.len();
     let mut first = (0..n)
         .min_by(|a, b| corner[*a].total_cmp(&corner[*b]))
         .unwrap_or(0);
     for _ in 0..3 {
-        let passed = drive_pass(shape, bends, limits, corner, first, n);
+        let passed = drive_pass(shape, bends, envelope, corner, first, n);
         let last = (first + n - 1) % n;
         let curvature = bends.curvature_1pm[last];
         let (closing, _) = across(
-            limits,
+            envelope,
             Pass::Drive,
             passed.0[last],
             curvature,
@@ -427,12 +427,12 @@ fn closed_drive(shape: &Shape, bends: &Bends, limits: &dyn Limits, corner: &[f64
             None => break,
         }
     }
-    drive_pass(shape, bends, limits, corner, first, 2 * n)
+    drive_pass(shape, bends, envelope, corner, first, 2 * n)
 }
 
 /// The braking pass, backwards below the speeds of the drive pass. It starts at the slowest node of a closed line, which no
 /// braking can lower, or at the end of an open one.
-fn brake_pass(shape: &Shape, bends: &Bends, limits: &dyn Limits, after_drive: &[f64]) -> Passed {
+fn brake_pass(shape: &Shape, bends: &Bends, envelope: &dyn GripEnvelope, after_drive: &[f64]) -> Passed {
     let n = after_drive.len();
     let slowest = (0..n)
         .min_by(|a, b| after_drive[*a].total_cmp(&after_drive[*b]))
@@ -443,7 +443,13 @@ fn brake_pass(shape: &Shape, bends: &Bends, limits: &dyn Limits, after_drive: &[
     for step in 1..n {
         let (next, node) = ((last + n + 1 - step) % n, (last + n - step) % n);
         let curvature = bends.curvature_1pm[node];
-        let (reached, origin) = across(limits, Pass::Brake, square[next], curvature, shape.length_m[node]);
+        let (reached, origin) = across(
+            envelope,
+            Pass::Brake,
+            square[next],
+            curvature,
+            shape.length_m[node],
+        );
         let own = reached >= after_drive[node];
         square[node] = if own { after_drive[node] } else { reached };
         origins.push((node, if own { Origin::Own } else { origin }));

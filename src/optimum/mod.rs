@@ -27,9 +27,9 @@ pub use conic::Status;
 pub use convex::{Optimum, least_gamma, least_squared_length, shortest, spacing_m};
 pub use deployment::{Deployment, DeploymentSearch};
 pub use descent::{
-    DescentSettings, Start, descend, fastest, least_curvature, least_curvature_of, polish_lines,
+    DescentSettings, Start, descend, fastest, minimum_curvature, minimum_curvature_of, polish_lines,
 };
 pub use geometry::LineMap;
-pub use lap::{Grip, Limits, SegmentBend, Slope};
+pub use lap::{Grip, GripEnvelope, SegmentBend, Slope};
 pub use objective::{Measures, ReferenceProblem, Weights};
-pub use point_mass::PointMassLimits;
+pub use point_mass::PointMassEnvelope;

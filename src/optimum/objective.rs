@@ -1,7 +1,7 @@
 //! The cost of a line, with its gradient.
 
 use super::geometry::{LineMap, Shape};
-use super::lap::{Lap, Limits, SegmentBend};
+use super::lap::{GripEnvelope, Lap, SegmentBend};
 use crate::hold::{self, Point};
 use glam::DVec2;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -53,7 +53,7 @@ pub struct ReferenceProblem<'a> {
     /// The map from a line's variables to its points.
     pub map: &'a LineMap,
     /// Envelope of the car; needed only for lap times.
-    pub limits: Option<&'a dyn Limits>,
+    pub envelope: Option<&'a dyn GripEnvelope>,
     /// Speed at the start of an open line (m/s).
     pub start_mps: f64,
     /// Spacing (m) for the second differences of Gamma, one for each segment: that of the reference line.
@@ -70,7 +70,7 @@ impl<'a> ReferenceProblem<'a> {
     pub fn of(map: &'a LineMap) -> Self {
         Self {
             map,
-            limits: None,
+            envelope: None,
             start_mps: 0.0,
             spacing_m: None,
             bend: SegmentBend::default(),
@@ -100,8 +100,8 @@ impl<'a> ReferenceProblem<'a> {
             };
             return (shape, None, measures);
         }
-        let limits = self.limits.filter(|_| weights.time != 0.0);
-        let lap = limits.map(|limits| Lap::of(&shape, limits, self.start_mps, self.bend));
+        let envelope = self.envelope.filter(|_| weights.time != 0.0);
+        let lap = envelope.map(|envelope| Lap::of(&shape, envelope, self.start_mps, self.bend));
         let measures = self.measured(&shape, lap.as_ref());
         (shape, lap, measures)
     }
@@ -119,8 +119,8 @@ impl<'a> ReferenceProblem<'a> {
     pub fn speeds_mps(&self, x: &[f64]) -> Vec<f64> {
         let shape = Shape::of(&self.map.line(x), self.map.closed);
         let lap = self
-            .limits
-            .map(|limits| Lap::of(&shape, limits, self.start_mps, self.bend));
+            .envelope
+            .map(|envelope| Lap::of(&shape, envelope, self.start_mps, self.bend));
         lap.map_or_else(Vec::new, |lap| lap.square.iter().map(|e| e.sqrt()).collect())
     }
 

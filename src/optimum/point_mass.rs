@@ -1,6 +1,6 @@
 //! The g-g-v envelope of a [`PointMass`], as the solvers use it.
 
-use super::lap::{Grip, Limits, Slope};
+use super::lap::{Grip, GripEnvelope, Slope};
 use crate::line::PointMass;
 use crate::vehicle::EnvelopeRow;
 use crate::{Error, Result};
@@ -9,11 +9,11 @@ use crate::{Error, Result};
 ///
 /// The steering lock is left out. It would slow the car in corners that are too tight for it, and no fast line has such corners.
 #[derive(Clone, Debug, PartialEq)]
-pub struct PointMassLimits {
+pub struct PointMassEnvelope {
     rows: Vec<EnvelopeRow>,
 }
 
-impl PointMassLimits {
+impl PointMassEnvelope {
     /// The envelope of `car`.
     ///
     /// # Errors
@@ -35,7 +35,7 @@ impl PointMassLimits {
     }
 }
 
-impl Limits for PointMassLimits {
+impl GripEnvelope for PointMassEnvelope {
     fn at(&self, v_mps: f64) -> Grip {
         let after = self.rows.partition_point(|row| row.v_mps <= v_mps);
         let (low, high) = (

@@ -5,15 +5,15 @@ use crate::line::Parametrisation;
 use crate::random::Random;
 use crate::track::{CrossSections, Shape, Spacing};
 
-fn ellipse(cuts: usize) -> CrossSections {
+fn ellipse(cross_sections: usize) -> CrossSections {
     let shape = Shape::parse("ellipse:300:60:12").unwrap().unwrap();
-    shape.cross_sections(&Spacing::equal(cuts)).unwrap()
+    shape.cross_sections(&Spacing::equal(cross_sections)).unwrap()
 }
 
 /// Grip that grows with speed, constant power, drag.
 struct Racer;
 
-impl Limits for Racer {
+impl GripEnvelope for Racer {
     fn at(&self, v: f64) -> Grip {
         let line = |value: f64, by_speed: f64| Slope {
             value: value + by_speed * v,
@@ -77,13 +77,13 @@ fn weights() -> [(&'static str, Weights); 5] {
 /// lap's Newton steps; what a wrong term would do is of the size of the gradient itself.
 #[test]
 fn gradients_are_those_of_differences() {
-    let cuts = ellipse(200);
-    let (spline, _) = LineMap::parametrised(&cuts, &Parametrisation::control_points(40)).unwrap();
-    for map in [LineMap::at_every_cut(&cuts), spline] {
+    let cross_sections = ellipse(200);
+    let (spline, _) = LineMap::parametrised(&cross_sections, &Parametrisation::control_points(40)).unwrap();
+    for map in [LineMap::at_every_cross_section(&cross_sections), spline] {
         let spacing = spacing_m(&map, &vec![0.5; map.variables()]);
         for spacing_m in [None, Some(&spacing[..])] {
             let problem = ReferenceProblem {
-                limits: Some(&Racer),
+                envelope: Some(&Racer),
                 spacing_m,
                 ..ReferenceProblem::of(&map)
             };
@@ -111,11 +111,11 @@ fn gradients_are_those_of_differences() {
 /// An open road, too: entry speed given, one fewer segment than points.
 #[test]
 fn gradients_on_an_open_road() {
-    let mut cuts = ellipse(200);
-    cuts.closed = false;
-    let map = LineMap::at_every_cut(&cuts);
+    let mut cross_sections = ellipse(200);
+    cross_sections.closed = false;
+    let map = LineMap::at_every_cross_section(&cross_sections);
     let problem = ReferenceProblem {
-        limits: Some(&Racer),
+        envelope: Some(&Racer),
         start_mps: 10.0,
         ..ReferenceProblem::of(&map)
     };
@@ -142,9 +142,9 @@ fn gradients_on_an_open_road() {
 #[test]
 fn a_steady_circle_is_driven_at_the_ellipse() {
     let circle = Shape::parse("circle:95:105").unwrap().unwrap();
-    let map = LineMap::at_every_cut(&circle.cross_sections(&Spacing::equal(360)).unwrap());
+    let map = LineMap::at_every_cross_section(&circle.cross_sections(&Spacing::equal(360)).unwrap());
     let problem = ReferenceProblem {
-        limits: Some(&Racer),
+        envelope: Some(&Racer),
         ..ReferenceProblem::of(&map)
     };
     for v in problem.speeds_mps(&[0.5; 360]) {

@@ -2,18 +2,18 @@
 
 use super::conic::{Affine, ConicProgram};
 use super::geometry::{LineMap, Shape};
-use super::lap::{Lap, Limits};
+use super::lap::{GripEnvelope, Lap};
 
 /// Least relative change of a squared speed in a step, so that speeds stay above zero.
 const LEAST_CHANGE: f64 = -0.9;
 
-/// Adds the time, times `weight`, of `lap` to a program whose variables so far are changes
-/// of the line's; relative changes of the squared speeds follow them. Tyres are held within the ellipse at the middle of each
-/// segment with the curvature that it is driven with (both ends', where that is the tighter one's), corner speeds at the points, as the lap has it.
+/// Adds the time, times `weight`, of `lap` to a program whose variables so far are changes of the line's; relative changes of the
+/// squared speeds follow them. Tyres are held within the ellipse at the middle of each segment with the curvature that it is
+/// driven with (both ends', where that is the tighter one's), corner speeds at the points, as the lap has it.
 pub(super) fn add_time(
     program: &mut ConicProgram,
     map: &LineMap,
-    limits: &dyn Limits,
+    envelope: &dyn GripEnvelope,
     shape: &Shape,
     lap: &Lap,
     weight: f64,
@@ -22,7 +22,7 @@ pub(super) fn add_time(
     let n = map.points();
     let squares = &lap.square;
     let speed: Vec<f64> = squares.iter().map(|e| e.sqrt()).collect();
-    let top = limits.top_speed_mps().powi(2);
+    let top = envelope.top_speed_mps().powi(2);
     let bounds = squares.iter().enumerate().map(|(i, e)| {
         // The speed at the start of an open line is fixed, and so is a standstill.
         let held = *e <= 0.0 || (!map.closed && i == 0);
@@ -54,10 +54,10 @@ pub(super) fn add_time(
         program.add_square(Affine::change(terms));
     }
     for s in 0..shape.length_m.len() {
-        add_segment(program, map, limits, shape, lap, (first, s));
+        add_segment(program, map, envelope, shape, lap, (first, s));
     }
     for i in 0..n {
-        let grip = limits.at(speed[i].max(f64::MIN_POSITIVE)).lateral;
+        let grip = envelope.at(speed[i].max(f64::MIN_POSITIVE)).lateral;
         let used = shape.curvature_1pm[i] * squares[i] / grip.value;
         let by_square = used * (1.0 - 0.5 * speed[i] * grip.by_speed / grip.value);
         // A linear model of grip leaves out the product of the relative changes of curvature and of speed squared. That costs at
@@ -83,7 +83,7 @@ pub(super) fn add_time(
 fn add_segment(
     program: &mut ConicProgram,
     map: &LineMap,
-    limits: &dyn Limits,
+    envelope: &dyn GripEnvelope,
     shape: &Shape,
     lap: &Lap,
     (first, s): (usize, usize),
@@ -92,7 +92,7 @@ fn add_segment(
     let (e0, e1, h) = (lap.square[s], lap.square[next], shape.length_m[s]);
     let middle = 0.5 * (e0 + e1);
     let v = middle.sqrt().max(f64::MIN_POSITIVE);
-    let grip = limits.at(v);
+    let grip = envelope.at(v);
     let per_square = 0.5 / v;
     let acceleration = 0.5 * (e1 - e0) / h;
     let demand = acceleration + grip.drag.value;

@@ -7,7 +7,7 @@ use crate::evaluate::Failure;
 use crate::evaluate::energy::{Free, HybridLine, HybridObjective, HybridProblem, Strategy};
 use crate::line::energy::{EnergyCar, EnergyLap, EnergyPlan, Gates, Mode, Traction};
 use crate::line::geometry;
-use crate::study::envelope::{EnvelopeSettings, car_limits};
+use crate::study::envelope::{EnvelopeSettings, car_envelope};
 use crate::study::raceline::{RacelineSettings, set_up};
 use crate::vehicle::Car;
 
@@ -56,7 +56,7 @@ pub struct Allowed {
 pub fn allowed(problem: &HybridProblem, exact: &EnergyLap<f64>) -> Allowed {
     let points = match problem.line() {
         HybridLine::Fixed { points_m, .. } => points_m.clone(),
-        HybridLine::Free { cuts, .. } => cuts.points(&vec![0.5; cuts.len()]),
+        HybridLine::Free { cross_sections, .. } => cross_sections.points(&vec![0.5; cross_sections.len()]),
     };
     let segments = geometry(&points, true).segment_m;
     let spacing = segments.iter().fold(0.0, |a: f64, b| a.max(*b));
@@ -133,14 +133,14 @@ pub fn problems(sections: usize, modes: &[Mode]) -> Result<Vec<HybridProblem>> {
         sections,
         ..RacelineSettings::default()
     })?;
-    let points_m = setup.cuts.points(&setup.cuts.reference);
+    let points_m = setup.cross_sections.points(&setup.cross_sections.reference);
     let length_m = geometry(&points_m, true).segment_m;
     let car = Car::bundled_hybrid()?;
     let coarse = EnvelopeSettings {
         step_mps: 8.0,
         ..EnvelopeSettings::default()
     };
-    let limits = car_limits(&car, &coarse)?;
+    let limits = car_envelope(&car, &coarse)?;
     let rows = limits.speeds.iter().map(|s| (s.row.v_mps, s.traction_mps2));
     let rows = rows.collect();
     let car = EnergyCar::new(car, limits.envelope, Traction { rows }, 2.0)?;

@@ -26,9 +26,12 @@ const SECTIONS: usize = 360;
 /// fill: `sqrt(2 * 1.8e-7)` or 6e-4 of the grip `g`. Half of `2 h` times that, over a corner's speed squared `g r`, is off by `h
 /// / r` times 6e-4, its root and so the time by half of that, in corners: 1.6e-4 at 16 m in bends of 30 m.
 pub fn line_tolerances(problem: &LineProblem, exact: &[f64]) -> [f64; 5] {
-    let cuts = problem.cuts();
-    let n = cuts.len() as f64;
-    let middle = geometry(&cuts.points(&vec![0.5; cuts.len()]), cuts.closed);
+    let cross_sections = problem.cross_sections();
+    let n = cross_sections.len() as f64;
+    let middle = geometry(
+        &cross_sections.points(&vec![0.5; cross_sections.len()]),
+        cross_sections.closed,
+    );
     // Inside bends, points are closer than in the middle of the road.
     let shortest = 0.6 * middle.segment_m.iter().fold(f64::INFINITY, |a, b| a.min(*b));
     let point = 6e-6;
@@ -38,7 +41,7 @@ pub fn line_tolerances(problem: &LineProblem, exact: &[f64]) -> [f64; 5] {
     let root = exact[3].sqrt();
     let integral = exact[0].sqrt() * bend + 1e-5 * root;
     let left = (2.0f64 * 3.0 * 6e-8).sqrt();
-    let sharpest = (0..cuts.len())
+    let sharpest = (0..cross_sections.len())
         .map(|i| middle.curvature_1pm[i].abs() * middle.segment_m[i.min(middle.segment_m.len() - 1)])
         .fold(0.0, f64::max);
     let time = (1e-5 + 0.5 * bend * 400.0).min(1e-4) + 0.5 * sharpest.min(0.53) * left;
@@ -90,7 +93,7 @@ pub(super) fn layer() -> Result<Layer> {
     let cases = ways.into_iter().map(|(way, parametrisation)| {
         let car = Some(setup.car.clone());
         let problem = LineProblem::new(
-            setup.cuts.clone(),
+            setup.cross_sections.clone(),
             parametrisation,
             &LineObjective::ALL,
             car,

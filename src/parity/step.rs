@@ -142,7 +142,7 @@ fn outputs<R: Real, T: Tyre<R>>(at: impl Fn(usize) -> R) -> [R; OUTPUTS] {
 }
 
 /// The outputs of a case in the scalar `R`.
-pub fn plain<R: Real>(model: TyreModel, case: &Case) -> [R; OUTPUTS] {
+pub fn evaluated<R: Real>(model: TyreModel, case: &Case) -> [R; OUTPUTS] {
     let row = case.row();
     let at = |i: usize| R::lit(f64::from(row[i]));
     match model {
@@ -293,13 +293,13 @@ pub fn compare(subject: &Subject) -> Result<Vec<Agreement>> {
             let mut agreement = Agreement::new(name, subject);
             let mut alike = true;
             for (number, (case, found)) in cases.iter().zip(&found).enumerate() {
-                let expected = plain::<f64>(*model, case);
+                let expected = evaluated::<f64>(*model, case);
                 for (i, scale) in scales(case).into_iter().enumerate() {
                     agreement.note(f64::from(found[i]), expected[i], scale, TOLERANCE * scale, || {
                         format!("output {i} of case {number}")
                     });
                 }
-                alike &= plain::<f32>(*model, case) == *found;
+                alike &= evaluated::<f32>(*model, case) == *found;
             }
             agreement.bits(alike, subject);
             Ok(agreement)

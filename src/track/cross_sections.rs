@@ -121,8 +121,8 @@ impl CrossSections {
     pub fn narrowed(&self, car_width_m: f64) -> Result<Self> {
         let mut narrowed = self.clone();
         let ends = narrowed.right_m.iter_mut().zip(&mut narrowed.left_m);
-        let cuts = ends.zip(&mut narrowed.reference).zip(&self.station_m);
-        for (((right, left), reference), station) in cuts {
+        let cross_sections = ends.zip(&mut narrowed.reference).zip(&self.station_m);
+        for (((right, left), reference), station) in cross_sections {
             let width = right.distance(*left);
             // NaN does not fit.
             let fits = width > car_width_m && car_width_m >= 0.0;
@@ -159,7 +159,7 @@ impl CrossSections {
                 format!("2 to {most} of {n}"),
             ));
         }
-        let cuts = (first..first + count).map(|i| i % n);
+        let cross_sections = (first..first + count).map(|i| i % n);
         let from = self.station_m[first];
         let station_m: Vec<f64> = (first..first + count)
             .map(|i| self.station_m[i % n] - from + if i < n { 0.0 } else { self.length_m })
@@ -169,9 +169,9 @@ impl CrossSections {
             closed: false,
             length_m: station_m[count - 1],
             station_m,
-            right_m: cuts.clone().map(|i| self.right_m[i]).collect(),
-            left_m: cuts.clone().map(|i| self.left_m[i]).collect(),
-            reference: cuts.map(|i| self.reference[i]).collect(),
+            right_m: cross_sections.clone().map(|i| self.right_m[i]).collect(),
+            left_m: cross_sections.clone().map(|i| self.left_m[i]).collect(),
+            reference: cross_sections.map(|i| self.reference[i]).collect(),
             sections: Vec::new(),
             corners: Vec::new(),
         })
@@ -239,23 +239,26 @@ mod tests {
 
     #[test]
     fn a_line_crosses_between_the_drawn_in_edges() {
-        let cuts = straight().narrowed(2.0).unwrap();
-        let points = cuts.points(&[0.0, 1.0]);
+        let cross_sections = straight().narrowed(2.0).unwrap();
+        let points = cross_sections.points(&[0.0, 1.0]);
         assert_eq!(points, [DVec2::new(0.0, -3.0), DVec2::new(10.0, 5.0)]);
         // The reference line stays where it is, 4 m from the right edge: 3 of the 8 m that are left.
-        assert!((cuts.reference[0] - 0.375).abs() < 1e-15);
+        assert!((cross_sections.reference[0] - 0.375).abs() < 1e-15);
     }
 
     #[test]
     fn a_stretch_goes_round_the_end_of_a_closed_circuit() {
-        let mut cuts = straight();
-        cuts.closed = true;
-        cuts.length_m = 25.0;
-        let stretch = cuts.stretch(1, 2).unwrap();
+        let mut cross_sections = straight();
+        cross_sections.closed = true;
+        cross_sections.length_m = 25.0;
+        let stretch = cross_sections.stretch(1, 2).unwrap();
         assert!(!stretch.closed);
         assert_eq!(stretch.station_m, [0.0, 15.0]);
-        assert_eq!(stretch.left_m, [cuts.left_m[1], cuts.left_m[0]]);
-        assert!(cuts.stretch(0, 3).is_err() && cuts.stretch(2, 2).is_err());
+        assert_eq!(
+            stretch.left_m,
+            [cross_sections.left_m[1], cross_sections.left_m[0]]
+        );
+        assert!(cross_sections.stretch(0, 3).is_err() && cross_sections.stretch(2, 2).is_err());
         assert!(straight().stretch(1, 2).is_err());
     }
 

@@ -22,13 +22,13 @@ const FINE_M: f64 = 0.5;
 const LEAST_STEP: f64 = 0.02;
 
 impl Circuit {
-    /// Cross-sections across the circuit at `cuts` equally spaced stations, along the normals of the centreline; normals that
+    /// Cross-sections across the circuit at `count` equally spaced stations, along the normals of the centreline; normals that
     /// cross are turned until they do not.
     ///
     /// # Errors
     /// [`Error::Input`] naming the station where the road overlaps itself or is wider than a bend allows.
-    pub fn cross_sections(&self, cuts: usize) -> Result<CrossSections> {
-        self.cross_sections_spaced(&Spacing::equal(cuts))
+    pub fn cross_sections(&self, count: usize) -> Result<CrossSections> {
+        self.cross_sections_spaced(&Spacing::equal(count))
     }
 
     /// As [`Circuit::cross_sections`], with a spacing that may be denser in corners.
@@ -103,7 +103,7 @@ impl<'a> Cutter<'a> {
             }
             widest = widest.max(width);
         }
-        let ends = frames.iter().map(square).collect();
+        let ends = frames.iter().map(along_normal).collect();
         let even = even_stations(road, 5.0);
         let line: Vec<DVec2> = even.iter().map(|&s| road.frame(s).position_m).collect();
         let Ok(bridges) = crossings(&stretches(&line, road.closed()), 1000) else {
@@ -216,8 +216,8 @@ impl<'a> Cutter<'a> {
         Ok(())
     }
 
-    fn too_tight(&self, cut: usize) -> Error {
-        let frame = &self.frames[cut];
+    fn too_tight(&self, section: usize) -> Error {
+        let frame = &self.frames[section];
         let inside = if frame.curvature_1pm > 0.0 {
             frame.left_m
         } else {
@@ -225,7 +225,7 @@ impl<'a> Cutter<'a> {
         };
         Error::input(
             self.road.source(),
-            Place::station(self.stations[cut]),
+            Place::station(self.stations[section]),
             format!(
                 "cross-sections that cross: {inside:.1} m of road inside a bend of {:.1} m radius",
                 1.0 / frame.curvature_1pm.abs().max(1e-9)
@@ -235,7 +235,7 @@ impl<'a> Cutter<'a> {
     }
 
     /// The ends of a turned cross-section, where it meets the edges.
-    fn slanted(&mut self, cut: usize) -> Option<Stretch> {
+    fn slanted(&mut self, section: usize) -> Option<Stretch> {
         if self.fine.is_empty() {
             let samples = even_stations(self.road, FINE_M).into_iter();
             self.fine = samples
@@ -249,12 +249,16 @@ impl<'a> Cutter<'a> {
                 })
                 .collect();
         }
-        let frame = &self.frames[cut];
-        let left = frame.tangent.rotate(DVec2::from_angle(self.turned[cut])).perp();
+        let frame = &self.frames[section];
+        let left = frame
+            .tangent
+            .rotate(DVec2::from_angle(self.turned[section]))
+            .perp();
         let reach = |way: f64, width: f64| {
             // Distance of a point on the cross-section from the edge beside it.
             let short = |along: f64| {
-                let (away, sample) = self.nearest(frame.position_m + way * along * left, self.stations[cut]);
+                let (away, sample) =
+                    self.nearest(frame.position_m + way * along * left, self.stations[section]);
                 let width = if way > 0.0 { sample.left_m } else { sample.right_m };
                 width - away
             };
@@ -325,7 +329,7 @@ impl<'a> Cutter<'a> {
 }
 
 /// A cross-section along the normal.
-fn square(frame: &RoadFrame) -> Stretch {
+fn along_normal(frame: &RoadFrame) -> Stretch {
     let left = frame.tangent.perp();
     [
         frame.position_m - frame.right_m * left,

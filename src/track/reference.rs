@@ -238,8 +238,8 @@ impl ReferenceLine {
     /// # Errors
     /// [`Error::Input`] naming the station where the line or its widths cannot be a road's.
     pub fn circuit(&self) -> Result<(Circuit, Closure)> {
-        let cuts = (self.length_m() / TRIED_EVERY_M).ceil().max(8.0) as usize;
-        self.cross_sections(&Spacing::equal(cuts))?;
+        let cross_sections = (self.length_m() / TRIED_EVERY_M).ceil().max(8.0) as usize;
+        self.cross_sections(&Spacing::equal(cross_sections))?;
         circuit(self)
     }
 

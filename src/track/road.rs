@@ -148,35 +148,38 @@ pub(super) fn circuit(road: &dyn Road) -> Result<(Circuit, Closure)> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Spacing {
     /// Number of cross-sections.
-    pub cuts: usize,
+    pub cross_sections: usize,
     /// Factor by which they are denser in the tightest corners than on straights; 1 for equal steps.
     pub corner_density: f64,
 }
 
 impl Spacing {
     /// Equal steps.
-    pub fn equal(cuts: usize) -> Self {
+    pub fn equal(cross_sections: usize) -> Self {
         Self {
-            cuts,
+            cross_sections,
             corner_density: 1.0,
         }
     }
 }
 
 /// Fewest and most cross-sections.
-const CUTS: (usize, usize) = (8, 1_000_000);
+const COUNTS: (usize, usize) = (8, 1_000_000);
 /// Cross-sections stand closer within this distance of a corner (m), so that steps change gradually.
 const APPROACH_M: f64 = 30.0;
 
 /// The stations of cross-sections, ascending from 0; an open road has its last at its end.
 pub(super) fn spread(road: &dyn Road, spacing: &Spacing) -> Result<Vec<f64>> {
-    let Spacing { cuts, corner_density } = *spacing;
-    if !(CUTS.0..=CUTS.1).contains(&cuts) {
+    let Spacing {
+        cross_sections,
+        corner_density,
+    } = *spacing;
+    if !(COUNTS.0..=COUNTS.1).contains(&cross_sections) {
         return Err(Error::input(
             road.source(),
             "number of cross-sections",
-            cuts.to_string(),
-            format!("{} to {}", CUTS.0, CUTS.1),
+            cross_sections.to_string(),
+            format!("{} to {}", COUNTS.0, COUNTS.1),
         ));
     }
     if !(1.0..=20.0).contains(&corner_density) {
@@ -187,11 +190,11 @@ pub(super) fn spread(road: &dyn Road, spacing: &Spacing) -> Result<Vec<f64>> {
             "1 (equal steps) to 20",
         ));
     }
-    let steps = cuts - usize::from(!road.closed());
+    let steps = cross_sections - usize::from(!road.closed());
     let length = road.length_m();
     let even = |i: usize| length * i as f64 / steps as f64;
     if corner_density == 1.0 {
-        return Ok((0..cuts).map(even).collect());
+        return Ok((0..cross_sections).map(even).collect());
     }
     // Cross-sections per metre by station: 1 on straights, corner_density where the curvature is greatest.
     let samples = even_stations(road, 2.0);
@@ -224,7 +227,7 @@ pub(super) fn spread(road: &dyn Road, spacing: &Spacing) -> Result<Vec<f64>> {
         let share = (wanted - sum[after - 1]) / (sum[after] - sum[after - 1]);
         ((after - 1) as f64 + share) * step
     };
-    Ok((0..cuts)
+    Ok((0..cross_sections)
         .map(|i| if i == steps { length } else { station(i) })
         .collect())
 }

@@ -14,8 +14,11 @@ fn polygon_length(points: &[DVec2], closed: bool) -> f64 {
     }
 }
 
-fn line_length(cuts: &CrossSections, alpha: f64) -> f64 {
-    polygon_length(&cuts.points(&vec![alpha; cuts.len()]), cuts.closed)
+fn line_length(cross_sections: &CrossSections, alpha: f64) -> f64 {
+    polygon_length(
+        &cross_sections.points(&vec![alpha; cross_sections.len()]),
+        cross_sections.closed,
+    )
 }
 
 /// A survey of a line at even steps, with one width on each side.
@@ -50,18 +53,21 @@ fn hairpin(radius: f64, width: f64) -> Survey {
 
 #[test]
 fn circle_polygons_have_their_lengths() {
-    let cuts = Shape::parse("circle:590:600").unwrap().unwrap();
-    let cuts = cuts.cross_sections(&Spacing::equal(361)).unwrap();
+    let cross_sections = Shape::parse("circle:590:600").unwrap().unwrap();
+    let cross_sections = cross_sections.cross_sections(&Spacing::equal(361)).unwrap();
     for (alpha, radius) in [(0.0, 590.0), (1.0, 600.0), (0.5, 595.0)] {
         let wanted = 2.0 * 361.0 * radius * (PI / 361.0).sin();
-        assert!((line_length(&cuts, alpha) - wanted).abs() < 1e-9, "{alpha}");
-        for p in cuts.points(&[alpha; 361]) {
+        assert!(
+            (line_length(&cross_sections, alpha) - wanted).abs() < 1e-9,
+            "{alpha}"
+        );
+        for p in cross_sections.points(&[alpha; 361]) {
             assert!((p.length() - radius).abs() < 1e-10);
         }
     }
     // Clockwise: the right edge is the inner one.
     let area: f64 = (0..361)
-        .map(|i| cuts.left_m[i].perp_dot(cuts.left_m[(i + 1) % 361]))
+        .map(|i| cross_sections.left_m[i].perp_dot(cross_sections.left_m[(i + 1) % 361]))
         .sum();
     assert!(area < 0.0);
 }
@@ -79,15 +85,19 @@ fn shapes_have_their_lengths_and_close() {
     ] {
         let shape = Shape::parse(name).unwrap().unwrap();
         assert_eq!(shape.name(), name);
-        let cuts = shape.cross_sections(&Spacing::equal(720)).unwrap();
-        assert!((cuts.length_m - length).abs() < 1e-6, "{name}: {}", cuts.length_m);
+        let cross_sections = shape.cross_sections(&Spacing::equal(720)).unwrap();
+        assert!(
+            (cross_sections.length_m - length).abs() < 1e-6,
+            "{name}: {}",
+            cross_sections.length_m
+        );
         let circuit = shape.circuit().unwrap();
         assert!((circuit.total_turn_rad() - TAU).abs() < 1e-9);
-        for (i, &s) in cuts.station_m.iter().enumerate() {
-            let middle = cuts.right_m[i].midpoint(cuts.left_m[i]);
+        for (i, &s) in cross_sections.station_m.iter().enumerate() {
+            let middle = cross_sections.right_m[i].midpoint(cross_sections.left_m[i]);
             let gap = circuit.position_at(s).distance(middle);
             assert!(gap < 0.01, "{name} at {s}: {gap}");
-            assert!((cuts.right_m[i].distance(cuts.left_m[i]) - 12.0).abs() < 1e-9);
+            assert!((cross_sections.right_m[i].distance(cross_sections.left_m[i]) - 12.0).abs() < 1e-9);
         }
     }
 }
@@ -110,42 +120,54 @@ fn shapes_that_cannot_be_are_refused() {
 }
 
 #[test]
-fn the_bundled_circuit_is_cut_across() {
+fn the_bundled_circuit_has_cross_sections() {
     let circuit = Circuit::silverstone_gp().unwrap();
-    let cuts = circuit.cross_sections(360).unwrap();
+    let cross_sections = circuit.cross_sections(360).unwrap();
     assert_eq!(
-        (cuts.len(), cuts.sections.len(), cuts.corners.len()),
+        (
+            cross_sections.len(),
+            cross_sections.sections.len(),
+            cross_sections.corners.len()
+        ),
         (360, 5, 15)
     );
     for i in 0..360 {
-        assert!((cuts.right_m[i].distance(cuts.left_m[i]) - 15.0).abs() < 1e-9);
-        assert!((cuts.station_m[i] - 5887.0 * i as f64 / 360.0).abs() < 1e-9);
-        let wanted = circuit.position_at(cuts.station_m[i]);
-        assert!(cuts.right_m[i].midpoint(cuts.left_m[i]).distance(wanted) < 1e-9);
+        assert!((cross_sections.right_m[i].distance(cross_sections.left_m[i]) - 15.0).abs() < 1e-9);
+        assert!((cross_sections.station_m[i] - 5887.0 * i as f64 / 360.0).abs() < 1e-9);
+        let wanted = circuit.position_at(cross_sections.station_m[i]);
+        assert!(
+            cross_sections.right_m[i]
+                .midpoint(cross_sections.left_m[i])
+                .distance(wanted)
+                < 1e-9
+        );
     }
     // The right-hand circuit's right edge is the shorter one, by the width times a whole turn.
-    let (right, left) = (line_length(&cuts, 0.0), line_length(&cuts, 1.0));
+    let (right, left) = (
+        line_length(&cross_sections, 0.0),
+        line_length(&cross_sections, 1.0),
+    );
     assert!((left - right - 15.0 * TAU).abs() < 1.0, "{right} {left}");
 }
 
 #[test]
-fn cuts_stand_denser_in_corners() {
+fn cross_sections_stand_denser_in_corners() {
     let circuit = Circuit::silverstone_gp().unwrap();
     let spacing = Spacing {
-        cuts: 400,
+        cross_sections: 400,
         corner_density: 4.0,
     };
-    let cuts = circuit.cross_sections_spaced(&spacing).unwrap();
-    let steps: Vec<f64> = cuts.station_m.windows(2).map(|s| s[1] - s[0]).collect();
+    let cross_sections = circuit.cross_sections_spaced(&spacing).unwrap();
+    let steps: Vec<f64> = cross_sections.station_m.windows(2).map(|s| s[1] - s[0]).collect();
     let (least, most) = steps
         .iter()
         .fold((f64::INFINITY, 0.0f64), |(a, b), &s| (a.min(s), b.max(s)));
     assert!(most / least > 3.0 && most / least < 4.1, "{least} {most}");
     let tightest = (0..399).min_by(|&a, &b| steps[a].total_cmp(&steps[b])).unwrap();
-    assert!(circuit.curvature_at(cuts.station_m[tightest]).abs() > 0.02);
+    assert!(circuit.curvature_at(cross_sections.station_m[tightest]).abs() > 0.02);
     for density in [0.5, f64::NAN, 1e9] {
         let spacing = Spacing {
-            cuts: 400,
+            cross_sections: 400,
             corner_density: density,
         };
         assert!(circuit.cross_sections_spaced(&spacing).is_err());
@@ -154,11 +176,11 @@ fn cuts_stand_denser_in_corners() {
 }
 
 #[test]
-fn a_hairpin_with_room_is_cut_square() {
+fn a_hairpin_with_room_has_cross_sections_along_its_normals() {
     let line = hairpin(20.0, 12.0).as_surveyed().unwrap();
-    let cuts = line.cross_sections(&Spacing::equal(300)).unwrap();
+    let cross_sections = line.cross_sections(&Spacing::equal(300)).unwrap();
     for i in 0..300 {
-        assert!((cuts.right_m[i].distance(cuts.left_m[i]) - 12.0).abs() < 1e-9);
+        assert!((cross_sections.right_m[i].distance(cross_sections.left_m[i]) - 12.0).abs() < 1e-9);
     }
 }
 
@@ -179,10 +201,10 @@ fn normals_that_cross_in_a_short_kink_are_turned_until_they_do_not() {
         .map(|i| line.curvature_at(0.1 * f64::from(i)))
         .fold(0.0, f64::max);
     assert!(tightest * 9.0 > 1.2, "the kink is no kink: {tightest}");
-    let cuts = line.cross_sections(&Spacing::equal(121)).unwrap();
+    let cross_sections = line.cross_sections(&Spacing::equal(121)).unwrap();
     for i in 0..120 {
-        let forwards = cuts.right_m[i + 1] - cuts.right_m[i];
-        let along = (cuts.left_m[i + 1] - cuts.left_m[i]).dot(forwards);
+        let forwards = cross_sections.right_m[i + 1] - cross_sections.right_m[i];
+        let along = (cross_sections.left_m[i + 1] - cross_sections.left_m[i]).dot(forwards);
         assert!(along > 0.0, "cut {i} crosses the next");
         // Ends stay on the road: no nearer to the line's samples than the width says.
         let near = |p: DVec2| {
@@ -190,8 +212,8 @@ fn normals_that_cross_in_a_short_kink_are_turned_until_they_do_not() {
                 .map(|k| line.position_at(0.05 * f64::from(k)).distance(p))
                 .fold(f64::INFINITY, f64::min)
         };
-        assert!(near(cuts.left_m[i]) < 9.01 && near(cuts.right_m[i]) < 5.01);
-        assert!(near(cuts.right_m[i]) > 4.9, "{i}");
+        assert!(near(cross_sections.left_m[i]) < 9.01 && near(cross_sections.right_m[i]) < 5.01);
+        assert!(near(cross_sections.right_m[i]) > 4.9, "{i}");
     }
 }
 
@@ -287,10 +309,15 @@ fn an_open_road_keeps_its_ends() {
         .collect();
     let hill = survey(points.clone(), false, 6.0);
     let line = hill.as_surveyed().unwrap();
-    let cuts = line.cross_sections(&Spacing::equal(50)).unwrap();
-    assert!(!cuts.closed && cuts.station_m[49] == cuts.length_m);
-    for (cut, wanted) in [(0, points[0]), (49, points[99])] {
-        assert!(cuts.right_m[cut].midpoint(cuts.left_m[cut]).distance(wanted) < 1e-9);
+    let cross_sections = line.cross_sections(&Spacing::equal(50)).unwrap();
+    assert!(!cross_sections.closed && cross_sections.station_m[49] == cross_sections.length_m);
+    for (section, wanted) in [(0, points[0]), (49, points[99])] {
+        assert!(
+            cross_sections.right_m[section]
+                .midpoint(cross_sections.left_m[section])
+                .distance(wanted)
+                < 1e-9
+        );
     }
     let (circuit, _) = line.circuit().unwrap();
     assert!(circuit.position_at(1e9).distance(points[99]) < 0.05);
@@ -321,29 +348,30 @@ fn exports_read_back() {
             .contains("cannot write")
     );
 
-    let cuts = circuit.cross_sections(1200).unwrap();
+    let cross_sections = circuit.cross_sections(1200).unwrap();
     let alpha: Vec<f64> = (0..1200)
         .map(|i| 0.5 + 0.5 * (0.01 * f64::from(i)).sin())
         .collect();
     let path = folder.path().join("line.csv");
-    cuts.write_racetrack_line(&alpha, &path).unwrap();
+    cross_sections.write_racetrack_line(&alpha, &path).unwrap();
     let line = Survey::read(&path, &SurveyOptions::default()).unwrap();
-    for (i, point) in cuts.points(&alpha).into_iter().enumerate() {
+    for (i, point) in cross_sections.points(&alpha).into_iter().enumerate() {
         assert!(line.centre_m[i].distance(point) < 1e-6);
         assert!((line.right_m[i] - 15.0 * alpha[i]).abs() < 2e-6);
         assert!((line.left_m[i] - 15.0 * (1.0 - alpha[i])).abs() < 2e-6);
     }
     assert!(
-        cuts.write_racetrack_line(&alpha[1..], folder.path().join("x.csv"))
+        cross_sections
+            .write_racetrack_line(&alpha[1..], folder.path().join("x.csv"))
             .is_err()
     );
     let path = folder.path().join("cuts.csv");
-    cuts.write_racetrack(&path).unwrap();
+    cross_sections.write_racetrack(&path).unwrap();
     let again = Track::read(&path).unwrap();
     let again = again.cross_sections(&Spacing::equal(1200), true).unwrap();
     for i in 0..1200 {
-        assert!(again.right_m[i].distance(cuts.right_m[i]) < 0.05, "{i}");
-        assert!(again.left_m[i].distance(cuts.left_m[i]) < 0.05, "{i}");
+        assert!(again.right_m[i].distance(cross_sections.right_m[i]) < 0.05, "{i}");
+        assert!(again.left_m[i].distance(cross_sections.left_m[i]) < 0.05, "{i}");
     }
 }
 
@@ -352,7 +380,7 @@ proptest! {
     fn any_survey_is_cut_or_refused_by_place(
         radii in prop::collection::vec(20.0..120.0f64, 8..40),
         width in 1.0..60.0f64,
-        cuts in 8usize..200,
+        cross_sections in 8usize..200,
         density in 1.0..5.0f64,
         smooth: bool,
     ) {
@@ -360,13 +388,13 @@ proptest! {
         let points = radii.iter().enumerate().map(|(i, r)| *r * DVec2::from_angle(TAU * i as f64 / n));
         let survey = survey(points.collect(), true, width);
         let line = if smooth { survey.smoothed(&Smoothing::default()) } else { survey.as_surveyed() };
-        let result = line.and_then(|line| line.cross_sections(&Spacing { cuts, corner_density: density }));
+        let result = line.and_then(|line| line.cross_sections(&Spacing { cross_sections, corner_density: density }));
         match result {
             Ok(found) => {
-                prop_assert_eq!(found.len(), cuts);
-                for i in 0..cuts {
+                prop_assert_eq!(found.len(), cross_sections);
+                for i in 0..cross_sections {
                     prop_assert!(found.right_m[i].is_finite() && found.left_m[i].is_finite());
-                    let j = (i + 1) % cuts;
+                    let j = (i + 1) % cross_sections;
                     let cross = super::crossing::meet(
                         &[found.right_m[i], found.left_m[i]],
                         &[found.right_m[j], found.left_m[j]],

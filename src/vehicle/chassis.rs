@@ -71,8 +71,8 @@ pub struct BodyForces<R> {
     pub yaw_moment: R,
 }
 
-/// Time derivatives of [`BodyState`] in its order (the book, chapter Model, section 2). The thesis misprints some of these equations
-/// (the book, chapter Model, section 9).
+/// Time derivatives of [`BodyState`] in its order (the book, chapter Model, section 2). The thesis misprints some of these
+/// equations (the book, chapter Model, section 9).
 ///
 /// `roll`'s derivative is `roll_rate` itself.
 #[inline(always)]

@@ -37,7 +37,7 @@ impl Case {
     }
 
     /// Runs everywhere.
-    pub fn plain(self) -> Self {
+    pub fn everywhere(self) -> Self {
         self
     }
 

@@ -25,7 +25,7 @@ use lapswarm::line::energy::{EnergyCar, EnergyPlan, Gates, Mode, Traction};
 use lapswarm::line::{Parametrisation, geometry};
 use lapswarm::parity::synthetic_lap::Lap;
 use lapswarm::parity::{Draws, drive, energy, laps, line_tolerances, steady};
-use lapswarm::study::envelope::{EnvelopeSettings, car_limits};
+use lapswarm::study::envelope::{EnvelopeSettings, car_envelope};
 use lapswarm::vehicle::Car;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -79,12 +79,12 @@ fn hybrid() -> HybridProblem {
         step_mps: 8.0,
         ..EnvelopeSettings::default()
     };
-    let limits = car_limits(&car, &coarse).expect("limits");
+    let limits = car_envelope(&car, &coarse).expect("limits");
     let rows = limits.speeds.iter().map(|s| (s.row.v_mps, s.traction_mps2));
     let rows = rows.collect();
     let car = EnergyCar::new(car, limits.envelope, Traction { rows }, 2.0).expect("a hybrid");
-    let cuts = ring(90.0, 104.0, 60);
-    let length = geometry(&cuts.points(&[0.5; 60]), true).segment_m;
+    let cross_sections = ring(90.0, 104.0, 60);
+    let length = geometry(&cross_sections.points(&[0.5; 60]), true).segment_m;
     let plan = EnergyPlan::zoned(&length, &[5, 25, 45], true, 30, Mode::Additional);
     let gates = [
         Free::Steer,
@@ -99,7 +99,7 @@ fn hybrid() -> HybridProblem {
         ..Strategy::fixed(Gates::OPEN, 3)
     };
     let line = HybridLine::Free {
-        cuts: Box::new(cuts),
+        cross_sections: Box::new(cross_sections),
         parametrisation: Parametrisation::control_points(8),
     };
     HybridProblem::new(line, car, plan, strategy, &HybridObjective::ALL, 30.0).expect("a sound problem")

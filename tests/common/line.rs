@@ -16,7 +16,7 @@ pub fn ring(inner_m: f64, outer_m: f64, sections: usize) -> CrossSections {
     cut("ring", right_m, left_m, true)
 }
 
-/// Cuts between edges, their stations along the middle.
+/// Cross-sections between edges, their stations along the middle.
 fn cut(name: &str, right_m: Vec<DVec2>, left_m: Vec<DVec2>, closed: bool) -> CrossSections {
     let middle: Vec<DVec2> = right_m
         .iter()
@@ -122,9 +122,9 @@ pub fn random_car(random: &mut Random) -> PointMass {
     car
 }
 
-/// All objectives on `cuts`.
-pub fn line_problem(cuts: CrossSections, way: Parametrisation, car: PointMass) -> LineProblem {
-    LineProblem::new(cuts, way, &LineObjective::ALL, Some(car), 30.0).expect("a sound problem")
+/// All objectives on `cross_sections`.
+pub fn line_problem(cross_sections: CrossSections, way: Parametrisation, car: PointMass) -> LineProblem {
+    LineProblem::new(cross_sections, way, &LineObjective::ALL, Some(car), 30.0).expect("a sound problem")
 }
 
 /// `count` smooth lines: they wander over the road a few times a lap, as lines in a search do after its first moments.

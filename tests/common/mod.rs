@@ -7,6 +7,7 @@ pub mod harness;
 pub mod kinds;
 pub mod line;
 pub mod runs;
+pub mod studies;
 
 use lapswarm::evaluate::replay::ReplayProblem;
 use lapswarm::parity::synthetic_lap;

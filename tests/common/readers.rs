@@ -1,19 +1,11 @@
 //! Every reader given bytes from anywhere: what it takes is sound, what it refuses it refuses by file and place, and it never
 //! panics. The fuzz targets of `fuzz/` and the tests of what they found share this file.
 
-use lapswarm::config::settings::Settings;
 use lapswarm::line::read_line;
 use lapswarm::report::compare::{self, Run};
-use lapswarm::study::envelope::EnvelopeSettings;
-use lapswarm::study::framework::journal::Journal;
-use lapswarm::study::hybrid::{self, HybridStudySettings};
-use lapswarm::study::identify::{IdentifySettings, SearchState};
-use lapswarm::study::raceline::{LinesState, RacelineSettings};
-use lapswarm::study::run::RunSettings;
-use lapswarm::study::sensitivity::SensitivitySettings;
-use lapswarm::study::surface::SurfaceSettings;
+use lapswarm::study::hybrid;
+use lapswarm::study::registry::STUDIES;
 use lapswarm::study::sweep::{self, SWEEP_FILE, SweepSettings};
-use lapswarm::study::transient::{DriveState, TransientSettings};
 use lapswarm::swarm::checkpoint::{self, Checkpoint};
 use lapswarm::swarm::device::DeviceState;
 use lapswarm::swarm::{
@@ -45,7 +37,7 @@ pub const READERS: &[Reader] = &[
     ("log_csv", log_csv),
     ("motec_csv", motec_csv),
     ("motec_ld", motec_ld),
-    ("limits", limits),
+    ("envelope", envelope),
     ("checkpoint", checkpoint),
     ("state", state),
     ("run_folder", run_folder),
@@ -176,14 +168,9 @@ pub fn tyre(data: &[u8]) {
 /// A study's settings, read as those of every study, and a channel map.
 pub fn study(data: &[u8]) {
     let path = on_disk("study.toml", data);
-    taken_from_disk(IdentifySettings::read(&path));
-    taken_from_disk(RacelineSettings::read(&path));
-    taken_from_disk(HybridStudySettings::read(&path));
-    taken_from_disk(RunSettings::read(&path));
-    taken_from_disk(SensitivitySettings::read(&path));
-    taken_from_disk(SurfaceSettings::read(&path));
-    taken_from_disk(EnvelopeSettings::read(&path));
-    taken_from_disk(TransientSettings::read(&path));
+    for study in STUDIES {
+        taken_from_disk(study.read_settings(&path));
+    }
     taken(ChannelMap::parse(&String::from_utf8_lossy(data), "f.toml"));
 }
 
@@ -201,13 +188,19 @@ pub fn curvature(data: &[u8]) {
     let path = on_disk("circuit.toml", toml);
     on_disk("circuit.csv", table);
     if let Some(circuit) = taken_from_disk(Circuit::load(path))
-        && let Some(cuts) = taken(circuit.cross_sections_spaced(&Spacing::equal(50)))
+        && let Some(cross_sections) = taken(circuit.cross_sections_spaced(&Spacing::equal(50)))
     {
-        assert!(cuts.right_m.iter().chain(&cuts.left_m).all(|p| p.is_finite()));
+        assert!(
+            cross_sections
+                .right_m
+                .iter()
+                .chain(&cross_sections.left_m)
+                .all(|p| p.is_finite())
+        );
     }
 }
 
-/// What is taken for a road is a road: its spline and cuts are finite, or refused.
+/// What is taken for a road is a road: its spline and cross-sections are finite, or refused.
 fn survey(data: &[u8], name: &str) {
     for width_m in [None, Some(8.0)] {
         let options = SurveyOptions {
@@ -216,9 +209,15 @@ fn survey(data: &[u8], name: &str) {
         };
         if let Some(survey) = taken(Survey::parse(data, name, &options))
             && let Some(line) = taken(survey.smoothed(&Smoothing::default()))
-            && let Some(cuts) = taken(line.cross_sections(&Spacing::equal(50)))
+            && let Some(cross_sections) = taken(line.cross_sections(&Spacing::equal(50)))
         {
-            assert!(cuts.right_m.iter().chain(&cuts.left_m).all(|p| p.is_finite()));
+            assert!(
+                cross_sections
+                    .right_m
+                    .iter()
+                    .chain(&cross_sections.left_m)
+                    .all(|p| p.is_finite())
+            );
         }
     }
 }
@@ -270,11 +269,11 @@ pub fn motec_ld(data: &[u8]) {
     log(Recording::read(path));
 }
 
-/// Limits over speed, and a line that another study wrote.
-pub fn limits(data: &[u8]) {
-    if let Some(limits) = taken(Envelope::from_csv("f.csv", &String::from_utf8_lossy(data))) {
-        let v = limits.top_speed_mps();
-        for row in [0.0, 0.5 * v, v, 2.0 * v].map(|v| limits.at(v)) {
+/// A g-g-v envelope, and a line that another study wrote.
+pub fn envelope(data: &[u8]) {
+    if let Some(envelope) = taken(Envelope::from_csv("f.csv", &String::from_utf8_lossy(data))) {
+        let v = envelope.top_speed_mps();
+        for row in [0.0, 0.5 * v, v, 2.0 * v].map(|v| envelope.at(v)) {
             let figures = [row.ay_mps2, row.ax_grip_mps2, row.ax_drive_mps2, row.drag_mps2];
             assert!(figures.iter().all(|x| x.is_finite()));
         }
@@ -284,15 +283,21 @@ pub fn limits(data: &[u8]) {
     }
 }
 
-/// A checkpoint with a head and a sum that are right, so that what is inside is looked at. What is taken can be kept again.
-fn forged<T: Checkpoint>(payload: &[u8]) {
+/// A checkpoint with a head and a sum that are right, so that what is inside is looked at.
+fn forged_file(kind: &str, payload: &[u8]) -> Vec<u8> {
     let mut bytes = b"LAPSWARM".to_vec();
     bytes.extend(checkpoint::VERSION.to_le_bytes());
-    bytes.extend((T::KIND.len() as u32).to_le_bytes());
-    bytes.extend(T::KIND.as_bytes());
+    bytes.extend((kind.len() as u32).to_le_bytes());
+    bytes.extend(kind.as_bytes());
     bytes.extend((payload.len() as u64).to_le_bytes());
     bytes.extend(payload);
     bytes.extend(crc32fast::hash(&bytes).to_le_bytes());
+    bytes
+}
+
+/// What is taken of such a checkpoint can be kept again.
+fn forged<T: Checkpoint>(payload: &[u8]) {
+    let bytes = forged_file(T::KIND, payload);
     if let Some(state) = taken(checkpoint::from_bytes::<T>(&bytes, Path::new("f"))) {
         taken(checkpoint::to_bytes(&state));
     }
@@ -320,20 +325,31 @@ pub fn checkpoint(data: &[u8]) {
     }
 }
 
-/// A study's state, by its first byte.
-pub fn state(data: &[u8]) {
-    let Some((&kind, payload)) = data.split_first() else {
-        return;
-    };
-    match kind % 4 {
-        0 => forged::<SearchState>(payload),
-        1 => forged::<LinesState>(payload),
-        2 => forged::<Journal>(payload),
-        _ => forged::<DriveState>(payload),
-    }
+/// The kinds of states that studies save.
+pub fn state_kinds() -> Vec<&'static str> {
+    let mut kinds: Vec<&str> = STUDIES
+        .iter()
+        .flat_map(|study| study.state_kinds())
+        .copied()
+        .collect();
+    kinds.sort_unstable();
+    kinds.dedup();
+    kinds
 }
 
-/// The manifest of a run and, behind noughts, its figures and a lap.
+/// A study's state, of the kind that its first byte says.
+pub fn state(data: &[u8]) {
+    let Some((&number, payload)) = data.split_first() else {
+        return;
+    };
+    let kinds = state_kinds();
+    let kind = kinds[usize::from(number) % kinds.len()];
+    let path = on_disk("state.lapswarm", &forged_file(kind, payload));
+    let study = STUDIES.iter().find(|study| study.state_kinds().contains(&kind));
+    taken(study.expect("one has it").read_state(&path));
+}
+
+/// The manifest of a run and, behind zeros, its figures and a lap.
 pub fn run_folder(data: &[u8]) {
     let (manifest, rest) = split(data);
     let (summary, lap) = split(rest);
@@ -361,9 +377,15 @@ pub fn survey_file(data: &[u8]) {
     let path = on_disk("surveyed.toml", toml);
     on_disk("survey.csv", table);
     if let Some(track) = taken_from_disk(Track::read(path))
-        && let Some(cuts) = taken(track.cross_sections(&Spacing::equal(50), false))
+        && let Some(cross_sections) = taken(track.cross_sections(&Spacing::equal(50), false))
     {
-        assert!(cuts.right_m.iter().chain(&cuts.left_m).all(|p| p.is_finite()));
+        assert!(
+            cross_sections
+                .right_m
+                .iter()
+                .chain(&cross_sections.left_m)
+                .all(|p| p.is_finite())
+        );
     }
 }
 

@@ -2,11 +2,8 @@
 
 use super::Random;
 use lapswarm::hold::{self, Point};
-use lapswarm::study::framework::journal::Journal;
-use lapswarm::study::identify::SearchState;
-use lapswarm::study::raceline::{LinesState, RacelineSettings, set_up};
-use lapswarm::study::transient::DriveState;
-use lapswarm::swarm::checkpoint;
+use lapswarm::study::raceline::{RacelineSettings, set_up};
+use lapswarm::study::registry::STUDIES;
 use lapswarm::vehicle::Car;
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -192,11 +189,8 @@ pub fn nothing_half_written(folder: &Path) {
                 assert!(both, "{name}");
             }
             Some("lapswarm" | "checkpoint") => {
-                let loads = checkpoint::load::<SearchState>(&path).is_ok()
-                    || checkpoint::load::<LinesState>(&path).is_ok()
-                    || checkpoint::load::<Journal>(&path).is_ok()
-                    || checkpoint::load::<DriveState>(&path).is_ok();
-                assert!(loads, "{name} is no whole state");
+                let is_whole = STUDIES.iter().any(|study| study.read_state(&path).is_ok());
+                assert!(is_whole, "{name} is no whole state");
             }
             // Every car's tyres here are the bundled ones with other figures.
             Some("tir") => {
@@ -295,7 +289,9 @@ pub fn along(track: &str, alpha: f64) -> String {
         ..RacelineSettings::default()
     })
     .expect("a track");
-    let points = setup.cuts.points(&vec![alpha; setup.cuts.len()]);
+    let points = setup
+        .cross_sections
+        .points(&vec![alpha; setup.cross_sections.len()]);
     let rows = points.iter().map(|p| format!("{},{}\n", p.x, p.y));
     format!("x_m,y_m\n{}", rows.collect::<String>())
 }

@@ -4,9 +4,9 @@ use crate::common::harness::survey;
 use lapswarm::config::settings::Settings;
 use lapswarm::evaluate::line::{CpuLineEvaluator, LineObjective, LineProblem};
 use lapswarm::evaluate::{BackendChoice, Evaluator};
-use lapswarm::line::{FineLine, Parametrisation, cuts_about};
-use lapswarm::optimum::{DescentSettings, LineMap, PointMassLimits, ReferenceProblem, fastest};
-use lapswarm::study::framework::{solve_unwatched, write_results};
+use lapswarm::line::{FineLine, Parametrisation, cross_sections_about};
+use lapswarm::optimum::{DescentSettings, LineMap, PointMassEnvelope, ReferenceProblem, fastest};
+use lapswarm::study::framework::{solve_unobserved, write_results};
 use lapswarm::study::raceline::{
     LineAlgorithm, ObjectiveOutcome, Outcome, Raceline, RacelineSettings, ReferenceSolvers, ReportedLine,
     Setup, set_up,
@@ -14,13 +14,13 @@ use lapswarm::study::raceline::{
 use std::path::PathBuf;
 
 tests! {
-    a_swarm_alone_finds_the_inside_of_a_circle: plain,
+    a_swarm_alone_finds_the_inside_of_a_circle: everywhere,
     the_surveyed_circuit_gives_the_published_optima: survey,
-    a_swarm_alone_finds_the_fastest_line: plain,
+    a_swarm_alone_finds_the_fastest_line: everywhere,
     a_swarm_alone_finds_the_fastest_line_of_the_surveyed_circuit: survey,
-    plain_swarms_and_sections_can_be_asked_for: plain,
-    a_study_of_the_bundled_circuit_holds_together: plain,
-    the_same_seed_gives_the_same_lines: plain,
+    particle_swarms_over_all_sections_can_be_asked_for: everywhere,
+    a_study_of_the_bundled_circuit_holds_together: everywhere,
+    the_same_seed_gives_the_same_lines: everywhere,
 }
 
 fn cold(track: &str, sections: usize, objectives: &[LineObjective]) -> RacelineSettings {
@@ -38,7 +38,7 @@ fn cold(track: &str, sections: usize, objectives: &[LineObjective]) -> RacelineS
 
 fn run(settings: &RacelineSettings) -> (Setup, Outcome) {
     let setup = set_up(settings).unwrap();
-    let outcome = solve_unwatched::<Raceline>(settings, &setup).unwrap();
+    let outcome = solve_unobserved::<Raceline>(settings, &setup).unwrap();
     (setup, outcome)
 }
 
@@ -93,13 +93,13 @@ fn racer() -> String {
 /// The minimum time on a road (s), on a fine spline at 1 m: splines about an exact line and about themselves, with a control every
 /// three metres at last. The tests of the optima show for this circuit that two transcriptions at a metre bracket such a line.
 fn minimum_time_s(setup: &Setup, alpha: &[f64]) -> f64 {
-    let limits = PointMassLimits::new(&setup.car).unwrap();
-    let mut points = setup.cuts.points(alpha);
+    let envelope = PointMassEnvelope::new(&setup.car).unwrap();
+    let mut points = setup.cross_sections.points(alpha);
     for count in [1962, 2943, 5886] {
-        let about = cuts_about(&setup.cuts, &points, count).unwrap();
+        let about = cross_sections_about(&setup.cross_sections, &points, count).unwrap();
         let (map, bounds) = LineMap::spline_about(&about, &about.reference, count / 3);
         let problem = ReferenceProblem {
-            limits: Some(&limits),
+            envelope: Some(&envelope),
             ..ReferenceProblem::of(&map)
         };
         let start = vec![0.0; count / 3];
@@ -123,8 +123,8 @@ fn a_swarm_alone_finds_the_fastest_line_of_the_surveyed_circuit() {
 
 /// The swarm alone, from a cold start and without gradients, on the fine spline: within 0.3 % of the exact solver's line (the
 /// swarm's spline and the solver's are different ones, and either may be ahead) and, on the surveyed circuit, of the minimum
-/// time; led on by the local search, which says more the closer the cuts are together, within 0.1 %. Of tracks, envelopes and numbers
-/// of sections.
+/// time; led on by the local search, which says more the closer the cross-sections are together, within 0.1 %. Of tracks,
+/// envelopes and numbers of sections.
 fn fastest_lines(cases: &[(String, Option<PathBuf>, usize)]) {
     for (track, envelope, sections) in cases {
         let sections = *sections;
@@ -141,7 +141,7 @@ fn fastest_lines(cases: &[(String, Option<PathBuf>, usize)]) {
             outcome.record.evaluations
         );
         assert!(swarm < exact * 1.003, "{swarm} and {exact}");
-        // Through the cuts and on the fine spline it is the same lap: nothing hides between them.
+        // Through the cross-sections and on the fine spline it is the same lap: nothing hides between them.
         assert!((found.best.objective(LineObjective::LapTime) / swarm - 1.0).abs() < 3e-3);
         if envelope.is_none() {
             continue;
@@ -150,7 +150,7 @@ fn fastest_lines(cases: &[(String, Option<PathBuf>, usize)]) {
         let solvers = ReferenceSolvers::new(&setup, &settings).unwrap();
         let led = solvers.fastest_about(&found.best.alpha).unwrap().unwrap();
         let led = setup.report("led", &led.x, &settings).unwrap().lap_time_fine_s();
-        println!("{sections} cuts: led on by the local search {led:.3} s, minimum {minimum:.3} s");
+        println!("{sections} cross-sections: led on by the local search {led:.3} s, minimum {minimum:.3} s");
         // What minimum-time optimal control comes to elsewhere, at 3 m.
         assert!((minimum / 116.37 - 1.0).abs() < 3e-3, "{minimum}");
         assert!(sections > 720 || swarm < minimum * 1.003, "{swarm} and {minimum}");
@@ -158,7 +158,7 @@ fn fastest_lines(cases: &[(String, Option<PathBuf>, usize)]) {
     }
 }
 
-fn plain_swarms_and_sections_can_be_asked_for() {
+fn particle_swarms_over_all_sections_can_be_asked_for() {
     for algorithm in [LineAlgorithm::Cooperative, LineAlgorithm::Thesis] {
         let settings = RacelineSettings {
             algorithm,
@@ -171,7 +171,7 @@ fn plain_swarms_and_sections_can_be_asked_for() {
         };
         let (setup, outcome) = run(&settings);
         // 310 m to 520 m at 12.3 m.
-        assert!(!setup.cuts.closed && (17..=19).contains(&setup.cuts.len()));
+        assert!(!setup.cross_sections.closed && (17..=19).contains(&setup.cross_sections.len()));
         let per_group = if algorithm == LineAlgorithm::Cooperative {
             4
         } else {
@@ -247,7 +247,7 @@ fn a_study_of_the_bundled_circuit_holds_together() {
         })
         .collect();
     let problem = LineProblem::new(
-        setup.cuts.clone(),
+        setup.cross_sections.clone(),
         Parametrisation::sections(),
         &settings.objectives,
         Some(setup.car.clone()),

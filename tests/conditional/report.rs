@@ -12,9 +12,9 @@ use std::time::{Duration, Instant};
 
 tests! {
     pages_work_in_a_browser: browser,
-    runs_are_laid_side_by_side: plain,
+    runs_are_laid_side_by_side: everywhere,
     what_is_measured_has_a_page: also_browser,
-    folders_that_are_no_runs_are_refused_by_name: plain,
+    folders_that_are_no_runs_are_refused_by_name: everywhere,
 }
 
 /// As a channel, a car and a track may be called in a file.

@@ -41,8 +41,8 @@ fn gt_car() -> PointMass {
 }
 
 /// The length of the polygon that is this share of the road's width from the right (m).
-fn line_length(cuts: &CrossSections, alpha: f64) -> f64 {
-    let points = cuts.points(&vec![alpha; cuts.len()]);
+fn line_length(cross_sections: &CrossSections, alpha: f64) -> f64 {
+    let points = cross_sections.points(&vec![alpha; cross_sections.len()]);
     let next = points.iter().cycle().skip(1);
     points.iter().zip(next).map(|(a, b)| a.distance(*b)).sum()
 }
@@ -83,12 +83,15 @@ fn the_surveyed_silverstone_is_cut_as_others_cut_it() {
     let survey = Survey::read(survey_file(), &SurveyOptions::default()).unwrap();
     assert!(survey.closed && survey.centre_m.len() == 1178);
     let raw = survey.as_surveyed().unwrap();
-    let cuts = raw.cross_sections(&Spacing::equal(360)).unwrap();
+    let cross_sections = raw.cross_sections(&Spacing::equal(360)).unwrap();
     // Figures of the same construction in Python (SciPy's CubicSpline with periodic ends over chord lengths). On these
-    // cuts Clarabel gives a shortest path of 5710.944 m, and 5734.241 m for a car 2 m wide.
+    // cross-sections Clarabel gives a shortest path of 5710.944 m, and 5734.241 m for a car 2 m wide.
     assert!((raw.length_m() - 5887.369016).abs() < 1e-5, "{}", raw.length_m());
     for (alpha, wanted) in [(0.0, 5839.944606), (0.5, 5883.661769), (1.0, 5927.850141)] {
-        assert!((line_length(&cuts, alpha) - wanted).abs() < 2e-5, "{alpha}");
+        assert!(
+            (line_length(&cross_sections, alpha) - wanted).abs() < 2e-5,
+            "{alpha}"
+        );
     }
     let smooth = survey.smoothed(&Smoothing::default()).unwrap();
     for deviation in [

@@ -1,41 +1,30 @@
 //! Runs that are killed at any point lose nothing, and end as if they had been left alone.
 
-use crate::common::Random;
 use crate::common::runs::{
     Held, along, finish, moments, nothing_half_written, nothing_on_its_way, same_results, start, summary,
 };
+use crate::common::{Random, studies};
 use lapswarm::study::framework::run_folder::STATE;
+use lapswarm::study::registry::STUDIES;
 use std::path::Path;
 
 tests! {
-    a_killed_identification_ends_as_one_that_was_left_alone: full,
-    a_killed_search_for_lines_ends_as_one_that_was_left_alone: full,
-    a_killed_hybrid_study_ends_as_one_that_was_left_alone: full,
-    a_killed_sensitivity_study_ends_as_one_that_was_left_alone: full,
-    a_killed_surface_ends_as_one_that_was_left_alone: full,
-    a_killed_plain_swarm_ends_as_one_that_was_left_alone: full,
-    a_killed_drive_ends_as_one_that_was_left_alone: full,
-    a_killed_run_ends_as_one_that_was_left_alone: full,
-    a_killed_sweep_goes_on_with_the_rows_that_it_has: full,
+    every_study_that_is_killed_ends_as_one_that_was_left_alone: full,
+    a_killed_swarm_over_groups_ends_as_one_that_was_left_alone: full,
+    a_killed_drive_of_one_line_ends_as_one_that_was_left_alone: full,
+    a_killed_sweep_keeps_the_rows_that_it_has: full,
     runs_on_a_device_that_are_broken_off_end_as_those_that_were_left_alone: device full,
 }
 
 const STUDY: &str =
     "section = \"Abbey\"\nbackend = \"simd\"\nhops = 0\n[swarm]\npopulation = 24\niterations = 20\n";
 
-/// A whole run, small. Without a hybrid drive, whose study would take longer than all the others here.
-const RUN: &str = "identify = \"car.toml\"\nraceline = \"line.toml\"\nrounds = 1\n";
-const RUN_CAR: &str = "car = \"gt\"\nsection = \"Abbey\"\nbackend = \"simd\"\npolish = false\n[free]\nK = [3e4, 3e5]\n\
-                       [swarm]\npopulation = 16\niterations = 8\n";
-const RUN_LINE: &str =
-    "track = \"stadium:500:100:14\"\nsections = 360\nobjectives = [\"lap_time\"]\nbackend = \"simd\"\n";
-
 /// Runs of two problems, each by itself.
 const SWEEP: &str = "study = \"identify\"\n[base]\nsection = \"Abbey\"\npolish = false\nbackend = \"simd\"\n[base.free]\n\
                      K = [3e4, 3e5]\n[base.swarm]\nalgorithm = \"thesis\"\niterations = 10\n[grid]\nnorm = [\"1\", \"2\"]\n\
                      \"swarm.population\" = [8, 12, 16]\nseed = [1, 2]\n";
 
-/// A study, and how it is gone on with.
+/// A study, and how it is resumed.
 struct Study<'a> {
     arguments: &'a [&'a str],
     again: &'a [&'a str],
@@ -56,14 +45,16 @@ impl<'a> Study<'a> {
 
     /// Kills it `kills` times at points that are drawn from all that it passes after its first save, resumes it each time, and
     /// holds what it ends with, every file of it, against a run that was left alone.
-    fn kill_and_go_on(&self, kills: usize) {
+    fn kill_and_resume(&self, kills: usize) {
         let root = tempfile::tempdir().expect("a temporary folder");
         let root = root.path();
+        self.kill_and_resume_in(root, kills);
+    }
+
+    /// As [`Study::kill_and_resume`], in a folder that holds what the study reads.
+    fn kill_and_resume_in(&self, root: &Path, kills: usize) {
         for (name, text) in [
             ("study.toml", STUDY),
-            ("run.toml", RUN),
-            ("car.toml", RUN_CAR),
-            ("line.toml", RUN_LINE),
             ("sweep.toml", SWEEP),
             ("line.csv", &along("stadium:400:120:14", 0.01)),
         ] {
@@ -139,75 +130,16 @@ impl<'a> Study<'a> {
     }
 }
 
-fn a_killed_identification_ends_as_one_that_was_left_alone() {
-    Study::new(&["identify", "study.toml"]).kill_and_go_on(6);
+fn every_study_that_is_killed_ends_as_one_that_was_left_alone() {
+    for &study in STUDIES {
+        let root = tempfile::tempdir().expect("a temporary folder");
+        let command = studies::command(study, &studies::longer(study.name(), root.path()));
+        let arguments: Vec<&str> = command.iter().map(String::as_str).collect();
+        Study::new(&arguments).kill_and_resume_in(root.path(), 7);
+    }
 }
 
-fn a_killed_search_for_lines_ends_as_one_that_was_left_alone() {
-    let study = [
-        "raceline",
-        "--track",
-        "stadium:300:80:12",
-        "--sections",
-        "120",
-        "--objectives",
-        "length,lap_time",
-        "--population",
-        "24",
-        "--iterations",
-        "6",
-        "--backend",
-        "simd",
-    ];
-    Study::new(&study).kill_and_go_on(8);
-}
-
-fn a_killed_hybrid_study_ends_as_one_that_was_left_alone() {
-    let study = [
-        "hybrid",
-        "--track",
-        "stadium:300:80:12",
-        "--sections",
-        "120",
-        "--population",
-        "16",
-        "--iterations",
-        "8",
-        "--backend",
-        "simd",
-    ];
-    Study::new(&study).kill_and_go_on(8);
-}
-
-fn a_killed_sensitivity_study_ends_as_one_that_was_left_alone() {
-    let study = [
-        "sensitivity",
-        "--section",
-        "Abbey",
-        "--parameters",
-        "rBy1,rCy1,K",
-        "--samples",
-        "64",
-        "--backend",
-        "simd",
-    ];
-    Study::new(&study).kill_and_go_on(6);
-}
-
-fn a_killed_surface_ends_as_one_that_was_left_alone() {
-    let study = [
-        "surface",
-        "--section",
-        "Abbey",
-        "--grid",
-        "30",
-        "--backend",
-        "simd",
-    ];
-    Study::new(&study).kill_and_go_on(6);
-}
-
-fn a_killed_plain_swarm_ends_as_one_that_was_left_alone() {
+fn a_killed_swarm_over_groups_ends_as_one_that_was_left_alone() {
     let study = [
         "raceline",
         "--track",
@@ -225,27 +157,22 @@ fn a_killed_plain_swarm_ends_as_one_that_was_left_alone() {
         "--backend",
         "simd",
     ];
-    Study::new(&study).kill_and_go_on(5);
+    Study::new(&study).kill_and_resume(5);
 }
 
-fn a_killed_drive_ends_as_one_that_was_left_alone() {
+fn a_killed_drive_of_one_line_ends_as_one_that_was_left_alone() {
     let study = ["transient", "--line", "line.csv", "--track", "stadium:400:120:14"];
-    Study::new(&study).kill_and_go_on(5);
+    Study::new(&study).kill_and_resume(5);
 }
 
-fn a_killed_run_ends_as_one_that_was_left_alone() {
-    let study = ["run", "run.toml", "--no-cache"];
-    Study::new(&study).kill_and_go_on(5);
-}
-
-/// Rows that are there stay, and what was at work goes on.
-fn a_killed_sweep_goes_on_with_the_rows_that_it_has() {
+/// Rows that are there stay, and the others are added.
+fn a_killed_sweep_keeps_the_rows_that_it_has() {
     let sweep = Study {
         again: &["sweep", "sweep.toml"],
         marker: "rows.jsonl",
         ..Study::new(&["sweep", "sweep.toml"])
     };
-    sweep.kill_and_go_on(6);
+    sweep.kill_and_resume(6);
 }
 
 /// On a device, whose work is cut by the time that it takes: killed, and told to stop.
@@ -281,7 +208,7 @@ fn runs_on_a_device_that_are_broken_off_end_as_those_that_were_left_alone() {
                 signal,
                 ..Study::new(study)
             };
-            study.kill_and_go_on(2);
+            study.kill_and_resume(2);
         }
     }
 }

@@ -3,16 +3,19 @@
 use crate::common::runs::{
     Held, along, finish, nothing_half_written, nothing_on_its_way, same_results, start, summary,
 };
+use crate::common::studies;
 use lapswarm::study::framework::run_folder::STATE;
+use lapswarm::study::registry::STUDIES;
 use serde_json::Value;
 use std::path::Path;
 use std::process::{Command, Output};
 
 tests! {
-    a_hybrid_that_is_told_to_stop_while_it_looks_for_its_line_goes_on: plain,
-    a_drive_that_is_told_to_stop_goes_on: plain,
-    an_interrupted_run_says_so_and_what_is_not_its_state_is_refused: plain,
-    a_full_disk_leaves_whole_files_or_none_and_room_lets_the_run_end: plain,
+    every_study_that_is_told_to_stop_is_resumed_to_the_same_results: full,
+    a_hybrid_that_is_told_to_stop_while_it_looks_for_its_line_is_resumed: everywhere,
+    a_drive_that_is_told_to_stop_is_resumed: everywhere,
+    an_interrupted_run_says_so_and_what_is_not_its_state_is_refused: everywhere,
+    a_full_disk_leaves_whole_files_or_none_and_room_lets_the_run_end: everywhere,
 }
 
 const STUDY: &str = "section = \"Abbey\"\nbackend = \"simd\"\n[swarm]\npopulation = 24\niterations = 12\n";
@@ -31,7 +34,7 @@ fn middle(passed: &[String], point: &str) -> usize {
 }
 
 /// Tells a study to stop when it is held at a point, resumes it, and holds what it ends with against `wanted`.
-fn stop_and_go_on(
+fn stop_and_resume(
     root: &Path,
     study: &[&str],
     (signal, point, number): (&str, &str, usize),
@@ -59,7 +62,33 @@ fn stop_and_go_on(
     assert!(!folder.join(STATE).exists());
 }
 
-fn a_hybrid_that_is_told_to_stop_while_it_looks_for_its_line_goes_on() {
+/// Told to stop after its first save, and where it is first asked whether it goes on.
+fn every_study_that_is_told_to_stop_is_resumed_to_the_same_results() {
+    for &study in STUDIES {
+        let root = tempfile::tempdir().expect("a temporary folder");
+        let root = root.path();
+        let command = studies::command(study, &studies::small(study.name(), root));
+        let arguments: Vec<&str> = command.iter().map(String::as_str).collect();
+        let (wanted, _) = whole(root, &arguments);
+        for (signal, point) in [("-TERM", "saved"), ("-INT", "step")] {
+            let out = format!("stopped{signal}");
+            let mut held = Held::start(root, &arguments, &out, (point, 1));
+            assert!(held.is_held(), "{arguments:?}: never at {point}");
+            let (ended, _) = held.signal(signal);
+            let said = String::from_utf8_lossy(&ended.stderr).into_owned();
+            assert_eq!(ended.status.code(), Some(130), "{arguments:?}: {said}");
+            let folder = root.join(&out);
+            assert!(folder.join(STATE).is_file(), "{arguments:?}: {said}");
+            nothing_half_written(&folder);
+            let resumed = finish(start(root, &[study.name(), "--resume", "--out", &out]));
+            assert_eq!(summary(&resumed), wanted, "{arguments:?}");
+            same_results(&out, &folder, &root.join("whole"));
+            assert!(!folder.join(STATE).exists(), "{arguments:?}");
+        }
+    }
+}
+
+fn a_hybrid_that_is_told_to_stop_while_it_looks_for_its_line_is_resumed() {
     let root = tempfile::tempdir().expect("a temporary folder");
     // The search for the line is nearly all there is to do.
     let study = [
@@ -75,18 +104,18 @@ fn a_hybrid_that_is_told_to_stop_while_it_looks_for_its_line_goes_on() {
         ("-INT", "saved", 1),
         ("-TERM", "solver", middle(&passed, "solver")),
     ] {
-        stop_and_go_on(root.path(), &study, at, &wanted, &["study.toml"]);
+        stop_and_resume(root.path(), &study, at, &wanted, &["study.toml"]);
     }
 }
 
-fn a_drive_that_is_told_to_stop_goes_on() {
+fn a_drive_that_is_told_to_stop_is_resumed() {
     let root = tempfile::tempdir().expect("a temporary folder");
     let root = root.path();
     std::fs::write(root.join("line.csv"), along("stadium:400:120:14", 0.01)).expect("a line");
     let alone = ["transient", "--line", "line.csv", "--track", "stadium:400:120:14"];
     let (wanted, passed) = whole(root, &alone);
     for at in [("-TERM", "saved", 1), ("-INT", "saved", middle(&passed, "saved"))] {
-        stop_and_go_on(root, &alone, at, &wanted, &["drive.csv", "speeds.svg"]);
+        stop_and_resume(root, &alone, at, &wanted, &["drive.csv", "speeds.svg"]);
     }
     for left in ["whole", "whole.passed"] {
         std::fs::rename(root.join(left), root.join(left.replace("whole", "alone"))).expect("it moves");
@@ -107,7 +136,7 @@ fn a_drive_that_is_told_to_stop_goes_on() {
     ];
     let (wanted, passed) = whole(root, &many);
     for at in [("-INT", "saved", 1), ("-TERM", "saved", middle(&passed, "saved"))] {
-        stop_and_go_on(root, &many, at, &wanted, &["setups.csv", "car.toml"]);
+        stop_and_resume(root, &many, at, &wanted, &["setups.csv", "car.toml"]);
     }
 }
 
@@ -185,23 +214,21 @@ fn with_room_for(blocks: u32, root: &Path, study: &[&str]) -> Output {
 /// what it could save.
 fn a_full_disk_leaves_whole_files_or_none_and_room_lets_the_run_end() {
     let root = tempfile::tempdir().expect("a temporary folder");
-    let study =
-        "section = \"Abbey\"\nbackend = \"simd\"\npolish = false\n[swarm]\npopulation = 8\niterations = 4\n";
-    std::fs::write(root.path().join("study.toml"), study).expect("a study");
-    let identify = ["identify", "study.toml"];
-    let track = ["--track", "stadium:300:80:12", "--sections", "60"];
-    let swarm = ["--population", "8", "--iterations", "4", "--backend", "simd"];
-    let raceline = [&["raceline"], &track[..], &swarm].concat();
-    let hybrid = [&["hybrid"], &track[..], &swarm].concat();
-    for study in [&identify[..], &raceline, &hybrid] {
+    // What a stage of a run cannot write ends the run before there is anything to resume; its stages are the other studies.
+    for study in STUDIES.iter().copied().filter(|study| study.name() != "run") {
+        let command = studies::command(study, &studies::small(study.name(), root.path()));
+        let study: Vec<&str> = command.iter().map(String::as_str).collect();
         let name = study[0];
         let whole = format!("{name}-whole");
-        let wanted = summary(&finish(start(root.path(), &[study, &["--out", &whole]].concat())));
+        let wanted = summary(&finish(start(
+            root.path(),
+            &[&study[..], &["--out", &whole]].concat(),
+        )));
         let mut files = Vec::new();
-        let mut gone_on = 0;
+        let mut resumed_runs = 0;
         for blocks in [0, 1, 8, 64, 512] {
             let out = format!("{name}-{blocks}");
-            let ended = with_room_for(blocks, root.path(), &[study, &["--out", &out]].concat());
+            let ended = with_room_for(blocks, root.path(), &[&study[..], &["--out", &out]].concat());
             let said = String::from_utf8_lossy(&ended.stderr).into_owned();
             let folder = root.path().join(&out);
             if ended.status.success() && blocks == 512 {
@@ -229,10 +256,10 @@ fn a_full_disk_leaves_whole_files_or_none_and_room_lets_the_run_end() {
                 assert_eq!(summary(&resumed), wanted, "{out}");
                 same_results(&out, &folder, &root.path().join(&whole));
                 nothing_on_its_way(&folder);
-                gone_on += 1;
+                resumed_runs += 1;
             }
         }
         assert!(files.last() > files.first(), "{name}: {files:?}");
-        assert!(gone_on > 0, "{name}");
+        assert!(resumed_runs > 0, "{name}");
     }
 }

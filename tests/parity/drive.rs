@@ -15,10 +15,10 @@ use lapswarm::track::Track;
 
 tests! {
     steps_of_the_driver_and_laps_agree_on_every_backend: also_device,
-    the_evaluators_lap_is_the_recorded_one: plain,
+    the_evaluators_lap_is_the_recorded_one: everywhere,
     a_lap_is_the_same_alone_and_among_others_however_it_is_cut: also_device,
     candidates_that_fail_say_why: also_device,
-    plans_blend_between_their_shares: plain,
+    plans_blend_between_their_shares: everywhere,
 }
 
 fn steps_of_the_driver_and_laps_agree_on_every_backend() {

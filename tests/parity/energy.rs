@@ -13,7 +13,7 @@ use lapswarm::evaluate::{Evaluator, Failure};
 use lapswarm::line::energy::{EnergyCar, EnergyLap, EnergyPlan, Gates, Mode, Traction};
 use lapswarm::line::{Parametrisation, geometry};
 use lapswarm::parity::energy::{Allowed, allowed};
-use lapswarm::study::envelope::{EnvelopeSettings, car_limits};
+use lapswarm::study::envelope::{EnvelopeSettings, car_envelope};
 use lapswarm::vehicle::Car;
 
 tests! {
@@ -27,7 +27,7 @@ fn hybrid_car(exponent: f64) -> EnergyCar {
         step_mps: 8.0,
         ..EnvelopeSettings::default()
     };
-    let limits = car_limits(&car, &coarse).expect("limits");
+    let limits = car_envelope(&car, &coarse).expect("limits");
     let rows = limits
         .speeds
         .iter()
@@ -55,8 +55,8 @@ fn problems() -> Vec<(String, HybridProblem)> {
         (false, 300, 8.0, 2.0),
     ] {
         let centre = DVec2::new(random.within(-2e3, 2e3), random.within(-2e3, 2e3));
-        let cuts = circuit(sections, spacing, closed, centre, &mut random);
-        let middle = cuts.points(&vec![0.5; sections]);
+        let cross_sections = circuit(sections, spacing, closed, centre, &mut random);
+        let middle = cross_sections.points(&vec![0.5; sections]);
         let shape = geometry(&middle, closed);
         let mut length = shape.segment_m.clone();
         length.resize(sections, 0.0);
@@ -70,7 +70,7 @@ fn problems() -> Vec<(String, HybridProblem)> {
                 ..Strategy::fixed(Gates::OPEN, plan.count())
             };
             let free = HybridLine::Free {
-                cuts: Box::new(cuts.clone()),
+                cross_sections: Box::new(cross_sections.clone()),
                 parametrisation: Parametrisation::control_points(sections / 6),
             };
             let fixed = HybridLine::Fixed {

@@ -71,8 +71,8 @@ fn problems() -> Vec<(&'static str, LineProblem)> {
     let mut random = Random(5);
     let mut made = |sections: usize, spacing: f64, closed: bool| {
         let centre = DVec2::new(random.within(-2e3, 2e3), random.within(-2e3, 2e3));
-        let cuts = circuit(sections, spacing, closed, centre, &mut random);
-        (cuts, random_car(&mut random))
+        let cross_sections = circuit(sections, spacing, closed, centre, &mut random);
+        (cross_sections, random_car(&mut random))
     };
     let mut problems = Vec::new();
     for (closed, sections, spacing) in [
@@ -81,20 +81,23 @@ fn problems() -> Vec<(&'static str, LineProblem)> {
         (true, 1000, 5.0),
         (true, 75, 12.0),
     ] {
-        let (cuts, car) = made(sections, spacing, closed);
+        let (cross_sections, car) = made(sections, spacing, closed);
         problems.push((
             "control points",
-            line_problem(cuts, Parametrisation::control_points(sections / 4), car),
+            line_problem(cross_sections, Parametrisation::control_points(sections / 4), car),
         ));
-        let (cuts, car) = made(sections, spacing, closed);
-        problems.push(("sections", line_problem(cuts, Parametrisation::sections(), car)));
+        let (cross_sections, car) = made(sections, spacing, closed);
+        problems.push((
+            "sections",
+            line_problem(cross_sections, Parametrisation::sections(), car),
+        ));
     }
-    let (cuts, car) = made(360, 16.0, true);
+    let (cross_sections, car) = made(360, 16.0, true);
     let part = Parametrisation::control_points(60).with_free((10..25).collect(), vec![0.4; 60]);
-    problems.push(("a sector", line_problem(cuts, part, car)));
-    let (cuts, car) = made(150, 12.0, false);
+    problems.push(("a sector", line_problem(cross_sections, part, car)));
+    let (cross_sections, car) = made(150, 12.0, false);
     let ends = Parametrisation::control_points(30).with_fixed_ends(vec![0.3; 30]);
-    problems.push(("fixed ends", line_problem(cuts, ends, car)));
+    problems.push(("fixed ends", line_problem(cross_sections, ends, car)));
     problems
 }
 
@@ -107,7 +110,7 @@ fn lines_cost_what_the_reference_says_on_every_backend() {
             let worst = compare(&format!("{kind}, {name}"), &problem, &population, &found);
             println!(
                 "{kind}, {} sections, {name}: {:?}",
-                problem.cuts().len(),
+                problem.cross_sections().len(),
                 worst.map(|x| format!("{x:.0e}"))
             );
             if name.starts_with("simd") {
@@ -119,10 +122,10 @@ fn lines_cost_what_the_reference_says_on_every_backend() {
 }
 
 fn circles_have_the_shape_of_their_polygons_on_every_backend() {
-    let cuts = ring(590.0, 600.0, 361);
-    // Second differences are over the spacing of the cuts, whatever the radius of the line.
-    let spacing = cuts.length_m / 361.0;
-    let problem = line_problem(cuts, Parametrisation::sections(), gt_car());
+    let cross_sections = ring(590.0, 600.0, 361);
+    // Second differences are over the spacing of the cross-sections, whatever the radius of the line.
+    let spacing = cross_sections.length_m / 361.0;
+    let problem = line_problem(cross_sections, Parametrisation::sections(), gt_car());
     let population: Vec<f64> = [0.0, 0.5, 1.0].iter().flat_map(|a| vec![*a; 361]).collect();
     let mut backends = backends(&problem);
     backends.push(("cpu".to_owned(), Box::new(CpuLineEvaluator::new(&problem))));
@@ -182,8 +185,8 @@ fn bits(evaluation: &Evaluation) -> (Vec<u64>, Vec<Option<Failure>>) {
 }
 
 fn a_line_costs_the_same_alone_and_among_others() {
-    let cuts = circuit(300, 14.0, true, DVec2::ZERO, &mut Random(11));
-    let problem = line_problem(cuts, Parametrisation::control_points(50), gt_car());
+    let cross_sections = circuit(300, 14.0, true, DVec2::ZERO, &mut Random(11));
+    let problem = line_problem(cross_sections, Parametrisation::control_points(50), gt_car());
     let mut population = lines(&problem, 150, &mut Random(12));
     population[50 * 7 + 3] = f64::NAN;
     for (name, mut backend) in backends(&problem) {
@@ -212,8 +215,8 @@ fn a_line_costs_the_same_alone_and_among_others() {
 
 fn batches_and_dispatches_of_lines_do_not_show() {
     let context = the_device();
-    let cuts = circuit(120, 14.0, true, DVec2::ZERO, &mut Random(13));
-    let problem = line_problem(cuts, Parametrisation::control_points(30), gt_car());
+    let cross_sections = circuit(120, 14.0, true, DVec2::ZERO, &mut Random(13));
+    let problem = line_problem(cross_sections, Parametrisation::control_points(30), gt_car());
     let population = lines(&problem, 400, &mut Random(14));
     let mut evaluator = GpuLineEvaluator::new(&problem, context).expect("the kernel compiles");
     let usual = evaluator.batching();
@@ -240,13 +243,19 @@ fn batches_and_dispatches_of_lines_do_not_show() {
 
 /// Each objective alone gives what it gives among all: kernels are specialised to what is asked for.
 fn objectives_do_not_depend_on_each_other() {
-    let cuts = circuit(100, 14.0, true, DVec2::ZERO, &mut Random(15));
-    let all = line_problem(cuts.clone(), Parametrisation::sections(), gt_car());
+    let cross_sections = circuit(100, 14.0, true, DVec2::ZERO, &mut Random(15));
+    let all = line_problem(cross_sections.clone(), Parametrisation::sections(), gt_car());
     let population = lines(&all, 20, &mut Random(16));
     for (k, objective) in LineObjective::ALL.into_iter().enumerate() {
         let car = (objective == LineObjective::LapTime).then(gt_car);
-        let one = LineProblem::new(cuts.clone(), Parametrisation::sections(), &[objective], car, 0.0)
-            .expect("a sound problem");
+        let one = LineProblem::new(
+            cross_sections.clone(),
+            Parametrisation::sections(),
+            &[objective],
+            car,
+            0.0,
+        )
+        .expect("a sound problem");
         for ((name, mut alone), (_, mut among)) in backends(&one).into_iter().zip(backends(&all)) {
             let alone = alone.evaluate(&population).expect("it runs");
             let among = among.evaluate(&population).expect("it runs");

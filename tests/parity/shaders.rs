@@ -24,15 +24,15 @@ use naga::valid::{Capabilities, ValidationFlags, Validator};
 use std::mem::offset_of;
 
 tests! {
-    kernels_validate_pass_the_lint_and_translate_to_every_platform: plain,
-    the_lint_finds_what_kernels_must_not_contain: plain,
-    structs_shared_with_the_host_have_its_offsets: plain,
-    structs_of_lines_have_the_hosts_offsets: plain,
-    the_structs_of_drives_have_the_hosts_fields: plain,
-    the_struct_of_circles_has_the_hosts_offsets: plain,
-    a_generation_has_the_hosts_offsets: plain,
-    the_struct_of_energies_has_the_hosts_offsets: plain,
-    parameter_structs_have_the_fields_of_their_rust_twins_in_order: plain,
+    kernels_validate_pass_the_lint_and_translate_to_every_platform: everywhere,
+    the_lint_finds_what_kernels_must_not_contain: everywhere,
+    structs_shared_with_the_host_have_its_offsets: everywhere,
+    structs_of_lines_have_the_hosts_offsets: everywhere,
+    the_structs_of_drives_have_the_hosts_fields: everywhere,
+    the_struct_of_circles_has_the_hosts_offsets: everywhere,
+    a_generation_has_the_hosts_offsets: everywhere,
+    the_struct_of_energies_has_the_hosts_offsets: everywhere,
+    parameter_structs_have_the_fields_of_their_rust_twins_in_order: everywhere,
 }
 
 const NORMS: [Norm; 4] = [Norm::One, Norm::Two, Norm::Infinity, Norm::MeanSquare];
@@ -118,11 +118,11 @@ fn line_shape(closed: bool, terms: usize, lap: bool) -> LineShape {
             integral: terms > 0,
             lap,
         },
-        limit_rows: 512,
+        envelope_rows: 512,
         corner_rows: 1024,
         ellipse_rows: if closed { 256 } else { 0 },
         uniform_sections: closed.then_some(360),
-        uniform_limits: terms == 4,
+        uniform_envelope: terms == 4,
         workgroup: 64,
         tile: if terms == 4 { 8 } else { 64 },
     }
@@ -296,7 +296,7 @@ fn structs_of_lines_have_the_hosts_offsets() {
         ("sources", offset_of!(DeviceSection, sources)),
         ("weights", offset_of!(DeviceSection, weights)),
         ("step", offset_of!(DeviceSection, step)),
-        ("cut", offset_of!(DeviceSection, cut)),
+        ("across", offset_of!(DeviceSection, across)),
         ("constant", offset_of!(DeviceSection, constant)),
         ("inverse_spacing", offset_of!(DeviceSection, inverse_spacing)),
         ("until", offset_of!(DeviceSection, until)),

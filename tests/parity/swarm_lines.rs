@@ -25,9 +25,9 @@ const PARTICLES: usize = MANY + 5;
 const GENERATIONS: usize = 12;
 
 fn problem(objectives: &[LineObjective]) -> LineProblem {
-    let cuts = circuit(120, 12.0, true, DVec2::new(300.0, -200.0), &mut Random(1));
+    let cross_sections = circuit(120, 12.0, true, DVec2::new(300.0, -200.0), &mut Random(1));
     let way = Parametrisation::control_points(30).with_overshoot(0.25);
-    LineProblem::new(cuts, way, objectives, Some(gt_car()), 0.0).expect("a sound problem")
+    LineProblem::new(cross_sections, way, objectives, Some(gt_car()), 0.0).expect("a sound problem")
 }
 
 fn start(line: &LineProblem) -> Vec<Vec<f64>> {
@@ -55,7 +55,7 @@ fn swarm(line: &LineProblem, context: &Arc<GpuContext>) -> DeviceMopso {
 }
 
 /// The device scales positions in `f32`: a control point is off by two spacings of a float beside one, 2.4e-7 of 12 m, which
-/// between cuts 12 m apart is 8e-8 1/m of curvatures of some 0.01, and less of all else: under 2e-5 of any objective.
+/// between cross-sections 12 m apart is 8e-8 1/m of curvatures of some 0.01, and less of all else: under 2e-5 of any objective.
 fn objectives_are_those_of_the_host() {
     let context = the_device();
     for objectives in [

@@ -29,7 +29,7 @@ fn flat(table: &'static [ParameterInfo]) -> impl Strategy<Value = Vec<f64>> {
         .collect::<Vec<_>>()
 }
 
-/// The same in every bit, which `==` does not say of noughts.
+/// The same in every bit, which `==` does not say of zeros.
 fn bits(figures: &[f64]) -> Vec<u64> {
     figures.iter().map(|x| x.to_bits()).collect()
 }

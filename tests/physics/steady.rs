@@ -6,9 +6,9 @@ use lapswarm::evaluate::steady::kernel::Settling;
 use lapswarm::evaluate::steady::{CpuSteadyEvaluator, SETTLED, SteadyObjective, SteadyProblem};
 use lapswarm::evaluate::{BackendChoice, Failure};
 use lapswarm::study::envelope::{
-    EnvelopeSettings, EnvelopeStudy, Prepared, SpeedLimits, car_limits, speeds_of,
+    EnvelopeAtSpeed, EnvelopeSettings, EnvelopeStudy, Prepared, car_envelope, speeds_of,
 };
-use lapswarm::study::framework::solve_unwatched;
+use lapswarm::study::framework::solve_unobserved;
 use lapswarm::vehicle::{Car, Turn, Tyres, steady_car};
 
 fn on_circles(car: Car) -> SteadyProblem {
@@ -125,7 +125,7 @@ fn the_populations_ridge_is_that_of_the_curves() {
     for car in [bundled_car(), random_car(7)] {
         let speeds = speeds_of(&car, &settings).expect("speeds");
         let prepared = Prepared { car, speeds };
-        let solved = || solve_unwatched::<EnvelopeStudy>(&settings, &prepared).expect("a surface");
+        let solved = || solve_unobserved::<EnvelopeStudy>(&settings, &prepared).expect("a surface");
         let found = solved();
         let (limits, surface) = (found.limits, found.surface);
         let summary = &surface.summary;
@@ -177,9 +177,9 @@ fn limits_hold_for_turns_to_both_sides() {
             step_mps: 15.0,
             ..EnvelopeSettings::default()
         };
-        car_limits(&car, &settings).expect("a car that corners").speeds
+        car_envelope(&car, &settings).expect("a car that corners").speeds
     };
-    let left = |s: &SpeedLimits| s.cornering.iter().map(|t| t.ay_mps2).fold(0.0, f64::max);
+    let left = |s: &EnvelopeAtSpeed| s.cornering.iter().map(|t| t.ay_mps2).fold(0.0, f64::max);
     let (light, heavy, even) = (limits_of(0.4), limits_of(0.6), limits_of(0.5));
     for ((light, heavy), even) in light.iter().zip(&heavy).zip(&even) {
         // The one car is the other's mirror image: towards the heavier side no wheel lifts, and the curves are smooth. Their points

@@ -36,7 +36,7 @@ fn agrees_with_mfeval_at_chosen_points() {
 
 /// Whether a mistake in one coefficient would be seen, so that agreement says something about each of them.
 #[test]
-fn every_coefficient_of_set_b_that_is_not_nought_shows_at_the_chosen_points() {
+fn every_coefficient_of_set_b_that_is_not_zero_shows_at_the_chosen_points() {
     let table = TyreCoefficients::<f64>::PARAMETERS;
     let flat = set_b().to_flat();
     for (index, info) in table.iter().enumerate() {

@@ -501,7 +501,7 @@ fn what_to_doubt_is_said() {
     assert!(said(&unsure).contains("8samplesaretoofew"), "{}", said(&unsure));
     let sure = lapswarm(folder.path(), &[&few[..], &["1024"]].concat());
     assert!(!said(&sure).contains("toofew"), "{}", said(&sure));
-    // Sixty cuts of a circuit of 5.9 km leave a hundred metres between them, in which no line keeps to the road.
+    // Sixty cross-sections of a circuit of 5.9 km leave a hundred metres between them, in which no line keeps to the road.
     let small = [
         "raceline",
         "--sections",

@@ -130,7 +130,7 @@ proptest! {
     }
 
     #[test]
-    fn limits_maps_and_states(edits in changes(), digits in any::<bool>(), noise in prop::collection::vec(any::<u8>(), 0..300)) {
+    fn envelopes_maps_and_states(edits in changes(), digits in any::<bool>(), noise in prop::collection::vec(any::<u8>(), 0..300)) {
         let text = |good: &str| String::from_utf8_lossy(&damaged(good.as_bytes(), &edits, digits)).into_owned();
         if let Some(limits) = names_its_place(Envelope::from_csv("f.csv", &text(LIMITS)))? {
             prop_assert!(limits.rows().iter().all(|r| r.v_mps.is_finite() && r.ay_mps2.is_finite()));

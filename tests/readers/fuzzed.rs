@@ -6,16 +6,13 @@ mod ld;
 #[path = "../common/readers.rs"]
 mod readers;
 
-use lapswarm::evaluate::{BackendChoice, Evaluator, Objective, Problem, Variable};
-use lapswarm::study::framework::journal::{Journal, Recorder};
+use crate::small_studies::small;
+use lapswarm::evaluate::{Objective, Problem, Variable};
+use lapswarm::study::framework::Request;
+use lapswarm::study::framework::memory::USUAL_MIB;
 use lapswarm::study::framework::run_folder::STATE;
-use lapswarm::study::framework::state_file::StateFile;
-use lapswarm::study::framework::{Study, Work};
-use lapswarm::study::identify::{Identify, IdentifySettings, ObjectiveChoice, SearchState};
-use lapswarm::study::raceline::{LinesState, Raceline, RacelineSettings};
 use lapswarm::study::registry::STUDIES;
 use lapswarm::study::sweep::{Row, SweepSettings};
-use lapswarm::study::transient::{DriveState, TransientSettings};
 use lapswarm::swarm::checkpoint::{self, Checkpoint};
 use lapswarm::swarm::{
     CooperativeSettings, CooperativeSwarm, CovarianceSettings, CovarianceSwarm, DifferenceSettings,
@@ -92,7 +89,7 @@ fn seeds() -> Vec<(&'static str, Vec<u8>)> {
         ("curvature", &circuit),
         ("line", "# a line\nstation (m),x (m),y (m)\n0,0,0\n5,5,0\n10,9,3\n15,9,8\n"),
         ("line", "x_m,y_m\n0,0\n4,0\n8,1e1\n"),
-        ("limits", "v_mps,ay_mps2,ax_grip_mps2,ax_drive_mps2,drag_mps2\n10,12,12,8,0.1\n30,14,13,6,0.8\n60,18,16,2,3\n"),
+        ("envelope", "v_mps,ay_mps2,ax_grip_mps2,ax_drive_mps2,drag_mps2\n10,12,12,8,0.1\n30,14,13,6,0.8\n60,18,16,2,3\n"),
         ("run_folder", "{\"program\":\"lapswarm\",\"version\":\"0.1.0\",\"study\":\"raceline\",\"seed\":1,\"track\":\"a\"}\0\
             {\"study\":\"raceline\",\"elapsed_s\":1.5,\"best\":{\"lap_time\":{\"lap_time_fine_s\":114.2}},\
             \"rows\":[{\"name\":\"a\",\"x\":1}]}\0station (m),x (m),y (m),speed (m/s),time (s)\n0,0,0,30,0\n1,1,0,31,0.1\n2,2,0,32,0.2\n"),
@@ -241,12 +238,15 @@ fn motec_ld() -> Vec<u8> {
 }
 
 /// What is inside a checkpoint, behind the number by which the target knows its kind.
-fn inside<T: Checkpoint>(kind: u8, state: &T) -> Vec<u8> {
-    let bytes = checkpoint::to_bytes(state).unwrap();
-    let head = 8 + 4 + 4 + T::KIND.len() + 8;
-    let mut seed = vec![kind];
-    seed.extend(&bytes[head..bytes.len() - 4]);
+fn inside(number: usize, kind: &str, file: &[u8]) -> Vec<u8> {
+    let head = 8 + 4 + 4 + kind.len() + 8;
+    let mut seed = vec![number as u8];
+    seed.extend(&file[head..file.len() - 4]);
     seed
+}
+
+fn swarm<T: Checkpoint>(number: usize, state: &T) -> Vec<u8> {
+    inside(number, T::KIND, &checkpoint::to_bytes(state).unwrap())
 }
 
 fn swarms() -> Vec<Vec<u8>> {
@@ -284,91 +284,70 @@ fn swarms() -> Vec<Vec<u8>> {
     let difference = || DifferenceSwarm::new(&one, DifferenceSettings::default()).unwrap();
     vec![
         checkpoint::to_bytes(&pso()).unwrap(),
-        inside(0, &pso()),
-        inside(1, &mopso()),
-        inside(2, &CooperativeSwarm::new(&one, cooperative).unwrap()),
-        inside(
+        swarm(0, &pso()),
+        swarm(1, &mopso()),
+        swarm(2, &CooperativeSwarm::new(&one, cooperative).unwrap()),
+        swarm(
             3,
             &CovarianceSwarm::new(&one, &[0.5; 4], CovarianceSettings::default()).unwrap(),
         ),
-        inside(5, &difference()),
-        inside(6, &HybridSwarm::new(&one, HybridSettings::default()).unwrap()),
-        inside(7, &Nsga2::new(&two, small).unwrap()),
-        inside(
+        swarm(5, &difference()),
+        swarm(6, &HybridSwarm::new(&one, HybridSettings::default()).unwrap()),
+        swarm(7, &Nsga2::new(&two, small).unwrap()),
+        swarm(
             8,
             &WindowSwarm::new(&one, &[0.5; 4], WindowSettings::default()).unwrap(),
         ),
-        inside(9, &Islands::new(&two, vec![mopso(), mopso()], None).unwrap()),
-        inside(10, &Islands::new(&one, vec![pso(), pso()], None).unwrap()),
-        inside(
+        swarm(9, &Islands::new(&two, vec![mopso(), mopso()], None).unwrap()),
+        swarm(10, &Islands::new(&one, vec![pso(), pso()], None).unwrap()),
+        swarm(
             11,
             &Islands::new(&one, vec![difference(), difference()], None).unwrap(),
         ),
     ]
 }
 
-/// Breaks a study off as soon as it tells of its progress.
-fn broken_off<S: Study>(settings: &S::Settings, prepared: &S::Prepared, state_file: &mut StateFile) {
-    let work = Work {
-        state: None,
-        state_file,
-        observe: &mut |_| ControlFlow::Break(()),
-        stop: Arc::default(),
-    };
-    S::solve(settings, prepared, work).unwrap();
-}
-
-/// States of short studies that were broken off.
+/// The state of every kind that a small study leaves when it is interrupted at its first step.
 fn states() -> Vec<Vec<u8>> {
+    let kinds = readers::state_kinds();
+    let mut seeds = vec![Vec::new(); kinds.len()];
     let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join(STATE);
-    let state_file = || StateFile::new(folder.path()).every(Duration::ZERO);
-    let settings = IdentifySettings {
-        section: Some("Abbey".to_owned()),
-        objectives: vec![ObjectiveChoice::All],
-        population: Some(8),
-        iterations: Some(3),
-        polish: false,
-        backend: BackendChoice::Simd,
-        ..IdentifySettings::default()
-    };
-    let setup = Identify::prepare(&settings).unwrap();
-    broken_off::<Identify>(&settings, &setup, &mut state_file());
-    let search: SearchState = checkpoint::load(&path).unwrap();
-
-    let settings = RacelineSettings {
-        track: "circle:590:600".to_owned(),
-        sections: 40,
-        backend: BackendChoice::Simd,
-        ..RacelineSettings::default()
-    };
-    let setup = Raceline::prepare(&settings).unwrap();
-    broken_off::<Raceline>(&settings, &setup, &mut state_file());
-    let lines: LinesState = checkpoint::load(&path).unwrap();
-
-    let mut squares = lapswarm::evaluate::point::PointEvaluator::new(
-        Problem {
-            variables: vec![Variable::new("x", "-", 0.0, 1.0)],
-            objectives: vec![Objective::new("square", "-")],
-        },
-        lapswarm::evaluate::point::CallCost::Cheap,
-        |x, f| f[0] = x[0] * x[0],
+    for study in STUDIES.iter().filter(|study| study.name() != "run") {
+        let given = small(study.name(), folder.path());
+        let mut ways = vec![given.clone()];
+        // A line that is driven alone keeps another state than set-ups do.
+        if given.iter().any(|(key, _)| key == "setups") {
+            let alone = given
+                .into_iter()
+                .filter(|(key, _)| key != "setups" && key != "backend");
+            ways.push(alone.collect());
+        }
+        for flags in ways {
+            let out = folder.path().join("out");
+            let stopped = study.run(Request {
+                file: None,
+                flags: &flags,
+                out: Some(&out),
+                resume: false,
+                save_every: Duration::ZERO,
+                memory_limit_mib: USUAL_MIB,
+                dry_run: false,
+                stop: Arc::default(),
+                observe: &mut |_| ControlFlow::Break(()),
+            });
+            drop(stopped);
+            let file = std::fs::read(out.join(STATE));
+            let file = file.unwrap_or_else(|error| panic!("{}: {error}", study.name()));
+            std::fs::remove_dir_all(&out).unwrap();
+            // The length of the kind stands behind the mark and the version.
+            let is_its = |kind: &&str| file[16..].starts_with(kind.as_bytes());
+            let number = kinds.iter().position(is_its).expect("a kind of a study");
+            seeds[number] = inside(number, kinds[number], &file);
+        }
+    }
+    assert!(
+        seeds.iter().all(|seed| !seed.is_empty()),
+        "no state of some of {kinds:?}"
     );
-    let mut saved = state_file();
-    let mut recorder = Recorder::new(Journal::new("squares", &3u32).unwrap(), &mut saved);
-    recorder.begin("a".to_owned(), &squares.backend()).unwrap();
-    recorder.over(&mut squares).evaluate(&[0.25, 0.5]).unwrap();
-    recorder.save().unwrap();
-    let journal: Journal = checkpoint::load(&path).unwrap();
-    let drive = DriveState::new(TransientSettings {
-        line: vec!["line.csv".into()],
-        envelope: Some("envelope.csv".into()),
-        ..TransientSettings::default()
-    });
-    vec![
-        inside(0, &search),
-        inside(1, &lines),
-        inside(2, &journal),
-        inside(3, &drive),
-    ]
+    seeds
 }

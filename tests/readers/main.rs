@@ -2,3 +2,6 @@
 
 mod damage;
 mod fuzzed;
+#[path = "../common/studies.rs"]
+#[allow(dead_code)] // Others run them from the command line.
+mod small_studies;

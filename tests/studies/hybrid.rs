@@ -6,7 +6,7 @@ use lapswarm::evaluate::BackendChoice;
 use lapswarm::line::energy::{Gates, Mode};
 use lapswarm::study::framework::journal::Recorder;
 use lapswarm::study::framework::state_file::StateFile;
-use lapswarm::study::framework::{Study, solve_unwatched, write_results};
+use lapswarm::study::framework::{Study, solve_unobserved, write_results};
 use lapswarm::study::hybrid::{
     Hybrid, HybridSetup, HybridStudySettings, ReportedLap, correlation, drive, engine_only, mean_worths,
     published, search_strategy, set_up, size, stint, worth,
@@ -131,16 +131,16 @@ fn without_the_motor_the_lap_is_the_racing_lines() {
     use lapswarm::evaluate::Evaluator;
     use lapswarm::evaluate::line::{CpuLineEvaluator, LineObjective, LineProblem};
     let setup = bundled();
-    let cuts = lapswarm::track::CrossSections {
+    let cross_sections = lapswarm::track::CrossSections {
         right_m: setup.points_m.clone(),
         left_m: setup.points_m.clone(),
         station_m: vec![0.0; setup.points_m.len()],
         reference: vec![0.5; setup.points_m.len()],
-        ..setup.raceline.cuts.clone()
+        ..setup.raceline.cross_sections.clone()
     };
-    // Cuts without width through the line's points: the line itself.
+    // Cross-sections without width through the line's points: the line itself.
     let plain = LineProblem::new(
-        cuts,
+        cross_sections,
         lapswarm::line::Parametrisation::sections(),
         &[LineObjective::LapTime],
         Some(setup.car.point_mass.clone()),
@@ -402,7 +402,7 @@ fn a_study_writes_what_scripts_read_and_repeats() {
         ..HybridStudySettings::default()
     };
     let inputs = Hybrid::prepare(&settings).unwrap();
-    let outcome = solve_unwatched::<Hybrid>(&settings, &inputs).unwrap();
+    let outcome = solve_unobserved::<Hybrid>(&settings, &inputs).unwrap();
     let folder = tempfile::tempdir().unwrap();
     let summary = write_results::<Hybrid>(folder.path(), &settings, &inputs, &outcome).unwrap();
     for name in [
@@ -468,7 +468,7 @@ fn a_study_writes_what_scripts_read_and_repeats() {
     .unwrap();
     assert!((again.length_m / outcome.setup.length_m - 1.0).abs() < 1e-3);
 
-    let other = solve_unwatched::<Hybrid>(&settings, &inputs).unwrap();
+    let other = solve_unobserved::<Hybrid>(&settings, &inputs).unwrap();
     let shares = |o: &lapswarm::study::hybrid::Outcome| {
         let optimised = o.optimised.as_ref().unwrap();
         (

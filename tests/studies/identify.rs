@@ -3,7 +3,7 @@
 use lapswarm::config::settings::Settings;
 use lapswarm::evaluate::replay::BackendChoice;
 use lapswarm::simulate::{SensorSettings, SimulateSettings, simulate_lap};
-use lapswarm::study::framework::{solve_unwatched, write_results};
+use lapswarm::study::framework::{solve_unobserved, write_results};
 use lapswarm::study::identify::{
     Algorithm, FreeParameter, Identify, IdentifySettings, Setup, judge, lap_format, polish, set_up,
     total_parameter_error,
@@ -82,7 +82,7 @@ fn a_cold_swarm_and_polish_find_the_car() {
         ..simd()
     };
     let setup = set_up(&settings).unwrap();
-    let outcome = solve_unwatched::<Identify>(&settings, &setup).unwrap();
+    let outcome = solve_unobserved::<Identify>(&settings, &setup).unwrap();
     let folder = tempfile::tempdir().unwrap();
     let summary = write_results::<Identify>(folder.path(), &settings, &setup, &outcome).unwrap();
     println!("{:?}", summary.total_parameter_error);
@@ -143,7 +143,7 @@ fn the_same_seed_gives_the_same_bytes() {
     };
     let setup = set_up(&settings).unwrap();
     let go = || {
-        solve_unwatched::<Identify>(&settings, &setup)
+        solve_unobserved::<Identify>(&settings, &setup)
             .unwrap()
             .swarm_candidate
     };

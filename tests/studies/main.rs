@@ -5,6 +5,9 @@ mod identify;
 mod registry;
 mod resume;
 mod sensitivity;
+#[path = "../common/studies.rs"]
+#[allow(dead_code)] // Others kill longer ones.
+mod small_studies;
 mod states;
 mod surface;
 mod sweep;

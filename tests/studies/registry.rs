@@ -1,7 +1,7 @@
 //! Every study of the registry, whichever it is: it is planned, starved, interrupted and resumed by the same means.
 
+use crate::small_studies::{command, small};
 use lapswarm::Error;
-use lapswarm::config::settings::Flag;
 use lapswarm::study::framework::memory::USUAL_MIB;
 use lapswarm::study::framework::{Answer, Finished, Request};
 use lapswarm::study::registry::{Registered, STUDIES};
@@ -10,77 +10,6 @@ use std::path::Path;
 use std::process::Command;
 use std::sync::Arc;
 use std::time::Duration;
-
-/// Flags that make a study small. A new study has a row here.
-fn small(study: &str, folder: &Path) -> Vec<(String, String)> {
-    let ring = || {
-        let points = (0..400).map(|i| {
-            let angle = std::f64::consts::TAU * f64::from(i) / 400.0;
-            format!("{},{}\n", 300.0 * angle.cos(), 300.0 * angle.sin())
-        });
-        let path = folder.join("ring.csv");
-        std::fs::write(&path, format!("x_m,y_m\n{}", points.collect::<String>())).expect("a line");
-        path.display().to_string()
-    };
-    let flags: Vec<(&str, String)> = match study {
-        "run" => vec![
-            ("track", "stadium:400:120:14".to_owned()),
-            ("backend", "simd".to_owned()),
-            ("no_cache", "true".to_owned()),
-        ],
-        "identify" => vec![
-            ("section", "Abbey".to_owned()),
-            ("swarm.population", "16".to_owned()),
-            ("swarm.iterations", "8".to_owned()),
-            ("polish", "false".to_owned()),
-            ("backend", "simd".to_owned()),
-        ],
-        "envelope" => vec![
-            ("step_mps", "25".to_owned()),
-            ("steers", "8".to_owned()),
-            ("backend", "simd".to_owned()),
-        ],
-        "raceline" => vec![
-            ("track", "stadium:400:120:14".to_owned()),
-            ("sections", "60".to_owned()),
-            ("objectives", "gamma,length".to_owned()),
-            ("population", "16".to_owned()),
-            ("iterations", "8".to_owned()),
-            ("backend", "simd".to_owned()),
-        ],
-        "hybrid" => vec![
-            ("track", "stadium:400:120:14".to_owned()),
-            ("sections", "60".to_owned()),
-            ("budgets_mj", "0.5".to_owned()),
-            ("objectives", "lap_time_s".to_owned()),
-            ("population", "16".to_owned()),
-            ("iterations", "8".to_owned()),
-            ("backend", "simd".to_owned()),
-        ],
-        "transient" => vec![
-            ("line", ring()),
-            ("track", "circle:294:306".to_owned()),
-            ("setups", "3".to_owned()),
-            ("backend", "simd".to_owned()),
-        ],
-        "sensitivity" => vec![
-            ("free", "K,C".to_owned()),
-            ("section", "Abbey".to_owned()),
-            ("samples", "8".to_owned()),
-            ("backend", "simd".to_owned()),
-        ],
-        "surface" => vec![
-            ("section", "Abbey".to_owned()),
-            ("grid", "3".to_owned()),
-            ("backend", "simd".to_owned()),
-        ],
-        other => panic!("{other} is new: say how it is made small"),
-    };
-    flags
-        .into_iter()
-        .map(|(key, value)| (key.to_owned(), value))
-        .collect()
-}
 
 /// Asks a study; it is interrupted when its observer is told for the `interrupted`-th time.
 fn ask(
@@ -154,25 +83,12 @@ fn every_study_that_has_too_little_memory_is_refused_and_leaves_nothing() {
         let root = tempfile::tempdir().expect("a folder");
         let out = root.path().join("out");
         let flags = small(study.name(), root.path());
-        let mut command = Command::new(env!("CARGO_BIN_EXE_lapswarm"));
-        command
-            .arg(study.name())
+        let mut program = Command::new(env!("CARGO_BIN_EXE_lapswarm"));
+        program
+            .args(command(study, &flags))
             .args(["--memory-limit-mib", "1", "--out"])
             .arg(&out);
-        for d in study.declared() {
-            let value = flags.iter().find(|(key, _)| key == d.key).map(|(_, value)| value);
-            match (d.flag, d.typed(), value) {
-                (Flag::Switch(_, on), Some(flag), Some(value)) if *value == on.to_string() => {
-                    command.arg(flag);
-                }
-                (Flag::Switch(..), ..) => {}
-                (_, Some(flag), Some(value)) => {
-                    command.arg(flag).arg(value);
-                }
-                _ => {}
-            }
-        }
-        let told = command.output().expect("the program starts");
+        let told = program.output().expect("the program starts");
         let words = String::from_utf8_lossy(&told.stderr);
         assert_eq!(told.status.code(), Some(2), "{}: {words}", study.name());
         assert!(words.contains("--memory-limit-mib"), "{}: {words}", study.name());

@@ -1,4 +1,4 @@
-//! Runs that are broken off and gone on with end as if nothing had happened, to the last bit.
+//! Runs that are interrupted and resumed end as if nothing had happened, to the last bit.
 
 use crate::solve;
 use lapswarm::Error;
@@ -6,7 +6,7 @@ use lapswarm::evaluate::line::LineObjective;
 use lapswarm::evaluate::{BackendChoice, BackendInfo, Evaluation, Evaluator, FAILED_COST, Failure, Problem};
 use lapswarm::study::framework::run_folder::STATE;
 use lapswarm::study::framework::state_file::StateFile;
-use lapswarm::study::framework::{Progress, Study, solve_unwatched, write_results};
+use lapswarm::study::framework::{Progress, Study, solve_unobserved, write_results};
 use lapswarm::study::identify::{
     self, Identify, IdentifySettings, ObjectiveChoice, SearchState, Setup, search_with,
 };
@@ -61,7 +61,7 @@ fn timeless(mut summary: Value) -> Value {
     summary
 }
 
-/// Breaks off at these observations, one after the other, and goes on each time.
+/// Interrupts at these observations, one after the other, and resumes each time.
 fn identify_in_pieces(settings: &IdentifySettings, setup: &Setup, breaks: &[usize]) -> identify::Outcome {
     let folder = tempfile::tempdir().unwrap();
     let mut seen = 0;
@@ -145,7 +145,7 @@ fn a_search_that_is_broken_off_before_anything_drives_is_interrupted() {
         let interrupted = go(None, 3);
         assert_eq!(interrupted.exit_code(), 130, "{interrupted}");
         assert!(matches!(interrupted, Error::Interrupted(at) if at == folder.path()));
-        // It is gone on with, and its end is that nothing drives.
+        // It is resumed, and ends with nothing that drives.
         let state: SearchState = checkpoint::load(&folder.path().join(STATE)).unwrap();
         assert_eq!(go(Some(state), usize::MAX).exit_code(), 1);
     }
@@ -153,7 +153,7 @@ fn a_search_that_is_broken_off_before_anything_drives_is_interrupted() {
 
 #[test]
 #[ignore = "full tier: nine searches"]
-fn an_identification_goes_on_bit_for_bit() {
+fn an_identification_is_resumed_bit_for_bit() {
     let settings = small(&[ObjectiveChoice::All]);
     let setup = identify::set_up(&settings).unwrap();
     let mut observations = 0;
@@ -186,10 +186,10 @@ fn an_identification_goes_on_bit_for_bit() {
 }
 
 #[test]
-fn a_front_goes_on_bit_for_bit() {
+fn a_front_is_resumed_bit_for_bit() {
     let settings = small(&[ObjectiveChoice::Channel(0), ObjectiveChoice::Channel(3)]);
     let setup = identify::set_up(&settings).unwrap();
-    let whole = solve_unwatched::<Identify>(&settings, &setup).unwrap();
+    let whole = solve_unobserved::<Identify>(&settings, &setup).unwrap();
     assert!(!whole.record.failures.is_empty(), "some of these particles spin");
     let wanted = told(&settings, &setup, &whole);
     for breaks in [&[1][..], &[13], &[29], &[30], &[2, 7, 11]] {
@@ -277,7 +277,7 @@ fn lines_in_pieces(
 
 #[test]
 #[ignore = "full tier: four searches in pieces"]
-fn lines_go_on_bit_for_bit_from_every_stage() {
+fn lines_are_resumed_bit_for_bit_from_every_stage() {
     let settings = lines();
     let setup = raceline::set_up(&settings).unwrap();
     let mut stages: Vec<String> = Vec::new();
@@ -291,7 +291,7 @@ fn lines_go_on_bit_for_bit_from_every_stage() {
     .unwrap()
     .unwrap();
     let wanted = lines_told(&settings, &setup, &whole);
-    // A run that is gone on with writes over what it had written when it was broken off.
+    // A resumed run writes over what it had written when it was interrupted.
     let folder = tempfile::tempdir().unwrap();
     for _ in 0..2 {
         write_results::<Raceline>(folder.path(), &settings, &setup, &whole).unwrap();
@@ -316,7 +316,7 @@ fn lines_go_on_bit_for_bit_from_every_stage() {
 /// section of it.
 #[test]
 #[ignore = "full tier: two searches in pieces"]
-fn cold_searches_go_on_bit_for_bit_from_every_stage() {
+fn cold_searches_are_resumed_bit_for_bit_from_every_stage() {
     let abbey = RacelineSettings {
         track: "silverstone_gp".to_owned(),
         section: Some("Abbey".to_owned()),
@@ -346,7 +346,7 @@ fn cold_searches_go_on_bit_for_bit_from_every_stage() {
 }
 
 #[test]
-fn plain_swarms_go_on_bit_for_bit() {
+fn particle_swarms_are_resumed_bit_for_bit() {
     for algorithm in [LineAlgorithm::Cooperative, LineAlgorithm::Thesis] {
         let settings = RacelineSettings {
             algorithm,

@@ -3,7 +3,7 @@
 use crate::solve;
 use lapswarm::config::settings::Settings;
 use lapswarm::study::framework::state_file::StateFile;
-use lapswarm::study::framework::{Study, solve_unwatched, write_results};
+use lapswarm::study::framework::{Study, solve_unobserved, write_results};
 use lapswarm::study::identify::IdentifySettings;
 use lapswarm::study::sensitivity::{LEVELS, Sensitivity, SensitivitySettings};
 use std::ops::ControlFlow;
@@ -30,7 +30,7 @@ fn settings() -> SensitivitySettings {
 fn the_lap_feels_grip_more_than_roll_and_files_say_so() {
     let settings = settings();
     let setup = Sensitivity::prepare(&settings).expect("the bundled lap");
-    let outcome = solve_unwatched::<Sensitivity>(&settings, &setup).expect("it runs");
+    let outcome = solve_unobserved::<Sensitivity>(&settings, &setup).expect("it runs");
     assert_eq!(outcome.record.evaluations, 1 + 3 * LEVELS.len() as u64 + 32 * 5);
     let folder = tempfile::tempdir().expect("a temporary folder");
     let written = write_results::<Sensitivity>(folder.path(), &settings, &setup, &outcome);

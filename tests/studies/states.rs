@@ -44,7 +44,7 @@ fn steps(optimiser: &mut dyn Optimiser, evaluator: &mut dyn Evaluator, count: us
 }
 
 /// `n` steps are the same as `k`, a file, and the rest: the whole state, byte for byte.
-fn goes_on<T: Checkpoint + Optimiser>(
+fn resumes<T: Checkpoint + Optimiser>(
     fresh: impl Fn(u64) -> T,
     objectives: usize,
     seed: u64,
@@ -105,32 +105,32 @@ fn pso(seed: u64) -> Pso {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(6))]
     #[test]
-    fn every_optimiser_goes_on_from_a_file(seed in 0u64..1 << 60, k in 0usize..40, more in 1usize..15) {
+    fn every_optimiser_resumes_from_a_file(seed in 0u64..1 << 60, k in 0usize..40, more in 1usize..15) {
         let at = (k, k + more);
         let one = problem(1);
         let middle = [4.0, 1.0, 1.0, 15.0, 1.5];
-        goes_on(pso, 1, seed, at);
-        goes_on(|s| mopso(s, 24), 2, seed, at);
-        goes_on(|s| DifferenceSwarm::new(&one, DifferenceSettings { seed: s, ..Default::default() }).unwrap(), 1, seed, at);
-        goes_on(|s| Nsga2::new(&problem(2), Nsga2Settings { seed: s, population: 20, ..Default::default() }).unwrap(), 2, seed, at);
+        resumes(pso, 1, seed, at);
+        resumes(|s| mopso(s, 24), 2, seed, at);
+        resumes(|s| DifferenceSwarm::new(&one, DifferenceSettings { seed: s, ..Default::default() }).unwrap(), 1, seed, at);
+        resumes(|s| Nsga2::new(&problem(2), Nsga2Settings { seed: s, population: 20, ..Default::default() }).unwrap(), 2, seed, at);
         let cooperative = CooperativeSettings::default();
-        goes_on(|s| {
+        resumes(|s| {
             let motion = PsoSettings { seed: s, ..cooperative.motion.clone() };
             CooperativeSwarm::new(&one, CooperativeSettings { motion, groups: 3 }).unwrap()
         }, 1, seed, at);
         // Exploring ends half-way.
         let hybrid = HybridSettings { iterations: 60, ..Default::default() };
-        goes_on(|s| HybridSwarm::new(&one, HybridSettings { seed: s, ..hybrid.clone() }).unwrap(), 1, seed, at);
+        resumes(|s| HybridSwarm::new(&one, HybridSettings { seed: s, ..hybrid.clone() }).unwrap(), 1, seed, at);
         for (active, beyond, restarts) in [
             (false, OutOfBounds::Reflected, Restarts::None),
             (true, OutOfBounds::AsDrawn, Restarts::Alternating),
         ] {
             let settings = CovarianceSettings { active, beyond, restarts, ..Default::default() };
-            goes_on(|s| CovarianceSwarm::new(&one, &middle, CovarianceSettings { seed: s, ..settings.clone() }).unwrap(), 1, seed, at);
+            resumes(|s| CovarianceSwarm::new(&one, &middle, CovarianceSettings { seed: s, ..settings.clone() }).unwrap(), 1, seed, at);
         }
         let windows = WindowSettings { strides: vec![2, 1], size: 2, turn: 3, ..Default::default() };
-        goes_on(|s| WindowSwarm::new(&one, &middle, WindowSettings { seed: s, ..windows.clone() }).unwrap(), 1, seed, at);
-        goes_on(|s| {
+        resumes(|s| WindowSwarm::new(&one, &middle, WindowSettings { seed: s, ..windows.clone() }).unwrap(), 1, seed, at);
+        resumes(|s| {
             let islands = (0..3).map(|i| mopso(s ^ i, 8)).collect();
             Islands::new(&problem(2), islands, Some(Migration { every: 4, count: 3 })).unwrap()
         }, 2, seed, at);
@@ -138,8 +138,8 @@ proptest! {
 }
 
 #[test]
-fn a_large_swarm_goes_on_from_a_file() {
-    goes_on(|seed| mopso(seed, MANY + 3), 2, 5, (4, 7));
+fn a_large_swarm_resumes_from_a_file() {
+    resumes(|seed| mopso(seed, MANY + 3), 2, 5, (4, 7));
 }
 
 #[test]

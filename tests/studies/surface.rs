@@ -1,7 +1,7 @@
 //! The surface study end to end on the bundled lap.
 
 use lapswarm::config::settings::Settings;
-use lapswarm::study::framework::{Study, solve_unwatched, write_results};
+use lapswarm::study::framework::{Study, solve_unobserved, write_results};
 use lapswarm::study::surface::{Surface, SurfaceSettings};
 
 #[test]
@@ -12,7 +12,7 @@ fn the_least_cost_is_at_the_car_that_logged_the_lap() {
         ..SurfaceSettings::default()
     };
     let setup = Surface::prepare(&settings).expect("the bundled lap");
-    let outcome = solve_unwatched::<Surface>(&settings, &setup).expect("it runs");
+    let outcome = solve_unobserved::<Surface>(&settings, &setup).expect("it runs");
     let folder = tempfile::tempdir().expect("a temporary folder");
     let written = write_results::<Surface>(folder.path(), &settings, &setup, &outcome);
     let summary = written.expect("files are written");

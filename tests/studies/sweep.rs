@@ -1,4 +1,4 @@
-//! Sweeps: a grid of small studies, broken off and gone on with.
+//! Sweeps: a grid of small studies, interrupted and resumed.
 
 use lapswarm::study::sweep::{SweepSettings, sweep};
 use std::ops::ControlFlow;
@@ -58,7 +58,7 @@ seed = [1, 2]
 
 /// A line's study within a sweep goes on from where it was; from another's state, or from none that can be read, it does not.
 #[test]
-fn the_study_at_work_goes_on_and_foreign_states_are_not_trusted() {
+fn the_study_at_work_is_resumed_and_foreign_states_are_not_trusted() {
     let root = tempfile::tempdir().expect("a temporary folder");
     let settings = SweepSettings::parse(Path::new("sweep.toml"), LINES).expect("a sweep");
     let whole = root.path().join("whole");
@@ -116,7 +116,7 @@ fn the_study_at_work_goes_on_and_foreign_states_are_not_trusted() {
 
 #[test]
 #[ignore = "full tier: eleven sweeps"]
-fn a_sweep_broken_off_and_gone_on_with_is_the_same_to_the_byte() {
+fn an_interrupted_and_resumed_sweep_is_the_same_to_the_byte() {
     let root = tempfile::tempdir().expect("a temporary folder");
     let settings = SweepSettings::parse(Path::new("sweep.toml"), SWEEP).expect("a sweep");
     let whole = root.path().join("whole");

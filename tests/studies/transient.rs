@@ -5,7 +5,7 @@ use lapswarm::evaluate::BackendChoice;
 use lapswarm::evaluate::line::LineObjective;
 use lapswarm::line::read_line;
 use lapswarm::study::framework::state_file::StateFile;
-use lapswarm::study::framework::{Study, solve_unwatched, write_results};
+use lapswarm::study::framework::{Study, solve_unobserved, write_results};
 use lapswarm::study::identify::{Algorithm, IdentifySettings};
 use lapswarm::study::raceline::{RacelineSettings, set_up};
 use lapswarm::study::run::{Run, RunSettings};
@@ -30,8 +30,8 @@ fn stadium() -> lapswarm::study::raceline::Setup {
 fn on_lines(lines: &[(&str, f64)]) -> Prepared {
     let road = stadium();
     let line = |(name, beside): &(&str, f64)| {
-        let alpha: Vec<f64> = road.cuts.reference.iter().map(|a| a - beside).collect();
-        let points = road.cuts.points(&alpha);
+        let alpha: Vec<f64> = road.cross_sections.reference.iter().map(|a| a - beside).collect();
+        let points = road.cross_sections.points(&alpha);
         NamedLine::new((*name).to_owned(), points, &road.edges_m, 2.0).expect("a line")
     };
     Prepared {
@@ -59,7 +59,7 @@ fn population_of(outcome: &Outcome) -> &PopulationOutcome {
 fn the_car_drives_a_line_as_fast_as_the_point_mass() {
     let prepared = on_lines(&[("middle", 0.0)]);
     let settings = TransientSettings::default();
-    let found = solve_unwatched::<Transient>(&settings, &prepared).expect("it drives");
+    let found = solve_unobserved::<Transient>(&settings, &prepared).expect("it drives");
     let outcome = line_of(&found);
     assert!(
         outcome.disagreement().abs() <= AGREEMENT,
@@ -106,7 +106,7 @@ fn set_ups_and_lines_are_driven_all_at_once() {
         backend: BackendChoice::Simd,
         ..TransientSettings::default()
     };
-    let found = solve_unwatched::<Transient>(&settings, &prepared).expect("they are driven");
+    let found = solve_unobserved::<Transient>(&settings, &prepared).expect("they are driven");
     let outcome = population_of(&found);
     assert_eq!(outcome.record.evaluations, 6 * 2 * 3);
     assert_eq!(outcome.driven.len(), 6 * 2);
@@ -134,7 +134,7 @@ fn set_ups_and_lines_are_driven_all_at_once() {
         grip_shares: Some(vec![own.grip_share]),
         ..TransientSettings::default()
     };
-    let alone = solve_unwatched::<Transient>(&alone, &on_lines(&[("middle", 0.0)])).expect("it drives");
+    let alone = solve_unobserved::<Transient>(&alone, &on_lines(&[("middle", 0.0)])).expect("it drives");
     let alone = line_of(&alone);
     // Single precision, and a recording every 10 ms: see the parity of drives.
     assert!(
@@ -201,7 +201,7 @@ fn set_ups_and_lines_are_driven_all_at_once() {
 #[test]
 fn a_road_too_narrow_for_the_car_and_a_table_of_something_else_are_refused() {
     let setup = stadium();
-    let points = setup.cuts.points(&setup.cuts.reference);
+    let points = setup.cross_sections.points(&setup.cross_sections.reference);
     let error = NamedLine::new("middle".to_owned(), points, &setup.edges_m, 16.0).expect_err("no room");
     assert_eq!(error.exit_code(), 2, "{error}");
 
@@ -240,7 +240,7 @@ fn a_run_goes_from_the_log_to_a_driven_lap_and_remembers_its_stages() {
             ..base.identify.clone()
         },
         raceline: RacelineSettings {
-            // Coarser cuts leave kinks in the spline that no steering follows.
+            // Coarser cross-sections leave kinks in the spline that no steering follows.
             objectives: vec![LineObjective::LapTime],
             ..base.raceline.clone()
         },

@@ -52,7 +52,7 @@ fn large_swarms_find_good_fronts_in_25_generations() {
 fn knee(population: usize, reference: Option<Vec<f64>>) -> (f64, usize) {
     let problem = Problem {
         variables: vec![Variable::new("u", "-", -4.0, 4.0)],
-        ..plain(0, 2)
+        ..unconstrained(0, 2)
     };
     let settings = MopsoSettings {
         reference,
@@ -84,7 +84,7 @@ fn a_large_swarm_keeps_the_knee_of_a_front_with_long_tails() {
     }
 }
 
-fn plain(variables: usize, objectives: usize) -> Problem {
+fn unconstrained(variables: usize, objectives: usize) -> Problem {
     Problem {
         variables: (0..variables)
             .map(|k| Variable::new(format!("x{k}"), "-", -1.0, 3.0))
@@ -96,7 +96,7 @@ fn plain(variables: usize, objectives: usize) -> Problem {
 }
 
 /// What is told of random candidates, on a coarse grid so that there are ties and duplicates; some fail.
-fn made_up(count: usize, width: usize, when: u32) -> Evaluation {
+fn synthetic_evaluation(count: usize, width: usize, when: u32) -> Evaluation {
     let random = Random::new(77);
     let mut evaluation = Evaluation::default();
     for i in 0..count as u32 {
@@ -120,7 +120,7 @@ fn made_up(count: usize, width: usize, when: u32) -> Evaluation {
 fn nothing_is_lost_but_by_truncation() {
     for width in [2, 3] {
         let mut swarm = Mopso::new(
-            &plain(3, width),
+            &unconstrained(3, width),
             MopsoSettings {
                 archive: 5000,
                 ..settings(MANY + 100, 10)
@@ -130,7 +130,7 @@ fn nothing_is_lost_but_by_truncation() {
         let mut told: Vec<Vec<f64>> = Vec::new();
         for when in 0..5 {
             swarm.ask();
-            let evaluation = made_up(MANY + 100, width, when);
+            let evaluation = synthetic_evaluation(MANY + 100, width, when);
             let rows = evaluation.objectives.chunks_exact(width);
             told.extend(
                 rows.filter(|r| r.iter().all(|x| x.is_finite() && *x < FAILED_COST))
@@ -222,7 +222,7 @@ fn translation_changes_nothing_and_corners_are_reached() {
                 .iter()
                 .map(|(a, b)| Variable::new("x", "-", a + shift, b + shift))
                 .collect(),
-            ..plain(0, 2)
+            ..unconstrained(0, 2)
         };
         let function = move |x: &[f64], f: &mut [f64]| {
             let back: Vec<f64> = x.iter().map(|x| ((x - shift) * GRID).round() / GRID).collect();
@@ -249,7 +249,7 @@ fn translation_changes_nothing_and_corners_are_reached() {
 
 #[test]
 fn nothing_that_can_be_evaluated_is_survived() {
-    let problem = plain(3, 2);
+    let problem = unconstrained(3, 2);
     let mut swarm = Mopso::new(&problem, settings(MANY, 5)).unwrap();
     let mut evaluator = PointEvaluator::new(problem, CallCost::Expensive, |_: &[f64], f: &mut [f64]| {
         f.fill(f64::NAN)

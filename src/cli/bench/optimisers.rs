@@ -1,7 +1,7 @@
 //! `lapswarm bench optimisers`: every algorithm on every test problem.
 
 use super::pages::of_optimisers;
-use crate::cli::measurement::Kept;
+use crate::cli::measurement::FolderFlag;
 use crate::cli::output::{Columns, line_of, outln};
 use lapswarm::swarm::comparison::{compare, quartiles};
 use lapswarm::swarm::metrics::signed_rank;
@@ -23,7 +23,7 @@ pub struct Arguments {
     #[arg(long, value_delimiter = ',', value_name = "NAMES")]
     algorithms: Vec<String>,
     #[command(flatten)]
-    kept: Kept,
+    kept: FolderFlag,
 }
 
 /// One algorithm on one problem; hypervolume for several objectives, error for one.

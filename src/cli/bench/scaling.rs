@@ -3,7 +3,7 @@
 use super::machine::{forget_peak_memory, peak_memory_bytes, peak_operations_per_s};
 use super::pages::{of_scaling, rates};
 use crate::cli::backend_flag;
-use crate::cli::measurement::{Kept, distinct};
+use crate::cli::measurement::{FolderFlag, distinct};
 use crate::cli::output::{Columns, line_of, outln};
 use clap::builder::PossibleValuesParser;
 use lapswarm::config::read_text;
@@ -35,7 +35,7 @@ use std::time::Instant;
 // They stand beside those of the subcommands, whose struct has the same name.
 #[group(skip)]
 pub struct Arguments {
-    /// Problems: replay (the bundled lap, 22 unknowns), line (lap time, 360 cuts, 90 control points), drive (set-ups driven
+    /// Problems: replay (the bundled lap, 22 unknowns), line (lap time, 360 cross-sections, 90 control points), drive (set-ups driven
     /// round a stadium of 840 m by the driver), steady (set-ups that settle on circles), energy (strategies of a hybrid on one line)
     #[arg(long, value_delimiter = ',', default_value = "replay,line",
           value_parser = PossibleValuesParser::new(PROBLEMS.iter().map(|(name, _)| *name)))]
@@ -60,7 +60,7 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE")]
     against: Option<PathBuf>,
     #[command(flatten)]
-    kept: Kept,
+    kept: FolderFlag,
     /// No table
     #[arg(long)]
     quiet: bool,
@@ -107,7 +107,7 @@ impl Table {
 const CANDIDATES: u32 = 0xbe0c;
 /// Cars lie within this share of the truth, so that all of them drive and none ends early.
 const SPREAD: f64 = 0.02;
-/// Cuts of the circuit that lines are driven on, and that energy is deployed on.
+/// Cross-sections of the circuit that lines are driven on, and that energy is deployed on.
 const SECTIONS: usize = 360;
 
 /// A problem with what is known of its arithmetic.
@@ -178,13 +178,13 @@ fn line() -> Result<Case<LineProblem>> {
     })?;
     let way = Parametrisation::control_points(SECTIONS / 4);
     let objectives = [LineObjective::LapTime];
-    let line = LineProblem::new(setup.cuts, way, &objectives, Some(setup.car), 0.0)?;
+    let line = LineProblem::new(setup.cross_sections, way, &objectives, Some(setup.car), 0.0)?;
     let dimensions = line.dimensions();
     let plan = line.plan().stored::<Counted>();
     let middle = vec![Counted(0.5); dimensions];
     let mut operations = 0;
-    if let Some(limits) = line.limits() {
-        let limits = limits.stored::<Counted>();
+    if let Some(envelope) = line.envelope() {
+        let envelope = envelope.stored::<Counted>();
         operations = operations_of(|| {
             let mut course = kernel::Course::default();
             let wanted = kernel::Wanted {
@@ -192,7 +192,13 @@ fn line() -> Result<Case<LineProblem>> {
                 lap: true,
             };
             kernel::shape(&plan, wanted, &middle, &mut course);
-            kernel::lap_time(&limits, plan.closed, plan.start, Counted(plan.entry), &mut course);
+            kernel::lap_time(
+                &envelope,
+                plan.closed,
+                plan.start,
+                Counted(plan.entry),
+                &mut course,
+            );
         });
     }
     Ok(Case {

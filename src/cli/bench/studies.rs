@@ -2,7 +2,7 @@
 
 use super::pages::{of_studies, qualities};
 use crate::cli::backend_flag;
-use crate::cli::measurement::Kept;
+use crate::cli::measurement::FolderFlag;
 use crate::cli::output::{Columns, line_of, outln};
 use clap::builder::PossibleValuesParser;
 use lapswarm::evaluate::line::{LineObjective, LineProblem};
@@ -44,7 +44,7 @@ pub struct Arguments {
     /// Runs of each, seeds 1 to N
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u64).range(1..=60))]
     seeds: u64,
-    /// Cuts of the circuit that lines are driven on
+    /// Cross-sections of the circuit that lines are driven on
     #[arg(long, value_name = "N", default_value_t = 480, value_parser = clap::value_parser!(u32).range(60..=100_000))]
     sections: u32,
     /// What evaluates
@@ -57,7 +57,7 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
     #[command(flatten)]
-    kept: Kept,
+    kept: FolderFlag,
 }
 
 /// Compares the optimisers on a problem.
@@ -200,7 +200,7 @@ fn raceline(arguments: &Arguments) -> Result<Case<LineProblem>> {
         known.extend(solvers.best(*objective)?.map(|line| line.alpha));
     }
     let problem = raceline::front_problem(&setup, &settings)?;
-    let mut lines: Vec<f64> = problem.candidate(&setup.cuts.reference)?;
+    let mut lines: Vec<f64> = problem.candidate(&setup.cross_sections.reference)?;
     for alpha in &known {
         lines.extend(problem.candidate(alpha)?);
     }

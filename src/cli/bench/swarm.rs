@@ -2,7 +2,7 @@
 
 use super::pages::of_swarm;
 use crate::cli::backend_flag;
-use crate::cli::measurement::Kept;
+use crate::cli::measurement::FolderFlag;
 use crate::cli::output::{Columns, line_of, outln};
 use lapswarm::evaluate::gpu::{GpuContext, devices};
 use lapswarm::evaluate::simd::InstructionSet;
@@ -40,7 +40,7 @@ pub struct Arguments {
     #[arg(long)]
     adapter: Option<String>,
     #[command(flatten)]
-    kept: Kept,
+    kept: FolderFlag,
 }
 
 /// One population on one problem.

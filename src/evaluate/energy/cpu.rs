@@ -3,14 +3,14 @@
 use super::problem::HybridProblem;
 use crate::line::energy::{EnergyLap, EnergyPlan, EnergyTable, SegmentEnergy, energy_lap};
 use crate::line::kernel::{Course, Wanted, shape};
-use crate::line::{LimitTable, LinePlan};
+use crate::line::{EnvelopeTable, LinePlan};
 use crate::scalar::Lookup;
 use rayon::prelude::*;
 
 /// Tables of a problem in the precision of a scalar.
 pub(super) struct Tables<'a, S> {
     pub plan: &'a LinePlan<S>,
-    pub limits: &'a LimitTable<S>,
+    pub envelope: &'a EnvelopeTable<S>,
     pub table: &'a EnergyTable<S>,
     pub energy: &'a EnergyPlan<S>,
 }
@@ -33,7 +33,7 @@ pub(super) fn measure<R: Lookup>(
     shape(plan, wanted, line, course);
     let begin = (plan.closed, plan.start, R::load(plan.entry));
     energy_lap(
-        tables.limits,
+        tables.envelope,
         tables.table,
         tables.energy,
         begin,
@@ -64,7 +64,7 @@ impl HybridProblem {
     fn tables(&self) -> Tables<'_, f64> {
         Tables {
             plan: self.plan(),
-            limits: &self.car().limits,
+            envelope: &self.car().envelope_table,
             table: &self.car().table,
             energy: self.energy(),
         }
@@ -74,7 +74,7 @@ impl HybridProblem {
     pub fn lap_in<R: Lookup>(&self, candidate: &[f64]) -> EnergyLap<R> {
         let tables = Tables {
             plan: &self.plan().stored::<R>(),
-            limits: &self.car().limits.stored::<R>(),
+            envelope: &self.car().envelope_table.stored::<R>(),
             table: &self.car().table.stored::<R>(),
             energy: &self.energy().stored::<R>(),
         };

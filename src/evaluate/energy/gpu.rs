@@ -76,13 +76,13 @@ impl DeviceKernel<HybridProblem> for EnergyDevice {
     fn open(hybrid: &HybridProblem, context: Arc<GpuContext>) -> Result<Self> {
         let device = context.limits();
         let plan = hybrid.plan().stored::<f32>();
-        let limits = hybrid.car().limits.stored::<f32>();
+        let envelope = hybrid.car().envelope_table.stored::<f32>();
         let table = hybrid.car().table.stored::<f32>();
         let wanted = Wanted {
             integral: false,
             lap: true,
         };
-        let tables = LineTables::new(&context, &plan, &limits, wanted)?;
+        let tables = LineTables::new(&context, &plan, &envelope, wanted)?;
         let vectors = energy_vectors(&table, &hybrid.energy().stored::<f32>());
         // A software driver is faster with uniform tables, see the line kernel.
         let uniform_energy = context.summary().kind == DeviceKind::Software
@@ -121,7 +121,7 @@ impl DeviceKernel<HybridProblem> for EnergyDevice {
             entry: "energy_line",
             tables,
             plan: &plan,
-            limits: &limits,
+            envelope: &envelope,
             others: vec![(Binding::Uniform, account), (energy_binding, energy)],
             variables: hybrid.line_variables() + hybrid.strategy_figures(),
             lap: true,

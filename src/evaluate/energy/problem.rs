@@ -35,7 +35,7 @@ pub enum HybridLine {
     /// A line across cross-sections, given by the first variables.
     Free {
         /// The cross-sections.
-        cuts: Box<CrossSections>,
+        cross_sections: Box<CrossSections>,
         /// How variables give a line.
         parametrisation: Parametrisation,
     },
@@ -150,13 +150,17 @@ impl HybridProblem {
         let (mut plan, mut variables) = match &line {
             HybridLine::Fixed { points_m, closed } => (LinePlan::of_points(points_m, *closed), Vec::new()),
             HybridLine::Free {
-                cuts,
+                cross_sections,
                 parametrisation,
             } => {
-                let mut plan =
-                    LinePlan::of_cuts(&cuts.right_m, &cuts.left_m, cuts.closed).spaced(&cuts.spacing_m());
-                parametrisation.apply(cuts, &mut plan)?;
-                (plan, parametrisation.variables(cuts))
+                let mut plan = LinePlan::of_cross_sections(
+                    &cross_sections.right_m,
+                    &cross_sections.left_m,
+                    cross_sections.closed,
+                )
+                .spaced(&cross_sections.spacing_m());
+                parametrisation.apply(cross_sections, &mut plan)?;
+                (plan, parametrisation.variables(cross_sections))
             }
         };
         let n = plan.rows.len();
@@ -187,7 +191,9 @@ impl HybridProblem {
         plan.entry = entry_mps * entry_mps;
         plan.start = match &line {
             HybridLine::Fixed { points_m, closed } => slowest(points_m, *closed),
-            HybridLine::Free { cuts, .. } => slowest(&cuts.points(&vec![0.5; n]), cuts.closed),
+            HybridLine::Free { cross_sections, .. } => {
+                slowest(&cross_sections.points(&vec![0.5; n]), cross_sections.closed)
+            }
         };
         // A floor that no lap can reach does not count.
         let mut energy = energy;

@@ -8,7 +8,7 @@ use crate::evaluate::simd::InstructionSet;
 use crate::line::energy::kernel::FIGURES;
 use crate::line::energy::{EnergyLap, EnergyPlan, EnergyTable};
 use crate::line::kernel::Course;
-use crate::line::{LimitTable, LinePlan};
+use crate::line::{EnvelopeTable, LinePlan};
 use crate::scalar::lanes::Lanes;
 
 /// Packs that one thread does in a row, in the same memory.
@@ -17,7 +17,7 @@ const PACKS: usize = 4;
 /// What lanes read of a problem.
 pub struct EnergyLanes {
     plan: LinePlan<f32>,
-    limits: LimitTable<f32>,
+    envelope: EnvelopeTable<f32>,
     table: EnergyTable<f32>,
     energy: EnergyPlan<f32>,
 }
@@ -47,7 +47,7 @@ impl LaneTables<HybridProblem> for EnergyLanes {
     fn new(hybrid: &HybridProblem) -> Self {
         Self {
             plan: hybrid.plan().stored::<f32>(),
-            limits: hybrid.car().limits.stored::<f32>(),
+            envelope: hybrid.car().envelope_table.stored::<f32>(),
             table: hybrid.car().table.stored::<f32>(),
             energy: hybrid.energy().stored::<f32>(),
         }
@@ -62,7 +62,7 @@ impl LaneTables<HybridProblem> for EnergyLanes {
         let kernel = Kernel {
             tables: Tables {
                 plan: &self.plan,
-                limits: &self.limits,
+                envelope: &self.envelope,
                 table: &self.table,
                 energy: &self.energy,
             },

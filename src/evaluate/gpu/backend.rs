@@ -26,7 +26,7 @@ pub trait DeviceKernel<K: ProblemKind>: Sized {
     /// How the work is cut.
     fn batching(&self) -> Batching;
 
-    /// Cuts the work differently.
+    /// Cross-sections the work differently.
     fn cut(&mut self, batching: Batching);
 
     /// Time that the device itself spent on the last outcomes (ms), where it can tell.
@@ -59,7 +59,7 @@ impl<'a, K: OnDevice> GpuBackend<'a, K> {
         })
     }
 
-    /// Cuts the work differently.
+    /// Cross-sections the work differently.
     pub fn with_batching(mut self, batching: Batching) -> Self {
         self.device.cut(batching);
         self

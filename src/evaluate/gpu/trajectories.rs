@@ -116,7 +116,7 @@ impl<const STATE: usize> Trajectories<STATE> {
         &self.context
     }
 
-    /// Cuts the work differently.
+    /// Cross-sections the work differently.
     pub fn cut(&mut self, batching: Batching) {
         self.batching = batching;
         self.batch = None;

@@ -15,7 +15,7 @@ use crate::error::Result;
 use crate::evaluate::gpu::{Batching, GpuContext};
 use crate::evaluate::resident::DeviceObjectives;
 use crate::evaluate::{DeviceKernel, GpuBackend, OnDevice, Problem, ProblemKind};
-use crate::line::LimitTable;
+use crate::line::EnvelopeTable;
 use exchange::Exchange;
 use std::sync::Arc;
 
@@ -37,24 +37,24 @@ impl DeviceKernel<LineProblem> for LineDevice {
     fn open(line: &LineProblem, context: Arc<GpuContext>) -> Result<Self> {
         let plan = line.plan().stored::<f32>();
         // Without laps the tables are there but not read.
-        let limits = line.limits().map_or(
-            LimitTable {
+        let envelope = line.envelope().map_or(
+            EnvelopeTable {
                 top: 0.0,
                 rows_per_speed_squared: 0.0,
-                limits: vec![0.0; 8],
+                rows: vec![0.0; 8],
                 rows_per_radius: 0.0,
                 corners: vec![0.0; 2],
                 ellipse: Vec::new(),
             },
-            |limits| limits.stored::<f32>(),
+            |envelope| envelope.stored::<f32>(),
         );
-        let tables = LineTables::new(&context, &plan, &limits, line.wanted())?;
+        let tables = LineTables::new(&context, &plan, &envelope, line.wanted())?;
         let kernel = LineKernel {
             source: &tables.shape.source(),
             entry: "line",
             tables,
             plan: &plan,
-            limits: &limits,
+            envelope: &envelope,
             others: Vec::new(),
             variables: line.dimensions(),
             lap: line.wanted().lap,

@@ -4,7 +4,7 @@ use crate::error::{Error, Result};
 use crate::evaluate::Problem;
 use crate::evaluate::objectives::{listed, objectives};
 use crate::line::kernel::{Shape, Wanted};
-use crate::line::{LimitTable, LinePlan, Parametrisation, PointMass, geometry};
+use crate::line::{EnvelopeTable, LinePlan, Parametrisation, PointMass, geometry};
 use crate::track::CrossSections;
 use glam::DVec2;
 
@@ -67,38 +67,38 @@ const INSIDE: f64 = 1e-6;
 pub struct LineProblem {
     /// Variables and objectives.
     pub problem: Problem,
-    cuts: CrossSections,
+    cross_sections: CrossSections,
     parametrisation: Parametrisation,
     pub(super) objectives: Vec<LineObjective>,
     plan: LinePlan<f64>,
     car: Option<PointMass>,
-    limits: Option<LimitTable<f64>>,
+    envelope: Option<EnvelopeTable<f64>>,
 }
 
 impl LineProblem {
-    /// The problem of finding lines across the cross-sections `cuts`, which the middle of the car may use from end to end (see
-    /// [`CrossSections::narrowed`]). `car` drives the laps; `entry_mps` is its greatest speed at the start of an open
-    /// circuit (m/s).
+    /// The problem of finding lines across `cross_sections`, which the middle of the car may use from end to end (see
+    /// [`CrossSections::narrowed`]). `car` drives the laps; `entry_mps` is its greatest speed at the start of an open circuit
+    /// (m/s).
     ///
     /// # Errors
     /// [`Error::Input`] if there are fewer than three sections, if objectives are missing or come twice, if a lap time is
     /// asked for without a car, or if the parametrisation or the car is out of range.
     pub fn new(
-        cuts: CrossSections,
+        cross_sections: CrossSections,
         parametrisation: Parametrisation,
         objectives: &[LineObjective],
         car: Option<PointMass>,
         entry_mps: f64,
     ) -> Result<Self> {
         let wrong = |place: &str, found: String, expected: &str| {
-            Err(Error::input(&cuts.name, place, found, expected))
+            Err(Error::input(&cross_sections.name, place, found, expected))
         };
-        let n = cuts.len();
-        if n < 3 || cuts.right_m.len() != n || cuts.left_m.len() != n {
+        let n = cross_sections.len();
+        if n < 3 || cross_sections.right_m.len() != n || cross_sections.left_m.len() != n {
             return wrong("sections", n.to_string(), "at least three, each with both ends");
         }
         let finite = |points: &[DVec2]| points.iter().all(|p| p.is_finite());
-        if !(finite(&cuts.right_m) && finite(&cuts.left_m)) {
+        if !(finite(&cross_sections.right_m) && finite(&cross_sections.left_m)) {
             return wrong(
                 "sections",
                 "a position that is not finite".to_owned(),
@@ -126,32 +126,37 @@ impl LineProblem {
                 "a car's envelope",
             );
         }
-        let mut plan = LinePlan::of_cuts(&cuts.right_m, &cuts.left_m, cuts.closed).spaced(&cuts.spacing_m());
-        parametrisation.apply(&cuts, &mut plan)?;
+        let mut plan = LinePlan::of_cross_sections(
+            &cross_sections.right_m,
+            &cross_sections.left_m,
+            cross_sections.closed,
+        )
+        .spaced(&cross_sections.spacing_m());
+        parametrisation.apply(&cross_sections, &mut plan)?;
         plan.entry = entry_mps * entry_mps;
-        let middle = geometry(&cuts.points(&vec![0.5; n]), cuts.closed);
+        let middle = geometry(&cross_sections.points(&vec![0.5; n]), cross_sections.closed);
         let sharpness = |i: &usize| middle.curvature_1pm[*i].abs();
         plan.start = (0..n)
             .max_by(|i, j| sharpness(i).total_cmp(&sharpness(j)))
             .unwrap_or(0);
-        let limits = car.as_ref().map(PointMass::table).transpose()?;
+        let envelope = car.as_ref().map(PointMass::table).transpose()?;
         Ok(Self {
             problem: Problem {
-                variables: parametrisation.variables(&cuts),
+                variables: parametrisation.variables(&cross_sections),
                 objectives: listed(objectives),
             },
-            cuts,
+            cross_sections,
             parametrisation,
             objectives: objectives.to_vec(),
             plan,
             car,
-            limits,
+            envelope,
         })
     }
 
     /// The sections.
-    pub fn cuts(&self) -> &CrossSections {
-        &self.cuts
+    pub fn cross_sections(&self) -> &CrossSections {
+        &self.cross_sections
     }
 
     /// How variables give a line.
@@ -170,8 +175,8 @@ impl LineProblem {
     }
 
     /// The car's limits, a table made from its g-g-v envelope.
-    pub fn limits(&self) -> Option<&LimitTable<f64>> {
-        self.limits.as_ref()
+    pub fn envelope(&self) -> Option<&EnvelopeTable<f64>> {
+        self.envelope.as_ref()
     }
 
     /// What the kernels read of the sections.
@@ -195,7 +200,7 @@ impl LineProblem {
 
     /// The points of a candidate's line (m), one per section.
     pub fn points(&self, candidate: &[f64]) -> Vec<DVec2> {
-        self.cuts.points(&self.alpha(candidate))
+        self.cross_sections.points(&self.alpha(candidate))
     }
 
     /// The candidate whose line comes closest to `alpha` at every section.
@@ -203,7 +208,7 @@ impl LineProblem {
     /// # Errors
     /// As [`Parametrisation::fit`].
     pub fn candidate(&self, alpha: &[f64]) -> Result<Vec<f64>> {
-        let coefficients = self.parametrisation.fit(&self.cuts, alpha)?;
+        let coefficients = self.parametrisation.fit(&self.cross_sections, alpha)?;
         Ok(self.parametrisation.variables_of(&coefficients))
     }
 

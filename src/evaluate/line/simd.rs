@@ -6,7 +6,7 @@ use crate::evaluate::LaneTables;
 use crate::evaluate::packs::{LaneFigures, LaneKernel, Pack};
 use crate::evaluate::simd::InstructionSet;
 use crate::line::kernel::Course;
-use crate::line::{LimitTable, LinePlan};
+use crate::line::{EnvelopeTable, LinePlan};
 use crate::scalar::lanes::Lanes;
 
 /// Packs that one thread does in a row, in the same memory.
@@ -15,7 +15,7 @@ const PACKS: usize = 4;
 /// What lanes read of a problem.
 pub struct LineLanes {
     plan: LinePlan<f32>,
-    limits: Option<LimitTable<f32>>,
+    envelope: Option<EnvelopeTable<f32>>,
 }
 
 struct Kernel<'a> {
@@ -37,7 +37,7 @@ impl LaneKernel<MEASURES> for Kernel<'_> {
         );
         measure::<L>(
             &tables.plan,
-            tables.limits.as_ref(),
+            tables.envelope.as_ref(),
             line.wanted(),
             variables,
             course,
@@ -50,7 +50,7 @@ impl LaneTables<LineProblem> for LineLanes {
     fn new(line: &LineProblem) -> Self {
         Self {
             plan: line.plan().stored::<f32>(),
-            limits: line.limits().map(|limits| limits.stored::<f32>()),
+            envelope: line.envelope().map(|envelope| envelope.stored::<f32>()),
         }
     }
 

@@ -1,6 +1,6 @@
 //! A point mass with engine, motors and store.
 
-use super::super::point_mass::{LimitTable, PointMass};
+use super::super::point_mass::{EnvelopeTable, PointMass};
 use super::table::{EnergyTable, Traction, hybrid_parts};
 use crate::error::Result;
 use crate::vehicle::{Car, Envelope, Hybrid};
@@ -13,7 +13,7 @@ pub struct EnergyCar {
     /// The point mass, with the rolling resistance in its drag.
     pub point_mass: PointMass,
     /// The table of its envelope.
-    pub limits: LimitTable<f64>,
+    pub envelope_table: EnvelopeTable<f64>,
     /// The tables of its energy.
     pub table: EnergyTable<f64>,
     /// Its hybrid drive.
@@ -40,13 +40,13 @@ impl EnergyCar {
             ellipse_exponent,
             ..PointMass::new(EnergyTable::rolling(&car, &envelope)?, wheelbase)
         };
-        let limits = point_mass.table()?;
-        let table = EnergyTable::new(&car, &point_mass.envelope, &traction, &limits)?;
+        let envelope_table = point_mass.table()?;
+        let table = EnergyTable::new(&car, &point_mass.envelope, &traction, &envelope_table)?;
         Ok(Self {
             name: car.name.clone(),
             fuel_density_kgpl,
             point_mass,
-            limits,
+            envelope_table,
             table,
             hybrid,
             envelope,

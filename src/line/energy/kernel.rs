@@ -10,8 +10,8 @@
 //! After R. Lot and S. A. Evangelou, *Lap time optimization of a sports series hybrid electric vehicle*, World Congress on
 //! Engineering 2013, for the energies that are accounted; the passes are those of [`super::super::kernel`].
 
-use super::super::kernel::{BLOCK, Course, braked, corner, limits_at, look_up};
-use super::super::point_mass::LimitTable;
+use super::super::kernel::{BLOCK, Course, braked, corner, envelope_at, look_up};
+use super::super::point_mass::EnvelopeTable;
 use super::plan::{EnergyPlan, GATES, Mode, ZoneRow};
 use super::table::EnergyTable;
 use crate::scalar::{Lookup, Real};
@@ -124,7 +124,7 @@ const LEAST_J: f64 = 5.0;
 
 /// All that does not change along a lap.
 struct Car<'a, R: Real> {
-    limits: &'a LimitTable<R::Storage>,
+    envelope: &'a EnvelopeTable<R::Storage>,
     table: &'a EnergyTable<R::Storage>,
     plan: &'a EnergyPlan<R::Storage>,
     strategy: &'a [R],
@@ -184,7 +184,7 @@ impl<R: Lookup> Car<'_, R> {
     fn additional(&self, here: usize, from: R, length: R, bends: [R; 2], most: R, left: R) -> Step<R> {
         let inverse = R::lit(1.0) / length;
         let zero = R::lit(0.0);
-        let [grip, drive, drag] = limits_at(self.limits, from, bends[0]);
+        let [grip, drive, drag] = envelope_at(self.envelope, from, bends[0]);
         let engine = grip.min(drive);
         let ahead = (from + length * (engine - drag)).max(zero);
         let rows = self.table.boosts.len() / 4;
@@ -197,7 +197,8 @@ impl<R: Lookup> Car<'_, R> {
 
         let both = grip.min(drive + boost);
         let middle = (from + length * (both - drag)).max(zero);
-        let [grip, drive, later_drag] = limits_at(self.limits, middle, R::lit(0.5) * (bends[0] + bends[1]));
+        let [grip, drive, later_drag] =
+            envelope_at(self.envelope, middle, R::lit(0.5) * (bends[0] + bends[1]));
         let later_both = grip.min(drive + boost);
         let motor = R::lit(0.5) * ((both - engine) + (later_both - grip.min(drive)));
         let reached = (from + length * ((both - drag) + (later_both - later_drag))).max(zero);
@@ -247,10 +248,10 @@ impl<R: Lookup> Car<'_, R> {
     #[inline(always)]
     fn engine_only(&self, from: R, length: R, bends: [R; 2], most: R) -> R {
         let zero = R::lit(0.0);
-        let [grip, drive, drag] = limits_at(self.limits, from, bends[0]);
+        let [grip, drive, drag] = envelope_at(self.envelope, from, bends[0]);
         let first = grip.min(drive) - drag;
         let middle = (from + length * first).max(zero);
-        let [grip, drive, drag] = limits_at(self.limits, middle, R::lit(0.5) * (bends[0] + bends[1]));
+        let [grip, drive, drag] = envelope_at(self.envelope, middle, R::lit(0.5) * (bends[0] + bends[1]));
         let second = grip.min(drive) - drag;
         (from + length * (first + second)).max(zero).min(most)
     }
@@ -383,7 +384,7 @@ impl<R: Lookup> Car<'_, R> {
 /// A segment of one lap by itself: the speed squared reached with the motor at a share of its force beside the engine,
 /// without a limit at the end, and the force of the motor over the mass (m/s^2).
 pub fn motor_step(
-    limits: &LimitTable<f64>,
+    envelope: &EnvelopeTable<f64>,
     table: &EnergyTable<f64>,
     from: f64,
     length: f64,
@@ -391,7 +392,7 @@ pub fn motor_step(
     share: f64,
 ) -> [f64; 2] {
     let car = Car {
-        limits,
+        envelope,
         table,
         plan: &EnergyPlan::whole(1, 0, Mode::Additional),
         strategy: &[
@@ -411,7 +412,7 @@ pub fn motor_step(
 /// Fills `course.speed_squared` with the greatest speeds squared from which all that follows can be braked for.
 #[inline(always)]
 fn ceilings<R: Lookup>(
-    limits: &LimitTable<R::Storage>,
+    envelope: &EnvelopeTable<R::Storage>,
     closed: bool,
     start: usize,
     entry: R,
@@ -423,14 +424,14 @@ fn ceilings<R: Lookup>(
     speeds.clear();
     speeds.resize(n, R::lit(0.0));
     let mut next = if closed { start } else { n - 1 };
-    speeds[next] = corner(limits, curvature[next]);
+    speeds[next] = corner(envelope, curvature[next]);
     // In the first round a section is limited by its corner speed alone. On a closed line the pass continues until it meets its
     // own values.
     let steps = if closed { 2 * n } else { n - 1 };
     for step in 0..steps {
         let here = if next > 0 { next - 1 } else { n - 1 };
         let reached = braked(
-            limits,
+            envelope,
             speeds[next],
             length[here],
             curvature[next],
@@ -440,7 +441,7 @@ fn ceilings<R: Lookup>(
         let most = if again {
             speeds[here]
         } else {
-            corner(limits, curvature[here])
+            corner(envelope, curvature[here])
         };
         let slower = reached.less_than(most);
         speeds[here] = R::select(slower, reached, most);
@@ -461,7 +462,7 @@ fn ceilings<R: Lookup>(
 #[inline(always)]
 #[allow(clippy::too_many_arguments)]
 pub fn energy_lap<R: Lookup>(
-    limits: &LimitTable<R::Storage>,
+    envelope: &EnvelopeTable<R::Storage>,
     table: &EnergyTable<R::Storage>,
     plan: &EnergyPlan<R::Storage>,
     (closed, start, entry): (bool, usize, R),
@@ -469,7 +470,7 @@ pub fn energy_lap<R: Lookup>(
     course: &mut Course<R>,
     mut record: impl FnMut(usize, &SegmentEnergy<R>),
 ) -> EnergyLap<R> {
-    ceilings(limits, closed, start, entry, course);
+    ceilings(envelope, closed, start, entry, course);
     let n = course.curvature.len();
     let zero = R::lit(0.0);
     let (length, curvature, most) = (&course.length, &course.curvature, &course.speed_squared);
@@ -479,7 +480,7 @@ pub fn energy_lap<R: Lookup>(
     let after = |here: usize| if here + 1 < n { here + 1 } else { 0 };
     let bends = |here: usize| [curvature[here], curvature[after(here)]];
     let car = Car {
-        limits,
+        envelope,
         table,
         plan,
         strategy,

@@ -1,6 +1,6 @@
 //! Forces and fuel flows of engine and motors over speed, as tables that every backend looks up in the same way.
 
-use super::super::point_mass::{LIMIT_WIDTH, LimitTable};
+use super::super::point_mass::{ENVELOPE_WIDTH, EnvelopeTable};
 use crate::error::{Error, Result};
 use crate::scalar::Real;
 use crate::vehicle::powertrain::{EngineMap, GRAVITY_MPS2};
@@ -30,7 +30,7 @@ impl Traction {
     }
 }
 
-/// Figures of a car's energy over even steps of the speed squared, those of its [`LimitTable`].
+/// Figures of a car's energy over even steps of the speed squared, those of its [`EnvelopeTable`].
 ///
 /// Each row of a table has the figures at its start, then their rises to its end. Forces are over the car's mass, in m/s^2 at the
 /// wheels.
@@ -96,7 +96,7 @@ pub fn hybrid_parts(car: &Car) -> Result<(&Powertrain, &EngineMap, &Hybrid)> {
 }
 
 impl EnergyTable<f64> {
-    /// The tables of `car` on the rows of `limits`, which are those of `envelope`; `traction` limits what motor and engine
+    /// The tables of `car` on the rows of `table`, which are those of `envelope`; `traction` limits what motor and engine
     /// give together.
     ///
     /// # Errors
@@ -105,18 +105,18 @@ impl EnergyTable<f64> {
         car: &Car,
         envelope: &Envelope,
         traction: &Traction,
-        limits: &LimitTable<f64>,
+        table: &EnvelopeTable<f64>,
     ) -> Result<Self> {
         let (powertrain, engine, hybrid) = hybrid_parts(car)?;
         let mass = car.chassis.mass;
         let radius = car.chassis.radius_rear;
         let k = &hybrid.mgu_k;
-        let rows = limits.limits.len() / LIMIT_WIDTH;
+        let rows = table.rows.len() / ENVELOPE_WIDTH;
         let top_ratio = powertrain.gear_ratios[powertrain.gear_ratios.len() - 1] * powertrain.final_drive;
         let last: EnvelopeRow = envelope.rows()[envelope.rows().len() - 1];
         let (mut forces, mut flows, mut boosts) = (Vec::new(), Vec::new(), Vec::new());
         for knot in 0..=rows {
-            let v = (limits.top * knot as f64 / rows as f64).sqrt();
+            let v = (table.top * knot as f64 / rows as f64).sqrt();
             let gear = powertrain.gear(v, radius);
             let rpm = gear.map_or(v / radius * 60.0 / std::f64::consts::TAU * top_ratio, |g| {
                 g.engine_speed_rpm
@@ -147,7 +147,7 @@ impl EnergyTable<f64> {
         let harvest_gain = k.generator_efficiency * powertrain.efficiency;
         Ok(Self {
             mass,
-            rows_per_speed_squared: limits.rows_per_speed_squared,
+            rows_per_speed_squared: table.rows_per_speed_squared,
             deploy_cost,
             harvest_gain,
             force_per_deployed: 1.0 / (mass * deploy_cost),

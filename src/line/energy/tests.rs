@@ -1,6 +1,6 @@
 use super::*;
 use crate::evaluate::energy::{Free, HybridLine, HybridObjective, HybridProblem, Strategy};
-use crate::study::envelope::{EnvelopeSettings, car_limits};
+use crate::study::envelope::{EnvelopeSettings, car_envelope};
 use crate::vehicle::Car;
 use glam::DVec2;
 use proptest::prelude::*;
@@ -15,7 +15,7 @@ fn car() -> &'static EnergyCar {
             step_mps: 10.0,
             ..EnvelopeSettings::default()
         };
-        let limits = car_limits(&car, &coarse).unwrap();
+        let limits = car_envelope(&car, &coarse).unwrap();
         let rows = limits
             .speeds
             .iter()

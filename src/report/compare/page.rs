@@ -138,7 +138,10 @@ fn head(page: &mut HtmlReport, runs: &[Named<'_>]) {
         }
         page.sentence(sentence + ".");
     }
-    for (name, _) in runs.iter().filter(|(_, r)| r.said("interrupted") == Some("true")) {
+    for (name, _) in runs
+        .iter()
+        .filter(|(_, r)| r.manifest_text("interrupted") == Some("true"))
+    {
         page.warning(format!(
             "{name} was interrupted. Its figures are the results that it had reached."
         ));
@@ -150,9 +153,9 @@ fn about(runs: &[Named<'_>]) -> Table<'static> {
         "study", "track", "car", "log", "seed", "backend", "adapter", "driver", "version",
     ];
     let table = Table::rows(runs).text("run", |(name, _)| name);
-    let table = keys
-        .iter()
-        .fold(table, |t, key| t.text(*key, |(_, r)| r.said(key).unwrap_or("")));
+    let table = keys.iter().fold(table, |t, key| {
+        t.text(*key, |(_, r)| r.manifest_text(key).unwrap_or(""))
+    });
     table.table().without_empty()
 }
 
@@ -253,10 +256,10 @@ fn laps(page: &mut HtmlReport, runs: &[Named<'_>]) -> Result<()> {
         return Ok(());
     };
     let length_of = |trace| Lap::new(trace).map_or(f64::NAN, |lap| lap.length_m());
-    let (length_m, track) = (length_of(trace), first.said("track"));
+    let (length_m, track) = (length_of(trace), first.manifest_text("track"));
     let alike = |run: &Run, trace| {
         let other_track = run
-            .said("track")
+            .manifest_text("track")
             .zip(track)
             .is_some_and(|(own, first)| own != first);
         !other_track && (length_of(trace) / length_m - 1.0).abs() < ONE_CIRCUIT

@@ -124,7 +124,7 @@ impl Run {
     }
 
     /// A text of the manifest.
-    pub fn said(&self, key: &str) -> Option<&str> {
+    pub fn manifest_text(&self, key: &str) -> Option<&str> {
         self.manifest
             .iter()
             .find(|(k, _)| k == key)

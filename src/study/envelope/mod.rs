@@ -18,7 +18,7 @@ use crate::config::settings::{Settings, settings};
 use crate::error::{Error, Result};
 use crate::evaluate::BackendChoice;
 use crate::study::framework::journal::Journal;
-use crate::study::framework::memory::{ANSWER, Kept};
+use crate::study::framework::memory::{ANSWER, MemoryItem};
 use crate::study::framework::{Plan, RunRecord, Study, Subject, Work};
 use crate::vehicle::{Car, Envelope, EnvelopeRow, Trim, Turn, steady_car};
 use rayon::prelude::*;
@@ -70,7 +70,7 @@ pub struct Prepared {
 #[derive(Clone, Debug)]
 pub struct Outcome {
     /// The limits.
-    pub limits: CarLimits,
+    pub limits: CarEnvelope,
     /// The surface of lateral acceleration.
     pub surface: SteadySurface,
     /// How the study ran; candidates are those of the surface.
@@ -98,9 +98,9 @@ impl Study for EnvelopeStudy {
         Ok(Prepared { car, speeds })
     }
 
-    fn size(settings: &EnvelopeSettings, prepared: Option<&Prepared>) -> Vec<Kept> {
+    fn size(settings: &EnvelopeSettings, prepared: Option<&Prepared>) -> Vec<MemoryItem> {
         let speeds = prepared.map_or_else(|| settings.most_speeds(), |prepared| prepared.speeds.len());
-        vec![Kept {
+        vec![MemoryItem {
             name: "steers, at each speed",
             count: (settings.steers as u64).saturating_mul(speeds as u64),
             each: CAR,
@@ -167,7 +167,7 @@ impl EnvelopeSettings {
 
 /// What the car does at one speed.
 #[derive(Clone, Debug, PartialEq)]
-pub struct SpeedLimits {
+pub struct EnvelopeAtSpeed {
     /// The row of the envelope.
     pub row: EnvelopeRow,
     /// Greatest lateral acceleration to the right (m/s^2). The row has the lesser of both sides.
@@ -196,9 +196,9 @@ pub struct Handling {
 
 /// A car's limits.
 #[derive(Clone, Debug, PartialEq)]
-pub struct CarLimits {
+pub struct CarEnvelope {
     /// Limits by rising speed.
-    pub speeds: Vec<SpeedLimits>,
+    pub speeds: Vec<EnvelopeAtSpeed>,
     /// Handling in the middle of the range.
     pub handling: Handling,
     /// The envelope.
@@ -215,13 +215,13 @@ const STEER_TO_GRIP: f64 = 0.6;
 /// # Errors
 /// [`Error::Input`] for settings out of range and for a car without a powertrain, [`Error::Study`] for one that has a steady
 /// state in bends at fewer than two of the speeds.
-pub fn car_limits(car: &Car, settings: &EnvelopeSettings) -> Result<CarLimits> {
+pub fn car_envelope(car: &Car, settings: &EnvelopeSettings) -> Result<CarEnvelope> {
     let speeds = speeds_of(car, settings)?;
     let force = engine_of(car)?;
     let steady = steady_car(car);
     // The two sides of a car with even loads are each other's mirror image.
     let even = car.chassis.left_share_front == 0.5 && car.chassis.left_share_rear == 0.5;
-    let found: Vec<SpeedLimits> = speeds
+    let found: Vec<EnvelopeAtSpeed> = speeds
         .into_par_iter()
         .map(|speed| {
             let cornering = steady.cornering(speed, STEER_TO_GRIP, Turn::Left);
@@ -232,7 +232,7 @@ pub fn car_limits(car: &Car, settings: &EnvelopeSettings) -> Result<CarLimits> {
             };
             let traction_mps2 = steady.greatest_traction(speed);
             let engine_mps2 = force(speed) / car.chassis.mass;
-            SpeedLimits {
+            EnvelopeAtSpeed {
                 row: EnvelopeRow {
                     v_mps: speed,
                     ay_mps2: peak(&cornering).min(right_mps2),
@@ -247,7 +247,7 @@ pub fn car_limits(car: &Car, settings: &EnvelopeSettings) -> Result<CarLimits> {
             }
         })
         .collect();
-    let corners = |l: &SpeedLimits| l.row.ay_mps2 > 0.0 && l.row.ax_grip_mps2 > 0.0;
+    let corners = |l: &EnvelopeAtSpeed| l.row.ay_mps2 > 0.0 && l.row.ax_grip_mps2 > 0.0;
     let (limits, left_out): (Vec<_>, Vec<_>) = found.into_iter().partition(corners);
     let left_out_mps: Vec<f64> = left_out.iter().map(|l| l.row.v_mps).collect();
     if limits.len() < 2 {
@@ -261,7 +261,7 @@ pub fn car_limits(car: &Car, settings: &EnvelopeSettings) -> Result<CarLimits> {
     }
     let envelope = Envelope::new(&car.name, limits.iter().map(|l| l.row).collect())?;
     let wheelbase = car.chassis.cg_to_front + car.chassis.cg_to_rear;
-    Ok(CarLimits {
+    Ok(CarEnvelope {
         handling: handling(&limits[limits.len() / 2], wheelbase),
         speeds: limits,
         envelope,
@@ -326,7 +326,7 @@ fn engine_of(car: &Car) -> Result<impl Fn(f64) -> f64 + Sync> {
 
 /// The slope of steering over lateral acceleration, between the two steady states nearest to 0 and 2 m/s^2: small
 /// against any tyre's limit, large against rounding.
-fn handling(limits: &SpeedLimits, wheelbase: f64) -> Handling {
+fn handling(limits: &EnvelopeAtSpeed, wheelbase: f64) -> Handling {
     /// Standard gravity (m/s^2).
     const G: f64 = 9.806_65;
     let first = limits.cornering.first();
@@ -357,7 +357,7 @@ mod tests {
     #[test]
     fn the_bundled_car_corners_as_it_was_made_to() {
         let car = Car::bundled().unwrap();
-        let limits = car_limits(&car, &EnvelopeSettings::default()).unwrap();
+        let limits = car_envelope(&car, &EnvelopeSettings::default()).unwrap();
         let envelope = &limits.envelope;
         // What the bundled car was made for: up to 15 m/s^2 at 25 m/s and 18 at 65, within a tenth.
         assert!((envelope.at(25.0).ay_mps2 / 15.0 - 1.0).abs() < 0.1);
@@ -385,13 +385,13 @@ mod tests {
             ..EnvelopeSettings::default()
         };
         assert!(
-            car_limits(&car, &backwards)
+            car_envelope(&car, &backwards)
                 .unwrap_err()
                 .to_string()
                 .contains("to")
         );
         car.powertrain = None;
-        let error = car_limits(&car, &EnvelopeSettings::default()).unwrap_err();
+        let error = car_envelope(&car, &EnvelopeSettings::default()).unwrap_err();
         assert!(error.to_string().contains("[powertrain]"));
     }
 }

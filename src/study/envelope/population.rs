@@ -1,7 +1,7 @@
 //! The surface of lateral acceleration over speed and steering, and its ridge: a population of cars in steady-state cornering,
 //! held against the curves of trims.
 
-use super::{CarLimits, EnvelopeSettings, EnvelopeStudy, Outcome, Prepared, STEER_TO_GRIP, car_limits};
+use super::{CarEnvelope, EnvelopeSettings, EnvelopeStudy, Outcome, Prepared, STEER_TO_GRIP, car_envelope};
 use crate::error::Result;
 use crate::evaluate::steady::kernel::INTEGRATED;
 use crate::evaluate::steady::{SteadyObjective, SteadyProblem, open_steady_evaluator};
@@ -118,7 +118,7 @@ fn ridge_of(x: &[f64], values: &[f64]) -> Option<(f64, f64, Option<f64>)> {
 /// observer ends it.
 ///
 /// # Errors
-/// As [`car_limits`]; [`crate::Error::Input`] if the journal belongs to other inputs; those of the evaluator.
+/// As [`car_envelope`]; [`crate::Error::Input`] if the journal belongs to other inputs; those of the evaluator.
 pub(super) fn measure(
     settings: &EnvelopeSettings,
     prepared: &Prepared,
@@ -127,7 +127,7 @@ pub(super) fn measure(
     let watch = Watch::begin();
     let Prepared { car, speeds } = prepared;
     // Refuses a car that has no drive at these speeds.
-    let limits = car_limits(car, settings)?;
+    let limits = car_envelope(car, settings)?;
     let lock = car.max_steer_rad.min(STEER_TO_GRIP);
     let last = settings.steers - 1;
     let steers: Vec<f64> = (0..=last).map(|i| lock * i as f64 / last as f64).collect();
@@ -172,7 +172,7 @@ pub(super) fn measure(
 /// The surface beside the curves of trims.
 fn compared(
     car: &Car,
-    limits: &CarLimits,
+    limits: &CarEnvelope,
     problem: &SteadyProblem,
     steers: Vec<f64>,
     found: Evaluation,
@@ -194,7 +194,7 @@ fn compared(
     let figures: [Vec<f64>; 5] = std::array::from_fn(figure);
 
     let steady = steady_car(car);
-    let rows: Vec<(&super::SpeedLimits, &[f64])> = limits
+    let rows: Vec<(&super::EnvelopeAtSpeed, &[f64])> = limits
         .speeds
         .iter()
         .zip(figures[0].chunks_exact(steers.len()))

@@ -1,6 +1,6 @@
 //! Tables and figures of a car's g-g-v envelope.
 
-use super::{CarLimits, Handling, Outcome, SpeedLimits, SteadySurface, SurfaceFigures};
+use super::{CarEnvelope, EnvelopeAtSpeed, Handling, Outcome, SteadySurface, SurfaceFigures};
 use crate::error::Result;
 use crate::evaluate::{Failure, failures_in_words};
 use crate::report::{Curves, HtmlReport, Levels, Panel, Surface, Table, write_whole};
@@ -47,7 +47,7 @@ pub(super) fn summarise(head: Head, outcome: &Outcome) -> EnvelopeSummary {
 }
 
 /// What a reader of the limits must know of them.
-fn notes(limits: &CarLimits) -> Vec<String> {
+fn notes(limits: &CarEnvelope) -> Vec<String> {
     let mut notes = Vec::new();
     if !limits.left_out_mps.is_empty() {
         notes.push(format!(
@@ -55,7 +55,7 @@ fn notes(limits: &CarLimits) -> Vec<String> {
             super::in_words(&limits.left_out_mps)
         ));
     }
-    let left = |s: &SpeedLimits| s.cornering.iter().map(|t| t.ay_mps2).fold(0.0, f64::max);
+    let left = |s: &EnvelopeAtSpeed| s.cornering.iter().map(|t| t.ay_mps2).fold(0.0, f64::max);
     let uneven = limits.speeds.iter().map(|s| (s, left(s), s.right_mps2));
     let most = uneven.max_by(|a, b| (a.1 - a.2).abs().total_cmp(&(b.1 - b.2).abs()));
     if let Some((at, left, right)) = most
@@ -123,7 +123,7 @@ pub(super) fn report(folder: &Path, outcome: &Outcome, summary: &EnvelopeSummary
     write_page(folder, outcome, summary)
 }
 
-fn write_cornering(path: &Path, limits: &CarLimits) -> Result<()> {
+fn write_cornering(path: &Path, limits: &CarEnvelope) -> Result<()> {
     let trims = limits
         .speeds
         .iter()
@@ -140,10 +140,10 @@ fn write_cornering(path: &Path, limits: &CarLimits) -> Result<()> {
         .write_csv(path)
 }
 
-fn limits_figure(limits: &CarLimits, car: &str) -> Curves {
+fn limits_figure(limits: &CarEnvelope, car: &str) -> Curves {
     let speeds = &limits.speeds;
     let v: Vec<f64> = speeds.iter().map(|s| s.row.v_mps).collect();
-    let over_speed = |f: &dyn Fn(&SpeedLimits) -> f64| speeds.iter().map(f).collect::<Vec<f64>>();
+    let over_speed = |f: &dyn Fn(&EnvelopeAtSpeed) -> f64| speeds.iter().map(f).collect::<Vec<f64>>();
     let mut cornering = Panel::new("Steady-state cornering")
         .x("road-wheel angle", "deg")
         .y("lateral acceleration", "m/s\u{b2}");
@@ -235,7 +235,7 @@ fn write_page(folder: &Path, outcome: &Outcome, summary: &EnvelopeSummary) -> Re
 }
 
 /// Accelerations by speed.
-fn speeds_table(limits: &CarLimits) -> Table<'static> {
+fn speeds_table(limits: &CarEnvelope) -> Table<'static> {
     Table::rows(&limits.speeds)
         .number("speed", "m/s", |s| s.row.v_mps)
         .number("cornering", "m/s^2", |s| s.row.ay_mps2)

@@ -228,7 +228,7 @@ pub(in crate::study) fn resumed_or_new<S: Study, T>(
 ///
 /// # Errors
 /// Those of the study.
-pub fn solve_unwatched<S: Study>(settings: &S::Settings, prepared: &S::Prepared) -> Result<S::Outcome> {
+pub fn solve_unobserved<S: Study>(settings: &S::Settings, prepared: &S::Prepared) -> Result<S::Outcome> {
     let work = Work {
         state: None,
         state_file: &mut StateFile::idle(),

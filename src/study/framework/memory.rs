@@ -1,6 +1,6 @@
 //! How large a study may be: what it would need is reckoned before any of it is taken, so that none is ended by the system.
 //!
-//! What a study keeps (its swarm, archive, history, journal, cuts) cannot be split and has to fit; what evaluators take
+//! What a study keeps (its swarm, archive, history, journal, cross-sections) cannot be split and has to fit; what evaluators take
 //! beside that is cut to what is left, by [`portions`].
 
 use crate::error::{Error, Result};
@@ -20,9 +20,9 @@ const PARTICLE: u64 = 320;
 const MEMBER: u64 = 320;
 /// Bytes of an iteration in the history and in the tables and pictures that it comes to.
 const ITERATION: u64 = 512;
-/// Bytes of a cut across the track: in every level of the search, in the cone programs of the exact solvers, whose
+/// Bytes of a cross-section: in every level of the search, in the cone programs of the exact solvers, whose
 /// factors are what is largest, in the edges that lines are checked against and the lines that are reported.
-const CUT: u64 = 16 << 10;
+const CROSS_SECTION: u64 = 16 << 10;
 /// Bytes of a candidate's answer in a journal: five objectives and a failure, as they are and twice while they are written.
 pub const ANSWER: u64 = 3 * (5 * 8 + 8);
 /// Bytes of a sample of a log: the log itself (11 numbers), what is driven and scored of it for laps fitted and held out (9 each,
@@ -33,7 +33,7 @@ const LEAST: u64 = 4 << 20;
 
 /// Something of which a study keeps many.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Kept {
+pub struct MemoryItem {
     /// The setting that says how many.
     pub name: &'static str,
     /// How many.
@@ -42,20 +42,22 @@ pub struct Kept {
     pub each: u64,
 }
 
-impl Kept {
+impl MemoryItem {
     fn bytes(&self) -> u64 {
         self.count.saturating_mul(self.each)
     }
 }
 
 /// Memory that so much takes, that of the evaluators at the least with it (MiB, rounded up).
-pub fn needed_mib(kept: &[Kept]) -> u64 {
+pub fn needed_mib(kept: &[MemoryItem]) -> u64 {
     needed(kept).div_ceil(1 << 20)
 }
 
 /// What is needed to keep all of this and to evaluate (bytes).
-fn needed(kept: &[Kept]) -> u64 {
-    kept.iter().map(Kept::bytes).fold(LEAST, u64::saturating_add)
+fn needed(kept: &[MemoryItem]) -> u64 {
+    kept.iter()
+        .map(MemoryItem::bytes)
+        .fold(LEAST, u64::saturating_add)
 }
 
 /// The limit that is in force (MiB).
@@ -64,7 +66,7 @@ pub fn limit_mib() -> u64 {
 }
 
 /// Whether all of this fits into so much memory (MiB).
-pub fn fits(kept: &[Kept], limit_mib: u64) -> bool {
+pub fn fits(kept: &[MemoryItem], limit_mib: u64) -> bool {
     needed(kept) <= bytes_of(limit_mib)
 }
 
@@ -76,7 +78,7 @@ fn bytes_of(limit_mib: u64) -> u64 {
 ///
 /// # Errors
 /// [`Error::Memory`] naming what takes most of it, and how much of that would fit beside the rest.
-pub fn check(kept: &[Kept], limit_mib: u64) -> Result<Allowance> {
+pub fn check(kept: &[MemoryItem], limit_mib: u64) -> Result<Allowance> {
     let limit = bytes_of(limit_mib);
     let needed = needed(kept);
     let Some(largest) = kept
@@ -103,8 +105,8 @@ pub fn check(kept: &[Kept], limit_mib: u64) -> Result<Allowance> {
 }
 
 /// A log of so many samples.
-pub fn log_kept(samples: usize) -> Kept {
-    Kept {
+pub fn log_item(samples: usize) -> MemoryItem {
+    MemoryItem {
         name: "samples of the log",
         count: samples as u64,
         each: LOG_SAMPLE,
@@ -120,7 +122,7 @@ pub struct Size {
     pub variables: usize,
     /// Iterations.
     pub iterations: usize,
-    /// Cuts across the track.
+    /// Cross-sections across the track.
     pub sections: usize,
     /// Members of the archive.
     pub archive: usize,
@@ -132,7 +134,7 @@ pub struct Size {
 
 impl Size {
     /// What the study keeps many of.
-    pub fn kept(&self) -> Vec<Kept> {
+    pub fn memory_items(&self) -> Vec<MemoryItem> {
         let particle = (self.variables as u64)
             .saturating_mul(8 * COPIES)
             .saturating_add(PARTICLE);
@@ -146,7 +148,7 @@ impl Size {
         let member = candidate
             .saturating_mul(1 + PER_PLACE as u64)
             .saturating_add(particle);
-        let kept = |name, count: usize, each| Kept {
+        let kept = |name, count: usize, each| MemoryItem {
             name,
             count: count as u64,
             each,
@@ -155,8 +157,8 @@ impl Size {
             kept("population", self.population, particle),
             kept("archive", self.archive, member),
             kept("iterations", self.iterations, ITERATION.saturating_add(answers)),
-            kept("sections", self.sections, CUT),
-            log_kept(self.samples),
+            kept("sections", self.sections, CROSS_SECTION),
+            log_item(self.samples),
         ]
     }
 }
@@ -176,7 +178,7 @@ mod tests {
     }
 
     fn checked(size: Size, limit_mib: u64) -> Result<Allowance> {
-        check(&size.kept(), limit_mib)
+        check(&size.memory_items(), limit_mib)
     }
 
     #[test]
@@ -192,8 +194,8 @@ mod tests {
         let fitting = said_to_fit(checked(size(1_000_000_000), USUAL_MIB));
         drop(checked(size(fitting), USUAL_MIB).expect("as was said"));
         assert!(checked(size(fitting + 1), USUAL_MIB).is_err());
-        assert_eq!(needed_mib(&size(fitting).kept()), USUAL_MIB);
-        assert!(needed_mib(&size(fitting + 1).kept()) > USUAL_MIB);
+        assert_eq!(needed_mib(&size(fitting).memory_items()), USUAL_MIB);
+        assert!(needed_mib(&size(fitting + 1).memory_items()) > USUAL_MIB);
         let absurd = Size {
             population: usize::MAX,
             sections: usize::MAX,
@@ -211,8 +213,9 @@ mod tests {
             iterations: 1500,
             ..Size::default()
         };
-        let together = |count: u64| -> Vec<Kept> { (0..count).flat_map(|_| size.kept()).collect() };
-        let alone: u64 = size.kept().iter().map(Kept::bytes).sum();
+        let together =
+            |count: u64| -> Vec<MemoryItem> { (0..count).flat_map(|_| size.memory_items()).collect() };
+        let alone: u64 = size.memory_items().iter().map(MemoryItem::bytes).sum();
         for count in 1..=8u64 {
             let limit_mib = (count * alone + LEAST).div_ceil(1 << 20);
             // Rounded up to whole MiB there is not room for another.

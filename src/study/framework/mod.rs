@@ -14,7 +14,7 @@ mod study;
 
 pub use inputs::Inputs;
 pub(in crate::study) use life::resumed_or_new;
-pub use life::{Answer, Finished, Request, solve_unwatched, write_results};
+pub use life::{Answer, Finished, Request, solve_unobserved, write_results};
 pub use plan::Plan;
 pub(in crate::study) use record::Watch;
 pub use record::{Losses, RunRecord};

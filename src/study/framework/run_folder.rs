@@ -579,10 +579,10 @@ mod tests {
     }
 
     #[test]
-    fn only_what_was_broken_off_is_gone_on_with() {
+    fn only_interrupted_runs_are_resumed() {
         let root = tempfile::tempdir().expect("a temporary folder");
         let refused = |folder: &Path| {
-            let error = reopen(folder).expect_err("nothing to go on with");
+            let error = reopen(folder).expect_err("nothing to resume");
             assert_eq!(error.exit_code(), 2);
             error.to_string()
         };

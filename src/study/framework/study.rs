@@ -1,7 +1,7 @@
 //! The shape of a study.
 
 use super::life::{Answer, Request, resumed_or_new, run};
-use super::memory::Kept;
+use super::memory::MemoryItem;
 use super::state_file::StateFile;
 use super::{Plan, RunRecord};
 use crate::config::settings::{Declared, Role, Settings};
@@ -56,6 +56,9 @@ impl Progress {
 
 /// The state of a study: all that it takes to resume it.
 pub trait State<S>: Checkpoint {
+    /// What files of it say that they are.
+    const KINDS: &'static [&'static str] = &[Self::KIND];
+
     /// Reads a saved state.
     ///
     /// # Errors
@@ -120,7 +123,7 @@ pub trait Study: Sized + 'static {
     fn prepare(settings: &Self::Settings) -> Result<Self::Prepared>;
 
     /// What it keeps in memory: before anything is read, and with what was read.
-    fn size(settings: &Self::Settings, prepared: Option<&Self::Prepared>) -> Vec<Kept>;
+    fn size(settings: &Self::Settings, prepared: Option<&Self::Prepared>) -> Vec<MemoryItem>;
 
     /// Says what it has read and what it would do.
     ///
@@ -143,8 +146,8 @@ pub trait Study: Sized + 'static {
         1
     }
 
-    /// Solves several studies of one problem, each from the state that an earlier run has left with its state_file. Each has a result
-    /// of its own.
+    /// Solves several studies of one problem, each from the state that an earlier run has left with its state_file. Each has a
+    /// result of its own.
     ///
     /// # Errors
     /// Those that concern all of them.
@@ -329,6 +332,18 @@ pub trait AnyStudy: Sync {
     /// # Errors
     /// As there.
     fn check(&self, path: &Path) -> Result<String>;
+    /// Whether a file holds its settings. Files that these name are not read.
+    ///
+    /// # Errors
+    /// As [`Settings::read`].
+    fn read_settings(&self, path: &Path) -> Result<()>;
+    /// [`State::KINDS`].
+    fn state_kinds(&self) -> &'static [&'static str];
+    /// Reads a saved state and gives the bytes of a checkpoint of it.
+    ///
+    /// # Errors
+    /// As [`State::load`].
+    fn read_state(&self, file: &Path) -> Result<Vec<u8>>;
     /// Runs it as a request says.
     ///
     /// # Errors
@@ -387,6 +402,18 @@ impl<S: Study> AnyStudy for Entry<S> {
 
     fn check(&self, path: &Path) -> Result<String> {
         S::check(path)
+    }
+
+    fn read_settings(&self, path: &Path) -> Result<()> {
+        S::Settings::read(path).map(drop)
+    }
+
+    fn state_kinds(&self) -> &'static [&'static str] {
+        S::State::KINDS
+    }
+
+    fn read_state(&self, file: &Path) -> Result<Vec<u8>> {
+        checkpoint::to_bytes(&S::State::load(file)?)
     }
 
     fn run(&self, request: Request<'_>) -> Result<Answer> {

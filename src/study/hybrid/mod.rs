@@ -28,7 +28,7 @@ use crate::config::settings::Settings;
 use crate::error::{Error, Result};
 use crate::optimum::Deployment;
 use crate::study::framework::journal::Journal;
-use crate::study::framework::memory::Kept;
+use crate::study::framework::memory::MemoryItem;
 use crate::study::framework::{Plan, RunRecord, Study, Subject, Work};
 use crate::study::raceline::road_read;
 use std::path::Path;
@@ -106,9 +106,9 @@ impl Study for Hybrid {
         read_inputs(settings)
     }
 
-    fn size(settings: &HybridStudySettings, prepared: Option<&HybridInputs>) -> Vec<Kept> {
+    fn size(settings: &HybridStudySettings, prepared: Option<&HybridInputs>) -> Vec<MemoryItem> {
         let variables = prepared.map_or(1, HybridInputs::variables);
-        settings.size_of(variables).kept()
+        settings.size_of(variables).memory_items()
     }
 
     fn plan(settings: &HybridStudySettings, inputs: &HybridInputs, plan: Plan) -> Result<Plan> {

@@ -7,7 +7,7 @@ use crate::evaluate::energy::{HybridLine, HybridObjective, HybridProblem, Strate
 use crate::evaluate::line::LineObjective;
 use crate::line::FineLine;
 use crate::line::energy::{EnergyCar, EnergyPlan, Gates, Mode, Traction, hybrid_parts};
-use crate::study::envelope::{EnvelopeSettings, car_limits};
+use crate::study::envelope::{EnvelopeSettings, car_envelope};
 use crate::study::raceline::{self, RacelineSettings, ReferenceSolvers};
 use crate::track::CrossSections;
 use crate::vehicle::{Car, Envelope};
@@ -23,8 +23,8 @@ pub(super) const GAP_M: f64 = 8.0;
 const CONTROL_SPACING_M: f64 = 40.0;
 
 /// Control points of lines across these cross-sections.
-pub(super) fn control_points(cuts: &CrossSections) -> usize {
-    ((cuts.length_m / CONTROL_SPACING_M) as usize).clamp(4, cuts.len().max(4))
+pub(super) fn control_points(cross_sections: &CrossSections) -> usize {
+    ((cross_sections.length_m / CONTROL_SPACING_M) as usize).clamp(4, cross_sections.len().max(4))
 }
 
 /// Everything that laps are driven with.
@@ -38,7 +38,7 @@ pub struct HybridSetup {
     pub car: EnergyCar,
     /// What the line is, in words.
     pub line_name: String,
-    /// Share of the usable width at every cut, where the line was found here.
+    /// Share of the usable width at every cross-section, where the line was found here.
     pub alpha: Option<Vec<f64>>,
     /// Points of the line (m).
     pub points_m: Vec<DVec2>,
@@ -91,7 +91,7 @@ pub fn read_inputs(settings: &HybridStudySettings) -> Result<HybridInputs> {
     let (envelope, traction) = match &settings.envelope {
         Some(path) => (Envelope::load(path)?, Traction::default()),
         None => {
-            let limits = car_limits(&car, &EnvelopeSettings::default())?;
+            let limits = car_envelope(&car, &EnvelopeSettings::default())?;
             let rows = limits.speeds.iter().map(|s| (s.row.v_mps, s.traction_mps2));
             (limits.envelope.clone(), Traction { rows: rows.collect() })
         }
@@ -100,7 +100,7 @@ pub fn read_inputs(settings: &HybridStudySettings) -> Result<HybridInputs> {
     raceline.car = car.point_mass.clone();
     if let Some(points) = &given {
         // As it will be driven, so that what is no line is refused before anything is begun.
-        let closed = raceline.cuts.closed;
+        let closed = raceline.cross_sections.closed;
         FineLine::new(points, closed, settings.spacing_m, None, settings.entry_mps)?;
     }
     Ok(HybridInputs {
@@ -114,9 +114,9 @@ pub fn read_inputs(settings: &HybridStudySettings) -> Result<HybridInputs> {
 impl HybridInputs {
     /// The most variables of a strategy and a line on this track.
     pub(super) fn variables(&self) -> usize {
-        let zones = (self.raceline.cuts.length_m / GAP_M).ceil() as usize;
+        let zones = (self.raceline.cross_sections.length_m / GAP_M).ceil() as usize;
         // The motor's power is one more.
-        zones + control_points(&self.raceline.cuts) + 1
+        zones + control_points(&self.raceline.cross_sections) + 1
     }
 
     /// All that laps are driven with. The line is found if none is given; nothing if `stop` was raised before it was found.
@@ -134,7 +134,7 @@ impl HybridInputs {
             car,
             given,
         } = self.clone();
-        let closed = raceline.cuts.closed;
+        let closed = raceline.cross_sections.closed;
         let (line_name, alpha, through) = match (&settings.line, given) {
             (Some(path), Some(points)) => (path.display().to_string(), None, points),
             _ => {
@@ -146,7 +146,7 @@ impl HybridInputs {
                 let Some(found) = found else {
                     return Err(Error::Study("there is no solver for the fastest line".to_owned()));
                 };
-                let points = raceline.cuts.points(&found.alpha);
+                let points = raceline.cross_sections.points(&found.alpha);
                 ("fastest".to_owned(), Some(found.alpha), points)
             }
         };

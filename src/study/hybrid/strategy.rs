@@ -190,23 +190,29 @@ pub fn search_front(
         (FreePart::Strategy, _) | (_, None) => (fixed, Vec::new()),
         (free, Some(alpha)) => {
             // Control points move the line about the fastest one, which a few of them alone could not say.
-            let mut cuts = setup.raceline.cuts.clone();
-            cuts.reference.clone_from(alpha);
-            let parametrisation = Parametrisation::control_points(control_points(&cuts));
-            let coefficients = parametrisation.fit(&cuts, alpha)?;
+            let mut cross_sections = setup.raceline.cross_sections.clone();
+            cross_sections.reference.clone_from(alpha);
+            let parametrisation = Parametrisation::control_points(control_points(&cross_sections));
+            let coefficients = parametrisation.fit(&cross_sections, alpha)?;
             let line = parametrisation.variables_of(&coefficients);
             // Zones lie where they do on the fixed line, by distance.
-            let shape = geometry(&cuts.points(alpha), cuts.closed);
+            let shape = geometry(&cross_sections.points(alpha), cross_sections.closed);
             let mut length = shape.segment_m.clone();
-            length.resize(cuts.len(), 0.0);
+            length.resize(cross_sections.len(), 0.0);
             let zone_sections = sections_of(&fixed, &length);
             let run_in = late_bend(&shape.curvature_1pm);
-            let plan = EnergyPlan::zoned(&length, &zone_sections, cuts.closed, run_in, Mode::Additional);
+            let plan = EnergyPlan::zoned(
+                &length,
+                &zone_sections,
+                cross_sections.closed,
+                run_in,
+                Mode::Additional,
+            );
             let zones = plan.count();
             let free_zones = if free == FreePart::Line { 0 } else { zones };
             let problem = HybridProblem::new(
                 HybridLine::Free {
-                    cuts: Box::new(cuts),
+                    cross_sections: Box::new(cross_sections),
                     parametrisation,
                 },
                 setup.car.clone(),

@@ -2,7 +2,7 @@
 //! does not leave, and beside them starts from which it comes further down.
 
 use super::coordinates::Logarithmic;
-use super::polish::{Polished, polish_watched};
+use super::polish::{Polished, polish_observed};
 use super::setup::CHANNELS;
 use crate::error::Result;
 use crate::evaluate::Evaluator;
@@ -71,7 +71,7 @@ pub(super) fn hop(
     }
     let dimensions = centre.len();
     let start = seen.to_parameters(&starts[best * dimensions..(best + 1) * dimensions]);
-    Ok(polish_watched(replay, &start, weights, MOST_DRIVES, watch))
+    Ok(polish_observed(replay, &start, weights, MOST_DRIVES, watch))
 }
 
 /// Whether a polished hop is further down than the minimum that it began from.

@@ -28,7 +28,7 @@ pub struct Identifiability {
 
 /// Singular values under this share of the greatest count as zero: the Jacobian's own rounding, about the square
 /// root of its number of rows times the precision of a double, lies well below.
-const NOUGHT: f64 = 1e-11;
+const ZERO: f64 = 1e-11;
 /// A parameter with more than this share of itself in directions of zero cannot be told.
 const NULL_SHARE: f64 = 1e-6;
 /// Noise is taken for no less than this share of a channel's scale: the rounding of a simulated log's figures.
@@ -91,7 +91,7 @@ pub fn judge(
     for (j, value) in values.iter().enumerate() {
         for k in 0..d {
             let share = vectors[(j, k)].powi(2);
-            if *value > NOUGHT * greatest {
+            if *value > ZERO * greatest {
                 variance[k] += share / (value * value);
             } else {
                 null_share[k] += share;

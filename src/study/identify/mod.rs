@@ -25,7 +25,7 @@ use crate::config::settings::Settings;
 use crate::error::{Error, Result};
 use crate::evaluate::replay::open_evaluator;
 use crate::evaluate::{PackedClient, run_packed};
-use crate::study::framework::memory::{Kept, Size};
+use crate::study::framework::memory::{MemoryItem, Size};
 use crate::study::framework::state_file::StateFile;
 use crate::study::framework::{Figures, Plan, Progress, RunRecord, Study, Subject, Work, resumed_or_new};
 use std::ops::ControlFlow;
@@ -56,10 +56,10 @@ impl Study for Identify {
         Ok(setup)
     }
 
-    fn size(settings: &IdentifySettings, prepared: Option<&Setup>) -> Vec<Kept> {
+    fn size(settings: &IdentifySettings, prepared: Option<&Setup>) -> Vec<MemoryItem> {
         let samples = prepared.map_or(0, |setup| setup.log.samples());
         let size = settings.size();
-        Size { samples, ..size }.kept()
+        Size { samples, ..size }.memory_items()
     }
 
     fn plan(settings: &IdentifySettings, setup: &Setup, plan: Plan) -> Result<Plan> {

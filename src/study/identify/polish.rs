@@ -104,13 +104,13 @@ impl LeastSquaresProblem<f64, Dyn, Dyn> for Bounded<'_> {
 /// Polishes `candidate` with the errors of each channel weighted by `weights` (one over their noise, or scale).
 /// `None` if the candidate is lost from the start.
 pub fn polish(replay: &ReplayProblem, candidate: &[f64], weights: [f64; CHANNELS]) -> Option<Polished> {
-    polish_watched(replay, candidate, weights, MOST_DRIVES, &mut || {
+    polish_observed(replay, candidate, weights, MOST_DRIVES, &mut || {
         ControlFlow::Continue(())
     })
 }
 
 /// As [`polish`], with no more than `most_drives`; `watch` is asked before each drive and may break the polish off.
-pub(super) fn polish_watched(
+pub(super) fn polish_observed(
     replay: &ReplayProblem,
     candidate: &[f64],
     weights: [f64; CHANNELS],

@@ -2,7 +2,7 @@
 
 use super::hops::{gains, hop, looks_like_noise};
 use super::identifiability::noise_of;
-use super::polish::{MOST_DRIVES, polish_watched};
+use super::polish::{MOST_DRIVES, polish_observed};
 use super::settings::IdentifySettings;
 use super::setup::{CHANNELS, Setup};
 use crate::error::Result;
@@ -40,7 +40,7 @@ pub(super) fn refine(
         interrupted: false,
     };
     let spread = setup.scales.map(|s| 1.0 / s);
-    let Some(polished) = polish_watched(replay, candidate, spread, MOST_DRIVES, watch) else {
+    let Some(polished) = polish_observed(replay, candidate, spread, MOST_DRIVES, watch) else {
         return Ok(refined);
     };
     refined.interrupted = polished.interrupted;
@@ -66,7 +66,7 @@ pub(super) fn refine(
         if refined.hops == hops || looks_like_noise(&residuals.errors) {
             // Maximum likelihood for white noise of these sizes.
             let weights = noise.map(|n| 1.0 / n);
-            if let Some(p) = polish_watched(replay, &refined.candidate, weights, MOST_DRIVES, watch) {
+            if let Some(p) = polish_observed(replay, &refined.candidate, weights, MOST_DRIVES, watch) {
                 refined.interrupted = p.interrupted;
                 refined.candidate = p.candidate;
             }

@@ -3,7 +3,7 @@
 use super::reference_optimum::ReferenceSolvers;
 use super::settings::RacelineSettings;
 use super::setup::Setup;
-use super::solver_thread::watched;
+use super::solver_thread::interruptible;
 use crate::error::Result;
 use crate::evaluate::line::{LineProblem, open_line_evaluator};
 use crate::evaluate::{BackendInfo, Evaluator, FailureCounts};
@@ -19,7 +19,7 @@ use std::sync::atomic::Ordering;
 /// Lines none of which another betters in every objective.
 #[derive(Clone, Debug, Default)]
 pub struct LineFront {
-    /// Share of the usable width at every cut, one row per line.
+    /// Share of the usable width at every cross-section, one row per line.
     pub alpha: Vec<Vec<f64>>,
     /// Objectives, one row per line.
     pub objectives: Vec<Vec<f64>>,
@@ -57,7 +57,7 @@ const LATTICE: u32 = 5;
 /// Cone programs for each line of the local search: most of the gain is in the first.
 const PROGRAMS: usize = 6;
 
-/// Looks for the front. `known` are lines to start from and to keep (`alpha` at every cut). `begun` is the swarm of the same
+/// Looks for the front. `known` are lines to start from and to keep (`alpha` at every cross-section). `begun` is the swarm of the same
 /// search that was interrupted, if one was, and what is known to go wrong with devices; `observe` is told the swarm after
 /// each iteration.
 ///
@@ -71,7 +71,7 @@ pub(super) fn search_front(
     (state, known_faults): (Option<FrontState>, &[String]),
     mut observe: impl FnMut(&Progress, &FrontState) -> Result<ControlFlow<()>>,
 ) -> Result<LineFront> {
-    let cuts = &setup.cuts;
+    let cross_sections = &setup.cross_sections;
     let problem = front_problem(setup, settings)?;
     let mopso = MopsoSettings {
         motion: PsoSettings {
@@ -118,7 +118,7 @@ pub(super) fn search_front(
     if !known.is_empty() {
         let blends = lattice(known.len(), BLENDS).into_iter();
         lines.extend(blends.map(|shares| {
-            (0..cuts.len())
+            (0..cross_sections.len())
                 .map(|i| blend(&shares, i).clamp(0.0, 1.0))
                 .collect()
         }));
@@ -129,13 +129,13 @@ pub(super) fn search_front(
     if settings.local_search && settings.objectives.iter().all(|o| solvers.solves(*o)) {
         let polished = std::thread::scope(|scope| {
             let led = scope.spawn(|| polish_along(&archive, settings, solvers));
-            watched(led, solvers.flag(), || observe(&latest, &state))
+            interruptible(led, solvers.flag(), || observe(&latest, &state))
         })?;
         evaluations += insert_all(&mut archive, judge.as_mut(), &polished)?;
     }
 
     // The point that the reference line and the edges of the archive do not exceed.
-    let middle = judge.evaluate(&cuts.reference)?.objectives;
+    let middle = judge.evaluate(&cross_sections.reference)?.objectives;
     let across = |k: usize| archive.objectives.iter().map(move |row| row[k]);
     let ideal: Vec<f64> = (0..middle.len())
         .map(|k| across(k).fold(f64::INFINITY, f64::min))
@@ -175,8 +175,8 @@ pub(super) fn search_front(
 /// # Errors
 /// Those of [`LineProblem::new`].
 pub fn front_problem(setup: &Setup, settings: &RacelineSettings) -> Result<LineProblem> {
-    let cuts = &setup.cuts;
-    let controls = ((cuts.length_m / CONTROL_SPACING_M) as usize).clamp(4, cuts.len());
+    let cross_sections = &setup.cross_sections;
+    let controls = ((cross_sections.length_m / CONTROL_SPACING_M) as usize).clamp(4, cross_sections.len());
     setup.problem(
         Parametrisation::control_points(controls),
         &settings.objectives,
@@ -184,8 +184,8 @@ pub fn front_problem(setup: &Setup, settings: &RacelineSettings) -> Result<LineP
     )
 }
 
-/// What that swarm starts from, a candidate to each of the settings' particles: the known lines (`alpha` at every cut), the
-/// reference line and the edges, then blends of them with a little noise.
+/// What that swarm starts from, a candidate to each of the settings' particles: the known lines (`alpha` at every cross-section),
+/// the reference line and the edges, then blends of them with a little noise.
 ///
 /// # Errors
 /// Those of [`LineProblem::candidate`].
@@ -194,9 +194,9 @@ pub fn starting_lines(
     settings: &RacelineSettings,
     known: &[Vec<f64>],
 ) -> Result<Vec<Vec<f64>>> {
-    let n = problem.cuts().len();
+    let n = problem.cross_sections().len();
     let mut given = known.to_vec();
-    given.push(problem.cuts().reference.clone());
+    given.push(problem.cross_sections().reference.clone());
     let mut lines = given.clone();
     lines.push(vec![0.0; n]);
     lines.push(vec![1.0; n]);

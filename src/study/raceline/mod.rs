@@ -27,7 +27,7 @@ pub use window_search::{FoundLine, LevelRow, LineSearch, LineSearchSettings, Lin
 use crate::config::settings::Settings;
 use crate::error::Result;
 use crate::evaluate::line::LineObjective;
-use crate::study::framework::memory::Kept;
+use crate::study::framework::memory::MemoryItem;
 use crate::study::framework::{Figures, Plan, RunRecord, Study, Subject, Work};
 use std::path::Path;
 
@@ -90,8 +90,8 @@ impl Study for Raceline {
         set_up(settings)
     }
 
-    fn size(settings: &RacelineSettings, _: Option<&Setup>) -> Vec<Kept> {
-        settings.size().kept()
+    fn size(settings: &RacelineSettings, _: Option<&Setup>) -> Vec<MemoryItem> {
+        settings.size().memory_items()
     }
 
     fn plan(settings: &RacelineSettings, setup: &Setup, plan: Plan) -> Result<Plan> {

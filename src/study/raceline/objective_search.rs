@@ -8,7 +8,7 @@ use super::whole_line_search::search_whole_lines;
 use super::window_search::{FoundLine, LevelRow, LineSearch, LineSearchSettings, search_line};
 use crate::error::Result;
 use crate::evaluate::line::LineObjective;
-use crate::line::{cuts_about, shares_across};
+use crate::line::{cross_sections_about, shares_across};
 use crate::study::framework::Progress;
 
 /// Rounds of a search that starts from a reference optimum.
@@ -71,7 +71,7 @@ pub(super) fn search_objective(
         ..cold
     };
     let search = LineSearch {
-        cuts: &setup.cuts,
+        cross_sections: &setup.cross_sections,
         objective,
         car: Some(&setup.car),
         entry_mps: settings.entry_mps,
@@ -84,8 +84,14 @@ pub(super) fn search_objective(
         return search_step(&search, &plain, objective, (0, 0), work);
     }
     // Open roads, and what folds over itself, cannot be cut square to lines on it.
-    let cuts = &setup.cuts;
-    if cuts_about(cuts, &cuts.points(&cuts.reference), cuts.len()).is_ok() {
+    let cross_sections = &setup.cross_sections;
+    if cross_sections_about(
+        cross_sections,
+        &cross_sections.points(&cross_sections.reference),
+        cross_sections.len(),
+    )
+    .is_ok()
+    {
         search_about(settings, setup, &search, &plain, work)
     } else {
         search_across(settings, setup, &search, &plain, work)
@@ -95,8 +101,8 @@ pub(super) fn search_objective(
 /// The fastest line of a closed circuit, in stages from coarse to fine about a line that becomes better and better.
 ///
 /// The first line is the minimum-curvature line of few control points, or the given one. Each stage leaves out of the line before
-/// what its control points could not mend, cuts the road square to what is left (so that neither the jitter of the cuts nor
-/// the bends of a far-off reference line come into it), and lays a spline on top, which is held inside by its control points.
+/// what its control points could not mend, cuts the road square to what is left (so that neither the jitter of the cross-sections
+/// nor the bends of a far-off reference line come into it), and lays a spline on top, which is held inside by its control points.
 /// The line therefore has no ripples that a lap time at few points would not feel, and no kinks at the edges.
 fn search_about(
     settings: &RacelineSettings,
@@ -105,7 +111,7 @@ fn search_about(
     across: &LineSearchSettings,
     work: &mut Running<'_>,
 ) -> Result<FoundLine> {
-    let (road, objective) = (&setup.cuts, search.objective);
+    let (road, objective) = (&setup.cross_sections, search.objective);
     let plain = LineSearchSettings {
         seed: settings.seed,
         strides: vec![16, 8, 4, 2, 1],
@@ -135,7 +141,7 @@ fn search_about(
         }
     };
     let mut best = setup.report("fastest", &found.alpha, settings)?;
-    let mut cuts = road.clone();
+    let mut cross_sections = road.clone();
     let mut line = found.alpha.clone();
     found.history.clear();
     let mut searched = false;
@@ -146,14 +152,14 @@ fn search_about(
         }
         let count = (controls / stage.coarseness).max(8);
         let wave_m = stage.wave * road.length_m / controls as f64;
-        let smooth = cuts.points(&cuts.smoothed(&line, wave_m));
-        // Where the line has come to fold the cuts, what has been found so far is the answer.
-        let Ok(about) = cuts_about(road, &smooth, controls * SECTIONS_PER_CONTROL) else {
+        let smooth = cross_sections.points(&cross_sections.smoothed(&line, wave_m));
+        // Where the line has come to fold the cross-sections, what has been found so far is the answer.
+        let Ok(about) = cross_sections_about(road, &smooth, controls * SECTIONS_PER_CONTROL) else {
             break;
         };
-        cuts = about;
+        cross_sections = about;
         let level = LineSearch {
-            cuts: &cuts,
+            cross_sections: &cross_sections,
             start: None,
             ..*search
         };
@@ -162,7 +168,7 @@ fn search_about(
             seed: settings.seed.wrapping_add((number as u64 + 1) << 48),
             rounds: stage.rounds,
             spread: stage.spread,
-            sections_per_control: cuts.len() as f64 / count as f64,
+            sections_per_control: cross_sections.len() as f64 / count as f64,
             first_controls: count,
             ..plain.clone()
         };
@@ -177,7 +183,7 @@ fn search_about(
         }));
         searched = true;
         line = step.alpha;
-        let Ok(shares) = shares_across(road, &cuts.points(&line)) else {
+        let Ok(shares) = shares_across(road, &cross_sections.points(&line)) else {
             break;
         };
         let told = setup.report("fastest", &within_road(shares), settings)?;
@@ -186,7 +192,7 @@ fn search_about(
         }
     }
     if !searched && !work.interrupted {
-        // Cuts so far apart that lines on them cannot be cut square to.
+        // Cross-sections so far apart that lines on them cannot be cut square to.
         return search_across(settings, setup, search, across, work);
     }
     found.cost = best.objective(objective);
@@ -194,18 +200,18 @@ fn search_about(
     Ok(found)
 }
 
-/// Cuts for each control point where lines go across the road's own cuts: with fewer, ripples between the cuts would pay;
-/// with more, a swarm cannot follow the edges.
-const CUTS_PER_CONTROL: f64 = 2.0;
+/// Cross-sections for each control point where lines go across the road's own cross-sections: with fewer, ripples between the
+/// cross-sections would pay; with more, a swarm cannot follow the edges.
+const CROSS_SECTIONS_PER_CONTROL: f64 = 2.0;
 /// Waves of the minimum-curvature line that are shorter than this (m) are left out where fast lines are measured from it.
 const BASE_M: f64 = 40.0;
 /// Waves (m) left out of a fast line, one after the other, to see whether a fine spline through it is faster without.
 const RIPPLES_M: [f64; 4] = [15.0, 20.0, 25.0, 30.0];
 
-/// The fastest line of any road, across its own cuts.
+/// The fastest line of any road, across its own cross-sections.
 ///
 /// It is looked for about the swarm's own minimum-curvature line, smoothed: about the reference line, a few control
-/// points could not say it. What is found has ripples between the cuts that its lap time through them does not feel; of
+/// points could not say it. What is found has ripples between the cross-sections that its lap time through them does not feel; of
 /// the line and smoother ones like it, the one is kept that is fastest on a fine spline.
 fn search_across(
     settings: &RacelineSettings,
@@ -223,16 +229,16 @@ fn search_across(
     if work.interrupted {
         return Ok(curved);
     }
-    let mut cuts = setup.cuts.clone();
-    cuts.reference.clone_from(&curved.alpha);
-    let smooth = cuts.with_smooth_reference(BASE_M);
+    let mut cross_sections = setup.cross_sections.clone();
+    cross_sections.reference.clone_from(&curved.alpha);
+    let smooth = cross_sections.with_smooth_reference(BASE_M);
     let fast = LineSearch {
-        cuts: &smooth,
+        cross_sections: &smooth,
         start: None,
         ..*search
     };
     let fast_settings = LineSearchSettings {
-        sections_per_control: CUTS_PER_CONTROL,
+        sections_per_control: CROSS_SECTIONS_PER_CONTROL,
         overshoot: 0.0,
         ..plain.clone()
     };
@@ -242,9 +248,9 @@ fn search_across(
     let before = std::mem::replace(&mut found.losses, curved.losses);
     found.losses.add(&before);
     let mut fastest = setup.report("fastest", &found.alpha, settings)?;
-    cuts.reference.clone_from(&found.alpha);
+    cross_sections.reference.clone_from(&found.alpha);
     for wavelength in RIPPLES_M {
-        let smooth = cuts.with_smooth_reference(wavelength).reference;
+        let smooth = cross_sections.with_smooth_reference(wavelength).reference;
         let line = setup.report("fastest", &smooth, settings)?;
         if line.lap_time_fine_s() < fastest.lap_time_fine_s() {
             fastest = line;

@@ -4,10 +4,10 @@ use super::settings::RacelineSettings;
 use super::setup::{FINE_M, Setup};
 use crate::error::Result;
 use crate::evaluate::line::LineObjective;
-use crate::line::{FineLine, PointMass, cuts_about, shares_across};
+use crate::line::{FineLine, PointMass, cross_sections_about, shares_across};
 use crate::optimum::{
-    Bounds, DescentSettings, LineMap, Optimum, PointMassLimits, ReferenceProblem, Start, Status, Weights,
-    fastest, least_curvature_of, least_gamma, least_squared_length, polish_lines, shortest,
+    Bounds, DescentSettings, LineMap, Optimum, PointMassEnvelope, ReferenceProblem, Start, Status, Weights,
+    fastest, least_gamma, least_squared_length, minimum_curvature_of, polish_lines, shortest,
 };
 use crate::track::CrossSections;
 use glam::DVec2;
@@ -16,16 +16,17 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 /// The solvers on one track.
 ///
-/// Lines without a lap time have a variable at every cut. With one, cuts' worth of zigzag between them would pay, so that
-/// lines are then a spline's distance from the minimum-curvature line, with three cross-sections for each control point.
+/// Lines without a lap time have a variable at every cross-section. With one, cross-sections' worth of zigzag between them would
+/// pay, so that lines are then a spline's distance from the minimum-curvature line, with three cross-sections for each control
+/// point.
 pub struct ReferenceSolvers {
-    cuts: CrossSections,
+    cross_sections: CrossSections,
     spacing_m: Vec<f64>,
     every: (LineMap, Bounds),
     smooth: (LineMap, Bounds),
     /// The minimum-curvature line, from which the smooth lines are measured.
     base: Vec<f64>,
-    limits: Option<PointMassLimits>,
+    envelope: Option<PointMassEnvelope>,
     car: PointMass,
     entry_mps: f64,
     stop: Arc<AtomicBool>,
@@ -34,7 +35,7 @@ pub struct ReferenceSolvers {
 /// A reference optimum.
 #[derive(Clone, Debug)]
 pub struct OptimumLine {
-    /// Share of the usable width at every cut.
+    /// Share of the usable width at every cross-section.
     pub alpha: Vec<f64>,
     /// How the solver ended.
     pub status: Status,
@@ -42,40 +43,41 @@ pub struct OptimumLine {
     pub seconds: f64,
 }
 
-/// A line to be led downhill (`alpha` at every cut), and the weight of each objective.
+/// A line to be led downhill (`alpha` at every cross-section), and the weight of each objective.
 pub type WeightedLine = (Vec<f64>, Vec<(LineObjective, f64)>);
 
-/// A line taken anew about itself: the distance between the cuts square to it (m), and how many of them there are for each
-/// control point.
+/// A line taken anew about itself: the distance between the cross-sections square to it (m), and how many of them there are for
+/// each control point.
 struct About {
     spacing_m: f64,
-    cuts_per_control: usize,
+    cross_sections_per_control: usize,
 }
 
 impl About {
     /// Distance between control points (m).
     const fn control_m(&self) -> f64 {
-        self.spacing_m * self.cuts_per_control as f64
+        self.spacing_m * self.cross_sections_per_control as f64
     }
 }
 
 /// At 4 m a lap's time is that on a fine spline to a few parts in ten thousand.
 const ABOUT: About = About {
     spacing_m: 4.0,
-    cuts_per_control: 4,
+    cross_sections_per_control: 4,
 };
-/// A thousandth of a lap better, at several times the cost: cuts ever closer together (m), with a control for as many of them
-/// as the study's own cuts can say, [`CUTS_TO_SAY_CONTROL`] each; where controls come closer by a quarter at least.
+/// A thousandth of a lap better, at several times the cost: cross-sections ever closer together (m), with a control for as many
+/// of them as the study's own cross-sections can say, [`CROSS_SECTIONS_TO_SAY_CONTROL`] each; where controls come closer by a
+/// quarter at least.
 const CLOSELY_M: [f64; 2] = [2.0, 1.0];
 const CLOSER: f64 = 0.75;
-const CUTS_TO_SAY_CONTROL: f64 = 1.4;
-/// Share of a lap below which no cone program is worth its second: a hundredth of what lies between two cuts.
+const CROSS_SECTIONS_TO_SAY_CONTROL: f64 = 1.4;
+/// Share of a lap below which no cone program is worth its second: a hundredth of what lies between two cross-sections.
 const LEAST_GAIN_ABOUT: f64 = 1e-5;
 /// Times that the fastest line is taken anew about itself.
 const ABOUTS: usize = 2;
 
-/// With two, ripples are left between the cuts that their lap time does not feel and a fine spline does.
-const CUTS_PER_CONTROL: usize = 3;
+/// With two, ripples are left between the cross-sections that their lap time does not feel and a fine spline does.
+const CROSS_SECTIONS_PER_CONTROL: usize = 3;
 
 /// What the solvers know of an objective: its weight where lines are led downhill, and its optimum.
 type Solver = (
@@ -97,30 +99,30 @@ impl ReferenceSolvers {
     /// # Errors
     /// As [`ReferenceSolvers::new`].
     pub fn stopped_by(setup: &Setup, settings: &RacelineSettings, stop: Arc<AtomicBool>) -> Result<Self> {
-        let cuts = setup.cuts.clone();
-        let map = LineMap::at_every_cut(&cuts);
-        let bounds = Bounds::road(cuts.len());
-        let spacing_m = cuts.spacing_m();
+        let cross_sections = setup.cross_sections.clone();
+        let map = LineMap::at_every_cross_section(&cross_sections);
+        let bounds = Bounds::road(cross_sections.len());
+        let spacing_m = cross_sections.spacing_m();
         let start = least_gamma(&map, &spacing_m, &bounds)?.x;
         let curvature = ReferenceProblem {
             stop: Some(&stop),
             ..ReferenceProblem::of(&map)
         };
-        let base = least_curvature_of(&curvature, &bounds, &start)?.x;
-        let controls = (cuts.len() / CUTS_PER_CONTROL).max(4);
+        let base = minimum_curvature_of(&curvature, &bounds, &start)?.x;
+        let controls = (cross_sections.len() / CROSS_SECTIONS_PER_CONTROL).max(4);
         Ok(Self {
-            smooth: LineMap::spline_about(&cuts, &base, controls),
+            smooth: LineMap::spline_about(&cross_sections, &base, controls),
             every: (map, bounds),
             base,
-            limits: if setup.car.ellipse_exponent == 2.0 {
-                Some(PointMassLimits::new(&setup.car)?)
+            envelope: if setup.car.ellipse_exponent == 2.0 {
+                Some(PointMassEnvelope::new(&setup.car)?)
             } else {
                 None
             },
             car: setup.car.clone(),
             entry_mps: settings.entry_mps,
             spacing_m,
-            cuts,
+            cross_sections,
             stop,
         })
     }
@@ -132,7 +134,7 @@ impl ReferenceSolvers {
 
     fn problem<'a>(&'a self, map: &'a LineMap) -> ReferenceProblem<'a> {
         ReferenceProblem {
-            limits: self.limits.as_ref().map(|l| l as _),
+            envelope: self.envelope.as_ref().map(|l| l as _),
             start_mps: self.entry_mps,
             spacing_m: Some(&self.spacing_m),
             stop: Some(&self.stop),
@@ -157,15 +159,15 @@ impl ReferenceSolvers {
             ),
             LineObjective::Kappa2 => (
                 |w| &mut w.curvature,
-                |s| least_curvature_of(&s.problem(&s.every.0), &s.every.1, &s.base),
+                |s| minimum_curvature_of(&s.problem(&s.every.0), &s.every.1, &s.base),
             ),
-            LineObjective::LapTime if self.limits.is_none() => return None,
+            LineObjective::LapTime if self.envelope.is_none() => return None,
             LineObjective::LapTime => (|w| &mut w.time, Self::fastest),
         };
         Some(solver)
     }
 
-    /// The fastest line, `alpha` at every cut.
+    /// The fastest line, `alpha` at every cross-section.
     fn fastest(&self) -> Result<Optimum> {
         let (map, bounds) = &self.smooth;
         let start = vec![0.0; map.variables()];
@@ -214,8 +216,9 @@ impl ReferenceSolvers {
         Ok(best)
     }
 
-    /// The fastest line near one, as splines about it and across cuts square to it: they say more than splines as short about
-    /// the minimum-curvature line. Nothing where the road cannot be cut so, or the line is not faster for it on a fine spline.
+    /// The fastest line near one, as splines about it and across cross-sections square to it: they say more than splines as short
+    /// about the minimum-curvature line. Nothing where the road cannot be cut so, or the line is not faster for it on a fine
+    /// spline.
     ///
     /// # Errors
     /// [`crate::Error::Study`] if a solver refuses.
@@ -225,16 +228,16 @@ impl ReferenceSolvers {
 
     /// The same, at first `abouts` times.
     fn about_itself(&self, alpha: &[f64], abouts: usize) -> Result<Option<Optimum>> {
-        let Some(limits) = &self.limits else {
+        let Some(envelope) = &self.envelope else {
             return Ok(None);
         };
-        let own_m = self.cuts.length_m / self.cuts.len() as f64;
+        let own_m = self.cross_sections.length_m / self.cross_sections.len() as f64;
         let mut control_m = CLOSER * ABOUT.control_m();
         let closely = CLOSELY_M.into_iter().filter_map(|spacing_m| {
-            let needed = (CUTS_TO_SAY_CONTROL * own_m / spacing_m).ceil() as usize;
+            let needed = (CROSS_SECTIONS_TO_SAY_CONTROL * own_m / spacing_m).ceil() as usize;
             let how = About {
                 spacing_m,
-                cuts_per_control: needed.max(CUTS_PER_CONTROL),
+                cross_sections_per_control: needed.max(CROSS_SECTIONS_PER_CONTROL),
             };
             let closer = how.control_m() <= control_m;
             if closer {
@@ -248,7 +251,7 @@ impl ReferenceSolvers {
                 return Ok(false);
             }
             let alpha = found.as_ref().map_or(alpha, |f| &f.x);
-            let Some(closer) = self.taken_about(limits, alpha, how)? else {
+            let Some(closer) = self.taken_about(envelope, alpha, how)? else {
                 return Ok(false);
             };
             let before_s = found.as_ref().map_or(0.0, |f| f.seconds);
@@ -270,22 +273,28 @@ impl ReferenceSolvers {
         Ok(found)
     }
 
-    fn taken_about(&self, limits: &PointMassLimits, alpha: &[f64], how: &About) -> Result<Option<Optimum>> {
-        let own = self.cuts.points(alpha);
-        let count = ((self.cuts.length_m / how.spacing_m).ceil() as usize).max(self.cuts.len());
-        let Ok(about) = cuts_about(&self.cuts, &own, count) else {
+    fn taken_about(
+        &self,
+        envelope: &PointMassEnvelope,
+        alpha: &[f64],
+        how: &About,
+    ) -> Result<Option<Optimum>> {
+        let own = self.cross_sections.points(alpha);
+        let count =
+            ((self.cross_sections.length_m / how.spacing_m).ceil() as usize).max(self.cross_sections.len());
+        let Ok(about) = cross_sections_about(&self.cross_sections, &own, count) else {
             return Ok(None);
         };
-        let controls = (about.len() / how.cuts_per_control).max(4);
+        let controls = (about.len() / how.cross_sections_per_control).max(4);
         let (map, bounds) = LineMap::spline_about(&about, &about.reference, controls);
         let problem = ReferenceProblem {
-            limits: Some(limits),
+            envelope: Some(envelope),
             start_mps: self.entry_mps,
             stop: Some(&self.stop),
             ..ReferenceProblem::of(&map)
         };
         let start = vec![0.0; map.variables()];
-        // Where the cuts are so far apart that no such spline is on the road, the line stays as it is.
+        // Where the cross-sections are so far apart that no such spline is on the road, the line stays as it is.
         let settings = DescentSettings {
             least_gain: LEAST_GAIN_ABOUT,
             ..DescentSettings::default()
@@ -293,7 +302,7 @@ impl ReferenceSolvers {
         let Ok(solved) = fastest(&problem, &bounds, &start, &settings) else {
             return Ok(None);
         };
-        let Ok(shares) = shares_across(&self.cuts, &map.line(&solved.x)) else {
+        let Ok(shares) = shares_across(&self.cross_sections, &map.line(&solved.x)) else {
             return Ok(None);
         };
         let x = within_road(shares);
@@ -301,14 +310,18 @@ impl ReferenceSolvers {
             let fine = FineLine::new(points, true, FINE_M, Some(&self.car), self.entry_mps)?;
             Ok(fine.lap_time_s())
         };
-        let faster = time(&self.cuts.points(&x))? < time(&own)?;
+        let faster = time(&self.cross_sections.points(&x))? < time(&own)?;
         Ok(faster.then_some(Optimum { x, ..solved }))
     }
 
-    /// `alpha` at every cut of a line of `map`.
+    /// `alpha` at every cross-section of a line of `map`.
     fn shares(&self, map: &LineMap, x: &[f64]) -> Vec<f64> {
         let points = map.line(x);
-        let ends = self.cuts.right_m.iter().zip(&self.cuts.left_m);
+        let ends = self
+            .cross_sections
+            .right_m
+            .iter()
+            .zip(&self.cross_sections.left_m);
         points
             .iter()
             .zip(ends)
@@ -357,11 +370,12 @@ impl ReferenceSolvers {
 
     /// Control points (m) of a smooth line near `alpha`: its distances from the base where they stand.
     fn offsets(&self, alpha: &[f64]) -> Vec<f64> {
-        let (n, controls) = (self.cuts.len(), self.smooth.0.variables());
+        let (n, controls) = (self.cross_sections.len(), self.smooth.0.variables());
         (0..controls)
             .map(|k| {
                 let i = (k * n / controls).min(n - 1);
-                (alpha[i] - self.base[i]) * self.cuts.left_m[i].distance(self.cuts.right_m[i])
+                (alpha[i] - self.base[i])
+                    * self.cross_sections.left_m[i].distance(self.cross_sections.right_m[i])
             })
             .collect()
     }

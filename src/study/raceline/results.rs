@@ -106,7 +106,7 @@ pub(super) fn summarise(settings: &RacelineSettings, setup: &Setup, outcome: &Ou
         head: Raceline::head(settings, setup, outcome),
         search_elapsed_s: outcome.search_s,
         exact_elapsed_s: outcome.exact_s,
-        sections: setup.cuts.len(),
+        sections: setup.cross_sections.len(),
         car_width_m: settings.car_width_m,
         warm_start: settings.warm_start,
         local_search: settings.local_search,
@@ -213,7 +213,7 @@ pub(super) fn write_files(folder: &Path, setup: &Setup, outcome: &Outcome) -> Re
         let name = stem(&line.name);
         write_line(&folder.join(format!("line_{name}.csv")), setup, line)?;
         // Replaces what an interrupted run has left, since it is resumed in the same folder.
-        let racetrack = setup.cuts.line_to_racetrack_csv(&line.alpha);
+        let racetrack = setup.cross_sections.line_to_racetrack_csv(&line.alpha);
         write_whole(folder.join(format!("racetrack_{name}.csv")), racetrack.as_bytes())?;
     }
     write_front(folder, outcome)

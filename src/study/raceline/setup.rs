@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 use crate::evaluate::Evaluator;
 use crate::evaluate::line::{CpuLineEvaluator, LineObjective, LineProblem};
 use crate::line::{Clearance, FineLine, Parametrisation, PointMass, TERMS, check_line};
-use crate::study::envelope::{EnvelopeSettings, car_limits};
+use crate::study::envelope::{EnvelopeSettings, car_envelope};
 use crate::study::framework::Plan;
 use crate::track::{CrossSections, Spacing, Track};
 use crate::vehicle::powertrain::Powertrain;
@@ -25,11 +25,11 @@ const EDGE_M: f64 = 2.0;
 pub struct Setup {
     /// Title of the track.
     pub track_name: String,
-    /// The cuts from edge to edge.
+    /// The cross-sections from edge to edge.
     pub road: CrossSections,
-    /// The cuts that the car's middle may use.
-    pub cuts: CrossSections,
-    /// The edges at close steps (m), right and left, which no cut has a part in.
+    /// The cross-sections that the car's middle may use.
+    pub cross_sections: CrossSections,
+    /// The edges at close steps (m), right and left, which no cross-section has a part in.
     pub edges_m: [Vec<DVec2>; 2],
     /// The car.
     pub car: PointMass,
@@ -60,19 +60,19 @@ pub fn set_up(settings: &RacelineSettings) -> Result<Setup> {
                 let expected = format!("so many that at least {TERMS} lie in it");
                 return Err(Error::input("the study", "sections", found, expected));
             }
-            // The edges reach past the stretch's own ends, wherever its cuts have put these.
-            let from_m = road.station_m[first_cut(&road, first_m)];
+            // The edges reach past the stretch's own ends, wherever its cross-sections have put these.
+            let from_m = road.station_m[first_cross_section(&road, first_m)];
             let edges = stretch_of(&dense, from_m - road.length_m / close as f64, stretch.length_m, 3)?;
             (stretch, edges)
         }
         None => (road, dense),
     };
-    let cuts = road.narrowed(settings.car_width_m)?;
+    let cross_sections = road.narrowed(settings.car_width_m)?;
     let car = Car::load(&settings.car)?;
     let (envelope, car_name) = match &settings.envelope {
         Some(path) => (Envelope::load(path)?, path.display().to_string()),
         None => (
-            car_limits(&car, &EnvelopeSettings::default())?.envelope,
+            car_envelope(&car, &EnvelopeSettings::default())?.envelope,
             car.name.clone(),
         ),
     };
@@ -87,7 +87,7 @@ pub fn set_up(settings: &RacelineSettings) -> Result<Setup> {
     Ok(Setup {
         track_name: track.name(),
         road,
-        cuts,
+        cross_sections,
         edges_m: [dense.right_m, dense.left_m],
         car,
         car_name,
@@ -127,8 +127,8 @@ fn section_named(road: &CrossSections, name: &str) -> Result<(f64, f64)> {
     Ok((section.start_m, section.length_m()))
 }
 
-/// The first cut at or after a station (m).
-fn first_cut(road: &CrossSections, from_m: f64) -> usize {
+/// The first cross-section at or after a station (m).
+fn first_cross_section(road: &CrossSections, from_m: f64) -> usize {
     let from_m = if road.closed {
         from_m.rem_euclid(road.length_m)
     } else {
@@ -142,9 +142,9 @@ fn first_cut(road: &CrossSections, from_m: f64) -> usize {
     }
 }
 
-/// The cuts from a station (m) on over a length (m), and some `more`, as an open road.
+/// The cross-sections from a station (m) on over a length (m), and some `more`, as an open road.
 fn stretch_of(road: &CrossSections, from_m: f64, length_m: f64, more: usize) -> Result<CrossSections> {
-    let first = first_cut(road, from_m);
+    let first = first_cross_section(road, from_m);
     let spacing_m = road.length_m / road.len() as f64;
     let most = if road.closed {
         road.len()
@@ -160,9 +160,9 @@ fn stretch_of(road: &CrossSections, from_m: f64, length_m: f64, more: usize) -> 
 pub struct ReportedLine {
     /// What it is, as in `shortest`.
     pub name: String,
-    /// Share of the usable width from the right at every cut.
+    /// Share of the usable width from the right at every cross-section.
     pub alpha: Vec<f64>,
-    /// What each objective comes to through the cuts, in the order of [`LineObjective::ALL`].
+    /// What each objective comes to through the cross-sections, in the order of [`LineObjective::ALL`].
     pub through_cuts: Vec<f64>,
     /// The line on the fine spline, with its lap.
     pub fine: FineLine,
@@ -177,7 +177,7 @@ impl ReportedLine {
     }
 
     /// What an objective comes to where lines are compared: lap times on the fine spline, so that no line wins by zigzag
-    /// between the cuts, the others through the cuts.
+    /// between the cross-sections, the others through the cross-sections.
     pub fn worth(&self, objective: LineObjective) -> f64 {
         match objective {
             LineObjective::LapTime => self.lap_time_fine_s(),
@@ -185,14 +185,14 @@ impl ReportedLine {
         }
     }
 
-    /// What an objective comes to through the cuts.
+    /// What an objective comes to through the cross-sections.
     pub fn objective(&self, objective: LineObjective) -> f64 {
         self.through_cuts[objective as usize]
     }
 }
 
 impl Setup {
-    /// The problem of lines through the cuts that are given `way`.
+    /// The problem of lines through the cross-sections that are given `way`.
     ///
     /// # Errors
     /// Those of [`LineProblem::new`].
@@ -203,7 +203,13 @@ impl Setup {
         settings: &RacelineSettings,
     ) -> Result<LineProblem> {
         let car = Some(self.car.clone());
-        LineProblem::new(self.cuts.clone(), way, objectives, car, settings.entry_mps)
+        LineProblem::new(
+            self.cross_sections.clone(),
+            way,
+            objectives,
+            car,
+            settings.entry_mps,
+        )
     }
 
     /// Works out everything that is reported of a line.
@@ -218,7 +224,11 @@ impl Setup {
                 "the line `{name}` cannot be driven: {failure}"
             )));
         }
-        let (points, closed, car) = (self.cuts.points(alpha), self.cuts.closed, Some(&self.car));
+        let (points, closed, car) = (
+            self.cross_sections.points(alpha),
+            self.cross_sections.closed,
+            Some(&self.car),
+        );
         let fine = FineLine::new(&points, closed, FINE_M, car, settings.entry_mps)?;
         Ok(ReportedLine {
             name: name.to_owned(),

@@ -2,7 +2,7 @@
 
 use super::front::search_front;
 use super::objective_search::search_objective;
-use super::solver_thread::watched;
+use super::solver_thread::interruptible;
 use super::state::{FinishedObjective, Running, inputs_of};
 use super::{
     LineFront, LinesState, ObjectiveOutcome, OptimumLine, Outcome, RacelineSettings, ReferenceSolvers, Setup,
@@ -44,7 +44,7 @@ pub(super) fn find_lines(
     let backend = open_line_evaluator(&probe, settings.backend, settings.adapter.as_deref())?.backend();
     let mut record = RunRecord::of(&backend);
     let mut work = Running::begin(settings, Origin::new(inputs_of(setup), &backend), work)?;
-    let reference = setup.report("reference", &setup.cuts.reference, settings)?;
+    let reference = setup.report("reference", &setup.cross_sections.reference, settings)?;
     let stop = Arc::new(AtomicBool::new(false));
     let solvers = ReferenceSolvers::stopped_by(setup, settings, Arc::clone(&stop))?;
     work.began = Instant::now();
@@ -69,7 +69,7 @@ pub(super) fn find_lines(
         for (k, (&objective, exact)) in settings.objectives.iter().zip(exact).enumerate() {
             let report = |alpha: &[f64]| setup.report(objective.line_name(), alpha, settings);
             let (exact, own_s) =
-                work.waited(|work| watched(exact, &stop, || work.asked("reference optimum")))?;
+                work.waited(|work| interruptible(exact, &stop, || work.asked("reference optimum")))?;
             exact_s = own_s.max(exact_s);
             let start = exact.as_ref().filter(|_| settings.warm_start);
             let start = start.map(|o| o.alpha.as_slice());
@@ -81,7 +81,7 @@ pub(super) fn find_lines(
                         let (found, interrupted) = (found.alpha.clone(), work.interrupted);
                         move || led_downhill(settings, objective, &found, solvers, interrupted)
                     });
-                    let led = watched(led, &stop, || work.asked("local search"))?;
+                    let led = interruptible(led, &stop, || work.asked("local search"))?;
                     // A search that goes from coarse to fine may lose a little of the line that it started from.
                     let mut best = report(&found.alpha)?;
                     for rival in start.into_iter().chain(led.iter().map(Vec::as_slice)) {

@@ -14,7 +14,7 @@ const LONGEST_PAUSE: Duration = Duration::from_millis(50);
 ///
 /// # Errors
 /// Those of the solver and of `going_on`.
-pub(super) fn watched<T>(
+pub(super) fn interruptible<T>(
     solver: ScopedJoinHandle<'_, Result<T>>,
     stop: &AtomicBool,
     mut going_on: impl FnMut() -> Result<ControlFlow<()>>,
@@ -56,7 +56,7 @@ mod tests {
         let stop = AtomicBool::new(false);
         let mut questions = 0;
         let found = std::thread::scope(|scope| {
-            watched(scope.spawn(|| patient(&stop)), &stop, || {
+            interruptible(scope.spawn(|| patient(&stop)), &stop, || {
                 questions += 1;
                 Ok(if questions == 3 {
                     ControlFlow::Break(())
@@ -73,7 +73,7 @@ mod tests {
     fn an_error_ends_the_solver() {
         let stop = AtomicBool::new(false);
         let found = std::thread::scope(|scope| {
-            watched(scope.spawn(|| patient(&stop)), &stop, || {
+            interruptible(scope.spawn(|| patient(&stop)), &stop, || {
                 Err(Error::Study("no more".to_owned()))
             })
         });

@@ -82,7 +82,7 @@ pub(super) fn search_whole_lines(
         losses.note(&progress.failures, &mut faults, evaluator.as_ref());
         state.history.push(LevelRow {
             controls: problem.dimensions(),
-            sections: setup.cuts.len(),
+            sections: setup.cross_sections.len(),
             evaluations: progress.evaluations,
             best: progress.best[0],
             elapsed_s: work.elapsed_s(),

@@ -19,7 +19,7 @@ use std::time::Instant;
 #[derive(Clone, Copy, Debug)]
 pub struct LineSearch<'a> {
     /// The sections, which the middle of the car may use from end to end.
-    pub cuts: &'a CrossSections,
+    pub cross_sections: &'a CrossSections,
     /// What is to be small.
     pub objective: LineObjective,
     /// The car, without which there are no lap times.
@@ -210,14 +210,14 @@ pub fn search_line(
 ) -> Result<FoundLine> {
     settings.validate()?;
     let clock = Instant::now();
-    let cuts = search.cuts;
-    let n = cuts.len();
-    let judge = problem(search, cuts.clone(), Parametrisation::sections())?;
+    let cross_sections = search.cross_sections;
+    let n = cross_sections.len();
+    let judge = problem(search, cross_sections.clone(), Parametrisation::sections())?;
     let mut state = match state {
         Some(state) => state,
         None => {
             // A line is handed on by its `alpha` as the control points have it, which may lie beyond the edges.
-            let sums = judge.candidate(search.start.unwrap_or(&cuts.reference))?;
+            let sums = judge.candidate(search.start.unwrap_or(&cross_sections.reference))?;
             LineState {
                 found: FoundLine::given(sums.clone(), cost(&judge, &sums)?),
                 sums,
@@ -229,13 +229,13 @@ pub fn search_line(
     let levels = levels(n, settings);
     while let Some(&(controls, sections)) = levels.get(state.level) {
         let level = state.level;
-        let places = thinned_places(n, sections, cuts.closed);
+        let places = thinned_places(n, sections, cross_sections.closed);
         let way = Parametrisation::control_points(controls).with_overshoot(settings.overshoot);
-        let line = problem(search, thinned(cuts, &places), way.clone())?;
+        let line = problem(search, thinned(cross_sections, &places), way.clone())?;
         if state.swarm.is_none() {
             let start: Vec<f64> = places.iter().map(|&i| state.sums[i]).collect();
             let strides = strides(&settings.strides, controls);
-            let windows = settings.windows(cuts.closed, level, strides);
+            let windows = settings.windows(cross_sections.closed, level, strides);
             let swarm = WindowSwarm::new(&line.problem, &line.candidate(&start)?, windows)?;
             state.swarm = Some(Box::new(swarm));
             (state.before, state.rounds) = (f64::INFINITY, 0);
@@ -281,13 +281,13 @@ pub fn search_line(
         let Some(swarm) = state.swarm.take() else { break };
         let found = &mut state.found;
         found.evaluations += swarm.evaluations();
-        let whole = problem(search, cuts.clone(), way)?;
+        let whole = problem(search, cross_sections.clone(), way)?;
         let mut candidate = swarm.best_candidate().0;
         if settings.inside {
             line.bring_inside(&mut candidate);
         }
-        // Control points count in mean widths of the road, and the mean is over other cuts here.
-        let scale = mean_width_m(line.cuts()) / mean_width_m(cuts);
+        // Control points count in mean widths of the road, and the mean is over other cross-sections here.
+        let scale = mean_width_m(line.cross_sections()) / mean_width_m(cross_sections);
         let candidate: Vec<f64> = candidate.iter().map(|c| 0.5 + scale * (c - 0.5)).collect();
         let row = |row: &SectionRow<f64>| {
             let terms = row.weights.iter().zip(row.sources);
@@ -312,9 +312,9 @@ pub fn search_line(
     Ok(state.found)
 }
 
-fn problem(search: &LineSearch, cuts: CrossSections, way: Parametrisation) -> Result<LineProblem> {
+fn problem(search: &LineSearch, cross_sections: CrossSections, way: Parametrisation) -> Result<LineProblem> {
     let car = search.car.cloned();
-    LineProblem::new(cuts, way, &[search.objective], car, search.entry_mps)
+    LineProblem::new(cross_sections, way, &[search.objective], car, search.entry_mps)
 }
 
 /// The objective of one candidate, in `f64`.
@@ -343,7 +343,7 @@ fn strides(wanted: &[usize], controls: usize) -> Vec<usize> {
     if fit.is_empty() { vec![1] } else { fit }
 }
 
-/// Which of `n` cuts are kept, evenly spread; of an open row both ends.
+/// Which of `n` cross-sections are kept, evenly spread; of an open row both ends.
 fn thinned_places(n: usize, kept: usize, closed: bool) -> Vec<usize> {
     let kept = kept.clamp(2, n);
     if closed {
@@ -353,20 +353,20 @@ fn thinned_places(n: usize, kept: usize, closed: bool) -> Vec<usize> {
     }
 }
 
-/// Some of the cuts.
-fn thinned(cuts: &CrossSections, places: &[usize]) -> CrossSections {
+/// Some of the cross-sections.
+fn thinned(cross_sections: &CrossSections, places: &[usize]) -> CrossSections {
     CrossSections {
-        station_m: places.iter().map(|&i| cuts.station_m[i]).collect(),
-        right_m: places.iter().map(|&i| cuts.right_m[i]).collect(),
-        left_m: places.iter().map(|&i| cuts.left_m[i]).collect(),
-        reference: places.iter().map(|&i| cuts.reference[i]).collect(),
-        ..cuts.clone()
+        station_m: places.iter().map(|&i| cross_sections.station_m[i]).collect(),
+        right_m: places.iter().map(|&i| cross_sections.right_m[i]).collect(),
+        left_m: places.iter().map(|&i| cross_sections.left_m[i]).collect(),
+        reference: places.iter().map(|&i| cross_sections.reference[i]).collect(),
+        ..cross_sections.clone()
     }
 }
 
-fn mean_width_m(cuts: &CrossSections) -> f64 {
-    let ends = cuts.right_m.iter().zip(&cuts.left_m);
-    ends.map(|(right, left)| right.distance(*left)).sum::<f64>() / cuts.len() as f64
+fn mean_width_m(cross_sections: &CrossSections) -> f64 {
+    let ends = cross_sections.right_m.iter().zip(&cross_sections.left_m);
+    ends.map(|(right, left)| right.distance(*left)).sum::<f64>() / cross_sections.len() as f64
 }
 
 #[cfg(test)]

@@ -17,7 +17,7 @@ use crate::line::read_line;
 use crate::report::write_whole;
 use crate::study::envelope::{EnvelopeSettings, EnvelopeStudy};
 use crate::study::framework::journal::Journal;
-use crate::study::framework::memory::{self, Kept};
+use crate::study::framework::memory::{self, MemoryItem};
 use crate::study::framework::{
     Inputs, Plan, Progress, RunRecord, Study, Subject, Watch, Work, resumed_or_new, write_results,
 };
@@ -71,7 +71,7 @@ impl Study for Run {
     }
 
     /// Each stage has the memory for itself: the one that needs most counts.
-    fn size(settings: &RunSettings, prepared: Option<&Prepared>) -> Vec<Kept> {
+    fn size(settings: &RunSettings, prepared: Option<&Prepared>) -> Vec<MemoryItem> {
         let setup = prepared.map(|prepared| &prepared.setup);
         let identify = Identify::size(&settings.identify, setup);
         let raceline = Raceline::size(&settings.raceline, None);
@@ -274,7 +274,7 @@ fn run_stages(
             envelope: None,
             ..line.clone()
         };
-        let inputs = (alike, &road.cuts, road.car.envelope.rows());
+        let inputs = (alike, &road.cross_sections, road.car.envelope.rows());
         let stage = (1 + 2 * round, format!("line {round}"));
         let (at, found) = going.stage::<Raceline>(stage, &inputs, &line, &road)?;
         let line_path = at.join("line_fastest.csv");

@@ -93,7 +93,7 @@ fn create(folder: &Path) -> Result<()> {
 type Sums = BTreeMap<String, (u64, u32)>;
 
 /// The name of a file and what is in it.
-type KeptFile = (String, Vec<u8>);
+type StoredFile = (String, Vec<u8>);
 
 fn sum(contents: &[u8]) -> (u64, u32) {
     (contents.len() as u64, crc32fast::hash(contents))
@@ -101,7 +101,7 @@ fn sum(contents: &[u8]) -> (u64, u32) {
 
 /// The files of a stage that is kept, each as it was when it was kept; nothing where there is no such stage, and where it is
 /// not what it was, as a loss of power may leave it: that one goes.
-fn whole(kept: &Path) -> Result<Option<Vec<KeptFile>>> {
+fn whole(kept: &Path) -> Result<Option<Vec<StoredFile>>> {
     if !kept.join(DONE).is_file() {
         return Ok(None);
     }
@@ -121,7 +121,7 @@ fn whole(kept: &Path) -> Result<Option<Vec<KeptFile>>> {
 }
 
 /// As [`whole`], or what is wrong with it.
-fn read_whole(kept: &Path) -> Result<Vec<KeptFile>, String> {
+fn read_whole(kept: &Path) -> Result<Vec<StoredFile>, String> {
     let mark = std::fs::read(kept.join(DONE)).map_err(|e| e.to_string())?;
     let sums: Sums = serde_json::from_slice(&mark).map_err(|e| format!("the list of its files: {e}"))?;
     let read = |(name, expected): (String, (u64, u32))| {

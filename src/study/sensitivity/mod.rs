@@ -15,7 +15,7 @@ use crate::config::settings::{Flag, Settings, settings};
 use crate::error::{Error, Result};
 use crate::evaluate::replay::{CHANNEL_NAMES, ReplayProblem, trace};
 use crate::study::framework::journal::Journal;
-use crate::study::framework::memory::{ANSWER, Kept, log_kept};
+use crate::study::framework::memory::{ANSWER, MemoryItem, log_item};
 use crate::study::framework::{Plan, RunRecord, Study, Subject, Work};
 use crate::study::identify::{IdentifySettings, Setup, planned, subject, without_laps};
 use crate::study::replayed::{drive, ranges_about, replay_settings, set_up_channels, windowed};
@@ -120,15 +120,15 @@ impl Study for Sensitivity {
     }
 
     /// Of every sample two rows of each car in the design and its costs, and the answer in a journal.
-    fn size(settings: &SensitivitySettings, prepared: Option<&Setup>) -> Vec<Kept> {
+    fn size(settings: &SensitivitySettings, prepared: Option<&Setup>) -> Vec<MemoryItem> {
         let variables = settings.replay.free.len() as u64;
         let car = variables.saturating_mul(16).saturating_add(80 + ANSWER);
-        let samples = Kept {
+        let samples = MemoryItem {
             name: "samples",
             count: settings.samples as u64,
             each: car.saturating_mul(variables + 2),
         };
-        let log = prepared.map(|setup| log_kept(setup.log.samples()));
+        let log = prepared.map(|setup| log_item(setup.log.samples()));
         std::iter::once(samples).chain(log).collect()
     }
 

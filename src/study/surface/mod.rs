@@ -8,7 +8,7 @@ use crate::config::kinds::{count, number, optional, two_texts};
 use crate::config::settings::{Settings, settings};
 use crate::error::{Error, Result};
 use crate::study::framework::journal::Journal;
-use crate::study::framework::memory::{ANSWER, Kept, log_kept};
+use crate::study::framework::memory::{ANSWER, MemoryItem, log_item};
 use crate::study::framework::{Plan, RunRecord, Study, Subject, Work};
 use crate::study::identify::{FreeParameter, IdentifySettings, Setup, planned, subject, without_laps};
 use crate::study::replayed::{drive, ranges_about, replay_settings, set_up_channels, windowed};
@@ -70,13 +70,13 @@ impl Study for Surface {
     }
 
     /// Of every candidate its two parameters, its costs, and the answer in a journal.
-    fn size(settings: &SurfaceSettings, prepared: Option<&Setup>) -> Vec<Kept> {
-        let grid = Kept {
+    fn size(settings: &SurfaceSettings, prepared: Option<&Setup>) -> Vec<MemoryItem> {
+        let grid = MemoryItem {
             name: "grid, squared",
             count: (settings.grid as u64).saturating_mul(settings.grid as u64),
             each: 2 * 8 + 2 * 80 + ANSWER,
         };
-        let log = prepared.map(|setup| log_kept(setup.log.samples()));
+        let log = prepared.map(|setup| log_item(setup.log.samples()));
         std::iter::once(grid).chain(log).collect()
     }
 

@@ -199,7 +199,7 @@ impl SweepSettings {
                 Ok(Point {
                     settings: chosen
                         .iter()
-                        .map(|(key, value)| ((*key).to_owned(), plain(value)))
+                        .map(|(key, value)| ((*key).to_owned(), unquoted(value)))
                         .collect(),
                     study: study.to_string(),
                 })
@@ -253,13 +253,13 @@ impl SweepSettings {
 }
 
 /// A value as a cell of a table.
-fn plain(value: &Value) -> String {
+fn unquoted(value: &Value) -> String {
     match value {
         Value::String(text) => text.clone(),
         Value::Table(table) => {
             let cells: Vec<String> = table
                 .iter()
-                .map(|(key, value)| format!("{key} {}", plain(value)))
+                .map(|(key, value)| format!("{key} {}", unquoted(value)))
                 .collect();
             cells.join(", ")
         }

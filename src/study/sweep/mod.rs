@@ -16,7 +16,7 @@ use crate::config::settings::{Role, Settings};
 use crate::error::{Error, Result};
 use crate::evaluate::portions::Allowance;
 use crate::report::write_whole;
-use crate::study::framework::memory::{self, Kept};
+use crate::study::framework::memory::{self, MemoryItem};
 use crate::study::framework::run_folder::{Manifest, write_json};
 use crate::study::framework::state_file::StateFile;
 use crate::study::framework::{Entry, Plan, Progress, Study};
@@ -128,7 +128,7 @@ impl<'a> Work<'a> {
     }
 
     /// Refuses what needs more memory than is allowed.
-    fn check(&self, kept: &[Kept], number: usize) -> Result<Allowance> {
+    fn check(&self, kept: &[MemoryItem], number: usize) -> Result<Allowance> {
         memory::check(kept, self.memory_limit_mib).map_err(|e| self.of_point(e, number))
     }
 
@@ -276,7 +276,7 @@ impl<S: Study> Swept for Entry<S> {
                 .map_err(|e| work.of_point(e, number))?;
             let together = alike::<S>(&studies[number..], inputs, work.memory_limit_mib);
             let chosen = &studies[number..number + together];
-            let mut kept: Vec<Kept> = S::size(&chosen[0], Some(inputs));
+            let mut kept: Vec<MemoryItem> = S::size(&chosen[0], Some(inputs));
             kept.extend(chosen[1..].iter().flat_map(|settings| S::size(settings, None)));
             let _allowed = work.check(&kept, number)?;
             let state_files = (number..number + together).map(|number| work.state_file_of(number));

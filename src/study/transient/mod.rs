@@ -24,7 +24,7 @@ use crate::drive::SpeedPlan;
 use crate::error::{Error, Result};
 use crate::evaluate::BackendInfo;
 use crate::line::{FineLine, PointMass, read_line};
-use crate::study::framework::memory::Kept;
+use crate::study::framework::memory::MemoryItem;
 use crate::study::framework::{Plan, RunRecord, Study, Subject, Work};
 use crate::study::raceline;
 use crate::track::Circuit;
@@ -119,8 +119,8 @@ impl Study for Transient {
         read(settings)
     }
 
-    fn size(settings: &TransientSettings, _: Option<&Prepared>) -> Vec<Kept> {
-        settings.kept()
+    fn size(settings: &TransientSettings, _: Option<&Prepared>) -> Vec<MemoryItem> {
+        settings.memory_items()
     }
 
     fn plan(settings: &TransientSettings, prepared: &Prepared, plan: Plan) -> Result<Plan> {

@@ -6,7 +6,7 @@ use crate::config::kinds::{
 use crate::config::settings::settings;
 use crate::error::{Error, Result};
 use crate::evaluate::BackendChoice;
-use crate::study::framework::memory::{ANSWER, Kept};
+use crate::study::framework::memory::{ANSWER, MemoryItem};
 use crate::study::raceline::RacelineSettings;
 use crate::vehicle::{Car, CarParameter};
 use std::path::PathBuf;
@@ -86,13 +86,13 @@ impl TransientSettings {
     }
 
     /// What a population keeps in memory.
-    pub(super) fn kept(&self) -> Vec<Kept> {
+    pub(super) fn memory_items(&self) -> Vec<MemoryItem> {
         if !self.is_population() {
             return Vec::new();
         }
         let [lines, shares] = [self.line.len(), self.shares().len()].map(|n| n as u64);
         let variables = self.parameters.len() as u64 + 2;
-        vec![Kept {
+        vec![MemoryItem {
             name: "setups",
             count: self.setups.unwrap_or(0) as u64 + 1,
             each: (lines * shares).saturating_mul(ANSWER) + lines * 3 * 8 * variables,

@@ -76,6 +76,8 @@ impl TransientState {
 }
 
 impl State<TransientSettings> for TransientState {
+    const KINDS: &'static [&'static str] = &[DriveState::KIND, Journal::KIND];
+
     fn load(file: &Path) -> Result<Self> {
         match checkpoint::load(file) {
             Ok(state) => Ok(Self::Line(state)),

@@ -64,11 +64,11 @@ proptest! {
         let options = SurveyOptions { closed, ..wide() };
         let result = Survey::parse(&bytes, name, &options);
         if let Ok(survey) = &result {
-            // What is taken for a road is a road: its spline and cuts are finite, or refused.
+            // What is taken for a road is a road: its spline and cross-sections are finite, or refused.
             if let Ok(line) = survey.smoothed(&crate::track::Smoothing::default())
-                && let Ok(cuts) = line.cross_sections(&crate::track::Spacing::equal(50))
+                && let Ok(cross_sections) = line.cross_sections(&crate::track::Spacing::equal(50))
             {
-                prop_assert!(cuts.right_m.iter().chain(&cuts.left_m).all(|p| p.is_finite()));
+                prop_assert!(cross_sections.right_m.iter().chain(&cross_sections.left_m).all(|p| p.is_finite()));
             }
         }
         names_its_place(result)?;

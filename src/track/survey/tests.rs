@@ -342,12 +342,14 @@ fn the_edges_of_a_circuit_give_it_back() {
         let width = survey.left_m[i] + survey.right_m[i];
         assert!((width - 15.0).abs() < 0.6, "{width} at {foot:?}");
     }
-    let cuts = survey.as_surveyed().unwrap();
-    let cuts = cuts.cross_sections(&crate::track::Spacing::equal(360)).unwrap();
+    let cross_sections = survey.as_surveyed().unwrap();
+    let cross_sections = cross_sections
+        .cross_sections(&crate::track::Spacing::equal(360))
+        .unwrap();
     assert!(
-        (cuts.length_m - circuit.length_m).abs() < 5.0,
+        (cross_sections.length_m - circuit.length_m).abs() < 5.0,
         "{}",
-        cuts.length_m
+        cross_sections.length_m
     );
 }
 
@@ -572,11 +574,14 @@ fn a_toml_file_says_what_a_survey_cannot() {
         "{left} {right}"
     );
     assert!(circuit.section("top").is_ok() && circuit.corners[0].name == "One");
-    let cuts = crate::track::Track::load(path.to_str().unwrap()).unwrap();
-    let cuts = cuts
+    let cross_sections = crate::track::Track::load(path.to_str().unwrap()).unwrap();
+    let cross_sections = cross_sections
         .cross_sections(&crate::track::Spacing::equal(100), false)
         .unwrap();
-    assert_eq!((cuts.sections.len(), cuts.corners.len()), (1, 1));
+    assert_eq!(
+        (cross_sections.sections.len(), cross_sections.corners.len()),
+        (1, 1)
+    );
     for (from, to, part) in [
         ("width_m = 9", "width_m = -9", "line 3, field width_m"),
         ("end_m = 300", "end_m = 90000", "field end_m"),

@@ -3,7 +3,8 @@
 use crate::vehicle::parameters::parameters;
 
 parameters! {
-    /// A complete MF 5.2 coefficient set for combined slip with aligning moment. Names are Pacejka's; a `.tir` key is the name in capitals.
+    /// A complete MF 5.2 coefficient set for combined slip with aligning moment. Names are Pacejka's; a `.tir` key is the name in
+    /// capitals.
     ///
     /// Outside the bounds the formula has no meaning. Real tyres lie in much narrower ranges.
     pub struct TyreCoefficients {

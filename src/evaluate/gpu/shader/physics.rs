@@ -199,7 +199,7 @@ pub struct LineShape {
     /// What is asked for beyond lengths.
     pub wanted: Wanted,
     /// Rows of the table of limits.
-    pub limit_rows: usize,
+    pub envelope_rows: usize,
     /// Rows of the table of corner speeds.
     pub corner_rows: usize,
     /// Rows of the table of the ellipse, zero where there is none.
@@ -207,7 +207,7 @@ pub struct LineShape {
     /// Cross-sections, if their table is to be uniform.
     pub uniform_sections: Option<usize>,
     /// Whether the tables of limits, of corner speeds and of the ellipse are to be uniform.
-    pub uniform_limits: bool,
+    pub uniform_envelope: bool,
     /// Lanes of a workgroup.
     pub workgroup: u32,
     /// Lanes whose figures of a cross-section stand together in memory; divides the workgroup.
@@ -217,19 +217,19 @@ pub struct LineShape {
 impl LineShape {
     /// Source of the kernel; entry point `line`.
     pub fn source(&self) -> String {
-        let rows = |rows: usize| self.uniform_limits.then_some(rows);
+        let rows = |rows: usize| self.uniform_envelope.then_some(rows);
         let generated = Generated::new()
             .flag("CLOSED", self.closed)
             .count("TERMS", self.terms)
             .flag("WANTS_INTEGRAL", self.wanted.integral)
             .flag("WANTS_LAP", self.wanted.lap)
-            .count("LIMIT_ROWS", self.limit_rows)
+            .count("ENVELOPE_ROWS", self.envelope_rows)
             .count("CORNER_ROWS", self.corner_rows)
             .count("ELLIPSE_ROWS", self.ellipse_rows)
             .count("WORKGROUP", self.workgroup)
             .count("TILE", self.tile)
             .table(1, "sections", "Section", self.uniform_sections)
-            .table(2, "limits", "vec4<f32>", rows(2 * self.limit_rows))
+            .table(2, "limits", "vec4<f32>", rows(2 * self.envelope_rows))
             .table(3, "corners", "vec4<f32>", rows(self.corner_rows))
             .table(4, "ellipse", "vec4<f32>", rows(self.ellipse_rows.max(1)));
         [ELEMENTARY, &generated.end(), LINE].concat()
@@ -255,7 +255,7 @@ impl EnergyShape {
     /// Source of the kernel; entry point `energy_line`.
     pub fn source(&self) -> String {
         // Where in the table of vectors of four the flows, the boosts and the zones begin.
-        let rows = self.line.limit_rows;
+        let rows = self.line.envelope_rows;
         let generated = Generated::new()
             .count("STRATEGY", self.line_variables)
             .flag("ADDITIONAL", self.additional)

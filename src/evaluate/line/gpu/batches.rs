@@ -3,7 +3,7 @@
 use super::tables::LineTables;
 use crate::error::{Error, Result};
 use crate::evaluate::gpu::{Batching, Binding, DeviceKind, GpuContext, Kernel, LanePacing};
-use crate::line::{LimitTable, LinePlan};
+use crate::line::{EnvelopeTable, LinePlan};
 use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -25,7 +25,7 @@ pub struct LineStretch {
     pub start: u32,
     /// Speed squared at the start of an open line, m^2/s^2.
     pub entry: f32,
-    /// Rows of limits per speed squared, s^2/m^2.
+    /// Rows of the envelope per speed squared, s^2/m^2.
     pub rows_per_speed_squared: f32,
     /// Rows of corner speeds per radius, 1/m.
     pub rows_per_radius: f32,
@@ -33,7 +33,7 @@ pub struct LineStretch {
 
 impl LineStretch {
     /// What all dispatches of a plan have in common.
-    fn of(plan: &LinePlan<f32>, limits: &LimitTable<f32>) -> Self {
+    fn of(plan: &LinePlan<f32>, envelope: &EnvelopeTable<f32>) -> Self {
         Self {
             candidates: 0,
             stride: 0,
@@ -41,8 +41,8 @@ impl LineStretch {
             sections: plan.rows.len() as u32,
             start: plan.start as u32,
             entry: plan.entry,
-            rows_per_speed_squared: limits.rows_per_speed_squared,
-            rows_per_radius: limits.rows_per_radius,
+            rows_per_speed_squared: envelope.rows_per_speed_squared,
+            rows_per_radius: envelope.rows_per_radius,
         }
     }
 }
@@ -53,7 +53,7 @@ pub(in crate::evaluate) struct LineKernel<'k> {
     pub entry: &'k str,
     pub tables: LineTables,
     pub plan: &'k LinePlan<f32>,
-    pub limits: &'k LimitTable<f32>,
+    pub envelope: &'k EnvelopeTable<f32>,
     /// From binding 9 on.
     pub others: Vec<(Binding, wgpu::Buffer)>,
     /// Figures of a candidate.
@@ -133,7 +133,7 @@ impl<const FIGURES: usize> LineBatches<FIGURES> {
             context,
             kernel,
             workgroup: parts.tables.shape.workgroup as usize,
-            task: LineStretch::of(parts.plan, parts.limits),
+            task: LineStretch::of(parts.plan, parts.envelope),
             stretch,
             tables: parts.tables.buffers,
             others,
@@ -149,7 +149,7 @@ impl<const FIGURES: usize> LineBatches<FIGURES> {
         &self.context
     }
 
-    /// Cuts the work differently.
+    /// Cross-sections the work differently.
     pub fn cut(&mut self, batching: Batching) {
         self.batching = batching;
         self.batch = None;

@@ -1,10 +1,10 @@
-//! The tables of a line's sections and of a car's limits on a device, and what a line kernel is specialised to by them.
+//! The tables of a line's sections and of a car's envelope on a device, and what a line kernel is specialised to by them.
 
 use crate::error::{Error, Result};
 use crate::evaluate::gpu::shader::LineShape;
 use crate::evaluate::gpu::{Binding, DeviceKind, GpuContext, LOOP_ROUNDS, workgroup};
 use crate::line::kernel::Wanted;
-use crate::line::{LimitTable, LinePlan, SectionRow, TERMS};
+use crate::line::{EnvelopeTable, LinePlan, SectionRow, TERMS};
 use bytemuck::{Pod, Zeroable};
 use wgpu::BufferUsages as Usage;
 
@@ -26,7 +26,7 @@ pub struct DeviceSection {
     /// From the right end of this cross-section to that of the next, m.
     pub step: [f32; 2],
     /// From the right end of the cross-section to the left end, m.
-    pub cut: [f32; 2],
+    pub across: [f32; 2],
     /// The part of `alpha` that no variable moves.
     pub constant: f32,
     /// One over the spacing of second differences, 1/m.
@@ -46,7 +46,7 @@ impl DeviceSection {
                 sources: row.sources,
                 weights: row.weights,
                 step: row.step,
-                cut: row.cut,
+                across: row.across,
                 constant: row.constant,
                 inverse_spacing: row.inverse_spacing,
                 until: rows.len() as u32,
@@ -72,14 +72,14 @@ pub(in crate::evaluate) struct LineTables {
 }
 
 impl LineTables {
-    /// The tables of `plan` and `limits` on `context`'s device.
+    /// The tables of `plan` and `envelope` on `context`'s device.
     ///
     /// # Errors
     /// [`Error::Device`] if the sections do not fit the device.
     pub(in crate::evaluate) fn new(
         context: &GpuContext,
         plan: &LinePlan<f32>,
-        limits: &LimitTable<f32>,
+        envelope: &EnvelopeTable<f32>,
         wanted: Wanted,
     ) -> Result<Self> {
         let device = context.limits();
@@ -93,7 +93,7 @@ impl LineTables {
                 .flat_map(|row| [row[0], row[1], 0.0, 0.0])
                 .collect()
         };
-        let (corners, mut ellipse) = (rows_of_four(&limits.corners), rows_of_four(&limits.ellipse));
+        let (corners, mut ellipse) = (rows_of_four(&envelope.corners), rows_of_four(&envelope.ellipse));
         let ellipse_rows = ellipse.len() / 4;
         if ellipse.is_empty() {
             // A binding holds at least what its type takes.
@@ -111,19 +111,19 @@ impl LineTables {
         let fits = |bytes: usize| bytes as u64 <= device.max_uniform_buffer_binding_size;
         let uniform_sections = fits(sections.len());
         // A card reads a uniform table row after row where lanes part; a software driver is faster with it.
-        let uniform_limits = software
-            && [&limits.limits, &corners, &ellipse]
+        let uniform_envelope = software
+            && [&envelope.rows, &corners, &ellipse]
                 .iter()
                 .all(|table| fits(size_of_val(table.as_slice())));
         let shape = LineShape {
             closed: plan.closed,
             terms: plan.terms,
             wanted,
-            limit_rows: limits.limits.len() / 8,
+            envelope_rows: envelope.rows.len() / 8,
             corner_rows: corners.len() / 4,
             ellipse_rows,
             uniform_sections: uniform_sections.then_some(plan.rows.len()),
-            uniform_limits,
+            uniform_envelope,
             workgroup,
             // A card's neighbouring lanes, however many, read together.
             tile: if software && workgroup.is_multiple_of(SOFTWARE_TILE) {
@@ -133,20 +133,20 @@ impl LineTables {
             },
         };
         let table_binding = |uniform: bool| if uniform { Binding::Uniform } else { Binding::Read };
-        let limits_binding = table_binding(uniform_limits);
+        let envelope_binding = table_binding(uniform_envelope);
         let both = Usage::STORAGE | Usage::UNIFORM;
         let table = |label: &str, data: &[f32]| context.buffer_of(label, bytemuck::cast_slice(data), both);
         Ok(Self {
             shape,
             bindings: [
                 table_binding(uniform_sections),
-                limits_binding,
-                limits_binding,
-                limits_binding,
+                envelope_binding,
+                envelope_binding,
+                envelope_binding,
             ],
             buffers: [
                 context.table("sections", sections, Usage::UNIFORM)?,
-                table("limits", &limits.limits)?,
+                table("envelope", &envelope.rows)?,
                 table("corners", &corners)?,
                 table("ellipse", &ellipse)?,
             ],

@@ -113,7 +113,7 @@ fn head(page: &mut HtmlReport, outcome: &Outcome, summary: &Summary, lines: &[&R
     if let Some(fastest) = lines.first() {
         let time = fastest.lap_time_fine_s();
         page.sentence(format!(
-            "The fastest line round {} is the {} line: {time:.2} s over {:.0} m.",
+            "The best lap of {} takes {time:.2} s, on the {} line of {:.0} m.",
             summary.head.subject.track_name(),
             fastest.name,
             fastest.fine.length_m
@@ -261,9 +261,9 @@ fn close_ups(folder: &Path, setup: &Setup, line: &ReportedLine, map: &TrackMap) 
     };
     // A point of the fine line lies at its cross-section's station of the reference line, and so on to the next.
     let station_of = |i: usize| {
-        let (cut, share) = line.fine.section[i];
-        let here = road.station_m[cut.min(road.len() - 1)];
-        let next = road.station_m.get(cut + 1).copied().unwrap_or(road.length_m);
+        let (section, share) = line.fine.section[i];
+        let here = road.station_m[section.min(road.len() - 1)];
+        let next = road.station_m.get(section + 1).copied().unwrap_or(road.length_m);
         here + share * (next - here)
     };
     // In order of travel, also where the stretch goes through the start line.
@@ -352,7 +352,7 @@ fn front(page: &mut HtmlReport, folder: &Path, outcome: &Outcome) -> Result<()> 
 
 /// An objective at the cross-section where its best line bends most and the next; none with fewer than two.
 fn surface(settings: &RacelineSettings, setup: &Setup, found: &ObjectiveOutcome) -> Result<Option<Surface>> {
-    let n = setup.cuts.len();
+    let n = setup.cross_sections.len();
     let axis: Vec<f64> = (0..GRID).map(|i| i as f64 / (GRID - 1) as f64).collect();
     let line = &found.best;
     let bend = |i: usize| {
@@ -361,10 +361,10 @@ fn surface(settings: &RacelineSettings, setup: &Setup, found: &ObjectiveOutcome)
         point.map_or(0.0, |p| line.fine.curvature_1pm[p].abs())
     };
     let bends = (0..n.saturating_sub(1)).map(|i| (i, bend(i)));
-    let Some((cut, _)) = bends.max_by(|a, b| a.1.total_cmp(&b.1)) else {
+    let Some((section, _)) = bends.max_by(|a, b| a.1.total_cmp(&b.1)) else {
         return Ok(None);
     };
-    let pair = Parametrisation::sections().with_free(vec![cut, cut + 1], line.alpha.clone());
+    let pair = Parametrisation::sections().with_free(vec![section, section + 1], line.alpha.clone());
     let problem = setup.problem(pair, &[found.objective], settings)?;
     let grid: Vec<f64> = axis
         .iter()
@@ -374,14 +374,14 @@ fn surface(settings: &RacelineSettings, setup: &Setup, found: &ObjectiveOutcome)
     let mut evaluator = open_line_evaluator(&problem, BackendChoice::Cpu, None)?;
     let costs = evaluator.evaluate(&grid)?.worths(1).into_iter();
     let (name, unit) = (found.objective.name(), found.objective.unit());
-    let label = |i: usize| format!("alpha at {:.1} m", setup.cuts.station_m[i]);
+    let label = |i: usize| format!("alpha at {:.1} m", setup.cross_sections.station_m[i]);
     Ok(Some(Surface {
         title: format!(
             "{}: {name} over the {} line's place on two neighbouring cross-sections",
             setup.track_name, line.name
         ),
-        x_label: label(cut),
-        y_label: label(cut + 1),
+        x_label: label(section),
+        y_label: label(section + 1),
         z_label: with_unit(name, unit),
         y: axis.clone(),
         x: axis,
@@ -389,6 +389,6 @@ fn surface(settings: &RacelineSettings, setup: &Setup, found: &ObjectiveOutcome)
             .map(|worth| if worth.succeeded() { worth.cost } else { f64::NAN })
             .collect(),
         levels: Levels::Basin,
-        marks: vec![(line.name.clone(), [line.alpha[cut], line.alpha[cut + 1]])],
+        marks: vec![(line.name.clone(), [line.alpha[section], line.alpha[section + 1]])],
     }))
 }

@@ -2,9 +2,13 @@ use super::*;
 use crate::track::{Shape, Spacing, Track};
 use std::f64::consts::PI;
 
-fn found(cuts: &CrossSections, objective: LineObjective, settings: &LineSearchSettings) -> FoundLine {
+fn found(
+    cross_sections: &CrossSections,
+    objective: LineObjective,
+    settings: &LineSearchSettings,
+) -> FoundLine {
     let search = LineSearch {
-        cuts,
+        cross_sections,
         objective,
         car: None,
         entry_mps: 0.0,
@@ -20,14 +24,14 @@ fn found(cuts: &CrossSections, objective: LineObjective, settings: &LineSearchSe
 #[test]
 fn the_ring_is_driven_along_the_inside() {
     let ring = Shape::parse("circle:590:600").unwrap().unwrap();
-    let cuts = ring.cross_sections(&Spacing::equal(361)).unwrap();
+    let cross_sections = ring.cross_sections(&Spacing::equal(361)).unwrap();
     let exact = 361.0 * 2.0 * 590.0 * (PI / 361.0).sin();
     for seed in 1..=3 {
         let settings = LineSearchSettings {
             seed,
             ..LineSearchSettings::default()
         };
-        let line = found(&cuts, LineObjective::Length, &settings);
+        let line = found(&cross_sections, LineObjective::Length, &settings);
         let short = line.cost / exact - 1.0;
         assert!((-1e-9..1e-4).contains(&short), "seed {seed}: {short:e}");
     }
@@ -40,11 +44,15 @@ fn circuit(sections: usize) -> CrossSections {
 }
 
 /// The line found is within 0.05 % of the exact shortest one.
-fn is_shortest(cuts: &CrossSections) {
-    let map = crate::optimum::LineMap::at_every_cut(cuts);
-    let bounds = crate::optimum::Bounds::road(cuts.len());
+fn is_shortest(cross_sections: &CrossSections) {
+    let map = crate::optimum::LineMap::at_every_cross_section(cross_sections);
+    let bounds = crate::optimum::Bounds::road(cross_sections.len());
     let exact = crate::optimum::shortest(&map, &bounds).unwrap().value;
-    let line = found(cuts, LineObjective::Length, &LineSearchSettings::default());
+    let line = found(
+        cross_sections,
+        LineObjective::Length,
+        &LineSearchSettings::default(),
+    );
     let short = line.cost / exact - 1.0;
     assert!((-1e-6..5e-4).contains(&short), "{short:e}");
 }
@@ -53,21 +61,21 @@ fn is_shortest(cuts: &CrossSections) {
 #[test]
 fn an_open_road_is_searched_to_its_ends() {
     let part: Vec<usize> = (0..120).collect();
-    let mut cuts = thinned(&circuit(360), &part);
-    cuts.closed = false;
-    is_shortest(&cuts);
+    let mut cross_sections = thinned(&circuit(360), &part);
+    cross_sections.closed = false;
+    is_shortest(&cross_sections);
 }
 
 #[test]
 fn the_same_seed_finds_the_same_line() {
-    let cuts = circuit(120);
+    let cross_sections = circuit(120);
     let quick = LineSearchSettings {
         rounds: 1,
         first_controls: 30,
         ..LineSearchSettings::default()
     };
     let bits = |settings: &LineSearchSettings| -> Vec<u64> {
-        let line = found(&cuts, LineObjective::Gamma, settings);
+        let line = found(&cross_sections, LineObjective::Gamma, settings);
         line.alpha.iter().map(|a| a.to_bits()).collect()
     };
     assert_eq!(bits(&quick), bits(&quick));
