@@ -85,7 +85,7 @@ pub fn write(
     );
     for found in &outcome.objectives {
         if let Some(surface) = surface(settings, setup, found)? {
-            let name = format!("surface_{}.svg", stem(&found.best.name));
+            let name = format!("surface_{}.svg", found.best.stem());
             page.figure(folder.join(name), &surface)?;
         }
     }
