@@ -140,7 +140,8 @@ fn write_cornering(path: &Path, limits: &CarEnvelope) -> Result<()> {
         .write_csv(path)
 }
 
-fn limits_figure(limits: &CarEnvelope, car: &str) -> Curves {
+/// Steady-state cornering, the limits of tyres and engine, the g-g-v diagram and sideslip of a car of this name.
+pub fn envelope_figure(limits: &CarEnvelope, car: &str) -> Curves {
     let speeds = &limits.speeds;
     let v: Vec<f64> = speeds.iter().map(|s| s.row.v_mps).collect();
     let over_speed = |f: &dyn Fn(&EnvelopeAtSpeed) -> f64| speeds.iter().map(f).collect::<Vec<f64>>();
@@ -216,7 +217,7 @@ fn write_page(folder: &Path, outcome: &Outcome, summary: &EnvelopeSummary) -> Re
         "Limits",
         "From steady states of the 4DOF model at each speed. The engine's limit is that of its best gear.",
     );
-    page.figure(folder.join("envelope.svg"), &limits_figure(limits, car))?;
+    page.figure(folder.join("envelope.svg"), &envelope_figure(limits, car))?;
     page.section("The surface", ABOUT_SURFACE);
     page.paragraph(&surface_in_words(&summary.surface, record));
     if let Some(figure) = surface_figure(&outcome.surface, car) {
