@@ -10,8 +10,9 @@ use lapswarm::study::run::RunSettings;
 use lapswarm::study::sensitivity::SensitivitySettings;
 use lapswarm::study::surface::SurfaceSettings;
 use lapswarm::study::transient::TransientSettings;
+use std::io::Write;
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::{Command, Output, Stdio};
 
 fn lapswarm(folder: &Path, arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_lapswarm"))
@@ -19,6 +20,22 @@ fn lapswarm(folder: &Path, arguments: &[&str]) -> Output {
         .current_dir(folder)
         .output()
         .expect("the program starts")
+}
+
+/// As [`lapswarm`], with answers on stdin.
+fn answered(folder: &Path, arguments: &[&str], answers: &str) -> Output {
+    let mut child = Command::new(env!("CARGO_BIN_EXE_lapswarm"))
+        .args(arguments)
+        .current_dir(folder)
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the program starts");
+    let mut stdin = child.stdin.take().expect("its stdin");
+    stdin.write_all(answers.as_bytes()).expect("it reads");
+    drop(stdin);
+    child.wait_with_output().expect("it ends")
 }
 
 fn text(bytes: &[u8]) -> String {
@@ -85,6 +102,89 @@ fn files_to_start_from_are_sound_and_never_overwrite() {
         "{}",
         text(&checked.stdout)
     );
+}
+
+/// The car of a kart, from figures that its driver knows.
+const KART: &str = "mass_kg=160,wheelbase_m=1.04,front_track_m=1.1,rear_track_m=1.15,cg_height_m=0.25,tyre_radius_m=0.135,\
+                    corner_g=1.9,corner_kmh=60,roll_deg_per_g=0.5,power_kw=22,redline_rpm=14000,gears=1,top_speed_kmh=115";
+
+#[test]
+fn a_car_is_made_of_what_is_known_and_compared_with_it() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let made = lapswarm(folder.path(), &["init", "car", "kart.toml", "--set", KART]);
+    assert!(made.status.success(), "{}", text(&made.stderr));
+    assert_eq!(text(&made.stdout), "kart.tir\nkart.toml\n");
+    let checked = lapswarm(folder.path(), &["check", "kart.toml", "--draw", "drawn"]);
+    assert!(checked.status.success(), "{}", text(&checked.stderr));
+    let told = text(&checked.stdout);
+    // What the car does is within a part in a hundred of what was asked.
+    let figures = [
+        ("mass", 160.0),
+        ("wheelbase", 1.04),
+        ("cornering at 60 km/h", 1.9),
+        ("power", 22.0),
+        ("top speed", 115.0),
+    ];
+    for (figure, asked) in figures {
+        let line = told.lines().find(|line| line.trim_start().starts_with(figure));
+        let last = line.and_then(|line| line.split_whitespace().last()?.parse::<f64>().ok());
+        assert!(
+            last.is_some_and(|x| (x / asked - 1.0).abs() < 0.01),
+            "{figure}: {told}"
+        );
+    }
+    assert!(told.contains("understeer gradient"), "{told}");
+    let picture = std::fs::read_to_string(folder.path().join("drawn/kart.svg")).expect("a picture");
+    assert!(picture.contains("<svg") && picture.contains("polyline"));
+    let run = [
+        "envelope",
+        "--car",
+        "kart.toml",
+        "--from-mps",
+        "8",
+        "--to-mps",
+        "30",
+        "--quiet",
+    ];
+    let found = lapswarm(folder.path(), &run);
+    assert!(found.status.success(), "{}", text(&found.stderr));
+
+    // Asked for on stdin: an empty line takes what is shown, one that cannot be is asked for again.
+    let answers = "asked car\nheavy\n-5\n900\n\n";
+    let asked = answered(folder.path(), &["init", "car", "asked.toml", "--ask"], answers);
+    assert!(asked.status.success(), "{}", text(&asked.stderr));
+    let told = text(&asked.stderr);
+    assert_eq!(
+        told.matches("Mass with driver and fuel (50 to 50000 kg) [1245.0]: ")
+            .count(),
+        3,
+        "{told}"
+    );
+    let car = std::fs::read_to_string(folder.path().join("asked.toml")).expect("a car");
+    assert!(
+        car.contains("name = \"asked car\"") && car.contains("mass_kg = 900.0"),
+        "{car}"
+    );
+
+    for (arguments, expected) in [
+        (["init", "car", "a.toml", "--set", "mass=900"], "mass_kg"),
+        (
+            ["init", "car", "a.toml", "--set", "mass_kg=heavy"],
+            "expected a number",
+        ),
+        (["init", "car", "a.toml", "--set", "mass_kg=1"], "50 to 50000"),
+        (
+            ["init", "car", "a.toml", "--set", "corner_g=1,tyre_friction=1"],
+            "not both",
+        ),
+        (["init", "run", "a.toml", "--set", "mass_kg=900"], "init car"),
+    ] {
+        let refused = lapswarm(folder.path(), &arguments);
+        assert_eq!(refused.status.code(), Some(2), "{arguments:?}");
+        let told = text(&refused.stderr);
+        assert!(told.contains(expected), "{arguments:?}: {told}");
+        assert!(!folder.path().join("a.toml").exists());
+    }
 }
 
 #[test]
