@@ -182,7 +182,7 @@ pub fn envelope_figure(limits: &CarEnvelope, car: &str) -> Curves {
         .curve("engine", &v, &over_speed(&|s| s.engine_mps2))
         .curve("drag", &v, &over_speed(&|s| s.row.drag_mps2));
     Curves::new(
-        format!("g-g-v envelope of the {car}"),
+        format!("g-g-v envelope: {car}"),
         [cornering, limits, diagram, sideslip],
     )
 }
@@ -190,7 +190,7 @@ pub fn envelope_figure(limits: &CarEnvelope, car: &str) -> Curves {
 fn write_page(folder: &Path, outcome: &Outcome, summary: &EnvelopeSummary) -> Result<()> {
     let limits = &outcome.limits;
     let (car, record) = (&summary.head.subject.car, &summary.head.record);
-    let mut page = HtmlReport::new(&summary.head.study, &format!("g-g-v envelope of the {car}"));
+    let mut page = HtmlReport::new(&summary.head.study, &format!("g-g-v envelope: {car}"));
     if let (Some(slow), Some(fast)) = (limits.speeds.first(), limits.speeds.last()) {
         page.sentence(format!(
             "The {car} corners at up to {:.1} m/s\u{b2} at {:.0} m/s and {:.1} m/s\u{b2} at {:.0} m/s, brakes at up to {:.1} and \
