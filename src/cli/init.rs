@@ -1,9 +1,9 @@
 //! `lapswarm init`: commented files to start from.
 
+use super::write_new;
 use crate::cli::output::{errln, outln, to_stderr};
 use clap::builder::PossibleValuesParser;
 use lapswarm::config::settings::{Settings, Written};
-use lapswarm::files;
 use lapswarm::study::registry;
 use lapswarm::vehicle::{Car, CarFacts};
 use lapswarm::{Error, Result};
@@ -39,17 +39,6 @@ fn after_help() -> String {
     text + "\nExamples:\n  lapswarm init identify study.toml\n  lapswarm init car gt.toml\n  \
             lapswarm init car my_car.toml --ask\n  \
             lapswarm init car kart.toml --set mass_kg=160,wheelbase_m=1.04,corner_g=1.9,power_kw=22,top_speed_kmh=115"
-}
-
-/// Writes a file that must not be there yet.
-fn write_new(path: &Path, text: &str) -> Result<()> {
-    files::write_new(path, text.as_bytes()).map_err(|error| match error {
-        Error::Io { source, .. } if source.kind() == std::io::ErrorKind::AlreadyExists => {
-            let expected = "a file that does not exist: nothing is overwritten";
-            Error::input(path, "FILE", "a file", expected)
-        }
-        error => error,
-    })
 }
 
 /// What is known of a car, from `--set` and from answers.
@@ -135,7 +124,7 @@ fn make_car(path: &Path, arguments: &Arguments) -> Result<()> {
         } else {
             path.with_file_name(name)
         };
-        write_new(&path, text)?;
+        write_new(&path, text.as_bytes())?;
         outln!("{}", path.display());
     }
     Ok(())
@@ -170,10 +159,10 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     }
     if what == "car" {
         let tyre = path.with_file_name("gt_slick.tir");
-        write_new(&tyre, Car::BUNDLED_TYRE)?;
+        write_new(&tyre, Car::BUNDLED_TYRE.as_bytes())?;
         outln!("{}", tyre.display());
     }
-    write_new(&path, &text)?;
+    write_new(&path, text.as_bytes())?;
     outln!("{}", path.display());
     Ok(())
 }

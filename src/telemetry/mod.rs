@@ -22,6 +22,7 @@ mod csv_native;
 mod delays;
 mod derived;
 mod driven;
+mod export;
 mod laps;
 mod log;
 mod make_log;
@@ -42,6 +43,7 @@ pub use calibration::{Calibration, CalibrationOptions, Finding, FindingKind, Swi
 pub use channel_map::{Axle, ChannelEntry, ChannelMap, Mapped};
 pub use csv_native::{COLUMNS, NativeFormat, write_native};
 pub use driven::DrivenLap;
+pub use export::{LapChannel, LapLabels, SampledLap};
 pub use laps::Lap;
 pub use log::{Log, LogOptions};
 pub use recording::{Channel, Clock, Format, Metadata, Recording, Unreadable};

@@ -188,6 +188,56 @@ fn a_car_is_made_of_what_is_known_and_compared_with_it() {
 }
 
 #[test]
+fn laps_are_exported_as_loggers_write_them() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let root = folder.path();
+    let simulated = lapswarm(
+        root,
+        &[
+            "simulate",
+            "--track",
+            "stadium:300:80:12",
+            "--out",
+            "lap",
+            "--quiet",
+        ],
+    );
+    assert!(simulated.status.success(), "{}", text(&simulated.stderr));
+    let exported = lapswarm(root, &["export", "lap", "lap/lap.csv", "--rate", "20", "--json"]);
+    assert!(exported.status.success(), "{}", text(&exported.stderr));
+    let said: serde_json::Value = serde_json::from_slice(&exported.stdout).expect("JSON");
+    let names: Vec<&str> = said["files"]
+        .as_array()
+        .expect("files")
+        .iter()
+        .filter_map(|f| f.as_str())
+        .collect();
+    let wanted = [
+        "lap_lap.csv",
+        "lap_lap.ld",
+        "lap_lap.ldx",
+        "lap.csv",
+        "lap.ld",
+        "lap.ldx",
+    ];
+    assert_eq!(names, wanted.map(|name| format!("export/{name}")));
+    for name in ["export/lap.ld", "export/lap.csv"] {
+        let checked = lapswarm(root, &["check", "--kind", "log", name]);
+        let told = text(&checked.stdout);
+        assert!(
+            checked.status.success() && told.contains("at 20 Hz"),
+            "{told} {}",
+            text(&checked.stderr)
+        );
+    }
+    let again = lapswarm(root, &["export", "lap/lap.csv"]);
+    assert_eq!(again.status.code(), Some(2));
+    assert!(text(&again.stderr).contains("nothing is overwritten"));
+    let line = lapswarm(root, &["export", "lap/manifest.json", "--out", "other"]);
+    assert_eq!(line.status.code(), Some(2), "{}", text(&line.stderr));
+}
+
+#[test]
 fn the_study_file_of_every_run_folder_is_taken_for_what_it_is() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     std::fs::write(folder.path().join("ring.csv"), ring()).expect("a line");
@@ -439,7 +489,7 @@ fn completions_name_every_command() {
     let printed = lapswarm(folder.path(), &["completions", "bash"]);
     let script = text(&printed.stdout);
     let others = [
-        "parity", "bench", "check", "init", "sweep", "simulate", "report", "devices",
+        "parity", "bench", "check", "init", "sweep", "simulate", "report", "export", "devices",
     ];
     for command in registry::names().into_iter().chain(others) {
         assert!(script.contains(command), "{command}");
