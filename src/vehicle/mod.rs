@@ -8,6 +8,7 @@ pub mod car;
 pub mod chassis;
 pub mod envelope;
 pub mod hybrid;
+pub mod limits;
 pub mod loads;
 pub mod model;
 pub mod modes;
