@@ -5,6 +5,7 @@
 //! row. The figures are a start to be fitted to a log, not measurements.
 
 use super::chassis::Chassis;
+use super::limits::STEER_TO_GRIP;
 use super::parameters::ParameterInfo;
 use super::powertrain::{Differential, Powertrain};
 use super::steady::{Turn, steady_car};
@@ -39,7 +40,7 @@ settings! {
             "Greatest lateral acceleration at corner_kmh; the tyres are scaled to it";
         corner_kmh: f64 ["km/h"] = 70.0, number(15.0, 350.0),
             "Speed at which corner_g is reached";
-        tyre_friction: Option<f64> ["-"] = None, optional(number(0.2, 3.0)).example("1.2"),
+        tyre_friction: Option<f64> ["-"] = None, optional(number(0.2, MOST_FRICTION)).example("1.2"),
             "Peak lateral friction of a tyre under the load at rest, in place of corner_g";
         roll_deg_per_g: f64 ["deg/g"] = 3.0, number(0.05, 15.0),
             "Roll angle over lateral acceleration";
@@ -93,8 +94,10 @@ const TORQUE: [(f64, f64); 8] = [
 ];
 /// First gear over top gear, for each gear more.
 const GEAR_SPAN: f64 = 0.36;
-/// Road-wheel angle up to which the grip is looked for (rad).
-const STEER_TO_GRIP: f64 = 0.6;
+/// Largest drag area that is taken from power and top speed, over the track squared: that of a box as high as wide.
+const MOST_DRAG: f64 = 1.2;
+/// Peak friction that no tyre has.
+const MOST_FRICTION: f64 = 3.0;
 
 impl CarFacts {
     /// What the table `[asked]` of a car's file says that the car was made of, if it has one.
@@ -150,9 +153,10 @@ impl CarFacts {
         let rolling = m * G * self.cg_height_m;
         let roll_stiffness = rolling * (1.0 + 1.0 / self.roll_deg_per_g.to_radians());
         let top_mps = self.top_speed_kmh / 3.6;
+        // Where more power than any drag takes is left, gears end the speed.
         let drag_area = self
             .drag_area_m2
-            .unwrap_or_else(|| 2e3 * EFFICIENCY * self.power_kw / (AIR * top_mps.powi(3)));
+            .unwrap_or_else(|| (self.drive_w() / air_w(top_mps)).min(MOST_DRAG * track.powi(2)));
         let chassis = Chassis {
             mass: m,
             cg_to_front: a,
@@ -185,7 +189,7 @@ impl CarFacts {
             tyres: base.tyres,
             steering_ratio: self.steering_ratio,
             max_steer_rad: 0.5,
-            powertrain: Some(self.powertrain(top_mps)),
+            powertrain: Some(self.powertrain(top_mps, drag_area)),
             hybrid: None,
             chassis,
         };
@@ -200,7 +204,15 @@ impl CarFacts {
         Ok(car)
     }
 
-    fn powertrain(&self, top_mps: f64) -> Powertrain {
+    /// Greatest power at the wheels (W).
+    fn drive_w(&self) -> f64 {
+        1e3 * EFFICIENCY * self.power_kw
+    }
+
+    fn powertrain(&self, top_mps: f64, drag_area: f64) -> Powertrain {
+        let at_redline = TORQUE[TORQUE.len() - 1].1 / AT_TOP_SPEED;
+        let geared = drag_area * air_w(top_mps) < at_redline * self.drive_w();
+        let top_rpm = if geared { 1.0 } else { AT_TOP_SPEED } * self.redline_rpm;
         let greatest = 1e3 * self.power_kw / (AT_TOP_SPEED * self.redline_rpm * TAU / 60.0);
         let wheel_rpm = top_mps / self.tyre_radius_m * 60.0 / TAU;
         let first = 1.0 + GEAR_SPAN * (self.gears - 1) as f64;
@@ -209,7 +221,7 @@ impl CarFacts {
             engine_speed_rpm: TORQUE.map(|(speed, _)| speed * self.redline_rpm).into(),
             torque_nm: TORQUE.map(|(_, torque)| torque * greatest).into(),
             gear_ratios: (0..self.gears).map(|gear| first.powf(step(gear))).collect(),
-            final_drive: AT_TOP_SPEED * self.redline_rpm / wheel_rpm,
+            final_drive: top_rpm / wheel_rpm,
             efficiency: EFFICIENCY,
             engine: None,
             differential: Differential::default(),
@@ -223,27 +235,30 @@ impl CarFacts {
             scale_grip(&mut car, scale);
             corner_g_of(&car, self.corner_kmh)
         };
+        let at_rest = friction_at_rest(car);
         let mut scale = 1.0;
         for _ in 0..40 {
             let found = reached(scale);
             if (found / corner_g - 1.0).abs() < 1e-3 {
                 return Ok(scale);
             }
-            if found <= 0.0 {
-                break;
-            }
             // Cornering is nearly in proportion to the friction.
             scale *= (corner_g / found).clamp(0.5, 2.0);
-            if !(0.02..10.0).contains(&scale) {
+            if found <= 0.0 || scale * at_rest > MOST_FRICTION {
                 break;
             }
         }
         Err(Error::Study(format!(
-            "no tyre brings {} to {corner_g} g at {} km/h: it would lift its inner wheels or slide first; ask for less, for a lower \
-             centre of gravity or for more downforce",
+            "no tyre with a friction of up to {MOST_FRICTION} brings {} to {corner_g} g at {} km/h: ask for less, for a lower centre of \
+             gravity or for more downforce",
             self.name, self.corner_kmh
         )))
     }
+}
+
+/// Power that the air takes from a drag area of 1 m^2 at a speed (m/s), W.
+fn air_w(speed_mps: f64) -> f64 {
+    0.5 * AIR * speed_mps.powi(3)
 }
 
 /// Greatest lateral acceleration in steady-state cornering at a speed (km/h), in g; 0 where there is no steady state.

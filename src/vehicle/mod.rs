@@ -9,6 +9,7 @@ pub mod chassis;
 pub mod envelope;
 pub mod facts;
 pub mod hybrid;
+pub mod limits;
 pub mod loads;
 pub mod model;
 pub mod modes;

@@ -1,8 +1,9 @@
 //! A car's figures beside those that it was made from, and its picture.
 
 use lapswarm::report::{Figure, Table};
-use lapswarm::study::envelope::{EnvelopeAtSpeed, EnvelopeSettings, car_envelope, envelope_figure};
+use lapswarm::study::envelope::envelope_figure;
 use lapswarm::vehicle::facts::{corner_g_of, friction_at_rest, top_speed_kmh};
+use lapswarm::vehicle::limits::{EnvelopeAtSpeed, SpeedRange, car_envelope};
 use lapswarm::vehicle::{Car, CarFacts};
 use lapswarm::{Error, Result};
 use std::f64::consts::TAU;
@@ -58,13 +59,12 @@ pub fn draw(path: &Path, folder: &Path) -> Result<String> {
     let car = Car::load(&path.display().to_string())?;
     let top = top_speed_kmh(&car).unwrap_or(250.0) / 3.6;
     let from_mps = (0.25 * top).max(3.0);
-    let settings = EnvelopeSettings {
+    let range = SpeedRange {
         from_mps,
         to_mps: top.max(from_mps + 1.0),
         step_mps: (top - from_mps).max(1.0) / SPEEDS,
-        ..EnvelopeSettings::default()
     };
-    let limits = car_envelope(&car, &settings)?;
+    let limits = car_envelope(&car, &range)?;
     std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, "create", e))?;
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
     let picture = folder.join(format!("{stem}.svg"));

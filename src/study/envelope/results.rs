@@ -1,10 +1,11 @@
 //! Tables and figures of a car's g-g-v envelope.
 
-use super::{CarEnvelope, EnvelopeAtSpeed, Handling, Outcome, SteadySurface, SurfaceFigures};
+use super::{EnvelopeStudy, Outcome, SteadySurface, SurfaceFigures};
 use crate::error::Result;
 use crate::evaluate::{Failure, failures_in_words};
 use crate::report::{Curves, HtmlReport, Levels, Panel, Surface, Table, write_whole};
-use crate::study::framework::{Head, RunRecord};
+use crate::study::framework::{Head, RunRecord, Solved};
+use crate::vehicle::limits::{CarEnvelope, EnvelopeAtSpeed, Handling, in_words};
 use crate::vehicle::{EnvelopeRow, Trim};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -33,16 +34,16 @@ pub struct EnvelopeSummary {
 }
 
 /// Puts the figures together.
-pub(super) fn summarise(head: Head, outcome: &Outcome) -> EnvelopeSummary {
-    let limits = &outcome.limits;
+pub(super) fn summarise(solved: &Solved<'_, EnvelopeStudy>) -> EnvelopeSummary {
+    let Outcome { limits, surface, .. } = solved.outcome;
     EnvelopeSummary {
-        head,
+        head: solved.head(),
         steady_states: limits.speeds.iter().map(|s| s.cornering.len()).sum(),
         top_speed_mps: limits.envelope.top_speed_mps(),
         handling: limits.handling,
         limits: limits.envelope.rows().to_vec(),
         notes: notes(limits),
-        surface: outcome.surface.summary.clone(),
+        surface: surface.summary.clone(),
     }
 }
 
@@ -52,7 +53,7 @@ fn notes(limits: &CarEnvelope) -> Vec<String> {
     if !limits.left_out_mps.is_empty() {
         notes.push(format!(
             "The car has no steady state in bends at {}: these speeds are left out.",
-            super::in_words(&limits.left_out_mps)
+            in_words(&limits.left_out_mps)
         ));
     }
     let left = |s: &EnvelopeAtSpeed| s.cornering.iter().map(|t| t.ay_mps2).fold(0.0, f64::max);
