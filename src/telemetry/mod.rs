@@ -18,6 +18,7 @@ mod build;
 mod calibrate;
 mod calibration;
 mod channel_map;
+mod csv_headed;
 mod csv_native;
 mod delays;
 mod derived;
