@@ -108,6 +108,14 @@ impl DeviceSummary {
     }
 }
 
+impl DeviceSummary {
+    /// Whether its name contains `name`, regardless of case, or `name` is its place on the PCI bus.
+    pub(super) fn is_called(&self, name: &str) -> bool {
+        let name = name.trim().to_lowercase();
+        self.name.to_lowercase().contains(&name) || self.pci_bus_id.to_lowercase() == name
+    }
+}
+
 impl fmt::Display for DeviceSummary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{} ({}, {})", self.name, self.backend, self.kind)
@@ -173,9 +181,9 @@ fn pick(present: &[DeviceSummary], wanted: Option<&str>) -> Result<usize> {
         .rsplit_once('#')
         .and_then(|(name, number)| Some((name, number.parse().ok()?)));
     let (name, number): (&str, usize) = numbered.unwrap_or((wanted, 1));
-    let key = name.to_lowercase();
-    let fits = |s: &DeviceSummary| s.name.to_lowercase().contains(&key) || s.pci_bus_id.to_lowercase() == key;
-    let fitting: Vec<usize> = (0..present.len()).filter(|i| fits(&present[*i])).collect();
+    let fitting: Vec<usize> = (0..present.len())
+        .filter(|i| present[*i].is_called(name))
+        .collect();
     let place = number.checked_sub(1).and_then(|k| fitting.get(k).copied());
     place.ok_or_else(|| {
         let list = |places: &[usize]| {
