@@ -181,7 +181,16 @@ impl Car {
     /// # Errors
     /// [`Error::Io`] if a file cannot be written.
     pub fn write(&self, folder: &Path, stem: &str) -> Result<()> {
-        let mut text = format!("name = {}\n\n[chassis]\n", toml_string(&self.name));
+        self.write_with(folder, stem, "")
+    }
+
+    /// As [`Car::write`], with a comment of some lines at the head of the car's file.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if a file cannot be written.
+    pub fn write_with(&self, folder: &Path, stem: &str, comment: &str) -> Result<()> {
+        let mut text: String = comment.lines().map(|line| format!("# {line}\n")).collect();
+        text.push_str(&format!("name = {}\n\n[chassis]\n", toml_string(&self.name)));
         push_parameters(&mut text, Chassis::<f64>::PARAMETERS, &self.chassis.to_flat());
         match &self.tyres {
             Tyres::MagicFormula { front, rear } if front == rear => {

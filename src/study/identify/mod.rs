@@ -3,6 +3,7 @@
 mod coordinates;
 mod hops;
 mod identifiability;
+mod notes;
 mod page;
 mod polish;
 mod refine;
@@ -11,8 +12,9 @@ mod search;
 mod settings;
 mod setup;
 mod state;
+mod verdict;
 
-pub use identifiability::{Identifiability, judge};
+pub use identifiability::{Group, Identifiability, judge};
 pub use polish::{Polished, polish};
 pub use results::Summary;
 pub use search::{Judged, Outcome, judge_candidate, search_with, total_parameter_error};
@@ -20,6 +22,7 @@ pub use settings::{Algorithm, FreeParameter, IdentifySettings, ObjectiveChoice};
 pub use setup::{Setup, cost_unit, lap_format, set_up};
 pub(in crate::study) use setup::{planned, subject, without_laps};
 pub use state::{Front, HistoryRow, SearchState};
+pub use verdict::{Untold, Verdict};
 
 use crate::config::settings::Settings;
 use crate::error::{Error, Result};
@@ -142,11 +145,8 @@ impl Study for Identify {
         outcome: &Outcome,
         summary: &Summary,
     ) -> Result<()> {
-        let car = setup
-            .replay
-            .free
-            .candidate_car(&results::reported_candidate(setup, outcome));
-        car.write(folder, "car")?;
+        let car = setup.replay.free.candidate_car(&outcome.candidate);
+        car.write_with(folder, "car", &results::car_comment(&setup.log.source, summary))?;
         results::write_history(folder, outcome)?;
         results::write_parameters(folder, summary)?;
         if let Some(front) = &outcome.front {

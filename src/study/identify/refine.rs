@@ -59,7 +59,7 @@ pub(super) fn refine(
         let Some(residuals) = replay.residuals(&refined.candidate) else {
             return Ok(refined);
         };
-        let noise = noise_of(&residuals.errors, &setup.scales);
+        let noise = noise_of(&residuals.errors, &setup.scales, replay.dimensions());
         if (0..CHANNELS).all(|k| noise[k] < EXACT * setup.scales[k]) {
             return Ok(refined);
         }

@@ -7,7 +7,7 @@ use super::settings::{Algorithm, EXPLORE, FRONT, GATHER, IdentifySettings};
 use super::setup::{CHANNELS, Setup};
 use super::state::{Front, HistoryRow, Place, SearchState, inputs_of};
 use crate::error::{Error, Result};
-use crate::evaluate::replay::{ReplayProblem, trace};
+use crate::evaluate::replay::{ReplayProblem, Residuals, trace};
 use crate::evaluate::{Evaluator, FailureCounts, add_failures};
 use crate::study::framework::state_file::{Origin, StateFile};
 use crate::study::framework::{DeviceFaults, Progress as Told, RunRecord, Watch};
@@ -134,6 +134,8 @@ pub fn search_with(
     let residuals = replay
         .residuals(&candidate)
         .ok_or_else(|| nothing_yet(nothing_drives(), interrupted))?;
+    let (candidate, mut residuals) = as_given_without_effect(replay, candidate, residuals);
+    residuals.start_errors = replay.start_errors(&candidate);
     let polish_s = polish_began.elapsed().as_secs_f64();
     let mut record = RunRecord::of(&backend);
     record.failures = state.failures;
@@ -235,6 +237,30 @@ fn best_so_far(place: &Place, evaluator: &mut dyn Evaluator) -> Result<(Vec<f64>
         return Err(nothing_drives());
     }
     Ok((best, None))
+}
+
+/// The candidate with the starting car's value of each parameter that changes nothing on this log: the search left it anywhere
+/// between its bounds.
+fn as_given_without_effect(
+    replay: &ReplayProblem,
+    candidate: Vec<f64>,
+    residuals: Residuals,
+) -> (Vec<f64>, Residuals) {
+    let given = replay.free.values_in(replay.free.base());
+    let mut changed = candidate.clone();
+    for (k, v) in replay.problem.variables.iter().enumerate() {
+        let without_effect = residuals.columns[k].iter().all(|slope| *slope == 0.0);
+        if without_effect && (v.lower..=v.upper).contains(&given[k]) {
+            changed[k] = given[k];
+        }
+    }
+    if changed == candidate {
+        return (candidate, residuals);
+    }
+    match replay.residuals(&changed) {
+        Some(same) if same.errors == residuals.errors => (changed, same),
+        _ => (candidate, residuals),
+    }
 }
 
 fn nothing_drives() -> Error {
