@@ -33,6 +33,9 @@ pub(super) fn errors(replay: &ReplayProblem, candidates: &[&[f64]]) -> Vec<Optio
         .collect()
 }
 
+/// How far ahead of a window a car is driven to find the state in which it comes there, s.
+const RUN_AHEAD_S: f64 = 6.0;
+
 /// See [`ReplayProblem::start_errors`].
 pub(super) fn start_errors(replay: &ReplayProblem, flat: &[f64]) -> Vec<f64> {
     match replay.tyre_model() {
@@ -51,13 +54,11 @@ fn start_errors_on<T: Tyre<f64>>(replay: &ReplayProblem, flat: &[f64]) -> Vec<f6
         });
         drives.then_some((outputs, state))
     };
+    let reach = (RUN_AHEAD_S / replay.interval_s).round() as usize;
     let differences = |window: &Window<f64>| {
-        let mut ahead = plan.samples[..window.start]
-            .iter()
-            .rev()
-            .take(2 * window.scored_from);
-        let reach = ahead.position(|s| s.measured[0] < replay.slowest_mps);
-        let reach = reach.unwrap_or(window.start.min(2 * window.scored_from));
+        let mut ahead = plan.samples[..window.start].iter().rev().take(reach);
+        let slow = ahead.position(|s| s.measured[0] < replay.slowest_mps);
+        let reach = slow.unwrap_or(window.start.min(reach));
         let begin = window.start - reach;
         let before = Window {
             start: begin,
@@ -74,7 +75,7 @@ fn start_errors_on<T: Tyre<f64>>(replay: &ReplayProblem, flat: &[f64]) -> Vec<f6
         let both = from_own.into_iter().zip(from_log).skip(window.scored_from);
         Some(
             both.flat_map(|(own, log)| std::array::from_fn::<f64, CHANNELS, _>(|k| own[k] - log[k]))
-                .collect(),
+                .collect::<Vec<f64>>(),
         )
     };
     let by_window = plan.windows.par_iter().map(|window| {

@@ -146,8 +146,8 @@ impl ReplayProblem {
     }
 
     /// By how much the errors of a candidate, in the order of [`super::Residuals::errors`], would differ if every window began in
-    /// the state in which the candidate comes there from further ahead, by twice the stretch that is not scored. Zero where the
-    /// log has nothing ahead, or the candidate does not come through it.
+    /// the state in which the candidate comes there from six seconds ahead. Zero where the log has nothing ahead, or the candidate
+    /// does not come through it.
     pub fn start_errors(&self, candidate: &[f64]) -> Vec<f64> {
         super::cpu::start_errors(self, &self.flat(candidate))
     }

@@ -258,7 +258,7 @@ mod tests {
         let random = Random::new(8);
         let (mut squares, draws) = (0.0, 4000);
         for draw in 0..draws {
-            let normal = |purpose, i| random.normal(purpose, draw, i as u32, 0);
+            let normal = |purpose: u32, i: usize| random.normal(purpose, draw, i as u32, 0);
             let rows = 2 * CHANNELS;
             let column: Vec<f64> = (0..rows).map(|i| normal(1, i)).collect();
             let noise: Vec<f64> = (0..rows).map(|i| normal(2, i)).collect();

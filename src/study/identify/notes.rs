@@ -18,16 +18,16 @@ pub(super) fn notes(setup: &Setup, summary: &Summary) -> Vec<String> {
     let word = Failure::StepTooLong.word();
     if let Some(lost) = summary.record.failures.get(word) {
         notes.push(format!(
-            "{lost} candidates were lost only because {taken} steps per sample are too long for them. If stiff cars are to be \
-             found, fit with substeps = {}, which suits each parameter up to its bounds.",
+            "{lost} candidates were lost that need more than the {taken} steps per sample taken: they may be no worse than others. If \
+             stiff cars are to be found, fit with substeps = {}, which suits each parameter up to its bounds.",
             steps_at_bounds(&setup.replay)
         ));
     }
     if setup.without_run_up > 0 {
+        let (settle_s, places) = (setup.settle_s, setup.without_run_up);
         notes.push(format!(
-            "Sideslip and roll are not logged. Windows are driven for {:.1} s before they are scored; {} of the stretches fitted \
-             begin where the log has nothing to drive ahead, and their first {:.1} s do not count.",
-            setup.settle_s, setup.without_run_up, setup.settle_s
+            "Sideslip and roll are not logged, so that each window is driven for {settle_s:.1} s before it is scored. The log has no \
+             such time ahead of {places} of the laps or sections fitted: their first {settle_s:.1} s do not count."
         ));
     }
     notes

@@ -4,7 +4,7 @@ use super::results::Summary;
 use serde::{Deserialize, Serialize};
 
 /// What may be said of the unknowns. Each says less than the next.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
     /// Nothing: the car is at no minimum of the cost, and standard errors hold near a minimum only.
