@@ -1,7 +1,7 @@
 //! The reference backend: `f64`, one candidate after another, threads by rayon.
 
 use super::kernel::{CHANNELS, drive_window, score_window};
-use super::plan::{Plan, Window, initial_state};
+use super::plan::{Plan, Window};
 use super::problem::ReplayProblem;
 use crate::vehicle::tyre::Tyre;
 use crate::vehicle::{CarModel, LinearTyre, MagicFormula, TyreModel};
@@ -31,58 +31,6 @@ pub(super) fn errors(replay: &ReplayProblem, candidates: &[&[f64]]) -> Vec<Optio
         .par_iter()
         .map(|candidate| errors(replay, candidate))
         .collect()
-}
-
-/// How far ahead of a window a car is driven to find the state in which it comes there, s.
-const RUN_AHEAD_S: f64 = 6.0;
-
-/// See [`ReplayProblem::start_errors`].
-pub(super) fn start_errors(replay: &ReplayProblem, flat: &[f64]) -> Vec<f64> {
-    match replay.tyre_model() {
-        TyreModel::MagicFormula => start_errors_on::<MagicFormula<f64>>(replay, flat),
-        TyreModel::Linear => start_errors_on::<LinearTyre<f64>>(replay, flat),
-    }
-}
-
-fn start_errors_on<T: Tyre<f64>>(replay: &ReplayProblem, flat: &[f64]) -> Vec<f64> {
-    let plan = &replay.plan;
-    let car = CarModel::<f64, T>::from_parameters(|i| flat[i]);
-    let driven = |window: &Window<f64>| {
-        let mut outputs = Vec::with_capacity(window.end - window.start);
-        let (drives, state) = drive_window(&car, plan, window, |_: usize, output: [f64; CHANNELS]| {
-            outputs.push(output)
-        });
-        drives.then_some((outputs, state))
-    };
-    let reach = (RUN_AHEAD_S / replay.interval_s).round() as usize;
-    let differences = |window: &Window<f64>| {
-        let mut ahead = plan.samples[..window.start].iter().rev().take(reach);
-        let slow = ahead.position(|s| s.measured[0] < replay.slowest_mps);
-        let reach = slow.unwrap_or(window.start.min(reach));
-        let begin = window.start - reach;
-        let before = Window {
-            start: begin,
-            end: window.start + 1,
-            scored_from: 0,
-            initial: initial_state(&plan.samples[begin]),
-        };
-        let (_, state) = (reach > 0).then(|| driven(&before)).flatten()?;
-        let own = Window {
-            initial: state.to_array(),
-            ..*window
-        };
-        let ((from_own, _), (from_log, _)) = (driven(&own)?, driven(window)?);
-        let both = from_own.into_iter().zip(from_log).skip(window.scored_from);
-        Some(
-            both.flat_map(|(own, log)| std::array::from_fn::<f64, CHANNELS, _>(|k| own[k] - log[k]))
-                .collect::<Vec<f64>>(),
-        )
-    };
-    let by_window = plan.windows.par_iter().map(|window| {
-        let scored = window.end - window.start - window.scored_from;
-        differences(window).unwrap_or_else(|| vec![0.0; scored * CHANNELS])
-    });
-    by_window.collect::<Vec<Vec<f64>>>().concat()
 }
 
 /// The four compared outputs at every sample of `window`, and whether the car drove to its end.

@@ -17,9 +17,6 @@ pub struct Residuals {
     pub errors: Vec<f64>,
     /// For each free parameter, the derivative of every error to it.
     pub columns: Vec<Vec<f64>>,
-    /// By how much the errors depend on what is not known where windows begin ([`ReplayProblem::start_errors`]); empty where that
-    /// was not asked for.
-    pub start_errors: Vec<f64>,
 }
 
 /// A drive through all windows with the derivatives to `CHUNK` parameters from `first`; `None` if the car is lost.
@@ -95,10 +92,6 @@ impl ReplayProblem {
             .map(|i| chunks[i / CHUNK].iter().map(|e| e.gradient[i % CHUNK]).collect())
             .collect();
         let finite = |column: &Vec<f64>| column.iter().all(|x| x.is_finite());
-        (finite(&errors) && columns.iter().all(finite)).then_some(Residuals {
-            errors,
-            columns,
-            start_errors: Vec::new(),
-        })
+        (finite(&errors) && columns.iter().all(finite)).then_some(Residuals { errors, columns })
     }
 }

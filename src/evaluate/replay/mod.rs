@@ -8,6 +8,7 @@ pub mod kernel;
 mod plan;
 mod problem;
 mod simd;
+mod starts;
 
 pub use super::{BackendChoice, ModelTable};
 pub use crate::evaluate::open_evaluator;

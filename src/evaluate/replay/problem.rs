@@ -145,13 +145,6 @@ impl ReplayProblem {
         }
     }
 
-    /// By how much the errors of a candidate, in the order of [`super::Residuals::errors`], would differ if every window began in
-    /// the state in which the candidate comes there from six seconds ahead. Zero where the log has nothing ahead, or the candidate
-    /// does not come through it.
-    pub fn start_errors(&self, candidate: &[f64]) -> Vec<f64> {
-        super::cpu::start_errors(self, &self.flat(candidate))
-    }
-
     /// The cost of each channel from the errors of all windows (summed, or their maxima).
     pub fn channel_costs(&self, errors: &[f64; CHANNELS]) -> [f64; CHANNELS] {
         let scored: usize = self

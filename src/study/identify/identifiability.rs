@@ -12,8 +12,8 @@ pub struct Identifiability {
     /// Singular values of the Jacobian, greatest first; rows in standard deviations of the noise, columns in
     /// ranges of the bounds.
     pub singular_values: Vec<f64>,
-    /// Standard error of each parameter, in its unit: the Cramer-Rao bound for white noise, and how far the parameter would move
-    /// if windows began where the car itself comes. Infinite where the log says nothing.
+    /// Standard error of each parameter by the Cramer-Rao bound for white noise, in its unit; infinite where the
+    /// log says nothing.
     pub standard_errors: Vec<f64>,
     /// Whether each parameter can be told by itself.
     pub identifiable: Vec<bool>,
@@ -134,28 +134,17 @@ pub fn judge(
         residuals.errors[i] / noise[i % CHANNELS]
     });
     // The triangular factor has the singular values and right vectors of the whole, and is small.
-    let whole = matrix.clone().qr();
-    let svd = whole.r().svd(true, true);
+    let svd = matrix.clone().qr().r().svd(false, true);
     let values = svd.singular_values;
-    let [left, vectors] = [svd.u, svd.v_t].map(|m| m.unwrap_or_else(|| DMatrix::identity(d, d)));
-    let mut starts = DVector::from_fn(residuals.errors.len(), |i, _| {
-        residuals
-            .start_errors
-            .get(i)
-            .map_or(0.0, |e| e / noise[i % CHANNELS])
-    });
-    whole.q_tr_mul(&mut starts);
-    let starts = left.tr_mul(&starts.rows(0, d));
+    let vectors = svd.v_t.unwrap_or_else(|| DMatrix::identity(d, d));
     let greatest = values.iter().copied().fold(0.0, f64::max);
     let mut variance = DVector::<f64>::zeros(d);
-    let mut moved = DVector::<f64>::zeros(d);
     let mut null_share = DVector::<f64>::zeros(d);
     for (j, value) in values.iter().enumerate() {
         for k in 0..d {
             let share = vectors[(j, k)].powi(2);
             if *value > ZERO * greatest {
                 variance[k] += share / (value * value);
-                moved[k] += vectors[(j, k)] * starts[j] / value;
             } else {
                 null_share[k] += share;
             }
@@ -167,7 +156,7 @@ pub fn judge(
             if blind(k) {
                 f64::INFINITY
             } else {
-                ranges[k] * variance[k].sqrt().hypot(moved[k])
+                ranges[k] * variance[k].sqrt()
             }
         })
         .collect();
@@ -228,7 +217,6 @@ mod tests {
         Residuals {
             errors: draws(100),
             columns: (0..unknowns as u32).map(draws).collect(),
-            start_errors: Vec::new(),
         }
     }
 
@@ -295,16 +283,5 @@ mod tests {
         residuals.columns.remove(1);
         let verdict = judged(&residuals);
         assert!(verdict.identifiable == [true; 2] && verdict.groups.is_empty());
-    }
-
-    #[test]
-    fn standard_errors_hold_what_the_starts_of_windows_are_worth() {
-        let mut residuals = residuals(2);
-        let alone = judged(&residuals).standard_errors;
-        // Starts that look like the first unknown off by three.
-        residuals.start_errors = residuals.columns[0].iter().map(|x| 3.0 * x).collect();
-        let with_starts = judged(&residuals).standard_errors;
-        assert!((with_starts[0] - alone[0].hypot(3.0)).abs() < 1e-9);
-        assert!((with_starts[1] - alone[1]).abs() < 1e-9);
     }
 }

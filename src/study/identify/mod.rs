@@ -152,7 +152,7 @@ impl Study for Identify {
         if let Some(front) = &outcome.front {
             results::write_front(folder, setup, front)?;
         }
-        let judged = judge_candidate(&setup.replay, &outcome.candidate);
+        let judged = judge_candidate(&outcome.replay, &outcome.candidate);
         results::write_traces(folder, setup, &judged)?;
         page::write(folder, settings, setup, outcome, &judged, summary)
     }

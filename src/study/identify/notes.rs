@@ -17,10 +17,10 @@ pub(super) fn notes(setup: &Setup, summary: &Summary) -> Vec<String> {
     }
     let word = Failure::StepTooLong.word();
     if let Some(lost) = summary.record.failures.get(word) {
+        let finer = steps_at_bounds(&setup.replay).max(taken + 1);
         notes.push(format!(
-            "{lost} candidates were lost that need more than the {taken} steps per sample taken: they may be no worse than others. If \
-             stiff cars are to be found, fit with substeps = {}, which suits each parameter up to its bounds.",
-            steps_at_bounds(&setup.replay)
+            "Of the candidates that were lost, {lost} need more steps per sample than {taken} and may be no worse than others. If \
+             stiff cars are to be found, fit with substeps = {finer}."
         ));
     }
     if setup.without_run_up > 0 {

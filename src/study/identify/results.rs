@@ -110,9 +110,9 @@ fn by_channel(values: [f64; CHANNELS]) -> BTreeMap<String, f64> {
 
 /// Works the figures out.
 pub(super) fn summarise(settings: &IdentifySettings, setup: &Setup, outcome: &Outcome) -> Summary {
-    let replay = &setup.replay;
+    let replay = &outcome.replay;
     let judged = judge_candidate(replay, &outcome.candidate);
-    let held = setup
+    let held = outcome
         .holdout
         .as_ref()
         .map(|h| (judge_candidate(h, &outcome.candidate), h.plan.windows.len()));

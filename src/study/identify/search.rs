@@ -2,7 +2,7 @@
 
 use super::coordinates::Logarithmic;
 use super::identifiability::{Identifiability, judge};
-use super::refine::refine;
+use super::refine::{refine, restarted};
 use super::settings::{Algorithm, EXPLORE, FRONT, GATHER, IdentifySettings};
 use super::setup::{CHANNELS, Setup};
 use super::state::{Front, HistoryRow, Place, SearchState, inputs_of};
@@ -34,6 +34,10 @@ pub struct Outcome {
     pub swarm_s: f64,
     /// Hops to other minima that were tried, and that led further down.
     pub hops: [usize; 2],
+    /// The laps to fit, with windows that start where the final candidate comes.
+    pub replay: ReplayProblem,
+    /// The same of the laps held out, if any.
+    pub holdout: Option<ReplayProblem>,
 }
 
 /// Searches on an evaluator that is open: one of `setup`'s replay. Starts from the state of an interrupted search of the same
@@ -50,7 +54,6 @@ pub fn search_with(
     observe: &mut dyn FnMut(&Told) -> ControlFlow<()>,
 ) -> Result<Outcome> {
     let watch = Watch::begin();
-    let replay = &setup.replay;
     let origin = Origin::new(inputs_of(setup), &evaluator.backend());
     let mut state = match state {
         Some(state) => {
@@ -123,7 +126,10 @@ pub fn search_with(
                 "least squares on the exact Jacobian",
             ))
         };
-        let found = refine(settings, setup, evaluator, &swarm_candidate, &mut told)?;
+        let mut found = refine(settings, setup, evaluator, &swarm_candidate, &mut told)?;
+        if !found.interrupted {
+            (found.candidate, found.interrupted) = restarted(setup, found.candidate, &mut told);
+        }
         interrupted |= found.interrupted;
         refined = Some(found);
     }
@@ -131,11 +137,18 @@ pub fn search_with(
         Some(r) => (r.candidate, [r.hops, r.hops_gained]),
         None => (swarm_candidate.clone(), [0, 0]),
     };
-    let residuals = replay
-        .residuals(&candidate)
+    let own_starts = |replay: &ReplayProblem| {
+        let mut own = replay.clone();
+        own.start_as_driven_by(&own.flat(&candidate));
+        own
+    };
+    let own = own_starts(&setup.replay);
+    let judged = own.residuals(&candidate).map(|residuals| (own, residuals));
+    let (replay, residuals) = judged
+        .or_else(|| Some((setup.replay.clone(), setup.replay.residuals(&candidate)?)))
         .ok_or_else(|| nothing_yet(nothing_drives(), interrupted))?;
-    let (candidate, mut residuals) = as_given_without_effect(replay, candidate, residuals);
-    residuals.start_errors = replay.start_errors(&candidate);
+    let holdout = setup.holdout.as_ref().map(own_starts);
+    let (candidate, residuals) = as_given_without_effect(&replay, candidate, residuals);
     let polish_s = polish_began.elapsed().as_secs_f64();
     let mut record = RunRecord::of(&backend);
     record.failures = state.failures;
@@ -152,6 +165,8 @@ pub fn search_with(
         record,
         swarm_s,
         hops,
+        replay,
+        holdout,
     })
 }
 

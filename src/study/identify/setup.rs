@@ -125,9 +125,9 @@ pub fn set_up(settings: &IdentifySettings) -> Result<Setup> {
         stable_steps(log.dt_s, fastest)
     });
     let scales = channel_scales(&samples, &fit_windows);
-    let problem = |windows: Vec<Window<f64>>| {
+    let problem = |windows: Vec<Window<f64>>| -> Result<ReplayProblem> {
         let weights = objective_weights(settings, &scales, &windows, log.dt_s);
-        ReplayProblem::new(
+        let mut problem = ReplayProblem::new(
             car.clone(),
             free.clone(),
             samples.clone(),
@@ -135,7 +135,9 @@ pub fn set_up(settings: &IdentifySettings) -> Result<Setup> {
             (log.dt_s, substeps),
             settings.norm,
             weights,
-        )
+        )?;
+        problem.start_as_driven_by(&car.to_flat());
+        Ok(problem)
     };
     let replay = problem(fit_windows)?;
     let holdout = (!held_windows.is_empty())

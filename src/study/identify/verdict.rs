@@ -96,7 +96,7 @@ impl Untold {
         match (self.parameters.len(), self.combinations_told) {
             (1, _) => format!("Not told: {names}."),
             (_, 0) => format!("Not told, nor apart from one another: {names}."),
-            (count, told) => format!("Of {names}, only {told} of {count} combinations."),
+            (count, told) => format!("Of {names} only {told} of {count} combinations are told."),
         }
     }
 }
