@@ -125,9 +125,9 @@ mod tests {
         let chassis = Car::load("gt").unwrap().chassis;
         let weight = chassis.mass * 9.81 * chassis.cg_height;
         let creeping = (chassis.roll_stiffness - weight) / (20.0 * chassis.roll_damping);
-        assert!((decay(&damped, 20.0) / creeping - 1.0).abs() < 0.05);
+        assert!((decay(&damped, 20.0) / creeping - 1.0).abs() < 0.1);
         // The tyres damp yaw and sideslip the less, the faster the car goes.
-        assert!(decay(&|_| (), 70.0) < 0.9 * decay(&|_| (), 40.0));
+        assert!(decay(&|_| (), 200.0) < 0.8 * decay(&|_| (), 70.0));
         // With its weight far behind, the car spins by itself at speed.
         let heavy_tail = |car: &mut Car| {
             let c = &mut car.chassis;
