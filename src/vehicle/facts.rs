@@ -92,6 +92,10 @@ const TORQUE: [(f64, f64); 8] = [
     (AT_TOP_SPEED, 1.0),
     (1.00, 0.93),
 ];
+/// How much more load than the front tyres the rear tyres are made for, over the loads at rest.
+const REAR_RESERVE: f64 = 1.15;
+/// The front axle's share of the roll moment. Like [`REAR_RESERVE`] it keeps the car from turning round by itself.
+const ROLL_SHARE_FRONT: f64 = 0.55;
 /// First gear over top gear, for each gear more.
 const GEAR_SPAN: f64 = 0.36;
 /// Largest drag area that is taken from power and top speed, over the track squared: that of a box as high as wide.
@@ -170,7 +174,7 @@ impl CarFacts {
             roll_stiffness,
             roll_damping: 2.0
                 * ((roll_stiffness - rolling) * (inertia_roll + m * self.cg_height_m.powi(2))).sqrt(),
-            roll_share_front: 0.5,
+            roll_share_front: ROLL_SHARE_FRONT,
             camber_front: 0.0,
             camber_rear: 0.0,
             radius_front: self.tyre_radius_m,
@@ -193,14 +197,15 @@ impl CarFacts {
             hybrid: None,
             chassis,
         };
-        let (size, load) = (
-            self.tyre_radius_m / base.chassis.radius_front,
-            m / base.chassis.mass,
-        );
-        for_each_tyre(&mut car, |tyre| {
-            tyre.r0 *= size;
-            tyre.fnomin *= load;
-        });
+        // As much nominal load over the load at rest as the base car has, and at the rear a little more: it grips longer.
+        let size = self.tyre_radius_m / base.chassis.radius_front;
+        let load = m / base.chassis.mass;
+        if let Tyres::MagicFormula { front, rear } = &mut car.tyres {
+            for (tyre, share) in [(front, front_share), (rear, REAR_RESERVE * (1.0 - front_share))] {
+                tyre.coefficients.r0 *= size;
+                tyre.coefficients.fnomin *= 2.0 * share * load;
+            }
+        }
         Ok(car)
     }
 
@@ -305,19 +310,14 @@ pub fn top_speed_kmh(car: &Car) -> Option<f64> {
     Some(low * 3.6)
 }
 
-fn for_each_tyre(car: &mut Car, change: impl Fn(&mut super::TyreCoefficients<f64>)) {
-    if let Tyres::MagicFormula { front, rear } = &mut car.tyres {
-        change(&mut front.coefficients);
-        change(&mut rear.coefficients);
-    }
-}
-
 /// Scales friction along and across.
 fn scale_grip(car: &mut Car, scale: f64) {
-    for_each_tyre(car, |tyre| {
-        tyre.lmux *= scale;
-        tyre.lmuy *= scale;
-    });
+    if let Tyres::MagicFormula { front, rear } = &mut car.tyres {
+        for tyre in [front, rear] {
+            tyre.coefficients.lmux *= scale;
+            tyre.coefficients.lmuy *= scale;
+        }
+    }
 }
 
 /// Facts that are each in their range may make a figure that is not.

@@ -113,7 +113,7 @@ fn a_car_is_made_of_what_is_known_and_compared_with_it() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let made = lapswarm(folder.path(), &["init", "car", "kart.toml", "--set", KART]);
     assert!(made.status.success(), "{}", text(&made.stderr));
-    assert_eq!(text(&made.stdout), "kart.tir\nkart.toml\n");
+    assert_eq!(text(&made.stdout), "kart_front.tir\nkart_rear.tir\nkart.toml\n");
     let checked = lapswarm(folder.path(), &["check", "kart.toml", "--draw", "drawn"]);
     assert!(checked.status.success(), "{}", text(&checked.stderr));
     let told = text(&checked.stdout);
