@@ -126,6 +126,10 @@ impl Study for EnvelopeStudy {
         &outcome.record
     }
 
+    fn record_mut(outcome: &mut Outcome) -> &mut RunRecord {
+        &mut outcome.record
+    }
+
     fn summarise(settings: &EnvelopeSettings, prepared: &Prepared, outcome: &Outcome) -> EnvelopeSummary {
         results::summarise(Self::head(settings, prepared, outcome), outcome)
     }

@@ -12,9 +12,9 @@ pub mod run_folder;
 pub mod state_file;
 mod study;
 
-pub use inputs::Inputs;
+pub use inputs::{InputFiles, Inputs};
 pub(in crate::study) use life::resumed_or_new;
-pub use life::{Answer, Finished, Request, solve_unobserved, write_results};
+pub use life::{Answer, Finished, Request, TIME_LIMIT, solve_unobserved, write_results};
 pub use plan::Plan;
 pub(in crate::study) use record::Watch;
 pub use record::{Losses, RunRecord};

@@ -19,7 +19,7 @@ const LOCK_TRIES: usize = 1000;
 /// The state of a run that can be resumed.
 pub const STATE: &str = "state.lapswarm";
 /// What a run writes before it begins.
-const SETTINGS: &str = "study.toml";
+pub const SETTINGS: &str = "study.toml";
 /// What a finished or interrupted run leaves last.
 const MANIFEST: &str = "manifest.json";
 

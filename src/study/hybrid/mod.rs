@@ -135,6 +135,10 @@ impl Study for Hybrid {
         &outcome.record
     }
 
+    fn record_mut(outcome: &mut Outcome) -> &mut RunRecord {
+        &mut outcome.record
+    }
+
     fn summarise(settings: &HybridStudySettings, inputs: &HybridInputs, outcome: &Outcome) -> HybridSummary {
         results::summarise(Self::head(settings, inputs, outcome), outcome)
     }

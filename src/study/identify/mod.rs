@@ -127,6 +127,10 @@ impl Study for Identify {
         &outcome.record
     }
 
+    fn record_mut(outcome: &mut Outcome) -> &mut RunRecord {
+        &mut outcome.record
+    }
+
     fn summarise(settings: &IdentifySettings, setup: &Setup, outcome: &Outcome) -> Summary {
         results::summarise(settings, setup, outcome)
     }

@@ -112,6 +112,10 @@ impl Study for Raceline {
         &outcome.record
     }
 
+    fn record_mut(outcome: &mut Outcome) -> &mut RunRecord {
+        &mut outcome.record
+    }
+
     fn summarise(settings: &RacelineSettings, setup: &Setup, outcome: &Outcome) -> Summary {
         results::summarise(settings, setup, outcome)
     }

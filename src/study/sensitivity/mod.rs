@@ -152,6 +152,10 @@ impl Study for Sensitivity {
         &outcome.record
     }
 
+    fn record_mut(outcome: &mut Outcome) -> &mut RunRecord {
+        &mut outcome.record
+    }
+
     fn summarise(settings: &SensitivitySettings, setup: &Setup, outcome: &Outcome) -> Summary {
         results::summarise(settings, setup, outcome)
     }

@@ -93,6 +93,10 @@ impl Study for Surface {
         &outcome.record
     }
 
+    fn record_mut(outcome: &mut Outcome) -> &mut RunRecord {
+        &mut outcome.record
+    }
+
     fn summarise(settings: &SurfaceSettings, setup: &Setup, outcome: &Outcome) -> Summary {
         results::summarise(settings, setup, outcome)
     }
