@@ -9,6 +9,7 @@ mod dispatches;
 pub mod drive;
 #[cfg(feature = "vehicle")]
 pub mod energy;
+mod faults;
 #[cfg(feature = "vehicle")]
 mod free_car;
 #[cfg(feature = "gpu")]
@@ -19,6 +20,7 @@ pub mod gpu;
 mod ill_formed;
 #[cfg(feature = "vehicle")]
 pub mod line;
+mod logarithmic;
 #[cfg(feature = "vehicle")]
 mod model_table;
 #[cfg(feature = "vehicle")]
@@ -38,12 +40,14 @@ pub mod simd;
 pub mod steady;
 
 pub use backend::BackendChoice;
+pub use faults::{DeviceFaults, Losses};
 #[cfg(feature = "vehicle")]
 pub use free_car::FreeCar;
 pub use gpu::OnDevice;
 #[cfg(feature = "gpu")]
 pub use gpu::{DeviceKernel, FallbackEvaluator, GpuBackend};
 pub use ill_formed::IllFormed;
+pub use logarithmic::Logarithmic;
 #[cfg(feature = "vehicle")]
 pub use model_table::ModelTable;
 pub use open::open_evaluator;

@@ -1,6 +1,6 @@
 //! What a result depends on, as one number, and the files that it was read from.
 
-use super::run_folder::write_json;
+use super::write_json;
 use crate::config::{FilesRead, LARGEST_LOG, noting_files, read_bytes, read_text};
 use crate::error::{Error, Result};
 use std::fmt::{Debug, Write as _};

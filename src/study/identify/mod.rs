@@ -1,6 +1,5 @@
 //! Identification: which car drove this lap?
 
-mod coordinates;
 mod hops;
 mod identifiability;
 mod page;
@@ -27,7 +26,9 @@ use crate::evaluate::replay::open_evaluator;
 use crate::evaluate::{PackedClient, run_packed};
 use crate::study::framework::memory::{MemoryItem, Size};
 use crate::study::framework::state_file::StateFile;
-use crate::study::framework::{Figures, Plan, Progress, RunRecord, Study, Subject, Work, resumed_or_new};
+use crate::study::framework::{
+    Figures, Plan, Progress, RunRecord, Solved, Study, Subject, Work, resumed_or_new,
+};
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -66,11 +67,8 @@ impl Study for Identify {
         planned(settings, setup, plan.evaluations(settings.evaluations()))
     }
 
-    fn solve(
-        settings: &IdentifySettings,
-        setup: &Setup,
-        work: Work<'_, SearchState>,
-    ) -> Result<Option<Outcome>> {
+    fn solve(work: Work<'_, Self>) -> Result<Option<Outcome>> {
+        let (settings, setup) = (work.settings, work.prepared);
         let mut evaluator = open_evaluator(&setup.replay, settings.backend, settings.adapter.as_deref())?;
         let begun = (work.state, work.state_file);
         search_with(settings, setup, evaluator.as_mut(), begun, work.observe).map(Some)
@@ -131,21 +129,16 @@ impl Study for Identify {
         &mut outcome.record
     }
 
-    fn summarise(settings: &IdentifySettings, setup: &Setup, outcome: &Outcome) -> Summary {
-        results::summarise(settings, setup, outcome)
+    fn summarise(solved: &Solved<'_, Self>) -> Summary {
+        results::summarise(solved.settings, solved.prepared, solved.outcome)
     }
 
     fn subject(settings: &IdentifySettings, setup: &Setup) -> Subject {
         subject(settings, setup)
     }
 
-    fn report(
-        folder: &Path,
-        settings: &IdentifySettings,
-        setup: &Setup,
-        outcome: &Outcome,
-        summary: &Summary,
-    ) -> Result<()> {
+    fn report(folder: &Path, solved: &Solved<'_, Self>, summary: &Summary) -> Result<()> {
+        let (setup, outcome) = (solved.prepared, solved.outcome);
         let car = setup
             .replay
             .free
@@ -158,7 +151,7 @@ impl Study for Identify {
         }
         let judged = judge_candidate(&setup.replay, &outcome.candidate);
         results::write_traces(folder, setup, &judged)?;
-        page::write(folder, settings, setup, outcome, &judged, summary)
+        page::write(folder, solved, &judged, summary)
     }
 
     fn text(settings: &IdentifySettings, summary: &Summary) -> String {

@@ -1,5 +1,6 @@
 //! The interactive report of an identification, with its figures.
 
+use super::Identify;
 use super::results::{Summary, parameter_rows, traced_lap};
 use super::search::{Judged, Outcome};
 use super::settings::IdentifySettings;
@@ -10,17 +11,16 @@ use crate::evaluate::replay::{CHANNEL_LABELS, CHANNEL_NAMES, CHANNEL_UNITS};
 use crate::report::{
     Curves, Figure, Front, HtmlReport, LapLine, LapView, Panel, Parameters, Scale, Table, significant,
 };
-use crate::study::framework::circuit_view::{circuit_road, sections};
+use crate::study::framework::Solved;
 use std::path::Path;
 
 pub(super) fn write(
     folder: &Path,
-    settings: &IdentifySettings,
-    setup: &Setup,
-    outcome: &Outcome,
+    solved: &Solved<'_, Identify>,
     judged: &Judged,
     summary: &Summary,
 ) -> Result<()> {
+    let (setup, outcome) = (solved.prepared, solved.outcome);
     // The file's name alone: a long path would run out of the figures.
     let source = Path::new(&setup.log.source)
         .file_name()
@@ -41,7 +41,7 @@ pub(super) fn write(
     if let Some(map) = setup.circuit.as_ref().and_then(|c| view.track_map(&*c.name)) {
         map.write_svg(folder.join("map.svg"))?;
     }
-    page.table("Channels", "", &channels(settings, summary))?;
+    page.table("Channels", "", &channels(solved.settings, summary))?;
     page.section("Parameters", "");
     let figure = Parameters {
         title: "Parameters within their bounds".to_owned(),
@@ -92,7 +92,7 @@ pub(super) fn write(
         ),
         ("swarm", &format!("{:.1} s", summary.swarm_elapsed_s)),
     ]);
-    page.settings("study.toml, which repeats this run", settings.to_toml());
+    page.settings("study.toml, which repeats this run", solved.settings.to_toml());
     page.write(folder.join("report.html"))
 }
 
@@ -206,8 +206,7 @@ fn lap(setup: &Setup, judged: &Judged, title: String) -> LapView {
         .line(logged.wide().at(places.collect::<Vec<_>>()))
         .line(fitted)
         .line(error)
-        .sections(circuit.into_iter().flat_map(sections))
-        .road(circuit.map(circuit_road))
+        .circuit(circuit)
 }
 
 fn rms_text(errors: &[f64], unit: &str) -> String {

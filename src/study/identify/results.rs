@@ -240,17 +240,12 @@ pub(super) fn parameter_rows(summary: &Summary) -> Vec<ParameterRow> {
 
 pub(super) fn write_front(folder: &Path, setup: &Setup, front: &super::Front) -> Result<()> {
     let problem = &setup.replay.problem;
-    let columns = |rows: &[Vec<f64>], named: Vec<(&String, &String)>| {
-        let mut table = Table::rows(rows);
-        for (k, (name, unit)) in named.into_iter().enumerate() {
-            table = table.number(name, unit, |row| row[k]);
-        }
-        table.table()
-    };
     let objectives = problem.objectives.iter().map(|o| (&o.name, &o.unit));
-    columns(&front.objectives, objectives.collect()).write_csv(folder.join("FUN.csv"))?;
+    let objectives = Table::rows(&front.objectives).each(objectives);
+    objectives.table().write_csv(folder.join("FUN.csv"))?;
     let variables = problem.variables.iter().map(|v| (&v.name, &v.unit));
-    columns(&front.candidates, variables.collect()).write_csv(folder.join("VAR.csv"))
+    let variables = Table::rows(&front.candidates).each(variables);
+    variables.table().write_csv(folder.join("VAR.csv"))
 }
 
 /// One lap, the first that has a fitted sample: laps over one another would not be legible.

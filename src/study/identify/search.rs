@@ -1,6 +1,5 @@
 //! The search itself: swarm, polish, judgement.
 
-use super::coordinates::Logarithmic;
 use super::identifiability::{Identifiability, judge};
 use super::refine::refine;
 use super::settings::{Algorithm, EXPLORE, FRONT, GATHER, IdentifySettings};
@@ -8,10 +7,10 @@ use super::setup::{CHANNELS, Setup};
 use super::state::{Front, HistoryRow, Place, SearchState, inputs_of};
 use crate::error::{Error, Result};
 use crate::evaluate::replay::{ReplayProblem, trace};
-use crate::evaluate::{Evaluator, FailureCounts, add_failures};
+use crate::evaluate::{DeviceFaults, Evaluator, FailureCounts, Logarithmic, add_failures};
 use crate::study::framework::state_file::{Origin, StateFile};
-use crate::study::framework::{DeviceFaults, Progress as Told, RunRecord, Watch};
-use crate::swarm::metrics::Scale;
+use crate::study::framework::{Progress as Told, RunRecord, Watch};
+use crate::swarm::metrics::nearest_to_ideal;
 use crate::swarm::{CovarianceSettings, CovarianceSwarm, Mopso, MopsoSettings, Progress, Pso, PsoSettings};
 use std::ops::ControlFlow;
 use std::time::Instant;
@@ -361,13 +360,10 @@ impl SearchState {
 /// The front of a swarm's archive.
 fn front_of(swarm: &Mopso) -> Option<Front> {
     let objectives = swarm.archive().objectives.clone();
-    let shares = Scale::of(&objectives).apply(&objectives);
-    let distance = |i: usize| shares[i].iter().map(|x| x * x).sum::<f64>();
-    let chosen = (0..objectives.len()).min_by(|&a, &b| distance(a).total_cmp(&distance(b)))?;
     Some(Front {
         candidates: swarm.archive_candidates(),
+        chosen: nearest_to_ideal(&objectives)?,
         objectives,
-        chosen,
     })
 }
 
