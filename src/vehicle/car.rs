@@ -187,7 +187,20 @@ impl Car {
     /// # Errors
     /// [`Error::Io`] if a file cannot be written.
     pub fn write(&self, folder: &Path, stem: &str) -> Result<()> {
-        let mut files = self.files(stem).into_iter();
+        self.write_with(folder, stem, "")
+    }
+
+    /// As [`Car::write`], with a comment of some lines at the head of the car's file.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if a file cannot be written.
+    pub fn write_with(&self, folder: &Path, stem: &str, comment: &str) -> Result<()> {
+        let comment: String = comment.lines().map(|line| format!("# {line}\n")).collect();
+        let mut files = self.files(stem);
+        if let Some((_, text)) = files.last_mut() {
+            text.insert_str(0, &comment);
+        }
+        let mut files = files.into_iter();
         files.try_for_each(|(name, text)| write_whole(folder.join(name), text.as_bytes()))
     }
 
