@@ -16,14 +16,14 @@ fn mistakes_are_told_in_words_that_know_nothing_of_the_program() {
     write("unquoted.toml", "log = lap.csv\n");
     write("list.toml", "window_s = [3, 4]\n");
     write("map.toml", "[channels]\nay = \"G Force Lat\"\n");
-    write("study.toml", "channels = \"map.toml\"\n");
+    write("study.toml", "channel_map = \"map.toml\"\n");
     write("road.toml", "survey = \"road.csv\"\nlap = 1.5\n");
     for (arguments, parts) in [
         (
             &["identify", "reversed.toml"][..],
             ["line2", "[lower,upper],twonumbersinascendingorder"],
         ),
-        (&["identify", "--free", "K=3e5:3e4"], ["K", "lower"]),
+        (&["identify", "--free", "K=3e5:3e4"], ["K=3e5", "ascendingorder"]),
         (&["identify", "syntax.toml"], ["syntax.toml:line1", "expected"]),
         (&["identify", "unquoted.toml"], ["unquoted.toml:line1", "quoted"]),
         (
