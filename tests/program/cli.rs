@@ -14,7 +14,7 @@ use std::io::Write;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
-fn lapswarm(folder: &Path, arguments: &[&str]) -> Output {
+pub fn lapswarm(folder: &Path, arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_lapswarm"))
         .args(arguments)
         .current_dir(folder)
@@ -38,12 +38,12 @@ fn answered(folder: &Path, arguments: &[&str], answers: &str) -> Output {
     child.wait_with_output().expect("it ends")
 }
 
-fn text(bytes: &[u8]) -> String {
+pub fn text(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes).into_owned()
 }
 
 /// A ring of 100 m about the origin, for what is driven along a line.
-fn ring() -> String {
+pub fn ring() -> String {
     let points = (0..200).map(|i| f64::from(i) * std::f64::consts::TAU / 200.0);
     let rows: String = points
         .map(|a| format!("{},{}\n", 100.0 * a.cos(), 100.0 * a.sin()))
@@ -52,7 +52,7 @@ fn ring() -> String {
 }
 
 /// The circuit on which [`ring`] lies.
-const AROUND_RING: [&str; 2] = ["--track", "circle:95:105"];
+pub const AROUND_RING: [&str; 2] = ["--track", "circle:95:105"];
 
 #[test]
 fn files_to_start_from_are_sound_and_never_overwrite() {
@@ -252,7 +252,7 @@ fn the_study_file_of_every_run_folder_is_taken_for_what_it_is() {
             "transient",
             TransientSettings {
                 line: vec![folder.path().join("ring.csv")],
-                track: AROUND_RING[1].to_owned(),
+                track: Some(AROUND_RING[1].to_owned()),
                 ..TransientSettings::default()
             }
             .to_toml(),
@@ -610,7 +610,7 @@ fn a_dry_run_of_any_study_says_what_it_would_do_and_writes_nothing() {
 }
 
 /// What the program says, on both channels, without the frames and line breaks of its reports.
-fn said(output: &Output) -> String {
+pub fn said(output: &Output) -> String {
     let all = text(&output.stdout) + &text(&output.stderr);
     all.replace(['\n', '│', ' '], "")
 }
