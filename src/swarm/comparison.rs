@@ -4,8 +4,8 @@
 //! on the scale of the true front; for one objective 100,000 evaluations, 40 particles, and the distance of the
 //! best cost from the optimum's.
 
-use super::metrics::{Scale, hypervolume, igd_plus};
-use super::problems::TestProblem;
+use super::metrics::{hypervolume, igd_plus};
+use super::problems::SuiteProblem;
 use super::{
     Beyond, CooperativeSettings, CooperativeSwarm, CovarianceSettings, CovarianceSwarm, DifferenceSettings,
     DifferenceSwarm, HybridSettings, HybridSwarm, Mopso, MopsoSettings, Mutation, Nsga2, Nsga2Settings,
@@ -35,8 +35,8 @@ pub const SINGLE_OBJECTIVE: [&str; 6] = [
     "thesis",
 ];
 
-/// Particles and evaluations of a comparison.
-fn budget(problem: &Problem) -> (usize, usize) {
+/// Particles and evaluations of a comparison: 100 and 25,000 for several objectives, 40 and 100,000 for one.
+pub fn budget(problem: &Problem) -> (usize, usize) {
     if problem.objectives.len() > 1 {
         (100, 25_000)
     } else {
@@ -54,7 +54,20 @@ const FRONT_POINTS: usize = 2000;
 /// # Errors
 /// [`Error::Input`] if no optimiser of that name exists for this number of objectives.
 pub fn optimiser(name: &str, problem: &Problem, seed: u64) -> Result<Box<dyn Optimiser + Send>> {
-    let (population, evaluations) = budget(problem);
+    optimiser_within(name, problem, budget(problem).1, seed)
+}
+
+/// The same at another budget of evaluations.
+///
+/// # Errors
+/// Those of [`optimiser`].
+pub fn optimiser_within(
+    name: &str,
+    problem: &Problem,
+    evaluations: usize,
+    seed: u64,
+) -> Result<Box<dyn Optimiser + Send>> {
+    let (population, _) = budget(problem);
     let iterations = evaluations / population;
     let pso = |settings: PsoSettings| -> Result<Box<dyn Optimiser + Send>> {
         let settings = PsoSettings {
@@ -199,41 +212,57 @@ pub fn several(
 }
 
 /// What one run reached.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Score {
     /// Hypervolume of what was found; for one objective how far the best cost is from the optimum's.
     pub quality: f64,
-    /// IGD+; `None` for one objective.
+    /// IGD+; `None` for one objective, and where the true front is not known or nothing was found.
     pub igd_plus: Option<f64>,
+    /// Rows of objectives that were found. What violates constraints is left out.
+    pub front: Vec<Vec<f64>>,
 }
 
-/// Runs an algorithm on a problem once for each seed from one to `seeds`, each run in a thread.
+/// Runs an algorithm on a problem once for each seed from one to `seeds`, each run in a thread, at the budget of the
+/// comparison or at another number of evaluations.
 ///
 /// # Errors
 /// Those of [`optimiser`].
-pub fn compare(name: &str, problem: &TestProblem, seeds: u64) -> Result<Vec<Score>> {
-    let front = problem.front(FRONT_POINTS);
-    let scale = Scale::of(&front);
-    let front = scale.apply(&front);
+pub fn compare(
+    name: &str,
+    problem: &SuiteProblem,
+    seeds: u64,
+    evaluations: Option<usize>,
+) -> Result<Vec<Score>> {
+    let truth = problem.scale().apply(&problem.front(FRONT_POINTS));
     let width = problem.problem().objectives.len();
+    let evaluations = evaluations.unwrap_or(budget(problem.problem()).1);
     (1..=seeds)
         .into_par_iter()
         .map(|seed| {
-            let mut optimiser = optimiser(name, problem.problem(), seed)?;
+            let mut optimiser = optimiser_within(name, problem.problem(), evaluations, seed)?;
             run(optimiser.as_mut(), &mut problem.evaluator(), |_| {
                 ControlFlow::Continue(())
             })?;
-            let found = scale.apply(&optimiser.front().objectives);
-            Ok(if width == 1 {
-                Score {
-                    quality: found[0][0],
+            let found = optimiser.front();
+            let members = found.candidates.iter().zip(found.objectives);
+            let front: Vec<Vec<f64>> = members
+                .filter(|(candidate, _)| problem.is_feasible(candidate))
+                .map(|(_, objectives)| objectives)
+                .collect();
+            let scaled = problem.scale().apply(&front);
+            if width == 1 {
+                let quality = scaled.first().map_or(f64::INFINITY, |row| row[0]);
+                return Ok(Score {
+                    quality,
                     igd_plus: None,
-                }
-            } else {
-                Score {
-                    quality: hypervolume(&found, &vec![REFERENCE; width])?,
-                    igd_plus: Some(igd_plus(&found, &front)?),
-                }
+                    front,
+                });
+            }
+            let judged = !truth.is_empty() && !scaled.is_empty();
+            Ok(Score {
+                quality: hypervolume(&scaled, &vec![REFERENCE; width])?,
+                igd_plus: judged.then(|| igd_plus(&scaled, &truth)).transpose()?,
+                front,
             })
         })
         .collect()
@@ -275,7 +304,7 @@ mod tests {
             ("zdt1", MULTI_OBJECTIVE.as_slice()),
             ("sphere", &SINGLE_OBJECTIVE),
         ] {
-            let problem = TestProblem::by_name(problem).unwrap();
+            let problem = SuiteProblem::by_name(problem).unwrap();
             for name in names {
                 optimiser(name, problem.problem(), 1).unwrap();
             }
