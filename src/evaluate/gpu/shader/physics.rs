@@ -229,7 +229,7 @@ impl LineShape {
             .count("WORKGROUP", self.workgroup)
             .count("TILE", self.tile)
             .table(1, "sections", "Section", self.uniform_sections)
-            .table(2, "limits", "vec4<f32>", rows(2 * self.envelope_rows))
+            .table(2, "envelope", "vec4<f32>", rows(2 * self.envelope_rows))
             .table(3, "corners", "vec4<f32>", rows(self.corner_rows))
             .table(4, "ellipse", "vec4<f32>", rows(self.ellipse_rows.max(1)));
         [ELEMENTARY, &generated.end(), LINE].concat()
