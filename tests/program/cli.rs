@@ -105,8 +105,9 @@ fn files_to_start_from_are_sound_and_never_overwrite() {
 }
 
 /// The car of a kart, from figures that its driver knows.
-const KART: &str = "mass_kg=160,wheelbase_m=1.04,front_track_m=1.1,rear_track_m=1.15,cg_height_m=0.25,tyre_radius_m=0.135,\
-                    corner_g=1.9,corner_kmh=60,roll_deg_per_g=0.5,power_kw=22,redline_rpm=14000,gears=1,top_speed_kmh=115";
+const KART: &str = "mass_kg=160,front_weight_percent=43,wheelbase_m=1.04,front_track_m=1.1,rear_track_m=1.15,cg_height_m=0.22,\
+                    tyre_radius_m=0.135,corner_g=1.8,corner_kmh=60,roll_deg_per_g=0.5,power_kw=22,redline_rpm=14000,gears=1,\
+                    top_speed_kmh=115";
 
 #[test]
 fn a_car_is_made_of_what_is_known_and_compared_with_it() {
@@ -121,7 +122,7 @@ fn a_car_is_made_of_what_is_known_and_compared_with_it() {
     let figures = [
         ("mass", 160.0),
         ("wheelbase", 1.04),
-        ("cornering at 60 km/h", 1.9),
+        ("cornering at 60 km/h", 1.8),
         ("power", 22.0),
         ("top speed", 115.0),
     ];
@@ -148,6 +149,19 @@ fn a_car_is_made_of_what_is_known_and_compared_with_it() {
     ];
     let found = lapswarm(folder.path(), &run);
     assert!(found.status.success(), "{}", text(&found.stderr));
+
+    let driven = lapswarm(
+        folder.path(),
+        &[
+            "simulate",
+            "--car",
+            "kart.toml",
+            "--track",
+            "stadium:100:25:8",
+            "--quiet",
+        ],
+    );
+    assert!(driven.status.success(), "{}", text(&driven.stderr));
 
     // Asked for on stdin: an empty line takes what is shown, one that cannot be is asked for again.
     let answers = "asked car\nheavy\n-5\n900\n\n";

@@ -4,7 +4,8 @@ use super::{Definition, square};
 use std::f64::consts::{FRAC_PI_2, PI};
 
 pub(super) fn by_name(name: &str) -> Option<Definition> {
-    let (count, formula): (_, fn(&[f64], &mut [f64])) = match name {
+    type Formula = fn(&[f64], &mut [f64]);
+    let (count, formula): (_, Formula) = match name {
         "dtlz3" => (12, dtlz3),
         "dtlz4" => (12, dtlz4),
         "dtlz5" => (12, |x, f| {

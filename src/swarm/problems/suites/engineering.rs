@@ -1,6 +1,9 @@
 //! Designs from engineering, with two and three objectives \[6\]. The last objective of many is the sum of what the design's
 //! own constraints are violated by.
 
+// The published designs have their own roundings of pi.
+#![allow(clippy::approx_constant)]
+
 use super::{Definition, square};
 use std::f64::consts::{FRAC_PI_4, PI, SQRT_2};
 

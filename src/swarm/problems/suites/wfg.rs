@@ -8,8 +8,8 @@ const POSITIONS: usize = 4;
 const VARIABLES: usize = 24;
 
 pub(super) fn by_position(position: usize, objectives: usize) -> Option<Definition> {
-    let problems: [fn(&mut [f64], usize) -> Vec<f64>; 9] =
-        [wfg1, wfg2, wfg2, wfg4, wfg5, wfg6, wfg7, wfg8, wfg9];
+    type Transformation = fn(&mut [f64], usize) -> Vec<f64>;
+    let problems: [Transformation; 9] = [wfg1, wfg2, wfg2, wfg4, wfg5, wfg6, wfg7, wfg8, wfg9];
     let transform = *problems.get(position)?;
     let number = position + 1;
     let formula = move |x: &[f64], f: &mut [f64]| {
