@@ -339,6 +339,7 @@ fn another_car(folder: &Path) -> String {
 }
 
 #[test]
+#[ignore = "full tier: whole polishes"]
 fn windows_of_a_perfect_lap_give_its_car() {
     let folder = tempfile::tempdir().unwrap();
     let settings = IdentifySettings {
@@ -354,6 +355,7 @@ fn windows_of_a_perfect_lap_give_its_car() {
 }
 
 #[test]
+#[ignore = "full tier: whole polishes"]
 fn windows_of_a_noisy_lap_give_its_car_within_three_standard_errors() {
     let folder = tempfile::tempdir().unwrap();
     let (log, _) = lap_of(&Car::bundled().unwrap(), [0.05, 0.3, 0.3, 0.005], folder.path());
