@@ -140,6 +140,8 @@ pub enum Failure {
     IllFormedTyre(IllFormed),
     /// It spun, rolled over or left the range of numbers.
     Spun,
+    /// The steps of the integration were too long for it, so that it may be no worse than others.
+    StepTooLong,
     /// It left the road.
     LeftRoad,
     /// It did not reach the end in time.
@@ -164,6 +166,7 @@ impl Failure {
         match self {
             Self::IllFormedTyre(_) => "ill_formed_tyre",
             Self::Spun => "spun",
+            Self::StepTooLong => "step_too_long",
             Self::LeftRoad => "left_the_road",
             Self::Unfinished => "did_not_finish",
             Self::Standstill => "standstill",
@@ -204,6 +207,7 @@ impl fmt::Display for Failure {
         match self {
             Self::IllFormedTyre(reason) => write!(f, "an ill-formed tyre: {reason}"),
             Self::Spun => f.write_str("spun"),
+            Self::StepTooLong => f.write_str("needs shorter steps"),
             Self::LeftRoad => f.write_str("left the road"),
             Self::Unfinished => f.write_str("did not finish in time"),
             Self::Standstill => f.write_str("came to a standstill"),

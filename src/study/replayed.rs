@@ -25,6 +25,7 @@ pub(in crate::study) fn replay_settings(
 pub(in crate::study) fn windowed() -> IdentifySettings {
     IdentifySettings {
         window_s: Some(1.5),
+        settle_s: Some(0.5),
         ..IdentifySettings::default()
     }
 }

@@ -188,6 +188,7 @@ impl Role {
                 "velocity",
                 "gpsspeed",
                 "speed",
+                "vx",
             ],
             Self::Ax => &[
                 "axmps2",
@@ -202,6 +203,7 @@ impl Role {
                 "accelerometerx",
                 "gpslonacc",
                 "glong",
+                "ax",
             ],
             Self::Ay => &[
                 "aymps2",
@@ -215,6 +217,7 @@ impl Role {
                 "accelerometery",
                 "gpslatacc",
                 "glat",
+                "ay",
             ],
             Self::YawRate => &[
                 "yawrateradps",

@@ -141,7 +141,8 @@ fn write_cornering(path: &Path, limits: &CarEnvelope) -> Result<()> {
         .write_csv(path)
 }
 
-fn limits_figure(limits: &CarEnvelope, car: &str) -> Curves {
+/// Steady-state cornering, the limits of tyres and engine, the g-g-v diagram and sideslip of a car of this name.
+pub fn envelope_figure(limits: &CarEnvelope, car: &str) -> Curves {
     let speeds = &limits.speeds;
     let v: Vec<f64> = speeds.iter().map(|s| s.row.v_mps).collect();
     let over_speed = |f: &dyn Fn(&EnvelopeAtSpeed) -> f64| speeds.iter().map(f).collect::<Vec<f64>>();
@@ -182,7 +183,7 @@ fn limits_figure(limits: &CarEnvelope, car: &str) -> Curves {
         .curve("engine", &v, &over_speed(&|s| s.engine_mps2))
         .curve("drag", &v, &over_speed(&|s| s.row.drag_mps2));
     Curves::new(
-        format!("g-g-v envelope of the {car}"),
+        format!("g-g-v envelope: {car}"),
         [cornering, limits, diagram, sideslip],
     )
 }
@@ -190,7 +191,7 @@ fn limits_figure(limits: &CarEnvelope, car: &str) -> Curves {
 fn write_page(folder: &Path, outcome: &Outcome, summary: &EnvelopeSummary) -> Result<()> {
     let limits = &outcome.limits;
     let (car, record) = (&summary.head.subject.car, &summary.head.record);
-    let mut page = HtmlReport::new(&summary.head.study, &format!("g-g-v envelope of the {car}"));
+    let mut page = HtmlReport::new(&summary.head.study, &format!("g-g-v envelope: {car}"));
     if let (Some(slow), Some(fast)) = (limits.speeds.first(), limits.speeds.last()) {
         page.sentence(format!(
             "The {car} corners at up to {:.1} m/s\u{b2} at {:.0} m/s and {:.1} m/s\u{b2} at {:.0} m/s, brakes at up to {:.1} and \
@@ -217,7 +218,7 @@ fn write_page(folder: &Path, outcome: &Outcome, summary: &EnvelopeSummary) -> Re
         "Limits",
         "From steady states of the 4DOF model at each speed. The engine's limit is that of its best gear.",
     );
-    page.figure(folder.join("envelope.svg"), &limits_figure(limits, car))?;
+    page.figure(folder.join("envelope.svg"), &envelope_figure(limits, car))?;
     page.section("The surface", ABOUT_SURFACE);
     page.paragraph(&surface_in_words(&summary.surface, record));
     if let Some(figure) = surface_figure(&outcome.surface, car) {

@@ -2,6 +2,7 @@
 
 mod hops;
 mod identifiability;
+mod notes;
 mod page;
 mod polish;
 mod refine;
@@ -10,8 +11,9 @@ mod search;
 mod settings;
 mod setup;
 mod state;
+mod verdict;
 
-pub use identifiability::{Identifiability, judge};
+pub use identifiability::{Group, Identifiability, judge};
 pub use polish::{Polished, polish};
 pub use results::Summary;
 pub use search::{Judged, Outcome, judge_candidate, search_with, total_parameter_error};
@@ -19,6 +21,7 @@ pub use settings::{Algorithm, FreeParameter, IdentifySettings, ObjectiveChoice};
 pub use setup::{Setup, cost_unit, lap_format, set_up};
 pub(in crate::study) use setup::{planned, subject, without_laps};
 pub use state::{Front, HistoryRow, SearchState};
+pub use verdict::{Untold, Verdict};
 
 use crate::config::settings::Settings;
 use crate::error::{Error, Result};
@@ -135,17 +138,14 @@ impl Study for Identify {
 
     fn report(folder: &Path, solved: &Solved<'_, Self>, summary: &Summary) -> Result<()> {
         let (setup, outcome) = (solved.prepared, solved.outcome);
-        let car = setup
-            .replay
-            .free
-            .candidate_car(&results::reported_candidate(setup, outcome));
-        car.write(folder, "car")?;
+        let car = setup.replay.free.candidate_car(&outcome.candidate);
+        car.write_with(folder, "car", &results::car_comment(&setup.log.source, summary))?;
         results::write_history(folder, outcome)?;
         results::write_parameters(folder, summary)?;
         if let Some(front) = &outcome.front {
             results::write_front(folder, setup, front)?;
         }
-        let judged = judge_candidate(&setup.replay, &outcome.candidate);
+        let judged = judge_candidate(&outcome.replay, &outcome.candidate);
         results::write_traces(folder, setup, &judged)?;
         page::write(folder, solved, &judged, summary)
     }

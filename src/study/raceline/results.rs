@@ -7,7 +7,6 @@ pub(super) use page::write as write_page;
 use super::{Outcome, Raceline, ReportedLine, Setup};
 use crate::error::Result;
 use crate::evaluate::line::LineObjective;
-use crate::files::stem;
 use crate::report::{Table, write_whole};
 use crate::study::framework::{Head, Solved};
 use serde::{Deserialize, Serialize};
@@ -211,7 +210,7 @@ pub(super) fn write_files(folder: &Path, setup: &Setup, outcome: &Outcome) -> Re
     let envelope = setup.car.envelope.to_csv();
     write_whole(folder.join("envelope.csv"), envelope.as_bytes())?;
     for line in reported_lines(outcome) {
-        let name = stem(&line.name);
+        let name = line.stem();
         write_line(&folder.join(format!("line_{name}.csv")), setup, line)?;
         // Replaces what an interrupted run has left, since it is resumed in the same folder.
         let racetrack = setup.cross_sections.line_to_racetrack_csv(&line.alpha);

@@ -115,7 +115,7 @@ pub struct ReportedLine {
     /// Share of the usable width from the right at every cross-section.
     pub alpha: Vec<f64>,
     /// What each objective comes to through the cross-sections, in the order of [`LineObjective::ALL`].
-    pub through_cuts: Vec<f64>,
+    pub at_cross_sections: Vec<f64>,
     /// The line on the fine spline, with its lap.
     pub fine: FineLine,
     /// How close its sides come to the edges.
@@ -123,6 +123,14 @@ pub struct ReportedLine {
 }
 
 impl ReportedLine {
+    /// What its files are named after, as in `line_fastest.csv`. Scripts read `line_least_curved.csv`.
+    pub fn stem(&self) -> String {
+        if self.name == LineObjective::Kappa2.line_name() {
+            return "least_curved".to_owned();
+        }
+        crate::files::stem(&self.name)
+    }
+
     /// Lap time on the fine spline (s): the one to believe.
     pub fn lap_time_fine_s(&self) -> f64 {
         self.fine.lap_time_s().unwrap_or(f64::NAN)
@@ -139,7 +147,7 @@ impl ReportedLine {
 
     /// What an objective comes to through the cross-sections.
     pub fn objective(&self, objective: LineObjective) -> f64 {
-        self.through_cuts[objective as usize]
+        self.at_cross_sections[objective as usize]
     }
 }
 
@@ -185,7 +193,7 @@ impl Setup {
         Ok(ReportedLine {
             name: name.to_owned(),
             alpha: alpha.to_vec(),
-            through_cuts: found.objectives,
+            at_cross_sections: found.objectives,
             clearance: check_line(&fine, &self.edges_m[0], &self.edges_m[1], settings.car_width_m),
             fine,
         })

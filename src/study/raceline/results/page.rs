@@ -81,7 +81,7 @@ pub fn write(folder: &Path, solved: &Solved<'_, Raceline>, summary: &Summary) ->
     );
     for found in &outcome.objectives {
         if let Some(surface) = surface(solved.settings, setup, found)? {
-            let name = format!("surface_{}.svg", stem(&found.best.name));
+            let name = format!("surface_{}.svg", found.best.stem());
             page.figure(folder.join(name), &surface)?;
         }
     }
