@@ -123,7 +123,7 @@ impl CarFacts {
     /// *Measured Vehicle Inertial Parameters*, SAE 1999-01-1336). Roll is critically damped.
     ///
     /// # Errors
-    /// [`Error::Input`] for facts out of their ranges, [`Error::Study`] if no friction brings the car to `corner_g`.
+    /// [`Error::Input`] for facts out of their ranges and a car that would turn over, [`Error::Study`] if no friction brings the car to `corner_g`.
     pub fn car(&self) -> Result<Car> {
         self.validate()?;
         let mut car = self.with_base_tyre()?;
@@ -235,6 +235,16 @@ impl CarFacts {
 
     /// The factor on the base tyre's friction with which the car corners at `corner_g`, by regula falsi.
     fn scale_for(&self, corner_g: f64, car: &Car) -> Result<f64> {
+        let lift = air_w(self.corner_kmh / 3.6) / (self.corner_kmh / 3.6) * self.downforce_area_m2;
+        let half_track = 0.25 * (self.front_track_m + self.rear_track_m);
+        let turns_over = half_track / self.cg_height_m * (1.0 + lift / (self.mass_kg * G));
+        if corner_g > turns_over {
+            let found = format!("{corner_g} g at {} km/h", self.corner_kmh);
+            let expected = format!(
+                "less than {turns_over:.2} g, at which this track and centre of gravity turn the car over"
+            );
+            return Err(Error::input("the car", "corner_g", found, expected));
+        }
         let reached = |scale: f64| {
             let mut car = car.clone();
             scale_grip(&mut car, scale);
