@@ -35,6 +35,7 @@ const ROWS: &[Row] = &[
         &[
             ("swarm.population", "24"),
             ("swarm.iterations", "20"),
+            ("free", "rBy1,rCy1,K"),
             ("polish", "true"),
             ("hops", "0"),
         ],
@@ -83,7 +84,7 @@ const ROWS: &[Row] = &[
             ("setups", "3"),
             ("backend", "simd"),
         ],
-        &[("setups", "60")],
+        &[("setups", "24")],
     ),
     (
         "sensitivity",
