@@ -84,7 +84,7 @@ const ROWS: &[Row] = &[
             ("setups", "3"),
             ("backend", "simd"),
         ],
-        &[("setups", "24")],
+        &[("setups", "8")],
     ),
     (
         "sensitivity",
@@ -112,7 +112,7 @@ const FILES: [(&str, &str); 2] = [
     ),
     (
         "line.toml",
-        "track = \"stadium:500:100:14\"\nsections = 360\nobjectives = [\"lap_time\"]\nbackend = \"simd\"\n",
+        "track = \"stadium:300:80:12\"\nsections = 120\nobjectives = [\"lap_time\"]\nbackend = \"simd\"\n",
     ),
 ];
 
