@@ -23,8 +23,8 @@ use lapswarm::evaluate::line::{
 use lapswarm::evaluate::simd::InstructionSet;
 use lapswarm::line::Parametrisation;
 use lapswarm::line::energy::{EnergyCar, EnergyPlan, Gates, Mode, Traction};
-use lapswarm::study::envelope::{EnvelopeSettings, car_envelope};
 use lapswarm::vehicle::Car;
+use lapswarm::vehicle::limits::{SpeedRange, car_envelope};
 use std::time::Duration;
 
 /// Lap times on a circuit of `sections`, lines by a control point for every four of them.
@@ -185,7 +185,7 @@ fn energy(criterion: &mut Criterion) {
 
 fn hybrid_car() -> EnergyCar {
     let car = Car::load("gt_hybrid").expect("bundled");
-    let limits = car_envelope(&car, &EnvelopeSettings::default()).expect("limits");
+    let limits = car_envelope(&car, &SpeedRange::USUAL).expect("limits");
     let rows = limits
         .speeds
         .iter()

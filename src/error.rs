@@ -305,7 +305,7 @@ impl Error {
 
     /// The same error, said of another file, if it is about input.
     #[must_use]
-    pub(crate) fn of_file(self, name: impl AsRef<Path>) -> Self {
+    pub fn of_file(self, name: impl AsRef<Path>) -> Self {
         match self {
             Self::Input {
                 place,

@@ -1,5 +1,7 @@
 //! Files that appear whole or not at all, and stay after a loss of power.
 
+pub mod run_folder;
+
 use std::fs::{self, File};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -46,6 +48,27 @@ pub fn sync_folder(folder: &Path) {
 pub fn stem(name: &str) -> String {
     name.chars()
         .map(|c| if c.is_alphanumeric() { c } else { '_' })
+        .collect()
+}
+
+/// What reports call files: their names without the ending, with the folders where these are not enough.
+pub fn names_of(files: &[PathBuf]) -> Vec<String> {
+    let text =
+        |part: Option<&std::ffi::OsStr>| part.map_or(String::new(), |s| s.to_string_lossy().into_owned());
+    let stem = |path: &Path| text(path.file_stem());
+    let within = |path: &Path| format!("{}/{}", text(path.parent().and_then(Path::file_name)), stem(path));
+    let whole = |path: &Path| path.display().to_string();
+    let lone = |of: &dyn Fn(&Path) -> String, path: &Path| {
+        let name = of(path);
+        (files.iter().filter(|f| of(f) == name).count() == 1).then_some(name)
+    };
+    files
+        .iter()
+        .map(|path| {
+            lone(&stem, path)
+                .or_else(|| lone(&within, path))
+                .unwrap_or_else(|| whole(path))
+        })
         .collect()
 }
 

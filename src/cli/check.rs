@@ -1,5 +1,7 @@
 //! `lapswarm check`: is this file what it should be?
 
+mod car;
+
 use crate::cli::output::{errln, outln};
 use lapswarm::config::{Document, read_start, read_text};
 use lapswarm::line::read_line;
@@ -8,7 +10,7 @@ use lapswarm::study::sweep::{self, SweepSettings};
 use lapswarm::telemetry::{ChannelMap, Log, LogOptions};
 use lapswarm::track::Track;
 use lapswarm::vehicle::tyre::TyreFile;
-use lapswarm::vehicle::{Car, Envelope};
+use lapswarm::vehicle::{Car, CarFacts, Envelope};
 use lapswarm::{Error, Result};
 use std::cmp::Reverse;
 use std::path::{Path, PathBuf};
@@ -22,6 +24,9 @@ pub struct Arguments {
     /// The files
     #[arg(required = true)]
     files: Vec<PathBuf>,
+    /// Draw cars into this folder: g-g-v envelope and steady-state cornering
+    #[arg(long, value_name = "DIR")]
+    draw: Option<PathBuf>,
     /// What they are [default: guessed from their names and heads]
     #[arg(long, value_parser = kind_flag)]
     kind: Option<Kind>,
@@ -54,7 +59,12 @@ static CAR: FileKind = file("car", "a car", |path| {
     } else {
         ", no powertrain"
     };
-    Ok(format!("a car, {}: {} kg{engine}", car.name, car.chassis.mass))
+    let text = format!("a car, {}: {} kg{engine}", car.name, car.chassis.mass);
+    Ok(match CarFacts::asked(path) {
+        Ok(Some(facts)) => format!("{text}\n{}", car::compared(&car, &facts)),
+        // A bundled car has no file.
+        _ => text,
+    })
 });
 
 static TYRE: FileKind = file("tyre", "a tyre", |path| {
@@ -225,8 +235,13 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     for path in &arguments.files {
         let found = arguments.kind.map_or_else(|| guess(path), Ok).and_then(|kind| {
             // Whoever meant another kind sees why it is found wrong.
-            kind.read(path)
-                .inspect_err(|_| errln!("{}: read as {}", path.display(), kind.name()))
+            let found = kind.read(path).and_then(|text| match (kind, &arguments.draw) {
+                (Kind::File(file), Some(folder)) if std::ptr::eq(file, &CAR) => {
+                    Ok(format!("{text}\n{}", car::draw(path, folder)?))
+                }
+                _ => Ok(text),
+            });
+            found.inspect_err(|_| errln!("{}: read as {}", path.display(), kind.name()))
         });
         match found {
             Ok(text) => outln!("{}: {text}", path.display()),

@@ -20,6 +20,7 @@ struct Row {
     name: String,
     backend: String,
     kind: String,
+    pci_bus_id: String,
     driver: String,
     max_buffer_mib: u64,
     max_binding_mib: u64,
@@ -40,6 +41,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         driver: format!("{} {}", d.driver, d.driver_info).trim().to_owned(),
         name: d.name,
         backend: d.backend,
+        pci_bus_id: d.pci_bus_id,
         max_buffer_mib: d.max_buffer_bytes >> 20,
         max_binding_mib: d.max_binding_bytes >> 20,
         max_workgroups: d.max_workgroups,
@@ -56,9 +58,18 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     if listing.gpus.is_empty() {
         outln!("no GPU: neither Vulkan, Metal nor DX12 found an adapter");
     }
-    for d in &listing.gpus {
+    for (i, d) in listing.gpus.iter().enumerate() {
+        // What tells it from others of its name.
+        let alike = |others: &[Row]| others.iter().filter(|other| other.name == d.name).count();
+        let number = match alike(&listing.gpus) {
+            1 => String::new(),
+            _ => format!("#{}", alike(&listing.gpus[..=i])),
+        };
+        let bus = Some(&d.pci_bus_id)
+            .filter(|id| !id.is_empty())
+            .map_or(String::new(), |id| format!(", PCI {id}"));
         outln!(
-            "{}\n  {} ({}), driver {}\n  buffers to {} MiB, bindings to {} MiB, {} workgroups per dimension, timestamps: {}",
+            "{}{number}\n  {} ({}){bus}, driver {}\n  buffers to {} MiB, bindings to {} MiB, {} workgroups per dimension, timestamps: {}",
             d.name,
             d.backend,
             d.kind,

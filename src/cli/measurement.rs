@@ -4,9 +4,9 @@ use super::output::outln;
 use super::print_json;
 use lapswarm::Result;
 use lapswarm::evaluate::BackendChoice;
+use lapswarm::files::run_folder::{self, MANIFEST, RunFolder, SUMMARY};
 use lapswarm::report::HtmlReport;
-use lapswarm::study::framework::run_folder::{self, Manifest, RunFolder, write_json};
-use lapswarm::study::framework::{RunRecord, Subject};
+use lapswarm::study::framework::{Head, Manifest, RunRecord, Subject, write_json};
 use serde::Serialize;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -81,7 +81,7 @@ impl Keeping<'_> {
             backend: backends.join(", "),
             ..RunRecord::of(&measured_by)
         };
-        write_json(&folder.join("summary.json"), summary)?;
+        write_json(&folder.join(SUMMARY), summary)?;
         let threads = std::thread::available_parallelism().map_or(String::new(), |n| n.to_string());
         page.facts(&[
             ("backends", &record.backend),
@@ -95,12 +95,15 @@ impl Keeping<'_> {
         ]);
         page.write(folder.join("report.html"))?;
         // Last: it says that the run is whole.
-        let subject = Subject {
-            seed: 1,
-            ..Subject::default()
+        let head = Head {
+            study: self.study.to_owned(),
+            subject: Subject {
+                seed: 1,
+                ..Subject::default()
+            },
+            record,
         };
-        let manifest = Manifest::new(self.study, &subject, &record, "");
-        write_json(&folder.join("manifest.json"), &manifest)
+        write_json(&folder.join(MANIFEST), &Manifest::new(head, ""))
     }
 }
 

@@ -3,6 +3,7 @@
 mod bench;
 mod check;
 mod devices;
+mod export;
 mod init;
 mod measurement;
 mod output;
@@ -23,7 +24,7 @@ use lapswarm::study::registry::{self, STUDIES};
 use lapswarm::{Error, Result};
 use output::{errln, out, outln};
 use std::ops::ControlFlow;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -38,6 +39,8 @@ enum Tool {
     Simulate(simulate::Arguments),
     /// Lay runs side by side on one page: figures, laps, g-g-v envelopes.
     Report(report::Arguments),
+    /// Write laps of runs for MoTeC i2: .ld, .ldx and CSV.
+    Export(export::Arguments),
     /// Write a commented study, car or track file to start from.
     Init(init::Arguments),
     /// Read files as the studies do, and say what is in them or what is wrong.
@@ -178,6 +181,7 @@ fn run_tool(tool: &Tool) -> Result<()> {
         Tool::Sweep(arguments) => sweep::run(arguments),
         Tool::Simulate(arguments) => simulate::run(arguments),
         Tool::Report(arguments) => report::run(arguments),
+        Tool::Export(arguments) => export::run(arguments),
         Tool::Init(arguments) => init::run(arguments),
         Tool::Check(arguments) => check::run(arguments),
         Tool::Completions { shell } => {
@@ -226,6 +230,17 @@ static JSON_TOLD: AtomicBool = AtomicBool::new(false);
 fn to_json(value: &impl serde::Serialize) -> Result<String> {
     let failed = |e| Error::io("standard output", "write", std::io::Error::other(e));
     serde_json::to_string(value).map_err(failed)
+}
+
+/// Writes a file that must not be there yet.
+fn write_new(path: &Path, bytes: &[u8]) -> Result<()> {
+    lapswarm::files::write_new(path, bytes).map_err(|error| match error {
+        Error::Io { source, .. } if source.kind() == std::io::ErrorKind::AlreadyExists => {
+            let expected = "a file that does not exist: nothing is overwritten";
+            Error::input(path, "FILE", "a file", expected)
+        }
+        error => error,
+    })
 }
 
 /// Prints a serialisable value as one JSON object on stdout.

@@ -3,10 +3,10 @@
 use super::study::{print_plan, print_results};
 use super::{Common, to_json};
 use lapswarm::evaluate::BackendChoice;
+use lapswarm::files::run_folder::{self, MANIFEST, SUMMARY};
 use lapswarm::report::compare::{Run, compare};
 use lapswarm::simulate::{SensorSettings, SimulateSettings, Simulated, simulate_lap};
-use lapswarm::study::framework::run_folder::{self, Manifest, write_json};
-use lapswarm::study::framework::{Plan, RunRecord, Subject};
+use lapswarm::study::framework::{Head, Manifest, Plan, RunRecord, Subject, write_json};
 use lapswarm::study::identify::lap_format;
 use lapswarm::telemetry::write_native;
 use lapswarm::track::Track;
@@ -138,19 +138,16 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         greatest_ay_mps2: greatest(&log.ay_mps2),
         log: path.display().to_string(),
     };
-    write_json(&folder.join("summary.json"), &summary)?;
+    write_json(&folder.join(SUMMARY), &summary)?;
     let backend = BackendChoice::Cpu.would_be(None)?;
-    let subject = Subject {
-        seed: settings.seed,
-        car: car.name.clone(),
-        log: None,
-        track: Some(circuit.name.clone()),
+    let head = Head {
+        study: summary.study.to_owned(),
+        subject: Subject::on_track(settings.seed, &car.name, &circuit.name),
+        record: RunRecord::of(&backend),
     };
-    let record = RunRecord::of(&backend);
-    let manifest = Manifest::new("simulate", &subject, &record, "");
     // The page of runs beside each other, of this one alone, which reads the manifest; without the page the run is not whole.
-    let file = folder.join("manifest.json");
-    write_json(&file, &manifest)?;
+    let file = folder.join(MANIFEST);
+    write_json(&file, &Manifest::new(head, ""))?;
     let written = Run::read(&folder)
         .and_then(|run| compare(&[run]))
         .and_then(|page| page.write(folder.join("report.html")));

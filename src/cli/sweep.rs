@@ -4,7 +4,8 @@ use super::study::{print_plan, print_results};
 use super::{Common, Memory, progress::Bar, stop_flag, stopped, to_json};
 use lapswarm::Result;
 use lapswarm::config::limit_memory;
-use lapswarm::study::framework::{Plan, run_folder};
+use lapswarm::files::run_folder;
+use lapswarm::study::framework::Plan;
 use lapswarm::study::sweep::{SWEEP_FILE, SweepSettings, plan, sweep};
 
 /// Flags of `sweep`.

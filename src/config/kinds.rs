@@ -1,10 +1,12 @@
 //! Kinds of settings: how each is read, written, checked and given as a flag.
 
 mod lists;
+mod places;
 
 pub use lists::{
     Counts, Files, Numbers, SomeOf, Texts, TwoTexts, choices, counts, files, numbers, texts, two_texts,
 };
+pub use places::{FileOrTable, Folder, NoFolder, file_or_table, folder_or_none, no_folder};
 
 use super::Table;
 pub use super::choice::Choice;

@@ -9,6 +9,7 @@ use crate::error::{Error, Result};
 use crate::track::Circuit;
 use crate::vehicle::tyre::Tyre;
 use crate::vehicle::{Car, CarModel, LinearTyre, MagicFormula, TyreModel};
+use glam::DVec2;
 
 /// One driven lap: what the wheels and the steering did, at a uniform rate.
 #[derive(Clone, Debug, Default)]
@@ -30,6 +31,26 @@ impl Drive {
         let (first, last) = (self.station_m.first()?, self.station_m.last()?);
         let (from, to) = (self.states.first()?[0], self.states.last()?[0]);
         Some((self.states.len() - 1) as f64 * interval_s + (length_m - last) / to + first / from)
+    }
+
+    /// Least room between the car's side and an edge (m), of a circuit whose widths are the room that the side has.
+    pub fn least_room_m(&self, circuit: &Circuit) -> f64 {
+        let places = self.station_m.iter().zip(&self.offset_m);
+        let room = |(station, offset): (&f64, &f64)| {
+            let (left, right) = circuit.widths_at(*station);
+            (left - offset).min(right + offset)
+        };
+        places.map(room).fold(f64::INFINITY, f64::min)
+    }
+
+    /// Where the car went on the circuit that it was driven round (m).
+    pub fn points_m(&self, circuit: &Circuit) -> Vec<DVec2> {
+        let places = self.station_m.iter().zip(&self.offset_m);
+        let point = |(station, offset): (&f64, &f64)| {
+            let heading = DVec2::from_angle(circuit.heading_at(*station));
+            circuit.position_at(*station) + *offset * heading.perp()
+        };
+        places.map(point).collect()
     }
 }
 

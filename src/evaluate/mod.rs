@@ -9,6 +9,7 @@ mod dispatches;
 pub mod drive;
 #[cfg(feature = "vehicle")]
 pub mod energy;
+mod faults;
 #[cfg(feature = "vehicle")]
 mod free_car;
 #[cfg(feature = "gpu")]
@@ -19,6 +20,7 @@ pub mod gpu;
 mod ill_formed;
 #[cfg(feature = "vehicle")]
 pub mod line;
+mod logarithmic;
 #[cfg(feature = "vehicle")]
 mod model_table;
 #[cfg(feature = "vehicle")]
@@ -38,12 +40,14 @@ pub mod simd;
 pub mod steady;
 
 pub use backend::BackendChoice;
+pub use faults::{DeviceFaults, Losses};
 #[cfg(feature = "vehicle")]
 pub use free_car::FreeCar;
 pub use gpu::OnDevice;
 #[cfg(feature = "gpu")]
 pub use gpu::{DeviceKernel, FallbackEvaluator, GpuBackend};
 pub use ill_formed::IllFormed;
+pub use logarithmic::Logarithmic;
 #[cfg(feature = "vehicle")]
 pub use model_table::ModelTable;
 pub use open::open_evaluator;
@@ -136,6 +140,8 @@ pub enum Failure {
     IllFormedTyre(IllFormed),
     /// It spun, rolled over or left the range of numbers.
     Spun,
+    /// The steps of the integration were too long for it, so that it may be no worse than others.
+    StepTooLong,
     /// It left the road.
     LeftRoad,
     /// It did not reach the end in time.
@@ -160,6 +166,7 @@ impl Failure {
         match self {
             Self::IllFormedTyre(_) => "ill_formed_tyre",
             Self::Spun => "spun",
+            Self::StepTooLong => "step_too_long",
             Self::LeftRoad => "left_the_road",
             Self::Unfinished => "did_not_finish",
             Self::Standstill => "standstill",
@@ -200,6 +207,7 @@ impl fmt::Display for Failure {
         match self {
             Self::IllFormedTyre(reason) => write!(f, "an ill-formed tyre: {reason}"),
             Self::Spun => f.write_str("spun"),
+            Self::StepTooLong => f.write_str("needs shorter steps"),
             Self::LeftRoad => f.write_str("left the road"),
             Self::Unfinished => f.write_str("did not finish in time"),
             Self::Standstill => f.write_str("came to a standstill"),

@@ -6,6 +6,9 @@ use super::spline::Spline;
 use crate::error::{Error, Place, Result};
 use glam::DVec2;
 
+/// Distance between the points of the fine spline that lines are reported on (m).
+pub const FINE_M: f64 = 1.0;
+
 /// A line on a fine grid, which shows oscillations between coarse points.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FineLine {
@@ -127,6 +130,44 @@ impl FineLine {
         self.segment_m.push(length);
         self.length_m += length;
         self.integral_kappa2_1pm += spline.integral(segment, t, end, |p| p.curvature * p.curvature * p.speed);
+    }
+
+    /// A quantity that is known at the given points, at each point of the spline: linear in between.
+    pub fn between(&self, at_given: &[f64]) -> Vec<f64> {
+        let n = at_given.len();
+        let value = |&(section, share): &(usize, f64)| {
+            let next = if self.closed {
+                (section + 1) % n
+            } else {
+                (section + 1).min(n - 1)
+            };
+            let here = section.min(n - 1);
+            at_given[here] + share * (at_given[next] - at_given[here])
+        };
+        self.section.iter().map(value).collect()
+    }
+
+    /// The time that this line loses on another (s), after each of these shares of the lap; nothing without a lap of both.
+    pub fn time_lost_s(&self, other: &Self, shares: &[f64]) -> Option<Vec<f64>> {
+        let clock = |line: &Self| {
+            let lap = line.lap.as_ref()?;
+            let (elapsed, end) = (lap.elapsed_s(), (line.length_m, lap.time_s));
+            let station = line.station_m.clone();
+            Some(move |share: f64| {
+                let at = share * end.0;
+                let after = station.partition_point(|s| *s <= at).max(1);
+                let (s0, t0) = (station[after - 1], elapsed[after - 1]);
+                let s1 = station.get(after).copied().unwrap_or(end.0);
+                let t1 = elapsed.get(after).copied().unwrap_or(end.1);
+                if s1 > s0 {
+                    t0 + (at - s0) / (s1 - s0) * (t1 - t0)
+                } else {
+                    t0
+                }
+            })
+        };
+        let (own, others) = (clock(self)?, clock(other)?);
+        Some(shares.iter().map(|&share| own(share) - others(share)).collect())
     }
 
     /// Time of the lap (s), if a car was given.

@@ -23,11 +23,11 @@ mod tests;
 
 pub(crate) use check::Polyline;
 pub use check::{Clearance, check_line};
-pub use fine::FineLine;
+pub use fine::{FINE_M, FineLine};
 pub use geometry::{Geometry, geometry};
 pub use parametrisation::Parametrisation;
 pub use perpendicular::{cross_sections_about, shares_across};
 pub use plan::{LinePlan, SectionRow, TERMS};
 pub use point_mass::{EnvelopeTable, PointMass};
 pub use profile::{LapProfile, lap_profile};
-pub use table::read_line;
+pub use table::{read_line, read_line_apart};

@@ -53,3 +53,21 @@ pub fn read_line(path: &Path) -> Result<Vec<DVec2>> {
     }
     Ok(points)
 }
+
+/// As [`read_line`], points at least `spacing_m` apart.
+///
+/// # Errors
+/// As there.
+pub fn read_line_apart(path: &Path, spacing_m: f64) -> Result<Vec<DVec2>> {
+    let mut points: Vec<DVec2> = Vec::new();
+    for point in read_line(path)? {
+        if points.last().is_none_or(|last| last.distance(point) >= spacing_m) {
+            points.push(point);
+        }
+    }
+    // The end of a closed line may repeat its start.
+    while points.len() > 3 && points[0].distance(points[points.len() - 1]) < 0.5 * spacing_m {
+        points.pop();
+    }
+    Ok(points)
+}

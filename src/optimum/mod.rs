@@ -18,6 +18,9 @@ mod geometry;
 mod lap;
 mod objective;
 mod point_mass;
+mod reference;
+#[cfg(feature = "studies")]
+mod solver_thread;
 #[cfg(test)]
 mod tests;
 mod time_model;
@@ -33,3 +36,8 @@ pub use geometry::LineMap;
 pub use lap::{Grip, GripEnvelope, SegmentBend, Slope};
 pub use objective::{Measures, ReferenceProblem, Weights};
 pub use point_mass::PointMassEnvelope;
+#[cfg(feature = "studies")]
+pub(crate) use reference::within_road;
+pub use reference::{OptimumLine, ReferenceSolvers, WeightedLine};
+#[cfg(feature = "studies")]
+pub(crate) use solver_thread::interruptible;

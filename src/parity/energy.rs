@@ -7,9 +7,9 @@ use crate::evaluate::Failure;
 use crate::evaluate::energy::{Free, HybridLine, HybridObjective, HybridProblem, Strategy};
 use crate::line::energy::{EnergyCar, EnergyLap, EnergyPlan, Gates, Mode, Traction};
 use crate::line::geometry;
-use crate::study::envelope::{EnvelopeSettings, car_envelope};
 use crate::study::raceline::{RacelineSettings, set_up};
 use crate::vehicle::Car;
+use crate::vehicle::limits::{SpeedRange, car_envelope};
 
 /// Strategies of each mode.
 const COUNT: usize = 64;
@@ -136,9 +136,9 @@ pub fn problems(sections: usize, modes: &[Mode]) -> Result<Vec<HybridProblem>> {
     let points_m = setup.cross_sections.points(&setup.cross_sections.reference);
     let length_m = geometry(&points_m, true).segment_m;
     let car = Car::bundled_hybrid()?;
-    let coarse = EnvelopeSettings {
+    let coarse = SpeedRange {
         step_mps: 8.0,
-        ..EnvelopeSettings::default()
+        ..SpeedRange::USUAL
     };
     let limits = car_envelope(&car, &coarse)?;
     let rows = limits.speeds.iter().map(|s| (s.row.v_mps, s.traction_mps2));

@@ -5,8 +5,10 @@ use super::synthetic_lap::{Lap, candidates, problem};
 use super::{Draws, Layer};
 use crate::error::Result;
 use crate::evaluate::replay::{CHANNEL_NAMES, ReplayProblem};
+use crate::scalar::{Counted, operations_of};
 use crate::study::identify::IdentifySettings;
-use crate::vehicle::Car;
+use crate::vehicle::model::runge_kutta_step;
+use crate::vehicle::{Car, CarInput, CarModel, CarState, MagicFormula};
 
 /// Cars that drive the lap.
 const COUNT: usize = 24;
@@ -22,6 +24,26 @@ const NEIGHBOURS: usize = 4;
 const TOLERANCE: f64 = 1e-4;
 /// The same, absolute, for cars whose cost is small (m/s, m/s^2, m/s^2, rad/s): the error in the mean.
 const FLOOR: [f64; 4] = [4e-6, 2e-5, 2e-5, 1e-6];
+
+/// Steps that a car takes over the log, and arithmetic operations of all of them.
+pub fn work_of(replay: &ReplayProblem) -> (usize, u64) {
+    let base = replay.free.base();
+    let samples: usize = replay.plan.windows.iter().map(|w| w.end - w.start - 1).sum();
+    let steps = samples * replay.plan.fractions.len();
+    let car = CarModel::<Counted, MagicFormula<Counted>>::from_parameters(|i| Counted(base[i] as f32));
+    let window = &replay.plan.windows[0];
+    let sample = &replay.plan.samples[window.start];
+    let input = CarInput {
+        wheel_speed: sample.wheel_speed.map(|x| Counted(x as f32)),
+        steer: Counted(sample.steer as f32),
+    };
+    let state = CarState::from_array(window.initial.map(|x| Counted(x as f32)));
+    // All steps are alike.
+    let per_step = operations_of(|| {
+        runge_kutta_step(&car, &state, |_| input, Counted(0.01), |_| {});
+    });
+    (steps, per_step * steps as u64)
+}
 
 /// What a channel's cost may be off that is `exact` in `f64`.
 pub fn allowed(channel: usize, exact: f64) -> f64 {

@@ -4,7 +4,8 @@ use super::cases::{Cases, Compared, layer_of};
 use super::{Draws, Layer};
 use crate::error::Result;
 use crate::evaluate::line::{LineObjective, LineProblem};
-use crate::line::{Parametrisation, geometry};
+use crate::line::{Parametrisation, geometry, kernel};
+use crate::scalar::{Counted, operations_of};
 use crate::study::raceline::{RacelineSettings, set_up};
 use std::f64::consts::TAU;
 
@@ -12,6 +13,30 @@ use std::f64::consts::TAU;
 const COUNT: usize = 64;
 /// Cross-sections of the circuit.
 const SECTIONS: usize = 360;
+
+/// Arithmetic operations of a line's shape and lap time; zero without a car.
+pub fn work_of(line: &LineProblem) -> u64 {
+    let plan = line.plan().stored::<Counted>();
+    let middle = vec![Counted(0.5); line.dimensions()];
+    line.envelope().map_or(0, |envelope| {
+        let envelope = envelope.stored::<Counted>();
+        operations_of(|| {
+            let mut course = kernel::Course::default();
+            let wanted = kernel::Wanted {
+                integral: false,
+                lap: true,
+            };
+            kernel::shape(&plan, wanted, &middle, &mut course);
+            kernel::lap_time(
+                &envelope,
+                plan.closed,
+                plan.start,
+                Counted(plan.entry),
+                &mut course,
+            );
+        })
+    })
+}
 
 /// How far single precision may be off, absolute, for each of [`LineObjective::ALL`], on a line that costs `exact` in
 /// `f64`; roads up to 14 m wide with bends of 30 m radius and more.

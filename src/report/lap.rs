@@ -225,6 +225,15 @@ impl LapView {
         self
     }
 
+    /// The circuit under the lines, with its sections, where there is one.
+    #[cfg(feature = "vehicle")]
+    #[must_use]
+    pub fn circuit(self, circuit: Option<&crate::track::Circuit>) -> Self {
+        let sections = circuit.iter().flat_map(|c| &c.sections);
+        let sections = sections.map(|s| (s.name.clone(), s.start_m, s.end_m));
+        self.sections(sections).road(circuit.map(Road::of))
+    }
+
     /// The map alone, coloured by the first line's first trace; nothing without a line on a road.
     pub fn track_map(&self, title: impl Into<String>) -> Option<TrackMap> {
         let line = self.lines.first().filter(|line| !line.place_m.is_empty())?;

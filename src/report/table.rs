@@ -78,6 +78,17 @@ impl<T> Rows<T> {
     }
 }
 
+impl<T: AsRef<[f64]>> Rows<T> {
+    /// Adds a column for each number of a row, by these names and units.
+    #[must_use]
+    pub fn each<N: Into<String>, U: Into<String>>(self, named: impl IntoIterator<Item = (N, U)>) -> Self {
+        let columns = named.into_iter().enumerate();
+        columns.fold(self, |rows, (k, (name, unit))| {
+            rows.number(name, unit, |row| row.as_ref()[k])
+        })
+    }
+}
+
 impl Column<'_> {
     pub(super) fn len(&self) -> usize {
         match &self.cells {

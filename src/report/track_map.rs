@@ -8,6 +8,8 @@ use plotters::style::RGBColor;
 use super::axis::{Axis, extent};
 use super::canvas::{Align, Canvas, Type, draw_to_file};
 use super::style::{FAINT_INK, FRAME, GREYED, INK, LABEL_PX, TICK_PX, TITLE_PX, viridis, with_unit};
+#[cfg(feature = "vehicle")]
+use crate::track::{Circuit, CrossSections, Section};
 use crate::{Error, Result};
 
 /// A road from above.
@@ -21,6 +23,44 @@ pub struct Road {
     pub closed: bool,
     /// Names and the places they belong to (m).
     pub names: Vec<(String, DVec2)>,
+}
+
+#[cfg(feature = "vehicle")]
+impl Road {
+    /// A circuit with the names of its sections.
+    pub fn of(circuit: &Circuit) -> Self {
+        let middle = |s: &Section| circuit.position_at(0.5 * (s.start_m + s.end_m));
+        let names = circuit.sections.iter().map(|s| (s.name.clone(), middle(s)));
+        Self {
+            left_edge_m: circuit.left_edge(),
+            right_edge_m: circuit.right_edge(),
+            closed: circuit.closed,
+            names: names.collect(),
+        }
+    }
+
+    /// The road of these cross-sections between edges (m, right and left), with the names of its corners, or of its sections
+    /// where corners have none.
+    pub fn across(road: &CrossSections, edges_m: &[Vec<DVec2>; 2]) -> Self {
+        let at = |station: f64| {
+            let i = road.station_m.partition_point(|s| *s < station);
+            let i = i.min(road.len() - 1);
+            0.5 * (road.left_m[i] + road.right_m[i])
+        };
+        let corners = road.corners.iter().map(|c| (c.name.clone(), at(c.station_m)));
+        let sections = road.sections.iter();
+        let sections = sections.map(|s| (s.name.clone(), at(0.5 * (s.start_m + s.end_m))));
+        Self {
+            left_edge_m: edges_m[1].clone(),
+            right_edge_m: edges_m[0].clone(),
+            closed: road.closed,
+            names: if road.corners.is_empty() {
+                sections.collect()
+            } else {
+                corners.collect()
+            },
+        }
+    }
 }
 
 /// A line on a road, coloured by a quantity.

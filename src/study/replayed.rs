@@ -3,14 +3,12 @@
 use crate::config::kinds::{Shared, shared};
 use crate::config::settings::{Declared, Flag, Role};
 use crate::error::Result;
-use crate::evaluate::replay::kernel::{CHANNELS, drive_window};
-use crate::evaluate::replay::{CHANNEL_NAMES, ReplayProblem, Window, open_evaluator};
+use crate::evaluate::replay::{CHANNEL_NAMES, open_evaluator};
 use crate::evaluate::{Evaluator, add_failures};
 use crate::study::framework::journal::{Journal, Recorder};
 use crate::study::framework::{Inputs, Progress, RunRecord, Study, Watch, Work};
 use crate::study::identify::{FreeParameter, IdentifySettings, ObjectiveChoice, Setup, set_up};
-use crate::vehicle::tyre::Tyre;
-use crate::vehicle::{Car, CarModel, LinearTyre, MagicFormula, TyreModel};
+use crate::vehicle::Car;
 
 /// The settings of an identification as another study of a replayed lap shares them. What concerns the search alone has no flag
 /// there.
@@ -27,6 +25,7 @@ pub(in crate::study) fn replay_settings(
 pub(in crate::study) fn windowed() -> IdentifySettings {
     IdentifySettings {
         window_s: Some(1.5),
+        settle_s: Some(0.5),
         ..IdentifySettings::default()
     }
 }
@@ -45,7 +44,7 @@ pub(in crate::study) fn set_up_channels(
         objectives: std::iter::once(ObjectiveChoice::All).chain(channels).collect(),
         ..settings.clone()
     })?;
-    start_as_base_drives(&mut setup.replay);
+    setup.replay.start_as_base_drives();
     Ok(setup)
 }
 
@@ -78,41 +77,6 @@ pub(in crate::study) fn ranges_about(
         .collect()
 }
 
-/// Lets every window start from the state in which the base car comes there, lateral speed and roll with it, which no
-/// log has: the base car's cost is then that of whole laps, and what others add is their own. A window that the base car
-/// does not reach starts as before.
-fn start_as_base_drives(replay: &mut ReplayProblem) {
-    fn chained<T: Tyre<f64>>(replay: &mut ReplayProblem, car: &CarModel<f64, T>) {
-        let mut before: Option<Window<f64>> = None;
-        for k in 0..replay.plan.windows.len() {
-            let window = replay.plan.windows[k];
-            if let Some(before) = before.filter(|b| b.start < window.start) {
-                let between = Window {
-                    end: window.start + 1,
-                    ..before
-                };
-                let (drives, state) =
-                    drive_window(car, &replay.plan, &between, |_: usize, _: [f64; CHANNELS]| {});
-                if drives {
-                    replay.plan.windows[k].initial = state.to_array();
-                }
-            }
-            before = Some(replay.plan.windows[k]);
-        }
-    }
-    let base = replay.free.base().to_vec();
-    match replay.tyre_model() {
-        TyreModel::MagicFormula => {
-            let car = CarModel::<f64, MagicFormula<f64>>::from_parameters(|i| base[i]);
-            chained(replay, &car);
-        }
-        TyreModel::Linear => {
-            let car = CarModel::<f64, LinearTyre<f64>>::from_parameters(|i| base[i]);
-            chained(replay, &car);
-        }
-    }
-}
-
 /// Candidates of one call of the evaluator: enough to fill any device for a moment, few enough to be interrupted.
 const BATCH: usize = 1024;
 
@@ -143,15 +107,15 @@ impl Driven {
 ///
 /// # Errors
 /// Those of the evaluator and of the journal.
-pub(in crate::study) fn drive<S: Study>(
-    settings: &S::Settings,
-    (replay, setup): (&IdentifySettings, &Setup),
+pub(in crate::study) fn drive<S: Study<Prepared = Setup, State = Journal>>(
+    replay: &IdentifySettings,
     populations: &[&[f64]],
-    work: Work<'_, Journal>,
+    work: Work<'_, S>,
 ) -> Result<Driven> {
     let watch = Watch::begin();
+    let setup = work.prepared;
     let mut evaluator = open_evaluator(&setup.replay, replay.backend, replay.adapter.as_deref())?;
-    let mut recorder = Recorder::of(S::NAME, settings, work.state, work.state_file)?;
+    let mut recorder = Recorder::of(S::NAME, work.settings, work.state, work.state_file)?;
     recorder.begin(inputs_of(S::NAME, setup), &evaluator.backend())?;
     let mut record = RunRecord::of(&evaluator.backend());
     let mut recorded = recorder.over(evaluator.as_mut());

@@ -41,6 +41,7 @@ mod covariance;
 pub mod device;
 mod difference;
 mod islands;
+mod lattice;
 pub mod metrics;
 mod minimise;
 mod mopso;
@@ -59,6 +60,7 @@ pub use cooperative::{CooperativeSettings, CooperativeSwarm};
 pub use covariance::{CovarianceSettings, CovarianceSwarm, OutOfBounds, Restarts};
 pub use difference::{DifferenceSettings, DifferenceSwarm};
 pub use islands::{AcceptsMigrants, Islands, Migration};
+pub use lattice::lattice;
 pub use minimise::{Indicators, Minimise, Minimum, Stopped, minimise, minimise_batch, minimise_several};
 #[cfg(feature = "studies")]
 pub(crate) use mopso::thinning::PER_PLACE;

@@ -20,10 +20,12 @@ mod calibration;
 mod channel_map;
 #[cfg(test)]
 mod conditioned;
+mod csv_headed;
 mod csv_native;
 mod delays;
 mod derived;
 mod driven;
+mod export;
 mod laps;
 mod log;
 mod make_log;
@@ -44,6 +46,7 @@ pub use calibration::{Calibration, CalibrationOptions, Finding, FindingKind, Swi
 pub use channel_map::{Axle, ChannelEntry, ChannelMap, Mapped};
 pub use csv_native::{COLUMNS, NativeFormat, write_native};
 pub use driven::DrivenLap;
+pub use export::{LapChannel, LapLabels, SampledLap};
 pub use laps::Lap;
 pub use log::{Log, LogOptions};
 pub use recording::{Channel, Clock, Format, Metadata, Recording, Unreadable};

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::path::Path;
 
 use super::recording::{Format, Reading, Recording};
-use super::{csv_native, motec_csv, motec_ld, text};
+use super::{csv_headed, csv_native, motec_csv, motec_ld, text};
 use crate::config::{LARGEST_LOG, read_bytes};
 use crate::{Error, Place, Result};
 
@@ -59,12 +59,7 @@ impl Recording {
         } else if first.cell(0).eq_ignore_ascii_case("Format") {
             motec_csv::parse(&text, path, reading)
         } else {
-            Err(Error::input(
-                path,
-                Place::line(first.line),
-                text::shown(first.cell(0)),
-                "a header row with a time_s column, a MoTeC CSV export (first cell \"Format\"), or a .ld file",
-            ))
+            csv_headed::parse(&text, path, reading)
         }
     }
 }

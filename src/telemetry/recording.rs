@@ -14,6 +14,8 @@ pub enum Format {
     Native,
     /// A CSV export of MoTeC i2, or one laid out like it (AiM Race Studio writes the same layout).
     MotecCsv,
+    /// A table whose header has names with their units.
+    Headed,
     /// MoTeC's binary `.ld`.
     MotecLd,
 }

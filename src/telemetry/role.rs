@@ -204,6 +204,7 @@ impl Role {
                 "velocity",
                 "gpsspeed",
                 "speed",
+                "vx",
             ],
             Self::Ax => &[
                 "axmps2",
@@ -218,6 +219,7 @@ impl Role {
                 "accelerometerx",
                 "gpslonacc",
                 "glong",
+                "ax",
             ],
             Self::Ay => &[
                 "aymps2",
@@ -231,6 +233,7 @@ impl Role {
                 "accelerometery",
                 "gpslatacc",
                 "glat",
+                "ay",
             ],
             Self::YawRate => &[
                 "yawrateradps",

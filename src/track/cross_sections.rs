@@ -177,6 +177,55 @@ impl CrossSections {
         })
     }
 
+    /// Where the section of this name, or of one of its names, begins (m), and its length (m).
+    ///
+    /// # Errors
+    /// [`Error::Input`] listing the names when there is none of this one.
+    pub fn section_named(&self, name: &str) -> Result<(f64, f64)> {
+        let called = |all: &str| all == name || all.split('/').any(|one| one.trim() == name);
+        let Some(section) = self.sections.iter().find(|s| called(&s.name)) else {
+            let known: Vec<&str> = self.sections.iter().map(|s| s.name.as_str()).collect();
+            let expected = if known.is_empty() {
+                "none: the circuit names no sections".to_owned()
+            } else {
+                format!("one of {}", known.join(", "))
+            };
+            return Err(Error::input(&self.name, "section", name, expected));
+        };
+        Ok((section.start_m, section.length_m()))
+    }
+
+    /// The first cross-section at or after a station (m).
+    pub fn first_from(&self, from_m: f64) -> usize {
+        let from_m = if self.closed {
+            from_m.rem_euclid(self.length_m)
+        } else {
+            from_m
+        };
+        let first = self.station_m.partition_point(|s| *s < from_m);
+        if self.closed {
+            first % self.len()
+        } else {
+            first.min(self.len() - 2)
+        }
+    }
+
+    /// The cross-sections from a station (m) on over a length (m), and some `more`, as an open road.
+    ///
+    /// # Errors
+    /// As [`CrossSections::stretch`].
+    pub fn stretch_from(&self, from_m: f64, length_m: f64, more: usize) -> Result<Self> {
+        let first = self.first_from(from_m);
+        let spacing_m = self.length_m / self.len() as f64;
+        let most = if self.closed {
+            self.len()
+        } else {
+            self.len() - first
+        };
+        let count = (length_m / spacing_m).round() as usize + 1 + more;
+        self.stretch(first, count.clamp(2, most))
+    }
+
     /// The points of a line (m), one per cross-section, from its `alpha` at every cross-section.
     pub fn points(&self, alpha: &[f64]) -> Vec<DVec2> {
         self.right_m

@@ -1,10 +1,12 @@
 //! A car as its file has it: TOML with units in the keys, and `.tir` files for the tyres.
 
 use super::chassis::Chassis;
+use super::facts::CarFacts;
 use super::hybrid::Hybrid;
 use super::parameters::ParameterInfo;
 use super::powertrain::Powertrain;
 use super::tyre::{LinearTyre, TyreCoefficients, TyreFile, TyreModel};
+use crate::config::settings::Settings;
 use crate::config::{Document, Table, read_text};
 use crate::error::{Error, Result};
 use crate::files::write_whole;
@@ -160,6 +162,10 @@ impl Car {
             }
             None => None,
         };
+        if let Some(table) = root.table("asked")? {
+            let facts = CarFacts::read_table(table, Path::new(""))?;
+            facts.validate().map_err(|error| error.of_file(file))?;
+        }
         let car = Self {
             name: root.name("name")?.unwrap_or("unnamed car").to_owned(),
             chassis,
@@ -181,20 +187,40 @@ impl Car {
     /// # Errors
     /// [`Error::Io`] if a file cannot be written.
     pub fn write(&self, folder: &Path, stem: &str) -> Result<()> {
+        self.write_with(folder, stem, "")
+    }
+
+    /// As [`Car::write`], with a comment of some lines at the head of the car's file.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if a file cannot be written.
+    pub fn write_with(&self, folder: &Path, stem: &str, comment: &str) -> Result<()> {
+        let comment: String = comment.lines().map(|line| format!("# {line}\n")).collect();
+        let mut files = self.files(stem);
+        if let Some((_, text)) = files.last_mut() {
+            text.insert_str(0, &comment);
+        }
+        let mut files = files.into_iter();
+        files.try_for_each(|(name, text)| write_whole(folder.join(name), text.as_bytes()))
+    }
+
+    /// The names and texts of the tyre files and, last, of `<stem>.toml`, which names them.
+    pub fn files(&self, stem: &str) -> Vec<(String, String)> {
+        let mut files = Vec::new();
         let mut text = format!("name = {}\n\n[chassis]\n", toml_string(&self.name));
         push_parameters(&mut text, Chassis::<f64>::PARAMETERS, &self.chassis.to_flat());
         match &self.tyres {
             Tyres::MagicFormula { front, rear } if front == rear => {
                 let name = format!("{stem}.tir");
-                write_file(&folder.join(&name), &front.to_text())?;
                 text.push_str(&format!("\n[tyres]\nboth = \"{name}\"\n"));
+                files.push((name, front.to_text()));
             }
             Tyres::MagicFormula { front, rear } => {
                 text.push_str("\n[tyres]\n");
                 for (axle, tyre) in [("front", front), ("rear", rear)] {
                     let name = format!("{stem}_{axle}.tir");
-                    write_file(&folder.join(&name), &tyre.to_text())?;
                     text.push_str(&format!("{axle} = \"{name}\"\n"));
+                    files.push((name, tyre.to_text()));
                 }
             }
             Tyres::Linear { front, rear } => {
@@ -216,7 +242,8 @@ impl Car {
             text.push('\n');
             text.push_str(&hybrid.to_toml());
         }
-        write_file(&folder.join(format!("{stem}.toml")), &text)
+        files.push((format!("{stem}.toml"), text));
+        files
     }
 
     /// Which tyre model the car has.
@@ -392,8 +419,4 @@ fn read_tyres(table: &Table<'_>, tyre: impl Fn(&str) -> Result<TyreFile>) -> Res
 
 fn toml_string(text: &str) -> String {
     toml::Value::String(text.to_owned()).to_string()
-}
-
-fn write_file(path: &Path, text: &str) -> Result<()> {
-    write_whole(path, text.as_bytes())
 }

@@ -60,6 +60,34 @@ pub trait SteadyCar: Send + Sync {
     /// first part, up to where the steering angle turns back. `None` beyond that part.
     fn trim_at(&self, speed: f64, steer: f64, curve: &[Trim]) -> Option<Trim>;
 
+    /// The trim of greatest lateral acceleration of a curve that [`SteadyCar::cornering`] found at `speed` (m/s), up to a steering
+    /// angle (rad), to rounding. `None` without a trim up to there.
+    fn greatest_cornering(&self, speed: f64, lock: f64, curve: &[Trim]) -> Option<Trim> {
+        let within = curve.iter().take_while(|t| t.steer_rad <= lock);
+        let (top, _) = within
+            .enumerate()
+            .max_by(|(_, a), (_, b)| a.ay_mps2.total_cmp(&b.ay_mps2))?;
+        let mut low = curve[top.saturating_sub(1)].steer_rad;
+        let mut high = curve.get(top + 1).map_or(lock, |t| t.steer_rad).min(lock);
+        let mut best = curve[top];
+        // By thirds: the curve is bent one way about its peak. Each round leaves two thirds of the range.
+        for _ in 0..40 {
+            let (a, b) = (low + (high - low) / 3.0, high - (high - low) / 3.0);
+            let (at_a, at_b) = (self.trim_at(speed, a, curve)?, self.trim_at(speed, b, curve)?);
+            for trim in [at_a, at_b] {
+                if trim.ay_mps2 > best.ay_mps2 {
+                    best = trim;
+                }
+            }
+            if at_a.ay_mps2 < at_b.ay_mps2 {
+                low = a
+            } else {
+                high = b
+            }
+        }
+        Some(best)
+    }
+
     /// The greatest deceleration by the tyres (m/s^2) running straight at `speed` (m/s), each axle at the slip at
     /// which it brakes hardest.
     fn greatest_braking(&self, speed: f64) -> f64;

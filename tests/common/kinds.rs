@@ -25,8 +25,8 @@ use lapswarm::line::energy::{EnergyCar, EnergyPlan, Gates, Mode, Traction};
 use lapswarm::line::{Parametrisation, geometry};
 use lapswarm::parity::synthetic_lap::Lap;
 use lapswarm::parity::{Draws, drive, energy, laps, line_tolerances, steady};
-use lapswarm::study::envelope::{EnvelopeSettings, car_envelope};
 use lapswarm::vehicle::Car;
+use lapswarm::vehicle::limits::{SpeedRange, car_envelope};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// Devices and their faults are of the whole process: one test at a time.
@@ -75,9 +75,9 @@ pub struct Kind<'a> {
 
 fn hybrid() -> HybridProblem {
     let car = Car::load("gt_hybrid").expect("bundled");
-    let coarse = EnvelopeSettings {
+    let coarse = SpeedRange {
         step_mps: 8.0,
-        ..EnvelopeSettings::default()
+        ..SpeedRange::USUAL
     };
     let limits = car_envelope(&car, &coarse).expect("limits");
     let rows = limits.speeds.iter().map(|s| (s.row.v_mps, s.traction_mps2));

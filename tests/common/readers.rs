@@ -1,9 +1,8 @@
 //! Every reader given bytes from anywhere: what it takes is sound, what it refuses it refuses by file and place, and it never
 //! panics. The fuzz targets of `fuzz/` and the tests of what they found share this file.
 
-use lapswarm::line::read_line;
+use lapswarm::line::{read_line, read_line_apart};
 use lapswarm::report::compare::{self, Run};
-use lapswarm::study::hybrid;
 use lapswarm::study::registry::STUDIES;
 use lapswarm::study::sweep::{self, SWEEP_FILE, SweepSettings};
 use lapswarm::swarm::checkpoint::{self, Checkpoint};
@@ -366,7 +365,7 @@ pub fn run_folder(data: &[u8]) {
 
 /// A line that a hybrid is driven on.
 pub fn line(data: &[u8]) {
-    if let Some(points) = taken(hybrid::read_line(&on_disk("driven.csv", data), 4.0)) {
+    if let Some(points) = taken(read_line_apart(&on_disk("driven.csv", data), 4.0)) {
         assert!(points.iter().all(|p| p.is_finite()));
     }
 }

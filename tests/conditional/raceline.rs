@@ -5,11 +5,12 @@ use lapswarm::config::settings::Settings;
 use lapswarm::evaluate::line::{CpuLineEvaluator, LineObjective, LineProblem};
 use lapswarm::evaluate::{BackendChoice, Evaluator};
 use lapswarm::line::{FineLine, Parametrisation, cross_sections_about};
-use lapswarm::optimum::{DescentSettings, LineMap, PointMassEnvelope, ReferenceProblem, fastest};
+use lapswarm::optimum::{
+    DescentSettings, LineMap, PointMassEnvelope, ReferenceProblem, ReferenceSolvers, fastest,
+};
 use lapswarm::study::framework::{solve_unobserved, write_results};
 use lapswarm::study::raceline::{
-    LineAlgorithm, ObjectiveOutcome, Outcome, Raceline, RacelineSettings, ReferenceSolvers, ReportedLine,
-    Setup, set_up,
+    LineAlgorithm, ObjectiveOutcome, Outcome, Raceline, RacelineSettings, ReportedLine, Setup, set_up,
 };
 use std::path::PathBuf;
 
@@ -147,7 +148,7 @@ fn fastest_lines(cases: &[(String, Option<PathBuf>, usize)]) {
             continue;
         }
         let minimum = minimum_time_s(&setup, &found.exact.as_ref().unwrap().alpha);
-        let solvers = ReferenceSolvers::new(&setup, &settings).unwrap();
+        let solvers = ReferenceSolvers::new(&setup.cross_sections, &setup.car, settings.entry_mps).unwrap();
         let led = solvers.fastest_about(&found.best.alpha).unwrap().unwrap();
         let led = setup.report("led", &led.x, &settings).unwrap().lap_time_fine_s();
         println!("{sections} cross-sections: led on by the local search {led:.3} s, minimum {minimum:.3} s");

@@ -5,7 +5,7 @@ use crate::common::runs::{finish, same_results, start, summary};
 use lapswarm::evaluate::BackendChoice;
 use lapswarm::evaluate::gpu::faults::{self, Fault};
 use lapswarm::evaluate::line::LineObjective;
-use lapswarm::study::framework::run_folder::STATE;
+use lapswarm::files::run_folder::STATE;
 use lapswarm::study::framework::state_file::StateFile;
 use lapswarm::study::framework::{Progress, Study, Work};
 use lapswarm::study::raceline::{
@@ -34,13 +34,15 @@ fn find_lines(
     (state, state_file): (Option<LinesState>, &mut StateFile),
     mut observe: impl FnMut(&Progress) -> ControlFlow<()>,
 ) -> lapswarm::Result<Outcome> {
-    let work = Work {
+    let work = Work::<Raceline> {
+        settings,
+        prepared: setup,
         state,
         state_file,
         observe: &mut observe,
         stop: Arc::default(),
     };
-    Raceline::solve(settings, setup, work).map(|found| found.expect("lines"))
+    Raceline::solve(work).map(|found| found.expect("lines"))
 }
 
 /// What went wrong with devices before a run was broken off is told at its end, and what ended it is what it names.

@@ -4,7 +4,7 @@ use crate::common::runs::{
     Held, along, finish, nothing_half_written, nothing_on_its_way, same_results, start, summary,
 };
 use crate::common::studies;
-use lapswarm::study::framework::run_folder::STATE;
+use lapswarm::files::run_folder::STATE;
 use lapswarm::study::registry::STUDIES;
 use serde_json::Value;
 use std::path::Path;

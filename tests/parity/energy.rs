@@ -13,8 +13,8 @@ use lapswarm::evaluate::{Evaluator, Failure};
 use lapswarm::line::energy::{EnergyCar, EnergyLap, EnergyPlan, Gates, Mode, Traction};
 use lapswarm::line::{Parametrisation, geometry};
 use lapswarm::parity::energy::{Allowed, allowed};
-use lapswarm::study::envelope::{EnvelopeSettings, car_envelope};
 use lapswarm::vehicle::Car;
+use lapswarm::vehicle::limits::{SpeedRange, car_envelope};
 
 tests! {
     laps_with_energy_agree_and_balance: also_device,
@@ -23,9 +23,9 @@ tests! {
 
 fn hybrid_car(exponent: f64) -> EnergyCar {
     let car = Car::load("gt_hybrid").expect("bundled");
-    let coarse = EnvelopeSettings {
+    let coarse = SpeedRange {
         step_mps: 8.0,
-        ..EnvelopeSettings::default()
+        ..SpeedRange::USUAL
     };
     let limits = car_envelope(&car, &coarse).expect("limits");
     let rows = limits

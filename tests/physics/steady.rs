@@ -5,10 +5,9 @@ use crate::common::{Random, bundled_car, linear_car};
 use lapswarm::evaluate::steady::kernel::Settling;
 use lapswarm::evaluate::steady::{CpuSteadyEvaluator, SETTLED, SteadyObjective, SteadyProblem};
 use lapswarm::evaluate::{BackendChoice, Failure};
-use lapswarm::study::envelope::{
-    EnvelopeAtSpeed, EnvelopeSettings, EnvelopeStudy, Prepared, car_envelope, speeds_of,
-};
+use lapswarm::study::envelope::{EnvelopeSettings, EnvelopeStudy, Prepared};
 use lapswarm::study::framework::solve_unobserved;
+use lapswarm::vehicle::limits::{EnvelopeAtSpeed, SpeedRange, car_envelope};
 use lapswarm::vehicle::{Car, Turn, Tyres, steady_car};
 
 fn on_circles(car: Car) -> SteadyProblem {
@@ -116,14 +115,18 @@ fn cars_settle_on_the_curve_of_trims() {
 
 #[test]
 fn the_populations_ridge_is_that_of_the_curves() {
-    let settings = EnvelopeSettings {
+    let range = SpeedRange {
         step_mps: 13.0,
+        ..SpeedRange::USUAL
+    };
+    let settings = EnvelopeSettings {
+        step_mps: range.step_mps,
         steers: 96,
         backend: BackendChoice::Simd,
         ..EnvelopeSettings::default()
     };
     for car in [bundled_car(), random_car(7)] {
-        let speeds = speeds_of(&car, &settings).expect("speeds");
+        let speeds = range.speeds_of(&car).expect("speeds");
         let prepared = Prepared { car, speeds };
         let solved = || solve_unobserved::<EnvelopeStudy>(&settings, &prepared).expect("a surface");
         let found = solved();
@@ -173,11 +176,11 @@ fn limits_hold_for_turns_to_both_sides() {
     let limits_of = |share: f64| {
         let mut car = bundled_car();
         (car.chassis.left_share_front, car.chassis.left_share_rear) = (share, share);
-        let settings = EnvelopeSettings {
+        let range = SpeedRange {
             step_mps: 15.0,
-            ..EnvelopeSettings::default()
+            ..SpeedRange::USUAL
         };
-        car_envelope(&car, &settings).expect("a car that corners").speeds
+        car_envelope(&car, &range).expect("a car that corners").speeds
     };
     let left = |s: &EnvelopeAtSpeed| s.cornering.iter().map(|t| t.ay_mps2).fold(0.0, f64::max);
     let (light, heavy, even) = (limits_of(0.4), limits_of(0.6), limits_of(0.5));

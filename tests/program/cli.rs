@@ -10,8 +10,9 @@ use lapswarm::study::run::RunSettings;
 use lapswarm::study::sensitivity::SensitivitySettings;
 use lapswarm::study::surface::SurfaceSettings;
 use lapswarm::study::transient::TransientSettings;
+use std::io::Write;
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::{Command, Output, Stdio};
 
 fn lapswarm(folder: &Path, arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_lapswarm"))
@@ -19,6 +20,22 @@ fn lapswarm(folder: &Path, arguments: &[&str]) -> Output {
         .current_dir(folder)
         .output()
         .expect("the program starts")
+}
+
+/// As [`lapswarm`], with answers on stdin.
+fn answered(folder: &Path, arguments: &[&str], answers: &str) -> Output {
+    let mut child = Command::new(env!("CARGO_BIN_EXE_lapswarm"))
+        .args(arguments)
+        .current_dir(folder)
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the program starts");
+    let mut stdin = child.stdin.take().expect("its stdin");
+    stdin.write_all(answers.as_bytes()).expect("it reads");
+    drop(stdin);
+    child.wait_with_output().expect("it ends")
 }
 
 fn text(bytes: &[u8]) -> String {
@@ -90,6 +107,139 @@ fn files_to_start_from_are_sound_and_never_overwrite() {
         "{}",
         text(&checked.stdout)
     );
+}
+
+/// The car of a kart, from figures that its driver knows.
+const KART: &str = "mass_kg=160,wheelbase_m=1.04,front_track_m=1.1,rear_track_m=1.15,cg_height_m=0.25,tyre_radius_m=0.135,\
+                    corner_g=1.9,corner_kmh=60,roll_deg_per_g=0.5,power_kw=22,redline_rpm=14000,gears=1,top_speed_kmh=115";
+
+#[test]
+fn a_car_is_made_of_what_is_known_and_compared_with_it() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let made = lapswarm(folder.path(), &["init", "car", "kart.toml", "--set", KART]);
+    assert!(made.status.success(), "{}", text(&made.stderr));
+    assert_eq!(text(&made.stdout), "kart.tir\nkart.toml\n");
+    let checked = lapswarm(folder.path(), &["check", "kart.toml", "--draw", "drawn"]);
+    assert!(checked.status.success(), "{}", text(&checked.stderr));
+    let told = text(&checked.stdout);
+    // What the car does is within a part in a hundred of what was asked.
+    let figures = [
+        ("mass", 160.0),
+        ("wheelbase", 1.04),
+        ("cornering at 60 km/h", 1.9),
+        ("power", 22.0),
+        ("top speed", 115.0),
+    ];
+    for (figure, asked) in figures {
+        let line = told.lines().find(|line| line.trim_start().starts_with(figure));
+        let last = line.and_then(|line| line.split_whitespace().last()?.parse::<f64>().ok());
+        assert!(
+            last.is_some_and(|x| (x / asked - 1.0).abs() < 0.01),
+            "{figure}: {told}"
+        );
+    }
+    assert!(told.contains("understeer gradient"), "{told}");
+    let picture = std::fs::read_to_string(folder.path().join("drawn/kart.svg")).expect("a picture");
+    assert!(picture.contains("<svg") && picture.contains("polyline"));
+    let run = [
+        "envelope",
+        "--car",
+        "kart.toml",
+        "--from-mps",
+        "8",
+        "--to-mps",
+        "30",
+        "--quiet",
+    ];
+    let found = lapswarm(folder.path(), &run);
+    assert!(found.status.success(), "{}", text(&found.stderr));
+
+    // Asked for on stdin: an empty line takes what is shown, one that cannot be is asked for again.
+    let answers = "asked car\nheavy\n-5\n900\n\n";
+    let asked = answered(folder.path(), &["init", "car", "asked.toml", "--ask"], answers);
+    assert!(asked.status.success(), "{}", text(&asked.stderr));
+    let told = text(&asked.stderr);
+    assert_eq!(
+        told.matches("Mass with driver and fuel (50 to 50000 kg) [1245.0]: ")
+            .count(),
+        3,
+        "{told}"
+    );
+    let car = std::fs::read_to_string(folder.path().join("asked.toml")).expect("a car");
+    assert!(
+        car.contains("name = \"asked car\"") && car.contains("mass_kg = 900.0"),
+        "{car}"
+    );
+
+    for (arguments, expected) in [
+        (["init", "car", "a.toml", "--set", "mass=900"], "mass_kg"),
+        (
+            ["init", "car", "a.toml", "--set", "mass_kg=heavy"],
+            "expected a number",
+        ),
+        (["init", "car", "a.toml", "--set", "mass_kg=1"], "50 to 50000"),
+        (
+            ["init", "car", "a.toml", "--set", "corner_g=1,tyre_friction=1"],
+            "not both",
+        ),
+        (["init", "run", "a.toml", "--set", "mass_kg=900"], "init car"),
+    ] {
+        let refused = lapswarm(folder.path(), &arguments);
+        assert_eq!(refused.status.code(), Some(2), "{arguments:?}");
+        let told = text(&refused.stderr);
+        assert!(told.contains(expected), "{arguments:?}: {told}");
+        assert!(!folder.path().join("a.toml").exists());
+    }
+}
+
+#[test]
+fn laps_are_exported_as_loggers_write_them() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let root = folder.path();
+    let simulated = lapswarm(
+        root,
+        &[
+            "simulate",
+            "--track",
+            "stadium:300:80:12",
+            "--out",
+            "lap",
+            "--quiet",
+        ],
+    );
+    assert!(simulated.status.success(), "{}", text(&simulated.stderr));
+    let exported = lapswarm(root, &["export", "lap", "lap/lap.csv", "--rate", "20", "--json"]);
+    assert!(exported.status.success(), "{}", text(&exported.stderr));
+    let said: serde_json::Value = serde_json::from_slice(&exported.stdout).expect("JSON");
+    let names: Vec<&str> = said["files"]
+        .as_array()
+        .expect("files")
+        .iter()
+        .filter_map(|f| f.as_str())
+        .collect();
+    let wanted = [
+        "lap_lap.csv",
+        "lap_lap.ld",
+        "lap_lap.ldx",
+        "lap.csv",
+        "lap.ld",
+        "lap.ldx",
+    ];
+    assert_eq!(names, wanted.map(|name| format!("export/{name}")));
+    for name in ["export/lap.ld", "export/lap.csv"] {
+        let checked = lapswarm(root, &["check", "--kind", "log", name]);
+        let told = text(&checked.stdout);
+        assert!(
+            checked.status.success() && told.contains("at 20 Hz"),
+            "{told} {}",
+            text(&checked.stderr)
+        );
+    }
+    let again = lapswarm(root, &["export", "lap/lap.csv"]);
+    assert_eq!(again.status.code(), Some(2));
+    assert!(text(&again.stderr).contains("nothing is overwritten"));
+    let line = lapswarm(root, &["export", "lap/manifest.json", "--out", "other"]);
+    assert_eq!(line.status.code(), Some(2), "{}", text(&line.stderr));
 }
 
 #[test]
@@ -344,7 +494,7 @@ fn completions_name_every_command() {
     let printed = lapswarm(folder.path(), &["completions", "bash"]);
     let script = text(&printed.stdout);
     let others = [
-        "parity", "bench", "check", "init", "sweep", "simulate", "report", "devices",
+        "parity", "bench", "check", "init", "sweep", "simulate", "report", "export", "devices",
     ];
     for command in registry::names().into_iter().chain(others) {
         assert!(script.contains(command), "{command}");

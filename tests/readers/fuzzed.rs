@@ -8,9 +8,9 @@ mod readers;
 
 use crate::small_studies::small;
 use lapswarm::evaluate::{Objective, Problem, Variable};
+use lapswarm::files::run_folder::STATE;
 use lapswarm::study::framework::Request;
 use lapswarm::study::framework::memory::USUAL_MIB;
-use lapswarm::study::framework::run_folder::STATE;
 use lapswarm::study::registry::STUDIES;
 use lapswarm::study::sweep::{Row, SweepSettings};
 use lapswarm::swarm::checkpoint::{self, Checkpoint};

@@ -25,11 +25,12 @@ fn solve<S: Study>(
     (state, state_file): (Option<S::State>, &mut StateFile),
     mut observe: impl FnMut(&Progress) -> ControlFlow<()>,
 ) -> lapswarm::Result<Option<S::Outcome>> {
-    let work = Work {
+    S::solve(Work {
+        settings,
+        prepared,
         state,
         state_file,
         observe: &mut observe,
         stop: Arc::default(),
-    };
-    S::solve(settings, prepared, work)
+    })
 }

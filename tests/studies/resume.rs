@@ -4,9 +4,9 @@ use crate::solve;
 use lapswarm::Error;
 use lapswarm::evaluate::line::LineObjective;
 use lapswarm::evaluate::{BackendChoice, BackendInfo, Evaluation, Evaluator, FAILED_COST, Failure, Problem};
-use lapswarm::study::framework::run_folder::STATE;
+use lapswarm::files::run_folder::STATE;
 use lapswarm::study::framework::state_file::StateFile;
-use lapswarm::study::framework::{Progress, Study, solve_unobserved, write_results};
+use lapswarm::study::framework::{Progress, Solved, Study, solve_unobserved, write_results};
 use lapswarm::study::identify::{
     self, Identify, IdentifySettings, ObjectiveChoice, SearchState, Setup, search_with,
 };
@@ -37,7 +37,11 @@ fn told(settings: &IdentifySettings, setup: &Setup, outcome: &identify::Outcome)
         .iter()
         .map(|r| (r.iteration, r.evaluations, r.best.clone(), r.median, r.failed))
         .collect();
-    let summary = Identify::summarise(settings, setup, outcome);
+    let summary = Identify::summarise(&Solved {
+        settings,
+        prepared: setup,
+        outcome,
+    });
     let summary = timeless(serde_json::to_value(&summary).unwrap());
     format!(
         "{:?} {:?} {:?} {history:?} {summary}",
@@ -216,7 +220,11 @@ fn lines() -> RacelineSettings {
 }
 
 fn lines_told(settings: &RacelineSettings, setup: &raceline::Setup, outcome: &raceline::Outcome) -> String {
-    let summary = Raceline::summarise(settings, setup, outcome);
+    let summary = Raceline::summarise(&Solved {
+        settings,
+        prepared: setup,
+        outcome,
+    });
     let each = outcome.objectives.iter();
     let best: Vec<_> = each.map(|o| (&o.best.alpha, &o.history)).collect();
     format!(

@@ -15,16 +15,15 @@ use lapswarm::evaluate::replay::ReplayProblem;
 use lapswarm::evaluate::simd::InstructionSet;
 use lapswarm::evaluate::steady::SteadyProblem;
 use lapswarm::evaluate::{BackendChoice, CpuBackend, Evaluator, GpuBackend, OnDevice, Problem, SimdBackend};
+use lapswarm::line::Parametrisation;
 use lapswarm::line::energy::Mode;
-use lapswarm::line::{Parametrisation, kernel};
 use lapswarm::parity;
 use lapswarm::random::Random;
 use lapswarm::report::Figure;
 use lapswarm::scalar::{Counted, operations_of};
 use lapswarm::study::identify::{IdentifySettings, set_up};
 use lapswarm::study::raceline::{self, RacelineSettings};
-use lapswarm::vehicle::model::runge_kutta_step;
-use lapswarm::vehicle::{Car, CarInput, CarModel, CarState, MagicFormula};
+use lapswarm::vehicle::Car;
 use lapswarm::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -149,24 +148,11 @@ fn middle(problem: &Problem) -> Vec<f64> {
 
 fn replay() -> Result<Case<ReplayProblem>> {
     let replay = set_up(&IdentifySettings::default())?.replay;
-    let base = replay.free.base();
-    let samples: usize = replay.plan.windows.iter().map(|w| w.end - w.start - 1).sum();
-    let steps = samples * replay.plan.fractions.len();
-    let car = CarModel::<Counted, MagicFormula<Counted>>::from_parameters(|i| Counted(base[i] as f32));
-    let window = &replay.plan.windows[0];
-    let sample = &replay.plan.samples[window.start];
-    let input = CarInput {
-        wheel_speed: sample.wheel_speed.map(|x| Counted(x as f32)),
-        steer: Counted(sample.steer as f32),
-    };
-    let state = CarState::from_array(window.initial.map(|x| Counted(x as f32)));
-    let per_step = operations_of(|| {
-        runge_kutta_step(&car, &state, |_| input, Counted(0.01), |_| {});
-    });
+    let (steps, operations) = parity::laps::work_of(&replay);
     Ok(Case {
-        about: spread(&replay.free.values_in(base)),
+        about: spread(&replay.free.values_in(replay.free.base())),
         steps: Some(steps),
-        operations: per_step * steps as u64,
+        operations,
         kind: replay,
     })
 }
@@ -180,31 +166,10 @@ fn line() -> Result<Case<LineProblem>> {
     let objectives = [LineObjective::LapTime];
     let line = LineProblem::new(setup.cross_sections, way, &objectives, Some(setup.car), 0.0)?;
     let dimensions = line.dimensions();
-    let plan = line.plan().stored::<Counted>();
-    let middle = vec![Counted(0.5); dimensions];
-    let mut operations = 0;
-    if let Some(envelope) = line.envelope() {
-        let envelope = envelope.stored::<Counted>();
-        operations = operations_of(|| {
-            let mut course = kernel::Course::default();
-            let wanted = kernel::Wanted {
-                integral: false,
-                lap: true,
-            };
-            kernel::shape(&plan, wanted, &middle, &mut course);
-            kernel::lap_time(
-                &envelope,
-                plan.closed,
-                plan.start,
-                Counted(plan.entry),
-                &mut course,
-            );
-        });
-    }
     Ok(Case {
         about: vec![(0.5, 0.3); dimensions],
         steps: None,
-        operations,
+        operations: parity::lines::work_of(&line),
         kind: line,
     })
 }

@@ -8,12 +8,13 @@ use clap::builder::PossibleValuesParser;
 use lapswarm::evaluate::line::{LineObjective, LineProblem};
 use lapswarm::evaluate::replay::{CHANNEL_NAMES, ReplayProblem};
 use lapswarm::evaluate::{BackendChoice, Evaluator, OnDevice, open_evaluator};
+use lapswarm::optimum::ReferenceSolvers;
 use lapswarm::random::Random;
 use lapswarm::report::Figure;
 use lapswarm::study::identify::{self, IdentifySettings, ObjectiveChoice};
-use lapswarm::study::raceline::{self, RacelineSettings, ReferenceSolvers};
+use lapswarm::study::raceline::{self, RacelineSettings};
 use lapswarm::swarm::comparison::quartiles;
-use lapswarm::swarm::metrics::hypervolume;
+use lapswarm::swarm::metrics::{Scale, hypervolume};
 use lapswarm::swarm::{MULTI_OBJECTIVE, Sizes, several_by_name};
 use lapswarm::{Error, Result};
 use serde::Serialize;
@@ -194,7 +195,7 @@ fn raceline(arguments: &Arguments) -> Result<Case<LineProblem>> {
         ..RacelineSettings::default()
     };
     let setup = raceline::set_up(&settings)?;
-    let solvers = ReferenceSolvers::new(&setup, &settings)?;
+    let solvers = ReferenceSolvers::new(&setup.cross_sections, &setup.car, settings.entry_mps)?;
     let mut known = Vec::new();
     for objective in &settings.objectives {
         known.extend(solvers.best(*objective)?.map(|line| line.alpha));
@@ -333,14 +334,7 @@ impl<K: OnDevice> Case<K> {
 
     /// Share of the box that a front dominates.
     fn quality(&self, front: &[Vec<f64>]) -> Result<f64> {
-        let share = |row: &Vec<f64>| {
-            let bounds = self.ideal.iter().zip(&self.reference);
-            row.iter()
-                .zip(bounds)
-                .map(|(x, (ideal, reference))| (x - ideal) / (reference - ideal))
-                .collect()
-        };
-        let shares: Vec<Vec<f64>> = front.iter().map(share).collect();
+        let shares = Scale::between(&self.ideal, &self.reference).apply(front);
         hypervolume(&shares, &vec![1.0; self.ideal.len()])
     }
 }

@@ -10,7 +10,7 @@ use lapswarm::evaluate::{BackendChoice, Evaluator};
 use lapswarm::swarm::device::DeviceMopso;
 use lapswarm::swarm::metrics::{Scale, hypervolume};
 use lapswarm::swarm::problems::{GpuTestEvaluator, SimdTestEvaluator, TestProblem};
-use lapswarm::swarm::{MANY, Mopso, MopsoSettings, Optimiser, PsoSettings};
+use lapswarm::swarm::{MANY, Mopso, MopsoSettings, Optimiser};
 use lapswarm::{Error, Result};
 use serde::Serialize;
 use std::time::Instant;
@@ -191,14 +191,7 @@ struct Run {
 
 /// The best of the repeats.
 fn measure(problem: &TestProblem, population: usize, here: bool, arguments: &Arguments) -> Result<Row> {
-    let settings = MopsoSettings {
-        motion: PsoSettings {
-            population,
-            iterations: arguments.generations as usize,
-            ..MopsoSettings::default().motion
-        },
-        ..MopsoSettings::default()
-    };
+    let settings = MopsoSettings::default().with_size(population, arguments.generations as usize);
     let run = |_| {
         if here {
             on_the_host(problem, settings.clone())

@@ -74,6 +74,8 @@ pub struct DeviceSummary {
     pub driver_info: String,
     /// What sort of device it is.
     pub kind: DeviceKind,
+    /// Its place on the PCI bus, as in `0000:41:00.0`; empty where the driver does not tell.
+    pub pci_bus_id: String,
     /// The largest buffer, bytes.
     pub max_buffer_bytes: u64,
     /// The largest part of a buffer that a kernel sees at once, bytes.
@@ -96,12 +98,21 @@ impl DeviceSummary {
             driver: info.driver,
             driver_info: info.driver_info,
             kind: info.device_type.into(),
+            pci_bus_id: info.device_pci_bus_id,
             max_buffer_bytes: limits.max_buffer_size,
             max_binding_bytes: limits.max_storage_buffer_binding_size,
             max_workgroups: limits.max_compute_workgroups_per_dimension,
             max_lanes_per_workgroup: limits.max_compute_invocations_per_workgroup,
             timestamps: adapter.features().contains(wgpu::Features::TIMESTAMP_QUERY),
         }
+    }
+}
+
+impl DeviceSummary {
+    /// Whether its name contains `name`, regardless of case, or `name` is its place on the PCI bus.
+    pub(super) fn is_called(&self, name: &str) -> bool {
+        let name = name.trim().to_lowercase();
+        self.name.to_lowercase().contains(&name) || self.pci_bus_id.to_lowercase() == name
     }
 }
 
@@ -137,7 +148,8 @@ pub fn devices() -> Vec<DeviceSummary> {
 }
 
 /// The best adapter, or the best whose name contains `name` regardless of case; where `name` is `None`, that of
-/// [`ADAPTER_VARIABLE`] counts.
+/// [`ADAPTER_VARIABLE`] counts. `name#2` is the second of those whose name contains `name`, and a place on the PCI bus names one
+/// card among several.
 ///
 /// # Errors
 /// [`Error::NoDevice`] if no adapter fits, listing the adapters.
@@ -155,7 +167,7 @@ pub(super) fn choose(name: Option<&str>) -> Result<(wgpu::Adapter, DeviceSummary
         .ok_or_else(|| Error::NoDevice("the adapter is gone".to_owned()))
 }
 
-/// The place in `present` (best first) of the first whose name contains `wanted`.
+/// The place in `present` (best first) of the adapter that `wanted` names.
 fn pick(present: &[DeviceSummary], wanted: Option<&str>) -> Result<usize> {
     if present.is_empty() {
         return Err(Error::NoDevice(
@@ -165,17 +177,33 @@ fn pick(present: &[DeviceSummary], wanted: Option<&str>) -> Result<usize> {
         ));
     }
     let Some(wanted) = wanted else { return Ok(0) };
-    let key = wanted.to_lowercase();
-    present
-        .iter()
-        .position(|summary| summary.name.to_lowercase().contains(&key))
-        .ok_or_else(|| {
-            let names: Vec<String> = present.iter().map(DeviceSummary::to_string).collect();
-            Error::NoDevice(format!(
-                "no adapter's name contains {wanted:?}; there is {}",
-                names.join(", ")
-            ))
+    let numbered = wanted
+        .rsplit_once('#')
+        .and_then(|(name, number)| Some((name, number.parse().ok()?)));
+    let (name, number): (&str, usize) = numbered.unwrap_or((wanted, 1));
+    let fitting: Vec<usize> = (0..present.len())
+        .filter(|i| present[*i].is_called(name))
+        .collect();
+    let place = number.checked_sub(1).and_then(|k| fitting.get(k).copied());
+    place.ok_or_else(|| {
+        let list = |places: &[usize]| {
+            let names = places.iter().map(|i| {
+                let at = Some(&present[*i].pci_bus_id).filter(|id| !id.is_empty());
+                at.map_or(present[*i].to_string(), |id| format!("{} at {id}", present[*i]))
+            });
+            names.collect::<Vec<_>>().join(", ")
+        };
+        Error::NoDevice(match fitting.len() {
+            0 => {
+                let all: Vec<usize> = (0..present.len()).collect();
+                format!("no adapter's name contains {name:?}; there is {}", list(&all))
+            }
+            count => format!(
+                "there is no adapter {wanted:?}: {count} of that name are here, counted from #1: {}",
+                list(&fitting)
+            ),
         })
+    })
 }
 
 #[cfg(test)]
@@ -189,6 +217,7 @@ mod tests {
             driver: String::new(),
             driver_info: String::new(),
             kind,
+            pci_bus_id: String::new(),
             max_buffer_bytes: 0,
             max_binding_bytes: 0,
             max_workgroups: 0,
@@ -212,6 +241,38 @@ mod tests {
             "{message}"
         );
         assert!(matches!(pick(&[], None), Err(Error::NoDevice(_))));
+    }
+
+    #[test]
+    fn adapters_of_one_name_are_told_apart() {
+        let card = |bus: &str| DeviceSummary {
+            pci_bus_id: bus.to_owned(),
+            ..summary("NVIDIA H200", DeviceKind::Discrete)
+        };
+        let present = [
+            card("0000:41:00.0"),
+            card("0000:C1:00.0"),
+            summary("llvmpipe", DeviceKind::Software),
+        ];
+        for (wanted, place) in [
+            ("h200", 0),
+            ("H200#1", 0),
+            ("h200#2", 1),
+            ("0000:c1:00.0", 1),
+            ("#3", 2),
+        ] {
+            assert_eq!(pick(&present, Some(wanted)).ok(), Some(place), "{wanted}");
+        }
+        for (wanted, told) in [
+            ("h200#3", "2 of that name are here"),
+            ("h200#0", "at 0000:C1:00.0"),
+            ("0000:02:00.0", "llvmpipe"),
+        ] {
+            let message = pick(&present, Some(wanted))
+                .map_err(|e| e.to_string())
+                .expect_err("no such adapter");
+            assert!(message.contains(told), "{message}");
+        }
     }
 
     #[test]

@@ -61,8 +61,8 @@ fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// The device that the process has open, if any.
-static SHARED: Mutex<Option<Arc<GpuContext>>> = Mutex::new(None);
+/// The device that the process has open, if any, with what it was asked for by.
+static SHARED: Mutex<Option<(Option<String>, Arc<GpuContext>)>> = Mutex::new(None);
 
 /// What the devices that the process has opened were asked for by.
 static OPENED: Mutex<Vec<Option<String>>> = Mutex::new(Vec::new());
@@ -75,14 +75,8 @@ impl GpuContext {
     /// [`Error::NoDevice`] if no device has that name, [`Error::Device`] if it does not open.
     pub fn shared(name: Option<&str>) -> Result<Arc<Self>> {
         let mut shared = locked(&SHARED);
-        if let Some(context) = shared.as_ref() {
-            let meant = name.is_none_or(|n| {
-                context
-                    .summary
-                    .name
-                    .to_lowercase()
-                    .contains(&n.trim().to_lowercase())
-            });
+        if let Some((asked, context)) = shared.as_ref() {
+            let meant = name.is_none_or(|n| asked.as_deref() == Some(n) || context.summary.is_called(n));
             if meant && context.check().is_ok() {
                 return Ok(Arc::clone(context));
             }
@@ -90,7 +84,7 @@ impl GpuContext {
         // The old device closes first, unless an evaluator still holds it.
         *shared = None;
         let context = Arc::new(Self::open(name)?);
-        *shared = Some(Arc::clone(&context));
+        *shared = Some((name.map(str::to_owned), Arc::clone(&context)));
         let mut opened = locked(&OPENED);
         if !opened.iter().any(|known| known.as_deref() == name) {
             opened.push(name.map(str::to_owned));

@@ -25,13 +25,13 @@ objectives! {
 }
 
 impl LineObjective {
-    /// What the line is called on which the objective is least; files are named after it.
+    /// What the line is called on which the objective is least.
     pub fn line_name(self) -> &'static str {
         [
             "shortest",
             "least squared length",
             "least second difference",
-            "least curved",
+            "minimum-curvature",
             "fastest",
         ][self as usize]
     }

@@ -59,3 +59,35 @@ pub fn trace(
         TyreModel::Linear => go::<LinearTyre<f64>>(flat, plan, window),
     }
 }
+
+impl ReplayProblem {
+    /// Lets every window start from the state in which the base car comes there, lateral speed and roll with it, which no
+    /// log has: the base car's cost is then that of whole laps, and what others add is their own. A window that the base car
+    /// does not reach starts as before.
+    pub fn start_as_base_drives(&mut self) {
+        let base = self.free.base().to_vec();
+        match self.tyre_model() {
+            TyreModel::MagicFormula => chained::<MagicFormula<f64>>(&mut self.plan, &base),
+            TyreModel::Linear => chained::<LinearTyre<f64>>(&mut self.plan, &base),
+        }
+    }
+}
+
+fn chained<T: Tyre<f64>>(plan: &mut Plan<f64>, flat: &[f64]) {
+    let car = CarModel::<f64, T>::from_parameters(|i| flat[i]);
+    let mut before: Option<Window<f64>> = None;
+    for k in 0..plan.windows.len() {
+        let window = plan.windows[k];
+        if let Some(before) = before.filter(|b| b.start < window.start) {
+            let between = Window {
+                end: window.start + 1,
+                ..before
+            };
+            let (drives, state) = drive_window(&car, plan, &between, |_: usize, _: [f64; CHANNELS]| {});
+            if drives {
+                plan.windows[k].initial = state.to_array();
+            }
+        }
+        before = Some(plan.windows[k]);
+    }
+}

@@ -8,6 +8,7 @@ pub mod kernel;
 mod plan;
 mod problem;
 mod simd;
+mod starts;
 
 pub use super::{BackendChoice, ModelTable};
 pub use crate::evaluate::open_evaluator;
@@ -51,8 +52,13 @@ impl ProblemKind for ReplayProblem {
         cpu::errors(self, candidates)
     }
 
-    fn objectives_of(&self, _: &[f64], errors: &Self::Outcome) -> std::result::Result<Vec<f64>, Failure> {
-        let costs = self.channel_costs(&errors.ok_or(Failure::Spun)?);
+    fn objectives_of(
+        &self,
+        candidate: &[f64],
+        errors: &Self::Outcome,
+    ) -> std::result::Result<Vec<f64>, Failure> {
+        let errors = errors.ok_or_else(|| self.why_lost(candidate))?;
+        let costs = self.channel_costs(&errors);
         let weighted = |o: &ChannelWeights| {
             let each = o.weights.iter().zip(costs).map(|(w, c)| w * c);
             match self.plan.norm {

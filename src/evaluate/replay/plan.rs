@@ -50,7 +50,7 @@ pub struct Window<S> {
 }
 
 /// The state that a window starts from: speed and yaw rate as measured, nothing else moving. Lateral speed, roll
-/// and the lagged acceleration are not logged; they settle in a few tenths of a second.
+/// and the lagged acceleration are not logged; they settle at the rate of [`crate::vehicle::modes::slowest_decay`].
 pub fn initial_state(sample: &Sample<f64>) -> [f64; 6] {
     [sample.measured[0], 0.0, sample.measured[3], 0.0, 0.0, 0.0]
 }

@@ -2,8 +2,9 @@
 
 use super::plan::{CHANNELS, Norm, Plan, Sample, Window, step_fractions};
 use crate::error::{Error, Result};
-use crate::evaluate::{FreeCar, Objective, Problem};
+use crate::evaluate::{Failure, FreeCar, Objective, Problem};
 use crate::vehicle::car::CarParameter;
+use crate::vehicle::modes::{fastest_mode, stable_steps};
 use crate::vehicle::{Car, TyreModel};
 
 /// Names of the compared channels, in the order of all arrays of four.
@@ -40,6 +41,8 @@ pub struct ReplayProblem {
     pub interval_s: f64,
     /// How channel costs make objectives.
     pub objectives: Vec<ChannelWeights>,
+    /// The least speed in the windows, at least 1 m/s: there a car's own motions are the fastest.
+    pub slowest_mps: f64,
 }
 
 impl ReplayProblem {
@@ -86,6 +89,11 @@ impl ReplayProblem {
                 "at least one of each",
             ));
         }
+        let within = windows.iter().flat_map(|w| &samples[w.start..w.end]);
+        let slowest_mps = within
+            .map(|s| s.measured[0])
+            .fold(f64::INFINITY, f64::min)
+            .max(1.0);
         Ok(Self {
             problem: Problem {
                 variables,
@@ -101,6 +109,7 @@ impl ReplayProblem {
             },
             interval_s,
             objectives,
+            slowest_mps,
         })
     }
 
@@ -117,6 +126,23 @@ impl ReplayProblem {
     /// A candidate's car in flat form.
     pub fn flat(&self, candidate: &[f64]) -> Vec<f64> {
         self.free.flat(candidate)
+    }
+
+    /// Runge-Kutta steps per sample that a car in flat form needs.
+    pub fn steps_needed(&self, flat: &[f64]) -> usize {
+        stable_steps(
+            self.interval_s,
+            fastest_mode(flat, self.tyre_model(), self.slowest_mps),
+        )
+    }
+
+    /// Why a candidate that did not drive to the end was lost.
+    pub(super) fn why_lost(&self, candidate: &[f64]) -> Failure {
+        if self.steps_needed(&self.flat(candidate)) > self.plan.fractions.len() {
+            Failure::StepTooLong
+        } else {
+            Failure::Spun
+        }
     }
 
     /// The cost of each channel from the errors of all windows (summed, or their maxima).

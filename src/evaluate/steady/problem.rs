@@ -5,7 +5,8 @@ use super::modes::{displaced, slopes};
 use crate::error::{Error, Result};
 use crate::evaluate::objectives::{listed, missing_or_twice, objectives};
 use crate::evaluate::{Failure, FreeCar, Problem, Variable};
-use crate::vehicle::{Car, CarParameter, Chassis, TyreModel};
+use crate::vehicle::aero::aero_forces;
+use crate::vehicle::{Car, CarParameter, Chassis, Trim, TyreModel};
 
 objectives! {
     /// What of a trim can be minimised.
@@ -184,5 +185,21 @@ impl SteadyProblem {
         ];
         let slopes = slopes((self.tyre_model(), &flat), gain, (speed, steer), figures);
         Some(speed * displaced(&slopes, &off)?[1])
+    }
+
+    /// The same of the car itself in a trim at `speed` (m/s), for problems without free parameters.
+    pub fn left_open_at(&self, speed: f64, trim: &Trim) -> Option<f64> {
+        let chassis = &self.free.car.chassis;
+        let (vx, vy) = (speed * trim.sideslip_rad.cos(), speed * trim.sideslip_rad.sin());
+        let drag = aero_forces(chassis, vx).drag / chassis.mass;
+        let figures = [
+            vy,
+            trim.yaw_rate_radps,
+            trim.roll_rad,
+            0.0,
+            -vy * trim.yaw_rate_radps - drag,
+            trim.slip_ratio,
+        ];
+        self.left_open(&[speed, trim.steer_rad], figures)
     }
 }

@@ -57,6 +57,16 @@ impl Gates {
         motor_share: 1.0,
     };
 
+    /// Gates that leave all to the zones, but for the energy (MJ).
+    pub fn of_zones(energy_mj: f64) -> Self {
+        Self {
+            ax_mps2: -1e3,
+            soc: -1e6,
+            energy_mj,
+            ..Self::OPEN
+        }
+    }
+
     /// The kernels' figures: curvature (1/m), speed squared (m^2/s^2), acceleration (m/s^2), least change of the charge (J),
     /// energy (J) and share of the motor, for a wheelbase (m), a capacity (J) and a state of charge at the start.
     pub fn figures(&self, wheelbase_m: f64, capacity_j: f64, start_soc: f64) -> [f64; GATES] {
@@ -150,6 +160,26 @@ impl EnergyPlan<f64> {
             }
         }
         plan
+    }
+
+    /// Sections of these lengths (m) where the zones of this plan, whose own sections are evenly spaced, begin.
+    pub fn starts_along(&self, length_m: &[f64]) -> Vec<usize> {
+        let n = self.zones.len();
+        let total: f64 = length_m.iter().sum();
+        let place = |i: usize| {
+            let station = i as f64 / n as f64 * total;
+            let mut along = 0.0;
+            let reached = length_m.iter().position(|h| {
+                along += h;
+                along > station
+            });
+            reached.unwrap_or(0)
+        };
+        let first = |i: &usize| self.zones[*i].zone != self.zones[(i + n - 1) % n].zone;
+        let mut starts: Vec<usize> = (0..n).filter(first).map(place).collect();
+        starts.sort_unstable();
+        starts.dedup();
+        if starts.is_empty() { vec![0] } else { starts }
     }
 
     /// Number of zones.

@@ -1,7 +1,7 @@
 use super::*;
 use crate::evaluate::energy::{Free, HybridLine, HybridObjective, HybridProblem, Strategy};
-use crate::study::envelope::{EnvelopeSettings, car_envelope};
 use crate::vehicle::Car;
+use crate::vehicle::limits::{SpeedRange, car_envelope};
 use glam::DVec2;
 use proptest::prelude::*;
 use std::f64::consts::TAU;
@@ -11,9 +11,9 @@ fn car() -> &'static EnergyCar {
     static CAR: OnceLock<EnergyCar> = OnceLock::new();
     CAR.get_or_init(|| {
         let car = Car::load("gt_hybrid").unwrap();
-        let coarse = EnvelopeSettings {
+        let coarse = SpeedRange {
             step_mps: 10.0,
-            ..EnvelopeSettings::default()
+            ..SpeedRange::USUAL
         };
         let limits = car_envelope(&car, &coarse).unwrap();
         let rows = limits

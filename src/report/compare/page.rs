@@ -366,9 +366,10 @@ fn edges(road: &Trace) -> Option<[Vec<DVec2>; 2]> {
     (n > 2).then(|| [edge(left, 1.0), edge(right, -1.0)])
 }
 
-/// What a file's name says of its line: `line_least_curved` is `least curved`.
+/// What a file's name says of its line.
 fn words_of(stem: &str) -> String {
     match stem.strip_prefix("line_") {
+        Some("least_curved") => "minimum-curvature".to_owned(),
         Some(line) => line.replace('_', " "),
         None if stem == "drive" => "driven".to_owned(),
         None if stem == "lap" => "logged".to_owned(),

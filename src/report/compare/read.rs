@@ -2,6 +2,7 @@
 
 use crate::config::read_bytes;
 use crate::error::{Error, Place, Result};
+use crate::files::run_folder::{MANIFEST, SETTINGS, SUMMARY};
 use serde_json::{Map, Value};
 use std::path::{Path, PathBuf};
 
@@ -74,7 +75,7 @@ impl Run {
     /// [`Error::Input`] naming the file if this is no run's folder, or a file in it cannot be what the study wrote;
     /// [`Error::Io`] if one cannot be read.
     pub fn read(folder: &Path) -> Result<Self> {
-        let path = folder.join("manifest.json");
+        let path = folder.join(MANIFEST);
         let Some(text) = read_text(&path)? else {
             let expected = "the folder of a run, which has one";
             return Err(Error::input(&path, "file", "none", expected));
@@ -88,7 +89,7 @@ impl Run {
         let Some(study) = said("study") else {
             return Err(Error::input(&path, "study", "none", "the name of a study"));
         };
-        let path = folder.join("summary.json");
+        let path = folder.join(SUMMARY);
         let Some(text) = read_text(&path)? else {
             let expected = "the figures of a run that has ended";
             return Err(Error::input(&path, "file", "none", expected));
@@ -115,7 +116,7 @@ impl Run {
                 .filter_map(|(key, v)| Some((key.clone(), word(v)?)))
                 .collect(),
             figures,
-            settings: read_text(&folder.join("study.toml"))?,
+            settings: read_text(&folder.join(SETTINGS))?,
             traces: read_traces(folder)?,
             road: table("racetrack_reference.csv")?,
             envelope: table("envelope.csv")?,

@@ -1,15 +1,14 @@
 //! The surface of lateral acceleration over speed and steering, and its ridge: a population of cars in steady-state cornering,
 //! held against the curves of trims.
 
-use super::{CarEnvelope, EnvelopeSettings, EnvelopeStudy, Outcome, Prepared, STEER_TO_GRIP, car_envelope};
+use super::{EnvelopeStudy, Outcome, Prepared};
 use crate::error::Result;
-use crate::evaluate::steady::kernel::INTEGRATED;
 use crate::evaluate::steady::{SteadyObjective, SteadyProblem, open_steady_evaluator};
 use crate::evaluate::{Evaluation, Evaluator, Failure, add_failures};
-use crate::study::framework::journal::{Journal, Recorder};
+use crate::study::framework::journal::Recorder;
 use crate::study::framework::{Inputs, Progress, RunRecord, Study, Watch, Work};
-use crate::vehicle::aero::aero_forces;
-use crate::vehicle::{Car, Trim, steady_car};
+use crate::vehicle::limits::{CarEnvelope, EnvelopeAtSpeed, STEER_TO_GRIP, car_envelope};
+use crate::vehicle::{Car, steady_car};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
@@ -119,15 +118,12 @@ fn ridge_of(x: &[f64], values: &[f64]) -> Option<(f64, f64, Option<f64>)> {
 ///
 /// # Errors
 /// As [`car_envelope`]; [`crate::Error::Input`] if the journal belongs to other inputs; those of the evaluator.
-pub(super) fn measure(
-    settings: &EnvelopeSettings,
-    prepared: &Prepared,
-    work: Work<'_, Journal>,
-) -> Result<Option<Outcome>> {
+pub(super) fn measure(work: Work<'_, EnvelopeStudy>) -> Result<Option<Outcome>> {
     let watch = Watch::begin();
-    let Prepared { car, speeds } = prepared;
+    let settings = work.settings;
+    let Prepared { car, speeds } = work.prepared;
     // Refuses a car that has no drive at these speeds.
-    let limits = car_envelope(car, settings)?;
+    let limits = car_envelope(car, &settings.range())?;
     let lock = car.max_steer_rad.min(STEER_TO_GRIP);
     let last = settings.steers - 1;
     let steers: Vec<f64> = (0..=last).map(|i| lock * i as f64 / last as f64).collect();
@@ -194,7 +190,7 @@ fn compared(
     let figures: [Vec<f64>; 5] = std::array::from_fn(figure);
 
     let steady = steady_car(car);
-    let rows: Vec<(&super::EnvelopeAtSpeed, &[f64])> = limits
+    let rows: Vec<(&EnvelopeAtSpeed, &[f64])> = limits
         .speeds
         .iter()
         .zip(figures[0].chunks_exact(steers.len()))
@@ -211,13 +207,12 @@ fn compared(
                 .filter_map(|(steer, ay)| Some((at(*steer)?.ay_mps2 - ay).abs()))
                 .filter(|off| off.is_finite())
                 .reduce(f64::max);
-            let exact = exact_ridge(curve, lock, at);
-            let left_open = |t: Trim| problem.left_open(&[v, t.steer_rad], figures_of(car, v, &t));
+            let exact = steady.greatest_cornering(v, lock, curve);
             let ridge = ridge_of(&steers, ay).map(|(steer_rad, ay_mps2, slack)| RidgePoint {
                 v_mps: v,
                 steer_rad,
                 ay_mps2,
-                tolerance_mps2: slack.and_then(|slack| Some(slack + left_open(exact?)?)),
+                tolerance_mps2: slack.and_then(|slack| Some(slack + problem.left_open_at(v, &exact?)?)),
                 exact_mps2: exact.map(|t| t.ay_mps2),
             });
             (ridge, off)
@@ -245,47 +240,6 @@ fn compared(
         ridge,
         summary,
     }
-}
-
-/// The trim of greatest lateral acceleration of a curve up to a steering angle, to rounding.
-fn exact_ridge(curve: &[Trim], lock: f64, at: impl Fn(f64) -> Option<Trim>) -> Option<Trim> {
-    let within = curve.iter().take_while(|t| t.steer_rad <= lock);
-    let (top, _) = within
-        .enumerate()
-        .max_by(|(_, a), (_, b)| a.ay_mps2.total_cmp(&b.ay_mps2))?;
-    let mut low = curve[top.saturating_sub(1)].steer_rad;
-    let mut high = curve.get(top + 1).map_or(lock, |t| t.steer_rad).min(lock);
-    let mut best = curve[top];
-    // By thirds: the curve is bent one way about its peak. Each round leaves two thirds of the range.
-    for _ in 0..40 {
-        let (a, b) = (low + (high - low) / 3.0, high - (high - low) / 3.0);
-        let (at_a, at_b) = (at(a)?, at(b)?);
-        for trim in [at_a, at_b] {
-            if trim.ay_mps2 > best.ay_mps2 {
-                best = trim;
-            }
-        }
-        if at_a.ay_mps2 < at_b.ay_mps2 {
-            low = a
-        } else {
-            high = b
-        }
-    }
-    Some(best)
-}
-
-/// What the evaluator integrates of a car in a trim.
-fn figures_of(car: &Car, speed: f64, trim: &Trim) -> [f64; INTEGRATED] {
-    let (vx, vy) = (speed * trim.sideslip_rad.cos(), speed * trim.sideslip_rad.sin());
-    let drag = aero_forces(&car.chassis, vx).drag / car.chassis.mass;
-    [
-        vy,
-        trim.yaw_rate_radps,
-        trim.roll_rad,
-        0.0,
-        -vy * trim.yaw_rate_radps - drag,
-        trim.slip_ratio,
-    ]
 }
 
 #[cfg(test)]

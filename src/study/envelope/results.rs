@@ -1,10 +1,11 @@
 //! Tables and figures of a car's g-g-v envelope.
 
-use super::{CarEnvelope, EnvelopeAtSpeed, Handling, Outcome, SteadySurface, SurfaceFigures};
+use super::{EnvelopeStudy, Outcome, SteadySurface, SurfaceFigures};
 use crate::error::Result;
 use crate::evaluate::{Failure, failures_in_words};
 use crate::report::{Curves, HtmlReport, Levels, Panel, Surface, Table, write_whole};
-use crate::study::framework::{Head, RunRecord};
+use crate::study::framework::{Head, RunRecord, Solved};
+use crate::vehicle::limits::{CarEnvelope, EnvelopeAtSpeed, Handling, in_words};
 use crate::vehicle::{EnvelopeRow, Trim};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -33,16 +34,16 @@ pub struct EnvelopeSummary {
 }
 
 /// Puts the figures together.
-pub(super) fn summarise(head: Head, outcome: &Outcome) -> EnvelopeSummary {
-    let limits = &outcome.limits;
+pub(super) fn summarise(solved: &Solved<'_, EnvelopeStudy>) -> EnvelopeSummary {
+    let Outcome { limits, surface, .. } = solved.outcome;
     EnvelopeSummary {
-        head,
+        head: solved.head(),
         steady_states: limits.speeds.iter().map(|s| s.cornering.len()).sum(),
         top_speed_mps: limits.envelope.top_speed_mps(),
         handling: limits.handling,
         limits: limits.envelope.rows().to_vec(),
         notes: notes(limits),
-        surface: outcome.surface.summary.clone(),
+        surface: surface.summary.clone(),
     }
 }
 
@@ -52,7 +53,7 @@ fn notes(limits: &CarEnvelope) -> Vec<String> {
     if !limits.left_out_mps.is_empty() {
         notes.push(format!(
             "The car has no steady state in bends at {}: these speeds are left out.",
-            super::in_words(&limits.left_out_mps)
+            in_words(&limits.left_out_mps)
         ));
     }
     let left = |s: &EnvelopeAtSpeed| s.cornering.iter().map(|t| t.ay_mps2).fold(0.0, f64::max);
@@ -140,7 +141,8 @@ fn write_cornering(path: &Path, limits: &CarEnvelope) -> Result<()> {
         .write_csv(path)
 }
 
-fn limits_figure(limits: &CarEnvelope, car: &str) -> Curves {
+/// Steady-state cornering, the limits of tyres and engine, the g-g-v diagram and sideslip of a car of this name.
+pub fn envelope_figure(limits: &CarEnvelope, car: &str) -> Curves {
     let speeds = &limits.speeds;
     let v: Vec<f64> = speeds.iter().map(|s| s.row.v_mps).collect();
     let over_speed = |f: &dyn Fn(&EnvelopeAtSpeed) -> f64| speeds.iter().map(f).collect::<Vec<f64>>();
@@ -181,7 +183,7 @@ fn limits_figure(limits: &CarEnvelope, car: &str) -> Curves {
         .curve("engine", &v, &over_speed(&|s| s.engine_mps2))
         .curve("drag", &v, &over_speed(&|s| s.row.drag_mps2));
     Curves::new(
-        format!("g-g-v envelope of the {car}"),
+        format!("g-g-v envelope: {car}"),
         [cornering, limits, diagram, sideslip],
     )
 }
@@ -189,7 +191,7 @@ fn limits_figure(limits: &CarEnvelope, car: &str) -> Curves {
 fn write_page(folder: &Path, outcome: &Outcome, summary: &EnvelopeSummary) -> Result<()> {
     let limits = &outcome.limits;
     let (car, record) = (&summary.head.subject.car, &summary.head.record);
-    let mut page = HtmlReport::new(&summary.head.study, &format!("g-g-v envelope of the {car}"));
+    let mut page = HtmlReport::new(&summary.head.study, &format!("g-g-v envelope: {car}"));
     if let (Some(slow), Some(fast)) = (limits.speeds.first(), limits.speeds.last()) {
         page.sentence(format!(
             "The {car} corners at up to {:.1} m/s\u{b2} at {:.0} m/s and {:.1} m/s\u{b2} at {:.0} m/s, brakes at up to {:.1} and \
@@ -216,7 +218,7 @@ fn write_page(folder: &Path, outcome: &Outcome, summary: &EnvelopeSummary) -> Re
         "Limits",
         "From steady states of the 4DOF model at each speed. The engine's limit is that of its best gear.",
     );
-    page.figure(folder.join("envelope.svg"), &limits_figure(limits, car))?;
+    page.figure(folder.join("envelope.svg"), &envelope_figure(limits, car))?;
     page.section("The surface", ABOUT_SURFACE);
     page.paragraph(&surface_in_words(&summary.surface, record));
     if let Some(figure) = surface_figure(&outcome.surface, car) {

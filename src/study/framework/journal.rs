@@ -4,12 +4,11 @@
 //! these populations. Run again and given the answers it has had, it arrives at the place where it was interrupted with every
 //! bit of its state, whatever that state is.
 
-use super::device_faults::DeviceFaults;
-use super::run_folder::STATE;
 use super::state_file::{Origin, StateFile};
 use super::{RunRecord, State};
 use crate::error::{Error, Result};
-use crate::evaluate::{BackendInfo, Evaluation, Evaluator, Problem};
+use crate::evaluate::{BackendInfo, DeviceFaults, Evaluation, Evaluator, Problem};
+use crate::files::run_folder::STATE;
 use crate::swarm::checkpoint::Checkpoint;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};

@@ -1,12 +1,12 @@
 //! The life of a study: from a request to files and figures.
 
-use super::run_folder::{self, Manifest, RunFolder, STATE, write_json, write_study};
 use super::state_file::StateFile;
 use super::study::{apply, moves};
-use super::{Plan, Progress, State, Study, Work, memory};
+use super::{Manifest, Plan, Progress, Solved, State, Study, Work, memory, write_json, write_study};
 use crate::config::limit_memory;
 use crate::config::settings::{Role, Settings};
 use crate::error::{Error, Result};
+use crate::files::run_folder::{self, MANIFEST, RunFolder, SETTINGS, STATE, SUMMARY};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -131,16 +131,14 @@ pub(in crate::study) fn run<S: Study>(request: Request<'_>) -> Result<Answer> {
     if moves::<S::Settings>(request.flags) {
         state_file = state_file.may_move();
     }
-    let outcome = S::solve(
-        &settings,
-        &prepared,
-        Work {
-            state,
-            state_file: &mut state_file,
-            observe: request.observe,
-            stop: request.stop,
-        },
-    );
+    let outcome = S::solve(Work {
+        settings: &settings,
+        prepared: &prepared,
+        state,
+        state_file: &mut state_file,
+        observe: request.observe,
+        stop: request.stop,
+    });
     // Input that is refused only now leaves no state in the way of the next run.
     let refused = matches!(
         outcome,
@@ -186,13 +184,16 @@ pub fn write_results<S: Study>(
     prepared: &S::Prepared,
     outcome: &S::Outcome,
 ) -> Result<S::Summary> {
-    let summary = S::summarise(settings, prepared, outcome);
+    let solved = Solved::<S> {
+        settings,
+        prepared,
+        outcome,
+    };
+    let summary = S::summarise(&solved);
     write_study(folder, &settings.to_toml())?;
-    write_json(&folder.join("summary.json"), &summary)?;
-    S::report(folder, settings, prepared, outcome, &summary)?;
-    let subject = S::subject(settings, prepared);
-    let manifest = Manifest::new(S::NAME, &subject, S::record(outcome), "study.toml");
-    write_json(&folder.join("manifest.json"), &manifest)?;
+    write_json(&folder.join(SUMMARY), &summary)?;
+    S::report(folder, &solved, &summary)?;
+    write_json(&folder.join(MANIFEST), &Manifest::new(solved.head(), SETTINGS))?;
     Ok(summary)
 }
 
@@ -229,12 +230,13 @@ pub(in crate::study) fn resumed_or_new<S: Study, T>(
 /// # Errors
 /// Those of the study.
 pub fn solve_unobserved<S: Study>(settings: &S::Settings, prepared: &S::Prepared) -> Result<S::Outcome> {
-    let work = Work {
+    let outcome = S::solve(Work {
+        settings,
+        prepared,
         state: None,
         state_file: &mut StateFile::idle(),
         observe: &mut |_| ControlFlow::Continue(()),
         stop: Arc::default(),
-    };
-    let outcome = S::solve(settings, prepared, work)?;
+    })?;
     outcome.ok_or_else(|| Error::Study("the study ended without a result".to_owned()))
 }

@@ -43,6 +43,12 @@ pub struct MemoryItem {
 }
 
 impl MemoryItem {
+    /// So many of what the setting `name` counts, each of so many bytes.
+    pub fn new(name: &'static str, count: usize, each: u64) -> Self {
+        let count = count as u64;
+        Self { name, count, each }
+    }
+
     fn bytes(&self) -> u64 {
         self.count.saturating_mul(self.each)
     }
@@ -106,11 +112,7 @@ pub fn check(kept: &[MemoryItem], limit_mib: u64) -> Result<Allowance> {
 
 /// A log of so many samples.
 pub fn log_item(samples: usize) -> MemoryItem {
-    MemoryItem {
-        name: "samples of the log",
-        count: samples as u64,
-        each: LOG_SAMPLE,
-    }
+    MemoryItem::new("samples of the log", samples, LOG_SAMPLE)
 }
 
 /// What a study of swarms keeps goes with.
@@ -148,16 +150,11 @@ impl Size {
         let member = candidate
             .saturating_mul(1 + PER_PLACE as u64)
             .saturating_add(particle);
-        let kept = |name, count: usize, each| MemoryItem {
-            name,
-            count: count as u64,
-            each,
-        };
         vec![
-            kept("population", self.population, particle),
-            kept("archive", self.archive, member),
-            kept("iterations", self.iterations, ITERATION.saturating_add(answers)),
-            kept("sections", self.sections, CROSS_SECTION),
+            MemoryItem::new("population", self.population, particle),
+            MemoryItem::new("archive", self.archive, member),
+            MemoryItem::new("iterations", self.iterations, ITERATION.saturating_add(answers)),
+            MemoryItem::new("sections", self.sections, CROSS_SECTION),
             log_item(self.samples),
         ]
     }

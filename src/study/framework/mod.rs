@@ -1,23 +1,20 @@
 //! What all studies share: the shape of a study, its life from settings to results, its state, its folder, its record.
 
-pub(in crate::study) mod circuit_view;
-mod device_faults;
 mod inputs;
 pub mod journal;
 mod life;
+mod manifest;
 pub mod memory;
 mod plan;
 mod record;
-pub mod run_folder;
 pub mod state_file;
 mod study;
 
 pub use inputs::Inputs;
 pub(in crate::study) use life::resumed_or_new;
 pub use life::{Answer, Finished, Request, solve_unobserved, write_results};
+pub use manifest::{Manifest, write_json, write_study};
 pub use plan::Plan;
+pub use record::RunRecord;
 pub(in crate::study) use record::Watch;
-pub use record::{Losses, RunRecord};
-pub use study::{AnyStudy, Entry, Figures, Head, Progress, State, Study, Subject, Work};
-
-pub(in crate::study) use device_faults::DeviceFaults;
+pub use study::{AnyStudy, Entry, Figures, Head, Progress, Solved, State, Study, Subject, Work};

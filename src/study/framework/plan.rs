@@ -1,9 +1,9 @@
 //! What a study would do, said and not done.
 
-use super::run_folder;
 use crate::config::settings::Settings;
 use crate::error::Result;
 use crate::evaluate::{BackendChoice, BackendInfo};
+use crate::files::run_folder;
 use serde::Serialize;
 use serde_json::Value;
 use std::path::{Path, PathBuf};

@@ -1,40 +1,10 @@
 //! How a study ran.
 
-use super::DeviceFaults;
 use crate::evaluate::gpu::DispatchWatch;
-use crate::evaluate::{BackendInfo, Evaluator, FailureCounts, add_failures, failures_in_words};
+use crate::evaluate::{BackendInfo, FailureCounts, Losses, add_failures, failures_in_words};
 use crate::report::HtmlReport;
 use serde::{Deserialize, Deserializer, Serialize};
 use std::time::Instant;
-
-/// What went wrong while candidates were evaluated.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Losses {
-    /// Candidates that failed, by reason.
-    pub failures: FailureCounts,
-    /// What went wrong with devices and was got over.
-    pub device_faults: Vec<String>,
-}
-
-impl Losses {
-    /// Adds the failures of an evaluation, and what has gone wrong with the device since the last.
-    pub(in crate::study) fn note(
-        &mut self,
-        failures: &FailureCounts,
-        faults: &mut DeviceFaults,
-        evaluator: &dyn Evaluator,
-    ) {
-        add_failures(&mut self.failures, failures);
-        let met = faults.since(evaluator, &self.device_faults);
-        self.device_faults.extend(met);
-    }
-
-    /// Adds those of another part of the study.
-    pub(in crate::study) fn add(&mut self, other: &Self) {
-        add_failures(&mut self.failures, &other.failures);
-        self.device_faults.extend_from_slice(&other.device_faults);
-    }
-}
 
 /// How a study ran: flattened into its summary and its manifest.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

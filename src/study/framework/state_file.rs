@@ -1,9 +1,9 @@
 //! The file of a study's state in its run folder, written while it works: an interrupted run loses seconds at most.
 
 use super::State;
-use super::run_folder::STATE;
 use crate::error::{Error, Result};
 use crate::evaluate::BackendInfo;
+use crate::files::run_folder::STATE;
 use crate::hold::{self, Point};
 use crate::swarm::checkpoint::{self, Checkpoint};
 use serde::{Deserialize, Serialize};

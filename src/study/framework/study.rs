@@ -84,15 +84,40 @@ pub trait State<S>: Checkpoint {
 }
 
 /// What a study works with.
-pub struct Work<'a, T> {
+pub struct Work<'a, S: Study> {
+    /// Its settings.
+    pub settings: &'a S::Settings,
+    /// What it has read.
+    pub prepared: &'a S::Prepared,
     /// The state to resume from, if there is one.
-    pub state: Option<T>,
+    pub state: Option<S::State>,
     /// What saves the state.
     pub state_file: &'a mut StateFile,
     /// Is told of the progress and may end the study.
     pub observe: &'a mut dyn FnMut(&Progress) -> ControlFlow<()>,
     /// Raised when the study is to end, for work that tells nobody of its progress.
     pub stop: Arc<AtomicBool>,
+}
+
+/// A study that is solved: what its results are made of.
+pub struct Solved<'a, S: Study> {
+    /// Its settings.
+    pub settings: &'a S::Settings,
+    /// What it has read.
+    pub prepared: &'a S::Prepared,
+    /// What it has found.
+    pub outcome: &'a S::Outcome,
+}
+
+impl<S: Study> Solved<'_, S> {
+    /// The head of its summary, and of its manifest.
+    pub fn head(&self) -> Head {
+        Head {
+            study: S::NAME.to_owned(),
+            subject: S::subject(self.settings, self.prepared),
+            record: S::record(self.outcome).clone(),
+        }
+    }
 }
 
 /// A study: from settings to results.
@@ -135,11 +160,7 @@ pub trait Study: Sized + 'static {
     ///
     /// # Errors
     /// Those of evaluators and solvers; [`Error::Input`] if the state belongs to something else.
-    fn solve(
-        settings: &Self::Settings,
-        prepared: &Self::Prepared,
-        work: Work<'_, Self::State>,
-    ) -> Result<Option<Self::Outcome>>;
+    fn solve(work: Work<'_, Self>) -> Result<Option<Self::Outcome>>;
 
     /// How many studies of one problem like this may be solved together; see [`Study::solve_together`].
     fn together(_: &Self::Settings) -> usize {
@@ -160,13 +181,14 @@ pub trait Study: Sized + 'static {
         let stop = Arc::new(AtomicBool::new(false));
         let mut each = |settings: &Self::Settings, state_file: &mut StateFile| {
             resumed_or_new::<Self, _>(settings, state_file, true, |state, state_file| {
-                let work = Work {
+                Self::solve(Work {
+                    settings,
+                    prepared,
                     state,
                     state_file,
                     observe: &mut *observe,
                     stop: Arc::clone(&stop),
-                };
-                Self::solve(settings, prepared, work)
+                })
             })
         };
         let all = studies.iter().zip(state_files);
@@ -179,35 +201,16 @@ pub trait Study: Sized + 'static {
     fn record(outcome: &Self::Outcome) -> &RunRecord;
 
     /// Works the figures out.
-    fn summarise(
-        settings: &Self::Settings,
-        prepared: &Self::Prepared,
-        outcome: &Self::Outcome,
-    ) -> Self::Summary;
+    fn summarise(solved: &Solved<'_, Self>) -> Self::Summary;
 
     /// What it was about, for the manifest.
     fn subject(settings: &Self::Settings, prepared: &Self::Prepared) -> Subject;
-
-    /// The head of its summary.
-    fn head(settings: &Self::Settings, prepared: &Self::Prepared, outcome: &Self::Outcome) -> Head {
-        Head {
-            study: Self::NAME.to_owned(),
-            subject: Self::subject(settings, prepared),
-            record: Self::record(outcome).clone(),
-        }
-    }
 
     /// Writes tables, pictures and the page. `study.toml` and `summary.json` are written before, the manifest after.
     ///
     /// # Errors
     /// [`Error::Io`] if a file cannot be written.
-    fn report(
-        folder: &Path,
-        settings: &Self::Settings,
-        prepared: &Self::Prepared,
-        outcome: &Self::Outcome,
-        summary: &Self::Summary,
-    ) -> Result<()>;
+    fn report(folder: &Path, solved: &Solved<'_, Self>, summary: &Self::Summary) -> Result<()>;
 
     /// The figures in words.
     fn text(settings: &Self::Settings, summary: &Self::Summary) -> String;
@@ -262,6 +265,16 @@ pub struct Subject {
 }
 
 impl Subject {
+    /// A car on a track.
+    pub fn on_track(seed: u64, car: &str, track: &str) -> Self {
+        Self {
+            seed,
+            car: car.to_owned(),
+            log: None,
+            track: Some(track.to_owned()),
+        }
+    }
+
     /// Track and car in words.
     pub fn words(&self) -> String {
         format!("{} with the {}", self.track_name(), self.car)

@@ -2,9 +2,9 @@
 
 use super::scenario::ReportedLap;
 use super::setup::HybridSetup;
-use super::strategy::zone_gates;
 use crate::error::Result;
 use crate::evaluate::energy::{Free, Strategy};
+use crate::line::energy::Gates;
 
 /// Length of the stretches that the motor is tried on by itself (m).
 const STRETCH_M: f64 = 25.0;
@@ -34,7 +34,7 @@ pub fn worth(setup: &HybridSetup, engine: &ReportedLap, deployed: &ReportedLap) 
     let n = setup.points_m.len();
     let problem = setup.by_segment(Strategy {
         free: (0..n).map(Free::Zone).collect(),
-        ..Strategy::fixed(zone_gates(1e6), n)
+        ..Strategy::fixed(Gates::of_zones(1e6), n)
     })?;
     let segments = engine.segments.len();
     let mut shares = vec![0.0; n];

@@ -19,17 +19,17 @@ pub use energy_value::{Worth, correlation, mean_worths, worth};
 pub use results::{FrontFigures, HybridSummary, ScenarioFigures};
 pub use scenario::{ReportedLap, Scenario, drive, published};
 pub use settings::{FreePart, HybridStudySettings};
-pub use setup::{HybridInputs, HybridSetup, read_inputs, read_line, set_up};
+pub use setup::{HybridInputs, HybridSetup, read_inputs, set_up};
 pub use sizing::{ENGINES, Sizing, engine_only, size};
 pub use stint::{StintLap, stint};
-pub use strategy::{FoundStrategy, StrategyFront, search_front, search_strategy, zone_gates, zone_starts};
+pub use strategy::{FoundStrategy, StrategyFront, search_front, search_strategy};
 
 use crate::config::settings::Settings;
 use crate::error::{Error, Result};
 use crate::optimum::Deployment;
 use crate::study::framework::journal::Journal;
 use crate::study::framework::memory::MemoryItem;
-use crate::study::framework::{Plan, RunRecord, Study, Subject, Work};
+use crate::study::framework::{Plan, RunRecord, Solved, Study, Subject, Work};
 use crate::study::raceline::road_read;
 use std::path::Path;
 
@@ -123,40 +123,25 @@ impl Study for Hybrid {
             .backend(settings.backend, settings.adapter.as_deref())
     }
 
-    fn solve(
-        settings: &HybridStudySettings,
-        inputs: &HybridInputs,
-        work: Work<'_, Journal>,
-    ) -> Result<Option<Outcome>> {
-        solve::deploy(settings, inputs, work)
+    fn solve(work: Work<'_, Self>) -> Result<Option<Outcome>> {
+        solve::deploy(work)
     }
 
     fn record(outcome: &Outcome) -> &RunRecord {
         &outcome.record
     }
 
-    fn summarise(settings: &HybridStudySettings, inputs: &HybridInputs, outcome: &Outcome) -> HybridSummary {
-        results::summarise(Self::head(settings, inputs, outcome), outcome)
+    fn summarise(solved: &Solved<'_, Self>) -> HybridSummary {
+        results::summarise(solved)
     }
 
     fn subject(settings: &HybridStudySettings, inputs: &HybridInputs) -> Subject {
-        Subject {
-            seed: settings.seed,
-            car: inputs.car.name.clone(),
-            log: None,
-            track: Some(inputs.raceline.track_name.clone()),
-        }
+        Subject::on_track(settings.seed, &inputs.car.name, &inputs.raceline.track_name)
     }
 
-    fn report(
-        folder: &Path,
-        settings: &HybridStudySettings,
-        _: &HybridInputs,
-        outcome: &Outcome,
-        summary: &HybridSummary,
-    ) -> Result<()> {
-        results::write_files(folder, settings, outcome)?;
-        results::write_page(folder, settings, outcome, summary)
+    fn report(folder: &Path, solved: &Solved<'_, Self>, summary: &HybridSummary) -> Result<()> {
+        results::write_files(folder, solved)?;
+        results::write_page(folder, solved, summary)
     }
 
     fn text(_: &HybridStudySettings, summary: &HybridSummary) -> String {

@@ -5,14 +5,12 @@ mod page;
 
 pub(super) use page::write as write_page;
 
-use super::{
-    HybridSetup, HybridStudySettings, Outcome, ReportedLap, Sizing, StintLap, correlation, mean_worths,
-};
+use super::{Hybrid, HybridSetup, Outcome, ReportedLap, Sizing, StintLap, correlation, mean_worths};
 use crate::error::Result;
 use crate::files::stem;
 use crate::line::energy::SegmentEnergy;
 use crate::report::Table;
-use crate::study::framework::Head;
+use crate::study::framework::{Head, Solved};
 use figures::power_kw;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -156,7 +154,8 @@ pub struct HybridSummary {
 }
 
 /// Puts the figures together.
-pub(super) fn summarise(head: Head, outcome: &Outcome) -> HybridSummary {
+pub(super) fn summarise(solved: &Solved<'_, Hybrid>) -> HybridSummary {
+    let outcome = solved.outcome;
     let setup = &outcome.setup;
     let figures = outcome.scenarios.iter();
     let figures = figures.map(|s| ScenarioFigures::of(setup, &s.own, &s.additional));
@@ -186,7 +185,7 @@ pub(super) fn summarise(head: Head, outcome: &Outcome) -> HybridSummary {
         }
     }
     HybridSummary {
-        head,
+        head: solved.head(),
         line: setup.line_name.clone(),
         length_m: setup.length_m,
         rules_deployed_mj: rules,
@@ -317,7 +316,8 @@ fn reported_laps(outcome: &Outcome) -> Vec<&ReportedLap> {
 ///
 /// # Errors
 /// [`crate::Error::Io`] if one cannot be written.
-pub(super) fn write_files(folder: &Path, settings: &HybridStudySettings, outcome: &Outcome) -> Result<()> {
+pub(super) fn write_files(folder: &Path, solved: &Solved<'_, Hybrid>) -> Result<()> {
+    let (settings, outcome) = (solved.settings, solved.outcome);
     let setup = &outcome.setup;
     setup.car.car.write(folder, "car")?;
     let (x, y): (Vec<f64>, Vec<f64>) = setup.points_m.iter().map(|p| (p.x, p.y)).unzip();
@@ -327,14 +327,12 @@ pub(super) fn write_files(folder: &Path, settings: &HybridStudySettings, outcome
         write_lap(&folder.join(format!("lap_{}.csv", stem(&lap.name))), setup, lap)?;
     }
     if let Some(front) = outcome.optimised.as_ref().and_then(|o| o.swarm_front.as_ref()) {
-        let mut table = Table::rows(front.objectives.iter().zip(&front.candidates));
-        for (k, o) in settings.objectives.iter().enumerate() {
-            table = table.number(o.name(), o.unit(), |(objectives, _)| objectives[k]);
-        }
-        for (k, name) in front.names.iter().enumerate() {
-            table = table.number(name, "-", |(_, candidate)| candidate[k]);
-        }
-        table.table().write_csv(folder.join("front.csv"))?;
+        let rows = front.objectives.iter().zip(&front.candidates);
+        let objectives = settings.objectives.iter().map(|o| (o.name(), o.unit()));
+        let variables = front.names.iter().map(|name| (name.as_str(), "-"));
+        let table = Table::rows(rows.map(|(objectives, candidate)| [&objectives[..], candidate].concat()));
+        let table = table.each(objectives.chain(variables)).table();
+        table.write_csv(folder.join("front.csv"))?;
     }
     Ok(())
 }

@@ -5,19 +5,17 @@ use crate::config::settings::Settings;
 use crate::error::{Error, Result};
 use crate::evaluate::energy::{HybridLine, HybridObjective, HybridProblem, Strategy};
 use crate::evaluate::line::LineObjective;
-use crate::line::FineLine;
-use crate::line::energy::{EnergyCar, EnergyPlan, Gates, Mode, Traction, hybrid_parts};
-use crate::study::envelope::{EnvelopeSettings, car_envelope};
-use crate::study::raceline::{self, RacelineSettings, ReferenceSolvers};
+use crate::line::energy::{EnergyCar, EnergyPlan, GAP_M, Gates, Mode, Traction, hybrid_parts, late_bend};
+use crate::line::{FineLine, read_line_apart};
+use crate::optimum::ReferenceSolvers;
+use crate::study::raceline;
 use crate::track::CrossSections;
+use crate::vehicle::limits::{SpeedRange, car_envelope};
 use crate::vehicle::{Car, Envelope};
 use glam::DVec2;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-
-/// Gaps shorter than this do not end a stretch (m).
-pub(super) const GAP_M: f64 = 8.0;
 
 /// Metres of the reference line for each control point of free lines.
 const CONTROL_SPACING_M: f64 = 40.0;
@@ -32,8 +30,6 @@ pub(super) fn control_points(cross_sections: &CrossSections) -> usize {
 pub struct HybridSetup {
     /// Track and limits as racing lines know them.
     pub raceline: raceline::Setup,
-    /// Their settings.
-    pub raceline_settings: RacelineSettings,
     /// The car with its energy.
     pub car: EnergyCar,
     /// What the line is, in words.
@@ -52,23 +48,11 @@ pub struct HybridSetup {
     pub entry_mps: f64,
 }
 
-/// Bends from this share of the lap on are late.
-const LATE: f64 = 0.6;
-
-/// The sharpest bend late in a lap of these curvatures (1/m).
-pub(super) fn late_bend(curvature_1pm: &[f64]) -> usize {
-    let n = curvature_1pm.len();
-    ((LATE * n as f64) as usize..n)
-        .max_by(|&i, &j| curvature_1pm[i].abs().total_cmp(&curvature_1pm[j].abs()))
-        .unwrap_or(0)
-}
-
 /// Track, car and limits as they are read; the line may be still to be found.
 #[derive(Clone, Debug)]
 pub struct HybridInputs {
     /// Track and limits as racing lines know them.
     pub raceline: raceline::Setup,
-    raceline_settings: RacelineSettings,
     /// The car.
     pub car: EnergyCar,
     /// The points of a line that is given (m).
@@ -84,14 +68,14 @@ pub fn read_inputs(settings: &HybridStudySettings) -> Result<HybridInputs> {
     settings.validate()?;
     let car = Car::load(&settings.car)?;
     hybrid_parts(&car)?;
-    let read = |path: &PathBuf| read_line(path, settings.spacing_m);
+    let read = |path: &PathBuf| read_line_apart(path, settings.spacing_m);
     let given = settings.line.as_ref().map(read).transpose()?;
     let raceline_settings = settings.raceline();
     let mut raceline = raceline::set_up(&raceline_settings)?;
     let (envelope, traction) = match &settings.envelope {
         Some(path) => (Envelope::load(path)?, Traction::default()),
         None => {
-            let limits = car_envelope(&car, &EnvelopeSettings::default())?;
+            let limits = car_envelope(&car, &SpeedRange::USUAL)?;
             let rows = limits.speeds.iter().map(|s| (s.row.v_mps, s.traction_mps2));
             (limits.envelope.clone(), Traction { rows: rows.collect() })
         }
@@ -103,12 +87,7 @@ pub fn read_inputs(settings: &HybridStudySettings) -> Result<HybridInputs> {
         let closed = raceline.cross_sections.closed;
         FineLine::new(points, closed, settings.spacing_m, None, settings.entry_mps)?;
     }
-    Ok(HybridInputs {
-        raceline,
-        raceline_settings,
-        car,
-        given,
-    })
+    Ok(HybridInputs { raceline, car, given })
 }
 
 impl HybridInputs {
@@ -128,17 +107,13 @@ impl HybridInputs {
         settings: &HybridStudySettings,
         stop: &Arc<AtomicBool>,
     ) -> Result<Option<HybridSetup>> {
-        let Self {
-            raceline,
-            raceline_settings,
-            car,
-            given,
-        } = self.clone();
+        let Self { raceline, car, given } = self.clone();
         let closed = raceline.cross_sections.closed;
         let (line_name, alpha, through) = match (&settings.line, given) {
             (Some(path), Some(points)) => (path.display().to_string(), None, points),
             _ => {
-                let solvers = ReferenceSolvers::stopped_by(&raceline, &raceline_settings, Arc::clone(stop))?;
+                let (road, entry_mps) = (&raceline.cross_sections, settings.entry_mps);
+                let solvers = ReferenceSolvers::stopped_by(road, &raceline.car, entry_mps, Arc::clone(stop))?;
                 let found = solvers.best(LineObjective::LapTime)?;
                 if stop.load(Ordering::Relaxed) {
                     return Ok(None);
@@ -161,7 +136,6 @@ impl HybridInputs {
             alpha,
             entry_mps: settings.entry_mps,
             raceline,
-            raceline_settings,
         }))
     }
 }
@@ -218,22 +192,4 @@ impl HybridSetup {
         let store = hybrid.store.capacity_j * hybrid.store.start_soc;
         asked_mj.map_or(rules.min(store), |mj| 1e6 * mj)
     }
-}
-
-/// As [`crate::line::read_line`], points at least `spacing_m` apart.
-///
-/// # Errors
-/// As there.
-pub fn read_line(path: &Path, spacing_m: f64) -> Result<Vec<DVec2>> {
-    let mut points: Vec<DVec2> = Vec::new();
-    for point in crate::line::read_line(path)? {
-        if points.last().is_none_or(|last| last.distance(point) >= spacing_m) {
-            points.push(point);
-        }
-    }
-    // The end of a closed line may repeat its start.
-    while points.len() > 3 && points[0].distance(points[points.len() - 1]) < 0.5 * spacing_m {
-        points.pop();
-    }
-    Ok(points)
 }

@@ -3,10 +3,10 @@
 use super::scenario::{ReportedLap, drive, drive_engine_alone};
 use super::settings::HybridStudySettings;
 use super::setup::HybridSetup;
-use super::strategy::{MOST_MJ, zone_gates};
+use super::strategy::MOST_MJ;
 use crate::error::{Error, Result};
 use crate::evaluate::energy::{Free, HybridObjective, HybridProblem, open_hybrid_evaluator};
-use crate::line::energy::Mode;
+use crate::line::energy::{Gates, Mode};
 use crate::study::framework::journal::Recorder;
 use crate::swarm::{
     CovarianceSettings, CovarianceSwarm, HybridSettings, HybridSwarm, Optimiser, Progress, run,
@@ -107,7 +107,7 @@ pub fn size(
     let whole = zoned(MOST_MJ)?;
     let upper: Vec<f64> = whole.problem.variables.iter().map(|v| v.upper).collect();
     let step_kw = upper[MOTOR] / RANGES as f64;
-    let engine_s = drive(setup, "engine alone", Mode::Additional, zone_gates(0.0))?
+    let engine_s = drive(setup, "engine alone", Mode::Additional, Gates::of_zones(0.0))?
         .lap
         .time;
     if engine_s <= lap_time_s {

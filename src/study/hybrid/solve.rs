@@ -2,14 +2,14 @@
 
 use super::scenario::drive_engine_alone;
 use super::{
-    DrivenScenario, FrontFigures, Hybrid, HybridInputs, HybridStudySettings, Optimised, Outcome, Scenario,
-    drive, search_front, search_strategy, size, stint, worth,
+    DrivenScenario, FrontFigures, Hybrid, Optimised, Outcome, Scenario, drive, search_front, search_strategy,
+    size, stint, worth,
 };
 use crate::error::Result;
 use crate::evaluate::add_failures;
 use crate::evaluate::energy::open_hybrid_evaluator;
 use crate::line::energy::{Gates, Mode};
-use crate::study::framework::journal::{Journal, Recorder};
+use crate::study::framework::journal::Recorder;
 use crate::study::framework::{Inputs, Progress, RunRecord, Study, Watch, Work};
 use std::cell::Cell;
 use std::time::Instant;
@@ -19,15 +19,12 @@ use std::time::Instant;
 ///
 /// # Errors
 /// Those of laps, evaluators and solvers; [`crate::Error::Input`] if the journal belongs to other inputs or another backend.
-pub(super) fn deploy(
-    settings: &HybridStudySettings,
-    inputs: &HybridInputs,
-    work: Work<'_, Journal>,
-) -> Result<Option<Outcome>> {
+pub(super) fn deploy(work: Work<'_, Hybrid>) -> Result<Option<Outcome>> {
+    let settings = work.settings;
     let mut recorder = Recorder::of(Hybrid::NAME, settings, work.state, work.state_file)?;
     recorder.save()?;
     // The search for the line starts anew in a study that is resumed: it takes seconds, and ends where it would have ended.
-    let Some(setup) = inputs.with_line(settings, &work.stop)? else {
+    let Some(setup) = work.prepared.with_line(settings, &work.stop)? else {
         return Ok(None);
     };
     let watch = Watch::begin();

@@ -2,68 +2,18 @@
 
 use super::scenario::{ReportedLap, drive};
 use super::settings::{FreePart, HybridStudySettings};
-use super::setup::{GAP_M, HybridSetup, control_points, late_bend};
+use super::setup::{HybridSetup, control_points};
 use crate::error::Result;
 use crate::evaluate::energy::{
     Free, HybridLine, HybridObjective, HybridProblem, Strategy, open_hybrid_evaluator,
 };
-use crate::line::energy::{EnergyPlan, Gates, Mode};
+use crate::line::energy::{EnergyPlan, Gates, Mode, late_bend, zone_starts};
 use crate::line::{Parametrisation, geometry};
 use crate::optimum::{Deployment, DeploymentSearch};
 use crate::random::Random;
 use crate::study::framework::journal::Recorder;
-use crate::swarm::{
-    HybridSettings, HybridSwarm, Mopso, MopsoSettings, Optimiser, Progress, PsoSettings, run,
-};
+use crate::swarm::{HybridSettings, HybridSwarm, Mopso, MopsoSettings, Optimiser, Progress, run};
 use std::ops::ControlFlow;
-
-/// Stretches of less are none (J).
-const LEAST_J: f64 = 5e3;
-
-/// Gates that leave all to the zones, but for the energy (MJ).
-pub fn zone_gates(energy_mj: f64) -> Gates {
-    Gates {
-        ax_mps2: -1e3,
-        soc: -1e6,
-        energy_mj,
-        ..Gates::OPEN
-    }
-}
-
-/// Sections where stretches begin that the motor is of use on, by what it gives in each segment (J) of a lap on which nothing
-/// holds it back, and by the segments' lengths (m). Where tyres or corners take all that the engine gives, it adds nothing.
-pub fn zone_starts(given_j: &[f64], length_m: &[f64]) -> Vec<usize> {
-    let n = given_j.len();
-    let mut on: Vec<bool> = given_j.iter().map(|j| *j > 0.0).collect();
-    let runs = |on: &[bool]| -> Vec<(usize, usize)> {
-        let Some(first) = (0..n).find(|&i| on[i] != on[(i + n - 1) % n]) else {
-            return Vec::new();
-        };
-        let mut runs = Vec::new();
-        let mut k = 0;
-        while k < n {
-            let start = (first + k) % n;
-            let count = (0..n - k)
-                .take_while(|j| on[(start + j) % n] == on[start])
-                .count();
-            runs.push((start, count));
-            k += count;
-        }
-        runs
-    };
-    let sum = |values: &[f64], (start, count): (usize, usize)| {
-        (0..count).map(|j| values[(start + j) % n]).sum::<f64>()
-    };
-    for run in runs(&on) {
-        if !on[run.0] && sum(length_m, run) < GAP_M {
-            (0..run.1).for_each(|j| on[(run.0 + j) % n] = true);
-        }
-    }
-    let worth_it = |run: &(usize, usize)| on[run.0] && sum(given_j, *run) > LEAST_J;
-    let mut starts: Vec<usize> = runs(&on).iter().filter(|r| worth_it(r)).map(|r| r.0).collect();
-    starts.sort_unstable();
-    if starts.is_empty() { vec![0] } else { starts }
-}
 
 /// What the swarm found for one budget.
 #[derive(Clone, Debug)]
@@ -99,7 +49,7 @@ impl HybridSetup {
     pub fn exact_lap(&self, name: &str, shares: &[f64], energy_j: f64) -> Result<ReportedLap> {
         let problem = self.by_segment(Strategy {
             shares: shares.to_vec(),
-            ..Strategy::fixed(zone_gates(energy_j / 1e6), self.points_m.len())
+            ..Strategy::fixed(Gates::of_zones(energy_j / 1e6), self.points_m.len())
         })?;
         Ok(ReportedLap::of(name, &problem, &[]))
     }
@@ -115,7 +65,7 @@ impl HybridSetup {
         energy_mj: f64,
         objectives: &[HybridObjective],
     ) -> Result<HybridProblem> {
-        let open = drive(self, "open", Mode::Additional, zone_gates(1e6))?;
+        let open = drive(self, "open", Mode::Additional, Gates::of_zones(1e6))?;
         let given: Vec<f64> = open.segments.iter().map(|s| s.deployed).collect();
         let starts = zone_starts(&given, &open.length_m);
         let mut length = open.length_m;
@@ -124,7 +74,7 @@ impl HybridSetup {
         let zones = plan.count();
         let strategy = Strategy {
             free: free.iter().copied().chain((0..zones).map(Free::Zone)).collect(),
-            ..Strategy::fixed(zone_gates(energy_mj), zones)
+            ..Strategy::fixed(Gates::of_zones(energy_mj), zones)
         };
         self.problem(plan, strategy, objectives)
     }
@@ -199,7 +149,7 @@ pub fn search_front(
             let shape = geometry(&cross_sections.points(alpha), cross_sections.closed);
             let mut length = shape.segment_m.clone();
             length.resize(cross_sections.len(), 0.0);
-            let zone_sections = sections_of(&fixed, &length);
+            let zone_sections = fixed.energy().starts_along(&length);
             let run_in = late_bend(&shape.curvature_1pm);
             let plan = EnergyPlan::zoned(
                 &length,
@@ -219,7 +169,7 @@ pub fn search_front(
                 plan,
                 Strategy {
                     free: (0..free_zones).map(Free::Zone).collect(),
-                    ..Strategy::fixed(zone_gates(energy_mj), zones)
+                    ..Strategy::fixed(Gates::of_zones(energy_mj), zones)
                 },
                 &settings.objectives,
                 settings.entry_mps,
@@ -227,15 +177,9 @@ pub fn search_front(
             (problem, line)
         }
     };
-    let mopso = MopsoSettings {
-        motion: PsoSettings {
-            population: settings.population,
-            iterations: settings.iterations,
-            seed: settings.seed,
-            ..MopsoSettings::default().motion
-        },
-        ..MopsoSettings::default()
-    };
+    let mopso = MopsoSettings::default()
+        .with_size(settings.population, settings.iterations)
+        .with_seed(settings.seed);
     let mut swarm = Mopso::new(&problem.problem, mopso)?;
     swarm.start_from(&starting_candidates(&problem, settings, &line))?;
     let mut evaluator = open_hybrid_evaluator(&problem, settings.backend, settings.adapter.as_deref())?;
@@ -246,30 +190,6 @@ pub fn search_front(
         objectives: swarm.archive().objectives.clone(),
         evaluations: swarm.evaluations(),
     })
-}
-
-/// Sections of these lengths (m) where the zones of `fixed`, whose sections are evenly spaced, begin.
-fn sections_of(fixed: &HybridProblem, length_m: &[f64]) -> Vec<usize> {
-    let zones = &fixed.energy().zones;
-    let n = zones.len();
-    let total: f64 = length_m.iter().sum();
-    let mut starts: Vec<usize> = (0..n)
-        .filter(|&i| zones[i].zone != zones[(i + n - 1) % n].zone)
-        .map(|i| {
-            let station = i as f64 / n as f64 * total;
-            let mut along = 0.0;
-            length_m
-                .iter()
-                .position(|h| {
-                    along += h;
-                    along > station
-                })
-                .unwrap_or(0)
-        })
-        .collect();
-    starts.sort_unstable();
-    starts.dedup();
-    if starts.is_empty() { vec![0] } else { starts }
 }
 
 /// The known line, where lines are free, with shares of all zones from none to all.

@@ -1,12 +1,11 @@
 //! Basin hopping after the polish (Wales and Doye, *J. Phys. Chem. A* 101, 1997): a lap can have minima that least squares
 //! does not leave, and beside them starts from which it comes further down.
 
-use super::coordinates::Logarithmic;
 use super::polish::{Polished, polish_observed};
 use super::setup::CHANNELS;
 use crate::error::Result;
-use crate::evaluate::Evaluator;
 use crate::evaluate::replay::ReplayProblem;
+use crate::evaluate::{Evaluator, Logarithmic};
 use crate::random::Random;
 use std::ops::ControlFlow;
 

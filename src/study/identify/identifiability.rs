@@ -15,8 +15,10 @@ pub struct Identifiability {
     /// Standard error of each parameter by the Cramer-Rao bound for white noise, in its unit; infinite where the
     /// log says nothing.
     pub standard_errors: Vec<f64>,
-    /// Whether each parameter can be told at all.
+    /// Whether each parameter can be told by itself.
     pub identifiable: Vec<bool>,
+    /// The parameters that cannot, in groups that the log cannot tell apart.
+    pub groups: Vec<Group>,
     /// Standard deviation of the errors that remain, per channel.
     pub noise: [f64; CHANNELS],
     /// How far a step of least squares would move a parameter that can be told and stands free of its bounds, in its
@@ -24,6 +26,15 @@ pub struct Identifiability {
     pub step_in_errors: f64,
     /// Whether the errors that remain look like noise, for which standard errors take them, or are mere rounding.
     pub looks_like_noise: bool,
+}
+
+/// Parameters none of which the log tells by itself.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Group {
+    /// Their places among the free parameters.
+    pub members: Vec<usize>,
+    /// How many independent combinations of them the log tells.
+    pub combinations_told: usize,
 }
 
 /// Singular values under this share of the greatest count as zero: the Jacobian's own rounding, about the square
@@ -34,9 +45,15 @@ const NULL_SHARE: f64 = 1e-6;
 /// Noise is taken for no less than this share of a channel's scale: the rounding of a simulated log's figures.
 const LEAST_NOISE: f64 = 1e-10;
 
-/// Standard deviation of each channel's errors, at least a trace of its scale.
-pub fn noise_of(errors: &[f64], scales: &[f64; CHANNELS]) -> [f64; CHANNELS] {
-    let count = (errors.len() / CHANNELS).max(1) as f64;
+/// Correlation of two parameters from which on they belong to one group. A combination of `n` equal parts leaves its members
+/// correlated by `1/(n - 1)`.
+const GROUPED: f64 = 0.2;
+
+/// Standard deviation of each channel's errors that are left by a fit of this many unknowns, at least a trace of its scale. A fit
+/// takes a degree of freedom for each unknown, an equal share from each channel.
+pub fn noise_of(errors: &[f64], scales: &[f64; CHANNELS], unknowns: usize) -> [f64; CHANNELS] {
+    let unknowns = unknowns as f64 / CHANNELS as f64;
+    let count = ((errors.len() / CHANNELS) as f64 - unknowns).max(1.0);
     std::array::from_fn(|k| {
         let squares: f64 = errors.iter().skip(k).step_by(CHANNELS).map(|e| e * e).sum();
         (squares / count).sqrt().max(LEAST_NOISE * scales[k])
@@ -51,24 +68,59 @@ pub(super) fn at_bound(value: f64, bounds: [f64; 2]) -> bool {
     (x - low).min(high - x) <= AT_BOUND * (high - low)
 }
 
+/// Groups parameters that are correlated, directly or through others, by their covariance in that of a guess.
+fn groups_of(covariance: &DMatrix<f64>, untold: &[usize]) -> Vec<Group> {
+    let grouped = |a: usize, b: usize| {
+        covariance[(a, b)].powi(2) > GROUPED * GROUPED * covariance[(a, a)] * covariance[(b, b)]
+    };
+    let mut left = untold.to_vec();
+    let mut groups = Vec::new();
+    while let Some(first) = left.first().copied() {
+        let mut members = vec![first];
+        let mut next = 0;
+        left.remove(0);
+        while next < members.len() {
+            let (with, without): (Vec<usize>, Vec<usize>) =
+                left.iter().partition(|&&other| grouped(members[next], other));
+            members.extend(with);
+            left = without;
+            next += 1;
+        }
+        members.sort_unstable();
+        // Half of a guess's variance is left of a combination that is told as well as it was guessed.
+        let own = covariance.select_rows(&members).select_columns(&members);
+        let combinations_told = own.symmetric_eigenvalues().iter().filter(|v| **v < 0.5).count();
+        groups.push(Group {
+            members,
+            combinations_told,
+        });
+    }
+    groups
+}
+
 /// Judges the parameters at a candidate with these residuals.
 ///
 /// A parameter counts as not identifiable where the Jacobian is blind to it (a singular value of zero), or where
-/// its standard error exceeds the standard deviation of a guess anywhere between its bounds (range / sqrt 12).
+/// its standard error exceeds the standard deviation of a guess anywhere between its bounds (range / sqrt 12). Of parameters that
+/// have the same effect, none may be identifiable and their combination known well: [`Identifiability::groups`] says so.
 pub fn judge(
     residuals: &Residuals,
     variables: &[Variable],
     candidate: &[f64],
     scales: &[f64; CHANNELS],
 ) -> Identifiability {
-    let noise = noise_of(&residuals.errors, scales);
     let d = variables.len();
+    let noise = noise_of(&residuals.errors, scales, d);
     if residuals.errors.len() < d {
         // Fewer figures than unknowns: any of them may be anything.
         return Identifiability {
             singular_values: Vec::new(),
             standard_errors: vec![f64::INFINITY; d],
             identifiable: vec![false; d],
+            groups: vec![Group {
+                members: (0..d).collect(),
+                combinations_told: 0,
+            }],
             noise,
             step_in_errors: f64::INFINITY,
             looks_like_noise: false,
@@ -113,6 +165,14 @@ pub fn judge(
     let identifiable: Vec<bool> = (0..d)
         .map(|k| standard_errors[k] < ranges[k] / 12f64.sqrt())
         .collect();
+    // What is known of the parameters after the log, of a guess anywhere between their bounds before it.
+    let guess = 12.0;
+    let known = DMatrix::from_fn(d, d, |a, b| {
+        let parts = (0..d).map(|j| vectors[(j, a)] * vectors[(j, b)] / (values[j].powi(2) + guess));
+        parts.sum::<f64>()
+    });
+    let untold: Vec<usize> = (0..d).filter(|&k| !identifiable[k]).collect();
+    let groups = groups_of(&(known * guess), &untold);
     let free: Vec<usize> = (0..d)
         .filter(|&k| identifiable[k] && !at_bound(candidate[k], [variables[k].lower, variables[k].upper]))
         .collect();
@@ -131,10 +191,97 @@ pub fn judge(
     let at_rounding = (0..CHANNELS).all(|k| noise[k] <= LEAST_NOISE * scales[k]);
     Identifiability {
         identifiable,
+        groups,
         standard_errors,
         singular_values,
         noise,
         step_in_errors,
         looks_like_noise: at_rounding || looks_like_noise(&residuals.errors),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::Random;
+
+    const ROWS: usize = 50;
+
+    /// Errors of these noises, and columns for unknowns of which each row's derivative is a draw.
+    fn residuals(unknowns: usize) -> Residuals {
+        let random = Random::new(5);
+        let draws = |purpose: u32| -> Vec<f64> {
+            let rows = 0..(ROWS * CHANNELS) as u32;
+            rows.map(|i| random.normal(purpose, 0, i, 0)).collect()
+        };
+        Residuals {
+            errors: draws(100),
+            columns: (0..unknowns as u32).map(draws).collect(),
+        }
+    }
+
+    fn variables(count: usize) -> Vec<Variable> {
+        let variable = |k: usize| Variable {
+            name: format!("x{k}"),
+            unit: "-".to_owned(),
+            lower: -1.0,
+            upper: 1.0,
+            whole: false,
+        };
+        (0..count).map(variable).collect()
+    }
+
+    fn judged(residuals: &Residuals) -> Identifiability {
+        let count = residuals.columns.len();
+        judge(residuals, &variables(count), &vec![0.0; count], &[1.0; CHANNELS])
+    }
+
+    #[test]
+    fn a_fit_takes_a_degree_of_freedom_for_each_unknown() {
+        // Eight rows of ones, of which sixteen unknowns take four from each channel.
+        let noise = noise_of(&[1.0; 8 * CHANNELS], &[1.0; CHANNELS], 16);
+        assert_eq!(noise, [2f64.sqrt(); CHANNELS]);
+        // Least squares leaves the noise's own size over by that count: the mean over many draws of a fit of one unknown to two
+        // rows of each channel.
+        let random = Random::new(8);
+        let (mut squares, draws) = (0.0, 4000);
+        for draw in 0..draws {
+            let normal = |purpose: u32, i: usize| random.normal(purpose, draw, i as u32, 0);
+            let rows = 2 * CHANNELS;
+            let column: Vec<f64> = (0..rows).map(|i| normal(1, i)).collect();
+            let noise: Vec<f64> = (0..rows).map(|i| normal(2, i)).collect();
+            let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+            let fitted = dot(&column, &noise) / dot(&column, &column);
+            let left: Vec<f64> = noise.iter().zip(&column).map(|(n, c)| n - fitted * c).collect();
+            let found = noise_of(&left, &[1.0; CHANNELS], 1);
+            squares += found.iter().map(|n| n * n).sum::<f64>() / CHANNELS as f64;
+        }
+        // Its standard error is sqrt(2/7)/sqrt(4000), 0.8 %; that of division by all rows would be off by 12 %.
+        assert!((squares / f64::from(draws) - 1.0).abs() < 0.03);
+    }
+
+    #[test]
+    fn parameters_of_the_same_effect_are_judged_together() {
+        let mut residuals = residuals(6);
+        // The second stands in for the first, the fourth and the fifth for the third; the sixth does nothing.
+        residuals.columns[1] = residuals.columns[0].clone();
+        residuals.columns[3] = residuals.columns[2].clone();
+        residuals.columns[4] = residuals.columns[2].iter().map(|x| -x).collect();
+        residuals.columns[5] = vec![0.0; residuals.errors.len()];
+        let verdict = judged(&residuals);
+        assert_eq!(verdict.identifiable, [false; 6]);
+        let group = |members: &[usize], combinations_told| Group {
+            members: members.to_vec(),
+            combinations_told,
+        };
+        assert_eq!(
+            verdict.groups,
+            [group(&[0, 1], 1), group(&[2, 3, 4], 1), group(&[5], 0)]
+        );
+
+        residuals.columns.truncate(3);
+        residuals.columns.remove(1);
+        let verdict = judged(&residuals);
+        assert!(verdict.identifiable == [true; 2] && verdict.groups.is_empty());
     }
 }

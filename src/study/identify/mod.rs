@@ -1,8 +1,8 @@
 //! Identification: which car drove this lap?
 
-mod coordinates;
 mod hops;
 mod identifiability;
+mod notes;
 mod page;
 mod polish;
 mod refine;
@@ -11,8 +11,9 @@ mod search;
 mod settings;
 mod setup;
 mod state;
+mod verdict;
 
-pub use identifiability::{Identifiability, judge};
+pub use identifiability::{Group, Identifiability, judge};
 pub use polish::{Polished, polish};
 pub use results::Summary;
 pub use search::{Judged, Outcome, judge_candidate, search_with, total_parameter_error};
@@ -20,6 +21,7 @@ pub use settings::{Algorithm, FreeParameter, IdentifySettings, ObjectiveChoice};
 pub use setup::{Setup, cost_unit, lap_format, set_up};
 pub(in crate::study) use setup::{planned, subject, without_laps};
 pub use state::{Front, HistoryRow, SearchState};
+pub use verdict::{Untold, Verdict};
 
 use crate::config::settings::Settings;
 use crate::error::{Error, Result};
@@ -27,7 +29,9 @@ use crate::evaluate::replay::open_evaluator;
 use crate::evaluate::{PackedClient, run_packed};
 use crate::study::framework::memory::{MemoryItem, Size};
 use crate::study::framework::state_file::StateFile;
-use crate::study::framework::{Figures, Plan, Progress, RunRecord, Study, Subject, Work, resumed_or_new};
+use crate::study::framework::{
+    Figures, Plan, Progress, RunRecord, Solved, Study, Subject, Work, resumed_or_new,
+};
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -66,11 +70,8 @@ impl Study for Identify {
         planned(settings, setup, plan.evaluations(settings.evaluations()))
     }
 
-    fn solve(
-        settings: &IdentifySettings,
-        setup: &Setup,
-        work: Work<'_, SearchState>,
-    ) -> Result<Option<Outcome>> {
+    fn solve(work: Work<'_, Self>) -> Result<Option<Outcome>> {
+        let (settings, setup) = (work.settings, work.prepared);
         let mut evaluator = open_evaluator(&setup.replay, settings.backend, settings.adapter.as_deref())?;
         let begun = (work.state, work.state_file);
         search_with(settings, setup, evaluator.as_mut(), begun, work.observe).map(Some)
@@ -127,34 +128,26 @@ impl Study for Identify {
         &outcome.record
     }
 
-    fn summarise(settings: &IdentifySettings, setup: &Setup, outcome: &Outcome) -> Summary {
-        results::summarise(settings, setup, outcome)
+    fn summarise(solved: &Solved<'_, Self>) -> Summary {
+        results::summarise(solved.settings, solved.prepared, solved.outcome)
     }
 
     fn subject(settings: &IdentifySettings, setup: &Setup) -> Subject {
         subject(settings, setup)
     }
 
-    fn report(
-        folder: &Path,
-        settings: &IdentifySettings,
-        setup: &Setup,
-        outcome: &Outcome,
-        summary: &Summary,
-    ) -> Result<()> {
-        let car = setup
-            .replay
-            .free
-            .candidate_car(&results::reported_candidate(setup, outcome));
-        car.write(folder, "car")?;
+    fn report(folder: &Path, solved: &Solved<'_, Self>, summary: &Summary) -> Result<()> {
+        let (setup, outcome) = (solved.prepared, solved.outcome);
+        let car = setup.replay.free.candidate_car(&outcome.candidate);
+        car.write_with(folder, "car", &results::car_comment(&setup.log.source, summary))?;
         results::write_history(folder, outcome)?;
         results::write_parameters(folder, summary)?;
         if let Some(front) = &outcome.front {
             results::write_front(folder, setup, front)?;
         }
-        let judged = judge_candidate(&setup.replay, &outcome.candidate);
+        let judged = judge_candidate(&outcome.replay, &outcome.candidate);
         results::write_traces(folder, setup, &judged)?;
-        page::write(folder, settings, setup, outcome, &judged, summary)
+        page::write(folder, solved, &judged, summary)
     }
 
     fn text(settings: &IdentifySettings, summary: &Summary) -> String {

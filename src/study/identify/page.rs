@@ -1,26 +1,27 @@
 //! The interactive report of an identification, with its figures.
 
+use super::Identify;
 use super::results::{Summary, parameter_rows, traced_lap};
 use super::search::{Judged, Outcome};
 use super::settings::IdentifySettings;
 use super::setup::{CHANNELS, Setup, cost_unit};
+use super::verdict::Verdict;
 use crate::config::settings::Settings;
 use crate::error::Result;
 use crate::evaluate::replay::{CHANNEL_LABELS, CHANNEL_NAMES, CHANNEL_UNITS};
 use crate::report::{
     Curves, Figure, Front, HtmlReport, LapLine, LapView, Panel, Parameters, Scale, Table, significant,
 };
-use crate::study::framework::circuit_view::{circuit_road, sections};
+use crate::study::framework::Solved;
 use std::path::Path;
 
 pub(super) fn write(
     folder: &Path,
-    settings: &IdentifySettings,
-    setup: &Setup,
-    outcome: &Outcome,
+    solved: &Solved<'_, Identify>,
     judged: &Judged,
     summary: &Summary,
 ) -> Result<()> {
+    let (setup, outcome) = (solved.prepared, solved.outcome);
     // The file's name alone: a long path would run out of the figures.
     let source = Path::new(&setup.log.source)
         .file_name()
@@ -41,7 +42,7 @@ pub(super) fn write(
     if let Some(map) = setup.circuit.as_ref().and_then(|c| view.track_map(&*c.name)) {
         map.write_svg(folder.join("map.svg"))?;
     }
-    page.table("Channels", "", &channels(settings, summary))?;
+    page.table("Channels", "", &channels(solved.settings, summary))?;
     page.section("Parameters", "");
     let figure = Parameters {
         title: "Parameters within their bounds".to_owned(),
@@ -92,13 +93,20 @@ pub(super) fn write(
         ),
         ("swarm", &format!("{:.1} s", summary.swarm_elapsed_s)),
     ]);
-    page.settings("study.toml, which repeats this run", settings.to_toml());
+    page.settings("study.toml, which repeats this run", solved.settings.to_toml());
     page.write(folder.join("report.html"))
 }
 
 fn head(page: &mut HtmlReport, car: &str, source: &str, outcome: &Outcome, summary: &Summary) {
     let count = summary.parameters.len();
-    let sound = count - summary.unidentifiable.len();
+    let sound = summary
+        .parameters
+        .iter()
+        .filter(|p| p.value.is_some() && !p.at_bound);
+    let sound = match summary.verdict {
+        Verdict::NotAtMinimum => "not known".to_owned(),
+        _ => format!("{} of {count}", sound.count()),
+    };
     let share = |name: &str| 100.0 * summary.rms_error[name] / summary.rms_signal[name];
     page.sentence(format!(
         "{count} unknowns of the {car} were fitted to {source} in {:.0} s on {} ({}). Driven by the logged steering and \
@@ -108,28 +116,9 @@ fn head(page: &mut HtmlReport, car: &str, source: &str, outcome: &Outcome, summa
         summary.record.adapter,
         by_channel(|name| format!("to {}", significant(summary.rms_error[name], 3)))
     ));
-    page.sentence(if summary.unidentifiable.is_empty() {
-        format!("All {count} parameters are identifiable from this log.")
-    } else {
-        format!(
-            "{sound} of {count} parameters are identifiable from this log. The starting car's values stand for the others: {}.",
-            summary.unidentifiable.join(", ")
-        )
-    });
-    if let Some(caution) = summary.caution() {
-        page.sentence(caution);
-    }
-    let bounds: Vec<&str> = summary
-        .parameters
-        .iter()
-        .filter(|p| p.at_bound)
-        .map(|p| p.name.as_str())
-        .collect();
-    if !bounds.is_empty() {
-        page.sentence(format!(
-            "At their bounds: {}. Either the bounds are too narrow, or these parameters stand in for something that the model lacks.",
-            bounds.join(", ")
-        ));
+    page.sentence(summary.verdict_text.clone());
+    for note in &summary.notes {
+        page.sentence(note.clone());
     }
     if let [tried @ (1..), gained] = summary.hops {
         page.sentence(format!(
@@ -146,7 +135,7 @@ fn head(page: &mut HtmlReport, car: &str, source: &str, outcome: &Outcome, summa
         ));
         page.tile("Total parameter error", significant(error, 3), "");
     }
-    page.tile("Identifiable parameters", format!("{sound} of {count}"), "");
+    page.tile("Parameters told", sound, "");
     for (k, label) in CHANNEL_LABELS.iter().enumerate() {
         page.tile(
             &format!("Error of {label}"),
@@ -206,8 +195,7 @@ fn lap(setup: &Setup, judged: &Judged, title: String) -> LapView {
         .line(logged.wide().at(places.collect::<Vec<_>>()))
         .line(fitted)
         .line(error)
-        .sections(circuit.into_iter().flat_map(sections))
-        .road(circuit.map(circuit_road))
+        .circuit(circuit)
 }
 
 fn rms_text(errors: &[f64], unit: &str) -> String {
@@ -242,7 +230,7 @@ pub(super) fn parameters(summary: &Summary) -> Table<'static> {
     Table::rows(&summary.parameters)
         .text("parameter", |p| &*p.name)
         .text("unit", |p| &*p.unit)
-        .number("fitted", "", |p| p.value)
+        .number("fitted", "", |p| p.car_value)
         .number("standard error", "", |p| p.standard_error)
         .number("truth", "", |p| p.truth)
         .number("off by", "%", |p| Some(100.0 * (p.value? / p.truth? - 1.0)))
@@ -250,6 +238,7 @@ pub(super) fn parameters(summary: &Summary) -> Table<'static> {
         .number("lower bound", "", |p| p.bounds[0])
         .number("upper bound", "", |p| p.bounds[1])
         .text("at a bound", |p| if p.at_bound { "yes" } else { "" })
+        .text("told", |p| if p.value.is_some() { "" } else { "no" })
         .table()
         .without_empty()
 }

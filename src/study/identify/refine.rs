@@ -59,7 +59,7 @@ pub(super) fn refine(
         let Some(residuals) = replay.residuals(&refined.candidate) else {
             return Ok(refined);
         };
-        let noise = noise_of(&residuals.errors, &setup.scales);
+        let noise = noise_of(&residuals.errors, &setup.scales, replay.dimensions());
         if (0..CHANNELS).all(|k| noise[k] < EXACT * setup.scales[k]) {
             return Ok(refined);
         }
@@ -84,6 +84,46 @@ pub(super) fn refine(
             }
         }
     }
+}
+
+/// Rounds of [`restarted`] at the most. Each leaves a small share of what the one before was off by.
+const ROUNDS: usize = 6;
+/// A round that moves no parameter by more than this share of its range is the last.
+const MOVED: f64 = 1e-7;
+
+/// Goes on with windows that start where the car found so far comes, until that changes nothing any more: a car is to be judged
+/// from its own sideslip and roll, and not from those of the starting car. The candidate, and whether this was interrupted.
+pub(super) fn restarted(
+    setup: &Setup,
+    mut candidate: Vec<f64>,
+    watch: &mut dyn FnMut() -> ControlFlow<()>,
+) -> (Vec<f64>, bool) {
+    let mut replay = setup.replay.clone();
+    for _ in 0..ROUNDS {
+        let before = replay.plan.windows.clone();
+        replay.start_as_driven_by(&replay.flat(&candidate));
+        if replay.plan.windows == before {
+            break;
+        }
+        let Some(residuals) = replay.residuals(&candidate) else {
+            break;
+        };
+        let noise = noise_of(&residuals.errors, &setup.scales, replay.dimensions());
+        let weights = noise.map(|n| 1.0 / n);
+        let Some(polished) = polish_observed(&replay, &candidate, weights, MOST_DRIVES, watch) else {
+            break;
+        };
+        let variables = replay.problem.variables.iter();
+        let moved = variables
+            .zip(candidate.iter().zip(&polished.candidate))
+            .map(|(v, (a, b))| (a - b).abs() / (v.upper - v.lower))
+            .fold(0.0, f64::max);
+        candidate = polished.candidate;
+        if polished.interrupted || moved < MOVED {
+            return (candidate, polished.interrupted);
+        }
+    }
+    (candidate, false)
 }
 
 #[cfg(test)]

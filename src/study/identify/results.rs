@@ -1,9 +1,11 @@
 //! What an identification leaves behind: figures for people and scripts, files, figures.
 
 use super::identifiability::at_bound;
+use super::notes::notes;
 use super::search::{Judged, Outcome, judge_candidate, total_parameter_error};
 use super::settings::IdentifySettings;
 use super::setup::{CHANNELS, Setup};
+use super::verdict::{Untold, Verdict};
 use crate::error::Result;
 use crate::evaluate::failures_in_words;
 use crate::evaluate::replay::{CHANNEL_NAMES, CHANNEL_UNITS};
@@ -26,11 +28,13 @@ pub struct ParameterSummary {
     pub swarm_value: f64,
     /// The fitted value; nothing where the log cannot tell it.
     pub value: Option<f64>,
+    /// The value in the car that was judged and written, whether the log tells it or not.
+    pub car_value: f64,
     /// Its standard error, where the log tells anything.
     pub standard_error: Option<f64>,
     /// The truth, where known.
     pub truth: Option<f64>,
-    /// Whether the fitted value is at one of the bounds: the log would have it elsewhere.
+    /// Whether the car's value is at one of the bounds: the log would have it elsewhere.
     pub at_bound: bool,
 }
 
@@ -64,8 +68,14 @@ pub struct Summary {
     pub holdout_rms_signal: Option<BTreeMap<String, f64>>,
     /// Windows on the laps held out, and how many of them lost the car.
     pub holdout_lost_windows: Option<[usize; 2]>,
-    /// Parameters that the log cannot tell.
+    /// What may be said of the unknowns: the strictest of what applies.
+    pub verdict: Verdict,
+    /// The same in words, with all that applies.
+    pub verdict_text: String,
+    /// Parameters that the log cannot tell, each by itself.
     pub unidentifiable: Vec<String>,
+    /// The same in groups that the log cannot tell apart.
+    pub untold_groups: Vec<Untold>,
     /// How far least squares would still move an identifiable parameter, in its standard errors, at most; zero at a minimum.
     pub step_in_standard_errors: Option<f64>,
     /// Whether the errors that remain look like noise, for which standard errors take them.
@@ -82,8 +92,14 @@ pub struct Summary {
     pub sample_interval_s: f64,
     /// Runge-Kutta steps per sample.
     pub substeps: usize,
+    /// Steps per sample that the car needs which was found.
+    pub substeps_needed: usize,
     /// Windows fitted.
     pub windows: usize,
+    /// Time that each window is driven before it is scored, s.
+    pub settle_s: f64,
+    /// What limits these results, in words.
+    pub notes: Vec<String>,
     /// What the telemetry's calibration found and applied.
     pub calibration: crate::telemetry::Calibration,
 }
@@ -92,27 +108,11 @@ fn by_channel(values: [f64; CHANNELS]) -> BTreeMap<String, f64> {
     CHANNEL_NAMES.into_iter().map(str::to_owned).zip(values).collect()
 }
 
-/// The candidate to hand out: fitted values, but the starting car's where the log cannot tell.
-pub(super) fn reported_candidate(setup: &Setup, outcome: &Outcome) -> Vec<f64> {
-    let free = &setup.replay.free;
-    let mut candidate = free.values_in(free.base());
-    let told = outcome
-        .candidate
-        .iter()
-        .zip(&outcome.identifiability.identifiable);
-    for (x, (fitted, told)) in candidate.iter_mut().zip(told) {
-        if *told {
-            *x = *fitted;
-        }
-    }
-    candidate
-}
-
 /// Works the figures out.
 pub(super) fn summarise(settings: &IdentifySettings, setup: &Setup, outcome: &Outcome) -> Summary {
-    let replay = &setup.replay;
+    let replay = &outcome.replay;
     let judged = judge_candidate(replay, &outcome.candidate);
-    let held = setup
+    let held = outcome
         .holdout
         .as_ref()
         .map(|h| (judge_candidate(h, &outcome.candidate), h.plan.windows.len()));
@@ -141,12 +141,21 @@ pub(super) fn summarise(settings: &IdentifySettings, setup: &Setup, outcome: &Ou
             bounds: [v.lower, v.upper],
             swarm_value: outcome.swarm_candidate[k],
             value: told(k).then_some(outcome.candidate[k]),
+            car_value: outcome.candidate[k],
             standard_error: Some(identifiability.standard_errors[k]).filter(|e| e.is_finite()),
             truth: setup.truth.as_ref().map(|t| t[k]),
-            at_bound: told(k) && at_bound(outcome.candidate[k], [v.lower, v.upper]),
+            at_bound: at_bound(outcome.candidate[k], [v.lower, v.upper]),
         })
         .collect();
-    Summary {
+    let untold_groups = identifiability.groups.iter().map(|group| Untold {
+        parameters: group
+            .members
+            .iter()
+            .map(|k| parameters[*k].name.clone())
+            .collect(),
+        combinations_told: group.combinations_told,
+    });
+    let mut summary = Summary {
         study: "identify".to_owned(),
         seed: settings.seed,
         record: outcome.record.clone(),
@@ -170,12 +179,21 @@ pub(super) fn summarise(settings: &IdentifySettings, setup: &Setup, outcome: &Ou
         hops: outcome.hops,
         singular_values: identifiability.singular_values.clone(),
         noise_estimate: by_channel(identifiability.noise),
+        verdict: Verdict::AllTold,
+        verdict_text: String::new(),
+        untold_groups: untold_groups.collect(),
         parameters,
         sample_interval_s: replay.interval_s,
         substeps: replay.plan.fractions.len(),
+        substeps_needed: replay.steps_needed(&replay.flat(&outcome.candidate)),
         windows: replay.plan.windows.len(),
+        settle_s: setup.settle_s,
+        notes: Vec::new(),
         calibration: setup.log.calibration.clone(),
-    }
+    };
+    summary.notes = notes(setup, &summary);
+    (summary.verdict, summary.verdict_text) = Verdict::of(&summary);
+    summary
 }
 
 pub(super) fn write_history(folder: &Path, outcome: &Outcome) -> Result<()> {
@@ -208,6 +226,7 @@ pub(super) fn write_parameters(folder: &Path, summary: &Summary) -> Result<()> {
         .number("upper", "", |p| p.bounds[1])
         .number("swarm_value", "", |p| p.swarm_value)
         .number("value", "", |p| p.value)
+        .number("car_value", "", |p| p.car_value)
         .number("standard_error", "", |p| p.standard_error)
         .number("truth", "", |p| p.truth)
         .number("at_bound", "", |p| f64::from(u8::from(p.at_bound)))
@@ -230,7 +249,7 @@ pub(super) fn parameter_rows(summary: &Summary) -> Vec<ParameterRow> {
             lower: p.bounds[0],
             upper: p.bounds[1],
             swarm: p.swarm_value,
-            fitted: p.value.unwrap_or(p.swarm_value),
+            fitted: p.car_value,
             standard_error: p.standard_error,
             truth: p.truth,
             identifiable: p.value.is_some(),
@@ -240,17 +259,33 @@ pub(super) fn parameter_rows(summary: &Summary) -> Vec<ParameterRow> {
 
 pub(super) fn write_front(folder: &Path, setup: &Setup, front: &super::Front) -> Result<()> {
     let problem = &setup.replay.problem;
-    let columns = |rows: &[Vec<f64>], named: Vec<(&String, &String)>| {
-        let mut table = Table::rows(rows);
-        for (k, (name, unit)) in named.into_iter().enumerate() {
-            table = table.number(name, unit, |row| row[k]);
-        }
-        table.table()
-    };
     let objectives = problem.objectives.iter().map(|o| (&o.name, &o.unit));
-    columns(&front.objectives, objectives.collect()).write_csv(folder.join("FUN.csv"))?;
+    let objectives = Table::rows(&front.objectives).each(objectives);
+    objectives.table().write_csv(folder.join("FUN.csv"))?;
     let variables = problem.variables.iter().map(|v| (&v.name, &v.unit));
-    columns(&front.candidates, variables.collect()).write_csv(folder.join("VAR.csv"))
+    let variables = Table::rows(&front.candidates).each(variables);
+    variables.table().write_csv(folder.join("VAR.csv"))
+}
+
+/// What `car.toml` says of itself: where it comes from, and what the log does not tell of it.
+pub(super) fn car_comment(source: &str, summary: &Summary) -> String {
+    let mut text = format!(
+        "Found by lapswarm identify from {source}.\n{}\n",
+        summary.verdict_text
+    );
+    for p in &summary.parameters {
+        let told = match (&p.value, p.at_bound) {
+            (None, _) => "not told by the log",
+            (Some(_), true) => "at a bound of the search",
+            (Some(_), false) => continue,
+        };
+        let error = match p.standard_error {
+            Some(error) => format!("standard error {error:.3e} {}", p.unit),
+            None => format!("anywhere from {} to {} {}", p.bounds[0], p.bounds[1], p.unit),
+        };
+        text.push_str(&format!("{}: {told}, {}\n", p.name, error.trim_end_matches(" -")));
+    }
+    text
 }
 
 /// One lap, the first that has a fitted sample: laps over one another would not be legible.
@@ -275,44 +310,14 @@ pub(super) fn write_traces(folder: &Path, setup: &Setup, judged: &Judged) -> Res
     table.write_csv(folder.join("traces.csv"))
 }
 
-/// Least squares may still move a parameter by this many of its standard errors at what counts as a minimum.
-const AT_MINIMUM: f64 = 1.0;
-
 impl Summary {
-    /// Why the standard errors, and the verdict on what the log tells, are not to be taken at their word; nothing where they are.
-    pub fn caution(&self) -> Option<String> {
-        match self.step_in_standard_errors {
-            Some(step) if step <= AT_MINIMUM => (!self.errors_look_like_noise).then(|| {
-                "The residuals do not look like noise: the model lacks something of this car, and the standard errors are too \
-                 small."
-                    .to_owned()
-            }),
-            step => Some(format!(
-                "This car is not at a minimum of the cost{}: standard errors and identifiability hold near a minimum only.",
-                step.map_or(String::new(), |s| format!(
-                    " (least squares would move a parameter by {s:.0} of its standard errors)"
-                ))
-            )),
-        }
-    }
-
     /// The parameter table and the errors, for a terminal.
     pub fn to_text(&self, settings: &IdentifySettings) -> String {
         let mut text = super::page::parameters(self).to_text();
         text.push('\n');
         text.push_str(&super::page::channels(settings, self).to_text());
-        if self.unidentifiable.is_empty() {
-            text.push_str("\nAll parameters are identifiable from this log.\n");
-        } else {
-            text.push_str(&format!(
-                "\nNot identifiable from this log: {}. The starting car's values stand in their place.\n",
-                self.unidentifiable.join(", ")
-            ));
-        }
-        if let Some(caution) = self.caution() {
-            text.push_str(&caution);
-            text.push('\n');
-        }
+        text.push_str(&format!("\n{}\n", self.verdict_text));
+        text.extend(self.notes.iter().map(|note| format!("Note: {note}\n")));
         if let [tried @ (1..), gained] = self.hops {
             text.push_str(&format!(
                 "The residuals did not look like noise: {tried} hops to other minima, {gained} of which led to a lower cost.\n"

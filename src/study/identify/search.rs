@@ -1,17 +1,16 @@
 //! The search itself: swarm, polish, judgement.
 
-use super::coordinates::Logarithmic;
 use super::identifiability::{Identifiability, judge};
-use super::refine::refine;
+use super::refine::{refine, restarted};
 use super::settings::{Algorithm, EXPLORE, FRONT, GATHER, IdentifySettings};
 use super::setup::{CHANNELS, Setup};
 use super::state::{Front, HistoryRow, Place, SearchState, inputs_of};
 use crate::error::{Error, Result};
-use crate::evaluate::replay::{ReplayProblem, trace};
-use crate::evaluate::{Evaluator, FailureCounts, add_failures};
+use crate::evaluate::replay::{ReplayProblem, Residuals, trace};
+use crate::evaluate::{DeviceFaults, Evaluator, FailureCounts, Logarithmic, add_failures};
 use crate::study::framework::state_file::{Origin, StateFile};
-use crate::study::framework::{DeviceFaults, Progress as Told, RunRecord, Watch};
-use crate::swarm::metrics::Scale;
+use crate::study::framework::{Progress as Told, RunRecord, Watch};
+use crate::swarm::metrics::nearest_to_ideal;
 use crate::swarm::{CovarianceSettings, CovarianceSwarm, Mopso, MopsoSettings, Progress, Pso, PsoSettings};
 use std::ops::ControlFlow;
 use std::time::Instant;
@@ -34,6 +33,10 @@ pub struct Outcome {
     pub swarm_s: f64,
     /// Hops to other minima that were tried, and that led further down.
     pub hops: [usize; 2],
+    /// The laps to fit, with windows that start where the final candidate comes.
+    pub replay: ReplayProblem,
+    /// The same of the laps held out, if any.
+    pub holdout: Option<ReplayProblem>,
 }
 
 /// Searches on an evaluator that is open: one of `setup`'s replay. Starts from the state of an interrupted search of the same
@@ -50,7 +53,6 @@ pub fn search_with(
     observe: &mut dyn FnMut(&Told) -> ControlFlow<()>,
 ) -> Result<Outcome> {
     let watch = Watch::begin();
-    let replay = &setup.replay;
     let origin = Origin::new(inputs_of(setup), &evaluator.backend());
     let mut state = match state {
         Some(state) => {
@@ -123,7 +125,10 @@ pub fn search_with(
                 "least squares on the exact Jacobian",
             ))
         };
-        let found = refine(settings, setup, evaluator, &swarm_candidate, &mut told)?;
+        let mut found = refine(settings, setup, evaluator, &swarm_candidate, &mut told)?;
+        if !found.interrupted {
+            (found.candidate, found.interrupted) = restarted(setup, found.candidate, &mut told);
+        }
         interrupted |= found.interrupted;
         refined = Some(found);
     }
@@ -131,9 +136,18 @@ pub fn search_with(
         Some(r) => (r.candidate, [r.hops, r.hops_gained]),
         None => (swarm_candidate.clone(), [0, 0]),
     };
-    let residuals = replay
-        .residuals(&candidate)
+    let own_starts = |replay: &ReplayProblem| {
+        let mut own = replay.clone();
+        own.start_as_driven_by(&own.flat(&candidate));
+        own
+    };
+    let own = own_starts(&setup.replay);
+    let judged = own.residuals(&candidate).map(|residuals| (own, residuals));
+    let (replay, residuals) = judged
+        .or_else(|| Some((setup.replay.clone(), setup.replay.residuals(&candidate)?)))
         .ok_or_else(|| nothing_yet(nothing_drives(), interrupted))?;
+    let holdout = setup.holdout.as_ref().map(own_starts);
+    let (candidate, residuals) = as_given_without_effect(&replay, candidate, residuals);
     let polish_s = polish_began.elapsed().as_secs_f64();
     let mut record = RunRecord::of(&backend);
     record.failures = state.failures;
@@ -150,6 +164,8 @@ pub fn search_with(
         record,
         swarm_s,
         hops,
+        replay,
+        holdout,
     })
 }
 
@@ -235,6 +251,30 @@ fn best_so_far(place: &Place, evaluator: &mut dyn Evaluator) -> Result<(Vec<f64>
         return Err(nothing_drives());
     }
     Ok((best, None))
+}
+
+/// The candidate with the starting car's value of each parameter that changes nothing on this log: the search left it anywhere
+/// between its bounds.
+fn as_given_without_effect(
+    replay: &ReplayProblem,
+    candidate: Vec<f64>,
+    residuals: Residuals,
+) -> (Vec<f64>, Residuals) {
+    let given = replay.free.values_in(replay.free.base());
+    let mut changed = candidate.clone();
+    for (k, v) in replay.problem.variables.iter().enumerate() {
+        let without_effect = residuals.columns[k].iter().all(|slope| *slope == 0.0);
+        if without_effect && (v.lower..=v.upper).contains(&given[k]) {
+            changed[k] = given[k];
+        }
+    }
+    if changed == candidate {
+        return (candidate, residuals);
+    }
+    match replay.residuals(&changed) {
+        Some(same) if same.errors == residuals.errors => (changed, same),
+        _ => (candidate, residuals),
+    }
 }
 
 fn nothing_drives() -> Error {
@@ -361,13 +401,10 @@ impl SearchState {
 /// The front of a swarm's archive.
 fn front_of(swarm: &Mopso) -> Option<Front> {
     let objectives = swarm.archive().objectives.clone();
-    let shares = Scale::of(&objectives).apply(&objectives);
-    let distance = |i: usize| shares[i].iter().map(|x| x * x).sum::<f64>();
-    let chosen = (0..objectives.len()).min_by(|&a, &b| distance(a).total_cmp(&distance(b)))?;
     Some(Front {
         candidates: swarm.archive_candidates(),
+        chosen: nearest_to_ideal(&objectives)?,
         objectives,
-        chosen,
     })
 }
 

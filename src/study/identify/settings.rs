@@ -101,8 +101,8 @@ settings! {
             "Norm of the costs";
         window_s: Option<f64> ["s"] = None, optional(number(0.2, 1e5)).example("3.0"),
             "Length of the windows that restart from the log; without it whole laps are driven";
-        settle_s: f64 ["s"] = 0.5, number(0.0, 60.0),
-            "Time at the start of each window that is driven but not scored";
+        settle_s: Option<f64> ["s"] = None, optional(number(0.0, 60.0)).example("2.0"),
+            "Time that each window is driven before it is scored, over samples ahead of it; without it as long as the car takes to settle";
         section: Option<String> ["-"] = None, optional(text()).example("\"Abbey\""),
             "Only this section of the track is scored";
         laps: Vec<u32> ["-"] = Vec::new(), counts().example("[1, 2]"),

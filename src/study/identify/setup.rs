@@ -10,7 +10,7 @@ use crate::study::framework::{Plan, Subject};
 use crate::telemetry::{ChannelMap, Log, LogOptions, NativeFormat, Recording};
 use crate::track::{Circuit, Track};
 use crate::vehicle::Car;
-use crate::vehicle::modes::{fastest_mode, stable_steps};
+use crate::vehicle::modes::{fastest_mode, slowest_decay, stable_steps};
 use std::path::Path;
 
 /// Number of compared channels.
@@ -34,6 +34,32 @@ pub struct Setup {
     pub circuit: Option<Circuit>,
     /// Standard deviation of each channel over the scored samples, which its errors are set against.
     pub scales: [f64; CHANNELS],
+    /// Time that each window is driven before it is scored, s.
+    pub settle_s: f64,
+    /// Laps and sections whose first moments are not scored, because the log has nothing to drive ahead of them.
+    pub without_run_up: usize,
+}
+
+/// Time constants of its slowest motion in which a car forgets where it started. A thousandth is left after seven. In corners, near
+/// the limit of its tyres, a car settles about half as fast as straight ahead, where its motions are worked out.
+const TIME_CONSTANTS: f64 = 14.0;
+/// The least and the most that a car is given to settle, s.
+const SETTLE_S: [f64; 2] = [0.5, 10.0];
+
+/// How long the starting car takes to settle on these laps, at most half of the shortest.
+fn settling_time(car: &Car, samples: &[Sample<f64>], laps: &[(usize, usize)], dt_s: f64) -> f64 {
+    let within = laps.iter().flat_map(|(start, end)| &samples[*start..*end]);
+    let fastest = within.map(|s| s.measured[0]).fold(1.0, f64::max);
+    let decay = slowest_decay(&car.to_flat(), car.tyre_model(), fastest);
+    let needed = if decay > 0.0 {
+        TIME_CONSTANTS / decay
+    } else {
+        f64::INFINITY
+    };
+    let shortest = laps.iter().map(|(start, end)| end - start).min().unwrap_or(0);
+    needed
+        .clamp(SETTLE_S[0], SETTLE_S[1])
+        .min(0.5 * shortest as f64 * dt_s)
 }
 
 /// Reads what the settings name and puts the problem together.
@@ -69,7 +95,12 @@ pub fn set_up(settings: &IdentifySettings) -> Result<Setup> {
 
     let samples = samples_of(&log);
     let (fitted, held) = choose_laps(settings, &log)?;
-    let fit_windows = windows_over(settings, &log, &samples, &fitted, circuit.as_ref())?;
+    let settle_s = settings
+        .settle_s
+        .unwrap_or_else(|| settling_time(&car, &samples, &fitted, log.dt_s));
+    let cut =
+        |laps: &[(usize, usize)]| windows_over(settings, settle_s, &log, &samples, laps, circuit.as_ref());
+    let (fit_windows, without_run_up) = cut(&fitted)?;
     if fit_windows.is_empty() {
         let found = format!(
             "no stretch of the laps chosen above {} m/s",
@@ -82,7 +113,7 @@ pub fn set_up(settings: &IdentifySettings) -> Result<Setup> {
             "at least one window of the length asked for",
         ));
     }
-    let held_windows = windows_over(settings, &log, &samples, &held, circuit.as_ref())?;
+    let (held_windows, _) = cut(&held)?;
     let slowest = fit_windows
         .iter()
         .chain(&held_windows)
@@ -96,9 +127,9 @@ pub fn set_up(settings: &IdentifySettings) -> Result<Setup> {
         stable_steps(log.dt_s, fastest)
     });
     let scales = channel_scales(&samples, &fit_windows);
-    let problem = |windows: Vec<Window<f64>>| {
+    let problem = |windows: Vec<Window<f64>>| -> Result<ReplayProblem> {
         let weights = objective_weights(settings, &scales, &windows, log.dt_s);
-        ReplayProblem::new(
+        let mut problem = ReplayProblem::new(
             car.clone(),
             free.clone(),
             samples.clone(),
@@ -106,7 +137,9 @@ pub fn set_up(settings: &IdentifySettings) -> Result<Setup> {
             (log.dt_s, substeps),
             settings.norm,
             weights,
-        )
+        )?;
+        problem.start_as_driven_by(&car.to_flat());
+        Ok(problem)
     };
     let replay = problem(fit_windows)?;
     let holdout = (!held_windows.is_empty())
@@ -120,6 +153,8 @@ pub fn set_up(settings: &IdentifySettings) -> Result<Setup> {
         holdout,
         replay,
         log,
+        settle_s,
+        without_run_up,
     })
 }
 
@@ -224,14 +259,18 @@ fn choose_laps(settings: &IdentifySettings, log: &Log) -> Result<(LapRanges, Lap
     Ok((fitted, held))
 }
 
+/// The windows over some laps, and on how many stretches the first window has less than `settle_s` ahead of it to settle in.
 fn windows_over(
     settings: &IdentifySettings,
+    settle_s: f64,
     log: &Log,
     samples: &[Sample<f64>],
     laps: &[(usize, usize)],
     circuit: Option<&Circuit>,
-) -> Result<Vec<Window<f64>>> {
-    let settle = (settings.settle_s / log.dt_s).round() as usize;
+) -> Result<(Vec<Window<f64>>, usize)> {
+    let settle = (settle_s / log.dt_s).round() as usize;
+    let fast = |s: &Sample<f64>| s.measured[0] >= settings.least_speed_mps;
+    let mut without_run_up = 0;
     let section = match (&settings.section, circuit) {
         (Some(name), Some(circuit)) => Some(circuit.section(name)?.clone()),
         (Some(name), None) => {
@@ -253,12 +292,17 @@ fn windows_over(
                     .filter(|&i| section.contains(log.distance_m[i]))
                     .collect();
                 match (inside.first(), inside.last()) {
-                    (Some(&first), Some(&last)) => vec![(first.saturating_sub(settle).max(start), last + 1)],
+                    (Some(&first), Some(&last)) => vec![(first, last + 1)],
                     _ => Vec::new(),
                 }
             }
         };
-        for (from, to) in stretches {
+        for (first, to) in stretches {
+            // Whatever lap the samples ahead are of, as long as the car is on its way there.
+            let mut ahead = samples[..first].iter().rev().take(settle);
+            let run_up = ahead.position(|s| !fast(s)).unwrap_or(settle.min(first));
+            without_run_up += usize::from(run_up < settle);
+            let from = first - run_up;
             let length = match settings.window_s {
                 // The settling time is driven besides.
                 Some(window) => ((window / log.dt_s).round() as usize).max(1) + settle,
@@ -269,7 +313,7 @@ fn windows_over(
                 let expected = format!(
                     "at least one window of {:.2} s with {:.2} s to settle",
                     settings.window_s.unwrap_or(0.0),
-                    settings.settle_s
+                    settle_s
                 );
                 return Err(Error::input(&log.source, "windows", found, expected));
             }
@@ -282,10 +326,7 @@ fn windows_over(
                     initial: initial_state(&samples[at]),
                 };
                 let whole_lap = settings.window_s.is_none();
-                let fast = samples[at..at + length]
-                    .iter()
-                    .all(|s| s.measured[0] >= settings.least_speed_mps);
-                if fast {
+                if samples[at..at + length].iter().all(fast) {
                     windows.push(window);
                 } else if whole_lap {
                     let found = format!("samples slower than {} m/s in the lap", settings.least_speed_mps);
@@ -300,7 +341,7 @@ fn windows_over(
             }
         }
     }
-    Ok(windows)
+    Ok((windows, without_run_up))
 }
 
 fn channel_scales(samples: &[Sample<f64>], windows: &[Window<f64>]) -> [f64; CHANNELS] {

@@ -1,10 +1,9 @@
 //! The state of a search: all that it takes to resume it.
 
-use super::coordinates::Logarithmic;
 use super::settings::IdentifySettings;
 use super::setup::Setup;
 use crate::error::Result;
-use crate::evaluate::{Evaluator, FailureCounts, Worth};
+use crate::evaluate::{Evaluator, FailureCounts, Logarithmic, Worth};
 use crate::study::framework::state_file::Origin;
 use crate::study::framework::{Inputs, State};
 use crate::swarm::checkpoint::Checkpoint;

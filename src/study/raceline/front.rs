@@ -1,17 +1,15 @@
 //! The front between several objectives: a swarm of whole lines, then the local search along it.
 
-use super::reference_optimum::ReferenceSolvers;
 use super::settings::RacelineSettings;
 use super::setup::Setup;
-use super::solver_thread::interruptible;
 use crate::error::Result;
 use crate::evaluate::line::{LineProblem, open_line_evaluator};
-use crate::evaluate::{BackendInfo, Evaluator, FailureCounts};
+use crate::evaluate::{BackendInfo, DeviceFaults, Evaluator, FailureCounts, Losses};
 use crate::line::Parametrisation;
+use crate::optimum::{ReferenceSolvers, interruptible};
 use crate::random::Random;
-use crate::study::framework::{DeviceFaults, Losses};
-use crate::swarm::metrics::hypervolume;
-use crate::swarm::{Archive, Mopso, MopsoSettings, Optimiser, Progress, PsoSettings, Truncation, step};
+use crate::swarm::metrics::{Scale, hypervolume};
+use crate::swarm::{Archive, Mopso, MopsoSettings, Optimiser, Progress, Truncation, lattice, step};
 use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
 use std::sync::atomic::Ordering;
@@ -74,15 +72,12 @@ pub(super) fn search_front(
     let cross_sections = &setup.cross_sections;
     let problem = front_problem(setup, settings)?;
     let mopso = MopsoSettings {
-        motion: PsoSettings {
-            population: settings.population,
-            iterations: settings.iterations,
-            seed: settings.seed,
-            ..MopsoSettings::default().motion
-        },
         archive: settings.archive,
         ..MopsoSettings::default()
     };
+    let mopso = mopso
+        .with_size(settings.population, settings.iterations)
+        .with_seed(settings.seed);
     let mut state = match state {
         Some(state) => state,
         None => {
@@ -143,14 +138,7 @@ pub(super) fn search_front(
     let reference: Vec<f64> = (0..middle.len())
         .map(|k| across(k).fold(middle[k], f64::max))
         .collect();
-    let shares: Vec<Vec<f64>> = archive
-        .objectives
-        .iter()
-        .map(|row| {
-            let share = |k: usize| (row[k] - ideal[k]) / (reference[k] - ideal[k]).max(f64::MIN_POSITIVE);
-            (0..row.len()).map(share).collect()
-        })
-        .collect();
+    let shares = Scale::between(&ideal, &reference).apply(&archive.objectives);
     let volume = if (2..=3).contains(&ideal.len()) {
         hypervolume(&shares, &vec![1.0; ideal.len()])?
     } else {
@@ -275,45 +263,4 @@ fn polish_along(
         })
         .collect();
     solvers.polish(starts, PROGRAMS)
-}
-
-/// All ways to share `steps` among `m`, as shares of one (Das, Dennis, *Normal-boundary intersection*, SIAM J.
-/// Optimization 8, 1998).
-fn lattice(m: usize, steps: u32) -> Vec<Vec<f64>> {
-    if m == 1 {
-        return vec![vec![1.0]];
-    }
-    let mut rows: Vec<Vec<u32>> = vec![Vec::new()];
-    for _ in 1..m {
-        rows = rows
-            .into_iter()
-            .flat_map(|row| {
-                let left = steps - row.iter().sum::<u32>();
-                (0..=left).map(move |k| {
-                    let mut next = row.clone();
-                    next.push(k);
-                    next
-                })
-            })
-            .collect();
-    }
-    rows.into_iter()
-        .map(|mut row| {
-            row.push(steps - row.iter().sum::<u32>());
-            row.into_iter().map(|k| f64::from(k) / f64::from(steps)).collect()
-        })
-        .collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_lattice_covers_the_simplex_evenly() {
-        let rows = lattice(3, 4);
-        assert_eq!(rows.len(), 15);
-        assert!(rows.iter().all(|r| (r.iter().sum::<f64>() - 1.0).abs() < 1e-15));
-        assert!(rows.contains(&vec![0.0, 0.25, 0.75]));
-    }
 }

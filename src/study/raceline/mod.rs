@@ -1,26 +1,23 @@
 //! The racing line: shortest, of minimum curvature, fastest, and the front between them, beside the reference optima.
 //!
 //! Every objective has a swarm of its own ([`search_line`]), all together have one that looks for their front
-//! ([`LineFront`]), and solvers of reference optima ([`ReferenceSolvers`]) say how far from the optimum each is. Whatever
+//! ([`LineFront`]), and solvers of reference optima ([`crate::optimum::ReferenceSolvers`]) say how far from the optimum each is. Whatever
 //! is reported is worked out anew on a fine spline and checked against the edges ([`Setup::report`]).
 
 mod front;
 mod objective_search;
-mod reference_optimum;
 mod results;
 mod settings;
 mod setup;
 mod solve;
-mod solver_thread;
 mod state;
 mod whole_line_search;
 mod window_search;
 
 pub use front::{LineFront, front_problem, starting_lines};
-pub use reference_optimum::{OptimumLine, ReferenceSolvers, WeightedLine};
 pub use results::{LineFigures, Summary};
 pub use settings::{LineAlgorithm, RacelineSettings};
-pub use setup::{FINE_M, ReportedLine, Setup, road_read, set_up};
+pub use setup::{ReportedLine, Setup, road_read, set_up};
 pub use state::LinesState;
 pub use window_search::{FoundLine, LevelRow, LineSearch, LineSearchSettings, LineState, search_line};
 
@@ -28,7 +25,7 @@ use crate::config::settings::Settings;
 use crate::error::Result;
 use crate::evaluate::line::LineObjective;
 use crate::study::framework::memory::MemoryItem;
-use crate::study::framework::{Figures, Plan, RunRecord, Study, Subject, Work};
+use crate::study::framework::{Figures, Plan, RunRecord, Solved, Study, Subject, Work};
 use std::path::Path;
 
 /// The study.
@@ -100,40 +97,25 @@ impl Study for Raceline {
             .backend(settings.backend, settings.adapter.as_deref())
     }
 
-    fn solve(
-        settings: &RacelineSettings,
-        setup: &Setup,
-        work: Work<'_, LinesState>,
-    ) -> Result<Option<Outcome>> {
-        solve::find_lines(settings, setup, work).map(Some)
+    fn solve(work: Work<'_, Self>) -> Result<Option<Outcome>> {
+        solve::find_lines(work).map(Some)
     }
 
     fn record(outcome: &Outcome) -> &RunRecord {
         &outcome.record
     }
 
-    fn summarise(settings: &RacelineSettings, setup: &Setup, outcome: &Outcome) -> Summary {
-        results::summarise(settings, setup, outcome)
+    fn summarise(solved: &Solved<'_, Self>) -> Summary {
+        results::summarise(solved)
     }
 
     fn subject(settings: &RacelineSettings, setup: &Setup) -> Subject {
-        Subject {
-            seed: settings.seed,
-            car: setup.car_name.clone(),
-            log: None,
-            track: Some(setup.track_name.clone()),
-        }
+        Subject::on_track(settings.seed, &setup.car_name, &setup.track_name)
     }
 
-    fn report(
-        folder: &Path,
-        settings: &RacelineSettings,
-        setup: &Setup,
-        outcome: &Outcome,
-        summary: &Summary,
-    ) -> Result<()> {
-        results::write_files(folder, setup, outcome)?;
-        results::write_page(folder, settings, setup, outcome, summary)
+    fn report(folder: &Path, solved: &Solved<'_, Self>, summary: &Summary) -> Result<()> {
+        results::write_files(folder, solved.prepared, solved.outcome)?;
+        results::write_page(folder, solved, summary)
     }
 
     fn text(_: &RacelineSettings, summary: &Summary) -> String {

@@ -1,6 +1,5 @@
 //! The searches that an objective takes: one for most, several for the fastest line.
 
-use super::reference_optimum::within_road;
 use super::settings::{LineAlgorithm, RacelineSettings};
 use super::setup::Setup;
 use super::state::Running;
@@ -9,6 +8,7 @@ use super::window_search::{FoundLine, LevelRow, LineSearch, LineSearchSettings, 
 use crate::error::Result;
 use crate::evaluate::line::LineObjective;
 use crate::line::{cross_sections_about, shares_across};
+use crate::optimum::within_road;
 use crate::study::framework::Progress;
 
 /// Rounds of a search that starts from a reference optimum.

@@ -4,12 +4,11 @@ mod page;
 
 pub(super) use page::write as write_page;
 
-use super::{Outcome, Raceline, RacelineSettings, ReportedLine, Setup};
+use super::{Outcome, Raceline, ReportedLine, Setup};
 use crate::error::Result;
 use crate::evaluate::line::LineObjective;
-use crate::files::stem;
 use crate::report::{Table, write_whole};
-use crate::study::framework::{Head, Study};
+use crate::study::framework::{Head, Solved};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -98,15 +97,16 @@ pub struct Summary {
 }
 
 /// Puts the figures together.
-pub(super) fn summarise(settings: &RacelineSettings, setup: &Setup, outcome: &Outcome) -> Summary {
+pub(super) fn summarise(solved: &Solved<'_, Raceline>) -> Summary {
+    let (settings, outcome) = (solved.settings, solved.outcome);
     let objectives = || outcome.objectives.iter();
     let each = || objectives().map(|o| (o.objective.name().to_owned(), o));
     let front = outcome.front.as_ref();
     Summary {
-        head: Raceline::head(settings, setup, outcome),
+        head: solved.head(),
         search_elapsed_s: outcome.search_s,
         exact_elapsed_s: outcome.exact_s,
-        sections: setup.cross_sections.len(),
+        sections: solved.prepared.cross_sections.len(),
         car_width_m: settings.car_width_m,
         warm_start: settings.warm_start,
         local_search: settings.local_search,
@@ -210,7 +210,7 @@ pub(super) fn write_files(folder: &Path, setup: &Setup, outcome: &Outcome) -> Re
     let envelope = setup.car.envelope.to_csv();
     write_whole(folder.join("envelope.csv"), envelope.as_bytes())?;
     for line in reported_lines(outcome) {
-        let name = stem(&line.name);
+        let name = line.stem();
         write_line(&folder.join(format!("line_{name}.csv")), setup, line)?;
         // Replaces what an interrupted run has left, since it is resumed in the same folder.
         let racetrack = setup.cross_sections.line_to_racetrack_csv(&line.alpha);
@@ -223,26 +223,12 @@ pub(super) fn write_files(folder: &Path, setup: &Setup, outcome: &Outcome) -> Re
 /// gives most (from 1) where there is a gearbox.
 fn write_line(path: &Path, setup: &Setup, line: &ReportedLine) -> Result<()> {
     let fine = &line.fine;
-    let n = line.alpha.len();
-    let alpha: Vec<f64> = fine
-        .section
-        .iter()
-        .map(|&(section, share)| {
-            let next = if fine.closed {
-                (section + 1) % n
-            } else {
-                (section + 1).min(n - 1)
-            };
-            let here = section.min(n - 1);
-            line.alpha[here] + share * (line.alpha[next] - line.alpha[here])
-        })
-        .collect();
     let (x, y): (Vec<f64>, Vec<f64>) = fine.points_m.iter().map(|p| (p.x, p.y)).unzip();
     let mut table = Table::new()
         .numbers("station", "m", &fine.station_m)
         .numbers("x", "m", x)
         .numbers("y", "m", y)
-        .numbers("alpha", "-", alpha)
+        .numbers("alpha", "-", fine.between(&line.alpha))
         .numbers("curvature", "1/m", &fine.curvature_1pm);
     if let Some(lap) = &fine.lap {
         table = table
@@ -267,14 +253,10 @@ fn write_front(folder: &Path, outcome: &Outcome) -> Result<()> {
     let Some(front) = outcome.front.as_ref().filter(|f| !f.alpha.is_empty()) else {
         return Ok(());
     };
-    let mut objectives = Table::rows(&front.objectives);
-    for (k, o) in outcome.objectives.iter().enumerate() {
-        objectives = objectives.number(o.objective.name(), o.objective.unit(), |row| row[k]);
-    }
+    let objectives = outcome.objectives.iter().map(|o| o.objective);
+    let objectives = Table::rows(&front.objectives).each(objectives.map(|o| (o.name(), o.unit())));
     objectives.table().write_csv(folder.join("front.csv"))?;
-    let mut lines = Table::rows(&front.alpha);
-    for i in 0..front.alpha[0].len() {
-        lines = lines.number(format!("alpha_{i}"), "-", |row| row[i]);
-    }
+    let alphas = (0..front.alpha[0].len()).map(|i| (format!("alpha_{i}"), "-"));
+    let lines = Table::rows(&front.alpha).each(alphas);
     lines.table().write_csv(folder.join("front_lines.csv"))
 }

@@ -5,16 +5,14 @@ use crate::config::settings::Settings;
 use crate::error::{Error, Result};
 use crate::evaluate::Evaluator;
 use crate::evaluate::line::{CpuLineEvaluator, LineObjective, LineProblem};
-use crate::line::{Clearance, FineLine, Parametrisation, PointMass, TERMS, check_line};
-use crate::study::envelope::{EnvelopeSettings, car_envelope};
+use crate::line::{Clearance, FINE_M, FineLine, Parametrisation, PointMass, TERMS, check_line};
 use crate::study::framework::Plan;
 use crate::track::{CrossSections, Spacing, Track};
+use crate::vehicle::limits::{SpeedRange, car_envelope};
 use crate::vehicle::powertrain::Powertrain;
 use crate::vehicle::{Car, Envelope};
 use glam::DVec2;
 
-/// Distance between the points of the fine spline that lines are reported on (m).
-pub const FINE_M: f64 = 1.0;
 /// Waves of a survey's reference line that are shorter than this are noise (m): the tightest bend of a road is longer.
 const REFERENCE_M: f64 = 60.0;
 /// Distance between the points of the edges that lines are checked against (m).
@@ -53,16 +51,16 @@ pub fn set_up(settings: &RacelineSettings) -> Result<Setup> {
     let dense = track.cross_sections(&Spacing::equal(close), settings.as_surveyed)?;
     let (road, dense) = match &settings.section {
         Some(name) => {
-            let (first_m, length_m) = section_named(&road, name)?;
-            let stretch = stretch_of(&road, first_m, length_m, 0)?;
+            let (first_m, length_m) = road.section_named(name)?;
+            let stretch = road.stretch_from(first_m, length_m, 0)?;
             if stretch.len() < TERMS {
                 let found = format!("{}, of which {} lie in {name}", settings.sections, stretch.len());
                 let expected = format!("so many that at least {TERMS} lie in it");
                 return Err(Error::input("the study", "sections", found, expected));
             }
             // The edges reach past the stretch's own ends, wherever its cross-sections have put these.
-            let from_m = road.station_m[first_cross_section(&road, first_m)];
-            let edges = stretch_of(&dense, from_m - road.length_m / close as f64, stretch.length_m, 3)?;
+            let from_m = road.station_m[road.first_from(first_m)];
+            let edges = dense.stretch_from(from_m - road.length_m / close as f64, stretch.length_m, 3)?;
             (stretch, edges)
         }
         None => (road, dense),
@@ -71,10 +69,7 @@ pub fn set_up(settings: &RacelineSettings) -> Result<Setup> {
     let car = Car::load(&settings.car)?;
     let (envelope, car_name) = match &settings.envelope {
         Some(path) => (Envelope::load(path)?, path.display().to_string()),
-        None => (
-            car_envelope(&car, &EnvelopeSettings::default())?.envelope,
-            car.name.clone(),
-        ),
+        None => (car_envelope(&car, &SpeedRange::USUAL)?.envelope, car.name.clone()),
     };
     let gearbox = car.powertrain.clone().filter(|_| settings.envelope.is_none());
     let gearbox = gearbox.map(|powertrain| (powertrain, car.chassis.radius_rear));
@@ -112,49 +107,6 @@ pub fn road_read(plan: Plan, setup: &Setup) -> Plan {
     ))
 }
 
-/// Where the section of this name, or of one of its names, begins (m), and its length (m).
-fn section_named(road: &CrossSections, name: &str) -> Result<(f64, f64)> {
-    let called = |all: &str| all == name || all.split('/').any(|one| one.trim() == name);
-    let Some(section) = road.sections.iter().find(|s| called(&s.name)) else {
-        let known: Vec<&str> = road.sections.iter().map(|s| s.name.as_str()).collect();
-        let expected = if known.is_empty() {
-            "none: the circuit names no sections".to_owned()
-        } else {
-            format!("one of {}", known.join(", "))
-        };
-        return Err(Error::input(&road.name, "section", name, expected));
-    };
-    Ok((section.start_m, section.length_m()))
-}
-
-/// The first cross-section at or after a station (m).
-fn first_cross_section(road: &CrossSections, from_m: f64) -> usize {
-    let from_m = if road.closed {
-        from_m.rem_euclid(road.length_m)
-    } else {
-        from_m
-    };
-    let first = road.station_m.partition_point(|s| *s < from_m);
-    if road.closed {
-        first % road.len()
-    } else {
-        first.min(road.len() - 2)
-    }
-}
-
-/// The cross-sections from a station (m) on over a length (m), and some `more`, as an open road.
-fn stretch_of(road: &CrossSections, from_m: f64, length_m: f64, more: usize) -> Result<CrossSections> {
-    let first = first_cross_section(road, from_m);
-    let spacing_m = road.length_m / road.len() as f64;
-    let most = if road.closed {
-        road.len()
-    } else {
-        road.len() - first
-    };
-    let count = (length_m / spacing_m).round() as usize + 1 + more;
-    road.stretch(first, count.clamp(2, most))
-}
-
 /// One line with everything that is reported of it.
 #[derive(Clone, Debug)]
 pub struct ReportedLine {
@@ -163,7 +115,7 @@ pub struct ReportedLine {
     /// Share of the usable width from the right at every cross-section.
     pub alpha: Vec<f64>,
     /// What each objective comes to through the cross-sections, in the order of [`LineObjective::ALL`].
-    pub through_cuts: Vec<f64>,
+    pub at_cross_sections: Vec<f64>,
     /// The line on the fine spline, with its lap.
     pub fine: FineLine,
     /// How close its sides come to the edges.
@@ -171,6 +123,14 @@ pub struct ReportedLine {
 }
 
 impl ReportedLine {
+    /// What its files are named after, as in `line_fastest.csv`. Scripts read `line_least_curved.csv`.
+    pub fn stem(&self) -> String {
+        if self.name == LineObjective::Kappa2.line_name() {
+            return "least_curved".to_owned();
+        }
+        crate::files::stem(&self.name)
+    }
+
     /// Lap time on the fine spline (s): the one to believe.
     pub fn lap_time_fine_s(&self) -> f64 {
         self.fine.lap_time_s().unwrap_or(f64::NAN)
@@ -187,7 +147,7 @@ impl ReportedLine {
 
     /// What an objective comes to through the cross-sections.
     pub fn objective(&self, objective: LineObjective) -> f64 {
-        self.through_cuts[objective as usize]
+        self.at_cross_sections[objective as usize]
     }
 }
 
@@ -233,7 +193,7 @@ impl Setup {
         Ok(ReportedLine {
             name: name.to_owned(),
             alpha: alpha.to_vec(),
-            through_cuts: found.objectives,
+            at_cross_sections: found.objectives,
             clearance: check_line(&fine, &self.edges_m[0], &self.edges_m[1], settings.car_width_m),
             fine,
         })

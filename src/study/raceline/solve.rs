@@ -2,16 +2,15 @@
 
 use super::front::search_front;
 use super::objective_search::search_objective;
-use super::solver_thread::interruptible;
 use super::state::{FinishedObjective, Running, inputs_of};
-use super::{
-    LineFront, LinesState, ObjectiveOutcome, OptimumLine, Outcome, RacelineSettings, ReferenceSolvers, Setup,
-};
+use super::{ObjectiveOutcome, Outcome, Raceline, RacelineSettings};
 use crate::error::Result;
 use crate::evaluate::line::{LineObjective, open_line_evaluator};
 use crate::line::Parametrisation;
+use crate::optimum::{OptimumLine, ReferenceSolvers, interruptible};
 use crate::study::framework::state_file::Origin;
 use crate::study::framework::{Progress, RunRecord, Watch, Work};
+use crate::swarm::metrics::nearest_to_ideal;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
@@ -33,20 +32,18 @@ impl Drop for Stopping<'_> {
 /// # Errors
 /// Those of the evaluators and the solvers; [`crate::Error::Input`] if the state belongs to other inputs or another backend;
 /// [`crate::Error::Io`] if the state cannot be saved when the study is interrupted.
-pub(super) fn find_lines(
-    settings: &RacelineSettings,
-    setup: &Setup,
-    work: Work<'_, LinesState>,
-) -> Result<Outcome> {
+pub(super) fn find_lines(work: Work<'_, Raceline>) -> Result<Outcome> {
     let watch = Watch::begin();
+    let (settings, setup) = (work.settings, work.prepared);
     // A small problem of the same kind says what evaluates.
     let probe = setup.problem(Parametrisation::sections(), &settings.objectives, settings)?;
     let backend = open_line_evaluator(&probe, settings.backend, settings.adapter.as_deref())?.backend();
     let mut record = RunRecord::of(&backend);
-    let mut work = Running::begin(settings, Origin::new(inputs_of(setup), &backend), work)?;
+    let mut work = Running::begin(Origin::new(inputs_of(setup), &backend), work)?;
     let reference = setup.report("reference", &setup.cross_sections.reference, settings)?;
     let stop = Arc::new(AtomicBool::new(false));
-    let solvers = ReferenceSolvers::stopped_by(setup, settings, Arc::clone(&stop))?;
+    let road = &setup.cross_sections;
+    let solvers = ReferenceSolvers::stopped_by(road, &setup.car, settings.entry_mps, Arc::clone(&stop))?;
     work.began = Instant::now();
     let mut evaluations = 0;
     let mut objectives = Vec::new();
@@ -138,7 +135,7 @@ pub(super) fn find_lines(
         })?;
         evaluations += found.evaluations;
         record.add(&found.losses, found.backend.as_ref());
-        if let Some(nearest) = nearest_to_ideal(&found) {
+        if let Some(nearest) = nearest_to_ideal(&found.objectives) {
             compromise = Some(setup.report("compromise", &found.alpha[nearest], settings)?);
         }
         front = Some(found);
@@ -175,23 +172,4 @@ fn led_downhill(
         return Ok(vec![led.x]);
     }
     solvers.polish(vec![(found.to_vec(), vec![(objective, 1.0)])], 60)
-}
-
-/// The member of a front nearest to the ideal, each objective as a share of the front's range.
-fn nearest_to_ideal(front: &LineFront) -> Option<usize> {
-    let rows = &front.objectives;
-    let distance = |row: &[f64]| -> f64 {
-        (0..row.len())
-            .map(|k| {
-                let worst = rows.iter().map(|r| r[k]).fold(front.ideal[k], f64::max);
-                let range = worst - front.ideal[k];
-                if range > 0.0 {
-                    ((row[k] - front.ideal[k]) / range).powi(2)
-                } else {
-                    0.0
-                }
-            })
-            .sum()
-    };
-    (0..rows.len()).min_by(|&i, &j| distance(&rows[i]).total_cmp(&distance(&rows[j])))
 }

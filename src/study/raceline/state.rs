@@ -1,10 +1,10 @@
 //! The state of a racing-line study: all that it takes to resume it.
 
-use super::Setup;
 use super::front::FrontState;
 use super::settings::RacelineSettings;
 use super::whole_line_search::WholeLineState;
 use super::window_search::{FoundLine, LineState};
+use super::{Raceline, Setup};
 use crate::error::Result;
 use crate::study::framework::state_file::{Origin, StateFile};
 use crate::study::framework::{Inputs, Progress, State, Work};
@@ -97,7 +97,7 @@ pub(super) struct Running<'a> {
 
 impl<'a> Running<'a> {
     /// A study that begins, or is resumed if there is a state.
-    pub fn begin(settings: &RacelineSettings, origin: Origin, work: Work<'a, LinesState>) -> Result<Self> {
+    pub fn begin(origin: Origin, work: Work<'a, Raceline>) -> Result<Self> {
         let state_file = work.state_file;
         let state = match work.state {
             Some(state) => {
@@ -105,7 +105,7 @@ impl<'a> Running<'a> {
                 state
             }
             None => LinesState {
-                settings: settings.clone(),
+                settings: work.settings.clone(),
                 origin,
                 ..LinesState::default()
             },

@@ -5,10 +5,10 @@ use super::setup::Setup;
 use super::state::{LinesState, Running};
 use super::window_search::{FoundLine, LevelRow};
 use crate::error::{Error, Result};
-use crate::evaluate::Evaluator;
 use crate::evaluate::line::{CpuLineEvaluator, LineObjective, LineProblem, open_line_evaluator};
+use crate::evaluate::{DeviceFaults, Evaluator, Losses};
 use crate::line::Parametrisation;
-use crate::study::framework::{DeviceFaults, Losses, Progress};
+use crate::study::framework::Progress;
 use crate::swarm::{CooperativeSettings, CooperativeSwarm, Optimiser, Pso, PsoSettings, step};
 use serde::{Deserialize, Serialize};
 

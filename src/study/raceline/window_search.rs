@@ -5,9 +5,8 @@
 
 use crate::error::{Error, Result};
 use crate::evaluate::line::{CpuLineEvaluator, LineObjective, LineProblem, open_line_evaluator};
-use crate::evaluate::{BackendChoice, BackendInfo, Evaluator};
+use crate::evaluate::{BackendChoice, BackendInfo, DeviceFaults, Evaluator, Losses};
 use crate::line::{Parametrisation, PointMass, SectionRow, TERMS};
-use crate::study::framework::{DeviceFaults, Losses};
 use crate::swarm::{Optimiser, WindowSettings, WindowSwarm};
 use crate::track::CrossSections;
 use rayon::prelude::*;

@@ -12,6 +12,7 @@ pub use summary::{EnergySummary, RoundSummary, Summary};
 
 use crate::config::settings::Settings;
 use crate::error::{Error, Result};
+use crate::files::run_folder::SUMMARY;
 use crate::line::energy::hybrid_parts;
 use crate::line::read_line;
 use crate::report::write_whole;
@@ -19,7 +20,7 @@ use crate::study::envelope::{EnvelopeSettings, EnvelopeStudy};
 use crate::study::framework::journal::Journal;
 use crate::study::framework::memory::{self, MemoryItem};
 use crate::study::framework::{
-    Inputs, Plan, Progress, RunRecord, Study, Subject, Watch, Work, resumed_or_new, write_results,
+    Inputs, Plan, Progress, RunRecord, Solved, Study, Subject, Watch, Work, resumed_or_new, write_results,
 };
 use crate::study::hybrid::{Hybrid, HybridStudySettings};
 use crate::study::identify::{self, Identify, planned, without_laps};
@@ -87,20 +88,16 @@ impl Study for Run {
         Ok(road_read(plan, &prepared.road))
     }
 
-    fn solve(
-        settings: &RunSettings,
-        prepared: &Prepared,
-        work: Work<'_, Journal>,
-    ) -> Result<Option<Summary>> {
-        run(settings, prepared, work).map(Some)
+    fn solve(work: Work<'_, Self>) -> Result<Option<Summary>> {
+        run(work).map(Some)
     }
 
     fn record(summary: &Summary) -> &RunRecord {
         &summary.record
     }
 
-    fn summarise(_: &RunSettings, _: &Prepared, summary: &Summary) -> Summary {
-        summary.clone()
+    fn summarise(solved: &Solved<'_, Self>) -> Summary {
+        solved.outcome.clone()
     }
 
     fn subject(settings: &RunSettings, prepared: &Prepared) -> Subject {
@@ -112,7 +109,7 @@ impl Study for Run {
         }
     }
 
-    fn report(folder: &Path, _: &RunSettings, _: &Prepared, _: &Summary, summary: &Summary) -> Result<()> {
+    fn report(folder: &Path, _: &Solved<'_, Self>, summary: &Summary) -> Result<()> {
         write_whole(folder.join("story.txt"), summary.to_text().as_bytes())?;
         page::write(folder, summary)
     }
@@ -175,13 +172,14 @@ impl Going<'_> {
             };
             // Where the stage's file lies is the run's matter: whatever state was left for these inputs is used.
             let outcome = resumed_or_new::<S, _>(settings, state_file, false, |state, state_file| {
-                let work = Work {
+                S::solve(Work {
+                    settings,
+                    prepared,
                     state,
                     state_file,
                     observe: &mut told,
                     stop: Arc::clone(stop),
-                };
-                S::solve(settings, prepared, work)
+                })
             });
             // The run's folder is what is resumed, wherever the stage's state is.
             let outcome = match outcome {
@@ -201,7 +199,7 @@ impl Going<'_> {
 
 /// The figures of a stage.
 fn read_summary<T: DeserializeOwned>(folder: &Path) -> Result<T> {
-    let path = folder.join("summary.json");
+    let path = folder.join(SUMMARY);
     let text = std::fs::read_to_string(&path).map_err(|e| Error::io(&path, "read", e))?;
     serde_json::from_str(&text)
         .map_err(|e| Error::input(&path, "contents", e.to_string(), "the summary of a stage"))
@@ -211,8 +209,9 @@ fn read_summary<T: DeserializeOwned>(folder: &Path) -> Result<T> {
 ///
 /// # Errors
 /// Those of the stages; [`Error::Interrupted`] if the run was interrupted.
-fn run(settings: &RunSettings, prepared: &Prepared, work: Work<'_, Journal>) -> Result<Summary> {
+fn run(work: Work<'_, Run>) -> Result<Summary> {
     let watch = Watch::begin();
+    let settings = work.settings;
     let journal = work.state.map_or_else(|| Journal::new(Run::NAME, settings), Ok)?;
     work.state_file.save(&journal)?;
     let folder = work.state_file.folder().to_owned();
@@ -227,7 +226,7 @@ fn run(settings: &RunSettings, prepared: &Prepared, work: Work<'_, Journal>) -> 
         stop: work.stop,
         reused: Vec::new(),
     };
-    let outcome = run_stages(settings, prepared, &mut going, &watch)?;
+    let outcome = run_stages(settings, work.prepared, &mut going, &watch)?;
     if own.exists() {
         std::fs::remove_dir_all(&own).map_err(|e| Error::io(&own, "remove", e))?;
     }

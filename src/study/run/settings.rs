@@ -1,25 +1,23 @@
 //! Settings of a run.
 
-use crate::config::Table;
-use crate::config::kinds::{Kind, count, number, of, quoted};
-use crate::config::settings::{Declared, Flag, Lens, Role, Setting, Settings, Written, Wrong, settings};
-use crate::error::{Error, Result};
+use crate::config::kinds::{count, file_or_table, folder_or_none, no_folder, number};
+use crate::config::settings::{Declared, Flag, Lens, Role, Setting, Settings, settings};
 use crate::study::identify::IdentifySettings;
 use crate::study::raceline::RacelineSettings;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 settings! {
     /// Settings of a run: those of its stages, and its own.
     pub struct RunSettings {
-        identify: IdentifySettings ["-"] = hybrid_car(), of(Stage).example("\"identify.toml\""),
+        identify: IdentifySettings ["-"] = hybrid_car(), file_or_table().example("\"identify.toml\""),
             "How the car is identified: a study file of identify, or its settings in a table";
-        raceline: RacelineSettings ["-"] = RacelineSettings::default(), of(Stage).example("\"raceline.toml\""),
+        raceline: RacelineSettings ["-"] = RacelineSettings::default(), file_or_table().example("\"raceline.toml\""),
             "How its line is found: a study file of raceline, or its settings in a table; car and envelope are those of the run";
         margin_m: f64 ["m"] = 0.5, number(0.0, 5.0),
             "Room that the line leaves on either side of the car for the driver's errors";
         rounds: usize ["-"] = 2, count(1, 20),
             "Most lines that are driven, each within the limits that the one before it left";
-        cache: Option<PathBuf> ["-"] = Some(PathBuf::from("runs/cache")), of(Cache).place(),
+        cache: Option<PathBuf> ["-"] = Some(PathBuf::from("runs/cache")), folder_or_none().place(),
             "Where results of stages are kept for runs of the same inputs; an empty name keeps none";
     }
 
@@ -41,7 +39,7 @@ settings! {
             let parts = std::iter::once(stage.within(&identify)).chain(line.map(|line| line.within(&raceline)));
             Some(Setting::linked(declared, parts.collect()))
         });
-        let no_cache = of(NoCache).flag(Flag::Switch("no_cache", true));
+        let no_cache = no_folder().flag(Flag::Switch("no_cache", true));
         let meaning = "Every stage is done anew, and none is kept";
         named.chain(no_cache.declare("no_cache", "-", meaning, &cache)).collect()
     }
@@ -81,105 +79,5 @@ impl RunSettings {
             car_width_m: self.raceline.car_width_m + 2.0 * self.margin_m,
             ..self.raceline.clone()
         }
-    }
-}
-
-/// Settings of a stage: a study file, or a table.
-struct Stage;
-
-impl<T: Settings> Kind<T> for Stage {
-    fn read(&self, table: &Table<'_>, key: &str, _: &str, folder: &Path) -> Result<Option<T>> {
-        if table.is_table(key) {
-            let stage = table.table(key)?;
-            return stage.map(|stage| T::read_table(stage, folder)).transpose();
-        }
-        let name = table.string(key)?;
-        name.map(|name| T::read(&folder.join(name))).transpose()
-    }
-
-    fn write(&self, settings: &T) -> Option<Written> {
-        Some(Written::Within(settings.to_toml()))
-    }
-
-    fn parse(&self, text: &str, _: &T) -> Result<T, String> {
-        T::read(Path::new(text)).map_err(|e| e.to_string())
-    }
-
-    fn check(&self, settings: &T) -> Result<(), Wrong> {
-        settings.validate().map_err(|error| match error {
-            Error::Input {
-                place,
-                found,
-                expected,
-                ..
-            } => Wrong {
-                found: format!("{place} {found}"),
-                expected,
-            },
-            other => Wrong {
-                found: other.to_string(),
-                expected: "settings that can be used".to_owned(),
-            },
-        })
-    }
-
-    fn make_absolute(&self, settings: &mut T) {
-        *settings = settings.clone().absolute();
-    }
-
-    fn value_name(&self) -> &'static str {
-        "FILE"
-    }
-}
-
-/// A folder; an empty name for none.
-struct Cache;
-
-impl Kind<Option<PathBuf>> for Cache {
-    fn read(&self, table: &Table<'_>, key: &str, _: &str, folder: &Path) -> Result<Option<Option<PathBuf>>> {
-        let name = table.string(key)?;
-        Ok(name.map(|name| (!name.is_empty()).then(|| folder.join(name))))
-    }
-
-    fn write(&self, path: &Option<PathBuf>) -> Option<Written> {
-        let name = path.as_ref().map_or(String::new(), |p| p.display().to_string());
-        Some(Written::Value(quoted(&name)))
-    }
-
-    fn parse(&self, text: &str, _: &Option<PathBuf>) -> Result<Option<PathBuf>, String> {
-        Ok((!text.is_empty()).then(|| PathBuf::from(text)))
-    }
-
-    fn make_absolute(&self, path: &mut Option<PathBuf>) {
-        if let Some(path) = path
-            && let Ok(whole) = std::path::absolute(&*path)
-        {
-            *path = whole;
-        }
-    }
-
-    fn value_name(&self) -> &'static str {
-        "DIR"
-    }
-}
-
-/// A switch that empties the name of the cache.
-struct NoCache;
-
-impl Kind<Option<PathBuf>> for NoCache {
-    fn read(&self, table: &Table<'_>, key: &str, _: &str, _: &Path) -> Result<Option<Option<PathBuf>>> {
-        Ok(table.boolean(key)?.filter(|none| *none).map(|_| None))
-    }
-
-    fn write(&self, _: &Option<PathBuf>) -> Option<Written> {
-        None
-    }
-
-    fn parse(&self, text: &str, present: &Option<PathBuf>) -> Result<Option<PathBuf>, String> {
-        Ok(present.clone().filter(|_| text != "true"))
-    }
-
-    fn value_name(&self) -> &'static str {
-        "true|false"
     }
 }

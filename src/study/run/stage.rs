@@ -1,10 +1,10 @@
 //! Stages whose results are kept by what went into them.
 
 use crate::error::{Error, Result};
+use crate::files::run_folder::{self, RunFolder, STATE};
 use crate::files::{sync_folder, write_whole};
-use crate::study::framework::Inputs;
-use crate::study::framework::run_folder::{self, RunFolder, STATE};
 use crate::study::framework::state_file::StateFile;
+use crate::study::framework::{Inputs, write_json};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -172,7 +172,7 @@ fn fill(from: &Path, to: &Path) -> Result<()> {
         write_whole(to.join(&name), &contents)?;
         sums.insert(name, sum(&contents));
     }
-    run_folder::write_json(&to.join(DONE), &sums)
+    write_json(&to.join(DONE), &sums)
 }
 
 /// A name beside a kept stage that nothing has.

@@ -13,11 +13,11 @@ pub use sobol::{DesignOutputs, MOST_SAMPLES, MOST_VARIABLES, SobolIndex, design,
 use crate::config::kinds::{count, number};
 use crate::config::settings::{Flag, Settings, settings};
 use crate::error::{Error, Result};
-use crate::evaluate::replay::{CHANNEL_NAMES, ReplayProblem, trace};
+use crate::evaluate::replay::CHANNEL_NAMES;
 use crate::study::framework::journal::Journal;
 use crate::study::framework::memory::{ANSWER, MemoryItem, log_item};
-use crate::study::framework::{Plan, RunRecord, Study, Subject, Work};
-use crate::study::identify::{IdentifySettings, Setup, planned, subject, without_laps};
+use crate::study::framework::{Plan, RunRecord, Solved, Study, Subject, Work};
+use crate::study::identify::{IdentifySettings, Setup, judge_candidate, planned, subject, without_laps};
 use crate::study::replayed::{drive, ranges_about, replay_settings, set_up_channels, windowed};
 use rayon::prelude::*;
 use std::path::Path;
@@ -123,11 +123,7 @@ impl Study for Sensitivity {
     fn size(settings: &SensitivitySettings, prepared: Option<&Setup>) -> Vec<MemoryItem> {
         let variables = settings.replay.free.len() as u64;
         let car = variables.saturating_mul(16).saturating_add(80 + ANSWER);
-        let samples = MemoryItem {
-            name: "samples",
-            count: settings.samples as u64,
-            each: car.saturating_mul(variables + 2),
-        };
+        let samples = MemoryItem::new("samples", settings.samples, car.saturating_mul(variables + 2));
         let log = prepared.map(|setup| log_item(setup.log.samples()));
         std::iter::once(samples).chain(log).collect()
     }
@@ -140,20 +136,16 @@ impl Study for Sensitivity {
         )
     }
 
-    fn solve(
-        settings: &SensitivitySettings,
-        setup: &Setup,
-        work: Work<'_, Journal>,
-    ) -> Result<Option<Outcome>> {
-        measure(settings, setup, work).map(Some)
+    fn solve(work: Work<'_, Self>) -> Result<Option<Outcome>> {
+        measure(work).map(Some)
     }
 
     fn record(outcome: &Outcome) -> &RunRecord {
         &outcome.record
     }
 
-    fn summarise(settings: &SensitivitySettings, setup: &Setup, outcome: &Outcome) -> Summary {
-        results::summarise(settings, setup, outcome)
+    fn summarise(solved: &Solved<'_, Self>) -> Summary {
+        results::summarise(solved)
     }
 
     fn subject(settings: &SensitivitySettings, setup: &Setup) -> Subject {
@@ -161,18 +153,12 @@ impl Study for Sensitivity {
     }
 
     /// Writes `sobol.csv`, `one_at_a_time.csv`, the figures `sobol.svg`, `one_at_a_time.svg` and `bands.svg`, and `report.html`.
-    fn report(
-        folder: &Path,
-        settings: &SensitivitySettings,
-        setup: &Setup,
-        outcome: &Outcome,
-        summary: &Summary,
-    ) -> Result<()> {
-        results::write_one_at_a_time(folder, setup, outcome)?;
-        if !outcome.indices.is_empty() {
+    fn report(folder: &Path, solved: &Solved<'_, Self>, summary: &Summary) -> Result<()> {
+        results::write_one_at_a_time(folder, solved.prepared, solved.outcome)?;
+        if !solved.outcome.indices.is_empty() {
             results::write_sobol(folder, summary)?;
         }
-        page::write(folder, &settings.to_toml(), setup, outcome, summary)
+        page::write(folder, solved, summary)
     }
 
     fn text(_: &SensitivitySettings, summary: &Summary) -> String {
@@ -192,7 +178,8 @@ impl Study for Sensitivity {
 ///
 /// # Errors
 /// [`Error::Study`] if the base car does not drive the lap, or too few of its neighbours do; those of the evaluator.
-fn measure(settings: &SensitivitySettings, setup: &Setup, work: Work<'_, Journal>) -> Result<Outcome> {
+fn measure(work: Work<'_, Sensitivity>) -> Result<Outcome> {
+    let (settings, setup) = (work.settings, work.prepared);
     let replay = &setup.replay;
     let dimensions = replay.dimensions();
     let base = replay.free.values_in(replay.free.base());
@@ -214,9 +201,8 @@ fn measure(settings: &SensitivitySettings, setup: &Setup, work: Work<'_, Journal
     let shares = design(dimensions, settings.samples, settings.replay.seed);
     let within = shares.iter().zip(variables.iter().cycle());
     let rest: Vec<f64> = within.map(|(u, v)| v.lower + u * (v.upper - v.lower)).collect();
-    let shared = (&settings.replay, setup);
     // The first are few enough to be driven whole, however soon the study is interrupted.
-    let driven = drive::<Sensitivity>(settings, shared, &[&first, &rest], work)?;
+    let driven = drive(&settings.replay, &[&first, &rest], work)?;
     let (single, global) = driven.costs.split_at(first.len() / dimensions);
     let base_costs = single[0].clone().ok_or_else(|| {
         Error::Study("the base car does not drive the lap: nothing to set changes against".to_owned())
@@ -285,9 +271,9 @@ fn indices_of(
 fn band(setup: &Setup, candidates: &[f64], dimensions: usize) -> Band {
     let replay = &setup.replay;
     let samples = replay.plan.samples.len();
-    let driven: Vec<Vec<[f64; 4]>> = candidates
+    let driven: Vec<[Vec<f64>; 4]> = candidates
         .par_chunks_exact(dimensions)
-        .map(|candidate| outputs_of(replay, candidate, samples))
+        .map(|candidate| judge_candidate(replay, candidate).outputs)
         .collect();
     let channel = |f: &dyn Fn(usize, usize) -> f64| -> Vec<Vec<f64>> {
         (0..CHANNEL_NAMES.len())
@@ -295,24 +281,11 @@ fn band(setup: &Setup, candidates: &[f64], dimensions: usize) -> Band {
             .collect()
     };
     let folded =
-        |fold: fn(f64, f64) -> f64| channel(&|i, k| driven.iter().map(|d| d[i][k]).fold(f64::NAN, fold));
+        |fold: fn(f64, f64) -> f64| channel(&|i, k| driven.iter().map(|d| d[k][i]).fold(f64::NAN, fold));
     Band {
         distance_m: setup.log.distance_m.clone(),
-        base: channel(&|i, k| driven[0][i][k]),
+        base: channel(&|i, k| driven[0][k][i]),
         low: folded(f64::min),
         high: folded(f64::max),
     }
-}
-
-/// The four outputs of a candidate at each sample; not a number where no window drives.
-fn outputs_of(replay: &ReplayProblem, candidate: &[f64], samples: usize) -> Vec<[f64; 4]> {
-    let flat = replay.flat(candidate);
-    let mut outputs = vec![[f64::NAN; 4]; samples];
-    for window in &replay.plan.windows {
-        let (driven, _) = trace(&flat, replay.tyre_model(), &replay.plan, window);
-        for (i, output) in driven.into_iter().enumerate().skip(window.scored_from) {
-            outputs[window.start + i] = output;
-        }
-    }
-    outputs
 }

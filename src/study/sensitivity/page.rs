@@ -1,21 +1,17 @@
 //! The interactive report of a sensitivity study, with its figures.
 
 use super::results::{ParameterSensitivity, Summary, one_at_a_time_figure, parameter_table, sobol_figure};
-use super::{LEVELS, Outcome};
+use super::{LEVELS, Outcome, Sensitivity};
+use crate::config::settings::Settings;
 use crate::error::Result;
 use crate::evaluate::replay::{CHANNEL_LABELS, CHANNEL_UNITS};
 use crate::report::{HtmlReport, LapLine, LapView};
-use crate::study::framework::circuit_view::{circuit_road, sections};
+use crate::study::framework::Solved;
 use crate::study::identify::Setup;
 use std::path::Path;
 
-pub(super) fn write(
-    folder: &Path,
-    study_toml: &str,
-    setup: &Setup,
-    outcome: &Outcome,
-    summary: &Summary,
-) -> Result<()> {
+pub(super) fn write(folder: &Path, solved: &Solved<'_, Sensitivity>, summary: &Summary) -> Result<()> {
+    let (setup, outcome) = (solved.prepared, solved.outcome);
     let car = &setup.replay.free.car.name;
     let mut page = HtmlReport::new("sensitivity", &format!("What matters of the {car}"));
     head(&mut page, car, summary);
@@ -43,7 +39,7 @@ pub(super) fn write(
     page.figure(folder.join("bands.svg"), &bands(setup, outcome))?;
     page.facts(&[("log", &setup.log.source), ("car", car), ("seed", &summary.seed)]);
     summary.record.provenance(&mut page, "candidates evaluated");
-    page.settings("study.toml, which repeats this run", study_toml);
+    page.settings("study.toml, which repeats this run", solved.settings.to_toml());
     page.write(folder.join("report.html"))
 }
 
@@ -117,6 +113,5 @@ fn bands(setup: &Setup, outcome: &Outcome) -> LapView {
     .panels((0..CHANNEL_LABELS.len()).map(|k| (CHANNEL_LABELS[k], CHANNEL_UNITS[k])))
     .line(greatest)
     .line(least)
-    .sections(circuit.into_iter().flat_map(sections))
-    .road(circuit.map(circuit_road))
+    .circuit(circuit)
 }

@@ -1,9 +1,9 @@
 //! What a sensitivity study leaves behind.
 
-use super::{MOST_SAMPLES, Outcome, SensitivitySettings, SobolIndex};
+use super::{MOST_SAMPLES, Outcome, Sensitivity, SobolIndex};
 use crate::error::Result;
 use crate::report::{BarPanel, Bars, Table};
-use crate::study::framework::RunRecord;
+use crate::study::framework::{RunRecord, Solved};
 use crate::study::identify::Setup;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -86,8 +86,9 @@ fn doubts(parameters: &[ParameterSensitivity], samples: usize) -> Option<String>
 }
 
 /// Puts the figures together.
-pub(super) fn summarise(settings: &SensitivitySettings, setup: &Setup, outcome: &Outcome) -> Summary {
-    let problem = &setup.replay.problem;
+pub(super) fn summarise(solved: &Solved<'_, Sensitivity>) -> Summary {
+    let (settings, outcome) = (solved.settings, solved.outcome);
+    let problem = &solved.prepared.replay.problem;
     let names = || problem.objectives.iter().map(|o| o.name.clone());
     let each = problem.variables.iter().enumerate();
     let mut parameters: Vec<ParameterSensitivity> = each

@@ -9,7 +9,7 @@ use crate::config::settings::{Settings, settings};
 use crate::error::{Error, Result};
 use crate::study::framework::journal::Journal;
 use crate::study::framework::memory::{ANSWER, MemoryItem, log_item};
-use crate::study::framework::{Plan, RunRecord, Study, Subject, Work};
+use crate::study::framework::{Plan, RunRecord, Solved, Study, Subject, Work};
 use crate::study::identify::{FreeParameter, IdentifySettings, Setup, planned, subject, without_laps};
 use crate::study::replayed::{drive, ranges_about, replay_settings, set_up_channels, windowed};
 use std::path::Path;
@@ -71,11 +71,8 @@ impl Study for Surface {
 
     /// Of every candidate its two parameters, its costs, and the answer in a journal.
     fn size(settings: &SurfaceSettings, prepared: Option<&Setup>) -> Vec<MemoryItem> {
-        let grid = MemoryItem {
-            name: "grid, squared",
-            count: (settings.grid as u64).saturating_mul(settings.grid as u64),
-            each: 2 * 8 + 2 * 80 + ANSWER,
-        };
+        let cars = settings.grid.saturating_mul(settings.grid);
+        let grid = MemoryItem::new("grid, squared", cars, 2 * 8 + 2 * 80 + ANSWER);
         let log = prepared.map(|setup| log_item(setup.log.samples()));
         std::iter::once(grid).chain(log).collect()
     }
@@ -85,30 +82,24 @@ impl Study for Surface {
         planned(&settings.replay, prepared, plan)
     }
 
-    fn solve(settings: &SurfaceSettings, setup: &Setup, work: Work<'_, Journal>) -> Result<Option<Outcome>> {
-        measure(settings, setup, work).map(Some)
+    fn solve(work: Work<'_, Self>) -> Result<Option<Outcome>> {
+        measure(work).map(Some)
     }
 
     fn record(outcome: &Outcome) -> &RunRecord {
         &outcome.record
     }
 
-    fn summarise(settings: &SurfaceSettings, setup: &Setup, outcome: &Outcome) -> Summary {
-        results::summarise(settings, setup, outcome)
+    fn summarise(solved: &Solved<'_, Self>) -> Summary {
+        results::summarise(solved)
     }
 
     fn subject(settings: &SurfaceSettings, setup: &Setup) -> Subject {
         subject(&settings.replay, setup)
     }
 
-    fn report(
-        folder: &Path,
-        settings: &SurfaceSettings,
-        setup: &Setup,
-        outcome: &Outcome,
-        summary: &Summary,
-    ) -> Result<()> {
-        results::report(folder, settings, setup, outcome, summary)
+    fn report(folder: &Path, solved: &Solved<'_, Self>, summary: &Summary) -> Result<()> {
+        results::report(folder, solved, summary)
     }
 
     fn text(_: &SurfaceSettings, summary: &Summary) -> String {
@@ -128,7 +119,8 @@ impl Study for Surface {
 ///
 /// # Errors
 /// [`Error::Study`] if no candidate drives the lap; those of the evaluator.
-fn measure(settings: &SurfaceSettings, setup: &Setup, work: Work<'_, Journal>) -> Result<Outcome> {
+fn measure(work: Work<'_, Surface>) -> Result<Outcome> {
+    let (settings, setup) = (work.settings, work.prepared);
     let problem = &setup.replay.problem;
     let n = settings.grid;
     let axes = [0, 1].map(|k| -> Vec<f64> {
@@ -141,7 +133,7 @@ fn measure(settings: &SurfaceSettings, setup: &Setup, work: Work<'_, Journal>) -
         .iter()
         .flat_map(|y| axes[0].iter().flat_map(|x| [*x, *y]))
         .collect();
-    let driven = drive::<Surface>(settings, (&settings.replay, setup), &[&population], work)?;
+    let driven = drive(&settings.replay, &[&population], work)?;
     let rows = &driven.costs;
     if !driven.interrupted() && rows.iter().all(Option::is_none) {
         let text = "no car of the grid drives the lap to its end: a smaller share, or shorter windows, keep more of them on the road";

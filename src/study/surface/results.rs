@@ -1,11 +1,10 @@
 //! What a surface study leaves behind.
 
-use super::{Outcome, SurfaceSettings};
 use crate::config::settings::Settings;
 use crate::error::Result;
 use crate::evaluate::failures_in_words;
 use crate::report::{HtmlReport, Levels, Surface, Table, significant, with_unit};
-use crate::study::framework::RunRecord;
+use crate::study::framework::{RunRecord, Solved};
 use crate::study::identify::Setup;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -41,7 +40,8 @@ pub struct Summary {
 }
 
 /// Puts the figures together.
-pub(super) fn summarise(settings: &SurfaceSettings, setup: &Setup, outcome: &Outcome) -> Summary {
+pub(super) fn summarise(solved: &Solved<'_, super::Surface>) -> Summary {
+    let (settings, outcome) = (solved.settings, solved.outcome);
     let n = outcome.axes[0].len();
     let least_of = |costs: &Vec<f64>| {
         let finite = (0..costs.len()).filter(|i| costs[*i].is_finite());
@@ -52,7 +52,7 @@ pub(super) fn summarise(settings: &SurfaceSettings, setup: &Setup, outcome: &Out
                 at: [outcome.axes[0][i % n], outcome.axes[1][i / n]],
             })
     };
-    let objectives = &setup.replay.problem.objectives;
+    let objectives = &solved.prepared.replay.problem.objectives;
     Summary {
         study: "surface".to_owned(),
         seed: settings.replay.seed,
@@ -101,13 +101,8 @@ impl Summary {
 ///
 /// # Errors
 /// [`crate::Error::Io`] if a file cannot be written.
-pub(super) fn report(
-    folder: &Path,
-    settings: &SurfaceSettings,
-    setup: &Setup,
-    outcome: &Outcome,
-    summary: &Summary,
-) -> Result<()> {
+pub(super) fn report(folder: &Path, solved: &Solved<'_, super::Surface>, summary: &Summary) -> Result<()> {
+    let (setup, outcome) = (solved.prepared, solved.outcome);
     if outcome.record.interrupted {
         return Ok(());
     }
@@ -146,7 +141,7 @@ pub(super) fn report(
     }
     page.facts(&[("log", &setup.log.source), ("car", &setup.replay.free.car.name)]);
     summary.record.provenance(&mut page, "candidates evaluated");
-    page.settings("study.toml, which repeats this run", settings.to_toml());
+    page.settings("study.toml, which repeats this run", solved.settings.to_toml());
     page.write(folder.join("report.html"))
 }
 

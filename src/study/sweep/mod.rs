@@ -17,9 +17,8 @@ use crate::error::{Error, Result};
 use crate::evaluate::portions::Allowance;
 use crate::report::write_whole;
 use crate::study::framework::memory::{self, MemoryItem};
-use crate::study::framework::run_folder::{Manifest, write_json};
 use crate::study::framework::state_file::StateFile;
-use crate::study::framework::{Entry, Plan, Progress, Study};
+use crate::study::framework::{Entry, Manifest, Plan, Progress, Solved, Study, write_json};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
@@ -290,17 +289,20 @@ impl<S: Study> Swept for Entry<S> {
                 let Some(outcome) = outcome.filter(|outcome| !S::record(outcome).interrupted) else {
                     return Err(Error::Interrupted(work.folder.to_owned()));
                 };
-                let record = S::record(&outcome);
+                let solved = Solved::<S> {
+                    settings,
+                    prepared: inputs,
+                    outcome: &outcome,
+                };
                 // What depends on the clock stands beside the study, and not in the row.
-                let subject = S::subject(settings, inputs);
-                let manifest = Manifest::new(S::NAME, &subject, record, "");
+                let manifest = Manifest::new(solved.head(), "");
                 write_json(&work.path_of(run).with_extension("json"), &manifest)?;
-                let summary = S::summarise(settings, inputs, &outcome);
+                let summary = S::summarise(&solved);
                 rows.push(Row {
                     run,
                     settings: points[run].settings.clone(),
                     figures: S::figures(&outcome, &summary),
-                    device_faults: record.device_faults.clone(),
+                    device_faults: S::record(&outcome).device_faults.clone(),
                     front: S::front(&outcome),
                 });
                 results::write_rows(&work.folder.join(ROWS), rows)?;

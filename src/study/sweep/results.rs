@@ -3,8 +3,9 @@
 use super::{Point, SweepSettings};
 use crate::config::{LARGEST_LOG, read_bytes, read_text};
 use crate::error::{Error, Place, Result};
+use crate::files::run_folder::SUMMARY;
 use crate::report::{Rows, Table, write_whole};
-use crate::study::framework::run_folder::write_json;
+use crate::study::framework::write_json;
 use crate::swarm::comparison::quartiles;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
@@ -224,7 +225,7 @@ impl Summary {
     /// # Errors
     /// [`Error::Io`] if a file cannot be written.
     pub(super) fn write(&self, folder: &Path, settings: &SweepSettings) -> Result<()> {
-        write_json(&folder.join("summary.json"), self)?;
+        write_json(&folder.join(SUMMARY), self)?;
         if self.rows.is_empty() {
             return Ok(());
         }

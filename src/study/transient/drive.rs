@@ -1,12 +1,12 @@
 //! One line alone, driven in `f64` with the greatest share of the grip that is held.
 
 use super::state::DriveState;
-use super::{NamedLine, Prepared, TransientSettings, TransientState, planned};
+use super::{NamedLine, Transient, planned};
 use crate::drive::{Drive, DriverSettings, drive_planned};
 use crate::error::{Error, Result};
 use crate::evaluate::BackendInfo;
+use crate::files::run_folder::STATE;
 use crate::line::FineLine;
-use crate::study::framework::run_folder::STATE;
 use crate::study::framework::{Inputs, Progress, RunRecord, Watch, Work};
 use crate::track::Circuit;
 use crate::vehicle::Envelope;
@@ -54,14 +54,10 @@ impl DrivenLine {
 /// # Errors
 /// [`Error::Study`] if the car gets round with none of the shares; [`Error::Input`] if the state belongs to other inputs;
 /// [`Error::Io`] if it cannot be saved.
-pub(super) fn drive(
-    settings: &TransientSettings,
-    prepared: &Prepared,
-    work: Work<'_, TransientState>,
-) -> Result<Option<DrivenLine>> {
+pub(super) fn drive(work: Work<'_, Transient>) -> Result<Option<DrivenLine>> {
     let watch = Watch::begin();
     let mut record = RunRecord::of(&BackendInfo::reference());
-    let found = greatest_share(settings, prepared, work)?;
+    let found = greatest_share(work)?;
     Ok(found.map(|mut found| {
         let elapsed_s = watch.elapsed_s();
         record.took(found.failures.len() as u64 + 1, elapsed_s, elapsed_s);
@@ -70,19 +66,16 @@ pub(super) fn drive(
     }))
 }
 
-fn greatest_share(
-    settings: &TransientSettings,
-    prepared: &Prepared,
-    work: Work<'_, TransientState>,
-) -> Result<Option<DrivenLine>> {
-    let (car, limits) = (&prepared.car, &prepared.road.car);
+fn greatest_share(work: Work<'_, Transient>) -> Result<Option<DrivenLine>> {
+    let (car, limits) = (&work.prepared.car, &work.prepared.road.car);
     let Some(NamedLine {
         points_m, circuit, ..
-    }) = prepared.lines.first()
+    }) = work.prepared.lines.first()
     else {
         return Err(Error::input("the study", "line", "none", "a line to drive"));
     };
     let Work {
+        settings,
         state,
         state_file,
         observe,
@@ -113,7 +106,7 @@ fn greatest_share(
             envelope,
             point_mass,
             lap_time_s,
-            margin_m: least_room(circuit, &drive),
+            margin_m: drive.least_room_m(circuit),
             drive,
             line: circuit.clone(),
             failures: Vec::new(),
@@ -180,17 +173,4 @@ fn greatest_share(
         "the car does not get round the line with any share of the envelope's grip that was tried{last}; a line with more room \
          to the edges (found for a wider car), or through more sections, is easier to drive"
     )))
-}
-
-/// Least room between the car's side and an edge over a drive (m).
-fn least_room(circuit: &Circuit, drive: &Drive) -> f64 {
-    drive
-        .station_m
-        .iter()
-        .zip(&drive.offset_m)
-        .map(|(station, offset)| {
-            let (left, right) = circuit.widths_at(*station);
-            (left - offset).min(right + offset)
-        })
-        .fold(f64::INFINITY, f64::min)
 }

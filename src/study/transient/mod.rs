@@ -23,15 +23,16 @@ use crate::config::settings::Settings;
 use crate::drive::SpeedPlan;
 use crate::error::{Error, Result};
 use crate::evaluate::BackendInfo;
+use crate::files::names_of;
 use crate::line::{FineLine, PointMass, read_line};
 use crate::study::framework::memory::MemoryItem;
-use crate::study::framework::{Plan, RunRecord, Study, Subject, Work};
+use crate::study::framework::{Plan, RunRecord, Solved, Study, Subject, Work};
 use crate::study::raceline;
 use crate::track::Circuit;
 use crate::vehicle::{Car, Envelope};
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// The study.
 pub struct Transient;
@@ -138,16 +139,12 @@ impl Study for Transient {
         }
     }
 
-    fn solve(
-        settings: &TransientSettings,
-        prepared: &Prepared,
-        work: Work<'_, TransientState>,
-    ) -> Result<Option<Outcome>> {
-        if settings.is_population() {
-            let found = population::drive(settings, prepared, work)?;
+    fn solve(work: Work<'_, Self>) -> Result<Option<Outcome>> {
+        if work.settings.is_population() {
+            let found = population::drive(work)?;
             Ok(found.map(|population| Outcome::Population(Box::new(population))))
         } else {
-            let found = drive::drive(settings, prepared, work)?;
+            let found = drive::drive(work)?;
             Ok(found.map(|line| Outcome::Line(Box::new(line))))
         }
     }
@@ -159,39 +156,28 @@ impl Study for Transient {
         }
     }
 
-    fn summarise(settings: &TransientSettings, prepared: &Prepared, outcome: &Outcome) -> Summary {
-        let mut head = Self::head(settings, prepared, outcome);
+    fn summarise(solved: &Solved<'_, Self>) -> Summary {
+        let mut head = solved.head();
         // Figures name the lines; the track gives no more than their edges.
         head.subject.track = None;
-        match outcome {
+        match solved.outcome {
             Outcome::Line(line) => Summary::Line(Box::new(LineSummary::of(head, line))),
             Outcome::Population(population) => {
-                let summary = population_results::summarise(head, settings, prepared, population);
+                let summary = population_results::summarise(head, solved, population);
                 Summary::Population(Box::new(summary))
             }
         }
     }
 
     fn subject(settings: &TransientSettings, prepared: &Prepared) -> Subject {
-        Subject {
-            seed: settings.seed,
-            car: prepared.car.name.clone(),
-            log: None,
-            track: Some(prepared.road.track_name.clone()),
-        }
+        Subject::on_track(settings.seed, &prepared.car.name, &prepared.road.track_name)
     }
 
-    fn report(
-        folder: &Path,
-        _: &TransientSettings,
-        prepared: &Prepared,
-        outcome: &Outcome,
-        summary: &Summary,
-    ) -> Result<()> {
-        match (outcome, summary) {
+    fn report(folder: &Path, solved: &Solved<'_, Self>, summary: &Summary) -> Result<()> {
+        match (solved.outcome, summary) {
             (Outcome::Line(line), Summary::Line(summary)) => results::report(folder, line, summary),
             (Outcome::Population(population), Summary::Population(summary)) => {
-                population_results::report(folder, prepared, population, summary)
+                population_results::report(folder, solved.prepared, population, summary)
             }
             _ => Err(Error::Study("figures of another kind of drive".to_owned())),
         }
@@ -245,27 +231,6 @@ fn read(settings: &TransientSettings) -> Result<Prepared> {
         .map(|(name, points)| NamedLine::new(name, points, &road.edges_m, settings.car_width_m))
         .collect::<Result<_>>()?;
     Ok(Prepared { car, road, lines })
-}
-
-/// What reports call the lines: their files' names, with the folders where these are not enough.
-fn names_of(files: &[PathBuf]) -> Vec<String> {
-    let text =
-        |part: Option<&std::ffi::OsStr>| part.map_or(String::new(), |s| s.to_string_lossy().into_owned());
-    let stem = |path: &Path| text(path.file_stem());
-    let within = |path: &Path| format!("{}/{}", text(path.parent().and_then(Path::file_name)), stem(path));
-    let whole = |path: &Path| path.display().to_string();
-    let lone = |of: &dyn Fn(&Path) -> String, path: &Path| {
-        let name = of(path);
-        (files.iter().filter(|f| of(f) == name).count() == 1).then_some(name)
-    };
-    files
-        .iter()
-        .map(|path| {
-            lone(&stem, path)
-                .or_else(|| lone(&within, path))
-                .unwrap_or_else(|| whole(path))
-        })
-        .collect()
 }
 
 /// The quasi-steady-state lap within a share of the envelope's grip on a line of points (m): the envelope, the lap, and its speeds

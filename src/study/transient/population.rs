@@ -3,7 +3,7 @@
 //! Every set-up drives every line at the speeds of quasi-steady-state laps with different shares of the envelope's grip; what it is
 //! worth is its fastest lap on which the car stays within the edges.
 
-use super::{Prepared, Transient, TransientSettings, TransientState, planned};
+use super::{Prepared, Transient, TransientState, planned};
 use crate::drive::{DriverSettings, Line};
 use crate::error::Result;
 use crate::evaluate::drive::{DriveObjective, DriveProblem, DriveSettings, open_drive_evaluator};
@@ -59,15 +59,12 @@ pub struct PopulationOutcome {
 ///
 /// # Errors
 /// [`crate::Error::Input`] for unknown parameters and if the state belongs to other inputs; those of the backend.
-pub(super) fn drive(
-    settings: &TransientSettings,
-    prepared: &Prepared,
-    work: Work<'_, TransientState>,
-) -> Result<Option<PopulationOutcome>> {
+pub(super) fn drive(work: Work<'_, Transient>) -> Result<Option<PopulationOutcome>> {
     let watch = Watch::begin();
-    let Prepared { car, road, lines } = prepared;
+    let Prepared { car, road, lines } = work.prepared;
     let limits = &road.car;
     let Work {
+        settings,
         state,
         state_file,
         observe,

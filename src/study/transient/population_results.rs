@@ -1,11 +1,11 @@
 //! What a population of drives leaves behind.
 
 use super::population::{Driven, DrivenBest, PopulationOutcome};
-use super::{Prepared, TransientSettings};
+use super::{Prepared, Transient};
 use crate::error::Result;
 use crate::evaluate::failures_in_words;
 use crate::report::{HtmlReport, Table};
-use crate::study::framework::Head;
+use crate::study::framework::{Head, Solved};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -53,10 +53,10 @@ pub struct PopulationSummary {
 /// Puts the figures together.
 pub(super) fn summarise(
     head: Head,
-    settings: &TransientSettings,
-    prepared: &Prepared,
+    solved: &Solved<'_, Transient>,
     outcome: &PopulationOutcome,
 ) -> PopulationSummary {
+    let prepared = solved.prepared;
     let names = || outcome.parameters.iter().map(|p| p.name.clone());
     let entry = |driven: &Driven| {
         Some(Entry {
@@ -74,7 +74,7 @@ pub(super) fn summarise(
         head,
         lines: prepared.lines.iter().map(|l| l.name.clone()).collect(),
         parameters: names().collect(),
-        share: settings.share,
+        share: solved.settings.share,
         within_edges: within().count(),
         driven: outcome.driven.len(),
         best: within().next().and_then(entry),

@@ -99,7 +99,7 @@ pub(super) fn report(folder: &Path, outcome: &DrivenLine, summary: &LineSummary)
     let envelope = outcome.envelope.to_csv();
     write_whole(folder.join("envelope_driven.csv"), envelope.as_bytes())?;
     let drive = &outcome.drive;
-    let driven_m = driven_m(outcome);
+    let driven_m = drive.points_m(&outcome.line);
     let state = |k: usize| -> Vec<f64> { drive.states.iter().map(|s| s[k]).collect() };
     let (x, y): (Vec<f64>, Vec<f64>) = driven_m.iter().map(|p| (p.x, p.y)).unzip();
     let steer: Vec<f64> = drive.inputs.iter().map(|(_, steer)| *steer).collect();
@@ -117,18 +117,6 @@ pub(super) fn report(folder: &Path, outcome: &DrivenLine, summary: &LineSummary)
         .numbers("steering", "rad", steer)
         .write_csv(folder.join("drive.csv"))?;
     write_page(folder, outcome, summary, &driven_m)
-}
-
-/// Where the car went (m).
-fn driven_m(outcome: &DrivenLine) -> Vec<DVec2> {
-    let (line, drive) = (&outcome.line, &outcome.drive);
-    let places = drive.station_m.iter().zip(&drive.offset_m);
-    places
-        .map(|(station, offset)| {
-            let heading = DVec2::from_angle(line.heading_at(*station));
-            line.position_at(*station) + *offset * heading.perp()
-        })
-        .collect()
 }
 
 fn write_page(folder: &Path, outcome: &DrivenLine, summary: &LineSummary, driven_m: &[DVec2]) -> Result<()> {

@@ -92,11 +92,8 @@ impl TransientSettings {
         }
         let [lines, shares] = [self.line.len(), self.shares().len()].map(|n| n as u64);
         let variables = self.parameters.len() as u64 + 2;
-        vec![MemoryItem {
-            name: "setups",
-            count: self.setups.unwrap_or(0) as u64 + 1,
-            each: (lines * shares).saturating_mul(ANSWER) + lines * 3 * 8 * variables,
-        }]
+        let each = (lines * shares).saturating_mul(ANSWER) + lines * 3 * 8 * variables;
+        vec![MemoryItem::new("setups", self.setups.unwrap_or(0) + 1, each)]
     }
 
     /// Checks that there is a line, that one line alone is driven where it can be, and that there are set-ups for what is said of

@@ -2,9 +2,9 @@
 
 use super::TransientSettings;
 use crate::error::{Error, Result};
+use crate::files::run_folder::STATE;
 use crate::study::framework::State;
 use crate::study::framework::journal::Journal;
-use crate::study::framework::run_folder::STATE;
 use crate::swarm::checkpoint::{self, Checkpoint};
 use serde::{Deserialize, Serialize};
 use std::path::Path;

@@ -22,6 +22,11 @@ impl Scale {
         Self { least, range }
     }
 
+    /// The scale from the ideal point to a reference point that nowhere falls short of it.
+    pub fn between(ideal: &[f64], reference: &[f64]) -> Self {
+        Self::of(&[ideal.to_vec(), reference.to_vec()])
+    }
+
     /// Points on this scale.
     pub fn apply(&self, points: &[Vec<f64>]) -> Vec<Vec<f64>> {
         let value = |row: &Vec<f64>, k: usize| (row[k] - self.least[k]) / self.range[k];
@@ -34,6 +39,13 @@ impl Scale {
             })
             .collect()
     }
+}
+
+/// The row nearest to the ideal point, each objective as a share of its range over the rows; nothing without rows.
+pub fn nearest_to_ideal(rows: &[Vec<f64>]) -> Option<usize> {
+    let shares = Scale::of(rows).apply(rows);
+    let distance = |i: usize| shares[i].iter().map(|x| x * x).sum::<f64>();
+    (0..rows.len()).min_by(|&a, &b| distance(a).total_cmp(&distance(b)))
 }
 
 /// Mean over the true front of how far the set is from dominating it \[2\]: zero at best. `O(n m)`.

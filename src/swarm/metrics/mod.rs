@@ -28,7 +28,7 @@ mod staircase;
 pub(super) use contribution::Columns;
 pub use contribution::contributions;
 pub use hypervolume::hypervolume;
-pub use indicators::{Scale, epsilon, igd_plus, spread};
+pub use indicators::{Scale, epsilon, igd_plus, nearest_to_ideal, spread};
 pub(super) use non_dominated::dominates;
 pub use non_dominated::non_dominated;
 pub use ranks::ranks;

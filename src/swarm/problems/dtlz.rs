@@ -2,30 +2,29 @@
 
 use super::{Function, TestProblem, sum};
 use crate::scalar::Real;
+use crate::swarm::lattice;
+
+/// About `count` points of an even lattice on the plane where three numbers, none negative, add up to one.
+fn on_plane(count: usize) -> impl Iterator<Item = Vec<f64>> {
+    let steps = ((2.0 * count as f64).sqrt().round() as u32).max(2) - 1;
+    lattice(3, steps).into_iter()
+}
 
 pub(super) fn by_name(name: &str) -> Option<TestProblem> {
     let unit = |count: usize| std::iter::repeat_n((0.0, 1.0), count);
     Some(match name {
         "dtlz1" => TestProblem::new("dtlz1", unit(7), 3, Function::Dtlz1, |n| {
-            lattice(n).map(|p| p.map(|x| 0.5 * x).to_vec()).collect()
+            on_plane(n).map(|p| p.iter().map(|x| 0.5 * x).collect()).collect()
         }),
         "dtlz2" => TestProblem::new("dtlz2", unit(12), 3, Function::Dtlz2, |n| {
-            let onto_sphere = |p: [f64; 3]| {
+            let onto_sphere = |p: Vec<f64>| {
                 let norm = p.iter().map(|x| x * x).sum::<f64>().sqrt();
-                p.map(|x| x / norm).to_vec()
+                p.iter().map(|x| x / norm).collect()
             };
-            lattice(n).map(onto_sphere).collect()
+            on_plane(n).map(onto_sphere).collect()
         }),
         _ => return None,
     })
-}
-
-/// About `count` points of an even lattice on the plane where three numbers, none negative, add up to one (Das,
-/// Dennis, 1998).
-fn lattice(count: usize) -> impl Iterator<Item = [f64; 3]> {
-    let steps = ((2.0 * count as f64).sqrt().round() as usize).max(2) - 1;
-    let at = move |i: usize, j: usize| [i, j, steps - i - j].map(|s| s as f64 / steps as f64);
-    (0..=steps).flat_map(move |i| (0..=steps - i).map(move |j| at(i, j)))
 }
 
 #[inline(always)]

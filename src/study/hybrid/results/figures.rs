@@ -42,7 +42,7 @@ fn words(lap: &ReportedLap) -> String {
 fn road(setup: &HybridSetup) -> Road {
     Road {
         closed: setup.closed,
-        ..setup.raceline.drawn_road()
+        ..Road::across(&setup.raceline.road, &setup.raceline.edges_m)
     }
 }
 

@@ -5,19 +5,16 @@ use crate::config::settings::Settings;
 use crate::error::Result;
 use crate::files::stem;
 use crate::report::{Figure, Front, HtmlReport, Table};
-use crate::study::hybrid::{HybridStudySettings, Outcome, ReportedLap, StintLap};
+use crate::study::framework::Solved;
+use crate::study::hybrid::{Hybrid, Outcome, ReportedLap, StintLap};
 use std::path::Path;
 
 /// Draws figures into `folder`, and writes the page.
 ///
 /// # Errors
 /// [`crate::Error::Io`] if one cannot be written.
-pub fn write(
-    folder: &Path,
-    settings: &HybridStudySettings,
-    outcome: &Outcome,
-    summary: &HybridSummary,
-) -> Result<()> {
+pub fn write(folder: &Path, solved: &Solved<'_, Hybrid>, summary: &HybridSummary) -> Result<()> {
+    let (settings, outcome) = (solved.settings, solved.outcome);
     let subject = &summary.head.subject;
     let mut page = HtmlReport::new(&summary.head.study, &subject.words());
     head(&mut page, summary);

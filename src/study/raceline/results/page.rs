@@ -10,7 +10,8 @@ use crate::line::Parametrisation;
 use crate::report::{
     Curves, Front, HtmlReport, LapLine, LapView, Levels, Panel, Road, Surface, Table, TrackMap, with_unit,
 };
-use crate::study::raceline::{ObjectiveOutcome, Outcome, RacelineSettings, ReportedLine, Setup};
+use crate::study::framework::Solved;
+use crate::study::raceline::{ObjectiveOutcome, Outcome, Raceline, RacelineSettings, ReportedLine, Setup};
 use glam::DVec2;
 use std::path::Path;
 
@@ -32,13 +33,8 @@ const GRID: usize = 41;
 ///
 /// # Errors
 /// [`crate::Error::Io`] if one cannot be written.
-pub fn write(
-    folder: &Path,
-    settings: &RacelineSettings,
-    setup: &Setup,
-    outcome: &Outcome,
-    summary: &Summary,
-) -> Result<()> {
+pub fn write(folder: &Path, solved: &Solved<'_, Raceline>, summary: &Summary) -> Result<()> {
+    let (setup, outcome) = (solved.prepared, solved.outcome);
     let (subject, record) = (&summary.head.subject, &summary.head.record);
     let mut page = HtmlReport::new(&summary.head.study, &subject.words());
     // The fastest first: it colours the map, and time is lost on it.
@@ -84,8 +80,8 @@ pub fn write(
         "Each over the line's place at the cross-section where it bends most and at the next.",
     );
     for found in &outcome.objectives {
-        if let Some(surface) = surface(settings, setup, found)? {
-            let name = format!("surface_{}.svg", stem(&found.best.name));
+        if let Some(surface) = surface(solved.settings, setup, found)? {
+            let name = format!("surface_{}.svg", found.best.stem());
             page.figure(folder.join(name), &surface)?;
         }
     }
@@ -105,7 +101,7 @@ pub fn write(
             status.as_deref().unwrap_or_default(),
         );
     }
-    page.settings("study.toml, which repeats this run", settings.to_toml());
+    page.settings("study.toml, which repeats this run", solved.settings.to_toml());
     page.write(folder.join("report.html"))
 }
 
@@ -166,33 +162,6 @@ fn head(page: &mut HtmlReport, outcome: &Outcome, summary: &Summary, lines: &[&R
     page.warnings(&summary.warnings, outcome.record.interrupted);
 }
 
-impl Setup {
-    /// The road that lines are found on, with the names of its corners, or of its stretches where corners have none.
-    pub(in crate::study) fn drawn_road(&self) -> Road {
-        let road = &self.road;
-        let at = |station: f64| {
-            let i = road
-                .station_m
-                .partition_point(|s| *s < station)
-                .min(road.len() - 1);
-            0.5 * (road.left_m[i] + road.right_m[i])
-        };
-        let corners = road.corners.iter().map(|c| (c.name.clone(), at(c.station_m)));
-        let sections = road.sections.iter();
-        let sections = sections.map(|s| (s.name.clone(), at(0.5 * (s.start_m + s.end_m))));
-        Road {
-            left_edge_m: self.edges_m[1].clone(),
-            right_edge_m: self.edges_m[0].clone(),
-            closed: road.closed,
-            names: if road.corners.is_empty() {
-                sections.collect()
-            } else {
-                corners.collect()
-            },
-        }
-    }
-}
-
 /// The lines over one another, the time that each loses being against the first.
 fn laps(setup: &Setup, lines: &[&ReportedLine]) -> LapView {
     let road = &setup.road;
@@ -205,7 +174,7 @@ fn laps(setup: &Setup, lines: &[&ReportedLine]) -> LapView {
         if let Some(lap) = &line.fine.lap {
             let lost = lines
                 .first()
-                .and_then(|fastest| lap_delta(line, fastest, &shares));
+                .and_then(|fastest| line.fine.time_lost_s(&fastest.fine, &shares));
             let steering = lap.steering_rad.iter().map(|a| a.to_degrees());
             view = view
                 .trace(0, &lap.v_mps[..])
@@ -222,31 +191,7 @@ fn laps(setup: &Setup, lines: &[&ReportedLine]) -> LapView {
         .panels(PANELS)
         .lines(lines.iter().map(line))
         .sections(sections.map(|s| (s.name.clone(), s.start_m, s.end_m)))
-        .road(setup.drawn_road())
-}
-
-/// The time that one line loses on another (s), after each share of the lap.
-fn lap_delta(line: &ReportedLine, other: &ReportedLine, shares: &[f64]) -> Option<Vec<f64>> {
-    let clock = |line: &ReportedLine| {
-        let fine = &line.fine;
-        let lap = fine.lap.as_ref()?;
-        let (elapsed, end) = (lap.elapsed_s(), (fine.length_m, lap.time_s));
-        let station = fine.station_m.clone();
-        Some(move |share: f64| {
-            let at = share * end.0;
-            let after = station.partition_point(|s| *s <= at).max(1);
-            let (s0, t0) = (station[after - 1], elapsed[after - 1]);
-            let s1 = station.get(after).copied().unwrap_or(end.0);
-            let t1 = elapsed.get(after).copied().unwrap_or(end.1);
-            if s1 > s0 {
-                t0 + (at - s0) / (s1 - s0) * (t1 - t0)
-            } else {
-                t0
-            }
-        })
-    };
-    let (mine, its) = (clock(line)?, clock(other)?);
-    Some(shares.iter().map(|&share| mine(share) - its(share)).collect())
+        .road(Road::across(road, &setup.edges_m))
 }
 
 /// A close-up of the map for each named section.

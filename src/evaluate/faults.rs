@@ -1,6 +1,7 @@
-//! What goes wrong with devices over a whole study, each fault told once.
+//! What goes wrong with devices and candidates over many evaluations, each fault told once.
 
-use crate::evaluate::Evaluator;
+use super::{Evaluator, FailureCounts, add_failures};
+use serde::{Deserialize, Serialize};
 
 /// What has been seen of an evaluator's [device faults](Evaluator::device_faults).
 #[derive(Debug)]
@@ -45,6 +46,30 @@ impl DeviceFaults {
         new.extend_from_slice(&met[self.seen..]);
         self.seen = met.len();
         new
+    }
+}
+
+/// What went wrong while candidates were evaluated.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Losses {
+    /// Candidates that failed, by reason.
+    pub failures: FailureCounts,
+    /// What went wrong with devices and was got over.
+    pub device_faults: Vec<String>,
+}
+
+impl Losses {
+    /// Adds the failures of an evaluation, and what has gone wrong with the device since the last.
+    pub fn note(&mut self, failures: &FailureCounts, faults: &mut DeviceFaults, evaluator: &dyn Evaluator) {
+        add_failures(&mut self.failures, failures);
+        let met = faults.since(evaluator, &self.device_faults);
+        self.device_faults.extend(met);
+    }
+
+    /// Adds those of another part of the study.
+    pub fn add(&mut self, other: &Self) {
+        add_failures(&mut self.failures, &other.failures);
+        self.device_faults.extend_from_slice(&other.device_faults);
     }
 }
 

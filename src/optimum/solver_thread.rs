@@ -1,4 +1,4 @@
-//! Solvers on threads of their own, so that whoever watches a study can break them off.
+//! Solvers on threads of their own, so that whoever watches can break them off.
 
 use crate::error::Result;
 use std::ops::ControlFlow;
@@ -14,7 +14,7 @@ const LONGEST_PAUSE: Duration = Duration::from_millis(50);
 ///
 /// # Errors
 /// Those of the solver and of `going_on`.
-pub(super) fn interruptible<T>(
+pub fn interruptible<T>(
     solver: ScopedJoinHandle<'_, Result<T>>,
     stop: &AtomicBool,
     mut going_on: impl FnMut() -> Result<ControlFlow<()>>,

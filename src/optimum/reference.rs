@@ -1,14 +1,12 @@
-//! The reference optima beside the swarm, and the local search by exact gradients.
+//! The reference optimum of each objective on one track, and the local search by exact gradients.
 
-use super::settings::RacelineSettings;
-use super::setup::{FINE_M, Setup};
-use crate::error::Result;
-use crate::evaluate::line::LineObjective;
-use crate::line::{FineLine, PointMass, cross_sections_about, shares_across};
-use crate::optimum::{
+use super::{
     Bounds, DescentSettings, LineMap, Optimum, PointMassEnvelope, ReferenceProblem, Start, Status, Weights,
     fastest, least_gamma, least_squared_length, minimum_curvature_of, polish_lines, shortest,
 };
+use crate::error::Result;
+use crate::evaluate::line::LineObjective;
+use crate::line::{FINE_M, FineLine, PointMass, cross_sections_about, shares_across};
 use crate::track::CrossSections;
 use glam::DVec2;
 use std::sync::Arc;
@@ -86,21 +84,26 @@ type Solver = (
 );
 
 impl ReferenceSolvers {
-    /// The solvers of `setup`. Lap times are theirs only on a friction ellipse of exponent 2.
+    /// The solvers of lines through these cross-sections by `car`, which enters an open road at `entry_mps` (m/s) at the most. Lap
+    /// times are theirs only on a friction ellipse of exponent 2.
     ///
     /// # Errors
     /// [`crate::Error::Input`] for a car that cannot be; [`crate::Error::Study`] if the minimum-curvature line is refused.
-    pub fn new(setup: &Setup, settings: &RacelineSettings) -> Result<Self> {
-        Self::stopped_by(setup, settings, Arc::default())
+    pub fn new(cross_sections: &CrossSections, car: &PointMass, entry_mps: f64) -> Result<Self> {
+        Self::stopped_by(cross_sections, car, entry_mps, Arc::default())
     }
 
     /// As [`ReferenceSolvers::new`], ended by the flag: what they say once it is raised is no optimum.
     ///
     /// # Errors
     /// As [`ReferenceSolvers::new`].
-    pub fn stopped_by(setup: &Setup, settings: &RacelineSettings, stop: Arc<AtomicBool>) -> Result<Self> {
-        let cross_sections = setup.cross_sections.clone();
-        let map = LineMap::at_every_cross_section(&cross_sections);
+    pub fn stopped_by(
+        cross_sections: &CrossSections,
+        car: &PointMass,
+        entry_mps: f64,
+        stop: Arc<AtomicBool>,
+    ) -> Result<Self> {
+        let map = LineMap::at_every_cross_section(cross_sections);
         let bounds = Bounds::road(cross_sections.len());
         let spacing_m = cross_sections.spacing_m();
         let start = least_gamma(&map, &spacing_m, &bounds)?.x;
@@ -111,24 +114,24 @@ impl ReferenceSolvers {
         let base = minimum_curvature_of(&curvature, &bounds, &start)?.x;
         let controls = (cross_sections.len() / CROSS_SECTIONS_PER_CONTROL).max(4);
         Ok(Self {
-            smooth: LineMap::spline_about(&cross_sections, &base, controls),
+            smooth: LineMap::spline_about(cross_sections, &base, controls),
             every: (map, bounds),
             base,
-            envelope: if setup.car.ellipse_exponent == 2.0 {
-                Some(PointMassEnvelope::new(&setup.car)?)
+            envelope: if car.ellipse_exponent == 2.0 {
+                Some(PointMassEnvelope::new(car)?)
             } else {
                 None
             },
-            car: setup.car.clone(),
-            entry_mps: settings.entry_mps,
+            car: car.clone(),
+            entry_mps,
             spacing_m,
-            cross_sections,
+            cross_sections: cross_sections.clone(),
             stop,
         })
     }
 
     /// The flag that ends them.
-    pub(super) fn flag(&self) -> &AtomicBool {
+    pub(crate) fn flag(&self) -> &AtomicBool {
         &self.stop
     }
 
@@ -382,6 +385,6 @@ impl ReferenceSolvers {
 }
 
 /// Shares of the usable width, none beyond its ends.
-pub(super) fn within_road(shares: Vec<f64>) -> Vec<f64> {
+pub(crate) fn within_road(shares: Vec<f64>) -> Vec<f64> {
     shares.into_iter().map(|share| share.clamp(0.0, 1.0)).collect()
 }

@@ -1,23 +1,24 @@
-//! The coordinates that the gathering swarm sees parameters in.
+//! Parameters of wide range by their logarithms, for optimisers that learn the shape of a valley.
 //!
 //! Factors of the Magic Formula stand in for one another as products: `B C` is a slope, so that its valley is a
 //! hyperbola over `B` and `C` and a straight line over their logarithms, which an adapted normal distribution can follow.
 
+use super::{BackendInfo, Evaluation, Evaluator, Problem};
 use crate::error::Result;
-use crate::evaluate::{BackendInfo, Evaluation, Evaluator, Problem};
 
 /// Parameters whose bounds are both positive and this far apart, as a ratio, are seen by their logarithm.
 const WIDE: f64 = 1.5;
 
 /// An evaluator whose positive parameters of wide range are given as logarithms.
-pub(super) struct Logarithmic<'a> {
+pub struct Logarithmic<'a> {
     inner: &'a mut dyn Evaluator,
     problem: Problem,
     logarithmic: Vec<bool>,
 }
 
 impl<'a> Logarithmic<'a> {
-    pub(super) fn new(inner: &'a mut dyn Evaluator) -> Self {
+    /// The evaluator in these coordinates.
+    pub fn new(inner: &'a mut dyn Evaluator) -> Self {
         let mut problem = inner.problem().clone();
         let logarithmic: Vec<bool> = problem
             .variables
@@ -41,13 +42,13 @@ impl<'a> Logarithmic<'a> {
     }
 
     /// A candidate in these coordinates.
-    pub(super) fn of_parameters(&self, candidate: &[f64]) -> Vec<f64> {
+    pub fn of_parameters(&self, candidate: &[f64]) -> Vec<f64> {
         let columns = candidate.iter().zip(&self.logarithmic);
         columns.map(|(x, l)| if *l { x.ln() } else { *x }).collect()
     }
 
     /// Candidates in the parameters' units, within the parameters' own bounds.
-    pub(super) fn to_parameters(&self, candidates: &[f64]) -> Vec<f64> {
+    pub fn to_parameters(&self, candidates: &[f64]) -> Vec<f64> {
         let own = &self.inner.problem().variables;
         let columns = self.logarithmic.iter().zip(own).cycle();
         candidates

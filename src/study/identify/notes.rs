@@ -1,0 +1,48 @@
+//! What limits the results of an identification, in words.
+
+use super::results::Summary;
+use super::setup::Setup;
+use crate::evaluate::Failure;
+use crate::evaluate::replay::ReplayProblem;
+
+/// The notes of a run.
+pub(super) fn notes(setup: &Setup, summary: &Summary) -> Vec<String> {
+    let mut notes = Vec::new();
+    let (taken, needed) = (summary.substeps, summary.substeps_needed);
+    if needed > taken {
+        notes.push(format!(
+            "The steps were too long for the car that was found: it needs {needed} steps per sample, {taken} were taken. Its \
+             motions are not reliable; fit again with substeps = {needed}."
+        ));
+    }
+    let word = Failure::StepTooLong.word();
+    if let Some(lost) = summary.record.failures.get(word) {
+        let finer = steps_at_bounds(&setup.replay).max(taken + 1);
+        notes.push(format!(
+            "Of the candidates that were lost, {lost} need more steps per sample than {taken} and may be no worse than others. If \
+             stiff cars are to be found, fit with substeps = {finer}."
+        ));
+    }
+    if setup.without_run_up > 0 {
+        let (settle_s, places) = (setup.settle_s, setup.without_run_up);
+        notes.push(format!(
+            "Sideslip and roll are not logged, so that each window is driven for {settle_s:.1} s before it is scored. The log has no \
+             such time ahead of {places} of the laps or sections fitted: their first {settle_s:.1} s do not count."
+        ));
+    }
+    notes
+}
+
+/// Steps per sample that the starting car needs with any one of its unknowns at either bound.
+fn steps_at_bounds(replay: &ReplayProblem) -> usize {
+    let given = replay.free.values_in(replay.free.base());
+    let mut most = 1;
+    for (k, v) in replay.problem.variables.iter().enumerate() {
+        for bound in [v.lower, v.upper] {
+            let mut candidate = given.clone();
+            candidate[k] = bound;
+            most = most.max(replay.steps_needed(&replay.flat(&candidate)));
+        }
+    }
+    most
+}

@@ -1,0 +1,270 @@
+//! What a car can do at each speed, from its 4DOF model: the limits that make its g-g-v envelope.
+//!
+//! At every speed the steady states of the car ([`super::steady`]) give lateral acceleration over steering and its ridge,
+//! straight-line running the greatest braking and traction, and the powertrain what the engine can give through the gears. The
+//! rows make an [`Envelope`]; the small-angle end of the curves gives the handling figures.
+
+use super::{Car, Envelope, EnvelopeRow, Trim, Turn, steady_car};
+use crate::error::{Error, Result};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+/// Speeds that limits are looked for at, in even steps.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SpeedRange {
+    /// The slowest (m/s).
+    pub from_mps: f64,
+    /// The greatest (m/s), if the engine goes that far.
+    pub to_mps: f64,
+    /// The step between them (m/s).
+    pub step_mps: f64,
+}
+
+impl SpeedRange {
+    /// The usual range of a racing car.
+    pub const USUAL: Self = Self {
+        from_mps: 18.0,
+        to_mps: 77.0,
+        step_mps: 2.0,
+    };
+
+    /// How many speeds there are, whatever the engine does.
+    pub fn most(&self) -> usize {
+        ((self.to_mps - self.from_mps) / self.step_mps + 1e-9).floor() as usize + 1
+    }
+
+    /// The speeds that the limits of `car` are looked for at (m/s), the last of them where its engine ends.
+    ///
+    /// # Errors
+    /// [`Error::Input`] for a range that is none and for a car without a powertrain.
+    pub fn speeds_of(&self, car: &Car) -> Result<Vec<f64>> {
+        if !(self.step_mps > 0.0 && self.to_mps > self.from_mps) {
+            let found = format!("{} to {} m/s by {}", self.from_mps, self.to_mps, self.step_mps);
+            let expected = "a step above 0, and to_mps above from_mps";
+            return Err(Error::input(&car.name, "speeds", found, expected));
+        }
+        let force = engine_of(car)?;
+        let mut speeds: Vec<f64> = Vec::new();
+        let count = self.most();
+        for i in 0..count {
+            let speed = self.from_mps + self.step_mps * i as f64;
+            if force(speed) <= 0.0 {
+                break;
+            }
+            speeds.push(speed);
+        }
+        if let Some(&last) = speeds.last()
+            && speeds.len() < count
+        {
+            // The engine ends between two speeds: that is the car's greatest.
+            let (mut low, mut high) = (last, last + self.step_mps);
+            while high - low > 1e-6 {
+                let middle = 0.5 * (low + high);
+                if force(middle) > 0.0 {
+                    low = middle;
+                } else {
+                    high = middle;
+                }
+            }
+            if low - last > 1e-3 {
+                speeds.push(low);
+            }
+        }
+        Ok(speeds)
+    }
+}
+
+/// What the car does at one speed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct EnvelopeAtSpeed {
+    /// The row of the envelope.
+    pub row: EnvelopeRow,
+    /// Greatest lateral acceleration to the right (m/s^2). The row has the lesser of both sides.
+    pub right_mps2: f64,
+    /// Steady cornering to the left, in order along the curve of steady states.
+    pub cornering: Vec<Trim>,
+    /// Greatest acceleration by the driven tyres (m/s^2).
+    pub traction_mps2: f64,
+    /// Greatest acceleration by the engine in its best gear (m/s^2).
+    pub engine_mps2: f64,
+}
+
+/// How the car steers at small lateral acceleration (R. Gillespie, *Fundamentals of Vehicle Dynamics*, 1992, ch. 6).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Handling {
+    /// Steering at the wheels beyond what geometry asks for, over lateral acceleration (deg per g); positive
+    /// understeers.
+    pub understeer_gradient_deg_per_g: f64,
+    /// `K` in `steer = L kappa (1 + K v^2)` (s^2/m^2).
+    pub stability_factor_s2_per_m2: f64,
+    /// Speed at which an understeering car answers most to the steering wheel (m/s).
+    pub characteristic_speed_mps: Option<f64>,
+    /// Speed at which an oversteering car becomes unstable (m/s).
+    pub critical_speed_mps: Option<f64>,
+}
+
+/// A car's limits.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CarEnvelope {
+    /// Limits by rising speed.
+    pub speeds: Vec<EnvelopeAtSpeed>,
+    /// Handling in the middle of the range.
+    pub handling: Handling,
+    /// The envelope.
+    pub envelope: Envelope,
+    /// Speeds at which the car has no steady state in a bend (m/s). The envelope goes on between its neighbours there.
+    pub left_out_mps: Vec<f64>,
+}
+
+/// Steering up to which the tyres' own limit is looked for (rad): a car whose lock is reached first still has it.
+pub const STEER_TO_GRIP: f64 = 0.6;
+
+/// Sweeps the car over speed and steering.
+///
+/// # Errors
+/// [`Error::Input`] for a range that is none and for a car without a powertrain, [`Error::Study`] for one that has a steady
+/// state in bends at fewer than two of the speeds.
+pub fn car_envelope(car: &Car, range: &SpeedRange) -> Result<CarEnvelope> {
+    let speeds = range.speeds_of(car)?;
+    let force = engine_of(car)?;
+    let steady = steady_car(car);
+    // The two sides of a car with even loads are each other's mirror image.
+    let even = car.chassis.left_share_front == 0.5 && car.chassis.left_share_rear == 0.5;
+    let found: Vec<EnvelopeAtSpeed> = speeds
+        .into_par_iter()
+        .map(|speed| {
+            let cornering = steady.cornering(speed, STEER_TO_GRIP, Turn::Left);
+            let peak = |trims: &[Trim]| trims.iter().map(|t| t.ay_mps2.abs()).fold(0.0, f64::max);
+            let right_mps2 = match even {
+                true => peak(&cornering),
+                false => peak(&steady.cornering(speed, STEER_TO_GRIP, Turn::Right)),
+            };
+            let traction_mps2 = steady.greatest_traction(speed);
+            let engine_mps2 = force(speed) / car.chassis.mass;
+            EnvelopeAtSpeed {
+                row: EnvelopeRow {
+                    v_mps: speed,
+                    ay_mps2: peak(&cornering).min(right_mps2),
+                    ax_grip_mps2: steady.greatest_braking(speed),
+                    ax_drive_mps2: traction_mps2.min(engine_mps2),
+                    drag_mps2: steady.drag(speed),
+                },
+                right_mps2,
+                cornering,
+                traction_mps2,
+                engine_mps2,
+            }
+        })
+        .collect();
+    let corners = |l: &EnvelopeAtSpeed| l.row.ay_mps2 > 0.0 && l.row.ax_grip_mps2 > 0.0;
+    let (limits, left_out): (Vec<_>, Vec<_>) = found.into_iter().partition(corners);
+    let left_out_mps: Vec<f64> = left_out.iter().map(|l| l.row.v_mps).collect();
+    if limits.len() < 2 {
+        return Err(Error::Study(format!(
+            "{} has no steady state in bends at {} of {} speeds ({}): its tyres cannot hold it on the road there",
+            car.name,
+            left_out_mps.len(),
+            left_out_mps.len() + limits.len(),
+            in_words(&left_out_mps)
+        )));
+    }
+    let envelope = Envelope::new(&car.name, limits.iter().map(|l| l.row).collect())?;
+    let wheelbase = car.chassis.cg_to_front + car.chassis.cg_to_rear;
+    Ok(CarEnvelope {
+        handling: handling(&limits[limits.len() / 2], wheelbase),
+        speeds: limits,
+        envelope,
+        left_out_mps,
+    })
+}
+
+/// Speeds (m/s) in words.
+pub(crate) fn in_words(speeds_mps: &[f64]) -> String {
+    let words: Vec<String> = speeds_mps.iter().map(|v| format!("{v:.1}")).collect();
+    format!("{} m/s", words.join(", "))
+}
+
+/// The engine's force at the wheels (N) by speed (m/s), in the best gear.
+fn engine_of(car: &Car) -> Result<impl Fn(f64) -> f64 + Sync> {
+    let Some(powertrain) = &car.powertrain else {
+        return Err(Error::input(
+            &car.name,
+            "[powertrain]",
+            "none",
+            "an engine and gears, for what the car can accelerate by",
+        ));
+    };
+    Ok(move |speed: f64| powertrain.wheel_force(speed, car.chassis.radius_rear))
+}
+
+/// The slope of steering over lateral acceleration, between the two steady states nearest to 0 and 2 m/s^2: small
+/// against any tyre's limit, large against rounding.
+fn handling(limits: &EnvelopeAtSpeed, wheelbase: f64) -> Handling {
+    /// Standard gravity (m/s^2).
+    const G: f64 = 9.806_65;
+    let first = limits.cornering.first();
+    let second = limits
+        .cornering
+        .iter()
+        .find(|t| t.ay_mps2 >= 2.0)
+        .or(limits.cornering.last());
+    let v = limits.row.v_mps;
+    let slope = match (first, second) {
+        (Some(a), Some(b)) if b.ay_mps2 > a.ay_mps2 => (b.steer_rad - a.steer_rad) / (b.ay_mps2 - a.ay_mps2),
+        _ => f64::NAN,
+    };
+    let understeer_gradient = slope - wheelbase / v.powi(2);
+    let stability_factor = understeer_gradient / wheelbase;
+    Handling {
+        understeer_gradient_deg_per_g: understeer_gradient.to_degrees() * G,
+        stability_factor_s2_per_m2: stability_factor,
+        characteristic_speed_mps: (stability_factor > 0.0).then(|| stability_factor.recip().sqrt()),
+        critical_speed_mps: (stability_factor < 0.0).then(|| (-stability_factor).recip().sqrt()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_bundled_car_corners_as_it_was_made_to() {
+        let car = Car::bundled().unwrap();
+        let limits = car_envelope(&car, &SpeedRange::USUAL).unwrap();
+        let envelope = &limits.envelope;
+        // What the bundled car was made for: up to 15 m/s^2 at 25 m/s and 18 at 65, within a tenth.
+        assert!((envelope.at(25.0).ay_mps2 / 15.0 - 1.0).abs() < 0.1);
+        assert!((envelope.at(65.0).ay_mps2 / 18.0 - 1.0).abs() < 0.1);
+        // Sixth gear ends at 8500 rpm: 70 m/s.
+        let top = 8500.0 * std::f64::consts::TAU / 60.0 / (1.2915 * 3.2) * 0.325;
+        assert!((envelope.top_speed_mps() - top).abs() < 1e-3);
+        // The engine limits where the tyres could do more, and the other way round.
+        let fast = limits.speeds.last().unwrap();
+        assert_eq!(fast.row.ax_drive_mps2, fast.engine_mps2);
+        assert!(
+            limits
+                .speeds
+                .iter()
+                .all(|s| s.row.ax_drive_mps2 <= s.traction_mps2)
+        );
+        assert!(limits.handling.stability_factor_s2_per_m2.abs() < 0.01);
+    }
+
+    #[test]
+    fn a_car_without_an_engine_and_absurd_ranges_are_refused() {
+        let mut car = Car::bundled().unwrap();
+        let backwards = SpeedRange {
+            to_mps: 10.0,
+            ..SpeedRange::USUAL
+        };
+        assert!(
+            car_envelope(&car, &backwards)
+                .unwrap_err()
+                .to_string()
+                .contains("to_mps above")
+        );
+        car.powertrain = None;
+        let error = car_envelope(&car, &SpeedRange::USUAL).unwrap_err();
+        assert!(error.to_string().contains("[powertrain]"));
+    }
+}
