@@ -85,6 +85,8 @@ struct MagicFormula {
     s2: Wheels,
     s_camber1: Wheels,
     s_camber2: Wheels,
+    as_measured: Wheels,
+    by_side: Wheels,
 }
 
 alias Tyre = MagicFormula;
@@ -142,6 +144,10 @@ fn pure_longitudinal(t: MagicFormula, load: Load, slip_ratio: Wheels) -> PureSli
     );
 }
 
+fn mirror(t: MagicFormula, side: Wheels) -> Wheels {
+    return t.as_measured + t.by_side * side;
+}
+
 struct PureLateral {
     pure_slip: PureSlip,
     slope: Wheels,
@@ -150,14 +156,15 @@ struct PureLateral {
 
 fn pure_lateral(t: MagicFormula, load: Load, slip_tangent: Wheels, side: Wheels) -> PureLateral {
     let dfz = load.difference;
+    let mirrored = mirror(t, side);
     let peak = (t.dy1 + t.dy2 * dfz) * load.force;
     let z = load.force * t.ky_load;
     let stiffness = t.ky * (z / (1.0 + z * z));
     let slope = stiffness / peak;
-    let horizontal_shift = t.hy1 + t.hy2 * dfz + t.hy_camber * side;
-    let vertical_shift = load.force * ((t.vy1 + t.vy2 * dfz) + (t.vy_camber1 + t.vy_camber2 * dfz) * side);
+    let horizontal_shift = (t.hy1 + t.hy2 * dfz) * mirrored + t.hy_camber * side;
+    let vertical_shift = load.force * ((t.vy1 + t.vy2 * dfz) * mirrored + (t.vy_camber1 + t.vy_camber2 * dfz) * side);
     let x = slip_tangent + horizontal_shift;
-    let e = clamp_curvature((t.ey1 + t.ey2 * dfz) * (1.0 - (t.ey3 + t.ey_camber * side) * sign_of(x)));
+    let e = clamp_curvature((t.ey1 + t.ey2 * dfz) * (1.0 - (t.ey3 * mirrored + t.ey_camber * side) * sign_of(x)));
     return PureLateral(
         PureSlip(Curve(t.cy, slope * t.inverse_cy, e, x), peak, vertical_shift, stiffness),
         slope,
@@ -172,14 +179,27 @@ fn weight(curve: Curve, shift: Wheels) -> Wheels {
     return cosines.first / cosines.second;
 }
 
-fn longitudinal_weight(t: MagicFormula, load: Load, slip_ratio: Wheels, slip_tangent: Wheels) -> Wheels {
+fn longitudinal_weight(
+    t: MagicFormula,
+    load: Load,
+    slip_ratio: Wheels,
+    slip_tangent: Wheels,
+    mirrored: Wheels,
+) -> Wheels {
     let b = t.rbx1 / sec_atan(t.rbx2 * slip_ratio);
     let e = clamp_curvature(t.rex1 + t.rex2 * load.difference);
-    return weight(Curve(t.rcx1, b, e, slip_tangent + t.rhx1), t.rhx1);
+    let shift = t.rhx1 * mirrored;
+    return weight(Curve(t.rcx1, b, e, slip_tangent + shift), shift);
 }
 
-fn lateral_weight(t: MagicFormula, load: Load, slip_ratio: Wheels, slip_tangent: Wheels) -> Wheels {
-    let b = t.rby1 / sec_atan(t.rby2 * (slip_tangent - t.rby3));
+fn lateral_weight(
+    t: MagicFormula,
+    load: Load,
+    slip_ratio: Wheels,
+    slip_tangent: Wheels,
+    mirrored: Wheels,
+) -> Wheels {
+    let b = t.rby1 / sec_atan(t.rby2 * (slip_tangent - t.rby3 * mirrored));
     let e = clamp_curvature(t.rey1 + t.rey2 * load.difference);
     let shift = t.rhy1 + t.rhy2 * load.difference;
     return weight(Curve(t.rcy1, b, e, slip_ratio + shift), shift);
@@ -198,6 +218,7 @@ fn tyre_forces(t: MagicFormula, input: TyreInput) -> TyreForces {
     let side = input.side;
     let slip_ratio = input.slip_ratio;
     let slip_tangent = input.slip_tangent;
+    let mirrored = mirror(t, side);
     let pure_x = pure_longitudinal(t, load, slip_ratio);
     let lateral = pure_lateral(t, load, slip_tangent, side);
     let pure_y = lateral.pure_slip;
@@ -205,14 +226,14 @@ fn tyre_forces(t: MagicFormula, input: TyreInput) -> TyreForces {
     let pure = curve_angles(pure_x.curve, pure_y.curve);
     let sines = own_sin_pi_each(pure.first, pure.second);
     let x = (pure_x.peak * sines.first + pure_x.vertical_shift)
-        * longitudinal_weight(t, load, slip_ratio, slip_tangent);
-    let trail_x = slip_tangent + (t.ht1 + t.ht2 * dfz + (t.ht_camber1 + t.ht_camber2 * dfz) * side);
-    let trail_b = (t.bt1 + dfz * (t.bt2 + t.bt3 * dfz)) * (t.bt_even + t.bt_odd * side);
+        * longitudinal_weight(t, load, slip_ratio, slip_tangent, mirrored);
+    let trail_x = slip_tangent + ((t.ht1 + t.ht2 * dfz) * mirrored + (t.ht_camber1 + t.ht_camber2 * dfz) * side);
+    let trail_b = (t.bt1 + dfz * (t.bt2 + t.bt3 * dfz)) * (t.bt_even + t.bt_odd * (side * mirrored));
     let angles = own_atan_each(t.rvy6 * slip_ratio, trail_b * t.bct * trail_x);
-    let amplitude = pure_y.peak * (t.rvy1 + t.rvy2 * dfz + t.rvy_camber * side);
+    let amplitude = pure_y.peak * ((t.rvy1 + t.rvy2 * dfz) * mirrored + t.rvy_camber * side);
     let induced = amplitude / sec_atan(t.rvy4 * slip_tangent) * own_sin_pi(t.rvy5 * angles.first);
     let y = (pure_y.peak * sines.second + pure_y.vertical_shift)
-        * lateral_weight(t, load, slip_ratio, slip_tangent)
+        * lateral_weight(t, load, slip_ratio, slip_tangent, mirrored)
         + induced;
 
     let slip_share = pure_x.stiffness / pure_y.stiffness * slip_ratio;
@@ -223,17 +244,17 @@ fn tyre_forces(t: MagicFormula, input: TyreInput) -> TyreForces {
         equivalent_tangent(residual_x, tangents.second, slip_share),
     );
     let trail_e = clamp_curvature(
-        (t.et1 + dfz * (t.et2 + t.et3 * dfz)) * (1.0 + (t.et4 + t.et_camber * side) * angles.second),
+        (t.et1 + dfz * (t.et2 + t.et3 * dfz)) * (1.0 + (t.et4 * mirrored + t.et_camber * side) * angles.second),
     );
     let cos_m = own_cos_pi(curve_angle(Curve(t.ct, trail_b, trail_e, slips.first)));
-    let d = load.force * (t.dt1 + t.dt2 * dfz) * (t.dt_even + t.dt_odd * side);
+    let d = load.force * (t.dt1 + t.dt2 * dfz) * (t.dt_even + t.dt_odd * (side * mirrored));
     let trail = d * cos_m / sec_atan(slip_tangent);
     let residual_slope = t.br1 + t.br2 * lateral.slope;
     let residual_peak = load.force
-        * (t.dr1 + t.dr2 * dfz + (t.dr_camber1 + t.dr_camber2 * dfz) * side)
+        * ((t.dr1 + t.dr2 * dfz) * mirrored + (t.dr_camber1 + t.dr_camber2 * dfz) * side)
         * own_cos(slip_tangent);
     let residual = residual_peak / sec_atan(residual_slope * slips.second);
-    let arm = t.s1 + t.s2 * y + (t.s_camber1 + t.s_camber2 * dfz) * side;
+    let arm = t.s1 * mirrored + t.s2 * y + (t.s_camber1 + t.s_camber2 * dfz) * side;
     let moment = residual - trail * (y - induced) + arm * x;
 
     let zero = Wheels(0.0);

@@ -12,11 +12,15 @@ pub use choice::Choice;
 pub(crate) use choice::named;
 #[cfg(feature = "vehicle")]
 pub use document::{Document, Table};
+#[cfg(feature = "vehicle")]
+pub(crate) use document::{line_of, refused};
 
 use crate::error::{Error, Place, Result};
+use std::cell::RefCell;
+use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::Read;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// The largest file of settings, a car, a tyre or a map (bytes): far above any that a person or a logger makes.
@@ -56,6 +60,27 @@ pub fn check_memory(path: &Path, size: &str, needed: u64, limit: u64) -> Result<
     })
 }
 
+/// Files that were read, each with a sum (CRC-32) over what was in it.
+pub type FilesRead = BTreeMap<PathBuf, u32>;
+
+thread_local! {
+    static READ: RefCell<Option<FilesRead>> = const { RefCell::new(None) };
+}
+
+/// Does `work`, and tells which files it read on this thread.
+pub fn noting_files<T>(work: impl FnOnce() -> T) -> (T, FilesRead) {
+    let outer = READ.replace(Some(FilesRead::new()));
+    let done = work();
+    let read = READ.replace(outer).unwrap_or_default();
+    (done, read)
+}
+
+/// The folder that a file lies in, which has a name even where the file was named without one.
+pub fn folder_of(path: &Path) -> &Path {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+    folder.unwrap_or(Path::new("."))
+}
+
 /// Reads a file of at most `most` bytes, so that none takes all memory, not even one without an end.
 ///
 /// # Errors
@@ -64,7 +89,11 @@ pub fn read_bytes(path: &Path, most: u64) -> Result<Vec<u8>> {
     let failed = |e| Error::io(path, "read", e);
     let too_large = |found: String| Error::input(path, "file size", found, format!("at most {most} bytes"));
     let file = File::open(path).map_err(failed)?;
-    let told = file.metadata().map_err(failed)?.len();
+    let metadata = file.metadata().map_err(failed)?;
+    if metadata.is_dir() {
+        return Err(Error::input(path, "contents", "a folder", "a file"));
+    }
+    let told = metadata.len();
     if told > most {
         return Err(too_large(format!("{told} bytes")));
     }
@@ -80,6 +109,11 @@ pub fn read_bytes(path: &Path, most: u64) -> Result<Vec<u8>> {
     if bytes.len() as u64 > most {
         return Err(too_large("more".to_owned()));
     }
+    READ.with_borrow_mut(|read| {
+        if let (Some(read), Ok(path)) = (read, std::path::absolute(path)) {
+            read.insert(path, crc32fast::hash(&bytes));
+        }
+    });
     Ok(bytes)
 }
 

@@ -7,6 +7,7 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use crate::config::folder_of;
 use crate::hold::{self, Point};
 use crate::{Error, Result};
 
@@ -37,9 +38,8 @@ pub fn write_new(path: impl AsRef<Path>, contents: &[u8]) -> Result<()> {
 
 /// Makes sure that the names in a folder are on the disk.
 pub fn sync_folder(folder: &Path) {
-    let folder = Some(folder).filter(|f| !f.as_os_str().is_empty());
     // Not every system lets a folder be opened; there a move is as safe as it gets.
-    if let Ok(folder) = File::open(folder.unwrap_or(Path::new("."))) {
+    if let Ok(folder) = File::open(folder) {
         let _ = folder.sync_all();
     }
 }
@@ -88,7 +88,7 @@ fn place(path: &Path, contents: &[u8], put: impl FnOnce(&Path) -> io::Result<()>
         hold::pass(Point::Written);
         put(&temporary)?;
         hold::pass(Point::Placed);
-        sync_folder(path.parent().unwrap_or(Path::new("")));
+        sync_folder(folder_of(path));
         Ok(())
     };
     write().map_err(|source| {

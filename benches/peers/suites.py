@@ -127,6 +127,14 @@ SEED = 2014
 SIZE = 30
 
 
+def shifted(name, bound):
+    """Problems whose optimum is only shifted."""
+    centre = np.array([0.8 * bound * (2.0 * uniform(2005, 0, 0, 0, k) - 1.0) for k in range(SIZE)])
+    function, _, optimum = CORES[name]
+    bounds = [-bound] * SIZE, [bound] * SIZE
+    return by_row("shifted", name, *bounds, 1, lambda row: [function(row - centre + optimum)], "opfunu")
+
+
 def shift(number, part):
     return np.array([80.0 * (2.0 * uniform(SEED, 0, number, part, k) - 1.0) for k in range(SIZE)])
 
@@ -223,4 +231,6 @@ def problems():
     ]
     found += [of_pymoo("constrained", name, problem) for name, problem in constrained]
     found += [of_tanabe(k) for k in (21, 22, 23, 24, 25, 31, 32, 33, 34, 35, 36, 37)]
-    return found + [rotated(i, name) for i, name in enumerate([*CORES, "hybrid", "composition"])]
+    found += [rotated(i, name) for i, name in enumerate([*CORES, "hybrid", "composition"])]
+    bounds = [("sphere", 100.0), ("rosenbrock", 30.0), ("rastrigin", 5.12), ("ackley", 32.0), ("griewank", 600.0)]
+    return found + [shifted(name, bound) for name, bound in bounds]

@@ -23,7 +23,7 @@ pub struct Arguments {
     /// Sample rate, Hz
     #[arg(long, value_name = "HZ", default_value_t = 50)]
     rate: u16,
-    /// Print one JSON object as the last thing on stdout
+    /// Print one JSON object on stdout; words go to stderr
     #[arg(long)]
     json: bool,
     /// Say nothing

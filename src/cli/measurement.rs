@@ -17,7 +17,7 @@ pub struct FolderFlag {
     /// Keep the figures in this folder, with pictures and report.html; refused if it holds anything
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Print one JSON object as the last thing on stdout
+    /// Print one JSON object on stdout; words go to stderr
     #[arg(long)]
     pub json: bool,
 }

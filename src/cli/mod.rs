@@ -14,7 +14,8 @@ mod simulate;
 mod study;
 mod sweep;
 
-use clap::{Args, Command, FromArgMatches, Subcommand};
+use clap::error::{ContextKind, ContextValue};
+use clap::{ArgMatches, Args, Command, FromArgMatches, Subcommand};
 use lapswarm::config::kinds::Choice;
 use lapswarm::error::Field;
 use lapswarm::evaluate::BackendChoice;
@@ -22,7 +23,8 @@ use lapswarm::hold::{self, Point};
 use lapswarm::study::framework::memory::USUAL_MIB;
 use lapswarm::study::registry::{self, STUDIES};
 use lapswarm::{Error, Result};
-use output::{errln, out, outln};
+use output::{errln, out};
+use std::num::{ParseFloatError, ParseIntError};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -138,12 +140,18 @@ fn stopped(stop: &AtomicBool) -> ControlFlow<()> {
 
 /// Runs the program.
 pub fn run() -> ExitCode {
-    // Clap ends with code 2 on bad flags and 0 on --help, as documented.
-    let matches = command().get_matches();
+    let matches = match command().try_get_matches() {
+        Ok(matches) => matches,
+        Err(error) => refuse_flags(in_words(error)),
+    };
     tracing_subscriber::fmt()
         .with_writer(std::io::stderr)
         .with_max_level(tracing::Level::WARN)
         .init();
+    let json = asks_for_json(&matches);
+    if json {
+        output::set_words_aside();
+    }
     let asked = matches
         .subcommand()
         .and_then(|(name, matches)| Some((registry::named(name)?, matches)));
@@ -159,8 +167,7 @@ pub fn run() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             let code = error.exit_code();
-            let asked = matches.subcommand().map(|(_, flags)| flags);
-            if asked.is_some_and(|flags| matches!(flags.try_get_one::<bool>("json"), Ok(Some(true)))) {
+            if json {
                 print_error_json(&error);
             }
             errln!("error: {error}");
@@ -174,6 +181,49 @@ pub fn run() -> ExitCode {
             ExitCode::from(code)
         }
     }
+}
+
+/// Whether JSON is asked for, of a command or of one within it.
+fn asks_for_json(matches: &ArgMatches) -> bool {
+    let here = matches!(matches.try_get_one::<bool>("json"), Ok(Some(true)));
+    here || matches
+        .subcommand()
+        .is_some_and(|(_, within)| asks_for_json(within))
+}
+
+/// An error of flags without the words of number parsers.
+fn in_words(error: clap::Error) -> clap::Error {
+    let expected = match std::error::Error::source(&error) {
+        Some(cause) if cause.is::<ParseIntError>() => "expected a whole number of 0 or more",
+        Some(cause) if cause.is::<ParseFloatError>() => "expected a number",
+        _ => return error,
+    };
+    let said = |kind| match error.get(kind) {
+        Some(ContextValue::String(text)) => text.clone(),
+        _ => String::new(),
+    };
+    let (flag, value) = (said(ContextKind::InvalidArg), said(ContextKind::InvalidValue));
+    let told = format!("invalid value '{value}' for '{flag}': {expected}\n");
+    clap::Error::raw(error.kind(), told).with_cmd(&command())
+}
+
+/// Ends the program as clap does: with code 2 on bad flags, which are an object where JSON is asked for, and with 0 on --help.
+fn refuse_flags(error: clap::Error) -> ! {
+    if error.use_stderr() && std::env::args_os().any(|argument| argument == "--json") {
+        let told = error.to_string();
+        let told = told
+            .lines()
+            .next()
+            .unwrap_or_default()
+            .trim_start_matches("error: ");
+        print_error_json(&Error::input(
+            "the command line",
+            "flags",
+            told,
+            "those of --help",
+        ));
+    }
+    error.exit()
 }
 
 fn run_tool(tool: &Tool) -> Result<()> {
@@ -251,7 +301,7 @@ fn print_json(value: &impl serde::Serialize) -> Result<()> {
 
 /// As [`print_json`], of what is JSON already.
 fn print_json_text(text: &str) {
-    outln!("{text}");
+    output::to_stdout(format_args!("{text}\n"));
     JSON_TOLD.store(true, Ordering::Relaxed);
 }
 

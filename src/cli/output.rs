@@ -2,6 +2,7 @@
 
 use std::fmt::Arguments;
 use std::io::{self, Write};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 /// The first failure of standard output.
@@ -13,6 +14,23 @@ fn note(outcome: io::Result<()>) {
             .lock()
             .unwrap_or_else(PoisonError::into_inner)
             .get_or_insert(error);
+    }
+}
+
+/// Whether words go to standard error.
+static ASIDE: AtomicBool = AtomicBool::new(false);
+
+/// From now on words and tables go to standard error: standard output is for the JSON object alone.
+pub fn set_words_aside() {
+    ASIDE.store(true, Ordering::Relaxed);
+}
+
+/// Writes words or a table.
+pub fn words(text: Arguments<'_>) {
+    if ASIDE.load(Ordering::Relaxed) {
+        to_stderr(text);
+    } else {
+        to_stdout(text);
     }
 }
 
@@ -58,17 +76,17 @@ pub fn line_of<R>(columns: &Columns<R>, row: Option<&R>) -> String {
     columns.iter().map(cell).collect()
 }
 
-/// As `print!`, which panics where nobody reads.
+/// As `print!`, which panics where nobody reads; see [`words`].
 macro_rules! out {
     ($($text:tt)*) => {
-        $crate::cli::output::to_stdout(format_args!($($text)*))
+        $crate::cli::output::words(format_args!($($text)*))
     };
 }
 
-/// As `println!`, which panics where nobody reads.
+/// As `println!`, which panics where nobody reads; see [`words`].
 macro_rules! outln {
     ($($text:tt)*) => {
-        $crate::cli::output::to_stdout(format_args!("{}\n", format_args!($($text)*)))
+        $crate::cli::output::words(format_args!("{}\n", format_args!($($text)*)))
     };
 }
 

@@ -15,7 +15,7 @@ pub struct Arguments {
     /// The page to write; refused if it is there already
     #[arg(long, value_name = "FILE", default_value = "comparison.html")]
     out: PathBuf,
-    /// Print one JSON object as the last thing on stdout
+    /// Print one JSON object on stdout; words go to stderr
     #[arg(long)]
     json: bool,
     /// Say nothing

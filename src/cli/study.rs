@@ -1,6 +1,6 @@
 //! The subcommands of the studies, made from the registry.
 
-use super::output::{errln, out, to_stderr};
+use super::output::{errln, out};
 use super::{Common, Memory, print_json_text, progress::Bar, stop_flag, stopped, to_json};
 use clap::{Arg, ArgAction, ArgMatches, Args, Command, FromArgMatches, value_parser};
 use lapswarm::config::settings::{Declared, Flag};
@@ -19,6 +19,9 @@ struct Resume {
     /// Time between saves of the run's state, s
     #[arg(long, value_name = "SECONDS", default_value_t = 5.0, value_parser = pause)]
     save_every_s: f64,
+    /// Time after which the run ends in order with what it has, s; --resume continues it
+    #[arg(long, value_name = "SECONDS", value_parser = pause)]
+    time_limit_s: Option<f64>,
 }
 
 fn pause(text: &str) -> Result<f64, String> {
@@ -115,6 +118,9 @@ pub fn run(study: &'static dyn Registered, matches: &ArgMatches) -> Result<()> {
         resume: resume.resume,
         // The flag's parser has seen to what it can be.
         save_every: Duration::try_from_secs_f64(resume.save_every_s).unwrap_or_default(),
+        time_limit: resume
+            .time_limit_s
+            .and_then(|s| Duration::try_from_secs_f64(s).ok()),
         memory_limit_mib: memory.memory_limit_mib,
         dry_run: common.dry_run,
         stop: stop.clone(),
@@ -142,15 +148,11 @@ pub fn print_plan(common: &Common, plan: &Plan) -> Result<()> {
     Ok(())
 }
 
-/// Prints what was found, as words and as JSON. Words stand on stdout, or on stderr where JSON is to stand on stdout by itself.
+/// Prints what was found, as words and as JSON.
 pub fn print_results(common: &Common, text: &str, folder: Option<&Path>, json: &str) {
     if !common.quiet {
         let at = folder.map_or(String::new(), |folder| format!("Results: {}\n", folder.display()));
-        if common.json {
-            to_stderr(format_args!("{text}{at}"));
-        } else {
-            out!("{text}{at}");
-        }
+        out!("{text}{at}");
     }
     if common.json {
         print_json_text(json);

@@ -15,12 +15,57 @@ pub struct Document<'a> {
     root: Spanned<DeTable<'a>>,
 }
 
-fn line_of(text: &str, offset: usize) -> usize {
+/// The line (from 1) where a byte of a text lies.
+pub(crate) fn line_of(text: &str, offset: usize) -> usize {
     text.as_bytes()[..offset.min(text.len())]
         .iter()
         .filter(|&&b| b == b'\n')
         .count()
         + 1
+}
+
+/// What a reader of TOML refuses, in words that know nothing of the program; `what` is what the text should be.
+pub(crate) fn refused(file: impl AsRef<Path>, text: &str, error: &toml::de::Error, what: &str) -> Error {
+    let line = error.span().map_or(1, |span| line_of(text, span.start));
+    let message = error.message().trim().replace('\n', ", ");
+    let (found, expected) = message.split_once(", expected ").unwrap_or((&message, what));
+    let found = match found.split_once(": ") {
+        // As in "invalid type: floating point `1.5`".
+        Some(("invalid type" | "invalid value" | "invalid length", value)) => told_value(value),
+        _ => found.to_owned(),
+    };
+    Error::input(file, Place::line(line), found, told_type(expected))
+}
+
+/// A value that stands in the wrong place.
+fn told_value(value: &str) -> String {
+    const KINDS: [&str; 4] = ["integer ", "floating point ", "boolean ", "string "];
+    match value {
+        "map" => "a table".to_owned(),
+        "sequence" => "a list".to_owned(),
+        _ => {
+            let bare = KINDS
+                .iter()
+                .find_map(|kind| value.strip_prefix(kind))
+                .unwrap_or(value);
+            bare.trim_matches('`').to_owned()
+        }
+    }
+}
+
+/// What a type is called in TOML.
+fn told_type(expected: &str) -> &str {
+    match expected {
+        "f64" | "f32" => "a number",
+        "u8" | "u16" | "u32" | "u64" | "usize" => "a whole number of 0 or more",
+        "i8" | "i16" | "i32" | "i64" | "isize" => "a whole number",
+        "a map" | "map" => "a table",
+        "a sequence" => "a list",
+        "a boolean" => "true or false",
+        _ if expected.starts_with("struct ") => "a table",
+        _ if expected.starts_with("a sequence") => "a list",
+        _ => expected,
+    }
 }
 
 impl<'a> Document<'a> {
@@ -29,10 +74,7 @@ impl<'a> Document<'a> {
     /// # Errors
     /// [`Error::Input`] naming the line if it is no TOML.
     pub fn parse(file: &Path, text: &'a str) -> Result<Self> {
-        let root = DeTable::parse(text).map_err(|e| {
-            let line = e.span().map_or(1, |s| line_of(text, s.start));
-            Error::input(file, Place::line(line), e.message().to_owned(), "valid TOML")
-        })?;
+        let root = DeTable::parse(text).map_err(|e| refused(file, text, &e, "valid TOML"))?;
         Ok(Self {
             file: file.to_owned(),
             text,
@@ -81,7 +123,12 @@ impl<'a> Table<'a> {
             DeValue::Integer(i) => i.as_str().to_owned(),
             DeValue::Float(f) => f.as_str().to_owned(),
             DeValue::Boolean(b) => b.to_string(),
-            other => format!("a {}", other.type_str()),
+            DeValue::Array(items) => {
+                let items: Vec<String> = items.iter().map(|item| Self::describe(item.get_ref())).collect();
+                format!("[{}]", items.join(", "))
+            }
+            DeValue::Table(_) => "a table".to_owned(),
+            DeValue::Datetime(_) => "a date".to_owned(),
         }
     }
 
@@ -343,5 +390,84 @@ impl<'a> Table<'a> {
             }
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::telemetry::ChannelMap;
+    use crate::track::Circuit;
+
+    /// What is wrong in a file is told in TOML's words and the file's, by every reader.
+    #[test]
+    fn refusals_know_nothing_of_the_program() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let track = |text: &str| {
+            let path = folder.path().join("t.toml");
+            std::fs::write(&path, text).expect("room");
+            Circuit::load(&path).map(drop)
+        };
+        let map = |text: &str| ChannelMap::parse(text, "m.toml").map(drop);
+        let own = |text: &str| {
+            let document = Document::parse(Path::new("s.toml"), text)?;
+            let root = document.root();
+            root.number("x", 0.0, 1.0, "m").map(drop)
+        };
+        type Reader<'a> = &'a dyn Fn(&str) -> Result<()>;
+        let (track, map, own): (Reader<'_>, Reader<'_>, Reader<'_>) = (&track, &map, &own);
+        for (read, text, words) in [
+            (
+                map,
+                "[channels]\nay = \"G Force Lat\"\n",
+                ["line 2", "expected a table"],
+            ),
+            (
+                map,
+                "[channels.ay]\nsign = \"minus\"\n",
+                ["line 2", "expected a number"],
+            ),
+            (map, "vehicle = [1]\n", ["line 1", "a table"]),
+            (map, "[channels.ay]\nname = 5\n", ["found 5", "expected a string"]),
+            (map, "[channels.ay\n", ["line 1", "expected"]),
+            (track, "survey = 5\n", ["found 5", "expected a string"]),
+            (
+                track,
+                "survey = \"a.csv\"\nlap = -1\n",
+                ["found -1", "a whole number of 0 or more"],
+            ),
+            (
+                track,
+                "survey = \"a.csv\"\nsections = \"Abbey\"\n",
+                ["Abbey", "expected a list"],
+            ),
+            (
+                track,
+                "survey = \"a.csv\"\nsections = [7]\n",
+                ["found 7", "expected a table"],
+            ),
+            (own, "x = [1, 2]\n", ["found [1, 2]", "a number"]),
+            (own, "x = 1979-05-27\n", ["found a date", "a number"]),
+            (own, "x = 1\nx = 2\n", ["line 2", "duplicate"]),
+            (own, "x = wide\n", ["line 1", "expected"]),
+            (own, "x = \n", ["line 1", "expected"]),
+        ] {
+            let said = read(text).expect_err(text).to_string();
+            let said = said.replace(&folder.path().display().to_string(), "");
+            for leak in [
+                "struct",
+                "Entry",
+                "f64",
+                "u32",
+                "sequence",
+                "a array",
+                "map",
+                "integer `",
+            ] {
+                let named = said.replace("m.toml", "").contains(leak);
+                assert!(!named, "{text}: {said}");
+            }
+            assert!(words.iter().all(|word| said.contains(word)), "{text}: {said}");
+        }
     }
 }

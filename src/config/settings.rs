@@ -5,7 +5,7 @@
 //! reference page of the book.
 
 use super::kinds::Kind;
-use super::{Document, Table, read_text};
+use super::{Document, Table, folder_of, read_text};
 use crate::error::{Error, Result};
 use std::path::Path;
 use std::sync::Arc;
@@ -350,16 +350,16 @@ pub trait Settings: Clone + Default + PartialEq + Send + Sync + 'static {
     /// # Errors
     /// [`Error::Io`] if it cannot be read, [`Error::Input`] naming line and field if it says something wrong.
     fn read(path: &Path) -> Result<Self> {
-        Self::parse(path, &read_text(path)?)
+        Self::parse(path, &read_text(path)?, folder_of(path))
     }
 
-    /// As [`Settings::read`], of a file's text; `path` is its name in messages, and paths are relative to it.
+    /// As [`Settings::read`], of a file's text; `path` is its name in messages, and paths are relative to `folder`.
     ///
     /// # Errors
     /// As [`Settings::read`].
-    fn parse(path: &Path, text: &str) -> Result<Self> {
+    fn parse(path: &Path, text: &str, folder: &Path) -> Result<Self> {
         let document = Document::parse(path, text)?;
-        let settings = Self::read_table(document.root(), path.parent().unwrap_or(Path::new("")))?;
+        let settings = Self::read_table(document.root(), folder)?;
         settings.validate().map_err(|error| error.of_file(path))?;
         Ok(settings)
     }

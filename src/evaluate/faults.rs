@@ -9,7 +9,7 @@ pub struct DeviceFaults {
     /// How many were met when it was opened; zero once they are told.
     opening: usize,
     seen: usize,
-    /// What the study has been told of before.
+    /// What has been told of before.
     known: Vec<String>,
 }
 
@@ -24,7 +24,7 @@ impl DeviceFaults {
         }
     }
 
-    /// The same for a study that has been told of these before.
+    /// The same where these have been told of before.
     pub fn beyond(known: &[String], evaluator: &dyn Evaluator) -> Self {
         let known = known.to_vec();
         Self {
@@ -66,7 +66,7 @@ impl Losses {
         self.device_faults.extend(met);
     }
 
-    /// Adds those of another part of the study.
+    /// Adds those of another part of the work.
     pub fn add(&mut self, other: &Self) {
         add_failures(&mut self.failures, &other.failures);
         self.device_faults.extend_from_slice(&other.device_faults);

@@ -64,7 +64,7 @@ const ABOUT: About = About {
     cross_sections_per_control: 4,
 };
 /// A thousandth of a lap better, at several times the cost: cross-sections ever closer together (m), with a control for as many
-/// of them as the study's own cross-sections can say, [`CROSS_SECTIONS_TO_SAY_CONTROL`] each; where controls come closer by a
+/// of them as the track's own cross-sections can say, [`CROSS_SECTIONS_TO_SAY_CONTROL`] each; where controls come closer by a
 /// quarter at least.
 const CLOSELY_M: [f64; 2] = [2.0, 1.0];
 const CLOSER: f64 = 0.75;

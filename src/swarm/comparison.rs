@@ -1,11 +1,11 @@
-//! Every algorithm on every test problem at the same budget.
+//! Every algorithm on every problem of the suites at the same budget.
 //!
 //! Conventions: 25,000 evaluations, swarm and archive of 100, hypervolume with reference 1.1 per objective and IGD+
 //! on the scale of the true front; for one objective 100,000 evaluations, 40 particles, and the distance of the
 //! best cost from the optimum's.
 
-use super::metrics::{Scale, hypervolume, igd_plus};
-use super::problems::TestProblem;
+use super::metrics::{hypervolume, igd_plus};
+use super::problems::SuiteProblem;
 use super::{Optimiser, Sizes, by_name, run};
 use crate::error::Result;
 use crate::evaluate::Problem;
@@ -31,52 +31,70 @@ const FRONT_POINTS: usize = 2000;
 /// # Errors
 /// Those of [`by_name()`].
 pub fn optimiser(name: &str, problem: &Problem, seed: u64) -> Result<Box<dyn Optimiser + Send>> {
-    let (population, evaluations) = budget(problem);
-    let sizes = Sizes {
+    by_name(name, problem, sizes(problem, None, seed))
+}
+
+/// The budget of the comparison, or another number of evaluations.
+fn sizes(problem: &Problem, evaluations: Option<usize>, seed: u64) -> Sizes {
+    let (population, usual) = budget(problem);
+    Sizes {
         population,
-        iterations: evaluations / population,
+        iterations: evaluations.unwrap_or(usual) / population,
         archive: population,
         seed,
-    };
-    by_name(name, problem, sizes)
+    }
 }
 
 /// What one run reached.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Score {
     /// Hypervolume of what was found; for one objective how far the best cost is from the optimum's.
     pub quality: f64,
-    /// IGD+; `None` for one objective.
+    /// IGD+; `None` for one objective, and where the true front is not known or nothing was found.
     pub igd_plus: Option<f64>,
+    /// Rows of objectives that were found. What violates constraints is left out.
+    pub front: Vec<Vec<f64>>,
 }
 
-/// Runs an algorithm on a problem once for each seed from one to `seeds`, each run in a thread.
+/// Runs an algorithm on a problem once for each seed from one to `seeds`, each run in a thread, at the budget of the
+/// comparison or at another number of evaluations.
 ///
 /// # Errors
 /// Those of [`optimiser`].
-pub fn compare(name: &str, problem: &TestProblem, seeds: u64) -> Result<Vec<Score>> {
-    let front = problem.front(FRONT_POINTS);
-    let scale = Scale::of(&front);
-    let front = scale.apply(&front);
+pub fn compare(
+    name: &str,
+    problem: &SuiteProblem,
+    seeds: u64,
+    evaluations: Option<usize>,
+) -> Result<Vec<Score>> {
+    let truth = problem.scale().apply(&problem.front(FRONT_POINTS));
     let width = problem.problem().objectives.len();
     (1..=seeds)
         .into_par_iter()
         .map(|seed| {
-            let mut optimiser = optimiser(name, problem.problem(), seed)?;
+            let sizes = sizes(problem.problem(), evaluations, seed);
+            let mut optimiser = by_name(name, problem.problem(), sizes)?;
             run(optimiser.as_mut(), &mut problem.evaluator(), |_| {
                 ControlFlow::Continue(())
             })?;
-            let found = scale.apply(&optimiser.front().objectives);
-            Ok(if width == 1 {
-                Score {
-                    quality: found.first().map_or(f64::INFINITY, |row| row[0]),
+            let found = optimiser.front();
+            let front = match found.is_feasible() {
+                true => found.objectives,
+                false => Vec::new(),
+            };
+            let scaled = problem.scale().apply(&front);
+            if width == 1 {
+                return Ok(Score {
+                    quality: scaled.first().map_or(f64::INFINITY, |row| row[0]),
                     igd_plus: None,
-                }
-            } else {
-                Score {
-                    quality: hypervolume(&found, &vec![REFERENCE; width])?,
-                    igd_plus: Some(igd_plus(&found, &front)?),
-                }
+                    front,
+                });
+            }
+            let judged = !truth.is_empty() && !scaled.is_empty();
+            Ok(Score {
+                quality: hypervolume(&scaled, &vec![REFERENCE; width])?,
+                igd_plus: judged.then(|| igd_plus(&scaled, &truth)).transpose()?,
+                front,
             })
         })
         .collect()

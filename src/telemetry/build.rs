@@ -7,7 +7,7 @@ use std::sync::Arc;
 use super::audit::check_magnitude;
 use super::calibration::Calibration;
 use super::channel_map::{Axle, ChannelMap, Mapped};
-use super::laps::{self, Lap};
+use super::laps::{LEAST_M, Lap, Marks, restarts};
 use super::log::{Log, LogOptions};
 use super::recording::{Channel, Clock, Format, Recording};
 use super::resample::{Grid, check_times, onto, uniform_interval};
@@ -76,7 +76,7 @@ pub(super) fn signals<'a>(
     Ok(signals)
 }
 
-fn check_samples(source: &str, channel: &Channel) -> Result<()> {
+pub(super) fn check_samples(source: &str, channel: &Channel) -> Result<()> {
     let Some(bad) = &channel.unreadable else {
         return Ok(());
     };
@@ -223,10 +223,14 @@ impl Build<'_> {
             Some(signal) => sampled(signal),
             None => self.speed_of_wheels(&mut log)?,
         };
-        log.laps = self.laps(signals, &grid, &mut log.calibration)?;
         let driven = integrated(&log.vx_mps, grid.dt_s);
+        log.laps = self.laps(signals, &log.time_s, &driven, &mut log.calibration)?;
         let logged = find(Role::Distance).map(|signal| {
-            if through && self.recording.format == Format::Native {
+            let goes_on = |lap: &Lap| {
+                let values = signal.values.get(lap.start..lap.end).unwrap_or_default();
+                !values.windows(2).any(|pair| restarts(pair[0], pair[1]))
+            };
+            if through && self.recording.format == Format::Native && log.laps.iter().all(goes_on) {
                 return signal.values.to_vec();
             }
             let running = running_distance(&signal.values);
@@ -318,46 +322,36 @@ impl Build<'_> {
             .collect())
     }
 
-    fn laps(&self, signals: &[Signal<'_>], grid: &Grid, calibration: &mut Calibration) -> Result<Vec<Lap>> {
-        let whole = |number, complete| Lap {
-            number,
-            start: 0,
-            end: grid.samples,
-            complete,
-        };
-        let native = self.recording.format == Format::Native;
-        if !self.recording.beacons_s.is_empty() {
-            let cuts = laps::cuts_from_beacons(&self.recording.beacons_s, *grid);
-            return Ok(laps::cut(&cuts, 0, *grid));
-        }
+    fn laps(
+        &self,
+        signals: &[Signal<'_>],
+        times_s: &[f64],
+        driven_m: &[f64],
+        calibration: &mut Calibration,
+    ) -> Result<Vec<Lap>> {
         let channel = |role| signals.iter().find(|s| s.mapped.role == role);
-        if let Some(lap) = channel(Role::Lap) {
-            let numbers = lap_numbers(self.source, lap)?;
-            let first = numbers.first().copied().unwrap_or(0);
-            let cuts = laps::cuts_from_numbers(&lap.times, &numbers);
-            let mut found = laps::cut(&cuts, first, *grid);
-            if let Some(flags) = channel(Role::LapComplete) {
-                for lap in &mut found {
-                    let at = flags
-                        .times
-                        .partition_point(|t| *t < grid.time_s(lap.start) - grid.dt_s / 2.0);
-                    lap.complete = flags.values.get(at).is_some_and(|v| *v == 1.0);
-                }
-            } else if native && cuts.is_empty() {
-                found = vec![whole(first, true)];
-            }
-            return Ok(found);
-        }
-        let range = self.recording.metadata.range.as_deref().unwrap_or("");
-        let exported_lap = range.to_ascii_lowercase().starts_with("lap");
-        if !native && !exported_lap {
+        let timed = |role| channel(role).map(|s| (&*s.times, &*s.values));
+        let numbers = channel(Role::Lap).map(|lap| {
+            let numbers = lap_numbers(self.source, lap.mapped.channel, &lap.values)?;
+            Ok((&*lap.times, numbers))
+        });
+        let marks = Marks {
+            beacons_s: &self.recording.beacons_s,
+            numbers: numbers.transpose()?,
+            complete: timed(Role::LapComplete),
+            distance_m: timed(Role::Distance),
+            whole: self.recording.is_one_lap(),
+        };
+        let laps = marks.laps(times_s, driven_m);
+        let untold = marks.beacons_s.is_empty() && marks.numbers.is_none() && laps.len() == 1;
+        if untold && !marks.whole {
             let note = "laps: no beacons and no lap number are logged; the whole file is taken as one lap that may not \
                         be complete";
             if !calibration.notes.iter().any(|n| n == note) {
                 calibration.notes.push(note.to_owned());
             }
         }
-        Ok(vec![whole(1, native || exported_lap)])
+        Ok(laps)
     }
 }
 
@@ -368,26 +362,25 @@ enum Clocked {
     Resampled(Grid),
 }
 
-fn lap_numbers(source: &str, lap: &Signal<'_>) -> Result<Vec<u32>> {
+/// Lap numbers from the values of their channel.
+pub(super) fn lap_numbers(source: &str, channel: &Channel, values: &[f64]) -> Result<Vec<u32>> {
     let number = |(at, &value): (usize, &f64)| {
         if value.fract() == 0.0 && (0.0..=f64::from(u32::MAX)).contains(&value) {
             Ok(value as u32)
         } else {
             Err(Error::input(
                 source,
-                lap.mapped.channel.place(at),
+                channel.place(at),
                 value.to_string(),
                 "a lap number: whole, 0 or more",
             ))
         }
     };
-    lap.values.iter().enumerate().map(number).collect()
+    values.iter().enumerate().map(number).collect()
 }
 
 /// Rates that a log may have (Hz).
 pub(super) const RATES_HZ: RangeInclusive<f64> = 0.1..=100_000.0;
-/// Least distance (m) over which a logged distance is checked.
-const LEAST_M: f64 = 50.0;
 
 /// Distance that continues where the logged one restarts at zero.
 fn running_distance(values: &[f64]) -> Vec<f64> {
@@ -396,8 +389,7 @@ fn running_distance(values: &[f64]) -> Vec<f64> {
     values
         .iter()
         .map(|&value| {
-            // The threshold is half of the distance reached, because a counter may correct itself by a few metres.
-            if value < 0.5 * last {
+            if restarts(last, value) {
                 carried += last;
             }
             last = value;
@@ -482,8 +474,8 @@ mod tests {
     #[test]
     fn logged_distance_starts_again_with_the_counter() {
         assert_eq!(
-            running_distance(&[0.0, 10.0, 20.0, 1.0, 11.0]),
-            [0.0, 10.0, 20.0, 21.0, 31.0]
+            running_distance(&[0.0, 100.0, 200.0, 1.0, 11.0]),
+            [0.0, 100.0, 200.0, 201.0, 211.0]
         );
     }
 }

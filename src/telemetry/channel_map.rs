@@ -10,7 +10,7 @@ use super::recording::{Channel, Recording};
 use super::role::Role;
 use super::text::shown;
 use super::units::Unit;
-use crate::config::read_text;
+use crate::config::{line_of, read_text, refused};
 use crate::{Error, Place, Result};
 
 /// One of the car's axles.
@@ -114,23 +114,13 @@ impl ChannelMap {
     /// As for [`ChannelMap::read`].
     pub fn parse(text: &str, path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
-        let line_of = |at: usize| 1 + text.bytes().take(at).filter(|&byte| byte == b'\n').count();
-        let file: FileMap = toml::from_str(text).map_err(|e| {
-            let place = match e.span() {
-                Some(span) => Place::line(line_of(span.start)),
-                None => "the file".into(),
-            };
-            let message = e.message().replace('\n', " ");
-            let (found, expected) = message
-                .split_once(", expected ")
-                .unwrap_or((&message, "a channel map in TOML"));
-            Error::input(path, place, found, expected)
-        })?;
+        let file: FileMap =
+            toml::from_str(text).map_err(|e| refused(path, text, &e, "a channel map in TOML"))?;
         let checked =
             |value: Option<Spanned<f64>>, key: &str, expected: &str, fits: fn(f64) -> bool| match value {
                 Some(value) if !fits(*value.get_ref()) => Err(Error::input(
                     path,
-                    Place::line(line_of(value.span().start)).field(key),
+                    Place::line(line_of(text, value.span().start)).field(key),
                     value.get_ref().to_string(),
                     expected,
                 )),
@@ -142,7 +132,7 @@ impl ChannelMap {
                 && !role.quantities().is_empty()
             {
                 check_unit(unit.get_ref(), role).map_err(|expected| {
-                    let line = line_of(unit.span().start);
+                    let line = line_of(text, unit.span().start);
                     let place = Place::line(line).field(format!("channels.{}.unit", role.key()));
                     Error::input(path, place, shown(unit.get_ref()), expected)
                 })?;

@@ -1,8 +1,12 @@
 //! The path of the car: one lap of a log with GPS.
 
-use super::recording::{Channel, Clock, Format, Recording};
+use super::build::{check_samples, lap_numbers};
+use super::laps::{Lap, Marks};
+use super::recording::{Channel, Recording};
+use super::role::Role;
 use super::{csv_native, motec_ld, text};
 use crate::{Error, Place, Result};
+use std::ops::Range;
 use std::path::Path;
 
 /// One lap as positions on the globe.
@@ -29,7 +33,8 @@ const LONGITUDE: [&str; 7] = [
     "long",
     "lon",
 ];
-const LAP: [&str; 4] = ["lap", "lapnumber", "lapnum", "lapno"];
+/// The earth's radius (m), for lengths of laps.
+const RADIUS_M: f64 = 6.371e6;
 
 impl Recording {
     /// Whether a file's content or extension is that of a log.
@@ -79,10 +84,11 @@ impl Recording {
                 format!("{}, as {} has", latitude.values.len(), latitude.name),
             ));
         }
-        let (number, range) = self.range_of_lap(lap, latitude)?;
+        let factors = (self.in_degrees(latitude)?, self.in_degrees(longitude)?);
+        let (number, range) = self.range_of_lap(lap, (latitude, longitude), factors)?;
         Ok(DrivenLap {
-            latitude_deg: self.degrees(latitude, 90.0, range.clone())?,
-            longitude_deg: self.degrees(longitude, 180.0, range.clone())?,
+            latitude_deg: self.degrees(latitude, factors.0, 90.0, range.clone())?,
+            longitude_deg: self.degrees(longitude, factors.1, 180.0, range.clone())?,
             lines: latitude
                 .lines
                 .as_ref()
@@ -91,9 +97,10 @@ impl Recording {
         })
     }
 
-    fn degrees(&self, channel: &Channel, most: f64, range: std::ops::Range<usize>) -> Result<Vec<f64>> {
+    /// What turns a channel's values into degrees.
+    fn in_degrees(&self, channel: &Channel) -> Result<f64> {
         let unit = channel.unit.trim().trim_end_matches('.').to_lowercase();
-        let factor = match unit.as_str() {
+        Ok(match unit.as_str() {
             "" | "deg" | "°" | "degrees" | "degree" => 1.0,
             "rad" => 1f64.to_degrees(),
             // Racelogic logs minutes of arc.
@@ -106,7 +113,10 @@ impl Recording {
                     "deg, rad or min",
                 ));
             }
-        };
+        })
+    }
+
+    fn degrees(&self, channel: &Channel, factor: f64, most: f64, range: Range<usize>) -> Result<Vec<f64>> {
         range
             .map(|i| {
                 let x = channel.values[i] * factor;
@@ -123,74 +133,79 @@ impl Recording {
             .collect()
     }
 
-    /// The lap's number and the samples of a channel that lie in it.
+    /// The lap's number and its samples. A log that tells of no line is one road.
     fn range_of_lap(
         &self,
         asked: Option<u32>,
-        of: &Channel,
-    ) -> Result<(Option<u32>, std::ops::Range<usize>)> {
-        let samples = of.values.len();
-        // Times at which laps begin, each with its number; the last one is where the last complete lap ends.
-        let mut cuts: Vec<(f64, u32)> = Vec::new();
-        let mut first_number = None;
-        if let Some(numbers) = self.usual(&LAP) {
-            for (i, pair) in numbers.values.windows(2).enumerate() {
-                if pair[0] != pair[1] && (0.0..=1e6).contains(&pair[1]) {
-                    cuts.push((numbers.time_s(i + 1), pair[1] as u32));
-                }
-            }
-            first_number = numbers.values.first().map(|n| n.clamp(0.0, 1e6) as u32);
-        } else {
-            let numbered = self.beacons_s.iter().zip(1..);
-            cuts.extend(numbered.map(|(&time, number)| (time, number)));
-        }
-        let index = |time: f64| match &of.clock {
-            Clock::Times(times) => times.partition_point(|&t| t < time - 1e-9).min(samples),
-            Clock::Rate { start_s, rate_hz } => {
-                let position = (time - start_s) * rate_hz - 1e-6;
-                (position.ceil().max(0.0) as usize).min(samples)
-            }
+        (latitude, longitude): (&Channel, &Channel),
+        factors: (f64, f64),
+    ) -> Result<(Option<u32>, Range<usize>)> {
+        let source = self.source.display().to_string();
+        let times_of = |c: &Channel| -> Vec<f64> { (0..c.values.len()).map(|i| c.time_s(i)).collect() };
+        let timed = |role: Role| {
+            let channel = self.usual(role.usual_names())?;
+            Some(check_samples(&source, channel).map(|()| (channel, times_of(channel))))
         };
-        if cuts.is_empty() {
-            return match (asked, first_number) {
-                (None, number) => Ok((number, 0..samples)),
-                (Some(asked), Some(number)) if asked == number => Ok((Some(asked), 0..samples)),
-                (Some(asked), _) => Err(self.no_lap(asked, &[])),
-            };
-        }
-        let mut laps: Vec<(u32, std::ops::Range<usize>)> = cuts
-            .windows(2)
-            .map(|c| (c[0].1, index(c[0].0)..index(c[1].0)))
-            .collect();
-        if let (Format::Native, Some(number)) = (self.format, first_number) {
-            // Native files begin and end on the line.
-            laps.insert(0, (number, 0..index(cuts[0].0)));
-            let (time, last) = cuts[cuts.len() - 1];
-            laps.push((last, index(time)..samples));
-        }
-        let complete = self.usual(&["lapcomplete"]);
-        let is_complete = |range: &std::ops::Range<usize>| {
-            let flag = complete.and_then(|c| c.values.get(range.start));
-            flag.is_none_or(|flag| *flag != 0.0)
+        let numbers = timed(Role::Lap).transpose()?;
+        let complete = timed(Role::LapComplete).transpose()?;
+        // A distance that cannot be read tells of no laps.
+        let distance = timed(Role::Distance).and_then(Result::ok);
+        let numbered = numbers
+            .as_ref()
+            .map(|(channel, times)| Ok((&**times, lap_numbers(&source, channel, &channel.values)?)));
+        let marks = Marks {
+            beacons_s: &self.beacons_s,
+            numbers: numbered.transpose()?,
+            complete: complete
+                .as_ref()
+                .map(|(channel, times)| (&**times, &*channel.values)),
+            distance_m: distance
+                .as_ref()
+                .map(|(channel, times)| (&**times, &*channel.values)),
+            whole: self.is_one_lap(),
         };
-        laps.retain(|(_, range)| !range.is_empty() && is_complete(range));
+        let mut driven_m = Vec::with_capacity(latitude.values.len());
+        let mut sum = 0.0;
+        let mut last: Option<(f64, f64)> = None;
+        for (lat, lon) in latitude.values.iter().zip(&longitude.values) {
+            let here = ((lat * factors.0).to_radians(), (lon * factors.1).to_radians());
+            if here.0.is_finite() && here.1.is_finite() {
+                let (lat, lon) = last.unwrap_or(here);
+                sum += RADIUS_M * (here.0 - lat).hypot((here.1 - lon) * here.0.cos());
+                last = Some(here);
+            }
+            driven_m.push(sum);
+        }
+        let laps = marks.laps(&times_of(latitude), &driven_m);
+        let line_told = !marks.beacons_s.is_empty() || laps.len() > 1;
+        let number = marks
+            .numbers
+            .is_some()
+            .then(|| laps.first().map(|lap| lap.number))
+            .flatten();
+        if !line_told && asked.is_none_or(|asked| number == Some(asked)) {
+            return Ok((number, 0..latitude.values.len()));
+        }
+        let laps: Vec<Lap> = laps.into_iter().filter(|lap| line_told && lap.complete).collect();
         let found = match asked {
-            Some(asked) => laps.iter().find(|(number, _)| *number == asked),
+            Some(asked) => laps.iter().find(|lap| lap.number == asked),
             None => laps.first(),
         };
-        let none = || self.no_lap(asked.unwrap_or(0), &laps);
-        let (number, range) = found.ok_or_else(none)?;
-        Ok((Some(*number), range.clone()))
+        let lap = found.ok_or_else(|| self.no_lap(asked, &laps))?;
+        Ok((Some(lap.number), lap.start..lap.end))
     }
 
-    fn no_lap(&self, asked: u32, laps: &[(u32, std::ops::Range<usize>)]) -> Error {
-        let there: Vec<String> = laps.iter().map(|(n, _)| n.to_string()).collect();
+    fn no_lap(&self, asked: Option<u32>, laps: &[Lap]) -> Error {
+        let there: Vec<String> = laps.iter().map(|lap| lap.number.to_string()).collect();
         Error::input(
             &self.source,
             "laps",
-            format!("no complete lap {asked}"),
+            match asked {
+                Some(asked) => format!("no complete lap {asked}"),
+                None => "no complete lap".to_owned(),
+            },
             if there.is_empty() {
-                "a log with laps, or no lap asked for".to_owned()
+                "a lap from line to line, or a log of one road without laps".to_owned()
             } else {
                 format!("one of {}", there.join(", "))
             },

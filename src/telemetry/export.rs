@@ -44,7 +44,7 @@ pub struct LapLabels {
 /// Largest file that is read (bytes); a lap is far smaller.
 const MOST_BYTES: u64 = 256 << 20;
 /// Greatest sample rate (Hz): the fastest that loggers have.
-pub const MOST_RATE_HZ: u16 = 1000;
+const MOST_RATE_HZ: u16 = 1000;
 /// Most samples of a channel: hours at the greatest rate.
 const MOST_SAMPLES: f64 = 2e7;
 
@@ -122,7 +122,7 @@ impl SampledLap {
     ///
     /// # Errors
     /// [`Error::Io`] if it cannot be read; [`Error::Input`] naming file and line for a table without rising times or other
-    /// columns, for cells that are no numbers in a row that is too short, and for a rate out of 1 to [`MOST_RATE_HZ`].
+    /// columns, for rows of another width, and for a rate out of 1 to 1000 Hz.
     pub fn read(path: &Path, rate_hz: u16) -> Result<Self> {
         if !(1..=MOST_RATE_HZ).contains(&rate_hz) {
             let expected = format!("1 to {MOST_RATE_HZ} Hz");

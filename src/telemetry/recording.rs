@@ -147,6 +147,13 @@ pub struct Recording {
 }
 
 impl Recording {
+    /// Whether the file runs from line to line where nothing in it tells of a line: it is one of this crate's, or the export of a
+    /// lap.
+    pub(super) fn is_one_lap(&self) -> bool {
+        let range = self.metadata.range.as_deref().unwrap_or("");
+        self.format == Format::Native || range.to_ascii_lowercase().starts_with("lap")
+    }
+
     /// The channel called `name`, exactly or else without regard to case.
     pub fn channel(&self, name: &str) -> Option<&Channel> {
         self.channels

@@ -7,7 +7,7 @@ use serde::de::DeserializeOwned;
 use toml::Spanned;
 
 use super::circuit::Section;
-use crate::config::LONGEST_NAME;
+use crate::config::{LONGEST_NAME, line_of, refused};
 use crate::files::stem;
 use crate::{Error, Place, Result};
 
@@ -20,25 +20,9 @@ pub(super) struct SectionEntry {
     end_m: Spanned<f64>,
 }
 
-/// The line (from 1) where a byte of a text lies.
-pub(super) fn line_of(text: &str, at: usize) -> usize {
-    1 + text.bytes().take(at).filter(|&b| b == b'\n').count()
-}
-
 /// Reads a TOML text; `what` is what errors expect it to be.
 pub(super) fn parse_toml<T: DeserializeOwned>(file: &str, text: &str, what: &str) -> Result<T> {
-    toml::from_str(text).map_err(|error| {
-        let place = match error.span() {
-            Some(span) => Place::line(line_of(text, span.start)),
-            None => "document".into(),
-        };
-        let message = error.message().trim().replace('\n', ", ");
-        // serde's messages end with what was expected, as in "unknown field `x`, expected one of ...".
-        match message.split_once(", expected ") {
-            Some((found, expected)) => Error::input(file, place, found, expected),
-            None => Error::input(file, place, message, what),
-        }
-    })
+    toml::from_str(text).map_err(|error| refused(file, text, &error, what))
 }
 
 /// A checked value of the TOML file.

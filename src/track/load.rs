@@ -5,12 +5,12 @@ use std::path::Path;
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::checker::{Checker, SectionEntry, line_of, parse_toml};
+use super::checker::{Checker, SectionEntry, parse_toml};
 use super::circuit::Circuit;
 use super::from_curvature::{Closure, CurvatureRow, CurvatureTable};
 use super::reference::Smoothing;
 use super::survey::{Survey, SurveyOptions};
-use crate::config::read_text;
+use crate::config::{folder_of, line_of, read_text};
 use crate::{Error, Place, Result};
 
 /// A circuit embedded in the crate: name, TOML and curvature table.
@@ -137,10 +137,7 @@ impl CircuitSource {
             &text,
             "a circuit with name, curvature_table and length_m",
         )?;
-        let table_path = path
-            .parent()
-            .unwrap_or(Path::new(""))
-            .join(file.curvature_table.get_ref());
+        let table_path = folder_of(path).join(file.curvature_table.get_ref());
         let table_file = table_path.display().to_string();
         let csv = read(&table_path)?;
         let table = assemble(&toml_file, &text, file, &table_file, &csv)?;

@@ -10,6 +10,7 @@ use super::circuit::Corner;
 use super::reference::Smoothing;
 use super::survey::{Survey, SurveyOptions};
 use crate::Result;
+use crate::config::folder_of;
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -62,7 +63,7 @@ pub(super) fn read(path: &Path, text: &str) -> Result<(Survey, Smoothing)> {
         line_m: within(&file.smoothing_line_m, "smoothing_line_m", 0.0, 10.0)?.unwrap_or(usual.line_m),
         edges_m: within(&file.smoothing_edges_m, "smoothing_edges_m", 0.0, 10.0)?.unwrap_or(usual.edges_m),
     };
-    let beside = path.parent().unwrap_or(Path::new("")).join(&file.survey);
+    let beside = folder_of(path).join(&file.survey);
     let mut survey = Survey::read(beside, &options)?;
     if let Some(name) = &file.name {
         survey.name = check.name(name, "name")?;

@@ -33,7 +33,8 @@ impl Track {
         if let Some(shape) = Shape::parse(name_or_path) {
             return shape.map(Self::Shape);
         }
-        if Path::new(name_or_path).extension().is_some() {
+        let path = Path::new(name_or_path);
+        if path.extension().is_some() || path.is_dir() {
             Self::read(name_or_path)
         } else {
             Circuit::bundled(name_or_path).map(Self::Circuit)

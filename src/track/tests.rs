@@ -239,7 +239,7 @@ fn mistakes_are_named_by_file_line_and_field() {
         (
             TOML.replace("628.3", "\"long\""),
             TABLE.into(),
-            &["own.toml", "line 3", "string"],
+            &["own.toml", "line 3", "found \"long\""],
         ),
         (
             TOML.replace("width_m = 10", "width_m = nan"),

@@ -7,7 +7,7 @@ use super::parameters::ParameterInfo;
 use super::powertrain::Powertrain;
 use super::tyre::{LinearTyre, TyreCoefficients, TyreFile, TyreModel};
 use crate::config::settings::Settings;
-use crate::config::{Document, Table, read_text};
+use crate::config::{Document, Table, folder_of, read_text};
 use crate::error::{Error, Result};
 use crate::files::write_whole;
 use std::path::Path;
@@ -119,7 +119,7 @@ impl Car {
             return Err(Error::input(name_or_path, "car", "no such file", expected));
         }
         let text = read_text(path)?;
-        let folder = path.parent().unwrap_or(Path::new("."));
+        let folder = folder_of(path);
         Self::parse(path, &text, |name| TyreFile::read(&folder.join(name)))
     }
 

@@ -92,6 +92,10 @@ const TORQUE: [(f64, f64); 8] = [
     (AT_TOP_SPEED, 1.0),
     (1.00, 0.93),
 ];
+/// How much more load than the front tyres the rear tyres are made for, over the loads at rest.
+const REAR_RESERVE: f64 = 1.15;
+/// The front axle's share of the roll moment. Like [`REAR_RESERVE`] it keeps the car from turning round by itself.
+const ROLL_SHARE_FRONT: f64 = 0.55;
 /// First gear over top gear, for each gear more.
 const GEAR_SPAN: f64 = 0.36;
 /// Largest drag area that is taken from power and top speed, over the track squared: that of a box as high as wide.
@@ -119,7 +123,7 @@ impl CarFacts {
     /// *Measured Vehicle Inertial Parameters*, SAE 1999-01-1336). Roll is critically damped.
     ///
     /// # Errors
-    /// [`Error::Input`] for facts out of their ranges, [`Error::Study`] if no friction brings the car to `corner_g`.
+    /// [`Error::Input`] for facts out of their ranges and a car that would turn over, [`Error::Study`] if no friction brings the car to `corner_g`.
     pub fn car(&self) -> Result<Car> {
         self.validate()?;
         let mut car = self.with_base_tyre()?;
@@ -170,7 +174,7 @@ impl CarFacts {
             roll_stiffness,
             roll_damping: 2.0
                 * ((roll_stiffness - rolling) * (inertia_roll + m * self.cg_height_m.powi(2))).sqrt(),
-            roll_share_front: 0.5,
+            roll_share_front: ROLL_SHARE_FRONT,
             camber_front: 0.0,
             camber_rear: 0.0,
             radius_front: self.tyre_radius_m,
@@ -193,14 +197,15 @@ impl CarFacts {
             hybrid: None,
             chassis,
         };
-        let (size, load) = (
-            self.tyre_radius_m / base.chassis.radius_front,
-            m / base.chassis.mass,
-        );
-        for_each_tyre(&mut car, |tyre| {
-            tyre.r0 *= size;
-            tyre.fnomin *= load;
-        });
+        // As much nominal load over the load at rest as the base car has, and at the rear a little more: it grips longer.
+        let size = self.tyre_radius_m / base.chassis.radius_front;
+        let load = m / base.chassis.mass;
+        if let Tyres::MagicFormula { front, rear } = &mut car.tyres {
+            for (tyre, share) in [(front, front_share), (rear, REAR_RESERVE * (1.0 - front_share))] {
+                tyre.coefficients.r0 *= size;
+                tyre.coefficients.fnomin *= 2.0 * share * load;
+            }
+        }
         Ok(car)
     }
 
@@ -230,6 +235,16 @@ impl CarFacts {
 
     /// The factor on the base tyre's friction with which the car corners at `corner_g`, by regula falsi.
     fn scale_for(&self, corner_g: f64, car: &Car) -> Result<f64> {
+        let lift = air_w(self.corner_kmh / 3.6) / (self.corner_kmh / 3.6) * self.downforce_area_m2;
+        let half_track = 0.25 * (self.front_track_m + self.rear_track_m);
+        let turns_over = half_track / self.cg_height_m * (1.0 + lift / (self.mass_kg * G));
+        if corner_g > turns_over {
+            let found = format!("{corner_g} g at {} km/h", self.corner_kmh);
+            let expected = format!(
+                "less than {turns_over:.2} g, at which this track and centre of gravity turn the car over"
+            );
+            return Err(Error::input("the car", "corner_g", found, expected));
+        }
         let reached = |scale: f64| {
             let mut car = car.clone();
             scale_grip(&mut car, scale);
@@ -305,19 +320,14 @@ pub fn top_speed_kmh(car: &Car) -> Option<f64> {
     Some(low * 3.6)
 }
 
-fn for_each_tyre(car: &mut Car, change: impl Fn(&mut super::TyreCoefficients<f64>)) {
-    if let Tyres::MagicFormula { front, rear } = &mut car.tyres {
-        change(&mut front.coefficients);
-        change(&mut rear.coefficients);
-    }
-}
-
 /// Scales friction along and across.
 fn scale_grip(car: &mut Car, scale: f64) {
-    for_each_tyre(car, |tyre| {
-        tyre.lmux *= scale;
-        tyre.lmuy *= scale;
-    });
+    if let Tyres::MagicFormula { front, rear } = &mut car.tyres {
+        for tyre in [front, rear] {
+            tyre.coefficients.lmux *= scale;
+            tyre.coefficients.lmuy *= scale;
+        }
+    }
 }
 
 /// Facts that are each in their range may make a figure that is not.
@@ -355,9 +365,9 @@ mod tests {
                 wheelbase_m: 1.04,
                 front_track_m: 1.1,
                 rear_track_m: 1.15,
-                cg_height_m: 0.25,
+                cg_height_m: 0.22,
                 tyre_radius_m: 0.135,
-                corner_g: Some(1.9),
+                corner_g: Some(1.8),
                 corner_kmh: 60.0,
                 roll_deg_per_g: 0.5,
                 power_kw: 22.0,

@@ -377,7 +377,7 @@ fn what_is_measured_has_a_page() {
                 "--algorithms",
                 "default,nsga2",
             ],
-            "zdt1: default is best",
+            "zdt1 (chosen_on): default is best",
             1,
             "rows.csv",
         ),

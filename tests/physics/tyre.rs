@@ -55,6 +55,42 @@ fn every_coefficient_of_set_b_that_is_not_zero_shows_at_the_chosen_points() {
     }
 }
 
+/// A file that tells on which side the tyre was measured has its mirror image on the other: what drives left with one wheel drives
+/// right with the other. On the side of the measurement it is the tyre of a file that tells nothing.
+#[test]
+fn a_tyre_is_mirrored_on_the_side_on_which_it_was_not_measured() {
+    let camber = -0.05;
+    let forces = |words: &str, side: f64, slip_tangent: f64| {
+        let tyre = tyre_from(&format!("{SET_B} {words}")).prepare(camber);
+        tyre.forces(TyreInput {
+            load: 4200.0,
+            slip_ratio: 0.03,
+            slip_tangent,
+            side,
+        })
+    };
+    for (words, measured_on) in [("TYRESIDE='LEFT'", 1.0), ("TYRESIDE='right'", -1.0)] {
+        for slip_tangent in [-0.1, 0.0, 0.04] {
+            let here = forces(words, measured_on, slip_tangent);
+            assert_eq!(here, forces("", measured_on, slip_tangent), "{words}");
+            let there = forces(words, -measured_on, -slip_tangent);
+            let mirrored = [there.x, -there.y, -there.aligning_moment];
+            for (found, wanted) in mirrored.iter().zip([here.x, here.y, here.aligning_moment]) {
+                assert!(
+                    (found - wanted).abs() < 1e-9 * wanted.abs().max(1.0),
+                    "{words}: {found} {wanted}"
+                );
+            }
+            let unmirrored = forces("", -measured_on, -slip_tangent);
+            assert!(
+                (unmirrored.y - there.y).abs() > 10.0,
+                "{words}: the tyre is not even"
+            );
+        }
+    }
+    assert_eq!(forces("TYRESIDE='SYMMETRIC'", -1.0, 0.04), forces("", -1.0, 0.04));
+}
+
 /// `E > 1` turns a curve back on itself, so it acts as one, in every curve that has an `E`.
 #[test]
 fn curvature_above_one_acts_as_one() {

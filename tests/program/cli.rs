@@ -14,7 +14,7 @@ use std::io::Write;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
-fn lapswarm(folder: &Path, arguments: &[&str]) -> Output {
+pub fn lapswarm(folder: &Path, arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_lapswarm"))
         .args(arguments)
         .current_dir(folder)
@@ -38,12 +38,12 @@ fn answered(folder: &Path, arguments: &[&str], answers: &str) -> Output {
     child.wait_with_output().expect("it ends")
 }
 
-fn text(bytes: &[u8]) -> String {
+pub fn text(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes).into_owned()
 }
 
 /// A ring of 100 m about the origin, for what is driven along a line.
-fn ring() -> String {
+pub fn ring() -> String {
     let points = (0..200).map(|i| f64::from(i) * std::f64::consts::TAU / 200.0);
     let rows: String = points
         .map(|a| format!("{},{}\n", 100.0 * a.cos(), 100.0 * a.sin()))
@@ -52,7 +52,7 @@ fn ring() -> String {
 }
 
 /// The circuit on which [`ring`] lies.
-const AROUND_RING: [&str; 2] = ["--track", "circle:95:105"];
+pub const AROUND_RING: [&str; 2] = ["--track", "circle:95:105"];
 
 #[test]
 fn files_to_start_from_are_sound_and_never_overwrite() {
@@ -110,15 +110,16 @@ fn files_to_start_from_are_sound_and_never_overwrite() {
 }
 
 /// The car of a kart, from figures that its driver knows.
-const KART: &str = "mass_kg=160,wheelbase_m=1.04,front_track_m=1.1,rear_track_m=1.15,cg_height_m=0.25,tyre_radius_m=0.135,\
-                    corner_g=1.9,corner_kmh=60,roll_deg_per_g=0.5,power_kw=22,redline_rpm=14000,gears=1,top_speed_kmh=115";
+const KART: &str = "mass_kg=160,front_weight_percent=43,wheelbase_m=1.04,front_track_m=1.1,rear_track_m=1.15,cg_height_m=0.22,\
+                    tyre_radius_m=0.135,corner_g=1.8,corner_kmh=60,roll_deg_per_g=0.5,power_kw=22,redline_rpm=14000,gears=1,\
+                    top_speed_kmh=115";
 
 #[test]
 fn a_car_is_made_of_what_is_known_and_compared_with_it() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let made = lapswarm(folder.path(), &["init", "car", "kart.toml", "--set", KART]);
     assert!(made.status.success(), "{}", text(&made.stderr));
-    assert_eq!(text(&made.stdout), "kart.tir\nkart.toml\n");
+    assert_eq!(text(&made.stdout), "kart_front.tir\nkart_rear.tir\nkart.toml\n");
     let checked = lapswarm(folder.path(), &["check", "kart.toml", "--draw", "drawn"]);
     assert!(checked.status.success(), "{}", text(&checked.stderr));
     let told = text(&checked.stdout);
@@ -126,7 +127,7 @@ fn a_car_is_made_of_what_is_known_and_compared_with_it() {
     let figures = [
         ("mass", 160.0),
         ("wheelbase", 1.04),
-        ("cornering at 60 km/h", 1.9),
+        ("cornering at 60 km/h", 1.8),
         ("power", 22.0),
         ("top speed", 115.0),
     ];
@@ -153,6 +154,19 @@ fn a_car_is_made_of_what_is_known_and_compared_with_it() {
     ];
     let found = lapswarm(folder.path(), &run);
     assert!(found.status.success(), "{}", text(&found.stderr));
+
+    let driven = lapswarm(
+        folder.path(),
+        &[
+            "simulate",
+            "--car",
+            "kart.toml",
+            "--track",
+            "stadium:100:25:8",
+            "--quiet",
+        ],
+    );
+    assert!(driven.status.success(), "{}", text(&driven.stderr));
 
     // Asked for on stdin: an empty line takes what is shown, one that cannot be is asked for again.
     let answers = "asked car\nheavy\n-5\n900\n\n";
@@ -257,7 +271,7 @@ fn the_study_file_of_every_run_folder_is_taken_for_what_it_is() {
             "transient",
             TransientSettings {
                 line: vec![folder.path().join("ring.csv")],
-                track: AROUND_RING[1].to_owned(),
+                track: Some(AROUND_RING[1].to_owned()),
                 ..TransientSettings::default()
             }
             .to_toml(),
@@ -615,7 +629,7 @@ fn a_dry_run_of_any_study_says_what_it_would_do_and_writes_nothing() {
 }
 
 /// What the program says, on both channels, without the frames and line breaks of its reports.
-fn said(output: &Output) -> String {
+pub fn said(output: &Output) -> String {
     let all = text(&output.stdout) + &text(&output.stderr);
     all.replace(['\n', '│', ' '], "")
 }

@@ -5,6 +5,7 @@ mod bench_studies;
 mod bench_swarm;
 mod cli;
 mod examples;
+mod messages;
 mod paths;
 
 /// A bench of a kind, run to its end.

@@ -154,3 +154,73 @@ fn names_too_long_for_files_are_refused_before_anything_is_done() {
     }
     assert!(!folder.path().join("runs").exists());
 }
+
+/// Studies that name the car beside them find it from wherever they are begun, and named with a folder or without.
+#[test]
+fn files_are_relative_to_the_file_that_names_them() {
+    let root = tempfile::tempdir().expect("a temporary folder");
+    let folder = root.path().join("own");
+    std::fs::create_dir(&folder).expect("a folder");
+    for bundled in ["gt.toml", "gt_hybrid.toml"] {
+        car(&folder, bundled, "one of its own");
+    }
+    let write = |name: &str, text: &str| std::fs::write(folder.join(name), text).expect("a study");
+    write("ring.csv", &crate::cli::ring());
+    let studies = [
+        "identify",
+        "envelope",
+        "raceline",
+        "transient",
+        "sensitivity",
+        "surface",
+        "hybrid",
+        "run",
+    ];
+    for study in studies {
+        let text = match study {
+            "run" => "[identify]\ncar = \"gt.toml\"\n",
+            "transient" => "car = \"gt.toml\"\nline = [\"ring.csv\"]\ntrack = \"circle:95:105\"\n",
+            "hybrid" => "car = \"gt_hybrid.toml\"\n",
+            _ => "car = \"gt.toml\"\n",
+        };
+        write(&format!("{study}.toml"), text);
+    }
+    let swept = "track = \"stadium:200:60:12\"\nsections = 40\nalgorithm = \"thesis\"\nwarm_start = false\n\
+                 local_search = false\nbackend = \"simd\"\nobjectives = [\"gamma\"]\npopulation = 8\niterations = 2\n";
+    write(
+        "s.toml",
+        &format!("study = \"raceline\"\n[base]\n{swept}[grid]\ncar = [\"gt.toml\", \"gt_hybrid.toml\"]\n"),
+    );
+    write(
+        "nested.toml",
+        "study = \"run\"\n[base]\nrounds = 1\n[base.identify]\ncar = \"gt.toml\"\n[grid]\nmargin_m = [0.5]\n",
+    );
+    let goes = |within: &Path, arguments: &[&str]| {
+        let ended = lapswarm(within, arguments);
+        let said = String::from_utf8_lossy(&ended.stderr);
+        assert!(
+            ended.status.success(),
+            "{arguments:?} in {}: {said}",
+            within.display()
+        );
+    };
+    for (within, at) in [(&*folder, ""), (root.path(), "own/")] {
+        for study in studies {
+            let file = format!("{at}{study}.toml");
+            goes(within, &[study, &file, "--dry-run", "--quiet"]);
+        }
+        goes(
+            within,
+            &["sweep", &format!("{at}nested.toml"), "--dry-run", "--quiet"],
+        );
+        let out = root.path().join(format!("out{}", at.len()));
+        let out = out.to_string_lossy();
+        goes(
+            within,
+            &["sweep", &format!("{at}s.toml"), "--out", &out, "--quiet"],
+        );
+        // What a sweep has written runs by itself.
+        let study = format!("{out}/studies/00001.toml");
+        goes(root.path(), &["raceline", &study, "--dry-run", "--quiet"]);
+    }
+}

@@ -330,6 +330,7 @@ fn states() -> Vec<Vec<u8>> {
                 out: Some(&out),
                 resume: false,
                 save_every: Duration::ZERO,
+                time_limit: None,
                 memory_limit_mib: USUAL_MIB,
                 dry_run: false,
                 stop: Arc::default(),

@@ -18,6 +18,17 @@ fn ask(
     out: &Path,
     (resume, dry_run, interrupted): (bool, bool, Option<usize>),
 ) -> lapswarm::Result<Answer> {
+    ask_within(study, flags, out, (resume, dry_run, interrupted), None)
+}
+
+/// As [`ask`], of a study that has so much time.
+fn ask_within(
+    study: &dyn Registered,
+    flags: &[(String, String)],
+    out: &Path,
+    (resume, dry_run, interrupted): (bool, bool, Option<usize>),
+    limit: Option<Duration>,
+) -> lapswarm::Result<Answer> {
     let mut told = 0;
     study.run(Request {
         file: None,
@@ -25,6 +36,7 @@ fn ask(
         out: Some(out),
         resume,
         save_every: Duration::ZERO,
+        time_limit: limit,
         memory_limit_mib: USUAL_MIB,
         dry_run,
         stop: Arc::default(),
@@ -119,4 +131,41 @@ fn every_study_that_is_interrupted_is_resumed_to_the_same_figures() {
         assert_eq!(figures(&resumed.json), figures(&whole.json), "{name}");
         assert!(!out.join("state.lapswarm").exists(), "{name}");
     }
+}
+
+/// A study without time ends in order: with what it has and the word of it, or with none of it and saying so. In either case it is
+/// resumed to the figures of a run that had time.
+#[test]
+fn every_study_ends_in_order_when_its_time_is_over() {
+    let mut reported = 0;
+    for study in STUDIES.iter().copied().filter(|study| study.name() != "run") {
+        let name = study.name();
+        let root = tempfile::tempdir().expect("a folder");
+        let flags = small(name, root.path());
+        let within = |out: &str, resume: bool, limit: Option<Duration>| {
+            let flags = if resume { &[] } else { &flags[..] };
+            ask_within(study, flags, &root.path().join(out), (resume, false, None), limit)
+        };
+        let whole = finished(within("whole", false, Some(Duration::from_secs(86_400))), name);
+        assert!(
+            figures(&whole.json)["ended_by"].is_null(),
+            "{name}: {}",
+            whole.json
+        );
+        match within("out", false, Some(Duration::ZERO)) {
+            Ok(Answer::Finished(finished)) => {
+                reported += 1;
+                finished.verdict.expect(name);
+                assert_eq!(figures(&finished.json)["ended_by"], "time_limit", "{name}");
+                assert!(finished.folder.join("summary.json").is_file(), "{name}");
+            }
+            Err(Error::Study(said)) => assert!(said.contains("time limit"), "{name}: {said}"),
+            Err(error) => panic!("{name}: {error}"),
+            Ok(Answer::Planned(_)) => panic!("{name} was planned only"),
+        }
+        assert!(root.path().join("out/state.lapswarm").is_file(), "{name}");
+        let resumed = finished(within("out", true, None), name);
+        assert_eq!(figures(&resumed.json), figures(&whole.json), "{name}");
+    }
+    assert!(reported > 0, "some have a result at their first step");
 }

@@ -250,3 +250,72 @@ seed = [1, 2]
         }
     }
 }
+
+/// A circuit by a survey of its own, a bundled car by a file, and a sweep of its lines.
+fn sweep_of_files(folder: &Path) -> SweepSettings {
+    let cars = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/cars");
+    for file in cars.read_dir().expect("the cars").flatten() {
+        std::fs::copy(file.path(), folder.join(file.file_name())).expect("room");
+    }
+    let on = |i: usize| std::f64::consts::TAU * i as f64 / 120.0;
+    let points = (0..120).map(|i| format!("{:.3},{:.3},12\n", 150.0 * on(i).cos(), 100.0 * on(i).sin()));
+    let survey = format!("x_m,y_m,width_m\n{}", points.collect::<String>());
+    std::fs::write(folder.join("survey.csv"), survey).expect("room");
+    std::fs::write(folder.join("track.toml"), "survey = \"survey.csv\"\n").expect("room");
+    let text = LINES.replace("stadium:300:80:12\"", "track.toml\"\ncar = \"gt.toml\"");
+    SweepSettings::parse(&folder.join("sweep.toml"), &text).expect("a sweep")
+}
+
+#[test]
+fn a_sweep_whose_files_have_changed_is_not_resumed() {
+    let root = tempfile::tempdir().expect("a temporary folder");
+    let settings = sweep_of_files(root.path());
+    let folder = root.path().join("s");
+    let broken = sweep(&settings, &folder, false, |p| match p.done {
+        0 => ControlFlow::Continue(()),
+        _ => ControlFlow::Break(()),
+    });
+    assert_eq!(broken.expect_err("broken off").exit_code(), 130);
+    for name in ["gt.toml", "gt_slick.tir", "track.toml", "survey.csv"] {
+        let file = root.path().join(name);
+        let before = std::fs::read_to_string(&file).expect(name);
+        let refused = |change: &str| {
+            let refused = sweep(&settings, &folder, true, |_| ControlFlow::Continue(()));
+            let refused = refused.expect_err(change);
+            assert_eq!(refused.exit_code(), 2);
+            let said = refused.to_string();
+            assert!(
+                said.contains(name) && said.contains("begin anew"),
+                "{change}: {said}"
+            );
+        };
+        std::fs::write(&file, format!("{before}\n")).expect("room");
+        refused("another file");
+        std::fs::remove_file(&file).expect("it goes");
+        refused("no file");
+        std::fs::write(&file, before).expect("room");
+    }
+    let summary = sweep(&settings, &folder, true, |_| ControlFlow::Continue(())).expect("as it was");
+    assert_eq!(summary.rows.len(), 2);
+}
+
+#[test]
+fn a_file_that_changes_while_a_sweep_runs_ends_it() {
+    let root = tempfile::tempdir().expect("a temporary folder");
+    let settings = sweep_of_files(root.path());
+    let text = settings.text().replace("[grid]", "[grid]\nsections = [60, 64]");
+    let settings = SweepSettings::parse(
+        &root.path().join("sweep.toml"),
+        &text.replace("sections = 60\n", ""),
+    );
+    let car = root.path().join("gt.toml");
+    let ended = sweep(&settings.expect("a sweep"), &root.path().join("s"), false, |p| {
+        if p.done >= 1 {
+            let text = std::fs::read_to_string(&car).expect("the car");
+            std::fs::write(&car, text + "\n").expect("room");
+        }
+        ControlFlow::Continue(())
+    });
+    let said = ended.expect_err("two cars in one sweep").to_string();
+    assert!(said.contains("gt.toml"), "{said}");
+}

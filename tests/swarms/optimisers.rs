@@ -4,7 +4,7 @@ use lapswarm::evaluate::point::{CallCost, PointEvaluator};
 use lapswarm::evaluate::{Evaluator, Objective, Problem, Variable};
 use lapswarm::swarm::comparison::{compare, optimiser, quartiles};
 use lapswarm::swarm::metrics::{hypervolume, non_dominated};
-use lapswarm::swarm::problems::TestProblem;
+use lapswarm::swarm::problems::{SuiteProblem, TestProblem};
 use lapswarm::swarm::{
     CovarianceSettings, CovarianceSwarm, Front, MANY, MULTI_OBJECTIVE, Mopso, MopsoSettings, Optimiser,
     PsoSettings, Restarts, SINGLE_OBJECTIVE, run,
@@ -315,7 +315,7 @@ fn default_swarm_holds_its_own() {
         ("dtlz2", 0.757),
     ];
     for (name, bar) in bars {
-        let scores = compare("default", &TestProblem::by_name(name).unwrap(), 3).unwrap();
+        let scores = compare("default", &SuiteProblem::by_name(name).unwrap(), 3, None).unwrap();
         let values: Vec<f64> = scores.iter().map(|s| s.quality).collect();
         assert!(quartiles(&values)[1] >= bar, "{name}: {values:?}");
     }
@@ -340,7 +340,7 @@ fn default_single_objective_swarm_ends_at_rounding() {
         ("griewank", 8.0 * f64::EPSILON),
     ];
     for (name, bar) in bars {
-        let scores = compare("default", &TestProblem::by_name(name).unwrap(), 3).unwrap();
+        let scores = compare("default", &SuiteProblem::by_name(name).unwrap(), 3, None).unwrap();
         let values: Vec<f64> = scores.iter().map(|s| s.quality).collect();
         println!("{name}: {values:?}, at most {bar:e}");
         assert!(quartiles(&values)[1] <= bar, "{name}: {values:?}");

@@ -5,6 +5,7 @@ use super::{optimisers, studies, swarm};
 use lapswarm::Result;
 use lapswarm::report::{BarPanel, Bars, Curves, HtmlReport, Panel, Scale, Table, significant};
 use lapswarm::swarm::comparison::quartiles;
+use lapswarm::swarm::problems::Half;
 use std::path::Path;
 
 /// Rows that share a label, in the order in which labels come.
@@ -113,6 +114,33 @@ pub fn of_optimisers(folder: &Path, rows: &[optimisers::Row]) -> Result<HtmlRepo
         by_label(rows, |r| r.algorithm.to_owned()).len(),
         problems.len()
     ));
+    page.sentence(
+        "Settings are chosen on one half of each suite (chosen_on). The other half (published) says what they are worth.",
+    );
+    for half in [Half::ChosenOn, Half::Published] {
+        let default: Vec<_> = rows
+            .iter()
+            .filter(|r| r.half == half && r.algorithm == "default" && r.best_peer.is_some())
+            .collect();
+        let short: Vec<_> = default
+            .iter()
+            .filter(|r| r.falls_short())
+            .map(|r| r.problem)
+            .collect();
+        if !default.is_empty() {
+            page.sentence(format!(
+                "{}: the default falls short of the best other library on {} of {} problems: {}.",
+                half.name(),
+                short.len(),
+                default.len(),
+                if short.is_empty() {
+                    "none".to_owned()
+                } else {
+                    short.join(", ")
+                }
+            ));
+        }
+    }
     let mut panels = Vec::new();
     for (problem, of) in &problems {
         let several = of.iter().all(|r| r.hypervolume_median.is_some());
@@ -123,7 +151,8 @@ pub fn of_optimisers(folder: &Path, rows: &[optimisers::Row]) -> Result<HtmlRepo
         let Some(best) = ranked.first() else { continue };
         let what = if several { "hypervolume" } else { "error" };
         page.sentence(format!(
-            "{problem}: {} is best, with {what} {}.",
+            "{problem} ({}): {} is best, with {what} {}.",
+            best.half.name(),
             best.algorithm,
             significant(value(best), 4)
         ));
@@ -140,14 +169,18 @@ pub fn of_optimisers(folder: &Path, rows: &[optimisers::Row]) -> Result<HtmlRepo
     );
     page.place(&Bars::new("Behind the best", panels))?;
     let table = Table::rows(rows)
+        .text("suite", |r| r.suite)
+        .text("half", |r| r.half.name())
         .text("problem", |r| r.problem)
         .text("algorithm", |r| r.algorithm)
+        .number("seeds with something feasible", "", |r| r.feasible_seeds as f64)
         .number("hypervolume", "", |r| r.hypervolume_median)
         .number("its interquartile range", "", |r| r.hypervolume_iqr)
         .number("IGD+", "", |r| r.igd_plus_median)
         .number("error", "", |r| r.error_median)
         .number("the error's interquartile range", "", |r| r.error_iqr)
         .number("best peer", "", |r| r.best_peer)
+        .text("which peer", |r| r.best_peer_name.unwrap_or(""))
         .number("p of being better", "", |r| r.better_than_peer_p);
     rows_of(&mut page, folder, &table.table())?;
     Ok(page)

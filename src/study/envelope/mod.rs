@@ -115,6 +115,10 @@ impl Study for EnvelopeStudy {
         &outcome.record
     }
 
+    fn record_mut(outcome: &mut Outcome) -> &mut RunRecord {
+        &mut outcome.record
+    }
+
     fn summarise(solved: &Solved<'_, Self>) -> EnvelopeSummary {
         results::summarise(solved)
     }

@@ -1,7 +1,11 @@
-//! What a result depends on, as one number.
+//! What a result depends on, as one number, and the files that it was read from.
 
+use super::write_json;
+use crate::config::{FilesRead, LARGEST_LOG, noting_files, read_bytes, read_text};
+use crate::error::{Error, Result};
 use std::fmt::{Debug, Write as _};
 use std::hash::{DefaultHasher, Hasher};
+use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 /// What went into a stage, as one number: the program's version, and whatever is [added](Inputs::add).
@@ -45,4 +49,73 @@ impl Inputs {
     pub fn key(&self) -> String {
         format!("{:016x}", self.0.finish())
     }
+}
+
+/// The files that several studies read, kept in a file of their own: what they were when they were first read they must stay.
+pub struct InputFiles {
+    kept: PathBuf,
+    read: FilesRead,
+}
+
+impl InputFiles {
+    /// None yet; `kept` is where they are kept.
+    pub fn new(kept: PathBuf) -> Self {
+        Self {
+            kept,
+            read: FilesRead::new(),
+        }
+    }
+
+    /// Goes on from those that an earlier run has kept.
+    ///
+    /// # Errors
+    /// [`Error::Input`] naming a file that is not what it was; [`Error::Io`] if what was kept cannot be read.
+    pub fn reopen(&mut self) -> Result<()> {
+        if !self.kept.exists() {
+            return Ok(());
+        }
+        self.read = serde_json::from_str(&read_text(&self.kept)?).map_err(|e| {
+            let expected = "the files that the studies have read";
+            Error::input(&self.kept, "contents", e.to_string(), expected)
+        })?;
+        for (path, sum) in &self.read {
+            match read_bytes(path, LARGEST_LOG) {
+                Ok(bytes) if crc32fast::hash(&bytes) == *sum => {}
+                Ok(_) => return Err(changed(path, "another file than the one that was read before")),
+                Err(error) => return Err(changed(path, &error.to_string())),
+            }
+        }
+        Ok(())
+    }
+
+    /// Does `work`, and keeps the names of the files that it read.
+    ///
+    /// # Errors
+    /// Those of `work`; [`Error::Input`] naming a file that is not what it was when it was first read.
+    pub fn noted<T>(&mut self, work: impl FnOnce() -> Result<T>) -> Result<T> {
+        let (done, read) = noting_files(work);
+        let mut more = false;
+        for (path, sum) in read {
+            match self.read.get(&path) {
+                Some(before) if *before != sum => {
+                    return Err(changed(&path, "another file than the one that was read before"));
+                }
+                Some(_) => {}
+                None => {
+                    self.read.insert(path, sum);
+                    more = true;
+                }
+            }
+        }
+        if more {
+            write_json(&self.kept, &self.read)?;
+        }
+        done
+    }
+}
+
+/// A file is not what it was.
+fn changed(file: &Path, found: &str) -> Error {
+    let expected = "the file as it was: put it back, or begin anew in another folder";
+    Error::input(file, "contents", found, expected)
 }

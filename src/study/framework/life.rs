@@ -10,8 +10,9 @@ use crate::files::run_folder::{self, MANIFEST, RunFolder, SETTINGS, STATE, SUMMA
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
-use std::time::Duration;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
 
 /// What is asked of a study.
 pub struct Request<'a> {
@@ -25,6 +26,8 @@ pub struct Request<'a> {
     pub resume: bool,
     /// Time between saves of the state.
     pub save_every: Duration,
+    /// Time after which the study is to end with what it has.
+    pub time_limit: Option<Duration>,
     /// Memory that the study may take (MiB).
     pub memory_limit_mib: u64,
     /// Whether the study is planned only.
@@ -55,6 +58,73 @@ pub struct Finished {
     pub warnings: Vec<String>,
     /// Whether it was interrupted, or missed what it was asked to reach.
     pub verdict: Result<()>,
+}
+
+/// What a record says of a study that its time limit has ended.
+pub const TIME_LIMIT: &str = "time_limit";
+
+/// The time that a study may take. Once it is over it raises the flag that ends the study, for work that tells nobody of its
+/// progress.
+struct TimeLimit {
+    limit: Option<Duration>,
+    began: Instant,
+    stop: Arc<AtomicBool>,
+    over: Arc<AtomicBool>,
+    ended: Arc<AtomicBool>,
+    timer: Option<JoinHandle<()>>,
+}
+
+impl TimeLimit {
+    fn begin(limit: Option<Duration>, stop: &Arc<AtomicBool>) -> Self {
+        let mut begun = Self {
+            limit,
+            began: Instant::now(),
+            stop: Arc::clone(stop),
+            over: Arc::default(),
+            ended: Arc::default(),
+            timer: None,
+        };
+        let (over, ended, stop) = [&begun.over, &begun.ended, stop].map(Arc::clone).into();
+        let began = begun.began;
+        begun.timer = limit.map(|limit| {
+            std::thread::spawn(move || {
+                while !ended.load(Ordering::Relaxed) {
+                    let left = limit.saturating_sub(began.elapsed());
+                    if left.is_zero() {
+                        return end(&over, &stop);
+                    }
+                    std::thread::park_timeout(left);
+                }
+            })
+        });
+        begun
+    }
+
+    /// Whether it is over; a study that the user has stopped before has ended by that.
+    fn is_over(&self) -> bool {
+        if self.limit.is_some_and(|limit| self.began.elapsed() >= limit) {
+            end(&self.over, &self.stop);
+        }
+        self.over.load(Ordering::Relaxed)
+    }
+}
+
+impl Drop for TimeLimit {
+    fn drop(&mut self) {
+        self.ended.store(true, Ordering::Relaxed);
+        if let Some(timer) = self.timer.take() {
+            timer.thread().unpark();
+            // It has nothing to panic over.
+            let _ = timer.join();
+        }
+    }
+}
+
+/// Says that the time is over, unless the study is stopped already.
+fn end(over: &AtomicBool, stop: &AtomicBool) {
+    if !stop.swap(true, Ordering::Relaxed) {
+        over.store(true, Ordering::Relaxed);
+    }
 }
 
 /// The run that is resumed.
@@ -109,6 +179,7 @@ fn begin<S: Study>(request: &Request<'_>) -> Result<Begun<S>> {
 /// # Errors
 /// Those of the study. Input that is refused leaves nothing behind.
 pub(in crate::study) fn run<S: Study>(request: Request<'_>) -> Result<Answer> {
+    let time_limit = TimeLimit::begin(request.time_limit, &request.stop);
     let limit_mib = request.memory_limit_mib;
     limit_memory(limit_mib);
     let (settings, resumed) = begin::<S>(&request)?;
@@ -131,14 +202,20 @@ pub(in crate::study) fn run<S: Study>(request: Request<'_>) -> Result<Answer> {
     if moves::<S::Settings>(request.flags) {
         state_file = state_file.may_move();
     }
+    let observe = request.observe;
     let outcome = S::solve(Work {
         settings: &settings,
         prepared: &prepared,
         state,
         state_file: &mut state_file,
-        observe: request.observe,
+        observe: &mut |progress| match observe(progress) {
+            ControlFlow::Continue(()) if time_limit.is_over() => ControlFlow::Break(()),
+            flow => flow,
+        },
         stop: request.stop,
     });
+    let timed_out = time_limit.over.load(Ordering::Relaxed);
+    drop(time_limit);
     // Input that is refused only now leaves no state in the way of the next run.
     let refused = matches!(
         outcome,
@@ -151,11 +228,26 @@ pub(in crate::study) fn run<S: Study>(request: Request<'_>) -> Result<Answer> {
     if refused && !request.resume && untouched() {
         state_file.done()?;
     }
-    let Some(outcome) = outcome? else {
-        return Err(Error::Interrupted(folder.to_path_buf()));
+    let nothing_yet = || {
+        if timed_out {
+            let at = folder.display();
+            Error::Study(format!(
+                "the time limit came before there was a result; what was reached is saved in {at}, for --resume"
+            ))
+        } else {
+            Error::Interrupted(folder.to_path_buf())
+        }
     };
-    let summary = write_results::<S>(&folder, &settings, &prepared, &outcome)?;
+    let outcome = match outcome {
+        Err(Error::Interrupted(_)) if timed_out => None,
+        outcome => outcome?,
+    };
+    let mut outcome = outcome.ok_or_else(nothing_yet)?;
     let interrupted = S::record(&outcome).interrupted;
+    if interrupted && timed_out {
+        S::record_mut(&mut outcome).ended_by = Some(TIME_LIMIT.to_owned());
+    }
+    let summary = write_results::<S>(&folder, &settings, &prepared, &outcome)?;
     if !interrupted {
         state_file.done()?;
     }
@@ -165,10 +257,10 @@ pub(in crate::study) fn run<S: Study>(request: Request<'_>) -> Result<Answer> {
         text: S::text(&settings, &summary),
         json,
         warnings: S::warnings(&summary),
-        verdict: if interrupted {
-            Err(Error::Interrupted(folder.to_path_buf()))
-        } else {
-            S::verdict(&settings, &summary)
+        verdict: match interrupted {
+            true if timed_out => Ok(()),
+            true => Err(Error::Interrupted(folder.to_path_buf())),
+            false => S::verdict(&settings, &summary),
         },
         folder: folder.to_path_buf(),
     }))

@@ -10,9 +10,9 @@ mod record;
 pub mod state_file;
 mod study;
 
-pub use inputs::Inputs;
+pub use inputs::{InputFiles, Inputs};
 pub(in crate::study) use life::resumed_or_new;
-pub use life::{Answer, Finished, Request, solve_unobserved, write_results};
+pub use life::{Answer, Finished, Request, TIME_LIMIT, solve_unobserved, write_results};
 pub use manifest::{Manifest, write_json, write_study};
 pub use plan::Plan;
 pub use record::RunRecord;

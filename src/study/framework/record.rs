@@ -30,6 +30,8 @@ pub struct RunRecord {
     pub longest_dispatch_ms: Option<f64>,
     /// Whether the study was interrupted.
     pub interrupted: bool,
+    /// What interrupted it, if it was not the user: `time_limit`.
+    pub ended_by: Option<String>,
 }
 
 impl RunRecord {

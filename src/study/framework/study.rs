@@ -200,6 +200,9 @@ pub trait Study: Sized + 'static {
     /// How it ran.
     fn record(outcome: &Self::Outcome) -> &RunRecord;
 
+    /// As [`Study::record`], to add to it.
+    fn record_mut(outcome: &mut Self::Outcome) -> &mut RunRecord;
+
     /// Works the figures out.
     fn summarise(solved: &Solved<'_, Self>) -> Self::Summary;
 

@@ -131,6 +131,10 @@ impl Study for Hybrid {
         &outcome.record
     }
 
+    fn record_mut(outcome: &mut Outcome) -> &mut RunRecord {
+        &mut outcome.record
+    }
+
     fn summarise(solved: &Solved<'_, Self>) -> HybridSummary {
         results::summarise(solved)
     }

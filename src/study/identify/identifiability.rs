@@ -160,7 +160,10 @@ pub fn judge(
             }
         })
         .collect();
-    let mut singular_values: Vec<f64> = values.iter().copied().collect();
+    // What is below the rounding of the decomposition is zero.
+    let rounding = f64::EPSILON * d as f64 * greatest;
+    let exact = |value: &f64| if *value > rounding { *value } else { 0.0 };
+    let mut singular_values: Vec<f64> = values.iter().map(exact).collect();
     singular_values.sort_by(|a, b| b.total_cmp(a));
     let identifiable: Vec<bool> = (0..d)
         .map(|k| standard_errors[k] < ranges[k] / 12f64.sqrt())

@@ -128,6 +128,10 @@ impl Study for Identify {
         &outcome.record
     }
 
+    fn record_mut(outcome: &mut Outcome) -> &mut RunRecord {
+        &mut outcome.record
+    }
+
     fn summarise(solved: &Solved<'_, Self>) -> Summary {
         results::summarise(solved.settings, solved.prepared, solved.outcome)
     }

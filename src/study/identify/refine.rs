@@ -87,9 +87,11 @@ pub(super) fn refine(
 }
 
 /// Rounds of [`restarted`] at the most. Each leaves a small share of what the one before was off by.
-const ROUNDS: usize = 6;
+const ROUNDS: usize = 4;
+/// Drives that a round may take: it begins close to where it ends.
+const ROUND_DRIVES: usize = 50;
 /// A round that moves no parameter by more than this share of its range is the last.
-const MOVED: f64 = 1e-7;
+const MOVED: f64 = 1e-5;
 
 /// Goes on with windows that start where the car found so far comes, until that changes nothing any more: a car is to be judged
 /// from its own sideslip and roll, and not from those of the starting car. The candidate, and whether this was interrupted.
@@ -110,7 +112,7 @@ pub(super) fn restarted(
         };
         let noise = noise_of(&residuals.errors, &setup.scales, replay.dimensions());
         let weights = noise.map(|n| 1.0 / n);
-        let Some(polished) = polish_observed(&replay, &candidate, weights, MOST_DRIVES, watch) else {
+        let Some(polished) = polish_observed(&replay, &candidate, weights, ROUND_DRIVES, watch) else {
             break;
         };
         let variables = replay.problem.variables.iter();

@@ -249,11 +249,13 @@ fn choose_laps(settings: &IdentifySettings, log: &Log) -> Result<(LapRanges, Lap
         settings.laps.iter().map(range_of).collect::<Result<_>>()?
     };
     if fitted.is_empty() {
+        let expected = "at least one from line to line; the setting `laps` takes others, and a column lap_complete (0 or 1) \
+                        says which are complete";
         return Err(Error::input(
             &log.source,
             "laps",
             "no complete lap to fit",
-            "at least one",
+            expected,
         ));
     }
     Ok((fitted, held))

@@ -105,6 +105,10 @@ impl Study for Raceline {
         &outcome.record
     }
 
+    fn record_mut(outcome: &mut Outcome) -> &mut RunRecord {
+        &mut outcome.record
+    }
+
     fn summarise(solved: &Solved<'_, Self>) -> Summary {
         results::summarise(solved)
     }

@@ -96,6 +96,10 @@ impl Study for Run {
         &summary.record
     }
 
+    fn record_mut(summary: &mut Summary) -> &mut RunRecord {
+        &mut summary.record
+    }
+
     fn summarise(solved: &Solved<'_, Self>) -> Summary {
         solved.outcome.clone()
     }
@@ -280,7 +284,7 @@ fn run_stages(
 
         let drive = TransientSettings {
             line: vec![line_path.clone()],
-            track: line.track.clone(),
+            track: Some(line.track.clone()),
             car: car_path.clone(),
             car_width_m: settings.raceline.car_width_m,
             ..TransientSettings::default()

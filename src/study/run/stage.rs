@@ -1,5 +1,6 @@
 //! Stages whose results are kept by what went into them.
 
+use crate::config::folder_of;
 use crate::error::{Error, Result};
 use crate::files::run_folder::{self, RunFolder, STATE};
 use crate::files::{sync_folder, write_whole};
@@ -155,7 +156,7 @@ fn keep(from: &Path, kept: &Path) -> Result<()> {
         // The first failure is the one to tell.
         let _ = std::fs::remove_dir_all(&beside);
     }
-    sync_folder(kept.parent().unwrap_or(Path::new("")));
+    sync_folder(folder_of(kept));
     moved.map(|_| ())
 }
 

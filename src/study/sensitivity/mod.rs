@@ -144,6 +144,10 @@ impl Study for Sensitivity {
         &outcome.record
     }
 
+    fn record_mut(outcome: &mut Outcome) -> &mut RunRecord {
+        &mut outcome.record
+    }
+
     fn summarise(solved: &Solved<'_, Self>) -> Summary {
         results::summarise(solved)
     }

@@ -90,6 +90,10 @@ impl Study for Surface {
         &outcome.record
     }
 
+    fn record_mut(outcome: &mut Outcome) -> &mut RunRecord {
+        &mut outcome.record
+    }
+
     fn summarise(solved: &Solved<'_, Self>) -> Summary {
         results::summarise(solved)
     }

@@ -1,11 +1,11 @@
 //! The grid of settings of a sweep.
 
-use crate::config::{Document, read_text};
+use crate::config::{Document, folder_of, read_text};
 use crate::error::{Error, Result};
 use crate::study::registry::{self, Registered};
 use std::collections::BTreeMap;
 use std::fmt;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use toml::{Table, Value};
 
 /// A sweep: which study, what all of its runs share, and what they differ in.
@@ -19,7 +19,7 @@ pub struct SweepSettings {
     axes: Vec<(String, Vec<Value>)>,
     /// The sweep file, as it was read.
     text: String,
-    file: String,
+    file: PathBuf,
 }
 
 impl fmt::Debug for SweepSettings {
@@ -38,7 +38,7 @@ impl fmt::Debug for SweepSettings {
 pub struct Point {
     /// What it differs in, key by key, as text.
     pub settings: BTreeMap<String, String>,
-    /// Its study file.
+    /// Its study file, in which files are relative to the sweep's.
     pub study: String,
 }
 
@@ -101,22 +101,11 @@ impl SweepSettings {
                 &format!("one of {}", registry::names().join(", ")),
             )
         })?;
-        // Keys that name files, which are relative to the sweep file.
-        let declared = study.declared();
-        let names_files = |key: &str| {
-            let own = declared.iter().find(|d| d.key == key);
-            own.is_some_and(|d| d.value_name.contains("FILE"))
-        };
-        let folder = std::path::absolute(path.parent().unwrap_or(Path::new(""))).unwrap_or_default();
-        let absolute = |key: &str, value| absolute_value(names_files(key), value, &folder);
-        let mut base = match root.remove("base") {
+        let base = match root.remove("base") {
             None => Table::new(),
             Some(Value::Table(base)) => base,
             Some(other) => return Err(refuse("base", other.to_string(), "a table of the study's keys")),
         };
-        for (key, value) in &mut base {
-            *value = absolute(key, value.clone());
-        }
         let Some(Value::Table(grid)) = root.remove("grid") else {
             let expected = "a table of the study's keys, each with a list of values";
             return Err(refuse("grid", "no such table".to_owned(), expected));
@@ -130,10 +119,7 @@ impl SweepSettings {
                 let key: String = key.chars().take(60).collect();
                 Err(refuse("grid", key, "keys that go through a few tables at most"))
             }
-            Value::Array(values) if !values.is_empty() => {
-                let values = values.into_iter().map(|v| absolute(&key, v)).collect();
-                Ok((key, values))
-            }
+            Value::Array(values) if !values.is_empty() => Ok((key, values)),
             other => {
                 let place = format!("grid, {key}");
                 Err(refuse(
@@ -164,13 +150,18 @@ impl SweepSettings {
             base,
             axes,
             text: text.to_owned(),
-            file: path.display().to_string(),
+            file: path.to_owned(),
         })
     }
 
     /// The sweep file, as it was read.
     pub fn text(&self) -> &str {
         &self.text
+    }
+
+    /// The folder that files named in it are relative to.
+    pub(super) fn folder(&self) -> &Path {
+        folder_of(&self.file)
     }
 
     /// The keys of the grid, the seed last.
@@ -267,25 +258,10 @@ fn unquoted(value: &Value) -> String {
     }
 }
 
-/// Makes the files of a value absolute, if it names any.
-fn absolute_value(names_files: bool, value: Value, folder: &Path) -> Value {
-    match value {
-        Value::String(name) if names_files && Path::new(&name).extension().is_some() => {
-            Value::String(folder.join(name).display().to_string())
-        }
-        Value::Array(values) => {
-            let each = values.into_iter().map(|v| absolute_value(names_files, v, folder));
-            Value::Array(each.collect())
-        }
-        other => other,
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::Work;
     use super::*;
-    use std::path::PathBuf;
 
     #[test]
     fn bundled_sweeps_are_grids_of_sound_studies() {

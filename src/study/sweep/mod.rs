@@ -18,7 +18,7 @@ use crate::evaluate::portions::Allowance;
 use crate::report::write_whole;
 use crate::study::framework::memory::{self, MemoryItem};
 use crate::study::framework::state_file::StateFile;
-use crate::study::framework::{Entry, Manifest, Plan, Progress, Solved, Study, write_json};
+use crate::study::framework::{Entry, InputFiles, Manifest, Plan, Progress, Solved, Study, write_json};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
@@ -26,6 +26,8 @@ use std::path::{Path, PathBuf};
 const ROWS: &str = "rows.jsonl";
 /// The sweep that a folder holds.
 pub const SWEEP_FILE: &str = "sweep.toml";
+/// The files that its studies read, each with a sum over it, in the folder of its studies.
+const INPUTS: &str = "inputs.json";
 /// Most problems whose inputs are kept while a sweep is planned.
 const MOST_PREPARED: usize = 16;
 
@@ -36,8 +38,8 @@ type Observer<'a> = dyn FnMut(&Progress) -> ControlFlow<()> + 'a;
 /// at work at the same time share the [memory that is allowed](memory::limit_mib), which changes no row.
 ///
 /// # Errors
-/// [`Error::Input`] if the folder holds another sweep, or a point of the grid is no study; [`Error::Interrupted`] if the
-/// observer broke the sweep off; those of the studies.
+/// [`Error::Input`] if the folder holds another sweep, a file that its studies read has changed, or a point of the grid is no
+/// study; [`Error::Interrupted`] if the observer broke the sweep off; those of the studies.
 pub fn sweep(
     settings: &SweepSettings,
     folder: &Path,
@@ -45,6 +47,7 @@ pub fn sweep(
     mut observe: impl FnMut(&Progress) -> ControlFlow<()>,
 ) -> Result<Summary> {
     let work = Work::new(settings, folder, folder.join("studies"))?;
+    let mut inputs = InputFiles::new(work.studies.join(INPUTS));
     // Every point is read before anything is written: a mistake in the last shows at once, and leaves nothing behind.
     settings.study.check_points(&work)?;
     let mut rows = if resume {
@@ -57,9 +60,15 @@ pub fn sweep(
     } else {
         Vec::new()
     };
+    if resume {
+        inputs.reopen()?;
+    }
     let began_with = rows.len();
-    let ran = work.write_studies(resume);
-    let ran = ran.and_then(|()| settings.study.run_points(&work, &mut rows, &mut observe));
+    let ran = work.create(resume);
+    let ran = ran.and_then(|()| {
+        let study = settings.study;
+        study.run_points(&work, &mut inputs, &mut rows, &mut observe)
+    });
     if let Err(error) = ran {
         // What has come to nothing does not stand in the way of the next; what was interrupted may be resumed.
         // So may what a full disk or a lost device has ended.
@@ -134,24 +143,24 @@ impl<'a> Work<'a> {
     /// Reads the study of every point, and refuses what is wrong or too large.
     fn read<S: Study>(&self) -> Result<Vec<S::Settings>> {
         let read = |(number, point): (usize, &Point)| {
-            let study = S::Settings::parse(&self.path_of(number), &point.study).map(Settings::absolute);
-            let study = study.map_err(|e| self.of_point(e, number))?;
+            let study = S::Settings::parse(&self.path_of(number), &point.study, self.sweep.folder());
+            let study = study
+                .map(Settings::absolute)
+                .map_err(|e| self.of_point(e, number))?;
             self.check(&S::size(&study, None), number).map(|_| study)
         };
         self.points.iter().enumerate().map(read).collect()
     }
 
-    /// Writes the sweep and the study of every point.
-    fn write_studies(&self, resume: bool) -> Result<()> {
+    /// Writes the sweep, and makes the folder of its studies.
+    fn create(&self, resume: bool) -> Result<()> {
         let (folder, studies) = (self.folder, &self.studies);
         if !resume {
             std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, "create", e))?;
             // First: with it, an interrupted sweep can be resumed.
             write_whole(folder.join(SWEEP_FILE), self.sweep.text().as_bytes())?;
         }
-        std::fs::create_dir_all(studies).map_err(|e| Error::io(studies, "create", e))?;
-        let mut points = self.points.iter().enumerate();
-        points.try_for_each(|(number, point)| write_whole(self.path_of(number), point.study.as_bytes()))
+        std::fs::create_dir_all(studies).map_err(|e| Error::io(studies, "create", e))
     }
 }
 
@@ -173,7 +182,13 @@ pub trait Swept: Sync {
     ///
     /// # Errors
     /// [`Error::Interrupted`] if the observer ended it; those of the studies.
-    fn run_points(&self, work: &Work<'_>, rows: &mut Vec<Row>, observe: &mut Observer<'_>) -> Result<()>;
+    fn run_points(
+        &self,
+        work: &Work<'_>,
+        inputs: &mut InputFiles,
+        rows: &mut Vec<Row>,
+        observe: &mut Observer<'_>,
+    ) -> Result<()>;
 }
 
 /// The problem that a study solves: what only the search goes by is left out.
@@ -253,9 +268,18 @@ impl<S: Study> Swept for Entry<S> {
         })
     }
 
-    fn run_points(&self, work: &Work<'_>, rows: &mut Vec<Row>, observe: &mut Observer<'_>) -> Result<()> {
+    fn run_points(
+        &self,
+        work: &Work<'_>,
+        files: &mut InputFiles,
+        rows: &mut Vec<Row>,
+        observe: &mut Observer<'_>,
+    ) -> Result<()> {
         let points = &work.points;
-        let studies = work.read::<S>()?;
+        let studies = files.noted(|| work.read::<S>())?;
+        for (number, study) in studies.iter().enumerate() {
+            write_whole(work.path_of(number), study.to_toml().as_bytes())?;
+        }
         let mut known = Known::<S>(Vec::new());
         while rows.len() < points.len() {
             let number = rows.len();
@@ -270,9 +294,8 @@ impl<S: Study> Swept for Entry<S> {
             if observe(&progress).is_break() {
                 return Err(Error::Interrupted(work.folder.to_owned()));
             }
-            let inputs = known
-                .of(&studies[number], 1)
-                .map_err(|e| work.of_point(e, number))?;
+            let inputs = files.noted(|| known.of(&studies[number], 1));
+            let inputs = inputs.map_err(|e| work.of_point(e, number))?;
             let together = alike::<S>(&studies[number..], inputs, work.memory_limit_mib);
             let chosen = &studies[number..number + together];
             let mut kept: Vec<MemoryItem> = S::size(&chosen[0], Some(inputs));

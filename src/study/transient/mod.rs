@@ -104,7 +104,8 @@ impl Study for Transient {
     const ABOUT: &'static str =
         "Drive a line with the 4DOF car and a driver, and set its lap beside the quasi-steady-state lap.";
     const DETAILS: &'static str = "A driver needs room: half a metre on either side of the car, which a line found for a car one \
-        metre wider leaves.\n\nExample:\n  lapswarm raceline --car-width-m 3 --out fast\n  \
+        metre wider leaves. The circuit is that of the run in whose folder the line lies, unless --track names one.\n\n\
+        Example:\n  lapswarm raceline --car-width-m 3 --out fast\n  \
         lapswarm transient --line fast/line_fastest.csv\n\nSeveral lines, or set-ups, are driven all at once, each with several \
         shares of the grip; the fastest within the edges are listed:\n  lapswarm transient --line fast/line_fastest.csv \
         --line fast/line_shortest.csv --setups 63 --parameters aero_balance_front,front_roll_moment_share";
@@ -153,6 +154,13 @@ impl Study for Transient {
         match outcome {
             Outcome::Line(line) => &line.record,
             Outcome::Population(population) => &population.record,
+        }
+    }
+
+    fn record_mut(outcome: &mut Outcome) -> &mut RunRecord {
+        match outcome {
+            Outcome::Line(line) => &mut line.record,
+            Outcome::Population(population) => &mut population.record,
         }
     }
 
@@ -206,6 +214,11 @@ impl Study for Transient {
     /// Lines may be given by flags.
     fn check(path: &Path) -> Result<String> {
         let settings = TransientSettings::read(path)?;
+        if settings.line.is_empty() && settings.track.is_none() {
+            settings.free(&Car::load(&settings.car)?)?;
+            let setups = settings.setups.unwrap_or(0);
+            return Ok(format!("no line and no track yet, {setups} set-ups"));
+        }
         let prepared = read(&settings)?;
         Ok(format!(
             "{} lines, {} set-ups, {}",
@@ -225,7 +238,7 @@ fn read(settings: &TransientSettings) -> Result<Prepared> {
         .iter()
         .map(|file| read_line(file))
         .collect::<Result<Vec<_>>>()?;
-    let road = raceline::set_up(&settings.raceline())?;
+    let road = raceline::set_up(&settings.raceline()?)?;
     let named = names_of(files).into_iter().zip(points);
     let lines = named
         .map(|(name, points)| NamedLine::new(name, points, &road.edges_m, settings.car_width_m))

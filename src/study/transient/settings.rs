@@ -1,11 +1,13 @@
 //! Settings of a drive.
 
 use crate::config::kinds::{
-    choice, count, file, files, name_or_file, number, numbers, optional, text, texts,
+    Kind, NameOrFile, choice, count, file, files, name_or_file, number, numbers, optional, text, texts,
 };
 use crate::config::settings::settings;
+use crate::config::{Document, folder_of, read_text};
 use crate::error::{Error, Result};
 use crate::evaluate::BackendChoice;
+use crate::files::run_folder::SETTINGS;
 use crate::study::framework::memory::{ANSWER, MemoryItem};
 use crate::study::raceline::RacelineSettings;
 use crate::vehicle::{Car, CarParameter};
@@ -21,8 +23,8 @@ settings! {
     pub struct TransientSettings {
         line: Vec<PathBuf> ["-"] = Vec::new(), files().example("[\"line_fastest.csv\"]"),
             "The lines to drive, at least one: tables that raceline wrote, or any with columns x_m and y_m";
-        track: String ["-"] = "silverstone_gp".to_owned(), name_or_file(),
-            "The circuit, for its edges: a bundled name, a shape, or a file";
+        track: Option<String> ["-"] = None, optional(name_or_file()).example("\"silverstone_gp\""),
+            "The circuit, for its edges: a bundled name, a shape, or a file; without it that of the run in whose folder the line lies";
         car: String ["-"] = "gt".to_owned(), name_or_file(),
             "The car: a bundled name (gt) or a TOML file";
         envelope: Option<PathBuf> ["-"] = None, optional(file()).example("\"envelope.csv\""),
@@ -120,13 +122,55 @@ impl TransientSettings {
     }
 
     /// What the circuit and the limits are set up from.
-    pub(super) fn raceline(&self) -> RacelineSettings {
-        RacelineSettings {
-            track: self.track.clone(),
+    ///
+    /// # Errors
+    /// Those of [`TransientSettings::track_of_lines`].
+    pub(super) fn raceline(&self) -> Result<RacelineSettings> {
+        Ok(RacelineSettings {
+            track: match &self.track {
+                Some(track) => track.clone(),
+                None => self.track_of_lines()?,
+            },
             car: self.car.clone(),
             envelope: self.envelope.clone(),
             car_width_m: self.car_width_m,
             ..RacelineSettings::default()
+        })
+    }
+
+    /// The circuit of the runs that found the lines, by the settings beside them.
+    ///
+    /// # Errors
+    /// [`Error::Input`] where a line has none, or two have different ones.
+    fn track_of_lines(&self) -> Result<String> {
+        let mut tracks = Vec::new();
+        for line in &self.line {
+            let folder = folder_of(line);
+            let study = folder.join(SETTINGS);
+            let track = if study.is_file() {
+                let text = read_text(&study)?;
+                let document = Document::parse(&study, &text)?;
+                NameOrFile.read(&document.root(), "track", "-", folder)?
+            } else {
+                None
+            };
+            tracks.push(track.ok_or_else(|| {
+                let found = format!("none, and no run beside {} that tells of one", line.display());
+                Error::input("the study", "track", found, "the circuit that the lines are on")
+            })?);
+        }
+        tracks.dedup();
+        match &tracks[..] {
+            [track] => Ok(track.clone()),
+            _ => {
+                let found = format!("lines of different circuits: {}", tracks.join(", "));
+                Err(Error::input(
+                    "the study",
+                    "track",
+                    found,
+                    "the circuit that all lines are on",
+                ))
+            }
         }
     }
 

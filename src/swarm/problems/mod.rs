@@ -1,4 +1,7 @@
-//! Problems whose answers are known, to test optimisers and backends on.
+//! Problems to test optimisers and backends on.
+//!
+//! A [`TestProblem`] has a known answer and runs on every backend. A [`SuiteProblem`] is one of the [`SUITES`] that
+//! optimisers are compared on, in double precision; the test problems are among them.
 //!
 //! References:
 //! 1. Zitzler, Deb, Thiele, *Comparison of multiobjective evolutionary algorithms: empirical results*,
@@ -13,11 +16,13 @@ mod device;
 mod dtlz;
 mod lanes;
 mod single;
+mod suites;
 mod zdt;
 
 #[cfg(feature = "gpu")]
 pub use device::GpuTestEvaluator;
 pub use lanes::SimdTestEvaluator;
+pub use suites::{Half, SUITES, SuiteProblem};
 
 use crate::evaluate::point::{CallCost, PointEvaluator};
 use crate::evaluate::{Objective, Problem, Variable};
@@ -36,7 +41,7 @@ pub struct TestProblem {
     front: fn(usize) -> Vec<Vec<f64>>,
 }
 
-/// Names of all test problems, those with several objectives first.
+/// Names of the problems that run on every backend, those with several objectives first.
 pub const NAMES: [&str; 12] = [
     "zdt1",
     "zdt2",

@@ -259,6 +259,31 @@ fn a_lap_of_a_log_becomes_a_line() {
     assert!(text.contains("line 453") && text.contains("x5"), "{text}");
 }
 
+/// A log with lap numbers alone, whose first lap begins and whose last lap ends half-way round.
+#[test]
+fn the_part_of_a_lap_that_a_log_begins_with_is_no_line() {
+    let numbered = |first: u32, last: u32| {
+        let mut text = "time_s,lap,gps_lat,gps_long\n".to_owned();
+        for i in first..last {
+            let t = TAU * f64::from(i) / 300.0;
+            let (lat, lon) = places(&[DVec2::new(200.0 * t.cos(), 120.0 * t.sin())])[0];
+            let _ = writeln!(
+                text,
+                "{:.2},{},{lat:.9},{lon:.9}",
+                f64::from(i) * 0.1,
+                1 + i / 300
+            );
+        }
+        text
+    };
+    let name = |text: &str| parse(text, "outing.csv", &wide()).unwrap().name;
+    assert_eq!(name(&numbered(150, 1050)), "outing, lap 2");
+    // From line to line the first lap is one, as the second says.
+    assert_eq!(name(&numbered(0, 600)), "outing, lap 1");
+    let parts = refusal(&numbered(150, 500), "outing.csv", &wide());
+    assert!(parts.contains("no complete lap"), "{parts}");
+}
+
 #[test]
 fn a_motec_export_with_gps_becomes_a_line() {
     let mut text = "\"Format\",\"MoTeC CSV File\"\n\"Beacon Markers\",\"10.0 40.0 70.0\"\n\n\"Time\",\"GPS Latitude\",\"GPS \
@@ -271,6 +296,8 @@ fn a_motec_export_with_gps_becomes_a_line() {
     }
     let survey = parse(&text, "m.csv", &wide()).unwrap();
     assert!(survey.closed && survey.name == "m, lap 1");
+    let elsewhere = text.replace("10.0 40.0 70.0", "-90.0 -60.0 200.0 230.0");
+    assert!(refusal(&elsewhere, "m.csv", &wide()).contains("no complete lap"));
     let text = refusal(
         &text.replace("\"deg\",\"deg\"", "\"V\",\"deg\""),
         "m.csv",

@@ -117,12 +117,15 @@ impl EngineMap {
             Some("formula_one") => Some(FlowLimit::FORMULA_ONE),
             Some(_) => return Err(table.refuse("fuel_flow_limit", "\"none\" or \"formula_one\"")),
         };
+        let least = |key: &str, most: f64, unit: &str| -> Result<f64> {
+            Ok(table.number(key, 0.0, most, unit)?.unwrap_or(0.0))
+        };
         let flow_limit = match table.number("fuel_flow_most_kgph", 1.0, 1000.0, "kg/h")? {
             Some(most_kgph) => Some(FlowLimit {
                 most_kgph,
-                below_rpm: 0.0,
-                slope_kgph_per_rpm: 0.0,
-                offset_kgph: 0.0,
+                below_rpm: least("fuel_flow_below_rpm", 1e5, "rpm")?,
+                slope_kgph_per_rpm: least("fuel_flow_slope_kgph_per_rpm", 10.0, "kg/h per rpm")?,
+                offset_kgph: least("fuel_flow_offset_kgph", 1000.0, "kg/h")?,
             }),
             None => flow_limit,
         };
@@ -161,7 +164,15 @@ impl EngineMap {
         );
         match self.flow_limit {
             Some(FlowLimit::FORMULA_ONE) => text += "fuel_flow_limit = \"formula_one\"\n",
-            Some(limit) => text += &format!("fuel_flow_most_kgph = {:?}\n", limit.most_kgph),
+            Some(limit) => {
+                text += &format!("fuel_flow_most_kgph = {:?}\n", limit.most_kgph);
+                if limit.below_rpm > 0.0 {
+                    text += &format!(
+                        "fuel_flow_below_rpm = {:?}\nfuel_flow_slope_kgph_per_rpm = {:?}\nfuel_flow_offset_kgph = {:?}\n",
+                        limit.below_rpm, limit.slope_kgph_per_rpm, limit.offset_kgph
+                    );
+                }
+            }
             None => {}
         }
         text

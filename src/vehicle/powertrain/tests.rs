@@ -41,6 +41,29 @@ fn a_limit_of_the_flow_closes_the_throttle() {
     assert!((torque - 408.0 * share).abs() < 0.1, "{torque}");
 }
 
+/// A smaller engine under a limit as much smaller is written and read as it is: the line below 10500 rpm too.
+#[test]
+fn a_scaled_limit_of_the_flow_is_written_back_whole() {
+    let mut car = Car::load("gt_hybrid").unwrap();
+    let mut powertrain = car.powertrain.take().unwrap();
+    powertrain.engine.as_mut().unwrap().flow_limit = Some(FlowLimit::FORMULA_ONE);
+    car.powertrain = Some(powertrain.scaled(0.7));
+    let folder = tempfile::tempdir().unwrap();
+    car.write(folder.path(), "car").unwrap();
+    let back = Car::load(&folder.path().join("car.toml").display().to_string()).unwrap();
+    let limit = |car: &Car| {
+        car.powertrain
+            .as_ref()
+            .unwrap()
+            .engine
+            .as_ref()
+            .unwrap()
+            .flow_limit
+    };
+    assert_eq!(limit(&back), limit(&car));
+    assert!((limit(&back).unwrap().at(8000.0) - 0.7 * 77.5).abs() < 1e-9);
+}
+
 #[test]
 fn gears_give_most_force_and_shift_where_the_next_does() {
     let (powertrain, radius) = powertrain();

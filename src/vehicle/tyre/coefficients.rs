@@ -114,5 +114,6 @@ parameters! {
         ssz2: "sSz2" ["-"] -10.0..=10.0, Some(0.0), "variation of Fx moment arm with Fy";
         ssz3: "sSz3" ["-"] -100.0..=100.0, Some(0.0), "variation of Fx moment arm with camber";
         ssz4: "sSz4" ["-"] -100.0..=100.0, Some(0.0), "variation of Fx moment arm with camber and load";
+        tyre_side: "TYRESIDE" ["-"] -1.0..=1.0, Some(0.0), "side of its measurement: LEFT (1), RIGHT (-1) or UNKNOWN (0)";
     }
 }

@@ -75,6 +75,12 @@ fn pure_longitudinal<R: Real>(t: &MagicFormula<R>, load: Load<R>, slip_ratio: R)
     }
 }
 
+/// What terms are multiplied by that tell left from right without any camber: -1 where the mirror image of the tyre runs.
+#[inline(always)]
+fn mirror<R: Real>(t: &MagicFormula<R>, side: R) -> R {
+    t.as_measured + t.by_side * side
+}
+
 /// Pure side slip, with two figures for the residual moment: `By Cy` and `SHy + SVy/Ky`.
 #[inline(always)]
 fn pure_lateral<R: Real>(
@@ -83,21 +89,24 @@ fn pure_lateral<R: Real>(
     slip_tangent: R,
     side: R,
 ) -> (PureSlip<R>, R, R) {
-    let dfz = load.difference;
+    let (dfz, mirror) = (load.difference, mirror(t, side));
     let one = R::lit(1.0);
     let peak = (t.dy1 + t.dy2 * dfz) * load.force;
     // sin(2 atan z) = 2 z / (1 + z^2).
     let z = load.force * t.ky_load;
     let stiffness = t.ky * (z / (one + z * z));
     let slope = stiffness / peak;
-    let horizontal_shift = t.hy1 + t.hy2 * dfz + t.hy_camber * side;
-    let vertical_shift = load.force * ((t.vy1 + t.vy2 * dfz) + (t.vy_camber1 + t.vy_camber2 * dfz) * side);
+    let horizontal_shift = (t.hy1 + t.hy2 * dfz) * mirror + t.hy_camber * side;
+    let vertical_shift =
+        load.force * ((t.vy1 + t.vy2 * dfz) * mirror + (t.vy_camber1 + t.vy_camber2 * dfz) * side);
     let x = slip_tangent + horizontal_shift;
     let pure = PureSlip {
         curve: Curve {
             c: t.cy,
             b: slope * t.inverse_cy,
-            e: clamp_curvature((t.ey1 + t.ey2 * dfz) * (one - (t.ey3 + t.ey_camber * side) * x.sign())),
+            e: clamp_curvature(
+                (t.ey1 + t.ey2 * dfz) * (one - (t.ey3 * mirror + t.ey_camber * side) * x.sign()),
+            ),
             x,
         },
         peak,
@@ -113,11 +122,11 @@ fn longitudinal_weight<R: Real>(
     t: &MagicFormula<R>,
     load: Load<R>,
     slip_ratio: R,
-    slip_tangent: R,
+    (slip_tangent, mirror): (R, R),
 ) -> [Curve<R>; 2] {
     let b = t.rbx1 / (t.rbx2 * slip_ratio).sec_atan();
     let e = clamp_curvature(t.rex1 + t.rex2 * load.difference);
-    let (c, shift) = (t.rcx1, t.rhx1);
+    let (c, shift) = (t.rcx1, t.rhx1 * mirror);
     let x = slip_tangent + shift;
     [Curve { c, b, e, x }, Curve { c, b, e, x: shift }]
 }
@@ -128,9 +137,9 @@ fn lateral_weight<R: Real>(
     t: &MagicFormula<R>,
     load: Load<R>,
     slip_ratio: R,
-    slip_tangent: R,
+    (slip_tangent, mirror): (R, R),
 ) -> [Curve<R>; 2] {
-    let b = t.rby1 / (t.rby2 * (slip_tangent - t.rby3)).sec_atan();
+    let b = t.rby1 / (t.rby2 * (slip_tangent - t.rby3 * mirror)).sec_atan();
     let e = clamp_curvature(t.rey1 + t.rey2 * load.difference);
     let (c, shift) = (t.rcy1, t.rhy1 + t.rhy2 * load.difference);
     let x = slip_ratio + shift;
@@ -154,21 +163,23 @@ fn combined_slip<R: Real>(t: &MagicFormula<R>, input: TyreInput<R>) -> TyreForce
     };
     let (dfz, side, one) = (load.difference, input.side, R::lit(1.0));
     let (slip_ratio, slip_tangent) = (input.slip_ratio, input.slip_tangent);
+    let mirror = mirror(t, side);
     let pure_x = pure_longitudinal(t, load, slip_ratio);
     let (pure_y, slope, residual_shift) = pure_lateral(t, load, slip_tangent, side);
 
     // Each curve is a chain of an inner arc tangent, an outer one and a sine or cosine: `f` of a pure force, `w` of a weight and
     // `w0` of its shift, `m` of the trail. Curves of one kind are computed side by side.
-    let [wx, wx0] = longitudinal_weight(t, load, slip_ratio, slip_tangent);
-    let [wy, wy0] = lateral_weight(t, load, slip_ratio, slip_tangent);
+    let [wx, wx0] = longitudinal_weight(t, load, slip_ratio, (slip_tangent, mirror));
+    let [wy, wy0] = lateral_weight(t, load, slip_ratio, (slip_tangent, mirror));
     let (fx, fy) = (pure_x.curve, pure_y.curve);
 
     // Equivalent slip angles of the trail and the residual moment.
     let slip_share = pure_x.stiffness / pure_y.stiffness * slip_ratio;
-    let trail_x = slip_tangent + (t.ht1 + t.ht2 * dfz + (t.ht_camber1 + t.ht_camber2 * dfz) * side);
+    let trail_x =
+        slip_tangent + ((t.ht1 + t.ht2 * dfz) * mirror + (t.ht_camber1 + t.ht_camber2 * dfz) * side);
     let residual_x = slip_tangent + residual_shift;
     let [trail_tangent, residual_tangent] = R::tan_each([trail_x, residual_x]);
-    let trail_b = (t.bt1 + dfz * (t.bt2 + t.bt3 * dfz)) * (t.bt_even + t.bt_odd * side);
+    let trail_b = (t.bt1 + dfz * (t.bt2 + t.bt3 * dfz)) * (t.bt_even + t.bt_odd * (side * mirror));
     let [
         fx_atan,
         fy_atan,
@@ -200,7 +211,8 @@ fn combined_slip<R: Real>(t: &MagicFormula<R>, input: TyreInput<R>) -> TyreForce
         c: t.ct,
         b: trail_b,
         e: clamp_curvature(
-            (t.et1 + dfz * (t.et2 + t.et3 * dfz)) * (one + (t.et4 + t.et_camber * side) * trail_angle),
+            (t.et1 + dfz * (t.et2 + t.et3 * dfz))
+                * (one + (t.et4 * mirror + t.et_camber * side) * trail_angle),
         ),
         x: trail_slip,
     };
@@ -213,18 +225,19 @@ fn combined_slip<R: Real>(t: &MagicFormula<R>, input: TyreInput<R>) -> TyreForce
     let cos_m = (m.c * m_atan).cos_pi();
 
     let x = (pure_x.peak * sin_x + pure_x.vertical_shift) * (cos_wx / cos_wx0);
-    let amplitude = pure_y.peak * (t.rvy1 + t.rvy2 * dfz + t.rvy_camber * side);
+    let amplitude = pure_y.peak * ((t.rvy1 + t.rvy2 * dfz) * mirror + t.rvy_camber * side);
     let induced = amplitude / (t.rvy4 * slip_tangent).sec_atan() * sin_induced;
     let y = (pure_y.peak * sin_y + pure_y.vertical_shift) * (cos_wy / cos_wy0) + induced;
 
-    let d = load.force * (t.dt1 + t.dt2 * dfz) * (t.dt_even + t.dt_odd * side);
+    let d = load.force * (t.dt1 + t.dt2 * dfz) * (t.dt_even + t.dt_odd * (side * mirror));
     let trail = d * cos_m / slip_tangent.sec_atan();
     let residual_slope = t.br1 + t.br2 * slope;
     // This is the cosine of `a* = tan(alpha)` itself, as in the reference implementation. The trail uses another cosine.
-    let residual_peak =
-        load.force * (t.dr1 + t.dr2 * dfz + (t.dr_camber1 + t.dr_camber2 * dfz) * side) * slip_tangent.cos();
+    let residual_peak = load.force
+        * ((t.dr1 + t.dr2 * dfz) * mirror + (t.dr_camber1 + t.dr_camber2 * dfz) * side)
+        * slip_tangent.cos();
     let residual = residual_peak / (residual_slope * residual_slip).sec_atan();
-    let arm = t.s1 + t.s2 * y + (t.s_camber1 + t.s_camber2 * dfz) * side;
+    let arm = t.s1 * mirror + t.s2 * y + (t.s_camber1 + t.s_camber2 * dfz) * side;
     let moment = residual - trail * (y - induced) + arm * x;
 
     let zero = R::lit(0.0);

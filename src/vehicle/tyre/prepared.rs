@@ -9,7 +9,9 @@ fields! {
     /// Magic Formula 5.2 of one axle, with its static camber folded in. Twin of `MagicFormula` in `shaders/tyre.wgsl`.
     ///
     /// Terms odd in camber hold for the left wheel and are multiplied by the side (`+1` left, `-1` right), on which the same
-    /// camber leans the other way; even terms hold for both. The shape factors that multiply an angle (`cx`, `cy`, `rcx1`,
+    /// camber leans the other way; even terms hold for both. Terms that tell left from right without any camber hold for the side on
+    /// which the tyre was measured: on the other its mirror image runs, and they are multiplied by `as_measured + by_side side`,
+    /// which is 1 on both sides where nobody says which it was. The shape factors that multiply an angle (`cx`, `cy`, `rcx1`,
     /// `rcy1`, `rvy5` and `ct`) are divided by pi, so that the product is in half turns; `bct` is the shape factor of the trail,
     /// undivided.
     pub struct MagicFormula {
@@ -24,6 +26,7 @@ fields! {
         ht1, ht2, ht_camber1, ht_camber2,
         br1, br2, dr1, dr2, dr_camber1, dr_camber2,
         s1, s2, s_camber1, s_camber2,
+        as_measured, by_side,
     }
 }
 
@@ -133,6 +136,8 @@ impl<R: Real> TyreCoefficients<R> {
             s2: self.ssz2 * arm_scale / self.fnomin,
             s_camber1: self.ssz3 * gamma_z * arm_scale,
             s_camber2: self.ssz4 * gamma_z * arm_scale,
+            as_measured: one - self.tyre_side * self.tyre_side,
+            by_side: self.tyre_side,
         }
     }
 }

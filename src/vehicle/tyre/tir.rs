@@ -42,6 +42,7 @@ fn tir_section(name: &str) -> &'static str {
     match name.as_bytes() {
         b"R0" => "DIMENSION",
         b"FNOMIN" => "VERTICAL",
+        b"TYRESIDE" => "MODEL",
         [b'l', ..] => "SCALING_COEFFICIENTS",
         [b'q' | b's', ..] => "ALIGNING_COEFFICIENTS",
         [b'p', _, axis, ..] | [b'r', _, axis, ..] if *axis == b'x' => "LONGITUDINAL_COEFFICIENTS",
@@ -54,6 +55,26 @@ fn split_comment(text: &str) -> (&str, &str) {
     match text.find(['$', '!']) {
         Some(at) => (text[..at].trim(), text[at..].trim_end()),
         None => (text.trim(), ""),
+    }
+}
+
+/// The key whose value is a word.
+const SIDE: &str = "TYRESIDE";
+/// Its words and their values.
+const SIDES: [(&str, f64); 4] = [
+    ("LEFT", 1.0),
+    ("RIGHT", -1.0),
+    ("SYMMETRIC", 0.0),
+    ("UNKNOWN", 0.0),
+];
+
+/// The line of a parameter.
+fn entry(name: &str, value: f64) -> String {
+    let key = tir_key(name);
+    let is = |side: f64| side.to_bits() == value.to_bits();
+    match SIDES.iter().find(|(_, side)| key == SIDE && is(*side)) {
+        Some((word, _)) => format!("{key:<24} = '{word}'"),
+        None => format!("{key:<24} = {value}"),
     }
 }
 
@@ -129,17 +150,16 @@ impl TyreFile {
                 continue;
             };
             let info = &table[index];
-            let parsed = value
-                .parse::<f64>()
-                .ok()
-                .filter(|x| info.admits(*x))
-                .ok_or_else(|| {
-                    let expected = format!(
-                        "a number from {} to {} ({})",
-                        info.minimum, info.maximum, info.meaning
-                    );
-                    Error::input(file, place(&key), value, expected)
-                })?;
+            let side = SIDES.iter().find(|(word, _)| value.eq_ignore_ascii_case(word));
+            let side = side.filter(|_| key == SIDE).map(|(_, side)| *side);
+            let number = side.or_else(|| value.parse::<f64>().ok());
+            let parsed = number.filter(|x| info.admits(*x)).ok_or_else(|| {
+                let expected = format!(
+                    "a number from {} to {} ({})",
+                    info.minimum, info.maximum, info.meaning
+                );
+                Error::input(file, place(&key), value, expected)
+            })?;
             if values[index].replace(parsed).is_some() {
                 return Err(Error::input(
                     file,
@@ -219,7 +239,7 @@ impl TyreFile {
                 !written.contains(i) && table[*i].default.map(f64::to_bits) != Some(flat[*i].to_bits())
             })
             .collect();
-        let entry = |index: usize| format!("{:<24} = {}", tir_key(table[index].name), flat[index]);
+        let entry = |index: usize| entry(table[index].name, flat[index]);
         let mut text = String::new();
         for line in &self.lines {
             match line {
