@@ -17,7 +17,7 @@ const OTHERS: [&str; 4] = ["sweep", "car", "track", "channels"];
 #[derive(clap::Args)]
 #[command(after_help = after_help())]
 pub struct Arguments {
-    /// What to write: a study's file, a sweep over a grid, a car with its tyre beside it, or a circuit from a survey, or a channel map
+    /// What to write: a study's file, a sweep over a grid, a car with its tyre beside it, a circuit from a survey, or a channel map
     #[arg(value_parser = PossibleValuesParser::new(registry::names().into_iter().chain(OTHERS)))]
     what: String,
     /// Where to [default: its name and .toml]; refused if it exists

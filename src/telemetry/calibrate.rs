@@ -4,11 +4,13 @@
 //! which the car turns full circles and ends where it began, or from standstill; a rolling radius from wheels that roll freely.
 
 use super::calibration::{CalibrationOptions, Declared, Finding, FindingKind, Switch};
-use super::derived::{SURE_OF_SIGN, acceleration, front_difference, moving, product, unbraked};
+use super::derived::{
+    STRAIGHT_YAW, SURE_OF_SIGN, UNBRAKED_AX, acceleration, front_difference, moving, product, unbraked,
+};
 use super::laps::Lap;
 use super::log::Log;
 use super::role::Role;
-use super::statistics::{Fit, fit, regression};
+use super::statistics::{Fit, derivative, fit, regression};
 use std::f64::consts::TAU;
 
 /// Standing still, m/s.
@@ -30,8 +32,10 @@ const SURE_OFFSET: f64 = 3.0;
 /// Speed (m/s) below which wheel speeds are too coarse for a rolling radius.
 const ROLLING_MPS: f64 = 12.0;
 /// Least error of a radius that is corrected, as a share of it: of wheels that roll freely, and of driven ones, whose slip under
-/// power looks like a smaller radius.
-const LEAST_RADIUS: [f64; 2] = [0.002, 0.02];
+/// power looks like a smaller radius: that against drag is half a per cent.
+const LEAST_RADIUS: [f64; 2] = [0.002, 0.01];
+/// Half of the interval over which speed is differentiated for slip, s.
+const SLIP_S: f64 = 0.3;
 /// Radii are off by this many standard errors, at least.
 const SURE_RADIUS: f64 = 4.0;
 
@@ -52,7 +56,7 @@ fn signs(log: &mut Log, declared: &Declared) {
     let (moving, accel) = (moving(log), acceleration(log));
     if let Some(difference) = front_difference(log) {
         let yaw = log.yaw_rate_radps.clone();
-        let found = fit(&yaw, &difference, &unbraked(log, &accel), 0);
+        let found = fit(&yaw, &difference, &unbraked(log, &accel));
         let evidence = match found {
             Some(f) => format!(
                 "against the speed difference of the front wheels, which makes the front track about {:.1} m",
@@ -63,7 +67,7 @@ fn signs(log: &mut Log, declared: &Declared) {
         sign(log, declared, Role::YawRate, found, &evidence);
     }
     let turning = product(&log.vx_mps, &log.yaw_rate_radps);
-    let found = fit(&turning, &log.ay_mps2, &moving, 0);
+    let found = fit(&turning, &log.ay_mps2, &moving);
     sign(
         log,
         declared,
@@ -72,7 +76,7 @@ fn signs(log: &mut Log, declared: &Declared) {
         "against ground speed times yaw rate",
     );
     gain(log, Role::Ay, found, "ground speed times yaw rate");
-    let found = fit(&accel, &log.ax_mps2, &moving, 0);
+    let found = fit(&accel, &log.ax_mps2, &moving);
     sign(
         log,
         declared,
@@ -81,7 +85,7 @@ fn signs(log: &mut Log, declared: &Declared) {
         "against the change of ground speed",
     );
     gain(log, Role::Ax, found, "the change of ground speed");
-    let found = fit(&log.yaw_rate_radps, &log.steer_rad, &moving, 0);
+    let found = fit(&log.yaw_rate_radps, &log.steer_rad, &moving);
     sign(log, declared, Role::Steer, found, "against yaw rate");
 }
 
@@ -303,32 +307,32 @@ fn take_off(log: &mut Log, role: Role, offset: Option<Offset>, least: f64) {
     });
 }
 
-/// A share by which wheels turn too fast on a straight at steady speed.
+/// A share by which wheels turn too fast where nothing makes them slip.
 struct Excess {
     value: f64,
     standard_error: f64,
     samples: usize,
 }
 
-/// The part of `excess` that neither turning nor, of driven wheels, the force that accelerates the car explains.
-fn steady(log: &Log, excess: &[f64], driven: Option<&[f64]>, mask: &[bool]) -> Option<Excess> {
-    let one = vec![1.0; log.samples()];
-    let speeds = log.vx_mps.iter().map(|v| v.max(1.0));
-    let turning: Vec<f64> = log
-        .yaw_rate_radps
-        .iter()
-        .zip(speeds)
-        .map(|(r, v)| r / v)
+/// The part of `excess` that neither turning nor, of driven wheels, slip explains. On straights slip goes with acceleration; in
+/// bends it depends on more than that.
+fn steady(log: &Log, excess: &[f64], driven: bool) -> Option<Excess> {
+    let free_rolling = unbraked(log, &acceleration(log));
+    // Over so long that noise does not make slip look less than it is.
+    let accel = derivative(&log.vx_mps, log.dt_s, (SLIP_S / log.dt_s).ceil() as usize);
+    let straight = |i: usize| accel[i] > UNBRAKED_AX && log.yaw_rate_radps[i].abs() < STRAIGHT_YAW;
+    let mask: Vec<bool> = (0..log.samples())
+        .map(|i| free_rolling[i] && log.vx_mps[i] > ROLLING_MPS && (!driven || straight(i)))
         .collect();
-    let (value, standard_error, samples) = match driven {
-        Some(accel) => {
-            let found = regression(excess, [&one, &turning, accel], mask)?;
-            (found.factors[0], found.standard_errors[0], found.samples)
-        }
-        None => {
-            let found = regression(excess, [&one, &turning], mask)?;
-            (found.factors[0], found.standard_errors[0], found.samples)
-        }
+    let one = vec![1.0; log.samples()];
+    let per_metre = log.yaw_rate_radps.iter().zip(&log.vx_mps);
+    let turning: Vec<f64> = per_metre.map(|(r, v)| r / v.max(1.0)).collect();
+    let (value, standard_error, samples) = if driven {
+        let found = regression(excess, [&one, &turning, &accel], &mask)?;
+        (found.factors[0], found.standard_errors[0], found.samples)
+    } else {
+        let found = regression(excess, [&one, &turning], &mask)?;
+        (found.factors[0], found.standard_errors[0], found.samples)
     };
     Some(Excess {
         value,
@@ -340,10 +344,6 @@ fn steady(log: &Log, excess: &[f64], driven: Option<&[f64]>, mask: &[bool]) -> O
 /// Refers wheel speeds to the radius of their own axle. What both wheels of an axle have in common and what they differ by are
 /// judged apart: slip is common to both, and a difference is not slip.
 fn rolling_radii(log: &mut Log, declared: &Declared) {
-    let accel = acceleration(log);
-    let free_rolling = unbraked(log, &accel);
-    let pairs = log.vx_mps.iter().zip(free_rolling);
-    let mask: Vec<bool> = pairs.map(|(v, free)| free && *v > ROLLING_MPS).collect();
     for (axle, [left, right]) in [[0, 1], [2, 3]].into_iter().enumerate() {
         let driven = (axle == 1) != declared.rear_is_undriven;
         let reference_m = declared.rolling_radius_m.map(|radii| radii[axle]);
@@ -355,9 +355,8 @@ fn rolling_radii(log: &mut Log, declared: &Declared) {
                 .map(|i| combined(rim(left, i), rim(right, i)))
                 .collect()
         };
-        let slip = driven.then_some(&accel[..]);
-        let common = steady(log, &of_wheels(|l, r| (l + r) / 2.0 - 1.0), slip, &mask);
-        let half = steady(log, &of_wheels(|l, r| (r - l) / 2.0), slip, &mask);
+        let common = steady(log, &of_wheels(|l, r| (l + r) / 2.0 - 1.0), driven);
+        let half = steady(log, &of_wheels(|l, r| (r - l) / 2.0), driven);
         let (Some(common), Some(half)) = (common, half) else {
             log.calibration.notes.push(format!(
                 "{}, {}: too little driving without braking to tell their rolling radii",
@@ -433,8 +432,7 @@ mod tests {
         yaw_offset: 0.004,
         ay_offset: 0.3,
     };
-    /// The rear ones are further off the car's 0.325 m than slip under power could explain.
-    const RADII: [f64; 4] = [0.321, 0.324, 0.338, 0.341];
+    const RADII: [f64; 4] = [0.321, 0.324, 0.328, 0.331];
 
     fn read(map: &str) -> Log {
         let car = Car {
@@ -452,7 +450,10 @@ mod tests {
         // The lag of ay is the car's own, as far as the log tells: it is declared.
         let log = read("[vehicle]\nrolling_radius_m = 0.325\n[channels.ay]\ndelay_s = 0.12");
         let c = &log.calibration;
-        let delay = |role| c.applied(role, FindingKind::Delay).unwrap();
+        let delay = |role| {
+            c.applied(role, FindingKind::Delay)
+                .unwrap_or_else(|| panic!("{role:?}: {c:#?}"))
+        };
         for (role, injected) in [
             (Role::Vx, 0.07),
             (Role::WheelSpeedFl, 0.03),
@@ -504,7 +505,9 @@ mod tests {
         let c = &log.calibration;
         assert_eq!(c.applied(Role::Steer, FindingKind::Sign), None);
         assert_eq!(c.finding(Role::Steer, FindingKind::Sign).unwrap().value, 1.0);
-        let ax = c.finding(Role::Ax, FindingKind::Delay).unwrap();
+        let ax = c
+            .finding(Role::Ax, FindingKind::Delay)
+            .unwrap_or_else(|| panic!("{c:#?}"));
         assert!(!ax.applied && ax.value.abs() < 0.005, "{ax:?}");
         // Without a reference radius the radii are reported and nothing is scaled.
         let fl = c.finding(Role::WheelSpeedFl, FindingKind::RollingRadius).unwrap();

@@ -31,7 +31,7 @@ pub(super) struct Evidence<'a> {
     pub declared: &'a Declared,
     /// The wheels of the axle that is not driven, left and right.
     pub undriven: [usize; 2],
-    /// Whether two channels were sampled at the same times.
+    /// Whether two channels are known to have been sampled at the same times.
     pub one_clock: &'a dyn Fn(Role, Role) -> bool,
 }
 

@@ -10,7 +10,7 @@ const DERIVATIVE_S: f64 = 0.1;
 /// Limit of the front wheels' speed difference, in multiples of its 90 % quantile.
 const CLIP: f64 = 2.0;
 /// Value of ax (m/s^2) above which the brakes are hardly on.
-const UNBRAKED_AX: f64 = -1.0;
+pub(super) const UNBRAKED_AX: f64 = -1.0;
 /// On a straight yaw rate (rad/s) stays within this of its offset.
 pub(super) const STRAIGHT_YAW: f64 = 0.03;
 /// Evidence from a straight or standstill needs this much of it, s.

@@ -1,5 +1,7 @@
 //! The few statistics that calibration needs.
 
+use nalgebra::{SMatrix, SVector};
+
 /// The value below which the share `share` of `values` lies; none for no values.
 pub(super) fn quantile(mut values: Vec<f64>, share: f64) -> Option<f64> {
     let last = values.len().checked_sub(1)?;
@@ -23,15 +25,12 @@ pub(super) struct Fit {
     pub samples: usize,
 }
 
-/// Correlation of `a[i]` with `b[i + lag]` over the samples that `mask` allows; none when fewer than ten are left or
-/// one of the two does not vary.
-pub(super) fn fit(a: &[f64], b: &[f64], mask: &[bool], lag: isize) -> Option<Fit> {
+/// Correlation of two signals over the samples that `mask` allows; none when fewer than ten are left or one of the two does not
+/// vary.
+pub(super) fn fit(a: &[f64], b: &[f64], mask: &[bool]) -> Option<Fit> {
     let pairs = || {
-        a.iter()
-            .zip(mask)
-            .enumerate()
-            .filter(|(_, (_, allowed))| **allowed)
-            .filter_map(|(i, (x, _))| Some((*x, *b.get(i.checked_add_signed(lag)?)?)))
+        let pairs = a.iter().zip(b).zip(mask);
+        pairs.filter(|(_, allowed)| **allowed).map(|((x, y), _)| (*x, *y))
     };
     let (mut n, mut sum_a, mut sum_b) = (0_usize, 0.0, 0.0);
     for (x, y) in pairs() {
@@ -61,101 +60,93 @@ pub(super) fn fit(a: &[f64], b: &[f64], mask: &[bool], lag: isize) -> Option<Fit
 /// Parts of a log that standard errors come from: each part is left out once (a jackknife), so that errors that last for some
 /// seconds do not make an estimate look better than it is.
 const PARTS: usize = 8;
-/// Errors above this many robust standard deviations (spikes, locked wheels) do not count.
-const SPIKE: f64 = 3.0;
+/// Share of the errors that no spike is among. It is more than half: on straights, where a car mostly is, there is little to be
+/// wrong, and what is said in bends is no spike.
+const USUAL: f64 = 0.8;
+/// Errors above this many times the usual ones (spikes, locked wheels) count as no more: three standard deviations.
+const SPIKE: f64 = 3.0 / 1.2816;
 /// Rounds in which spikes are found.
 const ROUNDS: usize = 4;
 /// Samples beyond which every second one, or fewer, are used: what the road and the car do limits an estimate, not their number.
-const MOST_SAMPLES: usize = 50_000;
+const MOST_SAMPLES: usize = 20_000;
 /// Fewest samples for an estimate with a standard error.
 const LEAST_SAMPLES: usize = 10 * PARTS;
+
+/// Share of a column's square that must be its own: less is rounding.
+const NOTHING_NEW: f64 = 1e-10;
 
 /// The sums of a least-squares fit on `P` columns.
 #[derive(Clone, Copy)]
 struct Sums<const P: usize> {
-    gram: [[f64; P]; P],
-    moment: [f64; P],
+    gram: SMatrix<f64, P, P>,
+    moment: SVector<f64, P>,
     square: f64,
 }
 
 impl<const P: usize> Sums<P> {
-    const NONE: Self = Self {
-        gram: [[0.0; P]; P],
-        moment: [0.0; P],
-        square: 0.0,
-    };
-
-    fn add(&mut self, x: [f64; P], y: f64) {
-        for i in 0..P {
-            for j in 0..P {
-                self.gram[i][j] += x[i] * x[j];
-            }
-            self.moment[i] += x[i] * y;
+    fn none() -> Self {
+        Self {
+            gram: SMatrix::zeros(),
+            moment: SVector::zeros(),
+            square: 0.0,
         }
+    }
+
+    fn add(&mut self, x: &SVector<f64, P>, y: f64) {
+        self.gram += x * x.transpose();
+        self.moment += x * y;
         self.square += y * y;
     }
 
     /// These sums and those of another part, times `sign`.
     fn with(mut self, other: &Self, sign: f64) -> Self {
-        for i in 0..P {
-            for j in 0..P {
-                self.gram[i][j] += sign * other.gram[i][j];
-            }
-            self.moment[i] += sign * other.moment[i];
-        }
-        self.square += sign * other.square;
+        self.gram += other.gram * sign;
+        self.moment += other.moment * sign;
+        self.square += other.square * sign;
         self
     }
 
-    /// The coefficients; none where the columns do not tell them apart.
-    fn solve(&self) -> Option<[f64; P]> {
-        // Gaussian elimination on columns scaled to one; the matrix is symmetric and positive.
-        let scale: [f64; P] = std::array::from_fn(|i| self.gram[i][i].sqrt());
-        if scale.iter().any(|s| !(s.is_finite() && *s > 0.0)) {
-            return None;
-        }
-        let mut a = self.gram;
-        let mut b = self.moment;
-        for i in 0..P {
-            b[i] /= scale[i];
-            for j in 0..P {
-                a[i][j] /= scale[i] * scale[j];
+    /// The factors, that of a column being zero where it is a sum of those before it; none where there are no figures.
+    fn solve(&self) -> Option<SVector<f64, P>> {
+        // Columns scaled to one, so that their units do not matter.
+        let scale = self
+            .gram
+            .diagonal()
+            .map(|square| if square > 0.0 { square.sqrt() } else { 1.0 });
+        let mut matrix = self.gram.component_div(&(scale * scale.transpose()));
+        let mut factors = self.moment.component_div(&scale);
+        let mut told = [false; P];
+        for (i, told) in told.iter_mut().enumerate() {
+            let pivot = matrix[(i, i)];
+            *told = pivot > NOTHING_NEW;
+            if *told {
+                let row = matrix.row(i) / pivot;
+                let factor = factors[i] / pivot;
+                let above = matrix.column(i).into_owned();
+                matrix -= above * row;
+                factors -= above * factor;
+                matrix.set_row(i, &row);
+                factors[i] = factor;
             }
         }
-        for i in 0..P {
-            if a[i][i] < 1e-10 {
-                return None;
-            }
-            for k in i + 1..P {
-                let factor = a[k][i] / a[i][i];
-                for j in i..P {
-                    a[k][j] -= factor * a[i][j];
-                }
-                b[k] -= factor * b[i];
-            }
-        }
-        let mut x = [0.0; P];
-        for i in (0..P).rev() {
-            let known: f64 = (i + 1..P).map(|j| a[i][j] * x[j]).sum();
-            x[i] = (b[i] - known) / a[i][i];
-        }
-        Some(std::array::from_fn(|i| x[i] / scale[i]))
+        let factors = SVector::from_fn(|i, _| if told[i] { factors[i] / scale[i] } else { 0.0 });
+        (told.contains(&true) && factors.iter().all(|f| f.is_finite())).then_some(factors)
     }
 
     /// Sum of the squared errors that remain.
     fn remaining(&self) -> Option<f64> {
-        let x = self.solve()?;
-        let explained: f64 = x.iter().zip(&self.moment).map(|(x, m)| x * m).sum();
-        Some((self.square - explained).max(0.0))
+        Some((self.square - self.solve()?.dot(&self.moment)).max(0.0))
     }
 }
 
-/// Samples of a fit of one signal on `P` columns, cut into parts, without spikes.
+/// Samples of a fit of one signal on `P` columns, cut into parts. A spike counts as an error of the limit, at every lag: it may be
+/// in the signal or in a column, and a lag moves it to other samples.
 struct Chosen<'a, const P: usize> {
     signal: &'a [f64],
     columns: [&'a [f64]; P],
     samples: Vec<usize>,
-    kept: Vec<bool>,
+    factors: SVector<f64, P>,
+    limit: f64,
 }
 
 impl<'a, const P: usize> Chosen<'a, P> {
@@ -166,29 +157,35 @@ impl<'a, const P: usize> Chosen<'a, P> {
         let step = 1 + last.saturating_sub(most) / MOST_SAMPLES;
         let samples: Vec<usize> = (most..last).step_by(step).filter(allowed).collect();
         (samples.len() >= LEAST_SAMPLES).then(|| Self {
-            kept: vec![true; samples.len()],
             signal,
             columns,
             samples,
+            factors: SVector::zeros(),
+            limit: f64::INFINITY,
         })
     }
 
-    fn row(&self, sample: usize, lag: isize) -> Option<([f64; P], f64)> {
-        let y = self.signal.get(sample.checked_add_signed(lag)?)?;
-        Some((std::array::from_fn(|k| self.columns[k][sample]), *y))
+    /// The columns' values and the signal's, `lag` later, and the error of the last round's factors.
+    fn row(&self, sample: usize, lag: isize) -> Option<(SVector<f64, P>, f64, f64)> {
+        let y = *self.signal.get(sample.checked_add_signed(lag)?)?;
+        let x = SVector::from_fn(|k, _| self.columns[k][sample]);
+        Some((x, y, (y - x.dot(&self.factors)).abs()))
+    }
+
+    fn rows(&self, lag: isize) -> impl Iterator<Item = (SVector<f64, P>, f64, f64)> {
+        self.samples
+            .iter()
+            .filter_map(move |&sample| self.row(sample, lag))
     }
 
     fn parts(&self, lag: isize) -> [Sums<P>; PARTS] {
-        let mut parts = [Sums::NONE; PARTS];
-        for (at, (&sample, _)) in self
-            .samples
-            .iter()
-            .zip(&self.kept)
-            .enumerate()
-            .filter(|(_, (_, k))| **k)
-        {
-            if let Some((x, y)) = self.row(sample, lag) {
-                parts[at * PARTS / self.samples.len()].add(x, y);
+        let mut parts = [Sums::none(); PARTS];
+        for (at, (x, y, error)) in self.rows(lag).enumerate() {
+            let part = &mut parts[at * PARTS / self.samples.len()];
+            if error <= self.limit {
+                part.add(&x, y);
+            } else {
+                part.square += self.limit * self.limit;
             }
         }
         parts
@@ -196,44 +193,32 @@ impl<'a, const P: usize> Chosen<'a, P> {
 
     fn whole(&self, lag: isize) -> Sums<P> {
         let parts = self.parts(lag);
-        parts.iter().fold(Sums::NONE, |all, part| all.with(part, 1.0))
+        parts.iter().fold(Sums::none(), |all, part| all.with(part, 1.0))
     }
 
-    /// Keeps what is no spike beside the fit at a lag.
-    fn sift(&mut self, lag: isize) -> Option<()> {
-        let coefficients = self.whole(lag).solve()?;
-        let error = |sample: usize| {
-            let Some((x, y)) = self.row(sample, lag) else {
-                return 0.0;
-            };
-            let fitted: f64 = x.iter().zip(&coefficients).map(|(x, c)| x * c).sum();
-            (y - fitted).abs()
-        };
-        let errors: Vec<f64> = self.samples.iter().map(|&sample| error(sample)).collect();
-        // A median error of rounding only: then there are no spikes.
+    /// Fits the factors at a lag, and sets the limit to what is usual at `lags`.
+    fn sift(&mut self, lag: isize, lags: &[isize]) -> Option<()> {
+        self.factors = self.whole(lag).solve()?;
+        // Errors of rounding only are no measure: then there are no spikes.
         let size = self.signal.iter().fold(0.0f64, |most, y| most.max(y.abs()));
-        let limit = SPIKE * (1.4826 * median(errors.clone())?).max(1e-9 * size);
-        let kept: Vec<bool> = errors.iter().map(|e| *e <= limit).collect();
-        if kept.iter().filter(|k| **k).count() >= LEAST_SAMPLES {
-            self.kept = kept;
-        }
+        let usual = lags
+            .iter()
+            .filter_map(|&lag| quantile(self.rows(lag).map(|(_, _, error)| error).collect(), USUAL));
+        self.limit = SPIKE * usual.fold(1e-9 * size, f64::max);
         Some(())
     }
 
-    /// Squared deviations of the signal from its mean at a lag, summed.
-    fn variance(&self, lag: isize) -> f64 {
-        let kept = self.samples.iter().zip(&self.kept).filter(|(_, kept)| **kept);
-        let (mut n, mut sum, mut square) = (0.0, 0.0, 0.0);
-        for (_, y) in kept.filter_map(|(&sample, _)| self.row(sample, lag)) {
-            n += 1.0;
+    /// Share of the signal's variance at a lag that the factors account for, and the number of samples, both without spikes.
+    fn followed(&self, lag: isize) -> (f64, usize) {
+        let (mut n, mut sum, mut square, mut errors) = (0_usize, 0.0, 0.0, 0.0);
+        for (_, y, error) in self.rows(lag).filter(|(_, _, error)| *error <= self.limit) {
+            n += 1;
             sum += y;
             square += y * y;
+            errors += error * error;
         }
-        square - sum * sum / f64::max(n, 1.0)
-    }
-
-    fn used(&self) -> usize {
-        self.kept.iter().filter(|k| **k).count()
+        let variance = square - sum * sum / n.max(1) as f64;
+        (1.0 - errors / variance.max(f64::MIN_POSITIVE), n)
     }
 }
 
@@ -263,20 +248,20 @@ pub(super) fn regression<const P: usize>(
 ) -> Option<Regression<P>> {
     let mut chosen = Chosen::new(signal, columns, mask, 0)?;
     for _ in 1..ROUNDS {
-        chosen.sift(0)?;
+        chosen.sift(0, &[0])?;
     }
     let whole = chosen.whole(0);
     let mut without = [[0.0; PARTS]; P];
     for (at, part) in chosen.parts(0).iter().enumerate() {
         let factors = whole.with(part, -1.0).solve()?;
-        for (estimates, factor) in without.iter_mut().zip(factors) {
-            estimates[at] = factor;
+        for (estimates, factor) in without.iter_mut().zip(&factors) {
+            estimates[at] = *factor;
         }
     }
     Some(Regression {
-        factors: whole.solve()?,
+        factors: whole.solve()?.into(),
         standard_errors: without.map(jackknife),
-        samples: chosen.used(),
+        samples: chosen.followed(0).1,
     })
 }
 
@@ -295,18 +280,25 @@ pub(super) struct Lag {
     pub used: usize,
 }
 
-/// The lag within `-most..=most` samples with the highest score, first in steps and then around the best step: scores change
-/// little over a twentieth of the range, and there are many lags at high sample rates.
-fn search(most: isize, score: impl Fn(isize) -> Option<f64>) -> Option<isize> {
-    let best = |lags: &mut dyn Iterator<Item = isize>| {
-        lags.filter_map(|lag| Some((lag, score(lag)?)))
-            .max_by(|(_, a), (_, b)| a.total_cmp(b))
-            .map(|(lag, _)| lag)
-    };
-    let step = (most / 20).max(1);
-    let reach = most / step;
-    let near = best(&mut (-reach..=reach).map(|k| k * step))?;
-    best(&mut ((near - step).max(-most)..=(near + step).min(most)))
+/// The lag within `-most..=most` samples with the least error: in coarse steps first, then in ever finer ones around the best.
+/// Errors change little over a twentieth of the range, and there are many lags at high sample rates.
+fn search(most: isize, error: impl Fn(isize) -> Option<f64>) -> Option<isize> {
+    let mut step = (most / 20).max(1);
+    let (mut best, mut reach) = (0, most / step);
+    loop {
+        let near = (-reach..=reach)
+            .map(|k| best + k * step)
+            .filter(|lag| lag.abs() <= most);
+        best = near
+            .filter_map(|lag| Some((lag, error(lag)?)))
+            .min_by(|(_, a), (_, b)| a.total_cmp(b))?
+            .0;
+        if step == 1 {
+            return Some(best);
+        }
+        let finer = (step / 5).max(1);
+        (step, reach) = (finer, step / finer);
+    }
 }
 
 /// Where the parabola through three values at -1, 0 and 1 is least.
@@ -328,18 +320,18 @@ pub(super) fn best_lag<const P: usize>(
 ) -> Option<Lag> {
     let mut chosen = Chosen::new(signal, columns, mask, most)?;
     let most = isize::try_from(most).ok()?;
-    let mut lag = 0;
-    for round in 0..ROUNDS {
-        lag = search(most, |lag| chosen.whole(lag).remaining().map(|e| -e))?;
-        if round + 1 < ROUNDS {
-            chosen.sift(lag)?;
-        }
+    let least = |chosen: &Chosen<'_, P>| search(most, |lag| chosen.whole(lag).remaining());
+    let mut lag = least(&chosen)?;
+    for _ in 1..ROUNDS {
+        // Errors one sample off are usual too, or nothing would tell how the errors grow.
+        chosen.sift(lag, &[lag - 1, lag, lag + 1])?;
+        lag = least(&chosen)?;
     }
     if lag.abs() == most {
         return None;
     }
     let around = [lag - 1, lag, lag + 1].map(|lag| chosen.parts(lag));
-    let wholes = around.map(|parts| parts.iter().fold(Sums::NONE, |all, part| all.with(part, 1.0)));
+    let wholes = around.map(|parts| parts.iter().fold(Sums::none(), |all, part| all.with(part, 1.0)));
     let errors = |sums: [Sums<P>; 3]| -> Option<[f64; 3]> {
         let [before, here, after] = sums.map(|s| s.remaining());
         Some([before?, here?, after?])
@@ -356,6 +348,7 @@ pub(super) fn best_lag<const P: usize>(
     let (low, share) = (expected.floor(), expected - expected.floor());
     let at = |lag: f64| chosen.whole(lag as isize).remaining();
     let null = (1.0 - share) * at(low)? + share * at((low + 1.0).min(most as f64))?;
+    let (follows, used) = chosen.followed(lag);
     Some(Lag {
         samples: lag as f64 + between,
         standard_error: jackknife(without),
@@ -364,8 +357,8 @@ pub(super) fn best_lag<const P: usize>(
         } else {
             0.0
         },
-        follows: 1.0 - remaining / chosen.variance(lag).max(f64::MIN_POSITIVE),
-        used: chosen.used(),
+        follows,
+        used,
     })
 }
 
@@ -456,6 +449,16 @@ mod tests {
             (found.factors[0] - 1.0).abs() < 1e-9 && found.factors[1].abs() < 1e-9,
             "{found:?}"
         );
+    }
+
+    #[test]
+    fn a_column_that_says_nothing_new_has_no_factor() {
+        let (x, one, still) = (wave(0.0), vec![1.0; 800], vec![3e-7; 800]);
+        let y: Vec<f64> = x.iter().map(|x| 3.0 * x + 0.5).collect();
+        let found = regression(&y, [&one, &still, &x], &[true; 800]).unwrap();
+        let [mean, nothing, slope] = found.factors;
+        assert!((mean - 0.5).abs() < 1e-9 && nothing == 0.0 && (slope - 3.0).abs() < 1e-9);
+        assert!(regression(&y, [&vec![0.0; 800]], &[true; 800]).is_none());
     }
 
     #[test]

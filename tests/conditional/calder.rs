@@ -60,7 +60,7 @@ fn check_calibration(log: &Log) {
     assert_eq!(c.applied(Role::YawRate, FindingKind::Offset), None);
     let ay = c.applied(Role::Ay, FindingKind::Offset).unwrap();
     assert!((0.5..0.75).contains(&ay), "{ay}");
-    for role in [Role::WheelSpeedFl, Role::WheelSpeedFr] {
+    for role in Role::WHEELS {
         let radius = c.finding(role, FindingKind::RollingRadius).unwrap().value;
         assert!((radius - 0.325).abs() < 0.002, "{role:?} {radius}");
     }
