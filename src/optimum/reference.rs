@@ -19,6 +19,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// point.
 pub struct ReferenceSolvers {
     cross_sections: CrossSections,
+    /// The same road at close steps, which lines taken anew about another keep within.
+    close: Option<CrossSections>,
     spacing_m: Vec<f64>,
     every: (LineMap, Bounds),
     smooth: (LineMap, Bounds),
@@ -126,8 +128,17 @@ impl ReferenceSolvers {
             entry_mps,
             spacing_m,
             cross_sections: cross_sections.clone(),
+            close: None,
             stop,
         })
+    }
+
+    /// The same solvers with the road at close steps: what stands out of an edge between two cross-sections is seen there.
+    pub fn keeping_within(self, close: &CrossSections) -> Self {
+        Self {
+            close: Some(close.clone()),
+            ..self
+        }
     }
 
     /// The flag that ends them.
@@ -285,7 +296,8 @@ impl ReferenceSolvers {
         let own = self.cross_sections.points(alpha);
         let count =
             ((self.cross_sections.length_m / how.spacing_m).ceil() as usize).max(self.cross_sections.len());
-        let Ok(about) = cross_sections_about(&self.cross_sections, &own, count) else {
+        let road = self.close.as_ref().unwrap_or(&self.cross_sections);
+        let Ok(about) = cross_sections_about(road, &own, count) else {
             return Ok(None);
         };
         let controls = (about.len() / how.cross_sections_per_control).max(4);
