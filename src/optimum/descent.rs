@@ -356,6 +356,14 @@ impl Place {
                 }
             }
         }
+        for (s, weight, change) in problem.changes(shape) {
+            let root = (weights.time * weight).sqrt();
+            let mut terms = Vec::new();
+            shape.add_curvature(map, (s + 1) % map.points(), root, &mut terms);
+            shape.add_curvature(map, s, -root, &mut terms);
+            let constant = root * change;
+            program.add_square(Affine { constant, terms }.merged());
+        }
         if let (Some(lap), Some(envelope)) = (&self.lap, problem.envelope) {
             add_time(&mut program, map, envelope, shape, lap, weights.time, caution);
         }

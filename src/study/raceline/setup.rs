@@ -50,8 +50,13 @@ pub fn set_up(settings: &RacelineSettings) -> Result<Setup> {
     let road = track
         .cross_sections(&Spacing::equal(settings.sections), settings.as_surveyed)?
         .with_smooth_reference(REFERENCE_M);
-    let close = ((road.length_m / EDGE_M).ceil() as usize).clamp(settings.sections, 1_000_000);
-    let dense = track.cross_sections(&Spacing::equal(close), settings.as_surveyed)?;
+    let cut = |step_m: f64| {
+        let close = ((road.length_m / step_m).ceil() as usize).clamp(settings.sections, 1_000_000);
+        track.cross_sections(&Spacing::equal(close), settings.as_surveyed)
+    };
+    // Inside a bend that is hardly wider than its road, cross-sections may be too close to one another to be turned apart.
+    let dense = cut(EDGE_M).or_else(|_| cut(2.0 * EDGE_M))?;
+    let close = dense.len();
     let (road, dense) = match &settings.section {
         Some(name) => {
             let (first_m, length_m) = road.section_named(name)?;
@@ -160,9 +165,16 @@ impl ReportedLine {
         self.at_cross_sections[objective as usize]
     }
 
-    /// Whether this line is the better one by an objective. A line off the road is better than none.
+    /// Whether this line is the better one by an objective: a line on the road before any that leaves it; of fast lines the calm
+    /// one, by [`FineLine::unrest_s`].
     pub fn betters(&self, other: &Self, objective: LineObjective) -> bool {
-        let rank = |line: &Self| (!line.clearance.is_on_road(), line.worth(objective));
+        let rank = |line: &Self| {
+            let unrest_s = match objective {
+                LineObjective::LapTime => line.fine.unrest_s().unwrap_or(0.0),
+                _ => 0.0,
+            };
+            (!line.clearance.is_on_road(), line.worth(objective) + unrest_s)
+        };
         rank(self) < rank(other)
     }
 }
@@ -229,7 +241,7 @@ impl Setup {
     ///
     /// # Errors
     /// Those of [`mended`].
-    pub(super) fn brought_in(&self, alpha: &[f64], settings: &RacelineSettings) -> Result<Option<Vec<f64>>> {
+    pub fn brought_in(&self, alpha: &[f64], settings: &RacelineSettings) -> Result<Option<Vec<f64>>> {
         let (fine, clearances) = self.measured(alpha, settings)?;
         if Clearance::least(&fine, &clearances).is_on_road() {
             return Ok(Some(alpha.to_vec()));
