@@ -82,9 +82,15 @@ static TYRE: FileKind = file("tyre", "a tyre", |path| {
 static TRACK: FileKind = file("track", "a track", |path| {
     let circuit = Track::load(&path.display().to_string())?.circuit()?;
     let shape = if circuit.closed { "closed" } else { "open" };
+    let bridges = circuit.bridges();
+    let bridges = bridges
+        .iter()
+        .map(|[a, b]| format!(", with a bridge where {a:.0} m and {b:.0} m cross"));
     Ok(format!(
-        "a {shape} track, {}: {:.1} m",
-        circuit.name, circuit.length_m
+        "a {shape} track, {}: {:.1} m{}",
+        circuit.name,
+        circuit.length_m,
+        bridges.collect::<String>()
     ))
 });
 
