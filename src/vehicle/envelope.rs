@@ -85,19 +85,6 @@ impl Envelope {
         Ok(Self { name, rows })
     }
 
-    /// The envelope with a share of the grip; drive and drag are the car's own.
-    ///
-    /// # Errors
-    /// [`Error::Input`] if no grip is left.
-    pub fn with_grip_share(&self, share: f64) -> Result<Self> {
-        let rows = self.rows.iter().map(|row| EnvelopeRow {
-            ay_mps2: share * row.ay_mps2,
-            ax_grip_mps2: share * row.ax_grip_mps2,
-            ..*row
-        });
-        Self::new(format!("{}, {share:.3} of its grip", self.name), rows.collect())
-    }
-
     /// Reads an envelope from a CSV file with the columns [`ENVELOPE_COLUMNS`] in any order; lines that begin with
     /// `#` are comments.
     ///

@@ -4,7 +4,7 @@
 //! straight-line running the greatest braking and traction, and the powertrain what the engine can give through the gears. The
 //! rows make an [`Envelope`]; the small-angle end of the curves gives the handling figures.
 
-use super::{Car, Envelope, EnvelopeRow, Trim, Turn, steady_car};
+use super::{Car, Envelope, EnvelopeRow, Traction, Trim, Turn, steady_car};
 use crate::error::{Error, Result};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -114,6 +114,15 @@ pub struct CarEnvelope {
     pub envelope: Envelope,
     /// Speeds at which the car has no steady state in a bend (m/s). The envelope goes on between its neighbours there.
     pub left_out_mps: Vec<f64>,
+}
+
+impl CarEnvelope {
+    /// What the driven tyres can give.
+    pub fn traction(&self) -> Traction {
+        Traction {
+            rows: self.speeds.iter().map(|s| (s.row.v_mps, s.traction_mps2)).collect(),
+        }
+    }
 }
 
 /// Steering up to which the tyres' own limit is looked for (rad): a car whose lock is reached first still has it.

@@ -16,6 +16,7 @@ pub mod modes;
 pub mod parameters;
 pub mod powertrain;
 pub mod steady;
+pub mod traction;
 pub mod tyre;
 
 pub use car::{Car, CarParameter, Tyres};
@@ -27,4 +28,5 @@ pub use model::{CarInput, CarModel, CarRate, CarState};
 pub use parameters::ParameterInfo;
 pub use powertrain::Powertrain;
 pub use steady::{SteadyCar, Trim, Turn, steady_car};
+pub use traction::Traction;
 pub use tyre::{LinearTyre, MagicFormula, TyreCoefficients, TyreModel};

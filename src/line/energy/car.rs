@@ -1,9 +1,9 @@
 //! A point mass with engine, motors and store.
 
 use super::super::point_mass::{EnvelopeTable, PointMass};
-use super::table::{EnergyTable, Traction, hybrid_parts};
+use super::table::{EnergyTable, hybrid_parts};
 use crate::error::Result;
-use crate::vehicle::{Car, Envelope, Hybrid};
+use crate::vehicle::{Car, Envelope, Hybrid, Traction};
 
 /// A car for laps with energy.
 #[derive(Clone, Debug)]

@@ -4,31 +4,7 @@ use super::super::point_mass::{ENVELOPE_WIDTH, EnvelopeTable};
 use crate::error::{Error, Result};
 use crate::scalar::Real;
 use crate::vehicle::powertrain::{EngineMap, GRAVITY_MPS2};
-use crate::vehicle::{Car, Envelope, EnvelopeRow, Hybrid, Powertrain};
-
-/// Greatest acceleration by the driven tyres (m/s^2) over speed (m/s), by rising speed; without rows only the friction ellipse
-/// limits driving.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Traction {
-    /// Speeds and accelerations.
-    pub rows: Vec<(f64, f64)>,
-}
-
-impl Traction {
-    pub(super) fn at(&self, v_mps: f64) -> f64 {
-        let Some(last) = self.rows.last() else {
-            return f64::INFINITY;
-        };
-        match self.rows.iter().position(|row| row.0 >= v_mps) {
-            Some(0) => self.rows[0].1,
-            Some(i) => {
-                let (low, high) = (self.rows[i - 1], self.rows[i]);
-                low.1 + (v_mps - low.0) / (high.0 - low.0) * (high.1 - low.1)
-            }
-            None => last.1,
-        }
-    }
-}
+use crate::vehicle::{Car, Envelope, EnvelopeRow, Hybrid, Powertrain, Traction};
 
 /// Figures of a car's energy over even steps of the speed squared, those of its [`EnvelopeTable`].
 ///

@@ -16,12 +16,8 @@ fn car() -> &'static EnergyCar {
             ..SpeedRange::USUAL
         };
         let limits = car_envelope(&car, &coarse).unwrap();
-        let rows = limits
-            .speeds
-            .iter()
-            .map(|s| (s.row.v_mps, s.traction_mps2))
-            .collect();
-        EnergyCar::new(car, limits.envelope, Traction { rows }, 2.0).unwrap()
+        let traction = limits.traction();
+        EnergyCar::new(car, limits.envelope, traction, 2.0).unwrap()
     })
 }
 

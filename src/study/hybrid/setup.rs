@@ -5,13 +5,13 @@ use crate::config::settings::Settings;
 use crate::error::{Error, Result};
 use crate::evaluate::energy::{HybridLine, HybridObjective, HybridProblem, Strategy};
 use crate::evaluate::line::LineObjective;
-use crate::line::energy::{EnergyCar, EnergyPlan, GAP_M, Gates, Mode, Traction, hybrid_parts, late_bend};
+use crate::line::energy::{EnergyCar, EnergyPlan, GAP_M, Gates, Mode, hybrid_parts, late_bend};
 use crate::line::{FineLine, read_line_apart};
 use crate::optimum::ReferenceSolvers;
 use crate::study::raceline;
 use crate::track::CrossSections;
 use crate::vehicle::limits::{SpeedRange, car_envelope};
-use crate::vehicle::{Car, Envelope};
+use crate::vehicle::{Car, Envelope, Traction};
 use glam::DVec2;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -73,11 +73,15 @@ pub fn read_inputs(settings: &HybridStudySettings) -> Result<HybridInputs> {
     let raceline_settings = settings.raceline();
     let mut raceline = raceline::set_up(&raceline_settings)?;
     let (envelope, traction) = match &settings.envelope {
-        Some(path) => (Envelope::load(path)?, Traction::default()),
+        Some(path) => {
+            let envelope = Envelope::load(path)?;
+            let traction = Traction::of(&car, &envelope);
+            (envelope, traction)
+        }
         None => {
             let limits = car_envelope(&car, &SpeedRange::USUAL)?;
-            let rows = limits.speeds.iter().map(|s| (s.row.v_mps, s.traction_mps2));
-            (limits.envelope.clone(), Traction { rows: rows.collect() })
+            let traction = limits.traction();
+            (limits.envelope, traction)
         }
     };
     let car = EnergyCar::new(car, envelope, traction, raceline_settings.ellipse_exponent)?;
