@@ -5,6 +5,7 @@ use super::road::{Course, FRONT_CELLS, PLAN_AHEAD_S, PLAN_REACH_M, Road};
 use super::settings::DriverSettings;
 use crate::error::{Error, Result};
 use crate::scalar::{Lookup, Real};
+use crate::vehicle::aero::aero_forces;
 use crate::vehicle::model::wheel_speeds;
 use crate::vehicle::powertrain::Powertrain;
 use crate::vehicle::{Car, CarInput, CarState, Chassis};
@@ -304,7 +305,6 @@ pub fn act<R: Lookup>(
 ) -> Controls<R> {
     let zero = R::lit(0.0);
     let one = R::lit(1.0);
-    let half = R::lit(0.5);
     let step = R::load(driver.step);
     let knows = R::load(driver.knows);
     let body = &state.body;
@@ -336,9 +336,9 @@ pub fn act<R: Lookup>(
     let after = planned_speed(road, course, pace, view, look + reach);
     let planned = (after * after - before * before) / R::lit(4.0 * PLAN_REACH_M);
     let wanted = planned + R::load(driver.speed_gain) * behind;
-    let drag = half * c.air_density * c.drag_area * v * v;
-    let force = c.mass * wanted + drag;
-    let weight = c.mass * c.gravity + half * c.air_density * c.lift_area * v * v;
+    let aero = aero_forces(c, v);
+    let force = c.mass * wanted + aero.drag;
+    let weight = c.mass * c.gravity + (aero.downforce_front + aero.downforce_rear);
     // What a bend leaves of the tyres, by the friction circle.
     let used = knows * (body.yaw_rate * v / (R::load(driver.friction) * weight / c.mass)).abs();
     let used = used.min(one);

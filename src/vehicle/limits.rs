@@ -4,7 +4,8 @@
 //! straight-line running the greatest braking and traction, and the powertrain what the engine can give through the gears. The
 //! rows make an [`Envelope`]; the small-angle end of the curves gives the handling figures.
 
-use super::{Car, Envelope, EnvelopeRow, Traction, Trim, Turn, steady_car};
+use super::powertrain::GRAVITY_MPS2;
+use super::{Car, Envelope, EnvelopeRow, SteadyCar, Traction, Trim, Turn, steady_car};
 use crate::error::{Error, Result};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -97,6 +98,14 @@ pub struct Handling {
     pub understeer_gradient_deg_per_g: f64,
     /// `K` in `steer = L kappa (1 + K v^2)` (s^2/m^2).
     pub stability_factor_s2_per_m2: f64,
+    /// Yaw moment that turns the car back for every radian of sideslip, running straight (N m/rad): `b C_r - a C_f` of the
+    /// axles' cornering stiffnesses, which some call the stability factor; positive is stable.
+    #[serde(default)]
+    pub yaw_stiffness_nm_per_rad: f64,
+    /// The same over both axles' side force for a radian and the wheelbase: how far the neutral steer point lies behind the
+    /// centre of gravity, as a share of the wheelbase.
+    #[serde(default)]
+    pub static_margin: f64,
     /// Speed at which an understeering car answers most to the steering wheel (m/s).
     pub characteristic_speed_mps: Option<f64>,
     /// Speed at which an oversteering car becomes unstable (m/s).
@@ -120,7 +129,11 @@ impl CarEnvelope {
     /// What the driven tyres can give.
     pub fn traction(&self) -> Traction {
         Traction {
-            rows: self.speeds.iter().map(|s| (s.row.v_mps, s.traction_mps2)).collect(),
+            rows: self
+                .speeds
+                .iter()
+                .map(|s| (s.row.v_mps, s.traction_mps2))
+                .collect(),
         }
     }
 }
@@ -180,7 +193,7 @@ pub fn car_envelope(car: &Car, range: &SpeedRange) -> Result<CarEnvelope> {
     let envelope = Envelope::new(&car.name, limits.iter().map(|l| l.row).collect())?;
     let wheelbase = car.chassis.cg_to_front + car.chassis.cg_to_rear;
     Ok(CarEnvelope {
-        handling: handling(&limits[limits.len() / 2], wheelbase),
+        handling: handling(&limits[limits.len() / 2], wheelbase, steady.as_ref()),
         speeds: limits,
         envelope,
         left_out_mps,
@@ -208,9 +221,7 @@ fn engine_of(car: &Car) -> Result<impl Fn(f64) -> f64 + Sync> {
 
 /// The slope of steering over lateral acceleration, between the two steady states nearest to 0 and 2 m/s^2: small
 /// against any tyre's limit, large against rounding.
-fn handling(limits: &EnvelopeAtSpeed, wheelbase: f64) -> Handling {
-    /// Standard gravity (m/s^2).
-    const G: f64 = 9.806_65;
+fn handling(limits: &EnvelopeAtSpeed, wheelbase: f64, steady: &dyn SteadyCar) -> Handling {
     let first = limits.cornering.first();
     let second = limits
         .cornering
@@ -222,11 +233,14 @@ fn handling(limits: &EnvelopeAtSpeed, wheelbase: f64) -> Handling {
         (Some(a), Some(b)) if b.ay_mps2 > a.ay_mps2 => (b.steer_rad - a.steer_rad) / (b.ay_mps2 - a.ay_mps2),
         _ => f64::NAN,
     };
+    let [side_stiffness, yaw_stiffness] = steady.sideslip_stiffness(v);
     let understeer_gradient = slope - wheelbase / v.powi(2);
     let stability_factor = understeer_gradient / wheelbase;
     Handling {
-        understeer_gradient_deg_per_g: understeer_gradient.to_degrees() * G,
+        understeer_gradient_deg_per_g: understeer_gradient.to_degrees() * GRAVITY_MPS2,
         stability_factor_s2_per_m2: stability_factor,
+        yaw_stiffness_nm_per_rad: yaw_stiffness,
+        static_margin: yaw_stiffness / (wheelbase * side_stiffness),
         characteristic_speed_mps: (stability_factor > 0.0).then(|| stability_factor.recip().sqrt()),
         critical_speed_mps: (stability_factor < 0.0).then(|| (-stability_factor).recip().sqrt()),
     }

@@ -72,8 +72,7 @@ mod tests {
     /// alone, to 8.5.
     #[test]
     fn a_share_of_the_grip_is_a_share_of_the_traction() {
-        let text =
-            "v_mps,ay_mps2,ax_grip_mps2,ax_drive_mps2,drag_mps2\n20,15,14,9,0.5\n30,15,14,8,1\n60,18,16,3,4\n";
+        let text = "v_mps,ay_mps2,ax_grip_mps2,ax_drive_mps2,drag_mps2\n20,15,14,9,0.5\n30,15,14,8,1\n60,18,16,3,4\n";
         let whole = Envelope::from_csv("own.csv", text).unwrap();
         let traction = Traction {
             rows: vec![(20.0, 10.0), (60.0, 10.0)],

@@ -29,6 +29,29 @@ fn bundled() -> &'static HybridSetup {
     SETUP.get_or_init(|| set_up(&settings()).unwrap())
 }
 
+/// The car's own envelope as a file has the traction that the sweep knows: the tyres leave the motor the same room.
+#[test]
+fn an_envelope_from_a_file_has_the_cars_traction() {
+    let own = bundled();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("envelope.csv");
+    let range = lapswarm::vehicle::limits::SpeedRange::USUAL;
+    let limits = lapswarm::vehicle::limits::car_envelope(&own.car.car, &range).unwrap();
+    std::fs::write(&path, limits.envelope.to_csv()).unwrap();
+    let read = lapswarm::study::hybrid::read_inputs(&HybridStudySettings {
+        envelope: Some(path),
+        ..settings()
+    })
+    .unwrap();
+    let (own, read) = (&own.car.table.boosts, &read.car.table.boosts);
+    assert_eq!(own.len(), read.len());
+    for (i, (own, read)) in own.iter().zip(read).enumerate() {
+        assert!((own - read).abs() < 1e-9, "{i}: {own} {read}");
+    }
+    // At 18 m/s the tyres are the limit and leave it nothing.
+    assert!(read[1] < 1e-9, "{}", read[1]);
+}
+
 const NO_MOTOR: Gates = Gates {
     energy_mj: 0.0,
     ..Gates::OPEN

@@ -3,7 +3,7 @@
 use super::super::point_mass::{ENVELOPE_WIDTH, EnvelopeTable};
 use crate::error::{Error, Result};
 use crate::scalar::Real;
-use crate::vehicle::powertrain::{EngineMap, GRAVITY_MPS2};
+use crate::vehicle::powertrain::EngineMap;
 use crate::vehicle::{Car, Envelope, EnvelopeRow, Hybrid, Powertrain, Traction};
 
 /// Figures of a car's energy over even steps of the speed squared, those of its [`EnvelopeTable`].
@@ -144,7 +144,7 @@ impl EnergyTable<f64> {
     /// # Errors
     /// Those of [`Envelope::new`].
     pub fn rolling(car: &Car, envelope: &Envelope) -> Result<Envelope> {
-        let rolling = GRAVITY_MPS2 * car.hybrid.as_ref().map_or(0.0, |h| h.rolling_resistance);
+        let rolling = car.chassis.gravity * car.hybrid.as_ref().map_or(0.0, |h| h.rolling_resistance);
         let slowed = |row: &EnvelopeRow| EnvelopeRow {
             drag_mps2: row.drag_mps2 + rolling,
             ..*row

@@ -100,8 +100,12 @@ impl EnvelopeSummary {
         );
         let balance = self.balance();
         text += &format!(
-            "Understeer gradient {:.3} deg/g, stability factor {:.3e} s^2/m^2: {balance}\n",
-            self.handling.understeer_gradient_deg_per_g, self.handling.stability_factor_s2_per_m2
+            "Understeer gradient {:.3} deg/g, stability factor K {:.3e} s^2/m^2: {balance}\nYaw stiffness b Cr - a Cf {:.1} kN m/rad, \
+             static margin {:.2}% of the wheelbase\n",
+            self.handling.understeer_gradient_deg_per_g,
+            self.handling.stability_factor_s2_per_m2,
+            1e-3 * self.handling.yaw_stiffness_nm_per_rad,
+            100.0 * self.handling.static_margin
         );
         for note in &self.notes {
             text += &format!("{note}\n");

@@ -67,7 +67,7 @@ pub fn demand_w(v_mps: f64, ax_mps2: f64, mass_kg: f64, drag_n: f64, rolling: f6
     v_mps * (mass_kg * GRAVITY_MPS2 * rolling + drag_n + mass_kg * rotating * ax_mps2)
 }
 
-/// Acceleration of gravity (m/s^2).
+/// Standard gravity (m/s^2): that of a car unless its file says otherwise, and what is meant by one g.
 pub const GRAVITY_MPS2: f64 = 9.80665;
 
 impl Powertrain {
