@@ -14,6 +14,7 @@ struct EnergyAccount {
     force_per_deployed: f32,
     force_per_harvested: f32,
     harvest_most: f32,
+    store_room: f32,
     exhaust_gain: f32,
     exhaust_cost: f32,
     exhaust_from: f32,
@@ -139,7 +140,7 @@ fn provisional(
         let forces = energy[2u * row] + (held - f32(row)) * energy[2u * row + 1u];
         let inverse = 1.0 / length;
         let force = 0.5 * (step.end - start) * inverse + forces.w;
-        let unharvested = account.harvest_most - (*state).harvested_k;
+        let unharvested = min(account.harvest_most - (*state).harvested_k, account.store_room - (*state).change);
         let room = max(unharvested * account.force_per_harvested * inverse, 0.0);
         let generator = min(min(max(-force, 0.0), forces.z * gates.motor), room);
         let harvested_k = joules * generator * account.harvest_gain;
@@ -188,7 +189,8 @@ fn segment_energy(
         motor = min(min(select(0.0, forces.y * gates.motor * share, may), demand), reach);
     }
     let engine = demand - motor;
-    let unharvested = account.harvest_most - (*state).harvested_k;
+    let space = account.store_room - (*state).change;
+    let unharvested = min(account.harvest_most - (*state).harvested_k, space);
     let room = unharvested * account.force_per_harvested * inverse;
     let generator = min(min(shed, forces.z * gates.motor), max(room, 0.0));
     let deployed = joules * motor * account.deploy_cost;
@@ -204,7 +206,8 @@ fn segment_energy(
     let time = 2.0 * length / (sqrt(start) + sqrt(end));
     let burnt = flow * time;
     let spins = !(mean < account.exhaust_from) && 0.0 < ax && !(account.exhaust_to_ax < ax);
-    let harvested_h = select(0.0, account.exhaust_gain * burnt, spins);
+    let space_left = max(space + (deployed - harvested_k), 0.0);
+    let harvested_h = select(0.0, min(account.exhaust_gain * burnt, space_left), spins);
 
     (*state).speed_squared = end;
     (*state).change = (*state).change + ((harvested_k + harvested_h) - deployed);

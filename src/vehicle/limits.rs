@@ -80,7 +80,9 @@ impl SpeedRange {
 pub struct EnvelopeAtSpeed {
     /// The row of the envelope.
     pub row: EnvelopeRow,
-    /// Greatest lateral acceleration to the right (m/s^2). The row has the lesser of both sides.
+    /// Greatest lateral acceleration to the left within the steering lock (m/s^2),
+    pub left_mps2: f64,
+    /// and to the right. The row has the lesser of both sides.
     pub right_mps2: f64,
     /// Steady cornering to the left, in order along the curve of steady states.
     pub cornering: Vec<Trim>,
@@ -138,7 +140,7 @@ impl CarEnvelope {
     }
 }
 
-/// Steering up to which the tyres' own limit is looked for (rad): a car whose lock is reached first still has it.
+/// Steering up to which steady states are looked for (rad): a car whose lock is reached first still has the tyres' own limit.
 pub const STEER_TO_GRIP: f64 = 0.6;
 
 /// Sweeps the car over speed and steering.
@@ -156,9 +158,10 @@ pub fn car_envelope(car: &Car, range: &SpeedRange) -> Result<CarEnvelope> {
         .into_par_iter()
         .map(|speed| {
             let cornering = steady.cornering(speed, STEER_TO_GRIP, Turn::Left);
-            let peak = |trims: &[Trim]| trims.iter().map(|t| t.ay_mps2.abs()).fold(0.0, f64::max);
+            let peak = |trims: &[Trim]| greatest_within(car.max_steer_rad, trims);
+            let left_mps2 = peak(&cornering);
             let right_mps2 = match even {
-                true => peak(&cornering),
+                true => left_mps2,
                 false => peak(&steady.cornering(speed, STEER_TO_GRIP, Turn::Right)),
             };
             let traction_mps2 = steady.greatest_traction(speed);
@@ -166,11 +169,12 @@ pub fn car_envelope(car: &Car, range: &SpeedRange) -> Result<CarEnvelope> {
             EnvelopeAtSpeed {
                 row: EnvelopeRow {
                     v_mps: speed,
-                    ay_mps2: peak(&cornering).min(right_mps2),
+                    ay_mps2: left_mps2.min(right_mps2),
                     ax_grip_mps2: steady.greatest_braking(speed),
                     ax_drive_mps2: traction_mps2.min(engine_mps2),
                     drag_mps2: steady.drag(speed),
                 },
+                left_mps2,
                 right_mps2,
                 cornering,
                 traction_mps2,
@@ -198,6 +202,26 @@ pub fn car_envelope(car: &Car, range: &SpeedRange) -> Result<CarEnvelope> {
         envelope,
         left_out_mps,
     })
+}
+
+/// The greatest lateral acceleration (m/s^2) along a curve of trims, as far as the road wheels turn by no more than `lock` (rad).
+fn greatest_within(lock: f64, curve: &[Trim]) -> f64 {
+    let mut most = 0.0f64;
+    let mut before: Option<&Trim> = None;
+    for trim in curve {
+        let steer = trim.steer_rad.abs();
+        if steer > lock {
+            if let Some(last) = before {
+                let share = (lock - last.steer_rad.abs()) / (steer - last.steer_rad.abs());
+                let at_lock = last.ay_mps2.abs() + share * (trim.ay_mps2.abs() - last.ay_mps2.abs());
+                most = most.max(at_lock);
+            }
+            break;
+        }
+        most = most.max(trim.ay_mps2.abs());
+        before = Some(trim);
+    }
+    most
 }
 
 /// Speeds (m/s) in words.
@@ -271,6 +295,28 @@ mod tests {
                 .all(|s| s.row.ax_drive_mps2 <= s.traction_mps2)
         );
         assert!(limits.handling.stability_factor_s2_per_m2.abs() < 0.01);
+    }
+
+    /// A lock of 0.03 rad is a circle of 87 m: at 18 m/s less than 324 / 87 = 3.7 m/s^2, where the tyres would hold 15.
+    #[test]
+    fn the_steering_lock_ends_the_envelope() {
+        let mut car = Car::bundled().unwrap();
+        let coarse = SpeedRange {
+            step_mps: 20.0,
+            ..SpeedRange::USUAL
+        };
+        let free = car_envelope(&car, &coarse).unwrap();
+        car.max_steer_rad = 0.03;
+        let locked = car_envelope(&car, &coarse).unwrap();
+        let steady = steady_car(&car);
+        for (speed, free) in locked.speeds.iter().zip(&free.speeds) {
+            let v = speed.row.v_mps;
+            let exact = steady.trim_at(v, 0.03, &speed.cornering).map(|trim| trim.ay_mps2);
+            let wanted = exact.map_or(free.row.ay_mps2, |ay| ay.min(free.row.ay_mps2));
+            assert!((speed.row.ay_mps2 / wanted - 1.0).abs() < 5e-3, "{v}: {wanted}");
+        }
+        let slow = locked.speeds[0].row.ay_mps2;
+        assert!((slow / (324.0 * 0.03 / 2.6) - 1.0).abs() < 0.05, "{slow}");
     }
 
     #[test]

@@ -30,6 +30,8 @@ pub struct EnergyAccount {
     pub force_per_harvested: f32,
     /// What the MGU-K may put into the store in a lap, J.
     pub harvest_most: f32,
+    /// What the store takes beyond the charge at the start, J.
+    pub store_room: f32,
     /// Energy of the MGU-H for each kilogram of fuel, J/kg.
     pub exhaust_gain: f32,
     /// Fuel for each joule of the MGU-H, kg/J.
@@ -102,6 +104,7 @@ impl DeviceKernel<HybridProblem> for EnergyDevice {
             force_per_deployed: table.force_per_deployed,
             force_per_harvested: table.force_per_harvested,
             harvest_most: table.harvest_most,
+            store_room: table.store_room,
             exhaust_gain: table.exhaust_gain,
             exhaust_cost: table.exhaust_cost,
             exhaust_from: table.exhaust_from,

@@ -38,6 +38,7 @@ impl EnergyCar {
         let wheelbase = car.chassis.cg_to_front + car.chassis.cg_to_rear;
         let point_mass = PointMass {
             ellipse_exponent,
+            max_steer_rad: Some(car.max_steer_rad),
             ..PointMass::new(EnergyTable::rolling(&car, &envelope)?, wheelbase)
         };
         let envelope_table = point_mass.table()?;

@@ -275,7 +275,8 @@ impl<R: Lookup> Car<'_, R> {
             let row = R::pick_row(&table.forces, place);
             let inverse = R::lit(1.0) / length;
             let force = R::lit(0.5) * (step.end - from) * inverse + (row[3] + beyond * row[7]);
-            let unharvested = R::load(table.harvest_most) - state.harvested_k;
+            let unharvested = (R::load(table.harvest_most) - state.harvested_k)
+                .min(R::load(table.store_room) - state.change);
             let room = (unharvested * R::load(table.force_per_harvested) * inverse).max(zero);
             let most = (row[2] + beyond * row[6]) * self.strategy[5];
             let generator = (-force).max(zero).min(most).min(room);
@@ -337,7 +338,8 @@ impl<R: Lookup> Car<'_, R> {
             }
         };
         let engine = demand - motor;
-        let unharvested = R::load(table.harvest_most) - state.harvested_k;
+        let space = R::load(table.store_room) - state.change;
+        let unharvested = (R::load(table.harvest_most) - state.harvested_k).min(space);
         let room = unharvested * R::load(table.force_per_harvested) * inverse;
         let generator = shed.min(generator_most * self.strategy[5]).min(room.max(zero));
         let deployed = joules * motor * R::load(table.deploy_cost);
@@ -358,7 +360,8 @@ impl<R: Lookup> Car<'_, R> {
         let spins = !mean.less_than(R::load(table.exhaust_from))
             & zero.less_than(ax)
             & !R::load(table.exhaust_to_ax).less_than(ax);
-        let harvested_h = gated(spins, R::load(table.exhaust_gain) * burnt);
+        let space = (space + (deployed - harvested_k)).max(zero);
+        let harvested_h = gated(spins, (R::load(table.exhaust_gain) * burnt).min(space));
 
         state.speed_squared = end;
         state.change = state.change + ((harvested_k + harvested_h) - deployed);

@@ -26,6 +26,8 @@ pub struct EnergyTable<S> {
     pub force_per_harvested: S,
     /// Energy that the MGU-K may put into the store in a lap (J).
     pub harvest_most: S,
+    /// What the store takes beyond the charge at the start (J).
+    pub store_room: S,
     /// Energy of the MGU-H into the store for each kilogram of fuel (J/kg).
     pub exhaust_gain: S,
     /// Fuel for each joule of the MGU-H (kg/J).
@@ -129,6 +131,7 @@ impl EnergyTable<f64> {
             force_per_deployed: 1.0 / (mass * deploy_cost),
             force_per_harvested: 1.0 / (mass * harvest_gain),
             harvest_most: hybrid.rules.harvested_k_j.unwrap_or(1e12),
+            store_room: hybrid.store.room_j(),
             exhaust_gain: h.map_or(0.0, |h| -h.power_w(0.0, 1.0) / greatest_flow),
             exhaust_cost: h.map_or(0.0, |h| CONSUMPTION_KGPJ * h.generator_cost_w / h.generator_w),
             exhaust_from: h.map_or(1e9, |h| h.from_speed_mps.powi(2)),
@@ -163,6 +166,7 @@ impl EnergyTable<f64> {
             force_per_deployed: R::store(self.force_per_deployed),
             force_per_harvested: R::store(self.force_per_harvested),
             harvest_most: R::store(self.harvest_most),
+            store_room: R::store(self.store_room),
             exhaust_gain: R::store(self.exhaust_gain),
             exhaust_cost: R::store(self.exhaust_cost),
             exhaust_from: R::store(self.exhaust_from),

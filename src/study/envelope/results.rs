@@ -56,8 +56,7 @@ fn notes(limits: &CarEnvelope) -> Vec<String> {
             in_words(&limits.left_out_mps)
         ));
     }
-    let left = |s: &EnvelopeAtSpeed| s.cornering.iter().map(|t| t.ay_mps2).fold(0.0, f64::max);
-    let uneven = limits.speeds.iter().map(|s| (s, left(s), s.right_mps2));
+    let uneven = limits.speeds.iter().map(|s| (s, s.left_mps2, s.right_mps2));
     let most = uneven.max_by(|a, b| (a.1 - a.2).abs().total_cmp(&(b.1 - b.2).abs()));
     if let Some((at, left, right)) = most
         && left != right

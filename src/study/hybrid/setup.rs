@@ -66,8 +66,11 @@ pub struct HybridInputs {
 /// [`Error::Input`] and [`Error::Io`] for what cannot be read or used, such as a car without a hybrid drive.
 pub fn read_inputs(settings: &HybridStudySettings) -> Result<HybridInputs> {
     settings.validate()?;
-    let car = Car::load(&settings.car)?;
+    let mut car = Car::load(&settings.car)?;
     hybrid_parts(&car)?;
+    if settings.store_overflow {
+        car.hybrid = car.hybrid.map(|hybrid| hybrid.with_overflow());
+    }
     let read = |path: &PathBuf| read_line_apart(path, settings.spacing_m);
     let given = settings.line.as_ref().map(read).transpose()?;
     let raceline_settings = settings.raceline();

@@ -38,6 +38,7 @@ impl Hybrid {
         let store = Store {
             capacity_j: 1e6 * s.required_number("capacity_mj", 0.01, 1000.0, "MJ")?,
             start_soc: s.number("start_soc", 0.0, 1.0, "")?.unwrap_or(1.0),
+            overflow: false,
         };
         s.finish()?;
         let rules = match table.table("rules")? {
