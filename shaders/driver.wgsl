@@ -19,6 +19,8 @@ struct Driver {
     steer_lag: f32,
     pedal_lag: f32,
     reach: f32,
+    rolling: f32,
+    rotating: f32,
 }
 
 @group(0) @binding(7) var<uniform> driver: Driver;
@@ -93,7 +95,8 @@ fn act(course: Course, pace: Pace, c: Chassis, state: CarState, view: View, cont
     let used = min(driver.knows * abs(body.yaw_rate * v / (driver.friction * weight / c.mass)), 1.0);
     let left = sqrt(max(1.0 - used * used, 0.01));
     let limit = driver.slip_limit * left;
-    let most = torque_at(v / c.radius_rear) / c.radius_rear;
+    let pull = torque_at(v / c.radius_rear) / c.radius_rear;
+    let most = (pull - c.mass * driver.rolling + (driver.rotating - 1.0) * aero.drag) / driver.rotating;
     let driven = min(min(force, most) / (driver.driven_share * weight * driver.slip_stiffness), limit);
     let braked = max(force / (weight * driver.slip_stiffness), -limit);
     let brakes = force < 0.0;

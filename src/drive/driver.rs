@@ -85,6 +85,10 @@ driver_table! {
     pedal_lag,
     /// Half of the length over which the plan's acceleration is taken, m.
     reach,
+    /// Deceleration by rolling resistance, m/s^2.
+    rolling,
+    /// Mass that the engine accelerates over that of the car.
+    rotating,
 }
 
 impl DriverTable<f64> {
@@ -108,6 +112,8 @@ impl DriverTable<f64> {
             steer_lag: STEER_LAG,
             pedal_lag: PEDAL_LAG,
             reach: PLAN_REACH_M,
+            rolling: car.rolling_mps2(),
+            rotating: car.powertrain.as_ref().map_or(1.0, |p| p.rotating_mass_factor),
         }
     }
 }
@@ -345,7 +351,10 @@ pub fn act<R: Lookup>(
     let left = (one - used * used).max(R::lit(0.01)).sqrt();
     let limit = R::load(driver.slip_limit) * left;
     let stiffness = R::load(driver.slip_stiffness);
-    let most = torque_at(torque, v / c.radius_rear) / c.radius_rear;
+    let pull = torque_at(torque, v / c.radius_rear) / c.radius_rear;
+    // What the wheels take to roll and to be turned faster does not reach the road.
+    let rotating = R::load(driver.rotating);
+    let most = (pull - c.mass * R::load(driver.rolling) + (rotating - one) * aero.drag) / rotating;
     let driven = (force.min(most) / (R::load(driver.driven_share) * weight * stiffness)).min(limit);
     let braked = (force / (weight * stiffness)).max(-limit);
     let brakes = force.less_than(zero);

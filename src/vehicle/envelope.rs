@@ -22,7 +22,7 @@ pub struct EnvelopeRow {
     pub ax_grip_mps2: f64,
     /// Greatest acceleration that the engine can give, before drag (m/s^2).
     pub ax_drive_mps2: f64,
-    /// Deceleration by drag (m/s^2).
+    /// Deceleration by drag and rolling resistance (m/s^2).
     pub drag_mps2: f64,
 }
 

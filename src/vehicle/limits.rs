@@ -88,7 +88,7 @@ pub struct EnvelopeAtSpeed {
     pub cornering: Vec<Trim>,
     /// Greatest acceleration by the driven tyres (m/s^2).
     pub traction_mps2: f64,
-    /// Greatest acceleration by the engine in its best gear (m/s^2).
+    /// Greatest acceleration by the engine in its best gear, before drag (m/s^2).
     pub engine_mps2: f64,
 }
 
@@ -152,6 +152,11 @@ pub fn car_envelope(car: &Car, range: &SpeedRange) -> Result<CarEnvelope> {
     let speeds = range.speeds_of(car)?;
     let force = engine_of(car)?;
     let steady = steady_car(car);
+    let (mass, powertrain) = (car.chassis.mass, car.powertrain.as_ref());
+    let rolling = car.rolling_mps2();
+    let accelerated = |force_n: f64, drag_mps2: f64| {
+        powertrain.map_or(0.0, |p| p.acceleration_mps2(force_n, mass, drag_mps2))
+    };
     // The two sides of a car with even loads are each other's mirror image.
     let even = car.chassis.left_share_front == 0.5 && car.chassis.left_share_rear == 0.5;
     let found: Vec<EnvelopeAtSpeed> = speeds
@@ -165,14 +170,15 @@ pub fn car_envelope(car: &Car, range: &SpeedRange) -> Result<CarEnvelope> {
                 false => peak(&steady.cornering(speed, STEER_TO_GRIP, Turn::Right)),
             };
             let traction_mps2 = steady.greatest_traction(speed);
-            let engine_mps2 = force(speed) / car.chassis.mass;
+            let drag_mps2 = steady.drag(speed) + rolling;
+            let engine_mps2 = accelerated(force(speed), drag_mps2) + drag_mps2;
             EnvelopeAtSpeed {
                 row: EnvelopeRow {
                     v_mps: speed,
                     ay_mps2: left_mps2.min(right_mps2),
                     ax_grip_mps2: steady.greatest_braking(speed),
                     ax_drive_mps2: traction_mps2.min(engine_mps2),
-                    drag_mps2: steady.drag(speed),
+                    drag_mps2,
                 },
                 left_mps2,
                 right_mps2,
@@ -311,12 +317,43 @@ mod tests {
         let steady = steady_car(&car);
         for (speed, free) in locked.speeds.iter().zip(&free.speeds) {
             let v = speed.row.v_mps;
-            let exact = steady.trim_at(v, 0.03, &speed.cornering).map(|trim| trim.ay_mps2);
-            let wanted = exact.map_or(free.row.ay_mps2, |ay| ay.min(free.row.ay_mps2));
+            let curve = &speed.cornering;
+            let top = curve
+                .iter()
+                .max_by(|a, b| a.ay_mps2.total_cmp(&b.ay_mps2))
+                .unwrap();
+            let wanted = match top.steer_rad > 0.03 {
+                true => steady.trim_at(v, 0.03, curve).unwrap().ay_mps2,
+                false => free.row.ay_mps2,
+            };
             assert!((speed.row.ay_mps2 / wanted - 1.0).abs() < 5e-3, "{v}: {wanted}");
         }
         let slow = locked.speeds[0].row.ay_mps2;
         assert!((slow / (324.0 * 0.03 / 2.6) - 1.0).abs() < 0.05, "{slow}");
+    }
+
+    /// At 58 m/s the engine is the limit. With a rolling resistance of 0.013 and 1.1 of the mass to accelerate, force F and drag D
+    /// leave (F/m - D/m - 0.013 g) / 1.1.
+    #[test]
+    fn rolling_and_rotating_masses_slow_every_car() {
+        let mut car = Car::bundled().unwrap();
+        let range = SpeedRange {
+            from_mps: 58.0,
+            to_mps: 60.0,
+            step_mps: 2.0,
+        };
+        let plain = car_envelope(&car, &range).unwrap().envelope.rows()[0];
+        let powertrain = car.powertrain.as_mut().unwrap();
+        powertrain.rolling_resistance = 0.013;
+        powertrain.rotating_mass_factor = 1.1;
+        let slowed = car_envelope(&car, &range).unwrap().envelope.rows()[0];
+        let wanted = (plain.ax_drive_mps2 - plain.drag_mps2 - 0.013 * GRAVITY_MPS2) / 1.1;
+        assert!(
+            (slowed.ax_drive_mps2 - slowed.drag_mps2 - wanted).abs() < 1e-12,
+            "{slowed:?}"
+        );
+        assert!((slowed.drag_mps2 - plain.drag_mps2 - 0.013 * GRAVITY_MPS2).abs() < 1e-12);
+        assert_eq!(slowed.ay_mps2, plain.ay_mps2);
     }
 
     #[test]

@@ -22,7 +22,10 @@ tests! {
 }
 
 fn hybrid_car(exponent: f64) -> EnergyCar {
-    let car = Car::load("gt_hybrid").expect("bundled");
+    let mut car = Car::load("gt_hybrid").expect("bundled");
+    if let Some(powertrain) = &mut car.powertrain {
+        powertrain.rotating_mass_factor = 1.06;
+    }
     let coarse = SpeedRange {
         step_mps: 8.0,
         ..SpeedRange::USUAL

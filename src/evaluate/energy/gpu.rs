@@ -20,6 +20,8 @@ use wgpu::BufferUsages as Usage;
 pub struct EnergyAccount {
     /// Mass, kg.
     pub mass: f32,
+    /// Mass that is accelerated over that of the car.
+    pub rotating: f32,
     /// Energy out of the store for each joule at the wheels.
     pub deploy_cost: f32,
     /// Energy into the store for each joule at the wheels.
@@ -99,6 +101,7 @@ impl DeviceKernel<HybridProblem> for EnergyDevice {
         let both = Usage::STORAGE | Usage::UNIFORM;
         let account = EnergyAccount {
             mass: table.mass,
+            rotating: table.rotating,
             deploy_cost: table.deploy_cost,
             harvest_gain: table.harvest_gain,
             force_per_deployed: table.force_per_deployed,

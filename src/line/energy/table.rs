@@ -16,6 +16,8 @@ pub struct EnergyTable<S> {
     pub mass: S,
     /// Rows per speed squared (s^2/m^2).
     pub rows_per_speed_squared: S,
+    /// Mass that is accelerated over that of the car.
+    pub rotating: S,
     /// Energy out of the store for each joule at the wheels.
     pub deploy_cost: S,
     /// Energy into the store for each joule at the wheels.
@@ -40,7 +42,7 @@ pub struct EnergyTable<S> {
     pub forces: Vec<S>,
     /// Fuel flow (kg/s) at a load of 0, 1/3, 2/3 and 1, then the rises.
     pub flows: Vec<S>,
-    /// Force of the motor and the room that engine and tyres leave for it, then their rises.
+    /// What the motor adds to the acceleration (m/s^2) and the room that engine and tyres leave for it, then their rises.
     pub boosts: Vec<S>,
 }
 
@@ -117,7 +119,10 @@ impl EnergyTable<f64> {
                 let throttle = engine.throttle_for(rpm, most_nm * i as f64 / 3.0);
                 engine.fuel_flow_at(rpm, throttle) / 3600.0
             }));
-            boosts.push([motor, (traction.at(v) - driven).clamp(0.0, ENDLESS_MPS2)]);
+            boosts.push([
+                motor / powertrain.rotating_mass_factor,
+                (traction.at(v) - driven).clamp(0.0, ENDLESS_MPS2),
+            ]);
         }
         let greatest_flow = flows.iter().flatten().fold(0.0, |a: f64, b| a.max(*b));
         let h = hybrid.mgu_h;
@@ -125,6 +130,7 @@ impl EnergyTable<f64> {
         let harvest_gain = k.generator_efficiency * powertrain.efficiency;
         Ok(Self {
             mass,
+            rotating: powertrain.rotating_mass_factor,
             rows_per_speed_squared: table.rows_per_speed_squared,
             deploy_cost,
             harvest_gain,
@@ -142,24 +148,12 @@ impl EnergyTable<f64> {
         })
     }
 
-    /// `envelope` with the rolling resistance of `car`, if it has one.
-    ///
-    /// # Errors
-    /// Those of [`Envelope::new`].
-    pub fn rolling(car: &Car, envelope: &Envelope) -> Result<Envelope> {
-        let rolling = car.chassis.gravity * car.hybrid.as_ref().map_or(0.0, |h| h.rolling_resistance);
-        let slowed = |row: &EnvelopeRow| EnvelopeRow {
-            drag_mps2: row.drag_mps2 + rolling,
-            ..*row
-        };
-        Envelope::new(envelope.name(), envelope.rows().iter().map(slowed).collect())
-    }
-
     /// The tables in the precision that the scalar `R` stores tables in.
     pub fn stored<R: Real>(&self) -> EnergyTable<R::Storage> {
         let all = |table: &[f64]| table.iter().map(|x| R::store(*x)).collect();
         EnergyTable {
             mass: R::store(self.mass),
+            rotating: R::store(self.rotating),
             rows_per_speed_squared: R::store(self.rows_per_speed_squared),
             deploy_cost: R::store(self.deploy_cost),
             harvest_gain: R::store(self.harvest_gain),

@@ -5,6 +5,7 @@ use super::setup::HybridSetup;
 use super::strategy::{budget_at, gate_speeds};
 use crate::error::{Error, Result};
 use crate::line::energy::{Gates, Mode};
+use crate::vehicle::MassLimits;
 use serde::{Deserialize, Serialize};
 
 /// A lap of a stint.
@@ -37,12 +38,18 @@ const SUSTAINED: f64 = 0.02;
 const SPARE_J: f64 = 1.0;
 
 /// Drives `laps` with `fuel_kg` on board at first. Each lap deploys no more than it harvests, below the speed that makes it
-/// fastest; the mass falls by the fuel burnt.
+/// fastest; the mass falls by the fuel burnt, and the
+/// car's limits change with it.
 ///
 /// # Errors
-/// [`Error::Input`] if the fuel does not last; those of laps.
+/// [`Error::Input`] if the fuel does not last; those of laps and of the sweep of limits.
 pub fn stint(setup: &HybridSetup, laps: usize, fuel_kg: f64) -> Result<Vec<StintLap>> {
+    if laps == 0 {
+        return Ok(Vec::new());
+    }
     let dry_kg = setup.car.car.chassis.mass;
+    let masses_kg = [0.0, 0.5, 1.0].map(|share| dry_kg + share * fuel_kg);
+    let limits = MassLimits::sweep(&setup.car.car, &masses_kg)?;
     let density = setup.car.fuel_density_kgpl;
     let mut fuel = fuel_kg;
     let mut hybrid = setup.car.hybrid.clone();
@@ -51,7 +58,10 @@ pub fn stint(setup: &HybridSetup, laps: usize, fuel_kg: f64) -> Result<Vec<Stint
     for _ in 0..laps {
         let mass_kg = dry_kg + fuel;
         let heavy = HybridSetup {
-            car: setup.car.with_hybrid(hybrid.clone())?.with_mass(mass_kg)?,
+            car: setup
+                .car
+                .with_hybrid(hybrid.clone())?
+                .with_mass(mass_kg, &limits)?,
             ..setup.clone()
         };
         let lap_with = |speed_mps: f64, energy_mj: f64| {

@@ -170,8 +170,6 @@ pub struct Hybrid {
     pub store: Store,
     /// The rules.
     pub rules: EnergyRules,
-    /// Coefficient of rolling resistance, used in laps with energy.
-    pub rolling_resistance: f64,
 }
 
 impl Hybrid {

@@ -54,7 +54,6 @@ impl Hybrid {
             mgu_h,
             store,
             rules,
-            rolling_resistance: table.number("rolling_resistance", 0.0, 0.1, "")?.unwrap_or(0.0),
         })
     }
 
@@ -62,10 +61,9 @@ impl Hybrid {
     pub fn to_toml(&self) -> String {
         let k = &self.mgu_k;
         let mut text = format!(
-            "[hybrid]\nrolling_resistance = {:?}\n\n[hybrid.mgu_k]\nratio = {:?}\nspeed_rpm = {:?}\ntorque_nm = {:?}\n\
+            "[hybrid.mgu_k]\nratio = {:?}\nspeed_rpm = {:?}\ntorque_nm = {:?}\n\
              power_kw = {:?}\nmotor_efficiency = {:?}\ngenerator_efficiency = {:?}\n\n[hybrid.store]\ncapacity_mj = {:?}\n\
              start_soc = {:?}\n",
-            self.rolling_resistance,
             k.ratio,
             k.speed_rpm,
             k.torque_nm,
