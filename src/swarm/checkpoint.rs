@@ -7,8 +7,8 @@
 //! interrupted while it writes leaves the last one whole.
 
 use super::{
-    CooperativeSwarm, CovarianceSwarm, DifferenceSwarm, HybridSwarm, Islands, Mopso, Nsga2, Optimiser, Pso,
-    WindowSwarm,
+    CooperativeSwarm, CovarianceSwarm, DifferenceSwarm, HybridSwarm, Islands, Mopso, Nsga2, Nsga3, Optimiser,
+    Pso, WindowSwarm,
 };
 use crate::config::{check_memory, memory_limit, read_bytes, read_start};
 use crate::error::{Error, Result};
@@ -46,13 +46,14 @@ macro_rules! readers {
 }
 
 /// The states that are optimisers.
-const READERS: [(&str, Reader); 11] = readers![
+const READERS: [(&str, Reader); 12] = readers![
     CooperativeSwarm,
     CovarianceSwarm,
     DifferenceSwarm,
     HybridSwarm,
     Mopso,
     Nsga2,
+    Nsga3,
     Pso,
     WindowSwarm,
     Islands<Mopso>,
@@ -67,6 +68,7 @@ checkpoints! {
     HybridSwarm: "hybrid swarm",
     Mopso: "multi-objective swarm",
     Nsga2: "NSGA-II",
+    Nsga3: "NSGA-III",
     Pso: "swarm",
     WindowSwarm: "window swarm",
     Islands<Mopso>: "islands of multi-objective swarms",
