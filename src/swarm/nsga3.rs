@@ -7,6 +7,7 @@
 
 use super::checkpoint::to_bytes;
 use super::genetic::{Breeding, Generation, Member, fronts};
+use super::lattice::lattice;
 use super::motion::Purpose;
 use super::{Counters, Front, Optimiser};
 use crate::error::Result;
@@ -284,13 +285,17 @@ fn directions(objectives: usize, most: usize) -> Vec<Vec<f64>> {
         return vec![vec![1.0]];
     }
     let outer = finest(most).unwrap_or(1);
-    let mut all = simplex(objectives, outer);
+    let mut all = lattice(objectives, outer as u32);
     if outer < objectives
         && let Some(inner) = finest(most.saturating_sub(all.len()))
     {
         let middle = 1.0 / objectives as f64;
         let nearer = |row: Vec<f64>| -> Vec<f64> { row.into_iter().map(|x| 0.5 * (x + middle)).collect() };
-        all.extend(simplex(objectives, inner.min(outer)).into_iter().map(nearer));
+        all.extend(
+            lattice(objectives, inner.min(outer) as u32)
+                .into_iter()
+                .map(nearer),
+        );
     }
     for row in &mut all {
         let length = row.iter().map(|x| x * x).sum::<f64>().sqrt();
@@ -299,29 +304,9 @@ fn directions(objectives: usize, most: usize) -> Vec<Vec<f64>> {
     all
 }
 
-/// How many points [`simplex`] has.
+/// How many points [`lattice`] has.
 fn count(objectives: usize, parts: usize) -> usize {
     (1..objectives).fold(1_usize, |found, k| found.saturating_mul(parts + k) / k)
-}
-
-/// All points whose coordinates are multiples of one over `parts` and add up to one.
-fn simplex(objectives: usize, parts: usize) -> Vec<Vec<f64>> {
-    let mut all = vec![(Vec::new(), parts)];
-    for _ in 1..objectives {
-        let longer = |(row, left): (Vec<f64>, usize)| {
-            (0..=left).map(move |part| {
-                let mut row = row.clone();
-                row.push(part as f64 / parts as f64);
-                (row, left - part)
-            })
-        };
-        all = all.into_iter().flat_map(longer).collect();
-    }
-    let closed = |(mut row, left): (Vec<f64>, usize)| {
-        row.push(left as f64 / parts as f64);
-        row
-    };
-    all.into_iter().map(closed).collect()
 }
 
 /// Whether `b` is better than `a`. All that are left are equally good by their fronts; only constraints tell.
@@ -422,7 +407,7 @@ mod tests {
     #[test]
     fn the_scale_is_that_of_the_front() {
         let (ideal, range) = ([1e9, -5.0, 0.0], [1e6, 1e-3, 7.0]);
-        let points: Vec<Vec<f64>> = simplex(3, 4)
+        let points: Vec<Vec<f64>> = lattice(3, 4)
             .iter()
             .map(|row| (0..3).map(|k| ideal[k] + range[k] * row[k]).collect())
             .collect();
@@ -433,7 +418,7 @@ mod tests {
         for (k, found) in ranges.iter().enumerate() {
             assert!((found / range[k] - 1.0).abs() < 1e-9, "{found}");
         }
-        for (point, row) in points.iter().zip(simplex(3, 4)) {
+        for (point, row) in points.iter().zip(lattice(3, 4)) {
             let place = scale.place(point, &ranges);
             assert!(
                 place.iter().zip(&row).all(|(a, b)| (a - b).abs() < 1e-9),
