@@ -344,6 +344,8 @@ fn windows_of_a_perfect_lap_give_its_car() {
     let folder = tempfile::tempdir().unwrap();
     let settings = IdentifySettings {
         car: another_car(folder.path()),
+        population: Some(64),
+        iterations: Some(60),
         ..in_windows(None, None)
     };
     let (_, summary) = identified(&settings, folder.path());
@@ -361,6 +363,8 @@ fn windows_of_a_noisy_lap_give_its_car_within_three_standard_errors() {
     let (log, _) = lap_of(&Car::bundled().unwrap(), [0.05, 0.3, 0.3, 0.005], folder.path());
     let settings = IdentifySettings {
         car: another_car(folder.path()),
+        population: Some(64),
+        iterations: Some(60),
         ..in_windows(Some(log), None)
     };
     let (_, summary) = identified(&settings, folder.path());
@@ -417,8 +421,8 @@ fn a_lap_begins_to_count_where_the_one_before_has_let_the_car_settle() {
 fn identified(settings: &IdentifySettings, folder: &Path) -> (Setup, Summary) {
     let settings = IdentifySettings {
         algorithm: Algorithm::Pso,
-        population: Some(24),
-        iterations: Some(12),
+        population: settings.population.or(Some(24)),
+        iterations: settings.iterations.or(Some(12)),
         hops: 0,
         ..settings.clone()
     };
