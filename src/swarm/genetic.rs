@@ -178,43 +178,75 @@ impl Generation {
         Ok(all)
     }
 
-    /// Goes on with the members at these places of `all`, no more than there are children, and breeds from them. Of two
-    /// parents that are drawn, `better` says whether the second is better than the first.
+    /// Goes on with the members at these places of `all`, no more than there are children, and breeds from those that `mates`
+    /// names by their places: two for each pair of children.
     pub fn succeed(
         &mut self,
         all: Vec<Member>,
         kept: Vec<usize>,
         breeding: Breeding,
-        better: fn(&Member, &Member) -> bool,
+        mates: impl Fn(&Self) -> Vec<usize>,
     ) {
         let mut all: Vec<Option<Member>> = all.into_iter().map(Some).collect();
         let kept = kept.into_iter().take(self.children.count);
         self.parents = kept.filter_map(|i| all[i].take()).collect();
         self.counters.told(self.children.count);
-        self.breed(breeding, better);
+        let mates = mates(self);
+        self.breed(breeding, &mates);
     }
 
-    /// The better of two parents drawn at random.
-    fn parent(&self, pair: usize, which: u32, better: fn(&Member, &Member) -> bool) -> &Member {
-        let draw = |index| {
-            let (when, who) = (self.counters.iteration as u32, pair as u32);
-            &self.parents[self
-                .random
-                .below(self.parents.len(), Purpose::Leader as u32, when, who, index)]
+    /// Of two parents that are drawn at random, the better, as often as one is needed. `better` says whether the second is better
+    /// than the first.
+    pub fn drawn(&self, better: fn(&Member, &Member) -> bool) -> Vec<usize> {
+        let when = self.counters.iteration as u32;
+        let draw = |place: u32, index: u32| {
+            let (who, index) = (place / 2, 2 * (place % 2) + index);
+            let purpose = Purpose::Leader as u32;
+            self.random.below(self.parents.len(), purpose, when, who, index)
         };
-        let (a, b) = (draw(2 * which), draw(2 * which + 1));
-        if better(a, b) { b } else { a }
+        let places = 0..self.children.count as u32;
+        let pairs = places.map(|place| (draw(place, 0), draw(place, 1)));
+        pairs.map(|pair| self.winner(pair, better)).collect()
     }
 
-    fn breed(&mut self, breeding: Breeding, better: fn(&Member, &Member) -> bool) {
+    /// As [`Generation::drawn`], but every parent has its turn before one has two. Where none is better than another, all of them
+    /// mate equally often.
+    pub fn in_turn(&self, better: fn(&Member, &Member) -> bool) -> Vec<usize> {
+        let (first, second) = (self.shuffled(0), self.shuffled(1));
+        let pairs = first.into_iter().zip(second).cycle();
+        pairs
+            .take(self.children.count)
+            .map(|pair| self.winner(pair, better))
+            .collect()
+    }
+
+    fn winner(&self, (a, b): (usize, usize), better: fn(&Member, &Member) -> bool) -> usize {
+        match better(&self.parents[a], &self.parents[b]) {
+            true => b,
+            false => a,
+        }
+    }
+
+    /// The places of all parents in a random order.
+    fn shuffled(&self, index: u32) -> Vec<usize> {
+        let when = self.counters.iteration as u32;
+        let mut order: Vec<usize> = (0..self.parents.len()).collect();
+        for i in (1..order.len()).rev() {
+            let purpose = Purpose::Leader as u32;
+            order.swap(i, self.random.below(i + 1, purpose, when, i as u32, index));
+        }
+        order
+    }
+
+    fn breed(&mut self, breeding: Breeding, mates: &[usize]) {
         let d = self.children.dimensions();
         let when = self.counters.iteration as u32;
-        for pair in 0..self.children.count / 2 {
+        for (pair, mates) in mates.chunks_exact(2).enumerate() {
             let uniform = |index: u32| {
                 self.random
                     .uniform(Purpose::Recombine as u32, when, pair as u32, index)
             };
-            let (a, b) = (self.parent(pair, 0, better), self.parent(pair, 1, better));
+            let (a, b) = (&self.parents[mates[0]], &self.parents[mates[1]]);
             let (mut first, mut second) = (a.position.clone(), b.position.clone());
             if uniform(0) < breeding.crossover {
                 for k in 0..d {

@@ -115,7 +115,7 @@ impl Optimiser for Nsga2 {
             }
         }
         self.generation
-            .succeed(all, kept, self.settings.breeding(), better);
+            .succeed(all, kept, self.settings.breeding(), |g| g.drawn(better));
         Ok(())
     }
 

@@ -176,6 +176,9 @@ impl Default for FrontScale {
     }
 }
 
+/// Share of the front's range up to which a point counts as on an axis.
+const ON_AXIS: f64 = 1e-3;
+
 impl FrontScale {
     /// Learns from points that violate the constraints by so much.
     fn update(&mut self, violation: f64, points: &[&[f64]]) {
@@ -201,11 +204,12 @@ impl FrontScale {
         let span = |k: usize| known.iter().map(|p| p[k]).fold(f64::NEG_INFINITY, f64::max) - self.ideal[k];
         let spans: Vec<f64> = (0..width).map(span).collect();
         // How far a point is off the axis of an objective counts for much more than how far along. Objectives count alike,
-        // whatever their units.
+        // whatever their units. Very little counts as none, as in pymoo: else a point of the first
+        // generations that is closest to the axis and far from the front would stay for good.
         let off = |point: &[f64], axis: usize| {
-            let share = |k: usize| match spans[k] > 0.0 {
-                true => (point[k] - self.ideal[k]) / spans[k],
-                false => 0.0,
+            let share = |k: usize| match (point[k] - self.ideal[k]) / spans[k] {
+                share if share >= ON_AXIS => share,
+                _ => 0.0,
             };
             let weight = |k: usize| if k == axis { 1.0 } else { 1e6 };
             (0..width).map(|k| weight(k) * share(k)).fold(0.0, f64::max)
@@ -335,7 +339,7 @@ impl Optimiser for Nsga3 {
         }
         let kept = self.survivors(&all, whole);
         self.generation
-            .succeed(all, kept, self.settings.breeding(), better);
+            .succeed(all, kept, self.settings.breeding(), |g| g.in_turn(better));
         Ok(())
     }
 

@@ -56,37 +56,45 @@ fn igd(points: &[Vec<f64>], targets: &[Vec<f64>]) -> f64 {
     targets.iter().map(nearest).sum::<f64>() / targets.len() as f64
 }
 
-/// Deb and Jain's table for DTLZ2: with 5 objectives, 212 members and 350 generations the worst of their 20 runs ends at an IGD of
-/// 5.862e-3 from the 210 points that the directions aim at. Four objectives with 84 directions are held to the same. Half of it is
-/// asked of each member's distance from the front, in the mean: what is left of the aim is along the front. The swarms and NSGA-II aim
-/// at no points, so they are compared on points of a finer simplex that nobody aims at.
+/// Deb and Jain's table for DTLZ2: with 5 objectives, 212 members and 350 generations their 20 runs end at an IGD of 4.982e-3 in the
+/// median and 5.862e-3 at worst, from the 210 points that the directions aim at. Of the mean distance from the front, 3.763e-3 is the
+/// worst of five runs of pymoo 0.6.2. Their table has no 4 objectives: the worst run is held to the same, a quarter more than the
+/// median of pymoo's five runs, 2.021e-3, is let pass in the median, and half of the worst IGD off the front. The swarms and NSGA-II
+/// aim at no points, so they are compared on points of a finer simplex that nobody aims at.
 #[test]
 fn many_objectives() {
-    for (objectives, population, parts, finer) in [(4, 84, 6, 11), (5, 212, 6, 9)] {
+    for (objectives, population, finer, [typical, worst, off_front]) in [
+        (4, 84, 11, [1.25 * 2.021e-3, 5.862e-3, 0.5 * 5.862e-3]),
+        (5, 212, 9, [4.982e-3, 5.862e-3, 3.763e-3]),
+    ] {
         let problem = problem(objectives + 9, objectives);
-        let sizes = Sizes {
-            population,
-            iterations: 350,
-            archive: population,
-            seed: 3,
-        };
-        let found = |name: &str| {
+        let found = |name: &str, seed: u64| {
+            let sizes = Sizes {
+                population,
+                iterations: 350,
+                archive: population,
+                seed,
+            };
             let mut optimiser = by_name(name, &problem, sizes).unwrap();
             let mut evaluator = PointEvaluator::new(problem.clone(), CallCost::Cheap, dtlz2);
             run(optimiser.as_mut(), &mut evaluator, |_| ControlFlow::Continue(())).unwrap();
             optimiser.front().objectives
         };
-        let front = found("nsga3");
-        let aimed = igd(&front, &targets(objectives, parts));
+        let fronts: Vec<Vec<Vec<f64>>> = (1..=5).map(|seed| found("nsga3", seed)).collect();
+        let aims = targets(objectives, 6);
+        let mut aimed: Vec<f64> = fronts.iter().map(|front| igd(front, &aims)).collect();
+        aimed.sort_by(f64::total_cmp);
         let radius = |f: &Vec<f64>| f.iter().map(|f| f * f).sum::<f64>().sqrt() - 1.0;
-        let off = front.iter().map(radius).sum::<f64>() / front.len() as f64;
-        println!("{objectives} objectives: IGD {aimed:.2e} from the aims, {off:.2e} off the front");
-        assert!(aimed < 5.862e-3, "{objectives}: {aimed}");
-        assert!(off < 0.5 * 5.862e-3, "{objectives}: {off}");
+        let mean = |front: &Vec<Vec<f64>>| front.iter().map(radius).sum::<f64>() / front.len() as f64;
+        let off = fronts.iter().map(mean).fold(0.0, f64::max);
+        println!("{objectives} objectives: IGD {aimed:?} from the aims, at most {off:.2e} off the front");
+        assert!(aimed[2] < typical, "{objectives}: {aimed:?}");
+        assert!(aimed[4] < worst, "{objectives}: {aimed:?}");
+        assert!(off < off_front, "{objectives}: {off}");
         let finer = targets(objectives, finer);
-        let reached = igd(&front, &finer);
+        let reached = igd(&fronts[2], &finer);
         for other in ["default", "nsga2"] {
-            let theirs = igd(&found(other), &finer);
+            let theirs = igd(&found(other, 3), &finer);
             println!("{objectives} objectives: IGD {reached:.4}, {other} {theirs:.4}");
             assert!(reached < theirs, "{objectives}, {other}: {reached}, {theirs}");
         }
