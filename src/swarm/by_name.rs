@@ -2,16 +2,18 @@
 
 use super::{
     CooperativeSettings, CooperativeSwarm, CovarianceSettings, CovarianceSwarm, DifferenceSettings,
-    DifferenceSwarm, HybridSettings, HybridSwarm, Mopso, MopsoSettings, Mutation, Nsga2, Nsga2Settings,
-    Nsga3, Nsga3Settings, Optimiser, OutOfBounds, Pso, PsoSettings, Restarts, Truncation,
+    DifferenceSwarm, HybridSettings, HybridSwarm, Moead, MoeadSettings, Mopso, MopsoSettings, Mutation,
+    Nsga2, Nsga2Settings, Nsga3, Nsga3Settings, Optimiser, OutOfBounds, Pso, PsoSettings, Restarts,
+    Truncation,
 };
 use crate::error::{Error, Result};
 use crate::evaluate::Problem;
 
 /// Names of the optimisers for several objectives; `default` is [`MopsoSettings::default`].
-pub const MULTI_OBJECTIVE: [&str; 7] = [
+pub const MULTI_OBJECTIVE: [&str; 8] = [
     "default",
     "default_nearest",
+    "moead",
     "smpso",
     "nsga2",
     "nsga3",
@@ -156,6 +158,17 @@ pub fn several_by_name(
             mutation: Mutation::Random,
             ..MopsoSettings::thesis()
         }),
+        "moead" => {
+            let settings = MoeadSettings {
+                population: sizes.population,
+                iterations: sizes.iterations,
+                seed: sizes.seed,
+                ..MoeadSettings::default()
+            };
+            let mut genetic = Moead::new(problem, settings)?;
+            genetic.start_from(start)?;
+            Ok(Box::new(genetic))
+        }
         "nsga2" => {
             let settings = Nsga2Settings {
                 population: sizes.population,

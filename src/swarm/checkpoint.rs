@@ -7,8 +7,8 @@
 //! interrupted while it writes leaves the last one whole.
 
 use super::{
-    CooperativeSwarm, CovarianceSwarm, DifferenceSwarm, HybridSwarm, Islands, Mopso, Nsga2, Nsga3, Optimiser,
-    Pso, WindowSwarm,
+    CooperativeSwarm, CovarianceSwarm, DifferenceSwarm, HybridSwarm, Islands, Moead, Mopso, Nsga2, Nsga3,
+    Optimiser, Pso, WindowSwarm,
 };
 use crate::config::{check_memory, memory_limit, read_bytes, read_start};
 use crate::error::{Error, Result};
@@ -46,11 +46,12 @@ macro_rules! readers {
 }
 
 /// The states that are optimisers.
-const READERS: [(&str, Reader); 12] = readers![
+const READERS: [(&str, Reader); 13] = readers![
     CooperativeSwarm,
     CovarianceSwarm,
     DifferenceSwarm,
     HybridSwarm,
+    Moead,
     Mopso,
     Nsga2,
     Nsga3,
@@ -66,6 +67,7 @@ checkpoints! {
     CovarianceSwarm: "covariance swarm",
     DifferenceSwarm: "difference swarm",
     HybridSwarm: "hybrid swarm",
+    Moead: "MOEA/D",
     Mopso: "multi-objective swarm",
     Nsga2: "NSGA-II",
     Nsga3: "NSGA-III",

@@ -71,7 +71,7 @@ pub(super) struct Generation {
     pub random: Random,
     children: Particles,
     pub objectives: usize,
-    parents: Vec<Member>,
+    pub parents: Vec<Member>,
     pub counters: Counters,
 }
 
@@ -151,31 +151,41 @@ impl Generation {
     /// # Errors
     /// Those of [`Evaluation::check`].
     pub fn everyone(&mut self, evaluation: &Evaluation) -> Result<Vec<Member>> {
-        let count = self.children.count;
-        evaluation.check(count, self.objectives)?;
+        let children = self.evaluated(evaluation)?;
         let mut known = Known::default();
-        let mut all = Vec::with_capacity(2 * count);
+        let mut all = Vec::with_capacity(2 * children.len());
         for parent in std::mem::take(&mut self.parents) {
             known.is_new(&parent.position, &parent.objectives, &all);
             all.push(parent);
         }
-        for child in 0..count {
+        for child in children {
+            if known.is_new(&child.position, &child.objectives, &all) {
+                all.push(child);
+            }
+        }
+        Ok(all)
+    }
+
+    /// The children with what they are worth.
+    ///
+    /// # Errors
+    /// Those of [`Evaluation::check`].
+    pub fn evaluated(&self, evaluation: &Evaluation) -> Result<Vec<Member>> {
+        evaluation.check(self.children.count, self.objectives)?;
+        let member = |child: usize| {
             let (objectives, violation) = match evaluation.success(child, self.objectives) {
                 Some(row) => (row.to_vec(), evaluation.violation(child)),
                 None => (vec![Worth::FAILED.cost; self.objectives], Worth::FAILED.violation),
             };
-            let position = self.children.position[self.children.row(child)].to_vec();
-            if known.is_new(&position, &objectives, &all) {
-                all.push(Member {
-                    position,
-                    objectives,
-                    violation,
-                    rank: 0,
-                    crowding: 0.0,
-                });
+            Member {
+                position: self.children.position[self.children.row(child)].to_vec(),
+                objectives,
+                violation,
+                rank: 0,
+                crowding: 0.0,
             }
-        }
-        Ok(all)
+        };
+        Ok((0..self.children.count).map(member).collect())
     }
 
     /// Goes on with the members at these places of `all`, no more than there are children, and breeds from those that `mates`
@@ -189,7 +199,12 @@ impl Generation {
     ) {
         let mut all: Vec<Option<Member>> = all.into_iter().map(Some).collect();
         let kept = kept.into_iter().take(self.children.count);
-        self.parents = kept.filter_map(|i| all[i].take()).collect();
+        self.go_on(kept.filter_map(|i| all[i].take()).collect(), breeding, mates);
+    }
+
+    /// As [`Generation::succeed`], with parents of any number.
+    pub fn go_on(&mut self, parents: Vec<Member>, breeding: Breeding, mates: impl Fn(&Self) -> Vec<usize>) {
+        self.parents = parents;
         self.counters.told(self.children.count);
         let mates = mates(self);
         self.breed(breeding, &mates);
@@ -279,7 +294,7 @@ impl Generation {
 }
 
 /// Two children of two coordinates of the unit cube.
-fn cross(a: f64, b: f64, uniform: f64, index: f64) -> (f64, f64) {
+pub(super) fn cross(a: f64, b: f64, uniform: f64, index: f64) -> (f64, f64) {
     let (low, high) = (a.min(b), a.max(b));
     let gap = high - low;
     if gap < 1e-14 {

@@ -11,6 +11,7 @@
 //! | more | [`device::DeviceMopso`] | the same on a device, for problems that are evaluated there |
 //! | more | [`Nsga2`] | the genetic algorithm that swarms are compared with |
 //! | three and more | [`Nsga3`] | the genetic algorithm that spreads along given directions: for four objectives and more |
+//! | three and more | [`Moead`] | a genetic algorithm that minimises along each of these directions, with its neighbours' help |
 //!
 //! [`minimise()`] runs one of them on a closure in one call, and [`by_name()`] makes one of its name. [`Islands`] are several
 //! swarms in one population, with or without migration. [`checkpoint`] keeps the state of any optimiser in a file.
@@ -41,11 +42,13 @@ mod covariance;
 #[cfg(feature = "gpu")]
 pub mod device;
 mod difference;
+mod front_scale;
 mod genetic;
 mod islands;
 mod lattice;
 pub mod metrics;
 mod minimise;
+mod moead;
 mod mopso;
 mod motion;
 mod nsga2;
@@ -65,6 +68,7 @@ pub use difference::{DifferenceSettings, DifferenceSwarm};
 pub use islands::{AcceptsMigrants, Islands, Migration};
 pub use lattice::lattice;
 pub use minimise::{Indicators, Minimise, Minimum, Stopped, minimise, minimise_batch, minimise_several};
+pub use moead::{Moead, MoeadSettings};
 #[cfg(feature = "studies")]
 pub(crate) use mopso::thinning::PER_PLACE;
 pub use mopso::{Generation, MANY, Mopso};

@@ -16,8 +16,8 @@ use lapswarm::study::sweep::{Row, SweepSettings};
 use lapswarm::swarm::checkpoint::{self, Checkpoint};
 use lapswarm::swarm::{
     CooperativeSettings, CooperativeSwarm, CovarianceSettings, CovarianceSwarm, DifferenceSettings,
-    DifferenceSwarm, HybridSettings, HybridSwarm, Islands, Mopso, MopsoSettings, Nsga2, Nsga2Settings, Nsga3,
-    Nsga3Settings, Pso, PsoSettings, WindowSettings, WindowSwarm,
+    DifferenceSwarm, HybridSettings, HybridSwarm, Islands, Moead, MoeadSettings, Mopso, MopsoSettings, Nsga2,
+    Nsga2Settings, Nsga3, Nsga3Settings, Pso, PsoSettings, WindowSettings, WindowSwarm,
 };
 use lapswarm::vehicle::Car;
 use readers::READERS;
@@ -285,6 +285,10 @@ fn swarms() -> Vec<Vec<u8>> {
         population: 8,
         ..Nsga3Settings::default()
     };
+    let decomposed = MoeadSettings {
+        population: 8,
+        ..MoeadSettings::default()
+    };
     let difference = || DifferenceSwarm::new(&one, DifferenceSettings::default()).unwrap();
     vec![
         checkpoint::to_bytes(&pso()).unwrap(),
@@ -309,6 +313,7 @@ fn swarms() -> Vec<Vec<u8>> {
             &Islands::new(&one, vec![difference(), difference()], None).unwrap(),
         ),
         swarm(12, &Nsga3::new(&two, directed).unwrap()),
+        swarm(13, &Moead::new(&two, decomposed).unwrap()),
     ]
 }
 

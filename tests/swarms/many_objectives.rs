@@ -1,8 +1,8 @@
-//! NSGA-III where there are many objectives, and with constraints.
+//! NSGA-III and MOEA/D where there are many objectives, and with constraints.
 
 use lapswarm::evaluate::point::{CallCost, Constraint, PointEvaluator};
 use lapswarm::evaluate::{Objective, Problem, Variable};
-use lapswarm::swarm::{Nsga3, Nsga3Settings, Optimiser, Sizes, by_name, run};
+use lapswarm::swarm::{Moead, MoeadSettings, Optimiser, Sizes, by_name, run};
 use std::f64::consts::FRAC_PI_2;
 use std::ops::ControlFlow;
 
@@ -56,16 +56,16 @@ fn igd(points: &[Vec<f64>], targets: &[Vec<f64>]) -> f64 {
     targets.iter().map(nearest).sum::<f64>() / targets.len() as f64
 }
 
-/// Deb and Jain's table for DTLZ2: with 5 objectives, 212 members and 350 generations their 20 runs end at an IGD of 4.982e-3 in the
-/// median and 5.862e-3 at worst, from the 210 points that the directions aim at. Of the mean distance from the front, 3.763e-3 is the
-/// worst of five runs of pymoo 0.6.2. Their table has no 4 objectives: the worst run is held to the same, a quarter more than the
-/// median of pymoo's five runs, 2.021e-3, is let pass in the median, and half of the worst IGD off the front. The swarms and NSGA-II
-/// aim at no points, so they are compared on points of a finer simplex that nobody aims at.
+/// Deb and Jain's table for DTLZ2: with 5 objectives, 212 members and 350 generations the worst of their 20 runs ends at an IGD of
+/// 5.862e-3 from the 210 points that the directions aim at. Five runs of pymoo 0.6.2 end at 4.917e-3 at worst, which the median is
+/// held to, and at most 3.763e-3 off the front in the mean. The paper's table has no 4 objectives: the worst run is held to the same,
+/// a quarter more than the median of pymoo's five runs, 2.021e-3, is let pass in the median, and half of the worst IGD off the front.
+/// The swarms and NSGA-II aim at no points, so they are compared on points of a finer simplex that nobody aims at.
 #[test]
 fn many_objectives() {
     for (objectives, population, finer, [typical, worst, off_front]) in [
         (4, 84, 11, [1.25 * 2.021e-3, 5.862e-3, 0.5 * 5.862e-3]),
-        (5, 212, 9, [4.982e-3, 5.862e-3, 3.763e-3]),
+        (5, 212, 9, [4.917e-3, 5.862e-3, 3.763e-3]),
     ] {
         let problem = problem(objectives + 9, objectives);
         let found = |name: &str, seed: u64| {
@@ -101,15 +101,58 @@ fn many_objectives() {
     }
 }
 
+/// With objectives measured as they are, each run is held to the worst of six of pymoo 0.6.2 with the same settings, 8.161e-4. With
+/// objectives in units that differ by powers of ten, it is held to the worst of five runs of pymoo's NSGA-III without such units:
+/// 1.645e-3 with three objectives and 4.917e-3 with five.
+#[test]
+fn many_objectives_by_decomposition() {
+    for (objectives, population, iterations, parts, scaled, bar) in [
+        (3, 92, 250, 12, false, 8.161e-4),
+        (3, 92, 250, 12, true, 1.645e-3),
+        (5, 212, 350, 6, true, 4.917e-3),
+    ] {
+        let problem = problem(objectives + 9, objectives);
+        let unit = |k: usize| if scaled { 10f64.powi(k as i32) } else { 1.0 };
+        for seed in 1..=3 {
+            let settings = MoeadSettings {
+                population,
+                iterations,
+                seed,
+                scaled,
+                ..MoeadSettings::default()
+            };
+            let mut genetic = Moead::new(&problem, settings).unwrap();
+            let mut evaluator = PointEvaluator::new(problem.clone(), CallCost::Cheap, |x, f| {
+                dtlz2(x, f);
+                f.iter_mut().enumerate().for_each(|(k, f)| *f *= unit(k));
+            });
+            run(&mut genetic, &mut evaluator, |_| ControlFlow::Continue(())).unwrap();
+            let mut front = genetic.front().objectives;
+            for row in &mut front {
+                row.iter_mut().enumerate().for_each(|(k, f)| *f /= unit(k));
+            }
+            let aimed = igd(&front, &targets(objectives, parts));
+            println!("{objectives} objectives, scaled: {scaled}, seed {seed}: {aimed:.2e}");
+            assert!(aimed < bar, "{objectives}, {scaled}, {seed}: {aimed}");
+        }
+    }
+}
+
 /// The front of DTLZ2 where the first objective is at most a half. It starts where nearly nothing is feasible, and it ends with all
 /// members feasible, some of them at the limit, and with the least of each objective near zero.
 #[test]
 fn constraints_come_first() {
-    let settings = Nsga3Settings {
+    ["nsga3", "moead"].into_iter().for_each(keeps_to_constraints);
+}
+
+fn keeps_to_constraints(name: &str) {
+    let sizes = Sizes {
+        population: 92,
         iterations: 150,
-        ..Nsga3Settings::default()
+        archive: 92,
+        seed: 1,
     };
-    let mut genetic = Nsga3::new(&problem(12, 3), settings).unwrap();
+    let mut genetic = by_name(name, &problem(12, 3), sizes).unwrap();
     let limits = vec![Constraint::at_most_zero(); 2];
     let mut evaluator = PointEvaluator::constrained(problem(12, 3), limits, CallCost::Cheap, |x, f| {
         dtlz2(x, &mut f[..3]);
@@ -117,7 +160,7 @@ fn constraints_come_first() {
         f[4] = f[..3].iter().map(|f| f * f).sum::<f64>() - 1.21;
     });
     let mut last = f64::INFINITY;
-    run(&mut genetic, &mut evaluator, |p| {
+    run(genetic.as_mut(), &mut evaluator, |p| {
         assert!(p.violation <= last, "{} after {last}", p.violation);
         last = p.violation;
         ControlFlow::Continue(())
