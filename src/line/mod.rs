@@ -21,9 +21,8 @@ mod table;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use check::Polyline;
-pub use check::{Clearance, check_line};
-pub use fine::{FINE_M, FineLine};
+pub use check::{CarPlan, Clearance, ON_ROAD_M, RoadEdges, check_line};
+pub use fine::{FINE_M, FineLine, UNREST, UNREST_MPS3, unrest_weight};
 pub use geometry::{Geometry, geometry};
 pub use parametrisation::Parametrisation;
 pub use perpendicular::{cross_sections_about, shares_across};

@@ -51,6 +51,8 @@ const LEAST_KEPT: f64 = 0.1;
 const WELL_KEPT: f64 = 0.7;
 /// Factors on the penalty after a rejected step and after a good one.
 const CAUTION: (f64, f64) = (4.0, 0.4);
+/// Penalty at which a small promise means that the first-order conditions are met. A greater one makes any promise small.
+const UNIT_CAUTION: f64 = 1.0;
 /// Penalty beyond which only rounding is left to gain.
 const MOST_CAUTION: f64 = 1e7;
 /// Weight of the squared step of a variable at a penalty of 1, as a share of the cost over the number of variables.
@@ -85,6 +87,8 @@ pub fn descend(
     let mut here = Place::of(problem, weights, bounds.inside(&start.x)?);
     let (mut iterations, mut programs, mut caution) = (0, 0, settings.caution);
     let mut status = Status::Failed(format!("{} programs without an end", settings.programs));
+    // What a step of unit caution promises from here, once a great caution has made promises small.
+    let mut promised_at_unit = None;
     if !here.cost.is_finite() {
         let found = "two points in one place, or a car that stands still";
         return Err(Error::input(
@@ -104,9 +108,27 @@ pub fn descend(
         programs += 1;
         iterations += solution.iterations;
         let promise = -program.value(&solution.x);
-        if promise <= settings.least_gain * here.cost.abs() {
-            status = solution.status;
-            break;
+        let failed = matches!(solution.status, Status::Failed(_));
+        if failed {
+            status = solution.status.clone();
+        } else if promise <= settings.least_gain * here.cost.abs() {
+            if caution <= UNIT_CAUTION {
+                status = solution.status;
+                break;
+            }
+            if let Some(promised) = promised_at_unit {
+                status = Status::Almost(format!(
+                    "steps that promise {:.1e} of the cost do not keep it",
+                    promised / here.cost.abs()
+                ));
+                break;
+            }
+            caution = UNIT_CAUTION;
+            promised_at_unit = Some(0.0);
+            continue;
+        }
+        if caution == UNIT_CAUTION && promised_at_unit.is_some() {
+            promised_at_unit = Some(promise);
         }
         let moved = here
             .x
@@ -116,8 +138,9 @@ pub fn descend(
         let trial = moved.map(|((x, d), (l, u))| (x + d).clamp(*l, *u)).collect();
         let there = Place::of(problem, weights, trial);
         let gain = here.cost - there.cost;
-        if gain >= LEAST_KEPT * promise {
+        if !failed && gain >= LEAST_KEPT * promise {
             here = there;
+            promised_at_unit = None;
             if gain >= WELL_KEPT * promise {
                 caution *= CAUTION.1;
             }
@@ -125,7 +148,9 @@ pub fn descend(
             caution *= CAUTION.0;
         }
         if caution > MOST_CAUTION {
-            status = Status::Almost("steps too short to tell a gain from rounding".to_owned());
+            if !failed {
+                status = Status::Almost("steps too short to tell a gain from rounding".to_owned());
+            }
             break;
         }
     }
@@ -330,6 +355,14 @@ impl Place {
                     square(terms);
                 }
             }
+        }
+        for (s, weight, change) in problem.changes(shape) {
+            let root = (weights.time * weight).sqrt();
+            let mut terms = Vec::new();
+            shape.add_curvature(map, (s + 1) % map.points(), root, &mut terms);
+            shape.add_curvature(map, s, -root, &mut terms);
+            let constant = root * change;
+            program.add_square(Affine { constant, terms }.merged());
         }
         if let (Some(lap), Some(envelope)) = (&self.lap, problem.envelope) {
             add_time(&mut program, map, envelope, shape, lap, weights.time, caution);

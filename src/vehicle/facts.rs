@@ -7,7 +7,7 @@
 use super::chassis::Chassis;
 use super::limits::STEER_TO_GRIP;
 use super::parameters::ParameterInfo;
-use super::powertrain::{Differential, Powertrain};
+use super::powertrain::{Differential, GRAVITY_MPS2 as G, Powertrain};
 use super::steady::{Turn, steady_car};
 use super::{Car, Tyres};
 use crate::config::kinds::{count, number, optional, text};
@@ -73,8 +73,6 @@ settings! {
     }
 }
 
-/// Standard gravity (m/s^2).
-const G: f64 = 9.806_65;
 /// Density of the air (kg/m^3).
 const AIR: f64 = 1.2;
 /// Share of the engine's torque that reaches the wheels.
