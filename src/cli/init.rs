@@ -11,13 +11,13 @@ use std::io::BufRead;
 use std::path::{Path, PathBuf};
 
 /// What can be written beside the files of studies.
-const OTHERS: [&str; 3] = ["sweep", "car", "track"];
+const OTHERS: [&str; 4] = ["sweep", "car", "track", "channels"];
 
 /// Flags of `init`.
 #[derive(clap::Args)]
 #[command(after_help = after_help())]
 pub struct Arguments {
-    /// What to write: a study's file, a sweep over a grid, a car with its tyre beside it, or a circuit from a survey
+    /// What to write: a study's file, a sweep over a grid, a car with its tyre beside it, a circuit from a survey, or a channel map
     #[arg(value_parser = PossibleValuesParser::new(registry::names().into_iter().chain(OTHERS)))]
     what: String,
     /// Where to [default: its name and .toml]; refused if it exists
@@ -118,13 +118,21 @@ fn make_car(path: &Path, arguments: &Arguments) -> Result<()> {
         );
     }
     let count = files.len();
-    for (k, (name, text)) in files.iter().enumerate() {
-        let path = if k + 1 == count {
+    let placed = files.iter().enumerate().map(|(k, (name, text))| {
+        let place = if k + 1 == count {
             path.to_owned()
         } else {
             path.with_file_name(name)
         };
-        write_new(&path, text.as_bytes())?;
+        (place, text.as_bytes())
+    });
+    write_all(&placed.collect::<Vec<_>>())
+}
+
+/// Writes files that are not there yet, and names them.
+fn write_all(files: &[(PathBuf, &[u8])]) -> Result<()> {
+    write_new(files)?;
+    for (path, _) in files {
         outln!("{}", path.display());
     }
     Ok(())
@@ -146,6 +154,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let text = match what {
         "sweep" => include_str!("../../data/templates/sweep.toml").to_owned(),
         "track" => include_str!("../../data/templates/track.toml").to_owned(),
+        "channels" => include_str!("../../data/templates/channels.toml").to_owned(),
         "car" => Car::BUNDLED_TOML.to_owned(),
         // The parser lets nothing else through.
         study => registry::named(study).map_or(String::new(), |study| study.template()),
@@ -157,12 +166,10 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     if facts_given {
         return make_car(&path, arguments);
     }
+    let mut files = Vec::new();
     if what == "car" {
-        let tyre = path.with_file_name("gt_slick.tir");
-        write_new(&tyre, Car::BUNDLED_TYRE.as_bytes())?;
-        outln!("{}", tyre.display());
+        files.push((path.with_file_name("gt_slick.tir"), Car::BUNDLED_TYRE.as_bytes()));
     }
-    write_new(&path, text.as_bytes())?;
-    outln!("{}", path.display());
-    Ok(())
+    files.push((path, text.as_bytes()));
+    write_all(&files)
 }

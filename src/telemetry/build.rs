@@ -7,6 +7,7 @@ use std::sync::Arc;
 use super::audit::check_magnitude;
 use super::calibration::Calibration;
 use super::channel_map::{Axle, ChannelMap, Mapped};
+use super::derived::{acceleration, product};
 use super::laps::{LEAST_M, Lap, Marks, restarts};
 use super::log::{Log, LogOptions};
 use super::recording::{Channel, Clock, Format, Recording};
@@ -32,7 +33,7 @@ pub(super) fn signals<'a>(
     mapped: &[Mapped<'a>],
     map: &ChannelMap,
     options: &LogOptions,
-    radius: Option<f64>,
+    radius: Option<[f64; 2]>,
 ) -> Result<Vec<Signal<'a>>> {
     let mut signals: Vec<Signal<'a>> = Vec::new();
     for m in mapped {
@@ -113,7 +114,7 @@ fn times(source: &str, channel: &Channel) -> Result<Arc<[f64]>> {
 }
 
 /// The factor that turns a channel's values into SI with the declared sign.
-fn factor(source: &str, m: &Mapped<'_>, map: &ChannelMap, radius: Option<f64>) -> Result<f64> {
+fn factor(source: &str, m: &Mapped<'_>, map: &ChannelMap, radius: Option<[f64; 2]>) -> Result<f64> {
     let mut factor = m.sign.unwrap_or(1.0);
     let Some(unit) = m.unit else {
         return Ok(factor);
@@ -123,6 +124,8 @@ fn factor(source: &str, m: &Mapped<'_>, map: &ChannelMap, radius: Option<f64>) -
         factor /= map.steering_ratio.unwrap_or(1.0);
     }
     if Role::WHEELS.contains(&m.role) && unit.quantity == Quantity::Speed {
+        let rear = matches!(m.role, Role::WheelSpeedRl | Role::WheelSpeedRr);
+        let radius = radius.map(|radii| radii[usize::from(rear)]);
         factor /= radius.ok_or_else(|| {
             Error::input(
                 source,
@@ -135,14 +138,27 @@ fn factor(source: &str, m: &Mapped<'_>, map: &ChannelMap, radius: Option<f64>) -
     Ok(factor)
 }
 
+/// Whether two roles' channels were sampled at the same times.
+pub(super) fn one_clock(signals: &[Signal<'_>], a: Role, b: Role) -> bool {
+    let times = |role| signals.iter().find(|s| s.mapped.role == role).map(|s| &s.times);
+    matches!((times(a), times(b)), (Some(a), Some(b)) if Arc::ptr_eq(a, b))
+}
+
+/// Notes what stands in for a channel. A log is assembled anew when delays are found, and says it once.
+fn note(log: &mut Log, text: &str) {
+    if !log.calibration.notes.iter().any(|said| said == text) {
+        log.calibration.notes.push(text.to_owned());
+    }
+}
+
 /// What the arrays of a log are made from.
 pub(super) struct Build<'a> {
     pub source: &'a str,
     pub recording: &'a Recording,
     pub map: &'a ChannelMap,
     pub options: &'a LogOptions,
-    /// Reference rolling radius, m.
-    pub radius: Option<f64>,
+    /// Rolling radii of the front and the rear wheels, m.
+    pub radius: Option<[f64; 2]>,
     /// Checks that a log of so many samples fits into memory.
     pub fits: &'a dyn Fn(usize) -> Result<()>,
 }
@@ -204,8 +220,8 @@ impl Build<'_> {
             distance_m: Vec::new(),
             vx_mps: Vec::new(),
             steer_rad: needed(Role::Steer)?,
-            ax_mps2: needed(Role::Ax)?,
-            ay_mps2: needed(Role::Ay)?,
+            ax_mps2: Vec::new(),
+            ay_mps2: Vec::new(),
             yaw_rate_radps: needed(Role::YawRate)?,
             wheel_speed_radps,
             laps: Vec::new(),
@@ -214,6 +230,23 @@ impl Build<'_> {
         log.vx_mps = match find(Role::Vx) {
             Some(signal) => sampled(signal),
             None => self.speed_of_wheels(&mut log)?,
+        };
+        // What stands in leaves out how the sideslip changes.
+        log.ax_mps2 = match find(Role::Ax) {
+            Some(signal) => sampled(signal),
+            None => {
+                self.refuse_other_unit(Role::Ax)?;
+                note(&mut log, "ax: not logged; the change of speed stands in for it");
+                acceleration(&log)
+            }
+        };
+        log.ay_mps2 = match find(Role::Ay) {
+            Some(signal) => sampled(signal),
+            None => {
+                self.refuse_other_unit(Role::Ay)?;
+                note(&mut log, "ay: not logged; speed times yaw rate stands in for it");
+                product(&log.vx_mps, &log.yaw_rate_radps)
+            }
         };
         let driven = integrated(&log.vx_mps, grid.dt_s);
         log.laps = self.laps(signals, &log.time_s, &driven, &mut log.calibration)?;
@@ -258,11 +291,7 @@ impl Build<'_> {
             }));
         }
         // Lap numbers and distance may be logged slowly or start late. They do not shorten the log.
-        let driving = || {
-            signals
-                .iter()
-                .filter(|s| s.mapped.role.required() || s.mapped.role == Role::Vx)
-        };
+        let driving = || signals.iter().filter(|s| s.mapped.role.of_motion());
         let fastest = driving()
             .min_by(|a, b| a.nominal_s.total_cmp(&b.nominal_s))
             .unwrap_or(first);
@@ -279,7 +308,26 @@ impl Build<'_> {
         Grid::within(self.source, fastest.times[0], start, end, dt_s).map(Clocked::Resampled)
     }
 
+    /// Refuses a log that has the role's channel in an unknown unit. To make it of others without notice would be wrong.
+    fn refuse_other_unit(&self, role: Role) -> Result<()> {
+        let key = format!("{}_", role.key());
+        let Some(channel) = self.recording.channels.iter().find(|c| c.name.starts_with(&key)) else {
+            return Ok(());
+        };
+        Err(Error::input(
+            self.source,
+            Place::default().channel(&channel.name),
+            "a unit that is not known",
+            format!(
+                "{} in {}, or the channel's unit in the channel map",
+                role.key(),
+                role.si_unit()
+            ),
+        ))
+    }
+
     fn speed_of_wheels(&self, log: &mut Log) -> Result<Vec<f64>> {
+        self.refuse_other_unit(Role::Vx)?;
         let Some(radius) = self.radius else {
             return Err(Error::input(
                 self.source,
@@ -288,30 +336,21 @@ impl Build<'_> {
                 "a ground speed channel, or rolling_radius_m in [vehicle] of the channel map",
             ));
         };
-        // The log has a speed in an unknown unit. To replace it by the speed of the wheels without notice would be wrong.
-        if let Some(channel) = self.recording.channels.iter().find(|c| c.name.starts_with("vx_")) {
-            return Err(Error::input(
-                self.source,
-                Place::default().channel(&channel.name),
-                "a forward speed in a unit that is not known",
-                "vx_mps, or the channel with its unit in the channel map",
-            ));
-        }
         let [fl, fr, rl, rr] = &log.wheel_speed_radps;
-        let (left, right, name) = match self.map.speed_axle {
-            Axle::Front => (fl, fr, "front"),
-            Axle::Rear => (rl, rr, "rear"),
+        let (left, right, radius, name) = match self.map.speed_axle {
+            Axle::Front => (fl, fr, radius[0], "front"),
+            Axle::Rear => (rl, rr, radius[1], "rear"),
         };
-        let note =
-            format!("vx: no ground speed is logged; the mean of the {name} wheel speeds stands in for it");
-        if !log.calibration.notes.contains(&note) {
-            log.calibration.notes.push(note);
-        }
-        Ok(left
+        let speed = left
             .iter()
             .zip(right)
             .map(|(l, r)| (l + r) / 2.0 * radius)
-            .collect())
+            .collect();
+        note(
+            log,
+            &format!("vx: no ground speed is logged; the mean of the {name} wheel speeds stands in for it"),
+        );
+        Ok(speed)
     }
 
     fn laps(

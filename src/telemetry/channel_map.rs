@@ -44,9 +44,10 @@ pub struct ChannelMap {
     pub channels: BTreeMap<Role, ChannelEntry>,
     /// Steering-wheel angle over road-wheel angle, for a log of the steering-wheel angle.
     pub steering_ratio: Option<f64>,
-    /// Rolling radius (m) by which wheel speeds logged in km/h are divided to give rad/s, and on which wheel speeds
-    /// are calibrated.
+    /// Rolling radius (m) by which wheel speeds logged in km/h are divided to give rad/s.
     pub rolling_radius_m: Option<f64>,
+    /// That of the rear wheels, where it is another one.
+    pub rear_rolling_radius_m: Option<f64>,
     /// The axle whose wheel speeds replace a ground speed that is not logged: the undriven one.
     pub speed_axle: Axle,
 }
@@ -65,6 +66,7 @@ struct FileEntry {
 struct FileVehicle {
     steering_ratio: Option<Spanned<f64>>,
     rolling_radius_m: Option<Spanned<f64>>,
+    rear_rolling_radius_m: Option<Spanned<f64>>,
     #[serde(default)]
     speed_axle: Axle,
 }
@@ -163,8 +165,20 @@ impl ChannelMap {
                 "a radius between 0.05 and 2 m",
                 |v| (0.05..=2.0).contains(&v),
             )?,
+            rear_rolling_radius_m: checked(
+                file.vehicle.rear_rolling_radius_m,
+                "vehicle.rear_rolling_radius_m",
+                "a radius between 0.05 and 2 m",
+                |v| (0.05..=2.0).contains(&v),
+            )?,
             speed_axle: file.vehicle.speed_axle,
         })
+    }
+
+    /// The rolling radii (m) of the front and the rear wheels, if it gives any.
+    pub fn rolling_radii_m(&self) -> Option<[f64; 2]> {
+        let front = self.rolling_radius_m.or(self.rear_rolling_radius_m)?;
+        Some([front, self.rear_rolling_radius_m.unwrap_or(front)])
     }
 
     /// Finds the channel of each role.
@@ -175,62 +189,73 @@ impl ChannelMap {
     pub fn resolve<'a>(&self, recording: &'a Recording) -> Result<Vec<Mapped<'a>>> {
         let mut mapped = Vec::new();
         for role in Role::ALL {
-            let entry = self.channels.get(&role);
-            let name = entry.and_then(|e| e.name.as_deref());
-            let found = match name {
-                Some(name) => Some(recording.channel(name).ok_or_else(|| {
-                    Error::input(
-                        &recording.source,
-                        Place::default().channel(role.key()),
-                        format!("no channel {}; it has {}", shown(name), listed(recording)),
-                        "the name that the channel map gives",
-                    )
-                })?),
-                None => guess(role, recording),
-            };
-            let Some(channel) = found else {
-                if role.required() || entry.is_some() {
-                    return Err(Error::input(
-                        &recording.source,
-                        Place::default().channel(role.key()),
-                        format!("none with a usual name; it has {}", listed(recording)),
-                        format!(
-                            "a [channels.{}] entry with its name in the channel map",
-                            role.key()
-                        ),
-                    ));
-                }
-                continue;
-            };
-            let unit_text = entry.and_then(|e| e.unit.as_deref()).unwrap_or(&channel.unit);
-            let unit = match check_unit(unit_text, role) {
-                Ok(unit) => unit,
-                // A pedal in volts cannot be used, and the map does not name it.
-                Err(_) if name.is_none() && matches!(role, Role::Throttle | Role::Brake) => {
-                    continue;
-                }
-                Err(expected) => {
-                    return Err(Error::input(
-                        &recording.source,
-                        Place::default().channel(&channel.name),
-                        format!("the unit {}", shown(unit_text)),
-                        format!(
-                            "{expected}; a unit in [channels.{}] of the channel map overrides it",
-                            role.key()
-                        ),
-                    ));
-                }
-            };
-            mapped.push(Mapped {
-                role,
-                channel,
-                unit,
-                sign: entry.and_then(|e| e.sign),
-                delay_s: entry.and_then(|e| e.delay_s),
-                declared: name.is_some(),
-            });
+            match self.find(role, recording)? {
+                Some(found) => mapped.push(found),
+                None if role.required() => return Err(Self::none_found(role, recording)),
+                None => {}
+            }
         }
         Ok(mapped)
+    }
+
+    fn none_found(role: Role, recording: &Recording) -> Error {
+        Error::input(
+            &recording.source,
+            Place::default().channel(role.key()),
+            format!("none with a usual name; it has {}", listed(recording)),
+            format!(
+                "a [channels.{}] entry with its name in the channel map",
+                role.key()
+            ),
+        )
+    }
+
+    /// Finds the channel of a role.
+    pub(super) fn find<'a>(&self, role: Role, recording: &'a Recording) -> Result<Option<Mapped<'a>>> {
+        let entry = self.channels.get(&role);
+        let name = entry.and_then(|e| e.name.as_deref());
+        let found = match name {
+            Some(name) => Some(recording.channel(name).ok_or_else(|| {
+                Error::input(
+                    &recording.source,
+                    Place::default().channel(role.key()),
+                    format!("no channel {}; it has {}", shown(name), listed(recording)),
+                    "the name that the channel map gives",
+                )
+            })?),
+            None => guess(role, recording),
+        };
+        let Some(channel) = found else {
+            return match entry {
+                Some(_) => Err(Self::none_found(role, recording)),
+                None => Ok(None),
+            };
+        };
+        let unit_text = entry.and_then(|e| e.unit.as_deref()).unwrap_or(&channel.unit);
+        let unit = match check_unit(unit_text, role) {
+            Ok(unit) => unit,
+            // A pedal in volts cannot be used, and the map does not name it.
+            Err(_) if name.is_none() && matches!(role, Role::Throttle | Role::Brake) => return Ok(None),
+            Err(expected) => {
+                return Err(Error::input(
+                    &recording.source,
+                    Place::default().channel(&channel.name),
+                    format!("the unit {}", shown(unit_text)),
+                    format!(
+                        "{expected}; a unit in [channels.{}] of the channel map overrides it",
+                        role.key()
+                    ),
+                ));
+            }
+        };
+        Ok(Some(Mapped {
+            role,
+            channel,
+            unit,
+            sign: entry.and_then(|e| e.sign),
+            delay_s: entry.and_then(|e| e.delay_s),
+            declared: name.is_some(),
+        }))
     }
 
     /// Which of a recording's channels a log is made of.
@@ -329,10 +354,11 @@ mod tests {
     fn a_map_is_read_in_full() {
         let map = ChannelMap::parse(
             "[channels.yaw_rate]\nname = \"Gyro\"\nunit = \"deg/s\"\nsign = -1\ndelay_s = 0.1\n\
-             [vehicle]\nsteering_ratio = 14\nrolling_radius_m = 0.325\nspeed_axle = \"rear\"\n",
+             [vehicle]\nsteering_ratio = 14\nrolling_radius_m = 0.325\nrear_rolling_radius_m = 0.328\nspeed_axle = \"rear\"\n",
             "m.toml",
         )
         .unwrap();
+        assert_eq!(map.rolling_radii_m(), Some([0.325, 0.328]));
         let yaw = &map.channels[&Role::YawRate];
         assert_eq!((yaw.sign, yaw.delay_s), (Some(-1.0), Some(0.1)));
         assert_eq!(map.steering_ratio, Some(14.0));

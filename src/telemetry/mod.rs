@@ -17,7 +17,10 @@ mod audit;
 mod build;
 mod calibrate;
 mod calibration;
+mod channel_list;
 mod channel_map;
+#[cfg(test)]
+mod conditioned;
 mod csv_headed;
 mod csv_native;
 mod delays;
@@ -41,6 +44,7 @@ mod text;
 mod units;
 
 pub use calibration::{Calibration, CalibrationOptions, Finding, FindingKind, Switch};
+pub use channel_list::{ChannelList, ListedChannel, Missing};
 pub use channel_map::{Axle, ChannelEntry, ChannelMap, Mapped};
 pub use csv_native::{COLUMNS, NativeFormat, write_native};
 pub use driven::DrivenLap;

@@ -84,18 +84,32 @@ impl Role {
         }
     }
 
-    /// Whether a log cannot do without it. Ground speed can be made from wheel speeds.
-    pub fn required(self) -> bool {
-        matches!(
-            self,
+    /// The unit of its values in a log.
+    pub(super) fn si_unit(self) -> &'static str {
+        match self {
             Self::WheelSpeedFl
-                | Self::WheelSpeedFr
-                | Self::WheelSpeedRl
-                | Self::WheelSpeedRr
-                | Self::Steer
-                | Self::Ax
-                | Self::Ay
-                | Self::YawRate
+            | Self::WheelSpeedFr
+            | Self::WheelSpeedRl
+            | Self::WheelSpeedRr
+            | Self::YawRate => "rad/s",
+            Self::Steer => "rad",
+            Self::Vx => "m/s",
+            Self::Ax | Self::Ay => "m/s^2",
+            Self::Distance => "m",
+            Self::Lap | Self::LapComplete | Self::Throttle | Self::Brake => "",
+        }
+    }
+
+    /// Whether a log cannot do without it. Ground speed can be made from wheel speeds, and accelerations from speed and yaw rate.
+    pub fn required(self) -> bool {
+        self.of_motion() && !matches!(self, Self::Vx | Self::Ax | Self::Ay)
+    }
+
+    /// Whether it is part of the car's motion: what drives the model, or what the model is compared with.
+    pub(super) fn of_motion(self) -> bool {
+        !matches!(
+            self,
+            Self::Distance | Self::Lap | Self::LapComplete | Self::Throttle | Self::Brake
         )
     }
 

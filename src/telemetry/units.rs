@@ -3,7 +3,7 @@
 use std::f64::consts::{PI, TAU};
 
 /// Standard gravity, m/s^2: what loggers mean by one G.
-const G: f64 = 9.80665;
+pub(super) const G: f64 = 9.80665;
 
 /// What a unit measures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -7,7 +7,7 @@
 use super::chassis::Chassis;
 use super::limits::STEER_TO_GRIP;
 use super::parameters::ParameterInfo;
-use super::powertrain::{Differential, Powertrain};
+use super::powertrain::{Differential, GRAVITY_MPS2 as G, Powertrain};
 use super::steady::{Turn, steady_car};
 use super::{Car, Tyres};
 use crate::config::kinds::{count, number, optional, text};
@@ -73,8 +73,6 @@ settings! {
     }
 }
 
-/// Standard gravity (m/s^2).
-const G: f64 = 9.806_65;
 /// Density of the air (kg/m^3).
 const AIR: f64 = 1.2;
 /// Share of the engine's torque that reaches the wheels.
@@ -195,6 +193,7 @@ impl CarFacts {
             max_steer_rad: 0.5,
             powertrain: Some(self.powertrain(top_mps, drag_area)),
             hybrid: None,
+            reached: None,
             chassis,
         };
         // As much nominal load over the load at rest as the base car has, and at the rear a little more: it grips longer.

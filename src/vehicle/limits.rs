@@ -4,6 +4,7 @@
 //! straight-line running the greatest braking and traction, and the powertrain what the engine can give through the gears. The
 //! rows make an [`Envelope`]; the small-angle end of the curves gives the handling figures.
 
+use super::powertrain::GRAVITY_MPS2;
 use super::{Car, Envelope, EnvelopeRow, Trim, Turn, steady_car};
 use crate::error::{Error, Result};
 use rayon::prelude::*;
@@ -200,8 +201,6 @@ fn engine_of(car: &Car) -> Result<impl Fn(f64) -> f64 + Sync> {
 /// The slope of steering over lateral acceleration, between the two steady states nearest to 0 and 2 m/s^2: small
 /// against any tyre's limit, large against rounding.
 fn handling(limits: &EnvelopeAtSpeed, wheelbase: f64) -> Handling {
-    /// Standard gravity (m/s^2).
-    const G: f64 = 9.806_65;
     let first = limits.cornering.first();
     let second = limits
         .cornering
@@ -216,7 +215,7 @@ fn handling(limits: &EnvelopeAtSpeed, wheelbase: f64) -> Handling {
     let understeer_gradient = slope - wheelbase / v.powi(2);
     let stability_factor = understeer_gradient / wheelbase;
     Handling {
-        understeer_gradient_deg_per_g: understeer_gradient.to_degrees() * G,
+        understeer_gradient_deg_per_g: understeer_gradient.to_degrees() * GRAVITY_MPS2,
         stability_factor_s2_per_m2: stability_factor,
         characteristic_speed_mps: (stability_factor > 0.0).then(|| stability_factor.recip().sqrt()),
         critical_speed_mps: (stability_factor < 0.0).then(|| (-stability_factor).recip().sqrt()),

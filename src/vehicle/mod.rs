@@ -15,6 +15,7 @@ pub mod model;
 pub mod modes;
 pub mod parameters;
 pub mod powertrain;
+pub mod reached;
 pub mod steady;
 pub mod tyre;
 
@@ -26,5 +27,6 @@ pub use hybrid::Hybrid;
 pub use model::{CarInput, CarModel, CarRate, CarState};
 pub use parameters::ParameterInfo;
 pub use powertrain::Powertrain;
+pub use reached::Reached;
 pub use steady::{SteadyCar, Trim, Turn, steady_car};
 pub use tyre::{LinearTyre, MagicFormula, TyreCoefficients, TyreModel};

@@ -61,7 +61,12 @@ fn files_to_start_from_are_sound_and_never_overwrite() {
     let studies = registry::names()
         .into_iter()
         .map(|name| (name, format!("a study of {name}")));
-    let others = ["a sweep", "a car"].map(|said| (&said[2..], said.to_owned()));
+    let others = [
+        ("sweep", "a sweep"),
+        ("car", "a car"),
+        ("channels", "a channel map"),
+    ];
+    let others = others.map(|(what, said)| (what, said.to_owned()));
     for (what, said) in studies.chain(others) {
         let made = lapswarm(folder.path(), &["init", what]);
         assert!(made.status.success(), "{what}: {}", text(&made.stderr));
@@ -77,7 +82,7 @@ fn files_to_start_from_are_sound_and_never_overwrite() {
             std::fs::read(folder.path().join(&file)).expect("the file"),
             before
         );
-        if what != "car" {
+        if !["car", "channels"].contains(&what) {
             let mut arguments = vec![what, &file, "--dry-run"];
             // There is no line to start from.
             if what == "transient" {
@@ -456,6 +461,53 @@ fn refused_input_leaves_nothing_in_the_way() {
         ],
     );
     assert!(works.status.success(), "{}", text(&works.stderr));
+}
+
+/// A log with names of its own: its channels are listed, a map is written, and the map, edited, makes it a log.
+#[test]
+fn check_lists_the_channels_of_a_log_and_writes_a_map_of_them() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let rows = (0..200).map(|i| {
+        let t = f64::from(i) * 0.05;
+        let wheel = 60.0 + t.sin();
+        format!(
+            "{t},{wheel},{wheel},{wheel},{wheel},{},{},{}\n",
+            2.0 * t.sin(),
+            70.0 + t.sin(),
+            8.0 * t.sin()
+        )
+    });
+    let head = "time (s),wheel speed fl (rad/s),wheel speed fr (rad/s),wheel speed rl (rad/s),wheel speed rr (rad/s),\
+                steer (deg),speed (km/h),gyro (deg/s)\n";
+    let log = format!("{head}{}", rows.collect::<String>());
+    std::fs::write(folder.path().join("own.csv"), log).expect("a log");
+    let listed = lapswarm(folder.path(), &["check", "own.csv", "--write-map", "map.toml"]);
+    let told = text(&listed.stdout);
+    assert_eq!(listed.status.code(), Some(2), "{told}");
+    for part in [
+        "speed",
+        "km/h",
+        "vx, by its name",
+        "no yaw_rate: needed",
+        "could be, by the unit: gyro",
+    ] {
+        assert!(told.contains(part), "{part}: {told}");
+    }
+    let map = folder.path().join("map.toml");
+    let written = std::fs::read_to_string(&map).expect("a map");
+    let again = lapswarm(folder.path(), &["check", "own.csv", "--write-map", "map.toml"]);
+    assert_eq!(again.status.code(), Some(2));
+    assert_eq!(std::fs::read_to_string(&map).expect("a map"), written);
+    let edited = written.replace("# [channels.yaw_rate]\n# name", "[channels.yaw_rate]\nname");
+    assert_ne!(edited, written);
+    std::fs::write(&map, edited).expect("a map");
+    let mapped = lapswarm(folder.path(), &["check", "own.csv", "--channel-map", "map.toml"]);
+    let told = text(&mapped.stdout);
+    assert!(mapped.status.success(), "{told} {}", text(&mapped.stderr));
+    assert!(
+        told.contains("yaw_rate, by the channel map") && told.contains("no ay: speed times yaw rate"),
+        "{told}"
+    );
 }
 
 #[test]

@@ -4,6 +4,7 @@ use lapswarm::report::{Figure, Table};
 use lapswarm::study::envelope::envelope_figure;
 use lapswarm::vehicle::facts::{corner_g_of, friction_at_rest, top_speed_kmh};
 use lapswarm::vehicle::limits::{EnvelopeAtSpeed, SpeedRange, car_envelope};
+use lapswarm::vehicle::powertrain::GRAVITY_MPS2;
 use lapswarm::vehicle::{Car, CarFacts};
 use lapswarm::{Error, Result};
 use std::f64::consts::TAU;
@@ -70,7 +71,7 @@ pub fn draw(path: &Path, folder: &Path) -> Result<String> {
     let picture = folder.join(format!("{stem}.svg"));
     envelope_figure(&limits, &car.name).write_svg(&picture)?;
     let at = |speed: &EnvelopeAtSpeed| {
-        let in_g = |a: f64| a / 9.806_65;
+        let in_g = |a: f64| a / GRAVITY_MPS2;
         format!(
             "{:.0} km/h: corners at up to {:.2} g, brakes at up to {:.2} g",
             3.6 * speed.row.v_mps,
