@@ -84,6 +84,7 @@ pub fn set_up(settings: &RacelineSettings) -> Result<Setup> {
     let wheelbase = car.chassis.cg_to_front + car.chassis.cg_to_rear;
     let car = PointMass {
         ellipse_exponent: settings.ellipse_exponent,
+        max_steer_rad: Some(car.max_steer_rad),
         ..PointMass::new(envelope, wheelbase)
     };
     car.check()?;
