@@ -272,7 +272,7 @@ impl<'a> RoadEdges<'a> {
             };
             let (right, left) = (drawn(false), drawn(true));
             // Where both ends meet, the line has nowhere else to go.
-            if (left - right).dot(across) > LEAST_ROOM_M {
+            if [right, left] != ends && (left - right).dot(across) > LEAST_ROOM_M {
                 (cross_sections.right_m[i], cross_sections.left_m[i]) = (right, left);
                 let share = (reference_m[i] - right).dot(across) / left.distance(right);
                 cross_sections.reference[i] = share.clamp(0.0, 1.0);

@@ -55,6 +55,10 @@ const CAUTION: (f64, f64) = (4.0, 0.4);
 const UNIT_CAUTION: f64 = 1.0;
 /// Parts of a step that are tried where the whole of it loses, besides half of it.
 const PARTS: [f64; 4] = [0.25, 0.0625, 0.015_625, 0.003_906_25];
+/// Programs of unit caution that judge a line at most: each whose step gains is followed by others.
+const JUDGED: usize = 3;
+/// Share of the cost that parts of a rejected step may gain where the line counts as solved.
+const JUDGED_GAIN: f64 = 1e-6;
 /// Penalty beyond which only rounding is left to gain.
 const MOST_CAUTION: f64 = 1e7;
 /// Weight of the squared step of a variable at a penalty of 1, as a share of the cost over the number of variables.
@@ -89,8 +93,8 @@ pub fn descend(
     let mut here = Place::of(problem, weights, bounds.inside(&start.x)?);
     let (mut iterations, mut programs, mut caution) = (0, 0, settings.caution);
     let mut status = Status::Failed(format!("{} programs without an end", settings.programs));
-    // Whether the next program says that the first-order conditions are met.
-    let mut judging = false;
+    // Whether the next program says that the first-order conditions are met, and how many have been asked to.
+    let (mut judging, mut judged) = (false, 0);
     if !here.cost.is_finite() {
         let found = "two points in one place, or a car that stands still";
         return Err(Error::input(
@@ -121,8 +125,15 @@ pub fn descend(
                 status = solution.status;
                 break;
             }
+            if judged == JUDGED {
+                status = Status::Almost(format!(
+                    "steps of unit caution still gained after {JUDGED} trials"
+                ));
+                break;
+            }
             // A great caution makes any promise small: the step of unit caution judges.
             (caution, judging) = (UNIT_CAUTION, true);
+            judged += 1;
             continue;
         }
         let moved = here
@@ -142,12 +153,18 @@ pub fn descend(
         } else if judging {
             // Where all of the step loses, its parts say whether the line can be bettered that way.
             let part = here.part_of(problem, weights, &there.x);
-            if here.cost - part.cost <= settings.least_gain * here.cost.abs() {
-                status = solution.status;
-                break;
+            let gained = (here.cost - part.cost) / here.cost.abs();
+            status = if gained <= settings.least_gain.max(JUDGED_GAIN) {
+                solution.status
+            } else {
+                Status::Almost(format!(
+                    "a part of the last step still gained {gained:.1e} of the cost"
+                ))
+            };
+            if gained > 0.0 {
+                here = part;
             }
-            here = part;
-            judging = false;
+            break;
         } else {
             caution *= CAUTION.0;
         }
