@@ -83,8 +83,9 @@ static TRACK: FileKind = file("track", "a track", |path| {
 
 static LOG: FileKind = file("log", "a log", |path| {
     // As for an identification of the bundled car.
+    let car = Car::bundled()?;
     let options = LogOptions {
-        rolling_radius_m: Some(Car::bundled()?.chassis.radius_front),
+        rolling_radius_m: Some([car.chassis.radius_front, car.chassis.radius_rear]),
         ..LogOptions::default()
     };
     let log = Log::read(path, &ChannelMap::default(), &options)?;
@@ -94,6 +95,11 @@ static LOG: FileKind = file("log", "a log", |path| {
         log.time_s.len(),
         1.0 / log.dt_s
     ))
+});
+
+static CHANNELS: FileKind = file("channels", "a channel map", |path| {
+    let map = ChannelMap::read(path)?;
+    Ok(format!("a channel map of {} channels", map.channels.len()))
 });
 
 static ENVELOPE: FileKind = file("envelope", "a g-g-v envelope", |path| {
@@ -114,7 +120,7 @@ static SWEEP: FileKind = file("sweep", "a sweep", |path| {
     Ok(format!("a sweep: {planned}"))
 });
 
-static FILES: [&FileKind; 7] = [&CAR, &TYRE, &TRACK, &LOG, &ENVELOPE, &LINE, &SWEEP];
+static FILES: [&FileKind; 8] = [&CAR, &TYRE, &TRACK, &LOG, &CHANNELS, &ENVELOPE, &LINE, &SWEEP];
 
 /// Parses `--kind`.
 fn kind_flag(name: &str) -> Result<Kind, String> {
@@ -175,6 +181,9 @@ fn guess(path: &Path) -> Result<Kind> {
         }
         if has(&["survey", "curvature"]) {
             return Ok(Kind::File(&TRACK));
+        }
+        if has(&["channels", "vehicle"]) {
+            return Ok(Kind::File(&CHANNELS));
         }
         if has(&["study", "base"]) {
             return Ok(Kind::File(&SWEEP));

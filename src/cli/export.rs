@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
     after_help = "Examples:\n  lapswarm export runs/raceline-001\n  lapswarm export drive.csv --rate 100 --out motec"
 )]
 pub struct Arguments {
-    /// Folders of runs, or tables of laps such as line_fastest.csv
+    /// Folders of runs, tables of laps such as line_fastest.csv, or logs
     #[arg(value_name = "RUN|FILE", required = true)]
     laps: Vec<PathBuf>,
     /// Where the files go; none may be there yet

@@ -11,13 +11,13 @@ use std::io::BufRead;
 use std::path::{Path, PathBuf};
 
 /// What can be written beside the files of studies.
-const OTHERS: [&str; 3] = ["sweep", "car", "track"];
+const OTHERS: [&str; 4] = ["sweep", "car", "track", "channels"];
 
 /// Flags of `init`.
 #[derive(clap::Args)]
 #[command(after_help = after_help())]
 pub struct Arguments {
-    /// What to write: a study's file, a sweep over a grid, a car with its tyre beside it, or a circuit from a survey
+    /// What to write: a study's file, a sweep over a grid, a car with its tyre beside it, a circuit from a survey, or a channel map
     #[arg(value_parser = PossibleValuesParser::new(registry::names().into_iter().chain(OTHERS)))]
     what: String,
     /// Where to [default: its name and .toml]; refused if it exists
@@ -146,6 +146,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let text = match what {
         "sweep" => include_str!("../../data/templates/sweep.toml").to_owned(),
         "track" => include_str!("../../data/templates/track.toml").to_owned(),
+        "channels" => include_str!("../../data/templates/channels.toml").to_owned(),
         "car" => Car::BUNDLED_TOML.to_owned(),
         // The parser lets nothing else through.
         study => registry::named(study).map_or(String::new(), |study| study.template()),

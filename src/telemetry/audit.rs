@@ -58,7 +58,7 @@ pub(super) fn check_gains(log: &Log) -> Result<()> {
         ("ay", &log.ay_mps2, &turning, "ground speed times yaw rate"),
         ("ax", &log.ax_mps2, &accel, "the change of ground speed"),
     ] {
-        let Some(found) = fit(reference, values, &moving, 0) else {
+        let Some(found) = fit(reference, values, &moving) else {
             continue;
         };
         let gain = found.slope.abs();

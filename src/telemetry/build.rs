@@ -32,7 +32,7 @@ pub(super) fn signals<'a>(
     mapped: &[Mapped<'a>],
     map: &ChannelMap,
     options: &LogOptions,
-    radius: Option<f64>,
+    radius: Option<[f64; 2]>,
 ) -> Result<Vec<Signal<'a>>> {
     let mut signals: Vec<Signal<'a>> = Vec::new();
     for m in mapped {
@@ -113,7 +113,7 @@ fn times(source: &str, channel: &Channel) -> Result<Arc<[f64]>> {
 }
 
 /// The factor that turns a channel's values into SI with the declared sign.
-fn factor(source: &str, m: &Mapped<'_>, map: &ChannelMap, radius: Option<f64>) -> Result<f64> {
+fn factor(source: &str, m: &Mapped<'_>, map: &ChannelMap, radius: Option<[f64; 2]>) -> Result<f64> {
     let mut factor = m.sign.unwrap_or(1.0);
     let Some(unit) = m.unit else {
         return Ok(factor);
@@ -123,6 +123,8 @@ fn factor(source: &str, m: &Mapped<'_>, map: &ChannelMap, radius: Option<f64>) -
         factor /= map.steering_ratio.unwrap_or(1.0);
     }
     if Role::WHEELS.contains(&m.role) && unit.quantity == Quantity::Speed {
+        let rear = matches!(m.role, Role::WheelSpeedRl | Role::WheelSpeedRr);
+        let radius = radius.map(|radii| radii[usize::from(rear)]);
         factor /= radius.ok_or_else(|| {
             Error::input(
                 source,
@@ -135,14 +137,20 @@ fn factor(source: &str, m: &Mapped<'_>, map: &ChannelMap, radius: Option<f64>) -
     Ok(factor)
 }
 
+/// Whether two roles' channels were sampled at the same times.
+pub(super) fn one_clock(signals: &[Signal<'_>], a: Role, b: Role) -> bool {
+    let times = |role| signals.iter().find(|s| s.mapped.role == role).map(|s| &s.times);
+    matches!((times(a), times(b)), (Some(a), Some(b)) if Arc::ptr_eq(a, b))
+}
+
 /// What the arrays of a log are made from.
 pub(super) struct Build<'a> {
     pub source: &'a str,
     pub recording: &'a Recording,
     pub map: &'a ChannelMap,
     pub options: &'a LogOptions,
-    /// Reference rolling radius, m.
-    pub radius: Option<f64>,
+    /// Rolling radii of the front and the rear wheels, m.
+    pub radius: Option<[f64; 2]>,
     /// Checks that a log of so many samples fits into memory.
     pub fits: &'a dyn Fn(usize) -> Result<()>,
 }
@@ -298,9 +306,9 @@ impl Build<'_> {
             ));
         }
         let [fl, fr, rl, rr] = &log.wheel_speed_radps;
-        let (left, right, name) = match self.map.speed_axle {
-            Axle::Front => (fl, fr, "front"),
-            Axle::Rear => (rl, rr, "rear"),
+        let (left, right, radius, name) = match self.map.speed_axle {
+            Axle::Front => (fl, fr, radius[0], "front"),
+            Axle::Rear => (rl, rr, radius[1], "rear"),
         };
         let note =
             format!("vx: no ground speed is logged; the mean of the {name} wheel speeds stands in for it");

@@ -1,37 +1,54 @@
-//! Calibration of sensors from the log itself: signs, delays, zero offsets and rolling radii.
+//! Calibration of sensors from the log itself: signs, zero offsets and rolling radii. Delays have their own file.
 //!
-//! Yaw rate is the reference for everything else. Its sign comes from the front wheels, whose speeds differ by track times yaw
-//! rate; `ay` and steering follow yaw, `ax` follows the change of speed. Delays are relative to yaw rate: a delay that is common
-//! to all channels cannot be seen and does not matter.
+//! Nothing is taken off that the car can do. A sign follows from what a car cannot do otherwise; a zero offset from whole laps, on
+//! which the car turns full circles and ends where it began, or from standstill; a rolling radius from wheels that roll freely.
 
-use super::calibration::{CalibrationOptions, Declared, Finding, FindingKind};
+use super::calibration::{CalibrationOptions, Declared, Finding, FindingKind, Switch};
 use super::derived::{
-    LEAST_S, STRAIGHT_YAW, SURE_OF_SIGN, acceleration, front_difference, moving, product, unbraked,
+    STRAIGHT_YAW, SURE_OF_SIGN, UNBRAKED_AX, acceleration, front_difference, moving, product, unbraked,
 };
+use super::laps::Lap;
 use super::log::Log;
-use super::recording::Format;
 use super::role::Role;
-use super::statistics::{Fit, fit, median, quantile};
+use super::statistics::{Fit, derivative, fit, regression};
+use std::f64::consts::TAU;
 
-/// Speed (m/s) below which wheel speeds are too coarse for a rolling radius.
-const STRAIGHT_MPS: f64 = 12.0;
-/// On a straight lateral acceleration (m/s^2) stays within this of its offset.
-const STRAIGHT_AY: f64 = 1.0;
-/// Wheels roll freely enough when |ax| (m/s^2) is below this.
-const COASTING_AX: f64 = 1.0;
 /// Standing still, m/s.
 const STANDSTILL_MPS: f64 = 0.3;
+/// Shortest standstill that tells an offset, s.
+const STANDSTILL_S: f64 = 2.0;
+/// A lap drawn from speed and yaw rate ends where it began to within this share of its length. Laps miss by 0.001 to 0.004, and
+/// what is no lap by 0.1 and more.
+const CLOSED: f64 = 0.02;
+/// Angle (rad) by which a lap's end may differ from its start, together with the error of the yaw rate's scale: this is the
+/// standard error of a lap's sum.
+const LAP_ANGLE: f64 = 0.04;
+/// Least offset of yaw rate that is taken off, rad/s: 0.05 m/s^2 at 50 m/s.
+const LEAST_YAW_OFFSET: f64 = 0.001;
+/// Least offset of ay that is taken off, m/s^2: a bank of one per cent.
+const LEAST_AY_OFFSET: f64 = 0.1;
+/// Offsets are this many standard errors large, at least.
+const SURE_OFFSET: f64 = 3.0;
+/// Speed (m/s) below which wheel speeds are too coarse for a rolling radius.
+const ROLLING_MPS: f64 = 12.0;
+/// Least error of a radius that is corrected, as a share of it: of wheels that roll freely, and of driven ones, whose slip under
+/// power looks like a smaller radius: that against drag is half a per cent.
+const LEAST_RADIUS: [f64; 2] = [0.002, 0.01];
+/// Half of the interval over which speed is differentiated for slip, s.
+const SLIP_S: f64 = 0.3;
+/// Radii are off by this many standard errors, at least.
+const SURE_RADIUS: f64 = 4.0;
 
 /// Estimates and applies signs, offsets and rolling radii, in this order; delays have been corrected before.
-pub(super) fn apply(log: &mut Log, options: &CalibrationOptions, format: Format, declared: &Declared) {
-    if options.signs.is_on(format) {
+pub(super) fn apply(log: &mut Log, options: &CalibrationOptions, declared: &Declared) {
+    if options.signs == Switch::On {
         signs(log, declared);
     }
-    if options.offsets.is_on(format) {
+    if options.offsets == Switch::On {
         offsets(log);
     }
-    if options.rolling_radius.is_on(format) {
-        rolling_radii(log, declared.rolling_radius_m);
+    if options.rolling_radius == Switch::On {
+        rolling_radii(log, declared);
     }
 }
 
@@ -39,7 +56,7 @@ fn signs(log: &mut Log, declared: &Declared) {
     let (moving, accel) = (moving(log), acceleration(log));
     if let Some(difference) = front_difference(log) {
         let yaw = log.yaw_rate_radps.clone();
-        let found = fit(&yaw, &difference, &unbraked(log, &accel), 0);
+        let found = fit(&yaw, &difference, &unbraked(log, &accel));
         let evidence = match found {
             Some(f) => format!(
                 "against the speed difference of the front wheels, which makes the front track about {:.1} m",
@@ -50,7 +67,7 @@ fn signs(log: &mut Log, declared: &Declared) {
         sign(log, declared, Role::YawRate, found, &evidence);
     }
     let turning = product(&log.vx_mps, &log.yaw_rate_radps);
-    let found = fit(&turning, &log.ay_mps2, &moving, 0);
+    let found = fit(&turning, &log.ay_mps2, &moving);
     sign(
         log,
         declared,
@@ -59,7 +76,7 @@ fn signs(log: &mut Log, declared: &Declared) {
         "against ground speed times yaw rate",
     );
     gain(log, Role::Ay, found, "ground speed times yaw rate");
-    let found = fit(&accel, &log.ax_mps2, &moving, 0);
+    let found = fit(&accel, &log.ax_mps2, &moving);
     sign(
         log,
         declared,
@@ -68,7 +85,7 @@ fn signs(log: &mut Log, declared: &Declared) {
         "against the change of ground speed",
     );
     gain(log, Role::Ax, found, "the change of ground speed");
-    let found = fit(&log.yaw_rate_radps, &log.steer_rad, &moving, 0);
+    let found = fit(&log.yaw_rate_radps, &log.steer_rad, &moving);
     sign(log, declared, Role::Steer, found, "against yaw rate");
 }
 
@@ -96,6 +113,8 @@ fn sign(log: &mut Log, declared: &Declared, role: Role, found: Option<Fit>, evid
         role,
         kind: FindingKind::Sign,
         value,
+        standard_error: None,
+        threshold: None,
         applied,
         correlation: Some(found.correlation),
         samples: found.samples,
@@ -109,6 +128,8 @@ fn gain(log: &mut Log, role: Role, found: Option<Fit>, against: &str) {
             role,
             kind: FindingKind::Gain,
             value: found.slope.abs(),
+            standard_error: None,
+            threshold: None,
             applied: false,
             correlation: Some(found.correlation),
             samples: found.samples,
@@ -127,137 +148,272 @@ fn values_mut(log: &mut Log, role: Role) -> &mut [f64] {
     }
 }
 
-/// Samples on straights, given the offsets of yaw rate and `ay`: stretches, because yaw rate also passes through
-/// zero in the middle of an S.
-fn straights(log: &Log, yaw_offset: f64, ay_offset: f64) -> Vec<bool> {
-    let mut mask: Vec<bool> = (0..log.samples())
-        .map(|i| {
-            log.vx_mps[i] > STRAIGHT_MPS
-                && (log.yaw_rate_radps[i] - yaw_offset).abs() < STRAIGHT_YAW
-                && (log.ay_mps2[i] - ay_offset).abs() < STRAIGHT_AY
-        })
-        .collect();
-    let least = (0.5 / log.dt_s).ceil() as usize;
-    for stretch in mask.chunk_by_mut(|a, b| a == b) {
-        if stretch.len() < least {
+/// An offset with its standard error, what tells it, and the number of samples behind it.
+struct Offset {
+    value: f64,
+    standard_error: f64,
+    place: String,
+    samples: usize,
+}
+
+/// How far the lap misses its own start when it is drawn from speed and yaw rate less `offset`, as a share of its length.
+fn misses(log: &Log, lap: &Lap, offset: f64) -> f64 {
+    let (mut heading, mut x, mut y, mut length) = (0.0f64, 0.0, 0.0, 0.0);
+    for i in lap.start..lap.end {
+        heading += (log.yaw_rate_radps[i] - offset) * log.dt_s;
+        let step = log.vx_mps[i] * log.dt_s;
+        x += step * heading.cos();
+        y += step * heading.sin();
+        length += step.abs();
+    }
+    if length > 0.0 { x.hypot(y) / length } else { 1.0 }
+}
+
+/// Complete laps that end where they began, each with the yaw rate's offset for which it turns full circles.
+fn closed_laps(log: &Log) -> Vec<(Lap, f64)> {
+    let laps = log.laps.iter().filter(|lap| lap.complete && lap.end > lap.start);
+    laps.filter_map(|lap| {
+        let turned: f64 = log.yaw_rate_radps[lap.start..lap.end].iter().sum::<f64>() * log.dt_s;
+        let full = TAU * (turned / TAU).round();
+        let offset = (turned - full) / ((lap.end - lap.start) as f64 * log.dt_s);
+        (misses(log, lap, offset) < CLOSED).then(|| (lap.clone(), offset))
+    })
+    .collect()
+}
+
+fn laps_said(laps: usize) -> String {
+    if laps == 1 {
+        "a whole lap".to_owned()
+    } else {
+        format!("{laps} whole laps")
+    }
+}
+
+/// Yaw rate's offset from whole laps: a lap turns the car by full circles.
+fn offset_of_laps(log: &Log, laps: &[(Lap, f64)]) -> Option<Offset> {
+    let count = laps.len() as f64;
+    let time_s: f64 = laps
+        .iter()
+        .map(|(lap, _)| (lap.end - lap.start) as f64 * log.dt_s)
+        .sum();
+    let mean = laps.iter().map(|(_, offset)| offset).sum::<f64>() / count;
+    let spread = laps
+        .iter()
+        .map(|(_, offset)| (offset - mean).powi(2))
+        .sum::<f64>();
+    let scatter = (spread / (count - 1.0).max(1.0) / count).sqrt();
+    (!laps.is_empty()).then(|| Offset {
+        value: mean,
+        standard_error: scatter.max(LAP_ANGLE * count / time_s),
+        place: format!(
+            "{}, which must turn full circles and end where it began",
+            laps_said(laps.len())
+        ),
+        samples: laps.iter().map(|(lap, _)| lap.end - lap.start).sum(),
+    })
+}
+
+/// Yaw rate's offset while the car stands.
+fn offset_at_rest(log: &Log) -> Option<Offset> {
+    let mut standing: Vec<bool> = log.vx_mps.iter().map(|v| v.abs() < STANDSTILL_MPS).collect();
+    let least = (STANDSTILL_S / log.dt_s).ceil() as usize;
+    let mut start = 0;
+    for stretch in standing.chunk_by_mut(|a, b| a == b) {
+        let end = start + stretch.len();
+        // A logger that keeps running after its sensors are switched off repeats their last values.
+        let values = &log.yaw_rate_radps[start..end];
+        if stretch.len() < least || values.iter().all(|v| *v == values[0]) {
             stretch.fill(false);
         }
+        start = end;
     }
-    mask
+    let one = vec![1.0; log.samples()];
+    let found = regression(&log.yaw_rate_radps, [&one], &standing)?;
+    Some(Offset {
+        value: found.factors[0],
+        standard_error: found.standard_errors[0],
+        place: "standstill, where the car does not turn".to_owned(),
+        samples: found.samples,
+    })
 }
 
-fn chosen(values: &[f64], mask: &[bool]) -> Vec<f64> {
-    let pairs = values.iter().zip(mask);
-    pairs.filter(|(_, m)| **m).map(|(v, _)| *v).collect()
-}
-
-fn enough(mask: &[bool], dt_s: f64) -> bool {
-    mask.iter().filter(|m| **m).count() as f64 * dt_s >= LEAST_S
+/// The offset of ay over whole laps, on which the car's own sideways motion begins and ends alike: what is left beside speed times
+/// yaw rate, with whatever factor, is an offset or the road's mean bank.
+fn ay_offset(log: &Log, laps: &[(Lap, f64)]) -> Option<Offset> {
+    let mut mask = vec![false; log.samples()];
+    for (lap, _) in laps {
+        mask[lap.start..lap.end].fill(true);
+    }
+    for (allowed, moving) in mask.iter_mut().zip(moving(log)) {
+        *allowed &= moving;
+    }
+    let turning = product(&log.vx_mps, &log.yaw_rate_radps);
+    let one = vec![1.0; log.samples()];
+    let found = regression(&log.ay_mps2, [&turning, &one], &mask)?;
+    Some(Offset {
+        value: found.factors[1],
+        standard_error: found.standard_errors[1],
+        place: format!(
+            "{}, on which it must follow ground speed times yaw rate on average",
+            laps_said(laps.len())
+        ),
+        samples: found.samples,
+    })
 }
 
 fn offsets(log: &mut Log) {
-    let (mut yaw, mut ay) = (0.0, 0.0);
-    let mut mask = straights(log, yaw, ay);
-    // On straights, yaw rate and ay are near their offsets, which are unknown. A few rounds of iteration find both.
-    for _ in 0..8 {
-        if let (Some(y), Some(a)) = (
-            median(chosen(&log.yaw_rate_radps, &mask)),
-            median(chosen(&log.ay_mps2, &mask)),
-        ) {
-            (yaw, ay) = (y, a);
-        }
-        mask = straights(log, yaw, ay);
-    }
-    let mut place = "on straights";
-    if !enough(&mask, log.dt_s) {
-        place = "at standstill";
-        mask = log.vx_mps.iter().map(|v| v.abs() < STANDSTILL_MPS).collect();
-    }
-    for role in [Role::YawRate, Role::Ay] {
-        let samples = chosen(values_mut(log, role), &mask);
-        let varies = samples.windows(2).any(|pair| pair[0] != pair[1]);
-        // A logger that keeps running after its sensors are switched off repeats their last values.
-        let usable = enough(&mask, log.dt_s) && (place == "on straights" || varies);
-        let (Some(value), true) = (mean_of_middle(samples.clone()), usable) else {
-            log.calibration.notes.push(format!(
-                "{}: too little straight running or standstill to tell its zero offset",
-                role.key()
-            ));
-            continue;
-        };
-        for v in values_mut(log, role) {
-            *v -= value;
-        }
-        log.calibration.findings.push(Finding {
-            role,
-            kind: FindingKind::Offset,
-            value,
-            applied: true,
-            correlation: None,
-            samples: samples.len(),
-            evidence: place.to_owned(),
-        });
-    }
+    let laps = closed_laps(log);
+    let of_yaw = offset_of_laps(log, &laps).or_else(|| offset_at_rest(log));
+    take_off(log, Role::YawRate, of_yaw, LEAST_YAW_OFFSET);
+    let of_ay = ay_offset(log, &laps);
+    take_off(log, Role::Ay, of_ay, LEAST_AY_OFFSET);
 }
 
-/// Mean of the middle half. It is as robust as the median here, and finer than the steps of a coarse sensor.
-fn mean_of_middle(values: Vec<f64>) -> Option<f64> {
-    let low = quantile(values.clone(), 0.25)?;
-    let high = quantile(values.clone(), 0.75)?;
-    let (mut n, mut sum) = (0_usize, 0.0);
-    for v in values.into_iter().filter(|v| (low..=high).contains(v)) {
-        n += 1;
-        sum += v;
-    }
-    (n > 0).then(|| sum / n as f64)
-}
-
-fn rolling_radii(log: &mut Log, reference_m: Option<f64>) {
-    let accel = acceleration(log);
-    let mut mask = straights(log, 0.0, 0.0);
-    for (m, a) in mask.iter_mut().zip(&accel) {
-        *m &= a.abs() < COASTING_AX;
-    }
-    for (index, role) in Role::WHEELS.into_iter().enumerate() {
-        let wheel = &log.wheel_speed_radps[index];
-        let ratios: Vec<f64> = (0..log.samples())
-            .filter(|&i| mask[i] && wheel[i] > 0.0)
-            .map(|i| log.vx_mps[i] / wheel[i])
-            .collect();
-        let samples = ratios.len();
-        let (Some(radius), true) = (
-            mean_of_middle(ratios.clone()),
-            samples as f64 * log.dt_s >= LEAST_S,
-        ) else {
-            log.calibration.notes.push(format!(
-                "{}: too little coasting on straights to tell its rolling radius",
-                role.key()
-            ));
-            continue;
-        };
-        let spread = match (quantile(ratios.clone(), 0.25), quantile(ratios, 0.75)) {
-            (Some(low), Some(high)) => (high - low) / radius * 100.0,
-            _ => 0.0,
-        };
-        let mut evidence = format!("on straights; the middle half of the samples within {spread:.2} %");
-        // Speeds become those of a wheel of the reference radius: slip is computed with one radius for all wheels.
-        if let Some(reference) = reference_m {
-            let scale = radius / reference;
-            for w in &mut log.wheel_speed_radps[index] {
-                *w *= scale;
-            }
+fn take_off(log: &mut Log, role: Role, offset: Option<Offset>, least: f64) {
+    let Some(offset) = offset else {
+        let rest = if role == Role::YawRate {
+            " and no standstill"
         } else {
-            evidence.push_str("; left alone: no rolling_radius_m to refer wheel speeds to");
-        }
-        log.calibration.findings.push(Finding {
-            role,
-            kind: FindingKind::RollingRadius,
-            value: radius,
-            applied: reference_m.is_some(),
-            correlation: None,
-            samples,
-            evidence,
+            ""
+        };
+        log.calibration.notes.push(format!(
+            "{}: no complete lap that ends where it began{rest} to tell its zero offset",
+            role.key()
+        ));
+        return;
+    };
+    let threshold = least.max(SURE_OFFSET * offset.standard_error);
+    let applied = offset.value.abs() >= threshold;
+    if applied {
+        values_mut(log, role).iter_mut().for_each(|v| *v -= offset.value);
+    }
+    let mut evidence = format!("from {}", offset.place);
+    if !applied {
+        evidence.push_str(&format!(
+            "; below the threshold of {threshold:.4} {}",
+            role.si_unit()
+        ));
+    }
+    log.calibration.findings.push(Finding {
+        role,
+        kind: FindingKind::Offset,
+        value: offset.value,
+        standard_error: Some(offset.standard_error),
+        threshold: Some(threshold),
+        applied,
+        correlation: None,
+        samples: offset.samples,
+        evidence,
+    });
+}
+
+/// A share by which wheels turn too fast where nothing makes them slip.
+struct Excess {
+    value: f64,
+    standard_error: f64,
+    samples: usize,
+}
+
+/// The part of `excess` that neither turning nor, of driven wheels, slip explains. On straights slip goes with acceleration; in
+/// bends it depends on more than that.
+fn steady(log: &Log, excess: &[f64], driven: bool) -> Option<Excess> {
+    let free_rolling = unbraked(log, &acceleration(log));
+    // Over so long that noise does not make slip look less than it is.
+    let accel = derivative(&log.vx_mps, log.dt_s, (SLIP_S / log.dt_s).ceil() as usize);
+    let straight = |i: usize| accel[i] > UNBRAKED_AX && log.yaw_rate_radps[i].abs() < STRAIGHT_YAW;
+    let mask: Vec<bool> = (0..log.samples())
+        .map(|i| free_rolling[i] && log.vx_mps[i] > ROLLING_MPS && (!driven || straight(i)))
+        .collect();
+    let one = vec![1.0; log.samples()];
+    let per_metre = log.yaw_rate_radps.iter().zip(&log.vx_mps);
+    let turning: Vec<f64> = per_metre.map(|(r, v)| r / v.max(1.0)).collect();
+    let (value, standard_error, samples) = if driven {
+        let found = regression(excess, [&one, &turning, &accel], &mask)?;
+        (found.factors[0], found.standard_errors[0], found.samples)
+    } else {
+        let found = regression(excess, [&one, &turning], &mask)?;
+        (found.factors[0], found.standard_errors[0], found.samples)
+    };
+    Some(Excess {
+        value,
+        standard_error,
+        samples,
+    })
+}
+
+/// Refers wheel speeds to the radius of their own axle. What both wheels of an axle have in common and what they differ by are
+/// judged apart: slip is common to both, and a difference is not slip.
+fn rolling_radii(log: &mut Log, declared: &Declared) {
+    for (axle, [left, right]) in [[0, 1], [2, 3]].into_iter().enumerate() {
+        let driven = (axle == 1) != declared.rear_is_undriven;
+        let reference_m = declared.rolling_radius_m.map(|radii| radii[axle]);
+        let rim = |wheel: usize, i: usize| {
+            log.wheel_speed_radps[wheel][i] * reference_m.unwrap_or(1.0) / log.vx_mps[i].max(1.0)
+        };
+        let of_wheels = |combined: fn(f64, f64) -> f64| -> Vec<f64> {
+            (0..log.samples())
+                .map(|i| combined(rim(left, i), rim(right, i)))
+                .collect()
+        };
+        let common = steady(log, &of_wheels(|l, r| (l + r) / 2.0 - 1.0), driven);
+        let half = steady(log, &of_wheels(|l, r| (r - l) / 2.0), driven);
+        let (Some(common), Some(half)) = (common, half) else {
+            log.calibration.notes.push(format!(
+                "{}, {}: too little driving without braking to tell their rolling radii",
+                Role::WHEELS[left].key(),
+                Role::WHEELS[right].key()
+            ));
+            continue;
+        };
+        let free = declared.radius_is_free[axle];
+        let of_axle = LEAST_RADIUS[usize::from(driven)].max(SURE_RADIUS * common.standard_error);
+        let of_sides = LEAST_RADIUS[0].max(2.0 * SURE_RADIUS * half.standard_error);
+        let referred = reference_m.is_some();
+        let common_applied = referred && !free && common.value.abs() >= of_axle;
+        let sides_applied = referred && 2.0 * half.value.abs() >= of_sides;
+        let mut evidence = "from ground speed where the car is not braked".to_owned();
+        evidence.push_str(&match (reference_m, common_applied, sides_applied) {
+            (None, ..) => "; the car's radius is not known".to_owned(),
+            (Some(radius), true, _) => format!("; wheel speeds are referred to the car's {radius} m"),
+            (Some(_), false, true) => {
+                "; what the wheels of the axle differ by is taken off, their mean is left".to_owned()
+            }
+            (Some(_), false, false) if free => String::new(),
+            (Some(radius), false, false) => {
+                format!(
+                    "; the mean of the axle is within {:.1} % of the car's {radius} m",
+                    100.0 * of_axle
+                )
+            }
         });
+        if free {
+            evidence.push_str("; the mean of the axle is left to the fit, which finds its radius");
+        } else if driven && referred && !common_applied {
+            evidence.push_str(
+                "; slip under power looks like a smaller radius, and a free radius tells them apart",
+            );
+        }
+        for (wheel, side) in [(left, -1.0), (right, 1.0)] {
+            let taken = if common_applied { common.value } else { 0.0 }
+                + if sides_applied { side * half.value } else { 0.0 };
+            if taken != 0.0 {
+                log.wheel_speed_radps[wheel]
+                    .iter_mut()
+                    .for_each(|w| *w /= 1.0 + taken);
+            }
+            let radius_m = reference_m.unwrap_or(1.0) / (1.0 + common.value + side * half.value);
+            log.calibration.findings.push(Finding {
+                role: Role::WHEELS[wheel],
+                kind: FindingKind::RollingRadius,
+                value: radius_m,
+                standard_error: Some(radius_m * common.standard_error.hypot(half.standard_error)),
+                threshold: reference_m.map(|_| of_axle),
+                applied: common_applied || sides_applied,
+                correlation: None,
+                samples: common.samples,
+                evidence: evidence.clone(),
+            });
+        }
     }
 }
 
@@ -291,15 +447,18 @@ mod tests {
 
     #[test]
     fn injected_faults_are_found_and_taken_off() {
-        let log = read("[vehicle]\nrolling_radius_m = 0.325");
+        // The lag of ay is the car's own, as far as the log tells: it is declared.
+        let log = read("[vehicle]\nrolling_radius_m = 0.325\n[channels.ay]\ndelay_s = 0.12");
         let c = &log.calibration;
-        let delay = |role| c.applied(role, FindingKind::Delay).unwrap();
+        let delay = |role| {
+            c.applied(role, FindingKind::Delay)
+                .unwrap_or_else(|| panic!("{role:?}: {c:#?}"))
+        };
         for (role, injected) in [
             (Role::Vx, 0.07),
             (Role::WheelSpeedFl, 0.03),
             (Role::WheelSpeedRr, 0.03),
             (Role::Ax, 0.12),
-            (Role::Ay, 0.12),
         ] {
             assert!(
                 (delay(role) - injected).abs() < 0.006,
@@ -307,7 +466,8 @@ mod tests {
                 delay(role)
             );
         }
-        assert_eq!(c.applied(Role::Steer, FindingKind::Delay), None);
+        assert_eq!(c.finding(Role::Steer, FindingKind::Delay), None);
+        assert_eq!(c.finding(Role::Ay, FindingKind::Delay), None);
         assert_eq!(c.applied(Role::Steer, FindingKind::Sign), Some(-1.0));
         assert_eq!(c.applied(Role::Ay, FindingKind::Sign), Some(-1.0));
         assert_eq!(c.finding(Role::YawRate, FindingKind::Sign).unwrap().value, 1.0);
@@ -339,14 +499,16 @@ mod tests {
     #[test]
     fn what_the_map_declares_is_left_alone() {
         let log = read(
-            "[channels.steer]\nsign = -1\n[channels.ay]\nsign = -1\ndelay_s = 0.12\n\
+            "[channels.steer]\nsign = -1\n[channels.ay]\nsign = -1\n[channels.ax]\ndelay_s = 0.12\n\
              [channels.yaw_rate]\nsign = 1\n",
         );
         let c = &log.calibration;
         assert_eq!(c.applied(Role::Steer, FindingKind::Sign), None);
         assert_eq!(c.finding(Role::Steer, FindingKind::Sign).unwrap().value, 1.0);
-        let ay = c.finding(Role::Ay, FindingKind::Delay).unwrap();
-        assert!(!ay.applied && ay.value.abs() < 0.005, "{ay:?}");
+        let ax = c
+            .finding(Role::Ax, FindingKind::Delay)
+            .unwrap_or_else(|| panic!("{c:#?}"));
+        assert!(!ax.applied && ax.value.abs() < 0.005, "{ax:?}");
         // Without a reference radius the radii are reported and nothing is scaled.
         let fl = c.finding(Role::WheelSpeedFl, FindingKind::RollingRadius).unwrap();
         assert!(!fl.applied && (fl.value / RADII[0] - 1.0).abs() < 1e-3);

@@ -7,32 +7,19 @@ use crate::error::Result;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-use super::recording::Format;
 use super::role::Role;
 
-/// On, off, or as the file format suggests.
+/// Whether a correction is estimated from a log and applied to it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Switch {
-    /// On for foreign files, off for native ones, which are calibrated already.
+    /// It is.
     #[default]
-    Auto,
-    /// Always.
     On,
-    /// Never.
+    /// It is not.
     Off,
 }
 
-impl Switch {
-    pub(super) fn is_on(self, format: Format) -> bool {
-        match self {
-            Self::Auto => format != Format::Native,
-            Self::On => true,
-            Self::Off => false,
-        }
-    }
-}
-
-/// A [`Switch`] in files and flags: true, false, or no value for `Auto`.
+/// A [`Switch`] in files (true or false) and flags (on or off).
 struct Switched;
 
 impl Kind<Switch> for Switched {
@@ -42,38 +29,32 @@ impl Kind<Switch> for Switched {
     }
 
     fn write(&self, switch: &Switch) -> Option<Written> {
-        let on = match switch {
-            Switch::Auto => return None,
-            Switch::On => true,
-            Switch::Off => false,
-        };
-        Some(Written::Value(on.to_string()))
+        Some(Written::Value((*switch == Switch::On).to_string()))
     }
 
     fn parse(&self, text: &str, _: &Switch) -> Result<Switch, String> {
         match text {
-            "auto" => Ok(Switch::Auto),
             "on" => Ok(Switch::On),
             "off" => Ok(Switch::Off),
-            _ => Err("expected auto, on or off".to_owned()),
+            _ => Err("expected on or off".to_owned()),
         }
     }
 
     fn value_name(&self) -> &'static str {
-        "auto|on|off"
+        "on|off"
     }
 }
 
 settings! {
-    /// Which corrections are estimated from the log and applied to it.
+    /// Which corrections are estimated from the log and applied to it, in every format.
     pub struct CalibrationOptions {
-        signs: Switch as "calibration.signs" ["-"] = Switch::Auto, of(Switched).example("true"),
+        signs: Switch as "calibration.signs" ["-"] = Switch::On, of(Switched),
             "Signs of yaw rate, ay, ax and steering are found from the log";
-        delays: Switch as "calibration.delays" ["-"] = Switch::Auto, of(Switched).example("true"),
-            "Delays of the channels relative to yaw rate are found from the log";
-        offsets: Switch as "calibration.offsets" ["-"] = Switch::Auto, of(Switched).example("true"),
+        delays: Switch as "calibration.delays" ["-"] = Switch::On, of(Switched),
+            "Delays of wheel speeds, vx, ax and yaw rate are found from the log";
+        offsets: Switch as "calibration.offsets" ["-"] = Switch::On, of(Switched),
             "Zero offsets of yaw rate and ay are found from the log";
-        rolling_radius: Switch as "calibration.rolling_radius" ["-"] = Switch::Auto, of(Switched).example("true"),
+        rolling_radius: Switch as "calibration.rolling_radius" ["-"] = Switch::On, of(Switched),
             "The rolling radius of each wheel is found from the log";
     }
 }
@@ -96,9 +77,10 @@ impl CalibrationOptions {
 pub enum FindingKind {
     /// 1 or -1, by which the channel was multiplied.
     Sign,
-    /// Delay of the channel relative to yaw rate, s; it was corrected.
+    /// Delay of the channel, s: relative to the clock that most channels agree on where it was applied, else to the channel
+    /// that it was compared with.
     Delay,
-    /// Zero offset of the channel in its SI unit; it was corrected.
+    /// Zero offset of the channel in its SI unit.
     Offset,
     /// Ground speed over angular speed of a freely rolling wheel, m.
     RollingRadius,
@@ -115,6 +97,10 @@ pub struct Finding {
     pub kind: FindingKind,
     /// Its value, in the unit that `kind` names.
     pub value: f64,
+    /// Its standard error in the same unit, where there is one.
+    pub standard_error: Option<f64>,
+    /// What it must exceed to be applied, where there is such a limit; for a rolling radius, as a share of the car's.
+    pub threshold: Option<f64>,
     /// Whether the log was corrected by it.
     pub applied: bool,
     /// The correlation behind it, if there is one.
@@ -127,16 +113,24 @@ pub struct Finding {
 
 impl std::fmt::Display for Finding {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let state = if self.applied {
-            "corrected"
-        } else {
-            "left as it is"
+        let (channel, value) = (self.role.key(), self.value);
+        match self.kind {
+            FindingKind::Sign if value < 0.0 => write!(f, "{channel}: the sign is reversed")?,
+            FindingKind::Sign => write!(f, "{channel}: the sign is right")?,
+            FindingKind::Delay => write!(f, "{channel}: delay {value:.4} s")?,
+            FindingKind::Offset => write!(f, "{channel}: zero offset {value:.5} {}", self.role.si_unit())?,
+            FindingKind::RollingRadius => write!(f, "{channel}: rolling radius {value:.5} m")?,
+            FindingKind::Gain => write!(f, "{channel}: {value:.3} times what it should equal")?,
+        }
+        if let Some(error) = self.standard_error {
+            write!(f, " (standard error {error:.5})")?;
+        }
+        let state = match (self.applied, self.kind) {
+            (true, _) => "; corrected",
+            (false, FindingKind::Sign) if value > 0.0 => "",
+            (false, _) => "; not applied",
         };
-        write!(
-            f,
-            "{:?} {:?}: {:.4}, {state} ({})",
-            self.role, self.kind, self.value, self.evidence
-        )
+        write!(f, "{state}: {}", self.evidence)
     }
 }
 
@@ -161,12 +155,17 @@ impl Calibration {
     }
 }
 
-/// What the channel map declares. It takes precedence over the log.
+/// What the channel map and the car declare. It takes precedence over the log.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Declared {
     pub signs: Vec<Role>,
     pub delays: Vec<Role>,
-    pub rolling_radius_m: Option<f64>,
+    /// Rolling radii of the front and the rear wheels, m.
+    pub rolling_radius_m: Option<[f64; 2]>,
+    /// Whether the study finds an axle's radius itself.
+    pub radius_is_free: [bool; 2],
+    /// Whether the rear wheels are the ones that are not driven.
+    pub rear_is_undriven: bool,
     /// Ground speed was computed from wheel speeds and has no delay of its own.
     pub speed_of_wheels: bool,
 }

@@ -44,9 +44,10 @@ pub struct ChannelMap {
     pub channels: BTreeMap<Role, ChannelEntry>,
     /// Steering-wheel angle over road-wheel angle, for a log of the steering-wheel angle.
     pub steering_ratio: Option<f64>,
-    /// Rolling radius (m) by which wheel speeds logged in km/h are divided to give rad/s, and on which wheel speeds
-    /// are calibrated.
+    /// Rolling radius (m) by which wheel speeds logged in km/h are divided to give rad/s.
     pub rolling_radius_m: Option<f64>,
+    /// That of the rear wheels, where it is another one.
+    pub rear_rolling_radius_m: Option<f64>,
     /// The axle whose wheel speeds replace a ground speed that is not logged: the undriven one.
     pub speed_axle: Axle,
 }
@@ -65,6 +66,7 @@ struct FileEntry {
 struct FileVehicle {
     steering_ratio: Option<Spanned<f64>>,
     rolling_radius_m: Option<Spanned<f64>>,
+    rear_rolling_radius_m: Option<Spanned<f64>>,
     #[serde(default)]
     speed_axle: Axle,
 }
@@ -163,8 +165,20 @@ impl ChannelMap {
                 "a radius between 0.05 and 2 m",
                 |v| (0.05..=2.0).contains(&v),
             )?,
+            rear_rolling_radius_m: checked(
+                file.vehicle.rear_rolling_radius_m,
+                "vehicle.rear_rolling_radius_m",
+                "a radius between 0.05 and 2 m",
+                |v| (0.05..=2.0).contains(&v),
+            )?,
             speed_axle: file.vehicle.speed_axle,
         })
+    }
+
+    /// The rolling radii (m) of the front and the rear wheels, if it gives any.
+    pub fn rolling_radii_m(&self) -> Option<[f64; 2]> {
+        let front = self.rolling_radius_m.or(self.rear_rolling_radius_m)?;
+        Some([front, self.rear_rolling_radius_m.unwrap_or(front)])
     }
 
     /// Finds the channel of each role.
@@ -329,10 +343,11 @@ mod tests {
     fn a_map_is_read_in_full() {
         let map = ChannelMap::parse(
             "[channels.yaw_rate]\nname = \"Gyro\"\nunit = \"deg/s\"\nsign = -1\ndelay_s = 0.1\n\
-             [vehicle]\nsteering_ratio = 14\nrolling_radius_m = 0.325\nspeed_axle = \"rear\"\n",
+             [vehicle]\nsteering_ratio = 14\nrolling_radius_m = 0.325\nrear_rolling_radius_m = 0.328\nspeed_axle = \"rear\"\n",
             "m.toml",
         )
         .unwrap();
+        assert_eq!(map.rolling_radii_m(), Some([0.325, 0.328]));
         let yaw = &map.channels[&Role::YawRate];
         assert_eq!((yaw.sign, yaw.delay_s), (Some(-1.0), Some(0.1)));
         assert_eq!(map.steering_ratio, Some(14.0));

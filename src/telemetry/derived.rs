@@ -10,7 +10,7 @@ const DERIVATIVE_S: f64 = 0.1;
 /// Limit of the front wheels' speed difference, in multiples of its 90 % quantile.
 const CLIP: f64 = 2.0;
 /// Value of ax (m/s^2) above which the brakes are hardly on.
-const UNBRAKED_AX: f64 = -1.0;
+pub(super) const UNBRAKED_AX: f64 = -1.0;
 /// On a straight yaw rate (rad/s) stays within this of its offset.
 pub(super) const STRAIGHT_YAW: f64 = 0.03;
 /// Evidence from a straight or standstill needs this much of it, s.
@@ -28,10 +28,14 @@ pub(super) fn product(a: &[f64], b: &[f64]) -> Vec<f64> {
     a.iter().zip(b).map(|(x, y)| x * y).collect()
 }
 
+/// Samples to each side over which speed is differentiated.
+pub(super) fn acceleration_span(log: &Log) -> usize {
+    (DERIVATIVE_S / log.dt_s).round().max(1.0) as usize
+}
+
 /// Change of ground speed, m/s^2.
 pub(super) fn acceleration(log: &Log) -> Vec<f64> {
-    let half = (DERIVATIVE_S / log.dt_s).round().max(1.0) as usize;
-    derivative(&log.vx_mps, log.dt_s, half)
+    derivative(&log.vx_mps, log.dt_s, acceleration_span(log))
 }
 
 /// Front right minus front left wheel speed, m/s.

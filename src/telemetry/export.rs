@@ -1,8 +1,8 @@
 //! Laps as the tools of race engineers read them: MoTeC's `.ld` with its `.ldx` of beacons, and CSV as MoTeC i2 writes it.
 
-use super::csv_native::COLUMNS;
-use crate::config::read_bytes;
-use crate::error::{Error, Place, Result};
+use super::recording::{Channel, Recording};
+use super::units::{G, Unit};
+use crate::error::{Error, Result};
 use motec_i2::{ChannelMetadata, Datatype, Header, LDWriter, Sample};
 use std::fmt::Write as _;
 use std::io::Cursor;
@@ -41,21 +41,23 @@ pub struct LapLabels {
     pub comment: String,
 }
 
-/// Largest file that is read (bytes); a lap is far smaller.
-const MOST_BYTES: u64 = 256 << 20;
 /// Greatest sample rate (Hz): the fastest that loggers have.
 const MOST_RATE_HZ: u16 = 1000;
 /// Most samples of a channel: hours at the greatest rate.
 const MOST_SAMPLES: f64 = 2e7;
 
-/// Our columns, MoTeC's names and units for them, and the factor between.
-const NAMES: [(&[&str], &str, &str, f64); 12] = [
+/// Our columns, MoTeC's names and units for them, and the factor from SI.
+const NAMES: [(&[&str], &str, &str, f64); 16] = [
     (&["distance", "station"], "Lap Distance", "m", 1.0),
     (&["vx", "v"], "Ground Speed", "km/h", 3.6),
-    (&["ax"], "G Force Long", "G", 1.0 / 9.806_65),
-    (&["ay"], "G Force Lat", "G", 1.0 / 9.806_65),
+    (&["ax"], "G Force Long", "G", 1.0 / G),
+    (&["ay"], "G Force Lat", "G", 1.0 / G),
     (&["yaw_rate"], "Gyro Yaw Velocity", "deg/s", DEGREES),
     (&["steer", "steering"], "Steered Angle", "deg", DEGREES),
+    (&["wheel_speed_fl"], "Wheel Speed FL", "rad/s", 1.0),
+    (&["wheel_speed_fr"], "Wheel Speed FR", "rad/s", 1.0),
+    (&["wheel_speed_rl"], "Wheel Speed RL", "rad/s", 1.0),
+    (&["wheel_speed_rr"], "Wheel Speed RR", "rad/s", 1.0),
     (&["gear"], "Gear", "", 1.0),
     (&["x"], "Pos X", "m", 1.0),
     (&["y"], "Pos Y", "m", 1.0),
@@ -67,154 +69,95 @@ const DEGREES: f64 = 180.0 / std::f64::consts::PI;
 /// What stands after a column's name where a log is compared with a car.
 const VERSIONS: [(&str, &str); 2] = [("_measured", " Measured"), ("_fitted", " Fitted")];
 
-/// A column of one of our tables under MoTeC's name.
-fn renamed(name: &str, unit: &str) -> (String, String, f64) {
+/// A channel's name and unit in MoTeC i2, and the factor from the unit that it is recorded in.
+fn renamed(channel: &Channel) -> (String, String, f64) {
+    let (name, unit) = (channel.name.as_str(), channel.unit.as_str());
+    // Native logs have units in their names.
+    let name = name
+        .strip_suffix(unit)
+        .and_then(|name| name.strip_suffix('_'))
+        .unwrap_or(name);
     let version = VERSIONS
         .iter()
         .find_map(|(end, words)| Some((name.strip_suffix(end)?, *words)));
     let (base, words) = version.unwrap_or((name, ""));
-    if let Some((_, motec, unit, factor)) = NAMES.iter().find(|(ours, ..)| ours.contains(&base)) {
-        return (format!("{motec}{words}"), (*unit).to_owned(), *factor);
+    if let Some((_, motec, motec_unit, from_si)) = NAMES.iter().find(|(ours, ..)| ours.contains(&base)) {
+        let to_si = Unit::parse(unit).map_or(1.0, |unit| unit.factor);
+        return (
+            format!("{motec}{words}"),
+            (*motec_unit).to_owned(),
+            to_si * from_si,
+        );
     }
     let titled: Vec<String> = base
         .split(['_', ' '])
-        .map(|word| match word {
-            "fl" | "fr" | "rl" | "rr" => word.to_uppercase(),
-            _ => word
-                .chars()
-                .take(1)
+        .map(|word| {
+            let mut letters = word.chars();
+            letters
+                .next()
+                .into_iter()
                 .flat_map(char::to_uppercase)
-                .chain(word.chars().skip(1))
-                .collect(),
+                .chain(letters)
+                .collect()
         })
         .collect();
     let unit = if unit == "-" { "" } else { unit };
     (titled.join(" ") + words, unit.to_owned(), 1.0)
 }
 
-/// A column's name and unit, from a head such as `vx (m/s)` or `vx_mps`.
-fn split_head(head: &str) -> (String, String) {
-    let head = head.trim_start_matches('#').trim();
-    if let Some((name, unit)) = head.split_once(" (") {
-        return (name.to_owned(), unit.trim_end_matches(')').to_owned());
-    }
-    // As native logs have them; the longer endings come first.
-    let endings = [
-        ("_mps2", "m/s^2"),
-        ("_mps", "m/s"),
-        ("_radps", "rad/s"),
-        ("_rad", "rad"),
-        ("_m", "m"),
-        ("_s", "s"),
-    ];
-    let known = endings
-        .iter()
-        .find_map(|(end, unit)| Some((head.strip_suffix(end)?, *unit)));
-    known.map_or_else(
-        || (head.to_owned(), String::new()),
-        |(name, unit)| (name.to_owned(), unit.to_owned()),
-    )
-}
-
 impl SampledLap {
-    /// Samples a table that a study wrote (`line_fastest.csv`, `drive.csv`, `traces.csv`), or a native log, at `rate_hz` (Hz),
-    /// linearly between its rows; gears hold. Columns without a number are left out, and gaps are filled from their neighbours.
+    /// Samples a table that a study wrote (`line_fastest.csv`, `drive.csv`, `traces.csv`), or any log, at `rate_hz` (Hz), linearly
+    /// between its samples; gears hold. Channels without a number are left out, and gaps are filled from their neighbours.
     ///
     /// # Errors
-    /// [`Error::Io`] if it cannot be read; [`Error::Input`] naming file and line for a table without rising times or other
-    /// columns, for rows of another width, and for a rate out of 1 to 1000 Hz.
+    /// Those of [`Recording::read`]; [`Error::Input`] naming file and line for times that do not rise, and naming the file for a
+    /// rate out of 1 to 1000 Hz and for a table without a channel beside its times.
     pub fn read(path: &Path, rate_hz: u16) -> Result<Self> {
         if !(1..=MOST_RATE_HZ).contains(&rate_hz) {
             let expected = format!("1 to {MOST_RATE_HZ} Hz");
             return Err(Error::input(path, "rate", format!("{rate_hz} Hz"), expected));
         }
-        let bytes = read_bytes(path, MOST_BYTES)?;
-        let text = String::from_utf8(bytes)
-            .map_err(|_| Error::input(path, "file", "bytes that are no UTF-8", "text"))?;
-        let native = text.lines().any(|line| line.starts_with(COLUMNS[0]));
-        let mut reader = csv::ReaderBuilder::new()
-            .comment(native.then_some(b'#'))
-            .from_reader(text.as_bytes());
-        let refuse = |e: csv::Error| {
-            let line = e.position().map_or(1, csv::Position::line);
-            Error::input(
-                path,
-                Place::line(line as usize),
-                e.to_string(),
-                "a table with a header",
-            )
-        };
-        let heads: Vec<(String, String)> = reader.headers().map_err(refuse)?.iter().map(split_head).collect();
-        let Some(clock) = heads.iter().position(|(name, _)| name == "time") else {
-            let found: Vec<&str> = heads.iter().take(8).map(|(name, _)| name.as_str()).collect();
-            let expected = "a column of times (s), as a line, a drive, a lap or a log has it";
-            return Err(Error::input(path, Place::line(1), found.join(", "), expected));
-        };
-        let mut columns: Vec<Vec<f64>> = vec![Vec::new(); heads.len()];
-        for record in reader.records() {
-            let record = record.map_err(refuse)?;
-            let line = record.position().map_or(1, csv::Position::line) as usize;
-            let number = |cell: &str| {
-                cell.trim()
-                    .parse()
-                    .ok()
-                    .filter(|x: &f64| x.is_finite())
-                    .unwrap_or(f64::NAN)
-            };
-            for (column, cell) in columns.iter_mut().zip(record.iter()) {
-                column.push(number(cell));
-            }
-            let times = &columns[clock];
-            let at = times.len() - 1;
-            if !(times[at].is_finite() && (at == 0 || times[at] > times[at - 1])) {
-                let found = record.get(clock).unwrap_or_default();
-                return Err(Error::input(
-                    path,
-                    Place::line(line).named("time"),
-                    found,
-                    "times that rise",
-                ));
+        let channels = Recording::read(path)?.channels;
+        for channel in &channels {
+            let back = (1..channel.values.len()).find(|&i| channel.time_s(i) <= channel.time_s(i - 1));
+            if let Some(i) = back {
+                let found = format!("{} s after {} s", channel.time_s(i), channel.time_s(i - 1));
+                return Err(Error::input(path, channel.place(i), found, "times that rise"));
             }
         }
-        let times = columns[clock].clone();
-        let (Some(&first), Some(&last)) = (times.first(), times.last()) else {
-            return Err(Error::input(path, "rows", "none", "a lap"));
-        };
-        let time_s = last - first;
+        let ends = |c: &Channel| (c.time_s(0), c.time_s(c.values.len().saturating_sub(1)));
+        let begins = channels.iter().map(|c| ends(c).0).fold(f64::INFINITY, f64::min);
+        let time_s = channels
+            .iter()
+            .map(|c| ends(c).1)
+            .fold(f64::NEG_INFINITY, f64::max)
+            - begins;
         let count = (time_s * f64::from(rate_hz) + 1e-9).floor() + 1.0;
         if count > MOST_SAMPLES {
             return Err(Error::input(path, "time", format!("{time_s} s"), "a lap"));
         }
-        let named = heads
-            .iter()
-            .zip(&columns)
-            .enumerate()
-            .filter(|(i, _)| *i != clock);
-        let channels: Vec<LapChannel> = named
-            .filter_map(|(_, ((name, unit), values))| {
-                let known: Vec<(f64, f64)> = times
-                    .iter()
-                    .copied()
-                    .zip(values.iter().copied())
-                    .filter(|(_, x)| x.is_finite())
-                    .collect();
-                let (motec, unit, factor) = renamed(name, unit);
-                let at = |k: usize| {
-                    between(&known, first + k as f64 / f64::from(rate_hz), name == "gear") * factor
-                };
-                (!known.is_empty()).then(|| LapChannel {
-                    name: motec,
-                    unit,
-                    values: (0..count as usize).map(at).collect(),
-                })
+        let sampled = |channel: &Channel| -> Option<LapChannel> {
+            let samples = channel.values.iter().enumerate();
+            let known: Vec<(f64, f64)> = samples
+                .filter(|(_, x)| x.is_finite())
+                .map(|(i, x)| (channel.time_s(i), *x))
+                .collect();
+            let (name, unit, factor) = renamed(channel);
+            let holds = name == "Gear";
+            let at = |k: usize| between(&known, begins + k as f64 / f64::from(rate_hz), holds) * factor;
+            (!known.is_empty()).then(|| LapChannel {
+                name,
+                unit,
+                values: (0..count as usize).map(at).collect(),
             })
-            .collect();
+        };
+        let channels: Vec<LapChannel> = channels.iter().filter_map(sampled).collect();
         if channels.is_empty() {
             return Err(Error::input(
                 path,
-                Place::line(1),
-                "a column of times alone",
-                "a channel beside it",
+                "columns",
+                "times alone",
+                "a channel beside them",
             ));
         }
         Ok(Self {
@@ -389,12 +332,16 @@ mod tests {
             (of("Ground Speed").unit.as_str(), &of("Ground Speed").values[..]),
             ("km/h", &[36.0, 54.0, 72.0, 90.0, 108.0][..])
         );
-        assert!((of("G Force Lat").values[0] - 1.0 / 9.806_65).abs() < 1e-15);
+        assert!((of("G Force Lat").values[0] - 1.0 / G).abs() < 1e-15);
         assert_eq!(
             of("Ground Speed Fitted").values,
             [4.0 * 3.6, 4.0 * 3.6, 4.0 * 3.6, 6.0 * 3.6, 8.0 * 3.6]
         );
         assert_eq!(of("Gear").values, [1.0, 1.0, 2.0, 2.0, 3.0]);
+        // In whatever unit it is recorded.
+        let other = read("time (s),vx (km/h),yaw_rate (deg/s)\n0,36,5\n1,36,5\n", 1).unwrap();
+        assert!((other.channels[0].values[0] - 36.0).abs() < 1e-12, "{other:?}");
+        assert!((other.channels[1].values[0] - 5.0).abs() < 1e-12, "{other:?}");
         assert_eq!((of("Soc").unit.as_str(), of("Lap Distance").values[1]), ("", 2.5));
     }
 
@@ -404,7 +351,7 @@ mod tests {
             ("v (m/s),a (-)\n1,2\n", 10, "a column of times"),
             ("time (s),v (m/s)\n0,1\n2,1\n1,1\n", 10, "line 4"),
             ("time (s),v (m/s)\n0,1\nx,1\n", 10, "line 3"),
-            ("time (s),v (m/s)\n", 10, "a lap"),
+            ("time (s),v (m/s)\n", 10, "at least two"),
             ("time (s),v (m/s)\n0,word\n1,word\n", 10, "a channel"),
             ("time (s),v (m/s)\n0,1\n1,1\n", 0, "1 to 1000 Hz"),
             ("time (s),v (m/s)\n0,1\n1e300,1\n", 10, "a lap"),

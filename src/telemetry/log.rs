@@ -14,8 +14,10 @@ pub struct LogOptions {
     /// Gaps of up to this (s) are bridged by a straight line; longer ones are errors. Intervals of up to three times
     /// the nominal one are no gaps.
     pub bridge_gaps_s: f64,
-    /// The rolling radius (m) to use where the channel map gives none: that of the car being identified.
-    pub rolling_radius_m: Option<f64>,
+    /// The rolling radii (m) of the front and the rear wheels of the car being identified: wheel speeds are referred to them.
+    pub rolling_radius_m: Option<[f64; 2]>,
+    /// Whether the study finds the radius of the front or the rear wheels itself: then their mean speed is left as logged.
+    pub radius_is_free: [bool; 2],
     /// The corrections that are estimated from the log.
     pub calibration: CalibrationOptions,
 }

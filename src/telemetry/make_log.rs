@@ -3,11 +3,11 @@
 use std::path::Path;
 
 use super::audit::{check_gains, frozen_tail_s};
-use super::build::{Build, RATES_HZ, signals};
+use super::build::{Build, RATES_HZ, one_clock, signals};
 use super::calibrate;
-use super::calibration::{Calibration, Declared, FindingKind};
+use super::calibration::{Calibration, Declared, FindingKind, Switch};
 use super::channel_map::{Axle, ChannelMap, Mapped};
-use super::delays;
+use super::delays::{Evidence, delays};
 use super::log::{Log, LogOptions};
 use super::recording::{Format, Reading, Recording};
 use super::role::Role;
@@ -72,12 +72,15 @@ impl Log {
     ) -> Result<Self> {
         check_options(options)?;
         let source = recording.source.display().to_string();
-        let radius = map.rolling_radius_m.or(options.rolling_radius_m);
+        let radius = map.rolling_radii_m().or(options.rolling_radius_m);
         let mapped = map.resolve(recording)?;
         let declared = Declared {
             signs: roles(&mapped, |m| m.sign.is_some()),
             delays: roles(&mapped, |m| m.delay_s.is_some()),
-            rolling_radius_m: radius,
+            // What the model multiplies wheel speeds by, whatever the logger divided them by.
+            rolling_radius_m: options.rolling_radius_m.or(radius),
+            radius_is_free: options.radius_is_free,
+            rear_is_undriven: map.speed_axle == Axle::Rear,
             speed_of_wheels: !mapped.iter().any(|m| m.role == Role::Vx),
         };
         let mut calibration = Calibration::default();
@@ -114,26 +117,41 @@ impl Log {
         };
         let mut log = build.assemble(&signals, calibration)?;
         check_gains(&log)?;
-        if options.calibration.delays.is_on(recording.format) {
+        if options.calibration.delays == Switch::On {
             let mut calibration = std::mem::take(&mut log.calibration);
             let undriven = match map.speed_axle {
                 Axle::Front => [0, 1],
                 Axle::Rear => [2, 3],
             };
-            delays::delays(&log, &declared, undriven, &mut calibration);
+            // An export has all channels on one clock, whatever clocks they were sampled by.
+            let exported = recording.format == Format::MotecCsv;
+            let one_clock = |a, b| !exported && one_clock(&signals, a, b);
+            let evidence = Evidence {
+                log: &log,
+                declared: &declared,
+                undriven,
+                one_clock: &one_clock,
+            };
+            delays(&evidence, &mut calibration);
+            let mut late = false;
             for signal in &mut signals {
                 if let Some(delay) = calibration.applied(signal.mapped.role, FindingKind::Delay) {
                     signal.delay_s += delay;
+                    late = true;
                 }
             }
-            log = build.assemble(&signals, calibration)?;
+            if late {
+                log = build.assemble(&signals, calibration)?;
+            } else {
+                log.calibration = calibration;
+            }
         }
         if let Some(frozen_s) = frozen_tail_s(&log) {
             log.calibration.notes.push(format!(
                 "the last {frozen_s:.1} s repeat one sample: the sensors were off before the logger"
             ));
         }
-        calibrate::apply(&mut log, &options.calibration, recording.format, &declared);
+        calibrate::apply(&mut log, &options.calibration, &declared);
         Ok(log)
     }
 }
@@ -142,7 +160,18 @@ fn check_options(options: &LogOptions) -> Result<()> {
     let checks = [
         ("sample rate", options.rate_hz, RATES_HZ, "Hz"),
         ("bridged gap", Some(options.bridge_gaps_s), 0.0..=1e6, "s"),
-        ("rolling radius", options.rolling_radius_m, 0.05..=2.0, "m"),
+        (
+            "rolling radius",
+            options.rolling_radius_m.map(|r| r[0]),
+            0.05..=2.0,
+            "m",
+        ),
+        (
+            "rolling radius",
+            options.rolling_radius_m.map(|r| r[1]),
+            0.05..=2.0,
+            "m",
+        ),
     ];
     for (name, value, range, unit) in checks {
         if let Some(value) = value.filter(|v| !range.contains(v)) {

@@ -18,6 +18,8 @@ mod build;
 mod calibrate;
 mod calibration;
 mod channel_map;
+#[cfg(test)]
+mod conditioned;
 mod csv_headed;
 mod csv_native;
 mod delays;

@@ -84,6 +84,22 @@ impl Role {
         }
     }
 
+    /// The unit of its values in a log.
+    pub(super) fn si_unit(self) -> &'static str {
+        match self {
+            Self::WheelSpeedFl
+            | Self::WheelSpeedFr
+            | Self::WheelSpeedRl
+            | Self::WheelSpeedRr
+            | Self::YawRate => "rad/s",
+            Self::Steer => "rad",
+            Self::Vx => "m/s",
+            Self::Ax | Self::Ay => "m/s^2",
+            Self::Distance => "m",
+            Self::Lap | Self::LapComplete | Self::Throttle | Self::Brake => "",
+        }
+    }
+
     /// Whether a log cannot do without it. Ground speed can be made from wheel speeds.
     pub fn required(self) -> bool {
         matches!(

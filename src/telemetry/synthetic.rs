@@ -23,20 +23,20 @@ impl Default for Car {
 }
 
 impl Car {
-    /// Speed (m/s), acceleration (m/s^2) and yaw rate (rad/s) at a time: left and right corners taken with the speed
-    /// going up and down, and a straight at steady speed in every 20 s.
+    /// Speed (m/s), acceleration (m/s^2) and yaw rate (rad/s) at a time: a straight at steady speed and a right-hand bend with the
+    /// speed going down and up, twice in a lap of 40 s, which ends where it began.
     pub fn motion(time_s: f64) -> (f64, f64, f64) {
-        use std::f64::consts::TAU;
+        use std::f64::consts::{PI, TAU};
         let t = time_s.rem_euclid(20.0);
         if t < 8.0 {
             return (44.0, 0.0, 0.0);
         }
         let x = TAU * (t - 8.0) / 12.0;
-        // Smooth at both ends of the corners: speed from a squared cosine, yaw rate from an odd window.
+        // Smooth at both ends of the bend: speed from a squared cosine, yaw rate from an odd window. The bend is half a circle.
         let v = 36.0 + 8.0 * x.cos() + 2.0 * (2.0 * x).cos() - 2.0;
         let a = -(8.0 * x.sin() + 4.0 * (2.0 * x).sin()) * TAU / 12.0;
         let window = (x / 2.0).sin().powi(2);
-        (v, a, 0.45 * window * ((2.0 * x).sin() - 0.3))
+        (v, a, window * (0.45 * (2.0 * x).sin() - PI / 6.0))
     }
 
     /// A log of `duration_s` at `rate_hz`, right in every respect.
@@ -115,7 +115,7 @@ pub(super) struct Faults {
 }
 
 pub(super) fn motec_text(car: &Car, faults: &Faults, duration_s: f64, rate_hz: f64) -> String {
-    let mut text = "\"Format\",\"MoTeC CSV File\"\r\n\"Beacon Markers\",\"20.0 40.0 60.0\"\r\n\r\n\
+    let mut text = "\"Format\",\"MoTeC CSV File\"\r\n\"Beacon Markers\",\"20.0 60.0\"\r\n\r\n\
         \"Time\",\"Ground Speed\",\"Wheel Speed FL\",\"Wheel Speed FR\",\"Wheel Speed RL\",\"Wheel Speed RR\",\
         \"Steered Angle\",\"G Force Lat\",\"G Force Long\",\"Gyro Yaw Velocity\"\r\n\
         \"s\",\"km/h\",\"rpm\",\"rpm\",\"rpm\",\"rpm\",\"deg\",\"G\",\"G\",\"deg/s\"\r\n\r\n"

@@ -5,6 +5,7 @@ use super::facts::CarFacts;
 use super::hybrid::Hybrid;
 use super::parameters::ParameterInfo;
 use super::powertrain::Powertrain;
+use super::reached::Reached;
 use super::tyre::{LinearTyre, TyreCoefficients, TyreFile, TyreModel};
 use crate::config::settings::Settings;
 use crate::config::{Document, Table, folder_of, read_text};
@@ -48,6 +49,8 @@ pub struct Car {
     pub powertrain: Option<Powertrain>,
     /// Motor-generators and store, where there are any.
     pub hybrid: Option<Hybrid>,
+    /// What the log reached that it was fitted to, if it was.
+    pub reached: Option<Reached>,
 }
 
 /// A parameter that an identification may free: its name, and where it stands in the car's flat form.
@@ -162,6 +165,14 @@ impl Car {
             }
             None => None,
         };
+        let reached = match root.table("reached")? {
+            Some(table) => {
+                let reached = Reached::read(&table)?;
+                table.finish()?;
+                Some(reached)
+            }
+            None => None,
+        };
         if let Some(table) = root.table("asked")? {
             let facts = CarFacts::read_table(table, Path::new(""))?;
             facts.validate().map_err(|error| error.of_file(file))?;
@@ -176,6 +187,7 @@ impl Car {
                 .unwrap_or(0.5),
             powertrain,
             hybrid,
+            reached,
         };
         steering.finish()?;
         root.finish()?;
@@ -247,6 +259,10 @@ impl Car {
         if let Some(hybrid) = &self.hybrid {
             text.push('\n');
             text.push_str(&hybrid.to_toml());
+        }
+        if let Some(reached) = &self.reached {
+            text.push('\n');
+            text.push_str(&reached.to_toml());
         }
         files.push((format!("{stem}.toml"), text));
         files

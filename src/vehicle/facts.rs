@@ -193,6 +193,7 @@ impl CarFacts {
             max_steer_rad: 0.5,
             powertrain: Some(self.powertrain(top_mps, drag_area)),
             hybrid: None,
+            reached: None,
             chassis,
         };
         // As much nominal load over the load at rest as the base car has, and at the rear a little more: it grips longer.

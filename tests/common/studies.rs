@@ -35,6 +35,7 @@ const ROWS: &[Row] = &[
         &[
             ("swarm.population", "24"),
             ("swarm.iterations", "20"),
+            ("free", "rBy1,rCy1,K"),
             ("polish", "true"),
             ("hops", "0"),
         ],
@@ -83,7 +84,7 @@ const ROWS: &[Row] = &[
             ("setups", "3"),
             ("backend", "simd"),
         ],
-        &[("setups", "60")],
+        &[("setups", "8")],
     ),
     (
         "sensitivity",
@@ -111,7 +112,7 @@ const FILES: [(&str, &str); 2] = [
     ),
     (
         "line.toml",
-        "track = \"stadium:500:100:14\"\nsections = 360\nobjectives = [\"lap_time\"]\nbackend = \"simd\"\n",
+        "track = \"stadium:300:80:12\"\nsections = 120\nobjectives = [\"lap_time\"]\nbackend = \"simd\"\n",
     ),
 ];
 

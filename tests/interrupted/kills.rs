@@ -16,8 +16,8 @@ tests! {
     runs_on_a_device_that_are_broken_off_end_as_those_that_were_left_alone: device full,
 }
 
-const STUDY: &str =
-    "section = \"Abbey\"\nbackend = \"simd\"\nhops = 0\n[swarm]\npopulation = 24\niterations = 20\n";
+const STUDY: &str = "section = \"Abbey\"\nbackend = \"simd\"\nhops = 0\n[free]\nK = [3e4, 3e5]\nrBy1 = [8, 30]\n[swarm]\npopulation = 24\n\
+                     iterations = 20\n";
 
 /// Runs of two problems, each by itself.
 const SWEEP: &str = "study = \"identify\"\n[base]\nsection = \"Abbey\"\npolish = false\nbackend = \"simd\"\n[base.free]\n\

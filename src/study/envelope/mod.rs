@@ -7,7 +7,7 @@ mod population;
 mod results;
 
 pub use population::{RidgePoint, SteadySurface, SurfaceFigures};
-pub use results::{EnvelopeSummary, envelope_figure};
+pub use results::{EnvelopeSummary, Supported, envelope_figure};
 
 use crate::config::kinds::{choice, count, name_or_file, number, optional, text};
 use crate::config::settings::{Settings, settings};

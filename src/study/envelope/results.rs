@@ -6,7 +6,7 @@ use crate::evaluate::{Failure, failures_in_words};
 use crate::report::{Curves, HtmlReport, Levels, Panel, Surface, Table, write_whole};
 use crate::study::framework::{Head, RunRecord, Solved};
 use crate::vehicle::limits::{CarEnvelope, EnvelopeAtSpeed, Handling, in_words};
-use crate::vehicle::{EnvelopeRow, Trim};
+use crate::vehicle::{EnvelopeRow, Reached, Trim};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -25,6 +25,9 @@ pub struct EnvelopeSummary {
     pub handling: Handling,
     /// The limits at each speed, for turns to the side on which the car can do less.
     pub limits: Vec<EnvelopeRow>,
+    /// What the log supports of the limits, speed by speed, if the car was fitted to one.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub supported: Vec<Supported>,
     /// What the limits leave out or differ in, in words.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub notes: Vec<String>,
@@ -33,16 +36,75 @@ pub struct EnvelopeSummary {
     pub surface: SurfaceFigures,
 }
 
+/// What a log reached at a speed of the limits. Limits beyond it are extrapolated by the tyre model.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Supported {
+    /// Speed (m/s).
+    pub v_mps: f64,
+    /// Greatest lateral acceleration in the log about this speed (m/s^2); nothing where the log has no such speed.
+    pub ay_mps2: Option<f64>,
+    /// Greatest deceleration in the log by the tyres (m/s^2), drag taken off.
+    pub ax_grip_mps2: Option<f64>,
+    /// Whether the limit of cornering is beyond it.
+    pub ay_extrapolated: bool,
+    /// Whether the limit of braking is beyond it.
+    pub ax_extrapolated: bool,
+}
+
+impl Supported {
+    fn of(reached: &Reached, row: &EnvelopeRow) -> Self {
+        let at = reached.at(row.v_mps);
+        let ay_mps2 = at.map(|at| at.ay_mps2);
+        let ax_grip_mps2 = at.map(|at| (at.braking_mps2 - row.drag_mps2).max(0.0));
+        Self {
+            v_mps: row.v_mps,
+            ay_mps2,
+            ax_grip_mps2,
+            ay_extrapolated: !Reached::supports(ay_mps2, row.ay_mps2),
+            ax_extrapolated: !Reached::supports(ax_grip_mps2, row.ax_grip_mps2),
+        }
+    }
+}
+
+/// What of the limits is extrapolated, in words.
+fn extrapolated(supported: &[Supported], limits: &[EnvelopeRow]) -> Option<String> {
+    let share = |reached: Option<f64>, limit: f64| reached.map_or(0.0, |reached| reached / limit);
+    let rows = || supported.iter().zip(limits);
+    let greatest = |of: &dyn Fn(&Supported, &EnvelopeRow) -> f64| {
+        100.0 * rows().map(|(s, row)| of(s, row)).fold(0.0, f64::max)
+    };
+    let ay = supported.iter().filter(|s| s.ay_extrapolated).count();
+    let ax = supported.iter().filter(|s| s.ax_extrapolated).count();
+    (ay + ax > 0).then(|| {
+        format!(
+            "The car was fitted to a log that reached {:.0} % of the cornering limit and {:.0} % of the braking limit at most. \
+             Beyond what it reached the limits are extrapolated by the tyre model: cornering at {ay} of {n} speeds, braking at \
+             {ax}.",
+            greatest(&|s, row| share(s.ay_mps2, row.ay_mps2)),
+            greatest(&|s, row| share(s.ax_grip_mps2, row.ax_grip_mps2)),
+            n = supported.len()
+        )
+    })
+}
+
 /// Puts the figures together.
 pub(super) fn summarise(solved: &Solved<'_, EnvelopeStudy>) -> EnvelopeSummary {
     let Outcome { limits, surface, .. } = solved.outcome;
+    let rows = limits.envelope.rows();
+    let reached = solved.prepared.car.reached.iter();
+    let supported: Vec<Supported> = reached
+        .flat_map(|reached| rows.iter().map(|row| Supported::of(reached, row)))
+        .collect();
+    let mut notes = notes(limits);
+    notes.extend(extrapolated(&supported, rows));
     EnvelopeSummary {
         head: solved.head(),
         steady_states: limits.speeds.iter().map(|s| s.cornering.len()).sum(),
         top_speed_mps: limits.envelope.top_speed_mps(),
         handling: limits.handling,
-        limits: limits.envelope.rows().to_vec(),
-        notes: notes(limits),
+        limits: rows.to_vec(),
+        supported,
+        notes,
         surface: surface.summary.clone(),
     }
 }
@@ -81,6 +143,18 @@ impl EnvelopeSummary {
         }
     }
 
+    /// The limits by speed, with what a log reached of them.
+    fn limits_table(&self) -> Table<'_> {
+        let table = Table::rows(&self.limits)
+            .number("speed", "m/s", |r| r.v_mps)
+            .number("cornering", "m/s^2", |r| r.ay_mps2)
+            .number("braking grip", "m/s^2", |r| r.ax_grip_mps2)
+            .number("drive", "m/s^2", |r| r.ax_drive_mps2)
+            .number("drag", "m/s^2", |r| r.drag_mps2)
+            .table();
+        with_support(table, &self.supported)
+    }
+
     /// The figures in words.
     pub fn to_text(&self) -> String {
         let mut text = format!(
@@ -88,14 +162,7 @@ impl EnvelopeSummary {
             self.head.subject.car,
             self.steady_states,
             self.head.record.elapsed_s,
-            Table::rows(&self.limits)
-                .number("speed", "m/s", |r| r.v_mps)
-                .number("cornering", "m/s^2", |r| r.ay_mps2)
-                .number("braking grip", "m/s^2", |r| r.ax_grip_mps2)
-                .number("drive", "m/s^2", |r| r.ax_drive_mps2)
-                .number("drag", "m/s^2", |r| r.drag_mps2)
-                .table()
-                .to_text()
+            self.limits_table().to_text()
         );
         let balance = self.balance();
         text += &format!(
@@ -230,13 +297,40 @@ fn write_page(folder: &Path, outcome: &Outcome, summary: &EnvelopeSummary) -> Re
     page.table(
         "Limits at each speed",
         "Drive is the lesser of traction and engine. Drag reduces the drive and helps the brakes.",
-        &speeds_table(limits),
+        &with_support(speeds_table(limits), &summary.supported),
     )?;
     page.provenance("car", car);
     page.provenance("limits", "cpu, f64");
     page.provenance("steady states", summary.steady_states.to_string());
     record.provenance(&mut page, "cars of the surface");
     page.write(folder.join("report.html"))
+}
+
+/// A table of limits with what a log reached of them, where there is a log.
+fn with_support<'a>(table: Table<'a>, supported: &[Supported]) -> Table<'a> {
+    if supported.is_empty() {
+        return table;
+    }
+    let of =
+        |figure: fn(&Supported) -> Option<f64>| supported.iter().map(figure).map(|x| x.unwrap_or(f64::NAN));
+    let mark = |s: &Supported| match (s.ay_extrapolated, s.ax_extrapolated) {
+        (true, true) => "cornering, braking",
+        (true, false) => "cornering",
+        (false, true) => "braking",
+        (false, false) => "",
+    };
+    table
+        .numbers(
+            "cornering in the log",
+            "m/s^2",
+            of(|s| s.ay_mps2).collect::<Vec<_>>(),
+        )
+        .numbers(
+            "braking in the log",
+            "m/s^2",
+            of(|s| s.ax_grip_mps2).collect::<Vec<_>>(),
+        )
+        .texts("extrapolated", supported.iter().map(mark))
 }
 
 /// Accelerations by speed.
@@ -332,4 +426,41 @@ fn surface_figure(surface: &SteadySurface, car: &str) -> Option<Surface> {
             .map(|r| (String::new(), [r.steer_rad.to_degrees(), r.v_mps]))
             .collect(),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn limits_beyond_the_log_are_marked() {
+        let row = |v_mps: f64| EnvelopeRow {
+            v_mps,
+            ay_mps2: 14.4,
+            ax_grip_mps2: 10.0,
+            ax_drive_mps2: 4.0,
+            drag_mps2: 0.5,
+        };
+        // 14 m/s^2 across and 10.2 along at 20 m/s, 6 and 3 at 30, and nothing at 40.
+        let slow = vec![[22.0, -14.0, -10.2]; 100];
+        let fast = vec![[31.0, 6.0, -3.0]; 100];
+        let reached = Reached::of([&slow[..], &fast[..]].into_iter(), 0.02);
+        let limits = [20.0, 30.0, 40.0].map(row);
+        let supported = limits.map(|row| Supported::of(&reached, &row));
+        assert_eq!(supported.map(|s| s.ay_extrapolated), [false, true, true]);
+        assert_eq!(supported.map(|s| s.ax_extrapolated), [false, true, true]);
+        assert_eq!(supported.map(|s| s.ay_mps2), [Some(14.0), Some(6.0), None]);
+        assert_eq!(supported[1].ax_grip_mps2, Some(2.5));
+        let said = extrapolated(&supported, &limits).unwrap();
+        assert!(
+            said.contains("97 %") && said.contains("cornering at 2 of 3"),
+            "{said}"
+        );
+        assert_eq!(extrapolated(&supported[..1], &limits[..1]), None);
+        let table = with_support(Table::new(), &supported).to_text();
+        assert!(
+            table.contains("cornering, braking") && table.contains("14"),
+            "{table}"
+        );
+    }
 }

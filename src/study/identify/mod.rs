@@ -142,7 +142,8 @@ impl Study for Identify {
 
     fn report(folder: &Path, solved: &Solved<'_, Self>, summary: &Summary) -> Result<()> {
         let (setup, outcome) = (solved.prepared, solved.outcome);
-        let car = setup.replay.free.candidate_car(&outcome.candidate);
+        let mut car = setup.replay.free.candidate_car(&outcome.candidate);
+        car.reached = Some(results::reached(&outcome.replay));
         car.write_with(folder, "car", &results::car_comment(&setup.log.source, summary))?;
         results::write_history(folder, outcome)?;
         results::write_parameters(folder, summary)?;

@@ -23,6 +23,9 @@ pub(super) fn notes(setup: &Setup, summary: &Summary) -> Vec<String> {
              stiff cars are to be found, fit with substeps = {finer}."
         ));
     }
+    if setup.friction_is_free {
+        notes.push("The log shows the tyres' friction: its scale lMUy is free besides.".to_owned());
+    }
     if setup.without_run_up > 0 {
         let (settle_s, places) = (setup.settle_s, setup.without_run_up);
         notes.push(format!(

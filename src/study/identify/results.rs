@@ -8,9 +8,10 @@ use super::setup::{CHANNELS, Setup};
 use super::verdict::{Untold, Verdict};
 use crate::error::Result;
 use crate::evaluate::failures_in_words;
-use crate::evaluate::replay::{CHANNEL_NAMES, CHANNEL_UNITS};
+use crate::evaluate::replay::{CHANNEL_NAMES, CHANNEL_UNITS, ReplayProblem};
 use crate::report::{ParameterRow, Table};
 use crate::study::framework::RunRecord;
+use crate::vehicle::Reached;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -286,6 +287,23 @@ pub(super) fn car_comment(source: &str, summary: &Summary) -> String {
         text.push_str(&format!("{}: {told}, {}\n", p.name, error.trim_end_matches(" -")));
     }
     text
+}
+
+/// What the car holds in the windows that were fitted.
+pub(super) fn reached(replay: &ReplayProblem) -> Reached {
+    let plan = &replay.plan;
+    let stretches: Vec<Vec<[f64; 3]>> = plan
+        .windows
+        .iter()
+        .map(|w| {
+            let scored = &plan.samples[w.start + w.scored_from..w.end];
+            let figures = scored
+                .iter()
+                .map(|s| [s.measured[0], s.measured[2], s.measured[1]]);
+            figures.collect()
+        })
+        .collect();
+    Reached::of(stretches.iter().map(Vec::as_slice), replay.interval_s)
 }
 
 /// One lap, the first that has a fitted sample: laps over one another would not be legible.

@@ -155,7 +155,7 @@ settings! {
 }
 
 /// The 22 unknowns of the thesis (5.11) within wide bounds.
-fn usual_unknowns() -> Vec<FreeParameter> {
+pub(super) fn usual_unknowns() -> Vec<FreeParameter> {
     let free = |(name, lower, upper): (&str, f64, f64)| FreeParameter {
         name: name.to_owned(),
         lower,

@@ -1,6 +1,6 @@
 //! From a log to a problem: samples, windows, step size, scales of the channels.
 
-use super::settings::{IdentifySettings, ObjectiveChoice};
+use super::settings::{IdentifySettings, ObjectiveChoice, usual_unknowns};
 use crate::error::{Error, Result};
 use crate::evaluate::Objective;
 use crate::evaluate::replay::{
@@ -9,8 +9,8 @@ use crate::evaluate::replay::{
 use crate::study::framework::{Plan, Subject};
 use crate::telemetry::{ChannelMap, Log, LogOptions, NativeFormat, Recording};
 use crate::track::{Circuit, Track};
-use crate::vehicle::Car;
 use crate::vehicle::modes::{fastest_mode, slowest_decay, stable_steps};
+use crate::vehicle::{Car, CarParameter};
 use std::path::Path;
 
 /// Number of compared channels.
@@ -36,6 +36,8 @@ pub struct Setup {
     pub scales: [f64; CHANNELS],
     /// Time that each window is driven before it is scored, s.
     pub settle_s: f64,
+    /// Whether the tyres' friction was freed besides, because the log shows it.
+    pub friction_is_free: bool,
     /// Laps and sections whose first moments are not scored, because the log has nothing to drive ahead of them.
     pub without_run_up: usize,
 }
@@ -75,7 +77,9 @@ pub fn set_up(settings: &IdentifySettings) -> Result<Setup> {
     };
     let options = LogOptions {
         rate_hz: settings.rate_hz,
-        rolling_radius_m: Some(car.chassis.radius_front),
+        rolling_radius_m: Some([car.chassis.radius_front, car.chassis.radius_rear]),
+        radius_is_free: ["front_rolling_radius_m", "rear_rolling_radius_m"]
+            .map(|radius| settings.free.iter().any(|free| free.name == radius)),
         calibration: settings.calibration.clone(),
         ..LogOptions::default()
     };
@@ -118,18 +122,18 @@ pub fn set_up(settings: &IdentifySettings) -> Result<Setup> {
         .flat_map(|w| &samples[w.start..w.end])
         .map(|s| s.measured[0])
         .fold(f64::INFINITY, f64::min);
-    let free = free_parameters(settings, &car)?;
+    let mut free = free_parameters(settings, &car)?;
     // As fine as the car that the search starts from needs it at the slowest place.
     let substeps = settings.substeps.unwrap_or_else(|| {
         let fastest = fastest_mode(&car.to_flat(), car.tyre_model(), slowest.max(1.0));
         stable_steps(log.dt_s, fastest)
     });
     let scales = channel_scales(&samples, &fit_windows);
-    let problem = |windows: Vec<Window<f64>>| -> Result<ReplayProblem> {
+    let problem = |windows: Vec<Window<f64>>, free: &[Unknown]| -> Result<ReplayProblem> {
         let weights = objective_weights(settings, &scales, &windows, log.dt_s);
         let mut problem = ReplayProblem::new(
             car.clone(),
-            free.clone(),
+            free.to_vec(),
             samples.clone(),
             windows,
             (log.dt_s, substeps),
@@ -139,9 +143,19 @@ pub fn set_up(settings: &IdentifySettings) -> Result<Setup> {
         problem.start_as_driven_by(&car.to_flat());
         Ok(problem)
     };
-    let replay = problem(fit_windows)?;
+    let friction = friction_of(&car).filter(|_| !bundled && settings.free == usual_unknowns());
+    let friction = match friction {
+        Some(friction) => {
+            let alone = problem(fit_windows.clone(), std::slice::from_ref(&friction))?;
+            shows(&alone, &scales).then_some(friction)
+        }
+        None => None,
+    };
+    let friction_is_free = friction.is_some();
+    free.extend(friction);
+    let replay = problem(fit_windows, &free)?;
     let holdout = (!held_windows.is_empty())
-        .then(|| problem(held_windows))
+        .then(|| problem(held_windows, &free))
         .transpose()?;
     let truth = truth_car.map(|truth| replay.free.values_in(&truth.to_flat()));
     Ok(Setup {
@@ -152,6 +166,7 @@ pub fn set_up(settings: &IdentifySettings) -> Result<Setup> {
         replay,
         log,
         settle_s,
+        friction_is_free,
         without_run_up,
     })
 }
@@ -358,10 +373,35 @@ fn channel_scales(samples: &[Sample<f64>], windows: &[Window<f64>]) -> [f64; CHA
     })
 }
 
-fn free_parameters(
-    settings: &IdentifySettings,
-    car: &Car,
-) -> Result<Vec<(crate::vehicle::CarParameter, f64, f64)>> {
+/// A free parameter with its bounds.
+type Unknown = (CarParameter, f64, f64);
+
+/// The scale of the tyres' friction across, from half to one and a half of what the car has; none of a car on linear tyres.
+fn friction_of(car: &Car) -> Option<Unknown> {
+    let parameter = car.parameter("lMUy")?;
+    let given = car.to_flat()[parameter.slots[0]];
+    Some((parameter, 0.5 * given, 1.5 * given))
+}
+
+/// Share of a channel's spread by which a tenth of the friction must move it, root mean square. A car that uses half of its friction
+/// in bends comes to this.
+const SHOWN: f64 = 0.02;
+
+/// Whether the windows show the one free parameter of a problem: whether a change of the starting car's by a tenth moves a channel.
+fn shows(replay: &ReplayProblem, scales: &[f64; CHANNELS]) -> bool {
+    let given = replay.free.values_in(replay.free.base());
+    let Some(residuals) = replay.residuals(&given) else {
+        return false;
+    };
+    let slopes = &residuals.columns[0];
+    (0..CHANNELS).any(|k| {
+        let squares: f64 = slopes.iter().skip(k).step_by(CHANNELS).map(|s| s * s).sum();
+        let count = (slopes.len() / CHANNELS).max(1) as f64;
+        0.1 * given[0].abs() * (squares / count).sqrt() >= SHOWN * scales[k]
+    })
+}
+
+fn free_parameters(settings: &IdentifySettings, car: &Car) -> Result<Vec<Unknown>> {
     settings
         .free
         .iter()
@@ -446,4 +486,61 @@ pub fn lap_format() -> NativeFormat {
         })
         .decimals("time_s", 4)
         .decimals("distance_m", 3)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The bundled lap as somebody's log, with the usual unknowns.
+    fn of_a_log() -> IdentifySettings {
+        IdentifySettings {
+            log: Some("data/laps/gt_silverstone.csv".into()),
+            window_s: Some(2.0),
+            ..IdentifySettings::default()
+        }
+    }
+
+    #[test]
+    fn friction_is_free_where_the_log_shows_it() {
+        let setup = set_up(&of_a_log()).unwrap();
+        assert!(setup.friction_is_free);
+        let names: Vec<&str> = setup.replay.problem.variables.iter().map(|v| &*v.name).collect();
+        assert_eq!((names.len(), names.last()), (23, Some(&"lMUy")));
+        // Windows of the same lap on which the car uses little of it.
+        let mut gentle = setup.replay.clone();
+        let samples = setup.replay.plan.samples.clone();
+        let across = |w: &Window<f64>| {
+            let range = &samples[w.start..w.end];
+            range.iter().map(|s| s.measured[2].abs()).fold(0.0, f64::max)
+        };
+        gentle.plan.windows.retain(|w| across(w) < 5.0);
+        assert!(gentle.plan.windows.len() > 4);
+        let friction = friction_of(&setup.replay.free.car).unwrap();
+        let alone = |windows: Vec<Window<f64>>| {
+            let car = setup.replay.free.car.clone();
+            let (substeps, dt_s) = (setup.replay.plan.fractions.len(), setup.log.dt_s);
+            let weights = objective_weights(&of_a_log(), &setup.scales, &windows, dt_s);
+            let free = vec![friction.clone()];
+            ReplayProblem::new(
+                car,
+                free,
+                samples.clone(),
+                windows,
+                (dt_s, substeps),
+                Norm::Two,
+                weights,
+            )
+            .unwrap()
+        };
+        let all = setup.replay.plan.windows.clone();
+        assert!(shows(&alone(all.clone()), &channel_scales(&samples, &all)));
+        let gentle = gentle.plan.windows;
+        assert!(!shows(&alone(gentle.clone()), &channel_scales(&samples, &gentle)));
+        // Whoever names the unknowns has them, and no others.
+        let mut named = of_a_log();
+        named.free.truncate(3);
+        let setup = set_up(&named).unwrap();
+        assert!(!setup.friction_is_free && setup.replay.problem.variables.len() == 3);
+    }
 }

@@ -40,6 +40,9 @@ pub struct Run;
 /// Change of the grip's share from one line to the next below which another line would be the same.
 const SETTLED: f64 = 0.015;
 
+/// Speeds for which the story tells the car's limits, m/s.
+const SPEEDS_TOLD_MPS: [f64; 2] = [25.0, 65.0];
+
 /// What a run begins with: all that it reads, and could refuse.
 pub struct Prepared {
     /// Log and car.
@@ -360,7 +363,8 @@ fn run_stages(
         car: car.name.clone(),
         total_parameter_error: fitted.total_parameter_error,
         rms_error: fitted.rms_error,
-        ay_mps2: [25.0, 65.0].map(|v| whole.at(v).ay_mps2),
+        ay_mps2: SPEEDS_TOLD_MPS.map(|v| whole.at(v).ay_mps2),
+        ay_in_the_log_mps2: SPEEDS_TOLD_MPS.map(|v| Some(car.reached.as_ref()?.at(v)?.ay_mps2)),
         top_speed_mps: whole.top_speed_mps(),
         agrees: rounds.last().is_some_and(RoundSummary::agrees),
         rounds,

@@ -6,6 +6,7 @@ use crate::study::framework::RunRecord;
 use crate::study::hybrid::HybridSummary;
 use crate::study::raceline;
 use crate::study::transient::{self, AGREEMENT};
+use crate::vehicle::Reached;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -115,6 +116,9 @@ pub struct Summary {
     pub rms_error: BTreeMap<String, f64>,
     /// Lateral acceleration that the car can hold at 25 and at 65 m/s (m/s^2).
     pub ay_mps2: [f64; 2],
+    /// What the log reached about these speeds (m/s^2), where it came to them: limits beyond it are extrapolated.
+    #[serde(default)]
+    pub ay_in_the_log_mps2: [Option<f64>; 2],
     /// Greatest speed (m/s).
     pub top_speed_mps: f64,
     /// The lines, one after the other.
@@ -145,6 +149,18 @@ impl Summary {
             ".\nIts limits {:.1} m/s^2 across at 25 m/s, {:.1} at 65; {:.1} m/s at most.\n",
             self.ay_mps2[0], self.ay_mps2[1], self.top_speed_mps
         );
+        let beyond = [0, 1].map(|k| !Reached::supports(self.ay_in_the_log_mps2[k], self.ay_mps2[k]));
+        if beyond.contains(&true) {
+            let in_the_log = |k: usize| {
+                let reached: Option<f64> = self.ay_in_the_log_mps2[k];
+                reached.map_or("nothing".to_owned(), |ay| format!("{ay:.1} m/s^2"))
+            };
+            text += &format!(
+                "           The log reached {} and {} at these speeds: limits beyond are extrapolated by the tyre model.\n",
+                in_the_log(0),
+                in_the_log(1)
+            );
+        }
         for (number, r) in self.rounds.iter().enumerate() {
             text += &format!(
                 "Line {}     {:.0} m, planned in {:.2} s. The car itself, driven, holds {:.0}% of its grip on it and laps in {:.2} s, \
