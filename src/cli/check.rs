@@ -1,13 +1,14 @@
 //! `lapswarm check`: is this file what it should be?
 
 mod car;
+mod log;
 
 use crate::cli::output::{errln, outln};
 use lapswarm::config::{Document, read_start, read_text};
 use lapswarm::line::read_line;
 use lapswarm::study::registry::{self, Registered, STUDIES};
 use lapswarm::study::sweep::{self, SweepSettings};
-use lapswarm::telemetry::{ChannelMap, Log, LogOptions};
+use lapswarm::telemetry::ChannelMap;
 use lapswarm::track::Track;
 use lapswarm::vehicle::tyre::TyreFile;
 use lapswarm::vehicle::{Car, CarFacts, Envelope};
@@ -18,7 +19,7 @@ use std::path::{Path, PathBuf};
 /// Flags of `check`.
 #[derive(clap::Args)]
 #[command(
-    after_help = "Examples:\n  lapswarm check car.toml lap.csv\n  lapswarm check --kind track survey.csv"
+    after_help = "Examples:\n  lapswarm check car.toml lap.csv\n  lapswarm check outing.ld --write-map channels.toml\n  lapswarm check --kind track survey.csv"
 )]
 pub struct Arguments {
     /// The files
@@ -27,6 +28,12 @@ pub struct Arguments {
     /// Draw cars into this folder: g-g-v envelope and steady-state cornering
     #[arg(long, value_name = "DIR")]
     draw: Option<PathBuf>,
+    /// Channel map of the logs
+    #[arg(long, value_name = "FILE")]
+    channel_map: Option<PathBuf>,
+    /// Write a channel map of the log into this file, to be edited; refused if it exists
+    #[arg(long, value_name = "FILE")]
+    write_map: Option<PathBuf>,
     /// What they are [default: guessed from their names and heads]
     #[arg(long, value_parser = kind_flag)]
     kind: Option<Kind>,
@@ -75,27 +82,19 @@ static TYRE: FileKind = file("tyre", "a tyre", |path| {
 static TRACK: FileKind = file("track", "a track", |path| {
     let circuit = Track::load(&path.display().to_string())?.circuit()?;
     let shape = if circuit.closed { "closed" } else { "open" };
+    let bridges = circuit.bridges();
+    let bridges = bridges
+        .iter()
+        .map(|[a, b]| format!(", with a bridge where {a:.0} m and {b:.0} m cross"));
     Ok(format!(
-        "a {shape} track, {}: {:.1} m",
-        circuit.name, circuit.length_m
+        "a {shape} track, {}: {:.1} m{}",
+        circuit.name,
+        circuit.length_m,
+        bridges.collect::<String>()
     ))
 });
 
-static LOG: FileKind = file("log", "a log", |path| {
-    // As for an identification of the bundled car.
-    let car = Car::bundled()?;
-    let options = LogOptions {
-        rolling_radius_m: Some([car.chassis.radius_front, car.chassis.radius_rear]),
-        ..LogOptions::default()
-    };
-    let log = Log::read(path, &ChannelMap::default(), &options)?;
-    Ok(format!(
-        "a log of {} laps: {} samples at {:.0} Hz",
-        log.laps.len(),
-        log.time_s.len(),
-        1.0 / log.dt_s
-    ))
-});
+static LOG: FileKind = file("log", "a log", |path| log::described(path, None, None));
 
 static CHANNELS: FileKind = file("channels", "a channel map", |path| {
     let map = ChannelMap::read(path)?;
@@ -235,12 +234,17 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     for path in &arguments.files {
         let found = arguments.kind.map_or_else(|| guess(path), Ok).and_then(|kind| {
             // Whoever meant another kind sees why it is found wrong.
-            let found = kind.read(path).and_then(|text| match (kind, &arguments.draw) {
-                (Kind::File(file), Some(folder)) if std::ptr::eq(file, &CAR) => {
-                    Ok(format!("{text}\n{}", car::draw(path, folder)?))
-                }
-                _ => Ok(text),
-            });
+            let is =
+                |wanted: &'static FileKind| matches!(kind, Kind::File(file) if std::ptr::eq(file, wanted));
+            let found = if is(&LOG) {
+                let (map, write) = (&arguments.channel_map, &arguments.write_map);
+                log::described(path, map.as_deref(), write.as_deref())
+            } else {
+                kind.read(path).and_then(|text| match &arguments.draw {
+                    Some(folder) if is(&CAR) => Ok(format!("{text}\n{}", car::draw(path, folder)?)),
+                    _ => Ok(text),
+                })
+            };
             found.inspect_err(|_| errln!("{}: read as {}", path.display(), kind.name()))
         });
         match found {

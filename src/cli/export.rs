@@ -81,15 +81,15 @@ pub fn run(arguments: &Arguments) -> Result<()> {
                 String::new()
             };
             let path = |ending: &str| arguments.out.join(format!("{run}{name}.{ending}"));
-            let mut write = |path: PathBuf, bytes: &[u8]| -> Result<()> {
-                write_new(&path, bytes)?;
-                files.push(path);
-                Ok(())
-            };
             make(&arguments.out)?;
-            write(path("csv"), lap.to_motec_csv(&labels).as_bytes())?;
-            write(path("ld"), &lap.to_ld(&labels)?)?;
-            write(path("ldx"), lap.to_ldx().as_bytes())?;
+            let (csv, ldx) = (lap.to_motec_csv(&labels), lap.to_ldx());
+            let written = [
+                (path("csv"), csv.as_bytes()),
+                (path("ld"), &lap.to_ld(&labels)?[..]),
+                (path("ldx"), ldx.as_bytes()),
+            ];
+            write_new(&written)?;
+            files.extend(written.map(|(path, _)| path));
         }
     }
     if !arguments.quiet && !arguments.json {

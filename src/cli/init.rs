@@ -118,13 +118,21 @@ fn make_car(path: &Path, arguments: &Arguments) -> Result<()> {
         );
     }
     let count = files.len();
-    for (k, (name, text)) in files.iter().enumerate() {
-        let path = if k + 1 == count {
+    let placed = files.iter().enumerate().map(|(k, (name, text))| {
+        let place = if k + 1 == count {
             path.to_owned()
         } else {
             path.with_file_name(name)
         };
-        write_new(&path, text.as_bytes())?;
+        (place, text.as_bytes())
+    });
+    write_all(&placed.collect::<Vec<_>>())
+}
+
+/// Writes files that are not there yet, and names them.
+fn write_all(files: &[(PathBuf, &[u8])]) -> Result<()> {
+    write_new(files)?;
+    for (path, _) in files {
         outln!("{}", path.display());
     }
     Ok(())
@@ -158,12 +166,10 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     if facts_given {
         return make_car(&path, arguments);
     }
+    let mut files = Vec::new();
     if what == "car" {
-        let tyre = path.with_file_name("gt_slick.tir");
-        write_new(&tyre, Car::BUNDLED_TYRE.as_bytes())?;
-        outln!("{}", tyre.display());
+        files.push((path.with_file_name("gt_slick.tir"), Car::BUNDLED_TYRE.as_bytes()));
     }
-    write_new(&path, text.as_bytes())?;
-    outln!("{}", path.display());
-    Ok(())
+    files.push((path, text.as_bytes()));
+    write_all(&files)
 }

@@ -282,15 +282,22 @@ fn to_json(value: &impl serde::Serialize) -> Result<String> {
     serde_json::to_string(value).map_err(failed)
 }
 
-/// Writes a file that must not be there yet.
-fn write_new(path: &Path, bytes: &[u8]) -> Result<()> {
-    lapswarm::files::write_new(path, bytes).map_err(|error| match error {
-        Error::Io { source, .. } if source.kind() == std::io::ErrorKind::AlreadyExists => {
-            let expected = "a file that does not exist: nothing is overwritten";
-            Error::input(path, "FILE", "a file", expected)
-        }
-        error => error,
-    })
+/// Writes files that must not be there yet: none if one of them is.
+fn write_new(files: &[(PathBuf, &[u8])]) -> Result<()> {
+    let there = |path: &Path| {
+        let expected = "a file that does not exist: nothing is overwritten";
+        Error::input(path, "FILE", "a file", expected)
+    };
+    if let Some((path, _)) = files.iter().find(|(path, _)| path.symlink_metadata().is_ok()) {
+        return Err(there(path));
+    }
+    for (path, bytes) in files {
+        lapswarm::files::write_new(path, bytes).map_err(|error| match error {
+            Error::Io { source, .. } if source.kind() == std::io::ErrorKind::AlreadyExists => there(path),
+            error => error,
+        })?;
+    }
+    Ok(())
 }
 
 /// Prints a serialisable value as one JSON object on stdout.

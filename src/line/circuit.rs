@@ -1,10 +1,13 @@
 //! A line as a circuit of its own, to be driven along.
 
-use super::{FineLine, Polyline};
-use crate::error::{Error, Result};
+use super::{FineLine, RoadEdges};
+use crate::error::{Error, Place, Result};
 use crate::track::Circuit;
 use glam::DVec2;
 use rayon::prelude::*;
+
+/// How far beyond an edge the side of a car on a line may be that is to be driven (m).
+const FURTHEST_M: f64 = 0.5;
 
 impl FineLine {
     /// A circuit whose centreline is this line between edges (m, right and left). Widths are from the line to the edges less
@@ -66,20 +69,23 @@ impl FineLine {
                 .curvature_1pm
                 .push(mix(self.curvature_1pm[at], self.curvature_1pm[next]));
         }
-        let room = |edge: &[DVec2], side: f64| -> Vec<f64> {
-            let edge = Polyline::new(edge, true);
-            circuit
-                .centreline_m
-                .par_iter()
-                .map(|p| side * edge.leftward_distance(*p) - 0.5 * car_width_m)
+        let edges = RoadEdges::new(&edges_m[0], &edges_m[1], true);
+        let abreast = edges.abreast(&circuit.centreline_m);
+        let room = |left: bool| -> Vec<f64> {
+            let places = circuit.centreline_m.par_iter().zip(&abreast);
+            places
+                .map(|(p, abreast)| edges.inside(*p, *abreast, left) - 0.5 * car_width_m)
                 .collect()
         };
-        let (right, left) = (room(&edges_m[0], 1.0), room(&edges_m[1], -1.0));
+        let (right, left) = (room(false), room(true));
         let least = right.iter().chain(&left).fold(f64::INFINITY, |a, b| a.min(*b));
-        // The same tolerance as in the report of the line: the spline between cross-sections may pass an edge slightly.
-        if least < -0.5 {
+        // Lines from elsewhere may pass an edge slightly. The drive says where the car does.
+        if least < -FURTHEST_M {
+            let at = right.iter().zip(&left).position(|(r, l)| r.min(*l) == least);
+            let place = Place::station(at.map_or(0.0, |i| circuit.station_m[i]));
             let found = format!("a line that leaves the car's side {:.2} m beyond an edge", -least);
-            return Err(Error::input(name, "line", found, "a line within the edges"));
+            let expected = "a line within the edges of this circuit";
+            return Err(Error::input(name, place.named("line"), found, expected));
         }
         (circuit.width_right_m, circuit.width_left_m) = (right, left);
         Ok(circuit)

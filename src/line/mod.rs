@@ -21,8 +21,7 @@ mod table;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use check::Polyline;
-pub use check::{Clearance, check_line};
+pub use check::{CarPlan, Clearance, ON_ROAD_M, RoadEdges, check_line};
 pub use fine::{FINE_M, FineLine};
 pub use geometry::{Geometry, geometry};
 pub use parametrisation::Parametrisation;

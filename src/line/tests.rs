@@ -330,7 +330,11 @@ fn clearance_is_the_distance_to_the_edges() {
     let cross_sections = ring(590.0, 600.0, 720);
     for (alpha, expected, left) in [(0.5, 4.0, true), (0.9, 0.0, true), (0.02, -0.8, false)] {
         let line = FineLine::new(&cross_sections.points(&[alpha; 720]), true, 1.0, None, 0.0).unwrap();
-        let found = check_line(&line, &cross_sections.right_m, &cross_sections.left_m, 2.0);
+        let car = CarPlan {
+            width_m: 2.0,
+            length_m: 0.0,
+        };
+        let found = check_line(&line, &cross_sections.right_m, &cross_sections.left_m, &car);
         // The edges are polygons: at half a side they are 6 mm nearer the middle than the circle.
         assert!((found.margin_m - expected).abs() < 0.008, "{found:?}");
         assert!(found.left == left || alpha == 0.5);

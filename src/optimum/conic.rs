@@ -4,15 +4,45 @@ use crate::{Error, Result};
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::{DefaultSettingsBuilder, DefaultSolver, IPSolver, SolverStatus, SupportedConeT};
 
-/// How a solver ended.
+/// How a solver ended. It is displayed in plain words.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Status {
     /// Solved to the tolerances asked for.
     Solved,
-    /// A solution of reduced accuracy; in the solver's words.
+    /// A solution of reduced accuracy, and why.
     Almost(String),
-    /// No solution; in the solver's words.
+    /// No solution, and why.
     Failed(String),
+}
+
+impl std::fmt::Display for Status {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Solved => f.write_str("Solved"),
+            Self::Almost(why) => write!(f, "Almost solved: {why}"),
+            Self::Failed(why) => write!(f, "Failed: {why}"),
+        }
+    }
+}
+
+/// A cone solver's status in plain words.
+fn in_words(status: SolverStatus) -> Status {
+    let why = match status {
+        SolverStatus::Solved => return Status::Solved,
+        SolverStatus::AlmostSolved => return Status::Almost("a cone program of reduced accuracy".to_owned()),
+        SolverStatus::PrimalInfeasible | SolverStatus::AlmostPrimalInfeasible => {
+            "no line or speed meets all bounds of a cone program"
+        }
+        SolverStatus::DualInfeasible | SolverStatus::AlmostDualInfeasible => {
+            "a cone program without a least value"
+        }
+        SolverStatus::MaxIterations => "a cone program that takes too many iterations",
+        SolverStatus::MaxTime => "a cone program that takes too long",
+        SolverStatus::NumericalError => "a cone program that rounding stops",
+        SolverStatus::InsufficientProgress => "a cone program whose steps no longer lead on",
+        _ => "a cone program that was not begun, or broken off",
+    };
+    Status::Failed(why.to_owned())
 }
 
 /// A step of an affine map: `constant + sum of coefficient * variable`.
@@ -190,11 +220,7 @@ impl ConicProgram {
             .map_err(|e| Error::Study(format!("the conic solver refuses the problem: {e}")))?;
         solver.solve();
         let solution = &solver.solution;
-        let status = match solution.status {
-            SolverStatus::Solved => Status::Solved,
-            SolverStatus::AlmostSolved => Status::Almost(format!("{:?}", solution.status)),
-            other => Status::Failed(format!("{other:?}")),
-        };
+        let status = in_words(solution.status);
         let inside = solution.x.iter().zip(&self.lower).zip(&self.upper);
         Ok(Solution {
             x: inside.map(|((x, l), u)| x.clamp(*l, *u)).collect(),

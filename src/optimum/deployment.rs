@@ -21,7 +21,7 @@ pub struct Deployment {
     pub shares: Vec<f64>,
     /// The lap.
     pub lap: EnergyLap<f64>,
-    /// How the last program ended.
+    /// How the search ended: solved if a step over the whole range of the shares promises no more from here.
     pub status: Status,
     /// Programs solved.
     pub programs: usize,
@@ -50,12 +50,16 @@ pub struct DeploymentSearch<'a> {
 const PROGRAMS: usize = 30;
 /// Gain of time below which the search ends (s), well below the resolution of lap times.
 const GAIN_S: f64 = 2e-5;
+/// Time (s) that a step may still promise where the search counts as solved: the resolution of lap times.
+const SOLVED_S: f64 = 1e-3;
 /// Greatest change of a share in the first program.
 const FIRST_MOVE: f64 = 1.0;
 /// Unit of speeds squared in the programs (m^2/s^2), so that all unknowns are about one.
 const SQUARE: f64 = 1000.0;
 /// Step of the derivatives by the speed squared, as a share of it.
 const DERIVATIVE: f64 = 1e-4;
+/// Least speed squared about which that share is taken (m^2/s^2): a car may start from a standstill.
+const LEAST_SQUARE: f64 = 1.0;
 
 /// A segment about the last lap.
 struct Linear {
@@ -98,7 +102,7 @@ impl DeploymentSearch<'_> {
     /// The fastest lap with no more than `energy_j` out of the store, started from `shares`.
     ///
     /// # Errors
-    /// [`Error::Input`] for a line or energy out of range; [`Error::Study`] if the solver refuses.
+    /// [`Error::Input`] for a line, energy or start out of range; [`Error::Study`] if the solver refuses.
     pub fn best(&self, energy_j: f64, start: Option<&[f64]>) -> Result<Deployment> {
         let began = Instant::now();
         if !(0.0..=1e12).contains(&energy_j) {
@@ -112,11 +116,24 @@ impl DeploymentSearch<'_> {
         let problem = self.problem(energy_j)?;
         let n = self.points_m.len();
         let mut shares = start.map_or_else(|| vec![0.0; n], <[f64]>::to_vec);
+        if shares.len() != n || !shares.iter().all(|share| (0.0..=1.0).contains(share)) {
+            let found = format!("{} shares", shares.len());
+            let expected = format!("{n} shares from 0 to 1, one for each point of the line");
+            return Err(Error::input("deployment", "start", found, expected));
+        }
         let (mut lap, mut segments, mut course) = problem.lap(&shares);
         let mut status = Status::Solved;
         let mut bound_s = None;
         let (mut programs, mut reach) = (0, FIRST_MOVE);
-        while energy_j > 0.0 && programs < PROGRAMS {
+        let mut settled = false;
+        // Without energy there is nothing to share out.
+        let mut judged = energy_j <= 0.0;
+        while !judged {
+            settled |= programs == PROGRAMS;
+            if settled {
+                // Small steps promise little: the last one judges, over the whole range of the shares.
+                reach = FIRST_MOVE;
+            }
             let squares: Vec<f64> = segments.iter().map(|s| s.start).collect();
             let linear: Vec<Linear> = (0..segments.len())
                 .map(|i| self.linear(&course.length, &course.curvature, i, squares[i], shares[i]))
@@ -134,21 +151,28 @@ impl DeploymentSearch<'_> {
             };
             let (found, bound, ended) = program.solve()?;
             programs += 1;
+            let failed = matches!(ended, Status::Failed(_));
+            if settled {
+                let promised_s = lap.time - bound;
+                status = if failed || promised_s <= SOLVED_S {
+                    ended
+                } else {
+                    Status::Almost(format!("a step that promises {promised_s:.4} s does not keep it"))
+                };
+                judged = true;
+                continue;
+            }
             let tried = problem.lap(&found);
             let gain = lap.time - tried.0.time;
-            if gain > 0.0 {
+            if !failed && gain > 0.0 {
                 shares = found;
                 (lap, segments, course) = tried;
-                (status, bound_s) = (ended, Some(bound).filter(|b| b.is_finite()));
-                if gain < GAIN_S {
-                    break;
-                }
+                bound_s = Some(bound).filter(|b| b.is_finite());
+                settled = gain < GAIN_S;
             } else {
                 // The linear model holds near the last lap only.
                 reach *= 0.4;
-                if reach < 1e-3 {
-                    break;
-                }
+                settled = reach < 1e-3;
             }
         }
         Ok(Deployment {
@@ -169,9 +193,10 @@ impl DeploymentSearch<'_> {
         };
         let cost = self.car.table.mass * self.car.table.deploy_cost * h;
         let [reached, motor] = step(square, share);
-        let around = DERIVATIVE * square;
-        let (low, high) = (step(square - around, share), step(square + around, share));
-        let slope = |k: usize| (high[k] - low[k]) / (2.0 * around);
+        let around = DERIVATIVE * square.max(LEAST_SQUARE);
+        let below = (square - around).max(0.0);
+        let (low, high) = (step(below, share), step(square + around, share));
+        let slope = |k: usize| (high[k] - low[k]) / (square + around - below);
         // The derivative is taken between no motor and the whole motor. Beyond the grip of the tyres a share changes neither
         // speed nor energy.
         let (none, all) = (step(square, 0.0), step(square, 1.0));

@@ -16,6 +16,7 @@ mod deployment;
 mod descent;
 mod geometry;
 mod lap;
+mod mend;
 mod objective;
 mod point_mass;
 mod reference;
@@ -34,6 +35,7 @@ pub use descent::{
 };
 pub use geometry::LineMap;
 pub use lap::{Grip, GripEnvelope, SegmentBend, Slope};
+pub use mend::mended;
 pub use objective::{Measures, ReferenceProblem, Weights};
 pub use point_mass::PointMassEnvelope;
 #[cfg(feature = "studies")]

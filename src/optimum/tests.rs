@@ -138,6 +138,55 @@ fn gradients_on_an_open_road() {
     }
 }
 
+/// A great caution makes every promise small. That is no optimum.
+#[test]
+fn a_cautious_search_does_not_end_before_the_others() {
+    let cross_sections = ellipse(120);
+    let (map, bounds) = LineMap::parametrised(&cross_sections, &Parametrisation::control_points(30)).unwrap();
+    let problem = ReferenceProblem {
+        envelope: Some(&Racer),
+        ..ReferenceProblem::of(&map)
+    };
+    let start = vec![0.5; map.variables()];
+    let led = |caution: f64| {
+        let settings = DescentSettings {
+            caution,
+            ..DescentSettings::default()
+        };
+        fastest(&problem, &bounds, &start, &settings).unwrap()
+    };
+    let (usual, cautious) = (led(1.0), led(1e6));
+    println!(
+        "{} {}, {} {}",
+        usual.value, usual.status, cautious.value, cautious.status
+    );
+    assert_eq!(
+        (&usual.status, &cautious.status),
+        (&Status::Solved, &Status::Solved)
+    );
+    // Both gain something to speak of.
+    let middle = problem.measures(&start).time_s;
+    assert!(usual.value < 0.99 * middle, "{middle} {}", usual.value);
+    assert!(
+        (cautious.value / usual.value - 1.0).abs() < 1e-4,
+        "{} {}",
+        cautious.value,
+        usual.value
+    );
+}
+
+#[test]
+fn statuses_are_in_plain_words() {
+    for status in [
+        Status::Solved,
+        Status::Almost("a cone program of reduced accuracy".to_owned()),
+        Status::Failed("interrupted".to_owned()),
+    ] {
+        let text = status.to_string();
+        assert!(!text.contains(['"', '(', '\\']), "{text}");
+    }
+}
+
 /// On a circle the fastest steady speed is where the ellipse leaves just the drag: `(a_x/g_x)^2 + (v^2/(r g_y))^2 = 1`.
 #[test]
 fn a_steady_circle_is_driven_at_the_ellipse() {

@@ -2,18 +2,21 @@
 
 use super::{
     CooperativeSettings, CooperativeSwarm, CovarianceSettings, CovarianceSwarm, DifferenceSettings,
-    DifferenceSwarm, HybridSettings, HybridSwarm, Mopso, MopsoSettings, Mutation, Nsga2, Nsga2Settings,
-    Optimiser, OutOfBounds, Pso, PsoSettings, Restarts, Truncation,
+    DifferenceSwarm, HybridSettings, HybridSwarm, Moead, MoeadSettings, Mopso, MopsoSettings, Mutation,
+    Nsga2, Nsga2Settings, Nsga3, Nsga3Settings, Optimiser, OutOfBounds, Pso, PsoSettings, Restarts,
+    Truncation,
 };
 use crate::error::{Error, Result};
 use crate::evaluate::Problem;
 
 /// Names of the optimisers for several objectives; `default` is [`MopsoSettings::default`].
-pub const MULTI_OBJECTIVE: [&str; 6] = [
+pub const MULTI_OBJECTIVE: [&str; 8] = [
     "default",
     "default_nearest",
+    "moead",
     "smpso",
     "nsga2",
+    "nsga3",
     "thesis",
     "thesis_random_mu",
 ];
@@ -34,7 +37,7 @@ pub struct Sizes {
     pub population: usize,
     /// Generations; their product with the population is the budget of evaluations.
     pub iterations: usize,
-    /// Most members of the archive of several objectives; the genetic algorithm's is its population.
+    /// Most members of the archive of several objectives; the genetic algorithms' is their population.
     pub archive: usize,
     /// Seed of all random numbers.
     pub seed: u64,
@@ -155,6 +158,17 @@ pub fn several_by_name(
             mutation: Mutation::Random,
             ..MopsoSettings::thesis()
         }),
+        "moead" => {
+            let settings = MoeadSettings {
+                population: sizes.population,
+                iterations: sizes.iterations,
+                seed: sizes.seed,
+                ..MoeadSettings::default()
+            };
+            let mut genetic = Moead::new(problem, settings)?;
+            genetic.start_from(start)?;
+            Ok(Box::new(genetic))
+        }
         "nsga2" => {
             let settings = Nsga2Settings {
                 population: sizes.population,
@@ -163,6 +177,17 @@ pub fn several_by_name(
                 ..Nsga2Settings::default()
             };
             let mut genetic = Nsga2::new(problem, settings)?;
+            genetic.start_from(start)?;
+            Ok(Box::new(genetic))
+        }
+        "nsga3" => {
+            let settings = Nsga3Settings {
+                population: sizes.population,
+                iterations: sizes.iterations,
+                seed: sizes.seed,
+                ..Nsga3Settings::default()
+            };
+            let mut genetic = Nsga3::new(problem, settings)?;
             genetic.start_from(start)?;
             Ok(Box::new(genetic))
         }

@@ -7,8 +7,8 @@
 //! interrupted while it writes leaves the last one whole.
 
 use super::{
-    CooperativeSwarm, CovarianceSwarm, DifferenceSwarm, HybridSwarm, Islands, Mopso, Nsga2, Optimiser, Pso,
-    WindowSwarm,
+    CooperativeSwarm, CovarianceSwarm, DifferenceSwarm, HybridSwarm, Islands, Moead, Mopso, Nsga2, Nsga3,
+    Optimiser, Pso, WindowSwarm,
 };
 use crate::config::{check_memory, memory_limit, read_bytes, read_start};
 use crate::error::{Error, Result};
@@ -18,7 +18,7 @@ use serde::de::DeserializeOwned;
 use std::path::Path;
 
 /// The format that this version writes, and the only one that it reads. It changes with the fields of any state.
-pub const VERSION: u32 = 4;
+pub const VERSION: u32 = 5;
 
 const MAGIC: &[u8; 8] = b"LAPSWARM";
 /// Bytes of that and the version.
@@ -46,13 +46,15 @@ macro_rules! readers {
 }
 
 /// The states that are optimisers.
-const READERS: [(&str, Reader); 11] = readers![
+const READERS: [(&str, Reader); 13] = readers![
     CooperativeSwarm,
     CovarianceSwarm,
     DifferenceSwarm,
     HybridSwarm,
+    Moead,
     Mopso,
     Nsga2,
+    Nsga3,
     Pso,
     WindowSwarm,
     Islands<Mopso>,
@@ -65,8 +67,10 @@ checkpoints! {
     CovarianceSwarm: "covariance swarm",
     DifferenceSwarm: "difference swarm",
     HybridSwarm: "hybrid swarm",
+    Moead: "MOEA/D",
     Mopso: "multi-objective swarm",
     Nsga2: "NSGA-II",
+    Nsga3: "NSGA-III",
     Pso: "swarm",
     WindowSwarm: "window swarm",
     Islands<Mopso>: "islands of multi-objective swarms",

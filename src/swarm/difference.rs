@@ -10,7 +10,7 @@ use super::checkpoint::to_bytes;
 use super::motion::{Particles, Purpose};
 use super::settings::setting;
 use super::space::Space;
-use super::{AcceptsMigrants, Counters, Front, Optimiser};
+use super::{AcceptsMigrants, Counters, Front, Islands, Optimiser};
 use crate::error::Result;
 use crate::evaluate::{Evaluation, Problem, Worth};
 use crate::random::Random;
@@ -190,6 +190,10 @@ impl AcceptsMigrants for DifferenceSwarm {
                 self.worth[worst] = worth;
             }
         }
+    }
+
+    fn islands_to_checkpoint(islands: &Islands<Self>) -> Result<Vec<u8>> {
+        to_bytes(islands)
     }
 }
 

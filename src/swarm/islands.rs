@@ -6,7 +6,7 @@
 //! island gives the run that it would give alone.
 
 use super::settings::setting;
-use super::{Counters, Front, Optimiser};
+use super::{Counters, Front, Optimiser, no_checkpoint};
 use crate::error::Result;
 use crate::evaluate::Evaluation;
 use crate::swarm::metrics::non_dominated;
@@ -16,6 +16,17 @@ use serde::{Deserialize, Serialize};
 pub trait AcceptsMigrants: Optimiser {
     /// Takes in solutions of the same problem, with objectives that were evaluated.
     fn accept_migrants(&mut self, migrants: &Front);
+
+    /// The checkpoint of islands of such optimisers, see [`Optimiser::to_checkpoint`].
+    ///
+    /// # Errors
+    /// [`crate::Error::Study`] if they have none.
+    fn islands_to_checkpoint(_: &Islands<Self>) -> Result<Vec<u8>>
+    where
+        Self: Sized,
+    {
+        no_checkpoint()
+    }
 }
 
 /// How many solutions move between islands, and when.
@@ -146,6 +157,10 @@ impl<O: AcceptsMigrants> Optimiser for Islands<O> {
             iteration: self.iteration,
             evaluations: self.islands.iter().map(Optimiser::evaluations).sum(),
         }
+    }
+
+    fn to_checkpoint(&self) -> Result<Vec<u8>> {
+        O::islands_to_checkpoint(self)
     }
 
     fn planned_iterations(&self) -> usize {

@@ -10,6 +10,8 @@
 //! | more | [`Mopso`] | particle swarm with an archive: the default, SMPSO and the thesis's are settings of it |
 //! | more | [`device::DeviceMopso`] | the same on a device, for problems that are evaluated there |
 //! | more | [`Nsga2`] | the genetic algorithm that swarms are compared with |
+//! | three and more | [`Nsga3`] | the genetic algorithm that spreads along given directions: for four objectives and more |
+//! | three and more | [`Moead`] | a genetic algorithm that minimises along each of these directions, with its neighbours' help |
 //!
 //! [`minimise()`] runs one of them on a closure in one call, and [`by_name()`] makes one of its name. [`Islands`] are several
 //! swarms in one population, with or without migration. [`checkpoint`] keeps the state of any optimiser in a file.
@@ -40,13 +42,17 @@ mod covariance;
 #[cfg(feature = "gpu")]
 pub mod device;
 mod difference;
+mod front_scale;
+mod genetic;
 mod islands;
 mod lattice;
 pub mod metrics;
 mod minimise;
+mod moead;
 mod mopso;
 mod motion;
 mod nsga2;
+mod nsga3;
 pub mod problems;
 mod pso;
 mod settings;
@@ -62,10 +68,12 @@ pub use difference::{DifferenceSettings, DifferenceSwarm};
 pub use islands::{AcceptsMigrants, Islands, Migration};
 pub use lattice::lattice;
 pub use minimise::{Indicators, Minimise, Minimum, Stopped, minimise, minimise_batch, minimise_several};
+pub use moead::{Moead, MoeadSettings};
 #[cfg(feature = "studies")]
 pub(crate) use mopso::thinning::PER_PLACE;
 pub use mopso::{Generation, MANY, Mopso};
 pub use nsga2::{Nsga2, Nsga2Settings};
+pub use nsga3::{Nsga3, Nsga3Settings};
 pub use pso::Pso;
 pub use settings::{
     BoundHandling, Constriction, DRAWN_PULLS, Leaders, MopsoSettings, Mutation, PsoSettings, Randomness,
@@ -142,14 +150,17 @@ pub trait Optimiser {
     /// The result so far: the archive, or the one best candidate with its cost. It is empty before any candidate has succeeded.
     fn front(&self) -> Front;
 
-    /// A checkpoint of its whole state, which [`checkpoint::load_optimiser`] reads. The optimisers of this crate have one; of
-    /// islands, [`checkpoint::save`] does.
+    /// A checkpoint of its whole state, which [`checkpoint::load_optimiser`] reads. The optimisers of this crate have one.
     ///
     /// # Errors
     /// [`Error::Study`] if it has none.
     fn to_checkpoint(&self) -> Result<Vec<u8>> {
-        Err(Error::Study("this optimiser has no checkpoint".to_owned()))
+        no_checkpoint()
     }
+}
+
+fn no_checkpoint() -> Result<Vec<u8>> {
+    Err(Error::Study("this optimiser has no checkpoint".to_owned()))
 }
 
 impl<O: Optimiser + ?Sized> Optimiser for Box<O> {

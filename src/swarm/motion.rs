@@ -21,6 +21,7 @@ pub(super) enum Purpose {
     Coin,
     Pulls,
     Recombine,
+    Niche,
 }
 
 /// Positions and velocities, row-major, in the unit cube.

@@ -1,21 +1,15 @@
 //! NSGA-II, the genetic algorithm that swarms are compared with.
 //!
 //! Deb, Pratap, Agarwal, Meyarivan, *A fast and elitist multiobjective genetic algorithm: NSGA-II*, IEEE TEC 6
-//! (2002); simulated binary crossover as in Deb, Agrawal, *Simulated binary crossover for continuous search space*,
-//! Complex Systems 9 (1995), in the form that keeps to the bounds.
+//! (2002).
 
 use super::archive::crowding;
 use super::checkpoint::to_bytes;
-use super::metrics::{non_dominated, ranks};
-use super::motion::{Particles, Purpose, polynomial};
-use super::settings::setting;
+use super::genetic::{Breeding, Generation, Member, fronts};
 use super::{Counters, Front, Optimiser};
 use crate::error::Result;
-use crate::evaluate::{Evaluation, Problem, Worth};
-use crate::random::Random;
+use crate::evaluate::{Evaluation, Problem};
 use serde::{Deserialize, Serialize};
-use std::collections::HashMap;
-use std::hash::{DefaultHasher, Hash, Hasher};
 
 /// Settings of [`Nsga2`]; the defaults are those of the paper.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -54,52 +48,23 @@ impl Nsga2Settings {
     /// # Errors
     /// [`crate::Error::Input`] naming the setting.
     pub fn validate(&self) -> Result<()> {
-        if self.population < 4 || !self.population.is_multiple_of(2) {
-            let found = self.population.to_string();
-            return Err(setting("population", found, "an even number, 4 or more"));
-        }
-        if self.iterations < 1 {
-            return Err(setting("iterations", self.iterations.to_string(), "1 or more"));
-        }
-        if !(0.0..=1.0).contains(&self.crossover) {
-            return Err(setting(
-                "crossover",
-                self.crossover.to_string(),
-                "a share from 0 to 1",
-            ));
-        }
-        for (name, value) in [
-            ("crossover_index", self.crossover_index),
-            ("mutation_index", self.mutation_index),
-        ] {
-            if !(0.0..=1000.0).contains(&value) {
-                return Err(setting(name, value.to_string(), "a number from 0 to 1000"));
-            }
-        }
-        Ok(())
+        self.breeding().check(self.population, self.iterations)
     }
-}
 
-/// One solution, with the number of the front that it is in and its crowding there.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-struct Member {
-    position: Vec<f64>,
-    objectives: Vec<f64>,
-    /// By how much it violates the constraints; infinite if it failed.
-    violation: f64,
-    rank: usize,
-    crowding: f64,
+    fn breeding(&self) -> Breeding {
+        Breeding {
+            crossover: self.crossover,
+            crossover_index: self.crossover_index,
+            mutation_index: self.mutation_index,
+        }
+    }
 }
 
 /// The population and the children it has been asked for.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Nsga2 {
     settings: Nsga2Settings,
-    random: Random,
-    children: Particles,
-    objectives: usize,
-    parents: Vec<Member>,
-    counters: Counters,
+    generation: Generation,
 }
 
 impl Nsga2 {
@@ -109,14 +74,9 @@ impl Nsga2 {
     /// [`crate::Error::Input`] naming the setting that is out of its range.
     pub fn new(problem: &Problem, settings: Nsga2Settings) -> Result<Self> {
         settings.validate()?;
-        let random = Random::new(settings.seed);
         Ok(Self {
-            children: Particles::scattered(problem, settings.population, random)?,
-            objectives: problem.objectives.len(),
-            parents: Vec::new(),
-            random,
+            generation: Generation::first(problem, settings.population, settings.seed)?,
             settings,
-            counters: Counters::default(),
         })
     }
 
@@ -125,172 +85,22 @@ impl Nsga2 {
     /// # Errors
     /// [`crate::Error::Input`] naming a candidate that is no finite value for each variable.
     pub fn start_from(&mut self, candidates: &[Vec<f64>]) -> Result<()> {
-        let starts = self.children.space.starts(candidates, self.settings.population)?;
-        for (member, position) in starts.iter().enumerate() {
-            let row = self.children.row(member);
-            self.children.position[row].copy_from_slice(position);
-        }
-        Ok(())
-    }
-
-    /// The members of the first front, unless they failed.
-    fn first_front(&self) -> impl Iterator<Item = &Member> {
-        let first = |m: &&Member| m.rank == 0 && m.violation.is_finite();
-        self.parents.iter().filter(first)
-    }
-
-    /// The better of two parents drawn at random: by front, then by crowding.
-    fn parent(&self, pair: usize, which: u32) -> &Member {
-        let draw = |index| {
-            let (when, who) = (self.counters.iteration as u32, pair as u32);
-            &self.parents[self
-                .random
-                .below(self.parents.len(), Purpose::Leader as u32, when, who, index)]
-        };
-        let (a, b) = (draw(2 * which), draw(2 * which + 1));
-        if b.rank < a.rank || (b.rank == a.rank && b.crowding > a.crowding) {
-            b
-        } else {
-            a
-        }
-    }
-
-    fn breed(&mut self) {
-        let d = self.children.dimensions();
-        let when = self.counters.iteration as u32;
-        for pair in 0..self.settings.population / 2 {
-            let uniform = |index: u32| {
-                self.random
-                    .uniform(Purpose::Recombine as u32, when, pair as u32, index)
-            };
-            let (a, b) = (self.parent(pair, 0), self.parent(pair, 1));
-            let (mut first, mut second) = (a.position.clone(), b.position.clone());
-            if uniform(0) < self.settings.crossover {
-                for k in 0..d {
-                    let index = 1 + 3 * k as u32;
-                    if uniform(index) < 0.5 {
-                        let swap = uniform(index + 2) < 0.5;
-                        let (x, y) = cross(a.position[k], b.position[k], uniform(index + 1), {
-                            self.settings.crossover_index
-                        });
-                        (first[k], second[k]) = if swap { (y, x) } else { (x, y) };
-                    }
-                }
-            }
-            for (child, position) in [(2 * pair, first), (2 * pair + 1, second)] {
-                for (k, (i, x)) in self.children.row(child).zip(position).enumerate() {
-                    let uniform = |index: u32| {
-                        self.random
-                            .uniform(Purpose::Mutation as u32, when, child as u32, index)
-                    };
-                    let mutates = uniform(2 * k as u32) * (d as f64) < 1.0;
-                    self.children.position[i] = if mutates {
-                        polynomial(x, uniform(2 * k as u32 + 1), self.settings.mutation_index)
-                    } else {
-                        x
-                    };
-                }
-            }
-        }
+        self.generation.start_from(candidates)
     }
 }
 
-/// Two children of two coordinates of the unit cube.
-fn cross(a: f64, b: f64, uniform: f64, index: f64) -> (f64, f64) {
-    let (low, high) = (a.min(b), a.max(b));
-    let gap = high - low;
-    if gap < 1e-14 {
-        return (a, b);
-    }
-    let spread = |to_bound: f64| {
-        let beta = 1.0 + 2.0 * to_bound / gap;
-        let alpha = 2.0 - beta.powf(-(index + 1.0));
-        let base = if uniform <= 1.0 / alpha {
-            uniform * alpha
-        } else {
-            1.0 / (2.0 - uniform * alpha)
-        };
-        base.powf(1.0 / (index + 1.0))
-    };
-    let middle = 0.5 * (low + high);
-    let below = middle - 0.5 * spread(low) * gap;
-    let above = middle + 0.5 * spread(1.0 - high) * gap;
-    (below.clamp(0.0, 1.0), above.clamp(0.0, 1.0))
-}
-
-/// The fronts of a set, best first: by what solutions violate, then by dominance (Deb's rules).
-fn fronts(members: &[Member]) -> Vec<Vec<usize>> {
-    let mut order: Vec<usize> = (0..members.len()).collect();
-    order.sort_by(|&a, &b| members[a].violation.total_cmp(&members[b].violation));
-    let mut found: Vec<Vec<usize>> = Vec::new();
-    for alike in order.chunk_by(|&a, &b| members[a].violation == members[b].violation) {
-        let rows: Vec<Vec<f64>> = alike.iter().map(|&i| members[i].objectives.clone()).collect();
-        let before = found.len();
-        for (&i, rank) in alike.iter().zip(ranks(&rows)) {
-            if found.len() <= before + rank {
-                found.resize(before + rank + 1, Vec::new());
-            }
-            found[before + rank].push(i);
-        }
-    }
-    found
-}
-
-/// Solutions that are known, to find copies of them by.
-#[derive(Default)]
-struct Known {
-    /// Places of solutions by a digest of their numbers.
-    places: HashMap<u64, Vec<usize>>,
-}
-
-impl Known {
-    /// Notes down where a solution will stand, unless it is a copy of one of `all`.
-    fn is_new(&mut self, position: &[f64], objectives: &[f64], all: &[Member]) -> bool {
-        let mut digest = DefaultHasher::new();
-        for x in position.iter().chain(objectives) {
-            // Zero has two signs and one place.
-            (x + 0.0).to_bits().hash(&mut digest);
-        }
-        let places = self.places.entry(digest.finish()).or_default();
-        let copy = |&i: &usize| all[i].objectives == objectives && all[i].position == position;
-        let new = !places.iter().any(copy);
-        if new {
-            places.push(all.len());
-        }
-        new
-    }
+/// Whether `b` is better than `a`: by front, then by crowding.
+fn better(a: &Member, b: &Member) -> bool {
+    b.rank < a.rank || (b.rank == a.rank && b.crowding > a.crowding)
 }
 
 impl Optimiser for Nsga2 {
     fn ask(&mut self) -> Vec<f64> {
-        self.children.candidates()
+        self.generation.candidates()
     }
 
     fn tell(&mut self, evaluation: &Evaluation) -> Result<()> {
-        evaluation.check(self.settings.population, self.objectives)?;
-        let mut known = Known::default();
-        let mut all = Vec::with_capacity(2 * self.settings.population);
-        for parent in std::mem::take(&mut self.parents) {
-            known.is_new(&parent.position, &parent.objectives, &all);
-            all.push(parent);
-        }
-        for child in 0..self.settings.population {
-            let (objectives, violation) = match evaluation.success(child, self.objectives) {
-                Some(row) => (row.to_vec(), evaluation.violation(child)),
-                None => (vec![Worth::FAILED.cost; self.objectives], Worth::FAILED.violation),
-            };
-            let position = self.children.position[self.children.row(child)].to_vec();
-            // A copy of a member brings nothing and would crowd it out.
-            if known.is_new(&position, &objectives, &all) {
-                all.push(Member {
-                    position,
-                    objectives,
-                    violation,
-                    rank: 0,
-                    crowding: 0.0,
-                });
-            }
-        }
+        let mut all = self.generation.everyone(evaluation)?;
         let mut kept = Vec::new();
         for (rank, mut front) in fronts(&all).into_iter().enumerate() {
             let rows: Vec<&[f64]> = front.iter().map(|&i| all[i].objectives.as_slice()).collect();
@@ -304,16 +114,13 @@ impl Optimiser for Nsga2 {
                 break;
             }
         }
-        kept.truncate(self.settings.population);
-        let mut all: Vec<Option<Member>> = all.into_iter().map(Some).collect();
-        self.parents = kept.into_iter().filter_map(|i| all[i].take()).collect();
-        self.counters.told(self.settings.population);
-        self.breed();
+        self.generation
+            .succeed(all, kept, self.settings.breeding(), |g| g.drawn(better));
         Ok(())
     }
 
     fn counters(&self) -> Counters {
-        self.counters
+        self.generation.counters
     }
 
     fn to_checkpoint(&self) -> Result<Vec<u8>> {
@@ -325,29 +132,14 @@ impl Optimiser for Nsga2 {
     }
 
     fn best(&self) -> Vec<f64> {
-        let column = |k: usize| self.first_front().map(move |m| m.objectives[k]);
-        (0..self.objectives)
-            .map(|k| column(k).fold(f64::INFINITY, f64::min))
-            .collect()
+        self.generation.best()
     }
 
     fn violation(&self) -> f64 {
-        self.first_front().next().map_or(f64::INFINITY, |m| m.violation)
+        self.generation.violation()
     }
 
     fn front(&self) -> Front {
-        let members: Vec<&Member> = self.first_front().collect();
-        let rows: Vec<Vec<f64>> = members.iter().map(|m| m.objectives.clone()).collect();
-        let mut front = Front {
-            violation: self.violation(),
-            ..Front::default()
-        };
-        // One of those that are worth the same.
-        for i in non_dominated(&rows) {
-            let position = &members[i].position;
-            front.candidates.push(self.children.space.scaled(position, 1));
-            front.objectives.push(rows[i].clone());
-        }
-        front
+        self.generation.front()
     }
 }

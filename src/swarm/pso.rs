@@ -4,7 +4,7 @@ use super::checkpoint::to_bytes;
 use super::motion::{Particles, Purpose};
 use super::settings::PsoSettings;
 use super::space::Space;
-use super::{AcceptsMigrants, Counters, Front, Optimiser};
+use super::{AcceptsMigrants, Counters, Front, Islands, Optimiser};
 use crate::error::Result;
 use crate::evaluate::{Evaluation, Problem, Worth};
 use crate::random::Random;
@@ -137,6 +137,10 @@ impl AcceptsMigrants for Pso {
                 self.leader = worst;
             }
         }
+    }
+
+    fn islands_to_checkpoint(islands: &Islands<Self>) -> Result<Vec<u8>> {
+        to_bytes(islands)
     }
 }
 

@@ -222,7 +222,7 @@ impl Mutation {
 pub struct MopsoSettings {
     /// The motion's settings. A difference move goes from an archive member along the difference of two others
     /// \[7\]. A swarm that is told one candidate after the other takes their share as where to begin: it makes more or fewer of
-    /// them by what they earn. A share of zero or one stays.
+    /// them by what they earn, and crossings of two members besides, as genetic algorithms do. A share of zero or one stays.
     pub motion: PsoSettings,
     /// Most members of the archive.
     pub archive: usize,

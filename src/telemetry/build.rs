@@ -7,6 +7,7 @@ use std::sync::Arc;
 use super::audit::check_magnitude;
 use super::calibration::Calibration;
 use super::channel_map::{Axle, ChannelMap, Mapped};
+use super::derived::{acceleration, product};
 use super::laps::{LEAST_M, Lap, Marks, restarts};
 use super::log::{Log, LogOptions};
 use super::recording::{Channel, Clock, Format, Recording};
@@ -137,10 +138,27 @@ fn factor(source: &str, m: &Mapped<'_>, map: &ChannelMap, radius: Option<[f64; 2
     Ok(factor)
 }
 
+fn both<'s, 'a>(signals: &'s [Signal<'a>], a: Role, b: Role) -> Option<[&'s Signal<'a>; 2]> {
+    let of = |role| signals.iter().find(|s| s.mapped.role == role);
+    Some([of(a)?, of(b)?])
+}
+
 /// Whether two roles' channels were sampled at the same times.
 pub(super) fn one_clock(signals: &[Signal<'_>], a: Role, b: Role) -> bool {
-    let times = |role| signals.iter().find(|s| s.mapped.role == role).map(|s| &s.times);
-    matches!((times(a), times(b)), (Some(a), Some(b)) if Arc::ptr_eq(a, b))
+    both(signals, a, b).is_some_and(|[a, b]| Arc::ptr_eq(&a.times, &b.times))
+}
+
+/// Whether two roles' channels have the same times and the same unit, as those of one sensor.
+pub(super) fn alike(signals: &[Signal<'_>], a: Role, b: Role) -> bool {
+    both(signals, a, b)
+        .is_some_and(|[a, b]| a.times == b.times && a.mapped.channel.unit == b.mapped.channel.unit)
+}
+
+/// Notes what stands in for a channel. A log is assembled anew when delays are found, and says it once.
+fn note(log: &mut Log, text: &str) {
+    if !log.calibration.notes.iter().any(|said| said == text) {
+        log.calibration.notes.push(text.to_owned());
+    }
 }
 
 /// What the arrays of a log are made from.
@@ -212,8 +230,8 @@ impl Build<'_> {
             distance_m: Vec::new(),
             vx_mps: Vec::new(),
             steer_rad: needed(Role::Steer)?,
-            ax_mps2: needed(Role::Ax)?,
-            ay_mps2: needed(Role::Ay)?,
+            ax_mps2: Vec::new(),
+            ay_mps2: Vec::new(),
             yaw_rate_radps: needed(Role::YawRate)?,
             wheel_speed_radps,
             laps: Vec::new(),
@@ -222,6 +240,23 @@ impl Build<'_> {
         log.vx_mps = match find(Role::Vx) {
             Some(signal) => sampled(signal),
             None => self.speed_of_wheels(&mut log)?,
+        };
+        // What stands in leaves out how the sideslip changes.
+        log.ax_mps2 = match find(Role::Ax) {
+            Some(signal) => sampled(signal),
+            None => {
+                self.refuse_other_unit(Role::Ax)?;
+                note(&mut log, "ax: not logged; the change of speed stands in for it");
+                acceleration(&log)
+            }
+        };
+        log.ay_mps2 = match find(Role::Ay) {
+            Some(signal) => sampled(signal),
+            None => {
+                self.refuse_other_unit(Role::Ay)?;
+                note(&mut log, "ay: not logged; speed times yaw rate stands in for it");
+                product(&log.vx_mps, &log.yaw_rate_radps)
+            }
         };
         let driven = integrated(&log.vx_mps, grid.dt_s);
         log.laps = self.laps(signals, &log.time_s, &driven, &mut log.calibration)?;
@@ -266,11 +301,7 @@ impl Build<'_> {
             }));
         }
         // Lap numbers and distance may be logged slowly or start late. They do not shorten the log.
-        let driving = || {
-            signals
-                .iter()
-                .filter(|s| s.mapped.role.required() || s.mapped.role == Role::Vx)
-        };
+        let driving = || signals.iter().filter(|s| s.mapped.role.of_motion());
         let fastest = driving()
             .min_by(|a, b| a.nominal_s.total_cmp(&b.nominal_s))
             .unwrap_or(first);
@@ -287,7 +318,26 @@ impl Build<'_> {
         Grid::within(self.source, fastest.times[0], start, end, dt_s).map(Clocked::Resampled)
     }
 
+    /// Refuses a log that has the role's channel in an unknown unit. To make it of others without notice would be wrong.
+    fn refuse_other_unit(&self, role: Role) -> Result<()> {
+        let key = format!("{}_", role.key());
+        let Some(channel) = self.recording.channels.iter().find(|c| c.name.starts_with(&key)) else {
+            return Ok(());
+        };
+        Err(Error::input(
+            self.source,
+            Place::default().channel(&channel.name),
+            "a unit that is not known",
+            format!(
+                "{} in {}, or the channel's unit in the channel map",
+                role.key(),
+                role.si_unit()
+            ),
+        ))
+    }
+
     fn speed_of_wheels(&self, log: &mut Log) -> Result<Vec<f64>> {
+        self.refuse_other_unit(Role::Vx)?;
         let Some(radius) = self.radius else {
             return Err(Error::input(
                 self.source,
@@ -296,30 +346,21 @@ impl Build<'_> {
                 "a ground speed channel, or rolling_radius_m in [vehicle] of the channel map",
             ));
         };
-        // The log has a speed in an unknown unit. To replace it by the speed of the wheels without notice would be wrong.
-        if let Some(channel) = self.recording.channels.iter().find(|c| c.name.starts_with("vx_")) {
-            return Err(Error::input(
-                self.source,
-                Place::default().channel(&channel.name),
-                "a forward speed in a unit that is not known",
-                "vx_mps, or the channel with its unit in the channel map",
-            ));
-        }
         let [fl, fr, rl, rr] = &log.wheel_speed_radps;
         let (left, right, radius, name) = match self.map.speed_axle {
             Axle::Front => (fl, fr, radius[0], "front"),
             Axle::Rear => (rl, rr, radius[1], "rear"),
         };
-        let note =
-            format!("vx: no ground speed is logged; the mean of the {name} wheel speeds stands in for it");
-        if !log.calibration.notes.contains(&note) {
-            log.calibration.notes.push(note);
-        }
-        Ok(left
+        let speed = left
             .iter()
             .zip(right)
             .map(|(l, r)| (l + r) / 2.0 * radius)
-            .collect())
+            .collect();
+        note(
+            log,
+            &format!("vx: no ground speed is logged; the mean of the {name} wheel speeds stands in for it"),
+        );
+        Ok(speed)
     }
 
     fn laps(

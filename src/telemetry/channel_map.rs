@@ -189,62 +189,73 @@ impl ChannelMap {
     pub fn resolve<'a>(&self, recording: &'a Recording) -> Result<Vec<Mapped<'a>>> {
         let mut mapped = Vec::new();
         for role in Role::ALL {
-            let entry = self.channels.get(&role);
-            let name = entry.and_then(|e| e.name.as_deref());
-            let found = match name {
-                Some(name) => Some(recording.channel(name).ok_or_else(|| {
-                    Error::input(
-                        &recording.source,
-                        Place::default().channel(role.key()),
-                        format!("no channel {}; it has {}", shown(name), listed(recording)),
-                        "the name that the channel map gives",
-                    )
-                })?),
-                None => guess(role, recording),
-            };
-            let Some(channel) = found else {
-                if role.required() || entry.is_some() {
-                    return Err(Error::input(
-                        &recording.source,
-                        Place::default().channel(role.key()),
-                        format!("none with a usual name; it has {}", listed(recording)),
-                        format!(
-                            "a [channels.{}] entry with its name in the channel map",
-                            role.key()
-                        ),
-                    ));
-                }
-                continue;
-            };
-            let unit_text = entry.and_then(|e| e.unit.as_deref()).unwrap_or(&channel.unit);
-            let unit = match check_unit(unit_text, role) {
-                Ok(unit) => unit,
-                // A pedal in volts cannot be used, and the map does not name it.
-                Err(_) if name.is_none() && matches!(role, Role::Throttle | Role::Brake) => {
-                    continue;
-                }
-                Err(expected) => {
-                    return Err(Error::input(
-                        &recording.source,
-                        Place::default().channel(&channel.name),
-                        format!("the unit {}", shown(unit_text)),
-                        format!(
-                            "{expected}; a unit in [channels.{}] of the channel map overrides it",
-                            role.key()
-                        ),
-                    ));
-                }
-            };
-            mapped.push(Mapped {
-                role,
-                channel,
-                unit,
-                sign: entry.and_then(|e| e.sign),
-                delay_s: entry.and_then(|e| e.delay_s),
-                declared: name.is_some(),
-            });
+            match self.find(role, recording)? {
+                Some(found) => mapped.push(found),
+                None if role.required() => return Err(Self::none_found(role, recording)),
+                None => {}
+            }
         }
         Ok(mapped)
+    }
+
+    fn none_found(role: Role, recording: &Recording) -> Error {
+        Error::input(
+            &recording.source,
+            Place::default().channel(role.key()),
+            format!("none with a usual name; it has {}", listed(recording)),
+            format!(
+                "a [channels.{}] entry with its name in the channel map",
+                role.key()
+            ),
+        )
+    }
+
+    /// Finds the channel of a role.
+    pub(super) fn find<'a>(&self, role: Role, recording: &'a Recording) -> Result<Option<Mapped<'a>>> {
+        let entry = self.channels.get(&role);
+        let name = entry.and_then(|e| e.name.as_deref());
+        let found = match name {
+            Some(name) => Some(recording.channel(name).ok_or_else(|| {
+                Error::input(
+                    &recording.source,
+                    Place::default().channel(role.key()),
+                    format!("no channel {}; it has {}", shown(name), listed(recording)),
+                    "the name that the channel map gives",
+                )
+            })?),
+            None => guess(role, recording),
+        };
+        let Some(channel) = found else {
+            return match entry {
+                Some(_) => Err(Self::none_found(role, recording)),
+                None => Ok(None),
+            };
+        };
+        let unit_text = entry.and_then(|e| e.unit.as_deref()).unwrap_or(&channel.unit);
+        let unit = match check_unit(unit_text, role) {
+            Ok(unit) => unit,
+            // A pedal in volts cannot be used, and the map does not name it.
+            Err(_) if name.is_none() && matches!(role, Role::Throttle | Role::Brake) => return Ok(None),
+            Err(expected) => {
+                return Err(Error::input(
+                    &recording.source,
+                    Place::default().channel(&channel.name),
+                    format!("the unit {}", shown(unit_text)),
+                    format!(
+                        "{expected}; a unit in [channels.{}] of the channel map overrides it",
+                        role.key()
+                    ),
+                ));
+            }
+        };
+        Ok(Some(Mapped {
+            role,
+            channel,
+            unit,
+            sign: entry.and_then(|e| e.sign),
+            delay_s: entry.and_then(|e| e.delay_s),
+            declared: name.is_some(),
+        }))
     }
 
     /// Which of a recording's channels a log is made of.

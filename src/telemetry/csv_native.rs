@@ -306,7 +306,10 @@ mod tests {
                 text.replace("vx_mps", "steer_rad"),
                 "line 1, column 8: found a second steer_rad",
             ),
-            (text.replace("ay_mps2", "ay_furlongs"), "channel ay: found none"),
+            (
+                text.replace("ay_mps2", "ay_furlongs"),
+                "channel ay_furlongs: found a unit that is not known, expected ay in m/s^2",
+            ),
             (
                 text.replace("yaw_rate_radps", "yaw_rate"),
                 "channel yaw_rate: found the unit \"\"",

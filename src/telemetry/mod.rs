@@ -17,6 +17,7 @@ mod audit;
 mod build;
 mod calibrate;
 mod calibration;
+mod channel_list;
 mod channel_map;
 #[cfg(test)]
 mod conditioned;
@@ -43,6 +44,7 @@ mod text;
 mod units;
 
 pub use calibration::{Calibration, CalibrationOptions, Finding, FindingKind, Switch};
+pub use channel_list::{ChannelList, ListedChannel, Missing};
 pub use channel_map::{Axle, ChannelEntry, ChannelMap, Mapped};
 pub use csv_native::{COLUMNS, NativeFormat, write_native};
 pub use driven::DrivenLap;

@@ -100,18 +100,16 @@ impl Role {
         }
     }
 
-    /// Whether a log cannot do without it. Ground speed can be made from wheel speeds.
+    /// Whether a log cannot do without it. Ground speed can be made from wheel speeds, and accelerations from speed and yaw rate.
     pub fn required(self) -> bool {
-        matches!(
+        self.of_motion() && !matches!(self, Self::Vx | Self::Ax | Self::Ay)
+    }
+
+    /// Whether it is part of the car's motion: what drives the model, or what the model is compared with.
+    pub(super) fn of_motion(self) -> bool {
+        !matches!(
             self,
-            Self::WheelSpeedFl
-                | Self::WheelSpeedFr
-                | Self::WheelSpeedRl
-                | Self::WheelSpeedRr
-                | Self::Steer
-                | Self::Ax
-                | Self::Ay
-                | Self::YawRate
+            Self::Distance | Self::Lap | Self::LapComplete | Self::Throttle | Self::Brake
         )
     }
 

@@ -129,7 +129,8 @@ impl<const P: usize> Sums<P> {
                 factors[i] = factor;
             }
         }
-        let factors = SVector::from_fn(|i, _| if told[i] { factors[i] / scale[i] } else { 0.0 });
+        let factors: SVector<f64, P> =
+            SVector::from_fn(|i, _| if told[i] { factors[i] / scale[i] } else { 0.0 });
         (told.contains(&true) && factors.iter().all(|f| f.is_finite())).then_some(factors)
     }
 

@@ -3,6 +3,7 @@
 use glam::DVec2;
 
 use super::clothoid::displacement;
+use super::crossing::bridges;
 use crate::{Error, Result};
 
 /// A named stretch of a circuit.
@@ -297,6 +298,11 @@ impl Circuit {
         let frame = self.frame_in_lap(station);
         let (_, left) = frame.resolve(point_m);
         frame.project(station, left)
+    }
+
+    /// Where the centreline crosses itself on bridges: both stations (m) of each.
+    pub fn bridges(&self) -> Vec<[f64; 2]> {
+        bridges(&self.centreline_m, &self.station_m, self.closed)
     }
 
     /// The left edge as a polyline (m), one point per sample.

@@ -1,6 +1,7 @@
 //! Cross-sections of a circuit at stations: the straight segments that a racing line crosses.
 
 use super::circuit::{Corner, Section};
+use super::crossing::bridges;
 use crate::{Error, Place, Result};
 use glam::DVec2;
 
@@ -31,6 +32,11 @@ pub struct CrossSections {
 }
 
 impl CrossSections {
+    /// Where the road crosses itself on bridges: both stations (m) of each.
+    pub fn bridges(&self) -> Vec<[f64; 2]> {
+        bridges(&self.points(&vec![0.5; self.len()]), &self.station_m, self.closed)
+    }
+
     /// Number of cross-sections.
     pub fn len(&self) -> usize {
         self.station_m.len()

@@ -9,6 +9,7 @@ pub(super) type Stretch = [DVec2; 2];
 const BUDGET: u64 = 200_000_000;
 
 /// The stretches are too tangled to be checked.
+#[derive(Debug)]
 pub(super) struct Tangled;
 
 #[derive(Clone, Copy)]
@@ -109,6 +110,19 @@ pub(super) fn stretches(points: &[DVec2], closed: bool) -> Vec<Stretch> {
     }
     all
 }
+
+/// Where a line crosses itself, as on a bridge: both stations (m) of every crossing. `station_m` are those of the points.
+pub(super) fn bridges(points: &[DVec2], station_m: &[f64], closed: bool) -> Vec<[f64; 2]> {
+    // What is too tangled was refused when it was read.
+    let crossed = crossings(&stretches(points, closed), MOST_BRIDGES).unwrap_or_default();
+    crossed
+        .into_iter()
+        .map(|(i, j)| [station_m[i], station_m[j]])
+        .collect()
+}
+
+/// Bridges that are told of.
+const MOST_BRIDGES: usize = 100;
 
 #[cfg(test)]
 mod tests {

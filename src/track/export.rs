@@ -8,8 +8,8 @@ use glam::DVec2;
 use std::fmt::Write as _;
 use std::path::Path;
 
-/// A table of points with the distances to the right and left edges, to the micrometre.
-fn table(rows: impl Iterator<Item = (DVec2, f64, f64)>) -> String {
+/// Points (m) with their distances to the right and the left edge (m) in the racetrack database's format, to the micrometre.
+pub fn racetrack_csv(rows: impl Iterator<Item = (DVec2, f64, f64)>) -> String {
     let mut text = "# x_m,y_m,w_tr_right_m,w_tr_left_m\n".to_owned();
     for (point, right_m, left_m) in rows {
         // Writing to a string cannot fail.
@@ -23,7 +23,7 @@ impl Circuit {
     pub fn to_racetrack_csv(&self) -> String {
         let widths = self.width_right_m.iter().zip(&self.width_left_m);
         let points = self.centreline_m.iter().zip(widths);
-        table(points.map(|(&point, (&right, &left))| (point, right, left)))
+        racetrack_csv(points.map(|(&point, (&right, &left))| (point, right, left)))
     }
 
     /// Writes [`Circuit::to_racetrack_csv`] to a new file.
@@ -47,7 +47,9 @@ impl CrossSections {
         let points = self.points(alpha);
         let ends = self.right_m.iter().zip(&self.left_m);
         let rows = points.iter().zip(ends);
-        table(rows.map(|(&point, (&right, &left))| (point, point.distance(right), point.distance(left))))
+        racetrack_csv(
+            rows.map(|(&point, (&right, &left))| (point, point.distance(right), point.distance(left))),
+        )
     }
 
     /// Writes [`CrossSections::to_racetrack_csv`] to a new file.

@@ -27,6 +27,7 @@ mod survey;
 
 pub use circuit::{Circuit, Corner, Projection, Section};
 pub use cross_sections::CrossSections;
+pub use export::racetrack_csv;
 pub use from_curvature::{Closure, CurvatureRow, CurvatureTable};
 pub use load::BUNDLED;
 pub use reference::{ReferenceLine, Smoothing};

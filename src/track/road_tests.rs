@@ -246,23 +246,33 @@ fn a_hairpin_whose_edges_cross_is_refused_by_station() {
 }
 
 #[test]
-fn a_bridge_is_allowed_when_announced() {
-    let eight: Vec<DVec2> = (0..400)
-        .map(|i| f64::from(i) * TAU / 400.0 + 0.01)
-        .map(|t| 300.0 * DVec2::new(t.sin(), (2.0 * t).sin()))
-        .collect();
-    let mut eight = survey(eight, true, 10.0);
-    let error = eight.check().unwrap_err().to_string();
+fn a_bridge_is_steep_or_announced() {
+    let eight = |height: f64| -> Survey {
+        let t = (0..400).map(|i| f64::from(i) * TAU / 400.0 + 0.01);
+        let points = t.map(|t| DVec2::new(300.0 * t.sin(), height * (2.0 * t).sin()));
+        survey(points.collect(), true, 10.0)
+    };
+    let mut flat = eight(40.0);
+    let error = flat.check().unwrap_err().to_string();
     assert!(
         error.contains("crosses itself") && error.contains("point "),
         "{error}"
     );
-    eight.bridges = 1;
-    let line = eight.smoothed(&Smoothing::default()).unwrap();
+    flat.bridges = 1;
+    assert!(flat.check().is_ok());
+    let steep = eight(300.0);
+    let line = steep.smoothed(&Smoothing::default()).unwrap();
     line.cross_sections(&Spacing::equal(300)).unwrap();
     let (circuit, _) = line.circuit().unwrap();
     assert!(circuit.total_turn_rad().abs() < 1e-6);
-    circuit.cross_sections(300).unwrap();
+    let cross_sections = circuit.cross_sections(300).unwrap();
+    for bridges in [circuit.bridges(), cross_sections.bridges()] {
+        let [[a, b]] = bridges[..] else {
+            panic!("{bridges:?}")
+        };
+        let [a, b] = [a, b].map(|s| circuit.position_at(s).length());
+        assert!(a < 15.0 && b < 15.0, "{a} {b}");
+    }
 }
 
 #[test]

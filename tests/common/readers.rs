@@ -8,7 +8,8 @@ use lapswarm::study::sweep::{self, SWEEP_FILE, SweepSettings};
 use lapswarm::swarm::checkpoint::{self, Checkpoint};
 use lapswarm::swarm::device::DeviceState;
 use lapswarm::swarm::{
-    CooperativeSwarm, CovarianceSwarm, DifferenceSwarm, HybridSwarm, Islands, Mopso, Nsga2, Pso, WindowSwarm,
+    CooperativeSwarm, CovarianceSwarm, DifferenceSwarm, HybridSwarm, Islands, Moead, Mopso, Nsga2, Nsga3,
+    Pso, WindowSwarm,
 };
 use lapswarm::telemetry::{ChannelMap, Log, LogOptions, Recording};
 use lapswarm::track::{Circuit, Smoothing, Spacing, Survey, SurveyOptions, Track};
@@ -308,7 +309,7 @@ pub fn checkpoint(data: &[u8]) {
     let Some((&kind, payload)) = data.split_first() else {
         return;
     };
-    match kind % 12 {
+    match kind % 14 {
         0 => forged::<Pso>(payload),
         1 => forged::<Mopso>(payload),
         2 => forged::<CooperativeSwarm>(payload),
@@ -320,7 +321,9 @@ pub fn checkpoint(data: &[u8]) {
         8 => forged::<WindowSwarm>(payload),
         9 => forged::<Islands<Mopso>>(payload),
         10 => forged::<Islands<Pso>>(payload),
-        _ => forged::<Islands<DifferenceSwarm>>(payload),
+        11 => forged::<Islands<DifferenceSwarm>>(payload),
+        12 => forged::<Nsga3>(payload),
+        _ => forged::<Moead>(payload),
     }
 }
 

@@ -16,8 +16,8 @@ use lapswarm::study::sweep::{Row, SweepSettings};
 use lapswarm::swarm::checkpoint::{self, Checkpoint};
 use lapswarm::swarm::{
     CooperativeSettings, CooperativeSwarm, CovarianceSettings, CovarianceSwarm, DifferenceSettings,
-    DifferenceSwarm, HybridSettings, HybridSwarm, Islands, Mopso, MopsoSettings, Nsga2, Nsga2Settings, Pso,
-    PsoSettings, WindowSettings, WindowSwarm,
+    DifferenceSwarm, HybridSettings, HybridSwarm, Islands, Moead, MoeadSettings, Mopso, MopsoSettings, Nsga2,
+    Nsga2Settings, Nsga3, Nsga3Settings, Pso, PsoSettings, WindowSettings, WindowSwarm,
 };
 use lapswarm::vehicle::Car;
 use readers::READERS;
@@ -281,6 +281,14 @@ fn swarms() -> Vec<Vec<u8>> {
         population: 8,
         ..Nsga2Settings::default()
     };
+    let directed = Nsga3Settings {
+        population: 8,
+        ..Nsga3Settings::default()
+    };
+    let decomposed = MoeadSettings {
+        population: 8,
+        ..MoeadSettings::default()
+    };
     let difference = || DifferenceSwarm::new(&one, DifferenceSettings::default()).unwrap();
     vec![
         checkpoint::to_bytes(&pso()).unwrap(),
@@ -304,6 +312,8 @@ fn swarms() -> Vec<Vec<u8>> {
             11,
             &Islands::new(&one, vec![difference(), difference()], None).unwrap(),
         ),
+        swarm(12, &Nsga3::new(&two, directed).unwrap()),
+        swarm(13, &Moead::new(&two, decomposed).unwrap()),
     ]
 }
 

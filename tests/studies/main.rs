@@ -4,6 +4,7 @@ mod hybrid;
 mod identify;
 mod registry;
 mod resume;
+mod roads;
 mod sensitivity;
 #[path = "../common/studies.rs"]
 #[allow(dead_code)] // Others kill longer ones.

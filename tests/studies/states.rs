@@ -5,8 +5,9 @@ use lapswarm::evaluate::{Evaluator, Objective, Problem, Variable};
 use lapswarm::swarm::checkpoint::{Checkpoint, VERSION, from_bytes, load, save, to_bytes};
 use lapswarm::swarm::{
     CooperativeSettings, CooperativeSwarm, CovarianceSettings, CovarianceSwarm, DifferenceSettings,
-    DifferenceSwarm, HybridSettings, HybridSwarm, Islands, MANY, Migration, Mopso, MopsoSettings, Nsga2,
-    Nsga2Settings, Optimiser, OutOfBounds, Pso, PsoSettings, Restarts, WindowSettings, WindowSwarm,
+    DifferenceSwarm, HybridSettings, HybridSwarm, Islands, MANY, Migration, Moead, MoeadSettings, Mopso,
+    MopsoSettings, Nsga2, Nsga2Settings, Nsga3, Nsga3Settings, Optimiser, OutOfBounds, Pso, PsoSettings,
+    Restarts, WindowSettings, WindowSwarm,
 };
 use proptest::prelude::*;
 use std::path::Path;
@@ -113,6 +114,8 @@ proptest! {
         resumes(|s| mopso(s, 24), 2, seed, at);
         resumes(|s| DifferenceSwarm::new(&one, DifferenceSettings { seed: s, ..Default::default() }).unwrap(), 1, seed, at);
         resumes(|s| Nsga2::new(&problem(2), Nsga2Settings { seed: s, population: 20, ..Default::default() }).unwrap(), 2, seed, at);
+        resumes(|s| Moead::new(&problem(4), MoeadSettings { seed: s, population: 20, ..Default::default() }).unwrap(), 4, seed, at);
+        resumes(|s| Nsga3::new(&problem(4), Nsga3Settings { seed: s, population: 20, ..Default::default() }).unwrap(), 4, seed, at);
         let cooperative = CooperativeSettings::default();
         resumes(|s| {
             let motion = PsoSettings { seed: s, ..cooperative.motion.clone() };

@@ -2,6 +2,7 @@
 
 mod contract;
 mod large_swarms;
+mod many_objectives;
 mod minimise;
 mod optimisers;
 mod scales;

@@ -116,6 +116,21 @@ fn verdict(study: &str) -> Option<(&'static str, &'static str, &'static str)> {
     }
 }
 
+/// How far beyond an edge a car counts as off the road (m).
+const OFF_ROAD_M: f64 = 0.01;
+
+/// Best lines of a run that leave the road: by which objective, and how far (m).
+fn off_road(run: &Run) -> Vec<(&str, f64)> {
+    let beyond = run.figures.iter().filter_map(|figure| {
+        let line = figure
+            .name
+            .strip_prefix("best / ")?
+            .strip_suffix(" / clearance_m")?;
+        (figure.value < -OFF_ROAD_M).then_some((line, -figure.value))
+    });
+    beyond.collect()
+}
+
 fn head(page: &mut HtmlReport, runs: &[Named<'_>]) {
     let mut studies: Vec<&str> = runs.iter().map(|(_, r)| r.study.as_str()).collect();
     studies.sort_unstable();
@@ -125,8 +140,15 @@ fn head(page: &mut HtmlReport, runs: &[Named<'_>]) {
         let plural = if of.len() == 1 { "run" } else { "runs" };
         let mut sentence = format!("{} {plural} of {study}", of.len());
         let judged = verdict(study).into_iter().flat_map(|(figure, words, unit)| {
-            of.iter()
-                .filter_map(move |(name, r)| Some((name, words, significant(r.figure(figure)?, 6), unit)))
+            of.iter().filter_map(move |(name, r)| {
+                let off = if off_road(r).is_empty() {
+                    ""
+                } else {
+                    " off the road"
+                };
+                let unit = format!("{unit}{off}");
+                Some((name, words, significant(r.figure(figure)?, 6), unit))
+            })
         });
         for (number, (name, words, value, unit)) in judged.enumerate() {
             sentence += &if number == 0 {
@@ -135,9 +157,16 @@ fn head(page: &mut HtmlReport, runs: &[Named<'_>]) {
                 ", ".to_owned()
             };
             sentence += format!("{name} {value} {unit}").trim_end();
-            page.tile(&format!("{name}, {words}"), value, unit);
+            page.tile(&format!("{name}, {words}"), value, &unit);
         }
         page.sentence(sentence + ".");
+    }
+    for (name, run) in runs {
+        for (line, beyond_m) in off_road(run) {
+            page.warning(format!(
+                "{name}: on the best line by {line} the car is {beyond_m:.2} m off the road. Its figures are those of no lap."
+            ));
+        }
     }
     for (name, _) in runs
         .iter()

@@ -203,7 +203,7 @@ pub(super) fn summarise(solved: &Solved<'_, Hybrid>) -> HybridSummary {
             energy_mj: o.budget_j / 1e6,
             exact_lap_time_s: o.exact.lap.time,
             exact_deployed_mj: o.exact.lap.deployed / 1e6,
-            exact_status: format!("{:?}", o.exact.status),
+            exact_status: o.exact.status.to_string(),
             exact_programs: o.exact.programs,
             exact_bound_s: o.exact.bound_s,
             exact_elapsed_s: o.exact.seconds,

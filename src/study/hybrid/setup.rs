@@ -128,8 +128,12 @@ impl HybridInputs {
                 let Some(found) = found else {
                     return Err(Error::Study("there is no solver for the fastest line".to_owned()));
                 };
-                let points = raceline.cross_sections.points(&found.alpha);
-                ("fastest".to_owned(), Some(found.alpha), points)
+                let Some(alpha) = raceline.brought_in(&found.alpha, &settings.raceline())? else {
+                    let text = "the fastest line leaves the road between the cross-sections: ask for more with --sections";
+                    return Err(Error::Study(text.to_owned()));
+                };
+                let points = raceline.cross_sections.points(&alpha);
+                ("fastest".to_owned(), Some(alpha), points)
             }
         };
         let fine = FineLine::new(&through, closed, settings.spacing_m, None, settings.entry_mps)?;

@@ -10,6 +10,7 @@ use crate::optimum::{ReferenceSolvers, interruptible};
 use crate::random::Random;
 use crate::swarm::metrics::{Scale, hypervolume};
 use crate::swarm::{Archive, Mopso, MopsoSettings, Optimiser, Progress, Truncation, lattice, step};
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
 use std::sync::atomic::Ordering;
@@ -119,6 +120,7 @@ pub(super) fn search_front(
         }));
     }
     let mut archive = Archive::new(settings.archive, Truncation::Contribution);
+    let lines = on_road(setup, settings, &lines)?;
     let mut evaluations = swarm.evaluations();
     evaluations += insert_all(&mut archive, judge.as_mut(), &lines)?;
     if settings.local_search && settings.objectives.iter().all(|o| solvers.solves(*o)) {
@@ -126,6 +128,7 @@ pub(super) fn search_front(
             let led = scope.spawn(|| polish_along(&archive, settings, solvers));
             interruptible(led, solvers.flag(), || observe(&latest, &state))
         })?;
+        let polished = on_road(setup, settings, &polished)?;
         evaluations += insert_all(&mut archive, judge.as_mut(), &polished)?;
     }
 
@@ -216,6 +219,13 @@ pub fn starting_lines(
     }
     candidates.truncate(settings.population);
     Ok(candidates)
+}
+
+/// The lines that are on the road between the cross-sections as well, moved in where they have to be.
+fn on_road(setup: &Setup, settings: &RacelineSettings, lines: &[Vec<f64>]) -> Result<Vec<Vec<f64>>> {
+    let brought_in = lines.par_iter().map(|line| setup.brought_in(line, settings));
+    let kept = brought_in.collect::<Result<Vec<_>>>()?;
+    Ok(kept.into_iter().flatten().collect())
 }
 
 /// Scores lines and offers them to the archive; returns how many.

@@ -43,7 +43,7 @@ pub struct ObjectiveOutcome {
     pub swarm_cost: f64,
     /// The reference optimum, where there is a solver for it.
     pub exact: Option<ReportedLine>,
-    /// How its solver ended.
+    /// How its solver ended, in plain words.
     pub exact_status: Option<String>,
     /// Best cost against evaluations of its swarm.
     pub history: Vec<(u64, f64)>,
@@ -74,9 +74,8 @@ impl Study for Raceline {
         "Find the line round a circuit: shortest, of minimum curvature, fastest, and the front between them.";
     const DETAILS: &'static str = "Examples:\n  lapswarm raceline\n  lapswarm raceline --track my_circuit.csv --car \
         runs/identify-001/car.toml\n  lapswarm raceline --section Abbey --objectives lap_time\n\nLines are looked for through \
-        the cross-sections. Through too few of them the best one may leave the road in between. A warning on stderr says so, \
-        the JSON names the objectives in off_road, and the exit code stays 0: it is the best line through these \
-        cross-sections.";
+        the cross-sections. Where the car leaves the road between them, by a centimetre or more, the line is moved in. Where \
+        that cannot be, there is no best line: the study says where, and ends with exit code 1.";
     type Settings = RacelineSettings;
     type State = LinesState;
     type Prepared = Setup;
@@ -124,19 +123,6 @@ impl Study for Raceline {
 
     fn text(_: &RacelineSettings, summary: &Summary) -> String {
         summary.to_text()
-    }
-
-    /// Lines that leave the road are no failure: they are the best through the cross-sections that were asked for.
-    fn warnings(summary: &Summary) -> Vec<String> {
-        let said = || {
-            format!(
-                "the best line by {} leaves the road between the cross-sections: {} are too few, ask for more --sections",
-                summary.off_road.join(", "),
-                summary.sections
-            )
-        };
-        let off = !summary.off_road.is_empty();
-        off.then(said).into_iter().collect()
     }
 
     fn check(path: &Path) -> Result<String> {

@@ -84,14 +84,8 @@ pub(super) fn search_objective(
         return search_step(&search, &plain, objective, (0, 0), work);
     }
     // Open roads, and what folds over itself, cannot be cut square to lines on it.
-    let cross_sections = &setup.cross_sections;
-    if cross_sections_about(
-        cross_sections,
-        &cross_sections.points(&cross_sections.reference),
-        cross_sections.len(),
-    )
-    .is_ok()
-    {
+    let road = &setup.cross_sections;
+    if cross_sections_about(road, &road.points(&road.reference), setup.cross_sections.len()).is_ok() {
         search_about(settings, setup, &search, &plain, work)
     } else {
         search_across(settings, setup, &search, &plain, work)
@@ -187,7 +181,7 @@ fn search_about(
             break;
         };
         let told = setup.report("fastest", &within_road(shares), settings)?;
-        if told.lap_time_fine_s() < best.lap_time_fine_s() {
+        if told.betters(&best, objective) {
             best = told;
         }
     }
@@ -252,7 +246,7 @@ fn search_across(
     for wavelength in RIPPLES_M {
         let smooth = cross_sections.with_smooth_reference(wavelength).reference;
         let line = setup.report("fastest", &smooth, settings)?;
-        if line.lap_time_fine_s() < fastest.lap_time_fine_s() {
+        if line.betters(&fastest, objective) {
             fastest = line;
         }
     }

@@ -33,8 +33,10 @@ pub struct LineFigures {
     pub length_fine_m: f64,
     /// Integral of squared curvature on the fine spline (1/m).
     pub integral_kappa2_fine_1pm: f64,
-    /// Least distance from the sides of the car to the edges (m).
+    /// Least distance from the car, with the margin about it, to the edges (m).
     pub clearance_m: f64,
+    /// Distance along the line where that is (m).
+    pub clearance_station_m: f64,
 }
 
 impl LineFigures {
@@ -48,6 +50,7 @@ impl LineFigures {
             length_fine_m: line.fine.length_m,
             integral_kappa2_fine_1pm: line.fine.integral_kappa2_1pm,
             clearance_m: line.clearance.margin_m,
+            clearance_station_m: line.clearance.station_m,
         }
     }
 }
@@ -76,7 +79,7 @@ pub struct Summary {
     pub swarm: BTreeMap<String, f64>,
     /// The reference optima; `null` where there is no solver.
     pub exact: BTreeMap<String, Option<LineFigures>>,
-    /// How their solver ended, in its own words; `null` where there is no solver.
+    /// How their solver ended, in plain words; `null` where there is no solver.
     pub exact_status: BTreeMap<String, Option<String>>,
     /// How much more the best line costs than the reference optimum, of each objective (%); lap times on the fine spline.
     pub above_exact_percent: BTreeMap<String, Option<f64>>,
@@ -90,7 +93,8 @@ pub struct Summary {
     pub hypervolume_reference: Option<Vec<f64>>,
     /// Lines on the front.
     pub front_size: usize,
-    /// Best lines on which the car's side is more than 0.1 m beyond an edge, by the names of their objectives.
+    /// Best lines on which the car is more than a centimetre beyond an edge, by the names of their objectives: only a study that
+    /// was interrupted has any.
     pub off_road: Vec<String>,
     /// What a reader must know before believing the figures.
     pub warnings: Vec<String>,
@@ -128,11 +132,22 @@ pub(super) fn summarise(solved: &Solved<'_, Raceline>) -> Summary {
         hypervolume_reference: front.map(|f| f.reference.clone()),
         front_size: front.map_or(0, |f| f.alpha.len()),
         off_road: objectives()
-            .filter(|o| o.best.clearance.margin_m < -CLOSE_M)
+            .filter(|o| !o.best.clearance.is_on_road())
             .map(|o| o.objective.name().to_owned())
             .collect(),
-        warnings: warnings(outcome),
+        warnings: bridges(solved.prepared)
+            .into_iter()
+            .chain(warnings(outcome))
+            .collect(),
     }
+}
+
+/// A word on each bridge.
+fn bridges(setup: &Setup) -> Vec<String> {
+    let crossed = setup.road.bridges().into_iter();
+    crossed
+        .map(|[a, b]| format!("the road crosses itself at {a:.0} m and {b:.0} m: taken as a bridge"))
+        .collect()
 }
 
 /// The lines that a study tells of, the reference line last.
@@ -154,13 +169,12 @@ fn warnings(outcome: &Outcome) -> Vec<String> {
                 line.name
             ));
         }
-        if line.clearance.margin_m < -CLOSE_M {
+        if !line.clearance.is_on_road() {
             warnings.push(format!(
-                "{}: the car's side is {:.2} m beyond the {} edge at {:.0} m",
+                "{}: the car is {:.2} m beyond {}",
                 line.name,
                 -line.clearance.margin_m,
-                if line.clearance.left { "left" } else { "right" },
-                line.clearance.station_m
+                line.clearance.place()
             ));
         }
         if let Some(lap) = line.fine.lap.as_ref().filter(|lap| lap.beyond_lock > 0) {
@@ -173,9 +187,6 @@ fn warnings(outcome: &Outcome) -> Vec<String> {
     warnings
 }
 
-/// How far beyond an edge is not worth a word (m): between cross-sections a spline bulges, and edges are straight there.
-const CLOSE_M: f64 = 0.1;
-
 impl Summary {
     /// The figures in words.
     pub fn to_text(&self) -> String {
@@ -187,6 +198,12 @@ impl Summary {
             self.car_width_m,
             page::lines_table(self).first(7).to_text()
         );
+        for (name, line) in &self.best {
+            text += &format!(
+                "Least clearance of the best line by {name}: {:.3} m at {:.0} m\n",
+                line.clearance_m, line.clearance_station_m
+            );
+        }
         if let Some(volume) = self.hypervolume {
             text += &format!("Front of {} lines, hypervolume {volume:.4}\n", self.front_size);
         }
@@ -213,7 +230,7 @@ pub(super) fn write_files(folder: &Path, setup: &Setup, outcome: &Outcome) -> Re
         let name = line.stem();
         write_line(&folder.join(format!("line_{name}.csv")), setup, line)?;
         // Replaces what an interrupted run has left, since it is resumed in the same folder.
-        let racetrack = setup.cross_sections.line_to_racetrack_csv(&line.alpha);
+        let racetrack = setup.racetrack_csv(line);
         write_whole(folder.join(format!("racetrack_{name}.csv")), racetrack.as_bytes())?;
     }
     write_front(folder, outcome)

@@ -6,6 +6,7 @@ use crate::config::kinds::{
 use crate::config::settings::{Flag, settings};
 use crate::evaluate::BackendChoice;
 use crate::evaluate::line::LineObjective;
+use crate::line::CarPlan;
 use crate::study::framework::memory::Size;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
@@ -45,6 +46,10 @@ settings! {
             "Whether a surveyed track's line and edges are taken as they are; else they are smoothed, within 0.25 m";
         car_width_m: f64 ["m"] = 2.0, number(0.0, 10.0),
             "Width of the car; zero lets its middle use the whole road";
+        car_length_m: f64 ["m"] = 4.5, number(0.0, 20.0),
+            "Length of the car, whose corners swing out in tight bends; zero leaves them out";
+        margin_m: f64 ["m"] = 0.0, number(0.0, 10.0),
+            "Room that is left between the car and either edge";
         ellipse_exponent: f64 ["-"] = 2.0, number(1.0, 4.0),
             "Exponent of the friction ellipse";
         entry_mps: f64 ["m/s"] = 10.0, number(0.5, 150.0),
@@ -83,6 +88,19 @@ fn usual_objectives() -> Vec<LineObjective> {
 }
 
 impl RacelineSettings {
+    /// The car from above, with the margin on every side of it.
+    pub(super) fn plan_with_margin(&self) -> CarPlan {
+        let length_m = if self.car_length_m > 0.0 {
+            self.car_length_m + 2.0 * self.margin_m
+        } else {
+            0.0
+        };
+        CarPlan {
+            width_m: self.car_width_m + 2.0 * self.margin_m,
+            length_m,
+        }
+    }
+
     /// What the study's memory goes with.
     pub fn size(&self) -> Size {
         Size {

@@ -5,9 +5,10 @@ use crate::config::settings::Settings;
 use crate::error::{Error, Result};
 use crate::evaluate::Evaluator;
 use crate::evaluate::line::{CpuLineEvaluator, LineObjective, LineProblem};
-use crate::line::{Clearance, FINE_M, FineLine, Parametrisation, PointMass, TERMS, check_line};
+use crate::line::{Clearance, FINE_M, FineLine, Parametrisation, PointMass, RoadEdges, TERMS};
+use crate::optimum::mended;
 use crate::study::framework::Plan;
-use crate::track::{CrossSections, Spacing, Track};
+use crate::track::{CrossSections, Spacing, Track, racetrack_csv};
 use crate::vehicle::limits::{SpeedRange, car_envelope};
 use crate::vehicle::powertrain::Powertrain;
 use crate::vehicle::{Car, Envelope};
@@ -15,8 +16,8 @@ use glam::DVec2;
 
 /// Waves of a survey's reference line that are shorter than this are noise (m): the tightest bend of a road is longer.
 const REFERENCE_M: f64 = 60.0;
-/// Distance between the points of the edges that lines are checked against (m).
-const EDGE_M: f64 = 2.0;
+/// Distance between the points of the edges that lines are held within (m): an edge of 10 m radius is straight to a centimetre.
+const EDGE_M: f64 = 1.0;
 
 /// The track and the car, ready for lines.
 #[derive(Clone, Debug)]
@@ -47,8 +48,13 @@ pub fn set_up(settings: &RacelineSettings) -> Result<Setup> {
     let road = track
         .cross_sections(&Spacing::equal(settings.sections), settings.as_surveyed)?
         .with_smooth_reference(REFERENCE_M);
-    let close = ((road.length_m / EDGE_M).ceil() as usize).clamp(settings.sections, 1_000_000);
-    let dense = track.cross_sections(&Spacing::equal(close), settings.as_surveyed)?;
+    let cut = |step_m: f64| {
+        let close = ((road.length_m / step_m).ceil() as usize).clamp(settings.sections, 1_000_000);
+        track.cross_sections(&Spacing::equal(close), settings.as_surveyed)
+    };
+    // Inside a bend that is hardly wider than its road, cross-sections may be too close to one another to be turned apart.
+    let dense = cut(EDGE_M).or_else(|_| cut(2.0 * EDGE_M))?;
+    let close = dense.len();
     let (road, dense) = match &settings.section {
         Some(name) => {
             let (first_m, length_m) = road.section_named(name)?;
@@ -65,7 +71,9 @@ pub fn set_up(settings: &RacelineSettings) -> Result<Setup> {
         }
         None => (road, dense),
     };
-    let cross_sections = road.narrowed(settings.car_width_m)?;
+    let plan = settings.plan_with_margin();
+    let mut cross_sections = road.narrowed(plan.width_m)?;
+    RoadEdges::new(&dense.right_m, &dense.left_m, dense.closed).draw_in(&mut cross_sections, plan.width_m);
     let car = Car::load(&settings.car)?;
     let (envelope, car_name) = match &settings.envelope {
         Some(path) => (Envelope::load(path)?, path.display().to_string()),
@@ -119,7 +127,7 @@ pub struct ReportedLine {
     pub at_cross_sections: Vec<f64>,
     /// The line on the fine spline, with its lap.
     pub fine: FineLine,
-    /// How close its sides come to the edges.
+    /// How close the car comes to the edges.
     pub clearance: Clearance,
 }
 
@@ -150,6 +158,12 @@ impl ReportedLine {
     pub fn objective(&self, objective: LineObjective) -> f64 {
         self.at_cross_sections[objective as usize]
     }
+
+    /// Whether this line is the better one by an objective. Any line on the road is better than one that leaves it.
+    pub fn betters(&self, other: &Self, objective: LineObjective) -> bool {
+        let rank = |line: &Self| (!line.clearance.is_on_road(), line.worth(objective));
+        rank(self) < rank(other)
+    }
 }
 
 impl Setup {
@@ -173,11 +187,63 @@ impl Setup {
         )
     }
 
-    /// Works out everything that is reported of a line.
+    /// A line's points at the cross-sections in the racetrack database's format, with the distances square to the line from it to
+    /// the edges of the road.
+    pub(super) fn racetrack_csv(&self, line: &ReportedLine) -> String {
+        let (fine, n) = (&line.fine, line.fine.points_m.len());
+        let edges = RoadEdges::new(&self.edges_m[0], &self.edges_m[1], fine.closed);
+        let abreast = edges.abreast(&fine.points_m);
+        let given = (0..n).filter(|&i| fine.section[i].1 == 0.0);
+        racetrack_csv(given.map(|i| {
+            let (before, after) = if fine.closed {
+                ((i + n - 1) % n, (i + 1) % n)
+            } else {
+                (i.max(1) - 1, (i + 1).min(n - 1))
+            };
+            let leftward = (fine.points_m[after] - fine.points_m[before])
+                .perp()
+                .normalize_or_zero();
+            let point = fine.points_m[i];
+            let room = |way: DVec2, left: bool| {
+                let nearest_m = edges.inside(point, abreast[i], left);
+                // Beyond an edge there is none ahead.
+                let ahead_m = edges.meets(point, way, abreast[i], left);
+                ahead_m.filter(|_| nearest_m > 0.0).unwrap_or(nearest_m)
+            };
+            (point, room(-leftward, false), room(leftward, true))
+        }))
+    }
+
+    /// The line on its fine spline, and the clearance of the car with its margin on both sides at every point (m).
+    fn measured(&self, alpha: &[f64], settings: &RacelineSettings) -> Result<(FineLine, Vec<[f64; 2]>)> {
+        let cross_sections = &self.cross_sections;
+        let points = cross_sections.points(alpha);
+        let fine = FineLine::new(&points, cross_sections.closed, FINE_M, None, settings.entry_mps)?;
+        let edges = RoadEdges::new(&self.edges_m[0], &self.edges_m[1], cross_sections.closed);
+        let clearances = edges.clearances(&fine, &settings.plan_with_margin());
+        Ok((fine, clearances))
+    }
+
+    /// The line, moved in where the car leaves the road between the cross-sections; nothing where it cannot be.
+    ///
+    /// # Errors
+    /// Those of [`mended`].
+    pub fn brought_in(&self, alpha: &[f64], settings: &RacelineSettings) -> Result<Option<Vec<f64>>> {
+        let (fine, clearances) = self.measured(alpha, settings)?;
+        if Clearance::least(&fine, &clearances).is_on_road() {
+            return Ok(Some(alpha.to_vec()));
+        }
+        mended(&self.cross_sections, alpha, |line| self.measured(line, settings))
+    }
+
+    /// Works out everything that is reported of a line. Where the car leaves the road between the cross-sections, the line is moved
+    /// in first; where that cannot be, it stays as it is.
     ///
     /// # Errors
     /// [`Error::Study`] if the line cannot be driven at all.
     pub fn report(&self, name: &str, alpha: &[f64], settings: &RacelineSettings) -> Result<ReportedLine> {
+        let brought_in = self.brought_in(alpha, settings)?;
+        let alpha = brought_in.as_deref().unwrap_or(alpha);
         let problem = self.problem(Parametrisation::sections(), &LineObjective::ALL, settings)?;
         let found = CpuLineEvaluator::new(&problem).evaluate(alpha)?;
         if let Some(failure) = found.failures.first().copied().flatten() {
@@ -191,11 +257,13 @@ impl Setup {
             Some(&self.car),
         );
         let fine = FineLine::new(&points, closed, FINE_M, car, settings.entry_mps)?;
+        let edges = RoadEdges::new(&self.edges_m[0], &self.edges_m[1], closed);
+        let clearance = Clearance::least(&fine, &edges.clearances(&fine, &settings.plan_with_margin()));
         Ok(ReportedLine {
             name: name.to_owned(),
             alpha: alpha.to_vec(),
             at_cross_sections: found.objectives,
-            clearance: check_line(&fine, &self.edges_m[0], &self.edges_m[1], settings.car_width_m),
+            clearance,
             fine,
         })
     }

@@ -3,8 +3,8 @@
 use super::front::search_front;
 use super::objective_search::search_objective;
 use super::state::{FinishedObjective, Running, inputs_of};
-use super::{ObjectiveOutcome, Outcome, Raceline, RacelineSettings};
-use crate::error::Result;
+use super::{ObjectiveOutcome, Outcome, Raceline, RacelineSettings, ReportedLine, Setup};
+use crate::error::{Error, Result};
 use crate::evaluate::line::{LineObjective, open_line_evaluator};
 use crate::line::Parametrisation;
 use crate::optimum::{OptimumLine, ReferenceSolvers, interruptible};
@@ -83,9 +83,12 @@ pub(super) fn find_lines(work: Work<'_, Raceline>) -> Result<Outcome> {
                     let mut best = report(&found.alpha)?;
                     for rival in start.into_iter().chain(led.iter().map(Vec::as_slice)) {
                         let rival = report(rival)?;
-                        if rival.worth(objective) < best.worth(objective) {
+                        if rival.betters(&best, objective) {
                             best = rival;
                         }
+                    }
+                    if !best.clearance.is_on_road() && !work.interrupted {
+                        return Err(off_road(setup, &best));
                     }
                     let best = best.alpha;
                     let finished = FinishedObjective { found, best };
@@ -107,7 +110,7 @@ pub(super) fn find_lines(work: Work<'_, Raceline>) -> Result<Outcome> {
                 best: report(&finished.best)?,
                 swarm_cost: found.cost,
                 exact: exact.as_ref().map(|o| report(&o.alpha)).transpose()?,
-                exact_status: exact.map(|o| format!("{:?}", o.status)),
+                exact_status: exact.map(|o| o.status.to_string()),
                 history: history.map(|row| (row.evaluations, row.best)).collect(),
             });
             if work.interrupted {
@@ -153,6 +156,18 @@ pub(super) fn find_lines(work: Work<'_, Raceline>) -> Result<Outcome> {
         exact_s,
         record,
     })
+}
+
+/// A best line that leaves the road is none.
+fn off_road(setup: &Setup, line: &ReportedLine) -> Error {
+    Error::Study(format!(
+        "the {} line leaves the road: the car is {:.2} m beyond {}, and no line near it is on the road between the {} \
+         cross-sections: ask for more with --sections, or for a narrower car",
+        line.name,
+        -line.clearance.margin_m,
+        line.clearance.place(),
+        setup.cross_sections.len()
+    ))
 }
 
 /// What the local search makes of a line that was found.

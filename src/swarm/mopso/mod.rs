@@ -10,7 +10,7 @@ pub(super) mod thinning;
 use super::archive::Archive;
 use super::checkpoint::to_bytes;
 use super::settings::MopsoSettings;
-use super::{AcceptsMigrants, Counters, Front, Optimiser};
+use super::{AcceptsMigrants, Counters, Front, Islands, Optimiser};
 use crate::error::Result;
 use crate::evaluate::{Evaluation, Problem};
 pub use blocks::Generation;
@@ -103,6 +103,10 @@ impl AcceptsMigrants for Mopso {
             Kind::Small(swarm) => swarm.accept_migrants(migrants),
             Kind::Large(swarm) => swarm.accept_migrants(migrants),
         }
+    }
+
+    fn islands_to_checkpoint(islands: &Islands<Self>) -> Result<Vec<u8>> {
+        to_bytes(islands)
     }
 }
 

@@ -1,10 +1,11 @@
 //! The small swarm: double precision, one particle after the other.
 
-use super::earnings::Earnings;
+use super::earnings::{Earnings, Move};
 use crate::error::Result;
 use crate::evaluate::{Evaluation, Problem};
 use crate::random::Random;
 use crate::swarm::archive::Archive;
+use crate::swarm::genetic::cross;
 use crate::swarm::metrics::dominates;
 use crate::swarm::motion::{Particles, Purpose, polynomial};
 use crate::swarm::settings::{Leaders, MopsoSettings, Mutation};
@@ -150,10 +151,34 @@ impl SmallSwarm {
         }
     }
 
+    /// To a place between or about two archive members, each coordinate by itself, disturbed by polynomial mutation, as the
+    /// children of genetic algorithms \[5\].
+    fn crossing(&mut self, particle: usize, leader: usize) {
+        let (when, who) = (self.counters.iteration as u32, particle as u32);
+        let uniform = |purpose: Purpose, index: u32| self.random.uniform(purpose as u32, when, who, index);
+        let other = self
+            .random
+            .below(self.archive.len(), Purpose::Recombine as u32, when, who, 4);
+        let [one, other] = [leader, other].map(|m| &self.archive.positions[m]);
+        let share = 1.0 / self.particles.dimensions() as f64;
+        for (k, i) in self.particles.row(particle).enumerate() {
+            let drawn = |index: u32| uniform(Purpose::Recombine, 8 + 4 * k as u32 + index);
+            let mut x = one[k];
+            if drawn(0) < 0.5 {
+                let (low, high) = cross(one[k], other[k], drawn(1), INDEX);
+                x = if drawn(2) < 0.5 { low } else { high };
+            }
+            if uniform(Purpose::Mutation, 2 * k as u32) < share {
+                x = polynomial(x, uniform(Purpose::Mutation, 2 * k as u32 + 1), INDEX);
+            }
+            self.particles.position[i] = x;
+            self.particles.velocity[i] = 0.0;
+        }
+    }
+
     fn advance(&mut self) {
         let share = self.counters.iteration as f64 / (self.settings.motion.iterations.max(2) - 1) as f64;
         let worth = self.archive.worth();
-        let differences = self.earnings.share(self.settings.motion.difference_share);
         for particle in 0..self.settings.motion.population {
             if self.archive.is_empty() {
                 // Nobody knows anything yet.
@@ -161,21 +186,32 @@ impl SmallSwarm {
                     .rescatter(particle, self.counters.iteration, self.random);
             } else {
                 let leader = self.leader(&worth, particle);
-                if self.coin(Purpose::Recombine, particle) < differences {
-                    self.difference_move(particle, leader);
-                } else {
-                    let own = &self.best_position[self.particles.row(particle)];
-                    self.particles.pull(
-                        particle,
-                        (own, &self.archive.positions[leader]),
-                        &self.settings.motion,
-                        (share, self.counters.iteration),
-                        self.random,
-                    );
+                match self.choice(&self.earnings, particle) {
+                    Move::Crossing => {
+                        self.crossing(particle, leader);
+                        continue;
+                    }
+                    Move::Difference => self.difference_move(particle, leader),
+                    Move::Pull => {
+                        let own = &self.best_position[self.particles.row(particle)];
+                        self.particles.pull(
+                            particle,
+                            (own, &self.archive.positions[leader]),
+                            &self.settings.motion,
+                            (share, self.counters.iteration),
+                            self.random,
+                        );
+                    }
                 }
             }
             self.mutate(particle, share);
         }
+    }
+
+    /// The move that a particle makes by these earnings.
+    fn choice(&self, earnings: &Earnings, particle: usize) -> Move {
+        let usual = self.settings.motion.difference_share;
+        earnings.choice(usual, self.coin(Purpose::Recombine, particle))
     }
 
     fn coin(&self, purpose: Purpose, particle: usize) -> f64 {
@@ -189,6 +225,8 @@ const SCALE: f64 = 0.5;
 /// Share of the coordinates that a difference move changes. A third solves ZDT4 where all of them sometimes do
 /// not, and spreads DTLZ2's front better.
 const CROSSOVER: f64 = 0.3;
+/// Distribution index of the crossover and the mutation of a crossing.
+const INDEX: f64 = 20.0;
 
 impl Optimiser for SmallSwarm {
     fn ask(&mut self) -> Vec<f64> {
@@ -199,7 +237,7 @@ impl Optimiser for SmallSwarm {
         evaluation.check(self.particles.count, self.objectives)?;
         // Nobody moved towards anything yet.
         let scattered = self.archive.is_empty() || self.counters.iteration == 0;
-        let differences = self.earnings.share(self.settings.motion.difference_share);
+        let before = self.earnings.clone();
         self.earnings.fade();
         for particle in 0..self.particles.count {
             let Some(row) = evaluation.success(particle, self.objectives) else {
@@ -214,8 +252,8 @@ impl Optimiser for SmallSwarm {
                 // It takes no more room than what it dominates, and leaves some.
                 let room = self.archive.len() <= members && self.archive.len() < self.settings.archive;
                 let earned = entered && (room || self.archive.violation() < level);
-                let difference = self.coin(Purpose::Recombine, particle) < differences;
-                self.earnings.count(difference, earned);
+                let made = self.choice(&before, particle);
+                self.earnings.count(made, earned);
             }
             let heads = self.coin(Purpose::Coin, particle) < 0.5;
             let best = &mut self.best_objectives[particle];

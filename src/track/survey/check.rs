@@ -22,6 +22,13 @@ const NARROWEST_M: f64 = 0.1;
 /// its length.
 const JOINED_STEPS: f64 = 2.0;
 const OPEN_SHARE: f64 = 0.05;
+/// A line that crosses itself at this angle or a steeper one (degrees) does so at a bridge. Two stretches of a bad survey cross at
+/// a shallow one.
+const BRIDGE_DEG: f64 = 30.0;
+/// Line between the two decks of a bridge (m). A shorter loop is a knot of the survey.
+const BRIDGE_LOOP_M: f64 = 100.0;
+/// Bridges that need no word, at the most.
+const BRIDGES: usize = 8;
 
 /// Decides whether a line is closed, and drops the last point of a closed one where it repeats the first.
 pub(super) fn close(
@@ -134,7 +141,7 @@ pub(super) fn check_line(
     Ok(())
 }
 
-/// Refuses a line that crosses itself more often than it has bridges.
+/// Refuses a line that crosses itself more often than it has bridges. A steep crossing is a bridge by itself.
 pub(super) fn check_crossings(
     points: &[DVec2],
     closed: bool,
@@ -142,11 +149,35 @@ pub(super) fn check_crossings(
     source: &str,
     place: &dyn Fn(usize) -> Place,
 ) -> Result<()> {
-    let found = crossings(&stretches(points, closed), bridges.saturating_add(1));
+    let all = stretches(points, closed);
+    let mut along_m = vec![0.0];
+    for [from, to] in &all {
+        along_m.push(along_m[along_m.len() - 1] + from.distance(*to));
+    }
+    let length_m = along_m[all.len()];
+    let is_bridge = |&(i, j): &(usize, usize)| {
+        let [a, b] = [all[i], all[j]].map(|[from, to]| (to - from).normalize_or_zero());
+        let apart_m = along_m[j] - along_m[i + 1];
+        let back_m = if closed {
+            length_m - along_m[j + 1] + along_m[i]
+        } else {
+            f64::INFINITY
+        };
+        // Of two decks that are passed in opposite directions the smaller angle counts.
+        a.perp_dot(b).abs() >= BRIDGE_DEG.to_radians().sin() && apart_m.min(back_m) >= BRIDGE_LOOP_M
+    };
+    let found = crossings(&all, bridges.saturating_add(BRIDGES + 1));
     match found {
-        Ok(crossed) if crossed.len() <= bridges => Ok(()),
         Ok(crossed) => {
-            let (i, j) = crossed[0];
+            let steep = crossed.iter().filter(|pair| is_bridge(pair)).count().min(BRIDGES);
+            if crossed.len() - steep <= bridges {
+                return Ok(());
+            }
+            let (i, j) = crossed
+                .iter()
+                .copied()
+                .find(|pair| !is_bridge(pair))
+                .unwrap_or(crossed[0]);
             Err(Error::input(
                 source,
                 place(i),
@@ -156,8 +187,10 @@ pub(super) fn check_crossings(
                     crossed.len()
                 ),
                 match bridges {
-                    0 => "a line that does not, or a TOML file with `bridges`, the number of its crossings"
-                        .to_owned(),
+                    0 => format!(
+                        "a line that does not at less than {BRIDGE_DEG} degrees, or a TOML file with `bridges`, the number of \
+                         its crossings"
+                    ),
                     _ => format!("at most {bridges} crossing(s), as `bridges` says"),
                 },
             ))

@@ -562,8 +562,11 @@ fn mistakes_are_named_by_line() {
 fn a_line_that_crosses_itself_is_refused_where_it_does() {
     let eight: Vec<DVec2> = (0..100)
         .map(|i| TAU * f64::from(i) / 100.0 + 0.02)
-        .map(|t| 200.0 * DVec2::new(t.sin(), (2.0 * t).sin()))
+        .map(|t| DVec2::new(200.0 * t.sin(), 200.0 * (2.0 * t).sin()))
         .collect();
+    // Steep, it is a bridge by itself. At a shallow angle, it has to be said to be one.
+    assert!(parse(&gpx(&eight, "1.1"), "a.gpx", &wide()).is_ok());
+    let eight: Vec<DVec2> = eight.iter().map(|p| DVec2::new(p.x, 0.1 * p.y)).collect();
     let text = refusal(&gpx(&eight, "1.1"), "a.gpx", &wide());
     assert!(
         text.contains("crosses itself") && text.contains("line "),
@@ -571,6 +574,26 @@ fn a_line_that_crosses_itself_is_refused_where_it_does() {
     );
     let bridged = SurveyOptions { bridges: 1, ..wide() };
     assert!(parse(&gpx(&eight, "1.1"), "a.gpx", &bridged).is_ok());
+}
+
+/// A loop of a survey's own is a knot, and no bridge.
+#[test]
+fn bridges_have_road_between_their_decks() {
+    let crossing = |size: f64| {
+        let loop_of = [
+            [0.0, 0.0],
+            [10.0, 0.0],
+            [11.0, 1.0],
+            [10.0, 2.0],
+            [9.0, 1.0],
+            [9.0, -10.0],
+        ];
+        let points = loop_of.map(|p| size * DVec2::from(p));
+        super::check::check_crossings(&points, false, 0, "a.csv", &crate::error::Place::point)
+    };
+    let refused = crossing(10.0).unwrap_err().to_string();
+    assert!(refused.contains("crosses itself"), "{refused}");
+    assert!(crossing(30.0).is_ok());
 }
 
 #[test]

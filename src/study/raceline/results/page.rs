@@ -39,7 +39,11 @@ pub fn write(folder: &Path, solved: &Solved<'_, Raceline>, summary: &Summary) ->
     let mut page = HtmlReport::new(&summary.head.study, &subject.words());
     // The fastest first: it colours the map, and time is lost on it.
     let mut lines = reported_lines(outcome);
-    lines.sort_by(|a, b| a.lap_time_fine_s().total_cmp(&b.lap_time_fine_s()));
+    lines.sort_by(|a, b| {
+        let off_road = |line: &ReportedLine| !line.clearance.is_on_road();
+        let times = a.lap_time_fine_s().total_cmp(&b.lap_time_fine_s());
+        off_road(a).cmp(&off_road(b)).then(times)
+    });
     head(&mut page, outcome, summary, &lines);
     page.section(
         "Lines",
@@ -59,7 +63,8 @@ pub fn write(folder: &Path, solved: &Solved<'_, Raceline>, summary: &Summary) ->
     page.table(
         "Lines compared",
         "Values at the cross-sections are what the solvers see. Fine values are on a spline at 1 m through them, and are the \
-         ones to believe. Clearance is the least distance from the sides of the car to the edges.",
+         ones to believe. Clearance is the least distance from the car, its corners in bends \
+         included, to the edges.",
         &lines_table(summary),
     )?;
     front(&mut page, folder, outcome)?;
