@@ -2,8 +2,8 @@
 
 use std::f64::consts::{PI, TAU};
 
-/// Standard gravity, m/s^2: what loggers mean by one G.
-pub(super) const G: f64 = 9.80665;
+/// What loggers mean by one G, m/s^2.
+pub(super) use crate::vehicle::powertrain::GRAVITY_MPS2 as G;
 
 /// What a unit measures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -138,7 +138,7 @@ impl EnergyTable<f64> {
             force_per_harvested: 1.0 / (mass * harvest_gain),
             harvest_most: hybrid.rules.harvested_k_j.unwrap_or(1e12),
             store_room: hybrid.store.room_j(),
-            exhaust_gain: h.map_or(0.0, |h| -h.power_w(0.0, 1.0) / greatest_flow),
+            exhaust_gain: h.map_or(0.0, |h| h.generated_w(1.0) / greatest_flow),
             exhaust_cost: h.map_or(0.0, |h| CONSUMPTION_KGPJ * h.generator_cost_w / h.generator_w),
             exhaust_from: h.map_or(1e9, |h| h.from_speed_mps.powi(2)),
             exhaust_to_ax: h.map_or(0.0, |h| h.to_ax_mps2),

@@ -56,14 +56,10 @@ impl MguK {
     }
 }
 
-/// The motor-generator on the turbocharger.
+/// The motor-generator on the turbocharger, as a generator.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MguH {
-    /// Greatest power in as a motor (W).
-    pub motor_w: f64,
-    /// Gain of power at the crank from that (W).
-    pub motor_gain_w: f64,
-    /// Greatest power out as a generator (W).
+    /// Greatest power out (W).
     pub generator_w: f64,
     /// Loss of power at the crank from that (W).
     pub generator_cost_w: f64,
@@ -74,19 +70,10 @@ pub struct MguH {
 }
 
 impl MguH {
-    /// Its power (W), positive as a motor: `((Pmax - Pmin) Wg + Pmin) F` with the waste-gate `Wg` from 0 (the turbine
-    /// drives the generator) to 1 (the motor drives the compressor) and the fuel flow `F` as a share of its greatest; the
-    /// thesis's (4.9).
-    pub fn power_w(&self, waste_gate: f64, flow_share: f64) -> f64 {
-        ((self.motor_w + self.generator_w) * waste_gate - self.generator_w) * flow_share
-    }
-
-    /// Power at the crank (W) with the MGU-H at `power_w`, of an engine that gives `ice_w` at full generation: `P_add (P_H -
-    /// Pmin) / (Pmax - Pmin) + P_ice`, the thesis's (4.8), where `P_add` is the difference between full generation and full
-    /// boost.
-    pub fn boosted_w(&self, ice_w: f64, power_w: f64) -> f64 {
-        let added = self.motor_gain_w + self.generator_cost_w;
-        added * (power_w + self.generator_w) / (self.motor_w + self.generator_w) + ice_w
+    /// Its power out (W) with the turbine's flow all on the generator, by the fuel flow as a share of its greatest: the thesis's
+    /// (4.9) with a closed waste-gate.
+    pub fn generated_w(&self, flow_share: f64) -> f64 {
+        self.generator_w * flow_share
     }
 }
 

@@ -16,19 +16,11 @@ impl Hybrid {
         let mgu_h = match table.table("mgu_h")? {
             Some(h) => {
                 let mgu_h = MguH {
-                    motor_w: 1e3 * h.required_number("motor_kw", 0.0, 1000.0, "kW")?,
-                    motor_gain_w: 1e3 * h.number("motor_gain_kw", 0.0, 1000.0, "kW")?.unwrap_or(0.0),
                     generator_w: 1e3 * h.required_number("generator_kw", 0.1, 1000.0, "kW")?,
                     generator_cost_w: 1e3 * h.number("generator_cost_kw", 0.0, 1000.0, "kW")?.unwrap_or(0.0),
                     from_speed_mps: h.number("from_speed_mps", 0.0, 200.0, "m/s")?.unwrap_or(0.0),
                     to_ax_mps2: h.number("to_ax_mps2", 0.0, 100.0, "m/s^2")?.unwrap_or(100.0),
                 };
-                if mgu_h.motor_gain_w > mgu_h.motor_w {
-                    return Err(h.refuse(
-                        "motor_gain_kw",
-                        "no more than motor_kw: a gain of power from nothing",
-                    ));
-                }
                 h.finish()?;
                 Some(mgu_h)
             }
@@ -75,10 +67,8 @@ impl Hybrid {
         );
         if let Some(h) = &self.mgu_h {
             text += &format!(
-                "\n[hybrid.mgu_h]\nmotor_kw = {:?}\nmotor_gain_kw = {:?}\ngenerator_kw = {:?}\ngenerator_cost_kw = {:?}\n\
+                "\n[hybrid.mgu_h]\ngenerator_kw = {:?}\ngenerator_cost_kw = {:?}\n\
                  from_speed_mps = {:?}\nto_ax_mps2 = {:?}\n",
-                h.motor_w / 1e3,
-                h.motor_gain_w / 1e3,
                 h.generator_w / 1e3,
                 h.generator_cost_w / 1e3,
                 h.from_speed_mps,
