@@ -22,7 +22,7 @@ use lapswarm::evaluate::line::{
 };
 use lapswarm::evaluate::simd::InstructionSet;
 use lapswarm::line::Parametrisation;
-use lapswarm::line::energy::{EnergyCar, EnergyPlan, Gates, Mode, Traction};
+use lapswarm::line::energy::{EnergyCar, EnergyPlan, Gates, Mode};
 use lapswarm::vehicle::Car;
 use lapswarm::vehicle::limits::{SpeedRange, car_envelope};
 use std::time::Duration;
@@ -186,12 +186,8 @@ fn energy(criterion: &mut Criterion) {
 fn hybrid_car() -> EnergyCar {
     let car = Car::load("gt_hybrid").expect("bundled");
     let limits = car_envelope(&car, &SpeedRange::USUAL).expect("limits");
-    let rows = limits
-        .speeds
-        .iter()
-        .map(|s| (s.row.v_mps, s.traction_mps2))
-        .collect();
-    EnergyCar::new(car, limits.envelope, Traction { rows }, 2.0).expect("a hybrid")
+    let traction = limits.traction();
+    EnergyCar::new(car, limits.envelope, traction, 2.0).expect("a hybrid")
 }
 
 fn main() {

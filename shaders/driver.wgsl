@@ -19,6 +19,8 @@ struct Driver {
     steer_lag: f32,
     pedal_lag: f32,
     reach: f32,
+    rolling: f32,
+    rotating: f32,
 }
 
 @group(0) @binding(7) var<uniform> driver: Driver;
@@ -87,13 +89,14 @@ fn act(course: Course, pace: Pace, c: Chassis, state: CarState, view: View, cont
     let after = planned_speed(course, pace, view, ahead + driver.reach);
     let planned = (after * after - before * before) / 8.0;
     let wanted = planned + driver.speed_gain * behind;
-    let drag = 0.5 * c.air_density * c.drag_area * v * v;
-    let force = c.mass * wanted + drag;
-    let weight = c.mass * c.gravity + 0.5 * c.air_density * c.lift_area * v * v;
+    let aero = aero_forces(c, v);
+    let force = c.mass * wanted + aero.drag;
+    let weight = c.mass * c.gravity + (aero.downforce_front + aero.downforce_rear);
     let used = min(driver.knows * abs(body.yaw_rate * v / (driver.friction * weight / c.mass)), 1.0);
     let left = sqrt(max(1.0 - used * used, 0.01));
     let limit = driver.slip_limit * left;
-    let most = torque_at(v / c.radius_rear) / c.radius_rear;
+    let pull = torque_at(v / c.radius_rear) / c.radius_rear;
+    let most = (pull - c.mass * driver.rolling + (driver.rotating - 1.0) * aero.drag) / driver.rotating;
     let driven = min(min(force, most) / (driver.driven_share * weight * driver.slip_stiffness), limit);
     let braked = max(force / (weight * driver.slip_stiffness), -limit);
     let brakes = force < 0.0;

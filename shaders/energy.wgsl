@@ -9,11 +9,13 @@
 // Twin of `EnergyAccount` in `src/evaluate/energy/gpu.rs`.
 struct EnergyAccount {
     mass: f32,
+    rotating: f32,
     deploy_cost: f32,
     harvest_gain: f32,
     force_per_deployed: f32,
     force_per_harvested: f32,
     harvest_most: f32,
+    store_room: f32,
     exhaust_gain: f32,
     exhaust_cost: f32,
     exhaust_from: f32,
@@ -93,7 +95,7 @@ fn additional(section: u32, start: f32, length: f32, here: f32, there: f32, most
     let may = gates_open(here, start) && gates.ax < engine - first.z;
     let wanted = select(0.0, greatest * zone_share(section, candidate), may);
     let inverse = 1.0 / length;
-    let boost = min(wanted, left * account.force_per_deployed * inverse);
+    let boost = min(wanted, left * account.force_per_deployed * inverse / account.rotating);
 
     let both = min(first.x, first.y + boost);
     let middle = max(start + length * (both - first.z), 0.0);
@@ -129,7 +131,7 @@ fn provisional(
     let start = (*state).speed_squared;
     let step = additional(section, start, length, here, there, most, store_left(*state), candidate);
     let joules = account.mass * length;
-    let deployed = joules * step.motor * account.deploy_cost;
+    let deployed = joules * (account.rotating * step.motor) * account.deploy_cost;
     (*state).speed_squared = step.end;
     (*state).deployed = (*state).deployed + deployed;
     if COUNTS_CHARGE {
@@ -138,8 +140,8 @@ fn provisional(
         let row = min(u32(held), ENVELOPE_ROWS - 1u);
         let forces = energy[2u * row] + (held - f32(row)) * energy[2u * row + 1u];
         let inverse = 1.0 / length;
-        let force = 0.5 * (step.end - start) * inverse + forces.w;
-        let unharvested = account.harvest_most - (*state).harvested_k;
+        let force = account.rotating * (0.5 * (step.end - start) * inverse) + forces.w;
+        let unharvested = min(account.harvest_most - (*state).harvested_k, account.store_room - (*state).change);
         let room = max(unharvested * account.force_per_harvested * inverse, 0.0);
         let generator = min(min(max(-force, 0.0), forces.z * gates.motor), room);
         let harvested_k = joules * generator * account.harvest_gain;
@@ -173,14 +175,14 @@ fn segment_energy(
     let forces = energy[2u * row] + beyond * energy[2u * row + 1u];
     let inverse = 1.0 / length;
     let ax = 0.5 * (end - start) * inverse;
-    // The force of the tyres, driving or braking.
-    let force = ax + forces.w;
+    // The force at the wheels, driving or braking.
+    let force = account.rotating * ax + forces.w;
     let demand = max(force, 0.0);
     let shed = max(-force, 0.0);
     let joules = account.mass * length;
     var motor: f32;
     if ADDITIONAL {
-        motor = min(step.motor, demand);
+        motor = min(account.rotating * step.motor, demand);
     } else {
         let may = gates_open(here, start) && gates.ax < ax;
         let share = zone_share(section, candidate);
@@ -188,7 +190,8 @@ fn segment_energy(
         motor = min(min(select(0.0, forces.y * gates.motor * share, may), demand), reach);
     }
     let engine = demand - motor;
-    let unharvested = account.harvest_most - (*state).harvested_k;
+    let space = account.store_room - (*state).change;
+    let unharvested = min(account.harvest_most - (*state).harvested_k, space);
     let room = unharvested * account.force_per_harvested * inverse;
     let generator = min(min(shed, forces.z * gates.motor), max(room, 0.0));
     let deployed = joules * motor * account.deploy_cost;
@@ -204,7 +207,8 @@ fn segment_energy(
     let time = 2.0 * length / (sqrt(start) + sqrt(end));
     let burnt = flow * time;
     let spins = !(mean < account.exhaust_from) && 0.0 < ax && !(account.exhaust_to_ax < ax);
-    let harvested_h = select(0.0, account.exhaust_gain * burnt, spins);
+    let space_left = max(space + (deployed - harvested_k), 0.0);
+    let harvested_h = select(0.0, min(account.exhaust_gain * burnt, space_left), spins);
 
     (*state).speed_squared = end;
     (*state).change = (*state).change + ((harvested_k + harvested_h) - deployed);

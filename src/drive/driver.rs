@@ -5,6 +5,7 @@ use super::road::{Course, FRONT_CELLS, PLAN_AHEAD_S, PLAN_REACH_M, Road};
 use super::settings::DriverSettings;
 use crate::error::{Error, Result};
 use crate::scalar::{Lookup, Real};
+use crate::vehicle::aero::aero_forces;
 use crate::vehicle::model::wheel_speeds;
 use crate::vehicle::powertrain::Powertrain;
 use crate::vehicle::{Car, CarInput, CarState, Chassis};
@@ -84,6 +85,10 @@ driver_table! {
     pedal_lag,
     /// Half of the length over which the plan's acceleration is taken, m.
     reach,
+    /// Deceleration by rolling resistance, m/s^2.
+    rolling,
+    /// Mass that the engine accelerates over that of the car.
+    rotating,
 }
 
 impl DriverTable<f64> {
@@ -107,6 +112,8 @@ impl DriverTable<f64> {
             steer_lag: STEER_LAG,
             pedal_lag: PEDAL_LAG,
             reach: PLAN_REACH_M,
+            rolling: car.rolling_mps2(),
+            rotating: car.powertrain.as_ref().map_or(1.0, |p| p.rotating_mass_factor),
         }
     }
 }
@@ -304,7 +311,6 @@ pub fn act<R: Lookup>(
 ) -> Controls<R> {
     let zero = R::lit(0.0);
     let one = R::lit(1.0);
-    let half = R::lit(0.5);
     let step = R::load(driver.step);
     let knows = R::load(driver.knows);
     let body = &state.body;
@@ -336,16 +342,19 @@ pub fn act<R: Lookup>(
     let after = planned_speed(road, course, pace, view, look + reach);
     let planned = (after * after - before * before) / R::lit(4.0 * PLAN_REACH_M);
     let wanted = planned + R::load(driver.speed_gain) * behind;
-    let drag = half * c.air_density * c.drag_area * v * v;
-    let force = c.mass * wanted + drag;
-    let weight = c.mass * c.gravity + half * c.air_density * c.lift_area * v * v;
+    let aero = aero_forces(c, v);
+    let force = c.mass * wanted + aero.drag;
+    let weight = c.mass * c.gravity + (aero.downforce_front + aero.downforce_rear);
     // What a bend leaves of the tyres, by the friction circle.
     let used = knows * (body.yaw_rate * v / (R::load(driver.friction) * weight / c.mass)).abs();
     let used = used.min(one);
     let left = (one - used * used).max(R::lit(0.01)).sqrt();
     let limit = R::load(driver.slip_limit) * left;
     let stiffness = R::load(driver.slip_stiffness);
-    let most = torque_at(torque, v / c.radius_rear) / c.radius_rear;
+    let pull = torque_at(torque, v / c.radius_rear) / c.radius_rear;
+    // What the wheels take to roll and to be turned faster does not reach the road.
+    let rotating = R::load(driver.rotating);
+    let most = (pull - c.mass * R::load(driver.rolling) + (rotating - one) * aero.drag) / rotating;
     let driven = (force.min(most) / (R::load(driver.driven_share) * weight * stiffness)).min(limit);
     let braked = (force / (weight * stiffness)).max(-limit);
     let brakes = force.less_than(zero);

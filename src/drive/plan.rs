@@ -2,7 +2,8 @@
 //! section 5, in first-order form; a driver needs no better).
 
 use crate::track::Circuit;
-use crate::vehicle::{Car, Tyres};
+use crate::vehicle::aero::aero_forces;
+use crate::vehicle::{Car, Chassis, Tyres};
 
 /// Speeds to aim for along the centreline, at even steps from the start line, linear between them and periodic.
 #[derive(Clone, Debug)]
@@ -18,6 +19,12 @@ const LINEAR_TYRE_FRICTION: f64 = 1.0;
 /// Grid spacing along the centreline, m.
 const SPACING: f64 = 2.0;
 
+/// What the tyres carry at a speed (m/s), over the car's mass (m/s^2).
+pub(super) fn load_mps2(c: &Chassis<f64>, speed: f64) -> f64 {
+    let aero = aero_forces(c, speed);
+    c.gravity + (aero.downforce_front + aero.downforce_rear) / c.mass
+}
+
 /// Estimates of what the car can do at a speed: lateral and longitudinal grip, drive and drag, all in m/s^2.
 struct TyreEnvelope<'a> {
     car: &'a Car,
@@ -27,12 +34,12 @@ struct TyreEnvelope<'a> {
 impl TyreEnvelope<'_> {
     fn grip(&self, speed: f64) -> f64 {
         let c = &self.car.chassis;
-        self.friction * (c.gravity + 0.5 * c.air_density * c.lift_area * speed * speed / c.mass)
+        self.friction * load_mps2(c, speed)
     }
 
     fn drag(&self, speed: f64) -> f64 {
         let c = &self.car.chassis;
-        0.5 * c.air_density * c.drag_area * speed * speed / c.mass
+        aero_forces(c, speed).drag / c.mass
     }
 
     fn drive(&self, speed: f64) -> f64 {

@@ -1,5 +1,6 @@
 //! How the driver drives, and what the driver knows of the car.
 
+use super::plan::load_mps2;
 use crate::error::{Error, Result};
 use crate::vehicle::{Car, Turn, steady_car};
 
@@ -50,7 +51,7 @@ impl CarKnowledge {
             if most == 0.0 {
                 continue;
             }
-            let load = c.gravity + 0.5 * c.air_density * c.lift_area * speed * speed / c.mass;
+            let load = load_mps2(c, speed);
             frictions.push(most / load);
             let ridge = trims.iter().position(|t| t.ay_mps2 == most).unwrap_or(0);
             slips.extend(

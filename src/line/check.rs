@@ -1,7 +1,6 @@
 //! Whether a car on a line stays on the road, measured against the edges themselves, independently of how the line was made.
 
-use super::fine::{FINE_M, FineLine};
-use crate::error::Result;
+use super::fine::FineLine;
 use crate::track::CrossSections;
 use glam::DVec2;
 use std::ops::RangeInclusive;
@@ -243,61 +242,47 @@ impl<'a> RoadEdges<'a> {
             .min_by(f64::total_cmp)
     }
 
-    /// Draws in the ends of cross-sections until a car of this width (m) along them is within the edges, so that lines may use all
-    /// that is left: cross-sections slant, and edges bend or stand out between two of them. Half the car is taken off them
-    /// already. What no drawing in can mend stays as it is.
-    ///
-    /// # Errors
-    /// [`crate::Error::Input`] if neighbouring ends coincide.
-    pub fn draw_in(&self, cross_sections: &mut CrossSections, car_width_m: f64) -> Result<()> {
-        let n = cross_sections.len();
+    /// Draws in the ends of cross-sections at which a car of this width (m) would be beyond an edge: where they slant, or where
+    /// an edge bends round their ends. Half the car is taken off them already.
+    pub fn draw_in(&self, cross_sections: &mut CrossSections, car_width_m: f64) {
+        let middles = cross_sections.points(&vec![0.5; cross_sections.len()]);
         let reference_m = cross_sections.points(&cross_sections.reference);
-        let car = CarPlan {
-            width_m: car_width_m,
-            length_m: 0.0,
-        };
-        for _ in 0..DRAWN_ROUNDS {
-            let mut short_m = vec![[0.0f64; 2]; n];
-            for side in 0..2 {
-                let along = cross_sections.points(&vec![side as f64; n]);
-                let fine = FineLine::new(&along, cross_sections.closed, FINE_M, None, 0.0)?;
-                let clearances = self.clearances(&fine, &car);
-                for (&(section, share), margins) in fine.section.iter().zip(&clearances) {
-                    if margins[side] < -0.5 * ON_ROAD_M {
-                        // The least moves of both ends that move the place between them far enough.
-                        let ends = [(section, 1.0 - share), ((section + 1) % n, share)];
-                        let square = ends[0].1 * ends[0].1 + ends[1].1 * ends[1].1;
-                        for (end, weight) in ends {
-                            let short = &mut short_m[end % n][side];
-                            *short = short.max(-margins[side] * weight / square);
+        for (i, abreast) in self.abreast(&middles).into_iter().enumerate() {
+            let ends = [cross_sections.right_m[i], cross_sections.left_m[i]];
+            let across = (ends[1] - ends[0]).normalize_or_zero();
+            let drawn = |left: bool| {
+                let (mut end, inwards) = if left {
+                    (ends[1], -across)
+                } else {
+                    (ends[0], across)
+                };
+                let room = |end: DVec2| self.inside(end, abreast, left) - 0.5 * car_width_m;
+                if room(end) < -ON_ROAD_M {
+                    // No step leads past the first place that is far enough from the edge: a distance changes no faster than a
+                    // place.
+                    for _ in 0..DRAWN_STEPS {
+                        let short_m = -room(end);
+                        if short_m <= 1e-4 {
+                            break;
                         }
+                        end += short_m * inwards;
                     }
                 }
-            }
-            let mut moved = false;
-            for (i, [right_m, left_m]) in short_m.into_iter().enumerate() {
-                let (right, left) = (cross_sections.right_m[i], cross_sections.left_m[i]);
-                let width_m = right.distance(left);
-                // Where both ends meet, the line has nowhere else to go.
-                if right_m + left_m > 0.0 && width_m - right_m - left_m > LEAST_ROOM_M {
-                    let across = (left - right) / width_m;
-                    cross_sections.right_m[i] += right_m * across;
-                    cross_sections.left_m[i] -= left_m * across;
-                    let share = (reference_m[i] - cross_sections.right_m[i]).dot(across);
-                    cross_sections.reference[i] = (share / (width_m - right_m - left_m)).clamp(0.0, 1.0);
-                    moved = true;
-                }
-            }
-            if !moved {
-                break;
+                end
+            };
+            let (right, left) = (drawn(false), drawn(true));
+            // Where both ends meet, the line has nowhere else to go.
+            if (left - right).dot(across) > LEAST_ROOM_M {
+                (cross_sections.right_m[i], cross_sections.left_m[i]) = (right, left);
+                let share = (reference_m[i] - right).dot(across) / left.distance(right);
+                cross_sections.reference[i] = share.clamp(0.0, 1.0);
             }
         }
-        Ok(())
     }
 }
 
-/// Rounds of drawing in at most: each leaves what slanting and the bending of the spline take of its moves.
-const DRAWN_ROUNDS: usize = 10;
+/// Steps in which an end is drawn in at most: each leaves at most half of what a slanting one lacks.
+const DRAWN_STEPS: usize = 60;
 /// Room that is left on a cross-section (m).
 const LEAST_ROOM_M: f64 = 0.05;
 
@@ -383,9 +368,7 @@ mod tests {
         let edges = cross_sections.clone();
         cross_sections = cross_sections.narrowed(2.0).unwrap();
         assert!(cross_sections.right_m[30].y < -4.2);
-        RoadEdges::new(&edges.right_m, &edges.left_m, false)
-            .draw_in(&mut cross_sections, 2.0)
-            .unwrap();
+        RoadEdges::new(&edges.right_m, &edges.left_m, false).draw_in(&mut cross_sections, 2.0);
         for i in 10..50 {
             let ends = [cross_sections.right_m[i].y, cross_sections.left_m[i].y];
             assert!(

@@ -34,16 +34,6 @@ pub struct FineLine {
     pub lap: Option<LapProfile>,
 }
 
-/// Share of the time that counts as lost where the lateral acceleration changes by [`UNREST_MPS3`].
-pub const UNREST: f64 = 5e-4;
-/// Rate of the lateral acceleration (m/s^3) that a car follows without hurry.
-pub const UNREST_MPS3: f64 = 50.0;
-
-/// What the square of a change of curvature (1/m) over a distance (m) at a speed (m/s) counts as, in s m^2.
-pub fn unrest_weight(v_mps: f64, distance_m: f64) -> f64 {
-    UNREST * v_mps.powi(5) / (UNREST_MPS3 * UNREST_MPS3 * distance_m)
-}
-
 impl FineLine {
     /// The cubic spline through `points_m`, cut into pieces of at most `spacing_m`, and the lap of `car` on it;
     /// `entry_mps` is the greatest speed at the start of an open line (m/s).
@@ -178,24 +168,6 @@ impl FineLine {
         };
         let (own, others) = (clock(self)?, clock(other)?);
         Some(shares.iter().map(|&share| own(share) - others(share)).collect())
-    }
-
-    /// What the unrest of the lap counts as (s), if a car was given: [`UNREST`] of the time in which the lateral acceleration
-    /// changes by [`UNREST_MPS3`], and by the square of that rate. Where a line costs no time, on straights above all, it may waver
-    /// from side to side for nothing; of two lines as fast the calm one is better.
-    pub fn unrest_s(&self) -> Option<f64> {
-        let v = &self.lap.as_ref()?.v_mps;
-        let n = v.len();
-        let segments = self.segment_m.iter().enumerate();
-        Some(
-            segments
-                .map(|(i, h)| {
-                    let next = (i + 1) % n;
-                    let change = self.curvature_1pm[next] - self.curvature_1pm[i];
-                    unrest_weight(0.5 * (v[i] + v[next]), *h) * change * change
-                })
-                .sum(),
-        )
     }
 
     /// Time of the lap (s), if a car was given.

@@ -22,7 +22,7 @@ mod table;
 mod tests;
 
 pub use check::{CarPlan, Clearance, ON_ROAD_M, RoadEdges, check_line};
-pub use fine::{FINE_M, FineLine, UNREST, UNREST_MPS3, unrest_weight};
+pub use fine::{FINE_M, FineLine};
 pub use geometry::{Geometry, geometry};
 pub use parametrisation::Parametrisation;
 pub use perpendicular::{cross_sections_about, shares_across};

@@ -126,7 +126,9 @@ impl DeploymentSearch<'_> {
         let mut bound_s = None;
         let (mut programs, mut reach) = (0, FIRST_MOVE);
         let mut settled = false;
-        while energy_j > 0.0 {
+        // Without energy there is nothing to share out.
+        let mut judged = energy_j <= 0.0;
+        while !judged {
             settled |= programs == PROGRAMS;
             if settled {
                 // Small steps promise little: the last one judges, over the whole range of the shares.
@@ -157,7 +159,8 @@ impl DeploymentSearch<'_> {
                 } else {
                     Status::Almost(format!("a step that promises {promised_s:.4} s does not keep it"))
                 };
-                break;
+                judged = true;
+                continue;
             }
             let tried = problem.lap(&found);
             let gain = lap.time - tried.0.time;

@@ -53,6 +53,8 @@ const WELL_KEPT: f64 = 0.7;
 const CAUTION: (f64, f64) = (4.0, 0.4);
 /// Penalty at which a small promise means that the first-order conditions are met. A greater one makes any promise small.
 const UNIT_CAUTION: f64 = 1.0;
+/// Parts of a step that are tried where the whole of it loses, besides half of it.
+const PARTS: [f64; 4] = [0.25, 0.0625, 0.015_625, 0.003_906_25];
 /// Penalty beyond which only rounding is left to gain.
 const MOST_CAUTION: f64 = 1e7;
 /// Weight of the squared step of a variable at a penalty of 1, as a share of the cost over the number of variables.
@@ -87,8 +89,8 @@ pub fn descend(
     let mut here = Place::of(problem, weights, bounds.inside(&start.x)?);
     let (mut iterations, mut programs, mut caution) = (0, 0, settings.caution);
     let mut status = Status::Failed(format!("{} programs without an end", settings.programs));
-    // What a step of unit caution promises from here, once a great caution has made promises small.
-    let mut promised_at_unit = None;
+    // Whether the next program says that the first-order conditions are met.
+    let mut judging = false;
     if !here.cost.is_finite() {
         let found = "two points in one place, or a car that stands still";
         return Err(Error::input(
@@ -111,39 +113,41 @@ pub fn descend(
         let failed = matches!(solution.status, Status::Failed(_));
         if failed {
             status = solution.status.clone();
+            if judging {
+                break;
+            }
         } else if promise <= settings.least_gain * here.cost.abs() {
             if caution <= UNIT_CAUTION {
                 status = solution.status;
                 break;
             }
-            if let Some(promised) = promised_at_unit {
-                status = Status::Almost(format!(
-                    "steps that promise {:.1e} of the cost do not keep it",
-                    promised / here.cost.abs()
-                ));
-                break;
-            }
-            caution = UNIT_CAUTION;
-            promised_at_unit = Some(0.0);
+            // A great caution makes any promise small: the step of unit caution judges.
+            (caution, judging) = (UNIT_CAUTION, true);
             continue;
-        }
-        if caution == UNIT_CAUTION && promised_at_unit.is_some() {
-            promised_at_unit = Some(promise);
         }
         let moved = here
             .x
             .iter()
             .zip(&solution.x)
             .zip(bounds.lower.iter().zip(&bounds.upper));
-        let trial = moved.map(|((x, d), (l, u))| (x + d).clamp(*l, *u)).collect();
+        let trial: Vec<f64> = moved.map(|((x, d), (l, u))| (x + d).clamp(*l, *u)).collect();
         let there = Place::of(problem, weights, trial);
         let gain = here.cost - there.cost;
         if !failed && gain >= LEAST_KEPT * promise {
             here = there;
-            promised_at_unit = None;
+            judging = false;
             if gain >= WELL_KEPT * promise {
                 caution *= CAUTION.1;
             }
+        } else if judging {
+            // Where all of the step loses, its parts say whether the line can be bettered that way.
+            let part = here.part_of(problem, weights, &there.x);
+            if here.cost - part.cost <= settings.least_gain * here.cost.abs() {
+                status = solution.status;
+                break;
+            }
+            here = part;
+            judging = false;
         } else {
             caution *= CAUTION.0;
         }
@@ -284,6 +288,19 @@ impl Place {
         }
     }
 
+    /// The best of the lines on the way to another.
+    fn part_of(&self, problem: &ReferenceProblem, weights: &Weights, there: &[f64]) -> Self {
+        let part = |share: &f64| {
+            let ends = self.x.iter().zip(there);
+            Self::of(problem, weights, ends.map(|(x, t)| x + share * (t - x)).collect())
+        };
+        let parts = PARTS.iter().map(part);
+        parts.fold(
+            part(&0.5),
+            |best, next| if next.cost < best.cost { next } else { best },
+        )
+    }
+
     /// The program of the best step from here. Its variables are changes of the line's and, where time counts, relative
     /// changes of the squared speeds at its points.
     fn program(
@@ -355,14 +372,6 @@ impl Place {
                     square(terms);
                 }
             }
-        }
-        for (s, weight, change) in problem.changes(shape) {
-            let root = (weights.time * weight).sqrt();
-            let mut terms = Vec::new();
-            shape.add_curvature(map, (s + 1) % map.points(), root, &mut terms);
-            shape.add_curvature(map, s, -root, &mut terms);
-            let constant = root * change;
-            program.add_square(Affine { constant, terms }.merged());
         }
         if let (Some(lap), Some(envelope)) = (&self.lap, problem.envelope) {
             add_time(&mut program, map, envelope, shape, lap, weights.time, caution);

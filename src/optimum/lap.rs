@@ -39,6 +39,11 @@ pub trait GripEnvelope: Sync {
     fn at(&self, speed_mps: f64) -> Grip;
     /// The top speed (m/s).
     fn top_speed_mps(&self) -> f64;
+    /// The curvature (1/m) that the car reaches on its steering lock. Beyond it the corner speed squared falls as that of a
+    /// [`PointMass`](crate::line::PointMass) does.
+    fn lock_1pm(&self) -> f64 {
+        f64::INFINITY
+    }
 }
 
 /// The direction of a pass: driving out of a corner, or backwards into one for braking.
@@ -216,7 +221,18 @@ impl Lap {
 }
 
 /// The greatest `e` that a curvature (1/m) allows, and its derivative by curvature.
-fn corner_square(envelope: &dyn GripEnvelope, curvature_1pm: f64) -> (f64, f64) {
+pub(super) fn corner_square(envelope: &dyn GripEnvelope, curvature_1pm: f64) -> (f64, f64) {
+    let (square, slope) = grip_square(envelope, curvature_1pm);
+    let share = envelope.lock_1pm() / curvature_1pm.abs();
+    if share >= 1.0 {
+        return (square, slope);
+    }
+    let left = share.powi(4);
+    (left * square, left * (slope - 4.0 * square / curvature_1pm))
+}
+
+/// The greatest `e` at which the tyres hold a curvature (1/m), and its derivative by curvature.
+fn grip_square(envelope: &dyn GripEnvelope, curvature_1pm: f64) -> (f64, f64) {
     let k = curvature_1pm.abs();
     let top = envelope.top_speed_mps();
     let mut high = top * top;

@@ -12,10 +12,10 @@ const ROUNDS: usize = 12;
 /// Clearance up to which an edge is kept in sight (m).
 const NEAR_M: f64 = 1.0;
 /// Distance over which a move dies away (m), and how many cross-sections it takes in at least.
-const REACH_M: f64 = 12.0;
+const REACH_M: f64 = 30.0;
 const REACH_CROSS_SECTIONS: f64 = 2.0;
 /// Moves are looked for as far from the places that need them as so many of these distances.
-const ZONE: f64 = 6.0;
+const ZONE: f64 = 4.0;
 
 /// `alpha` of a line near the given one on which no clearance is negative; nothing where none is found. `measure` gives a line's
 /// fine spline, and the clearances on the right and on the left (m) at each of its points.

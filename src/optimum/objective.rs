@@ -34,14 +34,12 @@ pub struct Measures {
     pub gamma_1pm: f64,
     /// Integral of squared curvature (1/m): turned angle over true spacing, squared, times spacing.
     pub curvature_1pm: f64,
-    /// What changes of curvature count as beside the lap time (s); zero without [`ReferenceProblem::calm`].
-    pub unrest_s: f64,
 }
 
 impl Weights {
     /// The weighted sum of `measures`.
     pub fn sum(&self, measures: &Measures) -> f64 {
-        self.time * (measures.time_s + measures.unrest_s)
+        self.time * measures.time_s
             + self.length * measures.length_m
             + self.squared_length * measures.squared_length_m2
             + self.gamma * measures.gamma_1pm
@@ -63,9 +61,6 @@ pub struct ReferenceProblem<'a> {
     pub spacing_m: Option<&'a [f64]>,
     /// The curvature that a lap takes for each segment.
     pub bend: SegmentBend,
-    /// What the square of the change of curvature over each segment counts as beside the lap time (s m^2); nothing to leave it
-    /// out.
-    pub calm: Option<&'a [f64]>,
     /// A flag that, once raised, ends a sequence of programs after the present one.
     pub stop: Option<&'a AtomicBool>,
 }
@@ -79,7 +74,6 @@ impl<'a> ReferenceProblem<'a> {
             start_mps: 0.0,
             spacing_m: None,
             bend: SegmentBend::default(),
-            calm: None,
             stop: None,
         }
     }
@@ -103,7 +97,6 @@ impl<'a> ReferenceProblem<'a> {
                 squared_length_m2: far,
                 gamma_1pm: far,
                 curvature_1pm: far,
-                unrest_s: far,
             };
             return (shape, None, measures);
         }
@@ -145,18 +138,7 @@ impl<'a> ReferenceProblem<'a> {
                 .zip(&shape.curvature_1pm)
                 .map(|(turn, k)| turn * k)
                 .sum(),
-            unrest_s: self
-                .changes(shape)
-                .map(|(_, weight, change)| weight * change * change)
-                .sum(),
         }
-    }
-
-    /// Segments with what counts for the change of curvature over each, and the change (1/m); none where calm does not count.
-    pub(super) fn changes(&self, shape: &Shape) -> impl Iterator<Item = (usize, f64, f64)> {
-        let weights = self.calm.unwrap_or_default().iter().enumerate();
-        let curvature = &shape.curvature_1pm;
-        weights.map(move |(s, weight)| (s, *weight, curvature[(s + 1) % curvature.len()] - curvature[s]))
     }
 
     /// The weighted cost of line `x` and its gradient; an infinite cost where a line has two points in one place.
@@ -186,11 +168,6 @@ impl<'a> ReferenceProblem<'a> {
             for (bar, by) in by_length.iter_mut().zip(l).chain(by_curvature.iter_mut().zip(c)) {
                 *bar += weights.time * by;
             }
-        }
-        for (s, weight, change) in self.changes(&shape) {
-            let next = (s + 1) % by_curvature.len();
-            by_curvature[next] += 2.0 * weights.time * weight * change;
-            by_curvature[s] -= 2.0 * weights.time * weight * change;
         }
         let mut by_point = shape.pull_back(&by_length, &by_curvature);
         if weights.gamma != 0.0 && measures.gamma_1pm > 0.0 {

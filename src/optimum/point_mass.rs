@@ -5,12 +5,11 @@ use crate::line::PointMass;
 use crate::vehicle::EnvelopeRow;
 use crate::{Error, Result};
 
-/// The envelope of a point mass, linear in speed between its rows.
-///
-/// The steering lock is left out. It would slow the car in corners that are too tight for it, and no fast line has such corners.
+/// The envelope of a point mass, linear in speed between its rows, and its steering lock.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PointMassEnvelope {
     rows: Vec<EnvelopeRow>,
+    lock_1pm: f64,
 }
 
 impl PointMassEnvelope {
@@ -31,6 +30,9 @@ impl PointMassEnvelope {
         }
         Ok(Self {
             rows: car.envelope.rows().to_vec(),
+            lock_1pm: car
+                .max_steer_rad
+                .map_or(f64::INFINITY, |lock| lock / car.wheelbase_m),
         })
     }
 }
@@ -62,7 +64,52 @@ impl GripEnvelope for PointMassEnvelope {
         }
     }
 
+    fn lock_1pm(&self) -> f64 {
+        self.lock_1pm
+    }
+
     fn top_speed_mps(&self) -> f64 {
         self.rows.last().map_or(0.0, |row| row.v_mps)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::lap::corner_square;
+    use super::*;
+    use crate::line::kernel::corner;
+    use crate::vehicle::Envelope;
+
+    /// A lock of 0.012 rad at a wheelbase of 2.6 m turns a circle of 217 m. In one of 144.4 m, which takes 0.018 rad, the squared
+    /// speed is (0.012 / 0.018)^4 of what the tyres hold.
+    #[test]
+    fn the_solvers_know_the_steering_lock_as_the_kernels_do() {
+        let text = "v_mps,ay_mps2,ax_grip_mps2,ax_drive_mps2,drag_mps2\n10,14,14,9,0.1\n70,18,18,4,4\n";
+        let free = PointMass::new(Envelope::from_csv("own.csv", text).unwrap(), 2.6);
+        let locked = PointMass {
+            max_steer_rad: Some(0.012),
+            ..free.clone()
+        };
+        let table = locked.table().unwrap();
+        let [free, locked] = [free, locked].map(|car| PointMassEnvelope::new(&car).unwrap());
+        let tight = 0.018 / 2.6;
+        let share = corner_square(&locked, tight).0 / corner_square(&free, tight).0;
+        assert!((share - (2.0f64 / 3.0).powi(4)).abs() < 1e-12, "{share}");
+        for curvature in [0.5 / 217.0, 0.99 / 217.0, 1.1 / 217.0, -1.5 / 217.0, 3.0 / 217.0] {
+            let (square, slope) = corner_square(&locked, curvature);
+            // The kernels' table has steps of 0.3 m of radius.
+            let kernel = corner::<f64>(&table, curvature.abs());
+            assert!(
+                (kernel / square - 1.0).abs() < 1e-3,
+                "{curvature}: {kernel} {square}"
+            );
+            let step = 1e-6 * curvature.abs();
+            let ends = [curvature - step, curvature + step].map(|k| corner_square(&locked, k).0);
+            let found = (ends[1] - ends[0]) / (2.0 * step);
+            assert!(
+                (found - slope).abs() < 1e-5 * square / curvature.abs(),
+                "{curvature}: {found} {slope}"
+            );
+        }
     }
 }

@@ -1,13 +1,12 @@
 //! The reference optimum of each objective on one track, and the local search by exact gradients.
 
-use super::geometry::Shape;
 use super::{
     Bounds, DescentSettings, LineMap, Optimum, PointMassEnvelope, ReferenceProblem, Start, Status, Weights,
     fastest, least_gamma, least_squared_length, minimum_curvature_of, polish_lines, shortest,
 };
 use crate::error::Result;
 use crate::evaluate::line::LineObjective;
-use crate::line::{FINE_M, FineLine, PointMass, cross_sections_about, shares_across, unrest_weight};
+use crate::line::{FINE_M, FineLine, PointMass, cross_sections_about, shares_across};
 use crate::track::CrossSections;
 use glam::DVec2;
 use std::sync::Arc;
@@ -20,8 +19,6 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// point.
 pub struct ReferenceSolvers {
     cross_sections: CrossSections,
-    /// The same road at close steps, which lines taken anew about another keep within.
-    close: Option<CrossSections>,
     spacing_m: Vec<f64>,
     every: (LineMap, Bounds),
     smooth: (LineMap, Bounds),
@@ -129,17 +126,8 @@ impl ReferenceSolvers {
             entry_mps,
             spacing_m,
             cross_sections: cross_sections.clone(),
-            close: None,
             stop,
         })
-    }
-
-    /// The same solvers with the road at close steps: what stands out of an edge between two cross-sections is seen there.
-    pub fn keeping_within(self, close: &CrossSections) -> Self {
-        Self {
-            close: Some(close.clone()),
-            ..self
-        }
     }
 
     /// The flag that ends them.
@@ -297,8 +285,7 @@ impl ReferenceSolvers {
         let own = self.cross_sections.points(alpha);
         let count =
             ((self.cross_sections.length_m / how.spacing_m).ceil() as usize).max(self.cross_sections.len());
-        let road = self.close.as_ref().unwrap_or(&self.cross_sections);
-        let Ok(about) = cross_sections_about(road, &own, count) else {
+        let Ok(about) = cross_sections_about(&self.cross_sections, &own, count) else {
             return Ok(None);
         };
         let controls = (about.len() / how.cross_sections_per_control).max(4);
@@ -310,14 +297,6 @@ impl ReferenceSolvers {
             ..ReferenceProblem::of(&map)
         };
         let start = vec![0.0; map.variables()];
-        let shape = Shape::of(&map.line(&start), map.closed);
-        let speeds = problem.speeds_mps(&start);
-        let segments = shape.length_m.iter().zip(&speeds);
-        let calm: Vec<f64> = segments.map(|(h, v)| unrest_weight(*v, *h)).collect();
-        let problem = ReferenceProblem {
-            calm: Some(&calm),
-            ..problem
-        };
         // Where the cross-sections are so far apart that no such spline is on the road, the line stays as it is.
         let settings = DescentSettings {
             least_gain: LEAST_GAIN_ABOUT,
@@ -332,8 +311,7 @@ impl ReferenceSolvers {
         let x = within_road(shares);
         let time = |points: &[DVec2]| -> Result<Option<f64>> {
             let fine = FineLine::new(points, true, FINE_M, Some(&self.car), self.entry_mps)?;
-            let (lap_s, unrest_s) = (fine.lap_time_s(), fine.unrest_s());
-            Ok(lap_s.zip(unrest_s).map(|(lap_s, unrest_s)| lap_s + unrest_s))
+            Ok(fine.lap_time_s())
         };
         let faster = time(&self.cross_sections.points(&x))? < time(&own)?;
         Ok(faster.then_some(Optimum { x, ..solved }))

@@ -2,7 +2,7 @@
 
 use super::conic::{Affine, ConicProgram};
 use super::geometry::{LineMap, Shape};
-use super::lap::{GripEnvelope, Lap};
+use super::lap::{GripEnvelope, Lap, corner_square};
 
 /// Least relative change of a squared speed in a step, so that speeds stay above zero.
 const LEAST_CHANGE: f64 = -0.9;
@@ -73,6 +73,13 @@ pub(super) fn add_time(
             let mut terms = vec![(square(i), -sign * by_square)];
             shape.add_curvature(map, i, -sign * squares[i] / grip.value, &mut terms);
             let constant = (1.0 - sign * used).max(0.0);
+            program.add_nonnegative(Affine { constant, terms }.merged());
+        }
+        if shape.curvature_1pm[i].abs() > envelope.lock_1pm() {
+            let (most, by_curvature) = corner_square(envelope, shape.curvature_1pm[i]);
+            let mut terms = vec![(square(i), -squares[i] / most)];
+            shape.add_curvature(map, i, by_curvature / most, &mut terms);
+            let constant = (1.0 - squares[i] / most).max(0.0);
             program.add_nonnegative(Affine { constant, terms }.merged());
         }
     }

@@ -12,6 +12,7 @@ use crate::evaluate::drive::{
 };
 use crate::scalar::{Counted, Lookup, operations_of};
 use crate::track::Track;
+use crate::vehicle::powertrain::GRAVITY_MPS2;
 use crate::vehicle::{Car, CarModel, MagicFormula};
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -158,7 +159,7 @@ fn scales(problem: &DriveProblem, state: &[f32; STATE]) -> [f64; OF_A_STEP.len()
     let v = at(0);
     let steer = at(6) + d.step / 0.04 * 0.2;
     let foot = at(11) + at(12) + at(13) + v * d.step;
-    let wanted = (2.0 * v * v / 8.0 + d.speed_gain * v) / (9.81 * 0.55 * d.slip_stiffness);
+    let wanted = (2.0 * v * v / 8.0 + d.speed_gain * v) / (GRAVITY_MPS2 * 0.55 * d.slip_stiffness);
     let slip = |k: usize| at(k) + d.step / 0.06 * wanted;
     [
         steer,

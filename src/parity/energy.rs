@@ -5,7 +5,7 @@ use super::{Draws, Layer};
 use crate::error::{Error, Result};
 use crate::evaluate::Failure;
 use crate::evaluate::energy::{Free, HybridLine, HybridObjective, HybridProblem, Strategy};
-use crate::line::energy::{EnergyCar, EnergyLap, EnergyPlan, Gates, Mode, Traction};
+use crate::line::energy::{EnergyCar, EnergyLap, EnergyPlan, Gates, Mode};
 use crate::line::geometry;
 use crate::study::raceline::{RacelineSettings, set_up};
 use crate::vehicle::Car;
@@ -141,9 +141,8 @@ pub fn problems(sections: usize, modes: &[Mode]) -> Result<Vec<HybridProblem>> {
         ..SpeedRange::USUAL
     };
     let limits = car_envelope(&car, &coarse)?;
-    let rows = limits.speeds.iter().map(|s| (s.row.v_mps, s.traction_mps2));
-    let rows = rows.collect();
-    let car = EnergyCar::new(car, limits.envelope, Traction { rows }, 2.0)?;
+    let traction = limits.traction();
+    let car = EnergyCar::new(car, limits.envelope, traction, 2.0)?;
     let zones = [2, 8, 15, 21].map(|part| part * sections / 24);
     let problems = modes.iter().map(|mode| {
         let plan = EnergyPlan::zoned(&length_m, &zones, true, sections / 2, *mode);

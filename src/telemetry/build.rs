@@ -138,10 +138,20 @@ fn factor(source: &str, m: &Mapped<'_>, map: &ChannelMap, radius: Option<[f64; 2
     Ok(factor)
 }
 
+fn both<'s, 'a>(signals: &'s [Signal<'a>], a: Role, b: Role) -> Option<[&'s Signal<'a>; 2]> {
+    let of = |role| signals.iter().find(|s| s.mapped.role == role);
+    Some([of(a)?, of(b)?])
+}
+
 /// Whether two roles' channels were sampled at the same times.
 pub(super) fn one_clock(signals: &[Signal<'_>], a: Role, b: Role) -> bool {
-    let times = |role| signals.iter().find(|s| s.mapped.role == role).map(|s| &s.times);
-    matches!((times(a), times(b)), (Some(a), Some(b)) if Arc::ptr_eq(a, b))
+    both(signals, a, b).is_some_and(|[a, b]| Arc::ptr_eq(&a.times, &b.times))
+}
+
+/// Whether two roles' channels have the same times and the same unit, as those of one sensor.
+pub(super) fn alike(signals: &[Signal<'_>], a: Role, b: Role) -> bool {
+    both(signals, a, b)
+        .is_some_and(|[a, b]| a.times == b.times && a.mapped.channel.unit == b.mapped.channel.unit)
 }
 
 /// Notes what stands in for a channel. A log is assembled anew when delays are found, and says it once.

@@ -371,7 +371,8 @@ fn rolling_radii(log: &mut Log, declared: &Declared) {
         let referred = reference_m.is_some();
         let common_applied = referred && !free && common.value.abs() >= of_axle;
         let sides_applied = referred && 2.0 * half.value.abs() >= of_sides;
-        let mut evidence = "from ground speed where the car is not braked".to_owned();
+        let straight = if driven { ", on straights" } else { "" };
+        let mut evidence = format!("from ground speed where the car is not braked{straight}");
         evidence.push_str(&match (reference_m, common_applied, sides_applied) {
             (None, ..) => "; the car's radius is not known".to_owned(),
             (Some(radius), true, _) => format!("; wheel speeds are referred to the car's {radius} m"),

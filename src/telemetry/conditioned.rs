@@ -205,6 +205,7 @@ fn a_late_channel_is_found_and_no_other_is_moved() {
     for roles in [
         &[Role::Vx][..],
         &[Role::Ax],
+        &[Role::Ax, Role::Ay],
         &[Role::YawRate],
         &[Role::WheelSpeedFl],
         &[Role::WheelSpeedRr],

@@ -2,10 +2,11 @@
 //! wheels with yaw rate, and longitudinal acceleration with the change of ground speed.
 //!
 //! Lateral acceleration and steering coincide with nothing. Lateral acceleration follows speed times yaw rate by the car's sideslip,
-//! and yaw rate follows steering by the car's inertia: a lag between these is the car's, and belongs to the fit.
+//! and yaw rate follows steering by the car's inertia: a lag between these is the car's, and belongs to the fit. But one
+//! accelerometer measures both accelerations: as late as it is along the car, it is across.
 
 use super::calibration::{Calibration, Declared, Finding, FindingKind};
-use super::derived::{acceleration, acceleration_span, moving, unbraked};
+use super::derived::{acceleration, acceleration_span, moving, product, unbraked};
 use super::log::Log;
 use super::role::Role;
 use super::statistics::{Lag, best_lag, smoothed};
@@ -33,6 +34,8 @@ pub(super) struct Evidence<'a> {
     pub undriven: [usize; 2],
     /// Whether two channels are known to have been sampled at the same times.
     pub one_clock: &'a dyn Fn(Role, Role) -> bool,
+    /// Whether one sensor may measure both accelerations: they have the same times and unit.
+    pub one_accelerometer: bool,
 }
 
 impl Evidence<'_> {
@@ -320,13 +323,34 @@ pub(super) fn delays(evidence: &Evidence<'_>, calibration: &mut Calibration) {
         );
         calibration.notes.push(note);
     }
-    let mut note = "ay, steer: no delay is looked for, since their lags are the car's own; delay_s in the channel map sets one".to_owned();
-    if let Some(delay_s) = calibration.applied(Role::Ax, FindingKind::Delay) {
-        note.push_str(&format!(
-            "; ay is {delay_s:.3} s late too if one sensor measures it and ax"
-        ));
+    let of_ax = calibration.finding(Role::Ax, FindingKind::Delay);
+    let of_ax = of_ax.filter(|f| f.applied && f.value > 0.0 && evidence.one_accelerometer);
+    if let Some(ax) = of_ax.filter(|_| !declared.delays.contains(&Role::Ay)) {
+        let turning = product(&log.vx_mps, &log.yaw_rate_radps);
+        let lag = best_lag(&log.ay_mps2, [&turning, &one], &moving, most, 0.0);
+        if let Some(lag) = lag.filter(|lag| lag.follows >= FOLLOWS) {
+            // The car's own lag comes on top of the sensor's.
+            let behind_s = lag.samples * dt + yaw_s.map_or(0.0, |yaw_s| yaw_s - clock_s);
+            let applied = behind_s >= ax.value - 0.5 * evidence.shortest();
+            let mut said = format!(
+                "from ax, which the same sensor measures; ay follows ground speed times yaw rate by {behind_s:.4} s, the car's own lag \
+                 with it"
+            );
+            if !applied {
+                said.push_str("; left alone: that is less than the delay of ax");
+            }
+            let finding = Finding {
+                role: Role::Ay,
+                applied,
+                samples: lag.used,
+                evidence: said,
+                ..ax.clone()
+            };
+            calibration.findings.push(finding);
+        }
     }
-    calibration.notes.push(note);
+    let note = "ay, steer: no delay of their own is looked for, since their lags are the car's; delay_s in the channel map sets one";
+    calibration.notes.push(note.to_owned());
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::audit::{check_gains, frozen_tail_s};
-use super::build::{Build, RATES_HZ, one_clock, signals};
+use super::build::{Build, RATES_HZ, alike, one_clock, signals};
 use super::calibrate;
 use super::calibration::{Calibration, Declared, FindingKind, Switch};
 use super::channel_map::{Axle, ChannelMap, Mapped};
@@ -131,6 +131,7 @@ impl Log {
                 declared: &declared,
                 undriven,
                 one_clock: &one_clock,
+                one_accelerometer: alike(&signals, Role::Ax, Role::Ay),
             };
             delays(&evidence, &mut calibration);
             let mut late = false;

@@ -194,6 +194,12 @@ impl Car {
         Ok(car)
     }
 
+    /// Deceleration by rolling resistance (m/s^2).
+    pub fn rolling_mps2(&self) -> f64 {
+        let coefficient = self.powertrain.as_ref().map_or(0.0, |p| p.rolling_resistance);
+        coefficient * self.chassis.gravity
+    }
+
     /// Writes `<stem>.toml` and the tyre files it names into `folder`.
     ///
     /// # Errors

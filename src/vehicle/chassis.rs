@@ -2,6 +2,7 @@
 //! section 2).
 
 use super::parameters::parameters;
+use super::powertrain::GRAVITY_MPS2;
 use crate::scalar::Real;
 
 parameters! {
@@ -41,7 +42,7 @@ parameters! {
         drs_drag: "drs_drag_percent" ["%"] 0.0..=100.0, Some(0.0), "share of the whole car's drag that an open DRS sheds";
         drs_lift: "drs_downforce_percent" ["%"] 0.0..=100.0, Some(0.0), "share of the whole car's downforce that an open DRS sheds, all from the rear";
         slip_speed_floor: "slip_speed_floor_mps" ["m/s"] 0.5..=5.0, Some(1.0), "speed under which slip is reckoned as at this speed";
-        gravity: "gravity_mps2" ["m/s2"] 1.0..=30.0, Some(9.81), "gravitational acceleration";
+        gravity: "gravity_mps2" ["m/s2"] 1.0..=30.0, Some(GRAVITY_MPS2), "gravitational acceleration";
     }
 }
 

@@ -22,7 +22,7 @@ pub struct EnvelopeRow {
     pub ax_grip_mps2: f64,
     /// Greatest acceleration that the engine can give, before drag (m/s^2).
     pub ax_drive_mps2: f64,
-    /// Deceleration by drag (m/s^2).
+    /// Deceleration by drag and rolling resistance (m/s^2).
     pub drag_mps2: f64,
 }
 
@@ -83,19 +83,6 @@ impl Envelope {
         }
         check_count(&name, rows.len())?;
         Ok(Self { name, rows })
-    }
-
-    /// The envelope with a share of the grip; drive and drag are the car's own.
-    ///
-    /// # Errors
-    /// [`Error::Input`] if no grip is left.
-    pub fn with_grip_share(&self, share: f64) -> Result<Self> {
-        let rows = self.rows.iter().map(|row| EnvelopeRow {
-            ay_mps2: share * row.ay_mps2,
-            ax_grip_mps2: share * row.ax_grip_mps2,
-            ..*row
-        });
-        Self::new(format!("{}, {share:.3} of its grip", self.name), rows.collect())
     }
 
     /// Reads an envelope from a CSV file with the columns [`ENVELOPE_COLUMNS`] in any order; lines that begin with

@@ -7,7 +7,7 @@
 use super::chassis::Chassis;
 use super::limits::STEER_TO_GRIP;
 use super::parameters::ParameterInfo;
-use super::powertrain::{Differential, GRAVITY_MPS2 as G, Powertrain};
+use super::powertrain::{GRAVITY_MPS2 as G, Powertrain};
 use super::steady::{Turn, steady_car};
 use super::{Car, Tyres};
 use crate::config::kinds::{count, number, optional, text};
@@ -228,7 +228,8 @@ impl CarFacts {
             final_drive: top_rpm / wheel_rpm,
             efficiency: EFFICIENCY,
             engine: None,
-            differential: Differential::default(),
+            rolling_resistance: 0.0,
+            rotating_mass_factor: 1.0,
         }
     }
 

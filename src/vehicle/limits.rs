@@ -5,7 +5,7 @@
 //! rows make an [`Envelope`]; the small-angle end of the curves gives the handling figures.
 
 use super::powertrain::GRAVITY_MPS2;
-use super::{Car, Envelope, EnvelopeRow, Trim, Turn, steady_car};
+use super::{Car, Envelope, EnvelopeRow, SteadyCar, Traction, Trim, Turn, steady_car};
 use crate::error::{Error, Result};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -80,13 +80,15 @@ impl SpeedRange {
 pub struct EnvelopeAtSpeed {
     /// The row of the envelope.
     pub row: EnvelopeRow,
-    /// Greatest lateral acceleration to the right (m/s^2). The row has the lesser of both sides.
+    /// Greatest lateral acceleration to the left within the steering lock (m/s^2),
+    pub left_mps2: f64,
+    /// and to the right. The row has the lesser of both sides.
     pub right_mps2: f64,
     /// Steady cornering to the left, in order along the curve of steady states.
     pub cornering: Vec<Trim>,
     /// Greatest acceleration by the driven tyres (m/s^2).
     pub traction_mps2: f64,
-    /// Greatest acceleration by the engine in its best gear (m/s^2).
+    /// Greatest acceleration by the engine in its best gear, before drag (m/s^2).
     pub engine_mps2: f64,
 }
 
@@ -98,6 +100,14 @@ pub struct Handling {
     pub understeer_gradient_deg_per_g: f64,
     /// `K` in `steer = L kappa (1 + K v^2)` (s^2/m^2).
     pub stability_factor_s2_per_m2: f64,
+    /// Yaw moment that turns the car back for every radian of sideslip, running straight (N m/rad): `b C_r - a C_f` of the
+    /// axles' cornering stiffnesses, which some call the stability factor; positive is stable.
+    #[serde(default)]
+    pub yaw_stiffness_nm_per_rad: f64,
+    /// The same over both axles' side force for a radian and the wheelbase: how far the neutral steer point lies behind the
+    /// centre of gravity, as a share of the wheelbase.
+    #[serde(default)]
+    pub static_margin: f64,
     /// Speed at which an understeering car answers most to the steering wheel (m/s).
     pub characteristic_speed_mps: Option<f64>,
     /// Speed at which an oversteering car becomes unstable (m/s).
@@ -117,7 +127,20 @@ pub struct CarEnvelope {
     pub left_out_mps: Vec<f64>,
 }
 
-/// Steering up to which the tyres' own limit is looked for (rad): a car whose lock is reached first still has it.
+impl CarEnvelope {
+    /// What the driven tyres can give.
+    pub fn traction(&self) -> Traction {
+        Traction {
+            rows: self
+                .speeds
+                .iter()
+                .map(|s| (s.row.v_mps, s.traction_mps2))
+                .collect(),
+        }
+    }
+}
+
+/// Steering up to which steady states are looked for (rad): a car whose lock is reached first still has the tyres' own limit.
 pub const STEER_TO_GRIP: f64 = 0.6;
 
 /// Sweeps the car over speed and steering.
@@ -129,27 +152,35 @@ pub fn car_envelope(car: &Car, range: &SpeedRange) -> Result<CarEnvelope> {
     let speeds = range.speeds_of(car)?;
     let force = engine_of(car)?;
     let steady = steady_car(car);
+    let (mass, powertrain) = (car.chassis.mass, car.powertrain.as_ref());
+    let rolling = car.rolling_mps2();
+    let accelerated = |force_n: f64, drag_mps2: f64| {
+        powertrain.map_or(0.0, |p| p.acceleration_mps2(force_n, mass, drag_mps2))
+    };
     // The two sides of a car with even loads are each other's mirror image.
     let even = car.chassis.left_share_front == 0.5 && car.chassis.left_share_rear == 0.5;
     let found: Vec<EnvelopeAtSpeed> = speeds
         .into_par_iter()
         .map(|speed| {
             let cornering = steady.cornering(speed, STEER_TO_GRIP, Turn::Left);
-            let peak = |trims: &[Trim]| trims.iter().map(|t| t.ay_mps2.abs()).fold(0.0, f64::max);
+            let peak = |trims: &[Trim]| greatest_within(car.max_steer_rad, trims);
+            let left_mps2 = peak(&cornering);
             let right_mps2 = match even {
-                true => peak(&cornering),
+                true => left_mps2,
                 false => peak(&steady.cornering(speed, STEER_TO_GRIP, Turn::Right)),
             };
             let traction_mps2 = steady.greatest_traction(speed);
-            let engine_mps2 = force(speed) / car.chassis.mass;
+            let drag_mps2 = steady.drag(speed) + rolling;
+            let engine_mps2 = accelerated(force(speed), drag_mps2) + drag_mps2;
             EnvelopeAtSpeed {
                 row: EnvelopeRow {
                     v_mps: speed,
-                    ay_mps2: peak(&cornering).min(right_mps2),
+                    ay_mps2: left_mps2.min(right_mps2),
                     ax_grip_mps2: steady.greatest_braking(speed),
                     ax_drive_mps2: traction_mps2.min(engine_mps2),
-                    drag_mps2: steady.drag(speed),
+                    drag_mps2,
                 },
+                left_mps2,
                 right_mps2,
                 cornering,
                 traction_mps2,
@@ -172,11 +203,31 @@ pub fn car_envelope(car: &Car, range: &SpeedRange) -> Result<CarEnvelope> {
     let envelope = Envelope::new(&car.name, limits.iter().map(|l| l.row).collect())?;
     let wheelbase = car.chassis.cg_to_front + car.chassis.cg_to_rear;
     Ok(CarEnvelope {
-        handling: handling(&limits[limits.len() / 2], wheelbase),
+        handling: handling(&limits[limits.len() / 2], wheelbase, steady.as_ref()),
         speeds: limits,
         envelope,
         left_out_mps,
     })
+}
+
+/// The greatest lateral acceleration (m/s^2) along a curve of trims, as far as the road wheels turn by no more than `lock` (rad).
+fn greatest_within(lock: f64, curve: &[Trim]) -> f64 {
+    let mut most = 0.0f64;
+    let mut before: Option<&Trim> = None;
+    for trim in curve {
+        let steer = trim.steer_rad.abs();
+        if steer > lock {
+            if let Some(last) = before {
+                let share = (lock - last.steer_rad.abs()) / (steer - last.steer_rad.abs());
+                let at_lock = last.ay_mps2.abs() + share * (trim.ay_mps2.abs() - last.ay_mps2.abs());
+                most = most.max(at_lock);
+            }
+            break;
+        }
+        most = most.max(trim.ay_mps2.abs());
+        before = Some(trim);
+    }
+    most
 }
 
 /// Speeds (m/s) in words.
@@ -200,7 +251,7 @@ fn engine_of(car: &Car) -> Result<impl Fn(f64) -> f64 + Sync> {
 
 /// The slope of steering over lateral acceleration, between the two steady states nearest to 0 and 2 m/s^2: small
 /// against any tyre's limit, large against rounding.
-fn handling(limits: &EnvelopeAtSpeed, wheelbase: f64) -> Handling {
+fn handling(limits: &EnvelopeAtSpeed, wheelbase: f64, steady: &dyn SteadyCar) -> Handling {
     let first = limits.cornering.first();
     let second = limits
         .cornering
@@ -212,11 +263,14 @@ fn handling(limits: &EnvelopeAtSpeed, wheelbase: f64) -> Handling {
         (Some(a), Some(b)) if b.ay_mps2 > a.ay_mps2 => (b.steer_rad - a.steer_rad) / (b.ay_mps2 - a.ay_mps2),
         _ => f64::NAN,
     };
+    let [side_stiffness, yaw_stiffness] = steady.sideslip_stiffness(v);
     let understeer_gradient = slope - wheelbase / v.powi(2);
     let stability_factor = understeer_gradient / wheelbase;
     Handling {
         understeer_gradient_deg_per_g: understeer_gradient.to_degrees() * GRAVITY_MPS2,
         stability_factor_s2_per_m2: stability_factor,
+        yaw_stiffness_nm_per_rad: yaw_stiffness,
+        static_margin: yaw_stiffness / (wheelbase * side_stiffness),
         characteristic_speed_mps: (stability_factor > 0.0).then(|| stability_factor.recip().sqrt()),
         critical_speed_mps: (stability_factor < 0.0).then(|| (-stability_factor).recip().sqrt()),
     }
@@ -247,6 +301,59 @@ mod tests {
                 .all(|s| s.row.ax_drive_mps2 <= s.traction_mps2)
         );
         assert!(limits.handling.stability_factor_s2_per_m2.abs() < 0.01);
+    }
+
+    /// A lock of 0.03 rad is a circle of 87 m: at 18 m/s less than 324 / 87 = 3.7 m/s^2, where the tyres would hold 15.
+    #[test]
+    fn the_steering_lock_ends_the_envelope() {
+        let mut car = Car::bundled().unwrap();
+        let coarse = SpeedRange {
+            step_mps: 20.0,
+            ..SpeedRange::USUAL
+        };
+        let free = car_envelope(&car, &coarse).unwrap();
+        car.max_steer_rad = 0.03;
+        let locked = car_envelope(&car, &coarse).unwrap();
+        let steady = steady_car(&car);
+        for (speed, free) in locked.speeds.iter().zip(&free.speeds) {
+            let v = speed.row.v_mps;
+            let curve = &speed.cornering;
+            let top = curve
+                .iter()
+                .max_by(|a, b| a.ay_mps2.total_cmp(&b.ay_mps2))
+                .unwrap();
+            let wanted = match top.steer_rad > 0.03 {
+                true => steady.trim_at(v, 0.03, curve).unwrap().ay_mps2,
+                false => free.row.ay_mps2,
+            };
+            assert!((speed.row.ay_mps2 / wanted - 1.0).abs() < 5e-3, "{v}: {wanted}");
+        }
+        let slow = locked.speeds[0].row.ay_mps2;
+        assert!((slow / (324.0 * 0.03 / 2.6) - 1.0).abs() < 0.05, "{slow}");
+    }
+
+    /// At 58 m/s the engine is the limit. With a rolling resistance of 0.013 and 1.1 of the mass to accelerate, force F and drag D
+    /// leave (F/m - D/m - 0.013 g) / 1.1.
+    #[test]
+    fn rolling_and_rotating_masses_slow_every_car() {
+        let mut car = Car::bundled().unwrap();
+        let range = SpeedRange {
+            from_mps: 58.0,
+            to_mps: 60.0,
+            step_mps: 2.0,
+        };
+        let plain = car_envelope(&car, &range).unwrap().envelope.rows()[0];
+        let powertrain = car.powertrain.as_mut().unwrap();
+        powertrain.rolling_resistance = 0.013;
+        powertrain.rotating_mass_factor = 1.1;
+        let slowed = car_envelope(&car, &range).unwrap().envelope.rows()[0];
+        let wanted = (plain.ax_drive_mps2 - plain.drag_mps2 - 0.013 * GRAVITY_MPS2) / 1.1;
+        assert!(
+            (slowed.ax_drive_mps2 - slowed.drag_mps2 - wanted).abs() < 1e-12,
+            "{slowed:?}"
+        );
+        assert!((slowed.drag_mps2 - plain.drag_mps2 - 0.013 * GRAVITY_MPS2).abs() < 1e-12);
+        assert_eq!(slowed.ay_mps2, plain.ay_mps2);
     }
 
     #[test]

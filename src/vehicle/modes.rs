@@ -123,7 +123,7 @@ mod tests {
         // An overdamped roll creeps back at the rate of spring over damper, to within what tyres and inertia add.
         let damped = |car: &mut Car| car.chassis.roll_damping *= 20.0;
         let chassis = Car::load("gt").unwrap().chassis;
-        let weight = chassis.mass * 9.81 * chassis.cg_height;
+        let weight = chassis.mass * chassis.gravity * chassis.cg_height;
         let creeping = (chassis.roll_stiffness - weight) / (20.0 * chassis.roll_damping);
         assert!((decay(&damped, 20.0) / creeping - 1.0).abs() < 0.1);
         // The tyres damp yaw and sideslip the less, the faster the car goes.

@@ -96,6 +96,10 @@ pub trait SteadyCar: Send + Sync {
     /// give.
     fn greatest_traction(&self, speed: f64) -> f64;
 
+    /// Side force of the tyres against a radian of sideslip (N/rad), running straight at `speed` (m/s), and the yaw moment that
+    /// turns the car back into its direction (N m/rad).
+    fn sideslip_stiffness(&self, speed: f64) -> [f64; 2];
+
     /// Deceleration by drag (m/s^2) at `speed` (m/s).
     fn drag(&self, speed: f64) -> f64;
 }
@@ -371,6 +375,14 @@ impl<T: Tyre<f64>, D: Tyre<Exact>> SteadyCar for Ready<T, D> {
         self.push(speed, [0.0, slip])
     }
 
+    fn sideslip_stiffness(&self, speed: f64) -> [f64; 2] {
+        let c = &self.plain.chassis;
+        let straight = self.residual(speed, &Point::zeros());
+        let [side, yaw, roll, _] = straight.map(|rate| rate.gradient[0]);
+        // The body rolls about an axis in the ground, so that its roll takes part in the sideways acceleration.
+        [-c.mass * (side - c.cg_height * roll), c.inertia_yaw * yaw]
+    }
+
     fn drag(&self, speed: f64) -> f64 {
         aero_forces(&self.plain.chassis, speed).drag / self.plain.chassis.mass
     }
@@ -411,6 +423,9 @@ mod tests {
         let rear = stiffness(55_000.0, a / (a + b));
         let gradient = c.mass / (a + b) * (b / front - a / rear);
         let trims = steady_car(&car).cornering(speed, 0.17, Turn::Left);
+        let [side, yaw] = steady_car(&car).sideslip_stiffness(speed);
+        assert!((side / (front + rear) - 1.0).abs() < 1e-9, "{side}");
+        assert!((yaw / (b * rear - a * front) - 1.0).abs() < 1e-9, "{yaw}");
         let small = trims.iter().find(|t| t.ay_mps2 > 0.01).unwrap();
         let bicycle = (a + b) * small.ay_mps2 / speed.powi(2) + gradient * small.ay_mps2;
         // The first point lies at a few hundredths of a m/s^2: angles of 1e-3 rad, whose squares are a millionth,

@@ -21,7 +21,7 @@ use lapswarm::evaluate::steady::{
 use lapswarm::evaluate::{
     BackendChoice, Evaluation, Evaluator, FAILED_COST, Failure, FallbackEvaluator, Problem,
 };
-use lapswarm::line::energy::{EnergyCar, EnergyPlan, Gates, Mode, Traction};
+use lapswarm::line::energy::{EnergyCar, EnergyPlan, Gates, Mode};
 use lapswarm::line::{Parametrisation, geometry};
 use lapswarm::parity::synthetic_lap::Lap;
 use lapswarm::parity::{Draws, drive, energy, laps, line_tolerances, steady};
@@ -80,9 +80,8 @@ fn hybrid() -> HybridProblem {
         ..SpeedRange::USUAL
     };
     let limits = car_envelope(&car, &coarse).expect("limits");
-    let rows = limits.speeds.iter().map(|s| (s.row.v_mps, s.traction_mps2));
-    let rows = rows.collect();
-    let car = EnergyCar::new(car, limits.envelope, Traction { rows }, 2.0).expect("a hybrid");
+    let traction = limits.traction();
+    let car = EnergyCar::new(car, limits.envelope, traction, 2.0).expect("a hybrid");
     let cross_sections = ring(90.0, 104.0, 60);
     let length = geometry(&cross_sections.points(&[0.5; 60]), true).segment_m;
     let plan = EnergyPlan::zoned(&length, &[5, 25, 45], true, 30, Mode::Additional);

@@ -10,7 +10,7 @@ use lapswarm::evaluate::energy::{
 };
 use lapswarm::evaluate::simd::InstructionSet;
 use lapswarm::evaluate::{Evaluator, Failure};
-use lapswarm::line::energy::{EnergyCar, EnergyLap, EnergyPlan, Gates, Mode, Traction};
+use lapswarm::line::energy::{EnergyCar, EnergyLap, EnergyPlan, Gates, Mode};
 use lapswarm::line::{Parametrisation, geometry};
 use lapswarm::parity::energy::{Allowed, allowed};
 use lapswarm::vehicle::Car;
@@ -22,18 +22,17 @@ tests! {
 }
 
 fn hybrid_car(exponent: f64) -> EnergyCar {
-    let car = Car::load("gt_hybrid").expect("bundled");
+    let mut car = Car::load("gt_hybrid").expect("bundled");
+    if let Some(powertrain) = &mut car.powertrain {
+        powertrain.rotating_mass_factor = 1.06;
+    }
     let coarse = SpeedRange {
         step_mps: 8.0,
         ..SpeedRange::USUAL
     };
     let limits = car_envelope(&car, &coarse).expect("limits");
-    let rows = limits
-        .speeds
-        .iter()
-        .map(|s| (s.row.v_mps, s.traction_mps2))
-        .collect();
-    EnergyCar::new(car, limits.envelope, Traction { rows }, exponent).expect("a hybrid")
+    let traction = limits.traction();
+    EnergyCar::new(car, limits.envelope, traction, exponent).expect("a hybrid")
 }
 
 const GATES: [Free; 6] = [

@@ -99,7 +99,7 @@ fn free_body() -> (Chassis<f64>, BodyState<f64>) {
 
 const STEP: f64 = 1e-3;
 const STEPS: usize = 10_000;
-/// The free body rolls at omega = sqrt((1e5 - 1245 * 9.81 * 0.45)/300) = 17.7 1/s. RK4 loses (omega h)^6/144 of an
+/// The free body rolls at omega = sqrt((1e5 - 1245 * 9.80665 * 0.45)/300) = 17.7 1/s. RK4 loses (omega h)^6/144 of an
 /// oscillation's amplitude a step: 2.1e-13, or 4e-9 of its energy in the 10,000 steps. The roll holds 374 J of 250 kJ,
 /// so the method itself loses 6e-12 of the whole; the rest of the room is for ten thousand roundings of 1e-16 each
 /// in sums that cancel to a hundredth.

@@ -3,7 +3,7 @@
 use crate::common::{Random, bundled_car};
 use glam::DVec2;
 use lapswarm::drive::driver::{WheelTorque, torque_at};
-use lapswarm::drive::{Course, DriverSettings, Line, Pose, Road, SpeedPlan, look};
+use lapswarm::drive::{Course, DriverSettings, Line, Pose, Road, SpeedPlan, drive, look};
 use lapswarm::evaluate::drive::{DriveObjective, DriveProblem, DriveSettings};
 use lapswarm::track::{Circuit, Track};
 use lapswarm::vehicle::Car;
@@ -132,4 +132,38 @@ fn problems_that_cannot_be_are_refused() {
     }
     let none = DriveProblem::new(car, Vec::new(), &[], &[0.5], &settings, &time);
     assert_eq!(none.expect_err("no line").exit_code(), 2);
+}
+
+/// A headwind of 14 m/s at 35 m/s is 1.4 of the speed in still air: 1.96 of its forces. An open DRS sheds a quarter of the drag.
+/// Cars with 1.96 and 0.75 of the areas are driven likewise, if the driver knows what the air does. At other speeds the
+/// wind's forces differ a little. A driver who forgets the wind holds 0.3 m/s less.
+#[test]
+fn the_driver_knows_wind_and_drs() {
+    let round = circuit("stadium:200:70:14");
+    let settings = DriverSettings {
+        top_speed_mps: 35.0,
+        pace: 0.9,
+        ..DriverSettings::default()
+    };
+    let mut shedding = bundled_car();
+    shedding.chassis.drag_area = 4.0;
+    let mut small = shedding.clone();
+    shedding.chassis.drs_drag = 25.0;
+    small.chassis.drag_area = 3.0;
+    let [one, other] = [shedding, small].map(|car| drive(&car, &round, &settings, 0.05).expect("a lap"));
+    assert_eq!(one.states.len(), other.states.len());
+    for (one, other) in one.states.iter().zip(&other.states) {
+        assert!((one[0] - other[0]).abs() < 1e-6, "{one:?} {other:?}");
+    }
+
+    let mut windy = bundled_car();
+    windy.chassis.lift_area = 0.0;
+    let mut still = windy.clone();
+    windy.chassis.headwind = 14.0;
+    still.chassis.drag_area *= 1.96;
+    let [one, other] = [windy, still].map(|car| {
+        let lap = drive(&car, &round, &settings, 0.05).expect("a lap");
+        lap.states.iter().map(|state| state[0]).fold(0.0, f64::max)
+    });
+    assert!((one - other).abs() < 0.03, "{one} {other}");
 }

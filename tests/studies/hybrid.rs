@@ -29,6 +29,29 @@ fn bundled() -> &'static HybridSetup {
     SETUP.get_or_init(|| set_up(&settings()).unwrap())
 }
 
+/// The car's own envelope as a file has the traction that the sweep knows: the tyres leave the motor the same room.
+#[test]
+fn an_envelope_from_a_file_has_the_cars_traction() {
+    let own = bundled();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("envelope.csv");
+    let range = lapswarm::vehicle::limits::SpeedRange::USUAL;
+    let limits = lapswarm::vehicle::limits::car_envelope(&own.car.car, &range).unwrap();
+    std::fs::write(&path, limits.envelope.to_csv()).unwrap();
+    let read = lapswarm::study::hybrid::read_inputs(&HybridStudySettings {
+        envelope: Some(path),
+        ..settings()
+    })
+    .unwrap();
+    let (own, read) = (&own.car.table.boosts, &read.car.table.boosts);
+    assert_eq!(own.len(), read.len());
+    for (i, (own, read)) in own.iter().zip(read).enumerate() {
+        assert!((own - read).abs() < 1e-9, "{i}: {own} {read}");
+    }
+    // At 18 m/s the tyres are the limit and leave it nothing.
+    assert!(read[1] < 1e-9, "{}", read[1]);
+}
+
 const NO_MOTOR: Gates = Gates {
     energy_mj: 0.0,
     ..Gates::OPEN
@@ -164,7 +187,12 @@ fn without_the_motor_the_lap_is_the_racing_lines() {
 
 #[test]
 fn the_published_scenarios_are_of_their_kind() {
-    let setup = bundled();
+    // The published accounts let the charge pass one.
+    let own = bundled();
+    let setup = &HybridSetup {
+        car: own.car.with_hybrid(own.car.hybrid.with_overflow()).unwrap(),
+        ..own.clone()
+    };
     let engine = drive(setup, "engine", Mode::Offset, NO_MOTOR).unwrap();
     let litres = |lap: &ReportedLap| lap.lap.fuel / 0.748;
     assert!((2.5..3.1).contains(&litres(&engine)), "{}", litres(&engine));
@@ -201,6 +229,39 @@ fn the_published_scenarios_are_of_their_kind() {
     // The gate of charge holds along the whole lap.
     let least = sustaining.change_j().into_iter().fold(f64::INFINITY, f64::min);
     assert!(least > -1e-3, "{least} J");
+}
+
+/// From a charge of 0.9 a store of 5.3 MJ takes 0.53 MJ and no more; from 1 it takes nothing. The lap is the same: what the store
+/// does not take, the friction brakes do.
+#[test]
+fn a_full_store_takes_no_more() {
+    let own = bundled();
+    let lap = |start_soc: f64, overflow: bool| {
+        let mut hybrid = own.car.hybrid.clone();
+        hybrid.store.start_soc = start_soc;
+        hybrid.store.overflow = overflow;
+        let car = own.car.with_hybrid(hybrid).unwrap();
+        let setup = HybridSetup { car, ..own.clone() };
+        drive(&setup, "braking alone", Mode::Offset, NO_MOTOR).unwrap()
+    };
+    let (full, nearly, endless) = (lap(1.0, false), lap(0.9, false), lap(1.0, true));
+    assert_eq!((full.lap.harvested_k, full.lap.harvested_h), (0.0, 0.0));
+    assert!(
+        (nearly.lap.change - 0.53e6).abs() < 1e-3,
+        "{} J",
+        nearly.lap.change
+    );
+    assert!(endless.lap.change > 1.5e6);
+    for lap in [&full, &nearly] {
+        assert!(lap.balance_error_j().abs() < 1e-6);
+        let brakes = lap.segments.iter().zip(&endless.segments);
+        for (s, other) in brakes {
+            let shed = other.generator + other.hydraulic;
+            assert!((s.generator + s.hydraulic - shed).abs() < 1e-9 && s.end == other.end);
+        }
+    }
+    let most = nearly.change_j().into_iter().fold(0.0, f64::max);
+    assert!(most <= 0.53e6 + 1e-3, "{most} J");
 }
 
 #[test]

@@ -136,7 +136,12 @@ fn found(settings: &RacelineSettings, folder: &Path) -> Summary {
 /// Clearance of a car 2 m wide on the line of a run, by the distances from the surveyed centre line that it keeps, on the survey's
 /// own terms and by nothing of the product: that of the widths where the two are abreast.
 fn clearance_m(circuit: &Surveyed, folder: &Path) -> f64 {
-    let centre = read_line(&folder.join("survey.csv")).expect("the survey");
+    let text = std::fs::read_to_string(folder.join("survey.csv")).expect("the survey");
+    let point = |row: &str| -> DVec2 {
+        let mut row = row.split(',').map(|x| x.parse().expect("a number"));
+        DVec2::new(row.next().expect("x"), row.next().expect("y"))
+    };
+    let centre: Vec<DVec2> = text.lines().skip(1).map(point).collect();
     let centre = FineLine::new(&centre, true, 0.25, None, 0.0).expect("a line");
     let n = centre.points_m.len() as isize;
     let line = read_line(&folder.join("line_fastest.csv")).expect("the line");
@@ -149,19 +154,13 @@ fn clearance_m(circuit: &Surveyed, folder: &Path) -> f64 {
         at = near
             .min_by(|a, b| distance(a).total_cmp(&distance(b)))
             .expect("places");
-        let width = circuit.right_m.min(circuit.left_m).max(
-            // The wider side is that of the hairpin's inside, the left.
-            if (*point - centre.points_m[at.rem_euclid(n) as usize]).dot(
-                (centre.points_m[(at + 1).rem_euclid(n) as usize]
-                    - centre.points_m[(at - 1).rem_euclid(n) as usize])
-                    .perp(),
-            ) > 0.0
-            {
-                circuit.left_m
-            } else {
-                circuit.right_m
-            },
-        );
+        let [before, here, after] = [at - 1, at, at + 1].map(|k| centre.points_m[k.rem_euclid(n) as usize]);
+        let leftward = (after - before).perp_dot(*point - here);
+        let width = if leftward > 0.0 {
+            circuit.left_m
+        } else {
+            circuit.right_m
+        };
         least = least.min(width - 1.0 - distance(&at));
     }
     least
@@ -221,7 +220,7 @@ fn a_bridge_needs_no_word() {
     let reference = setup
         .report("reference", &setup.cross_sections.reference, &settings)
         .expect("a line");
-    assert!(reference.clearance.margin_m > 3.0, "{:?}", reference.clearance);
+    assert!(reference.clearance.margin_m > 2.0, "{:?}", reference.clearance);
 }
 
 #[test]

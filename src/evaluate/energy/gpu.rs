@@ -20,6 +20,8 @@ use wgpu::BufferUsages as Usage;
 pub struct EnergyAccount {
     /// Mass, kg.
     pub mass: f32,
+    /// Mass that is accelerated over that of the car.
+    pub rotating: f32,
     /// Energy out of the store for each joule at the wheels.
     pub deploy_cost: f32,
     /// Energy into the store for each joule at the wheels.
@@ -30,6 +32,8 @@ pub struct EnergyAccount {
     pub force_per_harvested: f32,
     /// What the MGU-K may put into the store in a lap, J.
     pub harvest_most: f32,
+    /// What the store takes beyond the charge at the start, J.
+    pub store_room: f32,
     /// Energy of the MGU-H for each kilogram of fuel, J/kg.
     pub exhaust_gain: f32,
     /// Fuel for each joule of the MGU-H, kg/J.
@@ -97,11 +101,13 @@ impl DeviceKernel<HybridProblem> for EnergyDevice {
         let both = Usage::STORAGE | Usage::UNIFORM;
         let account = EnergyAccount {
             mass: table.mass,
+            rotating: table.rotating,
             deploy_cost: table.deploy_cost,
             harvest_gain: table.harvest_gain,
             force_per_deployed: table.force_per_deployed,
             force_per_harvested: table.force_per_harvested,
             harvest_most: table.harvest_most,
+            store_room: table.store_room,
             exhaust_gain: table.exhaust_gain,
             exhaust_cost: table.exhaust_cost,
             exhaust_from: table.exhaust_from,

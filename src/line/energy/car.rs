@@ -1,16 +1,16 @@
 //! A point mass with engine, motors and store.
 
 use super::super::point_mass::{EnvelopeTable, PointMass};
-use super::table::{EnergyTable, Traction, hybrid_parts};
+use super::table::{EnergyTable, hybrid_parts};
 use crate::error::Result;
-use crate::vehicle::{Car, Envelope, Hybrid};
+use crate::vehicle::{Car, Envelope, Hybrid, MassLimits, Traction};
 
 /// A car for laps with energy.
 #[derive(Clone, Debug)]
 pub struct EnergyCar {
     /// Its name.
     pub name: String,
-    /// The point mass, with the rolling resistance in its drag.
+    /// The point mass.
     pub point_mass: PointMass,
     /// The table of its envelope.
     pub envelope_table: EnvelopeTable<f64>,
@@ -20,15 +20,14 @@ pub struct EnergyCar {
     pub hybrid: Hybrid,
     /// Density of its fuel (kg/l).
     pub fuel_density_kgpl: f64,
-    /// The envelope, traction and car that it was made from.
+    /// The car that it was made from.
     pub car: Car,
-    envelope: Envelope,
     traction: Traction,
     ellipse_exponent: f64,
 }
 
 impl EnergyCar {
-    /// `car` within `envelope` (without rolling resistance) and `traction`.
+    /// `car` within `envelope` and `traction`.
     ///
     /// # Errors
     /// [`crate::Error::Input`] for a car without engine map or hybrid drive, or limits that cannot be.
@@ -38,7 +37,8 @@ impl EnergyCar {
         let wheelbase = car.chassis.cg_to_front + car.chassis.cg_to_rear;
         let point_mass = PointMass {
             ellipse_exponent,
-            ..PointMass::new(EnergyTable::rolling(&car, &envelope)?, wheelbase)
+            max_steer_rad: Some(car.max_steer_rad),
+            ..PointMass::new(envelope, wheelbase)
         };
         let envelope_table = point_mass.table()?;
         let table = EnergyTable::new(&car, &point_mass.envelope, &traction, &envelope_table)?;
@@ -49,7 +49,6 @@ impl EnergyCar {
             envelope_table,
             table,
             hybrid,
-            envelope,
             traction,
             ellipse_exponent,
             car,
@@ -65,33 +64,22 @@ impl EnergyCar {
         car.hybrid = Some(hybrid);
         Self::new(
             car,
-            self.envelope.clone(),
+            self.point_mass.envelope.clone(),
             self.traction.clone(),
             self.ellipse_exponent,
         )
     }
 
-    /// The same car with another mass (kg). Engine, motors and drag keep their forces; the grip of the tyres is taken to grow
-    /// with the mass.
+    /// The same car with another mass (kg), within the limits that it has then.
     ///
     /// # Errors
     /// As [`EnergyCar::new`].
-    pub fn with_mass(&self, mass_kg: f64) -> Result<Self> {
-        let ratio = self.car.chassis.mass / mass_kg;
-        let rows = self
-            .envelope
-            .rows()
-            .iter()
-            .map(|row| crate::vehicle::EnvelopeRow {
-                ax_drive_mps2: (row.ax_drive_mps2 * ratio).min(self.traction.at(row.v_mps)),
-                drag_mps2: row.drag_mps2 * ratio,
-                ..*row
-            })
-            .collect();
+    pub fn with_mass(&self, mass_kg: f64, limits: &MassLimits) -> Result<Self> {
+        let own = (&self.point_mass.envelope, &self.traction);
+        let (envelope, traction) = limits.carry(own, self.car.chassis.mass, mass_kg)?;
         let mut car = self.car.clone();
         car.chassis.mass = mass_kg;
-        let envelope = Envelope::new(self.envelope.name(), rows)?;
-        Self::new(car, envelope, self.traction.clone(), self.ellipse_exponent)
+        Self::new(car, envelope, traction, self.ellipse_exponent)
     }
 
     /// The same car with torque and fuel flow of the engine multiplied by `share` at every engine speed, within its traction.
@@ -99,20 +87,23 @@ impl EnergyCar {
     /// # Errors
     /// As [`EnergyCar::new`].
     pub fn with_engine(&self, share: f64) -> Result<Self> {
+        let coasting = 1.0 - 1.0 / self.table.rotating;
         let mut car = self.car.clone();
         if let Some(powertrain) = &mut car.powertrain {
             *powertrain = powertrain.scaled(share);
         }
         let rows = self
+            .point_mass
             .envelope
             .rows()
             .iter()
             .map(|row| crate::vehicle::EnvelopeRow {
-                ax_drive_mps2: (row.ax_drive_mps2 * share).min(self.traction.at(row.v_mps)),
+                ax_drive_mps2: (row.ax_drive_mps2 * share + coasting * row.drag_mps2 * (1.0 - share))
+                    .min(self.traction.at(row.v_mps)),
                 ..*row
             })
             .collect();
-        let envelope = Envelope::new(self.envelope.name(), rows)?;
+        let envelope = Envelope::new(self.point_mass.envelope.name(), rows)?;
         Self::new(car, envelope, self.traction.clone(), self.ellipse_exponent)
     }
 

@@ -134,9 +134,9 @@ struct Car<'a, R: Real> {
 struct Step<R> {
     /// Speed squared at the end.
     end: R,
-    /// Force of the motor over the mass (m/s^2).
+    /// What the motor adds to the acceleration (m/s^2).
     motor: R,
-    /// Force of the motor over the mass that the gates and the zone allow (m/s^2),
+    /// The part of it (m/s^2) that gates and zone allow,
     wanted: R,
     /// and the part of it for which the store has energy.
     boost: R,
@@ -171,6 +171,12 @@ impl<R: Lookup> Car<'_, R> {
         R::select(left.less_than(R::lit(LEAST_J)), R::lit(0.0), left)
     }
 
+    /// Greatest part of the acceleration by the motor (m/s^2) with `left` (J) of energy for a segment.
+    #[inline(always)]
+    fn boost(&self, left: R, inverse: R) -> R {
+        self.reach(left, inverse) / R::load(self.table.rotating)
+    }
+
     /// Greatest force of the motor over the mass (m/s^2) with `left` (J) of energy for a segment; `inverse` is one over its
     /// length (1/m).
     #[inline(always)]
@@ -193,7 +199,7 @@ impl<R: Lookup> Car<'_, R> {
         let boost = (motor * self.strategy[5]).min(room);
         let open = self.open(bends[0], from) & self.strategy[2].less_than(engine - drag);
         let wanted = gated(open, boost * zone_share(&self.plan.zones[here], self.strategy));
-        let boost = wanted.min(self.reach(left, inverse));
+        let boost = wanted.min(self.boost(left, inverse));
 
         let both = grip.min(drive + boost);
         let middle = (from + length * (both - drag)).max(zero);
@@ -229,7 +235,7 @@ impl<R: Lookup> Car<'_, R> {
         left: R,
     ) -> Step<R> {
         if let Some([end, motor, wanted, boost]) = first {
-            let now = wanted.min(self.reach(left, R::lit(1.0) / length));
+            let now = wanted.min(self.boost(left, R::lit(1.0) / length));
             let differs =
                 from.less_than(before) | before.less_than(from) | now.less_than(boost) | boost.less_than(now);
             if R::all(!differs) {
@@ -265,7 +271,8 @@ impl<R: Lookup> Car<'_, R> {
         let from = state.speed_squared;
         let step = self.additional(here, from, length, bends, most, self.left(state));
         let joules = R::load(table.mass) * length;
-        let deployed = joules * step.motor * R::load(table.deploy_cost);
+        let rotating = R::load(table.rotating);
+        let deployed = joules * (rotating * step.motor) * R::load(table.deploy_cost);
         state.speed_squared = step.end;
         state.deployed = state.deployed + deployed;
         if self.plan.counts_charge {
@@ -274,8 +281,9 @@ impl<R: Lookup> Car<'_, R> {
             let (place, beyond) = (mean * R::load(table.rows_per_speed_squared)).place(rows, 8);
             let row = R::pick_row(&table.forces, place);
             let inverse = R::lit(1.0) / length;
-            let force = R::lit(0.5) * (step.end - from) * inverse + (row[3] + beyond * row[7]);
-            let unharvested = R::load(table.harvest_most) - state.harvested_k;
+            let force = rotating * (R::lit(0.5) * (step.end - from) * inverse) + (row[3] + beyond * row[7]);
+            let unharvested = (R::load(table.harvest_most) - state.harvested_k)
+                .min(R::load(table.store_room) - state.change);
             let room = (unharvested * R::load(table.force_per_harvested) * inverse).max(zero);
             let most = (row[2] + beyond * row[6]) * self.strategy[5];
             let generator = (-force).max(zero).min(most).min(room);
@@ -321,13 +329,14 @@ impl<R: Lookup> Car<'_, R> {
             std::array::from_fn(|column| row[column] + beyond * row[4 + column]);
         let inverse = R::lit(1.0) / length;
         let ax = R::lit(0.5) * (end - from) * inverse;
-        // The force of the tyres, driving or braking.
-        let force = ax + drag;
+        // The force at the wheels, driving or braking.
+        let rotating = R::load(table.rotating);
+        let force = rotating * ax + drag;
         let demand = force.max(zero);
         let shed = (-force).max(zero);
         let joules = R::load(table.mass) * length;
         let motor = match self.plan.mode {
-            Mode::Additional => step.motor.min(demand),
+            Mode::Additional => (rotating * step.motor).min(demand),
             Mode::Offset => {
                 let open = self.open(bends[0], from) & self.strategy[2].less_than(ax);
                 let share = zone_share(&self.plan.zones[here], self.strategy);
@@ -337,7 +346,8 @@ impl<R: Lookup> Car<'_, R> {
             }
         };
         let engine = demand - motor;
-        let unharvested = R::load(table.harvest_most) - state.harvested_k;
+        let space = R::load(table.store_room) - state.change;
+        let unharvested = (R::load(table.harvest_most) - state.harvested_k).min(space);
         let room = unharvested * R::load(table.force_per_harvested) * inverse;
         let generator = shed.min(generator_most * self.strategy[5]).min(room.max(zero));
         let deployed = joules * motor * R::load(table.deploy_cost);
@@ -358,7 +368,8 @@ impl<R: Lookup> Car<'_, R> {
         let spins = !mean.less_than(R::load(table.exhaust_from))
             & zero.less_than(ax)
             & !R::load(table.exhaust_to_ax).less_than(ax);
-        let harvested_h = gated(spins, R::load(table.exhaust_gain) * burnt);
+        let space = (space + (deployed - harvested_k)).max(zero);
+        let harvested_h = gated(spins, (R::load(table.exhaust_gain) * burnt).min(space));
 
         state.speed_squared = end;
         state.change = state.change + ((harvested_k + harvested_h) - deployed);
@@ -406,7 +417,7 @@ pub fn motor_step(
         ],
     };
     let step = car.additional(0, from, length, bends, f64::INFINITY, f64::INFINITY);
-    [step.end, step.motor]
+    [step.end, table.rotating * step.motor]
 }
 
 /// Fills `course.speed_squared` with the greatest speeds squared from which all that follows can be braked for.

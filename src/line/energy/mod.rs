@@ -11,5 +11,5 @@ mod zones;
 pub use car::EnergyCar;
 pub use kernel::{EnergyLap, SegmentEnergy, energy_lap};
 pub use plan::{EnergyPlan, GATES, Gates, Mode, ZoneRow};
-pub use table::{EnergyTable, Traction, hybrid_parts};
+pub use table::{EnergyTable, hybrid_parts};
 pub use zones::{GAP_M, late_bend, zone_starts};

@@ -3,32 +3,8 @@
 use super::super::point_mass::{ENVELOPE_WIDTH, EnvelopeTable};
 use crate::error::{Error, Result};
 use crate::scalar::Real;
-use crate::vehicle::powertrain::{EngineMap, GRAVITY_MPS2};
-use crate::vehicle::{Car, Envelope, EnvelopeRow, Hybrid, Powertrain};
-
-/// Greatest acceleration by the driven tyres (m/s^2) over speed (m/s), by rising speed; without rows only the friction ellipse
-/// limits driving.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Traction {
-    /// Speeds and accelerations.
-    pub rows: Vec<(f64, f64)>,
-}
-
-impl Traction {
-    pub(super) fn at(&self, v_mps: f64) -> f64 {
-        let Some(last) = self.rows.last() else {
-            return f64::INFINITY;
-        };
-        match self.rows.iter().position(|row| row.0 >= v_mps) {
-            Some(0) => self.rows[0].1,
-            Some(i) => {
-                let (low, high) = (self.rows[i - 1], self.rows[i]);
-                low.1 + (v_mps - low.0) / (high.0 - low.0) * (high.1 - low.1)
-            }
-            None => last.1,
-        }
-    }
-}
+use crate::vehicle::powertrain::EngineMap;
+use crate::vehicle::{Car, Envelope, EnvelopeRow, Hybrid, Powertrain, Traction};
 
 /// Figures of a car's energy over even steps of the speed squared, those of its [`EnvelopeTable`].
 ///
@@ -40,6 +16,8 @@ pub struct EnergyTable<S> {
     pub mass: S,
     /// Rows per speed squared (s^2/m^2).
     pub rows_per_speed_squared: S,
+    /// Mass that is accelerated over that of the car.
+    pub rotating: S,
     /// Energy out of the store for each joule at the wheels.
     pub deploy_cost: S,
     /// Energy into the store for each joule at the wheels.
@@ -50,6 +28,8 @@ pub struct EnergyTable<S> {
     pub force_per_harvested: S,
     /// Energy that the MGU-K may put into the store in a lap (J).
     pub harvest_most: S,
+    /// What the store takes beyond the charge at the start (J).
+    pub store_room: S,
     /// Energy of the MGU-H into the store for each kilogram of fuel (J/kg).
     pub exhaust_gain: S,
     /// Fuel for each joule of the MGU-H (kg/J).
@@ -62,7 +42,7 @@ pub struct EnergyTable<S> {
     pub forces: Vec<S>,
     /// Fuel flow (kg/s) at a load of 0, 1/3, 2/3 and 1, then the rises.
     pub flows: Vec<S>,
-    /// Force of the motor and the room that engine and tyres leave for it, then their rises.
+    /// What the motor adds to the acceleration (m/s^2) and the room that engine and tyres leave for it, then their rises.
     pub boosts: Vec<S>,
 }
 
@@ -139,7 +119,10 @@ impl EnergyTable<f64> {
                 let throttle = engine.throttle_for(rpm, most_nm * i as f64 / 3.0);
                 engine.fuel_flow_at(rpm, throttle) / 3600.0
             }));
-            boosts.push([motor, (traction.at(v) - driven).clamp(0.0, ENDLESS_MPS2)]);
+            boosts.push([
+                motor / powertrain.rotating_mass_factor,
+                (traction.at(v) - driven).clamp(0.0, ENDLESS_MPS2),
+            ]);
         }
         let greatest_flow = flows.iter().flatten().fold(0.0, |a: f64, b| a.max(*b));
         let h = hybrid.mgu_h;
@@ -147,12 +130,14 @@ impl EnergyTable<f64> {
         let harvest_gain = k.generator_efficiency * powertrain.efficiency;
         Ok(Self {
             mass,
+            rotating: powertrain.rotating_mass_factor,
             rows_per_speed_squared: table.rows_per_speed_squared,
             deploy_cost,
             harvest_gain,
             force_per_deployed: 1.0 / (mass * deploy_cost),
             force_per_harvested: 1.0 / (mass * harvest_gain),
             harvest_most: hybrid.rules.harvested_k_j.unwrap_or(1e12),
+            store_room: hybrid.store.room_j(),
             exhaust_gain: h.map_or(0.0, |h| -h.power_w(0.0, 1.0) / greatest_flow),
             exhaust_cost: h.map_or(0.0, |h| CONSUMPTION_KGPJ * h.generator_cost_w / h.generator_w),
             exhaust_from: h.map_or(1e9, |h| h.from_speed_mps.powi(2)),
@@ -163,30 +148,19 @@ impl EnergyTable<f64> {
         })
     }
 
-    /// `envelope` with the rolling resistance of `car`, if it has one.
-    ///
-    /// # Errors
-    /// Those of [`Envelope::new`].
-    pub fn rolling(car: &Car, envelope: &Envelope) -> Result<Envelope> {
-        let rolling = GRAVITY_MPS2 * car.hybrid.as_ref().map_or(0.0, |h| h.rolling_resistance);
-        let slowed = |row: &EnvelopeRow| EnvelopeRow {
-            drag_mps2: row.drag_mps2 + rolling,
-            ..*row
-        };
-        Envelope::new(envelope.name(), envelope.rows().iter().map(slowed).collect())
-    }
-
     /// The tables in the precision that the scalar `R` stores tables in.
     pub fn stored<R: Real>(&self) -> EnergyTable<R::Storage> {
         let all = |table: &[f64]| table.iter().map(|x| R::store(*x)).collect();
         EnergyTable {
             mass: R::store(self.mass),
+            rotating: R::store(self.rotating),
             rows_per_speed_squared: R::store(self.rows_per_speed_squared),
             deploy_cost: R::store(self.deploy_cost),
             harvest_gain: R::store(self.harvest_gain),
             force_per_deployed: R::store(self.force_per_deployed),
             force_per_harvested: R::store(self.force_per_harvested),
             harvest_most: R::store(self.harvest_most),
+            store_room: R::store(self.store_room),
             exhaust_gain: R::store(self.exhaust_gain),
             exhaust_cost: R::store(self.exhaust_cost),
             exhaust_from: R::store(self.exhaust_from),

@@ -16,12 +16,8 @@ fn car() -> &'static EnergyCar {
             ..SpeedRange::USUAL
         };
         let limits = car_envelope(&car, &coarse).unwrap();
-        let rows = limits
-            .speeds
-            .iter()
-            .map(|s| (s.row.v_mps, s.traction_mps2))
-            .collect();
-        EnergyCar::new(car, limits.envelope, Traction { rows }, 2.0).unwrap()
+        let traction = limits.traction();
+        EnergyCar::new(car, limits.envelope, traction, 2.0).unwrap()
     })
 }
 
@@ -99,6 +95,8 @@ proptest! {
             }
             change += s.harvested_k + s.harvested_h - s.deployed;
             least = least.min(change);
+            // The store begins full.
+            prop_assert!(change <= 1e-6);
             // No more than the motor's power at the mean speed, one way or the other.
             let (joules, shaft) = (1245.0 * course.length[i], 1e3 * motor_kw * s.time * (1.0 + 1e-2));
             prop_assert!(joules * s.motor <= shaft && joules * s.generator * 0.95 <= shaft);

@@ -9,7 +9,7 @@ use std::collections::{HashMap, HashSet};
 /// Runs that a page takes at most: more lines than colours cannot be told apart.
 const MOST_RUNS: usize = 24;
 /// Figures worth a look first, by how their names begin.
-const HEADLINES: [&str; 17] = [
+const HEADLINES: [&str; 18] = [
     "total_parameter_error",
     "swarm_total_parameter_error",
     "rms_error",
@@ -26,6 +26,7 @@ const HEADLINES: [&str; 17] = [
     "top_speed_mps",
     "understeer_gradient_deg_per_g",
     "stability_factor_s2_per_m2",
+    "static_margin",
     "elapsed_s",
 ];
 /// Figures of a best line that are: those on the fine spline, where there are two.

@@ -118,8 +118,7 @@ fn notes(limits: &CarEnvelope) -> Vec<String> {
             in_words(&limits.left_out_mps)
         ));
     }
-    let left = |s: &EnvelopeAtSpeed| s.cornering.iter().map(|t| t.ay_mps2).fold(0.0, f64::max);
-    let uneven = limits.speeds.iter().map(|s| (s, left(s), s.right_mps2));
+    let uneven = limits.speeds.iter().map(|s| (s, s.left_mps2, s.right_mps2));
     let most = uneven.max_by(|a, b| (a.1 - a.2).abs().total_cmp(&(b.1 - b.2).abs()));
     if let Some((at, left, right)) = most
         && left != right
@@ -167,8 +166,12 @@ impl EnvelopeSummary {
         );
         let balance = self.balance();
         text += &format!(
-            "Understeer gradient {:.3} deg/g, stability factor {:.3e} s^2/m^2: {balance}\n",
-            self.handling.understeer_gradient_deg_per_g, self.handling.stability_factor_s2_per_m2
+            "Understeer gradient {:.3} deg/g, stability factor K {:.3e} s^2/m^2: {balance}\nYaw stiffness b Cr - a Cf {:.1} kN m/rad, \
+             static margin {:.2}% of the wheelbase\n",
+            self.handling.understeer_gradient_deg_per_g,
+            self.handling.stability_factor_s2_per_m2,
+            1e-3 * self.handling.yaw_stiffness_nm_per_rad,
+            100.0 * self.handling.static_margin
         );
         for note in &self.notes {
             text += &format!("{note}\n");

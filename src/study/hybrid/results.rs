@@ -149,6 +149,9 @@ pub struct HybridSummary {
     pub stint: Vec<StintLap>,
     /// Motors with which the car laps in the time asked for.
     pub sizing: Vec<Sizing>,
+    /// Whether the accounts let the charge pass one, as published ones do.
+    #[serde(default)]
+    pub store_overflow: bool,
     /// What a reader must know before believing the figures.
     pub warnings: Vec<String>,
 }
@@ -162,6 +165,10 @@ pub(super) fn summarise(solved: &Solved<'_, Hybrid>) -> HybridSummary {
     let names = outcome.scenarios.iter().map(|s| s.own.name.clone());
     let scenarios: BTreeMap<String, ScenarioFigures> = names.zip(figures).collect();
     let mut warnings = Vec::new();
+    if setup.car.hybrid.store.overflow {
+        warnings
+            .push("store_overflow: the accounts let the charge pass one, as published ones do".to_owned());
+    }
     let rules = setup.car.hybrid.rules.deployed_on(setup.length_m);
     let rules = rules.map(|j| j / 1e6);
     for (name, s) in &scenarios {
@@ -214,6 +221,7 @@ pub(super) fn summarise(solved: &Solved<'_, Hybrid>) -> HybridSummary {
         }),
         stint: outcome.stint.clone(),
         sizing: outcome.sizing.clone(),
+        store_overflow: setup.car.hybrid.store.overflow,
         warnings,
     }
 }

@@ -66,6 +66,8 @@ settings! {
             "What the swarm minimises; more than one for a front";
         energy_mj: Option<f64> ["MJ"] = None, optional(number(0.0, 1000.0)).example("2.1"),
             "Energy that may be deployed in a lap; without it what rules and store allow";
+        store_overflow: bool ["-"] = false, switch(false).flag(Flag::Switch("store_overflow", true)),
+            "Whether accounts let the charge pass one, as published ones do; else a full store takes no more";
         budgets_mj: Vec<f64> ["MJ"] = usual_budgets_mj(), numbers(0.0, 1000.0),
             "Energies of the front of time against energy";
         stint_laps: usize ["-"] = 0, count(0, 1000),

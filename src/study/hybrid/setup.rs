@@ -5,13 +5,13 @@ use crate::config::settings::Settings;
 use crate::error::{Error, Result};
 use crate::evaluate::energy::{HybridLine, HybridObjective, HybridProblem, Strategy};
 use crate::evaluate::line::LineObjective;
-use crate::line::energy::{EnergyCar, EnergyPlan, GAP_M, Gates, Mode, Traction, hybrid_parts, late_bend};
+use crate::line::energy::{EnergyCar, EnergyPlan, GAP_M, Gates, Mode, hybrid_parts, late_bend};
 use crate::line::{FineLine, read_line_apart};
 use crate::optimum::ReferenceSolvers;
 use crate::study::raceline;
 use crate::track::CrossSections;
 use crate::vehicle::limits::{SpeedRange, car_envelope};
-use crate::vehicle::{Car, Envelope};
+use crate::vehicle::{Car, Envelope, Traction};
 use glam::DVec2;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -66,18 +66,25 @@ pub struct HybridInputs {
 /// [`Error::Input`] and [`Error::Io`] for what cannot be read or used, such as a car without a hybrid drive.
 pub fn read_inputs(settings: &HybridStudySettings) -> Result<HybridInputs> {
     settings.validate()?;
-    let car = Car::load(&settings.car)?;
+    let mut car = Car::load(&settings.car)?;
     hybrid_parts(&car)?;
+    if settings.store_overflow {
+        car.hybrid = car.hybrid.map(|hybrid| hybrid.with_overflow());
+    }
     let read = |path: &PathBuf| read_line_apart(path, settings.spacing_m);
     let given = settings.line.as_ref().map(read).transpose()?;
     let raceline_settings = settings.raceline();
     let mut raceline = raceline::set_up(&raceline_settings)?;
     let (envelope, traction) = match &settings.envelope {
-        Some(path) => (Envelope::load(path)?, Traction::default()),
+        Some(path) => {
+            let envelope = Envelope::load(path)?;
+            let traction = Traction::of(&car, &envelope);
+            (envelope, traction)
+        }
         None => {
             let limits = car_envelope(&car, &SpeedRange::USUAL)?;
-            let rows = limits.speeds.iter().map(|s| (s.row.v_mps, s.traction_mps2));
-            (limits.envelope.clone(), Traction { rows: rows.collect() })
+            let traction = limits.traction();
+            (limits.envelope, traction)
         }
     };
     let car = EnergyCar::new(car, envelope, traction, raceline_settings.ellipse_exponent)?;

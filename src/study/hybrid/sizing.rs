@@ -103,6 +103,11 @@ pub fn size(
     recorder: &mut Recorder<'_>,
     mut observe: impl FnMut(&Progress) -> ControlFlow<()>,
 ) -> Result<(Vec<Sizing>, u64)> {
+    // The charge sizes the store: a full one must not hold it back.
+    let setup = &HybridSetup {
+        car: setup.car.with_hybrid(setup.car.hybrid.with_overflow())?,
+        ..setup.clone()
+    };
     let zoned = |energy_mj| setup.zone_problem(&[Free::Motor], energy_mj, &[HybridObjective::LapTime]);
     let whole = zoned(MOST_MJ)?;
     let upper: Vec<f64> = whole.problem.variables.iter().map(|v| v.upper).collect();

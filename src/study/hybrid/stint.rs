@@ -5,6 +5,7 @@ use super::setup::HybridSetup;
 use super::strategy::{budget_at, gate_speeds};
 use crate::error::{Error, Result};
 use crate::line::energy::{Gates, Mode};
+use crate::vehicle::MassLimits;
 use serde::{Deserialize, Serialize};
 
 /// A lap of a stint.
@@ -33,21 +34,34 @@ pub struct StintLap {
 /// The greatest difference of the charge over a lap that counts as sustained, as a share of the energy used.
 const SUSTAINED: f64 = 0.02;
 
+/// A full store that is full again has changed by nothing: what a lap may lack so that it counts as sustained (J).
+const SPARE_J: f64 = 1.0;
+
 /// Drives `laps` with `fuel_kg` on board at first. Each lap deploys no more than it harvests, below the speed that makes it
-/// fastest; the mass falls by the fuel burnt.
+/// fastest; the mass falls by the fuel burnt, and the
+/// car's limits change with it.
 ///
 /// # Errors
-/// [`Error::Input`] if the fuel does not last; those of laps.
+/// [`Error::Input`] if the fuel does not last; those of laps and of the sweep of limits.
 pub fn stint(setup: &HybridSetup, laps: usize, fuel_kg: f64) -> Result<Vec<StintLap>> {
+    if laps == 0 {
+        return Ok(Vec::new());
+    }
     let dry_kg = setup.car.car.chassis.mass;
+    let masses_kg = [0.0, 0.5, 1.0].map(|share| dry_kg + share * fuel_kg);
+    let limits = MassLimits::sweep(&setup.car.car, &masses_kg)?;
     let density = setup.car.fuel_density_kgpl;
     let mut fuel = fuel_kg;
-    let mut soc = setup.car.hybrid.store.start_soc;
+    let mut hybrid = setup.car.hybrid.clone();
+    let mut soc = hybrid.store.start_soc;
     let mut rows = Vec::new();
     for _ in 0..laps {
         let mass_kg = dry_kg + fuel;
         let heavy = HybridSetup {
-            car: setup.car.with_mass(mass_kg)?,
+            car: setup
+                .car
+                .with_hybrid(hybrid.clone())?
+                .with_mass(mass_kg, &limits)?,
             ..setup.clone()
         };
         let lap_with = |speed_mps: f64, energy_mj: f64| {
@@ -62,14 +76,15 @@ pub fn stint(setup: &HybridSetup, laps: usize, fuel_kg: f64) -> Result<Vec<Stint
         let engine = lap_with(0.0, 0.0)?.lap;
         let (mut gate_mps, mut lap) = (0.0, engine);
         for speed in gate_speeds() {
-            let energy = budget_at(|mj| Ok(lap_with(speed, mj)?.lap.change))?;
+            let energy = budget_at(|mj| Ok(lap_with(speed, mj)?.lap.change + SPARE_J))?;
             let tried = lap_with(speed, energy)?.lap;
             if tried.time < lap.time {
                 (gate_mps, lap) = (speed, tried);
             }
         }
         let harvested = lap.harvested_k + lap.harvested_h;
-        soc += lap.change / setup.car.hybrid.store.capacity_j;
+        soc += lap.change / hybrid.store.capacity_j;
+        hybrid.store.start_soc = soc;
         if lap.change < -SUSTAINED * harvested.max(1e4) {
             return Err(Error::Study(format!(
                 "lap {} of the stint does not sustain its charge",

@@ -376,11 +376,14 @@ fn channel_scales(samples: &[Sample<f64>], windows: &[Window<f64>]) -> [f64; CHA
 /// A free parameter with its bounds.
 type Unknown = (CarParameter, f64, f64);
 
-/// The scale of the tyres' friction across, from half to one and a half of what the car has; none of a car on linear tyres.
+/// The scale of the tyres' friction across, from half to one and a half of what the car has; none of a car on linear tyres, or with
+/// another scale at each axle.
 fn friction_of(car: &Car) -> Option<Unknown> {
     let parameter = car.parameter("lMUy")?;
-    let given = car.to_flat()[parameter.slots[0]];
-    Some((parameter, 0.5 * given, 1.5 * given))
+    let flat = car.to_flat();
+    let given = flat[*parameter.slots.first()?];
+    let even = parameter.slots.iter().all(|slot| flat[*slot] == given);
+    even.then_some((parameter, 0.5 * given, 1.5 * given))
 }
 
 /// Share of a channel's spread by which a tenth of the friction must move it, root mean square. A car that uses half of its friction

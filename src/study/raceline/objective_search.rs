@@ -84,7 +84,7 @@ pub(super) fn search_objective(
         return search_step(&search, &plain, objective, (0, 0), work);
     }
     // Open roads, and what folds over itself, cannot be cut square to lines on it.
-    let road = &setup.close;
+    let road = &setup.cross_sections;
     if cross_sections_about(road, &road.points(&road.reference), setup.cross_sections.len()).is_ok() {
         search_about(settings, setup, &search, &plain, work)
     } else {
@@ -148,7 +148,7 @@ fn search_about(
         let wave_m = stage.wave * road.length_m / controls as f64;
         let smooth = cross_sections.points(&cross_sections.smoothed(&line, wave_m));
         // Where the line has come to fold the cross-sections, what has been found so far is the answer.
-        let Ok(about) = cross_sections_about(&setup.close, &smooth, controls * SECTIONS_PER_CONTROL) else {
+        let Ok(about) = cross_sections_about(road, &smooth, controls * SECTIONS_PER_CONTROL) else {
             break;
         };
         cross_sections = about;

@@ -28,8 +28,6 @@ pub struct Setup {
     pub road: CrossSections,
     /// The cross-sections that the car's middle may use.
     pub cross_sections: CrossSections,
-    /// The same at close steps: what lines cut square to another keep within.
-    pub close: CrossSections,
     /// The edges at close steps (m), right and left, which no cross-section has a part in.
     pub edges_m: [Vec<DVec2>; 2],
     /// The car.
@@ -75,11 +73,7 @@ pub fn set_up(settings: &RacelineSettings) -> Result<Setup> {
     };
     let plan = settings.plan_with_margin();
     let mut cross_sections = road.narrowed(plan.width_m)?;
-    let mut close = dense.narrowed(plan.width_m)?;
-    let edges = RoadEdges::new(&dense.right_m, &dense.left_m, dense.closed);
-    for drawn in [&mut cross_sections, &mut close] {
-        edges.draw_in(drawn, plan.width_m)?;
-    }
+    RoadEdges::new(&dense.right_m, &dense.left_m, dense.closed).draw_in(&mut cross_sections, plan.width_m);
     let car = Car::load(&settings.car)?;
     let (envelope, car_name) = match &settings.envelope {
         Some(path) => (Envelope::load(path)?, path.display().to_string()),
@@ -90,6 +84,7 @@ pub fn set_up(settings: &RacelineSettings) -> Result<Setup> {
     let wheelbase = car.chassis.cg_to_front + car.chassis.cg_to_rear;
     let car = PointMass {
         ellipse_exponent: settings.ellipse_exponent,
+        max_steer_rad: Some(car.max_steer_rad),
         ..PointMass::new(envelope, wheelbase)
     };
     car.check()?;
@@ -97,7 +92,6 @@ pub fn set_up(settings: &RacelineSettings) -> Result<Setup> {
         track_name: track.name(),
         road,
         cross_sections,
-        close,
         edges_m: [dense.right_m, dense.left_m],
         car,
         car_name,
@@ -165,16 +159,9 @@ impl ReportedLine {
         self.at_cross_sections[objective as usize]
     }
 
-    /// Whether this line is the better one by an objective: a line on the road before any that leaves it; of fast lines the calm
-    /// one, by [`FineLine::unrest_s`].
+    /// Whether this line is the better one by an objective. Any line on the road is better than one that leaves it.
     pub fn betters(&self, other: &Self, objective: LineObjective) -> bool {
-        let rank = |line: &Self| {
-            let unrest_s = match objective {
-                LineObjective::LapTime => line.fine.unrest_s().unwrap_or(0.0),
-                _ => 0.0,
-            };
-            (!line.clearance.is_on_road(), line.worth(objective) + unrest_s)
-        };
+        let rank = |line: &Self| (!line.clearance.is_on_road(), line.worth(objective));
         rank(self) < rank(other)
     }
 }

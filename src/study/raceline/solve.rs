@@ -43,8 +43,7 @@ pub(super) fn find_lines(work: Work<'_, Raceline>) -> Result<Outcome> {
     let reference = setup.report("reference", &setup.cross_sections.reference, settings)?;
     let stop = Arc::new(AtomicBool::new(false));
     let road = &setup.cross_sections;
-    let solvers = ReferenceSolvers::stopped_by(road, &setup.car, settings.entry_mps, Arc::clone(&stop))?
-        .keeping_within(&setup.close);
+    let solvers = ReferenceSolvers::stopped_by(road, &setup.car, settings.entry_mps, Arc::clone(&stop))?;
     work.began = Instant::now();
     let mut evaluations = 0;
     let mut objectives = Vec::new();

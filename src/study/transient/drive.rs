@@ -9,7 +9,7 @@ use crate::files::run_folder::STATE;
 use crate::line::FineLine;
 use crate::study::framework::{Inputs, Progress, RunRecord, Watch, Work};
 use crate::track::Circuit;
-use crate::vehicle::Envelope;
+use crate::vehicle::{Envelope, Traction};
 use rayon::prelude::*;
 
 /// Sample interval of the drive that is kept (s).
@@ -97,8 +97,9 @@ fn greatest_share(work: Work<'_, Transient>) -> Result<Option<DrivenLine>> {
     }
     state.inputs = Some(inputs);
     state_file.save(&state)?;
+    let traction = Traction::of(car, &limits.envelope);
     let attempt = |share: f64| -> Result<Option<DrivenLine>> {
-        let (envelope, point_mass, plan) = planned(limits, points_m, share)?;
+        let (envelope, point_mass, plan) = planned(limits, &traction, points_m, share)?;
         let drive = drive_planned(car, circuit, plan, &driver, INTERVAL_S)?;
         let lap_time_s = drive.lap_time_s(circuit.length_m, INTERVAL_S);
         Ok(lap_time_s.map(|lap_time_s| DrivenLine {

@@ -29,7 +29,7 @@ use crate::study::framework::memory::MemoryItem;
 use crate::study::framework::{Plan, RunRecord, Solved, Study, Subject, Work};
 use crate::study::raceline;
 use crate::track::Circuit;
-use crate::vehicle::{Car, Envelope};
+use crate::vehicle::{Car, Envelope, Traction};
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -248,8 +248,13 @@ fn read(settings: &TransientSettings) -> Result<Prepared> {
 
 /// The quasi-steady-state lap within a share of the envelope's grip on a line of points (m): the envelope, the lap, and its speeds
 /// as a plan.
-fn planned(limits: &PointMass, points_m: &[DVec2], share: f64) -> Result<(Envelope, FineLine, SpeedPlan)> {
-    let envelope = limits.envelope.with_grip_share(share)?;
+fn planned(
+    limits: &PointMass,
+    traction: &Traction,
+    points_m: &[DVec2],
+    share: f64,
+) -> Result<(Envelope, FineLine, SpeedPlan)> {
+    let envelope = limits.envelope.with_grip_share(share, traction)?;
     let point_mass = PointMass {
         envelope: envelope.clone(),
         ..limits.clone()

@@ -10,7 +10,7 @@ use crate::evaluate::drive::{DriveObjective, DriveProblem, DriveSettings, open_d
 use crate::evaluate::{Evaluator, add_failures};
 use crate::study::framework::journal::Recorder;
 use crate::study::framework::{Inputs, Progress, RunRecord, Study, Watch, Work};
-use crate::vehicle::CarParameter;
+use crate::vehicle::{CarParameter, Traction};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
@@ -75,6 +75,7 @@ pub(super) fn drive(work: Work<'_, Transient>) -> Result<Option<PopulationOutcom
     recorder.save()?;
     let shares = settings.shares();
     let all = settings.laps() as u64;
+    let traction = Traction::of(car, &limits.envelope);
     let mut plans = Vec::with_capacity(lines.len());
     for line in lines {
         if observe(&Progress::counted(0, all)).is_break() {
@@ -82,7 +83,7 @@ pub(super) fn drive(work: Work<'_, Transient>) -> Result<Option<PopulationOutcom
         }
         let of_line = shares
             .par_iter()
-            .map(|share| planned(limits, &line.points_m, *share).map(|(_, _, plan)| plan))
+            .map(|share| planned(limits, &traction, &line.points_m, *share).map(|(_, _, plan)| plan))
             .collect::<Result<Vec<_>>>()?;
         plans.push(of_line);
     }

@@ -157,8 +157,12 @@ pub(super) fn check_crossings(
     let length_m = along_m[all.len()];
     let is_bridge = |&(i, j): &(usize, usize)| {
         let [a, b] = [all[i], all[j]].map(|[from, to]| (to - from).normalize_or_zero());
-        let apart_m = along_m[j] - along_m[i];
-        let back_m = if closed { length_m - apart_m } else { f64::INFINITY };
+        let apart_m = along_m[j] - along_m[i + 1];
+        let back_m = if closed {
+            length_m - along_m[j + 1] + along_m[i]
+        } else {
+            f64::INFINITY
+        };
         // Of two decks that are passed in opposite directions the smaller angle counts.
         a.perp_dot(b).abs() >= BRIDGE_DEG.to_radians().sin() && apart_m.min(back_m) >= BRIDGE_LOOP_M
     };

@@ -97,6 +97,22 @@ pub struct Store {
     pub capacity_j: f64,
     /// State of charge at the start of a lap.
     pub start_soc: f64,
+    /// Whether accounts let the charge pass one, as published ones do; else a full store takes no more, and the friction brakes
+    /// take what it leaves. Studies set it; no car's file has it.
+    pub overflow: bool,
+}
+
+impl Store {
+    /// What it takes beyond the charge at the start of a lap (J).
+    pub fn room_j(&self) -> f64 {
+        /// Stands for no limit.
+        const ENDLESS_J: f64 = 1e12;
+        if self.overflow {
+            ENDLESS_J
+        } else {
+            (1.0 - self.start_soc) * self.capacity_j
+        }
+    }
 }
 
 /// Energies that the rules allow in a lap.
@@ -154,8 +170,20 @@ pub struct Hybrid {
     pub store: Store,
     /// The rules.
     pub rules: EnergyRules,
-    /// Coefficient of rolling resistance, used in laps with energy.
-    pub rolling_resistance: f64,
+}
+
+impl Hybrid {
+    /// The same with a store whose charge may pass one.
+    pub fn with_overflow(&self) -> Self {
+        let store = Store {
+            overflow: true,
+            ..self.store
+        };
+        Self {
+            store,
+            ..self.clone()
+        }
+    }
 }
 
 /// How braking is shared.

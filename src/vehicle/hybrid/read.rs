@@ -38,6 +38,7 @@ impl Hybrid {
         let store = Store {
             capacity_j: 1e6 * s.required_number("capacity_mj", 0.01, 1000.0, "MJ")?,
             start_soc: s.number("start_soc", 0.0, 1.0, "")?.unwrap_or(1.0),
+            overflow: false,
         };
         s.finish()?;
         let rules = match table.table("rules")? {
@@ -53,7 +54,6 @@ impl Hybrid {
             mgu_h,
             store,
             rules,
-            rolling_resistance: table.number("rolling_resistance", 0.0, 0.1, "")?.unwrap_or(0.0),
         })
     }
 
@@ -61,10 +61,9 @@ impl Hybrid {
     pub fn to_toml(&self) -> String {
         let k = &self.mgu_k;
         let mut text = format!(
-            "[hybrid]\nrolling_resistance = {:?}\n\n[hybrid.mgu_k]\nratio = {:?}\nspeed_rpm = {:?}\ntorque_nm = {:?}\n\
+            "[hybrid.mgu_k]\nratio = {:?}\nspeed_rpm = {:?}\ntorque_nm = {:?}\n\
              power_kw = {:?}\nmotor_efficiency = {:?}\ngenerator_efficiency = {:?}\n\n[hybrid.store]\ncapacity_mj = {:?}\n\
              start_soc = {:?}\n",
-            self.rolling_resistance,
             k.ratio,
             k.speed_rpm,
             k.torque_nm,

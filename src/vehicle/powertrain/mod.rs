@@ -1,11 +1,9 @@
 //! Engine, gears and driven axles: the greatest force at the wheels at a speed, and the engine state for any smaller one.
 
-mod differential;
 mod engine;
 #[cfg(test)]
 mod tests;
 
-pub use differential::Differential;
 pub use engine::{EngineMap, FlowLimit};
 
 use crate::config::Table;
@@ -27,8 +25,10 @@ pub struct Powertrain {
     pub efficiency: f64,
     /// Torque and fuel over engine speed and throttle, if the car has such maps.
     pub engine: Option<EngineMap>,
-    /// How the driven wheels share the torque.
-    pub differential: Differential,
+    /// Coefficient of rolling resistance.
+    pub rolling_resistance: f64,
+    /// Mass that the engine accelerates over that of the car: more than one by the inertia of all that turns.
+    pub rotating_mass_factor: f64,
 }
 
 /// A gear at a road speed.
@@ -61,13 +61,7 @@ pub struct OperatingPoint {
     pub missing_w: f64,
 }
 
-/// The power (W) that a car needs to move: `v (m g f_r + D + m I a)` with the coefficient of rolling resistance `f_r`, the drag
-/// `D` (N) and the factor of rotating masses `I` (R. Rajamani, *Vehicle Dynamics and Control*, 2012, ch. 4).
-pub fn demand_w(v_mps: f64, ax_mps2: f64, mass_kg: f64, drag_n: f64, rolling: f64, rotating: f64) -> f64 {
-    v_mps * (mass_kg * GRAVITY_MPS2 * rolling + drag_n + mass_kg * rotating * ax_mps2)
-}
-
-/// Acceleration of gravity (m/s^2).
+/// Standard gravity (m/s^2): that of a car unless its file says otherwise, and what is meant by one g.
 pub const GRAVITY_MPS2: f64 = 9.80665;
 
 impl Powertrain {
@@ -89,6 +83,14 @@ impl Powertrain {
             }),
             ..self.clone()
         }
+    }
+
+    /// The acceleration (m/s^2) that a force at the wheels (N) gives a car of this mass (kg) against its resistance (m/s^2, of the
+    /// air and of rolling), from the power that it needs to move: `v (D + m g f_r + m I a)` with the coefficient of rolling
+    /// resistance `f_r`, the drag `D` and the factor of rotating masses `I` (R. Rajamani, *Vehicle Dynamics and Control*, 2012,
+    /// ch. 4).
+    pub fn acceleration_mps2(&self, force_n: f64, mass_kg: f64, resistance_mps2: f64) -> f64 {
+        (force_n / mass_kg - resistance_mps2) / self.rotating_mass_factor
     }
 
     /// Reads `[powertrain]`.
@@ -126,7 +128,8 @@ impl Powertrain {
         };
         Ok(Self {
             engine,
-            differential: Differential::from_table(table)?,
+            rolling_resistance: table.number("rolling_resistance", 0.0, 0.1, "")?.unwrap_or(0.0),
+            rotating_mass_factor: table.number("rotating_mass_factor", 1.0, 3.0, "")?.unwrap_or(1.0),
             gear_ratios: list("gear_ratios", 1, 0.1, "ratios from first to top gear")?,
             final_drive: table.required_number("final_drive", 0.1, 50.0, "")?,
             efficiency: table.number("gearbox_efficiency", 0.1, 1.0, "")?.unwrap_or(1.0),
@@ -145,11 +148,13 @@ impl Powertrain {
             ),
         };
         format!(
-            "[powertrain]\n{engine}gear_ratios = {:?}\nfinal_drive = {:?}\ngearbox_efficiency = {:?}\n{}",
+            "[powertrain]\n{engine}gear_ratios = {:?}\nfinal_drive = {:?}\ngearbox_efficiency = {:?}\nrolling_resistance = {:?}\n\
+             rotating_mass_factor = {:?}\n",
             self.gear_ratios,
             self.final_drive,
             self.efficiency,
-            self.differential.to_toml()
+            self.rolling_resistance,
+            self.rotating_mass_factor
         )
     }
 

@@ -90,28 +90,35 @@ fn an_operating_point_is_the_maps_inverse() {
         assert!((engine.torque_at(rpm, point.throttle_deg) - point.torque_nm).abs() < 1e-9);
         assert!((0.0..=1.0).contains(&point.load) && point.missing_w.abs() < 1e-6);
     }
-    // At 50 m/s: 1245 x (9.80665 x 0.013 + 1.1 x 2) N and 1425 N of drag, all by 50 m/s.
-    let demand = demand_w(50.0, 2.0, 1245.0, 1425.0, 0.013, 1.1);
-    assert!(
-        (demand - 50.0 * (158.72 + 1425.0 + 2739.0)).abs() < 1.0,
-        "{demand}"
-    );
     let beyond = powertrain.operating_point(60.0, 1e6, radius).unwrap();
     assert_eq!(beyond.load, 1.0);
     assert!(beyond.missing_w > 6e5);
 }
 
+/// 5000 N on 1245 kg against 1425 N of drag and a rolling resistance of 0.013, with rotating masses of a tenth of the car's:
+/// (5000 - 1425 - 158.7) / (1.1 x 1245) = 2.495 m/s^2.
 #[test]
-fn the_outer_wheel_may_get_more() {
-    let differential = Differential {
-        front_share: 0.2,
-        share_per_steer: 1.0,
-        share_per_yaw_rate: 0.1,
+fn what_turns_is_accelerated_too() {
+    let (mut powertrain, _) = powertrain();
+    powertrain.rotating_mass_factor = 1.1;
+    let resistance = 1425.0 / 1245.0 + GRAVITY_MPS2 * 0.013;
+    let found = powertrain.acceleration_mps2(5000.0, 1245.0, resistance);
+    assert!((found - 2.4946).abs() < 1e-3, "{found}");
+}
+
+/// The rear axle drives, both wheels alike: a file that says otherwise is not half obeyed.
+#[test]
+fn a_differential_is_refused() {
+    let text = include_str!("../../../data/cars/gt.toml");
+    let tyre = include_str!("../../../data/cars/gt_slick.tir");
+    let read = |text: &str| {
+        Car::parse(std::path::Path::new("own.toml"), text, |name| {
+            crate::vehicle::tyre::TyreFile::parse(std::path::Path::new(name), tyre)
+        })
     };
-    // 0.5 + 0.1 + 0.05 of the rear axle's 800 Nm to the right in a left turn.
-    let torques = differential.torques_nm(1000.0, 0.1, 0.5);
-    for (found, wanted) in torques.iter().zip([100.0, 100.0, 280.0, 520.0]) {
-        assert!((found - wanted).abs() < 1e-9);
+    assert!(read(text).is_ok());
+    for key in ["front_share", "outer_share_per_rad", "outer_share_per_radps"] {
+        let error = read(&format!("{text}\n[powertrain.differential]\n{key} = 0.5\n")).unwrap_err();
+        assert!(error.to_string().contains("differential"), "{error}");
     }
-    assert_eq!(differential.torques_nm(1000.0, 0.0, 9.0)[2], 0.0);
 }
