@@ -154,17 +154,20 @@ pub fn descend(
             // Where all of the step loses, its parts say whether the line can be bettered that way.
             let part = here.part_of(problem, weights, &there.x);
             let gained = (here.cost - part.cost) / here.cost.abs();
-            status = if gained <= settings.least_gain.max(JUDGED_GAIN) {
-                solution.status
-            } else {
-                Status::Almost(format!(
-                    "a part of the last step still gained {gained:.1e} of the cost"
-                ))
-            };
             if gained > 0.0 {
                 here = part;
             }
-            break;
+            if gained <= settings.least_gain.max(JUDGED_GAIN) {
+                status = solution.status;
+                break;
+            }
+            if judged == JUDGED {
+                status = Status::Almost(format!(
+                    "a part of the last step still gained {gained:.1e} of the cost"
+                ));
+                break;
+            }
+            judging = false;
         } else {
             caution *= CAUTION.0;
         }

@@ -209,7 +209,8 @@ fn a_study_of_the_bundled_circuit_holds_together() {
     let [gamma, length, time] = &outcome.objectives[..] else {
         panic!("three objectives")
     };
-    // Each line is the best by its own objective, and no study ends worse than the exact line that it started from.
+    // Each line is the best by its own objective and on the road. No study ends worse than an exact line that is on the road too;
+    // through so few cross-sections the fastest one is not.
     for (own, others) in [
         (gamma, [length, time]),
         (length, [gamma, time]),
@@ -217,8 +218,14 @@ fn a_study_of_the_bundled_circuit_holds_together() {
     ] {
         let worth = own.best.worth(own.objective);
         assert!(others.iter().all(|o| o.best.worth(own.objective) > worth));
-        let exact = own.exact.as_ref().unwrap().worth(own.objective);
-        assert!(worth <= exact * (1.0 + 1e-9), "{:?}", own.objective);
+        assert!(own.best.clearance.is_on_road(), "{:?}", own.objective);
+        let exact_line = own.exact.as_ref().unwrap();
+        let exact = exact_line.worth(own.objective);
+        assert!(
+            worth <= exact * (1.0 + 1e-9) || !exact_line.clearance.is_on_road(),
+            "{:?}",
+            own.objective
+        );
         // The swarm by itself, from the exact line's spline on: no more than a hundredth is lost to its control points.
         assert!(
             own.swarm_cost <= exact * 1.01,
@@ -315,6 +322,7 @@ fn a_study_of_the_bundled_circuit_holds_together() {
 
 fn the_same_seed_gives_the_same_lines() {
     let settings = RacelineSettings {
+        track: "stadium:400:120:14".to_owned(),
         sections: 60,
         population: 20,
         iterations: 5,

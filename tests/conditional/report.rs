@@ -28,6 +28,8 @@ fn lapswarm(arguments: &[&str]) -> Output {
 fn raceline(folder: &Path, seed: &str) {
     let out = folder.to_str().unwrap();
     let small = [
+        "--track",
+        "stadium:400:120:14",
         "--sections",
         "60",
         "--population",

@@ -399,6 +399,7 @@ fn the_struct_of_energies_has_the_hosts_offsets() {
     let (members, size) = layout(&module, "EnergyAccount");
     let host = [
         ("mass", offset_of!(EnergyAccount, mass)),
+        ("rotating", offset_of!(EnergyAccount, rotating)),
         ("deploy_cost", offset_of!(EnergyAccount, deploy_cost)),
         ("harvest_gain", offset_of!(EnergyAccount, harvest_gain)),
         (
@@ -410,6 +411,7 @@ fn the_struct_of_energies_has_the_hosts_offsets() {
             offset_of!(EnergyAccount, force_per_harvested),
         ),
         ("harvest_most", offset_of!(EnergyAccount, harvest_most)),
+        ("store_room", offset_of!(EnergyAccount, store_room)),
         ("exhaust_gain", offset_of!(EnergyAccount, exhaust_gain)),
         ("exhaust_cost", offset_of!(EnergyAccount, exhaust_cost)),
         ("exhaust_from", offset_of!(EnergyAccount, exhaust_from)),
