@@ -57,8 +57,9 @@ const UNIT_CAUTION: f64 = 1.0;
 const PARTS: [f64; 4] = [0.25, 0.0625, 0.015_625, 0.003_906_25];
 /// Programs of unit caution that judge a line at most: each whose step gains is followed by others.
 const JUDGED: usize = 3;
-/// Share of the cost that parts of a rejected step may gain where the line counts as solved.
-const JUDGED_GAIN: f64 = 1e-6;
+/// Share of the cost that parts of a rejected step may gain where the line counts as solved: a hundredth of the 0.05 % that a
+/// line is asked to be near the optimum.
+const JUDGED_GAIN: f64 = 5e-6;
 /// Penalty beyond which only rounding is left to gain.
 const MOST_CAUTION: f64 = 1e7;
 /// Weight of the squared step of a variable at a penalty of 1, as a share of the cost over the number of variables.
@@ -154,20 +155,17 @@ pub fn descend(
             // Where all of the step loses, its parts say whether the line can be bettered that way.
             let part = here.part_of(problem, weights, &there.x);
             let gained = (here.cost - part.cost) / here.cost.abs();
+            status = if gained <= settings.least_gain.max(JUDGED_GAIN) {
+                solution.status
+            } else {
+                Status::Almost(format!(
+                    "a part of the last step still gained {gained:.1e} of the cost"
+                ))
+            };
             if gained > 0.0 {
                 here = part;
             }
-            if gained <= settings.least_gain.max(JUDGED_GAIN) {
-                status = solution.status;
-                break;
-            }
-            if judged == JUDGED {
-                status = Status::Almost(format!(
-                    "a part of the last step still gained {gained:.1e} of the cost"
-                ));
-                break;
-            }
-            judging = false;
+            break;
         } else {
             caution *= CAUTION.0;
         }
