@@ -166,6 +166,9 @@ impl ReportedLine {
     }
 }
 
+/// Shares of the way to the reference line by which a line gives way that bending does not bring onto the road.
+const TOWARDS_REFERENCE: [f64; 6] = [0.0025, 0.005, 0.01, 0.02, 0.04, 0.08];
+
 impl Setup {
     /// The problem of lines through the cross-sections that are given `way`.
     ///
@@ -233,7 +236,19 @@ impl Setup {
         if Clearance::least(&fine, &clearances).is_on_road() {
             return Ok(Some(alpha.to_vec()));
         }
-        mended(&self.cross_sections, alpha, |line| self.measured(line, settings))
+        if let Some(line) = mended(&self.cross_sections, alpha, |line| self.measured(line, settings))? {
+            return Ok(Some(line));
+        }
+        // Where bending alone does not help, the whole line gives way a little towards the reference line.
+        for share in TOWARDS_REFERENCE {
+            let both = alpha.iter().zip(&self.cross_sections.reference);
+            let line: Vec<f64> = both.map(|(a, r)| a + share * (r - a)).collect();
+            let (fine, clearances) = self.measured(&line, settings)?;
+            if Clearance::least(&fine, &clearances).is_on_road() {
+                return Ok(Some(line));
+            }
+        }
+        Ok(None)
     }
 
     /// Works out everything that is reported of a line. Where the car leaves the road between the cross-sections, the line is moved
