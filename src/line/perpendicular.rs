@@ -9,7 +9,7 @@ use crate::error::{Error, Result};
 use crate::track::CrossSections;
 use glam::DVec2;
 
-/// Distance between the points that curves are followed by (m). A chord of this length is half a millimetre off a bend of 15 m.
+/// Distance between the points that curves are followed by (m). Between two of them a curve is taken for an arc.
 const STEP_M: f64 = 0.25;
 /// Greatest distance along the road between a cross-section and the piece of edge that it meets (m).
 const REACH_M: f64 = 60.0;
@@ -31,6 +31,12 @@ fn meeting(from: DVec2, step: DVec2, start: DVec2, end: DVec2) -> Option<[f64; 2
     let apart = start - from;
     let shares = [apart.perp_dot(along) / cross, apart.perp_dot(step) / cross];
     shares.iter().all(|s| s.is_finite()).then_some(shares)
+}
+
+/// How far a curve is to the right of its chord at a share of a segment (m).
+fn sag_m(curve: &FineLine, segment: usize, share: f64) -> f64 {
+    let bends = [segment, (segment + 1) % curve.points_m.len()].map(|i| curve.curvature_1pm[i]);
+    0.25 * (bends[0] + bends[1]) * curve.segment_m[segment].powi(2) * share * (1.0 - share)
 }
 
 fn unseen(road: &CrossSections, what: &str, station_m: f64) -> Error {
@@ -58,7 +64,9 @@ fn crossings(road: &CrossSections, curve: &FineLine) -> Result<Vec<Crossing>> {
             road.left_m[section] - road.right_m[section],
         );
         let ends = [curve.points_m[segment % k], curve.points_m[(segment + 1) % k]];
-        let [alpha, share] = meeting(right, across, ends[0], ends[1])?;
+        let [chord_alpha, share] = meeting(right, across, ends[0], ends[1])?;
+        let square = (ends[1] - ends[0]).perp().normalize();
+        let alpha = chord_alpha - sag_m(curve, segment % k, share) / square.dot(across);
         // Slightly more than the segment, so that no crossing is missed between two segments.
         let crosses = (-1e-9..=1.0 + 1e-9).contains(&share) && (-0.5..=1.5).contains(&alpha);
         crosses.then(|| Crossing {
@@ -122,8 +130,9 @@ pub fn cross_sections_about(road: &CrossSections, points_m: &[DVec2], count: usi
         let station_m = spacing_m * i as f64;
         let segment = curve.station_m.partition_point(|s| *s <= station_m).max(1) - 1;
         let share = (station_m - curve.station_m[segment]) / curve.segment_m[segment];
-        let place = curve.points_m[segment].lerp(curve.points_m[(segment + 1) % k], share);
         let left = left_at(segment).lerp(left_at(segment + 1), share).normalize();
+        let chord = curve.points_m[segment].lerp(curve.points_m[(segment + 1) % k], share);
+        let place = chord - sag_m(&curve, segment, share) * left;
         let near = by_station.partition_point(|(s, _)| *s <= station_m).max(1) - 1;
         let near = by_station[near].1;
         // In a hairpin an edge is met several times. The nearest place belongs to the line.

@@ -6,7 +6,9 @@ use super::{
 };
 use crate::error::Result;
 use crate::evaluate::line::LineObjective;
-use crate::line::{FINE_M, FineLine, PointMass, cross_sections_about, shares_across};
+use crate::line::{
+    CarPlan, FINE_M, FineLine, ON_ROAD_M, PointMass, RoadEdges, cross_sections_about, shares_across,
+};
 use crate::track::CrossSections;
 use glam::DVec2;
 use std::sync::Arc;
@@ -27,7 +29,22 @@ pub struct ReferenceSolvers {
     envelope: Option<PointMassEnvelope>,
     car: PointMass,
     entry_mps: f64,
+    room: Option<Room>,
     stop: Arc<AtomicBool>,
+}
+
+/// The road's edges on the right and the left (m), and the car that is to stay between them.
+struct Room {
+    edges_m: [Vec<DVec2>; 2],
+    car: CarPlan,
+}
+
+/// A line on its fine spline, with its lap and its room on the right and the left (m) at each point; no room where no edges are
+/// known.
+#[derive(Clone)]
+struct Driven {
+    fine: FineLine,
+    clearances_m: Vec<[f64; 2]>,
 }
 
 /// A reference optimum.
@@ -69,6 +86,12 @@ const ABOUT: About = About {
 const CLOSELY_M: [f64; 2] = [2.0, 1.0];
 const CLOSER: f64 = 0.75;
 const CROSS_SECTIONS_TO_SAY_CONTROL: f64 = 1.4;
+/// Times that a line is solved anew within narrower bounds where it leaves the road between its points, and the room (m) that the
+/// bounds leave there.
+const TIGHTENINGS: usize = 5;
+const SPARE_M: f64 = 0.001;
+/// Share of a lap by which stations of two lines of one road differ at the most.
+const NEARBY: f64 = 0.02;
 /// Share of a lap below which no cone program is worth its second: a hundredth of what lies between two cross-sections.
 const LEAST_GAIN_ABOUT: f64 = 1e-5;
 /// Times that the fastest line is taken anew about itself.
@@ -124,10 +147,22 @@ impl ReferenceSolvers {
             },
             car: car.clone(),
             entry_mps,
+            room: None,
             spacing_m,
             cross_sections: cross_sections.clone(),
             stop,
         })
+    }
+
+    /// The same for a car that is kept between the road's own edges (m), on the right and the left, at every point of the fastest
+    /// lines' fine splines, not at the cross-sections alone.
+    #[must_use]
+    pub fn kept_between(mut self, edges_m: &[Vec<DVec2>; 2], car: CarPlan) -> Self {
+        self.room = Some(Room {
+            edges_m: edges_m.clone(),
+            car,
+        });
+        self
     }
 
     /// The flag that ends them.
@@ -170,8 +205,12 @@ impl ReferenceSolvers {
         Some(solver)
     }
 
-    /// The fastest line, `alpha` at every cross-section.
+    /// The fastest line, `alpha` at every cross-section: about the minimum-curvature line, then about itself while it gains by that.
+    /// Where no cross-sections square to a line can be cut, as on open roads, across the road's own.
     fn fastest(&self) -> Result<Optimum> {
+        if let Some(about) = self.about_itself(&self.base, ABOUTS)? {
+            return Ok(about);
+        }
         let (map, bounds) = &self.smooth;
         let start = vec![0.0; map.variables()];
         let solved = fastest(&self.problem(map), bounds, &start, &DescentSettings::default())?;
@@ -200,23 +239,6 @@ impl ReferenceSolvers {
             status: solved.status,
             seconds: solved.seconds,
         }))
-    }
-
-    /// As [`ReferenceSolvers::best`], and the fastest line taken anew about itself while it gains by that, which is the reference
-    /// that swarms are held against.
-    ///
-    /// # Errors
-    /// As [`ReferenceSolvers::best`].
-    pub fn reference(&self, objective: LineObjective) -> Result<Option<OptimumLine>> {
-        let mut best = self.best(objective)?;
-        if objective == LineObjective::LapTime
-            && let Some(line) = &mut best
-            && let Some(about) = self.about_itself(&line.alpha, ABOUTS)?
-        {
-            line.seconds += about.seconds;
-            (line.alpha, line.status) = (about.x, about.status);
-        }
-        Ok(best)
     }
 
     /// The fastest line near one, as splines about it and across cross-sections square to it: they say more than splines as short
@@ -285,11 +307,14 @@ impl ReferenceSolvers {
         let own = self.cross_sections.points(alpha);
         let count =
             ((self.cross_sections.length_m / how.spacing_m).ceil() as usize).max(self.cross_sections.len());
-        let Ok(about) = cross_sections_about(&self.cross_sections, &own, count) else {
+        let controls = (count / how.cross_sections_per_control).max(4);
+        let Ok(smooth) = smoothed(&self.cross_sections, &own, controls) else {
             return Ok(None);
         };
-        let controls = (about.len() / how.cross_sections_per_control).max(4);
-        let (map, bounds) = LineMap::spline_about(&about, &about.reference, controls);
+        let Ok(about) = cross_sections_about(&self.cross_sections, &smooth, count) else {
+            return Ok(None);
+        };
+        let (map, mut bounds) = LineMap::spline_about(&about, &about.reference, controls);
         let problem = ReferenceProblem {
             envelope: Some(envelope),
             start_mps: self.entry_mps,
@@ -302,19 +327,53 @@ impl ReferenceSolvers {
             least_gain: LEAST_GAIN_ABOUT,
             ..DescentSettings::default()
         };
-        let Ok(solved) = fastest(&problem, &bounds, &start, &settings) else {
+        let Ok(mut solved) = fastest(&problem, &bounds, &start, &settings) else {
             return Ok(None);
         };
-        let Ok(shares) = shares_across(&self.cross_sections, &map.line(&solved.x)) else {
-            return Ok(None);
-        };
-        let x = within_road(shares);
-        let time = |points: &[DVec2]| -> Result<Option<f64>> {
-            let fine = FineLine::new(points, true, FINE_M, Some(&self.car), self.entry_mps)?;
-            Ok(fine.lap_time_s())
-        };
-        let faster = time(&self.cross_sections.points(&x))? < time(&own)?;
-        Ok(faster.then_some(Optimum { x, ..solved }))
+        let before = self.driven(alpha)?;
+        let mut best: Option<(Vec<f64>, Driven)> = None;
+        for round in 0..=TIGHTENINGS {
+            let points = map.line(&solved.x);
+            let Ok(shares) = shares_across(&self.cross_sections, &points) else {
+                break;
+            };
+            let x = within_road(shares);
+            let driven = self.driven(&x)?;
+            if best.as_ref().is_none_or(|(_, best)| driven.rank() < best.rank()) {
+                best = Some((x, driven.clone()));
+            }
+            if driven.clearance_m() >= 0.0 || round == TIGHTENINGS {
+                break;
+            }
+            driven.tighten(&points, &mut bounds);
+            let Ok(tightened) = fastest(&problem, &bounds, &solved.x, &settings) else {
+                break;
+            };
+            solved = Optimum {
+                programs: solved.programs + tightened.programs,
+                iterations: solved.iterations + tightened.iterations,
+                seconds: solved.seconds + tightened.seconds,
+                ..tightened
+            };
+        }
+        let better = best.filter(|(_, driven)| driven.rank() < before.rank());
+        Ok(better.map(|(x, _)| Optimum { x, ..solved }))
+    }
+
+    /// A line through the cross-sections, as it is driven.
+    fn driven(&self, alpha: &[f64]) -> Result<Driven> {
+        let points = self.cross_sections.points(alpha);
+        let fine = FineLine::new(
+            &points,
+            self.cross_sections.closed,
+            FINE_M,
+            Some(&self.car),
+            self.entry_mps,
+        )?;
+        let clearances_m = self.room.as_ref().map_or_else(Vec::new, |room| {
+            RoadEdges::new(&room.edges_m[0], &room.edges_m[1], fine.closed).clearances(&fine, &room.car)
+        });
+        Ok(Driven { fine, clearances_m })
     }
 
     /// `alpha` at every cross-section of a line of `map`.
@@ -381,6 +440,60 @@ impl ReferenceSolvers {
                     * self.cross_sections.left_m[i].distance(self.cross_sections.right_m[i])
             })
             .collect()
+    }
+}
+
+/// A closed spline through as many points of a line as it has controls: it has no ripples that these could not take off. A line
+/// that touches jagged edges has, and a lap on the fine spline suffers from every one.
+fn smoothed(cross_sections: &CrossSections, points_m: &[DVec2], controls: usize) -> Result<Vec<DVec2>> {
+    let few = cross_sections_about(cross_sections, points_m, controls)?;
+    Ok(few.points(&few.reference))
+}
+
+impl Driven {
+    fn clearance_m(&self) -> f64 {
+        let least = self.clearances_m.iter().flatten();
+        least.copied().fold(f64::INFINITY, f64::min)
+    }
+
+    /// Lines on the road come first, then those that count as on it, then fast ones.
+    fn rank(&self) -> (bool, bool, f64) {
+        let (clearance_m, time_s) = (self.clearance_m(), self.fine.lap_time_s());
+        (
+            clearance_m < -ON_ROAD_M,
+            clearance_m < 0.0,
+            time_s.unwrap_or(f64::INFINITY),
+        )
+    }
+
+    /// Narrows the bounds of a line's points (m) where the line is short of room.
+    fn tighten(&self, points_m: &[DVec2], bounds: &mut Bounds) {
+        let n = points_m.len();
+        let abreast = |i: usize| {
+            let guess = (self.fine.station_m[i] / self.fine.length_m * n as f64) as usize;
+            let reach = (NEARBY * n as f64).ceil() as usize;
+            let near = (guess + n - reach.min(n / 2)..=guess + n + reach.min(n / 2)).map(|j| j % n);
+            let distance = |j: &usize| points_m[*j].distance_squared(self.fine.points_m[i]);
+            near.min_by(|a, b| distance(a).total_cmp(&distance(b)))
+                .unwrap_or(guess)
+        };
+        let mut short = vec![[0.0f64; 2]; n];
+        for (i, room_m) in self.clearances_m.iter().enumerate() {
+            for side in [0, 1] {
+                if room_m[side] < 0.0 {
+                    let at = abreast(i);
+                    for j in [at + n - 1, at, at + 1] {
+                        let short = &mut short[j % n][side];
+                        *short = short.max(SPARE_M - room_m[side]);
+                    }
+                }
+            }
+        }
+        for (row, [right, left]) in bounds.rows.iter_mut().zip(short) {
+            let middle = 0.5 * (row.lower + row.upper);
+            row.lower = (row.lower + right).min(middle);
+            row.upper = (row.upper - left).max(middle);
+        }
     }
 }
 

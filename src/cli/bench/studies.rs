@@ -8,7 +8,6 @@ use clap::builder::PossibleValuesParser;
 use lapswarm::evaluate::line::{LineObjective, LineProblem};
 use lapswarm::evaluate::replay::{CHANNEL_NAMES, ReplayProblem};
 use lapswarm::evaluate::{BackendChoice, Evaluator, OnDevice, open_evaluator};
-use lapswarm::optimum::ReferenceSolvers;
 use lapswarm::random::Random;
 use lapswarm::report::Figure;
 use lapswarm::study::identify::{self, IdentifySettings, ObjectiveChoice};
@@ -195,7 +194,7 @@ fn raceline(arguments: &Arguments) -> Result<Case<LineProblem>> {
         ..RacelineSettings::default()
     };
     let setup = raceline::set_up(&settings)?;
-    let solvers = ReferenceSolvers::new(&setup.cross_sections, &setup.car, settings.entry_mps)?;
+    let solvers = setup.solvers(&settings, &Default::default())?;
     let mut known = Vec::new();
     for objective in &settings.objectives {
         known.extend(solvers.best(*objective)?.map(|line| line.alpha));

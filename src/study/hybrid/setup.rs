@@ -7,7 +7,6 @@ use crate::evaluate::energy::{HybridLine, HybridObjective, HybridProblem, Strate
 use crate::evaluate::line::LineObjective;
 use crate::line::energy::{EnergyCar, EnergyPlan, GAP_M, Gates, Mode, hybrid_parts, late_bend};
 use crate::line::{FineLine, read_line_apart};
-use crate::optimum::ReferenceSolvers;
 use crate::study::raceline;
 use crate::track::CrossSections;
 use crate::vehicle::limits::{SpeedRange, car_envelope};
@@ -119,9 +118,9 @@ impl HybridInputs {
         let (line_name, alpha, through) = match (&settings.line, given) {
             (Some(path), Some(points)) => (path.display().to_string(), None, points),
             _ => {
-                let (road, entry_mps) = (&raceline.cross_sections, settings.entry_mps);
-                let solvers = ReferenceSolvers::stopped_by(road, &raceline.car, entry_mps, Arc::clone(stop))?;
-                let found = solvers.best(LineObjective::LapTime)?;
+                let found = raceline
+                    .solvers(&settings.raceline(), stop)?
+                    .best(LineObjective::LapTime)?;
                 if stop.load(Ordering::Relaxed) {
                     return Ok(None);
                 }

@@ -6,13 +6,15 @@ use crate::error::{Error, Result};
 use crate::evaluate::Evaluator;
 use crate::evaluate::line::{CpuLineEvaluator, LineObjective, LineProblem};
 use crate::line::{Clearance, FINE_M, FineLine, Parametrisation, PointMass, RoadEdges, TERMS};
-use crate::optimum::mended;
+use crate::optimum::{ReferenceSolvers, mended};
 use crate::study::framework::Plan;
 use crate::track::{CrossSections, Spacing, Track, racetrack_csv};
 use crate::vehicle::limits::{SpeedRange, car_envelope};
 use crate::vehicle::powertrain::Powertrain;
 use crate::vehicle::{Car, Envelope};
 use glam::DVec2;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 /// Waves of a survey's reference line that are shorter than this are noise (m): the tightest bend of a road is longer.
 const REFERENCE_M: f64 = 60.0;
@@ -190,6 +192,20 @@ impl Setup {
         )
     }
 
+    /// The solvers of reference optima, ended by `stop`. Their fastest lines keep the car between the edges.
+    ///
+    /// # Errors
+    /// Those of [`ReferenceSolvers::stopped_by`].
+    pub fn solvers(&self, settings: &RacelineSettings, stop: &Arc<AtomicBool>) -> Result<ReferenceSolvers> {
+        let solvers = ReferenceSolvers::stopped_by(
+            &self.cross_sections,
+            &self.car,
+            settings.entry_mps,
+            Arc::clone(stop),
+        )?;
+        Ok(solvers.kept_between(&self.edges_m, settings.plan_with_margin()))
+    }
+
     /// A line's points at the cross-sections in the racetrack database's format, with the distances square to the line from it to
     /// the edges of the road.
     pub(super) fn racetrack_csv(&self, line: &ReportedLine) -> String {
@@ -233,11 +249,15 @@ impl Setup {
     /// Those of [`mended`].
     pub fn brought_in(&self, alpha: &[f64], settings: &RacelineSettings) -> Result<Option<Vec<f64>>> {
         let (fine, clearances) = self.measured(alpha, settings)?;
-        if Clearance::least(&fine, &clearances).is_on_road() {
+        let least = Clearance::least(&fine, &clearances);
+        if least.margin_m >= 0.0 {
             return Ok(Some(alpha.to_vec()));
         }
         if let Some(line) = mended(&self.cross_sections, alpha, |line| self.measured(line, settings))? {
             return Ok(Some(line));
+        }
+        if least.is_on_road() {
+            return Ok(Some(alpha.to_vec()));
         }
         // Where bending alone does not help, the whole line gives way a little towards the reference line.
         for share in TOWARDS_REFERENCE {

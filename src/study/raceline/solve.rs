@@ -42,8 +42,7 @@ pub(super) fn find_lines(work: Work<'_, Raceline>) -> Result<Outcome> {
     let mut work = Running::begin(Origin::new(inputs_of(setup), &backend), work)?;
     let reference = setup.report("reference", &setup.cross_sections.reference, settings)?;
     let stop = Arc::new(AtomicBool::new(false));
-    let road = &setup.cross_sections;
-    let solvers = ReferenceSolvers::stopped_by(road, &setup.car, settings.entry_mps, Arc::clone(&stop))?;
+    let solvers = setup.solvers(settings, &stop)?;
     work.began = Instant::now();
     let mut evaluations = 0;
     let mut objectives = Vec::new();
@@ -58,7 +57,7 @@ pub(super) fn find_lines(work: Work<'_, Raceline>) -> Result<Outcome> {
         let solvers = &solvers;
         let solve = move |objective: LineObjective| -> Result<(Option<OptimumLine>, f64)> {
             let began = Instant::now();
-            let solved = solvers.reference(objective)?;
+            let solved = solvers.best(objective)?;
             Ok((solved, began.elapsed().as_secs_f64()))
         };
         let each = settings.objectives.iter();
