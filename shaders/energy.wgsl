@@ -84,7 +84,7 @@ fn store_left(state: EnergyState) -> f32 {
 }
 
 fn additional(section: u32, start: f32, length: f32, here: f32, there: f32, most: f32, left: f32, candidate: u32) -> Step {
-    let first = envelope_at(start, here);
+    let first = driving_at(start, here);
     let engine = min(first.x, first.y);
     let ahead = max(start + length * (engine - first.z), 0.0);
     let held = min(max(ahead * account.rows_per_speed_squared, 0.0), f32(ENVELOPE_ROWS));
@@ -99,7 +99,7 @@ fn additional(section: u32, start: f32, length: f32, here: f32, there: f32, most
 
     let both = min(first.x, first.y + boost);
     let middle = max(start + length * (both - first.z), 0.0);
-    let later = envelope_at(middle, 0.5 * (here + there));
+    let later = driving_at(middle, 0.5 * (here + there));
     let later_both = min(later.x, later.y + boost);
     let motor = 0.5 * ((both - engine) + (later_both - min(later.x, later.y)));
     let reached = max(start + length * ((both - first.z) + (later_both - later.z)), 0.0);
@@ -110,10 +110,10 @@ fn additional(section: u32, start: f32, length: f32, here: f32, there: f32, most
 }
 
 fn engine_only(start: f32, length: f32, here: f32, there: f32, most: f32) -> f32 {
-    let at_start = envelope_at(start, here);
+    let at_start = driving_at(start, here);
     let first = min(at_start.x, at_start.y) - at_start.z;
     let middle = max(start + length * first, 0.0);
-    let later = envelope_at(middle, 0.5 * (here + there));
+    let later = driving_at(middle, 0.5 * (here + there));
     let second = min(later.x, later.y) - later.z;
     return min(max(start + length * (first + second), 0.0), most);
 }

@@ -3,8 +3,9 @@
 // One lane per candidate. Segment lengths, curvatures and speeds squared stand in a buffer, in tiles of TILE lanes: section by
 // section within a tile, so that neighbouring lanes and neighbouring sections read neighbouring memory. All lanes start a lap's
 // passes at the same section for the same reason. The constants CLOSED, TERMS, WANTS_INTEGRAL, WANTS_LAP, ENVELOPE_ROWS,
-// CORNER_ROWS, ELLIPSE_ROWS, WORKGROUP and TILE are generated, and so are the bindings 1 to 4: `sections`; `envelope` in rows of
-// lateral, grip, drive, drag at their start and then of their rises; `corners` and `ellipse` in rows of a figure and its rise.
+// CORNER_ROWS, ELLIPSE_ROWS, HAS_TRACTION, TRACTION_SPEEDS, TRACTION_ROOTS, WORKGROUP and TILE are generated, and so are the
+// bindings 1 to 4: `sections`; `envelope` in rows of lateral, grip, drive, drag at their start and then of their rises, and behind
+// them the cells of traction; `corners` and `ellipse` in rows of a figure and its rise.
 // All lanes read the same section, so these tables are uniform buffers if they fit. The envelope is one only on drivers that let
 // lanes read different rows at full speed.
 
@@ -169,39 +170,72 @@ fn corner(curvature: f32) -> f32 {
     return figures.x + (held - f32(row)) * figures.y;
 }
 
-// The longitudinal grip that is left, the drive and the drag.
-fn envelope_at(speed_squared: f32, curvature: f32) -> vec3<f32> {
+// Lateral, grip, drive and drag.
+fn limits_at(speed_squared: f32) -> vec4<f32> {
     let held = min(max(speed_squared * stretch.rows_per_speed_squared, 0.0), f32(ENVELOPE_ROWS));
     let row = min(u32(held), ENVELOPE_ROWS - 1u);
-    let at = envelope[2u * row] + (held - f32(row)) * envelope[2u * row + 1u];
-    let share = curvature * speed_squared / at.x;
-    var left = sqrt(max(1.0 - share * share, 0.0));
-    if ELLIPSE_ROWS > 0u {
-        let held = min(max(left * f32(ELLIPSE_ROWS), 0.0), f32(ELLIPSE_ROWS));
-        let row = min(u32(held), ELLIPSE_ROWS - 1u);
-        let figures = ellipse[row];
-        left = figures.x + (held - f32(row)) * figures.y;
+    return envelope[2u * row] + (held - f32(row)) * envelope[2u * row + 1u];
+}
+
+fn root_left(speed_squared: f32, curvature: f32, lateral: f32) -> f32 {
+    let share = curvature * speed_squared / lateral;
+    return sqrt(max(1.0 - share * share, 0.0));
+}
+
+fn left_for_braking(root: f32) -> f32 {
+    if ELLIPSE_ROWS == 0u {
+        return root;
     }
+    let held = min(max(root * f32(ELLIPSE_ROWS), 0.0), f32(ELLIPSE_ROWS));
+    let row = min(u32(held), ELLIPSE_ROWS - 1u);
+    let figures = ellipse[row];
+    return figures.x + (held - f32(row)) * figures.y;
+}
+
+fn left_for_driving(speed_squared: f32, root: f32) -> f32 {
+    if !HAS_TRACTION {
+        return left_for_braking(root);
+    }
+    let per_row = f32(TRACTION_SPEEDS) / f32(ENVELOPE_ROWS);
+    let along = speed_squared * stretch.rows_per_speed_squared * per_row;
+    let held = min(max(along, 0.0), f32(TRACTION_SPEEDS));
+    let across = root * f32(TRACTION_ROOTS);
+    let speed = min(u32(held), TRACTION_SPEEDS - 1u);
+    let cell = min(u32(across), TRACTION_ROOTS - 1u);
+    let figures = envelope[2u * ENVELOPE_ROWS + speed * TRACTION_ROOTS + cell];
+    let beyond = held - f32(speed);
+    let start = figures.x + beyond * figures.y;
+    return start + (across - f32(cell)) * (figures.z + beyond * figures.w);
+}
+
+// The traction that is left, the drive and the drag.
+fn driving_at(speed_squared: f32, curvature: f32) -> vec3<f32> {
+    let at = limits_at(speed_squared);
+    let left = left_for_driving(speed_squared, root_left(speed_squared, curvature, at.x));
     return vec3<f32>(at.y * left, at.z, at.w);
 }
 
-// Greatest acceleration and greatest deceleration.
-fn longitudinal(speed_squared: f32, curvature: f32) -> vec2<f32> {
-    let at = envelope_at(speed_squared, curvature);
-    return vec2<f32>(min(at.x, at.y) - at.z, at.x + at.z);
+fn acceleration(speed_squared: f32, curvature: f32) -> f32 {
+    let at = driving_at(speed_squared, curvature);
+    return min(at.x, at.y) - at.z;
+}
+
+fn deceleration(speed_squared: f32, curvature: f32) -> f32 {
+    let at = limits_at(speed_squared);
+    return at.y * left_for_braking(root_left(speed_squared, curvature, at.x)) + at.w;
 }
 
 fn driven(start: f32, length: f32, here: f32, there: f32) -> f32 {
-    let first = longitudinal(start, here).x;
+    let first = acceleration(start, here);
     let middle = max(start + length * first, 0.0);
-    let drive = longitudinal(middle, 0.5 * (here + there)).x;
+    let drive = acceleration(middle, 0.5 * (here + there));
     return max(start + length * (first + drive), 0.0);
 }
 
 fn braked(end: f32, length: f32, there: f32, here: f32) -> f32 {
-    let first = longitudinal(end, there).y;
+    let first = deceleration(end, there);
     let middle = end + length * first;
-    let brake = longitudinal(middle, 0.5 * (here + there)).y;
+    let brake = deceleration(middle, 0.5 * (here + there));
     return end + length * (first + brake);
 }
 

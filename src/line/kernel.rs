@@ -9,7 +9,7 @@
 //! J. Dyn. Sys., Meas., Control 138, 2016).
 
 use super::plan::{LinePlan, SectionRow};
-use super::point_mass::{ENVELOPE_WIDTH, EnvelopeTable};
+use super::point_mass::{ENVELOPE_WIDTH, EnvelopeTable, TRACTION_ROOTS, TRACTION_SPEEDS};
 use crate::scalar::{Lookup, Real};
 
 /// Terms that are summed before they are added to the running total. This keeps `f32` sums over long laps accurate.
@@ -213,39 +213,79 @@ pub fn corner<R: Lookup>(envelope: &EnvelopeTable<R::Storage>, curvature: R) -> 
     look_up(&envelope.corners, 2, place, beyond, 0)
 }
 
-/// The longitudinal grip that is left, the drive and the drag (m/s^2) at a speed squared in a bend.
+/// The limits at a speed squared in a bend: lateral, grip, drive and drag (m/s^2), and the root of what the lateral share leaves.
 #[inline(always)]
-pub(super) fn envelope_at<R: Lookup>(
-    envelope: &EnvelopeTable<R::Storage>,
-    speed_squared: R,
-    curvature: R,
-) -> [R; 3] {
+fn limits_at<R: Lookup>(envelope: &EnvelopeTable<R::Storage>, speed_squared: R, curvature: R) -> ([R; 4], R) {
     let rows = envelope.rows.len() / ENVELOPE_WIDTH;
     let argument = speed_squared * R::load(envelope.rows_per_speed_squared);
     let (place, beyond) = argument.place(rows, ENVELOPE_WIDTH);
     let row = R::pick_row(&envelope.rows, place);
-    let at = |column: usize| row[column] + beyond * row[ENVELOPE_WIDTH / 2 + column];
-    let share = curvature * speed_squared / at(0);
+    let limits: [R; 4] =
+        std::array::from_fn(|column| row[column] + beyond * row[ENVELOPE_WIDTH / 2 + column]);
+    let share = curvature * speed_squared / limits[0];
     let root = (R::lit(1.0) - share * share).max(R::lit(0.0)).sqrt();
-    let left = if envelope.ellipse.is_empty() {
-        root
-    } else {
-        let rows = envelope.ellipse.len() / 2;
-        let (place, beyond) = (root * R::lit(rows as f64)).place(rows, 2);
-        look_up(&envelope.ellipse, 2, place, beyond, 0)
-    };
-    [at(1) * left, at(2), at(3)]
+    (limits, root)
 }
 
-/// Greatest acceleration and greatest deceleration (m/s^2) at a speed squared in a bend.
+/// The share of the longitudinal grip that is left for braking.
 #[inline(always)]
-pub fn longitudinal<R: Lookup>(
+fn left_for_braking<R: Lookup>(envelope: &EnvelopeTable<R::Storage>, root: R) -> R {
+    if envelope.ellipse.is_empty() {
+        return root;
+    }
+    let rows = envelope.ellipse.len() / 2;
+    let (place, beyond) = (root * R::lit(rows as f64)).place(rows, 2);
+    look_up(&envelope.ellipse, 2, place, beyond, 0)
+}
+
+/// The same for driving.
+#[inline(always)]
+fn left_for_driving<R: Lookup>(envelope: &EnvelopeTable<R::Storage>, speed_squared: R, root: R) -> R {
+    if envelope.traction.is_empty() {
+        return left_for_braking(envelope, root);
+    }
+    // Cells are counted in whole numbers, which scalars hold exactly.
+    let rows = envelope.rows.len() / ENVELOPE_WIDTH;
+    let per_row = R::lit(TRACTION_SPEEDS as f64 / rows as f64);
+    let (speeds, roots) = (R::lit(TRACTION_SPEEDS as f64), R::lit(TRACTION_ROOTS as f64));
+    let along = speed_squared * R::load(envelope.rows_per_speed_squared) * per_row;
+    let along = along.max(R::lit(0.0)).min(speeds);
+    let across = root * roots;
+    let (speed, cell) = (along.whole(TRACTION_SPEEDS - 1), across.whole(TRACTION_ROOTS - 1));
+    let (place, _) = (speed * roots + cell).place(TRACTION_SPEEDS * TRACTION_ROOTS, 4);
+    let figure = |column: usize| R::pick(&envelope.traction, place, column);
+    let along = along - speed;
+    let start = figure(0) + along * figure(1);
+    start + (across - cell) * (figure(2) + along * figure(3))
+}
+
+/// The traction that is left, the drive and the drag (m/s^2) at a speed squared in a bend.
+#[inline(always)]
+pub(super) fn driving_at<R: Lookup>(
     envelope: &EnvelopeTable<R::Storage>,
     speed_squared: R,
     curvature: R,
-) -> [R; 2] {
-    let [grip, drive, drag] = envelope_at(envelope, speed_squared, curvature);
-    [grip.min(drive) - drag, grip + drag]
+) -> [R; 3] {
+    let ([_, grip, drive, drag], root) = limits_at(envelope, speed_squared, curvature);
+    [
+        grip * left_for_driving(envelope, speed_squared, root),
+        drive,
+        drag,
+    ]
+}
+
+/// Greatest acceleration (m/s^2) at a speed squared in a bend.
+#[inline(always)]
+pub fn acceleration<R: Lookup>(envelope: &EnvelopeTable<R::Storage>, speed_squared: R, curvature: R) -> R {
+    let [traction, drive, drag] = driving_at(envelope, speed_squared, curvature);
+    traction.min(drive) - drag
+}
+
+/// Greatest deceleration (m/s^2) at a speed squared in a bend.
+#[inline(always)]
+pub fn deceleration<R: Lookup>(envelope: &EnvelopeTable<R::Storage>, speed_squared: R, curvature: R) -> R {
+    let ([_, grip, _, drag], root) = limits_at(envelope, speed_squared, curvature);
+    grip * left_for_braking(envelope, root) + drag
 }
 
 /// Speed squared after driving from a section to the next, on the mean of the limits at the start and at the middle. Out of a
@@ -255,9 +295,9 @@ pub fn longitudinal<R: Lookup>(
 #[inline(always)]
 fn driven<R: Lookup>(envelope: &EnvelopeTable<R::Storage>, from: R, length: R, here: R, there: R) -> R {
     let zero = R::lit(0.0);
-    let [start, _] = longitudinal(envelope, from, here);
+    let start = acceleration(envelope, from, here);
     let middle = (from + length * start).max(zero);
-    let [drive, _] = longitudinal(envelope, middle, R::lit(0.5) * (here + there));
+    let drive = acceleration(envelope, middle, R::lit(0.5) * (here + there));
     (from + length * (start + drive)).max(zero)
 }
 
@@ -270,9 +310,9 @@ pub(super) fn braked<R: Lookup>(
     there: R,
     here: R,
 ) -> R {
-    let [_, end] = longitudinal(envelope, to, there);
+    let end = deceleration(envelope, to, there);
     let middle = to + length * end;
-    let [_, brake] = longitudinal(envelope, middle, R::lit(0.5) * (here + there));
+    let brake = deceleration(envelope, middle, R::lit(0.5) * (here + there));
     to + length * (end + brake)
 }
 

@@ -3,6 +3,7 @@
 use crate::error::{Error, Result};
 use crate::scalar::Real;
 use crate::vehicle::Envelope;
+use crate::vehicle::envelope::root_left;
 
 /// A point mass within a car's g-g-v envelope.
 #[derive(Clone, Debug, PartialEq)]
@@ -38,7 +39,17 @@ pub struct EnvelopeTable<S> {
     /// The share of the longitudinal grip that is left over `sqrt(1 - (lateral share)^2)`, then its rise. Empty where the
     /// ellipse has exponent 2 and that root is the share itself.
     pub ellipse: Vec<S>,
+    /// The share of the longitudinal grip that is left for driving, in cells over [`TRACTION_SPEEDS`] even steps of the speed squared
+    /// and [`TRACTION_ROOTS`] of the same root: the figure at a cell's start, its rise over the speed squared, its rise over the
+    /// root, and what that rise gains over the speed squared. Empty where the envelope says nothing of it and driving has what
+    /// braking has.
+    pub traction: Vec<S>,
 }
+
+/// Cells of [`EnvelopeTable::traction`] over the speed squared. The share changes with downforce alone.
+pub const TRACTION_SPEEDS: usize = 32;
+/// Cells over the root of what the lateral share leaves.
+pub const TRACTION_ROOTS: usize = 32;
 
 /// Figures of a row of [`EnvelopeTable::rows`].
 pub const ENVELOPE_WIDTH: usize = 8;
@@ -109,7 +120,28 @@ impl PointMass {
             } else {
                 with_rises(&self.ellipse_knots())
             },
+            traction: self.traction_cells(top),
         })
+    }
+
+    /// The cells of traction in bends. Tyres that drive never have more than the ellipse.
+    fn traction_cells(&self, top: f64) -> Vec<f64> {
+        let knot = |speed: usize, root: usize| {
+            let v = (top * speed as f64 / TRACTION_SPEEDS as f64).sqrt();
+            let root = root as f64 / TRACTION_ROOTS as f64;
+            // The share whose root it is has that root in turn.
+            let most = self.envelope.traction_at(v, root_left(root))? / self.envelope.at(v).ax_grip_mps2;
+            Some(most.min(self.left_for_braking(root)))
+        };
+        let cell = |(speed, root): (usize, usize)| {
+            let start = knot(speed, root)?;
+            let (faster, straighter) = (knot(speed + 1, root)?, knot(speed, root + 1)?);
+            let both = knot(speed + 1, root + 1)?;
+            let across = straighter - start;
+            Some([start, faster - start, across, both - faster - across])
+        };
+        let cells = (0..TRACTION_SPEEDS).flat_map(|speed| (0..TRACTION_ROOTS).map(move |root| (speed, root)));
+        cells.filter_map(cell).flatten().collect()
     }
 
     /// The radius from which on no speed is too great, and the corner speed squared at even steps up to it: the least
@@ -145,15 +177,19 @@ impl PointMass {
         (radius_top, corners.collect())
     }
 
-    fn ellipse_knots(&self) -> Vec<[f64; 1]> {
+    /// The share of the longitudinal grip that the ellipse leaves at a root of what the lateral share leaves.
+    fn left_for_braking(&self, root: f64) -> f64 {
         let p = self.ellipse_exponent;
-        (0..=ELLIPSE_ROWS)
-            .map(|i| {
-                let root = i as f64 / ELLIPSE_ROWS as f64;
-                let lateral_squared = 1.0 - root * root;
-                [(1.0 - lateral_squared.powf(p / 2.0)).powf(1.0 / p)]
-            })
-            .collect()
+        if p == 2.0 {
+            return root;
+        }
+        let lateral_squared = 1.0 - root * root;
+        (1.0 - lateral_squared.powf(p / 2.0)).powf(1.0 / p)
+    }
+
+    fn ellipse_knots(&self) -> Vec<[f64; 1]> {
+        let roots = (0..=ELLIPSE_ROWS).map(|i| i as f64 / ELLIPSE_ROWS as f64);
+        roots.map(|root| [self.left_for_braking(root)]).collect()
     }
 }
 
@@ -179,6 +215,7 @@ impl EnvelopeTable<f64> {
             rows_per_radius: R::store(self.rows_per_radius),
             corners: all(&self.corners),
             ellipse: all(&self.ellipse),
+            traction: all(&self.traction),
         }
     }
 }

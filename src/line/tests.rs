@@ -2,7 +2,8 @@ use super::kernel::{Course, Wanted, lap_time, shape};
 use super::*;
 use crate::scalar::Dual;
 use crate::track::CrossSections;
-use crate::vehicle::{Envelope, EnvelopeRow};
+use crate::vehicle::limits::{SpeedRange, car_envelope};
+use crate::vehicle::{BendTraction, Car, Envelope, EnvelopeRow};
 use glam::DVec2;
 use std::f64::consts::{PI, TAU};
 
@@ -143,7 +144,7 @@ fn other_exponents_bulge_the_ellipse() {
     };
     let half = |exponent: f64| {
         let table = table(exponent);
-        let brake = kernel::longitudinal::<f64>(&table, 900.0, 0.5 * 15.229 / 900.0)[1];
+        let brake = kernel::deceleration::<f64>(&table, 900.0, 0.5 * 15.229 / 900.0);
         (brake - 0.5 * 1.2 * 0.9 / 1245.0 * 900.0) / 14.3056
     };
     for exponent in [1.0f64, 1.5, 2.0, 2.5] {
@@ -341,6 +342,63 @@ fn clearance_is_the_distance_to_the_edges() {
     }
 }
 
+/// With 12 m/s^2 across, 10 along and a traction of 6, 5 and 0 at shares of 0, 0.8 and 1: 0.8 of the limit leaves 5, where the
+/// ellipse leaves 6, and 0.6 leaves 0.8 of the root, half-way from 0.6 to 1. Braking has the ellipse.
+#[test]
+fn driven_tyres_have_less_in_bends() {
+    let free = car(|_| [12.0, 10.0, 9.0, 0.0], 100.0);
+    let in_bends = BendTraction {
+        shares: vec![0.0, 0.8, 1.0],
+        rows: vec![vec![6.0, 5.0, 0.0]; free.envelope.rows().len()],
+    };
+    let driven = PointMass {
+        envelope: free.envelope.clone().with_bend_traction(in_bends).unwrap(),
+        ..free.clone()
+    };
+    let tables = [free, driven].map(|car| car.table().unwrap());
+    for (share, ellipse, wanted) in [
+        (0.0, 9.0, 6.0),
+        (0.6, 8.0, 5.5),
+        (0.8, 6.0, 5.0),
+        (0.96, 2.8, 2.8 * 5.0 / 6.0),
+        (1.0, 0.0, 0.0),
+    ] {
+        let at = |table| kernel::acceleration::<f64>(table, 900.0, share * 12.0 / 900.0);
+        let [by_ellipse, by_table] = [at(&tables[0]), at(&tables[1])];
+        // Cells of a thirty-second of the root cut the corner at 0.6.
+        assert!((by_ellipse - ellipse).abs() < 1e-6, "{share}: {by_ellipse}");
+        assert!((by_table - wanted).abs() < 0.05, "{share}: {by_table}");
+        let brake = |table| kernel::deceleration::<f64>(table, 900.0, share * 12.0 / 900.0);
+        assert_eq!(brake(&tables[0]), brake(&tables[1]));
+    }
+}
+
+/// A bend of 25 m that opens within 60 m on to a straight. The bundled car is driven at the rear: with the ellipse of all four
+/// tyres it leaves the bend faster than it can.
+#[test]
+fn a_car_driven_at_the_rear_leaves_corners_more_slowly() {
+    let car = Car::bundled().unwrap();
+    let swept = car_envelope(&car, &SpeedRange::USUAL).unwrap().envelope;
+    let ellipse = Envelope::new("ellipse", swept.rows().to_vec()).unwrap();
+    let bend = |i: usize| (2.0 - i as f64 / 30.0).clamp(0.0, 1.0) / 25.0;
+    let curvature: Vec<f64> = (0..100).map(bend).collect();
+    let [slow, fast] = [swept, ellipse].map(|envelope| {
+        let car = PointMass::new(envelope, 2.6);
+        let table = car.table().unwrap();
+        lap_profile(&car, &table, &[2.0; 100], &curvature, 100.0).unwrap()
+    });
+    assert_eq!(slow.v_mps[0], fast.v_mps[0]);
+    let lost = |i: usize| fast.v_mps[i] - slow.v_mps[i];
+    let most = (0..100).map(lost).fold(0.0, f64::max);
+    assert!(most > 0.5 && (0..100).all(|i| lost(i) > -1e-9), "{most}");
+    assert!(
+        slow.time_s > fast.time_s + 0.05,
+        "{} {}",
+        slow.time_s,
+        fast.time_s
+    );
+}
+
 /// The lap with the limits of each segment's start, forwards and backwards, which the kernel does not do.
 fn first_order_time(shape: &Geometry) -> f64 {
     let table = gt_car().table().unwrap();
@@ -349,12 +407,12 @@ fn first_order_time(shape: &Geometry) -> f64 {
     let mut w: Vec<f64> = bend.iter().map(|k| kernel::corner::<f64>(&table, *k)).collect();
     for i in 0..2 * n {
         let (here, next) = (i % n, (i + 1) % n);
-        let drive = kernel::longitudinal::<f64>(&table, w[here], bend[here])[0];
+        let drive = kernel::acceleration::<f64>(&table, w[here], bend[here]);
         w[next] = w[next].min(w[here] + 2.0 * h[here] * drive);
     }
     for i in (0..2 * n).rev() {
         let (here, next) = (i % n, (i + 1) % n);
-        let brake = kernel::longitudinal::<f64>(&table, w[next], bend[next])[1];
+        let brake = kernel::deceleration::<f64>(&table, w[next], bend[next]);
         w[here] = w[here].min(w[next] + 2.0 * h[here] * brake);
     }
     (0..n)

@@ -33,10 +33,27 @@ pub struct Grip {
     pub drag: Slope,
 }
 
+/// What the driven tyres can give in a bend (m/s^2), with its derivatives by speed and by the root of what the lateral share
+/// leaves.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BendGrip {
+    /// The greatest acceleration.
+    pub value: f64,
+    /// Its derivative by speed (m/s).
+    pub by_speed: f64,
+    /// Its derivative by the root.
+    pub by_root: f64,
+}
+
 /// The g-g-v envelope of a point mass.
 pub trait GripEnvelope: Sync {
     /// The envelope at a speed (m/s).
     fn at(&self, speed_mps: f64) -> Grip;
+    /// What the driven tyres can give at a speed (m/s) and a root of what the lateral share leaves; `None` where the ellipse says
+    /// so.
+    fn traction(&self, _speed_mps: f64, _root: f64) -> Option<BendGrip> {
+        None
+    }
     /// The top speed (m/s).
     fn top_speed_mps(&self) -> f64;
     /// The curvature (1/m) that the car reaches on its steering lock. Beyond it the corner speed squared falls as that of a
@@ -291,7 +308,11 @@ fn push(envelope: &dyn GripEnvelope, pass: Pass, e: f64, curvature_1pm: f64) -> 
     };
     let (drag_value, drag_slope) = (sign * drag.value, sign * drag.by_speed * per_square);
     let share = left.max(0.0).sqrt();
-    let tyre = grip.longitudinal.value * share;
+    let in_bend = match pass {
+        Pass::Drive => envelope.traction(v, share),
+        Pass::Brake => None,
+    };
+    let tyre = in_bend.map_or(grip.longitudinal.value * share, |t| t.value);
     if pass == Pass::Drive && grip.drive.value < tyre {
         return Push {
             share: 1.0,
@@ -312,8 +333,11 @@ fn push(envelope: &dyn GripEnvelope, pass: Pass, e: f64, curvature_1pm: f64) -> 
     }
     let used_by_square = curvature_1pm / lateral - used * grip.lateral.by_speed * per_square / lateral;
     let used_by_curvature = e / lateral;
-    let pull = grip.longitudinal.value * used;
-    let along = grip.longitudinal.by_speed * per_square * left;
+    let pull = in_bend.map_or(grip.longitudinal.value, |t| t.by_root) * used;
+    let along = match in_bend {
+        Some(t) => t.by_speed * per_square * share,
+        None => grip.longitudinal.by_speed * per_square * left,
+    };
     Push {
         share,
         value: tyre + drag_value,

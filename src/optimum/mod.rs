@@ -34,7 +34,7 @@ pub use descent::{
     DescentSettings, Start, descend, fastest, minimum_curvature, minimum_curvature_of, polish_lines,
 };
 pub use geometry::LineMap;
-pub use lap::{Grip, GripEnvelope, SegmentBend, Slope};
+pub use lap::{BendGrip, Grip, GripEnvelope, SegmentBend, Slope};
 pub use mend::mended;
 pub use objective::{Measures, ReferenceProblem, Weights};
 pub use point_mass::PointMassEnvelope;

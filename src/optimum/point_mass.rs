@@ -1,14 +1,16 @@
 //! The g-g-v envelope of a [`PointMass`], as the solvers use it.
 
-use super::lap::{Grip, GripEnvelope, Slope};
+use super::lap::{BendGrip, Grip, GripEnvelope, Slope};
 use crate::line::PointMass;
-use crate::vehicle::EnvelopeRow;
+use crate::vehicle::envelope::traction_at_root;
+use crate::vehicle::{BendTraction, EnvelopeRow};
 use crate::{Error, Result};
 
 /// The envelope of a point mass, linear in speed between its rows, and its steering lock.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PointMassEnvelope {
     rows: Vec<EnvelopeRow>,
+    in_bends: Option<BendTraction>,
     lock_1pm: f64,
 }
 
@@ -30,6 +32,7 @@ impl PointMassEnvelope {
         }
         Ok(Self {
             rows: car.envelope.rows().to_vec(),
+            in_bends: car.envelope.bend_traction().cloned(),
             lock_1pm: car
                 .max_steer_rad
                 .map_or(f64::INFINITY, |lock| lock / car.wheelbase_m),
@@ -37,13 +40,17 @@ impl PointMassEnvelope {
     }
 }
 
+impl PointMassEnvelope {
+    /// The rows on both sides of a speed.
+    fn around(&self, v_mps: f64) -> [usize; 2] {
+        let after = self.rows.partition_point(|row| row.v_mps <= v_mps);
+        [after.saturating_sub(1), after.min(self.rows.len() - 1)]
+    }
+}
+
 impl GripEnvelope for PointMassEnvelope {
     fn at(&self, v_mps: f64) -> Grip {
-        let after = self.rows.partition_point(|row| row.v_mps <= v_mps);
-        let (low, high) = (
-            self.rows[after.saturating_sub(1)],
-            self.rows[after.min(self.rows.len() - 1)],
-        );
+        let [low, high] = self.around(v_mps).map(|i| self.rows[i]);
         let span = high.v_mps - low.v_mps;
         let between = |figure: fn(&EnvelopeRow) -> f64| {
             let by_speed = if span > 0.0 {
@@ -64,6 +71,26 @@ impl GripEnvelope for PointMassEnvelope {
         }
     }
 
+    fn traction(&self, v_mps: f64, root: f64) -> Option<BendGrip> {
+        let BendTraction { shares, rows } = self.in_bends.as_ref()?;
+        let [low, high] = self.around(v_mps);
+        let [from, to] = [low, high].map(|i| traction_at_root(shares, &rows[i], root));
+        let (start, span) = (self.rows[low].v_mps, self.rows[high].v_mps - self.rows[low].v_mps);
+        let share = if span > 0.0 {
+            ((v_mps - start) / span).max(0.0)
+        } else {
+            0.0
+        };
+        let value = from.0 + share * (to.0 - from.0);
+        // Tyres that drive never have more than the ellipse.
+        let grip = self.at(v_mps).longitudinal;
+        (value < grip.value * root).then_some(BendGrip {
+            value,
+            by_speed: if span > 0.0 { (to.0 - from.0) / span } else { 0.0 },
+            by_root: from.1 + share * (to.1 - from.1),
+        })
+    }
+
     fn lock_1pm(&self) -> f64 {
         self.lock_1pm
     }
@@ -77,8 +104,52 @@ impl GripEnvelope for PointMassEnvelope {
 mod tests {
     use super::super::lap::corner_square;
     use super::*;
-    use crate::line::kernel::corner;
-    use crate::vehicle::Envelope;
+    use crate::line::kernel::{acceleration, corner};
+    use crate::vehicle::limits::{SpeedRange, car_envelope};
+    use crate::vehicle::{Car, Envelope};
+
+    /// Both have the sweep's table: the solvers as it is, the kernels in cells of a thirty-second of the root, over which traction
+    /// bends by less than a tenth of a m/s^2.
+    #[test]
+    fn the_solvers_know_the_traction_in_bends_as_the_kernels_do() {
+        let car = Car::bundled().unwrap();
+        let swept = car_envelope(&car, &SpeedRange::USUAL).unwrap().envelope;
+        // The engine is out of the way.
+        let rows = swept.rows().iter().map(|row| EnvelopeRow {
+            ax_drive_mps2: 100.0,
+            ..*row
+        });
+        let car = PointMass::new(swept.with_rows("strong", rows.collect()).unwrap(), 2.6);
+        let (table, solvers) = (car.table().unwrap(), PointMassEnvelope::new(&car).unwrap());
+        let mut compared = 0;
+        for v in [20.0, 33.0, 50.0, 65.0f64] {
+            let grip = solvers.at(v);
+            for root in [0.0, 0.1, 0.3, 0.5, 0.7, 0.9, 0.99f64] {
+                let used = (1.0 - root * root).sqrt() * grip.lateral.value / (v * v);
+                let kernel = acceleration::<f64>(&table, v * v, used) + grip.drag.value;
+                let bend = solvers.traction(v, root);
+                let value = bend.map_or(grip.longitudinal.value * root, |bend| bend.value);
+                assert!((kernel - value).abs() < 0.15, "{v}, {root}: {kernel} {value}");
+                // Away from the shares that were swept the slopes are those of differences.
+                let step = |v: f64, root: f64| solvers.traction(v, root).map(|bend| bend.value);
+                if let (Some(bend), Some(faster), Some(wider)) =
+                    (bend, step(v + 1e-6, root), step(v, root + 1e-7))
+                {
+                    let (by_speed, by_root) = ((faster - value) / 1e-6, (wider - value) / 1e-7);
+                    assert!(
+                        (by_root - bend.by_root).abs() < 1e-4,
+                        "{v}, {root}: {by_root} {bend:?}"
+                    );
+                    assert!(
+                        (by_speed - bend.by_speed).abs() < 1e-4,
+                        "{v}, {root}: {by_speed} {bend:?}"
+                    );
+                    compared += 1;
+                }
+            }
+        }
+        assert!(compared > 12, "{compared}");
+    }
 
     /// A lock of 0.012 rad at a wheelbase of 2.6 m turns a circle of 217 m. In one of 144.4 m, which takes 0.018 rad, the squared
     /// speed is (0.012 / 0.018)^4 of what the tyres hold.

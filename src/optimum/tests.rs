@@ -38,6 +38,27 @@ impl GripEnvelope for Racer {
     }
 }
 
+/// The same car driven on one axle: it has more than the engine gives on straights only.
+struct DrivenByTwo;
+
+impl GripEnvelope for DrivenByTwo {
+    fn at(&self, v: f64) -> Grip {
+        Racer.at(v)
+    }
+
+    fn traction(&self, v: f64, root: f64) -> Option<BendGrip> {
+        Some(BendGrip {
+            value: (8.5 + 0.03 * v) * root * root,
+            by_speed: 0.03 * root * root,
+            by_root: 2.0 * (8.5 + 0.03 * v) * root,
+        })
+    }
+
+    fn top_speed_mps(&self) -> f64 {
+        70.0
+    }
+}
+
 /// A line that wanders over the middle of the road.
 fn wandering(variables: usize) -> Vec<f64> {
     let random = Random::new(11);
@@ -81,9 +102,10 @@ fn gradients_are_those_of_differences() {
     let (spline, _) = LineMap::parametrised(&cross_sections, &Parametrisation::control_points(40)).unwrap();
     for map in [LineMap::at_every_cross_section(&cross_sections), spline] {
         let spacing = spacing_m(&map, &vec![0.5; map.variables()]);
-        for spacing_m in [None, Some(&spacing[..])] {
+        let cars: [&dyn GripEnvelope; 2] = [&Racer, &DrivenByTwo];
+        for (spacing_m, car) in [None, Some(&spacing[..])].into_iter().zip(cars) {
             let problem = ReferenceProblem {
-                envelope: Some(&Racer),
+                envelope: Some(car),
                 spacing_m,
                 ..ReferenceProblem::of(&map)
             };
@@ -115,7 +137,7 @@ fn gradients_on_an_open_road() {
     cross_sections.closed = false;
     let map = LineMap::at_every_cross_section(&cross_sections);
     let problem = ReferenceProblem {
-        envelope: Some(&Racer),
+        envelope: Some(&DrivenByTwo),
         start_mps: 10.0,
         ..ReferenceProblem::of(&map)
     };
@@ -168,6 +190,38 @@ fn a_cautious_search_does_not_end_before_the_others() {
         "{} {}",
         cautious.value,
         usual.value
+    );
+}
+
+/// The model of a step knows the traction in bends: the search ends at one line from the middle of the road and from the line
+/// that is fastest for the ellipse, and that line is faster than this.
+#[test]
+fn the_search_knows_the_traction_in_bends() {
+    let cross_sections = ellipse(120);
+    let (map, bounds) = LineMap::parametrised(&cross_sections, &Parametrisation::control_points(30)).unwrap();
+    let of = |car| ReferenceProblem {
+        envelope: Some(car),
+        ..ReferenceProblem::of(&map)
+    };
+    let settings = DescentSettings::default();
+    let middle = vec![0.5; map.variables()];
+    let by_four = fastest(&of(&Racer), &bounds, &middle, &settings).unwrap();
+    let problem = of(&DrivenByTwo);
+    let found = [&middle, &by_four.x].map(|start| fastest(&problem, &bounds, start, &settings).unwrap());
+    let [from_middle, from_ellipse] = &found;
+    println!(
+        "{} {} {}",
+        from_middle.value, from_ellipse.value, from_middle.status
+    );
+    assert!(
+        (from_middle.value / from_ellipse.value - 1.0).abs() < 1e-4,
+        "{found:?}"
+    );
+    let kept = problem.measures(&by_four.x).time_s;
+    assert!(
+        from_middle.value < kept && by_four.value < 0.999 * kept,
+        "{kept} {}",
+        by_four.value
     );
 }
 

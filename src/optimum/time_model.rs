@@ -139,7 +139,22 @@ fn add_segment(
         // A segment may lie slightly beyond the ellipse, by rounding or because the car coasts through its middle. It may stay
         // there.
         let whole = affine(longitudinal.constant.hypot(used).max(1.0), Vec::new());
-        program.add_cone([whole, longitudinal.clone(), affine(used, change)]);
+        let across = affine(used, change);
+        program.add_cone([whole, longitudinal.clone(), across.clone()]);
+        // Driven tyres have less. What they have is linear in the root of what the lateral share leaves, which is a variable below
+        // a circle.
+        let root = (1.0 - used * used).max(0.0).sqrt();
+        if let Some(traction) = envelope.traction(v, root) {
+            let left = program.add_variables(std::iter::once((0.0, 1.0)));
+            let whole = affine(used.abs().max(1.0), Vec::new());
+            program.add_cone([whole, affine(0.0, vec![(left, 1.0)]), across]);
+            let slope = 0.5 * per_square * (traction.by_speed - grip.drag.by_speed) / along;
+            let by_root = traction.by_root / along;
+            let mut change = terms(slope + 0.5 / (h * along), slope - 0.5 / (h * along), -by_length);
+            change.push((left, by_root));
+            let spare = ((traction.value - demand) / along).max(0.0);
+            program.add_nonnegative(affine(spare - by_root * root, change));
+        }
     }
     let slope = 0.5 * per_square * (grip.drive.by_speed - grip.drag.by_speed) / along;
     let spare = affine(

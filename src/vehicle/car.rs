@@ -32,6 +32,19 @@ pub enum Tyres {
     },
 }
 
+impl Tyres {
+    /// Whether the right tyres are the mirror image of the left ones. Tyres that do not say on which side they were measured run as
+    /// measured on both.
+    pub fn are_mirrored(&self) -> bool {
+        match self {
+            Self::MagicFormula { front, rear } => [front, rear]
+                .iter()
+                .all(|tyre| tyre.coefficients.tyre_side != 0.0),
+            Self::Linear { .. } => true,
+        }
+    }
+}
+
 /// A car.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Car {

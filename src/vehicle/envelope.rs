@@ -1,8 +1,9 @@
 //! The g-g-v envelope of a car: the greatest accelerations at each speed, within which a point mass laps.
 //!
 //! The acceleration by the tyres stays inside a friction ellipse. Its half axes are the greatest lateral and longitudinal
-//! acceleration, which depend on speed. The engine limits driving too. Drag is not a force of the tyres, so it stays outside the
-//! ellipse. (D. L. Brayshaw and M. F. Harrison, *A quasi steady state approach to race car lap simulation*, Proc. IMechE D 219,
+//! acceleration, which depend on speed. A car that is driven on one axle has less of it for driving: the envelope may have a table
+//! of its traction over speed and share of the lateral limit. The engine limits driving too. Drag is not a force of the tyres, so
+//! it stays outside the ellipse. (D. L. Brayshaw and M. F. Harrison, *A quasi steady state approach to race car lap simulation*, Proc. IMechE D 219,
 //! 2005, for the g-g-speed surface.)
 
 use crate::config::read_text;
@@ -48,6 +49,32 @@ impl EnvelopeRow {
     }
 }
 
+/// The traction in bends: greatest acceleration by the driven tyres over speed and share of the lateral limit.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BendTraction {
+    /// Shares of the lateral limit, rising from 0 to 1.
+    pub shares: Vec<f64>,
+    /// The accelerations (m/s^2) at these shares, for each speed of the envelope.
+    pub rows: Vec<Vec<f64>>,
+}
+
+/// What a share of the lateral limit leaves of a friction ellipse's other half axis.
+pub fn root_left(share: f64) -> f64 {
+    (1.0 - share * share).max(0.0).sqrt()
+}
+
+/// The traction (m/s^2) at a root of what the lateral share leaves, and its derivative by that root.
+///
+/// What is left of the traction near the limit falls with that root, so it is linear in it between the shares.
+pub fn traction_at_root(shares: &[f64], figures: &[f64], root: f64) -> (f64, f64) {
+    let after = shares
+        .partition_point(|share| root_left(*share) >= root)
+        .clamp(1, shares.len() - 1);
+    let (more, less) = (root_left(shares[after - 1]), root_left(shares[after]));
+    let slope = (figures[after - 1] - figures[after]) / (more - less);
+    (figures[after] + (root - less) * slope, slope)
+}
+
 /// A g-g-v envelope: greatest accelerations over speed.
 ///
 /// Between rows the figures are linear in speed; below the first row they are those of the first row. There is no drive at or
@@ -56,10 +83,14 @@ impl EnvelopeRow {
 pub struct Envelope {
     name: String,
     rows: Vec<EnvelopeRow>,
+    in_bends: Option<BendTraction>,
 }
 
 /// The columns of an envelope's table, in the order that [`Envelope::to_csv`] writes them.
 pub const ENVELOPE_COLUMNS: [&str; 5] = ["v_mps", "ay_mps2", "ax_grip_mps2", "ax_drive_mps2", "drag_mps2"];
+
+/// Columns that a table may have besides: the traction at a share of the lateral limit, which the name ends with.
+pub const TRACTION_COLUMN: &str = "ax_traction_mps2_at_";
 
 /// Range of each column: the least value, whether that value itself is allowed, and the greatest.
 const RANGES: [(f64, bool, f64); 5] = [
@@ -82,7 +113,75 @@ impl Envelope {
             check_row(&name, Place::row(index + 1), row, rows[..index].last())?;
         }
         check_count(&name, rows.len())?;
-        Ok(Self { name, rows })
+        Ok(Self {
+            name,
+            rows,
+            in_bends: None,
+        })
+    }
+
+    /// The envelope with a table of its traction in bends.
+    ///
+    /// # Errors
+    /// [`Error::Input`] if shares do not rise from 0 to 1, if a row is missing, or if a figure is out of range or rises with the
+    /// share.
+    pub fn with_bend_traction(mut self, in_bends: BendTraction) -> Result<Self> {
+        let BendTraction { shares, rows } = &in_bends;
+        check_shares(&self.name, Place::from("shares of the lateral limit"), shares)?;
+        if rows.len() != self.rows.len() {
+            let expected = format!("{}, one for each speed", self.rows.len());
+            return Err(Error::input(
+                &self.name,
+                "rows of traction",
+                rows.len().to_string(),
+                expected,
+            ));
+        }
+        for (index, figures) in rows.iter().enumerate() {
+            check_traction(&self.name, Place::row(index + 1), shares, figures)?;
+        }
+        self.in_bends = Some(in_bends);
+        Ok(self)
+    }
+
+    /// The envelope with other figures at the same speeds. Its traction in bends stays.
+    ///
+    /// # Errors
+    /// As [`Envelope::new`] and [`Envelope::with_bend_traction`].
+    pub fn with_rows(&self, name: impl Into<String>, rows: Vec<EnvelopeRow>) -> Result<Self> {
+        let other = Self::new(name, rows)?;
+        match &self.in_bends {
+            Some(in_bends) => other.with_bend_traction(in_bends.clone()),
+            None => Ok(other),
+        }
+    }
+
+    /// The traction in bends, where the envelope has a table of it.
+    pub fn bend_traction(&self) -> Option<&BendTraction> {
+        self.in_bends.as_ref()
+    }
+
+    /// The traction (m/s^2) at a speed (m/s) and a share of the lateral limit, where the envelope has a table of it.
+    pub fn traction_at(&self, v_mps: f64, lateral_share: f64) -> Option<f64> {
+        let in_bends = self.in_bends.as_ref()?;
+        let after = self.after(v_mps);
+        let [low, high] = [after - 1, after];
+        let share = self.between(v_mps, low, high);
+        let at =
+            |row: usize| traction_at_root(&in_bends.shares, &in_bends.rows[row], root_left(lateral_share)).0;
+        Some(at(low) + share * (at(high) - at(low)))
+    }
+
+    /// The row that ends the span that a speed (m/s) lies in.
+    fn after(&self, v_mps: f64) -> usize {
+        let after = self.rows.partition_point(|r| r.v_mps <= v_mps);
+        after.clamp(1, self.rows.len() - 1)
+    }
+
+    /// How far a speed (m/s) is on its way from one row to another.
+    fn between(&self, v_mps: f64, low: usize, high: usize) -> f64 {
+        let (low, high) = (self.rows[low].v_mps, self.rows[high].v_mps);
+        ((v_mps - low) / (high - low)).clamp(0.0, 1.0)
     }
 
     /// Reads an envelope from a CSV file with the columns [`ENVELOPE_COLUMNS`] in any order; lines that begin with
@@ -146,40 +245,64 @@ impl Envelope {
                 }
             };
         }
+        let (places, shares) = traction_columns(file, &header, header_line)?;
         let mut rows: Vec<EnvelopeRow> = Vec::new();
+        let mut tractions = Vec::new();
         for record in reader.records() {
             let record = record.map_err(unreadable)?;
             let line = line_at(record.position());
-            let mut figures = [0.0; 5];
-            for ((figure, place), name) in figures.iter_mut().zip(column).zip(ENVELOPE_COLUMNS) {
+            let number = |place: usize| -> Result<f64> {
                 let field = record.get(place).unwrap_or_default();
-                *figure = field.parse().map_err(|_| {
-                    Error::input(
-                        file,
-                        Place::line(line).field(name),
-                        format!("`{field}`"),
-                        "a number",
-                    )
-                })?;
+                let name = header.get(place).unwrap_or_default();
+                let refused = |_| {
+                    let place = Place::line(line).field(name);
+                    Error::input(file, place, format!("`{field}`"), "a number")
+                };
+                field.parse().map_err(refused)
+            };
+            let mut figures = [0.0; 5];
+            for (figure, place) in figures.iter_mut().zip(column) {
+                *figure = number(place)?;
             }
             let row = EnvelopeRow::from_array(figures);
             check_row(file, Place::line(line), &row, rows.last())?;
             rows.push(row);
+            if !shares.is_empty() {
+                let figures = places
+                    .iter()
+                    .map(|place| number(*place))
+                    .collect::<Result<Vec<_>>>()?;
+                check_traction(file, Place::line(line), &shares, &figures)?;
+                tractions.push(figures);
+            }
         }
         check_count(file, rows.len())?;
+        let in_bends = (!shares.is_empty()).then_some(BendTraction {
+            shares,
+            rows: tractions,
+        });
         Ok(Self {
             name: file.to_owned(),
             rows,
+            in_bends,
         })
     }
 
     /// The table as [`Envelope::load`] reads it.
     pub fn to_csv(&self) -> String {
-        let mut text = ENVELOPE_COLUMNS.join(",") + "\n";
-        for row in &self.rows {
+        let mut text = ENVELOPE_COLUMNS.join(",");
+        // Writing to a string cannot fail.
+        for share in self.in_bends.iter().flat_map(|t| &t.shares) {
+            let _ = write!(text, ",{TRACTION_COLUMN}{share}");
+        }
+        text += "\n";
+        for (index, row) in self.rows.iter().enumerate() {
             let [v, ay, grip, drive, drag] = row.to_array();
-            // Writing to a string cannot fail.
-            let _ = writeln!(text, "{v},{ay},{grip},{drive},{drag}");
+            let _ = write!(text, "{v},{ay},{grip},{drive},{drag}");
+            for figure in self.in_bends.iter().flat_map(|t| &t.rows[index]) {
+                let _ = write!(text, ",{figure}");
+            }
+            text += "\n";
         }
         text
     }
@@ -201,12 +324,9 @@ impl Envelope {
 
     /// The envelope at a speed (m/s). At the top speed and above there is no drive.
     pub fn at(&self, v_mps: f64) -> EnvelopeRow {
-        let after = self
-            .rows
-            .partition_point(|r| r.v_mps <= v_mps)
-            .clamp(1, self.rows.len() - 1);
+        let after = self.after(v_mps);
+        let share = self.between(v_mps, after - 1, after);
         let (low, high) = (self.rows[after - 1].to_array(), self.rows[after].to_array());
-        let share = ((v_mps - low[0]) / (high[0] - low[0])).clamp(0.0, 1.0);
         let mut figures: [f64; 5] = std::array::from_fn(|i| low[i] + share * (high[i] - low[i]));
         figures[0] = v_mps;
         if v_mps >= self.top_speed_mps() {
@@ -214,6 +334,73 @@ impl Envelope {
         }
         EnvelopeRow::from_array(figures)
     }
+}
+
+/// The columns of traction in bends by rising share: their places, and the shares.
+fn traction_columns(
+    file: &str,
+    header: &csv::StringRecord,
+    header_line: usize,
+) -> Result<(Vec<usize>, Vec<f64>)> {
+    let mut columns = Vec::new();
+    for (place, name) in header.iter().enumerate() {
+        let Some(share) = name.strip_prefix(TRACTION_COLUMN) else {
+            continue;
+        };
+        let share: f64 = share.parse().map_err(|_| {
+            let expected = "a share of the lateral limit at its end, 0 to 1";
+            Error::input(
+                file,
+                Place::line(header_line).column(name),
+                format!("`{share}`"),
+                expected,
+            )
+        })?;
+        columns.push((place, share));
+    }
+    columns.sort_by(|a, b| a.1.total_cmp(&b.1));
+    let (places, shares): (Vec<_>, Vec<_>) = columns.into_iter().unzip();
+    if !shares.is_empty() {
+        let place = Place::line(header_line).column(format!("{TRACTION_COLUMN}*"));
+        check_shares(file, place, &shares)?;
+    }
+    Ok((places, shares))
+}
+
+fn check_shares(file: &str, place: Place, shares: &[f64]) -> Result<()> {
+    let rise = shares.windows(2).all(|pair| pair[0] < pair[1]);
+    if !(rise && shares.first() == Some(&0.0) && shares.last() == Some(&1.0)) {
+        let found = shares.iter().map(f64::to_string).collect::<Vec<_>>().join(", ");
+        return Err(Error::input(
+            file,
+            place,
+            found,
+            "shares that rise from 0 to 1, each once",
+        ));
+    }
+    Ok(())
+}
+
+fn check_traction(file: &str, place: Place, shares: &[f64], figures: &[f64]) -> Result<()> {
+    if figures.len() != shares.len() {
+        let expected = format!("{}, one for each share", shares.len());
+        return Err(Error::input(
+            file,
+            place,
+            format!("{} figures", figures.len()),
+            expected,
+        ));
+    }
+    let mut most = 200.0;
+    for (figure, share) in figures.iter().zip(shares) {
+        if !(*figure >= 0.0 && *figure <= most) {
+            let place = place.field(format!("{TRACTION_COLUMN}{share}"));
+            let expected = format!("0 to {most}: a car that corners more has no more traction");
+            return Err(Error::input(file, place, figure.to_string(), expected));
+        }
+        most = *figure;
+    }
+    Ok(())
 }
 
 fn check_count(file: &str, rows: usize) -> Result<()> {
@@ -275,9 +462,48 @@ mod tests {
         );
     }
 
+    const IN_BENDS: &str = "v_mps,ax_traction_mps2_at_1,ay_mps2,ax_grip_mps2,ax_drive_mps2,drag_mps2,ax_traction_mps2_at_0,\
+                            ax_traction_mps2_at_0.8\n20,1,15,14,9,0.5,10,7\n70,0,18,18,4,4,12,9\n";
+
+    /// Half-way in speed the figures are their means. Between shares they go with the root of what is left: 0.9 leaves 0.436, which
+    /// is 0.436 / 0.6 of the way from 1 to 0.8.
+    #[test]
+    fn traction_in_bends_is_read_looked_up_and_written() {
+        let envelope = Envelope::from_csv("own.csv", IN_BENDS).unwrap();
+        assert_eq!(envelope.bend_traction().unwrap().shares, [0.0, 0.8, 1.0]);
+        let at = |v: f64, share: f64| envelope.traction_at(v, share).unwrap();
+        for (found, wanted) in [
+            (at(20.0, 0.0), 10.0),
+            (at(45.0, 0.8), 8.0),
+            (at(5.0, 1.0), 1.0),
+            (at(90.0, 0.8), 9.0),
+            (at(20.0, 0.9), 1.0 + 6.0 * 0.19f64.sqrt() / 0.6),
+        ] {
+            assert!((found - wanted).abs() < 1e-12, "{found} {wanted}");
+        }
+        let again = Envelope::from_csv("own.csv", &envelope.to_csv()).unwrap();
+        assert_eq!(again, envelope);
+        let plain = Envelope::from_csv("own.csv", TEXT).unwrap();
+        assert_eq!(plain.traction_at(30.0, 0.5), None);
+        let rows = envelope.rows().to_vec();
+        assert_eq!(envelope.with_rows("own.csv", rows).unwrap(), envelope);
+    }
+
     #[test]
     fn mistakes_are_named_by_line_and_field() {
         for (text, wanted) in [
+            (
+                IN_BENDS.replace("at_0.8", "at_limit"),
+                "line 1, column ax_traction_mps2_at_limit: found `limit`",
+            ),
+            (
+                IN_BENDS.replace("at_0.8", "at_1"),
+                "line 1, column ax_traction_mps2_at_*: found 0, 1, 1",
+            ),
+            (
+                IN_BENDS.replace(",12,9", ",12,13"),
+                "line 3, field ax_traction_mps2_at_0.8: found 13, expected 0 to 12",
+            ),
             (
                 TEXT.replace("70,18", "70,fast"),
                 "own.csv: line 6, field ay_mps2: found `fast`",

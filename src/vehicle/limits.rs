@@ -1,9 +1,11 @@
 //! What a car can do at each speed, from its 4DOF model: the limits that make its g-g-v envelope.
 //!
 //! At every speed the steady states of the car ([`super::steady`]) give lateral acceleration over steering and its ridge,
-//! straight-line running the greatest braking and traction, and the powertrain what the engine can give through the gears. The
+//! straight-line running the greatest braking and traction, and the powertrain what the engine can give through the gears. At
+//! shares of the ridge the driven wheels are pushed on until they give no more: the traction that is left in bends. The
 //! rows make an [`Envelope`]; the small-angle end of the curves gives the handling figures.
 
+use super::envelope::{BendTraction, root_left};
 use super::powertrain::GRAVITY_MPS2;
 use super::{Car, Envelope, EnvelopeRow, SteadyCar, Traction, Trim, Turn, steady_car};
 use crate::error::{Error, Result};
@@ -86,8 +88,10 @@ pub struct EnvelopeAtSpeed {
     pub right_mps2: f64,
     /// Steady cornering to the left, in order along the curve of steady states.
     pub cornering: Vec<Trim>,
-    /// Greatest acceleration by the driven tyres (m/s^2).
+    /// Greatest acceleration by the driven tyres (m/s^2) running straight,
     pub traction_mps2: f64,
+    /// and at each of [`LATERAL_SHARES`] of the row's lateral acceleration.
+    pub traction_in_bends_mps2: Vec<f64>,
     /// Greatest acceleration by the engine in its best gear, before drag (m/s^2).
     pub engine_mps2: f64,
 }
@@ -140,6 +144,10 @@ impl CarEnvelope {
     }
 }
 
+/// Shares of the lateral limit at which the traction is swept. What is left of it falls with `sqrt(1 - share^2)`, over which they
+/// are spread. Beyond 0.97 wheels lift and steady states are few; at the limit itself there is no traction.
+pub const LATERAL_SHARES: [f64; 12] = [0.0, 0.2, 0.4, 0.5, 0.6, 0.7, 0.8, 0.85, 0.9, 0.94, 0.97, 1.0];
+
 /// Steering up to which steady states are looked for (rad): a car whose lock is reached first still has the tyres' own limit.
 pub const STEER_TO_GRIP: f64 = 0.6;
 
@@ -157,25 +165,37 @@ pub fn car_envelope(car: &Car, range: &SpeedRange) -> Result<CarEnvelope> {
     let accelerated = |force_n: f64, drag_mps2: f64| {
         powertrain.map_or(0.0, |p| p.acceleration_mps2(force_n, mass, drag_mps2))
     };
-    // The two sides of a car with even loads are each other's mirror image.
+    // The two sides of a car with even loads are each other's mirror image where they roll freely, and where they drive if its
+    // tyres are.
     let even = car.chassis.left_share_front == 0.5 && car.chassis.left_share_rear == 0.5;
+    let mirrored = even && car.tyres.are_mirrored();
     let found: Vec<EnvelopeAtSpeed> = speeds
         .into_par_iter()
         .map(|speed| {
             let cornering = steady.cornering(speed, STEER_TO_GRIP, Turn::Left);
+            let other = (!mirrored).then(|| steady.cornering(speed, STEER_TO_GRIP, Turn::Right));
             let peak = |trims: &[Trim]| greatest_within(car.max_steer_rad, trims);
             let left_mps2 = peak(&cornering);
-            let right_mps2 = match even {
-                true => left_mps2,
-                false => peak(&steady.cornering(speed, STEER_TO_GRIP, Turn::Right)),
-            };
+            let other_mps2 = other.as_deref().map_or(left_mps2, peak);
+            let right_mps2 = if even { left_mps2 } else { other_mps2 };
+            let ay_mps2 = left_mps2.min(right_mps2);
             let traction_mps2 = steady.greatest_traction(speed);
+            // Each side at its own share.
+            let driven = |share: f64| {
+                let lock = car.max_steer_rad;
+                let left = steady.greatest_drive(speed, share * left_mps2, lock, &cornering)?;
+                let right = other.as_deref().map_or(Some(left), |curve| {
+                    steady.greatest_drive(speed, -share * other_mps2, lock, curve)
+                });
+                right.map(|right| left.min(right))
+            };
+            let traction_in_bends_mps2 = in_bends(traction_mps2, driven);
             let drag_mps2 = steady.drag(speed) + rolling;
             let engine_mps2 = accelerated(force(speed), drag_mps2) + drag_mps2;
             EnvelopeAtSpeed {
                 row: EnvelopeRow {
                     v_mps: speed,
-                    ay_mps2: left_mps2.min(right_mps2),
+                    ay_mps2,
                     ax_grip_mps2: steady.greatest_braking(speed),
                     ax_drive_mps2: traction_mps2.min(engine_mps2),
                     drag_mps2,
@@ -184,6 +204,7 @@ pub fn car_envelope(car: &Car, range: &SpeedRange) -> Result<CarEnvelope> {
                 right_mps2,
                 cornering,
                 traction_mps2,
+                traction_in_bends_mps2,
                 engine_mps2,
             }
         })
@@ -200,7 +221,12 @@ pub fn car_envelope(car: &Car, range: &SpeedRange) -> Result<CarEnvelope> {
             in_words(&left_out_mps)
         )));
     }
-    let envelope = Envelope::new(&car.name, limits.iter().map(|l| l.row).collect())?;
+    let in_bends = BendTraction {
+        shares: LATERAL_SHARES.to_vec(),
+        rows: limits.iter().map(|l| l.traction_in_bends_mps2.clone()).collect(),
+    };
+    let rows = limits.iter().map(|l| l.row).collect();
+    let envelope = Envelope::new(&car.name, rows)?.with_bend_traction(in_bends)?;
     let wheelbase = car.chassis.cg_to_front + car.chassis.cg_to_rear;
     Ok(CarEnvelope {
         handling: handling(&limits[limits.len() / 2], wheelbase, steady.as_ref()),
@@ -208,6 +234,29 @@ pub fn car_envelope(car: &Car, range: &SpeedRange) -> Result<CarEnvelope> {
         envelope,
         left_out_mps,
     })
+}
+
+/// The traction (m/s^2) at each of [`LATERAL_SHARES`], from that of running straight and what `driven` finds up to the limit. What
+/// it does not find follows from the shares next to it. A car that corners more never has more.
+fn in_bends(straight_mps2: f64, driven: impl Fn(f64) -> Option<f64>) -> Vec<f64> {
+    let straight_mps2 = straight_mps2.max(0.0);
+    let mut found = vec![(1.0, straight_mps2)];
+    for share in &LATERAL_SHARES[1..LATERAL_SHARES.len() - 1] {
+        if let Some(most) = driven(*share).filter(|most| most.is_finite()) {
+            let least = found[found.len() - 1].1;
+            found.push((root_left(*share), most.clamp(0.0, least)));
+        }
+    }
+    found.push((0.0, 0.0));
+    let between = |share: &f64| {
+        let root = root_left(*share);
+        let after = found.partition_point(|f| f.0 >= root).clamp(1, found.len() - 1);
+        let (more, less) = (found[after - 1], found[after]);
+        let slope = (more.1 - less.1) / (more.0 - less.0);
+        (less.1 + (root - less.0) * slope).clamp(less.1, more.1)
+    };
+    let others = LATERAL_SHARES[1..].iter().map(between);
+    std::iter::once(straight_mps2).chain(others).collect()
 }
 
 /// The greatest lateral acceleration (m/s^2) along a curve of trims, as far as the road wheels turn by no more than `lock` (rad).
@@ -301,6 +350,41 @@ mod tests {
                 .all(|s| s.row.ax_drive_mps2 <= s.traction_mps2)
         );
         assert!(limits.handling.stability_factor_s2_per_m2.abs() < 0.01);
+    }
+
+    /// The rear axle carries its share of the lateral force whatever it drives with. At 0.8 of the limit the ellipse of the whole car
+    /// leaves 0.6 of its grip, and straight-line traction is more than that: the lesser of both is what a car had that is driven by
+    /// all of its tyres.
+    #[test]
+    fn a_car_driven_at_the_rear_loses_drive_to_the_lateral_force_there() {
+        let car = Car::bundled().unwrap();
+        let limits = car_envelope(&car, &SpeedRange::USUAL).unwrap();
+        let steady = steady_car(&car);
+        for speed in &limits.speeds {
+            let (v, table) = (speed.row.v_mps, &speed.traction_in_bends_mps2);
+            let straight = steady.greatest_traction(v);
+            assert_eq!(table[0], straight);
+            assert!(table.windows(2).all(|pair| pair[1] <= pair[0]), "{v}: {table:?}");
+            let share = 0.8;
+            let whole = (0.6 * speed.row.ax_grip_mps2).min(straight);
+            let found = limits.envelope.traction_at(v, share).unwrap();
+            assert!(found < 0.9 * whole && found > 0.5 * whole, "{v}: {found} {whole}");
+            assert!(table[10] < 0.5 * straight && table[11] == 0.0, "{v}: {table:?}");
+        }
+    }
+
+    /// A share without a steady state has what lies between its neighbours; without any, the ellipse is left.
+    #[test]
+    fn what_is_not_found_follows_from_its_neighbours() {
+        let gap = in_bends(10.0, |share| (share != 0.6).then(|| 10.0 * root_left(share)));
+        for (found, share) in gap.iter().zip(LATERAL_SHARES) {
+            assert!((found - 10.0 * root_left(share)).abs() < 1e-9, "{share}: {found}");
+        }
+        assert_eq!(in_bends(10.0, |_| None)[4], 10.0 * root_left(0.6));
+        assert_eq!(in_bends(10.0, |_| Some(f64::NAN))[0], 10.0);
+        // No more in a bend than in a wider one, and none that is negative.
+        assert_eq!(in_bends(10.0, |_| Some(11.0))[..11], [10.0; 11]);
+        assert_eq!(in_bends(10.0, |_| Some(-1.0))[1], 0.0);
     }
 
     /// A lock of 0.03 rad is a circle of 87 m: at 18 m/s less than 324 / 87 = 3.7 m/s^2, where the tyres would hold 15.

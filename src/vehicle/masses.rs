@@ -1,6 +1,7 @@
 //! A car's limits over its mass, which falls as fuel burns. Downforce does not fall with it and tyres are sensitive to load, so that
 //! limits of one mass say little of those of another.
 
+use super::envelope::BendTraction;
 use super::limits::{SpeedRange, car_envelope};
 use super::{Car, Envelope, EnvelopeRow, Traction};
 use crate::error::Result;
@@ -34,8 +35,8 @@ impl MassLimits {
         })
     }
 
-    /// The limits at a speed (m/s) and a mass (kg), and the traction (m/s^2): linear between the masses, held beyond them.
-    fn at(&self, mass_kg: f64, v_mps: f64) -> (EnvelopeRow, f64) {
+    /// The swept rows on both sides of a mass (kg), and how far it is on its way between them.
+    fn between(&self, mass_kg: f64) -> ([&(f64, Envelope, Traction); 2], f64) {
         let last = self.rows.len() - 1;
         let after = self.rows.partition_point(|row| row.0 < mass_kg).min(last);
         let (low, high) = (&self.rows[after.saturating_sub(1)], &self.rows[after]);
@@ -44,6 +45,12 @@ impl MassLimits {
         } else {
             0.0
         };
+        ([low, high], share)
+    }
+
+    /// The limits at a speed (m/s) and a mass (kg), and the traction (m/s^2): linear between the masses, held beyond them.
+    fn at(&self, mass_kg: f64, v_mps: f64) -> (EnvelopeRow, f64) {
+        let ([low, high], share) = self.between(mass_kg);
         let between = |low: f64, high: f64| low + share * (high - low);
         let (a, b) = (before_top(&low.1, v_mps), before_top(&high.1, v_mps));
         let row = EnvelopeRow {
@@ -54,6 +61,13 @@ impl MassLimits {
             drag_mps2: between(a.drag_mps2, b.drag_mps2),
         };
         (row, between(low.2.at(v_mps), high.2.at(v_mps)))
+    }
+
+    /// The traction (m/s^2) at a speed (m/s), a mass (kg) and a share of the lateral limit.
+    fn in_bend(&self, mass_kg: f64, v_mps: f64, lateral_share: f64) -> f64 {
+        let ([low, high], share) = self.between(mass_kg);
+        let at = |row: &(f64, Envelope, Traction)| row.1.traction_at(v_mps, lateral_share).unwrap_or(0.0);
+        at(low) + share * (at(high) - at(low))
     }
 
     /// Limits that the car has with a mass (kg), carried to another: each figure changes by the share by which that of the sweep
@@ -85,7 +99,25 @@ impl MassLimits {
         let traction = Traction {
             rows: driven.collect(),
         };
-        Ok((Envelope::new(envelope.name(), rows.collect())?, traction))
+        let carried = Envelope::new(envelope.name(), rows.collect())?;
+        let Some(BendTraction { shares, rows }) = envelope.bend_traction() else {
+            return Ok((carried, traction));
+        };
+        let mut in_bends = Vec::with_capacity(rows.len());
+        for (row, figures) in envelope.rows().iter().zip(rows) {
+            let mut most = f64::INFINITY;
+            let figures = figures.iter().zip(shares).map(|(figure, lateral)| {
+                let [from, to] = [from_kg, to_kg].map(|mass_kg| self.in_bend(mass_kg, row.v_mps, *lateral));
+                most = (figure * share(from, to)).min(most);
+                most
+            });
+            in_bends.push(figures.collect());
+        }
+        let in_bends = BendTraction {
+            shares: shares.clone(),
+            rows: in_bends,
+        };
+        Ok((carried.with_bend_traction(in_bends)?, traction))
     }
 }
 

@@ -23,7 +23,7 @@ pub mod tyre;
 
 pub use car::{Car, CarParameter, Tyres};
 pub use chassis::Chassis;
-pub use envelope::{Envelope, EnvelopeRow};
+pub use envelope::{BendTraction, Envelope, EnvelopeRow};
 pub use facts::CarFacts;
 pub use hybrid::Hybrid;
 pub use masses::MassLimits;

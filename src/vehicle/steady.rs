@@ -96,6 +96,11 @@ pub trait SteadyCar: Send + Sync {
     /// give.
     fn greatest_traction(&self, speed: f64) -> f64;
 
+    /// The greatest acceleration along the path by the tyres (m/s^2) while the car corners at `ay` (m/s^2, of the sign of the
+    /// turn), below the peak of `curve`, which is [`SteadyCar::cornering`] at `speed` (m/s). The road wheels turn by no more than
+    /// `lock` (rad). The driven wheels share one slip ratio. `None` where the curve does not reach `ay`, or turns back there.
+    fn greatest_drive(&self, speed: f64, ay: f64, lock: f64, curve: &[Trim]) -> Option<f64>;
+
     /// Side force of the tyres against a radian of sideslip (N/rad), running straight at `speed` (m/s), and the yaw moment that
     /// turns the car back into its direction (N m/rad).
     fn sideslip_stiffness(&self, speed: f64) -> [f64; 2];
@@ -110,6 +115,21 @@ pub fn steady_car(car: &Car) -> Box<dyn SteadyCar> {
         TyreModel::MagicFormula => Box::new(Ready::<MagicFormula<f64>, MagicFormula<Exact>>::new(car)),
         TyreModel::Linear => Box::new(Ready::<LinearTyre<f64>, LinearTyre<Exact>>::new(car)),
     }
+}
+
+/// What of lateral acceleration and push along the path is the second unknown of a point; the other is given.
+#[derive(Clone, Copy)]
+enum Bend {
+    /// The lateral acceleration; the tyres push by nothing.
+    Free,
+    /// The push (m/s^2), at this lateral acceleration (m/s^2).
+    Held(f64),
+}
+
+/// A trim as a point of its curve.
+fn place(t: &Trim) -> Point {
+    let unknown = [t.sideslip_rad, t.ay_mps2, t.roll_rad, t.slip_ratio, t.steer_rad];
+    Point::from_fn(|i, _| unknown[i] / SCALES[i])
 }
 
 /// A car prepared in `f64` and in dual numbers.
@@ -143,9 +163,13 @@ impl<T: Tyre<f64>, D: Tyre<Exact>> Ready<T, D> {
     }
 
     /// Residuals of the four equations at a point of the curve, with their derivatives with respect to the unknowns.
-    fn residual(&self, speed: f64, point: &Point) -> [Exact; 4] {
+    fn residual(&self, (speed, bend): (f64, Bend), point: &Point) -> [Exact; 4] {
         let unknown = |i: usize| Exact::variable(point[i] * SCALES[i], i);
-        let [sideslip, across, roll, slip_ratio, steer] = std::array::from_fn(unknown);
+        let [sideslip, second, roll, slip_ratio, steer] = std::array::from_fn(unknown);
+        let (across, push) = match bend {
+            Bend::Free => (second, Exact::constant(0.0)),
+            Bend::Held(across) => (Exact::constant(across), second),
+        };
         let v = Exact::constant(speed);
         let (cos, sin) = (sideslip.cos(), sideslip.sin());
         let yaw_rate = across / v;
@@ -159,10 +183,10 @@ impl<T: Tyre<f64>, D: Tyre<Exact>> Ready<T, D> {
             roll_rate: zero,
         };
         let chassis = &self.exact.chassis;
-        // The force along the path is zero: the tyres' forces along the car and across it balance in that direction.
+        // The force along the path is the push: the rest of the tyres' forces along the car and across it balances there.
         let drag = aero_forces(chassis, body.vx).drag / chassis.mass;
         let state = CarState {
-            pitch_acceleration: -(body.vx * yaw_rate * sin / cos) - drag,
+            pitch_acceleration: push * cos - body.vx * yaw_rate * sin / cos - drag,
             body,
         };
         let direction = (steer.cos(), steer.sin());
@@ -189,7 +213,8 @@ impl<T: Tyre<f64>, D: Tyre<Exact>> Ready<T, D> {
         let steer = (steer - chassis.steer_offset) / chassis.steer_scale;
         let rate = self.exact.rate(&state, &CarInput { wheel_speed, steer });
         [
-            rate.state.body.vy,
+            // At a steady sideslip the velocity across the car grows with that along the path.
+            rate.state.body.vy - push * sin,
             rate.state.body.yaw_rate,
             rate.state.body.roll_rate,
             rate.state.pitch_acceleration * chassis.pitch_lag,
@@ -197,12 +222,12 @@ impl<T: Tyre<f64>, D: Tyre<Exact>> Ready<T, D> {
     }
 
     /// The trim on the line `direction . (point - guess) = 0` nearest to `guess`, by Newton's method.
-    fn solve(&self, speed: f64, guess: &Point, direction: &Point) -> Option<(Point, Point)> {
+    fn solve(&self, held: (f64, Bend), guess: &Point, direction: &Point) -> Option<(Point, Point)> {
         /// Accelerations this small are rounding (m/s^2, rad/s^2).
         const BALANCED: f64 = 1e-9;
         let mut point = *guess;
         for _ in 0..12 {
-            let residual = self.residual(speed, &point);
+            let residual = self.residual(held, &point);
             let mut slopes = SMatrix::<f64, UNKNOWNS, UNKNOWNS>::zeros();
             let mut value = Point::zeros();
             for (row, equation) in residual.iter().enumerate() {
@@ -227,6 +252,35 @@ impl<T: Tyre<f64>, D: Tyre<Exact>> Ready<T, D> {
             point -= step;
         }
         None
+    }
+
+    /// Follows a curve from a point on it into the direction of a tangent, and tells of each further point. It ends where that
+    /// says so or no step leads on.
+    fn follow(
+        &self,
+        held: (f64, Bend),
+        (mut point, mut tangent): (Point, Point),
+        mut goes_on: impl FnMut(&Point) -> bool,
+    ) {
+        let mut length = 0.1;
+        while length > SHORTEST_STEP {
+            let guess = point + tangent * length;
+            let Some((next, direction)) = self.solve(held, &guess, &tangent) else {
+                length *= 0.5;
+                continue;
+            };
+            // Two tangents at more than a right angle belong to two branches, not to one step along a curve.
+            let ahead = direction.dot(&tangent);
+            if ahead.abs() < if length > KINK { 0.9 } else { 0.1 } {
+                length *= 0.5;
+                continue;
+            }
+            (point, tangent) = (next, direction * ahead.signum());
+            length = (1.4 * length).min(LONGEST_STEP);
+            if !goes_on(&point) {
+                break;
+            }
+        }
     }
 
     fn trim(&self, speed: f64, point: &Point) -> Trim {
@@ -295,6 +349,20 @@ fn greatest(low: f64, high: f64, f: impl Fn(f64) -> f64) -> f64 {
     0.5 * (a + b)
 }
 
+/// The top of the parabola through three points of which the middle one is the highest; its height, where they are no three.
+fn peak_of([(a, low), (b, top), (c, high)]: [(f64, f64); 3]) -> f64 {
+    let (left, right) = ((top - low) / (b - a), (high - top) / (c - b));
+    // Points that coincide have no slope.
+    let bend = (right - left) / (c - a);
+    let slope = left + bend * (b - a);
+    let rise = -slope * slope / (4.0 * bend);
+    if bend < 0.0 && rise.is_finite() {
+        top + rise
+    } else {
+        top
+    }
+}
+
 /// Greatest slip ratio in the search for the limits.
 const GREATEST_SLIP: f64 = 0.4;
 
@@ -304,10 +372,10 @@ impl<T: Tyre<f64>, D: Tyre<Exact>> SteadyCar for Ready<T, D> {
         // its critical speed with none that can be found: it starts without a yaw rate, whatever the steering.
         let held = |unknown: usize| {
             let direction = Point::from_fn(|i, _| f64::from(i == unknown));
-            self.solve(speed, &Point::zeros(), &direction)
+            self.solve((speed, Bend::Free), &Point::zeros(), &direction)
         };
         let unsteered = held(4).filter(|(point, _)| point[1].abs() < 1e-6);
-        let Some((mut point, mut tangent)) = unsteered.or_else(|| held(1)) else {
+        let Some((point, mut tangent)) = unsteered.or_else(|| held(1)) else {
             return Vec::new();
         };
         // A left turn has a yaw rate to the left, whatever the steering does.
@@ -316,31 +384,18 @@ impl<T: Tyre<f64>, D: Tyre<Exact>> SteadyCar for Ready<T, D> {
         }
         let mut trims = vec![self.trim(speed, &point)];
         let mut peak = 0.0f64;
-        let mut length = 0.1;
-        while length > SHORTEST_STEP && trims.len() < MOST_POINTS {
-            let guess = point + tangent * length;
-            let Some((next, direction)) = self.solve(speed, &guess, &tangent) else {
-                length *= 0.5;
-                continue;
-            };
-            // Two tangents at more than a right angle belong to two branches, not to one step along a curve.
-            let ahead = direction.dot(&tangent);
-            if ahead.abs() < if length > KINK { 0.9 } else { 0.1 } {
-                length *= 0.5;
-                continue;
-            }
-            (point, tangent) = (next, direction * ahead.signum());
-            length = (1.4 * length).min(LONGEST_STEP);
-            let trim = self.trim(speed, &point);
-            if trim.steer_rad.abs() > greatest_steer || trim.sideslip_rad.abs() > GREATEST_SIDESLIP {
-                break;
+        self.follow((speed, Bend::Free), (point, tangent), |point| {
+            let trim = self.trim(speed, point);
+            if trims.len() == MOST_POINTS
+                || trim.steer_rad.abs() > greatest_steer
+                || trim.sideslip_rad.abs() > GREATEST_SIDESLIP
+            {
+                return false;
             }
             peak = peak.max(trim.ay_mps2.abs());
             trims.push(trim);
-            if trim.ay_mps2.abs() < PAST_THE_PEAK * peak {
-                break;
-            }
-        }
+            trim.ay_mps2.abs() >= PAST_THE_PEAK * peak
+        });
         trims
     }
 
@@ -349,14 +404,10 @@ impl<T: Tyre<f64>, D: Tyre<Exact>> SteadyCar for Ready<T, D> {
         let pair = rising
             .into_iter()
             .find(|w| (w[0].steer_rad..=w[1].steer_rad).contains(&steer))?;
-        let place = |t: &Trim| {
-            let unknown = [t.sideslip_rad, t.ay_mps2, t.roll_rad, t.slip_ratio, t.steer_rad];
-            Point::from_fn(|i, _| unknown[i] / SCALES[i])
-        };
         let share = (steer - pair[0].steer_rad) / (pair[1].steer_rad - pair[0].steer_rad);
         let (from, to) = (place(&pair[0]), place(&pair[1]));
         let steering = Point::from_fn(|i, _| f64::from(i == 4));
-        let (point, _) = self.solve(speed, &(from + (to - from) * share), &steering)?;
+        let (point, _) = self.solve((speed, Bend::Free), &(from + (to - from) * share), &steering)?;
         Some(self.trim(speed, &point))
     }
 
@@ -375,9 +426,66 @@ impl<T: Tyre<f64>, D: Tyre<Exact>> SteadyCar for Ready<T, D> {
         self.push(speed, [0.0, slip])
     }
 
+    fn greatest_drive(&self, speed: f64, ay: f64, lock: f64, curve: &[Trim]) -> Option<f64> {
+        let pair = curve
+            .windows(2)
+            .find(|w| w[0].ay_mps2.abs() <= ay.abs() && ay.abs() < w[1].ay_mps2.abs())?;
+        // Between the two points by false position. Close to the peak the lateral acceleration itself cannot be held: steps across
+        // the chord find the curve there too.
+        let (from, to) = (place(&pair[0]), place(&pair[1]));
+        let chord = (to - from).normalize();
+        let (mut low, mut high) = ((0.0, pair[0].ay_mps2), (1.0, pair[1].ay_mps2));
+        let mut start = from;
+        for _ in 0..8 {
+            let share = low.0 + (ay - low.1) / (high.1 - low.1) * (high.0 - low.0);
+            (start, _) = self.solve((speed, Bend::Free), &(from + (to - from) * share), &chord)?;
+            let found = start[1] * SCALES[1];
+            if (found - ay).abs() < 1e-6 {
+                break;
+            }
+            let side = if found.abs() < ay.abs() {
+                &mut low
+            } else {
+                &mut high
+            };
+            *side = (share, found);
+        }
+        let held = (speed, Bend::Held(start[1] * SCALES[1]));
+        let across = Point::from_fn(|i, _| f64::from(i == 1));
+        start[1] = 0.0;
+        let (start, tangent) = self.solve(held, &start, &across)?;
+        let tangent = tangent * tangent[1].signum();
+        // Length along the curve and push, of the greatest push so far, the point before it and the one after it.
+        let mut around = [(0.0, 0.0); 3];
+        let (mut last, mut length) = (start, 0.0);
+        let mut points = 0;
+        self.follow(held, (start, tangent), |point| {
+            let [sideslip, push, _, slip, steer] = std::array::from_fn(|i| point[i] * SCALES[i]);
+            points += 1;
+            if points == MOST_POINTS
+                || steer.abs() > lock
+                || sideslip.abs() > GREATEST_SIDESLIP
+                || slip > GREATEST_SLIP
+            {
+                return false;
+            }
+            length += (point - last).norm();
+            last = *point;
+            let now = (length, push);
+            if push > around[1].1 {
+                around = [around[1], now, now];
+                true
+            } else {
+                around[2] = now;
+                false
+            }
+        });
+        Some(peak_of(around))
+    }
+
     fn sideslip_stiffness(&self, speed: f64) -> [f64; 2] {
         let c = &self.plain.chassis;
-        let straight = self.residual(speed, &Point::zeros());
+        let straight = self.residual((speed, Bend::Free), &Point::zeros());
         let [side, yaw, roll, _] = straight.map(|rate| rate.gradient[0]);
         // The body rolls about an axis in the ground, so that its roll takes part in the sideways acceleration.
         [-c.mass * (side - c.cg_height * roll), c.inertia_yaw * yaw]
@@ -466,6 +574,39 @@ mod tests {
         // The scan is coarser than the search: it may fall short by the curvature of the peak over 0.005 of slip.
         assert!(found >= scanned && found < 1.002 * scanned, "{found} {scanned}");
         assert!(steady.greatest_traction(40.0) < found);
+    }
+
+    /// A car whose right tyres are the mirror image of its left ones.
+    fn mirrored_car() -> Car {
+        let mut car = Car::bundled().unwrap();
+        if let Tyres::MagicFormula { front, rear } = &mut car.tyres {
+            (front.coefficients.tyre_side, rear.coefficients.tyre_side) = (1.0, 1.0);
+        }
+        car
+    }
+
+    /// In the widest of bends the wheels push as they do running straight, where the greatest push is found by a scan of the slip.
+    #[test]
+    fn a_straight_is_the_widest_bend() {
+        let steady = steady_car(&mirrored_car());
+        for speed in [20.0, 60.0] {
+            let curve = steady.cornering(speed, 0.6, Turn::Left);
+            let bend = steady.greatest_drive(speed, 0.02, 0.6, &curve).unwrap();
+            let straight = steady.greatest_traction(speed);
+            assert!((bend / straight - 1.0).abs() < 1e-3, "{speed}: {bend} {straight}");
+        }
+    }
+
+    #[test]
+    fn both_sides_of_a_mirrored_car_push_alike() {
+        let steady = steady_car(&mirrored_car());
+        let [left, right] = [Turn::Left, Turn::Right].map(|turn| steady.cornering(40.0, 0.6, turn));
+        let found = [(10.0, &left), (-10.0, &right)].map(|(ay, curve)| {
+            let most = steady.greatest_drive(40.0, ay, 0.6, curve);
+            most.unwrap()
+        });
+        assert!((found[0] / found[1] - 1.0).abs() < 1e-6, "{found:?}");
+        assert_eq!(steady.greatest_drive(40.0, 30.0, 0.6, &left), None);
     }
 
     #[test]

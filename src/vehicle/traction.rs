@@ -1,5 +1,6 @@
 //! What the driven tyres can give at each speed, which an envelope does not say where the engine gives less.
 
+use super::envelope::BendTraction;
 use super::{Car, Envelope, EnvelopeRow, steady_car};
 use crate::error::Result;
 use rayon::prelude::*;
@@ -12,9 +13,15 @@ pub struct Traction {
 }
 
 impl Traction {
-    /// The traction of `car` within `envelope`, a table of its own or of other grip: the driven tyres have the share of the
-    /// envelope's grip that they have of the car's own, and never less than the envelope's drive.
+    /// The traction of `car` within `envelope`, a table of its own or of other grip. Where that says nothing of it, the driven tyres
+    /// have the share of the envelope's grip that they have of the car's own, and never less than the envelope's drive.
     pub fn of(car: &Car, envelope: &Envelope) -> Self {
+        if let Some(in_bends) = envelope.bend_traction() {
+            let rows = envelope.rows().iter().zip(&in_bends.rows);
+            return Self {
+                rows: rows.map(|(row, straight)| (row.v_mps, straight[0])).collect(),
+            };
+        }
         let steady = steady_car(car);
         let at = |row: &EnvelopeRow| {
             let braking = steady.greatest_braking(row.v_mps);
@@ -52,7 +59,17 @@ impl Envelope {
             ax_drive_mps2: row.ax_drive_mps2.min(share * traction.at(row.v_mps)),
             ..*row
         });
-        Self::new(format!("{}, {share:.3} of its grip", self.name()), rows.collect())
+        let part = Self::new(format!("{}, {share:.3} of its grip", self.name()), rows.collect())?;
+        let Some(BendTraction { shares, rows }) = self.bend_traction().cloned() else {
+            return Ok(part);
+        };
+        let rows = rows
+            .into_iter()
+            .map(|row| row.iter().map(|x| share * x).collect());
+        part.with_bend_traction(BendTraction {
+            shares,
+            rows: rows.collect(),
+        })
     }
 }
 

@@ -5,7 +5,8 @@ use glam::DVec2;
 use lapswarm::evaluate::line::{LineObjective, LineProblem};
 use lapswarm::line::{Parametrisation, PointMass};
 use lapswarm::track::CrossSections;
-use lapswarm::vehicle::{Envelope, EnvelopeRow};
+use lapswarm::vehicle::limits::LATERAL_SHARES;
+use lapswarm::vehicle::{BendTraction, Envelope, EnvelopeRow};
 use std::f64::consts::TAU;
 
 /// A ring of circles, driven anticlockwise: the right edge is the outer one.
@@ -118,6 +119,18 @@ pub fn random_car(random: &mut Random) -> PointMass {
     }
     if random.within(0.0, 1.0) < 0.5 {
         car.max_steer_rad = Some(0.1745);
+    }
+    if random.within(0.0, 1.0) < 0.5 {
+        let (driven, power) = (random.within(0.4, 0.9), random.within(0.5, 1.0));
+        let row = |row: &EnvelopeRow| {
+            let left = |share: &f64| driven * row.ax_grip_mps2 * (1.0 - share * share).powf(power);
+            LATERAL_SHARES.iter().map(left).collect()
+        };
+        let in_bends = BendTraction {
+            shares: LATERAL_SHARES.to_vec(),
+            rows: car.envelope.rows().iter().map(row).collect(),
+        };
+        car.envelope = car.envelope.with_bend_traction(in_bends).expect("a table");
     }
     car
 }

@@ -276,6 +276,8 @@ pub fn envelope(data: &[u8]) {
         for row in [0.0, 0.5 * v, v, 2.0 * v].map(|v| envelope.at(v)) {
             let figures = [row.ay_mps2, row.ax_grip_mps2, row.ax_drive_mps2, row.drag_mps2];
             assert!(figures.iter().all(|x| x.is_finite()));
+            let in_bends = [0.0, 0.7, 1.0].map(|share| envelope.traction_at(row.v_mps, share));
+            assert!(in_bends.iter().flatten().all(|x| (0.0..=200.0).contains(x)));
         }
     }
     if let Some(points) = taken(read_line(&on_disk("line.csv", data))) {

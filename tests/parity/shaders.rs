@@ -121,6 +121,7 @@ fn line_shape(closed: bool, terms: usize, lap: bool) -> LineShape {
         envelope_rows: 512,
         corner_rows: 1024,
         ellipse_rows: if closed { 256 } else { 0 },
+        traction: terms != 1,
         uniform_sections: closed.then_some(360),
         uniform_envelope: terms == 4,
         workgroup: 64,

@@ -90,6 +90,8 @@ fn seeds() -> Vec<(&'static str, Vec<u8>)> {
         ("line", "# a line\nstation (m),x (m),y (m)\n0,0,0\n5,5,0\n10,9,3\n15,9,8\n"),
         ("line", "x_m,y_m\n0,0\n4,0\n8,1e1\n"),
         ("envelope", "v_mps,ay_mps2,ax_grip_mps2,ax_drive_mps2,drag_mps2\n10,12,12,8,0.1\n30,14,13,6,0.8\n60,18,16,2,3\n"),
+        ("envelope", "v_mps,ay_mps2,ax_grip_mps2,ax_drive_mps2,drag_mps2,ax_traction_mps2_at_0,ax_traction_mps2_at_0.8,\
+            ax_traction_mps2_at_1\n10,12,12,8,0.1,9,7,0\n60,18,16,2,3,12,10,1\n"),
         ("run_folder", "{\"program\":\"lapswarm\",\"version\":\"0.1.0\",\"study\":\"raceline\",\"seed\":1,\"track\":\"a\"}\0\
             {\"study\":\"raceline\",\"elapsed_s\":1.5,\"best\":{\"lap_time\":{\"lap_time_fine_s\":114.2}},\
             \"rows\":[{\"name\":\"a\",\"x\":1}]}\0station (m),x (m),y (m),speed (m/s),time (s)\n0,0,0,30,0\n1,1,0,31,0.1\n2,2,0,32,0.2\n"),

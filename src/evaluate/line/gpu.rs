@@ -45,6 +45,7 @@ impl DeviceKernel<LineProblem> for LineDevice {
                 rows_per_radius: 0.0,
                 corners: vec![0.0; 2],
                 ellipse: Vec::new(),
+                traction: Vec::new(),
             },
             |envelope| envelope.stored::<f32>(),
         );

@@ -103,7 +103,8 @@ impl EnergyCar {
                 ..*row
             })
             .collect();
-        let envelope = Envelope::new(self.point_mass.envelope.name(), rows)?;
+        let own = &self.point_mass.envelope;
+        let envelope = own.with_rows(own.name(), rows)?;
         Self::new(car, envelope, self.traction.clone(), self.ellipse_exponent)
     }
 

@@ -10,7 +10,7 @@
 //! After R. Lot and S. A. Evangelou, *Lap time optimization of a sports series hybrid electric vehicle*, World Congress on
 //! Engineering 2013, for the energies that are accounted; the passes are those of [`super::super::kernel`].
 
-use super::super::kernel::{BLOCK, Course, braked, corner, envelope_at, look_up};
+use super::super::kernel::{BLOCK, Course, braked, corner, driving_at, look_up};
 use super::super::point_mass::EnvelopeTable;
 use super::plan::{EnergyPlan, GATES, Mode, ZoneRow};
 use super::table::EnergyTable;
@@ -190,8 +190,8 @@ impl<R: Lookup> Car<'_, R> {
     fn additional(&self, here: usize, from: R, length: R, bends: [R; 2], most: R, left: R) -> Step<R> {
         let inverse = R::lit(1.0) / length;
         let zero = R::lit(0.0);
-        let [grip, drive, drag] = envelope_at(self.envelope, from, bends[0]);
-        let engine = grip.min(drive);
+        let [traction, drive, drag] = driving_at(self.envelope, from, bends[0]);
+        let engine = traction.min(drive);
         let ahead = (from + length * (engine - drag)).max(zero);
         let rows = self.table.boosts.len() / 4;
         let (place, beyond) = (ahead * R::load(self.table.rows_per_speed_squared)).place(rows, 4);
@@ -201,12 +201,12 @@ impl<R: Lookup> Car<'_, R> {
         let wanted = gated(open, boost * zone_share(&self.plan.zones[here], self.strategy));
         let boost = wanted.min(self.boost(left, inverse));
 
-        let both = grip.min(drive + boost);
+        let both = traction.min(drive + boost);
         let middle = (from + length * (both - drag)).max(zero);
-        let [grip, drive, later_drag] =
-            envelope_at(self.envelope, middle, R::lit(0.5) * (bends[0] + bends[1]));
-        let later_both = grip.min(drive + boost);
-        let motor = R::lit(0.5) * ((both - engine) + (later_both - grip.min(drive)));
+        let [traction, drive, later_drag] =
+            driving_at(self.envelope, middle, R::lit(0.5) * (bends[0] + bends[1]));
+        let later_both = traction.min(drive + boost);
+        let motor = R::lit(0.5) * ((both - engine) + (later_both - traction.min(drive)));
         let reached = (from + length * ((both - drag) + (later_both - later_drag))).max(zero);
         let end = reached.min(most);
         // Where less force is needed than both can give, the motor is reduced first.
@@ -254,11 +254,11 @@ impl<R: Lookup> Car<'_, R> {
     #[inline(always)]
     fn engine_only(&self, from: R, length: R, bends: [R; 2], most: R) -> R {
         let zero = R::lit(0.0);
-        let [grip, drive, drag] = envelope_at(self.envelope, from, bends[0]);
-        let first = grip.min(drive) - drag;
+        let [traction, drive, drag] = driving_at(self.envelope, from, bends[0]);
+        let first = traction.min(drive) - drag;
         let middle = (from + length * first).max(zero);
-        let [grip, drive, drag] = envelope_at(self.envelope, middle, R::lit(0.5) * (bends[0] + bends[1]));
-        let second = grip.min(drive) - drag;
+        let [traction, drive, drag] = driving_at(self.envelope, middle, R::lit(0.5) * (bends[0] + bends[1]));
+        let second = traction.min(drive) - drag;
         (from + length * (first + second)).max(zero).min(most)
     }
 

@@ -238,7 +238,9 @@ pub fn envelope_figure(limits: &CarEnvelope, car: &str) -> Curves {
         let around = (0..=120).map(|k| std::f64::consts::TAU * f64::from(k) / 120.0);
         let (across, along): (Vec<f64>, Vec<f64>) = around
             .map(|a| {
-                let push = (row.ax_grip_mps2 * a.cos()).min(row.ax_drive_mps2);
+                let tyres = row.ax_grip_mps2 * a.cos();
+                let driven = limits.envelope.traction_at(row.v_mps, a.sin().abs());
+                let push = tyres.min(driven.unwrap_or(tyres)).min(row.ax_drive_mps2);
                 (row.ay_mps2 * a.sin(), push - row.drag_mps2)
             })
             .unzip();

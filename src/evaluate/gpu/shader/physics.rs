@@ -3,6 +3,7 @@
 use super::ELEMENTARY;
 use crate::evaluate::replay::Norm;
 use crate::line::kernel::Wanted;
+use crate::line::{TRACTION_ROOTS, TRACTION_SPEEDS};
 use crate::vehicle::tyre::Tyre;
 use crate::vehicle::{Chassis, LinearTyre, MagicFormula, TyreModel};
 
@@ -204,6 +205,8 @@ pub struct LineShape {
     pub corner_rows: usize,
     /// Rows of the table of the ellipse, zero where there is none.
     pub ellipse_rows: usize,
+    /// Whether cells of traction in bends follow the table of limits.
+    pub traction: bool,
     /// Cross-sections, if their table is to be uniform.
     pub uniform_sections: Option<usize>,
     /// Whether the tables of limits, of corner speeds and of the ellipse are to be uniform.
@@ -218,6 +221,11 @@ impl LineShape {
     /// Source of the kernel; entry point `line`.
     pub fn source(&self) -> String {
         let rows = |rows: usize| self.uniform_envelope.then_some(rows);
+        let cells = if self.traction {
+            TRACTION_SPEEDS * TRACTION_ROOTS
+        } else {
+            0
+        };
         let generated = Generated::new()
             .flag("CLOSED", self.closed)
             .count("TERMS", self.terms)
@@ -226,10 +234,13 @@ impl LineShape {
             .count("ENVELOPE_ROWS", self.envelope_rows)
             .count("CORNER_ROWS", self.corner_rows)
             .count("ELLIPSE_ROWS", self.ellipse_rows)
+            .flag("HAS_TRACTION", self.traction)
+            .count("TRACTION_SPEEDS", TRACTION_SPEEDS)
+            .count("TRACTION_ROOTS", TRACTION_ROOTS)
             .count("WORKGROUP", self.workgroup)
             .count("TILE", self.tile)
             .table(1, "sections", "Section", self.uniform_sections)
-            .table(2, "envelope", "vec4<f32>", rows(2 * self.envelope_rows))
+            .table(2, "envelope", "vec4<f32>", rows(2 * self.envelope_rows + cells))
             .table(3, "corners", "vec4<f32>", rows(self.corner_rows))
             .table(4, "ellipse", "vec4<f32>", rows(self.ellipse_rows.max(1)));
         [ELEMENTARY, &generated.end(), LINE].concat()

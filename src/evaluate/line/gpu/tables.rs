@@ -99,6 +99,7 @@ impl LineTables {
             // A binding holds at least what its type takes.
             ellipse = vec![0.0; 4];
         }
+        let limits = [envelope.rows.as_slice(), &envelope.traction].concat();
         let sections: &[u8] = bytemuck::cast_slice(&sections);
         let most = LOOP_ROUNDS / ROUNDS_PER_SECTION;
         if software && plan.rows.len() > most {
@@ -112,7 +113,7 @@ impl LineTables {
         let uniform_sections = fits(sections.len());
         // A card reads a uniform table row after row where lanes part; a software driver is faster with it.
         let uniform_envelope = software
-            && [&envelope.rows, &corners, &ellipse]
+            && [&limits, &corners, &ellipse]
                 .iter()
                 .all(|table| fits(size_of_val(table.as_slice())));
         let shape = LineShape {
@@ -122,6 +123,7 @@ impl LineTables {
             envelope_rows: envelope.rows.len() / 8,
             corner_rows: corners.len() / 4,
             ellipse_rows,
+            traction: !envelope.traction.is_empty(),
             uniform_sections: uniform_sections.then_some(plan.rows.len()),
             uniform_envelope,
             workgroup,
@@ -146,7 +148,7 @@ impl LineTables {
             ],
             buffers: [
                 context.table("sections", sections, Usage::UNIFORM)?,
-                table("envelope", &envelope.rows)?,
+                table("envelope", &limits)?,
                 table("corners", &corners)?,
                 table("ellipse", &ellipse)?,
             ],
