@@ -223,7 +223,8 @@ impl ChannelMap {
                     "the name that the channel map gives",
                 )
             })?),
-            None => guess(role, recording),
+            // A column without a number in it, as of lap numbers where no line is set, is none.
+            None => guess(role, recording).filter(|c| role.of_motion() || !c.is_blank()),
         };
         let Some(channel) = found else {
             return match entry {
