@@ -66,6 +66,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         let planned = plan(&settings)?;
         let told = Plan::of_file("sweep", settings.text())
             .reads(planned.to_string())
+            .polish_drives(planned.polish_drives)
             .memory_mib(planned.memory_mib)
             .on_device_of(&planned.plan);
         let told = match planned.evaluations {

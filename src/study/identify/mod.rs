@@ -68,7 +68,9 @@ impl Study for Identify {
     }
 
     fn plan(settings: &IdentifySettings, setup: &Setup, plan: Plan) -> Result<Plan> {
-        planned(settings, setup, plan.evaluations(settings.evaluations()))
+        let polish = refine::most_drives(settings, setup.replay.dimensions());
+        let plan = plan.evaluations(settings.evaluations()).polish_drives(polish);
+        planned(settings, setup, plan)
     }
 
     fn solve(work: Work<'_, Self>) -> Result<Option<Outcome>> {

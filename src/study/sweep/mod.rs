@@ -292,7 +292,7 @@ impl<S: Study> Swept for Entry<S> {
         let mut problems: Vec<S::Settings> = Vec::new();
         let mut known = Known::<S>(Vec::new());
         let mut first: Option<Plan> = None;
-        let (mut evaluations, mut memory_mib) = (Some(0u64), 0);
+        let (mut evaluations, mut polish_drives, mut memory_mib) = (Some(0u64), 0u64, 0);
         for (number, settings) in work.read::<S>(0..work.points.len())?.iter().enumerate() {
             let of_point = |e| work.of_point(e, number);
             let problem = problem_of::<S>(settings);
@@ -305,6 +305,7 @@ impl<S: Study> Swept for Entry<S> {
             let plan = S::plan(settings, inputs, Plan::of(S::NAME, settings)).map_err(of_point)?;
             let both = evaluations.zip(plan.most_evaluations());
             evaluations = both.map(|(all, more)| all.saturating_add(more));
+            polish_drives = polish_drives.saturating_add(plan.most_polish_drives());
             memory_mib = memory_mib.max(memory::needed_mib(&kept));
             first.get_or_insert(plan);
         }
@@ -313,6 +314,7 @@ impl<S: Study> Swept for Entry<S> {
             runs: work.points.len(),
             problems: problems.len(),
             evaluations,
+            polish_drives,
             memory_mib,
             plan: first.ok_or_else(no_point)?,
         })
@@ -480,6 +482,8 @@ pub struct SweepPlan {
     pub problems: usize,
     /// Cars driven by all swarms at the most; none where the studies find out how many.
     pub evaluations: Option<u64>,
+    /// Cars driven after them at the most, to polish what they found.
+    pub polish_drives: u64,
     /// What the largest study keeps (MiB).
     pub memory_mib: u64,
     /// The plan of the first study.
