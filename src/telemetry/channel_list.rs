@@ -176,7 +176,15 @@ impl ChannelList {
         for role in Role::ALL {
             if let Some(channel) = played(role) {
                 let _ = writeln!(text, "[channels.{}]", role.key());
-                let _ = writeln!(text, "name = {}", quoted(&channel.name));
+                // As the map makes it of others.
+                let made = channel
+                    .name
+                    .strip_prefix(role.key())
+                    .and_then(|rest| rest.strip_prefix(" = "));
+                let _ = match made {
+                    Some(expression) => writeln!(text, "expression = {}", quoted(expression)),
+                    None => writeln!(text, "name = {}", quoted(&channel.name)),
+                };
                 if !role.quantities().is_empty() && Unit::parse(&channel.unit).is_some() {
                     let _ = writeln!(text, "unit = {}", quoted(&channel.unit));
                 }

@@ -109,7 +109,7 @@ mod tests {
             "\"Format\",\"AiM CSV File\"\n\"Venue\",\"Oval\"\n\"Sample Rate\",\"10\"\n\n\"Time\",\"GPS \
                        Latitude\",\"GPS Longitude\",\"GPS Speed\"\n\"s\",\"deg\",\"deg\",\"km/h\"\n\n"
                 .to_owned();
-        for (i, [lat, lon, speed]) in kart().iter().enumerate() {
+        for (i, [lat, lon, speed, _]) in kart().iter().enumerate() {
             let t = i as f64 / 10.0;
             let (minute, second) = ((t / 60.0).floor(), t % 60.0);
             let _ = writeln!(

@@ -256,8 +256,8 @@ pub(crate) mod testing {
     use std::fmt::Write as _;
 
     /// A kart on an oval of 400 m at 10 Hz: out of the pits at rest, four laps at 12 to 20 m/s, with the noise of a receiver.
-    /// Latitude and longitude in degrees and the true speed (m/s) at each tenth of a second.
-    pub(crate) fn kart() -> Vec<[f64; 3]> {
+    /// Latitude and longitude in degrees, true speed (m/s) and true distance (m) at each tenth of a second.
+    pub(crate) fn kart() -> Vec<[f64; 4]> {
         let (straight, radius) = (100.0, 100.0 / std::f64::consts::PI);
         let mut random = 7u64;
         let mut noise = || {
@@ -284,7 +284,7 @@ pub(crate) mod testing {
             };
             let (x, y) = (side * x + 0.1 * noise(), side * y + 0.1 * noise());
             let (lat, lon) = (52.0 + y / 111_263.0, -1.0 + x / 68_677.0);
-            fixes.push([lat, lon, speed]);
+            fixes.push([lat, lon, speed, s]);
         }
         fixes
     }
@@ -292,7 +292,7 @@ pub(crate) mod testing {
     #[test]
     fn laps_and_speed_of_a_kart_come_from_gps_alone() {
         let mut text = "time (s),latitude,longitude\n".to_owned();
-        for (i, [lat, lon, _]) in kart().iter().enumerate() {
+        for (i, [lat, lon, ..]) in kart().iter().enumerate() {
             let _ = match i {
                 // No fix, and a jump of the receiver.
                 40..43 => writeln!(text, "{:.1},0,0", i as f64 / 10.0),
@@ -317,14 +317,15 @@ pub(crate) mod testing {
             "{}",
             line.words
         );
-        let laps: Vec<f64> = line
-            .crossings_s
-            .windows(2)
-            .map(|pair| pair[1] - pair[0])
-            .collect();
-        // All laps but for the start are the same.
-        for pair in laps[1..].windows(2) {
-            assert!((pair[0] - pair[1]).abs() < 0.05, "{laps:?}");
+        // The true distance between passages is that of a lap.
+        let true_at = |time: f64| {
+            let (before, share) = ((10.0 * time) as usize, (10.0 * time).fract());
+            let [from, to] = [before, before + 1].map(|i| kart()[i][3]);
+            from + share * (to - from)
+        };
+        for pair in line.crossings_s.windows(2) {
+            let driven_m = true_at(pair[1]) - true_at(pair[0]);
+            assert!((driven_m - 400.0).abs() < 0.3, "{driven_m}: {line:?}");
         }
     }
 

@@ -192,9 +192,9 @@ mod tests {
             (
                 "235959.90",
                 "236059.90",
-                "line 22, channel time: found \"236059.90\", expected a time of day",
+                "line 21, channel time: found \"236059.90\", expected a time of day",
             ),
-            ("072.00 -0.500", "072.00", "line 23: found 5 cells, expected 6"),
+            ("072.00 -0.500", "072.00", "line 22: found 5 cells, expected 6"),
         ] {
             let text = SMALL.replacen(from, to, 1);
             let error = Recording::parse(text.as_bytes(), "a.vbo")

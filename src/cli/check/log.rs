@@ -12,6 +12,7 @@ use std::path::Path;
 pub fn described(path: &Path, map: Option<&Path>, write: Option<&Path>) -> Result<String> {
     let map = map.map_or_else(|| Ok(ChannelMap::default()), ChannelMap::read)?;
     let recording = Recording::read(path)?;
+    let recording = map.computed(&recording)?;
     let list = ChannelList::of(&recording, &map);
     let mut text = list.table();
     if let Some(file) = write {
