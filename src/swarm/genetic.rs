@@ -14,6 +14,40 @@ use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
 
+/// What every optimiser that breeds leaves to its `generation`: all of [`Optimiser`](super::Optimiser) but `tell`.
+macro_rules! delegated {
+    () => {
+        fn ask(&mut self) -> Vec<f64> {
+            self.generation.candidates()
+        }
+
+        fn counters(&self) -> $crate::swarm::Counters {
+            self.generation.counters
+        }
+
+        fn to_checkpoint(&self) -> $crate::Result<Vec<u8>> {
+            $crate::swarm::checkpoint::to_bytes(self)
+        }
+
+        fn planned_iterations(&self) -> usize {
+            self.settings.iterations
+        }
+
+        fn best(&self) -> Vec<f64> {
+            self.generation.best()
+        }
+
+        fn violation(&self) -> f64 {
+            self.generation.violation()
+        }
+
+        fn front(&self) -> $crate::swarm::Front {
+            self.generation.front()
+        }
+    };
+}
+pub(super) use delegated;
+
 /// How children are made of their parents.
 #[derive(Clone, Copy)]
 pub(super) struct Breeding {

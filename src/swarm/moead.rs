@@ -4,13 +4,12 @@
 //! intersection by a penalty. It differs in that a generation is bred before any of its children takes a place, so that all of
 //! them can be evaluated together.
 
-use super::checkpoint::to_bytes;
+use super::Optimiser;
 use super::front_scale::FrontScale;
-use super::genetic::{Breeding, Generation, Member, fronts};
+use super::genetic::{self, Breeding, Generation, Member, fronts};
 use super::lattice::directions;
 use super::motion::Purpose;
 use super::settings::setting;
-use super::{Counters, Front, Optimiser};
 use crate::error::Result;
 use crate::evaluate::{Evaluation, Problem};
 use serde::{Deserialize, Serialize};
@@ -173,9 +172,7 @@ impl Moead {
 }
 
 impl Optimiser for Moead {
-    fn ask(&mut self) -> Vec<f64> {
-        self.generation.candidates()
-    }
+    genetic::delegated!();
 
     fn tell(&mut self, evaluation: &Evaluation) -> Result<()> {
         let children = self.generation.evaluated(evaluation)?;
@@ -215,29 +212,5 @@ impl Optimiser for Moead {
         let mates = |generation: &Generation| settings.mates(generation, &directions);
         self.generation.go_on(members, settings.breeding(), mates);
         Ok(())
-    }
-
-    fn counters(&self) -> Counters {
-        self.generation.counters
-    }
-
-    fn to_checkpoint(&self) -> Result<Vec<u8>> {
-        to_bytes(self)
-    }
-
-    fn planned_iterations(&self) -> usize {
-        self.settings.iterations
-    }
-
-    fn best(&self) -> Vec<f64> {
-        self.generation.best()
-    }
-
-    fn violation(&self) -> f64 {
-        self.generation.violation()
-    }
-
-    fn front(&self) -> Front {
-        self.generation.front()
     }
 }

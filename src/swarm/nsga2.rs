@@ -3,10 +3,9 @@
 //! Deb, Pratap, Agarwal, Meyarivan, *A fast and elitist multiobjective genetic algorithm: NSGA-II*, IEEE TEC 6
 //! (2002).
 
+use super::Optimiser;
 use super::archive::crowding;
-use super::checkpoint::to_bytes;
-use super::genetic::{Breeding, Generation, Member, fronts};
-use super::{Counters, Front, Optimiser};
+use super::genetic::{self, Breeding, Generation, Member, fronts};
 use crate::error::Result;
 use crate::evaluate::{Evaluation, Problem};
 use serde::{Deserialize, Serialize};
@@ -95,9 +94,7 @@ fn better(a: &Member, b: &Member) -> bool {
 }
 
 impl Optimiser for Nsga2 {
-    fn ask(&mut self) -> Vec<f64> {
-        self.generation.candidates()
-    }
+    genetic::delegated!();
 
     fn tell(&mut self, evaluation: &Evaluation) -> Result<()> {
         let mut all = self.generation.everyone(evaluation)?;
@@ -117,29 +114,5 @@ impl Optimiser for Nsga2 {
         self.generation
             .succeed(all, kept, self.settings.breeding(), |g| g.drawn(better));
         Ok(())
-    }
-
-    fn counters(&self) -> Counters {
-        self.generation.counters
-    }
-
-    fn to_checkpoint(&self) -> Result<Vec<u8>> {
-        to_bytes(self)
-    }
-
-    fn planned_iterations(&self) -> usize {
-        self.settings.iterations
-    }
-
-    fn best(&self) -> Vec<f64> {
-        self.generation.best()
-    }
-
-    fn violation(&self) -> f64 {
-        self.generation.violation()
-    }
-
-    fn front(&self) -> Front {
-        self.generation.front()
     }
 }

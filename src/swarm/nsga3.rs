@@ -4,12 +4,11 @@
 //! approach, part I*, and Jain, Deb, *part II: handling constraints*, IEEE TEC 18 (2014). Directions as in Das, Dennis,
 //! *Normal-boundary intersection*, SIAM J. Optimization 8 (1998).
 
-use super::checkpoint::to_bytes;
+use super::Optimiser;
 use super::front_scale::FrontScale;
-use super::genetic::{Breeding, Generation, Member, fronts};
+use super::genetic::{self, Breeding, Generation, Member, fronts};
 use super::lattice::directions;
 use super::motion::Purpose;
-use super::{Counters, Front, Optimiser};
 use crate::error::Result;
 use crate::evaluate::{Evaluation, Problem};
 use serde::{Deserialize, Serialize};
@@ -171,9 +170,7 @@ fn better(a: &Member, b: &Member) -> bool {
 }
 
 impl Optimiser for Nsga3 {
-    fn ask(&mut self) -> Vec<f64> {
-        self.generation.candidates()
-    }
+    genetic::delegated!();
 
     fn tell(&mut self, evaluation: &Evaluation) -> Result<()> {
         let mut all = self.generation.everyone(evaluation)?;
@@ -193,29 +190,5 @@ impl Optimiser for Nsga3 {
         self.generation
             .succeed(all, kept, self.settings.breeding(), |g| g.in_turn(better));
         Ok(())
-    }
-
-    fn counters(&self) -> Counters {
-        self.generation.counters
-    }
-
-    fn to_checkpoint(&self) -> Result<Vec<u8>> {
-        to_bytes(self)
-    }
-
-    fn planned_iterations(&self) -> usize {
-        self.settings.iterations
-    }
-
-    fn best(&self) -> Vec<f64> {
-        self.generation.best()
-    }
-
-    fn violation(&self) -> f64 {
-        self.generation.violation()
-    }
-
-    fn front(&self) -> Front {
-        self.generation.front()
     }
 }

@@ -20,7 +20,7 @@ mod calibration;
 mod channel_list;
 mod channel_map;
 #[cfg(test)]
-mod conditioned;
+mod conditioned_tests;
 mod csv_headed;
 mod csv_native;
 mod delays;

@@ -271,6 +271,22 @@ fn a_line_that_cannot_be_on_the_road_is_no_result() {
     );
 }
 
+/// The minimum-curvature line of the bundled circuit leaves the road by centimetres between its cross-sections, and bending alone
+/// does not bring it back.
+#[test]
+fn the_minimum_curvature_line_is_on_the_road() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let settings = RacelineSettings {
+        objectives: vec![LineObjective::Gamma],
+        backend: BackendChoice::Simd,
+        ..RacelineSettings::default()
+    };
+    let summary = found(&settings, folder.path());
+    let clearance_m = summary.best["gamma"].clearance_m;
+    assert!(clearance_m >= -0.01, "{clearance_m}");
+    assert!(summary.off_road.is_empty());
+}
+
 #[test]
 fn a_margin_is_kept() {
     let folder = tempfile::tempdir().expect("a folder");
