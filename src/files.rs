@@ -1,5 +1,6 @@
 //! Files that appear whole or not at all, and stay after a loss of power.
 
+pub mod lock;
 pub mod run_folder;
 
 use std::fs::{self, File};

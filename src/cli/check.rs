@@ -162,7 +162,7 @@ fn guess(path: &Path) -> Result<Kind> {
         .to_lowercase();
     match extension.as_str() {
         "tir" => return Ok(Kind::File(&TYRE)),
-        "ld" => return Ok(Kind::File(&LOG)),
+        "ld" | "vbo" => return Ok(Kind::File(&LOG)),
         "gpx" | "kml" => return Ok(Kind::File(&TRACK)),
         _ => {}
     }
@@ -221,7 +221,7 @@ fn guess(path: &Path) -> Result<Kind> {
         Kind::File(&ENVELOPE)
     } else if has(&["station", "alpha"]) {
         Kind::File(&LINE)
-    } else if has(&["x_m", "y_m"]) && !has(&["time_s"]) || has(&["lat", "lon"]) {
+    } else if (has(&["x_m", "y_m"]) || has(&["lat", "lon"])) && !has(&["time"]) {
         Kind::File(&TRACK)
     } else {
         Kind::File(&LOG)

@@ -24,7 +24,8 @@ struct Resume {
     time_limit_s: Option<f64>,
 }
 
-fn pause(text: &str) -> Result<f64, String> {
+/// Parses a time in seconds.
+pub fn pause(text: &str) -> Result<f64, String> {
     let seconds = text
         .parse()
         .ok()

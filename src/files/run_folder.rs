@@ -1,19 +1,21 @@
 //! The folder that a run writes into: one run each, nothing overwritten, one process at a time.
 
 use super::is_temporary;
+use super::lock::LockFile;
 use crate::error::{Error, Result};
-use std::fs::{File, TryLockError};
-use std::io::{Read, Write};
 use std::ops::Deref;
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
 
 /// Where runs go that were given no folder.
 const RUNS: &str = "runs";
 /// The file that the process that writes into a folder holds locked; it says which process that is. The system gives the
 /// lock back when the process ends, however it ends.
 const LOCK: &str = ".lock";
-/// How often a lock file may be taken away just when it is locked, before something else is the matter.
-const LOCK_TRIES: usize = 1000;
+/// How long one that joins others waits for the first of them to begin.
+const PATIENCE: Duration = Duration::from_secs(60);
+/// How long it waits between two looks.
+const LOOK: Duration = Duration::from_millis(20);
 /// The state of a run that can be resumed.
 pub const STATE: &str = "state.lapswarm";
 /// What a run writes before it begins: its resolved settings.
@@ -23,7 +25,7 @@ pub const SUMMARY: &str = "summary.json";
 /// What a finished or interrupted run leaves last: who made it, and of what.
 pub const MANIFEST: &str = "manifest.json";
 
-/// The folder of a run, which no other process writes into while this lives.
+/// The folder of a run, which no other process writes into while this lives, unless it is shared.
 #[derive(Debug)]
 pub struct RunFolder {
     path: PathBuf,
@@ -31,7 +33,7 @@ pub struct RunFolder {
     first: bool,
     /// The folders that it made for that, the innermost first.
     made: Vec<PathBuf>,
-    _lock: File,
+    lock: Option<LockFile>,
 }
 
 impl Deref for RunFolder {
@@ -50,90 +52,46 @@ impl AsRef<Path> for RunFolder {
 
 impl Drop for RunFolder {
     fn drop(&mut self) {
-        // What cannot be removed stands in nobody's way: a lock file that stays behind is nobody's.
         if self.first && !holds_more_than(&self.path, &[LOCK, SETTINGS]) {
-            // A run that has come to nothing, not even to a state.
+            // A run that has come to nothing, not even to a state. What cannot be removed stands in nobody's way.
             let _ = std::fs::remove_file(self.path.join(SETTINGS));
         }
-        let _ = std::fs::remove_file(self.path.join(LOCK));
+        drop(self.lock.take());
         remove_empty(&self.made);
     }
 }
 
 impl RunFolder {
-    /// Takes the folder for this process.
-    fn lock(path: &Path) -> Result<Self> {
-        // A run that ends takes the lock file with it, and may take it from under one that waits for it.
-        for _ in 0..LOCK_TRIES {
-            if let Some(locked) = Self::try_lock(path)? {
-                return Ok(locked);
-            }
-        }
-        let changing = std::io::Error::other("the file there is another one each time");
-        Err(Error::io(path.join(LOCK), "lock", changing))
-    }
-
-    /// As [`RunFolder::lock`]; nothing if the file that is locked is not the one in the folder any more.
-    fn try_lock(path: &Path) -> Result<Option<Self>> {
-        let file = path.join(LOCK);
-        let failed = |e| Error::io(&file, "write", e);
-        let mut lock = File::options()
-            .read(true)
-            .write(true)
-            .create(true)
-            .truncate(false)
-            .open(&file)
-            .map_err(failed)?;
-        #[cfg(test)]
-        tests::between_open_and_lock(path);
-        match lock.try_lock() {
-            Ok(()) => {}
-            Err(TryLockError::WouldBlock) => {
-                let mut owner = String::new();
-                // Not every system lets a locked file be read.
-                let _ = lock.read_to_string(&mut owner);
-                let found = format!("a folder that process {} writes into", owner.trim());
-                let expected = "one that no run is at work in";
-                return Err(Error::input(path, "out", found, expected));
-            }
-            // A file system without locks: what a run leaves behind still keeps others out.
-            Err(TryLockError::Error(e)) if e.kind() == std::io::ErrorKind::Unsupported => {}
-            Err(TryLockError::Error(e)) => return Err(failed(e)),
-        }
-        if !is_at(&lock, &file) {
-            return Ok(None);
-        }
-        if let Err(error) = lock
-            .set_len(0)
-            .and_then(|()| write!(lock, "{}", std::process::id()))
-        {
-            // A full disk: nothing is to stay behind.
-            let _ = std::fs::remove_file(&file);
-            return Err(failed(error));
-        }
-        Ok(Some(Self {
+    fn of(path: &Path, lock: LockFile) -> Self {
+        Self {
             path: path.to_owned(),
             first: false,
             made: Vec::new(),
-            _lock: lock,
-        }))
+            lock: Some(lock),
+        }
     }
-}
 
-/// Whether an open file is the one that a path names.
-#[cfg(unix)]
-fn is_at(file: &File, path: &Path) -> bool {
-    use std::os::unix::fs::MetadataExt;
-    match (file.metadata(), path.metadata()) {
-        (Ok(open), Ok(there)) => (open.dev(), open.ino()) == (there.dev(), there.ino()),
-        _ => false,
+    /// Takes the folder for this process.
+    fn lock(path: &Path) -> Result<Self> {
+        match LockFile::try_take(&path.join(LOCK))? {
+            Ok(lock) => Ok(Self::of(path, lock)),
+            Err(owner) => Err(Self::held(path, &owner)),
+        }
     }
-}
 
-/// Whether an open file is the one that a path names: here a name is not free again before the file is closed.
-#[cfg(not(unix))]
-fn is_at(_: &File, path: &Path) -> bool {
-    path.exists()
+    /// Another process holds the folder.
+    fn held(path: &Path, owner: &str) -> Error {
+        let found = format!("a folder that process {owner} writes into");
+        Error::input(path, "out", found, "one that no run is at work in")
+    }
+
+    /// Lets other processes [join](join) this one in the folder.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if the system refuses.
+    pub fn share(&mut self) -> Result<()> {
+        self.lock.as_mut().map_or(Ok(()), LockFile::share)
+    }
 }
 
 /// Whether a folder has anything in it but what a run leaves that has come to nothing: its lock, its settings, and what it had
@@ -273,30 +231,86 @@ pub fn reopen(folder: &Path) -> Result<RunFolder> {
 /// # Errors
 /// As [`reopen`].
 pub fn reopen_by(folder: &Path, state: &str) -> Result<RunFolder> {
-    let refused = |found: &str, expected: &str| Err(Error::input(folder, "resume", found, expected));
-    if !folder.is_dir() {
-        return refused("no such folder", "the folder of an interrupted run");
-    }
-    let state = folder.join(state);
-    let nothing = || {
-        if folder.join(MANIFEST).is_file() {
-            refused("a run that is finished", "one that was interrupted")
-        } else {
-            refused(
-                "no saved state",
-                "an interrupted run; one that had not begun is started anew, not resumed",
-            )
-        }
-    };
-    if !state.is_file() {
-        return nothing();
-    }
+    check_begun(folder, state)?;
     let locked = RunFolder::lock(folder)?;
-    if !state.is_file() {
-        return nothing();
-    }
+    check_begun(folder, state)?;
     clean(folder, DEEPEST)?;
     Ok(locked)
+}
+
+/// Refuses a folder without the file that says that something is begun.
+fn check_begun(folder: &Path, state: &str) -> Result<()> {
+    let refused = |found: &str, expected: &str| Err(Error::input(folder, "resume", found, expected));
+    if !folder.is_dir() {
+        refused("no such folder", "the folder of an interrupted run")
+    } else if folder.join(state).is_file() {
+        Ok(())
+    } else if folder.join(MANIFEST).is_file() {
+        refused("a run that is finished", "one that was interrupted")
+    } else {
+        refused(
+            "no saved state",
+            "an interrupted run; one that had not begun is started anew, not resumed",
+        )
+    }
+}
+
+/// Takes the folder of work that several processes share, beside those that are at it. The file `begun` in it says that the work
+/// is begun; the first process writes it.
+///
+/// # Errors
+/// [`Error::Input`] if there is no such file, or a process has the folder for itself.
+pub fn join(folder: &Path, begun: &str) -> Result<RunFolder> {
+    check_begun(folder, begun)?;
+    let path = folder.join(LOCK);
+    let until = Instant::now() + PATIENCE;
+    let lock = loop {
+        if let Ok(mut lock) = LockFile::try_take(&path)? {
+            // Nobody else is at it: what is half written is nobody's.
+            clean(folder, DEEPEST)?;
+            lock.share()?;
+            break lock;
+        }
+        match LockFile::try_share(&path)? {
+            Ok(lock) => break lock,
+            Err(owner) if Instant::now() > until => return Err(RunFolder::held(folder, &owner)),
+            Err(_) => std::thread::sleep(LOOK),
+        }
+    };
+    check_begun(folder, begun)?;
+    Ok(RunFolder::of(folder, lock))
+}
+
+/// Joins the work that is begun in a folder, or takes the folder to begin it with `begin`.
+///
+/// # Errors
+/// Those of [`create`], [`join`] and `begin`.
+pub fn create_or_join(
+    study: &str,
+    folder: &Path,
+    begun: &str,
+    begin: impl Fn(&Path) -> Result<()>,
+) -> Result<RunFolder> {
+    let until = Instant::now() + PATIENCE;
+    loop {
+        if folder.join(begun).is_file() {
+            return join(folder, begun);
+        }
+        match create(study, Some(folder)) {
+            Ok(mut created) => {
+                begin(&created)?;
+                created.share()?;
+                return Ok(created);
+            }
+            // Another begins it just now.
+            Err(_)
+                if (folder.join(LOCK).exists() || folder.join(begun).exists()) && Instant::now() < until =>
+            {
+                std::thread::sleep(LOOK);
+            }
+            Err(error) => return Err(error),
+        }
+    }
 }
 
 /// Folders within folders of a run: its stages, what they keep, and no more.
@@ -319,24 +333,15 @@ fn clean(folder: &Path, deepest: usize) -> Result<()> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::lock::testing::BETWEEN;
     use super::*;
-    use std::cell::RefCell;
-
-    thread_local! {
-        static BETWEEN: RefCell<Option<RunFolder>> = const { RefCell::new(None) };
-    }
-
-    /// Lets go of a folder that is to be let go of when another is about to lock it.
-    pub(super) fn between_open_and_lock(path: &Path) {
-        BETWEEN.with_borrow_mut(|held| drop(held.take_if(|held| held.path == path)));
-    }
 
     #[cfg(unix)]
     #[test]
     fn a_lock_file_that_is_taken_away_while_another_waits_for_it_is_held_by_nobody() {
         let root = tempfile::tempdir().expect("a temporary folder");
         let first = take(root.path()).expect("nobody holds it");
-        BETWEEN.set(Some(first));
+        BETWEEN.set(Some((root.path().join(LOCK), Box::new(first))));
         let second = take(root.path()).expect("the first has let go of it");
         assert!(BETWEEN.take().is_none(), "it was let go of just then");
         assert!(second.join(LOCK).is_file());

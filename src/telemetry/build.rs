@@ -10,6 +10,7 @@ use super::channel_map::{Axle, ChannelMap, Mapped};
 use super::derived::{acceleration, product};
 use super::laps::{LEAST_M, Lap, Marks, restarts};
 use super::log::{Log, LogOptions};
+use super::path::start_line;
 use super::recording::{Channel, Clock, Format, Recording};
 use super::resample::{Grid, check_times, onto, uniform_interval};
 use super::role::Role;
@@ -37,11 +38,13 @@ pub(super) fn signals<'a>(
 ) -> Result<Vec<Signal<'a>>> {
     let mut signals: Vec<Signal<'a>> = Vec::new();
     for m in mapped {
-        if matches!(m.role, Role::Throttle | Role::Brake) {
+        if matches!(m.role, Role::Throttle | Role::Brake) || m.role.of_place() {
             continue;
         }
         let channel = m.channel;
-        check_samples(source, channel)?;
+        if m.role != Role::Lap {
+            check_samples(source, channel)?;
+        }
         let known = signals.iter().find(|s| same_clock(s.mapped.channel, channel));
         let (times, nominal_s) = match known {
             Some(signal) => (Arc::clone(&signal.times), signal.nominal_s),
@@ -77,6 +80,7 @@ pub(super) fn signals<'a>(
     Ok(signals)
 }
 
+/// Refuses a channel with samples that are no numbers.
 pub(super) fn check_samples(source: &str, channel: &Channel) -> Result<()> {
     let Some(bad) = &channel.unreadable else {
         return Ok(());
@@ -376,21 +380,27 @@ impl Build<'_> {
             let numbers = lap_numbers(self.source, lap.mapped.channel, &lap.values)?;
             Ok((&*lap.times, numbers))
         });
+        let numbers = numbers.transpose()?;
+        let line = start_line(self.recording, self.map, numbers.is_some())?;
         let marks = Marks {
             beacons_s: &self.recording.beacons_s,
-            numbers: numbers.transpose()?,
+            line: line.as_ref(),
+            numbers,
             complete: timed(Role::LapComplete),
             distance_m: timed(Role::Distance),
             whole: self.recording.is_one_lap(),
         };
         let laps = marks.laps(times_s, driven_m);
         let untold = marks.beacons_s.is_empty() && marks.numbers.is_none() && laps.len() == 1;
-        if untold && !marks.whole {
-            let note = "laps: no beacons and no lap number are logged; the whole file is taken as one lap that may not \
-                        be complete";
-            if !calibration.notes.iter().any(|n| n == note) {
-                calibration.notes.push(note.to_owned());
+        let note = match &line {
+            Some(line) => line.words.as_str(),
+            None if untold && !marks.whole => {
+                "laps: no beacons and no lap number are logged; the whole file is taken as one lap that may not be complete"
             }
+            None => return Ok(laps),
+        };
+        if !calibration.notes.iter().any(|n| n == note) {
+            calibration.notes.push(note.to_owned());
         }
         Ok(laps)
     }
@@ -405,8 +415,12 @@ enum Clocked {
 
 /// Lap numbers from the values of their channel.
 pub(super) fn lap_numbers(source: &str, channel: &Channel, values: &[f64]) -> Result<Vec<u32>> {
+    // RaceChrono leaves the number out before the first line and after the last.
+    let is_empty = channel.unreadable.as_ref().is_some_and(|bad| bad.text.is_empty());
     let number = |(at, &value): (usize, &f64)| {
-        if value.fract() == 0.0 && (0.0..=f64::from(u32::MAX)).contains(&value) {
+        if value.is_nan() && is_empty {
+            Ok(0)
+        } else if value.fract() == 0.0 && (0.0..=f64::from(u32::MAX)).contains(&value) {
             Ok(value as u32)
         } else {
             Err(Error::input(

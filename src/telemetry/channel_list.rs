@@ -65,6 +65,8 @@ impl ChannelList {
         let missing = found.iter().filter_map(|(role, found)| {
             let refused = match found {
                 Ok(Some(_)) => return None,
+                // Positions help where laps are not told, and no log lacks them otherwise.
+                Ok(None) if role.of_place() => return None,
                 Ok(None) => None,
                 Err(error) => Some(error.to_string()),
             };
@@ -100,6 +102,17 @@ impl ChannelList {
                 .collect(),
             missing: missing.collect(),
         }
+    }
+
+    /// Whether it is of a log that has positions, and nothing that could be a channel which a model of the car needs: of a kart
+    /// with GPS alone.
+    pub fn is_of_places_alone(&self) -> bool {
+        let plays = |role| self.channels.iter().any(|c| c.role == Some(role));
+        let placed = plays(Role::Latitude) && plays(Role::Longitude) || plays(Role::X) && plays(Role::Y);
+        let lacks_all = |role: Role| {
+            !role.required() || self.missing.iter().any(|m| m.role == role && m.refused.is_none())
+        };
+        placed && Role::ALL.into_iter().all(lacks_all)
     }
 
     /// The list as a table of text, and what is missing below it.
@@ -163,7 +176,15 @@ impl ChannelList {
         for role in Role::ALL {
             if let Some(channel) = played(role) {
                 let _ = writeln!(text, "[channels.{}]", role.key());
-                let _ = writeln!(text, "name = {}", quoted(&channel.name));
+                // As the map makes it of others.
+                let made = channel
+                    .name
+                    .strip_prefix(role.key())
+                    .and_then(|rest| rest.strip_prefix(" = "));
+                let _ = match made {
+                    Some(expression) => writeln!(text, "expression = {}", quoted(expression)),
+                    None => writeln!(text, "name = {}", quoted(&channel.name)),
+                };
                 if !role.quantities().is_empty() && Unit::parse(&channel.unit).is_some() {
                     let _ = writeln!(text, "unit = {}", quoted(&channel.unit));
                 }
@@ -203,9 +224,10 @@ fn without(role: Role) -> &'static str {
         Role::Ax => "the change of speed stands in for it",
         Role::Ay => "speed times yaw rate stands in for it",
         Role::Distance => "the speed is added up in its place",
-        Role::Lap => "laps come from beacons or from the distance",
+        Role::Lap => "laps come from beacons, from the distance, or from positions",
         Role::LapComplete => "laps between two passages of the line are complete",
         Role::Throttle | Role::Brake => "not needed",
+        Role::Latitude | Role::Longitude | Role::X | Role::Y => "laps can be found from it",
     }
 }
 

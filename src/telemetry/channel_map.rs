@@ -1,11 +1,13 @@
 //! Which logged channel plays which role: from a small TOML file, or else by the usual names.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 use toml::Spanned;
 
+use super::expression::Expression;
 use super::recording::{Channel, Recording};
 use super::role::Role;
 use super::text::shown;
@@ -29,7 +31,9 @@ pub enum Axle {
 pub struct ChannelEntry {
     /// The channel's name in the log; `None` to look for the usual names.
     pub name: Option<String>,
-    /// The unit that replaces the one in the log.
+    /// What it is worked out from, in place of a name.
+    pub expression: Option<Expression>,
+    /// The unit that replaces the one in the log; that of an expression.
     pub unit: Option<String>,
     /// Factor of the values, 1 or -1. If it is given, it is not estimated from the log.
     pub sign: Option<f64>,
@@ -56,6 +60,7 @@ pub struct ChannelMap {
 #[serde(deny_unknown_fields)]
 struct FileEntry {
     name: Option<String>,
+    expression: Option<Spanned<String>>,
     unit: Option<Spanned<String>>,
     sign: Option<Spanned<f64>>,
     delay_s: Option<Spanned<f64>>,
@@ -138,7 +143,21 @@ impl ChannelMap {
                 })?;
             }
             let field = |name: &str| format!("channels.{}.{name}", role.key());
+            let expression = entry.expression.map(|expression| {
+                let place = Place::line(line_of(text, expression.span().start)).field(field("expression"));
+                let refuse = |found: &str, expected: &str| {
+                    Err(Error::input(path, place.clone(), found.to_owned(), expected))
+                };
+                if entry.name.is_some() {
+                    return refuse("a name beside the expression", "one of the two");
+                }
+                if entry.unit.is_none() && !role.quantities().is_empty() {
+                    return refuse("no unit", "the unit of the expression beside it");
+                }
+                Expression::parse(expression.get_ref(), path, place)
+            });
             let entry = ChannelEntry {
+                expression: expression.transpose()?,
                 name: entry.name,
                 unit: entry.unit.map(Spanned::into_inner),
                 sign: checked(entry.sign, &field("sign"), "1 or -1", |v| v.abs() == 1.0)?,
@@ -213,7 +232,10 @@ impl ChannelMap {
     /// Finds the channel of a role.
     pub(super) fn find<'a>(&self, role: Role, recording: &'a Recording) -> Result<Option<Mapped<'a>>> {
         let entry = self.channels.get(&role);
-        let name = entry.and_then(|e| e.name.as_deref());
+        let made = entry
+            .and_then(|e| e.expression.as_ref())
+            .map(|e| made_name(role, e));
+        let name = made.as_deref().or_else(|| entry.and_then(|e| e.name.as_deref()));
         let found = match name {
             Some(name) => Some(recording.channel(name).ok_or_else(|| {
                 Error::input(
@@ -223,7 +245,8 @@ impl ChannelMap {
                     "the name that the channel map gives",
                 )
             })?),
-            None => guess(role, recording),
+            // A column without a number in it, as of lap numbers where no line is set, is none.
+            None => guess(role, recording).filter(|c| role.of_motion() || !c.is_blank()),
         };
         let Some(channel) = found else {
             return match entry {
@@ -258,12 +281,53 @@ impl ChannelMap {
         }))
     }
 
+    /// The recording with the channels that the map's expressions make of it.
+    ///
+    /// # Errors
+    /// [`Error::Input`] naming the map, the key, the expression and what is no channel of the recording.
+    pub fn computed<'a>(&self, recording: &'a Recording) -> Result<Cow<'a, Recording>> {
+        let mut made = Vec::new();
+        for (role, entry) in &self.channels {
+            if let Some(expression) = &entry.expression {
+                let unit = entry.unit.as_deref().unwrap_or_default();
+                let name = made_name(*role, expression);
+                if recording.channel(&name).is_none() {
+                    made.push(expression.channel(recording, name, unit)?);
+                }
+            }
+        }
+        Ok(if made.is_empty() {
+            Cow::Borrowed(recording)
+        } else {
+            let mut with = recording.clone();
+            with.channels.extend(made);
+            Cow::Owned(with)
+        })
+    }
+
     /// Which of a recording's channels a log is made of.
     pub(super) fn choose(&self, recording: &Recording) -> Result<Vec<bool>> {
-        let mapped = self.resolve(recording)?;
+        let computed = self.computed(recording)?;
+        let mapped = self.resolve(&computed)?;
         let of_log = |channel: &Channel| mapped.iter().any(|m| std::ptr::eq(m.channel, channel));
-        Ok(recording.channels.iter().map(of_log).collect())
+        let mut chosen: Vec<bool> = computed.channels.iter().map(of_log).collect();
+        chosen.truncate(recording.channels.len());
+        for expression in self
+            .channels
+            .values()
+            .filter_map(|entry| entry.expression.as_ref())
+        {
+            for place in expression.channels(recording)? {
+                chosen[place] = true;
+            }
+        }
+        Ok(chosen)
     }
+}
+
+/// The name of the channel that an expression makes.
+fn made_name(role: Role, expression: &Expression) -> String {
+    format!("{} = {}", role.key(), expression.text())
 }
 
 fn check_unit(text: &str, role: Role) -> Result<Option<Unit>, String> {
@@ -293,7 +357,8 @@ fn guess(role: Role, recording: &Recording) -> Option<&Channel> {
         .find_map(|usual| recording.channels.iter().find(|c| key(&c.name) == *usual))
 }
 
-fn listed(recording: &Recording) -> String {
+/// The names of a recording's channels, for messages.
+pub(super) fn listed(recording: &Recording) -> String {
     const MOST: usize = 40;
     let names: Vec<_> = recording
         .channels

@@ -1,10 +1,12 @@
 //! The path of the car: one lap of a log with GPS.
 
 use super::build::{check_samples, lap_numbers};
+use super::channel_map::ChannelMap;
 use super::laps::{Lap, Marks};
+use super::path::start_line;
 use super::recording::{Channel, Recording};
 use super::role::Role;
-use super::{csv_native, motec_ld, text};
+use super::{csv_native, motec_ld, text, vbox};
 use crate::{Error, Place, Result};
 use std::ops::Range;
 use std::path::Path;
@@ -22,17 +24,6 @@ pub struct DrivenLap {
     pub number: Option<u32>,
 }
 
-/// Names of these channels, in lower case and without anything but letters and digits.
-const LATITUDE: [&str; 5] = ["latitudedeg", "gpslatitude", "latitude", "gpslat", "lat"];
-const LONGITUDE: [&str; 7] = [
-    "longitudedeg",
-    "gpslongitude",
-    "longitude",
-    "gpslong",
-    "gpslon",
-    "long",
-    "lon",
-];
 /// The earth's radius (m), for lengths of laps.
 const RADIUS_M: f64 = 6.371e6;
 
@@ -44,6 +35,9 @@ impl Recording {
         }
         let start = &bytes[..bytes.len().min(1 << 16)];
         let text = text::decode(start);
+        if vbox::is_vbo(&text, path) {
+            return true;
+        }
         let first = text::Rows::new(&text, path, true).next();
         first.and_then(Result::ok).is_some_and(|row| {
             row.cells.iter().any(|c| c == csv_native::TIME) || row.cell(0).eq_ignore_ascii_case("Format")
@@ -65,17 +59,18 @@ impl Recording {
     /// # Errors
     /// [`Error::Input`] when the log has no latitude and longitude, no such lap, or no number where one is needed.
     pub fn driven_lap(&self, lap: Option<u32>) -> Result<DrivenLap> {
-        let find = |names: &[&str], what: &str| {
+        let find = |role: Role| {
+            let names = role.usual_names();
             self.usual(names).ok_or_else(|| {
                 Error::input(
                     &self.source,
-                    Place::default().channel(what),
+                    Place::default().channel(role.key()),
                     "none",
                     format!("a channel called {}", names.join(", ")),
                 )
             })
         };
-        let (latitude, longitude) = (find(&LATITUDE, "latitude")?, find(&LONGITUDE, "longitude")?);
+        let (latitude, longitude) = (find(Role::Latitude)?, find(Role::Longitude)?);
         if latitude.values.len() != longitude.values.len() {
             return Err(Error::input(
                 &self.source,
@@ -84,7 +79,7 @@ impl Recording {
                 format!("{}, as {} has", latitude.values.len(), latitude.name),
             ));
         }
-        let factors = (self.in_degrees(latitude)?, self.in_degrees(longitude)?);
+        let factors = (in_degrees(self, latitude)?, in_degrees(self, longitude)?);
         let (number, range) = self.range_of_lap(lap, (latitude, longitude), factors)?;
         Ok(DrivenLap {
             latitude_deg: self.degrees(latitude, factors.0, 90.0, range.clone())?,
@@ -94,25 +89,6 @@ impl Recording {
                 .as_ref()
                 .map_or_else(Vec::new, |l| l[range].to_vec()),
             number,
-        })
-    }
-
-    /// What turns a channel's values into degrees.
-    fn in_degrees(&self, channel: &Channel) -> Result<f64> {
-        let unit = channel.unit.trim().trim_end_matches('.').to_lowercase();
-        Ok(match unit.as_str() {
-            "" | "deg" | "°" | "degrees" | "degree" => 1.0,
-            "rad" => 1f64.to_degrees(),
-            // Racelogic logs minutes of arc.
-            "min" | "minutes" => 1.0 / 60.0,
-            _ => {
-                return Err(Error::input(
-                    &self.source,
-                    Place::default().channel(&channel.name),
-                    text::shown(&channel.unit),
-                    "deg, rad or min",
-                ));
-            }
         })
     }
 
@@ -143,8 +119,13 @@ impl Recording {
         let source = self.source.display().to_string();
         let times_of = |c: &Channel| -> Vec<f64> { (0..c.values.len()).map(|i| c.time_s(i)).collect() };
         let timed = |role: Role| {
-            let channel = self.usual(role.usual_names())?;
-            Some(check_samples(&source, channel).map(|()| (channel, times_of(channel))))
+            let channel = self.usual(role.usual_names()).filter(|c| !c.is_blank())?;
+            let checked = match role {
+                // Numbers may be left out.
+                Role::Lap => Ok(()),
+                _ => check_samples(&source, channel),
+            };
+            Some(checked.map(|()| (channel, times_of(channel))))
         };
         let numbers = timed(Role::Lap).transpose()?;
         let complete = timed(Role::LapComplete).transpose()?;
@@ -153,9 +134,12 @@ impl Recording {
         let numbered = numbers
             .as_ref()
             .map(|(channel, times)| Ok((&**times, lap_numbers(&source, channel, &channel.values)?)));
+        let numbered = numbered.transpose()?;
+        let line = start_line(self, &ChannelMap::default(), numbered.is_some())?;
         let marks = Marks {
             beacons_s: &self.beacons_s,
-            numbers: numbered.transpose()?,
+            line: line.as_ref(),
+            numbers: numbered,
             complete: complete
                 .as_ref()
                 .map(|(channel, times)| (&**times, &*channel.values)),
@@ -211,4 +195,26 @@ impl Recording {
             },
         )
     }
+}
+
+/// What turns the values of a latitude or longitude into degrees.
+///
+/// # Errors
+/// [`Error::Input`] for a unit that is not known.
+pub(super) fn in_degrees(recording: &Recording, channel: &Channel) -> Result<f64> {
+    let unit = channel.unit.trim().trim_end_matches('.').to_lowercase();
+    Ok(match unit.as_str() {
+        "" | "deg" | "°" | "degrees" | "degree" => 1.0,
+        "rad" => 1f64.to_degrees(),
+        // Racelogic logs minutes of arc.
+        "min" | "minutes" => 1.0 / 60.0,
+        _ => {
+            return Err(Error::input(
+                &recording.source,
+                Place::default().channel(&channel.name),
+                text::shown(&channel.unit),
+                "deg, rad or min",
+            ));
+        }
+    })
 }

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::path::{StartLine, like};
 use super::resample::JITTER;
 
 /// One lap of a log, as a range of its samples.
@@ -36,7 +37,8 @@ pub(super) const LEAST_M: f64 = 50.0;
 /// Values of a channel with their times (s).
 type Timed<'a> = (&'a [f64], &'a [f64]);
 
-/// What a recording tells of its laps. The first that it has counts: beacons, lap numbers, a distance that restarts.
+/// What a recording tells of its laps. The first that it has counts: beacons, lap numbers, a distance that restarts, a line that
+/// its path crosses.
 #[derive(Default)]
 pub(super) struct Marks<'a> {
     /// Times at which the car passed the line (s, ascending).
@@ -47,6 +49,8 @@ pub(super) struct Marks<'a> {
     pub complete: Option<Timed<'a>>,
     /// Distance travelled (m).
     pub distance_m: Option<Timed<'a>>,
+    /// A line that was found from its path.
+    pub line: Option<&'a StartLine>,
     /// Whether a file that tells of no line runs from line to line, as an exported lap does.
     pub whole: bool,
 }
@@ -58,6 +62,7 @@ impl Marks<'_> {
     /// where it has no beacons, if they are as long as another lap and the car does not stand at their outer end.
     pub fn laps(&self, times_s: &[f64], driven_m: &[f64]) -> Vec<Lap> {
         let span = Span::of(times_s);
+        let mut line = None;
         let (cuts, first) = if !self.beacons_s.is_empty() {
             (cuts_from_beacons(self.beacons_s, &span), 0)
         } else if let Some((times, numbers)) = &self.numbers {
@@ -69,11 +74,23 @@ impl Marks<'_> {
             let cuts = self
                 .distance_m
                 .map(|logged| cuts_from_restarts(logged, times_s, driven_m));
-            let cuts = cuts.unwrap_or_default();
+            let mut cuts = cuts.unwrap_or_default();
+            line = self.line.filter(|_| cuts.is_empty());
+            if let Some(line) = line {
+                cuts = cuts_from_beacons(&line.crossings_s, &span);
+            }
             let first = u32::from(cuts.is_empty());
             (cuts, first)
         };
         let mut laps = cut(&cuts, first, &span);
+        if let Some(line) = line {
+            // Laps through the pits, and those that were cut short, are not from line to line.
+            let driven = |at: usize| driven_m.get(at).or(driven_m.last()).copied().unwrap_or(0.0);
+            for lap in &mut laps {
+                lap.complete &= like(driven(lap.end) - driven(lap.start), line.lap_m);
+            }
+            return laps;
+        }
         if let Some((times, flags)) = self.complete {
             for lap in &mut laps {
                 let start_s = times_s.get(lap.start).copied().unwrap_or(f64::INFINITY);

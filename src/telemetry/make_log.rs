@@ -71,6 +71,8 @@ impl Log {
         limit: u64,
     ) -> Result<Self> {
         check_options(options)?;
+        let computed = map.computed(recording)?;
+        let recording = &*computed;
         let source = recording.source.display().to_string();
         let radius = map.rolling_radii_m().or(options.rolling_radius_m);
         let mapped = map.resolve(recording)?;

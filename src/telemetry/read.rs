@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::path::Path;
 
 use super::recording::{Format, Reading, Recording};
-use super::{csv_headed, csv_native, motec_csv, motec_ld, text};
+use super::{csv_headed, csv_native, motec_csv, motec_ld, text, vbox};
 use crate::config::{LARGEST_LOG, read_bytes};
 use crate::{Error, Place, Result};
 
@@ -50,6 +50,9 @@ impl Recording {
         // Text that is not UTF-8 is converted, to at most twice its length.
         reading.fits(path, size, text::decoded_size(&bytes))?;
         let text = text::decode(&bytes);
+        if vbox::is_vbo(&text, path) {
+            return vbox::parse(&text, path, reading);
+        }
         let mut rows = text::Rows::new(&text, path, true);
         let Some(first) = rows.next().transpose()? else {
             return Err(Error::input(path, Place::line(1), "no rows", "a log"));

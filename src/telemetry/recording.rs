@@ -18,6 +18,8 @@ pub enum Format {
     Headed,
     /// MoTeC's binary `.ld`.
     MotecLd,
+    /// Racelogic's `.vbo`.
+    Vbox,
 }
 
 /// When the samples of a channel were taken.
@@ -68,6 +70,11 @@ impl Channel {
             Clock::Rate { start_s, rate_hz } => start_s + sample as f64 / rate_hz,
             Clock::Times(times) => times.get(sample).or_else(|| times.last()).copied().unwrap_or(0.0),
         }
+    }
+
+    /// Whether it has samples, of which none is a number.
+    pub(super) fn is_blank(&self) -> bool {
+        !self.values.is_empty() && self.values.iter().all(|v| v.is_nan())
     }
 
     /// Where a sample stands, for an error message: `line 12, channel X`, or its time in a binary file.

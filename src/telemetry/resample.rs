@@ -165,6 +165,19 @@ fn area_to(times: &[f64], values: &[f64], integral: &[f64], time: f64, cursor: &
     integral[i] + (time - times[i]) * (values[i] + here) / 2.0
 }
 
+/// A channel between its samples, by a straight line; its first and its last value beyond them.
+pub(super) fn linear(times_s: &[f64], values: &[f64], at_s: f64) -> f64 {
+    let after = times_s.partition_point(|t| *t < at_s);
+    match (after.checked_sub(1), times_s.get(after)) {
+        (Some(before), Some(next_s)) => {
+            let share = (at_s - times_s[before]) / (next_s - times_s[before]);
+            values[before] + share * (values[after] - values[before])
+        }
+        (None, Some(_)) => values[0],
+        (_, None) => values.last().copied().unwrap_or(f64::NAN),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -36,11 +36,19 @@ pub enum Role {
     Throttle,
     /// Brake pressure or position.
     Brake,
+    /// Latitude.
+    Latitude,
+    /// Longitude.
+    Longitude,
+    /// Position along one axis of a plane.
+    X,
+    /// Position along the other.
+    Y,
 }
 
 impl Role {
     /// All roles.
-    pub const ALL: [Self; 14] = [
+    pub const ALL: [Self; 18] = [
         Self::WheelSpeedFl,
         Self::WheelSpeedFr,
         Self::WheelSpeedRl,
@@ -55,6 +63,10 @@ impl Role {
         Self::LapComplete,
         Self::Throttle,
         Self::Brake,
+        Self::Latitude,
+        Self::Longitude,
+        Self::X,
+        Self::Y,
     ];
     /// The wheels' roles, FL FR RL RR.
     pub const WHEELS: [Self; 4] = [
@@ -81,6 +93,10 @@ impl Role {
             Self::LapComplete => "lap_complete",
             Self::Throttle => "throttle",
             Self::Brake => "brake",
+            Self::Latitude => "latitude",
+            Self::Longitude => "longitude",
+            Self::X => "x",
+            Self::Y => "y",
         }
     }
 
@@ -95,8 +111,13 @@ impl Role {
             Self::Steer => "rad",
             Self::Vx => "m/s",
             Self::Ax | Self::Ay => "m/s^2",
-            Self::Distance => "m",
-            Self::Lap | Self::LapComplete | Self::Throttle | Self::Brake => "",
+            Self::Distance | Self::X | Self::Y => "m",
+            Self::Lap
+            | Self::LapComplete
+            | Self::Throttle
+            | Self::Brake
+            | Self::Latitude
+            | Self::Longitude => "",
         }
     }
 
@@ -110,7 +131,12 @@ impl Role {
         !matches!(
             self,
             Self::Distance | Self::Lap | Self::LapComplete | Self::Throttle | Self::Brake
-        )
+        ) && !self.of_place()
+    }
+
+    /// Whether it is part of the car's place: what laps are found from where nothing tells of them.
+    pub(super) fn of_place(self) -> bool {
+        matches!(self, Self::Latitude | Self::Longitude | Self::X | Self::Y)
     }
 
     /// The quantities its channel may have; none where it is a plain number.
@@ -125,12 +151,12 @@ impl Role {
             Self::YawRate => &[Quantity::AngularSpeed],
             Self::Distance => &[Quantity::Distance],
             Self::Throttle | Self::Brake => &[Quantity::Ratio, Quantity::Pressure],
-            Self::Lap | Self::LapComplete => &[],
+            Self::Lap | Self::LapComplete | Self::Latitude | Self::Longitude | Self::X | Self::Y => &[],
         }
     }
 
     /// Usual names, best first, in lower case and without anything but letters and digits: ours, then those of
-    /// MoTeC, AiM, Racelogic and iRacing.
+    /// MoTeC, AiM, Racelogic, RaceChrono and iRacing.
     pub(super) fn usual_names(self) -> &'static [&'static str] {
         match self {
             Self::WheelSpeedFl => &[
@@ -214,6 +240,7 @@ impl Role {
                 "accelerationx",
                 "inlineacc",
                 "lonacc",
+                "longitudinalacc",
                 "accelerometerx",
                 "gpslonacc",
                 "glong",
@@ -242,6 +269,7 @@ impl Role {
                 "gyrozaxis",
                 "rategyroz",
                 "zrate",
+                "zrateofrotation",
                 "gpsgyro",
             ],
             Self::Distance => &[
@@ -251,6 +279,8 @@ impl Role {
                 "correcteddistance",
                 "lapdist",
                 "distanceonvehiclespeed",
+                "distanceongpsspeed",
+                "distancetraveled",
             ],
             Self::Lap => &["lap", "lapnumber", "lapnum", "lapno"],
             Self::LapComplete => &["lapcomplete"],
@@ -270,6 +300,18 @@ impl Role {
                 "brakepress",
                 "brakepressure",
             ],
+            Self::Latitude => &["latitudedeg", "gpslatitude", "latitude", "gpslat", "lat"],
+            Self::Longitude => &[
+                "longitudedeg",
+                "gpslongitude",
+                "longitude",
+                "gpslong",
+                "gpslon",
+                "long",
+                "lon",
+            ],
+            Self::X => &["xm", "posx", "positionx", "xposition", "carposx", "x"],
+            Self::Y => &["ym", "posy", "positiony", "yposition", "carposy", "y"],
         }
     }
 }

@@ -402,7 +402,13 @@ pub fn sweep_rows(data: &[u8]) {
     let folder = FOLDER.with(|folder| folder.path().join("sweep"));
     std::fs::create_dir_all(&folder).expect("a temporary folder");
     std::fs::write(folder.join(SWEEP_FILE), SWEPT).expect("a temporary file");
-    std::fs::write(folder.join("rows.jsonl"), data).expect("a temporary file");
+    let _ = std::fs::remove_dir_all(folder.join("rows"));
+    std::fs::create_dir_all(folder.join("rows")).expect("a temporary folder");
+    std::fs::create_dir_all(folder.join("studies")).expect("a temporary folder");
+    let rows = String::from_utf8_lossy(data);
+    for (run, row) in rows.lines().take(4).enumerate() {
+        std::fs::write(folder.join(format!("rows/{run:05}.json")), row).expect("a temporary file");
+    }
     let settings = SweepSettings::parse(Path::new("s.toml"), SWEPT).expect("a sweep");
     match sweep::sweep(&settings, &folder, true, |_| ControlFlow::Break(())) {
         // Rows are left to do.

@@ -165,7 +165,8 @@ pub fn nothing_half_written(folder: &Path) {
             nothing_half_written(&path);
             continue;
         }
-        if on_its_way(&path) || path.ends_with(".lock") {
+        let locks = path.ends_with(".lock") || path.extension().is_some_and(|e| e == "lock");
+        if on_its_way(&path) || locks {
             continue;
         }
         let bytes = std::fs::read(&path).expect("a file");

@@ -122,10 +122,10 @@ impl<'a> Study<'a> {
 
     /// When each run of a sweep was done.
     fn rows(&self, folder: &Path) -> Vec<std::time::SystemTime> {
-        let rows = std::fs::read_to_string(folder.join("rows.jsonl")).unwrap_or_default();
-        (0..rows.lines().count())
-            .map(|run| folder.join(format!("studies/{run:05}.json")))
-            .map(|path| path.metadata().and_then(|m| m.modified()).expect("a manifest"))
+        (0..)
+            .map(|run| folder.join(format!("rows/{run:05}.json")))
+            .take_while(|path| path.is_file())
+            .map(|path| path.metadata().and_then(|m| m.modified()).expect("a row"))
             .collect()
     }
 }
@@ -169,7 +169,7 @@ fn a_killed_drive_of_one_line_ends_as_one_that_was_left_alone() {
 fn a_killed_sweep_keeps_the_rows_that_it_has() {
     let sweep = Study {
         again: &["sweep", "sweep.toml"],
-        marker: "rows.jsonl",
+        marker: "rows/00000.json",
         ..Study::new(&["sweep", "sweep.toml"])
     };
     sweep.kill_and_resume(6);

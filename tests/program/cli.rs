@@ -625,6 +625,11 @@ fn a_dry_run_of_any_study_says_what_it_would_do_and_writes_nothing() {
         assert_eq!(told["study"], study);
         assert_eq!(told["dry_run"], true);
         assert_eq!(told["evaluations"].as_u64(), evaluations, "{study}");
+        // What follows the swarm: two polishes of 150 drives, four rounds of 50, and hops of 64 starts and 120 drives. The sweep
+        // is without.
+        let hops = told["settings"]["hops"].as_u64().unwrap_or(0);
+        let polish = (study == "identify").then_some(2 * 150 + 4 * 50 + hops * (64 + 120));
+        assert_eq!(told["polish_drives"].as_u64(), polish, "{study}");
         assert_eq!(told["folder"], "new");
         assert_eq!(told["folder_exists"], false);
         assert!(told["settings"].is_object(), "{study}: {told}");

@@ -12,7 +12,7 @@ use lapswarm::files::run_folder::STATE;
 use lapswarm::study::framework::Request;
 use lapswarm::study::framework::memory::USUAL_MIB;
 use lapswarm::study::registry::STUDIES;
-use lapswarm::study::sweep::{Row, SweepSettings};
+use lapswarm::study::sweep::{KeptRow, Row, SweepSettings};
 use lapswarm::swarm::checkpoint::{self, Checkpoint};
 use lapswarm::swarm::{
     CooperativeSettings, CooperativeSwarm, CovarianceSettings, CovarianceSwarm, DifferenceSettings,
@@ -187,12 +187,18 @@ fn sweep_rows() -> Vec<u8> {
         .unwrap()
         .into_iter()
         .enumerate()
-        .map(|(run, point)| Row {
-            run,
-            settings: point.settings,
-            figures: [("hypervolume".to_owned(), Some(0.5)), ("none".to_owned(), None)].into(),
-            device_faults: Vec::new(),
-            front: vec![vec![1.0, 3.0 + run as f64], vec![2.0, 1.5]],
+        .map(|(run, point)| KeptRow {
+            row: Row {
+                run,
+                settings: point.settings,
+                figures: [("hypervolume".to_owned(), Some(0.5)), ("none".to_owned(), None)].into(),
+                device_faults: Vec::new(),
+                front: vec![vec![1.0, 3.0 + run as f64], vec![2.0, 1.5]],
+            },
+            exit_code: 0,
+            machine: "a".to_owned(),
+            seconds: 1.0,
+            log: Vec::new(),
         });
     rows.flat_map(|row| (serde_json::to_string(&row).unwrap() + "\n").into_bytes())
         .collect()

@@ -1,8 +1,13 @@
 //! Sweeps: a grid of small studies, interrupted and resumed.
 
-use lapswarm::study::sweep::{SweepSettings, sweep};
+use lapswarm::hold;
+use lapswarm::study::sweep::{RowsRequest, SweepSettings, begin, gather, run_rows, sweep};
+use serde_json::{Value, json};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::sync::Arc;
+use std::time::Duration;
 
 const SWEEP: &str = "study = \"identify\"
 [base]
@@ -318,4 +323,194 @@ fn a_file_that_changes_while_a_sweep_runs_ends_it() {
     });
     let said = ended.expect_err("two cars in one sweep").to_string();
     assert!(said.contains("gt.toml"), "{said}");
+}
+
+/// A process that works on rows of the sweep of lines in `folder`, and writes what it passes to `passed`. It is held at `point`.
+fn process(folder: &Path, flags: &[&str], passed: &str, point: (&str, usize)) -> Child {
+    std::fs::write(
+        folder.join("lines.toml"),
+        LINES.replace("[1, 2]", "[1, 2, 3, 4, 5, 6]"),
+    )
+    .expect("room");
+    let (name, number) = point;
+    Command::new(env!("CARGO_BIN_EXE_lapswarm"))
+        .args(["sweep", "lines.toml", "--out", "s", "--json", "--quiet"])
+        .args(flags)
+        .current_dir(folder)
+        .env(
+            hold::VARIABLE,
+            format!("{name}:{number}:{}", folder.join(passed).display()),
+        )
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the program starts")
+}
+
+/// What a process prints, whose exit code is `code`.
+fn told(process: Child, code: i32) -> Value {
+    let output = process.wait_with_output().expect("it ends");
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(code), "{errors}");
+    serde_json::from_slice(&output.stdout).unwrap_or_else(|e| panic!("{e}: {errors}"))
+}
+
+/// How many files a process has written, but for states, which are saved by the clock.
+fn written(folder: &Path, passed: &str) -> usize {
+    let text = std::fs::read_to_string(folder.join(passed)).expect("what it passed");
+    let count = |point: &str| text.lines().filter(|line| *line == point).count();
+    count("placed") - count("saved")
+}
+
+#[test]
+fn two_processes_share_the_rows_and_do_none_twice() {
+    let root = tempfile::tempdir().expect("a temporary folder");
+    let root = root.path();
+    let [alone, shared] = ["alone", "shared"].map(|name| root.join(name));
+    for folder in [&alone, &shared] {
+        std::fs::create_dir(folder).expect("a folder");
+    }
+    let part = told(process(&alone, &["--rows", ".."], "passed", ("none", 0)), 0);
+    let whole = json!({"study": "sweep", "rows": {"start": 0, "end": 6}, "finished": 6, "failed_runs": [],
+                       "elsewhere": [], "ended_by": null});
+    assert_eq!(part, whole);
+    let both = ["one", "other"].map(|name| process(&shared, &["--rows", ".."], name, ("none", 0)));
+    for process in both {
+        assert_eq!(told(process, 0)["failed_runs"], json!([]));
+    }
+    // Every file of one process is written by one of two.
+    assert_eq!(
+        written(&shared, "one") + written(&shared, "other"),
+        written(&alone, "passed")
+    );
+    for folder in [&alone, &shared] {
+        assert!(
+            !folder.join("s/summary.json").exists(),
+            "tables are made when they are asked for"
+        );
+        let summary = told(process(folder, &["--gather"], "gather", ("none", 0)), 0);
+        assert_eq!(summary["rows"].as_array().map(Vec::len), Some(6));
+        assert!(!folder.join("s/.lock").exists());
+    }
+    assert_eq!(files(&shared.join("s")), files(&alone.join("s")));
+    let row: Value = serde_json::from_slice(&std::fs::read(shared.join("s/rows/00003.json")).expect("a row"))
+        .expect("an object");
+    assert_eq!(
+        (&row["run"], &row["exit_code"], &row["log"]),
+        (&json!(3), &json!(0), &json!([]))
+    );
+    assert!(row["seconds"].as_f64().is_some_and(|s| s > 0.0) && row["machine"].is_string());
+}
+
+#[test]
+fn the_claim_of_a_killed_process_blocks_nobody() {
+    let root = tempfile::tempdir().expect("a temporary folder");
+    let root = root.path();
+    // Within its first run.
+    let mut first = process(root, &[], "first", ("step", 12));
+    let held = || {
+        std::fs::read_to_string(root.join("first"))
+            .unwrap_or_default()
+            .ends_with("held\n")
+    };
+    while !held() {
+        assert!(first.try_wait().expect("its state").is_none(), "it was not held");
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    let part = told(process(root, &["--rows", "0..3"], "second", ("none", 0)), 0);
+    assert_eq!((&part["finished"], &part["elsewhere"]), (&json!(2), &json!([0])));
+    let summary = told(process(root, &["--gather"], "gather", ("none", 0)), 0);
+    assert_eq!(summary["missing_runs"], 4);
+    assert_eq!(summary["rows"].as_array().map(Vec::len), Some(2));
+    // Another sweep is not mixed in, nor is another run.
+    std::fs::write(root.join("other.toml"), LINES).expect("room");
+    for command in [
+        &["sweep", "other.toml", "--resume"][..],
+        &["sweep", "lines.toml"],
+        &["identify"],
+    ] {
+        let refused = Command::new(env!("CARGO_BIN_EXE_lapswarm"))
+            .args(command)
+            .args(["--out", "s"])
+            .current_dir(root)
+            .output();
+        assert_eq!(refused.expect("it starts").status.code(), Some(2), "{command:?}");
+    }
+    first.kill().expect("it is killed");
+    first.wait().expect("it ends");
+    let whole = told(process(root, &["--resume"], "third", ("none", 0)), 0);
+    assert_eq!(whole["rows"].as_array().map(Vec::len), Some(6));
+    assert_eq!(whole["missing_runs"], Value::Null);
+    let left = root.join("s/rows").read_dir().expect("rows").flatten();
+    let left: Vec<_> = left
+        .map(|e| e.path())
+        .filter(|p| p.extension().is_none_or(|e| e != "json"))
+        .collect();
+    assert!(left.is_empty(), "{left:?}");
+}
+
+#[test]
+fn a_sweep_ends_in_time_and_goes_on() {
+    let root = tempfile::tempdir().expect("a temporary folder");
+    let settings = SweepSettings::parse(Path::new("sweep.toml"), LINES).expect("a sweep");
+    let folder = root.path().join("s");
+    begin(&settings, &folder).expect("begun");
+    let part = |rows, time_limit| {
+        let asked = RowsRequest {
+            rows,
+            to_the_end: true,
+            time_limit,
+            stop: Arc::default(),
+            observe: &mut |_| ControlFlow::Continue(()),
+        };
+        run_rows(&settings, &folder, asked)
+    };
+    let none = part(0..2, Some(Duration::ZERO)).expect("no error");
+    assert_eq!((none.finished, none.ended_by.as_deref()), (0, Some("time_limit")));
+    let second = part(1..9, None).expect("there is one");
+    assert_eq!((second.rows, second.finished, second.ended_by), (1..2, 1, None));
+    let refused = part(2..3, None).expect_err("there is none").to_string();
+    assert!(refused.contains("rows of 0..2"), "{refused}");
+    let some = gather(&settings, &folder).expect("tables");
+    assert_eq!((some.rows.len(), some.rows[0].run, some.missing_runs), (1, 1, 1));
+    let whole = sweep(&settings, &folder, true, |_| ControlFlow::Continue(())).expect("the rest");
+    assert_eq!((whole.rows.len(), whole.missing_runs), (2, 0));
+}
+
+#[test]
+fn a_run_that_fails_is_a_row_that_says_why_and_stops_no_other() {
+    let root = tempfile::tempdir().expect("a temporary folder");
+    let text = LINES
+        .replace("[grid]", "[grid]\nsections = [8, 60]")
+        .replace("sections = 60\n", "");
+    let text = text
+        .replace("[1, 2]", "[1]")
+        .replace("iterations = 30", "iterations = 1");
+    let settings = SweepSettings::parse(Path::new("sweep.toml"), &text).expect("a sweep");
+    let folder = root.path().join("s");
+    // A failed run is tried again by the next process.
+    for resume in [false, true] {
+        let mut done = Vec::new();
+        let summary = sweep(&settings, &folder, resume, |p| {
+            done.push(p.done);
+            ControlFlow::Continue(())
+        });
+        let summary = summary.expect("the other run");
+        assert_eq!(done.first(), Some(&u64::from(resume)));
+        assert_eq!(
+            (summary.rows.len(), summary.rows[0].run, summary.missing_runs),
+            (1, 1, 0)
+        );
+        let [why] = &summary.failed_runs[..] else {
+            panic!("{:?}", summary.failed_runs)
+        };
+        assert!(
+            why.starts_with("run 00000 failed: ") && why.contains("leaves the road"),
+            "{why}"
+        );
+        let row: Value =
+            serde_json::from_slice(&std::fs::read(folder.join("rows/00000.json")).expect("a row"))
+                .expect("an object");
+        assert_eq!((&row["exit_code"], &row["figures"]), (&json!(1), &json!({})));
+    }
 }

@@ -3,7 +3,7 @@
 use crate::cli::output::outln;
 use crate::cli::write_new;
 use lapswarm::Result;
-use lapswarm::telemetry::{ChannelList, ChannelMap, Log, LogOptions, Recording};
+use lapswarm::telemetry::{ChannelList, ChannelMap, Lap, Log, LogOptions, Outing, Recording};
 use lapswarm::vehicle::Car;
 use std::path::Path;
 
@@ -12,6 +12,7 @@ use std::path::Path;
 pub fn described(path: &Path, map: Option<&Path>, write: Option<&Path>) -> Result<String> {
     let map = map.map_or_else(|| Ok(ChannelMap::default()), ChannelMap::read)?;
     let recording = Recording::read(path)?;
+    let recording = map.computed(&recording)?;
     let list = ChannelList::of(&recording, &map);
     let mut text = list.table();
     if let Some(file) = write {
@@ -23,19 +24,36 @@ pub fn described(path: &Path, map: Option<&Path>, write: Option<&Path>) -> Resul
         rolling_radius_m: Some([car.chassis.radius_front, car.chassis.radius_rear]),
         ..LogOptions::default()
     };
-    let log = Log::from_recording(&recording, &map, &options).inspect_err(|_| {
+    let told = || {
         outln!("{}: {} channels", path.display(), list.channels.len());
         outln!("{}", text.trim_end());
-    })?;
-    for lap in &log.laps {
-        let seconds = (lap.end - lap.start) as f64 * log.dt_s;
-        let state = if lap.complete {
-            ""
-        } else {
-            ", not from line to line"
-        };
-        text += &format!("  lap {}: {seconds:.2} s{state}\n", lap.number);
+    };
+    if list.is_of_places_alone() {
+        let outing = Outing::of(&recording, &map).inspect_err(|_| told())?;
+        if let Some(outing) = outing {
+            let mut text = text.clone();
+            for note in &outing.notes {
+                text += &format!("  {note}\n");
+            }
+            text += &laps(&outing.laps, |sample| {
+                outing.time_s[sample.min(outing.time_s.len() - 1)]
+            });
+            return Ok(format!(
+                "a log of {} laps: {} samples; it lacks what a model of the car is driven by, and tells laps and speed\n{}",
+                outing.laps.len(),
+                outing.time_s.len(),
+                text.trim_end()
+            ));
+        }
     }
+    let log = Log::from_recording(&recording, &map, &options).inspect_err(|_| told())?;
+    text += &laps(&log.laps, |sample| sample as f64 * log.dt_s);
+    let of_laps = log
+        .calibration
+        .notes
+        .iter()
+        .filter(|note| note.starts_with("laps: "));
+    text.extend(of_laps.map(|note| format!("  {note}\n")));
     for finding in log.calibration.findings.iter().filter(|finding| finding.applied) {
         text += &format!("  {finding}\n");
     }
@@ -46,4 +64,18 @@ pub fn described(path: &Path, map: Option<&Path>, write: Option<&Path>) -> Resul
         1.0 / log.dt_s,
         text.trim_end()
     ))
+}
+
+/// The laps with their times, a line each; `time_s` is that of a sample.
+fn laps(laps: &[Lap], time_s: impl Fn(usize) -> f64) -> String {
+    let line = |lap: &Lap| {
+        let seconds = time_s(lap.end) - time_s(lap.start);
+        let state = if lap.complete {
+            ""
+        } else {
+            ", not from line to line"
+        };
+        format!("  lap {}: {seconds:.2} s{state}\n", lap.number)
+    };
+    laps.iter().map(line).collect()
 }

@@ -3,6 +3,7 @@
 use super::write_json;
 use crate::config::{FilesRead, LARGEST_LOG, noting_files, read_bytes, read_text};
 use crate::error::{Error, Result};
+use crate::files::lock::LockFile;
 use std::fmt::{Debug, Write as _};
 use std::hash::{DefaultHasher, Hasher};
 use std::path::{Path, PathBuf};
@@ -71,13 +72,7 @@ impl InputFiles {
     /// # Errors
     /// [`Error::Input`] naming a file that is not what it was; [`Error::Io`] if what was kept cannot be read.
     pub fn reopen(&mut self) -> Result<()> {
-        if !self.kept.exists() {
-            return Ok(());
-        }
-        self.read = serde_json::from_str(&read_text(&self.kept)?).map_err(|e| {
-            let expected = "the files that the studies have read";
-            Error::input(&self.kept, "contents", e.to_string(), expected)
-        })?;
+        self.read = self.kept()?;
         for (path, sum) in &self.read {
             match read_bytes(path, LARGEST_LOG) {
                 Ok(bytes) if crc32fast::hash(&bytes) == *sum => {}
@@ -88,28 +83,34 @@ impl InputFiles {
         Ok(())
     }
 
-    /// Does `work`, and keeps the names of the files that it read.
+    /// Those that are kept.
+    fn kept(&self) -> Result<FilesRead> {
+        if !self.kept.exists() {
+            return Ok(FilesRead::new());
+        }
+        serde_json::from_str(&read_text(&self.kept)?).map_err(|e| {
+            let expected = "the files that the studies have read";
+            Error::input(&self.kept, "contents", e.to_string(), expected)
+        })
+    }
+
+    /// Does `work`, and keeps the names of the files that it read. Other processes may keep theirs in the same place.
     ///
     /// # Errors
     /// Those of `work`; [`Error::Input`] naming a file that is not what it was when it was first read.
     pub fn noted<T>(&mut self, work: impl FnOnce() -> Result<T>) -> Result<T> {
         let (done, read) = noting_files(work);
-        let mut more = false;
+        if read.iter().all(|(path, sum)| self.read.get(path) == Some(sum)) {
+            return done;
+        }
+        let _alone = LockFile::take(&self.kept.with_extension("lock"))?;
+        self.read.extend(self.kept()?);
         for (path, sum) in read {
-            match self.read.get(&path) {
-                Some(before) if *before != sum => {
-                    return Err(changed(&path, "another file than the one that was read before"));
-                }
-                Some(_) => {}
-                None => {
-                    self.read.insert(path, sum);
-                    more = true;
-                }
+            if *self.read.entry(path.clone()).or_insert(sum) != sum {
+                return Err(changed(&path, "another file than the one that was read before"));
             }
         }
-        if more {
-            write_json(&self.kept, &self.read)?;
-        }
+        write_json(&self.kept, &self.read)?;
         done
     }
 }

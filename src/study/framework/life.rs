@@ -65,7 +65,7 @@ pub const TIME_LIMIT: &str = "time_limit";
 
 /// The time that a study may take. Once it is over it raises the flag that ends the study, for work that tells nobody of its
 /// progress.
-struct TimeLimit {
+pub(in crate::study) struct TimeLimit {
     limit: Option<Duration>,
     began: Instant,
     stop: Arc<AtomicBool>,
@@ -75,7 +75,8 @@ struct TimeLimit {
 }
 
 impl TimeLimit {
-    fn begin(limit: Option<Duration>, stop: &Arc<AtomicBool>) -> Self {
+    /// From now on.
+    pub fn begin(limit: Option<Duration>, stop: &Arc<AtomicBool>) -> Self {
         let mut begun = Self {
             limit,
             began: Instant::now(),
@@ -101,10 +102,15 @@ impl TimeLimit {
     }
 
     /// Whether it is over; a study that the user has stopped before has ended by that.
-    fn is_over(&self) -> bool {
+    pub fn is_over(&self) -> bool {
         if self.limit.is_some_and(|limit| self.began.elapsed() >= limit) {
             end(&self.over, &self.stop);
         }
+        self.has_ended_it()
+    }
+
+    /// Whether it, and not the user, has ended the study.
+    pub fn has_ended_it(&self) -> bool {
         self.over.load(Ordering::Relaxed)
     }
 }
@@ -214,7 +220,7 @@ pub(in crate::study) fn run<S: Study>(request: Request<'_>) -> Result<Answer> {
         },
         stop: request.stop,
     });
-    let timed_out = time_limit.over.load(Ordering::Relaxed);
+    let timed_out = time_limit.has_ended_it();
     drop(time_limit);
     // Input that is refused only now leaves no state in the way of the next run.
     let refused = matches!(

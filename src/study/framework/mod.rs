@@ -11,8 +11,8 @@ pub mod state_file;
 mod study;
 
 pub use inputs::{InputFiles, Inputs};
-pub(in crate::study) use life::resumed_or_new;
 pub use life::{Answer, Finished, Request, TIME_LIMIT, solve_unobserved, write_results};
+pub(in crate::study) use life::{TimeLimit, resumed_or_new};
 pub use manifest::{Manifest, write_json, write_study};
 pub use plan::Plan;
 pub use record::RunRecord;

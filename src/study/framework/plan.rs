@@ -17,6 +17,8 @@ pub struct Plan {
     backend: Option<&'static str>,
     adapter: Option<String>,
     evaluations: Option<u64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    polish_drives: Option<u64>,
     memory_mib: Option<u64>,
     folder: PathBuf,
     folder_exists: bool,
@@ -87,7 +89,21 @@ impl Plan {
         Self { evaluations, ..self }
     }
 
-    /// How many those are, where that is known.
+    /// So many cars at the most are driven after the swarm, to polish what it found.
+    pub fn polish_drives(self, drives: u64) -> Self {
+        let polish_drives = (drives > 0).then_some(drives);
+        Self {
+            polish_drives,
+            ..self
+        }
+    }
+
+    /// How many those are; none where nothing is polished.
+    pub fn most_polish_drives(&self) -> u64 {
+        self.polish_drives.unwrap_or(0)
+    }
+
+    /// How many candidates are evaluated, where that is known.
     pub fn most_evaluations(&self) -> Option<u64> {
         self.evaluations
     }
@@ -127,6 +143,14 @@ impl Plan {
         let most = self.evaluations.map(|n| format!("{n} at the most"));
         let unknown = || "as many as the search comes to".to_owned();
         row("evaluations", most.unwrap_or_else(unknown));
+        if let Some(drives) = self.polish_drives {
+            row(
+                "polish",
+                format!(
+                    "{drives} drives at the most after that, in f64, with the exact Jacobian of each step"
+                ),
+            );
+        }
         if let Some(mib) = self.memory_mib {
             row("memory", format!("{mib} MiB kept, evaluators beside"));
         }

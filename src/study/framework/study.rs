@@ -168,7 +168,7 @@ pub trait Study: Sized + 'static {
     }
 
     /// Solves several studies of one problem, each from the state that an earlier run has left with its state_file. Each has a
-    /// result of its own.
+    /// result of its own. They end in order once `stop` is raised.
     ///
     /// # Errors
     /// Those that concern all of them.
@@ -177,8 +177,8 @@ pub trait Study: Sized + 'static {
         prepared: &Self::Prepared,
         state_files: &mut [StateFile],
         observe: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
+        stop: &Arc<AtomicBool>,
     ) -> Result<Vec<Result<Option<Self::Outcome>>>> {
-        let stop = Arc::new(AtomicBool::new(false));
         let mut each = |settings: &Self::Settings, state_file: &mut StateFile| {
             resumed_or_new::<Self, _>(settings, state_file, true, |state, state_file| {
                 Self::solve(Work {
@@ -187,7 +187,7 @@ pub trait Study: Sized + 'static {
                     state,
                     state_file,
                     observe: &mut *observe,
-                    stop: Arc::clone(&stop),
+                    stop: Arc::clone(stop),
                 })
             })
         };

@@ -10,12 +10,12 @@ use crate::random::Random;
 use std::ops::ControlFlow;
 
 /// Starts that are drawn for a hop; the best of them is polished.
-const STARTS: usize = 64;
+pub(super) const STARTS: usize = 64;
 /// Their standard deviation about the minimum in turn, as shares of the parameters' ranges (of their logarithms where these
 /// are wide).
 const REACH: [f64; 2] = [0.05, 0.1];
 /// Drives that a hop may take: twice what led from a second minimum of the bundled lap into the first.
-const MOST_DRIVES: usize = 120;
+pub(super) const MOST_DRIVES: usize = 120;
 /// A hop counts that gains this share of the cost.
 const LEAST_GAIN: f64 = 1e-3;
 /// Purpose of the draws in the counter.

@@ -34,6 +34,7 @@ use crate::study::framework::{
 };
 use std::ops::ControlFlow;
 use std::path::Path;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// The study.
@@ -67,7 +68,9 @@ impl Study for Identify {
     }
 
     fn plan(settings: &IdentifySettings, setup: &Setup, plan: Plan) -> Result<Plan> {
-        planned(settings, setup, plan.evaluations(settings.evaluations()))
+        let polish = refine::most_drives(settings, setup.replay.dimensions());
+        let plan = plan.evaluations(settings.evaluations()).polish_drives(polish);
+        planned(settings, setup, plan)
     }
 
     fn solve(work: Work<'_, Self>) -> Result<Option<Outcome>> {
@@ -88,13 +91,13 @@ impl Study for Identify {
         setup: &Setup,
         state_files: &mut [StateFile],
         observe: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
+        stop: &Arc<AtomicBool>,
     ) -> Result<Vec<Result<Option<Outcome>>>> {
         let Some(first) = studies.first() else {
             return Ok(Vec::new());
         };
         let mut evaluator = open_evaluator(&setup.replay, first.backend, first.adapter.as_deref())?;
-        let stop = AtomicBool::new(false);
-        let stopped = &stop;
+        let stopped = &**stop;
         let searches: Vec<_> = studies
             .iter()
             .zip(state_files)

@@ -1,6 +1,6 @@
 //! What follows the swarm: polish, hops over into deeper minima, and the polish with the noise for weights.
 
-use super::hops::{gains, hop, looks_like_noise};
+use super::hops::{self, STARTS, gains, hop, looks_like_noise};
 use super::identifiability::noise_of;
 use super::polish::{MOST_DRIVES, polish_observed};
 use super::settings::IdentifySettings;
@@ -92,6 +92,22 @@ const ROUNDS: usize = 4;
 const ROUND_DRIVES: usize = 50;
 /// A round that moves no parameter by more than this share of its range is the last.
 const MOVED: f64 = 1e-5;
+
+/// Drives of the polish at the most, with hops and rounds, of so many free parameters; and the starts that hops draw.
+pub(super) fn most_drives(settings: &IdentifySettings, dimensions: usize) -> u64 {
+    if !settings.polish {
+        return 0;
+    }
+    let hops = if settings.objectives.len() == 1 {
+        settings.hops
+    } else {
+        0
+    };
+    let polished = |drives: usize| drives.max(dimensions + 1) as u64;
+    let hop = (STARTS as u64).saturating_add(polished(hops::MOST_DRIVES));
+    (2 * polished(MOST_DRIVES) + ROUNDS as u64 * polished(ROUND_DRIVES))
+        .saturating_add(hop.saturating_mul(hops as u64))
+}
 
 /// Goes on with windows that start where the car found so far comes, until that changes nothing any more: a car is to be judged
 /// from its own sideslip and roll, and not from those of the starting car. The candidate, and whether this was interrupted.

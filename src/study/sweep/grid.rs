@@ -159,6 +159,16 @@ impl SweepSettings {
         &self.text
     }
 
+    /// The sweep file.
+    pub(super) fn file(&self) -> &Path {
+        &self.file
+    }
+
+    /// How many runs there are.
+    pub fn runs(&self) -> usize {
+        self.axes.iter().map(|(_, values)| values.len()).product()
+    }
+
     /// The folder that files named in it are relative to.
     pub(super) fn folder(&self) -> &Path {
         folder_of(&self.file)
@@ -174,8 +184,7 @@ impl SweepSettings {
     /// # Errors
     /// [`Error::Input`] if a dotted key goes through something that is no table.
     pub fn points(&self) -> Result<Vec<Point>> {
-        let count: usize = self.axes.iter().map(|(_, v)| v.len()).product();
-        (0..count)
+        (0..self.runs())
             .map(|number| {
                 let mut left = number;
                 let mut chosen: Vec<(&str, &Value)> = Vec::with_capacity(self.axes.len());

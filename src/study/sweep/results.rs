@@ -1,8 +1,7 @@
 //! Rows of a sweep, and medians over its seeds.
 
-use super::{Point, SweepSettings};
-use crate::config::{LARGEST_LOG, read_bytes, read_text};
-use crate::error::{Error, Place, Result};
+use super::SweepSettings;
+use crate::error::{Error, Result};
 use crate::files::run_folder::SUMMARY;
 use crate::report::{Rows, Table, write_whole};
 use crate::study::framework::write_json;
@@ -11,8 +10,11 @@ use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
+/// All rows, one JSON object per line.
+const ROWS: &str = "rows.jsonl";
+
 /// One run.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Row {
     /// Its number, from 0.
     pub run: usize,
@@ -61,6 +63,19 @@ pub struct Summary {
     pub groups: Vec<Group>,
     /// What went wrong with devices and was got over, each with the runs that it befell.
     pub device_faults: Vec<String>,
+    /// Runs that came to no figures, each with the reason.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub failed_runs: Vec<String>,
+    /// Runs that are not done yet.
+    #[serde(skip_serializing_if = "is_none_left")]
+    pub missing_runs: usize,
+    /// What ended the sweep before it was done: `time_limit`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ended_by: Option<String>,
+}
+
+fn is_none_left(missing: &usize) -> bool {
+    *missing == 0
 }
 
 /// Faults with the numbers of the runs that met them, as in the file names of their studies.
@@ -123,55 +138,21 @@ pub fn medians(rows: &[Row]) -> Vec<Group> {
     by_settings(rows).into_iter().map(group).collect()
 }
 
-pub(super) fn write_rows(path: &Path, rows: &[Row]) -> Result<()> {
+/// Writes all rows into one file, one JSON object per line.
+pub(super) fn write_rows(folder: &Path, rows: &[Row]) -> Result<()> {
+    let path = folder.join(ROWS);
     let mut text = String::new();
     for row in rows {
         let line =
-            serde_json::to_string(row).map_err(|e| Error::io(path, "write", std::io::Error::other(e)))?;
+            serde_json::to_string(row).map_err(|e| Error::io(&path, "write", std::io::Error::other(e)))?;
         text += &line;
         text.push('\n');
     }
-    write_whole(path, text.as_bytes())
-}
-
-/// The rows that a folder holds of this very sweep.
-pub(super) fn read_rows(
-    path: &Path,
-    sweep: &Path,
-    settings: &SweepSettings,
-    points: &[Point],
-) -> Result<Vec<Row>> {
-    if read_text(sweep)? != settings.text() {
-        let expected = "the sweep that the folder holds";
-        return Err(Error::input(sweep, "resume", "another sweep", expected));
-    }
-    if !path.exists() {
-        return Ok(Vec::new());
-    }
-    String::from_utf8_lossy(&read_bytes(path, LARGEST_LOG)?)
-        .lines()
-        .enumerate()
-        .map(|(number, line)| {
-            let row: Option<Row> = serde_json::from_str(line).ok();
-            let own = |row: &Row| {
-                row.run == number
-                    && points.get(number).is_some_and(|p| p.settings == row.settings)
-                    && row.front.iter().all(|point| point.len() == row.front[0].len())
-            };
-            row.filter(own).ok_or_else(|| {
-                Error::input(
-                    path,
-                    Place::line(number + 1),
-                    line.chars().take(60).collect::<String>(),
-                    "a row of this sweep",
-                )
-            })
-        })
-        .collect()
+    write_whole(&path, text.as_bytes())
 }
 
 impl Summary {
-    pub(super) fn new(mut rows: Vec<Row>) -> Result<Self> {
+    pub(super) fn new(mut rows: Vec<Row>, failed_runs: Vec<String>, missing_runs: usize) -> Result<Self> {
         super::joint::compare(&mut rows)?;
         for row in &mut rows {
             row.front.clear();
@@ -180,17 +161,27 @@ impl Summary {
             study: "sweep",
             groups: medians(&rows),
             device_faults: faults_by_run(&rows),
+            failed_runs,
+            missing_runs,
+            ended_by: None,
             rows,
         })
     }
 
     /// The medians as a table.
     pub fn to_text(&self) -> String {
-        if self.groups.is_empty() {
-            return String::new();
+        let mut text = String::new();
+        if !self.groups.is_empty() {
+            let medians = self.median_table(&[("", |s| s.median)]);
+            text += &format!("Medians over the seeds\n{}", medians.to_text());
         }
-        let medians = self.median_table(&[("", |s| s.median)]);
-        let mut text = format!("Medians over the seeds\n{}", medians.to_text());
+        if self.missing_runs > 0 {
+            let (done, missing) = (self.rows.len(), self.missing_runs);
+            text += &format!("{done} runs are finished, and {missing} are not done yet\n");
+        }
+        for failed in &self.failed_runs {
+            text += &format!("{failed}\n");
+        }
         for fault in &self.device_faults {
             text += &format!("{fault}\n");
         }
