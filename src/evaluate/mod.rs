@@ -416,7 +416,8 @@ pub trait Evaluator {
         &[]
     }
 
-    /// Time that a device itself spent on the last evaluation (ms); `None` where none can tell.
+    /// Time that the kernels spent on the last evaluation (ms): of a device with a clock its own, of others that of the dispatches, of
+    /// lanes that of the pass through them. `None` where nothing measures it.
     fn last_kernel_ms(&self) -> Option<f64> {
         None
     }

@@ -10,7 +10,7 @@ pub trait OnDevice: ProblemKind {}
 
 impl<K: ProblemKind> OnDevice for K {}
 
-fn none() -> Error {
+pub(crate) fn none() -> Error {
     Error::NoDevice("this program was built without the feature `gpu`".to_owned())
 }
 

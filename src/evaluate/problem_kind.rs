@@ -4,6 +4,7 @@ use super::simd::InstructionSet;
 use super::{BackendInfo, Evaluation, Evaluator, FAILED_COST, Failure, Problem, are_numbers};
 use crate::error::Result;
 use rayon::prelude::*;
+use std::time::Instant;
 
 /// What a kernel finds of a candidate, or why the candidate need not be evaluated.
 pub type OutcomeOf<K> = std::result::Result<<K as ProblemKind>::Outcome, Failure>;
@@ -163,6 +164,7 @@ pub struct SimdBackend<'a, K: ProblemKind> {
     pub(super) kind: &'a K,
     pub(super) tables: K::Lanes,
     pub(super) set: InstructionSet,
+    kernel_ms: Option<f64>,
 }
 
 impl<'a, K: ProblemKind> SimdBackend<'a, K> {
@@ -172,14 +174,19 @@ impl<'a, K: ProblemKind> SimdBackend<'a, K> {
             kind,
             tables: K::Lanes::new(kind),
             set,
+            kernel_ms: None,
         }
     }
 
     /// The outcomes of candidates.
     pub fn outcomes(&self, candidates: &[&[f64]]) -> Vec<OutcomeOf<K>> {
         let checked = Checked::new(self.kind, candidates);
-        let outcomes = self.tables.outcomes(self.kind, self.set, &checked.rows);
+        let outcomes = self.run(&checked.rows);
         checked.joined(outcomes)
+    }
+
+    fn run(&self, rows: &[&[f64]]) -> Vec<K::Outcome> {
+        self.tables.outcomes(self.kind, self.set, rows)
     }
 }
 
@@ -192,9 +199,17 @@ impl<K: ProblemKind> Evaluator for SimdBackend<'_, K> {
         BackendInfo::of_lanes(self.set)
     }
 
+    fn last_kernel_ms(&self) -> Option<f64> {
+        self.kernel_ms
+    }
+
     fn evaluate(&mut self, population: &[f64]) -> Result<Evaluation> {
         let candidates = candidates(self.kind.problem(), population);
-        let outcomes = self.outcomes(&candidates);
+        let checked = Checked::new(self.kind, &candidates);
+        let began = Instant::now();
+        let outcomes = self.run(&checked.rows);
+        self.kernel_ms = Some(began.elapsed().as_secs_f64() * 1e3);
+        let outcomes = checked.joined(outcomes);
         Ok(evaluation(self.kind, &candidates, outcomes))
     }
 }

@@ -41,15 +41,15 @@ fn row_major(blocks: &[f32], n: usize, width: usize) -> Vec<f64> {
 /// A swarm off its device, for [`super::checkpoint`].
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct DeviceState {
-    settings: MopsoSettings,
-    space: Space,
-    objectives: usize,
-    position: Vec<f32>,
-    velocity: Vec<f32>,
-    best_position: Vec<f32>,
-    best_objectives: Vec<f32>,
-    archive: Archive,
-    counters: Counters,
+    pub(super) settings: MopsoSettings,
+    pub(super) space: Space,
+    pub(super) objectives: usize,
+    pub(super) position: Vec<f32>,
+    pub(super) velocity: Vec<f32>,
+    pub(super) best_position: Vec<f32>,
+    pub(super) best_objectives: Vec<f32>,
+    pub(super) archive: Archive,
+    pub(super) counters: Counters,
 }
 
 impl Checkpoint for DeviceState {

@@ -34,6 +34,8 @@
 //! 9. Zitzler, Laumanns, Thiele, *SPEA2*, TIK report 103 (2001) (truncation by the nearest neighbours).
 
 mod archive;
+#[cfg(feature = "studies")]
+mod at_work;
 mod by_name;
 pub mod checkpoint;
 pub mod comparison;
@@ -53,6 +55,7 @@ mod mopso;
 mod motion;
 mod nsga2;
 mod nsga3;
+mod place;
 pub mod problems;
 mod pso;
 mod settings;
@@ -61,6 +64,8 @@ mod two_phase;
 mod windows;
 
 pub use archive::Archive;
+#[cfg(feature = "studies")]
+pub(crate) use at_work::{SwarmAtWork, SwarmState};
 pub use by_name::{MULTI_OBJECTIVE, SINGLE_OBJECTIVE, Sizes, by_name, several_by_name};
 pub use cooperative::{CooperativeSettings, CooperativeSwarm};
 pub use covariance::{CovarianceSettings, CovarianceSwarm, OutOfBounds, Restarts};
@@ -74,6 +79,7 @@ pub(crate) use mopso::thinning::PER_PLACE;
 pub use mopso::{Generation, MANY, Mopso};
 pub use nsga2::{Nsga2, Nsga2Settings};
 pub use nsga3::{Nsga3, Nsga3Settings};
+pub use place::SwarmPlace;
 pub use pso::Pso;
 pub use settings::{
     BoundHandling, Constriction, DRAWN_PULLS, Leaders, MopsoSettings, Mutation, PsoSettings, Randomness,

@@ -3,6 +3,7 @@
 mod bench_optimisers;
 mod bench_studies;
 mod bench_swarm;
+mod bench_whole;
 mod cli;
 mod examples;
 mod messages;

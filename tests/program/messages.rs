@@ -162,3 +162,28 @@ fn a_line_is_driven_on_its_own_circuit() {
     assert_eq!(two.status.code(), Some(2), "{}", said(&two));
     assert!(said(&two).contains("differentcircuits"), "{}", said(&two));
 }
+
+/// A swarm cannot live on a device that does not evaluate it, nor with one objective; a dry run says so too.
+#[test]
+fn a_swarm_on_no_device_is_refused() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let asked = |more: &[&str]| {
+        let flags = ["raceline", "--swarm", "device", "--dry-run"];
+        lapswarm(folder.path(), &[&flags, more].concat())
+    };
+    for (more, reason) in [
+        (
+            &["--backend", "simd"][..],
+            "a swarm on the device needs the backend gpu",
+        ),
+        (
+            &["--backend", "gpu", "--objectives", "length"],
+            "a swarm on the device has two or three objectives",
+        ),
+    ] {
+        let refused = asked(more);
+        assert_eq!(refused.status.code(), Some(2), "{}", said(&refused));
+        let words: String = reason.split_whitespace().collect();
+        assert!(said(&refused).contains(&words), "{}", said(&refused));
+    }
+}

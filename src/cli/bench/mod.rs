@@ -6,6 +6,7 @@ mod pages;
 mod scaling;
 mod studies;
 mod swarm;
+mod whole;
 
 use lapswarm::Result;
 
@@ -31,6 +32,8 @@ enum What {
     Studies(studies::Arguments),
     /// Measure what the optimiser itself costs, from a thousand particles to a million.
     Swarm(swarm::Arguments),
+    /// Measure whole generations (ask, evaluate, tell) of every problem, and what of them is not kernels.
+    Whole(whole::Arguments),
 }
 
 /// Measures and prints.
@@ -39,6 +42,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         Some(What::Optimisers(arguments)) => optimisers::run(arguments),
         Some(What::Studies(arguments)) => studies::run(arguments),
         Some(What::Swarm(arguments)) => swarm::run(arguments),
+        Some(What::Whole(arguments)) => whole::run(arguments),
         None => scaling::run(&arguments.scaling),
     }
 }

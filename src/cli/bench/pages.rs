@@ -1,7 +1,7 @@
 //! Pages of what was measured: a figure for each, and every measurement as a table and as `rows.csv`.
 
 use super::scaling::{self, Table as Rates};
-use super::{optimisers, studies, swarm};
+use super::{optimisers, studies, swarm, whole};
 use lapswarm::Result;
 use lapswarm::report::{BarPanel, Bars, Curves, HtmlReport, Panel, Scale, Table, significant};
 use lapswarm::swarm::comparison::quartiles;
@@ -221,6 +221,51 @@ pub fn of_swarm(folder: &Path, rows: &[swarm::Row]) -> Result<HtmlReport> {
         .number("memory of a particle", "bytes", |r| r.bytes_per_particle as f64)
         .number("hypervolume", "", |r| r.hypervolume)
         .text("device", |r| &*r.device);
+    rows_of(&mut page, folder, &table.table())?;
+    Ok(page)
+}
+
+/// The page of `bench whole`.
+pub fn of_whole(folder: &Path, rows: &[whole::Row]) -> Result<HtmlReport> {
+    let mut page = HtmlReport::new("bench", "Whole generations");
+    let families = by_label(rows, |r| {
+        format!("{}, {}, swarm on the {}", r.problem, r.backend, r.swarm)
+    });
+    for (label, of) in &families {
+        if let Some(largest) = of.iter().max_by_key(|r| r.population) {
+            page.sentence(format!(
+                "{label}: {} % of a generation of {} particles is not kernels.",
+                significant(100.0 * largest.outside_kernels_share, 2),
+                largest.population
+            ));
+        }
+    }
+    page.section("Against the particles", "A generation asks, evaluates and tells.");
+    let population = |r: &whole::Row| r.population;
+    let time = Panel::new("Whole generation").y("time", "ms");
+    let share = Panel::new("Outside the kernels").y("share of the generation", "%");
+    page.figure(
+        folder.join("whole.svg"),
+        &Curves::new(
+            "Whole generations",
+            [
+                over_population(time, &families, population, |r| Some(r.generation_ms)),
+                over_population(share, &families, population, |r| {
+                    Some(100.0 * r.outside_kernels_share)
+                }),
+            ],
+        ),
+    )?;
+    let table = Table::rows(rows)
+        .text("problem", |r| r.problem)
+        .text("backend", |r| r.backend)
+        .text("swarm", |r| r.swarm)
+        .number("particles", "", |r| r.population as f64)
+        .number("objectives", "", |r| r.objectives as f64)
+        .number("generation", "ms", |r| r.generation_ms)
+        .number("kernels", "ms", |r| r.kernel_ms)
+        .number("outside kernels", "%", |r| 100.0 * r.outside_kernels_share)
+        .text("device", |r| &*r.adapter);
     rows_of(&mut page, folder, &table.table())?;
     Ok(page)
 }

@@ -110,10 +110,10 @@ const SPREAD: f64 = 0.02;
 const SECTIONS: usize = 360;
 
 /// A problem with what is known of its arithmetic.
-struct Case<K> {
-    kind: K,
+pub(super) struct Case<K> {
+    pub(super) kind: K,
     /// Candidates are drawn this far about these, each variable on its own.
-    about: Vec<(f64, f64)>,
+    pub(super) about: Vec<(f64, f64)>,
     /// Runge-Kutta steps of an evaluation, if it has any.
     steps: Option<usize>,
     /// Arithmetic operations of an evaluation.
@@ -126,7 +126,9 @@ type Measure = fn(&mut Bench<'_>) -> Result<()>;
 /// The problems, by name.
 const PROBLEMS: &[(&str, Measure)] = &[
     ("replay", |bench| bench.measure_all("replay", &replay()?)),
-    ("line", |bench| bench.measure_all("line", &line()?)),
+    ("line", |bench| {
+        bench.measure_all("line", &line(&[LineObjective::LapTime])?)
+    }),
     ("drive", |bench| bench.measure_all("drive", &drive()?)),
     ("steady", |bench| bench.measure_all("steady", &steady()?)),
     ("energy", |bench| bench.measure_all("energy", &energy()?)),
@@ -146,7 +148,7 @@ fn middle(problem: &Problem) -> Vec<f64> {
     variables.map(|v| 0.5 * (v.lower + v.upper)).collect()
 }
 
-fn replay() -> Result<Case<ReplayProblem>> {
+pub(super) fn replay() -> Result<Case<ReplayProblem>> {
     let replay = set_up(&IdentifySettings::default())?.replay;
     let (steps, operations) = parity::laps::work_of(&replay);
     Ok(Case {
@@ -157,14 +159,13 @@ fn replay() -> Result<Case<ReplayProblem>> {
     })
 }
 
-fn line() -> Result<Case<LineProblem>> {
+pub(super) fn line(objectives: &[LineObjective]) -> Result<Case<LineProblem>> {
     let setup = raceline::set_up(&RacelineSettings {
         sections: SECTIONS,
         ..RacelineSettings::default()
     })?;
     let way = Parametrisation::control_points(SECTIONS / 4);
-    let objectives = [LineObjective::LapTime];
-    let line = LineProblem::new(setup.cross_sections, way, &objectives, Some(setup.car), 0.0)?;
+    let line = LineProblem::new(setup.cross_sections, way, objectives, Some(setup.car), 0.0)?;
     let dimensions = line.dimensions();
     Ok(Case {
         about: vec![(0.5, 0.3); dimensions],
@@ -174,7 +175,7 @@ fn line() -> Result<Case<LineProblem>> {
     })
 }
 
-fn drive() -> Result<Case<DriveProblem>> {
+pub(super) fn drive() -> Result<Case<DriveProblem>> {
     let (circuit, pace, step) = DRIVEN;
     let drive = parity::drive::problem(Car::bundled()?, &[circuit], &[pace], step)?;
     let middle = middle(&drive.problem);
@@ -187,7 +188,7 @@ fn drive() -> Result<Case<DriveProblem>> {
     })
 }
 
-fn steady() -> Result<Case<SteadyProblem>> {
+pub(super) fn steady() -> Result<Case<SteadyProblem>> {
     let steady = parity::steady::problem(Car::bundled()?)?;
     let middle = middle(&steady.problem);
     Ok(Case {
@@ -198,7 +199,7 @@ fn steady() -> Result<Case<SteadyProblem>> {
     })
 }
 
-fn energy() -> Result<Case<HybridProblem>> {
+pub(super) fn energy() -> Result<Case<HybridProblem>> {
     let mut problems = parity::energy::problems(SECTIONS, &[Mode::Additional])?;
     let hybrid = problems.remove(0);
     let middle = middle(&hybrid.problem);
@@ -213,7 +214,7 @@ fn energy() -> Result<Case<HybridProblem>> {
 }
 
 impl<K: OnDevice> Case<K> {
-    fn candidates(&self, count: usize) -> Vec<f64> {
+    pub(super) fn candidates(&self, count: usize) -> Vec<f64> {
         let random = Random::new(1);
         let mut all = Vec::with_capacity(count * self.about.len());
         for i in 0..count as u32 {
@@ -227,8 +228,11 @@ impl<K: OnDevice> Case<K> {
     }
 
     /// Evaluators of the backends that are asked for.
-    fn evaluators(&self, arguments: &Arguments) -> Result<Vec<Box<dyn Evaluator + '_>>> {
-        let choice = arguments.backend.unwrap_or_default();
+    pub(super) fn evaluators(
+        &self,
+        choice: BackendChoice,
+        adapter: Option<&str>,
+    ) -> Result<Vec<Box<dyn Evaluator + '_>>> {
         let wanted = |backend| choice == backend || choice == BackendChoice::Auto;
         let mut found: Vec<Box<dyn Evaluator + '_>> = Vec::new();
         if wanted(BackendChoice::Cpu) {
@@ -237,9 +241,9 @@ impl<K: OnDevice> Case<K> {
         if wanted(BackendChoice::Simd) {
             found.push(Box::new(SimdBackend::new(&self.kind, InstructionSet::best())));
         }
-        let asked = choice == BackendChoice::Gpu || arguments.adapter.is_some();
+        let asked = choice == BackendChoice::Gpu || adapter.is_some();
         if asked || (wanted(BackendChoice::Gpu) && !devices().is_empty()) {
-            let context = GpuContext::shared(arguments.adapter.as_deref())?;
+            let context = GpuContext::shared(adapter)?;
             found.push(Box::new(GpuBackend::new(&self.kind, context)?));
         }
         Ok(found)
@@ -267,7 +271,7 @@ const COLUMNS: &Columns<Row> = &[
     }),
 ];
 
-fn or_dash(text: Option<String>) -> String {
+pub(super) fn or_dash(text: Option<String>) -> String {
     text.unwrap_or("-".to_owned())
 }
 
@@ -284,7 +288,8 @@ struct Bench<'a> {
 impl Bench<'_> {
     /// Measures a problem on every backend with every population.
     fn measure_all<K: OnDevice>(&mut self, name: &str, case: &Case<K>) -> Result<()> {
-        for mut evaluator in case.evaluators(self.arguments)? {
+        let choice = self.arguments.backend.unwrap_or_default();
+        for mut evaluator in case.evaluators(choice, self.arguments.adapter.as_deref())? {
             let mut rate: Option<f64> = None;
             for &population in &self.arguments.populations {
                 let population = population as usize;

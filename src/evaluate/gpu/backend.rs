@@ -1,8 +1,9 @@
 //! Kinds of problems on a device, and the evaluator that follows.
 
 use super::{Batching, FallbackEvaluator, GpuContext, devices};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::evaluate::problem_kind::{Checked, candidates, evaluation};
+use crate::evaluate::resident::DeviceObjectives;
 use crate::evaluate::{BackendChoice, BackendInfo, Evaluation, Evaluator, OutcomeOf, Problem, ProblemKind};
 use std::sync::{Arc, OnceLock};
 
@@ -29,7 +30,7 @@ pub trait DeviceKernel<K: ProblemKind>: Sized {
     /// Cross-sections the work differently.
     fn cut(&mut self, batching: Batching);
 
-    /// Time that the device itself spent on the last outcomes (ms), where it can tell.
+    /// Time that the device itself spent on the last outcomes (ms), where it can tell; else the time of the dispatches counts.
     fn kernel_ms(&self) -> Option<f64> {
         None
     }
@@ -39,12 +40,32 @@ pub trait DeviceKernel<K: ProblemKind>: Sized {
     /// # Errors
     /// [`crate::Error::Device`] if the device fails.
     fn outcomes(&mut self, kind: &K, candidates: &[&[f64]]) -> Result<Vec<K::Outcome>>;
+
+    /// Whether swarms that live on the device are scored there: whether [`DeviceKernel::score_resident`] does so.
+    const RESIDENT: bool = false;
+
+    /// Writes the objectives of particles that live on the device, see [`DeviceObjectives::evaluate`].
+    ///
+    /// # Errors
+    /// [`Error::Device`] if the device fails, and for kernels that score populations of the host only.
+    fn score_resident(
+        &mut self,
+        _kind: &K,
+        _particles: usize,
+        _position: &wgpu::Buffer,
+        _objectives: &wgpu::Buffer,
+    ) -> Result<()> {
+        Err(Error::Device(
+            "the kernel scores populations of the host only".to_owned(),
+        ))
+    }
 }
 
 /// The graphics backend: `f32`, one lane per candidate.
 pub struct GpuBackend<'a, K: OnDevice> {
     pub(in crate::evaluate) kind: &'a K,
     pub(in crate::evaluate) device: K::Device,
+    dispatched_ms: Option<f64>,
 }
 
 impl<'a, K: OnDevice> GpuBackend<'a, K> {
@@ -56,6 +77,7 @@ impl<'a, K: OnDevice> GpuBackend<'a, K> {
         Ok(Self {
             device: K::Device::open(kind, context)?,
             kind,
+            dispatched_ms: None,
         })
     }
 
@@ -76,7 +98,9 @@ impl<'a, K: OnDevice> GpuBackend<'a, K> {
     /// [`crate::Error::Device`] if the device fails.
     pub fn outcomes(&mut self, candidates: &[&[f64]]) -> Result<Vec<OutcomeOf<K>>> {
         let checked = Checked::new(self.kind, candidates);
+        let before = self.device.context().dispatched_ms();
         let outcomes = self.device.outcomes(self.kind, &checked.rows)?;
+        self.dispatched_ms = Some(self.device.context().dispatched_ms() - before);
         Ok(checked.joined(outcomes))
     }
 }
@@ -91,13 +115,29 @@ impl<K: OnDevice> Evaluator for GpuBackend<'_, K> {
     }
 
     fn last_kernel_ms(&self) -> Option<f64> {
-        self.device.kernel_ms()
+        self.device.kernel_ms().or(self.dispatched_ms)
     }
 
     fn evaluate(&mut self, population: &[f64]) -> Result<Evaluation> {
         let candidates = candidates(self.kind.problem(), population);
         let outcomes = self.outcomes(&candidates)?;
         Ok(evaluation(self.kind, &candidates, outcomes))
+    }
+}
+
+impl<K: OnDevice> DeviceObjectives for GpuBackend<'_, K> {
+    fn problem(&self) -> &Problem {
+        self.kind.problem()
+    }
+
+    fn evaluate(
+        &mut self,
+        particles: usize,
+        position: &wgpu::Buffer,
+        objectives: &wgpu::Buffer,
+    ) -> Result<()> {
+        self.device
+            .score_resident(self.kind, particles, position, objectives)
     }
 }
 

@@ -9,6 +9,7 @@ use super::lint;
 use crate::error::{Error, Result};
 use crate::evaluate::{BackendInfo, dispatches};
 use std::collections::HashMap;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::RecvTimeoutError;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
@@ -46,6 +47,8 @@ pub struct GpuContext {
     summary: DeviceSummary,
     failure: Arc<Mutex<Option<String>>>,
     kernels: Mutex<HashMap<String, Arc<Kernel>>>,
+    /// Time of all dispatches in whole microseconds, so that it fits an atomic.
+    dispatched_us: AtomicU64,
 }
 
 /// What did not happen in all the time that a device is given.
@@ -148,6 +151,7 @@ impl GpuContext {
             summary,
             failure,
             kernels: Mutex::default(),
+            dispatched_us: AtomicU64::new(0),
         })
     }
 
@@ -398,7 +402,15 @@ impl GpuContext {
             pass.set_bind_group(0, group, &[]);
             pass.dispatch_workgroups(wide, high, 1);
         })?;
-        Ok((begin.elapsed().as_secs_f64() * 1e3).max(1e-3))
+        let took = begin.elapsed();
+        self.dispatched_us
+            .fetch_add(took.as_micros() as u64, Ordering::Relaxed);
+        Ok((took.as_secs_f64() * 1e3).max(1e-3))
+    }
+
+    /// Time of all dispatches of evaluators since the device was opened, with their submissions and the waits (ms).
+    pub fn dispatched_ms(&self) -> f64 {
+        self.dispatched_us.load(Ordering::Relaxed) as f64 * 1e-3
     }
 
     /// What an injected fault does to the device that is about to do `what`.

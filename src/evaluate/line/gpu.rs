@@ -13,8 +13,7 @@ pub(in crate::evaluate) use tables::LineTables;
 use super::problem::{LineProblem, MEASURES, Measures};
 use crate::error::Result;
 use crate::evaluate::gpu::{Batching, GpuContext};
-use crate::evaluate::resident::DeviceObjectives;
-use crate::evaluate::{DeviceKernel, GpuBackend, OnDevice, Problem, ProblemKind};
+use crate::evaluate::{DeviceKernel, GpuBackend, OnDevice};
 use crate::line::EnvelopeTable;
 use exchange::Exchange;
 use std::sync::Arc;
@@ -84,31 +83,21 @@ impl DeviceKernel<LineProblem> for LineDevice {
             candidates[candidate][variable]
         })
     }
-}
 
-impl GpuBackend<'_, LineProblem> {
-    /// The longest dispatch of the last evaluation with its submission and the wait, ms.
-    pub fn longest_dispatch_ms(&self) -> f64 {
-        self.device.batches.longest_ms()
-    }
-}
+    const RESIDENT: bool = true;
 
-impl DeviceObjectives for GpuBackend<'_, LineProblem> {
-    fn problem(&self) -> &Problem {
-        ProblemKind::problem(self.kind)
-    }
-
-    fn evaluate(
+    fn score_resident(
         &mut self,
+        line: &LineProblem,
         particles: usize,
         position: &wgpu::Buffer,
         objectives: &wgpu::Buffer,
     ) -> Result<()> {
-        let LineDevice { batches, exchange } = &mut self.device;
+        let Self { batches, exchange } = self;
         let context = Arc::clone(batches.context());
         let exchange = match exchange {
             Some(exchange) => exchange,
-            None => exchange.insert(Exchange::new(self.kind, &context)?),
+            None => exchange.insert(Exchange::new(line, &context)?),
         };
         let most = batches.batch_size();
         for first in (0..particles).step_by(most) {
@@ -121,5 +110,12 @@ impl DeviceObjectives for GpuBackend<'_, LineProblem> {
             exchange.give(&context, [first, candidates, stride], results, objectives)?;
         }
         Ok(())
+    }
+}
+
+impl GpuBackend<'_, LineProblem> {
+    /// The longest dispatch of the last evaluation with its submission and the wait, ms.
+    pub fn longest_dispatch_ms(&self) -> f64 {
+        self.device.batches.longest_ms()
     }
 }

@@ -9,9 +9,10 @@ use crate::line::Parametrisation;
 use crate::optimum::{ReferenceSolvers, interruptible};
 use crate::random::Random;
 use crate::swarm::metrics::{Scale, hypervolume};
-use crate::swarm::{Archive, Mopso, MopsoSettings, Optimiser, Progress, Truncation, lattice, step};
+use crate::swarm::{
+    Archive, MopsoSettings, Optimiser, Progress, SwarmAtWork, SwarmState, Truncation, lattice,
+};
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
 use std::sync::atomic::Ordering;
 
@@ -36,13 +37,6 @@ pub struct LineFront {
     pub backend: Option<BackendInfo>,
 }
 
-/// Where the search for a front is.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub(super) struct FrontState {
-    pub swarm: Mopso,
-    pub losses: Losses,
-}
-
 /// Metres of the reference line for each control point of the front's lines.
 const CONTROL_SPACING_M: f64 = 20.0;
 /// Purpose of the draws of starting lines in the counter.
@@ -57,8 +51,8 @@ const LATTICE: u32 = 5;
 const PROGRAMS: usize = 6;
 
 /// Looks for the front. `known` are lines to start from and to keep (`alpha` at every cross-section). `begun` is the swarm of the same
-/// search that was interrupted, if one was, and what is known to go wrong with devices; `observe` is told the swarm after
-/// each iteration.
+/// search that was interrupted, if one was, and what is known to go wrong with devices; `observe` is told of
+/// each iteration and may ask for the swarm then.
 ///
 /// # Errors
 /// Those of the evaluator, of the solvers and of `observe`.
@@ -67,8 +61,8 @@ pub(super) fn search_front(
     settings: &RacelineSettings,
     solvers: &ReferenceSolvers,
     known: &[Vec<f64>],
-    (state, known_faults): (Option<FrontState>, &[String]),
-    mut observe: impl FnMut(&Progress, &FrontState) -> Result<ControlFlow<()>>,
+    (state, known_faults): (Option<SwarmState>, &[String]),
+    mut observe: impl FnMut(&Progress, &mut dyn FnMut() -> SwarmState) -> Result<ControlFlow<()>>,
 ) -> Result<LineFront> {
     let cross_sections = &setup.cross_sections;
     let problem = front_problem(setup, settings)?;
@@ -79,29 +73,28 @@ pub(super) fn search_front(
     let mopso = mopso
         .with_size(settings.population, settings.iterations)
         .with_seed(settings.seed);
-    let mut state = match state {
+    let on_device = settings.on_device()?;
+    let state = match state {
         Some(state) => state,
         None => {
-            let mut swarm = Mopso::new(&problem.problem, mopso)?;
+            let mut swarm = settings.swarm.swarm(&problem.problem, mopso)?;
             swarm.start_from(&starting_lines(&problem, settings, known)?)?;
             let losses = Losses::default();
-            FrontState { swarm, losses }
+            SwarmState { swarm, losses }
         }
     };
-    let mut evaluator = open_line_evaluator(&problem, settings.backend, settings.adapter.as_deref())?;
-    // Opened anew, a device may meet what it has met before.
-    let mut faults = DeviceFaults::beyond(known_faults, evaluator.as_ref());
+    let place = (settings.backend, settings.adapter.as_deref());
+    let mut at_work = SwarmAtWork::open(&problem, state, on_device, place, known_faults)?;
     // A search that is resumed may have no step left to tell of.
     let mut latest = Progress::default();
-    while !state.swarm.done() {
-        latest = step(&mut state.swarm, evaluator.as_mut())?;
-        let losses = &mut state.losses;
-        losses.note(&latest.failures, &mut faults, evaluator.as_ref());
-        if observe(&latest, &state)?.is_break() {
+    while !at_work.done() {
+        latest = at_work.step()?;
+        if observe(&latest, &mut || at_work.state().clone())?.is_break() {
             solvers.flag().store(true, Ordering::Relaxed);
             break;
         }
     }
+    let state = at_work.finish()?;
     let swarm = &state.swarm;
 
     let whole = setup.problem(Parametrisation::sections(), &settings.objectives, settings)?;
@@ -126,7 +119,7 @@ pub(super) fn search_front(
     if settings.local_search && settings.objectives.iter().all(|o| solvers.solves(*o)) {
         let polished = std::thread::scope(|scope| {
             let led = scope.spawn(|| polish_along(&archive, settings, solvers));
-            interruptible(led, solvers.flag(), || observe(&latest, &state))
+            interruptible(led, solvers.flag(), || observe(&latest, &mut || state.clone()))
         })?;
         let polished = on_road(setup, settings, &polished)?;
         evaluations += insert_all(&mut archive, judge.as_mut(), &polished)?;

@@ -83,6 +83,7 @@ impl Study for Raceline {
     type Summary = Summary;
 
     fn prepare(settings: &RacelineSettings) -> Result<Setup> {
+        settings.on_device()?;
         set_up(settings)
     }
 

@@ -8,6 +8,7 @@ use crate::evaluate::BackendChoice;
 use crate::evaluate::line::LineObjective;
 use crate::line::CarPlan;
 use crate::study::framework::memory::Size;
+use crate::swarm::SwarmPlace;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
@@ -72,6 +73,8 @@ settings! {
             "Lines that the front keeps";
         seed: u64 ["-"] = 1, count(0, u64::MAX).search(),
             "Seed of all random numbers";
+        swarm: SwarmPlace ["-"] = SwarmPlace::Auto, choice().search(),
+            "Where the particles of the front live; auto: on the device from 4096 particles on, where the backend is gpu";
         backend: BackendChoice ["-"] = BackendChoice::Auto, choice().place(),
             "Where lines are evaluated";
         adapter: Option<String> ["-"] = None, optional(text()).place().example("\"llvmpipe\""),
@@ -88,6 +91,16 @@ fn usual_objectives() -> Vec<LineObjective> {
 }
 
 impl RacelineSettings {
+    /// Whether the swarm for the front lives on the device.
+    ///
+    /// # Errors
+    /// [`crate::Error::Input`] with the reason if it is asked to and cannot.
+    pub(super) fn on_device(&self) -> crate::Result<bool> {
+        let place = (self.backend, self.adapter.as_deref());
+        self.swarm
+            .on_device(place, self.population, self.objectives.len())
+    }
+
     /// The car from above, with the margin on every side of it.
     pub(super) fn plan_with_margin(&self) -> CarPlan {
         let length_m = if self.car_length_m > 0.0 {

@@ -130,10 +130,10 @@ pub(super) fn find_lines(work: Work<'_, Raceline>) -> Result<Outcome> {
             work.state.front.take().map(|state| *state),
             &record.device_faults[..],
         );
-        let found = search_front(setup, settings, &solvers, &known, begun, |progress, at| {
+        let found = search_front(setup, settings, &solvers, &known, begun, |progress, now| {
             let best: Vec<String> = progress.best.iter().map(|b| format!("{b:.4}")).collect();
             let told = Progress::reached("front", progress.evaluations, format!("best {}", best.join(" ")));
-            work.told(&told, |state| state.front = Some(Box::new(at.clone())))
+            work.told(&told, |state| state.front = Some(Box::new(now())))
         })?;
         evaluations += found.evaluations;
         record.add(&found.losses, found.backend.as_ref());

@@ -1,6 +1,5 @@
 //! The state of a racing-line study: all that it takes to resume it.
 
-use super::front::FrontState;
 use super::settings::RacelineSettings;
 use super::whole_line_search::WholeLineState;
 use super::window_search::{FoundLine, LineState};
@@ -8,6 +7,7 @@ use super::{Raceline, Setup};
 use crate::error::Result;
 use crate::study::framework::state_file::{Origin, StateFile};
 use crate::study::framework::{Inputs, Progress, State, Work};
+use crate::swarm::SwarmState;
 use crate::swarm::checkpoint::Checkpoint;
 use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
@@ -38,7 +38,7 @@ pub struct LinesState {
     /// The swarm of whole lines in hand.
     pub(super) whole_lines: Option<Box<WholeLineState>>,
     /// The swarm that looks for the front.
-    pub(super) front: Option<Box<FrontState>>,
+    pub(super) front: Option<Box<SwarmState>>,
 }
 
 impl LinesState {

@@ -14,6 +14,8 @@ use crate::evaluate::{Evaluation, Failure, Problem};
 use crate::random::Random;
 use crate::scalar::lanes::Lanes;
 use crate::swarm::archive::Archive;
+#[cfg(feature = "gpu")]
+use crate::swarm::device::DeviceState;
 use crate::swarm::settings::MopsoSettings;
 use crate::swarm::space::Space;
 use crate::swarm::{Counters, Front, Optimiser};
@@ -217,6 +219,40 @@ impl LargeSwarm {
             }
         }
         Ok(())
+    }
+
+    /// What a device holds of the swarm; nothing if it knows of violations, which a device does not.
+    #[cfg(feature = "gpu")]
+    pub fn to_device(&self) -> Option<DeviceState> {
+        self.best_violation.is_empty().then(|| DeviceState {
+            settings: self.settings.clone(),
+            space: self.space.clone(),
+            objectives: self.objectives,
+            position: self.position.clone(),
+            velocity: self.velocity.clone(),
+            best_position: self.best_position.clone(),
+            best_objectives: self.best_objectives.clone(),
+            archive: self.archive.clone(),
+            counters: self.counters,
+        })
+    }
+
+    /// The swarm that a device has held.
+    #[cfg(feature = "gpu")]
+    pub fn from_device(state: DeviceState) -> Self {
+        Self {
+            random: Random::new(state.settings.motion.seed),
+            settings: state.settings,
+            space: state.space,
+            objectives: state.objectives,
+            position: state.position,
+            velocity: state.velocity,
+            best_position: state.best_position,
+            best_objectives: state.best_objectives,
+            best_violation: Vec::new(),
+            archive: state.archive,
+            counters: state.counters,
+        }
     }
 
     pub fn archive(&self) -> &Archive {

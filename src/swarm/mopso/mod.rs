@@ -9,6 +9,8 @@ pub(super) mod thinning;
 
 use super::archive::Archive;
 use super::checkpoint::to_bytes;
+#[cfg(feature = "gpu")]
+use super::device::DeviceState;
 use super::settings::MopsoSettings;
 use super::{AcceptsMigrants, Counters, Front, Islands, Optimiser};
 use crate::error::Result;
@@ -55,6 +57,31 @@ impl Mopso {
                 Kind::Small(SmallSwarm::new(problem, settings)?)
             },
         })
+    }
+
+    /// The same in single precision, however few particles it has: a swarm that can go to a device.
+    ///
+    /// # Errors
+    /// [`crate::Error::Input`] naming the setting that is out of its range.
+    pub(crate) fn in_single_precision(problem: &Problem, settings: MopsoSettings) -> Result<Self> {
+        let kind = Kind::Large(LargeSwarm::new(problem, settings)?);
+        Ok(Self { kind })
+    }
+
+    /// What a device holds of the swarm, if one can hold it.
+    #[cfg(feature = "gpu")]
+    pub(super) fn to_device(&self) -> Option<DeviceState> {
+        match &self.kind {
+            Kind::Small(_) => None,
+            Kind::Large(swarm) => swarm.to_device(),
+        }
+    }
+
+    /// The swarm that a device has held.
+    #[cfg(feature = "gpu")]
+    pub(super) fn from_device(state: DeviceState) -> Self {
+        let kind = Kind::Large(LargeSwarm::from_device(state));
+        Self { kind }
     }
 
     /// Puts the first particles at these candidates (in the variables' units), before the first population is asked for.

@@ -1,0 +1,97 @@
+//! Where a swarm lives.
+
+use super::{MANY, Mopso, MopsoSettings};
+use crate::error::{Error, Result};
+use crate::evaluate::{BackendChoice, Problem};
+use serde::{Deserialize, Serialize};
+
+/// Where the particles of a swarm of several objectives live. On a device, neither candidates nor objectives cross the bus.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum SwarmPlace {
+    /// On the device from [`MANY`] particles on, where the backend is a GPU; else on the host.
+    #[default]
+    Auto,
+    /// On the host.
+    Host,
+    /// On the device.
+    Device,
+}
+
+crate::config::named!(SwarmPlace {
+    Auto = "auto",
+    Host = "host",
+    Device = "device",
+});
+
+impl SwarmPlace {
+    /// Whether a swarm of so many particles and objectives lives on the device, if candidates are evaluated by `backend`.
+    ///
+    /// # Errors
+    /// [`Error::Input`] with the reason if the device is asked for and cannot be had.
+    pub fn on_device(
+        self,
+        (backend, adapter): (BackendChoice, Option<&str>),
+        population: usize,
+        objectives: usize,
+    ) -> Result<bool> {
+        let gpu = backend.decided(adapter) == BackendChoice::Gpu;
+        let several = (2..=3).contains(&objectives);
+        let refused = |found: String, expected: &str| {
+            let found = format!("device, with {found}");
+            Err(Error::input("the study", "swarm", found, expected))
+        };
+        match self {
+            Self::Host => Ok(false),
+            Self::Auto => Ok(gpu && several && population >= MANY),
+            Self::Device if !several => {
+                let found = format!("{objectives} objectives");
+                refused(found, "a swarm on the device has two or three objectives")
+            }
+            Self::Device if !gpu => refused(
+                "lanes or the reference to evaluate".to_owned(),
+                "a swarm on the device needs the backend gpu",
+            ),
+            Self::Device => Ok(true),
+        }
+    }
+
+    /// The swarm, before it goes to its place.
+    ///
+    /// # Errors
+    /// Those of [`Mopso::new`].
+    #[cfg(feature = "studies")]
+    pub(crate) fn swarm(self, problem: &Problem, settings: MopsoSettings) -> Result<Mopso> {
+        match self {
+            Self::Device => Mopso::in_single_precision(problem, settings),
+            Self::Auto | Self::Host => Mopso::new(problem, settings),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn large_swarms_go_to_the_device_where_there_is_one() {
+        let on = |place: SwarmPlace, backend, population, objectives| {
+            place.on_device((backend, None), population, objectives)
+        };
+        let gpu = BackendChoice::Gpu;
+        assert!(on(SwarmPlace::Auto, gpu, MANY, 3).expect("an answer"));
+        assert!(!on(SwarmPlace::Auto, gpu, MANY - 1, 3).expect("an answer"));
+        assert!(!on(SwarmPlace::Auto, gpu, MANY, 4).expect("an answer"));
+        assert!(!on(SwarmPlace::Auto, BackendChoice::Simd, MANY, 2).expect("an answer"));
+        assert!(!on(SwarmPlace::Host, gpu, MANY, 2).expect("an answer"));
+        assert!(on(SwarmPlace::Device, gpu, 8, 2).expect("an answer"));
+        for (backend, objectives, reason) in [
+            (gpu, 1, "two or three objectives"),
+            (gpu, 4, "two or three objectives"),
+            (BackendChoice::Simd, 2, "needs the backend gpu"),
+            (BackendChoice::Cpu, 2, "needs the backend gpu"),
+        ] {
+            let refusal = on(SwarmPlace::Device, backend, MANY, objectives).expect_err(reason);
+            assert!(refusal.to_string().contains(reason), "{refusal}");
+        }
+    }
+}
