@@ -1,13 +1,14 @@
 #!/usr/bin/env bash
 # Builds the wheel, installs it into a clean virtual environment, and runs the tests, the examples and the type checks there.
-# Needs Python 3.10 or later with venv, and a package index. WHEEL names a wheel that is built already.
+# Needs Python 3.11 or later with venv, and a package index. WHEEL names a wheel that is built already.
 set -euo pipefail
 cd "$(dirname "$0")"
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
 python3 -m venv "$folder/venv"
 python=$folder/venv/bin/python
-"$python" -m pip install --quiet --disable-pip-version-check maturin==1.16.0 numpy==2.2.6 pymoo==0.6.1.6 pytest==8.4.2 mypy==1.18.2
+"$python" -m pip install --quiet --disable-pip-version-check \
+    maturin==1.16.0 mypy==2.4.1 numpy==2.4.6 pymoo==0.6.2 pytest==9.2.0
 wheel=${WHEEL:-}
 if [ -z "$wheel" ]; then
     "$folder/venv/bin/maturin" build --release --locked --out "$folder/dist"
