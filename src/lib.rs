@@ -136,6 +136,8 @@
 // What parts that are left out would use is not dead.
 #![cfg_attr(not(feature = "cli"), allow(dead_code))]
 
+#[cfg(feature = "cli")]
+pub mod cli;
 pub mod config;
 #[cfg(feature = "vehicle")]
 pub mod drive;
@@ -164,6 +166,10 @@ pub mod telemetry;
 pub mod track;
 #[cfg(feature = "vehicle")]
 pub mod vehicle;
+
+// The program calls the library by its name, as any other does.
+#[cfg(feature = "cli")]
+extern crate self as lapswarm;
 
 pub use error::{Error, Place, Result};
 pub use swarm::{minimise, minimise_batch, minimise_several};

@@ -1,9 +1,8 @@
 //! The command line of lapswarm.
 
-mod cli;
-
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    cli::run()
+    let arguments: Vec<_> = std::env::args_os().collect();
+    ExitCode::from(lapswarm::cli::run(&arguments))
 }

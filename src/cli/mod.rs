@@ -24,10 +24,10 @@ use lapswarm::study::framework::memory::USUAL_MIB;
 use lapswarm::study::registry::{self, STUDIES};
 use lapswarm::{Error, Result};
 use output::{errln, out};
+use std::ffi::OsString;
 use std::num::{ParseFloatError, ParseIntError};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
-use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -138,11 +138,12 @@ fn stopped(stop: &AtomicBool) -> ControlFlow<()> {
     }
 }
 
-/// Runs the program.
-pub fn run() -> ExitCode {
-    let matches = match command().try_get_matches() {
+/// Runs the program with its arguments, of which the first is its name. Hands back its exit code; wrong flags and `--help` end
+/// the process.
+pub fn run(arguments: &[OsString]) -> u8 {
+    let matches = match command().try_get_matches_from(arguments) {
         Ok(matches) => matches,
-        Err(error) => refuse_flags(in_words(error)),
+        Err(error) => refuse_flags(in_words(error), arguments),
     };
     tracing_subscriber::fmt()
         .with_writer(std::io::stderr)
@@ -164,7 +165,7 @@ pub fn run() -> ExitCode {
     };
     // What went wrong before is the cause.
     match outcome.and_then(|()| output::finish()) {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(()) => 0,
         Err(error) => {
             let code = error.exit_code();
             if json {
@@ -178,7 +179,7 @@ pub fn run() -> ExitCode {
             if let Some(advice) = asked.and_then(|asked| advice(&error, asked)) {
                 errln!("help: {advice}");
             }
-            ExitCode::from(code)
+            code
         }
     }
 }
@@ -208,8 +209,8 @@ fn in_words(error: clap::Error) -> clap::Error {
 }
 
 /// Ends the program as clap does: with code 2 on bad flags, which are an object where JSON is asked for, and with 0 on --help.
-fn refuse_flags(error: clap::Error) -> ! {
-    if error.use_stderr() && std::env::args_os().any(|argument| argument == "--json") {
+fn refuse_flags(error: clap::Error, arguments: &[OsString]) -> ! {
+    if error.use_stderr() && arguments.iter().any(|argument| argument == "--json") {
         let told = error.to_string();
         let told = told
             .lines()

@@ -114,6 +114,7 @@ pub fn run(study: &'static dyn Registered, matches: &ArgMatches) -> Result<()> {
     let mut bar = Bar::new(common.quiet);
     let answer = study.run(Request {
         file: matches.get_one::<PathBuf>("study").map(PathBuf::as_path),
+        text: None,
         flags: &flags(study, matches),
         out: common.out.as_deref(),
         resume: resume.resume,

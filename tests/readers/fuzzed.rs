@@ -344,6 +344,7 @@ fn states() -> Vec<Vec<u8>> {
             let out = folder.path().join("out");
             let stopped = study.run(Request {
                 file: None,
+                text: None,
                 flags: &flags,
                 out: Some(&out),
                 resume: false,

@@ -32,6 +32,7 @@ fn ask_within(
     let mut told = 0;
     study.run(Request {
         file: None,
+        text: None,
         flags,
         out: Some(out),
         resume,

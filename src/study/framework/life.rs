@@ -18,6 +18,8 @@ use std::time::{Duration, Instant};
 pub struct Request<'a> {
     /// A study file, if there is one.
     pub file: Option<&'a Path>,
+    /// The text of one in its place, and its name in messages; paths in it are relative to the working folder.
+    pub text: Option<(&'a str, &'a Path)>,
     /// Keys of settings and what flags say of them, over the file.
     pub flags: &'a [(String, String)],
     /// The run folder; the next free one where not given.
@@ -145,9 +147,10 @@ type Begun<S> = (<S as Study>::Settings, Option<Resumed<<S as Study>::State>>);
 /// Settings from study file and flags, over those that the run was begun with if it is resumed.
 fn begin<S: Study>(request: &Request<'_>) -> Result<Begun<S>> {
     let asked = |base: S::Settings| -> Result<S::Settings> {
-        let mut settings = match request.file {
-            Some(path) => S::Settings::read(path)?,
-            None => base,
+        let mut settings = match (request.file, request.text) {
+            (Some(path), _) => S::Settings::read(path)?,
+            (None, Some((text, name))) => S::Settings::parse(name, text, Path::new(""))?,
+            (None, None) => base,
         };
         apply(&mut settings, request.flags)?;
         settings.validate()?;

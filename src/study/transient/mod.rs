@@ -13,7 +13,7 @@ mod settings;
 mod state;
 
 pub use drive::{AGREEMENT, DrivenLine, INTERVAL_S};
-pub use population::{Driven, DrivenBest, PopulationOutcome};
+pub use population::{Driven, DrivenBest, PopulationOutcome, drive_problem};
 pub use population_results::{Entry, PopulationSummary};
 pub use results::LineSummary;
 pub use settings::{MOST_SETUPS, TransientSettings};

@@ -3,7 +3,7 @@
 //! Every set-up drives every line at the speeds of quasi-steady-state laps with different shares of the envelope's grip; what it is
 //! worth is its fastest lap on which the car stays within the edges.
 
-use super::{Prepared, Transient, TransientState, planned};
+use super::{Prepared, Transient, TransientSettings, TransientState, planned};
 use crate::drive::{DriverSettings, Line};
 use crate::error::Result;
 use crate::evaluate::drive::{DriveObjective, DriveProblem, DriveSettings, open_drive_evaluator};
@@ -13,6 +13,7 @@ use crate::study::framework::{Inputs, Progress, RunRecord, Study, Watch, Work};
 use crate::vehicle::{CarParameter, Traction};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use std::ops::ControlFlow;
 use std::time::Instant;
 
 /// Laps between two reports of progress, of which no backend is short.
@@ -55,6 +56,43 @@ pub struct PopulationOutcome {
     pub record: RunRecord,
 }
 
+/// The problem of driving set-ups on lines with shares of the grip; nothing if `proceed`, which is asked before each line is
+/// planned, ends it.
+///
+/// # Errors
+/// [`crate::Error::Input`] for unknown parameters, and those of [`DriveProblem::new`].
+pub fn drive_problem(
+    settings: &TransientSettings,
+    prepared: &Prepared,
+    mut proceed: impl FnMut() -> ControlFlow<()>,
+) -> Result<Option<DriveProblem>> {
+    let Prepared { car, road, lines } = prepared;
+    let shares = settings.shares();
+    let traction = Traction::of(car, &road.car.envelope);
+    let mut plans = Vec::with_capacity(lines.len());
+    for line in lines {
+        if proceed().is_break() {
+            return Ok(None);
+        }
+        let of_line = shares
+            .par_iter()
+            .map(|share| planned(&road.car, &traction, &line.points_m, *share).map(|(_, _, plan)| plan))
+            .collect::<Result<Vec<_>>>()?;
+        plans.push(of_line);
+    }
+    let roads: Vec<Line<'_>> = lines
+        .iter()
+        .zip(&plans)
+        .map(|(line, plans)| Line {
+            circuit: &line.circuit,
+            plans,
+        })
+        .collect();
+    let driver = DriveSettings::new(DriverSettings::racing(car)?);
+    let free = settings.free(car)?;
+    DriveProblem::new(car.clone(), free, &roads, &shares, &driver, &DriveObjective::ALL).map(Some)
+}
+
 /// Drives all set-ups on all lines; nothing if the observer ends it while the lines are planned.
 ///
 /// # Errors
@@ -75,37 +113,12 @@ pub(super) fn drive(work: Work<'_, Transient>) -> Result<Option<PopulationOutcom
     recorder.save()?;
     let shares = settings.shares();
     let all = settings.laps() as u64;
-    let traction = Traction::of(car, &limits.envelope);
-    let mut plans = Vec::with_capacity(lines.len());
-    for line in lines {
-        if observe(&Progress::counted(0, all)).is_break() {
-            return Ok(None);
-        }
-        let of_line = shares
-            .par_iter()
-            .map(|share| planned(limits, &traction, &line.points_m, *share).map(|(_, _, plan)| plan))
-            .collect::<Result<Vec<_>>>()?;
-        plans.push(of_line);
-    }
-    let roads: Vec<Line<'_>> = lines
-        .iter()
-        .zip(&plans)
-        .map(|(line, plans)| Line {
-            circuit: &line.circuit,
-            plans,
-        })
-        .collect();
+    let planned = drive_problem(settings, work.prepared, || observe(&Progress::counted(0, all)))?;
+    let Some(problem) = planned else {
+        return Ok(None);
+    };
     let free = settings.free(car)?;
     let parameters: Vec<CarParameter> = free.iter().map(|(p, _, _)| p.clone()).collect();
-    let driver = DriveSettings::new(DriverSettings::racing(car)?);
-    let problem = DriveProblem::new(
-        car.clone(),
-        free.clone(),
-        &roads,
-        &shares,
-        &driver,
-        &DriveObjective::ALL,
-    )?;
     let flat = car.to_flat();
     let seed = (settings.seed ^ (settings.seed >> 32)) as u32;
     let setups: Vec<Vec<f64>> = (0..=settings.setups.unwrap_or(0))

@@ -1,0 +1,147 @@
+"""Problems: bounded decision variables and objectives, all of which are minimised."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from os import PathLike, fspath
+from typing import Any
+
+from . import _native
+from ._settings import as_text
+
+Path = str | PathLike[str]
+Bounds = Mapping[str, Sequence[float]]
+
+
+class ReplayProblem(_native.Problem):
+    """Which car did what was logged: free parameters of a car, and how far it is from the log.
+
+    car: a bundled name (``gt``, ``gt_hybrid``) or a TOML file. log: a CSV or MoTeC file; without one the bundled lap.
+    free: parameters with their least and greatest value in the parameter's unit, as in ``{"mass_kg": (1100, 1300)}``;
+    without it the usual 22. Variables are in the order of their names. objectives: of ``all``, ``vx``, ``ax``, ``ay``, ``yaw_rate``. settings: others of ``identify``,
+    such as ``window_s`` and ``laps``.
+    """
+
+    def __new__(
+        cls,
+        car: Path = "gt",
+        log: Path | None = None,
+        *,
+        free: Bounds | None = None,
+        objectives: Sequence[str] | None = None,
+        **settings: Any,
+    ) -> ReplayProblem:
+        settings |= {"car": car, "log": log, "free": free, "objectives": objectives}
+        return super().__new__(cls, _native.Problem.of_study("replay", as_text("identify", settings)))
+
+
+class LineProblem(_native.Problem):
+    """Lines round a circuit: the share of the usable width from the right, from 0 to 1, at every cross-section or at
+    ``control_points`` of a spline.
+
+    track: a bundled name, a shape such as ``circle:590:600``, or a file. objectives: of ``length`` (m), ``length_squared``,
+    ``gamma``, ``kappa2``, ``lap_time`` (s). settings: others of ``raceline``, such as ``sections`` and ``car_width_m``.
+    """
+
+    def __new__(
+        cls,
+        track: Path = "silverstone_gp",
+        car: Path = "gt",
+        *,
+        objectives: Sequence[str] | None = None,
+        control_points: int | None = None,
+        **settings: Any,
+    ) -> LineProblem:
+        settings |= {"track": track, "car": car, "objectives": objectives}
+        text = as_text("raceline", settings)
+        return super().__new__(cls, _native.Problem.of_study("line", text, control_points))
+
+
+class EnergyProblem(_native.Problem):
+    """Where a hybrid's energy goes on a lap: the share of each zone, from 0 to 1, in which the motor works.
+
+    objectives: of ``lap_time_s`` (s), ``fuel_l`` (l), ``energy_used_mj`` (MJ), ``soc_swing``. settings: others of ``hybrid``,
+    such as ``energy_mj`` and ``line``. Without a line the fastest is found first, which takes seconds.
+    """
+
+    def __new__(
+        cls,
+        track: Path = "silverstone_gp",
+        car: Path = "gt_hybrid",
+        *,
+        objectives: Sequence[str] | None = None,
+        **settings: Any,
+    ) -> EnergyProblem:
+        settings |= {"track": track, "car": car, "objectives": objectives}
+        return super().__new__(cls, _native.Problem.of_study("energy", as_text("hybrid", settings)))
+
+
+class DriveProblem(_native.Problem):
+    """Set-ups of a car driven round lines by a driver: its lap time (s), how far it leaves the road (m), how much it steers.
+
+    line: one or more tables with columns ``x_m`` and ``y_m``. parameters: those that set-ups move, each by ``share`` of its
+    value either way. Variables are the parameters, then ``line`` (a whole number) if there are several, then ``grip_share``.
+    settings: others of ``transient``, such as ``track`` and ``grip_shares``.
+    """
+
+    def __new__(
+        cls,
+        line: Path | Sequence[Path],
+        car: Path = "gt",
+        *,
+        parameters: Sequence[str] | None = None,
+        **settings: Any,
+    ) -> DriveProblem:
+        lines = [line] if isinstance(line, (str, PathLike)) else list(line)
+        settings.setdefault("setups", 1)
+        settings |= {"line": lines, "car": car, "parameters": parameters}
+        return super().__new__(cls, _native.Problem.of_study("drive", as_text("transient", settings)))
+
+
+class SteadyProblem(_native.Problem):
+    """Cars in steady-state cornering. Variables are the free parameters, then ``speed_mps`` and ``steer_rad``.
+
+    free: parameters with their bounds. objectives: of ``minus_ay_mps2``, ``sideslip_rad``, ``yaw_rate_radps``, ``roll_rad``,
+    ``slip_ratio``.
+    """
+
+    def __new__(
+        cls,
+        car: Path = "gt",
+        *,
+        free: Bounds | None = None,
+        speeds_mps: tuple[float, float] = (20.0, 70.0),
+        steers_rad: tuple[float, float] = (0.0, 0.1),
+        objectives: Sequence[str] = ("minus_ay_mps2",),
+    ) -> SteadyProblem:
+        rows = [(name, float(lower), float(upper)) for name, (lower, upper) in (free or {}).items()]
+        made = _native.Problem.of_steady(fspath(car), rows, list(speeds_mps), list(steers_rad), list(objectives))
+        return super().__new__(cls, made)
+
+
+class OwnProblem(_native.Problem):
+    """Variables and objectives of your own, for optimisers.
+
+    bounds: the least and the greatest value of each variable, of shape (d, 2). objectives: how many, or their names.
+    whole: which variables take whole numbers alone.
+    """
+
+    def __new__(
+        cls,
+        bounds: Sequence[Sequence[float]],
+        objectives: int | Sequence[str] = 1,
+        *,
+        names: Sequence[str] | None = None,
+        units: Sequence[str] | None = None,
+        whole: Sequence[bool] | None = None,
+    ) -> OwnProblem:
+        pairs = [(float(lower), float(upper)) for lower, upper in bounds]
+        count = len(pairs)
+        columns = (
+            list(names) if names is not None else [f"x{k + 1}" for k in range(count)],
+            list(units) if units is not None else ["-"] * count,
+            [bool(w) for w in whole] if whole is not None else [False] * count,
+        )
+        variables = [(n, u, lo, up, w) for n, u, w, (lo, up) in zip(*columns, pairs, strict=True)]
+        listed = [f"f{k + 1}" for k in range(objectives)] if isinstance(objectives, int) else list(objectives)
+        return super().__new__(cls, _native.Problem.of_own(variables, [(name, "-") for name in listed]))

@@ -1,0 +1,28 @@
+#!/usr/bin/env bash
+# Builds the wheel, installs it into a clean virtual environment, and runs the tests, the examples and the type checks there.
+# Needs Python 3.11 or later with venv, and a package index. WHEEL names a wheel that is built already.
+set -euo pipefail
+cd "$(dirname "$0")"
+folder=$(mktemp -d)
+trap 'rm -rf "$folder"' EXIT
+python3 -m venv "$folder/venv"
+python=$folder/venv/bin/python
+"$python" -m pip install --quiet --disable-pip-version-check \
+    maturin==1.16.0 mypy==2.4.1 numpy==2.4.6 pymoo==0.6.2 pytest==9.2.0
+wheel=${WHEEL:-}
+if [ -z "$wheel" ]; then
+    "$folder/venv/bin/maturin" build --release --locked --out "$folder/dist"
+    wheel=$(ls "$folder"/dist/*.whl)
+fi
+"$python" -m pip install --quiet --disable-pip-version-check --no-deps "$wheel"
+# What is tested is the wheel: the folder beside has no native half, and would hide it.
+cp -r tests examples pyproject.toml "$folder"
+cd "$folder"
+"$python" -m pytest -q -p no:cacheprovider tests
+for example in examples/*.py; do
+    echo "== $example"
+    "$python" "$example"
+done
+"$folder/venv/bin/lapswarm" --version
+"$python" -m mypy --strict -p lapswarm
+"$python" -m mypy --strict examples
