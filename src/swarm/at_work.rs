@@ -28,12 +28,16 @@ pub(crate) struct SwarmState {
 #[cfg(feature = "gpu")]
 type OnBoard<'a> = (DeviceMopso, Box<dyn DeviceObjectives + 'a>);
 
+/// Brings a swarm to a device.
+#[cfg(feature = "gpu")]
+type Opening<'a> = Box<dyn Fn(&Mopso) -> Result<OnBoard<'a>> + 'a>;
+
 /// What it takes to bring a swarm to a device, and back if that fails.
 #[cfg(feature = "gpu")]
 struct Resident<'a> {
     /// `None` while the device is opened.
     on_board: Option<OnBoard<'a>>,
-    open: Box<dyn Fn(&Mopso) -> Result<OnBoard<'a>> + 'a>,
+    open: Opening<'a>,
     lanes: Box<dyn Fn() -> Result<Box<dyn Evaluator + 'a>> + 'a>,
     /// Steps told when the device last failed.
     failed_at: Option<usize>,
@@ -42,7 +46,7 @@ struct Resident<'a> {
 enum Place<'a> {
     Host(Box<dyn Evaluator + 'a>, DeviceFaults),
     #[cfg(feature = "gpu")]
-    Device(Resident<'a>),
+    Device(Box<Resident<'a>>),
 }
 
 /// A swarm at work.
@@ -95,7 +99,7 @@ impl<'a> SwarmAtWork<'a> {
                 lanes: Box::new(move || open_evaluator(kind, BackendChoice::Simd, None)),
                 failed_at: None,
             };
-            let mut swarm = begin(Place::Device(resident), state);
+            let mut swarm = begin(Place::Device(Box::new(resident)), state);
             swarm.board(known, adapter)?;
             return Ok(swarm);
         }
@@ -148,8 +152,8 @@ impl<'a> SwarmAtWork<'a> {
 
     fn read_back(&mut self) -> Result<()> {
         #[cfg(feature = "gpu")]
-        if let Place::Device(Resident { on_board, .. }) = &self.place {
-            let (swarm, _) = on_board.as_ref().ok_or_else(no_device)?;
+        if let Place::Device(resident) = &self.place {
+            let (swarm, _) = resident.on_board.as_ref().ok_or_else(no_device)?;
             self.state.swarm = Mopso::from_device(swarm.state()?);
         }
         self.state.losses.clone_from(&self.losses);
@@ -181,8 +185,8 @@ impl<'a> SwarmAtWork<'a> {
                 }
             }
             #[cfg(feature = "gpu")]
-            Place::Device(Resident { on_board, .. }) => {
-                let (swarm, objectives) = on_board.as_mut().ok_or_else(no_device)?;
+            Place::Device(resident) => {
+                let (swarm, objectives) = resident.on_board.as_mut().ok_or_else(no_device)?;
                 while swarm.iteration() < iterations {
                     latest = Some(swarm.step(objectives.as_mut())?);
                 }
