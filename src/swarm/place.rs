@@ -45,11 +45,11 @@ impl SwarmPlace {
             Self::Auto => Ok(gpu && several && population >= MANY),
             Self::Device if !several => {
                 let found = format!("{objectives} objectives");
-                refused(found, "a swarm on the device has two or three objectives")
+                refused(found, "two or three objectives, for a swarm on the device")
             }
             Self::Device if !gpu => refused(
                 "lanes or the reference to evaluate".to_owned(),
-                "a swarm on the device needs the backend gpu",
+                "the backend gpu, for a swarm on the device",
             ),
             Self::Device => Ok(true),
         }
@@ -87,8 +87,8 @@ mod tests {
         for (backend, objectives, reason) in [
             (gpu, 1, "two or three objectives"),
             (gpu, 4, "two or three objectives"),
-            (BackendChoice::Simd, 2, "needs the backend gpu"),
-            (BackendChoice::Cpu, 2, "needs the backend gpu"),
+            (BackendChoice::Simd, 2, "the backend gpu"),
+            (BackendChoice::Cpu, 2, "the backend gpu"),
         ] {
             let refusal = on(SwarmPlace::Device, backend, MANY, objectives).expect_err(reason);
             assert!(refusal.to_string().contains(reason), "{refusal}");

@@ -174,11 +174,11 @@ fn a_swarm_on_no_device_is_refused() {
     for (more, reason) in [
         (
             &["--backend", "simd"][..],
-            "a swarm on the device needs the backend gpu",
+            "the backend gpu, for a swarm on the device",
         ),
         (
             &["--backend", "gpu", "--objectives", "length"],
-            "a swarm on the device has two or three objectives",
+            "two or three objectives, for a swarm on the device",
         ),
     ] {
         let refused = asked(more);
