@@ -85,7 +85,7 @@ impl RunFolder {
         Error::input(path, "out", found, "one that no run is at work in")
     }
 
-    /// Lets other processes [join](join) this one in the folder.
+    /// Lets other processes [join] this one in the folder.
     ///
     /// # Errors
     /// [`Error::Io`] if the system refuses.
