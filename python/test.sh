@@ -8,7 +8,8 @@ trap 'rm -rf "$folder"' EXIT
 python3 -m venv "$folder/venv"
 python=$folder/venv/bin/python
 "$python" -m pip install --quiet --disable-pip-version-check \
-    maturin==1.16.0 mypy==2.4.1 numpy==2.4.6 pymoo==0.6.2 pytest==9.2.0
+    maturin==1.16.0 mypy==2.4.1 numpy==2.4.6 optuna==5.0.0 pandas==3.1.1 polars==2.1.0 pyarrow==26.0.1 pymoo==0.6.2 \
+    pytest==9.2.0
 wheel=${WHEEL:-}
 if [ -z "$wheel" ]; then
     "$folder/venv/bin/maturin" build --release --locked --out "$folder/dist"
@@ -19,6 +20,7 @@ fi
 cp -r tests examples pyproject.toml "$folder"
 cd "$folder"
 "$python" -m pytest -q -p no:cacheprovider tests
+"$python" -m pytest -q -p no:cacheprovider --doctest-modules --pyargs lapswarm
 for example in examples/*.py; do
     echo "== $example"
     "$python" "$example"
