@@ -31,6 +31,9 @@ class Car:
 
     base: a bundled name or a TOML file. parameters: values in their units, as in ``Car("gt", mass_kg=1300, rBy1=12)``;
     a tyre coefficient of one axle is given as ``**{"front.rBy1": 12}``.
+
+    >>> Car("gt", mass_kg=1300, **{"front.rBy1": 12})
+    Car('gt', mass_kg=1300, front.rBy1=12)
     """
 
     def __init__(self, base: str | os.PathLike[str] = "gt", **parameters: float) -> None:
@@ -87,7 +90,11 @@ def _pairs(frame: Any, name: str) -> Iterable[tuple[str, Any]]:
 
 
 def frame_of(columns: Mapping[str, Any], kind: str | None = None) -> Any:
-    """Columns as a frame of pandas or polars, or as a dict of arrays of numpy; without a kind the first that is installed."""
+    """Columns as a frame of pandas or polars, or as a dict of arrays of numpy; without a kind the first that is installed.
+
+    >>> frame_of({"x_m": [0.0, 1.0]}, "numpy")
+    {'x_m': array([0., 1.])}
+    """
     arrays = {name: np.asarray(values) for name, values in columns.items()}
     if kind not in (None, *KINDS):
         raise InputError(f"frame: kind: found {kind}, expected {', '.join(KINDS)}", "frame", field="kind")

@@ -30,6 +30,13 @@ class ReplayProblem(_native.Problem):
     free: parameters with their least and greatest value in the parameter's unit, as in ``{"mass_kg": (1100, 1300)}``;
     without it the usual 22. Variables are in the order of their names. objectives: of ``all``, ``vx``, ``ax``, ``ay``, ``yaw_rate``. settings: others of ``identify``,
     such as ``window_s`` and ``laps``.
+
+    >>> cars = ReplayProblem("gt", free={"mass_kg": (1150, 1350)}, window_s=1.5, settle_s=0.5)
+    >>> cars.names, cars.units, cars.bounds.shape
+    (['mass_kg'], ['kg'], (1, 2))
+    >>> found = _native.Evaluator(cars, "cpu").evaluate([[1245.0], [1300.0]])
+    >>> bool(found.F[0, 0] < found.F[1, 0])
+    True
     """
 
     def __new__(
@@ -52,6 +59,14 @@ class LineProblem(_native.Problem):
     track: a bundled name, a shape such as ``circle:590:600``, a file, or a frame with its columns (``x_m``, ``y_m`` and widths).
     objectives: of ``length`` (m), ``length_squared``,
     ``gamma``, ``kappa2``, ``lap_time`` (s). settings: others of ``raceline``, such as ``sections`` and ``car_width_m``.
+
+    >>> circle = LineProblem("circle:590:600", sections=360, objectives=["length"])
+    >>> circle.objectives, circle.objective_units, circle.bounds.shape
+    (['length'], ['m'], (360, 2))
+    >>> x = [[0.0] * 360, [1.0] * 360]  # along the right edge, and along the left one
+    >>> right, left = _native.Evaluator(circle, "cpu").evaluate(x).F[:, 0]
+    >>> bool(3700 < right < left < 3770)
+    True
     """
 
     def __new__(
@@ -112,6 +127,12 @@ class SteadyProblem(_native.Problem):
 
     free: parameters with their bounds. objectives: of ``minus_ay_mps2``, ``sideslip_rad``, ``yaw_rate_radps``, ``roll_rad``,
     ``slip_ratio``.
+
+    >>> cars = SteadyProblem("gt", free={"mass_kg": (1000, 1400)}, objectives=["minus_ay_mps2", "roll_rad"])
+    >>> cars.names
+    ['mass_kg', 'speed_mps', 'steer_rad']
+    >>> _native.Evaluator(cars, "cpu").evaluate([[1200.0, 30.0, 0.02]]).F.shape
+    (1, 2)
     """
 
     def __new__(
@@ -135,6 +156,9 @@ class OwnProblem(_native.Problem):
 
     bounds: the least and the greatest value of each variable, of shape (d, 2). objectives: how many, or their names.
     whole: which variables take whole numbers alone.
+
+    >>> OwnProblem([(0, 9), (0, 1)], ["mass"], names=["plies", "share"], whole=[True, False])
+    <problem of 2 variables and 1 objectives>
     """
 
     def __new__(

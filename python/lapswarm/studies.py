@@ -27,6 +27,15 @@ class Result(Generic[F]):
     its files are. tables: names of those that ``frame`` reads. text: the figures in words. warnings: what must be told whatever
     is shown. interrupted: whether it was stopped before its end; ``resume=True`` continues it. verdict: what it did not reach
     of what it was asked to reach, None if it did.
+
+    >>> import tempfile
+    >>> folder = tempfile.TemporaryDirectory()
+    >>> found = surface(out=folder.name + "/run", section="Abbey", grid=3, backend="simd")
+    >>> found.figures.study, len(found.figures.base), found.interrupted
+    ('surface', 2, False)
+    >>> {len(column) for column in found.frame(found.tables[0], "numpy").values()}
+    {9}
+    >>> folder.cleanup()
     """
 
     def __init__(self, study: str, kind: Any, answer: dict[str, Any]) -> None:
