@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Builds the wheel, installs it into a clean virtual environment, and runs the tests, the examples and the type checks there.
+# Builds the wheel, installs it into a clean virtual environment, and runs the tests, the docstrings, the examples and the type
+# checks there.
 # Needs Python 3.11 or later with venv, and a package index. WHEEL names a wheel that is built already.
 set -euo pipefail
 cd "$(dirname "$0")"
@@ -17,7 +18,7 @@ if [ -z "$wheel" ]; then
 fi
 "$python" -m pip install --quiet --disable-pip-version-check --no-deps "$wheel"
 # What is tested is the wheel: the folder beside has no native half, and would hide it.
-cp -r tests examples pyproject.toml "$folder"
+cp -r benches examples tests pyproject.toml "$folder"
 cd "$folder"
 "$python" -m pytest -q -p no:cacheprovider tests
 "$python" -m pytest -q -p no:cacheprovider --doctest-modules --pyargs lapswarm
@@ -27,4 +28,4 @@ for example in examples/*.py; do
 done
 "$folder/venv/bin/lapswarm" --version
 "$python" -m mypy --strict -p lapswarm
-"$python" -m mypy --strict examples
+"$python" -m mypy --strict examples benches

@@ -104,6 +104,15 @@ fn work(
     }
 }
 
+/// Where the first number is that is not finite. Whole blocks are looked at first: they take many numbers at once.
+fn first_not_finite(rows: &[f64]) -> Option<usize> {
+    const BLOCK: usize = 512;
+    let all_are = |block: &[f64]| block.iter().fold(true, |all, x| all & x.is_finite());
+    let block = BLOCK * rows.chunks(BLOCK).position(|block| !all_are(block))?;
+    let within = rows[block..].iter().position(|x| !x.is_finite())?;
+    Some(block + within)
+}
+
 fn gone() -> Error {
     Error::Device("the thread of the evaluator has ended".to_owned())
 }
@@ -149,7 +158,7 @@ impl Evaluator {
         let population = table(X, "X")?;
         check_width(&population, "X", dimensions, "variable")?;
         let rows = population.as_slice()?;
-        if let Some(at) = rows.iter().position(|x| !x.is_finite()) {
+        if let Some(at) = first_not_finite(rows) {
             let found = format!("{} in row {} (from 0)", rows[at], at / dimensions);
             let name = &problem.variables[at % dimensions].name;
             return Err(refused(py, "X", name, found, "finite numbers"));
