@@ -28,4 +28,4 @@ for example in examples/*.py; do
 done
 "$folder/venv/bin/lapswarm" --version
 "$python" -m mypy --strict -p lapswarm
-"$python" -m mypy --strict examples benches
+"$python" -m mypy --strict examples benches/evaluate.py
