@@ -137,7 +137,6 @@ def test_a_killed_driver_is_resumed_to_the_same_bits(
 
 
 def test_states_go_where_fsspec_reaches(machines: Machines, undisturbed: list[bytes]) -> None:
-    pytest.importorskip("fsspec")
     place = "memory://lapswarm/islands"
     part = lapswarm.ray.islands(PROBLEM, function=two(), out=place, callback=lambda now: now["epoch"] < 3, **SIZES)
     assert part.epochs == 3

@@ -120,34 +120,49 @@ def test_a_killed_driver_is_resumed(machines: Machines, alone: tuple[Path, lapsw
     assert figures(folder) == figures(alone[0])
 
 
-def test_a_row_that_fails_says_why_and_stops_no_other(machines: Machines, tmp_path: Path) -> None:
-    # No car that slides like this drives the log to its end.
-    hard = SMALL | {"free": {"rBy1": (0.5, 0.6)}, "window_s": 30.0}
-    grid = {"window_s": [1.5, 1e9]}
-    base = {key: value for key, value in hard.items() if key != "window_s"} | {"free": SMALL["free"]}
-    try:
-        found = lapswarm.ray.sweep("identify", grid, out=tmp_path / "sweep", **base)
-    except lapswarm.InputError as error:
-        # A setting out of its range is refused before anything is there.
-        assert "window_s" in str(error) and not (tmp_path / "sweep").exists()
-    else:
-        assert len(found.rows) == 2
+def test_a_row_that_fails_says_why_and_is_tried_again(machines: Machines, tmp_path: Path) -> None:
+    base: dict[str, Any] = {
+        "track": "stadium:300:80:12",
+        "objectives": ["gamma"],
+        "algorithm": "thesis",
+        "warm_start": False,
+        "local_search": False,
+        "population": 8,
+        "iterations": 1,
+        "seed": 1,
+    }
+    # With so few cross-sections every line leaves the road.
+    grid = {"sections": [8, 60]}
+    for resume in (False, True):
+        told: list[int] = []
+        found = lapswarm.ray.sweep(
+            "raceline",
+            grid,
+            out=tmp_path / "sweep",
+            resume=resume,
+            callback=lambda now: told.append(now["row"]["run"]),
+            **base,
+        )
+        assert sorted(told) == ([0] if resume else [0, 1])
+        (why,) = found.failed
+        assert why.startswith("run 00000 failed: ") and "leaves the road" in why
+        assert found.rows[0]["exit_code"] == 1 and found.rows[1]["figures"]
 
 
 def test_files_go_along_and_stay(machines: Machines, tmp_path: Path) -> None:
-    cars = tmp_path / "cars"
-    cars.mkdir()
-    subprocess.run(
-        [sys.executable, "-m", "lapswarm.command_line", "init", "car", "--out", str(cars / "mine.toml"), "--quiet"],
-        cwd=cars,
-        check=False,
-        capture_output=True,
-    )
-    written = sorted(cars.glob("*.toml"))
-    if not written:
-        pytest.skip("no template")
-    found = lapswarm.ray.sweep("envelope", {"car": [written[0]]}, out=tmp_path / "sweep")
-    assert found.failed == [] and found.rows[0]["settings"]["car"].startswith("inputs/00/")
+    command = [sys.executable, "-m", "lapswarm.command_line", "init", "car", str(tmp_path / "mine.toml")]
+    subprocess.run(command, check=True, capture_output=True)
+    here = sorted(path.name for path in tmp_path.iterdir())
+    assert len(here) == 2, "a car and its tyre"
+    grid = {"seed": [1, 2]}
+    base = SMALL | {"car": tmp_path / "mine.toml"}
+    found = lapswarm.ray.sweep("identify", grid, out=tmp_path / "sweep", callback=lambda now: False, **base)
+    assert found.failed == [] and len(found.rows) == 1
+    assert sorted(path.name for path in (tmp_path / "sweep/inputs/00").iterdir()) == here
+    # The program goes on with the files that the folder has.
+    folder = str((tmp_path / "sweep").rename(tmp_path / "moved"))
+    (tmp_path / "mine.toml").unlink()
+    assert len(program("sweep", f"{folder}/sweep.toml", "--out", folder, "--resume")["rows"]) == 2
 
 
 def test_what_is_wrong_is_said_before_anything_is_written(machines: Machines, tmp_path: Path) -> None:
