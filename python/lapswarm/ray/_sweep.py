@@ -133,7 +133,7 @@ def sweep(
                     break
             _cluster.told()
             done.close()
-    _program(["sweep", "sweep.toml", "--out", ".", "--gather", "--quiet", "--json"], folder)
+    _program(["sweep", "sweep.toml", "--out", ".", "--gather", "--quiet", "--json"], folder, unless=folder / "summary.json")
     if lost:
         raise StudyError(f"{len(lost)} rows were lost with their workers, resume=True tries them again; {lost[0]}")
     ordered = [rows[run] for run in sorted(rows)]
@@ -273,7 +273,10 @@ def _row(text: str, files: dict[str, bytes], version: str, threads: int) -> dict
 
 
 def _program(arguments: list[str], folder: Path, environment: Mapping[str, str] | None = None, unless: Path | None = None) -> None:
-    """Runs the program in a folder. What it says of an error is raised, unless it has written what was wanted."""
+    """Runs the program in a folder, and raises what it says of an error.
+
+    unless: a file that it has written nevertheless, where it only says that a row has failed.
+    """
     command = [sys.executable, "-m", "lapswarm.command_line", *arguments]
     # Where this is imported from, the program is too.
     found_at = os.pathsep.join([str(Path(__file__).parents[2]), os.environ.get("PYTHONPATH", "")])
@@ -283,7 +286,7 @@ def _program(arguments: list[str], folder: Path, environment: Mapping[str, str] 
     )
     if ended.returncode < 0 or ended.returncode > 128:
         raise _Killed(f"the program was ended by signal {abs(ended.returncode) % 128}")
-    if ended.returncode == 0 or (unless is not None and unless.is_file()):
+    if ended.returncode == 0 or (ended.returncode == 1 and unless is not None and unless.is_file()):
         return
     try:
         said = json.loads(ended.stdout)["error"]
