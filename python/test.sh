@@ -25,6 +25,7 @@ cd "$folder"
 if [ "${1:-}" = ray ]; then
     "$python" -m pytest -q -p no:cacheprovider tests_ray
     "$python" -m mypy --strict -p lapswarm
+    "$python" -m mypy --strict benches
     exit
 fi
 "$python" -m pytest -q -p no:cacheprovider tests

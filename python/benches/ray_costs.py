@@ -12,6 +12,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from statistics import median
 
@@ -75,7 +76,7 @@ def main() -> None:
     migration_ms = milliseconds(lambda: accepted(state, state, 2))
     epoch_ms = per_call(pool, "epoch", (state, [state], 2, 0), 16) - migration_ms
     with tempfile.TemporaryDirectory() as folder:
-        keep_ms = milliseconds(lambda: write_whole(Path(folder) / "state", state))
+        keep_ms = milliseconds(partial(write_whole, Path(folder) / "state", state))
     pool.close()
 
     free = {"mass_kg": (1150.0, 1350.0)}
@@ -88,7 +89,7 @@ def main() -> None:
     row_ms = milliseconds(lambda: ray.get([task.remote(text, {}) for _ in range(20)])) / 20
     with tempfile.TemporaryDirectory() as folder:
         paths = [Path(folder) / name for name in found]
-        row_ms += milliseconds(lambda: [write_whole(path, found["row"]) for path in paths])
+        row_ms += sum(milliseconds(partial(write_whole, path, found["row"])) for path in paths)
     program = [sys.executable, "-m", "lapswarm.command_line", "--version"]
     program_ms = milliseconds(lambda: subprocess.run(program, check=True, capture_output=True))
 

@@ -13,20 +13,21 @@ Path = str | PathLike[str]
 Bounds = Mapping[str, Sequence[float]]
 
 
-def _again(kind: type[_Made], arguments: dict[str, Any]) -> _Made:
-    return kind(**arguments)
+def _again(kind: type[Made], given: Sequence[Any], settings: Mapping[str, Any]) -> Made:
+    return kind(*given, **settings)
 
 
-class _Made(_native.Problem):
+class Made(_native.Problem):
     """A problem that knows what it was made of: pickled, it is made again where it arrives."""
 
-    arguments: dict[str, Any]
+    def __init__(self, *given: Any, **settings: Any) -> None:
+        self.given, self.settings = given, settings
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _again, (type(self), self.arguments)
+        return _again, (type(self), self.given, self.settings)
 
 
-class ReplayProblem(_Made):
+class ReplayProblem(Made):
     """Which car did what was logged: free parameters of a car, and how far it is from the log.
 
     car: a bundled name (``gt``, ``gt_hybrid``) or a TOML file. log: a CSV or MoTeC file; without one the bundled lap.
@@ -45,12 +46,10 @@ class ReplayProblem(_Made):
         **settings: Any,
     ) -> ReplayProblem:
         settings |= {"car": car, "log": log, "free": free, "objectives": objectives}
-        made = super().__new__(cls, _native.Problem.of_study("replay", as_text("identify", settings)))
-        made.arguments = settings
-        return made
+        return super().__new__(cls, _native.Problem.of_study("replay", as_text("identify", settings)))
 
 
-class LineProblem(_Made):
+class LineProblem(Made):
     """Lines round a circuit: the share of the usable width from the right, from 0 to 1, at every cross-section or at
     ``control_points`` of a spline.
 
@@ -69,12 +68,10 @@ class LineProblem(_Made):
     ) -> LineProblem:
         settings |= {"track": track, "car": car, "objectives": objectives}
         text = as_text("raceline", settings)
-        made = super().__new__(cls, _native.Problem.of_study("line", text, control_points))
-        made.arguments = settings | {"control_points": control_points}
-        return made
+        return super().__new__(cls, _native.Problem.of_study("line", text, control_points))
 
 
-class EnergyProblem(_Made):
+class EnergyProblem(Made):
     """Where a hybrid's energy goes on a lap: the share of each zone, from 0 to 1, in which the motor works.
 
     objectives: of ``lap_time_s`` (s), ``fuel_l`` (l), ``energy_used_mj`` (MJ), ``soc_swing``. settings: others of ``hybrid``,
@@ -90,12 +87,10 @@ class EnergyProblem(_Made):
         **settings: Any,
     ) -> EnergyProblem:
         settings |= {"track": track, "car": car, "objectives": objectives}
-        made = super().__new__(cls, _native.Problem.of_study("energy", as_text("hybrid", settings)))
-        made.arguments = settings
-        return made
+        return super().__new__(cls, _native.Problem.of_study("energy", as_text("hybrid", settings)))
 
 
-class DriveProblem(_Made):
+class DriveProblem(Made):
     """Set-ups of a car driven round lines by a driver: its lap time (s), how far it leaves the road (m), how much it steers.
 
     line: one or more tables with columns ``x_m`` and ``y_m``. parameters: those that set-ups move, each by ``share`` of its
@@ -114,12 +109,10 @@ class DriveProblem(_Made):
         lines = [line] if isinstance(line, (str, PathLike)) else list(line)
         settings.setdefault("setups", 1)
         settings |= {"line": lines, "car": car, "parameters": parameters}
-        made = super().__new__(cls, _native.Problem.of_study("drive", as_text("transient", settings)))
-        made.arguments = settings
-        return made
+        return super().__new__(cls, _native.Problem.of_study("drive", as_text("transient", settings)))
 
 
-class SteadyProblem(_Made):
+class SteadyProblem(Made):
     """Cars in steady-state cornering. Variables are the free parameters, then ``speed_mps`` and ``steer_rad``.
 
     free: parameters with their bounds. objectives: of ``minus_ay_mps2``, ``sideslip_rad``, ``yaw_rate_radps``, ``roll_rad``,
@@ -136,14 +129,11 @@ class SteadyProblem(_Made):
         objectives: Sequence[str] = ("minus_ay_mps2",),
     ) -> SteadyProblem:
         rows = [(name, float(lower), float(upper)) for name, (lower, upper) in (free or {}).items()]
-        native = _native.Problem.of_steady(fspath(car), rows, list(speeds_mps), list(steers_rad), list(objectives))
-        made = super().__new__(cls, native)
-        ranges = {"speeds_mps": speeds_mps, "steers_rad": steers_rad}
-        made.arguments = {"car": car, "free": free, "objectives": objectives, **ranges}
-        return made
+        made = _native.Problem.of_steady(fspath(car), rows, list(speeds_mps), list(steers_rad), list(objectives))
+        return super().__new__(cls, made)
 
 
-class OwnProblem(_Made):
+class OwnProblem(Made):
     """Variables and objectives of your own, for optimisers.
 
     bounds: the least and the greatest value of each variable, of shape (d, 2). objectives: how many, or their names.
@@ -168,7 +158,4 @@ class OwnProblem(_Made):
         )
         variables = [(n, u, lo, up, w) for n, u, w, (lo, up) in zip(*columns, pairs, strict=True)]
         listed = [f"f{k + 1}" for k in range(objectives)] if isinstance(objectives, int) else list(objectives)
-        made = super().__new__(cls, _native.Problem.of_own(variables, [(name, "-") for name in listed]))
-        given = zip(("names", "units", "whole"), columns, strict=True)
-        made.arguments = {"bounds": pairs, "objectives": listed, **dict(given)}
-        return made
+        return super().__new__(cls, _native.Problem.of_own(variables, [(name, "-") for name in listed]))

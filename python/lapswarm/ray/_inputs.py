@@ -11,7 +11,7 @@ from typing import Any
 
 from .. import _native
 from ..errors import FileError, InputError
-from ..problems import _Made
+from ..problems import Made
 
 _QUOTED = re.compile(rb"[\"']([^\"'\n]+)[\"']")
 
@@ -90,12 +90,13 @@ class Recipe:
     """A problem as it travels: what it is made of, with all files that it reads."""
 
     def __init__(self, problem: _native.Problem) -> None:
-        if not isinstance(problem, _Made):
+        if not isinstance(problem, Made):
             message = "problem: found one that was made by hand, expected ReplayProblem or another of lapswarm's classes"
             raise InputError(message, file="problem")
         inputs = Inputs()
         self.kind = type(problem)
-        self.arguments: dict[str, Any] = inputs.packed(problem.arguments)
+        self.given: list[Any] = inputs.packed(problem.given)
+        self.settings: dict[str, Any] = inputs.packed(problem.settings)
         self.files = inputs.files
         self.version = _native.__version__
 
@@ -103,4 +104,5 @@ class Recipe:
         """The problem, made again here."""
         with tempfile.TemporaryDirectory(prefix="lapswarm-") as folder:
             write_files(self.files, Path(folder))
-            return self.kind(**_unpacked(self.arguments, Path(folder)))
+            here = Path(folder)
+            return self.kind(*_unpacked(self.given, here), **_unpacked(self.settings, here))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import pickle
 from collections.abc import Callable
 from dataclasses import dataclass
 from os import PathLike
@@ -180,8 +179,12 @@ def _seed(seed: int, island: int) -> int:
 
 def _sum_of(problem: _native.Problem, pool: Pool) -> str:
     """A sum over what a problem is made of, and over the files that it reads."""
-    made = (pool.recipe.arguments, pool.recipe.files, problem.names, problem.objectives, problem.bounds.tolist())
-    return hashlib.sha256(pickle.dumps(made, protocol=4)).hexdigest()
+    recipe = pool.recipe
+    told = (recipe.kind.__name__, recipe.given, recipe.settings, problem.names, problem.objectives, problem.bounds.tolist())
+    added = hashlib.sha256(repr(told).encode())
+    for name, content in sorted(recipe.files.items()):
+        added.update(f"{name} {len(content)} ".encode() + content)
+    return added.hexdigest()
 
 
 def _name(epoch: int) -> str:
