@@ -118,21 +118,20 @@ def sweep(
         lost: list[str] = []
         if left:
             _cluster.join()
-            done = _done(left, inputs, num_cpus, num_gpus, retries, lost)
-            for count, (run, files) in enumerate(done, planned - len(left) + 1):
-                row = json.loads(files["row"]) | {"run": run}
-                # The row comes last: with it, the run is done.
-                for ending in ("toml", "json"):
-                    if ending in files:
-                        write_whole(folder / f"studies/{run:05}.{ending}", files[ending])
-                write_whole(folder / f"rows/{run:05}.json", json.dumps(row, indent=2, ensure_ascii=False).encode())
-                rows[run] = row
-                _cluster.tell(f"row {count} of {planned}")
-                said = None if callback is None else callback({"done": count, "planned": planned, "row": row})
-                if said is not None and not said:
-                    break
+            with contextlib.closing(_done(left, inputs, num_cpus, num_gpus, retries, lost)) as done:
+                for count, (run, files) in enumerate(done, planned - len(left) + 1):
+                    row = json.loads(files["row"]) | {"run": run}
+                    # The row comes last: with it, the run is done.
+                    for ending in ("toml", "json"):
+                        if ending in files:
+                            write_whole(folder / f"studies/{run:05}.{ending}", files[ending])
+                    write_whole(folder / f"rows/{run:05}.json", json.dumps(row, indent=2, ensure_ascii=False).encode())
+                    rows[run] = row
+                    _cluster.tell(f"row {count} of {planned}")
+                    said = None if callback is None else callback({"done": count, "planned": planned, "row": row})
+                    if said is not None and not said:
+                        break
             _cluster.told()
-            done.close()
     _program(["sweep", "sweep.toml", "--out", ".", "--gather", "--quiet", "--json"], folder, unless=folder / "summary.json")
     if lost:
         raise StudyError(f"{len(lost)} rows were lost with their workers, resume=True tries them again; {lost[0]}")
@@ -207,6 +206,9 @@ def _alone(folder: Path) -> Iterator[None]:
         except BlockingIOError:
             message = f"{folder}: another process works in it"
             raise FileError(message, file=str(folder)) from None
+        except OSError:
+            # A file system without locks.
+            pass
         try:
             yield
         finally:
