@@ -183,17 +183,20 @@ def test_what_is_wrong_is_said_before_anything_is_written(machines: Machines, tm
     with pytest.raises(lapswarm.FileError, match="none.csv"):
         lapswarm.ray.sweep("identify", GRID, out=out, **(SMALL | {"log": Path("none.csv")}))
     assert list(tmp_path.iterdir()) == []
-    (out).mkdir()
+    with pytest.raises(lapswarm.DeviceError, match="no node has 1 CPUs and 1 GPUs"):
+        lapswarm.ray.sweep("identify", GRID, out=out, num_gpus=1, **SMALL)
+    assert list(tmp_path.iterdir()) == []
+    out.mkdir()
     (out / "mine.txt").write_text("mine")
     with pytest.raises(lapswarm.InputError, match="other files"):
         lapswarm.ray.sweep("identify", GRID, out=out, **SMALL)
     assert [path.name for path in out.iterdir()] == ["mine.txt"]
 
 
-def test_a_node_of_another_version_is_named_before_any_row(machines: Machines, tmp_path: Path) -> None:
+def test_a_node_of_another_version_is_named_before_anything_is_written(machines: Machines, tmp_path: Path) -> None:
     (tmp_path / "lapswarm").mkdir()
     (tmp_path / "lapswarm/__init__.py").write_text("__version__ = '0.0.7'\n")
     machines.add(env_vars={"PYTHONPATH": str(tmp_path)})
     with pytest.raises(lapswarm.InputError, match=r"0\.0\.7"):
         lapswarm.ray.sweep("identify", GRID, out=tmp_path / "sweep", **SMALL)
-    assert not list((tmp_path / "sweep").glob("rows/*"))
+    assert not (tmp_path / "sweep").exists()

@@ -107,6 +107,8 @@ def sweep(
     axes = {_key(name, key): [_value(v) for v in inputs.packed(list(values))] for key, values in grid.items()}
     axes = dict(sorted(axes.items(), key=lambda axis: (axis[0] == "seed", axis[0])))
     folder = Path(fspath(out)).absolute()
+    _cluster.join()
+    _check_cluster(num_cpus, num_gpus)
     text = _text(name, shared, axes)
     _begin(folder, text, inputs, resume)
     with _alone(folder):
@@ -117,7 +119,6 @@ def sweep(
         planned = len(rows) + len(left)
         lost: list[str] = []
         if left:
-            _cluster.join()
             with contextlib.closing(_done(left, inputs, num_cpus, num_gpus, retries, lost)) as done:
                 for count, (run, files) in enumerate(done, planned - len(left) + 1):
                     row = json.loads(files["row"]) | {"run": run}
@@ -143,6 +144,15 @@ def sweep(
 def _text(name: str, shared: str, axes: Mapping[str, list[str]]) -> str:
     grid = "".join(f"{json.dumps(key)} = [{', '.join(values)}]\n" for key, values in axes.items())
     return f"study = {json.dumps(name)}\n\n[base]\n{shared}\n[grid]\n{grid}"
+
+
+def _check_cluster(num_cpus: float, num_gpus: float) -> None:
+    """Refuses a cluster whose nodes have other versions, or no room for a row."""
+    nodes = _cluster.nodes(strict=True)
+    sizes = [node["Resources"] for node in nodes]
+    if not any(size.get("CPU", 0) >= num_cpus and size.get("GPU", 0) >= num_gpus for size in sizes):
+        message = f"the cluster: no node has {num_cpus:g} CPUs and {num_gpus:g} GPUs, which a row needs"
+        raise DeviceError(message, file="the cluster")
 
 
 def _begin(folder: Path, text: str, inputs: Inputs, resume: bool) -> None:
@@ -219,11 +229,6 @@ def _done(
     left: list[tuple[int, str]], inputs: Inputs, num_cpus: float, num_gpus: float, retries: int, lost: list[str]
 ) -> Generator[tuple[int, dict[str, bytes]], None, None]:
     """The files of rows as they are done; those that could not be are added to ``lost``."""
-    nodes = _cluster.nodes(strict=True)
-    sizes = [node["Resources"] for node in nodes]
-    if not any(size.get("CPU", 0) >= num_cpus and size.get("GPU", 0) >= num_gpus for size in sizes):
-        message = f"the cluster: no node has {num_cpus:g} CPUs and {num_gpus:g} GPUs, which a row needs"
-        raise DeviceError(message, file="the cluster")
     task = ray.remote(_row).options(
         num_cpus=num_cpus,
         num_gpus=num_gpus,
