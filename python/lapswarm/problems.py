@@ -22,7 +22,21 @@ def _of_study(kind: str, study: str, settings: Mapping[str, Any], control_points
         return _native.Problem.of_study(kind, as_text(study, files), control_points)
 
 
-class ReplayProblem(_native.Problem):
+def _again(kind: type[Made], given: Sequence[Any], settings: Mapping[str, Any]) -> Made:
+    return kind(*given, **settings)
+
+
+class Made(_native.Problem):
+    """A problem that knows what it was made of: pickled, it is made again where it arrives."""
+
+    def __init__(self, *given: Any, **settings: Any) -> None:
+        self.given, self.settings = given, settings
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _again, (type(self), self.given, self.settings)
+
+
+class ReplayProblem(Made):
     """Which car did what was logged: free parameters of a car, and how far it is from the log.
 
     car: a bundled name (``gt``, ``gt_hybrid``), a TOML file, a ``Car``, or a dict as such a file has it. log: a CSV or MoTeC file,
@@ -52,7 +66,7 @@ class ReplayProblem(_native.Problem):
         return super().__new__(cls, _of_study("replay", "identify", settings))
 
 
-class LineProblem(_native.Problem):
+class LineProblem(Made):
     """Lines round a circuit: the share of the usable width from the right, from 0 to 1, at every cross-section or at
     ``control_points`` of a spline.
 
@@ -82,7 +96,7 @@ class LineProblem(_native.Problem):
         return super().__new__(cls, _of_study("line", "raceline", settings, control_points))
 
 
-class EnergyProblem(_native.Problem):
+class EnergyProblem(Made):
     """Where a hybrid's energy goes on a lap: the share of each zone, from 0 to 1, in which the motor works.
 
     objectives: of ``lap_time_s`` (s), ``fuel_l`` (l), ``energy_used_mj`` (MJ), ``soc_swing``. settings: others of ``hybrid``,
@@ -101,7 +115,7 @@ class EnergyProblem(_native.Problem):
         return super().__new__(cls, _of_study("energy", "hybrid", settings))
 
 
-class DriveProblem(_native.Problem):
+class DriveProblem(Made):
     """Set-ups of a car driven round lines by a driver: its lap time (s), how far it leaves the road (m), how much it steers.
 
     line: one or more files or frames with columns ``x_m`` and ``y_m``. parameters: those that set-ups move, each by ``share`` of its
@@ -122,7 +136,7 @@ class DriveProblem(_native.Problem):
         return super().__new__(cls, _of_study("drive", "transient", settings))
 
 
-class SteadyProblem(_native.Problem):
+class SteadyProblem(Made):
     """Cars in steady-state cornering. Variables are the free parameters, then ``speed_mps`` and ``steer_rad``.
 
     free: parameters with their bounds. objectives: of ``minus_ay_mps2``, ``sideslip_rad``, ``yaw_rate_radps``, ``roll_rad``,
@@ -151,7 +165,7 @@ class SteadyProblem(_native.Problem):
         return super().__new__(cls, made)
 
 
-class OwnProblem(_native.Problem):
+class OwnProblem(Made):
     """Variables and objectives of your own, for optimisers.
 
     bounds: the least and the greatest value of each variable, of shape (d, 2). objectives: how many, or their names.
