@@ -70,7 +70,7 @@ class Sweep:
 
 
 def sweep(
-    study: str | Study,
+    study: str | Study[Any],
     grid: Mapping[str, Sequence[Any]],
     *,
     out: str | PathLike[str],
