@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# Builds the wheel, installs it into a clean virtual environment, and runs the tests, the examples and the type checks there.
-# Needs Python 3.11 or later with venv, and a package index. WHEEL names a wheel that is built already.
+# Builds the wheel, installs it into a clean virtual environment, and runs the tests, the docstrings, the examples and the type
+# checks there. Needs Python 3.11 or later with venv, and a package index. WHEEL names a wheel that is built already.
+# `test.sh ray` tests lapswarm.ray alone, on a cluster of several nodes on this machine.
 set -euo pipefail
 cd "$(dirname "$0")"
 folder=$(mktemp -d)
@@ -8,7 +9,11 @@ trap 'rm -rf "$folder"' EXIT
 python3 -m venv "$folder/venv"
 python=$folder/venv/bin/python
 "$python" -m pip install --quiet --disable-pip-version-check \
-    maturin==1.16.0 mypy==2.4.1 numpy==2.4.6 pymoo==0.6.2 pytest==9.2.0
+    maturin==1.16.0 mypy==2.4.1 numpy==2.4.6 optuna==5.0.0 pandas==3.1.1 polars==2.1.0 pyarrow==26.0.1 pymoo==0.6.2 \
+    pytest==9.2.0
+if [ "${1:-}" = ray ]; then
+    "$python" -m pip install --quiet --disable-pip-version-check fsspec==2026.9.0 ray==2.60.0
+fi
 wheel=${WHEEL:-}
 if [ -z "$wheel" ]; then
     "$folder/venv/bin/maturin" build --release --locked --out "$folder/dist"
@@ -16,13 +21,20 @@ if [ -z "$wheel" ]; then
 fi
 "$python" -m pip install --quiet --disable-pip-version-check --no-deps "$wheel"
 # What is tested is the wheel: the folder beside has no native half, and would hide it.
-cp -r tests examples pyproject.toml "$folder"
+cp -r tests tests_ray benches examples pyproject.toml "$folder"
 cd "$folder"
+if [ "${1:-}" = ray ]; then
+    "$python" -m pytest -q -p no:cacheprovider tests_ray
+    "$python" -m mypy --strict -p lapswarm
+    "$python" -m mypy --strict benches
+    exit
+fi
 "$python" -m pytest -q -p no:cacheprovider tests
+"$python" -m pytest -q -p no:cacheprovider --doctest-modules --ignore-glob='*/lapswarm/ray/*' --pyargs lapswarm
 for example in examples/*.py; do
     echo "== $example"
     "$python" "$example"
 done
 "$folder/venv/bin/lapswarm" --version
 "$python" -m mypy --strict -p lapswarm
-"$python" -m mypy --strict examples
+"$python" -m mypy --strict examples benches/evaluate.py

@@ -4,6 +4,8 @@ Problems name bounded variables and objectives, evaluators score whole populatio
 optimisers are asked for candidates and told what they are worth. Studies are what the command line runs.
 """
 
+from . import figures
+from ._frames import Car
 from ._minimise import Minimum, minimise
 from ._native import (
     MULTI_OBJECTIVE,
@@ -32,6 +34,7 @@ from .studies import (
 __all__ = [
     "MULTI_OBJECTIVE",
     "SINGLE_OBJECTIVE",
+    "Car",
     "DeviceError",
     "DriveProblem",
     "EnergyProblem",
@@ -54,6 +57,7 @@ __all__ = [
     "StudyError",
     "__version__",
     "envelope",
+    "figures",
     "hybrid",
     "identify",
     "minimise",

@@ -72,6 +72,10 @@ def minimise(
     evaluations: at the most; 100,000 for one objective and 25,000 for several. stagnation: evaluations that may gain no more
     than a share. reference: the point up to which the hypervolume is told. callback: is told of each generation, and stops the
     run when it returns something false that is not None. An interrupt stops the run too, with what was reached.
+
+    >>> found = minimise([(-2, 3)] * 4, lambda X: (X**2).sum(axis=1), evaluations=8_000)
+    >>> found.stopped, found.x.shape, found.f < 1e-6
+    ('evaluations', (4,), True)
     """
     problem = bounds if isinstance(bounds, _native.Problem) else OwnProblem(bounds, objectives)
     asked = {

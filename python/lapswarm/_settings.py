@@ -10,6 +10,8 @@ from typing import Any
 
 from . import _native
 
+# Settings that are lists, of which one alone may be given.
+LISTS = {("transient", "line")}
 STUDIES: dict[str, _native.StudyInfo] = {study["name"]: study for study in _native.studies()}
 
 
@@ -46,4 +48,15 @@ def _key(study: str, name: str) -> str:
 
 def as_text(study: str, settings: Mapping[str, Any]) -> str:
     """The study file that says the same; None stands for the default."""
-    return "".join(f"{_key(study, name)} = {_value(value)}\n" for name, value in settings.items() if value is not None)
+    lines = []
+    for name, value in settings.items():
+        if (study, name) in LISTS and isinstance(value, (str, os.PathLike)):
+            value = [value]
+        if value is not None:
+            lines.append(f"{_key(study, name)} = {_value(value)}\n")
+    return "".join(lines)
+
+
+def as_toml(table: Mapping[str, Any]) -> str:
+    """A table as the text of a TOML file."""
+    return "".join(f"{json.dumps(name)} = {_value(value)}\n" for name, value in table.items() if value is not None)

@@ -9,29 +9,60 @@ import webbrowser
 from collections.abc import Callable
 from os import PathLike, fspath
 from pathlib import Path
-from typing import Any
+from typing import Any, Generic, TypeVar
 
-from . import _native
+from . import _native, figures
+from ._frames import Given, frame_of, in_passing, read_table
 from ._native import USUAL_MIB
 from ._settings import STUDIES, as_text
+from .errors import InputError
+
+F = TypeVar("F")
 
 
-class Result:
+class Result(Generic[F]):
     """What a study came to.
 
-    summary: its figures, as ``--json`` prints them. folder: where its files are. text: the figures in words. warnings: what
-    must be told whatever is shown. interrupted: whether it was stopped before its end; ``resume=True`` continues it.
-    verdict: what it did not reach of what it was asked to reach, None if it did.
+    figures: typed, as ``found.figures.parameters[0].value``. summary: the same as ``--json`` prints them, a dict. folder: where
+    its files are. tables: names of those that ``frame`` reads. text: the figures in words. warnings: what must be told whatever
+    is shown. interrupted: whether it was stopped before its end; ``resume=True`` continues it. verdict: what it did not reach
+    of what it was asked to reach, None if it did.
+
+    >>> import tempfile
+    >>> folder = tempfile.TemporaryDirectory()
+    >>> found = surface(out=folder.name + "/run", section="Abbey", grid=3, backend="simd")
+    >>> found.figures.study, len(found.figures.base), found.interrupted
+    ('surface', 2, False)
+    >>> {len(column) for column in found.frame(found.tables[0], "numpy").values()}
+    {9}
+    >>> folder.cleanup()
     """
 
-    def __init__(self, study: str, answer: dict[str, Any]) -> None:
+    def __init__(self, study: str, kind: Any, answer: dict[str, Any]) -> None:
         self.study = study
         self.summary: dict[str, Any] = json.loads(answer["json"])
+        self.figures: F = figures.typed(kind, self.summary)
         self.folder = Path(answer["folder"])
         self.text: str = answer["text"]
         self.warnings: list[str] = answer["warnings"]
         self.interrupted: bool = answer["interrupted"]
         self.verdict: str | None = answer["verdict"]
+
+    @property
+    def tables(self) -> list[str]:
+        """Names of the tables in the run folder, ``stage/name`` for those of a stage."""
+        found = self.folder.rglob("*.csv")
+        return sorted(path.relative_to(self.folder).with_suffix("").as_posix() for path in found)
+
+    def frame(self, name: str, kind: str | None = None) -> Any:
+        """A table of the run folder as a frame: numbers, not a number where a cell is empty, or texts.
+
+        kind: ``pandas``, ``polars`` or ``numpy`` (a dict of arrays of shape (n,)); without it the first that is installed.
+        """
+        if name not in self.tables:
+            expected = ", ".join(self.tables)
+            raise InputError(f"{self.folder}: table: found {name}, expected one of {expected}", str(self.folder), field=name)
+        return frame_of(read_table(self.folder / f"{name}.csv"), kind)
 
     def report(self, open_it: bool = True) -> Path:
         """The page with all tables and pictures; it is opened in a browser unless ``open_it`` is false."""
@@ -51,11 +82,12 @@ class Result:
         return f"<table>{rows}</table>{picture}"
 
 
-class Study:
+class Study(Generic[F]):
     """A study: called, it runs. ``settings`` are the declarations of what it may be given."""
 
-    def __init__(self, name: str) -> None:
+    def __init__(self, name: str, kind: Any) -> None:
         info = STUDIES[name]
+        self.kind = kind
         self.name = self.__name__ = name
         self.settings = info["settings"]
         self.__doc__ = info["about"] + "\n\n" + "".join(map(_line, self.settings))
@@ -75,12 +107,16 @@ class Study:
         memory_limit_mib: int = USUAL_MIB,
         callback: Callable[[dict[str, Any]], object] | None = None,
         **settings: Any,
-    ) -> Result:
+    ) -> Result[F]:
         """Runs the study.
 
         out: the run folder, else the next ``runs/STUDY-NNN``. resume: continues the interrupted run in ``out``. callback: is
         told of the progress (``stage``, ``done``, ``planned``, ``reached``), and stops the study when it returns something
         false that is not None. An interrupt stops the study too; what it has reached is saved and returned.
+
+        log, track, line and envelope may be frames (pandas, polars, pyarrow, anything of Arrow's C interface) or dicts of arrays
+        of shape (n,), with the columns of the files; car may be a ``Car`` or a dict as its TOML file has it. They are kept
+        beside the run folder, in ``frames``, for as long as the run may be resumed or checked.
         """
         asked = {
             "out": None if out is None else fspath(out),
@@ -90,7 +126,10 @@ class Study:
             "memory_limit_mib": memory_limit_mib,
             "dry_run": False,
         }
-        return Result(self.name, _native.run_study(self.name, as_text(self.name, settings), asked, callback))
+        given = Given((Path("runs") if out is None else Path(out).absolute().parent) / "frames")
+        with given.named():
+            text = as_text(self.name, given.put(settings))
+            return Result(self.name, self.kind, _native.run_study(self.name, text, asked, callback))
 
     def plan(self, **settings: Any) -> str:
         """Reads and checks all that is needed and says what would be done. Nothing is written."""
@@ -102,7 +141,8 @@ class Study:
             "memory_limit_mib": USUAL_MIB,
             "dry_run": True,
         }
-        said: str = _native.run_study(self.name, as_text(self.name, settings), asked, None)["plan"]
+        with in_passing(settings) as files:
+            said: str = _native.run_study(self.name, as_text(self.name, files), asked, None)["plan"]
         return said
 
     def __repr__(self) -> str:
@@ -116,11 +156,13 @@ def _line(setting: _native.Setting) -> str:
     return f"{setting['key']}: {setting['meaning']}{told}.{usual}\n"
 
 
-run = Study("run")
-identify = Study("identify")
-envelope = Study("envelope")
-raceline = Study("raceline")
-hybrid = Study("hybrid")
-transient = Study("transient")
-sensitivity = Study("sensitivity")
-surface = Study("surface")
+run: Study[figures.RunFigures] = Study("run", figures.RunFigures)
+identify: Study[figures.Identified] = Study("identify", figures.Identified)
+envelope: Study[figures.Enveloped] = Study("envelope", figures.Enveloped)
+raceline: Study[figures.Lines] = Study("raceline", figures.Lines)
+hybrid: Study[figures.Energy] = Study("hybrid", figures.Energy)
+transient: Study[figures.DrivenLine | figures.DrivenSetUps] = Study(
+    "transient", figures.DrivenLine | figures.DrivenSetUps
+)
+sensitivity: Study[figures.Sensitivities] = Study("sensitivity", figures.Sensitivities)
+surface: Study[figures.SurfaceFigures] = Study("surface", figures.SurfaceFigures)

@@ -7,11 +7,13 @@ use lapswarm::config::kinds::Choice;
 use lapswarm::evaluate::{self, BackendChoice, BackendInfo, Failure};
 use lapswarm::{Error, Result};
 use numpy::{PyArray2, PyArrayMethods, PyUntypedArrayMethods};
+use pyo3::exceptions::PyRuntimeWarning;
 use pyo3::prelude::*;
 use std::collections::BTreeMap;
+use std::ffi::CString;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// Time between two looks for an interrupt.
 pub const LOOK: Duration = Duration::from_millis(50);
@@ -44,8 +46,8 @@ impl Rows {
     }
 }
 
-/// What a thread answers: the evaluation, and what did the work.
-type Reply = Result<(evaluate::Evaluation, BackendInfo, Vec<String>)>;
+/// What a thread answers: the evaluation, the time that it took (s), and what did the work.
+type Reply = Result<(evaluate::Evaluation, f64, BackendInfo, Vec<String>)>;
 
 /// A population to evaluate, and where the answer goes.
 type Task = (Rows, Sender<Reply>);
@@ -91,10 +93,24 @@ fn work(
     let _ = opened.send(Ok(evaluator.backend()));
     while let Ok((rows, reply)) = tasks.recv() {
         // SAFETY: the owner waits for the answer, and keeps the rows until then.
+        let began = Instant::now();
         let found = evaluator.evaluate(unsafe { rows.get() });
-        let answer = found.map(|found| (found, evaluator.backend(), evaluator.device_faults().to_vec()));
+        let elapsed_s = began.elapsed().as_secs_f64();
+        let answer = found.map(|found| {
+            let faults = evaluator.device_faults().to_vec();
+            (found, elapsed_s, evaluator.backend(), faults)
+        });
         let _ = reply.send(answer);
     }
+}
+
+/// Where the first number is that is not finite. Whole blocks are looked at first: they take many numbers at once.
+fn first_not_finite(rows: &[f64]) -> Option<usize> {
+    const BLOCK: usize = 512;
+    let all_are = |block: &[f64]| block.iter().fold(true, |all, x| all & x.is_finite());
+    let block = BLOCK * rows.chunks(BLOCK).position(|block| !all_are(block))?;
+    let within = rows[block..].iter().position(|x| !x.is_finite())?;
+    Some(block + within)
 }
 
 fn gone() -> Error {
@@ -117,6 +133,14 @@ impl Evaluator {
         let info = wait(py, &mut opened)?
             .ok_or_else(|| exception(py, &gone()))?
             .or_raise(py)?;
+        if choice == BackendChoice::Auto && info.backend != "gpu" {
+            let said = format!(
+                "no GPU with a driver of its own was found; the processor evaluates ({}, {}), which backend=\"{}\" asks for outright",
+                info.backend, info.device, info.backend
+            );
+            let said = CString::new(said)?;
+            PyErr::warn(py, &py.get_type::<PyRuntimeWarning>(), &said, 1)?;
+        }
         Ok(Self {
             problem,
             tasks: Mutex::new(tasks),
@@ -134,13 +158,13 @@ impl Evaluator {
         let population = table(X, "X")?;
         check_width(&population, "X", dimensions, "variable")?;
         let rows = population.as_slice()?;
-        if let Some(at) = rows.iter().position(|x| !x.is_finite()) {
+        if let Some(at) = first_not_finite(rows) {
             let found = format!("{} in row {} (from 0)", rows[at], at / dimensions);
             let name = &problem.variables[at % dimensions].name;
             return Err(refused(py, "X", name, found, "finite numbers"));
         }
         if population.shape()[0] == 0 {
-            return Evaluation::new(py, evaluate::Evaluation::default(), width);
+            return Evaluation::new(py, evaluate::Evaluation::default(), width, 0.0);
         }
         let (reply, mut answers) = channel();
         let tasks = self.tasks.lock().unwrap_or_else(PoisonError::into_inner);
@@ -149,9 +173,9 @@ impl Evaluator {
         sent.map_err(|_| exception(py, &gone()))?;
         // The rows stay borrowed until the answer is there or the thread has ended.
         let answer = wait(py, &mut answers)?.ok_or_else(|| exception(py, &gone()))?;
-        let (found, info, faults) = answer.or_raise(py)?;
+        let (found, elapsed_s, info, faults) = answer.or_raise(py)?;
         *self.backend.lock().unwrap_or_else(PoisonError::into_inner) = (info, faults);
-        Evaluation::new(py, found, width)
+        Evaluation::new(py, found, width, elapsed_s)
     }
 
     /// The problem.
@@ -201,13 +225,17 @@ impl Evaluator {
 pub struct Evaluation {
     objectives: Py<PyArray2<f64>>,
     pub failures: Vec<Option<Failure>>,
+    /// Time that the evaluation itself took, without the way there and back (s).
+    #[pyo3(get)]
+    elapsed_s: f64,
 }
 
 impl Evaluation {
-    fn new(py: Python<'_>, found: evaluate::Evaluation, width: usize) -> PyResult<Self> {
+    fn new(py: Python<'_>, found: evaluate::Evaluation, width: usize, elapsed_s: f64) -> PyResult<Self> {
         Ok(Self {
             objectives: array(py, found.objectives, width)?.unbind(),
             failures: found.failures,
+            elapsed_s,
         })
     }
 

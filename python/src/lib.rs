@@ -1,6 +1,7 @@
 //! lapswarm for Python: the native half of the package `lapswarm`.
 
 mod arrays;
+mod arrow;
 mod errors;
 mod evaluator;
 mod minimise;
@@ -28,6 +29,8 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<evaluator::Evaluator>()?;
     module.add_class::<evaluator::Evaluation>()?;
     module.add_class::<optimiser::Optimiser>()?;
+    module.add_function(wrap_pyfunction!(arrow::arrow_columns, module)?)?;
+    module.add_function(wrap_pyfunction!(problem::car_files, module)?)?;
     module.add_function(wrap_pyfunction!(command_line, module)?)?;
     module.add_function(wrap_pyfunction!(minimise::minimise, module)?)?;
     module.add_function(wrap_pyfunction!(optimiser::optimiser_from_bytes, module)?)?;

@@ -5,7 +5,7 @@ use crate::errors::{OrRaise, exception, refused};
 use crate::evaluator::Evaluation;
 use crate::problem::Problem;
 use lapswarm::evaluate::{self, Failure};
-use lapswarm::swarm::{self, Sizes, by_name, checkpoint};
+use lapswarm::swarm::{self, Migration, Sizes, by_name, checkpoint, islands_by_name};
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
@@ -15,6 +15,11 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 type Boxed = Box<dyn swarm::Optimiser + Send>;
 
 /// An optimiser that is asked for candidates and told what they are worth.
+///
+/// name: one of ``SINGLE_OBJECTIVE`` or ``MULTI_OBJECTIVE``. population: candidates of a generation; iterations: generations.
+/// archive: the most that are kept for several objectives. islands: so many swarms side by side, each of that population, asked
+/// together, with seeds from ``seed`` on; of ``pso``, ``thesis`` and ``difference`` for one objective, of the swarms for several.
+/// Every ``migrate_every`` iterations up to ``migrants`` solutions of each go to the next; without it none ever does.
 #[pyclass(frozen, module = "lapswarm._native")]
 pub struct Optimiser {
     inner: Mutex<Boxed>,
@@ -62,7 +67,9 @@ fn told(
 #[pymethods]
 impl Optimiser {
     #[new]
-    #[pyo3(signature = (problem, name="default", *, population=100, iterations=250, archive=100, seed=1))]
+    #[pyo3(signature = (problem, name="default", *, population=100, iterations=250, archive=100, seed=1, islands=None,
+        migrate_every=None, migrants=2))]
+    #[allow(clippy::too_many_arguments)]
     fn new(
         py: Python<'_>,
         problem: PyRef<'_, Problem>,
@@ -71,6 +78,9 @@ impl Optimiser {
         iterations: usize,
         archive: usize,
         seed: u64,
+        islands: Option<usize>,
+        migrate_every: Option<usize>,
+        migrants: usize,
     ) -> PyResult<Self> {
         let problem = problem.kind.problem();
         let sizes = Sizes {
@@ -79,8 +89,16 @@ impl Optimiser {
             archive,
             seed,
         };
+        let migration = migrate_every.map(|every| Migration {
+            every,
+            count: migrants,
+        });
+        let inner = match islands {
+            Some(count) => islands_by_name(name, problem, sizes, (count, migration)),
+            None => by_name(name, problem, sizes),
+        };
         Ok(Self {
-            inner: Mutex::new(by_name(name, problem, sizes).or_raise(py)?),
+            inner: Mutex::new(inner.or_raise(py)?),
             dimensions: problem.variables.len(),
             width: problem.objectives.len(),
         })

@@ -19,6 +19,7 @@ use lapswarm::vehicle::Car;
 use lapswarm::{Error, Result};
 use numpy::PyArray2;
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::Arc;
@@ -27,7 +28,7 @@ use std::sync::Arc;
 pub enum Kind {
     Replay(ReplayProblem),
     Line(LineProblem),
-    Energy(HybridProblem),
+    Energy(Box<HybridProblem>),
     Drive(DriveProblem),
     Steady(SteadyProblem),
     /// Variables and objectives of one's own, which nothing here evaluates.
@@ -57,7 +58,7 @@ impl Kind {
         match self {
             Self::Replay(kind) => open_evaluator(kind, choice, adapter),
             Self::Line(kind) => open_line_evaluator(kind, choice, adapter),
-            Self::Energy(kind) => open_hybrid_evaluator(kind, choice, adapter),
+            Self::Energy(kind) => open_hybrid_evaluator(kind.as_ref(), choice, adapter),
             Self::Drive(kind) => open_drive_evaluator(kind, choice, adapter),
             Self::Steady(kind) => open_steady_evaluator(kind, choice, adapter),
             Self::Own(_) => Err(Error::input(
@@ -91,11 +92,8 @@ fn energy(text: &str) -> Result<Kind> {
     let settings: HybridStudySettings = settings("EnergyProblem", text)?;
     let setup = hybrid::set_up(&settings)?;
     let energy_mj = setup.budget_j(settings.energy_mj) / 1e6;
-    Ok(Kind::Energy(setup.zone_problem(
-        &[],
-        energy_mj,
-        &settings.objectives,
-    )?))
+    let problem = setup.zone_problem(&[], energy_mj, &settings.objectives)?;
+    Ok(Kind::Energy(Box::new(problem)))
 }
 
 fn drive(text: &str) -> Result<Kind> {
@@ -256,6 +254,20 @@ impl Problem {
         self.each_objective(|o| o.unit.clone())
     }
 
+    /// The variables as a frame: `name`, `unit`, `lower`, `upper`, `whole`. kind: `pandas`, `polars` or `numpy` (a dict of arrays);
+    /// without it the first of these that is installed.
+    #[pyo3(signature = (kind=None))]
+    fn frame<'py>(&self, py: Python<'py>, kind: Option<&str>) -> PyResult<Bound<'py, PyAny>> {
+        let columns = PyDict::new(py);
+        columns.set_item("name", self.names())?;
+        columns.set_item("unit", self.units())?;
+        columns.set_item("lower", self.each(|v| v.lower))?;
+        columns.set_item("upper", self.each(|v| v.upper))?;
+        columns.set_item("whole", self.whole())?;
+        let frames = py.import("lapswarm._frames")?;
+        frames.call_method1("frame_of", (columns, kind))
+    }
+
     fn __repr__(&self) -> String {
         let problem = self.kind.problem();
         format!(
@@ -264,4 +276,20 @@ impl Problem {
             problem.objectives.len()
         )
     }
+}
+
+/// The files of a bundled or written car with other values of its parameters: names and texts, the car itself last.
+#[pyfunction]
+pub fn car_files(py: Python<'_>, base: &str, values: Vec<(String, f64)>) -> PyResult<Vec<(String, String)>> {
+    let made = || -> Result<_> {
+        let car = Car::load(base)?;
+        let mut flat = car.to_flat();
+        for (name, value) in values {
+            for slot in car.known_parameter("Car", "parameters", &name)?.slots {
+                flat[slot] = value;
+            }
+        }
+        Ok(car.with_flat(&flat).files("car"))
+    };
+    made().or_raise(py)
 }

@@ -135,6 +135,10 @@ def test_what_is_wrong_with_an_array_is_said(line: lapswarm.LineProblem) -> None
     with pytest.raises(lapswarm.InputError, match=r"X: .*NaN in row 1 .*finite") as raised:
         evaluator.evaluate(bad)
     assert raised.value.file == "X" and raised.value.field == line.names[2]
+    many = drawn(line, 40)
+    many[30, 7] = many[31, 0] = np.inf
+    with pytest.raises(lapswarm.InputError, match="inf in row 30 "):
+        evaluator.evaluate(many)
     with pytest.raises(lapswarm.InputError, match="59 columns, expected 60"):
         evaluator.evaluate(rows[:, :-1])
     with pytest.raises(lapswarm.InputError, match=r"shape \(60,\)"):

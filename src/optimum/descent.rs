@@ -43,8 +43,9 @@ pub struct Start {
     pub weights: Weights,
 }
 
-/// Relative accuracy of a program.
+/// Relative accuracy of a program at the least, and as a share of the gain that ends the sequence.
 const PROGRAM_TOLERANCE: f64 = 1e-8;
+const TOLERANCE_OF_GAIN: f64 = 0.01;
 /// Share of the predicted gain below which a step is rejected.
 const LEAST_KEPT: f64 = 0.1;
 /// Share of the predicted gain above which the penalty on the next step is reduced.
@@ -93,7 +94,7 @@ pub fn descend(
     let weights = &start.weights;
     let mut here = Place::of(problem, weights, bounds.inside(&start.x)?);
     let (mut iterations, mut programs, mut caution) = (0, 0, settings.caution);
-    let mut status = Status::Failed(format!("{} programs without an end", settings.programs));
+    let mut status = Status::Almost(format!("{} programs without an end", settings.programs));
     // Whether the next program says that the first-order conditions are met, and how many have been asked to.
     let (mut judging, mut judged) = (false, 0);
     if !here.cost.is_finite() {
@@ -110,7 +111,10 @@ pub fn descend(
             status = Status::Failed("interrupted".to_owned());
             break;
         }
-        let program = here.program(problem, bounds, weights, caution);
+        let tolerance = PROGRAM_TOLERANCE.max(TOLERANCE_OF_GAIN * settings.least_gain);
+        let program = here
+            .program(problem, bounds, weights, caution)
+            .with_tolerance(tolerance);
         let solution = program.solve()?;
         programs += 1;
         iterations += solution.iterations;
@@ -331,8 +335,7 @@ impl Place {
         let (map, shape, x) = (problem.map, &self.shape, &self.x);
         let lower = bounds.lower.iter().zip(x).map(|(l, x)| (l - x).min(0.0));
         let upper = bounds.upper.iter().zip(x).map(|(u, x)| (u - x).max(0.0));
-        let mut program =
-            ConicProgram::new(lower.collect(), upper.collect()).with_tolerance(PROGRAM_TOLERANCE);
+        let mut program = ConicProgram::new(lower.collect(), upper.collect());
         bounds.add_rows(&mut program, x);
         let smooth = Weights {
             time: 0.0,

@@ -88,13 +88,18 @@ const CLOSER: f64 = 0.75;
 const CROSS_SECTIONS_TO_SAY_CONTROL: f64 = 1.4;
 /// Times that a line is solved anew within narrower bounds where it leaves the road between its points, and the room (m) that the
 /// bounds leave there.
-const TIGHTENINGS: usize = 5;
+const TIGHTENINGS: usize = 6;
 const SPARE_M: f64 = 0.001;
+/// Most programs of a line taken about another, and of one that is solved anew within narrower bounds. More would gain less than
+/// a ten thousandth of a lap.
+const PROGRAMS_ABOUT: usize = 8;
+const PROGRAMS_TIGHTENED: usize = 4;
 /// Share of a lap by which stations of two lines of one road differ at the most.
 const NEARBY: f64 = 0.02;
-/// Share of a lap below which no cone program is worth its second: a hundredth of what lies between two cross-sections.
-const LEAST_GAIN_ABOUT: f64 = 1e-5;
-/// Times that the fastest line is taken anew about itself.
+/// Share of a lap below which no cone program is worth its time. Programs that promise less gain a fraction of it: the envelope's
+/// kinks between its rows are beyond their models.
+const LEAST_GAIN_ABOUT: f64 = 4e-5;
+/// Times that the fastest line is taken about another before it is taken closely about itself.
 const ABOUTS: usize = 2;
 
 /// With two, ripples are left between the cross-sections that their lap time does not feel and a fine spline does.
@@ -205,7 +210,7 @@ impl ReferenceSolvers {
         Some(solver)
     }
 
-    /// The fastest line, `alpha` at every cross-section: about the minimum-curvature line, then about itself while it gains by that.
+    /// The fastest line, `alpha` at every cross-section: about the minimum-curvature line, then ever more closely about itself.
     /// Where no cross-sections square to a line can be cut, as on open roads, across the road's own.
     fn fastest(&self) -> Result<Optimum> {
         if let Some(about) = self.about_itself(&self.base, ABOUTS)? {
@@ -248,61 +253,53 @@ impl ReferenceSolvers {
     /// # Errors
     /// [`crate::Error::Study`] if a solver refuses.
     pub fn fastest_about(&self, alpha: &[f64]) -> Result<Option<Optimum>> {
-        self.about_itself(alpha, 1)
+        self.about_itself(alpha, 0)
     }
 
-    /// The same, at first `abouts` times.
+    /// The same, at first `abouts` times with controls farther apart.
     fn about_itself(&self, alpha: &[f64], abouts: usize) -> Result<Option<Optimum>> {
         let Some(envelope) = &self.envelope else {
             return Ok(None);
         };
         let own_m = self.cross_sections.length_m / self.cross_sections.len() as f64;
-        let mut control_m = CLOSER * ABOUT.control_m();
-        let closely = CLOSELY_M.into_iter().filter_map(|spacing_m| {
+        let closest = CLOSELY_M.into_iter().fold(ABOUT, |closest, spacing_m| {
             let needed = (CROSS_SECTIONS_TO_SAY_CONTROL * own_m / spacing_m).ceil() as usize;
             let how = About {
                 spacing_m,
                 cross_sections_per_control: needed.max(CROSS_SECTIONS_PER_CONTROL),
             };
-            let closer = how.control_m() <= control_m;
-            if closer {
-                control_m = CLOSER * how.control_m();
+            if how.control_m() <= CLOSER * closest.control_m() {
+                how
+            } else {
+                closest
             }
-            closer.then_some(how)
         });
         let mut found: Option<Optimum> = None;
-        let mut closer = |how: &About| -> Result<bool> {
+        for turn in 0..=abouts {
             if self.stop.load(Ordering::Relaxed) {
-                return Ok(false);
-            }
-            let alpha = found.as_ref().map_or(alpha, |f| &f.x);
-            let Some(closer) = self.taken_about(envelope, alpha, how)? else {
-                return Ok(false);
-            };
-            let before_s = found.as_ref().map_or(0.0, |f| f.seconds);
-            found = Some(Optimum {
-                seconds: before_s + closer.seconds,
-                ..closer
-            });
-            Ok(true)
-        };
-        // The same again, from the same line, would come to the same.
-        for _ in 0..abouts {
-            if !closer(&ABOUT)? {
                 break;
             }
-        }
-        for how in closely {
-            closer(&how)?;
+            let kept = turn == abouts;
+            let how = if kept { &closest } else { &ABOUT };
+            let alpha = found.as_ref().map_or(alpha, |f| &f.x);
+            if let Some(closer) = self.taken_about(envelope, alpha, how, kept)? {
+                let before_s = found.as_ref().map_or(0.0, |f| f.seconds);
+                found = Some(Optimum {
+                    seconds: before_s + closer.seconds,
+                    ..closer
+                });
+            }
         }
         Ok(found)
     }
 
+    /// The fastest line about one, if it is faster. If it is to be kept on the road, a line on the road is better than any other.
     fn taken_about(
         &self,
         envelope: &PointMassEnvelope,
         alpha: &[f64],
         how: &About,
+        kept: bool,
     ) -> Result<Option<Optimum>> {
         let own = self.cross_sections.points(alpha);
         let count =
@@ -325,28 +322,37 @@ impl ReferenceSolvers {
         // Where the cross-sections are so far apart that no such spline is on the road, the line stays as it is.
         let settings = DescentSettings {
             least_gain: LEAST_GAIN_ABOUT,
+            programs: PROGRAMS_ABOUT,
             ..DescentSettings::default()
+        };
+        let tightening = DescentSettings {
+            programs: PROGRAMS_TIGHTENED,
+            ..settings
         };
         let Ok(mut solved) = fastest(&problem, &bounds, &start, &settings) else {
             return Ok(None);
         };
         let before = self.driven(alpha)?;
         let mut best: Option<(Vec<f64>, Driven)> = None;
-        for round in 0..=TIGHTENINGS {
+        let rounds = if kept { TIGHTENINGS } else { 0 };
+        for round in 0..=rounds {
             let points = map.line(&solved.x);
             let Ok(shares) = shares_across(&self.cross_sections, &points) else {
                 break;
             };
             let x = within_road(shares);
             let driven = self.driven(&x)?;
-            if best.as_ref().is_none_or(|(_, best)| driven.rank() < best.rank()) {
+            if best
+                .as_ref()
+                .is_none_or(|(_, best)| driven.rank(kept) < best.rank(kept))
+            {
                 best = Some((x, driven.clone()));
             }
-            if driven.clearance_m() >= 0.0 || round == TIGHTENINGS {
+            if driven.clearance_m() >= 0.0 || round == rounds {
                 break;
             }
-            driven.tighten(&points, &mut bounds);
-            let Ok(tightened) = fastest(&problem, &bounds, &solved.x, &settings) else {
+            driven.tighten(&points, &solved.x, &mut bounds);
+            let Ok(tightened) = fastest(&problem, &bounds, &solved.x, &tightening) else {
                 break;
             };
             solved = Optimum {
@@ -356,7 +362,7 @@ impl ReferenceSolvers {
                 ..tightened
             };
         }
-        let better = best.filter(|(_, driven)| driven.rank() < before.rank());
+        let better = best.filter(|(_, driven)| driven.rank(kept) < before.rank(kept));
         Ok(better.map(|(x, _)| Optimum { x, ..solved }))
     }
 
@@ -456,18 +462,18 @@ impl Driven {
         least.copied().fold(f64::INFINITY, f64::min)
     }
 
-    /// Lines on the road come first, then those that count as on it, then fast ones.
-    fn rank(&self) -> (bool, bool, f64) {
+    /// Fast lines come first; of those that are `kept`, lines on the road, then those that count as on it.
+    fn rank(&self, kept: bool) -> (bool, bool, f64) {
         let (clearance_m, time_s) = (self.clearance_m(), self.fine.lap_time_s());
         (
-            clearance_m < -ON_ROAD_M,
-            clearance_m < 0.0,
+            kept && clearance_m < -ON_ROAD_M,
+            kept && clearance_m < 0.0,
             time_s.unwrap_or(f64::INFINITY),
         )
     }
 
-    /// Narrows the bounds of a line's points (m) where the line is short of room.
-    fn tighten(&self, points_m: &[DVec2], bounds: &mut Bounds) {
+    /// Narrows the bounds of a line's points (m) at `x` where the line is short of room: there it has to move by what it lacks.
+    fn tighten(&self, points_m: &[DVec2], x: &[f64], bounds: &mut Bounds) {
         let n = points_m.len();
         let abreast = |i: usize| {
             let guess = (self.fine.station_m[i] / self.fine.length_m * n as f64) as usize;
@@ -490,9 +496,13 @@ impl Driven {
             }
         }
         for (row, [right, left]) in bounds.rows.iter_mut().zip(short) {
-            let middle = 0.5 * (row.lower + row.upper);
-            row.lower = (row.lower + right).min(middle);
-            row.upper = (row.upper - left).max(middle);
+            let (here, middle) = (row.at(x), 0.5 * (row.lower + row.upper));
+            if right > 0.0 {
+                row.lower = row.lower.max((here + right).min(middle));
+            }
+            if left > 0.0 {
+                row.upper = row.upper.min((here - left).max(middle));
+            }
         }
     }
 }

@@ -1,10 +1,10 @@
 //! Optimisers by name, with what most users set: how many particles, for how long, from which seed.
 
 use super::{
-    CooperativeSettings, CooperativeSwarm, CovarianceSettings, CovarianceSwarm, DifferenceSettings,
-    DifferenceSwarm, HybridSettings, HybridSwarm, Moead, MoeadSettings, Mopso, MopsoSettings, Mutation,
-    Nsga2, Nsga2Settings, Nsga3, Nsga3Settings, Optimiser, OutOfBounds, Pso, PsoSettings, Restarts,
-    Truncation,
+    AcceptsMigrants, CooperativeSettings, CooperativeSwarm, CovarianceSettings, CovarianceSwarm,
+    DifferenceSettings, DifferenceSwarm, HybridSettings, HybridSwarm, Islands, Migration, Moead,
+    MoeadSettings, Mopso, MopsoSettings, Mutation, Nsga2, Nsga2Settings, Nsga3, Nsga3Settings, Optimiser,
+    OutOfBounds, Pso, PsoSettings, Restarts, Truncation,
 };
 use crate::error::{Error, Result};
 use crate::evaluate::Problem;
@@ -28,6 +28,15 @@ pub const SINGLE_OBJECTIVE: [&str; 6] = [
     "difference",
     "cooperative",
     "thesis",
+];
+
+/// Those of [`MULTI_OBJECTIVE`] that are swarms.
+const SWARMS: [&str; 5] = [
+    "default",
+    "default_nearest",
+    "smpso",
+    "thesis",
+    "thesis_random_mu",
 ];
 
 /// How large a run of an optimiser is.
@@ -57,15 +66,6 @@ pub fn by_name(name: &str, problem: &Problem, sizes: Sizes) -> Result<Box<dyn Op
         seed,
         ..
     } = sizes;
-    let pso = |settings: PsoSettings| -> Result<Box<dyn Optimiser + Send>> {
-        let settings = PsoSettings {
-            population,
-            iterations,
-            seed,
-            ..settings
-        };
-        Ok(Box::new(Pso::new(problem, settings)?))
-    };
     Ok(match name {
         "default" => {
             let settings = HybridSettings {
@@ -76,8 +76,7 @@ pub fn by_name(name: &str, problem: &Problem, sizes: Sizes) -> Result<Box<dyn Op
             };
             Box::new(HybridSwarm::new(problem, settings)?)
         }
-        "pso" => pso(PsoSettings::default())?,
-        "thesis" => pso(PsoSettings::thesis())?,
+        "pso" | "thesis" => Box::new(pso(name, problem, sizes)?),
         "covariance" => {
             let settings = CovarianceSettings {
                 population,
@@ -95,15 +94,7 @@ pub fn by_name(name: &str, problem: &Problem, sizes: Sizes) -> Result<Box<dyn Op
                 .collect();
             Box::new(CovarianceSwarm::new(problem, &middle, settings)?)
         }
-        "difference" => {
-            let settings = DifferenceSettings {
-                population,
-                iterations,
-                seed,
-                ..DifferenceSettings::default()
-            };
-            Box::new(DifferenceSwarm::new(problem, settings)?)
-        }
+        "difference" => Box::new(difference(problem, sizes)?),
         "cooperative" => {
             let base = CooperativeSettings::default();
             let motion = PsoSettings {
@@ -120,6 +111,90 @@ pub fn by_name(name: &str, problem: &Problem, sizes: Sizes) -> Result<Box<dyn Op
     })
 }
 
+/// The swarm called `pso` or `thesis`.
+fn pso(name: &str, problem: &Problem, sizes: Sizes) -> Result<Pso> {
+    let settings = match name {
+        "thesis" => PsoSettings::thesis(),
+        _ => PsoSettings::default(),
+    };
+    let settings = PsoSettings {
+        population: sizes.population,
+        iterations: sizes.iterations,
+        seed: sizes.seed,
+        ..settings
+    };
+    Pso::new(problem, settings)
+}
+
+fn difference(problem: &Problem, sizes: Sizes) -> Result<DifferenceSwarm> {
+    let settings = DifferenceSettings {
+        population: sizes.population,
+        iterations: sizes.iterations,
+        seed: sizes.seed,
+        ..DifferenceSettings::default()
+    };
+    DifferenceSwarm::new(problem, settings)
+}
+
+/// The swarm for several objectives of that name; `default` for one that is not its own.
+fn mopso(name: &str, problem: &Problem, sizes: Sizes) -> Result<Mopso> {
+    let settings = match name {
+        "default_nearest" => MopsoSettings {
+            truncation: Truncation::MutualNearest,
+            ..MopsoSettings::default()
+        },
+        "smpso" => MopsoSettings::smpso(),
+        "thesis" => MopsoSettings::thesis(),
+        "thesis_random_mu" => MopsoSettings {
+            mutation: Mutation::Random,
+            ..MopsoSettings::thesis()
+        },
+        _ => MopsoSettings::default(),
+    };
+    let settings = MopsoSettings {
+        archive: sizes.archive,
+        ..settings
+    };
+    let settings = settings
+        .with_size(sizes.population, sizes.iterations)
+        .with_seed(sizes.seed);
+    Mopso::new(problem, settings)
+}
+
+/// Islands of the optimiser of that name, each of these sizes, with seeds that follow one another. They are those that take
+/// solutions in from others: `pso`, `thesis` and `difference` for one objective, the swarms among [`MULTI_OBJECTIVE`] for several.
+///
+/// # Errors
+/// As [`by_name`] and [`Islands::new`].
+pub fn islands_by_name(
+    name: &str,
+    problem: &Problem,
+    sizes: Sizes,
+    (count, migration): (usize, Option<Migration>),
+) -> Result<Box<dyn Optimiser + Send>> {
+    fn of<O: AcceptsMigrants + Send + 'static>(
+        problem: &Problem,
+        sizes: Sizes,
+        (count, migration): (usize, Option<Migration>),
+        one: impl Fn(Sizes) -> Result<O>,
+    ) -> Result<Box<dyn Optimiser + Send>> {
+        let seeds = (0..count).map(|k| Sizes {
+            seed: sizes.seed.wrapping_add(k as u64),
+            ..sizes
+        });
+        let islands = seeds.map(one).collect::<Result<Vec<_>>>()?;
+        Ok(Box::new(Islands::new(problem, islands, migration)?))
+    }
+    let asked = (count, migration);
+    match (problem.objectives.len() > 1, name) {
+        (false, "pso" | "thesis") => of(problem, sizes, asked, |sizes| pso(name, problem, sizes)),
+        (false, "difference") => of(problem, sizes, asked, |sizes| difference(problem, sizes)),
+        (false, _) => Err(unknown(name, &["pso", "thesis", "difference"])),
+        (true, _) if SWARMS.contains(&name) => of(problem, sizes, asked, |sizes| mopso(name, problem, sizes)),
+        (true, _) => Err(unknown(name, &SWARMS)),
+    }
+}
+
 fn unknown(name: &str, known: &[&str]) -> Error {
     Error::input("the optimisers", "name", name, known.join(", "))
 }
@@ -134,30 +209,12 @@ pub fn several_by_name(
     sizes: Sizes,
     start: &[Vec<f64>],
 ) -> Result<Box<dyn Optimiser + Send>> {
-    let mopso = |settings: MopsoSettings| -> Result<Box<dyn Optimiser + Send>> {
-        let settings = MopsoSettings {
-            archive: sizes.archive,
-            ..settings
-        };
-        let settings = settings
-            .with_size(sizes.population, sizes.iterations)
-            .with_seed(sizes.seed);
-        let mut swarm = Mopso::new(problem, settings)?;
-        swarm.start_from(start)?;
-        Ok(Box::new(swarm))
-    };
     match name {
-        "default" => mopso(MopsoSettings::default()),
-        "default_nearest" => mopso(MopsoSettings {
-            truncation: Truncation::MutualNearest,
-            ..MopsoSettings::default()
-        }),
-        "smpso" => mopso(MopsoSettings::smpso()),
-        "thesis" => mopso(MopsoSettings::thesis()),
-        "thesis_random_mu" => mopso(MopsoSettings {
-            mutation: Mutation::Random,
-            ..MopsoSettings::thesis()
-        }),
+        _ if SWARMS.contains(&name) => {
+            let mut swarm = mopso(name, problem, sizes)?;
+            swarm.start_from(start)?;
+            Ok(Box::new(swarm))
+        }
         "moead" => {
             let settings = MoeadSettings {
                 population: sizes.population,
@@ -215,6 +272,16 @@ mod tests {
             };
             for name in names {
                 by_name(name, problem.problem(), sizes).unwrap();
+            }
+            for name in names {
+                let islands = islands_by_name(name, problem.problem(), sizes, (3, None));
+                let takes_in = ["difference", "pso"].contains(name)
+                    || SWARMS.contains(name) && (*name != "default" || names.contains(&"nsga2"));
+                assert_eq!(islands.is_ok(), takes_in, "{name}");
+                if let Ok(mut islands) = islands {
+                    let variables = problem.problem().variables.len();
+                    assert_eq!(islands.ask().len(), 3 * sizes.population * variables, "{name}");
+                }
             }
             let said = by_name("best", problem.problem(), sizes)
                 .err()

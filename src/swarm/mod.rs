@@ -66,7 +66,7 @@ mod windows;
 pub use archive::Archive;
 #[cfg(feature = "studies")]
 pub(crate) use at_work::{SwarmAtWork, SwarmState};
-pub use by_name::{MULTI_OBJECTIVE, SINGLE_OBJECTIVE, Sizes, by_name, several_by_name};
+pub use by_name::{MULTI_OBJECTIVE, SINGLE_OBJECTIVE, Sizes, by_name, islands_by_name, several_by_name};
 pub use cooperative::{CooperativeSettings, CooperativeSwarm};
 pub use covariance::{CovarianceSettings, CovarianceSwarm, OutOfBounds, Restarts};
 pub use difference::{DifferenceSettings, DifferenceSwarm};

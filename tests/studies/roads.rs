@@ -13,6 +13,7 @@ use lapswarm::study::raceline::{Raceline, RacelineSettings, Summary, set_up};
 use lapswarm::study::transient::NamedLine;
 use std::fmt::Write as _;
 use std::path::Path;
+use std::sync::Arc;
 
 /// A surveyed circuit: corners, each with the radius of its bend (m), the widths to the right and the left (m), and how jagged it
 /// is (m).
@@ -69,6 +70,20 @@ const EIGHT: Surveyed = Surveyed {
     right_m: 5.0,
     left_m: 5.0,
     jagged_m: 0.03,
+};
+
+/// Wide corners of 60 to 90 m radius, between edges that are jagged a little.
+const WIDE: Surveyed = Surveyed {
+    corners: &[
+        [0.0, 0.0, 80.0],
+        [600.0, 0.0, 60.0],
+        [650.0, 300.0, 90.0],
+        [300.0, 250.0, 70.0],
+        [100.0, 400.0, 60.0],
+    ],
+    right_m: 10.0,
+    left_m: 10.0,
+    jagged_m: 0.05,
 };
 
 impl Surveyed {
@@ -209,6 +224,34 @@ fn fastest_lines_are_on_the_road() {
         let room_m = widths.map(|(l, r)| l.min(*r)).fold(f64::INFINITY, f64::min);
         assert!(room_m > -0.02, "{name}: {room_m}");
     }
+}
+
+/// The fastest line is a line of the road, and not of the places where the road was cut.
+#[test]
+fn reference_optima_agree_across_cross_sections() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let lap_s = [400, 800].map(|sections| {
+        let settings = RacelineSettings {
+            sections,
+            ..WIDE.settings(folder.path())
+        };
+        let setup = set_up(&settings).expect("a road");
+        let solvers = setup.solvers(&settings, &Arc::default()).expect("solvers");
+        let report = |objective| {
+            let line = solvers.best(objective).expect("a line").expect("a solver");
+            setup.report("reference", &line.alpha, &settings).expect("a line")
+        };
+        let fastest = report(LineObjective::LapTime);
+        assert!(fastest.clearance.is_on_road(), "{:?}", fastest.clearance);
+        let least_curved_s = report(LineObjective::Kappa2).lap_time_fine_s();
+        assert!(
+            fastest.lap_time_fine_s() < 0.98 * least_curved_s,
+            "{least_curved_s}"
+        );
+        fastest.lap_time_fine_s()
+    });
+    let apart = (lap_s[0] - lap_s[1]).abs() / lap_s[1];
+    assert!(apart < 1e-3, "{lap_s:?}");
 }
 
 #[test]

@@ -73,17 +73,23 @@ pub(super) fn find_lines(work: Work<'_, Raceline>) -> Result<Outcome> {
                 Some(finished) => finished.clone(),
                 None => {
                     let found = search_objective(settings, setup, objective, start, &mut work)?;
-                    let led = scope.spawn({
-                        let (found, interrupted) = (found.alpha.clone(), work.interrupted);
-                        move || led_downhill(settings, objective, &found, solvers, interrupted)
-                    });
-                    let led = interruptible(led, &stop, || work.asked("local search"))?;
-                    // A search that goes from coarse to fine may lose a little of the line that it started from.
+                    // A search that goes from coarse to fine may lose a little of the line that it started from. That is a local
+                    // optimum, so nothing is left to find downhill of it.
                     let mut best = report(&found.alpha)?;
-                    for rival in start.into_iter().chain(led.iter().map(Vec::as_slice)) {
-                        let rival = report(rival)?;
-                        if rival.betters(&best, objective) {
-                            best = rival;
+                    let start = start.map(&report).transpose()?;
+                    match start.filter(|start| start.betters(&best, objective)) {
+                        Some(start) => best = start,
+                        None => {
+                            let led = scope.spawn({
+                                let (found, interrupted) = (found.alpha.clone(), work.interrupted);
+                                move || led_downhill(settings, objective, &found, solvers, interrupted)
+                            });
+                            for rival in interruptible(led, &stop, || work.asked("local search"))? {
+                                let rival = report(&rival)?;
+                                if rival.betters(&best, objective) {
+                                    best = rival;
+                                }
+                            }
                         }
                     }
                     if !best.clearance.is_on_road() && !work.interrupted {
