@@ -8,6 +8,7 @@ mod axis;
 mod bars;
 mod canvas;
 pub mod compare;
+mod corners;
 mod curves;
 mod figure;
 mod html;
@@ -24,6 +25,7 @@ mod track_map;
 
 pub use crate::files::write_whole;
 pub use bars::{BarPanel, Bars};
+pub use corners::{CornerLap, Stretch, corner_table};
 pub use curves::{Curves, Panel, Scale};
 pub use figure::Figure;
 pub use html::HtmlReport;

@@ -32,6 +32,12 @@
     const charts = [...document.querySelectorAll("[data-chart]")];
     findings.charts = charts.length;
     findings.blank = charts.filter((chart) => ![...chart.querySelectorAll("canvas")].some(painted)).length;
+    const measured = [...document.querySelectorAll(".table th")].find((th) => th.textContent === "n g");
+    const column = measured && [...measured.parentElement.cells].indexOf(measured);
+    findings.in_g =
+      measured && [...measured.closest("table").tBodies[0].rows].map((row) => row.cells[column].textContent);
+    findings.lap_units = [...document.querySelectorAll(".readout .unit")].map((unit) => unit.textContent.trim());
+    findings.switch = document.querySelector("header .units")?.textContent ?? null;
     findings.tables = document.querySelectorAll(".table table").length;
 
     const lap = document.querySelector(".chart.lap");

@@ -262,6 +262,19 @@ fn pages_work_in_a_browser() {
     let findings = used(&browser, &page);
     sound(&findings, 6);
     linked(&findings);
+    // 2 and 1 m/s^2, with a gap.
+    assert_eq!(
+        findings["in_g"],
+        serde_json::json!(["0.2039", "\u{2013}", "0.102"]),
+        "{findings}"
+    );
+    assert_eq!(findings["lap_units"], serde_json::json!(["g"]), "{findings}");
+    assert!(
+        findings["switch"]
+            .as_str()
+            .is_some_and(|s| s.ends_with("change to SI")),
+        "{findings}"
+    );
 
     let [first, second] = ["a", "b"].map(|name| folder.path().join(name));
     raceline(&first, "1");

@@ -2,14 +2,16 @@
 
 use super::read::{Run, Trace};
 use crate::error::{Error, Result};
-use crate::report::{Curves, HtmlReport, LapLine, LapView, Panel, Road, Scale, Table, significant};
+use crate::report::{
+    CornerLap, Curves, HtmlReport, LapLine, LapView, Panel, Road, Scale, Table, significant,
+};
 use glam::DVec2;
 use std::collections::{HashMap, HashSet};
 
 /// Runs that a page takes at most: more lines than colours cannot be told apart.
 const MOST_RUNS: usize = 24;
 /// Figures worth a look first, by how their names begin.
-const HEADLINES: [&str; 18] = [
+const HEADLINES: [&str; 17] = [
     "total_parameter_error",
     "swarm_total_parameter_error",
     "rms_error",
@@ -27,7 +29,6 @@ const HEADLINES: [&str; 18] = [
     "understeer_gradient_deg_per_g",
     "stability_factor_s2_per_m2",
     "static_margin",
-    "elapsed_s",
 ];
 /// Figures of a best line that are: those on the fine spline, where there are two.
 const BEST: [&str; 4] = [
@@ -68,13 +69,13 @@ pub fn compare(runs: &[Run]) -> Result<HtmlReport> {
     };
     let mut page = HtmlReport::new("report", &title);
     head(&mut page, runs);
+    laps(&mut page, runs)?;
     page.section("Runs", "");
     page.table("What was run", "", &about(runs))?;
     let note = "Units are the endings of the names.";
     if let Some(table) = figures(runs, true) {
         page.table("Headline figures", note, &table)?;
     }
-    laps(&mut page, runs)?;
     let envelopes = runs.iter().map(|(name, run)| (&**name, run.envelope.as_ref()));
     let limits = limits("Limits over speed", &LIMITS, envelopes);
     if !limits.is_empty() {
@@ -301,7 +302,24 @@ fn laps(page: &mut HtmlReport, runs: &[Named<'_>]) -> Result<()> {
         "Laps",
         "The quickest line of each run, or what it fitted to its log.",
     );
+    if one_track {
+        corners(page, &labelled, length_m)?;
+    }
     overlay(page, &labelled, road, one_track)
+}
+
+/// Laps of one track by corner and sector, against the first.
+fn corners(page: &mut HtmlReport, named: &[(&str, &Trace)], length_m: f64) -> Result<()> {
+    let laps = named.iter().filter_map(|(name, trace)| {
+        let lap = Lap::new(trace)?;
+        let v = lap.column(PANELS[0].0)?;
+        let ay = lap.column(PANELS[2].0).or_else(|| {
+            let yaw_rate = lap.column(PANELS[3].0)?;
+            Some(yaw_rate.iter().zip(&v).map(|(r, v)| r * v).collect())
+        })?;
+        CornerLap::new(name, &lap.station_m, &v, &ay, length_m / lap.length_m())
+    });
+    page.corners(&laps.collect::<Vec<_>>(), &[])
 }
 
 /// Lays laps over one another: the traces that two of them share, or the only one has, the time that each loses on the

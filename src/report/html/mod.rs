@@ -12,7 +12,7 @@ pub(super) mod thin;
 pub(super) use escape::{Numbers, raised};
 
 use super::table::{Cells, Column, plain_digits};
-use super::{Figure, Table};
+use super::{CornerLap, Figure, Table, corner_table};
 use crate::files::write_whole;
 use crate::{Error, Result};
 use escape::{html, json_in_script};
@@ -139,6 +139,26 @@ impl HtmlReport {
             html(title)
         ));
         Ok(())
+    }
+
+    /// Laps by corner and by sector, the first of them against the others; nothing without a lap.
+    ///
+    /// # Errors
+    /// As [`HtmlReport::table`].
+    pub fn corners(&mut self, laps: &[CornerLap<'_>], sections: &[(String, f64, f64)]) -> Result<()> {
+        let Some(first) = laps.first() else {
+            return Ok(());
+        };
+        let note = "A corner is where the first lap holds more than a third of its lateral acceleration: entry and exit are its ends.";
+        let corners = first.corners(sections);
+        if !corners.is_empty() {
+            self.table("By corner", note, &corner_table(laps, &corners))?;
+        }
+        self.table(
+            "By sector",
+            "Thirds of the lap.",
+            &corner_table(laps, &first.sectors()),
+        )
     }
 
     /// A figure as charts.

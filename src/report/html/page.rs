@@ -6,7 +6,7 @@ use super::escape::html;
 const STYLE: &str = include_str!("page/page.css");
 const LIBRARY: &str = include_str!("vendor/echarts.min.js");
 /// Our own script, in the order that its parts need one another.
-const SCRIPT: [&str; 9] = [
+const SCRIPT: [&str; 10] = [
     include_str!("page/base.js"),
     include_str!("page/map.js"),
     include_str!("page/lap.js"),
@@ -15,6 +15,7 @@ const SCRIPT: [&str; 9] = [
     include_str!("page/bars.js"),
     include_str!("page/surface.js"),
     include_str!("page/heat.js"),
+    include_str!("page/units.js"),
     include_str!("page/start.js"),
 ];
 /// Nothing may be loaded from anywhere; what the page needs stands in it.

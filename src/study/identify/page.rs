@@ -10,7 +10,8 @@ use crate::config::settings::Settings;
 use crate::error::Result;
 use crate::evaluate::replay::{CHANNEL_LABELS, CHANNEL_NAMES, CHANNEL_UNITS};
 use crate::report::{
-    Curves, Figure, Front, HtmlReport, LapLine, LapView, Panel, Parameters, Scale, Table, significant,
+    CornerLap, Curves, Figure, Front, HtmlReport, LapLine, LapView, Panel, Parameters, Scale, Table,
+    significant,
 };
 use crate::study::framework::Solved;
 use std::path::Path;
@@ -42,6 +43,7 @@ pub(super) fn write(
     if let Some(map) = setup.circuit.as_ref().and_then(|c| view.track_map(&*c.name)) {
         map.write_svg(folder.join("map.svg"))?;
     }
+    corners(&mut page, setup, judged)?;
     page.table("Channels", "", &channels(solved.settings, summary))?;
     page.section("Parameters", "");
     let figure = Parameters {
@@ -196,6 +198,23 @@ fn lap(setup: &Setup, judged: &Judged, title: String) -> LapView {
         .line(fitted)
         .line(error)
         .circuit(circuit)
+}
+
+/// The measured lap by corner and sector, and the fitted car's against it.
+fn corners(page: &mut HtmlReport, setup: &Setup, judged: &Judged) -> Result<()> {
+    let log = &setup.log;
+    let range = traced_lap(log, judged);
+    let station = &log.distance_m[range.clone()];
+    let lap = |name, v: &[f64], ay: &[f64]| {
+        CornerLap::new(name, station, &v[range.clone()], &ay[range.clone()], 1.0)
+    };
+    let measured = lap("measured", &log.vx_mps, &log.ay_mps2);
+    // The fitted car is driven where windows are, and a time is told of a whole lap only.
+    let whole = range.clone().all(|i| judged.outputs[0][i].is_finite());
+    let fitted = lap("fitted", &judged.outputs[0], &judged.outputs[2]).filter(|_| whole);
+    let sections = setup.circuit.iter().flat_map(|c| &c.sections);
+    let sections: Vec<_> = sections.map(|s| (s.name.clone(), s.start_m, s.end_m)).collect();
+    page.corners(&measured.into_iter().chain(fitted).collect::<Vec<_>>(), &sections)
 }
 
 fn rms_text(errors: &[f64], unit: &str) -> String {

@@ -86,7 +86,7 @@ settings! {
         car: String ["-"] = "gt".to_owned(), name_or_file(),
             "The car that fixed parameters come from: a bundled name (gt, gt_hybrid) or a TOML file";
         log: Option<PathBuf> ["-"] = None, optional(file()).example("\"lap.csv\""),
-            "The log: our CSV, a MoTeC i2 CSV export or a MoTeC .ld file; without it the bundled lap";
+            "The log: CSV (ours, MoTeC i2, RaceChrono, others), MoTeC .ld or VBOX .vbo; without it the bundled lap";
         channel_map: Option<PathBuf> ["-"] = None, optional(file()).example("\"channels.toml\""),
             "Channel names, units, signs and delays of the log, as TOML; without it they are guessed";
         track: Option<String> ["-"] = None, optional(name_or_file()).example("\"silverstone_gp\""),

@@ -2,7 +2,7 @@
 
 use super::drive::{AGREEMENT, DrivenLine, INTERVAL_S};
 use crate::error::Result;
-use crate::report::{HtmlReport, LapLine, LapView, Road, Table, write_whole};
+use crate::report::{CornerLap, HtmlReport, LapLine, LapView, Road, Table, write_whole};
 use crate::study::framework::Head;
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
@@ -165,6 +165,14 @@ fn write_page(folder: &Path, outcome: &DrivenLine, summary: &LineSummary, driven
     if let Some(map) = view.track_map(format!("Driven in {:.2} s", outcome.lap_time_s)) {
         map.write_svg(folder.join("map.svg"))?;
     }
+    let ay = drive.states.iter().map(|s| s[0] * s[2]).collect::<Vec<f64>>();
+    let driven = CornerLap::new("4DOF car and driver", &drive.station_m, &state(0), &ay, 1.0);
+    let ideal = outcome.point_mass.lap.as_ref().and_then(|lap| {
+        let length = lap.station_m.len().min(lap.v_mps.len());
+        let stations = &lap.station_m[..length];
+        CornerLap::new("quasi-steady-state lap", stations, &lap.v_mps, &lap.ay_mps2, 1.0)
+    });
+    page.corners(&driven.into_iter().chain(ideal).collect::<Vec<_>>(), &[])?;
     page.provenance("car", car);
     summary.head.record.provenance(&mut page, "laps driven");
     page.write(folder.join("report.html"))

@@ -1,6 +1,7 @@
-// Draws every chart, and makes the tables sort.
+// Draws every chart, in the units that the reader chose, and makes the tables sort.
 
 const data = JSON.parse(document.getElementById("charts").textContent);
+inUnits(data);
 for (const place of document.querySelectorAll("[data-chart]")) {
   const chart = data[Number(place.dataset.chart)];
   draw[chart.kind](place, chart);

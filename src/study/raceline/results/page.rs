@@ -8,7 +8,8 @@ use crate::evaluate::line::open_line_evaluator;
 use crate::files::stem;
 use crate::line::Parametrisation;
 use crate::report::{
-    Curves, Front, HtmlReport, LapLine, LapView, Levels, Panel, Road, Surface, Table, TrackMap, with_unit,
+    CornerLap, Curves, Front, HtmlReport, LapLine, LapView, Levels, Panel, Road, Surface, Table, TrackMap,
+    with_unit,
 };
 use crate::study::framework::Solved;
 use crate::study::raceline::{ObjectiveOutcome, Outcome, Raceline, RacelineSettings, ReportedLine, Setup};
@@ -60,6 +61,7 @@ pub fn write(folder: &Path, solved: &Solved<'_, Raceline>, summary: &Summary) ->
             close_ups(folder, setup, fastest, &map)?;
         }
     }
+    corners(&mut page, setup, &lines)?;
     page.table(
         "Lines compared",
         "Values at the cross-sections are what the solvers see. Fine values are on a spline at 1 m through them, and are the \
@@ -197,6 +199,18 @@ fn laps(setup: &Setup, lines: &[&ReportedLine]) -> LapView {
         .lines(lines.iter().map(line))
         .sections(sections.map(|s| (s.name.clone(), s.start_m, s.end_m)))
         .road(Road::across(road, &setup.edges_m))
+}
+
+/// The lines by corner and sector, against the first.
+fn corners(page: &mut HtmlReport, setup: &Setup, lines: &[&ReportedLine]) -> Result<()> {
+    let laps = lines.iter().filter_map(|line| {
+        let (fine, lap) = (&line.fine, line.fine.lap.as_ref()?);
+        let stretch = setup.road.length_m / fine.length_m;
+        CornerLap::new(&line.name, &fine.station_m, &lap.v_mps, &lap.ay_mps2, stretch)
+    });
+    let sections = setup.road.sections.iter();
+    let sections: Vec<_> = sections.map(|s| (s.name.clone(), s.start_m, s.end_m)).collect();
+    page.corners(&laps.collect::<Vec<_>>(), &sections)
 }
 
 /// A close-up of the map for each named section.
