@@ -20,6 +20,7 @@ pub mod reached;
 pub mod steady;
 pub mod traction;
 pub mod tyre;
+pub mod wheels;
 
 pub use car::{Car, CarParameter, Tyres};
 pub use chassis::Chassis;

@@ -92,6 +92,14 @@ fn the_car_drives_a_line_as_fast_as_the_point_mass() {
     ] {
         assert!(folder.path().join(name).is_file(), "{name}");
     }
+    let drive = std::fs::read_to_string(folder.path().join("drive.csv")).expect("it is there");
+    let header = drive.lines().next().unwrap_or_default();
+    for channel in ["load_fl (N)", "slip_angle_rr (rad)", "friction_used_rl"] {
+        assert!(
+            header.split(',').any(|column| column == channel),
+            "{channel} in {header}"
+        );
+    }
 }
 
 /// Set-ups on two lines: the fastest within the edges comes first, the car as it is on a line laps as that line driven alone

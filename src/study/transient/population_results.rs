@@ -4,7 +4,7 @@ use super::population::{Driven, DrivenBest, PopulationOutcome};
 use super::{Prepared, Transient};
 use crate::error::Result;
 use crate::evaluate::failures_in_words;
-use crate::report::{HtmlReport, Table};
+use crate::report::{Curves, HtmlReport, Panel, Table};
 use crate::study::framework::{Head, Solved};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -187,6 +187,23 @@ pub(super) fn report(
     page.section("Set-ups", "");
     let note = "Each with the share of the envelope's grip with which it was fastest within the edges.";
     page.table("All set-ups on all lines", note, &table)?;
+    let scatter = |label: &str, unit: &str, of: &dyn Fn(&Driven) -> Option<f64>| {
+        let points = all.iter().filter_map(|d| Some((of(d)?, d.best?.lap_time_s)));
+        let panel = Panel::new(format!("Lap time over {label}"));
+        panel.x(label, unit).y("lap time", "s").dots("", points)
+    };
+    let parameters = outcome.parameters.iter().enumerate().map(|(k, parameter)| {
+        let unit = parameter.info.unit.trim_matches('-');
+        scatter(&parameter.name, unit, &|d| Some(d.values[k]))
+    });
+    let panels = [scatter("room to the edge", "m", &|d| Some(d.best?.room_m))];
+    let scatters = Curves::new(
+        "Set-ups",
+        panels.into_iter().chain(parameters).filter(Panel::has_points),
+    );
+    if !scatters.is_empty() {
+        page.place(&scatters)?;
+    }
     page.provenance("car", &car.name);
     summary.head.record.provenance(&mut page, "laps driven");
     page.write(folder.join("report.html"))

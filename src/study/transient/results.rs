@@ -4,6 +4,8 @@ use super::drive::{AGREEMENT, DrivenLine, INTERVAL_S};
 use crate::error::Result;
 use crate::report::{CornerLap, HtmlReport, LapLine, LapView, Road, Table, write_whole};
 use crate::study::framework::Head;
+use crate::vehicle::wheels::{WHEELS, Wheel, wheels_of};
+use crate::vehicle::{Car, CarInput, CarState};
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -15,6 +17,16 @@ const PANELS: [(&str, &str); 5] = [
     ("steering", "deg"),
     ("yaw rate", "rad/s"),
     ("lateral speed", "m/s"),
+];
+
+/// Rows of the tyres' traces, in the order of [`CHANNELS`].
+const TYRE_PANELS: [(&str, &str); 6] = [
+    ("load", "N"),
+    ("slip ratio", ""),
+    ("slip angle", "rad"),
+    ("longitudinal force", "N"),
+    ("lateral force", "N"),
+    ("friction used", ""),
 ];
 
 /// The figures of one line alone; `--json` prints this.
@@ -95,7 +107,7 @@ impl LineSummary {
 ///
 /// # Errors
 /// [`crate::Error::Io`] if a file cannot be written.
-pub(super) fn report(folder: &Path, outcome: &DrivenLine, summary: &LineSummary) -> Result<()> {
+pub(super) fn report(folder: &Path, car: &Car, outcome: &DrivenLine, summary: &LineSummary) -> Result<()> {
     let envelope = outcome.envelope.to_csv();
     write_whole(folder.join("envelope_driven.csv"), envelope.as_bytes())?;
     let drive = &outcome.drive;
@@ -104,7 +116,13 @@ pub(super) fn report(folder: &Path, outcome: &DrivenLine, summary: &LineSummary)
     let (x, y): (Vec<f64>, Vec<f64>) = driven_m.iter().map(|p| (p.x, p.y)).unzip();
     let steer: Vec<f64> = drive.inputs.iter().map(|(_, steer)| *steer).collect();
     let time = (0..drive.states.len()).map(|i| i as f64 * INTERVAL_S);
-    Table::new()
+    let moments = drive.states.iter().zip(&drive.inputs);
+    let moments = moments.map(|(state, (wheel_speed, steer))| {
+        let (wheel_speed, steer) = (*wheel_speed, *steer);
+        (CarState::from_array(*state), CarInput { wheel_speed, steer })
+    });
+    let wheels = wheels_of(car, &moments.collect::<Vec<_>>());
+    let table = Table::new()
         .numbers("time", "s", time.collect::<Vec<f64>>())
         .numbers("station", "m", &drive.station_m)
         .numbers("offset", "m", &drive.offset_m)
@@ -114,12 +132,56 @@ pub(super) fn report(folder: &Path, outcome: &DrivenLine, summary: &LineSummary)
         .numbers("vy", "m/s", state(1))
         .numbers("yaw_rate", "rad/s", state(2))
         .numbers("roll", "rad", state(3))
-        .numbers("steering", "rad", steer)
-        .write_csv(folder.join("drive.csv"))?;
-    write_page(folder, outcome, summary, &driven_m)
+        .numbers("steering", "rad", steer);
+    let channels = CHANNELS
+        .iter()
+        .flat_map(|channel| (0..4).map(move |k| (channel, k)));
+    let table = channels.fold(table, |table, ((name, unit, of), k)| {
+        table.numbers(format!("{name}_{}", WHEELS[k]), *unit, of_wheel(&wheels, k, *of))
+    });
+    table.write_csv(folder.join("drive.csv"))?;
+    write_page(folder, outcome, summary, (&driven_m, &wheels))
 }
 
-fn write_page(folder: &Path, outcome: &DrivenLine, summary: &LineSummary, driven_m: &[DVec2]) -> Result<()> {
+/// What a tyre has at a moment.
+type OfWheel = fn(&Wheel) -> f64;
+
+/// Channels of each tyre: name in files, unit, value.
+const CHANNELS: [(&str, &str, OfWheel); 6] = [
+    ("load", "N", |w| w.load_n),
+    ("slip_ratio", "", |w| w.slip_ratio),
+    ("slip_angle", "rad", |w| w.slip_angle_rad),
+    ("longitudinal_force", "N", |w| w.longitudinal_n),
+    ("lateral_force", "N", |w| w.lateral_n),
+    ("friction_used", "", Wheel::friction),
+];
+
+fn of_wheel(wheels: &[[Wheel; 4]], k: usize, of: OfWheel) -> Vec<f64> {
+    wheels.iter().map(|tyres| of(&tyres[k])).collect()
+}
+
+/// The tyres over the lap.
+fn tyres(station_m: &[f64], wheels: &[[Wheel; 4]]) -> LapView {
+    let lines = WHEELS.iter().enumerate().map(|(k, name)| {
+        let line = LapLine::new(name.to_uppercase(), station_m);
+        let channels = CHANNELS.iter().enumerate();
+        channels.fold(line, |line, (panel, (.., of))| {
+            line.trace(panel, of_wheel(wheels, k, *of))
+        })
+    });
+    LapView::new("Tyres")
+        .note("Friction used is force over load. Forces are along and across each wheel, positive forwards and to the left.")
+        .x("distance along the line", "m")
+        .panels(TYRE_PANELS)
+        .lines(lines)
+}
+
+fn write_page(
+    folder: &Path,
+    outcome: &DrivenLine,
+    summary: &LineSummary,
+    (driven_m, wheels): (&[DVec2], &[[Wheel; 4]]),
+) -> Result<()> {
     let car = &summary.head.subject.car;
     let mut page = HtmlReport::new(&summary.head.study, &format!("A line driven by the {car}"));
     for sentence in summary.to_text().lines() {
@@ -173,6 +235,8 @@ fn write_page(folder: &Path, outcome: &DrivenLine, summary: &LineSummary, driven
         CornerLap::new("quasi-steady-state lap", stations, &lap.v_mps, &lap.ay_mps2, 1.0)
     });
     page.corners(&driven.into_iter().chain(ideal).collect::<Vec<_>>(), &[])?;
+    page.section("Tyres", "");
+    page.place(&tyres(&drive.station_m, wheels))?;
     page.provenance("car", car);
     summary.head.record.provenance(&mut page, "laps driven");
     page.write(folder.join("report.html"))
