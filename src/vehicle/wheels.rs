@@ -35,22 +35,31 @@ impl Wheel {
 /// Names of the four wheels, in the order of all that has four.
 pub const WHEELS: [&str; 4] = ["fl", "fr", "rl", "rr"];
 
-/// The tyres FL FR RL RR of a car at each moment of a drive: its state and inputs.
-pub fn wheels_of(car: &Car, moments: &[(CarState<f64>, CarInput<f64>)]) -> Vec<[Wheel; 4]> {
+/// A car at a moment of a drive.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Moment {
+    /// The tyres FL FR RL RR.
+    pub wheels: [Wheel; 4],
+    /// Lateral acceleration of the roll axis (m/s^2), as the replay compares it with logs; positive to the left.
+    pub ay_mps2: f64,
+}
+
+/// A car at each moment of a drive: its state and inputs.
+pub fn moments_of(car: &Car, driven: &[(CarState<f64>, CarInput<f64>)]) -> Vec<Moment> {
     let flat = car.to_flat();
     match car.tyre_model() {
         TyreModel::MagicFormula => at(
             &CarModel::<f64, MagicFormula<f64>>::from_parameters(|i| flat[i]),
-            moments,
+            driven,
         ),
         TyreModel::Linear => at(
             &CarModel::<f64, LinearTyre<f64>>::from_parameters(|i| flat[i]),
-            moments,
+            driven,
         ),
     }
 }
 
-fn at<T: Tyre<f64>>(car: &CarModel<f64, T>, moments: &[(CarState<f64>, CarInput<f64>)]) -> Vec<[Wheel; 4]> {
+fn at<T: Tyre<f64>>(car: &CarModel<f64, T>, driven: &[(CarState<f64>, CarInput<f64>)]) -> Vec<Moment> {
     let chassis = &car.chassis;
     let sides = [1.0, -1.0];
     let places = [
@@ -61,7 +70,7 @@ fn at<T: Tyre<f64>>(car: &CarModel<f64, T>, moments: &[(CarState<f64>, CarInput<
         ),
         (-chassis.cg_to_rear, chassis.half_track_rear, chassis.radius_rear),
     ];
-    let tyres = moments.iter().map(|(state, input)| {
+    let moments = driven.iter().map(|(state, input)| {
         let body = &state.body;
         let aero = aero_forces(chassis, body.vx);
         let loads = wheel_loads(chassis, body, state.pitch_acceleration, &aero);
@@ -94,9 +103,12 @@ fn at<T: Tyre<f64>>(car: &CarModel<f64, T>, moments: &[(CarState<f64>, CarInput<
             })
         });
         let [[fl, fr], [rl, rr]] = axles;
-        [fl, fr, rl, rr]
+        Moment {
+            wheels: [fl, fr, rl, rr],
+            ay_mps2: car.rate(state, input).ay,
+        }
     });
-    tyres.collect()
+    moments.collect()
 }
 
 #[cfg(test)]
@@ -124,19 +136,26 @@ mod tests {
             wheel_speed: [40.0 / 0.33, 40.5 / 0.33, 41.0 / 0.33, 41.5 / 0.33],
             steer: 0.03,
         };
-        let [[fl, fr, rl, rr]] = wheels_of(&car, &[(state, input)])[..] else {
+        let [moment] = moments_of(&car, &[(state, input)])[..] else {
             panic!("one moment")
         };
+        let [fl, fr, rl, rr] = moment.wheels;
         let chassis = &model.chassis;
         let steer = input.steer * chassis.steer_scale + chassis.steer_offset;
         let front = |w: &Wheel| w.longitudinal_n * steer.cos() - w.lateral_n * steer.sin();
         let drag = aero_forces(chassis, 40.0).drag;
         let total = front(&fl) + front(&fr) + rl.longitudinal_n + rr.longitudinal_n - drag;
-        let ax = model.rate(&state, &input).ax;
+        let rate = model.rate(&state, &input);
+        let ax = rate.ax;
         assert!(
             (total / chassis.mass - ax).abs() < 1e-9,
             "{total} N and {ax} m/s^2"
         );
+        let side = |w: &Wheel| w.longitudinal_n * steer.sin() + w.lateral_n * steer.cos();
+        let across = side(&fl) + side(&fr) + rl.lateral_n + rr.lateral_n;
+        // Upright, the car's mass moves against its roll axis as the roll rate changes.
+        let ay = across / chassis.mass + chassis.cg_height * rate.state.body.roll_rate;
+        assert!((ay - moment.ay_mps2).abs() < 1e-9, "{ay} and {moment:?}");
         let downforce = aero_forces(chassis, 40.0);
         let weight = chassis.mass * chassis.gravity + downforce.downforce_front + downforce.downforce_rear;
         let loads = fl.load_n + fr.load_n + rl.load_n + rr.load_n;

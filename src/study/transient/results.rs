@@ -4,7 +4,7 @@ use super::drive::{AGREEMENT, DrivenLine, INTERVAL_S};
 use crate::error::Result;
 use crate::report::{CornerLap, HtmlReport, LapLine, LapView, Road, Table, write_whole};
 use crate::study::framework::Head;
-use crate::vehicle::wheels::{WHEELS, Wheel, wheels_of};
+use crate::vehicle::wheels::{Moment, WHEELS, Wheel, moments_of};
 use crate::vehicle::{Car, CarInput, CarState};
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
@@ -116,12 +116,12 @@ pub(super) fn report(folder: &Path, car: &Car, outcome: &DrivenLine, summary: &L
     let (x, y): (Vec<f64>, Vec<f64>) = driven_m.iter().map(|p| (p.x, p.y)).unzip();
     let steer: Vec<f64> = drive.inputs.iter().map(|(_, steer)| *steer).collect();
     let time = (0..drive.states.len()).map(|i| i as f64 * INTERVAL_S);
-    let moments = drive.states.iter().zip(&drive.inputs);
-    let moments = moments.map(|(state, (wheel_speed, steer))| {
+    let driven = drive.states.iter().zip(&drive.inputs);
+    let driven = driven.map(|(state, (wheel_speed, steer))| {
         let (wheel_speed, steer) = (*wheel_speed, *steer);
         (CarState::from_array(*state), CarInput { wheel_speed, steer })
     });
-    let wheels = wheels_of(car, &moments.collect::<Vec<_>>());
+    let moments = moments_of(car, &driven.collect::<Vec<_>>());
     let table = Table::new()
         .numbers("time", "s", time.collect::<Vec<f64>>())
         .numbers("station", "m", &drive.station_m)
@@ -137,10 +137,10 @@ pub(super) fn report(folder: &Path, car: &Car, outcome: &DrivenLine, summary: &L
         .iter()
         .flat_map(|channel| (0..4).map(move |k| (channel, k)));
     let table = channels.fold(table, |table, ((name, unit, of), k)| {
-        table.numbers(format!("{name}_{}", WHEELS[k]), *unit, of_wheel(&wheels, k, *of))
+        table.numbers(format!("{name}_{}", WHEELS[k]), *unit, of_wheel(&moments, k, *of))
     });
     table.write_csv(folder.join("drive.csv"))?;
-    write_page(folder, outcome, summary, (&driven_m, &wheels))
+    write_page(folder, outcome, summary, (&driven_m, &moments))
 }
 
 /// What a tyre has at a moment.
@@ -156,17 +156,17 @@ const CHANNELS: [(&str, &str, OfWheel); 6] = [
     ("friction_used", "", Wheel::friction),
 ];
 
-fn of_wheel(wheels: &[[Wheel; 4]], k: usize, of: OfWheel) -> Vec<f64> {
-    wheels.iter().map(|tyres| of(&tyres[k])).collect()
+fn of_wheel(moments: &[Moment], k: usize, of: OfWheel) -> Vec<f64> {
+    moments.iter().map(|moment| of(&moment.wheels[k])).collect()
 }
 
 /// The tyres over the lap.
-fn tyres(station_m: &[f64], wheels: &[[Wheel; 4]]) -> LapView {
+fn tyres(station_m: &[f64], moments: &[Moment]) -> LapView {
     let lines = WHEELS.iter().enumerate().map(|(k, name)| {
         let line = LapLine::new(name.to_uppercase(), station_m);
         let channels = CHANNELS.iter().enumerate();
         channels.fold(line, |line, (panel, (.., of))| {
-            line.trace(panel, of_wheel(wheels, k, *of))
+            line.trace(panel, of_wheel(moments, k, *of))
         })
     });
     LapView::new("Tyres")
@@ -180,7 +180,7 @@ fn write_page(
     folder: &Path,
     outcome: &DrivenLine,
     summary: &LineSummary,
-    (driven_m, wheels): (&[DVec2], &[[Wheel; 4]]),
+    (driven_m, moments): (&[DVec2], &[Moment]),
 ) -> Result<()> {
     let car = &summary.head.subject.car;
     let mut page = HtmlReport::new(&summary.head.study, &format!("A line driven by the {car}"));
@@ -227,7 +227,7 @@ fn write_page(
     if let Some(map) = view.track_map(format!("Driven in {:.2} s", outcome.lap_time_s)) {
         map.write_svg(folder.join("map.svg"))?;
     }
-    let ay = drive.states.iter().map(|s| s[0] * s[2]).collect::<Vec<f64>>();
+    let ay: Vec<f64> = moments.iter().map(|moment| moment.ay_mps2).collect();
     let driven = CornerLap::new("4DOF car and driver", &drive.station_m, &state(0), &ay, 1.0);
     let ideal = outcome.point_mass.lap.as_ref().and_then(|lap| {
         let length = lap.station_m.len().min(lap.v_mps.len());
@@ -236,7 +236,7 @@ fn write_page(
     });
     page.corners(&driven.into_iter().chain(ideal).collect::<Vec<_>>(), &[])?;
     page.section("Tyres", "");
-    page.place(&tyres(&drive.station_m, wheels))?;
+    page.place(&tyres(&drive.station_m, moments))?;
     page.provenance("car", car);
     summary.head.record.provenance(&mut page, "laps driven");
     page.write(folder.join("report.html"))
