@@ -55,6 +55,7 @@ mod mopso;
 mod motion;
 mod nsga2;
 mod nsga3;
+#[cfg(feature = "studies")]
 mod place;
 pub mod problems;
 mod pso;
@@ -79,6 +80,7 @@ pub(crate) use mopso::thinning::PER_PLACE;
 pub use mopso::{Generation, MANY, Mopso};
 pub use nsga2::{Nsga2, Nsga2Settings};
 pub use nsga3::{Nsga3, Nsga3Settings};
+#[cfg(feature = "studies")]
 pub use place::SwarmPlace;
 pub use pso::Pso;
 pub use settings::{

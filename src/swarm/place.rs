@@ -59,7 +59,6 @@ impl SwarmPlace {
     ///
     /// # Errors
     /// Those of [`Mopso::new`].
-    #[cfg(feature = "studies")]
     pub(crate) fn swarm(self, problem: &Problem, settings: MopsoSettings) -> Result<Mopso> {
         match self {
             Self::Device => Mopso::in_single_precision(problem, settings),
