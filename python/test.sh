@@ -21,7 +21,8 @@ if [ -z "$wheel" ]; then
 fi
 "$python" -m pip install --quiet --disable-pip-version-check --no-deps "$wheel"
 # What is tested is the wheel: the folder beside has no native half, and would hide it.
-cp -r tests tests_ray benches examples pyproject.toml "$folder"
+cp -r tests benches examples pyproject.toml "$folder"
+[ "${1:-}" != ray ] || cp -r tests_ray "$folder"
 cd "$folder"
 if [ "${1:-}" = ray ]; then
     "$python" -m pytest -q -p no:cacheprovider tests_ray
