@@ -80,9 +80,8 @@ const ABOUT: About = About {
     spacing_m: 4.0,
     cross_sections_per_control: 4,
 };
-/// A thousandth of a lap better, at several times the cost: cross-sections ever closer together (m), with a control for as many
-/// of them as the track's own cross-sections can say, [`CROSS_SECTIONS_TO_SAY_CONTROL`] each; where controls come closer by a
-/// quarter at least.
+/// A thousandth of a lap better: the closest of these distances between cross-sections (m) that brings controls closer by a quarter
+/// at least. A control takes as many of the track's own cross-sections as [`CROSS_SECTIONS_TO_SAY_CONTROL`] says.
 const CLOSELY_M: [f64; 2] = [2.0, 1.0];
 const CLOSER: f64 = 0.75;
 const CROSS_SECTIONS_TO_SAY_CONTROL: f64 = 1.4;

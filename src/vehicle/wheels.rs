@@ -1,4 +1,4 @@
-//! What each tyre does at a moment of a drive.
+//! What each tyre does at a moment of a drive: load, slip and forces of the 4DOF car as [`CarModel::rate`] has them.
 
 use super::aero::aero_forces;
 use super::loads::wheel_loads;
@@ -11,7 +11,7 @@ use super::{Car, CarInput, CarModel, CarState};
 pub struct Wheel {
     /// Vertical load (N); negative of a wheel that has lifted.
     pub load_n: f64,
-    /// Slip ratio, positive when driven.
+    /// Slip ratio (-), positive when driven.
     pub slip_ratio: f64,
     /// Slip angle (rad), positive when the wheel drifts to its left.
     pub slip_angle_rad: f64,
@@ -22,7 +22,7 @@ pub struct Wheel {
 }
 
 impl Wheel {
-    /// Force over load: the friction that is used.
+    /// Force over load (-): the friction that is used. NaN of a wheel that has lifted.
     pub fn friction(&self) -> f64 {
         if self.load_n > 0.0 {
             self.longitudinal_n.hypot(self.lateral_n) / self.load_n
@@ -44,7 +44,7 @@ pub struct Moment {
     pub ay_mps2: f64,
 }
 
-/// A car at each moment of a drive: its state and inputs.
+/// A car at each moment of a drive, from its states and inputs: as many as `driven` has, in its order.
 pub fn moments_of(car: &Car, driven: &[(CarState<f64>, CarInput<f64>)]) -> Vec<Moment> {
     let flat = car.to_flat();
     match car.tyre_model() {
