@@ -1,8 +1,8 @@
 #!/bin/sh
-# Mixed small studies in a loop under a memory limit: soak.sh SECONDS [FOLDER]. What comes of equal seeds must be equal to the
-# byte, times aside; no study's peak of memory may grow from round to round; and a long sweep, many studies in one process,
-# may not take more than a short one. Prints a line for each round and the figures at the end; ends with 1 if anything
-# differed or grew. LAPSWARM names the program, else it is built. Reads /proc, so it needs Linux.
+# Mixed small studies in a loop under a memory limit: soak.sh SECONDS [FOLDER], of two rounds at least. What comes of equal
+# seeds must be equal to the byte, times aside; no study's peak of memory may grow from round to round; and a long sweep, many
+# studies in one process, may not take more than a short one. Prints a line for each round and the figures at the end; ends with
+# 1 if anything differed or grew. LAPSWARM names the program, else it is built. Reads /proc, so it needs Linux.
 set -eu
 seconds=${1:?how many seconds}
 root=$(cd "$(dirname "$0")/.." && pwd)
@@ -100,7 +100,7 @@ studies=0
 round=0
 began=$(date +%s)
 rm -f ./*.first ./*.sum ./*.peak ./*.peaks
-while [ $(($(date +%s) - began)) -lt "$seconds" ]; do
+while [ $round -lt 2 ] || [ $(($(date +%s) - began)) -lt "$seconds" ]; do
     round=$((round + 1))
     for backend in $backends; do
         to="--backend $backend --memory-limit-mib $limit"

@@ -399,7 +399,7 @@ fn two_processes_share_the_rows_and_do_none_twice() {
         (&row["run"], &row["exit_code"], &row["log"]),
         (&json!(3), &json!(0), &json!([]))
     );
-    assert!(row["seconds"].as_f64().is_some_and(|s| s > 0.0) && row["machine"].is_string());
+    assert!(row["elapsed_s"].as_f64().is_some_and(|s| s > 0.0) && row["machine"].is_string());
 }
 
 #[test]

@@ -55,7 +55,7 @@ class Sweep:
             {"run": row["run"]}
             | row["settings"]
             | row["figures"]
-            | {name: row[name] for name in ("exit_code", "machine", "seconds")}
+            | {name: row[name] for name in ("exit_code", "machine", "elapsed_s")}
             for row in self.rows
             if row["figures"]
         ]

@@ -446,7 +446,7 @@ impl<S: Study> Group<S> {
                         .device_faults
                         .clone_from(&S::record(&outcome).device_faults);
                     kept.row.front = S::front(&outcome);
-                    kept.seconds = S::record(&outcome).elapsed_s;
+                    kept.elapsed_s = S::record(&outcome).elapsed_s;
                     kept.log.clone_from(&kept.row.device_faults);
                     kept.log.extend(S::warnings(&summary));
                     if let Err(missed) = S::verdict(settings, &summary) {
@@ -460,9 +460,9 @@ impl<S: Study> Group<S> {
                     ended = ended.and(Err(Error::Interrupted(work.folder.to_owned())));
                 }
                 Err(error @ Error::Study(_)) => {
-                    let seconds = began.elapsed().as_secs_f64();
+                    let elapsed_s = began.elapsed().as_secs_f64();
                     work.keep(&KeptRow {
-                        seconds,
+                        elapsed_s,
                         ..work.failed(*number, &error)
                     })?;
                 }

@@ -30,7 +30,7 @@ pub struct KeptRow {
     /// The machine that it ran on.
     pub machine: String,
     /// Time that it took (s).
-    pub seconds: f64,
+    pub elapsed_s: f64,
     /// What it had to tell, and why it failed if it did.
     pub log: Vec<String>,
 }
@@ -172,7 +172,7 @@ impl<'a> Work<'a> {
             },
             exit_code: 0,
             machine: machine(),
-            seconds: 0.0,
+            elapsed_s: 0.0,
             log: Vec::new(),
         }
     }
