@@ -197,7 +197,7 @@ fn sweep_rows() -> Vec<u8> {
             },
             exit_code: 0,
             machine: "a".to_owned(),
-            seconds: 1.0,
+            elapsed_s: 1.0,
             log: Vec::new(),
         });
     rows.flat_map(|row| (serde_json::to_string(&row).unwrap() + "\n").into_bytes())

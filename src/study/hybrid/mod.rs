@@ -95,6 +95,7 @@ impl Study for Hybrid {
         113.5\n\nA study file has the same names, and scenarios of its own:\n  [scenarios.own]\n  mode = \"additional\"     # or \
         offset: the motor takes the engine's place\n  steer_rad = 0.03        # greatest steering at the wheels\n  \
         speed_mps = 60          # greatest speed\n  soc = 0.5               # least state of charge\n  \
+        start_soc = 0.5         # state of charge at the start; the car's own if left out\n  \
         energy_mj = 3           # energy out of the store in a lap";
     type Settings = HybridStudySettings;
     type State = Journal;

@@ -49,8 +49,6 @@ pub struct ScenarioFigures {
 
 impl ScenarioFigures {
     fn of(setup: &HybridSetup, own: &ReportedLap, additional: &ReportedLap) -> Self {
-        let store = &setup.car.hybrid.store;
-        let soc = |change: f64| store.start_soc + change / store.capacity_j;
         let lap = &own.lap;
         let greatest = own.change_j().into_iter().fold(0.0, f64::max);
         let generating = own.segments.iter().filter(|s| s.generator > 0.0).map(|s| s.time);
@@ -59,8 +57,8 @@ impl ScenarioFigures {
             deployed_mj: lap.deployed / 1e6,
             harvested_k_mj: lap.harvested_k / 1e6,
             harvested_h_mj: lap.harvested_h / 1e6,
-            soc_end: soc(lap.change),
-            soc_greatest: soc(greatest),
+            soc_end: own.soc(lap.change),
+            soc_greatest: own.soc(greatest),
             fuel_l: lap.fuel / setup.car.fuel_density_kgpl,
             motor_time_share: lap.motor_time / lap.time,
             generator_time_share: generating.sum::<f64>() / lap.time,
@@ -349,11 +347,8 @@ pub(super) fn write_files(folder: &Path, solved: &Solved<'_, Hybrid>) -> Result<
 fn write_lap(path: &Path, setup: &HybridSetup, lap: &ReportedLap) -> Result<()> {
     let each = |f: fn(&SegmentEnergy<f64>) -> f64| lap.segments.iter().map(f).collect::<Vec<f64>>();
     let power = |f: fn(&SegmentEnergy<f64>) -> f64| power_kw(setup, lap, f);
-    let store = &setup.car.hybrid.store;
     let change_j = lap.change_j();
-    let soc = change_j[..lap.segments.len()]
-        .iter()
-        .map(|c| store.start_soc + c / store.capacity_j);
+    let soc = change_j[..lap.segments.len()].iter().map(|c| lap.soc(*c));
     Table::new()
         .numbers("station", "m", &lap.station_m)
         .numbers("v", "m/s", each(|s| s.start.sqrt()))

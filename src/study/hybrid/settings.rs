@@ -211,7 +211,12 @@ fn scenario_table(scenario: &Scenario) -> String {
     let (name, mode) = (quoted(&scenario.name), quoted(scenario.mode.name()));
     let mut gates = scenario.gates;
     let rows = GATES.map(|(key, _, of)| format!("{key} = {:?}\n", of(&mut gates)));
-    format!("[scenarios.{name}]\nmode = {mode}\n{}", rows.concat())
+    let start = scenario.start_soc.map(|soc| format!("start_soc = {soc:?}\n"));
+    format!(
+        "[scenarios.{name}]\nmode = {mode}\n{}{}",
+        rows.concat(),
+        start.unwrap_or_default()
+    )
 }
 
 fn read_scenario(name: &str, row: &Table<'_>) -> Result<Scenario> {
@@ -225,8 +230,12 @@ fn read_scenario(name: &str, row: &Table<'_>) -> Result<Scenario> {
             *of(&mut gates) = value;
         }
     }
-    let name = name.to_owned();
-    Ok(Scenario { name, mode, gates })
+    Ok(Scenario {
+        name: name.to_owned(),
+        mode,
+        gates,
+        start_soc: row.number("start_soc", 0.0, 1.0, "")?,
+    })
 }
 
 #[cfg(test)]
@@ -243,6 +252,7 @@ mod tests {
                 steer_rad: 0.07,
                 ..Gates::OPEN
             },
+            start_soc: Some(0.4),
         };
         assert_repeated(&HybridStudySettings {
             scenarios: vec![own],

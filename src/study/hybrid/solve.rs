@@ -2,8 +2,8 @@
 
 use super::scenario::drive_engine_alone;
 use super::{
-    DrivenScenario, FrontFigures, Hybrid, Optimised, Outcome, Scenario, drive, search_front, search_strategy,
-    size, stint, worth,
+    DrivenScenario, FrontFigures, Hybrid, Optimised, Outcome, Scenario, search_front, search_strategy, size,
+    stint, worth,
 };
 use crate::error::Result;
 use crate::evaluate::add_failures;
@@ -43,8 +43,8 @@ pub(super) fn deploy(work: Work<'_, Hybrid>) -> Result<Option<Outcome>> {
     let engine = drive_engine_alone(&setup)?;
     let driven = |s: &Scenario| {
         Ok(DrivenScenario {
-            own: drive(&setup, &s.name, s.mode, s.gates)?,
-            additional: drive(&setup, &s.name, Mode::Additional, s.gates)?,
+            own: s.drive(&setup, s.mode)?,
+            additional: s.drive(&setup, Mode::Additional)?,
         })
     };
     let scenarios = settings

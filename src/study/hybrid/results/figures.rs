@@ -50,7 +50,6 @@ fn road(setup: &HybridSetup) -> Road {
 pub fn laps(outcome: &Outcome, laps: &[&ReportedLap], title: String) -> LapView {
     let (setup, engine) = (&outcome.setup, &outcome.engine);
     let (alone_mps, alone_s) = (speeds(engine), summed(engine, |s| s.time));
-    let store = &setup.car.hybrid.store;
     let line = |lap: &&ReportedLap| {
         let n = lap.segments.len();
         let line = LapLine::new(words(lap), &lap.station_m[..n])
@@ -63,7 +62,7 @@ pub fn laps(outcome: &Outcome, laps: &[&ReportedLap], title: String) -> LapView 
         }
         let soc = lap.change_j()[1..]
             .iter()
-            .map(|j| store.start_soc + j / store.capacity_j)
+            .map(|j| lap.soc(*j))
             .collect::<Vec<f64>>();
         line.trace(1, less(&speeds(lap), &alone_mps))
             .trace(2, less(&alone_s, &summed(lap, |s| s.time)))
