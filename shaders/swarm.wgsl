@@ -23,8 +23,6 @@ struct Generation {
     mutation_share: f32,
     mutation_power: f32,
     mutation_root: f32,
-    log_left: f32,
-    mu: f32,
     pulls: vec2<f32>,
 }
 
@@ -161,11 +159,7 @@ fn advance(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups
     } else {
         pull(who, leader);
     }
-    if generation.mutation == 1u {
-        if unit(choice.w) < generation.mutation_share { disturb(who); }
-    } else if generation.mutation > 1u {
-        redraw(who);
-    }
+    if generation.mutation == 1u && unit(choice.w) < generation.mutation_share { disturb(who); }
 }
 
 fn pull(who: u32, leader: u32) {
@@ -247,17 +241,4 @@ fn polynomial(x: f32, uniform_draw: f32) -> f32 {
     let base = part + (1.0 - part) * own_power(room, generation.mutation_power);
     let step = own_power(base, generation.mutation_root) - 1.0;
     return held(select(x - step, x + step, low));
-}
-
-// With a probability that falls over the run, one coordinate anew within that share of the range.
-fn redraw(who: u32) {
-    let draws = words(MUTATION, who, 0u);
-    let mu = select(generation.mu, max(unit(draws.x), 1e-3), generation.mutation == 3u);
-    let probability = own_exp(Wheels(generation.log_left / mu)).x;
-    if unit(draws.y) >= probability { return; }
-    let i = place(who, generation.dimensions, below(draws.z, generation.dimensions));
-    let x = position[i];
-    let low = max(x - probability, 0.0);
-    let high = min(x + probability, 1.0);
-    position[i] = low + unit(draws.w) * (high - low);
 }

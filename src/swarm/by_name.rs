@@ -145,10 +145,11 @@ fn mopso(name: &str, problem: &Problem, sizes: Sizes) -> Result<Mopso> {
         },
         "smpso" => MopsoSettings::smpso(),
         "thesis" => MopsoSettings::thesis(),
-        "thesis_random_mu" => MopsoSettings {
-            mutation: Mutation::Random,
-            ..MopsoSettings::thesis()
-        },
+        "thesis_random_mu" => {
+            let mut thesis = MopsoSettings::thesis();
+            thesis.motion.mutation = Mutation::Random;
+            thesis
+        }
         _ => MopsoSettings::default(),
     };
     let settings = MopsoSettings {

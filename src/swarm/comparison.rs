@@ -74,8 +74,13 @@ pub fn compare(
         .map(|seed| {
             let sizes = sizes(problem.problem(), evaluations, seed);
             let mut optimiser = by_name(name, problem.problem(), sizes)?;
-            run(optimiser.as_mut(), &mut problem.evaluator(), |_| {
-                ControlFlow::Continue(())
+            let most = (sizes.population * sizes.iterations) as u64;
+            run(optimiser.as_mut(), &mut problem.evaluator(), |p| {
+                // Trials of mutation are evaluations too, and the budget is one for all.
+                match p.evaluations >= most {
+                    true => ControlFlow::Break(()),
+                    false => ControlFlow::Continue(()),
+                }
             })?;
             let found = optimiser.front();
             let front = match found.is_feasible() {

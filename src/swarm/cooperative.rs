@@ -8,7 +8,7 @@
 
 use super::checkpoint::to_bytes;
 use super::motion::{Particles, Purpose};
-use super::settings::{BoundHandling, Constriction, PsoSettings, Randomness, Schedule, setting};
+use super::settings::{BoundHandling, Constriction, Mutation, PsoSettings, Randomness, Schedule, setting};
 use super::space::Space;
 use super::{Counters, Front, Optimiser};
 use crate::error::Result;
@@ -43,6 +43,7 @@ impl Default for CooperativeSettings {
                 speed_limit: 0.5,
                 bounds: BoundHandling::Bounce,
                 difference_share: 0.0,
+                mutation: Mutation::None,
             },
             groups: 6,
         }
@@ -57,6 +58,14 @@ impl CooperativeSettings {
     pub fn validate(&self) -> Result<()> {
         if self.groups == 0 {
             return Err(setting("groups", self.groups.to_string(), "1 or more"));
+        }
+        if self.motion.mutation != Mutation::None {
+            let found = format!("{:?}", self.motion.mutation);
+            return Err(setting(
+                "mutation",
+                found,
+                "none: the cooperative swarm has no mutation",
+            ));
         }
         self.motion.validate()
     }

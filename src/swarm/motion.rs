@@ -1,9 +1,10 @@
 //! What all swarms share: particles in the unit cube, their velocities, and the pulls on them.
 
-use super::settings::{BoundHandling, Constriction, DRAWN_PULLS, PsoSettings, Randomness};
+use super::metrics::dominates;
+use super::settings::{BoundHandling, Constriction, DRAWN_PULLS, Mutation, PsoSettings, Randomness};
 use super::space::Space;
 use crate::error::Result;
-use crate::evaluate::Problem;
+use crate::evaluate::{Evaluation, Problem};
 use crate::random::Random;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
@@ -125,6 +126,49 @@ impl Particles {
         }
     }
 
+    /// Mutates one particle, or makes a trial beside it, at the share of the run and in the iteration.
+    pub fn mutate(
+        &mut self,
+        particle: usize,
+        mutation: Mutation,
+        (share, iteration): (f64, usize),
+        random: Random,
+        trials: &mut Trials,
+    ) {
+        let (when, who) = (iteration as u32, particle as u32);
+        let uniform = |index| random.uniform(Purpose::Mutation as u32, when, who, index);
+        let d = self.dimensions();
+        let mu = match mutation {
+            Mutation::None => return,
+            Mutation::Fixed(mu) => mu,
+            Mutation::Random => uniform(0).max(1e-3),
+            Mutation::Polynomial { share, index } => {
+                if uniform(0) < share {
+                    for (k, i) in self.row(particle).enumerate() {
+                        if uniform(1 + 2 * k as u32) * (d as f64) < 1.0 {
+                            self.position[i] = polynomial(self.position[i], uniform(2 + 2 * k as u32), index);
+                        }
+                    }
+                }
+                return;
+            }
+        };
+        // A range that shrinks over the run (equation 5.13 of the thesis).
+        let probability = (1.0 - share.min(1.0)).powf(1.0 / mu);
+        if d == 0 || uniform(1) >= probability {
+            return;
+        }
+        let k = random.below(d, Purpose::Mutation as u32, when, who, 2);
+        let mut trial = self.position[self.row(particle)].to_vec();
+        let (low, high) = (
+            (trial[k] - probability).max(0.0),
+            (trial[k] + probability).min(1.0),
+        );
+        trial[k] = low + uniform(3) * (high - low);
+        trials.of.push(particle);
+        trials.position.extend(trial);
+    }
+
     /// Brings one coordinate back into the cube.
     pub fn confine(&mut self, i: usize, handling: BoundHandling) {
         let inside = self.position[i].clamp(0.0, 1.0);
@@ -136,6 +180,55 @@ impl Particles {
                 BoundHandling::Reverse => -1.0,
             };
         }
+    }
+}
+
+/// Trials beside particles, for which an evaluation has rows after those of the particles.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub(super) struct Trials {
+    of: Vec<usize>,
+    position: Vec<f64>,
+}
+
+impl Trials {
+    pub fn len(&self) -> usize {
+        self.of.len()
+    }
+
+    /// The candidates that particles and trials stand for.
+    pub fn candidates(&self, particles: &Particles) -> Vec<f64> {
+        let mut candidates = particles.candidates();
+        candidates.extend(particles.space.scaled(&self.position, self.len()));
+        candidates
+    }
+
+    /// Puts particles where a trial dominates them, forgets all trials, and says for each particle which row of the evaluation
+    /// is its own then.
+    pub fn settle(
+        &mut self,
+        particles: &mut Particles,
+        evaluation: &Evaluation,
+        objectives: usize,
+    ) -> Vec<usize> {
+        let mut rows: Vec<usize> = (0..particles.count).collect();
+        let Self { of, position } = std::mem::take(self);
+        for (j, particle) in of.into_iter().enumerate() {
+            let trial = particles.count + j;
+            let Some(tried) = evaluation.success(trial, objectives) else {
+                continue;
+            };
+            let better = evaluation.success(particle, objectives).is_none_or(|own| {
+                let [before, after] = [particle, trial].map(|row| evaluation.violation(row));
+                after < before || (after == before && dominates(tried, own))
+            });
+            if better {
+                let d = particles.dimensions();
+                let place = particles.row(particle);
+                particles.position[place].copy_from_slice(&position[j * d..(j + 1) * d]);
+                rows[particle] = trial;
+            }
+        }
+        rows
     }
 }
 
@@ -161,4 +254,53 @@ pub(super) fn polynomial(x: f64, uniform: f64, index: f64) -> f64 {
         1.0 - base.powf(power)
     };
     (x + step).clamp(0.0, 1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::evaluate::{Objective, Variable};
+
+    /// At the start of a run every particle has a trial, in one dimension. Those that dominate take their particles' places.
+    #[test]
+    fn trials_take_the_places_of_what_they_dominate() {
+        let problem = Problem {
+            variables: ["a", "b"].map(|name| Variable::new(name, "-", 0.0, 1.0)).to_vec(),
+            objectives: ["f", "g"].map(|name| Objective::new(name, "-")).to_vec(),
+        };
+        let random = Random::new(3);
+        let mut particles = Particles::scattered(&problem, 4, random).expect("particles");
+        let mut trials = Trials::default();
+        for particle in 0..4 {
+            particles.mutate(particle, Mutation::Fixed(0.5), (0.0, 1), random, &mut trials);
+        }
+        assert_eq!(trials.len(), 4);
+        let candidates = trials.candidates(&particles);
+        assert_eq!(candidates.len(), 2 * 8);
+        let row = |k: usize| &candidates[2 * k..2 * k + 2];
+        for particle in 0..4 {
+            let moved = row(particle)
+                .iter()
+                .zip(row(4 + particle))
+                .filter(|(a, b)| a != b);
+            assert_eq!(moved.count(), 1, "one dimension of particle {particle}");
+        }
+        // Better in both, better in one, equal, and beside a particle that failed.
+        let own = [[1.0, 1.0], [1.0, 1.0], [1.0, 1.0], [f64::NAN; 2]];
+        let tried = [[0.5, 0.5], [0.5, 2.0], [1.0, 1.0], [9.0, 9.0]];
+        let evaluation = Evaluation::of_rows(
+            [own, tried]
+                .concat()
+                .iter()
+                .map(|row| (row.to_vec(), None))
+                .collect(),
+        );
+        let rows = trials.settle(&mut particles, &evaluation, 2);
+        assert_eq!(rows, [4, 1, 2, 7]);
+        assert_eq!(trials.len(), 0);
+        let settled = particles.candidates();
+        for (particle, of) in rows.into_iter().enumerate() {
+            assert_eq!(&settled[2 * particle..2 * particle + 2], row(of));
+        }
+    }
 }

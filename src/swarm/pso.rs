@@ -1,7 +1,7 @@
 //! Single-objective particle swarm.
 
 use super::checkpoint::to_bytes;
-use super::motion::{Particles, Purpose};
+use super::motion::{Particles, Purpose, Trials};
 use super::settings::PsoSettings;
 use super::space::Space;
 use super::{AcceptsMigrants, Counters, Front, Islands, Optimiser};
@@ -16,6 +16,7 @@ pub struct Pso {
     settings: PsoSettings,
     random: Random,
     particles: Particles,
+    trials: Trials,
     best_position: Vec<f64>,
     best: Vec<Worth>,
     leader: usize,
@@ -40,6 +41,7 @@ impl Pso {
             best: vec![Worth::FAILED; settings.population],
             random,
             particles,
+            trials: Trials::default(),
             settings,
             leader: 0,
             counters: Counters::default(),
@@ -78,6 +80,14 @@ impl Pso {
                     self.random,
                 );
             }
+            let now = (share, self.counters.iteration);
+            self.particles.mutate(
+                particle,
+                self.settings.mutation,
+                now,
+                self.random,
+                &mut self.trials,
+            );
         }
     }
 
@@ -146,13 +156,16 @@ impl AcceptsMigrants for Pso {
 
 impl Optimiser for Pso {
     fn ask(&mut self) -> Vec<f64> {
-        self.particles.candidates()
+        self.trials.candidates(&self.particles)
     }
 
     fn tell(&mut self, evaluation: &Evaluation) -> Result<()> {
-        evaluation.check(self.settings.population, 1)?;
+        let asked = self.particles.count + self.trials.len();
+        evaluation.check(asked, 1)?;
         let d = self.particles.dimensions();
-        for (particle, worth) in evaluation.worths(1).into_iter().enumerate() {
+        let worths = evaluation.worths(1);
+        let rows = self.trials.settle(&mut self.particles, evaluation, 1);
+        for (particle, worth) in rows.into_iter().map(|row| worths[row]).enumerate() {
             if worth < self.best[particle] {
                 self.best[particle] = worth;
                 let range = particle * d..(particle + 1) * d;
@@ -162,7 +175,7 @@ impl Optimiser for Pso {
                 self.leader = particle;
             }
         }
-        self.counters.told(self.settings.population);
+        self.counters.told(asked);
         self.advance();
         Ok(())
     }

@@ -94,6 +94,8 @@ pub struct PsoSettings {
     /// particles, plus the difference of two others' bests. They follow valleys that run across the axes, where
     /// the pulls of a swarm alone stall. Zero gives the plain swarm.
     pub difference_share: f64,
+    /// Mutation.
+    pub mutation: Mutation,
 }
 
 impl Default for PsoSettings {
@@ -110,20 +112,34 @@ impl Default for PsoSettings {
             speed_limit: 0.5,
             bounds: BoundHandling::Bounce,
             difference_share: 0.8,
+            mutation: Mutation::None,
         }
     }
 }
 
 impl PsoSettings {
-    /// The thesis's swarm: inertia 0.5 to 0.1, c1 1.5, c2 2.5, a random number per dimension.
+    /// The thesis's swarm for one objective of an identification: inertia 0.5 to 0.1, c1 and c2 2, a random number per dimension.
     pub fn thesis() -> Self {
         Self {
             population: 50,
             iterations: 100,
+            cognitive: Schedule::Fixed(2.0),
+            social: Schedule::Fixed(2.0),
             speed_limit: 1.0,
             bounds: BoundHandling::Absorb,
             difference_share: 0.0,
             ..Self::default()
+        }
+    }
+
+    /// The thesis's swarm for one objective of a line: inertia 0.1 to 1, c1 3, c2 1, mutation with `mu` 0.95.
+    pub fn thesis_lines() -> Self {
+        Self {
+            inertia: Schedule::Linear { from: 0.1, to: 1.0 },
+            cognitive: Schedule::Fixed(3.0),
+            social: Schedule::Fixed(1.0),
+            mutation: Mutation::Fixed(0.95),
+            ..Self::thesis()
         }
     }
 
@@ -165,7 +181,16 @@ impl PsoSettings {
                 "a share from 0 to 1",
             ));
         }
-        Ok(())
+        match self.mutation {
+            Mutation::Fixed(mu) if !(mu > 0.0 && mu <= 10.0) => {
+                Err(setting("mutation", mu.to_string(), "a number above 0 up to 10"))
+            }
+            Mutation::Polynomial { share, index } if !((0.0..=1.0).contains(&share) && index >= 0.0) => {
+                let found = format!("a share of {share}, an index of {index}");
+                Err(setting("mutation", found, "a share from 0 to 1, an index from 0"))
+            }
+            _ => Ok(()),
+        }
     }
 }
 
@@ -189,13 +214,14 @@ pub enum Truncation {
     MutualNearest,
 }
 
-/// What disturbs a particle after its move.
+/// What disturbs a particle after its move: the particle itself, or a trial beside it, which takes its place if it dominates it
+/// (less violation, or no objective worse and one better). Each trial is an evaluation more.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Mutation {
     /// Nothing.
     None,
-    /// With probability `(1 - t)^(1/mu)` at the share `t` of the run, one dimension is redrawn within that share
-    /// of the range \[4\], with this exponent `mu`.
+    /// With probability `(1 - t)^(1/mu)` at the share `t` of the run, a trial in one dimension, drawn within that share of the
+    /// range \[4\], with this exponent `mu`. For swarms on the host.
     Fixed(f64),
     /// The same with a `mu` drawn for each particle and iteration, between zero and one.
     Random,
@@ -210,6 +236,11 @@ pub enum Mutation {
 }
 
 impl Mutation {
+    /// Whether it makes trials.
+    pub(super) fn tries(self) -> bool {
+        matches!(self, Self::Fixed(_) | Self::Random)
+    }
+
     /// Polynomial mutation with the constants of SMPSO \[6\].
     pub const SMPSO: Self = Self::Polynomial {
         share: 1.0 / 6.0,
@@ -233,8 +264,6 @@ pub struct MopsoSettings {
     pub reference: Option<Vec<f64>>,
     /// Choice of leaders.
     pub leaders: Leaders,
-    /// Mutation.
-    pub mutation: Mutation,
 }
 
 impl Default for MopsoSettings {
@@ -270,12 +299,12 @@ impl MopsoSettings {
                 speed_limit: 0.5,
                 bounds: BoundHandling::Reverse,
                 difference_share: 0.0,
+                mutation: Mutation::SMPSO,
             },
             archive: 100,
             truncation: Truncation::Crowding,
             reference: None,
             leaders: Leaders::Tournament,
-            mutation: Mutation::SMPSO,
         }
     }
 
@@ -293,15 +322,19 @@ impl MopsoSettings {
         self
     }
 
-    /// The thesis's swarm: its [`PsoSettings::thesis`], mutation with `mu` 0.3.
+    /// The thesis's swarm for several objectives: inertia 0.5 to 0.1, c1 1.5, c2 2.5, mutation with `mu` 0.3.
     pub fn thesis() -> Self {
         Self {
-            motion: PsoSettings::thesis(),
+            motion: PsoSettings {
+                cognitive: Schedule::Fixed(1.5),
+                social: Schedule::Fixed(2.5),
+                mutation: Mutation::Fixed(0.3),
+                ..PsoSettings::thesis()
+            },
             archive: 100,
             truncation: Truncation::Crowding,
             reference: None,
             leaders: Leaders::Tournament,
-            mutation: Mutation::Fixed(0.3),
         }
     }
 
@@ -322,16 +355,7 @@ impl MopsoSettings {
                 return Err(setting("reference", found, expected));
             }
         }
-        match self.mutation {
-            Mutation::Fixed(mu) if !(mu > 0.0 && mu <= 10.0) => {
-                Err(setting("mutation", mu.to_string(), "a number above 0 up to 10"))
-            }
-            Mutation::Polynomial { share, index } if !((0.0..=1.0).contains(&share) && index >= 0.0) => {
-                let found = format!("a share of {share}, an index of {index}");
-                Err(setting("mutation", found, "a share from 0 to 1, an index from 0"))
-            }
-            _ => Ok(()),
-        }
+        Ok(())
     }
 }
 

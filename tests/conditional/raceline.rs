@@ -30,8 +30,8 @@ fn cold(track: &str, sections: usize, objectives: &[LineObjective]) -> RacelineS
         sections,
         objectives: objectives.to_vec(),
         car_width_m: 0.0,
-        warm_start: false,
-        local_search: false,
+        warm_start: Some(false),
+        local_search: Some(false),
         backend: BackendChoice::Simd,
         ..RacelineSettings::default()
     }

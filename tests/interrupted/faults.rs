@@ -56,8 +56,8 @@ fn faults_survive_a_resume_and_the_summary_names_what_ended_the_run() {
             population: 16,
             iterations: 12,
             objectives: vec![LineObjective::Length],
-            warm_start: false,
-            local_search: false,
+            warm_start: Some(false),
+            local_search: Some(false),
             backend: BackendChoice::Gpu,
             algorithm,
             ..RacelineSettings::default()
@@ -130,8 +130,8 @@ fn a_study_ends_without_the_adapter_that_it_began_with() {
         population: 16,
         iterations: 12,
         objectives: vec![LineObjective::Length, LineObjective::Gamma],
-        warm_start: false,
-        local_search: false,
+        warm_start: Some(false),
+        local_search: Some(false),
         backend: BackendChoice::Gpu,
         ..RacelineSettings::default()
     };
@@ -169,8 +169,8 @@ fn a_swarm_on_the_device_loses_nothing_to_faults_and_breaks() {
         iterations: 8,
         archive: 12,
         objectives: vec![LineObjective::Length, LineObjective::Gamma],
-        warm_start: false,
-        local_search: false,
+        warm_start: Some(false),
+        local_search: Some(false),
         backend: BackendChoice::Gpu,
         swarm: SwarmPlace::Device,
         ..RacelineSettings::default()

@@ -387,8 +387,6 @@ fn a_generation_has_the_hosts_offsets() {
         mutation_share,
         mutation_power,
         mutation_root,
-        log_left,
-        mu,
         pulls
     );
     assert_eq!((members, size), (host.to_vec(), size_of::<Generation>()));

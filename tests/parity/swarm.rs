@@ -180,10 +180,8 @@ const GENERATIONS: usize = 100;
 fn swarms_in_lanes_and_on_the_device_in_lockstep() {
     let context = the_device();
     let default = MopsoSettings::default();
-    let thesis = MopsoSettings {
-        mutation: Mutation::Random,
-        ..MopsoSettings::thesis()
-    };
+    let mut thesis = MopsoSettings::thesis();
+    thesis.motion.mutation = Mutation::None;
     // A block that is not full, and more than one part.
     for (name, settings, population) in [
         ("zdt1", default.clone(), 4100),

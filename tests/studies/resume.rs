@@ -334,8 +334,8 @@ fn cold_searches_are_resumed_bit_for_bit_from_every_stage() {
     for base in [lines(), abbey] {
         let settings = RacelineSettings {
             objectives: vec![LineObjective::LapTime],
-            warm_start: false,
-            local_search: false,
+            warm_start: Some(false),
+            local_search: Some(false),
             ..base
         };
         let setup = raceline::set_up(&settings).unwrap();
@@ -359,7 +359,7 @@ fn particle_swarms_are_resumed_bit_for_bit() {
         let settings = RacelineSettings {
             algorithm,
             groups: 4,
-            local_search: false,
+            local_search: Some(false),
             ..lines()
         };
         let setup = raceline::set_up(&settings).unwrap();

@@ -9,8 +9,9 @@ use lapswarm::optimum::DeploymentSearch;
 use lapswarm::random::Random;
 use lapswarm::study::framework::{solve_unobserved, write_results};
 use lapswarm::study::hybrid::{HybridStudySettings, set_up as hybrid_set_up};
-use lapswarm::study::raceline::{Raceline, RacelineSettings, Summary, set_up};
+use lapswarm::study::raceline::{LineAlgorithm, Raceline, RacelineSettings, Summary, set_up};
 use lapswarm::study::transient::NamedLine;
+use lapswarm::swarm::Schedule;
 use std::fmt::Write as _;
 use std::path::Path;
 use std::sync::Arc;
@@ -379,4 +380,56 @@ fn deployments_start_from_a_standstill() {
         .expect_err("a short start")
         .to_string();
     assert!(error.contains("start") && error.contains("3 shares"), "{error}");
+}
+
+/// The published swarm searches the front as it does single lines: through every cross-section, cold, without gradients, with the
+/// coefficients that the settings name. Where a warm start is asked for, it has one.
+#[test]
+fn the_published_swarm_finds_fronts_by_itself() {
+    let settings = RacelineSettings {
+        track: "stadium:300:80:12".to_owned(),
+        sections: 60,
+        objectives: vec![LineObjective::Gamma, LineObjective::Length],
+        algorithm: LineAlgorithm::Thesis,
+        population: 20,
+        iterations: 20,
+        backend: BackendChoice::Simd,
+        ..RacelineSettings::default()
+    };
+    let front_of = |settings: &RacelineSettings| {
+        let found = solve_unobserved::<Raceline>(settings, &set_up(settings).unwrap()).unwrap();
+        (found.front.unwrap(), found.objectives)
+    };
+    let (cold, singles) = front_of(&settings);
+    // Trials of mutation are evaluations beyond those of the particles.
+    assert!(cold.evaluations > 20 * 20);
+    // No line of its own swarm's front is as good as the reference optima, and none of these was put in.
+    for (k, single) in singles.iter().enumerate() {
+        let least = cold
+            .objectives
+            .iter()
+            .map(|row| row[k])
+            .fold(f64::INFINITY, f64::min);
+        let exact = single.exact.as_ref().unwrap().worth(single.objective);
+        assert!(least > 1.01 * exact, "{least} beside {exact}");
+        assert!(single.best.worth(single.objective) > 1.01 * exact);
+    }
+    let heavy = RacelineSettings {
+        inertia: Some(Schedule::Fixed(0.9)),
+        ..settings.clone()
+    };
+    assert_ne!(front_of(&heavy).0.objectives, cold.objectives);
+    let warm = RacelineSettings {
+        warm_start: Some(true),
+        ..settings
+    };
+    let (front, singles) = front_of(&warm);
+    for (k, single) in singles.iter().enumerate() {
+        let least = front
+            .objectives
+            .iter()
+            .map(|row| row[k])
+            .fold(f64::INFINITY, f64::min);
+        assert!(least <= single.exact.as_ref().unwrap().worth(single.objective) * 1.001);
+    }
 }

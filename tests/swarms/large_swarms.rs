@@ -157,8 +157,10 @@ fn threads_change_nothing() {
     let variants = [
         settings(MANY + 1, 10),
         MopsoSettings {
-            mutation: Mutation::Random,
-            truncation: Truncation::Crowding,
+            motion: PsoSettings {
+                mutation: Mutation::None,
+                ..MopsoSettings::thesis().motion
+            },
             ..MopsoSettings::thesis()
         },
         MopsoSettings {
@@ -166,11 +168,11 @@ fn threads_change_nothing() {
                 constriction: Constriction::Clerc,
                 randomness: Randomness::PerDimension,
                 bounds: BoundHandling::Bounce,
+                mutation: Mutation::None,
                 ..MopsoSettings::smpso().motion
             },
             leaders: Leaders::Random,
             truncation: Truncation::MutualNearest,
-            mutation: Mutation::None,
             archive: 30,
             reference: None,
         },
@@ -258,4 +260,34 @@ fn nothing_that_can_be_evaluated_is_survived() {
     assert!(swarm.front().objectives.is_empty());
     assert_eq!(swarm.best(), [f64::INFINITY; 2]);
     assert_eq!(swarm.violation(), f64::INFINITY);
+}
+
+/// The published mutation is a trial beside a particle, an evaluation more: it is the same in a swarm of many particles, which is
+/// then kept in double precision, and a swarm in single precision refuses it.
+#[test]
+fn published_mutation_makes_trials_in_swarms_of_any_size() {
+    let test = TestProblem::sized("zdt1", 5).unwrap();
+    for population in [50, MANY] {
+        let settings = MopsoSettings::thesis().with_size(population, 6);
+        let mut swarm = Mopso::new(test.problem(), settings).unwrap();
+        let mut evaluator = test.threaded_evaluator();
+        let mut rows = Vec::new();
+        while !swarm.done() {
+            let asked = swarm.ask();
+            rows.push(asked.len() / 5);
+            swarm.tell(&evaluator.evaluate(&asked).unwrap()).unwrap();
+        }
+        assert_eq!(swarm.evaluations(), rows.iter().sum::<usize>() as u64);
+        // Nobody has moved at first. Then (1 - t)^(1 / 0.3) of the particles have a trial, and none at the end.
+        assert_eq!((rows[0], rows[5]), (population, population));
+        for (t, rows) in [(0.2, rows[1]), (0.4, rows[2])] {
+            let expected = (1.0f64 - t).powf(1.0 / 0.3) * population as f64;
+            let trials = (rows - population) as f64;
+            // Five standard deviations of a count.
+            assert!(
+                (trials - expected).abs() <= 5.0 * expected.sqrt(),
+                "{trials} trials, {expected} expected"
+            );
+        }
+    }
 }

@@ -14,7 +14,7 @@ use lapswarm::study::identify::{self, IdentifySettings, ObjectiveChoice};
 use lapswarm::study::raceline::{self, RacelineSettings};
 use lapswarm::swarm::comparison::quartiles;
 use lapswarm::swarm::metrics::{Scale, hypervolume};
-use lapswarm::swarm::{MULTI_OBJECTIVE, Sizes, several_by_name};
+use lapswarm::swarm::{MULTI_OBJECTIVE, Optimiser, Sizes, several_by_name};
 use lapswarm::{Error, Result};
 use serde::Serialize;
 use std::path::PathBuf;
@@ -310,7 +310,10 @@ impl<K: OnDevice> Case<K> {
         drop(start);
         let mut history = History::default();
         let (mut seconds, mut evaluating, mut noted) = (0.0, 0.0, 0.0);
-        while !optimiser.done() {
+        let most = (sizes.population * sizes.iterations) as u64;
+        // Trials of mutation are evaluations too, and the budget is one for all.
+        let over = |optimiser: &dyn Optimiser| optimiser.done() || optimiser.evaluations() >= most;
+        while !over(optimiser.as_ref()) {
             let began = Instant::now();
             let population = optimiser.ask();
             let asked = began.elapsed().as_secs_f64();
@@ -319,7 +322,7 @@ impl<K: OnDevice> Case<K> {
             optimiser.tell(&evaluation)?;
             seconds += began.elapsed().as_secs_f64();
             let done = optimiser.evaluations();
-            if done as f64 >= SPACING * noted || optimiser.done() {
+            if done as f64 >= SPACING * noted || over(optimiser.as_ref()) {
                 noted = done as f64;
                 history.evaluations.push(done);
                 history.seconds.push(seconds);

@@ -1,5 +1,6 @@
 //! What all studies share: the shape of a study, its life from settings to results, its state, its folder, its record.
 
+mod coefficients;
 mod inputs;
 pub mod journal;
 mod life;
@@ -10,6 +11,7 @@ mod record;
 pub mod state_file;
 mod study;
 
+pub use coefficients::{Coefficients, Mutated, Scheduled};
 pub use inputs::{InputFiles, Inputs};
 pub use life::{Answer, Finished, Request, TIME_LIMIT, solve_unobserved, write_results};
 pub(in crate::study) use life::{TimeLimit, resumed_or_new};

@@ -304,6 +304,7 @@ impl IdentifySettings {
 fn swarm_settings(settings: &IdentifySettings) -> PsoSettings {
     let several = settings.objectives.len() > 1;
     let base = match settings.algorithm {
+        Algorithm::Thesis if several => MopsoSettings::thesis().motion,
         Algorithm::Thesis => PsoSettings::thesis(),
         _ => PsoSettings::default(),
     };
@@ -327,27 +328,25 @@ fn swarm_settings(settings: &IdentifySettings) -> PsoSettings {
             )
         }
     };
-    PsoSettings {
+    settings.coefficients().apply(PsoSettings {
         population,
         iterations,
         seed: settings.seed,
-        inertia: settings.inertia.unwrap_or(base.inertia),
-        cognitive: settings.cognitive.unwrap_or(base.cognitive),
-        social: settings.social.unwrap_or(base.social),
         ..base
-    }
+    })
 }
 
 /// The thesis's swarm, or the best there is; pulls that the study names make it a plain one with these.
 fn front_settings(settings: &IdentifySettings, motion: PsoSettings) -> MopsoSettings {
-    let named = [settings.inertia, settings.cognitive, settings.social];
+    let named = settings.coefficients();
     let base = match settings.algorithm {
         Algorithm::Thesis => MopsoSettings::thesis(),
         _ => MopsoSettings::default(),
     };
-    let motion = if settings.algorithm == Algorithm::Thesis || named.iter().any(Option::is_some) {
+    let motion = if settings.algorithm == Algorithm::Thesis || named.names_motion() {
         PsoSettings {
             difference_share: base.motion.difference_share,
+            mutation: named.mutation.unwrap_or(base.motion.mutation),
             ..motion
         }
     } else {
@@ -355,13 +354,13 @@ fn front_settings(settings: &IdentifySettings, motion: PsoSettings) -> MopsoSett
             population: motion.population,
             iterations: motion.iterations,
             seed: motion.seed,
+            mutation: named.mutation.unwrap_or(base.motion.mutation),
             ..base.motion
         }
     };
     MopsoSettings {
         motion,
         archive: settings.archive,
-        mutation: settings.mutation.unwrap_or(base.mutation),
         ..base
     }
 }

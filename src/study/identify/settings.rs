@@ -10,6 +10,7 @@ use crate::error::{Error, Result};
 use crate::evaluate::BackendChoice;
 use crate::evaluate::replay::{CHANNEL_NAMES, Norm};
 use crate::study::framework::memory::Size;
+use crate::study::framework::{Coefficients, Mutated, Scheduled};
 use crate::swarm::{Mutation, Schedule};
 use crate::telemetry::CalibrationOptions;
 use serde::{Deserialize, Serialize};
@@ -130,7 +131,7 @@ settings! {
         social: Option<Schedule> as "swarm.social" ["-"] = None, of(Scheduled).search().example("1.5"),
             "Pull towards the leader, as inertia is given";
         mutation: Option<Mutation> as "swarm.mutation" ["-"] = None, of(Mutated).search().example("\"polynomial\""),
-            "Mutation of the multi-objective swarm: an exponent from 0 (none) to 10, random or polynomial";
+            "Mutation of the swarm: an exponent from 0 (none) to 10, random or polynomial";
         archive: usize as "swarm.archive" ["-"] = 100, count(2, 100_000).search(),
             "Members of the archive of the multi-objective swarm";
         seed: u64 ["-"] = 1, count(0, u64::MAX).search(),
@@ -191,6 +192,16 @@ const USUAL_UNKNOWNS: [(&str, f64, f64); 22] = [
 ];
 
 impl IdentifySettings {
+    /// What they say of the swarm's motion.
+    pub(super) fn coefficients(&self) -> Coefficients {
+        Coefficients {
+            inertia: self.inertia,
+            cognitive: self.cognitive,
+            social: self.social,
+            mutation: self.mutation,
+        }
+    }
+
     /// What the study's memory goes with.
     pub fn size(&self) -> Size {
         let several = self.objectives.len() > 1;
@@ -272,95 +283,5 @@ impl Kind<Vec<FreeParameter>> for Bounds {
 
     fn flag(&self, name: &'static str) -> Flag {
         Flag::List(name)
-    }
-}
-
-/// A [`Schedule`]: a number, or two.
-struct Scheduled;
-
-impl Kind<Option<Schedule>> for Scheduled {
-    fn read(&self, table: &Table<'_>, key: &str, _: &str, _: &Path) -> Result<Option<Option<Schedule>>> {
-        if let Ok(fixed) = table.number(key, 0.0, 10.0, "") {
-            return Ok(Some(fixed.map(Schedule::Fixed)));
-        }
-        match table.numbers(key)?.as_deref() {
-            Some(&[from, to]) => Ok(Some(Some(Schedule::Linear { from, to }))),
-            _ => Err(table.refuse(key, "a number, or [first, last] for a linear schedule")),
-        }
-    }
-
-    fn write(&self, schedule: &Option<Schedule>) -> Option<Written> {
-        schedule.map(|schedule| {
-            Written::Value(match schedule {
-                Schedule::Fixed(v) => format!("{v:?}"),
-                Schedule::Linear { from, to } => format!("[{from:?}, {to:?}]"),
-            })
-        })
-    }
-
-    fn parse(&self, text: &str, _: &Option<Schedule>) -> Result<Option<Schedule>, String> {
-        let numbers: Result<Vec<f64>, _> = text.split(',').map(|part| part.trim().parse()).collect();
-        match numbers.as_deref() {
-            Ok([v]) if (0.0..=10.0).contains(v) => Ok(Some(Schedule::Fixed(*v))),
-            Ok([from, to]) if from.is_finite() && to.is_finite() => {
-                Ok(Some(Schedule::Linear { from: *from, to: *to }))
-            }
-            _ => Err("expected a number from 0 to 10, or FIRST,LAST".to_owned()),
-        }
-    }
-
-    fn range(&self) -> String {
-        "0 to 10".to_owned()
-    }
-
-    fn value_name(&self) -> &'static str {
-        "X|FIRST,LAST"
-    }
-}
-
-/// A [`Mutation`]: an exponent, or a name.
-struct Mutated;
-
-impl Kind<Option<Mutation>> for Mutated {
-    fn read(&self, table: &Table<'_>, key: &str, _: &str, _: &Path) -> Result<Option<Option<Mutation>>> {
-        let fixed = |mu: f64| {
-            if mu > 0.0 {
-                Mutation::Fixed(mu)
-            } else {
-                Mutation::None
-            }
-        };
-        match (table.number(key, 0.0, 10.0, ""), table.string(key)) {
-            (Ok(None), _) => Ok(None),
-            (Ok(Some(mu)), _) => Ok(Some(Some(fixed(mu)))),
-            (_, Ok(Some("random"))) => Ok(Some(Some(Mutation::Random))),
-            (_, Ok(Some("polynomial"))) => Ok(Some(Some(Mutation::SMPSO))),
-            _ => Err(table.refuse(key, "a number from 0 to 10, \"random\" or \"polynomial\"")),
-        }
-    }
-
-    fn write(&self, mutation: &Option<Mutation>) -> Option<Written> {
-        mutation.map(|mutation| {
-            Written::Value(match mutation {
-                Mutation::None => "0".to_owned(),
-                Mutation::Fixed(mu) => format!("{mu:?}"),
-                Mutation::Random => quoted("random"),
-                Mutation::Polynomial { .. } => quoted("polynomial"),
-            })
-        })
-    }
-
-    fn parse(&self, text: &str, _: &Option<Mutation>) -> Result<Option<Mutation>, String> {
-        match (text, text.parse::<f64>()) {
-            ("random", _) => Ok(Some(Mutation::Random)),
-            ("polynomial", _) => Ok(Some(Mutation::SMPSO)),
-            (_, Ok(0.0)) => Ok(Some(Mutation::None)),
-            (_, Ok(mu)) if (0.0..=10.0).contains(&mu) => Ok(Some(Mutation::Fixed(mu))),
-            _ => Err("expected a number from 0 to 10, random or polynomial".to_owned()),
-        }
-    }
-
-    fn value_name(&self) -> &'static str {
-        "MU|NAME"
     }
 }

@@ -1,6 +1,6 @@
 //! The front between several objectives: a swarm of whole lines, then the local search along it.
 
-use super::settings::RacelineSettings;
+use super::settings::{LineAlgorithm, RacelineSettings};
 use super::setup::Setup;
 use crate::error::Result;
 use crate::evaluate::line::{LineProblem, open_line_evaluator};
@@ -66,19 +66,33 @@ pub(super) fn search_front(
 ) -> Result<LineFront> {
     let cross_sections = &setup.cross_sections;
     let problem = front_problem(setup, settings)?;
-    let mopso = MopsoSettings {
-        archive: settings.archive,
-        ..MopsoSettings::default()
+    let published = settings.algorithm == LineAlgorithm::Thesis;
+    let mut mopso = if published {
+        MopsoSettings::thesis()
+    } else {
+        MopsoSettings::default()
     };
+    if published {
+        mopso.motion = settings.coefficients().apply(mopso.motion);
+    }
+    mopso.archive = settings.archive;
     let mopso = mopso
         .with_size(settings.population, settings.iterations)
         .with_seed(settings.seed);
+    // The published swarm by itself knows nothing of the lines that other swarms found.
+    let known = if published && !settings.starts_warm() {
+        &[]
+    } else {
+        known
+    };
     let on_device = settings.on_device()?;
     let state = match state {
         Some(state) => state,
         None => {
             let mut swarm = settings.swarm.swarm(&problem.problem, mopso)?;
-            swarm.start_from(&starting_lines(&problem, settings, known)?)?;
+            if !published || settings.starts_warm() {
+                swarm.start_from(&starting_lines(&problem, settings, known)?)?;
+            }
             let losses = Losses::default();
             SwarmState { swarm, losses }
         }
@@ -116,7 +130,7 @@ pub(super) fn search_front(
     let lines = on_road(setup, settings, &lines)?;
     let mut evaluations = swarm.evaluations();
     evaluations += insert_all(&mut archive, judge.as_mut(), &lines)?;
-    if settings.local_search && settings.objectives.iter().all(|o| solvers.solves(*o)) {
+    if settings.searches_locally() && settings.objectives.iter().all(|o| solvers.solves(*o)) {
         let polished = std::thread::scope(|scope| {
             let led = scope.spawn(|| polish_along(&archive, settings, solvers));
             interruptible(led, solvers.flag(), || observe(&latest, &mut || state.clone()))
@@ -154,11 +168,15 @@ pub(super) fn search_front(
     })
 }
 
-/// The problem that the swarm of the front is given: lines through control points.
+/// The problem that the swarm of the front is given: lines through control points, and the published swarm's through every
+/// cross-section.
 ///
 /// # Errors
 /// Those of [`LineProblem::new`].
 pub fn front_problem(setup: &Setup, settings: &RacelineSettings) -> Result<LineProblem> {
+    if settings.algorithm == LineAlgorithm::Thesis {
+        return setup.problem(Parametrisation::sections(), &settings.objectives, settings);
+    }
     let cross_sections = &setup.cross_sections;
     let controls = ((cross_sections.length_m / CONTROL_SPACING_M) as usize).clamp(4, cross_sections.len());
     setup.problem(

@@ -112,8 +112,8 @@ pub(super) fn summarise(solved: &Solved<'_, Raceline>) -> Summary {
         exact_elapsed_s: outcome.exact_s,
         sections: solved.prepared.cross_sections.len(),
         car_width_m: settings.car_width_m,
-        warm_start: settings.warm_start,
-        local_search: settings.local_search,
+        warm_start: settings.starts_warm(),
+        local_search: settings.searches_locally(),
         best: each().map(|(name, o)| (name, LineFigures::of(&o.best))).collect(),
         swarm: each().map(|(name, o)| (name, o.swarm_cost)).collect(),
         exact: each()

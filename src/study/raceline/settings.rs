@@ -1,14 +1,16 @@
 //! What a racing-line study is asked to do.
 
 use crate::config::kinds::{
-    choice, choices, count, file, name_or_file, named, number, optional, switch, text,
+    Choice, choice, choices, count, file, name_or_file, named, number, of, optional, switch, text,
 };
 use crate::config::settings::{Flag, settings};
+use crate::error::{Error, Result};
 use crate::evaluate::BackendChoice;
 use crate::evaluate::line::LineObjective;
 use crate::line::CarPlan;
 use crate::study::framework::memory::Size;
-use crate::swarm::SwarmPlace;
+use crate::study::framework::{Coefficients, Mutated, Scheduled};
+use crate::swarm::{Mutation, Schedule, SwarmPlace};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
@@ -20,7 +22,7 @@ pub enum LineAlgorithm {
     Windows,
     /// CPSO-S_K over `alpha` at every cross-section: a swarm to each of the groups, by turns, in the others' context.
     Cooperative,
-    /// One plain particle swarm over `alpha` at every cross-section, with the settings of the thesis.
+    /// One plain particle swarm over `alpha` at every cross-section, with the settings of the thesis; so for the front.
     Thesis,
 }
 
@@ -57,12 +59,20 @@ settings! {
             "Greatest speed at the start of an open track";
         objectives: Vec<LineObjective> ["-"] = usual_objectives(), choices(),
             "What is minimised; more than one for a front";
-        warm_start: bool ["-"] = true, switch(true).flag(Flag::Switch("no_warm_start", false)).search(),
-            "Whether the swarms start from the reference optima; else they start cold, from no known line";
-        local_search: bool ["-"] = true, switch(true).flag(Flag::Switch("no_local_search", false)).search(),
-            "Whether exact gradients lead what the swarms find to the nearest optimum";
+        warm_start: Option<bool> ["-"] = None, optional(switch(true)).flag(Flag::Switch("no_warm_start", false)).search().example("true"),
+            "Whether the swarms start from the reference optima; without it they do, but with algorithm thesis start from no known line";
+        local_search: Option<bool> ["-"] = None, optional(switch(true)).flag(Flag::Switch("no_local_search", false)).search().example("true"),
+            "Whether exact gradients lead what the swarms find to the nearest optimum; without it they do, but not with algorithm thesis";
         algorithm: LineAlgorithm ["-"] = LineAlgorithm::Windows, choice().search(),
             "What looks for the best line by one objective; cooperative (CPSO-S_K) and thesis start at random";
+        inertia: Option<Schedule> ["-"] = None, of(Scheduled).search().example("[0.1, 1.0]"),
+            "Inertia weight with cooperative or thesis: a number, or the first and the last of a linear schedule; without it the algorithm's own";
+        cognitive: Option<Schedule> ["-"] = None, of(Scheduled).search().example("3.0"),
+            "Pull towards the particle's own best, as inertia is given";
+        social: Option<Schedule> ["-"] = None, of(Scheduled).search().example("1.0"),
+            "Pull towards the leader, as inertia is given";
+        mutation: Option<Mutation> ["-"] = None, of(Mutated).search().example("0.95"),
+            "Mutation with thesis: an exponent from 0 (none) to 10, random or polynomial; without it the algorithm's own";
         groups: usize ["-"] = 12, count(1, 1_000_000).search(),
             "Groups of neighbouring cross-sections of the cooperative algorithm";
         population: usize ["-"] = 200, count(8, 10_000_000).search(),
@@ -80,6 +90,29 @@ settings! {
         adapter: Option<String> ["-"] = None, optional(text()).place().example("\"llvmpipe\""),
             "Part of the name of the GPU to use";
     }
+
+    /// Coefficients are those of the algorithm.
+    fn consistent(&self) -> Result<()> {
+        let refused = match self.algorithm {
+            LineAlgorithm::Thesis => None,
+            LineAlgorithm::Cooperative => Coefficients {
+                mutation: self.mutation,
+                ..Coefficients::default()
+            }
+            .first_named(),
+            LineAlgorithm::Windows => self.coefficients().first_named(),
+        };
+        refused.map_or(Ok(()), |(key, found)| {
+            let algorithm = self.algorithm.name();
+            let found = format!("{found}, with algorithm {algorithm}");
+            Err(Error::input(
+                "the study",
+                key,
+                found,
+                "no such coefficient, or algorithm thesis",
+            ))
+        })
+    }
 }
 
 fn usual_objectives() -> Vec<LineObjective> {
@@ -91,11 +124,36 @@ fn usual_objectives() -> Vec<LineObjective> {
 }
 
 impl RacelineSettings {
+    /// Whether the swarms start from the reference optima.
+    pub fn starts_warm(&self) -> bool {
+        self.warm_start.unwrap_or(self.algorithm != LineAlgorithm::Thesis)
+    }
+
+    /// Whether exact gradients lead what the swarms find.
+    pub fn searches_locally(&self) -> bool {
+        self.local_search
+            .unwrap_or(self.algorithm != LineAlgorithm::Thesis)
+    }
+
+    /// What they say of the motion of cooperative and published swarms.
+    pub(super) fn coefficients(&self) -> Coefficients {
+        Coefficients {
+            inertia: self.inertia,
+            cognitive: self.cognitive,
+            social: self.social,
+            mutation: self.mutation,
+        }
+    }
+
     /// Whether the swarm for the front lives on the device.
     ///
     /// # Errors
-    /// [`crate::Error::Input`] with the reason if it is asked to and cannot.
-    pub(super) fn on_device(&self) -> crate::Result<bool> {
+    /// [`Error::Input`] with the reason if it is asked to and cannot.
+    pub(super) fn on_device(&self) -> Result<bool> {
+        if self.algorithm == LineAlgorithm::Thesis && self.swarm != SwarmPlace::Device {
+            // Its mutation is for swarms on the host; a device that is asked for is refused with that reason.
+            return Ok(false);
+        }
         let place = (self.backend, self.adapter.as_deref());
         self.swarm
             .on_device(place, self.population, self.objectives.len())
@@ -137,8 +195,9 @@ mod tests {
     fn a_study_file_repeats_its_study() {
         assert_repeated(&RacelineSettings {
             objectives: vec![LineObjective::Kappa2, LineObjective::LapTime],
-            warm_start: false,
+            warm_start: Some(false),
             algorithm: LineAlgorithm::Cooperative,
+            inertia: Some(Schedule::Fixed(0.5)),
             groups: 5,
             section: Some("Abbey".to_owned()),
             seed: 7,
@@ -155,6 +214,9 @@ mod tests {
             ("width = 2.0", "width"),
             ("algorithm = \"ants\"", "algorithm"),
             ("car_width_m = \"wide\"", "car_width_m"),
+            ("inertia = 0.5", "inertia"),
+            ("algorithm = \"cooperative\"\nmutation = 0.5", "mutation"),
+            ("algorithm = \"thesis\"\nsocial = \"much\"", "social"),
         ]);
     }
 }

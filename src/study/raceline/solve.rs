@@ -67,7 +67,7 @@ pub(super) fn find_lines(work: Work<'_, Raceline>) -> Result<Outcome> {
             let (exact, own_s) =
                 work.waited(|work| interruptible(exact, &stop, || work.asked("reference optimum")))?;
             exact_s = own_s.max(exact_s);
-            let start = exact.as_ref().filter(|_| settings.warm_start);
+            let start = exact.as_ref().filter(|_| settings.starts_warm());
             let start = start.map(|o| o.alpha.as_slice());
             let finished = match work.state.finished.get(k) {
                 Some(finished) => finished.clone(),
@@ -183,7 +183,7 @@ fn led_downhill(
     solvers: &ReferenceSolvers,
     interrupted: bool,
 ) -> Result<Vec<Vec<f64>>> {
-    if !settings.local_search || !solvers.solves(objective) || interrupted {
+    if !settings.searches_locally() || !solvers.solves(objective) || interrupted {
         return Ok(Vec::new());
     }
     if objective == LineObjective::LapTime

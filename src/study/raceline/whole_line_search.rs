@@ -29,11 +29,13 @@ pub(super) struct WholeLineState {
 
 impl WholeLineState {
     fn new(settings: &RacelineSettings, problem: &LineProblem) -> Result<Self> {
-        let sized = |motion: PsoSettings, turns: usize| PsoSettings {
-            population: settings.population,
-            iterations: settings.iterations.saturating_mul(turns),
-            seed: settings.seed,
-            ..motion
+        let sized = |motion: PsoSettings, turns: usize| {
+            settings.coefficients().apply(PsoSettings {
+                population: settings.population,
+                iterations: settings.iterations.saturating_mul(turns),
+                seed: settings.seed,
+                ..motion
+            })
         };
         let swarm = if settings.algorithm == LineAlgorithm::Cooperative {
             // The groups take turns, and each has the iterations that are asked for.
@@ -42,7 +44,7 @@ impl WholeLineState {
             let settings = CooperativeSettings { motion, groups };
             WholeLineSwarm::Cooperative(Box::new(CooperativeSwarm::new(&problem.problem, settings)?))
         } else {
-            let motion = sized(PsoSettings::thesis(), 1);
+            let motion = sized(PsoSettings::thesis_lines(), 1);
             WholeLineSwarm::Thesis(Box::new(Pso::new(&problem.problem, motion)?))
         };
         Ok(Self {

@@ -7,7 +7,7 @@
 
 use crate::evaluate::resident::BLOCK;
 use crate::random::{Random, below_u32, unit_f32};
-use crate::scalar::elementary::{exp, power};
+use crate::scalar::elementary::power;
 use crate::swarm::motion::Purpose;
 use crate::swarm::settings::{
     BoundHandling, Constriction, DRAWN_PULLS, Leaders, MopsoSettings, Mutation, Randomness,
@@ -42,7 +42,7 @@ pub struct Generation {
     pub per_dimension: u32,
     /// Whether leaders are the better of two.
     pub tournament: u32,
-    /// The kind of mutation: none, polynomial, one dimension with `mu` or with a random one.
+    /// Whether there is mutation.
     pub mutation: u32,
     /// Inertia.
     pub inertia: f32,
@@ -62,10 +62,6 @@ pub struct Generation {
     pub mutation_power: f32,
     /// One over it.
     pub mutation_root: f32,
-    /// Logarithm of the share of the run that is left.
-    pub log_left: f32,
-    /// Exponent of the mutation that shrinks over the run.
-    pub mu: f32,
     /// Least drawn pull and the range of drawn pulls.
     pub pulls: [f32; 2],
 }
@@ -88,11 +84,10 @@ impl Generation {
                 (chi, chi * cognitive, chi * social)
             }
         };
-        let (mutation, mutation_share, index, mu) = match settings.mutation {
-            Mutation::None => (0, 0.0, 0.0, 1.0),
-            Mutation::Polynomial { share, index } => (1, share, index, 1.0),
-            Mutation::Fixed(mu) => (2, 0.0, 0.0, mu),
-            Mutation::Random => (3, 0.0, 0.0, 1.0),
+        // A swarm in single precision has no trials: `LargeSwarm::new` refuses them.
+        let (mutation_share, index) = match motion.mutation {
+            Mutation::Polynomial { share, index } => (share, index),
+            Mutation::None | Mutation::Fixed(_) | Mutation::Random => (0.0, 0.0),
         };
         Self {
             key: Random::new(motion.seed).key(),
@@ -104,7 +99,7 @@ impl Generation {
             signed: u32::from(motion.constriction == Constriction::Signed),
             per_dimension: u32::from(motion.randomness == Randomness::PerDimension),
             tournament: u32::from(settings.leaders == Leaders::Tournament),
-            mutation,
+            mutation: u32::from(mutation_share > 0.0),
             inertia: inertia as f32,
             cognitive: cognitive as f32,
             social: social as f32,
@@ -118,9 +113,6 @@ impl Generation {
             mutation_share: mutation_share as f32,
             mutation_power: (index + 1.0) as f32,
             mutation_root: (1.0 / (index + 1.0)) as f32,
-            // At the end of the run nothing is left, whose logarithm no float is.
-            log_left: (1.0 - share.min(1.0)).ln().max(-1e30) as f32,
-            mu: mu as f32,
             pulls: [DRAWN_PULLS[0] as f32, (DRAWN_PULLS[1] - DRAWN_PULLS[0]) as f32],
         }
     }
@@ -278,14 +270,8 @@ pub fn advance(
             let from = leader[lane] as usize;
             difference(g, who, lane, (leaders, from), (position, velocity));
         }
-        match g.mutation {
-            0 => {}
-            1 => {
-                if unit_f32(choice[3][lane]) < g.mutation_share {
-                    disturb(g, who, lane, position);
-                }
-            }
-            _ => redraw(g, who, lane, position),
+        if g.mutation == 1 && unit_f32(choice[3][lane]) < g.mutation_share {
+            disturb(g, who, lane, position);
         }
     }
 }
@@ -346,23 +332,4 @@ fn polynomial(g: &Generation, x: f32, uniform: f32) -> f32 {
     let step = power(base, g.mutation_root) - 1.0;
     let moved = if low { x + step } else { x - step };
     moved.clamp(0.0, 1.0)
-}
-
-/// With a probability that falls over the run, one coordinate anew within that share of the range.
-#[inline(always)]
-fn redraw(g: &Generation, who: u32, lane: usize, position: &mut [f32]) {
-    let words = g.words(Purpose::Mutation, who, 0);
-    let mu = if g.mutation == 3 {
-        unit_f32(words[0]).max(1e-3)
-    } else {
-        g.mu
-    };
-    let probability = exp(g.log_left / mu);
-    if g.dimensions == 0 || unit_f32(words[1]) >= probability {
-        return;
-    }
-    let k = below_u32(words[2], g.dimensions) as usize;
-    let x = &mut position[k * BLOCK + lane];
-    let (low, high) = ((*x - probability).max(0.0), (*x + probability).min(1.0));
-    *x = low + unit_f32(words[3]) * (high - low);
 }

@@ -16,7 +16,7 @@ use crate::scalar::lanes::Lanes;
 use crate::swarm::archive::Archive;
 #[cfg(feature = "gpu")]
 use crate::swarm::device::DeviceState;
-use crate::swarm::settings::MopsoSettings;
+use crate::swarm::settings::{MopsoSettings, setting};
 use crate::swarm::space::Space;
 use crate::swarm::{Counters, Front, Optimiser};
 use rayon::prelude::*;
@@ -174,6 +174,11 @@ impl LargeSwarm {
     /// [`crate::Error::Input`] naming the setting that is out of its range.
     pub fn new(problem: &Problem, settings: MopsoSettings) -> Result<Self> {
         settings.validate()?;
+        if settings.motion.mutation.tries() {
+            let found = format!("{:?}", settings.motion.mutation);
+            let expected = "none or polynomial, for a swarm in single precision or on a device";
+            return Err(setting("mutation", found, expected));
+        }
         let space = Space::new(problem)?;
         let (d, width) = (space.dimensions(), problem.objectives.len());
         let lanes = settings.motion.population.next_multiple_of(BLOCK);

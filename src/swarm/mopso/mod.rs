@@ -26,7 +26,8 @@ pub const MANY: usize = 4096;
 
 /// A swarm that follows an archive of non-dominated solutions (references 4 and 5 of [`super`]).
 ///
-/// With fewer than [`MANY`] particles the swarm is kept in `f64` and told one candidate after the other. A larger swarm is
+/// With fewer than [`MANY`] particles, or with trials of mutation, the swarm is kept in `f64` and told one candidate after the
+/// other. A larger swarm is
 /// kept in `f32` (a coordinate to 6e-8 of its range): `4 (3 d + m)` bytes for a particle of `d` variables and `m`
 /// objectives. Its generations take time in proportion to the particles: they are moved in lanes and threads and filtered
 /// instead of ranked, and the archive is told only what may enter it. Results depend neither on threads nor on lanes.
@@ -48,6 +49,7 @@ impl Mopso {
     /// [`crate::Error::Input`] naming the setting that is out of its range.
     pub fn new(problem: &Problem, settings: MopsoSettings) -> Result<Self> {
         let many = settings.motion.population >= MANY
+            && !settings.motion.mutation.tries()
             && (2..=3).contains(&problem.objectives.len())
             && problem.variables.iter().any(|v| v.upper > v.lower);
         Ok(Self {

@@ -7,8 +7,8 @@ use crate::random::Random;
 use crate::swarm::archive::Archive;
 use crate::swarm::genetic::cross;
 use crate::swarm::metrics::dominates;
-use crate::swarm::motion::{Particles, Purpose, polynomial};
-use crate::swarm::settings::{Leaders, MopsoSettings, Mutation};
+use crate::swarm::motion::{Particles, Purpose, Trials, polynomial};
+use crate::swarm::settings::{Leaders, MopsoSettings};
 use crate::swarm::{Counters, Front, Optimiser};
 use serde::{Deserialize, Serialize};
 
@@ -18,6 +18,7 @@ pub(super) struct SmallSwarm {
     settings: MopsoSettings,
     random: Random,
     particles: Particles,
+    trials: Trials,
     objectives: usize,
     best_position: Vec<f64>,
     best_objectives: Vec<Vec<f64>>,
@@ -42,6 +43,7 @@ impl SmallSwarm {
             archive: settings.empty_archive(problem.objectives.len())?,
             random,
             particles,
+            trials: Trials::default(),
             settings,
             earnings: Earnings::default(),
             counters: Counters::default(),
@@ -95,38 +97,6 @@ impl SmallSwarm {
                 }
             }
         }
-    }
-
-    fn mutate(&mut self, particle: usize, share: f64) {
-        let (when, who) = (self.counters.iteration as u32, particle as u32);
-        let uniform = |index| self.random.uniform(Purpose::Mutation as u32, when, who, index);
-        let d = self.particles.dimensions();
-        let mu = match self.settings.mutation {
-            Mutation::None => return,
-            Mutation::Fixed(mu) => mu,
-            Mutation::Random => uniform(0).max(1e-3),
-            Mutation::Polynomial { share, index } => {
-                if uniform(0) < share {
-                    for (k, i) in self.particles.row(particle).enumerate() {
-                        if uniform(1 + 2 * k as u32) * (d as f64) < 1.0 {
-                            let x = self.particles.position[i];
-                            self.particles.position[i] = polynomial(x, uniform(2 + 2 * k as u32), index);
-                        }
-                    }
-                }
-                return;
-            }
-        };
-        // A range that shrinks over the run (equation 5.13 of the thesis).
-        let probability = (1.0 - share.min(1.0)).powf(1.0 / mu);
-        if d == 0 || uniform(1) >= probability {
-            return;
-        }
-        let k = self.random.below(d, Purpose::Mutation as u32, when, who, 2);
-        let i = particle * d + k;
-        let x = self.particles.position[i];
-        let (low, high) = ((x - probability).max(0.0), (x + probability).min(1.0));
-        self.particles.position[i] = low + uniform(3) * (high - low);
     }
 
     /// From an archive member along the difference of two others, in some of the coordinates \[7\].
@@ -204,7 +174,9 @@ impl SmallSwarm {
                     }
                 }
             }
-            self.mutate(particle, share);
+            let (motion, now) = (&self.settings.motion, (share, self.counters.iteration));
+            self.particles
+                .mutate(particle, motion.mutation, now, self.random, &mut self.trials);
         }
     }
 
@@ -230,22 +202,26 @@ const INDEX: f64 = 20.0;
 
 impl Optimiser for SmallSwarm {
     fn ask(&mut self) -> Vec<f64> {
-        self.particles.candidates()
+        self.trials.candidates(&self.particles)
     }
 
     fn tell(&mut self, evaluation: &Evaluation) -> Result<()> {
-        evaluation.check(self.particles.count, self.objectives)?;
+        let asked = self.particles.count + self.trials.len();
+        evaluation.check(asked, self.objectives)?;
+        let rows = self
+            .trials
+            .settle(&mut self.particles, evaluation, self.objectives);
         // Nobody moved towards anything yet.
         let scattered = self.archive.is_empty() || self.counters.iteration == 0;
         let before = self.earnings.clone();
         self.earnings.fade();
-        for particle in 0..self.particles.count {
-            let Some(row) = evaluation.success(particle, self.objectives) else {
+        for (particle, of) in rows.into_iter().enumerate() {
+            let Some(row) = evaluation.success(of, self.objectives) else {
                 continue;
             };
             let range = self.particles.row(particle);
             let position = &self.particles.position[range.clone()];
-            let violation = evaluation.violation(particle);
+            let violation = evaluation.violation(of);
             let (members, level) = (self.archive.len(), self.archive.violation());
             let entered = self.archive.insert_violating(position, row, violation);
             if !scattered {
@@ -265,7 +241,7 @@ impl Optimiser for SmallSwarm {
                 self.best_position[range].copy_from_slice(position);
             }
         }
-        self.counters.told(self.settings.motion.population);
+        self.counters.told(asked);
         self.advance();
         Ok(())
     }
