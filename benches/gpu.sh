@@ -1,6 +1,7 @@
 #!/bin/sh
 # What a GPU makes of lapswarm, in eight minutes: devices, parity, rates against population, whole generations from 1e3 to 1e6
-# particles, and a study of each kind. Writes gpu.json and gpu.md into a folder, for `benches/results/`.
+# particles, and a study of each kind. Writes one JSON and one Markdown file into a folder, for
+# `benches/results/`.
 #
 #   benches/gpu.sh FOLDER [ADAPTER]           on the GPU whose name has ADAPTER in it, else on the first
 #   SMALL=1 benches/gpu.sh FOLDER llvmpipe    small sizes, to try the script on a software driver
@@ -78,7 +79,7 @@ on surface 60 surface --section Abbey --grid 64 --out "$work/surface"
         tr '\r' '\n' <"$work/$name.txt" | grep -v '^ *$' | tail -60
         printf '```\n'
     done
-} >gpu.md
+} >"gpu".md
 {
     between='{'
     for name in $steps; do
@@ -88,5 +89,5 @@ on surface 60 surface --section Abbey --grid 64 --out "$work/surface"
     done
     echo '}'
 } >gpu.json
-echo "$folder/gpu.md and $folder/gpu.json" >&2
+echo "$folder: gpu.json and a page of the same name" >&2
 exit $failed
