@@ -1,4 +1,4 @@
-// Exchange between a swarm on the device and the line kernel. Twin of `src/evaluate/line/exchange.rs`. The swarm's rows are in
+// Exchange between a swarm on the device and the line kernel. Twin of `src/evaluate/line/gpu/exchange.rs`. The swarm's rows are in
 // blocks of particles, the kernel's in planes of candidates.
 
 struct Exchange {
