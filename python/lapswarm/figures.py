@@ -123,6 +123,20 @@ class Limits:
 
 
 @dataclass(frozen=True)
+class SmallSteering:
+    """How a car answers to small steering at a speed."""
+
+    v_mps: float
+    yaw_rate_gain_1ps: float
+    ay_gain_mps2: float
+    sideslip_gain: float
+    stability_factor_s2_per_m2: float
+    frequency_hz: float | None
+    damping_ratio: float | None
+    slowest_decay_1ps: float
+
+
+@dataclass(frozen=True)
 class Supported:
     """What a log reached about a speed of the limits."""
 
@@ -146,6 +160,7 @@ class Enveloped(Figures):
     static_margin: float
     characteristic_speed_mps: float | None
     critical_speed_mps: float | None
+    small_steering: list[SmallSteering]
     limits: list[Limits]
     surface_difference_mps2: float | None
     ridge_speeds: int

@@ -10,6 +10,7 @@ mod output;
 mod parity;
 mod progress;
 mod report;
+mod reproduce;
 mod simulate;
 mod study;
 mod sweep;
@@ -37,6 +38,8 @@ use std::time::{Duration, Instant};
 enum Tool {
     /// Run the same study over a grid of settings and seeds, with medians.
     Sweep(sweep::Arguments),
+    /// The thesis's tables, chapter by chapter, with the published figures beside ours.
+    Reproduce(reproduce::Arguments),
     /// Drive a car round a circuit and log it.
     Simulate(simulate::Arguments),
     /// Lay runs side by side on one page: figures, laps, g-g-v envelopes.
@@ -230,6 +233,7 @@ fn refuse_flags(error: clap::Error, arguments: &[OsString]) -> ! {
 fn run_tool(tool: &Tool) -> Result<()> {
     match tool {
         Tool::Sweep(arguments) => sweep::run(arguments),
+        Tool::Reproduce(arguments) => reproduce::run(arguments),
         Tool::Simulate(arguments) => simulate::run(arguments),
         Tool::Report(arguments) => report::run(arguments),
         Tool::Export(arguments) => export::run(arguments),

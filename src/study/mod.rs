@@ -7,6 +7,7 @@ pub mod identify;
 pub mod raceline;
 pub mod registry;
 mod replayed;
+pub mod reproduce;
 pub mod run;
 pub mod sensitivity;
 pub mod surface;

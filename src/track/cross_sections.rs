@@ -183,11 +183,22 @@ impl CrossSections {
         })
     }
 
-    /// Where the section of this name, or of one of its names, begins (m), and its length (m).
+    /// Where the section of this name, or of one of its names, begins (m), and its length (m). `3/12` is the third of twelve
+    /// sectors of equally many cross-sections; the links from one sector to the next belong to neither.
     ///
     /// # Errors
-    /// [`Error::Input`] listing the names when there is none of this one.
+    /// [`Error::Input`] listing the names when there is none of this one, or if there is no such sector.
     pub fn section_named(&self, name: &str) -> Result<(f64, f64)> {
+        if let Some((number, of)) = numbered(name) {
+            let n = self.len();
+            if !(1..=of).contains(&number) || of > n / 2 {
+                let expected = format!("1/{of} to {of}/{of}, with at most {} sectors", n / 2);
+                return Err(Error::input(&self.name, "section", name, expected));
+            }
+            let (first, end) = ((number - 1) * n / of, number * n / of);
+            let spacing_m = self.length_m / n as f64;
+            return Ok((self.station_m[first], (end - first - 1) as f64 * spacing_m));
+        }
         let called = |all: &str| all == name || all.split('/').any(|one| one.trim() == name);
         let Some(section) = self.sections.iter().find(|s| called(&s.name)) else {
             let known: Vec<&str> = self.sections.iter().map(|s| s.name.as_str()).collect();
@@ -241,6 +252,12 @@ impl CrossSections {
             .map(|((right, left), alpha)| *right + *alpha * (*left - *right))
             .collect()
     }
+}
+
+/// The numbers of `3/12`.
+fn numbered(name: &str) -> Option<(usize, usize)> {
+    let (number, of) = name.split_once('/')?;
+    Some((number.trim().parse().ok()?, of.trim().parse().ok()?))
 }
 
 /// The solution of a symmetric positive definite system, by the method of conjugate gradients (Hestenes, Stiefel, *Methods

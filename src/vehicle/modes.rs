@@ -1,9 +1,11 @@
-//! How fast a car's own motions are, how fine the steps of its integration must be, and how long it takes to settle.
+//! How fast a car's own motions are, how fine the steps of its integration must be, how long it takes to settle, and how it
+//! answers to small steering.
 
 use super::chassis::BodyState;
 use super::model::{CarInput, CarModel, CarState, wheel_speeds};
 use super::tyre::{LinearTyre, MagicFormula, Tyre, TyreModel};
-use nalgebra::{Complex, Matrix6};
+use nalgebra::{Complex, Matrix6, Vector6};
+use serde::{Deserialize, Serialize};
 
 /// The greatest product of a mode's rate (1/s) and a step (s). The classical Runge-Kutta method is stable up to 2.78 on the negative
 /// real axis and 2.82 on the imaginary one (E. Hairer and G. Wanner, *Solving Ordinary Differential Equations II*, 1996, ch. IV.2).
@@ -30,15 +32,81 @@ pub fn slowest_decay(flat: &[f64], tyre: TyreModel, speed: f64) -> f64 {
     })
 }
 
-/// The eigenvalues (1/s) of a car that rolls straight ahead; nothing for figures that are no car.
-fn modes(flat: &[f64], tyre: TyreModel, speed: f64) -> Option<[Complex<f64>; 6]> {
-    match tyre {
-        TyreModel::MagicFormula => modes_of::<MagicFormula<f64>>(flat, speed),
-        TyreModel::Linear => modes_of::<LinearTyre<f64>>(flat, speed),
-    }
+/// How a car answers to small steering at a speed: its linearised equations of motion, as (3.5) to (3.7) of the thesis have them in
+/// matrices.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SmallSteering {
+    /// Speed (m/s).
+    pub v_mps: f64,
+    /// Yaw rate once it has settled, for each radian at the wheels (1/s).
+    pub yaw_rate_gain_1ps: f64,
+    /// Lateral acceleration once it has settled, for each radian at the wheels (m/s^2).
+    pub ay_gain_mps2: f64,
+    /// Sideslip at the centre of gravity once it has settled, for each radian at the wheels.
+    pub sideslip_gain: f64,
+    /// `K` in `yaw rate = v steer / (L (1 + K v^2))` (s^2/m^2); negative oversteers.
+    pub stability_factor_s2_per_m2: f64,
+    /// Natural frequency of the least damped oscillation (Hz); nothing where none oscillates.
+    pub frequency_hz: Option<f64>,
+    /// Its damping, as a share of the critical one.
+    pub damping_ratio: Option<f64>,
+    /// Rate at which the slowest motion dies out (1/s); below zero it grows.
+    pub slowest_decay_1ps: f64,
+    /// The eigenvalues (1/s), real and imaginary part.
+    #[serde(skip)]
+    pub eigenvalues_1ps: [[f64; 2]; 6],
 }
 
-fn modes_of<T: Tyre<f64>>(flat: &[f64], speed: f64) -> Option<[Complex<f64>; 6]> {
+/// How a car that rolls straight ahead at `speed` (m/s) answers to small steering; nothing for figures that are no car, and where it
+/// settles nowhere. `flat` is the car in flat form.
+pub fn small_steering(flat: &[f64], tyre: TyreModel, speed: f64) -> Option<SmallSteering> {
+    let (linear, wheelbase) = match tyre {
+        TyreModel::MagicFormula => linearised::<MagicFormula<f64>>(flat, speed)?,
+        TyreModel::Linear => linearised::<LinearTyre<f64>>(flat, speed)?,
+    };
+    // At rest in these axes: 0 = A x + B steer.
+    let settled = linear.states.lu().solve(&-linear.steer)?;
+    let eigenvalues = linear.states.complex_eigenvalues();
+    let oscillates = |x: &&Complex<f64>| x.im > 1e-6 * x.norm();
+    let damping = |x: &Complex<f64>| -x.re / x.norm();
+    let least = eigenvalues
+        .iter()
+        .filter(oscillates)
+        .min_by(|a, b| damping(a).total_cmp(&damping(b)));
+    let gain = settled[2];
+    let decay = eigenvalues.iter().map(|x| -x.re).fold(f64::INFINITY, f64::min);
+    settled.iter().all(|x| x.is_finite()).then(|| SmallSteering {
+        v_mps: speed,
+        yaw_rate_gain_1ps: gain,
+        ay_gain_mps2: speed * gain,
+        sideslip_gain: settled[1] / speed,
+        stability_factor_s2_per_m2: (speed / (wheelbase * gain) - 1.0) / speed.powi(2),
+        frequency_hz: least.map(|x| x.norm() / std::f64::consts::TAU),
+        damping_ratio: least.map(damping),
+        slowest_decay_1ps: decay,
+        eigenvalues_1ps: std::array::from_fn(|k| [eigenvalues[k].re, eigenvalues[k].im]),
+    })
+}
+
+/// The eigenvalues (1/s) of a car that rolls straight ahead; nothing for figures that are no car.
+fn modes(flat: &[f64], tyre: TyreModel, speed: f64) -> Option<[Complex<f64>; 6]> {
+    let states = match tyre {
+        TyreModel::MagicFormula => linearised::<MagicFormula<f64>>(flat, speed)?.0.states,
+        TyreModel::Linear => linearised::<LinearTyre<f64>>(flat, speed)?.0.states,
+    };
+    Some(states.complex_eigenvalues().into())
+}
+
+/// Slopes of the rates of a car's states: longitudinal and lateral speed, yaw rate, roll, roll rate, lagged acceleration.
+struct Linearised {
+    /// By the states (`A`).
+    states: Matrix6<f64>,
+    /// By the steering at the wheels (`B`).
+    steer: Vector6<f64>,
+}
+
+/// A car that rolls straight ahead, linearised, and its wheelbase (m); nothing for figures that are no car.
+fn linearised<T: Tyre<f64>>(flat: &[f64], speed: f64) -> Option<(Linearised, f64)> {
     let car = CarModel::<f64, T>::from_parameters(|i| flat[i]);
     let state = |x: [f64; 6]| CarState {
         body: BodyState {
@@ -51,36 +119,32 @@ fn modes_of<T: Tyre<f64>>(flat: &[f64], speed: f64) -> Option<[Complex<f64>; 6]>
         pitch_acceleration: x[5],
     };
     let straight = [speed, 0.0, 0.0, 0.0, 0.0, 0.0];
-    let input = CarInput {
-        wheel_speed: wheel_speeds(&car.chassis, &state(straight).body, (1.0, 0.0), [0.0; 2]),
-        steer: 0.0,
-    };
-    let rate = |x: [f64; 6]| {
-        let rate = car.rate(&state(x), &input).state;
+    let wheel_speed = wheel_speeds(&car.chassis, &state(straight).body, (1.0, 0.0), [0.0; 2]);
+    let rate = |x: [f64; 6], steer: f64| {
+        let rate = car.rate(&state(x), &CarInput { wheel_speed, steer }).state;
         let body = rate.body;
-        [
+        Vector6::new(
             body.vx,
             body.vy,
             body.yaw_rate,
             body.roll,
             body.roll_rate,
             rate.pitch_acceleration,
-        ]
+        )
     };
     // Central differences: a state's unit is a tenth or more of what the car has in a corner.
     let step = 1e-5;
-    let mut jacobian = Matrix6::zeros();
+    let mut states = Matrix6::zeros();
     for k in 0..6 {
         let [mut above, mut below] = [straight; 2];
         above[k] += step;
         below[k] -= step;
-        let (above, below) = (rate(above), rate(below));
-        for row in 0..6 {
-            jacobian[(row, k)] = (above[row] - below[row]) / (2.0 * step);
-        }
+        states.set_column(k, &((rate(above, 0.0) - rate(below, 0.0)) / (2.0 * step)));
     }
-    let finite = jacobian.iter().all(|x| x.is_finite());
-    finite.then(|| jacobian.complex_eigenvalues().into())
+    let steer = (rate(straight, step) - rate(straight, -step)) / (2.0 * step);
+    let finite = states.iter().chain(&steer).all(|x| x.is_finite());
+    let wheelbase = car.chassis.cg_to_front + car.chassis.cg_to_rear;
+    finite.then_some((Linearised { states, steer }, wheelbase))
 }
 
 /// Runge-Kutta steps in which a car with modes up to `fastest` (1/s) is integrated over `interval_s` (s): 1 to 1000.
@@ -134,6 +198,41 @@ mod tests {
             (c.cg_to_front, c.cg_to_rear) = (c.cg_to_front + 0.8, c.cg_to_rear - 0.8);
         };
         assert!(decay(&heavy_tail, 70.0) < 0.0);
+    }
+
+    #[test]
+    fn small_steering_turns_a_slow_car_by_its_geometry_and_a_fast_one_by_its_balance() {
+        let car = Car::load("gt").unwrap();
+        let at = |speed: f64| small_steering(&car.to_flat(), car.tyre_model(), speed).expect("a car");
+        let wheelbase = car.chassis.cg_to_front + car.chassis.cg_to_rear;
+        // Slow cars follow their wheels.
+        let slow = at(2.0);
+        assert!((slow.yaw_rate_gain_1ps / (2.0 / wheelbase) - 1.0).abs() < 0.01);
+        assert!((slow.sideslip_gain / (car.chassis.cg_to_rear / wheelbase) - 1.0).abs() < 0.05);
+        for speed in [20.0, 45.0, 65.0] {
+            let now = at(speed);
+            let eigenvalues = now.eigenvalues_1ps;
+            assert!(eigenvalues.iter().all(|x| x[0] < 0.0), "{eigenvalues:?}");
+            let again = -eigenvalues.iter().map(|x| x[0]).fold(f64::NEG_INFINITY, f64::max);
+            assert_eq!(now.slowest_decay_1ps, again);
+            assert_eq!(
+                now.slowest_decay_1ps,
+                slowest_decay(&car.to_flat(), car.tyre_model(), speed)
+            );
+            let k = (speed / (wheelbase * now.yaw_rate_gain_1ps) - 1.0) / speed.powi(2);
+            assert_eq!(now.stability_factor_s2_per_m2, k);
+        }
+        // More weight in front understeers, more behind oversteers.
+        let moved = |metres: f64| {
+            let mut car = Car::load("gt").unwrap();
+            let chassis = &mut car.chassis;
+            (chassis.cg_to_front, chassis.cg_to_rear) =
+                (chassis.cg_to_front - metres, chassis.cg_to_rear + metres);
+            small_steering(&car.to_flat(), car.tyre_model(), 30.0)
+                .expect("a car")
+                .stability_factor_s2_per_m2
+        };
+        assert!(moved(0.2) > 0.0 && moved(0.2) > moved(0.0) && moved(0.0) > moved(-0.2) && moved(-0.2) < 0.0);
     }
 
     #[test]

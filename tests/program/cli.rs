@@ -409,6 +409,16 @@ fn refused_input_leaves_nothing_in_the_way() {
         vec!["surface", "--section", "Abbey", "--parameters", "K,K"],
         vec!["sweep", "sweep.toml"],
         vec!["sweep", "few.toml"],
+        vec!["reproduce", "--chapter", "4"],
+        vec![
+            "reproduce",
+            "--adapter",
+            "no such adapter",
+            "--backend",
+            "gpu",
+            "--chapter",
+            "2",
+        ],
         vec!["envelope", "--step-mps", "0"],
         vec!["envelope", "--from-mps", "90", "--to-mps", "20"],
         vec!["simulate", "--rate", "0"],
@@ -555,7 +565,16 @@ fn completions_name_every_command() {
     let printed = lapswarm(folder.path(), &["completions", "bash"]);
     let script = text(&printed.stdout);
     let others = [
-        "parity", "bench", "check", "init", "sweep", "simulate", "report", "export", "devices",
+        "parity",
+        "bench",
+        "check",
+        "init",
+        "sweep",
+        "reproduce",
+        "simulate",
+        "report",
+        "export",
+        "devices",
     ];
     for command in registry::names().into_iter().chain(others) {
         assert!(script.contains(command), "{command}");
@@ -606,6 +625,7 @@ fn a_dry_run_of_any_study_says_what_it_would_do_and_writes_nothing() {
         ("simulate", &["--noise", "0.1,0,0,0"], Some(1)),
         ("sweep", &["thesis_inertia"], Some(48 * 5000)),
         ("sweep", &["sections"], None),
+        ("reproduce", &["--quick"], None),
     ];
     for (study, flags, evaluations) in studies {
         let said = |more: &[&str]| {

@@ -3,6 +3,7 @@
 mod hybrid;
 mod identify;
 mod registry;
+mod reproduce;
 mod resume;
 mod roads;
 mod sensitivity;

@@ -6,6 +6,7 @@ use crate::evaluate::{Failure, failures_in_words};
 use crate::report::{Curves, HtmlReport, Levels, Panel, Surface, Table, write_whole};
 use crate::study::framework::{Head, RunRecord, Solved};
 use crate::vehicle::limits::{CarEnvelope, EnvelopeAtSpeed, Handling, in_words};
+use crate::vehicle::modes::{SmallSteering, small_steering};
 use crate::vehicle::{EnvelopeRow, Reached, Trim};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -23,6 +24,9 @@ pub struct EnvelopeSummary {
     /// Handling in the middle of the range of speeds.
     #[serde(flatten)]
     pub handling: Handling,
+    /// How the car answers to small steering at each speed.
+    #[serde(default)]
+    pub small_steering: Vec<SmallSteering>,
     /// The limits at each speed, for turns to the side on which the car can do less.
     pub limits: Vec<EnvelopeRow>,
     /// What the log supports of the limits, speed by speed, if the car was fitted to one.
@@ -102,11 +106,22 @@ pub(super) fn summarise(solved: &Solved<'_, EnvelopeStudy>) -> EnvelopeSummary {
         steady_states: limits.speeds.iter().map(|s| s.cornering.len()).sum(),
         top_speed_mps: limits.envelope.top_speed_mps(),
         handling: limits.handling,
+        small_steering: steering_of(solved),
         limits: rows.to_vec(),
         supported,
         notes,
         surface: surface.summary.clone(),
     }
+}
+
+/// How the car answers to small steering at the speeds of its limits.
+fn steering_of(solved: &Solved<'_, EnvelopeStudy>) -> Vec<SmallSteering> {
+    let car = &solved.prepared.car;
+    let flat = car.to_flat();
+    let speeds = solved.prepared.speeds.iter();
+    speeds
+        .filter_map(|speed| small_steering(&flat, car.tyre_model(), *speed))
+        .collect()
 }
 
 /// What a reader of the limits must know of them.
@@ -181,7 +196,7 @@ impl EnvelopeSummary {
     }
 }
 
-/// Writes `envelope.csv` (as `--envelope` reads it), `cornering.csv`, `surface.csv`, `ridge.csv`, figures and
+/// Writes `envelope.csv` (as `--envelope` reads it), `cornering.csv`, `handling.csv`, `surface.csv`, `ridge.csv`, figures and
 /// `report.html`.
 ///
 /// # Errors
@@ -191,6 +206,7 @@ pub(super) fn report(folder: &Path, outcome: &Outcome, summary: &EnvelopeSummary
     write_whole(folder.join("envelope.csv"), limits.envelope.to_csv().as_bytes())?;
     write_cornering(&folder.join("cornering.csv"), limits)?;
     write_surface(folder, &outcome.surface)?;
+    write_handling(&folder.join("handling.csv"), &summary.small_steering)?;
     write_page(folder, outcome, summary)
 }
 
@@ -209,6 +225,51 @@ fn write_cornering(path: &Path, limits: &CarEnvelope) -> Result<()> {
         .number("slip_ratio", "-", |(_, t)| t.slip_ratio)
         .table()
         .write_csv(path)
+}
+
+fn write_handling(path: &Path, rows: &[SmallSteering]) -> Result<()> {
+    let part = |k: usize, part: usize| move |r: &&SmallSteering| r.eigenvalues_1ps[k][part];
+    let mut table = Table::rows(rows)
+        .number("v", "m/s", |r| r.v_mps)
+        .number("yaw_rate_gain", "1/s", |r| r.yaw_rate_gain_1ps)
+        .number("ay_gain", "m/s^2", |r| r.ay_gain_mps2)
+        .number("sideslip_gain", "-", |r| r.sideslip_gain)
+        .number("stability_factor", "s^2/m^2", |r| r.stability_factor_s2_per_m2)
+        .number("frequency", "Hz", |r| r.frequency_hz)
+        .number("damping_ratio", "-", |r| r.damping_ratio)
+        .number("slowest_decay", "1/s", |r| r.slowest_decay_1ps);
+    for k in 0..6 {
+        table = table
+            .number(format!("eigenvalue_{}_real", k + 1), "1/s", part(k, 0))
+            .number(format!("eigenvalue_{}_imaginary", k + 1), "1/s", part(k, 1));
+    }
+    table.table().write_csv(path)
+}
+
+/// Gains, damping and eigenvalues over speed.
+fn handling_figure(rows: &[SmallSteering], car: &str) -> Curves {
+    let of = |f: &dyn Fn(&SmallSteering) -> f64| rows.iter().map(f).collect::<Vec<f64>>();
+    let v = of(&|r| r.v_mps);
+    let gain = Panel::new("Yaw rate for each degree at the wheels")
+        .x("speed", "m/s")
+        .y("yaw rate", "deg/s")
+        .curve("", &v, &of(&|r| r.yaw_rate_gain_1ps));
+    let factor = Panel::new("Stability factor")
+        .x("speed", "m/s")
+        .y("K", "s\u{b2}/m\u{b2}")
+        .curve("", &v, &of(&|r| r.stability_factor_s2_per_m2));
+    let damping = Panel::new("Damping of the least damped oscillation")
+        .x("speed", "m/s")
+        .y("share of the critical damping", "")
+        .curve("", &v, &of(&|r| r.damping_ratio.unwrap_or(f64::NAN)));
+    let mut roots = Panel::new("Eigenvalues")
+        .x("real part", "1/s")
+        .y("imaginary part", "1/s");
+    for i in (0..rows.len()).step_by(rows.len().div_ceil(6).max(1)) {
+        let points = rows[i].eigenvalues_1ps.map(|[re, im]| (re, im));
+        roots = roots.dots(format!("{:.0} m/s", v[i]), points);
+    }
+    Curves::new(format!("Small steering: {car}"), [gain, factor, damping, roots])
 }
 
 /// Steady-state cornering, the limits of tyres and engine, the g-g-v diagram and sideslip of a car of this name.
@@ -291,6 +352,17 @@ fn write_page(folder: &Path, outcome: &Outcome, summary: &EnvelopeSummary) -> Re
         "From steady states of the 4DOF model at each speed. The engine's limit is that of its best gear.",
     );
     page.figure(folder.join("envelope.svg"), &envelope_figure(limits, car))?;
+    if !summary.small_steering.is_empty() {
+        page.section(
+            "Handling",
+            "The car running straight, linearised at each speed. An eigenvalue on the right of zero is a motion that grows. Above \
+             the critical speed of a car that oversteers there is one.",
+        );
+        page.figure(
+            folder.join("handling.svg"),
+            &handling_figure(&summary.small_steering, car),
+        )?;
+    }
     page.section("The surface", ABOUT_SURFACE);
     page.paragraph(&surface_in_words(&summary.surface, record));
     if let Some(figure) = surface_figure(&outcome.surface, car) {

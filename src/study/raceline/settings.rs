@@ -42,7 +42,7 @@ settings! {
         envelope: Option<PathBuf> ["-"] = None, optional(file()).example("\"envelope.csv\""),
             "A g-g-v envelope (columns v_mps, ay_mps2, ax_grip_mps2, ax_drive_mps2, drag_mps2) instead of the car's own";
         section: Option<String> ["-"] = None, optional(text()).example("\"Abbey\""),
-            "Only this named stretch of the track, as an open road";
+            "Only this named stretch of the track, or a sector such as 3/12 of its cross-sections, as an open road";
         sections: usize ["-"] = 960, count(8, 1_000_000),
             "Cross-sections of the track";
         as_surveyed: bool ["-"] = true, switch(true).flag(Flag::Switch("smoothed", false)),

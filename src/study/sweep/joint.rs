@@ -1,21 +1,22 @@
 //! Fronts of several runs against the front of all of them together.
 
 use super::Row;
-use super::results::by_settings;
 use crate::error::Result;
 use crate::swarm::metrics::{hypervolume, non_dominated};
+use std::collections::BTreeMap;
 
 /// The reference point, in ranges of the joint front from its best.
 const REFERENCE: f64 = 1.1;
 /// The figure that rows with a front are given.
 pub(super) const SHARE: &str = "hypervolume_share";
 
-/// Gives every row that has a front its hypervolume as a share of that of the front of all runs with the same settings but
-/// for the seed. Objectives count in ranges of that joint front, and volumes are up to 1.1 of these from its best point.
+/// Gives every row that has a front its hypervolume as a share of that of the front of all runs of the same problem, whatever
+/// searched it; `problems` has the number of each run's. Objectives count in ranges of that joint front, and volumes are up to 1.1
+/// of these from its best point.
 ///
 /// # Errors
 /// Those of [`hypervolume`].
-pub(super) fn compare(rows: &mut [Row]) -> Result<()> {
+pub(super) fn compare(rows: &mut [Row], problems: &[usize]) -> Result<()> {
     // Volumes are worked out in two and three dimensions.
     let width_of = |row: &Row| {
         row.front
@@ -23,7 +24,11 @@ pub(super) fn compare(rows: &mut [Row]) -> Result<()> {
             .map(Vec::len)
             .filter(|width| (2..=3).contains(width))
     };
-    for (_, mut members) in by_settings(rows) {
+    let mut of_problem: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+    for (place, row) in rows.iter().enumerate() {
+        of_problem.entry(problems[row.run]).or_default().push(place);
+    }
+    for mut members in of_problem.into_values() {
         let Some(width) = members.iter().find_map(|&i| width_of(&rows[i])) else {
             continue;
         };
@@ -57,30 +62,25 @@ pub(super) fn compare(rows: &mut [Row]) -> Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::collections::BTreeMap;
 
-    fn row(run: usize, sections: &str, front: Vec<Vec<f64>>) -> Row {
+    fn row(run: usize, front: Vec<Vec<f64>>) -> Row {
         Row {
             run,
-            settings: BTreeMap::from([
-                ("sections".to_owned(), sections.to_owned()),
-                ("seed".to_owned(), run.to_string()),
-            ]),
-            figures: BTreeMap::new(),
-            device_faults: Vec::new(),
             front,
+            ..Row::default()
         }
     }
 
-    /// Two runs that have half of a front of four each; a third of another setting is its own joint front.
+    /// Two runs that have half of a front of four each; a third of another problem is its own joint front.
     #[test]
-    fn shares_are_of_the_front_of_all_seeds() {
+    fn shares_are_of_the_front_of_all_runs_of_a_problem() {
         let mut rows = [
-            row(0, "a", vec![vec![0.0, 3.0], vec![2.0, 1.0]]),
-            row(1, "a", vec![vec![1.0, 2.0], vec![3.0, 0.0]]),
-            row(2, "b", vec![vec![5.0, 6.0], vec![7.0, 5.0]]),
+            row(0, vec![vec![0.0, 3.0], vec![2.0, 1.0]]),
+            row(2, vec![vec![1.0, 2.0], vec![3.0, 0.0]]),
+            row(3, vec![vec![5.0, 6.0], vec![7.0, 5.0]]),
         ];
-        compare(&mut rows).unwrap();
+        // The run of number 1 has failed.
+        compare(&mut rows, &[0, 0, 0, 1]).unwrap();
         let share = |i: usize| rows[i].figures[SHARE].unwrap();
         // On a scale of 3: the joint front's staircase under 3.3 has 0.3 + 1.3 + 2.3 + 3.3 columns less what lies beyond.
         let whole = 0.3 + 1.3 + 2.3 + 3.3 * 0.3;

@@ -11,7 +11,7 @@ mod results;
 mod rows;
 
 pub use grid::{Point, SweepSettings};
-pub use results::{Row, Summary, medians};
+pub use results::{Group, Row, Summary, medians};
 pub use rows::{KeptRow, Part, RowsRequest};
 
 use crate::config::read_text;
@@ -24,6 +24,7 @@ use crate::study::framework::state_file::StateFile;
 use crate::study::framework::{
     Entry, InputFiles, Manifest, Plan, Progress, Solved, Study, TIME_LIMIT, TimeLimit, write_json,
 };
+use std::collections::BTreeMap;
 use std::ops::{ControlFlow, Range};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -145,9 +146,34 @@ pub fn gather(settings: &SweepSettings, folder: &Path) -> Result<Summary> {
     let rows: Vec<Row> = finished.map(|kept| kept.row).collect();
     results::write_rows(folder, &rows)?;
     let missing = work.points.len() - rows.len() - failed_runs.len();
-    let summary = Summary::new(rows, failed_runs, missing)?;
+    let summary = Summary::new(rows, &settings.study.problems(&work)?, failed_runs, missing)?;
     summary.write(folder, settings)?;
     Ok(summary)
+}
+
+/// Whether every row of a sweep that is begun in `folder` has figures.
+///
+/// # Errors
+/// As [`gather`].
+pub fn is_finished(settings: &SweepSettings, folder: &Path) -> Result<bool> {
+    check_same(settings, folder)?;
+    let work = Work::new(settings, folder, folder.join("studies"))?;
+    let rows = work.rows_within(0..work.points.len())?;
+    Ok(rows.len() == work.points.len() && rows.values().all(|kept| !kept.failed()))
+}
+
+/// The time that each row took (s), by its number.
+///
+/// # Errors
+/// As [`gather`].
+pub fn elapsed_s(settings: &SweepSettings, folder: &Path) -> Result<BTreeMap<usize, f64>> {
+    check_same(settings, folder)?;
+    let work = Work::new(settings, folder, folder.join("studies"))?;
+    let rows = work.rows_within(0..work.points.len())?;
+    Ok(rows
+        .into_iter()
+        .map(|(number, kept)| (number, kept.elapsed_s))
+        .collect())
 }
 
 /// Refuses a folder that holds another sweep.
@@ -222,6 +248,12 @@ pub trait Swept: Sync {
     /// [`Error::Input`] naming the point.
     fn check_points(&self, work: &Work<'_>) -> Result<()>;
 
+    /// Which problem each point is of: points that only search in another way, or elsewhere, share a number.
+    ///
+    /// # Errors
+    /// [`Error::Input`] naming a point that is wrong.
+    fn problems(&self, work: &Work<'_>) -> Result<Vec<usize>>;
+
     /// Says what a sweep over these points would do; see [`plan`].
     ///
     /// # Errors
@@ -286,6 +318,19 @@ impl<S: Study> Known<S> {
 impl<S: Study> Swept for Entry<S> {
     fn check_points(&self, work: &Work<'_>) -> Result<()> {
         work.read::<S>(0..work.points.len()).map(drop)
+    }
+
+    fn problems(&self, work: &Work<'_>) -> Result<Vec<usize>> {
+        let mut known: Vec<S::Settings> = Vec::new();
+        let number = |settings: &S::Settings| {
+            let problem = problem_of::<S>(settings).with_role_of(Role::Place, &S::Settings::default());
+            known.iter().position(|k| *k == problem).unwrap_or_else(|| {
+                known.push(problem);
+                known.len() - 1
+            })
+        };
+        let studies = work.read::<S>(0..work.points.len())?;
+        Ok(studies.iter().map(number).collect())
     }
 
     fn plan_points(&self, work: &Work<'_>) -> Result<SweepPlan> {
@@ -369,7 +414,7 @@ impl<S: Study> Swept for Entry<S> {
                 };
                 let next = left[at..].iter().take(S::together(study_of(number)) - 1);
                 let next: Vec<S::Settings> = next.map(|n| study_of(*n).clone()).collect();
-                let mut group = Group::<S> {
+                let mut group = Together::<S> {
                     claims: vec![claim],
                     numbers: vec![number],
                     studies: vec![study_of(number).clone()],
@@ -400,14 +445,14 @@ impl<S: Study> Swept for Entry<S> {
 }
 
 /// Runs that are solved together.
-struct Group<S: Study> {
+struct Together<S: Study> {
     /// Held until their rows are kept.
     claims: Vec<LockFile>,
     numbers: Vec<usize>,
     studies: Vec<S::Settings>,
 }
 
-impl<S: Study> Group<S> {
+impl<S: Study> Together<S> {
     /// Solves them, and keeps their rows.
     fn run(
         self,
@@ -446,7 +491,8 @@ impl<S: Study> Group<S> {
                         .device_faults
                         .clone_from(&S::record(&outcome).device_faults);
                     kept.row.front = S::front(&outcome);
-                    kept.elapsed_s = S::record(&outcome).elapsed_s;
+                    // Runs that go together end together.
+                    kept.elapsed_s = S::record(&outcome).elapsed_s / numbers.len() as f64;
                     kept.log.clone_from(&kept.row.device_faults);
                     kept.log.extend(S::warnings(&summary));
                     if let Err(missed) = S::verdict(settings, &summary) {

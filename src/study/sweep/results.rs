@@ -100,7 +100,7 @@ fn faults_by_run(rows: &[Row]) -> Vec<String> {
 }
 
 /// Settings but for the seed, each with its rows, in the order in which they were run.
-pub(super) fn by_settings(rows: &[Row]) -> Vec<(BTreeMap<String, String>, Vec<usize>)> {
+fn by_settings(rows: &[Row]) -> Vec<(BTreeMap<String, String>, Vec<usize>)> {
     let mut groups: Vec<(BTreeMap<String, String>, Vec<usize>)> = Vec::new();
     for (number, row) in rows.iter().enumerate() {
         let mut settings = row.settings.clone();
@@ -152,8 +152,14 @@ pub(super) fn write_rows(folder: &Path, rows: &[Row]) -> Result<()> {
 }
 
 impl Summary {
-    pub(super) fn new(mut rows: Vec<Row>, failed_runs: Vec<String>, missing_runs: usize) -> Result<Self> {
-        super::joint::compare(&mut rows)?;
+    /// The figures of these rows; `problems` says of each point which problem it is of.
+    pub(super) fn new(
+        mut rows: Vec<Row>,
+        problems: &[usize],
+        failed_runs: Vec<String>,
+        missing_runs: usize,
+    ) -> Result<Self> {
+        super::joint::compare(&mut rows, problems)?;
         for row in &mut rows {
             row.front.clear();
         }

@@ -29,7 +29,7 @@ pub struct KeptRow {
     pub exit_code: u8,
     /// The machine that it ran on.
     pub machine: String,
-    /// Time that it took (s).
+    /// Time that it took (s); runs that go together have an equal share of theirs.
     pub elapsed_s: f64,
     /// What it had to tell, and why it failed if it did.
     pub log: Vec<String>,

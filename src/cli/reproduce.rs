@@ -1,0 +1,119 @@
+//! `lapswarm reproduce`.
+
+use super::study::{pause, print_results};
+use super::{Common, Memory, backend_flag, progress::Bar, stop_flag, stopped, to_json};
+use lapswarm::config::limit_memory;
+use lapswarm::evaluate::BackendChoice;
+use lapswarm::files::run_folder;
+use lapswarm::study::reproduce::{
+    Place, REPRODUCE_FILE, ReproduceRequest, ReproduceSettings, begin, reproduce,
+};
+use lapswarm::{Error, Result};
+use std::time::Duration;
+
+/// Flags of `reproduce`.
+#[derive(clap::Args)]
+#[command(
+    after_help = "Examples:\n  lapswarm reproduce --quick\n  lapswarm reproduce --chapter 7 --out chapter7\n  lapswarm \
+                  reproduce --out thesis\n  lapswarm reproduce --out thesis --resume\n\nEach table has a folder of its own in the \
+                  run folder, with the page of its study."
+)]
+pub struct Arguments {
+    /// A chapter: 2, 3, 5, 6 or 7; may be repeated [default: all]
+    #[arg(long, value_name = "N")]
+    chapter: Vec<u8>,
+    /// A subset: fewer settings, fewer seeds
+    #[arg(long)]
+    quick: bool,
+    /// Where candidates are evaluated: auto, cpu, simd or gpu [default: auto]
+    #[arg(long, value_name = "BACKEND", value_parser = backend_flag)]
+    backend: Option<BackendChoice>,
+    /// Part of the name of the GPU to use
+    #[arg(long, value_name = "NAME")]
+    adapter: Option<String>,
+    #[command(flatten)]
+    common: Common,
+    #[command(flatten)]
+    memory: Memory,
+    /// Resume the reproduction that --out holds a part of, with the same flags
+    #[arg(long, requires = "out", conflicts_with = "dry_run")]
+    resume: bool,
+    /// Time between saves of the state of a study at work, s
+    #[arg(long, value_name = "SECONDS", default_value_t = 5.0, value_parser = pause)]
+    save_every_s: f64,
+    /// Time after which it ends in order with the tables that are finished, s; --resume continues it
+    #[arg(long, value_name = "SECONDS", value_parser = pause)]
+    time_limit_s: Option<f64>,
+}
+
+/// Runs it.
+pub fn run(arguments: &Arguments) -> Result<()> {
+    let common = &arguments.common;
+    limit_memory(arguments.memory.memory_limit_mib);
+    let place = Place {
+        backend: arguments.backend,
+        adapter: arguments.adapter.clone(),
+    };
+    let settings = ReproduceSettings::new(&arguments.chapter, arguments.quick, place)?;
+    if common.dry_run {
+        let told = settings.plan()?;
+        let folder = run_folder::would_be("reproduce", common.out.as_deref())?;
+        let planned = serde_json::json!({
+            "study": "reproduce", "dry_run": true, "reads": told, "folder": folder,
+            "folder_exists": folder.is_dir(), "evaluations": null,
+        });
+        let state = if folder.is_dir() {
+            "is there, and empty"
+        } else {
+            "would be made"
+        };
+        let text = format!(
+            "A dry run of reproduce: nothing is written.\n  {}\n  {} {state}\n",
+            told.join("\n  "),
+            folder.display()
+        );
+        print_results(common, &text, None, &to_json(&planned)?);
+        return Ok(());
+    }
+    let folder = if arguments.resume {
+        run_folder::reopen_by(
+            arguments.common.out.as_deref().unwrap_or("".as_ref()),
+            REPRODUCE_FILE,
+        )?
+    } else {
+        let created = run_folder::create("reproduce", common.out.as_deref())?;
+        begin(&settings, &created)?;
+        created
+    };
+    let stop = stop_flag();
+    let mut bar = Bar::new(common.quiet);
+    let reproduced = reproduce(
+        &settings,
+        &folder,
+        ReproduceRequest {
+            // The flags' parsers have seen to what they can be.
+            save_every: Duration::try_from_secs_f64(arguments.save_every_s).unwrap_or_default(),
+            time_limit: arguments
+                .time_limit_s
+                .and_then(|s| Duration::try_from_secs_f64(s).ok()),
+            memory_limit_mib: arguments.memory.memory_limit_mib,
+            stop: stop.clone(),
+            observe: &mut |progress| {
+                bar.show(progress);
+                stopped(&stop)
+            },
+        },
+    );
+    bar.finish();
+    let summary = reproduced?;
+    print_results(common, &summary.to_text(), Some(&folder), &to_json(&summary)?);
+    let failed: Vec<&String> = summary
+        .tables
+        .iter()
+        .flat_map(|table| &table.failed_runs)
+        .collect();
+    match failed.first() {
+        Some(first) => Err(Error::Study(format!("{} runs failed; {first}", failed.len()))),
+        None => Ok(()),
+    }
+}

@@ -1,0 +1,239 @@
+//! What a chapter of the thesis shows, as files of this crate declare it.
+
+use crate::config::Document;
+use crate::error::{Error, Result};
+use crate::evaluate::BackendChoice;
+use crate::study::registry::{self, Registered};
+use crate::study::sweep::SweepSettings;
+use serde::Deserialize;
+use std::collections::BTreeMap;
+use std::path::Path;
+use toml::{Table, Value};
+
+macro_rules! bundled {
+    ($($number:literal),*) => {
+        [$(($number, include_str!(concat!("../../../data/reproduce/chapter_", $number, ".toml")))),*]
+    };
+}
+
+const BUNDLED: [(u8, &str); 5] = bundled!(2, 3, 5, 6, 7);
+
+/// The chapters that there is something to reproduce of.
+pub fn numbers() -> Vec<u8> {
+    BUNDLED.iter().map(|(number, _)| *number).collect()
+}
+
+/// A chapter of the thesis: its tables, and what of it is not here.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Chapter {
+    /// Its number.
+    #[serde(skip)]
+    pub number: u8,
+    /// What it is about.
+    pub title: String,
+    /// Its tables.
+    #[serde(rename = "table")]
+    pub items: Vec<Item>,
+    /// What it has that is not reproduced, and why, a sentence each.
+    #[serde(default)]
+    pub left_out: Vec<String>,
+}
+
+/// A table: a study, or a sweep over a grid of its settings, and the figures that are laid beside the published ones.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Item {
+    /// The name of its folder: letters, digits and underscores.
+    pub name: String,
+    /// Its heading.
+    pub title: String,
+    /// What is done, and what to look at.
+    pub about: String,
+    /// The study.
+    pub study: String,
+    /// Its settings.
+    #[serde(default)]
+    settings: Table,
+    /// What the runs differ in; without it, one run with its own page.
+    #[serde(default)]
+    grid: Table,
+    /// Settings and axes of the quick subset, over the others.
+    #[serde(default)]
+    quick: Quick,
+    /// The figures.
+    pub figures: Vec<Asked>,
+}
+
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Quick {
+    #[serde(default)]
+    settings: Table,
+    #[serde(default)]
+    grid: Table,
+}
+
+/// A figure of a table.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Asked {
+    /// Its key in the study's summary, with dots through tables; in a sweep, that of a column, or `elapsed_s`.
+    pub figure: String,
+    /// What it is called.
+    pub name: String,
+    /// Its unit.
+    #[serde(default)]
+    pub unit: String,
+    /// What the key's figure is multiplied by to be in that unit.
+    #[serde(default = "one")]
+    pub scale: f64,
+    /// What it is of, as a scenario.
+    #[serde(default)]
+    pub of: String,
+    /// The settings of a sweep that it is of; without any, it is shown for all of them.
+    #[serde(default)]
+    pub at: BTreeMap<String, String>,
+    /// Whether it is the sum over all settings of the sweep, as a lap is of its sectors.
+    #[serde(default)]
+    pub sum: bool,
+    /// The published figure, where it is known.
+    pub published: Option<f64>,
+    /// Why the two differ.
+    #[serde(default)]
+    pub differs: String,
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+/// How a table is filled.
+#[derive(Clone, Debug)]
+pub enum Task {
+    /// By a study with the text of its file.
+    Study(&'static dyn Registered, String),
+    /// By a sweep.
+    Sweep(SweepSettings),
+}
+
+impl std::fmt::Debug for dyn Registered {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// Where candidates are evaluated, over the files.
+#[derive(Clone, Debug, Default)]
+pub struct Place {
+    /// The backend.
+    pub backend: Option<BackendChoice>,
+    /// Part of the name of the GPU.
+    pub adapter: Option<String>,
+}
+
+impl Chapter {
+    /// A chapter by its number.
+    ///
+    /// # Errors
+    /// [`Error::Input`] if there is none of this number.
+    pub fn load(number: u8) -> Result<Self> {
+        let found = BUNDLED.iter().find(|(known, _)| *known == number);
+        let (_, text) = found.ok_or_else(|| {
+            let known: Vec<String> = numbers().iter().map(u8::to_string).collect();
+            let expected = format!("one of {}", known.join(", "));
+            Error::input("the command line", "chapter", number.to_string(), expected)
+        })?;
+        let name = format!("chapter_{number}.toml");
+        let path = Path::new(&name);
+        // Says what is wrong in text that is no TOML.
+        Document::parse(path, text)?;
+        let wrong = |e: toml::de::Error| Error::input(path, "contents", e.message(), "a chapter");
+        let chapter: Self = toml::from_str(text).map_err(wrong)?;
+        Ok(Self { number, ..chapter })
+    }
+}
+
+impl Item {
+    /// What is to be done for the table: all of it, or the quick subset.
+    ///
+    /// # Errors
+    /// [`Error::Input`] if the file asks for what there is not.
+    pub fn task(&self, quick: bool, place: &Place) -> Result<Task> {
+        let study = registry::named(&self.study).ok_or_else(|| {
+            let expected = format!("one of {}", registry::names().join(", "));
+            Error::input(&self.name, "study", &*self.study, expected)
+        })?;
+        let (mut settings, mut grid) = (self.settings.clone(), self.grid.clone());
+        if quick {
+            extend(&mut settings, &self.quick.settings);
+            extend(&mut grid, &self.quick.grid);
+        }
+        let has = |key: &str| study.declared().iter().any(|d| d.key == key);
+        if let Some(backend) = place.backend.filter(|_| has("backend")) {
+            use crate::config::kinds::Choice;
+            settings.insert("backend".to_owned(), Value::String(backend.name().to_owned()));
+        }
+        if let Some(adapter) = place.adapter.as_ref().filter(|_| has("adapter")) {
+            settings.insert("adapter".to_owned(), Value::String(adapter.clone()));
+        }
+        if grid.is_empty() {
+            return Ok(Task::Study(study, settings.to_string()));
+        }
+        let sweep = Table::from_iter([
+            ("study".to_owned(), Value::String(self.study.clone())),
+            ("base".to_owned(), Value::Table(settings)),
+            ("grid".to_owned(), Value::Table(grid)),
+        ]);
+        SweepSettings::parse(Path::new(&self.name), &sweep.to_string()).map(Task::Sweep)
+    }
+}
+
+/// Adds keys to a table; tables within it are added to.
+fn extend(table: &mut Table, more: &Table) {
+    for (key, value) in more {
+        match (table.get_mut(key), value) {
+            (Some(Value::Table(there)), Value::Table(more)) => extend(there, more),
+            _ => {
+                table.insert(key.clone(), value.clone());
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::study::sweep::plan;
+
+    /// What the bundled chapters ask for can be done, in full and quickly.
+    #[test]
+    fn every_chapter_is_sound() {
+        let mut names = std::collections::BTreeSet::new();
+        for number in numbers() {
+            let chapter = Chapter::load(number).expect("a chapter");
+            for item in &chapter.items {
+                assert!(names.insert(item.name.clone()), "{} twice", item.name);
+                assert!(item.name.starts_with(&format!("{number}_")), "{}", item.name);
+                assert!(!item.figures.is_empty(), "{}", item.name);
+                for quick in [false, true] {
+                    match item.task(quick, &Place::default()).expect(&item.name) {
+                        Task::Sweep(sweep) => drop(plan(&sweep).expect(&item.name)),
+                        Task::Study(study, text) => {
+                            let folder = tempfile::tempdir().expect("a folder");
+                            let path = folder.path().join("study.toml");
+                            std::fs::write(&path, text).expect("a file");
+                            study.check(&path).expect(&item.name);
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_chapter_that_is_not_there_is_refused_with_those_that_are() {
+        let said = Chapter::load(4).expect_err("no chapter 4").to_string();
+        assert!(said.contains("2, 3, 5, 6, 7"), "{said}");
+    }
+}

@@ -1,0 +1,74 @@
+//! Reproductions: tables beside the published figures, broken off and resumed.
+
+use lapswarm::Error;
+use lapswarm::study::framework::Progress;
+use lapswarm::study::reproduce::{Place, ReproduceRequest, ReproduceSettings, Summary, begin, reproduce};
+use std::ops::ControlFlow;
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Duration;
+
+fn run(
+    settings: &ReproduceSettings,
+    folder: &Path,
+    observe: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
+) -> Result<Summary, Error> {
+    let request = ReproduceRequest {
+        save_every: Duration::ZERO,
+        time_limit: None,
+        memory_limit_mib: 4096,
+        stop: Arc::default(),
+        observe,
+    };
+    reproduce(settings, folder, request)
+}
+
+fn begun(folder: &Path) -> ReproduceSettings {
+    let settings = ReproduceSettings::new(&[3, 2], true, Place::default()).expect("chapters");
+    std::fs::create_dir_all(folder).expect("a folder");
+    begin(&settings, folder).expect("it begins");
+    settings
+}
+
+#[test]
+fn a_reproduction_that_is_broken_off_goes_on_with_what_is_left() {
+    let root = tempfile::tempdir().expect("a temporary folder");
+    let (whole, broken) = (root.path().join("whole"), root.path().join("broken"));
+    let settings = begun(&whole);
+    let expected = run(&settings, &whole, &mut |_| ControlFlow::Continue(())).expect("it ends");
+    assert!(expected.tables.len() >= 2);
+    let last = expected.tables.last().expect("a table").name.clone();
+
+    begun(&broken);
+    let mut stages = Vec::new();
+    let error = run(&settings, &broken, &mut |progress| {
+        stages.push(progress.stage.clone());
+        if progress.stage.starts_with(&last) {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        }
+    });
+    assert!(
+        matches!(&error, Err(Error::Interrupted(at)) if *at == broken),
+        "{error:?}"
+    );
+    assert!(!broken.join("summary.json").exists());
+    let mut again = Vec::new();
+    let resumed = run(&settings, &broken, &mut |progress| {
+        again.push(progress.stage.clone());
+        ControlFlow::Continue(())
+    });
+    let resumed = resumed.expect("it ends");
+    assert!(again.iter().all(|stage| stage.starts_with(&last)), "{again:?}");
+    for (resumed, expected) in resumed.tables.iter().zip(&expected.tables) {
+        assert_eq!(resumed.rows, expected.rows);
+        assert!(resumed.elapsed_s > 0.0);
+    }
+    for name in ["published.csv", "report.html", "summary.json"] {
+        assert!(broken.join(name).is_file(), "{name}");
+    }
+    let other = ReproduceSettings::new(&[3], true, Place::default()).expect("a chapter");
+    let refused = run(&other, &broken, &mut |_| ControlFlow::Continue(())).expect_err("another");
+    assert_eq!(refused.exit_code(), 2);
+}
