@@ -31,7 +31,10 @@ fn main() {
         eprintln!("IGNORED: {reason}");
         return;
     }
-    let arguments: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with("--")).collect();
+    let arguments: Vec<String> = std::env::args()
+        .skip(1)
+        .filter(|a| !a.starts_with("--"))
+        .collect();
     let wanted: Vec<&str> = arguments.iter().map(String::as_str).collect();
     for family in radv::FAMILIES {
         match radv::ask(family, &wanted) {
@@ -52,7 +55,12 @@ fn print_table(family: &str, answers: &[radv::Compiled]) {
             .map(|(name, _)| kernel.figure(name).to_string())
             .collect();
         let separator = if kernel.shape.is_empty() { "" } else { ": " };
-        println!("| {}{separator}{} | {} |", kernel.entry, kernel.shape, figures.join(" | "));
+        println!(
+            "| {}{separator}{} | {} |",
+            kernel.entry,
+            kernel.shape,
+            figures.join(" | ")
+        );
     }
     println!();
 }

@@ -8,15 +8,17 @@ use crate::scalar::lanes::Lanes;
 use crate::vehicle::tyre::Tyre;
 use crate::vehicle::{CarModel, LinearTyre, MagicFormula, TyreModel};
 use rayon::prelude::*;
+use std::collections::HashMap;
 
 /// Ready cars of one problem (see [`CarModel::to_table`]), worked out in `f64` and rounded once.
 #[derive(Clone, Debug)]
 pub struct ModelTable {
     /// The table of a candidate in the middle of the bounds; figures that do not vary hold for all.
     pub base: Vec<f32>,
-    /// For each place of the table, which varying figure it is, if it varies.
+    /// For each place of the table, which varying figure it is, if it varies. Places that always hold the same, such as a figure of
+    /// both axles' tyres that one unknown moves, are one figure, which kernels read once and keep once.
     pub sources: Vec<Option<usize>>,
-    /// Places of the table that vary, ascending.
+    /// For each varying figure, the first place of the table that holds it; ascending.
     pub varying: Vec<usize>,
 }
 
@@ -38,18 +40,23 @@ impl ModelTable {
         };
         let base = at_share(&|_| 0.5);
         let random = Random::new(0);
-        let mut varies = vec![false; base.len()];
-        for probe in 0..PROBES {
-            let table = at_share(&|i| random.uniform(PROBE, probe, 0, i));
-            for ((varies, a), b) in varies.iter_mut().zip(&table).zip(&base) {
-                *varies |= a.to_bits() != b.to_bits();
-            }
-        }
-        let varying: Vec<usize> = (0..base.len()).filter(|&i| varies[i]).collect();
-        let mut sources = vec![None; base.len()];
-        for (figure, &place) in varying.iter().enumerate() {
-            sources[place] = Some(figure);
-        }
+        let probes: Vec<Vec<f64>> = (0..PROBES)
+            .map(|probe| at_share(&|i| random.uniform(PROBE, probe, 0, i)))
+            .collect();
+        let mut varying = Vec::new();
+        let mut known = HashMap::new();
+        let sources = (0..base.len())
+            .map(|place| {
+                let bits: Vec<u64> = probes.iter().map(|table| table[place].to_bits()).collect();
+                let varies = bits.iter().any(|bits| *bits != base[place].to_bits());
+                varies.then(|| {
+                    *known.entry(bits).or_insert_with(|| {
+                        varying.push(place);
+                        varying.len() - 1
+                    })
+                })
+            })
+            .collect();
         Self {
             base: base.iter().map(|x| *x as f32).collect(),
             sources,

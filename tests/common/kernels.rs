@@ -2,7 +2,8 @@
 
 use super::{UNKNOWNS, bundled_car, linear_car, problem};
 use lapswarm::evaluate::gpu::shader::{
-    CarShape, DriveShape, EnergyShape, LineShape, ReplayShape, line_swarm, swarm, swarm_gather, test_problem,
+    CarShape, DriveShape, EnergyShape, LineShape, ReplayShape, WheelOrder, line_swarm, swarm, swarm_gather,
+    test_problem,
 };
 use lapswarm::evaluate::replay::{ModelTable, Norm};
 use lapswarm::line::kernel::Wanted;
@@ -49,20 +50,32 @@ pub fn kernels() -> Vec<KernelSource> {
     for (free, car, unknowns) in cars {
         let problem = problem(car, unknowns, lap);
         let table = ModelTable::new(&problem.free, &problem.problem.variables);
-        let car = CarShape {
-            model: problem.tyre_model(),
-            sources: &table.sources,
-            workgroup: 64,
-        };
-        for norm in NORMS {
-            let shape = ReplayShape { car, norm };
-            add("replay", &format!("{free}, {norm:?}"), shape.replay());
-            add("replay_reduce", &format!("{free}, {norm:?}"), shape.reduce());
-        }
-        add("settle", free, car.steady());
-        for blends in [false, true] {
-            let plans = if blends { "plans blended" } else { "one plan" };
-            add("drive", &format!("{free}, {plans}"), drive_shape(car, blends).source());
+        for wheels in [WheelOrder::ByAxle, WheelOrder::SideBySide] {
+            let car = CarShape {
+                model: problem.tyre_model(),
+                wheels,
+                sources: &table.sources,
+                workgroup: 64,
+            };
+            let order = match wheels {
+                WheelOrder::ByAxle => "by axle",
+                WheelOrder::SideBySide => "side by side",
+            };
+            let of = format!("{order}, {free}");
+            for norm in NORMS {
+                let shape = ReplayShape { car, norm };
+                add("replay", &format!("{of}, {norm:?}"), shape.replay());
+                add("replay_reduce", &format!("{of}, {norm:?}"), shape.reduce());
+            }
+            add("settle", &of, car.steady());
+            for blends in [false, true] {
+                let plans = if blends { "plans blended" } else { "one plan" };
+                add(
+                    "drive",
+                    &format!("{of}, {plans}"),
+                    drive_shape(car, blends).source(),
+                );
+            }
         }
     }
     for closed in [false, true] {
@@ -70,7 +83,11 @@ pub fn kernels() -> Vec<KernelSource> {
             let of = format!("{}, {terms} terms", if closed { "closed" } else { "open" });
             for lap in [false, true] {
                 let measures = if lap { "lap" } else { "lengths" };
-                add("line", &format!("{of}, {measures}"), line_shape(closed, terms, lap).source());
+                add(
+                    "line",
+                    &format!("{of}, {measures}"),
+                    line_shape(closed, terms, lap).source(),
+                );
             }
             for additional in [false, true] {
                 let motor = if additional { "adds" } else { "shares" };

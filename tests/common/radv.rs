@@ -150,8 +150,8 @@ impl Driver {
             ash::ext::robustness2::NAME.as_ptr(),
         ];
         let queue = [vk::DeviceQueueCreateInfo::default().queue_priorities(&[1.0])];
-        let mut statistics =
-            vk::PhysicalDevicePipelineExecutablePropertiesFeaturesKHR::default().pipeline_executable_info(true);
+        let mut statistics = vk::PhysicalDevicePipelineExecutablePropertiesFeaturesKHR::default()
+            .pipeline_executable_info(true);
         let mut memory_model = vk::PhysicalDeviceVulkan12Features::default().vulkan_memory_model(true);
         // As wgpu opens it.
         let mut robust = vk::PhysicalDeviceRobustness2FeaturesEXT::default().robust_buffer_access2(true);
@@ -198,9 +198,15 @@ impl Driver {
         // SAFETY: as above; the module is SPIR-V that naga has validated, and the layout names every buffer of it.
         let statistics = unsafe {
             let module = self.device.create_shader_module(&module, None).expect("a module");
-            let sets = [self.device.create_descriptor_set_layout(&set, None).expect("a layout")];
+            let sets = [self
+                .device
+                .create_descriptor_set_layout(&set, None)
+                .expect("a layout")];
             let layout = vk::PipelineLayoutCreateInfo::default().set_layouts(&sets);
-            let layout = self.device.create_pipeline_layout(&layout, None).expect("a layout");
+            let layout = self
+                .device
+                .create_pipeline_layout(&layout, None)
+                .expect("a layout");
             let stage = vk::PipelineShaderStageCreateInfo::default()
                 .stage(vk::ShaderStageFlags::COMPUTE)
                 .module(module)
@@ -211,7 +217,8 @@ impl Driver {
                 .layout(layout);
             let cache = vk::PipelineCache::null();
             let pipelines = self.device.create_compute_pipelines(cache, &[wanted], None);
-            let executable = vk::PipelineExecutableInfoKHR::default().pipeline(pipelines.expect("a pipeline")[0]);
+            let executable =
+                vk::PipelineExecutableInfoKHR::default().pipeline(pipelines.expect("a pipeline")[0]);
             self.statistics
                 .get_pipeline_executable_statistics(&executable)
                 .expect("statistics")

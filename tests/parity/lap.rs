@@ -122,15 +122,15 @@ fn device_trace(replay: &ReplayProblem, candidate: &[f64]) -> Vec<[f32; 4]> {
         fn given(i: u32) -> f32 { return figures[AFTER_FIGURES + i]; }
         @compute @workgroup_size(64) fn trace(@builtin(global_invocation_id) id: vec3<u32>) {
             if id.x > 0u { return; }
-            let car = CarModel(load_chassis(0u), load_tyres(0u));
+            let car = load_car(0u);
             var state = CarState(BodyState(given(0u), given(1u), given(2u), given(3u), given(4u)), given(5u));
             let step = given(6u);
             let last = arrayLength(&to_host) / 4u - 1u;
             for (var i = 0u; i <= last; i++) {
                 let a = 7u + 5u * i;
                 let b = 7u + 5u * min(i + 1u, last);
-                let from_wheels = Wheels(given(a), given(a + 1u), given(a + 2u), given(a + 3u));
-                let to_wheels = Wheels(given(b), given(b + 1u), given(b + 2u), given(b + 3u));
+                let from_wheels = vec4<f32>(given(a), given(a + 1u), given(a + 2u), given(a + 3u));
+                let to_wheels = vec4<f32>(given(b), given(b + 1u), given(b + 2u), given(b + 3u));
                 var sum = state;
                 var reached = state;
                 for (var stage = 0u; stage < STAGES; stage++) {
@@ -162,7 +162,7 @@ fn device_trace(replay: &ReplayProblem, candidate: &[f64]) -> Vec<[f32; 4]> {
         input.extend(sample.wheel_speed);
         input.push(sample.steer);
     }
-    let source = car_source(replay.tyre_model(), figures.len(), 1, entry);
+    let source = car_source((replay.tyre_model(), context.wheels()), figures.len(), 1, entry);
     let flat = context
         .run_array(&source, "trace", &input, samples.len() * 4, 1)
         .expect("the kernel runs");

@@ -8,7 +8,7 @@ use lapswarm::drive::{Course, PATH_WIDTH};
 use lapswarm::evaluate::energy::EnergyAccount;
 use lapswarm::evaluate::gpu::TrajectoryStretch;
 use lapswarm::evaluate::gpu::lint;
-use lapswarm::evaluate::gpu::shader::{CarShape, car_fragments, swarm, tyre_struct};
+use lapswarm::evaluate::gpu::shader::{CarShape, WheelOrder, swarm, tyre_struct};
 use lapswarm::evaluate::line::{DeviceSection, LineStretch};
 use lapswarm::evaluate::replay::{DeviceSample, DeviceWindow, ModelTable, Stretch};
 use lapswarm::evaluate::steady::DevicePlan;
@@ -105,8 +105,11 @@ fn the_lint_finds_what_kernels_must_not_contain() {
     }
     lint::check(&spoilt("sqrt(abs(x)) + floor(x) + max(x, 1.0)")).expect("these round alike everywhere");
     // The kernels' own sources, with a built-in slipped in.
-    let source = car_fragments(TyreModel::Linear)
-        .concat()
+    let kernels = kernels();
+    let linear = kernels.iter().find(|kernel| kernel.shape.contains("linear"));
+    let source = linear
+        .expect("a kernel")
+        .source
         .replace("own_atan(input", "atan(input");
     assert!(lint::check(&source).expect_err("atan").contains("Atan"));
 }
@@ -212,6 +215,7 @@ fn the_structs_of_drives_have_the_hosts_fields() {
     let source = drive_shape(
         CarShape {
             model: problem.tyre_model(),
+            wheels: WheelOrder::ByAxle,
             sources: &table.sources,
             workgroup: 64,
         },
@@ -325,8 +329,14 @@ fn the_struct_of_energies_has_the_hosts_offsets() {
 
 fn parameter_structs_have_the_fields_of_their_rust_twins_in_order() {
     for model in [TyreModel::MagicFormula, TyreModel::Linear] {
-        let source = car_fragments(model).concat();
-        let module = lint::check(&source).expect("the fragments parse on their own");
+        let (structure, fields) = tyre_struct(model);
+        let car = CarShape {
+            model,
+            wheels: WheelOrder::ByAxle,
+            sources: &vec![None; Chassis::<f32>::FIELDS.len() + 2 * fields.len()],
+            workgroup: 64,
+        };
+        let module = lint::check(&car.steady()).expect("the kernel parses");
         let names = |name: &str| -> Vec<String> {
             layout(&module, name)
                 .0
@@ -335,7 +345,6 @@ fn parameter_structs_have_the_fields_of_their_rust_twins_in_order() {
                 .collect()
         };
         assert_eq!(names("Chassis"), Chassis::<f32>::FIELDS);
-        let (structure, fields) = tyre_struct(model);
         assert_eq!(names(structure), fields);
     }
 }
