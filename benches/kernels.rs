@@ -38,29 +38,23 @@ fn main() {
     let wanted: Vec<&str> = arguments.iter().map(String::as_str).collect();
     for family in radv::FAMILIES {
         match radv::ask(family, &wanted) {
-            Ok(answers) => print_table(family, &answers),
+            Ok(answer) => print_table(family, &answer),
             Err(reason) => eprintln!("IGNORED: {reason}"),
         }
     }
 }
 
-fn print_table(family: &str, answers: &[radv::Compiled]) {
-    println!("## {family}\n");
+fn print_table(family: &str, answer: &radv::Answer) {
+    println!("## {family}, Mesa {}.{}\n", answer.mesa.0, answer.mesa.1);
     let heads: Vec<&str> = COLUMNS.iter().map(|(_, head)| *head).collect();
     println!("| kernel | {} |", heads.join(" | "));
     println!("|{}", "---|".repeat(1 + COLUMNS.len()));
-    for kernel in answers {
+    for kernel in &answer.kernels {
         let figures: Vec<String> = COLUMNS
             .iter()
             .map(|(name, _)| kernel.figure(name).to_string())
             .collect();
-        let separator = if kernel.shape.is_empty() { "" } else { ": " };
-        println!(
-            "| {}{separator}{} | {} |",
-            kernel.entry,
-            kernel.shape,
-            figures.join(" | ")
-        );
+        println!("| {} | {} |", kernel.name(), figures.join(" | "));
     }
     println!();
 }

@@ -17,6 +17,18 @@ pub const FAMILIES: [&str; 3] = ["navi21", "gfx1100", "vega20"];
 /// What the driver reads.
 const FAMILY: &str = "RADV_FORCE_FAMILY";
 
+/// The Mesa whose figures the tests hold to. Another one allots registers otherwise.
+const MESA: (u32, u32) = (22, 3);
+
+/// What a compiler says of kernels.
+#[derive(Clone, Debug, Deserialize, Serialize)]
+pub struct Answer {
+    /// The version of Mesa, the first two numbers of it.
+    pub mesa: (u32, u32),
+    /// The kernels.
+    pub kernels: Vec<Compiled>,
+}
+
 /// What a compiler says of a kernel.
 #[derive(Clone, Debug, Deserialize, Serialize)]
 pub struct Compiled {
@@ -29,11 +41,39 @@ pub struct Compiled {
 }
 
 impl Compiled {
+    /// Its entry point and what it is specialised to.
+    pub fn name(&self) -> String {
+        name(&self.entry, &self.shape)
+    }
+
     /// The figure of that name.
     pub fn figure(&self, name: &str) -> u64 {
         let found = self.statistics.iter().find(|(known, _)| known == name);
         found.unwrap_or_else(|| panic!("no {name} in {self:?}")).1
     }
+}
+
+fn name(entry: &str, shape: &str) -> String {
+    if shape.is_empty() {
+        entry.to_owned()
+    } else {
+        format!("{entry}: {shape}")
+    }
+}
+
+/// Whether the driver is there in the version that tests have bars for.
+///
+/// # Errors
+/// That it is not.
+pub fn with_bars() -> Result<(), String> {
+    let found = ask(FAMILIES[0], &["gather"])?.mesa;
+    if found == MESA {
+        return Ok(());
+    }
+    Err(format!(
+        "registers are known for RADV of Mesa {}.{}, here is {}.{}",
+        MESA.0, MESA.1, found.0, found.1
+    ))
 }
 
 /// The driver's file for the Vulkan loader.
@@ -56,12 +96,11 @@ pub fn driver() -> Result<PathBuf, String> {
         .ok_or_else(|| "no RADV here (Mesa's driver for AMD; Debian package mesa-vulkan-drivers)".to_owned())
 }
 
-/// What the compiler for `family` says of the kernels whose entry point and shape contain one of `wanted`: of all where that is
-/// empty. The program itself does the work, see [`answer_parent`].
+/// What the compiler for `family` says of the kernels whose names contain one of `wanted`: of all where that is empty. The program itself does the work, see [`answer_parent`].
 ///
 /// # Errors
 /// That the driver is not there or fails.
-pub fn ask(family: &str, wanted: &[&str]) -> Result<Vec<Compiled>, String> {
+pub fn ask(family: &str, wanted: &[&str]) -> Result<Answer, String> {
     let driver = driver()?;
     let program = std::env::current_exe().map_err(|e| e.to_string())?;
     let output = Command::new(program)
@@ -86,15 +125,19 @@ pub fn answer_parent(kernels: impl FnOnce() -> Vec<KernelSource>) -> bool {
         return false;
     };
     let driver = Driver::open();
-    let answers: Vec<Compiled> = kernels()
+    let compiled = kernels()
         .iter()
         .filter(|kernel| {
-            let name = format!("{}: {}", kernel.entry, kernel.shape);
+            let name = name(kernel.entry, &kernel.shape);
             wanted.lines().all(str::is_empty) || wanted.lines().any(|wanted| name.contains(wanted))
         })
         .map(|kernel| driver.compile(kernel))
         .collect();
-    serde_json::to_writer(std::io::stdout(), &answers).expect("a parent that listens");
+    let answer = Answer {
+        mesa: driver.mesa,
+        kernels: compiled,
+    };
+    serde_json::to_writer(std::io::stdout(), &answer).expect("a parent that listens");
     true
 }
 
@@ -138,6 +181,7 @@ fn spirv(kernel: &KernelSource) -> (Vec<u32>, Vec<(u32, vk::DescriptorType)>) {
 struct Driver {
     // Holds the library.
     _entry: ash::Entry,
+    mesa: (u32, u32),
     device: ash::Device,
     statistics: ash::khr::pipeline_executable_properties::Device,
 }
@@ -162,6 +206,9 @@ impl Driver {
             let entry = ash::Entry::load().expect("a Vulkan loader");
             let instance = entry.create_instance(&instance, None).expect("RADV");
             let adapters = instance.enumerate_physical_devices().expect("RADV's processor");
+            let version = instance
+                .get_physical_device_properties(adapters[0])
+                .driver_version;
             let wanted = vk::DeviceCreateInfo::default()
                 .queue_create_infos(&queue)
                 .enabled_extension_names(&extensions)
@@ -174,6 +221,7 @@ impl Driver {
             let statistics = ash::khr::pipeline_executable_properties::Device::new(&instance, &device);
             Self {
                 _entry: entry,
+                mesa: (vk::api_version_major(version), vk::api_version_minor(version)),
                 device,
                 statistics,
             }

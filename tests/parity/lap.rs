@@ -1,7 +1,7 @@
 //! Layer three and four: whole laps on every `f32` backend against the `f64` reference.
 
 use crate::common::{Random, UNKNOWNS, bundled_car, linear_car, problem};
-use crate::device::device;
+use crate::device::{device, devices};
 use lapswarm::evaluate::replay::kernel::{drive_window, score_window};
 use lapswarm::evaluate::replay::{
     CHANNEL_NAMES, CpuEvaluator, GpuEvaluator, ModelTable, Norm, Plan, ReplayProblem, SimdEvaluator, trace,
@@ -9,11 +9,12 @@ use lapswarm::evaluate::replay::{
 use lapswarm::evaluate::simd::InstructionSet;
 use lapswarm::evaluate::{Evaluation, Evaluator, ProblemKind};
 use lapswarm::parity::synthetic_lap::{INTERVAL_S, Lap, candidates};
-use lapswarm::parity::{Draws, car_source};
+use lapswarm::parity::{Draws, Subject, car_source};
 use lapswarm::scalar::Real;
 use lapswarm::vehicle::tyre::Tyre;
 use lapswarm::vehicle::{CarModel, LinearTyre, MagicFormula, TyreModel};
 use std::fmt::Write as _;
+use std::sync::Arc;
 
 tests! {
     a_whole_lap_agrees_on_every_backend_in_every_norm: also_device,
@@ -324,10 +325,16 @@ fn all_backends(what: &str, replay: &ReplayProblem, count: usize, share: f64) ->
             .expect("lanes run");
         assert!(found == single, "{set:?} is not the f32 scalar bit for bit");
     }
-    if let Some(context) = device() {
+    let mut in_one_order = None;
+    for context in devices() {
+        let subject = Subject::Device(Arc::clone(&context));
         let mut evaluator = GpuEvaluator::new(replay, context).expect("the kernels compile");
         let found = evaluator.evaluate(&population).expect("the device runs");
         figures.push(("gpu", compare(replay, "gpu", &population, &expected, &found)));
+        let other = in_one_order.get_or_insert_with(|| found.clone());
+        if subject.rounds_like_the_processor() {
+            assert!(found == *other, "the order of wheels shows");
+        }
     }
     let norm = replay.plan.norm;
     println!("{what}, {norm:?}: {failed} of {count} failed; {figures:?}");
