@@ -1,11 +1,11 @@
 // Twin of `src/vehicle/model.rs`: wheels, tyres, aero, loads and body put together. `Tyre` and `tyre_forces` come
 // from the tyre model's own module.
 //
-// The twin's loop over the wheels is one pass over all four side by side; the order of every sum and every
-// operation are the twin's.
+// The twin's loop over the wheels is one pass over all four, or one for each axle: `car_side_by_side.wgsl` and `car_by_axle.wgsl`
+// have `CarModel`, how its figures are read, and `forces_of_all`. The order of every sum and every operation are the twin's.
 
 struct CarInput {
-    wheel_speed: Wheels,
+    wheel_speed: vec4<f32>,
     steer: f32,
 }
 
@@ -18,12 +18,6 @@ struct CarRate {
     state: CarState,
     ax: f32,
     ay: f32,
-}
-
-struct CarModel {
-    chassis: Chassis,
-    // The front axle's figures in the first two places, the rear's in the others.
-    tyres: Tyre,
 }
 
 struct WheelSlip {
@@ -53,10 +47,10 @@ fn wheel_speed(c: Chassis, body: BodyState, x: f32, y: f32, cosine: f32, sine: f
     return (hub + slip * max(abs(hub), c.slip_speed_floor)) / radius;
 }
 
-fn wheel_speeds(c: Chassis, body: BodyState, cosine: f32, sine: f32, front_slip: f32, rear_slip: f32) -> Wheels {
+fn wheel_speeds(c: Chassis, body: BodyState, cosine: f32, sine: f32, front_slip: f32, rear_slip: f32) -> vec4<f32> {
     let a = c.cg_to_front;
     let b = -c.cg_to_rear;
-    return Wheels(
+    return vec4<f32>(
         wheel_speed(c, body, a, c.half_track_front, cosine, sine, front_slip, c.radius_front),
         wheel_speed(c, body, a, -c.half_track_front, cosine, sine, front_slip, c.radius_front),
         wheel_speed(c, body, b, c.half_track_rear, 1.0, 0.0, rear_slip, c.radius_rear),
@@ -67,19 +61,53 @@ fn wheel_speeds(c: Chassis, body: BodyState, cosine: f32, sine: f32, front_slip:
 struct WheelForces {
     x: Wheels,
     y: Wheels,
+    moment: Wheels,
 }
 
-fn to_body_axes(forces: TyreForces, cosine: Wheels, sine: Wheels) -> WheelForces {
-    return WheelForces(forces.x * cosine - forces.y * sine, forces.x * sine + forces.y * cosine);
+// Some wheels: loads, speeds of rims, places from the centre of gravity, side of the car, cosine and sine of their angles.
+struct SomeWheels {
+    load: Wheels,
+    rim_speed: Wheels,
+    x: Wheels,
+    y: Wheels,
+    side: Wheels,
+    cosine: Wheels,
+    sine: Wheels,
+}
+
+// The same of FL, FR, RL and RR.
+struct AllWheels {
+    load: vec4<f32>,
+    rim_speed: vec4<f32>,
+    x: vec4<f32>,
+    y: vec4<f32>,
+    side: vec4<f32>,
+    cosine: vec4<f32>,
+    sine: vec4<f32>,
+}
+
+struct AllForces {
+    x: vec4<f32>,
+    y: vec4<f32>,
+    moment: vec4<f32>,
+}
+
+// Forces in the body's axes, and moments about the centre of gravity.
+fn forces_of_some(tyres: Tyre, body: BodyState, least_speed: f32, at: SomeWheels) -> WheelForces {
+    let slip = wheel_slip(body, at.x, at.y, at.cosine, at.sine, at.rim_speed, least_speed);
+    let forces = tyre_forces(tyres, TyreInput(at.load, slip.ratio, slip.tangent, at.side));
+    let x = forces.x * at.cosine - forces.y * at.sine;
+    let y = forces.x * at.sine + forces.y * at.cosine;
+    return WheelForces(x, y, at.x * y - at.y * x + forces.aligning_moment);
 }
 
 // `start` with the four figures, one after the other.
-fn with_all(start: f32, figures: Wheels) -> f32 {
+fn with_all(start: f32, figures: vec4<f32>) -> f32 {
     return start + figures.x + figures.y + figures.z + figures.w;
 }
 
 fn car_rate(car: CarModel, state: CarState, input: CarInput) -> CarRate {
-    let chassis = car.chassis;
+    let chassis = chassis_of(car);
     let body = state.body;
     let aero = aero_forces(chassis, body.vx);
     let loads = wheel_loads(chassis, body, state.pitch_acceleration, aero);
@@ -87,27 +115,25 @@ fn car_rate(car: CarModel, state: CarState, input: CarInput) -> CarRate {
     let steer = input.steer * chassis.steer_scale + chassis.steer_offset;
     let steer_cosine = own_cos(Wheels(steer)).x;
     let steer_sine = own_sin(Wheels(steer)).x;
-    let cosine = Wheels(steer_cosine, steer_cosine, 1.0, 1.0);
-    let sine = Wheels(steer_sine, steer_sine, 0.0, 0.0);
-    let x = Wheels(chassis.cg_to_front, chassis.cg_to_front, -chassis.cg_to_rear, -chassis.cg_to_rear);
-    let half_track = Wheels(
+    let cosine = vec4<f32>(steer_cosine, steer_cosine, 1.0, 1.0);
+    let sine = vec4<f32>(steer_sine, steer_sine, 0.0, 0.0);
+    let x = vec4<f32>(chassis.cg_to_front, chassis.cg_to_front, -chassis.cg_to_rear, -chassis.cg_to_rear);
+    let half_track = vec4<f32>(
         chassis.half_track_front,
         chassis.half_track_front,
         chassis.half_track_rear,
         chassis.half_track_rear,
     );
-    let radius = Wheels(chassis.radius_front, chassis.radius_front, chassis.radius_rear, chassis.radius_rear);
-    let side = Wheels(1.0, -1.0, 1.0, -1.0);
+    let radius = vec4<f32>(chassis.radius_front, chassis.radius_front, chassis.radius_rear, chassis.radius_rear);
+    let side = vec4<f32>(1.0, -1.0, 1.0, -1.0);
     let y = half_track * side;
 
     let rim_speed = input.wheel_speed * radius;
-    let slip = wheel_slip(body, x, y, cosine, sine, rim_speed, chassis.slip_speed_floor);
-    let forces = tyre_forces(car.tyres, TyreInput(loads, slip.ratio, slip.tangent, side));
-    let force = to_body_axes(forces, cosine, sine);
+    let forces = forces_of_all(car, body, AllWheels(loads, rim_speed, x, y, side, cosine, sine));
     let total = BodyForces(
-        with_all(-aero.drag, force.x),
-        with_all(0.0, force.y),
-        with_all(0.0, x * force.y - y * force.x + forces.aligning_moment),
+        with_all(-aero.drag, forces.x),
+        with_all(0.0, forces.y),
+        with_all(0.0, forces.moment),
     );
 
     let rate = body_derivative(chassis, body, total);

@@ -64,8 +64,8 @@ fn drive_step(car: CarModel, course: Course, pace: Pace, number: f32, before: Dr
         return state;
     }
 
-    let controls = act(course, pace, car.chassis, before.car, view, before.controls);
-    let input = car_input(car.chassis, before.car, controls);
+    let controls = act(course, pace, chassis_of(car), before.car, view, before.controls);
+    let input = car_input(chassis_of(car), before.car, controls);
     var next = before.car;
     var reached = before.car;
     for (var stage = 0u; stage < STAGES; stage++) {
@@ -144,7 +144,7 @@ fn drive(@builtin(global_invocation_id) id: vec3<u32>) {
         return;
     }
 
-    let car = CarModel(load_chassis(candidate), load_tyres(candidate));
+    let car = load_car(candidate);
     for (var i = 0u; i < stretch.steps; i++) {
         state = drive_step(car, course, pace, f32(stretch.first_step + i), state);
         if state.ending != UNDER_WAY {

@@ -2,14 +2,11 @@
 // promises 2^-11 for `sin` and `cos` and 4096 ULP for `atan`. Same functions, same order, same operations. Drivers may regroup
 // literals, so no product has more than one.
 //
-// They work on four figures side by side, one per wheel. Polynomials are long chains of dependent operations, and several chains
+// They work on several figures side by side, one per wheel: on `Wheels`, which a kernel's list of fragments defines. Polynomials are long chains of dependent operations, and several chains
 // hide each other's latency, as `Pair` in `src/scalar/pair.rs` does on the processor. `_each` computes two functions of the
 // wheels in lockstep for the same reason. A single function is half of that; every compiler sees that both halves are the same.
 // Compilers may serialise the chains to save registers, so the longest polynomials are also split by powers of the square into
 // independent halves.
-
-// Figures of the wheels FL, FR, RL, RR.
-alias Wheels = vec4<f32>;
 
 struct WheelsPair {
     first: Wheels,
@@ -36,16 +33,16 @@ const WHOLE: f32 = 12582912.0;
 const WHOLE_AND_BIAS: f32 = 12583039.0;
 
 fn negate_where_odd(x: Wheels, n: Wheels) -> Wheels {
-    return bitcast<Wheels>(bitcast<vec4<u32>>(x) ^ (bitcast<vec4<u32>>(n + WHOLE) << vec4<u32>(31u)));
+    return bitcast<Wheels>(bitcast<WheelBits>(x) ^ (bitcast<WheelBits>(n + WHOLE) << WheelBits(31u)));
 }
 
 fn with_sign_of(x: Wheels, other: Wheels) -> Wheels {
-    let sign = bitcast<vec4<u32>>(other) & vec4<u32>(0x80000000u);
-    return bitcast<Wheels>((bitcast<vec4<u32>>(x) & vec4<u32>(0x7fffffffu)) | sign);
+    let sign = bitcast<WheelBits>(other) & WheelBits(0x80000000u);
+    return bitcast<Wheels>((bitcast<WheelBits>(x) & WheelBits(0x7fffffffu)) | sign);
 }
 
 fn two_to_the(n: Wheels) -> Wheels {
-    return bitcast<Wheels>(bitcast<vec4<u32>>(n + WHOLE_AND_BIAS) << vec4<u32>(23u));
+    return bitcast<Wheels>(bitcast<WheelBits>(n + WHOLE_AND_BIAS) << WheelBits(23u));
 }
 
 fn sine_polynomial(r: Wheels) -> Wheels {
@@ -164,7 +161,7 @@ fn own_exp(argument: Wheels) -> Wheels {
     return (r * r * p + (r + 1.0)) * two_to_the(n);
 }
 
-// For one figure; the functions above are for four wheels.
+// For one figure; the functions above are for wheels.
 fn own_ln(x: f32) -> f32 {
     let offset = bitcast<u32>(x) - 0x3f3504f3u;
     let exponent = f32(bitcast<i32>(offset) >> 23u);

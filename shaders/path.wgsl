@@ -86,15 +86,15 @@ struct Sight {
 
 fn sight(row: PathRow, pose: Pose) -> Sight {
     let half_slope = 0.5 * row.slope;
-    let s = Wheels(
+    let s = vec4<f32>(
         0.1127016653792583 * pose.along,
         0.5 * pose.along,
         0.8872983346207417 * pose.along,
         pose.along,
     );
     let angle = s * (row.curvature + half_slope * s);
-    let cosine = own_cos(angle);
-    let sine = own_sin(angle);
+    let cosine = cos_of_four(angle);
+    let sine = sin_of_four(angle);
     var x = 0.2777777777777778 * cosine.x;
     x = x + 0.4444444444444444 * cosine.y;
     x = x + 0.2777777777777778 * cosine.z;

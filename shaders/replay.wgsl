@@ -81,7 +81,7 @@ fn replay(@builtin(global_invocation_id) id: vec3<u32>) {
         drives = progress[place_of(10u, row, candidate)] != 0.0;
     }
 
-    let car = CarModel(load_chassis(candidate), load_tyres(candidate));
+    let car = load_car(candidate);
     var block = vec4<f32>(0.0);
     let stop = min(stretch.first_sample + stretch.samples, last + 1u);
     for (var i = stretch.first_sample; i < stop; i++) {

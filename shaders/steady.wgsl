@@ -57,7 +57,7 @@ struct SettleRate {
 }
 
 fn settle_rate(car: CarModel, speed: f32, steer: f32, now: Figures) -> SettleRate {
-    let c = car.chassis;
+    let c = chassis_of(car);
     let state = car_state(speed, now);
     let body = state.body;
     let cosine = own_cos(Wheels(steer)).x;
@@ -155,7 +155,7 @@ fn settle(@builtin(global_invocation_id) id: vec3<u32>) {
         return;
     }
 
-    let car = CarModel(load_chassis(candidate), load_tyres(candidate));
+    let car = load_car(candidate);
     for (var i = 0u; i < stretch.steps; i++) {
         state = settle_step(car, aim, f32(stretch.first_step + i), state);
         if state.ending != SETTLING {

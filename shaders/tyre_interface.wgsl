@@ -1,5 +1,5 @@
-// Twin of the types in `src/vehicle/tyre/mod.rs` that every tyre model shares. The
-// four wheels are computed side by side.
+// Twin of the types in `src/vehicle/tyre/mod.rs` that every tyre model shares. Some
+// wheels are computed side by side: see `Wheels`.
 
 struct TyreInput {
     load: Wheels,

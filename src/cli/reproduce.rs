@@ -1,10 +1,11 @@
 //! `lapswarm reproduce`.
 
-use super::study::{pause, print_results};
+use super::study::{pause, print_plan, print_results};
 use super::{Common, Memory, backend_flag, progress::Bar, stop_flag, stopped, to_json};
 use lapswarm::config::limit_memory;
 use lapswarm::evaluate::BackendChoice;
 use lapswarm::files::run_folder;
+use lapswarm::study::framework::Plan;
 use lapswarm::study::reproduce::{
     Place, REPRODUCE_FILE, ReproduceRequest, ReproduceSettings, begin, reproduce,
 };
@@ -50,30 +51,19 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<()> {
     let common = &arguments.common;
     limit_memory(arguments.memory.memory_limit_mib);
+    let backend = arguments.backend.unwrap_or(BackendChoice::Auto);
+    // A device that is not there shows before anything is written.
+    backend.would_be(arguments.adapter.as_deref())?;
     let place = Place {
         backend: arguments.backend,
         adapter: arguments.adapter.clone(),
     };
     let settings = ReproduceSettings::new(&arguments.chapter, arguments.quick, place)?;
     if common.dry_run {
-        let told = settings.plan()?;
-        let folder = run_folder::would_be("reproduce", common.out.as_deref())?;
-        let planned = serde_json::json!({
-            "study": "reproduce", "dry_run": true, "reads": told, "folder": folder,
-            "folder_exists": folder.is_dir(), "evaluations": null,
-        });
-        let state = if folder.is_dir() {
-            "is there, and empty"
-        } else {
-            "would be made"
-        };
-        let text = format!(
-            "A dry run of reproduce: nothing is written.\n  {}\n  {} {state}\n",
-            told.join("\n  "),
-            folder.display()
-        );
-        print_results(common, &text, None, &to_json(&planned)?);
-        return Ok(());
+        let plan = Plan::of_file("reproduce", &settings.to_toml());
+        let plan = settings.plan()?.into_iter().fold(plan, Plan::reads);
+        let plan = plan.backend(backend, arguments.adapter.as_deref())?;
+        return print_plan(common, &plan.into_folder(common.out.as_deref())?);
     }
     let folder = if arguments.resume {
         run_folder::reopen_by(

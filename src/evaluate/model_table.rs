@@ -6,7 +6,7 @@ use super::{FreeCar, Variable};
 use crate::random::Random;
 use crate::scalar::lanes::Lanes;
 use crate::vehicle::tyre::Tyre;
-use crate::vehicle::{CarModel, LinearTyre, MagicFormula, TyreModel};
+use crate::vehicle::{CarModel, Chassis, LinearTyre, MagicFormula, TyreModel};
 use rayon::prelude::*;
 
 /// Ready cars of one problem (see [`CarModel::to_table`]), worked out in `f64` and rounded once.
@@ -14,9 +14,10 @@ use rayon::prelude::*;
 pub struct ModelTable {
     /// The table of a candidate in the middle of the bounds; figures that do not vary hold for all.
     pub base: Vec<f32>,
-    /// For each place of the table, which varying figure it is, if it varies.
+    /// For each place of the table, which varying figure it is, if it varies. One that both axles' tyres share is one figure, which
+    /// kernels read once and keep once.
     pub sources: Vec<Option<usize>>,
-    /// Places of the table that vary, ascending.
+    /// For each varying figure, the first place of the table that holds it; ascending.
     pub varying: Vec<usize>,
 }
 
@@ -38,17 +39,30 @@ impl ModelTable {
         };
         let base = at_share(&|_| 0.5);
         let random = Random::new(0);
+        let probe = |probe: u32| at_share(&|i| random.uniform(PROBE, probe, 0, i));
+        let probes: Vec<Vec<f64>> = (0..PROBES).map(probe).collect();
         let mut varies = vec![false; base.len()];
-        for probe in 0..PROBES {
-            let table = at_share(&|i| random.uniform(PROBE, probe, 0, i));
-            for ((varies, a), b) in varies.iter_mut().zip(&table).zip(&base) {
+        for table in &probes {
+            for ((varies, a), b) in varies.iter_mut().zip(table).zip(&base) {
                 *varies |= a.to_bits() != b.to_bits();
             }
         }
-        let varying: Vec<usize> = (0..base.len()).filter(|&i| varies[i]).collect();
+        let [front, rear] = axles(base.len());
+        let mut varying: Vec<usize> = Vec::new();
         let mut sources = vec![None; base.len()];
-        for (figure, &place) in varying.iter().enumerate() {
-            sources[place] = Some(figure);
+        for place in (0..base.len()).filter(|&i| varies[i]) {
+            // The same tyre on both axles is one figure: kernels read it once. Both are made by the same formula, so that what is
+            // equal for random cars is equal for all.
+            let twin = (place >= rear).then(|| front + place - rear);
+            let same = |twin: &usize| {
+                probes
+                    .iter()
+                    .all(|table| table[place].to_bits() == table[*twin].to_bits())
+            };
+            sources[place] = twin.filter(same).and_then(|twin| sources[twin]).or_else(|| {
+                varying.push(place);
+                Some(varying.len() - 1)
+            });
         }
         Self {
             base: base.iter().map(|x| *x as f32).collect(),
@@ -82,6 +96,12 @@ impl ModelTable {
             None => L::load(self.base[place]),
         })
     }
+}
+
+/// Where the figures of the front and of the rear tyres begin in a table of so many: behind those of the chassis.
+fn axles(figures: usize) -> [usize; 2] {
+    let front = Chassis::<f64>::FIELDS.len();
+    [front, front + (figures - front) / 2]
 }
 
 /// A candidate's ready table in `f64`.

@@ -18,7 +18,7 @@ pub mod synthetic_lap;
 pub use lines::line_tolerances;
 
 use crate::error::{Error, Result};
-use crate::evaluate::gpu::shader::{ELEMENTARY, car_fragments, loaders};
+use crate::evaluate::gpu::shader::{WheelOrder, car_fragments, elementary, loaders};
 use crate::evaluate::gpu::{DeviceKind, GpuContext, devices};
 use crate::evaluate::simd::InstructionSet;
 use crate::evaluate::{BackendChoice, GpuBackend, OnDevice, OutcomeOf, SimdBackend};
@@ -268,7 +268,12 @@ const PARITY: u32 = 0xa61;
 
 /// The car's fragments with loaders that take every figure from rows of `lanes` floats at the front of the input,
 /// which is bound as `figures`; `to_host` is the output.
-pub fn car_source(model: TyreModel, figures: usize, lanes: usize, entry: &str) -> String {
+pub fn car_source(
+    (model, wheels): (TyreModel, WheelOrder),
+    figures: usize,
+    lanes: usize,
+    entry: &str,
+) -> String {
     let sources: Vec<_> = (0..figures).map(Some).collect();
     format!(
         "{}
@@ -279,21 +284,22 @@ pub fn car_source(model: TyreModel, figures: usize, lanes: usize, entry: &str) -
         @group(0) @binding(1) var<storage, read_write> to_host: array<f32>;
         {}
         {entry}",
-        car_fragments(model).concat(),
+        car_fragments(model, wheels),
         figures * lanes,
-        loaders(model, &sources),
+        loaders(model, wheels, &sources),
     )
 }
 
 /// `function` (of four figures at once) over `inputs`, whose count is a multiple of four.
 pub(crate) fn map(context: &GpuContext, function: &str, inputs: &[f32]) -> Result<Vec<f32>> {
     let source = format!(
-        "{ELEMENTARY}
+        "{}
         @group(0) @binding(0) var<storage, read> from_host: array<vec4<f32>>;
         @group(0) @binding(1) var<storage, read_write> to_host: array<vec4<f32>>;
         @compute @workgroup_size(64) fn apply(@builtin(global_invocation_id) id: vec3<u32>) {{
             if id.x < arrayLength(&from_host) {{ to_host[id.x] = {function}(from_host[id.x]); }}
-        }}"
+        }}",
+        elementary(WheelOrder::SideBySide),
     );
     context.run_array(&source, "apply", inputs, inputs.len(), inputs.len() / 4)
 }

@@ -183,12 +183,12 @@ fn on_device(context: &GpuContext, model: TyreModel, cases: &[Case]) -> Result<V
         @compute @workgroup_size(64) fn one_step(@builtin(global_invocation_id) id: vec3<u32>) {
             let lane = id.x;
             if lane >= stretch.stride { return; }
-            let car = CarModel(load_chassis(lane), load_tyres(lane));
+            let car = load_car(lane);
             let state = CarState(
                 BodyState(given(0u, lane), given(1u, lane), given(2u, lane), given(3u, lane), given(4u, lane)),
                 given(5u, lane),
             );
-            let wheels = Wheels(given(6u, lane), given(7u, lane), given(8u, lane), given(9u, lane));
+            let wheels = vec4<f32>(given(6u, lane), given(7u, lane), given(8u, lane), given(9u, lane));
             let input = CarInput(wheels, given(10u, lane));
             let step = given(11u, lane);
             var first: CarRate;
@@ -219,7 +219,7 @@ fn on_device(context: &GpuContext, model: TyreModel, cases: &[Case]) -> Result<V
         rows.extend(cases.iter().map(|c| c.input[i]));
     }
     rows.extend(cases.iter().map(|_| STEP));
-    let source = car_source(model, figures, lanes, entry);
+    let source = car_source((model, context.wheels()), figures, lanes, entry);
     let out = context.run_array(&source, "one_step", &rows, OUTPUTS * lanes, lanes)?;
     Ok((0..lanes)
         .map(|lane| std::array::from_fn(|i| out[i * lanes + lane]))

@@ -1,5 +1,6 @@
 //! Tests that need what not every machine has: they show as ignored, with the reason, where it is missing.
 
+use super::radv;
 use lapswarm::evaluate::gpu::GpuContext;
 use libtest_mimic::{Arguments, Completion, Failed, Trial};
 use std::cell::RefCell;
@@ -68,6 +69,11 @@ impl Case {
     pub fn needing(mut self, needs: impl Fn() -> Result<(), String> + Send + 'static) -> Self {
         self.needs = Some(Box::new(needs));
         self
+    }
+
+    /// Needs the compiler for AMD that the bars were measured with.
+    pub fn radv(self) -> Self {
+        self.needing(radv::with_bars)
     }
 
     /// Needs the survey of Silverstone.

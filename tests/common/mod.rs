@@ -4,8 +4,10 @@
 
 #[macro_use]
 pub mod harness;
+pub mod kernels;
 pub mod kinds;
 pub mod line;
+pub mod radv;
 pub mod runs;
 pub mod studies;
 

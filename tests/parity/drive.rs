@@ -1,7 +1,7 @@
 //! Layer six: cars driven by a driver, on every backend against `f64` and against the recorded drive of one lap.
 
 use crate::common::{bundled_car, linear_car};
-use crate::device::{device, subjects};
+use crate::device::{device, devices, subjects};
 use lapswarm::drive::kernel::{DrivenLap, ending};
 use lapswarm::drive::{DriverSettings, SpeedPlan, drive_planned};
 use lapswarm::evaluate::drive::{
@@ -169,7 +169,7 @@ fn candidates_that_fail_say_why() {
     for set in InstructionSet::available() {
         backends.push(Box::new(SimdDriveEvaluator::new(&problem, set)));
     }
-    if let Some(context) = device() {
+    for context in devices() {
         backends.push(Box::new(
             GpuDriveEvaluator::new(&problem, context).expect("the kernel compiles"),
         ));

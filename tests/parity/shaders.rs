@@ -1,23 +1,19 @@
 //! The kernels without a driver: they parse, validate, keep the rules, translate to what every platform's driver
 //! takes, and their structs are the host's.
 
-use crate::common::{UNKNOWNS, bundled_car, linear_car, problem};
+use crate::common::kernels::{KernelSource, drive_shape, energy_shape, kernels, line_shape};
+use crate::common::{UNKNOWNS, bundled_car, problem};
 use lapswarm::drive::driver::DriverTable;
 use lapswarm::drive::{Course, PATH_WIDTH};
 use lapswarm::evaluate::energy::EnergyAccount;
 use lapswarm::evaluate::gpu::TrajectoryStretch;
 use lapswarm::evaluate::gpu::lint;
-use lapswarm::evaluate::gpu::shader::{
-    CarShape, DriveShape, EnergyShape, LineShape, ReplayShape, car_fragments, line_swarm, swarm,
-    swarm_gather, test_problem, tyre_struct,
-};
+use lapswarm::evaluate::gpu::shader::{CarShape, WheelOrder, swarm, tyre_struct};
 use lapswarm::evaluate::line::{DeviceSection, LineStretch};
-use lapswarm::evaluate::replay::{DeviceSample, DeviceWindow, ModelTable, Norm, Stretch};
+use lapswarm::evaluate::replay::{DeviceSample, DeviceWindow, ModelTable, Stretch};
 use lapswarm::evaluate::steady::DevicePlan;
-use lapswarm::line::kernel::Wanted;
 use lapswarm::parity::synthetic_lap::Lap;
 use lapswarm::swarm::Generation;
-use lapswarm::swarm::problems::NAMES;
 use lapswarm::vehicle::{Chassis, TyreModel};
 use naga::back::{hlsl, msl, spv};
 use naga::valid::{Capabilities, ValidationFlags, Validator};
@@ -35,102 +31,8 @@ tests! {
     parameter_structs_have_the_fields_of_their_rust_twins_in_order: everywhere,
 }
 
-const NORMS: [Norm; 4] = [Norm::One, Norm::Two, Norm::Infinity, Norm::MeanSquare];
-
-/// Every kernel for both tyre models, a few sets of free parameters and all norms: entry point and source.
-fn kernels() -> Vec<(&'static str, String)> {
-    let lap = Lap {
-        samples: 200,
-        ..Lap::default()
-    };
-    let chassis_only = ["mass_kg", "roll_stiffness_nm_per_rad", "aero_balance_front"];
-    let mixed = ["front.rBx1", "rear.pKy1", "mass_kg", "front_camber_deg"];
-    let problems = [
-        problem(bundled_car(), &[], lap),
-        problem(bundled_car(), &UNKNOWNS, lap),
-        problem(bundled_car(), &mixed, lap),
-        problem(linear_car(), &[], lap),
-        problem(linear_car(), &chassis_only, lap),
-        problem(linear_car(), &["front.cornering_stiffness_n_per_rad"], lap),
-    ];
-    let mut kernels = Vec::new();
-    for problem in &problems {
-        let table = ModelTable::new(&problem.free, &problem.problem.variables);
-        let car = CarShape {
-            model: problem.tyre_model(),
-            sources: &table.sources,
-            workgroup: 64,
-        };
-        for norm in NORMS {
-            let shape = ReplayShape { car, norm };
-            kernels.push(("replay", shape.replay()));
-            kernels.push(("replay_reduce", shape.reduce()));
-        }
-        kernels.push(("settle", car.steady()));
-        for blends in [false, true] {
-            kernels.push(("drive", drive_shape(car, blends).source()));
-        }
-    }
-    for closed in [false, true] {
-        for terms in [0, 1, 4] {
-            for lap in [false, true] {
-                kernels.push(("line", line_shape(closed, terms, lap).source()));
-            }
-            for additional in [false, true] {
-                kernels.push(("energy_line", energy_shape(closed, terms, additional).source()));
-            }
-        }
-    }
-    kernels.extend(["scatter", "learn", "advance"].map(|entry| (entry, swarm())));
-    kernels.push(("gather", swarm_gather()));
-    for entry in ["variables_of_positions", "objectives_of_figures"] {
-        kernels.push((entry, line_swarm()));
-    }
-    kernels.extend((0..NAMES.len() as u32).map(|number| ("test_problem", test_problem(number, 1.5e30))));
-    kernels
-}
-
-fn drive_shape(car: CarShape<'_>, blends: bool) -> DriveShape<'_> {
-    DriveShape {
-        car,
-        stretches: 31,
-        rows_ahead: 52,
-        cells_ahead: 20,
-        blends,
-    }
-}
-
-fn energy_shape(closed: bool, terms: usize, additional: bool) -> EnergyShape {
-    EnergyShape {
-        line: line_shape(closed, terms, true),
-        line_variables: 12,
-        additional,
-        counts_charge: closed,
-        uniform_energy: (terms == 4).then_some(5 * 512 + 360),
-    }
-}
-
-fn line_shape(closed: bool, terms: usize, lap: bool) -> LineShape {
-    LineShape {
-        closed,
-        terms,
-        wanted: Wanted {
-            integral: terms > 0,
-            lap,
-        },
-        envelope_rows: 512,
-        corner_rows: 1024,
-        ellipse_rows: if closed { 256 } else { 0 },
-        traction: terms != 1,
-        uniform_sections: closed.then_some(360),
-        uniform_envelope: terms == 4,
-        workgroup: 64,
-        tile: if terms == 4 { 8 } else { 64 },
-    }
-}
-
 fn kernels_validate_pass_the_lint_and_translate_to_every_platform() {
-    for (entry, source) in kernels() {
+    for KernelSource { entry, source, .. } in kernels() {
         let module = lint::check(&source).unwrap_or_else(|message| panic!("{entry}: {message}"));
         // No capabilities: what WebGPU has at its barest must do.
         let info = Validator::new(ValidationFlags::all(), Capabilities::empty())
@@ -203,8 +105,11 @@ fn the_lint_finds_what_kernels_must_not_contain() {
     }
     lint::check(&spoilt("sqrt(abs(x)) + floor(x) + max(x, 1.0)")).expect("these round alike everywhere");
     // The kernels' own sources, with a built-in slipped in.
-    let source = car_fragments(TyreModel::Linear)
-        .concat()
+    let kernels = kernels();
+    let linear = kernels.iter().find(|kernel| kernel.shape.contains("linear"));
+    let source = linear
+        .expect("a kernel")
+        .source
         .replace("own_atan(input", "atan(input");
     assert!(lint::check(&source).expect_err("atan").contains("Atan"));
 }
@@ -227,8 +132,7 @@ fn layout(module: &naga::Module, name: &str) -> (Vec<(String, usize)>, usize) {
 }
 
 fn structs_shared_with_the_host_have_its_offsets() {
-    let (_, source) = &kernels()[0];
-    let module = lint::check(source).expect("the kernel parses");
+    let module = lint::check(&kernels()[0].source).expect("the kernel parses");
     let named = |pairs: &[(&str, usize)]| -> Vec<(String, usize)> {
         pairs
             .iter()
@@ -311,6 +215,7 @@ fn the_structs_of_drives_have_the_hosts_fields() {
     let source = drive_shape(
         CarShape {
             model: problem.tyre_model(),
+            wheels: WheelOrder::ByAxle,
             sources: &table.sources,
             workgroup: 64,
         },
@@ -344,11 +249,8 @@ fn the_structs_of_drives_have_the_hosts_fields() {
 
 fn the_struct_of_circles_has_the_hosts_offsets() {
     let kernels = kernels();
-    let (_, source) = kernels
-        .iter()
-        .find(|(entry, _)| *entry == "settle")
-        .expect("a kernel");
-    let module = lint::check(source).expect("the kernel parses");
+    let kernel = kernels.iter().find(|kernel| kernel.entry == "settle");
+    let module = lint::check(&kernel.expect("a kernel").source).expect("the kernel parses");
     macro_rules! offsets {
         ($($field:ident),*) => {
             [$((stringify!($field).to_owned(), offset_of!(DevicePlan, $field))),*]
@@ -427,8 +329,14 @@ fn the_struct_of_energies_has_the_hosts_offsets() {
 
 fn parameter_structs_have_the_fields_of_their_rust_twins_in_order() {
     for model in [TyreModel::MagicFormula, TyreModel::Linear] {
-        let source = car_fragments(model).concat();
-        let module = lint::check(&source).expect("the fragments parse on their own");
+        let (structure, fields) = tyre_struct(model);
+        let car = CarShape {
+            model,
+            wheels: WheelOrder::ByAxle,
+            sources: &vec![None; Chassis::<f32>::FIELDS.len() + 2 * fields.len()],
+            workgroup: 64,
+        };
+        let module = lint::check(&car.steady()).expect("the kernel parses");
         let names = |name: &str| -> Vec<String> {
             layout(&module, name)
                 .0
@@ -437,7 +345,6 @@ fn parameter_structs_have_the_fields_of_their_rust_twins_in_order() {
                 .collect()
         };
         assert_eq!(names("Chassis"), Chassis::<f32>::FIELDS);
-        let (structure, fields) = tyre_struct(model);
         assert_eq!(names(structure), fields);
     }
 }

@@ -1,7 +1,7 @@
 //! Layer seven: cars that settle on circles, on every backend against `f64`.
 
 use crate::common::{bundled_car, linear_car};
-use crate::device::{device, subjects};
+use crate::device::{device, devices, subjects};
 use lapswarm::evaluate::drive::DriveBatching;
 use lapswarm::evaluate::simd::InstructionSet;
 use lapswarm::evaluate::steady::kernel::Settling;
@@ -92,7 +92,7 @@ fn failures(problem: &SteadyProblem, all: &[Vec<f64>]) -> Vec<(String, Vec<Optio
     for set in InstructionSet::available() {
         backends.push(Box::new(SimdSteadyEvaluator::new(problem, set)));
     }
-    if let Some(context) = device() {
+    for context in devices() {
         backends.push(Box::new(
             GpuSteadyEvaluator::new(problem, context).expect("the kernel compiles"),
         ));

@@ -3,7 +3,7 @@
 use crate::common::Random;
 use crate::device::{device, the_device};
 use lapswarm::Result;
-use lapswarm::evaluate::gpu::shader::{ELEMENTARY, random};
+use lapswarm::evaluate::gpu::shader::{WheelOrder, elementary, random};
 use lapswarm::evaluate::gpu::{Binding, GpuContext, Kernel};
 use lapswarm::evaluate::simd::InstructionSet;
 use lapswarm::evaluate::{Evaluator, Failure, Objective, Problem, Variable};
@@ -79,7 +79,8 @@ fn the_device_takes_the_same_powers() {
         .collect();
     let expression = "bitcast<vec4<u32>>(vec4<f32>(own_ln(bitcast<f32>(a.y) + 1e-9), own_ln(bitcast<f32>(a.z) + 1e-9), \
                       own_power(bitcast<f32>(a.x), 21.0), own_power(bitcast<f32>(a.x), bitcast<f32>(a.w))))";
-    let found = map_words(&context, ELEMENTARY, expression, bytemuck::cast_slice(&inputs));
+    let source = elementary(WheelOrder::SideBySide);
+    let found = map_words(&context, &source, expression, bytemuck::cast_slice(&inputs));
     for (given, words) in inputs.chunks_exact(8).zip(found.chunks_exact(4)) {
         let expected = [
             ln(given[1] + 1e-9),

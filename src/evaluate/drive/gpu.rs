@@ -60,6 +60,7 @@ impl DeviceKernel<DriveProblem> for DriveDevice {
         let shape = DriveShape {
             car: CarShape {
                 model: drive.tyre_model(),
+                wheels: context.wheels(),
                 sources: &table.sources,
                 workgroup: workgroup(&context),
             },

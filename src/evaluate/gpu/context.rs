@@ -3,9 +3,10 @@
 //! No error of wgpu reaches the user as a panic. Allocation and compilation run inside error scopes; handlers keep errors that
 //! occur outside them and return them as [`Error::Device`] at the next check.
 
-use super::adapter::{DeviceSummary, choose};
+use super::adapter::{DeviceKind, DeviceSummary, choose};
 use super::faults::{self, Fault, Place};
 use super::lint;
+use super::shader::WheelOrder;
 use crate::error::{Error, Result};
 use crate::evaluate::{BackendInfo, dispatches};
 use std::collections::HashMap;
@@ -45,6 +46,7 @@ pub struct GpuContext {
     device: wgpu::Device,
     queue: wgpu::Queue,
     summary: DeviceSummary,
+    wheels: WheelOrder,
     failure: Arc<Mutex<Option<String>>>,
     kernels: Mutex<HashMap<String, Arc<Kernel>>>,
     /// Time of all dispatches in whole microseconds, so that it fits an atomic.
@@ -114,6 +116,17 @@ impl GpuContext {
         Ok(Arc::new(Self::open_within(name, |_| wgpu::Limits::default())?))
     }
 
+    /// A device of its own whose kernels go through wheels in that order, whatever kind it is.
+    ///
+    /// # Errors
+    /// As [`GpuContext::shared`].
+    pub fn with_wheels(name: Option<&str>, wheels: WheelOrder) -> Result<Arc<Self>> {
+        Ok(Arc::new(Self {
+            wheels,
+            ..Self::open(name)?
+        }))
+    }
+
     fn open(name: Option<&str>) -> Result<Self> {
         Self::open_within(name, wgpu::Adapter::limits)
     }
@@ -148,6 +161,10 @@ impl GpuContext {
         Ok(Self {
             device,
             queue,
+            wheels: match summary.kind {
+                DeviceKind::Software => WheelOrder::SideBySide,
+                _ => WheelOrder::ByAxle,
+            },
             summary,
             failure,
             kernels: Mutex::default(),
@@ -158,6 +175,11 @@ impl GpuContext {
     /// What the device is.
     pub fn summary(&self) -> &DeviceSummary {
         &self.summary
+    }
+
+    /// How kernels go through the wheels of a car here.
+    pub fn wheels(&self) -> WheelOrder {
+        self.wheels
     }
 
     /// The device, as evaluators report it.

@@ -7,13 +7,32 @@ mod physics;
 #[cfg(feature = "vehicle")]
 pub use physics::*;
 
-/// Our own `sin`, `cos`, `atan` and `exp`.
-pub const ELEMENTARY: &str = include_str!("../../../shaders/elementary.wgsl");
+const ELEMENTARY: &str = include_str!("../../../shaders/elementary.wgsl");
+const WHEELS_SIDE_BY_SIDE: &str = include_str!("../../../shaders/wheels_side_by_side.wgsl");
+const WHEELS_BY_AXLE: &str = include_str!("../../../shaders/wheels_by_axle.wgsl");
 const RANDOM: &str = include_str!("../../../shaders/random.wgsl");
 const SWARM: &str = include_str!("../../../shaders/swarm.wgsl");
 const SWARM_GATHER: &str = include_str!("../../../shaders/swarm_gather.wgsl");
 const TEST_PROBLEMS: &str = include_str!("../../../shaders/test_problems.wgsl");
 const LINE_SWARM: &str = include_str!("../../../shaders/line_swarm.wgsl");
+
+/// How a kernel goes through the wheels of a car. Results have the same bits either way where a device rounds as the processor does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum WheelOrder {
+    /// All four at once, with the car's figures read once: for software drivers.
+    SideBySide,
+    /// The two of an axle at once, with figures read where they are used: for graphics processors, whose registers are few.
+    ByAxle,
+}
+
+/// Our own `sin`, `cos`, `atan` and `exp` of as many figures at once as a kernel takes wheels. Kernels without a car take four.
+pub fn elementary(wheels: WheelOrder) -> String {
+    let width = match wheels {
+        WheelOrder::SideBySide => WHEELS_SIDE_BY_SIDE,
+        WheelOrder::ByAxle => WHEELS_BY_AXLE,
+    };
+    [width, "\n", ELEMENTARY].concat()
+}
 
 /// Philox, the twin of [`crate::random`].
 pub fn random() -> &'static str {
@@ -22,7 +41,7 @@ pub fn random() -> &'static str {
 
 /// Source of the kernels that move a swarm; entry points `scatter`, `learn` and `advance`.
 pub fn swarm() -> String {
-    [ELEMENTARY, RANDOM, SWARM].concat()
+    [&elementary(WheelOrder::SideBySide), RANDOM, SWARM].concat()
 }
 
 /// Source of the kernel that copies a few particles' positions; entry point `gather`.
@@ -41,5 +60,5 @@ pub fn line_swarm() -> String {
 pub fn test_problem(number: u32, factor: f32) -> String {
     let constants =
         format!("\n// Generated.\nconst PROBLEM: u32 = {number}u;\nconst FACTOR: f32 = {factor:e}f;\n\n");
-    [ELEMENTARY, &constants, TEST_PROBLEMS].concat()
+    [&elementary(WheelOrder::SideBySide), &constants, TEST_PROBLEMS].concat()
 }

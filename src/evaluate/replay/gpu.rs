@@ -150,6 +150,7 @@ impl DeviceKernel<ReplayProblem> for ReplayDevice {
         let shape = ReplayShape {
             car: CarShape {
                 model: replay.tyre_model(),
+                wheels: context.wheels(),
                 sources: &table.sources,
                 workgroup,
             },

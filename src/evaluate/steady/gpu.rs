@@ -57,6 +57,7 @@ impl DeviceKernel<SteadyProblem> for SteadyDevice {
         let table = ModelTable::new(&steady.free, &steady.problem.variables);
         let shape = CarShape {
             model: steady.tyre_model(),
+            wheels: context.wheels(),
             sources: &table.sources,
             workgroup: workgroup(&context),
         };

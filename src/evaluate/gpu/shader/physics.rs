@@ -1,6 +1,6 @@
 //! The kernels of cars, lines and drives.
 
-use super::ELEMENTARY;
+use super::{WheelOrder, elementary};
 use crate::evaluate::replay::Norm;
 use crate::line::kernel::Wanted;
 use crate::line::{TRACTION_ROOTS, TRACTION_SPEEDS};
@@ -14,6 +14,8 @@ const TYRE_INTERFACE: &str = include_str!("../../../../shaders/tyre_interface.wg
 const TYRE_MAGIC_FORMULA: &str = include_str!("../../../../shaders/tyre.wgsl");
 const TYRE_LINEAR: &str = include_str!("../../../../shaders/tyre_linear.wgsl");
 const CAR: &str = include_str!("../../../../shaders/car.wgsl");
+const CAR_SIDE_BY_SIDE: &str = include_str!("../../../../shaders/car_side_by_side.wgsl");
+const CAR_BY_AXLE: &str = include_str!("../../../../shaders/car_by_axle.wgsl");
 const REPLAY_COMMON: &str = include_str!("../../../../shaders/replay_common.wgsl");
 const REPLAY: &str = include_str!("../../../../shaders/replay.wgsl");
 const REPLAY_REDUCE: &str = include_str!("../../../../shaders/replay_reduce.wgsl");
@@ -26,13 +28,28 @@ const LINE: &str = include_str!("../../../../shaders/line.wgsl");
 /// Engine, motors, store and fuel on a lap of a line.
 const ENERGY: &str = include_str!("../../../../shaders/energy.wgsl");
 
-/// The car's fragments with the tyre model's.
-pub fn car_fragments(model: TyreModel) -> [&'static str; 7] {
+/// The car's fragments with the tyre model's. The loaders are not among them.
+pub fn car_fragments(model: TyreModel, wheels: WheelOrder) -> String {
     let tyre = match model {
         TyreModel::MagicFormula => TYRE_MAGIC_FORMULA,
         TyreModel::Linear => TYRE_LINEAR,
     };
-    [ELEMENTARY, CHASSIS, AERO, LOADS, TYRE_INTERFACE, tyre, CAR]
+    let order = match wheels {
+        WheelOrder::SideBySide => CAR_SIDE_BY_SIDE,
+        WheelOrder::ByAxle => CAR_BY_AXLE,
+    };
+    let elementary = elementary(wheels);
+    [
+        &elementary,
+        CHASSIS,
+        AERO,
+        LOADS,
+        TYRE_INTERFACE,
+        tyre,
+        CAR,
+        order,
+    ]
+    .concat()
 }
 
 /// The tyre model's struct, which has one name in WGSL and in Rust, with its fields in order.
@@ -89,6 +106,8 @@ impl Generated {
 pub struct CarShape<'a> {
     /// The tyre model.
     pub model: TyreModel,
+    /// How it goes through the wheels.
+    pub wheels: WheelOrder,
     /// For each figure of a ready car, which varying figure it is, if it varies: `ModelTable::sources`.
     pub sources: &'a [Option<usize>],
     /// Lanes of a workgroup.
@@ -104,17 +123,20 @@ impl CarShape<'_> {
 
     /// The car, the constants, the fragments and the loaders.
     fn kernel(&self, constants: Generated, fragments: &[&str]) -> String {
-        let mut source = car_fragments(self.model).concat();
+        let mut source = car_fragments(self.model, self.wheels);
         source.push_str(&constants.end());
         source.extend(fragments.iter().copied());
-        source.push_str(&loaders(self.model, self.sources));
+        source.push_str(&loaders(self.model, self.wheels, self.sources));
         source
     }
 
     /// The same for a kernel that takes candidates on step by step. `VARYING` figures of a candidate vary; the figures that are
     /// not its car's stand behind them.
     fn trajectories(&self, constants: Generated, fragments: &[&str]) -> String {
-        let constants = constants.count("VARYING", self.sources.iter().flatten().count());
+        let constants = constants.count(
+            "VARYING",
+            self.sources.iter().flatten().max().map_or(0, |last| last + 1),
+        );
         self.kernel(constants, &[&[TRAJECTORIES], fragments].concat())
     }
 
@@ -243,7 +265,7 @@ impl LineShape {
             .table(2, "envelope", "vec4<f32>", rows(2 * self.envelope_rows + cells))
             .table(3, "corners", "vec4<f32>", rows(self.corner_rows))
             .table(4, "ellipse", "vec4<f32>", rows(self.ellipse_rows.max(1)));
-        [ELEMENTARY, &generated.end(), LINE].concat()
+        [&elementary(WheelOrder::SideBySide), &generated.end(), LINE].concat()
     }
 }
 
@@ -284,9 +306,9 @@ pub fn base_vectors(count: usize) -> usize {
     count.div_ceil(4).max(1)
 }
 
-/// The loaders `load_chassis` and `load_tyres`: a figure that candidates share comes from the uniform table `base`,
+/// The loaders `load_chassis` and `load_tyres`, or one for each axle's tyres: a figure that candidates share comes from the uniform table `base`,
 /// where the compiler sees that all lanes read the same, one that varies from its row of `figures`.
-pub fn loaders(model: TyreModel, sources: &[Option<usize>]) -> String {
+pub fn loaders(model: TyreModel, wheels: WheelOrder, sources: &[Option<usize>]) -> String {
     let chassis = Chassis::<f32>::FIELDS;
     let (structure, tyre) = tyre_struct(model);
     let place = |slot: usize| match sources[slot] {
@@ -303,18 +325,23 @@ pub fn loaders(model: TyreModel, sources: &[Option<usize>]) -> String {
         .enumerate()
         .map(|(i, field)| format!("        {}, // {field}\n", place(i)))
         .collect();
-    let tyre_lines: Vec<String> = tyre
-        .iter()
-        .enumerate()
-        .map(|(i, field)| {
+    let tyres = |name: &str, figures: &dyn Fn(usize) -> String| {
+        let lines = tyre.iter().enumerate();
+        let lines: Vec<String> = lines
+            .map(|(i, field)| format!("        Wheels({}), // {field}\n", figures(i)))
+            .collect();
+        function(name, structure, &lines)
+    };
+    let tyres = match wheels {
+        WheelOrder::SideBySide => tyres("load_tyres", &|i| {
             let (front, rear) = (place(front + i), place(rear + i));
-            format!("        Wheels({front}, {front}, {rear}, {rear}), // {field}\n")
-        })
-        .collect();
-    [
-        "\n// Generated.\n".to_owned(),
-        function("load_chassis", "Chassis", &chassis_lines),
-        function("load_tyres", structure, &tyre_lines),
-    ]
-    .concat()
+            format!("{front}, {front}, {rear}, {rear}")
+        }),
+        WheelOrder::ByAxle => {
+            let front = tyres("load_front_tyres", &|i| place(front + i));
+            front + &tyres("load_rear_tyres", &|i| place(rear + i))
+        }
+    };
+    let chassis = function("load_chassis", "Chassis", &chassis_lines);
+    ["\n// Generated.\n", &chassis, &tyres].concat()
 }

@@ -1,0 +1,62 @@
+//! What kernels take of a graphics processor's registers, by the compiler of Mesa's driver for AMD, which needs no processor.
+//!
+//! Registers that do not suffice are spilled to memory, and those that a lane takes decide how many lanes wait for memory at once.
+//! `cargo bench --bench kernels` prints the whole table.
+
+use crate::common::radv::{self, FAMILIES};
+
+tests! {
+    kernels_fit_the_registers_of_graphics_processors: radv,
+}
+
+/// What kernels whose names begin so may take at most on a processor of [`FAMILIES`]: vector registers, and spilled ones; scalar
+/// registers are spilled on none but for some twenty. A driver keeps those in lanes of a vector register, which is cheap.
+struct Bar {
+    kernels: &'static str,
+    vectors: [u64; 3],
+    spilled: [u64; 3],
+}
+
+/// As Mesa 22.3 compiles them. A wave of 128 vector registers runs beside seven others on a SIMD of navi21.
+const BARS: [Bar; 6] = [
+    bar("replay: by axle, magic formula", [128, 128, 128], [0; 3]),
+    bar("settle: by axle, magic formula", [128, 132, 128], [0; 3]),
+    bar("drive: by axle, magic formula", [160, 132, 160], [0, 32, 0]),
+    bar("by axle, linear", [120, 120, 120], [0; 3]),
+    bar("line: ", [48, 48, 48], [0; 3]),
+    bar("replay_reduce: by axle", [32, 32, 32], [0; 3]),
+];
+const SPILLED_SCALARS: u64 = 20;
+
+const fn bar(kernels: &'static str, vectors: [u64; 3], spilled: [u64; 3]) -> Bar {
+    Bar {
+        kernels,
+        vectors,
+        spilled,
+    }
+}
+
+fn kernels_fit_the_registers_of_graphics_processors() {
+    for (place, family) in FAMILIES.into_iter().enumerate() {
+        let answer = radv::ask(family, &BARS.map(|bar| bar.kernels)).expect("RADV compiles");
+        for bar in &BARS {
+            let fitting = || {
+                answer
+                    .kernels
+                    .iter()
+                    .filter(|kernel| kernel.name().contains(bar.kernels))
+            };
+            assert!(fitting().count() > 0, "no kernel is called {}", bar.kernels);
+            for kernel in fitting() {
+                let found = ["VGPRs", "Spilled VGPRs", "Spilled SGPRs"].map(|name| kernel.figure(name));
+                let most = [bar.vectors[place], bar.spilled[place], SPILLED_SCALARS];
+                println!("{family}, {}: {found:?} of {most:?}", kernel.name());
+                assert!(
+                    found.iter().zip(most).all(|(found, most)| *found <= most),
+                    "{family}, {}: vector registers, spilled ones and spilled scalar registers are {found:?}, at most {most:?}",
+                    kernel.name()
+                );
+            }
+        }
+    }
+}
