@@ -9,11 +9,12 @@ tests! {
     kernels_fit_the_registers_of_graphics_processors: radv,
 }
 
-/// What kernels whose names begin so may take at most on a processor of [`FAMILIES`]: vector registers, and spilled ones; scalar
-/// registers are spilled on none but for some twenty. A driver keeps those in lanes of a vector register, which is cheap.
+/// What kernels whose names have these words may take at most on each processor of [`FAMILIES`].
 struct Bar {
     kernels: &'static str,
+    /// Vector registers of a lane.
     vectors: [u64; 3],
+    /// Those that are spilled.
     spilled: [u64; 3],
 }
 
@@ -26,6 +27,7 @@ const BARS: [Bar; 6] = [
     bar("line: ", [48, 48, 48], [0; 3]),
     bar("replay_reduce: by axle", [32, 32, 32], [0; 3]),
 ];
+/// Spilled scalar registers, on all of them. The driver keeps these in lanes of a vector register, so that few do no harm.
 const SPILLED_SCALARS: u64 = 20;
 
 const fn bar(kernels: &'static str, vectors: [u64; 3], spilled: [u64; 3]) -> Bar {
