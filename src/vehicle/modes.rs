@@ -4,7 +4,7 @@
 use super::chassis::BodyState;
 use super::model::{CarInput, CarModel, CarState, wheel_speeds};
 use super::tyre::{LinearTyre, MagicFormula, Tyre, TyreModel};
-use nalgebra::{Complex, Matrix6, Vector6};
+use nalgebra::{Complex, Matrix4, Matrix6, Vector4, Vector6};
 use serde::{Deserialize, Serialize};
 
 /// The greatest product of a mode's rate (1/s) and a step (s). The classical Runge-Kutta method is stable up to 2.78 on the negative
@@ -32,8 +32,8 @@ pub fn slowest_decay(flat: &[f64], tyre: TyreModel, speed: f64) -> f64 {
     })
 }
 
-/// How a car answers to small steering at a speed: its linearised equations of motion, as (3.5) to (3.7) of the thesis have them in
-/// matrices.
+/// How a car whose wheels roll freely answers to small steering at a held speed: its linearised equations of motion, as (3.5) to (3.7)
+/// of the thesis have them in matrices.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SmallSteering {
     /// Speed (m/s).
@@ -52,34 +52,37 @@ pub struct SmallSteering {
     pub damping_ratio: Option<f64>,
     /// Rate at which the slowest motion dies out (1/s); below zero it grows.
     pub slowest_decay_1ps: f64,
-    /// The eigenvalues (1/s), real and imaginary part.
+    /// The eigenvalues of sideslip, yaw and roll (1/s), real and imaginary part.
     #[serde(skip)]
-    pub eigenvalues_1ps: [[f64; 2]; 6],
+    pub eigenvalues_1ps: [[f64; 2]; 4],
 }
 
 /// How a car that rolls straight ahead at `speed` (m/s) answers to small steering; nothing for figures that are no car, and where it
 /// settles nowhere. `flat` is the car in flat form.
 pub fn small_steering(flat: &[f64], tyre: TyreModel, speed: f64) -> Option<SmallSteering> {
     let (linear, wheelbase) = match tyre {
-        TyreModel::MagicFormula => linearised::<MagicFormula<f64>>(flat, speed)?,
-        TyreModel::Linear => linearised::<LinearTyre<f64>>(flat, speed)?,
+        TyreModel::MagicFormula => linearised::<MagicFormula<f64>>(flat, speed, Wheels::RollFreely)?,
+        TyreModel::Linear => linearised::<LinearTyre<f64>>(flat, speed, Wheels::RollFreely)?,
     };
-    // At rest in these axes: 0 = A x + B steer.
-    let settled = linear.states.lu().solve(&-linear.steer)?;
-    let eigenvalues = linear.states.complex_eigenvalues();
+    // Lateral speed, yaw rate, roll and roll rate; the speed is held, and the car's pitch has no part in them.
+    let states: Matrix4<f64> = linear.states.fixed_view::<4, 4>(1, 1).into();
+    let steer: Vector4<f64> = linear.steer.fixed_rows::<4>(1).into();
+    // Settled: 0 = A x + B steer.
+    let settled = states.lu().solve(&-steer)?;
+    let eigenvalues = states.complex_eigenvalues();
     let oscillates = |x: &&Complex<f64>| x.im > 1e-6 * x.norm();
     let damping = |x: &Complex<f64>| -x.re / x.norm();
     let least = eigenvalues
         .iter()
         .filter(oscillates)
         .min_by(|a, b| damping(a).total_cmp(&damping(b)));
-    let gain = settled[2];
+    let gain = settled[1];
     let decay = eigenvalues.iter().map(|x| -x.re).fold(f64::INFINITY, f64::min);
     settled.iter().all(|x| x.is_finite()).then(|| SmallSteering {
         v_mps: speed,
         yaw_rate_gain_1ps: gain,
         ay_gain_mps2: speed * gain,
-        sideslip_gain: settled[1] / speed,
+        sideslip_gain: settled[0] / speed,
         stability_factor_s2_per_m2: (speed / (wheelbase * gain) - 1.0) / speed.powi(2),
         frequency_hz: least.map(|x| x.norm() / std::f64::consts::TAU),
         damping_ratio: least.map(damping),
@@ -91,10 +94,23 @@ pub fn small_steering(flat: &[f64], tyre: TyreModel, speed: f64) -> Option<Small
 /// The eigenvalues (1/s) of a car that rolls straight ahead; nothing for figures that are no car.
 fn modes(flat: &[f64], tyre: TyreModel, speed: f64) -> Option<[Complex<f64>; 6]> {
     let states = match tyre {
-        TyreModel::MagicFormula => linearised::<MagicFormula<f64>>(flat, speed)?.0.states,
-        TyreModel::Linear => linearised::<LinearTyre<f64>>(flat, speed)?.0.states,
+        TyreModel::MagicFormula => {
+            linearised::<MagicFormula<f64>>(flat, speed, Wheels::Turn)?
+                .0
+                .states
+        }
+        TyreModel::Linear => linearised::<LinearTyre<f64>>(flat, speed, Wheels::Turn)?.0.states,
     };
     Some(states.complex_eigenvalues().into())
+}
+
+/// What the wheels of a linearised car do.
+#[derive(Clone, Copy, PartialEq)]
+enum Wheels {
+    /// They turn as fast as straight ahead, as a log has them: whatever the car does, they hold it.
+    Turn,
+    /// They roll without slip.
+    RollFreely,
 }
 
 /// Slopes of the rates of a car's states: longitudinal and lateral speed, yaw rate, roll, roll rate, lagged acceleration.
@@ -106,7 +122,7 @@ struct Linearised {
 }
 
 /// A car that rolls straight ahead, linearised, and its wheelbase (m); nothing for figures that are no car.
-fn linearised<T: Tyre<f64>>(flat: &[f64], speed: f64) -> Option<(Linearised, f64)> {
+fn linearised<T: Tyre<f64>>(flat: &[f64], speed: f64, wheels: Wheels) -> Option<(Linearised, f64)> {
     let car = CarModel::<f64, T>::from_parameters(|i| flat[i]);
     let state = |x: [f64; 6]| CarState {
         body: BodyState {
@@ -119,8 +135,17 @@ fn linearised<T: Tyre<f64>>(flat: &[f64], speed: f64) -> Option<(Linearised, f64
         pitch_acceleration: x[5],
     };
     let straight = [speed, 0.0, 0.0, 0.0, 0.0, 0.0];
-    let wheel_speed = wheel_speeds(&car.chassis, &state(straight).body, (1.0, 0.0), [0.0; 2]);
     let rate = |x: [f64; 6], steer: f64| {
+        let (rolling, turned) = match wheels {
+            Wheels::Turn => (straight, 0.0),
+            Wheels::RollFreely => (x, steer),
+        };
+        let wheel_speed = wheel_speeds(
+            &car.chassis,
+            &state(rolling).body,
+            (turned.cos(), turned.sin()),
+            [0.0; 2],
+        );
         let rate = car.rate(&state(x), &CarInput { wheel_speed, steer }).state;
         let body = rate.body;
         Vector6::new(
@@ -206,18 +231,25 @@ mod tests {
         let at = |speed: f64| small_steering(&car.to_flat(), car.tyre_model(), speed).expect("a car");
         let wheelbase = car.chassis.cg_to_front + car.chassis.cg_to_rear;
         // Slow cars follow their wheels.
-        let slow = at(2.0);
-        assert!((slow.yaw_rate_gain_1ps / (2.0 / wheelbase) - 1.0).abs() < 0.01);
-        assert!((slow.sideslip_gain / (car.chassis.cg_to_rear / wheelbase) - 1.0).abs() < 0.05);
+        let slow = at(3.0);
+        assert!(
+            (slow.yaw_rate_gain_1ps / (3.0 / wheelbase) - 1.0).abs() < 0.01,
+            "{slow:?}"
+        );
+        assert!(
+            (slow.sideslip_gain / (car.chassis.cg_to_rear / wheelbase) - 1.0).abs() < 0.05,
+            "{slow:?}"
+        );
         for speed in [20.0, 45.0, 65.0] {
             let now = at(speed);
-            let eigenvalues = now.eigenvalues_1ps;
-            assert!(eigenvalues.iter().all(|x| x[0] < 0.0), "{eigenvalues:?}");
-            let again = -eigenvalues.iter().map(|x| x[0]).fold(f64::NEG_INFINITY, f64::max);
-            assert_eq!(now.slowest_decay_1ps, again);
-            assert_eq!(
-                now.slowest_decay_1ps,
-                slowest_decay(&car.to_flat(), car.tyre_model(), speed)
+            assert!(
+                now.eigenvalues_1ps.iter().all(|x| x[0] < 0.0) && now.slowest_decay_1ps > 0.0,
+                "{now:?}"
+            );
+            assert!(
+                now.damping_ratio
+                    .is_none_or(|damping| (0.1..1.0).contains(&damping)),
+                "{now:?}"
             );
             let k = (speed / (wheelbase * now.yaw_rate_gain_1ps) - 1.0) / speed.powi(2);
             assert_eq!(now.stability_factor_s2_per_m2, k);

@@ -238,7 +238,7 @@ fn write_handling(path: &Path, rows: &[SmallSteering]) -> Result<()> {
         .number("frequency", "Hz", |r| r.frequency_hz)
         .number("damping_ratio", "-", |r| r.damping_ratio)
         .number("slowest_decay", "1/s", |r| r.slowest_decay_1ps);
-    for k in 0..6 {
+    for k in 0..4 {
         table = table
             .number(format!("eigenvalue_{}_real", k + 1), "1/s", part(k, 0))
             .number(format!("eigenvalue_{}_imaginary", k + 1), "1/s", part(k, 1));
