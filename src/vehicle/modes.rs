@@ -77,13 +77,18 @@ pub fn small_steering(flat: &[f64], tyre: TyreModel, speed: f64) -> Option<Small
         .filter(oscillates)
         .min_by(|a, b| damping(a).total_cmp(&damping(b)));
     let gain = settled[1];
+    let stability_factor = (speed / (wheelbase * gain) - 1.0) / speed.powi(2);
     let decay = eigenvalues.iter().map(|x| -x.re).fold(f64::INFINITY, f64::min);
-    settled.iter().all(|x| x.is_finite()).then(|| SmallSteering {
+    let finite = settled
+        .iter()
+        .chain(&[stability_factor, decay])
+        .all(|x| x.is_finite());
+    finite.then(|| SmallSteering {
         v_mps: speed,
         yaw_rate_gain_1ps: gain,
         ay_gain_mps2: speed * gain,
         sideslip_gain: settled[0] / speed,
-        stability_factor_s2_per_m2: (speed / (wheelbase * gain) - 1.0) / speed.powi(2),
+        stability_factor_s2_per_m2: stability_factor,
         frequency_hz: least.map(|x| x.norm() / std::f64::consts::TAU),
         damping_ratio: least.map(damping),
         slowest_decay_1ps: decay,

@@ -337,12 +337,7 @@ impl Summary {
                 );
                 page.table("Published and ours", &table.took(), &table.columns())?;
                 for row in table.rows.iter().filter(|row| !row.differs.is_empty()) {
-                    let of = if row.of.is_empty() {
-                        String::new()
-                    } else {
-                        format!("{}, ", row.of)
-                    };
-                    page.paragraph(&format!("{of}{}: {}", row.figure, row.differs));
+                    page.paragraph(&format!("{}: {}", row.figure, row.differs));
                 }
                 for failed in &table.failed_runs {
                     page.warning(format!("{}: {failed}", item.title));
