@@ -2,11 +2,11 @@
 // promises 2^-11 for `sin` and `cos` and 4096 ULP for `atan`. Same functions, same order, same operations. Drivers may regroup
 // literals, so no product has more than one.
 //
-// They work on several figures side by side, one per wheel: on `Wheels`, which a kernel's list of fragments defines. Polynomials are long chains of dependent operations, and several chains
-// hide each other's latency, as `Pair` in `src/scalar/pair.rs` does on the processor. `_each` computes two functions of the
-// wheels in lockstep for the same reason. A single function is half of that; every compiler sees that both halves are the same.
-// Compilers may serialise the chains to save registers, so the longest polynomials are also split by powers of the square into
-// independent halves.
+// They work on several figures side by side, one per wheel: on `Wheels`, which a kernel's list of fragments defines. Polynomials
+// are long chains of dependent operations, and several chains hide each other's latency, as `Pair` in `src/scalar/pair.rs` does on
+// the processor. `_each` computes two functions of the wheels in lockstep for the same reason. A single function is half of that;
+// every compiler sees that both halves are the same. Compilers may serialise the chains to save registers, so the longest
+// polynomials are also split by powers of the square into independent halves.
 
 struct WheelsPair {
     first: Wheels,

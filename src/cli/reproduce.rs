@@ -1,16 +1,16 @@
 //! `lapswarm reproduce`.
 
-use super::study::{pause, print_plan, print_results};
+use super::study::{Resume, print_plan, print_results};
+use super::sweep::verdict;
 use super::{Common, Memory, backend_flag, progress::Bar, stop_flag, stopped, to_json};
+use lapswarm::Result;
 use lapswarm::config::limit_memory;
 use lapswarm::evaluate::BackendChoice;
 use lapswarm::files::run_folder;
 use lapswarm::study::framework::Plan;
 use lapswarm::study::reproduce::{
-    Place, REPRODUCE_FILE, ReproduceRequest, ReproduceSettings, begin, reproduce,
+    EvaluatedOn, REPRODUCE_FILE, ReproduceRequest, ReproduceSettings, begin, reproduce,
 };
-use lapswarm::{Error, Result};
-use std::time::Duration;
 
 /// Flags of `reproduce`.
 #[derive(clap::Args)]
@@ -36,15 +36,8 @@ pub struct Arguments {
     common: Common,
     #[command(flatten)]
     memory: Memory,
-    /// Resume the reproduction that --out holds a part of, with the same flags
-    #[arg(long, requires = "out", conflicts_with = "dry_run")]
-    resume: bool,
-    /// Time between saves of the state of a study at work, s
-    #[arg(long, value_name = "SECONDS", default_value_t = 5.0, value_parser = pause)]
-    save_every_s: f64,
-    /// Time after which it ends in order with the tables that are finished, s; --resume continues it
-    #[arg(long, value_name = "SECONDS", value_parser = pause)]
-    time_limit_s: Option<f64>,
+    #[command(flatten)]
+    resume: Resume,
 }
 
 /// Runs it.
@@ -54,22 +47,19 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let backend = arguments.backend.unwrap_or(BackendChoice::Auto);
     // A device that is not there shows before anything is written.
     backend.would_be(arguments.adapter.as_deref())?;
-    let place = Place {
+    let on = EvaluatedOn {
         backend: arguments.backend,
         adapter: arguments.adapter.clone(),
     };
-    let settings = ReproduceSettings::new(&arguments.chapter, arguments.quick, place)?;
+    let settings = ReproduceSettings::new(&arguments.chapter, arguments.quick, on)?;
     if common.dry_run {
         let plan = Plan::of_file("reproduce", &settings.to_toml());
         let plan = settings.plan()?.into_iter().fold(plan, Plan::reads);
         let plan = plan.backend(backend, arguments.adapter.as_deref())?;
         return print_plan(common, &plan.into_folder(common.out.as_deref())?);
     }
-    let folder = if arguments.resume {
-        run_folder::reopen_by(
-            arguments.common.out.as_deref().unwrap_or("".as_ref()),
-            REPRODUCE_FILE,
-        )?
+    let folder = if arguments.resume.resume {
+        run_folder::reopen_by(common.out.as_deref().unwrap_or("".as_ref()), REPRODUCE_FILE)?
     } else {
         let created = run_folder::create("reproduce", common.out.as_deref())?;
         begin(&settings, &created)?;
@@ -81,11 +71,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         &settings,
         &folder,
         ReproduceRequest {
-            // The flags' parsers have seen to what they can be.
-            save_every: Duration::try_from_secs_f64(arguments.save_every_s).unwrap_or_default(),
-            time_limit: arguments
-                .time_limit_s
-                .and_then(|s| Duration::try_from_secs_f64(s).ok()),
+            save_every: arguments.resume.save_every(),
+            time_limit: arguments.resume.time_limit(),
             memory_limit_mib: arguments.memory.memory_limit_mib,
             stop: stop.clone(),
             observe: &mut |progress| {
@@ -97,13 +84,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     bar.finish();
     let summary = reproduced?;
     print_results(common, &summary.to_text(), Some(&folder), &to_json(&summary)?);
-    let failed: Vec<&String> = summary
-        .tables
-        .iter()
-        .flat_map(|table| &table.failed_runs)
-        .collect();
-    match failed.first() {
-        Some(first) => Err(Error::Study(format!("{} runs failed; {first}", failed.len()))),
-        None => Ok(()),
-    }
+    let tables = summary.tables.into_iter();
+    let failed: Vec<String> = tables.flat_map(|table| table.failed_runs).collect();
+    verdict(&failed)
 }

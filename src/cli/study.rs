@@ -12,16 +12,29 @@ use std::time::Duration;
 
 /// Flags of a run that can be resumed.
 #[derive(Args)]
-struct Resume {
+pub struct Resume {
     /// Resume the interrupted run in --out, with its own settings
     #[arg(long, requires = "out", conflicts_with = "dry_run")]
-    resume: bool,
+    pub resume: bool,
     /// Time between saves of the run's state, s
     #[arg(long, value_name = "SECONDS", default_value_t = 5.0, value_parser = pause)]
     save_every_s: f64,
     /// Time after which the run ends in order with what it has, s; --resume continues it
     #[arg(long, value_name = "SECONDS", value_parser = pause)]
     time_limit_s: Option<f64>,
+}
+
+impl Resume {
+    /// Time between saves; the flag's parser has seen to what it can be.
+    pub fn save_every(&self) -> Duration {
+        Duration::try_from_secs_f64(self.save_every_s).unwrap_or_default()
+    }
+
+    /// Time after which the run ends.
+    pub fn time_limit(&self) -> Option<Duration> {
+        self.time_limit_s
+            .and_then(|s| Duration::try_from_secs_f64(s).ok())
+    }
 }
 
 /// Parses a time in seconds.
@@ -118,11 +131,8 @@ pub fn run(study: &'static dyn Registered, matches: &ArgMatches) -> Result<()> {
         flags: &flags(study, matches),
         out: common.out.as_deref(),
         resume: resume.resume,
-        // The flag's parser has seen to what it can be.
-        save_every: Duration::try_from_secs_f64(resume.save_every_s).unwrap_or_default(),
-        time_limit: resume
-            .time_limit_s
-            .and_then(|s| Duration::try_from_secs_f64(s).ok()),
+        save_every: resume.save_every(),
+        time_limit: resume.time_limit(),
         memory_limit_mib: memory.memory_limit_mib,
         dry_run: common.dry_run,
         stop: stop.clone(),

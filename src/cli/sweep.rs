@@ -135,7 +135,7 @@ fn open(arguments: &Arguments, settings: &SweepSettings) -> Result<RunFolder> {
 }
 
 /// Says that runs have failed, once all that did not are kept.
-fn verdict(failed: &[String]) -> Result<()> {
+pub fn verdict(failed: &[String]) -> Result<()> {
     match failed {
         [] => Ok(()),
         [alone] => Err(Error::Study(alone.clone())),

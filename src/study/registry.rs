@@ -16,6 +16,12 @@ pub trait Registered: AnyStudy + Swept {}
 
 impl<T: AnyStudy + Swept> Registered for T {}
 
+impl std::fmt::Debug for dyn Registered {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
 /// Every study. A line here gives it its subcommand, its files for `init`, its place in `check` and `sweep`, its page of
 /// settings in the book, and its share of the tests.
 pub static STUDIES: &[&dyn Registered] = &[

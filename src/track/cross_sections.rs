@@ -335,6 +335,32 @@ mod tests {
     }
 
     #[test]
+    fn numbered_sectors_share_the_cross_sections_out_and_leave_the_links_between_them() {
+        let n = 12;
+        let at = |i: usize, y: f64| DVec2::new(i as f64, y);
+        let ring = CrossSections {
+            closed: true,
+            length_m: 24.0,
+            station_m: (0..n).map(|i| 2.0 * i as f64).collect(),
+            right_m: (0..n).map(|i| at(i, -4.0)).collect(),
+            left_m: (0..n).map(|i| at(i, 6.0)).collect(),
+            reference: vec![0.4; n],
+            ..straight()
+        };
+        let mut shared = Vec::new();
+        for number in 1..=3 {
+            let (from_m, length_m) = ring.section_named(&format!("{number}/3")).unwrap();
+            assert_eq!(length_m, 6.0, "three links of the four cross-sections");
+            shared.extend(ring.stretch_from(from_m, length_m, 0).unwrap().right_m);
+        }
+        assert_eq!(shared, ring.right_m);
+        for wrong in ["0/3", "4/3", "1/7", "3/0"] {
+            let refused = ring.section_named(wrong).expect_err(wrong).to_string();
+            assert!(refused.contains(wrong), "{refused}");
+        }
+    }
+
+    #[test]
     fn a_smooth_reference_keeps_long_waves_and_leaves_short_ones_out() {
         // A straight road, closed only in that the last cross-section is followed by the first: waves alone bend its reference.
         let n = 600;

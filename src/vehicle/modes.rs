@@ -60,10 +60,7 @@ pub struct SmallSteering {
 /// How a car that rolls straight ahead at `speed` (m/s) answers to small steering; nothing for figures that are no car, and where it
 /// settles nowhere. `flat` is the car in flat form.
 pub fn small_steering(flat: &[f64], tyre: TyreModel, speed: f64) -> Option<SmallSteering> {
-    let (linear, wheelbase) = match tyre {
-        TyreModel::MagicFormula => linearised::<MagicFormula<f64>>(flat, speed, Wheels::RollFreely)?,
-        TyreModel::Linear => linearised::<LinearTyre<f64>>(flat, speed, Wheels::RollFreely)?,
-    };
+    let (linear, wheelbase) = linearised(flat, tyre, speed, Wheels::RollFreely)?;
     // Lateral speed, yaw rate, roll and roll rate; the speed is held, and the car's pitch has no part in them.
     let states: Matrix4<f64> = linear.states.fixed_view::<4, 4>(1, 1).into();
     let steer: Vector4<f64> = linear.steer.fixed_rows::<4>(1).into();
@@ -98,15 +95,8 @@ pub fn small_steering(flat: &[f64], tyre: TyreModel, speed: f64) -> Option<Small
 
 /// The eigenvalues (1/s) of a car that rolls straight ahead; nothing for figures that are no car.
 fn modes(flat: &[f64], tyre: TyreModel, speed: f64) -> Option<[Complex<f64>; 6]> {
-    let states = match tyre {
-        TyreModel::MagicFormula => {
-            linearised::<MagicFormula<f64>>(flat, speed, Wheels::Turn)?
-                .0
-                .states
-        }
-        TyreModel::Linear => linearised::<LinearTyre<f64>>(flat, speed, Wheels::Turn)?.0.states,
-    };
-    Some(states.complex_eigenvalues().into())
+    let (linear, _) = linearised(flat, tyre, speed, Wheels::Turn)?;
+    Some(linear.states.complex_eigenvalues().into())
 }
 
 /// What the wheels of a linearised car do.
@@ -127,7 +117,15 @@ struct Linearised {
 }
 
 /// A car that rolls straight ahead, linearised, and its wheelbase (m); nothing for figures that are no car.
-fn linearised<T: Tyre<f64>>(flat: &[f64], speed: f64, wheels: Wheels) -> Option<(Linearised, f64)> {
+fn linearised(flat: &[f64], tyre: TyreModel, speed: f64, wheels: Wheels) -> Option<(Linearised, f64)> {
+    match tyre {
+        TyreModel::MagicFormula => linearised_on::<MagicFormula<f64>>(flat, speed, wheels),
+        TyreModel::Linear => linearised_on::<LinearTyre<f64>>(flat, speed, wheels),
+    }
+}
+
+/// As [`linearised`], with tyres of this model.
+fn linearised_on<T: Tyre<f64>>(flat: &[f64], speed: f64, wheels: Wheels) -> Option<(Linearised, f64)> {
     let car = CarModel::<f64, T>::from_parameters(|i| flat[i]);
     let state = |x: [f64; 6]| CarState {
         body: BodyState {

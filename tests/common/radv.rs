@@ -96,7 +96,8 @@ pub fn driver() -> Result<PathBuf, String> {
         .ok_or_else(|| "no RADV here (Mesa's driver for AMD; Debian package mesa-vulkan-drivers)".to_owned())
 }
 
-/// What the compiler for `family` says of the kernels whose names contain one of `wanted`: of all where that is empty. The program itself does the work, see [`answer_parent`].
+/// What the compiler for `family` says of the kernels whose names contain one of `wanted`: of all where that is empty. The program
+/// itself does the work, see [`answer_parent`].
 ///
 /// # Errors
 /// That the driver is not there or fails.

@@ -2,7 +2,9 @@
 
 use lapswarm::Error;
 use lapswarm::study::framework::Progress;
-use lapswarm::study::reproduce::{Place, ReproduceRequest, ReproduceSettings, Summary, begin, reproduce};
+use lapswarm::study::reproduce::{
+    EvaluatedOn, ReproduceRequest, ReproduceSettings, Summary, begin, reproduce,
+};
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::Arc;
@@ -24,7 +26,7 @@ fn run(
 }
 
 fn begun(folder: &Path) -> ReproduceSettings {
-    let settings = ReproduceSettings::new(&[3, 2], true, Place::default()).expect("chapters");
+    let settings = ReproduceSettings::new(&[3, 2], true, EvaluatedOn::default()).expect("chapters");
     std::fs::create_dir_all(folder).expect("a folder");
     begin(&settings, folder).expect("it begins");
     settings
@@ -40,9 +42,7 @@ fn a_reproduction_that_is_broken_off_goes_on_with_what_is_left() {
     let last = expected.tables.last().expect("a table").name.clone();
 
     begun(&broken);
-    let mut stages = Vec::new();
     let error = run(&settings, &broken, &mut |progress| {
-        stages.push(progress.stage.clone());
         if progress.stage.starts_with(&last) {
             ControlFlow::Break(())
         } else {
@@ -68,7 +68,7 @@ fn a_reproduction_that_is_broken_off_goes_on_with_what_is_left() {
     for name in ["published.csv", "report.html", "summary.json"] {
         assert!(broken.join(name).is_file(), "{name}");
     }
-    let other = ReproduceSettings::new(&[3], true, Place::default()).expect("a chapter");
+    let other = ReproduceSettings::new(&[3], true, EvaluatedOn::default()).expect("a chapter");
     let refused = run(&other, &broken, &mut |_| ControlFlow::Continue(())).expect_err("another");
     assert_eq!(refused.exit_code(), 2);
 }

@@ -1,6 +1,7 @@
 //! What a chapter of the thesis shows, as files of this crate declare it.
 
 use crate::config::Document;
+use crate::config::kinds::Choice;
 use crate::error::{Error, Result};
 use crate::evaluate::BackendChoice;
 use crate::study::registry::{self, Registered};
@@ -117,15 +118,9 @@ pub enum Task {
     Sweep(SweepSettings),
 }
 
-impl std::fmt::Debug for dyn Registered {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(self.name())
-    }
-}
-
 /// Where candidates are evaluated, over the files.
 #[derive(Clone, Debug, Default)]
-pub struct Place {
+pub struct EvaluatedOn {
     /// The backend.
     pub backend: Option<BackendChoice>,
     /// Part of the name of the GPU.
@@ -159,7 +154,7 @@ impl Item {
     ///
     /// # Errors
     /// [`Error::Input`] if the file asks for what there is not.
-    pub fn task(&self, quick: bool, place: &Place) -> Result<Task> {
+    pub fn task(&self, quick: bool, on: &EvaluatedOn) -> Result<Task> {
         let study = registry::named(&self.study).ok_or_else(|| {
             let expected = format!("one of {}", registry::names().join(", "));
             Error::input(&self.name, "study", &*self.study, expected)
@@ -170,11 +165,10 @@ impl Item {
             extend(&mut grid, &self.quick.grid);
         }
         let has = |key: &str| study.declared().iter().any(|d| d.key == key);
-        if let Some(backend) = place.backend.filter(|_| has("backend")) {
-            use crate::config::kinds::Choice;
+        if let Some(backend) = on.backend.filter(|_| has("backend")) {
             settings.insert("backend".to_owned(), Value::String(backend.name().to_owned()));
         }
-        if let Some(adapter) = place.adapter.as_ref().filter(|_| has("adapter")) {
+        if let Some(adapter) = on.adapter.as_ref().filter(|_| has("adapter")) {
             settings.insert("adapter".to_owned(), Value::String(adapter.clone()));
         }
         if grid.is_empty() {
@@ -217,7 +211,7 @@ mod tests {
                 assert!(item.name.starts_with(&format!("{number}_")), "{}", item.name);
                 assert!(!item.figures.is_empty(), "{}", item.name);
                 for quick in [false, true] {
-                    match item.task(quick, &Place::default()).expect(&item.name) {
+                    match item.task(quick, &EvaluatedOn::default()).expect(&item.name) {
                         Task::Sweep(sweep) => drop(plan(&sweep).expect(&item.name)),
                         Task::Study(study, text) => {
                             let folder = tempfile::tempdir().expect("a folder");

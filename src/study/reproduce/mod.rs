@@ -6,9 +6,10 @@
 mod chapter;
 mod results;
 
-pub use chapter::{Chapter, Item, Place, Task, numbers};
+pub use chapter::{Chapter, EvaluatedOn, Item, Task, numbers};
 pub use results::{Compared, Summary, TableSummary};
 
+use crate::config::kinds::Choice;
 use crate::config::read_text;
 use crate::error::{Error, Result};
 use crate::files::run_folder::{MANIFEST, STATE, SUMMARY};
@@ -16,7 +17,8 @@ use crate::report::write_whole;
 use crate::study::framework::{
     Answer, Figures, Progress, Request, TIME_LIMIT, TimeLimit, add_numbers, write_json,
 };
-use crate::study::sweep::{self, Row, RowsRequest, SWEEP_FILE, SweepSettings};
+use crate::study::registry::Registered;
+use crate::study::sweep::{self, KeptRow, Row, RowsRequest, SWEEP_FILE, SweepSettings};
 use cpu_time::ProcessTime;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -39,7 +41,7 @@ pub struct ReproduceSettings {
     /// Whether the quick subset is enough.
     pub quick: bool,
     /// Where candidates are evaluated.
-    pub place: Place,
+    pub on: EvaluatedOn,
 }
 
 /// How it is reproduced.
@@ -56,11 +58,12 @@ pub struct ReproduceRequest<'a> {
     pub observe: &'a mut dyn FnMut(&Progress) -> ControlFlow<()>,
 }
 
-/// What a table took, over all processes that worked on it.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+/// What a table took, over all processes that worked on it, and what failed in the last of them.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 struct Took {
     elapsed_s: f64,
     processor_s: f64,
+    failed: Vec<String>,
 }
 
 impl ReproduceSettings {
@@ -68,7 +71,7 @@ impl ReproduceSettings {
     ///
     /// # Errors
     /// [`Error::Input`] if there is none of such a number.
-    pub fn new(chapters: &[u8], quick: bool, place: Place) -> Result<Self> {
+    pub fn new(chapters: &[u8], quick: bool, on: EvaluatedOn) -> Result<Self> {
         let mut asked = if chapters.is_empty() {
             numbers()
         } else {
@@ -79,19 +82,18 @@ impl ReproduceSettings {
         Ok(Self {
             chapters: asked.into_iter().map(Chapter::load).collect::<Result<_>>()?,
             quick,
-            place,
+            on,
         })
     }
 
     /// As the folder keeps it: what was asked for, to resume nothing else.
     pub fn to_toml(&self) -> String {
-        use crate::config::kinds::Choice;
         let numbers: Vec<String> = self.chapters.iter().map(|c| c.number.to_string()).collect();
         let mut text = format!("chapters = [{}]\nquick = {}\n", numbers.join(", "), self.quick);
-        if let Some(backend) = self.place.backend {
+        if let Some(backend) = self.on.backend {
             text += &format!("backend = \"{}\"\n", backend.name());
         }
-        if let Some(adapter) = &self.place.adapter {
+        if let Some(adapter) = &self.on.adapter {
             text += &format!("adapter = {}\n", toml::Value::String(adapter.clone()));
         }
         text
@@ -110,7 +112,7 @@ impl ReproduceSettings {
     /// Those of [`Item::task`] and of the sweeps.
     pub fn plan(&self) -> Result<Vec<String>> {
         let line = |(chapter, item): (&Chapter, &Item)| {
-            let what = match item.task(self.quick, &self.place)? {
+            let what = match item.task(self.quick, &self.on)? {
                 Task::Study(study, _) => format!("one run of {}", study.name()),
                 Task::Sweep(sweep) => format!("{} runs of {}", sweep.runs(), sweep.study.name()),
             };
@@ -165,7 +167,7 @@ pub fn reproduce(
                 stop: &request.stop,
                 observe: &mut told,
             };
-            match item.task(settings.quick, &settings.place)? {
+            match item.task(settings.quick, &settings.on)? {
                 Task::Study(study, text) => at_work.study(study, &text, &item.name),
                 Task::Sweep(sweep) => at_work.sweep(&sweep),
             }
@@ -174,11 +176,14 @@ pub fn reproduce(
         if !matches!(done, Ok(Done { found: true, .. })) {
             took.elapsed_s += began.elapsed().as_secs_f64();
             took.processor_s += processor.elapsed().as_secs_f64();
+            if let Ok(done) = &done {
+                took.failed.clone_from(&done.failed);
+            }
         }
-        let took = *took;
+        let took = took.clone();
         write_json(&folder.join(TIMES), &times)?;
         match done {
-            Ok(done) => tables.push(TableSummary::new(chapter, item, done.rows, done.failed, took)),
+            Ok(done) => tables.push(TableSummary::new(chapter, item, done.rows, took)),
             Err(Error::Interrupted(_)) if time_limit.has_ended_it() => {
                 ended_by = Some(TIME_LIMIT.to_owned());
                 break;
@@ -218,12 +223,7 @@ struct AtWork<'a> {
 
 impl AtWork<'_> {
     /// One run with its own page, unless it is there.
-    fn study(
-        &mut self,
-        study: &'static dyn crate::study::registry::Registered,
-        text: &str,
-        name: &str,
-    ) -> Result<Done> {
+    fn study(&mut self, study: &'static dyn Registered, text: &str, name: &str) -> Result<Done> {
         let found = self.folder.join(MANIFEST).is_file() && !self.folder.join(STATE).is_file();
         let mut failed = Vec::new();
         if !found {
@@ -269,13 +269,13 @@ impl AtWork<'_> {
 
     /// All rows of a sweep that are not there, and its page.
     fn sweep(&mut self, settings: &SweepSettings) -> Result<Done> {
-        let begun = self.folder.join(SWEEP_FILE).is_file();
-        if !begun {
+        if !self.folder.join(SWEEP_FILE).is_file() {
             sweep::begin(settings, self.folder)?;
         }
-        let found = begun && sweep::is_finished(settings, self.folder)?;
+        let rows = sweep::kept_rows(settings, self.folder)?;
+        let found = rows.len() == settings.runs() && !rows.values().any(KeptRow::failed);
         if !found {
-            let part = sweep::run_rows(
+            sweep::run_rows(
                 settings,
                 self.folder,
                 RowsRequest {
@@ -286,13 +286,12 @@ impl AtWork<'_> {
                     observe: &mut *self.observe,
                 },
             )?;
-            drop(part);
         }
         let summary = sweep::gather(settings, self.folder)?;
-        let elapsed_s = sweep::elapsed_s(settings, self.folder)?;
+        let kept = sweep::kept_rows(settings, self.folder)?;
         let mut rows = summary.rows;
         for row in &mut rows {
-            let took = elapsed_s.get(&row.run).copied();
+            let took = kept.get(&row.run).map(|kept| kept.elapsed_s);
             row.figures.insert("elapsed_s".to_owned(), took);
         }
         Ok(Done {

@@ -138,13 +138,7 @@ fn compared(asked: &Asked, groups: &[Group]) -> Vec<Compared> {
 }
 
 impl TableSummary {
-    pub(super) fn new(
-        chapter: &Chapter,
-        item: &Item,
-        rows: Vec<Row>,
-        failed: Vec<String>,
-        took: Took,
-    ) -> Self {
+    pub(super) fn new(chapter: &Chapter, item: &Item, rows: Vec<Row>, took: Took) -> Self {
         let groups = medians(&rows);
         let evaluations: Option<f64> = rows.iter().map(|row| *row.figures.get("evaluations")?).sum();
         Self {
@@ -159,7 +153,7 @@ impl TableSummary {
                 .collect(),
             runs: rows.len(),
             evaluations,
-            failed_runs: failed,
+            failed_runs: took.failed,
             elapsed_s: took.elapsed_s,
             processor_elapsed_s: took.processor_s,
         }

@@ -4,12 +4,11 @@ use crate::config::{Document, folder_of, read_text};
 use crate::error::{Error, Result};
 use crate::study::registry::{self, Registered};
 use std::collections::BTreeMap;
-use std::fmt;
 use std::path::{Path, PathBuf};
 use toml::{Table, Value};
 
 /// A sweep: which study, what all of its runs share, and what they differ in.
-#[derive(Clone)]
+#[derive(Clone, Debug)]
 pub struct SweepSettings {
     /// The study.
     pub study: &'static dyn Registered,
@@ -20,17 +19,6 @@ pub struct SweepSettings {
     /// The sweep file, as it was read.
     text: String,
     file: PathBuf,
-}
-
-impl fmt::Debug for SweepSettings {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("SweepSettings")
-            .field("study", &self.study.name())
-            .field("base", &self.base)
-            .field("axes", &self.axes)
-            .field("file", &self.file)
-            .finish_non_exhaustive()
-    }
 }
 
 /// One run of a sweep.

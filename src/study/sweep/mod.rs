@@ -151,29 +151,14 @@ pub fn gather(settings: &SweepSettings, folder: &Path) -> Result<Summary> {
     Ok(summary)
 }
 
-/// Whether every row of a sweep that is begun in `folder` has figures.
+/// The rows that a folder has of a sweep, by their numbers.
 ///
 /// # Errors
-/// As [`gather`].
-pub fn is_finished(settings: &SweepSettings, folder: &Path) -> Result<bool> {
+/// [`Error::Input`] if the folder holds another sweep, or a row in it is none.
+pub fn kept_rows(settings: &SweepSettings, folder: &Path) -> Result<BTreeMap<usize, KeptRow>> {
     check_same(settings, folder)?;
     let work = Work::new(settings, folder, folder.join("studies"))?;
-    let rows = work.rows_within(0..work.points.len())?;
-    Ok(rows.len() == work.points.len() && rows.values().all(|kept| !kept.failed()))
-}
-
-/// The time that each row took (s), by its number.
-///
-/// # Errors
-/// As [`gather`].
-pub fn elapsed_s(settings: &SweepSettings, folder: &Path) -> Result<BTreeMap<usize, f64>> {
-    check_same(settings, folder)?;
-    let work = Work::new(settings, folder, folder.join("studies"))?;
-    let rows = work.rows_within(0..work.points.len())?;
-    Ok(rows
-        .into_iter()
-        .map(|(number, kept)| (number, kept.elapsed_s))
-        .collect())
+    work.rows_within(0..work.points.len())
 }
 
 /// Refuses a folder that holds another sweep.

@@ -306,8 +306,8 @@ pub fn base_vectors(count: usize) -> usize {
     count.div_ceil(4).max(1)
 }
 
-/// The loaders `load_chassis` and `load_tyres`, or one for each axle's tyres: a figure that candidates share comes from the uniform table `base`,
-/// where the compiler sees that all lanes read the same, one that varies from its row of `figures`.
+/// The loaders `load_chassis` and `load_tyres`, or one for each axle's tyres: a figure that candidates share comes from the uniform
+/// table `base`, where the compiler sees that all lanes read the same, one that varies from its row of `figures`.
 pub fn loaders(model: TyreModel, wheels: WheelOrder, sources: &[Option<usize>]) -> String {
     let chassis = Chassis::<f32>::FIELDS;
     let (structure, tyre) = tyre_struct(model);
