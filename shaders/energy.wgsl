@@ -4,7 +4,7 @@
 // STRATEGY on. The constants STRATEGY, ADDITIONAL, COUNTS_CHARGE, FLOWS_AT, BOOSTS_AT and ZONES_AT are generated: where in
 // `energy` the flows, the boosts and the zones begin, after the forces. So is binding 10, `energy`, an array of vectors of four:
 // rows of engine, motor, generator, drag and of their rises; of flows at four loads and of their rises; of the motor, the room
-// for it and of their rises; of each section's zone, position and one over its share.
+// for it, what the MGU-H takes, zero and of their rises; of each section's zone, position and one over its share.
 
 // Twin of `EnergyAccount` in `src/evaluate/energy/gpu.rs`.
 struct EnergyAccount {
@@ -83,25 +83,49 @@ fn store_left(state: EnergyState) -> f32 {
     return select(left, 0.0, left < LEAST_J);
 }
 
-fn additional(section: u32, start: f32, length: f32, here: f32, there: f32, most: f32, left: f32, candidate: u32) -> Step {
+// What the store takes yet.
+fn store_space(state: EnergyState) -> f32 {
+    return account.store_room - state.change;
+}
+
+fn spins(speed_squared: f32, ax: f32) -> bool {
+    return !(speed_squared < account.exhaust_from) && 0.0 < ax && !(account.exhaust_to_ax < ax);
+}
+
+fn additional(
+    section: u32,
+    start: f32,
+    length: f32,
+    here: f32,
+    there: f32,
+    most: f32,
+    left: f32,
+    space: f32,
+    candidate: u32,
+) -> Step {
     let first = driving_at(start, here);
-    let engine = min(first.x, first.y);
-    let ahead = max(start + length * (engine - first.z), 0.0);
+    let alone = min(first.x, first.y);
+    let ahead = max(start + length * (alone - first.z), 0.0);
     let held = min(max(ahead * account.rows_per_speed_squared, 0.0), f32(ENVELOPE_ROWS));
     let row = min(u32(held), ENVELOPE_ROWS - 1u);
-    let figures = energy[BOOSTS_AT + row];
-    let force_and_room = figures.xy + (held - f32(row)) * figures.zw;
-    let greatest = min(force_and_room.x * gates.motor, force_and_room.y);
-    let may = gates_open(here, start) && gates.ax < engine - first.z;
+    let figures = energy[BOOSTS_AT + 2u * row] + (held - f32(row)) * energy[BOOSTS_AT + 2u * row + 1u];
+    let greatest = min(figures.x * gates.motor, figures.y);
+    let may = gates_open(here, start) && gates.ax < alone - first.z;
     let wanted = select(0.0, greatest * zone_share(section, candidate), may);
     let inverse = 1.0 / length;
     let boost = min(wanted, left * account.force_per_deployed * inverse / account.rotating);
 
-    let both = min(first.x, first.y + boost);
+    let turns = spins(start, min(first.x, first.y + boost) - first.z) && 0.0 < space;
+    let exhaust = select(0.0, figures.z, turns);
+
+    let drive = first.y - exhaust;
+    let engine = min(first.x, drive);
+    let both = min(first.x, drive + boost);
     let middle = max(start + length * (both - first.z), 0.0);
     let later = driving_at(middle, 0.5 * (here + there));
-    let later_both = min(later.x, later.y + boost);
-    let motor = 0.5 * ((both - engine) + (later_both - min(later.x, later.y)));
+    let later_drive = later.y - exhaust;
+    let later_both = min(later.x, later_drive + boost);
+    let motor = 0.5 * ((both - engine) + (later_both - min(later.x, later_drive)));
     let reached = max(start + length * ((both - first.z) + (later_both - later.z)), 0.0);
     let end = min(reached, most);
     // Where less force is needed than both can give, the motor is reduced first.
@@ -129,11 +153,13 @@ fn provisional(
     candidate: u32,
 ) {
     let start = (*state).speed_squared;
-    let step = additional(section, start, length, here, there, most, store_left(*state), candidate);
+    let space = store_space(*state);
+    let step = additional(section, start, length, here, there, most, store_left(*state), space, candidate);
     let joules = account.mass * length;
     let deployed = joules * (account.rotating * step.motor) * account.deploy_cost;
     (*state).speed_squared = step.end;
     (*state).deployed = (*state).deployed + deployed;
+    (*state).change = (*state).change - deployed;
     if COUNTS_CHARGE {
         let mean = 0.5 * (start + step.end);
         let held = min(max(mean * account.rows_per_speed_squared, 0.0), f32(ENVELOPE_ROWS));
@@ -141,13 +167,25 @@ fn provisional(
         let forces = energy[2u * row] + (held - f32(row)) * energy[2u * row + 1u];
         let inverse = 1.0 / length;
         let force = account.rotating * (0.5 * (step.end - start) * inverse) + forces.w;
-        let unharvested = min(account.harvest_most - (*state).harvested_k, account.store_room - (*state).change);
+        let unharvested = min(account.harvest_most - (*state).harvested_k, space);
         let room = max(unharvested * account.force_per_harvested * inverse, 0.0);
         let generator = min(min(max(-force, 0.0), forces.z * gates.motor), room);
         let harvested_k = joules * generator * account.harvest_gain;
-        (*state).change = (*state).change + (harvested_k - deployed);
+        (*state).change = (*state).change + harvested_k;
         (*state).harvested_k = (*state).harvested_k + harvested_k;
     }
+}
+
+// Least energy at the wheels for a joule of the MGU-H that is told from none.
+const LEAST_COST: f32 = 1e-6;
+
+// The flow of fuel at a load, between those at 0, 1/3, 2/3 and 1.
+fn flow_at(flows: vec4<f32>, load: f32) -> f32 {
+    let thirds = 3.0 * load;
+    return flows.x
+        + (flows.y - flows.x) * min(thirds, 1.0)
+        + (flows.z - flows.y) * min(max(thirds - 1.0, 0.0), 1.0)
+        + (flows.w - flows.z) * max(thirds - 2.0, 0.0);
 }
 
 fn segment_energy(
@@ -161,9 +199,10 @@ fn segment_energy(
 ) -> SegmentEnergy {
     let start = (*state).speed_squared;
     let left = store_left(*state);
+    let space = store_space(*state);
     var step: Step;
     if ADDITIONAL {
-        step = additional(section, start, length, here, there, most, left, candidate);
+        step = additional(section, start, length, here, there, most, left, space, candidate);
     } else {
         step = Step(engine_only(start, length, here, there, most), 0.0);
     }
@@ -190,31 +229,29 @@ fn segment_energy(
         motor = min(min(select(0.0, forces.y * gates.motor * share, may), demand), reach);
     }
     let engine = demand - motor;
-    let space = account.store_room - (*state).change;
     let unharvested = min(account.harvest_most - (*state).harvested_k, space);
     let room = unharvested * account.force_per_harvested * inverse;
     let generator = min(min(shed, forces.z * gates.motor), max(room, 0.0));
     let deployed = joules * motor * account.deploy_cost;
     let harvested_k = joules * generator * account.harvest_gain;
 
-    let load = min(engine / max(forces.x, 1e-3), 1.0);
     let flows = energy[FLOWS_AT + 2u * row] + beyond * energy[FLOWS_AT + 2u * row + 1u];
-    let thirds = 3.0 * load;
-    let flow = flows.x
-        + (flows.y - flows.x) * min(thirds, 1.0)
-        + (flows.z - flows.y) * min(max(thirds - 1.0, 0.0), 1.0)
-        + (flows.w - flows.z) * max(thirds - 2.0, 0.0);
     let time = 2.0 * length / (sqrt(start) + sqrt(end));
-    let burnt = flow * time;
-    let spins = !(mean < account.exhaust_from) && 0.0 < ax && !(account.exhaust_to_ax < ax);
+    // The MGU-H generates by the flow of the exhaust, while the store has space and the engine power to spare for it. The engine
+    // then burns for its load at the wheels and for this.
     let space_left = max(space + (deployed - harvested_k), 0.0);
-    let harvested_h = select(0.0, min(account.exhaust_gain * burnt, space_left), spins);
+    let spare = joules * max(forces.x - engine, 0.0) / max(account.exhaust_cost, LEAST_COST);
+    let driving = min(engine / max(forces.x, 1e-3), 1.0);
+    let exhaust = account.exhaust_gain * (flow_at(flows, driving) * time);
+    let harvested_h = select(0.0, min(min(exhaust, spare), space_left), spins(mean, ax));
+    let crank = engine + account.exhaust_cost * harvested_h / joules;
+    let load = min(crank / max(forces.x, 1e-3), 1.0);
 
     (*state).speed_squared = end;
     (*state).change = (*state).change + ((harvested_k + harvested_h) - deployed);
     (*state).deployed = (*state).deployed + deployed;
     (*state).harvested_k = (*state).harvested_k + harvested_k;
-    return SegmentEnergy(time, burnt + account.exhaust_cost * harvested_h, deployed, harvested_k, harvested_h);
+    return SegmentEnergy(time, flow_at(flows, load) * time, deployed, harvested_k, harvested_h);
 }
 
 // Fills `speeds_squared` with the greatest speeds squared from which the car can brake for all that follows.
@@ -274,7 +311,8 @@ fn energy_lap(candidate: u32) {
             let there = course[place_of(after, candidate)];
             let most = speeds_squared[place_of(after, candidate)];
             if ADDITIONAL {
-                from_late = additional(here, from_late, bend.x, bend.y, there.y, most, gates.budget, candidate).end;
+                let space = account.store_room + gates.budget;
+                from_late = additional(here, from_late, bend.x, bend.y, there.y, most, gates.budget, space, candidate).end;
             } else {
                 from_late = engine_only(from_late, bend.x, bend.y, there.y, most);
             }

@@ -34,8 +34,8 @@ pub struct Course<R> {
     /// Speed squared at each section (m^2/s^2).
     pub speed_squared: Vec<R>,
     /// Results of the first drive of a lap with a motor beside the engine, for each segment: speed squared at its end (m^2/s^2),
-    /// and over the mass (m/s^2) the force of the motor, the force that was wanted, and the force for which the store had energy.
-    pub first_drive: Vec<[R; 4]>,
+    /// what the motor added, what was wanted of it and for what the store had energy (m/s^2), and the store's space (J).
+    pub first_drive: Vec<[R; 5]>,
 }
 
 impl<R> Default for Course<R> {

@@ -26,6 +26,15 @@ fn hybrid_car(exponent: f64) -> EnergyCar {
     if let Some(powertrain) = &mut car.powertrain {
         powertrain.rotating_mass_factor = 1.06;
     }
+    if exponent < 2.0 {
+        // Such that the MGU-H turns at full load too, which the bundled rule allows nowhere on these lines.
+        let h = car
+            .hybrid
+            .as_mut()
+            .and_then(|hybrid| hybrid.mgu_h.as_mut())
+            .expect("bundled");
+        (h.from_speed_mps, h.to_ax_mps2) = (30.0, 3.0);
+    }
     let coarse = SpeedRange {
         step_mps: 8.0,
         ..SpeedRange::USUAL

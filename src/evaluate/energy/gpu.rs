@@ -36,7 +36,7 @@ pub struct EnergyAccount {
     pub store_room: f32,
     /// Energy of the MGU-H for each kilogram of fuel, J/kg.
     pub exhaust_gain: f32,
-    /// Fuel for each joule of the MGU-H, kg/J.
+    /// Energy that the wheels lack for each joule of the MGU-H.
     pub exhaust_cost: f32,
     /// Speed squared from which the MGU-H generates, m^2/s^2.
     pub exhaust_from: f32,

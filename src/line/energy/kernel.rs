@@ -7,6 +7,10 @@
 //! the start line. The car must cross it at the speed with which it ends the lap, so a closed lap is driven twice: once to find
 //! that speed and once for the accounts.
 //!
+//! The MGU-H is a machine on the turbocharger's shaft: what it generates costs power at the crank. At part load the engine burns
+//! for it by its map. At full load the engine cannot give more, and the car is slower for it. Where the motor replaces the engine,
+//! the speed is kept, and the MGU-H takes only what the engine has to spare.
+//!
 //! After R. Lot and S. A. Evangelou, *Lap time optimization of a sports series hybrid electric vehicle*, World Congress on
 //! Engineering 2013, for the energies that are accounted; the passes are those of [`super::super::kernel`].
 
@@ -122,6 +126,9 @@ struct State<R> {
 /// A remainder below this (J) is left in the store. In single precision, rounding would spend it in ever smaller shares.
 const LEAST_J: f64 = 5.0;
 
+/// Least energy at the wheels for a joule of the MGU-H that is told from none.
+const LEAST_COST: f64 = 1e-6;
+
 /// All that does not change along a lap.
 struct Car<'a, R: Real> {
     envelope: &'a EnvelopeTable<R::Storage>,
@@ -140,6 +147,8 @@ struct Step<R> {
     wanted: R,
     /// and the part of it for which the store has energy.
     boost: R,
+    /// What the store took yet (J): with room in it the MGU-H lowered the engine's part.
+    space: R,
 }
 
 /// The share of a segment in which its zone allows the motor to work.
@@ -153,6 +162,17 @@ fn zone_share<R: Real>(row: &ZoneRow<R::Storage>, strategy: &[R]) -> R {
 #[inline(always)]
 fn gated<R: Real>(mask: R::Mask, x: R) -> R {
     R::select(mask, x, R::lit(0.0))
+}
+
+/// The flow of fuel at a load, between those at 0, 1/3, 2/3 and 1.
+#[inline(always)]
+fn flow_at<R: Real>(flows: [R; 4], load: R) -> R {
+    let (zero, one) = (R::lit(0.0), R::lit(1.0));
+    let thirds = R::lit(3.0) * load;
+    flows[0]
+        + (flows[1] - flows[0]) * thirds.min(one)
+        + (flows[2] - flows[1]) * (thirds - one).max(zero).min(one)
+        + (flows[3] - flows[2]) * (thirds - R::lit(2.0)).max(zero)
 }
 
 impl<R: Lookup> Car<'_, R> {
@@ -184,27 +204,43 @@ impl<R: Lookup> Car<'_, R> {
         left * R::load(self.table.force_per_deployed) * inverse
     }
 
-    /// Drives along a segment, with the motor beside the engine in as much of it as `left` (J) suffices for, up to the
-    /// greatest speed squared at its end.
+    /// Whether the MGU-H may generate at this speed squared and this acceleration.
     #[inline(always)]
-    fn additional(&self, here: usize, from: R, length: R, bends: [R; 2], most: R, left: R) -> Step<R> {
+    fn spins(&self, speed_squared: R, ax: R) -> R::Mask {
+        !speed_squared.less_than(R::load(self.table.exhaust_from))
+            & R::lit(0.0).less_than(ax)
+            & !R::load(self.table.exhaust_to_ax).less_than(ax)
+    }
+
+    /// Drives along a segment, with the motor beside the engine in as much of it as the store's energy suffices for, up to the
+    /// greatest speed squared at its end. `store` has the energy that may leave the store and the space that is in it (J): while
+    /// there is some, the MGU-H lowers what an engine at full load gives.
+    #[inline(always)]
+    fn additional(&self, here: usize, from: R, length: R, bends: [R; 2], most: R, store: [R; 2]) -> Step<R> {
+        let [left, space] = store;
         let inverse = R::lit(1.0) / length;
         let zero = R::lit(0.0);
         let [traction, drive, drag] = driving_at(self.envelope, from, bends[0]);
         let engine = traction.min(drive);
         let ahead = (from + length * (engine - drag)).max(zero);
-        let rows = self.table.boosts.len() / 4;
-        let (place, beyond) = (ahead * R::load(self.table.rows_per_speed_squared)).place(rows, 4);
-        let [motor, room] = [0, 1].map(|column| look_up(&self.table.boosts, 4, place, beyond, column));
+        let rows = self.table.boosts.len() / 8;
+        let (place, beyond) = (ahead * R::load(self.table.rows_per_speed_squared)).place(rows, 8);
+        let [motor, room, exhaust] =
+            [0, 1, 2].map(|column| look_up(&self.table.boosts, 8, place, beyond, column));
         let boost = (motor * self.strategy[5]).min(room);
         let open = self.open(bends[0], from) & self.strategy[2].less_than(engine - drag);
         let wanted = gated(open, boost * zone_share(&self.plan.zones[here], self.strategy));
         let boost = wanted.min(self.boost(left, inverse));
+        let spins = self.spins(from, traction.min(drive + boost) - drag) & zero.less_than(space);
+        let exhaust = gated(spins, exhaust);
 
+        let drive = drive - exhaust;
+        let engine = traction.min(drive);
         let both = traction.min(drive + boost);
         let middle = (from + length * (both - drag)).max(zero);
         let [traction, drive, later_drag] =
             driving_at(self.envelope, middle, R::lit(0.5) * (bends[0] + bends[1]));
+        let drive = drive - exhaust;
         let later_both = traction.min(drive + boost);
         let motor = R::lit(0.5) * ((both - engine) + (later_both - traction.min(drive)));
         let reached = (from + length * ((both - drag) + (later_both - later_drag))).max(zero);
@@ -216,38 +252,46 @@ impl<R: Lookup> Car<'_, R> {
             motor: (motor - spare).max(zero),
             wanted,
             boost,
+            space,
         }
     }
 
     /// As the function above, but reuses the results of the first drive if that entered the segment at the same speed and with
-    /// the same energy in every lane. After the first slow bend the two drives differ only where the store runs out.
+    /// the same energy and space in every lane. After the first slow bend the two drives differ only where the store runs out.
     #[inline(always)]
     #[allow(clippy::too_many_arguments)]
     fn additional_again(
         &self,
-        first: Option<[R; 4]>,
+        first: Option<[R; 5]>,
         before: R,
         here: usize,
         from: R,
         length: R,
         bends: [R; 2],
         most: R,
-        left: R,
+        store: [R; 2],
     ) -> Step<R> {
-        if let Some([end, motor, wanted, boost]) = first {
-            let now = wanted.min(self.boost(left, R::lit(1.0) / length));
-            let differs =
-                from.less_than(before) | before.less_than(from) | now.less_than(boost) | boost.less_than(now);
+        if let Some([end, motor, wanted, boost, space]) = first {
+            let zero = R::lit(0.0);
+            let now = wanted.min(self.boost(store[0], R::lit(1.0) / length));
+            let (had, has) = (zero.less_than(space), zero.less_than(store[1]));
+            let differs = from.less_than(before)
+                | before.less_than(from)
+                | now.less_than(boost)
+                | boost.less_than(now)
+                | (had & !has)
+                | (has & !had);
             if R::all(!differs) {
                 return Step {
                     end,
                     motor,
                     wanted,
                     boost,
+                    space,
                 };
             }
         }
-        self.additional(here, from, length, bends, most, left)
+        self.additional(here, from, length, bends, most, store)
     }
 
     /// Drives along a segment by the engine alone.
@@ -263,18 +307,20 @@ impl<R: Lookup> Car<'_, R> {
     }
 
     /// One segment of the lap that only finds the speed at the start line, with the motor beside the engine: what is deployed,
-    /// and what the MGU-K harvests where the charge matters. The small contribution of the MGU-H is left out here.
+    /// and what the MGU-K harvests where the charge matters. The small charge by the MGU-H is left out here.
     #[inline(always)]
     fn provisional(&self, state: &mut State<R>, here: usize, length: R, bends: [R; 2], most: R) -> Step<R> {
         let zero = R::lit(0.0);
         let table = self.table;
         let from = state.speed_squared;
-        let step = self.additional(here, from, length, bends, most, self.left(state));
+        let space = R::load(table.store_room) - state.change;
+        let step = self.additional(here, from, length, bends, most, [self.left(state), space]);
         let joules = R::load(table.mass) * length;
         let rotating = R::load(table.rotating);
         let deployed = joules * (rotating * step.motor) * R::load(table.deploy_cost);
         state.speed_squared = step.end;
         state.deployed = state.deployed + deployed;
+        state.change = state.change - deployed;
         if self.plan.counts_charge {
             let mean = R::lit(0.5) * (from + step.end);
             let rows = table.forces.len() / 8;
@@ -282,13 +328,12 @@ impl<R: Lookup> Car<'_, R> {
             let row = R::pick_row(&table.forces, place);
             let inverse = R::lit(1.0) / length;
             let force = rotating * (R::lit(0.5) * (step.end - from) * inverse) + (row[3] + beyond * row[7]);
-            let unharvested = (R::load(table.harvest_most) - state.harvested_k)
-                .min(R::load(table.store_room) - state.change);
+            let unharvested = (R::load(table.harvest_most) - state.harvested_k).min(space);
             let room = (unharvested * R::load(table.force_per_harvested) * inverse).max(zero);
             let most = (row[2] + beyond * row[6]) * self.strategy[5];
             let generator = (-force).max(zero).min(most).min(room);
             let harvested_k = joules * generator * R::load(table.harvest_gain);
-            state.change = state.change + (harvested_k - deployed);
+            state.change = state.change + harvested_k;
             state.harvested_k = state.harvested_k + harvested_k;
         }
         step
@@ -303,21 +348,23 @@ impl<R: Lookup> Car<'_, R> {
         root: &mut R,
         here: usize,
         (length, bends, most): (R, [R; 2], R),
-        first: (Option<[R; 4]>, R),
+        first: (Option<[R; 5]>, R),
     ) -> SegmentEnergy<R> {
         let (zero, one) = (R::lit(0.0), R::lit(1.0));
         let table = self.table;
         let from = state.speed_squared;
         let left = self.left(state);
+        let space = R::load(table.store_room) - state.change;
         let step = match self.plan.mode {
             Mode::Additional => {
-                self.additional_again(first.0, first.1, here, from, length, bends, most, left)
+                self.additional_again(first.0, first.1, here, from, length, bends, most, [left, space])
             }
             Mode::Offset => Step {
                 end: self.engine_only(from, length, bends, most),
                 motor: zero,
                 wanted: zero,
                 boost: zero,
+                space,
             },
         };
         let end = step.end;
@@ -346,30 +393,27 @@ impl<R: Lookup> Car<'_, R> {
             }
         };
         let engine = demand - motor;
-        let space = R::load(table.store_room) - state.change;
         let unharvested = (R::load(table.harvest_most) - state.harvested_k).min(space);
         let room = unharvested * R::load(table.force_per_harvested) * inverse;
         let generator = shed.min(generator_most * self.strategy[5]).min(room.max(zero));
         let deployed = joules * motor * R::load(table.deploy_cost);
         let harvested_k = joules * generator * R::load(table.harvest_gain);
 
-        let load = (engine / greatest.max(R::lit(1e-3))).min(one);
         let row = R::pick_row(&table.flows, place);
         let flows: [R; 4] = std::array::from_fn(|column| row[column] + beyond * row[4 + column]);
-        let thirds = R::lit(3.0) * load;
-        let flow = flows[0]
-            + (flows[1] - flows[0]) * thirds.min(one)
-            + (flows[2] - flows[1]) * (thirds - one).max(zero).min(one)
-            + (flows[3] - flows[2]) * (thirds - R::lit(2.0)).max(zero);
         let end_root = end.sqrt();
         let time = R::lit(2.0) * length / (*root + end_root);
         *root = end_root;
-        let burnt = flow * time;
-        let spins = !mean.less_than(R::load(table.exhaust_from))
-            & zero.less_than(ax)
-            & !R::load(table.exhaust_to_ax).less_than(ax);
+        // The MGU-H generates by the flow of the exhaust, while the store has space and the engine power to spare for it. The
+        // engine then burns for its load at the wheels and for this.
+        let cost = R::load(table.exhaust_cost);
         let space = (space + (deployed - harvested_k)).max(zero);
-        let harvested_h = gated(spins, (R::load(table.exhaust_gain) * burnt).min(space));
+        let spare = joules * (greatest - engine).max(zero) / cost.max(R::lit(LEAST_COST));
+        let driving = (engine / greatest.max(R::lit(1e-3))).min(one);
+        let exhaust = R::load(table.exhaust_gain) * (flow_at(flows, driving) * time);
+        let harvested_h = gated(self.spins(mean, ax), exhaust.min(spare).min(space));
+        let crank = engine + cost * harvested_h / joules;
+        let load = (crank / greatest.max(R::lit(1e-3))).min(one);
 
         state.speed_squared = end;
         state.change = state.change + ((harvested_k + harvested_h) - deployed);
@@ -384,7 +428,7 @@ impl<R: Lookup> Car<'_, R> {
             generator,
             hydraulic: shed - generator,
             load,
-            fuel: burnt + R::load(table.exhaust_cost) * harvested_h,
+            fuel: flow_at(flows, load) * time,
             deployed,
             harvested_k,
             harvested_h,
@@ -416,7 +460,7 @@ pub fn motor_step(
             share,
         ],
     };
-    let step = car.additional(0, from, length, bends, f64::INFINITY, f64::INFINITY);
+    let step = car.additional(0, from, length, bends, f64::INFINITY, [f64::INFINITY; 2]);
     [step.end, table.rotating * step.motor]
 }
 
@@ -511,7 +555,8 @@ pub fn energy_lap<R: Lookup>(
             state = match plan.mode {
                 Mode::Additional => {
                     let enough = car.strategy[4];
-                    car.additional(here, state, h, bend, held, enough).end
+                    let space = R::load(table.store_room) + enough;
+                    car.additional(here, state, h, bend, held, [enough, space]).end
                 }
                 Mode::Offset => car.engine_only(state, h, bend, held),
             };
@@ -522,7 +567,7 @@ pub fn energy_lap<R: Lookup>(
             let mut state = fresh(speed_squared);
             for here in 0..n {
                 let step = car.provisional(&mut state, here, length[here], bends(here), most[after(here)]);
-                first_drive.push([step.end, step.motor, step.wanted, step.boost]);
+                first_drive.push([step.end, step.motor, step.wanted, step.boost, step.space]);
             }
             speed_squared = state.speed_squared;
         }

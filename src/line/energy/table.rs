@@ -32,7 +32,7 @@ pub struct EnergyTable<S> {
     pub store_room: S,
     /// Energy of the MGU-H into the store for each kilogram of fuel (J/kg).
     pub exhaust_gain: S,
-    /// Fuel for each joule of the MGU-H (kg/J).
+    /// Energy that the wheels lack for each joule of the MGU-H, while the engine gives no more.
     pub exhaust_cost: S,
     /// Speed squared from which the MGU-H generates (m^2/s^2).
     pub exhaust_from: S,
@@ -42,12 +42,11 @@ pub struct EnergyTable<S> {
     pub forces: Vec<S>,
     /// Fuel flow (kg/s) at a load of 0, 1/3, 2/3 and 1, then the rises.
     pub flows: Vec<S>,
-    /// What the motor adds to the acceleration (m/s^2) and the room that engine and tyres leave for it, then their rises.
+    /// What the motor adds to the acceleration (m/s^2), the room that engine and tyres leave for it, what the MGU-H takes from it at
+    /// full load, and zero; then their rises.
     pub boosts: Vec<S>,
 }
 
-/// Specific consumption with which the cost of the MGU-H at the crank is converted to fuel if the map has none (kg/J): 270 g/kWh.
-const CONSUMPTION_KGPJ: f64 = 0.270 / 3.6e6;
 /// Stands for unlimited room (m/s^2); its rises are finite numbers.
 const ENDLESS_MPS2: f64 = 1e4;
 /// At standstill motors have a torque, but power divided by speed is undefined.
@@ -122,10 +121,21 @@ impl EnergyTable<f64> {
             boosts.push([
                 motor / powertrain.rotating_mass_factor,
                 (traction.at(v) - driven).clamp(0.0, ENDLESS_MPS2),
+                flows[knot][3],
+                0.0,
             ]);
         }
         let greatest_flow = flows.iter().flatten().fold(0.0, |a: f64, b| a.max(*b));
         let h = hybrid.mgu_h;
+        let exhaust_gain = h.map_or(0.0, |h| h.generated_w(1.0) / greatest_flow);
+        let exhaust_cost = h.map_or(0.0, |h| {
+            powertrain.efficiency * h.generator_cost_w / h.generator_w
+        });
+        for (knot, row) in boosts.iter_mut().enumerate() {
+            let slow = (table.top * knot as f64 / rows as f64).sqrt().max(SLOWEST_MPS);
+            let per_flow = exhaust_cost * exhaust_gain / (mass * slow * powertrain.rotating_mass_factor);
+            row[2] *= per_flow;
+        }
         let deploy_cost = 1.0 / (k.motor_efficiency * powertrain.efficiency);
         let harvest_gain = k.generator_efficiency * powertrain.efficiency;
         Ok(Self {
@@ -138,8 +148,8 @@ impl EnergyTable<f64> {
             force_per_harvested: 1.0 / (mass * harvest_gain),
             harvest_most: hybrid.rules.harvested_k_j.unwrap_or(1e12),
             store_room: hybrid.store.room_j(),
-            exhaust_gain: h.map_or(0.0, |h| h.generated_w(1.0) / greatest_flow),
-            exhaust_cost: h.map_or(0.0, |h| CONSUMPTION_KGPJ * h.generator_cost_w / h.generator_w),
+            exhaust_gain,
+            exhaust_cost,
             exhaust_from: h.map_or(1e9, |h| h.from_speed_mps.powi(2)),
             exhaust_to_ax: h.map_or(0.0, |h| h.to_ax_mps2),
             forces: with_rises(&forces),

@@ -32,7 +32,20 @@ fn bean() -> Vec<DVec2> {
         .collect()
 }
 
+/// The car without its MGU-H.
+fn car_without_h() -> EnergyCar {
+    let hybrid = crate::vehicle::Hybrid {
+        mgu_h: None,
+        ..car().hybrid.clone()
+    };
+    car().with_hybrid(hybrid).unwrap()
+}
+
 fn problem(mode: Mode) -> HybridProblem {
+    problem_of(car().clone(), mode)
+}
+
+fn problem_of(car: EnergyCar, mode: Mode) -> HybridProblem {
     let points_m = bean();
     let n = points_m.len();
     let lengths: Vec<f64> = (0..n)
@@ -55,13 +68,14 @@ fn problem(mode: Mode) -> HybridProblem {
         points_m,
         closed: true,
     };
-    HybridProblem::new(line, car().clone(), plan, strategy, &HybridObjective::ALL, 10.0).unwrap()
+    HybridProblem::new(line, car, plan, strategy, &HybridObjective::ALL, 10.0).unwrap()
 }
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(200))]
     /// Whatever the strategy: what is in the store at the end is what was there, was harvested and was not deployed; gates
-    /// and limits hold on every segment; and a lap with the motor is none slower.
+    /// and limits hold on every segment; and a lap with the motor is none slower, if no MGU-H makes use of the space that it leaves
+    /// in the store.
     #[test]
     fn books_balance_and_gates_hold(
         additional in any::<bool>(),
@@ -106,9 +120,16 @@ proptest! {
         }
         let closed = (segments[0].start / segments[249].end - 1.0).abs();
         prop_assert!(closed < 2e-3, "the lap ends {closed} off the speed that it began with");
+        static WITHOUT: OnceLock<[HybridProblem; 2]> = OnceLock::new();
+        let without = WITHOUT.get_or_init(|| {
+            [Mode::Offset, Mode::Additional].map(|mode| problem_of(car_without_h(), mode))
+        });
+        let without = &without[usize::from(additional)];
+        let motor = without.lap(&candidate).0;
         candidate[4] = 0.0;
-        let engine = problem.lap(&candidate).0;
-        prop_assert!(lap.time <= engine.time * (1.0 + 1e-9) && engine.deployed == 0.0);
+        let engine = without.lap(&candidate).0;
+        prop_assert!(motor.time <= engine.time * (1.0 + 1e-9) && engine.deployed == 0.0);
+        prop_assert!(motor.harvested_h == 0.0);
     }
 }
 
@@ -202,4 +223,76 @@ fn zones_are_cut_by_distance() {
     assert!(near(row(2), (0, 0.0, 3.0 / 7.0)) && near(row(3), (0, 3.0 / 7.0, 4.0 / 7.0)));
     assert!(near(row(4), (1, 0.0, 5.0 / 14.0)) && near(row(1), (1, 12.0 / 14.0, 2.0 / 14.0)));
     assert_eq!(plan.count(), 2);
+}
+
+/// On a straight at 66 m/s the engine is at full load: the MGU-H's 20 kW at the crank come off what drives the car, less the
+/// gearbox's losses, and the fuel is that of the full load. Where the motor replaces the engine, the lap is that of the engine
+/// alone, and the machine runs where it has power to spare, at the price of the map.
+#[test]
+fn the_turbocharger_s_generator_takes_its_power_from_the_crank() {
+    let mut hybrid = car().hybrid.with_overflow();
+    // The bundled rule lets it stand still at full load.
+    let h = hybrid.mgu_h.as_mut().unwrap();
+    (h.from_speed_mps, h.to_ax_mps2) = (30.0, 10.0);
+    let (with, without) = (&car().with_hybrid(hybrid).unwrap(), car_without_h());
+    let (v, h) = (66.0f64, 5.0);
+    let reached =
+        |car: &EnergyCar| kernel::motor_step(&car.envelope_table, &car.table, v * v, h, [0.0; 2], 0.0)[0];
+    // The flow at this speed is not the greatest, and so is not the power: its share is the map's.
+    let powertrain = with.car.powertrain.as_ref().unwrap();
+    let full = |v: f64| {
+        let gear = powertrain.gear(v, 0.325).unwrap();
+        let point = powertrain.operating_point(v, gear.force_n * v, 0.325).unwrap();
+        point.fuel_flow_kgph
+    };
+    let greatest = (220..=690).map(|v| full(f64::from(v) / 10.0)).fold(0.0, f64::max);
+    let crank_w = 20e3 * full(v) / greatest;
+    let slower = crank_w * 0.95 / (v * 1245.0 * powertrain.rotating_mass_factor);
+    let found = (reached(&without) - reached(with)) / (2.0 * h);
+    // The table's steps over the speed, as in the test of the tables.
+    assert!((found / slower - 1.0).abs() < 2e-2, "{found} and {slower} m/s^2");
+
+    let lap = |car: &EnergyCar, mode: Mode, energy_mj: f64| {
+        let gates = Gates {
+            energy_mj,
+            ..Gates::OPEN
+        };
+        let whole = problem_of(car.clone(), mode);
+        let strategy = Strategy::fixed(gates, 4);
+        let (line, energy) = (whole.line().clone(), whole.energy().clone());
+        HybridProblem::new(
+            line,
+            car.clone(),
+            energy,
+            strategy,
+            &[HybridObjective::LapTime],
+            10.0,
+        )
+        .unwrap()
+        .lap(&[])
+    };
+    for mode in [Mode::Offset, Mode::Additional] {
+        for energy_mj in [0.0, 3.0] {
+            let (plain, plain_segments, _) = lap(&without, mode, energy_mj);
+            let (lap, segments, _) = lap(with, mode, energy_mj);
+            assert!(segments.iter().all(|s| s.load <= 1.0), "{mode:?}");
+            match mode {
+                Mode::Offset => {
+                    assert_eq!(lap.time, plain.time);
+                    assert!(lap.harvested_h > 0.0);
+                    for (s, plain) in segments.iter().zip(&plain_segments) {
+                        // 20 kW at the crank for 40 kW, the engine's share of it at the map's price: some 200 to 400 g/kWh.
+                        let (fuel, energy) = (s.fuel - plain.fuel, s.harvested_h);
+                        assert!(plain.load < 1.0 || energy == 0.0);
+                        assert!(
+                            energy == 0.0 || (0.05..0.25).contains(&(fuel / energy * 3.6e6)),
+                            "{}",
+                            fuel / energy * 3.6e6
+                        );
+                    }
+                }
+                Mode::Additional => assert!(lap.harvested_h > 0.0 && lap.time > plain.time),
+            }
+        }
+    }
 }

@@ -295,7 +295,7 @@ impl EnergyShape {
             .flag("COUNTS_CHARGE", self.counts_charge)
             .count("FLOWS_AT", 2 * rows)
             .count("BOOSTS_AT", 4 * rows)
-            .count("ZONES_AT", 5 * rows)
+            .count("ZONES_AT", 6 * rows)
             .table(10, "energy", "vec4<f32>", self.uniform_energy);
         [&self.line.source(), &generated.end(), ENERGY].concat()
     }
