@@ -15,7 +15,7 @@ use crate::vehicle::Car;
 pub(in crate::study) fn replay_settings(
     renamed: &'static [(&'static str, Flag)],
 ) -> Shared<IdentifySettings> {
-    const OTHER: [&str; 4] = ["truth", "objectives", "holdout", "free"];
+    const OTHER: [&str; 6] = ["truth", "objectives", "holdout", "free", "free_from", "most"];
     let without = |d: &Declared| (d.role == Role::Search && d.key != "seed") || OTHER.contains(&d.key);
     shared().without_flags(without).renamed(renamed)
 }
@@ -41,6 +41,7 @@ pub(in crate::study) fn set_up_channels(
     let channels = (0..CHANNEL_NAMES.len()).map(ObjectiveChoice::Channel);
     let mut setup = set_up(&IdentifySettings {
         free,
+        free_from: None,
         objectives: std::iter::once(ObjectiveChoice::All).chain(channels).collect(),
         ..settings.clone()
     })?;

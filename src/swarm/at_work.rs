@@ -3,13 +3,15 @@
 //! A resident swarm is read back when its state is to be saved. Steps since then follow from that state: after a fault of
 //! the device they are taken again, on the device opened anew or in lanes on the host.
 
-use super::{Mopso, Optimiser, Progress, step};
+use super::{FrontSwarm, Optimiser, Progress, step};
 use crate::error::Result;
 #[cfg(feature = "gpu")]
 use crate::evaluate::GpuBackend;
 use crate::evaluate::{BackendChoice, DeviceFaults, Evaluator, Losses, OnDevice, open_evaluator};
 use serde::{Deserialize, Serialize};
 
+#[cfg(feature = "gpu")]
+use super::Mopso;
 #[cfg(feature = "gpu")]
 use super::device::{DeviceMopso, DeviceObjectives};
 #[cfg(feature = "gpu")]
@@ -20,7 +22,7 @@ use crate::evaluate::gpu::GpuContext;
 /// A swarm off its device, and what went wrong until then: all that it takes to go on.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct SwarmState {
-    pub swarm: Mopso,
+    pub swarm: FrontSwarm,
     pub losses: Losses,
 }
 
@@ -30,7 +32,7 @@ type OnBoard<'a> = (DeviceMopso, Box<dyn DeviceObjectives + 'a>);
 
 /// Brings a swarm to a device.
 #[cfg(feature = "gpu")]
-type Opening<'a> = Box<dyn Fn(&Mopso) -> Result<OnBoard<'a>> + 'a>;
+type Opening<'a> = Box<dyn Fn(&FrontSwarm) -> Result<OnBoard<'a>> + 'a>;
 
 /// What it takes to bring a swarm to a device, and back if that fails.
 #[cfg(feature = "gpu")]
@@ -85,11 +87,11 @@ impl<'a> SwarmAtWork<'a> {
         }
         #[cfg(feature = "gpu")]
         if on_device {
-            let open = move |swarm: &Mopso| -> Result<OnBoard<'a>> {
+            let open = move |swarm: &FrontSwarm| -> Result<OnBoard<'a>> {
                 let context = GpuContext::shared(adapter)?;
                 let objectives = GpuBackend::new(kind, context.clone())?;
-                let state = swarm.to_device().ok_or_else(|| {
-                    Error::Study("a swarm in double precision does not go to a device".to_owned())
+                let state = swarm.alone().and_then(Mopso::to_device).ok_or_else(|| {
+                    Error::Study("only one swarm, in single precision, goes to a device".to_owned())
                 })?;
                 Ok((DeviceMopso::from_state(state, context)?, Box::new(objectives)))
             };
@@ -154,7 +156,7 @@ impl<'a> SwarmAtWork<'a> {
         #[cfg(feature = "gpu")]
         if let Place::Device(resident) = &self.place {
             let (swarm, _) = resident.on_board.as_ref().ok_or_else(no_device)?;
-            self.state.swarm = Mopso::from_device(swarm.state()?);
+            self.state.swarm = FrontSwarm::Swarm(Box::new(Mopso::from_device(swarm.state()?)));
         }
         self.state.losses.clone_from(&self.losses);
         Ok(())

@@ -86,6 +86,12 @@ impl<O: AcceptsMigrants> Islands<O> {
         &self.islands
     }
 
+    /// The swarms, to be given where they start.
+    #[cfg(feature = "studies")]
+    pub(super) fn islands_mut(&mut self) -> &mut [O] {
+        &mut self.islands
+    }
+
     /// Those whose result violates the constraints least.
     fn least_violating(&self) -> impl Iterator<Item = &O> {
         let least = self.violation();

@@ -45,6 +45,8 @@ mod covariance;
 pub mod device;
 mod difference;
 mod front_scale;
+#[cfg(feature = "studies")]
+mod front_swarm;
 mod genetic;
 mod islands;
 mod lattice;
@@ -71,6 +73,8 @@ pub use by_name::{MULTI_OBJECTIVE, SINGLE_OBJECTIVE, Sizes, by_name, islands_by_
 pub use cooperative::{CooperativeSettings, CooperativeSwarm};
 pub use covariance::{CovarianceSettings, CovarianceSwarm, OutOfBounds, Restarts};
 pub use difference::{DifferenceSettings, DifferenceSwarm};
+#[cfg(feature = "studies")]
+pub(crate) use front_swarm::{FrontSearch, FrontSwarm};
 pub use islands::{AcceptsMigrants, Islands, Migration};
 pub use lattice::lattice;
 pub use minimise::{Indicators, Minimise, Minimum, Stopped, minimise, minimise_batch, minimise_several};

@@ -188,7 +188,8 @@ impl<'a> Cutter<'a> {
             let spread = 1 + round / 3;
             let mut zone = vec![false; n];
             for &(i, j) in &crossed {
-                // The shorter way along the road between the two.
+                // The shorter way along the road between the two, of which the last and the first are neighbours.
+                let (i, j) = (i.min(j), i.max(j));
                 let (from, to) = if j - i <= n / 2 { (i, j) } else { (j, i + n) };
                 for k in from as isize - spread as isize..=(to + spread) as isize {
                     if self.road.closed() {

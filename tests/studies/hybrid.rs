@@ -8,9 +8,11 @@ use lapswarm::study::framework::journal::Recorder;
 use lapswarm::study::framework::state_file::StateFile;
 use lapswarm::study::framework::{Study, solve_unobserved, write_results};
 use lapswarm::study::hybrid::{
-    Hybrid, HybridSetup, HybridStudySettings, ReportedLap, correlation, drive, engine_only, mean_worths,
-    published, search_strategy, set_up, size, stint, worth,
+    Hybrid, HybridAlgorithm, HybridSetup, HybridStudySettings, ReportedLap, correlation, drive, engine_only,
+    mean_worths, published, search_front, search_strategy, set_up, size, stint, worth,
 };
+use lapswarm::swarm::Mutation;
+use lapswarm::swarm::metrics::non_dominated;
 use std::f64::consts::PI;
 use std::ops::ControlFlow;
 use std::sync::OnceLock;
@@ -468,6 +470,42 @@ fn stints_sustain_their_charge_and_sizes_meet_their_lap() {
         slower.exit_code() == 2 && slower.to_string().contains("match_lap_time_s"),
         "{slower}"
     );
+}
+
+/// The published swarms, NSGA-II and islands: the evaluations that were asked for, and laps none of which another betters.
+#[test]
+fn strategies_are_searched_by_the_swarm_that_is_asked_for() {
+    let own = HybridStudySettings {
+        population: 16,
+        iterations: 24,
+        ..settings()
+    };
+    let thesis = HybridStudySettings {
+        algorithm: HybridAlgorithm::Thesis,
+        mutation: Some(Mutation::None),
+        ..own.clone()
+    };
+    let genetic = HybridStudySettings {
+        algorithm: HybridAlgorithm::Nsga2,
+        ..own.clone()
+    };
+    let islands = HybridStudySettings {
+        islands: 2,
+        ..own.clone()
+    };
+    let mut fronts: Vec<Vec<Vec<f64>>> = Vec::new();
+    for (settings, evaluations) in [(own, 384), (thesis, 384), (genetic, 384), (islands, 768)] {
+        let mut state_file = StateFile::idle();
+        let mut recorder = Recorder::idle(&mut state_file);
+        let front = search_front(bundled(), &settings, 2.1, &mut recorder, |_| {
+            ControlFlow::Continue(())
+        })
+        .unwrap();
+        assert_eq!(front.evaluations, evaluations, "{:?}", settings.algorithm);
+        assert_eq!(non_dominated(&front.objectives).len(), front.objectives.len());
+        assert!(!fronts.contains(&front.candidates), "{:?}", settings.algorithm);
+        fronts.push(front.candidates);
+    }
 }
 
 #[test]

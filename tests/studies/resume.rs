@@ -8,7 +8,7 @@ use lapswarm::files::run_folder::STATE;
 use lapswarm::study::framework::state_file::StateFile;
 use lapswarm::study::framework::{Progress, Solved, Study, solve_unobserved, write_results};
 use lapswarm::study::identify::{
-    self, Identify, IdentifySettings, ObjectiveChoice, SearchState, Setup, search_with,
+    self, Algorithm, Identify, IdentifySettings, ObjectiveChoice, SearchState, Setup, search_with,
 };
 use lapswarm::study::raceline::{self, LineAlgorithm, LinesState, Raceline, RacelineSettings};
 use lapswarm::swarm::checkpoint;
@@ -206,6 +206,36 @@ fn a_front_is_resumed_bit_for_bit() {
     }
 }
 
+/// Islands and NSGA-II too: each with as many evaluations as it was asked for, and with a front of its own.
+#[test]
+fn fronts_of_islands_and_of_nsga2_are_resumed_bit_for_bit() {
+    let alone = IdentifySettings {
+        iterations: Some(24),
+        ..small(&[ObjectiveChoice::Channel(0), ObjectiveChoice::Channel(3)])
+    };
+    let setup = identify::set_up(&alone).unwrap();
+    let genetic = IdentifySettings {
+        algorithm: Algorithm::Nsga2,
+        ..alone.clone()
+    };
+    let islands = IdentifySettings {
+        islands: 2,
+        ..alone.clone()
+    };
+    let mut fronts = Vec::new();
+    for (settings, evaluations) in [(alone, 16 * 24), (genetic, 16 * 24), (islands, 2 * 16 * 24)] {
+        assert_eq!(settings.evaluations(), evaluations);
+        let whole = solve_unobserved::<Identify>(&settings, &setup).unwrap();
+        assert_eq!(whole.record.evaluations, evaluations);
+        let wanted = told(&settings, &setup, &whole);
+        // Solutions move after ten iterations.
+        let outcome = identify_in_pieces(&settings, &setup, &[3, 10, 17]);
+        assert_eq!(told(&settings, &setup, &outcome), wanted);
+        fronts.push(whole.front.expect("a front").candidates);
+    }
+    assert!(fronts[0] != fronts[1] && fronts[0] != fronts[2]);
+}
+
 fn lines() -> RacelineSettings {
     RacelineSettings {
         track: "stadium:300:80:12".to_owned(),
@@ -355,9 +385,15 @@ fn cold_searches_are_resumed_bit_for_bit_from_every_stage() {
 
 #[test]
 fn particle_swarms_are_resumed_bit_for_bit() {
-    for algorithm in [LineAlgorithm::Cooperative, LineAlgorithm::Thesis] {
+    for (algorithm, islands) in [
+        (LineAlgorithm::Cooperative, 1),
+        (LineAlgorithm::Thesis, 1),
+        (LineAlgorithm::Thesis, 2),
+        (LineAlgorithm::Nsga2, 1),
+    ] {
         let settings = RacelineSettings {
             algorithm,
+            islands,
             groups: 4,
             local_search: Some(false),
             ..lines()
@@ -376,7 +412,11 @@ fn particle_swarms_are_resumed_bit_for_bit() {
         let wanted = lines_told(&settings, &setup, &whole);
         let all = stages.len();
         let fastest = 1 + stages.iter().position(|s| s == "fastest").unwrap();
-        for breaks in [vec![1, fastest - 1, fastest], vec![5, fastest + 6, all]] {
+        let front = 1 + stages.iter().position(|s| s == "front").unwrap();
+        for breaks in [
+            vec![1, fastest - 1, fastest],
+            vec![5, fastest + 6, front + 10, all],
+        ] {
             lines_in_pieces((&settings, &setup), &breaks, (&wanted, all));
         }
     }

@@ -4,7 +4,7 @@ use crate::solve;
 use lapswarm::config::settings::Settings;
 use lapswarm::study::framework::state_file::StateFile;
 use lapswarm::study::framework::{Study, solve_unobserved, write_results};
-use lapswarm::study::identify::IdentifySettings;
+use lapswarm::study::identify::{self, IdentifySettings};
 use lapswarm::study::sensitivity::{LEVELS, Sensitivity, SensitivitySettings};
 use std::ops::ControlFlow;
 
@@ -67,6 +67,43 @@ fn the_lap_feels_grip_more_than_roll_and_files_say_so() {
     let read = SensitivitySettings::read(&folder.path().join("study.toml")).expect("it reads back");
     assert_eq!(read.replay.free.len(), 3);
     assert_eq!((read.share, read.samples), (0.02, 32));
+
+    // What matters most is handed to an identification, in the bounds that it has for it or else in the range here.
+    let identify = IdentifySettings {
+        free: read
+            .replay
+            .free
+            .into_iter()
+            .filter(|f| f.name == "rBy1")
+            .collect(),
+        free_from: Some(folder.path().to_owned()),
+        most: 2,
+        ..settings.replay.clone()
+    };
+    let variables = identify::set_up(&identify)
+        .expect("a setup")
+        .replay
+        .problem
+        .variables;
+    let found: Vec<(&str, [f64; 2])> = variables
+        .iter()
+        .map(|v| (v.name.as_str(), [v.lower, v.upper]))
+        .collect();
+    let second = &summary.parameters[1];
+    assert_eq!(
+        found,
+        [("rBy1", [5.0, 25.0]), (second.name.as_str(), second.range)]
+    );
+    let study = folder.path().join("study.toml");
+    let no_summary = identify::set_up(&IdentifySettings {
+        free_from: Some(study),
+        ..identify
+    });
+    let refused = no_summary.err().expect("it is no summary");
+    assert!(
+        refused.exit_code() == 2 && refused.to_string().contains("study.toml"),
+        "{refused}"
+    );
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use crate::config::Table;
 use crate::config::kinds::{Kind, quoted};
 use crate::config::settings::Written;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::swarm::{Mutation, PsoSettings, Schedule};
 use std::path::Path;
 
@@ -39,8 +39,21 @@ impl Coefficients {
             .any(Option::is_some)
     }
 
+    /// Refuses any of them, which an algorithm of that name does not have.
+    ///
+    /// # Errors
+    /// [`Error::Input`] naming the first that is set.
+    pub fn refuse_with(&self, algorithm: &str) -> Result<()> {
+        let Some((key, found)) = self.first_named() else {
+            return Ok(());
+        };
+        let found = format!("{found}, with algorithm {algorithm}");
+        let expected = "no such coefficient, or algorithm thesis";
+        Err(Error::input("the study", key, found, expected))
+    }
+
     /// The key of the first that is named, and what it is.
-    pub fn first_named(&self) -> Option<(&'static str, String)> {
+    fn first_named(&self) -> Option<(&'static str, String)> {
         let schedules = [
             ("inertia", self.inertia),
             ("cognitive", self.cognitive),

@@ -18,7 +18,7 @@ mod strategy;
 pub use energy_value::{Worth, correlation, mean_worths, worth};
 pub use results::{FrontFigures, HybridSummary, ScenarioFigures};
 pub use scenario::{ReportedLap, Scenario, drive, published};
-pub use settings::{FreePart, HybridStudySettings};
+pub use settings::{FreePart, HybridAlgorithm, HybridStudySettings};
 pub use setup::{HybridInputs, HybridSetup, read_inputs, set_up};
 pub use sizing::{ENGINES, Sizing, engine_only, size};
 pub use stint::{StintLap, stint};

@@ -2,8 +2,8 @@
 
 use super::scenario::{Scenario, published};
 use crate::config::kinds::{
-    Kind, choice, choices, count, file, name_or_file, named, number, numbers, of, optional, quoted, switch,
-    text,
+    Choice, Kind, choice, choices, count, file, name_or_file, named, number, numbers, of, optional, quoted,
+    switch, text,
 };
 use crate::config::settings::{Flag, Written, settings};
 use crate::config::{LONGEST_NAME, Table};
@@ -13,7 +13,9 @@ use crate::evaluate::energy::{HybridObjective, MOST_MOTOR};
 use crate::files::stem;
 use crate::line::energy::{Gates, Mode};
 use crate::study::framework::memory::Size;
+use crate::study::framework::{Coefficients, Mutated, Scheduled};
 use crate::study::raceline::RacelineSettings;
+use crate::swarm::{FrontSearch, Mutation, Schedule};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -35,6 +37,23 @@ named!(FreePart {
     Strategy = "strategy",
     Line = "line",
     Both = "both",
+});
+
+/// Which swarms share the energy out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum HybridAlgorithm {
+    /// The best there are.
+    Default,
+    /// Those of the thesis.
+    Thesis,
+    /// The best there is for one objective, and NSGA-II for the front.
+    Nsga2,
+}
+
+named!(HybridAlgorithm {
+    Default = "default",
+    Thesis = "thesis",
+    Nsga2 = "nsga2",
 });
 
 settings! {
@@ -76,6 +95,20 @@ settings! {
             "Fuel on board at the start of the stint";
         match_lap_time_s: Option<f64> ["s"] = None, optional(number(1.0, 1e5)).example("113.5"),
             "Motor and store are sized so that the car laps in this time";
+        algorithm: HybridAlgorithm ["-"] = HybridAlgorithm::Default, choice().search(),
+            "Which swarms share the energy out; nsga2 is NSGA-II for the front";
+        warm_start: Option<bool> ["-"] = None, optional(switch(true)).flag(Flag::Switch("no_warm_start", false)).search().example("true"),
+            "Whether the front's swarm starts from the line and even shares; without it it does, but with algorithm thesis starts at random";
+        inertia: Option<Schedule> ["-"] = None, of(Scheduled).search().example("[0.5, 0.1]"),
+            "Inertia weight with thesis: a number, or the first and the last of a linear schedule; without it the algorithm's own";
+        cognitive: Option<Schedule> ["-"] = None, of(Scheduled).search().example("1.5"),
+            "Pull towards the particle's own best, as inertia is given";
+        social: Option<Schedule> ["-"] = None, of(Scheduled).search().example("2.5"),
+            "Pull towards the leader, as inertia is given";
+        mutation: Option<Mutation> ["-"] = None, of(Mutated).search().example("0.3"),
+            "Mutation with thesis: an exponent from 0 (none) to 10, random or polynomial; without it the algorithm's own";
+        islands: usize ["-"] = 1, count(1, 1000).search(),
+            "Swarms for the front, each of the whole population; five members of each go to the next one every ten iterations";
         population: usize ["-"] = 64, count(8, 10_000_000).search(),
             "Particles of the swarms";
         iterations: usize ["-"] = 300, count(1, 1_000_000).search(),
@@ -93,7 +126,10 @@ settings! {
             let found = "none, and no optimisation";
             return Err(Error::input("the study", "scenarios", found, "something to do"));
         }
-        Ok(())
+        if self.algorithm != HybridAlgorithm::Thesis {
+            self.coefficients().refuse_with(self.algorithm.name())?;
+        }
+        self.front_search().check(self.objectives.len(), self.population)
     }
 }
 
@@ -109,13 +145,37 @@ fn usual_budgets_mj() -> Vec<f64> {
 const SIZING: usize = 22;
 
 impl HybridStudySettings {
+    /// What looks for the front.
+    pub(super) fn front_search(&self) -> FrontSearch {
+        FrontSearch {
+            genetic: self.algorithm == HybridAlgorithm::Nsga2,
+            islands: self.islands,
+        }
+    }
+
+    /// Whether the front's swarm starts from what is known.
+    pub(super) fn starts_warm(&self) -> bool {
+        self.warm_start
+            .unwrap_or(self.algorithm != HybridAlgorithm::Thesis)
+    }
+
+    /// What they say of the motion of the thesis's swarms.
+    pub(super) fn coefficients(&self) -> Coefficients {
+        Coefficients {
+            inertia: self.inertia,
+            cognitive: self.cognitive,
+            social: self.social,
+            mutation: self.mutation,
+        }
+    }
+
     /// What the study's memory goes with, with so many variables of a strategy and a line.
     pub(super) fn size_of(&self, variables: usize) -> Size {
         let front = usize::from(self.objectives.len() > 1);
         let sizing = self.match_lap_time_s.map_or(0, |_| SIZING);
         let searches = if self.optimise { 1 + front } else { 0 } + sizing;
         Size {
-            population: self.population,
+            population: self.population.saturating_mul(self.islands),
             variables,
             // The journal holds those of all searches.
             iterations: self.iterations.saturating_mul(searches),

@@ -1,7 +1,7 @@
 //! Where the motor works: by the reference optimum, by a swarm, and along the fronts between objectives.
 
 use super::scenario::{ReportedLap, drive};
-use super::settings::{FreePart, HybridStudySettings};
+use super::settings::{FreePart, HybridAlgorithm, HybridStudySettings};
 use super::setup::{HybridSetup, control_points};
 use crate::error::Result;
 use crate::evaluate::energy::{
@@ -12,7 +12,9 @@ use crate::line::{Parametrisation, geometry};
 use crate::optimum::{Deployment, DeploymentSearch};
 use crate::random::Random;
 use crate::study::framework::journal::Recorder;
-use crate::swarm::{HybridSettings, HybridSwarm, Mopso, MopsoSettings, Optimiser, Progress, run};
+use crate::swarm::{
+    HybridSettings, HybridSwarm, MopsoSettings, Optimiser, Progress, Pso, PsoSettings, SwarmPlace, run,
+};
 use std::ops::ControlFlow;
 
 /// What the swarm found for one budget.
@@ -92,18 +94,28 @@ pub fn search_strategy(
     observe: impl FnMut(&Progress) -> ControlFlow<()>,
 ) -> Result<FoundStrategy> {
     let problem = setup.zone_problem(&[], energy_mj, &[HybridObjective::LapTime])?;
-    let mut swarm = HybridSwarm::new(
-        &problem.problem,
-        HybridSettings {
+    let mut swarm: Box<dyn Optimiser> = if settings.algorithm == HybridAlgorithm::Thesis {
+        let motion = PsoSettings {
+            population: settings.population,
+            iterations: settings.iterations,
+            seed: settings.seed,
+            ..PsoSettings::thesis()
+        };
+        Box::new(Pso::new(&problem.problem, settings.coefficients().apply(motion))?)
+    } else {
+        let best = HybridSettings {
             population: settings.population,
             iterations: settings.iterations,
             seed: settings.seed,
             ..HybridSettings::default()
-        },
-    )?;
+        };
+        Box::new(HybridSwarm::new(&problem.problem, best)?)
+    };
     let mut evaluator = open_hybrid_evaluator(&problem, settings.backend, settings.adapter.as_deref())?;
     run(&mut swarm, &mut recorder.over(evaluator.as_mut()), observe)?;
-    let (shares, _) = swarm.best_candidate();
+    // A lap that cannot be driven is no answer: the shares are then none.
+    let best = swarm.front().candidates.into_iter().next();
+    let shares = best.unwrap_or_else(|| vec![0.0; problem.dimensions()]);
     Ok(FoundStrategy {
         lap: ReportedLap::of("swarm", &problem, &shares),
         shares,
@@ -177,17 +189,30 @@ pub fn search_front(
             (problem, line)
         }
     };
-    let mopso = MopsoSettings::default()
+    let mopso = if settings.algorithm == HybridAlgorithm::Thesis {
+        let thesis = MopsoSettings::thesis();
+        MopsoSettings {
+            motion: settings.coefficients().apply(thesis.motion),
+            ..thesis
+        }
+    } else {
+        MopsoSettings::default()
+    };
+    let mopso = mopso
         .with_size(settings.population, settings.iterations)
         .with_seed(settings.seed);
-    let mut swarm = Mopso::new(&problem.problem, mopso)?;
-    swarm.start_from(&starting_candidates(&problem, settings, &line))?;
+    let search = settings.front_search();
+    let mut swarm = search.begin(&problem.problem, mopso, SwarmPlace::Host)?;
+    if settings.starts_warm() {
+        swarm.start_from(&starting_candidates(&problem, settings, &line))?;
+    }
     let mut evaluator = open_hybrid_evaluator(&problem, settings.backend, settings.adapter.as_deref())?;
     run(&mut swarm, &mut recorder.over(evaluator.as_mut()), observe)?;
+    let front = swarm.front();
     Ok(StrategyFront {
         names: problem.problem.variables.iter().map(|v| v.name.clone()).collect(),
-        candidates: swarm.archive_candidates(),
-        objectives: swarm.archive().objectives.clone(),
+        candidates: front.candidates,
+        objectives: front.objectives,
         evaluations: swarm.evaluations(),
     })
 }

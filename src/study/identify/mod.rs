@@ -48,7 +48,8 @@ impl Study for Identify {
     const ABOUT: &'static str =
         "Find a car's unknown parameters from a logged lap; with no argument, on the bundled lap.";
     const DETAILS: &'static str = "Examples:\n  lapswarm identify\n  lapswarm identify study.toml --seed 7 --json\n  lapswarm \
-        identify --log lap.csv --car start.toml --laps 1,2 --holdout 3";
+        identify --log lap.csv --car start.toml --laps 1,2 --holdout 3\n  lapswarm identify --log lap.csv --free-from \
+        runs/sensitivity-001 --most 12";
     type Settings = IdentifySettings;
     type State = SearchState;
     type Prepared = Setup;
@@ -167,8 +168,11 @@ impl Study for Identify {
 
     fn check(path: &Path) -> Result<String> {
         let settings = IdentifySettings::read(path)?;
-        set_up(&without_laps(&settings))?;
-        Ok(format!("{} free parameters", settings.free.len()))
+        let setup = set_up(&without_laps(&settings))?;
+        Ok(format!(
+            "{} free parameters",
+            setup.replay.problem.variables.len()
+        ))
     }
 
     fn figures(outcome: &Outcome, summary: &Summary) -> Figures {

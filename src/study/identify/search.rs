@@ -11,7 +11,10 @@ use crate::evaluate::{DeviceFaults, Evaluator, FailureCounts, Logarithmic, add_f
 use crate::study::framework::state_file::{Origin, StateFile};
 use crate::study::framework::{Progress as Told, RunRecord, Watch};
 use crate::swarm::metrics::nearest_to_ideal;
-use crate::swarm::{CovarianceSettings, CovarianceSwarm, Mopso, MopsoSettings, Progress, Pso, PsoSettings};
+use crate::swarm::{
+    CovarianceSettings, CovarianceSwarm, FrontSwarm, MopsoSettings, Optimiser, Progress, Pso, PsoSettings,
+    SwarmPlace,
+};
 use std::ops::ControlFlow;
 use std::time::Instant;
 
@@ -174,7 +177,8 @@ fn first_place(settings: &IdentifySettings, setup: &Setup) -> Result<Place> {
     let problem = &setup.replay.problem;
     let motion = swarm_settings(settings);
     Ok(if settings.objectives.len() > 1 {
-        Place::Front(Box::new(Mopso::new(problem, front_settings(settings, motion))?))
+        let swarm = front_settings(settings, motion);
+        Place::Front(settings.front_search().begin(problem, swarm, SwarmPlace::Host)?)
     } else {
         Place::Explore(Box::new(Pso::new(problem, motion)?))
     })
@@ -297,7 +301,9 @@ impl IdentifySettings {
         } else {
             0
         };
-        cars(first.population, first.iterations).saturating_add(gathered)
+        cars(first.population, first.iterations)
+            .saturating_mul(self.islands as u64)
+            .saturating_add(gathered)
     }
 }
 
@@ -397,13 +403,13 @@ impl SearchState {
     }
 }
 
-/// The front of a swarm's archive.
-fn front_of(swarm: &Mopso) -> Option<Front> {
-    let objectives = swarm.archive().objectives.clone();
+/// The front that a swarm has come to.
+fn front_of(swarm: &FrontSwarm) -> Option<Front> {
+    let front = swarm.front();
     Some(Front {
-        candidates: swarm.archive_candidates(),
-        chosen: nearest_to_ideal(&objectives)?,
-        objectives,
+        chosen: nearest_to_ideal(&front.objectives)?,
+        candidates: front.candidates,
+        objectives: front.objectives,
     })
 }
 

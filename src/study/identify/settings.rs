@@ -1,17 +1,18 @@
 //! Settings of an identification.
 
-use crate::config::Table;
 use crate::config::kinds::{
     Choice, Kind, choice, choices, count, counts, file, name_or_file, number, of, optional, quoted, shared,
     switch, text,
 };
 use crate::config::settings::{Flag, Written, settings};
+use crate::config::{Table, read_text};
 use crate::error::{Error, Result};
 use crate::evaluate::BackendChoice;
 use crate::evaluate::replay::{CHANNEL_NAMES, Norm};
+use crate::files::run_folder::SUMMARY;
 use crate::study::framework::memory::Size;
 use crate::study::framework::{Coefficients, Mutated, Scheduled};
-use crate::swarm::{Mutation, Schedule};
+use crate::swarm::{FrontSearch, Mutation, Schedule};
 use crate::telemetry::CalibrationOptions;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -73,12 +74,15 @@ pub enum Algorithm {
     Pso,
     /// The swarm of the thesis, exactly.
     Thesis,
+    /// NSGA-II, for several objectives.
+    Nsga2,
 }
 
 crate::config::kinds::named!(Algorithm {
     Adaptive = "adaptive",
     Pso = "pso",
     Thesis = "thesis",
+    Nsga2 = "nsga2",
 });
 
 settings! {
@@ -96,6 +100,10 @@ settings! {
             "The car that drove the log, where it is known: the parameters' errors are stated against it";
         free: Vec<FreeParameter> ["-"] = usual_unknowns(), of(Bounds),
             "Parameters to find, each with its least and greatest value";
+        free_from: Option<PathBuf> ["-"] = None, optional(file()).example("\"runs/sensitivity-001\""),
+            "A run of sensitivity: its parameters that matter most are found, within the bounds of free or else over the range that it moved them";
+        most: usize ["-"] = 12, count(1, 1000),
+            "Parameters that are found with free_from";
         objectives: Vec<ObjectiveChoice> ["-"] = vec![ObjectiveChoice::All], choices(),
             "What is fitted: all channels together, or channels at once; more than one searches a Pareto front";
         norm: Norm ["-"] = Norm::Two, choice(),
@@ -119,7 +127,7 @@ settings! {
         calibration: CalibrationOptions ["-"] = CalibrationOptions::default(), shared(),
             "Corrections that are estimated from the log";
         algorithm: Algorithm as "swarm.algorithm" ["-"] = Algorithm::Adaptive, choice().search(),
-            "The search";
+            "The search; nsga2 (NSGA-II) for several objectives";
         population: Option<usize> as "swarm.population" ["-"] = None, optional(count(2, 100_000_000)).search().example("64"),
             "Particles; without it the algorithm's own number";
         iterations: Option<usize> as "swarm.iterations" ["-"] = None, optional(count(1, 100_000_000)).search().example("1500"),
@@ -132,6 +140,8 @@ settings! {
             "Pull towards the leader, as inertia is given";
         mutation: Option<Mutation> as "swarm.mutation" ["-"] = None, of(Mutated).search().example("\"polynomial\""),
             "Mutation of the swarm: an exponent from 0 (none) to 10, random or polynomial";
+        islands: usize as "swarm.islands" ["-"] = 1, count(1, 1000).search(),
+            "Swarms for several objectives, each of the whole population; five members of each go to the next one every ten iterations";
         archive: usize as "swarm.archive" ["-"] = 100, count(2, 100_000).search(),
             "Members of the archive of the multi-objective swarm";
         seed: u64 ["-"] = 1, count(0, u64::MAX).search(),
@@ -151,7 +161,11 @@ settings! {
             let expected = "at least one parameter = [lower, upper]";
             return Err(Error::input("the study", "table [free]", "no parameter", expected));
         }
-        Ok(())
+        if self.algorithm == Algorithm::Nsga2 {
+            self.coefficients().refuse_with(self.algorithm.name())?;
+        }
+        let population = self.population.unwrap_or(FRONT.0);
+        self.front_search().check(self.objectives.len(), population)
     }
 }
 
@@ -191,7 +205,67 @@ const USUAL_UNKNOWNS: [(&str, f64, f64); 22] = [
     ("C", 3e3, 5e4),
 ];
 
+/// What is read of the summary of a sensitivity study: its parameters, those that matter most first.
+#[derive(Deserialize)]
+struct Ranking {
+    study: String,
+    #[serde(default)]
+    parameters: Vec<Ranked>,
+}
+
+#[derive(Deserialize)]
+struct Ranked {
+    name: String,
+    range: [f64; 2],
+}
+
 impl IdentifySettings {
+    /// The parameters to find: those of the settings, or those that matter most by a sensitivity study.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if the study's summary cannot be read, [`Error::Input`] if it is another study's.
+    pub(super) fn freed(&self) -> Result<Vec<FreeParameter>> {
+        let Some(run) = &self.free_from else {
+            return Ok(self.free.clone());
+        };
+        let path = if run.is_dir() {
+            run.join(SUMMARY)
+        } else {
+            run.clone()
+        };
+        let refused = |found: String| {
+            let expected = "the summary of a sensitivity study";
+            Error::input(path.display().to_string(), "study", found, expected)
+        };
+        let ranking: Ranking =
+            serde_json::from_str(&read_text(&path)?).map_err(|e| refused(format!("no summary ({e})")))?;
+        if ranking.study != "sensitivity" || ranking.parameters.is_empty() {
+            return Err(refused(ranking.study));
+        }
+        let with_bounds = |ranked: &Ranked| {
+            let known = self.free.iter().find(|free| free.name == ranked.name);
+            known.cloned().unwrap_or(FreeParameter {
+                name: ranked.name.clone(),
+                lower: ranked.range[0],
+                upper: ranked.range[1],
+            })
+        };
+        Ok(ranking
+            .parameters
+            .iter()
+            .take(self.most)
+            .map(with_bounds)
+            .collect())
+    }
+
+    /// What looks for a front.
+    pub(super) fn front_search(&self) -> FrontSearch {
+        FrontSearch {
+            genetic: self.algorithm == Algorithm::Nsga2,
+            islands: self.islands,
+        }
+    }
+
     /// What they say of the swarm's motion.
     pub(super) fn coefficients(&self) -> Coefficients {
         Coefficients {
@@ -208,7 +282,7 @@ impl IdentifySettings {
         let population = self.population.unwrap_or(if several { FRONT.0 } else { 0 });
         Size {
             population: population.max(EXPLORE.0),
-            variables: self.free.len(),
+            variables: self.free_from.as_ref().map_or(self.free.len(), |_| self.most),
             iterations: self.iterations.unwrap_or(GATHER.1),
             archive: if several { self.archive } else { 0 },
             ..Size::default()

@@ -1,6 +1,6 @@
 //! From a log to a problem: samples, windows, step size, scales of the channels.
 
-use super::settings::{IdentifySettings, ObjectiveChoice};
+use super::settings::{FreeParameter, IdentifySettings, ObjectiveChoice};
 use crate::error::{Error, Result};
 use crate::evaluate::Objective;
 use crate::evaluate::replay::{
@@ -68,6 +68,7 @@ fn settling_time(car: &Car, samples: &[Sample<f64>], laps: &[(usize, usize)], dt
 /// [`Error::Input`] naming file and field for anything that does not fit.
 pub fn set_up(settings: &IdentifySettings) -> Result<Setup> {
     let car = Car::load(&settings.car)?;
+    let freed = settings.freed()?;
     let bundled = settings.log.is_none();
     let map = match &settings.channel_map {
         Some(path) => ChannelMap::read(path)?,
@@ -77,7 +78,7 @@ pub fn set_up(settings: &IdentifySettings) -> Result<Setup> {
         rate_hz: settings.rate_hz,
         rolling_radius_m: Some([car.chassis.radius_front, car.chassis.radius_rear]),
         radius_is_free: ["front_rolling_radius_m", "rear_rolling_radius_m"]
-            .map(|radius| settings.free.iter().any(|free| free.name == radius)),
+            .map(|radius| freed.iter().any(|free| free.name == radius)),
         calibration: settings.calibration.clone(),
         ..LogOptions::default()
     };
@@ -120,7 +121,7 @@ pub fn set_up(settings: &IdentifySettings) -> Result<Setup> {
         .flat_map(|w| &samples[w.start..w.end])
         .map(|s| s.measured[0])
         .fold(f64::INFINITY, f64::min);
-    let free = free_parameters(settings, &car)?;
+    let free = free_parameters(&freed, &car)?;
     // As fine as the car that the search starts from needs it at the slowest place.
     let substeps = settings.substeps.unwrap_or_else(|| {
         let fastest = fastest_mode(&car.to_flat(), car.tyre_model(), slowest.max(1.0));
@@ -361,11 +362,10 @@ fn channel_scales(samples: &[Sample<f64>], windows: &[Window<f64>]) -> [f64; CHA
 }
 
 fn free_parameters(
-    settings: &IdentifySettings,
+    freed: &[FreeParameter],
     car: &Car,
 ) -> Result<Vec<(crate::vehicle::CarParameter, f64, f64)>> {
-    settings
-        .free
+    freed
         .iter()
         .map(|free| {
             let parameter = car.known_parameter("the study", "table [free]", &free.name)?;

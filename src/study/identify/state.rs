@@ -7,7 +7,7 @@ use crate::evaluate::{Evaluator, FailureCounts, Logarithmic, Worth};
 use crate::study::framework::state_file::Origin;
 use crate::study::framework::{Inputs, State};
 use crate::swarm::checkpoint::Checkpoint;
-use crate::swarm::{CovarianceSwarm, Mopso, Optimiser, Progress, Pso, step};
+use crate::swarm::{CovarianceSwarm, FrontSwarm, Optimiser, Progress, Pso, step};
 use serde::{Deserialize, Serialize};
 
 /// One line of the convergence history.
@@ -44,7 +44,7 @@ pub(super) enum Place {
     /// The exploring swarm.
     Explore(Box<Pso>),
     /// The swarm that looks for a front.
-    Front(Box<Mopso>),
+    Front(FrontSwarm),
     /// The swarm that learns the valley, and the best before it.
     Gather {
         best: Vec<f64>,
@@ -115,7 +115,7 @@ impl Place {
         }
         match self {
             Self::Explore(swarm) => go("exploring", swarm.as_mut(), evaluator),
-            Self::Front(swarm) => go("exploring", swarm.as_mut(), evaluator),
+            Self::Front(swarm) => go("exploring", swarm, evaluator),
             Self::Gather { swarm, .. } => go("gathering", swarm.as_mut(), &mut Logarithmic::new(evaluator)),
             Self::Searched { .. } => Ok(None),
         }

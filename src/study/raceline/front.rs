@@ -89,7 +89,8 @@ pub(super) fn search_front(
     let state = match state {
         Some(state) => state,
         None => {
-            let mut swarm = settings.swarm.swarm(&problem.problem, mopso)?;
+            let search = settings.front_search();
+            let mut swarm = search.begin(&problem.problem, mopso, settings.swarm)?;
             if !published || settings.starts_warm() {
                 swarm.start_from(&starting_lines(&problem, settings, known)?)?;
             }
@@ -114,8 +115,8 @@ pub(super) fn search_front(
     let whole = setup.problem(Parametrisation::sections(), &settings.objectives, settings)?;
     let mut judge = open_line_evaluator(&whole, settings.backend, settings.adapter.as_deref())?;
     let mut judging = DeviceFaults::beyond(known_faults, judge.as_ref());
-    let archived = swarm.archive_candidates();
-    let mut lines: Vec<Vec<f64>> = archived.iter().map(|c| problem.alpha(c)).collect();
+    let found = swarm.front().candidates;
+    let mut lines: Vec<Vec<f64>> = found.iter().map(|c| problem.alpha(c)).collect();
     // The known lines, and what lies evenly between them.
     let blend = |shares: &[f64], i: usize| shares.iter().zip(known).map(|(s, line)| s * line[i]).sum::<f64>();
     if !known.is_empty() {

@@ -60,7 +60,10 @@ pub(super) fn search_objective(
     start: Option<&[f64]>,
     work: &mut Running<'_>,
 ) -> Result<FoundLine> {
-    if settings.algorithm != LineAlgorithm::Windows {
+    if matches!(
+        settings.algorithm,
+        LineAlgorithm::Cooperative | LineAlgorithm::Thesis
+    ) {
         return search_whole_lines(settings, setup, objective, work);
     }
     let cold = LineSearchSettings::default();

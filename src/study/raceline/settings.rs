@@ -10,7 +10,7 @@ use crate::evaluate::line::LineObjective;
 use crate::line::CarPlan;
 use crate::study::framework::memory::Size;
 use crate::study::framework::{Coefficients, Mutated, Scheduled};
-use crate::swarm::{Mutation, Schedule, SwarmPlace};
+use crate::swarm::{FrontSearch, Mutation, Schedule, SwarmPlace};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
@@ -24,12 +24,15 @@ pub enum LineAlgorithm {
     Cooperative,
     /// One plain particle swarm over `alpha` at every cross-section, with the settings of the thesis; so for the front.
     Thesis,
+    /// As windows, and NSGA-II for the front.
+    Nsga2,
 }
 
 named!(LineAlgorithm {
     Windows = "windows",
     Cooperative = "cooperative",
     Thesis = "thesis",
+    Nsga2 = "nsga2",
 });
 
 settings! {
@@ -64,7 +67,7 @@ settings! {
         local_search: Option<bool> ["-"] = None, optional(switch(true)).flag(Flag::Switch("no_local_search", false)).search().example("true"),
             "Whether exact gradients lead what the swarms find to the nearest optimum; without it they do, but not with algorithm thesis";
         algorithm: LineAlgorithm ["-"] = LineAlgorithm::Windows, choice().search(),
-            "What looks for the best line by one objective; cooperative (CPSO-S_K) and thesis start at random";
+            "What looks for the best line by one objective; cooperative (CPSO-S_K) and thesis start at random; nsga2 is windows, and NSGA-II for the front";
         inertia: Option<Schedule> ["-"] = None, of(Scheduled).search().example("[0.1, 1.0]"),
             "Inertia weight with cooperative or thesis: a number, or the first and the last of a linear schedule; without it the algorithm's own";
         cognitive: Option<Schedule> ["-"] = None, of(Scheduled).search().example("3.0"),
@@ -79,6 +82,8 @@ settings! {
             "Particles of the swarm for the front, and of each objective's with cooperative or thesis; windows have their own";
         iterations: usize ["-"] = 200, count(1, 1_000_000).search(),
             "Iterations of these swarms; without effect for one objective searched by windows";
+        islands: usize ["-"] = 1, count(1, 1000).search(),
+            "Swarms for the front, each of the whole population; five members of each go to the next one every ten iterations";
         archive: usize ["-"] = 100, count(8, 10_000).search(),
             "Lines that the front keeps";
         seed: u64 ["-"] = 1, count(0, u64::MAX).search(),
@@ -93,25 +98,16 @@ settings! {
 
     /// Coefficients are those of the algorithm.
     fn consistent(&self) -> Result<()> {
+        self.front_search().check(self.objectives.len(), self.population)?;
         let refused = match self.algorithm {
-            LineAlgorithm::Thesis => None,
+            LineAlgorithm::Thesis => Coefficients::default(),
             LineAlgorithm::Cooperative => Coefficients {
                 mutation: self.mutation,
                 ..Coefficients::default()
-            }
-            .first_named(),
-            LineAlgorithm::Windows => self.coefficients().first_named(),
+            },
+            LineAlgorithm::Windows | LineAlgorithm::Nsga2 => self.coefficients(),
         };
-        refused.map_or(Ok(()), |(key, found)| {
-            let algorithm = self.algorithm.name();
-            let found = format!("{found}, with algorithm {algorithm}");
-            Err(Error::input(
-                "the study",
-                key,
-                found,
-                "no such coefficient, or algorithm thesis",
-            ))
-        })
+        refused.refuse_with(self.algorithm.name())
     }
 }
 
@@ -145,12 +141,25 @@ impl RacelineSettings {
         }
     }
 
+    /// What looks for the front.
+    pub(super) fn front_search(&self) -> FrontSearch {
+        FrontSearch {
+            genetic: self.algorithm == LineAlgorithm::Nsga2,
+            islands: self.islands,
+        }
+    }
+
     /// Whether the swarm for the front lives on the device.
     ///
     /// # Errors
     /// [`Error::Input`] with the reason if it is asked to and cannot.
     pub(super) fn on_device(&self) -> Result<bool> {
-        if self.algorithm == LineAlgorithm::Thesis && self.swarm != SwarmPlace::Device {
+        let several = self.islands > 1 || self.algorithm == LineAlgorithm::Nsga2;
+        if several && self.swarm == SwarmPlace::Device {
+            let found = "device, with islands or algorithm nsga2";
+            return Err(Error::input("the study", "swarm", found, "host or auto"));
+        }
+        if several || self.algorithm == LineAlgorithm::Thesis && self.swarm != SwarmPlace::Device {
             // Its mutation is for swarms on the host; a device that is asked for is refused with that reason.
             return Ok(false);
         }
@@ -175,7 +184,7 @@ impl RacelineSettings {
     /// What the study's memory goes with.
     pub fn size(&self) -> Size {
         Size {
-            population: self.population,
+            population: self.population.saturating_mul(self.islands),
             // The swarm's control points are fewer than the cross-sections; the lines of the front are whole.
             variables: self.sections,
             iterations: self.iterations,
@@ -217,6 +226,11 @@ mod tests {
             ("inertia = 0.5", "inertia"),
             ("algorithm = \"cooperative\"\nmutation = 0.5", "mutation"),
             ("algorithm = \"thesis\"\nsocial = \"much\"", "social"),
+            ("algorithm = \"nsga2\"\ninertia = 0.5", "inertia"),
+            ("algorithm = \"nsga2\"\npopulation = 33", "population"),
+            ("algorithm = \"nsga2\"\nobjectives = [\"length\"]", "algorithm"),
+            ("algorithm = \"nsga2\"\nislands = 2", "islands"),
+            ("objectives = [\"length\"]\nislands = 2", "islands"),
         ]);
     }
 }

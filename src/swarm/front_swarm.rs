@@ -1,0 +1,160 @@
+//! What looks for a front in a study: a swarm, islands of swarms, or the genetic algorithm that they are compared with.
+
+use super::{
+    Counters, Front, Islands, Migration, Mopso, MopsoSettings, Nsga2, Nsga2Settings, Optimiser, SwarmPlace,
+};
+use crate::error::{Error, Result};
+use crate::evaluate::{Evaluation, Problem};
+use serde::{Deserialize, Serialize};
+
+/// How solutions move between the islands of a study.
+const MIGRATION: Migration = Migration { every: 10, count: 5 };
+
+/// What is to look for a front.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct FrontSearch {
+    /// Whether NSGA-II does, with the swarm's population, iterations and seed.
+    pub genetic: bool,
+    /// Swarms between which solutions move, each of the whole population.
+    pub islands: usize,
+}
+
+impl FrontSearch {
+    /// Checks that there can be such a search for so many objectives.
+    ///
+    /// # Errors
+    /// [`Error::Input`] naming the setting.
+    pub fn check(self, objectives: usize, population: usize) -> Result<()> {
+        let setting =
+            |name: &str, found: String, expected: &str| Error::input("the study", name, found, expected);
+        if self.genetic && objectives < 2 {
+            let found = "nsga2, with one objective".to_owned();
+            return Err(setting("algorithm", found, "nsga2 with two objectives or more"));
+        }
+        if self.genetic && !population.is_multiple_of(2) {
+            let found = format!("{population}, with algorithm nsga2");
+            return Err(setting("population", found, "an even number"));
+        }
+        let reason = match (self.islands, self.genetic, objectives) {
+            (1, ..) => return Ok(()),
+            (_, true, _) => "with algorithm nsga2",
+            (_, _, 0 | 1) => "with one objective",
+            _ => return Ok(()),
+        };
+        let found = format!("{}, {reason}", self.islands);
+        Err(setting("islands", found, "1, or a swarm of several objectives"))
+    }
+
+    /// The search, with seeds of islands that follow one another.
+    ///
+    /// # Errors
+    /// Those of [`FrontSearch::check`] and of the swarm.
+    pub fn begin(self, problem: &Problem, settings: MopsoSettings, place: SwarmPlace) -> Result<FrontSwarm> {
+        let motion = &settings.motion;
+        self.check(problem.objectives.len(), motion.population)?;
+        if self.genetic {
+            let settings = Nsga2Settings {
+                population: motion.population,
+                iterations: motion.iterations,
+                seed: motion.seed,
+                ..Nsga2Settings::default()
+            };
+            return Ok(FrontSwarm::Genetic(Box::new(Nsga2::new(problem, settings)?)));
+        }
+        if self.islands == 1 {
+            return Ok(FrontSwarm::Swarm(Box::new(place.swarm(problem, settings)?)));
+        }
+        let swarms = (0..self.islands as u64)
+            .map(|k| Mopso::new(problem, settings.clone().with_seed(motion.seed.wrapping_add(k))))
+            .collect::<Result<_>>()?;
+        let islands = Islands::new(problem, swarms, Some(MIGRATION))?;
+        Ok(FrontSwarm::Islands(Box::new(islands)))
+    }
+}
+
+/// A search for a front, with its whole state.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub(crate) enum FrontSwarm {
+    /// One swarm.
+    Swarm(Box<Mopso>),
+    /// Swarms with migration.
+    Islands(Box<Islands<Mopso>>),
+    /// NSGA-II.
+    Genetic(Box<Nsga2>),
+}
+
+impl FrontSwarm {
+    /// Puts the first candidates at these, before the first population is asked for: those of every island.
+    ///
+    /// # Errors
+    /// [`Error::Input`] naming a candidate that is no finite value for each variable.
+    pub fn start_from(&mut self, candidates: &[Vec<f64>]) -> Result<()> {
+        match self {
+            Self::Swarm(swarm) => swarm.start_from(candidates),
+            Self::Islands(islands) => {
+                let mut swarms = islands.islands_mut().iter_mut();
+                swarms.try_for_each(|swarm| swarm.start_from(candidates))
+            }
+            Self::Genetic(genetic) => genetic.start_from(candidates),
+        }
+    }
+
+    /// The one swarm, which may live on a device.
+    #[cfg(feature = "gpu")]
+    pub fn alone(&self) -> Option<&Mopso> {
+        match self {
+            Self::Swarm(swarm) => Some(swarm),
+            _ => None,
+        }
+    }
+
+    fn present(&self) -> &dyn Optimiser {
+        match self {
+            Self::Swarm(swarm) => swarm,
+            Self::Islands(islands) => islands,
+            Self::Genetic(genetic) => genetic,
+        }
+    }
+
+    fn present_mut(&mut self) -> &mut dyn Optimiser {
+        match self {
+            Self::Swarm(swarm) => swarm,
+            Self::Islands(islands) => islands,
+            Self::Genetic(genetic) => genetic,
+        }
+    }
+}
+
+impl Optimiser for FrontSwarm {
+    fn ask(&mut self) -> Vec<f64> {
+        self.present_mut().ask()
+    }
+
+    fn tell(&mut self, evaluation: &Evaluation) -> Result<()> {
+        self.present_mut().tell(evaluation)
+    }
+
+    fn counters(&self) -> Counters {
+        self.present().counters()
+    }
+
+    fn planned_iterations(&self) -> usize {
+        self.present().planned_iterations()
+    }
+
+    fn done(&self) -> bool {
+        self.present().done()
+    }
+
+    fn best(&self) -> Vec<f64> {
+        self.present().best()
+    }
+
+    fn violation(&self) -> f64 {
+        self.present().violation()
+    }
+
+    fn front(&self) -> Front {
+        self.present().front()
+    }
+}
