@@ -92,12 +92,20 @@ pub struct DeviceMopso {
     counters: Counters,
 }
 
+/// The most particles of so many variables that a swarm on this device has room for: no buffer is larger than a kernel may see.
+pub fn most_particles(context: &GpuContext, variables: usize) -> usize {
+    let bytes = context.limits().max_storage_buffer_binding_size - HEADER;
+    // A particle takes a float for each variable, and four in the list of those that an archive may take in.
+    let lanes = bytes / (4 * variables.max(4) as u64);
+    (lanes / BLOCK as u64 * BLOCK as u64) as usize
+}
+
 impl DeviceMopso {
     /// A swarm over the variables of `problem` on `context`'s device.
     ///
     /// # Errors
-    /// [`Error::Input`] naming the setting that is out of its range, [`Error::Device`] if the device cannot hold the
-    /// swarm.
+    /// [`Error::Input`] naming the setting that is out of its range, also where the device has no room for so many particles;
+    /// [`Error::Device`] if the device fails.
     pub fn new(problem: &Problem, settings: MopsoSettings, context: Arc<GpuContext>) -> Result<Self> {
         let space = Space::new(problem)?;
         let (d, width) = (space.dimensions(), problem.objectives.len());
@@ -146,14 +154,20 @@ impl DeviceMopso {
         let members = settings.archive.max(SAMPLE_FRONT) as u64;
         let most = PER_PLACE * settings.archive;
         let listed = HEADER + lanes * 16;
-        let device = context.limits();
         let largest = state.max(listed);
-        if largest > device.max_storage_buffer_binding_size {
-            return Err(Error::Device(format!(
-                "{} holds at most {} bytes in a buffer; {n} particles of {d} variables need {largest}",
-                context.summary(),
-                device.max_storage_buffer_binding_size
-            )));
+        let room = most_particles(&context, d);
+        if n > room {
+            let found = n.to_string();
+            let expected = format!(
+                "at most {room} particles of {d} variables on {}",
+                context.summary()
+            );
+            return Err(Error::input(
+                "the swarm's settings",
+                "population",
+                found,
+                expected,
+            ));
         }
         let on = Usage::STORAGE | Usage::COPY_SRC | Usage::COPY_DST;
         let size = size_of::<Generation>() as u64;

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 /// Where the particles of a swarm of several objectives live. On a device, neither candidates nor objectives cross the bus.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum SwarmPlace {
-    /// On the device from [`MANY`] particles on, where the backend is a GPU; else on the host.
+    /// On the device from [`MANY`] particles on, where the backend is a GPU that has room for them; else on the host.
     #[default]
     Auto,
     /// On the host.
@@ -53,6 +53,40 @@ impl SwarmPlace {
             ),
             Self::Device => Ok(true),
         }
+    }
+
+    /// Whether a swarm that may live on the device has room there for so many variables to a particle.
+    ///
+    /// # Errors
+    /// [`Error::Input`] with what fits if the device is asked for and has none; those of a device that does not open.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn has_room(self, adapter: Option<&str>, population: usize, variables: usize) -> Result<bool> {
+        let context = match crate::evaluate::gpu::GpuContext::shared(adapter) {
+            Ok(context) => context,
+            // A study that had its device finishes without it.
+            Err(_) if crate::evaluate::gpu::GpuContext::was_open(adapter) => return Ok(true),
+            Err(error) => return Err(error),
+        };
+        let most = super::device::most_particles(&context, variables);
+        if population > most && self == Self::Device {
+            let expected = format!(
+                "at most {most} particles of {variables} variables, for which {} has room, or swarm host",
+                context.summary()
+            );
+            return Err(Error::input(
+                "the study",
+                "population",
+                population.to_string(),
+                expected,
+            ));
+        }
+        Ok(population <= most)
+    }
+
+    /// No device has any.
+    #[cfg(not(feature = "gpu"))]
+    pub(crate) fn has_room(self, _: Option<&str>, _: usize, _: usize) -> Result<bool> {
+        Ok(false)
     }
 
     /// The swarm, before it goes to its place.

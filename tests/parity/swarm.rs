@@ -10,7 +10,7 @@ use lapswarm::evaluate::{Evaluator, Failure, Objective, Problem, Variable};
 use lapswarm::parity::Subject;
 use lapswarm::random::philox;
 use lapswarm::scalar::elementary::{ln, power};
-use lapswarm::swarm::device::{BLOCK, DeviceMopso};
+use lapswarm::swarm::device::{BLOCK, DeviceMopso, most_particles};
 use lapswarm::swarm::metrics::hypervolume;
 use lapswarm::swarm::problems::{GpuTestEvaluator, NAMES, SimdTestEvaluator, TestProblem};
 use lapswarm::swarm::{Mopso, MopsoSettings, Mutation, Optimiser, PsoSettings};
@@ -24,6 +24,27 @@ tests! {
     a_swarm_on_the_device_takes_costs_of_any_size: device,
     a_swarm_on_the_device_counts_what_is_beyond_single_precision: device,
     swarms_on_the_device_keep_the_knee_of_a_front_with_long_tails: device,
+    a_swarm_that_the_device_has_no_room_for_is_refused_with_the_size_that_fits: device,
+}
+
+/// A buffer of the device holds a whole number of blocks of particles; one particle more is refused before anything is made.
+fn a_swarm_that_the_device_has_no_room_for_is_refused_with_the_size_that_fits() {
+    let context = the_device();
+    let test = TestProblem::by_name(NAMES[0]).unwrap();
+    let variables = test.problem().variables.len();
+    let room = most_particles(&context, variables);
+    let largest = context.limits().max_storage_buffer_binding_size as usize;
+    assert!(room * variables * 4 <= largest && (room + 2 * BLOCK) * variables * 4 > largest);
+    let settings = MopsoSettings::default().with_size(room + 1, 1);
+    let refused = DeviceMopso::new(test.problem(), settings, context)
+        .err()
+        .expect("no room");
+    assert_eq!(refused.exit_code(), 2);
+    let text = refused.to_string();
+    assert!(
+        text.contains("population") && text.contains(&format!("at most {room} ")),
+        "{text}"
+    );
 }
 
 /// Whether the device is known to round every operation as the processor does.

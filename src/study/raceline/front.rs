@@ -85,7 +85,7 @@ pub(super) fn search_front(
     } else {
         known
     };
-    let on_device = settings.on_device()?;
+    let on_device = settings.on_device(problem.problem.variables.len())?;
     let state = match state {
         Some(state) => state,
         None => {

@@ -26,6 +26,7 @@ use crate::error::Result;
 use crate::evaluate::line::LineObjective;
 use crate::study::framework::memory::MemoryItem;
 use crate::study::framework::{Figures, Plan, RunRecord, Solved, Study, Subject, Work};
+use crate::swarm::SwarmPlace;
 use std::path::Path;
 
 /// The study.
@@ -83,8 +84,12 @@ impl Study for Raceline {
     type Summary = Summary;
 
     fn prepare(settings: &RacelineSettings) -> Result<Setup> {
-        settings.on_device()?;
-        set_up(settings)
+        let setup = set_up(settings)?;
+        if settings.objectives.len() > 1 || settings.swarm == SwarmPlace::Device {
+            let variables = front::front_problem(&setup, settings)?.problem.variables.len();
+            settings.on_device(variables)?;
+        }
+        Ok(setup)
     }
 
     fn size(settings: &RacelineSettings, _: Option<&Setup>) -> Vec<MemoryItem> {

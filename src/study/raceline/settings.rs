@@ -149,11 +149,11 @@ impl RacelineSettings {
         }
     }
 
-    /// Whether the swarm for the front lives on the device.
+    /// Whether the swarm for the front lives on the device, with so many variables to a particle.
     ///
     /// # Errors
     /// [`Error::Input`] with the reason if it is asked to and cannot.
-    pub(super) fn on_device(&self) -> Result<bool> {
+    pub(super) fn on_device(&self, variables: usize) -> Result<bool> {
         let several = self.islands > 1 || self.algorithm == LineAlgorithm::Nsga2;
         if several && self.swarm == SwarmPlace::Device {
             let found = "device, with islands or algorithm nsga2";
@@ -164,8 +164,9 @@ impl RacelineSettings {
             return Ok(false);
         }
         let place = (self.backend, self.adapter.as_deref());
-        self.swarm
-            .on_device(place, self.population, self.objectives.len())
+        let objectives = self.objectives.len();
+        Ok(self.swarm.on_device(place, self.population, objectives)?
+            && self.swarm.has_room(place.1, self.population, variables)?)
     }
 
     /// The car from above, with the margin on every side of it.
