@@ -181,7 +181,7 @@ mod tests {
         assert!(stem(&longest).len() <= longest.len());
     }
 
-    #[cfg(unix)]
+    #[cfg(all(unix, feature = "studies"))]
     #[test]
     fn cars_and_laps_take_the_place_of_the_last_ones() {
         use crate::telemetry::{ChannelMap, Log, LogOptions, NativeFormat, write_native};

@@ -46,9 +46,9 @@ counted() {
 }
 counted cargo test --release --no-fail-fast -- $ignored
 if [ "$tier" = full ]; then
-    # Features: every set that makes sense builds, and a library of optimisers stays light.
+    # Features: every set that makes sense builds, with its tests, and a library of optimisers stays light.
     for features in '' gpu vehicle vehicle,gpu report studies; do
-        counted cargo clippy --quiet --lib --no-default-features --features "$features" -- -D warnings
+        counted cargo clippy --quiet --lib --tests --no-default-features --features "$features" -- -D warnings
     done
     crates=$(cargo tree --no-default-features --edges normal,build --no-dedupe --prefix none --format '{p}' | sort -u | wc -l)
     if [ "$crates" -ge 40 ]; then

@@ -291,6 +291,7 @@ fn parameters_list_every_row() {
     assert!(draw("bad", &[]).is_err());
 }
 
+#[cfg(feature = "studies")]
 #[test]
 fn the_map_shows_a_circuit() {
     let circuit = crate::track::Circuit::silverstone_gp().expect("bundled");
