@@ -127,7 +127,11 @@ fn the_populations_ridge_is_that_of_the_curves() {
     };
     for car in [bundled_car(), random_car(7)] {
         let speeds = range.speeds_of(&car).expect("speeds");
-        let prepared = Prepared { car, speeds };
+        let prepared = Prepared {
+            car,
+            speeds,
+            log: None,
+        };
         let solved = || solve_unobserved::<EnvelopeStudy>(&settings, &prepared).expect("a surface");
         let found = solved();
         let (limits, surface) = (found.limits, found.surface);

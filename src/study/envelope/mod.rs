@@ -3,22 +3,25 @@
 //! The limits come of the car's steady states ([`crate::vehicle::limits`]). The surface of lateral acceleration over speed and steering also comes from a population of cars in steady-state cornering
 //! ([`crate::evaluate::steady`]), on any backend; the limits stay those of the curves, which are exact.
 
+mod measured;
 mod population;
 mod results;
 
+pub use measured::Measured;
 pub use population::{RidgePoint, SteadySurface, SurfaceFigures};
 pub use results::{EnvelopeSummary, Supported, envelope_figure};
 
-use crate::config::kinds::{choice, count, name_or_file, number, optional, text};
+use crate::config::kinds::{choice, count, file, name_or_file, number, optional, text};
 use crate::config::settings::{Settings, settings};
 use crate::error::{Error, Result};
 use crate::evaluate::BackendChoice;
 use crate::study::framework::journal::Journal;
 use crate::study::framework::memory::{ANSWER, MemoryItem};
 use crate::study::framework::{Plan, RunRecord, Solved, Study, Subject, Work};
+use crate::telemetry::{ChannelMap, Log, LogOptions};
 use crate::vehicle::Car;
 use crate::vehicle::limits::{CarEnvelope, SpeedRange};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// The study.
 pub struct EnvelopeStudy;
@@ -28,6 +31,10 @@ settings! {
     pub struct EnvelopeSettings {
         car: String ["-"] = "gt".to_owned(), name_or_file(),
             "The car: a bundled name (gt) or a TOML file, such as the one that identify writes";
+        log: Option<PathBuf> ["-"] = None, optional(file()).example("\"lap.csv\""),
+            "A log that is held against the limits: CSV (ours, MoTeC i2, RaceChrono, others), MoTeC .ld or VBOX .vbo";
+        channel_map: Option<PathBuf> ["-"] = None, optional(file()).example("\"channels.toml\""),
+            "Channel names, units, signs and delays of the log, as TOML; without it they are guessed";
         from_mps: f64 ["m/s"] = SpeedRange::USUAL.from_mps, number(3.0, 150.0),
             "Slowest speed; below it the limits are taken to be its";
         to_mps: f64 ["m/s"] = SpeedRange::USUAL.to_mps, number(4.0, 160.0),
@@ -44,6 +51,10 @@ settings! {
 
     fn consistent(&self) -> Result<()> {
         let least = self.from_mps + 1.0;
+        if let (None, Some(map)) = (&self.log, &self.channel_map) {
+            let found = format!("{}, without a log", map.display());
+            return Err(Error::input("the study", "channel_map", found, "a log beside it"));
+        }
         if self.to_mps < least {
             let expected = format!("{least} m/s or more, as from_mps is {}", self.from_mps);
             return Err(Error::input("the study", "to_mps", self.to_mps.to_string(), expected));
@@ -59,6 +70,8 @@ pub struct Prepared {
     pub car: Car,
     /// Speeds that its limits are looked for at (m/s).
     pub speeds: Vec<f64>,
+    /// A log that is held against them.
+    pub log: Option<Log>,
 }
 
 /// What the study finds.
@@ -80,7 +93,7 @@ impl Study for EnvelopeStudy {
     const ABOUT: &'static str =
         "Find a car's limits at each speed: the g-g-v envelope that racing lines are driven within.";
     const DETAILS: &'static str =
-        "Examples:\n  lapswarm envelope\n  lapswarm envelope --car runs/identify-001/car.toml --step-mps 5";
+        "Examples:\n  lapswarm envelope\n  lapswarm envelope --car runs/identify-001/car.toml --log lap.csv";
     type Settings = EnvelopeSettings;
     type State = Journal;
     type Prepared = Prepared;
@@ -91,7 +104,9 @@ impl Study for EnvelopeStudy {
         let car = Car::load(&settings.car)?;
         settings.validate()?;
         let speeds = settings.range().speeds_of(&car)?;
-        Ok(Prepared { car, speeds })
+        let log = settings.log.as_deref().map(|path| settings.read_log(path, &car));
+        let log = log.transpose()?;
+        Ok(Prepared { car, speeds, log })
     }
 
     fn size(settings: &EnvelopeSettings, prepared: Option<&Prepared>) -> Vec<MemoryItem> {
@@ -101,8 +116,13 @@ impl Study for EnvelopeStudy {
     }
 
     fn plan(settings: &EnvelopeSettings, prepared: &Prepared, plan: Plan) -> Result<Plan> {
-        let Prepared { car, speeds } = prepared;
-        plan.reads(format!("car {}, {} speeds", car.name, speeds.len()))
+        let Prepared { car, speeds, log } = prepared;
+        let plan = plan.reads(format!("car {}, {} speeds", car.name, speeds.len()));
+        let samples = log
+            .iter()
+            .map(|log| format!("{}: {} samples", log.source, log.samples()));
+        samples
+            .fold(plan, Plan::reads)
             .evaluations((speeds.len() * settings.steers) as u64)
             .backend(settings.backend, settings.adapter.as_deref())
     }
@@ -131,7 +151,7 @@ impl Study for EnvelopeStudy {
     }
 
     fn report(folder: &Path, solved: &Solved<'_, Self>, summary: &EnvelopeSummary) -> Result<()> {
-        results::report(folder, solved.outcome, summary)
+        results::report(folder, solved, summary)
     }
 
     fn text(_: &EnvelopeSettings, summary: &EnvelopeSummary) -> String {
@@ -146,6 +166,16 @@ impl Study for EnvelopeStudy {
 }
 
 impl EnvelopeSettings {
+    /// The log at `path`, as one of this car.
+    fn read_log(&self, path: &Path, car: &Car) -> Result<Log> {
+        let map = self.channel_map.as_deref().map(ChannelMap::read).transpose()?;
+        let options = LogOptions {
+            rolling_radius_m: Some([car.chassis.radius_front, car.chassis.radius_rear]),
+            ..LogOptions::default()
+        };
+        Log::read(path, &map.unwrap_or_default(), &options)
+    }
+
     /// The speeds that limits are looked for at.
     fn range(&self) -> SpeedRange {
         SpeedRange {

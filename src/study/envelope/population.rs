@@ -121,7 +121,7 @@ fn ridge_of(x: &[f64], values: &[f64]) -> Option<(f64, f64, Option<f64>)> {
 pub(super) fn measure(work: Work<'_, EnvelopeStudy>) -> Result<Option<Outcome>> {
     let watch = Watch::begin();
     let settings = work.settings;
-    let Prepared { car, speeds } = work.prepared;
+    let Prepared { car, speeds, log } = work.prepared;
     // Refuses a car that has no drive at these speeds.
     let limits = car_envelope(car, &settings.range())?;
     let lock = car.max_steer_rad.min(STEER_TO_GRIP);
@@ -138,6 +138,9 @@ pub(super) fn measure(work: Work<'_, EnvelopeStudy>) -> Result<Option<Outcome>> 
     let mut recorder = Recorder::of(EnvelopeStudy::NAME, settings, work.state, work.state_file)?;
     let mut inputs = Inputs::new(EnvelopeStudy::NAME);
     inputs.add(&(car, speeds, settings.steers));
+    if let Some(log) = log {
+        inputs.add(&(&log.vx_mps, &log.ay_mps2, &log.ax_mps2));
+    }
     recorder.begin(inputs.key(), &evaluator.backend())?;
     let mut record = RunRecord::of(&evaluator.backend());
     let began = Instant::now();

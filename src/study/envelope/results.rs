@@ -1,5 +1,6 @@
 //! Tables and figures of a car's g-g-v envelope.
 
+use super::measured::{self, Measured, Taken};
 use super::{EnvelopeStudy, Outcome, SteadySurface, SurfaceFigures};
 use crate::error::Result;
 use crate::evaluate::{Failure, failures_in_words};
@@ -7,7 +8,7 @@ use crate::report::{Curves, HtmlReport, Levels, Panel, Surface, Table, write_who
 use crate::study::framework::{Head, RunRecord, Solved};
 use crate::vehicle::limits::{CarEnvelope, EnvelopeAtSpeed, Handling, in_words};
 use crate::vehicle::modes::{SmallSteering, small_steering};
-use crate::vehicle::{EnvelopeRow, Reached, Trim};
+use crate::vehicle::{Envelope, EnvelopeRow, Reached, Trim};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -32,6 +33,9 @@ pub struct EnvelopeSummary {
     /// What the log supports of the limits, speed by speed, if the car was fitted to one.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub supported: Vec<Supported>,
+    /// How much of the limits the study's log takes, if it has one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub measured: Option<Measured>,
     /// What the limits leave out or differ in, in words.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub notes: Vec<String>,
@@ -109,6 +113,11 @@ pub(super) fn summarise(solved: &Solved<'_, EnvelopeStudy>) -> EnvelopeSummary {
         small_steering: steering_of(solved),
         limits: rows.to_vec(),
         supported,
+        measured: solved
+            .prepared
+            .log
+            .as_ref()
+            .and_then(|log| Measured::of(log, &measured::taken(log, &limits.envelope))),
         notes,
         surface: surface.summary.clone(),
     }
@@ -188,7 +197,12 @@ impl EnvelopeSummary {
             1e-3 * self.handling.yaw_stiffness_nm_per_rad,
             100.0 * self.handling.static_margin
         );
-        for note in &self.notes {
+        for note in self
+            .notes
+            .iter()
+            .cloned()
+            .chain(self.measured.iter().map(Measured::to_text))
+        {
             text += &format!("{note}\n");
         }
         text += &surface_in_words(&self.surface, &self.head.record);
@@ -196,18 +210,30 @@ impl EnvelopeSummary {
     }
 }
 
-/// Writes `envelope.csv` (as `--envelope` reads it), `cornering.csv`, `handling.csv`, `surface.csv`, `ridge.csv`, figures and
-/// `report.html`.
+/// Writes `envelope.csv` (as `--envelope` reads it), `cornering.csv`, `handling.csv`, `surface.csv`, `ridge.csv`, with a log
+/// `measured.csv`, figures and `report.html`.
 ///
 /// # Errors
 /// [`crate::Error::Io`] if a file cannot be written.
-pub(super) fn report(folder: &Path, outcome: &Outcome, summary: &EnvelopeSummary) -> Result<()> {
+pub(super) fn report(
+    folder: &Path,
+    solved: &Solved<'_, EnvelopeStudy>,
+    summary: &EnvelopeSummary,
+) -> Result<()> {
+    let outcome = solved.outcome;
     let limits = &outcome.limits;
     write_whole(folder.join("envelope.csv"), limits.envelope.to_csv().as_bytes())?;
     write_cornering(&folder.join("cornering.csv"), limits)?;
     write_surface(folder, &outcome.surface)?;
     write_handling(&folder.join("handling.csv"), &summary.small_steering)?;
-    write_page(folder, outcome, summary)
+    let log = solved.prepared.log.iter();
+    let taken: Vec<_> = log
+        .flat_map(|log| measured::taken(log, &limits.envelope))
+        .collect();
+    if !taken.is_empty() {
+        measured::write(&folder.join("measured.csv"), &taken)?;
+    }
+    write_page(folder, outcome, &taken, summary)
 }
 
 fn write_cornering(path: &Path, limits: &CarEnvelope) -> Result<()> {
@@ -272,6 +298,20 @@ fn handling_figure(rows: &[SmallSteering], car: &str) -> Curves {
     Curves::new(format!("Small steering: {car}"), [gain, factor, damping, roots])
 }
 
+/// The limit at a speed once round, from full drive over full cornering to full braking and back: lateral and longitudinal
+/// accelerations (m/s^2), drag taken off.
+pub(super) fn around(row: &EnvelopeRow, limits: &Envelope) -> (Vec<f64>, Vec<f64>) {
+    let around = (0..=120).map(|k| std::f64::consts::TAU * f64::from(k) / 120.0);
+    around
+        .map(|a| {
+            let tyres = row.ax_grip_mps2 * a.cos();
+            let driven = limits.traction_at(row.v_mps, a.sin().abs());
+            let push = tyres.min(driven.unwrap_or(tyres)).min(row.ax_drive_mps2);
+            (row.ay_mps2 * a.sin(), push - row.drag_mps2)
+        })
+        .unzip()
+}
+
 /// Steady-state cornering, the limits of tyres and engine, the g-g-v diagram and sideslip of a car of this name.
 pub fn envelope_figure(limits: &CarEnvelope, car: &str) -> Curves {
     let speeds = &limits.speeds;
@@ -295,16 +335,7 @@ pub fn envelope_figure(limits: &CarEnvelope, car: &str) -> Curves {
         cornering = cornering.shaded(shade, format!("{:.0} m/s", v[i]), &steer, &ay);
         sideslip = sideslip.shaded(shade, "", &ay, &of(&|t| t.sideslip_rad.to_degrees()));
         let row = speeds[i].row;
-        // Once round, from full drive over full cornering to full braking and back; drag taken off.
-        let around = (0..=120).map(|k| std::f64::consts::TAU * f64::from(k) / 120.0);
-        let (across, along): (Vec<f64>, Vec<f64>) = around
-            .map(|a| {
-                let tyres = row.ax_grip_mps2 * a.cos();
-                let driven = limits.envelope.traction_at(row.v_mps, a.sin().abs());
-                let push = tyres.min(driven.unwrap_or(tyres)).min(row.ax_drive_mps2);
-                (row.ay_mps2 * a.sin(), push - row.drag_mps2)
-            })
-            .unzip();
+        let (across, along) = around(&row, &limits.envelope);
         diagram = diagram.shaded(shade, "", &across, &along);
     }
     let limits = Panel::new("Limits of the tyres and the engine")
@@ -321,7 +352,7 @@ pub fn envelope_figure(limits: &CarEnvelope, car: &str) -> Curves {
     )
 }
 
-fn write_page(folder: &Path, outcome: &Outcome, summary: &EnvelopeSummary) -> Result<()> {
+fn write_page(folder: &Path, outcome: &Outcome, taken: &[Taken], summary: &EnvelopeSummary) -> Result<()> {
     let limits = &outcome.limits;
     let (car, record) = (&summary.head.subject.car, &summary.head.record);
     let mut page = HtmlReport::new(&summary.head.study, &format!("g-g-v envelope: {car}"));
@@ -352,6 +383,11 @@ fn write_page(folder: &Path, outcome: &Outcome, summary: &EnvelopeSummary) -> Re
         "From steady states of the 4DOF model at each speed. The engine's limit is that of its best gear.",
     );
     page.figure(folder.join("envelope.svg"), &envelope_figure(limits, car))?;
+    if let Some(measured) = &summary.measured {
+        page.section("The log", &measured.to_text());
+        let figure = measured::figure(taken, &limits.envelope, car);
+        page.figure(folder.join("measured.svg"), &figure)?;
+    }
     if !summary.small_steering.is_empty() {
         page.section(
             "Handling",
