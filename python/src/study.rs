@@ -13,7 +13,7 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::time::Duration;
 
 /// Every study: its name, what it does, and the declarations of its settings.
@@ -62,7 +62,7 @@ fn solve(
     (text, name): (&str, &Path),
     asked: &Asked,
     stop: &Arc<AtomicBool>,
-    tell: &Sender<Told>,
+    tell: &SyncSender<Told>,
 ) -> Result<Answer> {
     let seconds = |s: f64, what: &str| {
         Duration::try_from_secs_f64(s)
@@ -119,7 +119,8 @@ pub fn run_study<'py>(
     let known = || refused(py, "the studies", "name", name, &registry::names().join(", "));
     let study = registry::named(name).ok_or_else(known)?;
     let stop: Arc<AtomicBool> = Arc::default();
-    let (tell, mut told) = channel();
+    // The study waits until it is heard: one that the callback ends is at most a progress ahead of it.
+    let (tell, mut told) = sync_channel(0);
     let raised_there = Arc::clone(&stop);
     let called = PathBuf::from(name);
     std::thread::spawn(move || {
