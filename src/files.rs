@@ -18,8 +18,16 @@ use crate::{Error, Result};
 /// # Errors
 /// [`Error::Io`] when the folder is missing or cannot be written to.
 pub fn write_whole(path: impl AsRef<Path>, contents: &[u8]) -> Result<()> {
+    write_whole_by(path, |file| file.write_all(contents))
+}
+
+/// As [`write_whole`], of a file that `write` writes piece by piece.
+///
+/// # Errors
+/// As [`write_whole`], and those of `write`.
+pub fn write_whole_by(path: impl AsRef<Path>, write: impl FnOnce(&mut File) -> io::Result<()>) -> Result<()> {
     let path = path.as_ref();
-    place(path, contents, |temporary| fs::rename(temporary, path))
+    place(path, write, |temporary| fs::rename(temporary, path))
 }
 
 /// As [`write_whole`], of a file that is not there yet.
@@ -28,7 +36,8 @@ pub fn write_whole(path: impl AsRef<Path>, contents: &[u8]) -> Result<()> {
 /// As [`write_whole`], and of the kind [`io::ErrorKind::AlreadyExists`] when it is there.
 pub fn write_new(path: impl AsRef<Path>, contents: &[u8]) -> Result<()> {
     let path = path.as_ref();
-    place(path, contents, |temporary| match fs::hard_link(temporary, path) {
+    let write = |file: &mut File| file.write_all(contents);
+    place(path, write, |temporary| match fs::hard_link(temporary, path) {
         Ok(()) => fs::remove_file(temporary),
         Err(error) if error.kind() == io::ErrorKind::AlreadyExists => Err(error),
         // A file system without links.
@@ -79,10 +88,14 @@ pub fn is_temporary(name: &str) -> bool {
 }
 
 /// Writes a temporary file beside `path`, and moves it there.
-fn place(path: &Path, contents: &[u8], put: impl FnOnce(&Path) -> io::Result<()>) -> Result<()> {
+fn place(
+    path: &Path,
+    write: impl FnOnce(&mut File) -> io::Result<()>,
+    put: impl FnOnce(&Path) -> io::Result<()>,
+) -> Result<()> {
     let (temporary, mut file) = temporary_beside(path).map_err(|e| Error::io(path, "write", e))?;
-    let write = || {
-        file.write_all(contents)?;
+    let placed = || {
+        write(&mut file)?;
         // On the disk before it takes the place of the last one.
         file.sync_all()?;
         drop(file);
@@ -92,7 +105,7 @@ fn place(path: &Path, contents: &[u8], put: impl FnOnce(&Path) -> io::Result<()>
         sync_folder(folder_of(path));
         Ok(())
     };
-    write().map_err(|source| {
+    placed().map_err(|source| {
         // The first failure is the one to report; a leftover that cannot be removed changes nothing.
         let _ = fs::remove_file(&temporary);
         Error::io(path, "write", source)

@@ -105,7 +105,7 @@ fn work(
 }
 
 /// Where the first number is that is not finite. Whole blocks are looked at first: they take many numbers at once.
-fn first_not_finite(rows: &[f64]) -> Option<usize> {
+pub fn first_not_finite(rows: &[f64]) -> Option<usize> {
     const BLOCK: usize = 512;
     let all_are = |block: &[f64]| block.iter().fold(true, |all, x| all & x.is_finite());
     let block = BLOCK * rows.chunks(BLOCK).position(|block| !all_are(block))?;

@@ -2,10 +2,10 @@
 
 use crate::arrays::{array, check_width, table};
 use crate::errors::{OrRaise, exception, refused};
-use crate::evaluator::Evaluation;
+use crate::evaluator::{Evaluation, first_not_finite};
 use crate::problem::Problem;
 use lapswarm::evaluate::{self, Failure};
-use lapswarm::swarm::{self, Migration, Sizes, by_name, checkpoint, islands_by_name};
+use lapswarm::swarm::{self, Front, Migration, Sizes, by_name, checkpoint, islands_by_name};
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
@@ -125,6 +125,62 @@ impl Optimiser {
             Err(_) => told(evaluation, violations, self.width)?,
         };
         py.detach(|| self.inner().tell(&found)).or_raise(py)
+    }
+
+    /// Takes in candidates that were evaluated elsewhere, such as those of another swarm or rows that were known before: X of shape
+    /// (n, d) in the units of the variables, F of shape (n, m), violations of shape (n,) as for ``tell``. A row whose objectives are
+    /// not finite has failed, and is left out. Each is taken where it beats what the swarm has: for one objective it becomes the
+    /// best of the particle whose best is worst, for several it joins the archive. Every island takes them. They count as no
+    /// evaluations. ``pso``, ``thesis`` and ``difference`` take them for one objective, the swarms for several.
+    #[pyo3(signature = (X, F, violations=None))]
+    #[allow(non_snake_case)]
+    fn accept(
+        &self,
+        py: Python<'_>,
+        X: &Bound<'_, PyAny>,
+        F: &Bound<'_, PyAny>,
+        violations: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<()> {
+        let candidates = table(X, "X")?;
+        check_width(&candidates, "X", self.dimensions, "variable")?;
+        let rows = candidates.as_slice()?;
+        if let Some(at) = first_not_finite(rows) {
+            let found = format!("{} in row {} (from 0)", rows[at], at / self.dimensions);
+            return Err(refused(py, "X", "value", found, "finite numbers"));
+        }
+        let found = told(F, violations, self.width)?;
+        found
+            .check(rows.len() / self.dimensions, self.width)
+            .or_raise(py)?;
+        let mut inner = self.inner();
+        let Some(accepting) = inner.accepting() else {
+            let expected = "a particle swarm or difference";
+            return Err(refused(
+                py,
+                "accept",
+                "optimiser",
+                "one that takes in no candidates of others",
+                expected,
+            ));
+        };
+        let known: Vec<usize> = (0..found.failures.len())
+            .filter(|&i| found.success(i, self.width).is_some())
+            .collect();
+        // Together go those that violate the constraints equally.
+        for equal in known.chunk_by(|&a, &b| found.violation(a) == found.violation(b)) {
+            let of = |rows: &[f64], width: usize| -> Vec<Vec<f64>> {
+                equal
+                    .iter()
+                    .map(|&i| rows[i * width..(i + 1) * width].to_vec())
+                    .collect()
+            };
+            accepting.accept_migrants(&Front {
+                candidates: of(rows, self.dimensions),
+                objectives: of(&found.objectives, self.width),
+                violation: found.violation(equal[0]),
+            });
+        }
+        Ok(())
     }
 
     /// Whether the planned iterations are done.

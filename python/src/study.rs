@@ -119,7 +119,7 @@ pub fn run_study<'py>(
     let known = || refused(py, "the studies", "name", name, &registry::names().join(", "));
     let study = registry::named(name).ok_or_else(known)?;
     let stop: Arc<AtomicBool> = Arc::default();
-    // The study waits until each progress is taken, and so for the callback before it: it ends where the callback says.
+    // The study waits until it is heard: one that the callback ends is at most a progress ahead of it.
     let (tell, mut told) = sync_channel(0);
     let raised_there = Arc::clone(&stop);
     let called = PathBuf::from(name);

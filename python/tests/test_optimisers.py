@@ -144,3 +144,61 @@ def test_minimise_passes_on_what_is_raised() -> None:
 
     found = lapswarm.minimise(BOX, stopped)
     assert found.stopped == "interrupt" and len(found.X) == 1 and calls == 5
+
+
+TAKE_IN = [("pso", sphere), ("thesis", sphere), ("difference", sphere), ("default", two), ("smpso", two), ("thesis", two)]
+
+
+@pytest.mark.parametrize(("name", "function"), TAKE_IN)
+def test_what_is_accepted_is_what_islands_of_the_library_exchange(name: str, function) -> None:  # type: ignore[no-untyped-def]
+    problem = lapswarm.OwnProblem(BOX, 1 if function is sphere else 2)
+    sizes = {"population": 12, "iterations": 9, "archive": 8}
+    within = lapswarm.Optimiser(problem, name, seed=5, islands=3, migrate_every=2, migrants=2, **sizes)
+    apart = [lapswarm.Optimiser(problem, name, seed=5 + k, **sizes) for k in range(3)]
+    while not within.done:
+        x, asked = within.ask(), [one.ask() for one in apart]
+        assert np.array_equal(x, np.vstack(asked))
+        within.tell(function(x))
+        for one, own in zip(apart, asked, strict=True):
+            one.tell(function(own))
+        if within.iteration % 2 == 0:
+            fronts = [one.front for one in apart]
+            for k, one in enumerate(apart):
+                X, F = fronts[k - 1]
+                rows = [i * len(F) // min(2, len(F)) for i in range(min(2, len(F)))]
+                one.accept(X[rows], F[rows])
+    assert np.array_equal(within.best, np.min([one.best for one in apart], axis=0))
+
+
+def test_rows_known_from_before_are_accepted_by_their_violations() -> None:
+    swarm = lapswarm.Optimiser(lapswarm.OwnProblem(BOX), "pso", population=10, iterations=5, seed=3)
+    swarm.tell(sphere(swarm.ask()) + 10.0)
+    # The first has failed, the second violates, the third is feasible, and beyond the bounds.
+    known = np.array([[0.0] * 4, [0.1] * 4, [9.0, 0.2, 0.2, 0.2]])
+    swarm.accept(known, [np.nan, 0.04, 0.5], violations=[0.0, 1.0, 0.0])
+    X, F = swarm.front
+    assert np.allclose(X, [[3.0, 0.2, 0.2, 0.2]], rtol=0.0, atol=1e-15) and F[0, 0] == 0.5 == swarm.best[0]
+    assert swarm.violation == 0.0 and swarm.evaluations == 10
+    several = lapswarm.Optimiser(lapswarm.OwnProblem(BOX, 2), population=10, iterations=5)
+    known[2] = 0.9
+    several.accept(known, two(known), violations=[2.0, 1.0, 1.0])
+    assert several.violation == 1.0 and len(several.front[0]) == 2
+
+
+def test_what_cannot_be_accepted_is_refused_and_changes_nothing() -> None:
+    swarm = lapswarm.Optimiser(lapswarm.OwnProblem(BOX), "pso", population=10, iterations=5)
+    before = swarm.to_bytes()
+    x = np.zeros((3, 4))
+    for X, F, said in (
+        (x[:, :3], sphere(x), "3 columns, expected 4"),
+        (x, sphere(x[:2]), "3 candidates"),
+        (x, two(x), "2 columns, expected 1"),
+        (x * np.nan, sphere(x), "NaN in row 0"),
+    ):
+        with pytest.raises(lapswarm.InputError, match=said):
+            swarm.accept(X, F)
+    with pytest.raises(lapswarm.InputError, match="violations"):
+        swarm.accept(x, sphere(x), violations=[0.0])
+    assert swarm.to_bytes() == before
+    with pytest.raises(lapswarm.InputError, match="takes in no candidates"):
+        lapswarm.Optimiser(lapswarm.OwnProblem(BOX), "covariance").accept(x, sphere(x))

@@ -12,8 +12,8 @@ import lapswarm.ray
 import numpy as np
 import pytest
 from conftest import Machines, once
-from lapswarm.ray._islands import non_dominated
-from lapswarm.ray._migration import together
+from lapswarm.ray._islands import _seed, non_dominated
+from lapswarm.ray._migration import accepted
 
 PROBLEM = lapswarm.OwnProblem([(-2.0, 3.0)] * 4, 2)
 SIZES: dict[str, Any] = {"islands": 3, "epochs": 4, "iterations": 3, "population": 16, "archive": 12, "seed": 7, "num_cpus": 1}
@@ -37,26 +37,22 @@ def states(found: lapswarm.ray.Archipelago) -> list[bytes]:
 
 
 @pytest.mark.parametrize(("algorithm", "objectives"), [("default", 2), ("smpso", 2), ("pso", 1), ("difference", 1)])
-def test_islands_are_those_of_the_library_in_one_process(machines: Machines, algorithm: str, objectives: int) -> None:
+def test_islands_are_those_of_a_loop_in_one_process(machines: Machines, algorithm: str, objectives: int) -> None:
     problem = lapswarm.OwnProblem([(-2.0, 3.0)] * 4, objectives)
     function = two() if objectives == 2 else lambda x: (x**2).sum(axis=1)
-    sizes = SIZES | {"iterations": 1, "algorithm": algorithm}
-    # Without migration the first epoch is that of swarms by themselves.
-    begun = lapswarm.ray.islands(
-        problem, function=function, topology="none", callback=lambda now: now["epoch"] < 1, **sizes
-    )
-    both = together(states(begun), 2)
-    # The library migrates at the end of an iteration, islands before the next epoch.
-    both.tell(np.empty((0, objectives)))
-    for _ in range(2):
-        both.tell(function(both.ask()))
-    found = lapswarm.ray.islands(problem, function=function, callback=lambda now: now["epoch"] < 3, **sizes)
-    assert found.epochs == 3
-    after = together(states(found), 2)
-    after.tell(np.empty((0, objectives)))
-    assert np.array_equal(after.best, both.best)
-    for a, b in zip(after.front, both.front, strict=True):
-        assert np.array_equal(a, b) and len(a) > 0
+    found = lapswarm.ray.islands(problem, function=function, algorithm=algorithm, **SIZES)
+    alone = [
+        lapswarm.Optimiser(problem, algorithm, population=16, iterations=12, archive=12, seed=_seed(7, k)) for k in range(3)
+    ]
+    for epoch in range(4):
+        if epoch > 0:
+            before = [one.to_bytes() for one in alone]
+            alone = [lapswarm.Optimiser.from_bytes(accepted(before[k], before[k - 1], 2)) for k in range(3)]
+        for one in alone:
+            for _ in range(3):
+                one.tell(function(one.ask()))
+    assert states(found) == [one.to_bytes() for one in alone]
+    assert all(len(one.front[0]) > 0 for one in alone)
 
 
 def test_a_run_depends_on_its_settings_alone(machines: Machines, undisturbed: list[bytes]) -> None:

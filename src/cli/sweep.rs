@@ -32,7 +32,7 @@ pub struct Arguments {
     /// Do these rows only, which no other process does: `0..500`, `500..`, `..` or `37`. --out may hold a part of the sweep
     #[arg(long, requires = "out", conflicts_with_all = ["dry_run", "resume"], value_name = "A..B", value_parser = rows)]
     rows: Option<Range<usize>>,
-    /// Make the tables and the page of the rows that --out holds, and run none
+    /// Make the tables (sweep and medians, as CSV and Parquet) and the page of the rows that --out holds, and run none
     #[arg(long, requires = "out", conflicts_with_all = ["dry_run", "resume", "rows", "time_limit_s"])]
     gather: bool,
     /// Time after which the sweep ends in order with what it has, s; the runs at work keep their states

@@ -225,6 +225,10 @@ impl Optimiser for DifferenceSwarm {
         to_bytes(self)
     }
 
+    fn accepting(&mut self) -> Option<&mut dyn AcceptsMigrants> {
+        Some(self)
+    }
+
     fn planned_iterations(&self) -> usize {
         self.settings.iterations
     }

@@ -14,7 +14,8 @@ use serde::{Deserialize, Serialize};
 
 /// An optimiser that accepts solutions of others.
 pub trait AcceptsMigrants: Optimiser {
-    /// Takes in solutions of the same problem, with objectives that were evaluated.
+    /// Takes in solutions of the same problem, with objectives that were evaluated and are finite. Values beyond their bounds are
+    /// brought within them.
     fn accept_migrants(&mut self, migrants: &Front);
 
     /// The checkpoint of islands of such optimisers, see [`Optimiser::to_checkpoint`].
@@ -124,6 +125,15 @@ impl<O: AcceptsMigrants> Islands<O> {
     }
 }
 
+impl<O: AcceptsMigrants> AcceptsMigrants for Islands<O> {
+    /// Every island takes them in.
+    fn accept_migrants(&mut self, migrants: &Front) {
+        for island in &mut self.islands {
+            island.accept_migrants(migrants);
+        }
+    }
+}
+
 impl<O: AcceptsMigrants> Optimiser for Islands<O> {
     fn ask(&mut self) -> Vec<f64> {
         let mut population = Vec::new();
@@ -167,6 +177,10 @@ impl<O: AcceptsMigrants> Optimiser for Islands<O> {
 
     fn to_checkpoint(&self) -> Result<Vec<u8>> {
         O::islands_to_checkpoint(self)
+    }
+
+    fn accepting(&mut self) -> Option<&mut dyn AcceptsMigrants> {
+        Some(self)
     }
 
     fn planned_iterations(&self) -> usize {

@@ -169,6 +169,11 @@ pub trait Optimiser {
     fn to_checkpoint(&self) -> Result<Vec<u8>> {
         no_checkpoint()
     }
+
+    /// The same as one that takes in solutions of others, if it does.
+    fn accepting(&mut self) -> Option<&mut dyn AcceptsMigrants> {
+        None
+    }
 }
 
 fn no_checkpoint() -> Result<Vec<u8>> {
@@ -218,6 +223,10 @@ impl<O: Optimiser + ?Sized> Optimiser for Box<O> {
 
     fn to_checkpoint(&self) -> Result<Vec<u8>> {
         (**self).to_checkpoint()
+    }
+
+    fn accepting(&mut self) -> Option<&mut dyn AcceptsMigrants> {
+        (**self).accepting()
     }
 }
 

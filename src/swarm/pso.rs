@@ -188,6 +188,10 @@ impl Optimiser for Pso {
         to_bytes(self)
     }
 
+    fn accepting(&mut self) -> Option<&mut dyn AcceptsMigrants> {
+        Some(self)
+    }
+
     fn planned_iterations(&self) -> usize {
         self.settings.iterations
     }

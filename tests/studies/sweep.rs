@@ -2,6 +2,8 @@
 
 use lapswarm::hold;
 use lapswarm::study::sweep::{RowsRequest, SweepSettings, begin, gather, run_rows, sweep};
+use parquet::file::reader::{FileReader, SerializedFileReader};
+use parquet::record::Field;
 use serde_json::{Value, json};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -227,6 +229,27 @@ fn sweeps_beyond_all_measure_are_refused() {
     }
 }
 
+/// What a Parquet file holds, as the CSV beside it has it.
+fn parquet_as_csv(path: &Path) -> String {
+    let file = std::fs::File::open(path).expect("a file");
+    let reader = SerializedFileReader::new(file).expect("a Parquet file");
+    let schema = reader.metadata().file_metadata().schema_descr();
+    let mut table = csv::Writer::from_writer(Vec::new());
+    let names = schema.columns().iter().map(|column| column.name());
+    table.write_record(names).expect("a head");
+    for row in reader.get_row_iter(None).expect("rows") {
+        let row = row.expect("a row");
+        let cells = row.get_column_iter().map(|(_, cell)| match cell {
+            Field::Str(text) => text.clone(),
+            Field::Double(number) => number.to_string(),
+            Field::Null => String::new(),
+            other => panic!("{other} is no text and no number"),
+        });
+        table.write_record(cells).expect("a row");
+    }
+    String::from_utf8(table.into_inner().expect("a table")).expect("text")
+}
+
 #[test]
 fn figures_of_all_objectives_have_their_columns() {
     let root = tempfile::tempdir().expect("a temporary folder");
@@ -253,6 +276,10 @@ seed = [1, 2]
             let name = format!("{name}{ending}");
             assert!(head.split(',').any(|column| column == name), "{file}: {head}");
         }
+        assert_eq!(
+            parquet_as_csv(&folder.join(file).with_extension("parquet")),
+            table
+        );
     }
 }
 

@@ -13,7 +13,6 @@ import numpy as np
 from .. import _native
 from ..errors import InputError
 from . import _cluster
-from ._migration import check_accepts
 from ._pool import Array, Function, Handle, Job, Pool
 from ._store import Store, sealed, unsealed
 
@@ -96,7 +95,7 @@ def islands(
         raise InputError(message, field="topology")
     if algorithm is None:
         algorithm = "pso" if len(problem.objectives) == 1 else "default"
-    states = [
+    optimisers = [
         _native.Optimiser(
             problem,
             algorithm,
@@ -104,10 +103,15 @@ def islands(
             iterations=epochs * iterations,
             archive=archive,
             seed=_seed(seed, island),
-        ).to_bytes()
+        )
         for island in range(islands)
     ]
-    check_accepts(states[0], algorithm)
+    try:
+        optimisers[0].accept(np.empty((0, len(problem.names))), np.empty((0, len(problem.objectives))))
+    except InputError:
+        message = f"algorithm: found {algorithm}, which takes in no solutions of other islands, expected a particle swarm or difference"
+        raise InputError(message, field="algorithm") from None
+    states = [optimiser.to_bytes() for optimiser in optimisers]
     store = None if out is None else Store(out)
     pool = Pool(problem, function, backend, num_cpus, num_gpus, retries, most=islands)
     try:

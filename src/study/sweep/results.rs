@@ -1,13 +1,15 @@
 //! Rows of a sweep, and medians over its seeds.
 
 use super::SweepSettings;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::files::run_folder::SUMMARY;
-use crate::report::{Rows, Table, write_whole};
+use crate::files::write_whole_by;
+use crate::report::{Rows, Table};
 use crate::study::framework::write_json;
 use crate::swarm::comparison::quartiles;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
+use std::io::{BufWriter, Write};
 use std::path::Path;
 
 /// All rows, one JSON object per line.
@@ -140,15 +142,14 @@ pub fn medians(rows: &[Row]) -> Vec<Group> {
 
 /// Writes all rows into one file, one JSON object per line.
 pub(super) fn write_rows(folder: &Path, rows: &[Row]) -> Result<()> {
-    let path = folder.join(ROWS);
-    let mut text = String::new();
-    for row in rows {
-        let line =
-            serde_json::to_string(row).map_err(|e| Error::io(&path, "write", std::io::Error::other(e)))?;
-        text += &line;
-        text.push('\n');
-    }
-    write_whole(&path, text.as_bytes())
+    write_whole_by(folder.join(ROWS), |file| {
+        let mut file = BufWriter::new(file);
+        for row in rows {
+            serde_json::to_writer(&mut file, row)?;
+            file.write_all(b"\n")?;
+        }
+        file.flush()
+    })
 }
 
 impl Summary {

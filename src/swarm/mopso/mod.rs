@@ -162,6 +162,10 @@ impl Optimiser for Mopso {
         to_bytes(self)
     }
 
+    fn accepting(&mut self) -> Option<&mut dyn AcceptsMigrants> {
+        Some(self)
+    }
+
     fn planned_iterations(&self) -> usize {
         self.present().planned_iterations()
     }
