@@ -148,6 +148,18 @@ class Supported:
 
 
 @dataclass(frozen=True)
+class Measured:
+    """How much of the limits a log takes, as shares of them."""
+
+    log: str
+    samples: int
+    used_median: float
+    used_p95: float
+    used_greatest: float
+    beyond_share: float
+
+
+@dataclass(frozen=True)
 class Enveloped(Figures):
     """Figures of ``envelope``."""
 
@@ -168,6 +180,7 @@ class Enveloped(Figures):
     ridge_tolerance_mps2: float | None
     ridge_agrees: bool
     supported: list[Supported] | None = None
+    measured: Measured | None = None
     notes: list[str] | None = None
 
 
