@@ -190,7 +190,7 @@ def equations(m: Any, where: Callable[..., Any], jit: Callable[[Any], Any]) -> C
         end = moved(moved(moved(moved(state, k1, dt / 6), k2, dt / 3), k3, dt / 3), k4, dt / 6)
         return end, ax, ay
 
-    return step
+    return step  # type: ignore[no-any-return]
 
 
 def inputs(columns: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

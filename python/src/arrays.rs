@@ -11,6 +11,16 @@ use pyo3::prelude::*;
 pub fn table<'py>(given: &Bound<'py, PyAny>, name: &str) -> PyResult<PyReadonlyArray2<'py, f64>> {
     let py = given.py();
     let numpy = py.import("numpy")?;
+    // The conversion would drop a part of each.
+    if numpy.call_method1("iscomplexobj", (given,))?.extract()? {
+        return Err(refused(
+            py,
+            name,
+            "type",
+            "complex numbers",
+            "an array of real numbers",
+        ));
+    }
     let array = numpy
         .call_method1("ascontiguousarray", (given, "float64"))
         .map_err(|error| {

@@ -141,6 +141,8 @@ def test_what_is_wrong_with_an_array_is_said(line: lapswarm.LineProblem) -> None
         evaluator.evaluate(many)
     with pytest.raises(lapswarm.InputError, match="59 columns, expected 60"):
         evaluator.evaluate(rows[:, :-1])
+    with pytest.raises(lapswarm.InputError, match="X: type: found complex numbers"):
+        evaluator.evaluate(np.full((2, 60), 0.5j))
     with pytest.raises(lapswarm.InputError, match=r"shape \(60,\)"):
         evaluator.evaluate(rows[0])
     with pytest.raises(lapswarm.InputError, match="array of numbers"):
