@@ -9,7 +9,7 @@ tests! {
     kernels_fit_the_registers_of_graphics_processors: radv,
 }
 
-/// What kernels whose names have these words may take at most on each processor of [`FAMILIES`].
+/// What kernels whose names have these whole words may take at most on each processor of [`FAMILIES`].
 struct Bar {
     kernels: &'static str,
     /// Vector registers of a lane.
@@ -19,12 +19,13 @@ struct Bar {
 }
 
 /// As Mesa 22.3 compiles them. A wave of 128 vector registers runs beside seven others on a SIMD of navi21.
-const BARS: [Bar; 6] = [
+const BARS: [Bar; 7] = [
     bar("replay: by axle, magic formula", [120, 120, 120], [0; 3]),
     bar("settle: by axle, magic formula", [128, 132, 124], [0; 3]),
     bar("drive: by axle, magic formula", [160, 132, 156], [0, 26, 0]),
     bar("by axle, linear", [120, 120, 112], [0; 3]),
-    bar("line: ", [48, 48, 48], [0; 3]),
+    bar("line: ", [32, 36, 32], [0; 3]),
+    bar("energy_line: ", [64, 60, 64], [0; 3]),
     bar("replay_reduce: by axle", [16, 24, 16], [0; 3]),
 ];
 /// Spilled scalar registers, on all of them. The driver keeps these in lanes of a vector register, so that few do no harm.
@@ -46,7 +47,7 @@ fn kernels_fit_the_registers_of_graphics_processors() {
                 answer
                     .kernels
                     .iter()
-                    .filter(|kernel| kernel.name().contains(bar.kernels))
+                    .filter(|kernel| format!(" {}", kernel.name()).contains(&format!(" {}", bar.kernels)))
             };
             assert!(fitting().count() > 0, "no kernel is called {}", bar.kernels);
             for kernel in fitting() {
