@@ -74,7 +74,12 @@ def test_an_interrupted_study_is_resumed_to_the_same_figures(tmp_path: Path) -> 
             signal.raise_signal(signal.SIGINT)
 
     assert threading.current_thread() is threading.main_thread()
-    part = lapswarm.identify(out=tmp_path / "part", callback=interrupt, **settings)
+    # A shell starts what runs in the background with interrupts ignored.
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        part = lapswarm.identify(out=tmp_path / "part", callback=interrupt, **settings)
+    finally:
+        signal.signal(signal.SIGINT, before)
     assert part.interrupted and part.summary["evaluations"] < whole.summary["evaluations"]
     rest = lapswarm.identify(out=tmp_path / "part", resume=True)
     assert not rest.interrupted
