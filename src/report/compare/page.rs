@@ -11,7 +11,7 @@ use std::collections::{HashMap, HashSet};
 /// Runs that a page takes at most: more lines than colours cannot be told apart.
 const MOST_RUNS: usize = 24;
 /// Figures worth a look first, by how their names begin.
-const HEADLINES: [&str; 17] = [
+const HEADLINES: [&str; 18] = [
     "total_parameter_error",
     "swarm_total_parameter_error",
     "rms_error",
@@ -21,6 +21,7 @@ const HEADLINES: [&str; 17] = [
     "hypervolume",
     "front_size",
     "lap_time_s",
+    "clearance_m",
     "point_mass_lap_time_s",
     "grip_share",
     "disagreement_percent",
@@ -31,8 +32,9 @@ const HEADLINES: [&str; 17] = [
     "static_margin",
 ];
 /// Figures of a best line that are: those on the fine spline, where there are two.
-const BEST: [&str; 4] = [
+const BEST: [&str; 5] = [
     "lap_time_fine_s",
+    "clearance_m",
     "length_fine_m",
     "integral_kappa2_fine_1pm",
     "gamma_1pm",
