@@ -222,6 +222,13 @@ fn fronts_of_islands_and_of_nsga2_are_resumed_bit_for_bit() {
         islands: 2,
         ..alone.clone()
     };
+    // Memory goes with the particles of all islands.
+    let many = IdentifySettings {
+        population: Some(1000),
+        islands: 3,
+        ..alone.clone()
+    };
+    assert_eq!(many.size().population, 3000);
     let mut fronts = Vec::new();
     for (settings, evaluations) in [(alone, 16 * 24), (genetic, 16 * 24), (islands, 2 * 16 * 24)] {
         assert_eq!(settings.evaluations(), evaluations);

@@ -74,7 +74,7 @@ impl Measured {
         })
     }
 
-    /// They in words.
+    /// The figures in words.
     pub(super) fn to_text(&self) -> String {
         format!(
             "{}: of the limit the tyres take {:.0} % in half of {} samples, more than {:.0} % in a twentieth, and {:.0} % at most. \

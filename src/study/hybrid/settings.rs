@@ -98,7 +98,7 @@ settings! {
         algorithm: HybridAlgorithm ["-"] = HybridAlgorithm::Default, choice().search(),
             "Which swarms share the energy out; nsga2 is NSGA-II for the front";
         warm_start: Option<bool> ["-"] = None, optional(switch(true)).flag(Flag::Switch("no_warm_start", false)).search().example("true"),
-            "Whether the front's swarm starts from the line and even shares; without it it does, but with algorithm thesis starts at random";
+            "Whether the front's swarm starts from the line and even shares; by default it does, except with algorithm thesis";
         inertia: Option<Schedule> ["-"] = None, of(Scheduled).search().example("[0.5, 0.1]"),
             "Inertia weight with thesis: a number, or the first and the last of a linear schedule; without it the algorithm's own";
         cognitive: Option<Schedule> ["-"] = None, of(Scheduled).search().example("1.5"),

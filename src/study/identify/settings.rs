@@ -281,7 +281,7 @@ impl IdentifySettings {
         let several = self.objectives.len() > 1;
         let population = self.population.unwrap_or(if several { FRONT.0 } else { 0 });
         Size {
-            population: population.max(EXPLORE.0),
+            population: population.saturating_mul(self.islands).max(EXPLORE.0),
             variables: self.free_from.as_ref().map_or(self.free.len(), |_| self.most),
             iterations: self.iterations.unwrap_or(GATHER.1),
             archive: if several { self.archive } else { 0 },
