@@ -7,6 +7,7 @@
 struct CarInput {
     wheel_speed: vec4<f32>,
     steer: f32,
+    flap: f32,
 }
 
 struct CarState {
@@ -109,7 +110,7 @@ fn with_all(start: f32, figures: vec4<f32>) -> f32 {
 fn car_rate(car: CarModel, state: CarState, input: CarInput) -> CarRate {
     let chassis = chassis_of(car);
     let body = state.body;
-    let aero = aero_forces(chassis, body.vx);
+    let aero = aero_forces(chassis, body.vx, input.flap);
     let loads = wheel_loads(chassis, body, state.pitch_acceleration, aero);
 
     let steer = input.steer * chassis.steer_scale + chassis.steer_offset;

@@ -65,7 +65,7 @@ fn drive_step(car: CarModel, course: Course, pace: Pace, number: f32, before: Dr
     }
 
     let controls = act(course, pace, chassis_of(car), before.car, view, before.controls);
-    let input = car_input(chassis_of(car), before.car, controls);
+    let input = car_input(chassis_of(car), before.car, controls, view.row.flap);
     var next = before.car;
     var reached = before.car;
     for (var stage = 0u; stage < STAGES; stage++) {

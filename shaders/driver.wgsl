@@ -89,7 +89,7 @@ fn act(course: Course, pace: Pace, c: Chassis, state: CarState, view: View, cont
     let after = planned_speed(course, pace, view, ahead + driver.reach);
     let planned = (after * after - before * before) / 8.0;
     let wanted = planned + driver.speed_gain * behind;
-    let aero = aero_forces(c, v);
+    let aero = aero_forces(c, v, view.row.flap);
     let force = c.mass * wanted + aero.drag;
     let weight = c.mass * c.gravity + (aero.downforce_front + aero.downforce_rear);
     let used = min(driver.knows * abs(body.yaw_rate * v / (driver.friction * weight / c.mass)), 1.0);
@@ -109,11 +109,12 @@ fn act(course: Course, pace: Pace, c: Chassis, state: CarState, view: View, cont
     );
 }
 
-fn car_input(c: Chassis, state: CarState, controls: Controls) -> CarInput {
+fn car_input(c: Chassis, state: CarState, controls: Controls, flap: f32) -> CarInput {
     let cosine = own_cos(Wheels(controls.steer)).x;
     let sine = own_sin(Wheels(controls.steer)).x;
     return CarInput(
         wheel_speeds(c, state.body, cosine, sine, controls.front_slip, controls.rear_slip),
         controls.steer,
+        select(flap, 0.0, controls.rear_slip < 0.0),
     );
 }

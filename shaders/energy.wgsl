@@ -92,6 +92,15 @@ fn spins(speed_squared: f32, ax: f32) -> bool {
     return !(speed_squared < account.exhaust_from) && 0.0 < ax && !(account.exhaust_to_ax < ax);
 }
 
+// What an open DRS sheds of the drag on a section's segment.
+fn shed_drag(section: u32, speed_squared: f32, curvature: f32) -> f32 {
+    if !may_open(section) {
+        return 0.0;
+    }
+    let shut = driving_with_drs(false, speed_squared, curvature);
+    return shut.z - driving_with_drs(true, speed_squared, curvature).z;
+}
+
 fn additional(
     section: u32,
     start: f32,
@@ -103,7 +112,8 @@ fn additional(
     space: f32,
     candidate: u32,
 ) -> Step {
-    let first = driving_at(start, here);
+    let drs = may_open(section);
+    let first = driving_with_drs(drs, start, here);
     let alone = min(first.x, first.y);
     let ahead = max(start + length * (alone - first.z), 0.0);
     let held = min(max(ahead * account.rows_per_speed_squared, 0.0), f32(ENVELOPE_ROWS));
@@ -122,7 +132,7 @@ fn additional(
     let engine = min(first.x, drive);
     let both = min(first.x, drive + boost);
     let middle = max(start + length * (both - first.z), 0.0);
-    let later = driving_at(middle, 0.5 * (here + there));
+    let later = driving_with_drs(drs, middle, 0.5 * (here + there));
     let later_drive = later.y - exhaust;
     let later_both = min(later.x, later_drive + boost);
     let motor = 0.5 * ((both - engine) + (later_both - min(later.x, later_drive)));
@@ -133,11 +143,12 @@ fn additional(
     return Step(end, max(motor - spare, 0.0));
 }
 
-fn engine_only(start: f32, length: f32, here: f32, there: f32, most: f32) -> f32 {
-    let at_start = driving_at(start, here);
+fn engine_only(section: u32, start: f32, length: f32, here: f32, there: f32, most: f32) -> f32 {
+    let drs = may_open(section);
+    let at_start = driving_with_drs(drs, start, here);
     let first = min(at_start.x, at_start.y) - at_start.z;
     let middle = max(start + length * first, 0.0);
-    let later = driving_at(middle, 0.5 * (here + there));
+    let later = driving_with_drs(drs, middle, 0.5 * (here + there));
     let second = min(later.x, later.y) - later.z;
     return min(max(start + length * (first + second), 0.0), most);
 }
@@ -204,7 +215,7 @@ fn segment_energy(
     if ADDITIONAL {
         step = additional(section, start, length, here, there, most, left, space, candidate);
     } else {
-        step = Step(engine_only(start, length, here, there, most), 0.0);
+        step = Step(engine_only(section, start, length, here, there, most), 0.0);
     }
     let end = step.end;
     let mean = 0.5 * (start + end);
@@ -215,7 +226,10 @@ fn segment_energy(
     let inverse = 1.0 / length;
     let ax = 0.5 * (end - start) * inverse;
     // The force at the wheels, driving or braking.
-    let force = account.rotating * ax + forces.w;
+    let shut = account.rotating * ax + forces.w;
+    let open = shut - shed_drag(section, mean, 0.5 * (here + there));
+    // A driver shuts the flap on the brakes.
+    let force = max(open, 0.0) + min(shut, 0.0);
     let demand = max(force, 0.0);
     let shed = max(-force, 0.0);
     let joules = account.mass * length;
@@ -314,7 +328,7 @@ fn energy_lap(candidate: u32) {
                 let space = account.store_room + gates.budget;
                 from_late = additional(here, from_late, bend.x, bend.y, there.y, most, gates.budget, space, candidate).end;
             } else {
-                from_late = engine_only(from_late, bend.x, bend.y, there.y, most);
+                from_late = engine_only(here, from_late, bend.x, bend.y, there.y, most);
             }
             bend = there;
         }

@@ -3,9 +3,9 @@
 // One lane per candidate. Segment lengths, curvatures and speeds squared stand in a buffer, in tiles of TILE lanes: section by
 // section within a tile, so that neighbouring lanes and neighbouring sections read neighbouring memory. All lanes start a lap's
 // passes at the same section for the same reason. The constants CLOSED, TERMS, WANTS_INTEGRAL, WANTS_LAP, ENVELOPE_ROWS,
-// CORNER_ROWS, ELLIPSE_ROWS, HAS_TRACTION, TRACTION_SPEEDS, TRACTION_ROOTS, WORKGROUP and TILE are generated, and so are the
-// bindings 1 to 4: `sections`; `envelope` in rows of lateral, grip, drive, drag at their start and then of their rises, and behind
-// them the cells of traction; `corners` and `ellipse` in rows of a figure and its rise.
+// CORNER_ROWS, ELLIPSE_ROWS, HAS_TRACTION, TRACTION_SPEEDS, TRACTION_ROOTS, HAS_DRS, OPEN_AT, WORKGROUP and TILE are generated, and
+// so are the bindings 1 to 4: `sections`; `envelope` in rows of lateral, grip, drive, drag at their start and then of their rises,
+// behind them the cells of traction, and from OPEN_AT on the same of the car with its DRS open; `corners` and `ellipse` in rows of a figure and its rise.
 // All lanes read the same section, so these tables are uniform buffers if they fit. The envelope is one only on drivers that let
 // lanes read different rows at full speed.
 
@@ -33,6 +33,8 @@ struct Section {
     inverse_spacing: f32,
     // The next section that takes other variables, or one past the last.
     until: u32,
+    // Whether the DRS may be open from here to the next section.
+    drs: u32,
 }
 
 @group(0) @binding(0) var<uniform> stretch: LineStretch;
@@ -170,11 +172,11 @@ fn corner(curvature: f32) -> f32 {
     return figures.x + (held - f32(row)) * figures.y;
 }
 
-// Lateral, grip, drive and drag.
-fn limits_at(speed_squared: f32) -> vec4<f32> {
+// Lateral, grip, drive and drag. `table` is where the limits begin: 0, or OPEN_AT with the DRS open.
+fn limits_at(speed_squared: f32, table: u32) -> vec4<f32> {
     let held = min(max(speed_squared * stretch.rows_per_speed_squared, 0.0), f32(ENVELOPE_ROWS));
     let row = min(u32(held), ENVELOPE_ROWS - 1u);
-    return envelope[2u * row] + (held - f32(row)) * envelope[2u * row + 1u];
+    return envelope[table + 2u * row] + (held - f32(row)) * envelope[table + 2u * row + 1u];
 }
 
 fn root_left(speed_squared: f32, curvature: f32, lateral: f32) -> f32 {
@@ -192,7 +194,7 @@ fn left_for_braking(root: f32) -> f32 {
     return figures.x + (held - f32(row)) * figures.y;
 }
 
-fn left_for_driving(speed_squared: f32, root: f32) -> f32 {
+fn left_for_driving(speed_squared: f32, root: f32, table: u32) -> f32 {
     if !HAS_TRACTION {
         return left_for_braking(root);
     }
@@ -202,33 +204,47 @@ fn left_for_driving(speed_squared: f32, root: f32) -> f32 {
     let across = root * f32(TRACTION_ROOTS);
     let speed = min(u32(held), TRACTION_SPEEDS - 1u);
     let cell = min(u32(across), TRACTION_ROOTS - 1u);
-    let figures = envelope[2u * ENVELOPE_ROWS + speed * TRACTION_ROOTS + cell];
+    let figures = envelope[table + 2u * ENVELOPE_ROWS + speed * TRACTION_ROOTS + cell];
     let beyond = held - f32(speed);
     let start = figures.x + beyond * figures.y;
     return start + (across - f32(cell)) * (figures.z + beyond * figures.w);
 }
 
 // The traction that is left, the drive and the drag.
-fn driving_at(speed_squared: f32, curvature: f32) -> vec3<f32> {
-    let at = limits_at(speed_squared);
-    let left = left_for_driving(speed_squared, root_left(speed_squared, curvature, at.x));
+fn driving_at(speed_squared: f32, curvature: f32, table: u32) -> vec3<f32> {
+    let at = limits_at(speed_squared, table);
+    let left = left_for_driving(speed_squared, root_left(speed_squared, curvature, at.x), table);
     return vec3<f32>(at.y * left, at.z, at.w);
 }
 
-fn acceleration(speed_squared: f32, curvature: f32) -> f32 {
-    let at = driving_at(speed_squared, curvature);
+fn may_open(section: u32) -> bool {
+    return HAS_DRS && sections[section].drs != 0u;
+}
+
+fn driving_with_drs(drs: bool, speed_squared: f32, curvature: f32) -> vec3<f32> {
+    let shut = driving_at(speed_squared, curvature, 0u);
+    if !drs {
+        return shut;
+    }
+    let open = driving_at(speed_squared, curvature, OPEN_AT);
+    let pays = min(shut.x, shut.y) - shut.z < min(open.x, open.y) - open.z;
+    return select(shut, open, pays);
+}
+
+fn acceleration(drs: bool, speed_squared: f32, curvature: f32) -> f32 {
+    let at = driving_with_drs(drs, speed_squared, curvature);
     return min(at.x, at.y) - at.z;
 }
 
 fn deceleration(speed_squared: f32, curvature: f32) -> f32 {
-    let at = limits_at(speed_squared);
+    let at = limits_at(speed_squared, 0u);
     return at.y * left_for_braking(root_left(speed_squared, curvature, at.x)) + at.w;
 }
 
-fn driven(start: f32, length: f32, here: f32, there: f32) -> f32 {
-    let first = acceleration(start, here);
+fn driven(drs: bool, start: f32, length: f32, here: f32, there: f32) -> f32 {
+    let first = acceleration(drs, start, here);
     let middle = max(start + length * first, 0.0);
-    let drive = acceleration(middle, 0.5 * (here + there));
+    let drive = acceleration(drs, middle, 0.5 * (here + there));
     return max(start + length * (first + drive), 0.0);
 }
 
@@ -254,7 +270,7 @@ fn lap_time(candidate: u32) -> f32 {
     for (var i = 0u; i < steps; i++) {
         let next = select(0u, here + 1u, here + 1u < n);
         let there = course[place_of(next, candidate)];
-        let reached = driven(speed_squared, bend.x, bend.y, there.y);
+        let reached = driven(may_open(here), speed_squared, bend.x, bend.y, there.y);
         // In the first round a section is limited by its corner speed alone.
         let again = i + 1u >= n;
         var most: f32;

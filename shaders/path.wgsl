@@ -1,7 +1,7 @@
 // Twin of `src/drive/path.rs`: the path that is followed, in the frame of its samples, and the car's place relative to it.
 // The constants ROWS_AHEAD, CELLS_AHEAD and BLENDS are generated.
 
-// Three vectors for each row of the path: the figures of `PathRow` in its order, and one without meaning.
+// Three vectors for each row of the path: the figures of `PathRow` in its order.
 @group(0) @binding(4) var<storage, read> path: array<vec4<f32>>;
 @group(0) @binding(5) var<storage, read> plans: array<f32>;
 @group(0) @binding(6) var<storage, read> courses: array<Course>;
@@ -35,6 +35,7 @@ struct PathRow {
     right_rise: f32,
     cell: f32,
     cell_share: f32,
+    flap: f32,
 }
 
 struct Pose {
@@ -71,7 +72,7 @@ fn path_row(number: f32) -> PathRow {
     let a = path[at];
     let b = path[at + 1u];
     let c = path[at + 2u];
-    return PathRow(a.x, a.y, a.z, a.w, b.x, b.y, b.z, b.w, c.x, c.y, c.z);
+    return PathRow(a.x, a.y, a.z, a.w, b.x, b.y, b.z, b.w, c.x, c.y, c.z, c.w);
 }
 
 // The path `along` metres behind the sample of `row`: `frame_at` and `resolve` in one, because both take sines of the same

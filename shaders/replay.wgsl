@@ -11,6 +11,7 @@ struct Sample {
     wheel_speed: vec4<f32>,
     measured: vec4<f32>,
     steer: f32,
+    flap: f32,
 }
 
 struct Window {
@@ -31,6 +32,7 @@ fn input_between(a: Sample, b: Sample, fraction: f32) -> CarInput {
     return CarInput(
         a.wheel_speed + fraction * (b.wheel_speed - a.wheel_speed),
         a.steer + fraction * (b.steer - a.steer),
+        a.flap + fraction * (b.flap - a.flap),
     );
 }
 

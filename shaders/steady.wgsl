@@ -65,10 +65,11 @@ fn settle_rate(car: CarModel, speed: f32, steer: f32, now: Figures) -> SettleRat
     let input = CarInput(
         wheel_speeds(c, body, cosine, sine, 0.0, now.slip),
         (steer - c.steer_offset) / c.steer_scale,
+        0.0,
     );
     let rate = car_rate(car, state, input).state;
     let lag = rate.pitch_acceleration * c.pitch_lag;
-    let drag = aero_forces(c, body.vx).drag / c.mass;
+    let drag = aero_forces(c, body.vx, 0.0).drag / c.mass;
     let push = state.pitch_acceleration + lag + drag + body.vy * body.yaw_rate;
     let damped = c.roll_damping * body.roll_rate / (c.mass * c.cg_height);
     var residual = max(abs(rate.body.vy), abs(rate.body.yaw_rate * (c.cg_to_front + c.cg_to_rear)));

@@ -342,7 +342,7 @@ pub fn act<R: Lookup>(
     let after = planned_speed(road, course, pace, view, look + reach);
     let planned = (after * after - before * before) / R::lit(4.0 * PLAN_REACH_M);
     let wanted = planned + R::load(driver.speed_gain) * behind;
-    let aero = aero_forces(c, v);
+    let aero = aero_forces(c, v, view.row.flap);
     let force = c.mass * wanted + aero.drag;
     let weight = c.mass * c.gravity + (aero.downforce_front + aero.downforce_rear);
     // What a bend leaves of the tyres, by the friction circle.
@@ -368,12 +368,18 @@ pub fn act<R: Lookup>(
     }
 }
 
-/// The wheel speeds and the steering that the controls ask for.
+/// The wheel speeds and the steering that the controls ask for, and the DRS: open where the path says so, shut on the brakes.
 #[inline(always)]
-pub fn car_input<R: Real>(c: &Chassis<R>, state: &CarState<R>, controls: &Controls<R>) -> CarInput<R> {
+pub fn car_input<R: Real>(
+    c: &Chassis<R>,
+    state: &CarState<R>,
+    controls: &Controls<R>,
+    flap: R,
+) -> CarInput<R> {
     let turned = (controls.steer.cos(), controls.steer.sin());
     CarInput {
         wheel_speed: wheel_speeds(c, &state.body, turned, [controls.front_slip, controls.rear_slip]),
         steer: controls.steer,
+        flap: R::select(controls.rear_slip.less_than(R::lit(0.0)), R::lit(0.0), flap),
     }
 }

@@ -215,7 +215,7 @@ pub fn drive_step<R: Lookup, T: Tyre<R>>(
         (&before.car, &view),
         &before.controls,
     );
-    let input = car_input(&car.chassis, &before.car, &controls);
+    let input = car_input(&car.chassis, &before.car, &controls, view.row.flap);
     watch(&Moment {
         car: &before.car,
         view: &view,

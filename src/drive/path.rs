@@ -28,6 +28,8 @@ pub struct Row<R> {
     pub cell: R,
     /// Position of the sample within that cell, as a share of its length.
     pub cell_share: R,
+    /// 1 where the driver opens the DRS, else 0.
+    pub flap: R,
 }
 
 impl<R: Lookup> Row<R> {
@@ -48,6 +50,7 @@ impl<R: Lookup> Row<R> {
             right_rise: at(8),
             cell: at(9),
             cell_share: at(10),
+            flap: at(11),
         }
     }
 }

@@ -21,7 +21,7 @@ const SPACING: f64 = 2.0;
 
 /// What the tyres carry at a speed (m/s), over the car's mass (m/s^2).
 pub(super) fn load_mps2(c: &Chassis<f64>, speed: f64) -> f64 {
-    let aero = aero_forces(c, speed);
+    let aero = aero_forces(c, speed, 0.0);
     c.gravity + (aero.downforce_front + aero.downforce_rear) / c.mass
 }
 
@@ -37,9 +37,9 @@ impl TyreEnvelope<'_> {
         self.friction * load_mps2(c, speed)
     }
 
-    fn drag(&self, speed: f64) -> f64 {
+    fn drag(&self, speed: f64, flap: f64) -> f64 {
         let c = &self.car.chassis;
-        aero_forces(c, speed).drag / c.mass
+        aero_forces(c, speed, flap).drag / c.mass
     }
 
     fn drive(&self, speed: f64) -> f64 {
@@ -93,13 +93,14 @@ impl SpeedPlan {
         for step in 0..2 * count {
             let (i, next) = (step % count, (step + 1) % count);
             let v = speed_mps[i];
-            let a = envelope.drive(v).min(0.6 * envelope.remaining(v, curvature[i])) - envelope.drag(v);
+            let flap = f64::from(u8::from(circuit.drs_at(i as f64 * spacing_m)));
+            let a = envelope.drive(v).min(0.6 * envelope.remaining(v, curvature[i])) - envelope.drag(v, flap);
             speed_mps[next] = speed_mps[next].min((v * v + 2.0 * a * spacing_m).max(1.0).sqrt());
         }
         for step in (0..2 * count).rev() {
             let (i, next) = (step % count, (step + 1) % count);
             let v = speed_mps[next];
-            let a = 0.85 * envelope.remaining(v, curvature[next]) + envelope.drag(v);
+            let a = 0.85 * envelope.remaining(v, curvature[next]) + envelope.drag(v, 0.0);
             speed_mps[i] = speed_mps[i].min((v * v + 2.0 * a * spacing_m).sqrt());
         }
         Self { spacing_m, speed_mps }

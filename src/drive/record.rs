@@ -8,14 +8,14 @@ use super::settings::DriverSettings;
 use crate::error::{Error, Result};
 use crate::track::Circuit;
 use crate::vehicle::tyre::Tyre;
-use crate::vehicle::{Car, CarModel, LinearTyre, MagicFormula, TyreModel};
+use crate::vehicle::{Car, CarInput, CarModel, LinearTyre, MagicFormula, TyreModel};
 use glam::DVec2;
 
 /// One driven lap: what the wheels and the steering did, at a uniform rate.
 #[derive(Clone, Debug, Default)]
 pub struct Drive {
-    /// Wheel speeds FL FR RL RR and road-wheel angle at each sample, rad/s and rad.
-    pub inputs: Vec<([f64; 4], f64)>,
+    /// What the wheels, the steering and the DRS did at each sample.
+    pub inputs: Vec<CarInput<f64>>,
     /// State at each sample, in the order of [`crate::vehicle::CarState::to_array`].
     pub states: Vec<[f64; 6]>,
     /// Distance driven along the centreline from the start line, m.
@@ -131,7 +131,7 @@ fn record<T: Tyre<f64>>(
             }
             let due = *next_sample.get_or_insert(time);
             if time >= due - 0.5 * STEP {
-                log.inputs.push((moment.input.wheel_speed, moment.input.steer));
+                log.inputs.push(*moment.input);
                 log.states.push(moment.car.to_array());
                 log.station_m
                     .push((pose.lap * course.rows + pose.row) * course.spacing + pose.along);

@@ -232,7 +232,7 @@ impl Road<f64> {
                 right[next] - right[here],
                 cell.floor(),
                 cell - cell.floor(),
-                0.0,
+                f64::from(u8::from(circuit.drs_at((here as f64 + 0.5) * spacing))),
             ];
             self.path.extend(row);
         }

@@ -364,6 +364,7 @@ mod tests {
             reference: vec![0.5; 60],
             sections: Vec::new(),
             corners: Vec::new(),
+            drs: Vec::new(),
         };
         let edges = cross_sections.clone();
         cross_sections = cross_sections.narrowed(2.0).unwrap();

@@ -10,6 +10,25 @@ use rayon::prelude::*;
 const FURTHEST_M: f64 = 0.5;
 
 impl FineLine {
+    /// Where the lap has the DRS open: start and end (m) of each stretch.
+    fn open_m(&self) -> Vec<[f64; 2]> {
+        let open = self
+            .lap
+            .iter()
+            .flat_map(|lap| &lap.drs_open)
+            .enumerate()
+            .filter(|(_, open)| **open);
+        let mut stretches: Vec<[f64; 2]> = Vec::new();
+        for (i, _) in open {
+            let (start, end) = (self.station_m[i], self.station_m[i] + self.segment_m[i]);
+            match stretches.last_mut() {
+                Some(last) if last[1] == start => last[1] = end,
+                _ => stretches.push([start, end]),
+            }
+        }
+        stretches
+    }
+
     /// A circuit whose centreline is this line between edges (m, right and left). Widths are from the line to the edges less
     /// half the car (m); `name` is what errors call the line.
     ///
@@ -49,6 +68,7 @@ impl FineLine {
             width_right_m: Vec::new(),
             sections: Vec::new(),
             corners: Vec::new(),
+            drs_zones_m: self.open_m(),
         };
         let mut at = 0;
         for station in &circuit.station_m {

@@ -36,7 +36,8 @@ pub struct FineLine {
 
 impl FineLine {
     /// The cubic spline through `points_m`, cut into pieces of at most `spacing_m`, and the lap of `car` on it;
-    /// `entry_mps` is the greatest speed at the start of an open line (m/s).
+    /// `entry_mps` is the greatest speed at the start of an open line (m/s). With the car stands whether its DRS may be open from each
+    /// given point to the next; nowhere if that is empty.
     ///
     /// # Errors
     /// [`Error::Input`] if there are too few points, if neighbours coincide, or if the car or the spacing is out of range.
@@ -44,7 +45,7 @@ impl FineLine {
         points_m: &[DVec2],
         closed: bool,
         spacing_m: f64,
-        car: Option<&PointMass>,
+        car: Option<(&PointMass, &[bool])>,
         entry_mps: f64,
     ) -> Result<Self> {
         let n = points_m.len();
@@ -107,9 +108,14 @@ impl FineLine {
             gamma_squared += line.curvature_1pm[line.curvature_1pm.len() - 1].powi(2);
         }
         line.gamma_1pm = gamma_squared.sqrt();
-        if let Some(car) = car {
+        if let Some((car, drs)) = car {
             let table = car.table()?;
-            let lap = lap_profile(car, &table, &line.segment_m, &line.curvature_1pm, entry_mps)?;
+            let drs: Vec<bool> = line
+                .section
+                .iter()
+                .filter_map(|(section, _)| drs.get(*section).copied())
+                .collect();
+            let lap = lap_profile(car, &table, &line.segment_m, &line.curvature_1pm, entry_mps, &drs)?;
             line.lap = Some(lap);
         }
         Ok(line)

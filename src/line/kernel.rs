@@ -31,6 +31,8 @@ pub struct Course<R> {
     pub length: Vec<R>,
     /// Curvature at each section (1/m), without a sign.
     pub curvature: Vec<R>,
+    /// Whether the DRS may be open on each segment; nowhere if empty.
+    pub drs: Vec<bool>,
     /// Speed squared at each section (m^2/s^2).
     pub speed_squared: Vec<R>,
     /// Results of the first drive of a lap with a motor beside the engine, for each segment: speed squared at its end (m^2/s^2),
@@ -43,10 +45,17 @@ impl<R> Default for Course<R> {
         Self {
             length: Vec::new(),
             curvature: Vec::new(),
+            drs: Vec::new(),
             speed_squared: Vec::new(),
             first_drive: Vec::new(),
         }
     }
+}
+
+/// Whether the DRS may be open on a segment; nowhere if `drs` is empty.
+#[inline(always)]
+pub(crate) fn may_open(drs: &[bool], segment: usize) -> bool {
+    drs.get(segment).is_some_and(|drs| *drs)
 }
 
 /// Sums over a line.
@@ -133,6 +142,8 @@ pub fn shape<R: Real>(
     course.length.resize(n, zero);
     course.curvature.clear();
     course.curvature.resize(n, zero);
+    course.drs.clear();
+    course.drs.extend(plan.rows.iter().map(|row| row.drs));
 
     // This is not a closure. Code that is compiled for an instruction set has to be inlined, and closures cannot be marked so.
     let first = offset(&plan.rows[0], plan.terms, variables);
@@ -274,10 +285,36 @@ pub(super) fn driving_at<R: Lookup>(
     ]
 }
 
-/// Greatest acceleration (m/s^2) at a speed squared in a bend.
+/// As [`driving_at`]. Where the DRS may be open, the driver opens it if the car then gains more speed.
 #[inline(always)]
-pub fn acceleration<R: Lookup>(envelope: &EnvelopeTable<R::Storage>, speed_squared: R, curvature: R) -> R {
-    let [traction, drive, drag] = driving_at(envelope, speed_squared, curvature);
+pub(super) fn driving_with_drs<R: Lookup>(
+    envelope: &EnvelopeTable<R::Storage>,
+    drs: bool,
+    speed_squared: R,
+    curvature: R,
+) -> [R; 3] {
+    let shut = driving_at(envelope, speed_squared, curvature);
+    let Some(open) = envelope.open.as_ref().filter(|_| drs) else {
+        return shut;
+    };
+    let open = driving_at(open, speed_squared, curvature);
+    let pays = (shut[0].min(shut[1]) - shut[2]).less_than(open[0].min(open[1]) - open[2]);
+    [
+        R::select(pays, open[0], shut[0]),
+        R::select(pays, open[1], shut[1]),
+        R::select(pays, open[2], shut[2]),
+    ]
+}
+
+/// Greatest acceleration (m/s^2) at a speed squared in a bend; `drs` says whether the DRS may be open.
+#[inline(always)]
+pub fn acceleration<R: Lookup>(
+    envelope: &EnvelopeTable<R::Storage>,
+    drs: bool,
+    speed_squared: R,
+    curvature: R,
+) -> R {
+    let [traction, drive, drag] = driving_with_drs(envelope, drs, speed_squared, curvature);
     traction.min(drive) - drag
 }
 
@@ -293,11 +330,17 @@ pub fn deceleration<R: Lookup>(envelope: &EnvelopeTable<R::Storage>, speed_squar
 /// smooth lines at 5 to 16 m the middle was 0.4% to 1.2% of a lap off, the start 0.4% to 0.5% the other way, and the mean 0.1% to
 /// 0.2%. On jagged lines no coarse grid is accurate.
 #[inline(always)]
-fn driven<R: Lookup>(envelope: &EnvelopeTable<R::Storage>, from: R, length: R, here: R, there: R) -> R {
+fn driven<R: Lookup>(
+    envelope: &EnvelopeTable<R::Storage>,
+    drs: bool,
+    from: R,
+    length: R,
+    [here, there]: [R; 2],
+) -> R {
     let zero = R::lit(0.0);
-    let start = acceleration(envelope, from, here);
+    let start = acceleration(envelope, drs, from, here);
     let middle = (from + length * start).max(zero);
-    let drive = acceleration(envelope, middle, R::lit(0.5) * (here + there));
+    let drive = acceleration(envelope, drs, middle, R::lit(0.5) * (here + there));
     (from + length * (start + drive)).max(zero)
 }
 
@@ -329,7 +372,7 @@ pub fn lap_time<R: Lookup>(
     course: &mut Course<R>,
 ) -> R {
     let n = course.curvature.len();
-    let (length, curvature) = (&course.length, &course.curvature);
+    let (length, curvature, drs) = (&course.length, &course.curvature, &course.drs);
     let speeds = &mut course.speed_squared;
     speeds.clear();
     speeds.resize(n, R::lit(0.0));
@@ -346,10 +389,10 @@ pub fn lap_time<R: Lookup>(
         let next = if here + 1 < n { here + 1 } else { 0 };
         let reached = driven(
             envelope,
+            may_open(drs, here),
             speeds[here],
             length[here],
-            curvature[here],
-            curvature[next],
+            [curvature[here], curvature[next]],
         );
         // In the first round a section is limited by its corner speed alone.
         let again = step + 1 >= n;

@@ -196,6 +196,7 @@ pub fn cross_sections_about(road: &CrossSections, points_m: &[DVec2], count: usi
         cross_sections.left_m.push(place + (middle + half) * left);
         cross_sections.reference.push((half - middle) / (2.0 * half));
     }
+    cross_sections.drs = road.drs_along(&cross_sections.points(&cross_sections.reference));
     Ok(cross_sections)
 }
 

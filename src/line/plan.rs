@@ -21,6 +21,8 @@ pub struct SectionRow<S> {
     pub weights: [S; TERMS],
     /// Which variables those are.
     pub sources: [u32; TERMS],
+    /// Whether the DRS may be open from here to the next cross-section.
+    pub drs: bool,
 }
 
 /// All sections, and the order in which a lap passes them.
@@ -54,6 +56,7 @@ impl LinePlan<f64> {
             constant: 0.0,
             weights: [0.0; TERMS],
             sources: [0; TERMS],
+            drs: false,
         });
         Self {
             closed,
@@ -68,6 +71,14 @@ impl LinePlan<f64> {
     pub fn spaced(mut self, spacing_m: &[f64]) -> Self {
         for (row, spacing) in self.rows.iter_mut().zip(spacing_m) {
             row.inverse_spacing = spacing.recip();
+        }
+        self
+    }
+
+    /// The plan with the segments on which the DRS may be open; none where `drs` is empty.
+    pub fn with_drs(mut self, drs: &[bool]) -> Self {
+        for (row, drs) in self.rows.iter_mut().zip(drs) {
+            row.drs = *drs;
         }
         self
     }
@@ -95,6 +106,7 @@ impl LinePlan<f64> {
                     constant: store(row.constant),
                     weights: row.weights.map(store),
                     sources: row.sources,
+                    drs: row.drs,
                 })
                 .collect(),
         }

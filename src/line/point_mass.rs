@@ -44,6 +44,9 @@ pub struct EnvelopeTable<S> {
     /// root, and what that rise gains over the speed squared. Empty where the envelope says nothing of it and driving has what
     /// braking has.
     pub traction: Vec<S>,
+    /// The table of the same car with its DRS open, over the same speeds, if it has one. Its corners are not used: a driver shuts
+    /// the flap where it costs speed.
+    pub open: Option<Box<Self>>,
 }
 
 /// Cells of [`EnvelopeTable::traction`] over the speed squared. The share changes with downforce alone.
@@ -121,7 +124,19 @@ impl PointMass {
                 with_rises(&self.ellipse_knots())
             },
             traction: self.traction_cells(top),
+            open: match self.envelope.open() {
+                Some(open) => Some(Box::new(self.within(open.clone()).table()?)),
+                None => None,
+            },
         })
+    }
+
+    /// The same point mass within another envelope.
+    fn within(&self, envelope: Envelope) -> Self {
+        Self {
+            envelope,
+            ..self.clone()
+        }
     }
 
     /// The cells of traction in bends. Tyres that drive never have more than the ellipse.
@@ -216,6 +231,7 @@ impl EnvelopeTable<f64> {
             corners: all(&self.corners),
             ellipse: all(&self.ellipse),
             traction: all(&self.traction),
+            open: self.open.as_ref().map(|open| Box::new(open.stored::<R>())),
         }
     }
 }

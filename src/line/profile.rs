@@ -1,6 +1,6 @@
 //! All figures of a lap on one line.
 
-use super::kernel::{Course, lap_time};
+use super::kernel::{Course, acceleration, driving_at, lap_time, may_open};
 use super::point_mass::{EnvelopeTable, PointMass};
 use crate::error::{Error, Result};
 
@@ -23,6 +23,8 @@ pub struct LapProfile {
     pub segment_time_s: Vec<f64>,
     /// Sections where the steering passes the lock, if there is one.
     pub beyond_lock: usize,
+    /// Whether the driver has the DRS open from each section to the next.
+    pub drs_open: Vec<bool>,
 }
 
 impl LapProfile {
@@ -39,7 +41,8 @@ impl LapProfile {
 }
 
 /// Drives `car` along a line of these segments (m) and curvatures (1/m, with sign). A line is closed if it has as many
-/// segments as sections; `entry_mps` is the greatest speed (m/s) at the start of an open one. `table` is the car's.
+/// segments as sections; `entry_mps` is the greatest speed (m/s) at the start of an open one. `table` is the car's. `drs` says on
+/// which segments the DRS may be open; nowhere if it is empty.
 ///
 /// # Errors
 /// [`Error::Input`] if lengths are not positive, the numbers of figures do not fit each other, or the car comes to a
@@ -50,6 +53,7 @@ pub fn lap_profile(
     segment_m: &[f64],
     curvature_1pm: &[f64],
     entry_mps: f64,
+    drs: &[bool],
 ) -> Result<LapProfile> {
     let n = curvature_1pm.len();
     let wrong =
@@ -80,6 +84,7 @@ pub fn lap_profile(
     let mut course = Course {
         length: segment_m.to_vec(),
         curvature: curvature_1pm.iter().map(|k| k.abs()).collect(),
+        drs: drs.to_vec(),
         ..Course::default()
     };
     let start = slowest(&course.curvature);
@@ -92,6 +97,7 @@ pub fn lap_profile(
         );
     }
     let w = &course.speed_squared;
+    let drs_open = (0..segment_m.len()).map(|i| opens(table, &course, i)).collect();
     let v_mps: Vec<f64> = w.iter().map(|w| w.sqrt()).collect();
     let next = |i: usize| (i + 1) % n;
     let mut ax_mps2: Vec<f64> = segment_m
@@ -112,6 +118,7 @@ pub fn lap_profile(
     let steering_rad: Vec<f64> = curvature_1pm.iter().map(|k| car.wheelbase_m * k).collect();
     Ok(LapProfile {
         time_s,
+        drs_open,
         station_m,
         ax_mps2,
         ay_mps2: curvature_1pm.iter().zip(w).map(|(k, w)| k * w).collect(),
@@ -126,6 +133,18 @@ pub fn lap_profile(
             .collect(),
         v_mps,
     })
+}
+
+/// Whether the driver has the DRS open on a segment: it may be, he does not brake, and it gains him speed.
+fn opens(table: &EnvelopeTable<f64>, course: &Course<f64>, segment: usize) -> bool {
+    let next = (segment + 1) % course.curvature.len();
+    let [from, to] = [segment, next].map(|i| course.speed_squared[i]);
+    let middle = 0.5 * (from + to);
+    let bend = 0.5 * (course.curvature[segment] + course.curvature[next]);
+    let gained = 0.5 * (to - from) / course.length[segment];
+    let most = |drs: bool| acceleration::<f64>(table, drs, middle, bend);
+    let [.., drag] = driving_at::<f64>(table, middle, bend);
+    may_open(&course.drs, segment) && most(false) < most(true) && gained > -drag
 }
 
 /// The section of the greatest curvature, where a car is slowest.

@@ -23,6 +23,7 @@ fn ring(inner_m: f64, outer_m: f64, sections: usize) -> CrossSections {
         reference: vec![0.5; sections],
         sections: Vec::new(),
         corners: Vec::new(),
+        drs: Vec::new(),
     }
 }
 
@@ -83,7 +84,7 @@ fn a_lap_at_constant_grip_takes_what_it_must() {
     let car = car(|_| [12.0, 10.0, 5.0, 0.0], 100.0);
     let table = car.table().unwrap();
     let shape = geometry(&ring(590.0, 600.0, 361).points(&[0.5; 361]), true);
-    let lap = lap_profile(&car, &table, &shape.segment_m, &shape.curvature_1pm, 0.0).unwrap();
+    let lap = lap_profile(&car, &table, &shape.segment_m, &shape.curvature_1pm, 0.0, &[]).unwrap();
     let speed = (12.0f64 * 595.0).sqrt();
     assert!(
         lap.v_mps.iter().all(|v| (v - speed).abs() < 1e-8 * speed),
@@ -101,7 +102,7 @@ fn a_straight_is_left_at_the_speed_of_constant_acceleration() {
     let table = car.table().unwrap();
     let points: Vec<DVec2> = (0..50).map(|i| DVec2::new(7.0 * f64::from(i), 3.0)).collect();
     let shape = geometry(&points, false);
-    let lap = lap_profile(&car, &table, &shape.segment_m, &shape.curvature_1pm, 20.0).unwrap();
+    let lap = lap_profile(&car, &table, &shape.segment_m, &shape.curvature_1pm, 20.0, &[]).unwrap();
     let distance = 7.0 * 49.0;
     let speed = (400.0f64 + 2.0 * 5.0 * distance).sqrt();
     assert!((lap.v_mps[49] - speed).abs() < 1e-9);
@@ -197,7 +198,7 @@ fn a_closed_lap_does_not_depend_on_where_its_passes_start() {
 fn coarse_grids_come_close_to_fine_ones() {
     let car = gt_car();
     let time = |sections| {
-        let line = FineLine::new(&wavy(sections), true, 1000.0, Some(&car), 0.0).unwrap();
+        let line = FineLine::new(&wavy(sections), true, 1000.0, Some((&car, &[])), 0.0).unwrap();
         line.lap_time_s().unwrap()
     };
     let reference = time(12_800);
@@ -363,7 +364,7 @@ fn driven_tyres_have_less_in_bends() {
         (0.96, 2.8, 2.8 * 5.0 / 6.0),
         (1.0, 0.0, 0.0),
     ] {
-        let at = |table| kernel::acceleration::<f64>(table, 900.0, share * 12.0 / 900.0);
+        let at = |table| kernel::acceleration::<f64>(table, false, 900.0, share * 12.0 / 900.0);
         let [by_ellipse, by_table] = [at(&tables[0]), at(&tables[1])];
         // Cells of a thirty-second of the root cut the corner at 0.6.
         assert!((by_ellipse - ellipse).abs() < 1e-6, "{share}: {by_ellipse}");
@@ -385,7 +386,7 @@ fn a_car_driven_at_the_rear_leaves_corners_more_slowly() {
     let [slow, fast] = [swept, ellipse].map(|envelope| {
         let car = PointMass::new(envelope, 2.6);
         let table = car.table().unwrap();
-        lap_profile(&car, &table, &[2.0; 100], &curvature, 100.0).unwrap()
+        lap_profile(&car, &table, &[2.0; 100], &curvature, 100.0, &[]).unwrap()
     });
     assert_eq!(slow.v_mps[0], fast.v_mps[0]);
     let lost = |i: usize| fast.v_mps[i] - slow.v_mps[i];
@@ -407,7 +408,7 @@ fn first_order_time(shape: &Geometry) -> f64 {
     let mut w: Vec<f64> = bend.iter().map(|k| kernel::corner::<f64>(&table, *k)).collect();
     for i in 0..2 * n {
         let (here, next) = (i % n, (i + 1) % n);
-        let drive = kernel::acceleration::<f64>(&table, w[here], bend[here]);
+        let drive = kernel::acceleration::<f64>(&table, false, w[here], bend[here]);
         w[next] = w[next].min(w[here] + 2.0 * h[here] * drive);
     }
     for i in (0..2 * n).rev() {
@@ -424,11 +425,11 @@ fn first_order_time(shape: &Geometry) -> f64 {
 fn limits_of_start_and_middle_beat_those_of_the_start() {
     let car = gt_car();
     let table = car.table().unwrap();
-    let reference = FineLine::new(&wavy(6400), true, 1000.0, Some(&car), 0.0).unwrap();
+    let reference = FineLine::new(&wavy(6400), true, 1000.0, Some((&car, &[])), 0.0).unwrap();
     let reference = reference.lap_time_s().unwrap();
     let off = |sections: usize| {
         let shape = geometry(&wavy(sections), true);
-        let lap = lap_profile(&car, &table, &shape.segment_m, &shape.curvature_1pm, 0.0).unwrap();
+        let lap = lap_profile(&car, &table, &shape.segment_m, &shape.curvature_1pm, 0.0, &[]).unwrap();
         (lap.time_s - reference, first_order_time(&shape) - reference)
     };
     for sections in [200, 400, 800, 1600] {
@@ -436,4 +437,77 @@ fn limits_of_start_and_middle_beat_those_of_the_start() {
         println!("{sections} sections: {second:.4} s of {reference:.3} s off, start alone {first:.4} s");
         assert!(second.abs() < 0.6 * first.abs(), "{second} {first}");
     }
+}
+
+/// An envelope of 15 m/s^2 of grip, 5 of drive and 2 of drag. The open DRS leaves 1 of the drag and 12 of the grip.
+fn car_with_drs() -> PointMass {
+    let shut = car(|_| [15.0, 15.0, 5.0, 2.0], 70.0);
+    let open = |_: &Envelope, row: &EnvelopeRow| EnvelopeRow {
+        ay_mps2: 12.0,
+        ax_grip_mps2: 12.0,
+        drag_mps2: 1.0,
+        ..*row
+    };
+    let open = shut.envelope.with_rows("open", &open).unwrap();
+    PointMass::new(shut.envelope.with_open(open).unwrap(), 2.6)
+}
+
+/// On a straight the car gains 3 m/s^2, and 4 where its flap is open. It brakes for the bend at the end with 17, whatever the zone
+/// says. In a bend that takes nearly all of its grip it goes faster with the flap shut.
+#[test]
+fn the_drs_is_open_where_it_may_be_and_gains_speed_and_shut_on_the_brakes() {
+    let car = car_with_drs();
+    let table = car.table().unwrap();
+    let mut curvature = vec![0.0; 101];
+    curvature[100] = 15.0 / 100.0;
+    let drs: Vec<bool> = (0..100).map(|i| i >= 40).collect();
+    let lap = |drs: &[bool]| lap_profile(&car, &table, &[2.0; 100], &curvature, 20.0, drs).unwrap();
+    let (with, without) = (lap(&drs), lap(&[]));
+    // On the segment between driving and braking the car does both.
+    let change = with.ax_mps2.iter().skip(60).position(|ax| *ax < 3.9).unwrap() + 60;
+    assert!((62..90).contains(&change), "{change}");
+    for i in (0..98).filter(|i| *i != change) {
+        let wanted = match i {
+            _ if i > change => -17.0,
+            40.. => 4.0,
+            _ => 3.0,
+        };
+        assert!(
+            (with.ax_mps2[i] - wanted).abs() < 1e-6,
+            "{i}: {}",
+            with.ax_mps2[i]
+        );
+        assert_eq!(with.drs_open[i], (40..change).contains(&i), "{i}");
+    }
+    assert!(without.ax_mps2[..60].iter().all(|ax| (ax - 3.0).abs() < 1e-6));
+    assert!(without.drs_open.iter().all(|open| !open) && with.time_s < without.time_s);
+    // At 11.9 of 15 m/s^2 the shut car has 9.1 for driving, more than its engine; with the flap open 1.5 would be left.
+    let bend = kernel::driving_at::<f64>(&table, 900.0, 11.9 / 900.0);
+    let chosen = kernel::driving_with_drs::<f64>(&table, true, 900.0, 11.9 / 900.0);
+    assert_eq!(chosen, bend);
+    let straight = kernel::driving_with_drs::<f64>(&table, true, 900.0, 0.0);
+    assert_eq!(straight, [12.0, 5.0, 1.0]);
+}
+
+/// A line of other points than the cross-sections has the zones of the road that it is on.
+#[test]
+fn zones_follow_a_line_along_the_road() {
+    let mut road = ring(180.0, 220.0, 400);
+    road.drs = (0..400).map(|i| (100..250).contains(&i)).collect();
+    let line: Vec<DVec2> = (0..1000)
+        .map(|i| {
+            (195.0 + 10.0 * (TAU * 3.0 * f64::from(i) / 1000.0).sin())
+                * DVec2::from_angle(TAU * f64::from(i) / 1000.0)
+        })
+        .collect();
+    let drs = road.drs_along(&line);
+    for (i, open) in drs.iter().enumerate() {
+        // The cross-section that is nearest to a point may be half a step ahead of it.
+        let at = i as f64 * 0.4;
+        if (at - 100.0).abs() > 1.0 && (at - 250.0).abs() > 1.0 {
+            assert_eq!(*open, (100.0..250.0).contains(&at), "{i}");
+        }
+    }
+    road.drs.clear();
+    assert!(road.drs_along(&line).is_empty());
 }

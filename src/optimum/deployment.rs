@@ -11,6 +11,7 @@ use crate::error::{Error, Result};
 use crate::evaluate::energy::{HybridObjective, HybridProblem, Strategy};
 use crate::line::energy::kernel::motor_step;
 use crate::line::energy::{EnergyCar, EnergyLap, EnergyPlan, Gates, Mode};
+use crate::line::kernel::may_open;
 use glam::DVec2;
 use std::time::Instant;
 
@@ -40,6 +41,8 @@ pub struct DeploymentSearch<'a> {
     pub points_m: &'a [DVec2],
     /// Whether the line is closed.
     pub closed: bool,
+    /// Whether the DRS may be open from each point to the next; nowhere if empty.
+    pub drs: &'a [bool],
     /// A slow section late in the lap.
     pub run_in: usize,
     /// Greatest speed at the start of an open line (m/s).
@@ -87,6 +90,7 @@ impl DeploymentSearch<'_> {
             crate::evaluate::energy::HybridLine::Fixed {
                 points_m: self.points_m.to_vec(),
                 closed: self.closed,
+                drs: self.drs.to_vec(),
             },
             self.car.clone(),
             EnergyPlan::single(n, self.run_in, Mode::Additional),
@@ -187,7 +191,7 @@ impl DeploymentSearch<'_> {
 
     fn linear(&self, length: &[f64], curvature: &[f64], i: usize, square: f64, share: f64) -> Linear {
         let (h, n) = (length[i], curvature.len());
-        let bends = [curvature[i], curvature[(i + 1) % n]];
+        let bends = ([curvature[i], curvature[(i + 1) % n]], may_open(self.drs, i));
         let step = |square: f64, share: f64| {
             motor_step(&self.car.envelope_table, &self.car.table, square, h, bends, share)
         };

@@ -18,6 +18,8 @@ pub struct LineMap {
     origin_m: Vec<DVec2>,
     starts: Vec<usize>,
     reach: Vec<(usize, DVec2)>,
+    /// Whether the DRS may be open from each point to the next; nowhere if empty.
+    pub(super) drs: Vec<bool>,
 }
 
 impl LineMap {
@@ -33,6 +35,7 @@ impl LineMap {
             origin_m: Vec::new(),
             starts: vec![0],
             reach: Vec::new(),
+            drs: Vec::new(),
         };
         for (origin, reach) in points {
             map.origin_m.push(origin);
@@ -50,7 +53,7 @@ impl LineMap {
                 vec![(i, cross_sections.left_m[i] - cross_sections.right_m[i])],
             )
         });
-        Self::new(cross_sections.closed, cross_sections.len(), points)
+        Self::new(cross_sections.closed, cross_sections.len(), points).with_drs(cross_sections)
     }
 
     /// The variables of a parametrisation, and the bounds that keep them and the line within theirs.
@@ -79,7 +82,7 @@ impl LineMap {
             let reach = shares(row).into_iter().map(|(k, share)| (k, share * across));
             (cross_sections.right_m[i] + row.constant * across, reach.collect())
         });
-        let map = Self::new(cross_sections.closed, variables.len(), points);
+        let map = Self::new(cross_sections.closed, variables.len(), points).with_drs(cross_sections);
         // A single variable at a section has its own bounds.
         let sums = plan.rows.iter().filter(|_| plan.terms > 1);
         let rows = sums.map(|row| RowBound {
@@ -119,7 +122,14 @@ impl LineMap {
             upper: vec![f64::INFINITY; controls],
             rows: rows.collect(),
         };
-        (Self::new(cross_sections.closed, controls, reaches), bounds)
+        let map = Self::new(cross_sections.closed, controls, reaches).with_drs(cross_sections);
+        (map, bounds)
+    }
+
+    /// The map of a line with a point at every cross-section, which has the DRS open where these allow it.
+    fn with_drs(mut self, cross_sections: &CrossSections) -> Self {
+        self.drs.clone_from(&cross_sections.drs);
+        self
     }
 
     /// Number of variables.

@@ -10,6 +10,7 @@
 //! Sys. Meas. Control 138 (2016).
 
 use super::geometry::Shape;
+use crate::line::kernel::may_open;
 
 /// A quantity at one speed, with its derivative by speed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -52,6 +53,10 @@ pub trait GripEnvelope: Sync {
     /// What the driven tyres can give at a speed (m/s) and a root of what the lateral share leaves; `None` where the ellipse says
     /// so.
     fn traction(&self, _speed_mps: f64, _root: f64) -> Option<BendGrip> {
+        None
+    }
+    /// The same with the DRS open, of a car that has one.
+    fn open(&self) -> Option<&dyn GripEnvelope> {
         None
     }
     /// The top speed (m/s).
@@ -133,6 +138,8 @@ pub(super) struct Lap {
     /// Speed squared at the points.
     pub square: Vec<f64>,
     pub bends: Bends,
+    /// Whether the car drives along each segment with its DRS open.
+    pub open: Vec<bool>,
     corner_by_curvature: Vec<f64>,
     drive: Vec<(usize, Origin)>,
     brake: Vec<(usize, Origin)>,
@@ -145,8 +152,14 @@ const MOST_STEPS: usize = 60;
 const ACCURACY: f64 = 1e-12;
 
 impl Lap {
-    /// Drives `shape` as fast as `envelope` allows, from `start_mps` on an open line.
-    pub fn of(shape: &Shape, envelope: &dyn GripEnvelope, start_mps: f64, bend: SegmentBend) -> Self {
+    /// Drives `shape` as fast as `envelope` allows, from `start_mps` on an open line. `drs` says on which segments the DRS may be
+    /// open; nowhere if it is empty.
+    pub fn of(
+        shape: &Shape,
+        envelope: &dyn GripEnvelope,
+        start_mps: f64,
+        (bend, drs): (SegmentBend, &[bool]),
+    ) -> Self {
         let n = shape.curvature_1pm.len();
         let bends = Bends::of(shape, bend);
         let (mut corner, mut corner_by_curvature) = (Vec::with_capacity(n), Vec::with_capacity(n));
@@ -162,12 +175,20 @@ impl Lap {
                 corner_by_curvature[0] = 0.0;
             }
         }
-        let (after_drive, drive) = if shape.closed {
-            closed_drive(shape, &bends, envelope, &corner)
+        let (after_drive, drive, mut open) = if shape.closed {
+            closed_drive(shape, &bends, (envelope, drs), &corner)
         } else {
-            drive_pass(shape, &bends, envelope, &corner, 0, n)
+            drive_pass(shape, &bends, (envelope, drs), &corner, 0, n)
         };
         let (square, brake) = brake_pass(shape, &bends, envelope, &after_drive);
+        for (s, h) in shape.length_m.iter().enumerate() {
+            let (from, to) = (square[s], square[(s + 1) % n]);
+            let drag = envelope
+                .open()
+                .map_or(0.0, |open| open.at((0.5 * (from + to)).sqrt()).drag.value);
+            // The flap is shut on the brakes.
+            open[s] &= 0.5 * (to - from) / h > -drag;
+        }
         let speed: Vec<f64> = square.iter().map(|e| e.sqrt()).collect();
         let segments = shape.length_m.iter().enumerate();
         let time_s = segments
@@ -177,6 +198,7 @@ impl Lap {
             time_s,
             square,
             bends,
+            open,
             corner_by_curvature,
             drive,
             brake,
@@ -406,54 +428,65 @@ fn across(envelope: &dyn GripEnvelope, pass: Pass, start: f64, curvature_1pm: f6
 }
 
 type Passed = (Vec<f64>, Vec<(usize, Origin)>);
+/// The same of a drive pass, and the segments along which it has the DRS open.
+type Driven = (Vec<f64>, Vec<(usize, Origin)>, Vec<bool>);
+
+/// The `e` that the car drives to along a segment, and whether it does so with its DRS open: where that may be, it is if it leads
+/// to more.
+fn driven(
+    (envelope, drs): (&dyn GripEnvelope, &[bool]),
+    segment: usize,
+    start: f64,
+    curvature_1pm: f64,
+    h: f64,
+) -> (f64, Origin, bool) {
+    let (reached, origin) = across(envelope, Pass::Drive, start, curvature_1pm, h);
+    let open = envelope.open().filter(|_| may_open(drs, segment));
+    match open.map(|open| across(open, Pass::Drive, start, curvature_1pm, h)) {
+        Some((further, origin)) if further > reached => (further, origin, true),
+        _ => (reached, origin, false),
+    }
+}
 
 /// Drives `count` nodes from `first` on, where the car has its corner speed.
 fn drive_pass(
     shape: &Shape,
     bends: &Bends,
-    envelope: &dyn GripEnvelope,
+    car: (&dyn GripEnvelope, &[bool]),
     corner: &[f64],
     first: usize,
     count: usize,
-) -> Passed {
+) -> Driven {
     let n = corner.len();
     let mut square = corner.to_vec();
     let mut origins = vec![(first, Origin::Own)];
+    let mut open = vec![false; n];
     for step in 1..count {
         let (previous, node) = ((first + step - 1) % n, (first + step) % n);
         let curvature = bends.curvature_1pm[previous];
-        let (reached, origin) = across(
-            envelope,
-            Pass::Drive,
-            square[previous],
-            curvature,
-            shape.length_m[previous],
-        );
+        let length_m = shape.length_m[previous];
+        let (reached, origin, with_drs) = driven(car, previous, square[previous], curvature, length_m);
+        open[previous] = with_drs;
         let own = reached >= corner[node];
         square[node] = if own { corner[node] } else { reached };
         origins.push((node, if own { Origin::Own } else { origin }));
     }
-    (square, origins)
+    (square, origins, open)
 }
 
 /// The drive pass of a closed lap. It starts at a node whose corner speed the car reaches again a lap later. Drag may prevent
 /// that at the slowest corner; then another node is tried. If there is none (a circle), two laps are driven.
-fn closed_drive(shape: &Shape, bends: &Bends, envelope: &dyn GripEnvelope, corner: &[f64]) -> Passed {
+fn closed_drive(shape: &Shape, bends: &Bends, car: (&dyn GripEnvelope, &[bool]), corner: &[f64]) -> Driven {
     let n = corner.len();
     let mut first = (0..n)
         .min_by(|a, b| corner[*a].total_cmp(&corner[*b]))
         .unwrap_or(0);
     for _ in 0..3 {
-        let passed = drive_pass(shape, bends, envelope, corner, first, n);
+        let mut passed = drive_pass(shape, bends, car, corner, first, n);
         let last = (first + n - 1) % n;
         let curvature = bends.curvature_1pm[last];
-        let (closing, _) = across(
-            envelope,
-            Pass::Drive,
-            passed.0[last],
-            curvature,
-            shape.length_m[last],
-        );
+        let (closing, _, open) = driven(car, last, passed.0[last], curvature, shape.length_m[last]);
+        passed.2[last] = open;
         if closing >= corner[first] {
             return passed;
         }
@@ -467,7 +500,7 @@ fn closed_drive(shape: &Shape, bends: &Bends, envelope: &dyn GripEnvelope, corne
             None => break,
         }
     }
-    drive_pass(shape, bends, envelope, corner, first, 2 * n)
+    drive_pass(shape, bends, car, corner, first, 2 * n)
 }
 
 /// The braking pass, backwards below the speeds of the drive pass. It starts at the slowest node of a closed line, which no

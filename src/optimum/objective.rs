@@ -101,7 +101,8 @@ impl<'a> ReferenceProblem<'a> {
             return (shape, None, measures);
         }
         let envelope = self.envelope.filter(|_| weights.time != 0.0);
-        let lap = envelope.map(|envelope| Lap::of(&shape, envelope, self.start_mps, self.bend));
+        let lap =
+            envelope.map(|envelope| Lap::of(&shape, envelope, self.start_mps, (self.bend, &self.map.drs)));
         let measures = self.measured(&shape, lap.as_ref());
         (shape, lap, measures)
     }
@@ -120,7 +121,7 @@ impl<'a> ReferenceProblem<'a> {
         let shape = Shape::of(&self.map.line(x), self.map.closed);
         let lap = self
             .envelope
-            .map(|envelope| Lap::of(&shape, envelope, self.start_mps, self.bend));
+            .map(|envelope| Lap::of(&shape, envelope, self.start_mps, (self.bend, &self.map.drs)));
         lap.map_or_else(Vec::new, |lap| lap.square.iter().map(|e| e.sqrt()).collect())
     }
 

@@ -3,7 +3,7 @@
 use super::lap::{BendGrip, Grip, GripEnvelope, Slope};
 use crate::line::PointMass;
 use crate::vehicle::envelope::traction_at_root;
-use crate::vehicle::{BendTraction, EnvelopeRow};
+use crate::vehicle::{BendTraction, Envelope, EnvelopeRow};
 use crate::{Error, Result};
 
 /// The envelope of a point mass, linear in speed between its rows, and its steering lock.
@@ -12,6 +12,7 @@ pub struct PointMassEnvelope {
     rows: Vec<EnvelopeRow>,
     in_bends: Option<BendTraction>,
     lock_1pm: f64,
+    open: Option<Box<Self>>,
 }
 
 impl PointMassEnvelope {
@@ -30,13 +31,22 @@ impl PointMassEnvelope {
                 "2 for a reference optimum",
             ));
         }
+        let lock_1pm = car
+            .max_steer_rad
+            .map_or(f64::INFINITY, |lock| lock / car.wheelbase_m);
         Ok(Self {
-            rows: car.envelope.rows().to_vec(),
-            in_bends: car.envelope.bend_traction().cloned(),
-            lock_1pm: car
-                .max_steer_rad
-                .map_or(f64::INFINITY, |lock| lock / car.wheelbase_m),
+            open: car.envelope.open().map(|open| Box::new(Self::of(open, lock_1pm))),
+            ..Self::of(&car.envelope, lock_1pm)
         })
+    }
+
+    fn of(envelope: &Envelope, lock_1pm: f64) -> Self {
+        Self {
+            rows: envelope.rows().to_vec(),
+            in_bends: envelope.bend_traction().cloned(),
+            lock_1pm,
+            open: None,
+        }
     }
 }
 
@@ -91,6 +101,10 @@ impl GripEnvelope for PointMassEnvelope {
         })
     }
 
+    fn open(&self) -> Option<&dyn GripEnvelope> {
+        self.open.as_deref().map(|open| open as &dyn GripEnvelope)
+    }
+
     fn lock_1pm(&self) -> f64 {
         self.lock_1pm
     }
@@ -102,11 +116,14 @@ impl GripEnvelope for PointMassEnvelope {
 
 #[cfg(test)]
 mod tests {
-    use super::super::lap::corner_square;
+    use super::super::lap::{SegmentBend, corner_square};
+    use super::super::{LineMap, ReferenceProblem, Weights};
     use super::*;
+    use crate::line::FineLine;
     use crate::line::kernel::{acceleration, corner};
+    use crate::track::{Shape, Spacing};
+    use crate::vehicle::Car;
     use crate::vehicle::limits::{SpeedRange, car_envelope};
-    use crate::vehicle::{Car, Envelope};
 
     /// Both have the sweep's table: the solvers as it is, the kernels in cells of a thirty-second of the root, over which traction
     /// bends by less than a tenth of a m/s^2.
@@ -115,18 +132,18 @@ mod tests {
         let car = Car::bundled().unwrap();
         let swept = car_envelope(&car, &SpeedRange::USUAL).unwrap().envelope;
         // The engine is out of the way.
-        let rows = swept.rows().iter().map(|row| EnvelopeRow {
+        let strong = |_: &Envelope, row: &EnvelopeRow| EnvelopeRow {
             ax_drive_mps2: 100.0,
             ..*row
-        });
-        let car = PointMass::new(swept.with_rows("strong", rows.collect()).unwrap(), 2.6);
+        };
+        let car = PointMass::new(swept.with_rows("strong", &strong).unwrap(), 2.6);
         let (table, solvers) = (car.table().unwrap(), PointMassEnvelope::new(&car).unwrap());
         let mut compared = 0;
         for v in [20.0, 33.0, 50.0, 65.0f64] {
             let grip = solvers.at(v);
             for root in [0.0, 0.1, 0.3, 0.5, 0.7, 0.9, 0.99f64] {
                 let used = (1.0 - root * root).sqrt() * grip.lateral.value / (v * v);
-                let kernel = acceleration::<f64>(&table, v * v, used) + grip.drag.value;
+                let kernel = acceleration::<f64>(&table, false, v * v, used) + grip.drag.value;
                 let bend = solvers.traction(v, root);
                 let value = bend.map_or(grip.longitudinal.value * root, |bend| bend.value);
                 assert!((kernel - value).abs() < 0.15, "{v}, {root}: {kernel} {value}");
@@ -149,6 +166,48 @@ mod tests {
             }
         }
         assert!(compared > 12, "{compared}");
+    }
+
+    /// Solvers and kernels gain the same by a DRS on two thirds of an ellipse. Both laps are of second order on segments of 3.5 m.
+    #[test]
+    fn the_solvers_open_the_drs_as_the_kernels_do() {
+        let shape = Shape::parse("ellipse:300:60:12").unwrap().unwrap();
+        let mut road = shape.cross_sections(&Spacing::equal(400)).unwrap();
+        let swept = car_envelope(&Car::bundled().unwrap(), &SpeedRange::USUAL)
+            .unwrap()
+            .envelope;
+        let less = |_: &Envelope, row: &EnvelopeRow| EnvelopeRow {
+            ay_mps2: 0.96 * row.ay_mps2,
+            drag_mps2: 0.6 * row.drag_mps2,
+            ..*row
+        };
+        let open = swept.with_rows("open", &less).unwrap();
+        let car = PointMass::new(swept.with_open(open).unwrap(), 2.6);
+        let solvers = PointMassEnvelope::new(&car).unwrap();
+        let middle = vec![0.5; road.len()];
+        let mut gained = |drs: bool| {
+            road.drs = (0..400).map(|i| drs && i % 150 < 100).collect();
+            let map = LineMap::at_every_cross_section(&road);
+            let problem = ReferenceProblem {
+                envelope: Some(&solvers),
+                bend: SegmentBend::Mean,
+                ..ReferenceProblem::of(&map)
+            };
+            let time = Weights {
+                time: 1.0,
+                ..Weights::default()
+            };
+            let points = road.points(&middle);
+            let line = FineLine::new(&points, true, 1000.0, Some((&car, &road.drs)), 0.0).unwrap();
+            (problem.cost(&time, &middle).0, line.lap_time_s().unwrap())
+        };
+        let (without, with) = (gained(false), gained(true));
+        let [by_solver, by_kernel] = [without.0 - with.0, without.1 - with.1];
+        assert!(by_kernel > 0.05, "{by_kernel} s");
+        assert!(
+            (by_solver / by_kernel - 1.0).abs() < 0.02,
+            "{by_solver} and {by_kernel} s"
+        );
     }
 
     /// A lock of 0.012 rad at a wheelbase of 2.6 m turns a circle of 217 m. In one of 144.4 m, which takes 0.018 rad, the squared

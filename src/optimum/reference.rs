@@ -372,7 +372,7 @@ impl ReferenceSolvers {
             &points,
             self.cross_sections.closed,
             FINE_M,
-            Some(&self.car),
+            Some((&self.car, &self.cross_sections.drs)),
             self.entry_mps,
         )?;
         let clearances_m = self.room.as_ref().map_or_else(Vec::new, |room| {

@@ -59,6 +59,46 @@ impl GripEnvelope for DrivenByTwo {
     }
 }
 
+/// The same car with a DRS, open.
+struct Open;
+
+impl GripEnvelope for Open {
+    fn at(&self, v: f64) -> Grip {
+        let shut = Racer.at(v);
+        let part = |slope: Slope, share: f64| Slope {
+            value: share * slope.value,
+            by_speed: share * slope.by_speed,
+        };
+        Grip {
+            lateral: part(shut.lateral, 0.96),
+            longitudinal: part(shut.longitudinal, 0.97),
+            drag: part(shut.drag, 0.6),
+            ..shut
+        }
+    }
+
+    fn top_speed_mps(&self) -> f64 {
+        70.0
+    }
+}
+
+/// The same car with a DRS.
+struct WithDrs;
+
+impl GripEnvelope for WithDrs {
+    fn at(&self, v: f64) -> Grip {
+        Racer.at(v)
+    }
+
+    fn open(&self) -> Option<&dyn GripEnvelope> {
+        Some(&Open)
+    }
+
+    fn top_speed_mps(&self) -> f64 {
+        70.0
+    }
+}
+
 /// A line that wanders over the middle of the road.
 fn wandering(variables: usize) -> Vec<f64> {
     let random = Random::new(11);
@@ -98,12 +138,13 @@ fn weights() -> [(&'static str, Weights); 5] {
 /// lap's Newton steps; what a wrong term would do is of the size of the gradient itself.
 #[test]
 fn gradients_are_those_of_differences() {
-    let cross_sections = ellipse(200);
+    let mut cross_sections = ellipse(200);
+    cross_sections.drs = (0..200).map(|i| i < 120).collect();
     let (spline, _) = LineMap::parametrised(&cross_sections, &Parametrisation::control_points(40)).unwrap();
     for map in [LineMap::at_every_cross_section(&cross_sections), spline] {
         let spacing = spacing_m(&map, &vec![0.5; map.variables()]);
-        let cars: [&dyn GripEnvelope; 2] = [&Racer, &DrivenByTwo];
-        for (spacing_m, car) in [None, Some(&spacing[..])].into_iter().zip(cars) {
+        let cars: [&dyn GripEnvelope; 3] = [&Racer, &DrivenByTwo, &WithDrs];
+        for (spacing_m, car) in [None, Some(&spacing[..]), None].into_iter().zip(cars) {
             let problem = ReferenceProblem {
                 envelope: Some(car),
                 spacing_m,

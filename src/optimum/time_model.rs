@@ -100,6 +100,7 @@ fn add_segment(
     lap: &Lap,
     (first, s): (usize, usize),
 ) {
+    let envelope = envelope.open().filter(|_| lap.open[s]).unwrap_or(envelope);
     let next = (s + 1) % map.points();
     let (e0, e1, h) = (lap.square[s], lap.square[next], shape.length_m[s]);
     let middle = 0.5 * (e0 + e1);

@@ -62,7 +62,12 @@ pub fn problem_of(
 ) -> Result<DriveProblem> {
     let circuits = circuits
         .iter()
-        .map(|name| Track::load(name)?.circuit())
+        .map(|name| {
+            let mut circuit = Track::load(name)?.circuit()?;
+            // On straights and in bends, and on the brakes, where the driver shuts the flap.
+            circuit.drs_zones_m = vec![[0.1 * circuit.length_m, 0.6 * circuit.length_m]];
+            Ok(circuit)
+        })
         .collect::<Result<Vec<_>>>()?;
     let driver = DriverSettings::racing(&car)?;
     let plans: Vec<Vec<SpeedPlan>> = circuits
@@ -247,7 +252,9 @@ fn steps_of(problem: &DriveProblem, cars: &[Vec<f64>]) -> Vec<Step> {
 /// # Errors
 /// Those of reading the bundled car.
 pub fn layer() -> Result<Layer> {
-    let problem = problem(Car::bundled()?, &CIRCUITS, &PACES, STEP)?;
+    let mut car = Car::bundled()?;
+    (car.chassis.drs_drag, car.chassis.drs_lift) = (20.0, 10.0);
+    let problem = problem(car, &CIRCUITS, &PACES, STEP)?;
     let mut draws = Draws::new(7);
     let cars = candidates(&problem, COUNT, &mut draws);
     let names = ["time", "room", "steering"].map(|name| format!("drive, {name}"));

@@ -1,6 +1,7 @@
 //! Layer five: laps with a hybrid's energy on a fixed line, their time, fuel and accounts.
 
 use super::cases::{Cases, Compared, layer_of};
+use super::lines::with_drs;
 use super::{Draws, Layer};
 use crate::error::{Error, Result};
 use crate::evaluate::Failure;
@@ -98,7 +99,7 @@ impl Compared for HybridProblem {
 pub(super) fn layer() -> Result<Layer> {
     let modes = [Mode::Offset, Mode::Additional];
     let mut draws = Draws::new(5);
-    let cases = problems(SECTIONS, &modes)?
+    let cases = problems(SECTIONS, &modes, true)?
         .into_iter()
         .zip(modes)
         .map(|(problem, mode)| {
@@ -124,11 +125,11 @@ pub(super) fn layer() -> Result<Layer> {
 }
 
 /// Problems of deploying the bundled hybrid's energy on the bundled circuit's reference line, cut into so many cross-sections, a
-/// problem of each mode. All gates and four zones are free.
+/// problem of each mode. All gates and four zones are free. The car has a DRS if `drs` is set.
 ///
 /// # Errors
 /// Those of reading the bundled circuit and car.
-pub fn problems(sections: usize, modes: &[Mode]) -> Result<Vec<HybridProblem>> {
+pub fn problems(sections: usize, modes: &[Mode], drs: bool) -> Result<Vec<HybridProblem>> {
     let setup = set_up(&RacelineSettings {
         sections,
         ..RacelineSettings::default()
@@ -142,7 +143,12 @@ pub fn problems(sections: usize, modes: &[Mode]) -> Result<Vec<HybridProblem>> {
     };
     let limits = car_envelope(&car, &coarse)?;
     let traction = limits.traction();
-    let car = EnergyCar::new(car, limits.envelope, traction, 2.0)?;
+    let (envelope, drs) = if drs {
+        with_drs(&limits.envelope, sections)?
+    } else {
+        (limits.envelope, Vec::new())
+    };
+    let car = EnergyCar::new(car, envelope, traction, 2.0)?;
     let zones = [2, 8, 15, 21].map(|part| part * sections / 24);
     let problems = modes.iter().map(|mode| {
         let plan = EnergyPlan::zoned(&length_m, &zones, true, sections / 2, *mode);
@@ -154,6 +160,7 @@ pub fn problems(sections: usize, modes: &[Mode]) -> Result<Vec<HybridProblem>> {
         let line = HybridLine::Fixed {
             points_m: points_m.clone(),
             closed: true,
+            drs: drs.clone(),
         };
         HybridProblem::new(line, car.clone(), plan, strategy, &HybridObjective::ALL, 30.0)
     });

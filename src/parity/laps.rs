@@ -36,6 +36,7 @@ pub fn work_of(replay: &ReplayProblem) -> (usize, u64) {
     let input = CarInput {
         wheel_speed: sample.wheel_speed.map(|x| Counted(x as f32)),
         steer: Counted(sample.steer as f32),
+        flap: Counted(sample.flap as f32),
     };
     let state = CarState::from_array(window.initial.map(|x| Counted(x as f32)));
     // All steps are alike.
@@ -66,7 +67,9 @@ impl Compared for ReplayProblem {
 pub(super) fn layer() -> Result<Layer> {
     let unknowns = IdentifySettings::default().free;
     let names: Vec<&str> = unknowns.iter().map(|f| f.name.as_str()).collect();
-    let replay = problem(Car::bundled()?, &names, Lap::default())?;
+    let mut car = Car::bundled()?;
+    (car.chassis.drs_drag, car.chassis.drs_lift) = (20.0, 15.0);
+    let replay = problem(car, &names, Lap::default())?;
     let mut draws = Draws::new(3);
     let cars = candidates(&replay, COUNT, SHARE, &mut draws);
     let cars = cars

@@ -7,6 +7,7 @@ use crate::evaluate::line::{LineObjective, LineProblem};
 use crate::line::{Parametrisation, geometry, kernel};
 use crate::scalar::{Counted, operations_of};
 use crate::study::raceline::{RacelineSettings, set_up};
+use crate::vehicle::{Envelope, EnvelopeRow};
 use std::f64::consts::TAU;
 
 /// Lines by each parametrisation.
@@ -101,15 +102,31 @@ fn line(dimensions: usize, draws: &mut Draws) -> Vec<f64> {
     points.collect()
 }
 
+/// The envelope of a car that also has a DRS, and segments on which it may be open: some in bends, some on straights.
+///
+/// # Errors
+/// None in practice: the made-up limits are within those of the car.
+pub(super) fn with_drs(envelope: &Envelope, sections: usize) -> Result<(Envelope, Vec<bool>)> {
+    let open = envelope.with_rows(envelope.name(), &|_, row| EnvelopeRow {
+        ay_mps2: 0.96 * row.ay_mps2,
+        ax_grip_mps2: 0.97 * row.ax_grip_mps2,
+        drag_mps2: 0.8 * row.drag_mps2,
+        ..*row
+    })?;
+    let drs = (0..sections).map(|i| i % 7 < 4).collect();
+    Ok((envelope.clone().with_open(open)?, drs))
+}
+
 /// The layer.
 ///
 /// # Errors
 /// Those of reading the bundled circuit and car.
 pub(super) fn layer() -> Result<Layer> {
-    let setup = set_up(&RacelineSettings {
+    let mut setup = set_up(&RacelineSettings {
         sections: SECTIONS,
         ..RacelineSettings::default()
     })?;
+    (setup.car.envelope, setup.cross_sections.drs) = with_drs(&setup.car.envelope, SECTIONS)?;
     let mut draws = Draws::new(4);
     let ways = [
         ("control points", Parametrisation::control_points(SECTIONS / 4)),

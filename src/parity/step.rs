@@ -26,8 +26,8 @@ pub struct Case {
     pub table: Vec<f32>,
     /// The state (m/s, m/s, rad/s, rad, rad/s, m/s^2).
     pub state: [f32; 6],
-    /// Wheel speeds (rad/s) and steering (rad).
-    pub input: [f32; 5],
+    /// Wheel speeds (rad/s), steering (rad) and how far the DRS is open.
+    pub input: [f32; 6],
 }
 
 /// A case from the car `model` with every parameter up to a fifth off, and a state that races see. `None` if the
@@ -64,7 +64,14 @@ fn case(model: TyreModel, base: &Car, random: &mut Draws) -> Option<Case> {
     ];
     let radius = car.chassis.radius_front;
     let mut rim = || vx / radius * random.within(0.92, 1.06);
-    let input = [rim(), rim(), rim(), rim(), random.within(-0.12, 0.12)];
+    let input = [
+        rim(),
+        rim(),
+        rim(),
+        rim(),
+        random.within(-0.12, 0.12),
+        random.within(0.0, 1.0),
+    ];
     Some(Case {
         table: table.iter().map(|x| *x as f32).collect(),
         state: state.map(|x| x as f32),
@@ -94,7 +101,8 @@ pub(super) fn on_linear_tyres(base: &Car) -> Car {
 /// # Errors
 /// Those of reading the bundled car.
 pub fn cases(model: TyreModel, count: usize, seed: u64) -> Result<Vec<Case>> {
-    let base = Car::bundled()?;
+    let mut base = Car::bundled()?;
+    (base.chassis.drs_drag, base.chassis.drs_lift) = (20.0, 15.0);
     let mut random = Draws::new(seed);
     Ok(std::iter::repeat_with(|| case(model, &base, &mut random))
         .flatten()
@@ -112,11 +120,12 @@ impl Case {
 /// The outputs in the scalar `R` of what `at` yields by its place in [`Case::row`].
 #[inline(always)]
 fn outputs<R: Real, T: Tyre<R>>(at: impl Fn(usize) -> R) -> [R; OUTPUTS] {
-    let car = CarModel::<R, T>::from_table(|i| at(11 + i));
+    let car = CarModel::<R, T>::from_table(|i| at(12 + i));
     let state = CarState::from_array(std::array::from_fn(&at));
     let input = CarInput {
         wheel_speed: std::array::from_fn(|i| at(6 + i)),
         steer: at(10),
+        flap: at(11),
     };
     // A loop as in the kernel, whose count the compiler does not know: it would unroll a lone step of many lanes
     // until it ran out of stack.
@@ -189,8 +198,8 @@ fn on_device(context: &GpuContext, model: TyreModel, cases: &[Case]) -> Result<V
                 given(5u, lane),
             );
             let wheels = vec4<f32>(given(6u, lane), given(7u, lane), given(8u, lane), given(9u, lane));
-            let input = CarInput(wheels, given(10u, lane));
-            let step = given(11u, lane);
+            let input = CarInput(wheels, given(10u, lane), given(11u, lane));
+            let step = given(12u, lane);
             var first: CarRate;
             var sum = state;
             var reached = state;
@@ -215,7 +224,7 @@ fn on_device(context: &GpuContext, model: TyreModel, cases: &[Case]) -> Result<V
     for i in 0..6 {
         rows.extend(cases.iter().map(|c| c.state[i]));
     }
-    for i in 0..5 {
+    for i in 0..6 {
         rows.extend(cases.iter().map(|c| c.input[i]));
     }
     rows.extend(cases.iter().map(|_| STEP));

@@ -39,6 +39,8 @@ fn inputs(car: &Car, count: usize, grip: f64) -> Vec<Sample<f64>> {
                     rim(-c.half_track_rear, c.radius_rear),
                 ],
                 steer: wheelbase * ay / (speed * speed) + 0.0015 * ay,
+                // Half open, shut, half open, open and so on: each state and each way between them.
+                flap: [0.5, 0.0, 0.5, 1.0][i % 4],
                 measured: [0.0; 4],
             }
         })

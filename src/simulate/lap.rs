@@ -100,9 +100,10 @@ pub fn simulate_lap(car: &Car, circuit: &Circuit, settings: &SimulateSettings) -
         .inputs
         .iter()
         .zip(&lap.states)
-        .map(|((wheels, steer), state)| Sample {
-            wheel_speed: wheels.map(|w| rounded(w, INPUT_DECIMALS[0])),
-            steer: rounded(*steer, INPUT_DECIMALS[1]),
+        .map(|(input, state)| Sample {
+            wheel_speed: input.wheel_speed.map(|w| rounded(w, INPUT_DECIMALS[0])),
+            steer: rounded(input.steer, INPUT_DECIMALS[1]),
+            flap: input.flap,
             measured: [
                 rounded(state[0], INPUT_DECIMALS[0]),
                 0.0,
@@ -179,6 +180,7 @@ pub fn simulate_lap(car: &Car, circuit: &Circuit, settings: &SimulateSettings) -
             samples.iter().map(|s| s.wheel_speed[wheel]).collect()
         }),
         steer_rad: samples.iter().map(|s| s.steer).collect(),
+        drs: samples.iter().map(|s| s.flap).collect(),
         vx_mps: column(0),
         ax_mps2: column(1),
         ay_mps2: column(2),

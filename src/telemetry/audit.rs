@@ -26,6 +26,7 @@ fn limit(role: Role) -> Option<(f64, &'static str, &'static str)> {
         | Role::LapComplete
         | Role::Throttle
         | Role::Brake
+        | Role::Drs
         | Role::Latitude
         | Role::Longitude
         | Role::X

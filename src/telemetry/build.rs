@@ -234,6 +234,7 @@ impl Build<'_> {
             distance_m: Vec::new(),
             vx_mps: Vec::new(),
             steer_rad: needed(Role::Steer)?,
+            drs: Vec::new(),
             ax_mps2: Vec::new(),
             ay_mps2: Vec::new(),
             yaw_rate_radps: needed(Role::YawRate)?,
@@ -262,6 +263,14 @@ impl Build<'_> {
                 product(&log.vx_mps, &log.yaw_rate_radps)
             }
         };
+        log.drs = find(Role::Drs).map_or_else(|| vec![0.0; grid.samples], sampled);
+        if let Some(beyond) = log.drs.iter().find(|open| !(0.0..=1.0).contains(*open)) {
+            let text = format!(
+                "drs: left out, the flap counts as shut; found {beyond}, expected 0 (shut) to 1 (open)"
+            );
+            note(&mut log, &text);
+            log.drs.fill(0.0);
+        }
         let driven = integrated(&log.vx_mps, grid.dt_s);
         log.laps = self.laps(signals, &log.time_s, &driven, &mut log.calibration)?;
         let logged = find(Role::Distance).map(|signal| {

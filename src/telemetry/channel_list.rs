@@ -227,6 +227,7 @@ fn without(role: Role) -> &'static str {
         Role::Lap => "laps come from beacons, from the distance, or from positions",
         Role::LapComplete => "laps between two passages of the line are complete",
         Role::Throttle | Role::Brake => "not needed",
+        Role::Drs => "the DRS counts as shut",
         Role::Latitude | Role::Longitude | Role::X | Role::Y => "laps can be found from it",
     }
 }

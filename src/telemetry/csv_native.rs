@@ -18,7 +18,7 @@ pub(super) const TIME: &str = "time_s";
 /// The columns of a native file, in the order they are written: time and distance, four wheel speeds, road-wheel
 /// angle, forward speed, accelerations at the ground-level reference point (`ax = dVx/dt - Vy r`,
 /// `ay = dVy/dt + Vx r`) and yaw rate. A file may have them in any order and hold others besides; `lap` (a whole
-/// number) and `lap_complete` (0 or 1) are understood.
+/// number), `lap_complete` (0 or 1) and `drs` (0 shut to 1 open) are understood.
 pub const COLUMNS: [&str; 11] = [
     TIME,
     "distance_m",
@@ -175,6 +175,10 @@ fn render(log: &Log, path: &Path, format: &NativeFormat) -> Result<String> {
         text.push('\n');
     }
     text.push_str(&COLUMNS.join(","));
+    let drs = log.drs.iter().any(|open| *open != 0.0);
+    if drs {
+        text.push_str(",drs");
+    }
     text.push_str(if plain { "\n" } else { ",lap,lap_complete\n" });
     let decimals = COLUMNS.map(|name| format.decimals.get(name).copied());
     for lap in &log.laps {
@@ -184,6 +188,10 @@ fn render(log: &Log, path: &Path, format: &NativeFormat) -> Result<String> {
                     text.push(',');
                 }
                 push_number(&mut text, values[sample], decimals);
+            }
+            if drs {
+                text.push(',');
+                push_number(&mut text, log.drs[sample], None);
             }
             if !plain {
                 let _ = write!(text, ",{},{}", lap.number, u8::from(lap.complete));
@@ -241,6 +249,24 @@ mod tests {
         let mut back = log_of(&text).unwrap();
         back.calibration = log.calibration.clone();
         assert_eq!(back, log);
+    }
+
+    #[test]
+    fn the_drs_comes_back_where_it_was_open() {
+        let mut log = Car::default().drive(3.0, 20.0);
+        log.drs[30..50].fill(1.0);
+        log.drs[50] = 0.5;
+        let text = render(&log, Path::new("a.csv"), &NativeFormat::exact()).unwrap();
+        assert_eq!(log_of(&text).unwrap().drs, log.drs);
+        // Some loggers count in other ways.
+        let counted = text.replace(",1\n", ",3\n");
+        let log = log_of(&counted).unwrap();
+        assert!(log.drs.iter().all(|open| *open == 0.0));
+        let said = log.calibration.notes.join(" ");
+        assert!(
+            said.contains("drs: left out") && said.contains("found 3"),
+            "{said}"
+        );
     }
 
     #[test]

@@ -38,6 +38,8 @@ pub struct Log {
     pub wheel_speed_radps: [Vec<f64>; 4],
     /// Road-wheel angle, rad.
     pub steer_rad: Vec<f64>,
+    /// How far the DRS is open, from 0 to 1; shut where it is not logged.
+    pub drs: Vec<f64>,
     /// Forward speed, m/s.
     pub vx_mps: Vec<f64>,
     /// Longitudinal acceleration `dVx/dt - Vy r`, m/s^2.
@@ -93,6 +95,7 @@ impl Log {
             distance_m: cut(&self.distance_m),
             wheel_speed_radps: [0, 1, 2, 3].map(|w| cut(&self.wheel_speed_radps[w])),
             steer_rad: cut(&self.steer_rad),
+            drs: cut(&self.drs),
             vx_mps: cut(&self.vx_mps),
             ax_mps2: cut(&self.ax_mps2),
             ay_mps2: cut(&self.ay_mps2),

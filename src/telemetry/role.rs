@@ -36,6 +36,8 @@ pub enum Role {
     Throttle,
     /// Brake pressure or position.
     Brake,
+    /// How far the DRS is open, from 0 to 1.
+    Drs,
     /// Latitude.
     Latitude,
     /// Longitude.
@@ -48,7 +50,7 @@ pub enum Role {
 
 impl Role {
     /// All roles.
-    pub const ALL: [Self; 18] = [
+    pub const ALL: [Self; 19] = [
         Self::WheelSpeedFl,
         Self::WheelSpeedFr,
         Self::WheelSpeedRl,
@@ -63,6 +65,7 @@ impl Role {
         Self::LapComplete,
         Self::Throttle,
         Self::Brake,
+        Self::Drs,
         Self::Latitude,
         Self::Longitude,
         Self::X,
@@ -93,6 +96,7 @@ impl Role {
             Self::LapComplete => "lap_complete",
             Self::Throttle => "throttle",
             Self::Brake => "brake",
+            Self::Drs => "drs",
             Self::Latitude => "latitude",
             Self::Longitude => "longitude",
             Self::X => "x",
@@ -116,6 +120,7 @@ impl Role {
             | Self::LapComplete
             | Self::Throttle
             | Self::Brake
+            | Self::Drs
             | Self::Latitude
             | Self::Longitude => "",
         }
@@ -130,7 +135,7 @@ impl Role {
     pub(super) fn of_motion(self) -> bool {
         !matches!(
             self,
-            Self::Distance | Self::Lap | Self::LapComplete | Self::Throttle | Self::Brake
+            Self::Distance | Self::Lap | Self::LapComplete | Self::Throttle | Self::Brake | Self::Drs
         ) && !self.of_place()
     }
 
@@ -151,6 +156,7 @@ impl Role {
             Self::YawRate => &[Quantity::AngularSpeed],
             Self::Distance => &[Quantity::Distance],
             Self::Throttle | Self::Brake => &[Quantity::Ratio, Quantity::Pressure],
+            Self::Drs => &[Quantity::Ratio],
             Self::Lap | Self::LapComplete | Self::Latitude | Self::Longitude | Self::X | Self::Y => &[],
         }
     }
@@ -300,6 +306,7 @@ impl Role {
                 "brakepress",
                 "brakepressure",
             ],
+            Self::Drs => &["drs", "drsopen", "drsactive", "drsposition", "rearflap"],
             Self::Latitude => &["latitudedeg", "gpslatitude", "latitude", "gpslat", "lat"],
             Self::Longitude => &[
                 "longitudedeg",

@@ -65,6 +65,7 @@ impl Car {
                 .collect(),
             wheel_speed_radps: [wheel(0), wheel(1), wheel(2), wheel(3)],
             // A car that answers 0.1 s after it is steered.
+            drs: of(&|_| 0.0),
             steer_rad: of(&|t| 2.6 * yaw(t + 0.1) / vx(t + 0.1)),
             vx_mps: of(&vx),
             ax_mps2: of(&|t| Self::motion(t).1),

@@ -20,6 +20,14 @@ pub(super) struct SectionEntry {
     end_m: Spanned<f64>,
 }
 
+/// A stretch where the DRS may be open.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct DrsZoneEntry {
+    start_m: Spanned<f64>,
+    end_m: Spanned<f64>,
+}
+
 /// Reads a TOML text; `what` is what errors expect it to be.
 pub(super) fn parse_toml<T: DeserializeOwned>(file: &str, text: &str, what: &str) -> Result<T> {
     toml::from_str(text).map_err(|error| refused(file, text, &error, what))
@@ -98,5 +106,22 @@ impl Checker<'_> {
             sections.push(Section { name, start_m, end_m });
         }
         Ok(sections)
+    }
+
+    /// Stretches within a length (m) where the DRS may be open. On a closed road one may pass the start line.
+    ///
+    /// # Errors
+    /// [`Error::Input`] naming line and field for a stretch that does not lie within the length.
+    pub fn drs_zones(&self, entries: &[DrsZoneEntry], length_m: f64, closed: bool) -> Result<Vec<[f64; 2]>> {
+        let zone = |entry: &DrsZoneEntry| {
+            let start_m = self.within(&entry.start_m, "start_m", 0.0, length_m)?;
+            let end_m = self.within(&entry.end_m, "end_m", 0.0, length_m)?;
+            if end_m == start_m || (end_m < start_m && !closed) {
+                let expected = format!("another station than start_m, {start_m}; beyond it on an open road");
+                return Err(self.refuse(entry.end_m.span(), "end_m", end_m.to_string(), &expected));
+            }
+            Ok([start_m, end_m])
+        };
+        entries.iter().map(zone).collect()
     }
 }

@@ -90,6 +90,20 @@ pub struct Circuit {
     pub sections: Vec<Section>,
     /// Named corners, in the order of the lap.
     pub corners: Vec<Corner>,
+    /// Stretches where the DRS may be open: start and end (m) of each. One whose end lies before its start passes the start line.
+    pub drs_zones_m: Vec<[f64; 2]>,
+}
+
+/// Whether a station (m) lies in one of these zones.
+pub(crate) fn in_a_zone(zones_m: &[[f64; 2]], station_m: f64) -> bool {
+    zones_m.iter().any(|&[start, end]| {
+        let (after, before) = (station_m >= start, station_m < end);
+        if start < end {
+            after && before
+        } else {
+            after || before
+        }
+    })
 }
 
 /// The centreline at one station.
@@ -172,6 +186,11 @@ impl Circuit {
         self.heading_rad[at.before]
             + at.past_m * (self.curvature_1pm[at.before] + 0.5 * self.slope(&at) * at.past_m)
             + at.laps * self.total_turn_rad()
+    }
+
+    /// Whether the DRS may be open at a station (m).
+    pub fn drs_at(&self, station_m: f64) -> bool {
+        in_a_zone(&self.drs_zones_m, self.wrap(station_m))
     }
 
     /// Position at a station (m).

@@ -29,6 +29,8 @@ pub struct CrossSections {
     pub sections: Vec<Section>,
     /// Named corners, by station.
     pub corners: Vec<Corner>,
+    /// Whether the DRS may be open from each cross-section to the next. Empty where it may be open nowhere.
+    pub drs: Vec<bool>,
 }
 
 impl CrossSections {
@@ -177,7 +179,8 @@ impl CrossSections {
             station_m,
             right_m: cross_sections.clone().map(|i| self.right_m[i]).collect(),
             left_m: cross_sections.clone().map(|i| self.left_m[i]).collect(),
-            reference: cross_sections.map(|i| self.reference[i]).collect(),
+            reference: cross_sections.clone().map(|i| self.reference[i]).collect(),
+            drs: cross_sections.filter_map(|i| self.drs.get(i).copied()).collect(),
             sections: Vec::new(),
             corners: Vec::new(),
         })
@@ -243,6 +246,40 @@ impl CrossSections {
         self.stretch(first, count.clamp(2, most))
     }
 
+    /// Whether the DRS may be open from each point (m) of a line along the road to the next; empty where it may be open nowhere.
+    pub fn drs_along(&self, points_m: &[DVec2]) -> Vec<bool> {
+        /// Cross-sections on each side among which the next point's own is looked for: those of another part of the road, beside it
+        /// or on a bridge, are further away.
+        const NEARBY: usize = 30;
+        let n = self.len();
+        if self.drs.is_empty() {
+            return Vec::new();
+        }
+        let distance = |point: DVec2, i: usize| {
+            let across = self.left_m[i] - self.right_m[i];
+            let share = (point - self.right_m[i]).dot(across) / across.length_squared();
+            point.distance_squared(self.right_m[i] + share.clamp(0.0, 1.0) * across)
+        };
+        let nearest = |point: DVec2, among: &mut dyn Iterator<Item = usize>| {
+            among
+                .min_by(|i, j| distance(point, *i).total_cmp(&distance(point, *j)))
+                .unwrap_or(0)
+        };
+        let mut before: Option<usize> = None;
+        let at = |point: &DVec2| {
+            let here = match before {
+                None => nearest(*point, &mut (0..n)),
+                Some(before) => {
+                    let around = (n + before).saturating_sub(NEARBY)..=n + before + NEARBY;
+                    nearest(*point, &mut around.map(|i| i % n))
+                }
+            };
+            before = Some(here);
+            self.drs[here]
+        };
+        points_m.iter().map(at).collect()
+    }
+
     /// The points of a line (m), one per cross-section, from its `alpha` at every cross-section.
     pub fn points(&self, alpha: &[f64]) -> Vec<DVec2> {
         self.right_m
@@ -306,6 +343,7 @@ mod tests {
             reference: vec![0.4, 0.4],
             sections: Vec::new(),
             corners: Vec::new(),
+            drs: Vec::new(),
         }
     }
 

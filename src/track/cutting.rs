@@ -6,6 +6,7 @@
 //! meets the edge.
 
 use super::circuit::Circuit;
+use super::circuit::in_a_zone;
 use super::cross_sections::CrossSections;
 use super::crossing::{Stretch, crossings, stretches};
 use super::road::{Road, RoadFrame, Spacing, even_stations, spread};
@@ -50,6 +51,18 @@ pub(super) fn cross_sections(road: &dyn Road, spacing: &Spacing) -> Result<Cross
         (frame.position_m - right).dot(across) / across.length_squared()
     };
     let reference = cutter.frames.iter().zip(&cutter.ends).map(share).collect();
+    let zones = road.drs_zones_m();
+    let end_m = road.length_m();
+    let after = cutter.stations.iter().skip(1).chain([&end_m]);
+    let middles = cutter
+        .stations
+        .iter()
+        .zip(after)
+        .map(|(from, to)| 0.5 * (from + to));
+    let drs = middles
+        .filter(|_| !zones.is_empty())
+        .map(|middle| in_a_zone(zones, middle))
+        .collect();
     let (right_m, left_m) = cutter.ends.iter().map(|&[right, left]| (right, left)).unzip();
     Ok(CrossSections {
         reference,
@@ -61,6 +74,7 @@ pub(super) fn cross_sections(road: &dyn Road, spacing: &Spacing) -> Result<Cross
         left_m,
         sections: road.sections().to_vec(),
         corners: road.corners().to_vec(),
+        drs,
     })
 }
 

@@ -59,6 +59,8 @@ pub struct CurvatureTable {
     pub rows: Vec<CurvatureRow>,
     /// Named stretches.
     pub sections: Vec<Section>,
+    /// Stretches where the DRS may be open, as a [`Circuit`] has them.
+    pub drs_zones_m: Vec<[f64; 2]>,
 }
 
 /// The changes that close a lap; all zero for an open circuit.
@@ -136,6 +138,7 @@ impl CurvatureTable {
             start_heading_rad: 0.0,
             rows,
             sections: Vec::new(),
+            drs_zones_m: Vec::new(),
         }
     }
 
@@ -173,6 +176,7 @@ impl CurvatureTable {
             curvature_1pm: curvature,
             sections: self.sections.clone(),
             corners: self.corners(),
+            drs_zones_m: self.drs_zones_m.clone(),
         };
         Ok((circuit, closure))
     }

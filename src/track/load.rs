@@ -5,7 +5,7 @@ use std::path::Path;
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::checker::{Checker, SectionEntry, parse_toml};
+use super::checker::{Checker, DrsZoneEntry, SectionEntry, parse_toml};
 use super::circuit::Circuit;
 use super::from_curvature::{Closure, CurvatureRow, CurvatureTable};
 use super::reference::Smoothing;
@@ -44,6 +44,8 @@ struct CircuitFile {
     width_m: Option<Spanned<f64>>,
     #[serde(default)]
     sections: Vec<SectionEntry>,
+    #[serde(default)]
+    drs_zones: Vec<DrsZoneEntry>,
 }
 
 fn yes() -> bool {
@@ -84,11 +86,14 @@ impl Circuit {
     ///
     /// A TOML file names a survey or a curvature table that lies beside it. Keys with a survey: `survey` (the file),
     /// `name`, `closed`, `width_m`, `lap` and `bridges` as in [`SurveyOptions`], `smoothing_line_m` and
-    /// `smoothing_edges_m` as in [`Smoothing`], `[[sections]]` as below and `[[corners]]` with `name` and `station_m`.
+    /// `smoothing_edges_m` as in [`Smoothing`], `[[sections]]` and `[[drs_zones]]` as below and `[[corners]]` with `name` and
+    /// `station_m`.
     ///
     /// Keys with a curvature table: `name`, `curvature_table` (a CSV file with columns `station_m`, `curvature_1pm` and, if
     /// wanted, `width_left_m`, `width_right_m`, `corner`), `length_m`; `closed` (default true), `start_heading_deg` (0),
-    /// `width_m` (of the whole road, where the table has no widths), and `[[sections]]` with `name`, `start_m`, `end_m`.
+    /// `width_m` (of the whole road, where the table has no widths), `[[sections]]` with `name`, `start_m`, `end_m`, and
+    /// `[[drs_zones]]` with `start_m` and `end_m`, where the DRS may be open; one whose end lies before its start passes the start
+    /// line.
     ///
     /// # Errors
     /// [`Error::Io`] when a file cannot be read; [`Error::Input`] with the file, line and field when
@@ -180,6 +185,7 @@ fn assemble(
         length_m,
         start_heading_rad: heading.to_radians(),
         sections,
+        drs_zones_m: check.drs_zones(&file.drs_zones, length_m, file.closed)?,
     })
 }
 

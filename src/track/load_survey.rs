@@ -5,7 +5,7 @@ use std::path::Path;
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::checker::{Checker, SectionEntry, parse_toml};
+use super::checker::{Checker, DrsZoneEntry, SectionEntry, parse_toml};
 use super::circuit::Corner;
 use super::reference::Smoothing;
 use super::survey::{Survey, SurveyOptions};
@@ -28,6 +28,8 @@ struct SurveyFile {
     sections: Vec<SectionEntry>,
     #[serde(default)]
     corners: Vec<CornerEntry>,
+    #[serde(default)]
+    drs_zones: Vec<DrsZoneEntry>,
 }
 
 #[derive(Deserialize)]
@@ -68,9 +70,10 @@ pub(super) fn read(path: &Path, text: &str) -> Result<(Survey, Smoothing)> {
     if let Some(name) = &file.name {
         survey.name = check.name(name, "name")?;
     }
-    if !file.sections.is_empty() || !file.corners.is_empty() {
+    if !(file.sections.is_empty() && file.corners.is_empty() && file.drs_zones.is_empty()) {
         let length_m = survey.smoothed(&smoothing)?.length_m();
         survey.sections = check.sections(&file.sections, length_m)?;
+        survey.drs_zones_m = check.drs_zones(&file.drs_zones, length_m, survey.closed)?;
         for corner in &file.corners {
             survey.corners.push(Corner {
                 name: check.name(&corner.name, "name")?,

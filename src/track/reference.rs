@@ -66,6 +66,7 @@ pub struct ReferenceLine {
     right: Widths,
     sections: Vec<Section>,
     corners: Vec<Corner>,
+    drs_zones_m: Vec<[f64; 2]>,
 }
 
 /// Nodes (from -1 to 1) and weights of Gauss and Legendre's quadrature with five points.
@@ -192,6 +193,7 @@ impl Survey {
             right,
             sections: self.sections.clone(),
             corners: self.corners.clone(),
+            drs_zones_m: self.drs_zones_m.clone(),
         }
     }
 }
@@ -318,5 +320,9 @@ impl Road for ReferenceLine {
 
     fn corners(&self) -> &[Corner] {
         &self.corners
+    }
+
+    fn drs_zones_m(&self) -> &[[f64; 2]] {
+        &self.drs_zones_m
     }
 }

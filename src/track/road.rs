@@ -40,6 +40,8 @@ pub(super) trait Road {
     fn sections(&self) -> &[Section];
     /// Named corners.
     fn corners(&self) -> &[Corner];
+    /// Stretches where the DRS may be open, as a [`Circuit`] has them.
+    fn drs_zones_m(&self) -> &[[f64; 2]];
 }
 
 impl Road for Circuit {
@@ -76,6 +78,10 @@ impl Road for Circuit {
 
     fn corners(&self) -> &[Corner] {
         &self.corners
+    }
+
+    fn drs_zones_m(&self) -> &[[f64; 2]] {
+        &self.drs_zones_m
     }
 }
 
@@ -135,6 +141,7 @@ pub(super) fn circuit(road: &dyn Road) -> Result<(Circuit, Closure)> {
         start_heading_rad,
         rows,
         sections: road.sections().to_vec(),
+        drs_zones_m: road.drs_zones_m().to_vec(),
     };
     let (mut circuit, closure) = table.build()?;
     for position in &mut circuit.centreline_m {

@@ -34,6 +34,7 @@ fn survey(points: Vec<DVec2>, closed: bool, width_m: f64) -> Survey {
         lines: Vec::new(),
         sections: Vec::new(),
         corners: Vec::new(),
+        drs_zones_m: Vec::new(),
         bridges: 0,
     }
 }

@@ -295,4 +295,8 @@ impl Road for Shaped {
     fn corners(&self) -> &[Corner] {
         &[]
     }
+
+    fn drs_zones_m(&self) -> &[[f64; 2]] {
+        &[]
+    }
 }

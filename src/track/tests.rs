@@ -189,6 +189,52 @@ fn a_users_own_circuit_loads() {
     assert!((left - 6.0).abs() < 1e-9 && (right - 6.0).abs() < 1e-9);
 }
 
+/// The first zone passes the start line; an open road has none that does.
+#[test]
+fn zones_of_the_drs_come_from_the_file_and_reach_the_cross_sections() {
+    let zone = |start: f64, end: f64| format!("[[drs_zones]]\nstart_m = {start}\nend_m = {end}\n");
+    let (_folder, path) = Folder::with(
+        &format!("{TOML}{}{}", zone(600.0, 50.0), zone(100.0, 200.0)),
+        TABLE,
+    );
+    let c = Circuit::load(&path).expect("a circle");
+    assert_eq!(c.drs_zones_m, [[600.0, 50.0], [100.0, 200.0]]);
+    for (station, wanted) in [
+        (0.0, true),
+        (50.0, false),
+        (100.0, true),
+        (250.0, false),
+        (620.0, true),
+        (630.0, true),
+    ] {
+        assert_eq!(c.drs_at(station), wanted, "{station}");
+    }
+    let sections = c.cross_sections(100).expect("a road");
+    let open = sections.drs.iter().filter(|open| **open).count();
+    // The middles of 5, 8 and 16 stretches of 6.283 m lie within.
+    assert_eq!((sections.drs.len(), open), (100, 29));
+    assert_eq!(
+        sections.stretch(10, 20).expect("a stretch").drs,
+        sections.drs[10..30]
+    );
+    assert!(silverstone().cross_sections(100).expect("a road").drs.is_empty());
+    for (toml, part) in [
+        (zone(10.0, 700.0), "field end_m: found 700, expected 0 to 628.3"),
+        (
+            zone(10.0, 10.0),
+            "found 10, expected another station than start_m, 10",
+        ),
+        (
+            format!("closed = false\n{}", zone(20.0, 10.0)),
+            "beyond it on an open road",
+        ),
+    ] {
+        let (_folder, path) = Folder::with(&format!("{TOML}{toml}"), TABLE);
+        let said = Circuit::load(&path).expect_err("refused").to_string();
+        assert!(said.contains(part), "{said}");
+    }
+}
+
 #[test]
 fn names_that_files_cannot_have_or_share_are_refused() {
     let section = |name: &str, start: u32| {

@@ -84,6 +84,7 @@ pub struct Envelope {
     name: String,
     rows: Vec<EnvelopeRow>,
     in_bends: Option<BendTraction>,
+    open: Option<Box<Self>>,
 }
 
 /// The columns of an envelope's table, in the order that [`Envelope::to_csv`] writes them.
@@ -91,6 +92,9 @@ pub const ENVELOPE_COLUMNS: [&str; 5] = ["v_mps", "ay_mps2", "ax_grip_mps2", "ax
 
 /// Columns that a table may have besides: the traction at a share of the lateral limit, which the name ends with.
 pub const TRACTION_COLUMN: &str = "ax_traction_mps2_at_";
+
+/// What the names of columns begin with that hold the figures with the DRS open.
+pub const OPEN_COLUMN: &str = "open_";
 
 /// Range of each column: the least value, whether that value itself is allowed, and the greatest.
 const RANGES: [(f64, bool, f64); 5] = [
@@ -117,6 +121,7 @@ impl Envelope {
             name,
             rows,
             in_bends: None,
+            open: None,
         })
     }
 
@@ -144,15 +149,39 @@ impl Envelope {
         Ok(self)
     }
 
-    /// The envelope with other figures at the same speeds. Its traction in bends stays.
+    /// The envelope of a car with a DRS; `open` is that with the flap open.
+    ///
+    /// # Errors
+    /// [`Error::Input`] if the speeds of both differ, or if one has traction in bends and the other does not.
+    pub fn with_open(mut self, open: Self) -> Result<Self> {
+        let speeds = |limits: &Self| -> Vec<f64> { limits.rows.iter().map(|row| row.v_mps).collect() };
+        if speeds(&self) != speeds(&open) || self.in_bends.is_some() != open.in_bends.is_some() {
+            let found = format!("{} speeds with the flap open", open.rows.len());
+            let expected = "the columns and the speeds that it has with the flap shut";
+            return Err(Error::input(&self.name, "DRS", found, expected));
+        }
+        self.open = Some(Box::new(open));
+        Ok(self)
+    }
+
+    /// The envelope with the DRS open, of a car that has one.
+    pub fn open(&self) -> Option<&Self> {
+        self.open.as_deref()
+    }
+
+    /// The envelope with other figures at the same speeds: `other` gives them from an envelope, this one or that with the DRS open,
+    /// and one of its rows. The traction in bends stays.
     ///
     /// # Errors
     /// As [`Envelope::new`] and [`Envelope::with_bend_traction`].
-    pub fn with_rows(&self, name: impl Into<String>, rows: Vec<EnvelopeRow>) -> Result<Self> {
-        let other = Self::new(name, rows)?;
-        match &self.in_bends {
-            Some(in_bends) => other.with_bend_traction(in_bends.clone()),
-            None => Ok(other),
+    pub fn with_rows(&self, name: &str, other: &dyn Fn(&Self, &EnvelopeRow) -> EnvelopeRow) -> Result<Self> {
+        let mut changed = Self::new(name, self.rows.iter().map(|row| other(self, row)).collect())?;
+        if let Some(in_bends) = &self.in_bends {
+            changed = changed.with_bend_traction(in_bends.clone())?;
+        }
+        match &self.open {
+            Some(open) => changed.with_open(open.with_rows(name, other)?),
+            None => Ok(changed),
         }
     }
 
@@ -185,7 +214,7 @@ impl Envelope {
     }
 
     /// Reads an envelope from a CSV file with the columns [`ENVELOPE_COLUMNS`] in any order; lines that begin with
-    /// `#` are comments.
+    /// `#` are comments. Columns whose names begin with [`OPEN_COLUMN`] hold the figures with the DRS open.
     ///
     /// # Errors
     /// [`Error::Io`] if the file cannot be read, [`Error::Input`] with line and field if it holds no envelope.
@@ -226,81 +255,50 @@ impl Envelope {
         };
         let header = reader.headers().map_err(unreadable)?.clone();
         let header_line = line_at(header.position());
-        let mut column = [0; 5];
-        for (place, name) in column.iter_mut().zip(ENVELOPE_COLUMNS) {
-            let mut found = header.iter().enumerate().filter(|(_, h)| *h == name);
-            *place = match (found.next(), found.next()) {
-                (Some((i, _)), None) => i,
-                (first, _) => {
-                    return Err(Error::input(
-                        file,
-                        Place::line(header_line).column(name),
-                        if first.is_some() {
-                            "it twice".to_owned()
-                        } else {
-                            format!("only `{}`", header.iter().collect::<Vec<_>>().join(","))
-                        },
-                        format!("each of {} once", ENVELOPE_COLUMNS.join(", ")),
-                    ));
-                }
-            };
-        }
-        let (places, shares) = traction_columns(file, &header, header_line)?;
-        let mut rows: Vec<EnvelopeRow> = Vec::new();
-        let mut tractions = Vec::new();
+        let mut records = Vec::new();
         for record in reader.records() {
             let record = record.map_err(unreadable)?;
-            let line = line_at(record.position());
-            let number = |place: usize| -> Result<f64> {
-                let field = record.get(place).unwrap_or_default();
-                let name = header.get(place).unwrap_or_default();
-                let refused = |_| {
-                    let place = Place::line(line).field(name);
-                    Error::input(file, place, format!("`{field}`"), "a number")
-                };
-                field.parse().map_err(refused)
-            };
-            let mut figures = [0.0; 5];
-            for (figure, place) in figures.iter_mut().zip(column) {
-                *figure = number(place)?;
-            }
-            let row = EnvelopeRow::from_array(figures);
-            check_row(file, Place::line(line), &row, rows.last())?;
-            rows.push(row);
-            if !shares.is_empty() {
-                let figures = places
-                    .iter()
-                    .map(|place| number(*place))
-                    .collect::<Result<Vec<_>>>()?;
-                check_traction(file, Place::line(line), &shares, &figures)?;
-                tractions.push(figures);
-            }
+            records.push((line_at(record.position()), record));
         }
-        check_count(file, rows.len())?;
-        let in_bends = (!shares.is_empty()).then_some(BendTraction {
-            shares,
-            rows: tractions,
-        });
-        Ok(Self {
-            name: file.to_owned(),
-            rows,
-            in_bends,
-        })
+        let table = TableText {
+            file,
+            header: (header_line, &header),
+            records: &records,
+        };
+        let shut = table.envelope("")?;
+        if header.iter().any(|name| name.starts_with(OPEN_COLUMN)) {
+            return shut.with_open(table.envelope(OPEN_COLUMN)?);
+        }
+        Ok(shut)
     }
 
     /// The table as [`Envelope::load`] reads it.
     pub fn to_csv(&self) -> String {
-        let mut text = ENVELOPE_COLUMNS.join(",");
+        let states = [("", Some(self)), (OPEN_COLUMN, self.open())];
+        let states: Vec<_> = states
+            .into_iter()
+            .filter_map(|(prefix, state)| Some((prefix, state?)))
+            .collect();
+        let mut text = ENVELOPE_COLUMNS[0].to_owned();
         // Writing to a string cannot fail.
-        for share in self.in_bends.iter().flat_map(|t| &t.shares) {
-            let _ = write!(text, ",{TRACTION_COLUMN}{share}");
+        for (prefix, state) in &states {
+            for name in &ENVELOPE_COLUMNS[1..] {
+                let _ = write!(text, ",{prefix}{name}");
+            }
+            for share in state.in_bends.iter().flat_map(|t| &t.shares) {
+                let _ = write!(text, ",{prefix}{TRACTION_COLUMN}{share}");
+            }
         }
         text += "\n";
         for (index, row) in self.rows.iter().enumerate() {
-            let [v, ay, grip, drive, drag] = row.to_array();
-            let _ = write!(text, "{v},{ay},{grip},{drive},{drag}");
-            for figure in self.in_bends.iter().flat_map(|t| &t.rows[index]) {
-                let _ = write!(text, ",{figure}");
+            let _ = write!(text, "{}", row.v_mps);
+            for (_, state) in &states {
+                for figure in &state.rows[index].to_array()[1..] {
+                    let _ = write!(text, ",{figure}");
+                }
+                for figure in state.in_bends.iter().flat_map(|t| &t.rows[index]) {
+                    let _ = write!(text, ",{figure}");
+                }
             }
             text += "\n";
         }
@@ -336,15 +334,104 @@ impl Envelope {
     }
 }
 
+/// The rows of a table, each with its line, and its header.
+struct TableText<'a> {
+    file: &'a str,
+    header: (usize, &'a csv::StringRecord),
+    records: &'a [(usize, csv::StringRecord)],
+}
+
+impl TableText<'_> {
+    /// The envelope in the columns whose names begin with `prefix`; all have the speed in common.
+    fn envelope(&self, prefix: &str) -> Result<Envelope> {
+        let Self {
+            file,
+            header: (header_line, header),
+            records,
+        } = *self;
+        let named = |name: &str| {
+            if name == ENVELOPE_COLUMNS[0] {
+                name.to_owned()
+            } else {
+                format!("{prefix}{name}")
+            }
+        };
+        let names = ENVELOPE_COLUMNS.map(named);
+        let mut column = [0; 5];
+        for (place, name) in column.iter_mut().zip(&names) {
+            let mut found = header.iter().enumerate().filter(|(_, h)| h == name);
+            *place = match (found.next(), found.next()) {
+                (Some((i, _)), None) => i,
+                (first, _) => {
+                    return Err(Error::input(
+                        file,
+                        Place::line(header_line).column(name),
+                        if first.is_some() {
+                            "it twice".to_owned()
+                        } else {
+                            format!("only `{}`", header.iter().collect::<Vec<_>>().join(","))
+                        },
+                        format!("each of {} once", names.join(", ")),
+                    ));
+                }
+            };
+        }
+        let (places, shares) = traction_columns(file, header, header_line, prefix)?;
+        let mut rows: Vec<EnvelopeRow> = Vec::new();
+        let mut tractions = Vec::new();
+        for (line, record) in records {
+            let number = |place: usize| -> Result<f64> {
+                let field = record.get(place).unwrap_or_default();
+                let name = header.get(place).unwrap_or_default();
+                let refused = |_| {
+                    let place = Place::line(*line).field(name);
+                    Error::input(file, place, format!("`{field}`"), "a number")
+                };
+                field.parse().map_err(refused)
+            };
+            let mut figures = [0.0; 5];
+            for (figure, place) in figures.iter_mut().zip(column) {
+                *figure = number(place)?;
+            }
+            let row = EnvelopeRow::from_array(figures);
+            check_row(file, Place::line(*line), &row, rows.last())?;
+            rows.push(row);
+            if !shares.is_empty() {
+                let figures = places
+                    .iter()
+                    .map(|place| number(*place))
+                    .collect::<Result<Vec<_>>>()?;
+                check_traction(file, Place::line(*line), &shares, &figures)?;
+                tractions.push(figures);
+            }
+        }
+        check_count(file, rows.len())?;
+        let in_bends = (!shares.is_empty()).then_some(BendTraction {
+            shares,
+            rows: tractions,
+        });
+        Ok(Envelope {
+            name: file.to_owned(),
+            rows,
+            in_bends,
+            open: None,
+        })
+    }
+}
+
 /// The columns of traction in bends by rising share: their places, and the shares.
 fn traction_columns(
     file: &str,
     header: &csv::StringRecord,
     header_line: usize,
+    prefix: &str,
 ) -> Result<(Vec<usize>, Vec<f64>)> {
     let mut columns = Vec::new();
     for (place, name) in header.iter().enumerate() {
-        let Some(share) = name.strip_prefix(TRACTION_COLUMN) else {
+        let Some(share) = name
+            .strip_prefix(prefix)
+            .and_then(|name| name.strip_prefix(TRACTION_COLUMN))
+        else {
             continue;
         };
         let share: f64 = share.parse().map_err(|_| {
@@ -485,8 +572,18 @@ mod tests {
         assert_eq!(again, envelope);
         let plain = Envelope::from_csv("own.csv", TEXT).unwrap();
         assert_eq!(plain.traction_at(30.0, 0.5), None);
-        let rows = envelope.rows().to_vec();
-        assert_eq!(envelope.with_rows("own.csv", rows).unwrap(), envelope);
+        let same = |_: &Envelope, row: &EnvelopeRow| *row;
+        assert_eq!(envelope.with_rows("own.csv", &same).unwrap(), envelope);
+        let less = |limits: &Envelope, row: &EnvelopeRow| EnvelopeRow {
+            drag_mps2: row.drag_mps2 * if std::ptr::eq(limits, &envelope) { 0.8 } else { 1.0 },
+            ..*row
+        };
+        let open = envelope.with_rows("own.csv", &less).unwrap();
+        let both = envelope.clone().with_open(open.clone()).unwrap();
+        let again = Envelope::from_csv("own.csv", &both.to_csv()).unwrap();
+        assert_eq!((again.open(), &again), (Some(&open), &both));
+        // A flap that is open at speeds of its own belongs to another car.
+        assert!(plain.with_open(open).is_err());
     }
 
     #[test]

@@ -127,6 +127,8 @@ pub struct CarEnvelope {
     pub handling: Handling,
     /// The envelope.
     pub envelope: Envelope,
+    /// Limits at the same speeds with the DRS open, of a car that has one.
+    pub open: Option<Vec<EnvelopeAtSpeed>>,
     /// Speeds at which the car has no steady state in a bend (m/s). The envelope goes on between its neighbours there.
     pub left_out_mps: Vec<f64>,
 }
@@ -151,13 +153,78 @@ pub const LATERAL_SHARES: [f64; 12] = [0.0, 0.2, 0.4, 0.5, 0.6, 0.7, 0.8, 0.85, 
 /// Steering up to which steady states are looked for (rad): a car whose lock is reached first still has the tyres' own limit.
 pub const STEER_TO_GRIP: f64 = 0.6;
 
-/// Sweeps the car over speed and steering.
+/// Sweeps the car over speed and steering, with its DRS shut and open.
 ///
 /// # Errors
 /// [`Error::Input`] for a range that is none and for a car without a powertrain, [`Error::Study`] for one that has a steady
 /// state in bends at fewer than two of the speeds.
 pub fn car_envelope(car: &Car, range: &SpeedRange) -> Result<CarEnvelope> {
     let speeds = range.speeds_of(car)?;
+    let shut = limits_at(car, &speeds)?;
+    let open = match car.chassis.with_open_drs() {
+        Some(chassis) => Some(limits_at(
+            &Car {
+                chassis,
+                ..car.clone()
+            },
+            &speeds,
+        )?),
+        None => None,
+    };
+    let corners = |l: &EnvelopeAtSpeed| l.row.ay_mps2 > 0.0 && l.row.ax_grip_mps2 > 0.0;
+    let kept: Vec<bool> = (0..speeds.len())
+        .map(|i| corners(&shut[i]) && open.as_ref().is_none_or(|open| corners(&open[i])))
+        .collect();
+    let left_out_mps: Vec<f64> = speeds
+        .iter()
+        .zip(&kept)
+        .filter(|(_, kept)| !**kept)
+        .map(|(v, _)| *v)
+        .collect();
+    let of_kept = |all: Vec<EnvelopeAtSpeed>| -> Vec<EnvelopeAtSpeed> {
+        all.into_iter()
+            .zip(&kept)
+            .filter(|(_, kept)| **kept)
+            .map(|(at, _)| at)
+            .collect()
+    };
+    let (limits, open) = (of_kept(shut), open.map(of_kept));
+    if limits.len() < 2 {
+        return Err(Error::Study(format!(
+            "{} has no steady state in bends at {} of {} speeds ({}): its tyres cannot hold it on the road there",
+            car.name,
+            left_out_mps.len(),
+            left_out_mps.len() + limits.len(),
+            in_words(&left_out_mps)
+        )));
+    }
+    let envelope = envelope_of(&car.name, &limits)?;
+    let envelope = match &open {
+        Some(open) => envelope.with_open(envelope_of(&car.name, open)?)?,
+        None => envelope,
+    };
+    let wheelbase = car.chassis.cg_to_front + car.chassis.cg_to_rear;
+    Ok(CarEnvelope {
+        handling: handling(&limits[limits.len() / 2], wheelbase, steady_car(car).as_ref()),
+        speeds: limits,
+        envelope,
+        open,
+        left_out_mps,
+    })
+}
+
+/// The envelope of these limits.
+fn envelope_of(name: &str, limits: &[EnvelopeAtSpeed]) -> Result<Envelope> {
+    let in_bends = BendTraction {
+        shares: LATERAL_SHARES.to_vec(),
+        rows: limits.iter().map(|l| l.traction_in_bends_mps2.clone()).collect(),
+    };
+    let rows = limits.iter().map(|l| l.row).collect();
+    Envelope::new(name, rows)?.with_bend_traction(in_bends)
+}
+
+/// What the car does at these speeds (m/s).
+fn limits_at(car: &Car, speeds: &[f64]) -> Result<Vec<EnvelopeAtSpeed>> {
     let force = engine_of(car)?;
     let steady = steady_car(car);
     let (mass, powertrain) = (car.chassis.mass, car.powertrain.as_ref());
@@ -169,71 +236,44 @@ pub fn car_envelope(car: &Car, range: &SpeedRange) -> Result<CarEnvelope> {
     // tyres are.
     let even = car.chassis.left_share_front == 0.5 && car.chassis.left_share_rear == 0.5;
     let mirrored = even && car.tyres.are_mirrored();
-    let found: Vec<EnvelopeAtSpeed> = speeds
-        .into_par_iter()
-        .map(|speed| {
-            let cornering = steady.cornering(speed, STEER_TO_GRIP, Turn::Left);
-            let other = (!mirrored).then(|| steady.cornering(speed, STEER_TO_GRIP, Turn::Right));
-            let peak = |trims: &[Trim]| greatest_within(car.max_steer_rad, trims);
-            let left_mps2 = peak(&cornering);
-            let other_mps2 = other.as_deref().map_or(left_mps2, peak);
-            let right_mps2 = if even { left_mps2 } else { other_mps2 };
-            let ay_mps2 = left_mps2.min(right_mps2);
-            let traction_mps2 = steady.greatest_traction(speed);
-            // Each side at its own share.
-            let driven = |share: f64| {
-                let lock = car.max_steer_rad;
-                let left = steady.greatest_drive(speed, share * left_mps2, lock, &cornering)?;
-                let right = other.as_deref().map_or(Some(left), |curve| {
-                    steady.greatest_drive(speed, -share * other_mps2, lock, curve)
-                });
-                right.map(|right| left.min(right))
-            };
-            let traction_in_bends_mps2 = in_bends(traction_mps2, driven);
-            let drag_mps2 = steady.drag(speed) + rolling;
-            let engine_mps2 = accelerated(force(speed), drag_mps2) + drag_mps2;
-            EnvelopeAtSpeed {
-                row: EnvelopeRow {
-                    v_mps: speed,
-                    ay_mps2,
-                    ax_grip_mps2: steady.greatest_braking(speed),
-                    ax_drive_mps2: traction_mps2.min(engine_mps2),
-                    drag_mps2,
-                },
-                left_mps2,
-                right_mps2,
-                cornering,
-                traction_mps2,
-                traction_in_bends_mps2,
-                engine_mps2,
-            }
-        })
-        .collect();
-    let corners = |l: &EnvelopeAtSpeed| l.row.ay_mps2 > 0.0 && l.row.ax_grip_mps2 > 0.0;
-    let (limits, left_out): (Vec<_>, Vec<_>) = found.into_iter().partition(corners);
-    let left_out_mps: Vec<f64> = left_out.iter().map(|l| l.row.v_mps).collect();
-    if limits.len() < 2 {
-        return Err(Error::Study(format!(
-            "{} has no steady state in bends at {} of {} speeds ({}): its tyres cannot hold it on the road there",
-            car.name,
-            left_out_mps.len(),
-            left_out_mps.len() + limits.len(),
-            in_words(&left_out_mps)
-        )));
-    }
-    let in_bends = BendTraction {
-        shares: LATERAL_SHARES.to_vec(),
-        rows: limits.iter().map(|l| l.traction_in_bends_mps2.clone()).collect(),
+    let at = |&speed: &f64| {
+        let cornering = steady.cornering(speed, STEER_TO_GRIP, Turn::Left);
+        let other = (!mirrored).then(|| steady.cornering(speed, STEER_TO_GRIP, Turn::Right));
+        let peak = |trims: &[Trim]| greatest_within(car.max_steer_rad, trims);
+        let left_mps2 = peak(&cornering);
+        let other_mps2 = other.as_deref().map_or(left_mps2, peak);
+        let right_mps2 = if even { left_mps2 } else { other_mps2 };
+        let ay_mps2 = left_mps2.min(right_mps2);
+        let traction_mps2 = steady.greatest_traction(speed);
+        // Each side at its own share.
+        let driven = |share: f64| {
+            let lock = car.max_steer_rad;
+            let left = steady.greatest_drive(speed, share * left_mps2, lock, &cornering)?;
+            let right = other.as_deref().map_or(Some(left), |curve| {
+                steady.greatest_drive(speed, -share * other_mps2, lock, curve)
+            });
+            right.map(|right| left.min(right))
+        };
+        let traction_in_bends_mps2 = in_bends(traction_mps2, driven);
+        let drag_mps2 = steady.drag(speed) + rolling;
+        let engine_mps2 = accelerated(force(speed), drag_mps2) + drag_mps2;
+        EnvelopeAtSpeed {
+            row: EnvelopeRow {
+                v_mps: speed,
+                ay_mps2,
+                ax_grip_mps2: steady.greatest_braking(speed),
+                ax_drive_mps2: traction_mps2.min(engine_mps2),
+                drag_mps2,
+            },
+            left_mps2,
+            right_mps2,
+            cornering,
+            traction_mps2,
+            traction_in_bends_mps2,
+            engine_mps2,
+        }
     };
-    let rows = limits.iter().map(|l| l.row).collect();
-    let envelope = Envelope::new(&car.name, rows)?.with_bend_traction(in_bends)?;
-    let wheelbase = car.chassis.cg_to_front + car.chassis.cg_to_rear;
-    Ok(CarEnvelope {
-        handling: handling(&limits[limits.len() / 2], wheelbase, steady.as_ref()),
-        speeds: limits,
-        envelope,
-        left_out_mps,
-    })
+    Ok(speeds.par_iter().map(at).collect())
 }
 
 /// The traction (m/s^2) at each of [`LATERAL_SHARES`], from that of running straight and what `driven` finds up to the limit. What

@@ -99,10 +99,27 @@ impl MassLimits {
         let traction = Traction {
             rows: driven.collect(),
         };
-        let carried = Envelope::new(envelope.name(), rows.collect())?;
-        let Some(BendTraction { shares, rows }) = envelope.bend_traction() else {
-            return Ok((carried, traction));
-        };
+        let mut carried = Envelope::new(envelope.name(), rows.collect())?;
+        if let Some(in_bends) = self.carried_in_bends(envelope, from_kg, to_kg) {
+            carried = carried.with_bend_traction(in_bends)?;
+        }
+        let swept = self.rows.iter().map(|(mass_kg, limits, traction)| {
+            let open = limits.open()?;
+            let own = open.straight_traction().unwrap_or_else(|| traction.clone());
+            Some((*mass_kg, open.clone(), own))
+        });
+        if let (Some(open), Some(rows)) = (envelope.open(), swept.collect()) {
+            let own = open.straight_traction().unwrap_or_else(|| traction.clone());
+            let (open, _) = Self { rows }.carry((open, &own), from_kg, to_kg)?;
+            carried = carried.with_open(open)?;
+        }
+        Ok((carried, traction))
+    }
+
+    /// The traction in bends of an envelope, carried likewise.
+    fn carried_in_bends(&self, envelope: &Envelope, from_kg: f64, to_kg: f64) -> Option<BendTraction> {
+        let share = |from: f64, to: f64| if from > 0.0 { to / from } else { 1.0 };
+        let BendTraction { shares, rows } = envelope.bend_traction()?;
         let mut in_bends = Vec::with_capacity(rows.len());
         for (row, figures) in envelope.rows().iter().zip(rows) {
             let mut most = f64::INFINITY;
@@ -113,11 +130,10 @@ impl MassLimits {
             });
             in_bends.push(figures.collect());
         }
-        let in_bends = BendTraction {
+        Some(BendTraction {
             shares: shares.clone(),
             rows: in_bends,
-        };
-        Ok((carried.with_bend_traction(in_bends)?, traction))
+        })
     }
 }
 

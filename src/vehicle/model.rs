@@ -14,6 +14,8 @@ pub struct CarInput<R> {
     pub wheel_speed: [R; 4],
     /// Angle of the front road wheels, positive to the left, rad.
     pub steer: R,
+    /// How far the DRS is open, from 0 to 1.
+    pub flap: R,
 }
 
 /// The state of the car.
@@ -165,7 +167,7 @@ impl<R: Real, T: Tyre<R>> CarModel<R, T> {
     pub fn rate(&self, state: &CarState<R>, input: &CarInput<R>) -> CarRate<R> {
         let chassis = &self.chassis;
         let body = &state.body;
-        let aero = aero_forces(chassis, body.vx);
+        let aero = aero_forces(chassis, body.vx, input.flap);
         let loads = wheel_loads(chassis, body, state.pitch_acceleration, &aero);
 
         let steer = input.steer * chassis.steer_scale + chassis.steer_offset;

@@ -149,7 +149,16 @@ fn linearised_on<T: Tyre<f64>>(flat: &[f64], speed: f64, wheels: Wheels) -> Opti
             (turned.cos(), turned.sin()),
             [0.0; 2],
         );
-        let rate = car.rate(&state(x), &CarInput { wheel_speed, steer }).state;
+        let rate = car
+            .rate(
+                &state(x),
+                &CarInput {
+                    wheel_speed,
+                    steer,
+                    flap: 0.0,
+                },
+            )
+            .state;
         let body = rate.body;
         Vector6::new(
             body.vx,

@@ -184,7 +184,7 @@ impl<T: Tyre<f64>, D: Tyre<Exact>> Ready<T, D> {
         };
         let chassis = &self.exact.chassis;
         // The force along the path is the push: the rest of the tyres' forces along the car and across it balances there.
-        let drag = aero_forces(chassis, body.vx).drag / chassis.mass;
+        let drag = aero_forces(chassis, body.vx, zero).drag / chassis.mass;
         let state = CarState {
             pitch_acceleration: push * cos - body.vx * yaw_rate * sin / cos - drag,
             body,
@@ -211,7 +211,14 @@ impl<T: Tyre<f64>, D: Tyre<Exact>> Ready<T, D> {
         });
         // The model takes the angle as a sensor reads it.
         let steer = (steer - chassis.steer_offset) / chassis.steer_scale;
-        let rate = self.exact.rate(&state, &CarInput { wheel_speed, steer });
+        let rate = self.exact.rate(
+            &state,
+            &CarInput {
+                wheel_speed,
+                steer,
+                flap: zero,
+            },
+        );
         [
             // At a steady sideslip the velocity across the car grows with that along the path.
             rate.state.body.vy - push * sin,
@@ -295,7 +302,7 @@ impl<T: Tyre<f64>, D: Tyre<Exact>> Ready<T, D> {
             roll_rate: 0.0,
         };
         let chassis = &self.plain.chassis;
-        let aero = aero_forces(chassis, body.vx);
+        let aero = aero_forces(chassis, body.vx, 0.0);
         let push = -body.vy * yaw_rate_radps - aero.drag / chassis.mass;
         Trim {
             steer_rad,
@@ -320,6 +327,7 @@ impl<T: Tyre<f64>, D: Tyre<Exact>> Ready<T, D> {
         let input = CarInput {
             wheel_speed,
             steer: -chassis.steer_offset / chassis.steer_scale,
+            flap: 0.0,
         };
         // Load transfer and force depend on each other. The iteration converges, since a change of one changes the other by a
         // sixth at most.
@@ -492,7 +500,7 @@ impl<T: Tyre<f64>, D: Tyre<Exact>> SteadyCar for Ready<T, D> {
     }
 
     fn drag(&self, speed: f64) -> f64 {
-        aero_forces(&self.plain.chassis, speed).drag / self.plain.chassis.mass
+        aero_forces(&self.plain.chassis, speed, 0.0).drag / self.plain.chassis.mass
     }
 }
 
@@ -554,7 +562,7 @@ mod tests {
             let peak = trims.iter().map(|t| t.ay_mps2).fold(0.0, f64::max);
             assert!(trims.len() > 10 && peak > 10.0, "{speed}: {} {peak}", trims.len());
             // What the wheels carry is the car and its downforce.
-            let aero = aero_forces(&car.chassis, speed * trims[5].sideslip_rad.cos());
+            let aero = aero_forces(&car.chassis, speed * trims[5].sideslip_rad.cos(), 0.0);
             let carried: f64 = trims[5].wheel_load_n.iter().sum();
             let weight = car.chassis.mass * car.chassis.gravity + aero.downforce_front + aero.downforce_rear;
             assert!((carried / weight - 1.0).abs() < 1e-12);

@@ -16,11 +16,8 @@ impl Traction {
     /// The traction of `car` within `envelope`, a table of its own or of other grip. Where that says nothing of it, the driven tyres
     /// have the share of the envelope's grip that they have of the car's own, and never less than the envelope's drive.
     pub fn of(car: &Car, envelope: &Envelope) -> Self {
-        if let Some(in_bends) = envelope.bend_traction() {
-            let rows = envelope.rows().iter().zip(&in_bends.rows);
-            return Self {
-                rows: rows.map(|(row, straight)| (row.v_mps, straight[0])).collect(),
-            };
+        if let Some(known) = envelope.straight_traction() {
+            return known;
         }
         let steady = steady_car(car);
         let at = |row: &EnvelopeRow| {
@@ -48,6 +45,15 @@ impl Traction {
 }
 
 impl Envelope {
+    /// What the driven tyres can give running straight, where the envelope has a table of its traction.
+    pub fn straight_traction(&self) -> Option<Traction> {
+        let in_bends = self.bend_traction()?;
+        let rows = self.rows().iter().zip(&in_bends.rows);
+        Some(Traction {
+            rows: rows.map(|(row, straight)| (row.v_mps, straight[0])).collect(),
+        })
+    }
+
     /// The envelope with a share of the grip, that of the driven tyres included; the engine and drag are the car's own.
     ///
     /// # Errors
@@ -59,17 +65,21 @@ impl Envelope {
             ax_drive_mps2: row.ax_drive_mps2.min(share * traction.at(row.v_mps)),
             ..*row
         });
-        let part = Self::new(format!("{}, {share:.3} of its grip", self.name()), rows.collect())?;
-        let Some(BendTraction { shares, rows }) = self.bend_traction().cloned() else {
+        let mut part = Self::new(format!("{}, {share:.3} of its grip", self.name()), rows.collect())?;
+        if let Some(BendTraction { shares, rows }) = self.bend_traction().cloned() {
+            let rows = rows
+                .into_iter()
+                .map(|row| row.iter().map(|x| share * x).collect());
+            part = part.with_bend_traction(BendTraction {
+                shares,
+                rows: rows.collect(),
+            })?;
+        }
+        let Some(open) = self.open() else {
             return Ok(part);
         };
-        let rows = rows
-            .into_iter()
-            .map(|row| row.iter().map(|x| share * x).collect());
-        part.with_bend_traction(BendTraction {
-            shares,
-            rows: rows.collect(),
-        })
+        let own = open.straight_traction();
+        part.with_open(open.with_grip_share(share, own.as_ref().unwrap_or(traction))?)
     }
 }
 

@@ -72,7 +72,7 @@ fn at<T: Tyre<f64>>(car: &CarModel<f64, T>, driven: &[(CarState<f64>, CarInput<f
     ];
     let moments = driven.iter().map(|(state, input)| {
         let body = &state.body;
-        let aero = aero_forces(chassis, body.vx);
+        let aero = aero_forces(chassis, body.vx, input.flap);
         let loads = wheel_loads(chassis, body, state.pitch_acceleration, &aero);
         let steer = input.steer * chassis.steer_scale + chassis.steer_offset;
         let axles = [0, 1].map(|axle| {
@@ -119,7 +119,8 @@ mod tests {
     /// The tyres' forces are those that move the car: with the drag they make its acceleration.
     #[test]
     fn forces_add_up_to_the_acceleration() {
-        let car = Car::load("gt").unwrap();
+        let mut car = Car::load("gt").unwrap();
+        (car.chassis.drs_drag, car.chassis.drs_lift) = (20.0, 30.0);
         let flat = car.to_flat();
         let model = CarModel::<f64, MagicFormula<f64>>::from_parameters(|i| flat[i]);
         let state = CarState {
@@ -135,6 +136,7 @@ mod tests {
         let input = CarInput {
             wheel_speed: [40.0 / 0.33, 40.5 / 0.33, 41.0 / 0.33, 41.5 / 0.33],
             steer: 0.03,
+            flap: 1.0,
         };
         let [moment] = moments_of(&car, &[(state, input)])[..] else {
             panic!("one moment")
@@ -143,7 +145,7 @@ mod tests {
         let chassis = &model.chassis;
         let steer = input.steer * chassis.steer_scale + chassis.steer_offset;
         let front = |w: &Wheel| w.longitudinal_n * steer.cos() - w.lateral_n * steer.sin();
-        let drag = aero_forces(chassis, 40.0).drag;
+        let drag = aero_forces(chassis, 40.0, 1.0).drag;
         let total = front(&fl) + front(&fr) + rl.longitudinal_n + rr.longitudinal_n - drag;
         let rate = model.rate(&state, &input);
         let ax = rate.ax;
@@ -156,7 +158,7 @@ mod tests {
         // Upright, the car's mass moves against its roll axis as the roll rate changes.
         let ay = across / chassis.mass + chassis.cg_height * rate.state.body.roll_rate;
         assert!((ay - moment.ay_mps2).abs() < 1e-9, "{ay} and {moment:?}");
-        let downforce = aero_forces(chassis, 40.0);
+        let downforce = aero_forces(chassis, 40.0, 1.0);
         let weight = chassis.mass * chassis.gravity + downforce.downforce_front + downforce.downforce_rear;
         let loads = fl.load_n + fr.load_n + rl.load_n + rr.load_n;
         assert!((loads - weight).abs() < 1e-6, "{loads} of {weight}");

@@ -144,6 +144,7 @@ pub fn line_shape(closed: bool, terms: usize, lap: bool) -> LineShape {
         corner_rows: 1024,
         ellipse_rows: if closed { 256 } else { 0 },
         traction: terms != 1,
+        drs: terms == 0,
         uniform_sections: closed.then_some(360),
         uniform_envelope: terms == 4,
         workgroup: 64,

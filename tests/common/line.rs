@@ -45,6 +45,7 @@ fn cut(name: &str, right_m: Vec<DVec2>, left_m: Vec<DVec2>, closed: bool) -> Cro
         reference: vec![0.5; count],
         sections: Vec::new(),
         corners: Vec::new(),
+        drs: Vec::new(),
     }
 }
 

@@ -93,6 +93,7 @@ impl Manoeuvre {
         CarInput {
             wheel_speed: [w0, w1, w2, w3],
             steer,
+            flap: 0.0,
         }
     }
 

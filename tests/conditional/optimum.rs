@@ -311,7 +311,7 @@ fn fastest_lines_of_the_surveyed_silverstone() {
     for (start, end) in starts.iter().zip(&ends) {
         let before = problem.measures(&start.x).time_s;
         // At a quarter of a metre the passes' own error, of the first order, is 0.01 %.
-        let fine = FineLine::new(&map.line(&end.x), true, 0.25, Some(&car), 0.0).unwrap();
+        let fine = FineLine::new(&map.line(&end.x), true, 0.25, Some((&car, &[])), 0.0).unwrap();
         let again = fine.lap_time_s().unwrap();
         println!(
             "{before:.3} s to {:.5} s, on a fine spline {again:.5} s, {} programs, {:.2} s",
@@ -453,7 +453,7 @@ fn every_start_ends_at_the_same_lap_of_the_surveyed_silverstone() {
     let envelope = PointMassEnvelope::new(&car).unwrap();
     let mut points = map.line(&best.x);
     let lap = |points: &[glam::DVec2]| {
-        let fine = FineLine::new(points, true, 0.25, Some(&car), 0.0).unwrap();
+        let fine = FineLine::new(points, true, 0.25, Some((&car, &[])), 0.0).unwrap();
         fine.lap_time_s().unwrap()
     };
     let about = |points: &[glam::DVec2], count: usize, bend: SegmentBend| {

@@ -107,7 +107,7 @@ fn minimum_time_s(setup: &Setup, alpha: &[f64]) -> f64 {
         let solved = fastest(&problem, &bounds, &start, &DescentSettings::default()).unwrap();
         points = map.line(&solved.x);
     }
-    let fine = FineLine::new(&points, true, 1.0, Some(&setup.car), 0.0).unwrap();
+    let fine = FineLine::new(&points, true, 1.0, Some((&setup.car, &[])), 0.0).unwrap();
     fine.lap_time_s().unwrap()
 }
 

@@ -144,7 +144,7 @@ fn the_surveyed_silverstone_is_cut_as_others_cut_it() {
 
 /// The surveyed centreline, as far as the public database has it.
 fn the_surveyed_centreline_takes_what_others_found() {
-    let line = FineLine::new(&centreline(), true, 1.0, Some(&gt_car()), 0.0).unwrap();
+    let line = FineLine::new(&centreline(), true, 1.0, Some((&gt_car(), &[])), 0.0).unwrap();
     let time = line.lap_time_s().unwrap();
     println!("{time} s, {} m", line.length_m);
     // A published minimum-time solution for this car has 146 s for the centreline.

@@ -84,6 +84,7 @@ fn problems() -> Vec<(String, HybridProblem)> {
             let fixed = HybridLine::Fixed {
                 points_m: middle.clone(),
                 closed,
+                drs: Vec::new(),
             };
             for (name, line) in [("free", free), ("fixed", fixed)] {
                 let problem = HybridProblem::new(

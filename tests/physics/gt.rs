@@ -39,6 +39,7 @@ fn inputs(model: &GtModel, state: &CarState<f64>, steer: f64, drive: f64) -> Car
     CarInput {
         wheel_speed: [front(wf), front(-wf), rear(wr), rear(-wr)],
         steer,
+        flap: 0.0,
     }
 }
 

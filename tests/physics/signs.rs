@@ -45,7 +45,7 @@ fn still() -> BodyState<f64> {
 }
 
 fn loads(chassis: &Chassis<f64>, body: &BodyState<f64>, ax: f64) -> [f64; 4] {
-    wheel_loads(chassis, body, ax, &aero_forces(chassis, body.vx))
+    wheel_loads(chassis, body, ax, &aero_forces(chassis, body.vx, 0.0))
 }
 
 #[track_caller]
@@ -61,6 +61,7 @@ fn rolling(vx: f64, steer: f64) -> CarInput<f64> {
     CarInput {
         wheel_speed: [front, front, vx / 0.3, vx / 0.3],
         steer,
+        flap: 0.0,
     }
 }
 
@@ -141,7 +142,7 @@ fn transfers_neither_make_nor_lose_load() {
 fn drag_and_downforce_by_the_centre_of_pressure() {
     let chassis = hand_car("drag_area_m2=1 downforce_area_m2=2 aero_balance_front=0.4");
     // 1.25/2 * 40^2 = 1000 Pa.
-    let aero = aero_forces(&chassis, 40.0);
+    let aero = aero_forces(&chassis, 40.0, 0.0);
     close(aero.drag, 1000.0, 1e3);
     close(aero.downforce_front, 800.0, 1e3);
     close(aero.downforce_rear, 1200.0, 1e3);
@@ -160,6 +161,7 @@ fn headwind_adds_to_speed_and_a_gale_from_behind_pushes() {
         aero_forces(
             &hand_car(&format!("drag_area_m2=1 downforce_area_m2=1 headwind_mps={wind}")),
             vx,
+            0.0,
         )
     };
     close(at("10", 30.0).drag, 1000.0, 1e3);
@@ -176,10 +178,13 @@ fn drs_sheds_its_share_of_the_whole_from_the_rear() {
     let chassis = hand_car(
         "drag_area_m2=1 downforce_area_m2=2 aero_balance_front=0.4 drs_downforce_percent=10 drs_drag_percent=5",
     );
-    let aero = aero_forces(&chassis, 40.0);
+    let aero = aero_forces(&chassis, 40.0, 1.0);
     close(aero.drag, 950.0, 1e3);
     close(aero.downforce_front, 800.0, 1e3);
     close(aero.downforce_rear, 1000.0, 1e3);
+    let shut = aero_forces(&chassis, 40.0, 0.0);
+    close(shut.drag, 1000.0, 1e3);
+    close(shut.downforce_rear, 1200.0, 1e3);
 }
 
 // --- Slips -----------------------------------------------------------------------------------------------------
@@ -333,16 +338,20 @@ fn steering_left_turns_left() {
 
 #[test]
 fn a_mirrored_manoeuvre_is_a_mirrored_answer() {
-    let model = linear("front_camber_deg=-3 rear_camber_deg=-1 drag_area_m2=1 downforce_area_m2=2");
+    let model = linear(
+        "front_camber_deg=-3 rear_camber_deg=-1 drag_area_m2=1 downforce_area_m2=2 drs_drag_percent=10 drs_downforce_percent=20",
+    );
     let state = CarState::from_array([30.0, -0.4, 0.3, 0.02, -0.1, -2.0]);
     let mirror = |[vx, vy, r, phi, p, ax]: [f64; 6]| [vx, -vy, -r, -phi, -p, ax];
     let input = CarInput {
         wheel_speed: [99.0, 102.0, 98.0, 104.0],
         steer: 0.05,
+        flap: 0.3,
     };
     let mirrored = CarInput {
         wheel_speed: [102.0, 99.0, 104.0, 98.0],
         steer: -0.05,
+        flap: 0.3,
     };
     let rate = model.rate(&state, &input).state.to_array();
     let other = model

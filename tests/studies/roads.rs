@@ -216,7 +216,7 @@ fn fastest_lines_are_on_the_road() {
         // What drives the line takes it for what it is, and knows the room on both decks of a bridge.
         let setup = set_up(&settings).expect("a road");
         let points = read_line(&folder.path().join("line_fastest.csv")).expect("a line");
-        let driven = NamedLine::new("fastest".to_owned(), points, &setup.edges_m, 2.0).expect("room");
+        let driven = NamedLine::new("fastest".to_owned(), points, &setup, 2.0).expect("room");
         let widths = driven
             .circuit
             .width_left_m
@@ -359,6 +359,7 @@ fn deployments_start_from_a_standstill() {
         car: &setup.car,
         points_m: half,
         closed: false,
+        drs: &[],
         run_in: 0,
         entry_mps: 0.0,
     };

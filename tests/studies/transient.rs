@@ -32,7 +32,7 @@ fn on_lines(lines: &[(&str, f64)]) -> Prepared {
     let line = |(name, beside): &(&str, f64)| {
         let alpha: Vec<f64> = road.cross_sections.reference.iter().map(|a| a - beside).collect();
         let points = road.cross_sections.points(&alpha);
-        NamedLine::new((*name).to_owned(), points, &road.edges_m, 2.0).expect("a line")
+        NamedLine::new((*name).to_owned(), points, &road, 2.0).expect("a line")
     };
     Prepared {
         car: Car::bundled().expect("the bundled car"),
@@ -210,7 +210,7 @@ fn set_ups_and_lines_are_driven_all_at_once() {
 fn a_road_too_narrow_for_the_car_and_a_table_of_something_else_are_refused() {
     let setup = stadium();
     let points = setup.cross_sections.points(&setup.cross_sections.reference);
-    let error = NamedLine::new("middle".to_owned(), points, &setup.edges_m, 16.0).expect_err("no room");
+    let error = NamedLine::new("middle".to_owned(), points, &setup, 16.0).expect_err("no room");
     assert_eq!(error.exit_code(), 2, "{error}");
 
     let folder = tempfile::tempdir().expect("a temporary folder");

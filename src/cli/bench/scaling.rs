@@ -200,7 +200,7 @@ pub(super) fn steady() -> Result<Case<SteadyProblem>> {
 }
 
 pub(super) fn energy() -> Result<Case<HybridProblem>> {
-    let mut problems = parity::energy::problems(SECTIONS, &[Mode::Additional])?;
+    let mut problems = parity::energy::problems(SECTIONS, &[Mode::Additional], false)?;
     let hybrid = problems.remove(0);
     let middle = middle(&hybrid.problem);
     Ok(Case {

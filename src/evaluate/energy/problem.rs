@@ -31,6 +31,8 @@ pub enum HybridLine {
         points_m: Vec<DVec2>,
         /// Whether the last is followed by the first.
         closed: bool,
+        /// Whether the DRS may be open from each point to the next; nowhere if empty.
+        drs: Vec<bool>,
     },
     /// A line across cross-sections, given by the first variables.
     Free {
@@ -148,7 +150,11 @@ impl HybridProblem {
         let wrong =
             |place: &str, found: String, expected: &str| Err(Error::input("hybrid", place, found, expected));
         let (mut plan, mut variables) = match &line {
-            HybridLine::Fixed { points_m, closed } => (LinePlan::of_points(points_m, *closed), Vec::new()),
+            HybridLine::Fixed {
+                points_m,
+                closed,
+                drs,
+            } => (LinePlan::of_points(points_m, *closed).with_drs(drs), Vec::new()),
             HybridLine::Free {
                 cross_sections,
                 parametrisation,
@@ -158,7 +164,8 @@ impl HybridProblem {
                     &cross_sections.left_m,
                     cross_sections.closed,
                 )
-                .spaced(&cross_sections.spacing_m());
+                .spaced(&cross_sections.spacing_m())
+                .with_drs(&cross_sections.drs);
                 parametrisation.apply(cross_sections, &mut plan)?;
                 (plan, parametrisation.variables(cross_sections))
             }
@@ -190,7 +197,7 @@ impl HybridProblem {
         }
         plan.entry = entry_mps * entry_mps;
         plan.start = match &line {
-            HybridLine::Fixed { points_m, closed } => slowest(points_m, *closed),
+            HybridLine::Fixed { points_m, closed, .. } => slowest(points_m, *closed),
             HybridLine::Free { cross_sections, .. } => {
                 slowest(&cross_sections.points(&vec![0.5; n]), cross_sections.closed)
             }

@@ -45,6 +45,7 @@ impl DeviceKernel<LineProblem> for LineDevice {
                 corners: vec![0.0; 2],
                 ellipse: Vec::new(),
                 traction: Vec::new(),
+                open: None,
             },
             |envelope| envelope.stored::<f32>(),
         );

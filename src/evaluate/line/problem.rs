@@ -131,7 +131,8 @@ impl LineProblem {
             &cross_sections.left_m,
             cross_sections.closed,
         )
-        .spaced(&cross_sections.spacing_m());
+        .spaced(&cross_sections.spacing_m())
+        .with_drs(&cross_sections.drs);
         parametrisation.apply(&cross_sections, &mut plan)?;
         plan.entry = entry_mps * entry_mps;
         let middle = geometry(&cross_sections.points(&vec![0.5; n]), cross_sections.closed);

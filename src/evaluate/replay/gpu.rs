@@ -23,8 +23,10 @@ pub struct DeviceSample {
     pub measured: [f32; 4],
     /// Road-wheel angle, rad.
     pub steer: f32,
+    /// How far the DRS is open, 0 to 1.
+    pub flap: f32,
     /// Nothing: vectors of four are aligned to 16 bytes.
-    pub padding: [f32; 3],
+    pub padding: [f32; 2],
 }
 
 /// One window on the device. Twin of `Window` in `shaders/replay.wgsl`.
@@ -185,7 +187,8 @@ impl DeviceKernel<ReplayProblem> for ReplayDevice {
                 wheel_speed: s.wheel_speed,
                 measured: s.measured,
                 steer: s.steer,
-                padding: [0.0; 3],
+                flap: s.flap,
+                padding: [0.0; 2],
             })
             .collect();
         let narrow = |x: usize| {

@@ -32,6 +32,8 @@ pub struct Sample<S> {
     pub wheel_speed: [S; 4],
     /// Road-wheel angle, rad.
     pub steer: S,
+    /// How far the DRS is open, 0 to 1.
+    pub flap: S,
     /// Measured outputs.
     pub measured: [S; CHANNELS],
 }
@@ -89,6 +91,7 @@ impl Plan<f64> {
                 .map(|s| Sample {
                     wheel_speed: s.wheel_speed.map(|x| x as f32),
                     steer: s.steer as f32,
+                    flap: s.flap as f32,
                     measured: s.measured.map(|x| x as f32),
                 })
                 .collect(),

@@ -177,10 +177,11 @@ pub fn settle_rate<R: Real, T: Tyre<R>>(
         wheel_speed: wheel_speeds(c, body, (steer.cos(), steer.sin()), slips),
         // The model takes the angle that a sensor reads.
         steer: (steer - c.steer_offset) / c.steer_scale,
+        flap: R::lit(0.0),
     };
     let rate = car.rate(&state, &input).state;
     let lag = rate.pitch_acceleration * c.pitch_lag;
-    let drag = aero_forces(c, body.vx).drag / c.mass;
+    let drag = aero_forces(c, body.vx, R::lit(0.0)).drag / c.mass;
     // Along the path, over the cosine of the sideslip, where the push across it is what the circle takes.
     let push = state.pitch_acceleration + lag + drag + body.vy * body.yaw_rate;
     let damped = c.roll_damping * body.roll_rate / (c.mass * c.cg_height);

@@ -191,7 +191,7 @@ impl SteadyProblem {
     pub fn left_open_at(&self, speed: f64, trim: &Trim) -> Option<f64> {
         let chassis = &self.free.car.chassis;
         let (vx, vy) = (speed * trim.sideslip_rad.cos(), speed * trim.sideslip_rad.sin());
-        let drag = aero_forces(chassis, vx).drag / chassis.mass;
+        let drag = aero_forces(chassis, vx, 0.0).drag / chassis.mass;
         let figures = [
             vy,
             trim.yaw_rate_radps,

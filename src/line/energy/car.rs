@@ -92,19 +92,16 @@ impl EnergyCar {
         if let Some(powertrain) = &mut car.powertrain {
             *powertrain = powertrain.scaled(share);
         }
-        let rows = self
-            .point_mass
-            .envelope
-            .rows()
-            .iter()
-            .map(|row| crate::vehicle::EnvelopeRow {
-                ax_drive_mps2: (row.ax_drive_mps2 * share + coasting * row.drag_mps2 * (1.0 - share))
-                    .min(self.traction.at(row.v_mps)),
-                ..*row
-            })
-            .collect();
         let own = &self.point_mass.envelope;
-        let envelope = own.with_rows(own.name(), rows)?;
+        let envelope = own.with_rows(own.name(), &|limits, row| {
+            let swept = limits.straight_traction().filter(|_| !std::ptr::eq(limits, own));
+            let traction = swept.unwrap_or_else(|| self.traction.clone());
+            crate::vehicle::EnvelopeRow {
+                ax_drive_mps2: (row.ax_drive_mps2 * share + coasting * row.drag_mps2 * (1.0 - share))
+                    .min(traction.at(row.v_mps)),
+                ..*row
+            }
+        })?;
         Self::new(car, envelope, self.traction.clone(), self.ellipse_exponent)
     }
 

@@ -14,7 +14,7 @@
 //! After R. Lot and S. A. Evangelou, *Lap time optimization of a sports series hybrid electric vehicle*, World Congress on
 //! Engineering 2013, for the energies that are accounted; the passes are those of [`super::super::kernel`].
 
-use super::super::kernel::{BLOCK, Course, braked, corner, driving_at, look_up};
+use super::super::kernel::{BLOCK, Course, braked, corner, driving_with_drs, look_up, may_open};
 use super::super::point_mass::EnvelopeTable;
 use super::plan::{EnergyPlan, GATES, Mode, ZoneRow};
 use super::table::EnergyTable;
@@ -135,6 +135,7 @@ struct Car<'a, R: Real> {
     table: &'a EnergyTable<R::Storage>,
     plan: &'a EnergyPlan<R::Storage>,
     strategy: &'a [R],
+    drs: &'a [bool],
 }
 
 /// A step along a segment.
@@ -176,6 +177,23 @@ fn flow_at<R: Real>(flows: [R; 4], load: R) -> R {
 }
 
 impl<R: Lookup> Car<'_, R> {
+    /// The traction that is left, the drive and the drag (m/s^2) on a segment, at a speed squared in a bend.
+    #[inline(always)]
+    fn driving_at(&self, here: usize, speed_squared: R, curvature: R) -> [R; 3] {
+        driving_with_drs(self.envelope, may_open(self.drs, here), speed_squared, curvature)
+    }
+
+    /// What an open DRS sheds of the drag (m/s^2) on a segment, at a mean speed squared and curvature.
+    #[inline(always)]
+    fn shed(&self, here: usize, speed_squared: R, curvature: R) -> R {
+        if self.envelope.open.is_none() || !may_open(self.drs, here) {
+            return R::lit(0.0);
+        }
+        let [.., shut] = driving_with_drs(self.envelope, false, speed_squared, curvature);
+        let [.., drag] = self.driving_at(here, speed_squared, curvature);
+        shut - drag
+    }
+
     /// Whether the gates of steering and speed are open at a section.
     #[inline(always)]
     fn open(&self, curvature: R, speed_squared: R) -> R::Mask {
@@ -220,7 +238,7 @@ impl<R: Lookup> Car<'_, R> {
         let [left, space] = store;
         let inverse = R::lit(1.0) / length;
         let zero = R::lit(0.0);
-        let [traction, drive, drag] = driving_at(self.envelope, from, bends[0]);
+        let [traction, drive, drag] = self.driving_at(here, from, bends[0]);
         let engine = traction.min(drive);
         let ahead = (from + length * (engine - drag)).max(zero);
         let rows = self.table.boosts.len() / 8;
@@ -239,7 +257,7 @@ impl<R: Lookup> Car<'_, R> {
         let both = traction.min(drive + boost);
         let middle = (from + length * (both - drag)).max(zero);
         let [traction, drive, later_drag] =
-            driving_at(self.envelope, middle, R::lit(0.5) * (bends[0] + bends[1]));
+            self.driving_at(here, middle, R::lit(0.5) * (bends[0] + bends[1]));
         let drive = drive - exhaust;
         let later_both = traction.min(drive + boost);
         let motor = R::lit(0.5) * ((both - engine) + (later_both - traction.min(drive)));
@@ -296,12 +314,12 @@ impl<R: Lookup> Car<'_, R> {
 
     /// Drives along a segment by the engine alone.
     #[inline(always)]
-    fn engine_only(&self, from: R, length: R, bends: [R; 2], most: R) -> R {
+    fn engine_only(&self, here: usize, from: R, length: R, bends: [R; 2], most: R) -> R {
         let zero = R::lit(0.0);
-        let [traction, drive, drag] = driving_at(self.envelope, from, bends[0]);
+        let [traction, drive, drag] = self.driving_at(here, from, bends[0]);
         let first = traction.min(drive) - drag;
         let middle = (from + length * first).max(zero);
-        let [traction, drive, drag] = driving_at(self.envelope, middle, R::lit(0.5) * (bends[0] + bends[1]));
+        let [traction, drive, drag] = self.driving_at(here, middle, R::lit(0.5) * (bends[0] + bends[1]));
         let second = traction.min(drive) - drag;
         (from + length * (first + second)).max(zero).min(most)
     }
@@ -360,7 +378,7 @@ impl<R: Lookup> Car<'_, R> {
                 self.additional_again(first.0, first.1, here, from, length, bends, most, [left, space])
             }
             Mode::Offset => Step {
-                end: self.engine_only(from, length, bends, most),
+                end: self.engine_only(here, from, length, bends, most),
                 motor: zero,
                 wanted: zero,
                 boost: zero,
@@ -378,7 +396,10 @@ impl<R: Lookup> Car<'_, R> {
         let ax = R::lit(0.5) * (end - from) * inverse;
         // The force at the wheels, driving or braking.
         let rotating = R::load(table.rotating);
-        let force = rotating * ax + drag;
+        let shut = rotating * ax + drag;
+        let open = shut - self.shed(here, mean, R::lit(0.5) * (bends[0] + bends[1]));
+        // A driver shuts the flap on the brakes.
+        let force = open.max(zero) + shut.min(zero);
         let demand = force.max(zero);
         let shed = (-force).max(zero);
         let joules = R::load(table.mass) * length;
@@ -443,7 +464,7 @@ pub fn motor_step(
     table: &EnergyTable<f64>,
     from: f64,
     length: f64,
-    bends: [f64; 2],
+    (bends, drs): ([f64; 2], bool),
     share: f64,
 ) -> [f64; 2] {
     let car = Car {
@@ -459,6 +480,7 @@ pub fn motor_step(
             1.0,
             share,
         ],
+        drs: &[drs],
     };
     let step = car.additional(0, from, length, bends, f64::INFINITY, [f64::INFINITY; 2]);
     [step.end, table.rotating * step.motor]
@@ -529,6 +551,7 @@ pub fn energy_lap<R: Lookup>(
     let n = course.curvature.len();
     let zero = R::lit(0.0);
     let (length, curvature, most) = (&course.length, &course.curvature, &course.speed_squared);
+    let drs = &course.drs;
     let first_drive = &mut course.first_drive;
     first_drive.clear();
     let mut first_speed_squared = zero;
@@ -539,6 +562,7 @@ pub fn energy_lap<R: Lookup>(
         table,
         plan,
         strategy,
+        drs,
     };
     let fresh = |speed_squared: R| State {
         speed_squared,
@@ -558,7 +582,7 @@ pub fn energy_lap<R: Lookup>(
                     let space = R::load(table.store_room) + enough;
                     car.additional(here, state, h, bend, held, [enough, space]).end
                 }
-                Mode::Offset => car.engine_only(state, h, bend, held),
+                Mode::Offset => car.engine_only(here, state, h, bend, held),
             };
         }
         speed_squared = state;

@@ -1,7 +1,7 @@
 use super::*;
 use crate::evaluate::energy::{Free, HybridLine, HybridObjective, HybridProblem, Strategy};
-use crate::vehicle::Car;
 use crate::vehicle::limits::{SpeedRange, car_envelope};
+use crate::vehicle::{Car, EnvelopeRow};
 use glam::DVec2;
 use proptest::prelude::*;
 use std::f64::consts::TAU;
@@ -67,6 +67,7 @@ fn problem_of(car: EnergyCar, mode: Mode) -> HybridProblem {
     let line = HybridLine::Fixed {
         points_m,
         closed: true,
+        drs: Vec::new(),
     };
     HybridProblem::new(line, car, plan, strategy, &HybridObjective::ALL, 10.0).unwrap()
 }
@@ -236,8 +237,9 @@ fn the_turbocharger_s_generator_takes_its_power_from_the_crank() {
     (h.from_speed_mps, h.to_ax_mps2) = (30.0, 10.0);
     let (with, without) = (&car().with_hybrid(hybrid).unwrap(), car_without_h());
     let (v, h) = (66.0f64, 5.0);
-    let reached =
-        |car: &EnergyCar| kernel::motor_step(&car.envelope_table, &car.table, v * v, h, [0.0; 2], 0.0)[0];
+    let reached = |car: &EnergyCar| {
+        kernel::motor_step(&car.envelope_table, &car.table, v * v, h, ([0.0; 2], false), 0.0)[0]
+    };
     // The flow at this speed is not the greatest, and so is not the power: its share is the map's.
     let powertrain = with.car.powertrain.as_ref().unwrap();
     let full = |v: f64| {
@@ -294,5 +296,69 @@ fn the_turbocharger_s_generator_takes_its_power_from_the_crank() {
                 Mode::Additional => assert!(lap.harvested_h > 0.0 && lap.time > plain.time),
             }
         }
+    }
+}
+
+/// Where the DRS is open the wheels push against what drag it leaves, else against all of it. All that they push less comes off
+/// the fuel or the motor.
+#[test]
+fn an_open_drs_takes_its_share_off_the_drag_that_is_driven_against() {
+    let shut = &car().point_mass.envelope;
+    let open = shut.with_rows("open", &|_, row| EnvelopeRow {
+        drag_mps2: 0.7 * row.drag_mps2,
+        ..*row
+    });
+    let envelope = shut.clone().with_open(open.unwrap()).unwrap();
+    let traction = envelope.straight_traction().unwrap();
+    let flapped = EnergyCar::new(car().car.clone(), envelope, traction, 2.0).unwrap();
+    let points_m = bean();
+    let n = points_m.len();
+    let lap = |drs: &[bool], mode: Mode| {
+        let plan = EnergyPlan::whole(n, 220, mode);
+        let line = HybridLine::Fixed {
+            points_m: points_m.clone(),
+            closed: true,
+            drs: drs.to_vec(),
+        };
+        let strategy = Strategy::fixed(Gates::OPEN, 1);
+        let problem = HybridProblem::new(
+            line,
+            flapped.clone(),
+            plan,
+            strategy,
+            &[HybridObjective::LapTime],
+            10.0,
+        );
+        let (lap, segments, course) = problem.unwrap().lap(&[]);
+        (lap, segments, course.length)
+    };
+    let zones: Vec<bool> = (0..n).map(|i| i % 125 < 80).collect();
+    for mode in [Mode::Offset, Mode::Additional] {
+        let (with, segments, length) = lap(&zones, mode);
+        let (without, ..) = lap(&[], mode);
+        assert!(
+            with.time < without.time,
+            "{mode:?}: {} {}",
+            with.time,
+            without.time
+        );
+        let (mut opened, mut braked) = (0, 0);
+        for (i, s) in segments.iter().enumerate() {
+            let (mean, ax) = (0.5 * (s.start + s.end), 0.5 * (s.end - s.start) / length[i]);
+            let drag = flapped.point_mass.envelope.at(mean.sqrt()).drag_mps2;
+            let pushed = s.engine + s.motor - s.generator - s.hydraulic - flapped.table.rotating * ax;
+            let open = zones[i] && s.engine + s.motor > 0.0;
+            let wanted = if open { 0.7 * drag } else { drag };
+            // Rows of the tables are straight lines over the speed squared.
+            if !(zones[i] && s.engine + s.motor + s.generator + s.hydraulic == 0.0) {
+                assert!(
+                    (pushed - wanted).abs() < 1e-3 * drag,
+                    "{mode:?}, {i}: {pushed} {wanted}"
+                );
+            }
+            opened += usize::from(open);
+            braked += usize::from(zones[i] && s.generator + s.hydraulic > 0.0);
+        }
+        assert!(opened > 50 && braked > 5, "{opened} {braked}");
     }
 }

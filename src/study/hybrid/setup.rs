@@ -41,6 +41,8 @@ pub struct HybridSetup {
     pub length_m: f64,
     /// Whether it is closed.
     pub closed: bool,
+    /// Whether the DRS may be open from each point to the next; nowhere if empty.
+    pub drs: Vec<bool>,
     /// The sharpest bend late in the lap.
     pub run_in: usize,
     /// Greatest speed at the start of an open line (m/s).
@@ -137,6 +139,7 @@ impl HybridInputs {
         };
         let fine = FineLine::new(&through, closed, settings.spacing_m, None, settings.entry_mps)?;
         Ok(Some(HybridSetup {
+            drs: raceline.cross_sections.drs_along(&fine.points_m),
             run_in: late_bend(&fine.curvature_1pm),
             length_m: fine.length_m,
             points_m: fine.points_m,
@@ -173,6 +176,7 @@ impl HybridSetup {
         let line = HybridLine::Fixed {
             points_m: self.points_m.clone(),
             closed: self.closed,
+            drs: self.drs.clone(),
         };
         HybridProblem::new(line, self.car.clone(), plan, strategy, objectives, self.entry_mps)
     }

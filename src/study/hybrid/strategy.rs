@@ -38,6 +38,7 @@ impl HybridSetup {
             car: &self.car,
             points_m: &self.points_m,
             closed: self.closed,
+            drs: &self.drs,
             run_in: self.run_in,
             entry_mps: self.entry_mps,
         };

@@ -30,6 +30,17 @@ pub(super) fn notes(setup: &Setup, summary: &Summary) -> Vec<String> {
              such time ahead of {places} of the laps or sections fitted: their first {settle_s:.1} s do not count."
         ));
     }
+    let freed = ["drs_drag_percent", "drs_downforce_percent"];
+    let frees = setup
+        .replay
+        .problem
+        .variables
+        .iter()
+        .any(|v| freed.contains(&v.name.as_str()));
+    let has_drs = frees || setup.replay.free.car.chassis.with_open_drs().is_some();
+    if has_drs && setup.log.drs.iter().all(|open| *open == 0.0) {
+        notes.push("The car has a DRS, and the log has no channel in which it is open: it counts as shut throughout.".to_owned());
+    }
     notes
 }
 

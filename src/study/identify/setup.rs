@@ -205,6 +205,7 @@ fn samples_of(log: &Log) -> Vec<Sample<f64>> {
         .map(|i| Sample {
             wheel_speed: std::array::from_fn(|wheel| log.wheel_speed_radps[wheel][i]),
             steer: log.steer_rad[i],
+            flap: log.drs[i],
             measured: [
                 log.vx_mps[i],
                 log.ax_mps2[i],

@@ -137,6 +137,7 @@ pub(super) fn summarise(solved: &Solved<'_, Raceline>) -> Summary {
             .collect(),
         warnings: bridges(solved.prepared)
             .into_iter()
+            .chain(unused_drs(solved.prepared))
             .chain(warnings(outcome))
             .collect(),
     }
@@ -148,6 +149,14 @@ fn bridges(setup: &Setup) -> Vec<String> {
     crossed
         .map(|[a, b]| format!("the road crosses itself at {a:.0} m and {b:.0} m: taken as a bridge"))
         .collect()
+}
+
+/// A word on a DRS that opens nowhere.
+fn unused_drs(setup: &Setup) -> Option<String> {
+    let unused = setup.car.envelope.open().is_some() && setup.cross_sections.drs.is_empty();
+    unused.then(|| {
+        "the car has a DRS, and the track names no drs_zones where it may be open: it stays shut".to_owned()
+    })
 }
 
 /// The lines that a study tells of, the reference line last.
@@ -237,7 +246,7 @@ pub(super) fn write_files(folder: &Path, setup: &Setup, outcome: &Outcome) -> Re
 }
 
 /// The line on its fine spline: station, place, alpha, curvature, speed, accelerations, steering, time, and the gear that
-/// gives most (from 1) where there is a gearbox.
+/// gives most (from 1) where there is a gearbox. Where the DRS is open anywhere, 1 says where.
 fn write_line(path: &Path, setup: &Setup, line: &ReportedLine) -> Result<()> {
     let fine = &line.fine;
     let (x, y): (Vec<f64>, Vec<f64>) = fine.points_m.iter().map(|p| (p.x, p.y)).unzip();
@@ -261,6 +270,15 @@ fn write_line(path: &Path, setup: &Setup, line: &ReportedLine) -> Result<()> {
             };
             table = table.numbers("gear", "-", lap.v_mps.iter().map(gear).collect::<Vec<f64>>());
         }
+    }
+    if let Some(lap) = fine.lap.as_ref().filter(|lap| lap.drs_open.contains(&true)) {
+        let last = lap.drs_open.last().filter(|_| !fine.closed);
+        let open = lap
+            .drs_open
+            .iter()
+            .chain(last)
+            .map(|open| f64::from(u8::from(*open)));
+        table = table.numbers("drs", "-", open.collect::<Vec<f64>>());
     }
     table.write_csv(path)
 }

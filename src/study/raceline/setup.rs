@@ -289,7 +289,7 @@ impl Setup {
         let (points, closed, car) = (
             self.cross_sections.points(alpha),
             self.cross_sections.closed,
-            Some(&self.car),
+            Some((&self.car, self.cross_sections.drs.as_slice())),
         );
         let fine = FineLine::new(&points, closed, FINE_M, car, settings.entry_mps)?;
         let edges = RoadEdges::new(&self.edges_m[0], &self.edges_m[1], closed);

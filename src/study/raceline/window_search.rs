@@ -359,6 +359,7 @@ fn thinned(cross_sections: &CrossSections, places: &[usize]) -> CrossSections {
         right_m: places.iter().map(|&i| cross_sections.right_m[i]).collect(),
         left_m: places.iter().map(|&i| cross_sections.left_m[i]).collect(),
         reference: places.iter().map(|&i| cross_sections.reference[i]).collect(),
+        drs: Vec::new(),
         ..cross_sections.clone()
     }
 }

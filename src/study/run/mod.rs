@@ -295,7 +295,7 @@ fn run_stages(
         let points_m = read_line(&line_path)?;
         let width_m = settings.raceline.car_width_m;
         let name = "fastest".to_owned();
-        let fastest = NamedLine::new(name, points_m, &road.edges_m, width_m)?;
+        let fastest = NamedLine::new(name, points_m, &road, width_m)?;
         let mut road = road;
         road.car.envelope = whole.clone();
         let driven = transient::Prepared {

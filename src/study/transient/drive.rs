@@ -69,7 +69,10 @@ pub(super) fn drive(work: Work<'_, Transient>) -> Result<Option<DrivenLine>> {
 fn greatest_share(work: Work<'_, Transient>) -> Result<Option<DrivenLine>> {
     let (car, limits) = (&work.prepared.car, &work.prepared.road.car);
     let Some(NamedLine {
-        points_m, circuit, ..
+        points_m,
+        drs,
+        circuit,
+        ..
     }) = work.prepared.lines.first()
     else {
         return Err(Error::input("the study", "line", "none", "a line to drive"));
@@ -99,7 +102,7 @@ fn greatest_share(work: Work<'_, Transient>) -> Result<Option<DrivenLine>> {
     state_file.save(&state)?;
     let traction = Traction::of(car, &limits.envelope);
     let attempt = |share: f64| -> Result<Option<DrivenLine>> {
-        let (envelope, point_mass, plan) = planned(limits, &traction, points_m, share)?;
+        let (envelope, point_mass, plan) = planned(limits, &traction, (points_m, drs), share)?;
         let drive = drive_planned(car, circuit, plan, &driver, INTERVAL_S)?;
         let lap_time_s = drive.lap_time_s(circuit.length_m, INTERVAL_S);
         Ok(lap_time_s.map(|lap_time_s| DrivenLine {

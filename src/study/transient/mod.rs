@@ -44,7 +44,10 @@ pub struct NamedLine {
     pub name: String,
     /// Its points (m).
     pub points_m: Vec<DVec2>,
-    /// The line as a circuit of its own, its widths the room that the car's side has to the edges.
+    /// Whether the DRS may be open from each point to the next; nowhere if empty.
+    pub drs: Vec<bool>,
+    /// The line as a circuit of its own, its widths the room that the car's side has to the edges. Its DRS zones are where the
+    /// quasi-steady-state lap has the flap open.
     pub circuit: Circuit,
 }
 
@@ -53,17 +56,15 @@ impl NamedLine {
     ///
     /// # Errors
     /// [`Error::Input`] for a line that is no lap, or leaves no room for the car.
-    pub fn new(
-        name: String,
-        points_m: Vec<DVec2>,
-        edges_m: &[Vec<DVec2>; 2],
-        car_width_m: f64,
-    ) -> Result<Self> {
-        let fine = FineLine::new(&points_m, true, 1.0, None, 0.0)?;
-        let circuit = fine.circuit(&name, edges_m, car_width_m)?;
+    pub fn new(name: String, points_m: Vec<DVec2>, road: &raceline::Setup, car_width_m: f64) -> Result<Self> {
+        let drs = road.cross_sections.drs_along(&points_m);
+        let car = (!drs.is_empty()).then_some((&road.car, drs.as_slice()));
+        let fine = FineLine::new(&points_m, true, 1.0, car, 0.0)?;
+        let circuit = fine.circuit(&name, &road.edges_m, car_width_m)?;
         Ok(Self {
             name,
             points_m,
+            drs,
             circuit,
         })
     }
@@ -243,7 +244,7 @@ fn read(settings: &TransientSettings) -> Result<Prepared> {
     let road = raceline::set_up(&settings.raceline()?)?;
     let named = names_of(files).into_iter().zip(points);
     let lines = named
-        .map(|(name, points)| NamedLine::new(name, points, &road.edges_m, settings.car_width_m))
+        .map(|(name, points)| NamedLine::new(name, points, &road, settings.car_width_m))
         .collect::<Result<_>>()?;
     Ok(Prepared { car, road, lines })
 }
@@ -253,7 +254,7 @@ fn read(settings: &TransientSettings) -> Result<Prepared> {
 fn planned(
     limits: &PointMass,
     traction: &Traction,
-    points_m: &[DVec2],
+    (points_m, drs): (&[DVec2], &[bool]),
     share: f64,
 ) -> Result<(Envelope, FineLine, SpeedPlan)> {
     let envelope = limits.envelope.with_grip_share(share, traction)?;
@@ -261,7 +262,7 @@ fn planned(
         envelope: envelope.clone(),
         ..limits.clone()
     };
-    let fine = FineLine::new(points_m, true, 1.0, Some(&point_mass), 0.0)?;
+    let fine = FineLine::new(points_m, true, 1.0, Some((&point_mass, drs)), 0.0)?;
     let Some(lap) = &fine.lap else {
         return Err(Error::Study(
             "there is no quasi-steady-state lap on this line".to_owned(),

@@ -76,7 +76,9 @@ pub fn drive_problem(
         }
         let of_line = shares
             .par_iter()
-            .map(|share| planned(&road.car, &traction, &line.points_m, *share).map(|(_, _, plan)| plan))
+            .map(|share| {
+                planned(&road.car, &traction, (&line.points_m, &line.drs), *share).map(|(_, _, plan)| plan)
+            })
             .collect::<Result<Vec<_>>>()?;
         plans.push(of_line);
     }

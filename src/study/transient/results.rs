@@ -5,7 +5,7 @@ use crate::error::Result;
 use crate::report::{CornerLap, HtmlReport, LapLine, LapView, Road, Table, write_whole};
 use crate::study::framework::Head;
 use crate::vehicle::wheels::{Moment, WHEELS, Wheel, moments_of};
-use crate::vehicle::{Car, CarInput, CarState};
+use crate::vehicle::{Car, CarState};
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -114,13 +114,10 @@ pub(super) fn report(folder: &Path, car: &Car, outcome: &DrivenLine, summary: &L
     let driven_m = drive.points_m(&outcome.line);
     let state = |k: usize| -> Vec<f64> { drive.states.iter().map(|s| s[k]).collect() };
     let (x, y): (Vec<f64>, Vec<f64>) = driven_m.iter().map(|p| (p.x, p.y)).unzip();
-    let steer: Vec<f64> = drive.inputs.iter().map(|(_, steer)| *steer).collect();
+    let steer: Vec<f64> = drive.inputs.iter().map(|input| input.steer).collect();
     let time = (0..drive.states.len()).map(|i| i as f64 * INTERVAL_S);
     let driven = drive.states.iter().zip(&drive.inputs);
-    let driven = driven.map(|(state, (wheel_speed, steer))| {
-        let (wheel_speed, steer) = (*wheel_speed, *steer);
-        (CarState::from_array(*state), CarInput { wheel_speed, steer })
-    });
+    let driven = driven.map(|(state, input)| (CarState::from_array(*state), *input));
     let moments = moments_of(car, &driven.collect::<Vec<_>>());
     let table = Table::new()
         .numbers("time", "s", time.collect::<Vec<f64>>())
@@ -197,7 +194,7 @@ fn write_page(
     }
     let (drive, line) = (&outcome.drive, &outcome.line);
     let state = |k: usize| drive.states.iter().map(|s| s[k]).collect::<Vec<f64>>();
-    let steer_deg = drive.inputs.iter().map(|(_, steer)| steer.to_degrees());
+    let steer_deg = drive.inputs.iter().map(|input| input.steer.to_degrees());
     let driven = LapLine::new("4DOF car and driver", &drive.station_m[..])
         .trace(0, state(0))
         .trace(1, &drive.offset_m[..])

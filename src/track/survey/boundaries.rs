@@ -112,6 +112,7 @@ pub(super) fn survey(left: &Edge, right: &Edge, path: &Path, options: &SurveyOpt
         lines: Vec::new(),
         sections: Vec::new(),
         corners: Vec::new(),
+        drs_zones_m: Vec::new(),
         bridges: options.bridges,
     };
     survey.check()?;

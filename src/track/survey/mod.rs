@@ -69,6 +69,8 @@ pub struct Survey {
     pub sections: Vec<Section>,
     /// Named corners, by station along the smoothed line.
     pub corners: Vec<Corner>,
+    /// Stretches where the DRS may be open, by station along the smoothed line, as a [`super::Circuit`] has them.
+    pub drs_zones_m: Vec<[f64; 2]>,
     /// How many times the line may cross itself.
     pub bridges: usize,
 }
@@ -178,6 +180,7 @@ fn assemble(mut raw: Raw, path: &Path, options: &SurveyOptions) -> Result<Survey
         lines: raw.lines,
         sections: Vec::new(),
         corners: Vec::new(),
+        drs_zones_m: Vec::new(),
         bridges: options.bridges,
     };
     survey.check()?;

@@ -229,6 +229,8 @@ pub struct LineShape {
     pub ellipse_rows: usize,
     /// Whether cells of traction in bends follow the table of limits.
     pub traction: bool,
+    /// Whether the limits with the DRS open follow those with it shut.
+    pub drs: bool,
     /// Cross-sections, if their table is to be uniform.
     pub uniform_sections: Option<usize>,
     /// Whether the tables of limits, of corner speeds and of the ellipse are to be uniform.
@@ -248,6 +250,7 @@ impl LineShape {
         } else {
             0
         };
+        let limits = 2 * self.envelope_rows + cells;
         let generated = Generated::new()
             .flag("CLOSED", self.closed)
             .count("TERMS", self.terms)
@@ -259,10 +262,17 @@ impl LineShape {
             .flag("HAS_TRACTION", self.traction)
             .count("TRACTION_SPEEDS", TRACTION_SPEEDS)
             .count("TRACTION_ROOTS", TRACTION_ROOTS)
+            .flag("HAS_DRS", self.drs)
+            .count("OPEN_AT", limits)
             .count("WORKGROUP", self.workgroup)
             .count("TILE", self.tile)
             .table(1, "sections", "Section", self.uniform_sections)
-            .table(2, "envelope", "vec4<f32>", rows(2 * self.envelope_rows + cells))
+            .table(
+                2,
+                "envelope",
+                "vec4<f32>",
+                rows(limits * (1 + usize::from(self.drs))),
+            )
             .table(3, "corners", "vec4<f32>", rows(self.corner_rows))
             .table(4, "ellipse", "vec4<f32>", rows(self.ellipse_rows.max(1)));
         [&elementary(WheelOrder::SideBySide), &generated.end(), LINE].concat()

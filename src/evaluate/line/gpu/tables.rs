@@ -33,8 +33,8 @@ pub struct DeviceSection {
     pub inverse_spacing: f32,
     /// The next section whose `alpha` is the sum of other variables, or one past the last.
     pub until: u32,
-    /// Nothing: vectors of four are aligned to 16 bytes.
-    pub padding: u32,
+    /// 1 where the DRS may be open from here to the next section, else 0.
+    pub drs: u32,
 }
 
 impl DeviceSection {
@@ -50,7 +50,7 @@ impl DeviceSection {
                 constant: row.constant,
                 inverse_spacing: row.inverse_spacing,
                 until: rows.len() as u32,
-                padding: 0,
+                drs: u32::from(row.drs),
             })
             .collect();
         for i in (1..sections.len()).rev() {
@@ -99,7 +99,14 @@ impl LineTables {
             // A binding holds at least what its type takes.
             ellipse = vec![0.0; 4];
         }
-        let limits = [envelope.rows.as_slice(), &envelope.traction].concat();
+        let open = envelope
+            .open
+            .as_deref()
+            .filter(|_| plan.rows.iter().any(|row| row.drs));
+        let states = [Some(envelope), open].into_iter().flatten();
+        let limits: Vec<f32> = states
+            .flat_map(|state| [state.rows.as_slice(), &state.traction].concat())
+            .collect();
         let sections: &[u8] = bytemuck::cast_slice(&sections);
         let most = LOOP_ROUNDS / ROUNDS_PER_SECTION;
         if software && plan.rows.len() > most {
@@ -124,6 +131,7 @@ impl LineTables {
             corner_rows: corners.len() / 4,
             ellipse_rows,
             traction: !envelope.traction.is_empty(),
+            drs: open.is_some(),
             uniform_sections: uniform_sections.then_some(plan.rows.len()),
             uniform_envelope,
             workgroup,
