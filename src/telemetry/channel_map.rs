@@ -255,10 +255,15 @@ impl ChannelMap {
             };
         };
         let unit_text = entry.and_then(|e| e.unit.as_deref()).unwrap_or(&channel.unit);
+        // A switch has no unit.
+        let switch = role == Role::Drs && unit_text.is_empty();
+        let unit_text = if switch { "1" } else { unit_text };
         let unit = match check_unit(unit_text, role) {
             Ok(unit) => unit,
             // A pedal in volts cannot be used, and the map does not name it.
-            Err(_) if name.is_none() && matches!(role, Role::Throttle | Role::Brake) => return Ok(None),
+            Err(_) if name.is_none() && matches!(role, Role::Throttle | Role::Brake | Role::Drs) => {
+                return Ok(None);
+            }
             Err(expected) => {
                 return Err(Error::input(
                     &recording.source,

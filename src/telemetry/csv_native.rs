@@ -258,6 +258,11 @@ mod tests {
         log.drs[50] = 0.5;
         let text = render(&log, Path::new("a.csv"), &NativeFormat::exact()).unwrap();
         assert_eq!(log_of(&text).unwrap().drs, log.drs);
+        let percent = text
+            .replace(",drs\n", ",drs_%\n")
+            .replace(",1\n", ",100\n")
+            .replace(",0.5\n", ",50\n");
+        assert_eq!(log_of(&percent).unwrap().drs, log.drs);
         // Some loggers count in other ways.
         let counted = text.replace(",1\n", ",3\n");
         let log = log_of(&counted).unwrap();
