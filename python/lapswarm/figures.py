@@ -327,6 +327,18 @@ class Energy(Figures):
 
 
 @dataclass(frozen=True)
+class CornerGrip:
+    """A corner of a driven lap: the share of the grip held there, and times with it and with all of the grip."""
+
+    start_m: float
+    end_m: float
+    least_speed_mps: float
+    grip_share: float
+    driven_s: float
+    full_grip_s: float | None
+
+
+@dataclass(frozen=True)
 class DrivenLine(Figures):
     """Figures of ``transient`` for one line."""
 
@@ -340,6 +352,9 @@ class DrivenLine(Figures):
     margin_m: float
     greatest_offset_m: float
     beyond: str | None
+    corners: list[CornerGrip]
+    full_grip_lap_time_s: float | None
+    behind_full_grip_percent: float | None
 
 
 @dataclass(frozen=True)

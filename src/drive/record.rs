@@ -69,6 +69,17 @@ pub fn drive(car: &Car, circuit: &Circuit, settings: &DriverSettings, interval_s
     })
 }
 
+/// Where and how a car was lost.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lost {
+    /// Station along the line (m).
+    pub station_m: f64,
+    /// Speed (m/s).
+    pub speed_mps: f64,
+    /// What the driver did, in words.
+    pub how: &'static str,
+}
+
 /// As [`drive`], at the speeds of `plan` instead of the driver's own.
 ///
 /// # Errors
@@ -80,6 +91,26 @@ pub fn drive_planned(
     settings: &DriverSettings,
     interval_s: f64,
 ) -> Result<Drive> {
+    match drive_until_lost(car, circuit, plan, settings, interval_s)? {
+        (drive, None) => Ok(drive),
+        (_, Some(lost)) => Err(Error::Study(format!(
+            "the driver {} at station {:.0} m of {} ({:.1} m/s)",
+            lost.how, lost.station_m, circuit.name, lost.speed_mps
+        ))),
+    }
+}
+
+/// As [`drive_planned`], with the part of the lap that was driven before the car was lost.
+///
+/// # Errors
+/// [`Error::Input`] for a circuit that [`Road::new`] refuses.
+pub fn drive_until_lost(
+    car: &Car,
+    circuit: &Circuit,
+    plan: SpeedPlan,
+    settings: &DriverSettings,
+    interval_s: f64,
+) -> Result<(Drive, Option<Lost>)> {
     let line = Line {
         circuit,
         plans: &[plan],
@@ -91,28 +122,21 @@ pub fn drive_planned(
         torque: &WheelTorque::of_car(car)?,
     };
     let flat = car.to_flat();
-    match car.tyre_model() {
-        TyreModel::MagicFormula => record::<MagicFormula<f64>>(
-            &CarModel::from_parameters(|i| flat[i]),
-            &world,
-            circuit,
-            interval_s,
-        ),
-        TyreModel::Linear => record::<LinearTyre<f64>>(
-            &CarModel::from_parameters(|i| flat[i]),
-            &world,
-            circuit,
-            interval_s,
-        ),
-    }
+    Ok(match car.tyre_model() {
+        TyreModel::MagicFormula => {
+            record::<MagicFormula<f64>>(&CarModel::from_parameters(|i| flat[i]), &world, interval_s)
+        }
+        TyreModel::Linear => {
+            record::<LinearTyre<f64>>(&CarModel::from_parameters(|i| flat[i]), &world, interval_s)
+        }
+    })
 }
 
 fn record<T: Tyre<f64>>(
     car: &CarModel<f64, T>,
     world: &World<'_, f64>,
-    circuit: &Circuit,
     interval_s: f64,
-) -> Result<Drive> {
+) -> (Drive, Option<Lost>) {
     let course = Course::at(world.road, 0.0);
     let pace = Pace {
         plan: 0.0,
@@ -142,19 +166,19 @@ fn record<T: Tyre<f64>>(
         time += STEP;
         number += 1.0;
     }
-    if state.ending == ending::FINISHED {
-        return Ok(log);
-    }
-    let what = if state.ending == ending::LEFT_ROAD {
+    let how = if state.ending == ending::FINISHED {
+        return (log, None);
+    } else if state.ending == ending::LEFT_ROAD {
         "left the track"
     } else if state.ending == ending::TOO_LATE {
         "did not get round in time"
     } else {
         "spun"
     };
-    let station = state.pose.row * course.spacing + state.pose.along;
-    Err(Error::Study(format!(
-        "the driver {what} at station {station:.0} m of {} ({:.1} m/s)",
-        circuit.name, state.car.body.vx
-    )))
+    let lost = Lost {
+        station_m: state.pose.row * course.spacing + state.pose.along,
+        speed_mps: state.car.body.vx,
+        how,
+    };
+    (log, Some(lost))
 }

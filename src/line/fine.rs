@@ -110,11 +110,7 @@ impl FineLine {
         line.gamma_1pm = gamma_squared.sqrt();
         if let Some((car, drs)) = car {
             let table = car.table()?;
-            let drs: Vec<bool> = line
-                .section
-                .iter()
-                .filter_map(|(section, _)| drs.get(*section).copied())
-                .collect();
+            let drs = line.drs_of(drs);
             let lap = lap_profile(car, &table, &line.segment_m, &line.curvature_1pm, entry_mps, &drs)?;
             line.lap = Some(lap);
         }
@@ -136,6 +132,15 @@ impl FineLine {
         self.segment_m.push(length);
         self.length_m += length;
         self.integral_kappa2_1pm += spline.integral(segment, t, end, |p| p.curvature * p.curvature * p.speed);
+    }
+
+    /// Whether the DRS may be open from each point of the spline to the next, from what is known of the given points; empty where
+    /// that is.
+    pub fn drs_of(&self, drs: &[bool]) -> Vec<bool> {
+        let sections = self.section.iter();
+        sections
+            .filter_map(|(section, _)| drs.get(*section).copied())
+            .collect()
     }
 
     /// A quantity that is known at the given points, at each point of the spline: linear in between.

@@ -359,13 +359,42 @@ pub(super) fn braked<R: Lookup>(
     to + length * (end + brake)
 }
 
+/// The envelopes that a lap is driven within, section by section: an [`EnvelopeTable`] is the same at all.
+pub trait Within<S> {
+    /// The envelope at a section and on the segment after it.
+    fn at(&self, section: usize) -> &EnvelopeTable<S>;
+}
+
+impl<S> Within<S> for EnvelopeTable<S> {
+    #[inline(always)]
+    fn at(&self, _: usize) -> &Self {
+        self
+    }
+}
+
+/// Envelopes of which each section has one. All have the same speeds.
+#[derive(Clone, Copy, Debug)]
+pub struct BySection<'a, S> {
+    /// The envelopes.
+    pub tables: &'a [EnvelopeTable<S>],
+    /// The number of each section's.
+    pub of: &'a [usize],
+}
+
+impl<S> Within<S> for BySection<'_, S> {
+    #[inline(always)]
+    fn at(&self, section: usize) -> &EnvelopeTable<S> {
+        &self.tables[self.of[section]]
+    }
+}
+
 /// Time of a lap (s) on `course`, whose lengths and curvatures are given; it has the speeds after.
 ///
 /// A closed lap's passes continue beyond the section where they started until they meet themselves, so that any start
 /// gives the same lap.
 #[inline(always)]
 pub fn lap_time<R: Lookup>(
-    envelope: &EnvelopeTable<R::Storage>,
+    envelope: &impl Within<R::Storage>,
     closed: bool,
     start: usize,
     entry: R,
@@ -377,7 +406,7 @@ pub fn lap_time<R: Lookup>(
     speeds.clear();
     speeds.resize(n, R::lit(0.0));
     let start = if closed { start } else { 0 };
-    speeds[start] = corner(envelope, curvature[start]);
+    speeds[start] = corner(envelope.at(start), curvature[start]);
     if !closed {
         speeds[0] = speeds[0].min(entry);
     }
@@ -388,7 +417,7 @@ pub fn lap_time<R: Lookup>(
     for step in 0..steps {
         let next = if here + 1 < n { here + 1 } else { 0 };
         let reached = driven(
-            envelope,
+            envelope.at(here),
             may_open(drs, here),
             speeds[here],
             length[here],
@@ -399,7 +428,7 @@ pub fn lap_time<R: Lookup>(
         let most = if again {
             speeds[next]
         } else {
-            corner(envelope, curvature[next])
+            corner(envelope.at(next), curvature[next])
         };
         let slower = reached.less_than(most);
         speeds[next] = R::select(slower, reached, most);
@@ -413,7 +442,7 @@ pub fn lap_time<R: Lookup>(
     for step in 0..steps {
         let here = if next > 0 { next - 1 } else { n - 1 };
         let reached = braked(
-            envelope,
+            envelope.at(here),
             speeds[next],
             length[here],
             curvature[next],

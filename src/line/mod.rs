@@ -24,6 +24,7 @@ mod tests;
 pub use check::{CarPlan, Clearance, ON_ROAD_M, RoadEdges, check_line};
 pub use fine::{FINE_M, FineLine};
 pub use geometry::{Geometry, geometry};
+pub use kernel::{BySection, Within};
 pub use parametrisation::Parametrisation;
 pub use perpendicular::{cross_sections_about, shares_across};
 pub use plan::{LinePlan, SectionRow, TERMS};

@@ -1,6 +1,6 @@
 //! All figures of a lap on one line.
 
-use super::kernel::{Course, acceleration, driving_at, lap_time, may_open};
+use super::kernel::{Course, Within, acceleration, driving_at, lap_time, may_open};
 use super::point_mass::{EnvelopeTable, PointMass};
 use crate::error::{Error, Result};
 
@@ -41,7 +41,8 @@ impl LapProfile {
 }
 
 /// Drives `car` along a line of these segments (m) and curvatures (1/m, with sign). A line is closed if it has as many
-/// segments as sections; `entry_mps` is the greatest speed (m/s) at the start of an open one. `table` is the car's. `drs` says on
+/// segments as sections; `entry_mps` is the greatest speed (m/s) at the start of an open one. `within` is the car's
+/// table, or one for each section. `drs` says on
 /// which segments the DRS may be open; nowhere if it is empty.
 ///
 /// # Errors
@@ -49,7 +50,7 @@ impl LapProfile {
 /// standstill.
 pub fn lap_profile(
     car: &PointMass,
-    table: &EnvelopeTable<f64>,
+    within: &impl Within<f64>,
     segment_m: &[f64],
     curvature_1pm: &[f64],
     entry_mps: f64,
@@ -88,7 +89,7 @@ pub fn lap_profile(
         ..Course::default()
     };
     let start = slowest(&course.curvature);
-    let time_s = lap_time::<f64>(table, closed, start, entry_mps * entry_mps, &mut course);
+    let time_s = lap_time::<f64>(within, closed, start, entry_mps * entry_mps, &mut course);
     if !time_s.is_finite() {
         return wrong(
             "lap",
@@ -97,7 +98,9 @@ pub fn lap_profile(
         );
     }
     let w = &course.speed_squared;
-    let drs_open = (0..segment_m.len()).map(|i| opens(table, &course, i)).collect();
+    let drs_open = (0..segment_m.len())
+        .map(|i| opens(within.at(i), &course, i))
+        .collect();
     let v_mps: Vec<f64> = w.iter().map(|w| w.sqrt()).collect();
     let next = |i: usize| (i + 1) % n;
     let mut ax_mps2: Vec<f64> = segment_m

@@ -1,5 +1,6 @@
 //! One line alone, driven in `f64` with the greatest share of the grip that is held.
 
+use super::corners::{CornerGrip, raise};
 use super::state::DriveState;
 use super::{NamedLine, Transient, planned};
 use crate::drive::{Drive, DriverSettings, drive_planned};
@@ -20,12 +21,18 @@ pub const AGREEMENT: f64 = 0.005;
 /// What a line driven alone comes to.
 #[derive(Clone, Debug)]
 pub struct DrivenLine {
-    /// The greatest share of the envelope's grip that the car and the driver held; where the laps agree with none, the
-    /// share with which they agree best.
+    /// The greatest share of the envelope's grip that the car and the driver held on the whole lap; where the laps agree with none,
+    /// the share with which they agree best.
     pub grip_share: f64,
+    /// The share that they held in each corner, where that was looked for.
+    pub corners: Vec<CornerGrip>,
+    /// The quasi-steady-state lap with all of the grip (s), where corners were looked at.
+    pub full_grip_s: Option<f64>,
+    /// Laps driven for the corners.
+    pub(super) drives: usize,
     /// The envelope with that share.
     pub envelope: Envelope,
-    /// The quasi-steady-state lap within it.
+    /// The quasi-steady-state lap with the shares of the grip that were held.
     pub point_mass: FineLine,
     /// The lap that was driven.
     pub drive: Drive,
@@ -60,7 +67,11 @@ pub(super) fn drive(work: Work<'_, Transient>) -> Result<Option<DrivenLine>> {
     let found = greatest_share(work)?;
     Ok(found.map(|mut found| {
         let elapsed_s = watch.elapsed_s();
-        record.took(found.failures.len() as u64 + 1, elapsed_s, elapsed_s);
+        record.took(
+            (found.failures.len() + found.drives) as u64 + 1,
+            elapsed_s,
+            elapsed_s,
+        );
         found.record = record;
         found
     }))
@@ -68,15 +79,16 @@ pub(super) fn drive(work: Work<'_, Transient>) -> Result<Option<DrivenLine>> {
 
 fn greatest_share(work: Work<'_, Transient>) -> Result<Option<DrivenLine>> {
     let (car, limits) = (&work.prepared.car, &work.prepared.road.car);
-    let Some(NamedLine {
+    let Some(line) = work.prepared.lines.first() else {
+        return Err(Error::input("the study", "line", "none", "a line to drive"));
+    };
+    let NamedLine {
         points_m,
         drs,
         circuit,
         ..
-    }) = work.prepared.lines.first()
-    else {
-        return Err(Error::input("the study", "line", "none", "a line to drive"));
-    };
+    } = line;
+    let parts = (car, limits, line);
     let Work {
         settings,
         state,
@@ -107,6 +119,9 @@ fn greatest_share(work: Work<'_, Transient>) -> Result<Option<DrivenLine>> {
         let lap_time_s = drive.lap_time_s(circuit.length_m, INTERVAL_S);
         Ok(lap_time_s.map(|lap_time_s| DrivenLine {
             grip_share: share,
+            corners: Vec::new(),
+            full_grip_s: None,
+            drives: 0,
             envelope,
             point_mass,
             lap_time_s,
@@ -122,6 +137,11 @@ fn greatest_share(work: Work<'_, Transient>) -> Result<Option<DrivenLine>> {
         let before = state.failures.iter();
         let before = before.take_while(|(failed, _)| *failed != best.grip_share);
         best.failures = before.cloned().collect();
+    }
+    if state.corners.is_some()
+        && let Some(base) = best
+    {
+        return raise(parts, (&driver, &shares), base, &mut state, (state_file, observe));
     }
     let planned = shares.len();
     // A few at once: the greatest that works ends the search.
@@ -141,7 +161,14 @@ fn greatest_share(work: Work<'_, Transient>) -> Result<Option<DrivenLine>> {
                     outcome.failures.clone_from(&state.failures);
                     let off = outcome.disagreement();
                     if off.abs() <= AGREEMENT {
-                        return Ok(Some(outcome));
+                        state.best = Some(share);
+                        return raise(
+                            parts,
+                            (&driver, &shares),
+                            outcome,
+                            &mut state,
+                            (state_file, observe),
+                        );
                     }
                     // It gets round, but more slowly than its plan: the limits are not held yet.
                     let why = format!(

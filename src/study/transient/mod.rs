@@ -5,6 +5,7 @@
 //! the greatest share at which the car gets round within the edges and as fast as that lap, to half a percent; the envelope with
 //! this share is fed back, and both laps are set side by side. Several lines, or set-ups of the car, are driven all at once.
 
+mod corners;
 mod drive;
 mod population;
 mod population_results;
@@ -12,6 +13,7 @@ mod results;
 mod settings;
 mod state;
 
+pub use corners::CornerGrip;
 pub use drive::{AGREEMENT, DrivenLine, INTERVAL_S};
 pub use population::{Driven, DrivenBest, PopulationOutcome, drive_problem};
 pub use population_results::{Entry, PopulationSummary};

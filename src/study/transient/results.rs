@@ -1,5 +1,6 @@
 //! What a drive leaves behind.
 
+use super::corners::CornerGrip;
 use super::drive::{AGREEMENT, DrivenLine, INTERVAL_S};
 use crate::error::Result;
 use crate::report::{CornerLap, HtmlReport, LapLine, LapView, Road, Table, write_whole};
@@ -35,11 +36,11 @@ pub struct LineSummary {
     /// The study: the drive is in `f64`, candidates are laps, and no random numbers are drawn.
     #[serde(flatten)]
     pub head: Head,
-    /// The greatest share of the envelope's grip that was held.
+    /// The greatest share of the envelope's grip that was held on the whole lap.
     pub grip_share: f64,
     /// The driven lap (s).
     pub lap_time_s: f64,
-    /// The quasi-steady-state lap on the same line with that share of the grip (s).
+    /// The quasi-steady-state lap on the same line with the shares of the grip that were held (s).
     pub point_mass_lap_time_s: f64,
     /// How far the driven lap is off that (%).
     pub disagreement_percent: f64,
@@ -53,6 +54,11 @@ pub struct LineSummary {
     pub greatest_offset_m: f64,
     /// What became of the car at the least share that failed.
     pub beyond: Option<String>,
+    /// The share that was held in each corner, and the time there.
+    pub corners: Vec<CornerGrip>,
+    /// The quasi-steady-state lap on the same line with all of the grip (s), and how far the driven lap is behind it (%).
+    pub full_grip_lap_time_s: Option<f64>,
+    pub behind_full_grip_percent: Option<f64>,
 }
 
 impl LineSummary {
@@ -74,18 +80,35 @@ impl LineSummary {
             margin_m: outcome.margin_m,
             greatest_offset_m: outcome.drive.offset_m.iter().fold(0.0, |a, b| a.max(b.abs())),
             beyond: outcome.failures.last().map(|(_, why)| why.clone()),
+            corners: outcome.corners.clone(),
+            full_grip_lap_time_s: outcome.full_grip_s,
+            behind_full_grip_percent: outcome
+                .full_grip_s
+                .map(|full| 100.0 * (outcome.lap_time_s / full - 1.0)),
         }
     }
 
     /// The figures in words.
     pub fn to_text(&self) -> String {
-        let beyond = self
-            .beyond
-            .as_ref()
-            .map_or(String::new(), |why| format!("Beyond it {why}.\n"));
+        let beyond = self.beyond.as_ref().map_or(String::new(), |why| {
+            format!("With more on the whole lap {why}.\n")
+        });
+        let shares = self.corners.iter().map(|corner| 100.0 * corner.grip_share);
+        let [least, most] = shares.fold([f64::INFINITY, 0.0f64], |[a, b], share| {
+            [a.min(share), b.max(share)]
+        });
+        let by_corner = if least < most {
+            format!(" on the whole lap, and {least:.0} to {most:.0}% corner by corner")
+        } else {
+            String::new()
+        };
+        let all = self.full_grip_lap_time_s.zip(self.behind_full_grip_percent);
+        let all = all.map_or(String::new(), |(full_s, behind)| {
+            format!("With all of the grip it takes {full_s:.3} s: the car is {behind:.2}% behind.\n")
+        });
         format!(
-            "{} drives the line in {:.3} s, with {:.0}% of the envelope's grip; the quasi-steady-state lap with as much takes {:.3} s \
-             ({:+.2}%{}).\n{beyond}Chosen: {}.\nAt most {:.2} m off the line; {:.2} m left between the car's side and the edge.\n",
+            "{} drives the line in {:.3} s, with {:.0}% of the envelope's grip{by_corner}; the quasi-steady-state lap with as much takes \
+             {:.3} s ({:+.2}%{}).\n{all}{beyond}Chosen: {}.\nAt most {:.2} m off the line; {:.2} m left between the car's side and the edge.\n",
             self.head.subject.car,
             self.lap_time_s,
             100.0 * self.grip_share,
@@ -103,13 +126,31 @@ impl LineSummary {
     }
 }
 
-/// Writes `drive.csv`, `envelope_driven.csv`, `speeds.svg`, `map.svg` and `report.html`.
+/// The corners as a table.
+fn corners(summary: &LineSummary) -> Table<'_> {
+    Table::rows(summary.corners.iter().enumerate())
+        .number("corner", "", |(k, _)| (k + 1) as f64)
+        .number("from", "m", |(_, c)| c.start_m)
+        .number("to", "m", |(_, c)| c.end_m)
+        .number("least speed", "m/s", |(_, c)| c.least_speed_mps)
+        .number("grip held", "%", |(_, c)| 100.0 * c.grip_share)
+        .number("driven", "s", |(_, c)| c.driven_s)
+        .number("lost to all of the grip", "s", |(_, c)| {
+            c.driven_s - c.full_grip_s
+        })
+        .table()
+}
+
+/// Writes `drive.csv`, `corners.csv`, `envelope_driven.csv`, `speeds.svg`, `map.svg` and `report.html`.
 ///
 /// # Errors
 /// [`crate::Error::Io`] if a file cannot be written.
 pub(super) fn report(folder: &Path, car: &Car, outcome: &DrivenLine, summary: &LineSummary) -> Result<()> {
     let envelope = outcome.envelope.to_csv();
     write_whole(folder.join("envelope_driven.csv"), envelope.as_bytes())?;
+    if !summary.corners.is_empty() {
+        corners(summary).write_csv(folder.join("corners.csv"))?;
+    }
     let drive = &outcome.drive;
     let driven_m = drive.points_m(&outcome.line);
     let state = |k: usize| -> Vec<f64> { drive.states.iter().map(|s| s[k]).collect() };
@@ -232,6 +273,10 @@ fn write_page(
         CornerLap::new("quasi-steady-state lap", stations, &lap.v_mps, &lap.ay_mps2, 1.0)
     });
     page.corners(&driven.into_iter().chain(ideal).collect::<Vec<_>>(), &[])?;
+    if !summary.corners.is_empty() {
+        let note = "Each from one greatest speed to the next. Lost is the time to the quasi-steady-state lap with all of the grip.";
+        page.table("Grip by corner", note, &corners(summary))?;
+    }
     page.section("Tyres", "");
     page.place(&tyres(&drive.station_m, moments))?;
     page.provenance("car", car);

@@ -22,6 +22,24 @@ pub struct DriveState {
     pub(super) failures: Vec<(f64, String)>,
     /// The share with which the laps agreed best so far.
     pub(super) best: Option<f64>,
+    /// How far the shares of corners have come, once the whole lap's is found.
+    pub(super) corners: Option<CornerState>,
+}
+
+/// How far the shares of the grip have come that corners hold. They are numbers among the shares from that of the whole lap on.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct CornerState {
+    /// The shares to drive with next.
+    pub levels: Vec<usize>,
+    /// Corners that go no higher.
+    pub frozen: Vec<bool>,
+    /// The shares of the fastest lap, and its time (s).
+    pub best: Vec<usize>,
+    pub best_s: f64,
+    /// Whether the car held the shares that it was driven with last.
+    pub accepted: bool,
+    /// Laps driven.
+    pub drives: usize,
 }
 
 impl DriveState {
@@ -33,6 +51,7 @@ impl DriveState {
             tried: 0,
             failures: Vec::new(),
             best: None,
+            corners: None,
         }
     }
 }

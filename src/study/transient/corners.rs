@@ -1,0 +1,341 @@
+//! Grip by corner: where the car holds more than on the whole lap, its plan takes more.
+//!
+//! The greatest share of the grip that a whole lap holds is that of its worst corner. From there the shares of all corners are raised
+//! together, step by step. Where the car is lost, or falls behind its plan, the corner goes back by a step and stays there. Each drive
+//! follows from the ones before, so that a resumed search ends with the same bits.
+
+use super::NamedLine;
+use super::drive::{AGREEMENT, DrivenLine, INTERVAL_S};
+use super::state::{CornerState, DriveState};
+use crate::drive::{Drive, DriverSettings, SpeedPlan, drive_until_lost};
+use crate::error::{Error, Result};
+use crate::line::{BySection, EnvelopeTable, FineLine, LapProfile, PointMass, lap_profile};
+use crate::study::framework::Progress;
+use crate::study::framework::state_file::StateFile;
+use crate::vehicle::{Car, Traction};
+use serde::{Deserialize, Serialize};
+use std::ops::ControlFlow;
+
+/// A corner ends at a greatest speed from which the car slows down by at least this much (m/s), and has gained as much.
+const LEAST_DROP_MPS: f64 = 3.0;
+
+/// A corner of a driven lap, from one greatest speed to the next.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct CornerGrip {
+    /// Station of its start along the line (m).
+    pub start_m: f64,
+    /// Station of its end (m), before its start if it passes the start line.
+    pub end_m: f64,
+    /// Least speed of the quasi-steady-state lap (m/s).
+    pub least_speed_mps: f64,
+    /// The share of the envelope's grip that the car holds.
+    pub grip_share: f64,
+    /// Time of the driven lap (s).
+    pub driven_s: f64,
+    /// Time of the quasi-steady-state lap with all of the grip (s).
+    pub full_grip_s: f64,
+}
+
+/// The corner that each section of a closed lap belongs to, and how many there are; `v_mps` are its speeds.
+fn corners_of(v_mps: &[f64]) -> (Vec<usize>, usize) {
+    let n = v_mps.len();
+    let start = (0..n).max_by(|i, j| v_mps[*i].total_cmp(&v_mps[*j])).unwrap_or(0);
+    let mut corner_of = vec![0; n];
+    let (mut corner, mut rising) = (0, false);
+    let (mut least, mut most) = (v_mps[start], start);
+    for step in 0..n {
+        let here = (start + step) % n;
+        let v = v_mps[here];
+        if rising {
+            if v > v_mps[most] {
+                most = here;
+            }
+            if v < v_mps[most] - LEAST_DROP_MPS {
+                corner += 1;
+                let after = (0..).map(|k| (most + k) % n).take_while(|i| *i != here);
+                after.for_each(|i| corner_of[i] = corner);
+                (rising, least) = (false, v);
+            }
+        } else {
+            least = least.min(v);
+            if v > least + LEAST_DROP_MPS {
+                (rising, most) = (true, here);
+            }
+        }
+        corner_of[here] = corner;
+    }
+    (corner_of, corner + 1)
+}
+
+/// The plans of a line, each corner with a share of the grip of its own.
+struct Corners<'a> {
+    limits: &'a PointMass,
+    /// Rising from the share that the whole lap holds.
+    shares: Vec<f64>,
+    tables: Vec<EnvelopeTable<f64>>,
+    fine: FineLine,
+    drs: Vec<bool>,
+    corner_of: Vec<usize>,
+    count: usize,
+}
+
+impl<'a> Corners<'a> {
+    fn new(
+        line: &NamedLine,
+        limits: &'a PointMass,
+        traction: &Traction,
+        base: &DrivenLine,
+        shares: &[f64],
+    ) -> Result<Self> {
+        let from = shares.iter().filter(|share| **share >= base.grip_share);
+        let mut shares: Vec<f64> = from.copied().collect();
+        shares.sort_by(f64::total_cmp);
+        let table = |share: &f64| {
+            let envelope = limits.envelope.with_grip_share(*share, traction)?;
+            let limits = PointMass {
+                envelope,
+                ..limits.clone()
+            };
+            limits.table()
+        };
+        let tables = shares.iter().map(table).collect::<Result<_>>()?;
+        let fine = FineLine::new(&line.points_m, true, 1.0, None, 0.0)?;
+        let (corner_of, count) = match &base.point_mass.lap {
+            Some(lap) => corners_of(&lap.v_mps),
+            None => (vec![0; fine.points_m.len()], 1),
+        };
+        Ok(Self {
+            drs: fine.drs_of(&line.drs),
+            limits,
+            shares,
+            tables,
+            fine,
+            corner_of,
+            count,
+        })
+    }
+
+    /// The quasi-steady-state lap with a share of the grip in each corner, by their numbers among the shares.
+    fn lap(&self, levels: &[usize]) -> Result<LapProfile> {
+        let of: Vec<usize> = self.corner_of.iter().map(|corner| levels[*corner]).collect();
+        let within = BySection {
+            tables: &self.tables,
+            of: &of,
+        };
+        let (segment_m, curvature_1pm) = (&self.fine.segment_m, &self.fine.curvature_1pm);
+        lap_profile(self.limits, &within, segment_m, curvature_1pm, 0.0, &self.drs)
+    }
+
+    /// The corner at a station (m).
+    fn at(&self, station_m: f64) -> usize {
+        let after = self.fine.station_m.partition_point(|s| *s <= station_m);
+        self.corner_of[after.saturating_sub(1)]
+    }
+
+    /// The time (s) that a lap spends in each corner, from its time at each section of the line and at its end.
+    fn times_s(&self, elapsed_s: &[f64], end_s: f64) -> Vec<f64> {
+        let mut times = vec![0.0; self.count];
+        for (i, corner) in self.corner_of.iter().enumerate() {
+            times[*corner] += elapsed_s.get(i + 1).copied().unwrap_or(end_s) - elapsed_s[i];
+        }
+        times
+    }
+
+    /// The times (s) that a driven lap spends in each corner.
+    fn driven_s(&self, drive: &Drive, lap_time_s: f64) -> Vec<f64> {
+        let stations = &drive.station_m;
+        let offset_s = stations
+            .first()
+            .zip(drive.states.first())
+            .map_or(0.0, |(s, state)| s / state[0]);
+        let at = |station_m: &f64| {
+            let after = stations.partition_point(|s| s <= station_m);
+            let Some(before) = after.checked_sub(1) else {
+                return 0.0;
+            };
+            let speed = drive.states[before][0];
+            (offset_s + before as f64 * INTERVAL_S + (station_m - stations[before]) / speed).min(lap_time_s)
+        };
+        let elapsed_s: Vec<f64> = self.fine.station_m.iter().map(at).collect();
+        self.times_s(&elapsed_s, lap_time_s)
+    }
+
+    /// Start and end (m) of a corner.
+    fn ends_m(&self, corner: usize) -> [f64; 2] {
+        let n = self.corner_of.len();
+        let is = |i: usize| self.corner_of[i % n] == corner;
+        let start = (0..n).find(|i| is(*i) && !is(i + n - 1)).unwrap_or(0);
+        let end = (0..n).find(|i| is(*i) && !is(i + 1)).unwrap_or(n - 1);
+        [start, (end + 1) % n].map(|i| self.fine.station_m[i])
+    }
+}
+
+/// Raises the share of the grip corner by corner from what `base` holds on the whole lap, and drives the fastest; nothing if the
+/// observer ends it.
+///
+/// # Errors
+/// Those of the drives, and of saving the state.
+pub(super) fn raise(
+    (car, limits, line): (&Car, &PointMass, &NamedLine),
+    (driver, shares): (&DriverSettings, &[f64]),
+    base: DrivenLine,
+    state: &mut DriveState,
+    (state_file, observe): (&mut StateFile, &mut dyn FnMut(&Progress) -> ControlFlow<()>),
+) -> Result<Option<DrivenLine>> {
+    let traction = Traction::of(car, &limits.envelope);
+    let corners = Corners::new(line, limits, &traction, &base, shares)?;
+    let top = corners.shares.len() - 1;
+    let mut found = state.corners.take().unwrap_or_else(|| CornerState {
+        levels: vec![0; corners.count],
+        frozen: vec![false; corners.count],
+        best: vec![0; corners.count],
+        best_s: base.lap_time_s,
+        accepted: true,
+        drives: 0,
+    });
+    let drive = |lap: &LapProfile| {
+        let plan = SpeedPlan::of_speeds(&lap.station_m, &lap.v_mps, corners.fine.length_m);
+        drive_until_lost(car, &line.circuit, plan, driver, INTERVAL_S)
+    };
+    loop {
+        if found.accepted {
+            let rising: Vec<usize> = (0..corners.count)
+                .filter(|c| !found.frozen[*c] && found.levels[*c] < top)
+                .collect();
+            if rising.is_empty() {
+                break;
+            }
+            rising.into_iter().for_each(|corner| found.levels[corner] += 1);
+            found.accepted = false;
+        }
+        let done = (state.tried + found.drives) as u64;
+        let planned = done + (top - found.levels.iter().copied().min().unwrap_or(top)) as u64 + 1;
+        if observe(&Progress::counted(done, planned)).is_break() {
+            state.corners = Some(found);
+            state_file.save(state)?;
+            return Ok(None);
+        }
+        let lap = corners.lap(&found.levels)?;
+        let (driven, lost) = drive(&lap)?;
+        found.drives += 1;
+        let whole_s = driven.lap_time_s(line.circuit.length_m, INTERVAL_S);
+        let blamed = match (&lost, whole_s) {
+            (Some(lost), _) => lowered_from(corners.at(lost.station_m), &found.levels),
+            (None, Some(lap_time_s)) if (lap_time_s / lap.time_s - 1.0).abs() > AGREEMENT => {
+                let planned_s = corners.times_s(&lap.elapsed_s(), lap.time_s);
+                let driven_s = corners.driven_s(&driven, lap_time_s);
+                let behind = |c: &usize| driven_s[*c] / planned_s[*c] - 1.0;
+                let raised = (0..corners.count).filter(|c| found.levels[*c] > 0);
+                raised.max_by(|a, b| behind(a).total_cmp(&behind(b)))
+            }
+            (None, Some(lap_time_s)) => {
+                if lap_time_s < found.best_s {
+                    (found.best, found.best_s) = (found.levels.clone(), lap_time_s);
+                }
+                found.accepted = true;
+                keep(state, &found, state_file);
+                continue;
+            }
+            (None, None) => None,
+        };
+        // No corner is left that takes more than the whole lap.
+        let Some(corner) = blamed else {
+            break;
+        };
+        found.levels[corner] -= 1;
+        found.frozen[corner] = true;
+        keep(state, &found, state_file);
+    }
+
+    let lap = corners.lap(&found.best)?;
+    let (driven, _) = drive(&lap)?;
+    let Some(lap_time_s) = driven.lap_time_s(line.circuit.length_m, INTERVAL_S) else {
+        return Err(Error::Study(
+            "the fastest lap did not come round again".to_owned(),
+        ));
+    };
+    let driven_s = corners.driven_s(&driven, lap_time_s);
+    let full = FineLine::new(&line.points_m, true, 1.0, Some((limits, &line.drs)), 0.0)?;
+    let full_s = full.lap.as_ref().map_or_else(
+        || vec![f64::NAN; corners.count],
+        |lap| corners.times_s(&lap.elapsed_s(), lap.time_s),
+    );
+    let grip = (0..corners.count).map(|corner| {
+        let [start_m, end_m] = corners.ends_m(corner);
+        let within = corners
+            .corner_of
+            .iter()
+            .zip(&lap.v_mps)
+            .filter(|(of, _)| **of == corner);
+        CornerGrip {
+            start_m,
+            end_m,
+            least_speed_mps: within.map(|(_, v)| *v).fold(f64::INFINITY, f64::min),
+            grip_share: corners.shares[found.best[corner]],
+            driven_s: driven_s[corner],
+            full_grip_s: full_s[corner],
+        }
+    });
+    let corner_grip = grip.collect();
+    let drives = found.drives;
+    let mut fine = corners.fine;
+    fine.lap = Some(lap);
+    Ok(Some(DrivenLine {
+        point_mass: fine,
+        margin_m: driven.least_room_m(&line.circuit),
+        drive: driven,
+        lap_time_s,
+        corners: corner_grip,
+        full_grip_s: full.lap_time_s(),
+        drives,
+        ..base
+    }))
+}
+
+/// The corner that goes back by a step where a car is lost in one: itself, or the last before it that takes more than the whole lap.
+fn lowered_from(corner: usize, levels: &[usize]) -> Option<usize> {
+    let n = levels.len();
+    (0..n)
+        .map(|back| (corner + n - back) % n)
+        .find(|c| levels[*c] > 0)
+}
+
+fn keep(state: &mut DriveState, found: &CornerState, state_file: &mut StateFile) {
+    state.corners = Some(found.clone());
+    if state_file.due() {
+        state_file.save_or_warn(state);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Three straights of 60, 50 and 40 m/s: a dip of 2 m/s on the first is no corner. Numbers begin at the greatest speed, and the
+    /// last corner passes the start line.
+    #[test]
+    fn corners_lie_between_the_greatest_speeds() {
+        let ends = [30.0, 50.0, 20.0, 40.0, 25.0, 58.0, 56.0, 60.0];
+        let mut v = Vec::new();
+        for pair in ends.windows(2) {
+            v.extend((0..10).map(|i| pair[0] + (pair[1] - pair[0]) * f64::from(i) / 10.0));
+        }
+        // From the end back to the start, braking.
+        v.extend((0..10).map(|i| 60.0 - 3.0 * f64::from(i)));
+        let (corner_of, count) = corners_of(&v);
+        assert_eq!(count, 3);
+        assert_eq!((corner_of[70], corner_of[0], corner_of[9]), (0, 0, 0));
+        assert_eq!(
+            (corner_of[10], corner_of[29], corner_of[30], corner_of[69]),
+            (1, 1, 2, 2)
+        );
+    }
+
+    #[test]
+    fn a_car_that_is_lost_lowers_the_corner_or_the_one_before() {
+        assert_eq!(lowered_from(2, &[1, 0, 3, 0]), Some(2));
+        assert_eq!(lowered_from(1, &[1, 0, 3, 0]), Some(0));
+        assert_eq!(lowered_from(0, &[0, 0, 3, 0]), Some(2));
+        assert_eq!(lowered_from(0, &[0, 0, 0, 0]), None);
+    }
+}
