@@ -21,6 +21,8 @@ struct Driver {
     reach: f32,
     rolling: f32,
     rotating: f32,
+    speed_ahead: f32,
+    plan_ahead: f32,
 }
 
 @group(0) @binding(7) var<uniform> driver: Driver;
@@ -83,8 +85,8 @@ fn act(course: Course, pace: Pace, c: Chassis, state: CarState, view: View, cont
     let steer = min(max(asked, -driver.max_steer), driver.max_steer);
     let rate = min(max((steer - controls.steer) / driver.steer_lag, -0.9), 0.9);
 
-    let behind = planned_speed(course, pace, view, 0.1 * v) - body.vx;
-    let ahead = 0.15 * v;
+    let behind = planned_speed(course, pace, view, driver.speed_ahead * v) - body.vx;
+    let ahead = driver.plan_ahead * v;
     let before = planned_speed(course, pace, view, ahead - driver.reach);
     let after = planned_speed(course, pace, view, ahead + driver.reach);
     let planned = (after * after - before * before) / 8.0;

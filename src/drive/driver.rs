@@ -1,7 +1,7 @@
 //! The driver: steering by preview and feedback, drive and brake by limited wheel slip. Twin of `shaders/driver.wgsl`.
 
 use super::path::{View, curvature_ahead};
-use super::road::{Course, FRONT_CELLS, PLAN_AHEAD_S, PLAN_REACH_M, Road};
+use super::road::{Course, FRONT_CELLS, PLAN_REACH_M, Road};
 use super::settings::DriverSettings;
 use crate::error::{Error, Result};
 use crate::scalar::{Lookup, Real};
@@ -12,7 +12,7 @@ use crate::vehicle::{Car, CarInput, CarState, Chassis};
 use std::f64::consts::TAU;
 
 /// Time constant with which wheel slip follows the pedals, s.
-const PEDAL_LAG: f64 = 0.06;
+pub(super) const PEDAL_LAG_S: f64 = 0.06;
 /// Time constant of the driver's arms, s.
 const STEER_LAG: f64 = 0.04;
 /// Greatest rate of the driver's arms, rad/s.
@@ -89,6 +89,10 @@ driver_table! {
     rolling,
     /// Mass that the engine accelerates over that of the car.
     rotating,
+    /// How far ahead in the plan the driver takes the speed, s,
+    speed_ahead,
+    /// and the acceleration.
+    plan_ahead,
 }
 
 impl DriverTable<f64> {
@@ -110,10 +114,12 @@ impl DriverTable<f64> {
             understeer: UNDERSTEER,
             driven_share: DRIVEN_SHARE,
             steer_lag: STEER_LAG,
-            pedal_lag: PEDAL_LAG,
+            pedal_lag: PEDAL_LAG_S,
             reach: PLAN_REACH_M,
             rolling: car.rolling_mps2(),
             rotating: car.powertrain.as_ref().map_or(1.0, |p| p.rotating_mass_factor),
+            speed_ahead: settings.speed_ahead_s,
+            plan_ahead: settings.plan_ahead_s,
         }
     }
 }
@@ -335,8 +341,8 @@ pub fn act<R: Lookup>(
         .max(R::lit(-STEER_RATE))
         .min(R::lit(STEER_RATE));
 
-    let behind = planned_speed(road, course, pace, view, R::lit(0.1) * v) - body.vx;
-    let look = R::lit(PLAN_AHEAD_S) * v;
+    let behind = planned_speed(road, course, pace, view, R::load(driver.speed_ahead) * v) - body.vx;
+    let look = R::load(driver.plan_ahead) * v;
     let reach = R::load(driver.reach);
     let before = planned_speed(road, course, pace, view, look - reach);
     let after = planned_speed(road, course, pace, view, look + reach);

@@ -16,8 +16,6 @@ const SLOWEST_MPS: f64 = 5.0;
 pub const FRONT_CELLS: usize = 2;
 /// Half of the length over which a plan's acceleration is taken, m.
 pub const PLAN_REACH_M: f64 = 2.0;
-/// How far ahead a driver looks into the plan, s.
-pub(super) const PLAN_AHEAD_S: f64 = 0.15;
 /// Whole numbers beyond this are not exact in `f32`.
 const MOST_COUNTED: f64 = 16_777_216.0;
 /// Least distance between samples of a path (m), so that no car passes two of them in one step.
@@ -188,9 +186,11 @@ impl Road<f64> {
             road.rows_ahead = road
                 .rows_ahead
                 .max((ahead_m(driver.preview_s.max(0.08)) / spacing) as usize + 2);
-            road.cells_ahead = road
-                .cells_ahead
-                .max(((ahead_m(PLAN_AHEAD_S) + PLAN_REACH_M) / cell_m) as usize + FRONT_CELLS + 2);
+            road.cells_ahead = road.cells_ahead.max(
+                ((ahead_m(driver.plan_ahead_s.max(driver.speed_ahead_s)) + PLAN_REACH_M) / cell_m) as usize
+                    + FRONT_CELLS
+                    + 2,
+            );
         }
         for line in lines {
             road.push(line, step_s);

@@ -1,5 +1,6 @@
 //! How the driver drives, and what the driver knows of the car.
 
+use super::driver::PEDAL_LAG_S;
 use super::plan::load_mps2;
 use crate::error::{Error, Result};
 use crate::vehicle::{Car, Turn, steady_car};
@@ -15,6 +16,10 @@ pub struct DriverSettings {
     pub slip_stiffness: f64,
     /// How far ahead the driver looks, s.
     pub preview_s: f64,
+    /// How far ahead in the plan the driver takes the speed to aim for, s,
+    pub speed_ahead_s: f64,
+    /// and the acceleration.
+    pub plan_ahead_s: f64,
     /// Speed not to exceed, m/s.
     pub top_speed_mps: f64,
     /// How much the driver steers against an angle to the path, rad per rad.
@@ -82,6 +87,9 @@ impl DriverSettings {
         Ok(Self {
             heading_gain: 0.8,
             speed_gain_1ps: 3.0,
+            // What the feet lag behind: who looks further brakes early in every corner, for a hundredth of the lap.
+            speed_ahead_s: PEDAL_LAG_S,
+            plan_ahead_s: PEDAL_LAG_S,
             knowledge: Some(CarKnowledge::of_car(car)?),
             ..Self::default()
         })
@@ -95,6 +103,8 @@ impl Default for DriverSettings {
             slip_limit: 0.14,
             slip_stiffness: 18.0,
             preview_s: 0.25,
+            speed_ahead_s: 0.1,
+            plan_ahead_s: 0.15,
             top_speed_mps: 70.0,
             heading_gain: 0.55,
             speed_gain_1ps: 1.8,

@@ -56,8 +56,9 @@ pub struct LineSummary {
     pub beyond: Option<String>,
     /// The share that was held in each corner, and the time there.
     pub corners: Vec<CornerGrip>,
-    /// The quasi-steady-state lap on the same line with all of the grip (s), and how far the driven lap is behind it (%).
+    /// The quasi-steady-state lap on the same line with all of the grip (s).
     pub full_grip_lap_time_s: Option<f64>,
+    /// How far the driven lap is behind that (%).
     pub behind_full_grip_percent: Option<f64>,
 }
 
