@@ -352,6 +352,7 @@ class DrivenLine(Figures):
     margin_m: float
     greatest_offset_m: float
     beyond: str | None
+    warnings: list[str]
     corners: list[CornerGrip]
     full_grip_lap_time_s: float | None
     behind_full_grip_percent: float | None

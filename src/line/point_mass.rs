@@ -94,6 +94,16 @@ impl PointMass {
             .map_or(Ok(()), |x| within("max_steer_rad", x, 0.01, 1.5))
     }
 
+    /// The share of the tyres' grip that accelerations along and across the car (m/s^2) take at a speed (m/s): 1 on the ellipse. Drag is
+    /// no force of the tyres.
+    pub fn grip_used(&self, v_mps: f64, [ax_mps2, ay_mps2]: [f64; 2]) -> f64 {
+        let limits = self.envelope.at(v_mps);
+        let along = (ax_mps2 + limits.drag_mps2).abs() / limits.ax_grip_mps2;
+        let across = ay_mps2.abs() / limits.ay_mps2;
+        let p = self.ellipse_exponent;
+        (along.powf(p) + across.powf(p)).powf(1.0 / p)
+    }
+
     /// The tables of its envelope.
     ///
     /// # Errors

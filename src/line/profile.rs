@@ -28,6 +28,14 @@ pub struct LapProfile {
 }
 
 impl LapProfile {
+    /// The share of `car`'s grip that is used at each section.
+    pub fn grip_used(&self, car: &PointMass) -> Vec<f64> {
+        let places = self.v_mps.iter().zip(&self.ax_mps2).zip(&self.ay_mps2);
+        places
+            .map(|((v, ax), ay)| car.grip_used(*v, [*ax, *ay]))
+            .collect()
+    }
+
     /// Time at each section (s), from zero at the first.
     pub fn elapsed_s(&self) -> Vec<f64> {
         let mut time = 0.0;

@@ -12,6 +12,10 @@ pub struct CornerLap<'a> {
     time_s: Vec<f64>,
     v_mps: Vec<f64>,
     ay_mps2: Vec<f64>,
+    /// Places of these among those that were given.
+    kept: Vec<usize>,
+    gear: Vec<f64>,
+    grip: Vec<f64>,
 }
 
 /// A stretch of the shared distance, with its name.
@@ -49,10 +53,13 @@ impl<'a> CornerLap<'a> {
             time_s: Vec::new(),
             v_mps: Vec::new(),
             ay_mps2: Vec::new(),
+            kept: Vec::new(),
+            gear: Vec::new(),
+            grip: Vec::new(),
         };
         let mut last: Option<(f64, f64)> = None;
         let mut time_s = 0.0;
-        for ((&station, &v), &ay) in station_m.iter().zip(v_mps).zip(ay_mps2) {
+        for (place, ((&station, &v), &ay)) in station_m.iter().zip(v_mps).zip(ay_mps2).enumerate() {
             let sound = station.is_finite() && ay.is_finite() && v > 0.0 && v.is_finite();
             if !sound || last.is_some_and(|(before, _)| station <= before) {
                 continue;
@@ -65,8 +72,54 @@ impl<'a> CornerLap<'a> {
             lap.time_s.push(time_s);
             lap.v_mps.push(v);
             lap.ay_mps2.push(ay);
+            lap.kept.push(place);
         }
         (lap.at_m.len() > 1).then_some(lap)
+    }
+
+    /// The lap with the gear at each of its stations, from 1.
+    #[must_use]
+    pub fn gears(mut self, gear: &[f64]) -> Self {
+        self.gear = self.kept_of(gear);
+        self
+    }
+
+    /// The lap with the share of the grip that is used at each of its stations.
+    #[must_use]
+    pub fn grip_used(mut self, grip: &[f64]) -> Self {
+        self.grip = self.kept_of(grip);
+        self
+    }
+
+    /// What is kept of figures at all stations; nothing if there is not one for each.
+    fn kept_of(&self, figures: &[f64]) -> Vec<f64> {
+        let kept = self.kept.iter().map(|place| figures.get(*place).copied());
+        kept.collect::<Option<_>>().unwrap_or_default()
+    }
+
+    /// The gear where the lap is slowest on a stretch.
+    fn slowest_gear(&self, stretch: &Stretch) -> Option<f64> {
+        let inside = |at: &f64| (stretch.start_m..=stretch.end_m).contains(at);
+        let places = (0..self.gear.len()).filter(|i| inside(&self.at_m[*i]));
+        let slowest = places.min_by(|a, b| self.v_mps[*a].total_cmp(&self.v_mps[*b]))?;
+        Some(self.gear[slowest])
+    }
+
+    /// The mean over time (%) of the grip that is used on a stretch.
+    fn mean_grip(&self, stretch: &Stretch) -> Option<f64> {
+        if self.grip.is_empty() {
+            return None;
+        }
+        let inside = |i: &usize| self.at_m[*i] >= stretch.start_m && self.at_m[*i + 1] <= stretch.end_m;
+        let steps = (0..self.at_m.len() - 1).filter(inside);
+        let sums = steps.fold([0.0; 2], |[grip, time], i| {
+            let step_s = self.time_s[i + 1] - self.time_s[i];
+            [
+                grip + 0.5 * (self.grip[i] + self.grip[i + 1]) * step_s,
+                time + step_s,
+            ]
+        });
+        (sums[1] > 0.0).then(|| (1e3 * sums[0] / sums[1]).round() / 10.0)
     }
 
     /// The corners of the lap by number, and by the names of `sections` (start and end in metres) that their middles lie in.
@@ -163,6 +216,8 @@ pub fn corner_table(laps: &[CornerLap<'_>], stretches: &[Stretch]) -> Table<'sta
             let ay = lap.on(&lap.ay_mps2, s).into_iter();
             ay.map(f64::abs).fold(0.0, f64::max)
         })
+        .number("gear", "", |(s, (_, lap))| lap.slowest_gear(s))
+        .number("grip used", "%", |(s, (_, lap))| lap.mean_grip(s))
         .number("time", "s", |(s, (_, lap))| milliseconds(lap.time_on_s(s)))
         .number("against the first lap", "s", |(s, (i, lap))| {
             (*i > 0).then(|| milliseconds(lap.time_on_s(s) - laps[0].time_on_s(s)))
@@ -177,6 +232,38 @@ fn milliseconds(time_s: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// In the bend the car is in second gear where it is slowest, and uses 0.8 of its grip on one half of the time and all on the other.
+    #[test]
+    fn gear_and_grip_are_those_of_the_corner() {
+        let station: Vec<f64> = (0..=400).map(f64::from).collect();
+        let of = |inside: &dyn Fn(f64) -> f64, outside: f64| -> Vec<f64> {
+            let bend = |s: &f64| {
+                if (100.0..=160.0).contains(s) {
+                    inside(*s)
+                } else {
+                    outside
+                }
+            };
+            station.iter().map(bend).collect()
+        };
+        let gear = of(&|s| if s < 130.0 { 2.0 } else { 3.0 }, 6.0);
+        let grip = of(&|s| if s <= 130.0 { 0.8 } else { 1.0 }, 0.1);
+        let v = of(&|s| if s == 120.0 { 19.999 } else { 20.0 }, 40.0);
+        let ay = of(&|_| 10.0, 0.0);
+        let plain = CornerLap::new("a", &station, &v, &ay, 1.0).unwrap();
+        let corner = &plain.corners(&[])[0];
+        assert_eq!(
+            (plain.slowest_gear(corner), plain.mean_grip(corner)),
+            (None, None)
+        );
+        let lap = plain.clone().gears(&gear).grip_used(&grip);
+        assert_eq!(lap.slowest_gear(corner), Some(2.0));
+        // Thirty metres at 0.8, one between, 29 at 1.
+        assert_eq!(lap.mean_grip(corner), Some(89.8));
+        // Figures of other stations are none of this lap's.
+        assert_eq!(plain.gears(&gear[1..]).slowest_gear(corner), None);
+    }
 
     /// A straight of 100 m, a left bend of 60 m at 20 m/s and 10 m/s^2, a straight, a right bend of 60 m at 30 m/s.
     fn lap(name: &str, bend_mps: f64) -> CornerLap<'_> {

@@ -40,7 +40,9 @@ pub const WHEELS: [&str; 4] = ["fl", "fr", "rl", "rr"];
 pub struct Moment {
     /// The tyres FL FR RL RR.
     pub wheels: [Wheel; 4],
-    /// Lateral acceleration of the roll axis (m/s^2), as the replay compares it with logs; positive to the left.
+    /// Longitudinal acceleration (m/s^2), as the replay compares it with logs,
+    pub ax_mps2: f64,
+    /// and lateral acceleration of the roll axis, positive to the left.
     pub ay_mps2: f64,
 }
 
@@ -103,9 +105,11 @@ fn at<T: Tyre<f64>>(car: &CarModel<f64, T>, driven: &[(CarState<f64>, CarInput<f
             })
         });
         let [[fl, fr], [rl, rr]] = axles;
+        let rate = car.rate(state, input);
         Moment {
             wheels: [fl, fr, rl, rr],
-            ay_mps2: car.rate(state, input).ay,
+            ax_mps2: rate.ax,
+            ay_mps2: rate.ay,
         }
     });
     moments.collect()

@@ -102,6 +102,77 @@ fn the_car_drives_a_line_as_fast_as_the_point_mass() {
     }
 }
 
+/// A car with half a metre of room. In one of an ellipse's two tight ends its line lies aside, with less room on the outside, so that
+/// it holds less grip there than in the other. A search that is broken off anywhere ends with the same lap.
+#[test]
+fn each_corner_has_the_grip_that_the_car_holds_there() {
+    let road = set_up(&RacelineSettings {
+        track: "ellipse:200:100:10".to_owned(),
+        sections: 120,
+        ..RacelineSettings::default()
+    });
+    let road = road.expect("an ellipse");
+    let cross_sections = &road.cross_sections;
+    let beside = |i: usize| {
+        let turn = std::f64::consts::TAU * i as f64 / cross_sections.len() as f64;
+        0.05 * (0.5 - 0.5 * turn.cos())
+    };
+    let reference = cross_sections.reference.iter().enumerate();
+    let alpha: Vec<f64> = reference.map(|(i, a)| a - beside(i)).collect();
+    let line = NamedLine::new("aside".to_owned(), cross_sections.points(&alpha), &road, 9.0);
+    let prepared = Prepared {
+        car: Car::bundled().expect("the bundled car"),
+        lines: vec![line.expect("a line")],
+        road,
+    };
+    let settings = TransientSettings::default();
+    let found = solve_unobserved::<Transient>(&settings, &prepared).expect("it drives");
+    let whole = line_of(&found);
+    let shares: Vec<f64> = whole.corners.iter().map(|corner| corner.grip_share).collect();
+    println!("{} on the whole lap, {shares:?} by corner", whole.grip_share);
+    let least = shares.iter().copied().fold(f64::INFINITY, f64::min);
+    let most = shares.iter().copied().fold(0.0, f64::max);
+    assert!(
+        least >= whole.grip_share && most > whole.grip_share + 0.05,
+        "{shares:?}"
+    );
+    assert!(whole.margin_m > 0.0 && whole.disagreement().abs() <= AGREEMENT);
+    let by_corner: f64 = whole.corners.iter().map(|corner| corner.driven_s).sum();
+    assert!(
+        (by_corner - whole.lap_time_s).abs() < 1e-9,
+        "{by_corner} {}",
+        whole.lap_time_s
+    );
+
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = folder.path().join("checkpoint.bin");
+    let mut state = None;
+    let resumed = loop {
+        let mut state_file = StateFile::at(path.clone()).every(std::time::Duration::ZERO);
+        // Each time it comes one step further.
+        let mut steps = 0;
+        let found = solve::<Transient>(&settings, &prepared, (state.take(), &mut state_file), |_| {
+            steps += 1;
+            if steps > 1 {
+                ControlFlow::Break(())
+            } else {
+                ControlFlow::Continue(())
+            }
+        });
+        if let Some(found) = found.expect("it drives") {
+            break found;
+        }
+        state = state_file.saved::<TransientSettings, _>();
+        assert!(state.is_some());
+    };
+    let resumed = line_of(&resumed);
+    assert_eq!(
+        (resumed.lap_time_s, &resumed.corners),
+        (whole.lap_time_s, &whole.corners)
+    );
+    assert_eq!(resumed.drive.states, whole.drive.states);
+}
+
 /// Set-ups on two lines: the fastest within the edges comes first, the car as it is on a line laps as that line driven alone
 /// with the same share of the grip, and a search can be broken off.
 #[test]

@@ -319,7 +319,10 @@ fn corners(page: &mut HtmlReport, named: &[(&str, &Trace)], length_m: f64) -> Re
             let yaw_rate = lap.column(PANELS[3].0)?;
             Some(yaw_rate.iter().zip(&v).map(|(r, v)| r * v).collect())
         })?;
-        CornerLap::new(name, &lap.station_m, &v, &ay, length_m / lap.length_m())
+        let corners = CornerLap::new(name, &lap.station_m, &v, &ay, length_m / lap.length_m())?;
+        let gear = lap.column(&["gear"]).unwrap_or_default();
+        let grip = lap.column(&["grip_used"]).unwrap_or_default();
+        Some(corners.gears(&gear).grip_used(&grip))
     });
     page.corners(&laps.collect::<Vec<_>>(), &[])
 }

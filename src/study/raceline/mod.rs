@@ -17,6 +17,7 @@ mod window_search;
 pub use front::{LineFront, front_problem, starting_lines};
 pub use results::{LineFigures, Summary};
 pub use settings::{LineAlgorithm, RacelineSettings};
+pub(in crate::study) use setup::best_gears;
 pub use setup::{ReportedLine, Setup, road_read, set_up};
 pub use state::LinesState;
 pub use window_search::{FoundLine, LevelRow, LineSearch, LineSearchSettings, LineState, search_line};

@@ -245,8 +245,8 @@ pub(super) fn write_files(folder: &Path, setup: &Setup, outcome: &Outcome) -> Re
     write_front(folder, outcome)
 }
 
-/// The line on its fine spline: station, place, alpha, curvature, speed, accelerations, steering, time, and the gear that
-/// gives most (from 1) where there is a gearbox. Where the DRS is open anywhere, 1 says where.
+/// The line on its fine spline: station, place, alpha, curvature, speed, accelerations, steering, time, the gear that gives most
+/// (from 1) where there is a gearbox, and the share of the grip that is used. Where the DRS is open anywhere, 1 says where.
 fn write_line(path: &Path, setup: &Setup, line: &ReportedLine) -> Result<()> {
     let fine = &line.fine;
     let (x, y): (Vec<f64>, Vec<f64>) = fine.points_m.iter().map(|p| (p.x, p.y)).unzip();
@@ -263,13 +263,10 @@ fn write_line(path: &Path, setup: &Setup, line: &ReportedLine) -> Result<()> {
             .numbers("ay", "m/s^2", &lap.ay_mps2)
             .numbers("steering", "rad", &lap.steering_rad)
             .numbers("time", "s", lap.elapsed_s());
-        if let Some((powertrain, radius_m)) = &setup.gearbox {
-            let gear = |v: &f64| {
-                let gear = powertrain.gear(*v, *radius_m);
-                gear.map_or(powertrain.gear_ratios.len(), |g| g.index + 1) as f64
-            };
-            table = table.numbers("gear", "-", lap.v_mps.iter().map(gear).collect::<Vec<f64>>());
+        if let Some(gear) = setup.gears(&lap.v_mps) {
+            table = table.numbers("gear", "-", gear);
         }
+        table = table.numbers("grip_used", "-", lap.grip_used(&setup.car));
     }
     if let Some(lap) = fine.lap.as_ref().filter(|lap| lap.drs_open.contains(&true)) {
         let last = lap.drs_open.last().filter(|_| !fine.closed);

@@ -171,6 +171,13 @@ impl ReportedLine {
 /// Shares of the way to the reference line by which a line gives way that bending does not bring onto the road.
 const TOWARDS_REFERENCE: [f64; 6] = [0.0025, 0.005, 0.01, 0.02, 0.04, 0.08];
 
+/// The gear that gives most (from 1) at each speed (m/s), on driven wheels of a radius (m); the top gear beyond the last engine speed.
+pub(in crate::study) fn best_gears(powertrain: &Powertrain, radius_m: f64, v_mps: &[f64]) -> Vec<f64> {
+    let top = powertrain.gear_ratios.len();
+    let gear = |v: &f64| powertrain.gear(*v, radius_m).map_or(top, |gear| gear.index + 1) as f64;
+    v_mps.iter().map(gear).collect()
+}
+
 impl Setup {
     /// The problem of lines through the cross-sections that are given `way`.
     ///
@@ -231,6 +238,12 @@ impl Setup {
             };
             (point, room(-leftward, false), room(leftward, true))
         }))
+    }
+
+    /// The gear that gives most (from 1) at each speed (m/s), of a car whose limits are its own.
+    pub fn gears(&self, v_mps: &[f64]) -> Option<Vec<f64>> {
+        let (powertrain, radius_m) = self.gearbox.as_ref()?;
+        Some(best_gears(powertrain, *radius_m, v_mps))
     }
 
     /// The line on its fine spline, and the clearance of the car with its margin on both sides at every point (m).

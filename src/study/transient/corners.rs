@@ -180,7 +180,8 @@ pub(super) fn raise(
     (driver, shares): (&DriverSettings, &[f64]),
     base: DrivenLine,
     state: &mut DriveState,
-    (state_file, observe): (&mut StateFile, &mut dyn FnMut(&Progress) -> ControlFlow<()>),
+    state_file: &mut StateFile,
+    observe: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
 ) -> Result<Option<DrivenLine>> {
     let traction = Traction::of(car, &limits.envelope);
     let corners = Corners::new(line, limits, &traction, &base, shares)?;

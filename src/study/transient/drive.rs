@@ -141,7 +141,7 @@ fn greatest_share(work: Work<'_, Transient>) -> Result<Option<DrivenLine>> {
     if state.corners.is_some()
         && let Some(base) = best
     {
-        return raise(parts, (&driver, &shares), base, &mut state, (state_file, observe));
+        return raise(parts, (&driver, &shares), base, &mut state, state_file, observe);
     }
     let planned = shares.len();
     // A few at once: the greatest that works ends the search.
@@ -167,7 +167,8 @@ fn greatest_share(work: Work<'_, Transient>) -> Result<Option<DrivenLine>> {
                             (&driver, &shares),
                             outcome,
                             &mut state,
-                            (state_file, observe),
+                            state_file,
+                            observe,
                         );
                     }
                     // It gets round, but more slowly than its plan: the limits are not held yet.

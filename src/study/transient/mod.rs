@@ -187,7 +187,8 @@ impl Study for Transient {
     fn report(folder: &Path, solved: &Solved<'_, Self>, summary: &Summary) -> Result<()> {
         match (solved.outcome, summary) {
             (Outcome::Line(line), Summary::Line(summary)) => {
-                results::report(folder, &solved.prepared.car, line, summary)
+                let prepared = solved.prepared;
+                results::report(folder, (&prepared.car, &prepared.road.car), line, summary)
             }
             (Outcome::Population(population), Summary::Population(summary)) => {
                 population_results::report(folder, solved.prepared, population, summary)

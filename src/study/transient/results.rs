@@ -3,8 +3,11 @@
 use super::corners::CornerGrip;
 use super::drive::{AGREEMENT, DrivenLine, INTERVAL_S};
 use crate::error::Result;
+use crate::line::{ON_ROAD_M, PointMass};
 use crate::report::{CornerLap, HtmlReport, LapLine, LapView, Road, Table, write_whole};
 use crate::study::framework::Head;
+use crate::study::raceline::best_gears;
+use crate::track::Circuit;
 use crate::vehicle::wheels::{Moment, WHEELS, Wheel, moments_of};
 use crate::vehicle::{Car, CarState};
 use glam::DVec2;
@@ -54,6 +57,8 @@ pub struct LineSummary {
     pub greatest_offset_m: f64,
     /// What became of the car at the least share that failed.
     pub beyond: Option<String>,
+    /// What limits the result, in words.
+    pub warnings: Vec<String>,
     /// The share that was held in each corner, and the time there.
     pub corners: Vec<CornerGrip>,
     /// The quasi-steady-state lap on the same line with all of the grip (s).
@@ -81,6 +86,7 @@ impl LineSummary {
             margin_m: outcome.margin_m,
             greatest_offset_m: outcome.drive.offset_m.iter().fold(0.0, |a, b| a.max(b.abs())),
             beyond: outcome.failures.last().map(|(_, why)| why.clone()),
+            warnings: off_road(&outcome.line).into_iter().collect(),
             corners: outcome.corners.clone(),
             full_grip_lap_time_s: outcome.full_grip_s,
             behind_full_grip_percent: outcome
@@ -123,8 +129,28 @@ impl LineSummary {
             self.rule,
             self.greatest_offset_m,
             self.margin_m
-        )
+        ) + &self
+            .warnings
+            .iter()
+            .map(|warning| format!("Note: {warning}.\n"))
+            .collect::<String>()
     }
+}
+
+/// A word on a line that is itself off the road: the driver follows it as far as the edges allow.
+fn off_road(line: &Circuit) -> Option<String> {
+    let rooms = line
+        .width_left_m
+        .iter()
+        .zip(&line.width_right_m)
+        .map(|(left, right)| left.min(*right));
+    let (at, least) = rooms.enumerate().min_by(|a, b| a.1.total_cmp(&b.1))?;
+    (least < -ON_ROAD_M).then(|| {
+        format!(
+            "the line itself leaves the car's side {:.2} m beyond an edge at station {:.0} m: the car has to leave the line there",
+            -least, line.station_m[at]
+        )
+    })
 }
 
 /// The corners as a table.
@@ -146,7 +172,12 @@ fn corners(summary: &LineSummary) -> Table<'_> {
 ///
 /// # Errors
 /// [`crate::Error::Io`] if a file cannot be written.
-pub(super) fn report(folder: &Path, car: &Car, outcome: &DrivenLine, summary: &LineSummary) -> Result<()> {
+pub(super) fn report(
+    folder: &Path,
+    (car, limits): (&Car, &PointMass),
+    outcome: &DrivenLine,
+    summary: &LineSummary,
+) -> Result<()> {
     let envelope = outcome.envelope.to_csv();
     write_whole(folder.join("envelope_driven.csv"), envelope.as_bytes())?;
     if !summary.corners.is_empty() {
@@ -171,7 +202,12 @@ pub(super) fn report(folder: &Path, car: &Car, outcome: &DrivenLine, summary: &L
         .numbers("vy", "m/s", state(1))
         .numbers("yaw_rate", "rad/s", state(2))
         .numbers("roll", "rad", state(3))
-        .numbers("steering", "rad", steer);
+        .numbers("steering", "rad", steer)
+        .numbers("grip_used", "-", grip_used(limits, outcome, &moments));
+    let table = match gears(car, &state(0)) {
+        Some(gear) => table.numbers("gear", "-", gear),
+        None => table,
+    };
     let channels = CHANNELS
         .iter()
         .flat_map(|channel| (0..4).map(move |k| (channel, k)));
@@ -179,7 +215,20 @@ pub(super) fn report(folder: &Path, car: &Car, outcome: &DrivenLine, summary: &L
         table.numbers(format!("{name}_{}", WHEELS[k]), *unit, of_wheel(&moments, k, *of))
     });
     table.write_csv(folder.join("drive.csv"))?;
-    write_page(folder, outcome, summary, (&driven_m, &moments))
+    write_page(folder, (car, limits), outcome, summary, (&driven_m, &moments))
+}
+
+/// The gear that gives most (from 1) at each speed (m/s), of a car with a gearbox.
+fn gears(car: &Car, v_mps: &[f64]) -> Option<Vec<f64>> {
+    let powertrain = car.powertrain.as_ref()?;
+    Some(best_gears(powertrain, car.chassis.radius_rear, v_mps))
+}
+
+/// The share of all of the grip that the driven lap uses at each sample.
+fn grip_used(limits: &PointMass, outcome: &DrivenLine, moments: &[Moment]) -> Vec<f64> {
+    let places = outcome.drive.states.iter().zip(moments);
+    let used = places.map(|(state, moment)| limits.grip_used(state[0], [moment.ax_mps2, moment.ay_mps2]));
+    used.collect()
 }
 
 /// What a tyre has at a moment.
@@ -217,6 +266,7 @@ fn tyres(station_m: &[f64], moments: &[Moment]) -> LapView {
 
 fn write_page(
     folder: &Path,
+    (driver_car, limits): (&Car, &PointMass),
     outcome: &DrivenLine,
     summary: &LineSummary,
     (driven_m, moments): (&[DVec2], &[Moment]),
@@ -231,6 +281,9 @@ fn write_page(
     page.tile("Quasi-steady-state lap", point_mass_s, "s");
     page.tile("Grip held", format!("{:.0}", 100.0 * summary.grip_share), "%");
     page.tile("Least room", format!("{:.2}", summary.margin_m), "m");
+    for warning in &summary.warnings {
+        page.warning(warning);
+    }
     if !summary.agrees {
         page.warning("The two laps differ by more than the half percent asked for.");
     }
@@ -267,11 +320,20 @@ fn write_page(
         map.write_svg(folder.join("map.svg"))?;
     }
     let ay: Vec<f64> = moments.iter().map(|moment| moment.ay_mps2).collect();
+    let with = |corners: CornerLap<'static>, v_mps: &[f64], grip: &[f64]| {
+        let corners = corners.grip_used(grip);
+        match gears(driver_car, v_mps) {
+            Some(gear) => corners.gears(&gear),
+            None => corners,
+        }
+    };
     let driven = CornerLap::new("4DOF car and driver", &drive.station_m, &state(0), &ay, 1.0);
+    let driven = driven.map(|corners| with(corners, &state(0), &grip_used(limits, outcome, moments)));
     let ideal = outcome.point_mass.lap.as_ref().and_then(|lap| {
         let length = lap.station_m.len().min(lap.v_mps.len());
         let stations = &lap.station_m[..length];
-        CornerLap::new("quasi-steady-state lap", stations, &lap.v_mps, &lap.ay_mps2, 1.0)
+        let corners = CornerLap::new("quasi-steady-state lap", stations, &lap.v_mps, &lap.ay_mps2, 1.0)?;
+        Some(with(corners, &lap.v_mps, &lap.grip_used(limits)))
     });
     page.corners(&driven.into_iter().chain(ideal).collect::<Vec<_>>(), &[])?;
     if !summary.corners.is_empty() {

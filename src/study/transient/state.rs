@@ -64,7 +64,7 @@ impl Checkpoint for DriveState {
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub enum TransientState {
     /// Of one line alone.
-    Line(DriveState),
+    Line(Box<DriveState>),
     /// Of a population.
     Population(Journal),
 }
@@ -81,7 +81,7 @@ impl TransientState {
 
     pub(super) fn line(self) -> Result<DriveState> {
         match self {
-            Self::Line(state) => Ok(state),
+            Self::Line(state) => Ok(*state),
             Self::Population(_) => Self::foreign(),
         }
     }
@@ -99,7 +99,7 @@ impl State<TransientSettings> for TransientState {
 
     fn load(file: &Path) -> Result<Self> {
         match checkpoint::load(file) {
-            Ok(state) => Ok(Self::Line(state)),
+            Ok(state) => Ok(Self::Line(Box::new(state))),
             Err(_) => checkpoint::load(file).map(Self::Population),
         }
     }

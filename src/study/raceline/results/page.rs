@@ -206,7 +206,12 @@ fn corners(page: &mut HtmlReport, setup: &Setup, lines: &[&ReportedLine]) -> Res
     let laps = lines.iter().filter_map(|line| {
         let (fine, lap) = (&line.fine, line.fine.lap.as_ref()?);
         let stretch = setup.road.length_m / fine.length_m;
-        CornerLap::new(&line.name, &fine.station_m, &lap.v_mps, &lap.ay_mps2, stretch)
+        let corners = CornerLap::new(&line.name, &fine.station_m, &lap.v_mps, &lap.ay_mps2, stretch)?;
+        let corners = corners.grip_used(&lap.grip_used(&setup.car));
+        Some(match setup.gears(&lap.v_mps) {
+            Some(gear) => corners.gears(&gear),
+            None => corners,
+        })
     });
     let sections = setup.road.sections.iter();
     let sections: Vec<_> = sections.map(|s| (s.name.clone(), s.start_m, s.end_m)).collect();
