@@ -46,6 +46,47 @@ pub fn write_new(path: impl AsRef<Path>, contents: &[u8]) -> Result<()> {
     })
 }
 
+/// Writes several files into a folder, all or none: `write` gets a folder within it, whose files take their places in the end. Folders
+/// that are not there yet are made.
+///
+/// # Errors
+/// [`Error::Input`] if a file stands in the folder's place; [`Error::Io`] when the folder cannot be made or written to; those of
+/// `write`.
+pub fn write_together(folder: &Path, write: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
+    if folder.is_file() {
+        let expected = "a folder, or a new name for one";
+        return Err(Error::input(folder, "the folder", "a file", expected));
+    }
+    let made = run_folder::missing(folder);
+    let staged = folder.join(format!(".lapswarm-{}.tmp", std::process::id()));
+    let placed = fs::create_dir_all(&staged)
+        .map_err(|e| Error::io(folder, "create", e))
+        .and_then(|()| write(&staged))
+        .and_then(|()| {
+            let failed = |e| Error::io(folder, "write", e);
+            for entry in fs::read_dir(&staged).map_err(failed)? {
+                let entry = entry.map_err(failed)?;
+                let path = folder.join(entry.file_name());
+                fs::rename(entry.path(), &path).map_err(|e| Error::io(path, "write", e))?;
+            }
+            Ok(())
+        });
+    // The first failure is the one to report.
+    let _ = fs::remove_dir_all(&staged);
+    if placed.is_err() {
+        run_folder::remove_empty(&made);
+    }
+    sync_folder(folder);
+    placed.map_err(|error| match error {
+        // Named as it was to be.
+        Error::Io { path, action, source } if path.starts_with(&staged) => {
+            let name = path.file_name().map(|name| folder.join(name));
+            Error::io(name.unwrap_or(path), action, source)
+        }
+        error => error,
+    })
+}
+
 /// Makes sure that the names in a folder are on the disk.
 pub fn sync_folder(folder: &Path) {
     // Not every system lets a folder be opened; there a move is as safe as it gets.
@@ -162,6 +203,32 @@ mod tests {
         assert!(matches!(error, Error::Io { action: "write", .. }), "{error}");
         assert_eq!(names(folder.path()), ["taken"]);
         assert!(write_whole(folder.path().join("none/file"), b"text").is_err());
+    }
+
+    #[test]
+    fn files_are_written_together_or_not_at_all() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let new = folder.path().join("a/b");
+        let failed = write_together(&new, |within| {
+            write_whole(within.join("one"), b"1")?;
+            write_whole(within.join("none/two"), b"2")
+        });
+        let told = failed.expect_err("no such folder").to_string();
+        assert!(told.contains("a/b/two"), "{told}");
+        assert_eq!(names(folder.path()), [""; 0]);
+        for contents in ["1", "2"] {
+            write_together(&new, |within| {
+                write_whole(within.join("one"), contents.as_bytes())
+            })
+            .expect("written");
+            assert_eq!(fs::read_to_string(new.join("one")).expect("a file"), contents);
+            assert_eq!(names(&new), ["one"]);
+        }
+        let within_a_file = new.join("one");
+        let told = write_together(&within_a_file, |_| Ok(())).expect_err("a file");
+        assert_eq!(told.exit_code(), 2);
+        assert!(write_together(&within_a_file.join("c"), |_| Ok(())).is_err());
+        assert_eq!(fs::read_to_string(&within_a_file).expect("a file"), "2");
     }
 
     #[test]

@@ -1,7 +1,9 @@
 //! `lapswarm check`: is this file what it should be?
 
 mod car;
+mod draw;
 mod log;
+mod tyres;
 
 use crate::cli::output::{errln, outln};
 use lapswarm::config::{Document, read_start, read_text};
@@ -19,13 +21,14 @@ use std::path::{Path, PathBuf};
 /// Flags of `check`.
 #[derive(clap::Args)]
 #[command(
-    after_help = "Examples:\n  lapswarm check car.toml lap.csv\n  lapswarm check outing.ld --write-map channels.toml\n  lapswarm check --kind track survey.csv"
+    after_help = "Examples:\n  lapswarm check car.toml lap.csv\n  lapswarm check outing.ld --write-map channels.toml\n  lapswarm check car.toml --draw pictures\n  lapswarm check soft.tir hard.tir --draw compared\n  lapswarm check --kind track survey.csv"
 )]
 pub struct Arguments {
     /// The files
     #[arg(required = true)]
     files: Vec<PathBuf>,
-    /// Draw cars into this folder: g-g-v envelope and steady-state cornering
+    /// Draw one car, or one or two tyres beside each other, into this folder: figures, tables and a page. What has their names
+    /// there is replaced
     #[arg(long, value_name = "DIR")]
     draw: Option<PathBuf>,
     /// Channel map of the logs
@@ -141,6 +144,11 @@ impl Kind {
         }
     }
 
+    /// Whether it is this kind of file.
+    fn is(self, wanted: &'static FileKind) -> bool {
+        matches!(self, Self::File(file) if std::ptr::eq(file, wanted))
+    }
+
     /// Reads a file as what it is, and says in a line what is in it.
     fn read(self, path: &Path) -> Result<String> {
         match self {
@@ -228,22 +236,21 @@ fn guess(path: &Path) -> Result<Kind> {
     })
 }
 
-/// Checks them all; the first that is wrong ends the program, once all have been told of.
+/// Checks them all; the first that is wrong ends the program, once all have been told of. What is right is drawn, where that is
+/// asked for.
 pub fn run(arguments: &Arguments) -> Result<()> {
+    let drawing = arguments.draw.as_deref();
+    let drawing = drawing.map(|folder| Ok((draw::Subject::of(&arguments.files, arguments.kind)?, folder)));
+    let drawing = drawing.transpose()?;
     let mut wrong: Option<Error> = None;
     for path in &arguments.files {
         let found = arguments.kind.map_or_else(|| guess(path), Ok).and_then(|kind| {
             // Whoever meant another kind sees why it is found wrong.
-            let is =
-                |wanted: &'static FileKind| matches!(kind, Kind::File(file) if std::ptr::eq(file, wanted));
-            let found = if is(&LOG) {
+            let found = if kind.is(&LOG) {
                 let (map, write) = (&arguments.channel_map, &arguments.write_map);
                 log::described(path, map.as_deref(), write.as_deref())
             } else {
-                kind.read(path).and_then(|text| match &arguments.draw {
-                    Some(folder) if is(&CAR) => Ok(format!("{text}\n{}", car::draw(path, folder)?)),
-                    _ => Ok(text),
-                })
+                kind.read(path)
             };
             found.inspect_err(|_| errln!("{}: read as {}", path.display(), kind.name()))
         });
@@ -253,5 +260,11 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             Err(error) => errln!("{error}"),
         }
     }
-    wrong.map_or(Ok(()), Err)
+    if let Some(error) = wrong {
+        return Err(error);
+    }
+    if let Some((subject, folder)) = drawing {
+        outln!("{}", subject.draw(folder)?);
+    }
+    Ok(())
 }

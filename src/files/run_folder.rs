@@ -153,14 +153,14 @@ fn holds_more_than(folder: &Path, names: &[&str]) -> bool {
 }
 
 /// Removes those of folders that are empty.
-fn remove_empty(folders: &[PathBuf]) {
+pub(super) fn remove_empty(folders: &[PathBuf]) {
     for folder in folders {
         let _ = std::fs::remove_dir(folder);
     }
 }
 
 /// The folder and those around it that are not there, the innermost first.
-fn missing(folder: &Path) -> Vec<PathBuf> {
+pub(super) fn missing(folder: &Path) -> Vec<PathBuf> {
     let around = folder.ancestors().filter(|path| !path.as_os_str().is_empty());
     around
         .take_while(|path| !path.exists())

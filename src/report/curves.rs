@@ -192,7 +192,19 @@ impl Figure for Curves {
                 let left = width * (index % columns) as f64 + 78.0;
                 let right = width * (index % columns + 1) as f64;
                 let top = TOP + PANEL.1 * (index / columns) as f64 + 34.0;
-                let bottom = TOP + PANEL.1 * (index / columns + 1) as f64 - 76.0;
+                let colour = |i: usize, curve: &Curve| curve.shade.map_or_else(|| series_colour(i), viridis);
+                let named = panel
+                    .curves
+                    .iter()
+                    .enumerate()
+                    .filter(|(_, c)| !c.label.is_empty());
+                let legend: Vec<_> = named
+                    .map(|(i, c)| (c.label.as_str(), colour(i, c), 2.0))
+                    .collect();
+                let lines = legend_rows(&legend, right - left + 60.0);
+                // A long legend takes its room from the plot, but never most of it.
+                let legend_px = (17.0 * lines.len().saturating_sub(1) as f64).min(120.0);
+                let bottom = TOP + PANEL.1 * (index / columns + 1) as f64 - 76.0 - legend_px;
                 let name = Type::new(LABEL_PX, INK, Align::Left).bold();
                 canvas.text(&panel.title, (left, top - 14.0), name);
                 let axis = |k: usize, range, margin, pixels| match (panel.scales[k], panel.y_range) {
@@ -213,7 +225,6 @@ impl Figure for Curves {
                         y_ticks: 7,
                     },
                 );
-                let colour = |i: usize, curve: &Curve| curve.shade.map_or_else(|| series_colour(i), viridis);
                 for (i, curve) in panel.curves.iter().enumerate() {
                     let all = curve.x.iter().copied().zip(curve.y.iter().copied());
                     let positive = |k: usize, v: f64| panel.scales[k] == Scale::Linear || v > 0.0;
@@ -239,16 +250,8 @@ impl Figure for Curves {
                         }
                     }
                 }
-                let named = panel
-                    .curves
-                    .iter()
-                    .enumerate()
-                    .filter(|(_, c)| !c.label.is_empty());
-                let legend: Vec<_> = named
-                    .map(|(i, c)| (c.label.as_str(), colour(i, c), 2.0))
-                    .collect();
                 // Below the axis: the head of a panel is its title's.
-                for (row, entries) in legend_rows(&legend, right - left + 60.0).into_iter().enumerate() {
+                for (row, entries) in lines.into_iter().enumerate() {
                     draw_legend(canvas, entries, right, bottom + 54.0 + 17.0 * row as f64);
                 }
             }
@@ -278,6 +281,7 @@ impl Figure for Curves {
                 "y_label": panel.y_label,
                 "x_scale": panel.scales[0],
                 "y_scale": panel.scales[1],
+                "y_range": panel.y_range,
                 "curves": curves.collect::<Vec<_>>(),
             });
             page.chart(&panel.title, "", chart);

@@ -199,6 +199,29 @@ fn curves_show_every_run() {
     assert!(draw(&[panel().curve("one", &[0.0], &[0.5])]).is_ok());
 }
 
+/// A legend of three lines takes their room from the plot: no word of it lies beyond the picture's edge, which is 472 px high.
+#[test]
+fn a_long_legend_stays_within_the_picture() {
+    let names = (0..9).map(|k| format!("a curve with a long name, number {k}"));
+    let panel = Panel::new("many").x("x", "m").y("y", "N");
+    let panel = names.fold(panel, |panel, name| panel.curve(name, &[0.0, 1.0], &[0.0, 1.0]));
+    let figure = Curves::new("Legend", [panel.clone(), panel]);
+    let svg = drawn("legend", |p| figure.write_svg(p)).expect("drawn");
+    assert!(svg.contains("height=\"472\""), "{}", &svg[..300]);
+    let heights = svg.split("<text ").skip(1).map(|text| {
+        let (_, from) = text.split_once(" y=\"").expect("a place");
+        from.split('"')
+            .next()
+            .expect("a number")
+            .parse::<f64>()
+            .expect("a number")
+            / 10.0
+    });
+    // Half of the type's height lies below the middle of a line.
+    let lowest = heights.fold(0.0, f64::max);
+    assert!((440.0..466.0).contains(&lowest), "{lowest}");
+}
+
 #[test]
 fn pareto_marks_the_choice() {
     let names = [("lap time", "s"), ("fuel", "l"), ("tyre energy", "MJ")];

@@ -3,10 +3,11 @@
 use super::chassis::Chassis;
 use super::facts::CarFacts;
 use super::hybrid::Hybrid;
+use super::model::CarModel;
 use super::parameters::ParameterInfo;
 use super::powertrain::Powertrain;
 use super::reached::Reached;
-use super::tyre::{LinearTyre, TyreCoefficients, TyreFile, TyreModel};
+use super::tyre::{AxleTyre, LinearTyre, MagicFormula, TyreCoefficients, TyreFile, TyreModel};
 use crate::config::settings::Settings;
 use crate::config::{Document, Table, folder_of, read_text};
 use crate::error::{Error, Result};
@@ -286,6 +287,21 @@ impl Car {
         match self.tyres {
             Tyres::MagicFormula { .. } => TyreModel::MagicFormula,
             Tyres::Linear { .. } => TyreModel::Linear,
+        }
+    }
+
+    /// The left tyres of the front and the rear axle, with their camber.
+    pub fn axle_tyres(&self) -> [AxleTyre; 2] {
+        let flat = self.to_flat();
+        match self.tyre_model() {
+            TyreModel::MagicFormula => {
+                let car = CarModel::<f64, MagicFormula<f64>>::from_parameters(|slot| flat[slot]);
+                car.tyres.map(|tyre| AxleTyre::MagicFormula(Box::new(tyre), 1.0))
+            }
+            TyreModel::Linear => {
+                let car = CarModel::<f64, LinearTyre<f64>>::from_parameters(|slot| flat[slot]);
+                car.tyres.map(AxleTyre::Linear)
+            }
         }
     }
 

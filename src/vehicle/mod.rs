@@ -4,6 +4,7 @@
 //! RR. Units are SI unless a name says otherwise.
 
 pub mod aero;
+pub mod brakes;
 pub mod car;
 pub mod chassis;
 pub mod envelope;

@@ -341,7 +341,7 @@ impl<T: Tyre<f64>, D: Tyre<Exact>> Ready<T, D> {
 
 /// The argument between `low` and `high` where `f` is greatest, to a ten-thousandth of the range: the best of an
 /// even scan, narrowed by golden sections.
-fn greatest(low: f64, high: f64, f: impl Fn(f64) -> f64) -> f64 {
+pub(super) fn greatest(low: f64, high: f64, f: impl Fn(f64) -> f64) -> f64 {
     const SCAN: usize = 24;
     const GOLDEN: f64 = 0.618_033_988_749_894_9;
     let step = (high - low) / SCAN as f64;
@@ -372,7 +372,7 @@ fn peak_of([(a, low), (b, top), (c, high)]: [(f64, f64); 3]) -> f64 {
 }
 
 /// Greatest slip ratio in the search for the limits.
-const GREATEST_SLIP: f64 = 0.4;
+pub(super) const GREATEST_SLIP: f64 = 0.4;
 
 impl<T: Tyre<f64>, D: Tyre<Exact>> SteadyCar for Ready<T, D> {
     fn cornering(&self, speed: f64, greatest_steer: f64, turn: Turn) -> Vec<Trim> {

@@ -140,7 +140,7 @@ fn a_car_is_made_of_what_is_known_and_compared_with_it() {
         );
     }
     assert!(told.contains("understeer gradient"), "{told}");
-    let picture = std::fs::read_to_string(folder.path().join("drawn/kart.svg")).expect("a picture");
+    let picture = std::fs::read_to_string(folder.path().join("drawn/envelope.svg")).expect("a picture");
     assert!(picture.contains("<svg") && picture.contains("polyline"));
     let run = [
         "envelope",

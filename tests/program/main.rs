@@ -8,6 +8,7 @@ mod cli;
 mod examples;
 mod messages;
 mod paths;
+mod pictures;
 
 /// A bench of a kind, run to its end.
 fn bench(kind: &str, arguments: &[&str]) -> std::process::Output {

@@ -64,6 +64,16 @@ fn no_text_from_a_file_becomes_markup() {
 }
 
 #[test]
+fn a_page_shows_the_range_that_a_picture_shows() {
+    let mut page = HtmlReport::new("check", "range");
+    let panel = Panel::new("range").curve("", &[0.0, 1.0], &[2.0, 3.0]);
+    page.place(&Curves::new("", [panel.clone(), panel.shown(-1.0, 4.0)]))
+        .unwrap();
+    assert_eq!(page.charts[0]["y_range"], serde_json::Value::Null);
+    assert_eq!(page.charts[1]["y_range"], serde_json::json!([-1.0, 4.0]));
+}
+
+#[test]
 fn the_page_is_whole_small_and_asks_for_nothing() {
     let mut page = HtmlReport::new("identify", "long lap");
     let n = 14_000;

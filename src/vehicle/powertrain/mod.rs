@@ -171,15 +171,35 @@ impl Powertrain {
         }
     }
 
+    /// Engine turns per wheel turn in a gear, by its place in [`Powertrain::gear_ratios`].
+    fn ratio(&self, gear: usize) -> f64 {
+        self.gear_ratios[gear] * self.final_drive
+    }
+
+    /// Engine speed (rpm) in a gear at road speed `speed` (m/s) on wheels of this rolling radius (m).
+    pub fn engine_speed_in(&self, gear: usize, speed: f64, wheel_radius: f64) -> f64 {
+        speed / wheel_radius * 60.0 / TAU * self.ratio(gear)
+    }
+
+    /// Road speed (m/s) in a gear at an engine speed (rpm) on wheels of this rolling radius (m).
+    pub fn road_speed_in(&self, gear: usize, engine_speed_rpm: f64, wheel_radius: f64) -> f64 {
+        engine_speed_rpm * TAU / 60.0 * wheel_radius / self.ratio(gear)
+    }
+
+    /// Force at the wheels (N) at full throttle in a gear at road speed `speed` (m/s) on wheels of this rolling radius (m); zero
+    /// beyond the last engine speed.
+    pub fn force_in(&self, gear: usize, speed: f64, wheel_radius: f64) -> f64 {
+        let torque = self.torque_at(self.engine_speed_in(gear, speed, wheel_radius));
+        torque * self.ratio(gear) * self.efficiency / wheel_radius
+    }
+
     /// The gear with the greatest force at road speed `speed` (m/s), the lowest one of equals. `None` above the speed that the
     /// engine reaches in top gear.
     pub fn gear(&self, speed: f64, wheel_radius: f64) -> Option<Gear> {
-        let wheel_rpm = speed / wheel_radius * 60.0 / TAU;
         let mut best: Option<Gear> = None;
-        for (index, gear) in self.gear_ratios.iter().enumerate() {
-            let ratio = gear * self.final_drive;
-            let engine_speed_rpm = wheel_rpm * ratio;
-            let force_n = self.torque_at(engine_speed_rpm) * ratio * self.efficiency / wheel_radius;
+        for index in 0..self.gear_ratios.len() {
+            let engine_speed_rpm = self.engine_speed_in(index, speed, wheel_radius);
+            let force_n = self.force_in(index, speed, wheel_radius);
             if force_n > best.map_or(0.0, |b| b.force_n) {
                 best = Some(Gear {
                     index,
@@ -199,14 +219,10 @@ impl Powertrain {
     /// Road speeds (m/s) from which the next gear gives more force, one fewer than gears. `None` where it never does.
     pub fn shift_points_mps(&self, wheel_radius: f64) -> Vec<Option<f64>> {
         let top_rpm = self.engine_speed_rpm[self.engine_speed_rpm.len() - 1];
-        let force = |gear: usize, speed: f64| {
-            let ratio = self.gear_ratios[gear] * self.final_drive;
-            self.torque_at(speed / wheel_radius * 60.0 / TAU * ratio) * ratio
-        };
+        let force = |gear, speed| self.force_in(gear, speed, wheel_radius);
         (1..self.gear_ratios.len())
             .map(|next| {
-                let end =
-                    top_rpm * TAU / 60.0 * wheel_radius / (self.gear_ratios[next - 1] * self.final_drive);
+                let end = self.road_speed_in(next - 1, top_rpm, wheel_radius);
                 // Above its last speed a gear gives no force, so the next one takes over there at the latest.
                 const STEPS: usize = 2000;
                 (1..=STEPS + 1)

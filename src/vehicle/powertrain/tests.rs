@@ -6,6 +6,20 @@ fn powertrain() -> (Powertrain, f64) {
     (car.powertrain.unwrap(), car.chassis.radius_rear)
 }
 
+/// Third gear turns 2.15 x 3.2 = 6.88 times: 6000 rpm are 100 Hz, so that the wheel turns 14.5349 times a second, 2.04204 m each. The
+/// 417 N m of that engine speed push with 417 x 6.88 x 0.95 / 0.325 N.
+#[test]
+fn a_gears_speed_and_force_by_hand() {
+    let car = Car::bundled().unwrap();
+    let (powertrain, radius) = (car.powertrain.unwrap(), car.chassis.radius_rear);
+    let speed = powertrain.road_speed_in(2, 6000.0, radius);
+    assert!((speed / 29.6808 - 1.0).abs() < 1e-5, "{speed}");
+    assert!((powertrain.engine_speed_in(2, speed, radius) - 6000.0).abs() < 1e-9);
+    let force = powertrain.force_in(2, speed, radius);
+    assert!((force / 8386.2 - 1.0).abs() < 1e-5, "{force}");
+    assert_eq!(powertrain.force_in(2, 1.5 * speed, radius), 0.0);
+}
+
 #[test]
 fn formula_ones_fuel_flow() {
     // 0.009 x 8000 + 5.5 by hand, and 100 from 10500 rpm on, where both agree.

@@ -1,6 +1,7 @@
 //! Tyres: the Magic Formula 5.2 with combined slip, and a linear tyre as the simplest alternative.
 
 mod coefficients;
+mod curves;
 mod linear;
 mod magic_formula;
 mod prepared;
@@ -8,6 +9,7 @@ mod tir;
 mod well_formed;
 
 pub use coefficients::TyreCoefficients;
+pub use curves::{AxleTyre, PeakFriction};
 pub use linear::LinearTyre;
 pub use prepared::MagicFormula;
 pub use tir::TyreFile;

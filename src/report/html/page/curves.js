@@ -26,7 +26,12 @@ draw.curves = (place, data) => {
   const option = () => ({
     grid: { left: 74, right: 20, top: 26, bottom: labels.length ? 74 : 46 },
     xAxis: axis(data.x_label, { type: data.x_scale === "log" ? "log" : "value" }),
-    yAxis: axis(data.y_label, { type: data.y_scale === "log" ? "log" : "value", nameGap: 52 }),
+    yAxis: axis(data.y_label, {
+      type: data.y_scale === "log" ? "log" : "value",
+      nameGap: 52,
+      min: data.y_range?.[0],
+      max: data.y_range?.[1],
+    }),
     legend: legend(
       labels.map((name) => ({ name, icon: "roundRect", itemStyle: { opacity: 1 } })),
       { itemHeight: 4 },

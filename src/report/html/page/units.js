@@ -44,7 +44,9 @@ function curvesInEngineers(data) {
   for (const axis of ["x", "y"]) {
     const [label, factor] = relabelled(data[`${axis}_label`]);
     data[`${axis}_label`] = label;
-    if (factor !== 1) for (const curve of data.curves) curve[axis] = scaled(curve[axis], factor);
+    if (factor === 1) continue;
+    for (const curve of data.curves) curve[axis] = scaled(curve[axis], factor);
+    if (axis === "y" && data.y_range) data.y_range = scaled(data.y_range, factor);
   }
 }
 
