@@ -310,6 +310,14 @@ impl Envelope {
         &self.name
     }
 
+    /// All its figures, with the DRS shut and, of a car that has one, open: what laps within it depend on, whatever it is called.
+    pub fn figures(&self) -> Vec<(&[EnvelopeRow], Option<&BendTraction>)> {
+        let states = std::iter::once(self).chain(self.open());
+        states
+            .map(|state| (state.rows(), state.bend_traction()))
+            .collect()
+    }
+
     /// The rows, by rising speed.
     pub fn rows(&self) -> &[EnvelopeRow] {
         &self.rows

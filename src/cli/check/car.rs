@@ -202,7 +202,9 @@ fn gears(powertrain: &Powertrain, radius: f64) -> Chart {
             )
         })
         .collect();
-    let about = if told.is_empty() {
+    let about = if powertrain.gear_ratios.len() == 1 {
+        "The car has one gear.".to_owned()
+    } else if told.is_empty() {
         "No gear gives more force than the one before it.".to_owned()
     } else {
         format!(
@@ -211,11 +213,10 @@ fn gears(powertrain: &Powertrain, radius: f64) -> Chart {
         )
     };
     lines.push(Line::new("at full throttle", Look::Own, way));
-    lines.push(Line::new(
-        "shift points",
-        Look::Dots,
-        shifts.into_iter().step_by(2),
-    ));
+    if !shifts.is_empty() {
+        let points = shifts.into_iter().step_by(2);
+        lines.push(Line::new("shift points", Look::Dots, points));
+    }
     Chart {
         file: "gears",
         title: "Gears",

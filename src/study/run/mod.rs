@@ -280,7 +280,7 @@ fn run_stages(
             envelope: None,
             ..line.clone()
         };
-        let inputs = (alike, &road.cross_sections, &road.car.envelope);
+        let inputs = (alike, &road.cross_sections, road.car.envelope.figures());
         let stage = (1 + 2 * round, format!("line {round}"));
         let (at, found) = going.stage::<Raceline>(stage, &inputs, &line, &road)?;
         let line_path = at.join("line_fastest.csv");
@@ -307,7 +307,7 @@ fn run_stages(
         let inputs = (
             &car,
             drive.car_width_m,
-            &whole,
+            whole.figures(),
             &road.edges_m,
             &line.points_m,
             &line.circuit.drs_zones_m,
@@ -341,7 +341,12 @@ fn run_stages(
         let line = deployed.line.as_deref().map(read_line).transpose()?;
         let within = deployed.envelope.as_deref().map(Envelope::load).transpose()?;
         let place = (&deployed.backend, &deployed.adapter, deployed.seed);
-        let road = (line, within, &deployed.track, deployed.car_width_m);
+        let road = (
+            line,
+            within.as_ref().map(Envelope::figures),
+            &deployed.track,
+            deployed.car_width_m,
+        );
         let inputs = (&car, road, place);
         let prepared = Hybrid::prepare(&deployed)?;
         let stage = (3 + 2 * rounds.len(), "energy".to_owned());
