@@ -1,8 +1,8 @@
-#!/usr/bin/env bash
+#!/bin/sh
 # Builds the wheel, installs it into a clean virtual environment, and runs the tests, the docstrings, the examples and the type
 # checks there. Needs Python 3.11 or later with venv, and a package index. WHEEL names a wheel that is built already.
 # `test.sh ray` tests lapswarm.ray alone, on a cluster of several nodes on this machine.
-set -euo pipefail
+set -eu
 cd "$(dirname "$0")"
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
