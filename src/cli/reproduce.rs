@@ -29,7 +29,7 @@ pub struct Arguments {
     /// Where candidates are evaluated: auto, cpu, simd or gpu [default: auto]
     #[arg(long, value_name = "BACKEND", value_parser = backend_flag)]
     backend: Option<BackendChoice>,
-    /// Part of the name of the GPU to use
+    /// Part of the name of the GPU to use, or all for several
     #[arg(long, value_name = "NAME")]
     adapter: Option<String>,
     #[command(flatten)]

@@ -264,6 +264,13 @@ impl Worth {
 }
 
 impl Evaluation {
+    /// The candidates of `other` behind its own.
+    pub(crate) fn append(&mut self, other: Self) {
+        self.objectives.extend(other.objectives);
+        self.failures.extend(other.failures);
+        self.violations.extend(other.violations);
+    }
+
     /// Checks that this is of so many candidates and objectives.
     ///
     /// # Errors

@@ -99,10 +99,7 @@ impl<E: Evaluator> Evaluator for Portions<E> {
         }
         let mut whole = Evaluation::default();
         for candidates in population.chunks(portion) {
-            let part = self.evaluator.evaluate(candidates)?;
-            whole.objectives.extend(part.objectives);
-            whole.failures.extend(part.failures);
-            whole.violations.extend(part.violations);
+            whole.append(self.evaluator.evaluate(candidates)?);
         }
         Ok(whole)
     }

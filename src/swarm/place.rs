@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 /// Where the particles of a swarm of several objectives live. On a device, neither candidates nor objectives cross the bus.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum SwarmPlace {
-    /// On the device from [`MANY`] particles on, where the backend is a GPU that has room for them; else on the host.
+    /// On the device from [`MANY`] particles on, where the backend is one GPU that has room for them; else on the host.
     #[default]
     Auto,
     /// On the host.
@@ -35,6 +35,7 @@ impl SwarmPlace {
         objectives: usize,
     ) -> Result<bool> {
         let gpu = backend.decided(adapter) == BackendChoice::Gpu;
+        let one = !crate::evaluate::gpu::asks_for_all(adapter);
         let several = (2..=3).contains(&objectives);
         let refused = |found: String, expected: &str| {
             let found = format!("device, with {found}");
@@ -42,7 +43,7 @@ impl SwarmPlace {
         };
         match self {
             Self::Host => Ok(false),
-            Self::Auto => Ok(gpu && several && population >= MANY),
+            Self::Auto => Ok(gpu && one && several && population >= MANY),
             Self::Device if !several => {
                 let found = format!("{objectives} objectives");
                 refused(found, "two or three objectives, for a swarm on the device")
@@ -50,6 +51,10 @@ impl SwarmPlace {
             Self::Device if !gpu => refused(
                 "lanes or the reference to evaluate".to_owned(),
                 "the backend gpu, for a swarm on the device",
+            ),
+            Self::Device if !one => refused(
+                "all adapters to evaluate".to_owned(),
+                "one adapter, for a swarm on the device",
             ),
             Self::Device => Ok(true),
         }
@@ -117,6 +122,16 @@ mod tests {
         assert!(!on(SwarmPlace::Auto, BackendChoice::Simd, MANY, 2).expect("an answer"));
         assert!(!on(SwarmPlace::Host, gpu, MANY, 2).expect("an answer"));
         assert!(on(SwarmPlace::Device, gpu, 8, 2).expect("an answer"));
+        let all = Some("all");
+        let spread = SwarmPlace::Auto.on_device((gpu, all), MANY, 2);
+        assert!(!spread.expect("an answer"));
+        let refusal = SwarmPlace::Device.on_device((gpu, all), MANY, 2);
+        assert!(
+            refusal
+                .expect_err("one device")
+                .to_string()
+                .contains("one adapter")
+        );
         for (backend, objectives, reason) in [
             (gpu, 1, "two or three objectives"),
             (gpu, 4, "two or three objectives"),

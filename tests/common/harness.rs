@@ -11,6 +11,9 @@ use std::sync::OnceLock;
 /// Names the folder of data that belong to others and are not in the repository.
 const OUTSIDE: &str = "LAPSWARM_OUTSIDE";
 
+/// Names the file of SwiftShader for the Vulkan loader.
+const SWIFTSHADER: &str = "LAPSWARM_SWIFTSHADER";
+
 /// A test and what it needs.
 pub struct Case {
     name: String,
@@ -74,6 +77,16 @@ impl Case {
     /// Needs the compiler for AMD that the bars were measured with.
     pub fn radv(self) -> Self {
         self.needing(radv::with_bars)
+    }
+
+    /// Needs lavapipe, which the loader can be given twice.
+    pub fn two_software_devices(self) -> Self {
+        self.needing(|| radv::software_driver().map(drop))
+    }
+
+    /// Needs SwiftShader.
+    pub fn swiftshader(self) -> Self {
+        self.needing(|| swiftshader().map(drop))
     }
 
     /// Needs the survey of Silverstone.
@@ -171,6 +184,27 @@ pub fn outside(name: &str, source: &str) -> Result<PathBuf, String> {
 /// As [`outside`].
 pub fn survey() -> Result<PathBuf, String> {
     outside("Silverstone.csv", "the TUM race track database")
+}
+
+/// The file of SwiftShader, a driver on the processor that comes with Chromium, for the Vulkan loader.
+///
+/// # Errors
+/// How to make it known.
+pub fn swiftshader() -> Result<PathBuf, String> {
+    let asked = std::env::var_os(SWIFTSHADER).map(PathBuf::from);
+    let beside = [
+        "/usr/lib/chromium",
+        "/usr/lib/chromium-browser",
+        "/opt/google/chrome",
+    ];
+    let files = beside.map(|folder| PathBuf::from(folder).join("vk_swiftshader_icd.json"));
+    asked
+        .into_iter()
+        .chain(files)
+        .find(|file| file.is_file())
+        .ok_or_else(|| {
+            format!("no SwiftShader here: it comes with Chromium, or {SWIFTSHADER} names its file")
+        })
 }
 
 /// A browser that runs without a screen.

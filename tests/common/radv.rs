@@ -81,6 +81,22 @@ pub fn with_bars() -> Result<(), String> {
 /// # Errors
 /// That there is none.
 pub fn driver() -> Result<PathBuf, String> {
+    installed("radeon_icd")
+        .ok_or_else(|| "no RADV here (Mesa's driver for AMD; Debian package mesa-vulkan-drivers)".to_owned())
+}
+
+/// The file of lavapipe for the Vulkan loader.
+///
+/// # Errors
+/// That there is none.
+pub fn software_driver() -> Result<PathBuf, String> {
+    installed("lvp_icd").ok_or_else(|| {
+        "no lavapipe here (Mesa's driver on the processor; Debian package mesa-vulkan-drivers)".to_owned()
+    })
+}
+
+/// The file of a driver, by what its name begins with.
+fn installed(beginning: &str) -> Option<PathBuf> {
     let folders = [
         "/usr/share/vulkan/icd.d",
         "/etc/vulkan/icd.d",
@@ -88,12 +104,10 @@ pub fn driver() -> Result<PathBuf, String> {
     ];
     let files = folders.iter().filter_map(|folder| std::fs::read_dir(folder).ok());
     let mut files = files.flatten().flatten().map(|entry| entry.path());
-    files
-        .find(|path| {
-            let name = path.file_name().unwrap_or_default().to_string_lossy();
-            name.starts_with("radeon_icd") && name.contains(std::env::consts::ARCH)
-        })
-        .ok_or_else(|| "no RADV here (Mesa's driver for AMD; Debian package mesa-vulkan-drivers)".to_owned())
+    files.find(|path| {
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        name.starts_with(beginning) && name.contains(std::env::consts::ARCH)
+    })
 }
 
 /// What the compiler for `family` says of the kernels whose names contain one of `wanted`: of all where that is empty. The program

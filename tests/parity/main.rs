@@ -9,6 +9,7 @@ mod common;
 mod cutting;
 mod device;
 mod drive;
+mod drivers;
 mod elementary;
 mod energy;
 mod lap;
@@ -27,6 +28,7 @@ fn main() -> std::process::ExitCode {
     common::harness::main([
         cutting::tests(),
         drive::tests(),
+        drivers::tests(),
         elementary::tests(),
         energy::tests(),
         lap::tests(),

@@ -50,7 +50,7 @@ pub struct Arguments {
     /// What evaluates
     #[arg(long, value_parser = backend_flag, default_value = "auto")]
     backend: BackendChoice,
-    /// Part of the name of the GPU to use
+    /// Part of the name of the GPU to use, or all for several
     #[arg(long)]
     adapter: Option<String>,
     /// Draw hypervolume against time into this SVG

@@ -6,6 +6,9 @@ use std::fmt;
 /// The environment variable that names an adapter if no flag does.
 pub const ADAPTER_VARIABLE: &str = "LAPSWARM_ADAPTER";
 
+/// Asks for all adapters of the best kind that is present, instead of one.
+pub const ALL_ADAPTERS: &str = "all";
+
 /// Kinds of devices, best first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum DeviceKind {
@@ -154,10 +157,8 @@ pub fn devices() -> Vec<DeviceSummary> {
 /// # Errors
 /// [`Error::NoDevice`] if no adapter fits, listing the adapters.
 pub(super) fn choose(name: Option<&str>) -> Result<(wgpu::Adapter, DeviceSummary)> {
-    let from_environment = std::env::var(ADAPTER_VARIABLE)
-        .ok()
-        .filter(|x| !x.trim().is_empty());
-    let wanted = name.or(from_environment.as_deref()).map(str::trim);
+    let wanted = wanted(name);
+    let wanted = wanted.as_deref();
     let adapters = enumerate();
     let present: Vec<DeviceSummary> = adapters.iter().map(|(_, summary)| summary.clone()).collect();
     let place = pick(&present, wanted)?;
@@ -165,6 +166,34 @@ pub(super) fn choose(name: Option<&str>) -> Result<(wgpu::Adapter, DeviceSummary
         .into_iter()
         .nth(place)
         .ok_or_else(|| Error::NoDevice("the adapter is gone".to_owned()))
+}
+
+/// What is asked for, by name or by [`ADAPTER_VARIABLE`].
+fn wanted(name: Option<&str>) -> Option<String> {
+    let from_environment = || {
+        std::env::var(ADAPTER_VARIABLE)
+            .ok()
+            .filter(|x| !x.trim().is_empty())
+    };
+    let wanted = name.map(str::to_owned).or_else(from_environment)?;
+    Some(wanted.trim().to_owned())
+}
+
+/// Whether all adapters are asked for.
+pub fn asks_for_all(name: Option<&str>) -> bool {
+    wanted(name).is_some_and(|x| x.eq_ignore_ascii_case(ALL_ADAPTERS))
+}
+
+/// What [`choose`] knows each adapter of the best kind by.
+pub(super) fn names_of_all() -> Vec<String> {
+    numbered_alike(&devices())
+}
+
+/// The numbers of those in `present` (best first) that are of the first one's kind. A population goes to its adapters in equal
+/// shares, which the slowest of another kind would hold up.
+fn numbered_alike(present: &[DeviceSummary]) -> Vec<String> {
+    let alike = present.iter().take_while(|other| other.kind == present[0].kind);
+    (1..=alike.count()).map(|number| format!("#{number}")).collect()
 }
 
 /// The place in `present` (best first) of the adapter that `wanted` names.
@@ -177,6 +206,11 @@ fn pick(present: &[DeviceSummary], wanted: Option<&str>) -> Result<usize> {
         ));
     }
     let Some(wanted) = wanted else { return Ok(0) };
+    if wanted.eq_ignore_ascii_case(ALL_ADAPTERS) {
+        return Err(Error::NoDevice(format!(
+            "adapter {ALL_ADAPTERS} spreads populations over several devices, and this works on one: name one of them"
+        )));
+    }
     let numbered = wanted
         .rsplit_once('#')
         .and_then(|(name, number)| Some((name, number.parse().ok()?)));
@@ -273,6 +307,20 @@ mod tests {
                 .expect_err("no such adapter");
             assert!(message.contains(told), "{message}");
         }
+    }
+
+    #[test]
+    fn all_adapters_are_those_of_the_best_kind() {
+        let present = [
+            summary("NVIDIA H200", DeviceKind::Discrete),
+            summary("Radeon Pro", DeviceKind::Discrete),
+            summary("llvmpipe", DeviceKind::Software),
+        ];
+        assert_eq!(numbered_alike(&present), ["#1", "#2"]);
+        assert_eq!(numbered_alike(&present[2..]), ["#1"]);
+        assert!(numbered_alike(&[]).is_empty());
+        let refused = pick(&present, Some("All")).map_err(|e| e.to_string());
+        assert!(refused.expect_err("one is wanted").contains("name one of them"));
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! Kinds of problems on a device, and the evaluator that follows.
 
+use super::spread::{Spread, joined};
 use super::{Batching, FallbackEvaluator, GpuContext, devices};
 use crate::error::{Error, Result};
 use crate::evaluate::problem_kind::{Checked, candidates, evaluation};
@@ -10,7 +11,7 @@ use std::sync::{Arc, OnceLock};
 /// A kind of problem that devices evaluate.
 pub trait OnDevice: ProblemKind {
     /// The kernel on a device, with its tables and buffers.
-    type Device: DeviceKernel<Self>;
+    type Device: DeviceKernel<Self> + Send;
 }
 
 /// The kernel of a kind of problem on a device.
@@ -147,12 +148,13 @@ pub(in crate::evaluate) fn is_real() -> bool {
     *PRESENT.get_or_init(|| devices().iter().any(|d| d.kind.is_real()))
 }
 
-/// The device that would evaluate. It is opened, nothing is compiled.
+/// The device that would evaluate, or the devices. They are opened, nothing is compiled.
 pub(in crate::evaluate) fn would_be(adapter: Option<&str>) -> Result<BackendInfo> {
-    Ok(GpuContext::shared(adapter)?.backend_info())
+    let contexts = GpuContext::all_shared(adapter)?;
+    Ok(joined(contexts.iter().map(|c| c.backend_info())))
 }
 
-/// An evaluator of `kind` on a device, which `lanes` take over from.
+/// An evaluator of `kind` on a device or on several, which `lanes` take over from.
 pub(in crate::evaluate) fn open<'a, K: OnDevice>(
     kind: &'a K,
     (choice, adapter): (BackendChoice, Option<&str>),
@@ -160,8 +162,13 @@ pub(in crate::evaluate) fn open<'a, K: OnDevice>(
 ) -> Result<Box<dyn Evaluator + 'a>> {
     let name = adapter.map(str::to_owned);
     let open = move || -> Result<Box<dyn Evaluator + 'a>> {
-        let context = GpuContext::shared(name.as_deref())?;
-        Ok(Box::new(GpuBackend::new(kind, context)?))
+        let contexts = GpuContext::all_shared(name.as_deref())?;
+        let opened = contexts.into_iter().map(|context| GpuBackend::new(kind, context));
+        let mut devices: Vec<_> = opened.collect::<Result<_>>()?;
+        match devices.pop() {
+            Some(only) if devices.is_empty() => Ok(Box::new(only)),
+            last => Ok(Box::new(Spread::new(devices.into_iter().chain(last))?)),
+        }
     };
     let evaluator = FallbackEvaluator::new(kind.problem(), (choice, adapter), open, lanes)?;
     Ok(Box::new(evaluator))

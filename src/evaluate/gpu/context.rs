@@ -3,7 +3,7 @@
 //! No error of wgpu reaches the user as a panic. Allocation and compilation run inside error scopes; handlers keep errors that
 //! occur outside them and return them as [`Error::Device`] at the next check.
 
-use super::adapter::{DeviceKind, DeviceSummary, choose};
+use super::adapter::{DeviceKind, DeviceSummary, asks_for_all, choose, names_of_all};
 use super::faults::{self, Fault, Place};
 use super::lint;
 use super::shader::WheelOrder;
@@ -66,8 +66,11 @@ fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// The device that the process has open, if any, with what it was asked for by.
-static SHARED: Mutex<Option<(Option<String>, Arc<GpuContext>)>> = Mutex::new(None);
+/// A device that the process has open, with what it was asked for by.
+type Opened = (Option<String>, Arc<GpuContext>);
+
+/// The devices that the process has open: one, or those that were asked for together.
+static SHARED: Mutex<Vec<Opened>> = Mutex::new(Vec::new());
 
 /// What the devices that the process has opened were asked for by.
 static OPENED: Mutex<Vec<Option<String>>> = Mutex::new(Vec::new());
@@ -79,22 +82,64 @@ impl GpuContext {
     /// # Errors
     /// [`Error::NoDevice`] if no device has that name, [`Error::Device`] if it does not open.
     pub fn shared(name: Option<&str>) -> Result<Arc<Self>> {
+        let context = Self::open_in(&mut locked(&SHARED), name)?;
+        Self::note_open(name);
+        Ok(context)
+    }
+
+    /// The process's devices that `name` chooses: as [`GpuContext::shared`], but with [`super::ALL_ADAPTERS`] every adapter of the
+    /// best kind.
+    ///
+    /// # Errors
+    /// As [`GpuContext::shared`].
+    pub fn all_shared(name: Option<&str>) -> Result<Vec<Arc<Self>>> {
+        if !asks_for_all(name) {
+            return Ok(vec![Self::shared(name)?]);
+        }
+        let names = names_of_all();
+        if names.is_empty() {
+            // Says what is missing.
+            return Ok(vec![Self::shared(name)?]);
+        }
         let mut shared = locked(&SHARED);
-        if let Some((asked, context)) = shared.as_ref() {
-            let meant = name.is_none_or(|n| asked.as_deref() == Some(n) || context.summary.is_called(n));
-            if meant && context.check().is_ok() {
-                return Ok(Arc::clone(context));
+        shared.retain(|(asked, _)| asked.as_ref().is_some_and(|asked| names.contains(asked)));
+        let open = |name: &String| {
+            // Each by itself, or one would take the place of the one before.
+            let mut own = Vec::new();
+            if let Some(place) = shared.iter().position(|(asked, _)| asked.as_ref() == Some(name)) {
+                own.push(shared.swap_remove(place));
             }
+            let context = Self::open_in(&mut own, Some(name))?;
+            Ok((own, context))
+        };
+        let opened: Vec<_> = names.iter().map(open).collect::<Result<_>>()?;
+        let (own, contexts): (Vec<_>, Vec<_>) = opened.into_iter().unzip();
+        *shared = own.into_iter().flatten().collect();
+        Self::note_open(name);
+        Ok(contexts)
+    }
+
+    /// The one of `shared` that `name` means and that works; else a new one, which takes their place.
+    fn open_in(shared: &mut Vec<Opened>, name: Option<&str>) -> Result<Arc<Self>> {
+        let meant = |(asked, context): &&Opened| {
+            name.is_none_or(|n| asked.as_deref() == Some(n) || context.summary.is_called(n))
+                && context.check().is_ok()
+        };
+        if let Some((_, context)) = shared.iter().find(meant) {
+            return Ok(Arc::clone(context));
         }
         // The old device closes first, unless an evaluator still holds it.
-        *shared = None;
+        shared.clear();
         let context = Arc::new(Self::open(name)?);
-        *shared = Some((name.map(str::to_owned), Arc::clone(&context)));
+        shared.push((name.map(str::to_owned), Arc::clone(&context)));
+        Ok(context)
+    }
+
+    fn note_open(name: Option<&str>) {
         let mut opened = locked(&OPENED);
         if !opened.iter().any(|known| known.as_deref() == name) {
             opened.push(name.map(str::to_owned));
         }
-        Ok(context)
     }
 
     /// Whether the process has opened a device that matches `name` before. If it is absent now, it has gone.
@@ -102,9 +147,9 @@ impl GpuContext {
         locked(&OPENED).iter().any(|known| known.as_deref() == name)
     }
 
-    /// Releases the process's device; the next call of [`GpuContext::shared`] opens a new one.
+    /// Releases the process's devices; the next call of [`GpuContext::shared`] opens a new one.
     pub fn forget() {
-        *locked(&SHARED) = None;
+        locked(&SHARED).clear();
     }
 
     /// A device of its own that is held to the least that every WebGPU device has: storage bindings of 128 MiB, 65535

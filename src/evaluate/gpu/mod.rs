@@ -8,11 +8,12 @@ pub mod faults;
 pub mod lint;
 mod pacing;
 pub mod shader;
+mod spread;
 #[cfg(feature = "vehicle")]
 mod trajectories;
 
 pub use super::dispatches::DispatchWatch;
-pub use adapter::{ADAPTER_VARIABLE, DeviceKind, DeviceSummary, devices};
+pub use adapter::{ADAPTER_VARIABLE, ALL_ADAPTERS, DeviceKind, DeviceSummary, asks_for_all, devices};
 pub use backend::{DeviceKernel, GpuBackend, OnDevice};
 pub(super) use backend::{is_real, open, would_be};
 pub use context::{Binding, GpuContext, Kernel};
@@ -20,6 +21,7 @@ pub use fallback::FallbackEvaluator;
 pub use pacing::Batching;
 #[cfg(feature = "vehicle")]
 pub(crate) use pacing::{LOOP_ROUNDS, LanePacing, rounds_of};
+pub use spread::Spread;
 #[cfg(feature = "vehicle")]
 pub use trajectories::TrajectoryStretch;
 #[cfg(feature = "vehicle")]

@@ -153,7 +153,7 @@ settings! {
         backend: BackendChoice ["-"] = BackendChoice::Auto, choice().place(),
             "Where candidates are evaluated";
         adapter: Option<String> ["-"] = None, optional(text()).place().example("\"llvmpipe\""),
-            "Part of the name of the GPU to use";
+            "Part of the name of the GPU to use, its place on the PCI bus, or all for several";
     }
 
     fn consistent(&self) -> Result<()> {

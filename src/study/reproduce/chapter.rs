@@ -123,7 +123,7 @@ pub enum Task {
 pub struct EvaluatedOn {
     /// The backend.
     pub backend: Option<BackendChoice>,
-    /// Part of the name of the GPU.
+    /// Part of the name of the GPU, or `all`.
     pub adapter: Option<String>,
 }
 

@@ -51,7 +51,10 @@ const LINKED: [(&str, &str); 6] = [
     ("car", "The car that fixed parameters come from"),
     ("track", "The circuit, for identification and line"),
     ("backend", "Where candidates are evaluated"),
-    ("adapter", "Part of the name of the GPU to use"),
+    (
+        "adapter",
+        "Part of the name of the GPU to use, its place on the PCI bus, or all for several",
+    ),
     ("seed", "Seed of all random numbers"),
 ];
 
