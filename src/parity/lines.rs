@@ -51,7 +51,7 @@ pub fn work_of(line: &LineProblem) -> u64 {
 /// on the lateral limit itself, what is left of the ellipse is the root of a difference that three roundings of 6e-8 can
 /// fill: `sqrt(2 * 1.8e-7)` or 6e-4 of the grip `g`. Half of `2 h` times that, over a corner's speed squared `g r`, is off by `h
 /// / r` times 6e-4, its root and so the time by half of that, in corners: 1.6e-4 at 16 m in bends of 30 m.
-pub fn line_tolerances(problem: &LineProblem, exact: &[f64]) -> [f64; 5] {
+pub fn line_tolerances(problem: &LineProblem, exact: &[f64]) -> [f64; LineObjective::ALL.len()] {
     let cross_sections = problem.cross_sections();
     let n = cross_sections.len() as f64;
     let middle = geometry(

@@ -30,39 +30,21 @@ pub trait Checkpoint: Serialize + DeserializeOwned {
     const KIND: &'static str;
 }
 
-macro_rules! checkpoints {
-    ($($state:ty: $kind:literal),* $(,)?) => {
-        $(impl Checkpoint for $state { const KIND: &'static str = $kind; })*
-    };
-}
-
 /// Reads the bytes of a checkpoint of an optimiser; the path is what errors call them.
 type Reader = fn(&[u8], &Path) -> Result<Box<dyn Optimiser + Send>>;
 
-macro_rules! readers {
-    ($($state:ty),* $(,)?) => {
-        [$((<$state>::KIND, |bytes, file| Ok(Box::new(from_bytes::<$state>(bytes, file)?)))),*]
+macro_rules! optimisers {
+    ($($state:ty: $kind:literal),* $(,)?) => {
+        $(impl Checkpoint for $state { const KIND: &'static str = $kind; })*
+
+        /// The optimisers, by the names of their states.
+        const READERS: &[(&str, Reader)] = &[
+            $(($kind, |bytes, file| Ok(Box::new(from_bytes::<$state>(bytes, file)?)))),*
+        ];
     };
 }
 
-/// The states that are optimisers.
-const READERS: [(&str, Reader); 13] = readers![
-    CooperativeSwarm,
-    CovarianceSwarm,
-    DifferenceSwarm,
-    HybridSwarm,
-    Moead,
-    Mopso,
-    Nsga2,
-    Nsga3,
-    Pso,
-    WindowSwarm,
-    Islands<Mopso>,
-    Islands<Pso>,
-    Islands<DifferenceSwarm>,
-];
-
-checkpoints! {
+optimisers! {
     CooperativeSwarm: "cooperative swarm",
     CovarianceSwarm: "covariance swarm",
     DifferenceSwarm: "difference swarm",

@@ -21,6 +21,9 @@ tests! {
     objectives_do_not_depend_on_each_other: also_device,
 }
 
+/// Objectives of a line.
+const COUNT: usize = LineObjective::ALL.len();
+
 /// The single-precision backends.
 fn backends(problem: &LineProblem) -> Vec<(String, Box<dyn Evaluator + '_>)> {
     let mut backends: Vec<(String, Box<dyn Evaluator>)> = Vec::new();
@@ -38,16 +41,16 @@ fn backends(problem: &LineProblem) -> Vec<(String, Box<dyn Evaluator + '_>)> {
 }
 
 /// Compares `found` with `f64` and hands back the largest relative error of each objective.
-fn compare(name: &str, problem: &LineProblem, population: &[f64], found: &Evaluation) -> [f64; 5] {
+fn compare(name: &str, problem: &LineProblem, population: &[f64], found: &Evaluation) -> [f64; COUNT] {
     let expected = CpuLineEvaluator::new(problem)
         .evaluate(population)
         .expect("it runs");
     assert_eq!(found.failures, expected.failures, "{name}");
-    let mut worst = [0.0f64; 5];
+    let mut worst = [0.0f64; COUNT];
     let rows = found
         .objectives
-        .chunks_exact(5)
-        .zip(expected.objectives.chunks_exact(5));
+        .chunks_exact(COUNT)
+        .zip(expected.objectives.chunks_exact(COUNT));
     for (line, (found, expected)) in rows.enumerate() {
         let tolerances = line_tolerances(problem, expected);
         for k in 0..5 {
@@ -131,7 +134,7 @@ fn circles_have_the_shape_of_their_polygons_on_every_backend() {
     backends.push(("cpu".to_owned(), Box::new(CpuLineEvaluator::new(&problem))));
     for (name, mut backend) in backends {
         let found = backend.evaluate(&population).expect("it runs");
-        for (row, radius) in found.objectives.chunks_exact(5).zip([600.0f64, 595.0, 590.0]) {
+        for (row, radius) in found.objectives.chunks_exact(COUNT).zip([600.0f64, 595.0, 590.0]) {
             let side = 2.0 * radius * (std::f64::consts::PI / 361.0).sin();
             let bend = side * side / (radius * spacing * spacing);
             let exact = [361.0 * side, 361.0 * side * side, 19.0 * bend];
@@ -163,8 +166,8 @@ fn lines_do_not_know_where_on_earth_they_are() {
         let there = there.evaluate(&population).expect("it runs");
         for (row, (a, b)) in here
             .objectives
-            .chunks_exact(5)
-            .zip(there.objectives.chunks_exact(5))
+            .chunks_exact(COUNT)
+            .zip(there.objectives.chunks_exact(COUNT))
             .enumerate()
         {
             for (k, tolerance) in line_tolerances(&near, a).into_iter().enumerate() {
@@ -192,14 +195,14 @@ fn a_line_costs_the_same_alone_and_among_others() {
     for (name, mut backend) in backends(&problem) {
         let together = backend.evaluate(&population).expect("it runs");
         assert_eq!(together.failures[7], Some(Failure::NotFinite));
-        assert_eq!(together.objectives[35..40], [FAILED_COST; 5]);
+        assert_eq!(together.objectives[7 * COUNT..8 * COUNT], [FAILED_COST; COUNT]);
         assert_eq!(together.failures.iter().flatten().count(), 1);
         let again = backend.evaluate(&population).expect("it runs");
         assert_eq!(bits(&again), bits(&together), "{name}, repeated");
         for count in [1, 5, 64, 65, 149] {
             let fewer = backend.evaluate(&population[..count * 50]).expect("it runs");
             let expected = Evaluation {
-                objectives: together.objectives[..count * 5].to_vec(),
+                objectives: together.objectives[..count * COUNT].to_vec(),
                 failures: together.failures[..count].to_vec(),
                 violations: Vec::new(),
             };
@@ -259,7 +262,7 @@ fn objectives_do_not_depend_on_each_other() {
         for ((name, mut alone), (_, mut among)) in backends(&one).into_iter().zip(backends(&all)) {
             let alone = alone.evaluate(&population).expect("it runs");
             let among = among.evaluate(&population).expect("it runs");
-            for (found, row) in alone.objectives.iter().zip(among.objectives.chunks_exact(5)) {
+            for (found, row) in alone.objectives.iter().zip(among.objectives.chunks_exact(COUNT)) {
                 assert_eq!(*found, row[k], "{name}, {}", objective.name());
             }
         }

@@ -608,7 +608,7 @@ fn a_dry_run_of_any_study_says_what_it_would_do_and_writes_nothing() {
     // parameters a base car, four levels of each and eight samples of five; 5 * 5; four set-ups with 21 shares of the grip;
     // 41 of these alone; four runs of inertia and two each of the pulls with three seeds, 50 * 100 cars each; speeds of 18,
     // 38 and 58 m/s by 128 steering angles.
-    let studies: [(&str, &[&str], Option<u64>); 13] = [
+    let studies: &[(&str, &[&str], Option<u64>)] = &[
         ("run", &[], None),
         ("identify", &[], Some(128 * 50 + 64 * 1500)),
         ("raceline", &AROUND_RING, None),
@@ -627,7 +627,7 @@ fn a_dry_run_of_any_study_says_what_it_would_do_and_writes_nothing() {
         ("sweep", &["sections"], None),
         ("reproduce", &["--quick"], None),
     ];
-    for (study, flags, evaluations) in studies {
+    for &(study, flags, evaluations) in studies {
         let said = |more: &[&str]| {
             let all = [&[study], flags, &["--dry-run"], more].concat();
             let output = lapswarm(folder.path(), &all);

@@ -37,7 +37,7 @@ pub struct Arguments {
     /// Problems: replay (the bundled lap, 22 unknowns), line (lap time, 360 cross-sections, 90 control points), drive (set-ups driven
     /// round a stadium of 840 m by the driver), steady (set-ups that settle on circles), energy (strategies of a hybrid on one line)
     #[arg(long, value_delimiter = ',', default_value = "replay,line",
-          value_parser = PossibleValuesParser::new(PROBLEMS.iter().map(|(name, _)| *name)))]
+          value_parser = PossibleValuesParser::new(problems::<Rates<'_>>().map(|(name, _)| name)))]
     problems: Vec<String>,
     /// Populations to measure
     #[arg(long, value_delimiter = ',', default_value = "64,256,1024,4096,16384",
@@ -120,19 +120,39 @@ pub(super) struct Case<K> {
     operations: u64,
 }
 
-/// Measures a problem.
-type Measure = fn(&mut Bench<'_>) -> Result<()>;
+/// What measures problems.
+pub(super) trait Bench {
+    /// What lines are measured by.
+    const LINE_OBJECTIVES: &'static [LineObjective];
 
-/// The problems, by name.
-const PROBLEMS: &[(&str, Measure)] = &[
-    ("replay", |bench| bench.measure_all("replay", &replay()?)),
-    ("line", |bench| {
-        bench.measure_all("line", &line(&[LineObjective::LapTime])?)
-    }),
-    ("drive", |bench| bench.measure_all("drive", &drive()?)),
-    ("steady", |bench| bench.measure_all("steady", &steady()?)),
-    ("energy", |bench| bench.measure_all("energy", &energy()?)),
-];
+    /// Measures a problem with every population.
+    fn measure_all<K: OnDevice>(&mut self, name: &'static str, case: &Case<K>) -> Result<()>;
+}
+
+/// A problem's name, and how it is measured.
+pub(super) type Measured<B> = (&'static str, fn(&mut B) -> Result<()>);
+
+/// The problems.
+pub(super) fn problems<B: Bench>() -> [Measured<B>; 5] {
+    [
+        ("replay", |bench| bench.measure_all("replay", &replay()?)),
+        ("line", |bench| {
+            bench.measure_all("line", &line(B::LINE_OBJECTIVES)?)
+        }),
+        ("drive", |bench| bench.measure_all("drive", &drive()?)),
+        ("steady", |bench| bench.measure_all("steady", &steady()?)),
+        ("energy", |bench| bench.measure_all("energy", &energy()?)),
+    ]
+}
+
+/// Measures the problems of these names.
+pub(super) fn measure_named<B: Bench>(bench: &mut B, names: &[String]) -> Result<()> {
+    let wanted = |name: &String| problems::<B>().into_iter().find(|(known, _)| known == name);
+    names
+        .iter()
+        .filter_map(wanted)
+        .try_for_each(|(_, measure)| measure(bench))
+}
 
 /// The circuit that set-ups are driven round, with this share of the car's friction in steps of so many seconds.
 const DRIVEN: (&str, f64, f64) = ("stadium:200:70:14", 0.6, 2e-3);
@@ -276,7 +296,7 @@ pub(super) fn or_dash(text: Option<String>) -> String {
 }
 
 /// What has been measured so far.
-struct Bench<'a> {
+struct Rates<'a> {
     arguments: &'a Arguments,
     /// What another machine had.
     other: Option<Table>,
@@ -285,9 +305,11 @@ struct Bench<'a> {
     rows: Vec<Row>,
 }
 
-impl Bench<'_> {
-    /// Measures a problem on every backend with every population.
-    fn measure_all<K: OnDevice>(&mut self, name: &str, case: &Case<K>) -> Result<()> {
+impl Bench for Rates<'_> {
+    const LINE_OBJECTIVES: &'static [LineObjective] = &[LineObjective::LapTime];
+
+    /// On every backend.
+    fn measure_all<K: OnDevice>(&mut self, name: &'static str, case: &Case<K>) -> Result<()> {
         let choice = self.arguments.backend.unwrap_or_default();
         for mut evaluator in case.evaluators(choice, self.arguments.adapter.as_deref())? {
             let mut rate: Option<f64> = None;
@@ -306,7 +328,9 @@ impl Bench<'_> {
         }
         Ok(())
     }
+}
 
+impl Rates<'_> {
     fn measure<K: OnDevice>(
         &self,
         name: &str,
@@ -367,18 +391,14 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         let times = if other.is_some() { "   times the other" } else { "" };
         outln!("{}{times}", line_of(COLUMNS, None));
     }
-    let mut bench = Bench {
+    let mut bench = Rates {
         arguments,
         other,
         peak,
         rows: Vec::new(),
     };
-    for name in &arguments.problems {
-        for (_, measure) in PROBLEMS.iter().filter(|(known, _)| known == name) {
-            measure(&mut bench)?;
-        }
-    }
-    let Bench { other, rows, .. } = bench;
+    measure_named(&mut bench, &arguments.problems)?;
+    let Rates { other, rows, .. } = bench;
     let evaluations = rows.iter().map(|r| r.population as u64).sum();
     let elapsed_s = began.elapsed().as_secs_f64();
     let gpu = rows.iter().find(|r| r.backend == "gpu");

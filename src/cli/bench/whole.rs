@@ -1,7 +1,7 @@
 //! `lapswarm bench whole`: the time of a whole generation against the number of particles, and the share that is not kernels.
 
 use super::pages::of_whole;
-use super::scaling::{Case, drive, energy, line, replay, steady};
+use super::scaling::{Bench, Case, measure_named, problems};
 use crate::cli::backend_flag;
 use crate::cli::measurement::FolderFlag;
 use crate::cli::output::{Columns, line_of, outln};
@@ -20,7 +20,7 @@ use std::time::Instant;
 pub struct Arguments {
     /// Problems: those of `bench`, lines by Gamma, length and lap time
     #[arg(long, value_delimiter = ',', default_value = "replay,line,energy,drive,steady",
-          value_parser = PossibleValuesParser::new(PROBLEMS.map(|(name, _)| name)))]
+          value_parser = PossibleValuesParser::new(problems::<Generations<'_>>().map(|(name, _)| name)))]
     problems: Vec<String>,
     /// Particles to measure
     #[arg(long, value_delimiter = ',', default_value = "1000,10000,100000,1000000",
@@ -66,25 +66,6 @@ struct Table {
     rows: Vec<Row>,
 }
 
-/// Measures a problem.
-type Measure = fn(&mut Bench<'_>) -> Result<()>;
-
-/// The problems, by name.
-const PROBLEMS: [(&str, Measure); 5] = [
-    ("replay", |bench| bench.measure_all("replay", &replay()?)),
-    ("line", |bench| {
-        let objectives = [
-            LineObjective::Gamma,
-            LineObjective::Length,
-            LineObjective::LapTime,
-        ];
-        bench.measure_all("line", &line(&objectives)?)
-    }),
-    ("energy", |bench| bench.measure_all("energy", &energy()?)),
-    ("drive", |bench| bench.measure_all("drive", &drive()?)),
-    ("steady", |bench| bench.measure_all("steady", &steady()?)),
-];
-
 /// The table on a terminal.
 const COLUMNS: &Columns<Row> = &[
     ("problem", -8, |r| r.problem.to_owned()),
@@ -100,7 +81,7 @@ const COLUMNS: &Columns<Row> = &[
 ];
 
 /// What has been measured so far.
-struct Bench<'a> {
+struct Generations<'a> {
     arguments: &'a Arguments,
     rows: Vec<Row>,
 }
@@ -117,8 +98,14 @@ fn narrowed<K: OnDevice>(case: &Case<K>) -> Problem {
     problem
 }
 
-impl Bench<'_> {
-    /// Measures a problem on every backend, with the swarm on the host and, where its kernel scores such, on the device.
+impl Bench for Generations<'_> {
+    const LINE_OBJECTIVES: &'static [LineObjective] = &[
+        LineObjective::Gamma,
+        LineObjective::Length,
+        LineObjective::LapTime,
+    ];
+
+    /// On every backend, with the swarm on the host and, where its kernel scores such, on the device.
     fn measure_all<K: OnDevice>(&mut self, name: &'static str, case: &Case<K>) -> Result<()> {
         let choice = self.arguments.backend.unwrap_or_default();
         let adapter = self.arguments.adapter.as_deref();
@@ -173,7 +160,9 @@ impl Bench<'_> {
         }
         Ok(())
     }
+}
 
+impl Generations<'_> {
     /// Measures every population by `time`, which says how long a generation takes and of that its kernels, ms.
     fn measure(
         &mut self,
@@ -261,15 +250,11 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         outln!("whole generations, {threads} threads");
         outln!("{}", line_of(COLUMNS, None));
     }
-    let mut bench = Bench {
+    let mut bench = Generations {
         arguments,
         rows: Vec::new(),
     };
-    for name in &arguments.problems {
-        for (_, measure) in PROBLEMS.iter().filter(|(known, _)| known == name) {
-            measure(&mut bench)?;
-        }
-    }
+    measure_named(&mut bench, &arguments.problems)?;
     let table = Table {
         study: "bench whole",
         threads,
