@@ -29,7 +29,7 @@ pub enum Kind {
     Replay(ReplayProblem),
     Line(LineProblem),
     Energy(Box<HybridProblem>),
-    Drive(DriveProblem),
+    Drive(Box<DriveProblem>),
     Steady(SteadyProblem),
     /// Variables and objectives of one's own, which nothing here evaluates.
     Own(evaluate::Problem),
@@ -59,7 +59,7 @@ impl Kind {
             Self::Replay(kind) => open_evaluator(kind, choice, adapter),
             Self::Line(kind) => open_line_evaluator(kind, choice, adapter),
             Self::Energy(kind) => open_hybrid_evaluator(kind.as_ref(), choice, adapter),
-            Self::Drive(kind) => open_drive_evaluator(kind, choice, adapter),
+            Self::Drive(kind) => open_drive_evaluator(kind.as_ref(), choice, adapter),
             Self::Steady(kind) => open_steady_evaluator(kind, choice, adapter),
             Self::Own(_) => Err(Error::input(
                 "Evaluator",
@@ -101,7 +101,7 @@ fn drive(text: &str) -> Result<Kind> {
     let prepared = Transient::prepare(&settings)?;
     let problem = drive_problem(&settings, &prepared, || ControlFlow::Continue(()))?;
     let problem = problem.ok_or_else(|| Error::Study("the lines were not planned".to_owned()))?;
-    Ok(Kind::Drive(problem))
+    Ok(Kind::Drive(Box::new(problem)))
 }
 
 /// Parameters by name, with their bounds.

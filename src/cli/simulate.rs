@@ -4,9 +4,10 @@ use super::study::{print_plan, print_results};
 use super::{Common, to_json};
 use lapswarm::evaluate::BackendChoice;
 use lapswarm::files::run_folder::{self, MANIFEST, SUMMARY};
+use lapswarm::report::Table;
 use lapswarm::report::compare::{Run, compare};
 use lapswarm::simulate::{SensorSettings, SimulateSettings, Simulated, simulate_lap};
-use lapswarm::study::framework::{Head, Manifest, Plan, RunRecord, Subject, write_json};
+use lapswarm::study::framework::{Head, Manifest, Plan, RunRecord, Subject, with_tyres, write_json};
 use lapswarm::study::identify::lap_format;
 use lapswarm::telemetry::write_native;
 use lapswarm::track::Track;
@@ -120,12 +121,21 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             .into_folder(arguments.common.out.as_deref())?;
         return print_plan(&arguments.common, &plan);
     }
-    let Simulated { log, substeps } = simulate_lap(&car, &circuit, &settings)?;
+    let Simulated {
+        log,
+        substeps,
+        moments,
+    } = simulate_lap(&car, &circuit, &settings)?;
     let folder = run_folder::create("simulate", arguments.common.out.as_deref())?;
     let path = folder.join("lap.csv");
     let step_ms = 1e3 * log.dt_s / substeps as f64;
     let comment = format!("{}; outputs worked out at a step of {step_ms:.3} ms", log.source);
     write_native(&log, &path, &lap_format().comment(comment))?;
+    let tyres = Table::new()
+        .numbers("time", "s", &log.time_s)
+        .numbers("distance", "m", &log.distance_m);
+    let moments: Vec<_> = moments.into_iter().map(Some).collect();
+    with_tyres(tyres, &moments).write_csv(folder.join("tyres.csv"))?;
     car.write(&folder, "truth")?;
     let greatest = |values: &[f64]| values.iter().fold(0.0f64, |a, b| a.max(b.abs()));
     let summary = Summary {

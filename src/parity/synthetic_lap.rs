@@ -7,7 +7,7 @@ use super::{Draws, free_about};
 use crate::error::{Error, Result};
 use crate::evaluate::Objective;
 use crate::evaluate::replay::{
-    CHANNEL_NAMES, CHANNEL_UNITS, ChannelWeights, Norm, ReplayProblem, Sample, Window, trace,
+    CHANNEL_NAMES, CHANNEL_UNITS, ChannelWeights, Norm, ReplayProblem, Sample, Traced, Window, trace,
 };
 use crate::vehicle::Car;
 
@@ -117,7 +117,7 @@ pub fn problem(car: Car, free: &[&str], lap: Lap) -> Result<ReplayProblem> {
         )
     };
     let reference = build(samples.clone(), vec![whole])?;
-    let (outputs, drives) = trace(&flat, car.tyre_model(), &reference.plan, &whole);
+    let Traced { outputs, drives, .. } = trace(&flat, car.tyre_model(), &reference.plan, &whole);
     if !drives {
         return Err(Error::Study(format!(
             "{} does not drive the made-up lap to its end",

@@ -3,11 +3,12 @@
 use super::sensors::{SensorSettings, distort};
 use crate::drive::{DriverSettings, drive};
 use crate::error::{Error, Result};
-use crate::evaluate::replay::{Norm, Plan, Sample, Window, initial_state, step_fractions, trace};
+use crate::evaluate::replay::{Norm, Plan, Sample, Traced, Window, initial_state, step_fractions, trace};
 use crate::telemetry::{Calibration, Lap, Log};
 use crate::track::Circuit;
 use crate::vehicle::Car;
 use crate::vehicle::modes::{fastest_mode, stable_steps};
+use crate::vehicle::wheels::{Moment, moments_of};
 
 /// How a lap is simulated and logged.
 #[derive(Clone, Debug, PartialEq)]
@@ -43,6 +44,8 @@ pub struct Simulated {
     pub log: Log,
     /// Runge-Kutta steps per sample interval of the outputs: a fit with the same takes them up exactly.
     pub substeps: usize,
+    /// What each tyre did at each sample, as the log's outputs have it before the sensors.
+    pub moments: Vec<Moment>,
 }
 
 impl SimulateSettings {
@@ -144,7 +147,11 @@ pub fn simulate_lap(car: &Car, circuit: &Circuit, settings: &SimulateSettings) -
         fractions: step_fractions(substeps),
         norm: Norm::Two,
     };
-    let (outputs, drives) = trace(&flat, car.tyre_model(), &plan, &window);
+    let Traced {
+        outputs,
+        states,
+        drives,
+    } = trace(&flat, car.tyre_model(), &plan, &window);
     if !drives {
         return Err(Error::Study(format!(
             "the car, replayed open loop from its logged inputs at {} Hz in {substeps} steps per sample, is lost; try \
@@ -165,6 +172,8 @@ pub fn simulate_lap(car: &Car, circuit: &Circuit, settings: &SimulateSettings) -
             100.0 * MOST_APART
         )));
     }
+    let driven = states.iter().copied().zip(samples.iter().map(Sample::input));
+    let moments = moments_of(car, &driven.collect::<Vec<_>>());
     for (sample, output) in samples.iter_mut().zip(outputs) {
         sample.measured = output;
     }
@@ -193,5 +202,9 @@ pub fn simulate_lap(car: &Car, circuit: &Circuit, settings: &SimulateSettings) -
         }],
         calibration: Calibration::default(),
     };
-    Ok(Simulated { log, substeps })
+    Ok(Simulated {
+        log,
+        substeps,
+        moments,
+    })
 }

@@ -175,7 +175,7 @@ fn device_trace(replay: &ReplayProblem, candidate: &[f64]) -> Vec<[f32; 4]> {
 /// Writes both traces of `candidate`'s first window to a temporary folder and says where they first part.
 fn report(replay: &ReplayProblem, backend: &str, candidate: &[f64]) -> String {
     let window = &replay.plan.windows[0];
-    let (reference, _) = trace(&replay.flat(candidate), replay.tyre_model(), &replay.plan, window);
+    let reference = trace(&replay.flat(candidate), replay.tyre_model(), &replay.plan, window).outputs;
     let found = if backend == "gpu" {
         device_trace(replay, candidate)
     } else {

@@ -102,6 +102,7 @@ fn a_cold_swarm_and_polish_find_the_car() {
         "car.tir",
         "convergence.csv",
         "traces.csv",
+        "tyres.csv",
     ] {
         assert!(folder.path().join(name).metadata().unwrap().len() > 0, "{name}");
     }
@@ -113,6 +114,42 @@ fn a_cold_swarm_and_polish_find_the_car() {
             "{name}"
         );
     }
+    // Loads of the four tyres are the car's weight and its downforce.
+    let rows = |name: &str| -> Vec<Vec<String>> {
+        let text = std::fs::read_to_string(folder.path().join(name)).unwrap();
+        text.lines()
+            .map(|line| line.split(',').map(str::to_owned).collect())
+            .collect()
+    };
+    let (tyres, traces) = (rows("tyres.csv"), rows("traces.csv"));
+    let column = |rows: &[Vec<String>], name: &str| {
+        let found = rows[0]
+            .iter()
+            .position(|head| head.split(' ').next() == Some(name));
+        found.unwrap_or_else(|| panic!("{name} in {:?}", rows[0]))
+    };
+    let chassis = Car::bundled().unwrap().chassis;
+    let number = |row: &[String], at: usize| row[at].parse::<f64>().ok();
+    let mut compared = 0;
+    for row in &tyres[1..] {
+        let loads =
+            ["load_fl", "load_fr", "load_rl", "load_rr"].map(|name| number(row, column(&tyres, name)));
+        let time = &row[column(&tyres, "time")];
+        let trace = traces
+            .iter()
+            .find(|trace| trace[column(&traces, "time")] == *time)
+            .unwrap();
+        let speed = number(trace, column(&traces, "vx_fitted"));
+        let (Some(speed), [Some(a), Some(b), Some(c), Some(d)]) = (speed, loads) else {
+            continue;
+        };
+        let downforce = 0.5 * chassis.air_density * chassis.lift_area * speed * speed;
+        let expected = chassis.mass * chassis.gravity + downforce;
+        let off = (a + b + c + d) / expected - 1.0;
+        assert!(off.abs() < 1e-6, "{off:e} at {time} s");
+        compared += 1;
+    }
+    assert!(compared > 1000, "{compared}");
     // What was written is a car that reads back as the truth, to the parameter error above.
     let car = Car::load(&folder.path().join("car.toml").display().to_string()).unwrap();
     let (found, truth) = (car.to_flat(), Car::bundled().unwrap().to_flat());

@@ -246,6 +246,20 @@ fn set_ups_and_lines_are_driven_all_at_once() {
             parameter.name
         );
     }
+    // The page has the fastest lap, driven once more: the same one, in another precision.
+    let page = std::fs::read_to_string(folder.path().join("report.html")).expect("a page");
+    let again = page.split("in double precision: ").nth(1).expect("the laps");
+    let mut times = again.split(" in ").skip(1).map(|text| {
+        let (time, _) = text.split_once(" s").expect("a time");
+        time.parse::<f64>().expect("a number")
+    });
+    let best = outcome.driven[0].best.expect("a lap");
+    let off = times.next().expect("the fastest") / best.lap_time_s - 1.0;
+    assert!(off.abs() < 5e-5, "{off:e}");
+    for name in ["speeds.svg", "map.svg"] {
+        let svg = std::fs::read_to_string(folder.path().join(name)).expect(name);
+        assert!(svg.starts_with("<svg"), "{name}");
+    }
     let table = std::fs::read_to_string(folder.path().join("setups.csv")).expect("a table");
     assert_eq!(table.lines().count(), 1 + outcome.driven.len(), "{table}");
     assert!(summary.table().contains("beside it"));

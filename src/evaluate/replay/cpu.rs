@@ -1,10 +1,10 @@
 //! The reference backend: `f64`, one candidate after another, threads by rayon.
 
-use super::kernel::{CHANNELS, drive_window, score_window};
+use super::kernel::{CHANNELS, Visit, drive_window, score_window};
 use super::plan::{Plan, Window};
 use super::problem::ReplayProblem;
 use crate::vehicle::tyre::Tyre;
-use crate::vehicle::{CarModel, LinearTyre, MagicFormula, TyreModel};
+use crate::vehicle::{CarModel, CarState, LinearTyre, MagicFormula, TyreModel};
 use rayon::prelude::*;
 
 fn errors_on<T: Tyre<f64>>(replay: &ReplayProblem, candidate: &[f64]) -> Option<[f64; CHANNELS]> {
@@ -33,26 +33,35 @@ pub(super) fn errors(replay: &ReplayProblem, candidates: &[&[f64]]) -> Vec<Optio
         .collect()
 }
 
-/// The four compared outputs at every sample of `window`, and whether the car drove to its end.
-///
-/// `flat` is a car in flat form. From sample to sample as [`drive_window`] drives it, in `f64`.
-pub fn trace(
-    flat: &[f64],
-    model: TyreModel,
-    plan: &Plan<f64>,
-    window: &Window<f64>,
-) -> (Vec<[f64; CHANNELS]>, bool) {
-    fn go<T: Tyre<f64>>(
-        flat: &[f64],
-        plan: &Plan<f64>,
-        window: &Window<f64>,
-    ) -> (Vec<[f64; CHANNELS]>, bool) {
+/// A window as a car drives it.
+pub struct Traced {
+    /// The four compared outputs at every sample.
+    pub outputs: Vec<[f64; CHANNELS]>,
+    /// The car there.
+    pub states: Vec<CarState<f64>>,
+    /// Whether it drove to the end.
+    pub drives: bool,
+}
+
+impl Visit<f64> for &mut Traced {
+    fn visit(&mut self, _: usize, state: &CarState<f64>, outputs: [f64; CHANNELS]) {
+        self.outputs.push(outputs);
+        self.states.push(*state);
+    }
+}
+
+/// `window` as a car in flat form drives it: from sample to sample as [`drive_window`] has it, in `f64`.
+pub fn trace(flat: &[f64], model: TyreModel, plan: &Plan<f64>, window: &Window<f64>) -> Traced {
+    fn go<T: Tyre<f64>>(flat: &[f64], plan: &Plan<f64>, window: &Window<f64>) -> Traced {
         let car = CarModel::<f64, T>::from_parameters(|i| flat[i]);
-        let mut outputs = Vec::with_capacity(window.end - window.start);
-        let (drives, _) = drive_window(&car, plan, window, |_: usize, output: [f64; CHANNELS]| {
-            outputs.push(output)
-        });
-        (outputs, drives)
+        let samples = window.end - window.start;
+        let mut traced = Traced {
+            outputs: Vec::with_capacity(samples),
+            states: Vec::with_capacity(samples),
+            drives: false,
+        };
+        let (drives, _) = drive_window(&car, plan, window, &mut traced);
+        Traced { drives, ..traced }
     }
     match model {
         TyreModel::MagicFormula => go::<MagicFormula<f64>>(flat, plan, window),

@@ -26,13 +26,13 @@ fn input_between<R: Real>(from: &Sample<R::Storage>, to: &Sample<R::Storage>, fr
 /// Receives the compared outputs at every sample. This is a trait because lanes are only fast if everything is inlined into the
 /// code for their instruction set. A closure that is called from two places is not inlined.
 pub trait Visit<R> {
-    /// The outputs at a sample of the window.
-    fn visit(&mut self, sample: usize, outputs: [R; CHANNELS]);
+    /// The car and its outputs at a sample of the window.
+    fn visit(&mut self, sample: usize, state: &CarState<R>, outputs: [R; CHANNELS]);
 }
 
 impl<R, F: FnMut(usize, [R; CHANNELS])> Visit<R> for F {
     #[inline(always)]
-    fn visit(&mut self, sample: usize, outputs: [R; CHANNELS]) {
+    fn visit(&mut self, sample: usize, _: &CarState<R>, outputs: [R; CHANNELS]) {
         self(sample, outputs);
     }
 }
@@ -60,7 +60,8 @@ pub fn drive_window<R: Real, T: Tyre<R>>(
                 step,
                 |rate| {
                     if substep == 0 {
-                        visitor.visit(i, [state.body.vx, rate.ax, rate.ay, state.body.yaw_rate]);
+                        let outputs = [state.body.vx, rate.ax, rate.ay, state.body.yaw_rate];
+                        visitor.visit(i, &state, outputs);
                     }
                 },
             );
@@ -73,6 +74,7 @@ pub fn drive_window<R: Real, T: Tyre<R>>(
     let rate = car.rate(&state, &input_between(last, last, R::lit(0.0)));
     visitor.visit(
         samples.len() - 1,
+        &state,
         [state.body.vx, rate.ax, rate.ay, state.body.yaw_rate],
     );
     (drives, state)
@@ -97,7 +99,7 @@ struct Scoring<'a, R: Real> {
 
 impl<R: Real> Visit<R> for &mut Scoring<'_, R> {
     #[inline(always)]
-    fn visit(&mut self, sample: usize, outputs: [R; CHANNELS]) {
+    fn visit(&mut self, sample: usize, _: &CarState<R>, outputs: [R; CHANNELS]) {
         let (norm, window) = (self.plan.norm, self.window);
         if sample >= window.scored_from {
             let measured = &self.plan.samples[window.start + sample].measured;

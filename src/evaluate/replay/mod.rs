@@ -12,7 +12,7 @@ mod starts;
 
 pub use super::{BackendChoice, ModelTable};
 pub use crate::evaluate::open_evaluator;
-pub use cpu::trace;
+pub use cpu::{Traced, trace};
 #[cfg(feature = "gpu")]
 pub use gpu::{Batching, DeviceSample, DeviceWindow, DispatchStatistics, GpuEvaluator, Stretch};
 pub use jacobian::Residuals;

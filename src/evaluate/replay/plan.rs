@@ -1,5 +1,6 @@
 //! What kernels of a replay read: the log, how it is cut into windows, and how errors are put together.
 
+use crate::vehicle::CarInput;
 use serde::{Deserialize, Serialize};
 
 /// The compared outputs: forward speed (m/s), longitudinal and lateral acceleration (m/s^2), yaw rate (rad/s).
@@ -36,6 +37,17 @@ pub struct Sample<S> {
     pub flap: S,
     /// Measured outputs.
     pub measured: [S; CHANNELS],
+}
+
+impl Sample<f64> {
+    /// What moves the car at this sample.
+    pub fn input(&self) -> CarInput<f64> {
+        CarInput {
+            wheel_speed: self.wheel_speed,
+            steer: self.steer,
+            flap: self.flap,
+        }
+    }
 }
 
 /// A stretch of the log that is driven open loop from a known start.

@@ -107,11 +107,15 @@ fn named(runs: &[Run]) -> Vec<Named<'_>> {
     runs.iter().map(|run| (name(run), run)).collect()
 }
 
-/// What a study is judged by, where one number says it: its name, words for it, its unit.
-fn verdict(study: &str) -> Option<(&'static str, &'static str, &'static str)> {
-    match study {
+/// What a run is judged by, where one number says it: its name, words for it, its unit.
+fn verdict(run: &Run) -> Option<(&'static str, &'static str, &'static str)> {
+    match run.study.as_str() {
         "identify" => Some(("total_parameter_error", "total parameter error", "")),
         "raceline" => Some(("best / lap_time / lap_time_fine_s", "lap time", "s")),
+        // Of set-ups, the fastest.
+        "transient" if run.figure("best / lap_time_s").is_some() => {
+            Some(("best / lap_time_s", "fastest driven lap", "s"))
+        }
         "transient" => Some(("lap_time_s", "driven lap", "s")),
         "simulate" => Some(("lap_time_s", "logged lap", "s")),
         "envelope" => Some(("top_speed_mps", "top speed", "m/s")),
@@ -142,23 +146,24 @@ fn head(page: &mut HtmlReport, runs: &[Named<'_>]) {
         let of: Vec<&Named<'_>> = runs.iter().filter(|(_, r)| r.study == study).collect();
         let plural = if of.len() == 1 { "run" } else { "runs" };
         let mut sentence = format!("{} {plural} of {study}", of.len());
-        let judged = verdict(study).into_iter().flat_map(|(figure, words, unit)| {
-            of.iter().filter_map(move |(name, r)| {
-                let off = if off_road(r).is_empty() {
-                    ""
-                } else {
-                    " off the road"
-                };
-                let unit = format!("{unit}{off}");
-                Some((name, words, significant(r.figure(figure)?, 6), unit))
-            })
-        });
-        for (number, (name, words, value, unit)) in judged.enumerate() {
-            sentence += &if number == 0 {
-                format!(", by {words}: ")
+        let judged = of.iter().filter_map(|(name, r)| {
+            let (figure, words, unit) = verdict(r)?;
+            let off = if off_road(r).is_empty() {
+                ""
             } else {
-                ", ".to_owned()
+                " off the road"
             };
+            let unit = format!("{unit}{off}");
+            Some((name, words, significant(r.figure(figure)?, 6), unit))
+        });
+        let mut said = "";
+        for (name, words, value, unit) in judged {
+            sentence += &if words == said {
+                ", ".to_owned()
+            } else {
+                format!(", by {words}: ")
+            };
+            said = words;
             sentence += format!("{name} {value} {unit}").trim_end();
             page.tile(&format!("{name}, {words}"), value, &unit);
         }

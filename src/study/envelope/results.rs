@@ -318,22 +318,22 @@ pub fn envelope_figure(limits: &CarEnvelope, car: &str) -> Curves {
     let v: Vec<f64> = speeds.iter().map(|s| s.row.v_mps).collect();
     let over_speed = |f: &dyn Fn(&EnvelopeAtSpeed) -> f64| speeds.iter().map(f).collect::<Vec<f64>>();
     let mut cornering = Panel::new("Steady-state cornering")
-        .x("road-wheel angle", "deg")
+        .x("road-wheel angle", "rad")
         .y("lateral acceleration", "m/s\u{b2}");
     let mut diagram = Panel::new("g-g-v diagram, drag included")
         .x("lateral acceleration", "m/s\u{b2}")
         .y("longitudinal acceleration", "m/s\u{b2}");
     let mut sideslip = Panel::new("Sideslip in steady-state cornering")
         .x("lateral acceleration", "m/s\u{b2}")
-        .y("sideslip", "deg");
+        .y("sideslip", "rad");
     // A family of curves with every speed would be a smear.
     for i in (0..speeds.len()).rev().step_by(speeds.len().div_ceil(6)) {
         let shade = i as f64 / (speeds.len() - 1).max(1) as f64;
         let of = |f: &dyn Fn(&Trim) -> f64| speeds[i].cornering.iter().map(f).collect::<Vec<f64>>();
         let ay = of(&|t| t.ay_mps2);
-        let steer = of(&|t| t.steer_rad.to_degrees());
+        let steer = of(&|t| t.steer_rad);
         cornering = cornering.shaded(shade, format!("{:.0} m/s", v[i]), &steer, &ay);
-        sideslip = sideslip.shaded(shade, "", &ay, &of(&|t| t.sideslip_rad.to_degrees()));
+        sideslip = sideslip.shaded(shade, "", &ay, &of(&|t| t.sideslip_rad));
         let row = speeds[i].row;
         let (across, along) = around(&row, &limits.envelope);
         diagram = diagram.shaded(shade, "", &across, &along);
@@ -525,16 +525,14 @@ fn surface_figure(surface: &SteadySurface, car: &str) -> Option<Surface> {
     let marks = surface.ridge.iter().take(rows);
     (rows >= 2 && settled).then(|| Surface {
         title: format!("Lateral acceleration of the {car}, and its ridge"),
-        x_label: "road-wheel angle (deg)".to_owned(),
+        x_label: "road-wheel angle (rad)".to_owned(),
         y_label: "speed (m/s)".to_owned(),
         z_label: "lateral acceleration (m/s\u{b2})".to_owned(),
-        x: surface.steers.iter().map(|d| d.to_degrees()).collect(),
+        x: surface.steers.clone(),
         y: speeds[..rows].to_vec(),
         z: surface.figures[0][..rows * surface.steers.len()].to_vec(),
         levels: Levels::Even,
-        marks: marks
-            .map(|r| (String::new(), [r.steer_rad.to_degrees(), r.v_mps]))
-            .collect(),
+        marks: marks.map(|r| (String::new(), [r.steer_rad, r.v_mps])).collect(),
     })
 }
 

@@ -10,6 +10,7 @@ mod plan;
 mod record;
 pub mod state_file;
 mod study;
+mod tyres;
 
 pub use coefficients::{Coefficients, Mutated, Scheduled};
 pub use inputs::{InputFiles, Inputs};
@@ -21,3 +22,4 @@ pub use record::RunRecord;
 pub(in crate::study) use record::Watch;
 pub(in crate::study) use study::add_numbers;
 pub use study::{AnyStudy, Entry, Figures, Head, Progress, Solved, State, Study, Subject, Work};
+pub use tyres::{tyre_view, with_tyres};

@@ -156,7 +156,9 @@ impl Study for Identify {
         }
         let judged = judge_candidate(&outcome.replay, &outcome.candidate);
         results::write_traces(folder, setup, &judged)?;
-        page::write(folder, solved, &judged, summary)
+        let tyres = results::Tyres::of(solved, &judged);
+        tyres.write(folder, &setup.log)?;
+        page::write(folder, solved, (&judged, &tyres), summary)
     }
 
     fn text(settings: &IdentifySettings, summary: &Summary) -> String {

@@ -1,7 +1,7 @@
 //! The interactive report of an identification, with its figures.
 
 use super::Identify;
-use super::results::{Summary, parameter_rows, traced_lap};
+use super::results::{Summary, Tyres, parameter_rows, traced_lap};
 use super::search::{Judged, Outcome};
 use super::settings::IdentifySettings;
 use super::setup::{CHANNELS, Setup, cost_unit};
@@ -13,13 +13,13 @@ use crate::report::{
     CornerLap, Curves, Figure, Front, HtmlReport, LapLine, LapView, Panel, Parameters, Scale, Table,
     significant,
 };
-use crate::study::framework::Solved;
+use crate::study::framework::{Solved, tyre_view};
 use std::path::Path;
 
 pub(super) fn write(
     folder: &Path,
     solved: &Solved<'_, Identify>,
-    judged: &Judged,
+    (judged, tyres): (&Judged, &Tyres),
     summary: &Summary,
 ) -> Result<()> {
     let (setup, outcome) = (solved.prepared, solved.outcome);
@@ -45,6 +45,9 @@ pub(super) fn write(
     }
     corners(&mut page, setup, judged)?;
     page.table("Channels", "", &channels(solved.settings, summary))?;
+    page.section("Tyres", "What the tyres of the fitted car do on this lap.");
+    let distance_m = &setup.log.distance_m[tyres.lap.clone()];
+    page.place(&tyre_view(distance_m, &tyres.moments))?;
     page.section("Parameters", "");
     let figure = Parameters {
         title: "Parameters within their bounds".to_owned(),

@@ -1,5 +1,6 @@
 //! What an identification leaves behind: figures for people and scripts, files, figures.
 
+use super::Identify;
 use super::identifiability::at_bound;
 use super::notes::notes;
 use super::search::{Judged, Outcome, judge_candidate, total_parameter_error};
@@ -8,12 +9,15 @@ use super::setup::{CHANNELS, Setup};
 use super::verdict::{Untold, Verdict};
 use crate::error::Result;
 use crate::evaluate::failures_in_words;
-use crate::evaluate::replay::{CHANNEL_NAMES, CHANNEL_UNITS, ReplayProblem};
+use crate::evaluate::replay::{CHANNEL_NAMES, CHANNEL_UNITS, ReplayProblem, Sample, trace};
 use crate::report::{ParameterRow, Table};
-use crate::study::framework::RunRecord;
+use crate::study::framework::{RunRecord, Solved, with_tyres};
+use crate::telemetry::Log;
 use crate::vehicle::Reached;
+use crate::vehicle::wheels::{Moment, moments_of};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use std::ops::Range;
 use std::path::Path;
 
 /// One parameter's outcome.
@@ -311,6 +315,48 @@ pub(super) fn traced_lap(log: &crate::telemetry::Log, judged: &Judged) -> std::o
     let fitted = |i: usize| judged.outputs[0][i].is_finite();
     let mut laps = log.laps.iter().map(|l| l.start..l.end);
     laps.find(|r| r.clone().any(fitted)).unwrap_or(0..log.samples())
+}
+
+/// What the fitted car's tyres do on the lap that is drawn.
+pub(super) struct Tyres {
+    /// Samples of the lap.
+    pub lap: Range<usize>,
+    /// At each of them; nothing where no window is scored.
+    pub moments: Vec<Option<Moment>>,
+}
+
+impl Tyres {
+    /// Of the car that was judged.
+    pub fn of(solved: &Solved<'_, Identify>, judged: &Judged) -> Self {
+        let (replay, candidate) = (&solved.outcome.replay, &solved.outcome.candidate);
+        let lap = traced_lap(&solved.prepared.log, judged);
+        let mut moments = vec![None; lap.len()];
+        let (car, flat) = (replay.free.candidate_car(candidate), replay.flat(candidate));
+        let windows = &replay.plan.windows;
+        for window in windows.iter().filter(|w| w.start < lap.end && w.end > lap.start) {
+            let driven = trace(&flat, replay.tyre_model(), &replay.plan, window);
+            let samples = replay.plan.samples[window.start..].iter().map(Sample::input);
+            let driven: Vec<_> = driven.states.into_iter().zip(samples).collect();
+            for (i, moment) in moments_of(&car, &driven).into_iter().enumerate() {
+                let at = window.start + i;
+                if i >= window.scored_from && lap.contains(&at) {
+                    moments[at - lap.start] = Some(moment);
+                }
+            }
+        }
+        Self { lap, moments }
+    }
+
+    /// Writes `tyres.csv`.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`] if it cannot be written.
+    pub fn write(&self, folder: &Path, log: &Log) -> Result<()> {
+        let table = Table::new()
+            .numbers("time", "s", &log.time_s[self.lap.clone()])
+            .numbers("distance", "m", &log.distance_m[self.lap.clone()]);
+        with_tyres(table, &self.moments).write_csv(folder.join("tyres.csv"))
+    }
 }
 
 pub(super) fn write_traces(folder: &Path, setup: &Setup, judged: &Judged) -> Result<()> {

@@ -439,9 +439,9 @@ pub fn judge_candidate(replay: &ReplayProblem, candidate: &[f64]) -> Judged {
     let mut scored = 0usize;
     let mut lost_windows = 0;
     for window in &replay.plan.windows {
-        let (driven, drives) = trace(&flat, replay.tyre_model(), &replay.plan, window);
-        lost_windows += usize::from(!drives);
-        for (i, output) in driven.iter().enumerate() {
+        let driven = trace(&flat, replay.tyre_model(), &replay.plan, window);
+        lost_windows += usize::from(!driven.drives);
+        for (i, output) in driven.outputs.iter().enumerate() {
             let sample = &samples[window.start + i];
             if i < window.scored_from {
                 continue;

@@ -1,11 +1,14 @@
 //! What a population of drives leaves behind.
 
 use super::population::{Driven, DrivenBest, PopulationOutcome};
-use super::{Prepared, Transient};
+use super::results::{lap_of, place_laps};
+use super::{INTERVAL_S, Prepared, Transient, planned};
+use crate::drive::{Drive, DriverSettings, drive_planned};
 use crate::error::Result;
 use crate::evaluate::failures_in_words;
 use crate::report::{Curves, HtmlReport, Panel, Table};
 use crate::study::framework::{Head, Solved};
+use crate::vehicle::{Car, CarParameter, Traction};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -136,7 +139,74 @@ impl PopulationSummary {
     }
 }
 
-/// Writes `setups.csv`, the fastest car as `car.toml`, and `report.html`.
+/// The car with a set-up.
+fn car_of(car: &Car, parameters: &[CarParameter], values: &[f64]) -> Car {
+    let mut flat = car.to_flat();
+    for (parameter, value) in parameters.iter().zip(values) {
+        for slot in &parameter.slots {
+            flat[*slot] = *value;
+        }
+    }
+    car.with_flat(&flat)
+}
+
+/// The best lap of a set-up, driven once more in `f64`; nothing where the car does not come to its end there.
+fn driven_again(prepared: &Prepared, car: &Car, driven: &Driven) -> Result<Option<Drive>> {
+    let Some(best) = driven.best else {
+        return Ok(None);
+    };
+    let (limits, line) = (&prepared.road.car, &prepared.lines[driven.line]);
+    let traction = Traction::of(&prepared.car, &limits.envelope);
+    // Every set-up has the plans and the driver of the car as it is.
+    let (.., plan) = planned(limits, &traction, (&line.points_m, &line.drs), best.grip_share)?;
+    let driver = DriverSettings::racing(&prepared.car)?;
+    Ok(drive_planned(car, &line.circuit, plan, &driver, INTERVAL_S).ok())
+}
+
+/// The fastest set-up beside the car as it is, on the line of the fastest: traces, a map, a table by corner.
+fn place_fastest(
+    page: &mut HtmlReport,
+    folder: &Path,
+    prepared: &Prepared,
+    outcome: &PopulationOutcome,
+) -> Result<()> {
+    let all = &outcome.driven;
+    let Some(fastest) = all.first() else {
+        return Ok(());
+    };
+    let line = &prepared.lines[fastest.line];
+    let own = all.iter().find(|d| d.setup == 0 && d.line == fastest.line);
+    let shown = [Some(fastest), own.filter(|own| own.setup != fastest.setup)];
+    let name = |driven: &Driven| match driven.setup {
+        0 => "the car as it is".to_owned(),
+        setup => format!("set-up {setup}"),
+    };
+    let shown: Vec<_> = shown.into_iter().flatten().map(|d| (name(d), d)).collect();
+    let mut laps = (Vec::new(), Vec::new());
+    let mut times = Vec::new();
+    for (name, driven) in &shown {
+        let car = car_of(&prepared.car, &outcome.parameters, &driven.values);
+        if let Some(drive) = driven_again(prepared, &car, driven)? {
+            let (lap, corners) = lap_of(name, (&car, &prepared.road.car), &drive, &line.circuit);
+            laps.0.push(lap);
+            laps.1.extend(corners);
+            let time_s = drive.lap_time_s(line.circuit.length_m, INTERVAL_S);
+            times.extend(time_s.map(|time_s| format!("{name} in {time_s:.3} s")));
+        }
+    }
+    if laps.0.is_empty() {
+        return Ok(());
+    }
+    let times = format!("Driven once more, in double precision: {}.", times.join(", "));
+    page.section("Fastest lap", &times);
+    let titles = (
+        &*format!("On the line {}", line.name),
+        "The fastest lap".to_owned(),
+    );
+    place_laps(page, folder, titles, &line.circuit, laps)
+}
+
+/// Writes `setups.csv`, the fastest car as `car.toml`, `speeds.svg`, `map.svg` and `report.html`.
 ///
 /// # Errors
 /// [`crate::Error::Io`] if a file cannot be written.
@@ -165,13 +235,7 @@ pub(super) fn report(
     let table = table.table();
     table.write_csv(folder.join("setups.csv"))?;
     if let Some(best) = all.first().filter(|d| d.best.is_some()) {
-        let mut flat = car.to_flat();
-        for (parameter, value) in outcome.parameters.iter().zip(&best.values) {
-            for slot in &parameter.slots {
-                flat[*slot] = *value;
-            }
-        }
-        car.with_flat(&flat).write(folder, "car")?;
+        car_of(car, &outcome.parameters, &best.values).write(folder, "car")?;
     }
 
     let title = format!("Set-ups of the {}, driven", car.name);
@@ -204,6 +268,7 @@ pub(super) fn report(
     if !scatters.is_empty() {
         page.place(&scatters)?;
     }
+    place_fastest(&mut page, folder, prepared, outcome)?;
     page.provenance("car", &car.name);
     summary.head.record.provenance(&mut page, "laps driven");
     page.write(folder.join("report.html"))

@@ -2,15 +2,15 @@
 
 use super::corners::CornerGrip;
 use super::drive::{AGREEMENT, DrivenLine, INTERVAL_S};
+use crate::drive::Drive;
 use crate::error::Result;
 use crate::line::{ON_ROAD_M, PointMass};
 use crate::report::{CornerLap, HtmlReport, LapLine, LapView, Road, Table, write_whole};
-use crate::study::framework::Head;
+use crate::study::framework::{Head, tyre_view, with_tyres};
 use crate::study::raceline::best_gears;
 use crate::track::Circuit;
-use crate::vehicle::wheels::{Moment, WHEELS, Wheel, moments_of};
+use crate::vehicle::wheels::{Moment, moments_of};
 use crate::vehicle::{Car, CarState};
-use glam::DVec2;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -18,20 +18,13 @@ use std::path::Path;
 const PANELS: [(&str, &str); 5] = [
     ("speed", "m/s"),
     ("off the line", "m"),
-    ("steering", "deg"),
+    ("steering", "rad"),
     ("yaw rate", "rad/s"),
     ("lateral speed", "m/s"),
 ];
 
-/// Rows of the tyres' traces, in the order of [`CHANNELS`].
-const TYRE_PANELS: [(&str, &str); 6] = [
-    ("load", "N"),
-    ("slip ratio", ""),
-    ("slip angle", "rad"),
-    ("longitudinal force", "N"),
-    ("lateral force", "N"),
-    ("friction used", ""),
-];
+/// What pages call the lap beside the driven one.
+const IDEAL: &str = "quasi-steady-state lap";
 
 /// The figures of one line alone; `--json` prints this.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -184,14 +177,12 @@ pub(super) fn report(
         corners(summary).write_csv(folder.join("corners.csv"))?;
     }
     let drive = &outcome.drive;
-    let driven_m = drive.points_m(&outcome.line);
     let state = |k: usize| -> Vec<f64> { drive.states.iter().map(|s| s[k]).collect() };
+    let driven_m = drive.points_m(&outcome.line);
     let (x, y): (Vec<f64>, Vec<f64>) = driven_m.iter().map(|p| (p.x, p.y)).unzip();
     let steer: Vec<f64> = drive.inputs.iter().map(|input| input.steer).collect();
     let time = (0..drive.states.len()).map(|i| i as f64 * INTERVAL_S);
-    let driven = drive.states.iter().zip(&drive.inputs);
-    let driven = driven.map(|(state, input)| (CarState::from_array(*state), *input));
-    let moments = moments_of(car, &driven.collect::<Vec<_>>());
+    let moments = moments(car, drive);
     let table = Table::new()
         .numbers("time", "s", time.collect::<Vec<f64>>())
         .numbers("station", "m", &drive.station_m)
@@ -203,19 +194,80 @@ pub(super) fn report(
         .numbers("yaw_rate", "rad/s", state(2))
         .numbers("roll", "rad", state(3))
         .numbers("steering", "rad", steer)
-        .numbers("grip_used", "-", grip_used(limits, outcome, &moments));
+        .numbers("grip_used", "-", grip_used(limits, drive, &moments));
     let table = match gears(car, &state(0)) {
         Some(gear) => table.numbers("gear", "-", gear),
         None => table,
     };
-    let channels = CHANNELS
-        .iter()
-        .flat_map(|channel| (0..4).map(move |k| (channel, k)));
-    let table = channels.fold(table, |table, ((name, unit, of), k)| {
-        table.numbers(format!("{name}_{}", WHEELS[k]), *unit, of_wheel(&moments, k, *of))
+    let moments: Vec<_> = moments.into_iter().map(Some).collect();
+    with_tyres(table, &moments).write_csv(folder.join("drive.csv"))?;
+    write_page(folder, (car, limits), outcome, summary, &moments)
+}
+
+/// What each wheel of the car does at each sample of a drive.
+fn moments(car: &Car, drive: &Drive) -> Vec<Moment> {
+    let driven = drive.states.iter().zip(&drive.inputs);
+    let driven = driven.map(|(state, input)| (CarState::from_array(*state), *input));
+    moments_of(car, &driven.collect::<Vec<_>>())
+}
+
+/// A drive of a line: its traces on a page, and its rows in tables by corner.
+pub(super) fn lap_of<'a>(
+    name: &'a str,
+    (car, limits): (&Car, &PointMass),
+    drive: &Drive,
+    line: &Circuit,
+) -> (LapLine, Option<CornerLap<'a>>) {
+    let state = |k: usize| drive.states.iter().map(|s| s[k]).collect::<Vec<f64>>();
+    let steer = drive.inputs.iter().map(|input| input.steer);
+    let traces = LapLine::new(name, &drive.station_m[..])
+        .trace(0, state(0))
+        .trace(1, &drive.offset_m[..])
+        .trace(2, steer.collect::<Vec<f64>>())
+        .trace(3, state(2))
+        .trace(4, state(1))
+        .at(drive.points_m(line));
+    let moments = moments(car, drive);
+    let ay: Vec<f64> = moments.iter().map(|moment| moment.ay_mps2).collect();
+    let corners = CornerLap::new(name, &drive.station_m, &state(0), &ay, 1.0);
+    let corners = corners.map(|corners| {
+        let used = grip_used(limits, drive, &moments);
+        with_gears(corners.grip_used(&used), car, &state(0))
     });
-    table.write_csv(folder.join("drive.csv"))?;
-    write_page(folder, (car, limits), outcome, summary, (&driven_m, &moments))
+    (traces, corners)
+}
+
+fn with_gears<'a>(corners: CornerLap<'a>, car: &Car, v_mps: &[f64]) -> CornerLap<'a> {
+    match gears(car, v_mps) {
+        Some(gear) => corners.gears(&gear),
+        None => corners,
+    }
+}
+
+/// Places laps of one line on a page: traces and a map, which go into `speeds.svg` and `map.svg` too, and a table by corner.
+pub(super) fn place_laps(
+    page: &mut HtmlReport,
+    folder: &Path,
+    (title, map): (&str, String),
+    line: &Circuit,
+    (traces, corners): (Vec<LapLine>, Vec<CornerLap<'_>>),
+) -> Result<()> {
+    let view = LapView::new(title)
+        .note("Of the road, the map shows what the middle of the car may use. Positive is to the left.")
+        .x("distance along the line", "m")
+        .panels(PANELS)
+        .lines(traces)
+        .road(Road {
+            left_edge_m: line.left_edge(),
+            right_edge_m: line.right_edge(),
+            closed: true,
+            names: Vec::new(),
+        });
+    page.figure(folder.join("speeds.svg"), &view)?;
+    if let Some(map) = view.track_map(map) {
+        map.write_svg(folder.join("map.svg"))?;
+    }
+    page.corners(&corners, &[])
 }
 
 /// The gear that gives most (from 1) at each speed (m/s), of a car with a gearbox.
@@ -225,43 +277,10 @@ fn gears(car: &Car, v_mps: &[f64]) -> Option<Vec<f64>> {
 }
 
 /// The share of all of the grip that the driven lap uses at each sample.
-fn grip_used(limits: &PointMass, outcome: &DrivenLine, moments: &[Moment]) -> Vec<f64> {
-    let places = outcome.drive.states.iter().zip(moments);
+fn grip_used(limits: &PointMass, drive: &Drive, moments: &[Moment]) -> Vec<f64> {
+    let places = drive.states.iter().zip(moments);
     let used = places.map(|(state, moment)| limits.grip_used(state[0], [moment.ax_mps2, moment.ay_mps2]));
     used.collect()
-}
-
-/// What a tyre has at a moment.
-type OfWheel = fn(&Wheel) -> f64;
-
-/// Channels of each tyre: name in files, unit, value.
-const CHANNELS: [(&str, &str, OfWheel); 6] = [
-    ("load", "N", |w| w.load_n),
-    ("slip_ratio", "", |w| w.slip_ratio),
-    ("slip_angle", "rad", |w| w.slip_angle_rad),
-    ("longitudinal_force", "N", |w| w.longitudinal_n),
-    ("lateral_force", "N", |w| w.lateral_n),
-    ("friction_used", "", Wheel::friction),
-];
-
-fn of_wheel(moments: &[Moment], k: usize, of: OfWheel) -> Vec<f64> {
-    moments.iter().map(|moment| of(&moment.wheels[k])).collect()
-}
-
-/// The tyres over the lap.
-fn tyres(station_m: &[f64], moments: &[Moment]) -> LapView {
-    let lines = WHEELS.iter().enumerate().map(|(k, name)| {
-        let line = LapLine::new(name.to_uppercase(), station_m);
-        let channels = CHANNELS.iter().enumerate();
-        channels.fold(line, |line, (panel, (.., of))| {
-            line.trace(panel, of_wheel(moments, k, *of))
-        })
-    });
-    LapView::new("Tyres")
-        .note("Friction used is force over load. Forces are along and across each wheel, positive forwards and to the left.")
-        .x("distance along the line", "m")
-        .panels(TYRE_PANELS)
-        .lines(lines)
 }
 
 fn write_page(
@@ -269,7 +288,7 @@ fn write_page(
     (driver_car, limits): (&Car, &PointMass),
     outcome: &DrivenLine,
     summary: &LineSummary,
-    (driven_m, moments): (&[DVec2], &[Moment]),
+    moments: &[Option<Moment>],
 ) -> Result<()> {
     let car = &summary.head.subject.car;
     let mut page = HtmlReport::new(&summary.head.study, &format!("A line driven by the {car}"));
@@ -287,61 +306,39 @@ fn write_page(
     if !summary.agrees {
         page.warning("The two laps differ by more than the half percent asked for.");
     }
-    let (drive, line) = (&outcome.drive, &outcome.line);
-    let state = |k: usize| drive.states.iter().map(|s| s[k]).collect::<Vec<f64>>();
-    let steer_deg = drive.inputs.iter().map(|input| input.steer.to_degrees());
-    let driven = LapLine::new("4DOF car and driver", &drive.station_m[..])
-        .trace(0, state(0))
-        .trace(1, &drive.offset_m[..])
-        .trace(2, steer_deg.collect::<Vec<f64>>())
-        .trace(3, state(2))
-        .trace(4, state(1))
-        .at(driven_m);
-    let point_mass = outcome.point_mass.lap.iter().map(|lap| {
-        LapLine::new("quasi-steady-state lap", &lap.station_m[..])
+    let drive = &outcome.drive;
+    let (driven, by_corner) = lap_of("4DOF car and driver", (driver_car, limits), drive, &outcome.line);
+    let ideal = outcome.point_mass.lap.as_ref();
+    let ideal_line = ideal.map(|lap| {
+        LapLine::new(IDEAL, &lap.station_m[..])
             .trace(0, &lap.v_mps[..])
             .at(&outcome.point_mass.points_m[..])
     });
-    let view = LapView::new("The line, driven")
-        .note("Of the road, the map shows what the middle of the car may use. Positive is to the left.")
-        .x("distance along the line", "m")
-        .panels(PANELS)
-        .line(driven)
-        .lines(point_mass)
-        .road(Road {
-            left_edge_m: line.left_edge(),
-            right_edge_m: line.right_edge(),
-            closed: true,
-            names: Vec::new(),
-        });
-    page.section("Lap", "");
-    page.figure(folder.join("speeds.svg"), &view)?;
-    if let Some(map) = view.track_map(format!("Driven in {:.2} s", outcome.lap_time_s)) {
-        map.write_svg(folder.join("map.svg"))?;
-    }
-    let ay: Vec<f64> = moments.iter().map(|moment| moment.ay_mps2).collect();
-    let with = |corners: CornerLap<'static>, v_mps: &[f64], grip: &[f64]| {
-        let corners = corners.grip_used(grip);
-        match gears(driver_car, v_mps) {
-            Some(gear) => corners.gears(&gear),
-            None => corners,
-        }
-    };
-    let driven = CornerLap::new("4DOF car and driver", &drive.station_m, &state(0), &ay, 1.0);
-    let driven = driven.map(|corners| with(corners, &state(0), &grip_used(limits, outcome, moments)));
-    let ideal = outcome.point_mass.lap.as_ref().and_then(|lap| {
+    let ideal_by_corner = ideal.and_then(|lap| {
         let length = lap.station_m.len().min(lap.v_mps.len());
-        let stations = &lap.station_m[..length];
-        let corners = CornerLap::new("quasi-steady-state lap", stations, &lap.v_mps, &lap.ay_mps2, 1.0)?;
-        Some(with(corners, &lap.v_mps, &lap.grip_used(limits)))
+        let corners = CornerLap::new(IDEAL, &lap.station_m[..length], &lap.v_mps, &lap.ay_mps2, 1.0)?;
+        Some(with_gears(
+            corners.grip_used(&lap.grip_used(limits)),
+            driver_car,
+            &lap.v_mps,
+        ))
     });
-    page.corners(&driven.into_iter().chain(ideal).collect::<Vec<_>>(), &[])?;
+    page.section("Lap", "");
+    let laps = (
+        [driven].into_iter().chain(ideal_line).collect(),
+        by_corner.into_iter().chain(ideal_by_corner).collect(),
+    );
+    let titles = (
+        "The line, driven",
+        format!("Driven in {:.2} s", outcome.lap_time_s),
+    );
+    place_laps(&mut page, folder, titles, &outcome.line, laps)?;
     if !summary.corners.is_empty() {
         let note = "Each from one greatest speed to the next. Lost is the time to the quasi-steady-state lap with all of the grip.";
         page.table("Grip by corner", note, &corners(summary))?;
     }
     page.section("Tyres", "");
-    page.place(&tyres(&drive.station_m, moments))?;
+    page.place(&tyre_view(&drive.station_m, moments))?;
     page.provenance("car", car);
     summary.head.record.provenance(&mut page, "laps driven");
     page.write(folder.join("report.html"))

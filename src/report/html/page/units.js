@@ -50,6 +50,18 @@ function curvesInEngineers(data) {
   }
 }
 
+function surfaceInEngineers(data) {
+  ["x", "y"].forEach((axis, place) => {
+    const [label, factor] = relabelled(data[`${axis}_label`]);
+    data[`${axis}_label`] = label;
+    data[axis] = scaled(data[axis], factor);
+    for (const mark of data.marked) mark[place] *= factor;
+  });
+  const [label, factor] = relabelled(data.value_label);
+  data.value_label = label;
+  data.values = data.values.map((row) => scaled(row, factor));
+}
+
 function tableInEngineers(table) {
   [...table.tHead.rows[0].cells].forEach((head, column) => {
     const place = head.querySelector(".unit");
@@ -93,6 +105,7 @@ function inUnits(charts) {
   for (const chart of charts) {
     if (chart.kind === "lap") lapInEngineers(chart);
     if (chart.kind === "curves") curvesInEngineers(chart);
+    if (chart.kind === "surface") surfaceInEngineers(chart);
   }
   document.querySelectorAll(".table table").forEach(tableInEngineers);
   document.querySelectorAll(".tiles dd").forEach(tileInEngineers);

@@ -23,7 +23,7 @@ const PANELS: [(&str, &str); 6] = [
     ("ax", "m/s\u{b2}"),
     ("ay", "m/s\u{b2}"),
     ("curvature", "1/m"),
-    ("steering", "deg"),
+    ("steering", "rad"),
 ];
 /// Room before and behind a section in its close-up (m).
 const ROOM_M: f64 = 60.0;
@@ -182,13 +182,12 @@ fn laps(setup: &Setup, lines: &[&ReportedLine]) -> LapView {
             let lost = lines
                 .first()
                 .and_then(|fastest| line.fine.time_lost_s(&fastest.fine, &shares));
-            let steering = lap.steering_rad.iter().map(|a| a.to_degrees());
             view = view
                 .trace(0, &lap.v_mps[..])
                 .maybe(1, lost)
                 .trace(2, &lap.ax_mps2[..])
                 .trace(3, &lap.ay_mps2[..])
-                .trace(5, steering.collect::<Vec<f64>>());
+                .trace(5, &lap.steering_rad[..]);
         }
         view.trace(4, &line.fine.curvature_1pm[..])
     };
