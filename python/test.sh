@@ -29,7 +29,8 @@ if [ -z "$wheel" ]; then
 fi
 "$python" -m pip install --quiet --disable-pip-version-check --no-deps "$wheel"
 # What is tested is the wheel: the folder beside has no native half, and would hide it.
-cp -r tests tests_ray benches examples pyproject.toml "$folder"
+here=$PWD
+cp -r tests benches examples pyproject.toml "$folder"
 cd "$folder"
 if [ "$tier" != ray ]; then
     "$python" -m pytest -q -p no:cacheprovider tests
@@ -43,6 +44,8 @@ if [ "$tier" != ray ]; then
     "$python" -m mypy --strict examples benches/evaluate.py
 fi
 if [ "$tier" != usual ]; then
+    # Not before: pytest reads what it finds of settings of tests, and these want Ray.
+    cp -r "$here/tests_ray" "$folder"
     "$python" -m pip install --quiet --disable-pip-version-check fsspec==2026.9.0 ray==2.60.0
     "$python" -m pytest -q -p no:cacheprovider tests_ray
     "$python" -m mypy --strict -p lapswarm

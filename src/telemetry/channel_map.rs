@@ -479,6 +479,38 @@ mod tests {
     }
 
     #[test]
+    fn no_usual_name_is_that_of_two_roles() {
+        let mut names: Vec<&str> = Role::ALL
+            .iter()
+            .flat_map(|role| role.usual_names())
+            .copied()
+            .collect();
+        names.sort_unstable();
+        let twice = names.windows(2).find(|pair| pair[0] == pair[1]);
+        assert_eq!(twice, None);
+    }
+
+    /// A logger's short names.
+    #[test]
+    fn short_names_are_found() {
+        let short = [
+            ("WS_FL", "km/h"),
+            ("WS_FR", "km/h"),
+            ("WS_RL", "km/h"),
+            ("WS_RR", "km/h"),
+            ("SteerAngle", "deg"),
+            ("Speed", "km/h"),
+            ("LongG", "g"),
+            ("LatG", "g"),
+            ("Gyro Z", "deg/s"),
+        ];
+        let recording = recording(&short);
+        let mapped = ChannelMap::default().resolve(&recording).unwrap();
+        let found: Vec<&str> = mapped.iter().map(|m| m.channel.name.as_str()).collect();
+        assert_eq!(found, short.map(|(name, _)| name));
+    }
+
+    #[test]
     fn what_cannot_be_resolved_says_what_to_write() {
         let error = |channels: &[(&str, &str)], map: &str| {
             let map = ChannelMap::parse(map, "m.toml").unwrap();

@@ -176,6 +176,9 @@ impl Role {
                 "flwheelspeed",
                 "flspeed",
                 "lfspeed",
+                "wsfl",
+                "wslf",
+                "lfwheelspeed",
             ],
             Self::WheelSpeedFr => &[
                 "wheelspeedfrradps",
@@ -188,6 +191,9 @@ impl Role {
                 "frwheelspeed",
                 "frspeed",
                 "rfspeed",
+                "wsfr",
+                "wsrf",
+                "rfwheelspeed",
             ],
             Self::WheelSpeedRl => &[
                 "wheelspeedrlradps",
@@ -200,6 +206,9 @@ impl Role {
                 "rlwheelspeed",
                 "rlspeed",
                 "lrspeed",
+                "wsrl",
+                "wslr",
+                "lrwheelspeed",
             ],
             Self::WheelSpeedRr => &[
                 "wheelspeedrrradps",
@@ -211,6 +220,7 @@ impl Role {
                 "speedrr",
                 "rrwheelspeed",
                 "rrspeed",
+                "wsrr",
             ],
             Self::Steer => &[
                 "steerrad",
@@ -223,6 +233,10 @@ impl Role {
                 "steerpos",
                 "steeringposition",
                 "steer",
+                "steerwheelangle",
+                "steeringwheel",
+                "handwheelangle",
+                "swa",
             ],
             Self::Vx => &[
                 "vxmps",
@@ -235,6 +249,8 @@ impl Role {
                 "gpsspeed",
                 "speed",
                 "vx",
+                "vcar",
+                "carspeed",
             ],
             Self::Ax => &[
                 "axmps2",
@@ -251,6 +267,11 @@ impl Role {
                 "gpslonacc",
                 "glong",
                 "ax",
+                "longg",
+                "glon",
+                "accx",
+                "accelx",
+                "inlineg",
             ],
             Self::Ay => &[
                 "aymps2",
@@ -265,6 +286,10 @@ impl Role {
                 "gpslatacc",
                 "glat",
                 "ay",
+                "latg",
+                "accy",
+                "accely",
+                "lateralg",
             ],
             Self::YawRate => &[
                 "yawrateradps",
@@ -277,6 +302,8 @@ impl Role {
                 "zrate",
                 "zrateofrotation",
                 "gpsgyro",
+                "gyroz",
+                "yawspeed",
             ],
             Self::Distance => &[
                 "distancem",
