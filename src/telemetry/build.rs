@@ -222,8 +222,7 @@ impl Build<'_> {
                 "one",
             )),
         };
-        let [fl, fr, rl, rr] = Role::WHEELS;
-        let wheel_speed_radps = [needed(fl)?, needed(fr)?, needed(rl)?, needed(rr)?];
+        let wheel_speed_radps = Role::WHEELS.map(|wheel| find(wheel).map(sampled).unwrap_or_default());
         let mut log = Log {
             source: self.source.to_owned(),
             dt_s: grid.dt_s,
@@ -242,6 +241,22 @@ impl Build<'_> {
             laps: Vec::new(),
             calibration,
         };
+        let unlogged: Vec<Role> = Role::WHEELS
+            .into_iter()
+            .filter(|wheel| find(*wheel).is_none())
+            .collect();
+        for wheel in &unlogged {
+            self.refuse_other_unit(*wheel)?;
+        }
+        if let [first, others @ ..] = &unlogged[..] {
+            let others: String = others.iter().map(|wheel| format!(", {}", wheel.key())).collect();
+            let text = format!(
+                "{}{others}: not logged; the car's own motion stands in for them, and the log does not tell how its tyres slip \
+                 along the car",
+                first.key()
+            );
+            note(&mut log, &text);
+        }
         log.vx_mps = match find(Role::Vx) {
             Some(signal) => sampled(signal),
             None => self.speed_of_wheels(&mut log)?,
@@ -351,6 +366,19 @@ impl Build<'_> {
 
     fn speed_of_wheels(&self, log: &mut Log) -> Result<Vec<f64>> {
         self.refuse_other_unit(Role::Vx)?;
+        let [fl, fr, rl, rr] = &log.wheel_speed_radps;
+        let (left, right, axle, name) = match self.map.speed_axle {
+            Axle::Front => (fl, fr, 0, "front"),
+            Axle::Rear => (rl, rr, 1, "rear"),
+        };
+        if left.is_empty() || right.is_empty() {
+            return Err(Error::input(
+                self.source,
+                Place::default().channel("vx"),
+                format!("no ground speed, and no speeds of the {name} wheels to make one of"),
+                "a ground speed channel",
+            ));
+        }
         let Some(radius) = self.radius else {
             return Err(Error::input(
                 self.source,
@@ -359,15 +387,10 @@ impl Build<'_> {
                 "a ground speed channel, or rolling_radius_m in [vehicle] of the channel map",
             ));
         };
-        let [fl, fr, rl, rr] = &log.wheel_speed_radps;
-        let (left, right, radius, name) = match self.map.speed_axle {
-            Axle::Front => (fl, fr, radius[0], "front"),
-            Axle::Rear => (rl, rr, radius[1], "rear"),
-        };
         let speed = left
             .iter()
             .zip(right)
-            .map(|(l, r)| (l + r) / 2.0 * radius)
+            .map(|(l, r)| (l + r) / 2.0 * radius[axle])
             .collect();
         note(
             log,

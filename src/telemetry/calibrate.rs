@@ -65,6 +65,10 @@ fn signs(log: &mut Log, declared: &Declared) {
             None => String::new(),
         };
         sign(log, declared, Role::YawRate, found, &evidence);
+    } else if let Some(found) = against_two(log, &moving) {
+        // Of three channels the one that two contradict is the wrong one.
+        let evidence = "against ay and steering, which agree with one another";
+        sign(log, declared, Role::YawRate, Some(found), evidence);
     }
     let turning = product(&log.vx_mps, &log.yaw_rate_radps);
     let found = fit(&turning, &log.ay_mps2, &moving);
@@ -87,6 +91,14 @@ fn signs(log: &mut Log, declared: &Declared) {
     gain(log, Role::Ax, found, "the change of ground speed");
     let found = fit(&log.yaw_rate_radps, &log.steer_rad, &moving);
     sign(log, declared, Role::Steer, found, "against yaw rate");
+}
+
+/// The fit of yaw rate to ay, where both ay and steering contradict its sign.
+fn against_two(log: &Log, moving: &[bool]) -> Option<Fit> {
+    let contradicts = |found: &Fit| found.correlation <= -SURE_OF_SIGN;
+    let turning = product(&log.vx_mps, &log.yaw_rate_radps);
+    fit(&log.yaw_rate_radps, &log.steer_rad, moving).filter(contradicts)?;
+    fit(&turning, &log.ay_mps2, moving).filter(contradicts)
 }
 
 fn sign(log: &mut Log, declared: &Declared, role: Role, found: Option<Fit>, evidence: &str) {
@@ -346,6 +358,12 @@ fn steady(log: &Log, excess: &[f64], driven: bool) -> Option<Excess> {
 fn rolling_radii(log: &mut Log, declared: &Declared) {
     for (axle, [left, right]) in [[0, 1], [2, 3]].into_iter().enumerate() {
         let driven = (axle == 1) != declared.rear_is_undriven;
+        if [left, right]
+            .iter()
+            .any(|wheel| log.wheel_speed_radps[*wheel].is_empty())
+        {
+            continue;
+        }
         let reference_m = declared.rolling_radius_m.map(|radii| radii[axle]);
         let rim = |wheel: usize, i: usize| {
             log.wheel_speed_radps[wheel][i] * reference_m.unwrap_or(1.0) / log.vx_mps[i].max(1.0)

@@ -216,7 +216,7 @@ fn quoted(text: &str) -> String {
 fn without(role: Role) -> &'static str {
     match role {
         Role::WheelSpeedFl | Role::WheelSpeedFr | Role::WheelSpeedRl | Role::WheelSpeedRr => {
-            "needed: the speeds of the wheels drive the model"
+            "the car's own motion stands in for it; slip along the car is not told"
         }
         Role::Steer => "needed: the steering angle drives the model",
         Role::YawRate => "needed: the model is compared with it",
@@ -308,11 +308,11 @@ mod tests {
             .find(|m| m.role == Role::WheelSpeedFl)
             .unwrap();
         assert_eq!(wheel.candidates, ["FL", "Gyro"]);
-        assert!(wheel.without.starts_with("needed"));
+        assert!(wheel.without.contains("stands in"));
         assert!(!list.missing.iter().any(|m| m.role == Role::Vx));
         let table = list.table();
         assert!(
-            table.contains("no wheel_speed_fl: needed") && table.contains("36 to 72"),
+            table.contains("no wheel_speed_fl: the car's own") && table.contains("36 to 72"),
             "{table}"
         );
     }

@@ -66,6 +66,11 @@ fn conditioned(log: &Log) -> Log {
     read(&exported(log), "", &options())
 }
 
+/// As [`conditioned`], where the logger knows no wheels.
+fn without_wheels(log: &Log) -> Log {
+    read(&exported(log).replace("Wheel Speed ", "Board "), "", &options())
+}
+
 fn channels(log: &Log) -> [(Role, &Vec<f64>); 9] {
     let [fl, fr, rl, rr] = &log.wheel_speed_radps;
     [
@@ -291,15 +296,46 @@ fn swapped_signs_are_found() {
     for role in [Role::Steer, Role::Ay, Role::Ax, Role::YawRate] {
         let mut log = noisy(perfect(), 3);
         channel(&mut log, role).iter_mut().for_each(|v| *v = -*v);
-        let found = conditioned(&log);
-        assert_eq!(found.calibration.applied(role, FindingKind::Sign), Some(-1.0));
-        assert_eq!(
-            applied(&found.calibration).len(),
-            1,
-            "{:?}",
-            applied(&found.calibration)
-        );
+        for found in [conditioned(&log), without_wheels(&log)] {
+            assert_eq!(found.calibration.applied(role, FindingKind::Sign), Some(-1.0));
+            let applied = applied(&found.calibration);
+            assert_eq!(applied.len(), 1, "{applied:?}");
+        }
     }
+}
+
+#[test]
+fn a_log_without_wheel_speeds_is_read() {
+    let log = perfect();
+    let found = without_wheels(&log);
+    assert!(found.wheel_speed_radps.iter().all(Vec::is_empty));
+    assert_nothing_applied(&found);
+    let said = "wheel_speed_fl, wheel_speed_fr, wheel_speed_rl, wheel_speed_rr: not logged";
+    assert!(found.calibration.notes.iter().any(|note| note.starts_with(said)));
+    for (a, b) in found.yaw_rate_radps.iter().zip(&log.yaw_rate_radps) {
+        assert!((a - b).abs() < 1e-12);
+    }
+    assert!(found.slice(10..20).unwrap().wheel_speed_radps[0].is_empty());
+
+    // The front wheels alone: theirs are the speeds that are judged.
+    let text = exported(&log).replace("Wheel Speed R", "Board R");
+    let found = read(&text, "", &options());
+    assert!(found.wheel_speed_radps.map(|wheel| wheel.is_empty()) == [false, false, true, true]);
+    assert!(applied(&found.calibration).is_empty());
+    let radius = |role| found.calibration.finding(role, FindingKind::RollingRadius);
+    assert!(radius(Role::WheelSpeedFl).is_some() && radius(Role::WheelSpeedRl).is_none());
+
+    // Neither ground speed nor the speeds of the wheels that would stand in for it.
+    let text = text
+        .replace("Wheel Speed F", "Board F")
+        .replace("Ground Speed", "Board");
+    let recording = Recording::parse(text.as_bytes(), "lap.csv").unwrap();
+    let refused = Log::from_recording(&recording, &ChannelMap::default(), &options());
+    let said = refused.unwrap_err().to_string();
+    assert!(
+        said.contains("channel vx") && said.contains("front wheels"),
+        "{said}"
+    );
 }
 
 /// The wheels of a car whose axles have radii of their own, known or not.

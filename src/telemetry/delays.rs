@@ -119,7 +119,8 @@ pub(super) fn delays(evidence: &Evidence<'_>, calibration: &mut Calibration) {
     // Free wheels roll with the ground. Their paths differ from the car's by its turning.
     let rolling = "ground speed, while the wheel is neither driven nor braked";
     let mut placed: Vec<Placed> = Vec::new();
-    for wheel in *undriven {
+    let logged = |wheel: &usize| !log.wheel_speed_radps[*wheel].is_empty();
+    for wheel in undriven.iter().copied().filter(logged) {
         let role = Role::WHEELS[wheel];
         let columns = [&log.vx_mps[..], &log.yaw_rate_radps[..]];
         let lag = best_lag(&log.wheel_speed_radps[wheel], columns, &free, most, 0.0);
@@ -162,7 +163,7 @@ pub(super) fn delays(evidence: &Evidence<'_>, calibration: &mut Calibration) {
     // A driven wheel's delay cannot be told from its slip; that it is late beside the other wheel of its axle can.
     let beside = "the other wheel of its axle";
     for (wheel, other) in [(0, 1), (1, 0), (2, 3), (3, 2)] {
-        if undriven.contains(&wheel) {
+        if undriven.contains(&wheel) || !logged(&wheel) || !logged(&other) {
             continue;
         }
         let (role, partner) = (Role::WHEELS[wheel], Role::WHEELS[other]);
@@ -188,7 +189,10 @@ pub(super) fn delays(evidence: &Evidence<'_>, calibration: &mut Calibration) {
     let difference: Vec<f64> = right.iter().zip(left).map(|(r, l)| r - l).collect();
     let columns = [&log.yaw_rate_radps[..], &log.vx_mps[..]];
     // Yaw rate is late where the difference comes early.
-    let lag = best_lag(&difference, columns, &free, most, 0.0)
+    let both = undriven.iter().all(logged);
+    let lag = both.then(|| best_lag(&difference, columns, &free, most, 0.0));
+    let lag = lag
+        .flatten()
         .filter(|lag| one_board && lag.follows >= FOLLOWS)
         .map(|lag| Lag {
             samples: -lag.samples,

@@ -61,6 +61,9 @@ pub(super) fn unbraked(log: &Log, accel: &[f64]) -> Vec<bool> {
 /// Speed of a wheel in m/s, with a rolling radius that is good enough to compare wheels. It is estimated where the car hardly
 /// turns, since a wheel that is inside in most corners would look too large. Without such stretches all samples are used.
 fn linear_speed(log: &Log, wheel: &[f64]) -> Option<Vec<f64>> {
+    if wheel.is_empty() {
+        return None;
+    }
     let radius = |most_yaw: f64| {
         let ratios: Vec<f64> = (0..log.samples())
             .filter(|&i| {

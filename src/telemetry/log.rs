@@ -23,7 +23,7 @@ pub struct LogOptions {
 }
 
 /// A log on one uniform clock, in SI and ISO 8855: x forward, y left, yaw anticlockwise and steering to the left
-/// positive. All arrays have as many values as `time_s`.
+/// positive. All arrays have as many values as `time_s`, save those of wheels that are not logged.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Log {
     /// The file it came from.
@@ -34,7 +34,7 @@ pub struct Log {
     pub time_s: Vec<f64>,
     /// Distance from the start of the lap, m; integrated from speed where it is not logged.
     pub distance_m: Vec<f64>,
-    /// Wheel speeds FL FR RL RR, rad/s.
+    /// Wheel speeds FL FR RL RR, rad/s; those of a wheel that is not logged are empty.
     pub wheel_speed_radps: [Vec<f64>; 4],
     /// Road-wheel angle, rad.
     pub steer_rad: Vec<f64>,
@@ -93,7 +93,10 @@ impl Log {
             dt_s: self.dt_s,
             time_s: cut(&self.time_s),
             distance_m: cut(&self.distance_m),
-            wheel_speed_radps: [0, 1, 2, 3].map(|w| cut(&self.wheel_speed_radps[w])),
+            wheel_speed_radps: [0, 1, 2, 3].map(|w| match &self.wheel_speed_radps[w][..] {
+                [] => Vec::new(),
+                logged => cut(logged),
+            }),
             steer_rad: cut(&self.steer_rad),
             drs: cut(&self.drs),
             vx_mps: cut(&self.vx_mps),

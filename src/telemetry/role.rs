@@ -126,9 +126,10 @@ impl Role {
         }
     }
 
-    /// Whether a log cannot do without it. Ground speed can be made from wheel speeds, and accelerations from speed and yaw rate.
+    /// Whether a log cannot do without it. Ground speed can be made of wheel speeds and wheel speeds of ground speed, accelerations
+    /// of speed and yaw rate.
     pub fn required(self) -> bool {
-        self.of_motion() && !matches!(self, Self::Vx | Self::Ax | Self::Ay)
+        matches!(self, Self::Steer | Self::YawRate)
     }
 
     /// Whether it is part of the car's motion: what drives the model, or what the model is compared with.

@@ -10,6 +10,7 @@ mod results;
 mod search;
 mod settings;
 mod setup;
+mod stand_in;
 mod state;
 mod verdict;
 

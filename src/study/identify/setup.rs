@@ -1,13 +1,14 @@
 //! From a log to a problem: samples, windows, step size, scales of the channels.
 
 use super::settings::{FreeParameter, IdentifySettings, ObjectiveChoice};
+use super::stand_in::StandIn;
 use crate::error::{Error, Result};
 use crate::evaluate::Objective;
 use crate::evaluate::replay::{
     CHANNEL_NAMES, CHANNEL_UNITS, ChannelWeights, Norm, ReplayProblem, Sample, Window, initial_state,
 };
 use crate::study::framework::{Plan, Subject};
-use crate::telemetry::{ChannelMap, Log, LogOptions, NativeFormat, Recording};
+use crate::telemetry::{Axle, ChannelMap, Log, LogOptions, NativeFormat, Recording};
 use crate::track::{Circuit, Track};
 use crate::vehicle::Car;
 use crate::vehicle::modes::{fastest_mode, slowest_decay, stable_steps};
@@ -94,7 +95,7 @@ pub fn set_up(settings: &IdentifySettings) -> Result<Setup> {
     let truth_car = settings.truth.as_deref().or(bundled.then_some("gt"));
     let truth_car = truth_car.map(Car::load).transpose()?;
 
-    let samples = samples_of(&log);
+    let samples = samples_of(&log, &car, map.speed_axle);
     let (fitted, held) = choose_laps(settings, &log)?;
     let settle_s = settings
         .settle_s
@@ -200,10 +201,11 @@ pub(in crate::study) fn subject(settings: &IdentifySettings, setup: &Setup) -> S
     }
 }
 
-fn samples_of(log: &Log) -> Vec<Sample<f64>> {
+fn samples_of(log: &Log, car: &Car, undriven: Axle) -> Vec<Sample<f64>> {
+    let stand_in = StandIn::new(log, car, undriven);
     (0..log.samples())
         .map(|i| Sample {
-            wheel_speed: std::array::from_fn(|wheel| log.wheel_speed_radps[wheel][i]),
+            wheel_speed: stand_in.wheel_speeds(i),
             steer: log.steer_rad[i],
             flap: log.drs[i],
             measured: [
