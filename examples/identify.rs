@@ -20,7 +20,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             free("rCy1", 0.8, 1.5),
             free("roll_stiffness_nm_per_rad", 3e4, 3e5),
             free("roll_damping_nms_per_rad", 3e3, 5e4),
-        ],
+        ]
+        .into(),
         population: Some(32),
         iterations: Some(20),
         ..IdentifySettings::default()

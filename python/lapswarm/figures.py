@@ -56,6 +56,25 @@ class Untold:
 
 
 @dataclass(frozen=True)
+class Tried:
+    """A number of free parameters that was tried."""
+
+    parameters: int
+    held_out_error: float
+
+
+@dataclass(frozen=True)
+class Choice:
+    """How free parameters were chosen by a log."""
+
+    names: list[str]
+    among: int
+    starting_error: float | None
+    tried: list[Tried]
+    not_chosen: str | None
+
+
+@dataclass(frozen=True)
 class Finding:
     """What was found about a channel of a log."""
 
@@ -107,6 +126,7 @@ class Identified(Figures):
     substeps_needed: int
     windows: int
     settle_s: float
+    choice: Choice | None
     notes: list[str]
     calibration: Calibration
 

@@ -40,7 +40,7 @@ pub(in crate::study) fn set_up_channels(
 ) -> Result<Setup> {
     let channels = (0..CHANNEL_NAMES.len()).map(ObjectiveChoice::Channel);
     let mut setup = set_up(&IdentifySettings {
-        free,
+        free: free.into(),
         free_from: None,
         objectives: std::iter::once(ObjectiveChoice::All).chain(channels).collect(),
         ..settings.clone()

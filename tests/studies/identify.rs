@@ -6,8 +6,8 @@ use lapswarm::evaluate::replay::{BackendChoice, CHANNEL_NAMES, open_evaluator};
 use lapswarm::simulate::{SensorSettings, SimulateSettings, simulate_lap};
 use lapswarm::study::framework::{solve_unobserved, write_results};
 use lapswarm::study::identify::{
-    Algorithm, FreeParameter, Identify, IdentifySettings, Setup, Summary, Verdict, judge, judge_candidate,
-    lap_format, polish, set_up, total_parameter_error,
+    Algorithm, FreeParameter, Identify, IdentifySettings, Setup, Summary, Unknowns, Verdict, judge,
+    judge_candidate, lap_format, polish, set_up, total_parameter_error,
 };
 use lapswarm::telemetry::{Log, write_native};
 use lapswarm::track::Circuit;
@@ -161,9 +161,9 @@ fn a_cold_swarm_and_polish_find_the_car() {
     );
     // And the resolved study reads back as the one that was run.
     let again = IdentifySettings::read(&folder.path().join("study.toml")).unwrap();
-    let mut by_name = settings.free.clone();
+    let mut by_name = settings.free.to_vec();
     by_name.sort_by(|a, b| a.name.cmp(&b.name));
-    assert_eq!(again.free, by_name);
+    assert_eq!(again.free.to_vec(), by_name);
     assert_eq!(
         (again.population, again.iterations, again.seed),
         (Some(64), Some(150), settings.seed)
@@ -304,7 +304,7 @@ fn noise_stays_within_three_standard_errors() {
     }
 }
 
-fn free(unknowns: &[(&str, f64, f64)]) -> Vec<FreeParameter> {
+fn free(unknowns: &[(&str, f64, f64)]) -> Unknowns {
     let free = |(name, lower, upper): &(&str, f64, f64)| FreeParameter {
         name: (*name).to_owned(),
         lower: *lower,
@@ -345,6 +345,58 @@ fn in_windows(log: Option<PathBuf>, settle_s: Option<f64>) -> IdentifySettings {
         ]),
         ..simd()
     }
+}
+
+/// Of a car that differs from the starting one in two figures, the log chooses these and leaves what it cannot tell.
+#[test]
+fn the_log_chooses_what_it_can_tell() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut car = Car::bundled().unwrap();
+    car.chassis.lift_area *= 0.7;
+    car.chassis.inertia_yaw *= 1.3;
+    let (log, _) = lap_of(&car, [0.05, 0.1, 0.1, 0.005], folder.path());
+    let pool = [
+        ("roll_damping_nms_per_rad", 3e3, 5e4),
+        ("drs_drag_percent", 0.0, 50.0),
+        ("downforce_area_m2", 0.5, 4.0),
+        ("rEx2", -1.0, 1.0),
+        ("yaw_inertia_kgm2", 800.0, 3000.0),
+        ("rVy6", 2.0, 30.0),
+    ];
+    let settings = IdentifySettings {
+        log: Some(log),
+        free: Unknowns {
+            auto: true,
+            ..free(&pool)
+        },
+        ..simd()
+    };
+    let setup = set_up(&settings).unwrap();
+    let choice = setup.choice.expect("a choice");
+    println!("{}", choice.to_text());
+    assert!(choice.not_chosen.is_none() && choice.among == pool.len());
+    let mut first = [&choice.names[0][..], &choice.names[1][..]];
+    first.sort_unstable();
+    assert_eq!(first, ["downforce_area_m2", "yaw_inertia_kgm2"]);
+    assert!(choice.names.len() < pool.len() && !choice.names.iter().any(|n| n == "drs_drag_percent"));
+    assert_eq!(setup.replay.dimensions(), choice.names.len());
+    let chosen = choice.tried.iter().find(|t| t.parameters == choice.names.len());
+    assert!(chosen.unwrap().held_out_error < 0.5 * choice.starting_error.unwrap());
+
+    // The settings read back as they were.
+    let read = IdentifySettings::parse(Path::new("study.toml"), &settings.to_toml(), folder.path()).unwrap();
+    assert!(read.free.auto && read.free.len() == pool.len());
+
+    // The car that drove the bundled lap leaves nothing to choose by.
+    let exact = set_up(&IdentifySettings {
+        free: Unknowns {
+            auto: true,
+            ..IdentifySettings::default().free
+        },
+        ..simd()
+    });
+    let choice = exact.unwrap().choice.unwrap();
+    assert!(choice.not_chosen.is_some() && choice.names.len() == 22);
 }
 
 #[test]
@@ -636,11 +688,11 @@ fn bad_studies_are_refused_by_line_and_field() {
     );
 
     let unknown = IdentifySettings {
-        free: vec![FreeParameter {
+        free: Unknowns::from(vec![FreeParameter {
             name: "rZz9".to_owned(),
             lower: 0.0,
             upper: 1.0,
-        }],
+        }]),
         ..simd()
     };
     assert!(set_up(&unknown).err().unwrap().to_string().contains("rZz9"));

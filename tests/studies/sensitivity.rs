@@ -73,8 +73,9 @@ fn the_lap_feels_grip_more_than_roll_and_files_say_so() {
         free: read
             .replay
             .free
-            .into_iter()
+            .iter()
             .filter(|f| f.name == "rBy1")
+            .cloned()
             .collect(),
         free_from: Some(folder.path().to_owned()),
         most: 2,

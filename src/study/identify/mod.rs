@@ -1,5 +1,6 @@
 //! Identification: which car drove this lap?
 
+mod choose;
 mod hops;
 mod identifiability;
 mod notes;
@@ -14,11 +15,12 @@ mod stand_in;
 mod state;
 mod verdict;
 
+pub use choose::{Choice, Tried};
 pub use identifiability::{Group, Identifiability, judge};
 pub use polish::{Polished, polish};
 pub use results::Summary;
 pub use search::{Judged, Outcome, judge_candidate, search_with, total_parameter_error};
-pub use settings::{Algorithm, FreeParameter, IdentifySettings, ObjectiveChoice};
+pub use settings::{Algorithm, FreeParameter, IdentifySettings, ObjectiveChoice, Unknowns};
 pub use setup::{Setup, cost_unit, lap_format, set_up};
 pub(in crate::study) use setup::{planned, subject, without_laps};
 pub use state::{Front, HistoryRow, SearchState};

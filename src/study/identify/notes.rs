@@ -8,6 +8,15 @@ use crate::evaluate::replay::ReplayProblem;
 /// The notes of a run.
 pub(super) fn notes(setup: &Setup, summary: &Summary) -> Vec<String> {
     let mut notes = Vec::new();
+    if let Some(choice) = &summary.choice {
+        notes.push(choice.to_text());
+    } else if summary.total_parameter_error.is_none()
+        && 2 * summary.unidentifiable.len() >= summary.parameters.len()
+    {
+        notes.push(
+            "Half of the parameters or more cannot be told from this log. With free = \"auto\" those that it can tell are found.".to_owned(),
+        );
+    }
     let (taken, needed) = (summary.substeps, summary.substeps_needed);
     if needed > taken {
         notes.push(format!(

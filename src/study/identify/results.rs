@@ -1,6 +1,7 @@
 //! What an identification leaves behind: figures for people and scripts, files, figures.
 
 use super::Identify;
+use super::choose::Choice;
 use super::identifiability::at_bound;
 use super::notes::notes;
 use super::search::{Judged, Outcome, judge_candidate, total_parameter_error};
@@ -103,6 +104,8 @@ pub struct Summary {
     pub windows: usize,
     /// Time that each window is driven before it is scored, s.
     pub settle_s: f64,
+    /// How the free parameters were chosen, where the log chose them (`free` with `auto`).
+    pub choice: Option<Choice>,
     /// What limits these results, in words.
     pub notes: Vec<String>,
     /// What the telemetry's calibration found and applied.
@@ -193,6 +196,7 @@ pub(super) fn summarise(settings: &IdentifySettings, setup: &Setup, outcome: &Ou
         substeps_needed: replay.steps_needed(&replay.flat(&outcome.candidate)),
         windows: replay.plan.windows.len(),
         settle_s: setup.settle_s,
+        choice: setup.choice.clone(),
         notes: Vec::new(),
         calibration: setup.log.calibration.clone(),
     };

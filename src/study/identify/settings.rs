@@ -38,6 +38,35 @@ pub struct FreeParameter {
     pub upper: f64,
 }
 
+/// The parameters to find.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Unknowns {
+    /// The parameters.
+    pub among: Vec<FreeParameter>,
+    /// Whether those of them are found that the log can tell, and not all.
+    pub auto: bool,
+}
+
+impl From<Vec<FreeParameter>> for Unknowns {
+    fn from(among: Vec<FreeParameter>) -> Self {
+        Self { among, auto: false }
+    }
+}
+
+impl FromIterator<FreeParameter> for Unknowns {
+    fn from_iter<I: IntoIterator<Item = FreeParameter>>(iter: I) -> Self {
+        iter.into_iter().collect::<Vec<_>>().into()
+    }
+}
+
+impl std::ops::Deref for Unknowns {
+    type Target = [FreeParameter];
+
+    fn deref(&self) -> &[FreeParameter] {
+        &self.among
+    }
+}
+
 /// What the swarm minimises.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum ObjectiveChoice {
@@ -98,8 +127,8 @@ settings! {
             "The circuit that sections are named on: a bundled name, a TOML file, a survey (CSV, GPX, KML, log) or a shape";
         truth: Option<String> ["-"] = None, optional(name_or_file()).example("\"gt\""),
             "The car that drove the log, where it is known: the parameters' errors are stated against it";
-        free: Vec<FreeParameter> ["-"] = usual_unknowns(), of(Bounds),
-            "Parameters to find, each with its least and greatest value";
+        free: Unknowns ["-"] = usual_unknowns(), of(Bounds),
+            "Parameters to find, each with its least and greatest value; with auto those of them that the log can tell, by cross-validation";
         free_from: Option<PathBuf> ["-"] = None, optional(file()).example("\"runs/sensitivity-001\""),
             "A run of sensitivity: its parameters that matter most are found, within the bounds of free or else over the range that it moved them";
         most: usize ["-"] = 12, count(1, 1000),
@@ -170,13 +199,13 @@ settings! {
 }
 
 /// The 22 unknowns of the thesis (5.11) within wide bounds.
-fn usual_unknowns() -> Vec<FreeParameter> {
+fn usual_unknowns() -> Unknowns {
     let free = |(name, lower, upper): (&str, f64, f64)| FreeParameter {
         name: name.to_owned(),
         lower,
         upper,
     };
-    USUAL_UNKNOWNS.map(free).to_vec()
+    USUAL_UNKNOWNS.map(free).to_vec().into()
 }
 
 /// Names and bounds of [`usual_unknowns`].
@@ -226,7 +255,7 @@ impl IdentifySettings {
     /// [`Error::Io`] if the study's summary cannot be read, [`Error::Input`] if it is another study's.
     pub(super) fn freed(&self) -> Result<Vec<FreeParameter>> {
         let Some(run) = &self.free_from else {
-            return Ok(self.free.clone());
+            return Ok(self.free.to_vec());
         };
         let path = if run.is_dir() {
             run.join(SUMMARY)
@@ -290,11 +319,22 @@ impl IdentifySettings {
     }
 }
 
+/// The word for parameters that the log chooses.
+const AUTO: &str = "auto";
+
 /// Names of parameters with their bounds: the table `[free]`.
 struct Bounds;
 
-impl Kind<Vec<FreeParameter>> for Bounds {
-    fn read(&self, table: &Table<'_>, key: &str, _: &str, _: &Path) -> Result<Option<Vec<FreeParameter>>> {
+impl Kind<Unknowns> for Bounds {
+    fn read(&self, table: &Table<'_>, key: &str, _: &str, _: &Path) -> Result<Option<Unknowns>> {
+        let auto = |among: Vec<FreeParameter>| Unknowns { among, auto: true };
+        if !table.is_table(key) {
+            return match table.string(key)? {
+                None => Ok(None),
+                Some(word) if word == AUTO => Ok(Some(auto(usual_unknowns().among))),
+                Some(_) => Err(table.refuse(key, "\"auto\", or a table of parameters = [lower, upper]")),
+            };
+        }
         let Some(table) = table.table(key)? else {
             return Ok(None);
         };
@@ -306,12 +346,19 @@ impl Kind<Vec<FreeParameter>> for Bounds {
             }),
             _ => Err(table.refuse(name, "[lower, upper], two numbers in ascending order")),
         };
-        let found = table.keys().map(bounds).collect::<Result<_>>()?;
+        let is_auto = table.boolean(AUTO)?.unwrap_or(false);
+        let named = table.keys().filter(|name| *name != AUTO);
+        let found = named.map(bounds).collect::<Result<Vec<_>>>()?;
         table.finish()?;
-        Ok(Some(found))
+        Ok(Some(match (is_auto, found.is_empty()) {
+            (true, true) => auto(usual_unknowns().among),
+            (true, false) => auto(found),
+            (false, _) => found.into(),
+        }))
     }
 
-    fn write(&self, free: &Vec<FreeParameter>) -> Option<Written> {
+    fn write(&self, free: &Unknowns) -> Option<Written> {
+        let auto = if free.auto { "auto = true\n" } else { "" };
         let row = |free: &FreeParameter| {
             let dotted = free.name.contains('.');
             let key = if dotted {
@@ -322,11 +369,12 @@ impl Kind<Vec<FreeParameter>> for Bounds {
             format!("{key} = [{:?}, {:?}]\n", free.lower, free.upper)
         };
         let rows: String = free.iter().map(row).collect();
-        Some(Written::Table(format!("[free]\n{rows}")))
+        Some(Written::Table(format!("[free]\n{auto}{rows}")))
     }
 
-    /// Names whose bounds are those of the present list, or from zero to one, or `name=lower:upper`.
-    fn parse(&self, text: &str, present: &Vec<FreeParameter>) -> Result<Vec<FreeParameter>, String> {
+    /// Names whose bounds are those of the present list, or from zero to one, or `name=lower:upper`; `auto` chooses among them, or
+    /// among the present list.
+    fn parse(&self, text: &str, present: &Unknowns) -> Result<Unknowns, String> {
         let named = |part: &str| {
             if let Some((name, bounds)) = part.split_once('=') {
                 let parsed = bounds
@@ -348,7 +396,18 @@ impl Kind<Vec<FreeParameter>> for Bounds {
                 upper: 1.0,
             }))
         };
-        text.split(',').map(|part| named(part.trim())).collect()
+        let parts = || text.split(',').map(str::trim);
+        let auto = parts().any(|part| part == AUTO);
+        let among: Vec<FreeParameter> = parts()
+            .filter(|part| *part != AUTO)
+            .map(named)
+            .collect::<Result<_, String>>()?;
+        let among = if auto && among.is_empty() {
+            present.among.clone()
+        } else {
+            among
+        };
+        Ok(Unknowns { among, auto })
     }
 
     fn value_name(&self) -> &'static str {

@@ -1,5 +1,6 @@
 //! From a log to a problem: samples, windows, step size, scales of the channels.
 
+use super::choose::{Choice, choose};
 use super::settings::{FreeParameter, IdentifySettings, ObjectiveChoice};
 use super::stand_in::StandIn;
 use crate::error::{Error, Result};
@@ -39,11 +40,15 @@ pub struct Setup {
     pub settle_s: f64,
     /// Laps and sections whose first moments are not scored, because the log has nothing to drive ahead of them.
     pub without_run_up: usize,
+    /// How the free parameters were chosen, where the log chose them.
+    pub choice: Option<Choice>,
 }
 
 /// Time constants of its slowest motion in which a car forgets where it started. A thousandth is left after seven. In corners, near
 /// the limit of its tyres, a car settles about half as fast as straight ahead, where its motions are worked out.
 const TIME_CONSTANTS: f64 = 14.0;
+/// Windows on which free parameters are chosen where whole laps are driven, s.
+const CHOICE_WINDOW_S: f64 = 5.0;
 /// The least and the most that a car is given to settle, s.
 const SETTLE_S: [f64; 2] = [0.5, 10.0];
 
@@ -69,7 +74,7 @@ fn settling_time(car: &Car, samples: &[Sample<f64>], laps: &[(usize, usize)], dt
 /// [`Error::Input`] naming file and field for anything that does not fit.
 pub fn set_up(settings: &IdentifySettings) -> Result<Setup> {
     let car = Car::load(&settings.car)?;
-    let freed = settings.freed()?;
+    let mut freed = settings.freed()?;
     let bundled = settings.log.is_none();
     let map = match &settings.channel_map {
         Some(path) => ChannelMap::read(path)?,
@@ -122,18 +127,17 @@ pub fn set_up(settings: &IdentifySettings) -> Result<Setup> {
         .flat_map(|w| &samples[w.start..w.end])
         .map(|s| s.measured[0])
         .fold(f64::INFINITY, f64::min);
-    let free = free_parameters(&freed, &car)?;
     // As fine as the car that the search starts from needs it at the slowest place.
     let substeps = settings.substeps.unwrap_or_else(|| {
         let fastest = fastest_mode(&car.to_flat(), car.tyre_model(), slowest.max(1.0));
         stable_steps(log.dt_s, fastest)
     });
     let scales = channel_scales(&samples, &fit_windows);
-    let problem = |windows: Vec<Window<f64>>| -> Result<ReplayProblem> {
+    let problem = |freed: &[FreeParameter], windows: Vec<Window<f64>>| -> Result<ReplayProblem> {
         let weights = objective_weights(settings, &scales, &windows, log.dt_s);
         let mut problem = ReplayProblem::new(
             car.clone(),
-            free.clone(),
+            free_parameters(freed, &car)?,
             samples.clone(),
             windows,
             (log.dt_s, substeps),
@@ -143,9 +147,27 @@ pub fn set_up(settings: &IdentifySettings) -> Result<Setup> {
         problem.start_as_driven_by(&car.to_flat());
         Ok(problem)
     };
-    let replay = problem(fit_windows)?;
+    let choice = if settings.free.auto {
+        let looked_at = match settings.window_s {
+            Some(_) => fit_windows.clone(),
+            None => {
+                let window_s = Some(CHOICE_WINDOW_S);
+                let cut = IdentifySettings {
+                    window_s,
+                    ..settings.clone()
+                };
+                windows_over(&cut, settle_s, &log, &samples, &fitted, circuit.as_ref())?.0
+            }
+        };
+        let choice = choose(&problem(&freed, looked_at)?, &scales)?;
+        freed.retain(|free| choice.names.contains(&free.name));
+        Some(choice)
+    } else {
+        None
+    };
+    let replay = problem(&freed, fit_windows)?;
     let holdout = (!held_windows.is_empty())
-        .then(|| problem(held_windows))
+        .then(|| problem(&freed, held_windows))
         .transpose()?;
     let truth = truth_car.map(|truth| replay.free.values_in(&truth.to_flat()));
     Ok(Setup {
@@ -157,6 +179,7 @@ pub fn set_up(settings: &IdentifySettings) -> Result<Setup> {
         log,
         settle_s,
         without_run_up,
+        choice,
     })
 }
 

@@ -87,9 +87,10 @@ mod tests {
         let stand_in = StandIn::new(&without, &car, Axle::Front);
         let mut squares = 0.0;
         for i in 0..without.samples() {
-            for (wheel, found) in stand_in.wheel_speeds(i).into_iter().enumerate() {
-                squares += (found / logged[wheel][i] - 1.0).powi(2);
-            }
+            let found = stand_in.wheel_speeds(i).into_iter().zip(logged);
+            squares += found
+                .map(|(found, logged)| (found / logged[i] - 1.0).powi(2))
+                .sum::<f64>();
         }
         let rms = (squares / (4 * without.samples()) as f64).sqrt();
         assert!(rms < 0.01, "{rms}");

@@ -1,0 +1,320 @@
+//! Which parameters a log can tell: as many as still make the car drive better what was not fitted.
+
+use super::polish::polish_observed;
+use super::setup::CHANNELS;
+use crate::error::Result;
+use crate::evaluate::replay::{ReplayProblem, Residuals, Window};
+use serde::{Deserialize, Serialize};
+use std::ops::ControlFlow;
+
+/// A number of parameters that was tried.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Tried {
+    /// Parameters found at once.
+    pub parameters: usize,
+    /// Error over the windows that were not fitted, as a share of the channels' spread: root mean square.
+    pub held_out_error: f64,
+}
+
+/// What a choice came to.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Choice {
+    /// The parameters, those that explain most first.
+    pub names: Vec<String>,
+    /// How many there were to choose from.
+    pub among: usize,
+    /// Error of the starting car over the windows that were looked at.
+    pub starting_error: Option<f64>,
+    /// The numbers that were tried, in ascending order.
+    pub tried: Vec<Tried>,
+    /// Why all of them are found, where nothing could be chosen.
+    pub not_chosen: Option<String>,
+}
+
+impl Choice {
+    /// The choice in words.
+    pub fn to_text(&self) -> String {
+        let listed = self.names.join(", ");
+        if let Some(reason) = &self.not_chosen {
+            return format!("All {} parameters are found, since {reason}.", self.among);
+        }
+        let errors = self
+            .tried
+            .iter()
+            .map(|t| format!("{} {:.4}", t.parameters, t.held_out_error));
+        let errors: Vec<String> = errors.collect();
+        format!(
+            "Of {} parameters the log chose {}: {listed}. Errors on windows that were not fitted, as a share of the channels' \
+             spread, by the number of parameters: 0 {:.4}, {}.",
+            self.among,
+            self.names.len(),
+            self.starting_error.unwrap_or(f64::NAN),
+            errors.join(", ")
+        )
+    }
+}
+
+/// Numbers of parameters that are tried, besides all of them.
+const LADDER: [usize; 12] = [1, 2, 3, 4, 6, 8, 11, 15, 20, 30, 45, 70];
+/// Scored time that the choice looks at, s: as many windows as that, spread over the log.
+const LOOKS_AT_S: f64 = 60.0;
+/// Drives of each polish.
+const DRIVES: usize = 20;
+/// A longer list must lower the error by this share, or the shorter one is taken.
+const WORTH: f64 = 0.005;
+/// Lists that are tried beyond the best one.
+const PATIENCE: usize = 2;
+/// An error under this share of the spread is rounding.
+const EXACT: f64 = 1e-7;
+/// Of a column, the part that those before it do not explain must be more than this share of it.
+const INDEPENDENT: f64 = 1e-3;
+
+/// A list on the way: which parameters of the pool are free, and the value of each of the pool.
+struct Path<'a> {
+    pool: &'a ReplayProblem,
+    weights: [f64; CHANNELS],
+    chosen: Vec<usize>,
+    values: Vec<f64>,
+}
+
+impl<'a> Path<'a> {
+    /// The starting car.
+    fn begin(pool: &'a ReplayProblem, weights: [f64; CHANNELS]) -> Self {
+        let given = pool.free.values_in(pool.free.base());
+        let variables = pool.problem.variables.iter();
+        let values = given
+            .iter()
+            .zip(variables)
+            .map(|(x, v)| x.clamp(v.lower, v.upper));
+        Self {
+            pool,
+            weights,
+            chosen: Vec::new(),
+            values: values.collect(),
+        }
+    }
+
+    /// Adds parameters until there are `count`, those first that lower the error most by the present derivatives, and fits all of
+    /// them. `false` if the car is lost or nothing more can be told.
+    fn extend_to(&mut self, count: usize) -> Result<bool> {
+        let Some(residuals) = self.pool.residuals(&self.values) else {
+            return Ok(false);
+        };
+        let before = self.chosen.len();
+        self.add(count, &residuals);
+        if self.chosen.len() == before {
+            return Ok(false);
+        }
+        let part = part_of(self.pool, &self.chosen)?;
+        let from: Vec<f64> = self.chosen.iter().map(|&k| self.values[k]).collect();
+        let mut watch = || ControlFlow::Continue(());
+        if let Some(polished) = polish_observed(&part, &from, self.weights, DRIVES, &mut watch) {
+            for (&k, x) in self.chosen.iter().zip(polished.candidate) {
+                self.values[k] = x;
+            }
+        }
+        Ok(true)
+    }
+
+    fn add(&mut self, count: usize, residuals: &Residuals) {
+        let variables = &self.pool.problem.variables;
+        let weighted = |values: &[f64], by: f64| -> Vec<f64> {
+            let values = values.iter().enumerate();
+            values.map(|(i, x)| x * self.weights[i % CHANNELS] * by).collect()
+        };
+        let mut left = weighted(&residuals.errors, 1.0);
+        let noise = dot(&left, &left) / left.len().max(1) as f64;
+        let mut columns: Vec<Vec<f64>> = (0..variables.len())
+            .map(|k| weighted(&residuals.columns[k], variables[k].upper - variables[k].lower))
+            .collect();
+        let whole: Vec<f64> = columns.iter().map(|c| dot(c, c)).collect();
+        let mut order = self.chosen.clone();
+        for place in 0..count {
+            if place == order.len() {
+                let gain = |k: usize| -> f64 {
+                    let own = dot(&columns[k], &columns[k]);
+                    // Its standard error is below that of a guess anywhere between the bounds.
+                    let told = own > 12.0 * noise && own > INDEPENDENT * INDEPENDENT * whole[k];
+                    if order.contains(&k) || !told {
+                        return 0.0;
+                    }
+                    let v = &variables[k];
+                    let share = (self.values[k] - v.lower) / (v.upper - v.lower);
+                    let along = dot(&columns[k], &left);
+                    let step = (-along / own).clamp(-share, 1.0 - share);
+                    -(2.0 * step * along + step * step * own)
+                };
+                let best = (0..variables.len())
+                    .map(|k| (k, gain(k)))
+                    .max_by(|a, b| a.1.total_cmp(&b.1));
+                match best {
+                    Some((k, gain)) if gain > 0.0 => order.push(k),
+                    _ => break,
+                }
+            }
+            // What the parameter explains is taken from the errors and from the others.
+            let column = columns[order[place]].clone();
+            let own = dot(&column, &column);
+            if own <= 0.0 {
+                continue;
+            }
+            take_off(&mut left, &column, own);
+            for (k, other) in columns.iter_mut().enumerate() {
+                if !order[..=place].contains(&k) {
+                    take_off(other, &column, own);
+                }
+            }
+        }
+        self.chosen = order;
+    }
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+fn take_off(from: &mut [f64], column: &[f64], own: f64) {
+    let share = dot(from, column) / own;
+    for (x, c) in from.iter_mut().zip(column) {
+        *x -= share * c;
+    }
+}
+
+/// The pool's problem with some of its parameters free.
+fn part_of(pool: &ReplayProblem, chosen: &[usize]) -> Result<ReplayProblem> {
+    let variables = &pool.problem.variables;
+    let free = chosen.iter().map(|&k| {
+        let v = &variables[k];
+        (pool.free.parameters[k].clone(), v.lower, v.upper)
+    });
+    ReplayProblem::new(
+        pool.free.car.clone(),
+        free.collect(),
+        pool.plan.samples.clone(),
+        pool.plan.windows.clone(),
+        (pool.interval_s, pool.plan.fractions.len()),
+        pool.plan.norm,
+        pool.objectives.clone(),
+    )
+}
+
+/// The numbers that are tried of so many parameters.
+fn ladder(all: usize) -> impl Iterator<Item = usize> {
+    LADDER.into_iter().filter(move |n| *n < all).chain([all])
+}
+
+/// Chooses among the parameters of `pool` by cross-validation on its windows: lists of rising length are fitted to one half of them
+/// and judged on the other, and the other way round. Nothing is random.
+///
+/// # Errors
+/// Those of putting a problem together.
+pub(super) fn choose(pool: &ReplayProblem, scales: &[f64; CHANNELS]) -> Result<Choice> {
+    let weights = scales.map(|s| 1.0 / s);
+    let windows = looked_at(pool);
+    let with = |windows: Vec<Window<f64>>| {
+        let mut pool = pool.clone();
+        pool.plan.windows = windows;
+        pool
+    };
+    let half = |which: usize| -> Vec<Window<f64>> {
+        let each = windows.iter().enumerate();
+        each.filter(|(i, _)| i % 2 == which).map(|(_, w)| *w).collect()
+    };
+    let all = pool.dimensions();
+    let name = |k: usize| pool.problem.variables[k].name.clone();
+    let every_one = |starting_error: Option<f64>, reason: &str| Choice {
+        names: (0..all).map(name).collect(),
+        among: all,
+        starting_error,
+        tried: Vec::new(),
+        not_chosen: Some(reason.to_owned()),
+    };
+    let halves = [with(half(0)), with(half(1))];
+    if halves.iter().any(|half| half.plan.windows.is_empty()) {
+        return Ok(every_one(None, "the laps to fit are shorter than two windows"));
+    }
+    let error = |paths: &[Path<'_>; 2]| -> Option<f64> {
+        let mut sum = [0.0, 0.0];
+        for (path, other) in paths.iter().zip([1, 0]) {
+            let squares = squares(&halves[other], &path.values, &weights)?;
+            sum = [sum[0] + squares[0], sum[1] + squares[1]];
+        }
+        Some((sum[0] / sum[1].max(1.0)).sqrt())
+    };
+    let mut paths = [0, 1].map(|half| Path::begin(&halves[half], weights));
+    let Some(starting_error) = error(&paths) else {
+        return Ok(every_one(
+            None,
+            "the starting car does not drive the log to its end",
+        ));
+    };
+    if starting_error < EXACT {
+        return Ok(every_one(
+            Some(starting_error),
+            "the starting car drives the log exactly",
+        ));
+    }
+    let mut tried: Vec<Tried> = Vec::new();
+    let mut best = (1, starting_error);
+    let mut since = 0;
+    for count in ladder(all) {
+        let mut longer = false;
+        for path in &mut paths {
+            longer |= path.extend_to(count)?;
+        }
+        let Some(held_out_error) = error(&paths).filter(|_| longer) else {
+            break;
+        };
+        tried.push(Tried {
+            parameters: count,
+            held_out_error,
+        });
+        since += 1;
+        if held_out_error < best.1 * (1.0 - WORTH) {
+            best = (count, held_out_error);
+            since = 0;
+        }
+        if since > PATIENCE || best.1 < EXACT {
+            break;
+        }
+    }
+    let whole = with(windows.clone());
+    let mut path = Path::begin(&whole, weights);
+    for count in ladder(all).take_while(|n| *n < best.0).chain([best.0]) {
+        path.extend_to(count)?;
+    }
+    if path.chosen.is_empty() {
+        return Ok(every_one(
+            Some(starting_error),
+            "the log tells none of them by itself",
+        ));
+    }
+    Ok(Choice {
+        names: path.chosen.into_iter().map(name).collect(),
+        among: all,
+        starting_error: Some(starting_error),
+        tried,
+        not_chosen: None,
+    })
+}
+
+/// Sum of the squared weighted errors, and their number; `None` if the car is lost.
+fn squares(problem: &ReplayProblem, values: &[f64], weights: &[f64; CHANNELS]) -> Option<[f64; 2]> {
+    let errors = problem.residuals(values)?.errors;
+    let squares = errors
+        .iter()
+        .enumerate()
+        .map(|(i, e)| (e * weights[i % CHANNELS]).powi(2));
+    Some([squares.sum(), errors.len() as f64])
+}
+
+/// As many windows as [`LOOKS_AT_S`], evenly spread.
+fn looked_at(pool: &ReplayProblem) -> Vec<Window<f64>> {
+    let windows = &pool.plan.windows;
+    let scored = |w: &Window<f64>| (w.end - w.start - w.scored_from) as f64 * pool.interval_s;
+    let total: f64 = windows.iter().map(scored).sum();
+    let every = (total / LOOKS_AT_S).ceil().max(1.0) as usize;
+    // Pairs, so that both halves have windows side by side.
+    let pairs = windows.chunks(2).step_by(every);
+    pairs.flatten().copied().collect()
+}
