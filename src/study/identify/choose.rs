@@ -57,9 +57,9 @@ impl Choice {
 /// Numbers of parameters that are tried, besides all of them.
 const LADDER: [usize; 12] = [1, 2, 3, 4, 6, 8, 11, 15, 20, 30, 45, 70];
 /// Scored time that the choice looks at, s: as many windows as that, spread over the log.
-const LOOKS_AT_S: f64 = 60.0;
+const LOOKS_AT_S: f64 = 240.0;
 /// Drives of each polish.
-const DRIVES: usize = 20;
+const DRIVES: usize = 10;
 /// A longer list must lower the error by this share, or the shorter one is taken.
 const WORTH: f64 = 0.005;
 /// Lists that are tried beyond the best one.

@@ -18,23 +18,24 @@ pub struct Polished {
     pub interrupted: bool,
 }
 
-/// A candidate is moved this share of the range away from a bound before it is polished, where the
-/// transformation below would otherwise hold it for ever.
-const MARGIN: f64 = 1e-3;
-/// A polish ends when a step gains less than this share of the cost. An exact fit gains orders of magnitude with each
-/// step until it is down to rounding, so this only ends fits to noise.
-const LEAST_GAIN: f64 = 1e-9;
+/// A polish ends when a step gains, and promises, less than this share of what one residual costs on the mean. A parameter that is
+/// off by a standard error costs half as much as one residual. Steps of an exact fit promise nearly all of the cost, so this only ends
+/// fits to noise.
+const LEAST_GAIN: f64 = 0.01;
 /// Drives after which a polish that has not converged is left where it is.
 pub(super) const MOST_DRIVES: usize = 150;
 /// Error that stands for every sample of a car that was lost: far above any real one, so the step is refused.
 const LOST: f64 = 1e4;
 
-/// Bounds by `x = lower + range (1 + sin u)/2` with `u` unbounded, as MINUIT has it (James, Roos, 1975).
+/// Bounds by `x = lower + range u` with `u` held within 0 and 1. A parameter that a step leads out of them stays at its bound, and the
+/// further steps are of the others.
 struct Bounded<'a> {
     replay: &'a ReplayProblem,
     variables: &'a [Variable],
     weights: [f64; CHANNELS],
     u: DVector<f64>,
+    /// The parameters that stay at the bound at which they are.
+    held: Vec<bool>,
     current: Option<Residuals>,
     length: usize,
     /// Asked before every drive.
@@ -46,10 +47,21 @@ struct Bounded<'a> {
 
 impl Bounded<'_> {
     fn candidate(&self, u: &DVector<f64>) -> Vec<f64> {
-        let scaled = |(v, u): (&Variable, &f64)| {
-            (v.lower + 0.5 * (v.upper - v.lower) * (1.0 + u.sin())).clamp(v.lower, v.upper)
-        };
+        let scaled = |(v, u): (&Variable, &f64)| (v.lower + (v.upper - v.lower) * u).clamp(v.lower, v.upper);
         self.variables.iter().zip(u.iter()).map(scaled).collect()
+    }
+
+    /// Begins anew at the best point so far. Parameters at a bound that the cost pushes out are held there, all others move.
+    fn release(&mut self) {
+        let start = self.best.0.map(|u| u.clamp(0.0, 1.0));
+        self.held.fill(false);
+        self.set_params(&start);
+        if let (Some(jacobian), Some(residuals)) = (self.jacobian(), self.residuals()) {
+            let slopes = jacobian.tr_mul(&residuals);
+            for (held, (u, slope)) in self.held.iter_mut().zip(start.iter().zip(slopes.iter())) {
+                *held = (*u == 0.0 && *slope > 0.0) || (*u == 1.0 && *slope < 0.0);
+            }
+        }
     }
 
     fn weight(&self, row: usize) -> f64 {
@@ -95,8 +107,11 @@ impl LeastSquaresProblem<f64, Dyn, Dyn> for Bounded<'_> {
     fn jacobian(&self) -> Option<DMatrix<f64>> {
         let r = self.current.as_ref()?;
         Some(DMatrix::from_fn(self.length, self.variables.len(), |i, k| {
+            if self.held[k] || !(0.0..=1.0).contains(&self.u[k]) {
+                return 0.0;
+            }
             let v = &self.variables[k];
-            self.weight(i) * r.columns[k][i] * 0.5 * (v.upper - v.lower) * self.u[k].cos()
+            self.weight(i) * r.columns[k][i] * (v.upper - v.lower)
         }))
     }
 }
@@ -124,7 +139,7 @@ pub(super) fn polish_observed(
         candidate.iter().zip(variables).map(|(x, v)| {
             let range = v.upper - v.lower;
             let share = if range > 0.0 { (x - v.lower) / range } else { 0.5 };
-            (2.0 * share.clamp(MARGIN, 1.0 - MARGIN) - 1.0).asin()
+            share.clamp(0.0, 1.0)
         }),
     );
     let mut problem = Bounded {
@@ -132,18 +147,31 @@ pub(super) fn polish_observed(
         variables,
         weights,
         u: u.clone(),
+        held: vec![false; variables.len()],
         current: None,
         length,
         watch,
         interrupted: false,
         best: (u.clone(), f64::INFINITY),
     };
-    problem.set_params(&u);
-    let patience = (most_drives / (variables.len() + 1)).max(1);
-    let (problem, _) = LevenbergMarquardt::new()
-        .with_patience(patience)
-        .with_ftol(LEAST_GAIN)
-        .minimize(problem);
+    let least_gain = LEAST_GAIN / length.max(1) as f64;
+    let (mut drives, mut before) = (0, f64::INFINITY);
+    while drives < most_drives && !problem.interrupted {
+        problem.release();
+        let left = most_drives - drives;
+        let (driven, report) = LevenbergMarquardt::new()
+            .with_patience((left / (variables.len() + 1)).max(1))
+            .with_ftol(least_gain)
+            .minimize(problem);
+        problem = driven;
+        drives += 1 + report.number_of_evaluations;
+        let (from, to) = (before, problem.best.1);
+        // A parameter that met its bound on the way may leave it again.
+        if from - to <= least_gain * to {
+            break;
+        }
+        before = to;
+    }
     Some(Polished {
         candidate: problem.candidate(&problem.best.0),
         cost: problem.best.1,
