@@ -3,7 +3,7 @@
 use super::polish::polish_observed;
 use super::setup::CHANNELS;
 use crate::error::Result;
-use crate::evaluate::replay::{ReplayProblem, Residuals, Window};
+use crate::evaluate::replay::{ReplayProblem, Residuals, Window, trace};
 use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
 
@@ -78,19 +78,13 @@ struct Path<'a> {
 }
 
 impl<'a> Path<'a> {
-    /// The starting car.
+    /// The starting car, whose figures may be outside the bounds as long as they are not free.
     fn begin(pool: &'a ReplayProblem, weights: [f64; CHANNELS]) -> Self {
-        let given = pool.free.values_in(pool.free.base());
-        let variables = pool.problem.variables.iter();
-        let values = given
-            .iter()
-            .zip(variables)
-            .map(|(x, v)| x.clamp(v.lower, v.upper));
         Self {
             pool,
             weights,
             chosen: Vec::new(),
-            values: values.collect(),
+            values: pool.free.values_in(pool.free.base()),
         }
     }
 
@@ -231,7 +225,10 @@ pub(super) fn choose(pool: &ReplayProblem, scales: &[f64; CHANNELS]) -> Result<C
     };
     let halves = [with(half(0)), with(half(1))];
     if halves.iter().any(|half| half.plan.windows.is_empty()) {
-        return Ok(every_one(None, "the laps to fit are shorter than two windows"));
+        return Ok(every_one(
+            None,
+            "the starting car drives fewer than two windows to their end",
+        ));
     }
     let error = |paths: &[Path<'_>; 2]| -> Option<f64> {
         let mut sum = [0.0, 0.0];
@@ -243,10 +240,7 @@ pub(super) fn choose(pool: &ReplayProblem, scales: &[f64; CHANNELS]) -> Result<C
     };
     let mut paths = [0, 1].map(|half| Path::begin(&halves[half], weights));
     let Some(starting_error) = error(&paths) else {
-        return Ok(every_one(
-            None,
-            "the starting car does not drive the log to its end",
-        ));
+        return Ok(every_one(None, "the starting car is lost"));
     };
     if starting_error < EXACT {
         return Ok(every_one(
@@ -308,9 +302,10 @@ fn squares(problem: &ReplayProblem, values: &[f64], weights: &[f64; CHANNELS]) -
     Some([squares.sum(), errors.len() as f64])
 }
 
-/// As many windows as [`LOOKS_AT_S`], evenly spread.
+/// As many windows as [`LOOKS_AT_S`], evenly spread, of those that the starting car drives to their end.
 fn looked_at(pool: &ReplayProblem) -> Vec<Window<f64>> {
-    let windows = &pool.plan.windows;
+    let drives = |w: &&Window<f64>| trace(pool.free.base(), pool.tyre_model(), &pool.plan, w).drives;
+    let windows: Vec<Window<f64>> = pool.plan.windows.iter().filter(drives).copied().collect();
     let scored = |w: &Window<f64>| (w.end - w.start - w.scored_from) as f64 * pool.interval_s;
     let total: f64 = windows.iter().map(scored).sum();
     let every = (total / LOOKS_AT_S).ceil().max(1.0) as usize;
