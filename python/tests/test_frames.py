@@ -116,7 +116,7 @@ def test_missing_values_of_arrow_are_no_numbers() -> None:
 def test_what_is_wrong_with_a_frame_is_said(lap: tuple[Path, Columns], tmp_path: Path) -> None:
     columns = lap[1]
     gap = columns["yaw_rate_radps"].copy()
-    gap[5] = np.nan
+    gap[5:15] = np.nan  # longer than what straight lines join
     for changed, field, words in [
         ({"steer_rad": None}, "steer", "found none"),
         ({"time_s": None}, None, "a column of times"),

@@ -333,8 +333,14 @@ impl Build<'_> {
         let fastest = driving()
             .min_by(|a, b| a.nominal_s.total_cmp(&b.nominal_s))
             .unwrap_or(first);
+        // A channel with missing samples has a clock of its own, which is not uniform, beside one that is.
+        let as_fast = driving().filter(|s| s.nominal_s <= (1.0 + 1e-6) * fastest.nominal_s);
         let dt_s = asked
-            .or_else(|| uniform_interval(&fastest.times))
+            .or_else(|| {
+                as_fast
+                    .map(|s| &s.times)
+                    .find_map(|times| uniform_interval(times))
+            })
             .unwrap_or(fastest.nominal_s);
         let (mut start, mut end) = (f64::NEG_INFINITY, f64::INFINITY);
         for signal in driving() {

@@ -126,7 +126,8 @@ impl ChannelList {
                     None => "no numbers".to_owned(),
                 };
                 let why = match (c.role, c.unreadable) {
-                    (Some(role), _) => format!("{}, {}", role.key(), c.why),
+                    (Some(role), 0) => format!("{}, {}", role.key(), c.why),
+                    (Some(role), n) => format!("{}, {}; {n} samples are no numbers", role.key(), c.why),
                     (None, 0) => c.why.to_owned(),
                     (None, n) => format!("{}; {n} samples are no numbers", c.why),
                 };

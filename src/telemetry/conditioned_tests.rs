@@ -339,6 +339,115 @@ fn a_log_without_wheel_speeds_is_read() {
 }
 
 /// The wheels of a car whose axles have radii of their own, known or not.
+/// The perfect lap as a file of its own columns, with the cells changed by row, column and value.
+fn with_cells(change: impl Fn(usize, &str, &str) -> Option<&'static str>) -> String {
+    let mut names: Vec<&str> = Vec::new();
+    let (mut text, mut row) = (String::new(), 0);
+    for line in BUNDLED.lines().filter(|line| !line.starts_with('#')) {
+        let cells: Vec<&str> = line.split(',').collect();
+        if names.is_empty() {
+            names = cells;
+            text.push_str(line);
+        } else {
+            let changed = cells.iter().zip(&names).map(|(cell, name)| {
+                let value = change(row, name, cell);
+                value.unwrap_or(cell)
+            });
+            text.push_str(&changed.collect::<Vec<_>>().join(","));
+            row += 1;
+        }
+        text.push('\n');
+    }
+    text
+}
+
+#[test]
+fn samples_that_are_missing_are_joined() {
+    let truth = perfect();
+    // Two dropouts, of two rows and of one, and a channel that is logged at every fifth row.
+    let dropped = |row: usize| matches!(row, 1000 | 1001 | 3000);
+    let text = with_cells(|row, name, _| match name {
+        "yaw_rate_radps" if dropped(row) => Some(""),
+        "vx_mps" if dropped(row) => Some("NaN"),
+        "steer_rad" if row % 5 != 0 => Some(""),
+        _ => None,
+    });
+    let log = read(&text, "", &as_logged());
+    assert_eq!(log.samples(), truth.samples() - (truth.samples() - 1) % 5);
+    assert!((log.dt_s - truth.dt_s).abs() < 1e-12);
+    let notes = log.calibration.notes.join("\n");
+    for said in [
+        "\"yaw_rate_radps\": 3 of",
+        "\"vx_mps\": 3 of",
+        "\"steer_rad\": 5675 of",
+        "straight lines join the others",
+    ] {
+        assert!(notes.contains(said), "{said}: {notes}");
+    }
+    for i in 0..log.samples() {
+        let near = |a: f64, b: f64, bar: f64| assert!((a - b).abs() < bar, "sample {i}: {a} {b}");
+        // Times are sums, and the line between two samples a rounding off at them.
+        near(log.ax_mps2[i], truth.ax_mps2[i], 1e-6);
+        let (before, after) = match i {
+            1000 | 1001 => (999, 1002),
+            3000 => (2999, 3001),
+            _ => (i, i),
+        };
+        let line = |values: &[f64]| {
+            let share = if after > before {
+                (i - before) as f64 / (after - before) as f64
+            } else {
+                0.0
+            };
+            values[before] + share * (values[after] - values[before])
+        };
+        near(log.yaw_rate_radps[i], line(&truth.yaw_rate_radps), 1e-6);
+        near(log.vx_mps[i], line(&truth.vx_mps), 1e-6);
+        let fifth = i - i % 5;
+        let share = (i - fifth) as f64 / 5.0;
+        let next = truth.steer_rad[(fifth + 5).min(truth.samples() - 1)];
+        let steered = truth.steer_rad[fifth] + share * (next - truth.steer_rad[fifth]);
+        near(log.steer_rad[i], steered, 1e-6);
+    }
+}
+
+#[test]
+fn long_dropouts_and_other_text_are_refused() {
+    let refused = |text: &str| {
+        let recording = Recording::parse(text.as_bytes(), "lap.csv").unwrap();
+        let error = Log::from_recording(&recording, &ChannelMap::default(), &as_logged());
+        error.unwrap_err().to_string()
+    };
+    let long =
+        with_cells(|row, name, _| (name == "yaw_rate_radps" && (100..110).contains(&row)).then_some(""));
+    let said = refused(&long);
+    assert!(
+        said.contains("channel yaw_rate_radps: found a gap of 0.2"),
+        "{said}"
+    );
+    let text = with_cells(|row, name, _| match (name, row) {
+        ("vx_mps", 50) => Some(""),
+        ("vx_mps", 70) => Some("off"),
+        _ => None,
+    });
+    let said = refused(&text);
+    assert!(
+        said.contains("channel vx_mps: found \"off\", expected a finite number"),
+        "{said}"
+    );
+}
+
+#[test]
+fn what_is_computed_of_missing_samples_is_missing() {
+    let text = with_cells(|row, name, _| (name == "yaw_rate_radps" && row == 500).then_some(""));
+    let map =
+        "[channels.yaw_rate]\nexpression = \"2 * {yaw_rate_radps} - {yaw_rate_radps}\"\nunit = \"rad/s\"\n";
+    let log = read(&text, map, &as_logged());
+    let truth = perfect();
+    let middle = (truth.yaw_rate_radps[499] + truth.yaw_rate_radps[501]) / 2.0;
+    assert!((log.yaw_rate_radps[500] - middle).abs() < 1e-6);
+}
+
 #[test]
 fn each_axle_has_its_own_radius() {
     const OTHER: [f64; 2] = [0.325, 0.328];

@@ -116,12 +116,18 @@ impl Expression {
             .collect();
         let mut values = Vec::with_capacity(fastest.values.len());
         let mut unreadable = None;
+        let read = |c: &&Channel| c.unreadable.as_ref().is_none_or(Unreadable::is_missing);
+        let only_missing = channels.iter().all(read);
         for sample in 0..fastest.values.len() {
             let of: Vec<f64> = columns.iter().map(|column| column[sample]).collect();
             let value = self.parsed.eval(&of).unwrap_or(f64::NAN);
-            if !value.is_finite() && unreadable.is_none() {
-                let text = format!("{value} of {}", self.text);
-                unreadable = Some(Unreadable { sample, text });
+            if !value.is_finite() {
+                let text = if only_missing && of.iter().any(|v| v.is_nan()) {
+                    String::new()
+                } else {
+                    format!("{value} of {}", self.text)
+                };
+                Unreadable::keep(&mut unreadable, Unreadable { sample, text });
             }
             values.push(if value.is_finite() { value } else { f64::NAN });
         }

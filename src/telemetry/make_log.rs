@@ -1,5 +1,6 @@
 //! From a recording to the log that an identification works on.
 
+use std::borrow::Cow;
 use std::path::Path;
 
 use super::audit::{check_gains, frozen_tail_s};
@@ -9,7 +10,7 @@ use super::calibration::{Calibration, Declared, FindingKind, Switch};
 use super::channel_map::{Axle, ChannelMap, Mapped};
 use super::delays::{Evidence, delays};
 use super::log::{Log, LogOptions};
-use super::recording::{Format, Reading, Recording};
+use super::recording::{Channel, Clock, Format, Reading, Recording};
 use super::role::Role;
 use super::text::shown;
 use crate::config::{check_memory, memory_limit};
@@ -72,7 +73,9 @@ impl Log {
     ) -> Result<Self> {
         check_options(options)?;
         let computed = map.computed(recording)?;
-        let recording = &*computed;
+        let mut calibration = Calibration::default();
+        let joined = without_gaps(computed, map, &mut calibration)?;
+        let recording = &*joined;
         let source = recording.source.display().to_string();
         let radius = map.rolling_radii_m().or(options.rolling_radius_m);
         let mapped = map.resolve(recording)?;
@@ -85,7 +88,6 @@ impl Log {
             rear_is_undriven: map.speed_axle == Axle::Rear,
             speed_of_wheels: !mapped.iter().any(|m| m.role == Role::Vx),
         };
-        let mut calibration = Calibration::default();
         for m in mapped
             .iter()
             .filter(|m| !m.declared && recording.format != Format::Native)
@@ -157,6 +159,51 @@ impl Log {
         calibrate::apply(&mut log, &options.calibration, &declared);
         Ok(log)
     }
+}
+
+/// Gives the channels that a log is made of clocks of their own where samples are missing: empty cells of a table, or channels that
+/// are slower than its rows. Straight lines then join the samples, within the limits that hold for missing rows.
+fn without_gaps<'a>(
+    recording: Cow<'a, Recording>,
+    map: &ChannelMap,
+    calibration: &mut Calibration,
+) -> Result<Cow<'a, Recording>> {
+    let joined: Vec<(usize, Channel)> = {
+        let mapped = map.resolve(&recording)?;
+        // Lap numbers and positions may be left out, and pedals are not read.
+        let left_out = [Role::Lap, Role::LapComplete, Role::Throttle, Role::Brake];
+        let needed = |channel: &Channel| {
+            let of = |m: &&Mapped<'_>| std::ptr::eq(m.channel, channel);
+            mapped
+                .iter()
+                .filter(of)
+                .any(|m| !left_out.contains(&m.role) && !m.role.of_place())
+        };
+        let channels = recording.channels.iter().enumerate();
+        channels
+            .filter(|(_, channel)| needed(channel))
+            .filter_map(|(i, channel)| Some((i, channel.without_gaps()?)))
+            .collect()
+    };
+    if joined.is_empty() {
+        return Ok(recording);
+    }
+    let mut recording = recording.into_owned();
+    let mut clocks: Vec<Clock> = Vec::new();
+    for (i, mut channel) in joined {
+        let (all, left) = (recording.channels[i].values.len(), channel.values.len());
+        calibration.notes.push(format!(
+            "{}: {} of {all} samples are missing; straight lines join the others",
+            shown(&channel.name),
+            all - left
+        ));
+        match clocks.iter().find(|clock| **clock == channel.clock) {
+            Some(known) => channel.clock = known.clone(),
+            None => clocks.push(channel.clock.clone()),
+        }
+        recording.channels[i] = channel;
+    }
+    Ok(Cow::Owned(recording))
 }
 
 fn check_options(options: &LogOptions) -> Result<()> {

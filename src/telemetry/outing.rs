@@ -35,12 +35,14 @@ impl Outing {
             let Some(found) = map.find(role, recording)? else {
                 return Ok(None);
             };
+            let whole = found.channel.without_gaps().filter(|_| role != Role::Lap);
+            let channel = whole.as_ref().unwrap_or(found.channel);
             if role != Role::Lap {
-                check_samples(&source, found.channel)?;
+                check_samples(&source, channel)?;
             }
             let factor = found.unit.map_or(1.0, |unit| unit.factor) * found.sign.unwrap_or(1.0);
-            let values: Vec<f64> = found.channel.values.iter().map(|v| v * factor).collect();
-            let times = (0..values.len()).map(|i| found.channel.time_s(i)).collect();
+            let values: Vec<f64> = channel.values.iter().map(|v| v * factor).collect();
+            let times = (0..values.len()).map(|i| channel.time_s(i)).collect();
             Ok(Some((times, values)))
         };
         let mut notes = Vec::new();

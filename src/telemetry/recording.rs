@@ -45,6 +45,23 @@ pub struct Unreadable {
     pub text: String,
 }
 
+impl Unreadable {
+    /// Whether the file holds nothing there: an empty cell, or what a program writes for one.
+    pub(super) fn is_missing(&self) -> bool {
+        self.text.is_empty() || self.text.eq_ignore_ascii_case("nan")
+    }
+
+    /// Takes one that was found into what a channel keeps: the first that is not missing, or else the first.
+    pub(super) fn keep(first: &mut Option<Self>, found: Self) {
+        if first
+            .as_ref()
+            .is_none_or(|first| first.is_missing() && !found.is_missing())
+        {
+            *first = Some(found);
+        }
+    }
+}
+
 /// One logged quantity.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Channel {
@@ -56,8 +73,8 @@ pub struct Channel {
     pub clock: Clock,
     /// Its samples in `unit`; NaN where the file holds no finite number.
     pub values: Vec<f64>,
-    /// The first sample that is not a finite number. A channel that is not needed may have gaps, so this is an error only if the
-    /// channel is used.
+    /// The first sample that holds something other than a finite number; the first one that is missing where none does. This is an
+    /// error only if the channel is used, and samples that are missing are joined by straight lines.
     pub unreadable: Option<Unreadable>,
     /// The file line of each sample, for text formats.
     pub lines: Option<Arc<[usize]>>,
@@ -75,6 +92,29 @@ impl Channel {
     /// Whether it has samples, of which none is a number.
     pub(super) fn is_blank(&self) -> bool {
         !self.values.is_empty() && self.values.iter().all(|v| v.is_nan())
+    }
+
+    /// The channel without its missing samples, at the times of the others. None where nothing is missing, or everything, and
+    /// where a sample holds something else.
+    pub(super) fn without_gaps(&self) -> Option<Self> {
+        let missing = self.unreadable.as_ref().is_some_and(Unreadable::is_missing);
+        if !missing || self.is_blank() {
+            return None;
+        }
+        let kept: Vec<usize> = (0..self.values.len())
+            .filter(|i| !self.values[*i].is_nan())
+            .collect();
+        Some(Self {
+            name: self.name.clone(),
+            unit: self.unit.clone(),
+            clock: Clock::Times(kept.iter().map(|i| self.time_s(*i)).collect()),
+            values: kept.iter().map(|i| self.values[*i]).collect(),
+            unreadable: None,
+            lines: self
+                .lines
+                .as_ref()
+                .map(|lines| kept.iter().map(|i| lines[*i]).collect()),
+        })
     }
 
     /// Where a sample stands, for an error message: `line 12, channel X`, or its time in a binary file.

@@ -85,10 +85,8 @@ impl<'a> Table<'a> {
                     ));
                 }
                 _ => {
-                    if self.unreadable[index].is_none() {
-                        let text = cell.to_string();
-                        self.unreadable[index] = Some(Unreadable { sample, text });
-                    }
+                    let text = cell.to_string();
+                    Unreadable::keep(&mut self.unreadable[index], Unreadable { sample, text });
                     f64::NAN
                 }
             };

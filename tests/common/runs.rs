@@ -131,8 +131,9 @@ impl Held {
 
     /// Sends it a signal and waits for its end; with how many steps it and its solvers took after that.
     pub fn signal(self, signal: &str) -> (Output, usize) {
-        let told = Command::new("kill")
-            .args([signal, &self.child.id().to_string()])
+        // The shell's own: a bare machine has no program of that name.
+        let told = Command::new("sh")
+            .args(["-c", &format!("kill {signal} {}", self.child.id())])
             .status();
         assert!(told.expect("kill").success());
         let passed = self.passed.clone();

@@ -467,6 +467,35 @@ fn windows_of_a_noisy_lap_give_its_car_within_three_standard_errors() {
     assert!(summary.parameters[0].standard_error.unwrap() < 15.0);
 }
 
+/// Where the model lacks something, the errors are no noise, and the fit ends at a minimum of the cost that was asked for.
+#[test]
+fn a_car_that_the_model_cannot_be_is_fitted_to_the_cost() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut car = Car::bundled().unwrap();
+    car.chassis.mass *= 1.2;
+    car.chassis.drag_area *= 1.5;
+    car.write(folder.path(), "heavy").unwrap();
+    let settings = IdentifySettings {
+        car: folder.path().join("heavy.toml").display().to_string(),
+        ..in_windows(None, None)
+    };
+    let (setup, summary) = identified(&settings, folder.path());
+    assert!(!summary.errors_look_like_noise);
+    assert!(summary.step_in_standard_errors.unwrap() < 1.0);
+    let found: Vec<f64> = summary.parameters.iter().map(|p| p.car_value).collect();
+    let mut replay = setup.replay.clone();
+    replay.start_as_driven_by(&replay.flat(&found));
+    let weights = setup.scales.map(|s| 1.0 / s);
+    let errors = replay.residuals(&found).unwrap().errors;
+    let weighted = errors
+        .iter()
+        .zip(weights.iter().cycle())
+        .map(|(e, w)| (e * w).powi(2));
+    let cost = 0.5 * weighted.sum::<f64>();
+    let further = polish(&replay, &found, weights).unwrap().cost;
+    assert!(further > 0.999 * cost, "{further} of {cost}");
+}
+
 #[test]
 fn a_lap_begins_to_count_where_the_one_before_has_let_the_car_settle() {
     let folder = tempfile::tempdir().unwrap();

@@ -60,6 +60,25 @@ pub fn noise_of(errors: &[f64], scales: &[f64; CHANNELS], unknowns: usize) -> [f
     })
 }
 
+/// By what least squares weights the errors of each channel, one over the channel's unit; `errors` are row-major, one column for each
+/// channel, and `scales` the channels' spreads. Of errors that look like noise it is one over the noise: the maximum
+/// likelihood for white noise. Of others it is one over the scale, as the cost does. What the model lacks is no noise, and weights
+/// from its size would lead away from the cost that was asked for, to the channels that happen to fit best.
+pub fn weights_of(errors: &[f64], scales: &[f64; CHANNELS], unknowns: usize) -> [f64; CHANNELS] {
+    let noise = noise_of(errors, scales, unknowns);
+    if is_noise(errors, scales, &noise) {
+        noise.map(|n| 1.0 / n)
+    } else {
+        scales.map(|s| 1.0 / s)
+    }
+}
+
+/// Whether the errors look like noise, or are mere rounding.
+fn is_noise(errors: &[f64], scales: &[f64; CHANNELS], noise: &[f64; CHANNELS]) -> bool {
+    let at_rounding = (0..CHANNELS).all(|k| noise[k] <= LEAST_NOISE * scales[k]);
+    at_rounding || looks_like_noise(errors)
+}
+
 /// A value this share of the range from a bound is at it, of the logarithms' range where both bounds are positive.
 const AT_BOUND: f64 = 1e-3;
 
@@ -130,11 +149,8 @@ pub fn judge(
     let matrix = DMatrix::from_fn(residuals.errors.len(), d, |i, k| {
         residuals.columns[k][i] / noise[i % CHANNELS] * ranges[k]
     });
-    let errors = DVector::from_fn(residuals.errors.len(), |i, _| {
-        residuals.errors[i] / noise[i % CHANNELS]
-    });
     // The triangular factor has the singular values and right vectors of the whole, and is small.
-    let svd = matrix.clone().qr().r().svd(false, true);
+    let svd = matrix.qr().r().svd(false, true);
     let values = svd.singular_values;
     let vectors = svd.v_t.unwrap_or_else(|| DMatrix::identity(d, d));
     let greatest = values.iter().copied().fold(0.0, f64::max);
@@ -179,8 +195,15 @@ pub fn judge(
     let free: Vec<usize> = (0..d)
         .filter(|&k| identifiable[k] && !at_bound(candidate[k], [variables[k].lower, variables[k].upper]))
         .collect();
-    let factors = matrix.select_columns(&free).qr();
-    let mut wanted = errors;
+    // The step is that of the least squares that fitted the car, with its weights.
+    let weights = weights_of(&residuals.errors, scales, d);
+    let weighted = DMatrix::from_fn(residuals.errors.len(), free.len(), |i, k| {
+        residuals.columns[free[k]][i] * weights[i % CHANNELS] * ranges[free[k]]
+    });
+    let factors = weighted.qr();
+    let mut wanted = DVector::from_fn(residuals.errors.len(), |i, _| {
+        residuals.errors[i] * weights[i % CHANNELS]
+    });
     factors.q_tr_mul(&mut wanted);
     let step = factors
         .r()
@@ -191,7 +214,6 @@ pub fn judge(
             .map(|(&k, s)| (s * ranges[k] / standard_errors[k]).abs())
             .fold(0.0, f64::max)
     });
-    let at_rounding = (0..CHANNELS).all(|k| noise[k] <= LEAST_NOISE * scales[k]);
     Identifiability {
         identifiable,
         groups,
@@ -199,7 +221,7 @@ pub fn judge(
         singular_values,
         noise,
         step_in_errors,
-        looks_like_noise: at_rounding || looks_like_noise(&residuals.errors),
+        looks_like_noise: is_noise(&residuals.errors, scales, &noise),
     }
 }
 
@@ -261,6 +283,16 @@ mod tests {
         }
         // Its standard error is sqrt(2/7)/sqrt(4000), 0.8 %; that of division by all rows would be off by 12 %.
         assert!((squares / f64::from(draws) - 1.0).abs() < 0.03);
+    }
+
+    #[test]
+    fn what_the_model_lacks_is_no_noise_to_weight_by() {
+        let scales = [1.0, 2.0, 3.0, 4.0];
+        let noise = residuals(0).errors;
+        let weights = weights_of(&noise, &scales, 0);
+        assert_eq!(weights, noise_of(&noise, &scales, 0).map(|n| 1.0 / n));
+        let smooth: Vec<f64> = (0..ROWS * CHANNELS).map(|i| (0.01 * i as f64).sin()).collect();
+        assert_eq!(weights_of(&smooth, &scales, 0), scales.map(|s| 1.0 / s));
     }
 
     #[test]

@@ -1,7 +1,8 @@
-//! What follows the swarm: polish, hops over into deeper minima, and the polish with the noise for weights.
+//! What follows the swarm: polish, hops over into deeper minima, and the polish with the noise for weights where the errors
+//! that remain are noise.
 
 use super::hops::{self, STARTS, gains, hop, looks_like_noise};
-use super::identifiability::noise_of;
+use super::identifiability::{noise_of, weights_of};
 use super::polish::{MOST_DRIVES, polish_observed};
 use super::settings::IdentifySettings;
 use super::setup::{CHANNELS, Setup};
@@ -64,8 +65,10 @@ pub(super) fn refine(
             return Ok(refined);
         }
         if refined.hops == hops || looks_like_noise(&residuals.errors) {
-            // Maximum likelihood for white noise of these sizes.
-            let weights = noise.map(|n| 1.0 / n);
+            let weights = weights_of(&residuals.errors, &setup.scales, replay.dimensions());
+            if weights == spread {
+                return Ok(refined);
+            }
             if let Some(p) = polish_observed(replay, &refined.candidate, weights, MOST_DRIVES, watch) {
                 refined.interrupted = p.interrupted;
                 refined.candidate = p.candidate;
@@ -126,8 +129,7 @@ pub(super) fn restarted(
         let Some(residuals) = replay.residuals(&candidate) else {
             break;
         };
-        let noise = noise_of(&residuals.errors, &setup.scales, replay.dimensions());
-        let weights = noise.map(|n| 1.0 / n);
+        let weights = weights_of(&residuals.errors, &setup.scales, replay.dimensions());
         let Some(polished) = polish_observed(&replay, &candidate, weights, ROUND_DRIVES, watch) else {
             break;
         };
