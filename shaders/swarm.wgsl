@@ -28,6 +28,9 @@ struct Generation {
 
 const BLOCK: u32 = 64u;
 const UNKNOWN: f32 = 3.4028234e38;
+// Objectives of this size and more say in their last eight bits why a particle failed; this many reasons are told apart.
+const FAILED: u32 = 0x7f7fff00u;
+const REASONS: u32 = 15u;
 const SCALE: f32 = 0.5;
 const CROSSOVER: f32 = 0.3;
 
@@ -49,11 +52,11 @@ const RECOMBINE: u32 = 9u;
 @group(0) @binding(4) var<storage, read_write> best_position: array<f32>;
 @group(0) @binding(5) var<storage, read_write> best_objectives: array<f32>;
 @group(0) @binding(6) var<storage, read_write> objectives: array<f32>;
-// How many points no member dominates or equals, and how many particles failed; then those points: the particle and its
-// objectives, three to each.
+// How many points no member dominates or equals, and how many particles failed for each reason; then those points: the particle
+// and its objectives, three to each.
 struct Found {
     count: atomic<u32>,
-    failed: atomic<u32>,
+    failed: array<atomic<u32>, REASONS>,
     points: array<vec4<u32>>,
 }
 @group(0) @binding(7) var<storage, read_write> found: Found;
@@ -105,6 +108,7 @@ fn learn(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) 
     var no_worse = true;
     var no_better = true;
     var sound = true;
+    var reason = 0u;
     var at = vec3<f32>(0.0);
     for (var k = 0u; k < width; k++) {
         let i = place(who, width, k);
@@ -112,10 +116,15 @@ fn learn(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) 
         let best = best_objectives[i];
         no_worse = no_worse && value <= best;
         no_better = no_better && best <= value;
-        sound = sound && is_finite(value) && abs(value) < UNKNOWN;
+        let size = bitcast<u32>(value) & 0x7fffffffu;
+        if size >= FAILED {
+            sound = false;
+            // What is no number, or a number beyond the costs, has the first reason.
+            reason = select(0u, size - FAILED, size - FAILED < REASONS);
+        }
         at[k] = value;
     }
-    if !sound { atomicAdd(&found.failed, 1u); }
+    if !sound { atomicAdd(&found.failed[reason], 1u); }
     let heads = words(COIN, who, 0u).x < 0x80000000u;
     let better = no_worse && !no_better;
     let open = no_worse == no_better;

@@ -8,7 +8,7 @@ use crate::cli::output::{Columns, line_of, outln};
 use clap::builder::PossibleValuesParser;
 use lapswarm::evaluate::gpu::{GpuContext, devices};
 use lapswarm::evaluate::line::LineObjective;
-use lapswarm::evaluate::{BackendChoice, DeviceKernel, Evaluator, GpuBackend, OnDevice, Problem};
+use lapswarm::evaluate::{BackendChoice, Evaluator, GpuBackend, OnDevice, Problem};
 use lapswarm::swarm::device::DeviceMopso;
 use lapswarm::swarm::{Mopso, MopsoSettings, Optimiser, Pso};
 use lapswarm::{Error, Result};
@@ -105,7 +105,7 @@ impl Bench for Generations<'_> {
         LineObjective::LapTime,
     ];
 
-    /// On every backend, with the swarm on the host and, where its kernel scores such, on the device.
+    /// On every backend, with the swarm on the host and, of two or three objectives, on the device.
     fn measure_all<K: OnDevice>(&mut self, name: &'static str, case: &Case<K>) -> Result<()> {
         let choice = self.arguments.backend.unwrap_or_default();
         let adapter = self.arguments.adapter.as_deref();
@@ -131,7 +131,7 @@ impl Bench for Generations<'_> {
             _ => false,
         };
         let width = problem.objectives.len();
-        if <K::Device as DeviceKernel<K>>::RESIDENT && wanted && (2..=3).contains(&width) {
+        if wanted && (2..=3).contains(&width) {
             let context = GpuContext::shared(adapter)?;
             let mut evaluator = GpuBackend::new(&case.kind, context.clone())?;
             let info = evaluator.backend();
