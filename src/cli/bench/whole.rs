@@ -18,7 +18,7 @@ use std::time::Instant;
 /// Flags of `bench whole`.
 #[derive(clap::Args)]
 pub struct Arguments {
-    /// Problems: those of `bench`, lines by Gamma, length and lap time
+    /// Problems: those of `bench`, by two or three objectives
     #[arg(long, value_delimiter = ',', default_value = "replay,line,energy,drive,steady",
           value_parser = PossibleValuesParser::new(problems::<Generations<'_>>().map(|(name, _)| name)))]
     problems: Vec<String>,
@@ -104,6 +104,7 @@ impl Bench for Generations<'_> {
         LineObjective::Length,
         LineObjective::LapTime,
     ];
+    const FRONTS: bool = true;
 
     /// On every backend, with the swarm on the host and, of two or three objectives, on the device.
     fn measure_all<K: OnDevice>(&mut self, name: &'static str, case: &Case<K>) -> Result<()> {
