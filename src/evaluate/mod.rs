@@ -384,6 +384,7 @@ impl Evaluation {
     }
 
     /// Joins rows of objectives and failures.
+    #[cfg(test)]
     pub(crate) fn of_rows(rows: Vec<(Vec<f64>, Option<Failure>)>) -> Self {
         let mut evaluation = Self::default();
         for (row, failure) in rows {

@@ -464,7 +464,10 @@ impl DeviceMopso {
             &self.buffers.archive,
             bytemuck::cast_slice(&leaders(&self.archive)),
         );
-        self.dispatch(&self.kernels.advance, self.archive.len())?;
+        // The host goes on meanwhile: the evaluation that follows waits for it.
+        self.announce(self.archive.len());
+        self.context
+            .run_ahead(|encoder| self.record(encoder, &self.kernels.advance))?;
         Ok(Progress {
             iteration: self.counters.iteration,
             evaluations: self.counters.evaluations,

@@ -154,6 +154,8 @@ impl Bench for Generations<'_> {
                         swarm.evaluate(&mut evaluator)?;
                         let kernels = context.dispatched_ms() - before;
                         swarm.learn_and_move()?;
+                        // Or the next evaluation's kernels would have the time of the move.
+                        context.settle()?;
                         Ok(kernels)
                     })
                 },

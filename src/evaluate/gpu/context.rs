@@ -350,23 +350,44 @@ impl GpuContext {
     /// # Errors
     /// [`Error::Device`] if that fails or takes too long.
     pub(crate) fn run(&self, record: impl FnOnce(&mut wgpu::CommandEncoder)) -> Result<()> {
+        let begin = Instant::now();
+        let submission = self.submit(record)?;
+        self.wait(Some(submission))?;
+        dispatches::note(begin.elapsed());
+        Ok(())
+    }
+
+    /// Records with `record` and submits. What is submitted next comes after it, and finds what became of it.
+    ///
+    /// # Errors
+    /// [`Error::Device`] if that fails.
+    pub(crate) fn run_ahead(&self, record: impl FnOnce(&mut wgpu::CommandEncoder)) -> Result<()> {
+        self.submit(record).map(drop)
+    }
+
+    fn submit(&self, record: impl FnOnce(&mut wgpu::CommandEncoder)) -> Result<wgpu::SubmissionIndex> {
         let what = "run a kernel";
         let fault = faults::next(Place::Submission);
         if let Some(fault) = fault {
             self.suffer(fault, what)?;
         }
-        let begin = Instant::now();
         let submission = self.scoped(what, || {
             let mut encoder = self.device.create_command_encoder(&Default::default());
             record(&mut encoder);
             self.queue.submit([encoder.finish()])
         })?;
         if fault == Some(Fault::Hung) {
-            return self.waited(Err(wgpu::PollError::Timeout));
+            self.waited(Err(wgpu::PollError::Timeout))?;
         }
-        self.wait(Some(submission))?;
-        dispatches::note(begin.elapsed());
-        Ok(())
+        Ok(submission)
+    }
+
+    /// Waits for all that was submitted.
+    ///
+    /// # Errors
+    /// [`Error::Device`] if any of it fails or takes too long.
+    pub fn settle(&self) -> Result<()> {
+        self.wait(None)
     }
 
     /// Runs `kernel` over so many workgroups; returns how long that took with its submission and the wait (ms, above zero).

@@ -138,7 +138,12 @@ impl Exchange {
         context.write(&self.task, bytemuck::bytes_of(&task));
         let group = context.bind(kernel, &[&self.task, table, from, to])?;
         let (x, y) = groups(candidates);
-        context.dispatch(kernel, &group, [x, y], None).map(drop)
+        context.run_ahead(|encoder| {
+            let mut pass = encoder.begin_compute_pass(&Default::default());
+            pass.set_pipeline(&kernel.pipeline);
+            pass.set_bind_group(0, &group, &[]);
+            pass.dispatch_workgroups(x, y, 1);
+        })
     }
 
     /// Takes the figures of a batch from the swarm's positions. `batch` holds its first particle, the number of particles, and
