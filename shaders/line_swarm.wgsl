@@ -15,24 +15,17 @@ struct Exchange {
     failed: f32,
 }
 
-// A figure is `lower + range * position`.
+// A figure is `lower + range * position`, an objective a result, or its root, over `range`.
 struct Scaled {
     lower: f32,
     range: f32,
-    // Its row among the positions.
+    // Its row among the positions, or its place among the results.
     row: u32,
-}
-
-// An objective is a result, or its root, over `unit`.
-struct Objective {
-    figure: u32,
     root: u32,
-    unit: f32,
 }
 
 @group(0) @binding(0) var<uniform> exchange: Exchange;
 @group(0) @binding(1) var<storage, read> scaled: array<Scaled>;
-@group(0) @binding(1) var<storage, read> objectives: array<Objective>;
 // Positions or results, then figures or objectives.
 @group(0) @binding(2) var<storage, read> given: array<f32>;
 @group(0) @binding(3) var<storage, read_write> taken: array<f32>;
@@ -67,10 +60,9 @@ fn objectives_of_results(@builtin(global_invocation_id) id: vec3<u32>, @builtin(
     let who = exchange.first + candidate;
     var sound = true;
     for (var k = 0u; k < exchange.objectives; k++) {
-        let objective = objectives[k];
-        var value = given[objective.figure * exchange.stride + candidate];
-        if objective.root == 1u { value = sqrt(value); }
-        value = value / objective.unit;
+        var value = given[scaled[k].row * exchange.stride + candidate];
+        if scaled[k].root == 1u { value = sqrt(value); }
+        value = value / scaled[k].range;
         sound = sound && is_finite(value) && abs(value) < FAILED;
         taken[place(who, exchange.objectives, k)] = value;
     }

@@ -4,7 +4,7 @@ use super::problem::{Figure, HybridObjective, HybridProblem};
 use crate::error::Result;
 use crate::evaluate::gpu::shader::EnergyShape;
 use crate::evaluate::gpu::{Batching, Binding, DeviceKind, GpuContext};
-use crate::evaluate::line::gpu::{DeviceObjective, Exchange, LineBatches, LineKernel, LineTables, Scaled};
+use crate::evaluate::line::gpu::{Exchange, LineBatches, LineKernel, LineTables, Scaled};
 use crate::evaluate::{DeviceKernel, GpuBackend, OnDevice, ProblemKind};
 use crate::line::energy::kernel::FIGURES;
 use crate::line::energy::{EnergyLap, EnergyPlan, EnergyTable, Mode};
@@ -69,21 +69,14 @@ fn exchange_of(hybrid: &HybridProblem, context: &GpuContext) -> Result<Option<Ex
         })
         .collect();
     // In the order of the figures of a lap.
-    let objectives: Vec<DeviceObjective> = hybrid
+    let objectives: Vec<Scaled> = hybrid
         .objectives()
         .iter()
-        .map(|objective| {
-            let (figure, unit) = match objective {
-                HybridObjective::LapTime => (0, 1.0),
-                HybridObjective::Fuel => (1, hybrid.car().fuel_density_kgpl),
-                HybridObjective::EnergyUsed => (2, 1e6),
-                HybridObjective::SocSwing => (6, hybrid.car().hybrid.store.capacity_j),
-            };
-            DeviceObjective {
-                figure,
-                root: 0,
-                unit: unit as f32,
-            }
+        .map(|objective| match objective {
+            HybridObjective::LapTime => Scaled::of_result(0, 1.0),
+            HybridObjective::Fuel => Scaled::of_result(1, hybrid.car().fuel_density_kgpl),
+            HybridObjective::EnergyUsed => Scaled::of_result(2, 1e6),
+            HybridObjective::SocSwing => Scaled::of_result(6, hybrid.car().hybrid.store.capacity_j),
         })
         .collect();
     let free = hybrid.problem.variables.iter().filter(|v| v.is_free()).count();

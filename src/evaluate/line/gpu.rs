@@ -15,7 +15,7 @@ use crate::error::Result;
 use crate::evaluate::gpu::{Batching, GpuContext};
 use crate::evaluate::{DeviceKernel, GpuBackend, OnDevice, ProblemKind};
 use crate::line::EnvelopeTable;
-pub(in crate::evaluate) use exchange::{DeviceObjective, Exchange, Scaled};
+pub(in crate::evaluate) use exchange::{Exchange, Scaled};
 use std::sync::Arc;
 
 /// The line kernel on a device.
@@ -105,13 +105,12 @@ impl DeviceKernel<LineProblem> for LineDevice {
 /// Between a swarm and the line kernel.
 fn exchange_of(line: &LineProblem, context: &GpuContext) -> Result<Exchange> {
     let variables = &line.problem.variables;
-    let objectives: Vec<DeviceObjective> = line
+    let objectives: Vec<Scaled> = line
         .objectives()
         .iter()
-        .map(|objective| DeviceObjective {
-            figure: *objective as u32,
-            root: u32::from(*objective == LineObjective::Gamma),
-            unit: 1.0,
+        .map(|objective| match objective {
+            LineObjective::Gamma => Scaled::of_root(*objective as usize),
+            _ => Scaled::of_result(*objective as usize, 1.0),
         })
         .collect();
     let free = variables.iter().filter(|v| v.is_free()).count();

@@ -33,6 +33,7 @@ pub(in crate::evaluate) struct Scaled {
     lower: f32,
     range: f32,
     row: u32,
+    root: u32,
 }
 
 impl Scaled {
@@ -42,6 +43,25 @@ impl Scaled {
             lower: value as f32,
             range: 0.0,
             row: 0,
+            root: 0,
+        }
+    }
+
+    /// An objective that is the result of that place over `unit`.
+    pub fn of_result(row: usize, unit: f64) -> Self {
+        Self {
+            lower: 0.0,
+            range: unit as f32,
+            row: row as u32,
+            root: 0,
+        }
+    }
+
+    /// The same of the root of the result.
+    pub fn of_root(row: usize) -> Self {
+        Self {
+            root: 1,
+            ..Self::of_result(row, 1.0)
         }
     }
 
@@ -57,22 +77,11 @@ impl Scaled {
                 lower: v.lower as f32,
                 range: (v.upper - v.lower) as f32,
                 row: free - 1,
+                root: 0,
             }
         });
         scaled.collect()
     }
-}
-
-/// Twin of `Objective` in `shaders/line_swarm.wgsl`: an objective that is made of one of a kernel's results.
-#[repr(C)]
-#[derive(Clone, Copy, Pod, Zeroable)]
-pub(in crate::evaluate) struct DeviceObjective {
-    /// Which of them.
-    pub figure: u32,
-    /// Whether it is its root.
-    pub root: u32,
-    /// What it is divided by.
-    pub unit: f32,
 }
 
 /// What brings a swarm's positions to the line kernel and its figures back.
@@ -95,7 +104,7 @@ impl Exchange {
     pub fn new(
         context: &GpuContext,
         rows: usize,
-        (figures, objectives): (&[Scaled], &[DeviceObjective]),
+        (figures, objectives): (&[Scaled], &[Scaled]),
         without_cost: Failure,
     ) -> Result<Self> {
         use Binding::{Read, Uniform, Write};
