@@ -112,7 +112,7 @@ type Solver = (
 
 impl ReferenceSolvers {
     /// The solvers of lines through these cross-sections by `car`, which enters an open road at `entry_mps` (m/s) at the most. Lap
-    /// times are theirs only on a friction ellipse of exponent 2.
+    /// times are theirs only on a friction ellipse of exponent 2, and on level roads.
     ///
     /// # Errors
     /// [`crate::Error::Input`] for a car that cannot be; [`crate::Error::Study`] if the minimum-curvature line is refused.
@@ -144,7 +144,8 @@ impl ReferenceSolvers {
             smooth: LineMap::spline_about(cross_sections, &base, controls),
             every: (map, bounds),
             base,
-            envelope: if car.ellipse_exponent == 2.0 {
+            // The laps of the solvers are those of level roads.
+            envelope: if car.ellipse_exponent == 2.0 && cross_sections.relief.is_none() {
                 Some(PointMassEnvelope::new(car)?)
             } else {
                 None

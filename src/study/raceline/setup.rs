@@ -9,7 +9,7 @@ use crate::line::{Clearance, FINE_M, FineLine, Parametrisation, PointMass, RoadE
 use crate::optimum::{ReferenceSolvers, mended};
 use crate::study::framework::Plan;
 use crate::track::{CrossSections, Spacing, Track, racetrack_csv};
-use crate::vehicle::limits::{SpeedRange, car_envelope};
+use crate::vehicle::limits::{SpeedRange, car_envelope, car_envelope_under_loads};
 use crate::vehicle::powertrain::Powertrain;
 use crate::vehicle::{Car, Envelope};
 use glam::DVec2;
@@ -79,7 +79,13 @@ pub fn set_up(settings: &RacelineSettings) -> Result<Setup> {
     let car = Car::load(&settings.car)?;
     let (envelope, car_name) = match &settings.envelope {
         Some(path) => (Envelope::load(path)?, path.display().to_string()),
-        None => (car_envelope(&car, &SpeedRange::USUAL)?.envelope, car.name.clone()),
+        None => {
+            let limits = match road.relief {
+                Some(_) => car_envelope_under_loads(&car, &SpeedRange::USUAL)?,
+                None => car_envelope(&car, &SpeedRange::USUAL)?,
+            };
+            (limits.envelope, car.name.clone())
+        }
     };
     let gearbox = car.powertrain.clone().filter(|_| settings.envelope.is_none());
     let gearbox = gearbox.map(|powertrain| (powertrain, car.chassis.radius_rear));
@@ -87,6 +93,7 @@ pub fn set_up(settings: &RacelineSettings) -> Result<Setup> {
     let car = PointMass {
         ellipse_exponent: settings.ellipse_exponent,
         max_steer_rad: Some(car.max_steer_rad),
+        relief: road.relief.is_some(),
         ..PointMass::new(envelope, wheelbase)
     };
     car.check()?;
@@ -304,7 +311,15 @@ impl Setup {
             self.cross_sections.closed,
             Some((&self.car, self.cross_sections.drs.as_slice())),
         );
-        let fine = FineLine::new(&points, closed, FINE_M, car, settings.entry_mps)?;
+        let relief = self.cross_sections.relief_of(&points);
+        let fine = FineLine::on(
+            &points,
+            relief.as_deref(),
+            closed,
+            FINE_M,
+            car,
+            settings.entry_mps,
+        )?;
         let edges = RoadEdges::new(&self.edges_m[0], &self.edges_m[1], closed);
         let clearance = Clearance::least(&fine, &edges.clearances(&fine, &settings.plan_with_margin()));
         Ok(ReportedLine {
