@@ -227,7 +227,11 @@ impl Setup {
         let edges = RoadEdges::new(&self.edges_m[0], &self.edges_m[1], fine.closed);
         let abreast = edges.abreast(&fine.points_m);
         let given = (0..n).filter(|&i| fine.section[i].1 == 0.0);
-        racetrack_csv(given.map(|i| {
+        let relief = fine.relief.as_ref().map(|relief| -> Vec<[f64; 2]> {
+            let own = (0..n).filter(|&i| fine.section[i].1 == 0.0);
+            own.map(|i| [relief.z_m[i], relief.bank_rad[i]]).collect()
+        });
+        let rows = given.map(|i| {
             let (before, after) = if fine.closed {
                 ((i + n - 1) % n, (i + 1) % n)
             } else {
@@ -244,7 +248,8 @@ impl Setup {
                 ahead_m.filter(|_| nearest_m > 0.0).unwrap_or(nearest_m)
             };
             (point, room(-leftward, false), room(leftward, true))
-        }))
+        });
+        racetrack_csv(rows, relief.as_deref())
     }
 
     /// The gear that gives most (from 1) at each speed (m/s), of a car whose limits are its own.
