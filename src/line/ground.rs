@@ -138,38 +138,65 @@ impl<R: Lookup> Sloped<R> {
         }
     }
 
-    /// The row of limits under the load at a speed squared: figures and their rises over a row.
+    /// The row in which a speed squared lies, a whole number, and how far it is beyond its start.
     #[inline(always)]
-    fn row(loads: &LoadTables<R::Storage>, layer: Layer<R>, rows: usize, row: R, column: usize) -> [R; 2] {
-        let of = |table: R| {
-            let (place, _) = (table * R::lit(rows as f64) + row).place(loads.tables * rows, ENVELOPE_WIDTH);
-            [0, ENVELOPE_WIDTH / 2].map(|rise| R::pick(&loads.rows, place, rise + column))
-        };
-        let (low, high) = (of(layer.below), of(layer.below + R::lit(1.0)));
-        [0, 1].map(|k| low[k] + layer.share * (high[k] - low[k]))
+    fn row_of(envelope: &EnvelopeTable<R::Storage>, speed_squared: R) -> [R; 2] {
+        let rows = envelope.rows.len() / ENVELOPE_WIDTH;
+        let argument = speed_squared * R::load(envelope.rows_per_speed_squared);
+        let argument = argument.max(R::lit(0.0)).min(R::lit(rows as f64));
+        let row = argument.whole(rows - 1);
+        [row, argument - row]
+    }
+
+    /// A figure of one table, and its rise over a row.
+    #[inline(always)]
+    fn figure_of(envelope: &EnvelopeTable<R::Storage>, table: R, row: R, column: usize) -> [R; 2] {
+        let (loads, rows) = (&envelope.loads, envelope.rows.len() / ENVELOPE_WIDTH);
+        let (place, _) = (table * R::lit(rows as f64) + row).place(loads.tables * rows, ENVELOPE_WIDTH);
+        [
+            R::pick(&loads.rows, place, column),
+            R::pick(&loads.rows, place, ENVELOPE_WIDTH / 2 + column),
+        ]
+    }
+
+    /// A figure under a load.
+    #[inline(always)]
+    fn figure(
+        envelope: &EnvelopeTable<R::Storage>,
+        layer: Layer<R>,
+        [row, beyond]: [R; 2],
+        column: usize,
+    ) -> R {
+        let low = Self::figure_of(envelope, layer.below, row, column);
+        let high = Self::figure_of(envelope, layer.below + R::lit(1.0), row, column);
+        let figure = low[0] + layer.share * (high[0] - low[0]);
+        let rise = low[1] + layer.share * (high[1] - low[1]);
+        figure + beyond * rise
+    }
+
+    /// The traction in a cell of one table, so far beyond its start.
+    #[inline(always)]
+    fn traction_of(loads: &LoadTables<R::Storage>, table: R, cell: R, [along, across]: [R; 2]) -> R {
+        let cells = TRACTION_SPEEDS * TRACTION_ROOTS;
+        let (place, _) = (table * R::lit(cells as f64) + cell).place(loads.tables * cells, 4);
+        let start = R::pick(&loads.traction, place, 0) + along * R::pick(&loads.traction, place, 1);
+        start + across * (R::pick(&loads.traction, place, 2) + along * R::pick(&loads.traction, place, 3))
     }
 
     /// The lateral limit (m/s^2) at a speed squared, and its slope over it.
     #[inline(always)]
     fn lateral(self, envelope: &EnvelopeTable<R::Storage>, speed_squared: R) -> [R; 2] {
-        let loads = &envelope.loads;
-        let rows = envelope.rows.len() / ENVELOPE_WIDTH;
-        let per_row = R::load(envelope.rows_per_speed_squared);
-        let argument = (speed_squared * per_row)
-            .max(R::lit(0.0))
-            .min(R::lit(rows as f64));
-        let row = argument.whole(rows - 1);
-        let beyond = argument - row;
-        let layer = self.layer(loads, speed_squared);
-        let of = |share: R| {
-            let [figure, rise] = Self::row(loads, Layer { share, ..layer }, rows, row, 0);
-            [figure + beyond * rise, rise]
-        };
-        let (low, high, here) = (of(R::lit(0.0)), of(R::lit(1.0)), of(layer.share));
-        let by_load = (high[0] - low[0]) * R::load(loads.per_load);
+        let [row, beyond] = Self::row_of(envelope, speed_squared);
+        let layer = self.layer(&envelope.loads, speed_squared);
+        let low = Self::figure_of(envelope, layer.below, row, 0);
+        let high = Self::figure_of(envelope, layer.below + R::lit(1.0), row, 0);
+        let figure = low[0] + layer.share * (high[0] - low[0]);
+        let rise = low[1] + layer.share * (high[1] - low[1]);
+        let by_load = (high[0] + beyond * high[1]) - (low[0] + beyond * low[1]);
         [
-            here[0].max(R::lit(LEAST_GRIP)),
-            here[1] * per_row + by_load * self.dip,
+            (figure + beyond * rise).max(R::lit(LEAST_GRIP)),
+            rise * R::load(envelope.rows_per_speed_squared)
+                + by_load * R::load(envelope.loads.per_load) * self.dip,
         ]
     }
 }
@@ -177,34 +204,29 @@ impl<R: Lookup> Sloped<R> {
 impl<R: Lookup> Ground<R> for Sloped<R> {
     #[inline(always)]
     fn half_way(self, there: Self) -> Self {
-        let mean = |a: R, b: R| R::lit(0.5) * (a + b);
+        let half = R::lit(0.5);
         Self {
-            bend: mean(self.bend, there.bend),
-            dip: mean(self.dip, there.dip),
+            bend: half * (self.bend + there.bend),
+            dip: half * (self.dip + there.dip),
             // The gradient is that of the segment, at its start and at its end.
             climb: self.climb,
-            lean: mean(self.lean, there.lean),
-            press: mean(self.press, there.press),
+            lean: half * (self.lean + there.lean),
+            press: half * (self.press + there.press),
         }
     }
 
     #[inline(always)]
     fn limits(self, envelope: &EnvelopeTable<R::Storage>, speed_squared: R) -> ([R; 4], R) {
-        let loads = &envelope.loads;
-        let rows = envelope.rows.len() / ENVELOPE_WIDTH;
-        let argument = speed_squared * R::load(envelope.rows_per_speed_squared);
-        let argument = argument.max(R::lit(0.0)).min(R::lit(rows as f64));
-        let row = argument.whole(rows - 1);
-        let beyond = argument - row;
-        let layer = self.layer(loads, speed_squared);
-        let figure = |column: usize| {
-            let [figure, rise] = Self::row(loads, layer, rows, row, column);
-            figure + beyond * rise
-        };
+        let row = Self::row_of(envelope, speed_squared);
+        let layer = self.layer(&envelope.loads, speed_squared);
         let least = R::lit(LEAST_GRIP);
-        let lateral = figure(0).max(least);
-        let grip = figure(1).max(least);
-        let limits = [lateral, grip, figure(2), figure(3)];
+        let lateral = Self::figure(envelope, layer, row, 0).max(least);
+        let limits = [
+            lateral,
+            Self::figure(envelope, layer, row, 1).max(least),
+            Self::figure(envelope, layer, row, 2),
+            Self::figure(envelope, layer, row, 3),
+        ];
         let share = self.across(speed_squared) / lateral;
         let root = (R::lit(1.0) - share * share).max(R::lit(0.0)).sqrt();
         (limits, root)
@@ -220,17 +242,11 @@ impl<R: Lookup> Ground<R> for Sloped<R> {
         let along = along.max(R::lit(0.0)).min(speeds);
         let across = root * roots;
         let (speed, cell) = (along.whole(TRACTION_SPEEDS - 1), across.whole(TRACTION_ROOTS - 1));
-        let (along, across) = (along - speed, across - cell);
-        let cells = TRACTION_SPEEDS * TRACTION_ROOTS;
+        let beyond = [along - speed, across - cell];
+        let cell = speed * roots + cell;
         let layer = self.layer(loads, speed_squared);
-        let of = |table: R| {
-            let number = table * R::lit(cells as f64) + (speed * roots + cell);
-            let (place, _) = number.place(loads.tables * cells, 4);
-            let figure = |column: usize| R::pick(&loads.traction, place, column);
-            let start = figure(0) + along * figure(1);
-            start + across * (figure(2) + along * figure(3))
-        };
-        let (low, high) = (of(layer.below), of(layer.below + R::lit(1.0)));
+        let low = Self::traction_of(loads, layer.below, cell, beyond);
+        let high = Self::traction_of(loads, layer.below + R::lit(1.0), cell, beyond);
         (low + layer.share * (high - low)).max(R::lit(0.0))
     }
 
