@@ -7,7 +7,7 @@ use crate::vehicle::powertrain::GRAVITY_MPS2;
 
 /// The load beyond which limits no longer rise, as a share of the weight: compressions of two and a half times the weight are rare,
 /// and tyres gain ever less.
-const MOST_LOAD: f64 = 2.5;
+pub(crate) const MOST_LOAD: f64 = 2.5;
 
 /// Tables of limits under several loads, in even steps. Between two of them, and a little beyond the outer ones, limits are linear in
 /// the load. Empty for level roads.

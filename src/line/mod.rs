@@ -31,6 +31,7 @@ pub use fine::{FINE_M, FineLine};
 pub use geometry::{Geometry, geometry};
 pub use kernel::{BySection, Within};
 pub use loads::LoadTables;
+pub(crate) use loads::MOST_LOAD;
 pub use parametrisation::Parametrisation;
 pub use perpendicular::{cross_sections_about, shares_across};
 pub use plan::{LinePlan, ReliefRow, SectionRow, TERMS};

@@ -90,6 +90,12 @@ impl LineRelief {
         }
     }
 
+    /// Curvature square to the surface at a point (1/m), and gravity along the segment after it, to the left and square to the surface
+    /// (m/s^2).
+    pub(crate) fn place(&self, point: usize) -> [f64; 4] {
+        self.course[point]
+    }
+
     /// The specific forces of the road at each point (m/s^2), at these speeds (m/s) and accelerations (m/s^2): along the car,
     /// to its left, and square to the surface.
     pub fn forces_mps2(&self, v_mps: &[f64], ax_mps2: &[f64]) -> Vec<[f64; 3]> {

@@ -112,7 +112,7 @@ type Solver = (
 
 impl ReferenceSolvers {
     /// The solvers of lines through these cross-sections by `car`, which enters an open road at `entry_mps` (m/s) at the most. Lap
-    /// times are theirs only on a friction ellipse of exponent 2, and on level roads.
+    /// times are theirs only on a friction ellipse of exponent 2.
     ///
     /// # Errors
     /// [`crate::Error::Input`] for a car that cannot be; [`crate::Error::Study`] if the minimum-curvature line is refused.
@@ -144,8 +144,7 @@ impl ReferenceSolvers {
             smooth: LineMap::spline_about(cross_sections, &base, controls),
             every: (map, bounds),
             base,
-            // The laps of the solvers are those of level roads.
-            envelope: if car.ellipse_exponent == 2.0 && cross_sections.relief.is_none() {
+            envelope: if car.ellipse_exponent == 2.0 {
                 Some(PointMassEnvelope::new(car)?)
             } else {
                 None
@@ -369,8 +368,9 @@ impl ReferenceSolvers {
     /// A line through the cross-sections, as it is driven.
     fn driven(&self, alpha: &[f64]) -> Result<Driven> {
         let points = self.cross_sections.points(alpha);
-        let fine = FineLine::new(
+        let fine = FineLine::on(
             &points,
+            self.cross_sections.relief_of(&points).as_deref(),
             self.cross_sections.closed,
             FINE_M,
             Some((&self.car, &self.cross_sections.drs)),

@@ -158,8 +158,8 @@ fn three_dimensions(setup: &Setup) -> Vec<String> {
         return Vec::new();
     }
     let mut words = vec![
-        "the road has height or banking: laps are those of three dimensions, lengths and curvatures those of the map; the solvers \
-         of the fastest line know level roads alone, so that it has no reference optimum here"
+        "the road has height or banking: laps are those of three dimensions, lengths and curvatures those of the map; steps of the \
+         solver of the fastest line leave out what a line gains by going up or down the banking"
             .to_owned(),
     ];
     if setup.car.envelope.loads().is_empty() {
