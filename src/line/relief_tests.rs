@@ -201,41 +201,30 @@ fn gravity_keeps_its_size_in_the_frame_of_the_road() {
 }
 
 /// A level road given as heights and banking of zero has the lap of the plane: to 1e-6, by which the table of corner speeds is off
-/// from the corner speed itself, twice over.
+/// from the corner speed itself, twice over. All its bends are to one side, because kernels of level roads know no signs: half-way from a
+/// left bend to a right one they have the mean of both.
 #[test]
 fn height_and_banking_of_zero_are_the_level_lap() {
-    let (road, alpha) = hills();
-    let zero = SectionRelief {
-        z_m: vec![3.0; 720],
-        bank_rad: vec![0.0; 720],
-        ..road.relief.clone().unwrap()
-    };
+    let radius = |a: f64| 600.0 + 60.0 * (2.0 * a).sin();
+    let zero = ring(720, radius, 12.0, |_| [3.0, 0.0]);
+    let hilly = ring(720, radius, 12.0, |a| [20.0 * a.sin(), 0.05 * (3.0 * a).sin()]);
     let level = CrossSections {
         relief: None,
-        ..road.clone()
+        ..zero.clone()
     };
-    let zero = CrossSections {
-        relief: Some(zero),
-        ..road.clone()
-    };
-    let car = car([15.0, 14.0, 6.0, 1.0], 70.0);
-    let table = car.table().unwrap();
+    let table = car([9.0, 8.0, 6.0, 1.0], 90.0).table().unwrap();
     let time = |road: &CrossSections| {
-        let mut course = course_of(road, &alpha);
-        let slowest = (0..720).max_by(|i, j| {
-            let bend = |i: &usize| course.curvature[*i].abs();
-            bend(i).total_cmp(&bend(j))
-        });
-        let time = lap_time::<f64>(&table, true, slowest.unwrap(), 0.0, &mut course);
+        let mut course = course_of(road, &[0.5; 720]);
+        let time = lap_time::<f64>(&table, true, 0, 0.0, &mut course);
         (time, course)
     };
     let ((flat_s, flat), (found_s, found)) = (time(&level), time(&zero));
     assert!((found_s / flat_s - 1.0).abs() < 2e-6, "{found_s} for {flat_s}");
     for i in 0..720 {
         assert!((flat.length[i] - found.length[i]).abs() < 1e-12);
-        assert!((flat.curvature[i] - found.curvature[i].abs()).abs() < 1e-12);
+        assert!((flat.curvature[i] - found.curvature[i]).abs() < 1e-12);
     }
-    let (hilly_s, _) = time(&road);
+    let (hilly_s, _) = time(&hilly);
     assert!(
         (hilly_s / flat_s - 1.0).abs() > 1e-3,
         "{hilly_s} on hills, {flat_s}"
