@@ -95,10 +95,13 @@ impl Circuit {
     /// `station_m`.
     ///
     /// Keys with a curvature table: `name`, `curvature_table` (a CSV file with columns `station_m`, `curvature_1pm` and, if
-    /// wanted, `width_left_m`, `width_right_m`, `corner`, `z_m`, `bank_deg`), `length_m`; `closed` (default true), `start_heading_deg` (0),
-    /// `width_m` (of the whole road, where the table has no widths), `[[sections]]` with `name`, `start_m`, `end_m`, and
-    /// `[[drs_zones]]` with `start_m` and `end_m`, where the DRS may be open; one whose end lies before its start passes the start
-    /// line.
+    /// wanted, `width_left_m`, `width_right_m`, `corner`, `z_m`, `bank_deg`), `length_m`; `closed` (default true),
+    /// `start_heading_deg` (0), `width_m` (of the whole road, where the table has no widths), `[[sections]]` with `name`,
+    /// `start_m`, `end_m`, and `[[drs_zones]]` with `start_m` and `end_m`, where the DRS may be open; one whose end lies before
+    /// its start passes the start line.
+    ///
+    /// Both have `smoothing_height_m` and `smoothing_bank_deg` as in [`Smoothing`], and `flat`, which leaves height and banking
+    /// out.
     ///
     /// # Errors
     /// [`Error::Io`] when a file cannot be read; [`Error::Input`] with the file, line and field when
