@@ -83,10 +83,7 @@ fn greatest_share(work: Work<'_, Transient>) -> Result<Option<DrivenLine>> {
         return Err(Error::input("the study", "line", "none", "a line to drive"));
     };
     let NamedLine {
-        points_m,
-        drs,
-        circuit,
-        ..
+        points_m, circuit, ..
     } = line;
     let parts = (car, limits, line);
     let Work {
@@ -114,7 +111,7 @@ fn greatest_share(work: Work<'_, Transient>) -> Result<Option<DrivenLine>> {
     state_file.save(&state)?;
     let traction = Traction::of(car, &limits.envelope);
     let attempt = |share: f64| -> Result<Option<DrivenLine>> {
-        let (envelope, point_mass, plan) = planned(limits, &traction, (points_m, drs), share)?;
+        let (envelope, point_mass, plan) = planned(limits, &traction, line, share)?;
         let drive = drive_planned(car, circuit, plan, &driver, INTERVAL_S)?;
         let lap_time_s = drive.lap_time_s(circuit.length_m, INTERVAL_S);
         Ok(lap_time_s.map(|lap_time_s| DrivenLine {
