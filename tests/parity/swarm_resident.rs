@@ -31,16 +31,16 @@ fn settings(population: usize, iterations: usize) -> MopsoSettings {
 
 /// Figures of cars are made on the host for both swarms: candidates have the same bits in both, and so have failures and objectives,
 /// but that those are rounded to single precision on the device. Whole numbers or not.
-fn is_that_of_the_host<K: OnDevice>(kind: &K, context: &Arc<GpuContext>) {
+fn is_that_of_the_host<K: OnDevice>(kind: &K, population: usize, context: &Arc<GpuContext>) {
     let judge = || GpuBackend::new(kind, Arc::clone(context)).unwrap();
     let (mut there_judge, mut here_judge) = (judge(), judge());
     let problem: &Problem = Evaluator::problem(&there_judge);
     let width = problem.objectives.len();
-    // A few more than a whole number of blocks.
-    let settings = settings(MANY + 5, 3);
+    let settings = settings(population, 3);
     let mut here = Mopso::new(problem, settings.clone()).unwrap();
     let mut there = DeviceMopso::new(problem, settings, Arc::clone(context)).unwrap();
-    if crate::swarm::rounds_like_the_processor(context) {
+    // Fewer are kept in double precision on the host.
+    if population >= MANY && crate::swarm::rounds_like_the_processor(context) {
         assert!(here.ask() == there.candidates().unwrap());
     }
     for generation in 0..3 {
@@ -80,11 +80,12 @@ fn cars_of_a_swarm_on_the_device_are_those_of_the_host() {
         &[SteadyObjective::Cornering, SteadyObjective::Sideslip],
     )
     .unwrap();
-    is_that_of_the_host(&steady, &context);
+    // A few more than a whole number of blocks.
+    is_that_of_the_host(&steady, MANY + 5, &context);
     let mut judge = GpuSteadyEvaluator::new(&steady, Arc::clone(&context)).unwrap();
     let mut swarm = DeviceMopso::new(&steady.problem, settings(1000, 2), Arc::clone(&context)).unwrap();
     let progress = swarm.step(&mut judge).unwrap();
-    assert!(progress.failed > 10 && progress.failed < 990, "{progress:?}");
+    assert!((1..500).contains(&progress.failed), "{progress:?}");
     assert!(
         progress
             .failures
@@ -97,7 +98,7 @@ fn cars_of_a_swarm_on_the_device_are_those_of_the_host() {
     let circuits = ["stadium:60:40:14", "stadium:70:40:14"];
     let drive = drive::problem_of(linear_car(), &circuits, &[0.4, 0.5], 6e-3, &["mass_kg"]).unwrap();
     assert!(drive.problem.variables.iter().any(|v| v.whole));
-    is_that_of_the_host(&drive, &context);
+    is_that_of_the_host(&drive, 70, &context);
 }
 
 fn hybrid(free: Vec<Free>) -> HybridProblem {
@@ -136,7 +137,7 @@ fn hybrid(free: Vec<Free>) -> HybridProblem {
 fn laps_with_energy_of_a_swarm_on_the_device_are_those_of_the_host() {
     let context = the_device();
     // Gates are made into figures by the host.
-    is_that_of_the_host(&hybrid(vec![Free::Energy, Free::Zone(1)]), &context);
+    is_that_of_the_host(&hybrid(vec![Free::Energy, Free::Zone(1)]), MANY + 5, &context);
     let hybrid = hybrid(vec![Free::Zone(2), Free::Zone(1)]);
     let settings = settings(MANY + 5, 2);
     let mut swarm = DeviceMopso::new(&hybrid.problem, settings, Arc::clone(&context)).unwrap();
