@@ -138,7 +138,7 @@ settings! {
         norm: Norm ["-"] = Norm::Two, choice(),
             "Norm of the costs";
         window_s: Option<f64> ["s"] = None, optional(number(0.2, 1e5)).example("3.0"),
-            "Length of the windows that restart from the log; without it whole laps are driven";
+            "Length of the windows that restart from the log; without it whole laps are driven, or 5 s where the starting car does not drive them";
         settle_s: Option<f64> ["s"] = None, optional(number(0.0, 60.0)).example("2.0"),
             "Time that each window is driven before it is scored, over samples ahead of it; without it as long as the car takes to settle";
         section: Option<String> ["-"] = None, optional(text()).example("\"Abbey\""),
