@@ -252,13 +252,25 @@ fn guess(path: &Path) -> Result<Kind> {
     let start = read_start(path, HEAD)?;
     let start = String::from_utf8_lossy(&start);
     let head = start.lines().next().unwrap_or_default().to_lowercase();
-    let has = |names: &[&str]| names.iter().all(|n| head.contains(n));
-    // Speeds and accelerations of a log end like places of a track do.
+    let names: Vec<&str> = head
+        .split([',', ';', '\t'])
+        .map(|cell| cell.trim_matches(['#', '"', ' ', '\r']))
+        .collect();
+    // Whole names: a log's `g_lat` and `g_long` are no places.
+    let has = |wanted: &[&str]| wanted.iter().all(|w| names.contains(w));
+    let has_one = |wanted: &[&str]| wanted.iter().any(|w| names.contains(w));
+    let begins = |start: &str| names.iter().any(|name| name.starts_with(start));
+    let in_plane = has(&["x_m", "y_m"]) || has(&["left_x_m", "left_y_m"]);
+    let on_globe = has_one(&["lat", "latitude", "latitude_deg"])
+        && has_one(&["lon", "lng", "longitude", "longitude_deg"]);
+    let timed = names
+        .iter()
+        .any(|name| *name == "t" || name.starts_with("t ") || name.contains("time"));
     Ok(if has(&["v_mps", "ay_mps2"]) {
         Kind::File(&ENVELOPE)
-    } else if has(&["station", "alpha"]) {
+    } else if begins("station") && begins("alpha") {
         Kind::File(&LINE)
-    } else if (has(&["x_m", "y_m"]) || has(&["lat", "lon"])) && !has(&["time"]) {
+    } else if (in_plane || on_globe) && !timed {
         Kind::File(&TRACK)
     } else {
         Kind::File(&LOG)
