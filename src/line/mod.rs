@@ -30,4 +30,4 @@ pub use perpendicular::{cross_sections_about, shares_across};
 pub use plan::{LinePlan, SectionRow, TERMS};
 pub use point_mass::{EnvelopeTable, PointMass, TRACTION_ROOTS, TRACTION_SPEEDS};
 pub use profile::{LapProfile, lap_profile};
-pub use table::{read_line, read_line_apart};
+pub use table::{read_columns, read_line, read_line_apart};

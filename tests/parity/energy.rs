@@ -4,6 +4,7 @@ use crate::common::Random;
 use crate::common::line::circuit;
 use crate::device::device;
 use glam::DVec2;
+use lapswarm::config::Choice;
 use lapswarm::evaluate::energy::{
     CpuHybridEvaluator, Free, GpuHybridEvaluator, HybridLine, HybridObjective, HybridProblem,
     SimdHybridEvaluator, Strategy,

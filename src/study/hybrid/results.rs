@@ -6,6 +6,7 @@ mod page;
 pub(super) use page::write as write_page;
 
 use super::{Hybrid, HybridSetup, Outcome, ReportedLap, Sizing, StintLap, correlation, mean_worths};
+use crate::config::kinds::Choice;
 use crate::error::Result;
 use crate::files::stem;
 use crate::line::energy::SegmentEnergy;

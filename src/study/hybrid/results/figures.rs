@@ -1,6 +1,7 @@
 //! Figures of laps, energies and engine sites.
 
 use super::reported_laps;
+use crate::config::kinds::Choice;
 use crate::line::energy::SegmentEnergy;
 use crate::report::{Curves, LapLine, LapView, Panel, Road, SiteMap, TrackMap};
 use crate::study::hybrid::{HybridSetup, HybridStudySettings, Outcome, ReportedLap, StrategyFront, Worth};
