@@ -3,8 +3,7 @@
 use lapswarm::evaluate::replay::CHANNEL_NAMES;
 use lapswarm::study::identify::{IdentifySettings, ModelChoice, judge_candidate, set_up};
 
-/// The car that drove the lap fits it exactly with roll. Without roll and load transfer it does not, and a bicycle is no nearer in yaw
-/// than half of what the car does there.
+/// The car that drove the lap fits it exactly with roll. Without roll and load transfer it does not, and less so as a bicycle.
 #[test]
 fn simpler_models_leave_errors_on_a_lap_of_the_car_with_roll() {
     let errors = |model: ModelChoice| {
@@ -32,13 +31,9 @@ fn simpler_models_leave_errors_on_a_lap_of_the_car_with_roll() {
         for k in 0..CHANNEL_NAMES.len() {
             assert!(simpler[k] > with_roll[k], "{}: {simpler:?}", CHANNEL_NAMES[k]);
         }
-        let yaw = simpler[yaw_rate];
-        assert!(
-            yaw > 2.0 * with_roll[yaw_rate] && yaw < 0.5 * signal[yaw_rate],
-            "{simpler:?}"
-        );
     }
-    assert_ne!(no_roll, bicycle);
+    assert!(no_roll[yaw_rate] < 0.5 * signal[yaw_rate], "{no_roll:?}");
+    assert!(bicycle[yaw_rate] > no_roll[yaw_rate], "{bicycle:?}");
     assert!(flat.cg_height < 0.05 && flat.half_track_front == own.half_track_front);
     assert!(narrow.half_track_rear < 0.2 && narrow.mass == own.mass);
 }
