@@ -9,6 +9,7 @@ pub mod kernel;
 mod path;
 mod plan;
 mod record;
+pub mod relief;
 mod road;
 mod settings;
 

@@ -22,6 +22,8 @@ pub struct Drive {
     pub station_m: Vec<f64>,
     /// Distance from the centreline, left positive, m.
     pub offset_m: Vec<f64>,
+    /// Load over mass at each sample (m/s^2) on a road in three dimensions; empty on a level one.
+    pub loads_mps2: Vec<f64>,
 }
 
 impl Drive {
@@ -196,6 +198,7 @@ fn record<T: Tyre<f64>>(
                 log.station_m
                     .push((pose.lap * course.rows + pose.row) * course.spacing + pose.along);
                 log.offset_m.push(moment.view.offset);
+                log.loads_mps2.extend(moment.footing.map(|footing| footing.load));
                 next_sample = Some(due + interval_s);
             }
         });

@@ -164,6 +164,7 @@ impl HybridProblem {
                 cross_sections,
                 parametrisation,
             } => {
+                cross_sections.level_only("a lap with energy")?;
                 let mut plan = LinePlan::of_cross_sections(
                     &cross_sections.right_m,
                     &cross_sections.left_m,

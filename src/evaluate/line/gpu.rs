@@ -46,6 +46,7 @@ impl DeviceKernel<LineProblem> for LineDevice {
                 ellipse: Vec::new(),
                 traction: Vec::new(),
                 open: None,
+                loads: Default::default(),
             },
             |envelope| envelope.stored::<f32>(),
         );

@@ -39,6 +39,17 @@ pub(super) fn notes(setup: &Setup, summary: &Summary) -> Vec<String> {
              such time ahead of {places} of the laps or sections fitted: their first {settle_s:.1} s do not count."
         ));
     }
+    if setup
+        .circuit
+        .as_ref()
+        .is_some_and(|circuit| circuit.relief.is_some())
+    {
+        notes.push(
+            "The track has height or banking. Replays are those of a level road: both are left out, and what they do to the car is \
+             taken for the car's own."
+                .to_owned(),
+        );
+    }
     let freed = ["drs_drag_percent", "drs_downforce_percent"];
     let frees = setup
         .replay

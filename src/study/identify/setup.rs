@@ -82,11 +82,10 @@ pub fn set_up(settings: &IdentifySettings) -> Result<Setup> {
     };
     let options = LogOptions {
         rate_hz: settings.rate_hz,
-        rolling_radius_m: Some([car.chassis.radius_front, car.chassis.radius_rear]),
         radius_is_free: ["front_rolling_radius_m", "rear_rolling_radius_m"]
             .map(|radius| freed.iter().any(|free| free.name == radius)),
         calibration: settings.calibration.clone(),
-        ..LogOptions::default()
+        ..LogOptions::of(&car)
     };
     let log = match &settings.log {
         Some(path) => Log::read(path, &map, &options)?,

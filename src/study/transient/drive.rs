@@ -86,10 +86,7 @@ fn greatest_share(work: Work<'_, Transient>) -> Result<Option<DrivenLine>> {
         return Err(Error::input("the study", "line", "none", "a line to drive"));
     };
     let NamedLine {
-        points_m,
-        drs,
-        circuit,
-        ..
+        points_m, circuit, ..
     } = line;
     let parts = (car, limits, line);
     let motor = &work.prepared.motor;
@@ -118,14 +115,14 @@ fn greatest_share(work: Work<'_, Transient>) -> Result<Option<DrivenLine>> {
     state_file.save(&state)?;
     let traction = Traction::of(car, &limits.envelope);
     let attempt = |share: f64| -> Result<Option<DrivenLine>> {
-        let (envelope, mut point_mass, mut plan) = planned(limits, &traction, (points_m, drs), share)?;
+        let (envelope, mut point_mass, mut plan) = planned(limits, &traction, line, share)?;
         let ideal = match motor {
             Some(motor) => {
                 let within = PointMass {
                     envelope: envelope.clone(),
                     ..limits.clone()
                 };
-                let ideal = motor.ideal(&within, Traction::of(car, &envelope), &point_mass, drs)?;
+                let ideal = motor.ideal(&within, Traction::of(car, &envelope), &point_mass, &line.drs)?;
                 let (lap, speeds) = ideal.profile(&point_mass);
                 (point_mass.lap, plan) = (Some(lap), speeds);
                 Some(ideal)

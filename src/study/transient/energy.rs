@@ -34,7 +34,8 @@ impl Motor {
     /// Reads the lap that the settings name; nothing if they name none. The first of the lines is the one that it is of.
     ///
     /// # Errors
-    /// [`Error::Input`] for a file that is no lap of the study `hybrid` or of another line, and for a car without a hybrid drive.
+    /// [`Error::Input`] for a file that is no lap of the study `hybrid` or of another line, for a car without a hybrid drive, and for a road in
+    /// three dimensions.
     pub(super) fn read(
         settings: &TransientSettings,
         car: &Car,
@@ -44,6 +45,7 @@ impl Motor {
         let (Some(path), Some(line)) = (&settings.deployment, lines.first()) else {
             return Ok(None);
         };
+        line.circuit.level_only("a lap with energy")?;
         let expected = "a lap of the study hybrid: columns station, v, time, motor_power and soc";
         let rows = read_columns(path, ["station", "v", "time", "motor_power", "soc"], expected)?;
         let own = |car: &Car| {
@@ -166,6 +168,7 @@ impl Ideal {
         let lap = LapProfile::of_speeds(
             &self.car.point_mass,
             shape,
+            None,
             &speed_squared,
             self.lap.lap.time,
             Vec::new(),

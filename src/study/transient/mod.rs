@@ -50,6 +50,8 @@ pub struct NamedLine {
     pub points_m: Vec<DVec2>,
     /// Whether the DRS may be open from each point to the next; nowhere if empty.
     pub drs: Vec<bool>,
+    /// Height (m) and banking (rad) at each point, on a road in three dimensions.
+    pub relief: Option<Vec<[f64; 2]>>,
     /// The line as a circuit of its own, its widths the room that the car's side has to the edges. Its DRS zones are where the
     /// quasi-steady-state lap has the flap open.
     pub circuit: Circuit,
@@ -63,12 +65,14 @@ impl NamedLine {
     pub fn new(name: String, points_m: Vec<DVec2>, road: &raceline::Setup, car_width_m: f64) -> Result<Self> {
         let drs = road.cross_sections.drs_along(&points_m);
         let car = (!drs.is_empty()).then_some((&road.car, drs.as_slice()));
-        let fine = FineLine::new(&points_m, true, 1.0, car, 0.0)?;
+        let relief = road.cross_sections.relief_along(&points_m);
+        let fine = FineLine::on(&points_m, relief.as_deref(), true, 1.0, car, 0.0)?;
         let circuit = fine.circuit(&name, &road.edges_m, car_width_m)?;
         Ok(Self {
             name,
             points_m,
             drs,
+            relief,
             circuit,
         })
     }
@@ -273,7 +277,7 @@ fn read(settings: &TransientSettings) -> Result<Prepared> {
 fn planned(
     limits: &PointMass,
     traction: &Traction,
-    (points_m, drs): (&[DVec2], &[bool]),
+    line: &NamedLine,
     share: f64,
 ) -> Result<(Envelope, FineLine, SpeedPlan)> {
     let envelope = limits.envelope.with_grip_share(share, traction)?;
@@ -281,7 +285,8 @@ fn planned(
         envelope: envelope.clone(),
         ..limits.clone()
     };
-    let fine = FineLine::new(points_m, true, 1.0, Some((&point_mass, drs)), 0.0)?;
+    let driven = Some((&point_mass, line.drs.as_slice()));
+    let fine = FineLine::on(&line.points_m, line.relief.as_deref(), true, 1.0, driven, 0.0)?;
     let Some(lap) = &fine.lap else {
         return Err(Error::Study(
             "there is no quasi-steady-state lap on this line".to_owned(),

@@ -76,9 +76,7 @@ pub fn drive_problem(
         }
         let of_line = shares
             .par_iter()
-            .map(|share| {
-                planned(&road.car, &traction, (&line.points_m, &line.drs), *share).map(|(_, _, plan)| plan)
-            })
+            .map(|share| planned(&road.car, &traction, line, *share).map(|(_, _, plan)| plan))
             .collect::<Result<Vec<_>>>()?;
         plans.push(of_line);
     }

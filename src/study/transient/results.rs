@@ -11,7 +11,7 @@ use crate::report::{CornerLap, HtmlReport, LapLine, LapView, Road, Table, write_
 use crate::study::framework::{Head, tyre_view, with_tyres};
 use crate::study::raceline::best_gears;
 use crate::track::Circuit;
-use crate::vehicle::wheels::{Moment, moments_of};
+use crate::vehicle::wheels::{Moment, moments_under};
 use crate::vehicle::{Car, CarState};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -242,7 +242,7 @@ pub(super) fn energy_of(car: &Car, mode: Mode, outcome: &DrivenLine) -> Option<E
 fn moments(car: &Car, drive: &Drive) -> Vec<Moment> {
     let driven = drive.states.iter().zip(&drive.inputs);
     let driven = driven.map(|(state, input)| (CarState::from_array(*state), *input));
-    moments_of(car, &driven.collect::<Vec<_>>())
+    moments_under(car, &driven.collect::<Vec<_>>(), &drive.loads_mps2)
 }
 
 /// A drive of a line: its traces on a page, and its rows in tables by corner.
@@ -312,8 +312,11 @@ fn gears(car: &Car, v_mps: &[f64]) -> Option<Vec<f64>> {
 
 /// The share of all of the grip that the driven lap uses at each sample.
 fn grip_used(limits: &PointMass, drive: &Drive, moments: &[Moment]) -> Vec<f64> {
-    let places = drive.states.iter().zip(moments);
-    let used = places.map(|(state, moment)| limits.grip_used(state[0], [moment.ax_mps2, moment.ay_mps2]));
+    let places = drive.states.iter().zip(moments).enumerate();
+    let used = places.map(|(i, (state, moment))| match drive.loads_mps2.get(i) {
+        Some(load) => limits.grip_used_under(state[0], [moment.ax_mps2, moment.ay_mps2, *load]),
+        None => limits.grip_used(state[0], [moment.ax_mps2, moment.ay_mps2]),
+    });
     used.collect()
 }
 
