@@ -76,7 +76,7 @@ fn settling_time(car: &Car, samples: &[Sample<f64>], laps: &[(usize, usize)], dt
 /// # Errors
 /// [`Error::Input`] naming file and field for anything that does not fit.
 pub fn set_up(settings: &IdentifySettings) -> Result<Setup> {
-    let car = Car::load(&settings.car)?;
+    let car = settings.model.of(Car::load(&settings.car)?);
     let mut freed = settings.freed()?;
     let bundled = settings.log.is_none();
     let map = match &settings.channel_map {
