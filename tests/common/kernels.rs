@@ -112,7 +112,7 @@ pub fn kernels() -> Vec<KernelSource> {
         add(entry, "", swarm());
     }
     add("gather", "", swarm_gather());
-    for entry in ["variables_of_positions", "objectives_of_figures"] {
+    for entry in ["figures_of_positions", "objectives_of_results"] {
         add(entry, "", line_swarm());
     }
     for (name, number) in NAMES.iter().zip(0..) {

@@ -67,6 +67,15 @@ pub enum Free {
     Zone(usize),
 }
 
+/// A figure of the kernels that is a variable as it is, or the same for all candidates.
+#[cfg(feature = "gpu")]
+pub(super) enum Figure {
+    /// The variable of that place.
+    Variable(usize),
+    /// The value.
+    Fixed(f64),
+}
+
 /// The strongest motor that may be asked for, as a share of the car's own.
 pub const MOST_MOTOR: f64 = 2.0;
 
@@ -235,6 +244,21 @@ impl HybridProblem {
         })
     }
 
+    /// The same by other objectives.
+    ///
+    /// # Errors
+    /// [`Error::Input`] if objectives are missing or come twice.
+    pub fn by(mut self, objectives: &[HybridObjective]) -> Result<Self> {
+        if missing_or_twice(objectives) {
+            let found = format!("{objectives:?}");
+            let expected = "at least one, each once";
+            return Err(Error::input("hybrid", "objectives", found, expected));
+        }
+        self.problem.objectives = listed(objectives);
+        self.objectives = objectives.to_vec();
+        Ok(self)
+    }
+
     /// The line.
     pub fn line(&self) -> &HybridLine {
         &self.line
@@ -290,6 +314,27 @@ impl HybridProblem {
     pub fn strategy_of(&self, candidate: &[f64]) -> (Gates, Vec<f64>) {
         self.strategy
             .with(self.car.hybrid.mgu_k.power_w, &candidate[self.line_variables..])
+    }
+
+    /// What each of the kernels' figures is. Nothing where figures are made of
+    /// variables in other ways, as those of gates are, or the gates' own are no numbers in single precision.
+    #[cfg(feature = "gpu")]
+    pub(super) fn variables_of_figures(&self) -> Option<Vec<Figure>> {
+        let gates = self.car.gate_figures(&self.strategy.gates);
+        if !crate::evaluate::are_numbers(&gates) {
+            return None;
+        }
+        let mut figures: Vec<_> = (0..self.line_variables).map(Figure::Variable).collect();
+        figures.extend(gates.into_iter().map(Figure::Fixed));
+        let zones = figures.len();
+        figures.extend(self.strategy.shares.iter().copied().map(Figure::Fixed));
+        for (place, free) in self.strategy.free.iter().enumerate() {
+            let Free::Zone(zone) = free else {
+                return None;
+            };
+            figures[zones + zone] = Figure::Variable(self.line_variables + place);
+        }
+        Some(figures)
     }
 
     /// The kernels' figures of a candidate: variables of the line, gates, shares of zones.

@@ -106,6 +106,7 @@ impl Study for Hybrid {
     type Summary = HybridSummary;
 
     fn prepare(settings: &HybridStudySettings) -> Result<HybridInputs> {
+        settings.check_place()?;
         read_inputs(settings)
     }
 

@@ -15,7 +15,7 @@ use crate::line::energy::{Gates, Mode};
 use crate::study::framework::memory::Size;
 use crate::study::framework::{Coefficients, Mutated, Scheduled};
 use crate::study::raceline::RacelineSettings;
-use crate::swarm::{FrontSearch, Mutation, Schedule};
+use crate::swarm::{FrontSearch, MopsoSettings, Mutation, Schedule, SwarmPlace};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -165,6 +165,8 @@ settings! {
             "Iterations of the swarms";
         seed: u64 ["-"] = 1, count(0, u64::MAX).search(),
             "Seed of all random numbers";
+        swarm: SwarmPlace ["-"] = SwarmPlace::Auto, choice().search(),
+            "Where the particles of the front live; auto: on the device from 4096 particles on, where a graphics processor evaluates";
         backend: BackendChoice ["-"] = BackendChoice::Auto, choice().place(),
             "Where laps are evaluated";
         adapter: Option<String> ["-"] = None, optional(text()).place().example("\"llvmpipe\""),
@@ -212,6 +214,35 @@ impl HybridStudySettings {
             genetic: self.algorithm == HybridAlgorithm::Nsga2,
             islands: self.islands,
         }
+    }
+
+    /// The swarm that looks for the front.
+    pub(super) fn front_swarm(&self) -> MopsoSettings {
+        let mopso = if self.algorithm == HybridAlgorithm::Thesis {
+            let thesis = MopsoSettings::thesis();
+            MopsoSettings {
+                motion: self.coefficients().apply(thesis.motion),
+                ..thesis
+            }
+        } else {
+            MopsoSettings::default()
+        };
+        mopso
+            .with_size(self.population, self.iterations)
+            .with_seed(self.seed)
+    }
+
+    /// Checks that the front's swarm can live where it is asked to.
+    ///
+    /// # Errors
+    /// [`Error::Input`] with the reason if it cannot.
+    pub(super) fn check_place(&self) -> Result<()> {
+        let backend = (self.backend, self.adapter.as_deref());
+        let objectives = self.objectives.len();
+        let swarm = self.front_swarm();
+        self.front_search()
+            .wants_device(self.swarm, objectives, &swarm, backend)
+            .map(drop)
     }
 
     /// Whether the front's swarm starts from what is known.

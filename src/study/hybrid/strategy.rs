@@ -14,9 +14,7 @@ use crate::line::{Parametrisation, geometry};
 use crate::optimum::{Deployment, DeploymentSearch};
 use crate::random::Random;
 use crate::study::framework::journal::Recorder;
-use crate::swarm::{
-    HybridSettings, HybridSwarm, MopsoSettings, Optimiser, Progress, Pso, PsoSettings, SwarmPlace, run,
-};
+use crate::swarm::{HybridSettings, HybridSwarm, Optimiser, Progress, Pso, PsoSettings, run};
 use std::ops::ControlFlow;
 
 /// What the swarm found for one budget.
@@ -253,25 +251,20 @@ pub fn search_front(
             (problem, line)
         }
     };
-    let mopso = if settings.algorithm == HybridAlgorithm::Thesis {
-        let thesis = MopsoSettings::thesis();
-        MopsoSettings {
-            motion: settings.coefficients().apply(thesis.motion),
-            ..thesis
-        }
-    } else {
-        MopsoSettings::default()
-    };
-    let mopso = mopso
-        .with_size(settings.population, settings.iterations)
-        .with_seed(settings.seed);
     let search = settings.front_search();
-    let mut swarm = search.begin(&problem.problem, mopso, SwarmPlace::Host)?;
+    let mopso = settings.front_swarm();
+    let place = (settings.backend, settings.adapter.as_deref());
+    let on_device = search.on_device(settings.swarm, &problem.problem, &mopso, place)?;
+    let mut swarm = search.begin(&problem.problem, mopso, settings.swarm)?;
     if settings.starts_warm() {
         swarm.start_from(&starting_candidates(&problem, settings, &line))?;
     }
-    let mut evaluator = open_hybrid_evaluator(&problem, settings.backend, settings.adapter.as_deref())?;
-    run(&mut swarm, &mut recorder.over(evaluator.as_mut()), observe)?;
+    if on_device {
+        swarm = recorder.run_on_device(&problem, swarm, place, observe)?;
+    } else {
+        let mut evaluator = open_hybrid_evaluator(&problem, place.0, place.1)?;
+        run(&mut swarm, &mut recorder.over(evaluator.as_mut()), observe)?;
+    }
     let front = swarm.front();
     Ok(StrategyFront {
         names: problem.problem.variables.iter().map(|v| v.name.clone()).collect(),

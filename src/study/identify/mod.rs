@@ -7,6 +7,7 @@ mod notes;
 mod page;
 mod polish;
 mod refine;
+mod resident;
 mod results;
 mod search;
 mod settings;
@@ -35,6 +36,7 @@ use crate::study::framework::state_file::StateFile;
 use crate::study::framework::{
     Figures, Plan, Progress, RunRecord, Solved, Study, Subject, Work, resumed_or_new,
 };
+use crate::swarm::SwarmPlace;
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::Arc;
@@ -86,7 +88,12 @@ impl Study for Identify {
 
     /// Eight swarms of fifty particles fill the lanes of a small device.
     fn together(settings: &IdentifySettings) -> usize {
-        if settings.size().population <= SMALL { 8 } else { 1 }
+        let on_host = settings.place != SwarmPlace::Device;
+        if on_host && settings.size().population <= SMALL {
+            8
+        } else {
+            1
+        }
     }
 
     /// The swarms share an evaluator, and its calls.

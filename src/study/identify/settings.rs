@@ -12,7 +12,7 @@ use crate::evaluate::replay::{CHANNEL_NAMES, Norm};
 use crate::files::run_folder::SUMMARY;
 use crate::study::framework::memory::Size;
 use crate::study::framework::{Coefficients, Mutated, Scheduled};
-use crate::swarm::{FrontSearch, Mutation, Schedule};
+use crate::swarm::{FrontSearch, Mutation, Schedule, SwarmPlace};
 use crate::telemetry::CalibrationOptions;
 use crate::vehicle::Car;
 use serde::{Deserialize, Serialize};
@@ -212,6 +212,8 @@ settings! {
             "Swarms for several objectives, each of the whole population; five members of each go to the next one every ten iterations";
         archive: usize as "swarm.archive" ["-"] = 100, count(2, 100_000).search(),
             "Members of the archive of the multi-objective swarm";
+        place: SwarmPlace as "swarm.place" ["-"] = SwarmPlace::Auto, choice().flag(Flag::Value("swarm")).search(),
+            "Where the particles of a swarm for several objectives live; auto: on the device from 4096 particles on, where a graphics processor evaluates";
         seed: u64 ["-"] = 1, count(0, u64::MAX).search(),
             "Seed of all random numbers";
         polish: bool ["-"] = true, switch(true).flag(Flag::Switch("no_polish", false)).search(),

@@ -101,8 +101,7 @@ impl Study for Raceline {
             ));
         }
         if settings.objectives.len() > 1 || settings.swarm == SwarmPlace::Device {
-            let variables = front::front_problem(&setup, settings)?.problem.variables.len();
-            settings.on_device(variables)?;
+            settings.on_device(&front::front_problem(&setup, settings)?.problem)?;
         }
         Ok(setup)
     }

@@ -4,13 +4,13 @@ use crate::config::kinds::{
     Choice, choice, choices, count, counts, file, name_or_file, named, number, of, optional, switch, text,
 };
 use crate::config::settings::{Flag, settings};
-use crate::error::{Error, Result};
-use crate::evaluate::BackendChoice;
+use crate::error::Result;
 use crate::evaluate::line::LineObjective;
+use crate::evaluate::{BackendChoice, Problem};
 use crate::line::CarPlan;
 use crate::study::framework::memory::Size;
 use crate::study::framework::{Coefficients, Mutated, Scheduled};
-use crate::swarm::{FrontSearch, Mutation, Schedule, SwarmPlace};
+use crate::swarm::{FrontSearch, MopsoSettings, Mutation, Schedule, SwarmPlace};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
@@ -91,7 +91,7 @@ settings! {
         seed: u64 ["-"] = 1, count(0, u64::MAX).search(),
             "Seed of all random numbers";
         swarm: SwarmPlace ["-"] = SwarmPlace::Auto, choice().search(),
-            "Where the particles of the front live; auto: on the device from 4096 particles on, where the backend is gpu";
+            "Where the particles of the front live; auto: on the device from 4096 particles on, where a graphics processor evaluates";
         backend: BackendChoice ["-"] = BackendChoice::Auto, choice().place(),
             "Where lines are evaluated";
         adapter: Option<String> ["-"] = None, optional(text()).place().example("\"llvmpipe\""),
@@ -156,24 +156,30 @@ impl RacelineSettings {
         }
     }
 
-    /// Whether the swarm for the front lives on the device, with so many variables to a particle.
+    /// The swarm that looks for the front.
+    pub(super) fn front_swarm(&self) -> MopsoSettings {
+        let mut mopso = if self.algorithm == LineAlgorithm::Thesis {
+            MopsoSettings::thesis()
+        } else {
+            MopsoSettings::default()
+        };
+        if self.algorithm == LineAlgorithm::Thesis {
+            mopso.motion = self.coefficients().apply(mopso.motion);
+        }
+        mopso.archive = self.archive;
+        mopso
+            .with_size(self.population, self.iterations)
+            .with_seed(self.seed)
+    }
+
+    /// Whether it lives on the device.
     ///
     /// # Errors
     /// [`Error::Input`] with the reason if it is asked to and cannot.
-    pub(super) fn on_device(&self, variables: usize) -> Result<bool> {
-        let several = self.islands > 1 || self.algorithm == LineAlgorithm::Nsga2;
-        if several && self.swarm == SwarmPlace::Device {
-            let found = "device, with islands or algorithm nsga2";
-            return Err(Error::input("the study", "swarm", found, "host or auto"));
-        }
-        if several || self.algorithm == LineAlgorithm::Thesis && self.swarm != SwarmPlace::Device {
-            // Its mutation is for swarms on the host; a device that is asked for is refused with that reason.
-            return Ok(false);
-        }
-        let place = (self.backend, self.adapter.as_deref());
-        let objectives = self.objectives.len();
-        Ok(self.swarm.on_device(place, self.population, objectives)?
-            && self.swarm.has_room(place.1, self.population, variables)?)
+    pub(super) fn on_device(&self, problem: &Problem) -> Result<bool> {
+        let backend = (self.backend, self.adapter.as_deref());
+        self.front_search()
+            .on_device(self.swarm, problem, &self.front_swarm(), backend)
     }
 
     /// The car from above, with the margin on every side of it.

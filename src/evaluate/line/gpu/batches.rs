@@ -1,5 +1,6 @@
 //! Lines on a device, a batch at a time: what the kernels of lines and of laps with energy have in common.
 
+use super::exchange::Exchange;
 use super::tables::LineTables;
 use crate::error::{Error, Result};
 use crate::evaluate::gpu::{Batching, Binding, DeviceKind, GpuContext, Kernel, LanePacing};
@@ -141,7 +142,7 @@ impl<const FIGURES: usize> LineBatches<FIGURES> {
                 context.summary(),
             )));
         }
-        let kernel = context.kernel(parts.source, parts.entry, &bindings)?;
+        let kernel = context.own_kernel(parts.source, parts.entry, &bindings)?;
         let stretch = context.buffer(
             "stretch",
             size_of::<LineStretch>() as u64,
@@ -216,10 +217,7 @@ impl<const FIGURES: usize> LineBatches<FIGURES> {
     }
 
     /// Makes room for a batch of `candidates`.
-    ///
-    /// # Errors
-    /// [`Error::Device`] if the device has too little memory.
-    pub fn reserve(&mut self, candidates: usize) -> Result<()> {
+    fn reserve(&mut self, candidates: usize) -> Result<()> {
         let stride = candidates.next_multiple_of(self.workgroup);
         if self.batch.as_ref().is_some_and(|b| b.stride >= stride) {
             return Ok(());
@@ -258,20 +256,33 @@ impl<const FIGURES: usize> LineBatches<FIGURES> {
             .ok_or_else(|| Error::Device("a batch without buffers".to_owned()))
     }
 
-    /// Distance between the rows of a batch, its variables and its results.
-    ///
-    /// # Errors
-    /// [`Error::Device`] before any batch was reserved.
-    pub fn rows(&self) -> Result<(usize, &wgpu::Buffer, &wgpu::Buffer)> {
-        let batch = self.buffers()?;
-        Ok((batch.stride, &batch.variables, &batch.results))
-    }
-
-    /// Scores one batch, whose figures are on the device.
+    /// Writes the objectives of particles that live on the device.
     ///
     /// # Errors
     /// [`Error::Device`] if the device fails.
-    pub fn score_batch(&mut self, candidates: usize) -> Result<()> {
+    pub fn score_resident(
+        &mut self,
+        exchange: &Exchange,
+        particles: usize,
+        position: &wgpu::Buffer,
+        objectives: &wgpu::Buffer,
+    ) -> Result<()> {
+        let most = self.batch_size();
+        for first in (0..particles).step_by(most) {
+            let candidates = (particles - first).min(most);
+            self.reserve(candidates)?;
+            let batch = self.buffers()?;
+            let part = [first, candidates, batch.stride];
+            exchange.take(&self.context, part, position, &batch.variables)?;
+            self.score_batch(candidates)?;
+            let batch = self.buffers()?;
+            exchange.give(&self.context, part, &batch.results, objectives)?;
+        }
+        Ok(())
+    }
+
+    /// Scores one batch, whose figures are on the device.
+    fn score_batch(&mut self, candidates: usize) -> Result<()> {
         let most_groups = self.context.limits().max_compute_workgroups_per_dimension as usize;
         let mut first = 0;
         while first < candidates {
