@@ -4,7 +4,7 @@ use crate::config::kinds::{
     Choice, choice, choices, count, counts, file, name_or_file, named, number, of, optional, switch, text,
 };
 use crate::config::settings::{Flag, settings};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::evaluate::line::LineObjective;
 use crate::evaluate::{BackendChoice, Problem};
 use crate::line::CarPlan;
