@@ -372,7 +372,7 @@ fn sloped_corner(ground: Ground) -> f32 {
             low = speed_squared;
         }
         let next = speed_squared - spare / slope;
-        speed_squared = select(0.5 * (low + high), next, low < next && next < high);
+        speed_squared = select(0.5 * (low + high), next, !(next < low) && next < high);
     }
     let radius = 1.0 / max(abs(ground.bend), 1e-6);
     let share = min(radius / stretch.lock_radius, 1.0);

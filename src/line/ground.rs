@@ -267,7 +267,8 @@ impl<R: Lookup> Ground<R> for Sloped<R> {
             low = R::select(short, low, speed_squared);
             high = R::select(short, speed_squared, high);
             let next = speed_squared - spare / slope;
-            let within = low.less_than(next) & next.less_than(high);
+            // A place that is found stays: there the next is the last that holds.
+            let within = !next.less_than(low) & next.less_than(high);
             speed_squared = R::select(within, next, R::lit(0.5) * (low + high));
         }
         // A bend beyond the lock, as on a level road.

@@ -38,4 +38,4 @@ pub use plan::{LinePlan, ReliefRow, SectionRow, TERMS};
 pub use point_mass::{EnvelopeTable, PointMass, TRACTION_ROOTS, TRACTION_SPEEDS};
 pub use profile::{LapProfile, lap_profile, lap_profile_on};
 pub use relief::LineRelief;
-pub use table::{read_line, read_line_apart};
+pub use table::{read_columns, read_line, read_line_apart};

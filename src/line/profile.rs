@@ -33,6 +33,56 @@ pub struct LapProfile {
 }
 
 impl LapProfile {
+    /// A lap of `time_s` on a line of this plan view (lengths of segments in m, and curvatures in 1/m), with height and banking if it has
+    /// them, from its speeds squared (m^2/s^2) at the sections; `drs_open` says of each segment whether the driver has the flap open.
+    pub fn of_speeds(
+        car: &PointMass,
+        (segment_m, curvature_1pm): (&[f64], &[f64]),
+        relief: Option<&LineRelief>,
+        speed_squared: &[f64],
+        time_s: f64,
+        drs_open: Vec<bool>,
+    ) -> Self {
+        let (n, w) = (curvature_1pm.len(), speed_squared);
+        let v_mps: Vec<f64> = w.iter().map(|w| w.sqrt()).collect();
+        let next = |i: usize| (i + 1) % n;
+        let length_m = relief.map_or(segment_m, |relief| &relief.length_m);
+        let mut ax_mps2: Vec<f64> = length_m
+            .iter()
+            .enumerate()
+            .map(|(i, h)| (w[next(i)] - w[i]) / (2.0 * h))
+            .collect();
+        if segment_m.len() < n {
+            ax_mps2.push(ax_mps2[n - 2]);
+        }
+        let station_m = (0..n)
+            .scan(0.0, |station, i| {
+                let here = *station;
+                *station += segment_m.get(i).copied().unwrap_or(0.0);
+                Some(here)
+            })
+            .collect();
+        let steering_rad: Vec<f64> = curvature_1pm.iter().map(|k| car.wheelbase_m * k).collect();
+        Self {
+            time_s,
+            drs_open,
+            station_m,
+            ay_mps2: curvature_1pm.iter().zip(w).map(|(k, w)| k * w).collect(),
+            beyond_lock: car
+                .max_steer_rad
+                .map_or(0, |lock| steering_rad.iter().filter(|s| s.abs() > lock).count()),
+            steering_rad,
+            forces_mps2: relief.map_or(Vec::new(), |relief| relief.forces_mps2(&v_mps, &ax_mps2)),
+            segment_time_s: length_m
+                .iter()
+                .enumerate()
+                .map(|(i, h)| 2.0 * h / (v_mps[i] + v_mps[next(i)]))
+                .collect(),
+            ax_mps2,
+            v_mps,
+        }
+    }
+
     /// The share of `car`'s grip that is used at each section.
     pub fn grip_used(&self, car: &PointMass) -> Vec<f64> {
         if !self.forces_mps2.is_empty() {
@@ -144,50 +194,15 @@ pub fn lap_profile_on(
             "a car that moves along the whole line",
         );
     }
-    let w = &course.speed_squared;
     let drs_open = (0..segment_m.len())
         .map(|i| match relief {
             Some(_) => opens::<SlopedRoad>(within.at(i), &course, i),
             None => opens::<LevelRoad>(within.at(i), &course, i),
         })
         .collect();
-    let v_mps: Vec<f64> = w.iter().map(|w| w.sqrt()).collect();
-    let next = |i: usize| (i + 1) % n;
-    let length_m = relief.map_or(segment_m, |relief| &relief.length_m);
-    let mut ax_mps2: Vec<f64> = length_m
-        .iter()
-        .enumerate()
-        .map(|(i, h)| (w[next(i)] - w[i]) / (2.0 * h))
-        .collect();
-    if !closed {
-        ax_mps2.push(ax_mps2[n - 2]);
-    }
-    let station_m = (0..n)
-        .scan(0.0, |station, i| {
-            let here = *station;
-            *station += segment_m.get(i).copied().unwrap_or(0.0);
-            Some(here)
-        })
-        .collect();
-    let steering_rad: Vec<f64> = curvature_1pm.iter().map(|k| car.wheelbase_m * k).collect();
-    Ok(LapProfile {
-        time_s,
-        drs_open,
-        station_m,
-        ay_mps2: curvature_1pm.iter().zip(w).map(|(k, w)| k * w).collect(),
-        beyond_lock: car
-            .max_steer_rad
-            .map_or(0, |lock| steering_rad.iter().filter(|s| s.abs() > lock).count()),
-        steering_rad,
-        forces_mps2: relief.map_or(Vec::new(), |relief| relief.forces_mps2(&v_mps, &ax_mps2)),
-        segment_time_s: length_m
-            .iter()
-            .enumerate()
-            .map(|(i, h)| 2.0 * h / (v_mps[i] + v_mps[next(i)]))
-            .collect(),
-        ax_mps2,
-        v_mps,
-    })
+    let shape = (segment_m, curvature_1pm);
+    let w = &course.speed_squared;
+    Ok(LapProfile::of_speeds(car, shape, relief, w, time_s, drs_open))
 }
 
 /// Whether the driver has the DRS open on a segment: it may be, he does not brake, and it gains him speed.

@@ -2,6 +2,7 @@
 
 mod hybrid;
 mod identify;
+mod models;
 mod registry;
 mod reproduce;
 mod resume;

@@ -55,7 +55,8 @@ pub struct EnergyDevice {
     exchange: Option<Exchange>,
 }
 
-/// Between a swarm and the kernel, where variables are figures of the kernel as they are and no gate is free.
+/// Between a swarm and the kernel, where variables are figures of the kernel as they are, no gate is free and the kernel has
+/// all objectives.
 fn exchange_of(hybrid: &HybridProblem, context: &GpuContext) -> Result<Option<Exchange>> {
     let Some(variables) = hybrid.variables_of_figures() else {
         return Ok(None);
@@ -69,16 +70,21 @@ fn exchange_of(hybrid: &HybridProblem, context: &GpuContext) -> Result<Option<Ex
         })
         .collect();
     // In the order of the figures of a lap.
-    let objectives: Vec<Scaled> = hybrid
+    let objectives: Option<Vec<Scaled>> = hybrid
         .objectives()
         .iter()
         .map(|objective| match objective {
-            HybridObjective::LapTime => Scaled::of_result(0, 1.0),
-            HybridObjective::Fuel => Scaled::of_result(1, hybrid.car().fuel_density_kgpl),
-            HybridObjective::EnergyUsed => Scaled::of_result(2, 1e6),
-            HybridObjective::SocSwing => Scaled::of_result(6, hybrid.car().hybrid.store.capacity_j),
+            HybridObjective::LapTime => Some(Scaled::of_result(0, 1.0)),
+            HybridObjective::Fuel => Some(Scaled::of_result(1, hybrid.car().fuel_density_kgpl)),
+            HybridObjective::EnergyUsed => Some(Scaled::of_result(2, 1e6)),
+            HybridObjective::SocSwing => Some(Scaled::of_result(6, hybrid.car().hybrid.store.capacity_j)),
+            // The host works them out of the line.
+            HybridObjective::Length | HybridObjective::Gamma => None,
         })
         .collect();
+    let Some(objectives) = objectives else {
+        return Ok(None);
+    };
     let free = hybrid.problem.variables.iter().filter(|v| v.is_free()).count();
     let tables = (figures.as_slice(), objectives.as_slice());
     Exchange::new(context, free, tables, HybridProblem::WITHOUT_COST).map(Some)

@@ -4,6 +4,7 @@ use crate::error::{Error, Result};
 use crate::evaluate::objectives::{listed, missing_or_twice, objectives};
 use crate::evaluate::{Problem, Variable};
 use crate::line::energy::{EnergyCar, EnergyPlan, GATES, Gates};
+use crate::line::kernel::{Course, Wanted, shape};
 use crate::line::{LinePlan, Parametrisation};
 use crate::track::CrossSections;
 use glam::DVec2;
@@ -19,6 +20,10 @@ objectives! {
         EnergyUsed: "energy_used_mj", "MJ", "energy used";
         /// Greatest less least state of charge.
         SocSwing: "soc_swing", "-", "swing of charge";
+        /// Length of the line, m.
+        Length: "length_m", "m", "length";
+        /// Root of the sum of the line's squared curvatures, 1/m.
+        Gamma: "gamma_1pm", "1/m", "Gamma";
     }
 }
 
@@ -267,6 +272,17 @@ impl HybridProblem {
     /// What the kernels read of the sections.
     pub fn plan(&self) -> &LinePlan<f64> {
         &self.plan
+    }
+
+    /// Length (m) and Gamma (1/m) of a candidate's line. They take no kernel: lines are few beside the laps that they cost.
+    pub(super) fn line_measures(&self, candidate: &[f64]) -> [f64; 2] {
+        let wanted = Wanted {
+            integral: false,
+            lap: false,
+        };
+        let line = &candidate[..self.line_variables];
+        let shape = shape::<f64>(&self.plan, wanted, line, &mut Course::default());
+        [shape.length, shape.second_differences.sqrt()]
     }
 
     /// What the kernels read of the zones.

@@ -21,7 +21,7 @@ pub use identifiability::{Group, Identifiability, judge};
 pub use polish::{Polished, polish};
 pub use results::Summary;
 pub use search::{Judged, Outcome, judge_candidate, search_with, total_parameter_error};
-pub use settings::{Algorithm, FreeParameter, IdentifySettings, ObjectiveChoice, Unknowns};
+pub use settings::{Algorithm, FreeParameter, IdentifySettings, ModelChoice, ObjectiveChoice, Unknowns};
 pub use setup::{Setup, cost_unit, lap_format, set_up};
 pub(in crate::study) use setup::{planned, subject, without_laps};
 pub use state::{Front, HistoryRow, SearchState};
@@ -200,6 +200,8 @@ impl Study for Identify {
         .into();
         let costs = summary.costs.iter();
         figures.extend(costs.map(|(channel, cost)| (format!("cost_{channel}"), Some(*cost))));
+        let errors = summary.rms_error.iter();
+        figures.extend(errors.map(|(channel, rms)| (format!("rms_error_{channel}"), Some(*rms))));
         figures
     }
 }

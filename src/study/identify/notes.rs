@@ -17,6 +17,12 @@ pub(super) fn notes(setup: &Setup, summary: &Summary) -> Vec<String> {
             "Half of the parameters or more cannot be told from this log. With free = \"auto\" those that it can tell are found.".to_owned(),
         );
     }
+    if let Some(window_s) = setup.windows_instead_s {
+        notes.push(format!(
+            "The starting car does not drive the laps to their end, and few others would. The log is scored in windows of {window_s} s \
+             that start from the logged state (window_s sets their length)."
+        ));
+    }
     let (taken, needed) = (summary.substeps, summary.substeps_needed);
     if needed > taken {
         notes.push(format!(

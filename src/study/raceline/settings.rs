@@ -1,10 +1,10 @@
 //! What a racing-line study is asked to do.
 
 use crate::config::kinds::{
-    Choice, choice, choices, count, file, name_or_file, named, number, of, optional, switch, text,
+    Choice, choice, choices, count, counts, file, name_or_file, named, number, of, optional, switch, text,
 };
 use crate::config::settings::{Flag, settings};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::evaluate::line::LineObjective;
 use crate::evaluate::{BackendChoice, Problem};
 use crate::line::CarPlan;
@@ -62,6 +62,8 @@ settings! {
             "Greatest speed at the start of an open track";
         objectives: Vec<LineObjective> ["-"] = usual_objectives(), choices(),
             "What is minimised; more than one for a front";
+        surface_sections: Vec<u32> ["-"] = Vec::new(), counts().example("[120, 180]"),
+            "Two cross-sections, counted from 0, over whose alpha each objective is drawn; without them the sharpest bend's and the next";
         warm_start: Option<bool> ["-"] = None, optional(switch(true)).flag(Flag::Switch("no_warm_start", false)).search().example("true"),
             "Whether the swarms start from the reference optima; without it they do, but with algorithm thesis start from no known line";
         local_search: Option<bool> ["-"] = None, optional(switch(true)).flag(Flag::Switch("no_local_search", false)).search().example("true"),
@@ -98,6 +100,11 @@ settings! {
 
     /// Coefficients are those of the algorithm.
     fn consistent(&self) -> Result<()> {
+        let two = matches!(self.surface_sections[..], [a, b] if a != b);
+        if !two && !self.surface_sections.is_empty() {
+            let found = format!("{:?}", self.surface_sections);
+            return Err(Error::input("the study", "surface_sections", found, "two different ones"));
+        }
         self.front_search().check(self.objectives.len(), self.population)?;
         let refused = match self.algorithm {
             LineAlgorithm::Thesis => Coefficients::default(),
@@ -230,6 +237,8 @@ mod tests {
             ("width = 2.0", "width"),
             ("algorithm = \"ants\"", "algorithm"),
             ("car_width_m = \"wide\"", "car_width_m"),
+            ("surface_sections = [3]", "surface_sections"),
+            ("surface_sections = [3, 3]", "surface_sections"),
             ("inertia = 0.5", "inertia"),
             ("algorithm = \"cooperative\"\nmutation = 0.5", "mutation"),
             ("algorithm = \"thesis\"\nsocial = \"much\"", "social"),

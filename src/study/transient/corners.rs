@@ -195,7 +195,7 @@ pub(super) fn raise(
     });
     let drive = |lap: &LapProfile| {
         let plan = SpeedPlan::of_speeds(&lap.station_m, &lap.v_mps, corners.fine.length_m);
-        drive_until_lost(car, &line.circuit, plan, driver, INTERVAL_S)
+        drive_until_lost(car, &line.circuit, plan, driver, INTERVAL_S, None)
     };
     loop {
         if found.accepted {

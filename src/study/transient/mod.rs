@@ -7,6 +7,7 @@
 
 mod corners;
 mod drive;
+mod energy;
 mod population;
 mod population_results;
 mod results;
@@ -15,6 +16,7 @@ mod state;
 
 pub use corners::CornerGrip;
 pub use drive::{AGREEMENT, DrivenLine, INTERVAL_S};
+pub use energy::{Accounts, EnergyFigures, Ideal, Motor};
 pub use population::{Driven, DrivenBest, PopulationOutcome, drive_problem};
 pub use population_results::{Entry, PopulationSummary};
 pub use results::LineSummary;
@@ -85,6 +87,8 @@ pub struct Prepared {
     pub road: raceline::Setup,
     /// The lines.
     pub lines: Vec<NamedLine>,
+    /// Where a hybrid's motor works.
+    pub motor: Option<Motor>,
 }
 
 /// What the study finds.
@@ -115,7 +119,9 @@ impl Study for Transient {
         Example:\n  lapswarm raceline --car-width-m 3 --out fast\n  \
         lapswarm transient --line fast/line_fastest.csv\n\nSeveral lines, or set-ups, are driven all at once, each with several \
         shares of the grip; the fastest within the edges are listed:\n  lapswarm transient --line fast/line_fastest.csv \
-        --line fast/line_shortest.csv --setups 63 --parameters aero_balance_front,front_roll_moment_share";
+        --line fast/line_shortest.csv --setups 63 --parameters aero_balance_front,front_roll_moment_share\n\nA hybrid's lap, with \
+        accounts of its energy:\n  lapswarm hybrid --car-width-m 3 --out hy\n  lapswarm transient --car gt_hybrid --line hy/line.csv \
+        --deployment hy/lap_swarm.csv";
     type Settings = TransientSettings;
     type State = TransientState;
     type Prepared = Prepared;
@@ -176,7 +182,11 @@ impl Study for Transient {
         // Figures name the lines; the track gives no more than their edges.
         head.subject.track = None;
         match solved.outcome {
-            Outcome::Line(line) => Summary::Line(Box::new(LineSummary::of(head, line))),
+            Outcome::Line(line) => {
+                let mode = solved.settings.deployment_mode;
+                let energy = results::energy_of(&solved.prepared.car, mode, line);
+                Summary::Line(Box::new(LineSummary::of(head, line, energy)))
+            }
             Outcome::Population(population) => {
                 let summary = population_results::summarise(head, solved, population);
                 Summary::Population(Box::new(summary))
@@ -252,8 +262,14 @@ fn read(settings: &TransientSettings) -> Result<Prepared> {
     let named = names_of(files).into_iter().zip(points);
     let lines = named
         .map(|(name, points)| NamedLine::new(name, points, &road, settings.car_width_m))
-        .collect::<Result<_>>()?;
-    Ok(Prepared { car, road, lines })
+        .collect::<Result<Vec<_>>>()?;
+    let motor = Motor::read(settings, &car, &road.car, &lines)?;
+    Ok(Prepared {
+        car,
+        road,
+        lines,
+        motor,
+    })
 }
 
 /// The quasi-steady-state lap within a share of the envelope's grip on a line of points (m): the envelope, the lap, and its speeds

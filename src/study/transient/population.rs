@@ -66,7 +66,7 @@ pub fn drive_problem(
     prepared: &Prepared,
     mut proceed: impl FnMut() -> ControlFlow<()>,
 ) -> Result<Option<DriveProblem>> {
-    let Prepared { car, road, lines } = prepared;
+    let Prepared { car, road, lines, .. } = prepared;
     let shares = settings.shares();
     let traction = Traction::of(car, &road.car.envelope);
     let mut plans = Vec::with_capacity(lines.len());
@@ -99,7 +99,7 @@ pub fn drive_problem(
 /// [`crate::Error::Input`] for unknown parameters and if the state belongs to other inputs; those of the backend.
 pub(super) fn drive(work: Work<'_, Transient>) -> Result<Option<PopulationOutcome>> {
     let watch = Watch::begin();
-    let Prepared { car, road, lines } = work.prepared;
+    let Prepared { car, road, lines, .. } = work.prepared;
     let limits = &road.car;
     let Work {
         settings,

@@ -2,8 +2,10 @@
 
 use super::corners::CornerGrip;
 use super::drive::{AGREEMENT, DrivenLine, INTERVAL_S};
+use super::energy::{self, EnergyFigures};
 use crate::drive::Drive;
 use crate::error::Result;
+use crate::line::energy::{DrivenLapEnergy, Mode};
 use crate::line::{ON_ROAD_M, PointMass};
 use crate::report::{CornerLap, HtmlReport, LapLine, LapView, Road, Table, write_whole};
 use crate::study::framework::{Head, tyre_view, with_tyres};
@@ -58,10 +60,13 @@ pub struct LineSummary {
     pub full_grip_lap_time_s: Option<f64>,
     /// How far the driven lap is behind that (%).
     pub behind_full_grip_percent: Option<f64>,
+    /// The accounts of a hybrid's lap.
+    #[serde(default)]
+    pub energy: Option<EnergyFigures>,
 }
 
 impl LineSummary {
-    pub(super) fn of(head: Head, outcome: &DrivenLine) -> Self {
+    pub(super) fn of(head: Head, outcome: &DrivenLine, energy: Option<EnergyFigures>) -> Self {
         let agrees = outcome.disagreement().abs() <= AGREEMENT;
         let rule = if agrees {
             "the greatest share of the grip at which the driven lap and the quasi-steady-state lap agree to half a percent"
@@ -79,12 +84,16 @@ impl LineSummary {
             margin_m: outcome.margin_m,
             greatest_offset_m: outcome.drive.offset_m.iter().fold(0.0, |a, b| a.max(b.abs())),
             beyond: outcome.failures.last().map(|(_, why)| why.clone()),
-            warnings: off_road(&outcome.line).into_iter().collect(),
+            warnings: off_road(&outcome.line)
+                .into_iter()
+                .chain(energy.as_ref().and_then(EnergyFigures::doubt))
+                .collect(),
             corners: outcome.corners.clone(),
             full_grip_lap_time_s: outcome.full_grip_s,
             behind_full_grip_percent: outcome
                 .full_grip_s
                 .map(|full| 100.0 * (outcome.lap_time_s / full - 1.0)),
+            energy,
         }
     }
 
@@ -122,11 +131,12 @@ impl LineSummary {
             self.rule,
             self.greatest_offset_m,
             self.margin_m
-        ) + &self
-            .warnings
-            .iter()
-            .map(|warning| format!("Note: {warning}.\n"))
-            .collect::<String>()
+        ) + &self.energy.as_ref().map_or(String::new(), EnergyFigures::to_text)
+            + &self
+                .warnings
+                .iter()
+                .map(|warning| format!("Note: {warning}.\n"))
+                .collect::<String>()
     }
 }
 
@@ -161,7 +171,7 @@ fn corners(summary: &LineSummary) -> Table<'_> {
         .table()
 }
 
-/// Writes `drive.csv`, `corners.csv`, `envelope_driven.csv`, `speeds.svg`, `map.svg` and `report.html`.
+/// Writes `drive.csv`, `corners.csv`, `envelope_driven.csv`, `speeds.svg`, `map.svg`, `energy.svg` of a hybrid, and `report.html`.
 ///
 /// # Errors
 /// [`crate::Error::Io`] if a file cannot be written.
@@ -183,6 +193,7 @@ pub(super) fn report(
     let steer: Vec<f64> = drive.inputs.iter().map(|input| input.steer).collect();
     let time = (0..drive.states.len()).map(|i| i as f64 * INTERVAL_S);
     let moments = moments(car, drive);
+    let driven = accounts(outcome, &moments);
     let table = Table::new()
         .numbers("time", "s", time.collect::<Vec<f64>>())
         .numbers("station", "m", &drive.station_m)
@@ -199,9 +210,32 @@ pub(super) fn report(
         Some(gear) => table.numbers("gear", "-", gear),
         None => table,
     };
+    let table = match driven.as_ref().zip(outcome.ideal.as_ref()) {
+        Some((driven, ideal)) => energy::with_accounts(table, ideal, driven),
+        None => table,
+    };
     let moments: Vec<_> = moments.into_iter().map(Some).collect();
     with_tyres(table, &moments).write_csv(folder.join("drive.csv"))?;
-    write_page(folder, (car, limits), outcome, summary, &moments)
+    write_page(
+        folder,
+        (car, limits),
+        outcome,
+        summary,
+        (&moments, driven.as_ref()),
+    )
+}
+
+/// The accounts of a hybrid's lap; nothing of another car's.
+fn accounts(outcome: &DrivenLine, moments: &[Moment]) -> Option<DrivenLapEnergy> {
+    let ideal = outcome.ideal.as_ref()?;
+    Some(ideal.accounts(&outcome.drive, moments, outcome.line.length_m))
+}
+
+/// The figures of the accounts of a hybrid's lap.
+pub(super) fn energy_of(car: &Car, mode: Mode, outcome: &DrivenLine) -> Option<EnergyFigures> {
+    let ideal = outcome.ideal.as_ref()?;
+    let driven = accounts(outcome, &moments(car, &outcome.drive))?;
+    Some(EnergyFigures::of(mode, ideal, &driven))
 }
 
 /// What each wheel of the car does at each sample of a drive.
@@ -291,7 +325,7 @@ fn write_page(
     (driver_car, limits): (&Car, &PointMass),
     outcome: &DrivenLine,
     summary: &LineSummary,
-    moments: &[Option<Moment>],
+    (moments, accounts): (&[Option<Moment>], Option<&DrivenLapEnergy>),
 ) -> Result<()> {
     let car = &summary.head.subject.car;
     let mut page = HtmlReport::new(&summary.head.study, &format!("A line driven by the {car}"));
@@ -339,6 +373,13 @@ fn write_page(
     if !summary.corners.is_empty() {
         let note = "Each from one greatest speed to the next. Lost is the time to the quasi-steady-state lap with all of the grip.";
         page.table("Grip by corner", note, &corners(summary))?;
+    }
+    if let (Some(figures), Some(driven), Some(ideal)) = (&summary.energy, accounts, &outcome.ideal) {
+        let note = "The motor works at the same places of both laps. The driven car's wheels slip, and its tyres drag in bends.";
+        page.section("Energy", "");
+        let view = energy::view(ideal, driven, drive);
+        page.figure(folder.join("energy.svg"), &view)?;
+        page.table("Accounts", note, &figures.table())?;
     }
     page.section("Tyres", "");
     page.place(&tyre_view(&drive.station_m, moments))?;
