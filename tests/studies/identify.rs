@@ -467,6 +467,36 @@ fn windows_of_a_noisy_lap_give_its_car_within_three_standard_errors() {
     assert!(summary.parameters[0].standard_error.unwrap() < 15.0);
 }
 
+/// A log that tells of no laps is fitted as it is: as a whole where the starting car drives it to its end, else in windows.
+#[test]
+fn a_log_without_laps_is_scored_in_windows_where_the_starting_car_does_not_drive_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let bundled = include_str!("../../data/laps/gt_silverstone.csv");
+    let log = bundled
+        .lines()
+        .skip(1)
+        .map(|line| line.replace("time_s", "time (s)") + "\n")
+        .collect::<String>();
+    let path = folder.path().join("outing.csv");
+    std::fs::write(&path, log).unwrap();
+    let of = |car: &str| IdentifySettings {
+        car: car.to_owned(),
+        log: Some(path.display().to_string()),
+        ..simd()
+    };
+    let whole = set_up(&of("gt")).unwrap();
+    assert!(!whole.log.laps[0].complete);
+    assert_eq!(whole.windows_instead_s, None);
+    assert_eq!(whole.replay.plan.windows.len(), 1);
+    let mut car = Car::bundled().unwrap();
+    // Tyres that hold half as much.
+    car.chassis.gravity *= 0.5;
+    car.write(folder.path(), "slippery").unwrap();
+    let windows = set_up(&of(&folder.path().join("slippery.toml").display().to_string())).unwrap();
+    assert_eq!(windows.windows_instead_s, Some(5.0));
+    assert!(windows.replay.plan.windows.len() > 20);
+}
+
 /// Where the model lacks something, the errors are no noise, and the fit ends at a minimum of the cost that was asked for.
 #[test]
 fn a_car_that_the_model_cannot_be_is_fitted_to_the_cost() {
