@@ -1,7 +1,7 @@
 //! What a racing-line study is asked to do.
 
 use crate::config::kinds::{
-    Choice, choice, choices, count, file, name_or_file, named, number, of, optional, switch, text,
+    Choice, choice, choices, count, file, name_or_file, named, number, of, optional, switch, text, texts,
 };
 use crate::config::settings::{Flag, settings};
 use crate::error::{Error, Result};
@@ -9,6 +9,7 @@ use crate::evaluate::BackendChoice;
 use crate::evaluate::line::LineObjective;
 use crate::line::CarPlan;
 use crate::study::framework::memory::Size;
+use crate::study::framework::setups::{MOST_SETUPS, check_parameters};
 use crate::study::framework::{Coefficients, Mutated, Scheduled};
 use crate::swarm::{FrontSearch, Mutation, Schedule, SwarmPlace};
 use serde::{Deserialize, Serialize};
@@ -66,6 +67,12 @@ settings! {
             "Whether the swarms start from the reference optima; without it they do, but with algorithm thesis start from no known line";
         local_search: Option<bool> ["-"] = None, optional(switch(true)).flag(Flag::Switch("no_local_search", false)).search().example("true"),
             "Whether exact gradients lead what the swarms find to the nearest optimum; without it they do, but not with algorithm thesis";
+        setups: Option<usize> ["-"] = None, optional(count(0, MOST_SETUPS as u64)).example("63"),
+            "Set-ups of the car that each get a fastest line of their own, beside the car as it is";
+        parameters: Vec<String> ["-"] = ["mass_kg", "downforce_area_m2"].map(str::to_owned).to_vec(), texts(),
+            "Parameters that set-ups move";
+        share: f64 ["-"] = 0.1, number(1e-6, 1.0),
+            "How far each goes either way, as a share of its value";
         algorithm: LineAlgorithm ["-"] = LineAlgorithm::Windows, choice().search(),
             "What looks for the best line by one objective; cooperative (CPSO-S_K) and thesis start at random; nsga2 is windows, and NSGA-II for the front";
         inertia: Option<Schedule> ["-"] = None, of(Scheduled).search().example("[0.1, 1.0]"),
@@ -98,6 +105,8 @@ settings! {
 
     /// Coefficients are those of the algorithm.
     fn consistent(&self) -> Result<()> {
+        check_parameters(self.setups, &self.parameters)?;
+        self.check_setups()?;
         self.front_search().check(self.objectives.len(), self.population)?;
         let refused = match self.algorithm {
             LineAlgorithm::Thesis => Coefficients::default(),
@@ -120,6 +129,24 @@ fn usual_objectives() -> Vec<LineObjective> {
 }
 
 impl RacelineSettings {
+    /// Refuses set-ups where there is no fastest line of theirs.
+    fn check_setups(&self) -> Result<()> {
+        let refuse = |found: &str, expected: &str| Err(Error::input("the study", "setups", found, expected));
+        if self.setups.is_none() {
+            return Ok(());
+        }
+        if !self.objectives.contains(&LineObjective::LapTime) {
+            return refuse("set-ups without lap times", "lap_time among the objectives");
+        }
+        if self.envelope.is_some() {
+            return refuse("set-ups and an envelope from a file", "the car's own envelope");
+        }
+        if self.ellipse_exponent != 2.0 {
+            return refuse("set-ups and another exponent", "an ellipse exponent of 2");
+        }
+        Ok(())
+    }
+
     /// Whether the swarms start from the reference optima.
     pub fn starts_warm(&self) -> bool {
         self.warm_start.unwrap_or(self.algorithm != LineAlgorithm::Thesis)

@@ -83,13 +83,7 @@ pub fn set_up(settings: &RacelineSettings) -> Result<Setup> {
     };
     let gearbox = car.powertrain.clone().filter(|_| settings.envelope.is_none());
     let gearbox = gearbox.map(|powertrain| (powertrain, car.chassis.radius_rear));
-    let wheelbase = car.chassis.cg_to_front + car.chassis.cg_to_rear;
-    let car = PointMass {
-        ellipse_exponent: settings.ellipse_exponent,
-        max_steer_rad: Some(car.max_steer_rad),
-        ..PointMass::new(envelope, wheelbase)
-    };
-    car.check()?;
+    let car = point_mass(&car, envelope, settings)?;
     Ok(Setup {
         track_name: track.name(),
         road,
@@ -99,6 +93,21 @@ pub fn set_up(settings: &RacelineSettings) -> Result<Setup> {
         car_name,
         gearbox,
     })
+}
+
+/// The point mass of a car within an envelope.
+///
+/// # Errors
+/// Those of [`PointMass::check`].
+pub(super) fn point_mass(car: &Car, envelope: Envelope, settings: &RacelineSettings) -> Result<PointMass> {
+    let wheelbase = car.chassis.cg_to_front + car.chassis.cg_to_rear;
+    let car = PointMass {
+        ellipse_exponent: settings.ellipse_exponent,
+        max_steer_rad: Some(car.max_steer_rad),
+        ..PointMass::new(envelope, wheelbase)
+    };
+    car.check()?;
+    Ok(car)
 }
 
 /// Says that the track and the car's g-g-v envelope were read.

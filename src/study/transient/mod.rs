@@ -18,7 +18,7 @@ pub use drive::{AGREEMENT, DrivenLine, INTERVAL_S};
 pub use population::{Driven, DrivenBest, PopulationOutcome, drive_problem};
 pub use population_results::{Entry, PopulationSummary};
 pub use results::LineSummary;
-pub use settings::{MOST_SETUPS, TransientSettings};
+pub use settings::TransientSettings;
 pub use state::{DriveState, TransientState};
 
 use crate::config::settings::Settings;
