@@ -100,6 +100,9 @@ const NEARBY: f64 = 0.02;
 /// Share of a lap below which no cone program is worth its time. Programs that promise less gain a fraction of it: the envelope's
 /// kinks between its rows are beyond their models.
 const LEAST_GAIN_ABOUT: f64 = 4e-5;
+/// What a change of lateral acceleration of 1 g within 10 m counts (s). The fastest lines of ten made circuits lose a thousandth of a
+/// percent by it.
+const ROUGHNESS_S: f64 = 5e-4;
 /// Times that the fastest line is taken about another before it is taken closely about itself.
 const ABOUTS: usize = 2;
 
@@ -347,6 +350,7 @@ impl ReferenceSolvers {
         let settings = DescentSettings {
             least_gain: LEAST_GAIN_ABOUT,
             programs: PROGRAMS_ABOUT,
+            roughness_s: ROUGHNESS_S,
             ..DescentSettings::default()
         };
         let tightening = DescentSettings {

@@ -123,7 +123,7 @@ pub(super) fn with_drs(envelope: &Envelope, sections: usize) -> Result<(Envelope
 /// Those of reading the bundled circuit and car.
 pub(super) fn layer() -> Result<Layer> {
     let mut setup = set_up(&RacelineSettings {
-        sections: SECTIONS,
+        sections: Some(SECTIONS),
         ..RacelineSettings::default()
     })?;
     (setup.car.envelope, setup.cross_sections.drs) = with_drs(&setup.car.envelope, SECTIONS)?;

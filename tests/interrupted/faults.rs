@@ -52,7 +52,7 @@ fn faults_survive_a_resume_and_the_summary_names_what_ended_the_run() {
     for algorithm in [LineAlgorithm::Windows, LineAlgorithm::Thesis] {
         let settings = RacelineSettings {
             track: "stadium:300:80:12".to_owned(),
-            sections: 60,
+            sections: Some(60),
             population: 16,
             iterations: 12,
             objectives: vec![LineObjective::Length],
@@ -126,7 +126,7 @@ fn a_study_ends_without_the_adapter_that_it_began_with() {
     let _turn = alone();
     let settings = RacelineSettings {
         track: "stadium:300:80:12".to_owned(),
-        sections: 60,
+        sections: Some(60),
         population: 16,
         iterations: 12,
         objectives: vec![LineObjective::Length, LineObjective::Gamma],
@@ -164,7 +164,7 @@ fn a_swarm_on_the_device_loses_nothing_to_faults_and_breaks() {
     let _turn = alone();
     let settings = RacelineSettings {
         track: "stadium:300:80:12".to_owned(),
-        sections: 60,
+        sections: Some(60),
         population: 70,
         iterations: 8,
         archive: 12,

@@ -65,7 +65,12 @@ pub fn setups_of(car: &Car, free: &[FreeParameter], count: usize, seed: u64) -> 
         }
     };
     (0..=count)
-        .map(|setup| free.iter().zip(0..).map(|(free, k)| value(setup, k, free)).collect())
+        .map(|setup| {
+            free.iter()
+                .zip(0..)
+                .map(|(free, k)| value(setup, k, free))
+                .collect()
+        })
         .collect()
 }
 

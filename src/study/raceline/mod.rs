@@ -19,8 +19,8 @@ pub use front::{LineFront, front_problem, starting_lines};
 pub use results::{LineFigures, ParameterWorth, SetupFigures, SetupsSummary, Summary};
 pub use settings::{LineAlgorithm, RacelineSettings};
 pub(in crate::study) use setup::best_gears;
-pub use setups::{SetupLap, SetupsOutcome, SolvedSetup};
 pub use setup::{ReportedLine, Setup, road_read, set_up};
+pub use setups::{SetupLap, SetupsOutcome, SolvedSetup};
 pub use state::LinesState;
 pub use window_search::{FoundLine, LevelRow, LineSearch, LineSearchSettings, LineState, search_line};
 
@@ -97,8 +97,8 @@ impl Study for Raceline {
         Ok(setup)
     }
 
-    fn size(settings: &RacelineSettings, _: Option<&Setup>) -> Vec<MemoryItem> {
-        settings.size().memory_items()
+    fn size(settings: &RacelineSettings, setup: Option<&Setup>) -> Vec<MemoryItem> {
+        settings.size(setup.map(|setup| setup.road.len())).memory_items()
     }
 
     fn plan(settings: &RacelineSettings, setup: &Setup, plan: Plan) -> Result<Plan> {
@@ -138,8 +138,8 @@ impl Study for Raceline {
 
     fn check(path: &Path) -> Result<String> {
         let settings = RacelineSettings::read(path)?;
-        Self::prepare(&settings)?;
-        Ok(format!("{}, {} sections", settings.track, settings.sections))
+        let setup = Self::prepare(&settings)?;
+        Ok(format!("{}, {} sections", settings.track, setup.road.len()))
     }
 
     /// What was reached of each objective, and the quality of the front.

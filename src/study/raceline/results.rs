@@ -136,7 +136,10 @@ pub(super) fn summarise(solved: &Solved<'_, Raceline>) -> Summary {
         hypervolume: front.map(|f| f.hypervolume),
         hypervolume_reference: front.map(|f| f.reference.clone()),
         front_size: front.map_or(0, |f| f.alpha.len()),
-        setups: outcome.setups.as_ref().map(|found| setups::summarise(found, settings.share)),
+        setups: outcome
+            .setups
+            .as_ref()
+            .map(|found| setups::summarise(found, settings.share)),
         off_road: objectives()
             .filter(|o| !o.best.clearance.is_on_road())
             .map(|o| o.objective.name().to_owned())

@@ -47,8 +47,8 @@ settings! {
             "A g-g-v envelope (columns v_mps, ay_mps2, ax_grip_mps2, ax_drive_mps2, drag_mps2) instead of the car's own";
         section: Option<String> ["-"] = None, optional(text()).example("\"Abbey\""),
             "Only this named stretch of the track, or a sector such as 3/12 of its cross-sections, as an open road";
-        sections: usize ["-"] = 960, count(8, 1_000_000),
-            "Cross-sections of the track";
+        sections: Option<usize> ["-"] = None, optional(count(8, 1_000_000)).example("960"),
+            "Cross-sections of the track; without it one for every 4 m, and 960 at least";
         as_surveyed: bool ["-"] = true, switch(true).flag(Flag::Switch("smoothed", false)),
             "Whether a surveyed track's line and edges are taken as they are; else they are smoothed, within 0.25 m";
         car_width_m: f64 ["m"] = 2.0, number(0.0, 10.0),
@@ -120,6 +120,12 @@ settings! {
     }
 }
 
+/// Distance between cross-sections (m) where their number is not given, and how few there are at the least.
+const SECTION_M: f64 = 4.0;
+const LEAST_SECTIONS: usize = 960;
+/// As long as tracks are (m) whose memory is thought of before they are read.
+const LONG_TRACK_M: f64 = 7500.0;
+
 fn usual_objectives() -> Vec<LineObjective> {
     vec![
         LineObjective::Gamma,
@@ -150,6 +156,12 @@ impl RacelineSettings {
     /// Whether the swarms start from the reference optima.
     pub fn starts_warm(&self) -> bool {
         self.warm_start.unwrap_or(self.algorithm != LineAlgorithm::Thesis)
+    }
+
+    /// Cross-sections of a track of a length (m).
+    pub(super) fn sections_on(&self, length_m: f64) -> usize {
+        let by_length = (length_m / SECTION_M).ceil() as usize;
+        self.sections.unwrap_or(by_length.max(LEAST_SECTIONS))
     }
 
     /// Whether exact gradients lead what the swarms find.
@@ -210,13 +222,14 @@ impl RacelineSettings {
     }
 
     /// What the study's memory goes with.
-    pub fn size(&self) -> Size {
+    pub fn size(&self, known: Option<usize>) -> Size {
+        let sections = known.unwrap_or_else(|| self.sections_on(LONG_TRACK_M));
         Size {
             population: self.population.saturating_mul(self.islands),
             // The swarm's control points are fewer than the cross-sections; the lines of the front are whole.
-            variables: self.sections,
+            variables: sections,
             iterations: self.iterations,
-            sections: self.sections,
+            sections,
             archive: self.archive,
             ..Size::default()
         }

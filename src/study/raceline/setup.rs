@@ -18,6 +18,8 @@ use std::sync::atomic::AtomicBool;
 
 /// Waves of a survey's reference line that are shorter than this are noise (m): the tightest bend of a road is longer.
 const REFERENCE_M: f64 = 60.0;
+/// Cross-sections that tell the length of a track.
+const FEW: usize = 960;
 /// Distance between the points of the edges that lines are held within (m): an edge of 10 m radius is straight to a centimetre.
 const EDGE_M: f64 = 1.0;
 
@@ -47,11 +49,13 @@ pub struct Setup {
 pub fn set_up(settings: &RacelineSettings) -> Result<Setup> {
     settings.validate()?;
     let track = Track::load(&settings.track)?;
+    let few = track.cross_sections(&Spacing::equal(FEW), settings.as_surveyed)?;
+    let sections = settings.sections_on(few.length_m);
     let road = track
-        .cross_sections(&Spacing::equal(settings.sections), settings.as_surveyed)?
+        .cross_sections(&Spacing::equal(sections), settings.as_surveyed)?
         .with_smooth_reference(REFERENCE_M);
     let cut = |step_m: f64| {
-        let close = ((road.length_m / step_m).ceil() as usize).clamp(settings.sections, 1_000_000);
+        let close = ((road.length_m / step_m).ceil() as usize).clamp(sections, 1_000_000);
         track.cross_sections(&Spacing::equal(close), settings.as_surveyed)
     };
     // Inside a bend that is hardly wider than its road, cross-sections may be too close to one another to be turned apart.
@@ -62,7 +66,7 @@ pub fn set_up(settings: &RacelineSettings) -> Result<Setup> {
             let (first_m, length_m) = road.section_named(name)?;
             let stretch = road.stretch_from(first_m, length_m, 0)?;
             if stretch.len() < TERMS {
-                let found = format!("{}, of which {} lie in {name}", settings.sections, stretch.len());
+                let found = format!("{sections}, of which {} lie in {name}", stretch.len());
                 let expected = format!("so many that at least {TERMS} lie in it");
                 return Err(Error::input("the study", "sections", found, expected));
             }

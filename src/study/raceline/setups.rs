@@ -117,7 +117,10 @@ pub(super) fn solve_setups(
         .map(|k| with_lap[k * with_lap.len() / SAMPLE.min(with_lap.len())])
         .collect();
     let missing = |work: &Running<'_>, k: usize| {
-        work.state.setups[k].lap.as_ref().is_some_and(|lap| lap.reference_s.is_none())
+        work.state.setups[k]
+            .lap
+            .as_ref()
+            .is_some_and(|lap| lap.reference_s.is_none())
     };
     for k in sample {
         if work.interrupted || !missing(work, k) {
@@ -150,7 +153,11 @@ fn in_batch<T: Send>(
 impl Batch<'_> {
     /// The solvers of a set-up; nothing where it has no envelope.
     fn solvers_of(&self, values: &[f64]) -> Result<Option<ReferenceSolvers>> {
-        let car = car_of(&self.car, self.free.iter().map(|(parameter, ..)| parameter), values);
+        let car = car_of(
+            &self.car,
+            self.free.iter().map(|(parameter, ..)| parameter),
+            values,
+        );
         match car_envelope(&car, &SpeedRange::USUAL) {
             Ok(limits) => {
                 let car = point_mass(&car, limits.envelope, self.settings)?;
@@ -173,7 +180,8 @@ impl Batch<'_> {
         };
         let distance = |other: &SolvedSetup| -> f64 {
             let each = self.free.iter().zip(values.iter().zip(&other.values));
-            each.map(|((_, lower, upper), (a, b))| ((a - b) / (upper - lower)).powi(2)).sum()
+            each.map(|((_, lower, upper), (a, b))| ((a - b) / (upper - lower)).powi(2))
+                .sum()
         };
         let nearest = known
             .iter()

@@ -154,7 +154,13 @@ pub(super) fn find_lines(work: Work<'_, Raceline>) -> Result<Outcome> {
     if settings.setups.is_some() && !work.interrupted {
         let fastest = objectives.iter().find(|o| o.objective == LineObjective::LapTime);
         let first = &fastest.map_or(&reference, |o| &o.best);
-        setups = Some(solve_setups((settings, setup), &solvers, first, &stop, &mut work)?);
+        setups = Some(solve_setups(
+            (settings, setup),
+            &solvers,
+            first,
+            &stop,
+            &mut work,
+        )?);
     }
     record.took(evaluations, search_s + work.waited_s, search_s);
     record.longest_dispatch_ms = watch.longest_dispatch_ms();

@@ -28,7 +28,7 @@ settings! {
         car_width_m: f64 ["m"] = 2.0, number(0.0, 10.0),
             "Width of the car, all of which stays within the edges";
         grip_shares: Option<Vec<f64>> ["-"] = None, optional(numbers(0.05, 1.0)).example("[0.7, 0.8, 0.9]"),
-            "Shares of the envelope's grip to drive with; without it from 0.6 on for one line alone and from 0.8 on for a population";
+            "Shares of the envelope's grip to drive with; without it from 0.3 on for one line alone and from 0.8 on for a population";
         setups: Option<usize> ["-"] = None, optional(count(0, MOST_SETUPS as u64)).example("63"),
             "Set-ups of the car to drive beside the car as it is";
         parameters: Vec<String> ["-"] = ["front_roll_moment_share", "aero_balance_front"].map(str::to_owned).to_vec(), texts(),
@@ -67,7 +67,7 @@ impl TransientSettings {
             if self.is_population() {
                 (0..21).map(|i| 0.8 + 0.01 * f64::from(i)).collect()
             } else {
-                (0..41).map(|i| 1.0 - 0.01 * f64::from(i)).collect()
+                (0..71).map(|i| 1.0 - 0.01 * f64::from(i)).collect()
             }
         });
         shares.sort_by(f64::total_cmp);

@@ -111,7 +111,9 @@ fn worths(outcome: &SetupsOutcome) -> Option<(Vec<ParameterWorth>, Option<f64>)>
     let percent = |row: usize, k: usize| 100.0 * (rows[row].1.values[k] / own[k] - 1.0);
     let matrix = DMatrix::from_fn(n, m, |row, k| if k == 0 { 1.0 } else { percent(row, k - 1) });
     let times = DVector::from_fn(n, |row, _| rows[row].2.lap_time_s);
-    let slopes = (matrix.transpose() * &matrix).cholesky()?.solve(&(matrix.transpose() * &times));
+    let slopes = (matrix.transpose() * &matrix)
+        .cholesky()?
+        .solve(&(matrix.transpose() * &times));
     let worth = |k: usize| {
         let values = rows.iter().map(|row| row.1.values[k]);
         ParameterWorth {
@@ -142,22 +144,33 @@ impl SetupsSummary {
             );
         }
         if let Some(percent) = self.greatest_above_exact_percent {
-            text += &format!("Laps of a sample are {percent:.3} % above reference optima of their own at the most\n");
+            text += &format!(
+                "Laps of a sample are {percent:.3} % above reference optima of their own at the most\n"
+            );
         }
         if self.failed > 0 {
-            text += &format!("{} set-ups have no lap: their cars have no steady states in bends\n", self.failed);
+            text += &format!(
+                "{} set-ups have no lap: their cars have no steady states in bends\n",
+                self.failed
+            );
         }
         text
     }
 }
 
 fn worth_table(summary: &SetupsSummary) -> Table<'static> {
-    Table::rows(summary.worth.iter().map(|(name, worth)| (name.clone(), worth.clone())).collect::<Vec<_>>())
-        .text("parameter", |(name, _)| name.clone())
-        .number("from", "", |(_, worth)| worth.range[0])
-        .number("to", "", |(_, worth)| worth.range[1])
-        .number("lap time", "s/%", |(_, worth)| worth.lap_time_s_per_percent)
-        .table()
+    Table::rows(
+        summary
+            .worth
+            .iter()
+            .map(|(name, worth)| (name.clone(), worth.clone()))
+            .collect::<Vec<_>>(),
+    )
+    .text("parameter", |(name, _)| name.clone())
+    .number("from", "", |(_, worth)| worth.range[0])
+    .number("to", "", |(_, worth)| worth.range[1])
+    .number("lap time", "s/%", |(_, worth)| worth.lap_time_s_per_percent)
+    .table()
 }
 
 /// Writes `setups.csv`, `setup_worth.csv` and `setups.svg`, and their part of the page.
