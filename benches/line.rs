@@ -11,6 +11,7 @@ use common::Random;
 use common::line::{circuit, gt_car, lines};
 use criterion::{BenchmarkId, Criterion, SamplingMode, Throughput};
 use glam::DVec2;
+use lapswarm::config::Choice;
 use lapswarm::evaluate::Evaluator;
 use lapswarm::evaluate::energy::{
     CpuHybridEvaluator, GpuHybridEvaluator, HybridLine, HybridObjective, HybridProblem, SimdHybridEvaluator,

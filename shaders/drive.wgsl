@@ -64,12 +64,22 @@ fn drive_step(car: CarModel, course: Course, pace: Pace, number: f32, before: Dr
         return state;
     }
 
-    let controls = act(course, pace, chassis_of(car), before.car, view, before.controls);
-    let input = car_input(chassis_of(car), before.car, controls, view.row.flap);
+    var under = Footing(0.0, 0.0, 0.0);
+    if HAS_RELIEF {
+        under = footing(course, view, before.car.body.vx);
+    }
+    // Generated: the car with the gravity that its wheels feel.
+    let loaded = under_load(car, under.load);
+    let controls = act(course, pace, chassis_of(loaded), before.car, view, under, before.controls);
+    let input = car_input(chassis_of(loaded), before.car, controls, view.row.flap);
     var next = before.car;
     var reached = before.car;
     for (var stage = 0u; stage < STAGES; stage++) {
-        let rate = car_rate(car, reached, input);
+        var rate = car_rate(loaded, reached, input);
+        if HAS_RELIEF {
+            rate.state.body.vx = rate.state.body.vx - under.climb;
+            rate.state.body.vy = rate.state.body.vy - under.lean;
+        }
         next = carried(next, driver.step * stage_weight(stage), rate.state);
         reached = carried(before.car, driver.step * stage_reach(stage), rate.state);
     }

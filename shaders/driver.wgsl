@@ -71,14 +71,28 @@ fn planned_speed(course: Course, pace: Pace, view: View, ahead: f32) -> f32 {
     return speed + pace.share * (faster - speed);
 }
 
-fn act(course: Course, pace: Pace, c: Chassis, state: CarState, view: View, controls: Controls) -> Controls {
+fn act(
+    course: Course,
+    pace: Pace,
+    c: Chassis,
+    state: CarState,
+    view: View,
+    under: Footing,
+    controls: Controls,
+) -> Controls {
     let body = state.body;
     let v = max(body.vx, 3.0);
     let wheelbase = c.cg_to_front + c.cg_to_rear;
     let curvature = curvature_ahead(course, view.pose, driver.preview * v);
-    let understeer = driver.understeer * curvature * v * v / c.gravity * wheelbase;
+    var understeer = driver.understeer * curvature * v * v / c.gravity * wheelbase;
     let bend = view.bend;
-    let sideslip = driver.knows * (c.cg_to_rear * bend - driver.rear_slip_per_ay * bend * v * v);
+    var sideslip = driver.knows * (c.cg_to_rear * bend - driver.rear_slip_per_ay * bend * v * v);
+    var turning = body.yaw_rate * v;
+    if HAS_RELIEF {
+        understeer = understeer + driver.understeer * under.lean / c.gravity * wheelbase;
+        sideslip = sideslip - driver.knows * driver.rear_slip_per_ay * under.lean;
+        turning = turning + under.lean;
+    }
     let heading = view.heading_error + sideslip + view.offset * 0.9 / (v * 0.45 + 3.0);
     let yaw_lack = curvature_ahead(course, view.pose, 0.08 * v) * v - body.yaw_rate;
     let asked = wheelbase * curvature + understeer - driver.heading_gain * heading + 0.045 * yaw_lack;
@@ -92,9 +106,12 @@ fn act(course: Course, pace: Pace, c: Chassis, state: CarState, view: View, cont
     let planned = (after * after - before * before) / 8.0;
     let wanted = planned + driver.speed_gain * behind;
     let aero = aero_forces(c, v, view.row.flap);
-    let force = c.mass * wanted + aero.drag;
+    var force = c.mass * wanted + aero.drag;
+    if HAS_RELIEF {
+        force = force + c.mass * under.climb;
+    }
     let weight = c.mass * c.gravity + (aero.downforce_front + aero.downforce_rear);
-    let used = min(driver.knows * abs(body.yaw_rate * v / (driver.friction * weight / c.mass)), 1.0);
+    let used = min(driver.knows * abs(turning / (driver.friction * weight / c.mass)), 1.0);
     let left = sqrt(max(1.0 - used * used, 0.01));
     let limit = driver.slip_limit * left;
     let pull = torque_at(v / c.radius_rear) / c.radius_rear;

@@ -97,8 +97,8 @@ fn shed_drag(section: u32, speed_squared: f32, curvature: f32) -> f32 {
     if !may_open(section) {
         return 0.0;
     }
-    let shut = driving_with_drs(false, speed_squared, curvature);
-    return shut.z - driving_with_drs(true, speed_squared, curvature).z;
+    let shut = driving_with_drs(false, speed_squared, level(curvature));
+    return shut.z - driving_with_drs(true, speed_squared, level(curvature)).z;
 }
 
 fn additional(
@@ -113,7 +113,7 @@ fn additional(
     candidate: u32,
 ) -> Step {
     let drs = may_open(section);
-    let first = driving_with_drs(drs, start, here);
+    let first = driving_with_drs(drs, start, level(here));
     let alone = min(first.x, first.y);
     let ahead = max(start + length * (alone - first.z), 0.0);
     let held = min(max(ahead * account.rows_per_speed_squared, 0.0), f32(ENVELOPE_ROWS));
@@ -132,7 +132,7 @@ fn additional(
     let engine = min(first.x, drive);
     let both = min(first.x, drive + boost);
     let middle = max(start + length * (both - first.z), 0.0);
-    let later = driving_with_drs(drs, middle, 0.5 * (here + there));
+    let later = driving_with_drs(drs, middle, level(0.5 * (here + there)));
     let later_drive = later.y - exhaust;
     let later_both = min(later.x, later_drive + boost);
     let motor = 0.5 * ((both - engine) + (later_both - min(later.x, later_drive)));
@@ -145,10 +145,10 @@ fn additional(
 
 fn engine_only(section: u32, start: f32, length: f32, here: f32, there: f32, most: f32) -> f32 {
     let drs = may_open(section);
-    let at_start = driving_with_drs(drs, start, here);
+    let at_start = driving_with_drs(drs, start, level(here));
     let first = min(at_start.x, at_start.y) - at_start.z;
     let middle = max(start + length * first, 0.0);
-    let later = driving_with_drs(drs, middle, 0.5 * (here + there));
+    let later = driving_with_drs(drs, middle, level(0.5 * (here + there)));
     let second = min(later.x, later.y) - later.z;
     return min(max(start + length * (first + second), 0.0), most);
 }
@@ -273,7 +273,7 @@ fn ceilings(candidate: u32) {
     let n = stretch.sections;
     var next = select(n - 1u, stretch.start, CLOSED);
     var curvature = course[place_of(next, candidate)].y;
-    var speed_squared = corner(curvature);
+    var speed_squared = corner(level(curvature));
     speeds_squared[place_of(next, candidate)] = speed_squared;
     // In the first round a section is limited by its corner speed alone. On a closed line the pass continues until it meets its
     // own values.
@@ -281,13 +281,13 @@ fn ceilings(candidate: u32) {
     for (var i = 0u; i < steps; i++) {
         let before = select(n - 1u, next - 1u, next > 0u);
         let there = course[place_of(before, candidate)];
-        let reached = braked(speed_squared, there.x, curvature, there.y);
+        let reached = braked(speed_squared, there.x, level(curvature), level(there.y));
         let again = i + 1u >= n;
         var most: f32;
         if again {
             most = speeds_squared[place_of(before, candidate)];
         } else {
-            most = corner(there.y);
+            most = corner(level(there.y));
         }
         let slower = reached < most;
         if again && !slower {

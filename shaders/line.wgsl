@@ -3,9 +3,12 @@
 // One lane per candidate. Segment lengths, curvatures and speeds squared stand in a buffer, in tiles of TILE lanes: section by
 // section within a tile, so that neighbouring lanes and neighbouring sections read neighbouring memory. All lanes start a lap's
 // passes at the same section for the same reason. The constants CLOSED, TERMS, WANTS_INTEGRAL, WANTS_LAP, ENVELOPE_ROWS,
-// CORNER_ROWS, ELLIPSE_ROWS, HAS_TRACTION, TRACTION_SPEEDS, TRACTION_ROOTS, HAS_DRS, OPEN_AT, WORKGROUP and TILE are generated, and
+// CORNER_ROWS, ELLIPSE_ROWS, HAS_TRACTION, TRACTION_SPEEDS, TRACTION_ROOTS, HAS_DRS, OPEN_AT, HAS_RELIEF, LOADS, LOADS_AT, LOAD_STEP,
+// WORKGROUP and TILE are generated, and
 // so are the bindings 1 to 4: `sections`; `envelope` in rows of lateral, grip, drive, drag at their start and then of their rises,
-// behind them the cells of traction, and from OPEN_AT on the same of the car with its DRS open; `corners` and `ellipse` in rows of a figure and its rise.
+// behind them the cells of traction, and from OPEN_AT on the same of the car with its DRS open. On a road in three dimensions the
+// same again from LOADS_AT on, under each of LOADS loads, LOAD_STEP rows apart; behind the sections then stand as many whose weights
+// are height and banking: `step_rise`, `across_rise`, sine and cosine. Then `corners` and `ellipse` in rows of a figure and its rise.
 // All lanes read the same section, so these tables are uniform buffers if they fit. The envelope is one only on drivers that let
 // lanes read different rows at full speed.
 
@@ -22,6 +25,15 @@ struct LineStretch {
     entry: f32,
     rows_per_speed_squared: f32,
     rows_per_radius: f32,
+    // Of roads in three dimensions: load over mass of the first table, tables per load, the least and the greatest load in tables,
+    // the radius on the steering lock, and gravity.
+    load_first: f32,
+    tables_per_load: f32,
+    load_least: f32,
+    load_most: f32,
+    lock_radius: f32,
+    gravity: f32,
+    spare: vec2<u32>,
 }
 
 struct Section {
@@ -39,7 +51,8 @@ struct Section {
 
 @group(0) @binding(0) var<uniform> stretch: LineStretch;
 @group(0) @binding(5) var<storage, read> variables: array<f32>;
-// Length of the segment and curvature, section by section.
+// Length of the segment and curvature, section by section. On a road in three dimensions two more planes follow: curvature square to
+// the surface and gravity along the segment, then gravity to the left and square to the surface.
 @group(0) @binding(6) var<storage, read_write> course: array<vec2<f32>>;
 @group(0) @binding(7) var<storage, read_write> speeds_squared: array<f32>;
 // Planes of length, squared length, squared second differences, integral and time.
@@ -164,8 +177,214 @@ fn shape(candidate: u32) -> vec4<f32> {
     return total;
 }
 
-fn corner(curvature: f32) -> f32 {
-    let radius = 1.0 / max(curvature, 1e-6);
+// Where a line crosses a cross-section, from its right end: east, north and up.
+fn crossing(section: u32, candidate: u32) -> vec3<f32> {
+    let share = alpha(section, variables_of(section, candidate));
+    let relief = sections[stretch.sections + section].weights;
+    return vec3<f32>(share * sections[section].across, share * relief.y);
+}
+
+// A segment's direction in space and its length.
+struct Rising {
+    direction: vec3<f32>,
+    length: f32,
+}
+
+fn rising_between(section: u32, here: vec3<f32>, next: vec3<f32>) -> Rising {
+    let step = sections[section].step + (next.xy - here.xy);
+    let rise = sections[stretch.sections + section].weights.x + (next.z - here.z);
+    let length = sqrt(max(step.x * step.x + step.y * step.y + rise * rise, 1e-8));
+    return Rising(vec3<f32>(step, rise) / length, length);
+}
+
+// Curvature along and square to a surface that is banked by an angle of this sine and cosine, and gravity to the left and square to
+// it.
+fn turned(after: Rising, before: Rising, sine: f32, cosine: f32) -> vec4<f32> {
+    let change = after.direction - before.direction;
+    let mean = 0.5 * (after.direction + before.direction);
+    let level = sqrt(max(mean.x * mean.x + mean.y * mean.y, 1e-8));
+    let forward = mean.xy / level;
+    let slope = mean.z;
+    let spacing = 0.5 * (before.length + after.length);
+    let flat_share = sqrt(max(1.0 - slope * slope, 0.0));
+    let turn = (forward.x * change.y - forward.y * change.x) / spacing;
+    let bow = (flat_share * change.z - slope * (forward.x * change.x + forward.y * change.y)) / spacing;
+    let gravity = stretch.gravity * flat_share;
+    return vec4<f32>(
+        turn * cosine + bow * sine,
+        bow * cosine - turn * sine,
+        gravity * sine,
+        gravity * cosine,
+    );
+}
+
+// Gives the course the lengths and curvatures of a line in three dimensions, in the place of those of the plane.
+fn relieve(candidate: u32) {
+    let n = stretch.sections;
+    let segments = select(n - 1u, n, CLOSED);
+    let first = crossing(0u, candidate);
+    var here = first;
+    var before = Rising(vec3<f32>(0.0), 0.0);
+    if CLOSED {
+        before = rising_between(n - 1u, crossing(n - 1u, candidate), first);
+    }
+    for (var i = 0u; i < segments; i++) {
+        var next = first;
+        if i + 1u < n {
+            next = crossing(i + 1u, candidate);
+        }
+        let rising = rising_between(i, here, next);
+        let climb = stretch.gravity * rising.direction.z;
+        var found = vec4<f32>(0.0);
+        if CLOSED || i > 0u {
+            let relief = sections[n + i].weights;
+            found = turned(rising, before, relief.z, relief.w);
+        }
+        course[place_of(i, candidate)] = vec2<f32>(rising.length, found.x);
+        course[relief_at(1u, i, candidate)] = vec2<f32>(found.y, climb);
+        course[relief_at(2u, i, candidate)] = found.zw;
+        before = rising;
+        here = next;
+    }
+    if !CLOSED {
+        copy_relief(0u, 1u, 0u, candidate);
+        copy_relief(n - 1u, n - 2u, n - 2u, candidate);
+    }
+}
+
+// Gives an end of an open line its neighbour's figures, and the climb of a segment.
+fn copy_relief(end: u32, inner: u32, segment: u32, candidate: u32) {
+    course[place_of(end, candidate)].y = course[place_of(inner, candidate)].y;
+    let climb = course[relief_at(1u, segment, candidate)].y;
+    course[relief_at(1u, end, candidate)] = vec2<f32>(course[relief_at(1u, inner, candidate)].x, climb);
+    course[relief_at(2u, end, candidate)] = course[relief_at(2u, inner, candidate)];
+}
+
+// The two planes of a road in three dimensions behind the first.
+fn relief_at(plane: u32, section: u32, candidate: u32) -> u32 {
+    return plane * stretch.stride * stretch.sections + place_of(section, candidate);
+}
+
+// A place of the road; twin of `Sloped` in `src/line/ground.rs`. On a level road `bend` alone is used.
+struct Ground {
+    bend: f32,
+    dip: f32,
+    climb: f32,
+    lean: f32,
+    press: f32,
+}
+
+// A bend of a level road.
+fn level(curvature: f32) -> Ground {
+    return Ground(curvature, 0.0, 0.0, 0.0, 0.0);
+}
+
+// A section with the segment after it.
+struct Spot {
+    length: f32,
+    ground: Ground,
+}
+
+fn spot_at(section: u32, candidate: u32) -> Spot {
+    let first = course[place_of(section, candidate)];
+    if !HAS_RELIEF {
+        return Spot(first.x, level(first.y));
+    }
+    let second = course[relief_at(1u, section, candidate)];
+    let third = course[relief_at(2u, section, candidate)];
+    return Spot(first.x, Ground(first.y, second.x, second.y, third.x, third.y));
+}
+
+// The ground at the end of a segment, of which it has the climb.
+fn end_of(segment: Spot, end: Ground) -> Ground {
+    return Ground(end.bend, end.dip, segment.ground.climb, end.lean, end.press);
+}
+
+fn half_way(here: Ground, there: Ground) -> Ground {
+    let bend = 0.5 * (here.bend + there.bend);
+    if !HAS_RELIEF {
+        return level(bend);
+    }
+    return Ground(
+        bend,
+        0.5 * (here.dip + there.dip),
+        here.climb,
+        0.5 * (here.lean + there.lean),
+        0.5 * (here.press + there.press),
+    );
+}
+
+// The lower of the two tables that a load lies between, and how far it is beyond that, as a share of the step to the next.
+fn layer_of(ground: Ground, speed_squared: f32) -> vec2<f32> {
+    let load = speed_squared * ground.dip + ground.press;
+    let place = min(max((load - stretch.load_first) * stretch.tables_per_load, stretch.load_least), stretch.load_most);
+    let below = min(u32(max(place, 0.0)), LOADS - 2u);
+    return vec2<f32>(f32(below), place - f32(below));
+}
+
+// The row of limits under a load: figures and their rises over a row.
+struct LoadedRow {
+    figures: vec4<f32>,
+    rises: vec4<f32>,
+}
+
+fn loaded_row(layer: vec2<f32>, row: u32, table: u32) -> LoadedRow {
+    let low = table + LOADS_AT + u32(layer.x) * LOAD_STEP + 2u * row;
+    let high = low + LOAD_STEP;
+    return LoadedRow(
+        envelope[low] + layer.y * (envelope[high] - envelope[low]),
+        envelope[low + 1u] + layer.y * (envelope[high + 1u] - envelope[low + 1u]),
+    );
+}
+
+const LEAST_GRIP: f32 = 0.05;
+const CORNER_STEPS: u32 = 12u;
+
+// The lateral limit at a speed squared, and its slope over it.
+fn loaded_lateral(ground: Ground, speed_squared: f32) -> vec2<f32> {
+    let per_row = stretch.rows_per_speed_squared;
+    let held = min(max(speed_squared * per_row, 0.0), f32(ENVELOPE_ROWS));
+    let row = min(u32(held), ENVELOPE_ROWS - 1u);
+    let beyond = held - f32(row);
+    let layer = layer_of(ground, speed_squared);
+    let low = loaded_row(vec2<f32>(layer.x, 0.0), row, 0u);
+    let high = loaded_row(vec2<f32>(layer.x, 1.0), row, 0u);
+    let here = loaded_row(layer, row, 0u);
+    let by_load = ((high.figures.x + beyond * high.rises.x) - (low.figures.x + beyond * low.rises.x)) * stretch.tables_per_load;
+    return vec2<f32>(
+        max(here.figures.x + beyond * here.rises.x, LEAST_GRIP),
+        here.rises.x * per_row + by_load * ground.dip,
+    );
+}
+
+fn sloped_corner(ground: Ground) -> f32 {
+    var low = 0.0;
+    var high = f32(ENVELOPE_ROWS) / stretch.rows_per_speed_squared;
+    var speed_squared = high;
+    for (var i = 0u; i < CORNER_STEPS; i++) {
+        let limit = loaded_lateral(ground, speed_squared);
+        let across = speed_squared * ground.bend + ground.lean;
+        let spare = limit.x - abs(across);
+        let slope = limit.y - select(-ground.bend, ground.bend, 0.0 < across);
+        if spare < 0.0 {
+            high = speed_squared;
+        } else {
+            low = speed_squared;
+        }
+        let next = speed_squared - spare / slope;
+        speed_squared = select(0.5 * (low + high), next, !(next < low) && next < high);
+    }
+    let radius = 1.0 / max(abs(ground.bend), 1e-6);
+    let share = min(radius / stretch.lock_radius, 1.0);
+    let squared = share * share;
+    return speed_squared * (squared * squared);
+}
+
+fn corner(ground: Ground) -> f32 {
+    if HAS_RELIEF {
+        return sloped_corner(ground);
+    }
+    let radius = 1.0 / max(ground.bend, 1e-6);
     let held = min(max(radius * stretch.rows_per_radius, 0.0), f32(CORNER_ROWS));
     let row = min(u32(held), CORNER_ROWS - 1u);
     let figures = corners[row];
@@ -173,14 +392,22 @@ fn corner(curvature: f32) -> f32 {
 }
 
 // Lateral, grip, drive and drag. `table` is where the limits begin: 0, or OPEN_AT with the DRS open.
-fn limits_at(speed_squared: f32, table: u32) -> vec4<f32> {
+fn limits_at(speed_squared: f32, ground: Ground, table: u32) -> vec4<f32> {
     let held = min(max(speed_squared * stretch.rows_per_speed_squared, 0.0), f32(ENVELOPE_ROWS));
     let row = min(u32(held), ENVELOPE_ROWS - 1u);
+    if HAS_RELIEF {
+        let under = loaded_row(layer_of(ground, speed_squared), row, table);
+        let limits = under.figures + (held - f32(row)) * under.rises;
+        return vec4<f32>(max(limits.x, LEAST_GRIP), max(limits.y, LEAST_GRIP), limits.z, limits.w);
+    }
     return envelope[table + 2u * row] + (held - f32(row)) * envelope[table + 2u * row + 1u];
 }
 
-fn root_left(speed_squared: f32, curvature: f32, lateral: f32) -> f32 {
-    let share = curvature * speed_squared / lateral;
+fn root_left(speed_squared: f32, ground: Ground, lateral: f32) -> f32 {
+    var share = ground.bend * speed_squared / lateral;
+    if HAS_RELIEF {
+        share = (speed_squared * ground.bend + ground.lean) / lateral;
+    }
     return sqrt(max(1.0 - share * share, 0.0));
 }
 
@@ -194,7 +421,7 @@ fn left_for_braking(root: f32) -> f32 {
     return figures.x + (held - f32(row)) * figures.y;
 }
 
-fn left_for_driving(speed_squared: f32, root: f32, table: u32) -> f32 {
+fn left_for_driving(speed_squared: f32, root: f32, ground: Ground, table: u32) -> f32 {
     if !HAS_TRACTION {
         return left_for_braking(root);
     }
@@ -204,16 +431,27 @@ fn left_for_driving(speed_squared: f32, root: f32, table: u32) -> f32 {
     let across = root * f32(TRACTION_ROOTS);
     let speed = min(u32(held), TRACTION_SPEEDS - 1u);
     let cell = min(u32(across), TRACTION_ROOTS - 1u);
-    let figures = envelope[table + 2u * ENVELOPE_ROWS + speed * TRACTION_ROOTS + cell];
-    let beyond = held - f32(speed);
-    let start = figures.x + beyond * figures.y;
-    return start + (across - f32(cell)) * (figures.z + beyond * figures.w);
+    let beyond = vec2<f32>(held - f32(speed), across - f32(cell));
+    let place = table + 2u * ENVELOPE_ROWS + speed * TRACTION_ROOTS + cell;
+    if HAS_RELIEF {
+        let layer = layer_of(ground, speed_squared);
+        let below = place + LOADS_AT + u32(layer.x) * LOAD_STEP;
+        let low = traction_in(envelope[below], beyond);
+        let high = traction_in(envelope[below + LOAD_STEP], beyond);
+        return max(low + layer.y * (high - low), 0.0);
+    }
+    return traction_in(envelope[place], beyond);
+}
+
+fn traction_in(figures: vec4<f32>, beyond: vec2<f32>) -> f32 {
+    let start = figures.x + beyond.x * figures.y;
+    return start + beyond.y * (figures.z + beyond.x * figures.w);
 }
 
 // The traction that is left, the drive and the drag.
-fn driving_at(speed_squared: f32, curvature: f32, table: u32) -> vec3<f32> {
-    let at = limits_at(speed_squared, table);
-    let left = left_for_driving(speed_squared, root_left(speed_squared, curvature, at.x), table);
+fn driving_at(speed_squared: f32, ground: Ground, table: u32) -> vec3<f32> {
+    let at = limits_at(speed_squared, ground, table);
+    let left = left_for_driving(speed_squared, root_left(speed_squared, ground, at.x), ground, table);
     return vec3<f32>(at.y * left, at.z, at.w);
 }
 
@@ -221,37 +459,45 @@ fn may_open(section: u32) -> bool {
     return HAS_DRS && sections[section].drs != 0u;
 }
 
-fn driving_with_drs(drs: bool, speed_squared: f32, curvature: f32) -> vec3<f32> {
-    let shut = driving_at(speed_squared, curvature, 0u);
+fn driving_with_drs(drs: bool, speed_squared: f32, ground: Ground) -> vec3<f32> {
+    let shut = driving_at(speed_squared, ground, 0u);
     if !drs {
         return shut;
     }
-    let open = driving_at(speed_squared, curvature, OPEN_AT);
+    let open = driving_at(speed_squared, ground, OPEN_AT);
     let pays = min(shut.x, shut.y) - shut.z < min(open.x, open.y) - open.z;
     return select(shut, open, pays);
 }
 
-fn acceleration(drs: bool, speed_squared: f32, curvature: f32) -> f32 {
-    let at = driving_with_drs(drs, speed_squared, curvature);
-    return min(at.x, at.y) - at.z;
+fn acceleration(drs: bool, speed_squared: f32, ground: Ground) -> f32 {
+    let at = driving_with_drs(drs, speed_squared, ground);
+    let forces = min(at.x, at.y) - at.z;
+    if HAS_RELIEF {
+        return forces - ground.climb;
+    }
+    return forces;
 }
 
-fn deceleration(speed_squared: f32, curvature: f32) -> f32 {
-    let at = limits_at(speed_squared, 0u);
-    return at.y * left_for_braking(root_left(speed_squared, curvature, at.x)) + at.w;
+fn deceleration(speed_squared: f32, ground: Ground) -> f32 {
+    let at = limits_at(speed_squared, ground, 0u);
+    let forces = at.y * left_for_braking(root_left(speed_squared, ground, at.x)) + at.w;
+    if HAS_RELIEF {
+        return forces + ground.climb;
+    }
+    return forces;
 }
 
-fn driven(drs: bool, start: f32, length: f32, here: f32, there: f32) -> f32 {
+fn driven(drs: bool, start: f32, length: f32, here: Ground, there: Ground) -> f32 {
     let first = acceleration(drs, start, here);
     let middle = max(start + length * first, 0.0);
-    let drive = acceleration(drs, middle, 0.5 * (here + there));
+    let drive = acceleration(drs, middle, half_way(here, there));
     return max(start + length * (first + drive), 0.0);
 }
 
-fn braked(end: f32, length: f32, there: f32, here: f32) -> f32 {
+fn braked(end: f32, length: f32, there: Ground, here: Ground) -> f32 {
     let first = deceleration(end, there);
     let middle = end + length * first;
-    let brake = deceleration(middle, 0.5 * (here + there));
+    let brake = deceleration(middle, half_way(here, there));
     return end + length * (first + brake);
 }
 
@@ -261,23 +507,23 @@ fn lap_time(candidate: u32) -> f32 {
     let steps = select(n - 1u, 2u * n, CLOSED);
 
     var here = start;
-    var bend = course[place_of(start, candidate)];
-    var speed_squared = corner(bend.y);
+    var spot = spot_at(start, candidate);
+    var speed_squared = corner(spot.ground);
     if !CLOSED {
         speed_squared = min(speed_squared, stretch.entry);
     }
     speeds_squared[place_of(start, candidate)] = speed_squared;
     for (var i = 0u; i < steps; i++) {
         let next = select(0u, here + 1u, here + 1u < n);
-        let there = course[place_of(next, candidate)];
-        let reached = driven(may_open(here), speed_squared, bend.x, bend.y, there.y);
+        let there = spot_at(next, candidate);
+        let reached = driven(may_open(here), speed_squared, spot.length, spot.ground, there.ground);
         // In the first round a section is limited by its corner speed alone.
         let again = i + 1u >= n;
         var most: f32;
         if again {
             most = speeds_squared[place_of(next, candidate)];
         } else {
-            most = corner(there.y);
+            most = corner(there.ground);
         }
         let slower = reached < most;
         if again && !slower {
@@ -285,17 +531,17 @@ fn lap_time(candidate: u32) -> f32 {
         }
         speed_squared = select(most, reached, slower);
         speeds_squared[place_of(next, candidate)] = speed_squared;
-        bend = there;
+        spot = there;
         here = next;
     }
 
     var next = select(n - 1u, start, CLOSED);
     speed_squared = speeds_squared[place_of(next, candidate)];
-    var curvature = course[place_of(next, candidate)].y;
+    spot = spot_at(next, candidate);
     for (var i = 0u; i < steps; i++) {
         let before = select(n - 1u, next - 1u, next > 0u);
-        let there = course[place_of(before, candidate)];
-        let reached = braked(speed_squared, there.x, curvature, there.y);
+        let there = spot_at(before, candidate);
+        let reached = braked(speed_squared, there.length, end_of(there, spot.ground), there.ground);
         let known = speeds_squared[place_of(before, candidate)];
         let slower = reached < known;
         if slower {
@@ -304,7 +550,7 @@ fn lap_time(candidate: u32) -> f32 {
             break;
         }
         speed_squared = select(known, reached, slower);
-        curvature = there.y;
+        spot = there;
         next = before;
     }
 
@@ -337,6 +583,9 @@ fn line(@builtin(global_invocation_id) id: vec3<u32>) {
     results[2u * stretch.stride + candidate] = sums.z;
     results[3u * stretch.stride + candidate] = sums.w;
     if WANTS_LAP {
+        if HAS_RELIEF {
+            relieve(candidate);
+        }
         results[4u * stretch.stride + candidate] = lap_time(candidate);
     }
 }

@@ -1,7 +1,8 @@
 // Twin of `src/drive/path.rs`: the path that is followed, in the frame of its samples, and the car's place relative to it.
-// The constants ROWS_AHEAD, CELLS_AHEAD and BLENDS are generated.
+// The constants ROWS_AHEAD, CELLS_AHEAD, BLENDS, HAS_RELIEF and RELIEF_AT are generated.
 
-// Three vectors for each row of the path: the figures of `PathRow` in its order.
+// Three vectors for each row of the path: the figures of `PathRow` in its order. From RELIEF_AT on, on roads in three dimensions, one
+// more for each row: gravity along, across and square to the road, and the curvature square to it.
 @group(0) @binding(4) var<storage, read> path: array<vec4<f32>>;
 @group(0) @binding(5) var<storage, read> plans: array<f32>;
 @group(0) @binding(6) var<storage, read> courses: array<Course>;
@@ -152,6 +153,26 @@ fn look(course: Course, before: Pose) -> View {
         pose.yaw - seen.heading,
         seen.curvature,
         max(seen.left - left, -(seen.left + right)),
+    );
+}
+
+// The road under a car; twin of `Footing` in `src/drive/relief.rs`.
+struct Footing {
+    climb: f32,
+    lean: f32,
+    load: f32,
+}
+
+fn footing(course: Course, view: View, speed: f32) -> Footing {
+    let at = RELIEF_AT + place_of_number(course.path_at + view.pose.row);
+    let share = view.pose.along * course.per_metre;
+    let here = path[at];
+    let row = here + share * (path[at + 1u] - here);
+    let load = row.z + speed * speed * row.w;
+    return Footing(
+        row.x + view.heading_error * row.y,
+        row.y - view.heading_error * row.x,
+        max(load, 0.5),
     );
 }
 

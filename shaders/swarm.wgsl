@@ -28,6 +28,9 @@ struct Generation {
 
 const BLOCK: u32 = 64u;
 const UNKNOWN: f32 = 3.4028234e38;
+// Objectives of this size and more say in their last eight bits why a particle failed; this many reasons are told apart.
+const FAILED: u32 = 0x7f7fff00u;
+const REASONS: u32 = 15u;
 const SCALE: f32 = 0.5;
 const CROSSOVER: f32 = 0.3;
 
@@ -49,11 +52,11 @@ const RECOMBINE: u32 = 9u;
 @group(0) @binding(4) var<storage, read_write> best_position: array<f32>;
 @group(0) @binding(5) var<storage, read_write> best_objectives: array<f32>;
 @group(0) @binding(6) var<storage, read_write> objectives: array<f32>;
-// How many points no member dominates or equals, and how many particles failed; then those points: the particle and its
-// objectives, three to each.
+// How many points no member dominates or equals, and how many particles failed for each reason; then those points: the particle
+// and its objectives, three to each.
 struct Found {
     count: atomic<u32>,
-    failed: atomic<u32>,
+    failed: array<atomic<u32>, REASONS>,
     points: array<vec4<u32>>,
 }
 @group(0) @binding(7) var<storage, read_write> found: Found;
@@ -105,6 +108,7 @@ fn learn(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) 
     var no_worse = true;
     var no_better = true;
     var sound = true;
+    var reason = 0u;
     var at = vec3<f32>(0.0);
     for (var k = 0u; k < width; k++) {
         let i = place(who, width, k);
@@ -112,10 +116,15 @@ fn learn(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) 
         let best = best_objectives[i];
         no_worse = no_worse && value <= best;
         no_better = no_better && best <= value;
-        sound = sound && is_finite(value) && abs(value) < UNKNOWN;
+        let size = bitcast<u32>(value) & 0x7fffffffu;
+        if size >= FAILED {
+            sound = false;
+            // What is no number, or a number beyond the costs, has the first reason.
+            reason = select(0u, size - FAILED, size - FAILED < REASONS);
+        }
         at[k] = value;
     }
-    if !sound { atomicAdd(&found.failed, 1u); }
+    if !sound { atomicAdd(&found.failed[reason], 1u); }
     let heads = words(COIN, who, 0u).x < 0x80000000u;
     let better = no_worse && !no_better;
     let open = no_worse == no_better;
@@ -150,87 +159,85 @@ fn advance(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups
         scatter_one(who);
         return;
     }
-    let d = generation.dimensions;
     let choice = words(RECOMBINE, who, 0u);
     var leader = below(choice.y, generation.members);
     if generation.tournament == 1u { leader = min(leader, below(choice.z, generation.members)); }
-    if unit(choice.x) < generation.difference_share {
-        difference(who, leader);
-    } else {
-        pull(who, leader);
-    }
-    if generation.mutation == 1u && unit(choice.w) < generation.mutation_share { disturb(who); }
+    let differs = unit(choice.x) < generation.difference_share;
+    let disturbed = generation.mutation == 1u && unit(choice.w) < generation.mutation_share;
+    move_one(who, leader, differs, disturbed);
 }
 
-fn pull(who: u32, leader: u32) {
+// Shares of the velocity and of the ways to the own best and to the leader.
+struct Pulls {
+    inertia: f32,
+    own: f32,
+    social: f32,
+}
+
+fn pulls_of(draws: vec4<u32>) -> Pulls {
+    if generation.signed == 0u { return Pulls(generation.inertia, generation.cognitive, generation.social); }
+    let c1 = generation.pulls.x + generation.pulls.y * unit(draws.x);
+    let c2 = generation.pulls.x + generation.pulls.y * unit(draws.y);
+    let sum = c1 + c2;
+    let beyond = sum - 4.0;
+    let root = sqrt(sum * max(beyond, 0.0));
+    let chi = select(1.0, 2.0 / (-2.0 - beyond - root), beyond > 0.0);
+    return Pulls(chi * generation.inertia, chi * c1, chi * c2);
+}
+
+// Coordinate by coordinate, so that each is read and written once: by the pulls or, if it `differs`, from an archive member along the
+// difference of two others, in some of the coordinates; then polynomial mutation of each with probability one over their number if
+// it is `disturbed`.
+fn move_one(who: u32, leader: u32, differs: bool, disturbed: bool) {
     let d = generation.dimensions;
     let draws = words(PULLS, who, 0u);
-    var inertia = generation.inertia;
-    var own = generation.cognitive;
-    var social = generation.social;
-    if generation.signed == 1u {
-        let c1 = generation.pulls.x + generation.pulls.y * unit(draws.x);
-        let c2 = generation.pulls.x + generation.pulls.y * unit(draws.y);
-        let sum = c1 + c2;
-        let beyond = sum - 4.0;
-        let root = sqrt(sum * max(beyond, 0.0));
-        let chi = select(1.0, 2.0 / (-2.0 - beyond - root), beyond > 0.0);
-        inertia = chi * generation.inertia;
-        own = chi * c1;
-        social = chi * c2;
+    let pulls = pulls_of(draws);
+    var to_own = pulls.own * unit(draws.z);
+    var to_leader = pulls.social * unit(draws.w);
+    var one = 0u;
+    var two = 0u;
+    var always = 0u;
+    if differs {
+        let picks = words(DIFFERENCE, who, 0u);
+        one = below(picks.x, generation.members);
+        two = below(picks.y, generation.members);
+        always = below(picks.z, d);
     }
-    var to_own = own * unit(draws.z);
-    var to_leader = social * unit(draws.w);
     var first = vec4<u32>(0u);
     var second = vec4<u32>(0u);
+    var mutation = vec4<u32>(0u);
     for (var k = 0u; k < d; k++) {
-        if generation.per_dimension == 1u {
-            if k % 4u == 0u {
-                first = words(COGNITIVE, who, k / 4u);
-                second = words(SOCIAL, who, k / 4u);
+        let i = place(who, d, k);
+        let towards = archive[leader * d + k];
+        var x = position[i];
+        var v = 0.0;
+        if differs {
+            if k % 4u == 0u { first = words(DIFFERENCE, who, 1u + k / 4u); }
+            let chosen = k == always || unit(first[k % 4u]) < CROSSOVER;
+            let step = SCALE * (archive[one * d + k] - archive[two * d + k]);
+            x = held(towards + select(0.0, step, chosen));
+        } else {
+            if generation.per_dimension == 1u {
+                if k % 4u == 0u {
+                    first = words(COGNITIVE, who, k / 4u);
+                    second = words(SOCIAL, who, k / 4u);
+                }
+                to_own = pulls.own * unit(first[k % 4u]);
+                to_leader = pulls.social * unit(second[k % 4u]);
             }
-            to_own = own * unit(first[k % 4u]);
-            to_leader = social * unit(second[k % 4u]);
+            let wanted = pulls.inertia * velocity[i] + to_own * (best_position[i] - x) + to_leader * (towards - x);
+            let speed = min(max(wanted, -generation.speed_limit), generation.speed_limit);
+            let moved = x + speed;
+            x = held(moved);
+            v = select(speed * generation.rebound, speed, moved == x);
         }
-        let i = place(who, d, k);
-        let x = position[i];
-        let wanted = inertia * velocity[i] + to_own * (best_position[i] - x) + to_leader * (archive[leader * d + k] - x);
-        let speed = min(max(wanted, -generation.speed_limit), generation.speed_limit);
-        let moved = x + speed;
-        let inside = held(moved);
-        velocity[i] = select(speed * generation.rebound, speed, moved == inside);
-        position[i] = inside;
-    }
-}
-
-// From an archive member along the difference of two others, in some of the coordinates.
-fn difference(who: u32, leader: u32) {
-    let d = generation.dimensions;
-    let picks = words(DIFFERENCE, who, 0u);
-    let one = below(picks.x, generation.members);
-    let two = below(picks.y, generation.members);
-    let always = below(picks.z, d);
-    var four = vec4<u32>(0u);
-    for (var k = 0u; k < d; k++) {
-        if k % 4u == 0u { four = words(DIFFERENCE, who, 1u + k / 4u); }
-        let chosen = k == always || unit(four[k % 4u]) < CROSSOVER;
-        let step = SCALE * (archive[one * d + k] - archive[two * d + k]);
-        let i = place(who, d, k);
-        position[i] = held(archive[leader * d + k] + select(0.0, step, chosen));
-        velocity[i] = 0.0;
-    }
-}
-
-// Polynomial mutation of each coordinate with probability one over their number.
-fn disturb(who: u32) {
-    var four = vec4<u32>(0u);
-    for (var k = 0u; k < generation.dimensions; k++) {
-        if k % 2u == 0u { four = words(MUTATION, who, k / 2u); }
-        let pair = 2u * (k % 2u);
-        if unit(four[pair]) * f32(generation.dimensions) < 1.0 {
-            let i = place(who, generation.dimensions, k);
-            position[i] = polynomial(position[i], unit(four[pair + 1u]));
+        if disturbed {
+            if k % 2u == 0u { mutation = words(MUTATION, who, k / 2u); }
+            let pair = 2u * (k % 2u);
+            if unit(mutation[pair]) * f32(d) < 1.0 { x = polynomial(x, unit(mutation[pair + 1u])); }
         }
+        velocity[i] = v;
+        position[i] = x;
     }
 }
 

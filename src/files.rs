@@ -87,6 +87,23 @@ pub fn write_together(folder: &Path, write: impl FnOnce(&Path) -> Result<()>) ->
     })
 }
 
+/// The user's folder for what can be made again, if the system says where such are kept.
+pub fn cache_folder() -> Option<PathBuf> {
+    let of = |variable: &str| {
+        std::env::var_os(variable)
+            .map(PathBuf::from)
+            .filter(|path| path.is_absolute())
+    };
+    let all = if cfg!(windows) {
+        of("LOCALAPPDATA")
+    } else if cfg!(target_vendor = "apple") {
+        of("HOME").map(|home| home.join("Library/Caches"))
+    } else {
+        of("XDG_CACHE_HOME").or_else(|| of("HOME").map(|home| home.join(".cache")))
+    };
+    all.map(|folder| folder.join("lapswarm"))
+}
+
 /// Makes sure that the names in a folder are on the disk.
 pub fn sync_folder(folder: &Path) {
     // Not every system lets a folder be opened; there a move is as safe as it gets.

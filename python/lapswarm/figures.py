@@ -298,6 +298,34 @@ class Scenario:
     additional_lap_time_s: float
     additional_deployed_mj: float
     balance_error_j: float
+    soc_least: float
+    net_deployed_mj: float
+    fuel_percent: float
+
+
+@dataclass(frozen=True)
+class Site:
+    """A stretch on which the motor works; allocation is its share of all that leaves the store."""
+
+    start_m: float
+    end_m: float
+    deployed_mj: float
+    allocation: float
+
+
+@dataclass(frozen=True)
+class Search:
+    """What a further search of a hybrid's gates or zones found."""
+
+    mode: str
+    lap_time_s: float
+    fuel_l: float
+    fuel_percent: float
+    deployed_mj: float
+    soc_end: float
+    motor_time_share: float
+    evaluations: int
+    variables: dict[str, float]
 
 
 @dataclass(frozen=True)
@@ -331,6 +359,7 @@ class Deployment:
     worth_speed_correlation: float | None
     worth_taken_s_per_mj: float | None
     worth_left_s_per_mj: float | None
+    sites: list[Site]
 
 
 @dataclass(frozen=True)
@@ -376,6 +405,7 @@ class Energy(Figures):
     engine_fuel_l: float
     scenarios: dict[str, Scenario]
     deployment: Deployment | None
+    searches: dict[str, Search]
     stint: list[StintLap]
     sizing: list[Sizing]
     store_overflow: bool
@@ -392,6 +422,36 @@ class CornerGrip:
     grip_share: float
     driven_s: float
     full_grip_s: float | None
+
+
+@dataclass(frozen=True)
+class Accounts:
+    """The accounts of energy of a lap."""
+
+    lap_time_s: float
+    engine_mj: float
+    moving_mj: float
+    tyres_mj: float
+    deployed_mj: float
+    harvested_k_mj: float
+    harvested_h_mj: float
+    soc_end: float
+    fuel_l: float
+    motor_time_share: float
+    balance_error_j: float
+
+
+@dataclass(frozen=True)
+class DrivenEnergy:
+    """The accounts of a hybrid's lap, driven and in quasi-steady state."""
+
+    mode: str
+    driven: Accounts
+    quasi_steady_state: Accounts
+    deployed_difference_percent: float
+    harvested_k_difference_percent: float
+    moving_difference_percent: float
+    beyond_engine_mj: float
 
 
 @dataclass(frozen=True)
@@ -412,6 +472,7 @@ class DrivenLine(Figures):
     corners: list[CornerGrip]
     full_grip_lap_time_s: float | None
     behind_full_grip_percent: float | None
+    energy: DrivenEnergy | None
 
 
 @dataclass(frozen=True)
@@ -462,6 +523,7 @@ class ParameterSensitivity:
     value: float
     range: Pair
     one_at_a_time: dict[str, float | None]
+    rms_change: dict[str, float | None]
     sobol: dict[str, SobolIndex]
 
 

@@ -11,7 +11,7 @@ use lapswarm::line::read_line;
 use lapswarm::study::registry::{self, Registered, STUDIES};
 use lapswarm::study::sweep::{self, SweepSettings};
 use lapswarm::telemetry::ChannelMap;
-use lapswarm::track::Track;
+use lapswarm::track::{Circuit, Track};
 use lapswarm::vehicle::tyre::TyreFile;
 use lapswarm::vehicle::{Car, CarFacts, Envelope};
 use lapswarm::{Error, Result};
@@ -90,12 +90,41 @@ static TRACK: FileKind = file("track", "a track", |path| {
         .iter()
         .map(|[a, b]| format!(", with a bridge where {a:.0} m and {b:.0} m cross"));
     Ok(format!(
-        "a {shape} track, {}: {:.1} m{}",
+        "a {shape} track, {}: {:.1} m{}{}",
         circuit.name,
         circuit.length_m,
-        bridges.collect::<String>()
+        bridges.collect::<String>(),
+        relief_in_words(&circuit)
     ))
 });
+
+/// Height and banking of a circuit in words; nothing of a level one.
+fn relief_in_words(circuit: &Circuit) -> String {
+    let (Some(relief), Some(facts)) = (&circuit.relief, circuit.relief_facts()) else {
+        return String::new();
+    };
+    let change = &relief.change;
+    let mut text = format!(
+        "\n  climbs {:.1} m a lap, {:.1} m between its lowest and its highest point; steepest {:.1}% at {:.0} m; banked {:.1} degrees \
+         at the most, at {:.0} m\n  smoothing changed its height by {:.2} m at the most ({:.2} m rms), its banking by {:.2} degrees",
+        facts.climb_m,
+        facts.range_m,
+        100.0 * facts.gradient,
+        facts.gradient_at_m,
+        facts.bank_rad.to_degrees(),
+        facts.bank_at_m,
+        change.height_m,
+        change.height_rms_m,
+        change.bank_rad.to_degrees()
+    );
+    if change.gap_m != 0.0 {
+        text += &format!(
+            "\n  its end is given {:.2} m above its start: that is spread over the lap",
+            change.gap_m
+        );
+    }
+    text
+}
 
 static LOG: FileKind = file("log", "a log", |path| log::described(path, None, None));
 
@@ -223,13 +252,25 @@ fn guess(path: &Path) -> Result<Kind> {
     let start = read_start(path, HEAD)?;
     let start = String::from_utf8_lossy(&start);
     let head = start.lines().next().unwrap_or_default().to_lowercase();
-    let has = |names: &[&str]| names.iter().all(|n| head.contains(n));
-    // Speeds and accelerations of a log end like places of a track do.
+    let names: Vec<&str> = head
+        .split([',', ';', '\t'])
+        .map(|cell| cell.trim_matches(['#', '"', ' ', '\r']))
+        .collect();
+    // Whole names: a log's `g_lat` and `g_long` are no places.
+    let has = |wanted: &[&str]| wanted.iter().all(|w| names.contains(w));
+    let has_one = |wanted: &[&str]| wanted.iter().any(|w| names.contains(w));
+    let begins = |start: &str| names.iter().any(|name| name.starts_with(start));
+    let in_plane = has(&["x_m", "y_m"]) || has(&["left_x_m", "left_y_m"]);
+    let on_globe = has_one(&["lat", "latitude", "latitude_deg"])
+        && has_one(&["lon", "lng", "longitude", "longitude_deg"]);
+    let timed = names
+        .iter()
+        .any(|name| *name == "t" || name.starts_with("t ") || name.contains("time"));
     Ok(if has(&["v_mps", "ay_mps2"]) {
         Kind::File(&ENVELOPE)
-    } else if has(&["station", "alpha"]) {
+    } else if begins("station") && begins("alpha") {
         Kind::File(&LINE)
-    } else if (has(&["x_m", "y_m"]) || has(&["lat", "lon"])) && !has(&["time"]) {
+    } else if (in_plane || on_globe) && !timed {
         Kind::File(&TRACK)
     } else {
         Kind::File(&LOG)

@@ -1,6 +1,7 @@
 //! The driver: steering by preview and feedback, drive and brake by limited wheel slip. Twin of `shaders/driver.wgsl`.
 
 use super::path::{View, curvature_ahead};
+use super::relief::Footing;
 use super::road::{Course, FRONT_CELLS, PLAN_REACH_M, Road};
 use super::settings::DriverSettings;
 use crate::error::{Error, Result};
@@ -312,7 +313,7 @@ pub fn act<R: Lookup>(
     road: &Road<R::Storage>,
     (course, pace): (&Course<R>, &Pace<R>),
     c: &Chassis<R>,
-    (state, view): (&CarState<R>, &View<R>),
+    (state, view, footing): (&CarState<R>, &View<R>, Option<&Footing<R>>),
     controls: &Controls<R>,
 ) -> Controls<R> {
     let zero = R::lit(0.0);
@@ -327,9 +328,16 @@ pub fn act<R: Lookup>(
     // Feed-forward: geometry plus the understeer of a car near its limit; feedback: offset, heading and
     // the yaw rate that the present curvature asks for.
     let curvature = curvature_ahead(path, course, pose, R::load(driver.preview) * v);
-    let understeer = R::load(driver.understeer) * curvature * v * v / c.gravity * wheelbase;
+    let mut understeer = R::load(driver.understeer) * curvature * v * v / c.gravity * wheelbase;
     let bend = view.bend;
-    let sideslip = knows * (c.cg_to_rear * bend - R::load(driver.rear_slip_per_ay) * bend * v * v);
+    let mut sideslip = knows * (c.cg_to_rear * bend - R::load(driver.rear_slip_per_ay) * bend * v * v);
+    let mut turning = body.yaw_rate * v;
+    // On a banked road the tyres bear gravity's part too. The driver knows it, and the gradient, from the road under him.
+    if let Some(footing) = footing {
+        understeer = understeer + R::load(driver.understeer) * footing.lean / c.gravity * wheelbase;
+        sideslip = sideslip - knows * R::load(driver.rear_slip_per_ay) * footing.lean;
+        turning = turning + footing.lean;
+    }
     let heading =
         view.heading_error + sideslip + view.offset * R::lit(0.9) / (v * R::lit(0.45) + R::lit(3.0));
     let yaw_lack = curvature_ahead(path, course, pose, R::lit(0.08) * v) * v - body.yaw_rate;
@@ -349,10 +357,13 @@ pub fn act<R: Lookup>(
     let planned = (after * after - before * before) / R::lit(4.0 * PLAN_REACH_M);
     let wanted = planned + R::load(driver.speed_gain) * behind;
     let aero = aero_forces(c, v, view.row.flap);
-    let force = c.mass * wanted + aero.drag;
+    let mut force = c.mass * wanted + aero.drag;
+    if let Some(footing) = footing {
+        force = force + c.mass * footing.climb;
+    }
     let weight = c.mass * c.gravity + (aero.downforce_front + aero.downforce_rear);
     // What a bend leaves of the tyres, by the friction circle.
-    let used = knows * (body.yaw_rate * v / (R::load(driver.friction) * weight / c.mass)).abs();
+    let used = knows * (turning / (R::load(driver.friction) * weight / c.mass)).abs();
     let used = used.min(one);
     let left = (one - used * used).max(R::lit(0.01)).sqrt();
     let limit = R::load(driver.slip_limit) * left;

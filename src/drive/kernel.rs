@@ -2,9 +2,10 @@
 
 use super::driver::{Controls, DriverTable, Pace, WheelTorque, act, car_input, planned_speed};
 use super::path::{Pose, View, look};
+use super::relief::{Footing, footing};
 use super::road::{Course, Road};
 use crate::scalar::Lookup;
-use crate::vehicle::model::runge_kutta_step;
+use crate::vehicle::model::runge_kutta_step_on;
 use crate::vehicle::tyre::Tyre;
 use crate::vehicle::{CarInput, CarModel, CarState};
 
@@ -73,6 +74,8 @@ pub struct Moment<'a, R> {
     pub view: &'a View<R>,
     /// What the wheels and the steering are told.
     pub input: &'a CarInput<R>,
+    /// The road under it, if that is in three dimensions.
+    pub footing: Option<&'a Footing<R>>,
 }
 
 impl<R: Lookup> DriveState<R> {
@@ -206,13 +209,26 @@ pub fn drive_step<R: Lookup, T: Tyre<R>>(
     let rest = rest - R::select(finished, since, zero);
     let timed = !pose.lap.less_than(-half) & !finished;
 
+    let footing = if road.relief.is_empty() {
+        None
+    } else {
+        Some(footing(&road.relief, course, &view, before.car.body.vx))
+    };
+    let loaded;
+    let car = match &footing {
+        None => car,
+        Some(footing) => {
+            loaded = footing.under(car);
+            &loaded
+        }
+    };
     let controls = act(
         driver,
         world.torque,
         road,
         (course, pace),
         &car.chassis,
-        (&before.car, &view),
+        (&before.car, &view, footing.as_ref()),
         &before.controls,
     );
     let input = car_input(&car.chassis, &before.car, &controls, view.row.flap);
@@ -220,10 +236,12 @@ pub fn drive_step<R: Lookup, T: Tyre<R>>(
         car: &before.car,
         view: &view,
         input: &input,
+        footing: footing.as_ref(),
     });
 
     let step = R::load(driver.step);
-    let next = runge_kutta_step(car, &before.car, |_| input, step, |_| {});
+    let pull = footing.map(|footing| [footing.climb, footing.lean]);
+    let next = runge_kutta_step_on(car, &before.car, |_| input, pull, step, |_| {});
     let verdict = R::select(!lost & finished, R::lit(ending::FINISHED), verdict);
     let spun = !lost & !finished & !next.drives();
     let verdict = R::select(spun, R::lit(ending::SPUN), verdict);

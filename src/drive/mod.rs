@@ -9,11 +9,12 @@ pub mod kernel;
 mod path;
 mod plan;
 mod record;
+pub mod relief;
 mod road;
 mod settings;
 
 pub use path::{Pose, Row, View, frame_at, look};
 pub use plan::SpeedPlan;
-pub use record::{Drive, Lost, drive, drive_planned, drive_until_lost};
+pub use record::{Drive, Lost, MotorTorque, drive, drive_planned, drive_until_lost, drive_with_motor};
 pub use road::{Course, FRONT_CELLS, Line, PATH_WIDTH, PLAN_REACH_M, Road};
 pub use settings::{CarKnowledge, DriverSettings};

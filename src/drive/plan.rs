@@ -1,6 +1,7 @@
 //! The speed that the driver aims for: a forward and a backward pass under a friction ellipse (the book, chapter Model,
 //! section 5, in first-order form; a driver needs no better).
 
+use super::relief::row_of;
 use crate::track::Circuit;
 use crate::vehicle::aero::aero_forces;
 use crate::vehicle::{Car, Chassis, Tyres};
@@ -32,9 +33,12 @@ struct TyreEnvelope<'a> {
 }
 
 impl TyreEnvelope<'_> {
-    fn grip(&self, speed: f64) -> f64 {
+    /// On a row of the road, see [`row_of`].
+    fn grip(&self, speed: f64, [_, _, press, dip]: [f64; 4]) -> f64 {
         let c = &self.car.chassis;
-        self.friction * load_mps2(c, speed)
+        let aero = aero_forces(c, speed, 0.0);
+        let load = press + speed * speed * dip + (aero.downforce_front + aero.downforce_rear) / c.mass;
+        self.friction * load.max(0.0)
     }
 
     fn drag(&self, speed: f64, flap: f64) -> f64 {
@@ -46,15 +50,49 @@ impl TyreEnvelope<'_> {
         let c = &self.car.chassis;
         match &self.car.powertrain {
             Some(powertrain) => powertrain.wheel_force(speed, c.radius_rear) / c.mass,
-            None => 0.4 * self.grip(speed),
+            None => 0.4 * self.grip(speed, self.level()),
         }
     }
 
+    /// The row of a level road.
+    fn level(&self) -> [f64; 4] {
+        [0.0, 0.0, self.car.chassis.gravity, 0.0]
+    }
+
     /// What the ellipse leaves for the longitudinal direction at a curvature.
-    fn remaining(&self, speed: f64, curvature: f64) -> f64 {
-        let grip = self.grip(speed);
-        let used = (curvature.abs() * speed * speed / grip).min(1.0);
+    fn remaining(&self, speed: f64, curvature: f64, row: [f64; 4]) -> f64 {
+        let grip = self.grip(speed, row);
+        if grip <= 0.0 {
+            return 0.0;
+        }
+        let used = ((curvature * speed * speed + row[1]).abs() / grip).min(1.0);
         grip * (1.0 - used * used).sqrt()
+    }
+
+    /// The greatest speed (m/s) up to `top` at a curvature.
+    fn corner(&self, curvature: f64, top: f64, row: [f64; 4]) -> f64 {
+        if row[1] == 0.0 && row[3] == 0.0 {
+            // Grip grows with speed, so the corner speed is a fixed point; a few rounds settle it.
+            let mut v = top;
+            for _ in 0..60 {
+                v = (self.grip(v, row) / curvature.abs().max(1e-9)).sqrt().min(top);
+            }
+            return v;
+        }
+        let holds = |v: f64| (curvature * v * v + row[1]).abs() <= self.grip(v, row);
+        let (mut low, mut high) = (0.0, top);
+        if holds(top) {
+            return top;
+        }
+        for _ in 0..50 {
+            let middle = 0.5 * (low + high);
+            if holds(middle) {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        low
     }
 }
 
@@ -78,30 +116,34 @@ impl SpeedPlan {
         let curvature: Vec<f64> = (0..count)
             .map(|i| circuit.curvature_at(i as f64 * spacing_m))
             .collect();
-        let mut speed_mps: Vec<f64> = curvature
-            .iter()
-            .map(|k| {
-                // Grip grows with speed, so the corner speed is a fixed point; a few rounds settle it.
-                let mut v = top_speed;
-                for _ in 0..60 {
-                    v = (envelope.grip(v) / k.abs().max(1e-9)).sqrt().min(top_speed);
-                }
-                v
-            })
+        let samples = circuit.station_m.len();
+        let row = |i: usize| {
+            let sample = (i as f64 * spacing_m / circuit.spacing_m()).round() as usize % samples;
+            match circuit.relief {
+                Some(_) => row_of(circuit, sample),
+                None => envelope.level(),
+            }
+        };
+        let rows: Vec<[f64; 4]> = (0..count).map(row).collect();
+        let places = curvature.iter().zip(&rows);
+        let mut speed_mps: Vec<f64> = places
+            .map(|(k, row)| envelope.corner(*k, top_speed, *row))
             .collect();
         // Two rounds, because the start of a closed lap needs the speed at its end.
         for step in 0..2 * count {
             let (i, next) = (step % count, (step + 1) % count);
             let v = speed_mps[i];
             let flap = f64::from(u8::from(circuit.drs_at(i as f64 * spacing_m)));
-            let a = envelope.drive(v).min(0.6 * envelope.remaining(v, curvature[i])) - envelope.drag(v, flap);
+            let tyres = 0.6 * envelope.remaining(v, curvature[i], rows[i]);
+            let a = envelope.drive(v).min(tyres) - envelope.drag(v, flap) - rows[i][0];
             speed_mps[next] = speed_mps[next].min((v * v + 2.0 * a * spacing_m).max(1.0).sqrt());
         }
         for step in (0..2 * count).rev() {
             let (i, next) = (step % count, (step + 1) % count);
             let v = speed_mps[next];
-            let a = 0.85 * envelope.remaining(v, curvature[next]) + envelope.drag(v, 0.0);
-            speed_mps[i] = speed_mps[i].min((v * v + 2.0 * a * spacing_m).sqrt());
+            let tyres = 0.85 * envelope.remaining(v, curvature[next], rows[next]);
+            let a = tyres + envelope.drag(v, 0.0) + rows[next][0];
+            speed_mps[i] = speed_mps[i].min((v * v + 2.0 * a * spacing_m).max(1.0).sqrt());
         }
         Self { spacing_m, speed_mps }
     }

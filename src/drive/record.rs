@@ -22,6 +22,8 @@ pub struct Drive {
     pub station_m: Vec<f64>,
     /// Distance from the centreline, left positive, m.
     pub offset_m: Vec<f64>,
+    /// Load over mass at each sample (m/s^2) on a road in three dimensions; empty on a level one.
+    pub loads_mps2: Vec<f64>,
 }
 
 impl Drive {
@@ -91,7 +93,22 @@ pub fn drive_planned(
     settings: &DriverSettings,
     interval_s: f64,
 ) -> Result<Drive> {
-    match drive_until_lost(car, circuit, plan, settings, interval_s)? {
+    drive_with_motor(car, circuit, plan, settings, interval_s, None)
+}
+
+/// As [`drive_planned`], by a car that may have a motor beside its engine.
+///
+/// # Errors
+/// As [`drive_planned`].
+pub fn drive_with_motor(
+    car: &Car,
+    circuit: &Circuit,
+    plan: SpeedPlan,
+    settings: &DriverSettings,
+    interval_s: f64,
+    motor: Option<MotorTorque<'_>>,
+) -> Result<Drive> {
+    match drive_until_lost(car, circuit, plan, settings, interval_s, motor)? {
         (drive, None) => Ok(drive),
         (_, Some(lost)) => Err(Error::Study(format!(
             "the driver {} at station {:.0} m of {} ({:.1} m/s)",
@@ -100,7 +117,10 @@ pub fn drive_planned(
     }
 }
 
-/// As [`drive_planned`], with the part of the lap that was driven before the car was lost.
+/// Torque (N m) that a motor brings to the driven wheels beside the engine, at a station along the line (m) and a speed (m/s).
+pub type MotorTorque<'a> = &'a dyn Fn(f64, f64) -> f64;
+
+/// As [`drive_with_motor`], with the part of the lap that was driven before the car was lost.
 ///
 /// # Errors
 /// [`Error::Input`] for a circuit that [`Road::new`] refuses.
@@ -110,6 +130,7 @@ pub fn drive_until_lost(
     plan: SpeedPlan,
     settings: &DriverSettings,
     interval_s: f64,
+    motor: Option<MotorTorque<'_>>,
 ) -> Result<(Drive, Option<Lost>)> {
     let line = Line {
         circuit,
@@ -124,10 +145,12 @@ pub fn drive_until_lost(
     let flat = car.to_flat();
     Ok(match car.tyre_model() {
         TyreModel::MagicFormula => {
-            record::<MagicFormula<f64>>(&CarModel::from_parameters(|i| flat[i]), &world, interval_s)
+            let car = CarModel::<f64, MagicFormula<f64>>::from_parameters(|i| flat[i]);
+            record(&car, &world, interval_s, motor)
         }
         TyreModel::Linear => {
-            record::<LinearTyre<f64>>(&CarModel::from_parameters(|i| flat[i]), &world, interval_s)
+            let car = CarModel::<f64, LinearTyre<f64>>::from_parameters(|i| flat[i]);
+            record(&car, &world, interval_s, motor)
         }
     })
 }
@@ -136,6 +159,7 @@ fn record<T: Tyre<f64>>(
     car: &CarModel<f64, T>,
     world: &World<'_, f64>,
     interval_s: f64,
+    motor: Option<MotorTorque<'_>>,
 ) -> (Drive, Option<Lost>) {
     let course = Course::at(world.road, 0.0);
     let pace = Pace {
@@ -147,7 +171,21 @@ fn record<T: Tyre<f64>>(
     let mut next_sample: Option<f64> = None;
     let mut time = 0.0;
     let mut number = 0.0;
+    // What engine and motor give together: the motor's torque holds for a step.
+    let mut both = world.torque.clone();
     while state.under_way() {
+        if let Some(torque_nm) = motor {
+            let pose = &state.pose;
+            let station_m = (pose.lap * course.rows + pose.row) * course.spacing + pose.along;
+            let added = torque_nm(station_m, state.car.body.vx);
+            for (both, engine) in both.stretches.iter_mut().zip(&world.torque.stretches) {
+                both[1] = engine[1] + added;
+            }
+        }
+        let world = &World {
+            torque: &both,
+            ..*world
+        };
         state = drive_step(car, world, (&course, &pace), number, &state, |moment| {
             let pose = &moment.view.pose;
             if pose.lap < 0.0 {
@@ -160,6 +198,7 @@ fn record<T: Tyre<f64>>(
                 log.station_m
                     .push((pose.lap * course.rows + pose.row) * course.spacing + pose.along);
                 log.offset_m.push(moment.view.offset);
+                log.loads_mps2.extend(moment.footing.map(|footing| footing.load));
                 next_sample = Some(due + interval_s);
             }
         });

@@ -1,6 +1,7 @@
 //! Lines and their plans of speed as tables that every backend reads alike.
 
 use super::plan::SpeedPlan;
+use super::relief::row_of;
 use super::settings::DriverSettings;
 use crate::error::{Error, Result};
 use crate::scalar::{Lookup, Real};
@@ -32,6 +33,8 @@ pub const PATH_WIDTH: usize = 12;
 pub struct Road<S> {
     /// Rows of [`super::Row`] of all lines, one line after the other.
     pub path: Vec<S>,
+    /// Rows of height and banking, one for each of the path; empty where all lines are level.
+    pub relief: Vec<S>,
     /// Planned speeds (m/s), line by line, share by share.
     pub plans: Vec<S>,
     /// A row of [`Course`] for each line.
@@ -140,6 +143,7 @@ impl Road<f64> {
         let ahead_m = |seconds: f64| GREATEST_SPEED * seconds;
         let mut road = Self {
             path: Vec::new(),
+            relief: Vec::new(),
             plans: Vec::new(),
             courses: Vec::new(),
             plans_per_line,
@@ -192,8 +196,9 @@ impl Road<f64> {
                     + 2,
             );
         }
+        let hilly = lines.iter().any(|line| line.circuit.relief.is_some());
         for line in lines {
-            road.push(line, step_s);
+            road.push(line, step_s, hilly);
         }
         let most = (road.path.len() / PATH_WIDTH).max(road.plans.len());
         if most as f64 > MOST_COUNTED {
@@ -206,7 +211,7 @@ impl Road<f64> {
         Ok(road)
     }
 
-    fn push(&mut self, line: &Line<'_>, step_s: f64) {
+    fn push(&mut self, line: &Line<'_>, step_s: f64, hilly: bool) {
         let circuit = line.circuit;
         let (count, spacing) = (circuit.station_m.len(), circuit.spacing_m());
         let cell_m = line.plans[0].spacing_m;
@@ -235,6 +240,9 @@ impl Road<f64> {
                 f64::from(u8::from(circuit.drs_at((here as f64 + 0.5) * spacing))),
             ];
             self.path.extend(row);
+            if hilly {
+                self.relief.extend(row_of(circuit, here));
+            }
         }
         let plan_at = self.plans.len();
         for plan in line.plans {
@@ -273,6 +281,7 @@ impl Road<f64> {
         let all = |table: &[f64]| table.iter().map(|x| R::store(*x)).collect();
         Road {
             path: all(&self.path),
+            relief: all(&self.relief),
             plans: all(&self.plans),
             courses: all(&self.courses),
             plans_per_line: self.plans_per_line,

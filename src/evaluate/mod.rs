@@ -94,6 +94,23 @@ impl Variable {
             ..Self::new(name, unit, f64::from(lower), f64::from(upper))
         }
     }
+
+    /// Whether it can be moved at all: whether its bounds differ.
+    pub fn is_free(&self) -> bool {
+        self.upper > self.lower
+    }
+
+    /// What a coordinate of the unit cube stands for: each whole number for as much of it as the others, if only those will do.
+    #[inline(always)]
+    pub fn at(&self, position: f64) -> f64 {
+        let range = self.upper - self.lower;
+        let value = if self.whole {
+            self.lower + (position * (range + 1.0)).floor()
+        } else {
+            self.lower + position * range
+        };
+        value.min(self.upper)
+    }
 }
 
 /// An objective, to be minimised.
@@ -161,21 +178,41 @@ pub enum Failure {
 }
 
 impl Failure {
+    /// The words for counts and scripts, by [`Failure::code`].
+    pub(crate) const WORDS: [&'static str; 11] = [
+        "objective_beyond_single_precision",
+        "ill_formed_tyre",
+        "spun",
+        "step_too_long",
+        "left_the_road",
+        "did_not_finish",
+        "standstill",
+        "did_not_settle",
+        "off_the_envelope",
+        "variable_not_finite",
+        "objective_not_finite",
+    ];
+
+    /// Its place among [`Failure::WORDS`], and the number that it has on devices.
+    pub(crate) fn code(self) -> u32 {
+        match self {
+            Self::BeyondSinglePrecision => 0,
+            Self::IllFormedTyre(_) => 1,
+            Self::Spun => 2,
+            Self::StepTooLong => 3,
+            Self::LeftRoad => 4,
+            Self::Unfinished => 5,
+            Self::Standstill => 6,
+            Self::Unsettled => 7,
+            Self::OffTheEnvelope => 8,
+            Self::NotFinite => 9,
+            Self::Undefined => 10,
+        }
+    }
+
     /// A word for counts and scripts.
     pub fn word(self) -> &'static str {
-        match self {
-            Self::IllFormedTyre(_) => "ill_formed_tyre",
-            Self::Spun => "spun",
-            Self::StepTooLong => "step_too_long",
-            Self::LeftRoad => "left_the_road",
-            Self::Unfinished => "did_not_finish",
-            Self::Standstill => "standstill",
-            Self::Unsettled => "did_not_settle",
-            Self::OffTheEnvelope => "off_the_envelope",
-            Self::NotFinite => "variable_not_finite",
-            Self::Undefined => "objective_not_finite",
-            Self::BeyondSinglePrecision => "objective_beyond_single_precision",
-        }
+        Self::WORDS[self.code() as usize]
     }
 }
 
@@ -347,6 +384,7 @@ impl Evaluation {
     }
 
     /// Joins rows of objectives and failures.
+    #[cfg(test)]
     pub(crate) fn of_rows(rows: Vec<(Vec<f64>, Option<Failure>)>) -> Self {
         let mut evaluation = Self::default();
         for (row, failure) in rows {

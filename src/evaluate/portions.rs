@@ -50,6 +50,12 @@ pub fn present() -> u64 {
     allowed(|a| a.in_force.last().map_or(USUAL, |(_, bytes)| *bytes))
 }
 
+/// Candidates that an evaluator opened now may have at a time, each taking `bytes_each` bytes.
+pub(crate) fn portion(bytes_each: u64) -> usize {
+    let fitting = present() / bytes_each.max(1);
+    usize::try_from(fitting).unwrap_or(usize::MAX).max(LEAST)
+}
+
 /// Scores populations in portions, one after the other. Scores of a candidate do not depend on its neighbours: they are the same
 /// bit for bit.
 pub struct Portions<E> {
@@ -60,11 +66,9 @@ pub struct Portions<E> {
 impl<E: Evaluator> Portions<E> {
     /// As many candidates at a time as fit the allowance, each taking `bytes_each` bytes while it is evaluated.
     pub fn new(evaluator: E, bytes_each: u64) -> Self {
-        let fitting = present() / bytes_each.max(1);
-        let candidates = usize::try_from(fitting).unwrap_or(usize::MAX).max(LEAST);
         Self {
             evaluator,
-            candidates,
+            candidates: portion(bytes_each),
         }
     }
 

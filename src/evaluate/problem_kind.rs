@@ -118,10 +118,22 @@ pub(super) fn evaluation<K: ProblemKind>(
     candidates: &[&[f64]],
     outcomes: Vec<OutcomeOf<K>>,
 ) -> Evaluation {
-    let rows = candidates.par_iter().zip(&outcomes);
-    let rows =
-        rows.map(|(candidate, outcome)| kind.objective_row(candidate, outcome.as_ref().map_err(|f| *f)));
-    Evaluation::of_rows(rows.collect())
+    let width = kind.problem().objectives.len();
+    let mut objectives = vec![FAILED_COST; outcomes.len() * width];
+    let failures = objectives
+        .par_chunks_exact_mut(width)
+        .zip(candidates.par_iter().zip(&outcomes))
+        .map(|(own, (candidate, outcome))| {
+            let (row, failure) = kind.objective_row(candidate, outcome.as_ref().map_err(|f| *f));
+            own.copy_from_slice(&row);
+            failure
+        })
+        .collect();
+    Evaluation {
+        objectives,
+        failures,
+        violations: Vec::new(),
+    }
 }
 
 /// The reference backend: `f64`, one candidate after another, in threads.

@@ -1,7 +1,21 @@
 //! Populations that live on a device, where neither candidates nor objectives cross the bus.
 
+#[cfg(feature = "gpu")]
+use super::Failure;
+
 /// Particles of a block: a coordinate of all of them lies in a row, and the coordinates of a block follow one another.
 pub const BLOCK: usize = 64;
+
+/// Objectives of a particle whose size is this or more are no costs: the particle has failed. This and the code of a [`Failure`] in
+/// the last eight bits say why; any other says that the objective is beyond single precision.
+#[cfg(feature = "gpu")]
+pub(crate) const FAILED: u32 = 0x7f7f_ff00;
+
+/// What stands in the row of objectives of a particle that failed.
+#[cfg(feature = "gpu")]
+pub fn failed_objective(failure: Failure) -> f32 {
+    f32::from_bits(FAILED | failure.code())
+}
 
 /// Objectives of particles whose positions are on a device.
 #[cfg(feature = "gpu")]
@@ -11,7 +25,8 @@ pub trait DeviceObjectives {
 
     /// Writes the objectives of `particles` particles. Both buffers are in blocks of [`BLOCK`] particles: a coordinate of
     /// all particles of a block in a row of `f32`, the coordinates of a block one after the other. Positions are
-    /// in the unit cube of those variables whose bounds differ.
+    /// in the unit cube of those variables whose bounds differ; [`super::Variable::at`] says what they stand for. A particle that
+    /// failed has [`failed_objective`] for every objective.
     ///
     /// # Errors
     /// [`crate::Error::Device`] if the device fails.

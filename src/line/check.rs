@@ -365,6 +365,7 @@ mod tests {
             sections: Vec::new(),
             corners: Vec::new(),
             drs: Vec::new(),
+            relief: None,
         };
         let edges = cross_sections.clone();
         cross_sections = cross_sections.narrowed(2.0).unwrap();

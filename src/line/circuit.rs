@@ -2,7 +2,7 @@
 
 use super::{FineLine, RoadEdges};
 use crate::error::{Error, Place, Result};
-use crate::track::Circuit;
+use crate::track::{Circuit, Relief, ReliefChange};
 use glam::DVec2;
 use rayon::prelude::*;
 
@@ -69,8 +69,10 @@ impl FineLine {
             sections: Vec::new(),
             corners: Vec::new(),
             drs_zones_m: self.open_m(),
+            relief: None,
         };
         let mut at = 0;
+        let (mut z_m, mut bank_rad) = (Vec::new(), Vec::new());
         for station in &circuit.station_m {
             while at + 1 < n && self.station_m[at + 1] <= *station {
                 at += 1;
@@ -88,7 +90,16 @@ impl FineLine {
             circuit
                 .curvature_1pm
                 .push(mix(self.curvature_1pm[at], self.curvature_1pm[next]));
+            if let Some(relief) = &self.relief {
+                z_m.push(mix(relief.z_m[at], relief.z_m[next]));
+                bank_rad.push(mix(relief.bank_rad[at], relief.bank_rad[next]));
+            }
         }
+        circuit.relief = self.relief.as_ref().map(|_| Relief {
+            z_m,
+            bank_rad,
+            change: ReliefChange::default(),
+        });
         let edges = RoadEdges::new(&edges_m[0], &edges_m[1], true);
         let abreast = edges.abreast(&circuit.centreline_m);
         let room = |left: bool| -> Vec<f64> {

@@ -1,7 +1,9 @@
 //! A line on a fine spline through its points. Reports give figures of this line.
 
+use super::kernel::Within;
 use super::point_mass::PointMass;
-use super::profile::{LapProfile, lap_profile};
+use super::profile::{LapProfile, lap_profile_on};
+use super::relief::LineRelief;
 use super::spline::Spline;
 use crate::error::{Error, Place, Result};
 use glam::DVec2;
@@ -32,6 +34,8 @@ pub struct FineLine {
     pub integral_kappa2_1pm: f64,
     /// The lap, if a car was given.
     pub lap: Option<LapProfile>,
+    /// Height and banking of a line on a road in three dimensions. All other figures but the lap's are those of the plan view.
+    pub relief: Option<LineRelief>,
 }
 
 impl FineLine {
@@ -43,6 +47,21 @@ impl FineLine {
     /// [`Error::Input`] if there are too few points, if neighbours coincide, or if the car or the spacing is out of range.
     pub fn new(
         points_m: &[DVec2],
+        closed: bool,
+        spacing_m: f64,
+        car: Option<(&PointMass, &[bool])>,
+        entry_mps: f64,
+    ) -> Result<Self> {
+        Self::on(points_m, None, closed, spacing_m, car, entry_mps)
+    }
+
+    /// As [`FineLine::new`], on a road in three dimensions with height (m) and banking (rad) at each of the points.
+    ///
+    /// # Errors
+    /// As [`FineLine::new`].
+    pub fn on(
+        points_m: &[DVec2],
+        relief: Option<&[[f64; 2]]>,
         closed: bool,
         spacing_m: f64,
         car: Option<(&PointMass, &[bool])>,
@@ -80,6 +99,7 @@ impl FineLine {
             gamma_1pm: 0.0,
             integral_kappa2_1pm: 0.0,
             lap: None,
+            relief: None,
         };
         let mut gamma_squared = 0.0;
         for segment in 0..spline.segments() {
@@ -108,13 +128,28 @@ impl FineLine {
             gamma_squared += line.curvature_1pm[line.curvature_1pm.len() - 1].powi(2);
         }
         line.gamma_1pm = gamma_squared.sqrt();
+        line.relief = relief.map(|given| LineRelief::along(&line, given));
         if let Some((car, drs)) = car {
             let table = car.table()?;
             let drs = line.drs_of(drs);
-            let lap = lap_profile(car, &table, &line.segment_m, &line.curvature_1pm, entry_mps, &drs)?;
-            line.lap = Some(lap);
+            line.lap = Some(line.driven(car, &table, entry_mps, &drs)?);
         }
         Ok(line)
+    }
+
+    /// The lap of `car` on it within its table or one for each point; see [`lap_profile`] for the rest.
+    ///
+    /// # Errors
+    /// As [`lap_profile`](super::lap_profile).
+    pub fn driven(
+        &self,
+        car: &PointMass,
+        within: &impl Within<f64>,
+        entry_mps: f64,
+        drs: &[bool],
+    ) -> Result<LapProfile> {
+        let plan_view = (self.segment_m.as_slice(), self.curvature_1pm.as_slice());
+        lap_profile_on(car, within, plan_view, self.relief.as_ref(), entry_mps, drs)
     }
 
     /// Adds the place at `t` of a segment, with the piece from there to the parameter `end` if one follows.

@@ -8,8 +8,9 @@
 //! J. Subosits and J. C. Gerdes, *A sequential two-step algorithm for fast generation of vehicle racing trajectories*,
 //! J. Dyn. Sys., Meas., Control 138, 2016).
 
+use super::ground::{Ground, Grounds, LevelRoad, SlopedRoad, relieve};
 use super::plan::{LinePlan, SectionRow};
-use super::point_mass::{ENVELOPE_WIDTH, EnvelopeTable, TRACTION_ROOTS, TRACTION_SPEEDS};
+use super::point_mass::EnvelopeTable;
 use crate::scalar::{Lookup, Real};
 
 /// Terms that are summed before they are added to the running total. This keeps `f32` sums over long laps accurate.
@@ -29,8 +30,11 @@ pub struct Wanted {
 pub struct Course<R> {
     /// Length of each segment (m).
     pub length: Vec<R>,
-    /// Curvature at each section (1/m), without a sign.
+    /// Curvature at each section (1/m), without a sign; on a road in three dimensions along the surface, positive in left turns.
     pub curvature: Vec<R>,
+    /// Of a road in three dimensions at each section: curvature square to the surface (1/m), and gravity along the segment after it,
+    /// to the left and square to the surface (m/s^2). Empty on a level road.
+    pub relief: Vec<[R; 4]>,
     /// Whether the DRS may be open on each segment; nowhere if empty.
     pub drs: Vec<bool>,
     /// Speed squared at each section (m^2/s^2).
@@ -45,6 +49,7 @@ impl<R> Default for Course<R> {
         Self {
             length: Vec::new(),
             curvature: Vec::new(),
+            relief: Vec::new(),
             drs: Vec::new(),
             speed_squared: Vec::new(),
             first_drive: Vec::new(),
@@ -128,7 +133,8 @@ fn offset<R: Real>(row: &SectionRow<R::Storage>, terms: usize, variables: &[R]) 
     [share * R::load(row.across[0]), share * R::load(row.across[1])]
 }
 
-/// The shape of the line that `variables` give; `course` has its lengths and curvatures after.
+/// The shape of the line that `variables` give; `course` has its lengths and curvatures after. The sums are those of the plan view
+/// on any road.
 #[inline(always)]
 pub fn shape<R: Real>(
     plan: &LinePlan<R::Storage>,
@@ -194,6 +200,10 @@ pub fn shape<R: Real>(
         course.curvature[0] = course.curvature[1];
         course.curvature[n - 1] = course.curvature[n - 2];
     }
+    course.relief.clear();
+    if wanted.lap && !plan.relief.is_empty() {
+        relieve(plan, variables, course);
+    }
     let [length, length_squared, second_differences, integral] = total;
     Shape {
         length,
@@ -217,25 +227,8 @@ pub(super) fn look_up<R: Lookup>(
 
 /// Greatest speed squared (m^2/s^2) in a bend.
 #[inline(always)]
-pub fn corner<R: Lookup>(envelope: &EnvelopeTable<R::Storage>, curvature: R) -> R {
-    // Straights have no radius; a thousand kilometres stand for it.
-    let radius = R::lit(1.0) / curvature.max(R::lit(1e-6));
-    let (place, beyond) = (radius * R::load(envelope.rows_per_radius)).place(envelope.corners.len() / 2, 2);
-    look_up(&envelope.corners, 2, place, beyond, 0)
-}
-
-/// The limits at a speed squared in a bend: lateral, grip, drive and drag (m/s^2), and the root of what the lateral share leaves.
-#[inline(always)]
-fn limits_at<R: Lookup>(envelope: &EnvelopeTable<R::Storage>, speed_squared: R, curvature: R) -> ([R; 4], R) {
-    let rows = envelope.rows.len() / ENVELOPE_WIDTH;
-    let argument = speed_squared * R::load(envelope.rows_per_speed_squared);
-    let (place, beyond) = argument.place(rows, ENVELOPE_WIDTH);
-    let row = R::pick_row(&envelope.rows, place);
-    let limits: [R; 4] =
-        std::array::from_fn(|column| row[column] + beyond * row[ENVELOPE_WIDTH / 2 + column]);
-    let share = curvature * speed_squared / limits[0];
-    let root = (R::lit(1.0) - share * share).max(R::lit(0.0)).sqrt();
-    (limits, root)
+pub fn corner<R: Lookup>(envelope: &EnvelopeTable<R::Storage>, ground: impl Ground<R>) -> R {
+    ground.corner(envelope)
 }
 
 /// The share of the longitudinal grip that is left for braking.
@@ -251,23 +244,16 @@ fn left_for_braking<R: Lookup>(envelope: &EnvelopeTable<R::Storage>, root: R) ->
 
 /// The same for driving.
 #[inline(always)]
-fn left_for_driving<R: Lookup>(envelope: &EnvelopeTable<R::Storage>, speed_squared: R, root: R) -> R {
+fn left_for_driving<R: Lookup>(
+    envelope: &EnvelopeTable<R::Storage>,
+    speed_squared: R,
+    root: R,
+    ground: impl Ground<R>,
+) -> R {
     if envelope.traction.is_empty() {
         return left_for_braking(envelope, root);
     }
-    // Cells are counted in whole numbers, which scalars hold exactly.
-    let rows = envelope.rows.len() / ENVELOPE_WIDTH;
-    let per_row = R::lit(TRACTION_SPEEDS as f64 / rows as f64);
-    let (speeds, roots) = (R::lit(TRACTION_SPEEDS as f64), R::lit(TRACTION_ROOTS as f64));
-    let along = speed_squared * R::load(envelope.rows_per_speed_squared) * per_row;
-    let along = along.max(R::lit(0.0)).min(speeds);
-    let across = root * roots;
-    let (speed, cell) = (along.whole(TRACTION_SPEEDS - 1), across.whole(TRACTION_ROOTS - 1));
-    let (place, _) = (speed * roots + cell).place(TRACTION_SPEEDS * TRACTION_ROOTS, 4);
-    let figure = |column: usize| R::pick(&envelope.traction, place, column);
-    let along = along - speed;
-    let start = figure(0) + along * figure(1);
-    start + (across - cell) * (figure(2) + along * figure(3))
+    ground.left_for_driving(envelope, speed_squared, root)
 }
 
 /// The traction that is left, the drive and the drag (m/s^2) at a speed squared in a bend.
@@ -275,11 +261,11 @@ fn left_for_driving<R: Lookup>(envelope: &EnvelopeTable<R::Storage>, speed_squar
 pub(super) fn driving_at<R: Lookup>(
     envelope: &EnvelopeTable<R::Storage>,
     speed_squared: R,
-    curvature: R,
+    ground: impl Ground<R>,
 ) -> [R; 3] {
-    let ([_, grip, drive, drag], root) = limits_at(envelope, speed_squared, curvature);
+    let ([_, grip, drive, drag], root) = ground.limits(envelope, speed_squared);
     [
-        grip * left_for_driving(envelope, speed_squared, root),
+        grip * left_for_driving(envelope, speed_squared, root, ground),
         drive,
         drag,
     ]
@@ -291,13 +277,13 @@ pub(super) fn driving_with_drs<R: Lookup>(
     envelope: &EnvelopeTable<R::Storage>,
     drs: bool,
     speed_squared: R,
-    curvature: R,
+    ground: impl Ground<R>,
 ) -> [R; 3] {
-    let shut = driving_at(envelope, speed_squared, curvature);
+    let shut = driving_at(envelope, speed_squared, ground);
     let Some(open) = envelope.open.as_ref().filter(|_| drs) else {
         return shut;
     };
-    let open = driving_at(open, speed_squared, curvature);
+    let open = driving_at(open, speed_squared, ground);
     let pays = (shut[0].min(shut[1]) - shut[2]).less_than(open[0].min(open[1]) - open[2]);
     [
         R::select(pays, open[0], shut[0]),
@@ -312,17 +298,21 @@ pub fn acceleration<R: Lookup>(
     envelope: &EnvelopeTable<R::Storage>,
     drs: bool,
     speed_squared: R,
-    curvature: R,
+    ground: impl Ground<R>,
 ) -> R {
-    let [traction, drive, drag] = driving_with_drs(envelope, drs, speed_squared, curvature);
-    traction.min(drive) - drag
+    let [traction, drive, drag] = driving_with_drs(envelope, drs, speed_squared, ground);
+    ground.uphill(traction.min(drive) - drag)
 }
 
 /// Greatest deceleration (m/s^2) at a speed squared in a bend.
 #[inline(always)]
-pub fn deceleration<R: Lookup>(envelope: &EnvelopeTable<R::Storage>, speed_squared: R, curvature: R) -> R {
-    let ([_, grip, _, drag], root) = limits_at(envelope, speed_squared, curvature);
-    grip * left_for_braking(envelope, root) + drag
+pub fn deceleration<R: Lookup>(
+    envelope: &EnvelopeTable<R::Storage>,
+    speed_squared: R,
+    ground: impl Ground<R>,
+) -> R {
+    let ([_, grip, _, drag], root) = ground.limits(envelope, speed_squared);
+    ground.helped(grip * left_for_braking(envelope, root) + drag)
 }
 
 /// Speed squared after driving from a section to the next, on the mean of the limits at the start and at the middle. Out of a
@@ -330,32 +320,32 @@ pub fn deceleration<R: Lookup>(envelope: &EnvelopeTable<R::Storage>, speed_squar
 /// smooth lines at 5 to 16 m the middle was 0.4% to 1.2% of a lap off, the start 0.4% to 0.5% the other way, and the mean 0.1% to
 /// 0.2%. On jagged lines no coarse grid is accurate.
 #[inline(always)]
-fn driven<R: Lookup>(
+fn driven<R: Lookup, G: Ground<R>>(
     envelope: &EnvelopeTable<R::Storage>,
     drs: bool,
     from: R,
     length: R,
-    [here, there]: [R; 2],
+    [here, there]: [G; 2],
 ) -> R {
     let zero = R::lit(0.0);
     let start = acceleration(envelope, drs, from, here);
     let middle = (from + length * start).max(zero);
-    let drive = acceleration(envelope, drs, middle, R::lit(0.5) * (here + there));
+    let drive = acceleration(envelope, drs, middle, here.half_way(there));
     (from + length * (start + drive)).max(zero)
 }
 
 /// Greatest speed squared from which the car can brake to that of the next section.
 #[inline(always)]
-pub(super) fn braked<R: Lookup>(
+pub(super) fn braked<R: Lookup, G: Ground<R>>(
     envelope: &EnvelopeTable<R::Storage>,
     to: R,
     length: R,
-    there: R,
-    here: R,
+    there: G,
+    here: G,
 ) -> R {
     let end = deceleration(envelope, to, there);
     let middle = to + length * end;
-    let brake = deceleration(envelope, middle, R::lit(0.5) * (here + there));
+    let brake = deceleration(envelope, middle, here.half_way(there));
     to + length * (end + brake)
 }
 
@@ -400,13 +390,29 @@ pub fn lap_time<R: Lookup>(
     entry: R,
     course: &mut Course<R>,
 ) -> R {
+    if course.relief.is_empty() {
+        lap_on::<R, LevelRoad>(envelope, closed, start, entry, course)
+    } else {
+        lap_on::<R, SlopedRoad>(envelope, closed, start, entry, course)
+    }
+}
+
+/// [`lap_time`] on one kind of road.
+#[inline(always)]
+fn lap_on<R: Lookup, G: Grounds<R>>(
+    envelope: &impl Within<R::Storage>,
+    closed: bool,
+    start: usize,
+    entry: R,
+    course: &mut Course<R>,
+) -> R {
     let n = course.curvature.len();
-    let (length, curvature, drs) = (&course.length, &course.curvature, &course.drs);
-    let speeds = &mut course.speed_squared;
+    let mut speeds = std::mem::take(&mut course.speed_squared);
+    let (length, drs) = (&course.length, &course.drs);
     speeds.clear();
     speeds.resize(n, R::lit(0.0));
     let start = if closed { start } else { 0 };
-    speeds[start] = corner(envelope.at(start), curvature[start]);
+    speeds[start] = corner(envelope.at(start), G::at(course, start, start));
     if !closed {
         speeds[0] = speeds[0].min(entry);
     }
@@ -421,14 +427,14 @@ pub fn lap_time<R: Lookup>(
             may_open(drs, here),
             speeds[here],
             length[here],
-            [curvature[here], curvature[next]],
+            [G::at(course, here, here), G::at(course, next, here)],
         );
         // In the first round a section is limited by its corner speed alone.
         let again = step + 1 >= n;
         let most = if again {
             speeds[next]
         } else {
-            corner(envelope.at(next), curvature[next])
+            corner(envelope.at(next), G::at(course, next, next))
         };
         let slower = reached.less_than(most);
         speeds[next] = R::select(slower, reached, most);
@@ -445,8 +451,8 @@ pub fn lap_time<R: Lookup>(
             envelope.at(here),
             speeds[next],
             length[here],
-            curvature[next],
-            curvature[here],
+            G::at(course, next, here),
+            G::at(course, here, here),
         );
         let slower = reached.less_than(speeds[here]);
         speeds[here] = R::select(slower, reached, speeds[here]);
@@ -470,5 +476,6 @@ pub fn lap_time<R: Lookup>(
             block = zero;
         }
     }
+    course.speed_squared = speeds;
     total
 }

@@ -6,7 +6,7 @@
 
 use super::fine::FineLine;
 use crate::error::{Error, Result};
-use crate::track::CrossSections;
+use crate::track::{CrossSections, SectionRelief};
 use glam::DVec2;
 
 /// Distance between the points that curves are followed by (m). Between two of them a curve is taken for an arc.
@@ -196,7 +196,13 @@ pub fn cross_sections_about(road: &CrossSections, points_m: &[DVec2], count: usi
         cross_sections.left_m.push(place + (middle + half) * left);
         cross_sections.reference.push((half - middle) / (2.0 * half));
     }
-    cross_sections.drs = road.drs_along(&cross_sections.points(&cross_sections.reference));
+    let points = cross_sections.points(&cross_sections.reference);
+    cross_sections.drs = road.drs_along(&points);
+    cross_sections.relief = road.relief_along(&points).map(|relief| SectionRelief {
+        z_m: relief.iter().map(|[z, _]| *z).collect(),
+        bank_rad: relief.iter().map(|[_, bank]| *bank).collect(),
+        foot_m: points,
+    });
     Ok(cross_sections)
 }
 

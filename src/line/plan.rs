@@ -1,6 +1,7 @@
 //! The tables of a line's cross-sections that kernels read.
 
 use crate::scalar::Real;
+use crate::track::CrossSections;
 use glam::DVec2;
 
 /// Terms of the sum that gives `alpha` at a section.
@@ -25,6 +26,19 @@ pub struct SectionRow<S> {
     pub drs: bool,
 }
 
+/// Height and banking of one section, in differences of height.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ReliefRow<S> {
+    /// From the right end of this cross-section up to that of the next (m).
+    pub step_rise: S,
+    /// From the right end of the cross-section up to the left end (m).
+    pub across_rise: S,
+    /// Sine and cosine of the banking, positive with the left side up.
+    pub sin: S,
+    /// See above.
+    pub cos: S,
+}
+
 /// All sections, and the order in which a lap passes them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LinePlan<S> {
@@ -39,6 +53,8 @@ pub struct LinePlan<S> {
     pub terms: usize,
     /// The sections.
     pub rows: Vec<SectionRow<S>>,
+    /// Height and banking of the sections; empty on a level road.
+    pub relief: Vec<ReliefRow<S>>,
 }
 
 impl LinePlan<f64> {
@@ -64,7 +80,28 @@ impl LinePlan<f64> {
             entry: 0.0,
             terms: 0,
             rows: rows.collect(),
+            relief: Vec::new(),
         }
+    }
+
+    /// The plan of the road in three dimensions that `cross_sections` are, if they are.
+    pub fn with_relief(mut self, cross_sections: &CrossSections) -> Self {
+        let ends = [&cross_sections.right_m, &cross_sections.left_m];
+        let [Some(right), Some(left)] = ends.map(|points| cross_sections.relief_of(points)) else {
+            return self;
+        };
+        let n = right.len();
+        let row = |i: usize| {
+            let [z, bank] = right[i];
+            ReliefRow {
+                step_rise: right[(i + 1) % n][0] - z,
+                across_rise: left[i][0] - z,
+                sin: bank.sin(),
+                cos: bank.cos(),
+            }
+        };
+        self.relief = (0..n).map(row).collect();
+        self
     }
 
     /// The plan with the spacing (m) of every segment by which second differences are computed.
@@ -107,6 +144,16 @@ impl LinePlan<f64> {
                     weights: row.weights.map(store),
                     sources: row.sources,
                     drs: row.drs,
+                })
+                .collect(),
+            relief: self
+                .relief
+                .iter()
+                .map(|row| ReliefRow {
+                    step_rise: store(row.step_rise),
+                    across_rise: store(row.across_rise),
+                    sin: store(row.sin),
+                    cos: store(row.cos),
                 })
                 .collect(),
         }

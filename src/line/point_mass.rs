@@ -1,5 +1,6 @@
 //! The point mass of quasi-steady-state laps, and its envelope as tables that every backend looks up in the same way.
 
+use super::loads::LoadTables;
 use crate::error::{Error, Result};
 use crate::scalar::Real;
 use crate::vehicle::Envelope;
@@ -19,6 +20,8 @@ pub struct PointMass {
     /// A bend tighter than the lock allows cannot be driven. The line does not fail: the corner speed squared falls with the
     /// fourth power of the radius, so that a search is led back to lines that can be driven.
     pub max_steer_rad: Option<f64>,
+    /// Whether its tables have limits under loads, for laps on roads in three dimensions.
+    pub relief: bool,
 }
 
 /// The envelope of a [`PointMass`] over even steps of the speed squared, the variable of its equation of motion.
@@ -47,6 +50,8 @@ pub struct EnvelopeTable<S> {
     /// The table of the same car with its DRS open, over the same speeds, if it has one. Its corners are not used: a driver shuts
     /// the flap where it costs speed.
     pub open: Option<Box<Self>>,
+    /// Limits under loads; empty for level roads.
+    pub loads: LoadTables<S>,
 }
 
 /// Cells of [`EnvelopeTable::traction`] over the speed squared. The share changes with downforce alone.
@@ -71,6 +76,7 @@ impl PointMass {
             ellipse_exponent: 2.0,
             wheelbase_m,
             max_steer_rad: None,
+            relief: false,
         }
     }
 
@@ -109,8 +115,20 @@ impl PointMass {
     /// # Errors
     /// As [`PointMass::check`].
     pub fn table(&self) -> Result<EnvelopeTable<f64>> {
+        let mut table = self.table_up_to(self.envelope.top_speed_mps())?;
+        if self.relief {
+            table.loads = self.load_tables(&table)?;
+        }
+        Ok(table)
+    }
+
+    /// The tables up to a speed (m/s), without those under loads.
+    ///
+    /// # Errors
+    /// As [`PointMass::check`].
+    pub(super) fn table_up_to(&self, top_mps: f64) -> Result<EnvelopeTable<f64>> {
         self.check()?;
-        let top = self.envelope.top_speed_mps().powi(2);
+        let top = top_mps.powi(2);
         let at_knot = |knot: usize| {
             let row = self
                 .envelope
@@ -138,11 +156,12 @@ impl PointMass {
                 Some(open) => Some(Box::new(self.within(open.clone()).table()?)),
                 None => None,
             },
+            loads: LoadTables::default(),
         })
     }
 
     /// The same point mass within another envelope.
-    fn within(&self, envelope: Envelope) -> Self {
+    pub(super) fn within(&self, envelope: Envelope) -> Self {
         Self {
             envelope,
             ..self.clone()
@@ -242,6 +261,7 @@ impl EnvelopeTable<f64> {
             ellipse: all(&self.ellipse),
             traction: all(&self.traction),
             open: self.open.as_ref().map(|open| Box::new(open.stored::<R>())),
+            loads: self.loads.stored::<R>(),
         }
     }
 }

@@ -1,7 +1,9 @@
 //! All figures of a lap on one line.
 
+use super::ground::{Ground, Grounds, LevelRoad, SlopedRoad};
 use super::kernel::{Course, Within, acceleration, driving_at, lap_time, may_open};
 use super::point_mass::{EnvelopeTable, PointMass};
+use super::relief::LineRelief;
 use crate::error::{Error, Result};
 
 /// A lap, section by section.
@@ -25,11 +27,70 @@ pub struct LapProfile {
     pub beyond_lock: usize,
     /// Whether the driver has the DRS open from each section to the next.
     pub drs_open: Vec<bool>,
+    /// Specific forces of the road on a road in three dimensions (m/s^2): along the car, to its left, and square to the surface. Empty
+    /// on a level road, where they are the accelerations and gravity.
+    pub forces_mps2: Vec<[f64; 3]>,
 }
 
 impl LapProfile {
+    /// A lap of `time_s` on a line of this plan view (lengths of segments in m, and curvatures in 1/m), with height and banking if it has
+    /// them, from its speeds squared (m^2/s^2) at the sections; `drs_open` says of each segment whether the driver has the flap open.
+    pub fn of_speeds(
+        car: &PointMass,
+        (segment_m, curvature_1pm): (&[f64], &[f64]),
+        relief: Option<&LineRelief>,
+        speed_squared: &[f64],
+        time_s: f64,
+        drs_open: Vec<bool>,
+    ) -> Self {
+        let (n, w) = (curvature_1pm.len(), speed_squared);
+        let v_mps: Vec<f64> = w.iter().map(|w| w.sqrt()).collect();
+        let next = |i: usize| (i + 1) % n;
+        let length_m = relief.map_or(segment_m, |relief| &relief.length_m);
+        let mut ax_mps2: Vec<f64> = length_m
+            .iter()
+            .enumerate()
+            .map(|(i, h)| (w[next(i)] - w[i]) / (2.0 * h))
+            .collect();
+        if segment_m.len() < n {
+            ax_mps2.push(ax_mps2[n - 2]);
+        }
+        let station_m = (0..n)
+            .scan(0.0, |station, i| {
+                let here = *station;
+                *station += segment_m.get(i).copied().unwrap_or(0.0);
+                Some(here)
+            })
+            .collect();
+        let steering_rad: Vec<f64> = curvature_1pm.iter().map(|k| car.wheelbase_m * k).collect();
+        Self {
+            time_s,
+            drs_open,
+            station_m,
+            ay_mps2: curvature_1pm.iter().zip(w).map(|(k, w)| k * w).collect(),
+            beyond_lock: car
+                .max_steer_rad
+                .map_or(0, |lock| steering_rad.iter().filter(|s| s.abs() > lock).count()),
+            steering_rad,
+            forces_mps2: relief.map_or(Vec::new(), |relief| relief.forces_mps2(&v_mps, &ax_mps2)),
+            segment_time_s: length_m
+                .iter()
+                .enumerate()
+                .map(|(i, h)| 2.0 * h / (v_mps[i] + v_mps[next(i)]))
+                .collect(),
+            ax_mps2,
+            v_mps,
+        }
+    }
+
     /// The share of `car`'s grip that is used at each section.
     pub fn grip_used(&self, car: &PointMass) -> Vec<f64> {
+        if !self.forces_mps2.is_empty() {
+            let places = self.v_mps.iter().zip(&self.forces_mps2);
+            return places
+                .map(|(v, forces)| car.grip_used_under(*v, *forces))
+                .collect();
+        }
         let places = self.v_mps.iter().zip(&self.ax_mps2).zip(&self.ay_mps2);
         places
             .map(|((v, ax), ay)| car.grip_used(*v, [*ax, *ay]))
@@ -61,6 +122,21 @@ pub fn lap_profile(
     within: &impl Within<f64>,
     segment_m: &[f64],
     curvature_1pm: &[f64],
+    entry_mps: f64,
+    drs: &[bool],
+) -> Result<LapProfile> {
+    lap_profile_on(car, within, (segment_m, curvature_1pm), None, entry_mps, drs)
+}
+
+/// As [`lap_profile`], on a line of this plan view (lengths of segments and curvatures) with height and banking.
+///
+/// # Errors
+/// As [`lap_profile`]; also if the car has no tables for roads in three dimensions.
+pub fn lap_profile_on(
+    car: &PointMass,
+    within: &impl Within<f64>,
+    (segment_m, curvature_1pm): (&[f64], &[f64]),
+    relief: Option<&LineRelief>,
     entry_mps: f64,
     drs: &[bool],
 ) -> Result<LapProfile> {
@@ -96,6 +172,19 @@ pub fn lap_profile(
         drs: drs.to_vec(),
         ..Course::default()
     };
+    if let Some(relief) = relief {
+        if within.at(0).loads.tables == 0 {
+            let found = "limits for level roads";
+            return wrong(
+                "car",
+                found.to_owned(),
+                "limits under loads, for a road in three dimensions",
+            );
+        }
+        course.length.clone_from(&relief.length_m);
+        course.curvature.clone_from(&relief.bend_1pm);
+        course.relief.clone_from(&relief.course);
+    }
     let start = slowest(&course.curvature);
     let time_s = lap_time::<f64>(within, closed, start, entry_mps * entry_mps, &mut course);
     if !time_s.is_finite() {
@@ -105,57 +194,28 @@ pub fn lap_profile(
             "a car that moves along the whole line",
         );
     }
-    let w = &course.speed_squared;
     let drs_open = (0..segment_m.len())
-        .map(|i| opens(within.at(i), &course, i))
-        .collect();
-    let v_mps: Vec<f64> = w.iter().map(|w| w.sqrt()).collect();
-    let next = |i: usize| (i + 1) % n;
-    let mut ax_mps2: Vec<f64> = segment_m
-        .iter()
-        .enumerate()
-        .map(|(i, h)| (w[next(i)] - w[i]) / (2.0 * h))
-        .collect();
-    if !closed {
-        ax_mps2.push(ax_mps2[n - 2]);
-    }
-    let station_m = (0..n)
-        .scan(0.0, |station, i| {
-            let here = *station;
-            *station += segment_m.get(i).copied().unwrap_or(0.0);
-            Some(here)
+        .map(|i| match relief {
+            Some(_) => opens::<SlopedRoad>(within.at(i), &course, i),
+            None => opens::<LevelRoad>(within.at(i), &course, i),
         })
         .collect();
-    let steering_rad: Vec<f64> = curvature_1pm.iter().map(|k| car.wheelbase_m * k).collect();
-    Ok(LapProfile {
-        time_s,
-        drs_open,
-        station_m,
-        ax_mps2,
-        ay_mps2: curvature_1pm.iter().zip(w).map(|(k, w)| k * w).collect(),
-        beyond_lock: car
-            .max_steer_rad
-            .map_or(0, |lock| steering_rad.iter().filter(|s| s.abs() > lock).count()),
-        steering_rad,
-        segment_time_s: segment_m
-            .iter()
-            .enumerate()
-            .map(|(i, h)| 2.0 * h / (v_mps[i] + v_mps[next(i)]))
-            .collect(),
-        v_mps,
-    })
+    let shape = (segment_m, curvature_1pm);
+    let w = &course.speed_squared;
+    Ok(LapProfile::of_speeds(car, shape, relief, w, time_s, drs_open))
 }
 
 /// Whether the driver has the DRS open on a segment: it may be, he does not brake, and it gains him speed.
-fn opens(table: &EnvelopeTable<f64>, course: &Course<f64>, segment: usize) -> bool {
+fn opens<G: Grounds<f64>>(table: &EnvelopeTable<f64>, course: &Course<f64>, segment: usize) -> bool {
     let next = (segment + 1) % course.curvature.len();
     let [from, to] = [segment, next].map(|i| course.speed_squared[i]);
     let middle = 0.5 * (from + to);
-    let bend = 0.5 * (course.curvature[segment] + course.curvature[next]);
+    let [here, there] = [segment, next].map(|section| G::at(course, section, segment));
+    let bend = here.half_way(there);
     let gained = 0.5 * (to - from) / course.length[segment];
     let most = |drs: bool| acceleration::<f64>(table, drs, middle, bend);
     let [.., drag] = driving_at::<f64>(table, middle, bend);
-    may_open(&course.drs, segment) && most(false) < most(true) && gained > -drag
+    may_open(&course.drs, segment) && most(false) < most(true) && gained > bend.uphill(-drag)
 }
 
 /// The section of the greatest curvature, where a car is slowest.

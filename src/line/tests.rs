@@ -24,6 +24,7 @@ fn ring(inner_m: f64, outer_m: f64, sections: usize) -> CrossSections {
         sections: Vec::new(),
         corners: Vec::new(),
         drs: Vec::new(),
+        relief: None,
     }
 }
 

@@ -2,8 +2,8 @@
 
 use super::bounds::{Bounds, RowBound};
 use crate::Result;
-use crate::line::{LinePlan, Parametrisation, SectionRow};
-use crate::track::CrossSections;
+use crate::line::{LinePlan, LineRelief, Parametrisation, SectionRow};
+use crate::track::{CrossSections, SectionRelief};
 use glam::DVec2;
 
 /// The points of a line as a linear function of its variables: `point_j = origin_j + sum of reach_jk x_k`.
@@ -20,6 +20,8 @@ pub struct LineMap {
     reach: Vec<(usize, DVec2)>,
     /// Whether the DRS may be open from each point to the next; nowhere if empty.
     pub(super) drs: Vec<bool>,
+    /// Height and banking of the cross-section that each point lies on, and its direction to the left; none on a level road.
+    relief: Option<(SectionRelief, Vec<DVec2>)>,
 }
 
 impl LineMap {
@@ -36,6 +38,7 @@ impl LineMap {
             starts: vec![0],
             reach: Vec::new(),
             drs: Vec::new(),
+            relief: None,
         };
         for (origin, reach) in points {
             map.origin_m.push(origin);
@@ -53,7 +56,7 @@ impl LineMap {
                 vec![(i, cross_sections.left_m[i] - cross_sections.right_m[i])],
             )
         });
-        Self::new(cross_sections.closed, cross_sections.len(), points).with_drs(cross_sections)
+        Self::new(cross_sections.closed, cross_sections.len(), points).on(cross_sections)
     }
 
     /// The variables of a parametrisation, and the bounds that keep them and the line within theirs.
@@ -82,7 +85,7 @@ impl LineMap {
             let reach = shares(row).into_iter().map(|(k, share)| (k, share * across));
             (cross_sections.right_m[i] + row.constant * across, reach.collect())
         });
-        let map = Self::new(cross_sections.closed, variables.len(), points).with_drs(cross_sections);
+        let map = Self::new(cross_sections.closed, variables.len(), points).on(cross_sections);
         // A single variable at a section has its own bounds.
         let sums = plan.rows.iter().filter(|_| plan.terms > 1);
         let rows = sums.map(|row| RowBound {
@@ -122,13 +125,20 @@ impl LineMap {
             upper: vec![f64::INFINITY; controls],
             rows: rows.collect(),
         };
-        let map = Self::new(cross_sections.closed, controls, reaches).with_drs(cross_sections);
+        let map = Self::new(cross_sections.closed, controls, reaches).on(cross_sections);
         (map, bounds)
     }
 
-    /// The map of a line with a point at every cross-section, which has the DRS open where these allow it.
-    fn with_drs(mut self, cross_sections: &CrossSections) -> Self {
+    /// The map of a line with a point at every cross-section, which has the DRS open where these allow it and their height and
+    /// banking.
+    fn on(mut self, cross_sections: &CrossSections) -> Self {
         self.drs.clone_from(&cross_sections.drs);
+        let ends = cross_sections.right_m.iter().zip(&cross_sections.left_m);
+        let left = ends.map(|(right, left)| (*left - *right).normalize_or_zero());
+        self.relief = cross_sections
+            .relief
+            .clone()
+            .map(|relief| (relief, left.collect()));
         self
     }
 
@@ -154,6 +164,20 @@ impl LineMap {
             moved.fold(self.origin_m[j], |sum, step| sum + step)
         };
         (0..self.points()).map(point).collect()
+    }
+
+    /// The shape of line `x`.
+    pub(super) fn shape(&self, x: &[f64]) -> Shape {
+        let points = self.line(x);
+        let mut shape = Shape::of(&points, self.closed);
+        if let Some((relief, left)) = self.relief.as_ref().filter(|_| !shape.stands_still()) {
+            let places = points.iter().zip(left).enumerate();
+            let z_m = places.map(|(i, (point, left))| relief.height_m(i, *left, *point));
+            let (segments, curvature) = (&shape.length_m, &shape.curvature_1pm);
+            let (z_m, bank_rad) = (z_m.collect(), relief.bank_rad.clone());
+            shape.relief = Some(LineRelief::of(segments, curvature, z_m, bank_rad));
+        }
+        shape
     }
 
     /// Carries derivatives with respect to the points back to the variables.
@@ -215,6 +239,8 @@ pub(super) struct Shape {
     pub spacing_m: Vec<f64>,
     /// Turn over spacing (1/m).
     pub curvature_1pm: Vec<f64>,
+    /// Height and banking along it; none on a level road.
+    pub relief: Option<LineRelief>,
 }
 
 impl Shape {
@@ -229,6 +255,7 @@ impl Shape {
             turn_rad: vec![0.0; n],
             spacing_m: vec![0.0; n],
             curvature_1pm: vec![0.0; n],
+            relief: None,
             step_m,
         };
         for i in 0..n {

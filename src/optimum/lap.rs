@@ -55,6 +55,14 @@ pub trait GripEnvelope: Sync {
     fn traction(&self, _speed_mps: f64, _root: f64) -> Option<BendGrip> {
         None
     }
+    /// The envelopes on both sides of a load over mass, each with its own load (m/s^2), of a car whose limits are known under loads.
+    fn loaded(&self, _load_mps2: f64) -> Option<[(f64, &dyn GripEnvelope); 2]> {
+        None
+    }
+    /// What the road itself asks of the tyres to the left (m/s^2): gravity on a banked road.
+    fn lean_mps2(&self) -> f64 {
+        0.0
+    }
     /// The same with the DRS open, of a car that has one.
     fn open(&self) -> Option<&dyn GripEnvelope> {
         None
@@ -109,7 +117,7 @@ pub(super) struct Bends {
 
 impl Bends {
     pub fn of(shape: &Shape, bend: SegmentBend) -> Self {
-        let k = &shape.curvature_1pm;
+        let k = shape.bends_1pm();
         let ends = (0..k.len()).map(|s| match bend {
             SegmentBend::Mean => [0.5, 0.5],
             SegmentBend::Tighter if k[(s + 1) % k.len()].abs() > k[s].abs() => [0.0, 1.0],
@@ -163,8 +171,8 @@ impl Lap {
         let n = shape.curvature_1pm.len();
         let bends = Bends::of(shape, bend);
         let (mut corner, mut corner_by_curvature) = (Vec::with_capacity(n), Vec::with_capacity(n));
-        for curvature in &shape.curvature_1pm {
-            let (square, slope) = corner_square(envelope, *curvature);
+        for (i, curvature) in shape.bends_1pm().iter().enumerate() {
+            let (square, slope) = shape.at_point(i, envelope, |car| corner_square(car, *curvature));
             corner.push(square);
             corner_by_curvature.push(slope);
         }
@@ -181,16 +189,17 @@ impl Lap {
             drive_pass(shape, &bends, (envelope, drs), &corner, 0, n)
         };
         let (square, brake) = brake_pass(shape, &bends, envelope, &after_drive);
-        for (s, h) in shape.length_m.iter().enumerate() {
+        for (s, h) in shape.driven_m().iter().enumerate() {
             let (from, to) = (square[s], square[(s + 1) % n]);
-            let drag = envelope
-                .open()
-                .map_or(0.0, |open| open.at((0.5 * (from + to)).sqrt()).drag.value);
+            let drag = shape.on_segment(s, bends.ends[s], envelope, |car| {
+                car.open()
+                    .map_or(0.0, |open| open.at((0.5 * (from + to)).sqrt()).drag.value)
+            });
             // The flap is shut on the brakes.
             open[s] &= 0.5 * (to - from) / h > -drag;
         }
         let speed: Vec<f64> = square.iter().map(|e| e.sqrt()).collect();
-        let segments = shape.length_m.iter().enumerate();
+        let segments = shape.driven_m().iter().enumerate();
         let time_s = segments
             .map(|(s, h)| 2.0 * h / (speed[s] + speed[(s + 1) % n]))
             .sum();
@@ -212,7 +221,7 @@ impl Lap {
         let mut by_length = vec![0.0; shape.length_m.len()];
         let mut by_curvature = vec![0.0; n];
         let mut by_square = vec![0.0; n];
-        for (s, h) in shape.length_m.iter().enumerate() {
+        for (s, h) in shape.driven_m().iter().enumerate() {
             let next = (s + 1) % n;
             let sum = speed[s] + speed[next];
             by_length[s] += 2.0 / sum;
@@ -272,14 +281,19 @@ pub(super) fn corner_square(envelope: &dyn GripEnvelope, curvature_1pm: f64) -> 
 
 /// The greatest `e` at which the tyres hold a curvature (1/m), and its derivative by curvature.
 fn grip_square(envelope: &dyn GripEnvelope, curvature_1pm: f64) -> (f64, f64) {
-    let k = curvature_1pm.abs();
+    let (k, lean) = (curvature_1pm.abs(), envelope.lean_mps2());
     let top = envelope.top_speed_mps();
     let mut high = top * top;
     // The grip less the need for it, which falls through zero at the corner speed.
     let spare = |e: f64| {
         let v = e.sqrt();
         let lateral = envelope.at(v).lateral;
-        (lateral.value - k * e, 0.5 * lateral.by_speed / v - k)
+        let across = curvature_1pm * e + lean;
+        let by_square = across.signum() * curvature_1pm;
+        (
+            lateral.value - across.abs(),
+            0.5 * lateral.by_speed / v - by_square,
+        )
     };
     if spare(high).0 >= 0.0 {
         return (high, 0.0);
@@ -305,7 +319,7 @@ fn grip_square(envelope: &dyn GripEnvelope, curvature_1pm: f64) -> (f64, f64) {
             break;
         }
     }
-    (e, curvature_1pm.signum() * e / spare(e).1)
+    (e, (curvature_1pm * e + lean).signum() * e / spare(e).1)
 }
 
 /// Acceleration in the direction of a pass, at speed squared `e`, times `s`, where `s` is the share of longitudinal
@@ -322,7 +336,7 @@ fn push(envelope: &dyn GripEnvelope, pass: Pass, e: f64, curvature_1pm: f64) -> 
     let per_square = 0.5 / v;
     let grip = envelope.at(v);
     let lateral = grip.lateral.value;
-    let used = curvature_1pm * e / lateral;
+    let used = (curvature_1pm * e + envelope.lean_mps2()) / lateral;
     let left = 1.0 - used * used;
     let (sign, drag) = match pass {
         Pass::Drive => (-1.0, grip.drag),
@@ -464,8 +478,11 @@ fn drive_pass(
     for step in 1..count {
         let (previous, node) = ((first + step - 1) % n, (first + step) % n);
         let curvature = bends.curvature_1pm[previous];
-        let length_m = shape.length_m[previous];
-        let (reached, origin, with_drs) = driven(car, previous, square[previous], curvature, length_m);
+        let length_m = shape.driven_m()[previous];
+        let (envelope, drs) = car;
+        let (reached, origin, with_drs) = shape.on_segment(previous, bends.ends[previous], envelope, |car| {
+            driven((car, drs), previous, square[previous], curvature, length_m)
+        });
         open[previous] = with_drs;
         let own = reached >= corner[node];
         square[node] = if own { corner[node] } else { reached };
@@ -485,7 +502,16 @@ fn closed_drive(shape: &Shape, bends: &Bends, car: (&dyn GripEnvelope, &[bool]),
         let mut passed = drive_pass(shape, bends, car, corner, first, n);
         let last = (first + n - 1) % n;
         let curvature = bends.curvature_1pm[last];
-        let (closing, _, open) = driven(car, last, passed.0[last], curvature, shape.length_m[last]);
+        let (envelope, drs) = car;
+        let (closing, _, open) = shape.on_segment(last, bends.ends[last], envelope, |car| {
+            driven(
+                (car, drs),
+                last,
+                passed.0[last],
+                curvature,
+                shape.driven_m()[last],
+            )
+        });
         passed.2[last] = open;
         if closing >= corner[first] {
             return passed;
@@ -516,13 +542,9 @@ fn brake_pass(shape: &Shape, bends: &Bends, envelope: &dyn GripEnvelope, after_d
     for step in 1..n {
         let (next, node) = ((last + n + 1 - step) % n, (last + n - step) % n);
         let curvature = bends.curvature_1pm[node];
-        let (reached, origin) = across(
-            envelope,
-            Pass::Brake,
-            square[next],
-            curvature,
-            shape.length_m[node],
-        );
+        let (reached, origin) = shape.on_segment(node, bends.ends[node], envelope, |car| {
+            across(car, Pass::Brake, square[next], curvature, shape.driven_m()[node])
+        });
         let own = reached >= after_drive[node];
         square[node] = if own { after_drive[node] } else { reached };
         origins.push((node, if own { Origin::Own } else { origin }));

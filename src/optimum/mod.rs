@@ -24,6 +24,7 @@ mod reference;
 mod solver_thread;
 #[cfg(test)]
 mod tests;
+mod tilt;
 mod time_model;
 
 pub use bounds::{Bounds, RowBound};

@@ -88,7 +88,7 @@ impl<'a> ReferenceProblem<'a> {
 
     /// Shape, lap (where time counts) and measures of line `x`; all measures infinite where it has two points in one place.
     pub(super) fn judged(&self, weights: &Weights, x: &[f64]) -> (Shape, Option<Lap>, Measures) {
-        let shape = Shape::of(&self.map.line(x), self.map.closed);
+        let shape = self.map.shape(x);
         if shape.stands_still() {
             let far = f64::INFINITY;
             let measures = Measures {
@@ -118,7 +118,7 @@ impl<'a> ReferenceProblem<'a> {
 
     /// Speeds (m/s) at the points of line `x`; none without a car.
     pub fn speeds_mps(&self, x: &[f64]) -> Vec<f64> {
-        let shape = Shape::of(&self.map.line(x), self.map.closed);
+        let shape = self.map.shape(x);
         let lap = self
             .envelope
             .map(|envelope| Lap::of(&shape, envelope, self.start_mps, (self.bend, &self.map.drs)));

@@ -3,6 +3,7 @@
 use super::lap::{BendGrip, Grip, GripEnvelope, Slope};
 use crate::line::PointMass;
 use crate::vehicle::envelope::traction_at_root;
+use crate::vehicle::powertrain::GRAVITY_MPS2;
 use crate::vehicle::{BendTraction, Envelope, EnvelopeRow};
 use crate::{Error, Result};
 
@@ -13,6 +14,8 @@ pub struct PointMassEnvelope {
     in_bends: Option<BendTraction>,
     lock_1pm: f64,
     open: Option<Box<Self>>,
+    /// The same under loads over the mass (m/s^2), rising; none for level roads.
+    loads: Vec<(f64, Self)>,
 }
 
 impl PointMassEnvelope {
@@ -35,8 +38,11 @@ impl PointMassEnvelope {
             .max_steer_rad
             .map_or(f64::INFINITY, |lock| lock / car.wheelbase_m);
         Ok(Self {
-            open: car.envelope.open().map(|open| Box::new(Self::of(open, lock_1pm))),
-            ..Self::of(&car.envelope, lock_1pm)
+            open: car
+                .envelope
+                .open()
+                .map(|open| Box::new(Self::under_loads(open, car.relief, lock_1pm))),
+            ..Self::under_loads(&car.envelope, car.relief, lock_1pm)
         })
     }
 
@@ -46,7 +52,31 @@ impl PointMassEnvelope {
             in_bends: envelope.bend_traction().cloned(),
             lock_1pm,
             open: None,
+            loads: Vec::new(),
         }
+    }
+
+    /// The envelope and, for roads in three dimensions, those under loads. Limits that were not swept under any go with the load.
+    fn under_loads(envelope: &Envelope, relief: bool, lock_1pm: f64) -> Self {
+        let level = Self::of(envelope, lock_1pm);
+        if !relief {
+            return level;
+        }
+        let swept = envelope.loads().iter();
+        let mut loads: Vec<(f64, Self)> = swept
+            .map(|(share, limits)| (share * GRAVITY_MPS2, Self::of(limits, lock_1pm)))
+            .collect();
+        if loads.is_empty() {
+            let mut weightless = level.clone();
+            for row in &mut weightless.rows {
+                (row.ay_mps2, row.ax_grip_mps2) = (0.0, 0.0);
+            }
+            for figures in weightless.in_bends.iter_mut().flat_map(|table| &mut table.rows) {
+                figures.fill(0.0);
+            }
+            loads = vec![(0.0, weightless), (GRAVITY_MPS2, level.clone())];
+        }
+        Self { loads, ..level }
     }
 }
 
@@ -99,6 +129,13 @@ impl GripEnvelope for PointMassEnvelope {
             by_speed: if span > 0.0 { (to.0 - from.0) / span } else { 0.0 },
             by_root: from.1 + share * (to.1 - from.1),
         })
+    }
+
+    fn loaded(&self, load_mps2: f64) -> Option<[(f64, &dyn GripEnvelope); 2]> {
+        let after = self.loads.partition_point(|(load, _)| *load <= load_mps2);
+        let after = after.clamp(1, self.loads.len().checked_sub(1).filter(|last| *last > 0)?);
+        let [below, above] = [after - 1, after].map(|i| &self.loads[i]);
+        Some([(below.0, &below.1), (above.0, &above.1)])
     }
 
     fn open(&self) -> Option<&dyn GripEnvelope> {

@@ -397,8 +397,9 @@ impl ReferenceSolvers {
     /// A line through the cross-sections, as it is driven.
     fn driven(&self, alpha: &[f64]) -> Result<Driven> {
         let points = self.cross_sections.points(alpha);
-        let fine = FineLine::new(
+        let fine = FineLine::on(
             &points,
+            self.cross_sections.relief_of(&points).as_deref(),
             self.cross_sections.closed,
             FINE_M,
             Some((&self.car, &self.cross_sections.drs)),

@@ -39,7 +39,7 @@ pub(super) fn add_time(
     });
     let first = program.add_variables(bounds);
     let square = |i: usize| first + i;
-    for (s, h) in shape.length_m.iter().enumerate() {
+    for (s, h) in shape.driven_m().iter().enumerate() {
         let next = (s + 1) % n;
         let sum = speed[s] + speed[next];
         let mut by_length = Vec::new();
@@ -59,19 +59,25 @@ pub(super) fn add_time(
         program.add_square(Affine::change(terms));
     }
     for s in 0..shape.length_m.len() {
-        add_segment(program, map, envelope, shape, lap, (first, s));
+        shape.on_segment(s, lap.bends.ends[s], envelope, |car| {
+            add_segment(program, map, car, shape, lap, (first, s));
+        });
     }
     for i in 0..n {
-        let grip = envelope.at(speed[i].max(f64::MIN_POSITIVE)).lateral;
-        let used = shape.curvature_1pm[i] * squares[i] / grip.value;
-        let by_square = used * (1.0 - 0.5 * speed[i] * grip.by_speed / grip.value);
+        let (grip, lean) = shape.at_point(i, envelope, |car| {
+            let grip = car.at(speed[i].max(f64::MIN_POSITIVE)).lateral;
+            (grip, car.lean_mps2() / grip.value)
+        });
+        let bend = shape.bends_1pm()[i];
+        let used = bend * squares[i] / grip.value + lean;
+        let by_square = used * (1.0 - 0.5 * speed[i] * grip.by_speed / grip.value) - lean;
         // A linear model of grip leaves out the product of the relative changes of curvature and of speed squared. That costs at
         // most half the time spent here times the product, which the squares bound.
         let time = weight * shape.spacing_m[i] / speed[i].max(1.0);
         let caution = (0.25 * caution * time).sqrt();
-        let mut bend = Vec::new();
-        shape.add_curvature(map, i, caution * squares[i] / grip.value, &mut bend);
-        program.add_square(Affine::change(bend));
+        let mut turns = Vec::new();
+        shape.add_curvature(map, i, caution * squares[i] / grip.value, &mut turns);
+        program.add_square(Affine::change(turns));
         program.add_square(Affine::change(vec![(square(i), caution)]));
         // Both signs: on a straight a step may bend the line either way.
         for sign in [1.0, -1.0] {
@@ -80,8 +86,8 @@ pub(super) fn add_time(
             let constant = (1.0 - sign * used).max(0.0);
             program.add_nonnegative(Affine { constant, terms }.merged());
         }
-        if shape.curvature_1pm[i].abs() > envelope.lock_1pm() {
-            let (most, by_curvature) = corner_square(envelope, shape.curvature_1pm[i]);
+        if bend.abs() > envelope.lock_1pm() {
+            let (most, by_curvature) = shape.at_point(i, envelope, |car| corner_square(car, bend));
             let mut terms = vec![(square(i), -squares[i] / most)];
             shape.add_curvature(map, i, by_curvature / most, &mut terms);
             let constant = (1.0 - squares[i] / most).max(0.0);
@@ -102,7 +108,7 @@ fn add_segment(
 ) {
     let envelope = envelope.open().filter(|_| lap.open[s]).unwrap_or(envelope);
     let next = (s + 1) % map.points();
-    let (e0, e1, h) = (lap.square[s], lap.square[next], shape.length_m[s]);
+    let (e0, e1, h) = (lap.square[s], lap.square[next], shape.driven_m()[s]);
     let middle = 0.5 * (e0 + e1);
     let v = middle.sqrt().max(f64::MIN_POSITIVE);
     let grip = envelope.at(v);
@@ -124,7 +130,7 @@ fn add_segment(
         demand / along,
         terms(slope - 0.5 / (h * along), slope + 0.5 / (h * along), by_length),
     );
-    let across = grip.lateral.value;
+    let (across, lean) = (grip.lateral.value, envelope.lean_mps2());
     // After a step the other end may be the tighter one, so both are limited.
     let mixtures = match lap.bends.ends[s] {
         mean @ [0.5, 0.5] => vec![mean],
@@ -134,9 +140,9 @@ fn add_segment(
         let ends = [(s, mixture[0]), (next, mixture[1])];
         let curvature: f64 = ends
             .iter()
-            .map(|(end, share)| share * shape.curvature_1pm[*end])
+            .map(|(end, share)| share * shape.bends_1pm()[*end])
             .sum();
-        let used = curvature * middle / across;
+        let used = (curvature * middle + lean) / across;
         let slope = 0.5 * (curvature / across - used * per_square * grip.lateral.by_speed / across);
         let mut change = terms(slope, slope, 0.0);
         for (end, share) in ends {

@@ -11,10 +11,11 @@ use crate::evaluate::drive::{
     DriveObjective, DriveProblem, DriveSettings, GpuDriveEvaluator, SimdDriveEvaluator,
 };
 use crate::scalar::{Counted, Lookup, operations_of};
-use crate::track::Track;
+use crate::track::{Circuit, Relief, ReliefChange, Track};
 use crate::vehicle::powertrain::GRAVITY_MPS2;
 use crate::vehicle::{Car, CarModel, MagicFormula};
 use rayon::prelude::*;
+use std::f64::consts::TAU;
 use std::sync::Arc;
 
 /// The circuits: bends of one radius between straights, and bends that tighten and open.
@@ -60,15 +61,42 @@ pub fn problem_of(
     step_s: f64,
     parameters: &[&str],
 ) -> Result<DriveProblem> {
-    let circuits = circuits
-        .iter()
-        .map(|name| {
-            let mut circuit = Track::load(name)?.circuit()?;
-            // On straights and in bends, and on the brakes, where the driver shuts the flap.
-            circuit.drs_zones_m = vec![[0.1 * circuit.length_m, 0.6 * circuit.length_m]];
-            Ok(circuit)
-        })
-        .collect::<Result<Vec<_>>>()?;
+    problem_on(car, &circuits_of(circuits)?, paces, step_s, parameters)
+}
+
+fn circuits_of(names: &[&str]) -> Result<Vec<Circuit>> {
+    let circuit = |name: &&str| {
+        let mut circuit = Track::load(name)?.circuit()?;
+        // On straights and in bends, and on the brakes, where the driver shuts the flap.
+        circuit.drs_zones_m = vec![[0.1 * circuit.length_m, 0.6 * circuit.length_m]];
+        Ok(circuit)
+    };
+    names.iter().map(circuit).collect()
+}
+
+/// A circuit with made-up hills, 6 m high, and banking of up to four degrees.
+pub fn in_hills(mut circuit: Circuit) -> Circuit {
+    let angle = |station: &f64| TAU * station / circuit.length_m;
+    let stations = &circuit.station_m;
+    let relief = Relief {
+        z_m: stations
+            .iter()
+            .map(|s| 3.0 * angle(s).sin() + 0.5 * (4.0 * angle(s)).cos())
+            .collect(),
+        bank_rad: stations.iter().map(|s| 0.07 * (2.0 * angle(s)).sin()).collect(),
+        change: ReliefChange::default(),
+    };
+    circuit.relief = Some(relief);
+    circuit
+}
+
+fn problem_on(
+    car: Car,
+    circuits: &[Circuit],
+    paces: &[f64],
+    step_s: f64,
+    parameters: &[&str],
+) -> Result<DriveProblem> {
     let driver = DriverSettings::racing(&car)?;
     let plans: Vec<Vec<SpeedPlan>> = circuits
         .iter()
@@ -254,21 +282,36 @@ fn steps_of(problem: &DriveProblem, cars: &[Vec<f64>]) -> Vec<Step> {
 pub fn layer() -> Result<Layer> {
     let mut car = Car::bundled()?;
     (car.chassis.drs_drag, car.chassis.drs_lift) = (20.0, 10.0);
-    let problem = problem(car, &CIRCUITS, &PACES, STEP)?;
+    let level = circuits_of(&CIRCUITS)?;
+    let hills: Vec<Circuit> = level.iter().cloned().map(in_hills).collect();
     let mut draws = Draws::new(7);
-    let cars = candidates(&problem, COUNT, &mut draws);
-    let names = ["time", "room", "steering"].map(|name| format!("drive, {name}"));
-    let cases = Cases::among_neighbours(names.to_vec(), problem, cars, NEIGHBOURS, &mut draws);
-    // The last car is none that drives.
-    let steps = steps_of(&cases.problem, &cases.candidates[..COUNT - 1]);
+    let mut roads = Vec::new();
+    for (road, circuits) in [("drive", level), ("drive in hills", hills)] {
+        let problem = problem_on(car.clone(), &circuits, &PACES, STEP, &PARAMETERS)?;
+        let cars = candidates(&problem, COUNT, &mut draws);
+        let names = ["time", "room", "steering"].map(|name| format!("{road}, {name}"));
+        let cases = Cases::among_neighbours(names.to_vec(), problem, cars, NEIGHBOURS, &mut draws);
+        // The last car is none that drives.
+        let steps = steps_of(&cases.problem, &cases.candidates[..COUNT - 1]);
+        roads.push((road, cases, steps));
+    }
     Ok(Box::new(move |subject| {
-        let mut agreements = vec![compare_steps(&cases, &steps, subject)?];
-        agreements.extend(cases.compare(subject)?);
+        let mut agreements = Vec::new();
+        for (road, cases, steps) in &roads {
+            let name = format!("{road}, step of the driver");
+            agreements.push(compare_steps(&name, cases, steps, subject)?);
+            agreements.extend(cases.compare(subject)?);
+        }
         Ok(agreements)
     }))
 }
 
-fn compare_steps(cases: &Cases<DriveProblem>, steps: &[Step], subject: &Subject) -> Result<Agreement> {
+fn compare_steps(
+    name: &str,
+    cases: &Cases<DriveProblem>,
+    steps: &[Step],
+    subject: &Subject,
+) -> Result<Agreement> {
     let problem = &cases.problem;
     let cars: Vec<&[f64]> = steps.iter().map(|s| &*cases.candidates[s.car]).collect();
     let from: Vec<[f32; STATE]> = steps.iter().map(|s| s.from).collect();
@@ -278,7 +321,7 @@ fn compare_steps(cases: &Cases<DriveProblem>, steps: &[Step], subject: &Subject)
             GpuDriveEvaluator::new(problem, Arc::clone(context))?.advance(&cars, &from, 1)?
         }
     };
-    let mut agreement = Agreement::new("drive, step of the driver", subject);
+    let mut agreement = Agreement::new(name, subject);
     for (number, (case, found)) in steps.iter().zip(&found).enumerate() {
         // In another row, or ended: the same in both.
         for k in [9, 10, STATE - 1] {

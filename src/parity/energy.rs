@@ -3,6 +3,7 @@
 use super::cases::{Cases, Compared, layer_of};
 use super::lines::with_drs;
 use super::{Draws, Layer};
+use crate::config::kinds::Choice;
 use crate::error::{Error, Result};
 use crate::evaluate::Failure;
 use crate::evaluate::energy::{Free, HybridLine, HybridObjective, HybridProblem, Strategy};

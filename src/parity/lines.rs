@@ -4,9 +4,10 @@ use super::cases::{Cases, Compared, layer_of};
 use super::{Draws, Layer};
 use crate::error::Result;
 use crate::evaluate::line::{LineObjective, LineProblem};
-use crate::line::{Parametrisation, geometry, kernel};
+use crate::line::{Parametrisation, PointMass, geometry, kernel};
 use crate::scalar::{Counted, operations_of};
 use crate::study::raceline::{RacelineSettings, set_up};
+use crate::track::{CrossSections, SectionRelief};
 use crate::vehicle::{Envelope, EnvelopeRow};
 use std::f64::consts::TAU;
 
@@ -117,6 +118,44 @@ pub(super) fn with_drs(envelope: &Envelope, sections: usize) -> Result<(Envelope
     Ok((envelope.clone().with_open(open)?, drs))
 }
 
+/// Cross-sections with made-up hills and banking, and the car with made-up limits under loads.
+///
+/// # Errors
+/// None in practice: the made-up limits are within those of the car.
+pub fn in_relief(road: &CrossSections, car: &PointMass) -> Result<(CrossSections, PointMass)> {
+    let n = road.len();
+    let angle = |i: usize| TAU * i as f64 / n as f64;
+    let relief = SectionRelief {
+        foot_m: road.points(&vec![0.5; n]),
+        z_m: (0..n)
+            .map(|i| 15.0 * angle(i).sin() + 4.0 * (7.0 * angle(i)).cos())
+            .collect(),
+        bank_rad: (0..n).map(|i| 0.1 * (5.0 * angle(i)).sin()).collect(),
+    };
+    let under = |share: f64| {
+        let grip = share.powf(0.9);
+        let limits = car
+            .envelope
+            .with_rows(car.envelope.name(), &|_, row| EnvelopeRow {
+                ay_mps2: grip * row.ay_mps2,
+                ax_grip_mps2: grip * row.ax_grip_mps2,
+                ..*row
+            })?;
+        Ok((share, limits))
+    };
+    let loads = [0.6, 1.0, 1.4].map(under).into_iter().collect::<Result<_>>()?;
+    let road = CrossSections {
+        relief: Some(relief),
+        ..road.clone()
+    };
+    let car = PointMass {
+        envelope: car.envelope.clone().with_loads(loads)?,
+        relief: true,
+        ..car.clone()
+    };
+    Ok((road, car))
+}
+
 /// The layer.
 ///
 /// # Errors
@@ -146,5 +185,14 @@ pub(super) fn layer() -> Result<Layer> {
         let names = LineObjective::ALL.map(|objective| format!("line, {}, {way}", objective.name()));
         Ok(Cases::new(names.to_vec(), problem, lines, &[]))
     });
-    Ok(layer_of(cases.collect::<Result<_>>()?))
+    let mut cases = cases.collect::<Result<Vec<_>>>()?;
+    let (cross_sections, car) = in_relief(&setup.cross_sections, &setup.car)?;
+    let car = Some(car);
+    let way = Parametrisation::control_points(SECTIONS / 4);
+    let problem = LineProblem::new(cross_sections, way, &LineObjective::ALL, car, 30.0)?;
+    let dimensions = problem.dimensions();
+    let lines = (0..COUNT).map(|_| line(dimensions, &mut draws)).collect();
+    let names = LineObjective::ALL.map(|objective| format!("line, {}, hills", objective.name()));
+    cases.push(Cases::new(names.to_vec(), problem, lines, &[]));
+    Ok(layer_of(cases))
 }

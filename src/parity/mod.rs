@@ -15,7 +15,7 @@ pub mod steady;
 pub mod step;
 pub mod synthetic_lap;
 
-pub use lines::line_tolerances;
+pub use lines::{in_relief, line_tolerances};
 
 use crate::error::{Error, Result};
 use crate::evaluate::gpu::shader::{WheelOrder, car_fragments, elementary, loaders};

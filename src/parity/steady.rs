@@ -48,13 +48,21 @@ const DETERMINED: f64 = 0.02;
 /// # Errors
 /// [`crate::Error::Input`] naming a parameter that the car lacks.
 pub fn problem(car: Car) -> Result<SteadyProblem> {
+    problem_by(car, &SteadyObjective::ALL)
+}
+
+/// The same by these objectives.
+///
+/// # Errors
+/// As [`problem`].
+pub fn problem_by(car: Car, objectives: &[SteadyObjective]) -> Result<SteadyProblem> {
     let names = match car.tyre_model() {
         TyreModel::MagicFormula => PARAMETERS[0],
         TyreModel::Linear => PARAMETERS[1],
     };
     let free = free_about(&car, names, SHARE)?;
     let lock = car.max_steer_rad;
-    SteadyProblem::new(car, free, SPEEDS, [-lock, lock], &SteadyObjective::ALL)
+    SteadyProblem::new(car, free, SPEEDS, [-lock, lock], objectives)
 }
 
 /// A candidate's car as kernels read it.

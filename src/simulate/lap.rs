@@ -1,14 +1,14 @@
 //! A simulated log: the driver's inputs and the model's outputs.
 
 use super::sensors::{SensorSettings, distort};
-use crate::drive::{DriverSettings, drive};
+use crate::drive::{Drive, DriverSettings, drive};
 use crate::error::{Error, Result};
 use crate::evaluate::replay::{Norm, Plan, Sample, Traced, Window, initial_state, step_fractions, trace};
 use crate::telemetry::{Calibration, Lap, Log};
 use crate::track::Circuit;
-use crate::vehicle::Car;
 use crate::vehicle::modes::{fastest_mode, stable_steps};
-use crate::vehicle::wheels::{Moment, moments_of};
+use crate::vehicle::wheels::{Moment, moments_of, moments_under};
+use crate::vehicle::{Car, CarState};
 
 /// How a lap is simulated and logged.
 #[derive(Clone, Debug, PartialEq)]
@@ -140,48 +140,32 @@ pub fn simulate_lap(car: &Car, circuit: &Circuit, settings: &SimulateSettings) -
             ),
         ));
     }
-    let plan = Plan {
-        samples: samples.clone(),
-        windows: vec![window],
-        step: interval / substeps as f64,
-        fractions: step_fractions(substeps),
-        norm: Norm::Two,
+    let (outputs, moments) = if lap.loads_mps2.is_empty() {
+        replayed(car, (&lap, &samples), &window, substeps, settings)?
+    } else {
+        // A replay of the inputs knows no road. The log is that of the lap driven.
+        let driven = lap.states.iter().map(|state| CarState::from_array(*state));
+        let driven: Vec<_> = driven.zip(lap.inputs.iter().copied()).collect();
+        let moments = moments_under(car, &driven, &lap.loads_mps2);
+        let outputs = driven.iter().zip(&moments).map(|((state, _), moment)| {
+            let body = &state.body;
+            [body.vx, moment.ax_mps2, moment.ay_mps2, body.yaw_rate]
+        });
+        (outputs.collect(), moments)
     };
-    let Traced {
-        outputs,
-        states,
-        drives,
-    } = trace(&flat, car.tyre_model(), &plan, &window);
-    if !drives {
-        return Err(Error::Study(format!(
-            "the car, replayed open loop from its logged inputs at {} Hz in {substeps} steps per sample, is lost; try \
-             more steps per sample, a higher rate or a lower pace than {}",
-            settings.rate_hz, settings.driver.pace
-        )));
-    }
-    let most = lap.states.iter().map(|s| s[2].abs()).fold(0.0, f64::max);
-    let apart = outputs.iter().zip(&lap.states).map(|(o, s)| (o[3] - s[2]).abs());
-    let apart = apart.fold(0.0, f64::max) / most;
-    if apart > MOST_APART {
-        return Err(Error::Study(format!(
-            "the car, replayed open loop from its logged inputs at {} Hz in {substeps} steps per sample, leaves the lap that was \
-             driven: its yaw rate is off by {:.0} % of the lap's greatest, where {:.0} % may be; try more steps per sample or a \
-             higher rate",
-            settings.rate_hz,
-            100.0 * apart,
-            100.0 * MOST_APART
-        )));
-    }
-    let driven = states.iter().copied().zip(samples.iter().map(Sample::input));
-    let moments = moments_of(car, &driven.collect::<Vec<_>>());
     for (sample, output) in samples.iter_mut().zip(outputs) {
         sample.measured = output;
     }
     distort(&mut samples, interval, &settings.sensors, settings.seed);
 
     let column = |k: usize| samples.iter().map(|s| s.measured[k]).collect();
+    let road = if lap.loads_mps2.is_empty() {
+        ""
+    } else {
+        " in three dimensions"
+    };
     let log = Log {
-        source: format!("{} on {}, simulated", car.name, circuit.name),
+        source: format!("{} on {}{road}, simulated", car.name, circuit.name),
         dt_s: interval,
         time_s: (0..samples.len()).map(|i| i as f64 * interval).collect(),
         distance_m: lap.station_m,
@@ -207,4 +191,51 @@ pub fn simulate_lap(car: &Car, circuit: &Circuit, settings: &SimulateSettings) -
         substeps,
         moments,
     })
+}
+
+/// Outputs of a replay of the logged inputs, and what the tyres did in it.
+fn replayed(
+    car: &Car,
+    (lap, samples): (&Drive, &[Sample<f64>]),
+    window: &Window<f64>,
+    substeps: usize,
+    settings: &SimulateSettings,
+) -> Result<(Vec<[f64; 4]>, Vec<Moment>)> {
+    let flat = car.to_flat();
+    let interval = 1.0 / settings.rate_hz;
+    let plan = Plan {
+        samples: samples.to_vec(),
+        windows: vec![*window],
+        step: interval / substeps as f64,
+        fractions: step_fractions(substeps),
+        norm: Norm::Two,
+    };
+    let Traced {
+        outputs,
+        states,
+        drives,
+    } = trace(&flat, car.tyre_model(), &plan, window);
+    if !drives {
+        return Err(Error::Study(format!(
+            "the car, replayed open loop from its logged inputs at {} Hz in {substeps} steps per sample, is lost; try \
+             more steps per sample, a higher rate or a lower pace than {}",
+            settings.rate_hz, settings.driver.pace
+        )));
+    }
+    let most = lap.states.iter().map(|s| s[2].abs()).fold(0.0, f64::max);
+    let apart = outputs.iter().zip(&lap.states).map(|(o, s)| (o[3] - s[2]).abs());
+    let apart = apart.fold(0.0, f64::max) / most;
+    if apart > MOST_APART {
+        return Err(Error::Study(format!(
+            "the car, replayed open loop from its logged inputs at {} Hz in {substeps} steps per sample, leaves the lap that was \
+             driven: its yaw rate is off by {:.0} % of the lap's greatest, where {:.0} % may be; try more steps per sample or a \
+             higher rate",
+            settings.rate_hz,
+            100.0 * apart,
+            100.0 * MOST_APART
+        )));
+    }
+    let driven = states.iter().copied().zip(samples.iter().map(Sample::input));
+    let moments = moments_of(car, &driven.collect::<Vec<_>>());
+    Ok((outputs, moments))
 }

@@ -5,6 +5,7 @@ pub mod framework;
 pub mod hybrid;
 pub mod identify;
 pub mod raceline;
+mod ranges;
 pub mod registry;
 mod replayed;
 pub mod reproduce;
@@ -13,3 +14,5 @@ pub mod sensitivity;
 pub mod surface;
 pub mod sweep;
 pub mod transient;
+
+pub use ranges::OwnRange;

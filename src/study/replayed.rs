@@ -15,7 +15,15 @@ use crate::vehicle::Car;
 pub(in crate::study) fn replay_settings(
     renamed: &'static [(&'static str, Flag)],
 ) -> Shared<IdentifySettings> {
-    const OTHER: [&str; 6] = ["truth", "objectives", "holdout", "free", "free_from", "most"];
+    const OTHER: [&str; 7] = [
+        "truth",
+        "model",
+        "objectives",
+        "holdout",
+        "free",
+        "free_from",
+        "most",
+    ];
     let without = |d: &Declared| (d.role == Role::Search && d.key != "seed") || OTHER.contains(&d.key);
     shared().without_flags(without).renamed(renamed)
 }
@@ -55,7 +63,7 @@ pub(in crate::study) fn ranges_about(
     names: &[String],
     share: f64,
 ) -> Result<Vec<FreeParameter>> {
-    let car = Car::load(&settings.car)?;
+    let car = settings.model.of(Car::load(&settings.car)?);
     let flat = car.to_flat();
     names
         .iter()

@@ -7,7 +7,9 @@ use super::{FrontSwarm, Optimiser, Progress, step};
 use crate::error::Result;
 #[cfg(feature = "gpu")]
 use crate::evaluate::GpuBackend;
-use crate::evaluate::{BackendChoice, DeviceFaults, Evaluator, Losses, OnDevice, open_evaluator};
+use crate::evaluate::{
+    BackendChoice, BackendInfo, DeviceFaults, Evaluator, Losses, OnDevice, open_evaluator,
+};
 use serde::{Deserialize, Serialize};
 
 #[cfg(feature = "gpu")]
@@ -18,6 +20,8 @@ use super::device::{DeviceMopso, DeviceObjectives};
 use crate::error::Error;
 #[cfg(feature = "gpu")]
 use crate::evaluate::gpu::GpuContext;
+#[cfg(feature = "gpu")]
+use crate::evaluate::simd::InstructionSet;
 
 /// A swarm off its device, and what went wrong until then: all that it takes to go on.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -108,6 +112,23 @@ impl<'a> SwarmAtWork<'a> {
         let evaluator = open_evaluator(kind, choice, adapter)?;
         let faults = DeviceFaults::beyond(known, evaluator.as_ref());
         Ok(begin(Place::Host(evaluator, faults), state))
+    }
+
+    /// What evaluates it now.
+    pub fn backend(&self) -> BackendInfo {
+        match &self.place {
+            Place::Host(evaluator, _) => evaluator.backend(),
+            #[cfg(feature = "gpu")]
+            Place::Device(resident) => match &resident.on_board {
+                Some((swarm, _)) => swarm.backend(),
+                None => BackendInfo::of_lanes(InstructionSet::best()),
+            },
+        }
+    }
+
+    /// Iterations that it is to have.
+    pub fn planned_iterations(&self) -> usize {
+        self.state.swarm.planned_iterations()
     }
 
     /// Whether its planned iterations are done.

@@ -29,8 +29,11 @@ pub use crate::evaluate::resident::{BLOCK, DeviceObjectives};
 const SAMPLE: usize = 64 * BLOCK;
 /// The most points of it.
 const SAMPLE_FRONT: usize = 512;
-/// Bytes before the points of the list of those found.
-const HEADER: u64 = 16;
+/// Failures that are told apart.
+const REASONS: usize = 15;
+/// Bytes before the points of the list of those found: their number, and the failures by reason.
+const HEADER: u64 = 4 * (1 + REASONS as u64);
+const _: () = assert!(Failure::WORDS.len() <= REASONS && HEADER.is_multiple_of(16));
 
 /// `n` rows of `width` out of blocks.
 fn row_major(blocks: &[f32], n: usize, width: usize) -> Vec<f64> {
@@ -119,10 +122,6 @@ impl DeviceMopso {
                 expected,
             ));
         }
-        if let Some(v) = problem.variables.iter().find(|v| v.whole) {
-            let expected = "a swarm on a device moves real numbers only";
-            return Err(Error::input("the problem", &v.name, "whole numbers", expected));
-        }
         let archive = settings.empty_archive(width)?;
         let (swarm, scatter) = Self::unborn(settings, space, archive, width, context)?;
         swarm.dispatch(&scatter, 0)?;
@@ -141,12 +140,12 @@ impl DeviceMopso {
         let d = space.dimensions();
         let bindings = [Uniform, Read, Write, Write, Write, Write, Write, Write];
         let source = swarm();
-        let kernel = |entry: &str| context.kernel(&source, entry, &bindings);
+        let kernel = |entry: &str| context.own_kernel(&source, entry, &bindings);
         let scatter = kernel("scatter")?;
         let kernels = Kernels {
             learn: kernel("learn")?,
             advance: kernel("advance")?,
-            gather: context.kernel(&swarm_gather(), "gather", &[Uniform, Read, Read, Write])?,
+            gather: context.own_kernel(&swarm_gather(), "gather", &[Uniform, Read, Read, Write])?,
         };
         let n = settings.motion.population;
         let lanes = n.next_multiple_of(BLOCK) as u64;
@@ -307,19 +306,27 @@ impl DeviceMopso {
         (3 * self.space.dimensions() + 2 * self.objectives) * size_of::<f32>() + 16
     }
 
-    /// Runs a kernel of the swarm for the present iteration against so many members.
-    fn dispatch(&self, kernel: &Kernel, members: usize) -> Result<()> {
+    /// Tells the kernels of the present iteration and of so many members.
+    fn announce(&self, members: usize) {
         let sizes = (self.space.dimensions(), self.objectives, members);
         let generation = Generation::new(&self.settings, sizes, self.counters.iteration);
         self.context
             .write(&self.buffers.generation, bytemuck::bytes_of(&generation));
+    }
+
+    /// Records a kernel of the swarm, a lane to a particle.
+    fn record(&self, encoder: &mut wgpu::CommandEncoder, kernel: &Kernel) {
         let (x, y) = groups(self.settings.motion.population);
-        self.context.run(|encoder| {
-            let mut pass = encoder.begin_compute_pass(&Default::default());
-            pass.set_pipeline(&kernel.pipeline);
-            pass.set_bind_group(0, &self.buffers.swarm, &[]);
-            pass.dispatch_workgroups(x, y, 1);
-        })
+        let mut pass = encoder.begin_compute_pass(&Default::default());
+        pass.set_pipeline(&kernel.pipeline);
+        pass.set_bind_group(0, &self.buffers.swarm, &[]);
+        pass.dispatch_workgroups(x, y, 1);
+    }
+
+    /// Runs a kernel of the swarm for the present iteration against so many members.
+    fn dispatch(&self, kernel: &Kernel, members: usize) -> Result<()> {
+        self.announce(members);
+        self.context.run(|encoder| self.record(encoder, kernel))
     }
 
     /// The first `bytes` of a buffer.
@@ -339,13 +346,27 @@ impl DeviceMopso {
         Ok(thinned(learn_from(&plain, width), width, SAMPLE_FRONT, None))
     }
 
-    /// The particles that may enter the archive, and how many have failed.
-    fn found(&self) -> Result<(Vec<Point>, usize)> {
-        let counts: Vec<u32> = self.read(&self.buffers.found, 8)?;
-        let failed = counts[1] as usize;
+    /// Lets personal bests learn against so many members of the archive; the particles that may enter it, and those that have failed by
+    /// reason.
+    fn learn(&self, members: usize) -> Result<(Vec<Point>, FailureCounts)> {
+        let Buffers { found, readback, .. } = &self.buffers;
+        self.context.write(found, &[0; HEADER as usize]);
+        self.announce(members);
+        let counts: Vec<u32> = self.context.run_and_read_back(
+            |encoder| self.record(encoder, &self.kernels.learn),
+            (found, 0),
+            (readback, HEADER),
+            bytemuck::pod_collect_to_vec,
+        )?;
+        let failures = Failure::WORDS
+            .iter()
+            .zip(&counts[1..])
+            .filter(|(_, count)| **count > 0)
+            .map(|(word, count)| ((*word).to_owned(), u64::from(*count)))
+            .collect();
         let count = u64::from(counts[0]).min(self.settings.motion.population as u64);
         if count == 0 {
-            return Ok((Vec::new(), failed));
+            return Ok((Vec::new(), failures));
         }
         let words: Vec<u32> = self.read(&self.buffers.found, HEADER + 16 * count)?;
         let of = |word: u32| f64::from(f32::from_bits(word));
@@ -353,7 +374,7 @@ impl DeviceMopso {
             at: [of(p[1]), of(p[2]), of(p[3])],
             who: p[0],
         });
-        Ok((points.collect(), failed))
+        Ok((points.collect(), failures))
     }
 
     /// Positions of these particles.
@@ -369,17 +390,21 @@ impl DeviceMopso {
         );
         self.context
             .write(&self.buffers.chosen, bytemuck::cast_slice(&who));
-        self.context.run(|encoder| {
-            let mut pass = encoder.begin_compute_pass(&Default::default());
-            pass.set_pipeline(&self.kernels.gather.pipeline);
-            pass.set_bind_group(0, &self.buffers.gather, &[]);
-            pass.dispatch_workgroups((points.len() as u32).div_ceil(64), 1, 1);
-        })?;
-        self.read(&self.buffers.rows, (points.len() * d * 4) as u64)
+        self.context.run_and_read_back(
+            |encoder| {
+                let mut pass = encoder.begin_compute_pass(&Default::default());
+                pass.set_pipeline(&self.kernels.gather.pipeline);
+                pass.set_bind_group(0, &self.buffers.gather, &[]);
+                pass.dispatch_workgroups((points.len() as u32).div_ceil(64), 1, 1);
+            },
+            (&self.buffers.rows, 0),
+            (&self.buffers.readback, (points.len() * d * 4) as u64),
+            bytemuck::pod_collect_to_vec,
+        )
     }
 
     /// One generation: evaluates the particles by `objectives`, lets archive and personal bests learn, moves. A particle has failed
-    /// whose objectives are not finite numbers in single precision.
+    /// whose objectives say so, or are not finite numbers in single precision.
     ///
     /// # Errors
     /// [`Error::Device`] if the device fails.
@@ -418,9 +443,7 @@ impl DeviceMopso {
         table.extend(members.iter().flatten().map(|x| *x as f32));
         self.context
             .write(&self.buffers.archive, bytemuck::cast_slice(&table));
-        self.context.write(&self.buffers.found, &[0; HEADER as usize]);
-        self.dispatch(&self.kernels.learn, members.len())?;
-        let (mut points, failed) = self.found()?;
+        let (mut points, failures) = self.learn(members.len())?;
         // They were among the members, so that the list leaves them out.
         points.extend(sample);
         let points = thinned(
@@ -441,19 +464,17 @@ impl DeviceMopso {
             &self.buffers.archive,
             bytemuck::cast_slice(&leaders(&self.archive)),
         );
-        self.dispatch(&self.kernels.advance, self.archive.len())?;
-        let mut failures = FailureCounts::new();
-        if failed > 0 {
-            let reason = Failure::BeyondSinglePrecision.word().to_owned();
-            failures.insert(reason, failed as u64);
-        }
+        // The host goes on meanwhile: the evaluation that follows waits for it.
+        self.announce(self.archive.len());
+        self.context
+            .run_ahead(|encoder| self.record(encoder, &self.kernels.advance))?;
         Ok(Progress {
             iteration: self.counters.iteration,
             evaluations: self.counters.evaluations,
             best: self.best(),
             violation: self.archive.violation(),
             median: None,
-            failed,
+            failed: failures.values().sum::<u64>() as usize,
             failures,
         })
     }

@@ -4,7 +4,7 @@ use super::{
     Counters, Front, Islands, Migration, Mopso, MopsoSettings, Nsga2, Nsga2Settings, Optimiser, SwarmPlace,
 };
 use crate::error::{Error, Result};
-use crate::evaluate::{Evaluation, Problem};
+use crate::evaluate::{BackendChoice, Evaluation, Problem};
 use serde::{Deserialize, Serialize};
 
 /// How solutions move between the islands of a study.
@@ -43,6 +43,53 @@ impl FrontSearch {
         };
         let found = format!("{}, {reason}", self.islands);
         Err(setting("islands", found, "1, or a swarm of several objectives"))
+    }
+
+    /// Whether the swarm of so many objectives lives on the device, if candidates are evaluated by that backend and adapter and
+    /// there is room.
+    ///
+    /// # Errors
+    /// [`Error::Input`] with the reason if the device is asked for and cannot be had.
+    pub fn wants_device(
+        self,
+        place: SwarmPlace,
+        objectives: usize,
+        settings: &MopsoSettings,
+        backend: (BackendChoice, Option<&str>),
+    ) -> Result<bool> {
+        let reason = if self.genetic {
+            "algorithm nsga2"
+        } else if self.islands > 1 {
+            "islands"
+        } else if settings.motion.mutation.tries() {
+            "mutation whose trials are evaluated one by one"
+        } else {
+            return place.on_device(backend, settings.motion.population, objectives);
+        };
+        if place == SwarmPlace::Device {
+            let found = format!("device, with {reason}");
+            return Err(Error::input("the study", "swarm", found, "host or auto"));
+        }
+        Ok(false)
+    }
+
+    /// The same for this problem, where the device has room for it.
+    ///
+    /// # Errors
+    /// Those of [`FrontSearch::wants_device`]; [`Error::Input`] with what fits if the device is asked for and has no room; those of
+    /// a device that does not open.
+    pub fn on_device(
+        self,
+        place: SwarmPlace,
+        problem: &Problem,
+        settings: &MopsoSettings,
+        backend: (BackendChoice, Option<&str>),
+    ) -> Result<bool> {
+        let population = settings.motion.population;
+        Ok(
+            self.wants_device(place, problem.objectives.len(), settings, backend)?
+                && place.has_room(backend.1, population, problem.variables.len())?,
+        )
     }
 
     /// The search, with seeds of islands that follow one another.

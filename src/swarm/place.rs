@@ -8,7 +8,8 @@ use serde::{Deserialize, Serialize};
 /// Where the particles of a swarm of several objectives live. On a device, neither candidates nor objectives cross the bus.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum SwarmPlace {
-    /// On the device from [`MANY`] particles on, where the backend is one GPU that has room for them; else on the host.
+    /// On the device from [`MANY`] particles on, where the backend is one GPU that has room for them; else on the host. A software
+    /// driver moves particles in several times the time that the host takes in lanes (`lapswarm bench whole`).
     #[default]
     Auto,
     /// On the host.
@@ -60,7 +61,8 @@ impl SwarmPlace {
         }
     }
 
-    /// Whether a swarm that may live on the device has room there for so many variables to a particle.
+    /// Whether a swarm that may live on the device has room there for so many variables to a particle and, unless it is asked to,
+    /// gains by it.
     ///
     /// # Errors
     /// [`Error::Input`] with what fits if the device is asked for and has none; those of a device that does not open.
@@ -85,7 +87,8 @@ impl SwarmPlace {
                 expected,
             ));
         }
-        Ok(population <= most)
+        let gains = self == Self::Device || context.summary().kind.is_real();
+        Ok(population <= most && gains)
     }
 
     /// No device has any.

@@ -49,9 +49,7 @@ impl Space {
             ));
         }
         let variables = problem.variables.clone();
-        let free = (0..variables.len())
-            .filter(|&k| variables[k].upper > variables[k].lower)
-            .collect();
+        let free = (0..variables.len()).filter(|&k| variables[k].is_free()).collect();
         Ok(Self { variables, free })
     }
 
@@ -87,7 +85,7 @@ impl Space {
         for (row, &k) in positions.chunks_exact(lanes).zip(&self.free) {
             let v = &self.variables[k];
             for (candidate, x) in candidates.chunks_exact_mut(width).zip(row) {
-                candidate[k] = value(v, f64::from(*x));
+                candidate[k] = v.at(f64::from(*x));
             }
         }
     }
@@ -99,7 +97,7 @@ impl Space {
         let mut candidates: Vec<f64> = (0..count).flat_map(|_| fixed.clone()).collect();
         for (row, candidate) in candidates.chunks_exact_mut(self.variables.len()).enumerate() {
             for (j, &k) in self.free.iter().enumerate() {
-                candidate[k] = value(&self.variables[k], positions[row * d + j]);
+                candidate[k] = self.variables[k].at(positions[row * d + j]);
             }
         }
         candidates
@@ -153,16 +151,4 @@ impl Space {
         };
         self.free.iter().map(share).collect()
     }
-}
-
-/// What a coordinate of the cube stands for: each whole number for as much of it as the others, if only those will do.
-#[inline(always)]
-fn value(v: &Variable, position: f64) -> f64 {
-    let range = v.upper - v.lower;
-    let value = if v.whole {
-        v.lower + (position * (range + 1.0)).floor()
-    } else {
-        v.lower + position * range
-    };
-    value.min(v.upper)
 }

@@ -23,7 +23,7 @@ pub(super) struct Signal<'a> {
     pub mapped: Mapped<'a>,
     times: Arc<[f64]>,
     nominal_s: f64,
-    values: Cow<'a, [f64]>,
+    pub values: Cow<'a, [f64]>,
     /// Delay that is subtracted from its times, s.
     pub delay_s: f64,
 }
@@ -68,7 +68,10 @@ pub(super) fn signals<'a>(
         } else {
             channel.values.iter().map(|v| v * factor).collect()
         };
-        check_magnitude(source, m, &values)?;
+        // Steering is checked once it is known which angle it is.
+        if m.role != Role::Steer {
+            check_magnitude(source, m, &values)?;
+        }
         signals.push(Signal {
             mapped: *m,
             times,

@@ -5,10 +5,11 @@
 
 use super::calibration::{CalibrationOptions, Declared, Finding, FindingKind, Switch};
 use super::derived::{
-    STRAIGHT_YAW, SURE_OF_SIGN, UNBRAKED_AX, acceleration, front_difference, moving, product, unbraked,
+    MOVING_MPS, STRAIGHT_YAW, SURE_OF_SIGN, UNBRAKED_AX, acceleration, front_difference, moving, product,
+    unbraked,
 };
 use super::laps::Lap;
-use super::log::Log;
+use super::log::{Log, Steering};
 use super::role::Role;
 use super::statistics::{Fit, derivative, fit, regression};
 use std::f64::consts::TAU;
@@ -36,6 +37,8 @@ const ROLLING_MPS: f64 = 12.0;
 const LEAST_RADIUS: [f64; 2] = [0.002, 0.01];
 /// Half of the interval over which speed is differentiated for slip, s.
 const SLIP_S: f64 = 0.3;
+/// The steering wheel's angle is told from the road wheels' by this many standard errors, at least.
+const SURE_RATIO: f64 = 4.0;
 /// Radii are off by this many standard errors, at least.
 const SURE_RADIUS: f64 = 4.0;
 
@@ -158,6 +161,51 @@ fn values_mut(log: &mut Log, role: Role) -> &mut [f64] {
         Role::YawRate => &mut log.yaw_rate_radps,
         _ => &mut [],
     }
+}
+
+/// Tells the steering wheel's angle from the road wheels': the yaw rate needs `L r / v` at the road wheels, and what understeer adds
+/// goes with the lateral acceleration. What is nearer to the car's ratio than to one, by more than the standard errors, is the
+/// steering wheel's, and is divided by that ratio, which is returned.
+pub(super) fn steering_ratio(log: &mut Log, steering: Steering) -> Option<f64> {
+    let moving = moving(log);
+    let speeds = log.vx_mps.iter().zip(&log.yaw_rate_radps);
+    let needed: Vec<f64> = speeds
+        .map(|(&v, r)| steering.wheelbase_m * r / v.max(MOVING_MPS))
+        .collect();
+    let turning = product(&log.vx_mps, &log.yaw_rate_radps);
+    let found = regression(&log.steer_rad, [&needed, &turning], &moving)?;
+    let (value, standard_error) = (found.factors[0].abs(), found.standard_errors[0]);
+    let threshold = steering.ratio.sqrt();
+    let applied = steering.ratio > 1.0 && value - SURE_RATIO * standard_error > threshold;
+    let evidence = format!(
+        "against the yaw rate over speed; taken as the {}",
+        if applied {
+            format!(
+                "steering wheel's angle and divided by the car's ratio of {}",
+                steering.ratio
+            )
+        } else {
+            "road wheels' angle".to_owned()
+        }
+    );
+    log.calibration.findings.push(Finding {
+        role: Role::Steer,
+        kind: FindingKind::SteeringRatio,
+        value,
+        standard_error: Some(standard_error),
+        threshold: Some(threshold),
+        applied,
+        correlation: None,
+        samples: found.samples,
+        evidence,
+    });
+    if !applied {
+        return None;
+    }
+    for angle in &mut log.steer_rad {
+        *angle /= steering.ratio;
+    }
+    Some(steering.ratio)
 }
 
 /// An offset with its standard error, what tells it, and the number of samples behind it.

@@ -84,6 +84,8 @@ pub enum FindingKind {
     Offset,
     /// Ground speed over angular speed of a freely rolling wheel, m.
     RollingRadius,
+    /// Steering over the road wheels' angle that the yaw rate needs.
+    SteeringRatio,
     /// Slope of the channel on what it should equal; 1 is right. It is never applied.
     Gain,
 }
@@ -120,6 +122,7 @@ impl std::fmt::Display for Finding {
             FindingKind::Delay => write!(f, "{channel}: delay {value:.4} s")?,
             FindingKind::Offset => write!(f, "{channel}: zero offset {value:.5} {}", self.role.si_unit())?,
             FindingKind::RollingRadius => write!(f, "{channel}: rolling radius {value:.5} m")?,
+            FindingKind::SteeringRatio => write!(f, "{channel}: {value:.2} times the road wheels' angle")?,
             FindingKind::Gain => write!(f, "{channel}: {value:.3} times what it should equal")?,
         }
         if let Some(error) = self.standard_error {

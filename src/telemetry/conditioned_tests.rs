@@ -7,6 +7,7 @@ use super::{
     Calibration, CalibrationOptions, ChannelMap, FindingKind, Log, LogOptions, Recording, Role, Switch,
 };
 use crate::random::Random;
+use crate::vehicle::Car;
 
 /// The car that drove the bundled lap.
 const RADII: [f64; 2] = [0.325, 0.325];
@@ -17,10 +18,9 @@ fn read(text: &str, map: &str, options: &LogOptions) -> Log {
 }
 
 fn options() -> LogOptions {
-    LogOptions {
-        rolling_radius_m: Some(RADII),
-        ..LogOptions::default()
-    }
+    let of_car = LogOptions::of(&Car::bundled().unwrap());
+    assert_eq!(of_car.rolling_radius_m, Some(RADII));
+    of_car
 }
 
 fn as_logged() -> LogOptions {
@@ -302,6 +302,45 @@ fn swapped_signs_are_found() {
             assert_eq!(applied.len(), 1, "{applied:?}");
         }
     }
+}
+
+/// The bundled car's ratio is 14; the logger's own scale may be a tenth off. The road wheels' angle is never divided:
+/// `a_log_that_is_right_comes_through_bit_for_bit`.
+#[test]
+fn the_steering_wheels_angle_is_told_from_the_road_wheels() {
+    for (ratio, seed) in [(14.0, 1), (-14.0, 2), (12.6, 3), (15.4, 4)] {
+        let mut log = noisy(perfect(), seed);
+        let at_the_wheels = log.steer_rad.clone();
+        for angle in &mut log.steer_rad {
+            *angle *= ratio;
+        }
+        let found = conditioned(&log);
+        let finding = found
+            .calibration
+            .finding(Role::Steer, FindingKind::SteeringRatio)
+            .unwrap();
+        assert!(finding.applied, "{finding}");
+        // What is left of understeer in it is a fifth.
+        assert!((finding.value / ratio.abs() - 1.0).abs() < 0.2, "{finding}");
+        for (angle, before) in found.steer_rad.iter().zip(&at_the_wheels) {
+            assert!((angle - before * ratio.abs() / 14.0).abs() < 1e-9);
+        }
+    }
+}
+
+#[test]
+fn a_ratio_of_the_channel_map_is_not_judged() {
+    let mut log = perfect();
+    for angle in &mut log.steer_rad {
+        *angle *= 3.0;
+    }
+    let log = read(&exported(&log), "[vehicle]\nsteering_ratio = 3.0\n", &options());
+    assert!(
+        log.calibration
+            .finding(Role::Steer, FindingKind::SteeringRatio)
+            .is_none()
+    );
+    assert!((log.steer_rad[700] - perfect().steer_rad[700]).abs() < 1e-9);
 }
 
 #[test]

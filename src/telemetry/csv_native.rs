@@ -372,6 +372,10 @@ mod tests {
                 rate_hz: Some(25.0),
                 rolling_radius_m: Some([0.3, 0.31]),
                 radius_is_free: [false, true],
+                steering: Some(crate::telemetry::Steering {
+                    ratio: 14.0,
+                    wheelbase_m: 2.6,
+                }),
                 bridge_gaps_s: 1e6,
                 calibration: crate::telemetry::CalibrationOptions::all(crate::telemetry::Switch::On),
             }] {

@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use super::calibration::{Calibration, CalibrationOptions};
 use super::laps::Lap;
+use crate::vehicle::Car;
 use crate::{Error, Result};
 
 /// How a recording is turned into a [`Log`].
@@ -16,10 +17,36 @@ pub struct LogOptions {
     pub bridge_gaps_s: f64,
     /// The rolling radii (m) of the front and the rear wheels of the car being identified: wheel speeds are referred to them.
     pub rolling_radius_m: Option<[f64; 2]>,
+    /// The steering of the car being identified: it tells a log of the steering wheel's angle from one of the road wheels', where the
+    /// channel map gives no ratio.
+    pub steering: Option<Steering>,
     /// Whether the study finds the radius of the front or the rear wheels itself: then their mean speed is left as logged.
     pub radius_is_free: [bool; 2],
     /// The corrections that are estimated from the log.
     pub calibration: CalibrationOptions,
+}
+
+/// What a car's steering does at low lateral acceleration.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Steering {
+    /// Steering-wheel angle over road-wheel angle.
+    pub ratio: f64,
+    /// Distance between the axles, m.
+    pub wheelbase_m: f64,
+}
+
+impl LogOptions {
+    /// For a log of a car: its rolling radii and its steering.
+    pub fn of(car: &Car) -> Self {
+        Self {
+            rolling_radius_m: Some([car.chassis.radius_front, car.chassis.radius_rear]),
+            steering: Some(Steering {
+                ratio: car.steering_ratio,
+                wheelbase_m: car.chassis.cg_to_front + car.chassis.cg_to_rear,
+            }),
+            ..Self::default()
+        }
+    }
 }
 
 /// A log on one uniform clock, in SI and ISO 8855: x forward, y left, yaw anticlockwise and steering to the left

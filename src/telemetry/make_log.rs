@@ -3,9 +3,9 @@
 use std::borrow::Cow;
 use std::path::Path;
 
-use super::audit::{check_gains, frozen_tail_s};
+use super::audit::{check_gains, check_magnitude, frozen_tail_s};
 use super::build::{Build, RATES_HZ, alike, one_clock, signals};
-use super::calibrate;
+use super::calibrate::{self, steering_ratio};
 use super::calibration::{Calibration, Declared, FindingKind, Switch};
 use super::channel_map::{Axle, ChannelMap, Mapped};
 use super::delays::{Evidence, delays};
@@ -98,11 +98,6 @@ impl Log {
                 shown(&m.channel.name)
             ));
         }
-        if recording.format != Format::Native && map.steering_ratio.is_none() {
-            calibration.notes.push(
-                "steer: taken as the road-wheel angle: the channel map gives no steering_ratio".to_owned(),
-            );
-        }
         let recorded: u64 = recording.channels.iter().map(|c| c.values.len() as u64).sum();
         let fits = |samples: usize| {
             let needed = (samples as u64).saturating_mul(SAMPLE);
@@ -120,6 +115,22 @@ impl Log {
             fits: &fits,
         };
         let mut log = build.assemble(&signals, calibration)?;
+        if recording.format != Format::Native && map.steering_ratio.is_none() {
+            let ratio = options.steering.and_then(|s| steering_ratio(&mut log, s));
+            if let Some(ratio) = ratio {
+                for signal in signals.iter_mut().filter(|s| s.mapped.role == Role::Steer) {
+                    signal.values.to_mut().iter_mut().for_each(|v| *v /= ratio);
+                }
+            } else {
+                log.calibration.notes.push(
+                    "steer: taken as the road wheels' angle; steering_ratio in the channel map says otherwise"
+                        .to_owned(),
+                );
+            }
+        }
+        for steer in signals.iter().filter(|s| s.mapped.role == Role::Steer) {
+            check_magnitude(&source, &steer.mapped, &steer.values)?;
+        }
         check_gains(&log)?;
         if options.calibration.delays == Switch::On {
             let mut calibration = std::mem::take(&mut log.calibration);

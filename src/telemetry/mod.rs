@@ -55,7 +55,7 @@ pub use driven::DrivenLap;
 pub use export::{LapChannel, LapLabels, SampledLap};
 pub use expression::Expression;
 pub use laps::Lap;
-pub use log::{Log, LogOptions};
+pub use log::{Log, LogOptions, Steering};
 pub use outing::Outing;
 pub use recording::{Channel, Clock, Format, Metadata, Recording, Unreadable};
 pub use role::Role;

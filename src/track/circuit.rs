@@ -4,6 +4,7 @@ use glam::DVec2;
 
 use super::clothoid::displacement;
 use super::crossing::bridges;
+use super::relief::{Relief, ReliefFacts, cubic};
 use crate::{Error, Result};
 
 /// A named stretch of a circuit.
@@ -92,6 +93,8 @@ pub struct Circuit {
     pub corners: Vec<Corner>,
     /// Stretches where the DRS may be open: start and end (m) of each. One whose end lies before its start passes the start line.
     pub drs_zones_m: Vec<[f64; 2]>,
+    /// Height and banking at the samples; none of a level road.
+    pub relief: Option<Relief>,
 }
 
 /// Whether a station (m) lies in one of these zones.
@@ -204,6 +207,43 @@ impl Circuit {
         let share = at.past_m / self.spacing_m();
         let between = |w: &[f64]| w[at.before] + share * (w[at.after] - w[at.before]);
         (between(&self.width_left_m), between(&self.width_right_m))
+    }
+
+    /// Height (m) and banking (rad) at a station, of a road that has them: the cubic through the four samples about it.
+    pub fn relief_at(&self, station_m: f64) -> Option<[f64; 2]> {
+        let relief = self.relief.as_ref()?;
+        let at = self.locate(station_m);
+        let n = self.station_m.len();
+        let (before, after) = if self.closed {
+            ((at.before + n - 1) % n, (at.after + 1) % n)
+        } else {
+            (at.before.saturating_sub(1), (at.after + 1).min(n - 1))
+        };
+        let t = at.past_m / self.spacing_m();
+        let value = |of: &[f64]| cubic([before, at.before, at.after, after].map(|i| of[i]), t);
+        Some([value(&relief.z_m), value(&relief.bank_rad)])
+    }
+
+    /// What the road's height comes to, if it has one.
+    pub fn relief_facts(&self) -> Option<ReliefFacts> {
+        let relief = self.relief.as_ref()?;
+        Some(relief.facts(&self.station_m, self.spacing_m(), self.closed))
+    }
+
+    /// Refuses a road in three dimensions, for what would leave its height and banking out.
+    ///
+    /// # Errors
+    /// [`Error::Input`] naming what does not know them.
+    pub fn level_only(&self, what: &str) -> Result<()> {
+        if self.relief.is_none() {
+            return Ok(());
+        }
+        Err(Error::input(
+            &self.name,
+            "height and banking",
+            "a road in three dimensions",
+            super::relief::level_road(what),
+        ))
     }
 
     fn frame_in_lap(&self, station_m: f64) -> Frame {

@@ -2,6 +2,7 @@
 
 use super::circuit::{Corner, Section};
 use super::crossing::bridges;
+use super::relief::{SectionRelief, cubic, level_road};
 use crate::{Error, Place, Result};
 use glam::DVec2;
 
@@ -31,6 +32,8 @@ pub struct CrossSections {
     pub corners: Vec<Corner>,
     /// Whether the DRS may be open from each cross-section to the next. Empty where it may be open nowhere.
     pub drs: Vec<bool>,
+    /// Height and banking of each cross-section; none of a level road.
+    pub relief: Option<SectionRelief>,
 }
 
 impl CrossSections {
@@ -180,6 +183,10 @@ impl CrossSections {
             right_m: cross_sections.clone().map(|i| self.right_m[i]).collect(),
             left_m: cross_sections.clone().map(|i| self.left_m[i]).collect(),
             reference: cross_sections.clone().map(|i| self.reference[i]).collect(),
+            relief: self
+                .relief
+                .as_ref()
+                .map(|relief| relief.some(cross_sections.clone())),
             drs: cross_sections.filter_map(|i| self.drs.get(i).copied()).collect(),
             sections: Vec::new(),
             corners: Vec::new(),
@@ -248,13 +255,19 @@ impl CrossSections {
 
     /// Whether the DRS may be open from each point (m) of a line along the road to the next; empty where it may be open nowhere.
     pub fn drs_along(&self, points_m: &[DVec2]) -> Vec<bool> {
+        if self.drs.is_empty() {
+            return Vec::new();
+        }
+        let nearest = self.nearest_along(points_m);
+        nearest.into_iter().map(|i| self.drs[i]).collect()
+    }
+
+    /// The cross-section nearest to each point (m) of a line along the road.
+    fn nearest_along(&self, points_m: &[DVec2]) -> Vec<usize> {
         /// Cross-sections on each side among which the next point's own is looked for: those of another part of the road, beside it
         /// or on a bridge, are further away.
         const NEARBY: usize = 30;
         let n = self.len();
-        if self.drs.is_empty() {
-            return Vec::new();
-        }
         let distance = |point: DVec2, i: usize| {
             let across = self.left_m[i] - self.right_m[i];
             let share = (point - self.right_m[i]).dot(across) / across.length_squared();
@@ -275,9 +288,75 @@ impl CrossSections {
                 }
             };
             before = Some(here);
-            self.drs[here]
+            here
         };
         points_m.iter().map(at).collect()
+    }
+
+    /// Height (m) and banking (rad) at each point (m) of a line along the road, of a road that has them: the cubic through the four
+    /// cross-sections about it.
+    pub fn relief_along(&self, points_m: &[DVec2]) -> Option<Vec<[f64; 2]>> {
+        let relief = self.relief.as_ref()?;
+        let n = self.len() as isize;
+        let index = |i: isize| {
+            if self.closed {
+                i.rem_euclid(n) as usize
+            } else {
+                i.clamp(0, n - 1) as usize
+            }
+        };
+        let left = |i: usize| (self.left_m[i] - self.right_m[i]).normalize_or_zero();
+        // How far a point is ahead of a cross-section.
+        let ahead = |point: DVec2, i: usize| -left(i).perp().dot(point - self.right_m[i]);
+        let at = |(point, nearest): (&DVec2, usize)| {
+            let behind = ahead(*point, nearest) < 0.0;
+            let from = nearest as isize - isize::from(behind);
+            let four = [-1, 0, 1, 2].map(|k| index(from + k));
+            let (past, short) = (ahead(*point, four[1]), -ahead(*point, four[2]));
+            let whole = past + short;
+            let t = if whole > 0.0 {
+                (past / whole).clamp(0.0, 1.0)
+            } else {
+                0.0
+            };
+            let z = cubic(four.map(|i| relief.z_m[i]), t);
+            let bank = cubic(four.map(|i| relief.bank_rad[i]), t);
+            let foot = DVec2::new(
+                cubic(four.map(|i| relief.foot_m[i].x), t),
+                cubic(four.map(|i| relief.foot_m[i].y), t),
+            );
+            let across = left(four[1]).lerp(left(four[2]), t).normalize_or_zero();
+            [z + bank.tan() * (*point - foot).dot(across), bank]
+        };
+        let nearest = self.nearest_along(points_m);
+        Some(points_m.iter().zip(nearest).map(at).collect())
+    }
+
+    /// Height (m) and banking (rad) of a line's points (m), one per cross-section, of a road that has them.
+    pub fn relief_of(&self, points_m: &[DVec2]) -> Option<Vec<[f64; 2]>> {
+        let relief = self.relief.as_ref()?;
+        let at = |(i, point): (usize, &DVec2)| {
+            let left = (self.left_m[i] - self.right_m[i]).normalize_or_zero();
+            [relief.height_m(i, left, *point), relief.bank_rad[i]]
+        };
+        Some(points_m.iter().enumerate().map(at).collect())
+    }
+
+    /// Refuses a road in three dimensions, for what would leave its height and banking out.
+    ///
+    /// # Errors
+    /// [`Error::Input`] naming what does not know them.
+    pub fn level_only(&self, what: &str) -> Result<()> {
+        if self.relief.is_none() {
+            return Ok(());
+        }
+        let found = "a road in three dimensions";
+        Err(Error::input(
+            &self.name,
+            "height and banking",
+            found,
+            level_road(what),
+        ))
     }
 
     /// The points of a line (m), one per cross-section, from its `alpha` at every cross-section.
@@ -344,6 +423,7 @@ mod tests {
             sections: Vec::new(),
             corners: Vec::new(),
             drs: Vec::new(),
+            relief: None,
         }
     }
 

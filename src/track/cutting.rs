@@ -9,6 +9,7 @@ use super::circuit::Circuit;
 use super::circuit::in_a_zone;
 use super::cross_sections::CrossSections;
 use super::crossing::{Stretch, crossings, stretches};
+use super::relief::SectionRelief;
 use super::road::{Road, RoadFrame, Spacing, even_stations, spread};
 use crate::{Error, Place, Result};
 use glam::DVec2;
@@ -64,6 +65,12 @@ pub(super) fn cross_sections(road: &dyn Road, spacing: &Spacing) -> Result<Cross
         .map(|middle| in_a_zone(zones, middle))
         .collect();
     let (right_m, left_m) = cutter.ends.iter().map(|&[right, left]| (right, left)).unzip();
+    let frames = &cutter.frames;
+    let relief = road.relief_change().map(|_| SectionRelief {
+        foot_m: frames.iter().map(|frame| frame.position_m).collect(),
+        z_m: frames.iter().map(|frame| frame.relief[0]).collect(),
+        bank_rad: frames.iter().map(|frame| frame.relief[1]).collect(),
+    });
     Ok(CrossSections {
         reference,
         name: road.name().to_owned(),
@@ -75,6 +82,7 @@ pub(super) fn cross_sections(road: &dyn Road, spacing: &Spacing) -> Result<Cross
         sections: road.sections().to_vec(),
         corners: road.corners().to_vec(),
         drs,
+        relief,
     })
 }
 

@@ -8,12 +8,21 @@ use glam::DVec2;
 use std::fmt::Write as _;
 use std::path::Path;
 
-/// Points (m) with their distances to the right and the left edge (m) in the racetrack database's format, to the micrometre.
-pub fn racetrack_csv(rows: impl Iterator<Item = (DVec2, f64, f64)>) -> String {
-    let mut text = "# x_m,y_m,w_tr_right_m,w_tr_left_m\n".to_owned();
-    for (point, right_m, left_m) in rows {
+/// Points (m) with their distances to the right and the left edge (m) in the racetrack database's format, to the micrometre. On a
+/// road in three dimensions `relief` has height (m) and banking (rad) of each, which follow in columns of their own.
+pub fn racetrack_csv(rows: impl Iterator<Item = (DVec2, f64, f64)>, relief: Option<&[[f64; 2]]>) -> String {
+    let mut text = "# x_m,y_m,w_tr_right_m,w_tr_left_m".to_owned();
+    if relief.is_some() {
+        text += ",z_m,bank_deg";
+    }
+    text += "\n";
+    for (i, (point, right_m, left_m)) in rows.enumerate() {
         // Writing to a string cannot fail.
-        let _ = writeln!(text, "{:.6},{:.6},{right_m:.6},{left_m:.6}", point.x, point.y);
+        let _ = write!(text, "{:.6},{:.6},{right_m:.6},{left_m:.6}", point.x, point.y);
+        if let Some([z_m, bank_rad]) = relief.and_then(|relief| relief.get(i)) {
+            let _ = write!(text, ",{z_m:.6},{:.6}", bank_rad.to_degrees());
+        }
+        text += "\n";
     }
     text
 }
@@ -23,7 +32,14 @@ impl Circuit {
     pub fn to_racetrack_csv(&self) -> String {
         let widths = self.width_right_m.iter().zip(&self.width_left_m);
         let points = self.centreline_m.iter().zip(widths);
-        racetrack_csv(points.map(|(&point, (&right, &left))| (point, right, left)))
+        let relief = self.relief.as_ref().map(|relief| -> Vec<[f64; 2]> {
+            let places = relief.z_m.iter().zip(&relief.bank_rad);
+            places.map(|(z, bank)| [*z, *bank]).collect()
+        });
+        racetrack_csv(
+            points.map(|(&point, (&right, &left))| (point, right, left)),
+            relief.as_deref(),
+        )
     }
 
     /// Writes [`Circuit::to_racetrack_csv`] to a new file.
@@ -49,6 +65,7 @@ impl CrossSections {
         let rows = points.iter().zip(ends);
         racetrack_csv(
             rows.map(|(&point, (&right, &left))| (point, point.distance(right), point.distance(left))),
+            self.relief_of(&points).as_deref(),
         )
     }
 

@@ -16,6 +16,7 @@ use std::f64::consts::TAU;
 
 use super::circuit::{Circuit, Corner, Section};
 use super::clothoid::displacement;
+use super::relief::{Given, Relief};
 use crate::{Error, Place, Result};
 
 /// Distance between samples of a circuit (m), before rounding to a whole number of steps.
@@ -28,6 +29,9 @@ const CLOSED_TO_UP_TO_M: f64 = 10_000.0;
 const LARGEST_GAP: f64 = 0.03;
 /// A total turn further than this from a whole number of turns is a mistake in the table (rad).
 const LARGEST_TURN_ERROR: f64 = 0.5;
+
+/// Fewest rows of a table with height or banking.
+const LEAST_RELIEF_ROWS: usize = 5;
 
 /// One row of a [`CurvatureTable`].
 #[derive(Debug, Clone, PartialEq)]
@@ -61,6 +65,8 @@ pub struct CurvatureTable {
     pub sections: Vec<Section>,
     /// Stretches where the DRS may be open, as a [`Circuit`] has them.
     pub drs_zones_m: Vec<[f64; 2]>,
+    /// Height and banking at the rows; none of a level road.
+    pub relief: Option<Relief>,
 }
 
 /// The changes that close a lap; all zero for an open circuit.
@@ -139,6 +145,7 @@ impl CurvatureTable {
             rows,
             sections: Vec::new(),
             drs_zones_m: Vec::new(),
+            relief: None,
         }
     }
 
@@ -164,7 +171,9 @@ impl CurvatureTable {
         let mut line = integrate(&curvature, spacing, self.closed, self.start_heading_rad);
         line.heading.truncate(samples);
         line.position.truncate(samples);
+        let relief = self.relief(&station_m)?;
         let circuit = Circuit {
+            relief,
             name: self.name.clone(),
             closed: self.closed,
             length_m: self.length_m,
@@ -179,6 +188,43 @@ impl CurvatureTable {
             drs_zones_m: self.drs_zones_m.clone(),
         };
         Ok((circuit, closure))
+    }
+
+    /// Height and banking at the samples: smooth curves through those at the rows.
+    fn relief(&self, station_m: &[f64]) -> Result<Option<Relief>> {
+        let Some(relief) = &self.relief else {
+            return Ok(None);
+        };
+        if self.rows.len() < LEAST_RELIEF_ROWS {
+            let found = format!("{} rows", self.rows.len());
+            let expected = format!("at least {LEAST_RELIEF_ROWS} rows with height or banking");
+            return self.refuse("curvature table", found, &expected);
+        }
+        let given = Given {
+            z_m: relief.z_m.clone(),
+            bank_rad: relief.bank_rad.clone(),
+            gap_m: relief.change.gap_m,
+        };
+        let Some(smooth) = given.smoothed(&self.knots(), self.closed, [0.0; 2]) else {
+            return Ok(None);
+        };
+        smooth.check(&self.name)?;
+        let (z_m, bank_rad) = station_m
+            .iter()
+            .map(|station| smooth.at(*station))
+            .map(|[z, bank]| (z, bank))
+            .unzip();
+        Ok(Some(Relief {
+            z_m,
+            bank_rad,
+            change: relief.change,
+        }))
+    }
+
+    /// The stations of the rows (m), and of a closed road the end of the lap.
+    pub(super) fn knots(&self) -> Vec<f64> {
+        let rows = self.rows.iter().map(|row| row.station_m);
+        rows.chain(self.closed.then_some(self.length_m)).collect()
     }
 
     fn refuse<T>(&self, place: impl Into<Place>, found: String, expected: &str) -> Result<T> {

@@ -9,6 +9,7 @@ use super::checker::{Checker, DrsZoneEntry, SectionEntry, parse_toml};
 use super::circuit::Circuit;
 use super::from_curvature::{Closure, CurvatureRow, CurvatureTable};
 use super::reference::Smoothing;
+use super::relief::{Given, HEIGHTS_M, Relief, ReliefChange, STEEPEST_BANK_DEG};
 use super::survey::{Survey, SurveyOptions};
 use crate::config::{folder_of, line_of, read_text};
 use crate::{Error, Place, Result};
@@ -42,6 +43,10 @@ struct CircuitFile {
     start_heading_deg: Option<Spanned<f64>>,
     #[serde(default)]
     width_m: Option<Spanned<f64>>,
+    #[serde(default)]
+    flat: bool,
+    smoothing_height_m: Option<Spanned<f64>>,
+    smoothing_bank_deg: Option<Spanned<f64>>,
     #[serde(default)]
     sections: Vec<SectionEntry>,
     #[serde(default)]
@@ -90,10 +95,13 @@ impl Circuit {
     /// `station_m`.
     ///
     /// Keys with a curvature table: `name`, `curvature_table` (a CSV file with columns `station_m`, `curvature_1pm` and, if
-    /// wanted, `width_left_m`, `width_right_m`, `corner`), `length_m`; `closed` (default true), `start_heading_deg` (0),
-    /// `width_m` (of the whole road, where the table has no widths), `[[sections]]` with `name`, `start_m`, `end_m`, and
-    /// `[[drs_zones]]` with `start_m` and `end_m`, where the DRS may be open; one whose end lies before its start passes the start
-    /// line.
+    /// wanted, `width_left_m`, `width_right_m`, `corner`, `z_m`, `bank_deg`), `length_m`; `closed` (default true),
+    /// `start_heading_deg` (0), `width_m` (of the whole road, where the table has no widths), `[[sections]]` with `name`,
+    /// `start_m`, `end_m`, and `[[drs_zones]]` with `start_m` and `end_m`, where the DRS may be open; one whose end lies before
+    /// its start passes the start line.
+    ///
+    /// Both have `smoothing_height_m` and `smoothing_bank_deg` as in [`Smoothing`], and `flat`, which leaves height and banking
+    /// out.
     ///
     /// # Errors
     /// [`Error::Io`] when a file cannot be read; [`Error::Input`] with the file, line and field when
@@ -178,23 +186,72 @@ fn assemble(
         .map(|w| check.within(w, "width_m", 1.0, 200.0))
         .transpose()?;
     let sections = check.sections(&file.sections, length_m)?;
-    Ok(CurvatureTable {
-        rows: parse_table(table_file, csv, length_m, file.closed, width_m)?,
+    let usual = Smoothing::default();
+    let smoothing = |value: &Option<Spanned<f64>>, field: &str, usual: f64| {
+        let given = value.as_ref().map(|v| check.within(v, field, 0.0, 10.0));
+        given.unwrap_or(Ok(usual))
+    };
+    let within = [
+        smoothing(&file.smoothing_height_m, "smoothing_height_m", usual.height_m)?,
+        smoothing(&file.smoothing_bank_deg, "smoothing_bank_deg", usual.bank_deg)?.to_radians(),
+    ];
+    let (rows, given) = parse_table(table_file, csv, length_m, file.closed, width_m)?;
+    let mut table = CurvatureTable {
+        rows,
         name: check.name(&file.name, "name")?,
         closed: file.closed,
         length_m,
         start_heading_rad: heading.to_radians(),
         sections,
         drs_zones_m: check.drs_zones(&file.drs_zones, length_m, file.closed)?,
-    })
+        relief: None,
+    };
+    if !file.flat {
+        table.relief = smooth_relief(&table, given, table_file, within)?;
+    }
+    Ok(table)
 }
 
-const COLUMNS: [&str; 5] = [
+/// Height and banking of a table's rows, closed and smoothed within these deviations (m, rad); nothing of a level road.
+fn smooth_relief(
+    table: &CurvatureTable,
+    mut given: Given,
+    file: &str,
+    within: [f64; 2],
+) -> Result<Option<Relief>> {
+    let knots = table.knots();
+    // A spline takes no fewer rows. The table says so where it is built.
+    if table.rows.len() < 5 || given.is_level() {
+        let level = given.is_level();
+        return Ok((!level).then_some(Relief {
+            z_m: given.z_m,
+            bank_rad: given.bank_rad,
+            change: ReliefChange::default(),
+        }));
+    }
+    if table.closed {
+        given.close(file, table.rows.len(), &knots, table.length_m)?;
+    }
+    let smooth = given.smoothed(&knots, table.closed, within);
+    Ok(smooth.map(|smooth| {
+        let rows = table.rows.iter().map(|row| smooth.at(row.station_m));
+        let (z_m, bank_rad) = rows.map(|[z, bank]| (z, bank)).unzip();
+        Relief {
+            z_m,
+            bank_rad,
+            change: smooth.change,
+        }
+    }))
+}
+
+const COLUMNS: [&str; 7] = [
     "station_m",
     "curvature_1pm",
     "width_left_m",
     "width_right_m",
     "corner",
+    "z_m",
+    "bank_deg",
 ];
 
 /// The line of the row at this position. The reader's own count is that of the comments and empty lines before the row.
@@ -213,7 +270,7 @@ fn parse_table(
     length_m: f64,
     closed: bool,
     width_m: Option<f64>,
-) -> Result<Vec<CurvatureRow>> {
+) -> Result<(Vec<CurvatureRow>, Given)> {
     let text = text.trim_start_matches('\u{feff}');
     let mut reader = csv::ReaderBuilder::new()
         .comment(Some(b'#'))
@@ -246,7 +303,7 @@ fn parse_table(
             }
         }
     }
-    let [station, curvature, left, right, corner] = column;
+    let [station, curvature, left, right, corner, height, bank] = column;
     let missing = |name: &str, found: &str| {
         let place = Place::line(header_line).column(name);
         Error::input(file, place, found, "this column")
@@ -260,6 +317,7 @@ fn parse_table(
     }
 
     let mut rows: Vec<CurvatureRow> = Vec::new();
+    let mut given = Given::default();
     for record in reader.records() {
         let record = record.map_err(unreadable)?;
         let line = line_at(record.position());
@@ -303,6 +361,13 @@ fn parse_table(
             ));
         }
         rows.push(row);
+        if let Some(height) = height {
+            given.z_m.push(number(height, HEIGHTS_M)?);
+        }
+        if let Some(bank) = bank {
+            let bank_deg = number(bank, (-STEEPEST_BANK_DEG, STEEPEST_BANK_DEG))?;
+            given.bank_rad.push(bank_deg.to_radians());
+        }
     }
-    Ok(rows)
+    Ok((rows, given))
 }

@@ -22,8 +22,12 @@ struct SurveyFile {
     lap: Option<u32>,
     #[serde(default)]
     bridges: u16,
+    #[serde(default)]
+    flat: bool,
     smoothing_line_m: Option<Spanned<f64>>,
     smoothing_edges_m: Option<Spanned<f64>>,
+    smoothing_height_m: Option<Spanned<f64>>,
+    smoothing_bank_deg: Option<Spanned<f64>>,
     #[serde(default)]
     sections: Vec<SectionEntry>,
     #[serde(default)]
@@ -59,11 +63,16 @@ pub(super) fn read(path: &Path, text: &str) -> Result<(Survey, Smoothing)> {
         width_m: within(&file.width_m, "width_m", 0.1, 400.0)?,
         lap: file.lap,
         bridges: usize::from(file.bridges),
+        flat: file.flat,
     };
     let usual = Smoothing::default();
     let smoothing = Smoothing {
         line_m: within(&file.smoothing_line_m, "smoothing_line_m", 0.0, 10.0)?.unwrap_or(usual.line_m),
         edges_m: within(&file.smoothing_edges_m, "smoothing_edges_m", 0.0, 10.0)?.unwrap_or(usual.edges_m),
+        height_m: within(&file.smoothing_height_m, "smoothing_height_m", 0.0, 10.0)?
+            .unwrap_or(usual.height_m),
+        bank_deg: within(&file.smoothing_bank_deg, "smoothing_bank_deg", 0.0, 10.0)?
+            .unwrap_or(usual.bank_deg),
     };
     let beside = folder_of(path).join(&file.survey);
     let mut survey = Survey::read(beside, &options)?;

@@ -4,6 +4,7 @@ use super::circuit::{Circuit, Corner, Section};
 use super::cross_sections::CrossSections;
 use super::cutting::cross_sections;
 use super::from_curvature::Closure;
+use super::relief::{Given, ReliefChange, SmoothRelief};
 use super::road::{Road, RoadFrame, Spacing, circuit};
 use super::spline::{Deviation, Spline};
 use super::survey::Survey;
@@ -18,6 +19,10 @@ pub struct Smoothing {
     pub line_m: f64,
     /// Greatest change of an edge's distance from the reference line (m). With 0 the edge passes through every point.
     pub edges_m: f64,
+    /// Greatest change of the height (m). With 0 the height passes through every point.
+    pub height_m: f64,
+    /// Greatest change of the banking (degrees), likewise.
+    pub bank_deg: f64,
 }
 
 impl Default for Smoothing {
@@ -25,6 +30,8 @@ impl Default for Smoothing {
         Self {
             line_m: 0.25,
             edges_m: 0.25,
+            height_m: 0.5,
+            bank_deg: 0.5,
         }
     }
 }
@@ -67,6 +74,7 @@ pub struct ReferenceLine {
     sections: Vec<Section>,
     corners: Vec<Corner>,
     drs_zones_m: Vec<[f64; 2]>,
+    relief: Option<SmoothRelief>,
 }
 
 /// Nodes (from -1 to 1) and weights of Gauss and Legendre's quadrature with five points.
@@ -106,9 +114,10 @@ impl Survey {
             }
             Widths::Linear(all)
         };
+        let relief = self.relief(&knots, [0.0; 2])?;
         Ok(self.reference(
             &knots,
-            line,
+            (line, relief),
             [widths(&self.left_m), widths(&self.right_m)],
             [Deviation::default(); 2],
         ))
@@ -119,13 +128,18 @@ impl Survey {
     /// # Errors
     /// [`Error::Input`] as [`Survey::check`] gives it, or for a smoothing out of range.
     pub fn smoothed(&self, smoothing: &Smoothing) -> Result<ReferenceLine> {
-        for (field, value) in [("line_m", smoothing.line_m), ("edges_m", smoothing.edges_m)] {
+        for (field, value) in [
+            ("line_m", smoothing.line_m),
+            ("edges_m", smoothing.edges_m),
+            ("height_m", smoothing.height_m),
+            ("bank_deg", smoothing.bank_deg),
+        ] {
             if !(0.0..=MOST_SMOOTHING_M).contains(&value) {
                 return Err(Error::input(
                     &self.source,
                     format!("smoothing, {field}"),
                     value.to_string(),
-                    format!("0 to {MOST_SMOOTHING_M} m"),
+                    format!("0 to {MOST_SMOOTHING_M}"),
                 ));
             }
         }
@@ -150,7 +164,9 @@ impl Survey {
             (Widths::Smooth(fit), deviation)
         };
         let ((left, left_deviation), (right, right_deviation)) = (smooth(&left), smooth(&right));
-        Ok(self.reference(&knots, line, [left, right], [left_deviation, right_deviation]))
+        let relief = self.relief(&knots, [smoothing.height_m, smoothing.bank_deg.to_radians()])?;
+        let deviations = [left_deviation, right_deviation];
+        Ok(self.reference(&knots, (line, relief), [left, right], deviations))
     }
 
     /// Chord lengths up to the points, and the line within a deviation of them.
@@ -169,10 +185,24 @@ impl Survey {
         (knots, line)
     }
 
+    /// Height and banking over the knots, within these deviations (m, rad).
+    fn relief(&self, knots: &[f64], within: [f64; 2]) -> Result<Option<SmoothRelief>> {
+        let given = Given {
+            z_m: self.z_m.clone(),
+            bank_rad: self.bank_deg.iter().map(|bank| bank.to_radians()).collect(),
+            gap_m: self.height_gap_m,
+        };
+        let relief = given.smoothed(knots, self.closed, within);
+        if let Some(relief) = &relief {
+            relief.check(&self.source)?;
+        }
+        Ok(relief)
+    }
+
     fn reference(
         &self,
         knots: &[f64],
-        line: Spline<DVec2>,
+        (line, relief): (Spline<DVec2>, Option<SmoothRelief>),
         [left, right]: [Widths; 2],
         [left_deviation, right_deviation]: [Deviation; 2],
     ) -> ReferenceLine {
@@ -194,6 +224,7 @@ impl Survey {
             sections: self.sections.clone(),
             corners: self.corners.clone(),
             drs_zones_m: self.drs_zones_m.clone(),
+            relief,
         }
     }
 }
@@ -311,6 +342,7 @@ impl Road for ReferenceLine {
             curvature_1pm: jet.first.perp_dot(jet.second) / speed.powi(3).max(1e-300),
             left_m: self.left.at(&self.line.knots, i, t),
             right_m: self.right.at(&self.line.knots, i, t),
+            relief: self.relief.as_ref().map_or([0.0; 2], |relief| relief.on(i, t)),
         }
     }
 
@@ -324,5 +356,9 @@ impl Road for ReferenceLine {
 
     fn drs_zones_m(&self) -> &[[f64; 2]] {
         &self.drs_zones_m
+    }
+
+    fn relief_change(&self) -> Option<ReliefChange> {
+        self.relief.as_ref().map(|relief| relief.change)
     }
 }

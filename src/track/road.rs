@@ -2,6 +2,7 @@
 
 use super::circuit::{Circuit, Corner, Section};
 use super::from_curvature::{Closure, CurvatureRow, CurvatureTable};
+use super::relief::{Relief, ReliefChange};
 use crate::{Error, Place, Result};
 use glam::DVec2;
 use std::f64::consts::PI;
@@ -22,6 +23,8 @@ pub(super) struct RoadFrame {
     pub left_m: f64,
     /// Distance to the right edge (m).
     pub right_m: f64,
+    /// Height (m) and banking (rad); zero on a level road.
+    pub relief: [f64; 2],
 }
 
 /// A road along a smooth reference line.
@@ -42,6 +45,8 @@ pub(super) trait Road {
     fn corners(&self) -> &[Corner];
     /// Stretches where the DRS may be open, as a [`Circuit`] has them.
     fn drs_zones_m(&self) -> &[[f64; 2]];
+    /// What was changed of height and banking; nothing on a level road, which has none.
+    fn relief_change(&self) -> Option<ReliefChange>;
 }
 
 impl Road for Circuit {
@@ -69,7 +74,12 @@ impl Road for Circuit {
             curvature_1pm: self.curvature_at(station_m),
             left_m,
             right_m,
+            relief: self.relief_at(station_m).unwrap_or_default(),
         }
+    }
+
+    fn relief_change(&self) -> Option<ReliefChange> {
+        self.relief.as_ref().map(|relief| relief.change)
     }
 
     fn sections(&self) -> &[Section] {
@@ -142,12 +152,27 @@ pub(super) fn circuit(road: &dyn Road) -> Result<(Circuit, Closure)> {
         rows,
         sections: road.sections().to_vec(),
         drs_zones_m: road.drs_zones_m().to_vec(),
+        relief: None,
     };
     let (mut circuit, closure) = table.build()?;
     for position in &mut circuit.centreline_m {
         *position += start.position_m;
     }
     circuit.corners = road.corners().to_vec();
+    circuit.relief = road.relief_change().map(|change| {
+        let at = |station: &f64| road.frame(*station).relief;
+        let (z_m, bank_rad) = circuit
+            .station_m
+            .iter()
+            .map(at)
+            .map(|[z, bank]| (z, bank))
+            .unzip();
+        Relief {
+            z_m,
+            bank_rad,
+            change,
+        }
+    });
     Ok((circuit, closure))
 }
 

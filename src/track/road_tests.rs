@@ -36,6 +36,9 @@ fn survey(points: Vec<DVec2>, closed: bool, width_m: f64) -> Survey {
         corners: Vec::new(),
         drs_zones_m: Vec::new(),
         bridges: 0,
+        z_m: Vec::new(),
+        bank_deg: Vec::new(),
+        height_gap_m: 0.0,
     }
 }
 
@@ -308,6 +311,7 @@ fn smoothing_keeps_to_the_deviation_it_states() {
         let smoothing = Smoothing {
             line_m: wrong,
             edges_m: 0.1,
+            ..Smoothing::default()
         };
         assert!(noisy.smoothed(&smoothing).is_err());
     }

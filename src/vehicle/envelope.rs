@@ -85,6 +85,7 @@ pub struct Envelope {
     rows: Vec<EnvelopeRow>,
     in_bends: Option<BendTraction>,
     open: Option<Box<Self>>,
+    loads: Vec<(f64, Self)>,
 }
 
 /// The columns of an envelope's table, in the order that [`Envelope::to_csv`] writes them.
@@ -122,6 +123,7 @@ impl Envelope {
             rows,
             in_bends: None,
             open: None,
+            loads: Vec::new(),
         })
     }
 
@@ -164,6 +166,37 @@ impl Envelope {
         Ok(self)
     }
 
+    /// The envelope with those of the car under other loads: shares of its weight in even steps, each with its envelope.
+    ///
+    /// # Errors
+    /// [`Error::Input`] if there are fewer than two, if their steps are not even, or if one lacks what this one has.
+    pub fn with_loads(mut self, loads: Vec<(f64, Self)>) -> Result<Self> {
+        let steps: Vec<f64> = loads.windows(2).map(|pair| pair[1].0 - pair[0].0).collect();
+        let even = steps
+            .iter()
+            .all(|step| *step > 0.0 && (step - steps[0]).abs() < 1e-9);
+        let has = |limits: &Self| (limits.in_bends.is_some(), limits.open.is_some());
+        if steps.is_empty() || !even || loads.iter().any(|(_, limits)| has(limits) != has(&self)) {
+            let shares: Vec<String> = loads.iter().map(|(share, _)| share.to_string()).collect();
+            let expected = "two or more in even steps, each with the columns of this envelope";
+            return Err(Error::input(&self.name, "loads", shares.join(", "), expected));
+        }
+        if let Some(open) = &mut self.open {
+            let opened = loads.iter().filter_map(|(share, limits)| {
+                let limits = limits.open.as_deref()?;
+                Some((*share, limits.clone()))
+            });
+            open.loads = opened.collect();
+        }
+        self.loads = loads;
+        Ok(self)
+    }
+
+    /// The envelopes of the car under other loads, each with the share of its weight; none where they were not looked for.
+    pub fn loads(&self) -> &[(f64, Self)] {
+        &self.loads
+    }
+
     /// The envelope with the DRS open, of a car that has one.
     pub fn open(&self) -> Option<&Self> {
         self.open.as_deref()
@@ -179,10 +212,26 @@ impl Envelope {
         if let Some(in_bends) = &self.in_bends {
             changed = changed.with_bend_traction(in_bends.clone())?;
         }
-        match &self.open {
-            Some(open) => changed.with_open(open.with_rows(name, other)?),
-            None => Ok(changed),
+        if let Some(open) = &self.open {
+            changed = changed.with_open(open.with_rows(name, other)?)?;
         }
+        changed.with_loads_of(self, &|limits| limits.with_rows(name, other))
+    }
+
+    /// This envelope with what `changed` makes of another's under loads, if that has them.
+    ///
+    /// # Errors
+    /// As [`Envelope::with_loads`].
+    pub(super) fn with_loads_of(self, other: &Self, changed: &dyn Fn(&Self) -> Result<Self>) -> Result<Self> {
+        // Those with the flap open have theirs through those with it shut.
+        if other.loads.is_empty() || self.in_bends.is_some() != other.loads[0].1.in_bends.is_some() {
+            return Ok(self);
+        }
+        let loads = other
+            .loads
+            .iter()
+            .map(|(share, limits)| Ok((*share, changed(limits)?)));
+        self.with_loads(loads.collect::<Result<_>>()?)
     }
 
     /// The traction in bends, where the envelope has a table of it.
@@ -310,10 +359,14 @@ impl Envelope {
         &self.name
     }
 
-    /// All its figures, with the DRS shut and, of a car that has one, open: what laps within it depend on, whatever it is called.
+    /// All its figures, with the DRS shut and, of a car that has one, open, and under loads: what laps within it depend on, whatever it is called.
     pub fn figures(&self) -> Vec<(&[EnvelopeRow], Option<&BendTraction>)> {
-        let states = std::iter::once(self).chain(self.open());
+        let loads = self.loads.iter().map(|(_, limits)| limits);
+        let states = std::iter::once(self)
+            .chain(loads)
+            .flat_map(|limits| [Some(limits), limits.open()]);
         states
+            .flatten()
             .map(|state| (state.rows(), state.bend_traction()))
             .collect()
     }
@@ -423,6 +476,7 @@ impl TableText<'_> {
             rows,
             in_bends,
             open: None,
+            loads: Vec::new(),
         })
     }
 }

@@ -213,6 +213,29 @@ pub fn car_envelope(car: &Car, range: &SpeedRange) -> Result<CarEnvelope> {
     })
 }
 
+/// Shares of the weight under which the limits are swept for roads in three dimensions, in even steps.
+pub const LOADS: [f64; 4] = [0.6, 1.0, 1.4, 1.8];
+
+/// As [`car_envelope`], with the envelopes of the car under [`LOADS`]: in a crest, in a dip, on a banked road. A load is a gravity of
+/// that share.
+///
+/// # Errors
+/// As [`car_envelope`].
+pub fn car_envelope_under_loads(car: &Car, range: &SpeedRange) -> Result<CarEnvelope> {
+    let mut level = car_envelope(car, range)?;
+    let under = |share: f64| -> Result<(f64, Envelope)> {
+        if share == 1.0 {
+            return Ok((share, level.envelope.clone()));
+        }
+        let mut loaded = car.clone();
+        loaded.chassis.gravity *= share;
+        Ok((share, car_envelope(&loaded, range)?.envelope))
+    };
+    let loads = LOADS.into_iter().map(under).collect::<Result<Vec<_>>>()?;
+    level.envelope = level.envelope.with_loads(loads)?;
+    Ok(level)
+}
+
 /// The envelope of these limits.
 fn envelope_of(name: &str, limits: &[EnvelopeAtSpeed]) -> Result<Envelope> {
     let in_bends = BendTraction {

@@ -268,6 +268,19 @@ pub fn runge_kutta_step<R: Real, T: Tyre<R>>(
     state: &CarState<R>,
     input: impl Fn(usize) -> CarInput<R>,
     step: R,
+    watch: impl FnMut(&CarRate<R>),
+) -> CarState<R> {
+    runge_kutta_step_on(car, state, input, None, step, watch)
+}
+
+/// As [`runge_kutta_step`], on a road where gravity pulls at the body: against the car's forward direction and its left (m/s^2).
+#[inline(always)]
+pub fn runge_kutta_step_on<R: Real, T: Tyre<R>>(
+    car: &CarModel<R, T>,
+    state: &CarState<R>,
+    input: impl Fn(usize) -> CarInput<R>,
+    pull: Option<[R; 2]>,
+    step: R,
     mut watch: impl FnMut(&CarRate<R>),
 ) -> CarState<R> {
     let origin = state.to_array();
@@ -278,7 +291,12 @@ pub fn runge_kutta_step<R: Real, T: Tyre<R>>(
         if number == 0 {
             watch(&rate);
         }
-        let slope = rate.state.to_array();
+        let mut slope = rate.state.to_array();
+        if let Some([climb, lean]) = pull {
+            // A field that is the same all over the car moves it as a whole.
+            slope[0] = slope[0] - climb;
+            slope[1] = slope[1] - lean;
+        }
         let share = step * R::lit(stage.weight);
         let reach = step * R::lit(stage.reach);
         for k in 0..origin.len() {

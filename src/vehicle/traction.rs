@@ -75,11 +75,14 @@ impl Envelope {
                 rows: rows.collect(),
             })?;
         }
-        let Some(open) = self.open() else {
-            return Ok(part);
-        };
-        let own = open.straight_traction();
-        part.with_open(open.with_grip_share(share, own.as_ref().unwrap_or(traction))?)
+        if let Some(open) = self.open() {
+            let own = open.straight_traction();
+            part = part.with_open(open.with_grip_share(share, own.as_ref().unwrap_or(traction))?)?;
+        }
+        part.with_loads_of(self, &|limits| {
+            let own = limits.straight_traction();
+            limits.with_grip_share(share, own.as_ref().unwrap_or(traction))
+        })
     }
 }
 

@@ -48,20 +48,36 @@ pub struct Moment {
 
 /// A car at each moment of a drive, from its states and inputs: as many as `driven` has, in its order.
 pub fn moments_of(car: &Car, driven: &[(CarState<f64>, CarInput<f64>)]) -> Vec<Moment> {
+    moments_under(car, driven, &[])
+}
+
+/// As [`moments_of`], on a road in three dimensions: `loads_mps2` is the car's load over its mass at each moment (m/s^2). The
+/// accelerations are then those that sensors on the car read, with gravity's parts along and across it. Empty on a level road.
+pub fn moments_under(
+    car: &Car,
+    driven: &[(CarState<f64>, CarInput<f64>)],
+    loads_mps2: &[f64],
+) -> Vec<Moment> {
     let flat = car.to_flat();
     match car.tyre_model() {
         TyreModel::MagicFormula => at(
             &CarModel::<f64, MagicFormula<f64>>::from_parameters(|i| flat[i]),
             driven,
+            loads_mps2,
         ),
         TyreModel::Linear => at(
             &CarModel::<f64, LinearTyre<f64>>::from_parameters(|i| flat[i]),
             driven,
+            loads_mps2,
         ),
     }
 }
 
-fn at<T: Tyre<f64>>(car: &CarModel<f64, T>, driven: &[(CarState<f64>, CarInput<f64>)]) -> Vec<Moment> {
+fn at<T: Tyre<f64>>(
+    car: &CarModel<f64, T>,
+    driven: &[(CarState<f64>, CarInput<f64>)],
+    loads_mps2: &[f64],
+) -> Vec<Moment> {
     let chassis = &car.chassis;
     let sides = [1.0, -1.0];
     let places = [
@@ -72,7 +88,11 @@ fn at<T: Tyre<f64>>(car: &CarModel<f64, T>, driven: &[(CarState<f64>, CarInput<f
         ),
         (-chassis.cg_to_rear, chassis.half_track_rear, chassis.radius_rear),
     ];
-    let moments = driven.iter().map(|(state, input)| {
+    let moments = driven.iter().enumerate().map(|(i, (state, input))| {
+        // A load is a gravity that the wheels feel.
+        let mut car = *car;
+        car.chassis.gravity = loads_mps2.get(i).copied().unwrap_or(car.chassis.gravity);
+        let chassis = &car.chassis;
         let body = &state.body;
         let aero = aero_forces(chassis, body.vx, input.flap);
         let loads = wheel_loads(chassis, body, state.pitch_acceleration, &aero);

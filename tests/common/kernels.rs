@@ -68,6 +68,11 @@ pub fn kernels() -> Vec<KernelSource> {
                 add("replay_reduce", &format!("{of}, {norm:?}"), shape.reduce());
             }
             add("settle", &of, car.steady());
+            let hills = DriveShape {
+                relief_at: Some(3000),
+                ..drive_shape(car, false)
+            };
+            add("drive", &format!("{of}, hills"), hills.source());
             for blends in [false, true] {
                 let plans = if blends { "plans blended" } else { "one plan" };
                 add(
@@ -81,6 +86,13 @@ pub fn kernels() -> Vec<KernelSource> {
     for closed in [false, true] {
         for terms in [0, 1, 4] {
             let of = format!("{}, {terms} terms", if closed { "closed" } else { "open" });
+            let hills = LineShape {
+                relief: Some(4),
+                uniform_sections: None,
+                uniform_envelope: false,
+                ..line_shape(closed, terms, true)
+            };
+            add("line", &format!("{of}, hills"), hills.source());
             for lap in [false, true] {
                 let measures = if lap { "lap" } else { "lengths" };
                 add(
@@ -100,7 +112,7 @@ pub fn kernels() -> Vec<KernelSource> {
         add(entry, "", swarm());
     }
     add("gather", "", swarm_gather());
-    for entry in ["variables_of_positions", "objectives_of_figures"] {
+    for entry in ["figures_of_positions", "objectives_of_results"] {
         add(entry, "", line_swarm());
     }
     for (name, number) in NAMES.iter().zip(0..) {
@@ -117,6 +129,7 @@ pub fn drive_shape(car: CarShape<'_>, blends: bool) -> DriveShape<'_> {
         rows_ahead: 52,
         cells_ahead: 20,
         blends,
+        relief_at: None,
     }
 }
 
@@ -144,6 +157,7 @@ pub fn line_shape(closed: bool, terms: usize, lap: bool) -> LineShape {
         corner_rows: 1024,
         ellipse_rows: if closed { 256 } else { 0 },
         traction: terms != 1,
+        relief: None,
         drs: terms == 0,
         uniform_sections: closed.then_some(360),
         uniform_envelope: terms == 4,

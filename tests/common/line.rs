@@ -46,6 +46,7 @@ fn cut(name: &str, right_m: Vec<DVec2>, left_m: Vec<DVec2>, closed: bool) -> Cro
         sections: Vec::new(),
         corners: Vec::new(),
         drs: Vec::new(),
+        relief: None,
     }
 }
 

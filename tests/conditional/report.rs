@@ -477,6 +477,16 @@ fn what_is_measured_has_a_page() {
     // Speed, both accelerations, yaw rate and steering; alone, no time lost on another.
     let lines = data[0]["lines"][0]["traces"].as_array().unwrap();
     assert_eq!(lines.len(), 5);
+
+    // The log itself, beside the run that it is of.
+    let (log, out) = (path("simulate/lap.csv"), path("measured.html"));
+    let run = lapswarm(&["report", &log, &path("simulate"), "--out", &out]);
+    assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+    let html = std::fs::read_to_string(&out).unwrap();
+    assert!(
+        html.contains("lap.csv: logged") && html.contains("simulate: logged"),
+        "{out}"
+    );
 }
 
 fn folders_that_are_no_runs_are_refused_by_name() {

@@ -12,7 +12,7 @@ use lapswarm::study::raceline::{
     self, LineAlgorithm, LinesState, Outcome, Raceline, RacelineSettings, Setup,
 };
 use lapswarm::study::sweep::{SweepSettings, sweep};
-use lapswarm::swarm::{SwarmPlace, checkpoint};
+use lapswarm::swarm::checkpoint;
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::process::{Command, Output};
@@ -21,7 +21,6 @@ use std::sync::Arc;
 tests! {
     faults_survive_a_resume_and_the_summary_names_what_ended_the_run: device,
     a_study_ends_without_the_adapter_that_it_began_with: device,
-    a_swarm_on_the_device_loses_nothing_to_faults_and_breaks: device,
     without_a_driver_that_works_auto_works_and_gpu_says_why_not: everywhere,
     processes_that_share_a_device_all_finish_with_the_same_results: device,
     a_sweep_tells_of_faults_and_dispatches_run_by_run: device,
@@ -156,91 +155,6 @@ fn a_study_ends_without_the_adapter_that_it_began_with() {
         "{:?}",
         ended.record.device_faults
     );
-}
-
-/// The front's swarm lives on the device. A fault at any submission of a step, and a run that is broken off and resumed, lead to
-/// the same front bit for bit; a device that stays away leaves the swarm to lanes.
-fn a_swarm_on_the_device_loses_nothing_to_faults_and_breaks() {
-    let _turn = alone();
-    let settings = RacelineSettings {
-        track: "stadium:300:80:12".to_owned(),
-        sections: Some(60),
-        population: 70,
-        iterations: 8,
-        archive: 12,
-        objectives: vec![LineObjective::Length, LineObjective::Gamma],
-        warm_start: Some(false),
-        local_search: Some(false),
-        backend: BackendChoice::Gpu,
-        swarm: SwarmPlace::Device,
-        ..RacelineSettings::default()
-    };
-    let setup = raceline::set_up(&settings).unwrap();
-    // Does something at the fourth step of the front's swarm.
-    let at_fourth = |state, state_file: &mut StateFile, act: &dyn Fn() -> ControlFlow<()>| {
-        let mut steps = 0;
-        let ended = find_lines(&settings, &setup, (state, state_file), |p| {
-            steps += usize::from(p.stage == "front" && p.done > 0);
-            if steps == 4 && p.stage == "front" {
-                act()
-            } else {
-                ControlFlow::Continue(())
-            }
-        });
-        faults::end();
-        ended.unwrap()
-    };
-    let front = |outcome: &Outcome| {
-        let front = outcome.front.as_ref().expect("a front");
-        (front.alpha.clone(), front.objectives.clone(), front.evaluations)
-    };
-    let go_on = || ControlFlow::Continue(());
-    let clean = at_fourth(None, &mut StateFile::idle(), &go_on);
-    assert!(
-        clean.record.device_faults.is_empty(),
-        "{:?}",
-        clean.record.device_faults
-    );
-    for from in [0, 1, 2, 3, 4, 5, 6, 11] {
-        let struck = at_fourth(None, &mut StateFile::idle(), &|| {
-            faults::inject(Fault::Lost, from, 1);
-            ControlFlow::Continue(())
-        });
-        assert_eq!(
-            struck.record.device_faults.len(),
-            1,
-            "{:?}",
-            struck.record.device_faults
-        );
-        assert_eq!(front(&struck), front(&clean), "a fault at {from}");
-    }
-
-    let folder = tempfile::tempdir().unwrap();
-    let stop = || ControlFlow::Break(());
-    let broken = at_fourth(None, &mut StateFile::new(folder.path()), &stop);
-    assert!(broken.record.interrupted);
-    let state: LinesState = checkpoint::load(&folder.path().join(STATE)).unwrap();
-    let resumed = at_fourth(Some(state), &mut StateFile::new(folder.path()), &go_on);
-    assert_eq!(front(&resumed), front(&clean));
-
-    let lost = at_fourth(None, &mut StateFile::idle(), &|| {
-        faults::inject(Fault::Lost, 0, u64::MAX);
-        ControlFlow::Continue(())
-    });
-    let last = lost.record.device_faults.last().unwrap();
-    assert!(
-        last.contains("simd takes over"),
-        "{:?}",
-        lost.record.device_faults
-    );
-    assert_eq!(front(&lost).2, front(&clean).2);
-
-    let host = RacelineSettings {
-        backend: BackendChoice::Simd,
-        ..settings.clone()
-    };
-    let refusal = Raceline::prepare(&host).map(drop).unwrap_err().to_string();
-    assert!(refusal.contains("the backend gpu"), "{refusal}");
 }
 
 fn lapswarm(folder: &Path, driver: &Path, arguments: &[&str]) -> Output {

@@ -11,11 +11,17 @@ mod drive;
 mod faults;
 #[cfg(unix)]
 mod kills;
+mod resident;
 #[cfg(unix)]
 mod stops;
 
 fn main() -> std::process::ExitCode {
-    let mut modules = vec![devices::tests(), drive::tests(), faults::tests()];
+    let mut modules = vec![
+        devices::tests(),
+        drive::tests(),
+        faults::tests(),
+        resident::tests(),
+    ];
     #[cfg(unix)]
     modules.extend([kills::tests(), stops::tests()]);
     common::harness::main(modules)

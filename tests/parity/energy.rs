@@ -4,6 +4,7 @@ use crate::common::Random;
 use crate::common::line::circuit;
 use crate::device::device;
 use glam::DVec2;
+use lapswarm::config::Choice;
 use lapswarm::evaluate::energy::{
     CpuHybridEvaluator, Free, GpuHybridEvaluator, HybridLine, HybridObjective, HybridProblem,
     SimdHybridEvaluator, Strategy,
@@ -219,7 +220,7 @@ fn evaluations_are_rows_of_laps_and_candidates_that_are_no_numbers_fail() {
     for evaluator in &mut backends {
         let evaluation = evaluator.evaluate(&rows.concat()).expect("it runs");
         assert_eq!(evaluation.failures.iter().filter(|f| f.is_some()).count(), 1);
-        assert_eq!(evaluation.objectives[4..8], [lapswarm::evaluate::FAILED_COST; 4]);
+        assert_eq!(evaluation.objectives[6..12], [lapswarm::evaluate::FAILED_COST; 6]);
         let lap = problem.lap(&rows[0]).0;
         assert!((evaluation.objectives[0] / lap.time - 1.0).abs() < 2.6e-4);
         assert!((evaluation.objectives[1] / (lap.fuel / 0.748) - 1.0).abs() < 1e-2);

@@ -9,8 +9,8 @@ use lapswarm::evaluate::line::{
 };
 use lapswarm::evaluate::simd::InstructionSet;
 use lapswarm::evaluate::{Evaluation, Evaluator, FAILED_COST, Failure};
-use lapswarm::line::Parametrisation;
-use lapswarm::parity::line_tolerances;
+use lapswarm::line::{Parametrisation, PointMass};
+use lapswarm::parity::{in_relief, line_tolerances};
 
 tests! {
     lines_cost_what_the_reference_says_on_every_backend: also_device,
@@ -101,6 +101,18 @@ fn problems() -> Vec<(&'static str, LineProblem)> {
     let (cross_sections, car) = made(150, 12.0, false);
     let ends = Parametrisation::control_points(30).with_fixed_ends(vec![0.3; 30]);
     problems.push(("fixed ends", line_problem(cross_sections, ends, car)));
+    for (closed, sections) in [(true, 360), (false, 150)] {
+        let (cross_sections, car) = made(sections, 16.0, closed);
+        let (cross_sections, car) = in_relief(&cross_sections, &car).expect("sound limits");
+        let way = Parametrisation::control_points(sections / 4);
+        problems.push(("hills", line_problem(cross_sections, way, car)));
+        let (cross_sections, car) = made(sections, 16.0, closed);
+        let (cross_sections, _) = in_relief(&cross_sections, &car).expect("sound limits");
+        // Limits that were not swept go with the load.
+        let car = PointMass { relief: true, ..car };
+        let way = Parametrisation::sections();
+        problems.push(("hills, scaled limits", line_problem(cross_sections, way, car)));
+    }
     problems
 }
 

@@ -20,6 +20,8 @@ mod steady;
 mod step;
 mod swarm;
 mod swarm_lines;
+mod swarm_resident;
+mod tuning;
 
 fn main() -> std::process::ExitCode {
     if common::radv::answer_parent(common::kernels::kernels) {
@@ -39,5 +41,7 @@ fn main() -> std::process::ExitCode {
         step::tests(),
         swarm::tests(),
         swarm_lines::tests(),
+        swarm_resident::tests(),
+        tuning::tests(),
     ])
 }

@@ -48,7 +48,7 @@ fn a_swarm_that_the_device_has_no_room_for_is_refused_with_the_size_that_fits() 
 }
 
 /// Whether the device is known to round every operation as the processor does.
-fn rounds_like_the_processor(context: &Arc<GpuContext>) -> bool {
+pub fn rounds_like_the_processor(context: &Arc<GpuContext>) -> bool {
     Subject::Device(Arc::clone(context)).rounds_like_the_processor()
 }
 

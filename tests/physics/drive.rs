@@ -3,10 +3,14 @@
 use crate::common::{Random, bundled_car};
 use glam::DVec2;
 use lapswarm::drive::driver::{WheelTorque, torque_at};
-use lapswarm::drive::{Course, Drive, DriverSettings, Line, Pose, Road, SpeedPlan, drive, look};
+use lapswarm::drive::{
+    Course, Drive, DriverSettings, Line, Pose, Road, SpeedPlan, drive, drive_planned, look,
+};
 use lapswarm::evaluate::drive::{DriveObjective, DriveProblem, DriveSettings};
-use lapswarm::track::{Circuit, Track};
-use lapswarm::vehicle::Car;
+use lapswarm::track::{Circuit, CurvatureTable, Relief, ReliefChange, Track};
+use lapswarm::vehicle::model::runge_kutta_step_on;
+use lapswarm::vehicle::wheels::moments_under;
+use lapswarm::vehicle::{Car, CarInput, CarModel, CarState};
 
 fn circuit(name: &str) -> Circuit {
     Track::load(name).and_then(|t| t.circuit()).expect(name)
@@ -28,6 +32,138 @@ fn pose(circuit: &Circuit, station: f64, offset: f64, yaw_error: f64, guess: f64
         yaw: heading + yaw_error - circuit.heading_rad[row],
     };
     (point, pose)
+}
+
+/// A circle of this radius (m), driven to the left, banked by an angle (rad), its left side up.
+fn banked(radius_m: f64, bank_rad: f64) -> Circuit {
+    let mut circuit = CurvatureTable::circle(radius_m, 12.0, true)
+        .build()
+        .expect("a circle")
+        .0;
+    let n = circuit.station_m.len();
+    circuit.relief = Some(Relief {
+        z_m: vec![0.0; n],
+        bank_rad: vec![bank_rad; n],
+        change: ReliefChange::default(),
+    });
+    circuit
+}
+
+/// On a circle banked by `b`, right side up for a left-hander, at `v^2 = g R tan b`, the tyres bear no side force, the body does not
+/// lean, and the wheels carry the weight over the cosine with the downforce. The driver holds his speed to a percent, by which the
+/// side force is off by two of `g sin b`.
+#[test]
+fn a_banked_circle_is_driven_without_side_force_at_its_own_speed() {
+    let car = bundled_car();
+    let (radius, bank) = (200.0, 0.2f64);
+    let circuit = banked(radius, -bank);
+    let gravity = lapswarm::vehicle::powertrain::GRAVITY_MPS2;
+    let speed = (gravity * radius * bank.tan()).sqrt();
+    let plan = SpeedPlan::of_speeds(&[0.0], &[speed], circuit.length_m);
+    let driven =
+        drive_planned(&car, &circuit, plan, &DriverSettings::default(), 0.05).expect("it gets round");
+    let last = driven.states.len() - 1;
+    let (state, load) = (CarState::from_array(driven.states[last]), driven.loads_mps2[last]);
+    assert!(
+        (state.body.vx / speed - 1.0).abs() < 0.01,
+        "{} for {speed}",
+        state.body.vx
+    );
+    assert!((load * bank.cos() / gravity - 1.0).abs() < 2e-3, "{load}");
+    let moment = moments_under(&car, &[(state, driven.inputs[last])], &[load])[0];
+    assert!(
+        moment.ay_mps2.abs() < 0.02 * gravity * bank.sin(),
+        "{}",
+        moment.ay_mps2
+    );
+    assert!(state.body.roll.abs() < 1e-3, "{}", state.body.roll);
+    // Without banking the same bend takes all of `v^2 / R`.
+    let plan = SpeedPlan::of_speeds(&[0.0], &[speed], circuit.length_m);
+    let mut level = circuit;
+    level.relief = None;
+    let flat = drive_planned(&car, &level, plan, &DriverSettings::default(), 0.05).expect("it gets round");
+    let last = flat.states.len() - 1;
+    let state = CarState::from_array(flat.states[last]);
+    let moment = moments_under(&car, &[(state, flat.inputs[last])], &[])[0];
+    assert!(
+        (moment.ay_mps2 / (speed * speed / radius) - 1.0).abs() < 0.03,
+        "{}",
+        moment.ay_mps2
+    );
+    assert!(flat.loads_mps2.is_empty());
+}
+
+/// A road in three dimensions that is level drives as the plane does, to rounding.
+#[test]
+fn a_road_of_no_height_drives_as_a_level_one() {
+    let car = bundled_car();
+    let level = circuit("stadium:200:70:14");
+    let n = level.station_m.len();
+    let mut zero = level.clone();
+    zero.relief = Some(Relief {
+        z_m: vec![40.0; n],
+        bank_rad: vec![0.0; n],
+        change: ReliefChange::default(),
+    });
+    let settings = DriverSettings {
+        pace: 0.5,
+        ..DriverSettings::default()
+    };
+    let (flat, found) = (
+        drive(&car, &level, &settings, 0.05),
+        drive(&car, &zero, &settings, 0.05),
+    );
+    let (flat, found) = (flat.expect("it gets round"), found.expect("it gets round"));
+    assert_eq!(flat.states.len(), found.states.len());
+    for (a, b) in flat.states.iter().zip(&found.states) {
+        for (a, b) in a.iter().zip(b) {
+            assert!((a - b).abs() < 1e-6, "{a} {b}");
+        }
+    }
+}
+
+/// Rolling without drive or drag over a hill, the car loses the speed that the height takes: `v^2 = v0^2 - 2 g z`. Rolling
+/// resistance is none of the model's; the driver's feet are held still.
+#[test]
+fn a_rolling_car_gives_speed_for_height() {
+    let mut car = bundled_car();
+    car.chassis.drag_area = 0.0;
+    let gravity = car.chassis.gravity;
+    let flat = car.to_flat();
+    let model = CarModel::<f64, lapswarm::vehicle::MagicFormula<f64>>::from_parameters(|i| flat[i]);
+    let mut state = CarState::straight(40.0);
+    let (mut height, mut length, step) = (0.0, 0.0, 1e-3);
+    for _ in 0..2000 {
+        // A slope that grows and falls.
+        let slope = 0.08 * (length / 30.0f64).sin();
+        let [front, rear] =
+            [car.chassis.radius_front, car.chassis.radius_rear].map(|radius| state.body.vx / radius);
+        let input = CarInput {
+            wheel_speed: [front, front, rear, rear],
+            steer: 0.0,
+            flap: 0.0,
+        };
+        let before = state.body.vx;
+        state = runge_kutta_step_on(
+            &model,
+            &state,
+            |_| input,
+            Some([gravity * slope, 0.0]),
+            step,
+            |_| {},
+        );
+        let driven = 0.5 * step * (before + state.body.vx);
+        length += driven;
+        height += slope * driven;
+    }
+    let wanted = 1600.0 - 2.0 * gravity * height;
+    // Wheels at the speed of the step before slip by what gravity takes in a step, 1e-3 m/s of 40, and pull by as much.
+    let found = state.body.vx.powi(2);
+    assert!(height.abs() > 0.5, "{height}");
+    assert!(
+        (found - wanted).abs() < 0.05 * (1600.0 - wanted).abs(),
+        "{found} for {wanted}"
+    );
 }
 
 /// The foot found in the frame of a row is the circuit's own projection. A car moves by 0.1 m in a step; twice

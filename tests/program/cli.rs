@@ -520,6 +520,24 @@ fn check_lists_the_channels_of_a_log_and_writes_a_map_of_them() {
     );
 }
 
+/// Names of channels that begin like places: a log is no track for them.
+#[test]
+fn a_log_of_lateral_and_longitudinal_g_is_a_log() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let mut log = "t,G_Lat,G_Long\ns,g,g\n".to_owned();
+    for i in 0..100 {
+        log.push_str(&format!(
+            "{},{},0.1\n",
+            f64::from(i) * 0.05,
+            (f64::from(i) * 0.1).sin()
+        ));
+    }
+    std::fs::write(folder.path().join("own.csv"), log).expect("a log");
+    let checked = lapswarm(folder.path(), &["check", "own.csv"]);
+    let told = text(&checked.stdout);
+    assert!(told.contains("ay, by its name"), "{told}");
+}
+
 #[test]
 fn a_log_that_a_study_takes_is_one_that_check_takes() {
     let folder = tempfile::tempdir().expect("a temporary folder");

@@ -94,7 +94,13 @@ fn a_car_has_gears_forces_brakes_tyres_and_limits() {
     let checked = draw();
     assert!(checked.status.success(), "{}", text(&checked.stderr));
     let drawn = folder.path().join("drawn");
-    let of_car = ["gears", "tractive_force", "brake_balance", "envelope"];
+    let of_car = [
+        "gears",
+        "tractive_force",
+        "standing_start",
+        "brake_balance",
+        "envelope",
+    ];
     assert_eq!(names(&drawn), files_of(&[&of_car[..], &OF_TYRES[..]].concat()));
 
     // Sixth gear turns 4.1328 times: 8500 rpm on wheels of 0.325 m are 69.998 m/s.
@@ -108,6 +114,28 @@ fn a_car_has_gears_forces_brakes_tyres_and_limits() {
     let (_, forces) = rows(&drawn.join("tractive_force.csv"));
     let sixth = forces.iter().rfind(|row| row[1] == "gear 6").expect("sixth gear");
     assert!((number(&sixth[3]) / 4614.7 - 1.0).abs() < 1e-4, "{sixth:?}");
+
+    // From rest to 69.6 m/s the engine's 342 kW do 0.95 of their work at the wheels, which is more than the 1245 kg's energy; on the
+    // brakes the car is back at rest in less than half of the time.
+    let (heads, start) = rows(&drawn.join("standing_start.csv"));
+    assert_eq!(heads[2..], ["time (s)", "speed (m/s)"]);
+    let by_engine: Vec<[f64; 2]> = start
+        .iter()
+        .filter(|row| row[1] == "engine")
+        .map(|row| [number(&row[2]), number(&row[3])])
+        .collect();
+    let top = by_engine
+        .iter()
+        .max_by(|a, b| a[1].total_cmp(&b[1]))
+        .expect("a top speed");
+    let end = by_engine[by_engine.len() - 1];
+    assert!((top[1] - 0.995 * 69.998).abs() < 0.01, "{top:?}");
+    assert!(
+        top[0] > 0.5 * 1245.0 * top[1].powi(2) / (342e3 * 0.95) && top[0] < 60.0,
+        "{top:?}"
+    );
+    assert!(end[1] == 0.0 && end[0] < 1.5 * top[0], "{end:?}");
+    assert_eq!(start.iter().filter(|row| row[1] == "shift points").count(), 5);
 
     // The front carries 1.17 / 2.6 = 45 % of a car that rolls without air. Its tyres are the rear's but for their camber.
     let (heads, shares) = rows(&drawn.join("brake_balance.csv"));

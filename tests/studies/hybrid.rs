@@ -3,13 +3,14 @@
 use glam::DVec2;
 use lapswarm::config::settings::Settings;
 use lapswarm::evaluate::BackendChoice;
+use lapswarm::evaluate::energy::HybridObjective;
 use lapswarm::line::energy::{Gates, Mode};
 use lapswarm::study::framework::journal::Recorder;
 use lapswarm::study::framework::state_file::StateFile;
 use lapswarm::study::framework::{Study, solve_unobserved, write_results};
 use lapswarm::study::hybrid::{
-    Hybrid, HybridAlgorithm, HybridSetup, HybridStudySettings, ReportedLap, correlation, drive, engine_only,
-    mean_worths, published, search_front, search_strategy, set_up, size, stint, worth,
+    FreeGate, FreePart, Hybrid, HybridAlgorithm, HybridSetup, HybridStudySettings, ReportedLap, correlation,
+    drive, engine_only, mean_worths, published, search_front, search_strategy, set_up, size, stint, worth,
 };
 use lapswarm::swarm::Mutation;
 use lapswarm::swarm::metrics::non_dominated;
@@ -508,6 +509,101 @@ fn strategies_are_searched_by_the_swarm_that_is_asked_for() {
     }
 }
 
+/// Gates and zones that swarms set. In the engine's place the lap takes as long as by the engine alone and burns less; beside it the
+/// lap is faster. Sites share out all that leaves the store.
+#[test]
+fn gates_and_zones_are_searched_both_ways() {
+    let settings = HybridStudySettings {
+        track: "stadium:250:60:12".to_owned(),
+        sections: Some(120),
+        spacing_m: 6.0,
+        population: 24,
+        iterations: 30,
+        budgets_mj: Vec::new(),
+        energy_mj: Some(0.3),
+        objectives: vec![
+            HybridObjective::Gamma,
+            HybridObjective::Length,
+            HybridObjective::LapTime,
+        ],
+        free: FreePart::Both,
+        offset: true,
+        gates: vec![
+            FreeGate::Steer,
+            FreeGate::Speed,
+            FreeGate::Acceleration,
+            FreeGate::Charge,
+        ],
+        backend: BackendChoice::Simd,
+        ..HybridStudySettings::default()
+    };
+    let inputs = Hybrid::prepare(&settings).unwrap();
+    let outcome = solve_unobserved::<Hybrid>(&settings, &inputs).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let summary = write_results::<Hybrid>(folder.path(), &settings, &inputs, &outcome).unwrap();
+    for name in [
+        "lap_offset_zones.csv",
+        "lap_offset_gates.csv",
+        "lap_additional_gates.csv",
+        "motor_on.svg",
+    ] {
+        assert!(folder.path().join(name).is_file(), "{name}");
+    }
+    let searches = &summary.searches;
+    let (zones, gates) = (&searches["offset_zones"], &searches["offset_gates"]);
+    let beside = &searches["additional_gates"];
+    for found in [zones, gates] {
+        assert!(
+            (found.lap_time_s - summary.engine_lap_time_s).abs() < 1e-9,
+            "{found:?}"
+        );
+        assert!(
+            found.fuel_l < summary.engine_fuel_l && found.fuel_percent < 100.0,
+            "{found:?}"
+        );
+    }
+    for found in searches.values() {
+        assert!(
+            found.deployed_mj <= 0.3 + 1e-6 && found.deployed_mj > 0.05,
+            "{found:?}"
+        );
+    }
+    assert!(beside.lap_time_s < summary.engine_lap_time_s - 0.05, "{beside:?}");
+    let names: Vec<&str> = gates.variables.keys().map(String::as_str).collect();
+    assert_eq!(names, ["ax", "soc", "speed", "steer"]);
+    let deployment = summary.deployment.as_ref().unwrap();
+    let (allocated, out): (f64, f64) = deployment.sites.iter().fold((0.0, 0.0), |sum, site| {
+        (sum.0 + site.allocation, sum.1 + site.deployed_mj)
+    });
+    assert!((allocated - 1.0).abs() < 1e-9 && (out - deployment.swarm_deployed_mj).abs() < 1e-9);
+    assert!(deployment.sites.len() > 1, "{:?}", deployment.sites);
+    // The front's lengths are those of its lines: none is shorter than the inside of the road, and the shortest is not the fastest.
+    let front = outcome.optimised.as_ref().unwrap().swarm_front.as_ref().unwrap();
+    let least = |k: usize| {
+        let all = front.objectives.iter();
+        all.min_by(|a, b| a[k].total_cmp(&b[k])).unwrap().clone()
+    };
+    let (straight, short) = (least(0), least(1));
+    assert!(
+        short[1] > 500.0 + 2.0 * PI * 54.0 && short[1] < 500.0 + 2.0 * PI * 66.0,
+        "{short:?}"
+    );
+    assert!(
+        short[1] < straight[1] && straight[0] < short[0],
+        "{straight:?} {short:?}"
+    );
+
+    let of_one_line = HybridStudySettings {
+        free: FreePart::Strategy,
+        ..settings
+    };
+    let error = of_one_line.validate().err().unwrap().to_string();
+    assert!(
+        error.contains("objectives") && error.contains("gamma_1pm"),
+        "{error}"
+    );
+}
+
 #[test]
 fn a_study_writes_what_scripts_read_and_repeats() {
     let settings = HybridStudySettings {
@@ -519,11 +615,8 @@ fn a_study_writes_what_scripts_read_and_repeats() {
         budgets_mj: vec![0.0, 0.2],
         energy_mj: Some(0.3),
         stint_laps: 1,
-        objectives: vec![
-            lapswarm::evaluate::energy::HybridObjective::LapTime,
-            lapswarm::evaluate::energy::HybridObjective::Fuel,
-        ],
-        free: lapswarm::study::hybrid::FreePart::Both,
+        objectives: vec![HybridObjective::LapTime, HybridObjective::Fuel],
+        free: FreePart::Both,
         backend: BackendChoice::Simd,
         ..HybridStudySettings::default()
     };

@@ -5,6 +5,7 @@ mod hybrid;
 mod identify;
 #[path = "../common/circuits.rs"]
 mod made;
+mod models;
 mod registry;
 mod reproduce;
 mod resume;

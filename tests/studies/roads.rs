@@ -233,7 +233,7 @@ fn reference_optima_agree_across_cross_sections() {
     let folder = tempfile::tempdir().expect("a folder");
     let lap_s = [400, 800].map(|sections| {
         let settings = RacelineSettings {
-            sections,
+            sections: Some(sections),
             ..WIDE.settings(folder.path())
         };
         let setup = set_up(&settings).expect("a road");

@@ -2,6 +2,7 @@
 
 use crate::solve;
 use lapswarm::config::settings::Settings;
+use lapswarm::study::OwnRange;
 use lapswarm::study::framework::state_file::StateFile;
 use lapswarm::study::framework::{Study, solve_unobserved, write_results};
 use lapswarm::study::identify::{self, IdentifySettings};
@@ -23,7 +24,51 @@ fn settings() -> SensitivitySettings {
         samples: 32,
         resamples: 50,
         share: 0.02,
+        ranges: Vec::new(),
     }
+}
+
+/// Ranges of one's own are in place of the free parameters: the values of their steps, the bounds of the indices, traces. A lap feels
+/// the roll stiffness in its roll rate, which no log has.
+#[test]
+fn parameters_go_over_ranges_of_their_own() {
+    let range = |name: &str, lower: f64, upper: f64, step: Option<f64>| OwnRange {
+        name: name.to_owned(),
+        lower,
+        upper,
+        step,
+    };
+    let settings = SensitivitySettings {
+        ranges: vec![
+            range("K", 8e4, 1.2e5, Some(1e4)),
+            range("front.lMUy", 0.98, 1.02, None),
+        ],
+        samples: 8,
+        ..settings()
+    };
+    let setup = Sensitivity::prepare(&settings).expect("the bundled lap");
+    let outcome = solve_unobserved::<Sensitivity>(&settings, &setup).expect("it runs");
+    assert_eq!(outcome.record.evaluations, 1 + 5 + 2 + 8 * 4);
+    assert_eq!(settings.evaluations(), 1 + 5 + 2 + 8 * 4);
+    let values: Vec<f64> = outcome.one_at_a_time.iter().map(|row| row.value).collect();
+    assert_eq!(values, [8e4, 9e4, 1e5, 1.1e5, 1.2e5, 0.98, 1.02]);
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let written = write_results::<Sensitivity>(folder.path(), &settings, &setup, &outcome);
+    let summary = written.expect("files are written");
+    let of = |name: &str| {
+        let found = summary.parameters.iter().find(|p| p.name == name);
+        found.expect("a parameter")
+    };
+    const ROLL: &str = "roll_stiffness_nm_per_rad";
+    assert_eq!(of(ROLL).range, [8e4, 1.2e5]);
+    let roll = |name: &str| of(name).rms_change["roll_rate"].expect("it drives");
+    let yaw = |name: &str| of(name).rms_change["yaw_rate"].expect("it drives");
+    assert!(roll(ROLL) / yaw(ROLL) > roll("front.lMUy") / yaw("front.lMUy"));
+    for file in ["traces_K.svg", "report.html"] {
+        assert!(folder.path().join(file).is_file(), "{file}");
+    }
+    let read = SensitivitySettings::read(&folder.path().join("study.toml")).expect("it reads back");
+    assert_eq!(read.ranges, settings.ranges);
 }
 
 #[test]

@@ -1,13 +1,14 @@
 //! The surface study end to end on the bundled lap.
 
 use lapswarm::config::settings::Settings;
+use lapswarm::study::OwnRange;
 use lapswarm::study::framework::{Study, solve_unobserved, write_results};
 use lapswarm::study::surface::{Surface, SurfaceSettings};
 
 #[test]
 fn the_least_cost_is_at_the_car_that_logged_the_lap() {
     let settings = SurfaceSettings {
-        share: Some(0.05),
+        share: 0.05,
         grid: 5,
         ..SurfaceSettings::default()
     };
@@ -39,7 +40,37 @@ fn the_least_cost_is_at_the_car_that_logged_the_lap() {
         assert!(folder.path().join(name).is_file(), "{name}");
     }
     let read = SurfaceSettings::read(&folder.path().join("study.toml")).expect("it reads back");
-    assert_eq!((read.grid, read.share), (5, Some(0.05)));
+    assert_eq!((read.grid, read.share), (5, 0.05));
+}
+
+#[test]
+fn axes_may_have_ranges_of_their_own() {
+    let range = |name: &str, step: Option<f64>| OwnRange {
+        name: name.to_owned(),
+        lower: 12.0,
+        upper: 13.0,
+        step,
+    };
+    let settings = |ranges: Vec<OwnRange>| SurfaceSettings {
+        ranges,
+        grid: 3,
+        ..SurfaceSettings::default()
+    };
+    let own = settings(vec![range("rBy1", None)]);
+    let setup = Surface::prepare(&own).expect("the bundled lap");
+    let [x, y] = &setup.replay.problem.variables[..] else {
+        panic!("two variables")
+    };
+    assert_eq!((x.lower, x.upper), (12.0, 13.0));
+    // The other one goes by its share.
+    assert!((y.upper / y.lower - 1.5).abs() < 1e-9, "{y:?}");
+    for wrong in [range("rBy1", Some(0.5)), range("K", None)] {
+        let name = wrong.name.clone();
+        let error = Surface::prepare(&settings(vec![wrong]))
+            .err()
+            .expect("no such range");
+        assert!(error.to_string().contains(&format!("ranges.{name}")), "{error}");
+    }
 }
 
 #[test]

@@ -3,14 +3,16 @@
 use crate::solve;
 use lapswarm::evaluate::BackendChoice;
 use lapswarm::evaluate::line::LineObjective;
+use lapswarm::line::energy::{Gates, Mode};
 use lapswarm::line::read_line;
 use lapswarm::study::framework::state_file::StateFile;
 use lapswarm::study::framework::{Study, solve_unobserved, write_results};
+use lapswarm::study::hybrid::{Hybrid, HybridStudySettings, Scenario};
 use lapswarm::study::identify::{Algorithm, IdentifySettings};
 use lapswarm::study::raceline::{RacelineSettings, set_up};
 use lapswarm::study::run::{Run, RunSettings};
 use lapswarm::study::transient::{
-    AGREEMENT, DrivenLine, NamedLine, Outcome, PopulationOutcome, Prepared, Summary, Transient,
+    AGREEMENT, DrivenLine, LineSummary, NamedLine, Outcome, PopulationOutcome, Prepared, Summary, Transient,
     TransientSettings,
 };
 use lapswarm::vehicle::Car;
@@ -38,6 +40,7 @@ fn on_lines(lines: &[(&str, f64)]) -> Prepared {
         car: Car::bundled().expect("the bundled car"),
         lines: lines.iter().map(line).collect(),
         road,
+        motor: None,
     }
 }
 
@@ -53,6 +56,97 @@ fn population_of(outcome: &Outcome) -> &PopulationOutcome {
         Outcome::Population(population) => population,
         Outcome::Line(_) => panic!("a population was to be driven"),
     }
+}
+
+/// A hybrid's motor works where a lap of the study `hybrid` has it work: beside the engine it gains time, in its place it gains none.
+/// Both laps move the same car over the same way, and the books balance.
+#[test]
+fn a_hybrids_lap_has_accounts_that_agree_with_the_quasi_steady_state_lap() {
+    let track = "stadium:400:120:14";
+    let road = stadium();
+    let points = road.cross_sections.points(&road.cross_sections.reference);
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let line = folder.path().join("middle.csv");
+    let rows: String = points.iter().map(|p| format!("{},{}\n", p.x, p.y)).collect();
+    std::fs::write(&line, format!("x_m,y_m\n{rows}")).expect("a file");
+    let scenario = |name: &str, mode: Mode| Scenario {
+        name: name.to_owned(),
+        mode,
+        gates: Gates {
+            energy_mj: 0.5,
+            ..Gates::OPEN
+        },
+        start_soc: Some(0.6),
+    };
+    let hybrid = HybridStudySettings {
+        track: track.to_owned(),
+        line: Some(line.clone()),
+        optimise: false,
+        scenarios: vec![
+            scenario("beside", Mode::Additional),
+            scenario("instead", Mode::Offset),
+        ],
+        ..HybridStudySettings::default()
+    };
+    let inputs = Hybrid::prepare(&hybrid).expect("a hybrid");
+    let found = solve_unobserved::<Hybrid>(&hybrid, &inputs).expect("laps");
+    write_results::<Hybrid>(folder.path(), &hybrid, &inputs, &found).expect("files are written");
+    let driven = |lap: &str, deployment_mode: Mode| {
+        let settings = TransientSettings {
+            line: vec![folder.path().join("line.csv")],
+            track: Some(track.to_owned()),
+            car: "gt_hybrid".to_owned(),
+            deployment: Some(folder.path().join(lap)),
+            deployment_mode,
+            ..TransientSettings::default()
+        };
+        let prepared = Transient::prepare(&settings).expect("a lap to drive");
+        let found = solve_unobserved::<Transient>(&settings, &prepared).expect("it drives");
+        let out = tempfile::tempdir().expect("a temporary folder");
+        let summary = write_results::<Transient>(out.path(), &settings, &prepared, &found);
+        let Summary::Line(summary) = summary.expect("files are written") else {
+            panic!("the figures of one line")
+        };
+        let table = std::fs::read_to_string(out.path().join("drive.csv")).expect("a table");
+        assert!(
+            table
+                .lines()
+                .next()
+                .expect("a header")
+                .contains("motor_power (kW)")
+        );
+        *summary
+    };
+    let none = driven("lap_engine_alone.csv", Mode::Offset);
+    let beside = driven("lap_beside.csv", Mode::Additional);
+    let instead = driven("lap_instead.csv", Mode::Offset);
+    for (summary, start_soc) in [(&none, 1.0), (&beside, 0.6), (&instead, 0.6)] {
+        let energy = summary.energy.as_ref().expect("accounts");
+        println!("{energy:?}");
+        assert!(summary.agrees);
+        for accounts in [&energy.driven, &energy.quasi_steady_state] {
+            assert!(accounts.balance_error_j.abs() < 1.0, "{accounts:?}");
+            let change = accounts.harvested_k_mj + accounts.harvested_h_mj - accounts.deployed_mj;
+            assert!((accounts.soc_end - start_soc - change / 5.3).abs() < 1e-6);
+        }
+        assert!((energy.driven.lap_time_s / summary.lap_time_s - 1.0).abs() < 1e-6);
+        assert!(energy.deployed_difference_percent.abs() < 3.0);
+        // A driver slows down and speeds up a little more than his plan. A tenth more would be another lap.
+        assert!(energy.moving_difference_percent.abs() < 10.0);
+        assert!(energy.driven.tyres_mj > 0.0);
+    }
+    let out = |summary: &LineSummary| summary.energy.as_ref().expect("accounts").driven.deployed_mj;
+    assert_eq!(out(&none), 0.0);
+    assert!((out(&instead) - 0.5).abs() < 0.015 && (out(&beside) - 0.5).abs() < 0.015);
+    let gained = none.lap_time_s - beside.lap_time_s;
+    let planned = none.point_mass_lap_time_s - beside.point_mass_lap_time_s;
+    assert!(
+        gained > 0.5 * planned && planned > 0.1,
+        "{gained} s of {planned} s"
+    );
+    assert!((instead.lap_time_s / none.lap_time_s - 1.0).abs() < 1e-3);
+    let fuel = |summary: &LineSummary| summary.energy.as_ref().expect("accounts").driven.fuel_l;
+    assert!(fuel(&instead) < fuel(&none));
 }
 
 #[test]
@@ -124,6 +218,7 @@ fn each_corner_has_the_grip_that_the_car_holds_there() {
         car: Car::bundled().expect("the bundled car"),
         lines: vec![line.expect("a line")],
         road,
+        motor: None,
     };
     let settings = TransientSettings::default();
     let found = solve_unobserved::<Transient>(&settings, &prepared).expect("it drives");

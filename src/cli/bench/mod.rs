@@ -6,6 +6,7 @@ mod pages;
 mod scaling;
 mod studies;
 mod swarm;
+mod tune;
 mod whole;
 
 use lapswarm::Result;
@@ -34,6 +35,8 @@ enum What {
     Swarm(swarm::Arguments),
     /// Measure whole generations (ask, evaluate, tell) of every problem, and what of them is not kernels.
     Whole(whole::Arguments),
+    /// Try how kernels are best compiled and dispatched on a GPU, and remember it.
+    Tune(tune::Arguments),
 }
 
 /// Measures and prints.
@@ -43,6 +46,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         Some(What::Studies(arguments)) => studies::run(arguments),
         Some(What::Swarm(arguments)) => swarm::run(arguments),
         Some(What::Whole(arguments)) => whole::run(arguments),
+        Some(What::Tune(arguments)) => tune::run(arguments),
         None => scaling::run(&arguments.scaling),
     }
 }

@@ -1,7 +1,7 @@
 //! Pages of what was measured: a figure for each, and every measurement as a table and as `rows.csv`.
 
 use super::scaling::{self, Table as Rates};
-use super::{optimisers, studies, swarm, whole};
+use super::{optimisers, studies, swarm, tune, whole};
 use lapswarm::Result;
 use lapswarm::report::{BarPanel, Bars, Curves, HtmlReport, Panel, Scale, Table, significant};
 use lapswarm::swarm::comparison::quartiles;
@@ -266,6 +266,23 @@ pub fn of_whole(folder: &Path, rows: &[whole::Row]) -> Result<HtmlReport> {
         .number("kernels", "ms", |r| r.kernel_ms)
         .number("outside kernels", "%", |r| 100.0 * r.outside_kernels_share)
         .text("device", |r| &*r.adapter);
+    rows_of(&mut page, folder, &table.table())?;
+    Ok(page)
+}
+
+/// The page of `bench tune`.
+pub fn of_tune(folder: &Path, rows: &[tune::Row], best: String) -> Result<HtmlReport> {
+    let mut page = HtmlReport::new("bench", "How kernels are best compiled and dispatched");
+    page.sentence(best);
+    let table = Table::rows(rows)
+        .text("problem", |r| r.problem)
+        .number("workgroup", "lanes", |r| f64::from(r.workgroup))
+        .text("loops", |r| if r.bounded_loops { "bounded" } else { "trusted" })
+        .number("lanes of a dispatch", "", |r| r.lanes as f64)
+        .number("particles", "", |r| r.population as f64)
+        .number("evaluation", "ms", |r| r.evaluation_ms)
+        .number("times usual", "", |r| r.times_usual)
+        .text("bits", |r| if r.same_bits { "same" } else { "others" });
     rows_of(&mut page, folder, &table.table())?;
     Ok(page)
 }

@@ -8,12 +8,12 @@ use crate::cli::output::{Columns, line_of, outln};
 use clap::builder::PossibleValuesParser;
 use lapswarm::config::read_text;
 use lapswarm::evaluate::drive::DriveProblem;
-use lapswarm::evaluate::energy::HybridProblem;
+use lapswarm::evaluate::energy::{HybridObjective, HybridProblem};
 use lapswarm::evaluate::gpu::{GpuContext, devices};
 use lapswarm::evaluate::line::{LineObjective, LineProblem};
 use lapswarm::evaluate::replay::ReplayProblem;
 use lapswarm::evaluate::simd::InstructionSet;
-use lapswarm::evaluate::steady::SteadyProblem;
+use lapswarm::evaluate::steady::{SteadyObjective, SteadyProblem};
 use lapswarm::evaluate::{BackendChoice, CpuBackend, Evaluator, GpuBackend, OnDevice, Problem, SimdBackend};
 use lapswarm::line::Parametrisation;
 use lapswarm::line::energy::Mode;
@@ -21,7 +21,7 @@ use lapswarm::parity;
 use lapswarm::random::Random;
 use lapswarm::report::Figure;
 use lapswarm::scalar::{Counted, operations_of};
-use lapswarm::study::identify::{IdentifySettings, set_up};
+use lapswarm::study::identify::{IdentifySettings, ObjectiveChoice, set_up};
 use lapswarm::study::raceline::{self, RacelineSettings};
 use lapswarm::vehicle::Car;
 use lapswarm::{Error, Result};
@@ -124,6 +124,8 @@ pub(super) struct Case<K> {
 pub(super) trait Bench {
     /// What lines are measured by.
     const LINE_OBJECTIVES: &'static [LineObjective];
+    /// Whether problems are measured by two or three objectives; else by as many as they have.
+    const FRONTS: bool = false;
 
     /// Measures a problem with every population.
     fn measure_all<K: OnDevice>(&mut self, name: &'static str, case: &Case<K>) -> Result<()>;
@@ -135,13 +137,13 @@ pub(super) type Measured<B> = (&'static str, fn(&mut B) -> Result<()>);
 /// The problems.
 pub(super) fn problems<B: Bench>() -> [Measured<B>; 5] {
     [
-        ("replay", |bench| bench.measure_all("replay", &replay()?)),
+        ("replay", |bench| bench.measure_all("replay", &replay(B::FRONTS)?)),
         ("line", |bench| {
             bench.measure_all("line", &line(B::LINE_OBJECTIVES)?)
         }),
         ("drive", |bench| bench.measure_all("drive", &drive()?)),
-        ("steady", |bench| bench.measure_all("steady", &steady()?)),
-        ("energy", |bench| bench.measure_all("energy", &energy()?)),
+        ("steady", |bench| bench.measure_all("steady", &steady(B::FRONTS)?)),
+        ("energy", |bench| bench.measure_all("energy", &energy(B::FRONTS)?)),
     ]
 }
 
@@ -168,8 +170,12 @@ fn middle(problem: &Problem) -> Vec<f64> {
     variables.map(|v| 0.5 * (v.lower + v.upper)).collect()
 }
 
-pub(super) fn replay() -> Result<Case<ReplayProblem>> {
-    let replay = set_up(&IdentifySettings::default())?.replay;
+pub(super) fn replay(front: bool) -> Result<Case<ReplayProblem>> {
+    let mut settings = IdentifySettings::default();
+    if front {
+        settings.objectives = [0, 2, 3].map(ObjectiveChoice::Channel).to_vec();
+    }
+    let replay = set_up(&settings)?.replay;
     let (steps, operations) = parity::laps::work_of(&replay);
     Ok(Case {
         about: spread(&replay.free.values_in(replay.free.base())),
@@ -208,8 +214,13 @@ pub(super) fn drive() -> Result<Case<DriveProblem>> {
     })
 }
 
-pub(super) fn steady() -> Result<Case<SteadyProblem>> {
-    let steady = parity::steady::problem(Car::bundled()?)?;
+pub(super) fn steady(front: bool) -> Result<Case<SteadyProblem>> {
+    let objectives = if front {
+        &SteadyObjective::ALL[..3]
+    } else {
+        &SteadyObjective::ALL[..]
+    };
+    let steady = parity::steady::problem_by(Car::bundled()?, objectives)?;
     let middle = middle(&steady.problem);
     Ok(Case {
         about: spread(&middle),
@@ -219,9 +230,12 @@ pub(super) fn steady() -> Result<Case<SteadyProblem>> {
     })
 }
 
-pub(super) fn energy() -> Result<Case<HybridProblem>> {
+pub(super) fn energy(front: bool) -> Result<Case<HybridProblem>> {
     let mut problems = parity::energy::problems(SECTIONS, &[Mode::Additional], false)?;
-    let hybrid = problems.remove(0);
+    let mut hybrid = problems.remove(0);
+    if front {
+        hybrid = hybrid.by(&HybridObjective::ALL[..3])?;
+    }
     let middle = middle(&hybrid.problem);
     Ok(Case {
         about: spread(&middle),

@@ -255,12 +255,12 @@ fn on_a_device(problem: &TestProblem, settings: MopsoSettings, arguments: &Argum
     let mut first = DeviceMopso::new(problem.problem(), settings.clone(), context.clone())?;
     first.step(&mut evaluator)?;
     drop(first);
-    let mut swarm = DeviceMopso::new(problem.problem(), settings, context)?;
+    let mut swarm = DeviceMopso::new(problem.problem(), settings, context.clone())?;
     let mut times = Times::default();
     for _ in 0..arguments.generations {
         let (others, evaluated) = timed(|| swarm.evaluate(&mut evaluator));
         evaluated?;
-        let (own, moved) = timed(|| swarm.learn_and_move());
+        let (own, moved) = timed(|| swarm.learn_and_move().and_then(|_| context.settle()));
         moved?;
         times.note(own, others);
     }

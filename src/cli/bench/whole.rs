@@ -8,7 +8,7 @@ use crate::cli::output::{Columns, line_of, outln};
 use clap::builder::PossibleValuesParser;
 use lapswarm::evaluate::gpu::{GpuContext, devices};
 use lapswarm::evaluate::line::LineObjective;
-use lapswarm::evaluate::{BackendChoice, DeviceKernel, Evaluator, GpuBackend, OnDevice, Problem};
+use lapswarm::evaluate::{BackendChoice, Evaluator, GpuBackend, OnDevice, Problem};
 use lapswarm::swarm::device::DeviceMopso;
 use lapswarm::swarm::{Mopso, MopsoSettings, Optimiser, Pso};
 use lapswarm::{Error, Result};
@@ -18,7 +18,7 @@ use std::time::Instant;
 /// Flags of `bench whole`.
 #[derive(clap::Args)]
 pub struct Arguments {
-    /// Problems: those of `bench`, lines by Gamma, length and lap time
+    /// Problems: those of `bench`, by two or three objectives
     #[arg(long, value_delimiter = ',', default_value = "replay,line,energy,drive,steady",
           value_parser = PossibleValuesParser::new(problems::<Generations<'_>>().map(|(name, _)| name)))]
     problems: Vec<String>,
@@ -104,8 +104,9 @@ impl Bench for Generations<'_> {
         LineObjective::Length,
         LineObjective::LapTime,
     ];
+    const FRONTS: bool = true;
 
-    /// On every backend, with the swarm on the host and, where its kernel scores such, on the device.
+    /// On every backend, with the swarm on the host and, of two or three objectives, on the device.
     fn measure_all<K: OnDevice>(&mut self, name: &'static str, case: &Case<K>) -> Result<()> {
         let choice = self.arguments.backend.unwrap_or_default();
         let adapter = self.arguments.adapter.as_deref();
@@ -131,7 +132,7 @@ impl Bench for Generations<'_> {
             _ => false,
         };
         let width = problem.objectives.len();
-        if <K::Device as DeviceKernel<K>>::RESIDENT && wanted && (2..=3).contains(&width) {
+        if wanted && (2..=3).contains(&width) {
             let context = GpuContext::shared(adapter)?;
             let mut evaluator = GpuBackend::new(&case.kind, context.clone())?;
             let info = evaluator.backend();
@@ -153,6 +154,8 @@ impl Bench for Generations<'_> {
                         swarm.evaluate(&mut evaluator)?;
                         let kernels = context.dispatched_ms() - before;
                         swarm.learn_and_move()?;
+                        // Or the next evaluation's kernels would have the time of the move.
+                        context.settle()?;
                         Ok(kernels)
                     })
                 },

@@ -131,6 +131,7 @@ pub fn drawn(path: &Path) -> Result<(HtmlReport, Vec<Chart>, Option<Limits>)> {
             page.tile("Top speed", format!("{:.1}", top_mps(&car)), "m/s");
             charts.push(gears(powertrain, car.chassis.radius_rear));
             charts.push(tractive_force(&car, powertrain));
+            charts.push(standing_start(&car, powertrain));
         }
         None => {
             page.sentence("The car has no powertrain: there are no gears, no tractive force and no envelope.")
@@ -262,6 +263,84 @@ fn tractive_force(car: &Car, powertrain: &Powertrain) -> Chart {
         axes: [("speed", "m/s"), ("force at the wheels", "N")],
         of: ["chart", "line"],
         panels: vec![("Force at the wheels in each gear".to_owned(), lines)],
+    }
+}
+
+/// From standstill to the top speed at full throttle and back on the brakes: by the engine, and with the motor of a hybrid beside it.
+fn standing_start(car: &Car, powertrain: &Powertrain) -> Chart {
+    /// Speeds at which tyres are asked, and steps between two of these.
+    const KNOTS: usize = 40;
+    const WITHIN: usize = 10;
+    /// Motors have a torque at rest, and gears a speed: both are taken at this speed or above (m/s).
+    const SLOWEST_MPS: f64 = 1.0;
+    let (mass, radius) = (car.chassis.mass, car.chassis.radius_rear);
+    let steady = steady_car(car);
+    // Just below the top speed, which is reached where nothing is left to accelerate.
+    let top = 0.995 * top_mps(car);
+    let knot = |k: usize| (top * k as f64 / KNOTS as f64).max(SLOWEST_MPS);
+    let knots = |of: &dyn Fn(f64) -> f64| (0..=KNOTS).map(|k| of(knot(k))).collect::<Vec<f64>>();
+    let traction = knots(&|v| steady.greatest_traction(v));
+    let braking = knots(&|v| steady.greatest_braking(v));
+    let steps = KNOTS * WITHIN;
+    let at = |table: &[f64], step: f64| {
+        let place = step / WITHIN as f64;
+        let k = (place as usize).min(KNOTS - 1);
+        table[k] + (place - k as f64) * (table[k + 1] - table[k])
+    };
+    let rotating = powertrain.rotating_mass_factor;
+    let gains = |step: f64, motor: bool| {
+        let v = (top * step / steps as f64).max(SLOWEST_MPS);
+        let gear = powertrain.gear(v, radius);
+        let motor_n = match (&car.hybrid, gear) {
+            (Some(hybrid), Some(gear)) if motor => {
+                hybrid.mgu_k.power_at(gear.engine_speed_rpm) * powertrain.efficiency / v
+            }
+            _ => 0.0,
+        };
+        let pull = (gear.map_or(0.0, |gear| gear.force_n) + motor_n) / mass;
+        let drag = steady.drag(v);
+        let driven = (pull - car.rolling_mps2() + (rotating - 1.0) * drag) / rotating;
+        at(&traction, step).min(driven) - drag
+    };
+    let sheds = |step: f64| {
+        let v = (top * step / steps as f64).max(SLOWEST_MPS);
+        at(&braking, step) + steady.drag(v) + car.rolling_mps2()
+    };
+    let rise = top / steps as f64;
+    let run = |motor: bool| {
+        let (mut time, mut points) = (0.0, vec![(0.0, 0.0)]);
+        for step in 0..steps {
+            time += rise / gains(step as f64 + 0.5, motor);
+            points.push((time, rise * (step + 1) as f64));
+        }
+        let reached_s = time;
+        for step in (0..steps).rev() {
+            time += rise / sheds(step as f64 + 0.5);
+            points.push((time, rise * step as f64));
+        }
+        (points, reached_s, time - reached_s)
+    };
+    let (points, reached_s, stopped_s) = run(false);
+    let shifts = powertrain.shift_points_mps(radius).into_iter().flatten();
+    let passed = |speed: f64| points.iter().take(steps + 1).find(|(_, v)| *v >= speed).copied();
+    let shifts: Vec<(f64, f64)> = shifts.filter_map(passed).collect();
+    let mut about = format!("From rest to {top:.1} m/s in {reached_s:.2} s, and back in {stopped_s:.2} s");
+    let mut lines = vec![Line::new("engine", Look::Own, points.clone())];
+    if car.hybrid.is_some() {
+        let (with_motor, sooner_s, _) = run(true);
+        about += &format!("; with the motor beside the engine it takes {sooner_s:.2} s to that speed");
+        lines.push(Line::new("engine and motor", Look::Own, with_motor));
+    }
+    if !shifts.is_empty() {
+        lines.push(Line::new("shift points", Look::Dots, shifts));
+    }
+    Chart {
+        file: "standing_start",
+        title: "From standstill and back",
+        about: about + ".",
+        axes: [("time", "s"), ("speed", "m/s")],
+        of: ["chart", "line"],
+        panels: vec![("Speed, straight on".to_owned(), lines)],
     }
 }
 

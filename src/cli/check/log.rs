@@ -20,10 +20,7 @@ pub fn described(path: &Path, map: Option<&Path>, write: Option<&Path>) -> Resul
         text += &format!("  channel map: {}\n", file.display());
     }
     let car = Car::bundled()?;
-    let options = LogOptions {
-        rolling_radius_m: Some([car.chassis.radius_front, car.chassis.radius_rear]),
-        ..LogOptions::default()
-    };
+    let options = LogOptions::of(&car);
     let told = || {
         outln!("{}: {} channels", path.display(), list.channels.len());
         outln!("{}", text.trim_end());

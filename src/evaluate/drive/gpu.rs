@@ -68,6 +68,7 @@ impl DeviceKernel<DriveProblem> for DriveDevice {
             rows_ahead: road.rows_ahead,
             cells_ahead: road.cells_ahead,
             blends: road.plans_per_line > 1,
+            relief_at: (!road.relief.is_empty()).then_some(road.path.len() / 4),
         };
         let storage =
             |label: &str, data: &[f32]| context.table(label, bytemuck::cast_slice(data), Usage::STORAGE);
@@ -75,7 +76,10 @@ impl DeviceKernel<DriveProblem> for DriveDevice {
         let driver = drive.driver().stored::<f32>().to_row();
         use Binding::{Read, Uniform};
         let tables = vec![
-            (Read, storage("paths", &road.path)?),
+            (
+                Read,
+                storage("paths", &[road.path.as_slice(), &road.relief].concat())?,
+            ),
             (Read, storage("plans", &road.plans)?),
             (Read, storage("courses", &road.courses)?),
             (

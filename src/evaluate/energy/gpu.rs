@@ -1,11 +1,11 @@
 //! The graphics backend: `f32`, one lane per lap.
 
-use super::problem::HybridProblem;
+use super::problem::{Figure, HybridObjective, HybridProblem};
 use crate::error::Result;
 use crate::evaluate::gpu::shader::EnergyShape;
 use crate::evaluate::gpu::{Batching, Binding, DeviceKind, GpuContext};
-use crate::evaluate::line::gpu::{LineBatches, LineKernel, LineTables};
-use crate::evaluate::{DeviceKernel, GpuBackend, OnDevice};
+use crate::evaluate::line::gpu::{Exchange, LineBatches, LineKernel, LineTables, Scaled};
+use crate::evaluate::{DeviceKernel, GpuBackend, OnDevice, ProblemKind};
 use crate::line::energy::kernel::FIGURES;
 use crate::line::energy::{EnergyLap, EnergyPlan, EnergyTable, Mode};
 use crate::line::kernel::Wanted;
@@ -49,7 +49,46 @@ pub struct EnergyAccount {
 }
 
 /// The energy kernel on a device.
-pub struct EnergyDevice(LineBatches<FIGURES>);
+pub struct EnergyDevice {
+    batches: LineBatches<FIGURES>,
+    /// For swarms that live on the device.
+    exchange: Option<Exchange>,
+}
+
+/// Between a swarm and the kernel, where variables are figures of the kernel as they are, no gate is free and the kernel has
+/// all objectives.
+fn exchange_of(hybrid: &HybridProblem, context: &GpuContext) -> Result<Option<Exchange>> {
+    let Some(variables) = hybrid.variables_of_figures() else {
+        return Ok(None);
+    };
+    let scaled = Scaled::variables(&hybrid.problem.variables);
+    let figures: Vec<Scaled> = variables
+        .into_iter()
+        .map(|figure| match figure {
+            Figure::Variable(k) => scaled[k],
+            Figure::Fixed(value) => Scaled::fixed(value),
+        })
+        .collect();
+    // In the order of the figures of a lap.
+    let objectives: Option<Vec<Scaled>> = hybrid
+        .objectives()
+        .iter()
+        .map(|objective| match objective {
+            HybridObjective::LapTime => Some(Scaled::of_result(0, 1.0)),
+            HybridObjective::Fuel => Some(Scaled::of_result(1, hybrid.car().fuel_density_kgpl)),
+            HybridObjective::EnergyUsed => Some(Scaled::of_result(2, 1e6)),
+            HybridObjective::SocSwing => Some(Scaled::of_result(6, hybrid.car().hybrid.store.capacity_j)),
+            // The host works them out of the line.
+            HybridObjective::Length | HybridObjective::Gamma => None,
+        })
+        .collect();
+    let Some(objectives) = objectives else {
+        return Ok(None);
+    };
+    let free = hybrid.problem.variables.iter().filter(|v| v.is_free()).count();
+    let tables = (figures.as_slice(), objectives.as_slice());
+    Exchange::new(context, free, tables, HybridProblem::WITHOUT_COST).map(Some)
+}
 
 /// The energy tables one after the other, in vectors of four.
 fn energy_vectors(table: &EnergyTable<f32>, plan: &EnergyPlan<f32>) -> Vec<[f32; 4]> {
@@ -132,25 +171,46 @@ impl DeviceKernel<HybridProblem> for EnergyDevice {
             variables: hybrid.line_variables() + hybrid.strategy_figures(),
             lap: true,
         };
-        Ok(Self(LineBatches::new(context, kernel)?))
+        Ok(Self {
+            batches: LineBatches::new(context, kernel)?,
+            exchange: None,
+        })
     }
 
     fn context(&self) -> &GpuContext {
-        self.0.context()
+        self.batches.context()
     }
 
     fn batching(&self) -> Batching {
-        self.0.batching()
+        self.batches.batching()
     }
 
     fn cut(&mut self, batching: Batching) {
-        self.0.cut(batching);
+        self.batches.cut(batching);
+    }
+
+    fn score_resident(
+        &mut self,
+        hybrid: &HybridProblem,
+        particles: usize,
+        position: &wgpu::Buffer,
+        objectives: &wgpu::Buffer,
+    ) -> Result<bool> {
+        if self.exchange.is_none() {
+            self.exchange = exchange_of(hybrid, self.batches.context())?;
+        }
+        let Some(exchange) = &self.exchange else {
+            return Ok(false);
+        };
+        self.batches
+            .score_resident(exchange, particles, position, objectives)?;
+        Ok(true)
     }
 
     fn outcomes(&mut self, hybrid: &HybridProblem, candidates: &[&[f64]]) -> Result<Vec<EnergyLap<f64>>> {
         let figures: Vec<Vec<f64>> = candidates.par_iter().map(|c| hybrid.figures(c)).collect();
         let score = |candidate: usize, figure: usize| figures[candidate][figure];
-        let laps = self.0.score(candidates.len(), score)?;
+        let laps = self.batches.score(candidates.len(), score)?;
         Ok(laps.into_iter().map(EnergyLap::from_array).collect())
     }
 }

@@ -47,12 +47,18 @@ impl ProblemKind for HybridProblem {
         cpu::laps(self, candidates)
     }
 
-    fn objectives_of(&self, _: &[f64], lap: &EnergyLap<f64>) -> std::result::Result<Vec<f64>, Failure> {
+    fn objectives_of(
+        &self,
+        candidate: &[f64],
+        lap: &EnergyLap<f64>,
+    ) -> std::result::Result<Vec<f64>, Failure> {
         let figure = |objective: &HybridObjective| match objective {
             HybridObjective::LapTime => lap.time,
             HybridObjective::Fuel => lap.fuel / self.car().fuel_density_kgpl,
             HybridObjective::EnergyUsed => lap.deployed / 1e6,
             HybridObjective::SocSwing => lap.swing / self.car().hybrid.store.capacity_j,
+            HybridObjective::Length => self.line_measures(candidate)[0],
+            HybridObjective::Gamma => self.line_measures(candidate)[1],
         };
         Ok(self.objectives.iter().map(figure).collect())
     }

@@ -4,6 +4,7 @@ use crate::error::{Error, Result};
 use crate::evaluate::objectives::{listed, missing_or_twice, objectives};
 use crate::evaluate::{Problem, Variable};
 use crate::line::energy::{EnergyCar, EnergyPlan, GATES, Gates};
+use crate::line::kernel::{Course, Wanted, shape};
 use crate::line::{LinePlan, Parametrisation};
 use crate::track::CrossSections;
 use glam::DVec2;
@@ -19,6 +20,10 @@ objectives! {
         EnergyUsed: "energy_used_mj", "MJ", "energy used";
         /// Greatest less least state of charge.
         SocSwing: "soc_swing", "-", "swing of charge";
+        /// Length of the line, m.
+        Length: "length_m", "m", "length";
+        /// Root of the sum of the line's squared curvatures, 1/m.
+        Gamma: "gamma_1pm", "1/m", "Gamma";
     }
 }
 
@@ -60,6 +65,15 @@ pub enum Free {
     Motor,
     /// The share of a zone in which the motor works.
     Zone(usize),
+}
+
+/// A figure of the kernels that is a variable as it is, or the same for all candidates.
+#[cfg(feature = "gpu")]
+pub(super) enum Figure {
+    /// The variable of that place.
+    Variable(usize),
+    /// The value.
+    Fixed(f64),
 }
 
 /// The strongest motor that may be asked for, as a share of the car's own.
@@ -159,6 +173,7 @@ impl HybridProblem {
                 cross_sections,
                 parametrisation,
             } => {
+                cross_sections.level_only("a lap with energy")?;
                 let mut plan = LinePlan::of_cross_sections(
                     &cross_sections.right_m,
                     &cross_sections.left_m,
@@ -229,6 +244,21 @@ impl HybridProblem {
         })
     }
 
+    /// The same by other objectives.
+    ///
+    /// # Errors
+    /// [`Error::Input`] if objectives are missing or come twice.
+    pub fn by(mut self, objectives: &[HybridObjective]) -> Result<Self> {
+        if missing_or_twice(objectives) {
+            let found = format!("{objectives:?}");
+            let expected = "at least one, each once";
+            return Err(Error::input("hybrid", "objectives", found, expected));
+        }
+        self.problem.objectives = listed(objectives);
+        self.objectives = objectives.to_vec();
+        Ok(self)
+    }
+
     /// The line.
     pub fn line(&self) -> &HybridLine {
         &self.line
@@ -242,6 +272,17 @@ impl HybridProblem {
     /// What the kernels read of the sections.
     pub fn plan(&self) -> &LinePlan<f64> {
         &self.plan
+    }
+
+    /// Length (m) and Gamma (1/m) of a candidate's line. They take no kernel: lines are few beside the laps that they cost.
+    pub(super) fn line_measures(&self, candidate: &[f64]) -> [f64; 2] {
+        let wanted = Wanted {
+            integral: false,
+            lap: false,
+        };
+        let line = &candidate[..self.line_variables];
+        let shape = shape::<f64>(&self.plan, wanted, line, &mut Course::default());
+        [shape.length, shape.second_differences.sqrt()]
     }
 
     /// What the kernels read of the zones.
@@ -273,6 +314,27 @@ impl HybridProblem {
     pub fn strategy_of(&self, candidate: &[f64]) -> (Gates, Vec<f64>) {
         self.strategy
             .with(self.car.hybrid.mgu_k.power_w, &candidate[self.line_variables..])
+    }
+
+    /// What each of the kernels' figures is. Nothing where figures are made of
+    /// variables in other ways, as those of gates are, or the gates' own are no numbers in single precision.
+    #[cfg(feature = "gpu")]
+    pub(super) fn variables_of_figures(&self) -> Option<Vec<Figure>> {
+        let gates = self.car.gate_figures(&self.strategy.gates);
+        if !crate::evaluate::are_numbers(&gates) {
+            return None;
+        }
+        let mut figures: Vec<_> = (0..self.line_variables).map(Figure::Variable).collect();
+        figures.extend(gates.into_iter().map(Figure::Fixed));
+        let zones = figures.len();
+        figures.extend(self.strategy.shares.iter().copied().map(Figure::Fixed));
+        for (place, free) in self.strategy.free.iter().enumerate() {
+            let Free::Zone(zone) = free else {
+                return None;
+            };
+            figures[zones + zone] = Figure::Variable(self.line_variables + place);
+        }
+        Some(figures)
     }
 
     /// The kernels' figures of a candidate: variables of the line, gates, shares of zones.

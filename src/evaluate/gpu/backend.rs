@@ -3,10 +3,13 @@
 use super::spread::{Spread, joined};
 use super::{Batching, FallbackEvaluator, GpuContext, devices};
 use crate::error::{Error, Result};
+use crate::evaluate::portions::portion;
 use crate::evaluate::problem_kind::{Checked, candidates, evaluation};
-use crate::evaluate::resident::DeviceObjectives;
+use crate::evaluate::resident::{BLOCK, DeviceObjectives, failed_objective};
 use crate::evaluate::{BackendChoice, BackendInfo, Evaluation, Evaluator, OutcomeOf, Problem, ProblemKind};
+use rayon::prelude::*;
 use std::sync::{Arc, OnceLock};
+use wgpu::BufferUsages;
 
 /// A kind of problem that devices evaluate.
 pub trait OnDevice: ProblemKind {
@@ -42,23 +45,19 @@ pub trait DeviceKernel<K: ProblemKind>: Sized {
     /// [`crate::Error::Device`] if the device fails.
     fn outcomes(&mut self, kind: &K, candidates: &[&[f64]]) -> Result<Vec<K::Outcome>>;
 
-    /// Whether swarms that live on the device are scored there: whether [`DeviceKernel::score_resident`] does so.
-    const RESIDENT: bool = false;
-
-    /// Writes the objectives of particles that live on the device, see [`DeviceObjectives::evaluate`].
+    /// Writes the objectives of particles that live on the device, see [`DeviceObjectives::evaluate`], without the host; says
+    /// whether it did. Where the kernel wants figures that the host makes of candidates, as those of cars are, it does not.
     ///
     /// # Errors
-    /// [`Error::Device`] if the device fails, and for kernels that score populations of the host only.
+    /// [`crate::Error::Device`] if the device fails.
     fn score_resident(
         &mut self,
         _kind: &K,
         _particles: usize,
         _position: &wgpu::Buffer,
         _objectives: &wgpu::Buffer,
-    ) -> Result<()> {
-        Err(Error::Device(
-            "the kernel scores populations of the host only".to_owned(),
-        ))
+    ) -> Result<bool> {
+        Ok(false)
     }
 }
 
@@ -67,6 +66,8 @@ pub struct GpuBackend<'a, K: OnDevice> {
     pub(in crate::evaluate) kind: &'a K,
     pub(in crate::evaluate) device: K::Device,
     dispatched_ms: Option<f64>,
+    /// Takes positions to the host, with its size in bytes.
+    readback: Option<(wgpu::Buffer, u64)>,
 }
 
 impl<'a, K: OnDevice> GpuBackend<'a, K> {
@@ -79,6 +80,7 @@ impl<'a, K: OnDevice> GpuBackend<'a, K> {
             device: K::Device::open(kind, context)?,
             kind,
             dispatched_ms: None,
+            readback: None,
         })
     }
 
@@ -137,8 +139,79 @@ impl<K: OnDevice> DeviceObjectives for GpuBackend<'_, K> {
         position: &wgpu::Buffer,
         objectives: &wgpu::Buffer,
     ) -> Result<()> {
-        self.device
-            .score_resident(self.kind, particles, position, objectives)
+        let kind = self.kind;
+        if self
+            .device
+            .score_resident(kind, particles, position, objectives)?
+        {
+            return Ok(());
+        }
+        // So many that their memory is that of a portion.
+        let most = portion(kind.bytes_each()).next_multiple_of(BLOCK);
+        for first in (0..particles).step_by(most) {
+            self.by_way_of_the_host([first, most.min(particles - first)], position, objectives)?;
+        }
+        Ok(())
+    }
+}
+
+impl<K: OnDevice> GpuBackend<'_, K> {
+    /// Writes the objectives of some particles, from the first of a block on. Candidates are the very ones that a swarm on the host
+    /// has at these positions, so that their figures are.
+    fn by_way_of_the_host(
+        &mut self,
+        [first, count]: [usize; 2],
+        position: &wgpu::Buffer,
+        objectives: &wgpu::Buffer,
+    ) -> Result<()> {
+        let problem = self.kind.problem();
+        let (variables, width) = (&problem.variables, problem.objectives.len());
+        let d = variables.iter().filter(|v| v.is_free()).count();
+        let lanes = count.next_multiple_of(BLOCK);
+        let bytes = (lanes * d * 4) as u64;
+        let context = self.device.context();
+        if self.readback.as_ref().is_none_or(|(_, size)| *size < bytes) {
+            self.readback = None;
+            let usage = BufferUsages::MAP_READ | BufferUsages::COPY_DST;
+            self.readback = Some((context.buffer("readback", bytes, usage)?, bytes));
+        }
+        let Some((readback, _)) = &self.readback else {
+            return Err(Error::Device("no buffer to read positions through".to_owned()));
+        };
+        let from = (position, (first * d * 4) as u64);
+        let rows: Vec<f32> = context.read_back(from, readback, bytes, bytemuck::pod_collect_to_vec)?;
+        let mut population = vec![0.0; count * variables.len()];
+        population
+            .par_chunks_mut(BLOCK * variables.len())
+            .zip(rows.par_chunks(BLOCK * d))
+            .for_each(|(candidates, rows)| {
+                for (lane, candidate) in candidates.chunks_exact_mut(variables.len()).enumerate() {
+                    let mut place = lane;
+                    for (value, v) in candidate.iter_mut().zip(variables) {
+                        *value = v.lower;
+                        if v.is_free() {
+                            *value = v.at(f64::from(rows[place]));
+                            place += BLOCK;
+                        }
+                    }
+                }
+            });
+        let evaluation = Evaluator::evaluate(self, &population)?;
+        let mut rows = vec![0.0f32; lanes * width];
+        let told = evaluation
+            .objectives
+            .chunks_exact(width)
+            .zip(&evaluation.failures);
+        for (i, (row, failure)) in told.enumerate() {
+            for (k, cost) in row.iter().enumerate() {
+                rows[(i / BLOCK * width + k) * BLOCK + i % BLOCK] =
+                    failure.map_or(*cost as f32, failed_objective);
+            }
+        }
+        let place = (first * width * 4) as u64;
+        let context = self.device.context();
+        context.write_at(objectives, place, bytemuck::cast_slice(&rows));
+        Ok(())
     }
 }
 

@@ -3,10 +3,16 @@
 //! No error of wgpu reaches the user as a panic. Allocation and compilation run inside error scopes; handlers keep errors that
 //! occur outside them and return them as [`Error::Device`] at the next check.
 
+mod compile;
+
+pub use compile::{Binding, Kernel};
+
+use compile::Compiled;
+
 use super::adapter::{DeviceKind, DeviceSummary, asks_for_all, choose, names_of_all};
 use super::faults::{self, Fault, Place};
-use super::lint;
 use super::shader::WheelOrder;
+use super::tuning::Tuning;
 use crate::error::{Error, Result};
 use crate::evaluate::{BackendInfo, dispatches};
 use std::collections::HashMap;
@@ -19,27 +25,6 @@ use std::time::{Duration, Instant};
 /// loaded machine's software driver may need far longer for its first, which also compiles.
 const PATIENCE: Duration = Duration::from_secs(600);
 
-/// How a kernel sees a buffer, in the order of its bindings.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Binding {
-    /// A small table that all lanes share.
-    Uniform,
-    /// Read by lanes.
-    Read,
-    /// Read and written by lanes.
-    Write,
-}
-
-/// A compiled kernel.
-#[derive(Debug)]
-pub struct Kernel {
-    entry: String,
-    pub(crate) pipeline: wgpu::ComputePipeline,
-    layout: wgpu::BindGroupLayout,
-    /// How long parsing and compilation took, ms. Drivers may put off a part to the first dispatch.
-    pub compile_ms: f64,
-}
-
 /// A device with its queue, and the kernels compiled for it.
 #[derive(Debug)]
 pub struct GpuContext {
@@ -47,11 +32,17 @@ pub struct GpuContext {
     queue: wgpu::Queue,
     summary: DeviceSummary,
     wheels: WheelOrder,
+    tuning: Tuning,
+    /// What earlier runs have compiled, where the device keeps such.
+    compiled: Option<Compiled>,
     failure: Arc<Mutex<Option<String>>>,
     kernels: Mutex<HashMap<String, Arc<Kernel>>>,
     /// Time of all dispatches in whole microseconds, so that it fits an atomic.
     dispatched_us: AtomicU64,
 }
+
+/// What a device is asked for where its adapter has it.
+const USEFUL: wgpu::Features = wgpu::Features::TIMESTAMP_QUERY.union(wgpu::Features::PIPELINE_CACHE);
 
 /// What did not happen in all the time that a device is given.
 fn hung(what: &str) -> String {
@@ -172,6 +163,17 @@ impl GpuContext {
         }))
     }
 
+    /// A device of its own with this tuning, whatever is remembered of the adapter.
+    ///
+    /// # Errors
+    /// As [`GpuContext::shared`].
+    pub fn with_tuning(name: Option<&str>, tuning: Tuning) -> Result<Arc<Self>> {
+        Ok(Arc::new(Self {
+            tuning,
+            ..Self::open(name)?
+        }))
+    }
+
     fn open(name: Option<&str>) -> Result<Self> {
         Self::open_within(name, wgpu::Adapter::limits)
     }
@@ -184,7 +186,7 @@ impl GpuContext {
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("lapswarm"),
             // Whatever the adapter has of what is useful; nothing is demanded.
-            required_features: adapter.features() & wgpu::Features::TIMESTAMP_QUERY,
+            required_features: adapter.features() & USEFUL,
             required_limits: limits(&adapter),
             ..Default::default()
         };
@@ -204,6 +206,8 @@ impl GpuContext {
             keep(&lost, format!("the device was lost ({reason:?}): {message}"));
         });
         Ok(Self {
+            compiled: Compiled::of(&device, &summary),
+            tuning: Tuning::of(&summary),
             device,
             queue,
             wheels: match summary.kind {
@@ -225,6 +229,11 @@ impl GpuContext {
     /// How kernels go through the wheels of a car here.
     pub fn wheels(&self) -> WheelOrder {
         self.wheels
+    }
+
+    /// How kernels of lines and cars are compiled and dispatched here.
+    pub fn tuning(&self) -> Tuning {
+        self.tuning
     }
 
     /// The device, as evaluators report it.
@@ -326,102 +335,14 @@ impl GpuContext {
 
     /// Writes to the front of `buffer` before the next submission.
     pub(crate) fn write(&self, buffer: &wgpu::Buffer, data: &[u8]) {
+        self.write_at(buffer, 0, data);
+    }
+
+    /// Writes to the place `first` of `buffer` before the next submission.
+    pub(crate) fn write_at(&self, buffer: &wgpu::Buffer, first: u64, data: &[u8]) {
         if !data.is_empty() {
-            self.queue.write_buffer(buffer, 0, data);
+            self.queue.write_buffer(buffer, first, data);
         }
-    }
-
-    /// The kernel of `source` at `entry`, compiled on the first call.
-    ///
-    /// # Errors
-    /// [`Error::Device`] if it does not compile.
-    pub fn kernel(&self, source: &str, entry: &str, bindings: &[Binding]) -> Result<Arc<Kernel>> {
-        let key = format!("{entry} {bindings:?}\n{source}");
-        if let Some(kernel) = locked(&self.kernels).get(&key) {
-            return Ok(Arc::clone(kernel));
-        }
-        if cfg!(debug_assertions) {
-            lint::check(source).map_err(|message| Error::Device(format!("kernel {entry}: {message}")))?;
-        }
-        let start = Instant::now();
-        let entries: Vec<_> = bindings
-            .iter()
-            .zip(0..)
-            .map(|(kind, binding)| wgpu::BindGroupLayoutEntry {
-                binding,
-                visibility: wgpu::ShaderStages::COMPUTE,
-                ty: wgpu::BindingType::Buffer {
-                    ty: match kind {
-                        Binding::Uniform => wgpu::BufferBindingType::Uniform,
-                        Binding::Read => wgpu::BufferBindingType::Storage { read_only: true },
-                        Binding::Write => wgpu::BufferBindingType::Storage { read_only: false },
-                    },
-                    has_dynamic_offset: false,
-                    min_binding_size: None,
-                },
-                count: None,
-            })
-            .collect();
-        let (pipeline, layout) = self.scoped(&format!("compile the kernel {entry}"), || {
-            let module = self.device.create_shader_module(wgpu::ShaderModuleDescriptor {
-                label: Some(entry),
-                source: wgpu::ShaderSource::Wgsl(source.into()),
-            });
-            let layout = self
-                .device
-                .create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-                    label: Some(entry),
-                    entries: &entries,
-                });
-            let pipeline_layout = self
-                .device
-                .create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-                    label: Some(entry),
-                    bind_group_layouts: &[Some(&layout)],
-                    immediate_size: 0,
-                });
-            let pipeline = self
-                .device
-                .create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-                    label: Some(entry),
-                    layout: Some(&pipeline_layout),
-                    module: &module,
-                    entry_point: Some(entry),
-                    compilation_options: Default::default(),
-                    cache: None,
-                });
-            (pipeline, layout)
-        })?;
-        let kernel = Arc::new(Kernel {
-            entry: entry.to_owned(),
-            pipeline,
-            layout,
-            compile_ms: start.elapsed().as_secs_f64() * 1e3,
-        });
-        locked(&self.kernels).insert(key, Arc::clone(&kernel));
-        Ok(kernel)
-    }
-
-    /// Binds `buffers` to the kernel's bindings in order.
-    ///
-    /// # Errors
-    /// [`Error::Device`] if a buffer does not fit its binding.
-    pub fn bind(&self, kernel: &Kernel, buffers: &[&wgpu::Buffer]) -> Result<wgpu::BindGroup> {
-        let entries: Vec<_> = buffers
-            .iter()
-            .zip(0..)
-            .map(|(buffer, binding)| wgpu::BindGroupEntry {
-                binding,
-                resource: buffer.as_entire_binding(),
-            })
-            .collect();
-        self.scoped("bind buffers", || {
-            self.device.create_bind_group(&wgpu::BindGroupDescriptor {
-                label: None,
-                layout: &kernel.layout,
-                entries: &entries,
-            })
-        })
     }
 
     /// Records with `record`, submits, and waits for the device to finish.
@@ -429,23 +350,44 @@ impl GpuContext {
     /// # Errors
     /// [`Error::Device`] if that fails or takes too long.
     pub(crate) fn run(&self, record: impl FnOnce(&mut wgpu::CommandEncoder)) -> Result<()> {
+        let begin = Instant::now();
+        let submission = self.submit(record)?;
+        self.wait(Some(submission))?;
+        dispatches::note(begin.elapsed());
+        Ok(())
+    }
+
+    /// Records with `record` and submits. What is submitted next comes after it, and finds what became of it.
+    ///
+    /// # Errors
+    /// [`Error::Device`] if that fails.
+    pub(crate) fn run_ahead(&self, record: impl FnOnce(&mut wgpu::CommandEncoder)) -> Result<()> {
+        self.submit(record).map(drop)
+    }
+
+    fn submit(&self, record: impl FnOnce(&mut wgpu::CommandEncoder)) -> Result<wgpu::SubmissionIndex> {
         let what = "run a kernel";
         let fault = faults::next(Place::Submission);
         if let Some(fault) = fault {
             self.suffer(fault, what)?;
         }
-        let begin = Instant::now();
         let submission = self.scoped(what, || {
             let mut encoder = self.device.create_command_encoder(&Default::default());
             record(&mut encoder);
             self.queue.submit([encoder.finish()])
         })?;
         if fault == Some(Fault::Hung) {
-            return self.waited(Err(wgpu::PollError::Timeout));
+            self.waited(Err(wgpu::PollError::Timeout))?;
         }
-        self.wait(Some(submission))?;
-        dispatches::note(begin.elapsed());
-        Ok(())
+        Ok(submission)
+    }
+
+    /// Waits for all that was submitted.
+    ///
+    /// # Errors
+    /// [`Error::Device`] if any of it fails or takes too long.
+    pub fn settle(&self) -> Result<()> {
+        self.wait(None)
     }
 
     /// Runs `kernel` over so many workgroups; returns how long that took with its submission and the wait (ms, above zero).
@@ -597,12 +539,29 @@ impl GpuContext {
     /// [`Error::Device`] if they cannot be read.
     pub(crate) fn read_back<T>(
         &self,
-        (from, first): (&wgpu::Buffer, u64),
+        from: (&wgpu::Buffer, u64),
         readback: &wgpu::Buffer,
         bytes: u64,
         read: impl FnOnce(&[u8]) -> T,
     ) -> Result<T> {
-        self.run(|encoder| encoder.copy_buffer_to_buffer(from, first, readback, 0, bytes))?;
+        self.run_and_read_back(|_| (), from, (readback, bytes), read)
+    }
+
+    /// The same after what `record` records, in one submission.
+    ///
+    /// # Errors
+    /// [`Error::Device`] if that fails or takes too long.
+    pub(crate) fn run_and_read_back<T>(
+        &self,
+        record: impl FnOnce(&mut wgpu::CommandEncoder),
+        (from, first): (&wgpu::Buffer, u64),
+        (readback, bytes): (&wgpu::Buffer, u64),
+        read: impl FnOnce(&[u8]) -> T,
+    ) -> Result<T> {
+        self.run(|encoder| {
+            record(encoder);
+            encoder.copy_buffer_to_buffer(from, first, readback, 0, bytes);
+        })?;
         self.read(readback, bytes, read)
     }
 

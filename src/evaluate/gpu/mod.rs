@@ -11,6 +11,7 @@ pub mod shader;
 mod spread;
 #[cfg(feature = "vehicle")]
 mod trajectories;
+mod tuning;
 
 pub use super::dispatches::DispatchWatch;
 pub use adapter::{ADAPTER_VARIABLE, ALL_ADAPTERS, DeviceKind, DeviceSummary, asks_for_all, devices};
@@ -20,9 +21,10 @@ pub use context::{Binding, GpuContext, Kernel};
 pub use fallback::FallbackEvaluator;
 pub use pacing::Batching;
 #[cfg(feature = "vehicle")]
-pub(crate) use pacing::{LOOP_ROUNDS, LanePacing, rounds_of};
+pub(crate) use pacing::{LOOP_ROUNDS, LanePacing, most_rounds, rounds_of};
 pub use spread::Spread;
 #[cfg(feature = "vehicle")]
 pub use trajectories::TrajectoryStretch;
 #[cfg(feature = "vehicle")]
 pub(crate) use trajectories::{Trajectories, TrajectoryKernel, workgroup};
+pub use tuning::Tuning;

@@ -10,6 +10,11 @@ const GROWTH: f64 = 4.0;
 /// without an error; the difference is for other loops of a dispatch.
 pub(crate) const LOOP_ROUNDS: usize = 65_000;
 
+/// The most rounds of all loops of a kernel together on a kind of device: no dispatch of a graphics processor comes near its.
+pub(crate) fn most_rounds(kind: DeviceKind) -> usize {
+    if kind.is_real() { 1 << 24 } else { LOOP_ROUNDS }
+}
+
 /// The most rounds that llvmpipe counts for a loop of `count` rounds: one more to detect the end, and another one that was
 /// observed in nested loops (a replay's sample of `s` steps takes `3 + 6 s` in all).
 pub(crate) const fn rounds_of(count: usize) -> usize {
@@ -45,16 +50,17 @@ impl Batching {
 /// Chooses the steps of the next dispatch from the time of the last one.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Pacing {
-    rounds_per_step: usize,
+    /// The most steps of a dispatch.
+    most: usize,
     /// Steps of the last dispatch, its lanes, and how long it took, ms.
     last: Option<(usize, usize, f64)>,
 }
 
 impl Pacing {
-    /// For a kernel whose loops take so many rounds in a step.
-    pub fn new(rounds_per_step: usize) -> Self {
+    /// For a kernel whose loops take so many rounds in a step, and may take so many in a dispatch.
+    pub fn new(rounds_per_step: usize, most_rounds: usize) -> Self {
         Self {
-            rounds_per_step,
+            most: most_rounds / rounds_per_step,
             last: None,
         }
     }
@@ -72,7 +78,7 @@ impl Pacing {
         };
         by_time
             .min(batching.steps.unwrap_or(usize::MAX))
-            .min(LOOP_ROUNDS / self.rounds_per_step)
+            .min(self.most)
             .max(1)
     }
 
@@ -168,7 +174,7 @@ mod tests {
         };
         for mut device in devices() {
             for rounds_per_step in [1, 5, 37] {
-                let mut pacing = Pacing::new(rounds_per_step);
+                let mut pacing = Pacing::new(rounds_per_step, LOOP_ROUNDS);
                 let (mut lanes, mut total_ms, mut longest_steps) = (4096, 0.0, 0);
                 for dispatch in 0..2000 {
                     // Batches of other sizes, and the last steps of one.
@@ -204,7 +210,7 @@ mod tests {
             dispatch_ms: TARGET_MS,
             steps: None,
         };
-        let mut pacing = Pacing::new(5);
+        let mut pacing = Pacing::new(5, LOOP_ROUNDS);
         pacing.took(100, 64, 9000.0);
         assert_eq!(pacing.steps(64, &batching), 1);
         pacing.took(1, 64, 1e-3);

@@ -49,10 +49,10 @@ pub fn swarm_gather() -> String {
     SWARM_GATHER.to_owned()
 }
 
-/// Source of the kernels between a swarm on the device and the line kernel; entry points `variables_of_positions` and
-/// `objectives_of_figures`.
+/// Source of the kernels between a swarm on the device and the kernels of lines and laps; entry points `figures_of_positions` and
+/// `objectives_of_results`.
 pub fn line_swarm() -> String {
-    LINE_SWARM.to_owned()
+    [&elementary(WheelOrder::SideBySide), LINE_SWARM].concat()
 }
 
 /// Source of the kernel of the test problem of that number among

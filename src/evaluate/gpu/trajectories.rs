@@ -2,7 +2,7 @@
 
 use super::DeviceKind;
 use super::context::{Binding, GpuContext, Kernel};
-use super::pacing::{Batching, Pacing};
+use super::pacing::{Batching, Pacing, most_rounds};
 use super::shader::base_vectors;
 use crate::error::{Error, Result};
 use crate::evaluate::ModelTable;
@@ -24,13 +24,12 @@ pub struct TrajectoryStretch {
     pub steps: u32,
 }
 
-/// Lanes of a workgroup, where the device allows: a multiple of every device's subgroup.
-const WORKGROUP: u32 = 64;
-
 /// Lanes of a workgroup on `context`'s device.
 pub(crate) fn workgroup(context: &GpuContext) -> u32 {
     let limits = context.limits();
-    WORKGROUP
+    context
+        .tuning()
+        .workgroup
         .min(limits.max_compute_invocations_per_workgroup)
         .min(limits.max_compute_workgroup_size_x)
 }
@@ -82,7 +81,7 @@ impl<const STATE: usize> Trajectories<STATE> {
         use Binding::{Read, Uniform, Write};
         let (kinds, tables): (Vec<_>, Vec<_>) = parts.tables.into_iter().unzip();
         let bindings = [vec![Uniform, Uniform, Read, Write], kinds].concat();
-        let kernel = context.kernel(parts.source, parts.entry, &bindings)?;
+        let kernel = context.own_kernel(parts.source, parts.entry, &bindings)?;
         let mut base = parts.table.base.clone();
         base.resize(base_vectors(base.len()) * 4, 0.0);
         let base = context.buffer_of("parameters", bytemuck::cast_slice(&base), Usage::UNIFORM)?;
@@ -95,9 +94,10 @@ impl<const STATE: usize> Trajectories<STATE> {
         Ok(Self {
             // A step of all lanes takes milliseconds on a software driver, and fills a large card.
             batching: match context.summary().kind {
-                kind @ DeviceKind::Software => Batching::new(kind, 1 << 12, u64::MAX),
-                kind => Batching::new(kind, 1 << 17, u64::MAX),
+                kind @ DeviceKind::Software => Batching::new(kind, context.tuning().lanes / 4, u64::MAX),
+                kind => Batching::new(kind, context.tuning().lanes / 2, u64::MAX),
             },
+            pacing: Pacing::new(parts.rounds_per_step, most_rounds(context.summary().kind)),
             workgroup: workgroup(&context) as usize,
             context,
             kernel,
@@ -107,7 +107,6 @@ impl<const STATE: usize> Trajectories<STATE> {
             base,
             tables,
             batch: None,
-            pacing: Pacing::new(parts.rounds_per_step),
             dispatches: 0,
         })
     }

@@ -10,12 +10,12 @@ pub(in crate::evaluate) use batches::{LineBatches, LineKernel};
 pub use tables::DeviceSection;
 pub(in crate::evaluate) use tables::LineTables;
 
-use super::problem::{LineProblem, MEASURES, Measures};
+use super::problem::{LineObjective, LineProblem, MEASURES, Measures};
 use crate::error::Result;
 use crate::evaluate::gpu::{Batching, GpuContext};
-use crate::evaluate::{DeviceKernel, GpuBackend, OnDevice};
+use crate::evaluate::{DeviceKernel, GpuBackend, OnDevice, ProblemKind};
 use crate::line::EnvelopeTable;
-use exchange::Exchange;
+pub(in crate::evaluate) use exchange::{Exchange, Scaled};
 use std::sync::Arc;
 
 /// The line kernel on a device.
@@ -46,6 +46,7 @@ impl DeviceKernel<LineProblem> for LineDevice {
                 ellipse: Vec::new(),
                 traction: Vec::new(),
                 open: None,
+                loads: Default::default(),
             },
             |envelope| envelope.stored::<f32>(),
         );
@@ -85,33 +86,37 @@ impl DeviceKernel<LineProblem> for LineDevice {
         })
     }
 
-    const RESIDENT: bool = true;
-
     fn score_resident(
         &mut self,
         line: &LineProblem,
         particles: usize,
         position: &wgpu::Buffer,
         objectives: &wgpu::Buffer,
-    ) -> Result<()> {
+    ) -> Result<bool> {
         let Self { batches, exchange } = self;
-        let context = Arc::clone(batches.context());
         let exchange = match exchange {
             Some(exchange) => exchange,
-            None => exchange.insert(Exchange::new(line, &context)?),
+            None => exchange.insert(exchange_of(line, batches.context())?),
         };
-        let most = batches.batch_size();
-        for first in (0..particles).step_by(most) {
-            let candidates = (particles - first).min(most);
-            batches.reserve(candidates)?;
-            let (stride, variables, _) = batches.rows()?;
-            exchange.take(&context, [first, candidates, stride], position, variables)?;
-            batches.score_batch(candidates)?;
-            let (_, _, results) = batches.rows()?;
-            exchange.give(&context, [first, candidates, stride], results, objectives)?;
-        }
-        Ok(())
+        batches.score_resident(exchange, particles, position, objectives)?;
+        Ok(true)
     }
+}
+
+/// Between a swarm and the line kernel.
+fn exchange_of(line: &LineProblem, context: &GpuContext) -> Result<Exchange> {
+    let variables = &line.problem.variables;
+    let objectives: Vec<Scaled> = line
+        .objectives()
+        .iter()
+        .map(|objective| match objective {
+            LineObjective::Gamma => Scaled::of_root(*objective as usize),
+            _ => Scaled::of_result(*objective as usize, 1.0),
+        })
+        .collect();
+    let free = variables.iter().filter(|v| v.is_free()).count();
+    let figures = Scaled::variables(variables);
+    Exchange::new(context, free, (&figures, &objectives), LineProblem::WITHOUT_COST)
 }
 
 impl GpuBackend<'_, LineProblem> {

@@ -132,7 +132,8 @@ impl LineProblem {
             cross_sections.closed,
         )
         .spaced(&cross_sections.spacing_m())
-        .with_drs(&cross_sections.drs);
+        .with_drs(&cross_sections.drs)
+        .with_relief(&cross_sections);
         parametrisation.apply(&cross_sections, &mut plan)?;
         plan.entry = entry_mps * entry_mps;
         let middle = geometry(&cross_sections.points(&vec![0.5; n]), cross_sections.closed);
@@ -140,6 +141,10 @@ impl LineProblem {
         plan.start = (0..n)
             .max_by(|i, j| sharpness(i).total_cmp(&sharpness(j)))
             .unwrap_or(0);
+        if !plan.relief.is_empty() && car.as_ref().is_some_and(|car| !car.relief) {
+            let found = "a car with limits for level roads".to_owned();
+            return wrong("car", found, "limits under loads, for a road in three dimensions");
+        }
         let envelope = car.as_ref().map(PointMass::table).transpose()?;
         Ok(Self {
             problem: Problem {

@@ -6,7 +6,7 @@ use super::kernel::{BLOCK, CHANNELS};
 use super::problem::ReplayProblem;
 use crate::error::{Error, Result};
 use crate::evaluate::gpu::shader::{CarShape, ReplayShape, base_vectors};
-use crate::evaluate::gpu::{Binding, DeviceKind, GpuContext, Kernel, LOOP_ROUNDS, rounds_of, workgroup};
+use crate::evaluate::gpu::{Binding, GpuContext, Kernel, LOOP_ROUNDS, most_rounds, rounds_of, workgroup};
 use crate::evaluate::{DeviceKernel, GpuBackend, ModelTable, OnDevice};
 use crate::vehicle::model::STAGES;
 use bytemuck::{Pod, Zeroable};
@@ -159,19 +159,16 @@ impl DeviceKernel<ReplayProblem> for ReplayDevice {
             norm: replay.plan.norm,
         };
         use Binding::{Read, Uniform, Write};
-        let drive = context.kernel(
+        let drive = context.own_kernel(
             &shape.replay(),
             "replay",
             &[Uniform, Uniform, Read, Read, Read, Read, Write],
         )?;
-        let reduce = context.kernel(&shape.reduce(), "replay_reduce", &[Uniform, Read, Write])?;
+        let reduce = context.own_kernel(&shape.reduce(), "replay_reduce", &[Uniform, Read, Write])?;
 
         let plan = replay.plan.to_f32();
-        let (substeps, software) = (
-            plan.fractions.len(),
-            context.summary().kind == DeviceKind::Software,
-        );
-        if software && Self::most_samples(substeps) == 0 {
+        let substeps = plan.fractions.len();
+        if Self::most_samples(&context, substeps) == 0 {
             return Err(Error::Device(format!(
                 "{} limits the length of loops: it can drive at most {} steps between samples, {substeps} are needed",
                 context.summary(),
@@ -233,10 +230,7 @@ impl DeviceKernel<ReplayProblem> for ReplayDevice {
         Ok(Self {
             table,
             // The first dispatch of a block of samples must end in reasonable time on a software driver, and fill a large card.
-            batching: match context.summary().kind {
-                kind @ DeviceKind::Software => Batching::new(kind, 1 << 14, 128 << 20),
-                kind => Batching::new(kind, 1 << 18, 128 << 20),
-            },
+            batching: Batching::new(context.summary().kind, context.tuning().lanes, 128 << 20),
             windows: plan.windows.len(),
             substeps,
             context,
@@ -306,7 +300,7 @@ impl ReplayDevice {
         let most_groups = limits.max_compute_workgroups_per_dimension as usize;
         // The kernel that joins windows takes a round for each, and they are split only into whole blocks, because they are
         // summed by the block.
-        let most_groups = most_groups.min(LOOP_ROUNDS);
+        let most_groups = most_groups.min(most_rounds(self.context.summary().kind));
         let all = self.windows;
         let whole_blocks = (lanes / self.workgroup).min(most_groups) / BLOCK * BLOCK;
         let windows = if all * self.workgroup <= lanes && all <= most_groups {
@@ -378,9 +372,9 @@ impl ReplayDevice {
             .ok_or_else(|| Error::Device("a batch without buffers".to_owned()))
     }
 
-    /// The most samples of a dispatch, in whole blocks: a kernel's loops have a limit, see [`LOOP_ROUNDS`].
-    fn most_samples(substeps: usize) -> usize {
-        LOOP_ROUNDS / rounds_per_sample(substeps) / BLOCK * BLOCK
+    /// The most samples of a dispatch, in whole blocks: a kernel's loops have a limit, see [`most_rounds`].
+    fn most_samples(context: &GpuContext, substeps: usize) -> usize {
+        most_rounds(context.summary().kind) / rounds_per_sample(substeps) / BLOCK * BLOCK
     }
 
     /// Samples of the next dispatch, in whole blocks.
@@ -391,7 +385,7 @@ impl ReplayDevice {
         });
         let samples = by_time
             .min(self.batching.steps.unwrap_or(usize::MAX))
-            .min(Self::most_samples(self.substeps));
+            .min(Self::most_samples(&self.context, self.substeps));
         (samples / BLOCK).max(1) * BLOCK
     }
 

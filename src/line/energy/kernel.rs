@@ -116,11 +116,11 @@ pub struct SegmentEnergy<R> {
 
 /// The part of a lap that later segments depend on.
 #[derive(Clone, Copy)]
-struct State<R> {
-    speed_squared: R,
-    change: R,
-    deployed: R,
-    harvested_k: R,
+pub(super) struct State<R> {
+    pub(super) speed_squared: R,
+    pub(super) change: R,
+    pub(super) deployed: R,
+    pub(super) harvested_k: R,
 }
 
 /// A remainder below this (J) is left in the store. In single precision, rounding would spend it in ever smaller shares.
@@ -130,12 +130,26 @@ const LEAST_J: f64 = 5.0;
 const LEAST_COST: f64 = 1e-6;
 
 /// All that does not change along a lap.
-struct Car<'a, R: Real> {
-    envelope: &'a EnvelopeTable<R::Storage>,
-    table: &'a EnergyTable<R::Storage>,
-    plan: &'a EnergyPlan<R::Storage>,
-    strategy: &'a [R],
-    drs: &'a [bool],
+pub(super) struct Car<'a, R: Real> {
+    pub(super) envelope: &'a EnvelopeTable<R::Storage>,
+    pub(super) table: &'a EnergyTable<R::Storage>,
+    pub(super) plan: &'a EnergyPlan<R::Storage>,
+    pub(super) strategy: &'a [R],
+    pub(super) drs: &'a [bool],
+}
+
+/// A way of a lap.
+pub(super) struct Along<R> {
+    /// Speed squared at its ends,
+    pub(super) ends: [R; 2],
+    /// and the mean of them (m^2/s^2).
+    pub(super) mean: R,
+    /// Acceleration (m/s^2).
+    pub(super) ax: R,
+    /// Length (m).
+    pub(super) length: R,
+    /// Time (s).
+    pub(super) time: R,
 }
 
 /// A step along a segment.
@@ -202,7 +216,7 @@ impl<R: Lookup> Car<'_, R> {
 
     /// Energy that may still leave the store (J).
     #[inline(always)]
-    fn left(&self, state: &State<R>) -> R {
+    pub(super) fn left(&self, state: &State<R>) -> R {
         let of_charge = state.change - self.strategy[3];
         let of_budget = self.strategy[4] - state.deployed;
         let left = of_charge.min(of_budget);
@@ -218,7 +232,7 @@ impl<R: Lookup> Car<'_, R> {
     /// Greatest force of the motor over the mass (m/s^2) with `left` (J) of energy for a segment; `inverse` is one over its
     /// length (1/m).
     #[inline(always)]
-    fn reach(&self, left: R, inverse: R) -> R {
+    pub(super) fn reach(&self, left: R, inverse: R) -> R {
         left * R::load(self.table.force_per_deployed) * inverse
     }
 
@@ -368,7 +382,7 @@ impl<R: Lookup> Car<'_, R> {
         (length, bends, most): (R, [R; 2], R),
         first: (Option<[R; 5]>, R),
     ) -> SegmentEnergy<R> {
-        let (zero, one) = (R::lit(0.0), R::lit(1.0));
+        let zero = R::lit(0.0);
         let table = self.table;
         let from = state.speed_squared;
         let left = self.left(state);
@@ -402,7 +416,6 @@ impl<R: Lookup> Car<'_, R> {
         let force = open.max(zero) + shut.min(zero);
         let demand = force.max(zero);
         let shed = (-force).max(zero);
-        let joules = R::load(table.mass) * length;
         let motor = match self.plan.mode {
             Mode::Additional => (rotating * step.motor).min(demand),
             Mode::Offset => {
@@ -413,18 +426,49 @@ impl<R: Lookup> Car<'_, R> {
                     .min(self.reach(left, inverse))
             }
         };
-        let engine = demand - motor;
-        let unharvested = (R::load(table.harvest_most) - state.harvested_k).min(space);
-        let room = unharvested * R::load(table.force_per_harvested) * inverse;
-        let generator = shed.min(generator_most * self.strategy[5]).min(room.max(zero));
-        let deployed = joules * motor * R::load(table.deploy_cost);
-        let harvested_k = joules * generator * R::load(table.harvest_gain);
-
-        let row = R::pick_row(&table.flows, place);
-        let flows: [R; 4] = std::array::from_fn(|column| row[column] + beyond * row[4 + column]);
         let end_root = end.sqrt();
         let time = R::lit(2.0) * length / (*root + end_root);
         *root = end_root;
+        let along = Along {
+            ends: [from, end],
+            mean,
+            ax,
+            length,
+            time,
+        };
+        state.speed_squared = end;
+        let most = [greatest, generator_most * self.strategy[5]];
+        self.accounts(state, &along, [demand, shed, motor], most, space)
+    }
+
+    /// The accounts of a way whose forces over the mass (m/s^2) at the wheels are known: what drives the car, what holds it back and
+    /// the generator may take, and the motor's part of the first. With them stand the most that engine and generator do there, and
+    /// what the store takes yet (J). The shader, which drives no car, has it as the end of `segment_energy`.
+    #[inline(always)]
+    pub(super) fn accounts(
+        &self,
+        state: &mut State<R>,
+        along: &Along<R>,
+        [demand, shed, motor]: [R; 3],
+        [greatest, generator_most]: [R; 2],
+        space: R,
+    ) -> SegmentEnergy<R> {
+        let (zero, one) = (R::lit(0.0), R::lit(1.0));
+        let table = self.table;
+        let (length, time) = (along.length, along.time);
+        let inverse = one / length;
+        let joules = R::load(table.mass) * length;
+        let engine = demand - motor;
+        let unharvested = (R::load(table.harvest_most) - state.harvested_k).min(space);
+        let room = unharvested * R::load(table.force_per_harvested) * inverse;
+        let generator = shed.min(generator_most).min(room.max(zero));
+        let deployed = joules * motor * R::load(table.deploy_cost);
+        let harvested_k = joules * generator * R::load(table.harvest_gain);
+
+        let rows = table.flows.len() / 8;
+        let (place, beyond) = (along.mean * R::load(table.rows_per_speed_squared)).place(rows, 8);
+        let row = R::pick_row(&table.flows, place);
+        let flows: [R; 4] = std::array::from_fn(|column| row[column] + beyond * row[4 + column]);
         // The MGU-H generates by the flow of the exhaust, while the store has space and the engine power to spare for it. The
         // engine then burns for its load at the wheels and for this.
         let cost = R::load(table.exhaust_cost);
@@ -432,16 +476,16 @@ impl<R: Lookup> Car<'_, R> {
         let spare = joules * (greatest - engine).max(zero) / cost.max(R::lit(LEAST_COST));
         let driving = (engine / greatest.max(R::lit(1e-3))).min(one);
         let exhaust = R::load(table.exhaust_gain) * (flow_at(flows, driving) * time);
-        let harvested_h = gated(self.spins(mean, ax), exhaust.min(spare).min(space));
+        let harvested_h = gated(self.spins(along.mean, along.ax), exhaust.min(spare).min(space));
         let crank = engine + cost * harvested_h / joules;
         let load = (crank / greatest.max(R::lit(1e-3))).min(one);
 
-        state.speed_squared = end;
         state.change = state.change + ((harvested_k + harvested_h) - deployed);
         state.deployed = state.deployed + deployed;
         state.harvested_k = state.harvested_k + harvested_k;
+        let [start, end] = along.ends;
         SegmentEnergy {
-            start: from,
+            start,
             end,
             time,
             engine,

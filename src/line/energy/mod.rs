@@ -1,6 +1,7 @@
 //! Energy on a lap: engine, motor-generators, store and fuel, segment by segment, in every scalar.
 
 mod car;
+mod driven;
 pub mod kernel;
 mod plan;
 mod table;
@@ -9,6 +10,7 @@ mod tests;
 mod zones;
 
 pub use car::EnergyCar;
+pub use driven::{DrivenLapEnergy, DrivenMoment, MotorPlan, driven_energy};
 pub use kernel::{EnergyLap, SegmentEnergy, energy_lap};
 pub use plan::{EnergyPlan, GATES, Gates, Mode, ZoneRow};
 pub use table::{EnergyTable, hybrid_parts};

@@ -1,5 +1,6 @@
 //! The parts of a lap's energy strategy.
 
+use crate::config::kinds::named;
 use crate::scalar::Real;
 use serde::{Deserialize, Serialize};
 
@@ -12,22 +13,10 @@ pub enum Mode {
     Additional,
 }
 
-impl Mode {
-    /// The name in studies.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Offset => "offset",
-            Self::Additional => "additional",
-        }
-    }
-
-    /// The mode of this name.
-    pub fn named(name: &str) -> Option<Self> {
-        [Self::Offset, Self::Additional]
-            .into_iter()
-            .find(|m| m.name() == name)
-    }
-}
+named!(Mode {
+    Offset = "offset",
+    Additional = "additional",
+});
 
 /// Where the motor may work.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

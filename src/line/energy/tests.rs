@@ -362,3 +362,88 @@ fn an_open_drs_takes_its_share_off_the_drag_that_is_driven_against() {
         assert!(opened > 50 && braked > 5, "{opened} {braked}");
     }
 }
+
+/// A driven lap of moments worked by hand: the motor does what its plan says up to the demand, the engine the rest; the generator has
+/// what the rear brakes shed, up to its power; the front brakes are lost to it; a slipping tyre takes more than moves the car.
+#[test]
+fn the_accounts_of_a_driven_lap_by_hand() {
+    let car = car_without_h();
+    let table = &car.table;
+    let mass = table.mass;
+    let plan = MotorPlan {
+        station_m: vec![0.0, 100.0, 200.0],
+        share: vec![1.0, 0.5, 1.0],
+        length_m: 400.0,
+    };
+    let speed = 50.0;
+    let [engine_most, motor_most, generator_most] = car.greatest_mps2(speed);
+    let moment = |station_m: f64, wheels_w: [f64; 2]| DrivenMoment {
+        time_s: 0.1,
+        station_m,
+        speed_mps: speed,
+        ax_mps2: 0.0,
+        wheels_w,
+        drag_n: 1000.0,
+    };
+    let power = mass * speed;
+    let moments = [
+        // More than the motor gives, less than it gives, and more than engine and motor give.
+        moment(10.0, [0.0, (motor_most + 1.0) * power]),
+        moment(50.0, [0.0, 0.6 * motor_most * power]),
+        moment(150.0, [0.0, (engine_most + motor_most) * power]),
+        // Braking: a little at the rear, then more than the generator takes.
+        moment(250.0, [-3.0 * power, -0.5 * generator_most * power]),
+        moment(300.0, [-3.0 * power, -2.0 * generator_most * power]),
+    ];
+    let driven = driven_energy(&car, &plan, &moments);
+    let rolling = car.car.rolling_mps2();
+    let forces = driven
+        .segments
+        .iter()
+        .map(|s| [s.engine, s.motor, s.generator, s.hydraulic]);
+    let expected = [
+        [1.0 + rolling, motor_most, 0.0, 0.0],
+        [0.0, 0.6 * motor_most + rolling, 0.0, 0.0],
+        [
+            engine_most + 0.5 * motor_most + rolling,
+            0.5 * motor_most,
+            0.0,
+            0.0,
+        ],
+        [0.0, 0.0, 0.5 * generator_most - rolling, 3.0],
+        [0.0, 0.0, generator_most, generator_most + 3.0 - rolling],
+    ];
+    for (i, (found, expected)) in forces.zip(expected).enumerate() {
+        for (found, expected) in found.into_iter().zip(expected) {
+            assert!((found - expected).abs() < 1e-9, "{i}: {found} and {expected}");
+        }
+    }
+    let joules = mass * speed * 0.1;
+    let lap = &driven.lap;
+    let motor: f64 = driven.segments.iter().map(|s| s.motor).sum();
+    assert!((lap.deployed - joules * motor * table.deploy_cost).abs() < 1e-6);
+    let generator = 1.5 * generator_most - rolling;
+    assert!((lap.harvested_k - joules * generator * table.harvest_gain).abs() < 1e-6);
+    assert!((lap.change - (lap.harvested_k - lap.deployed)).abs() < 1e-9);
+    assert!((driven.beyond_engine_j - joules * (0.5 * motor_most + rolling)).abs() < 1e-6);
+    // At one speed the car is moved against drag and rolling resistance alone.
+    assert!((driven.moving_j - 5.0 * joules * (1000.0 / mass + rolling)).abs() < 1e-6);
+    assert!((lap.time - 0.5).abs() < 1e-12 && (lap.motor_time - 0.3).abs() < 1e-12);
+}
+
+/// A plan repeats from lap to lap, and between two places it has the mean of what is there.
+#[test]
+fn a_motors_plan_by_station() {
+    let plan = MotorPlan {
+        station_m: vec![0.0, 100.0, 200.0],
+        share: vec![1.0, 0.5, 0.0],
+        length_m: 400.0,
+    };
+    assert_eq!(
+        [-350.0, 0.0, 99.0, 100.0, 250.0, 500.0].map(|s| plan.at(s)),
+        [1.0, 1.0, 1.0, 0.5, 0.0, 0.5]
+    );
+    assert!((plan.mean(50.0, 250.0) - (50.0 + 50.0) / 200.0).abs() < 1e-12);
+    let twice = plan.stretched_to(800.0);
+    assert_eq!((twice.at(199.0), twice.at(201.0)), (1.0, 0.5));
+}

@@ -169,11 +169,7 @@ impl EnvelopeSettings {
     /// The log at `path`, as one of this car.
     fn read_log(&self, path: &Path, car: &Car) -> Result<Log> {
         let map = self.channel_map.as_deref().map(ChannelMap::read).transpose()?;
-        let options = LogOptions {
-            rolling_radius_m: Some([car.chassis.radius_front, car.chassis.radius_rear]),
-            ..LogOptions::default()
-        };
-        Log::read(path, &map.unwrap_or_default(), &options)
+        Log::read(path, &map.unwrap_or_default(), &LogOptions::of(car))
     }
 
     /// The speeds that limits are looked for at.

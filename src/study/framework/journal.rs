@@ -7,11 +7,15 @@
 use super::state_file::{Origin, StateFile};
 use super::{RunRecord, State};
 use crate::error::{Error, Result};
-use crate::evaluate::{BackendInfo, DeviceFaults, Evaluation, Evaluator, Problem};
+use crate::evaluate::{
+    BackendChoice, BackendInfo, DeviceFaults, Evaluation, Evaluator, Losses, OnDevice, Problem,
+};
 use crate::files::run_folder::STATE;
 use crate::swarm::checkpoint::Checkpoint;
+use crate::swarm::{FrontSwarm, Optimiser, Progress, SwarmAtWork, SwarmState};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
+use std::ops::ControlFlow;
 
 /// An answered population.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -26,13 +30,15 @@ struct Answer {
 }
 
 /// The answers that a study has had, and what they belong to.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Journal {
     study: String,
     /// The study's settings, as `postcard` writes them.
     settings: Vec<u8>,
     origin: Option<Origin>,
     answers: Vec<Answer>,
+    /// A swarm that lives on a device and has come after these answers: the host does not know what it asks.
+    resident: Option<Box<SwarmState>>,
 }
 
 impl Checkpoint for Journal {
@@ -50,6 +56,7 @@ impl Journal {
             settings: Vec::new(),
             origin: None,
             answers: Vec::new(),
+            resident: None,
         };
         journal.set_settings(settings)?;
         Ok(journal)
@@ -75,7 +82,7 @@ impl<S: Serialize + DeserializeOwned> State<S> for Journal {
     }
 
     fn is_untouched(&self) -> bool {
-        self.answers.is_empty()
+        self.answers.is_empty() && self.resident.is_none()
     }
 }
 
@@ -158,6 +165,59 @@ impl<'k> Recorder<'k> {
             Some(journal) => self.state_file.save(journal),
             None => Ok(()),
         }
+    }
+
+    /// Runs a swarm on the device that evaluates `kind` until its planned iterations are done or `observe` returns `Break`. One that
+    /// was interrupted goes on where it was; what was told until then is told again as one.
+    ///
+    /// # Errors
+    /// As [`SwarmAtWork::step`].
+    pub(in crate::study) fn run_on_device<K: OnDevice>(
+        &mut self,
+        kind: &K,
+        swarm: FrontSwarm,
+        place: (BackendChoice, Option<&str>),
+        mut observe: impl FnMut(&Progress) -> ControlFlow<()>,
+    ) -> Result<FrontSwarm> {
+        let begun = self.journal.as_mut().and_then(|journal| journal.resident.take());
+        let mut flow = ControlFlow::Continue(());
+        let state = match begun {
+            Some(state) => {
+                let failures = state.losses.failures.clone();
+                flow = observe(&Progress {
+                    iteration: state.swarm.iteration(),
+                    evaluations: state.swarm.evaluations(),
+                    best: state.swarm.best(),
+                    violation: state.swarm.violation(),
+                    median: None,
+                    failed: 0,
+                    failures,
+                });
+                *state
+            }
+            None => SwarmState {
+                swarm,
+                losses: Losses::default(),
+            },
+        };
+        let mut at_work = SwarmAtWork::open(kind, state, true, place, &self.device_faults)?;
+        while flow.is_continue() && !at_work.done() {
+            flow = observe(&at_work.step()?);
+            if let Some(journal) = &mut self.journal
+                && self.state_file.due()
+            {
+                journal.resident = Some(Box::new(at_work.state().clone()));
+                self.state_file.save_or_warn(journal);
+            }
+        }
+        let backend = at_work.backend();
+        let state = at_work.finish()?;
+        self.backend = Some(backend);
+        self.device_faults.extend_from_slice(&state.losses.device_faults);
+        if let Some(journal) = &mut self.journal {
+            journal.resident = Some(Box::new(state.clone()));
+        }
+        Ok(state.swarm)
     }
 
     /// An evaluator whose answers are noted.

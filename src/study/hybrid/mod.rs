@@ -16,9 +16,9 @@ mod stint;
 mod strategy;
 
 pub use energy_value::{Worth, correlation, mean_worths, worth};
-pub use results::{FrontFigures, HybridSummary, ScenarioFigures};
+pub use results::{FrontFigures, HybridSummary, ScenarioFigures, SearchFigures, Site};
 pub use scenario::{ReportedLap, Scenario, drive, published};
-pub use settings::{FreePart, HybridAlgorithm, HybridStudySettings};
+pub use settings::{FreeGate, FreePart, HybridAlgorithm, HybridStudySettings};
 pub use setup::{HybridInputs, HybridSetup, read_inputs, set_up};
 pub use sizing::{ENGINES, Sizing, engine_only, size};
 pub use stint::{StintLap, stint};
@@ -64,6 +64,8 @@ pub struct Optimised {
     pub worth: Vec<Worth>,
     /// The swarm's front between the study's objectives.
     pub swarm_front: Option<StrategyFront>,
+    /// What the further searches of the settings found.
+    pub further: Vec<FoundStrategy>,
 }
 
 /// The outcome of a study.
@@ -104,6 +106,7 @@ impl Study for Hybrid {
     type Summary = HybridSummary;
 
     fn prepare(settings: &HybridStudySettings) -> Result<HybridInputs> {
+        settings.check_place()?;
         read_inputs(settings)
     }
 

@@ -5,7 +5,10 @@ mod page;
 
 pub(super) use page::write as write_page;
 
-use super::{Hybrid, HybridSetup, Outcome, ReportedLap, Sizing, StintLap, correlation, mean_worths};
+use super::{
+    FoundStrategy, Hybrid, HybridSetup, Outcome, ReportedLap, Sizing, StintLap, correlation, mean_worths,
+};
+use crate::config::kinds::Choice;
 use crate::error::Result;
 use crate::files::stem;
 use crate::line::energy::SegmentEnergy;
@@ -45,12 +48,111 @@ pub struct ScenarioFigures {
     pub additional_deployed_mj: f64,
     /// What charge at the end, harvest and deployment do not balance by (J).
     pub balance_error_j: f64,
+    /// Least state of charge along the lap.
+    #[serde(default)]
+    pub soc_least: f64,
+    /// Energy out of the store less what went in (MJ).
+    #[serde(default)]
+    pub net_deployed_mj: f64,
+    /// Fuel as a share of that of the engine alone (%).
+    #[serde(default)]
+    pub fuel_percent: f64,
+}
+
+/// What a further search found.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct SearchFigures {
+    /// `offset` or `additional`.
+    pub mode: String,
+    /// Time (s).
+    pub lap_time_s: f64,
+    /// Fuel (l).
+    pub fuel_l: f64,
+    /// Fuel as a share of that of the engine alone (%).
+    pub fuel_percent: f64,
+    /// Energy out of the store (MJ).
+    pub deployed_mj: f64,
+    /// State of charge at the end.
+    pub soc_end: f64,
+    /// Share of the lap's time with the motor on.
+    pub motor_time_share: f64,
+    /// Laps evaluated.
+    pub evaluations: u64,
+    /// The gates, or the share of each zone.
+    pub variables: BTreeMap<String, f64>,
+}
+
+impl SearchFigures {
+    fn of(outcome: &Outcome, found: &FoundStrategy) -> Self {
+        let (setup, lap) = (&outcome.setup, &found.lap.lap);
+        Self {
+            mode: found.lap.mode.name().to_owned(),
+            lap_time_s: lap.time,
+            fuel_l: lap.fuel / setup.car.fuel_density_kgpl,
+            fuel_percent: 100.0 * lap.fuel / outcome.engine.lap.fuel,
+            deployed_mj: lap.deployed / 1e6,
+            soc_end: found.lap.soc(lap.change),
+            motor_time_share: lap.motor_time / lap.time,
+            evaluations: found.evaluations,
+            variables: found.names.iter().cloned().zip(found.shares.clone()).collect(),
+        }
+    }
+}
+
+/// A stretch of the lap on which the motor works.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Site {
+    /// Station of its start (m).
+    pub start_m: f64,
+    /// Station of its end (m), before its start if it passes the start line.
+    pub end_m: f64,
+    /// Energy out of the store (MJ).
+    pub deployed_mj: f64,
+    /// Share of all that leaves the store in the lap: its allocation factor.
+    pub allocation: f64,
+}
+
+/// The sites of a lap, in their order.
+fn sites(lap: &ReportedLap, closed: bool) -> Vec<Site> {
+    let (n, total) = (lap.segments.len(), lap.lap.deployed);
+    let end_of = |i: usize| lap.station_m[i] + lap.length_m[i];
+    let mut sites: Vec<Site> = Vec::new();
+    let mut working = false;
+    for (i, segment) in lap.segments.iter().enumerate() {
+        let works = segment.deployed > 0.0;
+        if works {
+            if !working {
+                sites.push(Site {
+                    start_m: lap.station_m[i],
+                    end_m: 0.0,
+                    deployed_mj: 0.0,
+                    allocation: 0.0,
+                });
+            }
+            if let Some(site) = sites.last_mut() {
+                site.end_m = end_of(i);
+                site.deployed_mj += segment.deployed / 1e6;
+                site.allocation += segment.deployed / total;
+            }
+        }
+        working = works;
+    }
+    let passes = closed && sites.len() > 1 && working && lap.segments[0].deployed > 0.0 && n > 1;
+    if passes && let Some(last) = sites.pop() {
+        let first = &mut sites[0];
+        first.start_m = last.start_m;
+        first.deployed_mj += last.deployed_mj;
+        first.allocation += last.allocation;
+    }
+    sites
 }
 
 impl ScenarioFigures {
-    fn of(setup: &HybridSetup, own: &ReportedLap, additional: &ReportedLap) -> Self {
-        let lap = &own.lap;
-        let greatest = own.change_j().into_iter().fold(0.0, f64::max);
+    fn of(outcome: &Outcome, own: &ReportedLap, additional: &ReportedLap) -> Self {
+        let (setup, lap) = (&outcome.setup, &own.lap);
+        let changes = own.change_j();
+        let greatest = changes.iter().copied().fold(0.0, f64::max);
+        let least = changes.into_iter().fold(0.0, f64::min);
         let generating = own.segments.iter().filter(|s| s.generator > 0.0).map(|s| s.time);
         Self {
             mode: own.mode.name().to_owned(),
@@ -66,6 +168,9 @@ impl ScenarioFigures {
             additional_lap_time_s: additional.lap.time,
             additional_deployed_mj: additional.lap.deployed / 1e6,
             balance_error_j: own.balance_error_j(),
+            soc_least: own.soc(least),
+            net_deployed_mj: (lap.deployed - lap.harvested_k - lap.harvested_h) / 1e6,
+            fuel_percent: 100.0 * lap.fuel / outcome.engine.lap.fuel,
         }
     }
 }
@@ -121,6 +226,9 @@ pub struct DeploymentFigures {
     pub worth_taken_s_per_mj: Option<f64>,
     /// and where it does not.
     pub worth_left_s_per_mj: Option<f64>,
+    /// Where the swarm deploys.
+    #[serde(default)]
+    pub sites: Vec<Site>,
 }
 
 /// The figures of a study; `--json` prints this.
@@ -143,6 +251,9 @@ pub struct HybridSummary {
     pub scenarios: BTreeMap<String, ScenarioFigures>,
     /// The deployment of the study's energy.
     pub deployment: Option<DeploymentFigures>,
+    /// The further searches, by their names: `offset_zones`, `additional_gates`, `offset_gates`.
+    #[serde(default)]
+    pub searches: BTreeMap<String, SearchFigures>,
     /// The laps of a stint.
     pub stint: Vec<StintLap>,
     /// Motors with which the car laps in the time asked for.
@@ -159,7 +270,7 @@ pub(super) fn summarise(solved: &Solved<'_, Hybrid>) -> HybridSummary {
     let outcome = solved.outcome;
     let setup = &outcome.setup;
     let figures = outcome.scenarios.iter();
-    let figures = figures.map(|s| ScenarioFigures::of(setup, &s.own, &s.additional));
+    let figures = figures.map(|s| ScenarioFigures::of(outcome, &s.own, &s.additional));
     let names = outcome.scenarios.iter().map(|s| s.own.name.clone());
     let scenarios: BTreeMap<String, ScenarioFigures> = names.zip(figures).collect();
     let mut warnings = Vec::new();
@@ -216,7 +327,14 @@ pub(super) fn summarise(solved: &Solved<'_, Hybrid>) -> HybridSummary {
             worth_speed_correlation: correlation(&o.worth),
             worth_taken_s_per_mj: mean_worths(&o.worth)[0],
             worth_left_s_per_mj: mean_worths(&o.worth)[1],
+            sites: sites(&o.swarm.lap, setup.closed),
         }),
+        searches: outcome
+            .optimised
+            .iter()
+            .flat_map(|o| &o.further)
+            .map(|found| (stem(&found.lap.name), SearchFigures::of(outcome, found)))
+            .collect(),
         stint: outcome.stint.clone(),
         sizing: outcome.sizing.clone(),
         store_overflow: setup.car.hybrid.store.overflow,
@@ -264,6 +382,9 @@ impl HybridSummary {
                      (correlation with speed {with:.2})\n"
                 );
             }
+        }
+        if !self.searches.is_empty() {
+            text += &page::searches_table(self).to_text();
         }
         if !self.stint.is_empty() {
             text += &page::stint_table(&self.stint).to_text();
@@ -314,6 +435,7 @@ fn reported_laps(outcome: &Outcome) -> Vec<&ReportedLap> {
     laps.extend(outcome.scenarios.iter().map(|s| &s.own));
     if let Some(o) = &outcome.optimised {
         laps.extend([&o.exact_lap, &o.swarm.lap]);
+        laps.extend(o.further.iter().map(|found| &found.lap));
     }
     laps
 }

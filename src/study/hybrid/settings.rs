@@ -2,25 +2,39 @@
 
 use super::scenario::{Scenario, published};
 use crate::config::kinds::{
-    Choice, Kind, choice, choices, count, file, name_or_file, named, number, numbers, of, optional, quoted,
-    switch, text,
+    Choice, Kind, SomeOf, choice, choices, count, file, name_or_file, named, number, numbers, of, optional,
+    quoted, switch, text,
 };
 use crate::config::settings::{Flag, Written, settings};
 use crate::config::{LONGEST_NAME, Table};
 use crate::error::{Error, Result};
 use crate::evaluate::BackendChoice;
-use crate::evaluate::energy::{HybridObjective, MOST_MOTOR};
+use crate::evaluate::energy::{Free, HybridObjective, MOST_MOTOR};
 use crate::files::stem;
 use crate::line::energy::{Gates, Mode};
 use crate::study::framework::memory::Size;
 use crate::study::framework::{Coefficients, Mutated, Scheduled};
 use crate::study::raceline::RacelineSettings;
-use crate::swarm::{FrontSearch, Mutation, Schedule};
+use crate::swarm::{FrontSearch, MopsoSettings, Mutation, Schedule, SwarmPlace};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
 /// Laps that a study has beside those of its scenarios.
-const OWN_LAPS: [&str; 3] = ["engine alone", "exact", "swarm"];
+const OWN_LAPS: [&str; 6] = [
+    "engine alone",
+    "exact",
+    "swarm",
+    OFFSET_ZONES,
+    ADDITIONAL_GATES,
+    OFFSET_GATES,
+];
+
+/// The lap of a swarm that shares the energy out in the engine's place.
+pub(super) const OFFSET_ZONES: &str = "offset zones";
+/// The lap of a swarm that sets gates, beside the engine,
+pub(super) const ADDITIONAL_GATES: &str = "additional gates";
+/// and in its place.
+pub(super) const OFFSET_GATES: &str = "offset gates";
 
 /// What the swarm may change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -48,6 +62,38 @@ pub enum HybridAlgorithm {
     Thesis,
     /// The best there is for one objective, and NSGA-II for the front.
     Nsga2,
+}
+
+/// A gate that a swarm may set.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum FreeGate {
+    /// Greatest steering.
+    Steer,
+    /// Greatest speed.
+    Speed,
+    /// Least acceleration.
+    Acceleration,
+    /// Least state of charge.
+    Charge,
+}
+
+named!(FreeGate {
+    Steer = "steer",
+    Speed = "speed",
+    Acceleration = "ax",
+    Charge = "soc",
+});
+
+impl FreeGate {
+    /// As a part of the strategy.
+    pub(super) fn free(self) -> Free {
+        match self {
+            Self::Steer => Free::Steer,
+            Self::Speed => Free::Speed,
+            Self::Acceleration => Free::Acceleration,
+            Self::Charge => Free::Soc,
+        }
+    }
 }
 
 named!(HybridAlgorithm {
@@ -83,6 +129,10 @@ settings! {
             "What the front's swarm may change";
         objectives: Vec<HybridObjective> ["-"] = usual_objectives(), choices(),
             "What the swarm minimises; more than one for a front";
+        gates: Vec<FreeGate> ["-"] = Vec::new(), of(FreeGates).example("[\"steer\", \"speed\"]"),
+            "Gates that a swarm sets for the whole lap in place of zones: for the least lap time beside the engine, and for the least fuel in its place";
+        offset: bool ["-"] = false, switch(false).flag(Flag::Switch("offset", true)),
+            "Whether a swarm shares the energy out in the engine's place too, for the least fuel";
         energy_mj: Option<f64> ["MJ"] = None, optional(number(0.0, 1000.0)).example("2.1"),
             "Energy that may be deployed in a lap; without it what rules and store allow";
         store_overflow: bool ["-"] = false, switch(false).flag(Flag::Switch("store_overflow", true)),
@@ -115,6 +165,8 @@ settings! {
             "Iterations of the swarms";
         seed: u64 ["-"] = 1, count(0, u64::MAX).search(),
             "Seed of all random numbers";
+        swarm: SwarmPlace ["-"] = SwarmPlace::Auto, choice().search(),
+            "Where the particles of the front live; auto: on the device from 4096 particles on, where a graphics processor evaluates";
         backend: BackendChoice ["-"] = BackendChoice::Auto, choice().place(),
             "Where laps are evaluated";
         adapter: Option<String> ["-"] = None, optional(text()).place().example("\"llvmpipe\""),
@@ -125,6 +177,17 @@ settings! {
         if self.scenarios.is_empty() && !self.optimise {
             let found = "none, and no optimisation";
             return Err(Error::input("the study", "scenarios", found, "something to do"));
+        }
+        let of_lines = |o: &&HybridObjective| matches!(o, HybridObjective::Length | HybridObjective::Gamma);
+        if let Some(objective) = self.objectives.iter().find(of_lines)
+            && (self.free == FreePart::Strategy || self.line.is_some())
+        {
+            let expected = "free = \"line\" or \"both\", and no line of a file: one line has one length";
+            return Err(Error::input("the study", "objectives", objective.name(), expected));
+        }
+        let twice = (1..self.gates.len()).any(|i| self.gates[..i].contains(&self.gates[i]));
+        if twice {
+            return Err(Error::input("the study", "gates", "one twice", "each at most once"));
         }
         if self.algorithm != HybridAlgorithm::Thesis {
             self.coefficients().refuse_with(self.algorithm.name())?;
@@ -153,6 +216,35 @@ impl HybridStudySettings {
         }
     }
 
+    /// The swarm that looks for the front.
+    pub(super) fn front_swarm(&self) -> MopsoSettings {
+        let mopso = if self.algorithm == HybridAlgorithm::Thesis {
+            let thesis = MopsoSettings::thesis();
+            MopsoSettings {
+                motion: self.coefficients().apply(thesis.motion),
+                ..thesis
+            }
+        } else {
+            MopsoSettings::default()
+        };
+        mopso
+            .with_size(self.population, self.iterations)
+            .with_seed(self.seed)
+    }
+
+    /// Checks that the front's swarm can live where it is asked to.
+    ///
+    /// # Errors
+    /// [`Error::Input`] with the reason if it cannot.
+    pub(super) fn check_place(&self) -> Result<()> {
+        let backend = (self.backend, self.adapter.as_deref());
+        let objectives = self.objectives.len();
+        let swarm = self.front_swarm();
+        self.front_search()
+            .wants_device(self.swarm, objectives, &swarm, backend)
+            .map(drop)
+    }
+
     /// Whether the front's swarm starts from what is known.
     pub(super) fn starts_warm(&self) -> bool {
         self.warm_start
@@ -173,7 +265,8 @@ impl HybridStudySettings {
     pub(super) fn size_of(&self, variables: usize) -> Size {
         let front = usize::from(self.objectives.len() > 1);
         let sizing = self.match_lap_time_s.map_or(0, |_| SIZING);
-        let searches = if self.optimise { 1 + front } else { 0 } + sizing;
+        let more = usize::from(self.offset) + 2 * usize::from(!self.gates.is_empty());
+        let searches = if self.optimise { 1 + front + more } else { 0 } + sizing;
         Size {
             population: self.population.saturating_mul(self.islands),
             variables,
@@ -199,6 +292,38 @@ impl HybridStudySettings {
             adapter: self.adapter.clone(),
             ..RacelineSettings::default()
         }
+    }
+}
+
+/// Some of the gates, or none.
+struct FreeGates;
+
+impl Kind<Vec<FreeGate>> for FreeGates {
+    fn read(&self, table: &Table<'_>, key: &str, unit: &str, folder: &Path) -> Result<Option<Vec<FreeGate>>> {
+        SomeOf.read(table, key, unit, folder)
+    }
+
+    fn write(&self, gates: &Vec<FreeGate>) -> Option<Written> {
+        if gates.is_empty() {
+            return None;
+        }
+        SomeOf.write(gates)
+    }
+
+    fn parse(&self, text: &str, present: &Vec<FreeGate>) -> Result<Vec<FreeGate>, String> {
+        SomeOf.parse(text, present)
+    }
+
+    fn range(&self) -> String {
+        Kind::<Vec<FreeGate>>::range(&SomeOf)
+    }
+
+    fn value_name(&self) -> &'static str {
+        "LIST"
+    }
+
+    fn flag(&self, name: &'static str) -> Flag {
+        Flag::List(name)
     }
 }
 

@@ -76,6 +76,7 @@ pub fn read_inputs(settings: &HybridStudySettings) -> Result<HybridInputs> {
     let given = settings.line.as_ref().map(read).transpose()?;
     let raceline_settings = settings.raceline();
     let mut raceline = raceline::set_up(&raceline_settings)?;
+    raceline.road.level_only("a lap with energy")?;
     let (envelope, traction) = match &settings.envelope {
         Some(path) => {
             let envelope = Envelope::load(path)?;

@@ -1,6 +1,7 @@
 //! The work of the study: scenarios, stint and sizes, then the deployment by solver and swarms.
 
 use super::scenario::drive_engine_alone;
+use super::strategy::search;
 use super::{
     DrivenScenario, FrontFigures, Hybrid, Optimised, Outcome, Scenario, search_front, search_strategy, size,
     stint, worth,
@@ -86,7 +87,7 @@ pub(super) fn deploy(work: Work<'_, Hybrid>) -> Result<Option<Outcome>> {
                 before = Some(found.shares);
             }
         }
-        let search = Instant::now();
+        let began = Instant::now();
         let energy_mj = budget_j / 1e6;
         let swarm = search_strategy(&setup, settings, energy_mj, &mut recorder, |p| {
             add_failures(&mut record.failures, &p.failures);
@@ -103,7 +104,19 @@ pub(super) fn deploy(work: Work<'_, Hybrid>) -> Result<Option<Outcome>> {
             evaluations += found.evaluations;
             swarm_front = Some(found);
         }
-        search_s = search.elapsed().as_secs_f64();
+        let mut further = Vec::new();
+        for (name, problem) in setup.further_searches(settings, energy_mj)? {
+            if interrupted.get() {
+                break;
+            }
+            let found = search((name, &problem), settings, &mut recorder, |p| {
+                add_failures(&mut record.failures, &p.failures);
+                tell(name, p.evaluations, format!("{:.4}", p.best[0]))
+            })?;
+            evaluations += found.evaluations;
+            further.push(found);
+        }
+        search_s = began.elapsed().as_secs_f64();
         if interrupted.get() {
             recorder.save()?;
         }
@@ -116,6 +129,7 @@ pub(super) fn deploy(work: Work<'_, Hybrid>) -> Result<Option<Outcome>> {
             front,
             unbound_j: unbound.lap.deployed,
             swarm_front,
+            further,
         });
     }
     recorder.complete(&mut record);

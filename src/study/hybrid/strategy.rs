@@ -1,7 +1,9 @@
 //! Where the motor works: by the reference optimum, by a swarm, and along the fronts between objectives.
 
 use super::scenario::{ReportedLap, drive};
-use super::settings::{FreePart, HybridAlgorithm, HybridStudySettings};
+use super::settings::{
+    ADDITIONAL_GATES, FreePart, HybridAlgorithm, HybridStudySettings, OFFSET_GATES, OFFSET_ZONES,
+};
 use super::setup::{HybridSetup, control_points};
 use crate::error::Result;
 use crate::evaluate::energy::{
@@ -12,16 +14,16 @@ use crate::line::{Parametrisation, geometry};
 use crate::optimum::{Deployment, DeploymentSearch};
 use crate::random::Random;
 use crate::study::framework::journal::Recorder;
-use crate::swarm::{
-    HybridSettings, HybridSwarm, MopsoSettings, Optimiser, Progress, Pso, PsoSettings, SwarmPlace, run,
-};
+use crate::swarm::{HybridSettings, HybridSwarm, Optimiser, Progress, Pso, PsoSettings, run};
 use std::ops::ControlFlow;
 
 /// What the swarm found for one budget.
 #[derive(Clone, Debug)]
 pub struct FoundStrategy {
-    /// The share of each zone in which the motor works.
+    /// The share of each zone in which the motor works, or the gates, in the order of their names.
     pub shares: Vec<f64>,
+    /// Names of the variables.
+    pub names: Vec<String>,
     /// The lap, in `f64`.
     pub lap: ReportedLap,
     /// Laps evaluated.
@@ -68,18 +70,63 @@ impl HybridSetup {
         energy_mj: f64,
         objectives: &[HybridObjective],
     ) -> Result<HybridProblem> {
-        let open = drive(self, "open", Mode::Additional, Gates::of_zones(1e6))?;
+        self.zones_of(Mode::Additional, free, energy_mj, objectives)
+    }
+
+    fn zones_of(
+        &self,
+        mode: Mode,
+        free: &[Free],
+        energy_mj: f64,
+        objectives: &[HybridObjective],
+    ) -> Result<HybridProblem> {
+        let open = drive(self, "open", mode, Gates::of_zones(1e6))?;
         let given: Vec<f64> = open.segments.iter().map(|s| s.deployed).collect();
         let starts = zone_starts(&given, &open.length_m);
         let mut length = open.length_m;
         length.resize(self.points_m.len(), 0.0);
-        let plan = EnergyPlan::zoned(&length, &starts, self.closed, self.run_in, Mode::Additional);
+        let plan = EnergyPlan::zoned(&length, &starts, self.closed, self.run_in, mode);
         let zones = plan.count();
         let strategy = Strategy {
             free: free.iter().copied().chain((0..zones).map(Free::Zone)).collect(),
             ..Strategy::fixed(Gates::of_zones(energy_mj), zones)
         };
         self.problem(plan, strategy, objectives)
+    }
+}
+
+impl HybridSetup {
+    /// The searches that the settings ask for beside the one of zones beside the engine, by the names of their laps: of zones in the
+    /// engine's place, and of gates both ways. In the engine's place the lap takes the same time, and the least fuel is sought.
+    pub(super) fn further_searches(
+        &self,
+        settings: &HybridStudySettings,
+        energy_mj: f64,
+    ) -> Result<Vec<(&'static str, HybridProblem)>> {
+        let mut problems = Vec::new();
+        if settings.offset {
+            let problem = self.zones_of(Mode::Offset, &[], energy_mj, &[HybridObjective::Fuel])?;
+            problems.push((OFFSET_ZONES, problem));
+        }
+        if settings.gates.is_empty() {
+            return Ok(problems);
+        }
+        for (name, mode, objective) in [
+            (ADDITIONAL_GATES, Mode::Additional, HybridObjective::LapTime),
+            (OFFSET_GATES, Mode::Offset, HybridObjective::Fuel),
+        ] {
+            let gates = Gates {
+                energy_mj,
+                ..Gates::OPEN
+            };
+            let strategy = Strategy {
+                free: settings.gates.iter().map(|gate| gate.free()).collect(),
+                ..Strategy::fixed(gates, 1)
+            };
+            let plan = EnergyPlan::whole(self.points_m.len(), self.run_in, mode);
+            problems.push((name, self.problem(plan, strategy, &[objective])?));
+        }
+        Ok(problems)
     }
 }
 
@@ -95,6 +142,19 @@ pub fn search_strategy(
     observe: impl FnMut(&Progress) -> ControlFlow<()>,
 ) -> Result<FoundStrategy> {
     let problem = setup.zone_problem(&[], energy_mj, &[HybridObjective::LapTime])?;
+    search(("swarm", &problem), settings, recorder, observe)
+}
+
+/// The swarm's strategy for a problem with one objective, and the name of its lap.
+///
+/// # Errors
+/// Those of the evaluator.
+pub(super) fn search(
+    (name, problem): (&str, &HybridProblem),
+    settings: &HybridStudySettings,
+    recorder: &mut Recorder<'_>,
+    observe: impl FnMut(&Progress) -> ControlFlow<()>,
+) -> Result<FoundStrategy> {
     let mut swarm: Box<dyn Optimiser> = if settings.algorithm == HybridAlgorithm::Thesis {
         let motion = PsoSettings {
             population: settings.population,
@@ -112,13 +172,14 @@ pub fn search_strategy(
         };
         Box::new(HybridSwarm::new(&problem.problem, best)?)
     };
-    let mut evaluator = open_hybrid_evaluator(&problem, settings.backend, settings.adapter.as_deref())?;
+    let mut evaluator = open_hybrid_evaluator(problem, settings.backend, settings.adapter.as_deref())?;
     run(&mut swarm, &mut recorder.over(evaluator.as_mut()), observe)?;
     // A lap that cannot be driven is no answer: the shares are then none.
     let best = swarm.front().candidates.into_iter().next();
     let shares = best.unwrap_or_else(|| vec![0.0; problem.dimensions()]);
     Ok(FoundStrategy {
-        lap: ReportedLap::of("swarm", &problem, &shares),
+        lap: ReportedLap::of(name, problem, &shares),
+        names: problem.problem.variables.iter().map(|v| v.name.clone()).collect(),
         shares,
         evaluations: swarm.evaluations(),
     })
@@ -190,25 +251,20 @@ pub fn search_front(
             (problem, line)
         }
     };
-    let mopso = if settings.algorithm == HybridAlgorithm::Thesis {
-        let thesis = MopsoSettings::thesis();
-        MopsoSettings {
-            motion: settings.coefficients().apply(thesis.motion),
-            ..thesis
-        }
-    } else {
-        MopsoSettings::default()
-    };
-    let mopso = mopso
-        .with_size(settings.population, settings.iterations)
-        .with_seed(settings.seed);
     let search = settings.front_search();
-    let mut swarm = search.begin(&problem.problem, mopso, SwarmPlace::Host)?;
+    let mopso = settings.front_swarm();
+    let place = (settings.backend, settings.adapter.as_deref());
+    let on_device = search.on_device(settings.swarm, &problem.problem, &mopso, place)?;
+    let mut swarm = search.begin(&problem.problem, mopso, settings.swarm)?;
     if settings.starts_warm() {
         swarm.start_from(&starting_candidates(&problem, settings, &line))?;
     }
-    let mut evaluator = open_hybrid_evaluator(&problem, settings.backend, settings.adapter.as_deref())?;
-    run(&mut swarm, &mut recorder.over(evaluator.as_mut()), observe)?;
+    if on_device {
+        swarm = recorder.run_on_device(&problem, swarm, place, observe)?;
+    } else {
+        let mut evaluator = open_hybrid_evaluator(&problem, place.0, place.1)?;
+        run(&mut swarm, &mut recorder.over(evaluator.as_mut()), observe)?;
+    }
     let front = swarm.front();
     Ok(StrategyFront {
         names: problem.problem.variables.iter().map(|v| v.name.clone()).collect(),

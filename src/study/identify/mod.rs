@@ -7,6 +7,7 @@ mod notes;
 mod page;
 mod polish;
 mod refine;
+mod resident;
 mod results;
 mod search;
 mod settings;
@@ -20,7 +21,7 @@ pub use identifiability::{Group, Identifiability, judge};
 pub use polish::{Polished, polish};
 pub use results::Summary;
 pub use search::{Judged, Outcome, judge_candidate, search_with, total_parameter_error};
-pub use settings::{Algorithm, FreeParameter, IdentifySettings, ObjectiveChoice, Unknowns};
+pub use settings::{Algorithm, FreeParameter, IdentifySettings, ModelChoice, ObjectiveChoice, Unknowns};
 pub use setup::{Setup, cost_unit, lap_format, set_up};
 pub(in crate::study) use setup::{planned, subject, without_laps};
 pub use state::{Front, HistoryRow, SearchState};
@@ -35,6 +36,7 @@ use crate::study::framework::state_file::StateFile;
 use crate::study::framework::{
     Figures, Plan, Progress, RunRecord, Solved, Study, Subject, Work, resumed_or_new,
 };
+use crate::swarm::SwarmPlace;
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::Arc;
@@ -86,7 +88,12 @@ impl Study for Identify {
 
     /// Eight swarms of fifty particles fill the lanes of a small device.
     fn together(settings: &IdentifySettings) -> usize {
-        if settings.size().population <= SMALL { 8 } else { 1 }
+        let on_host = settings.place != SwarmPlace::Device;
+        if on_host && settings.size().population <= SMALL {
+            8
+        } else {
+            1
+        }
     }
 
     /// The swarms share an evaluator, and its calls.
@@ -193,6 +200,8 @@ impl Study for Identify {
         .into();
         let costs = summary.costs.iter();
         figures.extend(costs.map(|(channel, cost)| (format!("cost_{channel}"), Some(*cost))));
+        let errors = summary.rms_error.iter();
+        figures.extend(errors.map(|(channel, rms)| (format!("rms_error_{channel}"), Some(*rms))));
         figures
     }
 }

@@ -17,6 +17,12 @@ pub(super) fn notes(setup: &Setup, summary: &Summary) -> Vec<String> {
             "Half of the parameters or more cannot be told from this log. With free = \"auto\" those that it can tell are found.".to_owned(),
         );
     }
+    if let Some(window_s) = setup.windows_instead_s {
+        notes.push(format!(
+            "The starting car does not drive the laps to their end, and few others would. The log is scored in windows of {window_s} s \
+             that start from the logged state (window_s sets their length)."
+        ));
+    }
     let (taken, needed) = (summary.substeps, summary.substeps_needed);
     if needed > taken {
         notes.push(format!(
@@ -38,6 +44,17 @@ pub(super) fn notes(setup: &Setup, summary: &Summary) -> Vec<String> {
             "Sideslip and roll are not logged, so that each window is driven for {settle_s:.1} s before it is scored. The log has no \
              such time ahead of {places} of the laps or sections fitted: their first {settle_s:.1} s do not count."
         ));
+    }
+    if setup
+        .circuit
+        .as_ref()
+        .is_some_and(|circuit| circuit.relief.is_some())
+    {
+        notes.push(
+            "The track has height or banking. Replays are those of a level road: both are left out, and what they do to the car is \
+             taken for the car's own."
+                .to_owned(),
+        );
     }
     let freed = ["drs_drag_percent", "drs_downforce_percent"];
     let frees = setup

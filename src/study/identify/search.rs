@@ -2,6 +2,7 @@
 
 use super::identifiability::{Identifiability, judge};
 use super::refine::{refine, restarted};
+use super::resident::Resident;
 use super::settings::{Algorithm, EXPLORE, FRONT, GATHER, IdentifySettings};
 use super::setup::{CHANNELS, Setup};
 use super::state::{Front, HistoryRow, Place, SearchState, inputs_of};
@@ -13,7 +14,6 @@ use crate::study::framework::{Progress as Told, RunRecord, Watch};
 use crate::swarm::metrics::nearest_to_ideal;
 use crate::swarm::{
     CovarianceSettings, CovarianceSwarm, FrontSwarm, MopsoSettings, Optimiser, Progress, Pso, PsoSettings,
-    SwarmPlace,
 };
 use std::ops::ControlFlow;
 use std::time::Instant;
@@ -77,8 +77,17 @@ pub fn search_with(
     let mut faults = DeviceFaults::of(evaluator);
     let began = Instant::now();
     let mut interrupted = false;
+    let mut resident = Resident::of(settings, setup, &state)?;
+    let mut swarm_backend = None;
     while !matches!(state.place, Place::Searched { .. }) {
-        let Some((doing, planned, progress)) = state.place.advance(evaluator)? else {
+        let advanced = match &mut resident {
+            Some(resident) => resident.advance()?,
+            None => state.place.advance(evaluator)?,
+        };
+        let Some((doing, planned, progress)) = advanced else {
+            if let Some(resident) = resident.take() {
+                swarm_backend = Some(resident.finish(&mut state)?);
+            }
             state.place = next_place(state.place, settings, evaluator)?;
             state_file.save_or_warn(&state);
             continue;
@@ -95,17 +104,23 @@ pub fn search_with(
             reached: format!("best {}, {} failed", best.join(" "), progress.failed),
         });
         if flow.is_break() {
+            if let Some(resident) = resident.take() {
+                swarm_backend = Some(resident.finish(&mut state)?);
+            }
             state_file.save(&state)?;
             interrupted = true;
             break;
         }
         if state_file.due() {
-            state_file.save_or_warn(&state);
+            match &mut resident {
+                Some(resident) => state_file.save_or_warn(&resident.kept(&state)),
+                None => state_file.save_or_warn(&state),
+            }
         }
     }
     let swarm_s = before_s + began.elapsed().as_secs_f64();
     let evaluations = state.history.last().map_or(0, |row| row.evaluations);
-    let backend = evaluator.backend();
+    let backend = swarm_backend.unwrap_or_else(|| evaluator.backend());
     // Of a search that is interrupted before anything drives there is nothing to tell yet; its state is saved.
     let folder = state_file.folder().to_owned();
     let nothing_yet = |error: Error, interrupted: bool| {
@@ -178,10 +193,23 @@ fn first_place(settings: &IdentifySettings, setup: &Setup) -> Result<Place> {
     let motion = swarm_settings(settings);
     Ok(if settings.objectives.len() > 1 {
         let swarm = front_settings(settings, motion);
-        Place::Front(settings.front_search().begin(problem, swarm, SwarmPlace::Host)?)
+        Place::Front(settings.front_search().begin(problem, swarm, settings.place)?)
     } else {
         Place::Explore(Box::new(Pso::new(problem, motion)?))
     })
+}
+
+/// Whether the swarm for several objectives lives on the device.
+///
+/// # Errors
+/// [`Error::Input`] with the reason if it is asked to and cannot.
+pub(super) fn on_device(settings: &IdentifySettings, setup: &Setup) -> Result<bool> {
+    let swarm = front_settings(settings, swarm_settings(settings));
+    let backend = (settings.backend, settings.adapter.as_deref());
+    let problem = &setup.replay.problem;
+    settings
+        .front_search()
+        .on_device(settings.place, problem, &swarm, backend)
 }
 
 /// Checks that the swarms which the search is to have can be.
@@ -189,7 +217,9 @@ fn first_place(settings: &IdentifySettings, setup: &Setup) -> Result<Place> {
 /// # Errors
 /// [`Error::Input`] naming the setting.
 pub fn check_swarms(settings: &IdentifySettings, setup: &Setup) -> Result<()> {
-    if let Place::Explore(_) = first_place(settings, setup)?
+    let first = first_place(settings, setup)?;
+    on_device(settings, setup)?;
+    if let Place::Explore(_) = first
         && settings.algorithm == Algorithm::Adaptive
     {
         let problem = &setup.replay.problem;

@@ -12,8 +12,9 @@ use crate::evaluate::replay::{CHANNEL_NAMES, Norm};
 use crate::files::run_folder::SUMMARY;
 use crate::study::framework::memory::Size;
 use crate::study::framework::{Coefficients, Mutated, Scheduled};
-use crate::swarm::{FrontSearch, Mutation, Schedule};
+use crate::swarm::{FrontSearch, Mutation, Schedule, SwarmPlace};
 use crate::telemetry::CalibrationOptions;
+use crate::vehicle::Car;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -94,6 +95,42 @@ impl Choice for ObjectiveChoice {
     }
 }
 
+/// How much of a car there is in its model.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum ModelChoice {
+    /// Four degrees of freedom, with roll.
+    Roll,
+    /// Three: the centre of gravity is on the ground, so that the car neither rolls nor shifts its load.
+    NoRoll,
+    /// As before, with both wheels of an axle at one place.
+    Bicycle,
+}
+
+crate::config::kinds::named!(ModelChoice {
+    Roll = "roll",
+    NoRoll = "no-roll",
+    Bicycle = "bicycle",
+});
+
+impl ModelChoice {
+    /// The car as this model has it. Heights and tracks are the least that a car may have.
+    pub(in crate::study) fn of(self, mut car: Car) -> Car {
+        let c = &mut car.chassis;
+        if self != Self::Roll {
+            (c.cg_height, c.drag_height, c.pitch_transfer) = (LEAST_HEIGHT_M, 0.0, 0.0);
+        }
+        if self == Self::Bicycle {
+            (c.half_track_front, c.half_track_rear) = (LEAST_HALF_TRACK_M, LEAST_HALF_TRACK_M);
+        }
+        car
+    }
+}
+
+/// The least height of a centre of gravity (m),
+const LEAST_HEIGHT_M: f64 = 0.01;
+/// and the least half of a track (m).
+const LEAST_HALF_TRACK_M: f64 = 0.1;
+
 /// Which swarm searches.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Algorithm {
@@ -119,6 +156,8 @@ settings! {
     pub struct IdentifySettings {
         car: String ["-"] = "gt".to_owned(), name_or_file(),
             "The car that fixed parameters come from: a bundled name (gt, gt_hybrid) or a TOML file";
+        model: ModelChoice ["-"] = ModelChoice::Roll, choice(),
+            "How much of the car there is: with roll, four wheels without roll and load transfer, or a bicycle, which has no track either";
         log: Option<PathBuf> ["-"] = None, optional(file()).example("\"lap.csv\""),
             "The log: CSV (ours, MoTeC i2, RaceChrono, others), MoTeC .ld or VBOX .vbo; without it the bundled lap";
         channel_map: Option<PathBuf> ["-"] = None, optional(file()).example("\"channels.toml\""),
@@ -138,7 +177,7 @@ settings! {
         norm: Norm ["-"] = Norm::Two, choice(),
             "Norm of the costs";
         window_s: Option<f64> ["s"] = None, optional(number(0.2, 1e5)).example("3.0"),
-            "Length of the windows that restart from the log; without it whole laps are driven";
+            "Length of the windows that restart from the log; without it whole laps are driven, or 5 s where the starting car does not drive them";
         settle_s: Option<f64> ["s"] = None, optional(number(0.0, 60.0)).example("2.0"),
             "Time that each window is driven before it is scored, over samples ahead of it; without it as long as the car takes to settle";
         section: Option<String> ["-"] = None, optional(text()).example("\"Abbey\""),
@@ -173,6 +212,8 @@ settings! {
             "Swarms for several objectives, each of the whole population; five members of each go to the next one every ten iterations";
         archive: usize as "swarm.archive" ["-"] = 100, count(2, 100_000).search(),
             "Members of the archive of the multi-objective swarm";
+        place: SwarmPlace as "swarm.place" ["-"] = SwarmPlace::Auto, choice().flag(Flag::Value("swarm")).search(),
+            "Where the particles of a swarm for several objectives live; auto: on the device from 4096 particles on, where a graphics processor evaluates";
         seed: u64 ["-"] = 1, count(0, u64::MAX).search(),
             "Seed of all random numbers";
         polish: bool ["-"] = true, switch(true).flag(Flag::Switch("no_polish", false)).search(),

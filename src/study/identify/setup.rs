@@ -6,7 +6,8 @@ use super::stand_in::StandIn;
 use crate::error::{Error, Result};
 use crate::evaluate::Objective;
 use crate::evaluate::replay::{
-    CHANNEL_NAMES, CHANNEL_UNITS, ChannelWeights, Norm, ReplayProblem, Sample, Window, initial_state,
+    CHANNEL_NAMES, CHANNEL_UNITS, ChannelWeights, Norm, Plan as ReplayPlan, ReplayProblem, Sample, Window,
+    initial_state, step_fractions, trace,
 };
 use crate::study::framework::{Plan, Subject};
 use crate::telemetry::{Axle, ChannelMap, Log, LogOptions, NativeFormat, Recording};
@@ -40,6 +41,8 @@ pub struct Setup {
     pub settle_s: f64,
     /// Laps and sections whose first moments are not scored, because the log has nothing to drive ahead of them.
     pub without_run_up: usize,
+    /// Length of the windows (s) where none was set and the starting car does not drive the laps to their end.
+    pub windows_instead_s: Option<f64>,
     /// How the free parameters were chosen, where the log chose them.
     pub choice: Option<Choice>,
 }
@@ -47,8 +50,8 @@ pub struct Setup {
 /// Time constants of its slowest motion in which a car forgets where it started. A thousandth is left after seven. In corners, near
 /// the limit of its tyres, a car settles about half as fast as straight ahead, where its motions are worked out.
 const TIME_CONSTANTS: f64 = 14.0;
-/// Windows on which free parameters are chosen where whole laps are driven, s.
-const CHOICE_WINDOW_S: f64 = 5.0;
+/// Windows where no length is set and whole laps are not what is wanted, s.
+const WINDOW_S: f64 = 5.0;
 /// The least and the most that a car is given to settle, s.
 const SETTLE_S: [f64; 2] = [0.5, 10.0];
 
@@ -73,7 +76,7 @@ fn settling_time(car: &Car, samples: &[Sample<f64>], laps: &[(usize, usize)], dt
 /// # Errors
 /// [`Error::Input`] naming file and field for anything that does not fit.
 pub fn set_up(settings: &IdentifySettings) -> Result<Setup> {
-    let car = Car::load(&settings.car)?;
+    let car = settings.model.of(Car::load(&settings.car)?);
     let mut freed = settings.freed()?;
     let bundled = settings.log.is_none();
     let map = match &settings.channel_map {
@@ -82,11 +85,10 @@ pub fn set_up(settings: &IdentifySettings) -> Result<Setup> {
     };
     let options = LogOptions {
         rate_hz: settings.rate_hz,
-        rolling_radius_m: Some([car.chassis.radius_front, car.chassis.radius_rear]),
         radius_is_free: ["front_rolling_radius_m", "rear_rolling_radius_m"]
             .map(|radius| freed.iter().any(|free| free.name == radius)),
         calibration: settings.calibration.clone(),
-        ..LogOptions::default()
+        ..LogOptions::of(&car)
     };
     let log = match &settings.log {
         Some(path) => Log::read(path, &map, &options)?,
@@ -105,8 +107,20 @@ pub fn set_up(settings: &IdentifySettings) -> Result<Setup> {
     let settle_s = settings
         .settle_s
         .unwrap_or_else(|| settling_time(&car, &samples, &fitted, log.dt_s));
-    let cut =
-        |laps: &[(usize, usize)]| windows_over(settings, settle_s, &log, &samples, laps, circuit.as_ref());
+    let windowed = |settings: &IdentifySettings, laps: &[(usize, usize)]| {
+        windows_over(settings, settle_s, &log, &samples, laps, circuit.as_ref())
+    };
+    let in_windows = IdentifySettings {
+        window_s: Some(WINDOW_S),
+        ..settings.clone()
+    };
+    let whole_laps_wanted = settings.window_s.is_some() || settings.log.is_none();
+    let instead = !whole_laps_wanted
+        && windowed(&in_windows, &fitted).is_ok()
+        && windowed(&in_windows, &held).is_ok()
+        && !windowed(settings, &fitted)
+            .is_ok_and(|(windows, _)| drives(&car, &samples, windows, settings.substeps, log.dt_s));
+    let cut = |laps: &[(usize, usize)]| windowed(if instead { &in_windows } else { settings }, laps);
     let (fit_windows, without_run_up) = cut(&fitted)?;
     if fit_windows.is_empty() {
         let found = format!(
@@ -128,10 +142,9 @@ pub fn set_up(settings: &IdentifySettings) -> Result<Setup> {
         .map(|s| s.measured[0])
         .fold(f64::INFINITY, f64::min);
     // As fine as the car that the search starts from needs it at the slowest place.
-    let substeps = settings.substeps.unwrap_or_else(|| {
-        let fastest = fastest_mode(&car.to_flat(), car.tyre_model(), slowest.max(1.0));
-        stable_steps(log.dt_s, fastest)
-    });
+    let substeps = settings
+        .substeps
+        .unwrap_or_else(|| steps_of(&car, slowest, log.dt_s));
     let scales = channel_scales(&samples, &fit_windows);
     let problem = |freed: &[FreeParameter], windows: Vec<Window<f64>>| -> Result<ReplayProblem> {
         let weights = objective_weights(settings, &scales, &windows, log.dt_s);
@@ -150,14 +163,7 @@ pub fn set_up(settings: &IdentifySettings) -> Result<Setup> {
     let choice = if settings.free.auto {
         let looked_at = match settings.window_s {
             Some(_) => fit_windows.clone(),
-            None => {
-                let window_s = Some(CHOICE_WINDOW_S);
-                let cut = IdentifySettings {
-                    window_s,
-                    ..settings.clone()
-                };
-                windows_over(&cut, settle_s, &log, &samples, &fitted, circuit.as_ref())?.0
-            }
+            None => windowed(&in_windows, &fitted)?.0,
         };
         let choice = choose(&problem(&freed, looked_at)?, &scales)?;
         freed.retain(|free| choice.names.contains(&free.name));
@@ -179,8 +185,41 @@ pub fn set_up(settings: &IdentifySettings) -> Result<Setup> {
         log,
         settle_s,
         without_run_up,
+        windows_instead_s: instead.then_some(WINDOW_S),
         choice,
     })
+}
+
+/// Steps per sample that a car needs at a speed (m/s).
+fn steps_of(car: &Car, slowest_mps: f64, dt_s: f64) -> usize {
+    stable_steps(
+        dt_s,
+        fastest_mode(&car.to_flat(), car.tyre_model(), slowest_mps.max(1.0)),
+    )
+}
+
+/// Whether a car drives all windows to their end.
+fn drives(
+    car: &Car,
+    samples: &[Sample<f64>],
+    windows: Vec<Window<f64>>,
+    substeps: Option<usize>,
+    dt_s: f64,
+) -> bool {
+    let driven = windows.iter().flat_map(|w| &samples[w.start..w.end]);
+    let slowest = driven.map(|s| s.measured[0]).fold(f64::INFINITY, f64::min);
+    let substeps = substeps.unwrap_or_else(|| steps_of(car, slowest, dt_s));
+    let plan = ReplayPlan {
+        samples: samples.to_vec(),
+        windows,
+        step: dt_s / substeps as f64,
+        fractions: step_fractions(substeps),
+        norm: Norm::Two,
+    };
+    let (flat, tyre) = (car.to_flat(), car.tyre_model());
+    plan.windows
+        .iter()
+        .all(|window| trace(&flat, tyre, &plan, window).drives)
 }
 
 /// A study file whose log is given by a flag names laps that the bundled log does not have: a check does not look for them.
@@ -267,10 +306,12 @@ fn choose_laps(settings: &IdentifySettings, log: &Log) -> Result<(LapRanges, Lap
     }
     let held: LapRanges = settings.holdout.iter().map(range_of).collect::<Result<_>>()?;
     let fitted: LapRanges = if settings.laps.is_empty() {
+        // A log that tells of no line is one stretch, which a fit takes as it is.
+        let whole = log.laps.len() == 1;
         let wanted = log
             .laps
             .iter()
-            .filter(|l| l.complete && !settings.holdout.contains(&l.number));
+            .filter(|l| (l.complete || whole) && !settings.holdout.contains(&l.number));
         wanted.map(|l| (l.start, l.end)).collect()
     } else {
         settings.laps.iter().map(range_of).collect::<Result<_>>()?

@@ -9,9 +9,7 @@ use crate::line::Parametrisation;
 use crate::optimum::{ReferenceSolvers, interruptible};
 use crate::random::Random;
 use crate::swarm::metrics::{Scale, hypervolume};
-use crate::swarm::{
-    Archive, MopsoSettings, Optimiser, Progress, SwarmAtWork, SwarmState, Truncation, lattice,
-};
+use crate::swarm::{Archive, Optimiser, Progress, SwarmAtWork, SwarmState, Truncation, lattice};
 use rayon::prelude::*;
 use std::ops::ControlFlow;
 use std::sync::atomic::Ordering;
@@ -67,30 +65,18 @@ pub(super) fn search_front(
     let cross_sections = &setup.cross_sections;
     let problem = front_problem(setup, settings)?;
     let published = settings.algorithm == LineAlgorithm::Thesis;
-    let mut mopso = if published {
-        MopsoSettings::thesis()
-    } else {
-        MopsoSettings::default()
-    };
-    if published {
-        mopso.motion = settings.coefficients().apply(mopso.motion);
-    }
-    mopso.archive = settings.archive;
-    let mopso = mopso
-        .with_size(settings.population, settings.iterations)
-        .with_seed(settings.seed);
     // The published swarm by itself knows nothing of the lines that other swarms found.
     let known = if published && !settings.starts_warm() {
         &[]
     } else {
         known
     };
-    let on_device = settings.on_device(problem.problem.variables.len())?;
+    let on_device = settings.on_device(&problem.problem)?;
     let state = match state {
         Some(state) => state,
         None => {
             let search = settings.front_search();
-            let mut swarm = search.begin(&problem.problem, mopso, settings.swarm)?;
+            let mut swarm = search.begin(&problem.problem, settings.front_swarm(), settings.swarm)?;
             if !published || settings.starts_warm() {
                 swarm.start_from(&starting_lines(&problem, settings, known)?)?;
             }

@@ -25,7 +25,7 @@ pub use state::LinesState;
 pub use window_search::{FoundLine, LevelRow, LineSearch, LineSearchSettings, LineState, search_line};
 
 use crate::config::settings::Settings;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::evaluate::line::LineObjective;
 use crate::study::framework::memory::MemoryItem;
 use crate::study::framework::{Figures, Plan, RunRecord, Solved, Study, Subject, Work};
@@ -90,9 +90,22 @@ impl Study for Raceline {
 
     fn prepare(settings: &RacelineSettings) -> Result<Setup> {
         let setup = set_up(settings)?;
+        let sections = setup.cross_sections.len();
+        if let Some(beyond) = settings
+            .surface_sections
+            .iter()
+            .find(|i| **i as usize >= sections)
+        {
+            let expected = format!("a cross-section from 0 to {}", sections - 1);
+            return Err(Error::input(
+                "the study",
+                "surface_sections",
+                beyond.to_string(),
+                expected,
+            ));
+        }
         if settings.objectives.len() > 1 || settings.swarm == SwarmPlace::Device {
-            let variables = front::front_problem(&setup, settings)?.problem.variables.len();
-            settings.on_device(variables)?;
+            settings.on_device(&front::front_problem(&setup, settings)?.problem)?;
         }
         Ok(setup)
     }

@@ -147,6 +147,7 @@ pub(super) fn summarise(solved: &Solved<'_, Raceline>) -> Summary {
         warnings: bridges(solved.prepared)
             .into_iter()
             .chain(unused_drs(solved.prepared))
+            .chain(three_dimensions(solved.prepared))
             .chain(warnings(outcome))
             .collect(),
     }
@@ -158,6 +159,25 @@ fn bridges(setup: &Setup) -> Vec<String> {
     crossed
         .map(|[a, b]| format!("the road crosses itself at {a:.0} m and {b:.0} m: taken as a bridge"))
         .collect()
+}
+
+/// What is left out of a road in three dimensions.
+fn three_dimensions(setup: &Setup) -> Vec<String> {
+    if setup.road.relief.is_none() {
+        return Vec::new();
+    }
+    let mut words = vec![
+        "the road has height or banking: laps are those of three dimensions, lengths and curvatures those of the map; steps of the \
+         solver of the fastest line leave out what a line gains by going up or down the banking"
+            .to_owned(),
+    ];
+    if setup.car.envelope.loads().is_empty() {
+        words.push(
+            "the table of limits was not swept under loads: on crests, in dips and on banked road its grip goes with the load"
+                .to_owned(),
+        );
+    }
+    words
 }
 
 /// A word on a DRS that opens nowhere.
@@ -258,7 +278,8 @@ pub(super) fn write_files(folder: &Path, setup: &Setup, outcome: &Outcome) -> Re
 }
 
 /// The line on its fine spline: station, place, alpha, curvature, speed, accelerations, steering, time, the gear that gives most
-/// (from 1) where there is a gearbox, and the share of the grip that is used. Where the DRS is open anywhere, 1 says where.
+/// (from 1) where there is a gearbox, and the share of the grip that is used. Where the DRS is open anywhere, 1 says where. On a road
+/// in three dimensions height, sine of the gradient, banking and load over mass follow.
 fn write_line(path: &Path, setup: &Setup, line: &ReportedLine) -> Result<()> {
     let fine = &line.fine;
     let (x, y): (Vec<f64>, Vec<f64>) = fine.points_m.iter().map(|p| (p.x, p.y)).unzip();
@@ -288,6 +309,19 @@ fn write_line(path: &Path, setup: &Setup, line: &ReportedLine) -> Result<()> {
             .chain(last)
             .map(|open| f64::from(u8::from(*open)));
         table = table.numbers("drs", "-", open.collect::<Vec<f64>>());
+    }
+    if let Some(relief) = &fine.relief {
+        let mut gradient = relief.gradient.clone();
+        // An open line ends with the gradient that leads to its end.
+        gradient.extend(relief.gradient.last().filter(|_| !fine.closed).copied());
+        table = table
+            .numbers("z", "m", &relief.z_m)
+            .numbers("gradient", "-", gradient)
+            .numbers("bank", "rad", &relief.bank_rad);
+        if let Some(lap) = &fine.lap {
+            let load: Vec<f64> = lap.forces_mps2.iter().map(|forces| forces[2]).collect();
+            table = table.numbers("load", "m/s^2", load);
+        }
     }
     table.write_csv(path)
 }

@@ -1,17 +1,18 @@
 //! What a racing-line study is asked to do.
 
 use crate::config::kinds::{
-    Choice, choice, choices, count, file, name_or_file, named, number, of, optional, switch, text, texts,
+    Choice, choice, choices, count, counts, file, name_or_file, named, number, of, optional, switch, text,
+    texts,
 };
 use crate::config::settings::{Flag, settings};
 use crate::error::{Error, Result};
-use crate::evaluate::BackendChoice;
 use crate::evaluate::line::LineObjective;
+use crate::evaluate::{BackendChoice, Problem};
 use crate::line::CarPlan;
 use crate::study::framework::memory::Size;
 use crate::study::framework::setups::{MOST_SETUPS, check_parameters};
 use crate::study::framework::{Coefficients, Mutated, Scheduled};
-use crate::swarm::{FrontSearch, Mutation, Schedule, SwarmPlace};
+use crate::swarm::{FrontSearch, MopsoSettings, Mutation, Schedule, SwarmPlace};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
@@ -63,6 +64,8 @@ settings! {
             "Greatest speed at the start of an open track";
         objectives: Vec<LineObjective> ["-"] = usual_objectives(), choices(),
             "What is minimised; more than one for a front";
+        surface_sections: Vec<u32> ["-"] = Vec::new(), counts().example("[120, 180]"),
+            "Two cross-sections, counted from 0, over whose alpha each objective is drawn; without them the sharpest bend's and the next";
         warm_start: Option<bool> ["-"] = None, optional(switch(true)).flag(Flag::Switch("no_warm_start", false)).search().example("true"),
             "Whether the swarms start from the reference optima; without it they do, but with algorithm thesis start from no known line";
         local_search: Option<bool> ["-"] = None, optional(switch(true)).flag(Flag::Switch("no_local_search", false)).search().example("true"),
@@ -96,7 +99,7 @@ settings! {
         seed: u64 ["-"] = 1, count(0, u64::MAX).search(),
             "Seed of all random numbers";
         swarm: SwarmPlace ["-"] = SwarmPlace::Auto, choice().search(),
-            "Where the particles of the front live; auto: on the device from 4096 particles on, where the backend is gpu";
+            "Where the particles of the front live; auto: on the device from 4096 particles on, where a graphics processor evaluates";
         backend: BackendChoice ["-"] = BackendChoice::Auto, choice().place(),
             "Where lines are evaluated";
         adapter: Option<String> ["-"] = None, optional(text()).place().example("\"llvmpipe\""),
@@ -107,6 +110,11 @@ settings! {
     fn consistent(&self) -> Result<()> {
         check_parameters(self.setups, &self.parameters)?;
         self.check_setups()?;
+        let two = matches!(self.surface_sections[..], [a, b] if a != b);
+        if !two && !self.surface_sections.is_empty() {
+            let found = format!("{:?}", self.surface_sections);
+            return Err(Error::input("the study", "surface_sections", found, "two different ones"));
+        }
         self.front_search().check(self.objectives.len(), self.population)?;
         let refused = match self.algorithm {
             LineAlgorithm::Thesis => Coefficients::default(),
@@ -188,24 +196,30 @@ impl RacelineSettings {
         }
     }
 
-    /// Whether the swarm for the front lives on the device, with so many variables to a particle.
+    /// The swarm that looks for the front.
+    pub(super) fn front_swarm(&self) -> MopsoSettings {
+        let mut mopso = if self.algorithm == LineAlgorithm::Thesis {
+            MopsoSettings::thesis()
+        } else {
+            MopsoSettings::default()
+        };
+        if self.algorithm == LineAlgorithm::Thesis {
+            mopso.motion = self.coefficients().apply(mopso.motion);
+        }
+        mopso.archive = self.archive;
+        mopso
+            .with_size(self.population, self.iterations)
+            .with_seed(self.seed)
+    }
+
+    /// Whether it lives on the device.
     ///
     /// # Errors
     /// [`Error::Input`] with the reason if it is asked to and cannot.
-    pub(super) fn on_device(&self, variables: usize) -> Result<bool> {
-        let several = self.islands > 1 || self.algorithm == LineAlgorithm::Nsga2;
-        if several && self.swarm == SwarmPlace::Device {
-            let found = "device, with islands or algorithm nsga2";
-            return Err(Error::input("the study", "swarm", found, "host or auto"));
-        }
-        if several || self.algorithm == LineAlgorithm::Thesis && self.swarm != SwarmPlace::Device {
-            // Its mutation is for swarms on the host; a device that is asked for is refused with that reason.
-            return Ok(false);
-        }
-        let place = (self.backend, self.adapter.as_deref());
-        let objectives = self.objectives.len();
-        Ok(self.swarm.on_device(place, self.population, objectives)?
-            && self.swarm.has_room(place.1, self.population, variables)?)
+    pub(super) fn on_device(&self, problem: &Problem) -> Result<bool> {
+        let backend = (self.backend, self.adapter.as_deref());
+        self.front_search()
+            .on_device(self.swarm, problem, &self.front_swarm(), backend)
     }
 
     /// The car from above, with the margin on every side of it.
@@ -264,6 +278,8 @@ mod tests {
             ("width = 2.0", "width"),
             ("algorithm = \"ants\"", "algorithm"),
             ("car_width_m = \"wide\"", "car_width_m"),
+            ("surface_sections = [3]", "surface_sections"),
+            ("surface_sections = [3, 3]", "surface_sections"),
             ("inertia = 0.5", "inertia"),
             ("algorithm = \"cooperative\"\nmutation = 0.5", "mutation"),
             ("algorithm = \"thesis\"\nsocial = \"much\"", "social"),

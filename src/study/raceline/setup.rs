@@ -9,7 +9,7 @@ use crate::line::{Clearance, FINE_M, FineLine, Parametrisation, PointMass, RoadE
 use crate::optimum::{ReferenceSolvers, mended};
 use crate::study::framework::Plan;
 use crate::track::{CrossSections, Spacing, Track, racetrack_csv};
-use crate::vehicle::limits::{SpeedRange, car_envelope};
+use crate::vehicle::limits::{SpeedRange, car_envelope, car_envelope_under_loads};
 use crate::vehicle::powertrain::Powertrain;
 use crate::vehicle::{Car, Envelope};
 use glam::DVec2;
@@ -83,11 +83,21 @@ pub fn set_up(settings: &RacelineSettings) -> Result<Setup> {
     let car = Car::load(&settings.car)?;
     let (envelope, car_name) = match &settings.envelope {
         Some(path) => (Envelope::load(path)?, path.display().to_string()),
-        None => (car_envelope(&car, &SpeedRange::USUAL)?.envelope, car.name.clone()),
+        None => {
+            let limits = match road.relief {
+                Some(_) => car_envelope_under_loads(&car, &SpeedRange::USUAL)?,
+                None => car_envelope(&car, &SpeedRange::USUAL)?,
+            };
+            (limits.envelope, car.name.clone())
+        }
     };
     let gearbox = car.powertrain.clone().filter(|_| settings.envelope.is_none());
     let gearbox = gearbox.map(|powertrain| (powertrain, car.chassis.radius_rear));
-    let car = point_mass(&car, envelope, settings)?;
+    let car = PointMass {
+        relief: road.relief.is_some(),
+        ..point_mass(&car, envelope, settings)?
+    };
+    car.check()?;
     Ok(Setup {
         track_name: track.name(),
         road,
@@ -233,7 +243,11 @@ impl Setup {
         let edges = RoadEdges::new(&self.edges_m[0], &self.edges_m[1], fine.closed);
         let abreast = edges.abreast(&fine.points_m);
         let given = (0..n).filter(|&i| fine.section[i].1 == 0.0);
-        racetrack_csv(given.map(|i| {
+        let relief = fine.relief.as_ref().map(|relief| -> Vec<[f64; 2]> {
+            let own = (0..n).filter(|&i| fine.section[i].1 == 0.0);
+            own.map(|i| [relief.z_m[i], relief.bank_rad[i]]).collect()
+        });
+        let rows = given.map(|i| {
             let (before, after) = if fine.closed {
                 ((i + n - 1) % n, (i + 1) % n)
             } else {
@@ -250,7 +264,8 @@ impl Setup {
                 ahead_m.filter(|_| nearest_m > 0.0).unwrap_or(nearest_m)
             };
             (point, room(-leftward, false), room(leftward, true))
-        }))
+        });
+        racetrack_csv(rows, relief.as_deref())
     }
 
     /// The gear that gives most (from 1) at each speed (m/s), of a car whose limits are its own.
@@ -317,7 +332,15 @@ impl Setup {
             self.cross_sections.closed,
             Some((&self.car, self.cross_sections.drs.as_slice())),
         );
-        let fine = FineLine::new(&points, closed, FINE_M, car, settings.entry_mps)?;
+        let relief = self.cross_sections.relief_of(&points);
+        let fine = FineLine::on(
+            &points,
+            relief.as_deref(),
+            closed,
+            FINE_M,
+            car,
+            settings.entry_mps,
+        )?;
         let edges = RoadEdges::new(&self.edges_m[0], &self.edges_m[1], closed);
         let clearance = Clearance::least(&fine, &edges.clearances(&fine, &settings.plan_with_margin()));
         Ok(ReportedLine {

@@ -80,6 +80,15 @@ pub(super) fn solve_setups(
     stop: &Arc<AtomicBool>,
     work: &mut Running<'_>,
 ) -> Result<SetupsOutcome> {
+    if setup.road.relief.is_some() {
+        let found = "set-ups on a road with height or banking";
+        return Err(Error::input(
+            "the study",
+            "setups",
+            found,
+            "a level road (flat = true)",
+        ));
+    }
     let car = Car::load(&settings.car)?;
     let free = free_parameters(&car, &settings.parameters, settings.share)?;
     let setups = setups_of(&car, &free, settings.setups.unwrap_or(0), settings.seed);

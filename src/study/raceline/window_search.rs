@@ -360,6 +360,10 @@ fn thinned(cross_sections: &CrossSections, places: &[usize]) -> CrossSections {
         left_m: places.iter().map(|&i| cross_sections.left_m[i]).collect(),
         reference: places.iter().map(|&i| cross_sections.reference[i]).collect(),
         drs: Vec::new(),
+        relief: cross_sections
+            .relief
+            .as_ref()
+            .map(|relief| relief.some(places.iter().copied())),
         ..cross_sections.clone()
     }
 }

@@ -1,6 +1,6 @@
 //! The thesis's tables, chapter by chapter: each is a study or a sweep, whose figures stand beside the published ones.
 //!
-//! Each table has a folder of its own, with the page of its study or sweep. A table that is finished is not done again, so a
+//! Each table has a folder of its own, with the page of its study or sweep. A study may read files of the tables before it. A table that is finished is not done again, so a
 //! reproduction that was interrupted goes on where it stopped.
 
 mod chapter;
@@ -12,7 +12,7 @@ pub use results::{Compared, Summary, TableSummary};
 use crate::config::kinds::Choice;
 use crate::config::read_text;
 use crate::error::{Error, Result};
-use crate::files::run_folder::{MANIFEST, STATE, SUMMARY};
+use crate::files::run_folder::{MANIFEST, SETTINGS, STATE, SUMMARY};
 use crate::report::write_whole;
 use crate::study::framework::{
     Answer, Figures, Progress, Request, TIME_LIMIT, TimeLimit, add_numbers, write_json,
@@ -168,7 +168,7 @@ pub fn reproduce(
                 observe: &mut told,
             };
             match item.task(settings.quick, &settings.on)? {
-                Task::Study(study, text) => at_work.study(study, &text, &item.name),
+                Task::Study(study, text) => at_work.study(study, &text),
                 Task::Sweep(sweep) => at_work.sweep(&sweep),
             }
         };
@@ -223,14 +223,16 @@ struct AtWork<'a> {
 
 impl AtWork<'_> {
     /// One run with its own page, unless it is there.
-    fn study(&mut self, study: &'static dyn Registered, text: &str, name: &str) -> Result<Done> {
+    fn study(&mut self, study: &'static dyn Registered, text: &str) -> Result<Done> {
         let found = self.folder.join(MANIFEST).is_file() && !self.folder.join(STATE).is_file();
         let mut failed = Vec::new();
         if !found {
             let resume = self.folder.join(STATE).is_file();
+            let file = self.folder.join(SETTINGS);
             let answer = study.run(Request {
                 file: None,
-                text: (!resume).then_some((text, Path::new(name))),
+                // Files are those of the tables before it: `../7_1_scenarios/line.csv`.
+                text: (!resume).then_some((text, &*file)),
                 flags: &[],
                 out: Some(self.folder),
                 resume,

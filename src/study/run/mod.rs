@@ -302,6 +302,7 @@ fn run_stages(
             car: car.clone(),
             road,
             lines: vec![fastest],
+            motor: None,
         };
         let (line, road) = (&driven.lines[0], &driven.road);
         let inputs = (

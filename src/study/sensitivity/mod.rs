@@ -10,14 +10,15 @@ mod sobol;
 pub use results::Summary;
 pub use sobol::{DesignOutputs, MOST_SAMPLES, MOST_VARIABLES, SobolIndex, design, indices};
 
-use crate::config::kinds::{count, number};
+use crate::config::kinds::{count, number, of};
 use crate::config::settings::{Flag, Settings, settings};
 use crate::error::{Error, Result};
-use crate::evaluate::replay::CHANNEL_NAMES;
+use crate::evaluate::replay::{CHANNEL_LABELS, CHANNEL_NAMES, CHANNEL_UNITS, trace};
 use crate::study::framework::journal::Journal;
 use crate::study::framework::memory::{ANSWER, MemoryItem, log_item};
 use crate::study::framework::{Plan, RunRecord, Solved, Study, Subject, Work};
-use crate::study::identify::{IdentifySettings, Setup, judge_candidate, planned, subject, without_laps};
+use crate::study::identify::{IdentifySettings, Setup, planned, subject, without_laps};
+use crate::study::ranges::{OwnRange, Ranges};
 use crate::study::replayed::{drive, ranges_about, replay_settings, set_up_channels, windowed};
 use rayon::prelude::*;
 use std::path::Path;
@@ -32,6 +33,8 @@ settings! {
             "Car, log, windows, norm and backend, as an identification has them; of the free parameters only the names count";
         share: f64 ["-"] = 0.05, number(1e-6, 1.0),
             "How far each parameter goes either way, as a share of its value; of its range where its value is zero";
+        ranges: Vec<OwnRange> ["-"] = Vec::new(), of(Ranges).example("{ K = [5e4, 2e5, 1e4], C = [5e3, 4e4] }"),
+            "Ranges of one's own, each [least, greatest] or [least, greatest, step]; with them these are the parameters";
         samples: usize ["-"] = 256, count(8, MOST_SAMPLES as u64),
             "Base samples of the Sobol indices; each costs as many evaluations as there are parameters, and two more";
         resamples: usize ["-"] = 400, count(8, 100_000),
@@ -39,7 +42,7 @@ settings! {
     }
 
     fn consistent(&self) -> Result<()> {
-        let count = self.replay.free.len();
+        let count = self.count();
         if !(1..=MOST_VARIABLES).contains(&count) {
             let expected = format!("1 to {MOST_VARIABLES}");
             return Err(Error::input("the study", "parameters", count.to_string(), expected));
@@ -49,10 +52,33 @@ settings! {
 }
 
 impl SensitivitySettings {
-    /// Cars that are driven: the base car, each parameter at each level, and the design of the indices.
+    /// Parameters that are moved.
+    fn count(&self) -> usize {
+        if self.ranges.is_empty() {
+            self.replay.free.len()
+        } else {
+            self.ranges.len()
+        }
+    }
+
+    /// Cars that are driven: the base car, each parameter at each of its values, and the design of the indices.
     pub fn evaluations(&self) -> usize {
-        let count = self.replay.free.len();
-        1 + count * LEVELS.len() + self.samples * (count + 2)
+        let count = self.count();
+        let values = if self.ranges.is_empty() {
+            count * LEVELS.len()
+        } else {
+            self.ranges.iter().map(|range| range.values().len()).sum()
+        };
+        1 + values + self.samples * (count + 2)
+    }
+
+    /// How far each parameter goes, in words.
+    fn reach(&self) -> String {
+        if self.ranges.is_empty() {
+            format!("{:.3} % either way", 100.0 * self.share)
+        } else {
+            "over its own range".to_owned()
+        }
     }
 }
 
@@ -70,17 +96,18 @@ pub struct OneAtATime {
     pub costs: Option<Vec<f64>>,
 }
 
-/// The least and greatest of an output at each sample, over all parameters at either end of their ranges.
-#[derive(Clone, Debug, Default)]
-pub struct Band {
-    /// Along the lap (m).
-    pub distance_m: Vec<f64>,
-    /// The base car's output, channel by channel.
-    pub base: Vec<Vec<f64>>,
-    /// The least.
-    pub low: Vec<Vec<f64>>,
-    /// The greatest.
-    pub high: Vec<Vec<f64>>,
+/// The outputs of a car at every sample: those that are compared with logs, and the roll rate, which no log has.
+pub type Outputs = [Vec<f64>; OUTPUTS];
+
+/// Outputs of a car.
+pub const OUTPUTS: usize = CHANNEL_NAMES.len() + 1;
+
+/// Name, label and unit of an output.
+pub fn output(k: usize) -> [&'static str; 3] {
+    match CHANNEL_NAMES.get(k) {
+        Some(name) => [name, CHANNEL_LABELS[k], CHANNEL_UNITS[k]],
+        None => ["roll_rate", "roll rate", "rad/s"],
+    }
 }
 
 /// The outcome of a study.
@@ -89,14 +116,14 @@ pub struct Outcome {
     pub base: Vec<f64>,
     /// The base car's costs, objective by objective.
     pub base_costs: Vec<f64>,
-    /// One at a time, parameter by parameter and [level](LEVELS) by level.
+    /// One at a time, parameter by parameter and value by value: the [levels](LEVELS), or those of its own range.
     pub one_at_a_time: Vec<OneAtATime>,
     /// The indices, objective by objective and parameter by parameter.
     pub indices: Vec<Vec<SobolIndex>>,
     /// Base samples that were left out because one of their cars did not drive.
     pub left_out: usize,
-    /// Outputs along the lap.
-    pub band: Band,
+    /// Outputs along the lap, of the base car and of the cars of `one_at_a_time`, in their order.
+    pub outputs: Vec<Outputs>,
     /// How it ran; where it was interrupted the indices are missing.
     pub record: RunRecord,
 }
@@ -115,13 +142,17 @@ impl Study for Sensitivity {
     fn prepare(settings: &SensitivitySettings) -> Result<Setup> {
         settings.validate()?;
         let replay = &settings.replay;
+        if !settings.ranges.is_empty() {
+            let own = settings.ranges.iter().map(OwnRange::free).collect();
+            return set_up_channels(replay, own);
+        }
         let names: Vec<String> = replay.free.iter().map(|f| f.name.clone()).collect();
         set_up_channels(replay, ranges_about(replay, &names, settings.share)?)
     }
 
     /// Of every sample two rows of each car in the design and its costs, and the answer in a journal.
     fn size(settings: &SensitivitySettings, prepared: Option<&Setup>) -> Vec<MemoryItem> {
-        let variables = settings.replay.free.len() as u64;
+        let variables = settings.count() as u64;
         let car = variables.saturating_mul(16).saturating_add(80 + ANSWER);
         let samples = MemoryItem::new("samples", settings.samples, car.saturating_mul(variables + 2));
         let log = prepared.map(|setup| log_item(setup.log.samples()));
@@ -173,7 +204,7 @@ impl Study for Sensitivity {
         let mut settings = SensitivitySettings::read(path)?;
         settings.replay = without_laps(&settings.replay);
         Self::prepare(&settings)?;
-        let count = settings.replay.free.len();
+        let count = settings.count();
         Ok(format!("{count} parameters, {} samples", settings.samples))
     }
 }
@@ -189,18 +220,29 @@ fn measure(work: Work<'_, Sensitivity>) -> Result<Outcome> {
     let base = replay.free.values_in(replay.free.base());
     let variables = &replay.problem.variables;
     // The base car and every parameter at every level, then the design of the indices.
-    let mut first = base.clone();
-    for (k, variable) in variables.iter().enumerate() {
-        for level in LEVELS {
+    let moved = |k: usize| -> Vec<f64> {
+        if let Some(range) = settings.ranges.get(k) {
+            return range.values();
+        }
+        let variable = &variables[k];
+        let at = |level: f64| {
             let end = if level < 0.0 {
                 variable.lower
             } else {
                 variable.upper
             };
-            let mut row = base.clone();
-            row[k] += level.abs() * (end - base[k]);
-            first.extend(row);
-        }
+            base[k] + level.abs() * (end - base[k])
+        };
+        LEVELS.map(at).to_vec()
+    };
+    let values: Vec<(usize, f64)> = (0..dimensions)
+        .flat_map(|k| moved(k).into_iter().map(move |value| (k, value)))
+        .collect();
+    let mut first = base.clone();
+    for (k, value) in &values {
+        let mut row = base.clone();
+        row[*k] = *value;
+        first.extend(row);
     }
     let shares = design(dimensions, settings.samples, settings.replay.seed);
     let within = shares.iter().zip(variables.iter().cycle());
@@ -211,11 +253,13 @@ fn measure(work: Work<'_, Sensitivity>) -> Result<Outcome> {
     let base_costs = single[0].clone().ok_or_else(|| {
         Error::Study("the base car does not drive the lap: nothing to set changes against".to_owned())
     })?;
-    let one_at_a_time = (0..dimensions * LEVELS.len())
-        .map(|i| OneAtATime {
-            parameter: i / LEVELS.len(),
-            value: first[(i + 1) * dimensions + i / LEVELS.len()],
-            costs: single[i + 1].clone(),
+    let one_at_a_time = values
+        .into_iter()
+        .zip(&single[1..])
+        .map(|((parameter, value), costs)| OneAtATime {
+            parameter,
+            value,
+            costs: costs.clone(),
         })
         .collect();
     let (indices, left_out) = if driven.interrupted() {
@@ -229,7 +273,10 @@ fn measure(work: Work<'_, Sensitivity>) -> Result<Outcome> {
         one_at_a_time,
         indices,
         left_out,
-        band: band(setup, &first, dimensions),
+        outputs: first
+            .par_chunks_exact(dimensions)
+            .map(|candidate| outputs(setup, candidate))
+            .collect(),
         record: driven.record(),
     })
 }
@@ -247,7 +294,7 @@ fn indices_of(
         .collect();
     if 2 * driven.len() < n {
         return Err(Error::Study(format!(
-            "of {n} samples only {} drive with every change: a smaller share keeps more of them on the road",
+            "of {n} samples only {} drive with every change: smaller ranges keep more of them on the road",
             driven.len()
         )));
     }
@@ -271,25 +318,19 @@ fn indices_of(
     Ok((all, n - driven.len()))
 }
 
-/// Outputs of the base car, and the least and greatest over the first rows of `candidates`, in `f64`.
-fn band(setup: &Setup, candidates: &[f64], dimensions: usize) -> Band {
+/// Outputs of a car in `f64`: not a number where windows settle, and where it does not drive.
+fn outputs(setup: &Setup, candidate: &[f64]) -> Outputs {
     let replay = &setup.replay;
-    let samples = replay.plan.samples.len();
-    let driven: Vec<[Vec<f64>; 4]> = candidates
-        .par_chunks_exact(dimensions)
-        .map(|candidate| judge_candidate(replay, candidate).outputs)
-        .collect();
-    let channel = |f: &dyn Fn(usize, usize) -> f64| -> Vec<Vec<f64>> {
-        (0..CHANNEL_NAMES.len())
-            .map(|k| (0..samples).map(|i| f(i, k)).collect())
-            .collect()
-    };
-    let folded =
-        |fold: fn(f64, f64) -> f64| channel(&|i, k| driven.iter().map(|d| d[k][i]).fold(f64::NAN, fold));
-    Band {
-        distance_m: setup.log.distance_m.clone(),
-        base: channel(&|i, k| driven[0][k][i]),
-        low: folded(f64::min),
-        high: folded(f64::max),
+    let flat = replay.flat(candidate);
+    let mut outputs = std::array::from_fn(|_| vec![f64::NAN; replay.plan.samples.len()]);
+    for window in &replay.plan.windows {
+        let driven = trace(&flat, replay.tyre_model(), &replay.plan, window);
+        let moments = driven.outputs.iter().zip(&driven.states).enumerate();
+        for (i, (channels, state)) in moments.skip(window.scored_from) {
+            for (k, value) in channels.iter().chain([&state.body.roll_rate]).enumerate() {
+                outputs[k][window.start + i] = *value;
+            }
+        }
     }
+    outputs
 }

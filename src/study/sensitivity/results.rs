@@ -1,6 +1,6 @@
 //! What a sensitivity study leaves behind.
 
-use super::{MOST_SAMPLES, Outcome, Sensitivity, SobolIndex};
+use super::{MOST_SAMPLES, OUTPUTS, Outcome, Outputs, Sensitivity, SobolIndex, output};
 use crate::error::Result;
 use crate::report::{BarPanel, Bars, Table};
 use crate::study::framework::{RunRecord, Solved};
@@ -23,6 +23,9 @@ pub struct ParameterSensitivity {
     /// Greatest change of each cost as the parameter alone goes to the ends of its range, in the cost's unit; nothing
     /// where the car then no longer drives.
     pub one_at_a_time: BTreeMap<String, Option<f64>>,
+    /// Greatest root of the mean squared change of each output as the parameter alone is moved; nothing where no car then drives.
+    #[serde(default)]
+    pub rms_change: BTreeMap<String, Option<f64>>,
     /// Its share of each cost's variance; empty if the study was interrupted.
     pub sobol: BTreeMap<String, SobolIndex>,
 }
@@ -37,8 +40,11 @@ pub struct Summary {
     /// How the study ran.
     #[serde(flatten)]
     pub record: RunRecord,
-    /// How far every parameter went, as a share of its value.
+    /// How far every parameter without a range of its own went, as a share of its value.
     pub share: f64,
+    /// The same in words, or that each has its own range.
+    #[serde(skip)]
+    pub(super) reach: String,
     /// Base samples of the indices, and how many of these were left out because a car of theirs did not drive.
     pub samples: usize,
     /// See `samples`.
@@ -100,6 +106,9 @@ pub(super) fn summarise(solved: &Solved<'_, Sensitivity>) -> Summary {
             one_at_a_time: names()
                 .zip((0..).map(|o| greatest_change(outcome, k, o)))
                 .collect(),
+            rms_change: (0..OUTPUTS)
+                .map(|o| (output(o)[0].to_owned(), greatest_rms(outcome, k, o)))
+                .collect(),
             sobol: names()
                 .zip(outcome.indices.iter().map(|indices| indices[k]))
                 .collect(),
@@ -116,6 +125,7 @@ pub(super) fn summarise(solved: &Solved<'_, Sensitivity>) -> Summary {
         seed: settings.replay.seed,
         record: outcome.record.clone(),
         share: settings.share,
+        reach: settings.reach(),
         samples: settings.samples,
         left_out: outcome.left_out,
         base_costs: names().zip(outcome.base_costs.clone()).collect(),
@@ -140,6 +150,28 @@ fn greatest_change(outcome: &Outcome, parameter: usize, objective: usize) -> Opt
             .map(|(g, c)| if c.abs() > g.abs() { c } else { g });
     }
     greatest
+}
+
+/// The greatest root of the mean squared change of an output, over the values of a parameter at which the car drives.
+fn greatest_rms(outcome: &Outcome, parameter: usize, output: usize) -> Option<f64> {
+    let [base, moved @ ..] = &outcome.outputs[..] else {
+        return None;
+    };
+    let rows = outcome.one_at_a_time.iter().zip(moved);
+    let own = rows.filter(|(row, _)| row.parameter == parameter && row.costs.is_some());
+    let rms = |outputs: &Outputs| {
+        let changes = outputs[output]
+            .iter()
+            .zip(&base[output])
+            .map(|(a, b)| (a - b).powi(2));
+        let (sum, count) = changes
+            .filter(|c| c.is_finite())
+            .fold((0.0, 0.0), |(sum, count), c| (sum + c, count + 1.0));
+        (sum / count).sqrt()
+    };
+    own.map(|(_, outputs)| rms(outputs))
+        .filter(|r| r.is_finite())
+        .reduce(f64::max)
 }
 
 impl Summary {
@@ -167,8 +199,8 @@ impl Summary {
         let doubts: String = self.warnings.iter().map(|w| format!("Note: {w}\n")).collect();
         let record = &self.record;
         format!(
-            "All channels together, each parameter {:.3}% either way:\n{table}{} evaluations in {:.1} s, {:.0}/s, {}{left}\n{}{doubts}",
-            100.0 * self.share,
+            "All channels together, each parameter {}:\n{table}{} evaluations in {:.1} s, {:.0}/s, {}{left}\n{}{doubts}",
+            self.reach,
             record.evaluations,
             record.elapsed_s,
             record.evaluations_per_s,
@@ -221,6 +253,16 @@ pub(super) fn parameter_table(summary: &Summary, cost: &str) -> Table<'static> {
         .table()
 }
 
+/// What the parameters change of each output.
+pub(super) fn output_table(summary: &Summary) -> Table<'static> {
+    let table = Table::rows(&summary.parameters).text("parameter", |p| &*p.name);
+    let each = (0..OUTPUTS).map(output);
+    let table = each.fold(table, |table, [name, label, unit]| {
+        table.number(label, unit, |p| p.rms_change[name])
+    });
+    table.table()
+}
+
 /// Most parameters that a figure has room for.
 const SHOWN: usize = 30;
 
@@ -257,9 +299,6 @@ pub(super) fn one_at_a_time_figure(summary: &Summary) -> Bars {
         let changes = shown.iter().map(|p| p.one_at_a_time[cost].unwrap_or(f64::NAN));
         BarPanel::new(&**cost, label, shown.iter().map(|p| &*p.name)).bars("", changes)
     });
-    let title = format!(
-        "One parameter at a time, {:.3}% either way",
-        100.0 * summary.share
-    );
+    let title = format!("One parameter at a time, each {}", summary.reach);
     Bars::new(title, panels.filter(BarPanel::has_bars))
 }

@@ -4,13 +4,14 @@ mod results;
 
 pub use results::Summary;
 
-use crate::config::kinds::{count, number, optional, two_texts};
+use crate::config::kinds::{count, number, of, two_texts};
 use crate::config::settings::{Settings, settings};
 use crate::error::{Error, Result};
 use crate::study::framework::journal::Journal;
 use crate::study::framework::memory::{ANSWER, MemoryItem, log_item};
 use crate::study::framework::{Plan, RunRecord, Solved, Study, Subject, Work};
-use crate::study::identify::{FreeParameter, IdentifySettings, Setup, planned, subject, without_laps};
+use crate::study::identify::{IdentifySettings, Setup, planned, subject, without_laps};
+use crate::study::ranges::{OwnRange, Ranges};
 use crate::study::replayed::{drive, ranges_about, replay_settings, set_up_channels, windowed};
 use std::path::Path;
 
@@ -21,11 +22,13 @@ settings! {
     /// Settings of a surface study.
     pub struct SurfaceSettings {
         replay: IdentifySettings ["-"] = windowed(), replay_settings(&[]),
-            "Car, log, windows, norm and backend, as an identification has them; of the free parameters only bounds are taken";
+            "Car, log, windows, norm and backend, as an identification has them";
         parameters: [String; 2] ["-"] = ["rBy1", "rCy1"].map(str::to_owned), two_texts(),
             "The horizontal and the vertical parameter; front.rBy1 is that of one axle";
-        share: Option<f64> ["-"] = Some(0.2), optional(number(1e-6, 1.0)),
+        share: f64 ["-"] = 0.2, number(1e-6, 1.0),
             "How far both go either way, as a share of their value";
+        ranges: Vec<OwnRange> ["-"] = Vec::new(), of(Ranges).example("{ rBy1 = [5.0, 30.0] }"),
+            "Ranges of their own in place of that, each [least, greatest]";
         grid: usize ["-"] = 41, count(2, 2000),
             "Values of each";
     }
@@ -58,15 +61,31 @@ impl Study for Surface {
     fn prepare(settings: &SurfaceSettings) -> Result<Setup> {
         settings.validate()?;
         let replay = &settings.replay;
-        let about = ranges_about(replay, &settings.parameters, settings.share.unwrap_or(0.2))?;
-        let bounds = |range: FreeParameter| {
-            let bounds = replay.free.iter().find(|f| f.name == range.name);
-            bounds
-                .filter(|_| settings.share.is_none())
-                .cloned()
-                .unwrap_or(range)
-        };
-        set_up_channels(replay, about.into_iter().map(bounds).collect())
+        let mut about = ranges_about(replay, &settings.parameters, settings.share)?;
+        for range in &settings.ranges {
+            let refuse = |found: &str, expected: String| {
+                Err(Error::input(
+                    "the study",
+                    format!("ranges.{}", range.name),
+                    found,
+                    expected,
+                ))
+            };
+            if range.step.is_some() {
+                return refuse(
+                    "a step",
+                    "[least, greatest]; grid says how many values there are".to_owned(),
+                );
+            }
+            match about.iter_mut().find(|free| free.name == range.name) {
+                Some(free) => *free = range.free(),
+                None => {
+                    let expected = format!("one of {}", settings.parameters.join(", "));
+                    return refuse("another parameter", expected);
+                }
+            }
+        }
+        set_up_channels(replay, about)
     }
 
     /// Of every candidate its two parameters, its costs, and the answer in a journal.
@@ -140,7 +159,7 @@ fn measure(work: Work<'_, Surface>) -> Result<Outcome> {
     let driven = drive(&settings.replay, &[&population], work)?;
     let rows = &driven.costs;
     if !driven.interrupted() && rows.iter().all(Option::is_none) {
-        let text = "no car of the grid drives the lap to its end: a smaller share, or shorter windows, keep more of them on the road";
+        let text = "no car of the grid drives the lap to its end: smaller ranges, or shorter windows, keep more of them on the road";
         return Err(Error::Study(text.to_owned()));
     }
     // Of an interrupted study nothing is told.

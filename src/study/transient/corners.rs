@@ -9,7 +9,7 @@ use super::drive::{DrivenLine, INTERVAL_S, keeps_up};
 use super::state::{CornerState, DriveState};
 use crate::drive::{Drive, DriverSettings, SpeedPlan, drive_until_lost};
 use crate::error::{Error, Result};
-use crate::line::{BySection, EnvelopeTable, FineLine, LapProfile, PointMass, lap_profile};
+use crate::line::{BySection, EnvelopeTable, FineLine, LapProfile, PointMass};
 use crate::study::framework::Progress;
 use crate::study::framework::state_file::StateFile;
 use crate::vehicle::{Car, Traction};
@@ -99,7 +99,7 @@ impl<'a> Corners<'a> {
             limits.table()
         };
         let tables = shares.iter().map(table).collect::<Result<_>>()?;
-        let fine = FineLine::new(&line.points_m, true, 1.0, None, 0.0)?;
+        let fine = FineLine::on(&line.points_m, line.relief.as_deref(), true, 1.0, None, 0.0)?;
         let (corner_of, count) = match &base.point_mass.lap {
             Some(lap) => corners_of(&lap.v_mps),
             None => (vec![0; fine.points_m.len()], 1),
@@ -122,8 +122,7 @@ impl<'a> Corners<'a> {
             tables: &self.tables,
             of: &of,
         };
-        let (segment_m, curvature_1pm) = (&self.fine.segment_m, &self.fine.curvature_1pm);
-        lap_profile(self.limits, &within, segment_m, curvature_1pm, 0.0, &self.drs)
+        self.fine.driven(self.limits, &within, 0.0, &self.drs)
     }
 
     /// The corner at a station (m).
@@ -196,7 +195,7 @@ pub(super) fn raise(
     });
     let drive = |lap: &LapProfile| {
         let plan = SpeedPlan::of_speeds(&lap.station_m, &lap.v_mps, corners.fine.length_m);
-        drive_until_lost(car, &line.circuit, plan, driver, INTERVAL_S)
+        drive_until_lost(car, &line.circuit, plan, driver, INTERVAL_S, None)
     };
     loop {
         if found.accepted {

@@ -1,13 +1,14 @@
 //! One line alone, driven in `f64` with the greatest share of the grip that is held.
 
 use super::corners::{CornerGrip, raise};
+use super::energy::Ideal;
 use super::state::DriveState;
 use super::{NamedLine, Transient, planned};
-use crate::drive::{Drive, DriverSettings, drive_planned};
+use crate::drive::{Drive, DriverSettings, MotorTorque, drive_with_motor};
 use crate::error::{Error, Result};
 use crate::evaluate::BackendInfo;
 use crate::files::run_folder::STATE;
-use crate::line::FineLine;
+use crate::line::{FineLine, PointMass};
 use crate::study::framework::{Inputs, Progress, RunRecord, Watch, Work};
 use crate::track::Circuit;
 use crate::vehicle::{Car, Envelope, Traction};
@@ -35,6 +36,8 @@ pub struct DrivenLine {
     pub corners: Vec<CornerGrip>,
     /// The quasi-steady-state lap with all of the grip (s), where corners were looked at.
     pub full_grip_s: Option<f64>,
+    /// The quasi-steady-state lap of a hybrid whose motor works.
+    pub ideal: Option<Ideal>,
     /// Laps driven for the corners.
     pub(super) drives: usize,
     /// The envelope with that share.
@@ -90,12 +93,10 @@ fn greatest_share(work: Work<'_, Transient>) -> Result<Option<DrivenLine>> {
         return Err(Error::input("the study", "line", "none", "a line to drive"));
     };
     let NamedLine {
-        points_m,
-        drs,
-        circuit,
-        ..
+        points_m, circuit, ..
     } = line;
     let parts = (car, limits, line);
+    let motor = &work.prepared.motor;
     let Work {
         settings,
         state,
@@ -107,7 +108,7 @@ fn greatest_share(work: Work<'_, Transient>) -> Result<Option<DrivenLine>> {
     // The greatest first.
     let shares: Vec<f64> = settings.shares().into_iter().rev().collect();
     let mut inputs = Inputs::new("transient");
-    inputs.add(&(car, limits, points_m, circuit, &shares));
+    inputs.add(&(car, limits, points_m, circuit, &shares, motor));
     let inputs = inputs.key();
     let mut state = match state {
         Some(state) => state.line()?,
@@ -121,10 +122,29 @@ fn greatest_share(work: Work<'_, Transient>) -> Result<Option<DrivenLine>> {
     state_file.save(&state)?;
     let traction = Traction::of(car, &limits.envelope);
     let attempt = |share: f64| -> Result<Option<DrivenLine>> {
-        let (envelope, point_mass, plan) = planned(limits, &traction, (points_m, drs), share)?;
-        let drive = drive_planned(car, circuit, plan, &driver, INTERVAL_S)?;
+        let (envelope, mut point_mass, mut plan) = planned(limits, &traction, line, share)?;
+        let ideal = match motor {
+            Some(motor) => {
+                let within = PointMass {
+                    envelope: envelope.clone(),
+                    ..limits.clone()
+                };
+                let ideal = motor.ideal(&within, Traction::of(car, &envelope), &point_mass, &line.drs)?;
+                let (lap, speeds) = ideal.profile(&point_mass);
+                (point_mass.lap, plan) = (Some(lap), speeds);
+                Some(ideal)
+            }
+            None => None,
+        };
+        let torque_nm = |station_m, speed_mps| {
+            let of = |ideal: &Ideal| ideal.torque_nm(station_m, speed_mps);
+            ideal.as_ref().map_or(0.0, of)
+        };
+        let motor = ideal.as_ref().map(|_| &torque_nm as MotorTorque<'_>);
+        let drive = drive_with_motor(car, circuit, plan, &driver, INTERVAL_S, motor)?;
         let lap_time_s = drive.lap_time_s(circuit.length_m, INTERVAL_S);
         Ok(lap_time_s.map(|lap_time_s| DrivenLine {
+            ideal,
             grip_share: share,
             corners: Vec::new(),
             full_grip_s: None,
@@ -169,6 +189,11 @@ fn greatest_share(work: Work<'_, Transient>) -> Result<Option<DrivenLine>> {
                     let off = outcome.disagreement();
                     if keeps_up(off) {
                         state.best = Some(share);
+                        // Accounts are those of a lap with one share of the grip.
+                        if outcome.ideal.is_some() {
+                            state.tried = end;
+                            return Ok(Some(outcome));
+                        }
                         return raise(
                             parts,
                             (&driver, &shares),

@@ -7,6 +7,7 @@
 
 mod corners;
 mod drive;
+mod energy;
 mod population;
 mod population_results;
 mod results;
@@ -15,6 +16,7 @@ mod state;
 
 pub use corners::CornerGrip;
 pub use drive::{AGREEMENT, DrivenLine, INTERVAL_S, keeps_up};
+pub use energy::{Accounts, EnergyFigures, Ideal, Motor};
 pub use population::{Driven, DrivenBest, PopulationOutcome, drive_problem};
 pub use population_results::{Entry, PopulationSummary};
 pub use results::LineSummary;
@@ -48,6 +50,8 @@ pub struct NamedLine {
     pub points_m: Vec<DVec2>,
     /// Whether the DRS may be open from each point to the next; nowhere if empty.
     pub drs: Vec<bool>,
+    /// Height (m) and banking (rad) at each point, on a road in three dimensions.
+    pub relief: Option<Vec<[f64; 2]>>,
     /// The line as a circuit of its own, its widths the room that the car's side has to the edges. Its DRS zones are where the
     /// quasi-steady-state lap has the flap open.
     pub circuit: Circuit,
@@ -61,12 +65,14 @@ impl NamedLine {
     pub fn new(name: String, points_m: Vec<DVec2>, road: &raceline::Setup, car_width_m: f64) -> Result<Self> {
         let drs = road.cross_sections.drs_along(&points_m);
         let car = (!drs.is_empty()).then_some((&road.car, drs.as_slice()));
-        let fine = FineLine::new(&points_m, true, 1.0, car, 0.0)?;
+        let relief = road.cross_sections.relief_along(&points_m);
+        let fine = FineLine::on(&points_m, relief.as_deref(), true, 1.0, car, 0.0)?;
         let circuit = fine.circuit(&name, &road.edges_m, car_width_m)?;
         Ok(Self {
             name,
             points_m,
             drs,
+            relief,
             circuit,
         })
     }
@@ -81,6 +87,8 @@ pub struct Prepared {
     pub road: raceline::Setup,
     /// The lines.
     pub lines: Vec<NamedLine>,
+    /// Where a hybrid's motor works.
+    pub motor: Option<Motor>,
 }
 
 /// What the study finds.
@@ -111,7 +119,9 @@ impl Study for Transient {
         Example:\n  lapswarm raceline --car-width-m 3 --out fast\n  \
         lapswarm transient --line fast/line_fastest.csv\n\nSeveral lines, or set-ups, are driven all at once, each with several \
         shares of the grip; the fastest within the edges are listed:\n  lapswarm transient --line fast/line_fastest.csv \
-        --line fast/line_shortest.csv --setups 63 --parameters aero_balance_front,front_roll_moment_share";
+        --line fast/line_shortest.csv --setups 63 --parameters aero_balance_front,front_roll_moment_share\n\nA hybrid's lap, with \
+        accounts of its energy:\n  lapswarm hybrid --car-width-m 3 --out hy\n  lapswarm transient --car gt_hybrid --line hy/line.csv \
+        --deployment hy/lap_swarm.csv";
     type Settings = TransientSettings;
     type State = TransientState;
     type Prepared = Prepared;
@@ -172,7 +182,11 @@ impl Study for Transient {
         // Figures name the lines; the track gives no more than their edges.
         head.subject.track = None;
         match solved.outcome {
-            Outcome::Line(line) => Summary::Line(Box::new(LineSummary::of(head, line))),
+            Outcome::Line(line) => {
+                let mode = solved.settings.deployment_mode;
+                let energy = results::energy_of(&solved.prepared.car, mode, line);
+                Summary::Line(Box::new(LineSummary::of(head, line, energy)))
+            }
             Outcome::Population(population) => {
                 let summary = population_results::summarise(head, solved, population);
                 Summary::Population(Box::new(summary))
@@ -248,8 +262,14 @@ fn read(settings: &TransientSettings) -> Result<Prepared> {
     let named = names_of(files).into_iter().zip(points);
     let lines = named
         .map(|(name, points)| NamedLine::new(name, points, &road, settings.car_width_m))
-        .collect::<Result<_>>()?;
-    Ok(Prepared { car, road, lines })
+        .collect::<Result<Vec<_>>>()?;
+    let motor = Motor::read(settings, &car, &road.car, &lines)?;
+    Ok(Prepared {
+        car,
+        road,
+        lines,
+        motor,
+    })
 }
 
 /// The quasi-steady-state lap within a share of the envelope's grip on a line of points (m): the envelope, the lap, and its speeds
@@ -257,7 +277,7 @@ fn read(settings: &TransientSettings) -> Result<Prepared> {
 fn planned(
     limits: &PointMass,
     traction: &Traction,
-    (points_m, drs): (&[DVec2], &[bool]),
+    line: &NamedLine,
     share: f64,
 ) -> Result<(Envelope, FineLine, SpeedPlan)> {
     let envelope = limits.envelope.with_grip_share(share, traction)?;
@@ -265,7 +285,8 @@ fn planned(
         envelope: envelope.clone(),
         ..limits.clone()
     };
-    let fine = FineLine::new(points_m, true, 1.0, Some((&point_mass, drs)), 0.0)?;
+    let driven = Some((&point_mass, line.drs.as_slice()));
+    let fine = FineLine::on(&line.points_m, line.relief.as_deref(), true, 1.0, driven, 0.0)?;
     let Some(lap) = &fine.lap else {
         return Err(Error::Study(
             "there is no quasi-steady-state lap on this line".to_owned(),

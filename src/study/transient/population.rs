@@ -67,7 +67,7 @@ pub fn drive_problem(
     prepared: &Prepared,
     mut proceed: impl FnMut() -> ControlFlow<()>,
 ) -> Result<Option<DriveProblem>> {
-    let Prepared { car, road, lines } = prepared;
+    let Prepared { car, road, lines, .. } = prepared;
     let shares = settings.shares();
     let traction = Traction::of(car, &road.car.envelope);
     let mut plans = Vec::with_capacity(lines.len());
@@ -77,9 +77,7 @@ pub fn drive_problem(
         }
         let of_line = shares
             .par_iter()
-            .map(|share| {
-                planned(&road.car, &traction, (&line.points_m, &line.drs), *share).map(|(_, _, plan)| plan)
-            })
+            .map(|share| planned(&road.car, &traction, line, *share).map(|(_, _, plan)| plan))
             .collect::<Result<Vec<_>>>()?;
         plans.push(of_line);
     }
@@ -102,7 +100,7 @@ pub fn drive_problem(
 /// [`crate::Error::Input`] for unknown parameters and if the state belongs to other inputs; those of the backend.
 pub(super) fn drive(work: Work<'_, Transient>) -> Result<Option<PopulationOutcome>> {
     let watch = Watch::begin();
-    let Prepared { car, road, lines } = work.prepared;
+    let Prepared { car, road, lines, .. } = work.prepared;
     let limits = &road.car;
     let Work {
         settings,

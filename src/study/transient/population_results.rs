@@ -148,7 +148,7 @@ fn driven_again(prepared: &Prepared, car: &Car, driven: &Driven) -> Result<Optio
     let (limits, line) = (&prepared.road.car, &prepared.lines[driven.line]);
     let traction = Traction::of(&prepared.car, &limits.envelope);
     // Every set-up has the plans and the driver of the car as it is.
-    let (.., plan) = planned(limits, &traction, (&line.points_m, &line.drs), best.grip_share)?;
+    let (.., plan) = planned(limits, &traction, line, best.grip_share)?;
     let driver = DriverSettings::racing(&prepared.car)?;
     Ok(drive_planned(car, &line.circuit, plan, &driver, INTERVAL_S).ok())
 }

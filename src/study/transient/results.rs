@@ -2,14 +2,16 @@
 
 use super::corners::CornerGrip;
 use super::drive::{DrivenLine, INTERVAL_S, keeps_up};
+use super::energy::{self, EnergyFigures};
 use crate::drive::Drive;
 use crate::error::Result;
+use crate::line::energy::{DrivenLapEnergy, Mode};
 use crate::line::{ON_ROAD_M, PointMass};
 use crate::report::{CornerLap, HtmlReport, LapLine, LapView, Road, Table, write_whole};
 use crate::study::framework::{Head, tyre_view, with_tyres};
 use crate::study::raceline::best_gears;
 use crate::track::Circuit;
-use crate::vehicle::wheels::{Moment, moments_of};
+use crate::vehicle::wheels::{Moment, moments_under};
 use crate::vehicle::{Car, CarState};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -58,10 +60,13 @@ pub struct LineSummary {
     pub full_grip_lap_time_s: Option<f64>,
     /// How far the driven lap is behind that (%).
     pub behind_full_grip_percent: Option<f64>,
+    /// The accounts of a hybrid's lap.
+    #[serde(default)]
+    pub energy: Option<EnergyFigures>,
 }
 
 impl LineSummary {
-    pub(super) fn of(head: Head, outcome: &DrivenLine) -> Self {
+    pub(super) fn of(head: Head, outcome: &DrivenLine, energy: Option<EnergyFigures>) -> Self {
         let agrees = keeps_up(outcome.disagreement());
         let rule = if agrees {
             "the greatest share of the grip at which the driven lap is half a percent behind the quasi-steady-state lap at most"
@@ -79,12 +84,16 @@ impl LineSummary {
             margin_m: outcome.margin_m,
             greatest_offset_m: outcome.drive.offset_m.iter().fold(0.0, |a, b| a.max(b.abs())),
             beyond: outcome.failures.last().map(|(_, why)| why.clone()),
-            warnings: off_road(&outcome.line).into_iter().collect(),
+            warnings: off_road(&outcome.line)
+                .into_iter()
+                .chain(energy.as_ref().and_then(EnergyFigures::doubt))
+                .collect(),
             corners: outcome.corners.clone(),
             full_grip_lap_time_s: outcome.full_grip_s,
             behind_full_grip_percent: outcome
                 .full_grip_s
                 .map(|full| 100.0 * (outcome.lap_time_s / full - 1.0)),
+            energy,
         }
     }
 
@@ -122,11 +131,12 @@ impl LineSummary {
             self.rule,
             self.greatest_offset_m,
             self.margin_m
-        ) + &self
-            .warnings
-            .iter()
-            .map(|warning| format!("Note: {warning}.\n"))
-            .collect::<String>()
+        ) + &self.energy.as_ref().map_or(String::new(), EnergyFigures::to_text)
+            + &self
+                .warnings
+                .iter()
+                .map(|warning| format!("Note: {warning}.\n"))
+                .collect::<String>()
     }
 }
 
@@ -161,7 +171,7 @@ fn corners(summary: &LineSummary) -> Table<'_> {
         .table()
 }
 
-/// Writes `drive.csv`, `corners.csv`, `envelope_driven.csv`, `speeds.svg`, `map.svg` and `report.html`.
+/// Writes `drive.csv`, `corners.csv`, `envelope_driven.csv`, `speeds.svg`, `map.svg`, `energy.svg` of a hybrid, and `report.html`.
 ///
 /// # Errors
 /// [`crate::Error::Io`] if a file cannot be written.
@@ -183,6 +193,7 @@ pub(super) fn report(
     let steer: Vec<f64> = drive.inputs.iter().map(|input| input.steer).collect();
     let time = (0..drive.states.len()).map(|i| i as f64 * INTERVAL_S);
     let moments = moments(car, drive);
+    let driven = accounts(outcome, &moments);
     let table = Table::new()
         .numbers("time", "s", time.collect::<Vec<f64>>())
         .numbers("station", "m", &drive.station_m)
@@ -199,16 +210,39 @@ pub(super) fn report(
         Some(gear) => table.numbers("gear", "-", gear),
         None => table,
     };
+    let table = match driven.as_ref().zip(outcome.ideal.as_ref()) {
+        Some((driven, ideal)) => energy::with_accounts(table, ideal, driven),
+        None => table,
+    };
     let moments: Vec<_> = moments.into_iter().map(Some).collect();
     with_tyres(table, &moments).write_csv(folder.join("drive.csv"))?;
-    write_page(folder, (car, limits), outcome, summary, &moments)
+    write_page(
+        folder,
+        (car, limits),
+        outcome,
+        summary,
+        (&moments, driven.as_ref()),
+    )
+}
+
+/// The accounts of a hybrid's lap; nothing of another car's.
+fn accounts(outcome: &DrivenLine, moments: &[Moment]) -> Option<DrivenLapEnergy> {
+    let ideal = outcome.ideal.as_ref()?;
+    Some(ideal.accounts(&outcome.drive, moments, outcome.line.length_m))
+}
+
+/// The figures of the accounts of a hybrid's lap.
+pub(super) fn energy_of(car: &Car, mode: Mode, outcome: &DrivenLine) -> Option<EnergyFigures> {
+    let ideal = outcome.ideal.as_ref()?;
+    let driven = accounts(outcome, &moments(car, &outcome.drive))?;
+    Some(EnergyFigures::of(mode, ideal, &driven))
 }
 
 /// What each wheel of the car does at each sample of a drive.
 fn moments(car: &Car, drive: &Drive) -> Vec<Moment> {
     let driven = drive.states.iter().zip(&drive.inputs);
     let driven = driven.map(|(state, input)| (CarState::from_array(*state), *input));
-    moments_of(car, &driven.collect::<Vec<_>>())
+    moments_under(car, &driven.collect::<Vec<_>>(), &drive.loads_mps2)
 }
 
 /// A drive of a line: its traces on a page, and its rows in tables by corner.
@@ -278,8 +312,11 @@ fn gears(car: &Car, v_mps: &[f64]) -> Option<Vec<f64>> {
 
 /// The share of all of the grip that the driven lap uses at each sample.
 fn grip_used(limits: &PointMass, drive: &Drive, moments: &[Moment]) -> Vec<f64> {
-    let places = drive.states.iter().zip(moments);
-    let used = places.map(|(state, moment)| limits.grip_used(state[0], [moment.ax_mps2, moment.ay_mps2]));
+    let places = drive.states.iter().zip(moments).enumerate();
+    let used = places.map(|(i, (state, moment))| match drive.loads_mps2.get(i) {
+        Some(load) => limits.grip_used_under(state[0], [moment.ax_mps2, moment.ay_mps2, *load]),
+        None => limits.grip_used(state[0], [moment.ax_mps2, moment.ay_mps2]),
+    });
     used.collect()
 }
 
@@ -288,7 +325,7 @@ fn write_page(
     (driver_car, limits): (&Car, &PointMass),
     outcome: &DrivenLine,
     summary: &LineSummary,
-    moments: &[Option<Moment>],
+    (moments, accounts): (&[Option<Moment>], Option<&DrivenLapEnergy>),
 ) -> Result<()> {
     let car = &summary.head.subject.car;
     let mut page = HtmlReport::new(&summary.head.study, &format!("A line driven by the {car}"));
@@ -336,6 +373,13 @@ fn write_page(
     if !summary.corners.is_empty() {
         let note = "Each from one greatest speed to the next. Lost is the time to the quasi-steady-state lap with all of the grip.";
         page.table("Grip by corner", note, &corners(summary))?;
+    }
+    if let (Some(figures), Some(driven), Some(ideal)) = (&summary.energy, accounts, &outcome.ideal) {
+        let note = "The motor works at the same places of both laps. The driven car's wheels slip, and its tyres drag in bends.";
+        page.section("Energy", "");
+        let view = energy::view(ideal, driven, drive);
+        page.figure(folder.join("energy.svg"), &view)?;
+        page.table("Accounts", note, &figures.table())?;
     }
     page.section("Tyres", "");
     page.place(&tyre_view(&drive.station_m, moments))?;

@@ -8,6 +8,7 @@ use crate::config::{Document, folder_of, read_text};
 use crate::error::{Error, Result};
 use crate::evaluate::BackendChoice;
 use crate::files::run_folder::SETTINGS;
+use crate::line::energy::Mode;
 use crate::study::framework::memory::{ANSWER, MemoryItem};
 use crate::study::framework::setups::{FreeParameter, MOST_SETUPS, check_parameters, free_parameters};
 use crate::study::raceline::RacelineSettings;
@@ -29,6 +30,10 @@ settings! {
             "Width of the car, all of which stays within the edges";
         grip_shares: Option<Vec<f64>> ["-"] = None, optional(numbers(0.05, 1.0)).example("[0.7, 0.8, 0.9]"),
             "Shares of the envelope's grip to drive with; without it from 0.3 on for one line alone and from 0.8 on for a population";
+        deployment: Option<PathBuf> ["-"] = None, optional(file()).example("\"lap_swarm.csv\""),
+            "A lap of the study hybrid on this line: its motor works there in the driven lap, which has accounts of energy";
+        deployment_mode: Mode ["-"] = Mode::Additional, choice(),
+            "Whether that motor adds to the engine or takes its place";
         setups: Option<usize> ["-"] = None, optional(count(0, MOST_SETUPS as u64)).example("63"),
             "Set-ups of the car to drive beside the car as it is";
         parameters: Vec<String> ["-"] = ["front_roll_moment_share", "aero_balance_front"].map(str::to_owned).to_vec(), texts(),
@@ -105,6 +110,10 @@ impl TransientSettings {
         let usual = Self::default();
         if self.setups.is_none() && (&self.parameters, self.share) != (&usual.parameters, usual.share) {
             return refuse("setups", "none", "how many set-ups move the parameters");
+        }
+        if self.is_population() && self.deployment.is_some() {
+            let found = "several lines or set-ups";
+            return refuse("deployment", found, "one line alone for a hybrid's lap");
         }
         let elsewhere = matches!(self.backend, BackendChoice::Simd | BackendChoice::Gpu);
         if !self.is_population() && (elsewhere || self.adapter.is_some()) {

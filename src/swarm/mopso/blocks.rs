@@ -1,5 +1,5 @@
-//! Particles in blocks of lanes, and how they move. Twin of `shaders/swarm.wgsl`: the same functions in the same
-//! order, with the same operations.
+//! Particles in blocks of lanes, and how they move. Twin of `shaders/swarm.wgsl`, with the same operations. The kernel moves a
+//! particle in one pass over its coordinates, for memory's sake; lanes take the few difference moves and mutations one by one.
 //!
 //! Positions and velocities are single precision: a coordinate in the unit cube is known to 6e-8 of its range.
 //! Every loop over the lanes of a block is plain arithmetic without branches, which the compiler turns into vector

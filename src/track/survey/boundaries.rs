@@ -114,6 +114,9 @@ pub(super) fn survey(left: &Edge, right: &Edge, path: &Path, options: &SurveyOpt
         corners: Vec::new(),
         drs_zones_m: Vec::new(),
         bridges: options.bridges,
+        z_m: Vec::new(),
+        bank_deg: Vec::new(),
+        height_gap_m: 0.0,
     };
     survey.check()?;
     Ok(survey)

@@ -1,5 +1,6 @@
 //! Surveys in columns of numbers.
 
+use super::super::relief::{HEIGHTS_M, STEEPEST_BANK_DEG};
 use super::check::FURTHEST_M;
 use super::geographic::{self, Fix};
 use super::{MOST_POINTS, Raw, WIDEST_M};
@@ -34,9 +35,11 @@ enum Column {
     LeftY,
     RightX,
     RightY,
+    Height,
+    Bank,
 }
 
-const NAMES: [(&str, Column); 18] = [
+const NAMES: [(&str, Column); 20] = [
     ("x_m", Column::X),
     ("y_m", Column::Y),
     ("latitude_deg", Column::Latitude),
@@ -55,6 +58,8 @@ const NAMES: [(&str, Column); 18] = [
     ("left_y_m", Column::LeftY),
     ("right_x_m", Column::RightX),
     ("right_y_m", Column::RightY),
+    ("z_m", Column::Height),
+    ("bank_deg", Column::Bank),
 ];
 
 /// The name of a column as the header spells it, shortened for messages.
@@ -149,6 +154,15 @@ pub(super) fn read(text: &str, path: &Path) -> Result<Content> {
         .both(Column::LeftX, Column::LeftY)
         .zip(table.both(Column::RightX, Column::RightY));
     if let Some((left, right)) = edges {
+        let relief = table.index(Column::Height).or(table.index(Column::Bank));
+        if let Some(at) = relief {
+            return Err(Error::input(
+                path,
+                Place::from("header").named(format!("column {}", at + 1)),
+                "height or banking beside two edges",
+                "a line with x_m,y_m, widths and z_m or bank_deg",
+            ));
+        }
         return read_edges(&table, rows, left, right);
     }
     let plane = table.both(Column::X, Column::Y);
@@ -222,6 +236,7 @@ fn read_line<'a>(
 ) -> Result<Raw> {
     let sides = table.both(Column::LeftWidth, Column::RightWidth);
     let whole = table.index(Column::Width);
+    let (height, bank) = (table.index(Column::Height), table.index(Column::Bank));
     let mut raw = Raw::default();
     let mut fixes = Vec::new();
     let (mut left, mut right) = (Vec::new(), Vec::new());
@@ -242,6 +257,13 @@ fn read_line<'a>(
             });
         }
         raw.lines.push(line);
+        if let Some(height) = height {
+            raw.z_m.push(cell(height, HEIGHTS_M.0, HEIGHTS_M.1)?);
+        }
+        if let Some(bank) = bank {
+            raw.bank_deg
+                .push(cell(bank, -STEEPEST_BANK_DEG, STEEPEST_BANK_DEG)?);
+        }
         if let Some([l, r]) = sides {
             left.push(cell(l, 0.0, WIDEST_M)?);
             right.push(cell(r, 0.0, WIDEST_M)?);

@@ -9,6 +9,8 @@
 //! - GPX (`trk` or `rte`) and KML (`LineString`, `LinearRing` or `gx:Track`);
 //! - a telemetry log with GPS, of which one lap becomes the line.
 //!
+//! Tables of lines may have a height, `z_m`, and a banking, `bank_deg`; GPX and KML have heights where all their points do.
+//!
 //! Geographic coordinates are projected onto the plane that touches the WGS 84 ellipsoid at the middle of the line.
 
 mod boundaries;
@@ -23,6 +25,7 @@ mod tests;
 mod xml;
 
 use super::circuit::{Corner, Section};
+use super::relief::Given;
 use crate::config::read_bytes;
 use crate::{Error, Place, Result};
 use glam::DVec2;
@@ -46,6 +49,8 @@ pub struct SurveyOptions {
     pub lap: Option<u32>,
     /// How many times the line may cross itself, as at the bridge of a figure of eight.
     pub bridges: usize,
+    /// Whether height and banking are left out.
+    pub flat: bool,
 }
 
 /// A surveyed line with the distances to both edges of the road.
@@ -73,6 +78,12 @@ pub struct Survey {
     pub drs_zones_m: Vec<[f64; 2]>,
     /// How many times the line may cross itself.
     pub bridges: usize,
+    /// Height of the line at each point (m); empty where it is not known.
+    pub z_m: Vec<f64>,
+    /// Banking at each point (degrees about the direction of driving, the left side up); empty where it is not known.
+    pub bank_deg: Vec<f64>,
+    /// Gap in height between end and start of a closed line, which is spread over its length already (m).
+    pub height_gap_m: f64,
 }
 
 /// A line as read: points of a plane or of the globe, with the widths that the file gives.
@@ -82,6 +93,9 @@ struct Raw {
     lines: Vec<usize>,
     /// Left and right widths, as many as points, or none.
     widths: Option<(Vec<f64>, Vec<f64>)>,
+    /// Heights (m) and banking (degrees), as many as points, or none.
+    z_m: Vec<f64>,
+    bank_deg: Vec<f64>,
     name: Option<String>,
 }
 
@@ -152,6 +166,10 @@ fn stem(path: &Path) -> String {
 
 /// Closes the line or leaves it open, adds widths and checks the whole.
 fn assemble(mut raw: Raw, path: &Path, options: &SurveyOptions) -> Result<Survey> {
+    if options.flat {
+        raw.z_m.clear();
+        raw.bank_deg.clear();
+    }
     let closed = check::close(&mut raw.points, &raw.lines, path, options.closed)?;
     let n = raw.points.len();
     let (mut left_m, mut right_m) = match (raw.widths, options.width_m) {
@@ -170,6 +188,18 @@ fn assemble(mut raw: Raw, path: &Path, options: &SurveyOptions) -> Result<Survey
     left_m.truncate(n);
     right_m.truncate(n);
     raw.lines.truncate(n);
+    raw.bank_deg.truncate(n);
+    let mut heights = Given {
+        z_m: raw.z_m,
+        ..Given::default()
+    };
+    if closed {
+        let mut station_m = vec![0.0];
+        for i in 1..=n {
+            station_m.push(station_m[i - 1] + raw.points[i % n].distance(raw.points[i - 1]));
+        }
+        heights.close(&path.display().to_string(), n, &station_m, station_m[n])?;
+    }
     let survey = Survey {
         name: raw.name.unwrap_or_else(|| stem(path)),
         source: path.display().to_string(),
@@ -182,6 +212,9 @@ fn assemble(mut raw: Raw, path: &Path, options: &SurveyOptions) -> Result<Survey
         corners: Vec::new(),
         drs_zones_m: Vec::new(),
         bridges: options.bridges,
+        z_m: heights.z_m,
+        bank_deg: raw.bank_deg,
+        height_gap_m: heights.gap_m,
     };
     survey.check()?;
     Ok(survey)

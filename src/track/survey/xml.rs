@@ -1,5 +1,6 @@
 //! GPX 1.0 and 1.1, and KML 2.2.
 
+use super::super::relief::HEIGHTS_M;
 use super::csv_columns::bounded;
 use super::geographic::{self, Fix};
 use super::{MOST_POINTS, Raw};
@@ -14,6 +15,8 @@ struct Reader<'a> {
     path: &'a Path,
     text: &'a str,
     fixes: Vec<Fix>,
+    /// Heights (m) of the points that have one.
+    heights: Vec<f64>,
     /// Byte of the text where each point stands.
     offsets: Vec<usize>,
 }
@@ -33,6 +36,7 @@ pub(super) fn read(text: &str, path: &Path) -> Result<Raw> {
         path,
         text,
         fixes: Vec::new(),
+        heights: Vec::new(),
         offsets: Vec::new(),
     };
     let root = document.root_element();
@@ -128,7 +132,10 @@ impl Reader<'_> {
 
     fn gpx_point(&mut self, point: Node<'_, '_>) -> Result<()> {
         let degrees = |name: &str| point.attribute(name).unwrap_or_default();
-        self.push(point, point.range().start, degrees("lat"), degrees("lon"))
+        self.push(point, point.range().start, degrees("lat"), degrees("lon"))?;
+        let height = children(point, "ele").next().and_then(|e| e.text());
+        self.height(height.unwrap_or_default());
+        Ok(())
     }
 
     fn kml(&mut self, root: Node<'_, '_>) -> Result<Option<String>> {
@@ -169,7 +176,17 @@ impl Reader<'_> {
     ) -> Result<()> {
         let longitude = parts.next().unwrap_or_default();
         let latitude = parts.next().unwrap_or_default();
-        self.push(node, offset, latitude, longitude)
+        self.push(node, offset, latitude, longitude)?;
+        self.height(parts.next().unwrap_or_default());
+        Ok(())
+    }
+
+    /// The height of the point that was read last, if it has one. Others cannot do without it.
+    fn height(&mut self, text: &str) {
+        let height = text.trim().parse::<f64>().ok();
+        let (low, high) = HEIGHTS_M;
+        self.heights
+            .extend(height.filter(|height| (low..=high).contains(height)));
     }
 
     fn finish(self, name: Option<String>) -> Result<Raw> {
@@ -192,6 +209,12 @@ impl Reader<'_> {
             lines,
             widths: None,
             name,
+            z_m: if self.heights.len() == self.fixes.len() {
+                self.heights
+            } else {
+                Vec::new()
+            },
+            bank_deg: Vec::new(),
         })
     }
 }

@@ -196,6 +196,8 @@ pub struct DriveShape<'a> {
     pub cells_ahead: usize,
     /// Whether there are plans to blend.
     pub blends: bool,
+    /// Of roads in three dimensions, the first vector of height and banking in the table of paths.
+    pub relief_at: Option<usize>,
 }
 
 impl DriveShape<'_> {
@@ -207,9 +209,42 @@ impl DriveShape<'_> {
             .count("STRETCHES", self.stretches)
             .float("ROWS_AHEAD", self.rows_ahead)
             .float("CELLS_AHEAD", self.cells_ahead)
-            .flag("BLENDS", self.blends);
-        self.car.trajectories(constants, &[PATH, DRIVER, DRIVE])
+            .flag("BLENDS", self.blends)
+            .flag("HAS_RELIEF", self.relief_at.is_some())
+            .count("RELIEF_AT", self.relief_at.unwrap_or(0));
+        let hilly = self.relief_at.is_some();
+        // A car whose figures are loaded where they are used has its gravity from a variable.
+        let by_axle = hilly && self.car.wheels == WheelOrder::ByAxle;
+        let under_load = if by_axle {
+            "var<private> felt_gravity: f32;\n\nfn under_load(car: CarModel, load: f32) -> CarModel {\n    felt_gravity = load;\n    \
+             return car;\n}\n\n"
+        } else if hilly {
+            "fn under_load(car: CarModel, load: f32) -> CarModel {\n    var loaded = car;\n    loaded.chassis.gravity = load;\n    \
+             return loaded;\n}\n\n"
+        } else {
+            "fn under_load(car: CarModel, load: f32) -> CarModel {\n    return car;\n}\n\n"
+        };
+        let source = self
+            .car
+            .trajectories(constants, &[PATH, DRIVER, under_load, DRIVE]);
+        if by_axle {
+            with_felt_gravity(&source)
+        } else {
+            source
+        }
     }
+}
+
+/// The source with the variable in the place where the chassis' gravity is loaded.
+fn with_felt_gravity(source: &str) -> String {
+    let lines = source.lines().map(|line| {
+        if line.ends_with(" // gravity") {
+            "        felt_gravity, // gravity"
+        } else {
+            line
+        }
+    });
+    lines.flat_map(|line| [line, "\n"]).collect()
 }
 
 /// What a line kernel is specialised to.
@@ -231,6 +266,8 @@ pub struct LineShape {
     pub traction: bool,
     /// Whether the limits with the DRS open follow those with it shut.
     pub drs: bool,
+    /// Of a road in three dimensions, how many tables of limits under loads follow those of the weight.
+    pub relief: Option<usize>,
     /// Cross-sections, if their table is to be uniform.
     pub uniform_sections: Option<usize>,
     /// Whether the tables of limits, of corner speeds and of the ellipse are to be uniform.
@@ -250,7 +287,8 @@ impl LineShape {
         } else {
             0
         };
-        let limits = 2 * self.envelope_rows + cells;
+        let of_load = 2 * self.envelope_rows + cells;
+        let limits = of_load * (1 + self.relief.unwrap_or(0));
         let generated = Generated::new()
             .flag("CLOSED", self.closed)
             .count("TERMS", self.terms)
@@ -264,6 +302,10 @@ impl LineShape {
             .count("TRACTION_ROOTS", TRACTION_ROOTS)
             .flag("HAS_DRS", self.drs)
             .count("OPEN_AT", limits)
+            .flag("HAS_RELIEF", self.relief.is_some())
+            .count("LOADS", self.relief.unwrap_or(2))
+            .count("LOADS_AT", of_load)
+            .count("LOAD_STEP", of_load)
             .count("WORKGROUP", self.workgroup)
             .count("TILE", self.tile)
             .table(1, "sections", "Section", self.uniform_sections)

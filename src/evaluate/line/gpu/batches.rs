@@ -1,9 +1,11 @@
 //! Lines on a device, a batch at a time: what the kernels of lines and of laps with energy have in common.
 
+use super::exchange::Exchange;
 use super::tables::LineTables;
 use crate::error::{Error, Result};
 use crate::evaluate::gpu::{Batching, Binding, DeviceKind, GpuContext, Kernel, LanePacing};
 use crate::line::{EnvelopeTable, LinePlan};
+use crate::vehicle::powertrain::GRAVITY_MPS2;
 use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -29,6 +31,20 @@ pub struct LineStretch {
     pub rows_per_speed_squared: f32,
     /// Rows of corner speeds per radius, 1/m.
     pub rows_per_radius: f32,
+    /// Of roads in three dimensions: load over mass of the first table of limits, m/s^2.
+    pub load_first: f32,
+    /// Tables of limits per load over mass, s^2/m.
+    pub tables_per_load: f32,
+    /// The least load that is told from others, in tables.
+    pub load_least: f32,
+    /// The greatest load that is told from others, in tables.
+    pub load_most: f32,
+    /// Radius on the steering lock, m.
+    pub lock_radius: f32,
+    /// Gravity, m/s^2.
+    pub gravity: f32,
+    /// Not used.
+    pub spare: [u32; 2],
 }
 
 impl LineStretch {
@@ -43,6 +59,13 @@ impl LineStretch {
             entry: plan.entry,
             rows_per_speed_squared: envelope.rows_per_speed_squared,
             rows_per_radius: envelope.rows_per_radius,
+            load_first: envelope.loads.first,
+            tables_per_load: envelope.loads.per_load,
+            load_least: envelope.loads.least,
+            load_most: envelope.loads.most,
+            lock_radius: envelope.loads.lock_radius,
+            gravity: GRAVITY_MPS2 as f32,
+            spare: [0; 2],
         }
     }
 }
@@ -62,8 +85,9 @@ pub(in crate::evaluate) struct LineKernel<'k> {
     pub lap: bool,
 }
 
-/// Floats per candidate and section in the course: length and curvature.
+/// Floats per candidate and section in the course: length and curvature, and on a road in three dimensions four more.
 const COURSE_WIDTH: usize = 2;
+const RELIEF_WIDTH: usize = 6;
 /// Sections of all lines of the first dispatch: tens of milliseconds on a software driver.
 const FIRST: usize = 1 << 17;
 
@@ -90,6 +114,8 @@ pub(in crate::evaluate) struct LineBatches<const FIGURES: usize> {
     variables: usize,
     /// Sections whose course is kept: none where no laps are driven.
     sections: usize,
+    /// Floats per candidate and section in the course.
+    course_width: usize,
     batch: Option<BatchBuffers>,
     pacing: LanePacing,
     longest_ms: f64,
@@ -116,7 +142,7 @@ impl<const FIGURES: usize> LineBatches<FIGURES> {
                 context.summary(),
             )));
         }
-        let kernel = context.kernel(parts.source, parts.entry, &bindings)?;
+        let kernel = context.own_kernel(parts.source, parts.entry, &bindings)?;
         let stretch = context.buffer(
             "stretch",
             size_of::<LineStretch>() as u64,
@@ -139,6 +165,11 @@ impl<const FIGURES: usize> LineBatches<FIGURES> {
             others,
             variables: parts.variables,
             sections: if parts.lap { sections } else { 0 },
+            course_width: if parts.tables.shape.relief.is_some() {
+                RELIEF_WIDTH
+            } else {
+                COURSE_WIDTH
+            },
             batch: None,
             pacing: LanePacing::new(FIRST / sections.max(1)),
             longest_ms: 0.0,
@@ -171,7 +202,9 @@ impl<const FIGURES: usize> LineBatches<FIGURES> {
     /// The most candidates of one batch.
     pub fn batch_size(&self) -> usize {
         let device = self.context.limits();
-        let planes = (COURSE_WIDTH * self.sections).max(self.variables).max(FIGURES);
+        let planes = (self.course_width * self.sections)
+            .max(self.variables)
+            .max(FIGURES);
         let bytes = self
             .batching
             .bytes
@@ -184,10 +217,7 @@ impl<const FIGURES: usize> LineBatches<FIGURES> {
     }
 
     /// Makes room for a batch of `candidates`.
-    ///
-    /// # Errors
-    /// [`Error::Device`] if the device has too little memory.
-    pub fn reserve(&mut self, candidates: usize) -> Result<()> {
+    fn reserve(&mut self, candidates: usize) -> Result<()> {
         let stride = candidates.next_multiple_of(self.workgroup);
         if self.batch.as_ref().is_some_and(|b| b.stride >= stride) {
             return Ok(());
@@ -202,7 +232,7 @@ impl<const FIGURES: usize> LineBatches<FIGURES> {
             Usage::STORAGE | Usage::COPY_DST,
         )?;
         let speeds = context.buffer("speeds", bytes(self.sections), Usage::STORAGE)?;
-        let course = context.buffer("course", bytes(COURSE_WIDTH * self.sections), Usage::STORAGE)?;
+        let course = context.buffer("course", bytes(self.course_width * self.sections), Usage::STORAGE)?;
         let results = context.buffer("results", bytes(FIGURES), Usage::STORAGE | Usage::COPY_SRC)?;
         let readback = context.buffer("readback", bytes(FIGURES), Usage::MAP_READ | Usage::COPY_DST)?;
         let mut bound = vec![&self.stretch];
@@ -226,20 +256,33 @@ impl<const FIGURES: usize> LineBatches<FIGURES> {
             .ok_or_else(|| Error::Device("a batch without buffers".to_owned()))
     }
 
-    /// Distance between the rows of a batch, its variables and its results.
-    ///
-    /// # Errors
-    /// [`Error::Device`] before any batch was reserved.
-    pub fn rows(&self) -> Result<(usize, &wgpu::Buffer, &wgpu::Buffer)> {
-        let batch = self.buffers()?;
-        Ok((batch.stride, &batch.variables, &batch.results))
-    }
-
-    /// Scores one batch, whose figures are on the device.
+    /// Writes the objectives of particles that live on the device.
     ///
     /// # Errors
     /// [`Error::Device`] if the device fails.
-    pub fn score_batch(&mut self, candidates: usize) -> Result<()> {
+    pub fn score_resident(
+        &mut self,
+        exchange: &Exchange,
+        particles: usize,
+        position: &wgpu::Buffer,
+        objectives: &wgpu::Buffer,
+    ) -> Result<()> {
+        let most = self.batch_size();
+        for first in (0..particles).step_by(most) {
+            let candidates = (particles - first).min(most);
+            self.reserve(candidates)?;
+            let batch = self.buffers()?;
+            let part = [first, candidates, batch.stride];
+            exchange.take(&self.context, part, position, &batch.variables)?;
+            self.score_batch(candidates)?;
+            let batch = self.buffers()?;
+            exchange.give(&self.context, part, &batch.results, objectives)?;
+        }
+        Ok(())
+    }
+
+    /// Scores one batch, whose figures are on the device.
+    fn score_batch(&mut self, candidates: usize) -> Result<()> {
         let most_groups = self.context.limits().max_compute_workgroups_per_dimension as usize;
         let mut first = 0;
         while first < candidates {

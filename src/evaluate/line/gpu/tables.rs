@@ -14,6 +14,8 @@ const SOFTWARE_TILE: u32 = 8;
 /// Rounds of all loops of a kernel for each section, at the most: three of the shape's, two laps of either pass and one of the
 /// times; with energy, the run-in and its two laps besides.
 const ROUNDS_PER_SECTION: usize = 10;
+/// The same of a road in three dimensions: one more of the shape, and those of the corner speed.
+const RELIEF_ROUNDS: usize = 14;
 
 /// One section on the device. Twin of `Section` in `shaders/line.wgsl`.
 #[repr(C)]
@@ -39,7 +41,8 @@ pub struct DeviceSection {
 
 impl DeviceSection {
     /// The sections of a plan.
-    fn all_of(rows: &[SectionRow<f32>]) -> Vec<Self> {
+    fn all_of(plan: &LinePlan<f32>) -> Vec<Self> {
+        let rows: &[SectionRow<f32>] = &plan.rows;
         let mut sections: Vec<Self> = rows
             .iter()
             .map(|row| Self {
@@ -60,6 +63,12 @@ impl DeviceSection {
                 i as u32
             };
         }
+        // Height and banking stand behind all of them.
+        let relief = plan.relief.iter().map(|row| Self {
+            weights: [row.step_rise, row.across_rise, row.sin, row.cos],
+            ..Self::zeroed()
+        });
+        sections.extend(relief);
         sections
     }
 }
@@ -85,7 +94,7 @@ impl LineTables {
         let device = context.limits();
         let software = context.summary().kind == DeviceKind::Software;
         let workgroup = workgroup(context);
-        let sections = DeviceSection::all_of(&plan.rows);
+        let sections = DeviceSection::all_of(plan);
         // Two figures to a row; uniform rows are of four.
         let rows_of_four = |table: &[f32]| -> Vec<f32> {
             table
@@ -104,11 +113,28 @@ impl LineTables {
             .as_deref()
             .filter(|_| plan.rows.iter().any(|row| row.drs));
         let states = [Some(envelope), open].into_iter().flatten();
-        let limits: Vec<f32> = states
-            .flat_map(|state| [state.rows.as_slice(), &state.traction].concat())
-            .collect();
+        let mut limits = Vec::new();
+        for state in states {
+            limits.extend([state.rows.as_slice(), &state.traction].concat());
+            // Under each load the rows, then the cells.
+            let loads = &state.loads;
+            if plan.relief.is_empty() || loads.tables == 0 {
+                continue;
+            }
+            let (rows, cells) = (
+                loads.rows.len() / loads.tables,
+                loads.traction.len() / loads.tables,
+            );
+            for table in 0..loads.tables {
+                limits.extend_from_slice(&loads.rows[table * rows..(table + 1) * rows]);
+                limits.extend_from_slice(&loads.traction[table * cells..(table + 1) * cells]);
+            }
+        }
+        let relief = (!plan.relief.is_empty() && wanted.lap).then_some(envelope.loads.tables);
+        let device_sections = sections.len();
         let sections: &[u8] = bytemuck::cast_slice(&sections);
-        let most = LOOP_ROUNDS / ROUNDS_PER_SECTION;
+        let more = if relief.is_some() { RELIEF_ROUNDS } else { 0 };
+        let most = LOOP_ROUNDS / (ROUNDS_PER_SECTION + more);
         if software && plan.rows.len() > most {
             return Err(Error::Device(format!(
                 "{} limits the length of loops: it can evaluate at most {most} cross-sections, {} are needed",
@@ -132,7 +158,8 @@ impl LineTables {
             ellipse_rows,
             traction: !envelope.traction.is_empty(),
             drs: open.is_some(),
-            uniform_sections: uniform_sections.then_some(plan.rows.len()),
+            relief,
+            uniform_sections: uniform_sections.then_some(device_sections),
             uniform_envelope,
             workgroup,
             // A card's neighbouring lanes, however many, read together.

@@ -1,6 +1,7 @@
 //! Figures of laps, energies and engine sites.
 
 use super::reported_laps;
+use crate::config::kinds::Choice;
 use crate::line::energy::SegmentEnergy;
 use crate::report::{Curves, LapLine, LapView, Panel, Road, SiteMap, TrackMap};
 use crate::study::hybrid::{HybridSetup, HybridStudySettings, Outcome, ReportedLap, StrategyFront, Worth};
@@ -72,6 +73,10 @@ pub fn laps(outcome: &Outcome, laps: &[&ReportedLap], title: String) -> LapView 
             .trace(7, summed(lap, |s| s.harvested_k / 1e6))
             .trace(8, summed(lap, |s| s.harvested_h / 1e6))
             .trace(9, soc)
+            .trace(
+                10,
+                summed(lap, |s| (s.deployed - s.harvested_k - s.harvested_h) / 1e6),
+            )
     };
     let rules = setup.car.hybrid.rules.deployed_on(setup.length_m);
     let allowed = rules.map(|j| {
@@ -90,6 +95,7 @@ pub fn laps(outcome: &Outcome, laps: &[&ReportedLap], title: String) -> LapView 
         .panel("MGU-K in", "MJ")
         .panel("MGU-H in", "MJ")
         .panel("state of charge", "")
+        .panel("net energy out", "MJ")
         .lines(laps.iter().map(line))
         .lines(allowed)
         .road(road(setup))
@@ -193,6 +199,25 @@ pub fn engine_sites(setup: &HybridSetup, alone: &ReportedLap, lap: &ReportedLap)
         value_unit: "g/kWh".to_owned(),
         sites: vec![("engine alone".to_owned(), alone), (words(lap), hybrid)],
     })
+}
+
+/// Where the motor works by speed and acceleration, a panel for each lap with a motor.
+pub fn motor_on(outcome: &Outcome) -> Curves {
+    let panel = |lap: &&ReportedLap| {
+        let dots = |on: bool| {
+            let rows = lap.segments.iter().zip(&lap.length_m).step_by(THINNED);
+            let rows = rows.filter(move |(s, _)| (s.deployed > 0.0) == on);
+            rows.map(|(s, h)| ((0.5 * (s.start + s.end)).sqrt(), (s.end - s.start) / (2.0 * h)))
+        };
+        Panel::new(format!("{} ({})", words(lap), lap.mode.name()))
+            .x("speed", "m/s")
+            .y("acceleration", "m/s^2")
+            .dots("motor off", dots(false))
+            .dots("motor on", dots(true))
+    };
+    let laps = reported_laps(outcome);
+    let with_motor = laps.iter().filter(|lap| lap.lap.deployed > 0.0);
+    Curves::new("Where the motor works", with_motor.map(panel).collect::<Vec<_>>())
 }
 
 /// Time against energy: the exact optima, the swarm's lap, the scenarios with the motor beside the engine.

@@ -1,10 +1,10 @@
 //! The interactive report of a hybrid study, with its figures.
 
-use super::{HybridSummary, ScenarioFigures, figures, reported_laps, sizing_in_words};
+use super::{HybridSummary, ScenarioFigures, SearchFigures, Site, figures, reported_laps, sizing_in_words};
 use crate::config::settings::Settings;
 use crate::error::Result;
 use crate::files::stem;
-use crate::report::{Figure, Front, HtmlReport, Table};
+use crate::report::{Figure, Front, HtmlReport, Table, significant};
 use crate::study::framework::Solved;
 use crate::study::hybrid::{Hybrid, Outcome, ReportedLap, StintLap};
 use std::path::Path;
@@ -30,6 +30,19 @@ pub fn write(folder: &Path, solved: &Solved<'_, Hybrid>, summary: &HybridSummary
             "Added: by the same gates with the motor beside the engine.",
             &scenarios_table(summary),
         )?;
+    }
+    let motor = figures::motor_on(outcome);
+    if !motor.is_empty() {
+        page.figure(folder.join("motor_on.svg"), &motor)?;
+    }
+    if let Some(d) = summary.deployment.as_ref().filter(|d| !d.sites.is_empty()) {
+        let note =
+            "Where the swarm deploys. The allocation factor is a site's share of all that leaves the store.";
+        page.table("Sites", note, &sites_table(&d.sites))?;
+    }
+    if !summary.searches.is_empty() {
+        let note = "Zones and gates that swarms set: for the least lap time beside the engine, for the least fuel in its place.";
+        page.table("Further searches", note, &searches_table(summary))?;
     }
     if let Some(figure) = figures::time_energy(outcome) {
         page.section(
@@ -133,6 +146,41 @@ pub fn scenarios_table(summary: &HybridSummary) -> Table<'static> {
         .number("motor on", "% of time", of(|s| 100.0 * s.motor_time_share))
         .number("fuel", "l", of(|s| s.fuel_l))
         .number("balance error", "J", of(|s| s.balance_error_j))
+        .number("least charge", "-", of(|s| s.soc_least))
+        .number("net out", "MJ", of(|s| s.net_deployed_mj))
+        .number("fuel of the engine alone", "%", of(|s| s.fuel_percent))
+        .table()
+}
+
+/// The stretches on which the motor works.
+pub fn sites_table(sites: &[Site]) -> Table<'static> {
+    Table::rows(sites.iter().enumerate())
+        .number("site", "", |(i, _)| (i + 1) as f64)
+        .number("from", "m", |(_, s)| s.start_m)
+        .number("to", "m", |(_, s)| s.end_m)
+        .number("out", "MJ", |(_, s)| s.deployed_mj)
+        .number("allocation factor", "-", |(_, s)| s.allocation)
+        .table()
+}
+
+/// What the further searches found.
+pub fn searches_table(summary: &HybridSummary) -> Table<'static> {
+    let of = |f: fn(&SearchFigures) -> f64| move |(_, s): &(&String, &SearchFigures)| f(s);
+    Table::rows(&summary.searches)
+        .text("search", |(name, _)| name.replace('_', " "))
+        .number("lap", "s", of(|s| s.lap_time_s))
+        .number("out", "MJ", of(|s| s.deployed_mj))
+        .number("charge at the end", "-", of(|s| s.soc_end))
+        .number("motor on", "% of time", of(|s| 100.0 * s.motor_time_share))
+        .number("fuel", "l", of(|s| s.fuel_l))
+        .number("fuel of the engine alone", "%", of(|s| s.fuel_percent))
+        .text("set to", |(_, s)| {
+            let set = s.variables.iter().filter(|(name, _)| !name.starts_with("zone"));
+            let set: Vec<String> = set
+                .map(|(name, x)| format!("{name} {}", significant(*x, 3)))
+                .collect();
+            set.join(", ")
+        })
         .table()
 }
 

@@ -87,7 +87,11 @@ pub fn write(folder: &Path, solved: &Solved<'_, Raceline>, summary: &Summary) ->
     }
     page.section(
         "Objectives about the best lines",
-        "Each over the line's place at the cross-section where it bends most and at the next.",
+        if solved.settings.surface_sections.is_empty() {
+            "Each over the line's place at the cross-section where it bends most and at the next."
+        } else {
+            "Each over the line's place at the two cross-sections that were asked for."
+        },
     );
     for found in &outcome.objectives {
         if let Some(surface) = surface(solved.settings, setup, found)? {
@@ -332,10 +336,15 @@ fn surface(settings: &RacelineSettings, setup: &Setup, found: &ObjectiveOutcome)
         point.map_or(0.0, |p| line.fine.curvature_1pm[p].abs())
     };
     let bends = (0..n.saturating_sub(1)).map(|i| (i, bend(i)));
-    let Some((section, _)) = bends.max_by(|a, b| a.1.total_cmp(&b.1)) else {
+    let sharpest = bends.max_by(|a, b| a.1.total_cmp(&b.1)).map(|(i, _)| [i, i + 1]);
+    let asked = match settings.surface_sections[..] {
+        [a, b] => Some([a.min(b) as usize, a.max(b) as usize]),
+        _ => sharpest,
+    };
+    let Some([across, up]) = asked else {
         return Ok(None);
     };
-    let pair = Parametrisation::sections().with_free(vec![section, section + 1], line.alpha.clone());
+    let pair = Parametrisation::sections().with_free(vec![across, up], line.alpha.clone());
     let problem = setup.problem(pair, &[found.objective], settings)?;
     let grid: Vec<f64> = axis
         .iter()
@@ -348,11 +357,11 @@ fn surface(settings: &RacelineSettings, setup: &Setup, found: &ObjectiveOutcome)
     let label = |i: usize| format!("alpha at {:.1} m", setup.cross_sections.station_m[i]);
     Ok(Some(Surface {
         title: format!(
-            "{}: {name} over the {} line's place on two neighbouring cross-sections",
+            "{}: {name} over the {} line's place on two cross-sections",
             setup.track_name, line.name
         ),
-        x_label: label(section),
-        y_label: label(section + 1),
+        x_label: label(across),
+        y_label: label(up),
         z_label: with_unit(name, unit),
         y: axis.clone(),
         x: axis,
@@ -360,6 +369,6 @@ fn surface(settings: &RacelineSettings, setup: &Setup, found: &ObjectiveOutcome)
             .map(|worth| if worth.succeeded() { worth.cost } else { f64::NAN })
             .collect(),
         levels: Levels::Basin,
-        marks: vec![(line.name.clone(), [line.alpha[section], line.alpha[section + 1]])],
+        marks: vec![(line.name.clone(), [line.alpha[across], line.alpha[up]])],
     }))
 }
