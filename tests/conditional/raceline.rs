@@ -27,7 +27,7 @@ tests! {
 fn cold(track: &str, sections: usize, objectives: &[LineObjective]) -> RacelineSettings {
     RacelineSettings {
         track: track.to_owned(),
-        sections,
+        sections: Some(sections),
         objectives: objectives.to_vec(),
         car_width_m: 0.0,
         warm_start: Some(false),
