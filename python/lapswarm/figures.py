@@ -220,6 +220,41 @@ class LineFigures:
 
 
 @dataclass(frozen=True)
+class ParameterWorth:
+    """What a parameter of set-ups is worth."""
+
+    range: list[float]
+    lap_time_s_per_percent: float
+
+
+@dataclass(frozen=True)
+class LineSetup:
+    """A set-up and the fastest lap on its own line."""
+
+    setup: int
+    values: dict[str, float]
+    lap_time_s: float
+    own_line_gains_s: float
+    clearance_m: float
+    above_exact_percent: float | None
+
+
+@dataclass(frozen=True)
+class LineSetups:
+    """Set-ups with fastest lines of their own."""
+
+    parameters: list[str]
+    share: float
+    solved: int
+    failed: int
+    laps_per_s: float
+    worth: dict[str, ParameterWorth]
+    worth_rms_s: float | None
+    fastest: list[LineSetup]
+    greatest_above_exact_percent: float | None
+
+
+@dataclass(frozen=True)
 class Lines(Figures):
     """Figures of ``raceline``; dicts are by objective."""
 
@@ -241,6 +276,7 @@ class Lines(Figures):
     hypervolume: float | None
     hypervolume_reference: list[float] | None
     front_size: int
+    setups: LineSetups | None
     off_road: list[str]
     warnings: list[str]
 

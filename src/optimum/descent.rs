@@ -22,6 +22,9 @@ pub struct DescentSettings {
     /// First weight of the distance from the line that a step starts at. At 1 it outweighs, for lap time, what a step's
     /// model leaves out.
     pub caution: f64,
+    /// What changes of lateral acceleration count beside the lap time (s), where that counts: so much for one of 1 g within 10 m. Where
+    /// the tyres have grip to spare, a line may turn to and fro at no cost; with a little of this it does not.
+    pub roughness_s: f64,
 }
 
 impl Default for DescentSettings {
@@ -30,6 +33,7 @@ impl Default for DescentSettings {
             programs: 60,
             least_gain: 1e-6,
             caution: 1.0,
+            roughness_s: 0.0,
         }
     }
 }
@@ -92,7 +96,12 @@ pub fn descend(
     check_start(problem, start)?;
     let clock = Instant::now();
     let weights = &start.weights;
-    let mut here = Place::of(problem, weights, bounds.inside(&start.x)?);
+    let judge = Judge {
+        problem,
+        weights,
+        roughness_s: settings.roughness_s,
+    };
+    let mut here = judge.place(bounds.inside(&start.x)?);
     let (mut iterations, mut programs, mut caution) = (0, 0, settings.caution);
     let mut status = Status::Almost(format!("{} programs without an end", settings.programs));
     // Whether the next program says that the first-order conditions are met, and how many have been asked to.
@@ -112,9 +121,7 @@ pub fn descend(
             break;
         }
         let tolerance = PROGRAM_TOLERANCE.max(TOLERANCE_OF_GAIN * settings.least_gain);
-        let program = here
-            .program(problem, bounds, weights, caution)
-            .with_tolerance(tolerance);
+        let program = here.program(&judge, bounds, caution).with_tolerance(tolerance);
         let solution = program.solve()?;
         programs += 1;
         iterations += solution.iterations;
@@ -147,7 +154,7 @@ pub fn descend(
             .zip(&solution.x)
             .zip(bounds.lower.iter().zip(&bounds.upper));
         let trial: Vec<f64> = moved.map(|((x, d), (l, u))| (x + d).clamp(*l, *u)).collect();
-        let there = Place::of(problem, weights, trial);
+        let there = judge.place(trial);
         let gain = here.cost - there.cost;
         if !failed && gain >= LEAST_KEPT * promise {
             here = there;
@@ -157,7 +164,7 @@ pub fn descend(
             }
         } else if judging {
             // Where all of the step loses, its parts say whether the line can be bettered that way.
-            let part = here.part_of(problem, weights, &there.x);
+            let part = here.part_of(&judge, &there.x);
             let gained = (here.cost - part.cost) / here.cost.abs();
             status = if gained <= settings.least_gain.max(JUDGED_GAIN) {
                 solution.status
@@ -182,8 +189,8 @@ pub fn descend(
     }
     Ok(Optimum {
         measures: problem.measures(&here.x),
+        value: weights.sum(&here.measures),
         x: here.x,
-        value: here.cost,
         lower_bound: None,
         status,
         programs,
@@ -252,7 +259,7 @@ pub fn minimum_curvature_of(problem: &ReferenceProblem, bounds: &Bounds, x: &[f6
     let settings = DescentSettings {
         programs: 200,
         least_gain: 1e-10,
-        caution: 1.0,
+        ..DescentSettings::default()
     };
     descend(
         problem,
@@ -297,11 +304,26 @@ struct Place {
     cost: f64,
 }
 
-impl Place {
-    fn of(problem: &ReferenceProblem, weights: &Weights, x: Vec<f64>) -> Self {
-        let (shape, lap, measures) = problem.judged(weights, &x);
-        let cost = weights.sum(&measures);
-        Self {
+/// What lines are judged by.
+struct Judge<'a> {
+    problem: &'a ReferenceProblem<'a>,
+    weights: &'a Weights,
+    roughness_s: f64,
+}
+
+/// The change of lateral acceleration that counts as [`DescentSettings::roughness_s`] (m/s^2), and the distance within which (m).
+const ROUGH_MPS2: f64 = 9.80665;
+const ROUGH_M: f64 = 10.0;
+
+impl Judge<'_> {
+    fn place(&self, x: Vec<f64>) -> Place {
+        let (shape, lap, measures) = self.problem.judged(self.weights, &x);
+        let rough: f64 = lap.as_ref().map_or(0.0, |lap| {
+            let each = (0..shape.length_m.len()).map(|s| self.roughness(&shape, lap, s).1);
+            each.map(|rough| rough * rough).sum()
+        });
+        let cost = self.weights.sum(&measures) + rough;
+        Place {
             cost: if cost.is_finite() { cost } else { f64::INFINITY },
             x,
             shape,
@@ -310,11 +332,25 @@ impl Place {
         }
     }
 
+    /// The square of the second is what segment `s` costs for its roughness (s); the first is its derivative by the difference of
+    /// its ends' curvature.
+    fn roughness(&self, shape: &Shape, lap: &Lap, s: usize) -> (f64, f64) {
+        let next = (s + 1) % lap.square.len();
+        let middle = 0.5 * (lap.square[s] + lap.square[next]);
+        let scale = (self.roughness_s * ROUGH_M / shape.length_m[s]).sqrt() * middle / ROUGH_MPS2;
+        (
+            scale,
+            scale * (shape.curvature_1pm[next] - shape.curvature_1pm[s]),
+        )
+    }
+}
+
+impl Place {
     /// The best of the lines on the way to another.
-    fn part_of(&self, problem: &ReferenceProblem, weights: &Weights, there: &[f64]) -> Self {
+    fn part_of(&self, judge: &Judge, there: &[f64]) -> Self {
         let part = |share: &f64| {
             let ends = self.x.iter().zip(there);
-            Self::of(problem, weights, ends.map(|(x, t)| x + share * (t - x)).collect())
+            judge.place(ends.map(|(x, t)| x + share * (t - x)).collect())
         };
         let parts = PARTS.iter().map(part);
         parts.fold(
@@ -325,13 +361,8 @@ impl Place {
 
     /// The program of the best step from here. Its variables are changes of the line's and, where time counts, relative
     /// changes of the squared speeds at its points.
-    fn program(
-        &self,
-        problem: &ReferenceProblem,
-        bounds: &Bounds,
-        weights: &Weights,
-        caution: f64,
-    ) -> ConicProgram {
+    fn program(&self, judge: &Judge, bounds: &Bounds, caution: f64) -> ConicProgram {
+        let (problem, weights) = (judge.problem, judge.weights);
         let (map, shape, x) = (problem.map, &self.shape, &self.x);
         let lower = bounds.lower.iter().zip(x).map(|(l, x)| (l - x).min(0.0));
         let upper = bounds.upper.iter().zip(x).map(|(u, x)| (u - x).max(0.0));
@@ -396,6 +427,13 @@ impl Place {
         }
         if let (Some(lap), Some(envelope)) = (&self.lap, problem.envelope) {
             add_time(&mut program, map, envelope, shape, lap, weights.time, caution);
+            for s in (0..shape.length_m.len()).filter(|_| judge.roughness_s > 0.0) {
+                let (scale, constant) = judge.roughness(shape, lap, s);
+                let mut terms = Vec::new();
+                shape.add_curvature(map, (s + 1) % map.points(), scale, &mut terms);
+                shape.add_curvature(map, s, -scale, &mut terms);
+                program.add_square(Affine { constant, terms }.merged());
+            }
         }
         program
     }

@@ -19,6 +19,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// Lines without a lap time have a variable at every cross-section. With one, cross-sections' worth of zigzag between them would
 /// pay, so that lines are then a spline's distance from the minimum-curvature line, with three cross-sections for each control
 /// point.
+#[derive(Clone)]
 pub struct ReferenceSolvers {
     cross_sections: CrossSections,
     spacing_m: Vec<f64>,
@@ -34,6 +35,7 @@ pub struct ReferenceSolvers {
 }
 
 /// The road's edges on the right and the left (m), and the car that is to stay between them.
+#[derive(Clone)]
 struct Room {
     edges_m: [Vec<DVec2>; 2],
     car: CarPlan,
@@ -98,6 +100,9 @@ const NEARBY: f64 = 0.02;
 /// Share of a lap below which no cone program is worth its time. Programs that promise less gain a fraction of it: the envelope's
 /// kinks between its rows are beyond their models.
 const LEAST_GAIN_ABOUT: f64 = 4e-5;
+/// What a change of lateral acceleration of 1 g within 10 m counts (s). The fastest lines of ten made circuits lose a thousandth of a
+/// percent by it.
+const ROUGHNESS_S: f64 = 5e-4;
 /// Times that the fastest line is taken about another before it is taken closely about itself.
 const ABOUTS: usize = 2;
 
@@ -167,6 +172,29 @@ impl ReferenceSolvers {
             car,
         });
         self
+    }
+
+    /// The same for another car.
+    ///
+    /// # Errors
+    /// [`crate::Error::Input`] for a car that cannot be.
+    pub fn of_car(&self, car: &PointMass) -> Result<Self> {
+        Ok(Self {
+            envelope: Some(PointMassEnvelope::new(car)?),
+            car: car.clone(),
+            ..self.clone()
+        })
+    }
+
+    /// The lap time (s) of a line on its fine spline, and its least clearance (m).
+    ///
+    /// # Errors
+    /// [`crate::Error::Study`] if the line cannot be driven.
+    pub fn lap(&self, alpha: &[f64]) -> Result<(f64, f64)> {
+        let driven = self.driven(alpha)?;
+        let time_s = driven.fine.lap_time_s();
+        let time_s = time_s.ok_or_else(|| crate::Error::Study("there is no lap on this line".to_owned()))?;
+        Ok((time_s, driven.clearance_m()))
     }
 
     /// The flag that ends them.
@@ -322,6 +350,7 @@ impl ReferenceSolvers {
         let settings = DescentSettings {
             least_gain: LEAST_GAIN_ABOUT,
             programs: PROGRAMS_ABOUT,
+            roughness_s: ROUGHNESS_S,
             ..DescentSettings::default()
         };
         let tightening = DescentSettings {

@@ -132,7 +132,7 @@ pub(super) fn layer() -> Result<Layer> {
 /// Those of reading the bundled circuit and car.
 pub fn problems(sections: usize, modes: &[Mode], drs: bool) -> Result<Vec<HybridProblem>> {
     let setup = set_up(&RacelineSettings {
-        sections,
+        sections: Some(sections),
         ..RacelineSettings::default()
     })?;
     let points_m = setup.cross_sections.points(&setup.cross_sections.reference);

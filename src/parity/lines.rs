@@ -162,7 +162,7 @@ pub fn in_relief(road: &CrossSections, car: &PointMass) -> Result<(CrossSections
 /// Those of reading the bundled circuit and car.
 pub(super) fn layer() -> Result<Layer> {
     let mut setup = set_up(&RacelineSettings {
-        sections: SECTIONS,
+        sections: Some(SECTIONS),
         ..RacelineSettings::default()
     })?;
     (setup.car.envelope, setup.cross_sections.drs) = with_drs(&setup.car.envelope, SECTIONS)?;

@@ -287,7 +287,7 @@ pub fn nothing_on_its_way(folder: &Path) {
 pub fn along(track: &str, alpha: f64) -> String {
     let setup = set_up(&RacelineSettings {
         track: track.to_owned(),
-        sections: 200,
+        sections: Some(200),
         ..RacelineSettings::default()
     })
     .expect("a track");

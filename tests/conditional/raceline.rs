@@ -27,7 +27,7 @@ tests! {
 fn cold(track: &str, sections: usize, objectives: &[LineObjective]) -> RacelineSettings {
     RacelineSettings {
         track: track.to_owned(),
-        sections,
+        sections: Some(sections),
         objectives: objectives.to_vec(),
         car_width_m: 0.0,
         warm_start: Some(false),
@@ -167,7 +167,7 @@ fn particle_swarms_over_all_sections_can_be_asked_for() {
             population: 10,
             iterations: 20,
             section: Some("Abbey".to_owned()),
-            sections: 480,
+            sections: Some(480),
             ..cold("silverstone_gp", 480, &[LineObjective::Length])
         };
         let (setup, outcome) = run(&settings);
@@ -198,7 +198,7 @@ fn particle_swarms_over_all_sections_can_be_asked_for() {
 
 fn a_study_of_the_bundled_circuit_holds_together() {
     let settings = RacelineSettings {
-        sections: 240,
+        sections: Some(240),
         population: 40,
         iterations: 20,
         archive: 40,
@@ -327,7 +327,7 @@ fn a_study_of_the_bundled_circuit_holds_together() {
 fn the_same_seed_gives_the_same_lines() {
     let settings = RacelineSettings {
         track: "stadium:400:120:14".to_owned(),
-        sections: 60,
+        sections: Some(60),
         population: 20,
         iterations: 5,
         backend: BackendChoice::Simd,

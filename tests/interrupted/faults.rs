@@ -51,7 +51,7 @@ fn faults_survive_a_resume_and_the_summary_names_what_ended_the_run() {
     for algorithm in [LineAlgorithm::Windows, LineAlgorithm::Thesis] {
         let settings = RacelineSettings {
             track: "stadium:300:80:12".to_owned(),
-            sections: 60,
+            sections: Some(60),
             population: 16,
             iterations: 12,
             objectives: vec![LineObjective::Length],
@@ -125,7 +125,7 @@ fn a_study_ends_without_the_adapter_that_it_began_with() {
     let _turn = alone();
     let settings = RacelineSettings {
         track: "stadium:300:80:12".to_owned(),
-        sections: 60,
+        sections: Some(60),
         population: 16,
         iterations: 12,
         objectives: vec![LineObjective::Length, LineObjective::Gamma],

@@ -119,7 +119,7 @@ fn lines_on_the_device_lose_nothing_to_faults_and_breaks() {
     let _turn = alone();
     let settings = RacelineSettings {
         track: "stadium:300:80:12".to_owned(),
-        sections: 60,
+        sections: Some(60),
         population: 70,
         iterations: STEPS,
         archive: 12,
@@ -228,7 +228,7 @@ fn laps_on_the_device_lose_nothing_to_faults_and_breaks() {
     let settings = HybridStudySettings {
         track: "circle:294:306".to_owned(),
         line: Some(line),
-        sections: 60,
+        sections: Some(60),
         budgets_mj: vec![0.5],
         objectives: vec![HybridObjective::LapTime, HybridObjective::EnergyUsed],
         population: 70,

@@ -20,7 +20,7 @@ use std::sync::OnceLock;
 
 fn settings() -> HybridStudySettings {
     HybridStudySettings {
-        sections: 480,
+        sections: Some(480),
         spacing_m: 7.0,
         backend: BackendChoice::Simd,
         ..HybridStudySettings::default()
@@ -515,7 +515,7 @@ fn strategies_are_searched_by_the_swarm_that_is_asked_for() {
 fn gates_and_zones_are_searched_both_ways() {
     let settings = HybridStudySettings {
         track: "stadium:250:60:12".to_owned(),
-        sections: 120,
+        sections: Some(120),
         spacing_m: 6.0,
         population: 24,
         iterations: 30,
@@ -608,7 +608,7 @@ fn gates_and_zones_are_searched_both_ways() {
 fn a_study_writes_what_scripts_read_and_repeats() {
     let settings = HybridStudySettings {
         track: "stadium:250:60:12".to_owned(),
-        sections: 120,
+        sections: Some(120),
         spacing_m: 6.0,
         population: 16,
         iterations: 10,

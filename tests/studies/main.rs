@@ -1,7 +1,10 @@
 //! Studies through the library: what they find, what they write, and that they go on where they were.
 
+mod circuits;
 mod hybrid;
 mod identify;
+#[path = "../common/circuits.rs"]
+mod made;
 mod models;
 mod registry;
 mod reproduce;

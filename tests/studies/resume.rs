@@ -246,7 +246,7 @@ fn fronts_of_islands_and_of_nsga2_are_resumed_bit_for_bit() {
 fn lines() -> RacelineSettings {
     RacelineSettings {
         track: "stadium:300:80:12".to_owned(),
-        sections: 120,
+        sections: Some(120),
         population: 16,
         iterations: 12,
         archive: 12,
@@ -365,7 +365,7 @@ fn cold_searches_are_resumed_bit_for_bit_from_every_stage() {
     let abbey = RacelineSettings {
         track: "silverstone_gp".to_owned(),
         section: Some("Abbey".to_owned()),
-        sections: 480,
+        sections: Some(480),
         ..lines()
     };
     for base in [lines(), abbey] {

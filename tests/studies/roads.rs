@@ -134,7 +134,7 @@ impl Surveyed {
         self.write(&track);
         RacelineSettings {
             track: track.display().to_string(),
-            sections: 200,
+            sections: Some(200),
             objectives: vec![LineObjective::LapTime],
             backend: BackendChoice::Simd,
             ..RacelineSettings::default()
@@ -233,7 +233,7 @@ fn reference_optima_agree_across_cross_sections() {
     let folder = tempfile::tempdir().expect("a folder");
     let lap_s = [400, 800].map(|sections| {
         let settings = RacelineSettings {
-            sections,
+            sections: Some(sections),
             ..WIDE.settings(folder.path())
         };
         let setup = set_up(&settings).expect("a road");
@@ -272,7 +272,7 @@ fn widths_of_written_lines_are_those_of_the_road() {
     let folder = tempfile::tempdir().expect("a folder");
     let settings = RacelineSettings {
         track: "circle:90:110".to_owned(),
-        sections: 120,
+        sections: Some(120),
         objectives: vec![LineObjective::Length],
         backend: BackendChoice::Simd,
         ..RacelineSettings::default()
@@ -295,7 +295,7 @@ fn widths_of_written_lines_are_those_of_the_road() {
 #[test]
 fn a_line_that_cannot_be_on_the_road_is_no_result() {
     let settings = RacelineSettings {
-        sections: 60,
+        sections: Some(60),
         objectives: vec![LineObjective::Length],
         backend: BackendChoice::Simd,
         ..RacelineSettings::default()
@@ -349,7 +349,7 @@ fn a_margin_is_kept() {
 fn deployments_start_from_a_standstill() {
     let settings = HybridStudySettings {
         track: "stadium:400:120:14".to_owned(),
-        sections: 60,
+        sections: Some(60),
         backend: BackendChoice::Simd,
         ..HybridStudySettings::default()
     };
@@ -389,7 +389,7 @@ fn deployments_start_from_a_standstill() {
 fn the_published_swarm_finds_fronts_by_itself() {
     let settings = RacelineSettings {
         track: "stadium:300:80:12".to_owned(),
-        sections: 60,
+        sections: Some(60),
         objectives: vec![LineObjective::Gamma, LineObjective::Length],
         algorithm: LineAlgorithm::Thesis,
         population: 20,

@@ -22,7 +22,7 @@ use std::path::PathBuf;
 fn stadium() -> lapswarm::study::raceline::Setup {
     set_up(&RacelineSettings {
         track: "stadium:400:120:14".to_owned(),
-        sections: 200,
+        sections: Some(200),
         ..RacelineSettings::default()
     })
     .expect("a stadium")
@@ -202,7 +202,7 @@ fn the_car_drives_a_line_as_fast_as_the_point_mass() {
 fn each_corner_has_the_grip_that_the_car_holds_there() {
     let road = set_up(&RacelineSettings {
         track: "ellipse:200:100:10".to_owned(),
-        sections: 120,
+        sections: Some(120),
         ..RacelineSettings::default()
     });
     let road = road.expect("an ellipse");

@@ -187,7 +187,7 @@ pub(super) fn replay(front: bool) -> Result<Case<ReplayProblem>> {
 
 pub(super) fn line(objectives: &[LineObjective]) -> Result<Case<LineProblem>> {
     let setup = raceline::set_up(&RacelineSettings {
-        sections: SECTIONS,
+        sections: Some(SECTIONS),
         ..RacelineSettings::default()
     })?;
     let way = Parametrisation::control_points(SECTIONS / 4);

@@ -185,7 +185,7 @@ fn identify(arguments: &Arguments) -> Result<Case<ReplayProblem>> {
 /// The box reaches from the best to the worst of each objective among the exact lines and the reference line.
 fn raceline(arguments: &Arguments) -> Result<Case<LineProblem>> {
     let settings = RacelineSettings {
-        sections: arguments.sections as usize,
+        sections: Some(arguments.sections as usize),
         objectives: vec![
             LineObjective::Gamma,
             LineObjective::Length,

@@ -8,6 +8,7 @@ mod manifest;
 pub mod memory;
 mod plan;
 mod record;
+pub mod setups;
 pub mod state_file;
 mod study;
 mod tyres;

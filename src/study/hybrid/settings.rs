@@ -113,8 +113,8 @@ settings! {
             "A g-g-v envelope (columns v_mps, ay_mps2, ax_grip_mps2, ax_drive_mps2, drag_mps2) instead of the car's own";
         line: Option<PathBuf> ["-"] = None, optional(file()).example("\"line_fastest.csv\""),
             "A line (CSV with columns x and y in m) instead of the fastest one";
-        sections: usize ["-"] = 960, count(8, 1_000_000),
-            "Cross-sections of the track that the fastest line is found through";
+        sections: Option<usize> ["-"] = None, optional(count(8, 1_000_000)).example("960"),
+            "Cross-sections of the track that the fastest line is found through; without it one for every 4 m, and 960 at least";
         spacing_m: f64 ["m"] = 4.0, number(0.5, 50.0),
             "Greatest distance between the points at which energy is accounted";
         car_width_m: f64 ["m"] = 2.0, number(0.0, 10.0),
@@ -272,7 +272,7 @@ impl HybridStudySettings {
             variables,
             // The journal holds those of all searches.
             iterations: self.iterations.saturating_mul(searches),
-            sections: self.sections,
+            sections: self.raceline().size(None).sections,
             journal: true,
             ..Size::default()
         }

@@ -9,16 +9,18 @@ mod objective_search;
 mod results;
 mod settings;
 mod setup;
+mod setups;
 mod solve;
 mod state;
 mod whole_line_search;
 mod window_search;
 
 pub use front::{LineFront, front_problem, starting_lines};
-pub use results::{LineFigures, Summary};
+pub use results::{LineFigures, ParameterWorth, SetupFigures, SetupsSummary, Summary};
 pub use settings::{LineAlgorithm, RacelineSettings};
 pub(in crate::study) use setup::best_gears;
 pub use setup::{ReportedLine, Setup, road_read, set_up};
+pub use setups::{SetupLap, SetupsOutcome, SolvedSetup};
 pub use state::LinesState;
 pub use window_search::{FoundLine, LevelRow, LineSearch, LineSearchSettings, LineState, search_line};
 
@@ -60,6 +62,8 @@ pub struct Outcome {
     pub front: Option<LineFront>,
     /// The compromise nearest to the ideal, each objective as a share of its range.
     pub compromise: Option<ReportedLine>,
+    /// Set-ups of the car with their own fastest lines, where they are asked for.
+    pub setups: Option<SetupsOutcome>,
     /// The reference line.
     pub reference: ReportedLine,
     /// Time of the swarms and the local search (s).
@@ -106,8 +110,8 @@ impl Study for Raceline {
         Ok(setup)
     }
 
-    fn size(settings: &RacelineSettings, _: Option<&Setup>) -> Vec<MemoryItem> {
-        settings.size().memory_items()
+    fn size(settings: &RacelineSettings, setup: Option<&Setup>) -> Vec<MemoryItem> {
+        settings.size(setup.map(|setup| setup.road.len())).memory_items()
     }
 
     fn plan(settings: &RacelineSettings, setup: &Setup, plan: Plan) -> Result<Plan> {
@@ -147,8 +151,8 @@ impl Study for Raceline {
 
     fn check(path: &Path) -> Result<String> {
         let settings = RacelineSettings::read(path)?;
-        Self::prepare(&settings)?;
-        Ok(format!("{}, {} sections", settings.track, settings.sections))
+        let setup = Self::prepare(&settings)?;
+        Ok(format!("{}, {} sections", settings.track, setup.road.len()))
     }
 
     /// What was reached of each objective, and the quality of the front.

@@ -1,8 +1,10 @@
 //! What a racing-line study leaves behind: figures for people and scripts, lines, pictures.
 
 mod page;
+mod setups;
 
 pub(super) use page::write as write_page;
+pub use setups::{ParameterWorth, SetupFigures, SetupsSummary};
 
 use super::{Outcome, Raceline, ReportedLine, Setup};
 use crate::error::Result;
@@ -93,6 +95,9 @@ pub struct Summary {
     pub hypervolume_reference: Option<Vec<f64>>,
     /// Lines on the front.
     pub front_size: usize,
+    /// Set-ups of the car with their own fastest lines; `null` where none are asked for.
+    #[serde(default)]
+    pub setups: Option<SetupsSummary>,
     /// Best lines on which the car is more than a centimetre beyond an edge, by the names of their objectives: only a study that
     /// was interrupted has any.
     pub off_road: Vec<String>,
@@ -131,6 +136,10 @@ pub(super) fn summarise(solved: &Solved<'_, Raceline>) -> Summary {
         hypervolume: front.map(|f| f.hypervolume),
         hypervolume_reference: front.map(|f| f.reference.clone()),
         front_size: front.map_or(0, |f| f.alpha.len()),
+        setups: outcome
+            .setups
+            .as_ref()
+            .map(|found| setups::summarise(found, settings.share)),
         off_road: objectives()
             .filter(|o| !o.best.clearance.is_on_road())
             .map(|o| o.objective.name().to_owned())
@@ -235,6 +244,9 @@ impl Summary {
         }
         if let Some(volume) = self.hypervolume {
             text += &format!("Front of {} lines, hypervolume {volume:.4}\n", self.front_size);
+        }
+        if let Some(setups) = &self.setups {
+            text += &setups.to_text();
         }
         text += &format!(
             "{} lines evaluated in {:.1} s ({:.0} per second) on {}; reference optima {:.1} s\n",

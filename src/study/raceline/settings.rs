@@ -2,6 +2,7 @@
 
 use crate::config::kinds::{
     Choice, choice, choices, count, counts, file, name_or_file, named, number, of, optional, switch, text,
+    texts,
 };
 use crate::config::settings::{Flag, settings};
 use crate::error::{Error, Result};
@@ -9,6 +10,7 @@ use crate::evaluate::line::LineObjective;
 use crate::evaluate::{BackendChoice, Problem};
 use crate::line::CarPlan;
 use crate::study::framework::memory::Size;
+use crate::study::framework::setups::{MOST_SETUPS, check_parameters};
 use crate::study::framework::{Coefficients, Mutated, Scheduled};
 use crate::swarm::{FrontSearch, MopsoSettings, Mutation, Schedule, SwarmPlace};
 use serde::{Deserialize, Serialize};
@@ -46,8 +48,8 @@ settings! {
             "A g-g-v envelope (columns v_mps, ay_mps2, ax_grip_mps2, ax_drive_mps2, drag_mps2) instead of the car's own";
         section: Option<String> ["-"] = None, optional(text()).example("\"Abbey\""),
             "Only this named stretch of the track, or a sector such as 3/12 of its cross-sections, as an open road";
-        sections: usize ["-"] = 960, count(8, 1_000_000),
-            "Cross-sections of the track";
+        sections: Option<usize> ["-"] = None, optional(count(8, 1_000_000)).example("960"),
+            "Cross-sections of the track; without it one for every 4 m, and 960 at least";
         as_surveyed: bool ["-"] = true, switch(true).flag(Flag::Switch("smoothed", false)),
             "Whether a surveyed track's line and edges are taken as they are; else they are smoothed, within 0.25 m";
         car_width_m: f64 ["m"] = 2.0, number(0.0, 10.0),
@@ -68,6 +70,12 @@ settings! {
             "Whether the swarms start from the reference optima; without it they do, but with algorithm thesis start from no known line";
         local_search: Option<bool> ["-"] = None, optional(switch(true)).flag(Flag::Switch("no_local_search", false)).search().example("true"),
             "Whether exact gradients lead what the swarms find to the nearest optimum; without it they do, but not with algorithm thesis";
+        setups: Option<usize> ["-"] = None, optional(count(0, MOST_SETUPS as u64)).example("63"),
+            "Set-ups of the car that each get a fastest line of their own, beside the car as it is";
+        parameters: Vec<String> ["-"] = ["mass_kg", "downforce_area_m2"].map(str::to_owned).to_vec(), texts(),
+            "Parameters that set-ups move";
+        share: f64 ["-"] = 0.1, number(1e-6, 1.0),
+            "How far each goes either way, as a share of its value";
         algorithm: LineAlgorithm ["-"] = LineAlgorithm::Windows, choice().search(),
             "What looks for the best line by one objective; cooperative (CPSO-S_K) and thesis start at random; nsga2 is windows, and NSGA-II for the front";
         inertia: Option<Schedule> ["-"] = None, of(Scheduled).search().example("[0.1, 1.0]"),
@@ -100,6 +108,8 @@ settings! {
 
     /// Coefficients are those of the algorithm.
     fn consistent(&self) -> Result<()> {
+        check_parameters(self.setups, &self.parameters)?;
+        self.check_setups()?;
         let two = matches!(self.surface_sections[..], [a, b] if a != b);
         if !two && !self.surface_sections.is_empty() {
             let found = format!("{:?}", self.surface_sections);
@@ -118,6 +128,12 @@ settings! {
     }
 }
 
+/// Distance between cross-sections (m) where their number is not given, and how few there are at the least.
+const SECTION_M: f64 = 4.0;
+const LEAST_SECTIONS: usize = 960;
+/// As long as tracks are (m) whose memory is thought of before they are read.
+const LONG_TRACK_M: f64 = 7500.0;
+
 fn usual_objectives() -> Vec<LineObjective> {
     vec![
         LineObjective::Gamma,
@@ -127,9 +143,33 @@ fn usual_objectives() -> Vec<LineObjective> {
 }
 
 impl RacelineSettings {
+    /// Refuses set-ups where there is no fastest line of theirs.
+    fn check_setups(&self) -> Result<()> {
+        let refuse = |found: &str, expected: &str| Err(Error::input("the study", "setups", found, expected));
+        if self.setups.is_none() {
+            return Ok(());
+        }
+        if !self.objectives.contains(&LineObjective::LapTime) {
+            return refuse("set-ups without lap times", "lap_time among the objectives");
+        }
+        if self.envelope.is_some() {
+            return refuse("set-ups and an envelope from a file", "the car's own envelope");
+        }
+        if self.ellipse_exponent != 2.0 {
+            return refuse("set-ups and another exponent", "an ellipse exponent of 2");
+        }
+        Ok(())
+    }
+
     /// Whether the swarms start from the reference optima.
     pub fn starts_warm(&self) -> bool {
         self.warm_start.unwrap_or(self.algorithm != LineAlgorithm::Thesis)
+    }
+
+    /// Cross-sections of a track of a length (m).
+    pub(super) fn sections_on(&self, length_m: f64) -> usize {
+        let by_length = (length_m / SECTION_M).ceil() as usize;
+        self.sections.unwrap_or(by_length.max(LEAST_SECTIONS))
     }
 
     /// Whether exact gradients lead what the swarms find.
@@ -196,13 +236,14 @@ impl RacelineSettings {
     }
 
     /// What the study's memory goes with.
-    pub fn size(&self) -> Size {
+    pub fn size(&self, known: Option<usize>) -> Size {
+        let sections = known.unwrap_or_else(|| self.sections_on(LONG_TRACK_M));
         Size {
             population: self.population.saturating_mul(self.islands),
             // The swarm's control points are fewer than the cross-sections; the lines of the front are whole.
-            variables: self.sections,
+            variables: sections,
             iterations: self.iterations,
-            sections: self.sections,
+            sections,
             archive: self.archive,
             ..Size::default()
         }

@@ -18,6 +18,8 @@ use std::sync::atomic::AtomicBool;
 
 /// Waves of a survey's reference line that are shorter than this are noise (m): the tightest bend of a road is longer.
 const REFERENCE_M: f64 = 60.0;
+/// Cross-sections that tell the length of a track.
+const FEW: usize = 960;
 /// Distance between the points of the edges that lines are held within (m): an edge of 10 m radius is straight to a centimetre.
 const EDGE_M: f64 = 1.0;
 
@@ -47,11 +49,13 @@ pub struct Setup {
 pub fn set_up(settings: &RacelineSettings) -> Result<Setup> {
     settings.validate()?;
     let track = Track::load(&settings.track)?;
+    let few = track.cross_sections(&Spacing::equal(FEW), settings.as_surveyed)?;
+    let sections = settings.sections_on(few.length_m);
     let road = track
-        .cross_sections(&Spacing::equal(settings.sections), settings.as_surveyed)?
+        .cross_sections(&Spacing::equal(sections), settings.as_surveyed)?
         .with_smooth_reference(REFERENCE_M);
     let cut = |step_m: f64| {
-        let close = ((road.length_m / step_m).ceil() as usize).clamp(settings.sections, 1_000_000);
+        let close = ((road.length_m / step_m).ceil() as usize).clamp(sections, 1_000_000);
         track.cross_sections(&Spacing::equal(close), settings.as_surveyed)
     };
     // Inside a bend that is hardly wider than its road, cross-sections may be too close to one another to be turned apart.
@@ -62,7 +66,7 @@ pub fn set_up(settings: &RacelineSettings) -> Result<Setup> {
             let (first_m, length_m) = road.section_named(name)?;
             let stretch = road.stretch_from(first_m, length_m, 0)?;
             if stretch.len() < TERMS {
-                let found = format!("{}, of which {} lie in {name}", settings.sections, stretch.len());
+                let found = format!("{sections}, of which {} lie in {name}", stretch.len());
                 let expected = format!("so many that at least {TERMS} lie in it");
                 return Err(Error::input("the study", "sections", found, expected));
             }
@@ -89,12 +93,9 @@ pub fn set_up(settings: &RacelineSettings) -> Result<Setup> {
     };
     let gearbox = car.powertrain.clone().filter(|_| settings.envelope.is_none());
     let gearbox = gearbox.map(|powertrain| (powertrain, car.chassis.radius_rear));
-    let wheelbase = car.chassis.cg_to_front + car.chassis.cg_to_rear;
     let car = PointMass {
-        ellipse_exponent: settings.ellipse_exponent,
-        max_steer_rad: Some(car.max_steer_rad),
         relief: road.relief.is_some(),
-        ..PointMass::new(envelope, wheelbase)
+        ..point_mass(&car, envelope, settings)?
     };
     car.check()?;
     Ok(Setup {
@@ -106,6 +107,21 @@ pub fn set_up(settings: &RacelineSettings) -> Result<Setup> {
         car_name,
         gearbox,
     })
+}
+
+/// The point mass of a car within an envelope.
+///
+/// # Errors
+/// Those of [`PointMass::check`].
+pub(super) fn point_mass(car: &Car, envelope: Envelope, settings: &RacelineSettings) -> Result<PointMass> {
+    let wheelbase = car.chassis.cg_to_front + car.chassis.cg_to_rear;
+    let car = PointMass {
+        ellipse_exponent: settings.ellipse_exponent,
+        max_steer_rad: Some(car.max_steer_rad),
+        ..PointMass::new(envelope, wheelbase)
+    };
+    car.check()?;
+    Ok(car)
 }
 
 /// Says that the track and the car's g-g-v envelope were read.

@@ -2,6 +2,7 @@
 
 use super::front::search_front;
 use super::objective_search::search_objective;
+use super::setups::solve_setups;
 use super::state::{FinishedObjective, Running, inputs_of};
 use super::{ObjectiveOutcome, Outcome, Raceline, RacelineSettings, ReportedLine, Setup};
 use crate::error::{Error, Result};
@@ -149,6 +150,18 @@ pub(super) fn find_lines(work: Work<'_, Raceline>) -> Result<Outcome> {
         front = Some(found);
     }
     let search_s = work.elapsed_s();
+    let mut setups = None;
+    if settings.setups.is_some() && !work.interrupted {
+        let fastest = objectives.iter().find(|o| o.objective == LineObjective::LapTime);
+        let first = &fastest.map_or(&reference, |o| &o.best);
+        setups = Some(solve_setups(
+            (settings, setup),
+            &solvers,
+            first,
+            &stop,
+            &mut work,
+        )?);
+    }
     record.took(evaluations, search_s + work.waited_s, search_s);
     record.longest_dispatch_ms = watch.longest_dispatch_ms();
     record.interrupted = work.interrupted;
@@ -156,6 +169,7 @@ pub(super) fn find_lines(work: Work<'_, Raceline>) -> Result<Outcome> {
         objectives,
         front,
         compromise,
+        setups,
         reference,
         search_s,
         exact_s,

@@ -1,6 +1,7 @@
 //! The state of a racing-line study: all that it takes to resume it.
 
 use super::settings::RacelineSettings;
+use super::setups::SolvedSetup;
 use super::whole_line_search::WholeLineState;
 use super::window_search::{FoundLine, LineState};
 use super::{Raceline, Setup};
@@ -39,6 +40,9 @@ pub struct LinesState {
     pub(super) whole_lines: Option<Box<WholeLineState>>,
     /// The swarm that looks for the front.
     pub(super) front: Option<Box<SwarmState>>,
+    /// Set-ups that are done with, and the time that they took (s).
+    pub(super) setups: Vec<SolvedSetup>,
+    pub(super) setups_s: f64,
 }
 
 impl LinesState {

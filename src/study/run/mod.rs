@@ -129,7 +129,7 @@ impl Study for Run {
         if summary.agrees {
             return Ok(());
         }
-        let text = "the driven lap and the quasi-steady-state lap differ by more than half a percent (see the story above)";
+        let text = "the driven lap is more than half a percent behind the quasi-steady-state lap (see the story above)";
         Err(Error::Study(text.to_owned()))
     }
 

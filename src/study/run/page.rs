@@ -23,7 +23,7 @@ pub(super) fn write(folder: &Path, summary: &Summary) -> Result<()> {
     }
     page.tile("Top speed", format!("{:.1}", summary.top_speed_mps), "m/s");
     if !summary.agrees {
-        page.warning("The driven lap and the quasi-steady-state lap differ by more than half a percent.");
+        page.warning("The driven lap is more than half a percent behind the quasi-steady-state lap.");
     }
     // Identification, limits, then a line and its drive for each round.
     let rounds = summary.rounds.len();

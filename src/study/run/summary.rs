@@ -5,7 +5,7 @@ use crate::evaluate::line::LineObjective;
 use crate::study::framework::RunRecord;
 use crate::study::hybrid::HybridSummary;
 use crate::study::raceline;
-use crate::study::transient::{self, AGREEMENT};
+use crate::study::transient::{self, keeps_up};
 use crate::vehicle::Reached;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -51,9 +51,9 @@ impl RoundSummary {
         })
     }
 
-    /// Whether the driven lap agrees with the quasi-steady-state lap.
+    /// Whether the driven lap keeps up with the quasi-steady-state lap.
     pub(super) fn agrees(&self) -> bool {
-        self.disagreement_percent.abs() <= 100.0 * AGREEMENT
+        keeps_up(0.01 * self.disagreement_percent)
     }
 }
 
@@ -125,7 +125,7 @@ pub struct Summary {
     pub rounds: Vec<RoundSummary>,
     /// What a hybrid's energy does; nothing for a car without.
     pub energy: Option<EnergySummary>,
-    /// Whether the last driven lap agrees with the quasi-steady-state lap to half a percent.
+    /// Whether the last driven lap is half a percent behind the quasi-steady-state lap at most.
     pub agrees: bool,
     /// Stages that were taken from earlier runs.
     pub reused: Vec<String>,

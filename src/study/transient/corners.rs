@@ -5,7 +5,7 @@
 //! follows from the ones before, so that a resumed search ends with the same bits.
 
 use super::NamedLine;
-use super::drive::{AGREEMENT, DrivenLine, INTERVAL_S};
+use super::drive::{DrivenLine, INTERVAL_S, keeps_up};
 use super::state::{CornerState, DriveState};
 use crate::drive::{Drive, DriverSettings, SpeedPlan, drive_until_lost};
 use crate::error::{Error, Result};
@@ -221,7 +221,7 @@ pub(super) fn raise(
         let whole_s = driven.lap_time_s(line.circuit.length_m, INTERVAL_S);
         let blamed = match (&lost, whole_s) {
             (Some(lost), _) => lowered_from(corners.at(lost.station_m), &found.levels),
-            (None, Some(lap_time_s)) if (lap_time_s / lap.time_s - 1.0).abs() > AGREEMENT => {
+            (None, Some(lap_time_s)) if !keeps_up(lap_time_s / lap.time_s - 1.0) => {
                 let planned_s = corners.times_s(&lap.elapsed_s(), lap.time_s);
                 let driven_s = corners.driven_s(&driven, lap_time_s);
                 let behind = |c: &usize| driven_s[*c] / planned_s[*c] - 1.0;

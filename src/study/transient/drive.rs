@@ -11,13 +11,20 @@ use crate::files::run_folder::STATE;
 use crate::line::{FineLine, PointMass};
 use crate::study::framework::{Inputs, Progress, RunRecord, Watch, Work};
 use crate::track::Circuit;
-use crate::vehicle::{Envelope, Traction};
+use crate::vehicle::{Car, Envelope, Traction};
+use glam::DVec2;
 use rayon::prelude::*;
 
 /// Sample interval of the drive that is kept (s).
 pub const INTERVAL_S: f64 = 0.01;
-/// Agreement of the two laps that is asked for.
+/// How much slower than the quasi-steady-state lap a driven lap may be, as a share of it.
 pub const AGREEMENT: f64 = 0.005;
+
+/// Whether a driven lap, this much longer than its plan as a share of it, keeps up with the plan. One that is shorter does: the car cuts
+/// the corners of a line that turns to and fro.
+pub fn keeps_up(disagreement: f64) -> bool {
+    disagreement <= AGREEMENT
+}
 
 /// What a line driven alone comes to.
 #[derive(Clone, Debug)]
@@ -180,7 +187,7 @@ fn greatest_share(work: Work<'_, Transient>) -> Result<Option<DrivenLine>> {
                 Ok(Some(mut outcome)) => {
                     outcome.failures.clone_from(&state.failures);
                     let off = outcome.disagreement();
-                    if off.abs() <= AGREEMENT {
+                    if keeps_up(off) {
                         state.best = Some(share);
                         // Accounts are those of a lap with one share of the grip.
                         if outcome.ideal.is_some() {
@@ -227,7 +234,30 @@ fn greatest_share(work: Work<'_, Transient>) -> Result<Option<DrivenLine>> {
         .last()
         .map_or(String::new(), |(share, why)| format!(" (at {share:.2}: {why})"));
     Err(Error::Study(format!(
-        "the car does not get round the line with any share of the envelope's grip that was tried{last}; a line with more room \
-         to the edges (found for a wider car), or through more sections, is easier to drive"
+        "the car does not get round the line with any share of the envelope's grip that was tried{last}; {}a line with more room \
+         to the edges (found for a wider car), or through more sections, is easier to drive",
+        beyond_lock(car, points_m)?
     )))
+}
+
+/// Room that a driver needs to correct on his steering lock, as a share of it.
+const LOCK_SPARE: f64 = 0.05;
+
+/// Where the line bends more than the car can on its steering lock, but for what a driver needs to correct; nothing where it does not.
+fn beyond_lock(car: &Car, points_m: &[DVec2]) -> Result<String> {
+    let line = FineLine::new(points_m, true, 1.0, None, 0.0)?;
+    let bends = line.curvature_1pm.iter().zip(&line.station_m);
+    let Some((bend, station_m)) = bends.max_by(|a, b| a.0.abs().total_cmp(&b.0.abs())) else {
+        return Ok(String::new());
+    };
+    let wheelbase_m = car.chassis.cg_to_front + car.chassis.cg_to_rear;
+    let least_m = wheelbase_m / car.max_steer_rad;
+    let radius_m = 1.0 / bend.abs();
+    Ok(if radius_m * (1.0 - LOCK_SPARE) < least_m {
+        format!(
+            "the line has a radius of {radius_m:.1} m at {station_m:.0} m, and the car turns one of {least_m:.1} m on its steering lock; "
+        )
+    } else {
+        String::new()
+    })
 }

@@ -2,7 +2,7 @@
 //! what lap comes of it.
 //!
 //! The driver is given the speeds of a quasi-steady-state lap within a share of the envelope's grip. One line alone is driven with
-//! the greatest share at which the car gets round within the edges and as fast as that lap, to half a percent; the envelope with
+//! the greatest share at which the car gets round within the edges and half a percent behind that lap at most; the envelope with
 //! this share is fed back, and both laps are set side by side. Several lines, or set-ups of the car, are driven all at once.
 
 mod corners;
@@ -15,12 +15,12 @@ mod settings;
 mod state;
 
 pub use corners::CornerGrip;
-pub use drive::{AGREEMENT, DrivenLine, INTERVAL_S};
+pub use drive::{AGREEMENT, DrivenLine, INTERVAL_S, keeps_up};
 pub use energy::{Accounts, EnergyFigures, Ideal, Motor};
 pub use population::{Driven, DrivenBest, PopulationOutcome, drive_problem};
 pub use population_results::{Entry, PopulationSummary};
 pub use results::LineSummary;
-pub use settings::{MOST_SETUPS, TransientSettings};
+pub use settings::TransientSettings;
 pub use state::{DriveState, TransientState};
 
 use crate::config::settings::Settings;
@@ -221,7 +221,7 @@ impl Study for Transient {
     fn verdict(_: &TransientSettings, summary: &Summary) -> Result<()> {
         match summary {
             Summary::Line(summary) if !summary.agrees => Err(Error::Study(format!(
-                "the driven lap is {:+.2}% off the quasi-steady-state lap, more than half a percent",
+                "the driven lap is {:+.2}% behind the quasi-steady-state lap, more than half a percent",
                 summary.disagreement_percent
             ))),
             Summary::Population(summary) if summary.best.is_none() => Err(Error::Study(

@@ -9,6 +9,7 @@ use crate::error::Result;
 use crate::evaluate::drive::{DriveObjective, DriveProblem, DriveSettings, open_drive_evaluator};
 use crate::evaluate::{Evaluator, add_failures};
 use crate::study::framework::journal::Recorder;
+use crate::study::framework::setups::setups_of;
 use crate::study::framework::{Inputs, Progress, RunRecord, Study, Watch, Work};
 use crate::vehicle::{CarParameter, Traction};
 use rayon::prelude::*;
@@ -119,22 +120,7 @@ pub(super) fn drive(work: Work<'_, Transient>) -> Result<Option<PopulationOutcom
     };
     let free = settings.free(car)?;
     let parameters: Vec<CarParameter> = free.iter().map(|(p, _, _)| p.clone()).collect();
-    let flat = car.to_flat();
-    let seed = (settings.seed ^ (settings.seed >> 32)) as u32;
-    let setups: Vec<Vec<f64>> = (0..=settings.setups.unwrap_or(0))
-        .map(|setup| {
-            free.iter()
-                .zip(0..)
-                .map(|((parameter, lower, upper), dimension)| match setup {
-                    0 => flat[parameter.slots[0]],
-                    _ => {
-                        let point = sobol_burley::sample(setup as u32 - 1, dimension, seed);
-                        lower + f64::from(point) * (upper - lower)
-                    }
-                })
-                .collect()
-        })
-        .collect();
+    let setups = setups_of(car, &free, settings.setups.unwrap_or(0), settings.seed);
     let width = problem.dimensions();
     let cases: Vec<(usize, usize)> = (0..setups.len())
         .flat_map(|setup| (0..lines.len()).map(move |line| (setup, line)))

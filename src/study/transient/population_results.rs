@@ -7,8 +7,9 @@ use crate::drive::{Drive, DriverSettings, drive_planned};
 use crate::error::Result;
 use crate::evaluate::failures_in_words;
 use crate::report::{Curves, HtmlReport, Panel, Table};
+use crate::study::framework::setups::car_of;
 use crate::study::framework::{Head, Solved};
-use crate::vehicle::{Car, CarParameter, Traction};
+use crate::vehicle::{Car, Traction};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -137,17 +138,6 @@ impl PopulationSummary {
             .table()
             .to_text()
     }
-}
-
-/// The car with a set-up.
-fn car_of(car: &Car, parameters: &[CarParameter], values: &[f64]) -> Car {
-    let mut flat = car.to_flat();
-    for (parameter, value) in parameters.iter().zip(values) {
-        for slot in &parameter.slots {
-            flat[*slot] = *value;
-        }
-    }
-    car.with_flat(&flat)
 }
 
 /// The best lap of a set-up, driven once more in `f64`; nothing where the car does not come to its end there.

@@ -1,7 +1,7 @@
 //! What a drive leaves behind.
 
 use super::corners::CornerGrip;
-use super::drive::{AGREEMENT, DrivenLine, INTERVAL_S};
+use super::drive::{DrivenLine, INTERVAL_S, keeps_up};
 use super::energy::{self, EnergyFigures};
 use crate::drive::Drive;
 use crate::error::Result;
@@ -67,11 +67,11 @@ pub struct LineSummary {
 
 impl LineSummary {
     pub(super) fn of(head: Head, outcome: &DrivenLine, energy: Option<EnergyFigures>) -> Self {
-        let agrees = outcome.disagreement().abs() <= AGREEMENT;
+        let agrees = keeps_up(outcome.disagreement());
         let rule = if agrees {
-            "the greatest share of the grip at which the driven lap and the quasi-steady-state lap agree to half a percent"
+            "the greatest share of the grip at which the driven lap is half a percent behind the quasi-steady-state lap at most"
         } else {
-            "the share of the grip at which the driven lap and the quasi-steady-state lap agree best, for they do to half a percent at none"
+            "the share of the grip at which the driven lap is least behind the quasi-steady-state lap, for it is by more than half a percent at all"
         };
         Self {
             head,
@@ -341,7 +341,7 @@ fn write_page(
         page.warning(warning);
     }
     if !summary.agrees {
-        page.warning("The two laps differ by more than the half percent asked for.");
+        page.warning("The driven lap is behind by more than half a percent.");
     }
     let drive = &outcome.drive;
     let (driven, by_corner) = lap_of("4DOF car and driver", (driver_car, limits), drive, &outcome.line);

@@ -10,14 +10,10 @@ use crate::evaluate::BackendChoice;
 use crate::files::run_folder::SETTINGS;
 use crate::line::energy::Mode;
 use crate::study::framework::memory::{ANSWER, MemoryItem};
+use crate::study::framework::setups::{FreeParameter, MOST_SETUPS, check_parameters, free_parameters};
 use crate::study::raceline::RacelineSettings;
-use crate::vehicle::{Car, CarParameter};
+use crate::vehicle::Car;
 use std::path::PathBuf;
-
-/// The most set-ups of a population.
-pub const MOST_SETUPS: usize = 1 << 16;
-/// The most parameters that set-ups move: those of the Sobol sequence.
-const MOST_PARAMETERS: usize = 256;
 
 settings! {
     /// Settings of a drive.
@@ -33,7 +29,7 @@ settings! {
         car_width_m: f64 ["m"] = 2.0, number(0.0, 10.0),
             "Width of the car, all of which stays within the edges";
         grip_shares: Option<Vec<f64>> ["-"] = None, optional(numbers(0.05, 1.0)).example("[0.7, 0.8, 0.9]"),
-            "Shares of the envelope's grip to drive with; without it from 0.6 on for one line alone and from 0.8 on for a population";
+            "Shares of the envelope's grip to drive with; without it from 0.3 on for one line alone and from 0.8 on for a population";
         deployment: Option<PathBuf> ["-"] = None, optional(file()).example("\"lap_swarm.csv\""),
             "A lap of the study hybrid on this line: its motor works there in the driven lap, which has accounts of energy";
         deployment_mode: Mode ["-"] = Mode::Additional, choice(),
@@ -56,10 +52,7 @@ settings! {
         let refuse = |place: &str, found: String, expected: &str| {
             Err(Error::input("the study", place, found, expected))
         };
-        let count = self.parameters.len();
-        if self.setups.is_some_and(|n| n > 0) && count == 0 || count > MOST_PARAMETERS {
-            return refuse("parameters", format!("{count} of them"), "1 to 256");
-        }
+        check_parameters(self.setups, &self.parameters)?;
         if self.grip_shares.as_ref().is_some_and(Vec::is_empty) {
             return refuse("grip_shares", "none".to_owned(), "at least one share");
         }
@@ -79,7 +72,7 @@ impl TransientSettings {
             if self.is_population() {
                 (0..21).map(|i| 0.8 + 0.01 * f64::from(i)).collect()
             } else {
-                (0..41).map(|i| 1.0 - 0.01 * f64::from(i)).collect()
+                (0..71).map(|i| 1.0 - 0.01 * f64::from(i)).collect()
             }
         });
         shares.sort_by(f64::total_cmp);
@@ -183,34 +176,14 @@ impl TransientSettings {
         }
     }
 
-    /// Free parameters of `car` with their bounds. A share of zero is zero: a parameter of that value is refused.
+    /// Free parameters of `car` with their bounds; none without set-ups.
     ///
     /// # Errors
     /// [`Error::Input`] naming the parameter.
-    pub(super) fn free(&self, car: &Car) -> Result<Vec<(CarParameter, f64, f64)>> {
+    pub(super) fn free(&self, car: &Car) -> Result<Vec<FreeParameter>> {
         if self.setups.unwrap_or(0) == 0 {
             return Ok(Vec::new());
         }
-        let flat = car.to_flat();
-        self.parameters
-            .iter()
-            .map(|name| {
-                let parameter = car.known_parameter(&car.name, "parameters", name)?;
-                let value = flat[parameter.slots[0]];
-                if parameter.slots.iter().any(|slot| flat[*slot] != value) {
-                    let expected = format!("front.{name} or rear.{name}, whose values differ");
-                    let found = format!("`{name}`");
-                    return Err(Error::input(&car.name, "parameters", found, expected));
-                }
-                if value == 0.0 {
-                    let expected = "one that is not zero, which no share of itself moves";
-                    return Err(Error::input(&car.name, name, "0", expected));
-                }
-                let reach = self.share * value.abs();
-                let within = |x: f64| x.clamp(parameter.info.minimum, parameter.info.maximum);
-                let (lower, upper) = (within(value - reach), within(value + reach));
-                Ok((parameter, lower, upper))
-            })
-            .collect()
+        free_parameters(car, &self.parameters, self.share)
     }
 }

@@ -1,6 +1,6 @@
 //! The figures of a racing-line study and its interactive report.
 
-use super::{LineFigures, Summary, reported_lines};
+use super::{LineFigures, Summary, reported_lines, setups};
 use crate::config::settings::Settings;
 use crate::error::Result;
 use crate::evaluate::BackendChoice;
@@ -69,6 +69,9 @@ pub fn write(folder: &Path, solved: &Solved<'_, Raceline>, summary: &Summary) ->
          included, to the edges.",
         &lines_table(summary),
     )?;
+    if let (Some(found), Some(figures)) = (&outcome.setups, &summary.setups) {
+        setups::report(&mut page, folder, found, figures)?;
+    }
     front(&mut page, folder, outcome)?;
     let searched = outcome.objectives.iter().filter(|o| !o.history.is_empty());
     let panels = searched.map(|o| {

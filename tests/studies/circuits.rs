@@ -1,0 +1,112 @@
+//! Lines of circuits that nobody has surveyed, and of set-ups.
+
+use crate::made::Circuit;
+use lapswarm::evaluate::BackendChoice;
+use lapswarm::evaluate::line::LineObjective;
+use lapswarm::line::ON_ROAD_M;
+use lapswarm::study::framework::solve_unobserved;
+use lapswarm::study::raceline::{Raceline, RacelineSettings, set_up};
+use std::path::Path;
+use std::sync::Arc;
+
+fn settings(circuit: &Circuit, folder: &Path) -> RacelineSettings {
+    let file = folder.join("circuit.csv");
+    std::fs::write(&file, circuit.csv()).expect("a file");
+    RacelineSettings {
+        track: file.display().to_string(),
+        objectives: vec![
+            LineObjective::Length,
+            LineObjective::Gamma,
+            LineObjective::LapTime,
+        ],
+        backend: BackendChoice::Simd,
+        ..RacelineSettings::default()
+    }
+}
+
+/// Whatever the survey's noise, widths and corners: the shortest line, that of least curvature and the fastest are on the road.
+#[test]
+fn lines_of_any_circuit_are_on_its_road() {
+    for seed in 0..5 {
+        let folder = tempfile::tempdir().expect("a folder");
+        let settings = settings(&Circuit::random(seed), folder.path());
+        let setup = set_up(&settings).expect("a circuit");
+        let solvers = setup.solvers(&settings, &Arc::default()).expect("solvers");
+        let mut times_s = Vec::new();
+        for objective in &settings.objectives {
+            let best = solvers.best(*objective).expect("a line").expect("a solver");
+            let line = setup.report("line", &best.alpha, &settings).expect("a lap");
+            let margin_m = line.clearance.margin_m;
+            assert!(
+                margin_m >= -ON_ROAD_M,
+                "circuit {seed}, {objective:?}: {margin_m} m"
+            );
+            times_s.push(line.lap_time_fine_s());
+        }
+        assert!(
+            times_s[2] < times_s[0].min(times_s[1]),
+            "circuit {seed}: {times_s:?}"
+        );
+    }
+}
+
+/// The bridge is one without a word, and its fastest line is on the road on both decks.
+#[test]
+fn a_figure_of_eight_has_a_fastest_line() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let circuit = Circuit::ten()
+        .into_iter()
+        .find(|circuit| circuit.name == "bridge");
+    let settings = settings(&circuit.expect("a bridge"), folder.path());
+    let setup = set_up(&settings).expect("a circuit");
+    assert_eq!(setup.road.bridges().len(), 1);
+    let solvers = setup.solvers(&settings, &Arc::default()).expect("solvers");
+    let best = solvers
+        .best(LineObjective::LapTime)
+        .expect("a line")
+        .expect("a solver");
+    let line = setup.report("line", &best.alpha, &settings).expect("a lap");
+    assert!(line.clearance.margin_m >= -ON_ROAD_M, "{:?}", line.clearance);
+}
+
+/// Lighter cars are faster, each on a line of its own that is no slower than that of the car as it is, and near a reference optimum.
+#[test]
+fn set_ups_have_lines_of_their_own() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let settings = RacelineSettings {
+        objectives: vec![LineObjective::LapTime],
+        setups: Some(5),
+        parameters: vec!["mass_kg".to_owned()],
+        ..settings(&Circuit::random(3), folder.path())
+    };
+    let setup = set_up(&settings).expect("a circuit");
+    let found = solve_unobserved::<Raceline>(&settings, &setup).expect("lines");
+    let setups = found.setups.expect("set-ups");
+    assert_eq!(setups.solved.len(), 6);
+    let mut laps = Vec::new();
+    for solved in &setups.solved {
+        let lap = solved.lap.as_ref().expect("a lap");
+        assert!(
+            lap.lap_time_s <= lap.on_first_line_s && lap.clearance_m >= -ON_ROAD_M,
+            "{lap:?}"
+        );
+        if let Some(reference_s) = lap.reference_s {
+            assert!(
+                (lap.lap_time_s / reference_s - 1.0).abs() < 2e-3,
+                "{} {reference_s}",
+                lap.lap_time_s
+            );
+        }
+        laps.push((solved.values[0], lap.lap_time_s));
+    }
+    laps.sort_by(|a, b| a.0.total_cmp(&b.0));
+    assert!(laps.windows(2).all(|pair| pair[0].1 < pair[1].1), "{laps:?}");
+    assert_eq!(
+        setups
+            .solved
+            .iter()
+            .filter_map(|s| s.lap.as_ref()?.reference_s)
+            .count(),
+        4
+    );
+}
