@@ -481,7 +481,7 @@ fn a_log_without_laps_is_scored_in_windows_where_the_starting_car_does_not_drive
     std::fs::write(&path, log).unwrap();
     let of = |car: &str| IdentifySettings {
         car: car.to_owned(),
-        log: Some(path.display().to_string()),
+        log: Some(path.clone()),
         ..simd()
     };
     let whole = set_up(&of("gt")).unwrap();
