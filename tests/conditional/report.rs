@@ -520,5 +520,6 @@ fn folders_that_are_no_runs_are_refused_by_name() {
     write("summary.json", b"{}");
     write("traces.csv", b"a,b\n1,2\n1,2,3\n");
     refused(&odd, "traces.csv: line 3");
-    refused(&odd.join("summary.json"), "manifest.json: file: found none");
+    // A file is taken for a log.
+    refused(&odd.join("summary.json"), "summary.json: line 1: found \"{}\"");
 }

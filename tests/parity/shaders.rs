@@ -188,6 +188,13 @@ fn structs_of_lines_have_the_hosts_offsets() {
             offset_of!(LineStretch, rows_per_speed_squared),
         ),
         ("rows_per_radius", offset_of!(LineStretch, rows_per_radius)),
+        ("load_first", offset_of!(LineStretch, load_first)),
+        ("tables_per_load", offset_of!(LineStretch, tables_per_load)),
+        ("load_least", offset_of!(LineStretch, load_least)),
+        ("load_most", offset_of!(LineStretch, load_most)),
+        ("lock_radius", offset_of!(LineStretch, lock_radius)),
+        ("gravity", offset_of!(LineStretch, gravity)),
+        ("spare", offset_of!(LineStretch, spare)),
     ];
     let named = |pairs: &[(&str, usize)]| -> Vec<(String, usize)> {
         pairs

@@ -50,15 +50,16 @@ fn banked(radius_m: f64, bank_rad: f64) -> Circuit {
 }
 
 /// On a circle banked by `b`, right side up for a left-hander, at `v^2 = g R tan b`, the tyres bear no side force, the body does not
-/// lean, and the wheels carry the weight over the cosine with the downforce. The driver holds his speed to a percent, by which the
-/// side force is off by two of `g sin b`.
+/// lean, and the wheels carry the weight over the cosine with the downforce. The drive goes along the map, where the car turns by
+/// `v / R` in place of `v cos b / R`: its speed without side force is that of `sin b`, 1 % less at this banking. The driver holds his
+/// speed to a percent, by which the side force is off by two of `g sin b`.
 #[test]
 fn a_banked_circle_is_driven_without_side_force_at_its_own_speed() {
     let car = bundled_car();
     let (radius, bank) = (200.0, 0.2f64);
     let circuit = banked(radius, -bank);
     let gravity = lapswarm::vehicle::powertrain::GRAVITY_MPS2;
-    let speed = (gravity * radius * bank.tan()).sqrt();
+    let speed = (gravity * radius * bank.sin()).sqrt();
     let plan = SpeedPlan::of_speeds(&[0.0], &[speed], circuit.length_m);
     let driven =
         drive_planned(&car, &circuit, plan, &DriverSettings::default(), 0.05).expect("it gets round");

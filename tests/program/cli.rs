@@ -624,7 +624,7 @@ fn a_dry_run_of_any_study_says_what_it_would_do_and_writes_nothing() {
     let setups = [line.as_slice(), &["--setups", "3", "--backend", "simd"]].concat();
     // Each with an evaluation's number where one is known beforehand: of the adaptive swarms 128 * 50 + 64 * 1500; of three
     // parameters a base car, four levels of each and eight samples of five; 5 * 5; four set-ups with 21 shares of the grip;
-    // 41 of these alone; four runs of inertia and two each of the pulls with three seeds, 50 * 100 cars each; speeds of 18,
+    // 71 of these alone; four runs of inertia and two each of the pulls with three seeds, 50 * 100 cars each; speeds of 18,
     // 38 and 58 m/s by 128 steering angles.
     let studies: &[(&str, &[&str], Option<u64>)] = &[
         ("run", &[], None),
@@ -638,7 +638,7 @@ fn a_dry_run_of_any_study_says_what_it_would_do_and_writes_nothing() {
             Some(1 + 3 * 4 + 8 * 5),
         ),
         ("surface", &["--grid", "5"], Some(25)),
-        ("transient", &line, Some(41)),
+        ("transient", &line, Some(71)),
         ("transient", &setups, Some(4 * 21)),
         ("simulate", &["--noise", "0.1,0,0,0"], Some(1)),
         ("sweep", &["thesis_inertia"], Some(48 * 5000)),
@@ -791,7 +791,10 @@ fn helps_and_errors_are_whole() {
         .split_whitespace()
         .collect::<Vec<_>>()
         .join(" ");
-    assert!(help.contains("(8 to 1000000) [default: 960]"), "{help}");
+    assert!(
+        help.contains("one for every 4 m, and 960 at least (8 to 1000000)"),
+        "{help}"
+    );
     assert!(help.contains("[default: gamma,length,lap_time]"), "{help}");
 
     std::fs::write(folder.path().join("s.toml"), "grid = 5\nshare = \"wide\"\n").expect("a file");
