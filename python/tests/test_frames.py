@@ -121,7 +121,7 @@ def test_what_is_wrong_with_a_frame_is_said(lap: tuple[Path, Columns], tmp_path:
         ({"steer_rad": None}, "steer", "found none"),
         ({"time_s": None}, None, "a column of times"),
         ({"vx_mps": np.full(len(gap), "fast")}, "vx_mps", "a text"),
-        ({"yaw_rate_radps": gap}, "yaw_rate_radps", "row 5"),
+        ({"yaw_rate_radps": gap}, "yaw_rate_radps", "row 15"),
         ({"ax_mps2": gap[:-1]}, None, "different lengths"),
         ({"ax_mps2": gap[:, None]}, "ax_mps2", "shape"),
     ]:
