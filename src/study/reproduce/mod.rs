@@ -229,9 +229,11 @@ impl AtWork<'_> {
         if !found {
             let resume = self.folder.join(STATE).is_file();
             let file = self.folder.join(SETTINGS);
+            // Files are those of the tables before it: `../7_1_scenarios/line.csv`.
+            let chapter = self.folder.parent().unwrap_or(Path::new(""));
+            let text = &text.replace("../", &format!("{}/", chapter.display()));
             let answer = study.run(Request {
                 file: None,
-                // Files are those of the tables before it: `../7_1_scenarios/line.csv`.
                 text: (!resume).then_some((text, &*file)),
                 flags: &[],
                 out: Some(self.folder),
