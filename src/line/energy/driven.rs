@@ -49,7 +49,7 @@ impl MotorPlan {
 /// A moment of a driven lap.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DrivenMoment {
-    /// Time until the next moment (s).
+    /// Time until the next moment (s); nothing happens in none.
     pub time_s: f64,
     /// Station along the line (m).
     pub station_m: f64,
@@ -114,6 +114,10 @@ pub fn driven_energy(car: &EnergyCar, plan: &MotorPlan, moments: &[DrivenMoment]
     let (mut greatest_change, mut least_change) = (0.0f64, 0.0f64);
     for (i, moment) in moments.iter().enumerate() {
         let next = moments.get(i + 1).map_or(moment.speed_mps, |m| m.speed_mps);
+        if moment.time_s <= 0.0 {
+            driven.segments.push(SegmentEnergy::default());
+            continue;
+        }
         let v = 0.5 * (moment.speed_mps + next);
         let length = v * moment.time_s;
         let per_mass = 1.0 / (table.mass * moment.speed_mps);

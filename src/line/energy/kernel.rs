@@ -86,7 +86,7 @@ impl<R: Copy> EnergyLap<R> {
 }
 
 /// One segment of a lap.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SegmentEnergy<R> {
     /// Speed squared at its start (m^2/s^2).
     pub start: R,

@@ -394,6 +394,11 @@ fn the_accounts_of_a_driven_lap_by_hand() {
         // Braking: a little at the rear, then more than the generator takes.
         moment(250.0, [-3.0 * power, -0.5 * generator_most * power]),
         moment(300.0, [-3.0 * power, -2.0 * generator_most * power]),
+        // A sample beyond the line, which takes no time any more.
+        DrivenMoment {
+            time_s: 0.0,
+            ..moment(401.0, [0.0, motor_most * power])
+        },
     ];
     let driven = driven_energy(&car, &plan, &moments);
     let rolling = car.car.rolling_mps2();
@@ -412,6 +417,7 @@ fn the_accounts_of_a_driven_lap_by_hand() {
         ],
         [0.0, 0.0, 0.5 * generator_most - rolling, 3.0],
         [0.0, 0.0, generator_most, generator_most + 3.0 - rolling],
+        [0.0; 4],
     ];
     for (i, (found, expected)) in forces.zip(expected).enumerate() {
         for (found, expected) in found.into_iter().zip(expected) {

@@ -200,12 +200,16 @@ impl Ideal {
                 drag_n: aero_forces(chassis, drive.states[i][0], drive.inputs[i].flap).drag,
             }
         };
-        // From the start line to the first sample, and from the last one to the line.
-        let first = moment(0, 0.0, drive.station_m[0] / drive.states[0][0]);
-        let rest = |i: usize| (length_m - drive.station_m[i]) / drive.states[i][0];
+        // From the start line to the first sample, and up to the line after the last one, which may lie beyond it.
+        let first = moment(0, 0.0, (drive.station_m[0] / drive.states[0][0]).max(0.0));
         let along = (0..samples).map(|i| {
-            let time_s = if i + 1 < samples { INTERVAL_S } else { rest(i) };
-            moment(i, drive.station_m[i], time_s)
+            let rest_s = (length_m - drive.station_m[i]) / drive.states[i][0];
+            let most_s = if i + 1 < samples {
+                INTERVAL_S
+            } else {
+                f64::INFINITY
+            };
+            moment(i, drive.station_m[i], rest_s.min(most_s).max(0.0))
         });
         let driven: Vec<DrivenMoment> = [first].into_iter().chain(along).collect();
         driven_energy(&self.car, &self.plan, &driven)
