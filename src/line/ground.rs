@@ -3,7 +3,7 @@
 //!
 //! The line's own frame on the road is T forward, L left and N up from the surface. With `dT/ds = k_g L + k_n N` the specific forces
 //! of the tyres are `f_T = dv/dt + g e_z.T`, `f_L = v^2 k_g + g e_z.L` and `f_N = v^2 k_n + g e_z.N` (D. J. N. Limebeer, G. Perantoni,
-//! *Optimal control of a Formula One car on a three-dimensional track*, J. Dyn. Sys. Meas. Control 137, 2015). Limits are those
+//! *Optimal control of a Formula One car on a three-dimensional track, part 2*, J. Dyn. Sys., Meas., Control 137, 2015). Limits are those
 //! of the load `f_N`, of which [`EnvelopeTable::loads`] has several.
 
 use super::kernel::{Course, alpha, look_up};
@@ -34,6 +34,21 @@ pub trait Ground<R: Lookup>: Copy {
     fn helped(self, deceleration: R) -> R;
 }
 
+/// The cell of the tables of traction at a speed squared and a root of what the lateral share leaves, and how far beyond its start
+/// that is along both.
+#[inline(always)]
+fn traction_cell<R: Lookup>(envelope: &EnvelopeTable<R::Storage>, speed_squared: R, root: R) -> (R, [R; 2]) {
+    // Cells are counted in whole numbers, which scalars hold exactly.
+    let rows = envelope.rows.len() / ENVELOPE_WIDTH;
+    let per_row = R::lit(TRACTION_SPEEDS as f64 / rows as f64);
+    let (speeds, roots) = (R::lit(TRACTION_SPEEDS as f64), R::lit(TRACTION_ROOTS as f64));
+    let along = speed_squared * R::load(envelope.rows_per_speed_squared) * per_row;
+    let along = along.max(R::lit(0.0)).min(speeds);
+    let across = root * roots;
+    let (speed, cell) = (along.whole(TRACTION_SPEEDS - 1), across.whole(TRACTION_ROOTS - 1));
+    (speed * roots + cell, [along - speed, across - cell])
+}
+
 impl<R: Lookup> Ground<R> for R {
     #[inline(always)]
     fn half_way(self, there: Self) -> Self {
@@ -55,19 +70,11 @@ impl<R: Lookup> Ground<R> for R {
 
     #[inline(always)]
     fn left_for_driving(self, envelope: &EnvelopeTable<R::Storage>, speed_squared: R, root: R) -> R {
-        // Cells are counted in whole numbers, which scalars hold exactly.
-        let rows = envelope.rows.len() / ENVELOPE_WIDTH;
-        let per_row = R::lit(TRACTION_SPEEDS as f64 / rows as f64);
-        let (speeds, roots) = (R::lit(TRACTION_SPEEDS as f64), R::lit(TRACTION_ROOTS as f64));
-        let along = speed_squared * R::load(envelope.rows_per_speed_squared) * per_row;
-        let along = along.max(R::lit(0.0)).min(speeds);
-        let across = root * roots;
-        let (speed, cell) = (along.whole(TRACTION_SPEEDS - 1), across.whole(TRACTION_ROOTS - 1));
-        let (place, _) = (speed * roots + cell).place(TRACTION_SPEEDS * TRACTION_ROOTS, 4);
+        let (cell, [along, across]) = traction_cell(envelope, speed_squared, root);
+        let (place, _) = cell.place(TRACTION_SPEEDS * TRACTION_ROOTS, 4);
         let figure = |column: usize| R::pick(&envelope.traction, place, column);
-        let along = along - speed;
         let start = figure(0) + along * figure(1);
-        start + (across - cell) * (figure(2) + along * figure(3))
+        start + across * (figure(2) + along * figure(3))
     }
 
     #[inline(always)]
@@ -235,15 +242,7 @@ impl<R: Lookup> Ground<R> for Sloped<R> {
     #[inline(always)]
     fn left_for_driving(self, envelope: &EnvelopeTable<R::Storage>, speed_squared: R, root: R) -> R {
         let loads = &envelope.loads;
-        let rows = envelope.rows.len() / ENVELOPE_WIDTH;
-        let per_row = R::lit(TRACTION_SPEEDS as f64 / rows as f64);
-        let (speeds, roots) = (R::lit(TRACTION_SPEEDS as f64), R::lit(TRACTION_ROOTS as f64));
-        let along = speed_squared * R::load(envelope.rows_per_speed_squared) * per_row;
-        let along = along.max(R::lit(0.0)).min(speeds);
-        let across = root * roots;
-        let (speed, cell) = (along.whole(TRACTION_SPEEDS - 1), across.whole(TRACTION_ROOTS - 1));
-        let beyond = [along - speed, across - cell];
-        let cell = speed * roots + cell;
+        let (cell, beyond) = traction_cell(envelope, speed_squared, root);
         let layer = self.layer(loads, speed_squared);
         let low = Self::traction_of(loads, layer.below, cell, beyond);
         let high = Self::traction_of(loads, layer.below + R::lit(1.0), cell, beyond);

@@ -3,7 +3,7 @@
 mod circuits;
 mod hybrid;
 mod identify;
-#[path = "../common/circuits.rs"]
+#[path = "../../examples/circuits/shapes.rs"]
 mod made;
 mod models;
 mod registry;

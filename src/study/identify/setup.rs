@@ -50,7 +50,7 @@ pub struct Setup {
 /// Time constants of its slowest motion in which a car forgets where it started. A thousandth is left after seven. In corners, near
 /// the limit of its tyres, a car settles about half as fast as straight ahead, where its motions are worked out.
 const TIME_CONSTANTS: f64 = 14.0;
-/// Windows where no length is set and whole laps are not what is wanted, s.
+/// Windows where none are set: those on which free parameters are chosen, and those of laps that the starting car does not drive, s.
 const WINDOW_S: f64 = 5.0;
 /// The least and the most that a car is given to settle, s.
 const SETTLE_S: [f64; 2] = [0.5, 10.0];
@@ -114,8 +114,8 @@ pub fn set_up(settings: &IdentifySettings) -> Result<Setup> {
         window_s: Some(WINDOW_S),
         ..settings.clone()
     };
-    let whole_laps_wanted = settings.window_s.is_some() || settings.log.is_none();
-    let instead = !whole_laps_wanted
+    let may_choose = settings.window_s.is_none() && settings.log.is_some();
+    let instead = may_choose
         && windowed(&in_windows, &fitted).is_ok()
         && windowed(&in_windows, &held).is_ok()
         && !windowed(settings, &fitted)
