@@ -137,7 +137,7 @@ impl FineLine {
         Ok(line)
     }
 
-    /// The lap of `car` on it within its table or one for each point; see [`lap_profile`] for the rest.
+    /// The lap of `car` on it within its table or one for each point; see [`lap_profile`](super::lap_profile) for the rest.
     ///
     /// # Errors
     /// As [`lap_profile`](super::lap_profile).
