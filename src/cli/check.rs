@@ -21,7 +21,7 @@ use std::path::{Path, PathBuf};
 /// Flags of `check`.
 #[derive(clap::Args)]
 #[command(
-    after_help = "Examples:\n  lapswarm check car.toml lap.csv\n  lapswarm check outing.ld --write-map channels.toml\n  lapswarm check car.toml --draw pictures\n  lapswarm check soft.tir hard.tir --draw compared\n  lapswarm check --kind track survey.csv"
+    after_help = "Examples:\n  lapswarm check car.toml lap.csv\n  lapswarm check lap.csv --car car.toml\n  lapswarm check outing.ld --write-map channels.toml\n  lapswarm check car.toml --draw pictures\n  lapswarm check soft.tir hard.tir --draw compared\n  lapswarm check --kind track survey.csv"
 )]
 pub struct Arguments {
     /// The files
@@ -31,6 +31,10 @@ pub struct Arguments {
     /// there is replaced
     #[arg(long, value_name = "DIR")]
     draw: Option<PathBuf>,
+    /// The car that drove the logs, a bundled name or a file: its steering ratio, wheelbase and rolling radii are used to read them
+    /// [default: the bundled car]
+    #[arg(long, value_name = "NAME|FILE")]
+    car: Option<String>,
     /// Channel map of the logs
     #[arg(long, value_name = "FILE")]
     channel_map: Option<PathBuf>,
@@ -126,7 +130,9 @@ fn relief_in_words(circuit: &Circuit) -> String {
     text
 }
 
-static LOG: FileKind = file("log", "a log", |path| log::described(path, None, None));
+static LOG: FileKind = file("log", "a log", |path| {
+    log::described(path, log::Reading::default())
+});
 
 static CHANNELS: FileKind = file("channels", "a channel map", |path| {
     let map = ChannelMap::read(path)?;
@@ -288,8 +294,12 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         let found = arguments.kind.map_or_else(|| guess(path), Ok).and_then(|kind| {
             // Whoever meant another kind sees why it is found wrong.
             let found = if kind.is(&LOG) {
-                let (map, write) = (&arguments.channel_map, &arguments.write_map);
-                log::described(path, map.as_deref(), write.as_deref())
+                let reading = log::Reading {
+                    car: arguments.car.as_deref(),
+                    map: arguments.channel_map.as_deref(),
+                    write: arguments.write_map.as_deref(),
+                };
+                log::described(path, reading)
             } else {
                 kind.read(path)
             };

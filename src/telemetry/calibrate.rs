@@ -33,7 +33,7 @@ const SURE_OFFSET: f64 = 3.0;
 /// Speed (m/s) below which wheel speeds are too coarse for a rolling radius.
 const ROLLING_MPS: f64 = 12.0;
 /// Least error of a radius that is corrected, as a share of it: of wheels that roll freely, and of driven ones, whose slip under
-/// power looks like a smaller radius: that against drag is half a per cent.
+/// power looks like a smaller radius.
 const LEAST_RADIUS: [f64; 2] = [0.002, 0.01];
 /// Half of the interval over which speed is differentiated for slip, s.
 const SLIP_S: f64 = 0.3;
@@ -371,11 +371,13 @@ fn take_off(log: &mut Log, role: Role, offset: Option<Offset>, least: f64) {
 struct Excess {
     value: f64,
     standard_error: f64,
+    /// What slip explains of it, twice the root mean square: a smaller excess may be slip that goes with more than that.
+    slip: f64,
     samples: usize,
 }
 
-/// The part of `excess` that neither turning nor, of driven wheels, slip explains. On straights slip goes with acceleration; in
-/// bends it depends on more than that.
+/// The part of `excess` that neither turning nor, of driven wheels, slip explains. On straights slip goes with acceleration and
+/// drag; in bends it depends on more than that.
 fn steady(log: &Log, excess: &[f64], driven: bool) -> Option<Excess> {
     let free_rolling = unbraked(log, &acceleration(log));
     // Over so long that noise does not make slip look less than it is.
@@ -387,16 +389,23 @@ fn steady(log: &Log, excess: &[f64], driven: bool) -> Option<Excess> {
     let one = vec![1.0; log.samples()];
     let per_metre = log.yaw_rate_radps.iter().zip(&log.vx_mps);
     let turning: Vec<f64> = per_metre.map(|(r, v)| r / v.max(1.0)).collect();
-    let (value, standard_error, samples) = if driven {
-        let found = regression(excess, [&one, &turning, &accel], &mask)?;
-        (found.factors[0], found.standard_errors[0], found.samples)
+    let (value, standard_error, samples, slip) = if driven {
+        // Power is needed against the drag as well, which grows with the square of speed.
+        let drag: Vec<f64> = log.vx_mps.iter().map(|v| v * v).collect();
+        let found = regression(excess, [&one, &turning, &accel, &drag], &mask)?;
+        let [_, _, of_accel, of_drag] = found.factors;
+        let looked_at = (0..log.samples()).filter(|i| mask[*i]);
+        let squares = looked_at.map(|i| (of_accel * accel[i] + of_drag * drag[i]).powi(2));
+        let slip = 2.0 * (squares.sum::<f64>() / found.samples.max(1) as f64).sqrt();
+        (found.factors[0], found.standard_errors[0], found.samples, slip)
     } else {
         let found = regression(excess, [&one, &turning], &mask)?;
-        (found.factors[0], found.standard_errors[0], found.samples)
+        (found.factors[0], found.standard_errors[0], found.samples, 0.0)
     };
     Some(Excess {
         value,
         standard_error,
+        slip,
         samples,
     })
 }
@@ -432,8 +441,12 @@ fn rolling_radii(log: &mut Log, declared: &Declared) {
             continue;
         };
         let free = declared.radius_is_free[axle];
-        let of_axle = LEAST_RADIUS[usize::from(driven)].max(SURE_RADIUS * common.standard_error);
-        let of_sides = LEAST_RADIUS[0].max(2.0 * SURE_RADIUS * half.standard_error);
+        let of_axle = LEAST_RADIUS[usize::from(driven)]
+            .max(SURE_RADIUS * common.standard_error)
+            .max(common.slip);
+        let of_sides = LEAST_RADIUS[0]
+            .max(2.0 * SURE_RADIUS * half.standard_error)
+            .max(2.0 * half.slip);
         let referred = reference_m.is_some();
         let common_applied = referred && !free && common.value.abs() >= of_axle;
         let sides_applied = referred && 2.0 * half.value.abs() >= of_sides;
@@ -561,6 +574,37 @@ mod tests {
             })
             .fold(0.0, f64::max);
         assert!(worst < 0.15, "{worst}");
+    }
+
+    /// Wheels that drive against a drag and up to half a g slip by several per cent, and their radii are the car's.
+    #[test]
+    fn slip_under_power_is_no_radius() {
+        let car = Car::default();
+        let mut log = car.drive(200.0, 50.0);
+        let accel: Vec<f64> = (0..log.samples())
+            .map(|i| 2.0 * (0.2 * log.time_s[i]).sin())
+            .collect();
+        let mut v = 25.0;
+        for (i, accel) in accel.into_iter().enumerate() {
+            v += accel * log.dt_s;
+            log.vx_mps[i] = v;
+            log.ax_mps2[i] = accel;
+            log.yaw_rate_radps[i] = 0.01 * (0.3 * log.time_s[i]).sin();
+            let slip = (accel + 0.0006 * v * v) / 100.0;
+            for (wheel, driven) in [0.0, 0.0, 1.0, 1.0].into_iter().enumerate() {
+                log.wheel_speed_radps[wheel][i] = v * (1.0 + driven * slip) / 0.325;
+            }
+        }
+        let declared = Declared {
+            rolling_radius_m: Some([0.325; 2]),
+            ..Declared::default()
+        };
+        rolling_radii(&mut log, &declared);
+        for role in Role::WHEELS {
+            let found = log.calibration.finding(role, FindingKind::RollingRadius).unwrap();
+            assert!(!found.applied, "{found:?}");
+            assert!((found.value / 0.325 - 1.0).abs() < 2e-3, "{found:?}");
+        }
     }
 
     #[test]

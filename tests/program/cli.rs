@@ -520,6 +520,49 @@ fn check_lists_the_channels_of_a_log_and_writes_a_map_of_them() {
     );
 }
 
+/// A log of the steering wheel's angle of a car with a ratio of its own, whose wheels are logged as speeds.
+#[test]
+fn check_reads_a_log_for_the_car_that_is_named() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let facts = "steering_ratio=18,tyre_radius_m=0.4";
+    let made = lapswarm(folder.path(), &["init", "car", "car.toml", "--set", facts]);
+    assert!(made.status.success(), "{}", text(&made.stderr));
+    let rows = (0..1200).map(|i| {
+        let t = f64::from(i) * 0.05;
+        let (v, yaw) = (20.0 + 2.0 * (0.3 * t).sin(), 0.2 * (0.7 * t).sin());
+        let steer = (18.0 * 2.7 * yaw / v).to_degrees();
+        let wheel = |side: f64| 3.6 * (v + side * 0.8 * yaw);
+        let (l, r) = (wheel(-1.0), wheel(1.0));
+        format!(
+            "{t},{l},{r},{l},{r},{steer},{},{},{}\n",
+            3.6 * v,
+            v * yaw,
+            yaw.to_degrees()
+        )
+    });
+    let head = "time (s),wheel speed fl (km/h),wheel speed fr (km/h),wheel speed rl (km/h),wheel speed rr (km/h),\
+                steering wheel angle (deg),vehicle speed (km/h),lateral acceleration (m/s^2),yaw rate (deg/s)\n";
+    let log = format!("{head}{}", rows.collect::<String>());
+    std::fs::write(folder.path().join("own.csv"), log).expect("a log");
+    let checked = lapswarm(folder.path(), &["check", "own.csv", "--car", "car.toml"]);
+    let told = text(&checked.stdout);
+    assert!(checked.status.success(), "{told} {}", text(&checked.stderr));
+    for part in [
+        "steering ratio 18, rolling radii 0.4 m in front and 0.4 m at the rear",
+        "divided by the car's ratio of 18",
+    ] {
+        assert!(told.contains(part), "{part}: {told}");
+    }
+    let bundled = lapswarm(folder.path(), &["check", "own.csv"]);
+    assert!(
+        text(&bundled.stdout).contains("--car names the car"),
+        "{}",
+        text(&bundled.stdout)
+    );
+    let nowhere = lapswarm(folder.path(), &["check", "own.csv", "--car", "nowhere.toml"]);
+    assert_eq!(nowhere.status.code(), Some(2));
+}
+
 /// Names of channels that begin like places: a log is no track for them.
 #[test]
 fn a_log_of_lateral_and_longitudinal_g_is_a_log() {

@@ -7,9 +7,22 @@ use lapswarm::telemetry::{ChannelList, ChannelMap, Lap, Log, LogOptions, Outing,
 use lapswarm::vehicle::Car;
 use std::path::Path;
 
-/// Reads a log as an identification of the bundled car does, and says what is in it. Where something is missing its channels are
-/// printed nonetheless, so that a map can be written.
-pub fn described(path: &Path, map: Option<&Path>, write: Option<&Path>) -> Result<String> {
+/// How a log is read.
+#[derive(Clone, Copy, Default)]
+pub struct Reading<'a> {
+    /// The car that drove it, by name or file; the bundled one where none is given.
+    pub car: Option<&'a str>,
+    /// A channel map.
+    pub map: Option<&'a Path>,
+    /// Where a channel map is to be written.
+    pub write: Option<&'a Path>,
+}
+
+/// Reads a log as an identification of the car does, and says what is in it. Where something is missing its channels are printed
+/// nonetheless, so that a map can be written.
+pub fn described(path: &Path, reading: Reading<'_>) -> Result<String> {
+    let Reading { map, write, .. } = reading;
+    let car = reading.car.map_or_else(Car::bundled, Car::load)?;
     let map = map.map_or_else(|| Ok(ChannelMap::default()), ChannelMap::read)?;
     let recording = Recording::read(path)?;
     let recording = map.computed(&recording)?;
@@ -19,7 +32,7 @@ pub fn described(path: &Path, map: Option<&Path>, write: Option<&Path>) -> Resul
         write_new(&[(file.to_owned(), list.map_text().as_bytes())])?;
         text += &format!("  channel map: {}\n", file.display());
     }
-    let car = Car::bundled()?;
+    text += &read_for(&car, reading.car.is_some());
     let options = LogOptions::of(&car);
     let told = || {
         outln!("{}: {} channels", path.display(), list.channels.len());
@@ -61,6 +74,20 @@ pub fn described(path: &Path, map: Option<&Path>, write: Option<&Path>) -> Resul
         1.0 / log.dt_s,
         text.trim_end()
     ))
+}
+
+/// What the log's reading takes from the car.
+fn read_for(car: &Car, is_given: bool) -> String {
+    let radii = [car.chassis.radius_front, car.chassis.radius_rear];
+    let other = if is_given {
+        ""
+    } else {
+        "; --car names the car that drove"
+    };
+    format!(
+        "  read for the car {}: steering ratio {}, rolling radii {} m in front and {} m at the rear{other}\n",
+        car.name, car.steering_ratio, radii[0], radii[1]
+    )
 }
 
 /// The laps with their times, a line each; `time_s` is that of a sample.

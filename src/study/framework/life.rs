@@ -194,7 +194,7 @@ pub(in crate::study) fn run<S: Study>(request: Request<'_>) -> Result<Answer> {
     let (settings, resumed) = begin::<S>(&request)?;
     // What no input has room for is refused before any is read.
     drop(memory::check(&S::size(&settings, None), limit_mib)?);
-    let prepared = S::prepare(&settings)?;
+    let prepared = S::prepare_until(&settings, &request.stop)?;
     let kept = S::size(&settings, Some(&prepared));
     let _allowed = memory::check(&kept, limit_mib)?;
     if request.dry_run {

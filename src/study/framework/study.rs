@@ -147,6 +147,14 @@ pub trait Study: Sized + 'static {
     /// [`Error::Io`] and [`Error::Input`] for what cannot be read or used.
     fn prepare(settings: &Self::Settings) -> Result<Self::Prepared>;
 
+    /// The same, where part of it takes long and ends with what it has once `stop` is raised.
+    ///
+    /// # Errors
+    /// Those of [`Study::prepare`].
+    fn prepare_until(settings: &Self::Settings, _: &AtomicBool) -> Result<Self::Prepared> {
+        Self::prepare(settings)
+    }
+
     /// What it keeps in memory: before anything is read, and with what was read.
     fn size(settings: &Self::Settings, prepared: Option<&Self::Prepared>) -> Vec<MemoryItem>;
 

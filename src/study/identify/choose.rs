@@ -29,15 +29,35 @@ pub struct Choice {
     pub tried: Vec<Tried>,
     /// Why all of them are found, where nothing could be chosen.
     pub not_chosen: Option<String>,
+    /// The values that they were fitted to, in the order of the names; none where nothing could be chosen.
+    #[serde(skip)]
+    pub values: Vec<f64>,
+    /// Whether the time was over before the choice was finished.
+    #[serde(skip)]
+    pub cut_short: bool,
 }
 
 impl Choice {
+    /// The values that it came to, as a candidate of this problem; nothing where nothing could be chosen.
+    pub(super) fn candidate(&self, replay: &ReplayProblem) -> Option<Vec<f64>> {
+        let value = |name: &str| {
+            let place = self.names.iter().position(|n| n == name)?;
+            self.values.get(place).copied()
+        };
+        replay.problem.variables.iter().map(|v| value(&v.name)).collect()
+    }
+
     /// The choice in words.
     pub fn to_text(&self) -> String {
         let listed = self.names.join(", ");
         if let Some(reason) = &self.not_chosen {
-            return format!("All {} parameters are found, since {reason}.", self.among);
+            return format!("All {} parameters are to be found, since {reason}.", self.among);
         }
+        let ended = if self.cut_short {
+            " The time was over before the choice was finished."
+        } else {
+            ""
+        };
         let errors = self
             .tried
             .iter()
@@ -45,7 +65,7 @@ impl Choice {
         let errors: Vec<String> = errors.collect();
         format!(
             "Of {} parameters the log chose {}: {listed}. Errors on windows that were not fitted, as a share of the channels' \
-             spread, by the number of parameters: 0 {:.4}, {}.",
+             spread, by the number of parameters: 0 {:.4}, {}.{ended}",
             self.among,
             self.names.len(),
             self.starting_error.unwrap_or(f64::NAN),
@@ -57,13 +77,15 @@ impl Choice {
 /// Numbers of parameters that are tried, besides all of them.
 const LADDER: [usize; 12] = [1, 2, 3, 4, 6, 8, 11, 15, 20, 30, 45, 70];
 /// Scored time that the choice looks at, s: as many windows as that, spread over the log.
-const LOOKS_AT_S: f64 = 240.0;
+const LOOKS_AT_S: f64 = 120.0;
+/// Runge-Kutta steps of one drive through all of these, at the most.
+const LOOKS_AT_STEPS: f64 = 20_000.0;
 /// Drives of each polish.
 const DRIVES: usize = 10;
 /// A longer list must lower the error by this share, or the shorter one is taken.
 const WORTH: f64 = 0.005;
 /// Lists that are tried beyond the best one.
-const PATIENCE: usize = 2;
+const PATIENCE: usize = 1;
 /// An error under this share of the spread is rounding.
 const EXACT: f64 = 1e-7;
 /// Of a column, the part that those before it do not explain must be more than this share of it.
@@ -75,6 +97,8 @@ struct Path<'a> {
     weights: [f64; CHANNELS],
     chosen: Vec<usize>,
     values: Vec<f64>,
+    /// Whether the time is over.
+    over: bool,
 }
 
 impl<'a> Path<'a> {
@@ -85,12 +109,17 @@ impl<'a> Path<'a> {
             weights,
             chosen: Vec::new(),
             values: pool.free.values_in(pool.free.base()),
+            over: false,
         }
     }
 
     /// Adds parameters until there are `count`, those first that lower the error most by the present derivatives, and fits all of
     /// them. `false` if the car is lost or nothing more can be told.
-    fn extend_to(&mut self, count: usize) -> Result<bool> {
+    fn extend_to(&mut self, count: usize, watch: &mut dyn FnMut() -> ControlFlow<()>) -> Result<bool> {
+        self.over |= watch().is_break();
+        if self.over {
+            return Ok(false);
+        }
         let Some(residuals) = self.pool.residuals(&self.values) else {
             return Ok(false);
         };
@@ -101,8 +130,8 @@ impl<'a> Path<'a> {
         }
         let part = part_of(self.pool, &self.chosen)?;
         let from: Vec<f64> = self.chosen.iter().map(|&k| self.values[k]).collect();
-        let mut watch = || ControlFlow::Continue(());
-        if let Some(polished) = polish_observed(&part, &from, self.weights, DRIVES, &mut watch) {
+        if let Some(polished) = polish_observed(&part, &from, self.weights, DRIVES, watch) {
+            self.over |= polished.interrupted;
             for (&k, x) in self.chosen.iter().zip(polished.candidate) {
                 self.values[k] = x;
             }
@@ -198,11 +227,16 @@ fn ladder(all: usize) -> impl Iterator<Item = usize> {
 }
 
 /// Chooses among the parameters of `pool` by cross-validation on its windows: lists of rising length are fitted to one half of them
-/// and judged on the other, and the other way round. Nothing is random.
+/// and judged on the other, and the other way round. Nothing is random. `watch` is asked before each drive and may break the choice
+/// off: it is then that of the lists which were tried.
 ///
 /// # Errors
 /// Those of putting a problem together.
-pub(super) fn choose(pool: &ReplayProblem, scales: &[f64; CHANNELS]) -> Result<Choice> {
+pub(super) fn choose(
+    pool: &ReplayProblem,
+    scales: &[f64; CHANNELS],
+    watch: &mut dyn FnMut() -> ControlFlow<()>,
+) -> Result<Choice> {
     let weights = scales.map(|s| 1.0 / s);
     let windows = looked_at(pool);
     let with = |windows: Vec<Window<f64>>| {
@@ -222,6 +256,8 @@ pub(super) fn choose(pool: &ReplayProblem, scales: &[f64; CHANNELS]) -> Result<C
         starting_error,
         tried: Vec::new(),
         not_chosen: Some(reason.to_owned()),
+        values: Vec::new(),
+        cut_short: false,
     };
     let halves = [with(half(0)), with(half(1))];
     if halves.iter().any(|half| half.plan.windows.is_empty()) {
@@ -250,11 +286,18 @@ pub(super) fn choose(pool: &ReplayProblem, scales: &[f64; CHANNELS]) -> Result<C
     }
     let mut tried: Vec<Tried> = Vec::new();
     let mut best = (1, starting_error);
+    // What the first half came to with the best list: it stands where the time does not reach to fit all windows.
+    let mut found = (Vec::new(), Vec::new());
+    let mut cut_short = false;
     let mut since = 0;
     for count in ladder(all) {
         let mut longer = false;
         for path in &mut paths {
-            longer |= path.extend_to(count)?;
+            longer |= path.extend_to(count, watch)?;
+        }
+        cut_short = paths.iter().any(|path| path.over);
+        if cut_short {
+            break;
         }
         let Some(held_out_error) = error(&paths).filter(|_| longer) else {
             break;
@@ -266,6 +309,7 @@ pub(super) fn choose(pool: &ReplayProblem, scales: &[f64; CHANNELS]) -> Result<C
         since += 1;
         if held_out_error < best.1 * (1.0 - WORTH) {
             best = (count, held_out_error);
+            found = (paths[0].chosen.clone(), paths[0].values.clone());
             since = 0;
         }
         if since > PATIENCE || best.1 < EXACT {
@@ -275,16 +319,28 @@ pub(super) fn choose(pool: &ReplayProblem, scales: &[f64; CHANNELS]) -> Result<C
     let whole = with(windows.clone());
     let mut path = Path::begin(&whole, weights);
     for count in ladder(all).take_while(|n| *n < best.0).chain([best.0]) {
-        path.extend_to(count)?;
+        path.extend_to(count, watch)?;
     }
-    if path.chosen.is_empty() {
-        return Ok(every_one(
-            Some(starting_error),
-            "the log tells none of them by itself",
-        ));
+    cut_short |= path.over;
+    if !cut_short {
+        found = (path.chosen, path.values);
+    }
+    let (chosen, values) = found;
+    if chosen.is_empty() {
+        let reason = if cut_short {
+            "the time was over before the log chose among them"
+        } else {
+            "the log tells none of them by itself"
+        };
+        return Ok(Choice {
+            cut_short,
+            ..every_one(Some(starting_error), reason)
+        });
     }
     Ok(Choice {
-        names: path.chosen.into_iter().map(name).collect(),
+        values: chosen.iter().map(|&k| values[k]).collect(),
+        cut_short,
+        names: chosen.into_iter().map(name).collect(),
         among: all,
         starting_error: Some(starting_error),
         tried,
@@ -302,14 +358,56 @@ fn squares(problem: &ReplayProblem, values: &[f64], weights: &[f64; CHANNELS]) -
     Some([squares.sum(), errors.len() as f64])
 }
 
-/// As many windows as [`LOOKS_AT_S`], evenly spread, of those that the starting car drives to their end.
+/// As many windows as [`LOOKS_AT_S`] and [`LOOKS_AT_STEPS`] have room for, evenly spread, of those that the starting car drives to their
+/// end.
 fn looked_at(pool: &ReplayProblem) -> Vec<Window<f64>> {
     let drives = |w: &&Window<f64>| trace(pool.free.base(), pool.tyre_model(), &pool.plan, w).drives;
     let windows: Vec<Window<f64>> = pool.plan.windows.iter().filter(drives).copied().collect();
     let scored = |w: &Window<f64>| (w.end - w.start - w.scored_from) as f64 * pool.interval_s;
     let total: f64 = windows.iter().map(scored).sum();
-    let every = (total / LOOKS_AT_S).ceil().max(1.0) as usize;
+    let samples: usize = windows.iter().map(|w| w.end - w.start).sum();
+    let steps = (samples * pool.plan.fractions.len()) as f64;
+    let every = (total / LOOKS_AT_S).max(steps / LOOKS_AT_STEPS).ceil().max(1.0) as usize;
     // Pairs, so that both halves have windows side by side.
     let pairs = windows.chunks(2).step_by(every);
     pairs.flatten().copied().collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::settings::Unknowns;
+    use super::super::{IdentifySettings, search_with, set_up_until};
+    use crate::evaluate::replay::open_evaluator;
+    use crate::study::framework::state_file::StateFile;
+    use crate::vehicle::Car;
+    use std::ops::ControlFlow;
+    use std::sync::atomic::AtomicBool;
+
+    /// A study that is stopped before anything is chosen or driven ends with the car that it began from, judged.
+    #[test]
+    fn a_choice_without_time_leaves_the_starting_car() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut car = Car::bundled().unwrap();
+        car.chassis.inertia_yaw *= 1.3;
+        car.write(folder.path(), "other").unwrap();
+        let settings = IdentifySettings {
+            car: folder.path().join("other.toml").display().to_string(),
+            free: Unknowns {
+                among: Vec::new(),
+                auto: true,
+            },
+            section: Some("Abbey".to_owned()),
+            ..IdentifySettings::default()
+        };
+        let setup = set_up_until(&settings, &AtomicBool::new(true)).unwrap();
+        let choice = setup.choice.as_ref().unwrap();
+        assert!(choice.names.len() == choice.among && choice.among > 10);
+        let mut evaluator = open_evaluator(&setup.replay, settings.backend, None).unwrap();
+        let mut observe = |_: &_| ControlFlow::Continue(());
+        let state = (None, &mut StateFile::idle());
+        let outcome = search_with(&settings, &setup, evaluator.as_mut(), state, &mut observe).unwrap();
+        assert!(outcome.record.interrupted && outcome.history.is_empty());
+        let replay = &setup.replay;
+        assert_eq!(outcome.candidate, replay.free.values_in(replay.free.base()));
+    }
 }

@@ -6,6 +6,7 @@ mod identifiability;
 mod notes;
 mod page;
 mod polish;
+mod pool;
 mod refine;
 mod resident;
 mod results;
@@ -22,6 +23,7 @@ pub use polish::{Polished, polish};
 pub use results::Summary;
 pub use search::{Judged, Outcome, judge_candidate, search_with, total_parameter_error};
 pub use settings::{Algorithm, FreeParameter, IdentifySettings, ModelChoice, ObjectiveChoice, Unknowns};
+pub(in crate::study) use setup::set_up_until;
 pub use setup::{Setup, cost_unit, lap_format, set_up};
 pub(in crate::study) use setup::{planned, subject, without_laps};
 pub use state::{Front, HistoryRow, SearchState};
@@ -62,7 +64,11 @@ impl Study for Identify {
     type Summary = Summary;
 
     fn prepare(settings: &IdentifySettings) -> Result<Setup> {
-        let setup = set_up(settings)?;
+        Self::prepare_until(settings, &AtomicBool::new(false))
+    }
+
+    fn prepare_until(settings: &IdentifySettings, stop: &AtomicBool) -> Result<Setup> {
+        let setup = set_up_until(settings, stop)?;
         search::check_swarms(settings, &setup)?;
         Ok(setup)
     }

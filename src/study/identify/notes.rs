@@ -17,10 +17,27 @@ pub(super) fn notes(setup: &Setup, summary: &Summary) -> Vec<String> {
             "Half of the parameters or more cannot be told from this log. With free = \"auto\" those that it can tell are found.".to_owned(),
         );
     }
+    let given = setup.replay.free.values_in(setup.replay.free.base());
+    for (v, value) in setup.replay.problem.variables.iter().zip(given) {
+        if !(v.lower..=v.upper).contains(&value) {
+            notes.push(format!(
+                "The starting car has {} = {value} {}, outside of the bounds within which it was looked for ({} to {}).",
+                v.name, v.unit, v.lower, v.upper
+            ));
+        }
+    }
     if let Some(window_s) = setup.windows_instead_s {
         notes.push(format!(
             "The starting car does not drive the laps to their end, and few others would. The log is scored in windows of {window_s} s \
              that start from the logged state (window_s sets their length)."
+        ));
+    }
+    if setup.windows_left_out > 0 {
+        let all = setup.windows_left_out + setup.replay.plan.windows.len();
+        notes.push(format!(
+            "{} of {all} windows are not fitted: the car that the choice of parameters came to is lost in them. It was driven beyond \
+             what this model of it can do, or starts too far from the car that drove.",
+            setup.windows_left_out
         ));
     }
     let (taken, needed) = (summary.substeps, summary.substeps_needed);

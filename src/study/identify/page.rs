@@ -266,7 +266,9 @@ pub(super) fn parameters(summary: &Summary) -> Table<'static> {
 }
 
 fn convergence(page: &mut HtmlReport, folder: &Path, outcome: &Outcome) -> Result<()> {
-    let rows = &outcome.history;
+    // Before any candidate drives there is nothing to draw.
+    let drives = |r: &&super::HistoryRow| r.best.iter().all(|best| best.is_finite());
+    let rows: Vec<&super::HistoryRow> = outcome.history.iter().filter(drives).collect();
     let width = rows.first().map_or(0, |r| r.best.len());
     if width == 0 {
         return Ok(());

@@ -7,10 +7,10 @@ use super::settings::{Algorithm, EXPLORE, FRONT, GATHER, IdentifySettings};
 use super::setup::{CHANNELS, Setup};
 use super::state::{Front, HistoryRow, Place, SearchState, inputs_of};
 use crate::error::{Error, Result};
-use crate::evaluate::replay::{ReplayProblem, Residuals, trace};
+use crate::evaluate::replay::{ReplayProblem, Residuals, Window, trace};
 use crate::evaluate::{DeviceFaults, Evaluator, FailureCounts, Logarithmic, add_failures};
 use crate::study::framework::state_file::{Origin, StateFile};
-use crate::study::framework::{Progress as Told, RunRecord, Watch};
+use crate::study::framework::{Progress as Told, RunRecord, State, Watch};
 use crate::swarm::metrics::nearest_to_ideal;
 use crate::swarm::{
     CovarianceSettings, CovarianceSwarm, FrontSwarm, MopsoSettings, Optimiser, Progress, Pso, PsoSettings,
@@ -58,28 +58,34 @@ pub fn search_with(
     let watch = Watch::begin();
     let origin = Origin::new(inputs_of(setup), &evaluator.backend());
     let mut state = match state {
-        Some(state) => {
+        // What to find may have been chosen in less time than it is now, where the search had not begun.
+        Some(state) if !state.is_untouched() => {
             state_file.check(&state.origin, &origin)?;
             state
         }
-        None => SearchState {
+        _ => SearchState {
             settings: settings.clone(),
             origin,
             history: Vec::new(),
             elapsed_s: 0.0,
             failures: FailureCounts::new(),
             device_faults: Vec::new(),
-            place: first_place(settings, setup)?,
+            place: begin(settings, setup, evaluator)?,
         },
     };
     state_file.save(&state)?;
     let before_s = state.elapsed_s;
     let mut faults = DeviceFaults::of(evaluator);
     let began = Instant::now();
-    let mut interrupted = false;
+    let mut interrupted = setup.choice.as_ref().is_some_and(|choice| choice.cut_short);
     let mut resident = Resident::of(settings, setup, &state)?;
     let mut swarm_backend = None;
-    while !matches!(state.place, Place::Searched { .. }) {
+    while !interrupted && !matches!(state.place, Place::Searched { .. }) {
+        if matches!(state.place, Place::Gather { .. }) && agrees(&state.history) {
+            state.place = next_place(state.place, settings, evaluator)?;
+            state_file.save_or_warn(&state);
+            continue;
+        }
         let advanced = match &mut resident {
             Some(resident) => resident.advance()?,
             None => state.place.advance(evaluator)?,
@@ -121,17 +127,11 @@ pub fn search_with(
     let swarm_s = before_s + began.elapsed().as_secs_f64();
     let evaluations = state.history.last().map_or(0, |row| row.evaluations);
     let backend = swarm_backend.unwrap_or_else(|| evaluator.backend());
-    // Of a search that is interrupted before anything drives there is nothing to tell yet; its state is saved.
-    let folder = state_file.folder().to_owned();
-    let nothing_yet = |error: Error, interrupted: bool| {
-        if interrupted {
-            Error::Interrupted(folder.clone())
-        } else {
-            error
-        }
+    let (swarm_candidate, front) = if interrupted {
+        best_of_interrupted(setup, &state.place, evaluator)?
+    } else {
+        best_so_far(&state.place, evaluator)?
     };
-    let best = best_so_far(&state.place, evaluator);
-    let (swarm_candidate, front) = best.map_err(|e| nothing_yet(e, interrupted))?;
 
     let polish_began = Instant::now();
     let mut refined = None;
@@ -160,10 +160,15 @@ pub fn search_with(
         own
     };
     let own = own_starts(&setup.replay);
-    let judged = own.residuals(&candidate).map(|residuals| (own, residuals));
-    let (replay, residuals) = judged
-        .or_else(|| Some((setup.replay.clone(), setup.replay.residuals(&candidate)?)))
-        .ok_or_else(|| nothing_yet(nothing_drives(), interrupted))?;
+    let (replay, residuals) = match (own.residuals(&candidate), setup.replay.residuals(&candidate)) {
+        (Some(residuals), _) => (own, residuals),
+        (None, Some(residuals)) => (setup.replay.clone(), residuals),
+        (None, None) if interrupted => {
+            let residuals = residuals_of_driven(&own, &candidate);
+            (own, residuals)
+        }
+        (None, None) => return Err(nothing_drives()),
+    };
     let holdout = setup.holdout.as_ref().map(own_starts);
     let (candidate, residuals) = as_given_without_effect(&replay, candidate, residuals);
     let polish_s = polish_began.elapsed().as_secs_f64();
@@ -184,6 +189,83 @@ pub fn search_with(
         hops,
         replay,
         holdout,
+    })
+}
+
+/// Where a search begins: about the values that the choice of what to find has come to, if these drive the log, and else with the
+/// first swarm.
+fn begin(settings: &IdentifySettings, setup: &Setup, evaluator: &mut dyn Evaluator) -> Result<Place> {
+    if settings.algorithm == Algorithm::Adaptive
+        && settings.objectives.len() == 1
+        && let Some(best) = chosen_values(setup)
+    {
+        let worth = evaluator.evaluate(&best)?.worths(1)[0];
+        if worth.succeeded() {
+            let seen = Logarithmic::new(evaluator);
+            let swarm =
+                CovarianceSwarm::new(seen.problem(), &seen.of_parameters(&best), gathering(settings))?;
+            return Ok(Place::Gather {
+                best,
+                worth,
+                swarm: Box::new(swarm),
+            });
+        }
+    }
+    first_place(settings, setup)
+}
+
+/// The candidate that the choice of what to find has come to.
+fn chosen_values(setup: &Setup) -> Option<Vec<f64>> {
+    setup.choice.as_ref()?.candidate(&setup.replay)
+}
+
+/// What an interrupted search hands on: the best that it has come to, or what it began from where that drives the log better. Where
+/// the truth is known, a search that has a best of its own is not given the starting car, which may be it.
+fn best_of_interrupted(
+    setup: &Setup,
+    place: &Place,
+    evaluator: &mut dyn Evaluator,
+) -> Result<(Vec<f64>, Option<Front>)> {
+    let replay = &setup.replay;
+    let given = replay.free.values_in(replay.free.base());
+    let own = best_so_far(place, evaluator).ok();
+    if own.is_some() && (setup.truth.is_some() || replay.problem.objectives.len() > 1) {
+        return own.ok_or_else(nothing_drives);
+    }
+    let own = own.map(|(candidate, _)| candidate);
+    let candidates: Vec<Vec<f64>> = [own, chosen_values(setup), Some(given)]
+        .into_iter()
+        .flatten()
+        .collect();
+    let worths = evaluator
+        .evaluate(&candidates.concat())?
+        .worths(replay.problem.objectives.len());
+    // Of those that are lost the last, the starting car.
+    let better = |a: usize, b: usize| {
+        if worths[b] < worths[a] || !worths[a].succeeded() {
+            b
+        } else {
+            a
+        }
+    };
+    let best = (0..candidates.len()).reduce(better).unwrap_or(0);
+    Ok((candidates[best].clone(), None))
+}
+
+/// Residuals over the windows that a candidate drives to their end; none where it drives no window.
+fn residuals_of_driven(replay: &ReplayProblem, candidate: &[f64]) -> Residuals {
+    let flat = replay.flat(candidate);
+    let mut driven = replay.clone();
+    let drives = |w: &Window<f64>| trace(&flat, replay.tyre_model(), &replay.plan, w).drives;
+    driven.plan.windows.retain(drives);
+    let found = if driven.plan.windows.is_empty() {
+        None
+    } else {
+        driven.residuals(candidate)
+    };
+    found.unwrap_or_else(|| Residuals {
+        errors: Vec::new(),
+        columns: vec![Vec::new(); replay.dimensions()],
     })
 }
 
@@ -401,6 +483,22 @@ fn front_settings(settings: &IdentifySettings, motion: PsoSettings) -> MopsoSett
     }
 }
 
+/// Iterations over which a gathering swarm must agree,
+const AGREED_FOR: usize = 10;
+/// and the share of the cost within which half of it must lie. Least squares goes on from there.
+const AGREED_WITHIN: f64 = 1e-3;
+
+/// Whether a gathering swarm with this history has nothing left to find that least squares does not: half of its candidates cost the
+/// same but for a thousandth, and none is lost. Where the log can be driven exactly, the costs fall together and this never is.
+fn agrees(history: &[HistoryRow]) -> bool {
+    let last = history.len().saturating_sub(AGREED_FOR);
+    let agree = |row: &HistoryRow| {
+        let costs = row.median.zip(row.best.first());
+        row.failed == 0 && costs.is_some_and(|(median, best)| median - best <= AGREED_WITHIN * best)
+    };
+    history.len() >= AGREED_FOR && history[last..].iter().all(agree)
+}
+
 impl SearchState {
     /// Records an iteration; counts continue from the stage before.
     fn note(&mut self, progress: &Progress) {
@@ -515,4 +613,43 @@ pub fn total_parameter_error(candidate: &[f64], truth: &[f64], counts: impl Fn(u
             }
         })
         .sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn row(best: f64, median: Option<f64>, failed: usize) -> HistoryRow {
+        HistoryRow {
+            iteration: 1,
+            evaluations: 64,
+            best: vec![best],
+            median,
+            failed,
+            elapsed_s: 0.0,
+        }
+    }
+
+    #[test]
+    fn a_swarm_agrees_once_its_costs_are_the_same() {
+        let mut history = vec![row(0.3, Some(0.9), 2)];
+        history.extend((0..AGREED_FOR).map(|_| row(0.2, Some(0.2001), 0)));
+        assert!(agrees(&history));
+        assert!(!agrees(&history[..AGREED_FOR]));
+        for other in [
+            row(0.2, Some(0.21), 0),
+            row(0.2, Some(0.2001), 1),
+            row(0.2, None, 0),
+        ] {
+            history.push(other);
+            assert!(!agrees(&history));
+            history.pop();
+        }
+        // Costs that fall together towards an exact fit.
+        let falling: Vec<HistoryRow> = (0..50)
+            .map(|i| 0.5f64.powi(i))
+            .map(|x| row(x, Some(1.5 * x), 0))
+            .collect();
+        assert!(!agrees(&falling));
+    }
 }

@@ -1,5 +1,6 @@
 //! Settings of an identification.
 
+use super::pool;
 use crate::config::kinds::{
     Choice, Kind, choice, choices, count, counts, file, name_or_file, number, of, optional, quoted, shared,
     switch, text,
@@ -42,7 +43,7 @@ pub struct FreeParameter {
 /// The parameters to find.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Unknowns {
-    /// The parameters.
+    /// The parameters; with `auto` none, where they are those that are usually not known of a car.
     pub among: Vec<FreeParameter>,
     /// Whether those of them are found that the log can tell, and not all.
     pub auto: bool,
@@ -167,7 +168,7 @@ settings! {
         truth: Option<String> ["-"] = None, optional(name_or_file()).example("\"gt\""),
             "The car that drove the log, where it is known: the parameters' errors are stated against it";
         free: Unknowns ["-"] = usual_unknowns(), of(Bounds),
-            "Parameters to find, each with its least and greatest value; with auto those of them that the log can tell, by cross-validation";
+            "Parameters to find, each with its least and greatest value; with auto those that the log can tell, by cross-validation, of these or else of what is usually not known of a car";
         free_from: Option<PathBuf> ["-"] = None, optional(file()).example("\"runs/sensitivity-001\""),
             "A run of sensitivity: its parameters that matter most are found, within the bounds of free or else over the range that it moved them";
         most: usize ["-"] = 12, count(1, 1000),
@@ -227,7 +228,7 @@ settings! {
     }
 
     fn consistent(&self) -> Result<()> {
-        if self.free.is_empty() {
+        if self.free.is_empty() && !self.free.auto {
             let expected = "at least one parameter = [lower, upper]";
             return Err(Error::input("the study", "table [free]", "no parameter", expected));
         }
@@ -290,12 +291,16 @@ struct Ranked {
 }
 
 impl IdentifySettings {
-    /// The parameters to find: those of the settings, or those that matter most by a sensitivity study.
+    /// The parameters to find: those of the settings, those that are usually not known of `car`, or those that matter most by a
+    /// sensitivity study.
     ///
     /// # Errors
     /// [`Error::Io`] if the study's summary cannot be read, [`Error::Input`] if it is another study's.
-    pub(super) fn freed(&self) -> Result<Vec<FreeParameter>> {
+    pub(super) fn freed(&self, car: &Car) -> Result<Vec<FreeParameter>> {
         let Some(run) = &self.free_from else {
+            if self.free.is_empty() {
+                return Ok(pool::unsure_of(car));
+            }
             return Ok(self.free.to_vec());
         };
         let path = if run.is_dir() {
@@ -352,7 +357,11 @@ impl IdentifySettings {
         let population = self.population.unwrap_or(if several { FRONT.0 } else { 0 });
         Size {
             population: population.saturating_mul(self.islands).max(EXPLORE.0),
-            variables: self.free_from.as_ref().map_or(self.free.len(), |_| self.most),
+            variables: match &self.free_from {
+                Some(_) => self.most,
+                None if self.free.is_empty() => pool::MOST,
+                None => self.free.len(),
+            },
             iterations: self.iterations.unwrap_or(GATHER.1),
             archive: if several { self.archive } else { 0 },
             ..Size::default()
@@ -372,7 +381,7 @@ impl Kind<Unknowns> for Bounds {
         if !table.is_table(key) {
             return match table.string(key)? {
                 None => Ok(None),
-                Some(word) if word == AUTO => Ok(Some(auto(usual_unknowns().among))),
+                Some(word) if word == AUTO => Ok(Some(auto(Vec::new()))),
                 Some(_) => Err(table.refuse(key, "\"auto\", or a table of parameters = [lower, upper]")),
             };
         }
@@ -391,11 +400,7 @@ impl Kind<Unknowns> for Bounds {
         let named = table.keys().filter(|name| *name != AUTO);
         let found = named.map(bounds).collect::<Result<Vec<_>>>()?;
         table.finish()?;
-        Ok(Some(match (is_auto, found.is_empty()) {
-            (true, true) => auto(usual_unknowns().among),
-            (true, false) => auto(found),
-            (false, _) => found.into(),
-        }))
+        Ok(Some(if is_auto { auto(found) } else { found.into() }))
     }
 
     fn write(&self, free: &Unknowns) -> Option<Written> {
@@ -414,7 +419,7 @@ impl Kind<Unknowns> for Bounds {
     }
 
     /// Names whose bounds are those of the present list, or from zero to one, or `name=lower:upper`; `auto` chooses among them, or
-    /// among the present list.
+    /// else among the study file's list, or else among what is usually not known of a car.
     fn parse(&self, text: &str, present: &Unknowns) -> Result<Unknowns, String> {
         let named = |part: &str| {
             if let Some((name, bounds)) = part.split_once('=') {
@@ -443,7 +448,7 @@ impl Kind<Unknowns> for Bounds {
             .filter(|part| *part != AUTO)
             .map(named)
             .collect::<Result<_, String>>()?;
-        let among = if auto && among.is_empty() {
+        let among = if auto && among.is_empty() && *present != usual_unknowns() {
             present.among.clone()
         } else {
             among

@@ -14,7 +14,9 @@ use crate::telemetry::{Axle, ChannelMap, Log, LogOptions, NativeFormat, Recordin
 use crate::track::{Circuit, Track};
 use crate::vehicle::Car;
 use crate::vehicle::modes::{fastest_mode, slowest_decay, stable_steps};
+use std::ops::ControlFlow;
 use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Number of compared channels.
 pub(super) const CHANNELS: usize = CHANNEL_NAMES.len();
@@ -43,6 +45,8 @@ pub struct Setup {
     pub without_run_up: usize,
     /// Length of the windows (s) where none was set and the starting car does not drive the laps to their end.
     pub windows_instead_s: Option<f64>,
+    /// Windows of the laps to fit that are left out, since the car that the choice came to is lost in them.
+    pub windows_left_out: usize,
     /// How the free parameters were chosen, where the log chose them.
     pub choice: Option<Choice>,
 }
@@ -52,6 +56,9 @@ pub struct Setup {
 const TIME_CONSTANTS: f64 = 14.0;
 /// Windows where none are set: those on which free parameters are chosen, and those of laps that the starting car does not drive, s.
 const WINDOW_S: f64 = 5.0;
+/// Windows where the starting car does not drive those to their end either, and how long a car may settle ahead of them, s: the further
+/// a car is from the one that drove, and the nearer that was to its limits, the sooner it goes elsewhere.
+const SHORT_S: [f64; 2] = [2.0, 1.0];
 /// The least and the most that a car is given to settle, s.
 const SETTLE_S: [f64; 2] = [0.5, 10.0];
 
@@ -76,8 +83,16 @@ fn settling_time(car: &Car, samples: &[Sample<f64>], laps: &[(usize, usize)], dt
 /// # Errors
 /// [`Error::Input`] naming file and field for anything that does not fit.
 pub fn set_up(settings: &IdentifySettings) -> Result<Setup> {
+    set_up_until(settings, &AtomicBool::new(false))
+}
+
+/// The same; once `stop` is raised, the choice of what to find ends with what it has.
+///
+/// # Errors
+/// Those of [`set_up`].
+pub(in crate::study) fn set_up_until(settings: &IdentifySettings, stop: &AtomicBool) -> Result<Setup> {
     let car = settings.model.of(Car::load(&settings.car)?);
-    let mut freed = settings.freed()?;
+    let mut freed = settings.freed(&car)?;
     let bundled = settings.log.is_none();
     let map = match &settings.channel_map {
         Some(path) => ChannelMap::read(path)?,
@@ -107,21 +122,34 @@ pub fn set_up(settings: &IdentifySettings) -> Result<Setup> {
     let settle_s = settings
         .settle_s
         .unwrap_or_else(|| settling_time(&car, &samples, &fitted, log.dt_s));
-    let windowed = |settings: &IdentifySettings, laps: &[(usize, usize)]| {
-        windows_over(settings, settle_s, &log, &samples, laps, circuit.as_ref())
+    let windowed = |(window_s, settle_s): (Option<f64>, f64), laps: &[(usize, usize)]| {
+        let settings = IdentifySettings {
+            window_s,
+            ..settings.clone()
+        };
+        windows_over(&settings, settle_s, &log, &samples, laps, circuit.as_ref())
     };
-    let in_windows = IdentifySettings {
-        window_s: Some(WINDOW_S),
-        ..settings.clone()
+    let driven = |cut: (Option<f64>, f64)| {
+        windowed(cut, &fitted)
+            .is_ok_and(|(windows, _)| drives(&car, &samples, windows, settings.substeps, log.dt_s))
     };
+    let as_set = (settings.window_s, settle_s);
+    let in_windows = (Some(WINDOW_S), settle_s);
+    let shorter = (
+        Some(SHORT_S[0]),
+        settings.settle_s.unwrap_or(settle_s.min(SHORT_S[1])),
+    );
     let may_choose = settings.window_s.is_none() && settings.log.is_some();
-    let instead = may_choose
-        && windowed(&in_windows, &fitted).is_ok()
-        && windowed(&in_windows, &held).is_ok()
-        && !windowed(settings, &fitted)
-            .is_ok_and(|(windows, _)| drives(&car, &samples, windows, settings.substeps, log.dt_s));
-    let cut = |laps: &[(usize, usize)]| windowed(if instead { &in_windows } else { settings }, laps);
-    let (fit_windows, without_run_up) = cut(&fitted)?;
+    let can_be = |cut: (Option<f64>, f64)| windowed(cut, &fitted).is_ok() && windowed(cut, &held).is_ok();
+    let cut = if !may_choose || !can_be(in_windows) || driven(as_set) {
+        as_set
+    } else if driven(in_windows) || !can_be(shorter) {
+        in_windows
+    } else {
+        shorter
+    };
+    let settle_s = cut.1;
+    let (mut fit_windows, without_run_up) = windowed(cut, &fitted)?;
     if fit_windows.is_empty() {
         let found = format!(
             "no stretch of the laps chosen above {} m/s",
@@ -134,7 +162,7 @@ pub fn set_up(settings: &IdentifySettings) -> Result<Setup> {
             "at least one window of the length asked for",
         ));
     }
-    let (held_windows, _) = cut(&held)?;
+    let (held_windows, _) = windowed(cut, &held)?;
     let slowest = fit_windows
         .iter()
         .chain(&held_windows)
@@ -161,16 +189,43 @@ pub fn set_up(settings: &IdentifySettings) -> Result<Setup> {
         Ok(problem)
     };
     let choice = if settings.free.auto {
-        let looked_at = match settings.window_s {
+        let looked_at = match cut.0 {
             Some(_) => fit_windows.clone(),
-            None => windowed(&in_windows, &fitted)?.0,
+            None => windowed(in_windows, &fitted)?.0,
         };
-        let choice = choose(&problem(&freed, looked_at)?, &scales)?;
-        freed.retain(|free| choice.names.contains(&free.name));
+        let mut watch = || match stop.load(Ordering::Relaxed) {
+            true => ControlFlow::Break(()),
+            false => ControlFlow::Continue(()),
+        };
+        let choice = choose(&problem(&freed, looked_at)?, &scales, &mut watch)?;
+        // A choice has the names that the car gives its parameters, and not what they may be called besides.
+        let chosen = |free: &FreeParameter| {
+            car.parameter(&free.name)
+                .is_some_and(|p| choice.names.contains(&p.name))
+        };
+        freed.retain(chosen);
         Some(choice)
     } else {
         None
     };
+    let mut windows_left_out = 0;
+    if let Some(choice) = choice.as_ref().filter(|_| cut.0.is_some()) {
+        // A window in which the chosen car is lost would lose nearly every candidate, and all that the others tell with it.
+        let replay = problem(&freed, fit_windows.clone())?;
+        if let Some(found) = choice.candidate(&replay) {
+            let flat = replay.flat(&found);
+            let windows = replay.plan.windows.iter();
+            let driven: Vec<bool> = windows
+                .map(|w| trace(&flat, replay.tyre_model(), &replay.plan, w).drives)
+                .collect();
+            let lost = driven.iter().filter(|driven| !**driven).count();
+            if 2 * lost < driven.len() {
+                windows_left_out = lost;
+                let mut keeps = driven.into_iter();
+                fit_windows.retain(|_| keeps.next().unwrap_or(true));
+            }
+        }
+    }
     let replay = problem(&freed, fit_windows)?;
     let holdout = (!held_windows.is_empty())
         .then(|| problem(&freed, held_windows))
@@ -185,7 +240,8 @@ pub fn set_up(settings: &IdentifySettings) -> Result<Setup> {
         log,
         settle_s,
         without_run_up,
-        windows_instead_s: instead.then_some(WINDOW_S),
+        windows_instead_s: cut.0.filter(|_| may_choose),
+        windows_left_out,
         choice,
     })
 }

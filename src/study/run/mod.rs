@@ -64,7 +64,11 @@ impl Study for Run {
     type Summary = Summary;
 
     fn prepare(settings: &RunSettings) -> Result<Prepared> {
-        let setup = Identify::prepare(&settings.identify)?;
+        Self::prepare_until(settings, &AtomicBool::new(false))
+    }
+
+    fn prepare_until(settings: &RunSettings, stop: &AtomicBool) -> Result<Prepared> {
+        let setup = Identify::prepare_until(&settings.identify, stop)?;
         let road = raceline::set_up(&settings.line_of(&settings.identify.car, None))?;
         let car = Car::load(&settings.identify.car)?;
         if car.hybrid.is_some() {
