@@ -85,7 +85,7 @@ const DRIVES: usize = 10;
 /// A longer list must lower the error by this share, or the shorter one is taken.
 const WORTH: f64 = 0.005;
 /// Lists that are tried beyond the best one.
-const PATIENCE: usize = 1;
+const PATIENCE: usize = 3;
 /// An error under this share of the spread is rounding.
 const EXACT: f64 = 1e-7;
 /// Of a column, the part that those before it do not explain must be more than this share of it.
