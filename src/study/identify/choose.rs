@@ -396,7 +396,6 @@ mod tests {
                 among: Vec::new(),
                 auto: true,
             },
-            section: Some("Abbey".to_owned()),
             ..IdentifySettings::default()
         };
         let setup = set_up_until(&settings, &AtomicBool::new(true)).unwrap();
