@@ -253,7 +253,7 @@ impl Program<'_> {
             upper.push((share + self.reach).min(1.0));
         }
         let (root, inverse, share) = (points, 2 * points, 2 * points + segments);
-        let mut program = ConicProgram::new(lower, upper).with_tolerance(1e-8);
+        let mut program = ConicProgram::new(lower, upper).for_step(1e-8, 1e-8);
         let affine = |constant: f64, terms: Vec<(usize, f64)>| Affine { constant, terms }.merged();
         for i in 0..points {
             // root^2 <= square

@@ -49,7 +49,9 @@ pub struct Start {
 
 /// Relative accuracy of a program at the least, and as a share of the gain that ends the sequence.
 const PROGRAM_TOLERANCE: f64 = 1e-8;
-const TOLERANCE_OF_GAIN: f64 = 0.01;
+const TOLERANCE_OF_GAIN: f64 = 0.025;
+/// What a program may leave to gain, as a share of the gain that ends the sequence.
+const GAP_OF_GAIN: f64 = 0.05;
 /// Share of the predicted gain below which a step is rejected.
 const LEAST_KEPT: f64 = 0.1;
 /// Share of the predicted gain above which the penalty on the next step is reduced.
@@ -121,7 +123,8 @@ pub fn descend(
             break;
         }
         let tolerance = PROGRAM_TOLERANCE.max(TOLERANCE_OF_GAIN * settings.least_gain);
-        let program = here.program(&judge, bounds, caution).with_tolerance(tolerance);
+        let gap = GAP_OF_GAIN * settings.least_gain * here.cost.abs();
+        let program = here.program(&judge, bounds, caution).for_step(tolerance, gap);
         let solution = program.solve()?;
         programs += 1;
         iterations += solution.iterations;

@@ -91,10 +91,13 @@ const CROSS_SECTIONS_TO_SAY_CONTROL: f64 = 1.4;
 /// bounds leave there.
 const TIGHTENINGS: usize = 6;
 const SPARE_M: f64 = 0.001;
-/// Most programs of a line taken about another, and of one that is solved anew within narrower bounds. More would gain less than
-/// a ten thousandth of a lap.
+/// Most programs of a line taken about another: of one that is to be taken more closely, of one that has been taken so before, and of
+/// one that has not. More would gain less than a ten thousandth of a lap.
+const PROGRAMS_FIRST: usize = 4;
+const PROGRAMS_AGAIN: usize = 3;
 const PROGRAMS_ABOUT: usize = 8;
-const PROGRAMS_TIGHTENED: usize = 4;
+/// Most programs of a line that is solved anew within narrower bounds.
+const PROGRAMS_TIGHTENED: usize = 3;
 /// Share of a lap by which stations of two lines of one road differ at the most.
 const NEARBY: f64 = 0.02;
 /// Share of a lap below which no cone program is worth its time. Programs that promise less gain a fraction of it: the envelope's
@@ -104,7 +107,7 @@ const LEAST_GAIN_ABOUT: f64 = 4e-5;
 /// percent by it.
 const ROUGHNESS_S: f64 = 5e-4;
 /// Times that the fastest line is taken about another before it is taken closely about itself.
-const ABOUTS: usize = 2;
+const ABOUTS: usize = 1;
 
 /// With two, ripples are left between the cross-sections that their lap time does not feel and a fine spline does.
 const CROSS_SECTIONS_PER_CONTROL: usize = 3;
@@ -307,9 +310,14 @@ impl ReferenceSolvers {
                 break;
             }
             let kept = turn == abouts;
+            let programs = match (kept, abouts) {
+                (false, _) => PROGRAMS_FIRST,
+                (true, 0) => PROGRAMS_ABOUT,
+                (true, _) => PROGRAMS_AGAIN,
+            };
             let how = if kept { &closest } else { &ABOUT };
             let alpha = found.as_ref().map_or(alpha, |f| &f.x);
-            if let Some(closer) = self.taken_about(envelope, alpha, how, kept)? {
+            if let Some(closer) = self.taken_about(envelope, alpha, how, (kept, programs))? {
                 let before_s = found.as_ref().map_or(0.0, |f| f.seconds);
                 found = Some(Optimum {
                     seconds: before_s + closer.seconds,
@@ -320,13 +328,14 @@ impl ReferenceSolvers {
         Ok(found)
     }
 
-    /// The fastest line about one, if it is faster. If it is to be kept on the road, a line on the road is better than any other.
+    /// The fastest line about one by so many programs at most, if it is faster. If it is to be kept on the road, a line on the road is
+    /// better than any other.
     fn taken_about(
         &self,
         envelope: &PointMassEnvelope,
         alpha: &[f64],
         how: &About,
-        kept: bool,
+        (kept, programs): (bool, usize),
     ) -> Result<Option<Optimum>> {
         let own = self.cross_sections.points(alpha);
         let count =
@@ -349,7 +358,7 @@ impl ReferenceSolvers {
         // Where the cross-sections are so far apart that no such spline is on the road, the line stays as it is.
         let settings = DescentSettings {
             least_gain: LEAST_GAIN_ABOUT,
-            programs: PROGRAMS_ABOUT,
+            programs,
             roughness_s: ROUGHNESS_S,
             ..DescentSettings::default()
         };

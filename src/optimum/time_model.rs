@@ -5,9 +5,12 @@ use super::geometry::{LineMap, Shape};
 use super::lap::{GripEnvelope, Lap, corner_square};
 use crate::vehicle::envelope::root_left;
 
-/// Least relative change of a squared speed in a step, so that speeds stay above zero.
-const LEAST_CHANGE: f64 = -0.9;
-
+/// Relative change of a squared speed beyond which no step goes: what is farther is no bound.
+const FAR_CHANGE: f64 = 1.0;
+/// Shares of the lateral grip: below the first, steps do without the bound of a corner's speed, since the tyres' ellipses hold them;
+/// below the second, the ellipse at a segment's tighter end holds for both.
+const NEAR_CORNER: f64 = 0.5;
+const NEAR_ELLIPSE: f64 = 0.5;
 /// Shares of the lateral and the longitudinal grip by which steps may come closer to the limit of the driven tyres. Where the car is
 /// farther from it, a step does without it, and its program takes half as long.
 const NEAR: f64 = 0.1;
@@ -34,7 +37,14 @@ pub(super) fn add_time(
         if held {
             (0.0, 0.0)
         } else {
-            (LEAST_CHANGE, (top / e - 1.0).max(0.0))
+            // Time falls with speed, so that none needs to be held from below.
+            let most = top / e - 1.0;
+            let upper = if most > FAR_CHANGE {
+                f64::INFINITY
+            } else {
+                most.max(0.0)
+            };
+            (f64::NEG_INFINITY, upper)
         }
     });
     let first = program.add_variables(bounds);
@@ -79,8 +89,7 @@ pub(super) fn add_time(
         shape.add_curvature(map, i, caution * squares[i] / grip.value, &mut turns);
         program.add_square(Affine::change(turns));
         program.add_square(Affine::change(vec![(square(i), caution)]));
-        // Both signs: on a straight a step may bend the line either way.
-        for sign in [1.0, -1.0] {
+        for sign in [1.0, -1.0].into_iter().filter(|sign| sign * used >= NEAR_CORNER) {
             let mut terms = vec![(square(i), -sign * by_square)];
             shape.add_curvature(map, i, -sign * squares[i] / grip.value, &mut terms);
             let constant = (1.0 - sign * used).max(0.0);
@@ -131,10 +140,16 @@ fn add_segment(
         terms(slope - 0.5 / (h * along), slope + 0.5 / (h * along), by_length),
     );
     let (across, lean) = (grip.lateral.value, envelope.lean_mps2());
-    // After a step the other end may be the tighter one, so both are limited.
-    let mixtures = match lap.bends.ends[s] {
-        mean @ [0.5, 0.5] => vec![mean],
-        _ => vec![[1.0, 0.0], [0.0, 1.0]],
+    let used_at = |[here, there]: [f64; 2]| {
+        let curvature = here * shape.bends_1pm()[s] + there * shape.bends_1pm()[next];
+        (curvature * middle + lean) / across
+    };
+    // After a step the other end may be the tighter one. Where much grip is used, both are limited.
+    let own = lap.bends.ends[s];
+    let mixtures = if own == [0.5, 0.5] || used_at(own).abs() < NEAR_ELLIPSE {
+        vec![own]
+    } else {
+        vec![[1.0, 0.0], [0.0, 1.0]]
     };
     for mixture in mixtures {
         let ends = [(s, mixture[0]), (next, mixture[1])];
@@ -160,7 +175,8 @@ fn add_segment(
         let least = envelope.traction(v, closer).map_or(along * closer, |t| t.value);
         let traction = envelope.traction(v, root);
         if let Some(traction) = traction.filter(|_| least < demand + NEAR * along) {
-            let left = program.add_variables(std::iter::once((0.0, 1.0)));
+            // The cone holds it below 1, and nothing gains by less than zero.
+            let left = program.add_variables(std::iter::once((f64::NEG_INFINITY, f64::INFINITY)));
             let whole = affine(used.abs().max(1.0), Vec::new());
             program.add_cone([whole, affine(0.0, vec![(left, 1.0)]), across]);
             let slope = 0.5 * per_square * (traction.by_speed - grip.drag.by_speed) / along;

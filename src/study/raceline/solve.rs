@@ -78,9 +78,10 @@ pub(super) fn find_lines(work: Work<'_, Raceline>) -> Result<Outcome> {
                     // optimum, so nothing is left to find downhill of it.
                     let mut best = report(&found.alpha)?;
                     let start = start.map(&report).transpose()?;
-                    match start.filter(|start| start.betters(&best, objective)) {
-                        Some(start) => best = start,
-                        None => {
+                    match start {
+                        Some(start) if start.betters(&best, objective) => best = start,
+                        Some(start) if !is_far_better(&best, &start, objective) => {}
+                        _ => {
                             let led = scope.spawn({
                                 let (found, interrupted) = (found.alpha.clone(), work.interrupted);
                                 move || led_downhill(settings, objective, &found, solvers, interrupted)
@@ -175,6 +176,15 @@ pub(super) fn find_lines(work: Work<'_, Raceline>) -> Result<Outcome> {
         exact_s,
         record,
     })
+}
+
+/// Share of an objective by which a swarm's line has to better the reference optimum that it started from. Less is what is left of
+/// the optimum's own accuracy, and the line is not led downhill again.
+const FAR_BETTER: f64 = 1e-4;
+
+fn is_far_better(line: &ReportedLine, start: &ReportedLine, objective: LineObjective) -> bool {
+    let gain = start.worth(objective) - line.worth(objective);
+    !start.clearance.is_on_road() || gain > FAR_BETTER * start.worth(objective).abs()
 }
 
 /// A best line that leaves the road is none.

@@ -28,7 +28,7 @@ const PANELS: [(&str, &str); 6] = [
 /// Room before and behind a section in its close-up (m).
 const ROOM_M: f64 = 60.0;
 /// Values of each `alpha` of a surface.
-const GRID: usize = 41;
+const GRID: usize = 25;
 
 /// Draws figures into `folder`, and writes the page.
 ///

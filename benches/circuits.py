@@ -1,0 +1,67 @@
+"""Fastest lines of circuits: lap, gap, processor time and clearance, as tables in Markdown.
+
+    cargo build --release
+    cargo run --release --example circuits -- circuits
+    python3 benches/circuits.py target/release/lapswarm circuits/*.csv
+
+With `--every 1 2 4 8` the cross-sections are so many metres apart, one row for each circuit; else a row has the study with one
+objective, the default three, and the gap to the best line of the first and of one with cross-sections every metre.
+"""
+
+import argparse
+import json
+import pathlib
+import resource
+import subprocess
+import tempfile
+
+
+def lines(program, track, *flags):
+    """The summary of a study, and the processor time that it took (s)."""
+    with tempfile.TemporaryDirectory() as folder:
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        command = [program, "raceline", "--track", track, "--out", f"{folder}/run", "--quiet", *flags]
+        subprocess.run(command, check=True, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+        summary = json.loads(pathlib.Path(folder, "run", "summary.json").read_text())
+    return summary, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+
+def main():
+    arguments = argparse.ArgumentParser(description=__doc__)
+    arguments.add_argument("program")
+    arguments.add_argument("tracks", nargs="+")
+    arguments.add_argument("--every", nargs="+", type=float, help="distances between cross-sections, m")
+    given = arguments.parse_args()
+    one = ["--objectives", "lap_time"]
+
+    def at(track, length_m, metres):
+        summary, cpu_s = lines(given.program, track, *one, "--sections", str(round(length_m / metres)))
+        return summary["best"]["lap_time"]["lap_time_fine_s"], cpu_s
+
+    if given.every:
+        print("| Circuit | " + " | ".join(f"{metres:g} m" for metres in given.every) + " |")
+        print("|---" * (1 + len(given.every)) + "|")
+    else:
+        print("| Circuit | Length, m | Lap, s | Above the best known, % | Clearance, m | Processor, s | For three, s |")
+        print("|---" * 7 + "|")
+    for track in given.tracks:
+        name = pathlib.Path(track).stem
+        summary, cpu_s = lines(given.program, track, *one)
+        length_m, best = summary["reference"]["length_fine_m"], summary["best"]["lap_time"]
+        if given.every:
+            laps = [at(track, length_m, metres) for metres in given.every]
+            cells = [f"{lap_s:.3f} ({taken_s:.1f})" for lap_s, taken_s in laps]
+            print(f"| {name} | " + " | ".join(cells) + " |", flush=True)
+            continue
+        _, three_s = lines(given.program, track)
+        lap_s = best["lap_time_fine_s"]
+        known_s = min(lap_s, at(track, length_m, 1.0)[0])
+        print(
+            f"| {name} | {length_m:.0f} | {lap_s:.3f} | {100 * (lap_s / known_s - 1):.3f} | {best['clearance_m']:.4f} | "
+            f"{cpu_s:.1f} | {three_s:.1f} |",
+            flush=True,
+        )
+
+
+main()
