@@ -392,12 +392,21 @@ fn steady(log: &Log, excess: &[f64], driven: bool) -> Option<Excess> {
     let (value, standard_error, samples, slip) = if driven {
         // Power is needed against the drag as well, which grows with the square of speed.
         let drag: Vec<f64> = log.vx_mps.iter().map(|v| v * v).collect();
+        let without = regression(excess, [&one, &turning, &accel], &mask)?;
         let found = regression(excess, [&one, &turning, &accel, &drag], &mask)?;
-        let [_, _, of_accel, of_drag] = found.factors;
+        let [of_all, _, of_accel, of_drag] = found.factors;
         let looked_at = (0..log.samples()).filter(|i| mask[*i]);
         let squares = looked_at.map(|i| (of_accel * accel[i] + of_drag * drag[i]).powi(2));
         let slip = 2.0 * (squares.sum::<f64>() / found.samples.max(1) as f64).sqrt();
-        (found.factors[0], found.standard_errors[0], found.samples, slip)
+        // Noise makes too much of a drag that is not there. What counts is what is left either way.
+        let least = of_all.abs().min(without.factors[0].abs());
+        let value = if of_all * without.factors[0] > 0.0 {
+            least.copysign(of_all)
+        } else {
+            0.0
+        };
+        let standard_error = found.standard_errors[0].max(without.standard_errors[0]);
+        (value, standard_error, found.samples, slip)
     } else {
         let found = regression(excess, [&one, &turning], &mask)?;
         (found.factors[0], found.standard_errors[0], found.samples, 0.0)

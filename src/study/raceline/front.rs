@@ -46,7 +46,7 @@ const BLENDS: u32 = 10;
 /// Steps between the objectives of the local search: `LATTICE` and the number of objectives give its lines.
 const LATTICE: u32 = 5;
 /// Cone programs for each line of the local search: most of the gain is in the first.
-const PROGRAMS: usize = 3;
+const PROGRAMS: usize = 5;
 
 /// Looks for the front. `known` are lines to start from and to keep (`alpha` at every cross-section). `begun` is the swarm of the same
 /// search that was interrupted, if one was, and what is known to go wrong with devices; `observe` is told of
