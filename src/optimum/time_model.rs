@@ -7,10 +7,8 @@ use crate::vehicle::envelope::root_left;
 
 /// Relative change of a squared speed beyond which no step goes: what is farther is no bound.
 const FAR_CHANGE: f64 = 1.0;
-/// Shares of the lateral grip: below the first, steps do without the bound of a corner's speed, since the tyres' ellipses hold them;
-/// below the second, the ellipse at a segment's tighter end holds for both.
+/// Share of the lateral grip below which steps do without the bound of a corner's speed, since the tyres' ellipses hold them.
 const NEAR_CORNER: f64 = 0.5;
-const NEAR_ELLIPSE: f64 = 0.5;
 /// Shares of the lateral and the longitudinal grip by which steps may come closer to the limit of the driven tyres. Where the car is
 /// farther from it, a step does without it, and its program takes half as long.
 const NEAR: f64 = 0.1;
@@ -140,16 +138,10 @@ fn add_segment(
         terms(slope - 0.5 / (h * along), slope + 0.5 / (h * along), by_length),
     );
     let (across, lean) = (grip.lateral.value, envelope.lean_mps2());
-    let used_at = |[here, there]: [f64; 2]| {
-        let curvature = here * shape.bends_1pm()[s] + there * shape.bends_1pm()[next];
-        (curvature * middle + lean) / across
-    };
-    // After a step the other end may be the tighter one. Where much grip is used, both are limited.
-    let own = lap.bends.ends[s];
-    let mixtures = if own == [0.5, 0.5] || used_at(own).abs() < NEAR_ELLIPSE {
-        vec![own]
-    } else {
-        vec![[1.0, 0.0], [0.0, 1.0]]
+    // After a step the other end may be the tighter one, so both are limited.
+    let mixtures = match lap.bends.ends[s] {
+        mean @ [0.5, 0.5] => vec![mean],
+        _ => vec![[1.0, 0.0], [0.0, 1.0]],
     };
     for mixture in mixtures {
         let ends = [(s, mixture[0]), (next, mixture[1])];

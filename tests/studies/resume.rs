@@ -118,7 +118,7 @@ impl Evaluator for NothingDrives {
 }
 
 #[test]
-fn a_search_that_is_broken_off_before_anything_drives_is_interrupted() {
+fn a_search_that_is_broken_off_before_anything_drives_hands_on_the_starting_car() {
     for objectives in [
         &[ObjectiveChoice::All][..],
         &[ObjectiveChoice::Channel(0), ObjectiveChoice::Channel(3)],
@@ -130,7 +130,7 @@ fn a_search_that_is_broken_off_before_anything_drives_is_interrupted() {
         let mut go = |state: Option<SearchState>, at: usize| {
             let mut seen = 0;
             let mut state_file = StateFile::new(folder.path());
-            let outcome = search_with(
+            search_with(
                 &settings,
                 &setup,
                 &mut evaluator,
@@ -143,15 +143,16 @@ fn a_search_that_is_broken_off_before_anything_drives_is_interrupted() {
                         ControlFlow::Continue(())
                     }
                 },
-            );
-            outcome.map(|_| ()).expect_err("nothing drives")
+            )
         };
-        let interrupted = go(None, 3);
-        assert_eq!(interrupted.exit_code(), 130, "{interrupted}");
-        assert!(matches!(interrupted, Error::Interrupted(at) if at == folder.path()));
+        let interrupted = go(None, 3).expect("the starting car drives the log");
+        assert!(interrupted.record.interrupted);
+        let free = &setup.replay.free;
+        assert_eq!(interrupted.candidate, free.values_in(free.base()));
         // It is resumed, and ends with nothing that drives.
         let state: SearchState = checkpoint::load(&folder.path().join(STATE)).unwrap();
-        assert_eq!(go(Some(state), usize::MAX).exit_code(), 1);
+        let ended = go(Some(state), usize::MAX).err();
+        assert_eq!(ended.map(|error| error.exit_code()), Some(1));
     }
 }
 

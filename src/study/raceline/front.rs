@@ -46,7 +46,7 @@ const BLENDS: u32 = 10;
 /// Steps between the objectives of the local search: `LATTICE` and the number of objectives give its lines.
 const LATTICE: u32 = 5;
 /// Cone programs for each line of the local search: most of the gain is in the first.
-const PROGRAMS: usize = 5;
+const PROGRAMS: usize = 6;
 
 /// Looks for the front. `known` are lines to start from and to keep (`alpha` at every cross-section). `begun` is the swarm of the same
 /// search that was interrupted, if one was, and what is known to go wrong with devices; `observe` is told of
@@ -113,12 +113,9 @@ pub(super) fn search_front(
                 .collect()
         }));
     }
-    // A line that is bettered before any is moved in is not worth the moving.
-    let mut unmoved = Archive::new(settings.archive, Truncation::Contribution);
-    let mut evaluations = swarm.evaluations();
-    evaluations += insert_all(&mut unmoved, judge.as_mut(), &lines)?;
     let mut archive = Archive::new(settings.archive, Truncation::Contribution);
-    let lines = on_road(setup, settings, &unmoved.positions)?;
+    let lines = on_road(setup, settings, &lines)?;
+    let mut evaluations = swarm.evaluations();
     evaluations += insert_all(&mut archive, judge.as_mut(), &lines)?;
     if settings.searches_locally() && settings.objectives.iter().all(|o| solvers.solves(*o)) {
         let polished = std::thread::scope(|scope| {
