@@ -30,7 +30,7 @@ pub use state::{Front, HistoryRow, SearchState};
 pub use verdict::{Untold, Verdict};
 
 use crate::config::settings::Settings;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::evaluate::replay::open_evaluator;
 use crate::evaluate::{PackedClient, run_packed};
 use crate::study::framework::memory::{MemoryItem, Size};
@@ -127,13 +127,10 @@ impl Study for Identify {
                             ControlFlow::Continue(())
                         }
                     };
-                    let found = resumed_or_new::<Self, _>(settings, state_file, true, |state, state_file| {
+                    resumed_or_new::<Self, _>(settings, state_file, true, |state, state_file| {
                         search_with(settings, setup, &mut evaluator, (state, state_file), &mut told)
-                    });
-                    match found {
-                        Err(Error::Interrupted(_)) => Ok(None),
-                        outcome => outcome.map(Some),
-                    }
+                    })
+                    .map(Some)
                 }
             })
             .collect();
