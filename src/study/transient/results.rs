@@ -66,8 +66,12 @@ pub struct LineSummary {
 }
 
 impl LineSummary {
-    pub(super) fn of(head: Head, outcome: &DrivenLine, energy: Option<EnergyFigures>) -> Self {
+    pub(super) fn of(head: Head, car: &Car, outcome: &DrivenLine, energy: Option<EnergyFigures>) -> Self {
         let agrees = keeps_up(outcome.disagreement());
+        let doubt = match &energy {
+            Some(energy) => energy.doubt(),
+            None => energy::doubt_of(car, &outcome.drive, &moments(car, &outcome.drive)),
+        };
         let rule = if agrees {
             "the greatest share of the grip at which the driven lap is half a percent behind the quasi-steady-state lap at most"
         } else {
@@ -84,10 +88,7 @@ impl LineSummary {
             margin_m: outcome.margin_m,
             greatest_offset_m: outcome.drive.offset_m.iter().fold(0.0, |a, b| a.max(b.abs())),
             beyond: outcome.failures.last().map(|(_, why)| why.clone()),
-            warnings: off_road(&outcome.line)
-                .into_iter()
-                .chain(energy.as_ref().and_then(EnergyFigures::doubt))
-                .collect(),
+            warnings: off_road(&outcome.line).into_iter().chain(doubt).collect(),
             corners: outcome.corners.clone(),
             full_grip_lap_time_s: outcome.full_grip_s,
             behind_full_grip_percent: outcome
@@ -239,7 +240,7 @@ pub(super) fn energy_of(car: &Car, mode: Mode, outcome: &DrivenLine) -> Option<E
 }
 
 /// What each wheel of the car does at each sample of a drive.
-fn moments(car: &Car, drive: &Drive) -> Vec<Moment> {
+pub(super) fn moments(car: &Car, drive: &Drive) -> Vec<Moment> {
     let driven = drive.states.iter().zip(&drive.inputs);
     let driven = driven.map(|(state, input)| (CarState::from_array(*state), *input));
     moments_under(car, &driven.collect::<Vec<_>>(), &drive.loads_mps2)
