@@ -19,6 +19,7 @@ struct CarRate {
     state: CarState,
     ax: f32,
     ay: f32,
+    rear_force: f32,
 }
 
 struct WheelSlip {
@@ -142,6 +143,7 @@ fn car_rate(car: CarModel, state: CarState, input: CarInput) -> CarRate {
         CarState(rate, (total.x / chassis.mass - state.pitch_acceleration) / chassis.pitch_lag),
         rate.vx - body.vy * body.yaw_rate,
         rate.vy + body.vx * body.yaw_rate,
+        forces.x.z + forces.x.w,
     );
 }
 

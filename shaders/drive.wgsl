@@ -25,7 +25,7 @@ fn begin(course: Course, pace: Pace) -> DriveState {
     let speed = planned_speed(course, pace, look(course, pose), 0.0);
     return DriveState(
         CarState(BodyState(speed, 0.0, 0.0, 0.0, 0.0), 0.0),
-        Controls(0.0, 0.0, 0.0),
+        Controls(0.0, 0.0, 0.0, 0.0, 0.0),
         pose,
         0.0,
         0.0,
@@ -70,7 +70,7 @@ fn drive_step(car: CarModel, course: Course, pace: Pace, number: f32, before: Dr
     }
     // Generated: the car with the gravity that its wheels feel.
     let loaded = under_load(car, under.load);
-    let controls = act(course, pace, chassis_of(loaded), before.car, view, under, before.controls);
+    var controls = act(course, pace, chassis_of(loaded), before.car, view, under, before.controls);
     let input = car_input(chassis_of(loaded), before.car, controls, view.row.flap);
     var next = before.car;
     var reached = before.car;
@@ -79,6 +79,10 @@ fn drive_step(car: CarModel, course: Course, pace: Pace, number: f32, before: Dr
         if HAS_RELIEF {
             rate.state.body.vx = rate.state.body.vx - under.climb;
             rate.state.body.vy = rate.state.body.vy - under.lean;
+        }
+        if stage == 0u {
+            controls.rear_force = rate.rear_force;
+            controls.gain = rate.state.body.vx;
         }
         next = carried(next, driver.step * stage_weight(stage), rate.state);
         reached = carried(before.car, driver.step * stage_reach(stage), rate.state);
@@ -133,21 +137,27 @@ fn drive(@builtin(global_invocation_id) id: vec3<u32>) {
                 ),
                 progress_of(5u, candidate),
             ),
-            Controls(progress_of(6u, candidate), progress_of(7u, candidate), progress_of(8u, candidate)),
-            Pose(
+            Controls(
+                progress_of(6u, candidate),
+                progress_of(7u, candidate),
+                progress_of(8u, candidate),
                 progress_of(9u, candidate),
                 progress_of(10u, candidate),
+            ),
+            Pose(
                 progress_of(11u, candidate),
                 progress_of(12u, candidate),
                 progress_of(13u, candidate),
                 progress_of(14u, candidate),
+                progress_of(15u, candidate),
+                progress_of(16u, candidate),
             ),
-            progress_of(15u, candidate),
-            progress_of(16u, candidate),
             progress_of(17u, candidate),
             progress_of(18u, candidate),
             progress_of(19u, candidate),
             progress_of(20u, candidate),
+            progress_of(21u, candidate),
+            progress_of(22u, candidate),
         );
     }
     if state.ending != UNDER_WAY {
@@ -164,7 +174,7 @@ fn drive(@builtin(global_invocation_id) id: vec3<u32>) {
 
     let car_state = state.car;
     let pose = state.pose;
-    let out = array<f32, 21>(
+    let out = array<f32, 23>(
         car_state.body.vx,
         car_state.body.vy,
         car_state.body.yaw_rate,
@@ -174,6 +184,8 @@ fn drive(@builtin(global_invocation_id) id: vec3<u32>) {
         state.controls.steer,
         state.controls.front_slip,
         state.controls.rear_slip,
+        state.controls.rear_force,
+        state.controls.gain,
         pose.row,
         pose.lap,
         pose.along,
@@ -187,7 +199,7 @@ fn drive(@builtin(global_invocation_id) id: vec3<u32>) {
         state.turned_here,
         state.ending,
     );
-    for (var i = 0u; i < 21u; i++) {
+    for (var i = 0u; i < 23u; i++) {
         progress[i * stretch.stride + candidate] = out[i];
     }
 }

@@ -44,6 +44,8 @@ struct Controls {
     steer: f32,
     front_slip: f32,
     rear_slip: f32,
+    rear_force: f32,
+    gain: f32,
 }
 
 struct Pace {
@@ -106,25 +108,28 @@ fn act(
     let planned = (after * after - before * before) / 8.0;
     let wanted = planned + driver.speed_gain * behind;
     let aero = aero_forces(c, v, view.row.flap);
-    var force = c.mass * wanted + aero.drag;
-    if HAS_RELIEF {
-        force = force + c.mass * under.climb;
-    }
     let weight = c.mass * c.gravity + (aero.downforce_front + aero.downforce_rear);
     let used = min(driver.knows * abs(turning / (driver.friction * weight / c.mass)), 1.0);
     let left = sqrt(max(1.0 - used * used, 0.01));
     let limit = driver.slip_limit * left;
-    let pull = torque_at(v / c.radius_rear) / c.radius_rear;
+    let stiffness = driver.driven_share * weight * driver.slip_stiffness;
+    let pedal = select(controls.rear_slip, controls.front_slip, controls.rear_slip < 0.0);
+    let slip = pedal + c.mass * (wanted - controls.gain) / stiffness;
+    let rim_speed = v * (1.0 + max(controls.rear_slip, 0.0));
+    let pull = torque_at(rim_speed / c.radius_rear) / c.radius_rear;
     let most = (pull - c.mass * driver.rolling + (driver.rotating - 1.0) * aero.drag) / driver.rotating;
-    let driven = min(min(force, most) / (driver.driven_share * weight * driver.slip_stiffness), limit);
-    let braked = max(force / (weight * driver.slip_stiffness), -limit);
-    let brakes = force < 0.0;
+    let within = max(controls.rear_slip, 0.0) + (most - controls.rear_force) / stiffness;
+    let driven = min(min(slip, max(within, 0.0)), limit);
+    let braked = max(slip, -limit);
+    let brakes = slip < 0.0;
     let front = select(0.0, braked, brakes);
     let rear = select(driven, 0.75 * braked, brakes);
     return Controls(
         controls.steer + rate * driver.step,
         controls.front_slip + (front - controls.front_slip) * driver.step / driver.pedal_lag,
         controls.rear_slip + (rear - controls.rear_slip) * driver.step / driver.pedal_lag,
+        controls.rear_force,
+        controls.gain,
     );
 }
 

@@ -63,7 +63,7 @@ driver_table! {
     speed_gain,
     /// Greatest slip ratio, driven or braked.
     slip_limit,
-    /// Slip stiffness per load with which the driver computes slip from force.
+    /// Slip stiffness per load with which the driver computes a change of slip from one of force.
     slip_stiffness,
     /// Greatest road-wheel angle, rad.
     max_steer,
@@ -264,6 +264,10 @@ pub struct Controls<R> {
     pub front_slip: R,
     /// Slip ratio of the rear wheels.
     pub rear_slip: R,
+    /// Forward force of the rear wheels at the step before (N),
+    pub rear_force: R,
+    /// and what the car gained in speed (m/s^2).
+    pub gain: R,
 }
 
 /// The plan of a candidate: a blend of two neighbouring plans of its line.
@@ -357,24 +361,26 @@ pub fn act<R: Lookup>(
     let planned = (after * after - before * before) / R::lit(4.0 * PLAN_REACH_M);
     let wanted = planned + R::load(driver.speed_gain) * behind;
     let aero = aero_forces(c, v, view.row.flap);
-    let mut force = c.mass * wanted + aero.drag;
-    if let Some(footing) = footing {
-        force = force + c.mass * footing.climb;
-    }
     let weight = c.mass * c.gravity + (aero.downforce_front + aero.downforce_rear);
     // What a bend leaves of the tyres, by the friction circle.
     let used = knows * (turning / (R::load(driver.friction) * weight / c.mass)).abs();
     let used = used.min(one);
     let left = (one - used * used).max(R::lit(0.01)).sqrt();
     let limit = R::load(driver.slip_limit) * left;
-    let stiffness = R::load(driver.slip_stiffness);
-    let pull = torque_at(torque, v / c.radius_rear) / c.radius_rear;
+    // The foot moves until the car gains what is wanted. How much slip that takes, the tyres know and the driver does not.
+    let stiffness = R::load(driver.driven_share) * weight * R::load(driver.slip_stiffness);
+    let drives = !controls.rear_slip.less_than(zero);
+    let pedal = R::select(drives, controls.rear_slip, controls.front_slip);
+    let asked = pedal + c.mass * (wanted - controls.gain) / stiffness;
+    let rim_speed = v * (one + controls.rear_slip.max(zero));
+    let pull = torque_at(torque, rim_speed / c.radius_rear) / c.radius_rear;
     // What the wheels take to roll and to be turned faster does not reach the road.
     let rotating = R::load(driver.rotating);
     let most = (pull - c.mass * R::load(driver.rolling) + (rotating - one) * aero.drag) / rotating;
-    let driven = (force.min(most) / (R::load(driver.driven_share) * weight * stiffness)).min(limit);
-    let braked = (force / (weight * stiffness)).max(-limit);
-    let brakes = force.less_than(zero);
+    let within = controls.rear_slip.max(zero) + (most - controls.rear_force) / stiffness;
+    let driven = asked.min(within.max(zero)).min(limit);
+    let braked = asked.max(-limit);
+    let brakes = asked.less_than(zero);
     let front = R::select(brakes, braked, zero);
     let rear = R::select(brakes, R::lit(0.75) * braked, driven);
     let lag = R::load(driver.pedal_lag);
@@ -382,6 +388,8 @@ pub fn act<R: Lookup>(
         steer: controls.steer + rate * step,
         front_slip: controls.front_slip + (front - controls.front_slip) * step / lag,
         rear_slip: controls.rear_slip + (rear - controls.rear_slip) * step / lag,
+        rear_force: controls.rear_force,
+        gain: controls.gain,
     }
 }
 

@@ -63,7 +63,7 @@ pub struct DriveState<R> {
 }
 
 /// Figures of [`DriveState::to_array`].
-pub const STATE: usize = 21;
+pub const STATE: usize = 23;
 
 /// What the driver saw and did in a step, before the car moved.
 #[derive(Clone, Copy, Debug)]
@@ -98,6 +98,8 @@ impl<R: Lookup> DriveState<R> {
                 steer: zero,
                 front_slip: zero,
                 rear_slip: zero,
+                rear_force: zero,
+                gain: zero,
             },
             pose,
             steps: zero,
@@ -124,6 +126,8 @@ impl<R: Lookup> DriveState<R> {
             c.steer,
             c.front_slip,
             c.rear_slip,
+            c.rear_force,
+            c.gain,
             p.row,
             p.lap,
             p.along,
@@ -149,21 +153,23 @@ impl<R: Lookup> DriveState<R> {
                 steer: f[6],
                 front_slip: f[7],
                 rear_slip: f[8],
+                rear_force: f[9],
+                gain: f[10],
             },
             pose: Pose {
-                row: f[9],
-                lap: f[10],
-                along: f[11],
-                x: f[12],
-                y: f[13],
-                yaw: f[14],
+                row: f[11],
+                lap: f[12],
+                along: f[13],
+                x: f[14],
+                y: f[15],
+                yaw: f[16],
             },
-            steps: f[15],
-            rest: f[16],
-            beyond: f[17],
-            turned: f[18],
-            turned_here: f[19],
-            ending: f[20],
+            steps: f[17],
+            rest: f[18],
+            beyond: f[19],
+            turned: f[20],
+            turned_here: f[21],
+            ending: f[22],
         }
     }
 
@@ -222,7 +228,7 @@ pub fn drive_step<R: Lookup, T: Tyre<R>>(
             &loaded
         }
     };
-    let controls = act(
+    let mut controls = act(
         driver,
         world.torque,
         road,
@@ -241,7 +247,10 @@ pub fn drive_step<R: Lookup, T: Tyre<R>>(
 
     let step = R::load(driver.step);
     let pull = footing.map(|footing| [footing.climb, footing.lean]);
-    let next = runge_kutta_step_on(car, &before.car, |_| input, pull, step, |_| {});
+    let next = runge_kutta_step_on(car, &before.car, |_| input, pull, step, |rate| {
+        controls.rear_force = rate.rear_force;
+        controls.gain = rate.state.body.vx - pull.map_or(zero, |[climb, _]| climb);
+    });
     let verdict = R::select(!lost & finished, R::lit(ending::FINISHED), verdict);
     let spun = !lost & !finished & !next.drives();
     let verdict = R::select(spun, R::lit(ending::SPUN), verdict);

@@ -164,46 +164,56 @@ struct Step {
 }
 
 /// The figures of a state that one step of the driver and the path sets, and what their errors are measured against.
-const OF_A_STEP: [(usize, &str); 9] = [
+const OF_A_STEP: [(usize, &str); 11] = [
     (6, "steering"),
     (7, "front slip"),
     (8, "rear slip"),
-    (11, "foot"),
-    (12, "place along"),
-    (13, "place across"),
-    (14, "direction"),
-    (17, "distance beyond the edge"),
-    (19, "steering so far"),
+    (9, "force of the rear wheels"),
+    (10, "gain in speed"),
+    (13, "foot"),
+    (14, "place along"),
+    (15, "place across"),
+    (16, "direction"),
+    (19, "distance beyond the edge"),
+    (21, "steering so far"),
 ];
 
 /// Greatest error of a step's figures in [`scales`]: each is the sum of some ten terms, whose roundings of 6e-8 add up to a few
 /// 1e-7 of what the terms amount to.
 const STEP_TOLERANCE: f64 = 1e-6;
 
+/// Force of the rear wheels for each slip ratio (N): some 40 times their load of up to 20 kN.
+const STIFFNESS_N: f64 = 8e5;
+/// Mass of the lightest car that is tried here (kg).
+const LIGHTEST_KG: f64 = 500.0;
+
 /// What the errors of a step's figures are measured against: what is added up in them.
 ///
 /// *Arms and feet* move by the step over their lag times what is wanted of them: angles and curvatures through gains of about
 /// one, that is at most the lock (0.2 rad), and forces in units of load over slip stiffness, the accelerations behind which are
-/// differences of squared speeds, `2 v^2` over 8 m. *Places* are a few metres, added to by speed times step. *Directions* are
+/// differences of squared speeds, `2 v^2` over 8 m. The *force* of the wheels comes from a slip ratio, which is the difference of two
+/// speeds of about the same size. *Places* are a few metres, added to by speed times step. *Directions* are
 /// fractions of a radian.
 fn scales(problem: &DriveProblem, state: &[f32; STATE]) -> [f64; OF_A_STEP.len()] {
     let d = problem.driver();
     let at = |k: usize| f64::from(state[k].abs());
     let v = at(0);
     let steer = at(6) + d.step / 0.04 * 0.2;
-    let foot = at(11) + at(12) + at(13) + v * d.step;
+    let foot = at(13) + at(14) + at(15) + v * d.step;
     let wanted = (2.0 * v * v / 8.0 + d.speed_gain * v) / (GRAVITY_MPS2 * 0.55 * d.slip_stiffness);
     let slip = |k: usize| at(k) + d.step / 0.06 * wanted;
     [
         steer,
         slip(7),
         slip(8),
+        STIFFNESS_N,
+        2.0 * STIFFNESS_N / LIGHTEST_KG,
         foot,
         foot,
         foot,
-        at(14) + at(2) * d.step + 1e-2,
+        at(16) + at(2) * d.step + 1e-2,
         20.0,
-        at(19) + 2.0 * steer,
+        at(21) + 2.0 * steer,
     ]
 }
 

@@ -37,6 +37,8 @@ pub struct CarRate<R> {
     pub ax: R,
     /// Lateral acceleration `dVy/dt + Vx r`, m/s^2.
     pub ay: R,
+    /// Forward force of the rear wheels on the road, N.
+    pub rear_force: R,
 }
 
 /// A car with its tyres prepared for their camber.
@@ -185,6 +187,7 @@ impl<R: Real, T: Tyre<R>> CarModel<R, T> {
         // One copy of the tyre's code serves both axles by an index, so that the code fits the processor's instruction cache and
         // the coefficients stay in memory. The loops over the wheels are not closures, because large closures would not be
         // compiled for the instruction set of their surroundings.
+        let mut rear_force = zero;
         for axle in 0..2 {
             let direction = directions[axle];
             let x = axle_x[axle];
@@ -202,6 +205,7 @@ impl<R: Real, T: Tyre<R>> CarModel<R, T> {
                 };
             }
             let forces = self.tyres[axle].axle_forces(inputs);
+            rear_force = forces[0].x + forces[1].x;
             for half in 0..2 {
                 let y = half_track[axle] * R::lit(SIDES[half]);
                 let (force_x, force_y) = to_body_axes(&forces[half], direction);
@@ -216,6 +220,7 @@ impl<R: Real, T: Tyre<R>> CarModel<R, T> {
         CarRate {
             ax: rate.vx - body.vy * body.yaw_rate,
             ay: rate.vy + body.vx * body.yaw_rate,
+            rear_force,
             state: CarState {
                 body: rate,
                 pitch_acceleration: (total.x / chassis.mass - state.pitch_acceleration) / chassis.pitch_lag,
