@@ -92,13 +92,17 @@ fn spins(speed_squared: f32, ax: f32) -> bool {
     return !(speed_squared < account.exhaust_from) && 0.0 < ax && !(account.exhaust_to_ax < ax);
 }
 
-// What an open DRS sheds of the drag on a section's segment.
-fn shed_drag(section: u32, speed_squared: f32, curvature: f32) -> f32 {
-    if !may_open(section) {
-        return 0.0;
+// What an open DRS sheds of the drag, and what the tyres take on a section's segment.
+fn shed_and_lost(section: u32, speed_squared: f32, curvature: f32) -> vec2<f32> {
+    if !HAS_TRACTION && !HAS_DRS {
+        return vec2<f32>(0.0, 0.0);
     }
     let shut = driving_with_drs(false, speed_squared, level(curvature));
-    return shut.z - driving_with_drs(true, speed_squared, level(curvature)).z;
+    if !may_open(section) {
+        return vec2<f32>(0.0, shut.w);
+    }
+    let open = driving_with_drs(true, speed_squared, level(curvature));
+    return vec2<f32>(shut.z - open.z, open.w);
 }
 
 fn additional(
@@ -177,7 +181,8 @@ fn provisional(
         let row = min(u32(held), ENVELOPE_ROWS - 1u);
         let forces = energy[2u * row] + (held - f32(row)) * energy[2u * row + 1u];
         let inverse = 1.0 / length;
-        let force = account.rotating * (0.5 * (step.end - start) * inverse) + forces.w;
+        let lost = shed_and_lost(section, mean, 0.5 * (here + there)).y;
+        let force = account.rotating * (0.5 * (step.end - start) * inverse) + forces.w + lost;
         let unharvested = min(account.harvest_most - (*state).harvested_k, space);
         let room = max(unharvested * account.force_per_harvested * inverse, 0.0);
         let generator = min(min(max(-force, 0.0), forces.z * gates.motor), room);
@@ -226,8 +231,9 @@ fn segment_energy(
     let inverse = 1.0 / length;
     let ax = 0.5 * (end - start) * inverse;
     // The force at the wheels, driving or braking.
-    let shut = account.rotating * ax + forces.w;
-    let open = shut - shed_drag(section, mean, 0.5 * (here + there));
+    let taken = shed_and_lost(section, mean, 0.5 * (here + there));
+    let shut = account.rotating * ax + forces.w + taken.y;
+    let open = shut - taken.x;
     // A driver shuts the flap on the brakes.
     let force = max(open, 0.0) + min(shut, 0.0);
     let demand = max(force, 0.0);

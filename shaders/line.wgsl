@@ -421,9 +421,10 @@ fn left_for_braking(root: f32) -> f32 {
     return figures.x + (held - f32(row)) * figures.y;
 }
 
-fn left_for_driving(speed_squared: f32, root: f32, ground: Ground, table: u32) -> f32 {
+// The share of the longitudinal grip that is left for driving, and what the tyres take from the drive.
+fn left_for_driving(speed_squared: f32, root: f32, ground: Ground, table: u32) -> vec2<f32> {
     if !HAS_TRACTION {
-        return left_for_braking(root);
+        return vec2<f32>(left_for_braking(root), 0.0);
     }
     let per_row = f32(TRACTION_SPEEDS) / f32(ENVELOPE_ROWS);
     let along = speed_squared * stretch.rows_per_speed_squared * per_row;
@@ -432,34 +433,37 @@ fn left_for_driving(speed_squared: f32, root: f32, ground: Ground, table: u32) -
     let speed = min(u32(held), TRACTION_SPEEDS - 1u);
     let cell = min(u32(across), TRACTION_ROOTS - 1u);
     let beyond = vec2<f32>(held - f32(speed), across - f32(cell));
-    let place = table + 2u * ENVELOPE_ROWS + speed * TRACTION_ROOTS + cell;
+    let place = table + 2u * (ENVELOPE_ROWS + speed * TRACTION_ROOTS + cell);
     if HAS_RELIEF {
         let layer = layer_of(ground, speed_squared);
         let below = place + LOADS_AT + u32(layer.x) * LOAD_STEP;
-        let low = traction_in(envelope[below], beyond);
-        let high = traction_in(envelope[below + LOAD_STEP], beyond);
-        return max(low + layer.y * (high - low), 0.0);
+        let low = traction_in(below, beyond);
+        let high = traction_in(below + LOAD_STEP, beyond);
+        let between = low + layer.y * (high - low);
+        return vec2<f32>(max(between.x, 0.0), between.y);
     }
-    return traction_in(envelope[place], beyond);
+    return traction_in(place, beyond);
 }
 
-fn traction_in(figures: vec4<f32>, beyond: vec2<f32>) -> f32 {
-    let start = figures.x + beyond.x * figures.y;
-    return start + beyond.y * (figures.z + beyond.x * figures.w);
+fn traction_in(place: u32, beyond: vec2<f32>) -> vec2<f32> {
+    let left = envelope[place];
+    let lost = envelope[place + 1u];
+    let start = vec2<f32>(left.x, lost.x) + beyond.x * vec2<f32>(left.y, lost.y);
+    return start + beyond.y * (vec2<f32>(left.z, lost.z) + beyond.x * vec2<f32>(left.w, lost.w));
 }
 
-// The traction that is left, the drive and the drag.
-fn driving_at(speed_squared: f32, ground: Ground, table: u32) -> vec3<f32> {
+// The traction that is left, the drive that the tyres leave of what the engine gives, the drag, and what the tyres take.
+fn driving_at(speed_squared: f32, ground: Ground, table: u32) -> vec4<f32> {
     let at = limits_at(speed_squared, ground, table);
-    let left = left_for_driving(speed_squared, root_left(speed_squared, ground, at.x), ground, table);
-    return vec3<f32>(at.y * left, at.z, at.w);
+    let in_bend = left_for_driving(speed_squared, root_left(speed_squared, ground, at.x), ground, table);
+    return vec4<f32>(at.y * in_bend.x, at.z - in_bend.y, at.w, in_bend.y);
 }
 
 fn may_open(section: u32) -> bool {
     return HAS_DRS && sections[section].drs != 0u;
 }
 
-fn driving_with_drs(drs: bool, speed_squared: f32, ground: Ground) -> vec3<f32> {
+fn driving_with_drs(drs: bool, speed_squared: f32, ground: Ground) -> vec4<f32> {
     let shut = driving_at(speed_squared, ground, 0u);
     if !drs {
         return shut;

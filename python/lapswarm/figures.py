@@ -451,7 +451,6 @@ class DrivenEnergy:
     deployed_difference_percent: float
     harvested_k_difference_percent: float
     moving_difference_percent: float
-    beyond_engine_mj: float
 
 
 @dataclass(frozen=True)

@@ -247,10 +247,17 @@ pub fn drive_step<R: Lookup, T: Tyre<R>>(
 
     let step = R::load(driver.step);
     let pull = footing.map(|footing| [footing.climb, footing.lean]);
-    let next = runge_kutta_step_on(car, &before.car, |_| input, pull, step, |rate| {
-        controls.rear_force = rate.rear_force;
-        controls.gain = rate.state.body.vx - pull.map_or(zero, |[climb, _]| climb);
-    });
+    let next = runge_kutta_step_on(
+        car,
+        &before.car,
+        |_| input,
+        pull,
+        step,
+        |rate| {
+            controls.rear_force = rate.rear_force;
+            controls.gain = rate.state.body.vx - pull.map_or(zero, |[climb, _]| climb);
+        },
+    );
     let verdict = R::select(!lost & finished, R::lit(ending::FINISHED), verdict);
     let spun = !lost & !finished & !next.drives();
     let verdict = R::select(spun, R::lit(ending::SPUN), verdict);

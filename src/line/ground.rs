@@ -9,7 +9,7 @@
 use super::kernel::{Course, alpha, look_up};
 use super::loads::LoadTables;
 use super::plan::{LinePlan, ReliefRow};
-use super::point_mass::{ENVELOPE_WIDTH, EnvelopeTable, TRACTION_ROOTS, TRACTION_SPEEDS};
+use super::point_mass::{ENVELOPE_WIDTH, EnvelopeTable, TRACTION_ROOTS, TRACTION_SPEEDS, TRACTION_WIDTH};
 use crate::scalar::{Lookup, Real};
 use crate::vehicle::powertrain::GRAVITY_MPS2;
 
@@ -24,8 +24,9 @@ pub trait Ground<R: Lookup>: Copy {
     fn half_way(self, there: Self) -> Self;
     /// Limits at a speed squared: lateral, grip, drive and drag (m/s^2), and the root of what the lateral share leaves.
     fn limits(self, envelope: &EnvelopeTable<R::Storage>, speed_squared: R) -> ([R; 4], R);
-    /// The share of the longitudinal grip that is left for driving, where the envelope has a table of it.
-    fn left_for_driving(self, envelope: &EnvelopeTable<R::Storage>, speed_squared: R, root: R) -> R;
+    /// The share of the longitudinal grip that is left for driving, and what the tyres take from the drive (m/s^2), where the envelope
+    /// has a table of it.
+    fn left_for_driving(self, envelope: &EnvelopeTable<R::Storage>, speed_squared: R, root: R) -> [R; 2];
     /// Greatest speed squared (m^2/s^2).
     fn corner(self, envelope: &EnvelopeTable<R::Storage>) -> R;
     /// An acceleration by forces (m/s^2), less the part of gravity that the car climbs against.
@@ -49,6 +50,16 @@ fn traction_cell<R: Lookup>(envelope: &EnvelopeTable<R::Storage>, speed_squared:
     (speed * roots + cell, [along - speed, across - cell])
 }
 
+/// The two figures of a cell, so far beyond its start.
+#[inline(always)]
+fn traction_in<R: Real>(figures: [R; TRACTION_WIDTH], [along, across]: [R; 2]) -> [R; 2] {
+    let of = |i: usize| {
+        let start = figures[i] + along * figures[i + 1];
+        start + across * (figures[i + 2] + along * figures[i + 3])
+    };
+    [of(0), of(TRACTION_WIDTH / 2)]
+}
+
 impl<R: Lookup> Ground<R> for R {
     #[inline(always)]
     fn half_way(self, there: Self) -> Self {
@@ -69,12 +80,10 @@ impl<R: Lookup> Ground<R> for R {
     }
 
     #[inline(always)]
-    fn left_for_driving(self, envelope: &EnvelopeTable<R::Storage>, speed_squared: R, root: R) -> R {
-        let (cell, [along, across]) = traction_cell(envelope, speed_squared, root);
-        let (place, _) = cell.place(TRACTION_SPEEDS * TRACTION_ROOTS, 4);
-        let figure = |column: usize| R::pick(&envelope.traction, place, column);
-        let start = figure(0) + along * figure(1);
-        start + across * (figure(2) + along * figure(3))
+    fn left_for_driving(self, envelope: &EnvelopeTable<R::Storage>, speed_squared: R, root: R) -> [R; 2] {
+        let (cell, beyond) = traction_cell(envelope, speed_squared, root);
+        let (place, _) = cell.place(TRACTION_SPEEDS * TRACTION_ROOTS, TRACTION_WIDTH);
+        traction_in(R::pick_row(&envelope.traction, place), beyond)
     }
 
     #[inline(always)]
@@ -181,13 +190,12 @@ impl<R: Lookup> Sloped<R> {
         figure + beyond * rise
     }
 
-    /// The traction in a cell of one table, so far beyond its start.
+    /// The figures of a cell of one table, so far beyond its start.
     #[inline(always)]
-    fn traction_of(loads: &LoadTables<R::Storage>, table: R, cell: R, [along, across]: [R; 2]) -> R {
+    fn traction_of(loads: &LoadTables<R::Storage>, table: R, cell: R, beyond: [R; 2]) -> [R; 2] {
         let cells = TRACTION_SPEEDS * TRACTION_ROOTS;
-        let (place, _) = (table * R::lit(cells as f64) + cell).place(loads.tables * cells, 4);
-        let start = R::pick(&loads.traction, place, 0) + along * R::pick(&loads.traction, place, 1);
-        start + across * (R::pick(&loads.traction, place, 2) + along * R::pick(&loads.traction, place, 3))
+        let (place, _) = (table * R::lit(cells as f64) + cell).place(loads.tables * cells, TRACTION_WIDTH);
+        traction_in(R::pick_row(&loads.traction, place), beyond)
     }
 
     /// The lateral limit (m/s^2) at a speed squared, and its slope over it.
@@ -240,13 +248,14 @@ impl<R: Lookup> Ground<R> for Sloped<R> {
     }
 
     #[inline(always)]
-    fn left_for_driving(self, envelope: &EnvelopeTable<R::Storage>, speed_squared: R, root: R) -> R {
+    fn left_for_driving(self, envelope: &EnvelopeTable<R::Storage>, speed_squared: R, root: R) -> [R; 2] {
         let loads = &envelope.loads;
         let (cell, beyond) = traction_cell(envelope, speed_squared, root);
         let layer = self.layer(loads, speed_squared);
         let low = Self::traction_of(loads, layer.below, cell, beyond);
         let high = Self::traction_of(loads, layer.below + R::lit(1.0), cell, beyond);
-        (low + layer.share * (high - low)).max(R::lit(0.0))
+        let [left, lost] = std::array::from_fn(|i: usize| low[i] + layer.share * (high[i] - low[i]));
+        [left.max(R::lit(0.0)), lost]
     }
 
     /// Where the lateral limit is passed: by Newton's method from above, which bisection helps where it leaves what is known.

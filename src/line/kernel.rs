@@ -242,33 +242,31 @@ fn left_for_braking<R: Lookup>(envelope: &EnvelopeTable<R::Storage>, root: R) ->
     look_up(&envelope.ellipse, 2, place, beyond, 0)
 }
 
-/// The same for driving.
+/// The same for driving, and what the tyres take from the drive (m/s^2).
 #[inline(always)]
 fn left_for_driving<R: Lookup>(
     envelope: &EnvelopeTable<R::Storage>,
     speed_squared: R,
     root: R,
     ground: impl Ground<R>,
-) -> R {
+) -> [R; 2] {
     if envelope.traction.is_empty() {
-        return left_for_braking(envelope, root);
+        return [left_for_braking(envelope, root), R::lit(0.0)];
     }
     ground.left_for_driving(envelope, speed_squared, root)
 }
 
-/// The traction that is left, the drive and the drag (m/s^2) at a speed squared in a bend.
+/// The traction that is left, the drive that the tyres leave of what the engine gives, the drag, and what the tyres take (m/s^2) at a
+/// speed squared in a bend.
 #[inline(always)]
 pub(super) fn driving_at<R: Lookup>(
     envelope: &EnvelopeTable<R::Storage>,
     speed_squared: R,
     ground: impl Ground<R>,
-) -> [R; 3] {
+) -> [R; 4] {
     let ([_, grip, drive, drag], root) = ground.limits(envelope, speed_squared);
-    [
-        grip * left_for_driving(envelope, speed_squared, root, ground),
-        drive,
-        drag,
-    ]
+    let [left, lost] = left_for_driving(envelope, speed_squared, root, ground);
+    [grip * left, drive - lost, drag, lost]
 }
 
 /// As [`driving_at`]. Where the DRS may be open, the driver opens it if the car then gains more speed.
@@ -278,18 +276,14 @@ pub(super) fn driving_with_drs<R: Lookup>(
     drs: bool,
     speed_squared: R,
     ground: impl Ground<R>,
-) -> [R; 3] {
+) -> [R; 4] {
     let shut = driving_at(envelope, speed_squared, ground);
     let Some(open) = envelope.open.as_ref().filter(|_| drs) else {
         return shut;
     };
     let open = driving_at(open, speed_squared, ground);
     let pays = (shut[0].min(shut[1]) - shut[2]).less_than(open[0].min(open[1]) - open[2]);
-    [
-        R::select(pays, open[0], shut[0]),
-        R::select(pays, open[1], shut[1]),
-        R::select(pays, open[2], shut[2]),
-    ]
+    std::array::from_fn(|i: usize| R::select(pays, open[i], shut[i]))
 }
 
 /// Greatest acceleration (m/s^2) at a speed squared in a bend; `drs` says whether the DRS may be open.
@@ -300,7 +294,7 @@ pub fn acceleration<R: Lookup>(
     speed_squared: R,
     ground: impl Ground<R>,
 ) -> R {
-    let [traction, drive, drag] = driving_with_drs(envelope, drs, speed_squared, ground);
+    let [traction, drive, drag, _] = driving_with_drs(envelope, drs, speed_squared, ground);
     ground.uphill(traction.min(drive) - drag)
 }
 

@@ -35,7 +35,7 @@ pub(crate) use loads::MOST_LOAD;
 pub use parametrisation::Parametrisation;
 pub use perpendicular::{cross_sections_about, shares_across};
 pub use plan::{LinePlan, ReliefRow, SectionRow, TERMS};
-pub use point_mass::{EnvelopeTable, PointMass, TRACTION_ROOTS, TRACTION_SPEEDS};
+pub use point_mass::{EnvelopeTable, PointMass, TRACTION_ROOTS, TRACTION_SPEEDS, TRACTION_WIDTH};
 pub use profile::{LapProfile, lap_profile, lap_profile_on};
 pub use relief::LineRelief;
 pub use table::{read_columns, read_line, read_line_apart};

@@ -44,8 +44,8 @@ pub struct EnvelopeTable<S> {
     pub ellipse: Vec<S>,
     /// The share of the longitudinal grip that is left for driving, in cells over [`TRACTION_SPEEDS`] even steps of the speed squared
     /// and [`TRACTION_ROOTS`] of the same root: the figure at a cell's start, its rise over the speed squared, its rise over the
-    /// root, and what that rise gains over the speed squared. Empty where the envelope says nothing of it and driving has what
-    /// braking has.
+    /// root, and what that rise gains over the speed squared. Behind them in each cell the same of what the tyres take from the
+    /// drive (m/s^2). Empty where the envelope says nothing of it and driving has what braking has.
     pub traction: Vec<S>,
     /// The table of the same car with its DRS open, over the same speeds, if it has one. Its corners are not used: a driver shuts
     /// the flap where it costs speed.
@@ -58,6 +58,8 @@ pub struct EnvelopeTable<S> {
 pub const TRACTION_SPEEDS: usize = 32;
 /// Cells over the root of what the lateral share leaves.
 pub const TRACTION_ROOTS: usize = 32;
+/// Figures of a cell.
+pub const TRACTION_WIDTH: usize = 8;
 
 /// Figures of a row of [`EnvelopeTable::rows`].
 pub const ENVELOPE_WIDTH: usize = 8;
@@ -174,18 +176,30 @@ impl PointMass {
             let v = (top * speed as f64 / TRACTION_SPEEDS as f64).sqrt();
             let root = root as f64 / TRACTION_ROOTS as f64;
             // The share whose root it is has that root in turn.
-            let most = self.envelope.traction_at(v, root_left(root))? / self.envelope.at(v).ax_grip_mps2;
-            Some(most.min(self.left_for_braking(root)))
+            let share = root_left(root);
+            let most = self.envelope.traction_at(v, share)? / self.envelope.at(v).ax_grip_mps2;
+            Some([
+                most.min(self.left_for_braking(root)),
+                self.envelope.lost_at(v, share),
+            ])
         };
         let cell = |(speed, root): (usize, usize)| {
             let start = knot(speed, root)?;
             let (faster, straighter) = (knot(speed + 1, root)?, knot(speed, root + 1)?);
             let both = knot(speed + 1, root + 1)?;
-            let across = straighter - start;
-            Some([start, faster - start, across, both - faster - across])
+            let of = |i: usize| {
+                let across = straighter[i] - start[i];
+                [
+                    start[i],
+                    faster[i] - start[i],
+                    across,
+                    both[i] - faster[i] - across,
+                ]
+            };
+            Some([of(0), of(1)])
         };
         let cells = (0..TRACTION_SPEEDS).flat_map(|speed| (0..TRACTION_ROOTS).map(move |root| (speed, root)));
-        cells.filter_map(cell).flatten().collect()
+        cells.filter_map(cell).flatten().flatten().collect()
     }
 
     /// The radius from which on no speed is too great, and the corner speed squared at even steps up to it: the least

@@ -214,7 +214,7 @@ fn opens<G: Grounds<f64>>(table: &EnvelopeTable<f64>, course: &Course<f64>, segm
     let bend = here.half_way(there);
     let gained = 0.5 * (to - from) / course.length[segment];
     let most = |drs: bool| acceleration::<f64>(table, drs, middle, bend);
-    let [.., drag] = driving_at::<f64>(table, middle, bend);
+    let [.., drag, _] = driving_at::<f64>(table, middle, bend);
     may_open(&course.drs, segment) && most(false) < most(true) && gained > bend.uphill(-drag)
 }
 

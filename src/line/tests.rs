@@ -1,5 +1,6 @@
 use super::kernel::{Course, Wanted, lap_time, shape};
 use super::*;
+use crate::optimum::{GripEnvelope, PointMassEnvelope};
 use crate::scalar::Dual;
 use crate::track::CrossSections;
 use crate::vehicle::limits::{SpeedRange, car_envelope};
@@ -344,15 +345,52 @@ fn clearance_is_the_distance_to_the_edges() {
     }
 }
 
+/// An engine of 4 m/s^2, of which the tyres take 0.2 running straight, 1 at 0.8 of the limit and 2 on it: 0.6 of the limit leaves 0.8
+/// of the root, half-way from 0.8 to 1.
+#[test]
+fn tyres_take_from_the_engine_in_bends() {
+    let free = car(|_| [12.0, 10.0, 4.0, 0.0], 100.0);
+    let rows = free.envelope.rows().len();
+    let in_bends = BendTraction {
+        shares: vec![0.0, 0.8, 1.0],
+        rows: vec![vec![10.0, 9.0, 0.0]; rows],
+        lost: vec![vec![0.2, 1.0, 2.0]; rows],
+    };
+    let driven = PointMass {
+        envelope: free.envelope.clone().with_bend_traction(in_bends).unwrap(),
+        ..free
+    };
+    let table = driven.table().unwrap();
+    let solvers = PointMassEnvelope::new(&driven).unwrap();
+    for (share, wanted) in [(0.0, 3.8), (0.6, 3.4), (0.8, 3.0)] {
+        let kernel = kernel::acceleration::<f64>(&table, false, 900.0, share * 12.0 / 900.0);
+        let root = (1.0f64 - share * share).sqrt();
+        let solver = solvers.traction(30.0, root).unwrap().value;
+        // Cells of a thirty-second of the root cut the corner at 0.6.
+        assert!((kernel - wanted).abs() < 0.02, "{share}: {kernel}");
+        assert!((solver - wanted).abs() < 1e-9, "{share}: {solver}");
+    }
+    // Half of the grip: half of the lateral acceleration at each share, and the engine of before.
+    let half = driven
+        .envelope
+        .with_grip_share(0.5, &driven.envelope.straight_traction().unwrap())
+        .unwrap();
+    // Half of 0.8 leaves the root of 1 - 0.16.
+    let wanted = 0.2 + 0.8 * (1.0 - 0.84f64.sqrt()) / 0.4;
+    assert!(
+        (half.lost_at(30.0, 0.8) - wanted).abs() < 1e-9,
+        "{}",
+        half.lost_at(30.0, 0.8)
+    );
+}
+
 /// With 12 m/s^2 across, 10 along and a traction of 6, 5 and 0 at shares of 0, 0.8 and 1: 0.8 of the limit leaves 5, where the
 /// ellipse leaves 6, and 0.6 leaves 0.8 of the root, half-way from 0.6 to 1. Braking has the ellipse.
 #[test]
 fn driven_tyres_have_less_in_bends() {
     let free = car(|_| [12.0, 10.0, 9.0, 0.0], 100.0);
-    let in_bends = BendTraction {
-        shares: vec![0.0, 0.8, 1.0],
-        rows: vec![vec![6.0, 5.0, 0.0]; free.envelope.rows().len()],
-    };
+    let rows = vec![vec![6.0, 5.0, 0.0]; free.envelope.rows().len()];
+    let in_bends = BendTraction::without_losses(vec![0.0, 0.8, 1.0], rows);
     let driven = PointMass {
         envelope: free.envelope.clone().with_bend_traction(in_bends).unwrap(),
         ..free.clone()
@@ -487,7 +525,7 @@ fn the_drs_is_open_where_it_may_be_and_gains_speed_and_shut_on_the_brakes() {
     let chosen = kernel::driving_with_drs::<f64>(&table, true, 900.0, 11.9 / 900.0);
     assert_eq!(chosen, bend);
     let straight = kernel::driving_with_drs::<f64>(&table, true, 900.0, 0.0);
-    assert_eq!(straight, [12.0, 5.0, 1.0]);
+    assert_eq!(straight, [12.0, 5.0, 1.0, 0.0]);
 }
 
 /// A line of other points than the cross-sections has the zones of the road that it is on.

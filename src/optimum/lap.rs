@@ -34,7 +34,7 @@ pub struct Grip {
     pub drag: Slope,
 }
 
-/// What the driven tyres can give in a bend (m/s^2), with its derivatives by speed and by the root of what the lateral share
+/// What driven tyres and engine can give in a bend (m/s^2), with its derivatives by speed and by the root of what the lateral share
 /// leaves.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BendGrip {
@@ -50,7 +50,7 @@ pub struct BendGrip {
 pub trait GripEnvelope: Sync {
     /// The envelope at a speed (m/s).
     fn at(&self, speed_mps: f64) -> Grip;
-    /// What the driven tyres can give at a speed (m/s) and a root of what the lateral share leaves; `None` where the ellipse says
+    /// What driven tyres and engine can give at a speed (m/s) and a root of what the lateral share leaves; `None` where the ellipse says
     /// so.
     fn traction(&self, _speed_mps: f64, _root: f64) -> Option<BendGrip> {
         None

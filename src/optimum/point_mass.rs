@@ -112,23 +112,32 @@ impl GripEnvelope for PointMassEnvelope {
     }
 
     fn traction(&self, v_mps: f64, root: f64) -> Option<BendGrip> {
-        let BendTraction { shares, rows } = self.in_bends.as_ref()?;
+        let BendTraction { shares, rows, lost } = self.in_bends.as_ref()?;
         let [low, high] = self.around(v_mps);
-        let [from, to] = [low, high].map(|i| traction_at_root(shares, &rows[i], root));
         let (start, span) = (self.rows[low].v_mps, self.rows[high].v_mps - self.rows[low].v_mps);
         let share = if span > 0.0 {
             ((v_mps - start) / span).max(0.0)
         } else {
             0.0
         };
-        let value = from.0 + share * (to.0 - from.0);
+        let within = |rows: &[Vec<f64>]| {
+            let [from, to] = [low, high].map(|i| traction_at_root(shares, &rows[i], root));
+            BendGrip {
+                value: from.0 + share * (to.0 - from.0),
+                by_speed: if span > 0.0 { (to.0 - from.0) / span } else { 0.0 },
+                by_root: from.1 + share * (to.1 - from.1),
+            }
+        };
+        let (tyres, lost) = (within(rows), within(lost));
+        let grip = self.at(v_mps);
+        let engine = BendGrip {
+            value: grip.drive.value - lost.value,
+            by_speed: grip.drive.by_speed - lost.by_speed,
+            by_root: -lost.by_root,
+        };
+        let least = if engine.value < tyres.value { engine } else { tyres };
         // Tyres that drive never have more than the ellipse.
-        let grip = self.at(v_mps).longitudinal;
-        (value < grip.value * root).then_some(BendGrip {
-            value,
-            by_speed: if span > 0.0 { (to.0 - from.0) / span } else { 0.0 },
-            by_root: from.1 + share * (to.1 - from.1),
-        })
+        (least.value < grip.longitudinal.value * root).then_some(least)
     }
 
     fn loaded(&self, load_mps2: f64) -> Option<[(f64, &dyn GripEnvelope); 2]> {

@@ -34,6 +34,7 @@ fn round_step(least: f64) -> f64 {
         .into_iter()
         .map(|m| m * decade)
         .find(|&step| step >= least * (1.0 - 1e-9))
+        .filter(|step| step.is_finite())
         .unwrap_or(least)
 }
 
@@ -59,9 +60,9 @@ impl Axis {
     /// A linear axis with a margin beyond the range.
     pub(super) fn padded(range: (f64, f64), share: f64, pixels: (f64, f64)) -> Self {
         let mut axis = Self::linear(range, pixels);
-        let margin = share * (axis.high - axis.low);
-        axis.low -= margin;
-        axis.high += margin;
+        let margin = share * axis.high - share * axis.low;
+        axis.low = (axis.low - margin).max(f64::MIN);
+        axis.high = (axis.high + margin).min(f64::MAX);
         axis
     }
 
@@ -96,7 +97,8 @@ impl Axis {
         let share = if self.log {
             (value / self.low).ln() / (self.high / self.low).ln()
         } else {
-            (value - self.low) / (self.high - self.low)
+            // By quarters: the range of the greatest numbers is beyond them.
+            (0.25 * value - 0.25 * self.low) / (0.25 * self.high - 0.25 * self.low)
         };
         self.pixels.0 + share * (self.pixels.1 - self.pixels.0)
     }
@@ -106,9 +108,10 @@ impl Axis {
         if self.log {
             return self.log_ticks(most);
         }
-        let step = self
-            .step
-            .unwrap_or_else(|| round_step((self.high - self.low) / most.max(1) as f64));
+        let step = self.step.unwrap_or_else(|| {
+            let most = most.max(1) as f64;
+            round_step(self.high / most - self.low / most)
+        });
         let first = (self.low / step - 1e-6).ceil() as i64;
         let last = (self.high / step + 1e-6).floor() as i64;
         let largest = self.low.abs().max(self.high.abs());

@@ -56,6 +56,17 @@ pub struct BendTraction {
     pub shares: Vec<f64>,
     /// The accelerations (m/s^2) at these shares, for each speed of the envelope.
     pub rows: Vec<Vec<f64>>,
+    /// What slip and the drag of tyres in bends take from the engine's acceleration (m/s^2), likewise; zeros where a table says
+    /// nothing of it.
+    pub lost: Vec<Vec<f64>>,
+}
+
+impl BendTraction {
+    /// A table that says nothing of losses.
+    pub fn without_losses(shares: Vec<f64>, rows: Vec<Vec<f64>>) -> Self {
+        let lost = vec![vec![0.0; shares.len()]; rows.len()];
+        Self { shares, rows, lost }
+    }
 }
 
 /// What a share of the lateral limit leaves of a friction ellipse's other half axis.
@@ -94,6 +105,9 @@ pub const ENVELOPE_COLUMNS: [&str; 5] = ["v_mps", "ay_mps2", "ax_grip_mps2", "ax
 /// Columns that a table may have besides: the traction at a share of the lateral limit, which the name ends with.
 pub const TRACTION_COLUMN: &str = "ax_traction_mps2_at_";
 
+/// Columns that go with these: what the tyres take there of the engine's acceleration.
+pub const LOST_COLUMN: &str = "ax_lost_mps2_at_";
+
 /// What the names of columns begin with that hold the figures with the DRS open.
 pub const OPEN_COLUMN: &str = "open_";
 
@@ -130,22 +144,20 @@ impl Envelope {
     /// The envelope with a table of its traction in bends.
     ///
     /// # Errors
-    /// [`Error::Input`] if shares do not rise from 0 to 1, if a row is missing, or if a figure is out of range or rises with the
-    /// share.
+    /// [`Error::Input`] if shares do not rise from 0 to 1, if a row is missing, or if a figure is out of range or a traction rises
+    /// with the share.
     pub fn with_bend_traction(mut self, in_bends: BendTraction) -> Result<Self> {
-        let BendTraction { shares, rows } = &in_bends;
+        let BendTraction { shares, rows, lost } = &in_bends;
         check_shares(&self.name, Place::from("shares of the lateral limit"), shares)?;
-        if rows.len() != self.rows.len() {
-            let expected = format!("{}, one for each speed", self.rows.len());
-            return Err(Error::input(
-                &self.name,
-                "rows of traction",
-                rows.len().to_string(),
-                expected,
-            ));
+        for (name, rows) in [("rows of traction", rows), ("rows of losses", lost)] {
+            if rows.len() != self.rows.len() {
+                let expected = format!("{}, one for each speed", self.rows.len());
+                return Err(Error::input(&self.name, name, rows.len().to_string(), expected));
+            }
         }
-        for (index, figures) in rows.iter().enumerate() {
+        for (index, (figures, lost)) in rows.iter().zip(lost).enumerate() {
             check_traction(&self.name, Place::row(index + 1), shares, figures)?;
+            check_losses(&self.name, Place::row(index + 1), shares, lost)?;
         }
         self.in_bends = Some(in_bends);
         Ok(self)
@@ -242,12 +254,21 @@ impl Envelope {
     /// The traction (m/s^2) at a speed (m/s) and a share of the lateral limit, where the envelope has a table of it.
     pub fn traction_at(&self, v_mps: f64, lateral_share: f64) -> Option<f64> {
         let in_bends = self.in_bends.as_ref()?;
+        Some(self.in_bend(in_bends, &in_bends.rows, v_mps, lateral_share))
+    }
+
+    /// What the tyres take of the engine's acceleration (m/s^2) at a speed (m/s) and a share of the lateral limit.
+    pub fn lost_at(&self, v_mps: f64, lateral_share: f64) -> f64 {
+        let lost = |in_bends: &BendTraction| self.in_bend(in_bends, &in_bends.lost, v_mps, lateral_share);
+        self.in_bends.as_ref().map_or(0.0, lost)
+    }
+
+    fn in_bend(&self, table: &BendTraction, rows: &[Vec<f64>], v_mps: f64, lateral_share: f64) -> f64 {
         let after = self.after(v_mps);
         let [low, high] = [after - 1, after];
         let share = self.between(v_mps, low, high);
-        let at =
-            |row: usize| traction_at_root(&in_bends.shares, &in_bends.rows[row], root_left(lateral_share)).0;
-        Some(at(low) + share * (at(high) - at(low)))
+        let at = |row: usize| traction_at_root(&table.shares, &rows[row], root_left(lateral_share)).0;
+        at(low) + share * (at(high) - at(low))
     }
 
     /// The row that ends the span that a speed (m/s) lies in.
@@ -334,8 +355,12 @@ impl Envelope {
             for name in &ENVELOPE_COLUMNS[1..] {
                 let _ = write!(text, ",{prefix}{name}");
             }
-            for share in state.in_bends.iter().flat_map(|t| &t.shares) {
-                let _ = write!(text, ",{prefix}{TRACTION_COLUMN}{share}");
+            if let Some(in_bends) = &state.in_bends {
+                for column in [TRACTION_COLUMN, LOST_COLUMN] {
+                    for share in &in_bends.shares {
+                        let _ = write!(text, ",{prefix}{column}{share}");
+                    }
+                }
             }
         }
         text += "\n";
@@ -345,8 +370,10 @@ impl Envelope {
                 for figure in &state.rows[index].to_array()[1..] {
                     let _ = write!(text, ",{figure}");
                 }
-                for figure in state.in_bends.iter().flat_map(|t| &t.rows[index]) {
-                    let _ = write!(text, ",{figure}");
+                if let Some(in_bends) = &state.in_bends {
+                    for figure in in_bends.rows[index].iter().chain(&in_bends.lost[index]) {
+                        let _ = write!(text, ",{figure}");
+                    }
                 }
             }
             text += "\n";
@@ -437,9 +464,16 @@ impl TableText<'_> {
                 }
             };
         }
-        let (places, shares) = traction_columns(file, header, header_line, prefix)?;
+        let columns = |column| columns_at_shares(file, header, header_line, prefix, column);
+        let (places, shares) = columns(TRACTION_COLUMN)?;
+        let (lost_places, lost_shares) = columns(LOST_COLUMN)?;
+        if !lost_shares.is_empty() && lost_shares != shares {
+            let place = Place::line(header_line).column(format!("{prefix}{LOST_COLUMN}*"));
+            let expected = format!("the shares of {prefix}{TRACTION_COLUMN}*, or none");
+            return Err(Error::input(file, place, in_list(&lost_shares), expected));
+        }
         let mut rows: Vec<EnvelopeRow> = Vec::new();
-        let mut tractions = Vec::new();
+        let (mut tractions, mut lost) = (Vec::new(), Vec::new());
         for (line, record) in records {
             let number = |place: usize| -> Result<f64> {
                 let field = record.get(place).unwrap_or_default();
@@ -457,20 +491,31 @@ impl TableText<'_> {
             let row = EnvelopeRow::from_array(figures);
             check_row(file, Place::line(*line), &row, rows.last())?;
             rows.push(row);
+            let numbers =
+                |places: &[usize]| -> Result<Vec<f64>> { places.iter().map(|p| number(*p)).collect() };
             if !shares.is_empty() {
-                let figures = places
-                    .iter()
-                    .map(|place| number(*place))
-                    .collect::<Result<Vec<_>>>()?;
+                let figures = numbers(&places)?;
                 check_traction(file, Place::line(*line), &shares, &figures)?;
                 tractions.push(figures);
             }
+            if !lost_shares.is_empty() {
+                let figures = numbers(&lost_places)?;
+                check_losses(file, Place::line(*line), &shares, &figures)?;
+                lost.push(figures);
+            }
         }
         check_count(file, rows.len())?;
-        let in_bends = (!shares.is_empty()).then_some(BendTraction {
-            shares,
-            rows: tractions,
-        });
+        let in_bends = if shares.is_empty() {
+            None
+        } else if lost.is_empty() {
+            Some(BendTraction::without_losses(shares, tractions))
+        } else {
+            Some(BendTraction {
+                shares,
+                rows: tractions,
+                lost,
+            })
+        };
         Ok(Envelope {
             name: file.to_owned(),
             rows,
@@ -481,18 +526,19 @@ impl TableText<'_> {
     }
 }
 
-/// The columns of traction in bends by rising share: their places, and the shares.
-fn traction_columns(
+/// The columns whose names end with a share of the lateral limit, by rising share: their places, and the shares.
+fn columns_at_shares(
     file: &str,
     header: &csv::StringRecord,
     header_line: usize,
     prefix: &str,
+    column: &str,
 ) -> Result<(Vec<usize>, Vec<f64>)> {
     let mut columns = Vec::new();
     for (place, name) in header.iter().enumerate() {
         let Some(share) = name
             .strip_prefix(prefix)
-            .and_then(|name| name.strip_prefix(TRACTION_COLUMN))
+            .and_then(|name| name.strip_prefix(column))
         else {
             continue;
         };
@@ -510,7 +556,7 @@ fn traction_columns(
     columns.sort_by(|a, b| a.1.total_cmp(&b.1));
     let (places, shares): (Vec<_>, Vec<_>) = columns.into_iter().unzip();
     if !shares.is_empty() {
-        let place = Place::line(header_line).column(format!("{TRACTION_COLUMN}*"));
+        let place = Place::line(header_line).column(format!("{column}*"));
         check_shares(file, place, &shares)?;
     }
     Ok((places, shares))
@@ -519,15 +565,39 @@ fn traction_columns(
 fn check_shares(file: &str, place: Place, shares: &[f64]) -> Result<()> {
     let rise = shares.windows(2).all(|pair| pair[0] < pair[1]);
     if !(rise && shares.first() == Some(&0.0) && shares.last() == Some(&1.0)) {
-        let found = shares.iter().map(f64::to_string).collect::<Vec<_>>().join(", ");
         return Err(Error::input(
             file,
             place,
-            found,
+            in_list(shares),
             "shares that rise from 0 to 1, each once",
         ));
     }
     Ok(())
+}
+
+fn in_list(shares: &[f64]) -> String {
+    let shares: Vec<String> = shares.iter().map(f64::to_string).collect();
+    shares.join(", ")
+}
+
+fn check_losses(file: &str, place: Place, shares: &[f64], figures: &[f64]) -> Result<()> {
+    let mut each = shares.iter().zip(figures);
+    if figures.len() != shares.len() {
+        let (found, expected) = (figures.len(), shares.len());
+        return Err(Error::input(
+            file,
+            place,
+            format!("{found} losses"),
+            format!("{expected}, one for each share"),
+        ));
+    }
+    match each.find(|(_, figure)| !(0.0..=200.0).contains(*figure)) {
+        Some((share, figure)) => {
+            let place = place.field(format!("{LOST_COLUMN}{share}"));
+            Err(Error::input(file, place, figure.to_string(), "0 to 200"))
+        }
+        None => Ok(()),
+    }
 }
 
 fn check_traction(file: &str, place: Place, shares: &[f64], figures: &[f64]) -> Result<()> {

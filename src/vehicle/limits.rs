@@ -7,7 +7,7 @@
 
 use super::envelope::{BendTraction, root_left};
 use super::powertrain::GRAVITY_MPS2;
-use super::{Car, Envelope, EnvelopeRow, SteadyCar, Traction, Trim, Turn, steady_car};
+use super::{BendDrive, Car, Envelope, EnvelopeRow, SteadyCar, Traction, Trim, Turn, steady_car};
 use crate::error::{Error, Result};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -92,6 +92,8 @@ pub struct EnvelopeAtSpeed {
     pub traction_mps2: f64,
     /// and at each of [`LATERAL_SHARES`] of the row's lateral acceleration.
     pub traction_in_bends_mps2: Vec<f64>,
+    /// What slip and the drag of the tyres take there of the row's drive (m/s^2).
+    pub lost_in_bends_mps2: Vec<f64>,
     /// Greatest acceleration by the engine in its best gear, before drag (m/s^2).
     pub engine_mps2: f64,
 }
@@ -149,6 +151,9 @@ impl CarEnvelope {
 /// Shares of the lateral limit at which the traction is swept. What is left of it falls with `sqrt(1 - share^2)`, over which they
 /// are spread. Beyond 0.97 wheels lift and steady states are few; at the limit itself there is no traction.
 pub const LATERAL_SHARES: [f64; 12] = [0.0, 0.2, 0.4, 0.5, 0.6, 0.7, 0.8, 0.85, 0.9, 0.94, 0.97, 1.0];
+
+/// Share at which the losses of running straight are found: curves of steady states begin with no bend at all.
+const STRAIGHT: f64 = 1e-3;
 
 /// Steering up to which steady states are looked for (rad): a car whose lock is reached first still has the tyres' own limit.
 pub const STEER_TO_GRIP: f64 = 0.6;
@@ -241,6 +246,7 @@ fn envelope_of(name: &str, limits: &[EnvelopeAtSpeed]) -> Result<Envelope> {
     let in_bends = BendTraction {
         shares: LATERAL_SHARES.to_vec(),
         rows: limits.iter().map(|l| l.traction_in_bends_mps2.clone()).collect(),
+        lost: limits.iter().map(|l| l.lost_in_bends_mps2.clone()).collect(),
     };
     let rows = limits.iter().map(|l| l.row).collect();
     Envelope::new(name, rows)?.with_bend_traction(in_bends)
@@ -268,24 +274,35 @@ fn limits_at(car: &Car, speeds: &[f64]) -> Result<Vec<EnvelopeAtSpeed>> {
         let right_mps2 = if even { left_mps2 } else { other_mps2 };
         let ay_mps2 = left_mps2.min(right_mps2);
         let traction_mps2 = steady.greatest_traction(speed);
+        let drag_mps2 = steady.drag(speed) + rolling;
+        let engine_mps2 = accelerated(force(speed), drag_mps2) + drag_mps2;
+        let ax_drive_mps2 = traction_mps2.min(engine_mps2);
+        // What the wheels take to roll does not reach the road.
+        let engine = engine_mps2 - rolling;
         // Each side at its own share.
         let driven = |share: f64| {
             let lock = car.max_steer_rad;
-            let left = steady.greatest_drive(speed, share * left_mps2, lock, &cornering)?;
+            let left = steady.greatest_drive(speed, share * left_mps2, lock, &cornering, engine)?;
             let right = other.as_deref().map_or(Some(left), |curve| {
-                steady.greatest_drive(speed, -share * other_mps2, lock, curve)
-            });
-            right.map(|right| left.min(right))
+                steady.greatest_drive(speed, -share * other_mps2, lock, curve, engine)
+            })?;
+            Some(BendDrive {
+                traction_mps2: left.traction_mps2.min(right.traction_mps2),
+                engine_mps2: left.engine_mps2.min(right.engine_mps2),
+            })
         };
-        let traction_in_bends_mps2 = in_bends(traction_mps2, driven);
-        let drag_mps2 = steady.drag(speed) + rolling;
-        let engine_mps2 = accelerated(force(speed), drag_mps2) + drag_mps2;
+        let of_shares: Vec<_> = LATERAL_SHARES
+            .iter()
+            .map(|share| driven(share.max(STRAIGHT)))
+            .collect();
+        let traction_in_bends_mps2 = in_bends(traction_mps2, &of_shares);
+        let lost_in_bends_mps2 = lost_in_bends(ax_drive_mps2 - rolling, &of_shares);
         EnvelopeAtSpeed {
             row: EnvelopeRow {
                 v_mps: speed,
                 ay_mps2,
                 ax_grip_mps2: steady.greatest_braking(speed),
-                ax_drive_mps2: traction_mps2.min(engine_mps2),
+                ax_drive_mps2,
                 drag_mps2,
             },
             left_mps2,
@@ -293,19 +310,37 @@ fn limits_at(car: &Car, speeds: &[f64]) -> Result<Vec<EnvelopeAtSpeed>> {
             cornering,
             traction_mps2,
             traction_in_bends_mps2,
+            lost_in_bends_mps2,
             engine_mps2,
         }
     };
     Ok(speeds.par_iter().map(at).collect())
 }
 
-/// The traction (m/s^2) at each of [`LATERAL_SHARES`], from that of running straight and what `driven` finds up to the limit. What
-/// it does not find follows from the shares next to it. A car that corners more never has more.
-fn in_bends(straight_mps2: f64, driven: impl Fn(f64) -> Option<f64>) -> Vec<f64> {
+/// What the tyres take of a drive (m/s^2) at each of [`LATERAL_SHARES`], from what was found there of the driven car. A share of which
+/// nothing was found, the limit itself among them, takes what the one before it does.
+fn lost_in_bends(drive_mps2: f64, driven: &[Option<BendDrive>]) -> Vec<f64> {
+    let mut lost = 0.0;
+    let at = |driven: &Option<BendDrive>| {
+        if let Some(taken) = driven
+            .map(|d| drive_mps2 - d.engine_mps2)
+            .filter(|t| t.is_finite())
+        {
+            lost = taken.max(0.0);
+        }
+        lost
+    };
+    driven.iter().map(at).collect()
+}
+
+/// The traction (m/s^2) at each of [`LATERAL_SHARES`], from that of running straight and what was found of the driven car up to the
+/// limit. What was not found follows from the shares next to it. A car that corners more never has more.
+fn in_bends(straight_mps2: f64, driven: &[Option<BendDrive>]) -> Vec<f64> {
     let straight_mps2 = straight_mps2.max(0.0);
     let mut found = vec![(1.0, straight_mps2)];
-    for share in &LATERAL_SHARES[1..LATERAL_SHARES.len() - 1] {
-        if let Some(most) = driven(*share).filter(|most| most.is_finite()) {
+    let bends = 1..LATERAL_SHARES.len() - 1;
+    for (share, driven) in LATERAL_SHARES[bends.clone()].iter().zip(&driven[bends]) {
+        if let Some(most) = driven.map(|d| d.traction_mps2).filter(|most| most.is_finite()) {
             let least = found[found.len() - 1].1;
             found.push((root_left(*share), most.clamp(0.0, least)));
         }
@@ -439,15 +474,27 @@ mod tests {
     /// A share without a steady state has what lies between its neighbours; without any, the ellipse is left.
     #[test]
     fn what_is_not_found_follows_from_its_neighbours() {
-        let gap = in_bends(10.0, |share| (share != 0.6).then(|| 10.0 * root_left(share)));
+        let found = |traction: &dyn Fn(f64) -> Option<f64>| {
+            let at = |share: &f64| {
+                traction(*share).map(|traction_mps2| BendDrive {
+                    traction_mps2,
+                    engine_mps2: 9.0,
+                })
+            };
+            LATERAL_SHARES.iter().map(at).collect::<Vec<_>>()
+        };
+        let gap = in_bends(
+            10.0,
+            &found(&|share| (share != 0.6).then(|| 10.0 * root_left(share))),
+        );
         for (found, share) in gap.iter().zip(LATERAL_SHARES) {
             assert!((found - 10.0 * root_left(share)).abs() < 1e-9, "{share}: {found}");
         }
-        assert_eq!(in_bends(10.0, |_| None)[4], 10.0 * root_left(0.6));
-        assert_eq!(in_bends(10.0, |_| Some(f64::NAN))[0], 10.0);
+        assert_eq!(in_bends(10.0, &found(&|_| None))[4], 10.0 * root_left(0.6));
+        assert_eq!(in_bends(10.0, &found(&|_| Some(f64::NAN)))[0], 10.0);
         // No more in a bend than in a wider one, and none that is negative.
-        assert_eq!(in_bends(10.0, |_| Some(11.0))[..11], [10.0; 11]);
-        assert_eq!(in_bends(10.0, |_| Some(-1.0))[1], 0.0);
+        assert_eq!(in_bends(10.0, &found(&|_| Some(11.0)))[..11], [10.0; 11]);
+        assert_eq!(in_bends(10.0, &found(&|_| Some(-1.0)))[1], 0.0);
     }
 
     /// A lock of 0.03 rad is a circle of 87 m: at 18 m/s less than 324 / 87 = 3.7 m/s^2, where the tyres would hold 15.

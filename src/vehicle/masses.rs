@@ -63,11 +63,11 @@ impl MassLimits {
         (row, between(low.2.at(v_mps), high.2.at(v_mps)))
     }
 
-    /// The traction (m/s^2) at a speed (m/s), a mass (kg) and a share of the lateral limit.
-    fn in_bend(&self, mass_kg: f64, v_mps: f64, lateral_share: f64) -> f64 {
+    /// What an envelope says of a place, at a mass (kg).
+    fn in_bend(&self, mass_kg: f64, figure: impl Fn(&Envelope) -> f64) -> f64 {
         let ([low, high], share) = self.between(mass_kg);
-        let at = |row: &(f64, Envelope, Traction)| row.1.traction_at(v_mps, lateral_share).unwrap_or(0.0);
-        at(low) + share * (at(high) - at(low))
+        let [low, high] = [low, high].map(|row| figure(&row.1));
+        low + share * (high - low)
     }
 
     /// Limits that the car has with a mass (kg), carried to another: each figure changes by the share by which that of the sweep
@@ -119,20 +119,29 @@ impl MassLimits {
     /// The traction in bends of an envelope, carried likewise.
     fn carried_in_bends(&self, envelope: &Envelope, from_kg: f64, to_kg: f64) -> Option<BendTraction> {
         let share = |from: f64, to: f64| if from > 0.0 { to / from } else { 1.0 };
-        let BendTraction { shares, rows } = envelope.bend_traction()?;
-        let mut in_bends = Vec::with_capacity(rows.len());
-        for (row, figures) in envelope.rows().iter().zip(rows) {
+        let BendTraction { shares, rows, lost } = envelope.bend_traction()?;
+        let masses_kg = [from_kg, to_kg];
+        let carried = |v_mps: f64, (figures, lost): (&Vec<f64>, &Vec<f64>)| {
             let mut most = f64::INFINITY;
             let figures = figures.iter().zip(shares).map(|(figure, lateral)| {
-                let [from, to] = [from_kg, to_kg].map(|mass_kg| self.in_bend(mass_kg, row.v_mps, *lateral));
+                let at = |limits: &Envelope| limits.traction_at(v_mps, *lateral).unwrap_or(0.0);
+                let [from, to] = masses_kg.map(|mass_kg| self.in_bend(mass_kg, at));
                 most = (figure * share(from, to)).min(most);
                 most
             });
-            in_bends.push(figures.collect());
-        }
+            let lost = lost.iter().zip(shares).map(|(figure, lateral)| {
+                let at = |limits: &Envelope| limits.lost_at(v_mps, *lateral);
+                let [from, to] = masses_kg.map(|mass_kg| self.in_bend(mass_kg, at));
+                figure * share(from, to)
+            });
+            (figures.collect(), lost.collect())
+        };
+        let of_rows = envelope.rows().iter().zip(rows.iter().zip(lost));
+        let (rows, lost) = of_rows.map(|(row, both)| carried(row.v_mps, both)).unzip();
         Some(BendTraction {
             shares: shares.clone(),
-            rows: in_bends,
+            rows,
+            lost,
         })
     }
 }

@@ -33,6 +33,6 @@ pub use model::{CarInput, CarModel, CarRate, CarState};
 pub use parameters::ParameterInfo;
 pub use powertrain::Powertrain;
 pub use reached::Reached;
-pub use steady::{SteadyCar, Trim, Turn, steady_car};
+pub use steady::{BendDrive, SteadyCar, Trim, Turn, steady_car};
 pub use traction::Traction;
 pub use tyre::{LinearTyre, MagicFormula, TyreCoefficients, TyreModel};

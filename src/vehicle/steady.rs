@@ -96,10 +96,18 @@ pub trait SteadyCar: Send + Sync {
     /// give.
     fn greatest_traction(&self, speed: f64) -> f64;
 
-    /// The greatest acceleration along the path by the tyres (m/s^2) while the car corners at `ay` (m/s^2, of the sign of the
-    /// turn), below the peak of `curve`, which is [`SteadyCar::cornering`] at `speed` (m/s). The road wheels turn by no more than
-    /// `lock` (rad). The driven wheels share one slip ratio. `None` where the curve does not reach `ay`, or turns back there.
-    fn greatest_drive(&self, speed: f64, ay: f64, lock: f64, curve: &[Trim]) -> Option<f64>;
+    /// What drives the car along its path while it corners at `ay` (m/s^2, of the sign of the turn), below the peak of `curve`,
+    /// which is [`SteadyCar::cornering`] at `speed` (m/s). The road wheels turn by no more than `lock` (rad). The driven wheels share
+    /// one slip ratio; the engine's power would push the car by `engine` (m/s^2) if nothing were lost. `None` where the curve does not
+    /// reach `ay`, or turns back there.
+    fn greatest_drive(
+        &self,
+        speed: f64,
+        ay: f64,
+        lock: f64,
+        curve: &[Trim],
+        engine: f64,
+    ) -> Option<BendDrive>;
 
     /// Side force of the tyres against a radian of sideslip (N/rad), running straight at `speed` (m/s), and the yaw moment that
     /// turns the car back into its direction (N m/rad).
@@ -115,6 +123,16 @@ pub fn steady_car(car: &Car) -> Box<dyn SteadyCar> {
         TyreModel::MagicFormula => Box::new(Ready::<MagicFormula<f64>, MagicFormula<Exact>>::new(car)),
         TyreModel::Linear => Box::new(Ready::<LinearTyre<f64>, LinearTyre<Exact>>::new(car)),
     }
+}
+
+/// Greatest accelerations of a car along its path in a bend (m/s^2), before drag.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BendDrive {
+    /// By the driven tyres, whatever the engine gives.
+    pub traction_mps2: f64,
+    /// By the engine. Slip of the driven tyres and drag of all tyres, whose side forces point backwards in a bend, take from what it
+    /// brings to the wheels. Where the tyres give way first, it is what the engine would reach with the losses there.
+    pub engine_mps2: f64,
 }
 
 /// What of lateral acceleration and push along the path is the second unknown of a point; the other is given.
@@ -163,7 +181,12 @@ impl<T: Tyre<f64>, D: Tyre<Exact>> Ready<T, D> {
     }
 
     /// Residuals of the four equations at a point of the curve, with their derivatives with respect to the unknowns.
-    fn residual(&self, (speed, bend): (f64, Bend), point: &Point) -> [Exact; 4] {
+    fn residual(&self, held: (f64, Bend), point: &Point) -> [Exact; 4] {
+        self.balance(held, point).0
+    }
+
+    /// The residuals, and the forward force of the rear wheels over the mass (m/s^2).
+    fn balance(&self, (speed, bend): (f64, Bend), point: &Point) -> ([Exact; 4], f64) {
         let unknown = |i: usize| Exact::variable(point[i] * SCALES[i], i);
         let [sideslip, second, roll, slip_ratio, steer] = std::array::from_fn(unknown);
         let (across, push) = match bend {
@@ -219,13 +242,14 @@ impl<T: Tyre<f64>, D: Tyre<Exact>> Ready<T, D> {
                 flap: zero,
             },
         );
-        [
+        let residual = [
             // At a steady sideslip the velocity across the car grows with that along the path.
             rate.state.body.vy - push * sin,
             rate.state.body.yaw_rate,
             rate.state.body.roll_rate,
             rate.state.pitch_acceleration * chassis.pitch_lag,
-        ]
+        ];
+        (residual, (rate.rear_force / chassis.mass).value)
     }
 
     /// The trim on the line `direction . (point - guess) = 0` nearest to `guess`, by Newton's method.
@@ -434,7 +458,14 @@ impl<T: Tyre<f64>, D: Tyre<Exact>> SteadyCar for Ready<T, D> {
         self.push(speed, [0.0, slip])
     }
 
-    fn greatest_drive(&self, speed: f64, ay: f64, lock: f64, curve: &[Trim]) -> Option<f64> {
+    fn greatest_drive(
+        &self,
+        speed: f64,
+        ay: f64,
+        lock: f64,
+        curve: &[Trim],
+        engine: f64,
+    ) -> Option<BendDrive> {
         let pair = curve
             .windows(2)
             .find(|w| w[0].ay_mps2.abs() <= ay.abs() && ay.abs() < w[1].ay_mps2.abs())?;
@@ -467,6 +498,13 @@ impl<T: Tyre<f64>, D: Tyre<Exact>> SteadyCar for Ready<T, D> {
         let mut around = [(0.0, 0.0); 3];
         let (mut last, mut length) = (start, 0.0);
         let mut points = 0;
+        // What the engine has to spare at a point, and the push with it: that is the engine's push where nothing is to spare.
+        let spare = |point: &Point| {
+            // The rims turn faster than the road passes, and take the power with less force.
+            let spare = engine / (1.0 + point[3] * SCALES[3]) - self.balance(held, point).1;
+            (spare, point[1] * SCALES[1] + spare)
+        };
+        let mut by_engine = spare(&start);
         self.follow(held, (start, tangent), |point| {
             let [sideslip, push, _, slip, steer] = std::array::from_fn(|i| point[i] * SCALES[i]);
             points += 1;
@@ -479,6 +517,15 @@ impl<T: Tyre<f64>, D: Tyre<Exact>> SteadyCar for Ready<T, D> {
             }
             length += (point - last).norm();
             last = *point;
+            if by_engine.0 > 0.0 {
+                let (before, here) = (by_engine, spare(point));
+                let share = (before.0 / (before.0 - here.0)).min(1.0);
+                by_engine = if here.0 > 0.0 {
+                    here
+                } else {
+                    (0.0, before.1 + share * (here.1 - before.1))
+                };
+            }
             let now = (length, push);
             if push > around[1].1 {
                 around = [around[1], now, now];
@@ -488,7 +535,10 @@ impl<T: Tyre<f64>, D: Tyre<Exact>> SteadyCar for Ready<T, D> {
                 false
             }
         });
-        Some(peak_of(around))
+        Some(BendDrive {
+            traction_mps2: peak_of(around),
+            engine_mps2: by_engine.1,
+        })
     }
 
     fn sideslip_stiffness(&self, speed: f64) -> [f64; 2] {
@@ -597,11 +647,57 @@ mod tests {
     #[test]
     fn a_straight_is_the_widest_bend() {
         let steady = steady_car(&mirrored_car());
+        let ready = Ready::<MagicFormula<f64>, MagicFormula<Exact>>::new(&mirrored_car());
         for speed in [20.0, 60.0] {
             let curve = steady.cornering(speed, 0.6, Turn::Left);
-            let bend = steady.greatest_drive(speed, 0.02, 0.6, &curve).unwrap();
+            let bend = steady.greatest_drive(speed, 0.02, 0.6, &curve, 5.0).unwrap();
             let straight = steady.greatest_traction(speed);
-            assert!((bend / straight - 1.0).abs() < 1e-3, "{speed}: {bend} {straight}");
+            let pushed = bend.traction_mps2;
+            assert!(
+                (pushed / straight - 1.0).abs() < 1e-3,
+                "{speed}: {pushed} {straight}"
+            );
+            // The slip at which the wheels make the power of 5 m/s^2.
+            let (mut low, mut high) = (0.0, 0.06);
+            for _ in 0..40 {
+                let slip = 0.5 * (low + high);
+                if (1.0 + slip) * ready.push(speed, [0.0, slip]) < 5.0 {
+                    low = slip
+                } else {
+                    high = slip
+                }
+            }
+            let wanted = ready.push(speed, [0.0, low]);
+            assert!(
+                (bend.engine_mps2 - wanted).abs() < 2e-3,
+                "{speed}: {bend:?} {wanted}"
+            );
+        }
+    }
+
+    /// The side force `F` of an axle of stiffness `C` points back by its slip angle `F / C` and takes `F^2 / C`; the driven wheels turn
+    /// faster than the road passes by force over stiffness. To first order: angles are a tenth of a radian at most, whose squares are a
+    /// hundredth.
+    #[test]
+    fn a_bend_takes_the_drag_of_its_side_forces() {
+        let mut car = linear_car();
+        (car.chassis.lift_area, car.chassis.drag_area) = (0.0, 0.0);
+        let c = car.chassis;
+        let (a, b) = (c.cg_to_front, c.cg_to_rear);
+        let weight = c.mass * c.gravity;
+        let [front, rear] = [b / (a + b), a / (a + b)];
+        let steady = steady_car(&car);
+        let curve = steady.cornering(30.0, 0.6, Turn::Left);
+        for ay in [3.0, 6.0] {
+            let found = steady.greatest_drive(30.0, ay, 0.6, &curve, 1.0).unwrap();
+            let side = |share: f64, per_tyre: f64| {
+                (c.mass * ay * share).powi(2) / (per_tyre * weight * share / 3000.0)
+            };
+            // A slip ratio for each 60 kN on 3 kN of load.
+            let slip = 1.0 / (20.0 * rear * c.gravity);
+            let taken = (side(front, 40_000.0) + side(rear, 55_000.0)) / c.mass + slip;
+            let lost = 1.0 - found.engine_mps2;
+            assert!((lost / taken - 1.0).abs() < 0.03, "{ay}: {lost} {taken}");
         }
     }
 
@@ -610,11 +706,11 @@ mod tests {
         let steady = steady_car(&mirrored_car());
         let [left, right] = [Turn::Left, Turn::Right].map(|turn| steady.cornering(40.0, 0.6, turn));
         let found = [(10.0, &left), (-10.0, &right)].map(|(ay, curve)| {
-            let most = steady.greatest_drive(40.0, ay, 0.6, curve);
-            most.unwrap()
+            let most = steady.greatest_drive(40.0, ay, 0.6, curve, 5.0);
+            most.unwrap().traction_mps2
         });
         assert!((found[0] / found[1] - 1.0).abs() < 1e-6, "{found:?}");
-        assert_eq!(steady.greatest_drive(40.0, 30.0, 0.6, &left), None);
+        assert_eq!(steady.greatest_drive(40.0, 30.0, 0.6, &left, 5.0), None);
     }
 
     #[test]

@@ -66,14 +66,20 @@ impl Envelope {
             ..*row
         });
         let mut part = Self::new(format!("{}, {share:.3} of its grip", self.name()), rows.collect())?;
-        if let Some(BendTraction { shares, rows }) = self.bend_traction().cloned() {
-            let rows = rows
-                .into_iter()
-                .map(|row| row.iter().map(|x| share * x).collect());
-            part = part.with_bend_traction(BendTraction {
-                shares,
-                rows: rows.collect(),
-            })?;
+        if let Some(BendTraction { shares, rows, .. }) = self.bend_traction() {
+            let less = rows.iter().map(|row| row.iter().map(|x| share * x).collect());
+            // The tyres take what they do at the same acceleration. What the driven ones cannot bring they do not lose.
+            let lost = self.rows().iter().zip(part.rows()).map(|(whole, part)| {
+                let unused = whole.ax_drive_mps2 - part.ax_drive_mps2;
+                let at = |lateral: &f64| (self.lost_at(whole.v_mps, share * lateral) - unused).max(0.0);
+                shares.iter().map(at).collect()
+            });
+            let in_bends = BendTraction {
+                shares: shares.clone(),
+                rows: less.collect(),
+                lost: lost.collect(),
+            };
+            part = part.with_bend_traction(in_bends)?;
         }
         if let Some(open) = self.open() {
             let own = open.straight_traction();

@@ -128,9 +128,14 @@ pub fn random_car(random: &mut Random) -> PointMass {
             let left = |share: &f64| driven * row.ax_grip_mps2 * (1.0 - share * share).powf(power);
             LATERAL_SHARES.iter().map(left).collect()
         };
+        let lost = |_: &EnvelopeRow| {
+            let at = |share: &f64| 0.1 + 2.0 * (1.0 - driven) * share * share;
+            LATERAL_SHARES.iter().map(at).collect()
+        };
         let in_bends = BendTraction {
             shares: LATERAL_SHARES.to_vec(),
             rows: car.envelope.rows().iter().map(row).collect(),
+            lost: car.envelope.rows().iter().map(lost).collect(),
         };
         car.envelope = car.envelope.with_bend_traction(in_bends).expect("a table");
     }

@@ -73,8 +73,6 @@ pub struct DrivenLapEnergy {
     /// Work that moves the car along its way (J), where it is driven: against drag, rolling resistance and inertia. What engine and
     /// motor bring to the wheels beyond that is lost in the tyres, which slip and which drag in bends.
     pub moving_j: f64,
-    /// Work at the wheels beyond what the engine gives (J): a driver commands slip, which takes other forces than he reckons with.
-    pub beyond_engine_j: f64,
 }
 
 impl EnergyCar {
@@ -150,7 +148,6 @@ pub fn driven_energy(car: &EnergyCar, plan: &MotorPlan, moments: &[DrivenMoment]
         let ax = 0.5 * (next * next - moment.speed_mps.powi(2)) / length;
         let moving = table.rotating * ax + moment.drag_n / table.mass + rolling;
         driven.moving_j += table.mass * length * moving.max(0.0);
-        driven.beyond_engine_j += table.mass * length * (segment.engine - engine_most).max(0.0);
         lap.time += segment.time;
         lap.fuel += segment.fuel;
         lap.deployed += segment.deployed;

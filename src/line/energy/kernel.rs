@@ -102,6 +102,8 @@ pub struct SegmentEnergy<R> {
     pub generator: R,
     /// and by the hydraulic brakes.
     pub hydraulic: R,
+    /// What the tyres take of these by slip and by their drag in bends (m/s^2), where a point mass knows it.
+    pub lost: R,
     /// Share of the engine's greatest power.
     pub load: R,
     /// Fuel (kg).
@@ -191,21 +193,25 @@ fn flow_at<R: Real>(flows: [R; 4], load: R) -> R {
 }
 
 impl<R: Lookup> Car<'_, R> {
-    /// The traction that is left, the drive and the drag (m/s^2) on a segment, at a speed squared in a bend.
+    /// The traction that is left, the drive that the tyres leave, the drag and what the tyres take (m/s^2) on a segment, at a speed
+    /// squared in a bend.
     #[inline(always)]
-    fn driving_at(&self, here: usize, speed_squared: R, curvature: R) -> [R; 3] {
+    fn driving_at(&self, here: usize, speed_squared: R, curvature: R) -> [R; 4] {
         driving_with_drs(self.envelope, may_open(self.drs, here), speed_squared, curvature)
     }
 
-    /// What an open DRS sheds of the drag (m/s^2) on a segment, at a mean speed squared and curvature.
+    /// What an open DRS sheds of the drag, and what the tyres take (m/s^2) on a segment, at a mean speed squared and curvature.
     #[inline(always)]
-    fn shed(&self, here: usize, speed_squared: R, curvature: R) -> R {
-        if self.envelope.open.is_none() || !may_open(self.drs, here) {
-            return R::lit(0.0);
+    fn shed_and_lost(&self, here: usize, speed_squared: R, curvature: R) -> [R; 2] {
+        if self.envelope.traction.is_empty() && self.envelope.open.is_none() {
+            return [R::lit(0.0); 2];
         }
-        let [.., shut] = driving_with_drs(self.envelope, false, speed_squared, curvature);
-        let [.., drag] = self.driving_at(here, speed_squared, curvature);
-        shut - drag
+        let [.., shut, lost] = driving_with_drs(self.envelope, false, speed_squared, curvature);
+        if self.envelope.open.is_none() || !may_open(self.drs, here) {
+            return [R::lit(0.0), lost];
+        }
+        let [.., drag, lost] = self.driving_at(here, speed_squared, curvature);
+        [shut - drag, lost]
     }
 
     /// Whether the gates of steering and speed are open at a section.
@@ -252,7 +258,7 @@ impl<R: Lookup> Car<'_, R> {
         let [left, space] = store;
         let inverse = R::lit(1.0) / length;
         let zero = R::lit(0.0);
-        let [traction, drive, drag] = self.driving_at(here, from, bends[0]);
+        let [traction, drive, drag, _] = self.driving_at(here, from, bends[0]);
         let engine = traction.min(drive);
         let ahead = (from + length * (engine - drag)).max(zero);
         let rows = self.table.boosts.len() / 8;
@@ -270,7 +276,7 @@ impl<R: Lookup> Car<'_, R> {
         let engine = traction.min(drive);
         let both = traction.min(drive + boost);
         let middle = (from + length * (both - drag)).max(zero);
-        let [traction, drive, later_drag] =
+        let [traction, drive, later_drag, _] =
             self.driving_at(here, middle, R::lit(0.5) * (bends[0] + bends[1]));
         let drive = drive - exhaust;
         let later_both = traction.min(drive + boost);
@@ -330,10 +336,10 @@ impl<R: Lookup> Car<'_, R> {
     #[inline(always)]
     fn engine_only(&self, here: usize, from: R, length: R, bends: [R; 2], most: R) -> R {
         let zero = R::lit(0.0);
-        let [traction, drive, drag] = self.driving_at(here, from, bends[0]);
+        let [traction, drive, drag, _] = self.driving_at(here, from, bends[0]);
         let first = traction.min(drive) - drag;
         let middle = (from + length * first).max(zero);
-        let [traction, drive, drag] = self.driving_at(here, middle, R::lit(0.5) * (bends[0] + bends[1]));
+        let [traction, drive, drag, _] = self.driving_at(here, middle, R::lit(0.5) * (bends[0] + bends[1]));
         let second = traction.min(drive) - drag;
         (from + length * (first + second)).max(zero).min(most)
     }
@@ -359,7 +365,9 @@ impl<R: Lookup> Car<'_, R> {
             let (place, beyond) = (mean * R::load(table.rows_per_speed_squared)).place(rows, 8);
             let row = R::pick_row(&table.forces, place);
             let inverse = R::lit(1.0) / length;
-            let force = rotating * (R::lit(0.5) * (step.end - from) * inverse) + (row[3] + beyond * row[7]);
+            let [_, lost] = self.shed_and_lost(here, mean, R::lit(0.5) * (bends[0] + bends[1]));
+            let force =
+                rotating * (R::lit(0.5) * (step.end - from) * inverse) + (row[3] + beyond * row[7]) + lost;
             let unharvested = (R::load(table.harvest_most) - state.harvested_k).min(space);
             let room = (unharvested * R::load(table.force_per_harvested) * inverse).max(zero);
             let most = (row[2] + beyond * row[6]) * self.strategy[5];
@@ -410,8 +418,9 @@ impl<R: Lookup> Car<'_, R> {
         let ax = R::lit(0.5) * (end - from) * inverse;
         // The force at the wheels, driving or braking.
         let rotating = R::load(table.rotating);
-        let shut = rotating * ax + drag;
-        let open = shut - self.shed(here, mean, R::lit(0.5) * (bends[0] + bends[1]));
+        let [opened, lost] = self.shed_and_lost(here, mean, R::lit(0.5) * (bends[0] + bends[1]));
+        let shut = rotating * ax + drag + lost;
+        let open = shut - opened;
         // A driver shuts the flap on the brakes.
         let force = open.max(zero) + shut.min(zero);
         let demand = force.max(zero);
@@ -438,7 +447,10 @@ impl<R: Lookup> Car<'_, R> {
         };
         state.speed_squared = end;
         let most = [greatest, generator_most * self.strategy[5]];
-        self.accounts(state, &along, [demand, shed, motor], most, space)
+        SegmentEnergy {
+            lost,
+            ..self.accounts(state, &along, [demand, shed, motor], most, space)
+        }
     }
 
     /// The accounts of a way whose forces over the mass (m/s^2) at the wheels are known: what drives the car, what holds it back and
@@ -492,6 +504,7 @@ impl<R: Lookup> Car<'_, R> {
             motor,
             generator,
             hydraulic: shed - generator,
+            lost: zero,
             load,
             fuel: flow_at(flows, load) * time,
             deployed,

@@ -30,7 +30,7 @@ pub fn keeps_up(disagreement: f64) -> bool {
 #[derive(Clone, Debug)]
 pub struct DrivenLine {
     /// The greatest share of the envelope's grip that the car and the driver held on the whole lap; where the laps agree with none,
-    /// the share with which they agree best.
+    /// the share of the fastest driven lap.
     pub grip_share: f64,
     /// The share that they held in each corner, where that was looked for.
     pub corners: Vec<CornerGrip>,
@@ -209,10 +209,10 @@ fn greatest_share(work: Work<'_, Transient>) -> Result<Option<DrivenLine>> {
                         100.0 * off
                     );
                     state.failures.push((share, why));
-                    let nearer = best
+                    let faster = best
                         .as_ref()
-                        .is_none_or(|b: &DrivenLine| off.abs() < b.disagreement().abs());
-                    if nearer {
+                        .is_none_or(|b: &DrivenLine| outcome.lap_time_s < b.lap_time_s);
+                    if faster {
                         state.best = Some(share);
                         best = Some(outcome);
                     }

@@ -144,8 +144,6 @@ impl Motor {
     }
 }
 
-/// Share of the engine's work beyond what it gives from which a reader is told.
-const DOUBTFUL: f64 = 0.01;
 /// Lines whose lengths differ by more than this are not one.
 const MOST_STRETCH: f64 = 0.002;
 
@@ -225,7 +223,7 @@ pub struct Accounts {
     pub engine_mj: f64,
     /// Work that moves the car along its way (MJ), where it is driven.
     pub moving_mj: f64,
-    /// Work that is lost in the tyres (MJ), where the car is driven. A point mass has no tyres.
+    /// Work that is lost in the tyres (MJ), where the car is driven.
     pub tyres_mj: f64,
     /// Energy out of the store (MJ).
     pub deployed_mj: f64,
@@ -256,7 +254,7 @@ impl Accounts {
             each.sum::<f64>()
         };
         let wheels_j = work(|s| s.engine + s.motor);
-        let moving_j = moving_j.unwrap_or(wheels_j);
+        let moving_j = moving_j.unwrap_or_else(|| work(|s| (s.engine + s.motor - s.lost).max(0.0)));
         Self {
             lap_time_s: lap.time,
             engine_mj: work(|s| s.engine) / 1e6,
@@ -271,38 +269,6 @@ impl Accounts {
             balance_error_j: lap.change - ((lap.harvested_k + lap.harvested_h) - lap.deployed),
         }
     }
-}
-
-/// A word on work beyond what an engine gives (MJ), where that is much of all its work (MJ).
-fn doubt(beyond_mj: f64, engine_mj: f64) -> Option<String> {
-    let share = beyond_mj / engine_mj;
-    (share > DOUBTFUL).then(|| {
-        format!(
-            "{beyond_mj:.2} MJ ({:.0} %) of the driven car's work are beyond what its engine gives, mostly in fast bends: the driver \
-             reckons with softer tyres than it has, and the lap that he follows knows nothing of the drag of tyres in bends. The lap is \
-             too fast by that, and no fuel is counted for it",
-            100.0 * share
-        )
-    })
-}
-
-/// The same of a car without a motor, from what its wheels did at each sample of the drive; nothing of one without an engine.
-pub(super) fn doubt_of(car: &Car, drive: &Drive, moments: &[Moment]) -> Option<String> {
-    let powertrain = car.powertrain.as_ref()?;
-    let (chassis, radius) = (&car.chassis, car.chassis.radius_rear);
-    let rotating = powertrain.rotating_mass_factor;
-    let (mut beyond_j, mut engine_j) = (0.0, 0.0);
-    for ((state, input), moment) in drive.states.iter().zip(&drive.inputs).zip(moments) {
-        let rims = [2, 3].map(|k| input.wheel_speed[k] * radius);
-        let wheels_w = moment.wheels[2].longitudinal_n * rims[0] + moment.wheels[3].longitudinal_n * rims[1];
-        let turning = car.rolling_mps2() + (rotating - 1.0) * moment.ax_mps2;
-        let rim = 0.5 * (rims[0] + rims[1]);
-        let taken_w = (wheels_w + chassis.mass * turning * state[0]).max(0.0);
-        let most_w = powertrain.wheel_force(rim, radius) * rim;
-        engine_j += taken_w * INTERVAL_S;
-        beyond_j += (taken_w - most_w).max(0.0) * INTERVAL_S;
-    }
-    doubt(beyond_j / 1e6, engine_j / 1e6)
 }
 
 /// The accounts of a hybrid's lap, driven and in quasi-steady state.
@@ -320,8 +286,6 @@ pub struct EnergyFigures {
     pub harvested_k_difference_percent: f64,
     /// and the work that moves the car.
     pub moving_difference_percent: f64,
-    /// Work of the driven car's wheels beyond what the engine gives (MJ).
-    pub beyond_engine_mj: f64,
 }
 
 impl EnergyFigures {
@@ -341,15 +305,9 @@ impl EnergyFigures {
             deployed_difference_percent: above(|a| a.deployed_mj),
             harvested_k_difference_percent: above(|a| a.harvested_k_mj),
             moving_difference_percent: above(|a| a.moving_mj),
-            beyond_engine_mj: driven.beyond_engine_j / 1e6,
             driven: own,
             quasi_steady_state: quasi,
         }
-    }
-
-    /// A word on work that no engine did.
-    pub(super) fn doubt(&self) -> Option<String> {
-        doubt(self.beyond_engine_mj, self.driven.engine_mj)
     }
 
     /// The figures in words.
@@ -358,7 +316,7 @@ impl EnergyFigures {
         format!(
             "Energy, driven (in quasi-steady state): {:.3} ({:.3}) MJ out of the store, {:.3} ({:.3}) MJ in by the MGU-K, {:.3} ({:.3}) \
              MJ by the MGU-H, charge {:.3} ({:.3}) at the end, {:.3} ({:.3}) l of fuel. {:.2} ({:.2}) MJ move the car, and its tyres lose \
-             {:.2} MJ; the books are off by {:.1e} J.\n",
+             {:.2} ({:.2}) MJ; the books are off by {:.1e} J.\n",
             own.deployed_mj,
             quasi.deployed_mj,
             own.harvested_k_mj,
@@ -372,6 +330,7 @@ impl EnergyFigures {
             own.moving_mj,
             quasi.moving_mj,
             own.tyres_mj,
+            quasi.tyres_mj,
             own.balance_error_j.abs()
         )
     }
@@ -466,37 +425,4 @@ pub(super) fn view(ideal: &Ideal, driven: &DrivenLapEnergy, drive: &Drive) -> La
                 &ideal.lap.segments,
             ),
         ])
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::study::transient::results::moments;
-    use crate::vehicle::model::wheel_speeds;
-    use crate::vehicle::{CarInput, CarState};
-
-    /// At 60 m/s the bundled car's 340 kW are 5.7 kN, and its rear tyres give some 38 times their load of 9 kN for each slip ratio:
-    /// 0.005 takes a third of the engine, 0.05 twice as much as it has.
-    #[test]
-    fn work_beyond_the_engine_is_told() {
-        let car = Car::bundled().unwrap();
-        let with_slip = |slip: f64| {
-            let state = CarState::straight(60.0);
-            let input = CarInput {
-                wheel_speed: wheel_speeds(&car.chassis, &state.body, (1.0, 0.0), [0.0, slip]),
-                steer: 0.0,
-                flap: 0.0,
-            };
-            let drive = Drive {
-                inputs: vec![input; 10],
-                states: vec![state.to_array(); 10],
-                ..Drive::default()
-            };
-            doubt_of(&car, &drive, &moments(&car, &drive))
-        };
-        assert_eq!(with_slip(0.005), None);
-        assert_eq!(with_slip(-0.05), None);
-        let told = with_slip(0.05).unwrap();
-        assert!(told.contains("beyond what its engine gives"), "{told}");
-    }
 }

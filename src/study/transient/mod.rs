@@ -185,12 +185,7 @@ impl Study for Transient {
             Outcome::Line(line) => {
                 let mode = solved.settings.deployment_mode;
                 let energy = results::energy_of(&solved.prepared.car, mode, line);
-                Summary::Line(Box::new(LineSummary::of(
-                    head,
-                    &solved.prepared.car,
-                    line,
-                    energy,
-                )))
+                Summary::Line(Box::new(LineSummary::of(head, line, energy)))
             }
             Outcome::Population(population) => {
                 let summary = population_results::summarise(head, solved, population);

@@ -66,16 +66,12 @@ pub struct LineSummary {
 }
 
 impl LineSummary {
-    pub(super) fn of(head: Head, car: &Car, outcome: &DrivenLine, energy: Option<EnergyFigures>) -> Self {
+    pub(super) fn of(head: Head, outcome: &DrivenLine, energy: Option<EnergyFigures>) -> Self {
         let agrees = keeps_up(outcome.disagreement());
-        let doubt = match &energy {
-            Some(energy) => energy.doubt(),
-            None => energy::doubt_of(car, &outcome.drive, &moments(car, &outcome.drive)),
-        };
         let rule = if agrees {
             "the greatest share of the grip at which the driven lap is half a percent behind the quasi-steady-state lap at most"
         } else {
-            "the share of the grip at which the driven lap is least behind the quasi-steady-state lap, for it is by more than half a percent at all"
+            "the fastest driven lap, for with every share of the grip it is more than half a percent behind the quasi-steady-state lap"
         };
         Self {
             head,
@@ -88,7 +84,7 @@ impl LineSummary {
             margin_m: outcome.margin_m,
             greatest_offset_m: outcome.drive.offset_m.iter().fold(0.0, |a, b| a.max(b.abs())),
             beyond: outcome.failures.last().map(|(_, why)| why.clone()),
-            warnings: off_road(&outcome.line).into_iter().chain(doubt).collect(),
+            warnings: off_road(&outcome.line).into_iter().collect(),
             corners: outcome.corners.clone(),
             full_grip_lap_time_s: outcome.full_grip_s,
             behind_full_grip_percent: outcome

@@ -3,7 +3,7 @@
 use super::{WheelOrder, elementary};
 use crate::evaluate::replay::Norm;
 use crate::line::kernel::Wanted;
-use crate::line::{TRACTION_ROOTS, TRACTION_SPEEDS};
+use crate::line::{TRACTION_ROOTS, TRACTION_SPEEDS, TRACTION_WIDTH};
 use crate::vehicle::tyre::Tyre;
 use crate::vehicle::{Chassis, LinearTyre, MagicFormula, TyreModel};
 
@@ -283,7 +283,7 @@ impl LineShape {
     pub fn source(&self) -> String {
         let rows = |rows: usize| self.uniform_envelope.then_some(rows);
         let cells = if self.traction {
-            TRACTION_SPEEDS * TRACTION_ROOTS
+            TRACTION_SPEEDS * TRACTION_ROOTS * (TRACTION_WIDTH / 4)
         } else {
             0
         };
