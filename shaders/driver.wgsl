@@ -108,6 +108,10 @@ fn act(
     let planned = (after * after - before * before) / 8.0;
     let wanted = planned + driver.speed_gain * behind;
     let aero = aero_forces(c, v, view.row.flap);
+    var force = c.mass * wanted + aero.drag;
+    if HAS_RELIEF {
+        force = force + c.mass * under.climb;
+    }
     let weight = c.mass * c.gravity + (aero.downforce_front + aero.downforce_rear);
     let used = min(driver.knows * abs(turning / (driver.friction * weight / c.mass)), 1.0);
     let left = sqrt(max(1.0 - used * used, 0.01));
@@ -119,7 +123,7 @@ fn act(
     let pull = torque_at(rim_speed / c.radius_rear) / c.radius_rear;
     let most = (pull - c.mass * driver.rolling + (driver.rotating - 1.0) * aero.drag) / driver.rotating;
     let within = max(controls.rear_slip, 0.0) + (most - controls.rear_force) / stiffness;
-    let driven = min(min(slip, max(within, 0.0)), limit);
+    let driven = min(min(min(slip, max(within, 0.0)), limit), max(force / stiffness, 0.0));
     let braked = max(slip, -limit);
     let brakes = slip < 0.0;
     let front = select(0.0, braked, brakes);

@@ -129,7 +129,7 @@ fn additional(
     let inverse = 1.0 / length;
     let boost = min(wanted, left * account.force_per_deployed * inverse / account.rotating);
 
-    let turns = spins(start, min(first.x, first.y + boost) - first.z) && 0.0 < space;
+    let turns = spins(start, min(first.x, first.y + boost) - first.z) && LEAST_J < space;
     let exhaust = select(0.0, figures.z, turns);
 
     let drive = first.y - exhaust;

@@ -361,13 +361,18 @@ pub fn act<R: Lookup>(
     let planned = (after * after - before * before) / R::lit(4.0 * PLAN_REACH_M);
     let wanted = planned + R::load(driver.speed_gain) * behind;
     let aero = aero_forces(c, v, view.row.flap);
+    let mut force = c.mass * wanted + aero.drag;
+    if let Some(footing) = footing {
+        force = force + c.mass * footing.climb;
+    }
     let weight = c.mass * c.gravity + (aero.downforce_front + aero.downforce_rear);
     // What a bend leaves of the tyres, by the friction circle.
     let used = knows * (turning / (R::load(driver.friction) * weight / c.mass)).abs();
     let used = used.min(one);
     let left = (one - used * used).max(R::lit(0.01)).sqrt();
     let limit = R::load(driver.slip_limit) * left;
-    // The foot moves until the car gains what is wanted. How much slip that takes, the tyres know and the driver does not.
+    // The foot moves until the car gains what is wanted. How much slip that takes, the tyres know and the driver does not: he goes no
+    // further than soft tyres would need, or he would spin the wheels of a car that gains no more.
     let stiffness = R::load(driver.driven_share) * weight * R::load(driver.slip_stiffness);
     let drives = !controls.rear_slip.less_than(zero);
     let pedal = R::select(drives, controls.rear_slip, controls.front_slip);
@@ -378,7 +383,10 @@ pub fn act<R: Lookup>(
     let rotating = R::load(driver.rotating);
     let most = (pull - c.mass * R::load(driver.rolling) + (rotating - one) * aero.drag) / rotating;
     let within = controls.rear_slip.max(zero) + (most - controls.rear_force) / stiffness;
-    let driven = asked.min(within.max(zero)).min(limit);
+    let driven = asked
+        .min(within.max(zero))
+        .min(limit)
+        .min((force / stiffness).max(zero));
     let braked = asked.max(-limit);
     let brakes = asked.less_than(zero);
     let front = R::select(brakes, braked, zero);

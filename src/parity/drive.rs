@@ -334,7 +334,7 @@ fn compare_steps(
     let mut agreement = Agreement::new(name, subject);
     for (number, (case, found)) in steps.iter().zip(&found).enumerate() {
         // In another row, or ended: the same in both.
-        for k in [9, 10, STATE - 1] {
+        for k in [11, 12, STATE - 1] {
             agreement.verdict(f64::from(found[k]) == case.exact[k], || {
                 format!("figure {k} of case {number}")
             });

@@ -22,13 +22,13 @@ struct Bar {
 /// As Mesa 22.3 compiles them. A wave of 128 vector registers runs beside seven others on a SIMD of navi21. The first that fits a kernel
 /// holds for it.
 const BARS: [Bar; 9] = [
-    bar("drive: by axle, magic formula", [160, 132, 156], [0, 27, 0]).of("hills"),
+    bar("drive: by axle, magic formula", [160, 132, 160], [0, 31, 0]).of("hills"),
     bar("line: ", [48, 48, 48], [0; 3]).of("hills"),
     bar("replay: by axle, magic formula", [120, 120, 120], [0; 3]),
     bar("settle: by axle, magic formula", [128, 132, 124], [0; 3]),
-    bar("drive: by axle, magic formula", [160, 132, 156], [0, 26, 0]),
+    bar("drive: by axle, magic formula", [160, 132, 160], [0, 30, 0]),
     bar("by axle, linear", [120, 120, 112], [0; 3]),
-    bar("line: ", [32, 36, 32], [0; 3]),
+    bar("line: ", [40, 48, 36], [0; 3]),
     bar("energy_line: ", [64, 60, 64], [0; 3]),
     bar("replay_reduce: by axle", [16, 24, 16], [0; 3]),
 ];
@@ -56,6 +56,7 @@ impl Bar {
 }
 
 fn kernels_fit_the_registers_of_graphics_processors() {
+    let mut beyond = Vec::new();
     for (place, family) in FAMILIES.into_iter().enumerate() {
         let answer = radv::ask(family, &BARS.map(|bar| bar.kernels)).expect("RADV compiles");
         for (at, bar) in BARS.iter().enumerate() {
@@ -75,12 +76,18 @@ fn kernels_fit_the_registers_of_graphics_processors() {
                 let found = ["VGPRs", "Spilled VGPRs", "Spilled SGPRs"].map(|name| kernel.figure(name));
                 let most = [bar.vectors[place], bar.spilled[place], SPILLED_SCALARS];
                 println!("{family}, {}: {found:?} of {most:?}", kernel.name());
-                assert!(
-                    found.iter().zip(most).all(|(found, most)| *found <= most),
-                    "{family}, {}: vector registers, spilled ones and spilled scalar registers are {found:?}, at most {most:?}",
-                    kernel.name()
-                );
+                if found.iter().zip(most).any(|(found, most)| *found > most) {
+                    beyond.push(format!(
+                        "{family}, {}: {found:?}, at most {most:?}",
+                        kernel.name()
+                    ));
+                }
             }
         }
     }
+    assert!(
+        beyond.is_empty(),
+        "vector registers, spilled ones and spilled scalar registers:\n{}",
+        beyond.join("\n")
+    );
 }

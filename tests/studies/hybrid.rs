@@ -209,9 +209,10 @@ fn the_published_scenarios_are_of_their_kind() {
         assert!((lap.lap.time - engine.lap.time).abs() < 1e-9);
         assert!(litres(lap) < litres(&engine));
         assert!((1.5e6..3.5e6).contains(&lap.lap.harvested_k));
-        // 0.23 MJ are published, at no cost to the lap. Here the generator takes what the engine has to spare.
+        // 0.23 MJ are published, at no cost to the lap. Here the generator takes what the engine has to spare, which is little: in bends
+        // the tyres take from it too.
         assert!(
-            (0.01e6..0.23e6).contains(&lap.lap.harvested_h),
+            (0.005e6..0.23e6).contains(&lap.lap.harvested_h),
             "{}",
             lap.lap.harvested_h
         );

@@ -125,7 +125,8 @@ pub(super) struct State<R> {
     pub(super) harvested_k: R,
 }
 
-/// A remainder below this (J) is left in the store. In single precision, rounding would spend it in ever smaller shares.
+/// A remainder below this (J) is left in the store, and the MGU-H does not fill a lesser room. In single precision, rounding would
+/// spend it in ever smaller shares, or take the engine's power for a room that is none.
 const LEAST_J: f64 = 5.0;
 
 /// Least energy at the wheels for a joule of the MGU-H that is told from none.
@@ -269,7 +270,7 @@ impl<R: Lookup> Car<'_, R> {
         let open = self.open(bends[0], from) & self.strategy[2].less_than(engine - drag);
         let wanted = gated(open, boost * zone_share(&self.plan.zones[here], self.strategy));
         let boost = wanted.min(self.boost(left, inverse));
-        let spins = self.spins(from, traction.min(drive + boost) - drag) & zero.less_than(space);
+        let spins = self.spins(from, traction.min(drive + boost) - drag) & R::lit(LEAST_J).less_than(space);
         let exhaust = gated(spins, exhaust);
 
         let drive = drive - exhaust;
@@ -312,7 +313,8 @@ impl<R: Lookup> Car<'_, R> {
         if let Some([end, motor, wanted, boost, space]) = first {
             let zero = R::lit(0.0);
             let now = wanted.min(self.boost(store[0], R::lit(1.0) / length));
-            let (had, has) = (zero.less_than(space), zero.less_than(store[1]));
+            let least = R::lit(LEAST_J);
+            let (had, has) = (least.less_than(space), least.less_than(store[1]));
             let differs = from.less_than(before)
                 | before.less_than(from)
                 | now.less_than(boost)

@@ -8,6 +8,7 @@ use crate::drive::{Drive, DriverSettings, MotorTorque, drive_with_motor};
 use crate::error::{Error, Result};
 use crate::evaluate::BackendInfo;
 use crate::files::run_folder::STATE;
+use crate::line::energy::Mode;
 use crate::line::{FineLine, PointMass};
 use crate::study::framework::{Inputs, Progress, RunRecord, Watch, Work};
 use crate::track::Circuit;
@@ -140,7 +141,9 @@ fn greatest_share(work: Work<'_, Transient>) -> Result<Option<DrivenLine>> {
             let of = |ideal: &Ideal| ideal.torque_nm(station_m, speed_mps);
             ideal.as_ref().map_or(0.0, of)
         };
-        let motor = ideal.as_ref().map(|_| &torque_nm as MotorTorque<'_>);
+        // In the engine's place the motor adds nothing to what the driver can have.
+        let adds = motor.as_ref().is_some_and(|motor| motor.mode == Mode::Additional);
+        let motor = adds.then_some(&torque_nm as MotorTorque<'_>);
         let drive = drive_with_motor(car, circuit, plan, &driver, INTERVAL_S, motor)?;
         let lap_time_s = drive.lap_time_s(circuit.length_m, INTERVAL_S);
         Ok(lap_time_s.map(|lap_time_s| DrivenLine {
