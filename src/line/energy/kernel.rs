@@ -311,7 +311,6 @@ impl<R: Lookup> Car<'_, R> {
         store: [R; 2],
     ) -> Step<R> {
         if let Some([end, motor, wanted, boost, space]) = first {
-            let zero = R::lit(0.0);
             let now = wanted.min(self.boost(store[0], R::lit(1.0) / length));
             let least = R::lit(LEAST_J);
             let (had, has) = (least.less_than(space), least.less_than(store[1]));
