@@ -305,8 +305,10 @@ pub(super) fn around(row: &EnvelopeRow, limits: &Envelope) -> (Vec<f64>, Vec<f64
     around
         .map(|a| {
             let tyres = row.ax_grip_mps2 * a.cos();
-            let driven = limits.traction_at(row.v_mps, a.sin().abs());
-            let push = tyres.min(driven.unwrap_or(tyres)).min(row.ax_drive_mps2);
+            let share = a.sin().abs();
+            let driven = limits.traction_at(row.v_mps, share).unwrap_or(tyres);
+            let engine = row.ax_drive_mps2 - limits.lost_at(row.v_mps, share);
+            let push = tyres.min(driven).min(engine);
             (row.ay_mps2 * a.sin(), push - row.drag_mps2)
         })
         .unzip()
@@ -406,7 +408,7 @@ fn write_page(folder: &Path, outcome: &Outcome, taken: &[Taken], summary: &Envel
     }
     page.table(
         "Limits at each speed",
-        "Drive is the lesser of traction and engine. Drag reduces the drive and helps the brakes.",
+        "Drive is the lesser of traction and engine, before the tyres take their part of it in bends. Drag reduces the drive and helps the brakes.",
         &with_support(speeds_table(limits), &summary.supported),
     )?;
     page.provenance("car", car);
