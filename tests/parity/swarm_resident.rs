@@ -132,8 +132,8 @@ fn hybrid(free: Vec<Free>) -> HybridProblem {
 }
 
 /// The device scales positions in `f32`, as it does those of lines, and divides results in it: what holds for objectives of lines
-/// holds for time and fuel. Energy is a difference of what comes in and what goes out along the lap, so that it is off by as much of
-/// the budget, 1.5 MJ.
+/// holds for time and fuel. Energy hangs on the roots that corners on the limit leave: a curvature that is off by 1.5e-6 of itself
+/// leaves a root of 1.7e-3, which is 0.02 m/s^2 for 1.3 t over 7 m, some 150 J in a corner: 1e-4 of the budget of 1.5 MJ.
 fn laps_with_energy_of_a_swarm_on_the_device_are_those_of_the_host() {
     let context = the_device();
     // Gates are made into figures by the host.
@@ -159,10 +159,10 @@ fn laps_with_energy_of_a_swarm_on_the_device_are_those_of_the_host() {
     let found = swarm.objectives().unwrap();
     let (mut apart, mut energies) = (0, 0);
     for (found, expected) in found.chunks_exact(3).zip(expected.objectives.chunks_exact(3)) {
-        for (k, least) in [(0, 0.0), (1, 0.0), (2, 1.5)] {
+        for (k, least, share) in [(0, 0.0, 2e-5), (1, 0.0, 2e-5), (2, 1.5, 1e-4)] {
             let size = expected[k].abs().max(least);
             assert!(
-                (found[k] - expected[k]).abs() <= 2e-5 * size,
+                (found[k] - expected[k]).abs() <= share * size,
                 "{found:?} for {expected:?}"
             );
         }
