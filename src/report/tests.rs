@@ -429,6 +429,21 @@ fn tables_keep_their_digits_and_their_units() {
     assert_eq!(std::fs::read_dir(&folder).expect("listed").count(), 1);
 }
 
+/// The margin of an axis from here to zero would end beyond the greatest number.
+#[test]
+fn the_greatest_numbers_have_axes() {
+    let x = [-1.69e308, 0.0, 1.69e308];
+    for n in [2, 3] {
+        let panel = Panel::new("greatest").curve("r", &x[..n], &x[..n]);
+        drawn("greatest", |p| Curves::new("greatest", [panel]).write_svg(p)).expect("drawn");
+        let points: Vec<Vec<f64>> = x[..n].iter().map(|x| vec![*x, -x]).collect();
+        let front = Front::new("greatest", &points)
+            .objective("a", "")
+            .objective("b", "");
+        drawn("front", |p| front.write_svg(p)).expect("drawn");
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(40))]
     #[test]

@@ -205,6 +205,7 @@ impl<R: Real, T: Tyre<R>> CarModel<R, T> {
                 };
             }
             let forces = self.tyres[axle].axle_forces(inputs);
+            // The rear axle comes last, and its wheels do not steer.
             rear_force = forces[0].x + forces[1].x;
             for half in 0..2 {
                 let y = half_track[axle] * R::lit(SIDES[half]);

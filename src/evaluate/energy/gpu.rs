@@ -6,7 +6,7 @@ use crate::evaluate::gpu::shader::EnergyShape;
 use crate::evaluate::gpu::{Batching, Binding, DeviceKind, GpuContext};
 use crate::evaluate::line::gpu::{Exchange, LineBatches, LineKernel, LineTables, Scaled};
 use crate::evaluate::{DeviceKernel, GpuBackend, OnDevice, ProblemKind};
-use crate::line::energy::kernel::FIGURES;
+use crate::line::energy::FIGURES;
 use crate::line::energy::{EnergyLap, EnergyPlan, EnergyTable, Mode};
 use crate::line::kernel::Wanted;
 use bytemuck::{Pod, Zeroable};

@@ -5,7 +5,7 @@ use super::problem::HybridProblem;
 use crate::evaluate::LaneTables;
 use crate::evaluate::packs::{LaneFigures, LaneKernel, Pack};
 use crate::evaluate::simd::InstructionSet;
-use crate::line::energy::kernel::FIGURES;
+use crate::line::energy::FIGURES;
 use crate::line::energy::{EnergyLap, EnergyPlan, EnergyTable};
 use crate::line::kernel::Course;
 use crate::line::{EnvelopeTable, LinePlan};

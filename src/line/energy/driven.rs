@@ -1,7 +1,8 @@
 //! The accounts of a lap that a car with four wheels drove: the motor does what its plan says, the engine the rest.
 
 use super::EnergyCar;
-use super::kernel::{Along, Car, EnergyLap, SegmentEnergy, State};
+use super::figures::{EnergyLap, SegmentEnergy};
+use super::kernel::{Along, Car, State};
 use super::plan::{EnergyPlan, Gates, Mode};
 use crate::scalar::Lookup;
 

@@ -2,6 +2,7 @@
 
 mod car;
 mod driven;
+mod figures;
 pub mod kernel;
 mod plan;
 mod table;
@@ -11,7 +12,8 @@ mod zones;
 
 pub use car::EnergyCar;
 pub use driven::{DrivenLapEnergy, DrivenMoment, MotorPlan, driven_energy};
-pub use kernel::{EnergyLap, SegmentEnergy, energy_lap};
+pub use figures::{EnergyLap, FIGURES, SegmentEnergy};
+pub use kernel::energy_lap;
 pub use plan::{EnergyPlan, GATES, Gates, Mode, ZoneRow};
 pub use table::{EnergyTable, hybrid_parts};
 pub use zones::{GAP_M, late_bend, zone_starts};
