@@ -12,9 +12,11 @@ struct Driver {
     max_steer: f32,
     knows: f32,
     rear_slip_per_ay: f32,
+    rear_slip_steep: f32,
     friction: f32,
     run_off: f32,
-    understeer: f32,
+    understeer_per_ay: f32,
+    understeer_steep: f32,
     driven_share: f32,
     steer_lag: f32,
     pedal_lag: f32,
@@ -73,6 +75,11 @@ fn planned_speed(course: Course, pace: Pace, view: View, ahead: f32) -> f32 {
     return speed + pace.share * (faster - speed);
 }
 
+fn steep(share: f32) -> f32 {
+    let square = min(share * share, 1.0);
+    return square * square;
+}
+
 fn act(
     course: Course,
     pace: Pace,
@@ -85,16 +92,22 @@ fn act(
     let body = state.body;
     let v = max(body.vx, 3.0);
     let wheelbase = c.cg_to_front + c.cg_to_rear;
+    let aero = aero_forces(c, v, view.row.flap);
+    let weight = c.mass * c.gravity + (aero.downforce_front + aero.downforce_rear);
+    let grip = driver.friction * weight / c.mass;
     let curvature = curvature_ahead(course, view.pose, driver.preview * v);
-    var understeer = driver.understeer * curvature * v * v / c.gravity * wheelbase;
     let bend = view.bend;
-    var sideslip = driver.knows * (c.cg_to_rear * bend - driver.rear_slip_per_ay * bend * v * v);
+    var across_ahead = curvature * v * v;
+    var across = bend * v * v;
     var turning = body.yaw_rate * v;
     if HAS_RELIEF {
-        understeer = understeer + driver.understeer * under.lean / c.gravity * wheelbase;
-        sideslip = sideslip - driver.knows * driver.rear_slip_per_ay * under.lean;
+        across_ahead = across_ahead + under.lean;
+        across = across + under.lean;
         turning = turning + under.lean;
     }
+    let understeer = across_ahead * (driver.understeer_per_ay + driver.understeer_steep * steep(across_ahead / grip));
+    let rear_slip = across * (driver.rear_slip_per_ay + driver.rear_slip_steep * steep(across / grip));
+    let sideslip = driver.knows * (c.cg_to_rear * bend - rear_slip);
     let heading = view.heading_error + sideslip + view.offset * 0.9 / (v * 0.45 + 3.0);
     let yaw_lack = curvature_ahead(course, view.pose, 0.08 * v) * v - body.yaw_rate;
     let asked = wheelbase * curvature + understeer - driver.heading_gain * heading + 0.045 * yaw_lack;
@@ -107,13 +120,11 @@ fn act(
     let after = planned_speed(course, pace, view, ahead + driver.reach);
     let planned = (after * after - before * before) / 8.0;
     let wanted = planned + driver.speed_gain * behind;
-    let aero = aero_forces(c, v, view.row.flap);
     var force = c.mass * wanted + aero.drag;
     if HAS_RELIEF {
         force = force + c.mass * under.climb;
     }
-    let weight = c.mass * c.gravity + (aero.downforce_front + aero.downforce_rear);
-    let used = min(driver.knows * abs(turning / (driver.friction * weight / c.mass)), 1.0);
+    let used = min(driver.knows * abs(turning / grip), 1.0);
     let left = sqrt(max(1.0 - used * used, 0.01));
     let limit = driver.slip_limit * left;
     let stiffness = driver.driven_share * weight * driver.slip_stiffness;

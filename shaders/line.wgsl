@@ -439,8 +439,8 @@ fn left_for_driving(speed_squared: f32, root: f32, ground: Ground, table: u32) -
         let below = place + LOADS_AT + u32(layer.x) * LOAD_STEP;
         let low = traction_in(below, beyond);
         let high = traction_in(below + LOAD_STEP, beyond);
-        let between = low + layer.y * (high - low);
-        return vec2<f32>(max(between.x, 0.0), between.y);
+        // Beyond the loads that were swept the tyres give nothing back.
+        return max(low + layer.y * (high - low), vec2<f32>(0.0));
     }
     return traction_in(place, beyond);
 }

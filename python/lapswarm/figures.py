@@ -240,6 +240,15 @@ class LineSetup:
 
 
 @dataclass(frozen=True)
+class LineSector:
+    """A sector of a line that was looked for in several, lengths in metres."""
+
+    sections: int
+    length_m: float
+    link_m: float
+
+
+@dataclass(frozen=True)
 class LineSetups:
     """Set-ups with fastest lines of their own."""
 
@@ -277,6 +286,7 @@ class Lines(Figures):
     hypervolume_reference: list[float] | None
     front_size: int
     setups: LineSetups | None
+    sectors: list[LineSector]
     off_road: list[str]
     warnings: list[str]
 

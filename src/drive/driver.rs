@@ -18,7 +18,7 @@ pub(super) const PEDAL_LAG_S: f64 = 0.06;
 const STEER_LAG: f64 = 0.04;
 /// Greatest rate of the driver's arms, rad/s.
 const STEER_RATE: f64 = 0.9;
-/// Steering added for understeer, rad per g and metre of wheelbase.
+/// Steering that a driver who does not know the car adds for understeer, rad per g and metre of wheelbase.
 const UNDERSTEER: f64 = 0.0025;
 /// Share of the load that the driven wheels are computed to carry.
 const DRIVEN_SHARE: f64 = 0.55;
@@ -69,16 +69,20 @@ driver_table! {
     max_steer,
     /// One for a driver who knows the car, zero for one who does not.
     knows,
-    /// Slip angle of the rear axle for every m/s^2 of lateral acceleration, rad s^2/m.
+    /// Slip angle of the rear axle for every m/s^2 of lateral acceleration, rad s^2/m,
     rear_slip_per_ay,
+    /// and what comes to it at the limit of grip, with the fourth power of the share that is used.
+    rear_slip_steep,
     /// Lateral acceleration that the tyres give for every m/s^2 of load over mass.
     friction,
     /// Distance beyond an edge at which a car counts as lost, m.
     run_off,
-    /// Steering added for understeer, rad per g of lateral acceleration and metre of wheelbase. This figure and those below are
-    /// constants. They are passed as data because compilers for devices would regroup known constants.
-    understeer,
-    /// Share of the load that the driven wheels are computed to carry.
+    /// Steering added for understeer for every m/s^2 of lateral acceleration, rad s^2/m,
+    understeer_per_ay,
+    /// and what comes to it at the limit, likewise.
+    understeer_steep,
+    /// Share of the load that the driven wheels are computed to carry. This figure and those below are constants. They are passed
+    /// as data because compilers for devices would regroup known constants.
     driven_share,
     /// Time constant of the arms, s.
     steer_lag,
@@ -100,6 +104,10 @@ impl DriverTable<f64> {
     /// The figures of `settings` in `car`, driven in steps of `step_s`; a car is lost `run_off_m` beyond an edge.
     pub fn new(settings: &DriverSettings, car: &Car, step_s: f64, run_off_m: f64) -> Self {
         let knowledge = settings.knowledge;
+        let c = &car.chassis;
+        let guess = UNDERSTEER * (c.cg_to_front + c.cg_to_rear) / c.gravity;
+        let understeer = knowledge.map_or([guess, 0.0], |k| k.understeer);
+        let rear_slip = knowledge.map_or([0.0; 2], |k| k.rear_slip);
         Self {
             step: step_s,
             preview: settings.preview_s,
@@ -109,10 +117,12 @@ impl DriverTable<f64> {
             slip_stiffness: settings.slip_stiffness,
             max_steer: car.max_steer_rad,
             knows: knowledge.map_or(0.0, |_| 1.0),
-            rear_slip_per_ay: knowledge.map_or(0.0, |k| k.rear_slip_per_ay),
+            rear_slip_per_ay: rear_slip[0],
+            rear_slip_steep: rear_slip[1],
             friction: knowledge.map_or(1.0, |k| k.friction),
             run_off: run_off_m,
-            understeer: UNDERSTEER,
+            understeer_per_ay: understeer[0],
+            understeer_steep: understeer[1],
             driven_share: DRIVEN_SHARE,
             steer_lag: STEER_LAG,
             pedal_lag: PEDAL_LAG_S,
@@ -309,6 +319,13 @@ pub fn planned_speed<R: Lookup>(
     speed + pace.share * (faster - speed)
 }
 
+/// How steeply slip rises towards the limit: the fourth power of the share of the grip that is used.
+#[inline(always)]
+fn steep<R: Real>(share: R) -> R {
+    let square = (share * share).min(R::lit(1.0));
+    square * square
+}
+
 /// Moves arms and feet for one step.
 #[inline(always)]
 pub fn act<R: Lookup>(
@@ -329,19 +346,27 @@ pub fn act<R: Lookup>(
     let wheelbase = c.cg_to_front + c.cg_to_rear;
     let path = &road.path;
     let pose = &view.pose;
-    // Feed-forward: geometry plus the understeer of a car near its limit; feedback: offset, heading and
-    // the yaw rate that the present curvature asks for.
+    let aero = aero_forces(c, v, view.row.flap);
+    let weight = c.mass * c.gravity + (aero.downforce_front + aero.downforce_rear);
+    let grip = R::load(driver.friction) * weight / c.mass;
+    // Feed-forward: geometry plus the slip of both axles in steady cornering; feedback: offset, heading and the yaw rate that the
+    // present curvature asks for.
     let curvature = curvature_ahead(path, course, pose, R::load(driver.preview) * v);
-    let mut understeer = R::load(driver.understeer) * curvature * v * v / c.gravity * wheelbase;
     let bend = view.bend;
-    let mut sideslip = knows * (c.cg_to_rear * bend - R::load(driver.rear_slip_per_ay) * bend * v * v);
+    let mut across_ahead = curvature * v * v;
+    let mut across = bend * v * v;
     let mut turning = body.yaw_rate * v;
     // On a banked road the tyres bear gravity's part too. The driver knows it, and the gradient, from the road under him.
     if let Some(footing) = footing {
-        understeer = understeer + R::load(driver.understeer) * footing.lean / c.gravity * wheelbase;
-        sideslip = sideslip - knows * R::load(driver.rear_slip_per_ay) * footing.lean;
+        across_ahead = across_ahead + footing.lean;
+        across = across + footing.lean;
         turning = turning + footing.lean;
     }
+    let understeer = across_ahead
+        * (R::load(driver.understeer_per_ay) + R::load(driver.understeer_steep) * steep(across_ahead / grip));
+    let rear_slip =
+        across * (R::load(driver.rear_slip_per_ay) + R::load(driver.rear_slip_steep) * steep(across / grip));
+    let sideslip = knows * (c.cg_to_rear * bend - rear_slip);
     let heading =
         view.heading_error + sideslip + view.offset * R::lit(0.9) / (v * R::lit(0.45) + R::lit(3.0));
     let yaw_lack = curvature_ahead(path, course, pose, R::lit(0.08) * v) * v - body.yaw_rate;
@@ -360,14 +385,12 @@ pub fn act<R: Lookup>(
     let after = planned_speed(road, course, pace, view, look + reach);
     let planned = (after * after - before * before) / R::lit(4.0 * PLAN_REACH_M);
     let wanted = planned + R::load(driver.speed_gain) * behind;
-    let aero = aero_forces(c, v, view.row.flap);
     let mut force = c.mass * wanted + aero.drag;
     if let Some(footing) = footing {
         force = force + c.mass * footing.climb;
     }
-    let weight = c.mass * c.gravity + (aero.downforce_front + aero.downforce_rear);
     // What a bend leaves of the tyres, by the friction circle.
-    let used = knows * (turning / (R::load(driver.friction) * weight / c.mass)).abs();
+    let used = knows * (turning / grip).abs();
     let used = used.min(one);
     let left = (one - used * used).max(R::lit(0.01)).sqrt();
     let limit = R::load(driver.slip_limit) * left;

@@ -30,51 +30,83 @@ pub struct DriverSettings {
     pub knowledge: Option<CarKnowledge>,
 }
 
-/// What a driver who knows the car computes with. Without the first figure the driver would steer against the car's normal drift
-/// angle. Without the second the driver would use grip for driving that the bend needs.
+/// What a driver who knows the car computes with: its steady cornering. Without the slip of its axles the driver would run wide or
+/// steer against the car's normal drift angle. Without the friction the driver would use grip for driving that the bend needs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CarKnowledge {
-    /// Slip angle of the rear axle for every m/s^2 of lateral acceleration (rad s^2/m): it turns the car into the bend.
-    pub rear_slip_per_ay: f64,
+    /// Steering beyond what the bend itself asks for, for every m/s^2 of lateral acceleration (rad s^2/m): that at little of it, and
+    /// what comes to it at the limit, with the fourth power of the share of the grip that is used.
+    pub understeer: [f64; 2],
+    /// Slip angle of the rear axle, likewise: it turns the car into the bend.
+    pub rear_slip: [f64; 2],
     /// Lateral acceleration that the tyres give for every m/s^2 of load over mass: a coefficient of friction.
     pub friction: f64,
 }
 
+/// Speeds at which the car's steady cornering is looked at (m/s).
+const SPEEDS_MPS: [f64; 5] = [15.0, 25.0, 40.0, 55.0, 70.0];
+/// Share of the greatest lateral acceleration up to which it is: beyond it the axle that gives way first takes any angle.
+const MOST_SHARE: f64 = 0.96;
+
 impl CarKnowledge {
-    /// From the car's steady states in bends at 60% to 90% of the greatest lateral acceleration.
+    /// From the car's steady states in bends.
     ///
     /// # Errors
     /// [`Error::Study`] if the car has none.
     pub fn of_car(car: &Car) -> Result<Self> {
         let c = &car.chassis;
+        let wheelbase = c.cg_to_front + c.cg_to_rear;
         let steady = steady_car(car);
-        let mut slips = Vec::new();
-        let mut frictions = Vec::new();
-        for speed in [25.0f64, 40.0, 55.0] {
+        let mut friction = f64::INFINITY;
+        // Lateral acceleration, what the tyres carry, understeer and slip of the rear axle.
+        let mut states: Vec<[f64; 4]> = Vec::new();
+        for speed in SPEEDS_MPS {
             let trims = steady.cornering(speed, car.max_steer_rad.max(0.3), Turn::Left);
             let most = trims.iter().map(|t| t.ay_mps2).fold(0.0, f64::max);
             if most == 0.0 {
                 continue;
             }
             let load = load_mps2(c, speed);
-            frictions.push(most / load);
+            friction = friction.min(most / load);
             let ridge = trims.iter().position(|t| t.ay_mps2 == most).unwrap_or(0);
-            slips.extend(
-                trims
-                    .iter()
-                    .take(ridge + 1)
-                    .filter(|t| (0.6..0.9).contains(&(t.ay_mps2 / most)))
-                    // Without slip the rear axle follows the path. That part of the angle is geometry.
-                    .map(|t| c.cg_to_rear / (speed * speed) - t.sideslip_rad / t.ay_mps2),
-            );
+            let before = trims.iter().take(ridge + 1);
+            states.extend(before.filter(|t| t.ay_mps2 < MOST_SHARE * most).map(|t| {
+                // Without slip the axles follow the path. That part of the angles is geometry.
+                let bend = t.ay_mps2 / (speed * speed);
+                let (understeer, rear_slip) = (
+                    t.steer_rad - wheelbase * bend,
+                    c.cg_to_rear * bend - t.sideslip_rad,
+                );
+                [t.ay_mps2, load, understeer, rear_slip]
+            }));
         }
-        if slips.is_empty() {
-            return Err(Error::Study(format!("{} has no steady state in bends", car.name)));
+        let fitted = |angle: usize| {
+            // The least squares of two terms, over the angles themselves.
+            let (mut squares, mut products) = ([0.0; 3], [0.0; 2]);
+            for state in &states {
+                let share = (state[0] / (friction * state[1])).min(1.0);
+                let terms = [state[0], state[0] * share.powi(4)];
+                for (sum, [i, j]) in squares.iter_mut().zip([[0, 0], [0, 1], [1, 1]]) {
+                    *sum += terms[i] * terms[j];
+                }
+                for (sum, term) in products.iter_mut().zip(terms) {
+                    *sum += term * state[angle];
+                }
+            }
+            let determinant = squares[0] * squares[2] - squares[1] * squares[1];
+            let by = |a: f64, b: f64| (a * products[0] + b * products[1]) / determinant;
+            [by(squares[2], -squares[1]), by(-squares[1], squares[0])]
+        };
+        let knowledge = Self {
+            understeer: fitted(2),
+            rear_slip: fitted(3),
+            friction,
+        };
+        let known = [knowledge.understeer, knowledge.rear_slip];
+        if known.as_flattened().iter().all(|figure| figure.is_finite()) && friction.is_finite() {
+            return Ok(knowledge);
         }
-        Ok(Self {
-            rear_slip_per_ay: slips.iter().sum::<f64>() / slips.len() as f64,
-            friction: frictions.iter().copied().fold(f64::INFINITY, f64::min),
-        })
+        Err(Error::Study(format!("{} has no steady state in bends", car.name)))
     }
 }
 
@@ -85,10 +117,11 @@ impl DriverSettings {
     /// As [`CarKnowledge::of_car`].
     pub fn racing(car: &Car) -> Result<Self> {
         Ok(Self {
-            heading_gain: 0.8,
-            speed_gain_1ps: 3.0,
-            // What the feet lag behind: who looks further brakes early in every corner, for a hundredth of the lap.
-            speed_ahead_s: PEDAL_LAG_S,
+            heading_gain: 1.0,
+            speed_gain_1ps: 6.0,
+            // The acceleration leads by what the feet lag behind: of a step in it no error of speed is left. Who aims for the speed
+            // ahead as well brakes early in every corner, for a hundredth of the lap.
+            speed_ahead_s: 0.0,
             plan_ahead_s: PEDAL_LAG_S,
             knowledge: Some(CarKnowledge::of_car(car)?),
             ..Self::default()

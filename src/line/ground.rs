@@ -254,8 +254,8 @@ impl<R: Lookup> Ground<R> for Sloped<R> {
         let layer = self.layer(loads, speed_squared);
         let low = Self::traction_of(loads, layer.below, cell, beyond);
         let high = Self::traction_of(loads, layer.below + R::lit(1.0), cell, beyond);
-        let [left, lost] = std::array::from_fn(|i: usize| low[i] + layer.share * (high[i] - low[i]));
-        [left.max(R::lit(0.0)), lost]
+        // Beyond the loads that were swept the tyres give nothing back.
+        std::array::from_fn(|i: usize| (low[i] + layer.share * (high[i] - low[i])).max(R::lit(0.0)))
     }
 
     /// Where the lateral limit is passed: by Newton's method from above, which bisection helps where it leaves what is known.

@@ -1,9 +1,9 @@
 //! The deployment of a motor's energy that saves most time on a fixed line.
 //!
-//! Speeds squared and the motor's share of its force in each segment are the unknowns. The lap time is a convex function of
-//! the speeds squared, and braking bounds them from above whatever the motor does. Only the acceleration by engine, tyres and
-//! motor is not linear. It is linearised about the last lap in a sequence of cone programs, which leads to the optimum; after
-//! each program the full lap is computed. After S. Ebbesen, M. Salazar, P. Elbert, C. Bussi and C. H.
+//! Speeds squared and what the motor adds to the acceleration of each segment are the unknowns: the energy is linear in the latter,
+//! and what the tyres still transmit bounds it. The lap time is a convex function of the speeds squared, and braking bounds them from
+//! above whatever the motor does. Only the acceleration by engine, tyres and motor is not linear. It is linearised about the last
+//! lap in a sequence of cone programs, which leads to the optimum; after each program the full lap is computed. After S. Ebbesen, M. Salazar, P. Elbert, C. Bussi and C. H.
 //! Onder, *Time-optimal control strategies for a hybrid electric race car*, IEEE Trans. Control Syst. Technol. 26, 2018.
 
 use super::conic::{Affine, ConicProgram, Status};
@@ -11,7 +11,7 @@ use crate::error::{Error, Result};
 use crate::evaluate::energy::{HybridObjective, HybridProblem, Strategy};
 use crate::line::energy::kernel::motor_step;
 use crate::line::energy::{EnergyCar, EnergyLap, EnergyPlan, Gates, Mode};
-use crate::line::kernel::may_open;
+use crate::line::kernel::{Course, may_open};
 use glam::DVec2;
 use std::time::Instant;
 
@@ -55,7 +55,7 @@ const PROGRAMS: usize = 30;
 const GAIN_S: f64 = 2e-5;
 /// Time (s) that a step may still promise where the search counts as solved: the resolution of lap times.
 const SOLVED_S: f64 = 1e-3;
-/// Greatest change of a share in the first program.
+/// Greatest change of the motor's part in the first program, as a share of the most it can be.
 const FIRST_MOVE: f64 = 1.0;
 /// Unit of speeds squared in the programs (m^2/s^2), so that all unknowns are about one.
 const SQUARE: f64 = 1000.0;
@@ -64,16 +64,31 @@ const DERIVATIVE: f64 = 1e-4;
 /// Least speed squared about which that share is taken (m^2/s^2): a car may start from a standstill.
 const LEAST_SQUARE: f64 = 1.0;
 
+/// Motor's part of the acceleration (m/s^2) below which a segment has no use for it.
+const LEAST_MOTOR: f64 = 1e-9;
+/// Halvings of the share that gives a wanted part: to the last bit of a double.
+const HALVINGS: usize = 52;
+/// A move below which a small gain settles nothing.
+const SMALL_MOVE: f64 = 0.05;
+/// Energy of a lap that may deploy as much as it wants to (J).
+const UNBOUND_J: f64 = 1e12;
+/// How near a lap comes to the energy that it is to spend, as a share of it, and in how many rounds at the most.
+const SPENT: f64 = 1e-6;
+const ROUNDS: usize = 6;
+
 /// A segment about the last lap.
 struct Linear {
-    /// Speed squared at the end at the last speed and share, and its derivatives by both.
+    /// Speed squared at the end at the last speed and motor's part, and its derivatives by both.
     reached: f64,
     by_square: f64,
-    by_share: f64,
-    /// Energy (J), likewise.
-    energy: f64,
-    energy_by_square: f64,
-    energy_by_share: f64,
+    by_motor: f64,
+    /// The motor's part of the acceleration (m/s^2).
+    motor: f64,
+    /// The most that it can be, and its derivative by the speed squared.
+    most: f64,
+    most_by_square: f64,
+    /// Energy for each m/s^2 of it (J).
+    cost: f64,
 }
 
 impl DeploymentSearch<'_> {
@@ -117,7 +132,7 @@ impl DeploymentSearch<'_> {
                 "0 or more",
             ));
         }
-        let problem = self.problem(energy_j)?;
+        let (problem, unbound) = (self.problem(energy_j)?, self.problem(UNBOUND_J)?);
         let n = self.points_m.len();
         let mut shares = start.map_or_else(|| vec![0.0; n], <[f64]>::to_vec);
         if shares.len() != n || !shares.iter().all(|share| (0.0..=1.0).contains(share)) {
@@ -140,7 +155,7 @@ impl DeploymentSearch<'_> {
             }
             let squares: Vec<f64> = segments.iter().map(|s| s.start).collect();
             let linear: Vec<Linear> = (0..segments.len())
-                .map(|i| self.linear(&course.length, &course.curvature, i, squares[i], shares[i]))
+                .map(|i| self.linear(&course, i, squares[i], shares[i]))
                 .collect();
             let program = Program {
                 closed: self.closed,
@@ -148,7 +163,6 @@ impl DeploymentSearch<'_> {
                 most: &course.speed_squared,
                 squares: &squares,
                 end: segments.last().map_or(0.0, |s| s.end),
-                shares: &shares,
                 linear: &linear,
                 energy_j,
                 reach,
@@ -166,13 +180,15 @@ impl DeploymentSearch<'_> {
                 judged = true;
                 continue;
             }
-            let tried = problem.lap(&found);
+            let asked = self.spending(energy_j, &unbound, &course, &linear, &found, &shares);
+            let tried = problem.lap(&asked);
             let gain = lap.time - tried.0.time;
             if !failed && gain > 0.0 {
-                shares = found;
+                shares = asked;
                 (lap, segments, course) = tried;
                 bound_s = Some(bound).filter(|b| b.is_finite());
-                settled = gain < GAIN_S;
+                settled = gain < GAIN_S && reach > SMALL_MOVE;
+                reach = (2.0 * reach).min(FIRST_MOVE);
             } else {
                 // The linear model holds near the last lap only.
                 reach *= 0.4;
@@ -189,32 +205,108 @@ impl DeploymentSearch<'_> {
         })
     }
 
-    fn linear(&self, length: &[f64], curvature: &[f64], i: usize, square: f64, share: f64) -> Linear {
-        let (h, n) = (length[i], curvature.len());
+    /// The speed squared at the end of segment `i` and the motor's part of the acceleration (m/s^2) there.
+    fn step(&self, course: &Course<f64>, i: usize, square: f64, share: f64) -> [f64; 2] {
+        let (curvature, n) = (&course.curvature, course.curvature.len());
         let bends = ([curvature[i], curvature[(i + 1) % n]], may_open(self.drs, i));
-        let step = |square: f64, share: f64| {
-            motor_step(&self.car.envelope_table, &self.car.table, square, h, bends, share)
-        };
-        let cost = self.car.table.mass * self.car.table.deploy_cost * h;
+        motor_step(
+            &self.car.envelope_table,
+            &self.car.table,
+            square,
+            course.length[i],
+            bends,
+            share,
+        )
+    }
+
+    fn linear(&self, course: &Course<f64>, i: usize, square: f64, share: f64) -> Linear {
+        let step = |square: f64, share: f64| self.step(course, i, square, share);
         let [reached, motor] = step(square, share);
         let around = DERIVATIVE * square.max(LEAST_SQUARE);
-        let below = (square - around).max(0.0);
-        let (low, high) = (step(below, share), step(square + around, share));
-        let slope = |k: usize| (high[k] - low[k]) / (square + around - below);
-        // The derivative is taken between no motor and the whole motor. Beyond the grip of the tyres a share changes neither
-        // speed nor energy.
+        let (below, above) = ((square - around).max(0.0), square + around);
+        let slopes = |share: f64| {
+            let (low, high) = (step(below, share), step(above, share));
+            [0, 1].map(|k| (high[k] - low[k]) / (above - below))
+        };
         let (none, all) = (step(square, 0.0), step(square, 1.0));
+        let by_motor = if all[1] > LEAST_MOTOR {
+            (all[0] - none[0]) / all[1]
+        } else {
+            0.0
+        };
+        let [reached_by_square, motor_by_square] = slopes(share);
         Linear {
             reached,
             // A greater speed at the start never gives a smaller one at the end. At the limit of grip a finite step may suggest
             // so; a program would then slow down, and the next lap would not.
-            by_square: slope(0).max(0.0),
-            by_share: all[0] - none[0],
-            energy: cost * motor,
-            energy_by_square: cost * slope(1),
-            energy_by_share: cost * (all[1] - none[1]),
+            by_square: (reached_by_square - by_motor * motor_by_square).max(0.0),
+            by_motor,
+            motor,
+            most: all[1],
+            most_by_square: slopes(1.0)[1],
+            cost: self.car.table.mass * self.car.table.deploy_cost * course.length[i],
         }
     }
+
+    /// The shares with which the motor does what is asked, a little less of it everywhere, or more, so that it takes the energy that
+    /// the program thought it would: a lap whose store runs out loses all at its end.
+    fn spending(
+        &self,
+        energy_j: f64,
+        unbound: &HybridProblem,
+        course: &Course<f64>,
+        linear: &[Linear],
+        asked: &[Asked],
+        shares: &[f64],
+    ) -> Vec<f64> {
+        let thought_j: f64 = asked
+            .iter()
+            .zip(linear)
+            .map(|(asked, of)| of.cost * asked.motor)
+            .sum();
+        let all_of_it = thought_j > (1.0 - SPENT) * energy_j;
+        let (mut shares, mut scale) = (shares.to_vec(), 1.0);
+        for _ in 0..ROUNDS {
+            for (i, Asked { square, motor }) in asked.iter().enumerate() {
+                shares[i] = self.share(course, i, *square, scale * motor);
+            }
+            let spent = unbound.lap(&shares).0.deployed / energy_j;
+            if (spent - 1.0).abs() < SPENT || spent < 1.0 && !all_of_it {
+                break;
+            }
+            scale /= spent.max(1e-3);
+        }
+        shares
+    }
+
+    /// The share of its force with which the motor adds `motor` (m/s^2) to segment `i`.
+    fn share(&self, course: &Course<f64>, i: usize, square: f64, motor: f64) -> f64 {
+        if motor <= LEAST_MOTOR {
+            return 0.0;
+        }
+        let added = |share: f64| self.step(course, i, square, share)[1];
+        if added(1.0) <= motor {
+            return 1.0;
+        }
+        let (mut low, mut high) = (0.0, 1.0);
+        for _ in 0..HALVINGS {
+            let middle = 0.5 * (low + high);
+            if added(middle) < motor {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        high
+    }
+}
+
+/// What a program asks of a segment.
+struct Asked {
+    /// Speed squared at its start (m^2/s^2).
+    square: f64,
+    /// The motor's part of the acceleration (m/s^2).
+    motor: f64,
 }
 
 /// The cone program about a lap.
@@ -225,20 +317,19 @@ struct Program<'a> {
     squares: &'a [f64],
     /// Speed squared at the end of the last segment.
     end: f64,
-    shares: &'a [f64],
     linear: &'a [Linear],
     energy_j: f64,
     reach: f64,
 }
 
 impl Program<'_> {
-    /// The shares, the bound on the time (s) and how the solver ended.
-    fn solve(&self) -> Result<(Vec<f64>, f64, Status)> {
+    /// What is asked of each segment, the bound on the time (s) and how the solver ended.
+    fn solve(&self) -> Result<(Vec<Asked>, f64, Status)> {
         let segments = self.linear.len();
-        let n = self.shares.len();
+        let n = self.most.len();
         let points = if self.closed { segments } else { segments + 1 };
         let old = |i: usize| self.squares.get(i).copied().unwrap_or(self.end);
-        // Speeds squared, roots, inverse means, shares.
+        // Speeds squared, roots, inverse means, the motor's parts.
         let mut lower: Vec<f64> = (0..points).map(|i| 0.5 * old(i) / SQUARE).collect();
         let mut upper: Vec<f64> = (0..points)
             .map(|i| self.most[i % n].max(old(i)) / SQUARE)
@@ -248,11 +339,12 @@ impl Program<'_> {
         }
         lower.extend(vec![f64::NEG_INFINITY; points + segments]);
         upper.extend(vec![f64::INFINITY; points + segments]);
-        for share in &self.shares[..segments] {
-            lower.push((share - self.reach).max(0.0));
-            upper.push((share + self.reach).min(1.0));
+        for linear in self.linear {
+            let reach = self.reach * linear.most;
+            lower.push((linear.motor - reach).max(0.0));
+            upper.push(linear.motor + reach);
         }
-        let (root, inverse, share) = (points, 2 * points, 2 * points + segments);
+        let (root, inverse, motor) = (points, 2 * points, 2 * points + segments);
         let mut program = ConicProgram::new(lower, upper).for_step(1e-8, 1e-8);
         let affine = |constant: f64, terms: Vec<(usize, f64)>| Affine { constant, terms }.merged();
         for i in 0..points {
@@ -283,20 +375,20 @@ impl Program<'_> {
             program.add_linear(inverse + i, 2.0 * self.length[i] / per_second);
             // The speed at the end is no greater than what the segment leads to.
             let constant =
-                linear.reached - linear.by_square * self.squares[i] - linear.by_share * self.shares[i];
+                linear.reached - linear.by_square * self.squares[i] - linear.by_motor * linear.motor;
             program.add_nonnegative(affine(
                 constant / SQUARE,
                 vec![
                     (i, linear.by_square),
-                    (share + i, linear.by_share / SQUARE),
+                    (motor + i, linear.by_motor / SQUARE),
                     (next, -1.0),
                 ],
             ));
-            budget.constant -= linear.energy
-                - linear.energy_by_square * self.squares[i]
-                - linear.energy_by_share * self.shares[i];
-            budget.terms.push((i, -linear.energy_by_square * SQUARE));
-            budget.terms.push((share + i, -linear.energy_by_share));
+            program.add_nonnegative(affine(
+                linear.most - linear.most_by_square * self.squares[i],
+                vec![(i, linear.most_by_square * SQUARE), (motor + i, -1.0)],
+            ));
+            budget.terms.push((motor + i, -linear.cost));
         }
         let scale = self.energy_j.max(1e3).recip();
         budget.constant *= scale;
@@ -305,10 +397,11 @@ impl Program<'_> {
         }
         program.add_nonnegative(budget.merged());
         let solution = program.solve()?;
-        let mut shares = self.shares.to_vec();
-        for (s, found) in shares.iter_mut().zip(&solution.x[share..]) {
-            *s = found.clamp(0.0, 1.0);
-        }
-        Ok((shares, solution.lower_bound, solution.status))
+        let both = solution.x[..segments].iter().zip(&solution.x[motor..]);
+        let asked = both.map(|(square, motor)| Asked {
+            square: SQUARE * square,
+            motor: motor.max(0.0),
+        });
+        Ok((asked.collect(), solution.lower_bound, solution.status))
     }
 }

@@ -112,8 +112,10 @@ impl GripEnvelope for Tilted<'_> {
         let (low, high) = (of(below), of(above));
         let between = |a: f64, b: f64| a + share * (b - a);
         let value = between(low.value, high.value);
-        let grip = self.at(v).longitudinal;
-        (value > 0.0 && value < grip.value * root).then(|| BendGrip {
+        let grip = self.at(v);
+        // Beyond the loads that were swept the tyres give nothing back.
+        let most = grip.drive.value.min(grip.longitudinal.value * root);
+        (value > 0.0 && value < most).then(|| BendGrip {
             value,
             by_speed: between(low.by_speed, high.by_speed) + by_speed * (high.value - low.value),
             by_root: between(low.by_root, high.by_root),

@@ -1,7 +1,8 @@
-//! Horizontal bars, several to a name, with intervals.
+//! Horizontal bars, several to a name, with intervals; or strips of single values about their median.
 
-use super::axis::{Axis, Labels, Plot, draw_legend};
+use super::axis::{Axis, Labels, Plot, draw_legend, extent};
 use super::canvas::{Align, Type, draw_to_file};
+use super::curves::Scale;
 use super::html::Numbers;
 use super::style::{INK, LABEL_PX, TICK_PX, series_colour};
 use super::{Figure, HtmlReport};
@@ -16,6 +17,22 @@ struct Series {
     values: Vec<f64>,
     /// What each may be instead, lower and upper; empty for none.
     intervals: Vec<[f64; 2]>,
+    /// The single values behind each, drawn instead of bars; empty for none.
+    singles: Vec<Vec<f64>>,
+}
+
+impl Series {
+    /// All that is drawn of it. Bars begin at zero.
+    fn ends(&self) -> impl Iterator<Item = f64> {
+        let zero = self.singles.is_empty().then_some(0.0);
+        let singles = self.singles.iter().flatten();
+        let drawn = self
+            .values
+            .iter()
+            .chain(self.intervals.iter().flatten())
+            .chain(singles);
+        zero.into_iter().chain(drawn.copied())
+    }
 }
 
 /// Bars of one quantity, names from the top.
@@ -60,8 +77,28 @@ impl BarPanel {
             label: label.to_owned(),
             values: values.into_iter().collect(),
             intervals: intervals.into_iter().collect(),
+            singles: Vec::new(),
         });
         self
+    }
+
+    /// Adds strips, one for each name: all single values, and their quartiles and median, on an axis that goes as far as they do.
+    #[must_use]
+    pub fn strips(mut self, singles: impl IntoIterator<Item = Vec<f64>>, quartiles: &[[f64; 3]]) -> Self {
+        let medians = quartiles.iter().map(|q| q[1]);
+        self = self.with_intervals("", medians, quartiles.iter().map(|q| [q[0], q[2]]));
+        if let Some(series) = self.series.last_mut() {
+            series.singles = singles.into_iter().collect();
+        }
+        self
+    }
+
+    /// Whether the axis goes by equal ratios: where single values are all positive and go over more than two powers of ten.
+    fn by_ratios(&self) -> bool {
+        let strips = self.series.iter().all(|s| !s.singles.is_empty());
+        let ends = self.series.iter().flat_map(Series::ends);
+        let range = extent(&ends.collect::<Vec<f64>>());
+        strips && range.is_some_and(|(low, high)| low > 0.0 && high / low > 100.0)
     }
 
     /// Whether a bar can be drawn.
@@ -71,7 +108,8 @@ impl BarPanel {
 
     fn check(&self, path: &Path) -> Result<()> {
         let n = self.names.len();
-        let sound = |s: &Series| s.values.len() == n && (s.intervals.is_empty() || s.intervals.len() == n);
+        let fits = |given: usize| given == 0 || given == n;
+        let sound = |s: &Series| s.values.len() == n && fits(s.intervals.len()) && fits(s.singles.len());
         if n > 0 && self.series.iter().all(sound) {
             return Ok(());
         }
@@ -104,8 +142,8 @@ impl Bars {
 
 const PANEL_WIDTH: f64 = 620.0;
 const ROW: f64 = 24.0;
-const HEAD: f64 = 96.0;
-const FOOT: f64 = 84.0;
+const HEAD: f64 = 84.0;
+const FOOT: f64 = 64.0;
 const NAMES: f64 = 190.0;
 
 impl Figure for Bars {
@@ -130,17 +168,14 @@ impl Figure for Bars {
                 let right = PANEL_WIDTH * (index % columns + 1) as f64 - 8.0;
                 let top = height * (index / columns) as f64 + HEAD;
                 let bottom = top + ROW * panel.names.len() as f64;
-                let ends = panel.series.iter().flat_map(|s| {
-                    s.values
-                        .iter()
-                        .copied()
-                        .chain(s.intervals.iter().flatten().copied())
-                });
-                let (low, high) = ends
-                    .filter(|v| v.is_finite())
-                    .fold((0.0f64, 0.0f64), |(l, h), v| (l.min(v), h.max(v)));
+                let ends: Vec<f64> = panel.series.iter().flat_map(Series::ends).collect();
+                let range = extent(&ends).unwrap_or((0.0, 1.0));
                 let plot = Plot {
-                    x: Axis::padded((low, high), 0.02, (left, right)),
+                    x: if panel.by_ratios() {
+                        Axis::log(range, (left, right))
+                    } else {
+                        Axis::padded(range, 0.02, (left, right))
+                    },
                     y: Axis::linear((0.0, panel.names.len() as f64), (bottom, top)),
                 };
                 // Names stand where figures would.
@@ -167,12 +202,20 @@ impl Figure for Bars {
                             continue;
                         }
                         let end = plot.x.at(value);
-                        canvas.rect(
-                            (zero.min(end), upper),
-                            (zero.max(end), upper + thick - 1.0),
-                            series_colour(i),
-                            0.85,
-                        );
+                        let singles = series.singles.get(row).map_or(&[][..], |all| all);
+                        if singles.is_empty() {
+                            canvas.rect(
+                                (zero.min(end), upper),
+                                (zero.max(end), upper + thick - 1.0),
+                                series_colour(i),
+                                0.85,
+                            );
+                        } else {
+                            canvas.line((end, upper), (end, upper + thick - 1.0), INK, 2.0);
+                        }
+                        for single in singles.iter().filter(|v| v.is_finite()) {
+                            canvas.dot((plot.x.at(*single), y), 3.5, series_colour(i), 0.55);
+                        }
                         if let Some([a, b]) = series
                             .intervals
                             .get(row)
@@ -202,10 +245,17 @@ impl Figure for Bars {
             let series = panel.series.iter().map(|s| {
                 let end = |k: usize| Numbers::new(s.intervals.iter().map(|i| i[k]));
                 let interval = (!s.intervals.is_empty()).then(|| [end(0), end(1)]);
-                json!({ "name": s.label, "values": Numbers::new(s.values.iter().copied()), "interval": interval })
+                let singles: Vec<Numbers> = s
+                    .singles
+                    .iter()
+                    .map(|v| Numbers::new(v.iter().copied()))
+                    .collect();
+                let values = Numbers::new(s.values.iter().copied());
+                json!({ "name": s.label, "values": values, "interval": interval, "singles": singles })
             });
             let chart = json!({
                 "kind": "bars",
+                "scale": if panel.by_ratios() { Scale::Log } else { Scale::Linear },
                 "value_label": panel.x_label,
                 "categories": panel.names,
                 "series": series.collect::<Vec<_>>(),

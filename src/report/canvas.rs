@@ -163,9 +163,14 @@ impl Canvas<'_> {
     }
 
     /// A filled polygon.
-    pub(super) fn polygon(&mut self, points: impl IntoIterator<Item = (f64, f64)>, colour: RGBColor) {
+    pub(super) fn polygon(
+        &mut self,
+        points: impl IntoIterator<Item = (f64, f64)>,
+        colour: RGBColor,
+        opacity: f64,
+    ) {
         let points: Vec<(i32, i32)> = points.into_iter().map(fine).collect();
-        let style = ShapeStyle::from(&colour).filled();
+        let style = ShapeStyle::from(&colour.mix(opacity)).filled();
         let drawn = self.backend.fill_polygon(points, &style);
         self.keep(drawn.map_err(|e| e.to_string()));
     }

@@ -34,6 +34,8 @@ struct Curve {
     y: Vec<f64>,
     /// Where the curve stands on a scale of colour from 0 to 1, for families of curves.
     shade: Option<f64>,
+    /// The band about it, below and above at each `x`.
+    band: Option<[Vec<f64>; 2]>,
 }
 
 /// Curves over one quantity.
@@ -92,9 +94,19 @@ impl Panel {
             label: label.into(),
             x: x.to_vec(),
             y: y.to_vec(),
-            shade: None,
+            ..Curve::default()
         });
         self
+    }
+
+    /// Adds a curve with a band about it, from below to above at each `x`.
+    #[must_use]
+    pub fn band(self, label: impl Into<String>, x: &[f64], y: &[f64], [below, above]: [&[f64]; 2]) -> Self {
+        let mut panel = self.curve(label, x, y);
+        if let Some(curve) = panel.curves.last_mut() {
+            curve.band = Some([below.to_vec(), above.to_vec()]);
+        }
+        panel
     }
 
     /// Adds a curve of a family, at a place from 0 to 1 on the scale of colour.
@@ -131,12 +143,19 @@ impl Panel {
         let log = |k: usize| self.scales[k] == Scale::Log;
         let drawable = |k: usize| move |v: &&f64| !log(k) || **v > 0.0;
         let x = extent(self.curves.iter().flat_map(|c| &c.x).filter(drawable(0)))?;
-        let y = extent(self.curves.iter().flat_map(|c| &c.y).filter(drawable(1)))?;
+        let heights = |c: &Curve| -> Vec<f64> {
+            let band = c.band.iter().flatten().flatten();
+            c.y.iter().chain(band).copied().collect()
+        };
+        let heights: Vec<f64> = self.curves.iter().flat_map(heights).collect();
+        let y = extent(heights.iter().filter(drawable(1)))?;
         Some([x, self.y_range.filter(|(low, high)| high > low).unwrap_or(y)])
     }
 
     fn odd(&self) -> bool {
-        self.curves.iter().any(|c| c.x.len() != c.y.len())
+        let odd = |c: &Curve, given: &[f64]| given.len() != c.x.len();
+        let banded = |c: &Curve| c.band.iter().flatten().any(|side| odd(c, side));
+        self.curves.iter().any(|c| odd(c, &c.y) || banded(c))
     }
 }
 
@@ -164,6 +183,8 @@ impl Curves {
 
 const PANEL: (f64, f64) = (590.0, 420.0);
 const TOP: f64 = 52.0;
+/// How much of what is below it a band hides.
+const BAND_OPACITY: f64 = 0.16;
 /// Points of a curve that are few enough to be marked.
 const FEW: usize = 40;
 
@@ -226,6 +247,22 @@ impl Figure for Curves {
                     },
                 );
                 for (i, curve) in panel.curves.iter().enumerate() {
+                    let Some([below, above]) = &curve.band else {
+                        continue;
+                    };
+                    let positive = |v: f64| v.is_finite() && (panel.scales[1] == Scale::Linear || v > 0.0);
+                    let both = curve.x.iter().zip(below.iter().zip(above));
+                    let seen: Vec<(f64, (f64, f64))> = both
+                        .map(|(x, (low, high))| (plot.x.at(*x), (*low, *high)))
+                        .filter(|(_, (low, high))| positive(*low) && positive(*high))
+                        .collect();
+                    let lower = seen.iter().map(|(x, (low, _))| (*x, plot.y.at(*low)));
+                    let upper = seen.iter().rev().map(|(x, (_, high))| (*x, plot.y.at(*high)));
+                    if seen.len() > 1 {
+                        canvas.polygon(lower.chain(upper), colour(i, curve), BAND_OPACITY);
+                    }
+                }
+                for (i, curve) in panel.curves.iter().enumerate() {
                     let all = curve.x.iter().copied().zip(curve.y.iter().copied());
                     let positive = |k: usize, v: f64| panel.scales[k] == Scale::Linear || v > 0.0;
                     let inside = |v: f64| panel.y_range.is_none_or(|(low, _)| v >= low);
@@ -273,7 +310,11 @@ impl Figure for Curves {
                     (0..c.x.len()).collect()
                 };
                 let pick = |values: &[f64]| Numbers::new(picked(values, &which));
-                json!({ "label": c.label, "x": pick(&c.x), "y": pick(&c.y), "shade": c.shade })
+                let band = c
+                    .band
+                    .as_ref()
+                    .map(|sides| sides.each_ref().map(|side| pick(side)));
+                json!({ "label": c.label, "x": pick(&c.x), "y": pick(&c.y), "shade": c.shade, "band": band })
             });
             let chart = json!({
                 "kind": "curves",

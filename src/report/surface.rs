@@ -264,7 +264,7 @@ fn draw_in_space(canvas: &mut Canvas<'_>, figure: &Surface, share: &dyn Fn(f64) 
                     .map(|(c, r)| share(figure.z[r * nx + c]))
                     .sum::<f64>()
                     / 4.0;
-                canvas.polygon(points.iter().copied(), viridis(mean));
+                canvas.polygon(points.iter().copied(), viridis(mean), 1.0);
                 canvas.path(points.iter().copied().chain([points[0]]), WHITE, 0.25);
             }
         }

@@ -194,7 +194,7 @@ fn draw_road(canvas: &mut Canvas<'_>, map: &TrackMap, view: &View) {
     let right = runs(&map.road.right_edge_m, view, map.road.closed);
     if let ([left], [right]) = (left.as_slice(), right.as_slice()) {
         let around = left.iter().chain(right.iter().rev()).copied();
-        canvas.polygon(around, ROAD);
+        canvas.polygon(around, ROAD, 1.0);
     }
     for edge in left.iter().chain(&right) {
         canvas.path(edge.iter().copied(), EDGE, 0.9);
@@ -269,7 +269,7 @@ fn draw_start(canvas: &mut Canvas<'_>, map: &TrackMap, view: &View) -> Option<[D
     let tip = tail + along * 26.0;
     canvas.line(pair(tail), pair(tip - along * 6.0), INK, 1.6);
     let barb = |side: f64| pair(tip - along * 9.0 + across * (side * 4.5));
-    canvas.polygon([pair(tip), barb(1.0), barb(-1.0)], INK);
+    canvas.polygon([pair(tip), barb(1.0), barb(-1.0)], INK, 1.0);
     Some([start, 0.5 * (tail + tip)])
 }
 

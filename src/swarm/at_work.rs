@@ -13,9 +13,9 @@ use crate::evaluate::{
 use serde::{Deserialize, Serialize};
 
 #[cfg(feature = "gpu")]
-use super::Mopso;
-#[cfg(feature = "gpu")]
 use super::device::{DeviceMopso, DeviceObjectives};
+#[cfg(feature = "gpu")]
+use super::{Counters, Mopso};
 #[cfg(feature = "gpu")]
 use crate::error::Error;
 #[cfg(feature = "gpu")]
@@ -177,7 +177,8 @@ impl<'a> SwarmAtWork<'a> {
         #[cfg(feature = "gpu")]
         if let Place::Device(resident) = &self.place {
             let (swarm, _) = resident.on_board.as_ref().ok_or_else(no_device)?;
-            self.state.swarm = FrontSwarm::Swarm(Box::new(Mopso::from_device(swarm.state()?)));
+            let swarm = Mopso::from_device(swarm.state()?);
+            self.state.swarm.back(swarm);
         }
         self.state.losses.clone_from(&self.losses);
         Ok(())
@@ -210,8 +211,17 @@ impl<'a> SwarmAtWork<'a> {
             #[cfg(feature = "gpu")]
             Place::Device(resident) => {
                 let (swarm, objectives) = resident.on_board.as_mut().ok_or_else(no_device)?;
+                let planned = self.state.swarm.planned_iterations();
+                let trail = self.state.swarm.trail_mut();
                 while swarm.iteration() < iterations {
-                    latest = Some(swarm.step(objectives.as_mut())?);
+                    trail.begin();
+                    let progress = swarm.step(objectives.as_mut())?;
+                    let now = Counters {
+                        iteration: progress.iteration,
+                        evaluations: progress.evaluations,
+                    };
+                    trail.note(now, planned, || swarm.front().objectives);
+                    latest = Some(progress);
                 }
             }
         }

@@ -1,7 +1,9 @@
 //! What looks for a front in a study: a swarm, islands of swarms, or the genetic algorithm that they are compared with.
 
+use super::trail::Trail;
 use super::{
-    Counters, Front, Islands, Migration, Mopso, MopsoSettings, Nsga2, Nsga2Settings, Optimiser, SwarmPlace,
+    Counters, Front, Islands, Migration, Mopso, MopsoSettings, Nsga2, Nsga2Settings, Optimiser, Reached,
+    SwarmPlace,
 };
 use crate::error::{Error, Result};
 use crate::evaluate::{BackendChoice, Evaluation, Problem};
@@ -106,22 +108,22 @@ impl FrontSearch {
                 seed: motion.seed,
                 ..Nsga2Settings::default()
             };
-            return Ok(FrontSwarm::Genetic(Box::new(Nsga2::new(problem, settings)?)));
+            return Ok(Kind::Genetic(Box::new(Nsga2::new(problem, settings)?)).into());
         }
         if self.islands == 1 {
-            return Ok(FrontSwarm::Swarm(Box::new(place.swarm(problem, settings)?)));
+            return Ok(Kind::Swarm(Box::new(place.swarm(problem, settings)?)).into());
         }
         let swarms = (0..self.islands as u64)
             .map(|k| Mopso::new(problem, settings.clone().with_seed(motion.seed.wrapping_add(k))))
             .collect::<Result<_>>()?;
         let islands = Islands::new(problem, swarms, Some(MIGRATION))?;
-        Ok(FrontSwarm::Islands(Box::new(islands)))
+        Ok(Kind::Islands(Box::new(islands)).into())
     }
 }
 
-/// A search for a front, with its whole state.
+/// What searches for a front.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-pub(crate) enum FrontSwarm {
+enum Kind {
     /// One swarm.
     Swarm(Box<Mopso>),
     /// Swarms with migration.
@@ -130,55 +132,94 @@ pub(crate) enum FrontSwarm {
     Genetic(Box<Nsga2>),
 }
 
+/// A search for a front, with its whole state and what it had come to on its way.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub(crate) struct FrontSwarm {
+    kind: Kind,
+    trail: Trail,
+}
+
+impl From<Kind> for FrontSwarm {
+    fn from(kind: Kind) -> Self {
+        Self {
+            kind,
+            trail: Trail::default(),
+        }
+    }
+}
+
 impl FrontSwarm {
     /// Puts the first candidates at these, before the first population is asked for: those of every island.
     ///
     /// # Errors
     /// [`Error::Input`] naming a candidate that is no finite value for each variable.
     pub fn start_from(&mut self, candidates: &[Vec<f64>]) -> Result<()> {
-        match self {
-            Self::Swarm(swarm) => swarm.start_from(candidates),
-            Self::Islands(islands) => {
+        match &mut self.kind {
+            Kind::Swarm(swarm) => swarm.start_from(candidates),
+            Kind::Islands(islands) => {
                 let mut swarms = islands.islands_mut().iter_mut();
                 swarms.try_for_each(|swarm| swarm.start_from(candidates))
             }
-            Self::Genetic(genetic) => genetic.start_from(candidates),
+            Kind::Genetic(genetic) => genetic.start_from(candidates),
         }
     }
 
     /// The one swarm, which may live on a device.
     #[cfg(feature = "gpu")]
     pub fn alone(&self) -> Option<&Mopso> {
-        match self {
-            Self::Swarm(swarm) => Some(swarm),
+        match &self.kind {
+            Kind::Swarm(swarm) => Some(swarm),
             _ => None,
         }
     }
 
+    /// The same search as that swarm has come back from a device.
+    #[cfg(feature = "gpu")]
+    pub fn back(&mut self, swarm: Mopso) {
+        self.kind = Kind::Swarm(Box::new(swarm));
+    }
+
+    /// What it had come to on its way.
+    pub fn reached(&self) -> &[Reached] {
+        self.trail.reached()
+    }
+
+    /// Its way, for who takes its steps elsewhere.
+    #[cfg(feature = "gpu")]
+    pub fn trail_mut(&mut self) -> &mut Trail {
+        &mut self.trail
+    }
+
     fn present(&self) -> &dyn Optimiser {
-        match self {
-            Self::Swarm(swarm) => swarm,
-            Self::Islands(islands) => islands,
-            Self::Genetic(genetic) => genetic,
+        match &self.kind {
+            Kind::Swarm(swarm) => swarm,
+            Kind::Islands(islands) => islands,
+            Kind::Genetic(genetic) => genetic,
         }
     }
 
     fn present_mut(&mut self) -> &mut dyn Optimiser {
-        match self {
-            Self::Swarm(swarm) => swarm,
-            Self::Islands(islands) => islands,
-            Self::Genetic(genetic) => genetic,
+        match &mut self.kind {
+            Kind::Swarm(swarm) => swarm,
+            Kind::Islands(islands) => islands,
+            Kind::Genetic(genetic) => genetic,
         }
     }
 }
 
 impl Optimiser for FrontSwarm {
     fn ask(&mut self) -> Vec<f64> {
+        self.trail.begin();
         self.present_mut().ask()
     }
 
     fn tell(&mut self, evaluation: &Evaluation) -> Result<()> {
-        self.present_mut().tell(evaluation)
+        self.present_mut().tell(evaluation)?;
+        let (now, planned) = (self.counters(), self.planned_iterations());
+        let mut trail = std::mem::take(&mut self.trail);
+        trail.note(now, planned, || self.front().objectives);
+        self.trail = trail;
+        Ok(())
     }
 
     fn counters(&self) -> Counters {

@@ -63,6 +63,8 @@ pub mod problems;
 mod pso;
 mod settings;
 mod space;
+#[cfg(feature = "studies")]
+mod trail;
 mod two_phase;
 mod windows;
 
@@ -91,6 +93,8 @@ pub use settings::{
     BoundHandling, Constriction, DRAWN_PULLS, Leaders, MopsoSettings, Mutation, PsoSettings, Randomness,
     Schedule, Truncation,
 };
+#[cfg(feature = "studies")]
+pub use trail::Reached;
 pub use two_phase::{HybridSettings, HybridSwarm};
 pub use windows::{WindowSettings, WindowSwarm};
 

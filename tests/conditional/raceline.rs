@@ -180,7 +180,7 @@ fn particle_swarms_over_all_sections_can_be_asked_for() {
         };
         assert!(outcome.record.evaluations >= 10 * 20 * per_group);
         let found = &outcome.objectives[0];
-        let [first, last] = [0, found.history.len() - 1].map(|i| found.history[i].1);
+        let [first, last] = [0, found.history.len() - 1].map(|i| found.history[i].best);
         let [best, exact] =
             [&found.best, found.exact.as_ref().unwrap()].map(|l| l.objective(found.objective));
         assert!(last < first && best >= exact - 1e-6);

@@ -350,7 +350,7 @@ fn what_is_measured_has_a_page() {
             "sweep",
             vec!["sweep", &sweep],
             "4 runs of identify with 2 settings, 2 seeds each.",
-            7,
+            13,
             "medians.svg",
         ),
         (

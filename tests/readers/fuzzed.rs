@@ -9,15 +9,15 @@ mod readers;
 use crate::small_studies::small;
 use lapswarm::evaluate::{Objective, Problem, Variable};
 use lapswarm::files::run_folder::STATE;
-use lapswarm::study::framework::Request;
 use lapswarm::study::framework::memory::USUAL_MIB;
+use lapswarm::study::framework::{Request, Searched};
 use lapswarm::study::registry::STUDIES;
 use lapswarm::study::sweep::{KeptRow, Row, SweepSettings};
 use lapswarm::swarm::checkpoint::{self, Checkpoint};
 use lapswarm::swarm::{
     CooperativeSettings, CooperativeSwarm, CovarianceSettings, CovarianceSwarm, DifferenceSettings,
     DifferenceSwarm, HybridSettings, HybridSwarm, Islands, Moead, MoeadSettings, Mopso, MopsoSettings, Nsga2,
-    Nsga2Settings, Nsga3, Nsga3Settings, Pso, PsoSettings, WindowSettings, WindowSwarm,
+    Nsga2Settings, Nsga3, Nsga3Settings, Pso, PsoSettings, Reached, WindowSettings, WindowSwarm,
 };
 use lapswarm::vehicle::Car;
 use readers::READERS;
@@ -188,6 +188,17 @@ fn sweep_rows() -> Vec<u8> {
         .into_iter()
         .enumerate()
         .map(|(run, point)| KeptRow {
+            processor_elapsed_s: 2.0,
+            searched: Searched {
+                objectives: vec!["length (m)".to_owned(), "lap time (s)".to_owned()],
+                reached: vec![Reached {
+                    evaluations: 8,
+                    elapsed_s: 0.5,
+                    best: None,
+                    front: vec![vec![2.0, 3.0]],
+                }],
+                front: Vec::new(),
+            },
             row: Row {
                 run,
                 settings: point.settings,

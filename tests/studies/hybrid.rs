@@ -5,7 +5,6 @@ use lapswarm::config::settings::Settings;
 use lapswarm::evaluate::BackendChoice;
 use lapswarm::evaluate::energy::HybridObjective;
 use lapswarm::line::energy::{Gates, Mode};
-use lapswarm::optimum::Status;
 use lapswarm::study::framework::journal::Recorder;
 use lapswarm::study::framework::state_file::StateFile;
 use lapswarm::study::framework::{Study, solve_unobserved, write_results};
@@ -329,14 +328,8 @@ fn the_swarm_comes_within_hundredths_of_a_second_of_the_exact_deployment() {
             "{mj} MJ: {time} s and {} s",
             exact.lap.time
         );
-        // A solver that says that it almost solved it is up to 0.011 s above the swarm here.
-        let above_s = if exact.status == Status::Solved {
-            2e-3
-        } else {
-            0.02
-        };
         assert!(
-            exact.lap.time < time + above_s,
+            exact.lap.time < time + 2e-3,
             "{mj} MJ: the exact {} s ({}) and {time} s",
             exact.lap.time,
             exact.status

@@ -43,9 +43,12 @@ fn told(settings: &IdentifySettings, setup: &Setup, outcome: &identify::Outcome)
         outcome,
     });
     let summary = timeless(serde_json::to_value(&summary).unwrap());
+    let mut front = outcome.front.clone();
+    let reached = front.iter_mut().flat_map(|front| &mut front.reached);
+    reached.for_each(|reached| reached.elapsed_s = 0.0);
     format!(
-        "{:?} {:?} {:?} {history:?} {summary}",
-        outcome.candidate, outcome.swarm_candidate, outcome.front
+        "{:?} {:?} {front:?} {history:?} {summary}",
+        outcome.candidate, outcome.swarm_candidate
     )
 }
 
@@ -264,7 +267,10 @@ fn lines_told(settings: &RacelineSettings, setup: &raceline::Setup, outcome: &ra
         outcome,
     });
     let each = outcome.objectives.iter();
-    let best: Vec<_> = each.map(|o| (&o.best.alpha, &o.history)).collect();
+    let reached = |o: &raceline::ObjectiveOutcome| -> Vec<(u64, Option<f64>)> {
+        o.history.iter().map(|row| (row.evaluations, row.best)).collect()
+    };
+    let best: Vec<_> = each.map(|o| (&o.best.alpha, reached(o))).collect();
     format!(
         "{best:?} {:?} {}",
         outcome
@@ -389,6 +395,54 @@ fn cold_searches_are_resumed_bit_for_bit_from_every_stage() {
         let breaks: Vec<usize> = (1..8).map(|k| 1 + k * (all - 1) / 8).collect();
         lines_in_pieces((&settings, &setup), &breaks, (&wanted, all));
     }
+}
+
+/// Four sectors of thirty cross-sections: the line is one line, and its length is that within the sectors and of the links.
+#[test]
+fn sectors_are_joined_and_resumed_bit_for_bit() {
+    let settings = RacelineSettings {
+        algorithm: LineAlgorithm::Thesis,
+        sectors: 4,
+        objectives: vec![LineObjective::Length],
+        iterations: 40,
+        ..lines()
+    };
+    let setup = raceline::set_up(&settings).unwrap();
+    let mut seen = 0;
+    let mut steps = Steps::default();
+    let whole = solve::<Raceline>(&settings, &setup, (None, &mut StateFile::idle()), |p| {
+        seen += usize::from(steps.is_next(p));
+        ControlFlow::Continue(())
+    })
+    .unwrap()
+    .unwrap();
+    // Its mutants are evaluated beside the particles.
+    assert_eq!(seen, 4 * 40);
+    assert!(whole.record.evaluations > 4 * 40 * 16);
+    let wanted = lines_told(&settings, &setup, &whole);
+    lines_in_pieces((&settings, &setup), &[1, 39, 40, 41, 97, 160], (&wanted, seen));
+
+    let summary = Raceline::summarise(&Solved {
+        settings: &settings,
+        prepared: &setup,
+        outcome: &whole,
+    });
+    let sectors = &summary.sectors;
+    assert!(sectors.len() == 4 && sectors.iter().all(|s| s.sections == 30));
+    let within_m: f64 = sectors.iter().map(|s| s.length_m).sum();
+    let links_m: f64 = sectors.iter().map(|s| s.link_m).sum();
+    let length_m = summary.best["length"].length_m;
+    assert!(
+        (within_m + links_m - length_m).abs() < 1e-6,
+        "{within_m} {links_m} {length_m}"
+    );
+    // Each sector has 29 steps of its own and one to the next: no link but the last leads across the road.
+    let step_m = length_m / 120.0;
+    assert!(
+        sectors[..3].iter().all(|s| s.link_m < 1.2 * step_m),
+        "{sectors:?}"
+    );
+    assert!(length_m < summary.reference.length_m);
 }
 
 #[test]

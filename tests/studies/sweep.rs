@@ -63,6 +63,64 @@ iterations = 30
 seed = [1, 2]
 ";
 
+/// Two searches for fronts, each with two seeds: what they had reached by what it cost, and their fronts over
+/// one another. What the clock says has a file of its own.
+#[test]
+fn searches_are_set_beside_one_another() {
+    let root = tempfile::tempdir().expect("a temporary folder");
+    let text = LINES
+        .replace("[\"gamma\"]", "[\"length\", \"gamma\"]")
+        .replace("algorithm = \"thesis\"\n", "")
+        .replace("[grid]", "[grid]\nalgorithm = [\"thesis\", \"nsga2\"]");
+    let settings = SweepSettings::parse(Path::new("sweep.toml"), &text).expect("a sweep");
+    let folder = root.path().join("fronts");
+    let summary = sweep(&settings, &folder, false, |_| ControlFlow::Continue(())).expect("it runs");
+    let read = |name: &str| std::fs::read_to_string(folder.join(name)).expect(name);
+    let rows: Vec<Vec<f64>> = read("convergence.csv")
+        .lines()
+        .skip(1)
+        .map(|line| {
+            line.split(',')
+                .map(|cell| cell.parse().expect("a number"))
+                .collect()
+        })
+        .collect();
+    for run in 0..4 {
+        let own: Vec<&Vec<f64>> = rows.iter().filter(|row| row[0] == f64::from(run)).collect();
+        // After the first of thirty iterations, and after each twenty-fourth of them.
+        assert_eq!(own.len(), 25);
+        for two in own.windows(2) {
+            assert!(two[1][1] > two[0][1] && two[1][2] >= two[0][2], "{two:?}");
+        }
+        let (last, row) = (own[24], &summary.rows[run as usize]);
+        // NSGA-II keeps eight members, and may lose a little of what they had.
+        assert!(last[3] > own[0][3] - 0.02, "{own:?}");
+        // The mutants of the published swarm are evaluated beside its particles.
+        assert!(last[1] >= 240.0);
+        // Thirty iterations over every cross-section leave the published swarm beyond the point that volumes go up to.
+        let least = if row.settings["algorithm"] == "nsga2" {
+            0.5
+        } else {
+            0.0
+        };
+        assert!((least..1.0 + 1e-9).contains(&last[3]), "{last:?}");
+        assert!(row.figures["hypervolume_share"].is_some_and(|share| share >= 0.0));
+    }
+    assert_eq!(read("times.csv").lines().count(), 5);
+    let page = read("report.html");
+    for told in [
+        "What was reached by what it cost",
+        "Fronts over one another",
+        "hypervolume share",
+        "length, by the swarm",
+    ] {
+        assert!(page.contains(told), "{told}");
+    }
+    for picture in ["convergence.svg", "fronts.svg", "medians.svg"] {
+        assert!(read(picture).contains("<svg"), "{picture}");
+    }
+}
+
 /// A line's study within a sweep goes on from where it was; from another's state, or from none that can be read, it does not.
 #[test]
 fn the_study_at_work_is_resumed_and_foreign_states_are_not_trusted() {

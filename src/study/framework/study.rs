@@ -6,6 +6,7 @@ use super::state_file::StateFile;
 use super::{Plan, RunRecord};
 use crate::config::settings::{Declared, Role, Settings};
 use crate::error::{Error, Result};
+use crate::swarm::Reached;
 use crate::swarm::checkpoint::{self, Checkpoint};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -254,10 +255,21 @@ pub trait Study: Sized + 'static {
         figures
     }
 
-    /// The front that it found, a row of costs for each member; empty where it looks for none.
-    fn front(_: &Self::Outcome) -> Vec<Vec<f64>> {
-        Vec::new()
+    /// What its search was for and what it came to, for a sweep to set searches beside one another; nothing where none was made.
+    fn searched(_: &Solved<'_, Self>) -> Searched {
+        Searched::default()
     }
+}
+
+/// A search of a study.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Searched {
+    /// What it made small, each in words with its unit.
+    pub objectives: Vec<String>,
+    /// What it had come to on its way.
+    pub reached: Vec<Reached>,
+    /// The front at its end, a row of costs for each member; empty for one objective.
+    pub front: Vec<Vec<f64>>,
 }
 
 /// What a study was about.

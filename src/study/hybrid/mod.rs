@@ -26,10 +26,12 @@ pub use strategy::{FoundStrategy, StrategyFront, search_front, search_strategy};
 
 use crate::config::settings::Settings;
 use crate::error::{Error, Result};
+use crate::evaluate::energy::HybridObjective;
 use crate::optimum::Deployment;
+use crate::report::with_unit;
 use crate::study::framework::journal::Journal;
 use crate::study::framework::memory::MemoryItem;
-use crate::study::framework::{Plan, RunRecord, Solved, Study, Subject, Work};
+use crate::study::framework::{Plan, RunRecord, Searched, Solved, Study, Subject, Work};
 use crate::study::raceline::road_read;
 use std::path::Path;
 
@@ -164,6 +166,25 @@ impl Study for Hybrid {
         Err(Error::Study(format!(
             "no motor that was tried makes the car lap in {time_s} s, whatever the energy (see the sizes above)"
         )))
+    }
+
+    fn searched(solved: &Solved<'_, Self>) -> Searched {
+        let Some(found) = &solved.outcome.optimised else {
+            return Searched::default();
+        };
+        let named = |o: &HybridObjective| with_unit(o.words(), o.unit());
+        match &found.swarm_front {
+            Some(front) => Searched {
+                objectives: solved.settings.objectives.iter().map(named).collect(),
+                reached: front.reached.clone(),
+                front: front.objectives.clone(),
+            },
+            None => Searched {
+                objectives: vec![named(&HybridObjective::LapTime)],
+                reached: found.swarm.reached.clone(),
+                front: Vec::new(),
+            },
+        }
     }
 
     fn check(path: &Path) -> Result<String> {

@@ -14,8 +14,9 @@ use crate::line::{Parametrisation, geometry};
 use crate::optimum::{Deployment, DeploymentSearch};
 use crate::random::Random;
 use crate::study::framework::journal::Recorder;
-use crate::swarm::{HybridSettings, HybridSwarm, Optimiser, Progress, Pso, PsoSettings, run};
+use crate::swarm::{HybridSettings, HybridSwarm, Optimiser, Progress, Pso, PsoSettings, Reached, run};
 use std::ops::ControlFlow;
+use std::time::Instant;
 
 /// What the swarm found for one budget.
 #[derive(Clone, Debug)]
@@ -28,6 +29,8 @@ pub struct FoundStrategy {
     pub lap: ReportedLap,
     /// Laps evaluated.
     pub evaluations: u64,
+    /// What the swarm had come to on its way.
+    pub reached: Vec<Reached>,
 }
 
 impl HybridSetup {
@@ -153,7 +156,7 @@ pub(super) fn search(
     (name, problem): (&str, &HybridProblem),
     settings: &HybridStudySettings,
     recorder: &mut Recorder<'_>,
-    observe: impl FnMut(&Progress) -> ControlFlow<()>,
+    mut observe: impl FnMut(&Progress) -> ControlFlow<()>,
 ) -> Result<FoundStrategy> {
     let mut swarm: Box<dyn Optimiser> = if settings.algorithm == HybridAlgorithm::Thesis {
         let motion = PsoSettings {
@@ -173,7 +176,13 @@ pub(super) fn search(
         Box::new(HybridSwarm::new(&problem.problem, best)?)
     };
     let mut evaluator = open_hybrid_evaluator(problem, settings.backend, settings.adapter.as_deref())?;
-    run(&mut swarm, &mut recorder.over(evaluator.as_mut()), observe)?;
+    let (began, mut reached) = (Instant::now(), Vec::new());
+    run(&mut swarm, &mut recorder.over(evaluator.as_mut()), |progress| {
+        let best = progress.best.first().copied().unwrap_or(f64::NAN);
+        let elapsed_s = began.elapsed().as_secs_f64();
+        reached.push(Reached::best(progress.evaluations, elapsed_s, best));
+        observe(progress)
+    })?;
     // A lap that cannot be driven is no answer: the shares are then none.
     let best = swarm.front().candidates.into_iter().next();
     let shares = best.unwrap_or_else(|| vec![0.0; problem.dimensions()]);
@@ -182,6 +191,7 @@ pub(super) fn search(
         names: problem.problem.variables.iter().map(|v| v.name.clone()).collect(),
         shares,
         evaluations: swarm.evaluations(),
+        reached,
     })
 }
 
@@ -196,6 +206,8 @@ pub struct StrategyFront {
     pub objectives: Vec<Vec<f64>>,
     /// Laps evaluated.
     pub evaluations: u64,
+    /// What the search had come to on its way.
+    pub reached: Vec<Reached>,
 }
 
 /// Looks for the front between the study's objectives, with strategy, line or both free.
@@ -271,6 +283,7 @@ pub fn search_front(
         candidates: front.candidates,
         objectives: front.objectives,
         evaluations: swarm.evaluations(),
+        reached: swarm.reached().to_vec(),
     })
 }
 

@@ -33,12 +33,13 @@ use crate::config::settings::Settings;
 use crate::error::Result;
 use crate::evaluate::replay::open_evaluator;
 use crate::evaluate::{PackedClient, run_packed};
+use crate::report::with_unit;
 use crate::study::framework::memory::{MemoryItem, Size};
 use crate::study::framework::state_file::StateFile;
 use crate::study::framework::{
-    Figures, Plan, Progress, RunRecord, Solved, Study, Subject, Work, resumed_or_new,
+    Figures, Plan, Progress, RunRecord, Searched, Solved, Study, Subject, Work, resumed_or_new,
 };
-use crate::swarm::SwarmPlace;
+use crate::swarm::{Reached, SwarmPlace};
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::Arc;
@@ -204,7 +205,42 @@ impl Study for Identify {
         let costs = summary.costs.iter();
         figures.extend(costs.map(|(channel, cost)| (format!("cost_{channel}"), Some(*cost))));
         let errors = summary.rms_error.iter();
-        figures.extend(errors.map(|(channel, rms)| (format!("rms_error_{channel}"), Some(*rms))));
+        for (channel, rms) in errors {
+            figures.insert(format!("rms_error_{channel}"), Some(*rms));
+            figures.insert(format!("mse_{channel}"), Some(rms * rms));
+        }
+        for parameter in &summary.parameters {
+            let name = &parameter.name;
+            figures.insert(format!("value_{name}"), Some(parameter.car_value));
+            // A truth of zero has no relative error.
+            if let Some(truth) = parameter.truth.filter(|truth| *truth != 0.0) {
+                let error = parameter.car_value / truth - 1.0;
+                figures.insert(format!("relative_error_{name}"), Some(error));
+            }
+        }
         figures
+    }
+
+    fn searched(solved: &Solved<'_, Self>) -> Searched {
+        let outcome = solved.outcome;
+        let objectives = &solved.prepared.replay.problem.objectives;
+        let objectives = objectives.iter().map(|o| match &*o.name {
+            "all" => "cost of all channels".to_owned(),
+            channel => with_unit(&format!("cost of {channel}"), &o.unit),
+        });
+        let (reached, front) = match &outcome.front {
+            Some(front) => (front.reached.clone(), front.objectives.clone()),
+            None => {
+                let rows = outcome.history.iter();
+                let best = |row: &HistoryRow| row.best.first().copied().unwrap_or(f64::NAN);
+                let rows = rows.map(|row| Reached::best(row.evaluations, row.elapsed_s, best(row)));
+                (rows.collect(), Vec::new())
+            }
+        };
+        Searched {
+            objectives: objectives.collect(),
+            reached,
+            front,
+        }
     }
 }

@@ -538,6 +538,7 @@ fn front_of(swarm: &FrontSwarm) -> Option<Front> {
         chosen: nearest_to_ideal(&front.objectives)?,
         candidates: front.candidates,
         objectives: front.objectives,
+        reached: swarm.reached().to_vec(),
     })
 }
 

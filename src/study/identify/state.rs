@@ -7,7 +7,7 @@ use crate::evaluate::{Evaluator, FailureCounts, Logarithmic, Worth};
 use crate::study::framework::state_file::Origin;
 use crate::study::framework::{Inputs, State};
 use crate::swarm::checkpoint::Checkpoint;
-use crate::swarm::{CovarianceSwarm, FrontSwarm, Optimiser, Progress, Pso, step};
+use crate::swarm::{CovarianceSwarm, FrontSwarm, Optimiser, Progress, Pso, Reached, step};
 use serde::{Deserialize, Serialize};
 
 /// One line of the convergence history.
@@ -34,6 +34,8 @@ pub struct Front {
     pub candidates: Vec<Vec<f64>>,
     /// One row per member.
     pub objectives: Vec<Vec<f64>>,
+    /// What the search had come to on its way.
+    pub reached: Vec<Reached>,
     /// The member nearest to the ideal point, each objective as a share of its range.
     pub chosen: usize,
 }

@@ -9,7 +9,7 @@ use crate::line::Parametrisation;
 use crate::optimum::{ReferenceSolvers, interruptible};
 use crate::random::Random;
 use crate::swarm::metrics::{Scale, hypervolume};
-use crate::swarm::{Archive, Optimiser, Progress, SwarmAtWork, SwarmState, Truncation, lattice};
+use crate::swarm::{Archive, Optimiser, Progress, Reached, SwarmAtWork, SwarmState, Truncation, lattice};
 use rayon::prelude::*;
 use std::ops::ControlFlow;
 use std::sync::atomic::Ordering;
@@ -29,6 +29,8 @@ pub struct LineFront {
     pub ideal: Vec<f64>,
     /// Lines evaluated.
     pub evaluations: u64,
+    /// What its swarm had come to on its way.
+    pub reached: Vec<Reached>,
     /// What went wrong.
     pub losses: Losses,
     /// What evaluated in the end.
@@ -152,6 +154,7 @@ pub(super) fn search_front(
         reference,
         ideal,
         evaluations,
+        reached: swarm.reached().to_vec(),
     })
 }
 

@@ -16,7 +16,7 @@ mod whole_line_search;
 mod window_search;
 
 pub use front::{LineFront, front_problem, starting_lines};
-pub use results::{LineFigures, ParameterWorth, SetupFigures, SetupsSummary, Summary};
+pub use results::{LineFigures, ParameterWorth, SectorFigures, SetupFigures, SetupsSummary, Summary};
 pub use settings::{LineAlgorithm, RacelineSettings};
 pub(in crate::study) use setup::best_gears;
 pub use setup::{ReportedLine, Setup, road_read, set_up};
@@ -27,9 +27,10 @@ pub use window_search::{FoundLine, LevelRow, LineSearch, LineSearchSettings, Lin
 use crate::config::settings::Settings;
 use crate::error::{Error, Result};
 use crate::evaluate::line::LineObjective;
+use crate::report::with_unit;
 use crate::study::framework::memory::MemoryItem;
-use crate::study::framework::{Figures, Plan, RunRecord, Solved, Study, Subject, Work};
-use crate::swarm::SwarmPlace;
+use crate::study::framework::{Figures, Plan, RunRecord, Searched, Solved, Study, Subject, Work};
+use crate::swarm::{Reached, SwarmPlace};
 use std::path::Path;
 
 /// The study.
@@ -49,8 +50,8 @@ pub struct ObjectiveOutcome {
     pub exact: Option<ReportedLine>,
     /// How its solver ended, in plain words.
     pub exact_status: Option<String>,
-    /// Best cost against evaluations of its swarm.
-    pub history: Vec<(u64, f64)>,
+    /// Best cost on the way of its swarm.
+    pub history: Vec<Reached>,
 }
 
 /// The outcome of a study.
@@ -156,7 +157,7 @@ impl Study for Raceline {
     }
 
     /// What was reached of each objective, and the quality of the front.
-    fn figures(outcome: &Outcome, _: &Summary) -> Figures {
+    fn figures(outcome: &Outcome, summary: &Summary) -> Figures {
         let evaluations = outcome.record.evaluations as f64;
         let mut figures = Figures::from([("evaluations".to_owned(), Some(evaluations))]);
         for o in &outcome.objectives {
@@ -171,13 +172,26 @@ impl Study for Raceline {
             figures.insert("hypervolume".to_owned(), Some(front.hypervolume));
             figures.insert("front_size".to_owned(), Some(front.alpha.len() as f64));
         }
+        if let Some([within_m, links_m]) = results::sectors::lengths_m(&summary.sectors) {
+            figures.insert("within_sectors_m".to_owned(), Some(within_m));
+            figures.insert("between_sectors_m".to_owned(), Some(links_m));
+        }
         figures
     }
 
-    fn front(outcome: &Outcome) -> Vec<Vec<f64>> {
-        outcome
-            .front
-            .as_ref()
-            .map_or(Vec::new(), |front| front.objectives.clone())
+    fn searched(solved: &Solved<'_, Self>) -> Searched {
+        let outcome = solved.outcome;
+        let objectives = outcome.objectives.iter();
+        let objectives = objectives.map(|o| with_unit(o.objective.words(), o.objective.unit()));
+        let (reached, front) = match (&outcome.front, &outcome.objectives[..]) {
+            (Some(front), _) => (front.reached.clone(), front.objectives.clone()),
+            (None, [only]) => (only.history.clone(), Vec::new()),
+            (None, _) => Default::default(),
+        };
+        Searched {
+            objectives: objectives.collect(),
+            reached,
+            front,
+        }
     }
 }

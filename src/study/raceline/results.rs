@@ -1,9 +1,11 @@
 //! What a racing-line study leaves behind: figures for people and scripts, lines, pictures.
 
 mod page;
+pub(super) mod sectors;
 mod setups;
 
 pub(super) use page::write as write_page;
+pub use sectors::SectorFigures;
 pub use setups::{ParameterWorth, SetupFigures, SetupsSummary};
 
 use super::{Outcome, Raceline, ReportedLine, Setup};
@@ -98,6 +100,9 @@ pub struct Summary {
     /// Set-ups of the car with their own fastest lines; `null` where none are asked for.
     #[serde(default)]
     pub setups: Option<SetupsSummary>,
+    /// The sectors of the best line, where it was looked for in several.
+    #[serde(default)]
+    pub sectors: Vec<SectorFigures>,
     /// Best lines on which the car is more than a centimetre beyond an edge, by the names of their objectives: only a study that
     /// was interrupted has any.
     pub off_road: Vec<String>,
@@ -140,6 +145,10 @@ pub(super) fn summarise(solved: &Solved<'_, Raceline>) -> Summary {
             .setups
             .as_ref()
             .map(|found| setups::summarise(found, settings.share)),
+        sectors: outcome
+            .objectives
+            .first()
+            .map_or_else(Vec::new, |o| sectors::of(settings, solved.prepared, &o.best)),
         off_road: objectives()
             .filter(|o| !o.best.clearance.is_on_road())
             .map(|o| o.objective.name().to_owned())
@@ -241,6 +250,9 @@ impl Summary {
                 "Least clearance of the best line by {name}: {:.3} m at {:.0} m\n",
                 line.clearance_m, line.clearance_station_m
             );
+        }
+        if let Some(words) = sectors::words(&self.sectors) {
+            text += &format!("{words}\n");
         }
         if let Some(volume) = self.hypervolume {
             text += &format!("Front of {} lines, hypervolume {volume:.4}\n", self.front_size);

@@ -86,6 +86,8 @@ settings! {
             "Pull towards the leader, as inertia is given";
         mutation: Option<Mutation> ["-"] = None, of(Mutated).search().example("0.95"),
             "Mutation with thesis: an exponent from 0 (none) to 10, random or polynomial; without it the algorithm's own";
+        sectors: usize ["-"] = 1, count(1, 1000).search(),
+            "Sectors of equally many cross-sections in which thesis looks for a line one after another, each from where the one before ends";
         groups: usize ["-"] = 12, count(1, 1_000_000).search(),
             "Groups of neighbouring cross-sections of the cooperative algorithm";
         population: usize ["-"] = 200, count(8, 10_000_000).search(),
@@ -115,6 +117,7 @@ settings! {
             let found = format!("{:?}", self.surface_sections);
             return Err(Error::input("the study", "surface_sections", found, "two different ones"));
         }
+        self.check_sectors()?;
         self.front_search().check(self.objectives.len(), self.population)?;
         let refused = match self.algorithm {
             LineAlgorithm::Thesis => Coefficients::default(),
@@ -159,6 +162,32 @@ impl RacelineSettings {
             return refuse("set-ups and another exponent", "an ellipse exponent of 2");
         }
         Ok(())
+    }
+
+    /// Refuses sectors where no line is looked for in them.
+    fn check_sectors(&self) -> Result<()> {
+        let refuse = |found: &str, expected: &str| {
+            let found = format!("{}, with {found}", self.sectors);
+            Err(Error::input("the study", "sectors", found, expected))
+        };
+        if self.sectors == 1 {
+            return Ok(());
+        }
+        if self.algorithm != LineAlgorithm::Thesis {
+            let found = format!("algorithm {}", self.algorithm.name());
+            return refuse(&found, "1, or algorithm thesis");
+        }
+        if self.section.is_some() {
+            return refuse("a section of the track", "1, or the whole track");
+        }
+        // A lap time would need the speed at which the sector before ends.
+        match self.objectives[..] {
+            [LineObjective::Length | LineObjective::Gamma | LineObjective::Kappa2] => Ok(()),
+            _ => refuse(
+                "other objectives",
+                "1, or one of the objectives length, gamma and kappa2",
+            ),
+        }
     }
 
     /// Whether the swarms start from the reference optima.

@@ -1,5 +1,6 @@
 //! The track, the car and lines as a study reports them.
 
+use super::results::sectors;
 use super::settings::RacelineSettings;
 use crate::config::settings::Settings;
 use crate::error::{Error, Result};
@@ -51,6 +52,7 @@ pub fn set_up(settings: &RacelineSettings) -> Result<Setup> {
     let track = Track::load(&settings.track)?;
     let few = track.cross_sections(&Spacing::equal(FEW), settings.as_surveyed)?;
     let sections = settings.sections_on(few.length_m);
+    sectors::check(settings, sections, TERMS)?;
     let road = track
         .cross_sections(&Spacing::equal(sections), settings.as_surveyed)?
         .with_smooth_reference(REFERENCE_M);

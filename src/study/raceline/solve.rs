@@ -11,6 +11,7 @@ use crate::line::Parametrisation;
 use crate::optimum::{OptimumLine, ReferenceSolvers, interruptible};
 use crate::study::framework::state_file::Origin;
 use crate::study::framework::{Progress, RunRecord, Watch, Work};
+use crate::swarm::Reached;
 use crate::swarm::metrics::nearest_to_ideal;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -118,7 +119,9 @@ pub(super) fn find_lines(work: Work<'_, Raceline>) -> Result<Outcome> {
                 swarm_cost: found.cost,
                 exact: exact.as_ref().map(|o| report(&o.alpha)).transpose()?,
                 exact_status: exact.map(|o| o.status.to_string()),
-                history: history.map(|row| (row.evaluations, row.best)).collect(),
+                history: history
+                    .map(|row| Reached::best(row.evaluations, row.elapsed_s, row.best))
+                    .collect(),
             });
             if work.interrupted {
                 // Nor are the solvers still at work waited for.

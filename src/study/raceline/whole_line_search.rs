@@ -6,10 +6,11 @@ use super::state::{LinesState, Running};
 use super::window_search::{FoundLine, LevelRow};
 use crate::error::{Error, Result};
 use crate::evaluate::line::{CpuLineEvaluator, LineObjective, LineProblem, open_line_evaluator};
-use crate::evaluate::{DeviceFaults, Evaluator, Losses};
+use crate::evaluate::{BackendInfo, DeviceFaults, Evaluator, Losses};
 use crate::line::Parametrisation;
 use crate::study::framework::Progress;
 use crate::swarm::{CooperativeSettings, CooperativeSwarm, Optimiser, Pso, PsoSettings, step};
+use crate::track::CrossSections;
 use serde::{Deserialize, Serialize};
 
 /// A swarm of whole lines.
@@ -23,6 +24,10 @@ pub(super) enum WholeLineSwarm {
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct WholeLineState {
     swarm: WholeLineSwarm,
+    /// `alpha` of the sectors that are done with.
+    before: Vec<f64>,
+    /// Lines that were evaluated in them.
+    spent: u64,
     history: Vec<LevelRow>,
     losses: Losses,
 }
@@ -49,6 +54,8 @@ impl WholeLineState {
         };
         Ok(Self {
             swarm,
+            before: Vec::new(),
+            spent: 0,
             history: Vec::new(),
             losses: Losses::default(),
         })
@@ -64,6 +71,22 @@ impl WholeLineSwarm {
     }
 }
 
+/// The cross-sections of the sector that follows those that are done with, of `alpha` `before`. It begins at the last one before,
+/// where the line is held: only the link from the last sector to the first belongs to none.
+fn next_sector(settings: &RacelineSettings, setup: &Setup, before: &[f64]) -> Result<CrossSections> {
+    let all = &setup.cross_sections;
+    let (n, first) = (all.len(), before.len());
+    let end = (1..=settings.sectors).map(|k| k * n / settings.sectors);
+    let end = end.into_iter().find(|end| *end > first).unwrap_or(n);
+    let Some(last) = before.last() else {
+        return all.stretch(0, end);
+    };
+    let held = all.right_m[first - 1].lerp(all.left_m[first - 1], *last);
+    let mut sector = all.stretch(first - 1, end - first + 1)?;
+    (sector.right_m[0], sector.left_m[0]) = (held, held);
+    Ok(sector)
+}
+
 /// The line that the settings' algorithm finds from a start at random.
 pub(super) fn search_whole_lines(
     settings: &RacelineSettings,
@@ -71,44 +94,101 @@ pub(super) fn search_whole_lines(
     objective: LineObjective,
     work: &mut Running<'_>,
 ) -> Result<FoundLine> {
-    let problem = setup.problem(Parametrisation::sections(), &[objective], settings)?;
-    let mut evaluator = open_line_evaluator(&problem, settings.backend, settings.adapter.as_deref())?;
-    let mut state = match work.state.whole_lines.take() {
-        Some(state) => *state,
-        None => WholeLineState::new(settings, &problem)?,
-    };
-    let mut faults = DeviceFaults::beyond(&work.state.device_faults(), evaluator.as_ref());
-    while !state.swarm.swarm().done() {
-        let progress = step(state.swarm.swarm(), evaluator.as_mut())?;
-        let losses = &mut state.losses;
-        losses.note(&progress.failures, &mut faults, evaluator.as_ref());
-        state.history.push(LevelRow {
-            controls: problem.dimensions(),
-            sections: setup.cross_sections.len(),
-            evaluations: progress.evaluations,
-            best: progress.best[0],
-            elapsed_s: work.elapsed_s(),
-        });
-        let best = format!("best {:.4} {}", progress.best[0], objective.unit());
-        let told = Progress::reached(objective.line_name(), progress.evaluations, best);
-        let update = |kept: &mut LinesState| kept.whole_lines = Some(Box::new(state.clone()));
-        if work.told(&told, update)?.is_break() {
-            break;
+    let whole = setup.problem(Parametrisation::sections(), &[objective], settings)?;
+    let problem_after = |before: &[f64]| -> Result<LineProblem> {
+        if settings.sectors == 1 {
+            return Ok(whole.clone());
         }
-    }
-    let swarm = state.swarm.swarm();
-    let front = swarm.front();
-    let Some(best) = front.candidates.first() else {
-        return Err(Error::Study(
-            "none of the lines that were tried could be evaluated".to_owned(),
-        ));
+        let sector = next_sector(settings, setup, before)?;
+        let car = Some(setup.car.clone());
+        LineProblem::new(
+            sector,
+            Parametrisation::sections(),
+            &[objective],
+            car,
+            settings.entry_mps,
+        )
     };
-    Ok(FoundLine {
-        alpha: problem.alpha(best),
-        cost: CpuLineEvaluator::new(&problem).evaluate(best)?.objectives[0],
-        evaluations: swarm.evaluations(),
-        history: state.history,
-        losses: state.losses,
-        backend: Some(evaluator.backend()),
-    })
+    let mut state = work.state.whole_lines.take().map(|state| *state);
+    loop {
+        let before = state.as_ref().map_or(&[][..], |state| &state.before);
+        let problem = problem_after(before)?;
+        let mut at_work = match state {
+            Some(state) => state,
+            None => WholeLineState::new(settings, &problem)?,
+        };
+        let (interrupted, backend) = at_work.search(&problem, settings, setup, objective, work)?;
+        let swarm = at_work.swarm.swarm();
+        let front = swarm.front();
+        let Some(best) = front.candidates.first() else {
+            return Err(Error::Study(
+                "none of the lines that were tried could be evaluated".to_owned(),
+            ));
+        };
+        let alpha = problem.alpha(best);
+        // A sector begins with the last cross-section of the one before.
+        let held = usize::from(!at_work.before.is_empty());
+        at_work.spent += swarm.evaluations();
+        at_work.before.extend_from_slice(&alpha[held..]);
+        let missing = setup.cross_sections.len() - at_work.before.len();
+        if interrupted || missing == 0 {
+            // Of an interrupted search there is a line all the same, for what is reported then.
+            at_work.before.extend(std::iter::repeat_n(0.5, missing));
+            let cost = CpuLineEvaluator::new(&whole)
+                .evaluate(&at_work.before)?
+                .objectives[0];
+            return Ok(FoundLine {
+                alpha: at_work.before,
+                cost,
+                evaluations: at_work.spent,
+                history: at_work.history,
+                losses: at_work.losses,
+                backend: Some(backend),
+            });
+        }
+        let next = problem_after(&at_work.before)?;
+        state = Some(WholeLineState {
+            swarm: WholeLineState::new(settings, &next)?.swarm,
+            ..at_work
+        });
+    }
+}
+
+impl WholeLineState {
+    /// Searches one sector to its end, or until it is interrupted; says which, and what evaluated.
+    fn search(
+        &mut self,
+        problem: &LineProblem,
+        settings: &RacelineSettings,
+        setup: &Setup,
+        objective: LineObjective,
+        work: &mut Running<'_>,
+    ) -> Result<(bool, BackendInfo)> {
+        let mut evaluator = open_line_evaluator(problem, settings.backend, settings.adapter.as_deref())?;
+        let mut faults = DeviceFaults::beyond(&work.state.device_faults(), evaluator.as_ref());
+        while !self.swarm.swarm().done() {
+            let progress = step(self.swarm.swarm(), evaluator.as_mut())?;
+            self.losses
+                .note(&progress.failures, &mut faults, evaluator.as_ref());
+            let evaluations = self.spent + progress.evaluations;
+            // What sectors cost by themselves makes no curve.
+            if settings.sectors == 1 {
+                self.history.push(LevelRow {
+                    controls: problem.dimensions(),
+                    sections: setup.cross_sections.len(),
+                    evaluations,
+                    best: progress.best[0],
+                    elapsed_s: work.elapsed_s(),
+                });
+            }
+            let best = format!("best {:.4} {}", progress.best[0], objective.unit());
+            let told = Progress::reached(objective.line_name(), evaluations, best);
+            let kept = &*self;
+            let update = |state: &mut LinesState| state.whole_lines = Some(Box::new(kept.clone()));
+            if work.told(&told, update)?.is_break() {
+                return Ok((true, evaluator.backend()));
+            }
+        }
+        Ok((false, evaluator.backend()))
+    }
 }

@@ -9,6 +9,8 @@ mod joint;
 mod page;
 mod results;
 mod rows;
+mod ways;
+mod words;
 
 pub use grid::{Point, SweepSettings};
 pub use results::{Group, Row, Summary, medians};
@@ -24,6 +26,7 @@ use crate::study::framework::state_file::StateFile;
 use crate::study::framework::{
     Entry, InputFiles, Manifest, Plan, Progress, Solved, Study, TIME_LIMIT, TimeLimit, write_json,
 };
+use cpu_time::ProcessTime;
 use std::collections::BTreeMap;
 use std::ops::{ControlFlow, Range};
 use std::path::{Path, PathBuf};
@@ -143,11 +146,12 @@ pub fn gather(settings: &SweepSettings, folder: &Path) -> Result<Summary> {
     let kept = work.rows_within(0..work.points.len())?;
     let failed_runs = rows::failures(kept.values());
     let finished = kept.into_values().filter(|kept| !kept.failed());
-    let rows: Vec<Row> = finished.map(|kept| kept.row).collect();
-    results::write_rows(folder, &rows)?;
-    let missing = work.points.len() - rows.len() - failed_runs.len();
-    let summary = Summary::new(rows, &settings.study.problems(&work)?, failed_runs, missing)?;
-    summary.write(folder, settings)?;
+    let mut finished: Vec<KeptRow> = finished.collect();
+    results::write_rows(folder, &finished)?;
+    let missing = work.points.len() - finished.len() - failed_runs.len();
+    joint::compare(&mut finished, &settings.study.problems(&work)?)?;
+    let summary = Summary::new(&finished, failed_runs, missing);
+    summary.write(folder, settings, &finished)?;
     Ok(summary)
 }
 
@@ -455,9 +459,10 @@ impl<S: Study> Together<S> {
         let _allowed = work.check(&kept, numbers[0])?;
         let state_files = numbers.iter().map(|number| work.state_file_of(*number));
         let mut state_files: Vec<StateFile> = state_files.collect();
-        let began = Instant::now();
+        let (began, processor) = (Instant::now(), ProcessTime::now());
         let found = S::solve_together(studies, prepared, &mut state_files, observe, stop);
         let found = found.map_err(|e| work.of_point(e, numbers[0]))?;
+        let processor_s = processor.elapsed().as_secs_f64();
         let mut ended = Ok(());
         for ((number, settings), outcome) in numbers.iter().zip(studies).zip(found) {
             let mut kept = work.empty_row(*number);
@@ -475,9 +480,11 @@ impl<S: Study> Together<S> {
                     kept.row
                         .device_faults
                         .clone_from(&S::record(&outcome).device_faults);
-                    kept.row.front = S::front(&outcome);
+                    kept.searched = S::searched(&solved);
+                    kept.row.front = std::mem::take(&mut kept.searched.front);
                     // Runs that go together end together.
                     kept.elapsed_s = S::record(&outcome).elapsed_s / numbers.len() as f64;
+                    kept.processor_elapsed_s = processor_s / numbers.len() as f64;
                     kept.log.clone_from(&kept.row.device_faults);
                     kept.log.extend(S::warnings(&summary));
                     if let Err(missed) = S::verdict(settings, &summary) {

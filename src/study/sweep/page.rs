@@ -1,15 +1,18 @@
-//! The report of a sweep: what the medians say, figure by figure.
+//! The report of a sweep: what the medians say, figure by figure, and what the searches reached by what they cost.
 
-use super::SweepSettings;
-use super::results::{Group, Spread, Summary};
+use super::results::{Group, NamedPart, Row, Spread, Summary};
+use super::ways::{Ways, times};
+use super::words::{is_detail, words};
+use super::{KeptRow, SweepSettings};
 use crate::error::Result;
-use crate::report::{BarPanel, Bars, HtmlReport, significant};
+use crate::report::{BarPanel, Bars, HtmlReport, significant, with_unit};
+use crate::swarm::comparison::quartiles;
 use std::path::Path;
 
-/// Settings that bars are drawn of: more are a wall, and stand in the table.
+/// Settings that strips are drawn of: more are a wall, and stand in the table.
 const DRAWN: usize = 40;
-/// Least of the figures as a share of the greatest, above which they are alike.
-const ALIKE: f64 = 0.7;
+/// Settings whose searches are drawn beside one another: as many as there are colours.
+const COMPARED: usize = 7;
 /// Figures of which more is better; of all others but counts less is.
 const MORE_IS_BETTER: [&str; 3] = ["hypervolume", "hypervolume_share", "front_size"];
 /// Figures that say what a run took, and not how good it is.
@@ -54,6 +57,7 @@ fn figures(summary: &Summary) -> Vec<&str> {
         .groups
         .iter()
         .flat_map(|g| g.figures.keys().map(String::as_str))
+        .filter(|name| !is_detail(name))
         .collect();
     names.sort_unstable();
     names.dedup();
@@ -89,35 +93,109 @@ fn short_name(group: &Group) -> String {
     }
 }
 
-/// The bars of a figure; nothing for one that is the same in all runs.
+/// All runs of every setting and their quartiles; nothing for a figure that is the same in all runs, or that is told of none.
 fn panel(summary: &Summary, figure: &str) -> Option<BarPanel> {
     let groups = ranked(summary, figure);
     let shown = &groups[..groups.len().min(DRAWN)];
-    let ends = || {
-        shown
-            .iter()
-            .flat_map(|(_, s)| [s.lower_quartile, s.upper_quartile])
+    let singles = |group: &Group| -> Vec<f64> {
+        let own = summary.rows.iter().filter(|row| is_of(row, group));
+        own.filter_map(|row| row.figures.get(figure).copied().flatten())
+            .collect()
     };
-    let least = ends().fold(f64::INFINITY, f64::min);
-    let most = ends().fold(f64::NEG_INFINITY, f64::max);
-    if most <= least {
+    let singles: Vec<Vec<f64>> = shown.iter().map(|(group, _)| singles(group)).collect();
+    let all = || singles.iter().flatten().copied();
+    if all().fold(f64::NEG_INFINITY, f64::max) <= all().fold(f64::INFINITY, f64::min) {
         return None;
     }
-    // Bars begin at zero; where all are nearly as long, the part above the least is what matters.
-    let (from, x_label) = if least > ALIKE * most {
-        (least, format!("{figure} above {}", significant(least, 6)))
-    } else {
-        (0.0, figure.to_owned())
-    };
-    let medians = shown.iter().map(|(_, s)| s.median - from);
-    let quartiles = shown
+    let quartiles: Vec<[f64; 3]> = shown
         .iter()
-        .map(|(_, s)| [s.lower_quartile - from, s.upper_quartile - from]);
+        .map(|(_, s)| [s.lower_quartile, s.median, s.upper_quartile])
+        .collect();
     let names = shown.iter().map(|(g, _)| short_name(g));
-    Some(BarPanel::new(figure, x_label, names).with_intervals("", medians, quartiles))
+    let (name, unit) = words(figure);
+    Some(BarPanel::new(&*name, with_unit(&name, unit), names).strips(singles, &quartiles))
 }
 
-pub(super) fn write(folder: &Path, summary: &Summary, settings: &SweepSettings) -> Result<()> {
+/// Whether a run is one of a group.
+fn is_of(row: &Row, group: &Group) -> bool {
+    let rest = row.settings.iter().filter(|(key, _)| *key != "seed");
+    rest.eq(group.settings.iter())
+}
+
+/// The searches of the runs beside one another: what they had reached by what it cost, and where they came to.
+fn searches(page: &mut HtmlReport, folder: &Path, summary: &Summary, kept: &[KeptRow]) -> Result<()> {
+    let mut all: Vec<&[String]> = Vec::new();
+    for kept in kept {
+        let objectives = &*kept.searched.objectives;
+        if !kept.searched.reached.is_empty() && !all.contains(&objectives) {
+            all.push(objectives);
+        }
+    }
+    for (number, objectives) in all.iter().enumerate() {
+        let own = |group: &Group| -> Vec<&KeptRow> {
+            let own = kept.iter().filter(|kept| is_of(&kept.row, group));
+            own.filter(|kept| kept.searched.objectives == *objectives)
+                .collect()
+        };
+        let fronts = objectives.len() > 1;
+        let last = |kept: &&KeptRow| kept.searched.reached.last().and_then(|reached| reached.best);
+        let mut ways: Vec<(f64, Ways<'_>)> = summary
+            .groups
+            .iter()
+            .map(|group| {
+                let runs = own(group);
+                let reached: Vec<f64> = runs.iter().filter_map(last).collect();
+                let name = short_name(group);
+                (quartiles(&reached)[1], Ways { name, runs })
+            })
+            .filter(|(_, ways)| !ways.runs.is_empty())
+            .collect();
+        ways.sort_by(|(a, _), (b, _)| if fronts { b.total_cmp(a) } else { a.total_cmp(b) });
+        let settings = ways.len();
+        let ways: Vec<Ways<'_>> = ways.into_iter().take(COMPARED).map(|(_, ways)| ways).collect();
+        let most = if settings > COMPARED {
+            format!(" The best {COMPARED} of {settings} settings are drawn.")
+        } else {
+            String::new()
+        };
+        let (label, what) = if fronts {
+            let what = "The hypervolume of the swarm's front, as a share of that of the front that all swarms end with";
+            ("hypervolume, share of all swarms'".to_owned(), what)
+        } else {
+            let only = objectives.first().cloned().unwrap_or_default();
+            (only, "The best that the swarm had found")
+        };
+        let figure = super::ways::figure(&ways, &label);
+        // Files of one name for the only objectives, and else with their number.
+        let named = |stem: &str| match number {
+            0 => folder.join(format!("{stem}.svg")),
+            _ => folder.join(format!("{stem}_{}.svg", number + 1)),
+        };
+        if !figure.is_empty() {
+            page.section(
+                "What was reached by what it cost",
+                &format!("{what}: the median over the seeds, and a band between the quartiles.{most}"),
+            );
+            page.figure(named("convergence"), &figure)?;
+        }
+        let over = super::ways::fronts(&ways, objectives);
+        if !over.is_empty() {
+            page.section(
+                "Fronts over one another",
+                &format!("The members of all seeds.{most}"),
+            );
+            page.figure(named("fronts"), &over)?;
+        }
+    }
+    Ok(())
+}
+
+pub(super) fn write(
+    folder: &Path,
+    summary: &Summary,
+    settings: &SweepSettings,
+    kept: &[KeptRow],
+) -> Result<()> {
     let study = settings.study.name();
     let (runs, groups) = (summary.rows.len(), summary.groups.len());
     let axes = settings.keys();
@@ -146,23 +224,24 @@ pub(super) fn write(folder: &Path, summary: &Summary, settings: &SweepSettings) 
         } else {
             "least"
         };
+        let (name, unit) = words(figure);
+        let value = |figure: f64| format!("{} {unit}", significant(figure, 4)).trim_end().to_owned();
         page.tile(
-            &format!("{figure}, {best_words} median"),
+            &format!("{name}, {best_words} median"),
             significant(spread.median, 4),
-            "",
+            unit,
         );
-        let quartiles = [spread.lower_quartile, spread.upper_quartile].map(|v| significant(v, 4));
         let mut sentence = format!(
-            "The {best_words} median of {figure} is {} (half of the runs between {} and {}), with {}",
-            significant(spread.median, 4),
-            quartiles[0],
-            quartiles[1],
+            "The {best_words} median of the {name} is {} (half of the runs between {} and {}), with {}",
+            value(spread.median),
+            value(spread.lower_quartile),
+            value(spread.upper_quartile),
             name_of(best)
         );
         if all.len() > 1 {
             sentence += &format!(
                 "; at the other end is {} with {}",
-                significant(last.median, 4),
+                value(last.median),
                 name_of(worst)
             );
         }
@@ -173,10 +252,12 @@ pub(super) fn write(folder: &Path, summary: &Summary, settings: &SweepSettings) 
         .first()
         .map(|g| g.settings.keys().cloned().collect::<Vec<_>>());
     let order = keys.unwrap_or_default().join(" / ");
+    searches(&mut page, folder, summary, kept)?;
     page.section(
-        "Medians",
+        "Runs of every setting",
         &format!(
-            "Over the seeds of each setting ({order}), with quartiles as whiskers. The best stands on top."
+            "A dot is a run. The median over the seeds of each setting ({order}) is marked, with quartiles as whiskers. The best \
+             stands on top."
         ),
     );
     if groups > DRAWN {
@@ -187,20 +268,27 @@ pub(super) fn write(folder: &Path, summary: &Summary, settings: &SweepSettings) 
     let panels = figures(summary)
         .into_iter()
         .filter_map(|figure| panel(summary, figure));
-    let bars = Bars::new(
-        format!("Medians over the seeds, with quartiles, by {order}"),
-        panels,
-    );
-    if !bars.is_empty() {
-        page.figure(folder.join("medians.svg"), &bars)?;
+    let strips = Bars::new(format!("Every run, medians and quartiles, by {order}"), panels);
+    if !strips.is_empty() {
+        page.figure(folder.join("medians.svg"), &strips)?;
     }
-    let medians = summary.median_table(&[
+    let parts: [NamedPart; 3] = [
         ("", |s| s.median),
         (", quartile below", |s| s.lower_quartile),
         (", quartile above", |s| s.upper_quartile),
-    ]);
+    ];
+    let medians = summary.median_table(&parts, |name| !is_detail(name), words);
     page.table("Every setting", "", &medians)?;
-    page.folded_table("Every run", "", &summary.row_table())?;
+    let has_details = summary
+        .groups
+        .iter()
+        .any(|g| g.figures.keys().any(|name| is_detail(name)));
+    if has_details {
+        let details = summary.median_table(&parts[..1], is_detail, words);
+        page.folded_table("Parameters and errors of every setting, medians", "", &details)?;
+    }
+    page.folded_table("Every run", "", &summary.row_table(words))?;
+    page.folded_table("What every run took", "", &times(kept).table())?;
     page.provenance("study", study);
     page.provenance("runs", runs.to_string());
     page.settings("sweep.toml, which repeats this sweep", settings.text());

@@ -1,6 +1,7 @@
 //! Rows of a sweep, and medians over its seeds.
 
-use super::SweepSettings;
+use super::words::is_detail;
+use super::{KeptRow, SweepSettings};
 use crate::error::Result;
 use crate::files::run_folder::SUMMARY;
 use crate::files::write_whole_by;
@@ -141,10 +142,10 @@ pub fn medians(rows: &[Row]) -> Vec<Group> {
 }
 
 /// Writes all rows into one file, one JSON object per line.
-pub(super) fn write_rows(folder: &Path, rows: &[Row]) -> Result<()> {
+pub(super) fn write_rows(folder: &Path, kept: &[KeptRow]) -> Result<()> {
     write_whole_by(folder.join(ROWS), |file| {
         let mut file = BufWriter::new(file);
-        for row in rows {
+        for KeptRow { row, .. } in kept {
             serde_json::to_writer(&mut file, row)?;
             file.write_all(b"\n")?;
         }
@@ -153,18 +154,17 @@ pub(super) fn write_rows(folder: &Path, rows: &[Row]) -> Result<()> {
 }
 
 impl Summary {
-    /// The figures of these rows; `problems` says of each point which problem it is of.
-    pub(super) fn new(
-        mut rows: Vec<Row>,
-        problems: &[usize],
-        failed_runs: Vec<String>,
-        missing_runs: usize,
-    ) -> Result<Self> {
-        super::joint::compare(&mut rows, problems)?;
-        for row in &mut rows {
-            row.front.clear();
-        }
-        Ok(Self {
+    /// The figures of these rows, whose fronts stay theirs.
+    pub(super) fn new(kept: &[KeptRow], failed_runs: Vec<String>, missing_runs: usize) -> Self {
+        let without_front = |kept: &KeptRow| Row {
+            run: kept.row.run,
+            settings: kept.row.settings.clone(),
+            figures: kept.row.figures.clone(),
+            device_faults: kept.row.device_faults.clone(),
+            front: Vec::new(),
+        };
+        let rows: Vec<Row> = kept.iter().map(without_front).collect();
+        Self {
             study: "sweep",
             groups: medians(&rows),
             device_faults: faults_by_run(&rows),
@@ -172,14 +172,14 @@ impl Summary {
             missing_runs,
             ended_by: None,
             rows,
-        })
+        }
     }
 
     /// The medians as a table.
     pub fn to_text(&self) -> String {
         let mut text = String::new();
         if !self.groups.is_empty() {
-            let medians = self.median_table(&[("", |s| s.median)]);
+            let medians = self.median_table(&[("", |s| s.median)], |name| !is_detail(name), as_named);
             text += &format!("Medians over the seeds\n{}", medians.to_text());
         }
         if self.missing_runs > 0 {
@@ -195,52 +195,77 @@ impl Summary {
         text
     }
 
-    /// Settings and figures of every run.
-    pub(super) fn row_table(&self) -> Table<'static> {
+    /// Settings and figures of every run, the figures called by `head`.
+    pub(super) fn row_table(&self, head: Head) -> Table<'static> {
         let table = with_settings(&self.rows, |r| &r.settings);
         // Rows of other objectives have other figures.
         let names: BTreeSet<&String> = self.rows.iter().flat_map(|r| r.figures.keys()).collect();
         let table = names.into_iter().fold(table, |table, name| {
-            table.number(name, "", |r| r.figures.get(name).copied().flatten())
+            let (words, unit) = head(name);
+            table.number(words, unit, |r| r.figures.get(name).copied().flatten())
         });
         table.table()
     }
 
-    /// Settings of every group and these parts of each of its figures, with endings of their names.
-    pub(super) fn median_table(&self, of: &[NamedPart]) -> Table<'static> {
+    /// Settings of every group and these parts of each of the figures that are `wanted`, called by `head` with endings of their
+    /// names.
+    pub(super) fn median_table(
+        &self,
+        of: &[NamedPart],
+        wanted: impl Fn(&str) -> bool,
+        head: Head,
+    ) -> Table<'static> {
         let mut table = with_settings(&self.groups, |g| &g.settings);
         let names: BTreeSet<&String> = self.groups.iter().flat_map(|g| g.figures.keys()).collect();
-        for name in names {
+        for name in names.into_iter().filter(|name| wanted(name)) {
             for (ending, part) in of {
-                table = table.number(format!("{name}{ending}"), "", |g| g.figures.get(name).map(part));
+                let (words, unit) = head(name);
+                table = table.number(format!("{words}{ending}"), unit, |g| {
+                    g.figures.get(name).map(part)
+                });
             }
         }
         table.table()
     }
 
-    /// Writes `sweep` and `medians` as CSV and as Parquet, `summary.json`, the figure `medians.svg` and `report.html`.
+    /// Writes `sweep` and `medians` as CSV and as Parquet, `convergence.csv` and `times.csv`, `summary.json`, pictures and
+    /// `report.html`.
     ///
     /// # Errors
     /// [`Error::Io`] if a file cannot be written.
-    pub(super) fn write(&self, folder: &Path, settings: &SweepSettings) -> Result<()> {
+    pub(super) fn write(&self, folder: &Path, settings: &SweepSettings, kept: &[KeptRow]) -> Result<()> {
         write_json(&folder.join(SUMMARY), self)?;
         if self.rows.is_empty() {
             return Ok(());
         }
-        let rows = self.row_table();
+        let rows = self.row_table(as_named);
         rows.write_csv(folder.join("sweep.csv"))?;
         #[cfg(feature = "parquet")]
         rows.write_parquet(folder.join("sweep.parquet"))?;
-        let medians = self.median_table(&[
+        let parts: [NamedPart; 3] = [
             ("_lower_quartile", |s| s.lower_quartile),
             ("_median", |s| s.median),
             ("_upper_quartile", |s| s.upper_quartile),
-        ]);
+        ];
+        let medians = self.median_table(&parts, |_| true, as_named);
         medians.write_csv(folder.join("medians.csv"))?;
         #[cfg(feature = "parquet")]
         medians.write_parquet(folder.join("medians.parquet"))?;
-        super::page::write(folder, self, settings)
+        // What the clock says differs from run to run, and stands apart from the figures.
+        super::ways::write(&folder.join("convergence.csv"), kept)?;
+        super::ways::times(kept)
+            .table()
+            .write_csv(folder.join("times.csv"))?;
+        super::page::write(folder, self, settings, kept)
     }
+}
+
+/// What a figure is called in a table, and its unit.
+pub(super) type Head = fn(&str) -> (String, &'static str);
+
+/// Figures as files call them, with the unit in the name.
+fn as_named(figure: &str) -> (String, &'static str) {
+    (figure.to_owned(), "")
 }
 
 /// A part of a spread, and how the names of its columns end.

@@ -7,7 +7,7 @@ use crate::error::{Error, Result};
 use crate::evaluate::portions::Allowance;
 use crate::files::lock::LockFile;
 use crate::study::framework::state_file::StateFile;
-use crate::study::framework::{Progress, write_json};
+use crate::study::framework::{Progress, Searched, write_json};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::ops::{ControlFlow, Range};
@@ -20,7 +20,7 @@ use std::time::Duration;
 const ROWS: &str = "rows";
 
 /// A row as it is kept, with how its run went.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct KeptRow {
     /// What goes into the tables; without figures where the run came to none.
     #[serde(flatten)]
@@ -31,6 +31,12 @@ pub struct KeptRow {
     pub machine: String,
     /// Time that it took (s); runs that go together have an equal share of theirs.
     pub elapsed_s: f64,
+    /// Processor time of all threads (s), likewise.
+    #[serde(default)]
+    pub processor_elapsed_s: f64,
+    /// Its search, but for the front, which is the row's.
+    #[serde(default)]
+    pub searched: Searched,
     /// What it had to tell, and why it failed if it did.
     pub log: Vec<String>,
 }
@@ -142,7 +148,7 @@ impl<'a> Work<'a> {
                     .points
                     .get(number)
                     .is_some_and(|p| p.settings == row.settings)
-                && row.front.iter().all(|point| point.len() == row.front[0].len())
+                && has_whole_fronts(kept)
         };
         let found = || text.chars().take(60).collect::<String>();
         let kept = kept.filter(own);
@@ -173,6 +179,8 @@ impl<'a> Work<'a> {
             exit_code: 0,
             machine: machine(),
             elapsed_s: 0.0,
+            processor_elapsed_s: 0.0,
+            searched: Searched::default(),
             log: Vec::new(),
         }
     }
@@ -208,6 +216,17 @@ impl<'a> Work<'a> {
     pub(super) fn check(&self, kept: &[super::MemoryItem], number: usize) -> Result<Allowance> {
         super::memory::check(kept, self.memory_limit_mib).map_err(|e| self.of_point(e, number))
     }
+}
+
+/// Whether all members of a row's fronts, at its end and on its way, have as many costs as there are objectives.
+fn has_whole_fronts(kept: &KeptRow) -> bool {
+    let Some(first) = kept.row.front.first() else {
+        return true;
+    };
+    let reached = kept.searched.reached.iter().map(|reached| &reached.front);
+    let mut members = std::iter::once(&kept.row.front).chain(reached).flatten();
+    let named = kept.searched.objectives.len();
+    (named == 0 || named == first.len()) && members.all(|member| member.len() == first.len())
 }
 
 /// Failures as a summary tells them.

@@ -1,7 +1,7 @@
-// Horizontal bars with intervals, and parameters within their bounds.
+// Horizontal bars with intervals, strips of single values, and parameters within their bounds.
 
-// A line with ends from `low` to `high` at the height of a row.
-function whisker(api, low, high, row, colour, offset = 0) {
+// A line with ends from `low` to `high` at the height of a row, and a mark in it if there is a median.
+function whisker(api, low, high, row, colour, offset = 0, median = null) {
   const [x0, y] = api.coord([low, row]);
   const [x1] = api.coord([high, row]);
   const at = y + offset;
@@ -12,12 +12,21 @@ function whisker(api, low, high, row, colour, offset = 0) {
   });
   return {
     type: "group",
-    children: [line(x0, at, x1, at), line(x0, at - 4, x0, at + 4), line(x1, at - 4, x1, at + 4)],
+    children: [
+      line(x0, at, x1, at),
+      line(x0, at - 4, x0, at + 4),
+      line(x1, at - 4, x1, at + 4),
+      ...(median === null
+        ? []
+        : [{ type: "circle", shape: { cx: api.coord([median, row])[0], cy: at, r: 4 }, style: { fill: colour } }]),
+    ],
   };
 }
 
 draw.bars = (place, data) => {
   const { series, categories } = data;
+  const isStrip = (s) => s.singles.length > 0;
+  const strips = series.every(isStrip);
   const value = (s, row) => {
     const interval = s.interval
       ? ` (${number(s.interval[0][row], 3)} to ${number(s.interval[1][row], 3)})`
@@ -28,7 +37,7 @@ draw.bars = (place, data) => {
     const t = theme();
     return {
       grid: { left: 10, right: 30, top: 26, bottom: series.length > 1 ? 74 : 50, containLabel: true },
-      xAxis: axis(data.value_label, { scale: false }),
+      xAxis: axis(data.value_label, { scale: strips, type: data.scale === "log" ? "log" : "value" }),
       yAxis: {
         type: "category",
         data: categories,
@@ -39,23 +48,46 @@ draw.bars = (place, data) => {
       },
       legend: legend(series.length > 1 ? series.map((s) => s.name) : []),
       toolbox: { ...toolbox({}), feature: { saveAsImage: toolbox({}).feature.saveAsImage } },
-      tooltip: tooltip({
-        trigger: "axis",
-        axisPointer: { type: "shadow" },
-        formatter: (items) =>
-          tip(
-            categories[items[0].dataIndex],
-            series.map((s, i) => [seriesColour(i), s.name || data.value_label, value(s, items[0].dataIndex)]),
-          ),
-      }),
+      tooltip: tooltip(
+        strips
+          ? {
+              trigger: "item",
+              formatter: ({ value: [single, row], color }) =>
+                tip(categories[row], [
+                  [color, data.value_label, number(single, 5)],
+                  ["transparent", "median (quartiles)", value(series[0], row)],
+                ]),
+            }
+          : {
+              trigger: "axis",
+              axisPointer: { type: "shadow" },
+              formatter: (items) =>
+                tip(
+                  categories[items[0].dataIndex],
+                  series.map((s, i) => [
+                    seriesColour(i),
+                    s.name || data.value_label,
+                    value(s, items[0].dataIndex),
+                  ]),
+                ),
+            },
+      ),
       series: series.flatMap((s, i) => [
-        {
-          name: s.name,
-          type: "bar",
-          data: s.values,
-          itemStyle: { color: seriesColour(i), opacity: 0.85 },
-          barMaxWidth: 16,
-        },
+        isStrip(s)
+          ? {
+              name: s.name,
+              type: "scatter",
+              data: s.singles.flatMap((values, row) => values.map((v) => [v, row])),
+              symbolSize: 8,
+              itemStyle: { color: seriesColour(i), opacity: 0.55 },
+            }
+          : {
+              name: s.name,
+              type: "bar",
+              data: s.values,
+              itemStyle: { color: seriesColour(i), opacity: 0.85 },
+              barMaxWidth: 16,
+            },
         ...(s.interval
           ? [
               {
@@ -68,11 +100,11 @@ draw.bars = (place, data) => {
                 encode: { x: [0, 1], y: 2 },
                 renderItem: (params, api) => {
                   const row = params.dataIndex;
-                  const layout = api.barLayout({ barMaxWidth: 16, count: series.length })[i];
                   const [low, high] = [s.interval[0][row], s.interval[1][row]];
-                  return low === null || high === null
-                    ? null
-                    : whisker(api, low, high, row, t.ink, layout.offsetCenter);
+                  if (low === null || high === null) return null;
+                  if (strips) return whisker(api, low, high, row, t.ink, 0, s.values[row]);
+                  const layout = api.barLayout({ barMaxWidth: 16, count: series.length })[i];
+                  return whisker(api, low, high, row, t.ink, layout.offsetCenter);
                 },
               },
             ]

@@ -22,7 +22,30 @@ draw.curves = (place, data) => {
   // A curve of gaps is dots.
   const isDots = (curve) => curve.y.every((y, k) => y === null || k === 0 || curve.y[k - 1] === null);
   const rows = (items) =>
-    items.map((p) => [p.color, curves[p.seriesIndex].label || data.y_label, number(p.value[1], 5)]);
+    items
+      .filter((p) => p.seriesIndex < curves.length)
+      .map((p) => [p.color, curves[p.seriesIndex].label || data.y_label, number(p.value[1], 5)]);
+  const area = (curve, fill) => {
+    const [below, above] = curve.band;
+    const drawable = (v) => v !== null && (data.y_scale !== "log" || v > 0);
+    const seen = curve.x.map((x, k) => k).filter((k) => drawable(below[k]) && drawable(above[k]));
+    return {
+      name: curve.label,
+      type: "custom",
+      silent: true,
+      z: 1,
+      clip: true,
+      // All of it goes into the axes' ranges; the first point draws it.
+      data: seen.flatMap((k) => [below, above].map((side) => [curve.x[k], side[k]])),
+      tooltip: { show: false },
+      renderItem: (params, api) => {
+        if (params.dataIndex > 0) return null;
+        const along = (side, order) => order.map((k) => api.coord([curve.x[k], side[k]]));
+        const points = [...along(below, seen), ...along(above, [...seen].reverse())];
+        return { type: "polygon", shape: { points }, style: { fill, opacity: 0.16 } };
+      },
+    };
+  };
   const option = () => ({
     grid: { left: 74, right: 20, top: 26, bottom: labels.length ? 74 : 46 },
     xAxis: axis(data.x_label, { type: data.x_scale === "log" ? "log" : "value" }),
@@ -53,28 +76,32 @@ draw.curves = (place, data) => {
       moveOnMouseWheel: false,
       filterMode: "none",
     })),
-    series: curves.map((curve, i) => ({
-      name: curve.label,
-      type: "line",
-      data: points(curve),
-      showSymbol: isDots(curve),
-      showAllSymbol: isDots(curve),
-      symbol: "circle",
-      symbolSize: overX ? 5 : 4,
-      lineStyle: { color: colour(curve, i), width: 1.8 },
-      itemStyle: { color: colour(curve, i) },
-      triggerLineEvent: !overX,
-      // Points that show under the mouse only are what the mouse finds.
-      ...(overX
-        ? {}
-        : {
-            showSymbol: true,
-            showAllSymbol: true,
-            symbolSize: 6,
-            itemStyle: { color: colour(curve, i), opacity: isDots(curve) ? 1 : 0 },
-            emphasis: { itemStyle: { opacity: 1 } },
-          }),
-    })),
+    series: [
+      ...curves.map((curve, i) => ({
+        name: curve.label,
+        type: "line",
+        data: points(curve),
+        showSymbol: isDots(curve),
+        showAllSymbol: isDots(curve),
+        symbol: "circle",
+        symbolSize: overX ? 5 : 4,
+        lineStyle: { color: colour(curve, i), width: 1.8 },
+        itemStyle: { color: colour(curve, i) },
+        triggerLineEvent: !overX,
+        // Points that show under the mouse only are what the mouse finds.
+        ...(overX
+          ? {}
+          : {
+              showSymbol: true,
+              showAllSymbol: true,
+              symbolSize: 6,
+              itemStyle: { color: colour(curve, i), opacity: isDots(curve) ? 1 : 0 },
+              emphasis: { itemStyle: { opacity: 1 } },
+            }),
+      })),
+      // Behind the curves, and after them: what the mouse finds counts them from the first.
+      ...curves.flatMap((curve, i) => (curve.band ? [area(curve, colour(curve, i))] : [])),
+    ],
   });
   const chart = mount(place, 360, option, dragToZoom);
   doubleClickResets(chart);

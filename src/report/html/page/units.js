@@ -45,7 +45,10 @@ function curvesInEngineers(data) {
     const [label, factor] = relabelled(data[`${axis}_label`]);
     data[`${axis}_label`] = label;
     if (factor === 1) continue;
-    for (const curve of data.curves) curve[axis] = scaled(curve[axis], factor);
+    for (const curve of data.curves) {
+      curve[axis] = scaled(curve[axis], factor);
+      if (axis === "y" && curve.band) curve.band = curve.band.map((side) => scaled(side, factor));
+    }
     if (axis === "y" && data.y_range) data.y_range = scaled(data.y_range, factor);
   }
 }

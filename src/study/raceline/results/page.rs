@@ -1,6 +1,6 @@
 //! The figures of a racing-line study and its interactive report.
 
-use super::{LineFigures, Summary, reported_lines, setups};
+use super::{LineFigures, Summary, reported_lines, sectors, setups};
 use crate::config::settings::Settings;
 use crate::error::Result;
 use crate::evaluate::BackendChoice;
@@ -69,6 +69,7 @@ pub fn write(folder: &Path, solved: &Solved<'_, Raceline>, summary: &Summary) ->
          included, to the edges.",
         &lines_table(summary),
     )?;
+    sectors::place(&mut page, &summary.sectors)?;
     if let (Some(found), Some(figures)) = (&outcome.setups, &summary.setups) {
         setups::report(&mut page, folder, found, figures)?;
     }
@@ -78,7 +79,12 @@ pub fn write(folder: &Path, solved: &Solved<'_, Raceline>, summary: &Summary) ->
         Panel::new(&*o.best.name)
             .x("lines evaluated", "")
             .y(o.objective.words(), o.objective.unit())
-            .points("", o.history.iter().map(|(n, best)| (*n as f64, *best)))
+            .points(
+                "",
+                o.history
+                    .iter()
+                    .map(|row| (row.evaluations as f64, row.best.unwrap_or(f64::NAN))),
+            )
     });
     let convergence = Curves::new("Convergence of the swarms", panels);
     if !convergence.is_empty() {
