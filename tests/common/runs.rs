@@ -243,7 +243,8 @@ pub fn results(folder: &Path) -> BTreeMap<String, Vec<u8>> {
                 continue;
             }
             let mut bytes = std::fs::read(&path).expect("a file");
-            if name == "traces.svg" || name.contains("convergence") && extension != "csv" {
+            let of_the_clock = ["traces.svg", "times.csv"].contains(&&*name);
+            if of_the_clock || name.contains("convergence") && extension != "csv" {
                 continue;
             }
             if name.contains("convergence") {
